@@ -1,0 +1,45 @@
+#include <cstdio>
+#include <exception>
+
+#include "commands.h"
+#include "esim/core/error.h"
+
+int main(int argc, char** argv) {
+  using namespace esim::app;
+  CLI::App app{"An open event-camera simulator.", "esim"};
+  app.set_version_flag("--version", ESIM_VERSION);
+  app.require_subcommand(1);
+  app.footer(
+      "Examples:\n"
+      "  esim simulate scenes/room.yaml --out out/room     simulate; then look at out/room/preview.png\n"
+      "  esim simulate scenes/room.yaml --out out/low --set event_camera.contrast_threshold=0.2\n"
+      "  esim check scenes/room.yaml                       is the scenario right? nothing is written\n"
+      "  esim info out/room                                what a recording holds\n"
+      "  esim options                                      every option of a scenario\n"
+      "\n"
+      "Exit status: 0 done, 1 a defect of esim, 2 something for you to repair, 130 interrupted.");
+
+  int exit_code = kOk;
+  add_simulate(app, exit_code);
+  add_check(app, exit_code);
+  add_info(app, exit_code);
+  add_options(app, exit_code);
+  try {
+    app.parse(argc, argv);
+    return exit_code;
+  } catch (const CLI::Success& success) {
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "esim: %s (see esim --help)\n", error.what());
+    return kUsersFault;
+  } catch (const esim::UserError& error) {
+    std::fprintf(stderr, "esim: %s\n", error.what());
+    return kUsersFault;
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "esim: out of memory; use smaller images, a smaller scene, or a machine with more memory\n");
+    return kUsersFault;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "esim: internal error: %s; please report it with the command that led to it\n", error.what());
+    return kOurFault;
+  }
+}

@@ -1,0 +1,116 @@
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <atomic>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+
+#include "commands.h"
+#include "esim/compose/compose.h"
+#include "esim/core/error.h"
+#include "esim/record/recording_directory.h"
+#include "esim/scenario/read.h"
+#include "progress_bar.h"
+
+namespace esim::app {
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+void on_signal(int) { interrupted = 1; }
+
+struct Arguments {
+  std::string scenario;
+  std::string out;
+  std::vector<std::string> overrides;
+  std::optional<std::uint64_t> seed;
+  int threads = 0;
+  bool quiet = false;
+  bool force = false;
+};
+
+void write_text(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw OutputError(fmt::format("{}: cannot be written; is the disk full?", path.string()));
+}
+
+void print_summary(const Summary& summary, const std::filesystem::path& out, bool preview) {
+  std::int64_t events = 0, samples = 0;
+  for (const CameraSummary& camera : summary.cameras) {
+    events += camera.events_on + camera.events_off;
+    samples += camera.sampling.samples;
+  }
+  const double simulated_s = to_seconds(summary.end - summary.start);
+  fmt::print(stderr, "{}: {:.3f} s simulated in {:.1f} s ({:.2f}x real time), {} samples, {} events\n",
+             summary.complete ? "done" : "interrupted", simulated_s, summary.wall_seconds,
+             simulated_s / summary.wall_seconds, samples, events);
+  fmt::print(stderr, "recording: {}\n", out.string());
+  if (preview) fmt::print(stderr, "look at:   {}\n", (out / "preview.png").string());
+}
+
+int run(const Arguments& arguments) {
+  Scenario scenario = read_scenario(arguments.scenario, arguments.overrides);
+  if (arguments.seed) scenario.seed = *arguments.seed;
+  Notices notices;
+  notices.warning = [](const std::string& text) { fmt::print(stderr, "warning: {}\n", text); };
+  notices.note = [&](const std::string& text) {
+    if (!arguments.quiet) fmt::print(stderr, "{}\n", text);
+  };
+  const std::filesystem::path out =
+      arguments.out.empty() ? std::filesystem::path("out") / std::filesystem::path(arguments.scenario).stem()
+                            : std::filesystem::path(arguments.out);
+
+  // The directory comes first: finding out that it exists should not take loading a scene.
+  RecordingDirectory directory(out, arguments.force);
+  World world = build_world(scenario, arguments.threads, notices);
+  write_text(directory.path() / "scenario.yaml", write_scenario(scenario));
+  const std::unique_ptr<Sink> sink = build_sink(scenario, directory.path());
+
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  ProgressBar bar(!arguments.quiet);
+  const Summary summary = simulate(world, *sink, [&](const Progress& progress) {
+    bar.show(progress);
+    return interrupted == 0;
+  });
+  bar.clear();
+  directory.finish(report_json(scenario, summary, world.workers->threads()));
+  if (!arguments.quiet)
+    print_summary(summary, out, scenario.output.preview && scenario.truth.rate_hz > 0 && scenario.cameras.size() == 1);
+  return summary.complete ? kOk : kInterrupted;
+}
+
+}  // namespace
+
+void add_simulate(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("simulate", "Simulate a scenario and write a recording");
+  command->add_option("scenario", arguments->scenario, "Scenario file (YAML)")->required()->type_name("SCENARIO.yaml");
+  command->add_option("-o,--out", arguments->out, "Folder to write (default: out/NAME of the scenario)")
+      ->type_name("DIR");
+  command
+      ->add_option("--set", arguments->overrides,
+                   "Change one option, for example --set event_camera.contrast_threshold=0.2")
+      ->type_name("KEY=VALUE")
+      ->expected(1)
+      ->take_all();
+  command->add_option("--seed", arguments->seed, "Seed of all random numbers (default: the scenario's)")
+      ->type_name("N");
+  command
+      ->add_option("-j,--threads", arguments->threads,
+                   "Threads; 0 takes every processor. The result does not depend on it")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1024));
+  command->add_flag("-q,--quiet", arguments->quiet, "Print warnings and errors only");
+  command->add_flag("--force", arguments->force, "Replace an earlier recording in --out");
+  command->footer(
+      "Examples:\n"
+      "  esim simulate scenes/room.yaml --out out/room\n"
+      "  esim simulate scenes/room.yaml --out out/fine --set sampling.lambda=0.1 --set duration_s=1 --seed 7");
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace esim::app

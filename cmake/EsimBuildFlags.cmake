@@ -1,0 +1,31 @@
+# Flags that every target of the project is compiled with, as the interface library esim_build_flags.
+if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Type of build" FORCE)
+endif()
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+
+add_library(esim_build_flags INTERFACE)
+target_compile_options(esim_build_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
+                                                  -Wno-sign-conversion -Wno-restrict -fno-math-errno -fno-trapping-math -fopenmp-simd)
+if(ESIM_WERROR)
+  target_compile_options(esim_build_flags INTERFACE -Werror)
+endif()
+
+# AVX2 and FMA, where the machine that builds has them.
+if(ESIM_MARCH AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
+  include(CheckCXXSourceRuns)
+  set(CMAKE_REQUIRED_QUIET ON)
+  check_cxx_source_runs("int main() { return __builtin_cpu_supports(\"avx2\") && __builtin_cpu_supports(\"fma\") ? 0 : 1; }"
+                        ESIM_HOST_HAS_AVX2)
+  if(ESIM_HOST_HAS_AVX2 OR NOT ESIM_MARCH STREQUAL "x86-64-v3")
+    add_compile_options(-march=${ESIM_MARCH})
+  endif()
+endif()
+
+if(ESIM_SANITIZE)
+  add_compile_options(-fsanitize=${ESIM_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${ESIM_SANITIZE})
+endif()

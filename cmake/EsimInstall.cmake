@@ -1,0 +1,19 @@
+# Installs the program, the libraries with their headers, and what find_package(esim) needs.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+get_property(targets GLOBAL PROPERTY ESIM_TARGETS)
+install(TARGETS esim_app RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS ${targets} esim_build_flags EXPORT esimTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/esim DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/esim PATTERN "*.py" EXCLUDE PATTERN "__pycache__" EXCLUDE)
+
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/esim)
+install(EXPORT esimTargets NAMESPACE esim:: DESTINATION ${package_dir})
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/esimConfig.cmake.in ${PROJECT_BINARY_DIR}/esimConfig.cmake
+                              INSTALL_DESTINATION ${package_dir})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/esimConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/esimConfig.cmake ${PROJECT_BINARY_DIR}/esimConfigVersion.cmake
+              ${PROJECT_SOURCE_DIR}/cmake/FindOpenCVModules.cmake ${PROJECT_SOURCE_DIR}/cmake/FindFFmpegLibraries.cmake
+              ${PROJECT_SOURCE_DIR}/cmake/EsimDependencies.cmake
+        DESTINATION ${package_dir})

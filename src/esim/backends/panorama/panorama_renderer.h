@@ -1,0 +1,25 @@
+#pragma once
+
+#include <memory>
+
+#include "esim/core/parallel.h"
+#include "esim/geometry/camera.h"
+#include "esim/geometry/se3.h"
+#include "esim/render/renderer.h"
+#include "esim/scene/texture.h"
+
+namespace esim {
+
+/// An equirectangular image at infinity, of which only the camera's rotation is seen.
+///
+/// In the panorama's frame z is up; the image's centre lies along +x, its left quarter along +y, its upper edge is
+/// the zenith. Column and row of a direction d:
+///     u = 1/2 - atan2(d_y, d_x) / 2pi,   v = 1/2 - atan2(d_z, |d_xy|) / pi   (fractions of width and height).
+struct Panorama {
+  std::shared_ptr<const Texture> radiance;  ///< wraps in u
+  Eigen::Quaterniond R_world_panorama = Eigen::Quaterniond::Identity();
+};
+
+std::unique_ptr<Renderer> make_panorama_renderer(Panorama panorama, const Camera& camera, const Workers& workers);
+
+}  // namespace esim

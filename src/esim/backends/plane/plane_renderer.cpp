@@ -1,0 +1,104 @@
+#include "esim/backends/plane/plane_renderer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "esim/render/bands.h"
+
+namespace esim {
+namespace {
+
+constexpr int kLanes = 16;
+
+class PlaneRenderer final : public Renderer {
+ public:
+  PlaneRenderer(Poster poster, const Camera& camera, const Workers& workers)
+      : poster_(std::move(poster)), rays_(camera), workers_(workers) {}
+
+  RendererTraits traits() const override { return {.name = "plane", .granularity = Granularity::tile}; }
+
+  void render(const RenderRequest& request, Sample& sample) override {
+    const SE3 T_poster_camera = poster_.T_world_poster.inverse() * request.camera.T_world_body;
+    const View view{T_poster_camera.rotation.toRotationMatrix().cast<float>(),
+                    T_poster_camera.translation.cast<float>()};
+    render_in_bands(request, rays_, workers_, sample, [&](const Tile& band) {
+      for (int y = band.y; y < band.y + band.height; ++y) {
+        for (int x = band.x; x < band.x + band.width; x += kLanes) {
+          shade(view, x, y, std::min(kLanes, band.x + band.width - x), sample);
+        }
+      }
+    });
+  }
+
+ private:
+  struct View {
+    Eigen::Matrix3f R_poster_camera;
+    Eigen::Vector3f origin;  // of the camera, in the poster's frame
+  };
+
+  void shade(const View& view, int first, int row, int count, Sample& sample) const {
+    RayLanes<kLanes> rays;
+    rays.load_span(rays_, first, row, count);
+    TextureLookup<kLanes> at;
+    alignas(64) std::array<float, kLanes> depth;
+    const Eigen::Matrix3f& R = view.R_poster_camera;
+    const float r00 = R(0, 0), r01 = R(0, 1), r02 = R(0, 2);
+    const float r10 = R(1, 0), r11 = R(1, 1), r12 = R(1, 2);
+    const float r20 = R(2, 0), r21 = R(2, 1), r22 = R(2, 2);
+    const float ox = view.origin.x(), oy = view.origin.y(), oz = view.origin.z();
+    const float per_width = 1.0F / static_cast<float>(poster_.width_m);
+    const float per_height =
+        per_width * static_cast<float>(poster_.radiance->width()) / static_cast<float>(poster_.radiance->height());
+    // Where the poster ends, in texture coordinates around its centre.
+    const float reach = poster_.endless ? 1e6F : 0.5F;
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+#pragma omp simd
+    for (int i = 0; i < kLanes; ++i) {
+      const float bx = rays.x[i], by = rays.y[i];
+      const float dx = r00 * bx + r01 * by + r02, dy = r10 * bx + r11 * by + r12, dz = r20 * bx + r21 * by + r22;
+      const float slope = std::fabs(dz) > 1e-12F ? 1.0F / dz : 1e12F;
+
+      // The bearing has z = 1 in the camera, so the ray's parameter is the planar depth.
+      const float distance = -oz * slope;
+      const float u = (ox + distance * dx) * per_width, v = (oy + distance * dy) * per_height;
+      const float seen = std::max(std::fabs(u), std::fabs(v)) <= reach ? distance : -1.0F;  // the distance, where hit
+      depth[i] = seen > 0 ? seen : kInfinity;
+      at.u[i] = seen > 0 ? u + 0.5F : 0.0F;
+      at.v[i] = seen > 0 ? v + 0.5F : 0.0F;
+
+      // As the bearing moves by e, the point on the plane moves by distance * (e - d e_z / d_z).
+      const float right_x = r00 * rays.dx_du[i] + r01 * rays.dy_du[i],
+                  down_x = r00 * rays.dx_dv[i] + r01 * rays.dy_dv[i];
+      const float right_y = r10 * rays.dx_du[i] + r11 * rays.dy_du[i],
+                  down_y = r10 * rays.dx_dv[i] + r11 * rays.dy_dv[i];
+      const float right_along = (r20 * rays.dx_du[i] + r21 * rays.dy_du[i]) * slope;
+      const float down_along = (r20 * rays.dx_dv[i] + r21 * rays.dy_dv[i]) * slope;
+      const float footprint = seen > 0 ? seen : 0.0F;
+      const float per_u = footprint * per_width, per_v = footprint * per_height;
+      at.du_dx[i] = per_u * (right_x - dx * right_along);
+      at.dv_dx[i] = per_v * (right_y - dy * right_along);
+      at.du_dy[i] = per_u * (down_x - dx * down_along);
+      at.dv_dy[i] = per_v * (down_y - dy * down_along);
+    }
+    const auto radiance = poster_.radiance->sample(at);
+    float* const irradiance = sample.irradiance.row(row) + first;
+    for (int i = 0; i < count; ++i) {
+      const auto lane = static_cast<unsigned>(i);
+      irradiance[i] = depth[lane] < kInfinity ? radiance[lane] : poster_.background;
+    }
+    std::copy_n(depth.begin(), count, sample.depth.row(row) + first);
+  }
+
+  Poster poster_;
+  PixelRays rays_;
+  const Workers& workers_;
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> make_plane_renderer(Poster poster, const Camera& camera, const Workers& workers) {
+  return std::make_unique<PlaneRenderer>(std::move(poster), camera, workers);
+}
+
+}  // namespace esim

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <memory>
+
+#include "esim/core/parallel.h"
+#include "esim/geometry/camera.h"
+#include "esim/geometry/se3.h"
+#include "esim/render/renderer.h"
+#include "esim/scene/texture.h"
+
+namespace esim {
+
+/// A textured rectangle at a pose, seen from both sides. In its own frame the poster lies in z = 0 with its centre at
+/// the origin, x to the right and y down the image, so that z points into the wall: a camera of the same orientation
+/// in front of it (at negative z) sees it upright.
+struct Poster {
+  std::shared_ptr<const Texture> radiance;
+  SE3 T_world_poster;
+  double width_m = 1.0;     ///< the height follows from the image's aspect
+  bool endless = false;     ///< the image repeats over the whole plane
+  float background = 0.2F;  ///< irradiance where the poster is not hit
+};
+
+std::unique_ptr<Renderer> make_plane_renderer(Poster poster, const Camera& camera, const Workers& workers);
+
+}  // namespace esim

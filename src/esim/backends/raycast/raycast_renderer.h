@@ -1,0 +1,27 @@
+#pragma once
+
+#include <memory>
+
+#include "esim/core/parallel.h"
+#include "esim/geometry/camera.h"
+#include "esim/render/renderer.h"
+#include "esim/scene/mesh.h"
+
+namespace esim {
+
+/// A mesh with its ray-casting accelerator; may be shared by the renderers of several cameras.
+class RaycastScene;
+std::shared_ptr<const RaycastScene> build_raycast_scene(const Mesh& mesh);
+
+struct RaycastOptions {
+  float background = 0.2F;    ///< irradiance where no surface is hit
+  int samples_per_pixel = 1;  ///< 1, 5 or 13 rays for the irradiance; depth is that of the pixel's centre
+};
+
+/// Renders triangles by ray casting with Embree: any tile at its own cost, lens distortion exact, textures averaged
+/// over the pixel's footprint.
+std::unique_ptr<Renderer> make_raycast_renderer(std::shared_ptr<const RaycastScene> scene,
+                                                const RaycastOptions& options, const Camera& camera,
+                                                const Workers& workers);
+
+}  // namespace esim

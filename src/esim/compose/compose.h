@@ -1,0 +1,43 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "esim/scenario/scenario.h"
+#include "esim/sim/simulate.h"
+#include "esim/sim/world.h"
+
+namespace esim {
+
+/// Receives one line about something that the user should know but that stops nothing.
+using NoticeHandler = std::function<void(const std::string&)>;
+
+/// Who is told what while a world is built.
+struct Notices {
+  NoticeHandler warning;  ///< something is probably not as meant
+  NoticeHandler note;     ///< something was chosen or measured
+};
+
+/// Builds everything that a scenario describes, ready to simulate on `threads` threads (0: every processor). Loads
+/// scenes and trajectories, and checks what can be checked beforehand. Throws UserError for whatever the user can
+/// repair.
+World build_world(const Scenario& scenario, int threads, const Notices& notices);
+
+/// The motion of the body that a scenario describes.
+std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const Notices& notices);
+
+/// Makes the renderers of a scenario's cameras; what they show is loaded once and shared.
+using RendererFactory = std::function<std::unique_ptr<Renderer>(const Camera& camera, const Workers& workers)>;
+RendererFactory build_renderer_factory(const RendererOptions& options, const Notices& notices);
+
+/// The files of a recording, to be written into `folder`: at its top for a single camera, in a folder per camera
+/// otherwise.
+std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem::path& folder);
+
+/// report.json: what was done, at which cost, and where the time went.
+std::string report_json(const Scenario& scenario, const Summary& summary, int threads);
+
+}  // namespace esim

@@ -1,0 +1,58 @@
+#include <nlohmann/json.hpp>
+
+#include "esim/compose/compose.h"
+
+namespace esim {
+
+std::string report_json(const Scenario& scenario, const Summary& summary, int threads) {
+  using Json = nlohmann::ordered_json;
+  const double simulated_s = to_seconds(summary.end - summary.start);
+
+  Json cameras = Json::array();
+  for (std::size_t i = 0; i < summary.cameras.size(); ++i) {
+    const CameraSummary& camera = summary.cameras[i];
+    const SamplingStatistics& sampling = camera.sampling;
+    const std::int64_t events = camera.events_on + camera.events_off;
+    const double pixels = static_cast<double>(camera.width * camera.height);
+    cameras.push_back({
+        {"name", camera.name},
+        {"renderer", camera.renderer},
+        {"width", camera.width},
+        {"height", camera.height},
+        {"sampling", std::visit([](const auto& criterion) { return criterion.kType; }, scenario.cameras[i].sampling)},
+        {"frames", sampling.samples},
+        {"pixel_evaluations", sampling.pixel_evaluations},
+        {"frame_equivalents", static_cast<double>(sampling.pixel_evaluations) / pixels},
+        {"samples_held_to_max_rate", sampling.held_to_max_rate},
+        {"events", events},
+        {"events_on", camera.events_on},
+        {"events_off", camera.events_off},
+        {"events_per_second", simulated_s > 0 ? static_cast<double>(events) / simulated_s : 0.0},
+    });
+  }
+
+  const StageSeconds& s = summary.seconds;
+  const double other = summary.wall_seconds - (s.render + s.sampling + s.events + s.truth + s.write);
+  const Json report = {
+      {"status", summary.complete ? "complete" : "interrupted"},
+      {"esim_version", ESIM_VERSION},
+      {"seed", scenario.seed},
+      {"start_s", to_seconds(summary.start)},
+      {"simulated_s", simulated_s},
+      {"wall_s", summary.wall_seconds},
+      {"real_time_factor", summary.wall_seconds > 0 ? simulated_s / summary.wall_seconds : 0.0},
+      {"threads", threads},
+      {"wall_s_by_stage",
+       {{"render", s.render},
+        {"sampling", s.sampling},
+        {"events", s.events},
+        {"truth", s.truth},
+        {"write", s.write},
+        {"other", other}}},
+      {"truth_frames", summary.truth_frames},
+      {"cameras", cameras},
+  };
+  return report.dump(2) + "\n";
+}
+
+}  // namespace esim

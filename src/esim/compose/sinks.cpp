@@ -1,0 +1,52 @@
+#include "esim/compose/compose.h"
+#include "esim/record/background_sink.h"
+#include "esim/record/fan_out.h"
+#include "esim/record/formats/events_hdf5.h"
+#include "esim/record/formats/events_text.h"
+#include "esim/record/formats/images_png.h"
+#include "esim/record/formats/poses_tum.h"
+#include "esim/record/formats/truth_hdf5.h"
+#include "esim/record/preview/preview_writer.h"
+
+namespace esim {
+namespace {
+
+Compression compression_of(EventCompression compression) {
+  switch (compression) {
+    case EventCompression::gzip:
+      return Compression::gzip;
+    case EventCompression::none:
+      return Compression::none;
+    default:
+      return Compression::blosc;
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem::path& folder) {
+  const TruthOptions& truth = scenario.truth;
+  const OutputOptions& output = scenario.output;
+  const Compression compression = compression_of(output.compression);
+  const TimeUnit unit = output.time_unit == EventTimeUnit::us ? TimeUnit::us : TimeUnit::ns;
+
+  auto sinks = std::make_unique<FanOut>();
+  if (truth.pose_rate_hz > 0) sinks->add(std::make_unique<PosesTumWriter>(folder / "poses.txt"));
+  for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
+    const int camera = static_cast<int>(i);
+    const auto place = scenario.cameras.size() == 1 ? folder : folder / scenario.cameras[i].name;
+    std::filesystem::create_directories(place);
+    sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", camera, EventsHdf5Options{unit, compression}));
+    if (output.events_txt) sinks->add(std::make_unique<EventsTextWriter>(place / "events.txt", camera));
+    if (truth.rate_hz <= 0) continue;
+    if (truth.images) sinks->add(std::make_unique<ImagesPngWriter>(place / "images", camera));
+    if (truth.depth || truth.flow) {
+      sinks->add(std::make_unique<TruthHdf5Writer>(place / "truth.h5", camera,
+                                                   TruthHdf5Options{truth.depth, truth.flow, compression}));
+    }
+    if (output.preview) sinks->add(std::make_unique<PreviewWriter>(place, camera));
+  }
+  return std::make_unique<BackgroundSink>(std::move(sinks));
+}
+
+}  // namespace esim

@@ -1,0 +1,107 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "esim/compose/compose.h"
+#include "esim/core/error.h"
+#include "esim/sampling/frame_sampler.h"
+#include "esim/scenario/read.h"
+
+namespace esim {
+namespace {
+
+/// The part of the trajectory that is simulated.
+TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory) {
+  const TimeNs start = trajectory.start() + to_ns(scenario.start_s);
+  const double available_s = to_seconds(trajectory.end() - start);
+  if (available_s <= 0) {
+    throw UserError(fmt::format("start_s: {} s is beyond the end of the trajectory, which lasts {:.3f} s",
+                                scenario.start_s, to_seconds(trajectory.end() - trajectory.start())));
+  }
+  if (!scenario.duration_s) return {start, trajectory.end()};
+  const TimeNs end = start + to_ns(*scenario.duration_s);
+  if (end > trajectory.end()) {
+    throw UserError(
+        fmt::format("duration_s: {} s is longer than the trajectory, which has {:.9g} s left; shorten it, or stretch "
+                    "the trajectory with trajectory.time_scale",
+                    *scenario.duration_s, available_s));
+  }
+  return {start, end};
+}
+
+void check_sampling(const CameraOptions& camera, const Notices& notices) {
+  const auto check = [&]<typename Criterion>(const Criterion& criterion) {
+    if constexpr (requires { criterion.lambda; }) {
+      if (criterion.lambda > 1) {
+        notices.warning(
+            fmt::format("camera {}: sampling.lambda = {} is above 1: changes between two samples are no longer bounded",
+                        camera.name, criterion.lambda));
+      }
+      if (criterion.bounds.min_rate_hz > criterion.bounds.max_rate_hz) {
+        throw UserError(fmt::format("camera {}: sampling.min_rate_hz = {} is above max_rate_hz = {}; swap them",
+                                    camera.name, criterion.bounds.min_rate_hz, criterion.bounds.max_rate_hz));
+      }
+    }
+  };
+  std::visit(check, camera.sampling);
+}
+
+bool sees_something(const Sample& sample, bool at_infinity) {
+  const auto depth = sample.depth.pixels();
+  return at_infinity || std::any_of(depth.begin(), depth.end(), [](float z) { return std::isfinite(z); });
+}
+
+/// Looks through a camera at a few times: one that never sees anything is a mistake of poses or frames.
+void require_a_view(const World& world, std::size_t index, bool at_infinity) {
+  constexpr int kLooks = 9;
+  const CameraInfo& info = world.info.cameras[index];
+  Sample sample;
+  for (int i = 0; i < kLooks; ++i) {
+    const TimeNs t = world.info.start + (world.info.end - world.info.start) / (kLooks - 1) * i;
+    const Kinematics camera = rigidly_attached(world.trajectory->at(t), info.T_body_camera);
+    world.cameras[index].renderer->render({t, camera, {{0, 0, info.model.width, info.model.height}}}, sample);
+    if (sees_something(sample, at_infinity)) return;
+  }
+  const Eigen::Vector3d position =
+      rigidly_attached(world.trajectory->at(world.info.start), info.T_body_camera).T_world_body.translation;
+  throw UserError(
+      fmt::format("camera {} sees nothing of the scene on its whole way (it starts at {:.3g} {:.3g} {:.3g} m); check "
+                  "the trajectory's frame and T_body_camera",
+                  info.name, position.x(), position.y(), position.z()));
+}
+
+}  // namespace
+
+World build_world(const Scenario& scenario, int threads, const Notices& notices) {
+  World world;
+  world.workers = std::make_unique<const Workers>(threads);
+  world.trajectory = build_trajectory(scenario, notices);
+  const TimeSpan span = simulated_span(scenario, *world.trajectory);
+  world.info.start = span.start;
+  world.info.end = span.end;
+  world.info.truth_rate_hz = scenario.truth.rate_hz;
+  world.truth_clock = PeriodicClock(span.start, span.end, scenario.truth.rate_hz);
+  world.pose_clock = PeriodicClock(span.start, span.end, scenario.truth.pose_rate_hz);
+
+  for (const CameraOptions& options : scenario.cameras) {
+    check_sampling(options, notices);
+    world.info.cameras.push_back({options.name, camera_model(options), pose_of(options.T_body_camera)});
+  }
+  const RendererFactory make_renderer = build_renderer_factory(scenario.renderer, notices);
+  for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
+    const CameraOptions& options = scenario.cameras[i];
+    const Camera& model = world.info.cameras[i].model;
+    const EventCameraOptions& sensor = options.event_camera;
+    const SensorTraits traits{std::min(sensor.threshold_on(), sensor.threshold_off()), sensor.log_eps};
+    world.cameras.push_back(
+        {make_renderer(model, *world.workers),
+         make_frame_sampler(options.sampling, traits, model.width, model.height, span, *world.workers),
+         EventCamera(sensor, model.width, model.height, scenario.seed, static_cast<std::uint16_t>(i)),
+         {}});
+    require_a_view(world, i, std::holds_alternative<PanoramaRendererOptions>(scenario.renderer));
+  }
+  return world;
+}
+
+}  // namespace esim

@@ -1,0 +1,38 @@
+#include "esim/core/parallel.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <thread>
+
+namespace esim {
+
+struct Workers::Arena {
+  explicit Arena(int threads, int processors) : threads_count(threads), arena(std::min(threads, processors)) {}
+
+  int threads_count;
+  tbb::task_arena arena;
+};
+
+Workers::Workers(int threads) {
+  const int processors = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  arena_ = std::make_unique<Arena>(threads > 0 ? threads : processors, processors);
+}
+
+Workers::~Workers() = default;
+
+int Workers::threads() const { return arena_->threads_count; }
+
+void Workers::for_each(int count, const std::function<void(int)>& body) const {
+  if (threads() == 1 || count <= 1) {
+    for (int i = 0; i < count; ++i) body(i);
+    return;
+  }
+  arena_->arena.execute([&] {
+    tbb::parallel_for(
+        0, count, [&](int i) { body(i); }, tbb::simple_partitioner{});
+  });
+}
+
+}  // namespace esim

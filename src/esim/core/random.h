@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace esim {
+
+/// What a random number is for. Values are part of the reproducibility promise: never renumber.
+enum class Purpose : std::uint16_t {
+  threshold_mismatch = 1,
+  threshold_noise = 2,
+  trajectory_position = 3,
+  trajectory_rotation = 4,
+  test = 1000,
+};
+
+/// Addressed randomness: every draw is a pure function of (seed, purpose, stream, item, draw), computed
+/// with the counter-based generator Philox4x32-10 (Salmon et al., SC 2011). No state, no order of calls, so
+/// results do not depend on threads or on what else was drawn.
+///
+/// `stream` separates cameras, `item` pixels (or axes), `draw` successive draws of one item.
+class AddressedRandom {
+ public:
+  AddressedRandom(std::uint64_t seed, Purpose purpose, std::uint16_t stream = 0);
+
+  /// Four independent uniform 32-bit words.
+  std::array<std::uint32_t, 4> bits(std::uint32_t item, std::uint64_t draw = 0) const;
+
+  /// Two independent uniforms on the open interval (0, 1), 53 bits each.
+  std::array<double, 2> uniforms(std::uint32_t item, std::uint64_t draw = 0) const;
+
+  /// Two independent standard normal deviates (Box-Muller).
+  std::array<double, 2> normals(std::uint32_t item, std::uint64_t draw = 0) const;
+
+ private:
+  std::array<std::uint32_t, 2> key_;
+  std::uint32_t address_;
+};
+
+}  // namespace esim

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+namespace esim {
+
+/// Instants and durations, in nanoseconds. Everything that is stored or compared uses this type;
+/// seconds as `double` appear only inside spline mathematics and at the user's side of the schema.
+using TimeNs = std::int64_t;
+
+inline constexpr TimeNs kNsPerUs = 1'000;
+inline constexpr TimeNs kNsPerMs = 1'000'000;
+inline constexpr TimeNs kNsPerSecond = 1'000'000'000;
+
+constexpr double to_seconds(TimeNs t) { return static_cast<double>(t) * 1e-9; }
+
+/// Nearest nanosecond. `seconds` must be finite and within ±292 years.
+inline TimeNs to_ns(double seconds) { return static_cast<TimeNs>(std::llround(seconds * 1e9)); }
+
+}  // namespace esim

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "esim/geometry/camera.h"
+
+namespace esim {
+
+/// A distorted image point and its derivative with respect to the ideal one.
+struct Distorted {
+  Eigen::Vector2d point;
+  Eigen::Matrix2d jacobian;
+};
+
+/// The formula of each model, stated with it in camera.h. Nothing outside the model's domain.
+std::optional<Distorted> distort(const NoDistortion&, const Eigen::Vector2d& ideal);
+std::optional<Distorted> distort(const RadialTangential& model, const Eigen::Vector2d& ideal);
+std::optional<Distorted> distort(const Equidistant& model, const Eigen::Vector2d& ideal);
+std::optional<Distorted> distort(const Fov& model, const Eigen::Vector2d& ideal);
+
+/// The ideal image point that distort() takes to `distorted`, or nothing where there is none.
+std::optional<Eigen::Vector2d> undistort(const NoDistortion&, const Eigen::Vector2d& distorted);
+std::optional<Eigen::Vector2d> undistort(const RadialTangential& model, const Eigen::Vector2d& distorted);
+std::optional<Eigen::Vector2d> undistort(const Equidistant& model, const Eigen::Vector2d& distorted);
+std::optional<Eigen::Vector2d> undistort(const Fov& model, const Eigen::Vector2d& distorted);
+
+}  // namespace esim

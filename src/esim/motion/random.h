@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "esim/core/time.h"
+#include "esim/motion/spline.h"
+
+namespace esim {
+
+struct RandomMotionOptions {
+  Eigen::Vector3d position_amplitude_m = Eigen::Vector3d::Zero();    // along the axes of `center`, ≥ 0
+  Eigen::Vector3d rotation_amplitude_rad = Eigen::Vector3d::Zero();  // about the axes of the body, ≥ 0
+  double knot_interval_s = 0.25;                                     // time between control points
+  SE3 center;                                                        // T_world_body about which it moves
+  int order = 5;                                                     // of the spline, 2 … 6
+};
+
+/// A smooth random motion: a uniform B-spline whose control points are drawn independently, control point j being
+///   center · (Exp(a_x e_x) Exp(a_y e_y) Exp(a_z e_z), p),   a and p uniform in ± amplitude per axis,
+/// with AddressedRandom(seed, trajectory_position or trajectory_rotation), item = axis and draw = j. So a longer
+/// duration only appends, and the amplitude of one axis does not change the others. The position stays within the
+/// amplitudes. Between successive control rotations the body turns the shorter way: with amplitudes beyond 90°, whole
+/// turns happen, but never more than 180° in one knot interval.
+///
+/// Throws UserError, naming the field, for amplitudes that are negative or not finite, an order outside 2 … 6, a knot
+/// interval or a duration that is not positive, more than ten million control points, and a center whose rotation
+/// has not unit norm.
+SplineTrajectory random_trajectory(const RandomMotionOptions& options, TimeNs start, TimeNs duration,
+                                   std::uint64_t seed);
+
+}  // namespace esim

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "esim/core/time.h"
+#include "esim/geometry/se3.h"
+
+namespace esim {
+
+struct TimedPose {
+  TimeNs t = 0;
+  SE3 T_world_body;
+};
+
+/// Why a list of poses cannot be made into a motion, and at which pose one notices.
+struct StampFault {
+  std::size_t pose = 0;
+  std::string message;
+};
+
+/// A gap of more than this many median intervals is a fault. It would hold more knots than a spline of order 5 with
+/// the default knots (up to four median intervals apart) can bridge: one of its control points would act on no pose.
+inline constexpr int kLargestGapInMedians = 20;
+
+/// The first duplicated or unsorted stamp; if there is none, the first gap that is too large. Stamps need not be
+/// uniform otherwise.
+std::optional<StampFault> find_stamp_fault(std::span<const TimedPose> poses);
+
+/// The median of the intervals between successive stamps (the upper one of an even number). Needs two poses.
+TimeNs median_interval(std::span<const TimedPose> poses);
+
+}  // namespace esim

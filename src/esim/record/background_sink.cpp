@@ -1,0 +1,107 @@
+#include "esim/record/background_sink.h"
+
+#include <vector>
+
+namespace esim {
+namespace {
+
+/// A copy of a record that lives as long as it is needed, and what it weighs.
+struct Copy {
+  std::function<void(Sink&)> write;
+  std::size_t bytes = 0;
+};
+
+Copy copy_of(const EventsRecord& record) {
+  auto events = std::make_shared<const std::vector<Event>>(record.events.begin(), record.events.end());
+  return {[camera = record.camera, events](Sink& sink) {
+            sink.write(EventsRecord{camera, *events});
+          },
+          record.events.size_bytes()};
+}
+
+Copy copy_of(const TruthRecord& record) {
+  struct Images {
+    Image<float> irradiance, depth, flow_x, flow_y;
+  };
+  auto images = std::make_shared<const Images>(Images{record.irradiance, record.depth, record.flow_x, record.flow_y});
+  return {[camera = record.camera, t = record.t, pose = record.T_world_camera, images](Sink& sink) {
+            sink.write(TruthRecord{camera, t, pose, images->irradiance, images->depth, images->flow_x, images->flow_y});
+          },
+          4 * record.irradiance.size() * sizeof(float)};
+}
+
+Copy copy_of(const PoseRecord& record) {
+  return {[record](Sink& sink) { sink.write(record); }, sizeof record};
+}
+
+}  // namespace
+
+BackgroundSink::BackgroundSink(std::unique_ptr<Sink> inner, std::size_t capacity_bytes)
+    : inner_(std::move(inner)), capacity_bytes_(capacity_bytes), thread_([this] { work(); }) {}
+
+BackgroundSink::~BackgroundSink() {
+  {
+    const std::lock_guard lock(mutex_);
+    jobs_.clear();  // ended without end(): what is waiting is not wanted
+  }
+  stop();
+}
+
+void BackgroundSink::begin(const RecordingInfo& info) {
+  submit({[info](Sink& sink) { sink.begin(info); }, 0});
+}
+
+void BackgroundSink::write(const Record& record) {
+  Copy copy = std::visit([](const auto& kind) { return copy_of(kind); }, record);
+  submit({std::move(copy.write), copy.bytes});
+}
+
+void BackgroundSink::end(bool complete) {
+  submit({[complete](Sink& sink) { sink.end(complete); }, 0});
+  stop();
+  if (failure_) std::rethrow_exception(failure_);
+}
+
+void BackgroundSink::submit(Job job) {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return waiting_bytes_ <= capacity_bytes_ || failure_; });
+  if (failure_) std::rethrow_exception(failure_);
+  waiting_bytes_ += job.bytes;
+  jobs_.push_back(std::move(job));
+  changed_.notify_all();
+}
+
+void BackgroundSink::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+    changed_.notify_all();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+void BackgroundSink::work() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    changed_.wait(lock, [this] { return !jobs_.empty() || stopping_; });
+    if (jobs_.empty() || failure_) return;
+    const Job job = std::move(jobs_.front());
+    jobs_.pop_front();
+
+    lock.unlock();
+    std::exception_ptr failure;
+    try {
+      job.run(*inner_);
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    lock.lock();
+
+    waiting_bytes_ -= job.bytes;
+    failure_ = failure;
+    changed_.notify_all();
+    if (failure_) return;
+  }
+}
+
+}  // namespace esim

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "esim/record/record.h"
+
+namespace esim {
+
+/// Passes everything on to several sinks, in their order.
+class FanOut final : public Sink {
+ public:
+  FanOut() = default;
+  explicit FanOut(std::vector<std::unique_ptr<Sink>> sinks) : sinks_(std::move(sinks)) {}
+
+  void add(std::unique_ptr<Sink> sink) { sinks_.push_back(std::move(sink)); }
+
+  void begin(const RecordingInfo& info) override;
+  void write(const Record& record) override;
+
+  /// Ends every sink, also when one of them fails; then rethrows the first failure.
+  void end(bool complete) override;
+
+ private:
+  std::vector<std::unique_ptr<Sink>> sinks_;
+};
+
+}  // namespace esim

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "esim/core/time.h"
+#include "esim/events/event.h"
+#include "esim/record/formats/compression.h"
+#include "esim/record/record.h"
+
+namespace esim {
+
+enum class TimeUnit { us, ns };
+
+struct EventsHdf5Options {
+  TimeUnit unit = TimeUnit::us;
+  Compression compression = Compression::blosc;
+};
+
+/// Events of one camera in DSEC's layout:
+///
+///   events/t   uint32 or uint64 [N]   time since t_offset, rounded down to the unit
+///   events/x, events/y  uint16 [N]    px
+///   events/p   uint8 [N]              1: ON, 0: OFF
+///   ms_to_idx  uint64 [M]             ms_to_idx[ms] = first i with t[i] >= ms milliseconds; M = duration in ms + 1
+///   t_offset   int64                  start of the recording, rounded down to the unit
+///
+/// and, beyond DSEC, the attributes unit ("us" or "ns"), width, height and esim_complete of the file: 0 while it is
+/// being written or if the recording was interrupted, 1 if it ran to its end. t is uint32 where the planned duration
+/// in µs fits. Memory does not grow with the recording; the same events give the same bytes however they arrive;
+/// a killed process loses at most its last 65536 events.
+class EventsHdf5Writer final : public Sink {
+ public:
+  /// Throws UserError if the compression is not available.
+  EventsHdf5Writer(std::filesystem::path path, int camera, EventsHdf5Options options = {});
+  ~EventsHdf5Writer() override;
+
+  void begin(const RecordingInfo& info) override;
+  void write(const Record& record) override;
+  void end(bool complete) override;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Reads what EventsHdf5Writer writes, and DSEC's own files, which lack the attributes. Files that are something else,
+/// damaged or cut are a UserError that names the file.
+class EventsHdf5Reader {
+ public:
+  explicit EventsHdf5Reader(std::filesystem::path path);
+  ~EventsHdf5Reader();
+  EventsHdf5Reader(EventsHdf5Reader&&) noexcept;
+  EventsHdf5Reader& operator=(EventsHdf5Reader&&) noexcept;
+
+  std::uint64_t size() const;            ///< number of events
+  std::optional<int> width() const;      ///< px, if the file says
+  std::optional<int> height() const;     ///< px, if the file says
+  TimeUnit unit() const;                 ///< µs if the file does not say
+  TimeNs t_offset() const;               ///< ns, whatever the file's unit
+  std::optional<bool> complete() const;  ///< esim_complete, if the file says
+
+  struct TimeSpan {
+    TimeNs first = 0, last = 0;
+  };
+  std::optional<TimeSpan> time_span() const;  ///< of the events; nothing if there are none
+
+  /// Up to `count` events from index `first` on; fewer at the end.
+  std::vector<Event> read(std::uint64_t first, std::uint64_t count) const;
+
+  struct IndexRange {
+    std::uint64_t first = 0, end = 0;
+  };
+  /// Indices of the events with t0 <= t < t1, found through ms_to_idx.
+  IndexRange find(TimeNs t0, TimeNs t1) const;
+  std::vector<Event> read_window(TimeNs t0, TimeNs t1) const;
+
+  /// Number of ON events; reads nothing but the polarities.
+  std::uint64_t count_on() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace esim

@@ -1,0 +1,208 @@
+#include <algorithm>
+#include <limits>
+
+#include "esim/core/error.h"
+#include "esim/record/formats/events_hdf5.h"
+#include "esim/record/formats/hdf5_detail.h"
+
+namespace esim {
+namespace {
+
+constexpr std::size_t kChunkEvents = 1 << 16;
+constexpr std::size_t kChunkMs = 1 << 10;
+constexpr std::size_t kMsBuffer = 1 << 16;
+
+std::int64_t floor_divide(std::int64_t value, std::int64_t divisor) {
+  const std::int64_t quotient = value / divisor;
+  return quotient - (value % divisor < 0 ? 1 : 0);
+}
+
+}  // namespace
+
+struct EventsHdf5Writer::Impl {
+  Impl(std::filesystem::path file_path, int camera_index, EventsHdf5Options chosen)
+      : path(std::move(file_path)), camera(camera_index), options(chosen) {}
+  ~Impl() {
+    const hdf5::Quiet quiet;
+    close_series();
+    file.reset();
+  }
+
+  void create(const RecordingInfo& info);
+  void append(EventSpan events);
+  void store(const Event& event);
+  void write_chunk();
+  void write_ms_buffer();
+  void index_milliseconds_until(std::uint64_t since_origin);
+  void close_series();
+
+  std::filesystem::path path;
+  int camera;
+  EventsHdf5Options options;
+
+  std::int64_t ns_per_unit = 1;
+  TimeNs origin = 0;  // t_offset in ns
+  TimeNs planned_end = 0;
+  TimeNs last_seen = 0;  // latest time of any record
+  int width = 0, height = 0;
+  bool narrow_t = false;  // uint32
+  Event last{std::numeric_limits<TimeNs>::min()};
+
+  std::uint64_t events_seen = 0;
+  std::uint64_t next_ms_ns = 0;  // first millisecond without an entry in ms_to_idx, ns since origin
+
+  // Filled up to `fill` events; ms_to_idx as far as it is known and not written.
+  std::size_t fill = 0;
+  std::vector<std::uint32_t> t32;
+  std::vector<std::uint64_t> t64;
+  std::vector<std::uint16_t> x, y;
+  std::vector<std::uint8_t> p;
+  std::vector<std::uint64_t> ms;
+
+  // The series close before the file.
+  std::optional<hdf5::Output> file;
+  hdf5::Handle esim_complete;
+  hdf5::Series t_series, x_series, y_series, p_series, ms_series;
+};
+
+void EventsHdf5Writer::Impl::create(const RecordingInfo& info) {
+  hdf5::require_available(options.compression);
+  const CameraInfo& model = info.cameras.at(static_cast<std::size_t>(camera));
+  width = model.model.width;
+  height = model.model.height;
+  ns_per_unit = options.unit == TimeUnit::us ? kNsPerUs : 1;
+  const std::int64_t t_offset = floor_divide(info.start, ns_per_unit);
+  origin = t_offset * ns_per_unit;
+  planned_end = info.end;
+  last_seen = info.start;
+  narrow_t = options.unit == TimeUnit::us &&
+             floor_divide(info.end, kNsPerUs) - t_offset <= std::numeric_limits<std::uint32_t>::max();
+
+  (narrow_t ? t32.resize(kChunkEvents) : t64.resize(kChunkEvents));
+  x.resize(kChunkEvents);
+  y.resize(kChunkEvents);
+  p.resize(kChunkEvents);
+
+  const hdf5::Quiet quiet;
+  file.emplace(path);
+  file->create_group("events");
+  const auto series = [&](const char* name, hid_t type) {
+    return hdf5::Series(*file, name, {type, {}, kChunkEvents, options.compression});
+  };
+  t_series = series("events/t", narrow_t ? H5T_STD_U32LE : H5T_STD_U64LE);
+  x_series = series("events/x", H5T_STD_U16LE);
+  y_series = series("events/y", H5T_STD_U16LE);
+  p_series = series("events/p", H5T_STD_U8LE);
+  ms_series = hdf5::Series(*file, "ms_to_idx", {H5T_STD_U64LE, {}, kChunkMs, Compression::none});
+  file->create_scalar("t_offset", t_offset);
+  file->create_text_attribute(file->id(), "unit", options.unit == TimeUnit::us ? "us" : "ns");
+  file->create_attribute(file->id(), "width", static_cast<std::uint32_t>(width));
+  file->create_attribute(file->id(), "height", static_cast<std::uint32_t>(height));
+  esim_complete = file->create_attribute(file->id(), "esim_complete", std::uint8_t{0});
+  file->flush();
+}
+
+void EventsHdf5Writer::Impl::append(EventSpan events) {
+  for (const Event& event : events) {
+    if (event < last || event.t < origin || event.x >= width || event.y >= height) {
+      throw InternalError(path.string() + ": event (t, x, y) = (" + std::to_string(event.t) + " ns, " +
+                          std::to_string(event.x) + ", " + std::to_string(event.y) +
+                          ") is out of order or outside the image");
+    }
+    last = event;
+    store(event);
+    if (fill == kChunkEvents) write_chunk();
+  }
+  if (!events.empty()) last_seen = std::max(last_seen, events.back().t);
+}
+
+void EventsHdf5Writer::Impl::store(const Event& event) {
+  const auto since_origin = static_cast<std::uint64_t>(event.t - origin);
+  index_milliseconds_until(since_origin);
+  if (narrow_t) {
+    const std::uint64_t t_us = since_origin / kNsPerUs;
+    if (t_us > std::numeric_limits<std::uint32_t>::max()) {
+      throw InternalError(path.string() + ": event at " + std::to_string(event.t) + " ns, long after the planned end");
+    }
+    t32[fill] = static_cast<std::uint32_t>(t_us);
+  } else {
+    t64[fill] = options.unit == TimeUnit::us ? since_origin / kNsPerUs : since_origin;
+  }
+  x[fill] = event.x;
+  y[fill] = event.y;
+  p[fill] = event.polarity > 0 ? 1 : 0;
+  ++fill;
+  ++events_seen;
+}
+
+void EventsHdf5Writer::Impl::write_chunk() {
+  const hdf5::Quiet quiet;
+  if (narrow_t) {
+    t_series.append(std::span<const std::uint32_t>(t32).first(fill));
+  } else {
+    t_series.append(std::span<const std::uint64_t>(t64).first(fill));
+  }
+  x_series.append(std::span<const std::uint16_t>(x).first(fill));
+  y_series.append(std::span<const std::uint16_t>(y).first(fill));
+  p_series.append(std::span<const std::uint8_t>(p).first(fill));
+  fill = 0;
+  write_ms_buffer();
+  file->flush();
+}
+
+void EventsHdf5Writer::Impl::write_ms_buffer() {
+  const hdf5::Quiet quiet;
+  ms_series.append(std::span<const std::uint64_t>(ms));
+  ms.clear();
+}
+
+// Milliseconds at or before this time start at the next event.
+void EventsHdf5Writer::Impl::index_milliseconds_until(std::uint64_t since_origin) {
+  while (since_origin >= next_ms_ns) {
+    ms.push_back(events_seen);
+    next_ms_ns += kNsPerMs;
+    if (ms.size() == kMsBuffer) write_ms_buffer();
+  }
+}
+
+void EventsHdf5Writer::Impl::close_series() {
+  esim_complete.reset();
+  for (hdf5::Series* series : {&t_series, &x_series, &y_series, &p_series, &ms_series}) *series = hdf5::Series();
+}
+
+EventsHdf5Writer::EventsHdf5Writer(std::filesystem::path path, int camera, EventsHdf5Options options)
+    : impl_(std::make_unique<Impl>(std::move(path), camera, options)) {
+  hdf5::require_available(options.compression);
+}
+
+EventsHdf5Writer::~EventsHdf5Writer() = default;
+
+void EventsHdf5Writer::begin(const RecordingInfo& info) { impl_->create(info); }
+
+void EventsHdf5Writer::write(const Record& record) {
+  if (const auto* events = std::get_if<EventsRecord>(&record)) {
+    if (events->camera == impl_->camera) impl_->append(events->events);
+  } else if (const auto* truth = std::get_if<TruthRecord>(&record)) {
+    impl_->last_seen = std::max(impl_->last_seen, truth->t);
+  } else if (const auto* pose = std::get_if<PoseRecord>(&record)) {
+    impl_->last_seen = std::max(impl_->last_seen, pose->t);
+  }
+}
+
+void EventsHdf5Writer::end(bool complete) {
+  Impl& impl = *impl_;
+  if (!impl.file) return;
+  const hdf5::Quiet quiet;
+  const TimeNs end = complete ? impl.planned_end : impl.last_seen;
+  impl.index_milliseconds_until(static_cast<std::uint64_t>(std::max<TimeNs>(end - impl.origin, 0)));
+  impl.write_chunk();
+  if (complete) {
+    constexpr std::uint8_t kOne = 1;
+    impl.file->check(H5Awrite(impl.esim_complete, H5T_NATIVE_UINT8, &kOne));
+  }
+  impl.close_series();
+  impl.file->close();
+  impl.file.reset();
+}
+
+}  // namespace esim

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "esim/events/event.h"
+#include "esim/record/output_file.h"
+#include "esim/record/record.h"
+
+namespace esim {
+
+/// Events of one camera as lines `t x y p`, as in the Event Camera Dataset: seconds with nine decimals, px, px, and
+/// 1 (ON) or 0 (OFF).
+class EventsTextWriter final : public Sink {
+ public:
+  EventsTextWriter(std::filesystem::path path, int camera) : path_(std::move(path)), camera_(camera) {}
+
+  void begin(const RecordingInfo& info) override;
+  void write(const Record& record) override;
+  void end(bool complete) override;
+
+ private:
+  std::filesystem::path path_;
+  int camera_;
+  std::optional<OutputFile> file_;
+};
+
+/// Reads such lines, also with fewer or more decimals, exponents aside; empty lines and those starting with # are
+/// passed over. Digits beyond the nanosecond are dropped. Throws UserError, with file and line, for anything else and
+/// for times that decrease.
+class EventsTextReader {
+ public:
+  explicit EventsTextReader(std::filesystem::path path);
+
+  /// Replaces `events` by the next ones, at most `count`; false if there are none left.
+  bool read(std::vector<Event>& events, std::size_t count);
+
+ private:
+  bool next_line(std::string_view& line);
+  [[noreturn]] void fail(const std::string& what) const;
+  Event parse(std::string_view line) const;
+
+  std::filesystem::path path_;
+  std::ifstream file_;
+  std::vector<char> block_;
+  std::size_t begin_ = 0, end_ = 0;  // what of the block is not read yet
+  std::uint64_t line_number_ = 0;
+  std::optional<TimeNs> last_t_;
+};
+
+}  // namespace esim

@@ -1,0 +1,186 @@
+#include "esim/record/formats/hdf5_input.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "esim/core/error.h"
+#include "esim/record/output_file.h"
+
+namespace esim::hdf5 {
+namespace {
+
+constexpr hsize_t kMaxChunkNumbers = hsize_t{1} << 25;
+constexpr std::size_t kMaxTextBytes = 256;
+constexpr std::size_t kBloscHead = 16;
+
+bool is_integer(hid_t type) { return H5Tget_class(type) == H5T_INTEGER && H5Tget_size(type) <= 8; }
+
+}  // namespace
+
+Input::Input(std::filesystem::path path) : path_(std::move(path)) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path_, error)) {
+    fail(error ? error.message() : "it does not exist or is not a file");
+  }
+  if (!std::ifstream(path_)) fail(system_reason(errno));
+  const Quiet quiet;
+  file_ = Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  if (!file_.valid()) fail("it is not an HDF5 file, or it is damaged (" + last_error() + ")");
+}
+
+void Input::fail(const std::string& what) const { throw UserError("cannot read " + path_.string() + ": " + what); }
+
+bool Input::has(const char* name) const {
+  const Quiet quiet;
+  // Each part of the name by itself: the library refuses to look below what is not there.
+  const std::string full = name;
+  for (std::size_t slash = full.find('/'); slash != std::string::npos; slash = full.find('/', slash + 1)) {
+    if (H5Lexists(file_, full.substr(0, slash).c_str(), H5P_DEFAULT) <= 0) return false;
+  }
+  return H5Lexists(file_, name, H5P_DEFAULT) > 0;
+}
+
+Column Input::open_column(const char* name) const {
+  const Quiet quiet;
+  if (!has(name)) fail(std::string("there is no dataset ") + name);
+  Column column;
+  column.dataset = Handle(H5Dopen2(file_, name, H5P_DEFAULT), H5Dclose);
+  if (!column.dataset.valid()) fail(std::string(name) + " is not a readable dataset (" + last_error() + ")");
+  const Handle type(H5Dget_type(column.dataset), H5Tclose);
+  const Handle space(H5Dget_space(column.dataset), H5Sclose);
+  if (!is_integer(type)) fail(std::string(name) + " does not hold integers");
+  if (H5Sget_simple_extent_ndims(space) != 1) fail(std::string(name) + " does not have one dimension");
+  if (H5Sget_simple_extent_dims(space, &column.size, nullptr) < 0) fail(last_error());
+  column.number_bytes = H5Tget_size(type);
+  require_storage(column, name);
+  const Handle creation(H5Dget_create_plist(column.dataset), H5Pclose);
+  if (H5Pget_layout(creation) == H5D_CHUNKED) open_chunks(creation, column, name);
+  return column;
+}
+
+void Input::require_storage(const Column& column, const std::string& name) const {
+  const Handle creation(H5Dget_create_plist(column.dataset), H5Pclose);
+  if (!creation.valid()) fail(name + ": " + last_error());
+  if (H5Pget_external_count(creation) != 0) fail(name + " keeps its data in another file");
+  const H5D_layout_t layout = H5Pget_layout(creation);
+  if (layout == H5D_CHUNKED) return;
+  if (layout != H5D_CONTIGUOUS && layout != H5D_COMPACT)
+    fail(name + " is stored in a way that this reader does not know");
+  std::error_code error;
+  const std::uintmax_t file_bytes = std::filesystem::file_size(path_, error);
+  if (H5Dget_storage_size(column.dataset) < column.size || column.size > file_bytes) fail_short(column, name);
+}
+
+void Input::open_chunks(hid_t creation, Column& column, const std::string& name) const {
+  if (H5Pget_chunk(creation, 1, &column.chunk) != 1 || column.chunk == 0 || column.chunk > kMaxChunkNumbers) {
+    fail(name + " has chunks of " + std::to_string(column.chunk) + " numbers, which is more than this reader takes");
+  }
+  // Blosc's filter takes four values without looking whether there are so many.
+  const int filters = H5Pget_nfilters(creation);
+  for (int i = 0; i < filters; ++i) {
+    unsigned flags = 0;
+    std::size_t values = 0;
+    const H5Z_filter_t filter =
+        H5Pget_filter2(creation, static_cast<unsigned>(i), &flags, &values, nullptr, 0, nullptr, nullptr);
+    if (filter == kBloscFilter && values < 4) fail(name + " has a damaged description of its compression");
+    column.only_blosc = filter == kBloscFilter && filters == 1;
+  }
+  hsize_t chunks = 0;
+  const Handle space(H5Dget_space(column.dataset), H5Sclose);
+  if (column.size > 0 && H5Dget_num_chunks(column.dataset, space, &chunks) < 0) fail(name + ": " + last_error());
+  if (column.size > 0 && chunks <= (column.size - 1) / column.chunk) fail_short(column, name);
+}
+
+void Input::fail_short(const Column& column, const std::string& name) const {
+  fail(name + " should hold " + std::to_string(column.size) + " numbers, but the file has fewer");
+}
+
+// The filter trusts the sizes in the head of each packed chunk: how much it allocates and how much it leaves for the
+// library to read.
+void Input::require_sound_chunks(const Column& column, hsize_t first, hsize_t count) const {
+  if (!column.only_blosc) return;
+  std::vector<std::uint8_t> packed;
+  for (hsize_t chunk = first / column.chunk; chunk <= (first + count - 1) / column.chunk; ++chunk) {
+    const hsize_t offset = chunk * column.chunk;
+    hsize_t bytes = 0;
+    if (H5Dget_chunk_storage_size(column.dataset, &offset, &bytes) < 0) fail(last_error());
+    const std::size_t chunk_bytes = column.chunk * column.number_bytes;
+    bool sound = bytes > 0 && bytes <= chunk_bytes + kBloscHead;
+    if (sound) {
+      packed.resize(std::max<std::size_t>(bytes, kBloscHead));
+      std::uint32_t skipped_filters = 0;
+      if (H5Dread_chunk(column.dataset, H5P_DEFAULT, &offset, &skipped_filters, packed.data()) < 0) fail(last_error());
+      std::uint32_t unpacked_bytes = 0, packed_bytes = 0;  // both little-endian
+      std::memcpy(&unpacked_bytes, &packed[4], sizeof(unpacked_bytes));
+      std::memcpy(&packed_bytes, &packed[12], sizeof(packed_bytes));
+      sound = skipped_filters != 0 ? bytes == chunk_bytes : unpacked_bytes == chunk_bytes && packed_bytes == bytes;
+    }
+    if (!sound) fail("the packed numbers from number " + std::to_string(offset) + " on are damaged");
+  }
+}
+
+void Input::read(const Column& column, hsize_t first, hsize_t count, hid_t type, void* out) const {
+  if (count == 0) return;
+  const Quiet quiet;
+  require_sound_chunks(column, first, count);
+  const Handle in_file(H5Dget_space(column.dataset), H5Sclose);
+  const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+  if (H5Sselect_hyperslab(in_file, H5S_SELECT_SET, &first, nullptr, &count, nullptr) < 0 ||
+      H5Dread(column.dataset, type, in_memory, in_file, H5P_DEFAULT, out) < 0) {
+    const std::string reason = last_error();
+    require_available(Compression::blosc);  // the usual cause has a remedy
+    fail("it is damaged, or packed in a way that this machine cannot read (" + reason + ")");
+  }
+}
+
+std::optional<std::int64_t> Input::scalar(const char* name) const {
+  if (!has(name)) return std::nullopt;
+  const Quiet quiet;
+  const Handle dataset(H5Dopen2(file_, name, H5P_DEFAULT), H5Dclose);
+  if (!dataset.valid()) fail(std::string(name) + " is not a readable dataset (" + last_error() + ")");
+  const Handle type(H5Dget_type(dataset), H5Tclose);
+  const Handle space(H5Dget_space(dataset), H5Sclose);
+  std::int64_t value = 0;
+  if (!is_integer(type) || H5Sget_simple_extent_npoints(space) != 1 ||
+      H5Dread(dataset, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) {
+    fail(std::string(name) + " is not one integer");
+  }
+  return value;
+}
+
+std::optional<std::int64_t> Input::integer_attribute(const char* name) const {
+  const Quiet quiet;
+  if (H5Aexists(file_, name) <= 0) return std::nullopt;
+  const Handle attribute(H5Aopen(file_, name, H5P_DEFAULT), H5Aclose);
+  if (!attribute.valid()) fail(std::string("attribute ") + name + ": " + last_error());
+  const Handle type(H5Aget_type(attribute), H5Tclose);
+  const Handle space(H5Aget_space(attribute), H5Sclose);
+  std::int64_t value = 0;
+  if (!is_integer(type) || H5Sget_simple_extent_npoints(space) != 1 ||
+      H5Aread(attribute, H5T_NATIVE_INT64, &value) < 0) {
+    fail(std::string("attribute ") + name + " is not one integer");
+  }
+  return value;
+}
+
+std::optional<std::string> Input::text_attribute(const char* name) const {
+  const Quiet quiet;
+  if (H5Aexists(file_, name) <= 0) return std::nullopt;
+  const Handle attribute(H5Aopen(file_, name, H5P_DEFAULT), H5Aclose);
+  if (!attribute.valid()) fail(std::string("attribute ") + name + ": " + last_error());
+  const Handle type(H5Aget_type(attribute), H5Tclose);
+  const Handle space(H5Aget_space(attribute), H5Sclose);
+  const std::size_t size = H5Tget_size(type);
+  if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || size > kMaxTextBytes ||
+      H5Sget_simple_extent_npoints(space) != 1) {
+    fail(std::string("attribute ") + name + " is not a short text");
+  }
+  std::string text(size, '\0');
+  if (H5Aread(attribute, type, text.data()) < 0) fail(std::string("attribute ") + name + ": " + last_error());
+  text.resize(std::min(text.size(), text.find('\0')));
+  return text;
+}
+
+}  // namespace esim::hdf5

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <utility>
+
+#include "esim/core/image.h"
+#include "esim/record/output_file.h"
+#include "esim/record/record.h"
+
+namespace esim {
+
+/// Irradiance of one camera's ground-truth frames as 8-bit grey PNG, sRGB-encoded: 000000.png and so on in a folder,
+/// beside timestamps.txt with lines `index t_s file`.
+class ImagesPngWriter final : public Sink {
+ public:
+  ImagesPngWriter(std::filesystem::path folder, int camera) : folder_(std::move(folder)), camera_(camera) {}
+
+  void begin(const RecordingInfo& info) override;
+  void write(const Record& record) override;
+  void end(bool complete) override;
+
+ private:
+  std::filesystem::path folder_;
+  int camera_;
+  std::int64_t count_ = 0;
+  std::optional<OutputFile> timestamps_;
+};
+
+/// Linear irradiance in 8-bit sRGB (IEC 61966-2-1): 0 and below, and NaN, to 0; 1 and above to 255.
+Image<std::uint8_t> encode_srgb(const Image<float>& irradiance);
+
+}  // namespace esim

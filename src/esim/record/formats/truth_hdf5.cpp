@@ -1,0 +1,131 @@
+#include "esim/record/formats/truth_hdf5.h"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "esim/core/error.h"
+#include "esim/record/formats/hdf5_detail.h"
+
+namespace esim {
+
+struct TruthHdf5Writer::Impl {
+  Impl(std::filesystem::path file_path, int camera_index, TruthHdf5Options chosen)
+      : path(std::move(file_path)), camera(camera_index), options(chosen) {}
+  ~Impl() {
+    const hdf5::Quiet quiet;
+    close_series();
+    file.reset();
+  }
+
+  void create(const CameraInfo& info);
+  void append(const TruthRecord& truth);
+  void close_series() {
+    esim_complete.reset();
+    for (hdf5::Series* series : {&t, &pose, &depth, &flow}) *series = hdf5::Series();
+  }
+  void check_size(const Image<float>& image) const;
+
+  std::filesystem::path path;
+  int camera;
+  TruthHdf5Options options;
+  int width = 0, height = 0;
+  std::vector<float> flow_frame;
+
+  // The series close before the file.
+  std::optional<hdf5::Output> file;
+  hdf5::Handle esim_complete;
+  hdf5::Series t, pose, depth, flow;
+};
+
+void TruthHdf5Writer::Impl::create(const CameraInfo& info) {
+  width = info.model.width;
+  height = info.model.height;
+  const auto rows = static_cast<hsize_t>(height), columns = static_cast<hsize_t>(width);
+
+  const hdf5::Quiet quiet;
+  file.emplace(path);
+  const auto describe = [&](const hdf5::Series& series, const char* unit, const char* convention) {
+    file->create_text_attribute(series.id(), "unit", unit);
+    file->create_text_attribute(series.id(), "convention", convention);
+  };
+  t = hdf5::Series(*file, "t", {H5T_STD_I64LE, {}, 256, Compression::none});
+  describe(t, "ns", "time of the frame");
+  pose = hdf5::Series(*file, "T_world_camera", {H5T_IEEE_F64LE, {7}, 64, Compression::none});
+  describe(pose, "m",
+           "tx ty tz qx qy qz qw: p_world = R(q) p_camera + t, Hamilton quaternion; camera x right, y down, "
+           "z forward");
+  if (options.depth) {
+    depth = hdf5::Series(*file, "depth", {H5T_IEEE_F32LE, {rows, columns}, 1, options.compression});
+    describe(depth, "m", "[frame, y, x]: z in the camera frame (planar depth); +inf where nothing is seen");
+  }
+  if (options.flow) {
+    flow = hdf5::Series(*file, "flow", {H5T_IEEE_F32LE, {2, rows, columns}, 1, options.compression});
+    describe(flow, "px/s", "[frame, component, y, x]: velocity of the image point, x to the right, then y downwards");
+    flow_frame.resize(2 * rows * columns);
+  }
+  file->create_attribute(file->id(), "width", static_cast<std::uint32_t>(width));
+  file->create_attribute(file->id(), "height", static_cast<std::uint32_t>(height));
+  esim_complete = file->create_attribute(file->id(), "esim_complete", std::uint8_t{0});
+  file->flush();
+}
+
+void TruthHdf5Writer::Impl::check_size(const Image<float>& image) const {
+  if (image.width() == width && image.height() == height) return;
+  throw InternalError(path.string() + ": a ground-truth image has " + std::to_string(image.width()) + "x" +
+                      std::to_string(image.height()) + " pixels, its camera " + std::to_string(width) + "x" +
+                      std::to_string(height));
+}
+
+void TruthHdf5Writer::Impl::append(const TruthRecord& truth) {
+  const hdf5::Quiet quiet;
+  if (options.depth) {
+    check_size(truth.depth);
+    depth.append(truth.depth.pixels());
+  }
+  if (options.flow) {
+    check_size(truth.flow_x);
+    check_size(truth.flow_y);
+    const auto middle = std::copy(truth.flow_x.pixels().begin(), truth.flow_x.pixels().end(), flow_frame.begin());
+    std::copy(truth.flow_y.pixels().begin(), truth.flow_y.pixels().end(), middle);
+    flow.append(std::span<const float>(flow_frame));
+  }
+  const Eigen::Vector3d& p = truth.T_world_camera.translation;
+  const Eigen::Quaterniond& q = truth.T_world_camera.rotation;
+  const std::array<double, 7> numbers = {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
+  pose.append(std::span<const double>(numbers));
+  const std::int64_t time = truth.t;
+  t.append(std::span<const std::int64_t>(&time, 1));
+  file->flush();
+}
+
+TruthHdf5Writer::TruthHdf5Writer(std::filesystem::path path, int camera, TruthHdf5Options options)
+    : impl_(std::make_unique<Impl>(std::move(path), camera, options)) {
+  hdf5::require_available(options.compression);
+}
+
+TruthHdf5Writer::~TruthHdf5Writer() = default;
+
+void TruthHdf5Writer::begin(const RecordingInfo& info) {
+  impl_->create(info.cameras.at(static_cast<std::size_t>(impl_->camera)));
+}
+
+void TruthHdf5Writer::write(const Record& record) {
+  const auto* truth = std::get_if<TruthRecord>(&record);
+  if (truth != nullptr && truth->camera == impl_->camera) impl_->append(*truth);
+}
+
+void TruthHdf5Writer::end(bool complete) {
+  if (!impl_->file) return;
+  const hdf5::Quiet quiet;
+  if (complete) {
+    constexpr std::uint8_t kOne = 1;
+    impl_->file->check(H5Awrite(impl_->esim_complete, H5T_NATIVE_UINT8, &kOne));
+  }
+  impl_->close_series();
+  impl_->file->close();
+  impl_->file.reset();
+}
+
+}  // namespace esim

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "esim/record/formats/compression.h"
+#include "esim/record/record.h"
+
+namespace esim {
+
+struct TruthHdf5Options {
+  bool depth = true;
+  bool flow = true;
+  Compression compression = Compression::blosc;
+};
+
+/// Ground truth of one camera:
+///
+///   t               int64 [N]           ns
+///   T_world_camera  float64 [N, 7]      tx ty tz (m) qx qy qz qw
+///   depth           float32 [N, H, W]   m, planar; +inf where nothing is seen
+///   flow            float32 [N, 2, H, W]  px/s, x to the right, then y downwards
+///
+/// with units and conventions as attributes of each. One frame is one chunk, and is in the file as soon as write()
+/// returns.
+class TruthHdf5Writer final : public Sink {
+ public:
+  /// Throws UserError if the compression is not available.
+  TruthHdf5Writer(std::filesystem::path path, int camera, TruthHdf5Options options = {});
+  ~TruthHdf5Writer() override;
+
+  void begin(const RecordingInfo& info) override;
+  void write(const Record& record) override;
+  void end(bool complete) override;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace esim

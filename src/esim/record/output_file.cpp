@@ -1,0 +1,80 @@
+#include "esim/record/output_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "esim/core/error.h"
+
+namespace esim {
+namespace {
+
+constexpr std::size_t kBufferBytes = 1 << 18;
+
+}  // namespace
+
+std::string system_reason(int error_number) { return std::generic_category().message(error_number); }
+
+void throw_cannot_write(const std::filesystem::path& path, std::string_view reason) {
+  throw OutputError("cannot write " + path.string() + ": " + std::string(reason));
+}
+
+OutputFile::OutputFile(std::filesystem::path path) : path_(std::move(path)) {
+  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (descriptor_ < 0) throw_cannot_write(path_, system_reason(errno));
+}
+
+OutputFile::~OutputFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void OutputFile::append(std::string_view text) {
+  buffer_ += text;
+  flush_if_full();
+}
+
+void OutputFile::flush_if_full() {
+  if (buffer_.size() >= kBufferBytes) flush();
+}
+
+void OutputFile::flush() {
+  std::string_view rest = buffer_;
+  while (!rest.empty()) {
+    const ssize_t written = ::write(descriptor_, rest.data(), rest.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) throw_cannot_write(path_, system_reason(errno));
+    rest.remove_prefix(static_cast<std::size_t>(written));
+  }
+  buffer_.clear();
+}
+
+void OutputFile::close() {
+  if (descriptor_ < 0) return;
+  flush();
+  // Pipes and devices cannot be synchronised: EINVAL is no failure.
+  if (::fsync(descriptor_) != 0 && errno != EINVAL) throw_cannot_write(path_, system_reason(errno));
+  if (::close(std::exchange(descriptor_, -1)) != 0) throw_cannot_write(path_, system_reason(errno));
+}
+
+void write_file_atomically(const std::filesystem::path& path, std::string_view text) {
+  std::filesystem::path temporary = path;
+  temporary += ".tmp";
+  OutputFile file(temporary);
+  file.append(text);
+  file.close();
+  std::error_code error;
+  std::filesystem::rename(temporary, path, error);
+  if (error) throw_cannot_write(path, error.message());
+}
+
+void sync_directory(const std::filesystem::path& directory) {
+  const int descriptor = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
+}  // namespace esim

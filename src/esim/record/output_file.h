@@ -1,0 +1,51 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace esim {
+
+/// A file being written: buffered, and every failure is an OutputError with the file's name and the system's reason.
+class OutputFile {
+ public:
+  /// Creates the file, or empties the one that is there.
+  explicit OutputFile(std::filesystem::path path);
+
+  /// Closes without writing what is still buffered: after close() nothing is.
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  /// Room to append text to; call flush_if_full() after each portion.
+  std::string& buffer() { return buffer_; }
+  void append(std::string_view text);
+  void flush_if_full();
+
+  /// Hands what is buffered to the system, so that it survives the end of this process.
+  void flush();
+
+  /// Writes everything to the disk and closes.
+  void close();
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  std::string buffer_;
+  int descriptor_ = -1;
+};
+
+/// Puts `text` into the file at once: readers see the old content or the new one, never a part.
+void write_file_atomically(const std::filesystem::path& path, std::string_view text);
+
+/// Makes the names in a directory durable. Silent where the file system cannot do that.
+void sync_directory(const std::filesystem::path& directory);
+
+/// The system's words for an errno value: "No space left on device".
+std::string system_reason(int error_number);
+
+/// An OutputError: "cannot write FILE: REASON".
+[[noreturn]] void throw_cannot_write(const std::filesystem::path& path, std::string_view reason);
+
+}  // namespace esim

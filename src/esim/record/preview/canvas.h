@@ -1,0 +1,44 @@
+#pragma once
+
+#include <string_view>
+#include <utility>
+
+#include "esim/core/image.h"
+#include "esim/record/preview/colours.h"
+
+namespace esim {
+
+enum class Align { left, centre, right };
+
+/// Colour pixels to draw figures on. What lies outside is cut off.
+class Canvas {
+ public:
+  Canvas(int width, int height, Rgb background) : pixels_(width, height, background) {}
+
+  const Image<Rgb>& pixels() const { return pixels_; }
+  Image<Rgb> take() && { return std::move(pixels_); }
+
+  void draw(const Image<Rgb>& image, int x, int y);
+  void fill(const Tile& area, Rgb colour);
+  void outline(const Tile& area, Rgb colour);
+
+  /// One line of ASCII text; capitals are `height` px tall and stand on `baseline`. Returns its width.
+  int text(int x, int baseline, std::string_view line, int height, Rgb colour, Align align = Align::left);
+
+  /// Width that text() would take.
+  static int text_width(std::string_view line, int height);
+
+ private:
+  Image<Rgb> pixels_;
+};
+
+/// Mean over the source pixels that each target pixel covers; for targets that are not larger.
+Image<float> reduce_mean(const Image<float>& image, int width, int height);
+
+/// The source pixel nearest to each target pixel's centre; mixes nothing, so that edges and infinities stay.
+Image<float> reduce_nearest(const Image<float>& image, int width, int height);
+
+/// Larger by repeating pixels; by factors that are not whole, with the borders between pixels blended.
+Image<Rgb> enlarge(const Image<Rgb>& image, int width, int height);
+
+}  // namespace esim

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+
+#include "esim/core/image.h"
+
+namespace esim {
+
+struct Rgb {
+  std::uint8_t r = 0, g = 0, b = 0;
+  bool operator==(const Rgb&) const = default;
+};
+
+/// `amount` (0 to 1) of the way from one colour to another.
+Rgb mix(Rgb from, Rgb to, float amount);
+
+// Orange and blue are told apart with any kind of colour vision.
+inline constexpr Rgb kOnColour{255, 152, 20};
+inline constexpr Rgb kOffColour{40, 140, 255};
+
+/// Where nothing is seen; not a colour of the depth map.
+inline constexpr Rgb kNoDepthColour{196, 196, 196};
+
+/// Events counted per pixel over the dimmed image: hue by the share of ON, opacity by the number, full from 8 events
+/// on. Counts may be fractions, as resampled ones are. Irradiance is linear; all images have the same size.
+Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, const Image<float>& irradiance);
+
+/// Image velocity in the colour code of Baker et al., "A Database and Evaluation Methodology for Optical Flow", IJCV
+/// 2011: hue by direction, white at rest, saturated at `full_scale_px_per_s`, darker beyond it.
+Image<Rgb> colour_flow(const Image<float>& flow_x, const Image<float>& flow_y, float full_scale_px_per_s);
+Rgb colour_flow(float x, float y, float full_scale);
+
+/// Depth in the map viridis, on a logarithmic scale from near_m (yellow) to far_m (violet), clamped; kNoDepthColour
+/// where there is none (infinite, NaN or not positive). 0 < near_m < far_m.
+Image<Rgb> colour_depth(const Image<float>& depth_m, float near_m, float far_m);
+Rgb colour_depth(float depth_m, float near_m, float far_m);
+
+}  // namespace esim

@@ -1,0 +1,139 @@
+#include "esim/record/preview/video_file.h"
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
+#include <libavutil/opt.h>
+#include <libswscale/swscale.h>
+}
+
+#include <cmath>
+#include <string>
+
+#include "esim/record/output_file.h"
+
+namespace esim {
+namespace {
+
+struct Deleter {
+  void operator()(AVCodecContext* context) const { avcodec_free_context(&context); }
+  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
+  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
+  void operator()(SwsContext* context) const { sws_freeContext(context); }
+  void operator()(AVFormatContext* context) const {
+    if (context->pb != nullptr) avio_closep(&context->pb);
+    avformat_free_context(context);
+  }
+};
+
+template <typename T>
+using Owned = std::unique_ptr<T, Deleter>;
+
+std::string reason_of(int error) {
+  char text[AV_ERROR_MAX_STRING_SIZE] = {};
+  av_strerror(error, text, sizeof text);
+  return text;
+}
+
+}  // namespace
+
+struct VideoFile::Impl {
+  std::filesystem::path path;
+  Owned<AVFormatContext> format;
+  Owned<AVCodecContext> encoder;
+  Owned<SwsContext> converter;
+  Owned<AVFrame> frame;
+  Owned<AVPacket> packet;
+  AVStream* stream = nullptr;  // belongs to format
+  std::int64_t frames = 0;
+
+  /// Passes a result on unless it is an error.
+  int check(int result) const {
+    if (result < 0) throw_cannot_write(path, reason_of(result));
+    return result;
+  }
+
+  void open_encoder(int width, int height, double frames_per_s);
+  void open_file();
+  void encode(const AVFrame* image);
+};
+
+void VideoFile::Impl::open_encoder(int width, int height, double frames_per_s) {
+  const AVCodec* codec = avcodec_find_encoder_by_name("libx264");
+  if (codec == nullptr) throw_cannot_write(path, "FFmpeg has no H.264 encoder (libx264); record without the preview");
+  encoder.reset(avcodec_alloc_context3(codec));
+  encoder->width = width;
+  encoder->height = height;
+  encoder->pix_fmt = AV_PIX_FMT_YUV420P;
+  encoder->time_base = av_inv_q(av_d2q(frames_per_s, 100000));
+  encoder->thread_count = 1;  // the same file on every machine, and processors left for the simulation
+  encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+  av_opt_set(encoder->priv_data, "preset", "ultrafast", 0);
+  av_opt_set(encoder->priv_data, "crf", "20", 0);
+  check(avcodec_open2(encoder.get(), codec, nullptr));
+
+  frame.reset(av_frame_alloc());
+  frame->format = encoder->pix_fmt;
+  frame->width = width;
+  frame->height = height;
+  check(av_frame_get_buffer(frame.get(), 0));
+  packet.reset(av_packet_alloc());
+  converter.reset(sws_getContext(width, height, AV_PIX_FMT_RGB24, width, height, encoder->pix_fmt, SWS_BILINEAR,
+                                 nullptr, nullptr, nullptr));
+}
+
+void VideoFile::Impl::open_file() {
+  AVFormatContext* context = nullptr;
+  check(avformat_alloc_output_context2(&context, nullptr, "mp4", nullptr));
+  format.reset(context);
+  format->flags |= AVFMT_FLAG_BITEXACT;
+  stream = avformat_new_stream(format.get(), nullptr);
+  stream->time_base = encoder->time_base;
+  stream->avg_frame_rate = av_inv_q(encoder->time_base);
+  check(avcodec_parameters_from_context(stream->codecpar, encoder.get()));
+  check(avio_open(&format->pb, ("file:" + path.string()).c_str(), AVIO_FLAG_WRITE));
+  check(avformat_write_header(format.get(), nullptr));
+}
+
+void VideoFile::Impl::encode(const AVFrame* image) {
+  check(avcodec_send_frame(encoder.get(), image));
+  while (true) {
+    const int result = avcodec_receive_packet(encoder.get(), packet.get());
+    if (result == AVERROR(EAGAIN) || result == AVERROR_EOF) return;
+    check(result);
+    packet->duration = 1;
+    av_packet_rescale_ts(packet.get(), encoder->time_base, stream->time_base);
+    check(av_interleaved_write_frame(format.get(), packet.get()));
+  }
+}
+
+VideoFile::VideoFile(std::filesystem::path path, int width, int height, double frames_per_s)
+    : impl_(std::make_unique<Impl>()) {
+  av_log_set_level(AV_LOG_QUIET);  // what fails becomes an exception
+  impl_->path = std::move(path);
+  OutputFile(impl_->path).close();  // says why, if the file cannot be created
+  impl_->open_encoder(width, height, frames_per_s);
+  impl_->open_file();
+}
+
+VideoFile::~VideoFile() = default;
+
+void VideoFile::append(const Image<Rgb>& frame) {
+  impl_->check(av_frame_make_writable(impl_->frame.get()));
+  const std::uint8_t* const source[] = {reinterpret_cast<const std::uint8_t*>(frame.data())};
+  const int source_stride[] = {3 * frame.width()};
+  sws_scale(impl_->converter.get(), source, source_stride, 0, frame.height(), impl_->frame->data,
+            impl_->frame->linesize);
+  impl_->frame->pts = impl_->frames++;
+  impl_->encode(impl_->frame.get());
+}
+
+void VideoFile::close() {
+  impl_->encode(nullptr);
+  impl_->check(av_write_trailer(impl_->format.get()));
+  avio_flush(impl_->format->pb);
+  impl_->check(impl_->format->pb->error);
+  impl_->check(avio_closep(&impl_->format->pb));
+}
+
+}  // namespace esim

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "esim/core/image.h"
+#include "esim/core/time.h"
+#include "esim/events/event.h"
+#include "esim/geometry/camera.h"
+#include "esim/geometry/se3.h"
+
+namespace esim {
+
+/// One camera of the recording.
+struct CameraInfo {
+  std::string name;   ///< unique within the rig: `cam0`, ...
+  Camera model;       ///< intrinsics and distortion
+  SE3 T_body_camera;  ///< pose of the camera in the body frame
+};
+
+/// What is true of a recording from its start to its end.
+struct RecordingInfo {
+  std::vector<CameraInfo> cameras;
+  TimeNs start = 0;          ///< time of the first sample
+  TimeNs end = 0;            ///< time of the last sample, if the recording becomes complete
+  double truth_rate_hz = 0;  ///< ground-truth frames per second; 0: none
+};
+
+/// Events of one camera, in order, none at or before what the same camera reported earlier.
+struct EventsRecord {
+  int camera = 0;  ///< index into RecordingInfo::cameras
+  EventSpan events;
+};
+
+/// Ground truth of one camera at one instant. The images are borrowed for the duration of the call.
+struct TruthRecord {
+  int camera = 0;
+  TimeNs t = 0;
+  SE3 T_world_camera;
+  const Image<float>& irradiance;  ///< E, 1.0 = diffuse white
+  const Image<float>& depth;       ///< Z, planar, m; +inf where nothing is seen
+  const Image<float>& flow_x;      ///< motion field, px/s, positive to the right
+  const Image<float>& flow_y;      ///< motion field, px/s, positive downwards
+};
+
+/// Pose of the body.
+struct PoseRecord {
+  TimeNs t = 0;
+  SE3 T_world_body;
+};
+
+using Record = std::variant<EventsRecord, TruthRecord, PoseRecord>;
+
+/// Where a simulation goes: one class per format, each taking the kinds of record that it can hold.
+/// Calls come from one thread: begin, then write in time order per camera, then end.
+/// Throws OutputError (what, which file) when something cannot be written.
+class Sink {
+ public:
+  virtual ~Sink() = default;
+
+  virtual void begin(const RecordingInfo& info) = 0;
+  virtual void write(const Record& record) = 0;
+
+  /// Makes everything durable. `complete` is false when the simulation was interrupted.
+  virtual void end(bool complete) = 0;
+};
+
+}  // namespace esim

@@ -1,0 +1,38 @@
+#include "esim/render/bands.h"
+
+#include <algorithm>
+
+#include "esim/render/motion_field.h"
+
+namespace esim {
+namespace {
+
+constexpr int kBandRows = 8;
+
+std::vector<Tile> cut_into_bands(const std::vector<Tile>& tiles) {
+  std::vector<Tile> bands;
+  for (const Tile& tile : tiles) {
+    for (int y = 0; y < tile.height; y += kBandRows) {
+      bands.push_back({tile.x, tile.y + y, tile.width, std::min(kBandRows, tile.height - y)});
+    }
+  }
+  return bands;
+}
+
+}  // namespace
+
+void render_in_bands(const RenderRequest& request, const PixelRays& rays, const Workers& workers, Sample& sample,
+                     const std::function<void(const Tile& band)>& shade) {
+  sample.resize(rays.x.width(), rays.x.height());
+  sample.t = request.t;
+  sample.tiles = request.tiles;
+
+  const std::vector<Tile> bands = cut_into_bands(request.tiles);
+  workers.for_each(static_cast<int>(bands.size()), [&](int i) {
+    const Tile& band = bands[static_cast<std::size_t>(i)];
+    shade(band);
+    motion_field(rays, request.camera, band, sample);
+  });
+}
+
+}  // namespace esim

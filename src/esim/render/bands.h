@@ -1,0 +1,16 @@
+#pragma once
+
+#include <functional>
+
+#include "esim/core/parallel.h"
+#include "esim/render/pixel_rays.h"
+#include "esim/render/renderer.h"
+
+namespace esim {
+
+/// What renderers on the CPU share: makes room in `sample`, cuts the request's tiles into bands of a few rows, calls
+/// `shade` for each of them in parallel to fill E and Z, and derives V from Z and the camera's twist.
+void render_in_bands(const RenderRequest& request, const PixelRays& rays, const Workers& workers, Sample& sample,
+                     const std::function<void(const Tile& band)>& shade);
+
+}  // namespace esim

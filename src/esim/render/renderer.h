@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "esim/core/image.h"
+#include "esim/core/time.h"
+#include "esim/motion/trajectory.h"
+#include "esim/render/sample.h"
+
+namespace esim {
+
+/// What to evaluate: some pixels of one camera at one time.
+struct RenderRequest {
+  TimeNs t = 0;
+  Kinematics camera;        ///< pose and twist of the camera frame (x right, y down, z forward) at t
+  std::vector<Tile> tiles;  ///< disjoint, inside the image, at least one
+};
+
+/// The smallest thing that a renderer can evaluate at its proper cost.
+enum class Granularity { tile, frame };
+
+struct RendererTraits {
+  std::string name;                             ///< as in the scenario, for reports
+  Granularity granularity = Granularity::tile;  ///< frame: asking for a tile costs as much as the whole image
+};
+
+/// Evaluates a scene as one camera sees it. A renderer is made for one camera and one scene, keeps no history, and
+/// never chooses a time: the same request gives the same sample, whatever was asked before and with any number of
+/// threads, and a tile's pixels are the same as in the whole frame.
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+
+  virtual RendererTraits traits() const = 0;
+
+  /// Fills E, Z and V of the request's tiles in `sample`, which is resized to the camera's image.
+  virtual void render(const RenderRequest& request, Sample& sample) = 0;
+};
+
+}  // namespace esim

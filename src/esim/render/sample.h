@@ -1,0 +1,38 @@
+#pragma once
+
+#include <vector>
+
+#include "esim/core/image.h"
+#include "esim/core/time.h"
+
+namespace esim {
+
+/// One evaluation of the scene by one camera: a field per quantity, all of the image's size, of which only the
+/// pixels of `tiles` are current.
+struct Sample {
+  TimeNs t = 0;             // of the evaluation            set by the renderer from the request
+  std::vector<Tile> tiles;  // that were evaluated          set by the renderer from the request
+
+  Image<float> irradiance;  // E, linear, 1.0 = white       computed by the renderer
+  Image<float> depth;       // Z, planar, m; +inf: nothing  computed by the renderer
+  Image<float> flow_x;      // V, px/s, to the right        computed by motion_field() from Z and the twist
+  Image<float> flow_y;      // V, px/s, downwards           computed by motion_field() from Z and the twist
+
+  /// Makes room for width x height pixels; keeps the content if the size is right already.
+  void resize(int width, int height) {
+    if (irradiance.width() == width && irradiance.height() == height) return;
+    for (Image<float>* field : {&irradiance, &depth, &flow_x, &flow_y}) *field = Image<float>(width, height);
+  }
+};
+
+/// The irradiance of a tile's pixels between two of their samples, linear in log-irradiance unless a sensor says
+/// otherwise. Contiguous segments of a tile follow each other: t0 of one is t1 of the one before. The first one of
+/// a tile is an instant (t0 == t1): it sets the pixels' reference.
+struct Segment {
+  Tile tile;
+  TimeNs t0 = 0, t1 = 0;
+  const Image<float>* irradiance0 = nullptr;  ///< E at t0; borrowed, of the whole image's size
+  const Image<float>* irradiance1 = nullptr;  ///< E at t1
+};
+
+}  // namespace esim

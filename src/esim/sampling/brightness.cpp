@@ -1,0 +1,45 @@
+#include <cmath>
+#include <limits>
+
+#include "esim/core/fast_log.h"
+#include "esim/sampling/criterion.h"
+#include "esim/sampling/row_maximum.h"
+
+namespace esim {
+
+double fastest_brightness_change_per_s(const Sample& sample, double log_eps, const Workers& workers) {
+  const Image<float>& irradiance = sample.irradiance;
+  const int width = irradiance.width(), height = irradiance.height();
+  const float eps = static_cast<float>(log_eps);
+  return row_maximum(height, workers, [&](int y) {
+    // Central differences of L = ln(E + eps), as logarithms of ratios; one-sided at the image's border.
+    const int above = std::max(y - 1, 0), below = std::min(y + 1, height - 1);
+    const float *const row = irradiance.row(y), *const row_above = irradiance.row(above),
+                       *const row_below = irradiance.row(below);
+    const float *const vx = sample.flow_x.row(y), *const vy = sample.flow_y.row(y);
+    const float per_dy = below > above ? 1.0F / static_cast<float>(below - above) : 0.0F;
+    const auto rate_at = [&](int x, int left, int right, float per_dx) {
+      const float gradient_x = fast_log((row[right] + eps) / (row[left] + eps)) * per_dx;
+      const float gradient_y = fast_log((row_below[x] + eps) / (row_above[x] + eps)) * per_dy;
+      const float rate = std::fabs(gradient_x * vx[x] + gradient_y * vy[x]);
+      return rate <= std::numeric_limits<float>::max() ? rate : 0.0F;
+    };
+    float maximum = 0;
+#pragma omp simd reduction(max : maximum)
+    for (int x = 1; x < width - 1; ++x) {
+      const float rate = rate_at(x, x - 1, x + 1, 0.5F);
+      maximum = rate > maximum ? rate : maximum;
+    }
+    if (width > 1) {
+      maximum = std::max({maximum, rate_at(0, 0, 1, 1.0F), rate_at(width - 1, width - 2, width - 1, 1.0F)});
+    }
+    return maximum;
+  });
+}
+
+double wanted_interval_s(const BrightnessSampling& options, const SensorTraits& sensor, const Sample& sample,
+                         const Workers& workers) {
+  return options.lambda * sensor.contrast_threshold / fastest_brightness_change_per_s(sample, sensor.log_eps, workers);
+}
+
+}  // namespace esim

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "esim/core/image.h"
+#include "esim/core/time.h"
+#include "esim/render/sample.h"
+
+namespace esim {
+
+/// Which pixels to evaluate at which time.
+struct SampleRequest {
+  TimeNs t = 0;
+  std::vector<Tile> tiles;
+};
+
+/// What a sampler has decided so far, for the report.
+struct SamplingStatistics {
+  std::int64_t samples = 0;            ///< requests answered
+  std::int64_t pixel_evaluations = 0;  ///< pixels in them
+  std::int64_t held_to_max_rate = 0;   ///< intervals that the criterion wanted shorter than 1 / max_rate_hz
+};
+
+/// Decides when which pixels of one camera are evaluated, and turns the samples into segments. A sampler never
+/// renders. Use: while next() gives a request, render it, and pass the sample to accept().
+class Sampler {
+ public:
+  virtual ~Sampler() = default;
+
+  /// The next evaluation wanted, empty after the last one; the same until accept() is called.
+  virtual std::optional<SampleRequest> next() const = 0;
+
+  /// Takes the evaluation that next() asked for. Returns the segments that are now known: per tile contiguous, in
+  /// order of time, valid until the next call. The sample's buffers are exchanged for used ones.
+  virtual std::span<const Segment> accept(Sample& sample) = 0;
+
+  /// No segment that is still to come begins before this time. Never decreases; the end after the last sample.
+  virtual TimeNs watermark() const = 0;
+
+  virtual SamplingStatistics statistics() const = 0;
+};
+
+}  // namespace esim

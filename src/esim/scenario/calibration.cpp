@@ -1,0 +1,169 @@
+#include "esim/scenario/calibration.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include "esim/core/error.h"
+
+namespace esim {
+namespace {
+
+/// One camera's part of a file, for reading and for messages.
+struct Section {
+  const std::filesystem::path& file;
+  std::string name;
+  YAML::Node node;
+
+  [[noreturn]] void fail(const std::string& message) const {
+    throw UserError(fmt::format("calibration {}: {}: {}", file.string(), name, message));
+  }
+
+  YAML::Node at(const char* key) const {
+    const YAML::Node value = node[key];
+    if (!value.IsDefined()) fail(fmt::format("{} is missing", key));
+    return value;
+  }
+
+  template <typename T>
+  T as(const char* key) const {
+    try {
+      return at(key).as<T>();
+    } catch (const YAML::Exception&) {
+      fail(fmt::format("{} has the wrong type", key));
+    }
+  }
+
+  /// Numbers of a flat list or of a list of rows.
+  std::vector<double> numbers(const YAML::Node& list, const char* key, std::size_t count) const {
+    std::vector<double> values;
+    try {
+      for (const YAML::Node& entry : list) {
+        if (entry.IsSequence()) {
+          for (const YAML::Node& value : entry) values.push_back(value.as<double>());
+        } else {
+          values.push_back(entry.as<double>());
+        }
+      }
+    } catch (const YAML::Exception&) {
+      fail(fmt::format("{} holds something that is not a number", key));
+    }
+    if (values.size() != count) fail(fmt::format("{} needs {} numbers and has {}", key, count, values.size()));
+    return values;
+  }
+
+  SE3 pose(const YAML::Node& list, const char* key) const {
+    const std::vector<double> values = numbers(list, key, 16);
+    try {
+      return SE3::from_matrix(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data()));
+    } catch (const UserError& error) {
+      fail(fmt::format("{}: {}", key, error.what()));
+    }
+  }
+};
+
+Distortion distortion_of(const Section& camera, const std::string& model, const YAML::Node& list, const char* key) {
+  const auto four = [&] { return camera.numbers(list, key, 4); };
+  if (model == "none") return NoDistortion{};
+  if (model == "radtan" || model == "radial-tangential") {
+    if (list.size() == 5) {
+      const auto k = camera.numbers(list, key, 5);
+      return RadialTangential{k[0], k[1], k[2], k[3], k[4]};
+    }
+    const auto k = four();
+    return RadialTangential{k[0], k[1], k[2], k[3], 0.0};
+  }
+  if (model == "equidistant" || model == "equi") {
+    const auto k = four();
+    return Equidistant{k[0], k[1], k[2], k[3]};
+  }
+  if (model == "fov") return Fov{camera.numbers(list, key, 1)[0]};
+  camera.fail(fmt::format(
+      "distortion model '{}' is not supported; use none, radial-tangential (radtan), equidistant or fov", model));
+}
+
+Camera camera_of(const Section& camera, const std::string& projection, int width, int height,
+                 const YAML::Node& intrinsics, const char* intrinsics_key, const Distortion& distortion) {
+  if (projection != "pinhole") camera.fail(fmt::format("camera model '{}' is not supported; use pinhole", projection));
+  const auto f = camera.numbers(intrinsics, intrinsics_key, 4);
+  Camera model{width, height, f[0], f[1], f[2], f[3], distortion};
+  try {
+    model.validate();
+  } catch (const UserError& error) {
+    camera.fail(error.what());
+  }
+  return model;
+}
+
+/// The original ESIM's layout.
+std::vector<CalibratedCamera> read_rig(const YAML::Node& root, const std::filesystem::path& file) {
+  std::vector<CalibratedCamera> cameras;
+  for (std::size_t i = 0; i < root["cameras"].size(); ++i) {
+    const YAML::Node entry = root["cameras"][i];
+    const Section outer{file, fmt::format("cameras[{}]", i), entry};
+    const Section camera{file, outer.name, outer.at("camera")};
+    const Section distortion{file, outer.name + ".distortion", camera.at("distortion")};
+    const YAML::Node parameters =
+        distortion.node["parameters"].IsDefined() ? distortion.node["parameters"]["data"] : YAML::Node();
+    const Camera model =
+        camera_of(camera, camera.as<std::string>("type"), camera.as<int>("image_width"), camera.as<int>("image_height"),
+                  camera.at("intrinsics")["data"], "intrinsics",
+                  distortion_of(distortion, distortion.as<std::string>("type"), parameters, "parameters"));
+    const std::string name =
+        camera.node["label"].IsDefined() ? camera.as<std::string>("label") : fmt::format("cam{}", i);
+    cameras.push_back({name, model, outer.pose(outer.at("T_B_C")["data"], "T_B_C")});
+  }
+  return cameras;
+}
+
+/// Kalibr's layout. T_cam_imu maps from the IMU to the camera; T_cn_cnm1 from the camera before.
+std::vector<CalibratedCamera> read_camchain(const YAML::Node& root, const std::filesystem::path& file) {
+  std::vector<CalibratedCamera> cameras;
+  for (int i = 0; root[fmt::format("cam{}", i)].IsDefined(); ++i) {
+    const Section camera{file, fmt::format("cam{}", i), root[fmt::format("cam{}", i)]};
+    const auto resolution = camera.numbers(camera.at("resolution"), "resolution", 2);
+    const std::string distortion_model =
+        camera.node["distortion_model"].IsDefined() ? camera.as<std::string>("distortion_model") : "none";
+    const Camera model =
+        camera_of(camera, camera.as<std::string>("camera_model"), static_cast<int>(resolution[0]),
+                  static_cast<int>(resolution[1]), camera.at("intrinsics"), "intrinsics",
+                  distortion_of(camera, distortion_model, camera.node["distortion_coeffs"], "distortion_coeffs"));
+
+    SE3 T_body_camera;
+    if (const YAML::Node T_cam_imu = camera.node["T_cam_imu"]; T_cam_imu.IsDefined()) {
+      T_body_camera = camera.pose(T_cam_imu, "T_cam_imu").inverse();
+    } else if (i > 0) {
+      T_body_camera = cameras.back().T_body_camera * camera.pose(camera.at("T_cn_cnm1"), "T_cn_cnm1").inverse();
+    }
+    cameras.push_back({camera.name, model, T_body_camera});
+  }
+  return cameras;
+}
+
+}  // namespace
+
+std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error))
+    throw UserError(fmt::format("calibration {}: no such file", file.string()));
+  YAML::Node root;
+  try {
+    root = YAML::LoadFile(file.string());
+  } catch (const YAML::Exception& exception) {
+    throw UserError(fmt::format("calibration {}:{}: {}", file.string(), exception.mark.line + 1, exception.msg));
+  }
+  std::vector<CalibratedCamera> cameras;
+  try {
+    if (root.IsMap() && root["cameras"].IsDefined() && root["cameras"].IsSequence()) cameras = read_rig(root, file);
+    if (root.IsMap() && root["cam0"].IsDefined()) cameras = read_camchain(root, file);
+  } catch (const YAML::Exception& exception) {
+    throw UserError(fmt::format("calibration {}: is not laid out as expected: {}", file.string(), exception.msg));
+  }
+  if (cameras.empty()) {
+    throw UserError(fmt::format(
+        "calibration {}: holds no cameras; expected a Kalibr camchain (cam0: ...) or a rig (cameras: - camera: ...)",
+        file.string()));
+  }
+  return cameras;
+}
+
+}  // namespace esim

@@ -1,0 +1,44 @@
+#include "esim/scenario/pose_options.h"
+
+#include <Eigen/Geometry>
+
+#include "esim/core/error.h"
+
+namespace esim {
+
+Eigen::Quaterniond looking_along(const Eigen::Vector3d& direction) {
+  const Eigen::Vector3d z = direction.normalized();
+  Eigen::Vector3d x = z.cross(Eigen::Vector3d::UnitZ());
+  if (x.norm() < 1e-6) x = Eigen::Vector3d::UnitX();  // straight up or down: any level x will do
+  x.normalize();
+  Eigen::Matrix3d R;
+  R << x, z.cross(x), z;
+  return Eigen::Quaterniond(R).normalized();
+}
+
+SE3 pose_of(const PoseOptions& options, const Eigen::Quaterniond& otherwise) {
+  SE3 pose{otherwise, options.position};
+  if (options.quaternion && options.look_at) {
+    throw UserError("a pose has both quaternion and look_at; remove one of them");
+  }
+  if (options.quaternion) {
+    if (!(options.quaternion->norm() > 1e-6))
+      throw UserError("quaternion [0, 0, 0, 0] is no orientation; use [0, 0, 0, 1]");
+    pose.rotation = Eigen::Quaterniond(options.quaternion->normalized());
+  }
+  if (options.look_at) {
+    const Eigen::Vector3d direction = *options.look_at - options.position;
+    if (!(direction.norm() > 1e-9)) throw UserError("look_at is the position itself; name another point");
+    pose.rotation = looking_along(direction);
+  }
+  return pose;
+}
+
+PoseOptions options_of(const SE3& pose) {
+  PoseOptions options;
+  options.position = pose.translation;
+  options.quaternion = pose.rotation.coeffs();
+  return options;
+}
+
+}  // namespace esim

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "esim/core/describe.h"
+#include "esim/geometry/se3.h"
+
+namespace esim {
+
+/// A pose as a person writes it: a position, and either a quaternion or a point to look at.
+struct PoseOptions {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  std::optional<Eigen::Vector4d> quaternion;  ///< x y z w
+  std::optional<Eigen::Vector3d> look_at;     ///< the frame's z axis points there, its y axis down (world z is up)
+};
+
+template <class Visitor>
+void describe(Visitor& visit, PoseOptions& o) {
+  visit("position", o.position, About{"origin of the frame", "m"});
+  visit("quaternion", o.quaternion, About{"orientation, Hamilton, x y z w"});
+  visit("look_at", o.look_at,
+        About{"instead of a quaternion: point that the z axis points at, with x level and y downwards (world z is up)",
+              "m"});
+}
+
+/// The rigid motion that `options` describe; `otherwise` is the orientation where they name none.
+/// Throws UserError where the quaternion is zero, both ways of giving an orientation are used, or the point to look at
+/// is the position itself.
+SE3 pose_of(const PoseOptions& options, const Eigen::Quaterniond& otherwise = Eigen::Quaterniond::Identity());
+
+/// Options that describe `pose` exactly.
+PoseOptions options_of(const SE3& pose);
+
+/// Orientation whose z axis points along `direction`, with x level and y downwards where world z is up.
+Eigen::Quaterniond looking_along(const Eigen::Vector3d& direction);
+
+}  // namespace esim

@@ -1,0 +1,192 @@
+#include "esim/scenario/read.h"
+
+#include <fmt/format.h>
+
+#include <numbers>
+#include <set>
+
+#include "esim/scenario/calibration.h"
+#include "esim/scenario/yaml_reader.h"
+
+namespace esim {
+namespace {
+
+YAML::Node load(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error))
+    throw UserError(fmt::format("{}: no such scenario file", file.string()));
+  try {
+    return YAML::LoadFile(file.string());
+  } catch (const YAML::BadFile&) {
+    throw UserError(fmt::format("{}: cannot be read; check its permissions", file.string()));
+  } catch (const YAML::Exception& exception) {
+    throw UserError(fmt::format("{}:{}: not valid YAML: {}", file.string(), exception.mark.line + 1, exception.msg));
+  }
+}
+
+/// Sets root[a][b][c] for "a.b.c=value"; list entries are named by their index.
+std::string apply_override(YAML::Node root, const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw UserError(fmt::format("--set {}: expected key=value, for example event_camera.contrast_threshold=0.2", text));
+  }
+  const std::string key = text.substr(0, equals);
+  try {
+    const YAML::Node value = YAML::Load(text.substr(equals + 1));
+    std::size_t begin = 0;
+    YAML::Node node = root;
+    while (true) {
+      const std::size_t dot = key.find('.', begin);
+      const std::string part = key.substr(begin, dot == std::string::npos ? dot : dot - begin);
+      YAML::Node child = node.IsSequence() ? node[std::stoul(part)] : node[part];
+      if (dot == std::string::npos) {
+        child = value;
+        return key;
+      }
+      node.reset(child);
+      begin = dot + 1;
+    }
+  } catch (const YAML::Exception& exception) {
+    throw UserError(fmt::format("--set {}: cannot be set: {}", text, exception.msg));
+  } catch (const std::logic_error&) {
+    throw UserError(fmt::format("--set {}: entries of a list are named by their number", text));
+  }
+}
+
+/// What a camera inherits for `key`: the shared map, overridden entry by entry by its own. A map of another type
+/// replaces the shared one.
+YAML::Node inherit(const YAML::Node& shared, const YAML::Node& own) {
+  if (!shared.IsDefined() || !shared.IsMap()) return own;
+  if (!own.IsDefined() || !own.IsMap()) return own.IsDefined() ? own : shared;
+  const YAML::Node own_type = own["type"], shared_type = shared["type"];
+  if (own_type.IsDefined() && (!shared_type.IsDefined() || own_type.Scalar() != shared_type.Scalar())) return own;
+  YAML::Node merged = YAML::Clone(shared);
+  for (const auto& entry : own) merged[entry.first.Scalar()] = entry.second;
+  return merged;
+}
+
+/// One camera for each of its calibration file's, or itself.
+std::vector<CameraOptions> with_calibration(const CameraOptions& options) {
+  if (options.calibration.empty()) return {options};
+  std::vector<CameraOptions> cameras;
+  for (const CalibratedCamera& calibrated : read_calibration(options.calibration)) {
+    CameraOptions camera = options;
+    camera.calibration.clear();
+    const Camera& model = calibrated.model;
+    camera.width = model.width, camera.height = model.height;
+    camera.fx = model.fx, camera.fy = model.fy, camera.cx = model.cx, camera.cy = model.cy;
+    camera.T_body_camera = options_of(calibrated.T_body_camera);
+    struct ToOptions {
+      DistortionOptions operator()(const NoDistortion&) const { return NoDistortionOptions{}; }
+      DistortionOptions operator()(const RadialTangential& d) const { return RadialTangentialOptions{d}; }
+      DistortionOptions operator()(const Equidistant& d) const { return EquidistantOptions{d}; }
+      DistortionOptions operator()(const Fov& d) const { return FovOptions{d}; }
+    };
+    camera.distortion = std::visit(ToOptions{}, model.distortion);
+    cameras.push_back(camera);
+  }
+  return cameras;
+}
+
+/// Keys of a camera that its calibration file would override.
+void refuse_geometry_beside_calibration(const YAML::Node& entry, const std::string& key, const YamlSource& source) {
+  if (!entry["calibration"].IsDefined()) return;
+  for (const char* name :
+       {"width", "height", "horizontal_fov_deg", "fx", "fy", "cx", "cy", "distortion", "T_body_camera"}) {
+    if (entry[name].IsDefined()) {
+      YamlReader::fail(source, entry[name], key + "." + name,
+                       "is given by the calibration file as well; remove one of them");
+    }
+  }
+}
+
+std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource& source) {
+  const YAML::Node one = root["camera"], several = root["cameras"];
+  if (one.IsDefined() && several.IsDefined())
+    YamlReader::fail(source, several, "cameras", "camera is given as well; remove one of them");
+  if (several.IsDefined() && (!several.IsSequence() || several.size() == 0))
+    YamlReader::fail(source, several, "cameras", "must be a list of at least one camera");
+
+  std::vector<CameraOptions> cameras;
+  const std::size_t count = several.IsDefined() ? several.size() : 1;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string key = several.IsDefined() ? fmt::format("cameras.{}", i) : "camera";
+    const YAML::Node entry = several.IsDefined() ? several[i] : one;
+    YAML::Node merged = entry.IsDefined() ? YAML::Clone(entry) : YAML::Node(YAML::NodeType::Map);
+    if (merged.IsMap()) {
+      for (const char* part : {"sampling", "event_camera"}) {
+        const YAML::Node inherited = inherit(root[part], std::as_const(merged)[part]);
+        if (inherited.IsDefined()) merged[part] = inherited;
+      }
+      refuse_geometry_beside_calibration(std::as_const(merged), key, source);
+    }
+    CameraOptions options;
+    YamlReader reader(merged, key, source);
+    describe(reader, options);
+    reader.finish();
+    for (CameraOptions& camera : with_calibration(options)) cameras.push_back(std::move(camera));
+  }
+  return cameras;
+}
+
+/// Gives every camera a name of its own, fit for a folder.
+void name_cameras(std::vector<CameraOptions>& cameras, const YamlSource& source) {
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    std::string& name = cameras[i].name;
+    if (name.empty()) name = fmt::format("cam{}", i);
+    const bool plain =
+        name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == std::string::npos;
+    if (!plain)
+      throw UserError(
+          fmt::format("{}: camera name '{}': use letters, digits, _ and - only", source.file.string(), name));
+    if (!names.insert(name).second)
+      throw UserError(fmt::format("{}: two cameras are named {}; name them apart", source.file.string(), name));
+  }
+}
+
+}  // namespace
+
+Scenario read_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
+  YAML::Node root = load(file);
+  YamlSource source{file, {}};
+  if (!root.IsMap()) YamlReader(root, "", source);
+  for (const std::string& text : overrides) source.changed.push_back(apply_override(root, text));
+
+  Scenario scenario;
+  YamlReader reader(root, "", source);
+  describe(reader, scenario);
+  for (const char* key : {"camera", "cameras", "sampling", "event_camera"}) reader.know(key);
+  reader.finish();
+  for (const char* required : {"renderer", "trajectory"}) {
+    if (!std::as_const(root)[required].IsDefined())
+      YamlReader::fail(source, YAML::Node(YAML::NodeType::Undefined), required, "is missing; every scenario needs one");
+  }
+  scenario.cameras = read_cameras(std::as_const(root), source);
+  name_cameras(scenario.cameras, source);
+  return scenario;
+}
+
+Camera camera_model(const CameraOptions& options) {
+  Camera camera =
+      Camera::from_fov(options.width, options.height, options.horizontal_fov_deg * std::numbers::pi / 180.0);
+  if (options.fx) camera.fx = camera.fy = *options.fx;
+  if (options.fy) camera.fy = *options.fy;
+  if (options.cx) camera.cx = *options.cx;
+  if (options.cy) camera.cy = *options.cy;
+  struct ToModel {
+    Distortion operator()(const NoDistortionOptions&) const { return NoDistortion{}; }
+    Distortion operator()(const RadialTangentialOptions& d) const { return RadialTangential{d}; }
+    Distortion operator()(const EquidistantOptions& d) const { return Equidistant{d}; }
+    Distortion operator()(const FovOptions& d) const { return Fov{d}; }
+  };
+  camera.distortion = std::visit(ToModel{}, options.distortion);
+  try {
+    camera.validate();
+  } catch (const UserError& error) {
+    throw UserError(fmt::format("camera {}: {}", options.name, error.what()));
+  }
+  return camera;
+}
+
+}  // namespace esim

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "esim/scenario/scenario.h"
+
+namespace esim {
+
+/// Reads a scenario from a YAML file. Relative paths in it are taken from the file's folder, and ${NAME} stands for an
+/// environment variable.
+///
+/// Cameras are a list under `cameras`, or a single one under `camera` (default: one camera of default values); the keys
+/// `sampling` and `event_camera` at the top hold for every camera that does not set them itself. A camera's calibration
+/// file is read here: the result holds explicit geometry only.
+///
+/// `overrides` are "dotted.key=value" and come last. Throws UserError with file, line, key, and what would be right.
+Scenario read_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides = {});
+
+/// The scenario in full, every option explicit, as YAML: reading it back gives the same scenario.
+std::string write_scenario(const Scenario& scenario);
+
+/// Every option with type, default, unit, range and help, as text for a person.
+std::string scenario_reference();
+
+/// The geometry that `options` describe. Throws UserError where it is impossible.
+Camera camera_model(const CameraOptions& options);
+
+}  // namespace esim

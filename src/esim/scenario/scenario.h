@@ -1,0 +1,138 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "esim/geometry/camera.h"
+#include "esim/sampling/criterion.h"
+#include "esim/scenario/pose_options.h"
+#include "esim/sensors/event_camera.h"
+
+namespace esim {
+
+// --- renderers ---------------------------------------------------------------------------------------------------
+
+/// Triangles, ray cast.
+struct MeshRendererOptions {
+  static constexpr const char* kType = "mesh";
+  std::filesystem::path scene;
+  int samples_per_pixel = 1;
+  double background = 0.2;
+};
+
+/// An equirectangular image at infinity.
+struct PanoramaRendererOptions {
+  static constexpr const char* kType = "panorama";
+  std::filesystem::path image;
+  Eigen::Vector4d orientation = {0, 0, 0, 1};
+};
+
+/// A textured rectangle.
+struct PlaneRendererOptions {
+  static constexpr const char* kType = "plane";
+  std::filesystem::path image;
+  double width_m = 1.0;
+  PoseOptions pose;
+  bool endless = false;
+  double background = 0.2;
+};
+
+using RendererOptions = std::variant<MeshRendererOptions, PanoramaRendererOptions, PlaneRendererOptions>;
+
+// --- trajectories of the body ------------------------------------------------------------------------------------
+
+struct FileTrajectoryOptions {
+  static constexpr const char* kType = "file";
+  std::filesystem::path path;
+  double time_scale = 1.0;
+  int order = 5;
+  double knot_interval_s = 0.0;
+  double smoothing_time_s = 0.0;
+};
+
+struct RandomTrajectoryOptions {
+  static constexpr const char* kType = "random";
+  Eigen::Vector3d position_amplitude_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rotation_amplitude_deg = Eigen::Vector3d::Zero();
+  double knot_interval_s = 0.25;
+  PoseOptions center;
+  int order = 5;
+};
+
+struct StaticTrajectoryOptions {
+  static constexpr const char* kType = "static";
+  PoseOptions pose;
+};
+
+using TrajectoryOptions = std::variant<FileTrajectoryOptions, RandomTrajectoryOptions, StaticTrajectoryOptions>;
+
+// --- cameras -----------------------------------------------------------------------------------------------------
+
+/// Distortions as written in a scenario. An empty struct stands for none.
+struct NoDistortionOptions {
+  static constexpr const char* kType = "none";
+};
+struct RadialTangentialOptions : RadialTangential {
+  static constexpr const char* kType = "radial-tangential";
+};
+struct EquidistantOptions : Equidistant {
+  static constexpr const char* kType = "equidistant";
+};
+struct FovOptions : Fov {
+  static constexpr const char* kType = "fov";
+};
+using DistortionOptions = std::variant<NoDistortionOptions, RadialTangentialOptions, EquidistantOptions, FovOptions>;
+
+/// One camera of the rig. Where `calibration` names a file, the geometry comes from there.
+struct CameraOptions {
+  std::string name;
+  std::filesystem::path calibration;
+  int width = 346, height = 260;
+  double horizontal_fov_deg = 75.0;
+  std::optional<double> fx, fy, cx, cy;
+  DistortionOptions distortion;
+  PoseOptions T_body_camera;
+  SamplingOptions sampling;
+  EventCameraOptions event_camera;
+};
+
+// --- what is written -----------------------------------------------------------------------------------------------
+
+struct TruthOptions {
+  double rate_hz = 30;
+  bool images = true;
+  bool depth = true;
+  bool flow = true;
+  double pose_rate_hz = 200;
+};
+
+enum class EventTimeUnit { us, ns };
+enum class EventCompression { blosc, gzip, none };
+
+struct OutputOptions {
+  EventTimeUnit time_unit = EventTimeUnit::us;
+  EventCompression compression = EventCompression::blosc;
+  bool events_txt = false;
+  bool preview = true;
+};
+
+// --- the whole -----------------------------------------------------------------------------------------------------
+
+/// Everything that determines a simulation, as values: what to show, how the rig moves, which cameras it has, what to
+/// keep.
+struct Scenario {
+  std::uint64_t seed = 0;
+  double start_s = 0.0;              ///< after the trajectory's start
+  std::optional<double> duration_s;  ///< to the trajectory's end where not set
+  RendererOptions renderer;
+  TrajectoryOptions trajectory;
+  std::vector<CameraOptions> cameras;
+  TruthOptions truth;
+  OutputOptions output;
+};
+
+}  // namespace esim

@@ -1,0 +1,145 @@
+#pragma once
+
+#include <array>
+
+#include "esim/scenario/scenario.h"
+
+/// The schema: every option of a scenario once, with unit, range and help (see core/describe.h). Options of modules
+/// that stand on their own, like the event camera's, are described beside them.
+namespace esim {
+
+template <class Visitor>
+void describe(Visitor& visit, MeshRendererOptions& o) {
+  visit("scene", o.scene, About{"mesh file (OBJ with MTL), world coordinates in metres"});
+  visit("samples_per_pixel", o.samples_per_pixel,
+        About{"rays per pixel, 1, 5 or 13: more smooth the edges of objects", "", 1, 13});
+  visit("background", o.background, About{"irradiance where nothing is seen", "", 0, 1e6});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, PanoramaRendererOptions& o) {
+  visit("image", o.image,
+        About{"equirectangular image: its centre is seen along world x, its upper edge at the zenith (z)"});
+  visit("orientation", o.orientation, About{"of the panorama in the world, quaternion x y z w"});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, PlaneRendererOptions& o) {
+  visit("image", o.image, About{"image of the poster"});
+  visit("width_m", o.width_m, About{"width of the poster; the height follows from the image", "m", 0, 1e6, true});
+  visit("pose", o.pose, About{"of the poster: origin at its centre, x right and y down the image, z into the wall"});
+  visit("endless", o.endless, About{"repeat the image over the whole plane"});
+  visit("background", o.background, About{"irradiance beside the poster", "", 0, 1e6});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, FileTrajectoryOptions& o) {
+  visit("path", o.path, About{"poses of the body: TUM text (s) or CSV (ns), told apart by content"});
+  visit("time_scale", o.time_scale, About{"stretches time: 2 takes twice as long", "", 0, 1e6, true});
+  visit("order", o.order, About{"of the fitted spline: 4 (cubic) to 6", "", 4, 6});
+  visit("knot_interval_s", o.knot_interval_s,
+        About{"time between the spline's control points; 0: from the data", "s", 0, 1e6});
+  visit("smoothing_time_s", o.smoothing_time_s,
+        About{"motion faster than this is smoothed away; 0: none", "s", 0, 1e6});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, RandomTrajectoryOptions& o) {
+  visit("position_amplitude_m", o.position_amplitude_m,
+        About{"greatest displacement along the centre's axes x y z", "m", 0, 1e6});
+  visit("rotation_amplitude_deg", o.rotation_amplitude_deg,
+        About{"greatest rotation about the body's axes x y z (for a camera: pitch, yaw, roll)", "deg", 0, 36000});
+  visit("knot_interval_s", o.knot_interval_s, About{"time between random poses: smaller is faster", "s", 0, 1e6, true});
+  visit("center", o.center, About{"pose that the body moves about; looks along world x where no orientation is given"});
+  visit("order", o.order, About{"of the spline: 4 (cubic) to 6", "", 4, 6});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, StaticTrajectoryOptions& o) {
+  visit("pose", o.pose, About{"of the body; looks along world x where no orientation is given"});
+}
+
+template <class Visitor>
+void describe(Visitor&, NoDistortionOptions&) {}
+
+template <class Visitor>
+void describe(Visitor& visit, RadialTangentialOptions& o) {
+  visit("k1", o.k1, About{"radial, r^2"});
+  visit("k2", o.k2, About{"radial, r^4"});
+  visit("p1", o.p1, About{"tangential"});
+  visit("p2", o.p2, About{"tangential"});
+  visit("k3", o.k3, About{"radial, r^6"});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, EquidistantOptions& o) {
+  visit("k1", o.k1, About{"theta^2"});
+  visit("k2", o.k2, About{"theta^4"});
+  visit("k3", o.k3, About{"theta^6"});
+  visit("k4", o.k4, About{"theta^8"});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, FovOptions& o) {
+  visit("w", o.w, About{"field of view of the distortion model", "rad", 0, 3.1, true});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, CameraOptions& o) {
+  visit("name", o.name, About{"unique within the rig (default: cam0, cam1, ...)"});
+  visit("calibration", o.calibration,
+        About{"rig file, Kalibr camchain or the original ESIM's: gives size, intrinsics, distortion and pose; a file "
+              "of several cameras makes as many"});
+  visit("width", o.width, About{"columns", "px", 1, 16384});
+  visit("height", o.height, About{"rows", "px", 1, 16384});
+  visit("horizontal_fov_deg", o.horizontal_fov_deg,
+        About{"field of view between the image's sides, where fx is not given", "deg", 0.1, 170});
+  visit("fx", o.fx, About{"focal length, horizontal", "px", 0, 1e6, true});
+  visit("fy", o.fy, About{"focal length, vertical (default: fx)", "px", 0, 1e6, true});
+  visit("cx", o.cx, About{"principal point, column (default: the middle)", "px", -1e6, 1e6});
+  visit("cy", o.cy, About{"principal point, row (default: the middle)", "px", -1e6, 1e6});
+  visit("distortion", o.distortion, About{"of the lens"});
+  visit("T_body_camera", o.T_body_camera, About{"pose of the camera (x right, y down, z forward) in the body"});
+  visit("sampling", o.sampling, About{"when the scene is evaluated"});
+  visit("event_camera", o.event_camera, About{"the event sensor"});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, TruthOptions& o) {
+  visit("rate_hz", o.rate_hz, About{"ground-truth frames per second; 0: none", "Hz", 0, 1e6});
+  visit("images", o.images, About{"write images/, 8-bit sRGB"});
+  visit("depth", o.depth, About{"write depth to truth.h5"});
+  visit("flow", o.flow, About{"write the motion field to truth.h5"});
+  visit("pose_rate_hz", o.pose_rate_hz, About{"poses per second in poses.txt; 0: none", "Hz", 0, 1e6});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, OutputOptions& o) {
+  visit("time_unit", o.time_unit, About{"of the times in events.h5"});
+  visit("compression", o.compression, About{"of events.h5 and truth.h5"});
+  visit("events_txt", o.events_txt, About{"write events.txt as well"});
+  visit("preview", o.preview, About{"write preview.mp4 and preview.png"});
+}
+
+/// All of a scenario but its cameras, which have two spellings (see read_scenario).
+template <class Visitor>
+void describe(Visitor& visit, Scenario& o) {
+  visit("seed", o.seed, About{"of all random numbers"});
+  visit("start_s", o.start_s, About{"where to begin, after the trajectory's start", "s", 0, 1e9});
+  visit("duration_s", o.duration_s,
+        About{"how long to simulate (default: to the trajectory's end)", "s", 0, 1e9, true});
+  visit("renderer", o.renderer, About{"what is seen"});
+  visit("trajectory", o.trajectory, About{"how the body moves"});
+  visit("truth", o.truth, About{"ground truth"});
+  visit("output", o.output, About{"what is written, and how"});
+}
+
+/// How the values of an enumeration are written, in order.
+template <typename Enum>
+inline constexpr std::array<const char*, 0> kEnumNames{};
+template <>
+inline constexpr std::array<const char*, 2> kEnumNames<EventTimeUnit>{"us", "ns"};
+template <>
+inline constexpr std::array<const char*, 3> kEnumNames<EventCompression>{"blosc", "gzip", "none"};
+
+}  // namespace esim

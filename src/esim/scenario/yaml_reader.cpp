@@ -1,0 +1,143 @@
+#include "esim/scenario/yaml_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace esim {
+namespace {
+
+/// Replaces every ${NAME} by the environment variable NAME.
+std::string expand_environment(const std::string& text, const YamlSource& source, const YAML::Node& node,
+                               const std::string& key) {
+  std::string out;
+  std::size_t position = 0;
+  while (true) {
+    const std::size_t open = text.find("${", position);
+    const std::size_t close = open == std::string::npos ? open : text.find('}', open);
+    if (close == std::string::npos) return out + text.substr(position);
+    const std::string name = text.substr(open + 2, close - open - 2);
+    const char* value = std::getenv(name.c_str());
+    if (value == nullptr) YamlReader::fail(source, node, key, fmt::format("environment variable {} is not set", name));
+    out += text.substr(position, open - position) + value;
+    position = close + 1;
+  }
+}
+
+std::string scalar(const YamlSource& source, const YAML::Node& node, const std::string& key, const char* kind) {
+  if (!node.IsScalar()) YamlReader::fail(source, node, key, fmt::format("must be {}", kind));
+  return node.Scalar();
+}
+
+}  // namespace
+
+YamlReader::YamlReader(const YAML::Node& map, std::string where, const YamlSource& source)
+    : map_(map), where_(std::move(where)), source_(source) {
+  if (!map.IsMap()) {
+    if (where_.empty())
+      throw UserError(fmt::format("{}: a scenario is a map of keys and values; see scenes/*.yaml for examples",
+                                  source.file.string()));
+    fail(source, map, where_, "must be a map of keys and values");
+  }
+  std::set<std::string> seen;
+  for (const auto& entry : map) {
+    if (!entry.first.IsScalar())
+      fail(source, entry.first, where_.empty() ? "scenario" : where_, "keys must be plain words");
+    if (!seen.insert(entry.first.Scalar()).second)
+      fail(source, entry.first, child(entry.first.Scalar()), "appears twice; remove one");
+  }
+}
+
+void YamlReader::fail(const YamlSource& source, const YAML::Node& node, const std::string& key,
+                      const std::string& message) {
+  const auto& changed = source.changed;
+  const bool from_command_line = std::any_of(changed.begin(), changed.end(), [&](const std::string& set) {
+    return key == set || key.starts_with(set + ".") || set.starts_with(key + ".");
+  });
+  if (from_command_line) throw UserError(fmt::format("--set {}: {}", key, message));
+  const YAML::Mark mark = node.IsDefined() ? node.Mark() : YAML::Mark::null_mark();
+  const std::string line = mark.line >= 0 ? fmt::format(":{}", mark.line + 1) : "";
+  throw UserError(fmt::format("{}{}: {}: {}", source.file.string(), line, key, message));
+}
+
+void YamlReader::finish() const {
+  for (const auto& entry : map_) {
+    const std::string& key = entry.first.Scalar();
+    if (known_.contains(key)) continue;
+    const std::vector<std::string> known(known_.begin(), known_.end());
+    const std::string suggestion = nearest(key, known);
+    fail(source_, entry.first, child(key),
+         suggestion.empty() ? fmt::format("unknown key; known are {}", list(known))
+                            : fmt::format("unknown key; did you mean {}?", suggestion));
+  }
+}
+
+double YamlReader::number(const YAML::Node& node, const std::string& key, const About& about, const char* kind) {
+  const std::string text = scalar(source_, node, key, kind);
+  double value = 0;
+  if (!YAML::convert<double>::decode(node, value) || !std::isfinite(value)) {
+    fail(source_, node, key, fmt::format("must be {}, not '{}'", kind, text));
+  }
+  const bool too_small = about.above_min ? value <= about.min : value < about.min;
+  if (!too_small && value <= about.max) return value;
+  const std::string unit = *about.unit != '\0' ? std::string(" ") + about.unit : "";
+  const std::string lower =
+      std::isfinite(about.min) ? fmt::format("{} {}{}", about.above_min ? "above" : "at least", about.min, unit) : "";
+  const std::string upper = std::isfinite(about.max) ? fmt::format("at most {}{}", about.max, unit) : "";
+  fail(source_, node, key,
+       fmt::format("{} is out of range: must be {}{}{}", text, lower, lower.empty() || upper.empty() ? "" : " and ",
+                   upper));
+}
+
+void YamlReader::read(const YAML::Node& node, const std::string& key, double& value, const About& about) {
+  value = number(node, key, about, "a number");
+}
+
+void YamlReader::read(const YAML::Node& node, const std::string& key, int& value, const About& about) {
+  const double number_value = number(node, key, about, "a whole number");
+  if (number_value != std::floor(number_value) || std::fabs(number_value) > 2e9)
+    fail(source_, node, key, fmt::format("must be a whole number, not '{}'", node.Scalar()));
+  value = static_cast<int>(number_value);
+}
+
+void YamlReader::read(const YAML::Node& node, const std::string& key, std::uint64_t& value, const About&) {
+  const std::string text = scalar(source_, node, key, "a whole number");
+  if (text.empty() || text.find_first_not_of("0123456789") != std::string::npos ||
+      !YAML::convert<std::uint64_t>::decode(node, value)) {
+    fail(source_, node, key, fmt::format("must be a whole number from 0 to 2^64 - 1, not '{}'", text));
+  }
+}
+
+void YamlReader::read(const YAML::Node& node, const std::string& key, bool& value, const About&) {
+  const std::string text = scalar(source_, node, key, "true or false");
+  if (!YAML::convert<bool>::decode(node, value))
+    fail(source_, node, key, fmt::format("must be true or false, not '{}'", text));
+}
+
+void YamlReader::read(const YAML::Node& node, const std::string& key, std::string& value, const About&) {
+  value = scalar(source_, node, key, "text");
+}
+
+void YamlReader::read(const YAML::Node& node, const std::string& key, std::filesystem::path& value, const About&) {
+  const std::string text = expand_environment(scalar(source_, node, key, "a path"), source_, node, key);
+  if (text.empty()) {
+    value.clear();
+    return;
+  }
+  value = (std::filesystem::absolute(source_.file).parent_path() / text).lexically_normal();
+}
+
+std::size_t YamlReader::index_of_name(const YAML::Node& node, const std::string& key,
+                                      const std::vector<std::string>& names) {
+  const std::string text = scalar(source_, node, key, ("one of " + list(names)).c_str());
+  const auto found = std::find(names.begin(), names.end(), text);
+  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  const std::string suggestion = nearest(text, names);
+  fail(source_, node, key,
+       fmt::format("'{}' is not one of {}{}", text, list(names),
+                   suggestion.empty() ? "" : "; did you mean " + suggestion + "?"));
+}
+
+}  // namespace esim

@@ -1,0 +1,174 @@
+#include "esim/sim/simulate.h"
+
+#include <algorithm>
+#include <chrono>
+
+namespace esim {
+namespace {
+
+/// Adds the wall-clock time of a scope to a total.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& total_seconds) : total_(total_seconds) {}
+  ~Stopwatch() { total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double& total_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// The camera whose next sample comes first, and that sample's request; null after the last one.
+CameraChannel* camera_due(World& world, SampleRequest& request) {
+  CameraChannel* due = nullptr;
+  for (CameraChannel& camera : world.cameras) {
+    auto next = camera.sampler->next();
+    if (!next || (due != nullptr && next->t >= request.t)) continue;
+    request = std::move(*next);
+    due = &camera;
+  }
+  return due;
+}
+
+/// The time before which every camera's events are known.
+TimeNs watermark(const World& world) {
+  TimeNs earliest = world.info.end;
+  for (const CameraChannel& camera : world.cameras) earliest = std::min(earliest, camera.sampler->watermark());
+  return earliest;
+}
+
+/// One run of a world: what it does with each piece of time, and the account of it.
+class Run {
+ public:
+  Run(World& world, Sink& out) : world_(world), out_(out) {
+    summary_.start = summary_.end = world.info.start;
+    for (std::size_t i = 0; i < world.cameras.size(); ++i) {
+      const CameraInfo& info = world.info.cameras[i];
+      summary_.cameras.push_back(
+          {info.name, world.cameras[i].renderer->traits().name, info.model.width, info.model.height, {}, 0, 0});
+    }
+  }
+
+  /// Evaluates the scene as a camera asks for, and lets its pixels see the result.
+  void advance(CameraChannel& camera, const SampleRequest& request) {
+    {
+      Stopwatch stopwatch(summary_.seconds.render);
+      camera.renderer->render(view(index_of(camera), request.t, request.tiles), camera.sample);
+    }
+    std::span<const Segment> segments;
+    {
+      Stopwatch stopwatch(summary_.seconds.sampling);
+      segments = camera.sampler->accept(camera.sample);
+    }
+    Stopwatch stopwatch(summary_.seconds.events);
+    camera.event_camera.integrate(segments, *world_.workers);
+  }
+
+  /// Writes everything up to `until`, all kinds of record together in order of time.
+  void deliver(TimeNs until) {
+    while (true) {
+      const TimeNs t = std::min({until, world_.truth_clock.due(), world_.pose_clock.due()});
+      deliver_events(t);
+      if (world_.pose_clock.due() == t) deliver_pose(t);
+      if (world_.truth_clock.due() == t) deliver_truth(t);
+      if (t == until && std::min(world_.truth_clock.due(), world_.pose_clock.due()) > until) break;
+    }
+    summary_.end = until;
+  }
+
+  Progress progress() const {
+    Progress progress{summary_.start, summary_.end, world_.info.end, 0, 0, elapsed()};
+    for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
+      progress.samples += world_.cameras[i].sampler->statistics().samples;
+      progress.events += summary_.cameras[i].events_on + summary_.cameras[i].events_off;
+    }
+    return progress;
+  }
+
+  Summary finish(bool complete) {
+    {
+      Stopwatch stopwatch(summary_.seconds.write);
+      out_.end(complete);
+    }
+    for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
+      summary_.cameras[i].sampling = world_.cameras[i].sampler->statistics();
+    }
+    summary_.complete = complete;
+    summary_.wall_seconds = elapsed();
+    return std::move(summary_);
+  }
+
+ private:
+  std::size_t index_of(const CameraChannel& camera) const {
+    return static_cast<std::size_t>(&camera - world_.cameras.data());
+  }
+
+  double elapsed() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+  RenderRequest view(std::size_t camera, TimeNs t, std::vector<Tile> tiles) const {
+    return {t, rigidly_attached(world_.trajectory->at(t), world_.info.cameras[camera].T_body_camera), std::move(tiles)};
+  }
+
+  void deliver_events(TimeNs until) {
+    for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
+      events_.clear();
+      {
+        Stopwatch stopwatch(summary_.seconds.events);
+        world_.cameras[i].event_camera.release_until(until, events_);
+        const auto on = std::count_if(events_.begin(), events_.end(), [](const Event& e) { return e.polarity > 0; });
+        summary_.cameras[i].events_on += on;
+        summary_.cameras[i].events_off += static_cast<std::int64_t>(events_.size()) - on;
+      }
+      if (!events_.empty()) write(EventsRecord{static_cast<int>(i), events_});
+    }
+  }
+
+  void deliver_pose(TimeNs t) {
+    write(PoseRecord{t, world_.trajectory->at(t).T_world_body});
+    world_.pose_clock.advance();
+  }
+
+  void deliver_truth(TimeNs t) {
+    for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
+      const Camera& model = world_.info.cameras[i].model;
+      const RenderRequest request = view(i, t, {{0, 0, model.width, model.height}});
+      {
+        Stopwatch stopwatch(summary_.seconds.truth);
+        world_.cameras[i].renderer->render(request, truth_);
+      }
+      write(TruthRecord{static_cast<int>(i), t, request.camera.T_world_body, truth_.irradiance, truth_.depth,
+                        truth_.flow_x, truth_.flow_y});
+      ++summary_.truth_frames;
+    }
+    world_.truth_clock.advance();
+  }
+
+  void write(const Record& record) {
+    Stopwatch stopwatch(summary_.seconds.write);
+    out_.write(record);
+  }
+
+  World& world_;
+  Sink& out_;
+  Summary summary_;
+  std::vector<Event> events_;
+  Sample truth_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+Summary simulate(World& world, Sink& out, const Monitor& monitor) {
+  Run run(world, out);
+  out.begin(world.info);
+  SampleRequest request;
+  while (CameraChannel* camera = camera_due(world, request)) {  // the camera whose next sample comes first
+    run.advance(*camera, request);                              // render, choose the next time, cross the thresholds
+    run.deliver(watermark(world));                              // write what is now certain, in order of time
+    if (!monitor(run.progress())) return run.finish(false);
+  }
+  return run.finish(true);
+}
+
+}  // namespace esim

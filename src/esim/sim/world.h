@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "esim/core/parallel.h"
+#include "esim/motion/trajectory.h"
+#include "esim/record/record.h"
+#include "esim/render/renderer.h"
+#include "esim/sampling/sampler.h"
+#include "esim/sensors/event_camera.h"
+#include "esim/truth/clock.h"
+
+namespace esim {
+
+/// One camera of the rig, with everything of its own: its view of the scene, its clock, its pixels.
+struct CameraChannel {
+  std::unique_ptr<Renderer> renderer;
+  std::unique_ptr<Sampler> sampler;
+  EventCamera event_camera;
+  Sample sample;  // the evaluation in progress; its buffers go round between renderer and sampler
+};
+
+/// The state of a simulation. Its description is a RecordingInfo, which does not change.
+struct World {
+  RecordingInfo info;
+  std::unique_ptr<const Workers> workers;        // outlives the channels
+  std::shared_ptr<const Trajectory> trajectory;  // of the body
+  std::vector<CameraChannel> cameras;            // as in info.cameras
+  PeriodicClock truth_clock, pose_clock;
+};
+
+}  // namespace esim

@@ -1,0 +1,209 @@
+#include <gtest/gtest.h>
+#include <hdf5.h>
+
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "esim/core/error.h"
+#include "esim/record/fan_out.h"
+#include "esim/record/formats/images_png.h"
+#include "esim/record/formats/poses_tum.h"
+#include "esim/record/formats/truth_hdf5.h"
+#include "record/recordings.h"
+#include "support/errors.h"
+#include "support/temporary_directory.h"
+
+namespace esim {
+namespace {
+
+using test::TemporaryDirectory;
+using test::TruthImages;
+
+SE3 some_pose(double t_s) {
+  SE3 pose;
+  pose.rotation = Eigen::AngleAxisd(t_s, Eigen::Vector3d(1, 2, 3).normalized());
+  pose.translation = {std::sin(t_s), -1e-7 * t_s, 1234.5};
+  return pose;
+}
+
+template <typename T>
+std::vector<T> read_dataset(const std::filesystem::path& path, const char* name, hid_t type,
+                            const std::vector<hsize_t>& shape) {
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  const hid_t dataset = H5Dopen2(file, name, H5P_DEFAULT);
+  const hid_t space = H5Dget_space(dataset);
+  std::vector<hsize_t> found(static_cast<std::size_t>(H5Sget_simple_extent_ndims(space)));
+  H5Sget_simple_extent_dims(space, found.data(), nullptr);
+  EXPECT_EQ(found, shape) << name;
+  std::vector<T> values(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
+  EXPECT_GE(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
+  H5Sclose(space);
+  H5Dclose(dataset);
+  H5Fclose(file);
+  return values;
+}
+
+TEST(TruthHdf5, HoldsWhatWasWritten) {
+  const TemporaryDirectory directory;
+  const auto path = directory.path() / "truth.h5";
+  constexpr hsize_t kFrames = 5, kRows = 7, kColumns = 9;
+  for (const auto compression : {Compression::blosc, Compression::gzip, Compression::none}) {
+    TruthHdf5Writer writer(path, 0, {true, true, compression});
+    writer.begin(test::recording_info(kColumns, kRows, 0, kNsPerSecond));
+    for (std::size_t i = 0; i < kFrames; ++i) {
+      const double t_s = 0.1 * static_cast<double>(i);
+      writer.write(TruthImages(kColumns, kRows, t_s).at(to_ns(t_s), some_pose(t_s)));
+    }
+    writer.end(true);
+
+    const auto t = read_dataset<std::int64_t>(path, "t", H5T_NATIVE_INT64, {kFrames});
+    const auto poses = read_dataset<double>(path, "T_world_camera", H5T_NATIVE_DOUBLE, {kFrames, 7});
+    const auto depth = read_dataset<float>(path, "depth", H5T_NATIVE_FLOAT, {kFrames, kRows, kColumns});
+    const auto flow = read_dataset<float>(path, "flow", H5T_NATIVE_FLOAT, {kFrames, 2, kRows, kColumns});
+    for (std::size_t i = 0; i < kFrames; ++i) {
+      const double t_s = 0.1 * static_cast<double>(i);
+      const TruthImages images(kColumns, kRows, t_s);
+      EXPECT_EQ(t[i], to_ns(t_s));
+      EXPECT_EQ(poses[7 * i + 2], 1234.5);
+      EXPECT_EQ(poses[7 * i + 6], some_pose(t_s).rotation.w());
+      const std::size_t n = kRows * kColumns;
+      EXPECT_TRUE(std::equal(images.depth.data(), images.depth.data() + n, &depth[i * n]));
+      EXPECT_TRUE(std::equal(images.flow_x.data(), images.flow_x.data() + n, &flow[2 * i * n]));
+      EXPECT_TRUE(std::equal(images.flow_y.data(), images.flow_y.data() + n, &flow[(2 * i + 1) * n]));
+    }
+  }
+}
+
+TEST(TruthHdf5, OptionsAndBytes) {
+  const TemporaryDirectory directory;
+  std::string bytes[2];
+  for (std::string& content : bytes) {
+    const auto path = directory.path() / "truth.h5";
+    TruthHdf5Writer writer(path, 0, {true, false});
+    writer.begin(test::recording_info(8, 6, 0, kNsPerSecond));
+    writer.write(TruthImages(8, 6, 0).at(0));
+    writer.end(true);
+    content = test::content(path);
+  }
+  EXPECT_TRUE(bytes[0] == bytes[1]);
+  EXPECT_EQ(bytes[0].find("flow"), std::string::npos);
+}
+
+TEST(TruthHdf5, FullDisk) {
+  const TemporaryDirectory directory;
+  testing::internal::CaptureStderr();
+  for (const rlim_t limit : {rlim_t{0}, rlim_t{3000}, rlim_t{20'000}}) {
+    const test::FileSizeLimit full(limit);
+    EXPECT_THROW(
+        {
+          TruthHdf5Writer writer(directory.path() / "truth.h5", 0);
+          writer.begin(test::recording_info(64, 48, 0, kNsPerSecond));
+          for (int i = 0; i < 10; ++i) writer.write(TruthImages(64, 48, 0.1 * i).at(i));
+          writer.end(true);
+        },
+        OutputError);
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(TruthHdf5, WrongImageSizeIsAnInternalError) {
+  const TemporaryDirectory directory;
+  TruthHdf5Writer writer(directory.path() / "truth.h5", 0);
+  writer.begin(test::recording_info(8, 6, 0, kNsPerSecond));
+  EXPECT_THROW(writer.write(TruthImages(6, 8, 0).at(0)), InternalError);
+}
+
+TEST(PosesTum, LinesParseBack) {
+  const TemporaryDirectory directory;
+  const auto path = directory.path() / "poses.txt";
+  PosesTumWriter writer(path);
+  writer.begin(test::recording_info(8, 6, 0, kNsPerSecond));
+  for (int i = 0; i < 20; ++i) writer.write(PoseRecord{i * 1'000'001 - 3, some_pose(0.3 * i)});
+  writer.end(true);
+
+  const auto lines = test::lines(path);
+  ASSERT_EQ(lines.size(), 21u);
+  EXPECT_EQ(lines[0], "# timestamp tx ty tz qx qy qz qw");
+  EXPECT_EQ(lines[1].substr(0, 12), "-0.000000003");
+  for (int i = 0; i < 20; ++i) {
+    std::istringstream line(lines[static_cast<std::size_t>(i) + 1]);
+    double t = 0, v[7];
+    line >> t;
+    for (double& value : v) line >> value;
+    ASSERT_TRUE(line && line.eof());
+    const SE3 expected = some_pose(0.3 * i);
+    EXPECT_NEAR(t, to_seconds(i * 1'000'001 - 3), 1e-15);
+    EXPECT_LT((Eigen::Vector3d(v[0], v[1], v[2]) - expected.translation).norm(), 1e-11);
+    EXPECT_LT((Eigen::Vector4d(v[3], v[4], v[5], v[6]) - expected.rotation.coeffs()).norm(), 1e-11);
+  }
+}
+
+TEST(ImagesPng, SrgbIsTheNearestLevel) {
+  Image<float> linear(1, 3000);
+  for (int i = 0; i < linear.height(); ++i) linear(0, i) = static_cast<float>(i) / 2999.0f;
+  const auto encoded = encode_srgb(linear);
+  for (int i = 0; i < linear.height(); ++i) {
+    const double e = linear(0, i);
+    const double exact = 255 * (e <= 0.0031308 ? 12.92 * e : 1.055 * std::pow(e, 1 / 2.4) - 0.055);
+    ASSERT_LE(std::abs(encoded(0, i) - exact), 0.5001) << e;
+  }
+  Image<float> odd(1, 4);
+  odd(0, 0) = -1;
+  odd(0, 1) = std::numeric_limits<float>::quiet_NaN();
+  odd(0, 2) = std::numeric_limits<float>::infinity();
+  odd(0, 3) = 100;
+  const auto clipped = encode_srgb(odd);
+  EXPECT_EQ(clipped(0, 0), 0);
+  EXPECT_EQ(clipped(0, 1), 0);
+  EXPECT_EQ(clipped(0, 2), 255);
+  EXPECT_EQ(clipped(0, 3), 255);
+}
+
+TEST(ImagesPng, FilesAndTimestamps) {
+  const TemporaryDirectory directory;
+  const auto folder = directory.path() / "cam0" / "images";
+  ImagesPngWriter writer(folder, 0);
+  writer.begin(test::recording_info(20, 10, 0, kNsPerSecond));
+  const TruthImages first(20, 10, 0), second(20, 10, 0.5);
+  writer.write(first.at(0));
+  writer.write(second.at(500'000'000));
+  writer.end(true);
+  EXPECT_EQ(test::lines(folder / "timestamps.txt"),
+            (std::vector<std::string>{"# index t_s file", "0 0.000000000 000000.png", "1 0.500000000 000001.png"}));
+  const cv::Mat image = cv::imread((folder / "000001.png").string(), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(image.type(), CV_8UC1);
+  ASSERT_EQ(image.size(), cv::Size(20, 10));
+  const auto expected = encode_srgb(second.irradiance);
+  EXPECT_TRUE(std::equal(image.begin<std::uint8_t>(), image.end<std::uint8_t>(), expected.data()));
+}
+
+// Notes what happens to it.
+class Probe final : public Sink {
+ public:
+  Probe(std::string& log, bool fails) : log_(log), fails_(fails) {}
+  void begin(const RecordingInfo&) override { log_ += "b"; }
+  void write(const Record&) override { log_ += "w"; }
+  void end(bool complete) override {
+    log_ += complete ? "E" : "e";
+    if (fails_) throw OutputError("full");
+  }
+
+ private:
+  std::string& log_;
+  bool fails_;
+};
+
+TEST(FanOut, EverySinkIsEnded) {
+  std::string log;
+  FanOut fan_out;
+  fan_out.add(std::make_unique<Probe>(log, true));
+  fan_out.add(std::make_unique<Probe>(log, false));
+  fan_out.begin({});
+  fan_out.write(PoseRecord{});
+  EXPECT_THROW(fan_out.end(false), OutputError);
+  EXPECT_EQ(log, "bbwwee");
+}
+
+}  // namespace
+}  // namespace esim

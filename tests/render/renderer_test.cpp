@@ -1,0 +1,235 @@
+// What every renderer promises. A new one is tested by adding its name to the list at the end.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "esim/geometry/so3.h"
+#include "esim/scene/texture.h"
+#include "render/scenes.h"
+
+namespace esim {
+namespace {
+
+/// (name of the renderer, kind of distortion)
+class EveryRenderer : public testing::TestWithParam<std::tuple<const char*, int>> {
+ public:
+  static std::string name(const testing::TestParamInfo<std::tuple<const char*, int>>& test) {
+    const char* distortions[] = {"none", "radtan", "equidistant", "fov"};
+    return std::string(std::get<0>(test.param)) + "_" + distortions[std::get<1>(test.param)];
+  }
+
+ protected:
+  const Camera model_ = test::distorted_camera(std::get<1>(GetParam()));
+  const Kinematics camera_ = test::moving_camera();
+  std::unique_ptr<Renderer> renderer_ = test::make_renderer(std::get<0>(GetParam()), model_);
+
+  /// Where the camera is `dt` seconds later if its twist stays as it is.
+  Kinematics later(double dt) const {
+    Kinematics moved = camera_;
+    moved.T_world_body.translation += camera_.velocity_world * dt;
+    moved.T_world_body.rotation = camera_.T_world_body.rotation * so3_exp(camera_.omega_body * dt);
+    return moved;
+  }
+};
+
+TEST_P(EveryRenderer, MotionFieldIsTheVelocityOfTheImageOfAFixedPoint) {
+  const Sample sample = test::render(*renderer_, model_, camera_);
+  constexpr double kStep = 1e-3;
+  double squared_error = 0, squared = 0;
+  int count = 0;
+  for (int y = 0; y < model_.height; ++y) {
+    for (int x = 0; x < model_.width; ++x) {
+      const Eigen::Vector3d bearing = model_.back_project(Eigen::Vector2d(x, y))->bearing;
+      const double depth = std::isfinite(sample.depth(x, y)) ? double{sample.depth(x, y)} : 1e9;
+      const Eigen::Vector3d point = camera_.T_world_body * (depth * bearing);
+      const auto before = model_.project(later(-kStep).T_world_body.inverse() * point);
+      const auto after = model_.project(later(kStep).T_world_body.inverse() * point);
+      ASSERT_TRUE(before && after);
+      const Eigen::Vector2d expected = (after->pixel - before->pixel) / (2 * kStep);
+      squared_error += (expected - Eigen::Vector2d(sample.flow_x(x, y), sample.flow_y(x, y))).squaredNorm();
+      squared += expected.squaredNorm();
+      ++count;
+    }
+  }
+  const double rmse = std::sqrt(squared_error / count), rms = std::sqrt(squared / count);
+  EXPECT_GT(rms, 50.0) << "the test's camera should move";
+  EXPECT_LT(rmse / rms, 1e-3);
+  EXPECT_LT(rmse, 0.05);
+}
+
+TEST_P(EveryRenderer, BrightnessMovesWithTheMotionField) {
+  // Brightness constancy, Eq. 1: dE/dt + <grad E, V> = 0 on a smooth texture. Ties E, Z and V together.
+  const Sample sample = test::render(*renderer_, model_, camera_);
+  constexpr double kStep = 2e-3;
+  const Sample before = test::render(*renderer_, model_, later(-kStep)),
+               after = test::render(*renderer_, model_, later(kStep));
+  std::vector<double> errors;
+  double squared = 0;
+  for (int y = 1; y + 1 < model_.height; ++y) {
+    for (int x = 1; x + 1 < model_.width; ++x) {
+      const double gradient_x = (sample.irradiance(x + 1, y) - sample.irradiance(x - 1, y)) / 2.0;
+      const double gradient_y = (sample.irradiance(x, y + 1) - sample.irradiance(x, y - 1)) / 2.0;
+      const double expected = -(gradient_x * sample.flow_x(x, y) + gradient_y * sample.flow_y(x, y));
+      const double measured = (after.irradiance(x, y) - before.irradiance(x, y)) / (2 * kStep);
+      errors.push_back(std::fabs(measured - expected));
+      squared += expected * expected;
+    }
+  }
+  // The 90th percentile: the corners of a room are no smooth texture.
+  const auto rank = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() * 9 / 10);
+  std::nth_element(errors.begin(), rank, errors.end());
+  EXPECT_LT(*rank, 0.1 * std::sqrt(squared / static_cast<double>(errors.size())));
+}
+
+TEST_P(EveryRenderer, ATileIsTheSameAsInTheWholeFrame) {
+  const Sample whole = test::render(*renderer_, model_, camera_);
+  const std::vector<Tile> tiles = {{0, 0, 1, 1}, {17, 3, 35, 21}, {100, 77, 20, 13}};
+  Sample sample = test::render(*renderer_, model_, camera_, tiles);
+  EXPECT_EQ(sample.tiles, tiles);
+  EXPECT_EQ(sample.t, 123);
+  for (const Tile& tile : tiles) {
+    for (int y = tile.y; y < tile.y + tile.height; ++y) {
+      for (int x = tile.x; x < tile.x + tile.width; ++x) {
+        ASSERT_EQ(sample.irradiance(x, y), whole.irradiance(x, y)) << x << ", " << y;
+        ASSERT_EQ(sample.depth(x, y), whole.depth(x, y));
+        ASSERT_EQ(sample.flow_x(x, y), whole.flow_x(x, y));
+        ASSERT_EQ(sample.flow_y(x, y), whole.flow_y(x, y));
+      }
+    }
+  }
+  EXPECT_EQ(sample.irradiance(60, 60), 0.0F) << "a pixel outside the tiles was touched";
+}
+
+TEST_P(EveryRenderer, DoesNotDependOnThreadsOrHistory) {
+  const Workers one(1);
+  const auto other = test::make_renderer(std::get<0>(GetParam()), model_, one);
+  test::render(*renderer_, model_, later(0.3));
+  const Sample a = test::render(*renderer_, model_, camera_), b = test::render(*other, model_, camera_);
+  EXPECT_TRUE(std::equal(a.irradiance.pixels().begin(), a.irradiance.pixels().end(), b.irradiance.pixels().begin()));
+  EXPECT_TRUE(std::equal(a.flow_x.pixels().begin(), a.flow_x.pixels().end(), b.flow_x.pixels().begin()));
+}
+
+INSTANTIATE_TEST_SUITE_P(Renderers, EveryRenderer,
+                         testing::Combine(testing::Values("panorama", "plane", "mesh"), testing::Values(0, 1, 2, 3)),
+                         EveryRenderer::name);
+
+// --- closed forms ---------------------------------------------------------------------------------------------------
+
+double smooth_value(double u, double v) {
+  return 0.5 + 0.2 * std::sin(2 * std::numbers::pi * 3 * u) + 0.2 * std::cos(2 * std::numbers::pi * 2 * v);
+}
+
+TEST(PanoramaRenderer, ShowsEachDirectionWhereItIs) {
+  for (int kind = 0; kind < 4; ++kind) {
+    const Camera model = test::distorted_camera(kind);
+    const Kinematics camera = test::moving_camera();
+    const Sample sample = test::render(*test::make_renderer("panorama", model), model, camera);
+    for (int y = 0; y < model.height; y += 7) {
+      for (int x = 0; x < model.width; x += 7) {
+        const Eigen::Vector3d d = camera.T_world_body.rotation * model.back_project(Eigen::Vector2d(x, y))->bearing;
+        const double u = 0.5 - std::atan2(d.y(), d.x()) / (2 * std::numbers::pi);
+        const double v = 0.5 - std::atan2(d.z(), std::hypot(d.x(), d.y())) / std::numbers::pi;
+        EXPECT_NEAR(sample.irradiance(x, y), smooth_value(u, v), 2e-3) << x << ", " << y << ", distortion " << kind;
+        EXPECT_TRUE(std::isinf(sample.depth(x, y)));
+      }
+    }
+  }
+}
+
+TEST(PanoramaRenderer, WrapsAtTheBack) {
+  // Looking along -x, across longitude ±180 degrees: no seam in a texture that is periodic.
+  Kinematics camera;
+  Eigen::Matrix3d R;
+  R << 0, 0, -1, 1, 0, 0, 0, -1, 0;
+  camera.T_world_body.rotation = Eigen::Quaterniond(R);
+  const Camera model = test::distorted_camera(0);
+  const Sample sample = test::render(*test::make_renderer("panorama", model), model, camera);
+  for (int x = 1; x < model.width; ++x) {
+    EXPECT_LT(std::fabs(sample.irradiance(x, 40) - sample.irradiance(x - 1, 40)), 0.02F) << x;
+  }
+}
+
+TEST(PanoramaRenderer, IsFiniteAtThePoles) {
+  Kinematics camera;  // looks along world z: the zenith
+  const Camera model = test::distorted_camera(0);
+  const Sample sample = test::render(*test::make_renderer("panorama", model), model, camera);
+  for (const float value : sample.irradiance.pixels()) EXPECT_TRUE(value > 0 && value < 1);
+}
+
+TEST(PlaneRenderer, ShowsEachPointWhereItIs) {
+  const Poster poster = test::test_poster();
+  for (int kind = 0; kind < 4; ++kind) {
+    const Camera model = test::distorted_camera(kind);
+    const Kinematics camera = test::moving_camera();
+    const Sample sample = test::render(*test::make_renderer("plane", model), model, camera);
+    for (int y = 0; y < model.height; y += 7) {
+      for (int x = 0; x < model.width; x += 7) {
+        const Eigen::Vector3d bearing = model.back_project(Eigen::Vector2d(x, y))->bearing;
+        const SE3 T_poster_camera = poster.T_world_poster.inverse() * camera.T_world_body;
+        const Eigen::Vector3d o = T_poster_camera.translation, d = T_poster_camera.rotation * bearing;
+        const double depth = -o.z() / d.z();
+        const Eigen::Vector3d point = o + depth * d;
+        EXPECT_NEAR(sample.depth(x, y), depth, 1e-5 * depth);
+        EXPECT_NEAR(sample.irradiance(x, y), smooth_value(point.x() / 5.0 + 0.5, point.y() / 2.5 + 0.5), 3e-3);
+      }
+    }
+  }
+}
+
+TEST(PlaneRenderer, ShowsTheBackgroundBesideThePosterAndBehindTheCamera) {
+  Poster poster = test::test_poster();
+  poster.endless = false;
+  poster.width_m = 0.1;
+  const Camera model = test::distorted_camera(0);
+  const auto renderer = make_plane_renderer(poster, model, test::two_threads());
+  Sample sample = test::render(*renderer, model, test::moving_camera());
+  EXPECT_EQ(sample.irradiance(0, 0), 0.2F);
+  EXPECT_TRUE(std::isinf(sample.depth(0, 0)));
+  EXPECT_TRUE(std::isfinite(sample.flow_x(0, 0)));
+
+  Kinematics away = test::moving_camera();
+  away.T_world_body.rotation =
+      away.T_world_body.rotation * Eigen::Quaterniond(0, 0, 1, 0);  // turned about y by 180 degrees
+  sample = test::render(*renderer, model, away);
+  for (const float value : sample.irradiance.pixels()) EXPECT_EQ(value, 0.2F);
+}
+
+TEST(RaycastRenderer, MeasuresPlanarDepth) {
+  // The wall at x = 4, seen straight from x = 1: 3 m in every pixel that sees it, however far from the axis.
+  Kinematics camera;
+  Eigen::Matrix3d R;
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  camera.T_world_body = {Eigen::Quaterniond(R), {1, 0, 0}};
+  const Camera model = test::distorted_camera(0);
+  const Sample sample = test::render(*test::make_renderer("mesh", model), model, camera);
+  for (int y = 0; y < model.height; ++y) {
+    for (int x = 0; x < model.width; ++x) EXPECT_NEAR(sample.depth(x, y), 3.0, 1e-5) << x << ", " << y;
+  }
+}
+
+TEST(RaycastRenderer, MoreRaysPerPixelSmoothEdges) {
+  // A black half-plane over white background: one ray gives two values only, five give the covered fraction.
+  Mesh mesh;
+  mesh.vertices = {{-5, 0.0123F, 1}, {5, 0.31F, 1}, {0, 50, 1}};
+  mesh.triangles = {{0, 1, 2}};
+  mesh.texture_uv.resize(1);
+  mesh.material = {0};
+  mesh.materials = {{"black", nullptr, 0.0F}};
+  const Camera model = test::distorted_camera(0);
+  const auto values = [&](int rays) {
+    const auto renderer = make_raycast_renderer(build_raycast_scene(mesh), {1.0F, rays}, model, test::two_threads());
+    const Sample sample = test::render(*renderer, model, Kinematics{});
+    int between = 0;
+    double mean = 0;
+    for (const float value : sample.irradiance.pixels())
+      between += value > 0.01F && value < 0.99F, mean += value / static_cast<double>(sample.irradiance.size());
+    return std::pair(between, mean);
+  };
+  EXPECT_EQ(values(1).first, 0);
+  EXPECT_GT(values(5).first, 60);
+  EXPECT_GT(values(13).first, 60);
+  EXPECT_NEAR(values(13).second, values(1).second, 2e-3);
+}
+
+}  // namespace
+}  // namespace esim

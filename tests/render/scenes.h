@@ -1,0 +1,112 @@
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <string>
+
+#include "esim/backends/panorama/panorama_renderer.h"
+#include "esim/backends/plane/plane_renderer.h"
+#include "esim/backends/raycast/raycast_renderer.h"
+#include "esim/motion/trajectory.h"
+
+namespace esim::test {
+
+inline const Workers& two_threads() {
+  static const Workers workers(2);
+  return workers;
+}
+
+/// A smooth texture: low spatial frequencies, so that filtering hardly changes it.
+inline Image<float> smooth_image(int width, int height) {
+  Image<float> image(width, height);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double u = (x + 0.5) / width, v = (y + 0.5) / height;
+      image(x, y) = static_cast<float>(0.5 + 0.2 * std::sin(2 * std::numbers::pi * 3 * u) +
+                                       0.2 * std::cos(2 * std::numbers::pi * 2 * v));
+    }
+  }
+  return image;
+}
+
+inline std::shared_ptr<const Texture> smooth_texture(Wrap wrap_u, Wrap wrap_v) {
+  return std::make_shared<const Texture>(smooth_image(1024, 512), wrap_u, wrap_v);
+}
+
+/// A box of 8 x 6 x 4 m around the origin, seen from inside, each face textured.
+inline Mesh box_mesh() {
+  Mesh mesh;
+  mesh.materials.push_back({"wall", smooth_texture(Wrap::repeat, Wrap::repeat), 0.5F});
+  const Eigen::Vector3f half(4, 3, 2);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const float side : {-1.0F, 1.0F}) {
+      Eigen::Vector3f n = Eigen::Vector3f::Zero(), a = n, b = n;
+      n[axis] = side * half[axis];
+      a[(axis + 1) % 3] = half[(axis + 1) % 3];
+      b[(axis + 2) % 3] = half[(axis + 2) % 3];
+      const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+      for (const Eigen::Vector3f& corner : {Eigen::Vector3f(n - a - b), Eigen::Vector3f(n + a - b),
+                                            Eigen::Vector3f(n + a + b), Eigen::Vector3f(n - a + b)}) {
+        mesh.vertices.push_back(corner);
+      }
+      const Eigen::Vector2f c00(0, 0), c10(1, 0), c11(1, 1), c01(0, 1);
+      mesh.triangles.push_back({first, first + 1, first + 2});
+      mesh.texture_uv.push_back({c00, c10, c11});
+      mesh.triangles.push_back({first, first + 2, first + 3});
+      mesh.texture_uv.push_back({c00, c11, c01});
+      mesh.material.insert(mesh.material.end(), {0, 0});
+    }
+  }
+  return mesh;
+}
+
+/// The poster of make_renderer("plane"): 5 m wide, 2 m in front of the world's origin along x, a little askew.
+inline Poster test_poster() {
+  SE3 pose;
+  pose.translation = {2.0, 0.1, -0.05};
+  Eigen::Matrix3d R;
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // x right = -y, y down = -z, z into the wall = +x
+  pose.rotation =
+      Eigen::Quaterniond(R) * Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Eigen::Vector3d(0.3, 0.9, 0.1).normalized()));
+  return {smooth_texture(Wrap::repeat, Wrap::repeat), pose, 5.0, true, 0.2F};
+}
+
+/// Every renderer on a scene that fills the view from near the origin.
+inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Camera& camera,
+                                               const Workers& workers = two_threads()) {
+  if (name == "panorama") return make_panorama_renderer({smooth_texture(Wrap::repeat, Wrap::clamp)}, camera, workers);
+  if (name == "plane") return make_plane_renderer(test_poster(), camera, workers);
+  return make_raycast_renderer(build_raycast_scene(box_mesh()), {}, camera, workers);
+}
+
+/// A camera with strong distortion of each kind, 120 x 90.
+inline Camera distorted_camera(int kind) {
+  Camera camera{120, 90, 99.7, 99.9, 61.3, 44.2, NoDistortion{}};
+  if (kind == 1) camera.distortion = RadialTangential{-0.3829, 0.1893, -0.001, -0.00056, 0.0};
+  if (kind == 2) camera.distortion = Equidistant{-0.1385, -0.0415, 0.0081, 0.0042};
+  if (kind == 3) camera.distortion = Fov{0.93};
+  return camera;
+}
+
+/// Near the origin, looking along world x, and moving in all six degrees of freedom.
+inline Kinematics moving_camera() {
+  Kinematics camera;
+  Eigen::Matrix3d R;
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  camera.T_world_body.rotation =
+      Eigen::Quaterniond(R) * Eigen::Quaterniond(Eigen::AngleAxisd(0.15, Eigen::Vector3d(1, -2, 0.5).normalized()));
+  camera.T_world_body.translation = {0.2, -0.1, 0.15};
+  camera.velocity_world = {0.4, -0.7, 0.5};
+  camera.omega_body = {0.8, -0.5, 1.1};
+  return camera;
+}
+
+inline Sample render(Renderer& renderer, const Camera& model, const Kinematics& camera, std::vector<Tile> tiles = {}) {
+  if (tiles.empty()) tiles = {{0, 0, model.width, model.height}};
+  Sample sample;
+  renderer.render({123, camera, std::move(tiles)}, sample);
+  return sample;
+}
+
+}  // namespace esim::test

@@ -1,0 +1,125 @@
+#include "esim/sampling/frame_sampler.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace esim {
+namespace {
+
+const Workers kWorkers(2);
+constexpr int kWidth = 50, kHeight = 70;
+
+/// A sample in which the brightness rises by `gradient` per pixel to the right and everything moves by (vx, vy).
+Sample moving_ramp(TimeNs t, float gradient, float vx, float vy, double log_eps) {
+  Sample sample;
+  sample.resize(kWidth, kHeight);
+  sample.t = t;
+  sample.tiles = {sample.irradiance.bounds()};
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      sample.irradiance(x, y) = static_cast<float>(std::exp(gradient * static_cast<float>(x - kWidth)) - log_eps);
+      sample.flow_x(x, y) = vx;
+      sample.flow_y(x, y) = vy;
+    }
+  }
+  return sample;
+}
+
+class EverySampler : public testing::TestWithParam<SamplingOptions> {};
+
+// The contract of Sampler: first sample at the start, last at the end, contiguous segments, a watermark that keeps up.
+TEST_P(EverySampler, KeepsItsContract) {
+  const TimeSpan span{-3 * kNsPerMs, 17 * kNsPerMs + 123};
+  const auto sampler = make_frame_sampler(GetParam(), {}, kWidth, kHeight, span, kWorkers);
+  EXPECT_EQ(sampler->watermark(), span.start);
+  TimeNs last = span.start;
+  std::int64_t samples = 0;
+  while (const auto request = sampler->next()) {
+    EXPECT_EQ(request->t, sampler->next()->t) << "next() is not idempotent";
+    ASSERT_EQ(request->tiles, (std::vector<Tile>{{0, 0, kWidth, kHeight}}));
+    ASSERT_TRUE(samples == 0 ? request->t == span.start : request->t > last);
+    Sample sample = moving_ramp(request->t, 0.05F, 100.0F, 200.0F, 0.001);
+    const Image<float> rendered = sample.irradiance;
+    const auto segments = sampler->accept(sample);
+    ASSERT_EQ(segments.size(), 1U);
+    EXPECT_EQ(segments[0].t0, last);
+    EXPECT_EQ(segments[0].t1, request->t);
+    EXPECT_EQ(segments[0].irradiance1->pixels()[5], rendered.pixels()[5]);
+    EXPECT_EQ(sampler->watermark(), request->t);
+    last = request->t;
+    ++samples;
+  }
+  EXPECT_EQ(last, span.end);
+  EXPECT_EQ(sampler->statistics().samples, samples);
+  EXPECT_EQ(sampler->statistics().pixel_evaluations, samples * kWidth * kHeight);
+}
+
+INSTANTIATE_TEST_SUITE_P(Options, EverySampler,
+                         testing::Values(SamplingOptions(UniformSampling{1234}), SamplingOptions(FlowSampling{}),
+                                         SamplingOptions(BrightnessSampling{}),
+                                         SamplingOptions(FlowSampling{0.5, {5000, 6000}})));
+
+TEST(FlowSampling, BoundsTheMotionBetweenSamples) {
+  Sample sample = moving_ramp(0, 0.1F, 30.0F, -40.0F, 0.001);
+  EXPECT_NEAR(fastest_motion_px_per_s(sample, kWorkers), 50.0, 1e-4);
+  sample.flow_x(kWidth - 1, kHeight - 1) = 300.0F;
+  sample.flow_y(kWidth - 1, kHeight - 1) = 400.0F;
+  EXPECT_NEAR(wanted_interval_s(FlowSampling{.lambda = 0.25, .bounds = {}}, {}, sample, kWorkers), 0.25 / 500, 1e-8);
+}
+
+TEST(FlowSampling, IgnoresMotionThatIsNotFinite) {
+  Sample sample = moving_ramp(0, 0.1F, 3.0F, 4.0F, 0.001);
+  sample.flow_x(1, 1) = std::numeric_limits<float>::quiet_NaN();
+  sample.flow_y(2, 1) = std::numeric_limits<float>::infinity();
+  EXPECT_NEAR(fastest_motion_px_per_s(sample, kWorkers), 5.0, 1e-5);
+}
+
+TEST(BrightnessSampling, BoundsTheChangeBetweenSamples) {
+  // dL/dt = gradient * v; the interval is lambda C / |dL/dt|: the C that the original forgot is in it.
+  const Sample sample = moving_ramp(0, 0.07F, -90.0F, 12.0F, 0.01);
+  EXPECT_NEAR(fastest_brightness_change_per_s(sample, 0.01, kWorkers), 0.07 * 90, 1e-3);
+  const SensorTraits sensor{.contrast_threshold = 0.3, .log_eps = 0.01};
+  EXPECT_NEAR(wanted_interval_s(BrightnessSampling{.lambda = 0.5, .bounds = {}}, sensor, sample, kWorkers),
+              0.5 * 0.3 / (0.07 * 90), 1e-5);
+}
+
+TEST(BrightnessSampling, SeesTheImagesBorder) {
+  Sample sample = moving_ramp(0, 0.0F, 10.0F, 0.0F, 0.001);
+  sample.irradiance(0, 3) *= std::exp(1.0F);  // one-sided difference: 1 per pixel; its neighbour's is half of that
+  EXPECT_NEAR(fastest_brightness_change_per_s(sample, 0.001, kWorkers), 10.0, 0.05);
+}
+
+std::vector<TimeNs> sample_times(const SamplingOptions& options, float speed, TimeNs end) {
+  const auto sampler = make_frame_sampler(options, {}, kWidth, kHeight, {0, end}, kWorkers);
+  std::vector<TimeNs> times;
+  while (const auto request = sampler->next()) {
+    Sample sample = moving_ramp(request->t, 0.1F, speed, 0, 0.001);
+    sampler->accept(sample);
+    times.push_back(request->t);
+  }
+  return times;
+}
+
+TEST(FrameSampler, KeepsToItsRates) {
+  EXPECT_EQ(sample_times(UniformSampling{100}, 0, kNsPerSecond).size(), 101U);
+  EXPECT_EQ(sample_times(FlowSampling{0.5, {200, 1000}}, 0, kNsPerSecond).size(), 201U)
+      << "nothing moves: the least rate";
+  EXPECT_EQ(sample_times(FlowSampling{0.5, {200, 1000}}, 1e9F, kNsPerSecond).size(), 1001U)
+      << "too fast: the greatest rate";
+  EXPECT_EQ(sample_times(FlowSampling{0.5, {10, 10000}}, 250, kNsPerSecond).size(), 501U);
+}
+
+TEST(FrameSampler, CountsIntervalsHeldToTheGreatestRate) {
+  const auto sampler =
+      make_frame_sampler(FlowSampling{0.5, {10, 1000}}, {}, kWidth, kHeight, {0, 5 * kNsPerMs}, kWorkers);
+  while (const auto request = sampler->next()) {
+    Sample sample = moving_ramp(request->t, 0.1F, 1e6F, 0, 0.001);
+    sampler->accept(sample);
+  }
+  EXPECT_EQ(sampler->statistics().held_to_max_rate, 5);
+}
+
+}  // namespace
+}  // namespace esim

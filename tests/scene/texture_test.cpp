@@ -1,0 +1,84 @@
+#include "esim/scene/texture.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace esim {
+namespace {
+
+constexpr int kLanes = 8;
+
+TextureLookup<kLanes> lookup(float u, float v, float du_dx, float dv_dx, float du_dy, float dv_dy) {
+  TextureLookup<kLanes> at;
+  at.u.fill(u), at.v.fill(v);
+  at.du_dx.fill(du_dx), at.dv_dx.fill(dv_dx), at.du_dy.fill(du_dy), at.dv_dy.fill(dv_dy);
+  return at;
+}
+
+Image<float> noise(int width, int height, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> uniform;
+  Image<float> image(width, height);
+  for (float& value : image.pixels()) value = uniform(random);
+  return image;
+}
+
+TEST(Texture, ASmallFootprintInterpolatesTexels) {
+  const Image<float> texels = noise(16, 8, 1);
+  const Texture texture(texels, Wrap::repeat, Wrap::clamp);
+  const float tiny = 1e-4F;
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 16; ++x) {
+      const float u = (static_cast<float>(x) + 0.5F) / 16, v = (static_cast<float>(y) + 0.5F) / 8;
+      EXPECT_NEAR(texture.sample(lookup(u, v, tiny, 0, 0, tiny))[0], texels(x, y), 1e-5);
+      EXPECT_NEAR(texture.sample(lookup(u + 3, v, tiny, 0, 0, tiny))[0], texels(x, y), 1e-4) << "repeats";
+      const float halfway = texture.sample(lookup(u + 0.5F / 16, v, tiny, 0, 0, tiny))[0];
+      EXPECT_NEAR(halfway, 0.5F * (texels(x, y) + texels((x + 1) % 16, y)), 1e-4);
+    }
+  }
+  EXPECT_NEAR(texture.sample(lookup(0.5F / 16, -0.4F, tiny, 0, 0, tiny))[0], texels(0, 0), 1e-5) << "clamps";
+}
+
+TEST(Texture, ALargeFootprintAverages) {
+  const Image<float> texels = noise(256, 256, 2);
+  const Texture texture(texels, Wrap::repeat, Wrap::repeat);
+  double mean = 0;
+  for (const float value : texels.pixels()) mean += value / static_cast<double>(texels.size());
+  EXPECT_NEAR(texture.sample(lookup(0.3F, 0.7F, 1, 0, 0, 1))[3], mean, 1e-3);
+  EXPECT_NEAR(texture.sample(lookup(0.3F, 0.7F, 40, 0, 0, 9))[3], mean, 1e-3);
+}
+
+TEST(Texture, EveryLevelKeepsTheMeanAlsoOfOddSizes) {
+  Image<float> texels(37, 23, 1.0F);
+  for (int y = 0; y < 23; ++y) texels(36, y) = 5.0F;
+  const Texture texture(texels, Wrap::clamp, Wrap::clamp);
+  EXPECT_NEAR(texture.sample(lookup(0.5F, 0.5F, 1, 0, 0, 1))[0], 1.0 + 4.0 / 37, 0.02);
+}
+
+TEST(Texture, DoesNotAliasAlongALongFootprint) {
+  // Stripes across u, seen at a grazing angle: a footprint of 8 x 1 texels along u averages them, one along v does not.
+  Image<float> stripes(256, 256);
+  for (int y = 0; y < 256; ++y) {
+    for (int x = 0; x < 256; ++x) stripes(x, y) = x % 2 == 0 ? 0.0F : 1.0F;
+  }
+  const Texture texture(stripes, Wrap::repeat, Wrap::repeat);
+  const float texel = 1.0F / 256;
+  for (const float u : {0.1F, 0.1F + 0.3F * texel, 0.1F + 0.9F * texel}) {
+    EXPECT_NEAR(texture.sample(lookup(u, 0.5F, 8 * texel, 0, 0, texel))[0], 0.5, 0.08);
+  }
+  const float across = texture.sample(lookup(100.5F * texel, 0.5F, texel, 0, 0, 8 * texel))[0];
+  EXPECT_LT(std::fabs(across - 0.0F), 0.1F) << "isotropic blur";
+}
+
+TEST(Texture, SurvivesDegenerateFootprints) {
+  const Texture texture(noise(64, 64, 3), Wrap::repeat, Wrap::clamp);
+  for (const float huge : {0.0F, 1e-30F, 1e6F, 1e20F}) {
+    const float value = texture.sample(lookup(0.2F, 0.3F, huge, 0, 0, huge))[0];
+    EXPECT_TRUE(value >= 0 && value <= 1) << huge;
+  }
+}
+
+}  // namespace
+}  // namespace esim

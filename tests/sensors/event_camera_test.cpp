@@ -1,0 +1,264 @@
+#include "esim/sensors/event_camera.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "esim/core/error.h"
+#include "sensors/literal_event_camera.h"
+#include "support/errors.h"
+
+namespace esim {
+namespace {
+
+const Workers kOneThread(1);
+
+/// Feeds whole frames to an event camera.
+class Feed {
+ public:
+  Feed(const EventCameraOptions& options, int width, int height, std::uint64_t seed = 0)
+      : camera_(options, width, height, seed, 0), image_{0, 0, width, height} {}
+
+  void frame(const Image<float>& frame, TimeNs t, const Workers& workers = kOneThread) {
+    feed(frame, t, {image_}, workers);
+  }
+
+  /// The same frame, tile by tile.
+  void feed(const Image<float>& frame, TimeNs t, const std::vector<Tile>& tiles, const Workers& workers = kOneThread) {
+    std::vector<Segment> segments;
+    const bool first = last_.empty();
+    for (const Tile& tile : tiles) segments.push_back({tile, first ? t : last_t_, t, first ? &frame : &last_, &frame});
+    camera_.integrate(segments, workers);
+    last_ = frame;
+    last_t_ = t;
+  }
+
+  std::vector<Event> events(TimeNs until = std::numeric_limits<TimeNs>::max()) {
+    std::vector<Event> events;
+    camera_.release_until(until, events);
+    return events;
+  }
+
+ private:
+  EventCamera camera_;
+  Tile image_;
+  Image<float> last_;
+  TimeNs last_t_ = 0;
+};
+
+Image<float> uniform_image(double brightness, double log_eps) {
+  return Image<float>(1, 1, static_cast<float>(std::exp(brightness) - log_eps));
+}
+
+/// A random walk of the log-irradiance in every pixel, with steps of very different sizes.
+std::vector<Image<float>> random_frames(int width, int height, int count, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<float> normal;
+  std::vector<Image<float>> frames(1, Image<float>(width, height, 0.3F));
+  while (static_cast<int>(frames.size()) < count) {
+    Image<float> next = frames.back();
+    for (float& value : next.pixels()) {
+      const float step = random() % 4 == 0 ? 1.5F : 0.1F;
+      value = std::clamp(value * std::exp(step * normal(random)), 0.0F, 50.0F);
+      if (random() % 50 == 0) value = 0;
+    }
+    frames.push_back(next);
+  }
+  return frames;
+}
+
+class EventCameraAgainstLiteral : public testing::TestWithParam<EventCameraOptions> {};
+
+TEST_P(EventCameraAgainstLiteral, FiresTheSameEvents) {
+  constexpr int kWidth = 37, kHeight = 11;
+  const std::vector<Image<float>> frames = random_frames(kWidth, kHeight, 60, 5);
+  Feed fast(GetParam(), kWidth, kHeight, 9);
+  test::LiteralEventCamera literal(GetParam(), kWidth, kHeight, 9, 0);
+  std::mt19937 random(3);
+  TimeNs t = -1000;
+  std::size_t total = 0;
+  for (const Image<float>& frame : frames) {
+    fast.frame(frame, t);
+    const std::vector<Event> expected = literal.process(frame, t);
+    ASSERT_EQ(fast.events(t), expected) << "at t = " << t << " ns";
+    total += expected.size();
+    t += 1 + static_cast<TimeNs>(random() % 2'000'000);
+  }
+  EXPECT_GT(total, 1000U);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Options, EventCameraAgainstLiteral,
+    testing::Values(EventCameraOptions{}, EventCameraOptions{.contrast_threshold = 0.05},
+                    EventCameraOptions{.contrast_threshold_on = 0.2, .contrast_threshold_off = 0.7},
+                    EventCameraOptions{.contrast_threshold = 0.3, .threshold_mismatch = 0.2},
+                    EventCameraOptions{.contrast_threshold = 0.3, .threshold_noise = 0.15},
+                    EventCameraOptions{.contrast_threshold = 0.2,
+                                       .threshold_mismatch = 0.05,
+                                       .threshold_noise = 0.1,
+                                       .refractory_period_us = 300},
+                    EventCameraOptions{.contrast_threshold = 0.1, .refractory_period_us = 5000, .log_eps = 1e-5}));
+
+TEST(EventCamera, TheFirstFrameFiresNothing) {
+  Feed feed({}, 4, 4);
+  feed.frame(Image<float>(4, 4, 7.0F), 100);
+  EXPECT_TRUE(feed.events().empty());
+}
+
+TEST(EventCamera, ARampFiresAtItsLevels) {
+  // L rises by 100 per second and then falls: events every C / 100 s, to the rounding of a float irradiance.
+  const EventCameraOptions options{.contrast_threshold_on = 0.3, .contrast_threshold_off = 0.2};
+  Feed feed(options, 1, 1);
+  constexpr double kSlope = 100;
+  for (int k = 0; k <= 20; ++k) feed.frame(uniform_image(-1 + kSlope * k * 1e-3, options.log_eps), k * kNsPerMs);
+  for (int k = 1; k <= 20; ++k) feed.frame(uniform_image(1 - kSlope * k * 1e-3, options.log_eps), (20 + k) * kNsPerMs);
+
+  const std::vector<Event> events = feed.events();
+  ASSERT_EQ(events.size(), 6U + 9U);  // up by 2.0 = 6 * 0.3 + 0.2; down from 1.8 above the start: 9 * 0.2, then 0.0
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const double expected_s =
+        i < 6 ? 0.3 * static_cast<double>(i + 1) / kSlope : 0.020 + (0.2 + 0.2 * static_cast<double>(i - 5)) / kSlope;
+    EXPECT_NEAR(static_cast<double>(events[i].t), expected_s * 1e9, 5) << i;
+    EXPECT_EQ(events[i].polarity, i < 6 ? 1 : -1);
+  }
+}
+
+TEST(EventCamera, DoesNotDependOnHowDenselyALineIsSampled) {
+  const EventCameraOptions options{.contrast_threshold = 0.13, .threshold_noise = 0.05, .refractory_period_us = 700};
+  std::vector<std::vector<Event>> results;
+  for (const int samples : {1, 7, 1000}) {
+    Feed feed(options, 1, 1, 4);
+    for (int k = 0; k <= samples; ++k) {
+      feed.frame(uniform_image(3.0 * k / samples, options.log_eps), 100 * kNsPerMs * k / samples);
+    }
+    results.push_back(feed.events());
+  }
+  ASSERT_GT(results[0].size(), 10U);
+  for (const auto& events : results) {
+    ASSERT_EQ(events.size(), results[0].size());
+    for (std::size_t i = 0; i < events.size(); ++i)
+      EXPECT_NEAR(static_cast<double>(events[i].t), static_cast<double>(results[0][i].t), 50);
+  }
+}
+
+TEST(EventCamera, TilesGiveTheSameAsTheWholeImage) {
+  const EventCameraOptions options{
+      .contrast_threshold = 0.2, .threshold_mismatch = 0.03, .threshold_noise = 0.02, .refractory_period_us = 100};
+  const std::vector<Tile> tiles = {{20, 0, 17, 11}, {0, 5, 20, 6}, {0, 0, 20, 5}};
+  Feed whole(options, 37, 11), tiled(options, 37, 11);
+  TimeNs t = 0;
+  for (const Image<float>& frame : random_frames(37, 11, 20, 8)) {
+    whole.frame(frame, t);
+    tiled.feed(frame, t, tiles);
+    t += kNsPerMs;
+  }
+  const std::vector<Event> events = whole.events();
+  EXPECT_GT(events.size(), 1000U);
+  EXPECT_EQ(tiled.events(), events);
+}
+
+TEST(EventCamera, DoesNotDependOnTheNumberOfThreads) {
+  const EventCameraOptions options{.contrast_threshold = 0.2, .threshold_mismatch = 0.03, .threshold_noise = 0.02};
+  const Workers two(2), five(5);
+  Feed a(options, 64, 48), b(options, 64, 48), c(options, 64, 48);
+  TimeNs t = 0;
+  for (const Image<float>& frame : random_frames(64, 48, 10, 2)) {
+    a.frame(frame, t);
+    b.frame(frame, t, two);
+    c.frame(frame, t, five);
+    t += kNsPerMs;
+  }
+  const std::vector<Event> events = a.events();
+  EXPECT_EQ(b.events(), events);
+  EXPECT_EQ(c.events(), events);
+}
+
+TEST(EventCamera, HoldsThePixelForTheRefractoryPeriod) {
+  const EventCameraOptions options{.contrast_threshold = 0.1, .refractory_period_us = 1000};
+  Feed feed(options, 1, 1);
+  // 1 per second: a level every 100 ms, far apart. Then 1000 per second: one event, reset for 1 ms, a new reference.
+  feed.frame(uniform_image(0, options.log_eps), 0);
+  feed.frame(uniform_image(1000 * 0.010, options.log_eps), 10 * kNsPerMs);
+  const std::vector<Event> events = feed.events();
+  ASSERT_EQ(events.size(), 9U);  // every 0.1 ms + 1 ms: 0.1, 1.2, 2.3, ... 8.9 ms
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    EXPECT_NEAR(static_cast<double>(events[i].t), 1e6 * (0.1 + 1.1 * static_cast<double>(i)), 5);
+  }
+}
+
+TEST(EventCamera, ThresholdsHaveTheGivenMeanAndSpread) {
+  // On a ramp of 1 per second the time between a pixel's events is its threshold.
+  constexpr int kWidth = 100, kHeight = 40;
+  constexpr double kMean = 0.2, kMismatch = 0.02, kNoise = 0.015;
+  const EventCameraOptions options{
+      .contrast_threshold = kMean, .threshold_mismatch = kMismatch, .threshold_noise = kNoise};
+  Feed feed(options, kWidth, kHeight, 17);
+  for (int k = 0; k <= 10; ++k) {
+    feed.frame(Image<float>(kWidth, kHeight, static_cast<float>(std::exp(0.42 * k) - options.log_eps)),
+               k * 420 * kNsPerMs);
+  }
+  Image<double> last(kWidth, kHeight, 0.0), sum(kWidth, kHeight, 0.0), sum2(kWidth, kHeight, 0.0),
+      count(kWidth, kHeight, 0.0);
+  for (const Event& event : feed.events()) {
+    const double interval = to_seconds(event.t) - last(event.x, event.y);
+    last(event.x, event.y) = to_seconds(event.t);
+    sum(event.x, event.y) += interval, sum2(event.x, event.y) += interval * interval, count(event.x, event.y) += 1;
+  }
+  double mean = 0, mean2 = 0, within = 0, freedom = 0;
+  const double pixels = kWidth * kHeight;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const double n = count(x, y), m = sum(x, y) / n;
+      mean += m / pixels, mean2 += m * m / pixels;
+      within += sum2(x, y) - n * m * m, freedom += n - 1;
+    }
+  }
+  const double events_per_pixel = freedom / pixels + 1;
+  const double between = mean2 - mean * mean - kNoise * kNoise / events_per_pixel;
+  EXPECT_NEAR(mean, kMean, 5 * std::sqrt((kMismatch * kMismatch + kNoise * kNoise / events_per_pixel) / pixels));
+  EXPECT_NEAR(std::sqrt(within / freedom), kNoise, 5 * kNoise / std::sqrt(2 * freedom));
+  EXPECT_NEAR(std::sqrt(between), kMismatch, 6 * kMismatch / std::sqrt(2 * pixels));
+}
+
+TEST(EventCamera, OnAndOffMismatchAreIndependent) {
+  constexpr int kPixels = 4000;
+  const EventCameraOptions options{.contrast_threshold = 0.5, .threshold_mismatch = 0.05};
+  Feed feed(options, kPixels, 1, 3);
+  const auto at = [&](double brightness) {
+    return Image<float>(kPixels, 1, static_cast<float>(std::exp(brightness) - options.log_eps));
+  };
+  feed.frame(at(0), 0);
+  feed.frame(at(0.9), 900 * kNsPerMs);  // each pixel's ON threshold is the time of its event
+  feed.frame(at(-0.9), 2700 * kNsPerMs);
+  std::vector<double> on(kPixels), off(kPixels);
+  for (const Event& event : feed.events()) {
+    if (event.polarity > 0) on[event.x] = to_seconds(event.t);
+    if (event.polarity < 0 && off[event.x] == 0) off[event.x] = on[event.x] - (0.9 - (to_seconds(event.t) - 0.9));
+  }
+  double product = 0, spread_on = 0, spread_off = 0;
+  for (int i = 0; i < kPixels; ++i) {
+    const double a = on[static_cast<std::size_t>(i)] - 0.5, b = off[static_cast<std::size_t>(i)] - 0.5;
+    product += a * b, spread_on += a * a, spread_off += b * b;
+  }
+  EXPECT_NEAR(product / std::sqrt(spread_on * spread_off), 0.0, 5 / std::sqrt(kPixels));
+  EXPECT_NEAR(std::sqrt(spread_off / kPixels), 0.05, 5 * 0.05 / std::sqrt(2.0 * kPixels));
+}
+
+TEST(EventCamera, RefusesWhatIsNoIrradiance) {
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -0.5F}) {
+    for (const bool in_first_frame : {true, false}) {
+      Feed feed({}, 40, 3);
+      Image<float> good(40, 3, 0.5F), broken = good;
+      broken(33, 2) = bad;
+      if (!in_first_frame) feed.frame(good, 0);
+      const std::string message = test::message_of<UserError>([&] { feed.frame(broken, 1500 * kNsPerMs); });
+      EXPECT_TRUE(test::contains(message, "(33, 2)")) << message;
+      EXPECT_TRUE(test::contains(message, "1.5")) << message;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace esim

@@ -14,7 +14,7 @@ struct RateBounds {
   double max_rate_hz = 50000;
 };
 
-/// Samples at a fixed rate.
+/// Samples at a fixed rate: the k-th one k / rate_hz after the start.
 struct UniformSampling {
   static constexpr const char* kType = "uniform";
   double rate_hz = 1000;
@@ -43,7 +43,6 @@ struct SensorTraits {
 };
 
 /// Time until the next sample, s; +inf where the criterion sees no change.
-double wanted_interval_s(const UniformSampling& options, const SensorTraits&, const Sample&, const Workers&);
 double wanted_interval_s(const BrightnessSampling& options, const SensorTraits&, const Sample&, const Workers&);
 double wanted_interval_s(const FlowSampling& options, const SensorTraits&, const Sample&, const Workers&);
 

@@ -6,31 +6,14 @@
 namespace esim {
 namespace {
 
-/// Shortest and longest interval between two samples, ns.
-struct IntervalBounds {
-  TimeNs shortest, longest;
-};
-
-IntervalBounds interval_bounds(const UniformSampling& options) {
-  const TimeNs interval = std::max<TimeNs>(1, to_ns(1.0 / options.rate_hz));
-  return {interval, interval};
-}
-
-template <typename Adaptive>
-IntervalBounds interval_bounds(const Adaptive& options) {
-  const TimeNs shortest = std::max<TimeNs>(1, to_ns(1.0 / options.bounds.max_rate_hz));
-  return {shortest, std::max(shortest, to_ns(1.0 / options.bounds.min_rate_hz))};
-}
-
 class FrameSampler final : public Sampler {
  public:
   FrameSampler(const SamplingOptions& options, const SensorTraits& sensor, int width, int height, const TimeSpan& span,
                const Workers& workers)
       : options_(options),
         sensor_(sensor),
-        bounds_(std::visit([](const auto& criterion) { return interval_bounds(criterion); }, options)),
         image_{0, 0, width, height},
-        end_(span.end),
+        span_(span),
         workers_(workers),
         request_(SampleRequest{span.start, {image_}}),
         watermark_(span.start) {}
@@ -57,24 +40,34 @@ class FrameSampler final : public Sampler {
  private:
   /// Chooses the time of the next request from the current sample.
   void schedule() {
-    if (current_.t >= end_) {
+    if (current_.t >= span_.end) {
       request_.reset();
       return;
     }
-    const double wanted_s = std::visit(
-        [&](const auto& criterion) { return wanted_interval_s(criterion, sensor_, current_, workers_); }, options_);
+    const TimeNs t = std::visit([this](const auto& criterion) { return next_time(criterion); }, options_);
+    request_->t = std::clamp(t, current_.t + 1, span_.end);
+  }
+
+  // The k-th time is computed from k, so that rounding does not accumulate.
+  TimeNs next_time(const UniformSampling& uniform) {
+    return span_.start + to_ns(static_cast<double>(statistics_.samples) / uniform.rate_hz);
+  }
+
+  template <typename Adaptive>
+  TimeNs next_time(const Adaptive& criterion) {
+    const TimeNs shortest = std::max<TimeNs>(1, to_ns(1.0 / criterion.bounds.max_rate_hz));
+    const TimeNs longest = std::max(shortest, to_ns(1.0 / criterion.bounds.min_rate_hz));
+    const double wanted_s = wanted_interval_s(criterion, sensor_, current_, workers_);
     // Rounded down, so that the criterion's bound holds to the nanosecond.
-    const double wanted_ns = std::floor(std::min(wanted_s * 1e9, static_cast<double>(bounds_.longest)));
-    const TimeNs interval = std::clamp(static_cast<TimeNs>(wanted_ns), bounds_.shortest, bounds_.longest);
-    if (wanted_ns < static_cast<double>(bounds_.shortest)) ++statistics_.held_to_max_rate;
-    request_->t = std::min(current_.t + interval, end_);
+    const auto wanted = static_cast<TimeNs>(std::min(wanted_s * 1e9, static_cast<double>(longest)));
+    if (wanted < shortest) ++statistics_.held_to_max_rate;
+    return current_.t + std::max(wanted, shortest);
   }
 
   SamplingOptions options_;
   SensorTraits sensor_;
-  IntervalBounds bounds_;
   Tile image_;
-  TimeNs end_;
+  TimeSpan span_;
   const Workers& workers_;
 
   std::optional<SampleRequest> request_;

@@ -31,7 +31,8 @@ std::string nearest(const std::string& word, const std::vector<std::string>& can
     // A word that the candidate contains is as good as one wrong letter.
     const bool contained = word.size() >= 4 && candidate.find(word) != std::string::npos;
     const std::size_t distance = contained ? 1 : edit_distance(word, candidate);
-    if (distance < best_distance) best = candidate, best_distance = distance;
+    const bool shorter = distance == best_distance && candidate.size() < best.size();
+    if (distance < best_distance || shorter) best = candidate, best_distance = distance;
   }
   return best;
 }

@@ -105,7 +105,7 @@ class ReferenceWriter {
 
   void line(const std::string& left, const char* help) {
     const std::string indented = std::string(static_cast<std::size_t>(2 * depth_), ' ') + left;
-    out_ += fmt::format("{:<{}} # {}\n", indented, kHelpColumn, help);
+    out_ += *help != '\0' ? fmt::format("{:<{}} # {}\n", indented, kHelpColumn, help) : indented + "\n";
   }
 
   static std::string default_of(bool value) { return value ? " true" : " false"; }
@@ -140,9 +140,8 @@ class ReferenceWriter {
   }
 
   static std::string range_of(const About& about) {
-    if (std::isfinite(about.min) && std::isfinite(about.max))
-      return fmt::format(" {}{} .. {}", about.above_min ? "> " : "", about.min, about.max);
-    return "";
+    if (!std::isfinite(about.min) || !std::isfinite(about.max)) return "";
+    return fmt::format(" ({}{} to {})", about.above_min ? "> " : "", about.min, about.max);
   }
 
   template <typename T>

@@ -1,0 +1,91 @@
+"""Holds the #includes of src/esim against the arrows of ARCHITECTURE.md.
+
+Run as: architecture_test.py ROOT_OF_THE_PROJECT
+"""
+
+import pathlib
+import re
+import sys
+import unittest
+
+ROOT = pathlib.Path(sys.argv[1])
+SOURCE = ROOT / "src" / "esim"
+
+# Which modules a module may include. compose alone knows every backend and format; sim knows none.
+ALLOWED = {
+    "core": "",
+    "geometry": "core",
+    "events": "core",
+    "motion": "core geometry",
+    "scene": "core geometry",
+    "render": "core geometry motion",
+    "backends": "core geometry motion scene render",
+    "sampling": "core render",
+    "sensors": "core events render",
+    "record": "core events geometry",
+    "truth": "core",
+    "sim": "core events geometry motion render sampling sensors record truth",
+    "scenario": "core geometry sampling sensors",
+    "compose": "core geometry motion scene render backends sampling sensors record truth sim scenario",
+}
+
+# Heavy libraries, and the headers of ours that may include them: private ones, which only .cpp files include.
+HEAVY = re.compile(r"^(embree3|assimp|opencv2|hdf5|yaml-cpp|nlohmann|fmt|tbb|libav|libsw|Imf)")
+PRIVATE_HEADERS = {"backends/raycast/raycast_scene.h", "scenario/yaml_reader.h", "record/formats/hdf5_detail.h",
+                   "record/formats/hdf5_input.h", "record/formats/hdf5_output_driver.h"}
+
+
+def includes(path):
+    return re.findall(r'^\s*#include\s+[<"]([^>"]+)[>"]', path.read_text(), re.MULTILINE)
+
+
+def files(pattern):
+    return sorted(path for path in SOURCE.rglob(pattern))
+
+
+def module_of(path):
+    return path.relative_to(SOURCE).parts[0]
+
+
+class Architecture(unittest.TestCase):
+    def test_every_module_is_listed(self):
+        self.assertEqual({p.name for p in SOURCE.iterdir() if p.is_dir()}, set(ALLOWED))
+
+    def test_includes_follow_the_arrows(self):
+        for path in files("*.h") + files("*.cpp"):
+            module = module_of(path)
+            for name in includes(path):
+                if not name.startswith("esim/"):
+                    continue
+                target = name.split("/")[1]
+                self.assertTrue(target == module or target in ALLOWED[module].split(), f"{path} includes {name}")
+                if module == target == "backends":
+                    own = path.relative_to(SOURCE).parts[1]
+                    self.assertEqual(name.split("/")[2], own, f"{path} includes another backend: {name}")
+
+    def test_heavy_libraries_stay_out_of_public_headers(self):
+        for path in files("*.h"):
+            if str(path.relative_to(SOURCE)) in PRIVATE_HEADERS:
+                continue
+            for name in includes(path):
+                self.assertIsNone(HEAVY.match(name), f"{path} includes {name}")
+
+    def test_private_headers_stay_private(self):
+        for path in files("*.h"):
+            if str(path.relative_to(SOURCE)) in PRIVATE_HEADERS:
+                continue
+            for name in includes(path):
+                self.assertNotIn(name.removeprefix("esim/"), PRIVATE_HEADERS, f"{path} includes {name}")
+
+    def test_files_stay_readable(self):
+        for path in files("*.h") + files("*.cpp"):
+            self.assertLess(len(path.read_text().splitlines()), 450, f"{path} has grown too long: split it")
+
+    def test_the_library_neither_prints_nor_exits(self):
+        for path in files("*.h") + files("*.cpp"):
+            found = re.search(r"std::c(out|err)|\bprintf\(|fmt::print|std::exit|\babort\(", path.read_text())
+            self.assertIsNone(found, f"{path}: {found and found.group()}")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=1)

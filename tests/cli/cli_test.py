@@ -1,0 +1,232 @@
+"""The program as its users meet it: exit codes, messages, and what is left on disk.
+
+Run as: cli_test.py ESIM_PROGRAM SCENES_FOLDER, with the standard library of Python alone.
+"""
+
+import json
+import os
+import pathlib
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+ESIM = os.path.abspath(sys.argv[1])
+SCENES = pathlib.Path(sys.argv[2]).absolute()
+
+# Small enough for a sanitizer: the poster at a low resolution.
+FAST = ["--set", "camera.width=64", "--set", "camera.height=48", "--set", "duration_s=0.2"]
+ENDLESS = ["--set", "camera.width=64", "--set", "camera.height=48", "--set", "duration_s=5000",
+           "--set", "sampling={type: uniform, rate_hz: 2000}", "--set", "output.preview=false"]
+
+
+def run(*arguments, **options):
+    return subprocess.run([ESIM, *map(str, arguments)], capture_output=True, text=True, timeout=120, **options)
+
+
+class Cli(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="esim_cli_"))
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.out = self.folder / "out"
+
+    def simulate(self, *arguments, scenario=SCENES / "poster.yaml", **options):
+        return run("simulate", scenario, "--out", self.out, *arguments, **options)
+
+    def assert_refused(self, result, *parts):
+        """One clear line, exit status 2, nothing left behind."""
+        self.assertEqual(result.returncode, 2, result.stderr)
+        lines = [line for line in result.stderr.splitlines() if line.startswith("esim: ")]
+        self.assertEqual(len(lines), 1, result.stderr)
+        for part in parts:
+            self.assertIn(part, lines[0])
+        self.assertEqual([p.name for p in self.folder.iterdir() if p.name.startswith("out")], [])
+
+    def start_and_wait_for_events(self):
+        process = subprocess.Popen([ESIM, "simulate", SCENES / "poster.yaml", "--out", self.out, *ENDLESS],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        events = pathlib.Path(str(self.out) + ".incomplete") / "events.h5"
+        deadline = time.time() + 60
+        while not (events.exists() and events.stat().st_size > 500_000):
+            self.assertIsNone(process.poll(), "ended early")
+            self.assertLess(time.time(), deadline, "wrote no events")
+            time.sleep(0.02)
+        return process
+
+
+class Recordings(Cli):
+    def test_a_recording_holds_what_the_manual_says(self):
+        result = self.simulate(*FAST, "--set", "output.events_txt=true")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        names = {p.name for p in self.out.iterdir()}
+        self.assertEqual(names, {"events.h5", "events.txt", "images", "poses.txt", "preview.mp4", "preview.png",
+                                 "report.json", "scenario.yaml", "truth.h5"})
+        report = json.loads((self.out / "report.json").read_text())
+        self.assertEqual(report["status"], "complete")
+        self.assertAlmostEqual(report["simulated_s"], 0.2, places=9)
+        camera = report["cameras"][0]
+        self.assertEqual(camera["pixel_evaluations"], camera["frames"] * 64 * 48)
+        self.assertEqual(camera["events"], len((self.out / "events.txt").read_text().splitlines()))
+        self.assertEqual(len((self.out / "poses.txt").read_text().splitlines()), 1 + 41)
+        self.assertFalse(any("\r" in line or "\033" in line for line in result.stderr.splitlines()), "a progress bar off a terminal")
+
+    def test_the_same_bytes_with_one_thread_and_two_and_from_the_resolved_scenario(self):
+        noise = ["--set", "event_camera.threshold_mismatch=0.02", "--seed", "3"]
+        self.assertEqual(self.simulate(*FAST, *noise, "--threads", "1").returncode, 0)
+        first = (self.out / "events.h5").read_bytes()
+        other = self.folder / "other"
+        for arguments in ([SCENES / "poster.yaml", *FAST, *noise, "--threads", "2"], [self.out / "scenario.yaml"]):
+            self.assertEqual(run("simulate", *arguments, "--out", other, "--force").returncode, 0)
+            self.assertEqual((other / "events.h5").read_bytes(), first)
+        self.assertEqual(self.simulate(*FAST, "--seed", "4", "--force").returncode, 0)
+        self.assertNotEqual((self.out / "events.h5").read_bytes(), first)
+
+    def test_several_cameras_have_folders(self):
+        cameras = "cameras=[{width: 32, height: 24}, {name: right, width: 48, height: 32}]"
+        scenario = self.folder / "s.yaml"
+        text = (SCENES / "poster.yaml").read_text().replace("poster/", str(SCENES / "poster") + "/")
+        scenario.write_text("\n".join(line for line in text.splitlines() if not line.startswith("camera:")))
+        result = self.simulate("--set", cameras, "--set", "duration_s=0.1", scenario=scenario)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertTrue((self.out / "cam0" / "events.h5").exists() and (self.out / "right" / "preview.png").exists())
+        self.assertIn("right", run("info", self.out).stdout)
+
+    def test_quiet_says_nothing(self):
+        result = self.simulate(*FAST, "--quiet")
+        self.assertEqual((result.returncode, result.stdout, result.stderr), (0, "", ""))
+
+    def test_info_and_check_and_options(self):
+        self.simulate(*FAST)
+        for path in (self.out, self.out / "events.h5"):
+            result = run("info", path)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn("64", result.stdout)
+        result = run("check", SCENES / "poster.yaml", *FAST)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("64x48", result.stdout)
+        reference = (SCENES.parent / "docs" / "scenario.md").read_text()
+        self.assertIn(run("options").stdout, reference, "docs/scenario.md is out of date: scripts/update-docs")
+        self.assertIn("Examples", run("--help").stdout)
+        self.assertIn("Example", run("simulate", "--help").stdout)
+
+
+class BadInput(Cli):
+    def test_command_line(self):
+        self.assert_refused(run("simulate"), "scenario")
+        self.assert_refused(run("frobnicate"))
+        self.assert_refused(run("simulate", self.folder / "none.yaml", "--out", self.out), "none.yaml", "no such")
+        self.assert_refused(run("info", self.folder / "none"))
+
+    def test_values(self):
+        cases = {
+            "event_camera.contrast_treshold=0.2": "did you mean contrast_threshold?",
+            "event_camera.contrast_threshold=high": "must be a number",
+            "sampling.lambda=0": "above 0",
+            "sampling.lambda=.inf": "must be a number",
+            "camera.width=0": "at least 1",
+            "duration_s=-1": "above 0",
+            "renderer.image=none.jpg": "no such file",
+            "trajectory={type: file, path: none.txt}": "none.txt",
+            "renderer.pose.look_at=[-5, 0, 0]": "sees nothing",
+            "renderer={type: mesh, scene: none.obj}": "no such file",
+            "camera={calibration: none.yaml}": "no such file",
+            "output.compression=zip": "is not one of",
+        }
+        for setting, message in cases.items():
+            with self.subTest(setting):
+                arguments = ["--set", setting]
+                if message == "sees nothing":
+                    arguments += ["--set", "renderer.pose.position=[-6, 0, 0]"]
+                self.assert_refused(self.simulate(*arguments), message)
+
+    def test_unreadable_files(self):
+        scenario = self.folder / "s.yaml"
+        for name, content, message in [
+            ("image.png", b"\x89PNG\r\n\x1a\nbroken", "cannot be decoded"),
+            ("image.exr", b"\x76\x2f\x31\x01broken", "cannot be read"),
+        ]:
+            (self.folder / name).write_bytes(content)
+            scenario.write_text(f"duration_s: 1\nrenderer: {{type: panorama, image: {name}}}\ntrajectory: {{type: static}}\n")
+            self.assert_refused(self.simulate(scenario=scenario), name, message)
+        (self.folder / "mesh.obj").write_text("v 0 0 0\n")
+        scenario.write_text("duration_s: 1\nrenderer: {type: mesh, scene: mesh.obj}\ntrajectory: {type: static}\n")
+        self.assert_refused(self.simulate(scenario=scenario), "mesh.obj")
+
+    def test_degenerate_trajectories(self):
+        for content in ("", "0 0 0 0 0 0 0 1\n", "0 0 0 0 0 0 0 1\n0 0 0 1 0 0 0 1\n", "1 0 0 0 0 0 0 1\n0 0 0 1 0 0 0 1\n",
+                        "0 0 0 0 0 0 0 0\n1 0 0 0 0 0 0 1\n", "0 0 0 nan 0 0 0 1\n1 0 0 0 0 0 0 1\n", "0 0 0\n1 0 0\n"):
+            with self.subTest(content):
+                path = self.folder / "t.txt"
+                path.write_text(content)
+                self.assert_refused(self.simulate("--set", f"trajectory={{type: file, path: {path}}}"), "t.txt")
+
+    def test_a_missing_texture_is_a_warning_and_grey(self):
+        (self.folder / "m.obj").write_text("mtllib m.mtl\nv 2 -9 -9\nv 2 9 -9\nv 2 0 9\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1/1 2/2 3/3\n")
+        (self.folder / "m.mtl").write_text("newmtl a\nKd 1 1 1\nmap_Kd gone.png\n")
+        scenario = self.folder / "s.yaml"
+        scenario.write_text("duration_s: 0.1\nrenderer: {type: mesh, scene: m.obj}\ntrajectory: {type: static}\ncamera: {width: 32, height: 24}\n")
+        result = self.simulate(scenario=scenario)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("warning: material a", result.stderr)
+        self.assertIn("gone.png", result.stderr)
+
+    def test_an_output_that_exists(self):
+        self.out.mkdir()
+        (self.out / "thesis.txt").write_text("precious")
+        for force in ([], ["--force"]):
+            result = self.simulate(*FAST, *force)
+            self.assertEqual(result.returncode, 2)
+            self.assertEqual((self.out / "thesis.txt").read_text(), "precious")
+        (self.out / "thesis.txt").unlink()
+        self.out.rmdir()
+        self.assertEqual(self.simulate(*FAST).returncode, 0)
+        before = (self.out / "report.json").read_text()
+        result = self.simulate(*FAST)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("--force", result.stderr)
+        self.assertEqual((self.out / "report.json").read_text(), before)
+        self.assertEqual(self.simulate(*FAST, "--force").returncode, 0)
+
+    def test_a_full_disk(self):
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+
+        result = self.simulate("--set", "duration_s=1", preexec_fn=limit)
+        self.assert_refused(result, "out.incomplete")
+
+
+class Signals(Cli):
+    def test_an_interrupt_finishes_the_files_and_marks_them_incomplete(self):
+        process = self.start_and_wait_for_events()
+        process.send_signal(signal.SIGINT)
+        _, stderr = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 130, stderr)
+        report = json.loads((self.out / "report.json").read_text())
+        self.assertEqual(report["status"], "interrupted")
+        result = run("info", self.out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("interrupted", result.stdout)
+
+    def test_a_kill_leaves_what_info_recognises(self):
+        process = self.start_and_wait_for_events()
+        process.kill()
+        process.communicate(timeout=60)
+        self.assertFalse(self.out.exists())
+        for path in (self.out, str(self.out) + ".incomplete"):
+            result = run("info", path)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn("killed", result.stdout)
+        result = self.simulate(*FAST)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("--force", result.stderr)
+        self.assertEqual(self.simulate(*FAST, "--force").returncode, 0)
+        self.assertEqual({p.name for p in self.folder.iterdir()}, {"out"})
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=1)

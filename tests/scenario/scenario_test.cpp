@@ -1,0 +1,219 @@
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "esim/core/error.h"
+#include "esim/scenario/calibration.h"
+#include "esim/scenario/read.h"
+#include "esim/scenario/suggest.h"
+#include "support/errors.h"
+#include "support/temporary_directory.h"
+#include "support/test_data.h"
+
+namespace esim {
+namespace {
+
+using test::contains;
+
+constexpr const char* kMinimal = R"(
+duration_s: 1
+renderer: {type: panorama, image: p.jpg}
+trajectory: {type: static}
+)";
+
+class ScenarioFile : public testing::Test {
+ protected:
+  Scenario read(const std::string& yaml, const std::vector<std::string>& overrides = {}) {
+    std::ofstream(file()) << yaml;
+    return read_scenario(file(), overrides);
+  }
+  std::string error(const std::string& yaml, const std::vector<std::string>& overrides = {}) {
+    const std::string message = test::message_of<UserError>([&] { read(yaml, overrides); });
+    EXPECT_EQ(message.find('\n'), std::string::npos) << "more than a line: " << message;
+    return message;
+  }
+  std::filesystem::path file() const { return folder_.path() / "s.yaml"; }
+
+  test::TemporaryDirectory folder_;
+};
+
+TEST_F(ScenarioFile, GivesDefaultsToWhatItDoesNotName) {
+  const Scenario scenario = read(kMinimal);
+  ASSERT_EQ(scenario.cameras.size(), 1U);
+  EXPECT_EQ(scenario.cameras[0].name, "cam0");
+  EXPECT_EQ(scenario.cameras[0].width, 346);
+  EXPECT_DOUBLE_EQ(scenario.cameras[0].event_camera.threshold_on(), 0.5);
+  EXPECT_DOUBLE_EQ(std::get<FlowSampling>(scenario.cameras[0].sampling).lambda, 0.5);
+  EXPECT_EQ(std::get<PanoramaRendererOptions>(scenario.renderer).image, folder_.path() / "p.jpg") << "relative to the file";
+}
+
+TEST_F(ScenarioFile, SharesSamplingAndSensorAmongCameras) {
+  const Scenario scenario = read(std::string(kMinimal) + R"(
+sampling: {type: brightness, lambda: 0.3, min_rate_hz: 77}
+event_camera: {contrast_threshold: 0.2, threshold_noise: 0.01}
+cameras:
+  - {width: 10, height: 20}
+  - {name: right, sampling: {lambda: 0.1}, event_camera: {contrast_threshold_on: 0.4}}
+  - {sampling: {type: uniform, rate_hz: 5}}
+)");
+  ASSERT_EQ(scenario.cameras.size(), 3U);
+  EXPECT_EQ(scenario.cameras[1].name, "right");
+  EXPECT_DOUBLE_EQ(std::get<BrightnessSampling>(scenario.cameras[0].sampling).lambda, 0.3);
+  EXPECT_DOUBLE_EQ(std::get<BrightnessSampling>(scenario.cameras[1].sampling).lambda, 0.1);
+  EXPECT_DOUBLE_EQ(std::get<BrightnessSampling>(scenario.cameras[1].sampling).bounds.min_rate_hz, 77);
+  EXPECT_DOUBLE_EQ(std::get<UniformSampling>(scenario.cameras[2].sampling).rate_hz, 5);
+  EXPECT_DOUBLE_EQ(scenario.cameras[1].event_camera.threshold_on(), 0.4);
+  EXPECT_DOUBLE_EQ(scenario.cameras[1].event_camera.threshold_off(), 0.2);
+  EXPECT_DOUBLE_EQ(scenario.cameras[1].event_camera.threshold_noise, 0.01);
+}
+
+TEST_F(ScenarioFile, IsTheSameAfterWritingAndReading) {
+  const Scenario scenario = read(std::string(kMinimal) + R"(
+seed: 18446744073709551615
+start_s: 0.1
+truth: {rate_hz: 12.5, depth: false}
+output: {time_unit: ns, compression: gzip}
+cameras:
+  - {fx: 200.123456789012345, cy: 3, distortion: {type: radial-tangential, k1: -0.38, p2: 1e-3}}
+  - {name: b, T_body_camera: {position: [0.1, 0, 0], quaternion: [0, 0.6, 0, 0.8]}, sampling: {type: uniform}}
+)");
+  const std::string text = write_scenario(scenario);
+  EXPECT_EQ(write_scenario(read(text)), text);
+  EXPECT_TRUE(contains(text, "200.1234567890123"));
+  EXPECT_EQ(read(text).seed, 18446744073709551615U);
+  EXPECT_EQ(read(text).output.time_unit, EventTimeUnit::ns);
+}
+
+TEST_F(ScenarioFile, TakesOverrides) {
+  const Scenario scenario = read(kMinimal, {"event_camera.contrast_threshold=0.2", "sampling.type=flow", "sampling.lambda=0.25",
+                                            "truth.images=false", "trajectory.pose.position=[1, 2, 3]", "seed=9"});
+  EXPECT_DOUBLE_EQ(scenario.cameras[0].event_camera.contrast_threshold, 0.2);
+  EXPECT_DOUBLE_EQ(std::get<FlowSampling>(scenario.cameras[0].sampling).lambda, 0.25);
+  EXPECT_FALSE(scenario.truth.images);
+  EXPECT_DOUBLE_EQ(std::get<StaticTrajectoryOptions>(scenario.trajectory).pose.position.z(), 3);
+  EXPECT_EQ(scenario.seed, 9U);
+  EXPECT_EQ(read(std::string(kMinimal) + "cameras: [{width: 5}, {width: 6}]", {"cameras.1.width=7"}).cameras[1].width, 7);
+}
+
+TEST_F(ScenarioFile, RefusesUnknownKeysAndNamesTheNearest) {
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "event_camera: {contrast_treshold: 0.2}\n"), "contrast_threshold?"));
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "event_camera: {contrast_treshold: 0.2}\n"), "s.yaml"));
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "samplin: {}\n"), ":5: samplin: unknown key; did you mean sampling?"));
+  EXPECT_TRUE(contains(error(kMinimal, {"truth.rate=3"}), "--set truth.rate: unknown key; did you mean rate_hz?"));
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "xyzzy: 1\n"), "known are"));
+}
+
+TEST_F(ScenarioFile, RefusesWrongTypesAndRanges) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"truth: {rate_hz: fast}", "must be a number, not 'fast'"},
+      {"truth: {rate_hz: -1}", "out of range: must be at least 0 Hz"},
+      {"truth: {rate_hz: .nan}", "must be a number"},
+      {"truth: {images: maybe}", "must be true or false"},
+      {"truth: 3", "must be a map"},
+      {"camera: {width: 0}", "out of range: must be at least 1 px"},
+      {"camera: {width: 1.5}", "must be a whole number"},
+      {"camera: {T_body_camera: {position: [1, 2]}}", "must be a list of 3 numbers"},
+      {"sampling: {type: flow, lambda: 0}", "must be above 0"},
+      {"sampling: {type: flow, lambda: .inf}", "must be a number"},
+      {"sampling: {type: flo}", "did you mean flow?"},
+      {"sampling: {lambda: 0.5}", "needs a type: one of flow, brightness, uniform"},
+      {"output: {time_unit: ms}", "is not one of us, ns"},
+      {"seed: -3", "whole number from 0"},
+      {"cameras: []", "at least one camera"},
+      {"cameras: [{name: a}, {name: a}]", "two cameras are named a"},
+      {"cameras: [{name: ../x}]", "use letters"},
+      {"camera: {width: 3, width: 4}", "appears twice"},
+  };
+  for (const auto& [yaml, expected] : cases) {
+    EXPECT_TRUE(contains(error(std::string(kMinimal) + yaml + "\n"), expected)) << yaml;
+  }
+}
+
+TEST_F(ScenarioFile, RefusesFilesThatAreNoScenario) {
+  EXPECT_TRUE(contains(error("renderer: [1, 2"), "not valid YAML"));
+  EXPECT_TRUE(contains(error("just text"), "a scenario is a map"));
+  EXPECT_TRUE(contains(error("duration_s: 1\ntrajectory: {type: static}\n"), "renderer: is missing"));
+  EXPECT_TRUE(contains(test::message_of<UserError>([&] { read_scenario(folder_.path() / "none.yaml"); }), "no such scenario file"));
+  EXPECT_TRUE(contains(error("renderer: {type: panorama, image: '${ESIM_NO_SUCH}/x'}\n"), "environment variable ESIM_NO_SUCH is not set"));
+}
+
+TEST_F(ScenarioFile, RefusesOverridesThatAreNone) {
+  EXPECT_TRUE(contains(error(kMinimal, {"seed"}), "expected key=value"));
+  EXPECT_TRUE(contains(error(kMinimal, {"seed.x=1"}), "--set"));
+}
+
+TEST_F(ScenarioFile, RefusesGeometryBesideACalibration) {
+  std::ofstream(folder_.path() / "c.yaml") << "cam0: {}\n";
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "camera: {calibration: c.yaml, fx: 3}\n"), "camera.fx: is given by the calibration"));
+}
+
+TEST(Calibration, ReadsTheOriginalsRigs) {
+  const auto ijrr = test::test_data("calibration/ijrr.yaml");
+  if (!ijrr) GTEST_SKIP() << "needs ESIM_TEST_DATA";
+  const auto cameras = read_calibration(*ijrr);
+  ASSERT_EQ(cameras.size(), 1U);
+  EXPECT_EQ(cameras[0].name, "dvs");
+  EXPECT_EQ(cameras[0].model.width, 240);
+  EXPECT_NEAR(cameras[0].model.fy, 199.7078674353677, 1e-12);
+  EXPECT_NEAR(std::get<RadialTangential>(cameras[0].model.distortion).k2, 0.18933636521343228, 1e-15);
+  EXPECT_NEAR(cameras[0].T_body_camera.translation.z(), 0.0342573613538, 1e-12);
+  for (const char* name : {"pinhole_mono.yaml", "pinhole_mono_nodistort.yaml", "pinhole_wide_fov.yaml", "quadrotor.yaml"}) {
+    EXPECT_EQ(read_calibration(ijrr->parent_path() / name).size(), 1U) << name;
+  }
+}
+
+constexpr const char* kCamchain = R"(
+cam0:
+  camera_model: pinhole
+  distortion_model: equidistant
+  distortion_coeffs: [-0.1, 0.01, 0.0, 0.0]
+  intrinsics: [235.9, 235.8, 170.4, 130.1]
+  resolution: [346, 260]
+  T_cam_imu: [[0, 1, 0, 0.1], [0, 0, 1, 0.2], [1, 0, 0, 0.3], [0, 0, 0, 1]]
+cam1:
+  camera_model: pinhole
+  distortion_model: radtan
+  distortion_coeffs: [-0.3, 0.1, 0.001, 0.002]
+  intrinsics: [230, 231, 170, 130]
+  resolution: [346, 260]
+  T_cn_cnm1: [[1, 0, 0, -0.11], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+)";
+
+TEST(Calibration, ReadsKalibrsCamchain) {
+  const test::TemporaryDirectory folder;
+  std::ofstream(folder.path() / "chain.yaml") << kCamchain;
+  const auto cameras = read_calibration(folder.path() / "chain.yaml");
+  ASSERT_EQ(cameras.size(), 2U);
+  EXPECT_DOUBLE_EQ(std::get<Equidistant>(cameras[0].model.distortion).k1, -0.1);
+  // T_cam_imu maps the body's origin to (0.1, 0.2, 0.3) in cam0; cam1 sits 0.11 m to the right of cam0.
+  EXPECT_LT((cameras[0].T_body_camera * Eigen::Vector3d(0.1, 0.2, 0.3)).norm(), 1e-12);
+  const Eigen::Vector3d baseline = cameras[0].T_body_camera.inverse() * cameras[1].T_body_camera.translation;
+  EXPECT_LT((baseline - Eigen::Vector3d(0.11, 0, 0)).norm(), 1e-12);
+}
+
+TEST(Calibration, RefusesWhatItCannotHold) {
+  const test::TemporaryDirectory folder;
+  const auto message = [&](std::string from, const std::string& to) {
+    std::string text = kCamchain;
+    text.replace(text.find(from), from.size(), to);
+    std::ofstream(folder.path() / "chain.yaml") << text;
+    return test::message_of<UserError>([&] { read_calibration(folder.path() / "chain.yaml"); });
+  };
+  EXPECT_TRUE(contains(message("camera_model: pinhole", "camera_model: omni"), "cam0: camera model 'omni' is not supported"));
+  EXPECT_TRUE(contains(message("[235.9, 235.8, 170.4, 130.1]", "[235.9, 235.8, 170.4]"), "intrinsics needs 4 numbers and has 3"));
+  EXPECT_TRUE(contains(message("235.9", "-235.9"), "cam0"));
+  EXPECT_TRUE(contains(message("equidistant", "equisolid"), "'equisolid' is not supported"));
+  EXPECT_TRUE(contains(message("[0, 1, 0, 0.1]", "[0, 2, 0, 0.1]"), "T_cam_imu"));
+  EXPECT_TRUE(contains(message("resolution: [346, 260]", "x: 1"), "resolution is missing"));
+  EXPECT_TRUE(contains(message("cam0:", "camera0:"), "holds no cameras"));
+  EXPECT_TRUE(contains(test::message_of<UserError>([] { read_calibration("/no/such.yaml"); }), "no such file"));
+}
+
+TEST(Suggest, FindsTheNearestWord) {
+  EXPECT_EQ(nearest("lamda", {"lambda", "rate_hz"}), "lambda");
+  EXPECT_EQ(nearest("rate", {"lambda", "pose_rate_hz", "rate_hz"}), "rate_hz");
+  EXPECT_EQ(nearest("qqqqqq", {"lambda", "rate_hz"}), "");
+}
+
+}  // namespace
+}  // namespace esim

@@ -1,0 +1,171 @@
+#include "esim/sim/simulate.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+
+#include "esim/compose/compose.h"
+#include "esim/core/error.h"
+#include "support/errors.h"
+#include "support/temporary_directory.h"
+
+namespace esim {
+namespace {
+
+/// Keeps everything, and checks the order in which it arrives.
+class Collector final : public Sink {
+ public:
+  void begin(const RecordingInfo& recording) override {
+    info = recording;
+    events.resize(recording.cameras.size());
+  }
+  void write(const Record& record) override {
+    if (const auto* part = std::get_if<EventsRecord>(&record)) {
+      auto& stream = events[static_cast<std::size_t>(part->camera)];
+      for (const Event& event : part->events) {
+        EXPECT_GE(event.t, last_truth) << "an event after the ground truth that it precedes";
+        stream.push_back(event);
+      }
+    }
+    if (const auto* truth = std::get_if<TruthRecord>(&record)) {
+      last_truth = truth->t;
+      truth_times.push_back(truth->t);
+      for (const auto& stream : events) {
+        EXPECT_TRUE(stream.empty() || stream.back().t <= truth->t);
+      }
+    }
+    if (const auto* pose = std::get_if<PoseRecord>(&record)) pose_times.push_back(pose->t);
+  }
+  void end(bool is_complete) override { complete = is_complete; }
+
+  RecordingInfo info;
+  std::vector<std::vector<Event>> events;
+  std::vector<TimeNs> truth_times, pose_times;
+  TimeNs last_truth = 0;
+  bool complete = false;
+};
+
+/// A panorama of soft blobs, seen by a camera that turns at random.
+class Simulation : public testing::Test {
+ protected:
+  void SetUp() override {
+    cv::Mat image(128, 256, CV_8U);
+    for (int y = 0; y < image.rows; ++y) {
+      for (int x = 0; x < image.cols; ++x) image.at<unsigned char>(y, x) = static_cast<unsigned char>(127 + 100 * std::sin(x * 0.3) * std::sin(y * 0.2));
+    }
+    cv::imwrite((folder_.path() / "p.png").string(), image);
+
+    RandomTrajectoryOptions motion;
+    motion.rotation_amplitude_deg = {20, 40, 30};
+    scenario_.trajectory = motion;
+    scenario_.renderer = PanoramaRendererOptions{folder_.path() / "p.png", {0, 0, 0, 1}};
+    scenario_.duration_s = 0.25;
+    scenario_.seed = 5;
+    CameraOptions camera;
+    camera.name = "cam0";
+    camera.width = 64, camera.height = 48;
+    camera.event_camera.contrast_threshold = 0.1;
+    camera.event_camera.threshold_mismatch = 0.01;
+    camera.event_camera.threshold_noise = 0.01;
+    scenario_.cameras = {camera};
+  }
+
+  Summary run(Collector& out, int threads = 1, const Monitor& monitor = [](const Progress&) { return true; }) {
+    World world = build_world(scenario_, threads, {[](const std::string&) {}, [](const std::string&) {}});
+    return simulate(world, out, monitor);
+  }
+
+  test::TemporaryDirectory folder_;
+  Scenario scenario_;
+};
+
+TEST_F(Simulation, DeliversOrderedEventsAndGroundTruthAtItsOwnRate) {
+  Collector out;
+  const Summary summary = run(out);
+  EXPECT_TRUE(summary.complete && out.complete);
+  EXPECT_EQ(summary.end, 250 * kNsPerMs);
+  ASSERT_GT(out.events[0].size(), 10000U);
+  EXPECT_TRUE(std::is_sorted(out.events[0].begin(), out.events[0].end()));
+  EXPECT_GT(out.events[0].front().t, 0);
+  EXPECT_LE(out.events[0].back().t, 250 * kNsPerMs);
+  EXPECT_EQ(static_cast<std::size_t>(summary.cameras[0].events_on + summary.cameras[0].events_off), out.events[0].size());
+  ASSERT_EQ(out.truth_times.size(), 8U);
+  EXPECT_EQ(out.truth_times[0], 0);
+  EXPECT_EQ(out.truth_times[1], 33'333'333);
+  EXPECT_EQ(out.pose_times.size(), 51U);
+}
+
+TEST_F(Simulation, IsTheSameWithAnyNumberOfThreadsAndAnyRateOfGroundTruth) {
+  Collector one, two, other_rate;
+  run(one, 1);
+  run(two, 2);
+  scenario_.truth.rate_hz = 111;
+  run(other_rate, 2);
+  EXPECT_EQ(one.events, two.events);
+  EXPECT_EQ(one.events, other_rate.events);
+}
+
+TEST_F(Simulation, DependsOnTheSeed) {
+  Collector a, b;
+  run(a);
+  scenario_.seed = 6;
+  run(b);
+  EXPECT_NE(a.events, b.events);
+}
+
+TEST_F(Simulation, RunsSeveralCamerasEachWithItsOwnClock) {
+  Collector alone, rig;
+  run(alone);
+  CameraOptions second = scenario_.cameras[0];
+  second.name = "cam1";
+  second.width = 32;
+  second.sampling = UniformSampling{444};
+  scenario_.cameras.push_back(second);
+  const Summary summary = run(rig);
+  EXPECT_EQ(rig.events[0], alone.events[0]) << "a second camera changed the first one's events";
+  EXPECT_EQ(summary.cameras[1].sampling.samples, 112);
+  EXPECT_GT(rig.events[1].size(), 1000U);
+  EXPECT_EQ(rig.truth_times.size(), 16U);
+}
+
+TEST_F(Simulation, EndsEarlyWhenAsked) {
+  Collector out;
+  const Summary summary = run(out, 1, [](const Progress& progress) { return progress.now < 100 * kNsPerMs; });
+  EXPECT_FALSE(summary.complete);
+  EXPECT_FALSE(out.complete);
+  EXPECT_GE(summary.end, 100 * kNsPerMs);
+  EXPECT_LT(summary.end, 200 * kNsPerMs);
+  EXPECT_LE(out.events[0].back().t, summary.end);
+}
+
+TEST_F(Simulation, RefusesWhatCannotBeSimulated) {
+  const auto error = [&] {
+    return test::message_of<UserError>([&] { build_world(scenario_, 1, {[](const std::string&) {}, [](const std::string&) {}}); });
+  };
+  scenario_.duration_s.reset();
+  EXPECT_TRUE(test::contains(error(), "duration_s"));
+  scenario_.duration_s = 1;
+  scenario_.cameras[0].sampling = FlowSampling{0.5, {100, 50}};
+  EXPECT_TRUE(test::contains(error(), "min_rate_hz"));
+  scenario_.cameras[0].sampling = FlowSampling{};
+  PlaneRendererOptions behind;
+  behind.image = folder_.path() / "p.png";
+  behind.pose.position = {-5, 0, 0};
+  behind.pose.look_at = Eigen::Vector3d(0, 0, 0);
+  scenario_.renderer = behind;
+  EXPECT_TRUE(test::contains(error(), "sees nothing"));
+  behind.image = folder_.path() / "q.png";
+  scenario_.renderer = behind;
+  EXPECT_TRUE(test::contains(error(), "no such file"));
+}
+
+TEST_F(Simulation, WarnsWhenTheBoundOfTheCriterionIsGivenUp) {
+  scenario_.cameras[0].sampling = FlowSampling{1.5, {}};
+  std::string warning;
+  build_world(scenario_, 1, {[&](const std::string& text) { warning = text; }, [](const std::string&) {}});
+  EXPECT_TRUE(test::contains(warning, "lambda = 1.5 is above 1"));
+}
+
+}  // namespace
+}  // namespace esim

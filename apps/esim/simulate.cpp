@@ -54,9 +54,14 @@ void print_summary(const Summary& summary, const std::filesystem::path& out, boo
 int run(const Arguments& arguments) {
   Scenario scenario = read_scenario(arguments.scenario, arguments.overrides);
   if (arguments.seed) scenario.seed = *arguments.seed;
+  std::vector<std::string> given;
   Notices notices;
-  notices.warning = [](const std::string& text) { fmt::print(stderr, "warning: {}\n", text); };
+  notices.warning = [&](const std::string& text) {
+    given.push_back("warning: " + text);
+    fmt::print(stderr, "warning: {}\n", text);
+  };
   notices.note = [&](const std::string& text) {
+    given.push_back(text);
     if (!arguments.quiet) fmt::print(stderr, "{}\n", text);
   };
   const std::filesystem::path out =
@@ -77,7 +82,7 @@ int run(const Arguments& arguments) {
     return interrupted == 0;
   });
   bar.clear();
-  directory.finish(report_json(scenario, summary, world.workers->threads()));
+  directory.finish(report_json(scenario, summary, world.workers->threads(), given));
   if (!arguments.quiet)
     print_summary(summary, out, scenario.output.preview && scenario.truth.rate_hz > 0 && scenario.cameras.size() == 1);
   return summary.complete ? kOk : kInterrupted;

@@ -114,6 +114,17 @@ class Recordings(Cli):
         self.assertIn("Example", run("simulate", "--help").stdout)
 
 
+@unittest.skipUnless(os.environ.get("ESIM_TEST_DATA") and os.path.isdir(os.environ["ESIM_TEST_DATA"]), "needs ESIM_TEST_DATA")
+class RealScenes(Cli):
+    def test_the_originals_set_ups_run(self):
+        for scenario in sorted((SCENES.parent / "tests" / "scenarios").glob("*.yaml")):
+            with self.subTest(scenario.name):
+                result = self.simulate("--set", "duration_s=0.03", "--force", scenario=scenario)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                report = json.loads((self.out / "report.json").read_text())
+                self.assertGreater(report["cameras"][0]["events"], 100)
+
+
 class BadInput(Cli):
     def test_command_line(self):
         self.assert_refused(run("simulate"), "scenario")

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <ostream>
 #include <string>
 
 #include "esim/motion/fit.h"
@@ -16,6 +17,10 @@ struct RealTrajectory {
   TimeNs end;
   // What the measured poses deviate from smooth motion (motion-capture noise and glitches).
   double rms_position_m, rms_rotation_rad;
+
+  friend std::ostream& operator<<(std::ostream& out, const RealTrajectory& trajectory) {
+    return out << trajectory.file;
+  }
 };
 
 class RealTrajectories : public testing::TestWithParam<RealTrajectory> {};

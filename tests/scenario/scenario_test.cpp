@@ -44,7 +44,8 @@ TEST_F(ScenarioFile, GivesDefaultsToWhatItDoesNotName) {
   EXPECT_EQ(scenario.cameras[0].width, 346);
   EXPECT_DOUBLE_EQ(scenario.cameras[0].event_camera.threshold_on(), 0.5);
   EXPECT_DOUBLE_EQ(std::get<FlowSampling>(scenario.cameras[0].sampling).lambda, 0.5);
-  EXPECT_EQ(std::get<PanoramaRendererOptions>(scenario.renderer).image, folder_.path() / "p.jpg") << "relative to the file";
+  EXPECT_EQ(std::get<PanoramaRendererOptions>(scenario.renderer).image, folder_.path() / "p.jpg")
+      << "relative to the file";
 }
 
 TEST_F(ScenarioFile, SharesSamplingAndSensorAmongCameras) {
@@ -85,20 +86,24 @@ cameras:
 }
 
 TEST_F(ScenarioFile, TakesOverrides) {
-  const Scenario scenario = read(kMinimal, {"event_camera.contrast_threshold=0.2", "sampling.type=flow", "sampling.lambda=0.25",
-                                            "truth.images=false", "trajectory.pose.position=[1, 2, 3]", "seed=9"});
+  const Scenario scenario =
+      read(kMinimal, {"event_camera.contrast_threshold=0.2", "sampling.type=flow", "sampling.lambda=0.25",
+                      "truth.images=false", "trajectory.pose.position=[1, 2, 3]", "seed=9"});
   EXPECT_DOUBLE_EQ(scenario.cameras[0].event_camera.contrast_threshold, 0.2);
   EXPECT_DOUBLE_EQ(std::get<FlowSampling>(scenario.cameras[0].sampling).lambda, 0.25);
   EXPECT_FALSE(scenario.truth.images);
   EXPECT_DOUBLE_EQ(std::get<StaticTrajectoryOptions>(scenario.trajectory).pose.position.z(), 3);
   EXPECT_EQ(scenario.seed, 9U);
-  EXPECT_EQ(read(std::string(kMinimal) + "cameras: [{width: 5}, {width: 6}]", {"cameras.1.width=7"}).cameras[1].width, 7);
+  EXPECT_EQ(read(std::string(kMinimal) + "cameras: [{width: 5}, {width: 6}]", {"cameras.1.width=7"}).cameras[1].width,
+            7);
 }
 
 TEST_F(ScenarioFile, RefusesUnknownKeysAndNamesTheNearest) {
-  EXPECT_TRUE(contains(error(std::string(kMinimal) + "event_camera: {contrast_treshold: 0.2}\n"), "contrast_threshold?"));
+  EXPECT_TRUE(
+      contains(error(std::string(kMinimal) + "event_camera: {contrast_treshold: 0.2}\n"), "contrast_threshold?"));
   EXPECT_TRUE(contains(error(std::string(kMinimal) + "event_camera: {contrast_treshold: 0.2}\n"), "s.yaml"));
-  EXPECT_TRUE(contains(error(std::string(kMinimal) + "samplin: {}\n"), ":5: samplin: unknown key; did you mean sampling?"));
+  EXPECT_TRUE(
+      contains(error(std::string(kMinimal) + "samplin: {}\n"), ":5: samplin: unknown key; did you mean sampling?"));
   EXPECT_TRUE(contains(error(kMinimal, {"truth.rate=3"}), "--set truth.rate: unknown key; did you mean rate_hz?"));
   EXPECT_TRUE(contains(error(std::string(kMinimal) + "xyzzy: 1\n"), "known are"));
 }
@@ -133,8 +138,10 @@ TEST_F(ScenarioFile, RefusesFilesThatAreNoScenario) {
   EXPECT_TRUE(contains(error("renderer: [1, 2"), "not valid YAML"));
   EXPECT_TRUE(contains(error("just text"), "a scenario is a map"));
   EXPECT_TRUE(contains(error("duration_s: 1\ntrajectory: {type: static}\n"), "renderer: is missing"));
-  EXPECT_TRUE(contains(test::message_of<UserError>([&] { read_scenario(folder_.path() / "none.yaml"); }), "no such scenario file"));
-  EXPECT_TRUE(contains(error("renderer: {type: panorama, image: '${ESIM_NO_SUCH}/x'}\n"), "environment variable ESIM_NO_SUCH is not set"));
+  EXPECT_TRUE(contains(test::message_of<UserError>([&] { read_scenario(folder_.path() / "none.yaml"); }),
+                       "no such scenario file"));
+  EXPECT_TRUE(contains(error("renderer: {type: panorama, image: '${ESIM_NO_SUCH}/x'}\n"),
+                       "environment variable ESIM_NO_SUCH is not set"));
 }
 
 TEST_F(ScenarioFile, RefusesOverridesThatAreNone) {
@@ -144,7 +151,8 @@ TEST_F(ScenarioFile, RefusesOverridesThatAreNone) {
 
 TEST_F(ScenarioFile, RefusesGeometryBesideACalibration) {
   std::ofstream(folder_.path() / "c.yaml") << "cam0: {}\n";
-  EXPECT_TRUE(contains(error(std::string(kMinimal) + "camera: {calibration: c.yaml, fx: 3}\n"), "camera.fx: is given by the calibration"));
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "camera: {calibration: c.yaml, fx: 3}\n"),
+                       "camera.fx: is given by the calibration"));
 }
 
 TEST(Calibration, ReadsTheOriginalsRigs) {
@@ -157,7 +165,8 @@ TEST(Calibration, ReadsTheOriginalsRigs) {
   EXPECT_NEAR(cameras[0].model.fy, 199.7078674353677, 1e-12);
   EXPECT_NEAR(std::get<RadialTangential>(cameras[0].model.distortion).k2, 0.18933636521343228, 1e-15);
   EXPECT_NEAR(cameras[0].T_body_camera.translation.z(), 0.0342573613538, 1e-12);
-  for (const char* name : {"pinhole_mono.yaml", "pinhole_mono_nodistort.yaml", "pinhole_wide_fov.yaml", "quadrotor.yaml"}) {
+  for (const char* name :
+       {"pinhole_mono.yaml", "pinhole_mono_nodistort.yaml", "pinhole_wide_fov.yaml", "quadrotor.yaml"}) {
     EXPECT_EQ(read_calibration(ijrr->parent_path() / name).size(), 1U) << name;
   }
 }
@@ -199,8 +208,10 @@ TEST(Calibration, RefusesWhatItCannotHold) {
     std::ofstream(folder.path() / "chain.yaml") << text;
     return test::message_of<UserError>([&] { read_calibration(folder.path() / "chain.yaml"); });
   };
-  EXPECT_TRUE(contains(message("camera_model: pinhole", "camera_model: omni"), "cam0: camera model 'omni' is not supported"));
-  EXPECT_TRUE(contains(message("[235.9, 235.8, 170.4, 130.1]", "[235.9, 235.8, 170.4]"), "intrinsics needs 4 numbers and has 3"));
+  EXPECT_TRUE(
+      contains(message("camera_model: pinhole", "camera_model: omni"), "cam0: camera model 'omni' is not supported"));
+  EXPECT_TRUE(contains(message("[235.9, 235.8, 170.4, 130.1]", "[235.9, 235.8, 170.4]"),
+                       "intrinsics needs 4 numbers and has 3"));
   EXPECT_TRUE(contains(message("235.9", "-235.9"), "cam0"));
   EXPECT_TRUE(contains(message("equidistant", "equisolid"), "'equisolid' is not supported"));
   EXPECT_TRUE(contains(message("[0, 1, 0, 0.1]", "[0, 2, 0, 0.1]"), "T_cam_imu"));

@@ -52,7 +52,8 @@ class Simulation : public testing::Test {
   void SetUp() override {
     cv::Mat image(128, 256, CV_8U);
     for (int y = 0; y < image.rows; ++y) {
-      for (int x = 0; x < image.cols; ++x) image.at<unsigned char>(y, x) = static_cast<unsigned char>(127 + 100 * std::sin(x * 0.3) * std::sin(y * 0.2));
+      for (int x = 0; x < image.cols; ++x)
+        image.at<unsigned char>(y, x) = static_cast<unsigned char>(127 + 100 * std::sin(x * 0.3) * std::sin(y * 0.2));
     }
     cv::imwrite((folder_.path() / "p.png").string(), image);
 
@@ -71,7 +72,8 @@ class Simulation : public testing::Test {
     scenario_.cameras = {camera};
   }
 
-  Summary run(Collector& out, int threads = 1, const Monitor& monitor = [](const Progress&) { return true; }) {
+  Summary run(
+      Collector& out, int threads = 1, const Monitor& monitor = [](const Progress&) { return true; }) {
     World world = build_world(scenario_, threads, {[](const std::string&) {}, [](const std::string&) {}});
     return simulate(world, out, monitor);
   }
@@ -89,7 +91,8 @@ TEST_F(Simulation, DeliversOrderedEventsAndGroundTruthAtItsOwnRate) {
   EXPECT_TRUE(std::is_sorted(out.events[0].begin(), out.events[0].end()));
   EXPECT_GT(out.events[0].front().t, 0);
   EXPECT_LE(out.events[0].back().t, 250 * kNsPerMs);
-  EXPECT_EQ(static_cast<std::size_t>(summary.cameras[0].events_on + summary.cameras[0].events_off), out.events[0].size());
+  EXPECT_EQ(static_cast<std::size_t>(summary.cameras[0].events_on + summary.cameras[0].events_off),
+            out.events[0].size());
   ASSERT_EQ(out.truth_times.size(), 8U);
   EXPECT_EQ(out.truth_times[0], 0);
   EXPECT_EQ(out.truth_times[1], 33'333'333);
@@ -141,7 +144,9 @@ TEST_F(Simulation, EndsEarlyWhenAsked) {
 
 TEST_F(Simulation, RefusesWhatCannotBeSimulated) {
   const auto error = [&] {
-    return test::message_of<UserError>([&] { build_world(scenario_, 1, {[](const std::string&) {}, [](const std::string&) {}}); });
+    return test::message_of<UserError>([&] {
+      build_world(scenario_, 1, {[](const std::string&) {}, [](const std::string&) {}});
+    });
   };
   scenario_.duration_s.reset();
   EXPECT_TRUE(test::contains(error(), "duration_s"));

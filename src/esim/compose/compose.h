@@ -37,7 +37,8 @@ RendererFactory build_renderer_factory(const RendererOptions& options, const Not
 /// otherwise.
 std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem::path& folder);
 
-/// report.json: what was done, at which cost, and where the time went.
-std::string report_json(const Scenario& scenario, const Summary& summary, int threads);
+/// report.json: what was done, at which cost, where the time went, and the notices given on the way.
+std::string report_json(const Scenario& scenario, const Summary& summary, int threads,
+                        const std::vector<std::string>& notices);
 
 }  // namespace esim

@@ -4,7 +4,8 @@
 
 namespace esim {
 
-std::string report_json(const Scenario& scenario, const Summary& summary, int threads) {
+std::string report_json(const Scenario& scenario, const Summary& summary, int threads,
+                        const std::vector<std::string>& notices) {
   using Json = nlohmann::ordered_json;
   const double simulated_s = to_seconds(summary.end - summary.start);
 
@@ -51,6 +52,7 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
         {"other", other}}},
       {"truth_frames", summary.truth_frames},
       {"cameras", cameras},
+      {"notices", notices},
   };
   return report.dump(2) + "\n";
 }

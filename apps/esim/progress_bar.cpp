@@ -8,12 +8,12 @@
 namespace esim::app {
 namespace {
 
-/// "1.23 M" for 1234567.
+/// "1.23M" for 1234567.
 std::string with_prefix(double value) {
-  if (value >= 1e9) return fmt::format("{:.2f} G", value * 1e-9);
-  if (value >= 1e6) return fmt::format("{:.2f} M", value * 1e-6);
-  if (value >= 1e3) return fmt::format("{:.1f} k", value * 1e-3);
-  return fmt::format("{:.0f} ", value);
+  if (value >= 1e9) return fmt::format("{:.2f}G", value * 1e-9);
+  if (value >= 1e6) return fmt::format("{:.2f}M", value * 1e-6);
+  if (value >= 1e3) return fmt::format("{:.1f}k", value * 1e-3);
+  return fmt::format("{:.0f}", value);
 }
 
 std::string minutes_and_seconds(double seconds) {
@@ -36,7 +36,7 @@ void ProgressBar::show(const Progress& progress) {
   const double fraction = all_s > 0 ? done_s / all_s : 1.0;
   const int full = static_cast<int>(fraction * kCells);
   const double left_s = fraction > 0 ? progress.wall_seconds * (1.0 - fraction) / fraction : 0.0;
-  fmt::print(stderr, "\r\033[K[{}{}] {:.3f}/{:.3f} s  {:.2f}x real time  {}events  {} left",
+  fmt::print(stderr, "\r\033[K[{}{}] {:.3f}/{:.3f} s  {:.2f}x real time  {} events  {} left",
              std::string(static_cast<std::size_t>(full), '#'),
              std::string(static_cast<std::size_t>(kCells - full), '.'), done_s, all_s,
              done_s / std::max(progress.wall_seconds, 1e-9), with_prefix(static_cast<double>(progress.events)),

@@ -57,8 +57,8 @@ class LiteralEventCamera {
       pixel.off += options_.threshold_noise * noise_.normals(item, pixel.draws)[1];
       ++pixel.draws;
     }
-    pixel.on = static_cast<float>(std::max(pixel.on, kMinContrastThreshold));
-    pixel.off = static_cast<float>(std::max(pixel.off, kMinContrastThreshold));
+    pixel.on = std::max(pixel.on, kMinContrastThreshold);
+    pixel.off = std::max(pixel.off, kMinContrastThreshold);
   }
 
   void walk(std::size_t i, TimeNs t0, TimeNs t1, double b0, double b1, std::vector<Event>& events) {

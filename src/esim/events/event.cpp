@@ -40,6 +40,11 @@ void order_simultaneous(std::vector<Event>& events) {
 }  // namespace
 
 void sort_events(std::vector<Event>& events) {
+  std::vector<Event> scratch;
+  sort_events(events, scratch);
+}
+
+void sort_events(std::vector<Event>& events, std::vector<Event>& scratch) {
   if (events.size() < kTooFewForRadix) {
     std::sort(events.begin(), events.end());
     return;
@@ -49,7 +54,7 @@ void sort_events(std::vector<Event>& events) {
   const TimeNs origin = first->t;
   const int bits = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(last->t - origin)));
 
-  std::vector<Event> scratch(events.size());
+  scratch.resize(events.size());
   for (int shift = 0; shift < bits; shift += kDigitBits) {
     radix_pass(events, scratch, origin, shift);
     events.swap(scratch);

@@ -6,7 +6,7 @@ namespace esim {
 
 void EventQueue::release_until(TimeNs watermark, std::vector<Event>& out) {
   // Merge what came in with what was left from before.
-  sort_events(incoming_);
+  sort_events(incoming_, scratch_);
   if (pending_.empty()) {
     pending_.swap(incoming_);
   } else if (!incoming_.empty()) {

@@ -21,6 +21,7 @@ class EventQueue {
  private:
   std::vector<Event> incoming_;  // unordered
   std::vector<Event> pending_;   // ordered, later than the last watermark
+  std::vector<Event> scratch_;   // for sorting
 };
 
 }  // namespace esim

@@ -60,6 +60,9 @@ class EventCamera {
  public:
   /// `stream` separates the random numbers of cameras that share a seed.
   EventCamera(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream);
+  ~EventCamera();
+  EventCamera(EventCamera&&) noexcept;
+  EventCamera& operator=(EventCamera&&) noexcept;
 
   /// Takes what is newly known of the pixels' irradiance: per tile, segments contiguous in time. Each pixel's first
   /// segment sets its reference at t0 and fires nothing before. Throws UserError naming the pixel and the time where an
@@ -71,10 +74,9 @@ class EventCamera {
   void release_until(TimeNs watermark, std::vector<Event>& out) { queue_.release_until(watermark, out); }
 
  private:
-  struct Crossings;  // works through the events of one pixel in one segment
+  class Crossings;  // works through the pixels of a piece of a segment that leave their bands
 
   void open(const Segment& segment, int row);
-  void integrate_row(const Segment& segment, int row, std::vector<Event>& events);
   void draw_thresholds(std::size_t pixel);
   void set_band(std::size_t pixel);
 
@@ -83,17 +85,23 @@ class EventCamera {
   TimeNs refractory_;
   AddressedRandom noise_;
 
-  // Per pixel. The band is a pair of irradiances strictly between which nothing can fire: most pixels of most segments
-  // are settled by two comparisons, without a logarithm.
+  /// What is needed of a pixel when it leaves its band, together in memory. Light is E + log_eps, so that a change of
+  /// brightness is a factor.
+  struct Pixel {
+    double reference = 0;       // light at the last event
+    double rise = 1, fall = 1;  // factors to the next levels: exp(C+), exp(-C-)
+    TimeNs reset_until = 0;     // kReady, or the end of the refractory period
+  };
+
+  // A pair of irradiances per pixel, strictly between which nothing can fire: most pixels of most segments are settled
+  // by two comparisons, without a logarithm.
   std::vector<float> band_low_, band_high_;
-  std::vector<double> reference_;                    // L at the last event
-  std::vector<float> mean_on_, mean_off_;            // thresholds with the pixel's mismatch
-  std::vector<float> threshold_on_, threshold_off_;  // of the next event
-  std::vector<TimeNs> reset_until_;                  // kReady, or the end of the refractory period
-  std::vector<std::uint32_t> draws_;                 // threshold draws so far
+  std::vector<Pixel> pixels_;
+  std::vector<float> mean_on_, mean_off_;  // thresholds with the pixel's mismatch
+  std::vector<std::uint32_t> draws_;       // threshold draws so far, per pixel
 
   EventQueue queue_;
-  std::vector<std::vector<Event>> piece_events_;  // one per piece of a parallel loop
+  std::vector<Crossings> pieces_;  // one per piece of a parallel loop
 };
 
 }  // namespace esim

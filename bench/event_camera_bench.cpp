@@ -22,15 +22,18 @@ const std::vector<Image<float>>& frames(int width, int height) {
 }
 
 void report(benchmark::State& state, std::size_t events) {
-  const double pixels = static_cast<double>(state.iterations()) * (kFrames - 1) * static_cast<double>(state.range(0) * state.range(1));
-  state.counters["ns/px"] = benchmark::Counter(pixels * 1e-9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  const double pixels =
+      static_cast<double>(state.iterations()) * (kFrames - 1) * static_cast<double>(state.range(0) * state.range(1));
+  state.counters["ns/px"] =
+      benchmark::Counter(pixels * 1e-9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
   state.counters["events/px"] = static_cast<double>(events) / pixels;
 }
 
 /// The loop of the paper's simulator: logarithms, every level between two frames, then a sort.
 class LiteralLoop {
  public:
-  LiteralLoop(float threshold, int width, int height) : threshold_(threshold), last_(width, height), reference_(width, height) {}
+  LiteralLoop(float threshold, int width, int height)
+      : threshold_(threshold), last_(width, height), reference_(width, height) {}
 
   void frame(const Image<float>& irradiance, TimeNs t, std::vector<Event>& events) {
     const bool first = t_ < 0;
@@ -46,11 +49,13 @@ class LiteralLoop {
         const float polarity = brightness >= before ? 1.0F : -1.0F;
         while (true) {
           const float level = reference_(x, y) + polarity * threshold_;
-          const bool crossed = polarity > 0 ? level > before && level <= brightness : level < before && level >= brightness;
+          const bool crossed =
+              polarity > 0 ? level > before && level <= brightness : level < before && level >= brightness;
           if (!crossed) break;
           const double fraction = (level - before) / (brightness - before);
-          events.push_back({t_ + static_cast<TimeNs>(fraction * static_cast<double>(t - t_)), static_cast<std::uint16_t>(x),
-                            static_cast<std::uint16_t>(y), static_cast<std::int8_t>(polarity)});
+          events.push_back({t_ + static_cast<TimeNs>(fraction * static_cast<double>(t - t_)),
+                            static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y),
+                            static_cast<std::int8_t>(polarity)});
           reference_(x, y) = level;
         }
       }

@@ -9,8 +9,9 @@
 
 namespace esim::bench {
 
-/// Benchmark frames: a log-normal texture with an amplitude spectrum 1/f^1.2 and a lens blur of 0.8 px, on (0, 1], that moves to
-/// the right by 0.5 px per frame. Made on a grid of half pixels and averaged 2 x 2, so that no interpolation is involved.
+/// Benchmark frames: a log-normal texture with an amplitude spectrum 1/f^1.2 and a lens blur of 0.8 px, on (0, 1], that
+/// moves to the right by 0.5 px per frame. Made on a grid of half pixels and averaged 2 x 2, so that no interpolation
+/// is involved.
 inline std::vector<Image<float>> moving_texture(int width, int height, int count) {
   const int grid_width = cv::getOptimalDFTSize(2 * width + count), grid_height = cv::getOptimalDFTSize(2 * height);
   std::mt19937 random(1);
@@ -47,7 +48,8 @@ inline std::vector<Image<float>> moving_texture(int width, int height, int count
     Image<float>& frame = frames.emplace_back(width, height);
     for (int y = 0; y < height; ++y) {
       const float *const upper = texture.ptr<float>(2 * y) + k, *const lower = texture.ptr<float>(2 * y + 1) + k;
-      for (int x = 0; x < width; ++x) frame(x, y) = 0.25F * (upper[2 * x] + upper[2 * x + 1] + lower[2 * x] + lower[2 * x + 1]);
+      for (int x = 0; x < width; ++x)
+        frame(x, y) = 0.25F * (upper[2 * x] + upper[2 * x + 1] + lower[2 * x] + lower[2 * x + 1]);
     }
   }
   return frames;

@@ -47,21 +47,22 @@ void check_sampling(const CameraOptions& camera, const Notices& notices) {
   std::visit(check, camera.sampling);
 }
 
-bool sees_something(const Sample& sample, bool at_infinity) {
+bool sees_something(const Sample& sample) {
   const auto depth = sample.depth.pixels();
-  return at_infinity || std::any_of(depth.begin(), depth.end(), [](float z) { return std::isfinite(z); });
+  return std::any_of(depth.begin(), depth.end(), [](float z) { return std::isfinite(z); });
 }
 
 /// Looks through a camera at a few times: one that never sees anything is a mistake of poses or frames.
-void require_a_view(const World& world, std::size_t index, bool at_infinity) {
+void require_a_view(const World& world, std::size_t index) {
   constexpr int kLooks = 9;
+  if (world.cameras[index].renderer->traits().at_infinity) return;
   const CameraInfo& info = world.info.cameras[index];
   Sample sample;
   for (int i = 0; i < kLooks; ++i) {
     const TimeNs t = world.info.start + (world.info.end - world.info.start) / (kLooks - 1) * i;
     const Kinematics camera = rigidly_attached(world.trajectory->at(t), info.T_body_camera);
     world.cameras[index].renderer->render({t, camera, {{0, 0, info.model.width, info.model.height}}}, sample);
-    if (sees_something(sample, at_infinity)) return;
+    if (sees_something(sample)) return;
   }
   const Eigen::Vector3d position =
       rigidly_attached(world.trajectory->at(world.info.start), info.T_body_camera).T_world_body.translation;
@@ -99,7 +100,7 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices)
          make_frame_sampler(options.sampling, traits, model.width, model.height, span, *world.workers),
          EventCamera(sensor, model.width, model.height, scenario.seed, static_cast<std::uint16_t>(i)),
          {}});
-    require_a_view(world, i, std::holds_alternative<PanoramaRendererOptions>(scenario.renderer));
+    require_a_view(world, i);
   }
   return world;
 }

@@ -39,7 +39,9 @@ class PanoramaRenderer final : public Renderer {
   PanoramaRenderer(Panorama panorama, const Camera& camera, const Workers& workers)
       : panorama_(std::move(panorama)), rays_(camera), workers_(workers) {}
 
-  RendererTraits traits() const override { return {.name = "panorama", .granularity = Granularity::tile}; }
+  RendererTraits traits() const override {
+    return {.name = "panorama", .granularity = Granularity::tile, .at_infinity = true};
+  }
 
   void render(const RenderRequest& request, Sample& sample) override {
     const Eigen::Quaterniond R_panorama_camera =

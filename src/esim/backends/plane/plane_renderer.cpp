@@ -16,7 +16,9 @@ class PlaneRenderer final : public Renderer {
   PlaneRenderer(Poster poster, const Camera& camera, const Workers& workers)
       : poster_(std::move(poster)), rays_(camera), workers_(workers) {}
 
-  RendererTraits traits() const override { return {.name = "plane", .granularity = Granularity::tile}; }
+  RendererTraits traits() const override {
+    return {.name = "plane", .granularity = Granularity::tile, .at_infinity = false};
+  }
 
   void render(const RenderRequest& request, Sample& sample) override {
     const SE3 T_poster_camera = poster_.T_world_poster.inverse() * request.camera.T_world_body;

@@ -59,7 +59,9 @@ class RaycastRenderer final : public Renderer {
         rays_(camera),
         workers_(workers) {}
 
-  RendererTraits traits() const override { return {.name = "mesh", .granularity = Granularity::tile}; }
+  RendererTraits traits() const override {
+    return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false};
+  }
 
   void render(const RenderRequest& request, Sample& sample) override {
     const View view{request.camera.T_world_body.rotation.toRotationMatrix().cast<float>(),

@@ -68,14 +68,15 @@ int run(const Arguments& arguments) {
       arguments.out.empty() ? std::filesystem::path("out") / std::filesystem::path(arguments.scenario).stem()
                             : std::filesystem::path(arguments.out);
 
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
   // The directory comes first: finding out that it exists should not take loading a scene.
   RecordingDirectory directory(out, arguments.force);
   World world = build_world(scenario, arguments.threads, notices);
   write_text(directory.path() / "scenario.yaml", write_scenario(scenario));
   const std::unique_ptr<Sink> sink = build_sink(scenario, directory.path());
 
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
+  if (interrupted != 0) return kInterrupted;  // while loading: nothing is worth keeping
   ProgressBar bar(!arguments.quiet);
   const Summary summary = simulate(world, *sink, [&](const Progress& progress) {
     bar.show(progress);

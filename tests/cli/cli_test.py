@@ -223,6 +223,19 @@ class Signals(Cli):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("interrupted", result.stdout)
 
+    def test_an_interrupt_while_loading_leaves_nothing(self):
+        process = subprocess.Popen([ESIM, "simulate", SCENES / "room.yaml", "--out", self.out, "--quiet"],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        working = pathlib.Path(str(self.out) + ".incomplete")
+        deadline = time.time() + 60
+        while not working.exists():
+            self.assertLess(time.time(), deadline)
+            time.sleep(0.001)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 130)
+        self.assertEqual(list(self.folder.iterdir()), [])
+
     def test_a_kill_leaves_what_info_recognises(self):
         process = self.start_and_wait_for_events()
         process.kill()

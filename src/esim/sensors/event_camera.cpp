@@ -72,12 +72,9 @@ void EventCamera::draw_thresholds(std::size_t pixel) {
   pixels_[pixel].fall = std::exp(-std::max(off, kMinContrastThreshold));
 }
 
-void EventCamera::set_band(std::size_t pixel) {
-  const Pixel& state = pixels_[pixel];
-  const double rise = state.reference * state.rise * (1.0 - kBandGuard);
-  const double fall = state.reference * state.fall * (1.0 + kBandGuard);
-  band_high_[pixel] = static_cast<float>(rise - options_.log_eps);
-  band_low_[pixel] = static_cast<float>(fall - options_.log_eps);
+void EventCamera::set_band(std::size_t pixel, double rise, double fall) {
+  band_high_[pixel] = static_cast<float>(rise * (1.0 - kBandGuard) - options_.log_eps);
+  band_low_[pixel] = static_cast<float>(fall * (1.0 + kBandGuard) - options_.log_eps);
 }
 
 /// The pixels of some rows of a segment that have left their bands, and their way through the levels. All of them take
@@ -219,8 +216,6 @@ void EventCamera::Crossings::wake_up(EventCamera& camera, const Segment& segment
 template <typename Reference>
 void EventCamera::Crossings::find_levels(EventCamera& camera, const Reference& reference_of) {
   Pixel* const pixels = camera.pixels_.data();
-  float *const band_low = camera.band_low_.data(), *const band_high = camera.band_high_.data();
-  const double eps = camera.options_.log_eps;
   Active* const active = active_.data();
   const std::size_t count = count_;
   std::size_t kept = 0;
@@ -232,8 +227,7 @@ void EventCamera::Crossings::find_levels(EventCamera& camera, const Reference& r
     pixel.reference = reference;
     const bool on = now.after >= rise, off = now.after <= fall;
     if (!on && !off) {
-      band_high[now.pixel] = static_cast<float>(rise * (1.0 - kBandGuard) - eps);
-      band_low[now.pixel] = static_cast<float>(fall * (1.0 + kBandGuard) - eps);
+      camera.set_band(now.pixel, rise, fall);
       continue;
     }
     now.level = on ? rise : fall;
@@ -283,9 +277,10 @@ void EventCamera::open(const Segment& segment, int y) {
     if (!is_irradiance(irradiance)) refuse_irradiance(irradiance, x, y, segment.t1);
     const std::size_t pixel =
         static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
-    pixels_[pixel].reference = irradiance + options_.log_eps;
-    pixels_[pixel].reset_until = kReady;
-    set_band(pixel);
+    Pixel& state = pixels_[pixel];
+    state.reference = irradiance + options_.log_eps;
+    state.reset_until = kReady;
+    set_band(pixel, state.reference * state.rise, state.reference * state.fall);
   }
 }
 

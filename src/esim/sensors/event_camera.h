@@ -78,7 +78,7 @@ class EventCamera {
 
   void open(const Segment& segment, int row);
   void draw_thresholds(std::size_t pixel);
-  void set_band(std::size_t pixel);
+  void set_band(std::size_t pixel, double rise, double fall);
 
   EventCameraOptions options_;
   int width_;

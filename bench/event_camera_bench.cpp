@@ -116,20 +116,39 @@ void event_camera(benchmark::State& state) {
 void event_camera_two_threads(benchmark::State& state) {
   run_event_camera(state, {.threshold_mismatch = 0.02, .refractory_period_us = 1}, 2);
 }
-void event_camera_threshold_noise(benchmark::State& state) {
-  run_event_camera(state, {.threshold_mismatch = 0.02, .threshold_noise = 0.02, .refractory_period_us = 1}, 1);
+
+EventCameraOptions everything() {
+  EventCameraOptions options;
+  options.threshold_mismatch = 0.03;
+  options.threshold_noise = 0.01;
+  options.low_pass_hz = 300;
+  options.refractory_period_us = 100;
+  options.leak_rate_hz = 0.1;
+  options.leak_mismatch_decades = 0.1;
+  options.leak_jitter = 0.1;
+  options.shot_noise_hz = 5;
+  options.hot_pixels = 0.001;
+  options.dead_pixels = 0.001;
+  options.latency_us = 20;
+  options.latency_jitter_us = 5;
+  options.latency_light_share = 0.5;
+  options.readout = {.rate_mev_per_s = 1000, .row_time_us = 0.01};
+  return options;
 }
+void event_camera_everything(benchmark::State& state) { run_event_camera(state, everything(), 1); }
+void event_camera_everything_two_threads(benchmark::State& state) { run_event_camera(state, everything(), 2); }
 
 void sizes(benchmark::internal::Benchmark* benchmark) {
-  for (const int hundredths : {15, 30, 50}) benchmark->Args({346, 260, hundredths});
-  benchmark->Args({1280, 720, 30});
+  for (const int hundredths : {15, 20, 30, 50}) benchmark->Args({346, 260, hundredths});
+  for (const int hundredths : {20, 30}) benchmark->Args({1280, 720, hundredths});
   benchmark->UseRealTime()->Unit(benchmark::kMillisecond);
 }
 
 BENCHMARK(literal_loop)->Apply(sizes);
 BENCHMARK(event_camera)->Apply(sizes);
 BENCHMARK(event_camera_two_threads)->Apply(sizes);
-BENCHMARK(event_camera_threshold_noise)->Apply(sizes);
+BENCHMARK(event_camera_everything)->Apply(sizes);
+BENCHMARK(event_camera_everything_two_threads)->Apply(sizes);
 
 }  // namespace
 }  // namespace esim

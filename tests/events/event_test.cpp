@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <random>
+#include <utility>
 
 #include "esim/events/event_queue.h"
+#include "esim/events/event_sorter.h"
 
 namespace esim {
 namespace {
@@ -30,14 +32,50 @@ TEST(Event, IsOrderedByTimeRowColumnPolarity) {
   EXPECT_LT(base, (Event{10, 5, 5, 1}));
 }
 
-TEST(SortEvents, AgreesWithStdSort) {
+constexpr int kWidth = 7, kHeight = 5;
+
+std::uint64_t packed(const EventPacking& packing, const Event& event) {
+  return packing.pack(event.t - packing.origin, packing.place(event.x, event.y), event.polarity > 0);
+}
+
+TEST(EventPacking, KeepsEventsAndTheirOrder) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {7, 5}, {346, 260}, {1280, 720}, {16384, 16384}}) {
+    EventPacking packing(width, height);
+    packing.origin = -123;
+    EXPECT_GT(packing.longest(), 17 * kNsPerSecond);
+    std::mt19937_64 random(1);
+    std::vector<std::pair<std::uint64_t, Event>> events;
+    for (int i = 0; i < 1000; ++i) {
+      const auto span = static_cast<std::uint64_t>(random() % 2 == 0 ? packing.longest() : 3);
+      const Event event{packing.origin + static_cast<TimeNs>(random() % span),
+                        static_cast<std::uint16_t>(random() % static_cast<unsigned>(width)),
+                        static_cast<std::uint16_t>(random() % static_cast<unsigned>(height)),
+                        static_cast<std::int8_t>(random() % 2 == 0 ? 1 : -1)};
+      EXPECT_EQ(packing.unpack(packed(packing, event)), event);
+      events.emplace_back(packed(packing, event), event);
+    }
+    std::sort(events.begin(), events.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (std::size_t i = 1; i < events.size(); ++i) EXPECT_LE(events[i - 1].second, events[i].second);
+  }
+}
+
+TEST(EventSorter, AgreesWithStdSort) {
+  const Workers one(1), three(3);
   unsigned seed = 0;
-  for (const std::size_t count : {0, 1, 2, 255, 256, 257, 5000}) {
-    for (const TimeNs span : {TimeNs{1}, TimeNs{3}, TimeNs{2048}, TimeNs{2049}, TimeNs{1'000'000}, TimeNs{1} << 62}) {
-      std::vector<Event> events = random_events(count, span, ++seed), expected = events;
-      std::sort(expected.begin(), expected.end());
-      sort_events(events);
-      EXPECT_EQ(events, expected) << count << " events over " << span << " ns";
+  EventSorter sorter;
+  for (const std::size_t count : {0, 1, 2, 63, 64, 257, 5000, 20000}) {
+    for (const TimeNs span : {TimeNs{1}, TimeNs{3}, TimeNs{2048}, TimeNs{2049}, TimeNs{1'000'000}, TimeNs{1} << 55}) {
+      std::vector<Event> expected = random_events(count, span, ++seed), sorted;
+      EventPacking packing(kWidth, kHeight);
+      packing.origin = -5;
+      for (const Workers* workers : {&one, &three}) {
+        std::vector<std::vector<std::uint64_t>> parts(3);
+        for (std::size_t i = 0; i < count; ++i) parts[(i * i) % 3].push_back(packed(packing, expected[i]));
+        sorter.sort(parts, packing, *workers, sorted);
+        std::sort(expected.begin(), expected.end());
+        EXPECT_EQ(sorted, expected) << count << " events over " << span << " ns";
+        for (const auto& part : parts) EXPECT_TRUE(part.empty());
+      }
     }
   }
 }
@@ -48,24 +86,27 @@ TEST(EventQueue, ReleasesInOrderWhateverTheOrderOfArrival) {
   std::sort(expected.begin(), expected.end());
 
   // An event may arrive at any time before the watermark passes it.
+  const Workers one(1);
+  EventPacking packing(kWidth, kHeight);
+  packing.origin = -5;
   std::mt19937 random(1);
   EventQueue queue;
   std::vector<Event> released;
-  for (TimeNs watermark = -10; watermark < 1000; watermark += 13) {
+  std::vector<std::vector<std::uint64_t>> parts(2);
+  for (TimeNs watermark = -10; watermark < 1200; watermark += 13) {
     for (auto it = events.begin(); it != events.end();) {
       if (it->t <= watermark || random() % 10 == 0) {
-        queue.incoming().push_back(*it);
+        parts[random() % 2].push_back(packed(packing, *it));
         it = events.erase(it);
       } else {
         ++it;
       }
     }
+    queue.add(parts, packing, one);
     const std::size_t before = released.size();
     queue.release_until(watermark, released);
     for (std::size_t i = before; i < released.size(); ++i) EXPECT_LE(released[i].t, watermark);
   }
-  queue.incoming().insert(queue.incoming().end(), events.begin(), events.end());
-  queue.release_until(2000, released);
   EXPECT_EQ(released, expected);
   EXPECT_EQ(queue.size(), 0U);
 }

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -9,31 +11,36 @@
 #include "esim/core/random.h"
 #include "esim/events/event.h"
 #include "esim/sensors/event_camera.h"
+#include "esim/sensors/event_normals.h"
 
 namespace esim::test {
 
-/// The event camera as the paper words it, pixel by pixel and level by level, in double precision and without a
-/// shortcut: slow, and simple enough to be believed. Frames are whole images at increasing times.
+/// The event camera as its options word it, without low-pass, surround and readout: pixel by pixel and event by event,
+/// in double precision and without a shortcut. Slow, and simple enough to be believed. It draws the same random
+/// numbers. Frames are whole images at increasing times.
 class LiteralEventCamera {
  public:
   LiteralEventCamera(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream)
       : options_(options),
         width_(width),
         pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)),
+        draws_(pixels_.size(), 0),
         mismatch_(seed, Purpose::threshold_mismatch, stream),
-        noise_(seed, Purpose::threshold_noise, stream) {}
+        per_event_(seed, Purpose::threshold_noise, stream),
+        leak_(seed, Purpose::leak_mismatch, stream),
+        shot_(seed, Purpose::shot_noise, stream),
+        defects_(seed, Purpose::pixel_defects, stream) {}
 
   std::vector<Event> process(const Image<float>& frame, TimeNs t) {
     std::vector<Event> events;
     for (std::size_t i = 0; i < pixels_.size(); ++i) {
-      const double brightness = std::log(frame.pixels()[i] + options_.log_eps);
+      const double light = frame.pixels()[i];
       if (last_t_) {
-        walk(i, *last_t_, t, pixels_[i].brightness, brightness, events);
+        walk(i, *last_t_, t, light, events);
       } else {
-        pixels_[i].reference = brightness;
-        draw(i);
+        open(i, t, light);
       }
-      pixels_[i].brightness = brightness;
+      pixels_[i].light = light;
     }
     last_t_ = t;
     std::sort(events.begin(), events.end());
@@ -42,52 +49,140 @@ class LiteralEventCamera {
 
  private:
   struct Pixel {
-    double brightness = 0, reference = 0, on = 0, off = 0;
-    std::uint64_t draws = 0;
-    std::optional<TimeNs> reset_until;
+    double light = 0, reference = 0, on = 0, off = 0;
+    double leak = 0, reference_t = 0;  // the reference falls by `leak` per second since then, s
+    std::array<float, 4> normals{};
+    std::uint64_t shots = 0;
+    TimeNs shot_at = std::numeric_limits<TimeNs>::max();
+    std::optional<TimeNs> busy_until;  // refractory
   };
 
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+
+  double brightness(double light) const {
+    if (options_.response == PixelResponse::log) return std::log(light + options_.log_eps);
+    const double knee = options_.lin_log_knee;
+    return light > knee ? std::log(255 * light) : light / knee * std::log(255 * knee);
+  }
+  double intensity(double light) const { return (light + options_.dark_irradiance) / (1 + options_.dark_irradiance); }
+  bool leaks() const { return options_.leak_rate_hz > 0 || options_.hot_pixels > 0; }
+
+  void open(std::size_t i, TimeNs t, double light) {
+    Pixel& pixel = pixels_[i];
+    const auto item = static_cast<std::uint32_t>(i);
+    draw(i);
+    pixel.reference = brightness(light);
+    pixel.reference_t = to_seconds(t);
+    if (pixel.leak > 0) pixel.reference -= pixel.on * leak_.uniforms(item, 1)[0];
+    if (options_.shot_noise_hz > 0) {
+      pixel.shot_at = t;
+      next_shot(pixel, shot_.uniforms(item, 0)[0]);
+    }
+  }
+
+  void next_shot(Pixel& pixel, double uniform) const {
+    pixel.shot_at += static_cast<TimeNs>(-std::log(uniform) / options_.shot_noise_hz * 1e9) + 1;
+    ++pixel.shots;
+  }
+
+  /// What holds from one event to the next.
   void draw(std::size_t i) {
     Pixel& pixel = pixels_[i];
     const auto item = static_cast<std::uint32_t>(i);
-    pixel.on = static_cast<float>(options_.threshold_on() + options_.threshold_mismatch * mismatch_.normals(item)[0]);
-    pixel.off = static_cast<float>(options_.threshold_off() + options_.threshold_mismatch * mismatch_.normals(item)[1]);
-    if (options_.threshold_noise > 0) {
-      pixel.on += options_.threshold_noise * noise_.normals(item, pixel.draws)[0];
-      pixel.off += options_.threshold_noise * noise_.normals(item, pixel.draws)[1];
-      ++pixel.draws;
+    const auto fixed = mismatch_.normals(item);
+    // What is random of the thresholds is kept in floats.
+    const auto above = [](double nominal, double deviation) {
+      return static_cast<float>(std::max(deviation, kMinContrastThreshold - nominal));
+    };
+    const float mean_on = above(options_.threshold_on(), options_.threshold_mismatch * fixed[0]);
+    const float mean_off = above(options_.threshold_off(), options_.threshold_mismatch * fixed[1]);
+    float on = mean_on, off = mean_off;
+    if (options_.threshold_noise > 0 || (leaks() && options_.leak_jitter > 0) || options_.latency_jitter_us > 0) {
+      EventNormals normals;
+      normals.draw(per_event_, std::array{item}, draws_);
+      std::copy_n(normals.of(0), 4, pixel.normals.begin());
+      on = above(options_.threshold_on(), mean_on + options_.threshold_noise * pixel.normals[0]);
+      off = above(options_.threshold_off(), mean_off + options_.threshold_noise * pixel.normals[1]);
     }
-    pixel.on = std::max(pixel.on, kMinContrastThreshold);
-    pixel.off = std::max(pixel.off, kMinContrastThreshold);
+    pixel.on = options_.threshold_on() + on;
+    pixel.off = options_.threshold_off() + off;
+    const auto [hot, dead] = defects_.uniforms(item);
+    if (leaks()) {
+      const double rate = hot < options_.hot_pixels ? options_.hot_pixel_rate_hz : options_.leak_rate_hz;
+      const double spread = std::pow(10.0, options_.leak_mismatch_decades * leak_.normals(item)[0]);
+      const auto mean_leak = static_cast<float>(rate * spread * (options_.threshold_on() + mean_on));
+      pixel.leak = static_cast<float>(mean_leak / std::max(1 + options_.leak_jitter * pixel.normals[2], 0.05));
+    }
+    if (dead < options_.dead_pixels) pixel.on = pixel.off = kNever, pixel.leak = 0;
   }
 
-  void walk(std::size_t i, TimeNs t0, TimeNs t1, double b0, double b1, std::vector<Event>& events) {
+  void walk(std::size_t i, TimeNs t0, TimeNs t1, double light1, std::vector<Event>& events) {
     Pixel& pixel = pixels_[i];
-    const double dt = static_cast<double>(t1 - t0);
+    const double start = brightness(pixel.light), end = brightness(light1), duration = to_seconds(t1 - t0);
+    const double slope = (end - start) / duration;
+    const auto level_at = [&](double tau) { return start + slope * tau; };  // tau in s after t0
+    const auto light_at = [&](double tau) { return pixel.light + (light1 - pixel.light) * tau / duration; };
+    const bool holds = options_.refractory_mode == RefractoryMode::hold;
+    double from = 0;
     while (true) {
-      if (pixel.reset_until) {
-        if (*pixel.reset_until > t1) return;
-        pixel.reference = b0 + (b1 - b0) * static_cast<double>(*pixel.reset_until - t0) / dt;
-        pixel.reset_until.reset();
+      if (holds && pixel.busy_until) {
+        if (*pixel.busy_until > t1) return;
+        from = to_seconds(*pixel.busy_until - t0);
+        pixel.reference = level_at(from);
+        pixel.reference_t = to_seconds(t0) + from;
+        pixel.busy_until.reset();
       }
+      // The levels fall with the reference.
+      const double reference_at_start = pixel.reference - pixel.leak * (to_seconds(t0) - pixel.reference_t);
+      double tau = kNever;
       int polarity = 0;
-      if (b1 >= pixel.reference + pixel.on) polarity = 1;
-      if (b1 <= pixel.reference - pixel.off) polarity = -1;
-      if (polarity == 0) return;
-      pixel.reference += polarity > 0 ? pixel.on : -pixel.off;
-      const TimeNs t = std::clamp<TimeNs>(t0 + std::llround((pixel.reference - b0) / (b1 - b0) * dt), t0 + 1, t1);
-      events.push_back({t, static_cast<std::uint16_t>(i % static_cast<std::size_t>(width_)),
-                        static_cast<std::uint16_t>(i / static_cast<std::size_t>(width_)),
-                        static_cast<std::int8_t>(polarity)});
+      const double approach = slope + pixel.leak;
+      if (approach > 0) tau = (reference_at_start + pixel.on - start) / approach, polarity = 1;
+      if (approach < 0) tau = (reference_at_start - pixel.off - start) / approach, polarity = -1;
+      if (tau > duration) tau = kNever;
+      tau = std::max(tau, from);
+
+      bool noise = false;
+      while (pixel.shot_at <= t1 && to_seconds(pixel.shot_at - t0) < tau) {
+        const double at = to_seconds(pixel.shot_at - t0);
+        const auto bits = shot_.bits(static_cast<std::uint32_t>(i), pixel.shots);
+        next_shot(pixel, (bits[0] + 0.5) * 0x1.0p-32);
+        if (at <= 0 || at < from) continue;
+        const double passes = 1 - (1 - options_.shot_noise_at_white) * std::min(intensity(light_at(at)), 1.0);
+        if (bits[1] * 0x1.0p-32 >= passes) continue;
+        tau = at, noise = true, polarity = (bits[2] & 1U) != 0 ? 1 : -1;
+        break;
+      }
+      if (tau == kNever) return;
+
+      const TimeNs t = std::clamp<TimeNs>(t0 + std::llround(tau * 1e9), t0 + 1, t1);
+      const double passed = reference_at_start - pixel.leak * tau + (polarity > 0 ? pixel.on : -pixel.off);
       draw(i);
-      if (options_.refractory_period_us > 0) pixel.reset_until = t + to_ns(options_.refractory_period_us * 1e-6);
+      const bool lost = !holds && pixel.busy_until && t < *pixel.busy_until;
+      if (!lost) {
+        events.push_back(
+            {t + delay(pixel, light_at(tau)), static_cast<std::uint16_t>(i % static_cast<std::size_t>(width_)),
+             static_cast<std::uint16_t>(i / static_cast<std::size_t>(width_)), static_cast<std::int8_t>(polarity)});
+        if (options_.refractory_period_us > 0) pixel.busy_until = t + to_ns(options_.refractory_period_us * 1e-6);
+      }
+      pixel.reference = noise ? level_at(tau) : passed;
+      pixel.reference_t = to_seconds(t0) + tau;
+      from = tau;
     }
+  }
+
+  TimeNs delay(const Pixel& pixel, double light) const {
+    const double share = options_.latency_light_share;
+    const double us =
+        (options_.latency_us + options_.latency_jitter_us * pixel.normals[3]) * (1 - share + share / intensity(light));
+    return std::llround(std::max(us, 0.0) * 1e3);
   }
 
   EventCameraOptions options_;
   int width_;
   std::vector<Pixel> pixels_;
-  AddressedRandom mismatch_, noise_;
+  std::vector<std::uint32_t> draws_;
+  AddressedRandom mismatch_, per_event_, leak_, shot_, defects_;
   std::optional<TimeNs> last_t_;
 };
 

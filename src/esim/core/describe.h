@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <limits>
 
 namespace esim {
@@ -16,5 +17,9 @@ struct About {
   double max = std::numeric_limits<double>::infinity();
   bool above_min = false;  ///< the minimum itself is not allowed
 };
+
+/// An enumeration among the options has a specialisation with its values' names as they are written, in order.
+template <typename Enum>
+inline constexpr std::array<const char*, 0> kEnumNames{};
 
 }  // namespace esim

@@ -26,17 +26,21 @@ Workers::~Workers() = default;
 int Workers::threads() const { return arena_->threads_count; }
 
 void Workers::for_each(int count, const std::function<void(int)>& body) const {
+  for_each_with_worker(count, [&](int i, int) { body(i); });
+}
+
+void Workers::for_each_with_worker(int count, const std::function<void(int, int)>& body) const {
   if (threads() == 1 || count <= 1) {
-    for (int i = 0; i < count; ++i) body(i);
+    for (int i = 0; i < count; ++i) body(i, 0);
     return;
   }
 #ifdef __SANITIZE_THREAD__
   // TBB's own synchronisation is invisible to the thread sanitizer: say what it does.
   std::atomic<int> order = 0;
   order.fetch_add(1);
-  const auto run = [&](int i) {
+  const auto run = [&](int i, int worker) {
     order.fetch_add(1);
-    body(i);
+    body(i, worker);
     order.fetch_add(1);
   };
 #else
@@ -44,7 +48,7 @@ void Workers::for_each(int count, const std::function<void(int)>& body) const {
 #endif
   arena_->arena.execute([&] {
     tbb::parallel_for(
-        0, count, [&](int i) { run(i); }, tbb::simple_partitioner{});
+        0, count, [&](int i) { run(i, tbb::this_task_arena::current_thread_index()); }, tbb::simple_partitioner{});
   });
 #ifdef __SANITIZE_THREAD__
   order.fetch_add(1);

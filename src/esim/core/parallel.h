@@ -22,6 +22,10 @@ class Workers {
   /// done. The first exception thrown by a body is rethrown here.
   void for_each(int count, const std::function<void(int)>& body) const;
 
+  /// The same with body(i, worker): `worker` in [0, threads()) is that of no other body at the same time, as the index
+  /// of memory to work in.
+  void for_each_with_worker(int count, const std::function<void(int, int)>& body) const;
+
  private:
   struct Arena;
   std::unique_ptr<Arena> arena_;

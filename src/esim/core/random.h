@@ -11,6 +11,9 @@ enum class Purpose : std::uint16_t {
   threshold_noise = 2,
   trajectory_position = 3,
   trajectory_rotation = 4,
+  leak_mismatch = 5,
+  pixel_defects = 6,
+  shot_noise = 7,
   test = 1000,
 };
 

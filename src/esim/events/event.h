@@ -3,7 +3,6 @@
 #include <compare>
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "esim/core/time.h"
 
@@ -28,11 +27,5 @@ struct Event {
 
 /// Consecutive events in their order.
 using EventSpan = std::span<const Event>;
-
-/// Sorts by the one order of events. Linear in the number of events: a radix sort by time, which is fastest when
-/// the events span a short time, as those of one sampling step do. `scratch` is memory to work in, kept from call to
-/// call.
-void sort_events(std::vector<Event>& events, std::vector<Event>& scratch);
-void sort_events(std::vector<Event>& events);
 
 }  // namespace esim

@@ -1,26 +1,33 @@
 #include "esim/events/event_queue.h"
 
 #include <algorithm>
+#include <cstddef>
 
 namespace esim {
 
-void EventQueue::release_until(TimeNs watermark, std::vector<Event>& out) {
-  // Merge what came in with what was left from before.
-  sort_events(incoming_, scratch_);
-  if (pending_.empty()) {
-    pending_.swap(incoming_);
-  } else if (!incoming_.empty()) {
-    const auto middle = static_cast<std::ptrdiff_t>(pending_.size());
-    pending_.insert(pending_.end(), incoming_.begin(), incoming_.end());
-    std::inplace_merge(pending_.begin(), pending_.begin() + middle, pending_.end());
+void EventQueue::add(std::span<std::vector<std::uint64_t>> parts, const EventPacking& packing, const Workers& workers) {
+  sorter_.sort(parts, packing, workers, added_);
+  if (size() == 0) {
+    pending_.swap(added_);
+  } else {
+    const auto rest = std::span(pending_).subspan(released_);
+    merged_.resize(rest.size() + added_.size());
+    std::merge(rest.begin(), rest.end(), added_.begin(), added_.end(), merged_.begin());
+    pending_.swap(merged_);
   }
-  incoming_.clear();
+  released_ = 0;
+}
 
-  // Release the front.
-  const auto end = std::upper_bound(pending_.begin(), pending_.end(), watermark,
-                                    [](TimeNs t, const Event& event) { return t < event.t; });
-  out.insert(out.end(), pending_.begin(), end);
-  pending_.erase(pending_.begin(), end);
+void EventQueue::release_until(TimeNs watermark, std::vector<Event>& out) {
+  const auto begin = pending_.begin() + static_cast<std::ptrdiff_t>(released_);
+  const auto end =
+      std::upper_bound(begin, pending_.end(), watermark, [](TimeNs t, const Event& event) { return t < event.t; });
+  if (out.empty() && released_ == 0 && end == pending_.end()) {
+    out.swap(pending_);
+    return;
+  }
+  out.insert(out.end(), begin, end);
+  released_ = static_cast<std::size_t>(end - pending_.begin());
 }
 
 }  // namespace esim

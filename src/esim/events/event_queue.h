@@ -1,8 +1,12 @@
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <vector>
 
+#include "esim/core/parallel.h"
 #include "esim/events/event.h"
+#include "esim/events/event_sorter.h"
 
 namespace esim {
 
@@ -10,18 +14,19 @@ namespace esim {
 /// arrive in any order; they leave in the one order of events, as far as the watermark allows.
 class EventQueue {
  public:
-  /// Room to append events to; anything later than the last watermark may be added, in any order.
-  std::vector<Event>& incoming() { return incoming_; }
+  /// Takes the packed events of all parts, in any order but later than the last watermark, and empties the parts.
+  void add(std::span<std::vector<std::uint64_t>> parts, const EventPacking& packing, const Workers& workers);
 
   /// Appends to `out`, in order, every event with t <= watermark, and forgets them.
   void release_until(TimeNs watermark, std::vector<Event>& out);
 
-  std::size_t size() const { return incoming_.size() + pending_.size(); }
+  std::size_t size() const { return pending_.size() - released_; }
 
  private:
-  std::vector<Event> incoming_;  // unordered
-  std::vector<Event> pending_;   // ordered, later than the last watermark
-  std::vector<Event> scratch_;   // for sorting
+  std::vector<Event> pending_;  // ordered
+  std::size_t released_ = 0;    // of pending_, from its front
+  std::vector<Event> added_, merged_;
+  EventSorter sorter_;
 };
 
 }  // namespace esim

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <array>
-
 #include "esim/scenario/scenario.h"
 
 /// The schema: every option of a scenario once, with unit, range and help (see core/describe.h). Options of modules
@@ -134,9 +132,6 @@ void describe(Visitor& visit, Scenario& o) {
   visit("output", o.output, About{"what is written, and how"});
 }
 
-/// How the values of an enumeration are written, in order.
-template <typename Enum>
-inline constexpr std::array<const char*, 0> kEnumNames{};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<EventTimeUnit>{"us", "ns"};
 template <>

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <bit>
+#include <cstdint>
+
+#include "esim/events/event.h"
+
+namespace esim {
+
+/// Events of a limited time as numbers whose order is the one order of events: half the memory, and faster to sort.
+class EventPacking {
+ public:
+  EventPacking(int width, int height)
+      : x_bits_(std::bit_width(static_cast<unsigned>(width - 1))),
+        time_shift_(1 + x_bits_ + std::bit_width(static_cast<unsigned>(height - 1))) {}
+
+  /// Time that packed events count from: none is earlier. They must be unpacked with the same origin.
+  TimeNs origin = 0;
+
+  /// Events must be earlier than the origin and this: 17 s for the largest images, hours for common ones.
+  TimeNs longest() const { return TimeNs{1} << (63 - time_shift_); }
+
+  /// The part of the number that says where; the least bit is left for the polarity.
+  std::uint64_t place(int x, int y) const {
+    return (static_cast<std::uint64_t>(y) << (x_bits_ + 1)) | (static_cast<std::uint64_t>(x) << 1);
+  }
+  std::uint64_t pack(TimeNs since_origin, std::uint64_t place, bool on) const {
+    return (static_cast<std::uint64_t>(since_origin) << time_shift_) | place | static_cast<std::uint64_t>(on);
+  }
+  Event unpack(std::uint64_t packed) const {
+    const std::uint64_t place = packed & ((std::uint64_t{1} << time_shift_) - 1);
+    return {origin + static_cast<TimeNs>(packed >> time_shift_),
+            static_cast<std::uint16_t>((place >> 1) & ((std::uint64_t{1} << x_bits_) - 1)),
+            static_cast<std::uint16_t>(place >> (x_bits_ + 1)), static_cast<std::int8_t>((packed & 1) != 0 ? 1 : -1)};
+  }
+
+  int time_shift() const { return time_shift_; }
+
+ private:
+  int x_bits_, time_shift_;
+};
+
+}  // namespace esim

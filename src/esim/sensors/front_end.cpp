@@ -1,0 +1,45 @@
+#include "esim/sensors/front_end.h"
+
+#include <cmath>
+
+#include "esim/sensors/vector_math.h"
+
+namespace esim {
+namespace {
+
+constexpr float kWhite = 255.0F;  // v2e counts in the steps of an 8-bit image
+
+/// L = ln(255 E) from the knee on; below, the straight line to L(0) = 0.
+template <class D, class V>
+V lin_log(D d, V irradiance, float knee) {
+  const auto logarithmic = hn::Log(d, hn::Mul(hn::Set(d, kWhite), hn::Max(irradiance, hn::Set(d, knee))));
+  const auto linear = hn::Mul(irradiance, hn::Set(d, std::log(kWhite * knee) / knee));
+  return hn::IfThenElse(hn::Gt(irradiance, hn::Set(d, knee)), logarithmic, linear);
+}
+
+}  // namespace
+
+void respond(const EventCameraOptions& options, std::size_t count, const float* irradiance, float* brightness) {
+  const auto run = [&](auto d, std::size_t first, std::size_t end) {
+    const auto eps = hn::Set(d, static_cast<float>(options.log_eps));
+    for (std::size_t i = first; i + hn::Lanes(d) <= end; i += hn::Lanes(d)) {
+      const auto e = hn::LoadU(d, irradiance + i);
+      const auto value = options.response == PixelResponse::log
+                             ? hn::Log(d, hn::Add(e, eps))
+                             : lin_log(d, e, static_cast<float>(options.lin_log_knee));
+      hn::StoreU(value, d, brightness + i);
+    }
+  };
+  const hn::ScalableTag<float> whole;
+  const std::size_t in_vectors = count / hn::Lanes(whole) * hn::Lanes(whole);
+  run(whole, 0, in_vectors);
+  run(hn::CappedTag<float, 1>(), in_vectors, count);
+}
+
+float respond(const EventCameraOptions& options, float irradiance) {
+  float brightness = 0;
+  respond(options, 1, &irradiance, &brightness);
+  return brightness;
+}
+
+}  // namespace esim

@@ -1,0 +1,130 @@
+#include "esim/sensors/pixel_signal.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace esim {
+
+RelaxingSignal::RelaxingSignal(bool two_poles, double rate, double moved, double filtered1, double filtered2,
+                               double start, double rise)
+    : two_poles_(two_poles),
+      rate_(rate),
+      start_(start),
+      rise_(rise),
+      filtered1_(filtered1),
+      filtered2_(filtered2),
+      moved_(moved) {
+  at_from_ = at(0, 0);
+}
+
+RelaxingSignal RelaxingSignal::first_order(double rate, double moved, double filtered, double start, double slope) {
+  return {false, rate, moved, filtered, filtered, start, slope / rate};
+}
+
+RelaxingSignal RelaxingSignal::second_order(double rate, double moved, double filtered1, double filtered2, double start,
+                                            double slope) {
+  return {true, rate, moved, filtered1, filtered2, start, slope / rate};
+}
+
+RelaxingSignal::Point RelaxingSignal::at(double u, double moved) const {
+  const double first = filtered1_ + (start_ - filtered1_) * moved + rise_ * (u - moved);
+  if (!two_poles_) return {u, first + offset_ + drift_ * u, start_ + rise_ * u - first + drift_};
+  const double second = filtered2_ + (start_ - filtered2_) * moved + (filtered1_ - start_) * u * (1 - moved) +
+                        rise_ * (2 * (u - moved) - u * moved);
+  return {u, second + offset_ + drift_ * u, first - second + drift_};
+}
+
+RelaxingSignal::Point RelaxingSignal::at(double u) const { return at(u, -std::expm1(-u)); }
+
+double RelaxingSignal::value(double tau) const { return at(rate_ * tau).value; }
+
+void RelaxingSignal::add(double offset, double drift) {
+  offset_ += offset;
+  drift_ += drift / rate_;
+  at_from_.value += offset + drift / rate_ * at_from_.u;
+  at_from_.slope += drift / rate_;
+}
+
+/// Where the signal passes `level` between a and b, between which it is monotone and does pass it: Newton's method from
+/// the inverse cubic through the ends, with bisection where that leaves the bracket.
+double RelaxingSignal::solve(double level, const Point& a, const Point& b) const {
+  constexpr double kToleranceNs = 0.05;
+  double low = a.u, high = b.u;
+  const double rise = b.value - a.value, s = (level - a.value) / rise;
+  if (!(s > 0)) return low;
+  if (s >= 1) return high;
+
+  const double t = 1 - s;
+  double u = t * t * (1 + 2 * s) * a.u + s * s * (3 - 2 * s) * b.u + s * t * rise * (t / a.slope - s / b.slope);
+  if (!(u > low && u < high)) u = low + s * (high - low);
+  const double tolerance = rate_ * kToleranceNs, small_step = 0.1 * std::sqrt(tolerance);
+  for (int i = 0; i < 100; ++i) {
+    const Point point = at(u);
+    if ((point.value < level) == (rise > 0)) {
+      low = u;
+    } else {
+      high = u;
+    }
+    double next = u - (point.value - level) / point.slope;
+    const bool inside = next >= low && next <= high;
+    if (!inside) next = 0.5 * (low + high);
+    const double step = std::fabs(next - u);
+    u = next;
+    // The next step of Newton's would be about this one squared.
+    if (step <= (inside ? small_step : tolerance)) break;
+  }
+  return u;
+}
+
+/// Where the slope changes its sign between a and b, between which it is monotone.
+double RelaxingSignal::turn_between(const Point& a, const Point& b) const {
+  if (!two_poles_) {
+    const double distance = start_ - filtered1_;
+    return -std::log1p(-(distance + drift_) / (distance - rise_));
+  }
+  constexpr double kPrecision = 1e-9;
+  double low = a.u, high = b.u;
+  while (high - low > kPrecision * (1 + high)) {
+    const double middle = 0.5 * (low + high);
+    ((at(middle).slope < 0) == (a.slope < 0) ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+/// Where the signal turns back between a and b, at most twice, in order; behind them, b.
+std::size_t RelaxingSignal::turns(const Point& a, const Point& b, std::array<Point, 3>& points) const {
+  std::size_t count = 0;
+  const auto add_turn = [&](const Point& from, const Point& to) {
+    if ((from.slope < 0) == (to.slope < 0) || from.slope == 0 || to.slope == 0) return;
+    points[count++] = at(std::clamp(turn_between(from, to), from.u, to.u));
+  };
+  // Behind two poles the slope is monotone on either side of where it is steepest.
+  const double resonance = filtered1_ - start_ + rise_;
+  const double steepest = two_poles_ && resonance != 0 ? 2.0 - (filtered2_ - start_ + 2 * rise_) / resonance : a.u;
+  if (steepest > a.u && steepest < b.u) {
+    const Point middle = at(steepest);
+    add_turn(a, middle);
+    add_turn(middle, b);
+  } else {
+    add_turn(a, b);
+  }
+  points[count++] = b;
+  return count;
+}
+
+Crossing RelaxingSignal::first_crossing(double end, double low, double high) const {
+  Point a = at_from_;
+  if (a.value >= high) return {from(), true};
+  if (a.value <= low) return {from(), false};
+  std::array<Point, 3> points;
+  const std::size_t count = turns(a, at(rate_ * end, moved_), points);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Point& b = points[i];
+    if (b.value >= high) return {solve(high, a, b) / rate_, true};
+    if (b.value <= low) return {solve(low, a, b) / rate_, false};
+    a = b;
+  }
+  return {};
+}
+
+}  // namespace esim

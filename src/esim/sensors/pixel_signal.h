@@ -1,0 +1,87 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+
+namespace esim {
+
+/// No crossing within a segment.
+inline constexpr double kNever = std::numeric_limits<double>::infinity();
+
+/// Where a signal first leaves the open interval between two levels.
+struct Crossing {
+  double tau = kNever;  ///< ns after the segment's start
+  bool on = false;      ///< through the upper level
+};
+
+/// What a pixel's comparator sees on a segment: a straight line G = start + slope tau, tau in ns after the segment's
+/// start. What lies before from() is done.
+struct LinearSignal {
+  double start = 0, slope = 0, done = 0;
+
+  double from() const { return done; }
+  double value(double tau) const { return start + slope * tau; }
+  double value() const { return value(done); }  ///< at from()
+  void advance(double tau) { done = tau; }
+
+  /// Adds offset + drift * tau.
+  void add(double offset, double drift) { start += offset, slope += drift; }
+
+  /// First time in [from, end] at which the signal is at `high` or above, or at `low` or below.
+  Crossing first_crossing(double end, double low, double high) const {
+    const double last = value(end);
+    const bool on = last >= high;
+    if (!on && last > low) return {};
+    const double tau = slope != 0 ? ((on ? high : low) - start) / slope : done;
+    return {tau > done ? (tau < end ? tau : end) : done, on};
+  }
+};
+
+/// The same behind a low-pass of one pole, or of two equal ones, plus what leaks. With u = rate tau, m = 1 - exp(-u)
+/// and an input L(u) = start + rise u, the poles answer
+///     F1 = F1(0) + (start - F1(0)) m + rise (u - m)
+///     F2 = F2(0) + (start - F2(0)) m + (F1(0) - start) u (1 - m) + rise (2 u - 2 m - u m),
+/// which lose no digits where u is small.
+class RelaxingSignal {
+ public:
+  RelaxingSignal() = default;
+
+  /// One pole, at `filtered` when its input, `start`, begins to rise with `slope` per ns. `moved` is m at the segment's
+  /// end.
+  static RelaxingSignal first_order(double rate, double moved, double filtered, double start, double slope);
+
+  /// Two poles, one behind the other, at `filtered1` and `filtered2`.
+  static RelaxingSignal second_order(double rate, double moved, double filtered1, double filtered2, double start,
+                                     double slope);
+
+  double from() const { return at_from_.u / rate_; }
+  double value(double tau) const;
+  double value() const { return at_from_.value; }
+  void advance(double tau) { at_from_ = at(rate_ * tau); }
+  void add(double offset, double drift);
+  Crossing first_crossing(double end, double low, double high) const;
+
+ private:
+  /// The signal at one time, with its derivative.
+  struct Point {
+    double u = 0, value = 0, slope = 0;
+  };
+  RelaxingSignal(bool two_poles, double rate, double moved, double filtered1, double filtered2, double start,
+                 double rise);
+  Point at(double u) const;
+  Point at(double u, double moved) const;
+  double solve(double level, const Point& a, const Point& b) const;
+  double turn_between(const Point& a, const Point& b) const;
+  std::size_t turns(const Point& a, const Point& b, std::array<Point, 3>& points) const;
+
+  bool two_poles_ = false;
+  double rate_ = 0;                       // 1/ns
+  double start_ = 0, rise_ = 0;           // of the input; per u
+  double filtered1_ = 0, filtered2_ = 0;  // at the segment's start
+  double offset_ = 0, drift_ = 0;         // what leaks; per u
+  double moved_ = 0;                      // m at the segment's end
+  Point at_from_;
+};
+
+}  // namespace esim

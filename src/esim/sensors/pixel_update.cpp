@@ -1,0 +1,194 @@
+#include "esim/sensors/pixel_update.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include "esim/sensors/front_end.h"
+#include "esim/sensors/vector_math.h"
+
+namespace esim {
+namespace {
+
+/// Bit i is set where lane i is.
+template <class D, class Mask>
+std::uint64_t bits_of(D d, Mask mask) {
+  std::uint64_t bits = 0;
+  hn::StoreMaskBits(d, mask, reinterpret_cast<std::uint8_t*>(&bits));
+  return bits;
+}
+
+/// Lanes whose alarm goes off by `now`, in ticks.
+template <class D>
+hn::Mask<D> alarmed(D d, const std::int32_t* alarms, std::int32_t now) {
+  const hn::RebindToSigned<D> di;
+  return hn::RebindMask(d, hn::Lt(hn::LoadU(di, alarms), hn::Set(di, now + 1)));
+}
+
+AwakePixel awake_pixel(const PixelArray& pixels, const Segment& segment, int x, int y) {
+  const auto pixel =
+      static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(pixels.width) + static_cast<std::uint32_t>(x);
+  __builtin_prefetch(&pixels.states[pixel], 1);
+  return {pixel, static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), segment.irradiance0->row(y)[x],
+          segment.irradiance1->row(y)[x]};
+}
+
+std::size_t index(const PixelArray& pixels, int x, int y) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width) + static_cast<std::size_t>(x);
+}
+
+}  // namespace
+
+/// Moves some neighbouring pixels' low-passes to the segment's end, exactly for brightness that is linear in time and
+/// for the segment's mean intensity, and wakes those that may have left their band on the way.
+template <int kOrder, class D>
+void PixelUpdate::filter_vector(D d, PixelArray& pixels, const Segment& segment, const float* brightness, int y,
+                                int x) {
+  using V = hn::Vec<D>;
+  const std::size_t i = index(pixels, x, y);
+  const V start = hn::LoadU(d, &pixels.brightness[i]), end = hn::LoadU(d, brightness);
+  hn::StoreU(end, d, &pixels.brightness[i]);
+  V lowest = hn::Min(start, end), highest = hn::Max(start, end);
+  V phase = hn::Zero(d), m = phase, f1 = start, f2 = start;
+
+  if constexpr (kOrder > 0) {
+    // How many time constants the segment lasts: of the mean light, by Simpson's rule for an exponential.
+    const EventCameraOptions& o = pixels.options;
+    const V e0 = hn::LoadU(d, segment.irradiance0->row(y) + x), e1 = hn::LoadU(d, segment.irradiance1->row(y) + x);
+    const V sum = hn::MulAdd(hn::Set(d, 4.0F), hn::Sqrt(hn::Mul(e0, e1)), hn::Add(e0, e1));
+    const double per_pole = kOrder == 2 ? 1.0 / std::sqrt(std::numbers::sqrt2 - 1.0) : 1.0;  // -3 dB of both together
+    const double phase_at_white =
+        2.0 * std::numbers::pi * o.low_pass_hz * per_pole * to_seconds(segment.t1 - segment.t0);
+    const double per_light = phase_at_white / (1.0 + o.dark_irradiance);
+    phase = hn::MulAdd(sum, hn::Set(d, static_cast<float>(per_light / 6.0)),
+                       hn::Set(d, static_cast<float>(per_light * o.dark_irradiance)));
+
+    // With m = 1 - exp(-phase): F moves by m of its distance, and lags behind the rise of L.
+    const V one = hn::Set(d, 1.0F), rise = hn::Sub(end, start);
+    m = hn::Neg(hn::Expm1(d, hn::Neg(phase)));
+    const V followed = hn::Div(m, phase);
+    f1 = hn::LoadU(d, &pixels.filtered1[i]);
+    const V distance = hn::Sub(start, f1);
+    const V f1_end = hn::Add(f1, hn::MulAdd(m, distance, hn::Mul(rise, hn::Sub(one, followed))));
+    hn::StoreU(f1_end, d, &pixels.filtered1[i]);
+    if constexpr (kOrder == 1) {
+      // Where F does not turn back, it stays between its ends.
+      const auto turns = hn::Lt(hn::Mul(distance, hn::Sub(end, f1_end)), hn::Zero(d));
+      lowest = hn::Min(hn::Min(f1, f1_end), hn::IfThenElse(turns, lowest, f1_end));
+      highest = hn::Max(hn::Max(f1, f1_end), hn::IfThenElse(turns, highest, f1_end));
+    } else {
+      f2 = hn::LoadU(d, &pixels.filtered2[i]);
+      const V from_first = hn::Mul(hn::Mul(phase, hn::Sub(one, m)), hn::Neg(distance));
+      const V from_rise = hn::Mul(rise, hn::Add(hn::MulAdd(hn::Set(d, -2.0F), followed, one), hn::Sub(one, m)));
+      const V f2_end = hn::Add(hn::MulAdd(m, hn::Sub(start, f2), f2), hn::Add(from_first, from_rise));
+      hn::StoreU(f2_end, d, &pixels.filtered2[i]);
+      lowest = hn::Min(hn::Min(f2, f2_end), hn::Min(f1, lowest));
+      highest = hn::Max(hn::Max(f2, f2_end), hn::Max(f1, highest));
+    }
+  }
+
+  auto restless =
+      hn::Or(hn::Le(lowest, hn::LoadU(d, &pixels.band_low[i])), hn::Ge(highest, hn::LoadU(d, &pixels.band_high[i])));
+  if (pixels.alarmed) restless = hn::Or(restless, alarmed(d, &pixels.alarms[i], pixels.ticks(segment.t1)));
+  std::uint64_t bits = bits_of(d, restless);
+  if (bits == 0) return;
+
+  alignas(64) float starts[16], ends[16], first[16], second[16], phases[16], moves[16];
+  hn::StoreU(start, d, starts), hn::StoreU(end, d, ends), hn::StoreU(phase, d, phases), hn::StoreU(m, d, moves);
+  hn::StoreU(f1, d, first), hn::StoreU(f2, d, second);
+  const double duration = static_cast<double>(segment.t1 - segment.t0);
+  for (; bits != 0; bits &= bits - 1) {
+    const int lane = std::countr_zero(bits);
+    const AwakePixel awake = awake_pixel(pixels, segment, x + lane, y);
+    const double from = starts[lane], slope = (static_cast<double>(ends[lane]) - from) / duration;
+    if constexpr (kOrder == 0) {
+      linear_.add(awake, {from, slope});
+    } else {
+      const double rate = phases[lane] / duration, moved = moves[lane];
+      relaxing_.add(awake, kOrder == 1
+                               ? RelaxingSignal::first_order(rate, moved, first[lane], from, slope)
+                               : RelaxingSignal::second_order(rate, moved, first[lane], second[lane], from, slope));
+    }
+  }
+}
+
+const float* PixelUpdate::brightness_row(const PixelArray& pixels, const Segment& segment,
+                                         const Image<float>* brightness, int y) {
+  if (brightness != nullptr) return brightness->row(y) + segment.tile.x;
+  const auto length = static_cast<std::size_t>(segment.tile.width);
+  row_.resize(length);
+  respond(pixels.options, length, segment.irradiance1->row(y) + segment.tile.x, row_.data());
+  return row_.data();
+}
+
+template <int kOrder>
+void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int y) {
+  const int first = segment.tile.x, last = first + segment.tile.width;
+  const float* const row = brightness_row(pixels, segment, brightness, y);
+  const hn::ScalableTag<float> d;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  int x = first;
+  for (; x + lanes <= last; x += lanes) filter_vector<kOrder>(d, pixels, segment, row + (x - first), y, x);
+  for (; x < last; ++x) filter_vector<kOrder>(hn::CappedTag<float, 1>(), pixels, segment, row + (x - first), y, x);
+}
+
+void PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int first,
+                         int last, PackedEvents& events) {
+  const int order = pixels.options.low_pass_hz > 0 ? pixels.options.low_pass_order : 0;
+  const auto most = static_cast<std::size_t>(segment.tile.width) * static_cast<std::size_t>(last - first);
+  if (order == 0) {
+    linear_.reserve(most);
+    for (int y = first; y < last; ++y) filter_row<0>(pixels, segment, brightness, y);
+    linear_.run(pixels, segment.t0, segment.t1, events);
+    return;
+  }
+  relaxing_.reserve(most);
+  for (int y = first; y < last; ++y) {
+    order == 1 ? filter_row<1>(pixels, segment, brightness, y) : filter_row<2>(pixels, segment, brightness, y);
+  }
+  relaxing_.run(pixels, segment.t0, segment.t1, events);
+}
+
+void PixelUpdate::cross(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, int first, int last,
+                        PackedEvents& events) {
+  if (CleanPass::serves(pixels)) {
+    clean_.run(pixels, segment, watch, first, last, events);
+    return;
+  }
+  linear_.reserve(static_cast<std::size_t>(segment.tile.width) * static_cast<std::size_t>(last - first));
+  for (int y = first; y < last; ++y) {
+    for (const std::uint32_t x : watch.columns(y)) linear_.add(awake_pixel(pixels, segment, static_cast<int>(x), y));
+  }
+  const std::size_t count = linear_.count();
+  if (before_.size() < count + kVectorPadding) {
+    before_.resize(2 * count + kVectorPadding, 1.0), after_.resize(2 * count + kVectorPadding, 1.0);
+  }
+  const double eps = pixels.options.log_eps;
+  for (std::size_t i = 0; i < count; ++i) {
+    before_[i] = linear_.pixel(i).light0 + eps;
+    after_[i] = linear_.pixel(i).light1 + eps;
+  }
+  logarithms(count, before_.data());
+  logarithms(count, after_.data());
+  const double per_ns = 1.0 / static_cast<double>(segment.t1 - segment.t0);
+  for (std::size_t i = 0; i < count; ++i) linear_.signal(i) = {before_[i], (after_[i] - before_[i]) * per_ns};
+  linear_.run(pixels, segment.t0, segment.t1, events);
+}
+
+void PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int first,
+                       int last) {
+  linear_.reserve(static_cast<std::size_t>(segment.tile.width) * static_cast<std::size_t>(last - first));
+  for (int y = first; y < last; ++y) {
+    const float* const row = pixels.in_brightness ? brightness_row(pixels, segment, brightness, y)
+                                                  : segment.irradiance1->row(y) + segment.tile.x;
+    for (int i = 0; i < segment.tile.width; ++i) {
+      const AwakePixel awake = awake_pixel(pixels, segment, segment.tile.x + i, y);
+      pixels.open(awake.pixel, row[i], segment.t0);
+      linear_.add(awake);
+    }
+  }
+  linear_.settle_all(pixels, segment.t0);
+}
+
+}  // namespace esim

@@ -1,0 +1,103 @@
+#include "esim/sensors/pixel_watch.h"
+
+#include <array>
+#include <bit>
+#include <limits>
+#include <string>
+
+#include "esim/core/error.h"
+#include "esim/sensors/vector_math.h"
+
+namespace esim {
+namespace {
+
+// The floats that are finite and >= 0 are those whose bits, as unsigned numbers, are at most those of the largest one.
+// Adding zero makes minus zero one of them.
+constexpr std::uint32_t kLargest = std::bit_cast<std::uint32_t>(std::numeric_limits<float>::max());
+
+using WatchTag = hn::CappedTag<float, 8>;
+
+/// For each set of lanes, as bits, the lanes in it, in order.
+constexpr auto kLanesOf = [] {
+  std::array<std::array<std::uint8_t, 8>, 256> lanes{};
+  for (std::size_t bits = 0; bits < 256; ++bits) {
+    std::size_t count = 0;
+    for (std::uint8_t lane = 0; lane < 8; ++lane) {
+      if ((bits >> lane & 1U) != 0) lanes[bits][count++] = lane;
+    }
+  }
+  return lanes;
+}();
+
+/// Writes first + lane for each lane that is set, in order, and maybe more behind; returns their number.
+template <class D>
+std::size_t store_columns(D d, hn::Mask<D> mask, int first, std::uint32_t* columns) {
+  const hn::RebindToUnsigned<D> du;
+  const hn::Rebind<std::uint8_t, D> d8;
+  std::uint64_t bits = 0;
+  hn::StoreMaskBits(d, mask, reinterpret_cast<std::uint8_t*>(&bits));
+  const auto lanes = hn::PromoteTo(du, hn::LoadU(d8, kLanesOf[bits].data()));
+  hn::StoreU(hn::Add(lanes, hn::Set(du, static_cast<std::uint32_t>(first))), du, columns);
+  return static_cast<std::size_t>(std::popcount(bits));
+}
+
+bool is_irradiance(float value) { return std::bit_cast<std::uint32_t>(value + 0.0F) <= kLargest; }
+
+}  // namespace
+
+PixelWatch::PixelWatch(int width, int height)
+    : stride_(static_cast<std::size_t>(width) + kVectorPadding),
+      columns_(stride_ * static_cast<std::size_t>(height)),
+      counts_(static_cast<std::size_t>(height)) {}
+
+bool PixelWatch::look(const PixelArray& pixels, const Segment& segment, int y) {
+  const std::size_t row = static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width);
+  const float* const irradiance = segment.irradiance1->row(y);
+  const float *const low = pixels.band_low.data() + row, *const high = pixels.band_high.data() + row;
+  const std::int32_t* const alarms = pixels.alarmed ? pixels.alarms.data() + row : nullptr;
+  const std::int32_t now = pixels.alarmed ? pixels.ticks(segment.t1) : 0;
+  std::uint32_t* const columns = columns_.data() + static_cast<std::size_t>(y) * stride_;
+  std::size_t count = 0;
+  bool good = true;
+
+  // Without branches: that a pixel wakes is as hard to foresee as an event.
+  const auto look_at = [&](auto d, int from, int to) {
+    const hn::RebindToUnsigned<decltype(d)> du;
+    const hn::RebindToSigned<decltype(d)> di;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    auto largest = hn::Zero(du);
+    for (int x = from; x + lanes <= to; x += lanes) {
+      const auto value = hn::LoadU(d, irradiance + x);
+      largest = hn::Max(largest, hn::BitCast(du, hn::Add(value, hn::Zero(d))));
+      auto awake = hn::Not(hn::And(hn::Gt(value, hn::LoadU(d, low + x)), hn::Lt(value, hn::LoadU(d, high + x))));
+      if (alarms != nullptr) {
+        const auto alarmed = hn::Lt(hn::LoadU(di, alarms + x), hn::Set(di, now + 1));
+        awake = hn::Or(awake, hn::RebindMask(d, alarmed));
+      }
+      count += store_columns(d, awake, x, columns + count);
+    }
+    good &= hn::GetLane(hn::MaxOfLanes(du, largest)) <= kLargest;
+  };
+  const WatchTag whole;
+  const int first = segment.tile.x, last = first + segment.tile.width;
+  const int middle = last - segment.tile.width % static_cast<int>(hn::Lanes(whole));
+  look_at(whole, first, middle);
+  look_at(hn::CappedTag<float, 1>(), middle, last);
+  counts_[static_cast<std::size_t>(y)] = static_cast<std::uint32_t>(count);
+  return good;
+}
+
+void check_irradiance(const Segment& segment) {
+  const Tile& tile = segment.tile;
+  for (int y = tile.y; y < tile.y + tile.height; ++y) {
+    const float* const row = segment.irradiance1->row(y);
+    for (int x = tile.x; x < tile.x + tile.width; ++x) {
+      if (is_irradiance(row[x])) continue;
+      throw UserError("irradiance " + std::to_string(row[x]) + " of pixel (" + std::to_string(x) + ", " +
+                      std::to_string(y) + ") at t = " + std::to_string(to_seconds(segment.t1)) +
+                      " s is not a finite number >= 0; check where the images come from");
+    }
+  }
+}
+
+}  // namespace esim

@@ -226,5 +226,32 @@ TEST(Suggest, FindsTheNearestWord) {
   EXPECT_EQ(nearest("qqqqqq", {"lambda", "rate_hz"}), "");
 }
 
+TEST_F(ScenarioFile, APresetStandsForWhatIsNotGiven) {
+  const EventCameraOptions davis = preset_options(SensorPreset::davis346);
+  const EventCameraOptions given =
+      read(std::string(kMinimal) + "event_camera: {contrast_threshold: 0.25, preset: davis346}\n")
+          .cameras[0]
+          .event_camera;
+  EXPECT_EQ(given.preset, SensorPreset::davis346);
+  EXPECT_EQ(given.threshold_on(), 0.25);
+  EXPECT_EQ(given.threshold_off(), 0.25);
+  EXPECT_EQ(given.low_pass_hz, davis.low_pass_hz);
+  EXPECT_EQ(given.readout.rate_mev_per_s, davis.readout.rate_mev_per_s);
+  EXPECT_GT(davis.leak_rate_hz, 0);
+
+  const EventCameraOptions set =
+      read(kMinimal, {"event_camera.preset=gen3.1-vga", "event_camera.readout.queue_events=7"}).cameras[0].event_camera;
+  EXPECT_EQ(set.preset, SensorPreset::gen31_vga);
+  EXPECT_EQ(set.readout.queue_events, 7);
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "event_camera: {preset: davis364}\n"), "davis346"));
+}
+
+TEST_F(ScenarioFile, PresetsAreWithinTheRangesOfTheirOptions) {
+  for (const char* name : kEnumNames<SensorPreset>) {
+    const Scenario scenario = read(kMinimal, {std::string("event_camera.preset=") + name});
+    EXPECT_EQ(write_scenario(read(write_scenario(scenario))), write_scenario(scenario)) << name;
+  }
+}
+
 }  // namespace
 }  // namespace esim

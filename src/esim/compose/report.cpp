@@ -28,6 +28,7 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
         {"events", events},
         {"events_on", camera.events_on},
         {"events_off", camera.events_off},
+        {"events_dropped_by_readout", camera.sensor.dropped},
         {"events_per_second", simulated_s > 0 ? static_cast<double>(events) / simulated_s : 0.0},
     });
   }

@@ -46,7 +46,7 @@ class Run {
     for (std::size_t i = 0; i < world.cameras.size(); ++i) {
       const CameraInfo& info = world.info.cameras[i];
       summary_.cameras.push_back(
-          {info.name, world.cameras[i].renderer->traits().name, info.model.width, info.model.height, {}, 0, 0});
+          {info.name, world.cameras[i].renderer->traits().name, info.model.width, info.model.height, {}, 0, 0, {}});
     }
   }
 
@@ -93,6 +93,7 @@ class Run {
     }
     for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
       summary_.cameras[i].sampling = world_.cameras[i].sampler->statistics();
+      summary_.cameras[i].sensor = world_.cameras[i].event_camera.statistics();
     }
     summary_.complete = complete;
     summary_.wall_seconds = elapsed();

@@ -26,6 +26,7 @@ struct CameraSummary {
   std::int64_t width = 0, height = 0;
   SamplingStatistics sampling;
   std::int64_t events_on = 0, events_off = 0;
+  EventCameraStatistics sensor;
 };
 
 /// What a simulation did, for the report.

@@ -225,8 +225,8 @@ void draw_phases(Canvas& canvas, const Cell& cell, const Statistics& s) {
   }
   const double even = std::max(1.0, static_cast<double>(phase.events)) / PhaseTest::kBins;
   const double largest = static_cast<double>(*std::max_element(phase.histogram.begin(), phase.histogram.end())) / even;
-  Axes axes(canvas, cell.diagram(), title, linear_scale(0, 1, "phase in the period: " + verdict(s)),
-            linear_scale(0, std::max(1.5, 1.1 * largest), "events, relative to an even spread"));
+  Axes axes(canvas, cell.diagram(), title, linear_scale(0, 1, "phase in the period"),
+            linear_scale(0, std::max(1.5, 1.2 * largest), "events, relative to an even spread"));
   const bool bands = s.banding() == Banding::strong || s.banding() == Banding::weak;
   for (std::size_t i = 0; i < phase.histogram.size(); ++i) {
     const double left = static_cast<double>(i) / PhaseTest::kBins;
@@ -235,6 +235,8 @@ void draw_phases(Canvas& canvas, const Cell& cell, const Statistics& s) {
   }
   axes.horizontal_line(1, kInk);
   axes.finish();
+  const Tile diagram = cell.diagram();
+  canvas.text(diagram.x + 10, diagram.y + 20, verdict(s), 11, bands ? kAlarmColour : kInk);
 }
 
 void draw_report(Canvas& canvas, const Cell& cell, const Statistics& s) {

@@ -39,7 +39,7 @@ class IntervalHistogram {
   static double edge_s(int bin);
 
   /// The interval that `fraction` of all are shorter than, s, taking the intervals of a bin as spread evenly in the
-  /// logarithm: wrong by at most a bin's width, 6 %. NaN if there are none.
+  /// logarithm: wrong by at most a bin's width, 6 %. Below 1 us it is no more than that; NaN if there are none.
   double quantile_s(double fraction) const;
 
  private:

@@ -148,9 +148,13 @@ std::vector<double> typical(const std::vector<double>& z, std::size_t first, std
   return level;
 }
 
-// Of the lines that bands may have, the one at their own frequency.
-std::size_t fundamental(const std::vector<double>& z, const std::vector<double>& level, std::size_t first,
-                        std::size_t end) {
+// A frequency of the bands that is seen well, and which harmonic of their own it is.
+struct Line {
+  std::size_t k = 0;
+  std::size_t harmonic = 1;
+};
+
+Line find_line(const std::vector<double>& z, const std::vector<double>& level, std::size_t first, std::size_t end) {
   std::vector<double> ratio(z.size());
   for (std::size_t k = first; k < end; ++k) ratio[k] = z[k] / level[k];
   const double highest = *std::max_element(ratio.begin(), ratio.end());
@@ -162,10 +166,9 @@ std::size_t fundamental(const std::vector<double>& z, const std::vector<double>&
     const std::size_t k = (line + divisor / 2) / divisor;
     if (k < first + 2) continue;
     const auto nearby = ratio.begin() + static_cast<std::ptrdiff_t>(k);
-    const auto best = std::max_element(nearby - 2, nearby + 3);
-    if (*best >= least) return static_cast<std::size_t>(best - ratio.begin());
+    if (*std::max_element(nearby - 2, nearby + 3) >= least) return {line, divisor};
   }
-  return line;
+  return {line, 1};
 }
 
 // Where z is largest within `reach` of a frequency, by looking closer and closer.
@@ -234,14 +237,16 @@ std::optional<Periodicity> find_periodicity(std::span<const TimeNs> times) {
   const auto end = std::min(spectrum.z.size(), static_cast<std::size_t>(kHighestHz / spectrum.step_hz) + 1);
   if (end <= first) return std::nullopt;
   const std::vector<double> level = typical(spectrum.z, first, end);
-  const std::size_t line = fundamental(spectrum.z, level, first, end);
+  const Line line = find_line(spectrum.z, level, first, end);
 
   const Tapered tapered(times);
+  const double harmonic_hz = refine(tapered, 1 + times.size() / kRefinedEvents,
+                                    static_cast<double>(line.k) * spectrum.step_hz, 2 * spectrum.step_hz);
   Periodicity result;
-  result.frequency_hz = refine(tapered, 1 + times.size() / kRefinedEvents, static_cast<double>(line) * spectrum.step_hz,
-                               2 * spectrum.step_hz);
+  result.frequency_hz = harmonic_hz / static_cast<double>(line.harmonic);
   result.rayleigh = tapered.rayleigh(result.frequency_hz, 1);
-  result.p_value = std::min(1.0, static_cast<double>(end - first) * std::exp(-result.rayleigh / level[line]));
+  const double typical_z = level[(line.k + line.harmonic / 2) / line.harmonic];
+  result.p_value = std::min(1.0, static_cast<double>(end - first) * std::exp(-result.rayleigh / typical_z));
   return result;
 }
 

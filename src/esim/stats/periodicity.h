@@ -54,9 +54,10 @@ PhaseTest test_phase(std::span<const TimeNs> times, double frequency_hz);
 ///
 /// Rayleigh's statistic with a Hann taper, exponentially distributed with mean 1 for a Poisson process. It is computed
 /// at all multiples of 1 / T by a Fourier transform of bins of 0.1 ms, and judged by its ratio to the typical z of
-/// frequencies nearby: their median / ln 2, but at least 1. Of all lines with at least a quarter of the highest ratio
-/// r, that of the lowest frequency is taken, since bands have harmonics. Then the maximum nearby is found with the time
-/// stamps themselves, and p = candidates exp(-r).
+/// frequencies nearby: their median / ln 2, but at least 1. Bands have harmonics: of all frequencies with at least a
+/// quarter of the highest ratio, the lowest is taken, and from there the largest divisor up to 16 that leads to another
+/// significant one with at least 1/64. The maximum nearby is found with the time stamps themselves; of its ratio r,
+/// p = candidates exp(-r).
 struct Periodicity {
   double frequency_hz = 0;
   double rayleigh = 0;  ///< z

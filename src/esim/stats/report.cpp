@@ -65,7 +65,11 @@ ReportSection pixel_section(const Statistics& s) {
 ReportSection interval_section(const Statistics& s) {
   const IntervalHistogram& intervals = s.intervals;
   const bool any = intervals.total() > 0;
-  const auto quantile = [&](double fraction) { return any ? format_duration(intervals.quantile_s(fraction)) : "-"; };
+  const auto quantile = [&](double fraction) -> std::string {
+    if (!any) return "-";
+    const double seconds = intervals.quantile_s(fraction);
+    return seconds < IntervalHistogram::edge_s(0) ? "< 1 us" : format_duration(seconds);
+  };
   return {"time between events of a pixel",
           {{"shortest", any ? format_duration(to_seconds(intervals.shortest())) : "-"},
            {"1 % below", quantile(0.01)},

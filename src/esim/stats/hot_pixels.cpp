@@ -1,9 +1,7 @@
 #include "esim/stats/hot_pixels.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <functional>
 #include <numeric>
 #include <tuple>
 
@@ -19,17 +17,17 @@ double median(std::vector<double> values) {
   return values.size() % 2 == 1 ? *middle : 0.5 * (*middle + *std::max_element(values.begin(), middle));
 }
 
-// The third largest count around a pixel.
-double busy_neighbour(const Image<std::uint32_t>& counts, int x, int y) {
-  std::array<std::uint32_t, 3> largest{};
+// The second largest count around a pixel.
+std::uint32_t busy_neighbour(const Image<std::uint32_t>& counts, int x, int y) {
+  std::uint32_t largest = 0, second = 0;
   for (int v = std::max(0, y - 2); v <= std::min(counts.height() - 1, y + 2); ++v) {
     for (int u = std::max(0, x - 2); u <= std::min(counts.width() - 1, x + 2); ++u) {
-      if ((u == x && v == y) || counts(u, v) <= largest[2]) continue;
-      largest[2] = counts(u, v);
-      std::sort(largest.begin(), largest.end(), std::greater());
+      if (u == x && v == y) continue;
+      second = std::max(second, std::min(largest, counts(u, v)));
+      largest = std::max(largest, counts(u, v));
     }
   }
-  return largest[2];
+  return second;
 }
 
 }  // namespace
@@ -52,7 +50,7 @@ std::vector<HotPixel> find_hot_pixels(const Image<std::uint32_t>& counts, double
     for (int x = 0; x < counts.width(); ++x) {
       const double events = counts(x, y);
       if (events <= middle + sigmas * sigma) continue;
-      const double background = std::max({middle, mean, busy_neighbour(counts, x, y)});
+      const double background = std::max({middle, mean, static_cast<double>(busy_neighbour(counts, x, y))});
       if (events <= 2 * background || poisson_tail(events, background) >= 0.01 / pixels) continue;
       hot.push_back({x, y, counts(x, y)});
     }

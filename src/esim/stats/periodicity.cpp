@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <vector>
@@ -81,30 +80,33 @@ double share_near(const std::vector<TimeNs>& times, double frequency_hz, std::si
 // Time stamps with Hann's taper over their span.
 class Tapered {
  public:
-  explicit Tapered(std::span<const TimeNs> times) : times_(times), span_s_(span_s(times)) {}
-
-  double weight(TimeNs t) const {
-    const double sine = std::sin(std::numbers::pi * to_seconds(t - times_.front()) / span_s_);
-    return sine * sine;
+  explicit Tapered(std::span<const TimeNs> times) : times_(times) {
+    const double span = span_s(times);
+    for (const TimeNs t : times) {
+      const double sine = std::sin(std::numbers::pi * to_seconds(t - times.front()) / span);
+      weights_.push_back(sine * sine);
+    }
   }
+
+  std::span<const TimeNs> times() const { return times_; }
+  const std::vector<double>& weights() const { return weights_; }
 
   // z(f), from every stride-th time stamp.
   double rayleigh(double frequency_hz, std::size_t stride) const {
     const Phase phase(frequency_hz);
-    std::complex<double> sum;
-    double weights2 = 0;
+    double real = 0, imaginary = 0, weights2 = 0;
     for (std::size_t i = 0; i < times_.size(); i += stride) {
-      const double w = weight(times_[i]);
-      const double turn = std::ldexp(static_cast<double>(phase(times_[i])), -64);
-      sum += std::polar(w, 2 * std::numbers::pi * turn);
-      weights2 += w * w;
+      const double angle = std::ldexp(2 * std::numbers::pi, -64) * static_cast<double>(phase(times_[i]));
+      real += weights_[i] * std::cos(angle);
+      imaginary += weights_[i] * std::sin(angle);
+      weights2 += weights_[i] * weights_[i];
     }
-    return weights2 > 0 ? std::norm(sum) / weights2 : 0.0;
+    return weights2 > 0 ? (real * real + imaginary * imaginary) / weights2 : 0.0;
   }
 
  private:
   std::span<const TimeNs> times_;
-  double span_s_;
+  std::vector<double> weights_;
 };
 
 struct Spectrum {
@@ -112,14 +114,14 @@ struct Spectrum {
   double step_hz = 0;
 };
 
-Spectrum compute_spectrum(std::span<const TimeNs> times) {
-  const Tapered tapered(times);
+Spectrum compute_spectrum(const Tapered& tapered) {
+  const std::span<const TimeNs> times = tapered.times();
   const int size = cv::getOptimalDFTSize(static_cast<int>(span_s(times) / kSearchBin_s) + 2);
   cv::Mat bins = cv::Mat::zeros(1, size, CV_32F), packed;
   double weights2 = 0;
-  for (const TimeNs t : times) {
-    const double w = tapered.weight(t);
-    bins.at<float>(0, static_cast<int>(to_seconds(t - times.front()) / kSearchBin_s)) += static_cast<float>(w);
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const double w = tapered.weights()[i];
+    bins.at<float>(0, static_cast<int>(to_seconds(times[i] - times.front()) / kSearchBin_s)) += static_cast<float>(w);
     weights2 += w * w;
   }
   cv::dft(bins, packed);  // real, then real and imaginary parts in turn
@@ -173,8 +175,8 @@ Line find_line(const std::vector<double>& z, const std::vector<double>& level, s
 
 // Where z is largest within `reach` of a frequency, by looking closer and closer.
 double refine(const Tapered& tapered, std::size_t stride, double frequency_hz, double reach_hz) {
-  constexpr int kSteps = 16;
-  for (int zoom = 0; zoom < 3; ++zoom, reach_hz /= kSteps / 2) {
+  constexpr int kSteps = 8;
+  for (int zoom = 0; zoom < 4; ++zoom, reach_hz /= kSteps / 2) {
     const double centre_hz = frequency_hz;
     double best = -1;
     for (int step = -kSteps; step <= kSteps; ++step) {
@@ -232,14 +234,14 @@ std::optional<Periodicity> find_periodicity(std::span<const TimeNs> times) {
   const double lowest_hz = std::max(kLowestHz, kLeastPeriods / span_s(times));
   if (times.size() < kLeastEvents || !(lowest_hz < kHighestHz)) return std::nullopt;
 
-  const Spectrum spectrum = compute_spectrum(times);
+  const Tapered tapered(times);
+  const Spectrum spectrum = compute_spectrum(tapered);
   const auto first = static_cast<std::size_t>(std::ceil(lowest_hz / spectrum.step_hz));
   const auto end = std::min(spectrum.z.size(), static_cast<std::size_t>(kHighestHz / spectrum.step_hz) + 1);
   if (end <= first) return std::nullopt;
   const std::vector<double> level = typical(spectrum.z, first, end);
   const Line line = find_line(spectrum.z, level, first, end);
 
-  const Tapered tapered(times);
   const double harmonic_hz = refine(tapered, 1 + times.size() / kRefinedEvents,
                                     static_cast<double>(line.k) * spectrum.step_hz, 2 * spectrum.step_hz);
   Periodicity result;

@@ -49,8 +49,8 @@ ReportSection stream_section(const Statistics& s) {
 ReportSection pixel_section(const Statistics& s) {
   ReportSection section{"pixels", {}};
   section.lines.push_back({"sensor", fmt::format("{} x {} px", s.sensor.width, s.sensor.height)});
-  section.lines.push_back({"events each", fmt::format("mean {}, median {:g}, max {}", three_digits(mean_count(s)),
-                                                      s.median_count, grouped(s.largest_count))});
+  section.lines.push_back({"counts", fmt::format("mean {}, median {:g}, max {} events", three_digits(mean_count(s)),
+                                                 s.median_count, grouped(s.largest_count))});
   section.lines.push_back({"mean rate", format_rate(mean_count(s) * s.per_second(1))});
   section.lines.push_back({"silent", percent(ratio(s.silent_pixels, s.counts.size()))});
   section.lines.push_back({"hot", s.hot_pixels.empty() ? "none" : grouped(s.hot_pixels.size())});

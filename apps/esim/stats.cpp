@@ -76,7 +76,7 @@ void add_stats(CLI::App& app, int& exit_code) {
   CLI::App* command =
       app.add_subcommand("stats", "Statistics of events, as text and figure; of two files side by side");
   command
-      ->add_option("files", arguments->files, "events.h5 (also DSEC's), lines of text `t x y p`, or a recording folder")
+      ->add_option("file", arguments->files, "events.h5 (also DSEC's), lines of text `t x y p`, or a recording folder")
       ->required()
       ->expected(1, 2)
       ->type_name("FILE");

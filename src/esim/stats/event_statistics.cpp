@@ -67,14 +67,16 @@ void EventStatistics::add(EventSpan events) {
   for (const Event& event : events) {
     if (event.x >= s.sensor.width || event.y >= s.sensor.height) make_room(event);
     count_stamp(event.t);
-    const bool on = event.polarity > 0;
-    ++(on ? s.on : s.off);
+    const bool on = event.polarity > 0;  // added rather than branched upon: it cannot be predicted
+    s.on += on;
+    s.off += !on;
     s.rate.add(event.t - s.first, on);
     sample_.add(event.t);
     Pixel& pixel = pixels_(event.x, event.y);
     if ((pixel.on | pixel.off) != 0) s.intervals.add(event.t - pixel.last_t);
     pixel.last_t = event.t;
-    ++(on ? pixel.on : pixel.off);
+    pixel.on += on;
+    pixel.off += !on;
   }
 }
 

@@ -22,7 +22,8 @@ class RateCurve {
   void add(TimeNs since_start, bool on) {
     const std::int64_t ms = since_start / kNsPerMs;
     if (ms != ms_) start_window(ms);
-    ++(on ? window_.on : window_.off);
+    window_.on += on;
+    window_.off += !on;
   }
 
   /// Takes the window that is still open into account: call once, after the last event.

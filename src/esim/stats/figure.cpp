@@ -221,7 +221,7 @@ void draw_phases(Canvas& canvas, const Cell& cell, const Statistics& s) {
   std::string title = "Time stamps modulo a period";
   if (s.phase) {
     title = fmt::format("Time stamps modulo {} ({:.6g} Hz{})", format_duration(1 / phase.frequency_hz),
-                        phase.frequency_hz, given ? "" : ", strongest");
+                        phase.frequency_hz, given ? "" : ", strongest found");
   }
   const double even = std::max(1.0, static_cast<double>(phase.events)) / PhaseTest::kBins;
   const double largest = static_cast<double>(*std::max_element(phase.histogram.begin(), phase.histogram.end())) / even;

@@ -23,6 +23,7 @@ ALLOWED = {
     "sampling": "core render",
     "sensors": "core events render",
     "record": "core events geometry",
+    "stats": "core events record",
     "truth": "core",
     "sim": "core events geometry motion render sampling sensors record truth",
     "scenario": "core geometry sampling sensors",

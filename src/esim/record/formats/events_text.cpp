@@ -141,7 +141,11 @@ bool EventsTextReader::read(std::vector<Event>& events, std::size_t count) {
     const std::string_view first = next_word(rest);
     if (first.empty() || first[0] == '#') continue;
     const Event event = parse(line);
-    if (last_t_ && event.t < *last_t_) fail("the time is before that of the line above");
+    if (last_t_ && event.t < *last_t_) {
+      std::string above;
+      append_seconds(above, *last_t_);
+      fail("the time is before that of the line above, " + above + " s: sort the events by time");
+    }
     last_t_ = event.t;
     events.push_back(event);
   }

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <string>
+#include <vector>
 
 namespace esim {
 namespace {
@@ -96,6 +97,14 @@ Image<float> reduce_nearest(const Image<float>& image, int width, int height) {
     for (int x = 0; x < width; ++x) out(x, y) = row[(2 * x + 1) * image.width() / (2 * width)];
   }
   return out;
+}
+
+std::string encode_png(const Image<Rgb>& image) {
+  cv::Mat bgr;
+  cv::cvtColor(view(image), bgr, cv::COLOR_RGB2BGR);
+  std::vector<unsigned char> png;
+  cv::imencode(".png", bgr, png, {cv::IMWRITE_PNG_COMPRESSION, 3});
+  return {png.begin(), png.end()};
 }
 
 Image<Rgb> enlarge(const Image<Rgb>& image, int width, int height) {

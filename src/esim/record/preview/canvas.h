@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -37,6 +38,9 @@ Image<float> reduce_mean(const Image<float>& image, int width, int height);
 
 /// The source pixel nearest to each target pixel's centre; mixes nothing, so that edges and infinities stay.
 Image<float> reduce_nearest(const Image<float>& image, int width, int height);
+
+/// The bytes of an 8-bit colour PNG file.
+std::string encode_png(const Image<Rgb>& image);
 
 /// Larger by repeating pixels; by factors that are not whole, with the borders between pixels blended.
 Image<Rgb> enlarge(const Image<Rgb>& image, int width, int height);

@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <cassert>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <vector>
 
 #include "esim/record/output_file.h"
+#include "esim/record/preview/canvas.h"
 #include "esim/record/preview/panels.h"
 #include "esim/record/preview/scales.h"
 #include "esim/record/preview/video_file.h"
@@ -21,15 +20,6 @@ constexpr double kLeastDuration_s = 2.0;
 constexpr double kMostFrames_hz = 60.0;
 constexpr double kLeastFrames_hz = 4.0;
 constexpr std::size_t kMostCandidates = 12;
-
-std::vector<unsigned char> encode_png(const Image<Rgb>& image) {
-  const cv::Mat rgb(image.height(), image.width(), CV_8UC3, const_cast<Rgb*>(image.data()));
-  cv::Mat bgr;
-  cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
-  std::vector<unsigned char> png;
-  cv::imencode(".png", bgr, png, {cv::IMWRITE_PNG_COMPRESSION, 3});
-  return png;
-}
 
 /// Frames that may become preview.png: every stride-th, the stride doubling so that there are never many.
 class Candidates {
@@ -166,9 +156,8 @@ void PreviewWriter::write(const Record& record) {
 void PreviewWriter::end(bool) {
   if (!impl_->video) return;
   if (const Image<Rgb>* image = impl_->candidates.best()) {
-    const std::vector<unsigned char> png = encode_png(*image);
     OutputFile file(impl_->folder / "preview.png");
-    file.append({reinterpret_cast<const char*>(png.data()), png.size()});
+    file.append(encode_png(*image));
     file.close();
   }
   impl_->video->close();

@@ -1,0 +1,64 @@
+#include "esim/stats/hot_pixels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <tuple>
+
+#include "esim/stats/probability.h"
+
+namespace esim {
+namespace {
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return values.size() % 2 == 1 ? *middle : 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+// The second largest count around a pixel.
+std::uint32_t busy_neighbour(const Image<std::uint32_t>& counts, int x, int y) {
+  std::uint32_t largest = 0, second = 0;
+  for (int v = std::max(0, y - 2); v <= std::min(counts.height() - 1, y + 2); ++v) {
+    for (int u = std::max(0, x - 2); u <= std::min(counts.width() - 1, x + 2); ++u) {
+      if (u == x && v == y) continue;
+      second = std::max(second, std::min(largest, counts(u, v)));
+      largest = std::max(largest, counts(u, v));
+    }
+  }
+  return second;
+}
+
+}  // namespace
+
+double median_count(const Image<std::uint32_t>& counts) {
+  return median(std::vector<double>(counts.pixels().begin(), counts.pixels().end()));
+}
+
+std::vector<HotPixel> find_hot_pixels(const Image<std::uint32_t>& counts, double sigmas) {
+  if (counts.empty()) return {};
+  std::vector<double> values(counts.pixels().begin(), counts.pixels().end());
+  const double pixels = static_cast<double>(values.size());
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / pixels;
+  const double middle = median(values);
+  for (double& value : values) value = std::abs(value - middle);
+  const double sigma = std::max({1.0, std::sqrt(middle), 1.4826 * median(std::move(values))});
+
+  std::vector<HotPixel> hot;
+  for (int y = 0; y < counts.height(); ++y) {
+    for (int x = 0; x < counts.width(); ++x) {
+      const double events = counts(x, y);
+      if (events <= middle + sigmas * sigma) continue;
+      const double background = std::max({middle, mean, static_cast<double>(busy_neighbour(counts, x, y))});
+      if (events <= 2 * background || poisson_tail(events, background) >= 0.01 / pixels) continue;
+      hot.push_back({x, y, counts(x, y)});
+    }
+  }
+  std::sort(hot.begin(), hot.end(), [](const HotPixel& a, const HotPixel& b) {
+    return std::tuple(b.events, a.y, a.x) < std::tuple(a.events, b.y, b.x);
+  });
+  return hot;
+}
+
+}  // namespace esim

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "esim/core/time.h"
+
+namespace esim {
+
+enum class Banding {
+  none,
+  weak,    ///< significant, but less than 10 % of rms modulation
+  strong,  ///< events prefer some phases of the period
+  unknown  ///< fewer than 100 events or 20 periods
+};
+
+/// How time stamps lie in a period of 1 / frequency_hz, as simulators that work frame by frame leave their mark there.
+///
+/// N time stamps t in bins n_b of their phase, the fraction of t f, with E = N / 64:
+///
+///   chi2 = sum over b of (n_b - E)^2 / E,   63 degrees of freedom
+///
+/// Events come in bursts and rates change, so that chi2 is large at any frequency. It is therefore held against c, the
+/// median of chi2 / 63 at 32 frequencies f (1 +- 0.1 ... 0.3), but at least 1, the value of a Poisson process:
+///
+///   p_value    = Q(63 / 2, chi2 / (2 c))            (quasi-likelihood)
+///   modulation = sqrt(max(0, chi2 - 63 c) / N)      rms of the rate over the period, relative to its mean
+///
+/// They band if p_value < 1e-4: strongly from a modulation of 10 % on. Stamps in whole microseconds are spread over
+/// theirs first, lest the bins hold different numbers of microseconds.
+struct PhaseTest {
+  static constexpr int kBins = 64;
+
+  double frequency_hz = 0;
+  std::uint64_t events = 0;  ///< that were tested: all, or a random part
+  double periods = 0;        ///< between the first event and the last
+  std::array<std::uint64_t, kBins> histogram{};
+  double chi2_per_dof = 0;
+  double neighbours_chi2_per_dof = 0;  ///< the median, before it is limited to 1
+  double p_value = 1;
+  double modulation = 0;
+  double share_at_peak = 0;  ///< of the events within 1 % of a period from the middle of the fullest bin; 0.02 if even
+  Banding banding = Banding::unknown;
+};
+
+/// `times` in order, ns; 0 < frequency_hz < 1e8.
+PhaseTest test_phase(std::span<const TimeNs> times, double frequency_hz);
+
+/// The frequency that the time stamps prefer, from 10 Hz (or 20 periods in the recording) to 2 kHz:
+///
+///   z(f) = |sum over i of w_i exp(2 pi j f t_i)|^2 / sum of w_i^2,    w_i = sin^2(pi (t_i - t_0) / T)
+///
+/// Rayleigh's statistic with a Hann taper, exponentially distributed with mean 1 for a Poisson process. It is computed
+/// at all multiples of 1 / T by a Fourier transform of bins of 0.1 ms, and judged by its ratio to the typical z of
+/// frequencies nearby: their median / ln 2, but at least 1. Bands have harmonics: of all frequencies with at least a
+/// quarter of the highest ratio, the lowest is taken, and from there the largest divisor up to 16 that leads to another
+/// significant one with at least 1/64. The maximum nearby is found with the time stamps themselves; of its ratio r,
+/// p = candidates exp(-r).
+struct Periodicity {
+  double frequency_hz = 0;
+  double rayleigh = 0;  ///< z
+  double p_value = 1;
+  bool found() const;  ///< p < 1e-6
+};
+
+/// `times` in order, ns; of more than 800 s, the first 800 s are searched. Nothing if there are fewer than 100 or if 20
+/// periods of 2 kHz do not fit in.
+std::optional<Periodicity> find_periodicity(std::span<const TimeNs> times);
+
+}  // namespace esim

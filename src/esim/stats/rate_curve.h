@@ -1,0 +1,51 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "esim/core/time.h"
+
+namespace esim {
+
+/// Events per time, counted in windows of 1 ms that start with the first event. The curve's bins grow by doubling, so
+/// that there are never more than kMaxBins of them.
+class RateCurve {
+ public:
+  static constexpr std::size_t kMaxBins = 2048;
+
+  struct Bin {
+    std::uint64_t on = 0, off = 0;
+  };
+
+  /// `since_start` >= 0, ns, never decreasing.
+  void add(TimeNs since_start, bool on) {
+    const std::int64_t ms = since_start / kNsPerMs;
+    if (ms != ms_) start_window(ms);
+    window_.on += on;
+    window_.off += !on;
+  }
+
+  /// Takes the window that is still open into account: call once, after the last event.
+  void finish() { close_window(); }
+
+  const std::vector<Bin>& bins() const { return bins_; }
+  TimeNs bin_width() const { return kNsPerMs << doublings_; }
+
+  /// Most events in one of the windows of 1 ms, and in ten consecutive ones.
+  std::uint64_t most_in_1_ms() const { return most_in_1_; }
+  std::uint64_t most_in_10_ms() const { return most_in_10_; }
+
+ private:
+  void start_window(std::int64_t ms);
+  void close_window();
+
+  std::int64_t ms_ = 0;  // the open window
+  Bin window_;
+  std::array<std::uint64_t, 10> recent_{};  // of the last windows, by ms modulo 10
+  std::uint64_t recent_sum_ = 0, most_in_1_ = 0, most_in_10_ = 0;
+  std::vector<Bin> bins_;
+  int doublings_ = 0;
+};
+
+}  // namespace esim

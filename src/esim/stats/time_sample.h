@@ -1,0 +1,46 @@
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <vector>
+
+#include "esim/core/time.h"
+
+namespace esim {
+
+/// A hash that spreads consecutive numbers over all 64 bits: SplitMix64 (Steele et al., OOPSLA 2014).
+constexpr std::uint64_t hash_index(std::uint64_t index) {
+  std::uint64_t z = (index + 1) * 0x9e3779b97f4a7c15ULL;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+  return z ^ (z >> 31);
+}
+
+/// Time stamps of all events or, of more than a million, of a part that every event is in with the same probability
+/// 2^-k: those whose index has a hash with at least k trailing zeros. Which ones depends on nothing else.
+class TimeSample {
+ public:
+  static constexpr std::size_t kCapacity = 1 << 20;
+
+  void add(TimeNs t) {
+    const int zeros = trailing_zeros(index_++);
+    if (zeros < least_zeros_) return;
+    if (times_.size() == kCapacity) thin();
+    if (zeros < least_zeros_) return;
+    times_.push_back(t);
+    zeros_.push_back(static_cast<std::uint8_t>(zeros));
+  }
+
+  const std::vector<TimeNs>& times() const { return times_; }
+
+ private:
+  static int trailing_zeros(std::uint64_t index) { return std::countr_zero(hash_index(index)); }
+  void thin();
+
+  std::uint64_t index_ = 0;
+  int least_zeros_ = 0;
+  std::vector<TimeNs> times_;
+  std::vector<std::uint8_t> zeros_;  // of each one's hash
+};
+
+}  // namespace esim

@@ -141,7 +141,10 @@ void event_camera_everything_two_threads(benchmark::State& state) { run_event_ca
 void sizes(benchmark::internal::Benchmark* benchmark) {
   for (const int hundredths : {15, 20, 30, 50}) benchmark->Args({346, 260, hundredths});
   for (const int hundredths : {20, 30}) benchmark->Args({1280, 720, hundredths});
-  benchmark->UseRealTime()->Unit(benchmark::kMillisecond);
+  // The fastest of several runs, taken in turn with the other benchmarks: what the rest of the machine does not slow.
+  benchmark->UseRealTime()->Unit(benchmark::kMillisecond)->Repetitions(7)->MinTime(0.05)->ReportAggregatesOnly();
+  benchmark->ComputeStatistics("min",
+                               [](const std::vector<double>& v) { return *std::min_element(v.begin(), v.end()); });
 }
 
 BENCHMARK(literal_loop)->Apply(sizes);

@@ -17,9 +17,9 @@ void CleanPass::make_room(std::size_t count) {
   settled_.resize(size), low_.resize(size), high_.resize(size);
 }
 
-void CleanPass::run(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, int first, int last,
+void CleanPass::run(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, Rows rows,
                     PackedEvents& events) {
-  gather(pixels, segment, watch, first, last, *events.packing);
+  gather(pixels, segment, watch, rows, *events.packing);
   logarithms(count_, before_.data());
   logarithms(count_, after_.data());
   if (pixels.holds) resume(pixels, segment);
@@ -31,14 +31,12 @@ void CleanPass::run(PixelArray& pixels, const Segment& segment, const PixelWatch
   set_bands(pixels);
 }
 
-void CleanPass::gather(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, int first, int last,
+void CleanPass::gather(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, Rows rows,
                        const EventPacking& packing) {
-  std::size_t most = 0;
-  for (int y = first; y < last; ++y) most += watch.columns(y).size();
-  make_room(most);
+  make_room(watch.count());
   const double eps = pixels.options.log_eps, on = pixels.threshold_on, off = pixels.threshold_off;
   std::size_t i = 0;
-  for (int y = first; y < last; ++y) {
+  for (int y = rows.first; y < rows.last; ++y) {
     const float *const light0 = segment.irradiance0->row(y), *const light1 = segment.irradiance1->row(y);
     const std::uint32_t row = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(pixels.width);
     const PixelArray::State* const states = pixels.states.data() + row;

@@ -19,12 +19,11 @@ class CleanPass {
            (pixels.refractory == 0 || pixels.holds);
   }
 
-  /// Rows [first, last) of the segment.
-  void run(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, int first, int last,
-           PackedEvents& events);
+  /// What `watch` found in rows of the segment.
+  void run(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, Rows rows, PackedEvents& events);
 
  private:
-  void gather(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, int first, int last,
+  void gather(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, Rows rows,
               const EventPacking& packing);
   void resume(PixelArray& pixels, const Segment& segment);
   void find_crossings(double duration, double refractory);

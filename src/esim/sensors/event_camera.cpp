@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "esim/core/error.h"
 #include "esim/events/event_queue.h"
@@ -38,23 +39,19 @@ struct RowPieces {
 /// From irradiance to events: surround, pixels, queue, readout.
 struct EventCamera::State {
   State(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream)
-      : pixels(options, width, height, seed, stream),
-        watch(width, height),
-        packing(width, height),
-        size{0, 0, width, height} {
+      : pixels(options, width, height, seed, stream), packing(width, height), size{0, 0, width, height} {
     if (options.surround_px > 0) surround.emplace(options.surround_px, options.surround_ms * 1e-3, width, height);
     if (options.readout.limited()) readout.emplace(options.readout, height);
   }
 
   void integrate(const Segment& segment, const Workers& workers);
-  void look(const Segment& segment, const Workers& workers);
   void refuse_long_time(TimeNs duration) const;
   void subtract_surround(const Segment& segment, const Workers& workers);
 
   PixelArray pixels;
-  PixelWatch watch;
   EventPacking packing;
   Tile size;
+  bool spoiled = false;  // by a segment that was only partly integrated
   std::optional<CenterSurround> surround;
   Image<float> brightness;                         // less the surround
   std::vector<PixelUpdate> updates;                // by worker
@@ -64,7 +61,7 @@ struct EventCamera::State {
   std::vector<Event> arrived;  // at the readout
 
   // Of process().
-  Image<float> last_frame;
+  Image<float> last_frame, next_frame;
   TimeNs last_time = 0;
   std::int64_t frames = 0;
 };
@@ -99,20 +96,7 @@ void EventCamera::State::refuse_long_time(TimeNs duration) const {
                   " s apart; give one at least every " + std::to_string(to_seconds(longest)) + " s");
 }
 
-/// Looks at all pixels before any of them moves.
-void EventCamera::State::look(const Segment& segment, const Workers& workers) {
-  const RowPieces pieces(segment.tile);
-  std::atomic<bool> good = true;
-  workers.for_each(pieces.count, [&](int piece) {
-    for (int y = pieces.begin(piece); y < pieces.end(piece); ++y) {
-      if (!watch.look(pixels, segment, y)) good = false;
-    }
-  });
-  if (!good) check_irradiance(segment);
-}
-
 void EventCamera::State::integrate(const Segment& segment, const Workers& workers) {
-  look(segment, workers);
   const Image<float>* given = nullptr;
   if (surround) {
     subtract_surround(segment, workers);
@@ -121,29 +105,32 @@ void EventCamera::State::integrate(const Segment& segment, const Workers& worker
   const bool first = segment.t0 == segment.t1;
   if (first) pixels.set_epoch(segment.t0);
   const RowPieces pieces(segment.tile);
+  std::atomic<bool> good = true;
   workers.for_each_with_worker(pieces.count, [&](int piece, int worker) {
     PixelUpdate& update = updates[static_cast<std::size_t>(worker)];
     PackedEvents out{&packing, &events[static_cast<std::size_t>(worker)]};
-    const int from = pieces.begin(piece), to = pieces.end(piece);
-    if (first) {
-      update.open(pixels, segment, given, from, to);
-    } else if (pixels.in_brightness) {
-      update.filter(pixels, segment, given, from, to, out);
-    } else {
-      update.cross(pixels, segment, watch, from, to, out);
-    }
+    const Rows rows{pieces.begin(piece), pieces.end(piece)};
+    const bool done =
+        first ? update.open(pixels, segment, given, rows) : update.advance(pixels, segment, given, rows, out);
+    if (!done) good = false;
   });
+  if (good) return;
+  spoiled = true;
+  check_irradiance(segment);
 }
 
 void EventCamera::integrate(std::span<const Segment> segments, const Workers& workers) {
+  State& state = *state_;
+  if (state.spoiled)
+    throw UserError("event camera: it has seen an irradiance that is none, and cannot go on; begin with a new one");
   const auto threads = static_cast<std::size_t>(workers.threads());
-  if (state_->updates.size() < threads) state_->updates.resize(threads), state_->events.resize(threads);
+  if (state.updates.size() < threads) state.updates.resize(threads), state.events.resize(threads);
   TimeNs first = std::numeric_limits<TimeNs>::max(), last = std::numeric_limits<TimeNs>::min();
   for (const Segment& segment : segments) first = std::min(first, segment.t0), last = std::max(last, segment.t1);
-  state_->packing.origin = first;
-  state_->refuse_long_time(last - first);
-  for (const Segment& segment : segments) state_->integrate(segment, workers);
-  state_->queue.add(state_->events, state_->packing, workers);
+  state.packing.origin = first;
+  state.refuse_long_time(last - first);
+  for (const Segment& segment : segments) state.integrate(segment, workers);
+  state.queue.add(state.events, state.packing, workers);
 }
 
 void EventCamera::release_until(TimeNs watermark, std::vector<Event>& out) {
@@ -166,15 +153,17 @@ void EventCamera::process(const Image<float>& irradiance, TimeNs t, std::vector<
     throw UserError(frame + ": its time, " + std::to_string(t) + " ns, does not come after that of the frame before, " +
                     std::to_string(state.last_time) + " ns; give frames in order");
   }
-  const Image<float>& before = first ? irradiance : state.last_frame;
-  const Segment segment{state.size, first ? t : state.last_time, t, &before, &irradiance};
+  state.next_frame = irradiance;
+  const Image<float>& before = first ? state.next_frame : state.last_frame;
+  const Segment segment{state.size, first ? t : state.last_time, t, &before, &state.next_frame};
   try {
+    check_irradiance(segment);
     integrate(std::span(&segment, 1), workers);
   } catch (const UserError& error) {
     throw UserError(frame + ": " + error.what());
   }
   release_until(t, out);
-  state.last_frame = irradiance;
+  std::swap(state.last_frame, state.next_frame);
   state.last_time = t;
   ++state.frames;
 }

@@ -63,9 +63,9 @@ class RelaxingSignal {
   Crossing first_crossing(double end, double low, double high) const;
 
  private:
-  /// The signal at one time, with its derivative.
+  /// The signal at one time, with its derivatives.
   struct Point {
-    double u = 0, value = 0, slope = 0;
+    double u = 0, value = 0, slope = 0, bend = 0;
   };
   RelaxingSignal(bool two_poles, double rate, double moved, double filtered1, double filtered2, double start,
                  double rise);

@@ -40,11 +40,29 @@ std::size_t index(const PixelArray& pixels, int x, int y) {
 
 }  // namespace
 
+/// What all pixels of a segment have in common.
+struct PixelUpdate::Filter {
+  float phase_per_light = 0, phase_in_dark = 0;  // time constants that the segment lasts: per 6 of light, and besides
+  double duration = 0, per_duration = 0;         // ns
+  std::int32_t now = 0;                          // for the alarms, in ticks
+
+  Filter(const PixelArray& pixels, const Segment& segment)
+      : duration(static_cast<double>(segment.t1 - segment.t0)), per_duration(1 / duration) {
+    const EventCameraOptions& o = pixels.options;
+    const double per_pole = o.low_pass_order == 2 ? 1 / std::sqrt(std::numbers::sqrt2 - 1) : 1;  // -3 dB of both
+    const double at_white = 2 * std::numbers::pi * o.low_pass_hz * per_pole * duration * 1e-9;
+    const double per_light = at_white / (1 + o.dark_irradiance);
+    phase_per_light = static_cast<float>(per_light / 6);
+    phase_in_dark = static_cast<float>(per_light * o.dark_irradiance);
+    if (pixels.alarmed) now = pixels.ticks(segment.t1);
+  }
+};
+
 /// Moves some neighbouring pixels' low-passes to the segment's end, exactly for brightness that is linear in time and
 /// for the segment's mean intensity, and wakes those that may have left their band on the way.
 template <int kOrder, class D>
-void PixelUpdate::filter_vector(D d, PixelArray& pixels, const Segment& segment, const float* brightness, int y,
-                                int x) {
+HWY_INLINE void PixelUpdate::filter_vector(D d, PixelArray& pixels, const Segment& segment, const Filter& filter,
+                                           const float* brightness, int y, int x) {
   using V = hn::Vec<D>;
   const std::size_t i = index(pixels, x, y);
   const V start = hn::LoadU(d, &pixels.brightness[i]), end = hn::LoadU(d, brightness);
@@ -54,15 +72,9 @@ void PixelUpdate::filter_vector(D d, PixelArray& pixels, const Segment& segment,
 
   if constexpr (kOrder > 0) {
     // How many time constants the segment lasts: of the mean light, by Simpson's rule for an exponential.
-    const EventCameraOptions& o = pixels.options;
     const V e0 = hn::LoadU(d, segment.irradiance0->row(y) + x), e1 = hn::LoadU(d, segment.irradiance1->row(y) + x);
     const V sum = hn::MulAdd(hn::Set(d, 4.0F), hn::Sqrt(hn::Mul(e0, e1)), hn::Add(e0, e1));
-    const double per_pole = kOrder == 2 ? 1.0 / std::sqrt(std::numbers::sqrt2 - 1.0) : 1.0;  // -3 dB of both together
-    const double phase_at_white =
-        2.0 * std::numbers::pi * o.low_pass_hz * per_pole * to_seconds(segment.t1 - segment.t0);
-    const double per_light = phase_at_white / (1.0 + o.dark_irradiance);
-    phase = hn::MulAdd(sum, hn::Set(d, static_cast<float>(per_light / 6.0)),
-                       hn::Set(d, static_cast<float>(per_light * o.dark_irradiance)));
+    phase = hn::MulAdd(sum, hn::Set(d, filter.phase_per_light), hn::Set(d, filter.phase_in_dark));
 
     // With m = 1 - exp(-phase): F moves by m of its distance, and lags behind the rise of L.
     const V one = hn::Set(d, 1.0F), rise = hn::Sub(end, start);
@@ -90,22 +102,22 @@ void PixelUpdate::filter_vector(D d, PixelArray& pixels, const Segment& segment,
 
   auto restless =
       hn::Or(hn::Le(lowest, hn::LoadU(d, &pixels.band_low[i])), hn::Ge(highest, hn::LoadU(d, &pixels.band_high[i])));
-  if (pixels.alarmed) restless = hn::Or(restless, alarmed(d, &pixels.alarms[i], pixels.ticks(segment.t1)));
+  if (pixels.alarmed) restless = hn::Or(restless, alarmed(d, &pixels.alarms[i], filter.now));
   std::uint64_t bits = bits_of(d, restless);
   if (bits == 0) return;
 
   alignas(64) float starts[16], ends[16], first[16], second[16], phases[16], moves[16];
-  hn::StoreU(start, d, starts), hn::StoreU(end, d, ends), hn::StoreU(phase, d, phases), hn::StoreU(m, d, moves);
-  hn::StoreU(f1, d, first), hn::StoreU(f2, d, second);
-  const double duration = static_cast<double>(segment.t1 - segment.t0);
+  hn::StoreU(start, d, starts), hn::StoreU(end, d, ends), hn::StoreU(f1, d, first);
+  if constexpr (kOrder > 0) hn::StoreU(phase, d, phases), hn::StoreU(m, d, moves);
+  if constexpr (kOrder == 2) hn::StoreU(f2, d, second);
   for (; bits != 0; bits &= bits - 1) {
     const int lane = std::countr_zero(bits);
     const AwakePixel awake = awake_pixel(pixels, segment, x + lane, y);
-    const double from = starts[lane], slope = (static_cast<double>(ends[lane]) - from) / duration;
+    const double from = starts[lane], slope = (static_cast<double>(ends[lane]) - from) * filter.per_duration;
     if constexpr (kOrder == 0) {
       linear_.add(awake, {from, slope});
     } else {
-      const double rate = phases[lane] / duration, moved = moves[lane];
+      const double rate = phases[lane] * filter.per_duration, moved = moves[lane];
       relaxing_.add(awake, kOrder == 1
                                ? RelaxingSignal::first_order(rate, moved, first[lane], from, slope)
                                : RelaxingSignal::second_order(rate, moved, first[lane], second[lane], from, slope));
@@ -123,42 +135,49 @@ const float* PixelUpdate::brightness_row(const PixelArray& pixels, const Segment
 }
 
 template <int kOrder>
-void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int y) {
+void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const Filter& filter,
+                             const Image<float>* brightness, int y) {
   const int first = segment.tile.x, last = first + segment.tile.width;
   const float* const row = brightness_row(pixels, segment, brightness, y);
   const hn::ScalableTag<float> d;
   const int lanes = static_cast<int>(hn::Lanes(d));
   int x = first;
-  for (; x + lanes <= last; x += lanes) filter_vector<kOrder>(d, pixels, segment, row + (x - first), y, x);
-  for (; x < last; ++x) filter_vector<kOrder>(hn::CappedTag<float, 1>(), pixels, segment, row + (x - first), y, x);
+  for (; x + lanes <= last; x += lanes) filter_vector<kOrder>(d, pixels, segment, filter, row + (x - first), y, x);
+  for (; x < last; ++x)
+    filter_vector<kOrder>(hn::CappedTag<float, 1>(), pixels, segment, filter, row + (x - first), y, x);
 }
 
-void PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int first,
-                         int last, PackedEvents& events) {
+/// Where bands are of brightness: moves all low-passes on, and takes those pixels through the segment whose filtered
+/// brightness may leave its band.
+void PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
+                         PackedEvents& events) {
+  const Filter common(pixels, segment);
   const int order = pixels.options.low_pass_hz > 0 ? pixels.options.low_pass_order : 0;
-  const auto most = static_cast<std::size_t>(segment.tile.width) * static_cast<std::size_t>(last - first);
+  const auto most = static_cast<std::size_t>(segment.tile.width) * static_cast<std::size_t>(rows.count());
   if (order == 0) {
     linear_.reserve(most);
-    for (int y = first; y < last; ++y) filter_row<0>(pixels, segment, brightness, y);
+    for (int y = rows.first; y < rows.last; ++y) filter_row<0>(pixels, segment, common, brightness, y);
     linear_.run(pixels, segment.t0, segment.t1, events);
     return;
   }
   relaxing_.reserve(most);
-  for (int y = first; y < last; ++y) {
-    order == 1 ? filter_row<1>(pixels, segment, brightness, y) : filter_row<2>(pixels, segment, brightness, y);
+  for (int y = rows.first; y < rows.last; ++y) {
+    order == 1 ? filter_row<1>(pixels, segment, common, brightness, y)
+               : filter_row<2>(pixels, segment, common, brightness, y);
   }
   relaxing_.run(pixels, segment.t0, segment.t1, events);
 }
 
-void PixelUpdate::cross(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, int first, int last,
-                        PackedEvents& events) {
+/// Where bands are of irradiance: takes the pixels through the segment that wake up in it.
+bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, PackedEvents& events) {
+  if (!watch_.look(pixels, segment, rows)) return false;
   if (CleanPass::serves(pixels)) {
-    clean_.run(pixels, segment, watch, first, last, events);
-    return;
+    clean_.run(pixels, segment, watch_, rows, events);
+    return true;
   }
-  linear_.reserve(static_cast<std::size_t>(segment.tile.width) * static_cast<std::size_t>(last - first));
-  for (int y = first; y < last; ++y) {
-    for (const std::uint32_t x : watch.columns(y)) linear_.add(awake_pixel(pixels, segment, static_cast<int>(x), y));
+  linear_.reserve(watch_.count());
+  for (int y = rows.first; y < rows.last; ++y) {
+    for (const std::uint32_t x : watch_.columns(y)) linear_.add(awake_pixel(pixels, segment, static_cast<int>(x), y));
   }
   const std::size_t count = linear_.count();
   if (before_.size() < count + kVectorPadding) {
@@ -174,12 +193,21 @@ void PixelUpdate::cross(PixelArray& pixels, const Segment& segment, const PixelW
   const double per_ns = 1.0 / static_cast<double>(segment.t1 - segment.t0);
   for (std::size_t i = 0; i < count; ++i) linear_.signal(i) = {before_[i], (after_[i] - before_[i]) * per_ns};
   linear_.run(pixels, segment.t0, segment.t1, events);
+  return true;
 }
 
-void PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int first,
-                       int last) {
-  linear_.reserve(static_cast<std::size_t>(segment.tile.width) * static_cast<std::size_t>(last - first));
-  for (int y = first; y < last; ++y) {
+bool PixelUpdate::advance(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
+                          PackedEvents& events) {
+  if (!pixels.in_brightness) return cross(pixels, segment, rows, events);
+  if (!all_irradiance(segment, rows)) return false;
+  filter(pixels, segment, brightness, rows, events);
+  return true;
+}
+
+bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows) {
+  if (!all_irradiance(segment, rows)) return false;
+  linear_.reserve(static_cast<std::size_t>(segment.tile.width) * static_cast<std::size_t>(rows.count()));
+  for (int y = rows.first; y < rows.last; ++y) {
     const float* const row = pixels.in_brightness ? brightness_row(pixels, segment, brightness, y)
                                                   : segment.irradiance1->row(y) + segment.tile.x;
     for (int i = 0; i < segment.tile.width; ++i) {
@@ -189,6 +217,7 @@ void PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<f
     }
   }
   linear_.settle_all(pixels, segment.t0);
+  return true;
 }
 
 }  // namespace esim

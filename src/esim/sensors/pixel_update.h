@@ -15,28 +15,31 @@ namespace esim {
 /// Brings rows of pixels from the beginning of a segment to its end. One for each thread, as memory to work in. Private
 /// to the event camera.
 ///
-/// In each, `brightness` is null or replaces what follows from the irradiance.
+/// In each, `brightness` is null or replaces what follows from the irradiance. False, and nothing is done, where an
+/// irradiance is not a finite number >= 0.
 class PixelUpdate {
  public:
-  /// Rows [first, last) of a segment that is an instant: sets the references.
-  void open(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int first, int last);
+  /// Of a segment that is an instant: sets the references.
+  bool open(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows);
 
-  /// Takes the pixels that woke up through the segment.
-  void cross(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, int first, int last,
-             PackedEvents& events);
-
-  /// The same where bands are of brightness: moves all low-passes on, and takes those pixels through the segment whose
-  /// filtered brightness may leave its band.
-  void filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int first, int last,
-              PackedEvents& events);
+  /// Of any other: adds what the pixels fire to `events`.
+  bool advance(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
+               PackedEvents& events);
 
  private:
+  bool cross(PixelArray& pixels, const Segment& segment, Rows rows, PackedEvents& events);
+  void filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
+              PackedEvents& events);
+  struct Filter;
   template <int kOrder>
-  void filter_row(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int y);
+  void filter_row(PixelArray& pixels, const Segment& segment, const Filter& filter, const Image<float>* brightness,
+                  int y);
   template <int kOrder, class D>
-  void filter_vector(D d, PixelArray& pixels, const Segment& segment, const float* brightness, int y, int x);
+  void filter_vector(D d, PixelArray& pixels, const Segment& segment, const Filter& filter, const float* brightness,
+                     int y, int x);
   const float* brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int y);
 
+  PixelWatch watch_;
   CleanPass clean_;
   PixelPass<LinearSignal> linear_;
   PixelPass<RelaxingSignal> relaxing_;

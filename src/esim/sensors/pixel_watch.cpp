@@ -45,19 +45,32 @@ bool is_irradiance(float value) { return std::bit_cast<std::uint32_t>(value + 0.
 
 }  // namespace
 
-PixelWatch::PixelWatch(int width, int height)
-    : stride_(static_cast<std::size_t>(width) + kVectorPadding),
-      columns_(stride_ * static_cast<std::size_t>(height)),
-      counts_(static_cast<std::size_t>(height)) {}
+bool PixelWatch::look(const PixelArray& pixels, const Segment& segment, Rows rows) {
+  first_ = rows.first;
+  ends_.assign(1, 0);
+  const std::size_t most = static_cast<std::size_t>(segment.tile.width) * static_cast<std::size_t>(rows.count());
+  if (columns_.size() < most + kVectorPadding) columns_.resize(most + kVectorPadding);
+  std::size_t count = 0;
+  for (int y = rows.first; y < rows.last; ++y) {
+    const std::size_t before = count;
+    if (!look_at_row(pixels, segment, y, count)) return false;
+    ends_.push_back(count);
+    // What is needed next of the pixels comes from memory while the rows behind are looked at.
+    const PixelArray::State* const states =
+        pixels.states.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width);
+    for (std::size_t i = before; i < count; ++i) __builtin_prefetch(states + columns_[i], 1);
+  }
+  return true;
+}
 
-bool PixelWatch::look(const PixelArray& pixels, const Segment& segment, int y) {
+bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, int y, std::size_t& count) {
   const std::size_t row = static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width);
   const float* const irradiance = segment.irradiance1->row(y);
   const float *const low = pixels.band_low.data() + row, *const high = pixels.band_high.data() + row;
   const std::int32_t* const alarms = pixels.alarmed ? pixels.alarms.data() + row : nullptr;
   const std::int32_t now = pixels.alarmed ? pixels.ticks(segment.t1) : 0;
-  std::uint32_t* const columns = columns_.data() + static_cast<std::size_t>(y) * stride_;
-  std::size_t count = 0;
+  std::uint32_t* const columns = columns_.data();
+  std::size_t found = count;
   bool good = true;
 
   // Without branches: that a pixel wakes is as hard to foresee as an event.
@@ -74,7 +87,7 @@ bool PixelWatch::look(const PixelArray& pixels, const Segment& segment, int y) {
         const auto alarmed = hn::Lt(hn::LoadU(di, alarms + x), hn::Set(di, now + 1));
         awake = hn::Or(awake, hn::RebindMask(d, alarmed));
       }
-      count += store_columns(d, awake, x, columns + count);
+      found += store_columns(d, awake, x, columns + found);
     }
     good &= hn::GetLane(hn::MaxOfLanes(du, largest)) <= kLargest;
   };
@@ -83,12 +96,29 @@ bool PixelWatch::look(const PixelArray& pixels, const Segment& segment, int y) {
   const int middle = last - segment.tile.width % static_cast<int>(hn::Lanes(whole));
   look_at(whole, first, middle);
   look_at(hn::CappedTag<float, 1>(), middle, last);
-  counts_[static_cast<std::size_t>(y)] = static_cast<std::uint32_t>(count);
+  count = found;
   return good;
+}
+
+bool all_irradiance(const Segment& segment, Rows rows) {
+  const WatchTag d;
+  const hn::RebindToUnsigned<WatchTag> du;
+  const int lanes = static_cast<int>(hn::Lanes(d)), width = segment.tile.width;
+  auto largest = hn::Zero(du);
+  bool good = true;
+  for (int y = rows.first; y < rows.last; ++y) {
+    const float* const row = segment.irradiance1->row(y) + segment.tile.x;
+    int x = 0;
+    for (; x + lanes <= width; x += lanes)
+      largest = hn::Max(largest, hn::BitCast(du, hn::Add(hn::LoadU(d, row + x), hn::Zero(d))));
+    for (; x < width; ++x) good &= is_irradiance(row[x]);
+  }
+  return good && hn::GetLane(hn::MaxOfLanes(du, largest)) <= kLargest;
 }
 
 void check_irradiance(const Segment& segment) {
   const Tile& tile = segment.tile;
+  if (all_irradiance(segment, {tile.y, tile.y + tile.height})) return;
   for (int y = tile.y; y < tile.y + tile.height; ++y) {
     const float* const row = segment.irradiance1->row(y);
     for (int x = tile.x; x < tile.x + tile.width; ++x) {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "esim/render/sample.h"
@@ -8,24 +10,39 @@
 
 namespace esim {
 
-/// The columns of each row in which a pixel woke up: its irradiance left the band, or its alarm went off. Private to
-/// the event camera.
+/// Rows [first, last) of an image.
+struct Rows {
+  int first, last;
+  int count() const { return last - first; }
+};
+
+/// Finds the pixels of some rows that wake up: whose irradiance leaves the band, or whose alarm goes off. Private to
+/// the event camera; holds memory to work in.
 class PixelWatch {
  public:
-  PixelWatch(int width, int height);
+  /// Looks at rows of the segment, without changing anything. False where an irradiance is not a finite
+  /// number >= 0.
+  bool look(const PixelArray& pixels, const Segment& segment, Rows rows);
 
-  /// Looks at a row of the segment, without changing anything. False where an irradiance is not a finite number >= 0.
-  bool look(const PixelArray& pixels, const Segment& segment, int y);
-
+  /// The columns in which a pixel of the row woke up.
   std::span<const std::uint32_t> columns(int y) const {
-    return {columns_.data() + static_cast<std::size_t>(y) * stride_, counts_[static_cast<std::size_t>(y)]};
+    const std::size_t row = static_cast<std::size_t>(y - first_);
+    return std::span(columns_).subspan(ends_[row], ends_[row + 1] - ends_[row]);
   }
 
+  /// Of all rows.
+  std::size_t count() const { return ends_.back(); }
+
  private:
-  std::size_t stride_;
+  bool look_at_row(const PixelArray& pixels, const Segment& segment, int y, std::size_t& count);
+
+  int first_ = 0;
   std::vector<std::uint32_t> columns_;
-  std::vector<std::uint32_t> counts_;
+  std::vector<std::size_t> ends_ = {0};  // of each row before
 };
+
+/// Whether all irradiances of the segment's rows are finite numbers >= 0.
+bool all_irradiance(const Segment& segment, Rows rows);
 
 /// Throws UserError, naming the first pixel and the time, unless every irradiance of the tile is a finite number >= 0.
 void check_irradiance(const Segment& segment);

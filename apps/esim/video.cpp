@@ -48,11 +48,12 @@ class CommandLine {
         choices += (names.empty() ? "" : "|") + std::string(word);
         names.emplace(word, static_cast<T>(names.size()));
       }
-      option->type_name(choices)->transform(CLI::CheckedTransformer(names));
+      option->type_name(choices)->transform(CLI::CheckedTransformer(names).description(""));
     } else {
       option->type_name(*about.unit != '\0' ? about.unit : "N")->check([about](const std::string& text) {
         return out_of_range(text, about);
       });
+      if constexpr (std::is_arithmetic_v<T>) option->capture_default_str();
     }
   }
 

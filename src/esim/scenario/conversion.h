@@ -26,7 +26,7 @@ struct ConversionOptions {
 /// What `esim video` has an option of its own for.
 template <class Visitor>
 void describe_command_line(Visitor& visit, ConversionOptions& o) {
-  visit("seed", o.seed, About{"of all random numbers"});
+  visit("seed", o.seed, About{"seed of all random numbers"});
   describe(visit, o.video);
   describe(visit, o.interpolation);
   visit("bayer", o.bayer, About{"events of a colour sensor: RGGB filters, red at even columns and rows"});

@@ -15,10 +15,10 @@ namespace esim {
 /// Which frames of a video are taken, and as what.
 struct VideoOptions {
   Encoding encoding = Encoding::automatic;
-  std::optional<double> fps;
+  std::optional<double> fps{};
   double slow_motion = 1.0;
   double start = 0.0;
-  std::optional<double> duration;
+  std::optional<double> duration{};
 };
 
 template <class Visitor>

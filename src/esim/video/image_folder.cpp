@@ -99,7 +99,11 @@ class ImageFolder final : public FrameSource {
   std::size_t index() const { return std::min(next_, names_.size()) - 1; }
 
   void take(const std::vector<StampedName>& entries, const char* file) {
-    const bool named = !entries.empty() && !entries.front().name.empty();
+    if (entries.empty()) {
+      throw UserError(
+          fmt::format("{}: names no frames; fill it, or remove it and pass --fps", (folder_ / file).string()));
+    }
+    const bool named = !entries.front().name.empty();
     if (!named) names_ = images_of(folder_);
     if (!named && names_.size() != entries.size()) {
       throw UserError(

@@ -19,8 +19,8 @@ using V = hn::Vec<D>;
 constexpr int kBorderBefore = 1, kBorderAfter = 2;  // of repeated pixels, for the 4 x 4 neighbourhood
 constexpr int kRowsPerPiece = 16;
 
-/// Change of brightness that says nothing about motion: the noise of 8-bit images.
-constexpr float kUnexplained = 0.1F;
+/// Change of brightness along the motion that says nothing against it: noise, and aliased texture.
+constexpr float kUnexplained = 0.5F;
 
 template <typename Body>
 void for_rows(int height, const Workers& workers, const Body& body) {

@@ -15,7 +15,7 @@ struct InterpolationOptions {
 
 template <class Visitor>
 void describe(Visitor& visit, InterpolationOptions& o) {
-  visit("interpolation", o.interpolation, About{"follow the motion between frames; otherwise they are blended"});
+  visit("interpolation", o.interpolation, About{"follow the motion between frames"});
   visit("lambda", o.lambda, About{"greatest displacement in a step between frames", "px", 0, 1000, true});
   visit("max_steps", o.max_steps, About{"most steps between two frames, whatever the displacement", "", 1, 1e6});
 }

@@ -122,7 +122,7 @@ class VideoFileSource final : public FrameSource {
     while (true) {
       const int result = avcodec_receive_frame(decoder_.get(), frame_.get());
       if (result == 0) {
-        if ((frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0) fail("it is damaged");
+        if ((frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0) fail("is damaged");
         return true;
       }
       if (result == AVERROR_EOF) {
@@ -156,19 +156,29 @@ class VideoFileSource final : public FrameSource {
   /// Hands the decoder the next packet. After an error it gets no more, but gives what it still holds.
   void feed() {
     int result = demuxer_.read(packet_.get());
-    const int indexed = avformat_index_get_entries_count(demuxer_.stream);
-    if (result == AVERROR_EOF && packets_ < indexed) {
-      failure_ = fmt::format("is missing, the file is cut off: by its index it holds {} frames", indexed);
+    if (result == AVERROR_EOF && is_cut_off()) {
+      failure_ = "is missing: the file is cut off";
     } else if (result < 0 && result != AVERROR_EOF) {
       failure_ = fmt::format("cannot be read: {}", reason_of(result));
     } else if (result >= 0 && (packet_->flags & AV_PKT_FLAG_CORRUPT) != 0) {
       failure_ = "is damaged";
     } else if (result >= 0) {
       ++packets_;
+      const std::int64_t stamp = packet_->pts != AV_NOPTS_VALUE ? packet_->pts : packet_->dts;
+      if (stamp != AV_NOPTS_VALUE) read_until_ = std::max(read_until_, demuxer_.to_ns(stamp + packet_->duration));
       result = avcodec_send_packet(decoder_.get(), packet_.get());
       if (result < 0) failure_ = fmt::format("cannot be decoded: {}", reason_of(result));
     }
     if (result < 0 || !failure_.empty()) avcodec_send_packet(decoder_.get(), nullptr);
+  }
+
+  /// Whether the file ends before its index or its heading says.
+  bool is_cut_off() const {
+    if (packets_ < avformat_index_get_entries_count(demuxer_.stream)) return true;
+    const AVFormatContext& format = *demuxer_.format;
+    if (format.nb_streams > 1 || format.duration_estimation_method != AVFMT_DURATION_FROM_STREAM) return false;
+    const TimeNs promised = av_rescale_q(format.start_time + format.duration, AV_TIME_BASE_Q, {1, kNsPerSecond});
+    return format.duration > 0 && read_until_ < promised - kNsPerSecond / 2;
   }
 
   /// Makes RGB of the frame, with 16 bits per channel where it has more than 8; returns whether it has.
@@ -223,6 +233,7 @@ class VideoFileSource final : public FrameSource {
   Owned<AVFrame> frame_, converted_;
   Owned<SwsContext> converter_;
   std::int64_t packets_ = 0;  // that the decoder got
+  TimeNs read_until_ = 0;     // end of the last of them
   std::int64_t count_ = 0;    // frames that advance() has come to
   std::string failure_;       // why there are no more packets
 };

@@ -197,6 +197,13 @@ TEST_F(FrameSequenceTest, NamesTheFrameThatCannotBeUsed) {
   write(bad, "\x89PNG\r\n\x1a\nbroken");
   EXPECT_TRUE(test::contains(refusal(folder, {.fps = 10}), "frame 3: image " + bad.string() + ": cannot be decoded"));
   std::filesystem::remove(bad);
+  const auto cut = folder / "f11.jpg";
+  cv::imwrite(cut.string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(9)));
+  EXPECT_EQ(take_all(folder, {.fps = 10}).values.size(), 4u);
+  std::filesystem::resize_file(cut, std::filesystem::file_size(cut) - 10);
+  EXPECT_TRUE(
+      test::contains(refusal(folder, {.fps = 10}), "frame 3: image " + cut.string() + ": is no JPEG image, or is cut"));
+  std::filesystem::remove(cut);
   for (const float value : {-0.5F, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
     test::write_exr(folder / "f12.exr", kWidth, kHeight, [&](int x, int y) { return x == 7 && y == 5 ? value : 0.5F; });
     EXPECT_TRUE(test::contains(refusal(folder, {.fps = 10}), "frame 3 (f12.exr): pixel (7, 5) is ")) << value;

@@ -7,7 +7,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
+#include <fstream>
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 
@@ -72,6 +73,17 @@ void load_exr(const std::filesystem::path& path, Encoding encoding, bool colour,
   }
 }
 
+/// Whether a JPEG file has an end-of-image mark near its end. The decoder makes grey of what is cut off, and says
+/// nothing.
+bool is_whole_jpeg(const std::filesystem::path& path) {
+  constexpr std::streamoff kTailBytes = 1 << 16;  // cameras append data of their own
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  const std::streamoff size = file.tellg();
+  file.seekg(std::max<std::streamoff>(0, size - kTailBytes));
+  const std::string tail{std::istreambuf_iterator<char>(file), {}};
+  return tail.find("\xff\xd9") != std::string::npos;
+}
+
 PixelType pixel_type(const std::filesystem::path& path, const cv::Mat& image) {
   switch (image.depth()) {
     case CV_8U:
@@ -94,6 +106,10 @@ void load_planes(const std::filesystem::path& path, Encoding encoding, bool colo
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return std::tolower(c); });
   if (extension == ".exr") return load_exr(path, encoding, colour, planes);
+
+  if ((extension == ".jpg" || extension == ".jpeg") && !is_whole_jpeg(path)) {
+    fail(path, "is no JPEG image, or is cut off; replace it");
+  }
 
   cv::Mat image;
   try {

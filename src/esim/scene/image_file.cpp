@@ -108,7 +108,7 @@ void load_planes(const std::filesystem::path& path, Encoding encoding, bool colo
   if (extension == ".exr") return load_exr(path, encoding, colour, planes);
 
   if ((extension == ".jpg" || extension == ".jpeg") && !is_whole_jpeg(path)) {
-    fail(path, "is no JPEG image, or is cut off; replace it");
+    fail(path, "is no JPEG image, or is cut off");
   }
 
   cv::Mat image;

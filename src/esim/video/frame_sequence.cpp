@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "esim/core/error.h"
 
@@ -42,10 +43,14 @@ FrameSequence::FrameSequence(const fs::path& input, const VideoOptions& options,
                                 input.string()));
   }
   choose_window(options);
-  if (!read(first_)) throw UserError(fmt::format("{}: no frame of it can be read", input.string()));
-  if (std::max(width(), height()) > kMaxSide) {
-    throw UserError(fmt::format("{}: the frames are {} x {} px; make them {} px at most", input.string(), width(),
-                                height(), kMaxSide));
+  first_.emplace();
+  if (!read(*first_)) throw UserError(fmt::format("{}: no frame of it can be read", input.string()));
+  start_ = first_->t;
+  width_ = first_->planes.front().width();
+  height_ = first_->planes.front().height();
+  if (std::max(width_, height_) > kMaxSide) {
+    throw UserError(fmt::format("{}: the frames are {} x {} px; make them {} px at most", input.string(), width_,
+                                height_, kMaxSide));
   }
 }
 
@@ -80,9 +85,9 @@ void FrameSequence::choose_window(const VideoOptions& options) {
 }
 
 bool FrameSequence::next(Frame& frame) {
-  if (!first_is_taken_) {
-    frame = first_;
-    first_is_taken_ = true;
+  if (first_) {
+    frame = std::move(*first_);
+    first_.reset();
     previous_ = frame.t;
     return true;
   }
@@ -109,9 +114,9 @@ bool FrameSequence::read(Frame& frame) {
 
 void FrameSequence::check(const Frame& frame) const {
   const Image<float>& plane = frame.planes.front();
-  if (!first_.planes.empty() && (plane.width() != width() || plane.height() != height())) {
+  if (width_ > 0 && (plane.width() != width_ || plane.height() != height_)) {
     fail(fmt::format("is {} x {} px, but the first one {} x {}; make all frames the same size", plane.width(),
-                     plane.height(), width(), height()));
+                     plane.height(), width_, height_));
   }
   for (const Image<float>& values : frame.planes) {
     const auto pixels = values.pixels();

@@ -38,7 +38,7 @@ struct Frame {
 };
 
 /// The chosen frames of a video or a folder of images, checked: times increase, sizes are all the same, and every value
-/// is an irradiance (finite, >= 0). One frame is in memory at a time.
+/// is an irradiance (finite, >= 0). Holds one frame at most.
 class FrameSequence {
  public:
   /// Opens the input and reads its first frame; three planes if `colour`, else luminance. Throws UserError if there are
@@ -50,12 +50,12 @@ class FrameSequence {
   bool next(Frame& frame);
 
   const std::filesystem::path& input() const { return input_; }
-  int width() const { return first_.planes.front().width(); }
-  int height() const { return first_.planes.front().height(); }
+  int width() const { return width_; }
+  int height() const { return height_; }
 
   /// As the input announces; a damaged one may hold less.
   std::int64_t frames() const { return frames_; }
-  TimeNs start() const { return first_.t; }
+  TimeNs start() const { return start_; }
   TimeNs end() const { return end_; }
 
  private:
@@ -73,10 +73,10 @@ class FrameSequence {
   std::size_t index_ = 0;                                 // of the frame that advance() comes to next
   TimeNs origin_ = 0, first_stamp_ = 0, last_stamp_ = 0;  // of the input; of what is taken of it
   std::int64_t frames_ = 0;
-  TimeNs end_ = 0;
-  Frame first_;
-  bool first_is_taken_ = false;
-  TimeNs previous_ = 0;
+  TimeNs start_ = 0, end_ = 0;
+  int width_ = 0, height_ = 0;
+  std::optional<Frame> first_;  // until it is taken
+  TimeNs previous_ = 0;         // time of the frame taken last
 };
 
 }  // namespace esim

@@ -197,7 +197,7 @@ TEST_F(FrameSequenceTest, NamesTheFrameThatCannotBeUsed) {
   write(bad, "\x89PNG\r\n\x1a\nbroken");
   EXPECT_TRUE(test::contains(refusal(folder, {.fps = 10}), "frame 3: image " + bad.string() + ": cannot be decoded"));
   std::filesystem::remove(bad);
-  const auto cut = folder / "f11.jpg";
+  const auto cut = folder / "f13.jpg";
   cv::imwrite(cut.string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(9)));
   EXPECT_EQ(take_all(folder, {.fps = 10}).values.size(), 4u);
   std::filesystem::resize_file(cut, std::filesystem::file_size(cut) - 10);

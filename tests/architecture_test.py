@@ -25,9 +25,10 @@ ALLOWED = {
     "record": "core events geometry",
     "stats": "core events record",
     "truth": "core",
-    "sim": "core events geometry motion render sampling sensors record truth",
-    "scenario": "core geometry sampling sensors",
-    "compose": "core geometry motion scene render backends sampling sensors record truth sim scenario",
+    "video": "core scene",
+    "sim": "core events geometry motion render sampling sensors record truth video",
+    "scenario": "core geometry sampling scene sensors video",
+    "compose": "core geometry motion scene render backends sampling sensors record truth video sim scenario",
 }
 
 # Heavy libraries, and the headers of ours that may include them: private ones, which only .cpp files include.

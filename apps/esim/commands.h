@@ -9,6 +9,7 @@ enum ExitCode : int { kOk = 0, kOurFault = 1, kUsersFault = 2, kInterrupted = 13
 
 // Each adds its subcommand to `app`; the exit code of the one that was chosen ends up in `exit_code`.
 void add_simulate(CLI::App& app, int& exit_code);
+void add_video(CLI::App& app, int& exit_code);
 void add_check(CLI::App& app, int& exit_code);
 void add_info(CLI::App& app, int& exit_code);
 void add_stats(CLI::App& app, int& exit_code);

@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
       "  esim simulate scenes/room.yaml --out out/room     simulate; then look at out/room/preview.png\n"
       "  esim simulate scenes/room.yaml --out out/low --set event_camera.contrast_threshold=0.2\n"
       "  esim check scenes/room.yaml                       is the scenario right? nothing is written\n"
+      "  esim video clip.mp4 --out out/clip                events of a video, or of a folder of images\n"
       "  esim info out/room                                what a recording holds\n"
       "  esim stats out/room --plot                        rates, intervals, hot pixels, banding of its events\n"
       "  esim options                                      every option of a scenario\n"
@@ -22,6 +23,7 @@ int main(int argc, char** argv) {
 
   int exit_code = kOk;
   add_simulate(app, exit_code);
+  add_video(app, exit_code);
   add_check(app, exit_code);
   add_info(app, exit_code);
   add_stats(app, exit_code);

@@ -1,24 +1,16 @@
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include <atomic>
-#include <csignal>
 #include <filesystem>
-#include <fstream>
 
 #include "commands.h"
 #include "esim/compose/compose.h"
-#include "esim/core/error.h"
 #include "esim/record/recording_directory.h"
 #include "esim/scenario/read.h"
 #include "progress_bar.h"
+#include "support.h"
 
 namespace esim::app {
 namespace {
-
-volatile std::sig_atomic_t interrupted = 0;
-
-void on_signal(int) { interrupted = 1; }
 
 struct Arguments {
   std::string scenario;
@@ -29,13 +21,6 @@ struct Arguments {
   bool quiet = false;
   bool force = false;
 };
-
-void write_text(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw OutputError(fmt::format("{}: cannot be written; is the disk full?", path.string()));
-}
 
 void print_summary(const Summary& summary, const std::filesystem::path& out, bool preview) {
   std::int64_t events = 0, samples = 0;
@@ -55,32 +40,23 @@ int run(const Arguments& arguments) {
   Scenario scenario = read_scenario(arguments.scenario, arguments.overrides);
   if (arguments.seed) scenario.seed = *arguments.seed;
   std::vector<std::string> given;
-  Notices notices;
-  notices.warning = [&](const std::string& text) {
-    given.push_back("warning: " + text);
-    fmt::print(stderr, "warning: {}\n", text);
-  };
-  notices.note = [&](const std::string& text) {
-    given.push_back(text);
-    if (!arguments.quiet) fmt::print(stderr, "{}\n", text);
-  };
+  const Notices notices = print_and_keep(given, arguments.quiet);
   const std::filesystem::path out =
       arguments.out.empty() ? std::filesystem::path("out") / std::filesystem::path(arguments.scenario).stem()
                             : std::filesystem::path(arguments.out);
 
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
+  catch_interrupts();
   // The directory comes first: finding out that it exists should not take loading a scene.
   RecordingDirectory directory(out, arguments.force);
   World world = build_world(scenario, arguments.threads, notices);
   write_text(directory.path() / "scenario.yaml", write_scenario(scenario));
   const std::unique_ptr<Sink> sink = build_sink(scenario, directory.path());
 
-  if (interrupted != 0) return kInterrupted;  // while loading: nothing is worth keeping
+  if (interrupted()) return kInterrupted;  // while loading: nothing is worth keeping
   ProgressBar bar(!arguments.quiet);
   const Summary summary = simulate(world, *sink, [&](const Progress& progress) {
     bar.show(progress);
-    return interrupted == 0;
+    return !interrupted();
   });
   bar.clear();
   directory.finish(report_json(scenario, summary, world.workers->threads(), given));

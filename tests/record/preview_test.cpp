@@ -120,8 +120,8 @@ TEST(PreviewLayoutTest, FitsAnyCamera) {
     }
     const TruthImages images(width, height, 0);
     const Image<float> none(width, height);
-    const auto image = compose_preview(layout, {0, 0, none, none, images.irradiance, images.depth, images.flow_x,
-                                                images.flow_y, 1, 3, 100, "caption"});
+    const auto image = compose_preview(layout, {0, 0, none, none, images.irradiance, &images.depth, &images.flow_x,
+                                                &images.flow_y, 1, 3, 100, "caption"});
     EXPECT_EQ(image.width(), layout.width);
     EXPECT_EQ(image.height(), layout.height);
   }

@@ -6,7 +6,9 @@
 #include <optional>
 #include <string>
 
+#include "esim/scenario/conversion.h"
 #include "esim/scenario/scenario.h"
+#include "esim/sim/convert.h"
 #include "esim/sim/simulate.h"
 #include "esim/sim/world.h"
 
@@ -37,8 +39,18 @@ RendererFactory build_renderer_factory(const RendererOptions& options, const Not
 /// otherwise.
 std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem::path& folder);
 
+/// The files of a converted video, to be written into `folder`.
+std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& folder);
+
+/// A file of events alone, text if `text` and HDF5 otherwise.
+std::unique_ptr<Sink> build_events_sink(const std::filesystem::path& file, bool text);
+
 /// report.json: what was done, at which cost, where the time went, and the notices given on the way.
 std::string report_json(const Scenario& scenario, const Summary& summary, int threads,
+                        const std::vector<std::string>& notices);
+
+/// The same of a conversion.
+std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,
                         const std::vector<std::string>& notices);
 
 }  // namespace esim

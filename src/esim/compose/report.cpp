@@ -58,4 +58,44 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
   return report.dump(2) + "\n";
 }
 
+std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,
+                        const std::vector<std::string>& notices) {
+  using Json = nlohmann::ordered_json;
+  const double converted_s = to_seconds(summary.end - summary.start);
+  const std::int64_t events = summary.events_on + summary.events_off;
+  const ConversionSummary::Seconds& s = summary.seconds;
+  const double other = summary.wall_seconds - (s.decode + s.motion + s.interpolation + s.events + s.write);
+  Json report = {
+      {"status", summary.complete ? "complete" : "interrupted"},
+      {"esim_version", ESIM_VERSION},
+      {"input", options.input.string()},
+      {"seed", options.seed},
+      {"start_s", to_seconds(summary.start)},
+      {"simulated_s", converted_s},
+      {"wall_s", summary.wall_seconds},
+      {"real_time_factor", summary.wall_seconds > 0 ? converted_s / summary.wall_seconds : 0.0},
+      {"threads", threads},
+      {"wall_s_by_stage",
+       {{"decode", s.decode},
+        {"motion", s.motion},
+        {"interpolation", s.interpolation},
+        {"events", s.events},
+        {"write", s.write},
+        {"other", other}}},
+      {"width", summary.width},
+      {"height", summary.height},
+      {"frames", summary.frames},
+      {"steps", summary.steps},
+      {"intervals_held_to_max_steps", summary.held},
+      {"greatest_displacement_px", summary.displacement_px},
+      {"events", events},
+      {"events_on", summary.events_on},
+      {"events_off", summary.events_off},
+      {"events_per_second", converted_s > 0 ? static_cast<double>(events) / converted_s : 0.0},
+      {"notices", notices},
+  };
+  if (!summary.problem.empty()) report["reason"] = summary.problem;
+  return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
 }  // namespace esim

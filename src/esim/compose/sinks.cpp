@@ -49,4 +49,16 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
   return std::make_unique<BackgroundSink>(std::move(sinks));
 }
 
+std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& folder) {
+  auto sinks = std::make_unique<FanOut>();
+  sinks->add(std::make_unique<EventsHdf5Writer>(folder / "events.h5", 0));
+  sinks->add(std::make_unique<PreviewWriter>(folder, 0));
+  return std::make_unique<BackgroundSink>(std::move(sinks));
+}
+
+std::unique_ptr<Sink> build_events_sink(const std::filesystem::path& file, bool text) {
+  if (text) return std::make_unique<BackgroundSink>(std::make_unique<EventsTextWriter>(file, 0));
+  return std::make_unique<BackgroundSink>(std::make_unique<EventsHdf5Writer>(file, 0));
+}
+
 }  // namespace esim

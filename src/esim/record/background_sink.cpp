@@ -30,6 +30,14 @@ Copy copy_of(const TruthRecord& record) {
           4 * record.irradiance.size() * sizeof(float)};
 }
 
+Copy copy_of(const ImageRecord& record) {
+  auto image = std::make_shared<const Image<float>>(record.irradiance);
+  return {[camera = record.camera, t = record.t, image](Sink& sink) {
+            sink.write(ImageRecord{camera, t, *image});
+          },
+          image->size() * sizeof(float)};
+}
+
 Copy copy_of(const PoseRecord& record) {
   return {[record](Sink& sink) { sink.write(record); }, sizeof record};
 }

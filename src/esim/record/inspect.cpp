@@ -52,7 +52,10 @@ EventsSummary summarise_text(const fs::path& path) {
   return summary;
 }
 
-bool is_text(const fs::path& path) { return path.extension() == ".txt" || path.extension() == ".csv"; }
+bool is_text(const fs::path& path) {
+  const fs::path extension = (path.extension() == ".incomplete" ? path.stem() : path).extension();
+  return extension == ".txt" || extension == ".csv";
+}
 
 // One camera's folder; nothing if it holds no events.
 std::optional<EventsSummary> summarise_folder(const fs::path& folder, const std::string& camera) {

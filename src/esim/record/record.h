@@ -25,7 +25,7 @@ struct RecordingInfo {
   std::vector<CameraInfo> cameras;
   TimeNs start = 0;          ///< time of the first sample
   TimeNs end = 0;            ///< time of the last sample, if the recording becomes complete
-  double truth_rate_hz = 0;  ///< ground-truth frames per second; 0: none
+  double truth_rate_hz = 0;  ///< frames of ground truth, or of a video, per second; 0: none
 };
 
 /// Events of one camera, in order, none at or before what the same camera reported earlier.
@@ -45,13 +45,20 @@ struct TruthRecord {
   const Image<float>& flow_y;      ///< motion field, px/s, positive downwards
 };
 
+/// A frame of a video, as one camera sees it. The image is borrowed for the duration of the call.
+struct ImageRecord {
+  int camera = 0;
+  TimeNs t = 0;
+  const Image<float>& irradiance;  ///< E, 1.0 = white
+};
+
 /// Pose of the body.
 struct PoseRecord {
   TimeNs t = 0;
   SE3 T_world_body;
 };
 
-using Record = std::variant<EventsRecord, TruthRecord, PoseRecord>;
+using Record = std::variant<EventsRecord, TruthRecord, ImageRecord, PoseRecord>;
 
 /// Where a simulation goes: one class per format, each taking the kinds of record that it can hold.
 /// Calls come from one thread: begin, then write in time order per camera, then end.

@@ -24,35 +24,6 @@ YAML::Node load(const std::filesystem::path& file) {
   }
 }
 
-/// Sets root[a][b][c] for "a.b.c=value"; list entries are named by their index.
-std::string apply_override(YAML::Node root, const std::string& text) {
-  const std::size_t equals = text.find('=');
-  if (equals == std::string::npos || equals == 0) {
-    throw UserError(fmt::format("--set {}: expected key=value, for example event_camera.contrast_threshold=0.2", text));
-  }
-  const std::string key = text.substr(0, equals);
-  try {
-    const YAML::Node value = YAML::Load(text.substr(equals + 1));
-    std::size_t begin = 0;
-    YAML::Node node = root;
-    while (true) {
-      const std::size_t dot = key.find('.', begin);
-      const std::string part = key.substr(begin, dot == std::string::npos ? dot : dot - begin);
-      YAML::Node child = node.IsSequence() ? node[std::stoul(part)] : node[part];
-      if (dot == std::string::npos) {
-        child = value;
-        return key;
-      }
-      node.reset(child);
-      begin = dot + 1;
-    }
-  } catch (const YAML::Exception& exception) {
-    throw UserError(fmt::format("--set {}: cannot be set: {}", text, exception.msg));
-  } catch (const std::logic_error&) {
-    throw UserError(fmt::format("--set {}: entries of a list are named by their number", text));
-  }
-}
-
 /// What a camera inherits for `key`: the shared map, overridden entry by entry by its own. A map of another type
 /// replaces the shared one.
 YAML::Node inherit(const YAML::Node& shared, const YAML::Node& own) {

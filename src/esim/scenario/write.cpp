@@ -6,6 +6,7 @@
 #include <type_traits>
 #include <variant>
 
+#include "esim/scenario/conversion.h"
 #include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
 
@@ -184,6 +185,16 @@ std::string write_scenario(const Scenario& scenario) {
     out << YAML::EndMap;
   }
   out << YAML::EndSeq << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+std::string write_conversion(const ConversionOptions& options) {
+  YAML::Emitter out;
+  YamlWriter writer(out);
+  out << YAML::BeginMap;
+  ConversionOptions copy = options;
+  describe(writer, copy);
+  out << YAML::EndMap;
   return std::string(out.c_str()) + "\n";
 }
 

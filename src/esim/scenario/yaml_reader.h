@@ -22,6 +22,9 @@ struct YamlSource {
   std::vector<std::string> changed;  ///< dotted keys that were set on the command line
 };
 
+/// Sets root[a][b][c] for "a.b.c=value" and returns the key; list entries are named by their index.
+std::string apply_override(YAML::Node root, const std::string& text);
+
 template <typename T>
 inline constexpr bool kIsVariant = false;
 template <typename... T>

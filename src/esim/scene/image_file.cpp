@@ -1,11 +1,14 @@
 #include "esim/scene/image_file.h"
 
-#include <ImfArray.h>
-#include <ImfRgbaFile.h>
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <fstream>
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 
@@ -15,8 +18,6 @@ namespace esim {
 namespace {
 
 constexpr std::size_t kMaxPixels = std::size_t{1} << 28;
-
-float luminance(float red, float green, float blue) { return 0.2126F * red + 0.7152F * green + 0.0722F * blue; }
 
 [[noreturn]] void fail(const std::filesystem::path& path, const std::string& reason) {
   throw UserError(fmt::format("image {}: {}", path.string(), reason));
@@ -28,25 +29,43 @@ void check_size(const std::filesystem::path& path, std::int64_t width, std::int6
   }
 }
 
-Image<float> load_exr(const std::filesystem::path& path) {
-  try {
-    Imf::RgbaInputFile file(path.c_str());
-    const auto window = file.dataWindow();
-    const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
-    const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
-    check_size(path, width, height);
-    Imf::Array2D<Imf::Rgba> pixels(height, width);
-    file.setFrameBuffer(&pixels[0][0] - window.min.x - window.min.y * width, 1, static_cast<std::size_t>(width));
-    file.readPixels(window.min.y, window.max.y);
+/// The channels that hold the colour: R, G, B, or the luminance Y.
+std::vector<const char*> colour_channels(const std::filesystem::path& path, const Imf::ChannelList& channels) {
+  const auto has = [&](const char* name) { return channels.findChannel(name) != nullptr; };
+  if (has("R") && has("G") && has("B")) return {"R", "G", "B"};
+  if (has("Y")) return {"Y"};
+  fail(path, "has neither the channels R, G, B nor Y; save it with one of these");
+}
 
-    Image<float> out(static_cast<int>(width), static_cast<int>(height));
-    for (int y = 0; y < out.height(); ++y) {
-      for (int x = 0; x < out.width(); ++x) {
-        const Imf::Rgba& p = pixels[y][x];
-        out(x, y) = luminance(p.r, p.g, p.b);
-      }
-    }
-    return out;
+void read_exr(const std::filesystem::path& path, Encoding encoding, bool colour, Planes& planes) {
+  Imf::InputFile file(path.c_str());
+  const auto window = file.header().dataWindow();
+  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
+  const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
+  check_size(path, width, height);
+  const auto names = colour_channels(path, file.header().channels());
+  const std::size_t count = names.size(), pixel_bytes = count * sizeof(float);
+  const std::size_t row_bytes = static_cast<std::size_t>(width) * pixel_bytes;
+
+  std::vector<float> pixels(static_cast<std::size_t>(width * height) * count);
+  Imf::FrameBuffer buffer;
+  for (std::size_t i = 0; i < count; ++i) {
+    buffer.insert(names[i], Imf::Slice::Make(Imf::FLOAT, pixels.data() + i, window, pixel_bytes, row_bytes));
+  }
+  file.setFrameBuffer(buffer);
+  file.readPixels(window.min.y, window.max.y);
+  decode({.data = pixels.data(),
+          .row_bytes = static_cast<std::ptrdiff_t>(row_bytes),
+          .width = static_cast<int>(width),
+          .height = static_cast<int>(height),
+          .channels = static_cast<int>(count),
+          .type = PixelType::float32},
+         encoding, colour, planes);
+}
+
+void load_exr(const std::filesystem::path& path, Encoding encoding, bool colour, Planes& planes) {
+  try {
+    read_exr(path, encoding, colour, planes);
   } catch (const UserError&) {
     throw;
   } catch (const std::exception& error) {
@@ -54,56 +73,43 @@ Image<float> load_exr(const std::filesystem::path& path) {
   }
 }
 
-/// One luminance from the channels of a pixel, each mapped by `linear`; OpenCV's order is B, G, R, A.
-template <typename T, typename Linear>
-float pixel_luminance(const T* channel, int channels, float full_scale, const Linear& linear) {
-  if (channels < 3) {
-    const float grey = linear(channel[0]);
-    if (channels == 1) return grey;
-    const float alpha = static_cast<float>(channel[1]) / full_scale;
-    return alpha * grey + (1.0F - alpha);
-  }
-  const float colour = luminance(linear(channel[2]), linear(channel[1]), linear(channel[0]));
-  if (channels == 3) return colour;
-  const float alpha = static_cast<float>(channel[3]) / full_scale;
-  return alpha * colour + (1.0F - alpha);
+/// Whether a JPEG file has an end-of-image mark near its end. The decoder makes grey of what is cut off, and says
+/// nothing.
+bool is_whole_jpeg(const std::filesystem::path& path) {
+  constexpr std::streamoff kTailBytes = 1 << 16;  // cameras append data of their own
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  const std::streamoff size = file.tellg();
+  file.seekg(std::max<std::streamoff>(0, size - kTailBytes));
+  const std::string tail{std::istreambuf_iterator<char>(file), {}};
+  return tail.find("\xff\xd9") != std::string::npos;
 }
 
-template <typename T, typename Linear>
-Image<float> convert(const cv::Mat& image, float full_scale, const Linear& linear) {
-  Image<float> out(image.cols, image.rows);
-  const int channels = image.channels();
-  for (int y = 0; y < out.height(); ++y) {
-    const T* row = image.ptr<T>(y);
-    for (int x = 0; x < out.width(); ++x) {
-      out(x, y) = pixel_luminance(row + std::ptrdiff_t{x} * channels, channels, full_scale, linear);
-    }
+PixelType pixel_type(const std::filesystem::path& path, const cv::Mat& image) {
+  switch (image.depth()) {
+    case CV_8U:
+      return PixelType::uint8;
+    case CV_16U:
+      return PixelType::uint16;
+    case CV_32F:
+      return PixelType::float32;
+    default:
+      fail(path, "has an unsupported pixel type; convert it to 8 or 16 bit, EXR or HDR");
   }
-  return out;
-}
-
-/// Linear values of every code of an integer image.
-std::vector<float> srgb_table(int codes) {
-  std::vector<float> table(static_cast<std::size_t>(codes));
-  for (int i = 0; i < codes; ++i) {
-    table[static_cast<std::size_t>(i)] = linear_from_srgb(static_cast<float>(i) / static_cast<float>(codes - 1));
-  }
-  return table;
 }
 
 }  // namespace
 
-float linear_from_srgb(float encoded) {
-  return encoded <= 0.04045F ? encoded / 12.92F : std::pow((encoded + 0.055F) / 1.055F, 2.4F);
-}
-
-Image<float> load_luminance(const std::filesystem::path& path) {
+void load_planes(const std::filesystem::path& path, Encoding encoding, bool colour, Planes& planes) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) fail(path, "no such file");
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return std::tolower(c); });
-  if (extension == ".exr") return load_exr(path);
+  if (extension == ".exr") return load_exr(path, encoding, colour, planes);
+
+  if ((extension == ".jpg" || extension == ".jpeg") && !is_whole_jpeg(path)) {
+    fail(path, "is no JPEG image, or is cut off");
+  }
 
   cv::Mat image;
   try {
@@ -113,21 +119,20 @@ Image<float> load_luminance(const std::filesystem::path& path) {
   }
   if (image.empty()) fail(path, "cannot be decoded; is it a PNG, JPEG, TIFF, EXR or HDR image, and complete?");
   check_size(path, image.cols, image.rows);
+  decode({.data = image.data,
+          .row_bytes = static_cast<std::ptrdiff_t>(image.step[0]),
+          .width = image.cols,
+          .height = image.rows,
+          .channels = image.channels(),
+          .blue_first = true,
+          .type = pixel_type(path, image)},
+         encoding, colour, planes);
+}
 
-  switch (image.depth()) {
-    case CV_8U: {
-      const auto table = srgb_table(256);
-      return convert<std::uint8_t>(image, 255.0F, [&](std::uint8_t code) { return table[code]; });
-    }
-    case CV_16U: {
-      const auto table = srgb_table(65536);
-      return convert<std::uint16_t>(image, 65535.0F, [&](std::uint16_t code) { return table[code]; });
-    }
-    case CV_32F:
-      return convert<float>(image, 1.0F, [](float value) { return value; });
-    default:
-      fail(path, "has an unsupported pixel type; convert it to 8 or 16 bit, EXR or HDR");
-  }
+Image<float> load_luminance(const std::filesystem::path& path) {
+  Planes planes;
+  load_planes(path, Encoding::automatic, false, planes);
+  return std::move(planes.front());
 }
 
 }  // namespace esim

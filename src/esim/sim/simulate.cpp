@@ -3,21 +3,10 @@
 #include <algorithm>
 #include <chrono>
 
+#include "esim/sim/stopwatch.h"
+
 namespace esim {
 namespace {
-
-/// Adds the wall-clock time of a scope to a total.
-class Stopwatch {
- public:
-  explicit Stopwatch(double& total_seconds) : total_(total_seconds) {}
-  ~Stopwatch() { total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double& total_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 /// The camera whose next sample comes first, and that sample's request; null after the last one.
 CameraChannel* camera_due(World& world, SampleRequest& request) {

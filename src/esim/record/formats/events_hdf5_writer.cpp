@@ -184,6 +184,8 @@ void EventsHdf5Writer::write(const Record& record) {
     if (events->camera == impl_->camera) impl_->append(events->events);
   } else if (const auto* truth = std::get_if<TruthRecord>(&record)) {
     impl_->last_seen = std::max(impl_->last_seen, truth->t);
+  } else if (const auto* image = std::get_if<ImageRecord>(&record)) {
+    impl_->last_seen = std::max(impl_->last_seen, image->t);
   } else if (const auto* pose = std::get_if<PoseRecord>(&record)) {
     impl_->last_seen = std::max(impl_->last_seen, pose->t);
   }

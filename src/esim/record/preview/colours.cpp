@@ -65,10 +65,10 @@ Rgb mix(Rgb from, Rgb to, float amount) {
 }
 
 Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, const Image<float>& irradiance) {
-  const Image<std::uint8_t> grey = encode_srgb(irradiance);
-  Image<Rgb> out(grey.width(), grey.height());
+  const Image<std::uint8_t> levels = encode_srgb(irradiance);
+  Image<Rgb> out(levels.width(), levels.height());
   for (std::size_t i = 0; i < out.size(); ++i) {
-    const std::uint8_t level = to_byte(kBackgroundLevel * static_cast<float>(grey.pixels()[i]));
+    const std::uint8_t level = to_byte(kBackgroundLevel * static_cast<float>(levels.pixels()[i]));
     const Rgb background{level, level, level};
     const float count = on.pixels()[i] + off.pixels()[i];
     if (!(count > 0.0f)) {
@@ -81,6 +81,15 @@ Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, const 
     const Rgb hue = mix(kOffColour, kOnColour, on.pixels()[i] / count);
     out.pixels()[i] = mix(background, hue, opacity);
   }
+  return out;
+}
+
+Image<Rgb> grey(const Image<float>& irradiance) {
+  const Image<std::uint8_t> levels = encode_srgb(irradiance);
+  Image<Rgb> out(levels.width(), levels.height());
+  std::transform(levels.pixels().begin(), levels.pixels().end(), out.pixels().begin(), [](std::uint8_t level) {
+    return Rgb{level, level, level};
+  });
   return out;
 }
 

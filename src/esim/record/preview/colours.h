@@ -25,6 +25,9 @@ inline constexpr Rgb kNoDepthColour{196, 196, 196};
 /// on. Counts may be fractions, as resampled ones are. Irradiance is linear; all images have the same size.
 Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, const Image<float>& irradiance);
 
+/// Irradiance in grey, sRGB-encoded.
+Image<Rgb> grey(const Image<float>& irradiance);
+
 /// Image velocity in the colour code of Baker et al., "A Database and Evaluation Methodology for Optical Flow", IJCV
 /// 2011: hue by direction, white at rest, saturated at `full_scale_px_per_s`, darker beyond it.
 Image<Rgb> colour_flow(const Image<float>& flow_x, const Image<float>& flow_y, float full_scale_px_per_s);

@@ -55,14 +55,16 @@ class Panels {
     return render_events(total(frame_.on_events), total(frame_.off_events), mean(frame_.irradiance));
   }
 
+  Image<Rgb> image() const { return large_ ? grey(mean(frame_.irradiance)) : fit(grey(frame_.irradiance)); }
+
   Image<Rgb> depth() const {
     const float near_m = frame_.near_m > 0 ? frame_.near_m : 1.0f, far_m = std::max(frame_.far_m, 1.01f * near_m);
-    if (!large_) return fit(colour_depth(frame_.depth_m, near_m, far_m));
-    return colour_depth(nearest(frame_.depth_m), near_m, far_m);
+    if (!large_) return fit(colour_depth(*frame_.depth_m, near_m, far_m));
+    return colour_depth(nearest(*frame_.depth_m), near_m, far_m);
   }
 
   Image<Rgb> flow() const {
-    const Image<float>&x = frame_.flow_x_px_per_s, &y = frame_.flow_y_px_per_s;
+    const Image<float>&x = *frame_.flow_x_px_per_s, &y = *frame_.flow_y_px_per_s;
     if (!large_) return fit(colour_flow(x, y, frame_.full_flow_px_per_s));
     return colour_flow(nearest(x), nearest(y), frame_.full_flow_px_per_s);
   }
@@ -160,16 +162,16 @@ void draw_flow_legend(Canvas& canvas, const PreviewLayout& layout, const Preview
 
 }  // namespace
 
-PreviewLayout::PreviewLayout(int camera_width, int camera_height) {
-  constexpr double kMostPanelWidth = (kMaxWidth - 2 * kMargin - 2 * kGap) / 3;
+PreviewLayout::PreviewLayout(int camera_width, int camera_height, int panel_count) : panels(panel_count) {
+  const double most_panel_width = (kMaxWidth - 2 * kMargin - (panels - 1) * kGap) / panels;
   const double whole_factor = (kLeastPanelWidth + camera_width - 1) / camera_width;
   const double scale =
-      std::min({whole_factor, kMostPanelWidth / camera_width, static_cast<double>(kMaxPanelHeight) / camera_height});
+      std::min({whole_factor, most_panel_width / camera_width, static_cast<double>(kMaxPanelHeight) / camera_height});
   const auto scaled = [scale](int extent) { return std::max(1, static_cast<int>(scale * extent + 1e-6)); };
   panel_width = scaled(camera_width);
   panel_height = scaled(camera_height);
   column_width = std::max(panel_width, kLeastColumnWidth);
-  width = 2 * kMargin + 2 * kGap + 3 * column_width;
+  width = 2 * kMargin + (panels - 1) * kGap + panels * column_width;
   height = kHeader + kTitle + panel_height + kLegend + kMargin;
   width += width % 2;
   height += height % 2;
@@ -182,14 +184,19 @@ int PreviewLayout::legend_y() const { return panel_y() + panel_height + 16; }
 Image<Rgb> compose_preview(const PreviewLayout& layout, const PreviewFrame& frame) {
   Canvas canvas(layout.width, layout.height, kPaper);
   canvas.text(kMargin, 30, fmt::format("t = {:.4f} s", to_seconds(frame.t)), kTextHeight + 2, kInk);
-  canvas.text(layout.panel_x(2) + layout.column_width, 30, frame.caption, kSmallTextHeight, kFaintInk, Align::right);
-  canvas.fill({kMargin, kHeader - 4, layout.panel_x(2) + layout.column_width - kMargin, 1}, {210, 210, 210});
+  const int right = layout.panel_x(layout.panels - 1) + layout.column_width;
+  canvas.text(right, 30, frame.caption, kSmallTextHeight, kFaintInk, Align::right);
+  canvas.fill({kMargin, kHeader - 4, right - kMargin, 1}, {210, 210, 210});
 
   const Panels panels(layout, frame);
   draw_panel(canvas, layout, 0, "Events", panels.events());
+  draw_events_legend(canvas, layout, frame);
+  if (frame.depth_m == nullptr) {
+    draw_panel(canvas, layout, 1, "Image", panels.image());
+    return std::move(canvas).take();
+  }
   draw_panel(canvas, layout, 1, "Depth", panels.depth());
   draw_panel(canvas, layout, 2, "Motion field", panels.flow());
-  draw_events_legend(canvas, layout, frame);
   draw_depth_legend(canvas, layout, frame);
   draw_flow_legend(canvas, layout, frame);
   return std::move(canvas).take();

@@ -16,19 +16,21 @@ struct PreviewFrame {
   const Image<float>& on_events;  ///< number per pixel
   const Image<float>& off_events;
   const Image<float>& irradiance;
-  const Image<float>& depth_m;
-  const Image<float>& flow_x_px_per_s;
-  const Image<float>& flow_y_px_per_s;
+  const Image<float>* depth_m = nullptr;  ///< null, like the motion field, where only images are known
+  const Image<float>* flow_x_px_per_s = nullptr;
+  const Image<float>* flow_y_px_per_s = nullptr;
   float near_m = 0, far_m = 0;   ///< of the depth's colours; 0: no depth is known
   float full_flow_px_per_s = 1;  ///< of the motion field's colours
-  std::string caption;           ///< to the right above the panels
+  std::string caption{};         ///< to the right above the panels
 };
 
-/// Where the three panels and their captions go, for a camera of this size. Panels are at least 320 px wide, by a whole
+/// Where the panels and their captions go, for a camera of this size: events, depth and motion field, or events and
+/// image. Panels are at least 320 px wide, by a whole
 /// factor where possible, and all together at most 1920 px. Width and height are even, as video wants them.
 struct PreviewLayout {
-  PreviewLayout(int camera_width, int camera_height);
+  PreviewLayout(int camera_width, int camera_height, int panels = 3);
 
+  int panels = 3;
   int panel_width = 0, panel_height = 0;
   int column_width = 0;  // of a panel and its legend
   int width = 0, height = 0;
@@ -38,7 +40,7 @@ struct PreviewLayout {
   int legend_y() const;
 };
 
-/// Events, depth and motion field side by side, with their legends.
+/// The panels side by side, with their legends.
 Image<Rgb> compose_preview(const PreviewLayout& layout, const PreviewFrame& frame);
 
 }  // namespace esim

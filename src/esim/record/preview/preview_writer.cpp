@@ -83,6 +83,8 @@ struct PreviewWriter::Impl {
 
   void count(EventSpan events);
   void add_frame(const TruthRecord& truth);
+  void add_frame(const ImageRecord& image);
+  void show(PreviewFrame frame);
 
   std::filesystem::path folder;
   int camera;
@@ -112,9 +114,28 @@ void PreviewWriter::Impl::count(EventSpan span) {
 void PreviewWriter::Impl::add_frame(const TruthRecord& truth) {
   depth_scale.include(truth.depth);
   flow_scale.include(truth.flow_x, truth.flow_y);
-  Image<Rgb> image = compose_preview(
-      *layout, {truth.t, previous ? truth.t - *previous : 0, on, off, truth.irradiance, truth.depth, truth.flow_x,
-                truth.flow_y, depth_scale.near_m(), depth_scale.far_m(), flow_scale.full_px_per_s(), caption});
+  show({.t = truth.t,
+        .on_events = on,
+        .off_events = off,
+        .irradiance = truth.irradiance,
+        .depth_m = &truth.depth,
+        .flow_x_px_per_s = &truth.flow_x,
+        .flow_y_px_per_s = &truth.flow_y,
+        .near_m = depth_scale.near_m(),
+        .far_m = depth_scale.far_m(),
+        .full_flow_px_per_s = flow_scale.full_px_per_s()});
+}
+
+void PreviewWriter::Impl::add_frame(const ImageRecord& image) {
+  show({.t = image.t, .on_events = on, .off_events = off, .irradiance = image.irradiance});
+}
+
+void PreviewWriter::Impl::show(PreviewFrame frame) {
+  constexpr int kPanels = 3, kPanelsOfImages = 2;
+  if (!layout) layout.emplace(on.width(), on.height(), frame.depth_m != nullptr ? kPanels : kPanelsOfImages);
+  frame.since_previous = previous ? frame.t - *previous : 0;
+  frame.caption = caption;
+  Image<Rgb> image = compose_preview(*layout, frame);
   if (!video) video.emplace(folder / "preview.mp4", layout->width, layout->height, playback.frames_per_s);
   video->append(image);
   if (candidates.wants_next()) {
@@ -125,7 +146,7 @@ void PreviewWriter::Impl::add_frame(const TruthRecord& truth) {
   on.fill(0);
   off.fill(0);
   events = 0;
-  previous = truth.t;
+  previous = frame.t;
 }
 
 PreviewWriter::PreviewWriter(std::filesystem::path folder, int camera)
@@ -136,7 +157,6 @@ PreviewWriter::~PreviewWriter() = default;
 void PreviewWriter::begin(const RecordingInfo& info) {
   const CameraInfo& camera = info.cameras.at(static_cast<std::size_t>(impl_->camera));
   const int width = camera.model.width, height = camera.model.height;
-  impl_->layout.emplace(width, height);
   impl_->on = impl_->off = Image<float>(width, height);
   impl_->playback = choose_playback(to_seconds(info.end - info.start), info.truth_rate_hz);
   impl_->caption = fmt::format("{}  {} x {} px", camera.name, width, height);
@@ -150,6 +170,8 @@ void PreviewWriter::write(const Record& record) {
     if (events->camera == impl_->camera) impl_->count(events->events);
   } else if (const auto* truth = std::get_if<TruthRecord>(&record)) {
     if (truth->camera == impl_->camera) impl_->add_frame(*truth);
+  } else if (const auto* image = std::get_if<ImageRecord>(&record)) {
+    if (image->camera == impl_->camera) impl_->add_frame(*image);
   }
 }
 

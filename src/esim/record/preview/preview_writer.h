@@ -7,9 +7,10 @@
 
 namespace esim {
 
-/// preview.mp4, a video of what one camera's ground truth and events look like, and preview.png, one frame of it: that
-/// with the median number of events among those of the second half. A video frame for each frame of ground truth,
-/// played at real time or, if that were too short or too fast to watch, slower as its caption tells.
+/// preview.mp4, a video of what one camera's events look like beside its ground truth or the video it saw, and
+/// preview.png, one frame of it: that with the median number of events among those of the second half. A frame for each
+/// frame of ground truth or of the video, played at real time or, if that were too short or too fast to watch, slower
+/// as its caption tells.
 class PreviewWriter final : public Sink {
  public:
   /// Both files go into `folder`, which must exist.

@@ -1,0 +1,46 @@
+#include "support.h"
+
+#include <fmt/format.h>
+
+#include <csignal>
+#include <fstream>
+
+#include "esim/core/error.h"
+
+namespace esim::app {
+namespace {
+
+volatile std::sig_atomic_t signal_came = 0;
+
+void on_signal(int) { signal_came = 1; }
+
+}  // namespace
+
+void catch_interrupts() {
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+}
+
+bool interrupted() { return signal_came != 0; }
+
+Notices print_and_keep(std::vector<std::string>& given, bool quiet) {
+  Notices notices;
+  notices.warning = [&given](const std::string& text) {
+    given.push_back("warning: " + text);
+    fmt::print(stderr, "warning: {}\n", text);
+  };
+  notices.note = [&given, quiet](const std::string& text) {
+    given.push_back(text);
+    if (!quiet) fmt::print(stderr, "{}\n", text);
+  };
+  return notices;
+}
+
+void write_text(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw OutputError(fmt::format("{}: cannot be written; is the disk full?", path.string()));
+}
+
+}  // namespace esim::app

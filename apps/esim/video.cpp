@@ -1,0 +1,223 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "commands.h"
+#include "esim/core/error.h"
+#include "esim/record/recording_directory.h"
+#include "esim/record/recording_file.h"
+#include "progress_bar.h"
+#include "support.h"
+
+namespace esim::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+  ConversionOptions options;
+  std::string input, out;
+  std::vector<std::string> overrides;
+  int threads = 0;
+  bool quiet = false;
+  bool force = false;
+};
+
+/// A visitor of describe() that gives every member an option of the command line: --max-steps for max_steps.
+class CommandLine {
+ public:
+  explicit CommandLine(CLI::App& command) : command_(command) {}
+
+  void operator()(const char* name, bool& value, const About& about) {
+    if (value) {
+      command_.add_flag_callback(
+          "--no-" + dashed(name), [&value] { value = false; }, fmt::format("Do not {}", about.help));
+    } else {
+      command_.add_flag("--" + dashed(name), value, help(about));
+    }
+  }
+
+  template <typename T>
+  void operator()(const char* name, T& value, const About& about) {
+    CLI::Option* option = command_.add_option("--" + dashed(name), value, help(about));
+    if constexpr (std::is_enum_v<T>) {
+      std::map<std::string, T> names;
+      std::string choices;
+      for (const char* word : kEnumNames<T>) {
+        choices += (names.empty() ? "" : "|") + std::string(word);
+        names.emplace(word, static_cast<T>(names.size()));
+      }
+      option->type_name(choices)->transform(CLI::CheckedTransformer(names).description(""));
+    } else {
+      option->type_name(*about.unit != '\0' ? about.unit : "N")->check([about](const std::string& text) {
+        return out_of_range(text, about);
+      });
+      if constexpr (std::is_arithmetic_v<T>) option->capture_default_str();
+    }
+  }
+
+ private:
+  static std::string dashed(std::string name) {
+    std::replace(name.begin(), name.end(), '_', '-');
+    return name;
+  }
+
+  static std::string help(const About& about) {
+    std::string text = about.help;
+    text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+    return text;
+  }
+
+  /// CLI11's convention: the error, or nothing.
+  static std::string out_of_range(const std::string& text, const About& about) {
+    double value = 0;
+    if (!CLI::detail::lexical_cast(text, value)) return fmt::format("'{}' is not a number", text);
+    if (value <= about.max && (about.above_min ? value > about.min : value >= about.min)) return "";
+    return fmt::format("{} is out of range: must be {} {} and at most {}", text, about.above_min ? "above" : "at least",
+                       about.min, about.max);
+  }
+
+  CLI::App& command_;
+};
+
+void report_held(const ConversionSummary& summary, int max_steps, const Notices& notices) {
+  if (summary.held == 0) return;
+  notices.warning(
+      fmt::format("between {} of {} pairs of frames, something moves too far for {} steps (up to {:.0f} px); "
+                  "raise --lambda or --max-steps, or give a video with more frames per second",
+                  summary.held, summary.frames - 1, max_steps, summary.displacement_px));
+}
+
+void print_summary(const ConversionSummary& summary) {
+  const double converted_s = to_seconds(summary.end - summary.start);
+  fmt::print(stderr, "{}: {} frames, {:.3f} s, converted in {:.1f} s ({:.2f}x real time), {} steps, {} events\n",
+             summary.complete ? "done" : "interrupted", summary.frames, converted_s, summary.wall_seconds,
+             converted_s / summary.wall_seconds, summary.steps, summary.events_on + summary.events_off);
+}
+
+/// A conversion from the opened input to the summary of what was written.
+class Converter {
+ public:
+  explicit Converter(const Arguments& arguments)
+      : arguments_(arguments),
+        workers_(arguments.threads),
+        frames_(arguments.input, arguments.options.video, arguments.options.bayer) {}
+
+  ConversionSummary run(Sink& out) {
+    const ConversionOptions& options = arguments_.options;
+    Interpolator interpolator(options.interpolation, options.event_camera.log_eps);
+    EventCamera event_camera(options.event_camera, frames_.width(), frames_.height(), options.seed, 0);
+    ProgressBar bar(!arguments_.quiet);
+    ConversionSummary summary =
+        convert({frames_, interpolator, event_camera, workers_}, out, [&](const Progress& progress) {
+          bar.show(progress);
+          return !interrupted();
+        });
+    bar.clear();
+    return summary;
+  }
+
+  int threads() const { return workers_.threads(); }
+
+ private:
+  const Arguments& arguments_;
+  Workers workers_;
+  FrameSequence frames_;
+};
+
+/// What the shell gets; throws what ended the conversion early.
+int outcome(const ConversionSummary& summary, const fs::path& out) {
+  if (!summary.problem.empty()) {
+    throw UserError(fmt::format("{}; the {} frames before it are converted: {}, marked incomplete", summary.problem,
+                                summary.frames, out.string()));
+  }
+  return summary.complete ? kOk : kInterrupted;
+}
+
+int convert_to_file(const Arguments& arguments, const fs::path& out, bool text, const Notices& notices) {
+  RecordingFile file(out, arguments.force);
+  Converter converter(arguments);
+  const std::unique_ptr<Sink> sink = build_events_sink(file.path(), text);
+  const ConversionSummary summary = converter.run(*sink);
+  file.finish();
+  report_held(summary, arguments.options.interpolation.max_steps, notices);
+  if (!arguments.quiet) {
+    print_summary(summary);
+    fmt::print(stderr, "events: {}\n", out.string());
+  }
+  return outcome(summary, out);
+}
+
+int convert_to_folder(const Arguments& arguments, const fs::path& out, const Notices& notices,
+                      const std::vector<std::string>& given) {
+  RecordingDirectory directory(out, arguments.force);
+  Converter converter(arguments);
+  write_text(directory.path() / "video.yaml", write_conversion(arguments.options));
+  const std::unique_ptr<Sink> sink = build_conversion_sink(directory.path());
+  const ConversionSummary summary = converter.run(*sink);
+  report_held(summary, arguments.options.interpolation.max_steps, notices);
+  directory.finish(report_json(arguments.options, summary, converter.threads(), given));
+  if (!arguments.quiet) {
+    print_summary(summary);
+    fmt::print(stderr, "recording: {}\nlook at:   {}\n", out.string(), (out / "preview.png").string());
+  }
+  return outcome(summary, out);
+}
+
+int run(Arguments& arguments) {
+  std::error_code error;
+  arguments.options.event_camera = read_event_camera(arguments.overrides);
+  arguments.options.input = fs::absolute(arguments.input, error);
+  std::vector<std::string> given;
+  const Notices notices = print_and_keep(given, arguments.quiet);
+  catch_interrupts();
+
+  const fs::path name = fs::path(arguments.input).lexically_normal();
+  const fs::path out = arguments.out.empty() ? "out" / (name.has_filename() ? name : name.parent_path()).stem()
+                                             : fs::path(arguments.out);
+  const std::string extension = out.extension().string();
+  const bool text = extension == ".txt";
+  if (text || extension == ".h5" || extension == ".hdf5") return convert_to_file(arguments, out, text, notices);
+  return convert_to_folder(arguments, out, notices, given);
+}
+
+}  // namespace
+
+void add_video(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("video", "Turn a video, or a folder of images, into events");
+  command
+      ->add_option("input", arguments->input,
+                   "Video file, or folder of images with images.csv (ns, file), timestamps.txt (s) or --fps")
+      ->required()
+      ->type_name("INPUT");
+  command
+      ->add_option("-o,--out", arguments->out,
+                   "Folder to write, or file of events: .h5 or .txt (default: out/NAME of the input)")
+      ->type_name("FILE_OR_DIR");
+  CommandLine options(*command);
+  describe_command_line(options, arguments->options);
+  command
+      ->add_option("--set", arguments->overrides,
+                   "Change one option of the event camera, for example --set contrast_threshold=0.2")
+      ->type_name("KEY=VALUE")
+      ->expected(1)
+      ->take_all();
+  command
+      ->add_option("-j,--threads", arguments->threads,
+                   "Threads; 0 takes every processor. The result does not depend on it")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1024));
+  command->add_flag("-q,--quiet", arguments->quiet, "Print warnings and errors only");
+  command->add_flag("--force", arguments->force, "Replace an earlier recording in --out");
+  command->footer(
+      "Examples:\n"
+      "  esim video clip.mp4 --out out/clip                        then look at out/clip/preview.png\n"
+      "  esim video clip.mp4 --out events.h5 --set contrast_threshold=0.2\n"
+      "  esim video images/ --fps 240 --out out/images\n"
+      "  esim video slow.mp4 --slow-motion 8 --start 2 --duration 1.5 --out out/slow");
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace esim::app

@@ -1,0 +1,46 @@
+#include "esim/record/recording_file.h"
+
+#include <system_error>
+#include <utility>
+
+#include "esim/core/error.h"
+#include "esim/record/output_file.h"
+#include "esim/record/recording_directory.h"
+
+namespace esim {
+
+namespace fs = std::filesystem;
+
+RecordingFile::RecordingFile(fs::path out, bool force) : out_(std::move(out)), working_(incomplete_path(out_)) {
+  const fs::path folder = out_.has_parent_path() ? out_.parent_path() : fs::path(".");
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) {
+    throw UserError(folder.string() + " is no folder: create it, or choose another --out");
+  }
+  for (const fs::path& path : {out_, working_}) {
+    const fs::file_status status = fs::symlink_status(path, error);
+    if (!fs::exists(status)) continue;
+    if (!fs::is_regular_file(status)) throw UserError(path.string() + " is not a file: choose another --out");
+    if (!force) {
+      throw UserError(path.string() + " exists already: pass --force to replace it, or choose another --out");
+    }
+  }
+}
+
+RecordingFile::~RecordingFile() {
+  std::error_code ignored;
+  if (!finished_) fs::remove(working_, ignored);
+}
+
+void RecordingFile::finish() {
+  std::error_code error;
+  fs::rename(working_, out_, error);
+  finished_ = true;
+  if (error) {
+    throw OutputError("cannot rename " + working_.string() + " to " + out_.string() + ": " + error.message() +
+                      "; the recording is kept in the former");
+  }
+  sync_directory(out_.has_parent_path() ? out_.parent_path() : fs::path("."));
+}
+
+}  // namespace esim

@@ -1,0 +1,21 @@
+#include "esim/scenario/conversion.h"
+
+#include "esim/scenario/yaml_reader.h"
+
+namespace esim {
+
+EventCameraOptions read_event_camera(const std::vector<std::string>& overrides) {
+  const std::string prefix = "event_camera.";
+  YAML::Node root(YAML::NodeType::Map);
+  YamlSource source;
+  for (const std::string& text : overrides) {
+    source.changed.push_back(apply_override(root, text.starts_with(prefix) ? text : prefix + text));
+  }
+  EventCameraOptions options;
+  YamlReader reader(root, "", source);
+  reader("event_camera", options, About{});
+  reader.finish();
+  return options;
+}
+
+}  // namespace esim

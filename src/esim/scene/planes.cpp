@@ -1,0 +1,94 @@
+#include "esim/scene/planes.h"
+
+#include <cmath>
+#include <cstdint>
+#include <utility>
+
+namespace esim {
+namespace {
+
+/// Light of every code of an integer image.
+template <typename Code>
+class CodeTable {
+ public:
+  static constexpr std::size_t kCodes = std::size_t{1} << (8 * sizeof(Code));
+
+  explicit CodeTable(bool srgb) : light_(kCodes) {
+    for (std::size_t code = 0; code < kCodes; ++code) {
+      const float value = static_cast<float>(code) / static_cast<float>(kCodes - 1);
+      light_[code] = srgb ? linear_from_srgb(value) : value;
+    }
+  }
+
+  float operator()(Code code) const { return light_[code]; }
+
+  static const CodeTable& of(bool srgb) {
+    static const CodeTable kSrgb(true), kLinear(false);
+    return srgb ? kSrgb : kLinear;
+  }
+
+ private:
+  std::vector<float> light_;
+};
+
+struct Light {
+  float red, green, blue;
+};
+
+template <typename T, typename Linear>
+Light light_of(const T* channel, const CodedImage& image, float full_scale, const Linear& linear) {
+  const bool grey = image.channels < 3;
+  const T* const last = channel + (grey ? 0 : 2);
+  Light light{linear(channel[0]), linear(channel[grey ? 0 : 1]), linear(*last)};
+  if (image.blue_first) std::swap(light.red, light.blue);
+  if (image.channels == 2 || image.channels == 4) {
+    const float alpha = static_cast<float>(channel[image.channels - 1]) / full_scale, white = 1.0F - alpha;
+    light = {alpha * light.red + white, alpha * light.green + white, alpha * light.blue + white};
+  }
+  return light;
+}
+
+template <typename T, typename Linear>
+void decode_as(const CodedImage& image, float full_scale, const Linear& linear, Planes& planes) {
+  for (int y = 0; y < image.height; ++y) {
+    const T* pixel = reinterpret_cast<const T*>(static_cast<const std::byte*>(image.data) + y * image.row_bytes);
+    for (int x = 0; x < image.width; ++x, pixel += image.channels) {
+      const Light light = light_of(pixel, image, full_scale, linear);
+      if (planes.size() == 1) {
+        planes[0](x, y) = luminance(light.red, light.green, light.blue);
+      } else {
+        planes[0](x, y) = light.red, planes[1](x, y) = light.green, planes[2](x, y) = light.blue;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+float linear_from_srgb(float encoded) {
+  return encoded <= 0.04045F ? encoded / 12.92F : std::pow((encoded + 0.055F) / 1.055F, 2.4F);
+}
+
+void resize(Planes& planes, int width, int height, bool colour) {
+  planes.resize(colour ? 3 : 1);
+  for (Image<float>& plane : planes) {
+    if (plane.width() != width || plane.height() != height) plane = Image<float>(width, height);
+  }
+}
+
+void decode(const CodedImage& image, Encoding encoding, bool colour, Planes& planes) {
+  resize(planes, image.width, image.height, colour);
+  switch (image.type) {
+    case PixelType::uint8:
+      return decode_as<std::uint8_t>(image, 255.0F, CodeTable<std::uint8_t>::of(encoding != Encoding::linear), planes);
+    case PixelType::uint16:
+      return decode_as<std::uint16_t>(image, 65535.0F, CodeTable<std::uint16_t>::of(encoding != Encoding::linear),
+                                      planes);
+    case PixelType::float32:
+      if (encoding == Encoding::srgb) return decode_as<float>(image, 1.0F, linear_from_srgb, planes);
+      return decode_as<float>(
+          image, 1.0F, [](float light) { return light; }, planes);
+  }
+}
+
+}  // namespace esim

@@ -1,0 +1,181 @@
+#include "esim/sim/convert.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+#include <vector>
+
+#include "esim/core/error.h"
+#include "esim/sensors/bayer.h"
+#include "esim/sim/stopwatch.h"
+
+namespace esim {
+namespace {
+
+/// One conversion: what it does with each frame, and the account of it.
+class Run {
+ public:
+  Run(const Conversion& conversion, Sink& out, const Monitor& monitor)
+      : conversion_(conversion), out_(out), monitor_(monitor) {
+    summary_.width = conversion.frames.width();
+    summary_.height = conversion.frames.height();
+  }
+
+  /// Reads the next frame and measures how the image moves towards it; false at the end of the input.
+  bool take_frame() {
+    {
+      Stopwatch stopwatch(summary_.seconds.decode);
+      if (!conversion_.frames.next(frame_)) return false;
+    }
+    Stopwatch stopwatch(summary_.seconds.motion);
+    conversion_.interpolator.advance(frame_.planes, conversion_.workers);
+    return true;
+  }
+
+  /// Sets the pixels' references from the first frame.
+  void open_pixels() {
+    summary_.start = summary_.end = frame_.t;
+    seen_by_pixels(frame_.planes, after_);
+    see(frame_.t);
+  }
+
+  void begin_output() {
+    out_.begin(info());
+    write_image();
+  }
+
+  /// Goes from the frame before to this one; false if the monitor wants to end.
+  bool cross_interval() {
+    const Interpolator& interpolator = conversion_.interpolator;
+    const TimeNs t0 = summary_.end, duration = frame_.t - t0;
+    const auto steps = std::min<TimeNs>(interpolator.steps(), duration);
+    summary_.displacement_px = std::max(summary_.displacement_px, interpolator.displacement());
+    if (interpolator.is_held()) ++summary_.held;
+
+    for (TimeNs step = 1; step <= steps; ++step) {
+      const double fraction = static_cast<double>(step) / static_cast<double>(steps);
+      const TimeNs t = step < steps ? t0 + static_cast<TimeNs>(fraction * static_cast<double>(duration)) : frame_.t;
+      {
+        Stopwatch stopwatch(summary_.seconds.interpolation);
+        if (step < steps) interpolator.at(fraction, conversion_.workers, between_);
+        seen_by_pixels(step < steps ? between_ : frame_.planes, after_);
+      }
+      see(t);
+      deliver_events(t);
+      ++summary_.steps;
+      if (step == steps) write_image();
+      if (!monitor_(progress())) return false;
+    }
+    return true;
+  }
+
+  ConversionSummary finish(bool complete, std::string problem) {
+    {
+      Stopwatch stopwatch(summary_.seconds.write);
+      out_.end(complete);
+    }
+    summary_.complete = complete;
+    summary_.problem = std::move(problem);
+    summary_.wall_seconds = elapsed();
+    return std::move(summary_);
+  }
+
+ private:
+  RecordingInfo info() const {
+    const FrameSequence& frames = conversion_.frames;
+    RecordingInfo info;
+    info.start = frames.start();
+    info.end = frames.end();
+    const double duration_s = to_seconds(info.end - info.start);
+    info.truth_rate_hz = duration_s > 0 ? static_cast<double>(frames.frames() - 1) / duration_s : 0;
+    CameraInfo camera;
+    camera.name = "cam0";
+    camera.model.width = summary_.width;
+    camera.model.height = summary_.height;
+    info.cameras.push_back(camera);
+    return info;
+  }
+
+  static void seen_by_pixels(const Planes& planes, Image<float>& irradiance) {
+    if (planes.size() == 1) {
+      irradiance = planes[0];
+    } else {
+      mosaic(planes[0], planes[1], planes[2], irradiance);
+    }
+  }
+
+  /// Lets the pixels see the light change to that of `after_` at time t.
+  void see(TimeNs t) {
+    Stopwatch stopwatch(summary_.seconds.events);
+    const bool first = before_.empty();
+    const Segment segment{after_.bounds(), summary_.end, t, first ? &after_ : &before_, &after_};
+    conversion_.event_camera.integrate({&segment, 1}, conversion_.workers);
+    std::swap(before_, after_);
+    summary_.end = t;
+  }
+
+  void deliver_events(TimeNs until) {
+    events_.clear();
+    {
+      Stopwatch stopwatch(summary_.seconds.events);
+      conversion_.event_camera.release_until(until, events_);
+      const auto on = std::count_if(events_.begin(), events_.end(), [](const Event& e) { return e.polarity > 0; });
+      summary_.events_on += on;
+      summary_.events_off += static_cast<std::int64_t>(events_.size()) - on;
+    }
+    if (!events_.empty()) write(EventsRecord{0, events_});
+  }
+
+  void write_image() {
+    ++summary_.frames;
+    write(ImageRecord{0, summary_.end, before_});
+  }
+
+  void write(const Record& record) {
+    Stopwatch stopwatch(summary_.seconds.write);
+    out_.write(record);
+  }
+
+  double elapsed() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count(); }
+
+  Progress progress() const {
+    return {summary_.start,
+            summary_.end,
+            conversion_.frames.end(),
+            summary_.steps,
+            summary_.events_on + summary_.events_off,
+            elapsed()};
+  }
+
+  const Conversion& conversion_;
+  Sink& out_;
+  const Monitor& monitor_;
+  ConversionSummary summary_;
+  Frame frame_;
+  Planes between_;
+  Image<float> before_, after_;  // what the pixels saw last, and what they see next
+  std::vector<Event> events_;
+  std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+ConversionSummary convert(const Conversion& conversion, Sink& out, const Monitor& monitor) {
+  Run run(conversion, out, monitor);
+  if (run.take_frame()) run.open_pixels();
+  if (!run.take_frame())
+    throw UserError(conversion.frames.input().string() + ": holds one frame; events need at least two");
+  run.begin_output();
+  try {
+    do {
+      if (!run.cross_interval()) return run.finish(false, "");
+    } while (run.take_frame());
+  } catch (const OutputError&) {
+    throw;
+  } catch (const UserError& problem) {
+    return run.finish(false, problem.what());
+  }
+  return run.finish(true, "");
+}
+
+}  // namespace esim

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "esim/core/describe.h"
+#include "esim/core/time.h"
+#include "esim/scene/planes.h"
+#include "esim/video/frame_source.h"
+
+namespace esim {
+
+/// Which frames of a video are taken, and as what.
+struct VideoOptions {
+  Encoding encoding = Encoding::automatic;
+  std::optional<double> fps{};
+  double slow_motion = 1.0;
+  double start = 0.0;
+  std::optional<double> duration{};
+};
+
+template <class Visitor>
+void describe(Visitor& visit, VideoOptions& o) {
+  visit("encoding", o.encoding,
+        About{"how codes stand for light; auto: integers are sRGB, floating point (EXR, HDR) is linear"});
+  visit("fps", o.fps, About{"frames per second, instead of the input's time stamps", "Hz", 0, 1e9, true});
+  visit("slow_motion", o.slow_motion,
+        About{"the scene was this many times faster than the time stamps say", "", 0, 1e9, true});
+  visit("start", o.start, About{"where to begin, after the first frame, by the time stamps", "s", 0, 1e9});
+  visit("duration", o.duration, About{"how much to convert, by the time stamps (default: all)", "s", 0, 1e9, true});
+}
+
+struct Frame {
+  TimeNs t = 0;
+  Planes planes;
+};
+
+/// The chosen frames of a video or a folder of images, checked: times increase, sizes are all the same, and every value
+/// is an irradiance (finite, >= 0). Holds one frame at most.
+class FrameSequence {
+ public:
+  /// Opens the input and reads its first frame; three planes if `colour`, else luminance. Throws UserError if there are
+  /// no frames or no times.
+  FrameSequence(const std::filesystem::path& input, const VideoOptions& options, bool colour);
+
+  /// Takes the next frame, in the memory of `frame`; false at the end. Throws UserError naming the frame that cannot be
+  /// used, and what to do.
+  bool next(Frame& frame);
+
+  const std::filesystem::path& input() const { return input_; }
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+  /// As the input announces; a damaged one may hold less.
+  std::int64_t frames() const { return frames_; }
+  TimeNs start() const { return start_; }
+  TimeNs end() const { return end_; }
+
+ private:
+  TimeNs stamp_of(std::size_t index) const;
+  TimeNs time_of(TimeNs stamp) const;
+  void choose_window(const VideoOptions& options);
+  bool read(Frame& frame);
+  void check(const Frame& frame) const;
+  [[noreturn]] void fail(const std::string& what) const;
+
+  std::filesystem::path input_;
+  std::unique_ptr<FrameSource> source_;
+  std::optional<double> fps_;
+  double slow_motion_;
+  std::size_t index_ = 0;                                 // of the frame that advance() comes to next
+  TimeNs origin_ = 0, first_stamp_ = 0, last_stamp_ = 0;  // of the input; of what is taken of it
+  std::int64_t frames_ = 0;
+  TimeNs start_ = 0, end_ = 0;
+  int width_ = 0, height_ = 0;
+  std::optional<Frame> first_;  // until it is taken
+  TimeNs previous_ = 0;         // time of the frame taken last
+};
+
+}  // namespace esim

@@ -1,0 +1,73 @@
+#pragma once
+
+#include "esim/core/describe.h"
+#include "esim/core/parallel.h"
+#include "esim/scene/planes.h"
+#include "esim/video/optical_flow.h"
+
+namespace esim {
+
+struct InterpolationOptions {
+  bool interpolation = true;
+  double lambda = 0.5;
+  int max_steps = 200;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, InterpolationOptions& o) {
+  visit("interpolation", o.interpolation, About{"follow the motion between frames"});
+  visit("lambda", o.lambda, About{"greatest displacement in a step between frames", "px", 0, 1000, true});
+  visit("max_steps", o.max_steps, About{"most steps between two frames, whatever the displacement", "", 1, 1e6});
+}
+
+/// The brightness between frames of a video. With displacements u forward from frame 0 and v backward from frame 1, the
+/// content of a pixel at the fraction s between them is at
+///   d0 = (s² - s)/2 u + (s² + s)/2 v   from it in frame 0, and at
+///   d1 = (r² + r)/2 u + (r² - r)/2 v   from it in frame 1,  r = 1 - s:
+/// the parabola through v, 0 and u, exact for steady motion along curves of constant acceleration. What both frames
+/// show there is blended, linearly in ln(E + log_eps). Where they disagree, more than what the pixel itself shows in
+/// the two frames does, motion does not explain what happens, and the pixel is blended without it. At s = 0 and 1 this
+/// gives the frames.
+class Interpolator {
+ public:
+  Interpolator(const InterpolationOptions& options, double log_eps) : options_(options), log_eps_(log_eps) {}
+
+  /// Takes the next frame, linear light; all have one size and number of planes. Afterwards frames 0 and 1 are the one
+  /// taken before and this one.
+  void advance(const Planes& frame, const Workers& workers);
+
+  /// Steps into which to divide the time between the frames so that no pixel moves farther than lambda in any.
+  int steps() const { return steps_; }
+
+  /// Greatest speed of any pixel, px per frame.
+  double displacement() const { return displacement_; }
+
+  /// Whether steps() is held to max_steps.
+  bool is_held() const { return held_; }
+
+  /// Light at the fraction between frames 0 and 1, in [0, 1].
+  void at(double fraction, const Workers& workers, Planes& light) const;
+
+ private:
+  /// ln(E + log_eps) with a border of repeated pixels, so that every neighbourhood lies within.
+  struct PaddedLog {
+    void assign(const Image<float>& light, float log_eps, const Workers& workers);
+    const float* row(int y) const { return pixels.row(y + 1) + 1; }
+    Image<float> pixels;
+  };
+
+  void measure_motion(const Planes& frame, const Workers& workers);
+  void interpolate_row(int y, float fraction, std::size_t plane, float* light) const;
+
+  InterpolationOptions options_;
+  double log_eps_;
+  std::vector<PaddedLog> before_, after_;  // one per plane
+  Image<float> luminance_before_, luminance_after_;
+  FlowField forward_, backward_;
+  std::unique_ptr<OpticalFlow> optical_flow_;
+  int steps_ = 1;
+  double displacement_ = 0;
+  bool held_ = false;
+};
+
+}  // namespace esim

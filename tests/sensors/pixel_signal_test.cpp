@@ -87,10 +87,42 @@ TEST(RelaxingSignal, FindsTheFirstCrossingThatAFineSearchFinds) {
     EXPECT_LE(crossing.tau, expected.tau + 1) << i;
     EXPECT_GE(crossing.tau, expected.tau - (Case::kDuration - from) / 20000 - 1) << i;
     EXPECT_EQ(crossing.on, expected.on) << i;
-    EXPECT_NEAR(signal.value(crossing.tau), crossing.on ? high : low, 1e-7 * (1 + std::fabs(now))) << i;
+    const double per_ns = std::fabs(signal.value(crossing.tau + 0.5) - signal.value(crossing.tau - 0.5));
+    EXPECT_NEAR(signal.value(crossing.tau), crossing.on ? high : low, 1e-9 * (1 + std::fabs(now)) + 0.1 * per_ns) << i;
   }
   EXPECT_GT(found, 500);
   EXPECT_GT(turned, 20);  // crossings that the segment's ends do not show
+}
+
+TEST(RelaxingSignal, DoesManyAtOnceAsItDoesOne) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform;
+  std::vector<RelaxingSignal> signals;
+  std::vector<double> low, high, from;
+  for (int i = 0; i < 4999; ++i) {
+    const Case c(random);
+    RelaxingSignal signal = i % 3 == 0 ? c.order2() : c.order1();
+    signal.add(0.1, 3e-7 * uniform(random));
+    if (i % 2 == 0) signal.advance(Case::kDuration * uniform(random));
+    low.push_back(signal.value() - (i % 50 == 0 ? -0.01 : 0.7 * uniform(random)));
+    high.push_back(signal.value() + 0.7 * uniform(random));
+    from.push_back(Case::kDuration * uniform(random));
+    signals.push_back(signal);
+  }
+  std::vector<Crossing> crossings(signals.size());
+  RelaxingSignal::first_crossings(signals, Case::kDuration, low.data(), high.data(), crossings.data());
+  for (std::size_t i = 0; i < signals.size(); ++i) {
+    const Crossing expected = signals[i].first_crossing(Case::kDuration, low[i], high[i]);
+    ASSERT_EQ(crossings[i].tau == kNever, expected.tau == kNever) << i;
+    if (expected.tau == kNever) continue;
+    EXPECT_NEAR(crossings[i].tau, expected.tau, 0.3) << i;
+    EXPECT_EQ(crossings[i].on, expected.on) << i;
+  }
+  std::vector<RelaxingSignal> advanced = signals;
+  RelaxingSignal::advance(advanced, from.data());
+  for (std::size_t i = 0; i < signals.size(); ++i)
+    EXPECT_NEAR(advanced[i].value(), signals[i].value(from[i]), 1e-11 * (1 + std::fabs(signals[i].value(from[i]))))
+        << i;
 }
 
 TEST(LinearSignal, FindsItsCrossing) {

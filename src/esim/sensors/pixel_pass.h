@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "esim/render/sample.h"
 #include "esim/sensors/event_normals.h"
 #include "esim/sensors/pixel_array.h"
 #include "esim/sensors/pixel_signal.h"
@@ -17,14 +16,14 @@ struct AwakePixel {
   float light0, light1;  ///< irradiance at the segment's ends
 };
 
-/// Takes the pixels that woke up through a segment. Private to the event camera; holds memory to work in.
+/// Takes the pixels that woke up through a segment. All take one event at a time, so that random numbers and
+/// exponentials are computed for many pixels at once. Private to the event camera; holds memory to work in.
 template <class Signal>
 class PixelPass {
  public:
   /// Makes room for so many more pixels.
-  void reserve(std::size_t more) {
-    if (awake_.size() < count_ + more) awake_.resize(2 * (count_ + more)), signals_.resize(2 * (count_ + more));
-  }
+  void reserve(std::size_t more);
+
   /// Appends a pixel; where `signal` is not given, it is to be set before run().
   void add(const AwakePixel& pixel) { awake_[count_++] = pixel; }
   void add(const AwakePixel& pixel, const Signal& signal) {
@@ -44,42 +43,42 @@ class PixelPass {
  private:
   /// The event that a pixel is about to fire.
   struct Next {
-    double tau = 0;    // ns after the segment's start
-    double level = 0;  // the new reference, in G
+    double tau = 0;        // ns after the segment's start
+    double reference = 0;  // the level that it passed, in G
     std::int8_t polarity = 0;
     bool noise = false;
   };
 
-  template <bool kNoisy>
-  void run_each(PixelArray& pixels, PackedEvents& events);
-  void run_in_rounds(PixelArray& pixels, PackedEvents& events);
-  bool begin(PixelArray& pixels, std::size_t i);
-  template <bool kNoisy>
-  bool find(PixelArray& pixels, const AwakePixel& awake, const Signal& signal, Next& next);
-  Crossing shot_before(PixelArray& pixels, const AwakePixel& awake, const Signal& signal, Crossing crossing) const;
+  // The steps of a round, for all pixels that are left. Those that are done are dropped on the way.
+  void begin(PixelArray& pixels);
+  void find(PixelArray& pixels);
   void renew(PixelArray& pixels);
-  template <bool kNoisy>
-  bool fire(PixelArray& pixels, const AwakePixel& awake, Signal& signal, const Next& next, const float* normals,
-            PackedEvents& events) const;
-  TimeNs delay(const PixelArray& pixels, const AwakePixel& awake, double tau, const float* normals) const;
+  void fire(PixelArray& pixels, PackedEvents& events);
+  void resume(PixelArray& pixels);
+
+  void keep(std::size_t from, std::size_t to);
+  Crossing shot_before(PixelArray& pixels, std::size_t i, Crossing crossing) const;
+  TimeNs delay(const PixelArray& pixels, std::size_t i) const;
   void settle(PixelArray& pixels, std::uint32_t pixel);
-  void make_room();
+  void set_bands(PixelArray& pixels);
 
   TimeNs t0_ = 0, t1_ = 0;
   double duration_ = 0;  // ns
   double epoch_s_ = 0;   // from the epoch to t0
 
+  // By pixel that is left.
   std::vector<AwakePixel> awake_;
   std::vector<Signal> signals_;
-  std::size_t count_ = 0;  // of both
+  std::vector<Next> next_;
+  std::vector<double> level_low_, level_high_, from_;
+  std::vector<Crossing> crossings_;
+  std::size_t count_ = 0;
 
-  // Pixels that are done, with the levels that they sleep between.
+  // By pixel that is done: the levels that it sleeps between.
   std::vector<std::uint32_t> settled_;
   std::vector<float> low_, high_;
   std::size_t settled_count_ = 0;
 
-  // For the rounds.
-  std::vector<Next> next_;
   EventNormals normals_;
   std::vector<std::uint32_t> firing_;
 };

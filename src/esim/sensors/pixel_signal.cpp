@@ -86,8 +86,8 @@ double RelaxingSignal::solve(double level, const Point& a, const Point& b) const
     if (!inside) next = 0.5 * (low + high);
     const double step = std::fabs(next - u);
     u = next;
-    // The next step would be about this one cubed: well below this one squared.
-    if (step <= tolerance || (inside && step * step * (1 + std::fabs(bend)) <= 10 * tolerance)) break;
+    // The next step of Halley's would be about this one cubed, times what the bend makes of it.
+    if (step <= tolerance || (inside && step * step * step * (1 + bend * bend) <= tolerance)) break;
   }
   return u;
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <limits>
+#include <span>
 
 namespace esim {
 
@@ -36,6 +37,17 @@ struct LinearSignal {
     const double tau = slope != 0 ? ((on ? high : low) - start) / slope : done;
     return {tau > done ? (tau < end ? tau : end) : done, on};
   }
+
+  /// The same of many signals: crossings[i] of signals[i] between low[i] and high[i]. All have as many elements.
+  static void first_crossings(std::span<const LinearSignal> signals, double end, const double* low, const double* high,
+                              Crossing* crossings) {
+    for (std::size_t i = 0; i < signals.size(); ++i) {
+      crossings[i] = signals[i].first_crossing(end, low[i], high[i]);
+    }
+  }
+  static void advance(std::span<LinearSignal> signals, const double* tau) {
+    for (std::size_t i = 0; i < signals.size(); ++i) signals[i].advance(tau[i]);
+  }
 };
 
 /// The same behind a low-pass of one pole, or of two equal ones, plus what leaks. With u = rate tau, m = 1 - exp(-u)
@@ -62,7 +74,13 @@ class RelaxingSignal {
   void add(double offset, double drift);
   Crossing first_crossing(double end, double low, double high) const;
 
+  /// The same of many signals, in vectors.
+  static void first_crossings(std::span<const RelaxingSignal> signals, double end, const double* low,
+                              const double* high, Crossing* crossings);
+  static void advance(std::span<RelaxingSignal> signals, const double* tau);
+
  private:
+  struct Lanes;
   /// The signal at one time, with its derivatives.
   struct Point {
     double u = 0, value = 0, slope = 0, bend = 0;

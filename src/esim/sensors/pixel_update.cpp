@@ -38,6 +38,13 @@ std::size_t index(const PixelArray& pixels, int x, int y) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width) + static_cast<std::size_t>(x);
 }
 
+/// Asks memory for a row of the new irradiance while the row before is worked on.
+void prefetch_row(const Segment& segment, int y) {
+  constexpr int kPerLine = 64 / sizeof(float);
+  const float* const row = segment.irradiance1->row(y) + segment.tile.x;
+  for (int x = 0; x < segment.tile.width; x += kPerLine) __builtin_prefetch(row + x);
+}
+
 }  // namespace
 
 /// What all pixels of a segment have in common.
@@ -149,23 +156,25 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
 
 /// Where bands are of brightness: moves all low-passes on, and takes those pixels through the segment whose filtered
 /// brightness may leave its band.
-void PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
+bool PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
                          PackedEvents& events) {
   const Filter common(pixels, segment);
   const int order = pixels.options.low_pass_hz > 0 ? pixels.options.low_pass_order : 0;
   const auto most = static_cast<std::size_t>(segment.tile.width) * static_cast<std::size_t>(rows.count());
-  if (order == 0) {
-    linear_.reserve(most);
-    for (int y = rows.first; y < rows.last; ++y) filter_row<0>(pixels, segment, common, brightness, y);
-    linear_.run(pixels, segment.t0, segment.t1, events);
-    return;
-  }
-  relaxing_.reserve(most);
+  order == 0 ? linear_.reserve(most) : relaxing_.reserve(most);
   for (int y = rows.first; y < rows.last; ++y) {
-    order == 1 ? filter_row<1>(pixels, segment, common, brightness, y)
-               : filter_row<2>(pixels, segment, common, brightness, y);
+    if (!all_irradiance(segment, {y, y + 1})) return false;
+    if (y + 1 < rows.last) prefetch_row(segment, y + 1);
+    if (order == 0) filter_row<0>(pixels, segment, common, brightness, y);
+    if (order == 1) filter_row<1>(pixels, segment, common, brightness, y);
+    if (order == 2) filter_row<2>(pixels, segment, common, brightness, y);
   }
-  relaxing_.run(pixels, segment.t0, segment.t1, events);
+  if (order == 0) {
+    linear_.run(pixels, segment.t0, segment.t1, events);
+  } else {
+    relaxing_.run(pixels, segment.t0, segment.t1, events);
+  }
+  return true;
 }
 
 /// Where bands are of irradiance: takes the pixels through the segment that wake up in it.
@@ -198,10 +207,8 @@ bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, P
 
 bool PixelUpdate::advance(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
                           PackedEvents& events) {
-  if (!pixels.in_brightness) return cross(pixels, segment, rows, events);
-  if (!all_irradiance(segment, rows)) return false;
-  filter(pixels, segment, brightness, rows, events);
-  return true;
+  return pixels.in_brightness ? filter(pixels, segment, brightness, rows, events)
+                              : cross(pixels, segment, rows, events);
 }
 
 bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows) {

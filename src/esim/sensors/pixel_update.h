@@ -28,7 +28,7 @@ class PixelUpdate {
 
  private:
   bool cross(PixelArray& pixels, const Segment& segment, Rows rows, PackedEvents& events);
-  void filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
+  bool filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
               PackedEvents& events);
   struct Filter;
   template <int kOrder>

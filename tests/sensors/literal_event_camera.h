@@ -99,7 +99,7 @@ class LiteralEventCamera {
     float on = mean_on, off = mean_off;
     if (options_.threshold_noise > 0 || (leaks() && options_.leak_jitter > 0) || options_.latency_jitter_us > 0) {
       EventNormals normals;
-      normals.draw(per_event_, std::array{item}, draws_);
+      normals.draw(per_event_, std::array{EventNormals::Address{item, draws_[i]++}});
       std::copy_n(normals.of(0), 4, pixel.normals.begin());
       on = above(options_.threshold_on(), mean_on + options_.threshold_noise * pixel.normals[0]);
       off = above(options_.threshold_off(), mean_off + options_.threshold_noise * pixel.normals[1]);

@@ -21,15 +21,14 @@ void box_muller(D d, Words word0, Words word1, hn::Vec<D>& normal0, hn::Vec<D>& 
 
 }  // namespace
 
-void EventNormals::draw(const AddressedRandom& random, std::span<const std::uint32_t> pixels,
-                        std::vector<std::uint32_t>& draws) {
-  const std::size_t count = pixels.size();
+void EventNormals::draw(const AddressedRandom& random, std::span<const Address> addresses) {
+  const std::size_t count = addresses.size();
   if (words_[0].size() < count + kVectorPadding) {
     for (auto& words : words_) words.resize(2 * count + kVectorPadding);
     normals_.resize(kPerEvent * (2 * count + kVectorPadding));
   }
   for (std::size_t i = 0; i < count; ++i) {
-    const auto bits = random.bits(pixels[i], draws[pixels[i]]++);
+    const auto bits = random.bits(addresses[i].pixel, addresses[i].draw);
     for (std::size_t k = 0; k < kPerEvent; ++k) words_[k][i] = bits[k];
   }
   const hn::ScalableTag<float> d;

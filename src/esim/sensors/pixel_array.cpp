@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "esim/sensors/event_normals.h"
 #include "esim/sensors/vector_math.h"
@@ -53,9 +52,7 @@ PixelArray::PixelArray(const EventCameraOptions& o, int width_px, int height, st
 
   const AddressedRandom mismatch(seed, Purpose::threshold_mismatch, stream);
   const AddressedRandom defects(seed, Purpose::pixel_defects, stream);
-  if (renews) mean_on.resize(pixels), mean_off.resize(pixels), draws.assign(pixels, 0);
-  if (leaks) mean_leak.resize(pixels), leak.resize(pixels);
-  if (shoots) shot_at.resize(pixels), shots.assign(pixels, 0);
+  if (renews || leaks || shoots) noise.resize(pixels);
   for (std::size_t i = 0; i < pixels; ++i) {
     State& state = states[i];
     if (o.threshold_mismatch > 0) {
@@ -67,13 +64,13 @@ PixelArray::PixelArray(const EventCameraOptions& o, int width_px, int height, st
       const double rate = hot < o.hot_pixels ? o.hot_pixel_rate_hz : o.leak_rate_hz;
       const double spread =
           o.leak_mismatch_decades > 0 ? std::pow(10.0, o.leak_mismatch_decades * per_leak.normals(item(i))[0]) : 1;
-      mean_leak[i] = leak[i] = static_cast<float>(rate * spread * (threshold_on + state.on));
+      noise[i].mean_leak = noise[i].leak = static_cast<float>(rate * spread * (threshold_on + state.on));
     }
     if (dead < o.dead_pixels) {
       state.on = state.off = std::numeric_limits<float>::infinity();
-      if (leaks) mean_leak[i] = leak[i] = 0;
+      if (leaks) noise[i].mean_leak = noise[i].leak = 0;
     }
-    if (renews) mean_on[i] = state.on, mean_off[i] = state.off;
+    if (renews) noise[i].mean_on = state.on, noise[i].mean_off = state.off;
   }
   if (renews) draw_first_thresholds();
 }
@@ -84,11 +81,16 @@ void PixelArray::set_thresholds(State& state, double above_on, double above_off)
 }
 
 void PixelArray::draw_first_thresholds() {
-  std::vector<std::uint32_t> pixels(states.size());
-  std::iota(pixels.begin(), pixels.end(), 0U);
+  constexpr std::size_t kAtOnce = 4096;
   EventNormals normals;
-  normals.draw(per_event, pixels, draws);
-  for (const std::uint32_t pixel : pixels) renew(pixel, normals.of(pixel));
+  std::vector<EventNormals::Address> addresses;
+  for (std::size_t first = 0; first < states.size(); first += kAtOnce) {
+    addresses.clear();
+    for (std::size_t i = first; i < std::min(first + kAtOnce, states.size()); ++i)
+      addresses.push_back({item(i), noise[i].draws++});
+    normals.draw(per_event, addresses);
+    for (std::size_t i = 0; i < addresses.size(); ++i) renew(addresses[i].pixel, normals.of(i));
+  }
 }
 
 std::int32_t PixelArray::ticks(TimeNs t) const {
@@ -96,28 +98,29 @@ std::int32_t PixelArray::ticks(TimeNs t) const {
 }
 
 void PixelArray::renew(std::uint32_t pixel, const float* normals) {
-  const double noise = options.threshold_noise;
-  set_thresholds(states[pixel], mean_on[pixel] + noise * normals[0], mean_off[pixel] + noise * normals[1]);
+  Noise& own = noise[pixel];
+  const double sigma = options.threshold_noise;
+  set_thresholds(states[pixel], own.mean_on + sigma * normals[0], own.mean_off + sigma * normals[1]);
   if (leaks) {
     const double interval = std::max(1.0 + options.leak_jitter * normals[2], kMinLeakInterval);
-    leak[pixel] = static_cast<float>(mean_leak[pixel] / interval);
+    own.leak = static_cast<float>(own.mean_leak / interval);
   }
 }
 
 void PixelArray::next_shot(std::uint32_t pixel, double uniform) {
   constexpr double kLongest = 1e17;  // ns
-  shot_at[pixel] += static_cast<TimeNs>(std::min(-std::log(uniform) / options.shot_noise_hz * 1e9, kLongest)) + 1;
+  noise[pixel].shot_at += static_cast<TimeNs>(std::min(-std::log(uniform) / options.shot_noise_hz * 1e9, kLongest)) + 1;
 }
 
-PixelArray::Levels PixelArray::sleep_until_alarm(std::uint32_t pixel, TimeNs now) {
+PixelArray::Levels PixelArray::sleep_until_alarm(std::uint32_t pixel, TimeNs now, double signal) {
   constexpr double kLongestNs = 1e17;
   double low = level_off(pixel), high = level_on(pixel);
   TimeNs alarm = std::numeric_limits<TimeNs>::max() / 2;
-  if (shoots) alarm = shot_at[pixel];
-  if (leaks && leak[pixel] > 0) {
-    // Both levels fall by what leaks: the lower one is lowest at the alarm, but surely not above where it is now.
-    const double rate = leak[pixel];
-    const double valid_s = std::min(kLeakPerBand * (threshold_on + states[pixel].on) / rate, kLongestNs * 1e-9);
+  if (shoots) alarm = noise[pixel].shot_at;
+  if (const double rate = leak(pixel); rate > 0) {
+    // Both levels fall by what leaks: the upper one until the alarm; the lower one is surely not above where it is now.
+    const double most = kLeakPerBand * (threshold_on + states[pixel].on);
+    const double valid_s = std::min(std::min(most, 0.5 * (high - signal)) / rate, kLongestNs * 1e-9);
     alarm = std::min(alarm, now + static_cast<TimeNs>(valid_s * 1e9));
     const double since = seconds_since_epoch(now);
     low -= rate * since;
@@ -148,25 +151,27 @@ void PixelArray::set_bands(std::size_t count, const std::uint32_t* which, float*
   }
 }
 
-void PixelArray::open(std::uint32_t pixel, double value, TimeNs t) {
+double PixelArray::open(std::uint32_t pixel, double value, TimeNs t) {
   State& state = states[pixel];
-  state.reference = in_brightness ? value : std::log(value + options.log_eps);
+  double signal = in_brightness ? value : std::log(value + options.log_eps);
+  state.reference = signal;
   if (in_brightness) {
     const auto brightness_now = static_cast<float>(value);
     brightness[pixel] = brightness_now;
     if (!filtered1.empty()) filtered1[pixel] = brightness_now;
     if (!filtered2.empty()) filtered2[pixel] = brightness_now;
   }
-  if (leaks && leak[pixel] > 0) {
+  if (const double rate = leak(pixel); rate > 0) {
     // The sensor has been running before: it is anywhere between two leak events.
-    state.reference += leak[pixel] * seconds_since_epoch(t);
-    state.reference -= (threshold_on + state.on) * per_leak.uniforms(pixel, 1)[0];
+    signal += rate * seconds_since_epoch(t);
+    state.reference = signal - (threshold_on + state.on) * per_leak.uniforms(pixel, 1)[0];
   }
   if (shoots) {
-    shot_at[pixel] = t;
+    noise[pixel].shot_at = t;
     next_shot(pixel, per_shot.uniforms(pixel, 0)[0]);
-    shots[pixel] = 1;
+    noise[pixel].shots = 1;
   }
+  return signal;
 }
 
 }  // namespace esim

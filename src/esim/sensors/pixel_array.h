@@ -42,20 +42,35 @@ class PixelArray {
     if (epoch == kLongAgo) epoch = t;
   }
 
-  /// Sets the reference of a pixel that is first seen at time t. `value` is its irradiance, or its brightness where
-  /// bands are of that.
-  void open(std::uint32_t pixel, double value, TimeNs t);
+  /// Sets the reference of a pixel that is first seen at time t, and returns G. `value` is its irradiance, or its
+  /// brightness where bands are of that.
+  double open(std::uint32_t pixel, double value, TimeNs t);
+
+  /// What leaks, in brightness per second.
+  double leak(std::uint32_t pixel) const { return leaks ? noise[pixel].leak : 0.0; }
+
+  /// Brightness behind the low-pass at the last sample, where bands are of that.
+  double filtered(std::uint32_t pixel) const {
+    if (!filtered2.empty()) return filtered2[pixel];
+    return filtered1.empty() ? brightness[pixel] : filtered1[pixel];
+  }
+
+  /// Asks memory for what is needed of a pixel that wakes up.
+  void prefetch(std::uint32_t pixel) const {
+    __builtin_prefetch(&states[pixel], 1);
+    if (!noise.empty()) __builtin_prefetch(&noise[pixel], 1);
+  }
 
   double level_on(std::uint32_t pixel) const { return states[pixel].reference + threshold_on + states[pixel].on; }
   double level_off(std::uint32_t pixel) const { return states[pixel].reference - threshold_off - states[pixel].off; }
 
-  /// Levels of the signal without what leaks, between which the pixel can sleep from `now` until its alarm, which is
-  /// set.
+  /// Levels of the signal without what leaks, between which the pixel can sleep from `now`, when its signal is G, until
+  /// its alarm, which is set.
   struct Levels {
     float low, high;
   };
-  Levels sleep(std::uint32_t pixel, TimeNs now) {
-    if (alarmed) return sleep_until_alarm(pixel, now);
+  Levels sleep(std::uint32_t pixel, TimeNs now, double signal) {
+    if (alarmed) return sleep_until_alarm(pixel, now, signal);
     return {static_cast<float>(level_off(pixel)), static_cast<float>(level_on(pixel))};
   }
 
@@ -108,17 +123,20 @@ class PixelArray {
   // With in_brightness: the brightness at the last sample, and behind each pole.
   std::vector<float> brightness, filtered1, filtered2;
 
-  // With renews, leaks and shoots, respectively.
-  std::vector<float> mean_on, mean_off;
-  std::vector<std::uint32_t> draws;
-  std::vector<float> mean_leak, leak;  // 1/s, in brightness
-  std::vector<TimeNs> shot_at;
-  std::vector<std::uint32_t> shots;
+  /// What is random about a pixel; where anything is.
+  struct alignas(32) Noise {
+    float mean_on = 0, mean_off = 0;  // of State::on and off
+    float mean_leak = 0, leak = 0;    // 1/s, in brightness
+    std::uint32_t draws = 0;          // for its events, so far
+    std::uint32_t shots = 0;          // candidates of shot noise, so far
+    TimeNs shot_at = 0;               // the next of them
+  };
+  std::vector<Noise> noise;
 
   AddressedRandom per_event, per_shot, per_leak;
 
  private:
-  Levels sleep_until_alarm(std::uint32_t pixel, TimeNs now);
+  Levels sleep_until_alarm(std::uint32_t pixel, TimeNs now, double signal);
   void draw_first_thresholds();
   void set_thresholds(State& state, double above_on, double above_off);
 };

@@ -48,7 +48,7 @@ void PixelPass<Signal>::begin(PixelArray& pixels) {
     const std::uint32_t pixel = awake_[i].pixel;
     const bool was_held = pixels.holds && pixels.states[pixel].reference == kHeld;
     if (was_held && pixels.until[pixel] > t1_) continue;
-    if (pixels.leaks) signals_[i].add(pixels.leak[pixel] * epoch_s_, pixels.leak[pixel] * 1e-9);
+    if (pixels.leaks) signals_[i].add(pixels.leak(pixel) * epoch_s_, pixels.leak(pixel) * 1e-9);
     if (was_held) {
       signals_[i].advance(static_cast<double>(pixels.until[pixel] - t0_));
       pixels.states[pixel].reference = signals_[i].value();
@@ -71,7 +71,7 @@ void PixelPass<Signal>::find(PixelArray& pixels) {
   for (std::size_t i = 0; i < count_; ++i) {
     const Crossing first = pixels.shoots ? shot_before(pixels, i, crossings_[i]) : crossings_[i];
     if (first.tau == kNever) {
-      settle(pixels, awake_[i].pixel);
+      settle(pixels, i);
       continue;
     }
     next_[kept] = {first.tau, first.on ? level_high_[i] : level_low_[i], static_cast<std::int8_t>(first.on ? 1 : -1),
@@ -86,11 +86,12 @@ void PixelPass<Signal>::find(PixelArray& pixels) {
 template <class Signal>
 Crossing PixelPass<Signal>::shot_before(PixelArray& pixels, std::size_t i, Crossing crossing) const {
   const AwakePixel& awake = awake_[i];
-  while (pixels.shot_at[awake.pixel] <= t1_) {
-    const double tau = static_cast<double>(pixels.shot_at[awake.pixel] - t0_);
+  PixelArray::Noise& noise = pixels.noise[awake.pixel];
+  while (noise.shot_at <= t1_) {
+    const double tau = static_cast<double>(noise.shot_at - t0_);
     if (tau >= crossing.tau) break;
     constexpr double kToUnit = 0x1.0p-32;
-    const auto bits = pixels.per_shot.bits(awake.pixel, pixels.shots[awake.pixel]++);
+    const auto bits = pixels.per_shot.bits(awake.pixel, noise.shots++);
     pixels.next_shot(awake.pixel, (bits[0] + 0.5) * kToUnit);
     if (tau <= 0 || tau < signals_[i].from()) continue;  // it fell into a refractory period
     const double light = awake.light0 + (awake.light1 - awake.light0) * tau / duration_;
@@ -104,14 +105,17 @@ Crossing PixelPass<Signal>::shot_before(PixelArray& pixels, std::size_t i, Cross
 /// Draws the thresholds and leaks after the events that were found.
 template <class Signal>
 void PixelPass<Signal>::renew(PixelArray& pixels) {
-  for (std::size_t i = 0; i < count_; ++i) firing_[i] = awake_[i].pixel;
-  normals_.draw(pixels.per_event, std::span(firing_).first(count_), pixels.draws);
   for (std::size_t i = 0; i < count_; ++i) {
-    const double before = pixels.leaks ? pixels.leak[firing_[i]] : 0;
-    pixels.renew(firing_[i], normals_.of(i));
+    firing_[i] = {awake_[i].pixel, pixels.noise[awake_[i].pixel].draws++};
+  }
+  normals_.draw(pixels.per_event, std::span(firing_).first(count_));
+  for (std::size_t i = 0; i < count_; ++i) {
+    const std::uint32_t pixel = awake_[i].pixel;
+    const double before = pixels.leak(pixel);
+    pixels.renew(pixel, normals_.of(i));
     if (!pixels.leaks) continue;
     // From this event on, so that the signal stands where it stood.
-    const double change = pixels.leak[firing_[i]] - before;
+    const double change = pixels.leak(pixel) - before;
     signals_[i].add(change * epoch_s_, change * 1e-9);
     next_[i].reference += change * (epoch_s_ + next_[i].tau * 1e-9);
   }
@@ -166,8 +170,14 @@ void PixelPass<Signal>::resume(PixelArray& pixels) {
 
 /// Notes the levels that the pixel sleeps between, and sets its alarm.
 template <class Signal>
-void PixelPass<Signal>::settle(PixelArray& pixels, std::uint32_t pixel) {
-  const PixelArray::Levels levels = pixels.sleep(pixel, t1_);
+void PixelPass<Signal>::settle(PixelArray& pixels, std::size_t i) {
+  const std::uint32_t pixel = awake_[i].pixel;
+  double signal = 0;
+  if (pixels.leaks) {
+    signal = pixels.in_brightness ? pixels.filtered(pixel) + pixels.leak(pixel) * pixels.seconds_since_epoch(t1_)
+                                  : signals_[i].value(duration_);
+  }
+  const PixelArray::Levels levels = pixels.sleep(pixel, t1_, signal);
   settled_[settled_count_] = pixel;
   low_[settled_count_] = levels.low;
   high_[settled_count_++] = levels.high;
@@ -183,7 +193,8 @@ void PixelPass<Signal>::set_bands(PixelArray& pixels) {
 template <class Signal>
 void PixelPass<Signal>::settle_all(PixelArray& pixels, TimeNs t) {
   t1_ = t;
-  for (std::size_t i = 0; i < count_; ++i) settle(pixels, awake_[i].pixel);
+  duration_ = 0;
+  for (std::size_t i = 0; i < count_; ++i) settle(pixels, i);
   set_bands(pixels);
 }
 

@@ -34,7 +34,7 @@ class PixelPass {
   const AwakePixel& pixel(std::size_t i) const { return awake_[i]; }
   Signal& signal(std::size_t i) { return signals_[i]; }
 
-  /// Gives the pixels the bands that follow from their references at time t, and forgets them.
+  /// Gives the pixels the bands that follow from their references and signals at time t, and forgets them.
   void settle_all(PixelArray& pixels, TimeNs t);
 
   /// Adds the pixels' events to `events`, in any order, and forgets the pixels.
@@ -59,7 +59,7 @@ class PixelPass {
   void keep(std::size_t from, std::size_t to);
   Crossing shot_before(PixelArray& pixels, std::size_t i, Crossing crossing) const;
   TimeNs delay(const PixelArray& pixels, std::size_t i) const;
-  void settle(PixelArray& pixels, std::uint32_t pixel);
+  void settle(PixelArray& pixels, std::size_t i);
   void set_bands(PixelArray& pixels);
 
   TimeNs t0_ = 0, t1_ = 0;
@@ -80,7 +80,7 @@ class PixelPass {
   std::size_t settled_count_ = 0;
 
   EventNormals normals_;
-  std::vector<std::uint32_t> firing_;
+  std::vector<EventNormals::Address> firing_;
 };
 
 extern template class PixelPass<LinearSignal>;

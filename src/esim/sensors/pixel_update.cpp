@@ -29,7 +29,7 @@ hn::Mask<D> alarmed(D d, const std::int32_t* alarms, std::int32_t now) {
 AwakePixel awake_pixel(const PixelArray& pixels, const Segment& segment, int x, int y) {
   const auto pixel =
       static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(pixels.width) + static_cast<std::uint32_t>(x);
-  __builtin_prefetch(&pixels.states[pixel], 1);
+  pixels.prefetch(pixel);
   return {pixel, static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), segment.irradiance0->row(y)[x],
           segment.irradiance1->row(y)[x]};
 }
@@ -219,8 +219,7 @@ bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<f
                                                   : segment.irradiance1->row(y) + segment.tile.x;
     for (int i = 0; i < segment.tile.width; ++i) {
       const AwakePixel awake = awake_pixel(pixels, segment, segment.tile.x + i, y);
-      pixels.open(awake.pixel, row[i], segment.t0);
-      linear_.add(awake);
+      linear_.add(awake, {pixels.open(awake.pixel, row[i], segment.t0), 0.0});
     }
   }
   linear_.settle_all(pixels, segment.t0);

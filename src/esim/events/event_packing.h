@@ -28,10 +28,13 @@ class EventPacking {
     return (static_cast<std::uint64_t>(since_origin) << time_shift_) | place | static_cast<std::uint64_t>(on);
   }
   Event unpack(std::uint64_t packed) const {
-    const std::uint64_t place = packed & ((std::uint64_t{1} << time_shift_) - 1);
-    return {origin + static_cast<TimeNs>(packed >> time_shift_),
-            static_cast<std::uint16_t>((place >> 1) & ((std::uint64_t{1} << x_bits_) - 1)),
-            static_cast<std::uint16_t>(place >> (x_bits_ + 1)), static_cast<std::int8_t>((packed & 1) != 0 ? 1 : -1)};
+    const std::uint64_t where = packed >> 1;
+    Event event;
+    event.t = origin + static_cast<TimeNs>(packed >> time_shift_);
+    event.x = static_cast<std::uint16_t>(where & ((std::uint64_t{1} << x_bits_) - 1));
+    event.y = static_cast<std::uint16_t>((where >> x_bits_) & ((std::uint64_t{1} << (time_shift_ - 1 - x_bits_)) - 1));
+    event.polarity = static_cast<std::int8_t>(static_cast<int>(packed & 1) * 2 - 1);
+    return event;
   }
 
   int time_shift() const { return time_shift_; }

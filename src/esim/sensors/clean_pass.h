@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "esim/render/sample.h"
@@ -14,6 +16,11 @@ namespace esim {
 /// memory to work in.
 class CleanPass {
  public:
+  CleanPass();
+  ~CleanPass();
+  CleanPass(CleanPass&&) noexcept;
+  CleanPass& operator=(CleanPass&&) noexcept;
+
   static bool serves(const PixelArray& pixels) {
     return !pixels.in_brightness && !pixels.alarmed && !pixels.renews && !pixels.delays &&
            (pixels.refractory == 0 || pixels.holds);
@@ -23,26 +30,10 @@ class CleanPass {
   void run(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, Rows rows, PackedEvents& events);
 
  private:
-  void gather(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, Rows rows,
-              const EventPacking& packing);
-  void resume(PixelArray& pixels, const Segment& segment);
-  void find_crossings(double duration, double refractory);
-  void report(PixelArray& pixels, TimeNs t0, double duration, PackedEvents& events);
-  void set_bands(PixelArray& pixels);
-  void make_room(std::size_t count);
-  void move(std::size_t from, std::size_t to);
+  struct Block;
+  void run_block(PixelArray& pixels, const Segment& segment, PackedEvents& events);
 
-  // By pixel that is awake. Brightness is at the segment's ends; times are ns after its start.
-  std::vector<double> before_, after_, on_, off_, reference_;
-  std::vector<double> crossing_, polarity_, next_reference_, resumes_;
-  std::vector<std::uint32_t> pixel_;
-  std::vector<std::uint64_t> place_;
-  std::size_t count_ = 0;
-
-  // By pixel that is done: the levels that it sleeps between.
-  std::vector<std::uint32_t> settled_;
-  std::vector<float> low_, high_;
-  std::size_t settled_count_ = 0;
+  std::unique_ptr<Block> block_;  // small enough for the first level of cache
 };
 
 }  // namespace esim

@@ -15,27 +15,6 @@ double moved_after(double u) {
 
 }  // namespace
 
-RelaxingSignal::RelaxingSignal(bool two_poles, double rate, double moved, double filtered1, double filtered2,
-                               double start, double rise)
-    : two_poles_(two_poles),
-      rate_(rate),
-      start_(start),
-      rise_(rise),
-      filtered1_(filtered1),
-      filtered2_(filtered2),
-      moved_(moved) {
-  at_from_ = at(0, 0);
-}
-
-RelaxingSignal RelaxingSignal::first_order(double rate, double moved, double filtered, double start, double slope) {
-  return {false, rate, moved, filtered, filtered, start, slope / rate};
-}
-
-RelaxingSignal RelaxingSignal::second_order(double rate, double moved, double filtered1, double filtered2, double start,
-                                            double slope) {
-  return {true, rate, moved, filtered1, filtered2, start, slope / rate};
-}
-
 RelaxingSignal::Point RelaxingSignal::at(double u, double moved) const {
   const double first = filtered1_ + (start_ - filtered1_) * moved + rise_ * (u - moved);
   const double input = start_ + rise_ * u;

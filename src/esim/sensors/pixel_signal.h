@@ -61,11 +61,20 @@ class RelaxingSignal {
 
   /// One pole, at `filtered` when its input, `start`, begins to rise with `slope` per ns. `moved` is m at the segment's
   /// end.
-  static RelaxingSignal first_order(double rate, double moved, double filtered, double start, double slope);
+  static RelaxingSignal first_order(double rate, double moved, double filtered, double start, double slope) {
+    RelaxingSignal signal(false, rate, moved, filtered, filtered, start, slope / rate);
+    const double distance = start - filtered;
+    signal.at_from_ = {0, filtered, distance, signal.rise_ - distance};
+    return signal;
+  }
 
   /// Two poles, one behind the other, at `filtered1` and `filtered2`.
   static RelaxingSignal second_order(double rate, double moved, double filtered1, double filtered2, double start,
-                                     double slope);
+                                     double slope) {
+    RelaxingSignal signal(true, rate, moved, filtered1, filtered2, start, slope / rate);
+    signal.at_from_ = {0, filtered2, filtered1 - filtered2, start - 2 * filtered1 + filtered2};
+    return signal;
+  }
 
   double from() const { return at_from_.u / rate_; }
   double value(double tau) const;
@@ -86,7 +95,14 @@ class RelaxingSignal {
     double u = 0, value = 0, slope = 0, bend = 0;
   };
   RelaxingSignal(bool two_poles, double rate, double moved, double filtered1, double filtered2, double start,
-                 double rise);
+                 double rise)
+      : two_poles_(two_poles),
+        rate_(rate),
+        start_(start),
+        rise_(rise),
+        filtered1_(filtered1),
+        filtered2_(filtered2),
+        moved_(moved) {}
   Point at(double u) const;
   Point at(double u, double moved) const;
   double solve(double level, const Point& a, const Point& b) const;

@@ -58,7 +58,11 @@ bool PixelWatch::look(const PixelArray& pixels, const Segment& segment, Rows row
     // What is needed next of the pixels comes from memory while the rows behind are looked at.
     const PixelArray::State* const states =
         pixels.states.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width);
-    for (std::size_t i = before; i < count; ++i) __builtin_prefetch(states + columns_[i], 1);
+    const float* const light0 = segment.irradiance0->row(y);
+    for (std::size_t i = before; i < count; ++i) {
+      __builtin_prefetch(states + columns_[i], 1);
+      __builtin_prefetch(light0 + columns_[i]);
+    }
   }
   return true;
 }

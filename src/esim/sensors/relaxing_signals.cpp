@@ -66,7 +66,10 @@ struct RelaxingSignal::Lanes {
     const V upper = load(high), lower = load(low);
     const auto on = hn::Ge(v1, upper), off = hn::Le(v1, lower), crosses = hn::Or(on, off);
     const auto straight = hn::Gt(hn::Mul(g0, g1), hn::Zero(kD));
-    auto clear = hn::Or(straight, hn::AndNot(crosses, turns_inside(last, upper, lower)));
+    auto clear = straight;
+    if (const auto bent = hn::Not(hn::Or(straight, crosses)); !hn::AllFalse(kD, bent)) {
+      clear = hn::Or(clear, hn::And(bent, turns_inside(last, upper, lower)));
+    }
     clear = hn::And(clear, hn::And(hn::Lt(v0, upper), hn::Gt(v0, lower)));
 
     // The inverse cubic.

@@ -277,5 +277,80 @@ TEST(EventCamera, RefusesWhatIsNoIrradiance) {
   }
 }
 
+TEST(EventCamera, TakesFramesChunkByChunk) {
+  const EventCameraOptions options{.contrast_threshold = 0.2, .threshold_noise = 0.02, .refractory_period_us = 50};
+  Feed feed(options, 37, 11, 3);
+  EventCamera camera(options, 37, 11, 3);
+  std::vector<Event> events;
+  TimeNs t = 5;
+  for (const Image<float>& frame : random_frames(37, 11, 20, 8)) {
+    feed.frame(frame, t);
+    camera.process(frame, t, events, test::kOneThread);
+    t += kNsPerMs;
+  }
+  EXPECT_GT(events.size(), 1000U);
+  EXPECT_EQ(events, feed.events(t));
+}
+
+TEST(EventCamera, RefusesAFrameAndGoesOnAsIfItHadNotBeen) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
+  for (const bool filtered : {false, true}) {
+    EventCameraOptions options{.contrast_threshold = 0.2};
+    if (filtered) options.low_pass_hz = 100;
+    EventCamera camera(options, 16, 12), undisturbed(options, 16, 12);
+    const std::vector<Image<float>> frames = random_frames(16, 12, 10, 4);
+    std::vector<Event> events, expected;
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      const TimeNs t = static_cast<TimeNs>(k) * kNsPerMs;
+      camera.process(frames[k], t, events, test::kOneThread);
+      undisturbed.process(frames[k], t, expected, test::kOneThread);
+      const auto refusal = [&](const Image<float>& frame, TimeNs at) {
+        return test::message_of<UserError>([&] { camera.process(frame, at, events, test::kOneThread); });
+      };
+      const std::string name = "frame " + std::to_string(k + 1) + ":";
+      for (const float bad : {kNan, kInf, -kInf, -1e-9F, -1.0F}) {
+        Image<float> broken = frames[k];
+        broken(15, 7) = bad;
+        const std::string message = refusal(broken, t + 1000);
+        EXPECT_TRUE(test::contains(message, name)) << message;
+        EXPECT_TRUE(test::contains(message, "(15, 7)")) << message;
+      }
+      EXPECT_TRUE(test::contains(refusal(Image<float>(12, 16, 1.0F), t + 1000), name));
+      EXPECT_TRUE(test::contains(refusal(Image<float>(), t + 1000), "0 x 0"));
+      EXPECT_TRUE(test::contains(refusal(frames[k], t), "does not come after"));
+      EXPECT_TRUE(test::contains(refusal(frames[k], t - 5), name));
+    }
+    EXPECT_EQ(events, expected);
+    EXPECT_GT(events.size(), 100U);
+  }
+}
+
+TEST(EventCamera, KeepsWhatCameBeforeABadSegment) {
+  Feed feed({}, 40, 3);
+  feed.frame(Image<float>(40, 3, 0.1F), 0);
+  feed.frame(Image<float>(40, 3, 0.9F), kNsPerMs);
+  EXPECT_THROW(feed.frame(Image<float>(40, 3, -1.0F), 2 * kNsPerMs), UserError);
+  EXPECT_EQ(feed.events(kNsPerMs).size(), 40U * 3 * 4);
+  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { feed.frame(Image<float>(40, 3, 0.9F), 3 * kNsPerMs); }),
+                             "cannot go on"));
+}
+
+TEST(EventCamera, TimesFarFromZeroAreAsExactAsAnyOthers) {
+  // Nanoseconds since 1970 and a large image's narrow packing.
+  for (const TimeNs start : {TimeNs{1'700'000'000} * kNsPerSecond, -TimeNs{5'000'000'000} * kNsPerSecond}) {
+    const EventCameraOptions options{.contrast_threshold = 0.3, .leak_rate_hz = 3, .shot_noise_hz = 20};
+    Feed here(options, 20, 10, 1), there(options, 20, 10, 1);
+    TimeNs t = 0;
+    for (const Image<float>& frame : random_frames(20, 10, 30, 2)) {
+      here.frame(frame, t), there.frame(frame, start + t);
+      t += 10 * kNsPerMs;
+    }
+    std::vector<Event> expected = here.events();
+    for (Event& event : expected) event.t += start;
+    EXPECT_EQ(there.events(), expected);
+    EXPECT_GT(expected.size(), 500U);
+  }
+}
+
 }  // namespace
 }  // namespace esim

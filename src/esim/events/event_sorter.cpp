@@ -14,15 +14,25 @@ constexpr std::size_t kRanges = 16;           // of time, sorted in parallel
 constexpr std::size_t kTooFewToShare = 2048;  // events
 constexpr std::size_t kTooFewForRadix = 64;
 
-/// One stable pass of a radix sort.
-void radix_pass(std::span<const std::uint64_t> from, std::span<std::uint64_t> to, int shift, int bits) {
-  std::array<std::uint32_t, std::size_t{1} << kMaxDigitBits> position;
-  const std::size_t buckets = std::size_t{1} << bits, mask = buckets - 1;
-  std::fill_n(position.begin(), buckets, 0U);
-  for (const std::uint64_t key : from) ++position[(key >> shift) & mask];
+using Counts = std::array<std::uint32_t, std::size_t{1} << kMaxDigitBits>;
+
+/// Positions of the buckets from the numbers in them.
+void add_up(Counts& counts, std::size_t buckets) {
   std::uint32_t sum = 0;
-  for (std::size_t i = 0; i < buckets; ++i) sum += std::exchange(position[i], sum);
-  for (const std::uint64_t key : from) to[position[(key >> shift) & mask]++] = key;
+  for (std::size_t i = 0; i < buckets; ++i) sum += std::exchange(counts[i], sum);
+}
+
+/// Two stable passes of a radix sort, by `bits` bits from `shift` on and as many above: from `keys` and back.
+void two_passes(std::span<std::uint64_t> keys, std::span<std::uint64_t> scratch, int shift, int bits) {
+  const std::size_t buckets = std::size_t{1} << bits, mask = buckets - 1;
+  Counts low, high;
+  std::fill_n(low.begin(), buckets, 0U);
+  std::fill_n(high.begin(), buckets, 0U);
+  for (const std::uint64_t key : keys) ++low[(key >> shift) & mask], ++high[(key >> (shift + bits)) & mask];
+  add_up(low, buckets);
+  add_up(high, buckets);
+  for (const std::uint64_t key : keys) scratch[low[(key >> shift) & mask]++] = key;
+  for (const std::uint64_t key : scratch.first(keys.size())) keys[high[(key >> (shift + bits)) & mask]++] = key;
 }
 
 /// Orders keys whose bits from `shift` on, `bits` of them, are ordered: those that are equal there, few of which are
@@ -48,10 +58,7 @@ void sort_keys(std::span<std::uint64_t> keys, std::span<std::uint64_t> scratch, 
   // An even number of passes ends where it began.
   const int passes = (bits + 2 * kMaxDigitBits - 1) / (2 * kMaxDigitBits) * 2;
   const int digit = passes > 0 ? (bits + passes - 1) / passes : 0;
-  for (int i = 0; i < passes; i += 2) {
-    radix_pass(keys, scratch, shift + i * digit, digit);
-    radix_pass(scratch, keys, shift + (i + 1) * digit, digit);
-  }
+  for (int i = 0; i < passes; i += 2) two_passes(keys, scratch, shift + i * digit, digit);
   order_ties(keys, shift);
 }
 
@@ -97,21 +104,31 @@ void EventSorter::scatter(std::span<std::vector<std::uint64_t>> parts, int shift
 
 void EventSorter::sort(std::span<std::vector<std::uint64_t>> parts, const EventPacking& packing, const Workers& workers,
                        std::vector<Event>& sorted) {
-  std::size_t count = 0;
-  std::uint64_t some = 0, differing = 0;
-  for (const auto& part : parts) {
+  std::size_t count = 0, filled = 0;
+  std::vector<std::uint64_t>* last_filled = nullptr;
+  for (auto& part : parts) {
     count += part.size();
-    if (!part.empty()) some = part.front();
+    if (!part.empty()) ++filled, last_filled = &part;
   }
   sorted.resize(count);
   if (count == 0) return;
-  if (keys_.size() < count) keys_.resize(2 * count), scratch_.resize(2 * count);
+  if (scratch_.size() < count) scratch_.resize(2 * count);
 
   // How many bits of the time do they differ in?
+  const std::uint64_t some = last_filled->front();
+  std::uint64_t differing = 0;
   for (const auto& part : parts) {
     for (const std::uint64_t key : part) differing |= key ^ some;
   }
   const int bits = std::max(0, static_cast<int>(std::bit_width(differing)) - packing.time_shift());
+  if (filled == 1 && workers.threads() == 1) {
+    sort_keys(*last_filled, scratch_, packing.time_shift(), bits);
+    for (std::size_t i = 0; i < count; ++i) sorted[i] = packing.unpack((*last_filled)[i]);
+    last_filled->clear();
+    return;
+  }
+
+  if (keys_.size() < count) keys_.resize(2 * count);
   const bool share = workers.threads() > 1 && count >= kTooFewToShare;
   const int range_bits = share ? std::min(bits, static_cast<int>(std::bit_width(kRanges)) - 1) : 0;
   const int sorted_bits = bits - range_bits;

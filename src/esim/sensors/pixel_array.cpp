@@ -151,15 +151,15 @@ void PixelArray::set_bands(std::size_t count, const std::uint32_t* which, float*
   }
 }
 
-double PixelArray::open(std::uint32_t pixel, double value, TimeNs t) {
+double PixelArray::open(std::uint32_t pixel, double brightness_now, TimeNs t) {
   State& state = states[pixel];
-  double signal = in_brightness ? value : std::log(value + options.log_eps);
+  double signal = brightness_now;
   state.reference = signal;
   if (in_brightness) {
-    const auto brightness_now = static_cast<float>(value);
-    brightness[pixel] = brightness_now;
-    if (!filtered1.empty()) filtered1[pixel] = brightness_now;
-    if (!filtered2.empty()) filtered2[pixel] = brightness_now;
+    const auto value = static_cast<float>(brightness_now);
+    brightness[pixel] = value;
+    if (!filtered1.empty()) filtered1[pixel] = value;
+    if (!filtered2.empty()) filtered2[pixel] = value;
   }
   if (const double rate = leak(pixel); rate > 0) {
     // The sensor has been running before: it is anywhere between two leak events.

@@ -42,9 +42,8 @@ class PixelArray {
     if (epoch == kLongAgo) epoch = t;
   }
 
-  /// Sets the reference of a pixel that is first seen at time t, and returns G. `value` is its irradiance, or its
-  /// brightness where bands are of that.
-  double open(std::uint32_t pixel, double value, TimeNs t);
+  /// Sets the reference of a pixel that is first seen at time t, with this brightness, and returns G.
+  double open(std::uint32_t pixel, double brightness_now, TimeNs t);
 
   /// What leaks, in brightness per second.
   double leak(std::uint32_t pixel) const { return leaks ? noise[pixel].leak : 0.0; }

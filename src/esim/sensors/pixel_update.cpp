@@ -214,12 +214,20 @@ bool PixelUpdate::advance(PixelArray& pixels, const Segment& segment, const Imag
 bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows) {
   if (!all_irradiance(segment, rows)) return false;
   linear_.reserve(static_cast<std::size_t>(segment.tile.width) * static_cast<std::size_t>(rows.count()));
+  const auto width = static_cast<std::size_t>(segment.tile.width);
+  if (after_.size() < width + kVectorPadding) after_.resize(width + kVectorPadding, 1.0);
   for (int y = rows.first; y < rows.last; ++y) {
-    const float* const row = pixels.in_brightness ? brightness_row(pixels, segment, brightness, y)
-                                                  : segment.irradiance1->row(y) + segment.tile.x;
+    if (pixels.in_brightness) {
+      const float* const row = brightness_row(pixels, segment, brightness, y);
+      std::copy_n(row, width, after_.data());
+    } else {
+      const float* const row = segment.irradiance1->row(y) + segment.tile.x;
+      for (std::size_t i = 0; i < width; ++i) after_[i] = row[i] + pixels.options.log_eps;
+      logarithms(width, after_.data());
+    }
     for (int i = 0; i < segment.tile.width; ++i) {
       const AwakePixel awake = awake_pixel(pixels, segment, segment.tile.x + i, y);
-      linear_.add(awake, {pixels.open(awake.pixel, row[i], segment.t0), 0.0});
+      linear_.add(awake, {pixels.open(awake.pixel, after_[static_cast<std::size_t>(i)], segment.t0), 0.0});
     }
   }
   linear_.settle_all(pixels, segment.t0);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <span>
 
 #include "esim/sensors/vector_math.h"
@@ -11,38 +12,75 @@ namespace esim {
 namespace {
 
 constexpr std::size_t kBlock = 256;  // pixels
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 template <typename T>
 using PerPixel = std::array<T, kBlock + kVectorPadding>;
 
-}  // namespace
-
-/// Some pixels that are awake. Brightness is at the segment's ends; times are ns after its start.
-struct CleanPass::Block {
+/// Pixels on their way through a segment. Brightness is at the segment's ends; times are ns after its start.
+struct Lanes {
   PerPixel<double> before, after, on, off, reference;
-  PerPixel<double> crossing, polarity, next_reference, resumes;
+  PerPixel<double> polarity;  // of the last round: 1, -1, or 0 where nothing fired
+  PerPixel<double> crossing;  // when it fired
+  PerPixel<double> resumes;   // end of the refractory period behind
   PerPixel<std::uint64_t> place;
-  PerPixel<std::uint32_t> pixel;
   std::size_t count = 0;
 
-  // Those that are done: the levels that they sleep between.
-  PerPixel<std::uint32_t> settled;
-  PerPixel<float> low, high;
-  std::size_t settled_count = 0;
+  Lanes() { before.fill(1), after.fill(1); }
 
-  Block() { before.fill(1), after.fill(1), low.fill(0), high.fill(0); }
+  /// One round: each pixel passes its next level, if it does, and takes its reference behind that.
+  void fire(double duration, double refractory) {
+    const double per_duration = 1 / duration;
+#pragma omp simd
+    for (std::size_t i = 0; i < count; ++i) {
+      const double start = before[i], end = after[i], rise = end - start, level = reference[i];
+      const double upper = level + on[i], lower = level - off[i];
+      const bool up = end >= upper, down = end <= lower;
+      const double passed = up ? upper : lower;
+      double t = std::floor((passed - start) / rise * duration + 0.5);
+      t = t > 1.0 ? t : 1.0;
+      t = t < duration ? t : duration;
+      const double until = t + refractory;
+      const double next = refractory > 0 ? start + rise * (until * per_duration) : passed;
+      crossing[i] = t;
+      resumes[i] = until;
+      polarity[i] = up ? 1.0 : (down ? -1.0 : 0.0);
+      reference[i] = up || down ? next : level;
+    }
+  }
+
+  /// A pixel that fires nothing more in this segment.
+  void silence(std::size_t i) { on[i] = off[i] = kInfinity; }
+
+  void copy(const Lanes& from, std::size_t i, std::size_t to) {
+    before[to] = from.before[i], after[to] = from.after[i];
+    on[to] = from.on[i], off[to] = from.off[i];
+    reference[to] = from.reference[i], place[to] = from.place[i];
+  }
+};
+
+}  // namespace
+
+struct CleanPass::Block {
+  Lanes all;
+  PerPixel<std::uint32_t> pixel;
+  bool some_held = false;  // among those that were gathered
+
+  // The few pixels that fire more than twice, and which they are.
+  Lanes rest;
+  PerPixel<std::uint32_t> origin;
+
+  PerPixel<float> low, high;  // levels to sleep between
+
+  Block() { low.fill(0), high.fill(0); }
 
   void gather(const PixelArray& pixels, const Segment& segment, const EventPacking& packing, int y,
               std::span<const std::uint32_t> columns);
   void resume(const PixelArray& pixels, const Segment& segment);
-  void find_crossings(double duration, double refractory);
-  void report(PixelArray& pixels, TimeNs t0, double duration, PackedEvents& events);
-  void keep(std::size_t from, std::size_t to, double new_reference) {
-    before[to] = before[from], after[to] = after[from];
-    on[to] = on[from], off[to] = off[from];
-    place[to] = place[from], pixel[to] = pixel[from];
-    reference[to] = new_reference;
-  }
+  void report(const Lanes& lanes, TimeNs start, PackedEvents& events) const;
+  void hold(PixelArray& pixels, Lanes& lanes, const std::uint32_t* which, TimeNs t0, double duration);
+  std::size_t take_rest();
+  void settle(PixelArray& pixels);
 };
 
 CleanPass::CleanPass() : block_(std::make_unique<Block>()) {}
@@ -56,107 +94,131 @@ void CleanPass::Block::gather(const PixelArray& pixels, const Segment& segment, 
   const float *const light0 = segment.irradiance0->row(y), *const light1 = segment.irradiance1->row(y);
   const std::uint32_t row = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(pixels.width);
   const PixelArray::State* const states = pixels.states.data() + row;
-  std::size_t i = count;
+  std::size_t i = all.count;
+  bool held = some_held;
   for (const std::uint32_t x : columns) {
-    before[i] = light0[x] + eps;
-    after[i] = light1[x] + eps;
     const PixelArray::State state = states[x];
-    reference[i] = state.reference;
-    on[i] = threshold_on + state.on;
-    off[i] = threshold_off + state.off;
+    all.before[i] = light0[x] + eps;
+    all.after[i] = light1[x] + eps;
+    all.reference[i] = state.reference;
+    all.on[i] = threshold_on + state.on;
+    all.off[i] = threshold_off + state.off;
+    all.place[i] = packing.place(static_cast<int>(x), y);
     pixel[i] = row + x;
-    place[i] = packing.place(static_cast<int>(x), y);
+    held |= state.reference == kHeld;
     ++i;
   }
-  count = i;
+  all.count = i;
+  some_held = held;
 }
 
-/// Ends the refractory periods that end in this segment. Pixels that stay in reset are dropped.
+/// Ends the refractory periods that end in this segment, and silences the pixels that stay in reset.
 void CleanPass::Block::resume(const PixelArray& pixels, const Segment& segment) {
   const double per_ns = 1.0 / static_cast<double>(segment.t1 - segment.t0);
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    double level = reference[i];
-    if (level == kHeld) [[unlikely]] {
-      const TimeNs until = pixels.until[pixel[i]];
-      if (until > segment.t1) continue;
-      level = before[i] + (after[i] - before[i]) * static_cast<double>(until - segment.t0) * per_ns;
-      reference[i] = level;
+  for (std::size_t i = 0; i < all.count; ++i) {
+    if (all.reference[i] != kHeld) continue;
+    const TimeNs until = pixels.until[pixel[i]];
+    if (until > segment.t1) {
+      all.silence(i);
+    } else {
+      const double rise = all.after[i] - all.before[i];
+      all.reference[i] = all.before[i] + rise * static_cast<double>(until - segment.t0) * per_ns;
     }
-    if (kept != i) [[unlikely]]
-      keep(i, kept, level);
-    ++kept;
-  }
-  count = kept;
-}
-
-/// When each pixel passes its next level, if it does, and its reference behind that.
-void CleanPass::Block::find_crossings(double duration, double refractory) {
-  const double per_duration = 1 / duration;
-#pragma omp simd
-  for (std::size_t i = 0; i < count; ++i) {
-    const double start = before[i], end = after[i], rise = end - start;
-    const double upper = reference[i] + on[i], lower = reference[i] - off[i];
-    const bool up = end >= upper, down = end <= lower;
-    const double level = up ? upper : lower;
-    double t = std::floor((level - start) / rise * duration + 0.5);
-    t = t > 1.0 ? t : 1.0;
-    t = t < duration ? t : duration;
-    crossing[i] = t;
-    polarity[i] = up ? 1.0 : (down ? -1.0 : 0.0);
-    const double until = t + refractory;
-    resumes[i] = until;
-    next_reference[i] = refractory > 0 ? start + rise * (until * per_duration) : level;
   }
 }
 
-/// Packs the events that were found, and settles the pixels without one. Those that may have another remain.
-void CleanPass::Block::report(PixelArray& pixels, TimeNs t0, double duration, PackedEvents& events) {
+/// Packs the events of a round. Without branches: that a pixel fires again is as hard to foresee as an event.
+void CleanPass::Block::report(const Lanes& lanes, TimeNs start, PackedEvents& events) const {
   std::vector<std::uint64_t>& out = *events.events;
   const std::size_t first = out.size();
-  out.resize(first + count);
+  out.resize(first + lanes.count);
   std::uint64_t* next = out.data() + first;
   const EventPacking packing = *events.packing;
-  const TimeNs start = t0 - packing.origin;
-  PixelArray::State* const states = pixels.states.data();
-  const bool holds = pixels.holds;
-  std::size_t kept = 0, done = settled_count;
-  for (std::size_t i = 0; i < count; ++i) {
-    const bool fired = polarity[i] != 0;
-    *next = packing.pack(start + static_cast<TimeNs>(crossing[i]), place[i], polarity[i] > 0);
-    next += fired;
-    const double level = reference[i];
-    settled[done] = pixel[i];
-    low[done] = static_cast<float>(level - off[i]);
-    high[done] = static_cast<float>(level + on[i]);
-    done += !fired;
-    states[pixel[i]].reference = level;
-    if (holds && fired && resumes[i] > duration) [[unlikely]] {
-      pixels.until[pixel[i]] = t0 + static_cast<TimeNs>(resumes[i]);
-      states[pixel[i]].reference = kHeld;
-      pixels.empty_band(pixel[i]);
-      continue;
-    }
-    keep(i, kept, next_reference[i]);
-    kept += fired;
+  for (std::size_t i = 0; i < lanes.count; ++i) {
+    *next = packing.pack(start + static_cast<TimeNs>(lanes.crossing[i]), lanes.place[i], lanes.polarity[i] > 0);
+    next += lanes.polarity[i] != 0;
   }
   out.resize(static_cast<std::size_t>(next - out.data()));
-  count = kept;
-  settled_count = done;
+}
+
+/// Holds those in reset that fired and whose refractory period ends after the segment. `which` are their indices among
+/// all; null: these are all.
+void CleanPass::Block::hold(PixelArray& pixels, Lanes& lanes, const std::uint32_t* which, TimeNs t0, double duration) {
+  bool any = false;
+  for (std::size_t i = 0; i < lanes.count; ++i) any |= lanes.resumes[i] > duration && lanes.polarity[i] != 0;
+  if (!any) return;
+  for (std::size_t i = 0; i < lanes.count; ++i) {
+    if (!(lanes.resumes[i] > duration && lanes.polarity[i] != 0)) continue;
+    const std::size_t index = which != nullptr ? which[i] : i;
+    pixels.until[pixel[index]] = t0 + static_cast<TimeNs>(lanes.resumes[i]);
+    lanes.silence(i);
+    lanes.reference[i] = all.reference[index] = kHeld;
+    all.silence(index);
+  }
+}
+
+/// Copies those pixels to `rest` that fired in the last round and may fire again.
+std::size_t CleanPass::Block::take_rest() {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < all.count; ++i) {
+    if (all.polarity[i] == 0) continue;
+    rest.copy(all, i, count);
+    origin[count++] = static_cast<std::uint32_t>(i);
+  }
+  rest.count = count;
+  return count;
+}
+
+/// Gives all pixels their references and bands.
+void CleanPass::Block::settle(PixelArray& pixels) {
+  for (std::size_t i = 0; i < all.count; ++i) {
+    low[i] = static_cast<float>(all.reference[i] - all.off[i]);
+    high[i] = static_cast<float>(all.reference[i] + all.on[i]);
+  }
+  PixelArray::State* const states = pixels.states.data();
+  for (std::size_t i = 0; i < all.count; ++i) states[pixel[i]].reference = all.reference[i];
+  pixels.set_bands(all.count, pixel.data(), low.data(), high.data());
+  if (pixels.holds) {
+    for (std::size_t i = 0; i < all.count; ++i) {
+      if (all.reference[i] == kHeld) [[unlikely]]
+        pixels.empty_band(pixel[i]);
+    }
+  }
+  all.count = 0;
+  some_held = false;
 }
 
 void CleanPass::run_block(PixelArray& pixels, const Segment& segment, PackedEvents& events) {
   Block& block = *block_;
-  logarithms(block.count, block.before.data());
-  logarithms(block.count, block.after.data());
-  if (pixels.holds) block.resume(pixels, segment);
+  if (block.all.count == 0) return;
+  logarithms(block.all.count, block.all.before.data());
+  logarithms(block.all.count, block.all.after.data());
+  if (block.some_held) block.resume(pixels, segment);
+
   const double duration = static_cast<double>(segment.t1 - segment.t0);
-  while (block.count > 0) {
-    block.find_crossings(duration, pixels.holds ? static_cast<double>(pixels.refractory) : 0.0);
-    block.report(pixels, segment.t0, duration, events);
+  const double refractory = pixels.holds ? static_cast<double>(pixels.refractory) : 0.0;
+  const TimeNs start = segment.t0 - events.packing->origin;
+  const auto round = [&](Lanes& lanes, const std::uint32_t* which) {
+    lanes.fire(duration, refractory);
+    block.report(lanes, start, events);
+    if (pixels.holds) block.hold(pixels, lanes, which, segment.t0, duration);
+  };
+  // Most pixels that wake up fire once; those that fire more than twice go on among themselves.
+  round(block.all, nullptr);
+  round(block.all, nullptr);
+  for (std::size_t left = block.take_rest(); left > 0;) {
+    Lanes& rest = block.rest;
+    round(rest, block.origin.data());
+    left = 0;
+    for (std::size_t i = 0; i < rest.count; ++i) {
+      block.all.reference[block.origin[i]] = rest.reference[i];
+      if (rest.polarity[i] == 0) continue;
+      if (left != i) rest.copy(rest, i, left), block.origin[left] = block.origin[i];
+      ++left;
+    }
+    rest.count = left;
   }
-  pixels.set_bands(block.settled_count, block.settled.data(), block.low.data(), block.high.data());
-  block.settled_count = 0;
+  block.settle(pixels);
 }
 
 void CleanPass::run(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, Rows rows,
@@ -164,10 +226,10 @@ void CleanPass::run(PixelArray& pixels, const Segment& segment, const PixelWatch
   for (int y = rows.first; y < rows.last; ++y) {
     std::span<const std::uint32_t> columns = watch.columns(y);
     while (!columns.empty()) {
-      const std::size_t room = std::min(kBlock - block_->count, columns.size());
+      const std::size_t room = std::min(kBlock - block_->all.count, columns.size());
       block_->gather(pixels, segment, *events.packing, y, columns.first(room));
       columns = columns.subspan(room);
-      if (block_->count == kBlock) run_block(pixels, segment, events);
+      if (block_->all.count == kBlock) run_block(pixels, segment, events);
     }
   }
   run_block(pixels, segment, events);

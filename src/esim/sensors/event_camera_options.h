@@ -136,8 +136,8 @@ void describe(Visitor& visit, EventCameraOptions& o) {
   visit("hot_pixel_rate_hz", o.hot_pixel_rate_hz, About{"ON events of a hot pixel", "Hz", 0, 1e6});
   visit("dead_pixels", o.dead_pixels, About{"share of pixels that never fire", "", 0, 1});
 
-  visit("latency_us", o.latency_us, About{"from the crossing to the time stamp, at white", "us", 0, 1e9});
-  visit("latency_jitter_us", o.latency_jitter_us, About{"standard deviation of the latency, at white", "us", 0, 1e9});
+  visit("latency_us", o.latency_us, About{"from the crossing to the time stamp, at white", "us", 0, 1e6});
+  visit("latency_jitter_us", o.latency_jitter_us, About{"standard deviation of the latency, at white", "us", 0, 1e6});
   visit("latency_light_share", o.latency_light_share,
         About{"share of latency and jitter that goes with 1 / intensity", "", 0, 1});
   visit("readout", o.readout, About{"from the pixels to the outside"});

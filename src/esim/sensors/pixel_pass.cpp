@@ -131,20 +131,24 @@ TimeNs PixelPass<Signal>::delay(const PixelArray& pixels, std::size_t i) const {
     const double light = awake.light0 + (awake.light1 - awake.light0) * next_[i].tau / duration_;
     ns *= 1.0 - o.latency_light_share + o.latency_light_share / pixels.relative_intensity(light);
   }
-  return static_cast<TimeNs>(std::max(ns, 0.0) + 0.5);
+  constexpr double kLongestNs = 1e17;
+  return static_cast<TimeNs>(std::clamp(ns, 0.0, kLongestNs) + 0.5);
 }
 
 /// Reports the events that were found. Pixels that are then held in reset until after the segment are dropped.
 template <class Signal>
 void PixelPass<Signal>::fire(PixelArray& pixels, PackedEvents& events) {
-  const TimeNs refractory = pixels.refractory;
+  const TimeNs refractory = pixels.refractory, longest_delay = events.packing->longest() / 4;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < count_; ++i) {
     const AwakePixel& awake = awake_[i];
     const Next next = next_[i];
     const TimeNs t = std::clamp<TimeNs>(t0_ + static_cast<TimeNs>(next.tau + 0.5), t0_ + 1, t1_);
     const bool dropped = refractory > 0 && !pixels.holds && t < pixels.until[awake.pixel];
-    if (!dropped) events.add(pixels.delays ? t + delay(pixels, i) : t, awake.x, awake.y, next.polarity > 0);
+    if (!dropped) {
+      const TimeNs stamp = pixels.delays ? t + std::min(delay(pixels, i), longest_delay) : t;
+      events.add(stamp, awake.x, awake.y, next.polarity > 0);
+    }
     if (refractory > 0 && !dropped) pixels.until[awake.pixel] = t + refractory;
     if (pixels.holds && t + refractory > t1_) {
       pixels.states[awake.pixel].reference = kHeld;

@@ -15,6 +15,7 @@ constexpr D kD;
 constexpr std::size_t kMaxLanes = HWY_MAX_BYTES / sizeof(double);
 
 constexpr double kToleranceNs = 0.05;
+constexpr int kMostSteps = 3;
 
 // Below, 1 - exp(-u) loses too many digits.
 constexpr double kSmallestSpan = 1e-4;
@@ -55,8 +56,8 @@ struct RelaxingSignal::Lanes {
 
   enum Outcome : int { kNone = 0, kOn = 1, kOff = 2, kUnclear = 3 };
 
-  /// For each lane, what happens until `end`, and when. Unclear is what turns back, is outside already, or is not found
-  /// with one step of Halley's method from the inverse cubic.
+  /// For each lane, what happens until `end`, and when. Unclear is what turns back before it crosses, is outside
+  /// already, or is not found with a few steps of Halley's method from the inverse cubic.
   void find(double end, Values& outcome, Values& tau) const {
     const V first = load(u), last = hn::Mul(load(rate), set(end)), v0 = load(value), g0 = load(slope);
     const V leak = load(drift), shift = load(offset);
@@ -81,19 +82,24 @@ struct RelaxingSignal::Lanes {
     V guess = hn::MulAdd(hn::Mul(hn::Mul(s, t), rises), bow, ends);
     guess = hn::Min(hn::Max(guess, first), last);
 
-    // One step of Halley's method.
-    const V m = hn::Sub(set(1), hn::Exp(kD, hn::Neg(guess)));
-    const V f = filtered_at(guess, m), own = hn::Sub(hn::MulAdd(load(rise), guess, load(start)), f);
-    const V g = hn::Add(own, leak), miss = hn::Sub(hn::Add(hn::MulAdd(leak, guess, shift), f), level);
-    const V newton = hn::Div(miss, g), bend = hn::Div(hn::Sub(load(rise), own), g);
-    const V next = hn::Sub(guess, hn::Div(newton, hn::NegMulAdd(hn::Mul(set(0.5), newton), bend, set(1))));
-    const V step = hn::Abs(hn::Sub(next, guess));
-    constexpr double kToleranceNs = 0.5;
-    const auto small =
-        hn::Le(hn::Mul(hn::Mul(step, step), hn::Add(set(1), hn::Abs(bend))), hn::Mul(load(rate), set(kToleranceNs)));
-    const auto inside = hn::And(hn::Ge(next, first), hn::Le(next, last));
-    clear = hn::And(clear, hn::Or(hn::Not(crosses), hn::And(small, inside)));
-    clear = hn::And(clear, hn::Gt(last, set(kSmallestSpan)));
+    // Halley's method, as far as all lanes that matter need it.
+    const auto wanted = hn::And(hn::And(clear, crosses), hn::Gt(last, set(kSmallestSpan)));
+    auto found = hn::Not(wanted);
+    V next = guess;
+    for (int i = 0; i < kMostSteps && !hn::AllTrue(kD, found); ++i) {
+      guess = next;
+      const V m = hn::Sub(set(1), hn::Exp(kD, hn::Neg(guess)));
+      const V f = filtered_at(guess, m), own = hn::Sub(hn::MulAdd(load(rise), guess, load(start)), f);
+      const V g = hn::Add(own, leak), miss = hn::Sub(hn::Add(hn::MulAdd(leak, guess, shift), f), level);
+      const V newton = hn::Div(miss, g), bend = hn::Div(hn::Sub(load(rise), own), g);
+      next = hn::Sub(guess, hn::Div(newton, hn::NegMulAdd(hn::Mul(set(0.5), newton), bend, set(1))));
+      next = hn::Min(hn::Max(next, first), last);
+      // The next step would be about this one cubed, times what the bend makes of it.
+      const V step = hn::Abs(hn::Sub(next, guess)), cube = hn::Mul(step, hn::Mul(step, step));
+      const V left = hn::Mul(cube, hn::MulAdd(bend, bend, set(1)));
+      found = hn::Or(found, hn::Le(left, hn::Mul(load(rate), set(kToleranceNs))));
+    }
+    clear = hn::And(hn::And(clear, found), hn::Or(wanted, hn::Not(crosses)));
 
     V what = hn::IfThenElse(on, set(kOn), hn::IfThenElse(off, set(kOff), set(kNone)));
     what = hn::IfThenElse(clear, what, set(kUnclear));

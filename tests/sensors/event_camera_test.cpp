@@ -142,6 +142,26 @@ TEST(EventCamera, ARampFiresAtItsLevels) {
   }
 }
 
+TEST(EventCamera, FiresWithinANanosecondOfItsLevels) {
+  // One slow segment of a second, for several thresholds; the irradiances are what the floats are.
+  for (const double threshold : {0.013, 0.1, 0.3}) {
+    for (const bool rises : {true, false}) {
+      const EventCameraOptions options{.contrast_threshold = threshold};
+      Feed feed(options, 1, 1);
+      const float first = rises ? 0.02F : 0.93F, last = rises ? 0.93F : 0.02F;
+      feed.frame(Image<float>(1, 1, first), 0);
+      feed.frame(Image<float>(1, 1, last), kNsPerSecond);
+      const double span = std::fabs(std::log((last + options.log_eps) / (first + options.log_eps)));
+      const std::vector<Event> events = feed.events();
+      ASSERT_EQ(events.size(), static_cast<std::size_t>(span / threshold));
+      for (std::size_t k = 0; k < events.size(); ++k) {
+        EXPECT_NEAR(static_cast<double>(events[k].t), 1e9 * threshold * static_cast<double>(k + 1) / span, 1);
+        EXPECT_EQ(events[k].polarity, rises ? 1 : -1);
+      }
+    }
+  }
+}
+
 TEST(EventCamera, DoesNotDependOnHowDenselyALineIsSampled) {
   const EventCameraOptions options{.contrast_threshold = 0.13, .threshold_noise = 0.05, .refractory_period_us = 700};
   std::vector<std::vector<Event>> results;
@@ -275,6 +295,43 @@ TEST(EventCamera, RefusesWhatIsNoIrradiance) {
       EXPECT_TRUE(test::contains(message, "1.5")) << message;
     }
   }
+}
+
+/// A texture of waves that moves to the right by half a pixel per frame.
+Image<float> moving_waves(int width, int height, int frame) {
+  std::mt19937 random(12);
+  std::uniform_real_distribution<double> uniform;
+  Image<double> brightness(width, height, -1.0);
+  for (int wave = 0; wave < 24; ++wave) {
+    const double angle = 6.283 * uniform(random), length = 9 + 40 * uniform(random), phase = 6.283 * uniform(random);
+    const double kx = 6.283185307 / length * std::cos(angle), ky = 6.283185307 / length * std::sin(angle);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) brightness(x, y) += 0.25 * std::sin(kx * (x - 0.5 * frame) + ky * y + phase);
+    }
+  }
+  Image<float> image(width, height);
+  for (std::size_t i = 0; i < image.size(); ++i) image.data()[i] = static_cast<float>(std::exp(brightness.data()[i]));
+  return image;
+}
+
+TEST(EventCamera, TimeStampsDoNotBandAtTheFrames) {
+  constexpr int kWidth = 64, kHeight = 48, kFrames = 120, kBins = 20;
+  const EventCameraOptions options{.contrast_threshold = 0.15, .threshold_mismatch = 0.03};
+  Feed feed(options, kWidth, kHeight, 2);
+  for (int k = 0; k < kFrames; ++k) feed.frame(moving_waves(kWidth, kHeight, k), k * kNsPerMs);
+  std::vector<double> bins(kBins, 0.0);
+  double count = 0;
+  // Neighbours see the same edge: far fewer events than there are tell something new.
+  std::mt19937 random(1);
+  for (const Event& event : feed.events()) {
+    if (random() % 5 != 0 || event.t < 20 * kNsPerMs) continue;
+    bins[static_cast<std::size_t>(event.t % kNsPerMs * kBins / kNsPerMs)] += 1;
+    ++count;
+  }
+  ASSERT_GT(count, 4000);
+  double chi2 = 0;
+  for (const double n : bins) chi2 += (n - count / kBins) * (n - count / kBins) / (count / kBins);
+  EXPECT_LT(chi2, 43.8);  // p = 0.001 with 19 degrees of freedom
 }
 
 TEST(EventCamera, TakesFramesChunkByChunk) {

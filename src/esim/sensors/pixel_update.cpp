@@ -11,6 +11,9 @@
 namespace esim {
 namespace {
 
+// Pixels that go through a segment together: enough for vectors, few enough for the cache.
+constexpr std::size_t kBatch = 192;
+
 /// Bit i is set where lane i is.
 template <class D, class Mask>
 std::uint64_t bits_of(D d, Mask mask) {
@@ -160,19 +163,17 @@ bool PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image
                          PackedEvents& events) {
   const Filter common(pixels, segment);
   const int order = pixels.options.low_pass_hz > 0 ? pixels.options.low_pass_order : 0;
-  const auto most = static_cast<std::size_t>(segment.tile.width) * static_cast<std::size_t>(rows.count());
-  order == 0 ? linear_.reserve(most) : relaxing_.reserve(most);
+  const auto width = static_cast<std::size_t>(segment.tile.width);
   for (int y = rows.first; y < rows.last; ++y) {
     if (!all_irradiance(segment, {y, y + 1})) return false;
     if (y + 1 < rows.last) prefetch_row(segment, y + 1);
+    order == 0 ? linear_.reserve(width) : relaxing_.reserve(width);
     if (order == 0) filter_row<0>(pixels, segment, common, brightness, y);
     if (order == 1) filter_row<1>(pixels, segment, common, brightness, y);
     if (order == 2) filter_row<2>(pixels, segment, common, brightness, y);
-  }
-  if (order == 0) {
-    linear_.run(pixels, segment.t0, segment.t1, events);
-  } else {
-    relaxing_.run(pixels, segment.t0, segment.t1, events);
+    const bool last = y + 1 == rows.last;
+    if (linear_.count() >= kBatch || last) linear_.run(pixels, segment.t0, segment.t1, events);
+    if (relaxing_.count() >= kBatch || last) relaxing_.run(pixels, segment.t0, segment.t1, events);
   }
   return true;
 }

@@ -14,14 +14,6 @@ namespace {
 // Pixels that go through a segment together: enough for vectors, few enough for the cache.
 constexpr std::size_t kBatch = 192;
 
-/// Bit i is set where lane i is.
-template <class D, class Mask>
-std::uint64_t bits_of(D d, Mask mask) {
-  std::uint64_t bits = 0;
-  hn::StoreMaskBits(d, mask, reinterpret_cast<std::uint8_t*>(&bits));
-  return bits;
-}
-
 /// Lanes whose alarm goes off by `now`, in ticks.
 template <class D>
 hn::Mask<D> alarmed(D d, const std::int32_t* alarms, std::int32_t now) {
@@ -113,24 +105,35 @@ HWY_INLINE void PixelUpdate::filter_vector(D d, PixelArray& pixels, const Segmen
   auto restless =
       hn::Or(hn::Le(lowest, hn::LoadU(d, &pixels.band_low[i])), hn::Ge(highest, hn::LoadU(d, &pixels.band_high[i])));
   if (pixels.alarmed) restless = hn::Or(restless, alarmed(d, &pixels.alarms[i], filter.now));
-  std::uint64_t bits = bits_of(d, restless);
-  if (bits == 0) return;
+  // Without a branch: that a pixel wakes is as hard to foresee as an event.
+  const ChosenLanes chosen(d, restless);
+  Woken& w = woken_;
+  chosen.store_positions(x, w.column.data() + w.count);
+  chosen.store(start, w.start.data() + w.count);
+  chosen.store(end, w.end.data() + w.count);
+  if constexpr (kOrder > 0) {
+    chosen.store(f1, w.filtered1.data() + w.count);
+    chosen.store(phase, w.phase.data() + w.count);
+    chosen.store(m, w.moved.data() + w.count);
+  }
+  if constexpr (kOrder == 2) chosen.store(f2, w.filtered2.data() + w.count);
+  w.count += chosen.count();
+}
 
-  alignas(64) float starts[16], ends[16], first[16], second[16], phases[16], moves[16];
-  hn::StoreU(start, d, starts), hn::StoreU(end, d, ends), hn::StoreU(f1, d, first);
-  if constexpr (kOrder > 0) hn::StoreU(phase, d, phases), hn::StoreU(m, d, moves);
-  if constexpr (kOrder == 2) hn::StoreU(f2, d, second);
-  for (; bits != 0; bits &= bits - 1) {
-    const int lane = std::countr_zero(bits);
-    const AwakePixel awake = awake_pixel(pixels, segment, x + lane, y);
-    const double from = starts[lane], slope = (static_cast<double>(ends[lane]) - from) * filter.per_duration;
+/// Hands the pixels of a row that woke up over to their passes.
+template <int kOrder>
+void PixelUpdate::take_woken(PixelArray& pixels, const Segment& segment, const Filter& filter, int y) {
+  const Woken& w = woken_;
+  for (std::size_t i = 0; i < w.count; ++i) {
+    const AwakePixel awake = awake_pixel(pixels, segment, static_cast<int>(w.column[i]), y);
+    const double from = w.start[i], slope = (static_cast<double>(w.end[i]) - from) * filter.per_duration;
     if constexpr (kOrder == 0) {
       linear_.add(awake, {from, slope});
     } else {
-      const double rate = phases[lane] * filter.per_duration, moved = moves[lane];
-      relaxing_.add(awake, kOrder == 1
-                               ? RelaxingSignal::first_order(rate, moved, first[lane], from, slope)
-                               : RelaxingSignal::second_order(rate, moved, first[lane], second[lane], from, slope));
+      const double rate = w.phase[i] * filter.per_duration, moved = w.moved[i];
+      relaxing_.add(
+          awake, kOrder == 1 ? RelaxingSignal::first_order(rate, moved, w.filtered1[i], from, slope)
+                             : RelaxingSignal::second_order(rate, moved, w.filtered1[i], w.filtered2[i], from, slope));
     }
   }
 }
@@ -149,12 +152,14 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
                              const Image<float>* brightness, int y) {
   const int first = segment.tile.x, last = first + segment.tile.width;
   const float* const row = brightness_row(pixels, segment, brightness, y);
-  const hn::ScalableTag<float> d;
+  const hn::CappedTag<float, 8> d;
   const int lanes = static_cast<int>(hn::Lanes(d));
+  woken_.begin(static_cast<std::size_t>(segment.tile.width) + kVectorPadding);
   int x = first;
   for (; x + lanes <= last; x += lanes) filter_vector<kOrder>(d, pixels, segment, filter, row + (x - first), y, x);
   for (; x < last; ++x)
     filter_vector<kOrder>(hn::CappedTag<float, 1>(), pixels, segment, filter, row + (x - first), y, x);
+  take_woken<kOrder>(pixels, segment, filter, y);
 }
 
 /// Where bands are of brightness: moves all low-passes on, and takes those pixels through the segment whose filtered

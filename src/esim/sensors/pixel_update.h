@@ -30,7 +30,24 @@ class PixelUpdate {
   bool cross(PixelArray& pixels, const Segment& segment, Rows rows, PackedEvents& events);
   bool filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
               PackedEvents& events);
+  /// The pixels of a row that woke up: brightness at the segment's ends, behind the poles at its start, and how many
+  /// time constants it lasts.
+  struct Woken {
+    std::vector<std::uint32_t> column;
+    std::vector<float> start, end, filtered1, filtered2, phase, moved;
+    std::size_t count = 0;
+
+    void begin(std::size_t most) {
+      count = 0;
+      if (column.size() >= most) return;
+      column.resize(most);
+      for (auto* values : {&start, &end, &filtered1, &filtered2, &phase, &moved}) values->resize(most);
+    }
+  };
+
   struct Filter;
+  template <int kOrder>
+  void take_woken(PixelArray& pixels, const Segment& segment, const Filter& filter, int y);
   template <int kOrder>
   void filter_row(PixelArray& pixels, const Segment& segment, const Filter& filter, const Image<float>* brightness,
                   int y);
@@ -40,6 +57,7 @@ class PixelUpdate {
   const float* brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int y);
 
   PixelWatch watch_;
+  Woken woken_;
   CleanPass clean_;
   PixelPass<LinearSignal> linear_;
   PixelPass<RelaxingSignal> relaxing_;

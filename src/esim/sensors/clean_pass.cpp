@@ -23,6 +23,7 @@ struct Lanes {
   PerPixel<double> polarity;  // of the last round: 1, -1, or 0 where nothing fired
   PerPixel<double> crossing;  // when it fired
   PerPixel<double> resumes;   // end of the refractory period behind
+  PerPixel<double> again;     // 1 where it fires in the next round, too
   PerPixel<std::uint64_t> place;
   std::size_t count = 0;
 
@@ -45,12 +46,17 @@ struct Lanes {
       crossing[i] = t;
       resumes[i] = until;
       polarity[i] = up ? 1.0 : (down ? -1.0 : 0.0);
-      reference[i] = up || down ? next : level;
+      const double now = up || down ? next : level;
+      reference[i] = now;
+      again[i] = end >= now + on[i] || end <= now - off[i] ? 1.0 : 0.0;
     }
   }
 
   /// A pixel that fires nothing more in this segment.
-  void silence(std::size_t i) { on[i] = off[i] = kInfinity; }
+  void silence(std::size_t i) {
+    on[i] = off[i] = kInfinity;
+    again[i] = 0;
+  }
 
   void copy(const Lanes& from, std::size_t i, std::size_t to) {
     before[to] = from.before[i], after[to] = from.after[i];
@@ -66,7 +72,7 @@ struct CleanPass::Block {
   PerPixel<std::uint32_t> pixel;
   bool some_held = false;  // among those that were gathered
 
-  // The few pixels that fire more than twice, and which they are.
+  // The few pixels that fire more than once, and which they are.
   Lanes rest;
   PerPixel<std::uint32_t> origin;
 
@@ -157,11 +163,11 @@ void CleanPass::Block::hold(PixelArray& pixels, Lanes& lanes, const std::uint32_
   }
 }
 
-/// Copies those pixels to `rest` that fired in the last round and may fire again.
+/// Copies those pixels to `rest` that fire again.
 std::size_t CleanPass::Block::take_rest() {
   std::size_t count = 0;
   for (std::size_t i = 0; i < all.count; ++i) {
-    if (all.polarity[i] == 0) continue;
+    if (all.again[i] == 0) continue;
     rest.copy(all, i, count);
     origin[count++] = static_cast<std::uint32_t>(i);
   }
@@ -203,8 +209,7 @@ void CleanPass::run_block(PixelArray& pixels, const Segment& segment, PackedEven
     block.report(lanes, start, events);
     if (pixels.holds) block.hold(pixels, lanes, which, segment.t0, duration);
   };
-  // Most pixels that wake up fire once; those that fire more than twice go on among themselves.
-  round(block.all, nullptr);
+  // Most pixels that wake up fire once; the others go on among themselves.
   round(block.all, nullptr);
   for (std::size_t left = block.take_rest(); left > 0;) {
     Lanes& rest = block.rest;
@@ -212,7 +217,7 @@ void CleanPass::run_block(PixelArray& pixels, const Segment& segment, PackedEven
     left = 0;
     for (std::size_t i = 0; i < rest.count; ++i) {
       block.all.reference[block.origin[i]] = rest.reference[i];
-      if (rest.polarity[i] == 0) continue;
+      if (rest.again[i] == 0) continue;
       if (left != i) rest.copy(rest, i, left), block.origin[left] = block.origin[i];
       ++left;
     }

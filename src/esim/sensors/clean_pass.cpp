@@ -29,10 +29,12 @@ struct Lanes {
 
   Lanes() { before.fill(1), after.fill(1); }
 
-  /// One round: each pixel passes its next level, if it does, and takes its reference behind that.
-  void fire(double duration, double refractory) {
+  /// One round: each pixel passes its next level, if it does, and takes its reference behind that. Returns when the
+  /// last refractory period ends.
+  double fire(double duration, double refractory) {
     const double per_duration = 1 / duration;
-#pragma omp simd
+    double last = 0;
+#pragma omp simd reduction(max : last)
     for (std::size_t i = 0; i < count; ++i) {
       const double start = before[i], end = after[i], rise = end - start, level = reference[i];
       const double upper = level + on[i], lower = level - off[i];
@@ -46,10 +48,13 @@ struct Lanes {
       crossing[i] = t;
       resumes[i] = until;
       polarity[i] = up ? 1.0 : (down ? -1.0 : 0.0);
+      const double ends = up || down ? until : 0.0;
+      last = last > ends ? last : ends;
       const double now = up || down ? next : level;
       reference[i] = now;
       again[i] = end >= now + on[i] || end <= now - off[i] ? 1.0 : 0.0;
     }
+    return last;
   }
 
   /// A pixel that fires nothing more in this segment.
@@ -150,9 +155,6 @@ void CleanPass::Block::report(const Lanes& lanes, TimeNs start, PackedEvents& ev
 /// Holds those in reset that fired and whose refractory period ends after the segment. `which` are their indices among
 /// all; null: these are all.
 void CleanPass::Block::hold(PixelArray& pixels, Lanes& lanes, const std::uint32_t* which, TimeNs t0, double duration) {
-  bool any = false;
-  for (std::size_t i = 0; i < lanes.count; ++i) any |= lanes.resumes[i] > duration && lanes.polarity[i] != 0;
-  if (!any) return;
   for (std::size_t i = 0; i < lanes.count; ++i) {
     if (!(lanes.resumes[i] > duration && lanes.polarity[i] != 0)) continue;
     const std::size_t index = which != nullptr ? which[i] : i;
@@ -205,9 +207,9 @@ void CleanPass::run_block(PixelArray& pixels, const Segment& segment, PackedEven
   const double refractory = pixels.holds ? static_cast<double>(pixels.refractory) : 0.0;
   const TimeNs start = segment.t0 - events.packing->origin;
   const auto round = [&](Lanes& lanes, const std::uint32_t* which) {
-    lanes.fire(duration, refractory);
+    const double last_reset = lanes.fire(duration, refractory);
     block.report(lanes, start, events);
-    if (pixels.holds) block.hold(pixels, lanes, which, segment.t0, duration);
+    if (pixels.holds && last_reset > duration) block.hold(pixels, lanes, which, segment.t0, duration);
   };
   // Most pixels that wake up fire once; the others go on among themselves.
   round(block.all, nullptr);

@@ -228,6 +228,22 @@ void CleanPass::run_block(PixelArray& pixels, const Segment& segment, PackedEven
   block.settle(pixels);
 }
 
+void CleanPass::open(PixelArray& pixels, std::uint32_t first, std::span<const double> brightness) {
+  Block& block = *block_;
+  for (std::size_t begin = 0; begin < brightness.size(); begin += kBlock) {
+    const std::size_t count = std::min(kBlock, brightness.size() - begin);
+    for (std::size_t i = 0; i < count; ++i) {
+      block.pixel[i] = first + static_cast<std::uint32_t>(begin + i);
+      const PixelArray::State& state = pixels.states[block.pixel[i]];
+      block.all.reference[i] = brightness[begin + i];
+      block.all.on[i] = pixels.threshold_on + state.on;
+      block.all.off[i] = pixels.threshold_off + state.off;
+    }
+    block.all.count = count;
+    block.settle(pixels);
+  }
+}
+
 void CleanPass::run(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, Rows rows,
                     PackedEvents& events) {
   for (int y = rows.first; y < rows.last; ++y) {

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <vector>
+#include <span>
 
 #include "esim/render/sample.h"
 #include "esim/sensors/pixel_array.h"
@@ -25,6 +25,9 @@ class CleanPass {
     return !pixels.in_brightness && !pixels.alarmed && !pixels.renews && !pixels.delays &&
            (pixels.refractory == 0 || pixels.holds);
   }
+
+  /// Sets the references of neighbouring pixels, from `first` on, that are seen for the first time.
+  void open(PixelArray& pixels, std::uint32_t first, std::span<const double> brightness);
 
   /// What `watch` found in rows of the segment.
   void run(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, Rows rows, PackedEvents& events);

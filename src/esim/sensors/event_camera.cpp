@@ -19,7 +19,7 @@
 namespace esim {
 namespace {
 
-constexpr int kPixelsPerPiece = 8192;  // of a parallel loop
+constexpr int kPixelsPerPiece = 4096;  // of a parallel loop
 
 /// The rows of a tile in pieces for a parallel loop.
 struct RowPieces {

@@ -231,6 +231,10 @@ bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<f
       for (std::size_t i = 0; i < width; ++i) after_[i] = row[i] + pixels.options.log_eps;
       logarithms(width, after_.data());
     }
+    if (CleanPass::serves(pixels)) {
+      clean_.open(pixels, static_cast<std::uint32_t>(index(pixels, segment.tile.x, y)), {after_.data(), width});
+      continue;
+    }
     for (int i = 0; i < segment.tile.width; ++i) {
       const AwakePixel awake = awake_pixel(pixels, segment, segment.tile.x + i, y);
       linear_.add(awake, {pixels.open(awake.pixel, after_[static_cast<std::size_t>(i)], segment.t0), 0.0});

@@ -12,14 +12,10 @@
 namespace esim::app {
 namespace {
 
-struct Arguments {
+struct Arguments : RunOptions {
   std::string scenario;
   std::string out;
-  std::vector<std::string> overrides;
   std::optional<std::uint64_t> seed;
-  int threads = 0;
-  bool quiet = false;
-  bool force = false;
 };
 
 void print_summary(const Summary& summary, const std::filesystem::path& out, bool preview) {
@@ -73,21 +69,9 @@ void add_simulate(CLI::App& app, int& exit_code) {
   command->add_option("scenario", arguments->scenario, "Scenario file (YAML)")->required()->type_name("SCENARIO.yaml");
   command->add_option("-o,--out", arguments->out, "Folder to write (default: out/NAME of the scenario)")
       ->type_name("DIR");
-  command
-      ->add_option("--set", arguments->overrides,
-                   "Change one option, for example --set event_camera.contrast_threshold=0.2")
-      ->type_name("KEY=VALUE")
-      ->expected(1)
-      ->take_all();
+  add_run_options(*command, *arguments, "Change one option, for example --set event_camera.contrast_threshold=0.2");
   command->add_option("--seed", arguments->seed, "Seed of all random numbers (default: the scenario's)")
       ->type_name("N");
-  command
-      ->add_option("-j,--threads", arguments->threads,
-                   "Threads; 0 takes every processor. The result does not depend on it")
-      ->type_name("N")
-      ->check(CLI::Range(0, 1024));
-  command->add_flag("-q,--quiet", arguments->quiet, "Print warnings and errors only");
-  command->add_flag("--force", arguments->force, "Replace an earlier recording in --out");
   command->footer(
       "Examples:\n"
       "  esim simulate scenes/room.yaml --out out/room\n"

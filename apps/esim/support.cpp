@@ -36,6 +36,16 @@ Notices print_and_keep(std::vector<std::string>& given, bool quiet) {
   return notices;
 }
 
+void add_run_options(CLI::App& command, RunOptions& options, const std::string& set_help) {
+  command.add_option("--set", options.overrides, set_help)->type_name("KEY=VALUE")->expected(1)->take_all();
+  command
+      .add_option("-j,--threads", options.threads, "Threads; 0 takes every processor. The result does not depend on it")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1024));
+  command.add_flag("-q,--quiet", options.quiet, "Print warnings and errors only");
+  command.add_flag("--force", options.force, "Replace an earlier recording in --out");
+}
+
 void write_text(const std::filesystem::path& path, const std::string& text) {
   std::ofstream file(path, std::ios::binary);
   file << text;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -14,6 +15,17 @@ bool interrupted();
 
 /// Prints warnings and, unless `quiet`, notes; keeps both in `given` for the report.
 Notices print_and_keep(std::vector<std::string>& given, bool quiet);
+
+/// What the commands that make recordings have in common.
+struct RunOptions {
+  std::vector<std::string> overrides;
+  int threads = 0;
+  bool quiet = false;
+  bool force = false;
+};
+
+/// Adds them to a command; `set_help` says what --set changes.
+void add_run_options(CLI::App& command, RunOptions& options, const std::string& set_help);
 
 void write_text(const std::filesystem::path& path, const std::string& text);
 

@@ -15,13 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct Arguments : RunOptions {
   ConversionOptions options;
   std::string input, out;
-  std::vector<std::string> overrides;
-  int threads = 0;
-  bool quiet = false;
-  bool force = false;
 };
 
 /// A visitor of describe() that gives every member an option of the command line: --max-steps for max_steps.
@@ -198,19 +194,8 @@ void add_video(CLI::App& app, int& exit_code) {
       ->type_name("FILE_OR_DIR");
   CommandLine options(*command);
   describe_command_line(options, arguments->options);
-  command
-      ->add_option("--set", arguments->overrides,
-                   "Change one option of the event camera, for example --set contrast_threshold=0.2")
-      ->type_name("KEY=VALUE")
-      ->expected(1)
-      ->take_all();
-  command
-      ->add_option("-j,--threads", arguments->threads,
-                   "Threads; 0 takes every processor. The result does not depend on it")
-      ->type_name("N")
-      ->check(CLI::Range(0, 1024));
-  command->add_flag("-q,--quiet", arguments->quiet, "Print warnings and errors only");
-  command->add_flag("--force", arguments->force, "Replace an earlier recording in --out");
+  add_run_options(*command, *arguments,
+                  "Change one option of the event camera, for example --set contrast_threshold=0.2");
   command->footer(
       "Examples:\n"
       "  esim video clip.mp4 --out out/clip                        then look at out/clip/preview.png\n"

@@ -74,7 +74,8 @@ class LiteralEventCamera {
     pixel.reference = brightness(light);
     pixel.reference_t = to_seconds(t);
     if (pixel.leak > 0) pixel.reference -= pixel.on * leak_.uniforms(item, 1)[0];
-    if (options_.shot_noise_hz > 0) {
+    const bool dead = pixel.on == kNever;
+    if (options_.shot_noise_hz > 0 && !dead) {
       pixel.shot_at = t;
       next_shot(pixel, shot_.uniforms(item, 0)[0]);
     }

@@ -161,6 +161,23 @@ TEST(PixelNoise, SomePixelsAreHotAndSomeAreDead) {
   EXPECT_NEAR(static_cast<double>(alive.size()), 0.95 * kPixels, 5 * std::sqrt(0.05 * kPixels));
 }
 
+TEST(PixelNoise, DeadPixelsAreSilentWhateverTheNoise) {
+  EventCameraOptions options;
+  options.contrast_threshold = 0.1;
+  options.threshold_noise = 0.02;
+  options.shot_noise_hz = 100;
+  options.leak_rate_hz = 50;
+  options.hot_pixels = 0.2;
+  options.dead_pixels = 1;
+  for (const double low_pass_hz : {0.0, 100.0}) {
+    options.low_pass_hz = low_pass_hz;
+    Feed feed(options, kWidth, kHeight, 5);
+    for (int k = 0; k < 10; ++k)
+      feed.frame(Image<float>(kWidth, kHeight, k % 2 == 0 ? 0.1F : 0.9F), k * 100 * kNsPerMs);
+    EXPECT_TRUE(feed.events().empty());
+  }
+}
+
 TEST(PixelNoise, LatencyHasTheGivenMeanAndSpreadAndGoesWithTheLight) {
   constexpr double kDark = 20.0 / 255;
   for (const double share : {0.0, 0.6}) {

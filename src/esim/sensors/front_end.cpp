@@ -36,10 +36,4 @@ void respond(const EventCameraOptions& options, std::size_t count, const float* 
   run(hn::CappedTag<float, 1>(), in_vectors, count);
 }
 
-float respond(const EventCameraOptions& options, float irradiance) {
-  float brightness = 0;
-  respond(options, 1, &irradiance, &brightness);
-  return brightness;
-}
-
 }  // namespace esim

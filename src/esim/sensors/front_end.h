@@ -9,7 +9,4 @@ namespace esim {
 /// Brightness of `count` pixels from their irradiance, as the sensor's front end responds.
 void respond(const EventCameraOptions& options, std::size_t count, const float* irradiance, float* brightness);
 
-/// The same, subtly slower, of one pixel.
-float respond(const EventCameraOptions& options, float irradiance);
-
 }  // namespace esim

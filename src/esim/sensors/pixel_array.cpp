@@ -170,6 +170,7 @@ double PixelArray::open(std::uint32_t pixel, double brightness_now, TimeNs t) {
     noise[pixel].shot_at = t;
     next_shot(pixel, per_shot.uniforms(pixel, 0)[0]);
     noise[pixel].shots = 1;
+    if (std::isinf(state.on)) noise[pixel].shot_at = std::numeric_limits<TimeNs>::max();  // a dead pixel
   }
   return signal;
 }

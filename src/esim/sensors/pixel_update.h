@@ -30,6 +30,7 @@ class PixelUpdate {
   bool cross(PixelArray& pixels, const Segment& segment, Rows rows, PackedEvents& events);
   bool filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
               PackedEvents& events);
+
   /// The pixels of a row that woke up: brightness at the segment's ends, behind the poles at its start, and how many
   /// time constants it lasts.
   struct Woken {

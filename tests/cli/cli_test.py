@@ -7,15 +7,14 @@ import json
 import os
 import pathlib
 import resource
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 
-ESIM = os.path.abspath(sys.argv[1])
+from program import ESIM, ProgramTest, run
+
 SCENES = pathlib.Path(sys.argv[2]).absolute()
 
 # Small enough for a sanitizer: the poster at a low resolution.
@@ -24,27 +23,9 @@ ENDLESS = ["--set", "camera.width=64", "--set", "camera.height=48", "--set", "du
            "--set", "sampling={type: uniform, rate_hz: 2000}", "--set", "output.preview=false"]
 
 
-def run(*arguments, **options):
-    return subprocess.run([ESIM, *map(str, arguments)], capture_output=True, text=True, timeout=120, **options)
-
-
-class Cli(unittest.TestCase):
-    def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="esim_cli_"))
-        self.addCleanup(shutil.rmtree, self.folder)
-        self.out = self.folder / "out"
-
+class Cli(ProgramTest):
     def simulate(self, *arguments, scenario=SCENES / "poster.yaml", **options):
         return run("simulate", scenario, "--out", self.out, *arguments, **options)
-
-    def assert_refused(self, result, *parts):
-        """One clear line, exit status 2, nothing left behind."""
-        self.assertEqual(result.returncode, 2, result.stderr)
-        lines = [line for line in result.stderr.splitlines() if line.startswith("esim: ")]
-        self.assertEqual(len(lines), 1, result.stderr)
-        for part in parts:
-            self.assertIn(part, lines[0])
-        self.assertEqual([p.name for p in self.folder.iterdir() if p.name.startswith("out")], [])
 
     def start_and_wait_for_events(self):
         process = subprocess.Popen([ESIM, "simulate", SCENES / "poster.yaml", "--out", self.out, *ENDLESS],

@@ -4,22 +4,16 @@ Run as: stats_test.py ESIM_PROGRAM SCENES_FOLDER, with the standard library of P
 """
 
 import json
-import os
 import pathlib
 import random
 import shutil
 import struct
-import subprocess
 import sys
-import tempfile
 import unittest
 
-ESIM = os.path.abspath(sys.argv[1])
+from program import ProgramTest, run
+
 SCENES = pathlib.Path(sys.argv[2]).absolute()
-
-
-def run(*arguments):
-    return subprocess.run([ESIM, *map(str, arguments)], capture_output=True, text=True, timeout=120)
 
 
 def stream(number=4000, duration_s=2.0, frame_rate_hz=None):
@@ -31,26 +25,14 @@ def stream(number=4000, duration_s=2.0, frame_rate_hz=None):
     return "".join(f"{t:.6f} {source.randrange(32)} {source.randrange(24)} {source.randrange(2)}\n" for t in times)
 
 
-class Stats(unittest.TestCase):
-    def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="esim_stats_"))
-        self.addCleanup(shutil.rmtree, self.folder)
-
+class Stats(ProgramTest):
     def write(self, name, text):
         path = self.folder / name
         path.write_text(text)
         return path
 
-    def assert_refused(self, result, *parts):
-        """One clear line, exit status 2."""
-        self.assertEqual(result.returncode, 2, result.stderr)
-        self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
-        self.assertTrue(result.stderr.startswith("esim: "), result.stderr)
-        for part in parts:
-            self.assertIn(part, result.stderr)
-
     def test_a_recording(self):
-        out = self.folder / "out"
+        out = self.out
         self.assertEqual(run("simulate", SCENES / "poster.yaml", "--out", out, "--set", "camera.width=64", "--set", "camera.height=48",
                              "--set", "duration_s=0.3", "--set", "output.events_txt=true", "--set", "output.preview=false").returncode, 0)
         report = json.loads((out / "report.json").read_text())

@@ -5,22 +5,16 @@ Run as: video_test.py ESIM_PROGRAM, with the standard library of Python alone.
 
 import json
 import math
-import os
 import pathlib
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 
-ESIM = os.path.abspath(sys.argv[1])
+from program import ESIM, ProgramTest, run
+
 WIDTH, HEIGHT = 64, 48
-
-
-def run(*arguments, **options):
-    return subprocess.run([ESIM, *map(str, arguments)], capture_output=True, text=True, timeout=120, **options)
 
 
 def write_frame(path, shift, width=WIDTH):
@@ -31,27 +25,16 @@ def write_frame(path, shift, width=WIDTH):
     path.write_bytes(b"P5 %d %d 255\n" % (width, HEIGHT) + bytes(rows))
 
 
-class Video(unittest.TestCase):
+class Video(ProgramTest):
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="esim_video_"))
-        self.addCleanup(shutil.rmtree, self.folder)
+        super().setUp()
         self.images = self.folder / "images"
         self.images.mkdir()
         for i in range(6):
             write_frame(self.images / f"{i}.pgm", 2.5 * i)
-        self.out = self.folder / "out"
 
     def video(self, *arguments, source=None, out=None):
         return run("video", source or self.images, "--out", out or self.out, *arguments)
-
-    def assert_refused(self, result, *parts):
-        """One clear line, exit status 2, nothing left behind."""
-        self.assertEqual(result.returncode, 2, result.stderr)
-        lines = [line for line in result.stderr.splitlines() if line.startswith("esim: ")]
-        self.assertEqual(len(lines), 1, result.stderr)
-        for part in parts:
-            self.assertIn(part, lines[0])
-        self.assertEqual([p.name for p in self.folder.iterdir() if p.name.startswith("out")], [])
 
     def test_a_recording_holds_what_the_manual_says(self):
         result = self.video("--fps", "50", "--seed", "7", "--set", "event_camera.contrast_threshold=0.2")

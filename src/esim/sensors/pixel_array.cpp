@@ -18,6 +18,9 @@ constexpr double kLeakPerBand = 0.05;
 // A pixel's time between leak events is never shorter than this share of the mean.
 constexpr double kMinLeakInterval = 0.05;
 
+// As good as never: three years.
+constexpr TimeNs kAges = 100'000'000 * kNsPerSecond;
+
 std::uint32_t item(std::size_t pixel) { return static_cast<std::uint32_t>(pixel); }
 
 }  // namespace
@@ -108,19 +111,18 @@ void PixelArray::renew(std::uint32_t pixel, const float* normals) {
 }
 
 void PixelArray::next_shot(std::uint32_t pixel, double uniform) {
-  constexpr double kLongest = 1e17;  // ns
-  noise[pixel].shot_at += static_cast<TimeNs>(std::min(-std::log(uniform) / options.shot_noise_hz * 1e9, kLongest)) + 1;
+  noise[pixel].shot_at +=
+      static_cast<TimeNs>(std::min(-std::log(uniform) / options.shot_noise_hz * 1e9, static_cast<double>(kAges))) + 1;
 }
 
 PixelArray::Levels PixelArray::sleep_until_alarm(std::uint32_t pixel, TimeNs now, double signal) {
-  constexpr double kLongestNs = 1e17;
   double low = level_off(pixel), high = level_on(pixel);
-  TimeNs alarm = std::numeric_limits<TimeNs>::max() / 2;
+  TimeNs alarm = now + kAges;
   if (shoots) alarm = noise[pixel].shot_at;
   if (const double rate = leak(pixel); rate > 0) {
     // Both levels fall by what leaks: the upper one until the alarm; the lower one is surely not above where it is now.
     const double most = kLeakPerBand * (threshold_on + states[pixel].on);
-    const double valid_s = std::min(std::min(most, 0.5 * (high - signal)) / rate, kLongestNs * 1e-9);
+    const double valid_s = std::min(std::min(most, 0.5 * (high - signal)) / rate, to_seconds(kAges));
     alarm = std::min(alarm, now + static_cast<TimeNs>(valid_s * 1e9));
     const double since = seconds_since_epoch(now);
     low -= rate * since;
@@ -170,7 +172,7 @@ double PixelArray::open(std::uint32_t pixel, double brightness_now, TimeNs t) {
     noise[pixel].shot_at = t;
     next_shot(pixel, per_shot.uniforms(pixel, 0)[0]);
     noise[pixel].shots = 1;
-    if (std::isinf(state.on)) noise[pixel].shot_at = std::numeric_limits<TimeNs>::max();  // a dead pixel
+    if (std::isinf(state.on)) noise[pixel].shot_at = t + kAges;  // a dead pixel
   }
   return signal;
 }

@@ -65,5 +65,18 @@ TEST(AddressedRandom, UniformsStayInTheOpenInterval) {
   EXPECT_NEAR(sum / 200000, 0.5, 5 * std::sqrt(1.0 / 12 / 200000));
 }
 
+TEST(AddressedRandom, DrawsManyAtOnceAsItDrawsOne) {
+  const AddressedRandom random(0x123456789abcdef0ULL, Purpose::test, 7);
+  constexpr std::size_t kCount = 100, kRoom = 112;
+  std::array<std::uint32_t, kRoom> items{}, draws{};
+  for (std::uint32_t i = 0; i < kRoom; ++i) items[i] = i * 2654435761U, draws[i] = i % 5 == 0 ? 0 : ~i;
+  std::array<std::array<std::uint32_t, kRoom>, 4> words{};
+  random.bits(kCount, items.data(), draws.data(), {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const auto expected = random.bits(items[i], draws[i]);
+    for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(words[k][i], expected[k]) << i << " " << k;
+  }
+}
+
 }  // namespace
 }  // namespace esim

@@ -99,9 +99,10 @@ class LiteralEventCamera {
     const float mean_off = above(options_.threshold_off(), options_.threshold_mismatch * fixed[1]);
     float on = mean_on, off = mean_off;
     if (options_.threshold_noise > 0 || (leaks() && options_.leak_jitter > 0) || options_.latency_jitter_us > 0) {
-      EventNormals normals;
-      normals.draw(per_event_, std::array{EventNormals::Address{item, draws_[i]++}});
-      std::copy_n(normals.of(0), 4, pixel.normals.begin());
+      PerPixel<std::uint32_t> items{}, draws{};
+      items[0] = item, draws[0] = draws_[i]++;
+      normals_.draw(per_event_, 1, items, draws);
+      for (std::size_t k = 0; k < 4; ++k) pixel.normals[k] = normals_[k][0];
       on = above(options_.threshold_on(), mean_on + options_.threshold_noise * pixel.normals[0]);
       off = above(options_.threshold_off(), mean_off + options_.threshold_noise * pixel.normals[1]);
     }
@@ -183,6 +184,7 @@ class LiteralEventCamera {
   int width_;
   std::vector<Pixel> pixels_;
   std::vector<std::uint32_t> draws_;
+  EventNormals normals_;
   AddressedRandom mismatch_, per_event_, leak_, shot_, defects_;
   std::optional<TimeNs> last_t_;
 };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 namespace esim {
@@ -28,6 +29,11 @@ class AddressedRandom {
 
   /// Four independent uniform 32-bit words.
   std::array<std::uint32_t, 4> bits(std::uint32_t item, std::uint64_t draw = 0) const;
+
+  /// bits(items[i], draws[i]) for many at once: word k of the i-th in words[k][i]. All arrays have room for `count`
+  /// rounded up to a multiple of 16, and are read and written that far.
+  void bits(std::size_t count, const std::uint32_t* items, const std::uint32_t* draws,
+            const std::array<std::uint32_t*, 4>& words) const;
 
   /// Two independent uniforms on the open interval (0, 1), 53 bits each.
   std::array<double, 2> uniforms(std::uint32_t item, std::uint64_t draw = 0) const;

@@ -6,16 +6,13 @@
 #include <limits>
 #include <span>
 
+#include "esim/sensors/pixel_block.h"
 #include "esim/sensors/vector_math.h"
 
 namespace esim {
 namespace {
 
-constexpr std::size_t kBlock = 256;  // pixels
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-template <typename T>
-using PerPixel = std::array<T, kBlock + kVectorPadding>;
 
 /// Pixels on their way through a segment. Brightness is at the segment's ends; times are ns after its start.
 struct Lanes {
@@ -104,11 +101,11 @@ void CleanPass::Block::gather(const PixelArray& pixels, const Segment& segment, 
   const double eps = pixels.options.log_eps, threshold_on = pixels.threshold_on, threshold_off = pixels.threshold_off;
   const float *const light0 = segment.irradiance0->row(y), *const light1 = segment.irradiance1->row(y);
   const std::uint32_t row = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(pixels.width);
-  const PixelArray::State* const states = pixels.states.data() + row;
+  const PixelArray::CleanPixel* const states = pixels.clean_pixels.data() + row;
   std::size_t i = all.count;
   bool held = some_held;
   for (const std::uint32_t x : columns) {
-    const PixelArray::State state = states[x];
+    const PixelArray::CleanPixel state = states[x];
     all.before[i] = light0[x] + eps;
     all.after[i] = light1[x] + eps;
     all.reference[i] = state.reference;
@@ -183,7 +180,7 @@ void CleanPass::Block::settle(PixelArray& pixels) {
     low[i] = static_cast<float>(all.reference[i] - all.off[i]);
     high[i] = static_cast<float>(all.reference[i] + all.on[i]);
   }
-  PixelArray::State* const states = pixels.states.data();
+  PixelArray::CleanPixel* const states = pixels.clean_pixels.data();
   for (std::size_t i = 0; i < all.count; ++i) states[pixel[i]].reference = all.reference[i];
   pixels.set_bands(all.count, pixel.data(), low.data(), high.data());
   if (pixels.holds) {
@@ -234,7 +231,7 @@ void CleanPass::open(PixelArray& pixels, std::uint32_t first, std::span<const do
     const std::size_t count = std::min(kBlock, brightness.size() - begin);
     for (std::size_t i = 0; i < count; ++i) {
       block.pixel[i] = first + static_cast<std::uint32_t>(begin + i);
-      const PixelArray::State& state = pixels.states[block.pixel[i]];
+      const PixelArray::CleanPixel& state = pixels.clean_pixels[block.pixel[i]];
       block.all.reference[i] = brightness[begin + i];
       block.all.on[i] = pixels.threshold_on + state.on;
       block.all.off[i] = pixels.threshold_off + state.off;

@@ -21,11 +21,6 @@ class CleanPass {
   CleanPass(CleanPass&&) noexcept;
   CleanPass& operator=(CleanPass&&) noexcept;
 
-  static bool serves(const PixelArray& pixels) {
-    return !pixels.in_brightness && !pixels.alarmed && !pixels.renews && !pixels.delays &&
-           (pixels.refractory == 0 || pixels.holds);
-  }
-
   /// Sets the references of neighbouring pixels, from `first` on, that are seen for the first time.
   void open(PixelArray& pixels, std::uint32_t first, std::span<const double> brightness);
 

@@ -21,23 +21,19 @@ void box_muller(D d, Words word0, Words word1, hn::Vec<D>& normal0, hn::Vec<D>& 
 
 }  // namespace
 
-void EventNormals::draw(const AddressedRandom& random, std::span<const Address> addresses) {
-  const std::size_t count = addresses.size();
-  if (words_[0].size() < count + kVectorPadding) {
-    for (auto& words : words_) words.resize(2 * count + kVectorPadding);
-    normals_.resize(kPerEvent * (2 * count + kVectorPadding));
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto bits = random.bits(addresses[i].pixel, addresses[i].draw);
-    for (std::size_t k = 0; k < kPerEvent; ++k) words_[k][i] = bits[k];
-  }
+void EventNormals::draw(const AddressedRandom& random, std::size_t count, const PerPixel<std::uint32_t>& pixel,
+                        const PerPixel<std::uint32_t>& draws) {
+  random.bits(count, pixel.data(), draws.data(),
+              {words_[0].data(), words_[1].data(), words_[2].data(), words_[3].data()});
   const hn::ScalableTag<float> d;
   const hn::RebindToUnsigned<decltype(d)> du;
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    hn::Vec<decltype(d)> n0, n1, n2, n3;
-    box_muller(d, hn::LoadU(du, &words_[0][i]), hn::LoadU(du, &words_[1][i]), n0, n1);
-    box_muller(d, hn::LoadU(du, &words_[2][i]), hn::LoadU(du, &words_[3][i]), n2, n3);
-    hn::StoreInterleaved4(n0, n1, n2, n3, d, &normals_[kPerEvent * i]);
+  for (std::size_t pair = 0; pair < 4; pair += 2) {
+    for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+      hn::Vec<decltype(d)> normal0, normal1;
+      box_muller(d, hn::LoadU(du, &words_[pair][i]), hn::LoadU(du, &words_[pair + 1][i]), normal0, normal1);
+      hn::StoreU(normal0, d, &normals_[pair][i]);
+      hn::StoreU(normal1, d, &normals_[pair + 1][i]);
+    }
   }
 }
 

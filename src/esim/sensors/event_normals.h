@@ -1,32 +1,26 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
-#include <span>
-#include <vector>
 
 #include "esim/core/random.h"
+#include "esim/sensors/pixel_block.h"
 
 namespace esim {
 
-/// Four standard normal deviates for each of many pixels' next events, computed together: Box-Muller on the 32-bit
-/// words of AddressedRandom::bits(pixel, draw), in floats. Those of a pixel do not depend on the others.
+/// Four standard normal deviates for the next event of each pixel of a block: Box-Muller on the 32-bit words of
+/// AddressedRandom::bits(pixel, draw), in floats. Those of a pixel do not depend on the others.
 class EventNormals {
  public:
-  static constexpr std::size_t kPerEvent = 4;
+  /// Draws for `count` pixels, each of which has had draws[i] before.
+  void draw(const AddressedRandom& random, std::size_t count, const PerPixel<std::uint32_t>& pixel,
+            const PerPixel<std::uint32_t>& draws);
 
-  /// What is drawn for: the pixel, and how many draws it has had before.
-  struct Address {
-    std::uint32_t pixel, draw;
-  };
-  void draw(const AddressedRandom& random, std::span<const Address> addresses);
-
-  /// Those of the i-th address.
-  const float* of(std::size_t i) const { return &normals_[kPerEvent * i]; }
+  /// The k-th of the four, by pixel.
+  const PerPixel<float>& operator[](std::size_t k) const { return normals_[k]; }
 
  private:
-  std::array<std::vector<std::uint32_t>, kPerEvent> words_;
-  std::vector<float> normals_;
+  std::array<PerPixel<std::uint32_t>, 4> words_;
+  std::array<PerPixel<float>, 4> normals_;
 };
 
 }  // namespace esim

@@ -2,207 +2,291 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
-
-#include "esim/sensors/vector_math.h"
 
 namespace esim {
+namespace {
 
-template <class Signal>
-void PixelPass<Signal>::reserve(std::size_t more) {
-  if (awake_.size() >= count_ + more) return;
-  const std::size_t size = 2 * (count_ + more);
-  awake_.resize(size), signals_.resize(size), next_.resize(size);
-  level_low_.resize(size), level_high_.resize(size), from_.resize(size), crossings_.resize(size);
-  firing_.resize(size), settled_.resize(size);
-  low_.resize(size + kVectorPadding), high_.resize(size + kVectorPadding);
-}
+// Share of a threshold that may leak before the band is renewed.
+constexpr double kLeakPerBand = 0.05;
 
-template <class Signal>
-void PixelPass<Signal>::keep(std::size_t from, std::size_t to) {
-  if (from == to) return;
-  awake_[to] = awake_[from];
-  signals_[to] = signals_[from];
-}
+// A pixel's time between leak events is never shorter than this share of the mean.
+constexpr double kMinLeakInterval = 0.05;
 
-template <class Signal>
-void PixelPass<Signal>::run(PixelArray& pixels, TimeNs t0, TimeNs t1, PackedEvents& events) {
+constexpr double kPerNs = 1e-9;
+
+}  // namespace
+
+template <class Signals>
+void PixelPass<Signals>::begin(const PixelArray& pixels, AwakePixels& awake, TimeNs t0, TimeNs t1) {
   t0_ = t0, t1_ = t1;
   duration_ = static_cast<double>(t1 - t0);
-  epoch_s_ = pixels.seconds_since_epoch(t0);
-  begin(pixels);
-  while (count_ > 0) {
-    find(pixels);
-    if (pixels.renews) renew(pixels);
-    fire(pixels, events);
-    resume(pixels);
-  }
-  set_bands(pixels);
-}
-
-/// Adds what leaks, and ends the refractory periods that end in this segment. Pixels that stay in reset are dropped.
-template <class Signal>
-void PixelPass<Signal>::begin(PixelArray& pixels) {
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < count_; ++i) {
-    const std::uint32_t pixel = awake_[i].pixel;
-    const bool was_held = pixels.holds && pixels.states[pixel].reference == kHeld;
-    if (was_held && pixels.until[pixel] > t1_) continue;
-    if (pixels.leaks) signals_[i].add(pixels.leak(pixel) * epoch_s_, pixels.leak(pixel) * 1e-9);
-    if (was_held) {
-      signals_[i].advance(static_cast<double>(pixels.until[pixel] - t0_));
-      pixels.states[pixel].reference = signals_[i].value();
-    }
-    keep(i, kept++);
-  }
-  count_ = kept;
-}
-
-/// Finds each pixel's next event. Pixels that have none in this segment are settled.
-template <class Signal>
-void PixelPass<Signal>::find(PixelArray& pixels) {
-  for (std::size_t i = 0; i < count_; ++i) {
-    level_low_[i] = pixels.level_off(awake_[i].pixel);
-    level_high_[i] = pixels.level_on(awake_[i].pixel);
-  }
-  Signal::first_crossings(std::span(signals_).first(count_), duration_, level_low_.data(), level_high_.data(),
-                          crossings_.data());
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < count_; ++i) {
-    const Crossing first = pixels.shoots ? shot_before(pixels, i, crossings_[i]) : crossings_[i];
-    if (first.tau == kNever) {
-      settle(pixels, i);
+  epoch_ns_ = static_cast<double>(t0 - pixels.epoch);
+  compare_.threshold_on = pixels.threshold_on, compare_.threshold_off = pixels.threshold_off;
+  some_held_ = false;
+  const double epoch_s = epoch_ns_ * kPerNs;
+  std::size_t count = 0;
+  for (std::size_t from = 0; from < awake.count; ++from) {
+    const PixelArray::NoisyPixel& own = pixels.noisy_pixels[awake.pixel[from]];
+    const bool held = own.reference == kHeld;
+    if (held && own.until > t1) [[unlikely]]
       continue;
-    }
-    next_[kept] = {first.tau, first.on ? level_high_[i] : level_low_[i], static_cast<std::int8_t>(first.on ? 1 : -1),
-                   first.tau < crossings_[i].tau};
-    keep(i, kept++);
+    some_held_ |= held;
+    const std::size_t i = count++;
+    if (i != from) awake.copy(from, i);
+    pixel_[i] = awake.pixel[i], place_[i] = awake.place[i];
+    light0_[i] = awake.light0[i], light1_[i] = awake.light1[i];
+    compare_.reference[i] = own.reference - own.leak * epoch_s;
+    compare_.on[i] = own.on, compare_.off[i] = own.off;
+    compare_.leak[i] = own.leak * kPerNs;
+    compare_.from[i] = 0;
+    mean_on_[i] = own.mean_on, mean_off_[i] = own.mean_off, mean_leak_[i] = own.mean_leak;
+    draws_[i] = own.draws, shots_[i] = own.shots;
+    shot_[i] = static_cast<double>(own.shot_at - t0);
+    until_[i] = static_cast<double>(own.until - t0);
   }
-  count_ = kept;
+  awake.count = compare_.count = count;
 }
 
-/// Shot noise is a Poisson process at its highest rate, thinned by the light of the moment: the first candidate before
-/// the crossing that passes, or the crossing.
-template <class Signal>
-Crossing PixelPass<Signal>::shot_before(PixelArray& pixels, std::size_t i, Crossing crossing) const {
-  const AwakePixel& awake = awake_[i];
-  PixelArray::Noise& noise = pixels.noise[awake.pixel];
-  while (noise.shot_at <= t1_) {
-    const double tau = static_cast<double>(noise.shot_at - t0_);
-    if (tau >= crossing.tau) break;
-    constexpr double kToUnit = 0x1.0p-32;
-    const auto bits = pixels.per_shot.bits(awake.pixel, noise.shots++);
-    pixels.next_shot(awake.pixel, (bits[0] + 0.5) * kToUnit);
-    if (tau <= 0 || tau < signals_[i].from()) continue;  // it fell into a refractory period
-    const double light = awake.light0 + (awake.light1 - awake.light0) * tau / duration_;
+template <class Signals>
+void PixelPass<Signals>::run(PixelArray& pixels, PackedEvents& events) {
+  if (some_held_) resume_held();
+  while (compare_.count > 0) {
+    signals.find(compare_);
+    std::fill_n(anew_.begin(), compare_.count, pixels.holds ? 1.0 : 0.0);
+    if (pixels.shoots) find_shots(pixels);
+    for (std::size_t i = 0; i < compare_.count; ++i) {
+      passed_[i] = compare_.polarity[i] > 0 ? compare_.upper(i) : compare_.lower(i);
+    }
+    if (pixels.renews) renew(pixels);
+    fire(pixels, *events.packing);
+    report(events);
+    reset(pixels);
+    sleep(pixels);
+  }
+}
+
+/// Ends the refractory periods that end in this segment.
+template <class Signals>
+void PixelPass<Signals>::resume_held() {
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    if (compare_.reference[i] != kHeld) continue;
+    compare_.from[i] = until_[i];
+    signals.advance(compare_, i);
+    compare_.reference[i] = signals.value(i) + compare_.leak[i] * until_[i];
+  }
+}
+
+/// Shot noise is a Poisson process at its highest rate, thinned by the light of the moment.
+template <class Signals>
+void PixelPass<Signals>::find_shots(const PixelArray& pixels) {
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    if (shot_[i] <= duration_) [[unlikely]]
+      find_shot(pixels, i);
+  }
+}
+
+/// The first candidate before the crossing that passes becomes the pixel's event.
+template <class Signals>
+void PixelPass<Signals>::find_shot(const PixelArray& pixels, std::size_t i) {
+  constexpr double kToUnit = 0x1.0p-32;
+  while (shot_[i] <= duration_ && !(compare_.polarity[i] != 0 && shot_[i] >= compare_.tau[i])) {
+    const double tau = shot_[i];
+    const auto bits = pixels.per_shot.bits(pixel_[i], shots_[i]++);
+    shot_[i] += pixels.shot_interval((bits[0] + 0.5) * kToUnit);
+    if (tau <= 0 || tau < compare_.from[i]) continue;  // it fell into a refractory period
+    const double light = light0_[i] + (light1_[i] - light0_[i]) * tau / duration_;
     const double intensity = std::min(pixels.relative_intensity(light), 1.0);
     const double passes = 1.0 - (1.0 - pixels.options.shot_noise_at_white) * intensity;
-    if (bits[1] * kToUnit < passes) return {tau, (bits[2] & 1U) != 0};
+    if (bits[1] * kToUnit >= passes) continue;
+    compare_.tau[i] = tau;
+    compare_.polarity[i] = (bits[2] & 1U) != 0 ? 1.0 : -1.0;
+    anew_[i] = 1;
+    return;
   }
-  return crossing;
 }
 
 /// Draws the thresholds and leaks after the events that were found.
-template <class Signal>
-void PixelPass<Signal>::renew(PixelArray& pixels) {
-  for (std::size_t i = 0; i < count_; ++i) {
-    firing_[i] = {awake_[i].pixel, pixels.noise[awake_[i].pixel].draws++};
+template <class Signals>
+void PixelPass<Signals>::renew(const PixelArray& pixels) {
+  normals_.draw(pixels.per_event, compare_.count, pixel_, draws_);
+  const double sigma = pixels.options.threshold_noise, jitter = pixels.options.leak_jitter;
+  const double least_on = kMinContrastThreshold - pixels.threshold_on;
+  const double least_off = kMinContrastThreshold - pixels.threshold_off;
+  const auto &normal_on = normals_[0], &normal_off = normals_[1], &normal_leak = normals_[2];
+#pragma omp simd
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    const bool fired = compare_.polarity[i] != 0;
+    const double on = mean_on_[i] + sigma * normal_on[i], off = mean_off_[i] + sigma * normal_off[i];
+    compare_.on[i] = fired ? static_cast<float>(on > least_on ? on : least_on) : compare_.on[i];
+    compare_.off[i] = fired ? static_cast<float>(off > least_off ? off : least_off) : compare_.off[i];
+    draws_[i] += fired ? 1U : 0U;
   }
-  normals_.draw(pixels.per_event, std::span(firing_).first(count_));
-  for (std::size_t i = 0; i < count_; ++i) {
-    const std::uint32_t pixel = awake_[i].pixel;
-    const double before = pixels.leak(pixel);
-    pixels.renew(pixel, normals_.of(i));
-    if (!pixels.leaks) continue;
+  if (!pixels.leaks) return;
+#pragma omp simd
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    const double interval = 1.0 + jitter * normal_leak[i];
+    const auto rate = static_cast<float>(mean_leak_[i] / (interval > kMinLeakInterval ? interval : kMinLeakInterval));
+    const double leak = compare_.polarity[i] != 0 ? rate * kPerNs : compare_.leak[i];
     // From this event on, so that the signal stands where it stood.
-    const double change = pixels.leak(pixel) - before;
-    signals_[i].add(change * epoch_s_, change * 1e-9);
-    next_[i].reference += change * (epoch_s_ + next_[i].tau * 1e-9);
+    passed_[i] += (leak - compare_.leak[i]) * compare_.tau[i];
+    compare_.leak[i] = leak;
   }
 }
 
-template <class Signal>
-TimeNs PixelPass<Signal>::delay(const PixelArray& pixels, std::size_t i) const {
-  const EventCameraOptions& o = pixels.options;
-  double ns = o.latency_us * 1e3;
-  if (o.latency_jitter_us > 0) ns += o.latency_jitter_us * 1e3 * normals_.of(i)[3];
-  if (o.latency_light_share > 0) {
-    const AwakePixel& awake = awake_[i];
-    const double light = awake.light0 + (awake.light1 - awake.light0) * next_[i].tau / duration_;
-    ns *= 1.0 - o.latency_light_share + o.latency_light_share / pixels.relative_intensity(light);
+/// Times of the events and of the refractory periods behind them.
+template <class Signals>
+void PixelPass<Signals>::fire(const PixelArray& pixels, const EventPacking& packing) {
+  const double duration = duration_, refractory = static_cast<double>(pixels.refractory);
+  const bool drops = pixels.refractory > 0 && !pixels.holds, holds = pixels.holds;
+#pragma omp simd
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    double t = std::floor(compare_.tau[i] + 0.5);
+    t = t > 1.0 ? t : 1.0;
+    t = t < duration ? t : duration;
+    const bool fired = compare_.polarity[i] != 0, reports = fired && !(drops && t < until_[i]);
+    reports_[i] = reports ? 1.0 : 0.0;
+    stamp_[i] = t;
+    until_[i] = reports ? t + refractory : until_[i];
+    const double resumes = holds ? until_[i] : compare_.tau[i];
+    compare_.from[i] = fired ? resumes : compare_.from[i];
   }
+  if (pixels.delays) delay(pixels, packing);
+}
+
+template <class Signals>
+void PixelPass<Signals>::delay(const PixelArray& pixels, const EventPacking& packing) {
   constexpr double kLongestNs = 1e17;
-  return static_cast<TimeNs>(std::clamp(ns, 0.0, kLongestNs) + 0.5);
+  const EventCameraOptions& o = pixels.options;
+  const double mean = o.latency_us * 1e3, jitter = o.latency_jitter_us * 1e3, share = o.latency_light_share;
+  const double dark = o.dark_irradiance, per_duration = 1 / duration_;
+  const double longest = std::min(kLongestNs, static_cast<double>(packing.longest() / 4));
+  const PerPixel<float>& normal = normals_[3];
+#pragma omp simd
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    const double light = light0_[i] + (light1_[i] - light0_[i]) * compare_.tau[i] * per_duration;
+    const double slower = 1.0 - share + share * (1.0 + dark) / (light + dark);
+    double ns = (mean + (jitter > 0 ? jitter * normal[i] : 0.0)) * (share > 0 ? slower : 1.0);
+    ns = ns > 0 ? ns : 0.0;
+    ns = ns < longest ? ns : longest;
+    stamp_[i] += std::floor(ns + 0.5);
+  }
 }
 
-/// Reports the events that were found. Pixels that are then held in reset until after the segment are dropped.
-template <class Signal>
-void PixelPass<Signal>::fire(PixelArray& pixels, PackedEvents& events) {
-  const TimeNs refractory = pixels.refractory, longest_delay = events.packing->longest() / 4;
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < count_; ++i) {
-    const AwakePixel& awake = awake_[i];
-    const Next next = next_[i];
-    const TimeNs t = std::clamp<TimeNs>(t0_ + static_cast<TimeNs>(next.tau + 0.5), t0_ + 1, t1_);
-    const bool dropped = refractory > 0 && !pixels.holds && t < pixels.until[awake.pixel];
-    if (!dropped) {
-      const TimeNs stamp = pixels.delays ? t + std::min(delay(pixels, i), longest_delay) : t;
-      events.add(stamp, awake.x, awake.y, next.polarity > 0);
-    }
-    if (refractory > 0 && !dropped) pixels.until[awake.pixel] = t + refractory;
-    if (pixels.holds && t + refractory > t1_) {
-      pixels.states[awake.pixel].reference = kHeld;
-      pixels.empty_band(awake.pixel);
+/// Packs the events of a round. Without branches: that a pixel fires again is as hard to foresee as an event.
+template <class Signals>
+void PixelPass<Signals>::report(PackedEvents& events) const {
+  std::vector<std::uint64_t>& out = *events.events;
+  const std::size_t first = out.size();
+  out.resize(first + compare_.count);
+  std::uint64_t* next = out.data() + first;
+  const EventPacking packing = *events.packing;
+  const TimeNs start = t0_ - packing.origin;
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    *next = packing.pack(start + static_cast<TimeNs>(stamp_[i]), place_[i], compare_.polarity[i] > 0);
+    next += reports_[i] != 0;
+  }
+  out.resize(static_cast<std::size_t>(next - out.data()));
+}
+
+/// Sets the references behind the events, and finds the pixels that may fire again.
+template <class Signals>
+void PixelPass<Signals>::reset(const PixelArray& pixels) {
+  signals.advance(compare_);
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    const double now = signals.value(i) + compare_.leak[i] * compare_.from[i];
+    const double next = anew_[i] != 0 ? now : passed_[i];
+    compare_.reference[i] = compare_.polarity[i] != 0 ? next : compare_.reference[i];
+  }
+  signals.look_ahead(compare_, again_.data());
+  const double duration = duration_;
+  const bool holds = pixels.holds, shoots = pixels.shoots;
+#pragma omp simd
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    const bool fired = compare_.polarity[i] != 0, held = holds && fired && until_[i] > duration;
+    const bool may = again_[i] != 0 || (shoots && shot_[i] <= duration);
+    again_[i] = fired && !held && may ? 1.0 : 0.0;
+    compare_.reference[i] = held ? kHeld : compare_.reference[i];
+  }
+}
+
+/// Puts the pixels that are done to sleep, and keeps the others.
+template <class Signals>
+void PixelPass<Signals>::sleep(PixelArray& pixels) {
+  const double duration = duration_, since_epoch = epoch_ns_ + duration_;
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    const double reference = compare_.reference[i], leak = compare_.leak[i];
+    const double upper = compare_.upper(i), lower = compare_.lower(i), now = signals.end(i) + leak * duration;
+    // Both levels fall by what leaks: the upper one until the alarm; the lower one is surely not above where it is now.
+    const double most = kLeakPerBand * (upper - reference), room = 0.5 * (upper - now);
+    double valid = (most < room ? most : room) / leak;
+    valid = leak > 0 && valid < static_cast<double>(kAges) ? valid : static_cast<double>(kAges);
+    const bool held = reference == kHeld;
+    const double sinks = leak > 0 ? leak * (duration + valid) : 0.0;
+    low_[i] = held ? std::numeric_limits<float>::infinity() : static_cast<float>(lower - leak * duration);
+    high_[i] = held ? -std::numeric_limits<float>::infinity() : static_cast<float>(upper - sinks);
+    const double shot = shot_[i] - duration, alarm = pixels.shoots && shot < valid ? shot : valid;
+    alarm_[i] = PixelArray::ticks_after_epoch(since_epoch + alarm);
+  }
+  std::size_t done = 0, kept = 0;
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    if (again_[i] != 0) {
+      keep(i, kept++);
       continue;
     }
-    next_[kept] = next;
-    from_[kept] = pixels.holds ? static_cast<double>(t + refractory - t0_) : next.tau;
-    keep(i, kept++);
+    write_back(pixels, i);
+    if (pixels.alarmed) pixels.alarms[pixel_[i]] = alarm_[i];
+    asleep_[done] = pixel_[i];
+    low_[done] = low_[i], high_[done] = high_[i];
+    ++done;
   }
-  count_ = kept;
+  pixels.set_bands(done, asleep_.data(), low_.data(), high_.data());
+  compare_.count = kept;
 }
 
-/// Sets the references behind the events.
-template <class Signal>
-void PixelPass<Signal>::resume(PixelArray& pixels) {
-  Signal::advance(std::span(signals_).first(count_), from_.data());
-  for (std::size_t i = 0; i < count_; ++i) {
-    const bool anew = pixels.holds || next_[i].noise;
-    pixels.states[awake_[i].pixel].reference = anew ? signals_[i].value() : next_[i].reference;
+template <class Signals>
+void PixelPass<Signals>::keep(std::size_t i, std::size_t to) {
+  if (i == to) return;
+  compare_.copy(i, to);
+  signals.copy(i, to);
+  pixel_[to] = pixel_[i], place_[to] = place_[i], draws_[to] = draws_[i], shots_[to] = shots_[i];
+  light0_[to] = light0_[i], light1_[to] = light1_[i];
+  mean_on_[to] = mean_on_[i], mean_off_[to] = mean_off_[i], mean_leak_[to] = mean_leak_[i];
+  shot_[to] = shot_[i], until_[to] = until_[i];
+}
+
+template <class Signals>
+void PixelPass<Signals>::write_back(PixelArray& pixels, std::size_t i) const {
+  PixelArray::NoisyPixel& own = pixels.noisy_pixels[pixel_[i]];
+  const double leak = compare_.leak[i];
+  own.reference = compare_.reference[i] + leak * epoch_ns_;
+  own.on = compare_.on[i], own.off = compare_.off[i];
+  own.leak = static_cast<float>(leak / kPerNs);
+  own.draws = draws_[i], own.shots = shots_[i];
+  own.shot_at = t0_ + static_cast<TimeNs>(shot_[i]);
+  own.until = t0_ + static_cast<TimeNs>(until_[i]);
+}
+
+template <class Signals>
+void PixelPass<Signals>::open(PixelArray& pixels) {
+  const std::size_t count = compare_.count;
+  std::fill_n(compare_.polarity.begin(), count, 1.0);
+  std::fill_n(compare_.tau.begin(), count, 0.0);
+  std::fill_n(again_.begin(), count, 0.0);
+  if (pixels.renews) renew(pixels);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double threshold = pixels.threshold_on + compare_.on[i];
+    compare_.reference[i] = signals.end(i);
+    // A sensor that leaks has been running before: it is anywhere between two leak events.
+    if (compare_.leak[i] > 0) compare_.reference[i] -= threshold * pixels.per_leak.uniforms(pixel_[i], 1)[0];
+    if (!pixels.shoots) continue;
+    const bool dead = std::isinf(compare_.on[i]);
+    shot_[i] = dead ? static_cast<double>(kAges) : pixels.shot_interval(pixels.per_shot.uniforms(pixel_[i], 0)[0]);
+    shots_[i] = 1;
   }
+  sleep(pixels);
 }
 
-/// Notes the levels that the pixel sleeps between, and sets its alarm.
-template <class Signal>
-void PixelPass<Signal>::settle(PixelArray& pixels, std::size_t i) {
-  const std::uint32_t pixel = awake_[i].pixel;
-  double signal = 0;
-  if (pixels.leaks) {
-    signal = pixels.in_brightness ? pixels.filtered(pixel) + pixels.leak(pixel) * pixels.seconds_since_epoch(t1_)
-                                  : signals_[i].value(duration_);
-  }
-  const PixelArray::Levels levels = pixels.sleep(pixel, t1_, signal);
-  settled_[settled_count_] = pixel;
-  low_[settled_count_] = levels.low;
-  high_[settled_count_++] = levels.high;
-}
-
-template <class Signal>
-void PixelPass<Signal>::set_bands(PixelArray& pixels) {
-  pixels.set_bands(settled_count_, settled_.data(), low_.data(), high_.data());
-  settled_count_ = 0;
-  count_ = 0;
-}
-
-template <class Signal>
-void PixelPass<Signal>::settle_all(PixelArray& pixels, TimeNs t) {
-  t1_ = t;
-  duration_ = 0;
-  for (std::size_t i = 0; i < count_; ++i) settle(pixels, i);
-  set_bands(pixels);
-}
-
-template class PixelPass<LinearSignal>;
-template class PixelPass<RelaxingSignal>;
+template class PixelPass<LinearSignals>;
+template class PixelPass<RelaxingSignals>;
 
 }  // namespace esim

@@ -1,89 +1,74 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "esim/sensors/event_normals.h"
+#include "esim/sensors/linear_signals.h"
 #include "esim/sensors/pixel_array.h"
-#include "esim/sensors/pixel_signal.h"
+#include "esim/sensors/pixel_block.h"
+#include "esim/sensors/relaxing_signals.h"
 
 namespace esim {
 
-/// A pixel that woke up in a segment.
-struct AwakePixel {
-  std::uint32_t pixel;
-  std::uint16_t x, y;
-  float light0, light1;  ///< irradiance at the segment's ends
-};
-
-/// Takes the pixels that woke up through a segment. All take one event at a time, so that random numbers and
-/// exponentials are computed for many pixels at once. Private to the event camera; holds memory to work in.
-template <class Signal>
+/// Takes the pixels that woke up through a segment, with all that is random about them. All of a block take one event
+/// at a time, in vectors. Private to the event camera; memory to work in, to be kept.
+template <class Signals>
 class PixelPass {
  public:
-  /// Makes room for so many more pixels.
-  void reserve(std::size_t more);
+  /// What the comparators see of the pixels: to be set between begin() and what follows.
+  Signals signals;
 
-  /// Appends a pixel; where `signal` is not given, it is to be set before run().
-  void add(const AwakePixel& pixel) { awake_[count_++] = pixel; }
-  void add(const AwakePixel& pixel, const Signal& signal) {
-    signals_[count_] = signal;
-    awake_[count_++] = pixel;
-  }
-  std::size_t count() const { return count_; }
-  const AwakePixel& pixel(std::size_t i) const { return awake_[i]; }
-  Signal& signal(std::size_t i) { return signals_[i]; }
+  /// Takes pixels that woke up between t0 and t1. Those that stay in reset are removed from `awake`.
+  void begin(const PixelArray& pixels, AwakePixels& awake, TimeNs t0, TimeNs t1);
 
-  /// Gives the pixels the bands that follow from their references and signals at time t, and forgets them.
-  void settle_all(PixelArray& pixels, TimeNs t);
+  /// Adds the events that they fire to `events`, in any order.
+  void run(PixelArray& pixels, PackedEvents& events);
 
-  /// Adds the pixels' events to `events`, in any order, and forgets the pixels.
-  void run(PixelArray& pixels, TimeNs t0, TimeNs t1, PackedEvents& events);
+  /// Instead of run() where the pixels are first seen, at t0 = t1: sets their references.
+  void open(PixelArray& pixels);
 
  private:
-  /// The event that a pixel is about to fire.
-  struct Next {
-    double tau = 0;        // ns after the segment's start
-    double reference = 0;  // the level that it passed, in G
-    std::int8_t polarity = 0;
-    bool noise = false;
-  };
+  void resume_held();
 
-  // The steps of a round, for all pixels that are left. Those that are done are dropped on the way.
-  void begin(PixelArray& pixels);
-  void find(PixelArray& pixels);
-  void renew(PixelArray& pixels);
-  void fire(PixelArray& pixels, PackedEvents& events);
-  void resume(PixelArray& pixels);
+  // The steps of a round, for all pixels that are left.
+  void find_shots(const PixelArray& pixels);
+  void find_shot(const PixelArray& pixels, std::size_t i);
+  void renew(const PixelArray& pixels);
+  void fire(const PixelArray& pixels, const EventPacking& packing);
+  void delay(const PixelArray& pixels, const EventPacking& packing);
+  void report(PackedEvents& events) const;
+  void reset(const PixelArray& pixels);
+  void sleep(PixelArray& pixels);
 
-  void keep(std::size_t from, std::size_t to);
-  Crossing shot_before(PixelArray& pixels, std::size_t i, Crossing crossing) const;
-  TimeNs delay(const PixelArray& pixels, std::size_t i) const;
-  void settle(PixelArray& pixels, std::size_t i);
-  void set_bands(PixelArray& pixels);
+  void keep(std::size_t i, std::size_t to);
+  void write_back(PixelArray& pixels, std::size_t i) const;
 
   TimeNs t0_ = 0, t1_ = 0;
-  double duration_ = 0;  // ns
-  double epoch_s_ = 0;   // from the epoch to t0
+  double duration_ = 0;     // ns
+  double epoch_ns_ = 0;     // from the epoch to t0
+  bool some_held_ = false;  // pixels whose refractory period ends in the segment
 
-  // By pixel that is left.
-  std::vector<AwakePixel> awake_;
-  std::vector<Signal> signals_;
-  std::vector<Next> next_;
-  std::vector<double> level_low_, level_high_, from_;
-  std::vector<Crossing> crossings_;
-  std::size_t count_ = 0;
+  // By pixel that is left. Times are ns after t0.
+  Comparators compare_{};
+  PerPixel<std::uint32_t> pixel_{}, place_{}, draws_{}, shots_{};
+  PerPixel<float> light0_{}, light1_{}, mean_on_{}, mean_off_{}, mean_leak_{};
+  PerPixel<double> shot_{};     // the next candidate of shot noise
+  PerPixel<double> until_{};    // end of the last refractory period
+  PerPixel<double> passed_{};   // the level that the event passed
+  PerPixel<double> anew_{};     // 1 where the event is none of the light: the reference is the signal of the moment
+  PerPixel<double> stamp_{};    // of the event
+  PerPixel<double> reports_{};  // 0 where the event is lost
+  PerPixel<double> again_{};    // 1 where another event may follow
+  EventNormals normals_{};
 
-  // By pixel that is done: the levels that it sleeps between.
-  std::vector<std::uint32_t> settled_;
-  std::vector<float> low_, high_;
-  std::size_t settled_count_ = 0;
-
-  EventNormals normals_;
-  std::vector<EventNormals::Address> firing_;
+  // The levels that pixels sleep between.
+  PerPixel<std::uint32_t> asleep_{};
+  PerPixel<float> low_{}, high_{};
+  PerPixel<std::int32_t> alarm_{};
 };
 
-extern template class PixelPass<LinearSignal>;
-extern template class PixelPass<RelaxingSignal>;
+extern template class PixelPass<LinearSignals>;
+extern template class PixelPass<RelaxingSignals>;
 
 }  // namespace esim

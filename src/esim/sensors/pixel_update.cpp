@@ -1,7 +1,6 @@
 #include "esim/sensors/pixel_update.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -11,22 +10,11 @@
 namespace esim {
 namespace {
 
-// Pixels that go through a segment together: enough for vectors, few enough for the cache.
-constexpr std::size_t kBatch = 192;
-
 /// Lanes whose alarm goes off by `now`, in ticks.
 template <class D>
 hn::Mask<D> alarmed(D d, const std::int32_t* alarms, std::int32_t now) {
   const hn::RebindToSigned<D> di;
   return hn::RebindMask(d, hn::Lt(hn::LoadU(di, alarms), hn::Set(di, now + 1)));
-}
-
-AwakePixel awake_pixel(const PixelArray& pixels, const Segment& segment, int x, int y) {
-  const auto pixel =
-      static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(pixels.width) + static_cast<std::uint32_t>(x);
-  pixels.prefetch(pixel);
-  return {pixel, static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), segment.irradiance0->row(y)[x],
-          segment.irradiance1->row(y)[x]};
 }
 
 std::size_t index(const PixelArray& pixels, int x, int y) {
@@ -64,17 +52,17 @@ struct PixelUpdate::Filter {
 /// for the segment's mean intensity, and wakes those that may have left their band on the way.
 template <int kOrder, class D>
 HWY_INLINE void PixelUpdate::filter_vector(D d, PixelArray& pixels, const Segment& segment, const Filter& filter,
-                                           const float* brightness, int y, int x) {
+                                           const float* brightness, int y, int x, const EventPacking& packing) {
   using V = hn::Vec<D>;
   const std::size_t i = index(pixels, x, y);
   const V start = hn::LoadU(d, &pixels.brightness[i]), end = hn::LoadU(d, brightness);
   hn::StoreU(end, d, &pixels.brightness[i]);
   V lowest = hn::Min(start, end), highest = hn::Max(start, end);
   V phase = hn::Zero(d), m = phase, f1 = start, f2 = start;
+  const V e0 = hn::LoadU(d, segment.irradiance0->row(y) + x), e1 = hn::LoadU(d, segment.irradiance1->row(y) + x);
 
   if constexpr (kOrder > 0) {
     // How many time constants the segment lasts: of the mean light, by Simpson's rule for an exponential.
-    const V e0 = hn::LoadU(d, segment.irradiance0->row(y) + x), e1 = hn::LoadU(d, segment.irradiance1->row(y) + x);
     const V sum = hn::MulAdd(hn::Set(d, 4.0F), hn::Sqrt(hn::Mul(e0, e1)), hn::Add(e0, e1));
     phase = hn::MulAdd(sum, hn::Set(d, filter.phase_per_light), hn::Set(d, filter.phase_in_dark));
 
@@ -107,59 +95,68 @@ HWY_INLINE void PixelUpdate::filter_vector(D d, PixelArray& pixels, const Segmen
   if (pixels.alarmed) restless = hn::Or(restless, alarmed(d, &pixels.alarms[i], filter.now));
   // Without a branch: that a pixel wakes is as hard to foresee as an event.
   const ChosenLanes chosen(d, restless);
-  Woken& w = woken_;
-  chosen.store_positions(x, w.column.data() + w.count);
-  chosen.store(start, w.start.data() + w.count);
-  chosen.store(end, w.end.data() + w.count);
+  AwakePixels& a = awake_;
+  const std::size_t at = a.count;
+  chosen.store_positions(static_cast<std::uint32_t>(i), 1, a.pixel.data() + at);
+  chosen.store_positions(static_cast<std::uint32_t>(packing.place(x, y)), 2, a.place.data() + at);
+  chosen.store(e0, a.light0.data() + at);
+  chosen.store(e1, a.light1.data() + at);
+  chosen.store(start, a.start.data() + at);
+  chosen.store(end, a.end.data() + at);
   if constexpr (kOrder > 0) {
-    chosen.store(f1, w.filtered1.data() + w.count);
-    chosen.store(phase, w.phase.data() + w.count);
-    chosen.store(m, w.moved.data() + w.count);
+    chosen.store(f1, a.filtered1.data() + at);
+    chosen.store(phase, a.phase.data() + at);
+    chosen.store(m, a.moved.data() + at);
   }
-  if constexpr (kOrder == 2) chosen.store(f2, w.filtered2.data() + w.count);
-  w.count += chosen.count();
+  if constexpr (kOrder == 2) chosen.store(f2, a.filtered2.data() + at);
+  a.count += chosen.count();
 }
 
-/// Hands the pixels of a row that woke up over to their passes.
+/// Takes the pixels that woke up through the segment.
 template <int kOrder>
-void PixelUpdate::take_woken(PixelArray& pixels, const Segment& segment, const Filter& filter, int y) {
-  const Woken& w = woken_;
-  for (std::size_t i = 0; i < w.count; ++i) {
-    const AwakePixel awake = awake_pixel(pixels, segment, static_cast<int>(w.column[i]), y);
-    const double from = w.start[i], slope = (static_cast<double>(w.end[i]) - from) * filter.per_duration;
-    if constexpr (kOrder == 0) {
-      linear_.add(awake, {from, slope});
-    } else {
-      const double rate = w.phase[i] * filter.per_duration, moved = w.moved[i];
-      relaxing_.add(
-          awake, kOrder == 1 ? RelaxingSignal::first_order(rate, moved, w.filtered1[i], from, slope)
-                             : RelaxingSignal::second_order(rate, moved, w.filtered1[i], w.filtered2[i], from, slope));
-    }
+void PixelUpdate::run_awake(PixelArray& pixels, const Segment& segment, PackedEvents& events) {
+  const auto duration = static_cast<double>(segment.t1 - segment.t0);
+  const auto run = [&](auto& pass, const auto& take) {
+    pass.begin(pixels, awake_, segment.t0, segment.t1);
+    take(pass.signals);
+    pass.run(pixels, events);
+  };
+  if constexpr (kOrder == 0) {
+    run(linear_, [&](LinearSignals& signals) { signals.take(awake_, duration); });
+  } else {
+    run(relaxing_, [&](RelaxingSignals& signals) { signals.take(awake_, kOrder, duration); });
   }
+  awake_.count = 0;
 }
 
 const float* PixelUpdate::brightness_row(const PixelArray& pixels, const Segment& segment,
                                          const Image<float>* brightness, int y) {
   if (brightness != nullptr) return brightness->row(y) + segment.tile.x;
   const auto length = static_cast<std::size_t>(segment.tile.width);
-  row_.resize(length);
-  respond(pixels.options, length, segment.irradiance1->row(y) + segment.tile.x, row_.data());
-  return row_.data();
+  float_row_.resize(length);
+  respond(pixels.options, length, segment.irradiance1->row(y) + segment.tile.x, float_row_.data());
+  return float_row_.data();
 }
 
 template <int kOrder>
-void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const Filter& filter,
-                             const Image<float>* brightness, int y) {
+void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const Filter& filter, const float* brightness,
+                             int y, PackedEvents& events) {
   const int first = segment.tile.x, last = first + segment.tile.width;
-  const float* const row = brightness_row(pixels, segment, brightness, y);
-  const hn::CappedTag<float, 8> d;
-  const int lanes = static_cast<int>(hn::Lanes(d));
-  woken_.begin(static_cast<std::size_t>(segment.tile.width) + kVectorPadding);
-  int x = first;
-  for (; x + lanes <= last; x += lanes) filter_vector<kOrder>(d, pixels, segment, filter, row + (x - first), y, x);
-  for (; x < last; ++x)
-    filter_vector<kOrder>(hn::CappedTag<float, 1>(), pixels, segment, filter, row + (x - first), y, x);
-  take_woken<kOrder>(pixels, segment, filter, y);
+  std::size_t asked = awake_.count;
+  const auto filter_to = [&](auto d, int begin, int end) {
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    for (int x = begin; x < end; x += lanes) {
+      filter_vector<kOrder>(d, pixels, segment, filter, brightness + (x - first), y, x, *events.packing);
+      if ((x & 31) < lanes) {
+        for (; asked < awake_.count; ++asked) pixels.prefetch(awake_.pixel[asked]);
+      }
+      if (!awake_.has_room()) run_awake<kOrder>(pixels, segment, events), asked = 0;
+    }
+  };
+  const hn::CappedTag<float, 8> whole;
+  const int middle = last - segment.tile.width % static_cast<int>(hn::Lanes(whole));
+  filter_to(whole, first, middle);
+  filter_to(hn::CappedTag<float, 1>(), middle, last);
 }
 
 /// Where bands are of brightness: moves all low-passes on, and takes those pixels through the segment whose filtered
@@ -168,46 +165,45 @@ bool PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image
                          PackedEvents& events) {
   const Filter common(pixels, segment);
   const int order = pixels.options.low_pass_hz > 0 ? pixels.options.low_pass_order : 0;
-  const auto width = static_cast<std::size_t>(segment.tile.width);
   for (int y = rows.first; y < rows.last; ++y) {
     if (!all_irradiance(segment, {y, y + 1})) return false;
     if (y + 1 < rows.last) prefetch_row(segment, y + 1);
-    order == 0 ? linear_.reserve(width) : relaxing_.reserve(width);
-    if (order == 0) filter_row<0>(pixels, segment, common, brightness, y);
-    if (order == 1) filter_row<1>(pixels, segment, common, brightness, y);
-    if (order == 2) filter_row<2>(pixels, segment, common, brightness, y);
-    const bool last = y + 1 == rows.last;
-    if (linear_.count() >= kBatch || last) linear_.run(pixels, segment.t0, segment.t1, events);
-    if (relaxing_.count() >= kBatch || last) relaxing_.run(pixels, segment.t0, segment.t1, events);
+    const float* const row = brightness_row(pixels, segment, brightness, y);
+    if (order == 0) filter_row<0>(pixels, segment, common, row, y, events);
+    if (order == 1) filter_row<1>(pixels, segment, common, row, y, events);
+    if (order == 2) filter_row<2>(pixels, segment, common, row, y, events);
   }
+  if (order == 0) run_awake<0>(pixels, segment, events);
+  if (order == 1) run_awake<1>(pixels, segment, events);
+  if (order == 2) run_awake<2>(pixels, segment, events);
   return true;
 }
 
 /// Where bands are of irradiance: takes the pixels through the segment that wake up in it.
 bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, PackedEvents& events) {
   if (!watch_.look(pixels, segment, rows)) return false;
-  if (CleanPass::serves(pixels)) {
+  if (pixels.clean) {
     clean_.run(pixels, segment, watch_, rows, events);
     return true;
   }
-  linear_.reserve(watch_.count());
+  const auto run = [&] {
+    linear_.begin(pixels, awake_, segment.t0, segment.t1);
+    linear_.signals.take_light(awake_, pixels.options.log_eps, static_cast<double>(segment.t1 - segment.t0));
+    linear_.run(pixels, events);
+    awake_.count = 0;
+  };
   for (int y = rows.first; y < rows.last; ++y) {
-    for (const std::uint32_t x : watch_.columns(y)) linear_.add(awake_pixel(pixels, segment, static_cast<int>(x), y));
+    for (const std::uint32_t x : watch_.columns(y)) {
+      const std::size_t i = awake_.count++;
+      const int column = static_cast<int>(x);
+      awake_.pixel[i] = static_cast<std::uint32_t>(index(pixels, column, y));
+      awake_.place[i] = static_cast<std::uint32_t>(events.packing->place(column, y));
+      awake_.light0[i] = segment.irradiance0->row(y)[x];
+      awake_.light1[i] = segment.irradiance1->row(y)[x];
+      if (!awake_.has_room()) run();
+    }
   }
-  const std::size_t count = linear_.count();
-  if (before_.size() < count + kVectorPadding) {
-    before_.resize(2 * count + kVectorPadding, 1.0), after_.resize(2 * count + kVectorPadding, 1.0);
-  }
-  const double eps = pixels.options.log_eps;
-  for (std::size_t i = 0; i < count; ++i) {
-    before_[i] = linear_.pixel(i).light0 + eps;
-    after_[i] = linear_.pixel(i).light1 + eps;
-  }
-  logarithms(count, before_.data());
-  logarithms(count, after_.data());
-  const double per_ns = 1.0 / static_cast<double>(segment.t1 - segment.t0);
-  for (std::size_t i = 0; i < count; ++i) linear_.signal(i) = {before_[i], (after_[i] - before_[i]) * per_ns};
-  linear_.run(pixels, segment.t0, segment.t1, events);
+  run();
   return true;
 }
 
@@ -219,28 +215,35 @@ bool PixelUpdate::advance(PixelArray& pixels, const Segment& segment, const Imag
 
 bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows) {
   if (!all_irradiance(segment, rows)) return false;
-  linear_.reserve(static_cast<std::size_t>(segment.tile.width) * static_cast<std::size_t>(rows.count()));
   const auto width = static_cast<std::size_t>(segment.tile.width);
-  if (after_.size() < width + kVectorPadding) after_.resize(width + kVectorPadding, 1.0);
+  if (row_.size() < width + kVectorPadding) row_.resize(width + kVectorPadding, 1.0);
   for (int y = rows.first; y < rows.last; ++y) {
+    const std::size_t first = index(pixels, segment.tile.x, y);
     if (pixels.in_brightness) {
       const float* const row = brightness_row(pixels, segment, brightness, y);
-      std::copy_n(row, width, after_.data());
+      std::copy_n(row, width, row_.data());
+      for (auto* values : {&pixels.brightness, &pixels.filtered1, &pixels.filtered2}) {
+        if (!values->empty()) std::copy_n(row, width, values->data() + first);
+      }
     } else {
       const float* const row = segment.irradiance1->row(y) + segment.tile.x;
-      for (std::size_t i = 0; i < width; ++i) after_[i] = row[i] + pixels.options.log_eps;
-      logarithms(width, after_.data());
+      for (std::size_t i = 0; i < width; ++i) row_[i] = row[i] + pixels.options.log_eps;
+      logarithms(width, row_.data());
     }
-    if (CleanPass::serves(pixels)) {
-      clean_.open(pixels, static_cast<std::uint32_t>(index(pixels, segment.tile.x, y)), {after_.data(), width});
+    if (pixels.clean) {
+      clean_.open(pixels, static_cast<std::uint32_t>(first), {row_.data(), width});
       continue;
     }
-    for (int i = 0; i < segment.tile.width; ++i) {
-      const AwakePixel awake = awake_pixel(pixels, segment, segment.tile.x + i, y);
-      linear_.add(awake, {pixels.open(awake.pixel, after_[static_cast<std::size_t>(i)], segment.t0), 0.0});
+    for (std::size_t begin = 0; begin < width; begin += kBlock) {
+      const std::size_t count = std::min(kBlock, width - begin);
+      for (std::size_t i = 0; i < count; ++i) awake_.pixel[i] = static_cast<std::uint32_t>(first + begin + i);
+      awake_.count = count;
+      linear_.begin(pixels, awake_, segment.t0, segment.t1);
+      for (std::size_t i = 0; i < count; ++i) linear_.signals.set(i, row_[begin + i], row_[begin + i]);
+      linear_.open(pixels);
+      awake_.count = 0;
     }
   }
-  linear_.settle_all(pixels, segment.t0);
   return true;
 }
 

@@ -7,6 +7,7 @@
 #include "esim/render/sample.h"
 #include "esim/sensors/clean_pass.h"
 #include "esim/sensors/pixel_array.h"
+#include "esim/sensors/pixel_block.h"
 #include "esim/sensors/pixel_pass.h"
 #include "esim/sensors/pixel_watch.h"
 
@@ -31,39 +32,24 @@ class PixelUpdate {
   bool filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
               PackedEvents& events);
 
-  /// The pixels of a row that woke up: brightness at the segment's ends, behind the poles at its start, and how many
-  /// time constants it lasts.
-  struct Woken {
-    std::vector<std::uint32_t> column;
-    std::vector<float> start, end, filtered1, filtered2, phase, moved;
-    std::size_t count = 0;
-
-    void begin(std::size_t most) {
-      count = 0;
-      if (column.size() >= most) return;
-      column.resize(most);
-      for (auto* values : {&start, &end, &filtered1, &filtered2, &phase, &moved}) values->resize(most);
-    }
-  };
-
   struct Filter;
   template <int kOrder>
-  void take_woken(PixelArray& pixels, const Segment& segment, const Filter& filter, int y);
-  template <int kOrder>
-  void filter_row(PixelArray& pixels, const Segment& segment, const Filter& filter, const Image<float>* brightness,
-                  int y);
+  void filter_row(PixelArray& pixels, const Segment& segment, const Filter& filter, const float* brightness, int y,
+                  PackedEvents& events);
   template <int kOrder, class D>
   void filter_vector(D d, PixelArray& pixels, const Segment& segment, const Filter& filter, const float* brightness,
-                     int y, int x);
+                     int y, int x, const EventPacking& packing);
+  template <int kOrder>
+  void run_awake(PixelArray& pixels, const Segment& segment, PackedEvents& events);
   const float* brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int y);
 
   PixelWatch watch_;
-  Woken woken_;
   CleanPass clean_;
-  PixelPass<LinearSignal> linear_;
-  PixelPass<RelaxingSignal> relaxing_;
-  std::vector<double> before_, after_;  // light, then brightness, at the segment's ends of each pixel that is awake
-  std::vector<float> row_;              // brightness at the segment's end
+  AwakePixels awake_;
+  PixelPass<LinearSignals> linear_;
+  PixelPass<RelaxingSignals> relaxing_;
+  std::vector<double> row_;       // brightness at the first sample
+  std::vector<float> float_row_;  // brightness at the segment's end
 };
 
 }  // namespace esim

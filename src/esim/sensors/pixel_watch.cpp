@@ -5,6 +5,7 @@
 #include <string>
 
 #include "esim/core/error.h"
+#include "esim/sensors/pixel_block.h"
 #include "esim/sensors/vector_math.h"
 
 namespace esim {
@@ -31,11 +32,10 @@ bool PixelWatch::look(const PixelArray& pixels, const Segment& segment, Rows row
     if (!look_at_row(pixels, segment, y, count)) return false;
     ends_.push_back(count);
     // What is needed next of the pixels comes from memory while the rows behind are looked at.
-    const PixelArray::State* const states =
-        pixels.states.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width);
+    const std::size_t row = static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width);
     const float* const light0 = segment.irradiance0->row(y);
     for (std::size_t i = before; i < count; ++i) {
-      __builtin_prefetch(states + columns_[i], 1);
+      pixels.prefetch(row + columns_[i]);
       __builtin_prefetch(light0 + columns_[i]);
     }
   }
@@ -67,7 +67,7 @@ bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, i
         awake = hn::Or(awake, hn::RebindMask(d, alarmed));
       }
       const ChosenLanes chosen(d, awake);
-      chosen.store_positions(x, columns + found);
+      chosen.store_positions(static_cast<std::uint32_t>(x), 1, columns + found);
       found += chosen.count();
     }
     good &= hn::GetLane(hn::MaxOfLanes(du, largest)) <= kLargest;

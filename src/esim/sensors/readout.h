@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <limits>
 #include <span>
 #include <vector>
@@ -28,15 +27,38 @@ class Readout {
   std::size_t waiting() const { return waiting_; }
 
  private:
-  void serve_until(TimeNs now, std::vector<Event>& out);
+  /// Times in 1/1024 ns: fine enough for any rate, and 104 days long.
+  using FineTime = std::int64_t;
+  static constexpr int kFineBits = 10;
 
-  double ns_per_event_;
-  double row_ns_;
+  void serve_until(TimeNs now, std::vector<Event>& out);
+  void accept(const Event& event);
+
+  FineTime per_event_, per_row_;
   std::size_t capacity_;
-  std::vector<std::vector<Event>> rows_;                 // the events that wait, by row
-  std::deque<std::uint16_t> requests_;                   // rows with events, in the order of their first
-  TimeNs free_at_ = std::numeric_limits<TimeNs>::min();  // when the reader is done, rounded up,
-  double ahead_ = 0;                                     // by so many ns
+  FineTime free_at_ = std::numeric_limits<FineTime>::min();  // when the reader is done
+
+  // The events that wait, by row: lists of slots.
+  struct Slot {
+    std::uint16_t x;
+    std::int8_t polarity;
+    std::uint32_t next;
+  };
+  struct Row {
+    std::uint32_t first = 0, count = 0;
+  };
+  std::vector<Slot> slots_;
+  std::uint32_t free_slot_ = 0;  // first of the list of those that are free
+  std::vector<Row> rows_;
+
+  // Rows with events, in the order of their first: a ring.
+  struct Request {
+    TimeNs t;
+    std::uint16_t row;
+  };
+  std::vector<Request> requests_;
+  std::size_t first_request_ = 0, request_count_ = 0;
+
   std::size_t waiting_ = 0;
   std::int64_t dropped_ = 0;
 };

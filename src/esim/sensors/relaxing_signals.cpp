@@ -1,9 +1,8 @@
-// RelaxingSignal, many at once.
-#include <algorithm>
-#include <array>
-#include <cmath>
+#include "esim/sensors/relaxing_signals.h"
 
-#include "esim/sensors/pixel_signal.h"
+#include <algorithm>
+#include <cstdint>
+
 #include "esim/sensors/vector_math.h"
 
 namespace esim {
@@ -12,137 +11,194 @@ namespace {
 using D = hn::ScalableTag<double>;
 using V = hn::Vec<D>;
 constexpr D kD;
-constexpr std::size_t kMaxLanes = HWY_MAX_BYTES / sizeof(double);
 
 constexpr double kToleranceNs = 0.05;
 constexpr int kMostSteps = 3;
 
 // Below, 1 - exp(-u) loses too many digits.
-constexpr double kSmallestSpan = 1e-4;
+constexpr double kSmallestSpan = 1e-5;
 
-using Values = std::array<double, kMaxLanes>;
-
-V load(const Values& values) { return hn::LoadU(kD, values.data()); }
 V set(double value) { return hn::Set(kD, value); }
+
+/// F behind one pole.
+V filtered_at(V u, V m, V filtered, V start, V rise) {
+  return hn::Add(hn::MulAdd(hn::Sub(start, filtered), m, filtered), hn::Mul(rise, hn::Sub(u, m)));
+}
 
 }  // namespace
 
-/// As many signals as a vector has lanes, one value of each beside the other.
-struct RelaxingSignal::Lanes {
-  alignas(64) Values rate, start, rise, filtered, offset, drift, moved, u, value, slope, low, high;
-
-  void take(std::size_t lane, const RelaxingSignal& s, double low_level, double high_level) {
-    rate[lane] = s.rate_, start[lane] = s.start_, rise[lane] = s.rise_, filtered[lane] = s.filtered1_;
-    offset[lane] = s.offset_, drift[lane] = s.drift_, moved[lane] = s.moved_;
-    u[lane] = s.at_from_.u, value[lane] = s.at_from_.value, slope[lane] = s.at_from_.slope;
-    low[lane] = low_level, high[lane] = high_level;
+void RelaxingSignals::take(const AwakePixels& awake, int poles, double duration) {
+  poles_ = poles;
+  duration_ = duration;
+  const auto fill = [&](const PerPixel<float>& from, PerPixel<double>& to) {
+    for (std::size_t i = 0; i < awake.count; ++i) to[i] = from[i];
+  };
+  fill(awake.phase, phase_), fill(awake.moved, moved_);
+  fill(awake.start, start_), fill(awake.filtered1, filtered1_);
+  if (poles == 2) fill(awake.filtered2, filtered2_);
+  for (std::size_t i = 0; i < awake.count; ++i) {
+    const double end = awake.end[i], rise = (end - start_[i]) / phase_[i], distance = start_[i] - filtered1_[i];
+    rise_[i] = rise;
+    u_[i] = 0, value_[i] = filtered1_[i], slope_[i] = distance;
+    end_[i] = filtered1_[i] + distance * moved_[i] + rise * (phase_[i] - moved_[i]);
+    end_slope_[i] = end - end_[i];
   }
-
-  /// Value without what leaks, of one pole.
-  V filtered_at(V u_now, V m) const {
-    const V f = load(filtered);
-    return hn::Add(hn::MulAdd(hn::Sub(load(start), f), m, f), hn::Mul(load(rise), hn::Sub(u_now, m)));
+  if (poles == 1) return;
+  Comparators none;
+  for (std::size_t i = 0; i < awake.count; ++i) {
+    none.leak[i] = 0, none.from[i] = 0;
+    RelaxingSignal one = signal(none, i);
+    value_[i] = one.value(), slope_[i] = one.slope();
+    one.advance(duration);
+    end_[i] = one.value(), end_slope_[i] = one.slope();
   }
+}
 
-  /// Where the signal turns back, is that between the levels, and before `last`?
-  hn::Mask<D> turns_inside(V last, V upper, V lower) const {
-    const V leak = load(drift), distance = hn::Sub(load(start), load(filtered));
-    const V m = hn::Div(hn::Add(distance, leak), hn::Sub(distance, load(rise)));
+RelaxingSignal RelaxingSignals::signal(const Comparators& c, std::size_t i) const {
+  const double rate = phase_[i] / duration_, slope = rise_[i] * rate;
+  RelaxingSignal one =
+      poles_ == 2 ? RelaxingSignal::second_order(rate, moved_[i], filtered1_[i], filtered2_[i], start_[i], slope)
+                  : RelaxingSignal::first_order(rate, moved_[i], filtered1_[i], start_[i], slope);
+  one.add(0, c.leak[i]);
+  if (c.from[i] > 0) one.advance(c.from[i]);
+  return one;
+}
+
+void RelaxingSignals::copy(std::size_t i, std::size_t to) {
+  for (auto* values :
+       {&phase_, &start_, &rise_, &filtered1_, &filtered2_, &moved_, &u_, &value_, &slope_, &end_, &end_slope_}) {
+    (*values)[to] = (*values)[i];
+  }
+}
+
+/// Some neighbouring signals of one pole, as many as a vector has lanes.
+struct RelaxingSignals::Finder {
+  V filtered, start, rise, leak, first, last;  // leak is per u
+
+  V level_at(V u, V m) const { return hn::MulAdd(leak, u, filtered_at(u, m, filtered, start, rise)); }
+
+  /// Where the signal turns back, is that between the levels, and between first and last?
+  hn::Mask<D> turns_inside(V upper, V lower) const {
+    const V distance = hn::Sub(start, filtered);
+    const V m = hn::Div(hn::Add(distance, leak), hn::Sub(distance, rise));
     const V turn = hn::Neg(hn::Log(kD, hn::Max(hn::Sub(set(1), m), set(1e-300))));
-    const V value_there = hn::Add(hn::MulAdd(leak, turn, load(offset)), filtered_at(turn, m));
+    const V value_there = level_at(turn, m);
     const auto inside = hn::And(hn::Lt(value_there, upper), hn::Gt(value_there, lower));
-    return hn::And(inside, hn::And(hn::Gt(turn, load(u)), hn::Lt(turn, last)));
+    return hn::And(inside, hn::And(hn::Gt(turn, first), hn::Lt(turn, last)));
   }
 
-  enum Outcome : int { kNone = 0, kOn = 1, kOff = 2, kUnclear = 3 };
-
-  /// For each lane, what happens until `end`, and when. Unclear is what turns back before it crosses, is outside
-  /// already, or is not found with a few steps of Halley's method from the inverse cubic.
-  void find(double end, Values& outcome, Values& tau) const {
-    const V first = load(u), last = hn::Mul(load(rate), set(end)), v0 = load(value), g0 = load(slope);
-    const V leak = load(drift), shift = load(offset);
-    const V f_last = filtered_at(last, load(moved));
-    const V v1 = hn::Add(hn::MulAdd(leak, last, shift), f_last);
-    const V g1 = hn::Add(hn::Sub(hn::MulAdd(load(rise), last, load(start)), f_last), leak);
-    const V upper = load(high), lower = load(low);
-    const auto on = hn::Ge(v1, upper), off = hn::Le(v1, lower), crosses = hn::Or(on, off);
-    const auto straight = hn::Gt(hn::Mul(g0, g1), hn::Zero(kD));
-    auto clear = straight;
-    if (const auto bent = hn::Not(hn::Or(straight, crosses)); !hn::AllFalse(kD, bent)) {
-      clear = hn::Or(clear, hn::And(bent, turns_inside(last, upper, lower)));
-    }
-    clear = hn::And(clear, hn::And(hn::Lt(v0, upper), hn::Gt(v0, lower)));
-
-    // The inverse cubic.
-    const V level = hn::IfThenElse(on, upper, lower), rises = hn::Sub(v1, v0);
-    const V s = hn::Div(hn::Sub(level, v0), rises), t = hn::Sub(set(1), s);
-    const V ends = hn::MulAdd(hn::Mul(hn::Mul(t, t), hn::MulAdd(set(2), s, set(1))), first,
-                              hn::Mul(hn::Mul(hn::Mul(s, s), hn::NegMulAdd(set(2), s, set(3))), last));
-    const V bow = hn::Sub(hn::Div(t, g0), hn::Div(s, g1));
-    V guess = hn::MulAdd(hn::Mul(hn::Mul(s, t), rises), bow, ends);
-    guess = hn::Min(hn::Max(guess, first), last);
-
-    // Halley's method, as far as all lanes that matter need it.
-    const auto wanted = hn::And(hn::And(clear, crosses), hn::Gt(last, set(kSmallestSpan)));
+  /// Where the signal passes `level`, by a few steps of Halley's method from `guess`, where `wanted`. Clears `wanted`
+  /// where that was not found.
+  V halley(V guess, V level, V tolerance, hn::Mask<D>& wanted) const {
     auto found = hn::Not(wanted);
-    V next = guess;
+    V u = guess;
     for (int i = 0; i < kMostSteps && !hn::AllTrue(kD, found); ++i) {
-      guess = next;
-      const V m = hn::Sub(set(1), hn::Exp(kD, hn::Neg(guess)));
-      const V f = filtered_at(guess, m), own = hn::Sub(hn::MulAdd(load(rise), guess, load(start)), f);
-      const V g = hn::Add(own, leak), miss = hn::Sub(hn::Add(hn::MulAdd(leak, guess, shift), f), level);
-      const V newton = hn::Div(miss, g), bend = hn::Div(hn::Sub(load(rise), own), g);
-      next = hn::Sub(guess, hn::Div(newton, hn::NegMulAdd(hn::Mul(set(0.5), newton), bend, set(1))));
+      const V m = hn::Sub(set(1), hn::Exp(kD, hn::Neg(u)));
+      const V f = filtered_at(u, m, filtered, start, rise), own = hn::Sub(hn::MulAdd(rise, u, start), f);
+      const V slope = hn::Add(own, leak), miss = hn::Sub(hn::MulAdd(leak, u, f), level);
+      const V newton = hn::Div(miss, slope), bend = hn::Div(hn::Sub(rise, own), slope);
+      V next = hn::Sub(u, hn::Div(newton, hn::NegMulAdd(hn::Mul(set(0.5), newton), bend, set(1))));
       next = hn::Min(hn::Max(next, first), last);
       // The next step would be about this one cubed, times what the bend makes of it.
-      const V step = hn::Abs(hn::Sub(next, guess)), cube = hn::Mul(step, hn::Mul(step, step));
+      const V step = hn::Abs(hn::Sub(next, u)), cube = hn::Mul(step, hn::Mul(step, step));
       const V left = hn::Mul(cube, hn::MulAdd(bend, bend, set(1)));
-      found = hn::Or(found, hn::Le(left, hn::Mul(load(rate), set(kToleranceNs))));
+      u = hn::IfThenElse(found, u, next);  // no lane depends on its neighbours
+      found = hn::Or(found, hn::Le(left, tolerance));
     }
-    clear = hn::And(hn::And(clear, found), hn::Or(wanted, hn::Not(crosses)));
-
-    V what = hn::IfThenElse(on, set(kOn), hn::IfThenElse(off, set(kOff), set(kNone)));
-    what = hn::IfThenElse(clear, what, set(kUnclear));
-    hn::StoreU(what, kD, outcome.data());
-    hn::StoreU(hn::Div(next, load(rate)), kD, tau.data());
+    wanted = hn::And(wanted, found);
+    return u;
   }
 };
 
-void RelaxingSignal::first_crossings(std::span<const RelaxingSignal> signals, double end, const double* low,
-                                     const double* high, Crossing* crossings) {
-  const std::size_t lanes = hn::Lanes(kD);
-  Lanes block;
-  Values outcome, tau;
-  for (std::size_t i = 0; i < signals.size(); i += lanes) {
-    const std::size_t count = std::min(lanes, signals.size() - i);
-    for (std::size_t k = 0; k < lanes; ++k) {
-      const std::size_t from = i + std::min(k, count - 1);  // fills the last vector up
-      block.take(k, signals[from], low[from], high[from]);
+void RelaxingSignals::find(Comparators& c) const {
+  const auto at = [](const auto& values, std::size_t i) { return hn::LoadU(kD, values.data() + i); };
+  const auto thresholds = [](const PerPixel<float>& above, std::size_t i, double threshold) {
+    return hn::Add(hn::PromoteTo(kD, hn::LoadU(hn::Rebind<float, D>(), above.data() + i)), set(threshold));
+  };
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(kD)) {
+    const V last = at(phase_, i), per_u = hn::Div(set(duration_), last), leak = hn::Mul(at(c.leak, i), per_u);
+    const Finder s{at(filtered1_, i), at(start_, i), at(rise_, i), leak, at(u_, i), last};
+    const V reference = at(c.reference, i);
+    const V upper = hn::Add(reference, thresholds(c.on, i, c.threshold_on));
+    const V lower = hn::Sub(reference, thresholds(c.off, i, c.threshold_off));
+    const V v0 = hn::MulAdd(leak, s.first, at(value_, i)), v1 = hn::MulAdd(leak, last, at(end_, i));
+    const V g0 = hn::Add(at(slope_, i), leak), g1 = hn::Add(at(end_slope_, i), leak);
+    const auto on = hn::Ge(v1, upper), off = hn::Le(v1, lower), crosses = hn::Or(on, off);
+
+    // Unclear is what turns back before it crosses, is outside already, or is not found in a few steps.
+    const auto straight = hn::Gt(hn::Mul(g0, g1), hn::Zero(kD));
+    auto clear = straight;
+    if (const auto bent = hn::Not(hn::Or(straight, crosses)); !hn::AllFalse(kD, bent)) {
+      clear = hn::Or(clear, hn::And(bent, s.turns_inside(upper, lower)));
     }
-    block.find(end, outcome, tau);
-    for (std::size_t k = 0; k < count; ++k) {
-      const RelaxingSignal& signal = signals[i + k];
-      const int what = static_cast<int>(outcome[k]);
-      if (what == Lanes::kUnclear || signal.two_poles_) [[unlikely]] {
-        crossings[i + k] = signal.first_crossing(end, low[i + k], high[i + k]);
-      } else {
-        crossings[i + k] = {what == Lanes::kNone ? kNever : tau[k], what == Lanes::kOn};
-      }
+    clear = hn::And(clear, hn::And(hn::Lt(v0, upper), hn::Gt(v0, lower)));
+    auto wanted = hn::And(hn::And(clear, crosses), hn::Gt(last, set(kSmallestSpan)));
+
+    // Begin at the inverse cubic through the ends.
+    const V level = hn::IfThenElse(on, upper, lower), rises = hn::Sub(v1, v0);
+    const V part = hn::Div(hn::Sub(level, v0), rises), left = hn::Sub(set(1), part);
+    const V ends = hn::MulAdd(hn::Mul(hn::Mul(left, left), hn::MulAdd(set(2), part, set(1))), s.first,
+                              hn::Mul(hn::Mul(hn::Mul(part, part), hn::NegMulAdd(set(2), part, set(3))), last));
+    const V bow = hn::Sub(hn::Div(left, g0), hn::Div(part, g1));
+    const V guess = hn::MulAdd(hn::Mul(hn::Mul(part, left), rises), bow, ends);
+    const V tolerance = hn::Div(set(kToleranceNs), per_u);
+    const V u = s.halley(hn::Min(hn::Max(guess, s.first), last), level, tolerance, wanted);
+    clear = hn::And(clear, hn::Or(wanted, hn::Not(crosses)));
+
+    hn::StoreU(hn::Mul(u, per_u), kD, c.tau.data() + i);
+    const V polarity = hn::IfThenElseZero(crosses, hn::IfThenElse(on, set(1), set(-1)));
+    hn::StoreU(polarity, kD, c.polarity.data() + i);
+    if (hn::AllTrue(kD, clear) && poles_ == 1) [[likely]]
+      continue;
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(kD, clear, bits);
+    for (std::size_t k = i; k < std::min(i + hn::Lanes(kD), c.count); ++k) {
+      if (poles_ == 1 && (bits[0] >> (k - i) & 1U) != 0) continue;
+      const Crossing crossing = signal(c, k).first_crossing(duration_, c.lower(k), c.upper(k));
+      c.polarity[k] = crossing.tau == kNever ? 0.0 : (crossing.on ? 1.0 : -1.0);
+      if (crossing.tau != kNever) c.tau[k] = crossing.tau;
     }
   }
 }
 
-void RelaxingSignal::advance(std::span<RelaxingSignal> signals, const double* tau) {
-  const std::size_t lanes = hn::Lanes(kD);
-  alignas(64) Values u{}, fade;
-  for (std::size_t i = 0; i < signals.size(); i += lanes) {
-    const std::size_t count = std::min(lanes, signals.size() - i);
-    for (std::size_t k = 0; k < count; ++k) u[k] = signals[i + k].rate_ * tau[i + k];
-    hn::StoreU(hn::Exp(kD, hn::Neg(load(u))), kD, fade.data());
-    for (std::size_t k = 0; k < count; ++k) {
-      RelaxingSignal& signal = signals[i + k];
-      signal.at_from_ = u[k] > kSmallestSpan ? signal.at(u[k], 1 - fade[k]) : signal.at(u[k]);
+void RelaxingSignals::advance(const Comparators& c, std::size_t i) {
+  const RelaxingSignal one = signal(c, i);
+  u_[i] = c.from[i] * phase_[i] / duration_;
+  value_[i] = one.value() - c.leak[i] * c.from[i];
+  slope_[i] = one.slope() - c.leak[i] * duration_ / phase_[i];
+}
+
+void RelaxingSignals::advance(const Comparators& c) {
+  if (poles_ == 2) {
+    for (std::size_t i = 0; i < c.count; ++i) advance(c, i);
+    return;
+  }
+  const auto at = [](const auto& values, std::size_t i) { return hn::LoadU(kD, values.data() + i); };
+  const V per_duration = set(1 / duration_);
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(kD)) {
+    const V u = hn::Mul(hn::Mul(at(c.from, i), per_duration), at(phase_, i));
+    const V m = hn::Sub(set(1), hn::Exp(kD, hn::Neg(u))), start = at(start_, i), rise = at(rise_, i);
+    const V value = filtered_at(u, m, at(filtered1_, i), start, rise);
+    hn::StoreU(u, kD, u_.data() + i);
+    hn::StoreU(value, kD, value_.data() + i);
+    hn::StoreU(hn::Sub(hn::MulAdd(rise, u, start), value), kD, slope_.data() + i);
+    const auto small = hn::And(hn::Gt(u, hn::Zero(kD)), hn::Lt(u, set(kSmallestSpan)));
+    if (hn::AllFalse(kD, small)) [[likely]]
+      continue;
+    for (std::size_t k = i; k < std::min(i + hn::Lanes(kD), c.count); ++k) {
+      if (u_[k] > 0 && u_[k] < kSmallestSpan) advance(c, k);
     }
+  }
+}
+
+void RelaxingSignals::look_ahead(const Comparators& c, double* again) const {
+  const bool may_turn_twice = poles_ == 2;
+#pragma omp simd
+  for (std::size_t i = 0; i < c.count; ++i) {
+    const double drift = c.leak[i] * duration_ / phase_[i], last = end_[i] + c.leak[i] * duration_;
+    const bool outside = last >= c.upper(i) || last <= c.lower(i);
+    const bool turns = !((slope_[i] + drift) * (end_slope_[i] + drift) > 0);
+    again[i] = outside || turns || may_turn_twice ? 1.0 : 0.0;
   }
 }
 

@@ -14,9 +14,6 @@ namespace esim {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Arrays that are worked on in whole vectors have room for one more.
-inline constexpr std::size_t kVectorPadding = 16;
-
 /// values[i] = f(d, values[i]) for whole vectors that cover `count` elements.
 template <typename T, typename Function>
 void for_vectors(std::size_t count, T* values, const Function& f) {
@@ -59,10 +56,10 @@ class ChosenLanes {
 
   std::size_t count() const { return count_; }
 
-  /// Writes first + lane for each chosen lane, in order, and maybe more behind.
-  void store_positions(int first, std::uint32_t* out) const {
+  /// Writes first + step * lane for each chosen lane, in order, and maybe more behind. The step is 1 or 2.
+  void store_positions(std::uint32_t first, int step, std::uint32_t* out) const {
     const hn::RebindToUnsigned<D> du;
-    hn::StoreU(hn::Add(lanes_, hn::Set(du, static_cast<std::uint32_t>(first))), du, out);
+    hn::StoreU(hn::Add(step == 2 ? hn::Add(lanes_, lanes_) : lanes_, hn::Set(du, first)), du, out);
   }
 
   /// Writes the values of the chosen lanes, in order, and maybe more behind.

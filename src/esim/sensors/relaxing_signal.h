@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 #include <limits>
-#include <span>
 
 namespace esim {
 
@@ -16,49 +15,14 @@ struct Crossing {
   bool on = false;      ///< through the upper level
 };
 
-/// What a pixel's comparator sees on a segment: a straight line G = start + slope tau, tau in ns after the segment's
-/// start. What lies before from() is done.
-struct LinearSignal {
-  double start = 0, slope = 0, done = 0;
-
-  double from() const { return done; }
-  double value(double tau) const { return start + slope * tau; }
-  double value() const { return value(done); }  ///< at from()
-  void advance(double tau) { done = tau; }
-
-  /// Adds offset + drift * tau.
-  void add(double offset, double drift) { start += offset, slope += drift; }
-
-  /// First time in [from, end] at which the signal is at `high` or above, or at `low` or below.
-  Crossing first_crossing(double end, double low, double high) const {
-    const double last = value(end);
-    const bool on = last >= high;
-    if (!on && last > low) return {};
-    const double tau = slope != 0 ? ((on ? high : low) - start) / slope : done;
-    return {tau > done ? (tau < end ? tau : end) : done, on};
-  }
-
-  /// The same of many signals: crossings[i] of signals[i] between low[i] and high[i]. All have as many elements.
-  static void first_crossings(std::span<const LinearSignal> signals, double end, const double* low, const double* high,
-                              Crossing* crossings) {
-    for (std::size_t i = 0; i < signals.size(); ++i) {
-      crossings[i] = signals[i].first_crossing(end, low[i], high[i]);
-    }
-  }
-  static void advance(std::span<LinearSignal> signals, const double* tau) {
-    for (std::size_t i = 0; i < signals.size(); ++i) signals[i].advance(tau[i]);
-  }
-};
-
-/// The same behind a low-pass of one pole, or of two equal ones, plus what leaks. With u = rate tau, m = 1 - exp(-u)
-/// and an input L(u) = start + rise u, the poles answer
+/// What a comparator sees on a segment behind a low-pass of one pole, or of two equal ones, plus what leaks. tau is in
+/// ns after the segment's start; what lies before from() is done. With u = rate tau, m = 1 - exp(-u) and an input
+/// L(u) = start + rise u, the poles answer
 ///     F1 = F1(0) + (start - F1(0)) m + rise (u - m)
 ///     F2 = F2(0) + (start - F2(0)) m + (F1(0) - start) u (1 - m) + rise (2 u - 2 m - u m),
 /// which lose no digits where u is small.
 class RelaxingSignal {
  public:
-  RelaxingSignal() = default;
-
   /// One pole, at `filtered` when its input, `start`, begins to rise with `slope` per ns. `moved` is m at the segment's
   /// end.
   static RelaxingSignal first_order(double rate, double moved, double filtered, double start, double slope) {
@@ -78,18 +42,17 @@ class RelaxingSignal {
 
   double from() const { return at_from_.u / rate_; }
   double value(double tau) const;
-  double value() const { return at_from_.value; }
+  double value() const { return at_from_.value; }  ///< at from()
+  double slope() const { return at_from_.slope; }  ///< at from(), per u
   void advance(double tau) { at_from_ = at(rate_ * tau); }
+
+  /// Adds offset + drift * tau.
   void add(double offset, double drift);
+
+  /// First time in [from, end] at which the signal is at `high` or above, or at `low` or below.
   Crossing first_crossing(double end, double low, double high) const;
 
-  /// The same of many signals, in vectors.
-  static void first_crossings(std::span<const RelaxingSignal> signals, double end, const double* low,
-                              const double* high, Crossing* crossings);
-  static void advance(std::span<RelaxingSignal> signals, const double* tau);
-
  private:
-  struct Lanes;
   /// The signal at one time, with its derivatives.
   struct Point {
     double u = 0, value = 0, slope = 0, bend = 0;

@@ -1,4 +1,4 @@
-#include "esim/sensors/pixel_signal.h"
+#include "esim/sensors/relaxing_signal.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,46 @@
+#include "esim/sensors/linear_signals.h"
+
+#include "esim/sensors/vector_math.h"
+
+namespace esim {
+
+void LinearSignals::take(const AwakePixels& awake, double duration) {
+  duration_ = duration, per_duration_ = 1 / duration;
+  for (std::size_t i = 0; i < awake.count; ++i) start_[i] = awake.start[i], end_[i] = awake.end[i];
+}
+
+void LinearSignals::take_light(const AwakePixels& awake, double eps, double duration) {
+  duration_ = duration, per_duration_ = 1 / duration;
+  for (std::size_t i = 0; i < awake.count; ++i) start_[i] = awake.light0[i] + eps, end_[i] = awake.light1[i] + eps;
+  logarithms(awake.count, start_.data());
+  logarithms(awake.count, end_.data());
+}
+
+void LinearSignals::find(Comparators& c) const {
+  const double duration = duration_;
+#pragma omp simd
+  for (std::size_t i = 0; i < c.count; ++i) {
+    const double rate = slope(i) + c.leak[i], last = end_[i] + c.leak[i] * duration;
+    const double upper = c.upper(i), lower = c.lower(i), from = c.from[i];
+    const bool on = last >= upper, off = last <= lower;
+    double tau = rate != 0 ? ((on ? upper : lower) - start_[i]) / rate : from;
+    tau = tau > from ? tau : from;
+    c.tau[i] = tau < duration ? tau : duration;
+    c.polarity[i] = on ? 1.0 : (off ? -1.0 : 0.0);
+  }
+}
+
+void LinearSignals::advance(const Comparators& c) {
+#pragma omp simd
+  for (std::size_t i = 0; i < c.count; ++i) value_[i] = start_[i] + slope(i) * c.from[i];
+}
+
+void LinearSignals::look_ahead(const Comparators& c, double* again) const {
+#pragma omp simd
+  for (std::size_t i = 0; i < c.count; ++i) {
+    const double last = end_[i] + c.leak[i] * duration_;
+    again[i] = last >= c.upper(i) || last <= c.lower(i) ? 1.0 : 0.0;
+  }
+}
+
+}  // namespace esim

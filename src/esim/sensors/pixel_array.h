@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "esim/core/image.h"
+#include "esim/core/large_vector.h"
 #include "esim/core/random.h"
 #include "esim/core/time.h"
 #include "esim/events/event_packing.h"
@@ -97,8 +98,8 @@ class PixelArray {
     double reference = 0;   // G at the last event; kHeld while the pixel is held in reset
     float on = 0, off = 0;  // what the pixel's thresholds are above threshold_on and threshold_off
   };
-  std::vector<CleanPixel> clean_pixels;
-  std::vector<TimeNs> until;  // end of the last refractory period of clean pixels
+  LargeVector<CleanPixel> clean_pixels;
+  LargeVector<TimeNs> until;  // end of the last refractory period of clean pixels
 
   struct alignas(64) NoisyPixel {
     double reference = 0;
@@ -109,14 +110,14 @@ class PixelArray {
     TimeNs shot_at = 0;             // the next of them
     TimeNs until = kLongAgo;        // end of the last refractory period
   };
-  std::vector<NoisyPixel> noisy_pixels;
+  LargeVector<NoisyPixel> noisy_pixels;
 
   // Band of the irradiance, or of the filtered brightness, strictly within which nothing fires.
-  std::vector<float> band_low, band_high;
-  std::vector<std::int32_t> alarms;  // in ticks
+  LargeVector<float> band_low, band_high;
+  LargeVector<std::int32_t> alarms;  // in ticks
 
   // With in_brightness: the brightness at the last sample, and behind each pole.
-  std::vector<float> brightness, filtered1, filtered2;
+  LargeVector<float> brightness, filtered1, filtered2;
 
   AddressedRandom per_event, per_shot, per_leak;
 

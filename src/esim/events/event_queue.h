@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "esim/core/parallel.h"
-#include "esim/events/event.h"
+#include "esim/events/event_buffer.h"
 #include "esim/events/event_sorter.h"
 
 namespace esim {
@@ -17,15 +17,15 @@ class EventQueue {
   /// Takes the packed events of all parts, in any order but later than the last watermark, and empties the parts.
   void add(std::span<std::vector<std::uint64_t>> parts, const EventPacking& packing, const Workers& workers);
 
-  /// Appends to `out`, in order, every event with t <= watermark, and forgets them.
-  void release_until(TimeNs watermark, std::vector<Event>& out);
+  /// Forgets every event with t <= watermark, and returns them in order: they are there until the next add().
+  EventSpan release_until(TimeNs watermark);
 
   std::size_t size() const { return pending_.size() - released_; }
 
  private:
-  std::vector<Event> pending_;  // ordered
-  std::size_t released_ = 0;    // of pending_, from its front
-  std::vector<Event> added_, merged_;
+  EventBuffer pending_;       // ordered
+  std::size_t released_ = 0;  // of pending_, from its front
+  EventBuffer added_, merged_;
   EventSorter sorter_;
 };
 

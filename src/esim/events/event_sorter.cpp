@@ -103,14 +103,14 @@ void EventSorter::scatter(std::span<std::vector<std::uint64_t>> parts, int shift
 }
 
 void EventSorter::sort(std::span<std::vector<std::uint64_t>> parts, const EventPacking& packing, const Workers& workers,
-                       std::vector<Event>& sorted) {
+                       EventBuffer& sorted) {
   std::size_t count = 0, filled = 0;
   std::vector<std::uint64_t>* last_filled = nullptr;
   for (auto& part : parts) {
     count += part.size();
     if (!part.empty()) ++filled, last_filled = &part;
   }
-  sorted.resize(count);
+  Event* const out = sorted.make_room(count);
   if (count == 0) return;
   if (scratch_.size() < count) scratch_.resize(2 * count);
 
@@ -123,7 +123,7 @@ void EventSorter::sort(std::span<std::vector<std::uint64_t>> parts, const EventP
   const int bits = std::max(0, static_cast<int>(std::bit_width(differing)) - packing.time_shift());
   if (filled == 1 && workers.threads() == 1) {
     sort_keys(*last_filled, scratch_, packing.time_shift(), bits);
-    for (std::size_t i = 0; i < count; ++i) sorted[i] = packing.unpack((*last_filled)[i]);
+    for (std::size_t i = 0; i < count; ++i) out[i] = packing.unpack((*last_filled)[i]);
     last_filled->clear();
     return;
   }
@@ -141,7 +141,7 @@ void EventSorter::sort(std::span<std::vector<std::uint64_t>> parts, const EventP
     const std::size_t size = begins_[static_cast<std::size_t>(range) + 1] - begin;
     const std::span keys = std::span(keys_).subspan(begin, size);
     sort_keys(keys, std::span(scratch_).subspan(begin, size), packing.time_shift(), sorted_bits);
-    for (std::size_t i = 0; i < size; ++i) sorted[begin + i] = packing.unpack(keys[i]);
+    for (std::size_t i = 0; i < size; ++i) out[begin + i] = packing.unpack(keys[i]);
   });
 }
 

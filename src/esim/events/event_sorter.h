@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "esim/core/parallel.h"
-#include "esim/events/event.h"
+#include "esim/events/event_buffer.h"
 #include "esim/events/event_packing.h"
 
 namespace esim {
@@ -16,7 +16,7 @@ class EventSorter {
  public:
   /// Moves the events of all parts, each in any order, to `sorted`, whose content is replaced.
   void sort(std::span<std::vector<std::uint64_t>> parts, const EventPacking& packing, const Workers& workers,
-            std::vector<Event>& sorted);
+            EventBuffer& sorted);
 
  private:
   void scatter(std::span<std::vector<std::uint64_t>> parts, int shift, std::size_t ranges, std::uint64_t first,

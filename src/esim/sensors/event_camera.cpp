@@ -58,7 +58,6 @@ struct EventCamera::State {
   std::vector<std::vector<std::uint64_t>> events;  // by worker, packed
   EventQueue queue;
   std::optional<Readout> readout;
-  std::vector<Event> arrived;  // at the readout
 
   // Of process().
   Image<float> last_frame, next_frame;
@@ -134,10 +133,12 @@ void EventCamera::integrate(std::span<const Segment> segments, const Workers& wo
 }
 
 void EventCamera::release_until(TimeNs watermark, std::vector<Event>& out) {
-  if (!state_->readout) return state_->queue.release_until(watermark, out);
-  state_->arrived.clear();
-  state_->queue.release_until(watermark, state_->arrived);
-  state_->readout->advance(state_->arrived, watermark, out);
+  const EventSpan arrived = state_->queue.release_until(watermark);
+  if (state_->readout) {
+    state_->readout->advance(arrived, watermark, out);
+  } else {
+    out.insert(out.end(), arrived.begin(), arrived.end());
+  }
 }
 
 void EventCamera::process(const Image<float>& irradiance, TimeNs t, std::vector<Event>& out, const Workers& workers) {

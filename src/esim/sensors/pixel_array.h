@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -74,7 +72,8 @@ class PixelArray {
   double seconds_since_epoch(TimeNs t) const { return to_seconds(t - epoch); }
   std::int32_t ticks(TimeNs t) const { return ticks_after_epoch(static_cast<double>(t - epoch)); }
   static std::int32_t ticks_after_epoch(double ns) {
-    return static_cast<std::int32_t>(std::floor(std::min(ns * kTicksPerNs, kLastTick)));
+    const double ticks = ns * kTicksPerNs;
+    return static_cast<std::int32_t>(ticks < kLastTick ? ticks : kLastTick);  // times are after the epoch
   }
 
   EventCameraOptions options;

@@ -192,6 +192,7 @@ void PixelPass<Signals>::report(PackedEvents& events) const {
 template <class Signals>
 void PixelPass<Signals>::reset(const PixelArray& pixels) {
   signals.advance(compare_);
+#pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
     const double now = signals.value(i) + compare_.leak[i] * compare_.from[i];
     const double next = anew_[i] != 0 ? now : passed_[i];
@@ -212,19 +213,23 @@ void PixelPass<Signals>::reset(const PixelArray& pixels) {
 /// Puts the pixels that are done to sleep, and keeps the others.
 template <class Signals>
 void PixelPass<Signals>::sleep(PixelArray& pixels) {
+  constexpr double kForever = static_cast<double>(kAges);
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const double duration = duration_, since_epoch = epoch_ns_ + duration_;
+  const bool shoots = pixels.shoots;
+#pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
     const double reference = compare_.reference[i], leak = compare_.leak[i];
     const double upper = compare_.upper(i), lower = compare_.lower(i), now = signals.end(i) + leak * duration;
     // Both levels fall by what leaks: the upper one until the alarm; the lower one is surely not above where it is now.
     const double most = kLeakPerBand * (upper - reference), room = 0.5 * (upper - now);
     double valid = (most < room ? most : room) / leak;
-    valid = leak > 0 && valid < static_cast<double>(kAges) ? valid : static_cast<double>(kAges);
+    valid = leak > 0 && valid < kForever ? valid : kForever;
     const bool held = reference == kHeld;
     const double sinks = leak > 0 ? leak * (duration + valid) : 0.0;
-    low_[i] = held ? std::numeric_limits<float>::infinity() : static_cast<float>(lower - leak * duration);
-    high_[i] = held ? -std::numeric_limits<float>::infinity() : static_cast<float>(upper - sinks);
-    const double shot = shot_[i] - duration, alarm = pixels.shoots && shot < valid ? shot : valid;
+    low_[i] = held ? kInfinity : static_cast<float>(lower - leak * duration);
+    high_[i] = held ? -kInfinity : static_cast<float>(upper - sinks);
+    const double shot = shot_[i] - duration, alarm = shoots && shot < valid ? shot : valid;
     alarm_[i] = PixelArray::ticks_after_epoch(since_epoch + alarm);
   }
   std::size_t done = 0, kept = 0;

@@ -68,7 +68,7 @@ HWY_INLINE void PixelUpdate::filter_vector(D d, PixelArray& pixels, const Segmen
 
     // With m = 1 - exp(-phase): F moves by m of its distance, and lags behind the rise of L.
     const V one = hn::Set(d, 1.0F), rise = hn::Sub(end, start);
-    m = hn::Neg(hn::Expm1(d, hn::Neg(phase)));
+    m = moved_after(d, phase);
     const V followed = hn::Div(m, phase);
     f1 = hn::LoadU(d, &pixels.filtered1[i]);
     const V distance = hn::Sub(start, f1);

@@ -96,7 +96,8 @@ struct RelaxingSignals::Finder {
       const V m = hn::Sub(set(1), hn::Exp(kD, hn::Neg(u)));
       const V f = filtered_at(u, m, filtered, start, rise), own = hn::Sub(hn::MulAdd(rise, u, start), f);
       const V slope = hn::Add(own, leak), miss = hn::Sub(hn::MulAdd(leak, u, f), level);
-      const V newton = hn::Div(miss, slope), bend = hn::Div(hn::Sub(rise, own), slope);
+      const V per_slope = hn::Div(set(1), slope);
+      const V newton = hn::Mul(miss, per_slope), bend = hn::Mul(hn::Sub(rise, own), per_slope);
       V next = hn::Sub(u, hn::Div(newton, hn::NegMulAdd(hn::Mul(set(0.5), newton), bend, set(1))));
       next = hn::Min(hn::Max(next, first), last);
       // The next step would be about this one cubed, times what the bend makes of it.
@@ -139,9 +140,9 @@ void RelaxingSignals::find(Comparators& c) const {
     const V part = hn::Div(hn::Sub(level, v0), rises), left = hn::Sub(set(1), part);
     const V ends = hn::MulAdd(hn::Mul(hn::Mul(left, left), hn::MulAdd(set(2), part, set(1))), s.first,
                               hn::Mul(hn::Mul(hn::Mul(part, part), hn::NegMulAdd(set(2), part, set(3))), last));
-    const V bow = hn::Sub(hn::Div(left, g0), hn::Div(part, g1));
+    const V bow = hn::Div(hn::NegMulAdd(part, g0, hn::Mul(left, g1)), hn::Mul(g0, g1));
     const V guess = hn::MulAdd(hn::Mul(hn::Mul(part, left), rises), bow, ends);
-    const V tolerance = hn::Div(set(kToleranceNs), per_u);
+    const V tolerance = hn::Mul(set(kToleranceNs / duration_), last);
     const V u = s.halley(hn::Min(hn::Max(guess, s.first), last), level, tolerance, wanted);
     clear = hn::And(clear, hn::Or(wanted, hn::Not(crosses)));
 

@@ -29,6 +29,24 @@ inline void exponentials(std::size_t count, float* values) {
   for_vectors(count, values, [](auto d, auto x) { return hn::Exp(d, x); });
 }
 
+/// 1 - exp(-u) for u >= 0, to a few units in the last place of a float.
+template <class D>
+HWY_INLINE hn::Vec<D> moved_after(D d, hn::Vec<D> u) {
+  // u = n ln 2 - r with |r| <= ln 2 / 2; then 1 - exp(-u) = (1 - 2^-n) - 2^-n (exp(r) - 1).
+  const hn::RebindToSigned<D> di;
+  u = hn::Min(u, hn::Set(d, 60.0F));  // where it has long been 1
+  const auto n = hn::Round(hn::Mul(u, hn::Set(d, 1.44269504F)));
+  const auto r = hn::MulSub(n, hn::Set(d, 0.693359375F), hn::MulAdd(n, hn::Set(d, 2.12194440e-4F), u));
+  const auto r2 = hn::Mul(r, r);
+  const auto p01 = hn::MulAdd(r, hn::Set(d, 1.0F / 6), hn::Set(d, 0.5F));
+  const auto p23 = hn::MulAdd(r, hn::Set(d, 1.0F / 120), hn::Set(d, 1.0F / 24));
+  const auto p45 = hn::MulAdd(r, hn::Set(d, 1.0F / 5040), hn::Set(d, 1.0F / 720));
+  const auto tail = hn::MulAdd(hn::MulAdd(p45, r2, p23), r2, p01);
+  const auto grown = hn::MulAdd(tail, r2, r);
+  const auto scale = hn::BitCast(d, hn::ShiftLeft<23>(hn::Sub(hn::Set(di, 127), hn::ConvertTo(di, n))));
+  return hn::NegMulAdd(scale, grown, hn::Sub(hn::Set(d, 1.0F), scale));
+}
+
 /// For each set of eight lanes, as bits, the lanes in it, in order, then others.
 inline constexpr auto kLanesOf = [] {
   std::array<std::array<std::uint8_t, 8>, 256> lanes{};

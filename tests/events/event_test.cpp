@@ -51,7 +51,9 @@ TEST(EventPacking, KeepsEventsAndTheirOrder) {
                         static_cast<std::uint16_t>(random() % static_cast<unsigned>(width)),
                         static_cast<std::uint16_t>(random() % static_cast<unsigned>(height)),
                         static_cast<std::int8_t>(random() % 2 == 0 ? 1 : -1)};
-      EXPECT_EQ(packing.unpack(packed(packing, event)), event);
+      Event unpacked;
+      packing.unpack(packed(packing, event), unpacked);
+      EXPECT_EQ(unpacked, event);
       events.emplace_back(packed(packing, event), event);
     }
     std::sort(events.begin(), events.end(), [](const auto& a, const auto& b) { return a.first < b.first; });

@@ -123,7 +123,7 @@ void EventSorter::sort(std::span<std::vector<std::uint64_t>> parts, const EventP
   const int bits = std::max(0, static_cast<int>(std::bit_width(differing)) - packing.time_shift());
   if (filled == 1 && workers.threads() == 1) {
     sort_keys(*last_filled, scratch_, packing.time_shift(), bits);
-    for (std::size_t i = 0; i < count; ++i) out[i] = packing.unpack((*last_filled)[i]);
+    for (std::size_t i = 0; i < count; ++i) packing.unpack((*last_filled)[i], out[i]);
     last_filled->clear();
     return;
   }
@@ -141,7 +141,7 @@ void EventSorter::sort(std::span<std::vector<std::uint64_t>> parts, const EventP
     const std::size_t size = begins_[static_cast<std::size_t>(range) + 1] - begin;
     const std::span keys = std::span(keys_).subspan(begin, size);
     sort_keys(keys, std::span(scratch_).subspan(begin, size), packing.time_shift(), sorted_bits);
-    for (std::size_t i = 0; i < size; ++i) out[begin + i] = packing.unpack(keys[i]);
+    for (std::size_t i = 0; i < size; ++i) packing.unpack(keys[i], out[begin + i]);
   });
 }
 

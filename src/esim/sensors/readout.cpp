@@ -24,7 +24,7 @@ void Readout::serve_until(TimeNs now, std::vector<Event>& out) {
     Row& row = rows_[request.row];
     const std::size_t first = out.size();
     for (std::uint32_t i = 0, slot = row.first; i < row.count; ++i) {
-      out.push_back({start, slots_[slot].x, request.row, slots_[slot].polarity});
+      out.emplace_back(start, slots_[slot].x, request.row, slots_[slot].polarity);
       const std::uint32_t next = slots_[slot].next;
       slots_[slot].next = free_slot_;
       free_slot_ = slot;

@@ -61,23 +61,32 @@ TEST(EventPacking, KeepsEventsAndTheirOrder) {
   }
 }
 
+void add(PackedEvents& part, const Event& event) {
+  const double time = static_cast<double>(event.t - part.packing().origin), polarity = event.polarity;
+  const auto place = static_cast<std::uint32_t>(part.packing().place(event.x, event.y));
+  const double times[] = {0, time}, polarities[] = {1, polarity}, reported[] = {0, 1};  // the first one is lost
+  const std::uint32_t places[] = {0, place};
+  part.add(2, part.packing().origin, times, places, polarities, reported);
+}
+
 TEST(EventSorter, AgreesWithStdSort) {
   const Workers one(1), three(3);
   unsigned seed = 0;
   EventSorter sorter;
   for (const std::size_t count : {0, 1, 2, 63, 64, 257, 5000, 20000}) {
-    for (const TimeNs span : {TimeNs{1}, TimeNs{3}, TimeNs{2048}, TimeNs{2049}, TimeNs{1'000'000}, TimeNs{1} << 55}) {
+    for (const TimeNs span : {TimeNs{1}, TimeNs{3}, TimeNs{2048}, TimeNs{2049}, TimeNs{1'000'000}, TimeNs{1} << 50}) {
       std::vector<Event> expected = random_events(count, span, ++seed);
       EventBuffer sorted;
       EventPacking packing(kWidth, kHeight);
       packing.origin = -5;
       for (const Workers* workers : {&one, &three}) {
-        std::vector<std::vector<std::uint64_t>> parts(3);
-        for (std::size_t i = 0; i < count; ++i) parts[(i * i) % 3].push_back(packed(packing, expected[i]));
-        sorter.sort(parts, packing, *workers, sorted);
+        std::vector<PackedEvents> parts(3);
+        for (PackedEvents& part : parts) part.expect(packing, seed % 2 == 0 ? span : span / 3);
+        for (std::size_t i = 0; i < count; ++i) add(parts[(i * i) % 3], expected[i]);
+        sorter.sort(parts, *workers, sorted);
         std::sort(expected.begin(), expected.end());
         EXPECT_TRUE(std::ranges::equal(sorted.events(), expected)) << count << " events over " << span << " ns";
-        for (const auto& part : parts) EXPECT_TRUE(part.empty());
+        for (const auto& part : parts) EXPECT_EQ(part.size(), 0U);
       }
     }
   }
@@ -95,17 +104,18 @@ TEST(EventQueue, ReleasesInOrderWhateverTheOrderOfArrival) {
   std::mt19937 random(1);
   EventQueue queue;
   std::vector<Event> released;
-  std::vector<std::vector<std::uint64_t>> parts(2);
+  std::vector<PackedEvents> parts(2);
+  for (PackedEvents& part : parts) part.expect(packing, 1000);
   for (TimeNs watermark = -10; watermark < 1200; watermark += 13) {
     for (auto it = events.begin(); it != events.end();) {
       if (it->t <= watermark || random() % 10 == 0) {
-        parts[random() % 2].push_back(packed(packing, *it));
+        add(parts[random() % 2], *it);
         it = events.erase(it);
       } else {
         ++it;
       }
     }
-    queue.add(parts, packing, one);
+    queue.add(parts, one);
     for (const Event& event : queue.release_until(watermark)) {
       EXPECT_LE(event.t, watermark);
       released.push_back(event);

@@ -5,8 +5,8 @@
 
 namespace esim {
 
-void EventQueue::add(std::span<std::vector<std::uint64_t>> parts, const EventPacking& packing, const Workers& workers) {
-  sorter_.sort(parts, packing, workers, added_);
+void EventQueue::add(std::span<PackedEvents> parts, const Workers& workers) {
+  sorter_.sort(parts, workers, added_);
   if (size() == 0) {
     pending_.swap(added_);
   } else {

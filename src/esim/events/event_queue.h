@@ -15,7 +15,7 @@ namespace esim {
 class EventQueue {
  public:
   /// Takes the packed events of all parts, in any order but later than the last watermark, and empties the parts.
-  void add(std::span<std::vector<std::uint64_t>> parts, const EventPacking& packing, const Workers& workers);
+  void add(std::span<PackedEvents> parts, const Workers& workers);
 
   /// Forgets every event with t <= watermark, and returns them in order: they are there until the next add().
   EventSpan release_until(TimeNs watermark);

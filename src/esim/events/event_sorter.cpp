@@ -10,8 +10,6 @@ namespace esim {
 namespace {
 
 constexpr int kMaxDigitBits = 11;
-constexpr std::size_t kRanges = 16;           // of time, sorted in parallel
-constexpr std::size_t kTooFewToShare = 2048;  // events
 constexpr std::size_t kTooFewForRadix = 64;
 
 using Counts = std::array<std::uint32_t, std::size_t{1} << kMaxDigitBits>;
@@ -64,85 +62,45 @@ void sort_keys(std::span<std::uint64_t> keys, std::span<std::uint64_t> scratch, 
 
 }  // namespace
 
-/// Brings the keys of all parts together in keys_: into `ranges` ranges of the bits from `shift` on, which begin at
-/// begins_.
-void EventSorter::scatter(std::span<std::vector<std::uint64_t>> parts, int shift, std::size_t ranges,
-                          std::uint64_t first, const Workers& workers) {
-  const auto range_of = [&](std::uint64_t key) { return (key >> shift) - first; };
-  const int part_count = static_cast<int>(parts.size());
-  positions_.assign(parts.size() * ranges, 0);
-  const auto positions_of = [&](int part) { return positions_.data() + static_cast<std::size_t>(part) * ranges; };
-  if (ranges > 1) {
-    workers.for_each(part_count, [&](int part) {
-      std::uint32_t* const position = positions_of(part);
-      for (const std::uint64_t key : parts[static_cast<std::size_t>(part)]) ++position[range_of(key)];
-    });
-  } else {
-    for (int part = 0; part < part_count; ++part) {
-      positions_of(part)[0] = static_cast<std::uint32_t>(parts[static_cast<std::size_t>(part)].size());
-    }
-  }
-
-  begins_.assign(ranges + 1, 0);
-  std::uint32_t sum = 0;
-  for (std::size_t range = 0; range < ranges; ++range) {
-    begins_[range] = sum;
-    for (int part = 0; part < part_count; ++part) sum += std::exchange(positions_of(part)[range], sum);
-  }
-  begins_[ranges] = sum;
-  workers.for_each(part_count, [&](int part) {
-    std::uint32_t* const position = positions_of(part);
-    std::vector<std::uint64_t>& keys = parts[static_cast<std::size_t>(part)];
-    if (ranges > 1) {
-      for (const std::uint64_t key : keys) keys_[position[range_of(key)]++] = key;
-    } else {
-      std::copy(keys.begin(), keys.end(), keys_.begin() + position[0]);
-    }
-    keys.clear();
-  });
+/// Brings the keys of a range together in `keys`, sorted.
+void EventSorter::sort_range(std::span<PackedEvents> parts, std::size_t range, std::span<std::uint64_t> keys,
+                             std::span<std::uint64_t> scratch, int time_shift) {
+  if (keys.empty()) return;
+  std::uint64_t* next = keys.data();
+  for (const PackedEvents& part : parts) next = std::ranges::copy(part.range(range), next).out;
+  // How many bits of the time do they differ in?
+  std::uint64_t differing = 0;
+  for (const std::uint64_t key : keys) differing |= key ^ keys[0];
+  sort_keys(keys, scratch, time_shift, std::max(0, static_cast<int>(std::bit_width(differing)) - time_shift));
 }
 
-void EventSorter::sort(std::span<std::vector<std::uint64_t>> parts, const EventPacking& packing, const Workers& workers,
-                       EventBuffer& sorted) {
-  std::size_t count = 0, filled = 0;
-  std::vector<std::uint64_t>* last_filled = nullptr;
-  for (auto& part : parts) {
-    count += part.size();
-    if (!part.empty()) ++filled, last_filled = &part;
+void EventSorter::sort(std::span<PackedEvents> parts, const Workers& workers, EventBuffer& sorted) {
+  std::array<std::size_t, PackedEvents::kRanges + 1> begins{};
+  for (std::size_t range = 0; range < PackedEvents::kRanges; ++range) {
+    begins[range + 1] = begins[range];
+    for (const PackedEvents& part : parts) begins[range + 1] += part.range(range).size();
   }
+  const std::size_t count = begins.back();
   Event* const out = sorted.make_room(count);
   if (count == 0) return;
-  if (scratch_.size() < count) scratch_.resize(2 * count);
+  if (keys_.size() < count) keys_.resize(2 * count), scratch_.resize(2 * count);
 
-  // How many bits of the time do they differ in?
-  const std::uint64_t some = last_filled->front();
-  std::uint64_t differing = 0;
-  for (const auto& part : parts) {
-    for (const std::uint64_t key : part) differing |= key ^ some;
-  }
-  const int bits = std::max(0, static_cast<int>(std::bit_width(differing)) - packing.time_shift());
-  if (filled == 1 && workers.threads() == 1) {
-    sort_keys(*last_filled, scratch_, packing.time_shift(), bits);
-    for (std::size_t i = 0; i < count; ++i) packing.unpack((*last_filled)[i], out[i]);
-    last_filled->clear();
-    return;
-  }
-
-  if (keys_.size() < count) keys_.resize(2 * count);
-  const bool share = workers.threads() > 1 && count >= kTooFewToShare;
-  const int range_bits = share ? std::min(bits, static_cast<int>(std::bit_width(kRanges)) - 1) : 0;
-  const int sorted_bits = bits - range_bits;
-  const int shift = packing.time_shift() + sorted_bits;
-  const std::size_t ranges = std::size_t{1} << range_bits;
-  scatter(parts, shift, ranges, (some >> shift) & ~(static_cast<std::uint64_t>(ranges) - 1), workers);
-
-  workers.for_each(static_cast<int>(ranges), [&](int range) {
-    const std::size_t begin = begins_[static_cast<std::size_t>(range)];
-    const std::size_t size = begins_[static_cast<std::size_t>(range) + 1] - begin;
+  const EventPacking packing = parts.front().packing();
+  const auto sort_one = [&](int i) {
+    const auto range = static_cast<std::size_t>(i);
+    const std::size_t begin = begins[range], size = begins[range + 1] - begin;
     const std::span keys = std::span(keys_).subspan(begin, size);
-    sort_keys(keys, std::span(scratch_).subspan(begin, size), packing.time_shift(), sorted_bits);
-    for (std::size_t i = 0; i < size; ++i) packing.unpack(keys[i], out[begin + i]);
-  });
+    sort_range(parts, range, keys, std::span(scratch_).subspan(begin, size), packing.time_shift());
+    for (std::size_t k = 0; k < size; ++k) packing.unpack(keys[k], out[begin + k]);
+  };
+  constexpr std::size_t kTooFewToShare = 1024;
+  constexpr int kRanges = static_cast<int>(PackedEvents::kRanges);
+  if (count < kTooFewToShare) {
+    for (int range = 0; range < kRanges; ++range) sort_one(range);
+  } else {
+    workers.for_each(kRanges, sort_one);
+  }
+  for (PackedEvents& part : parts) part.clear();
 }
 
 }  // namespace esim

@@ -21,7 +21,7 @@ struct Lanes {
   PerPixel<double> crossing;  // when it fired
   PerPixel<double> resumes;   // end of the refractory period behind
   PerPixel<double> again;     // 1 where it fires in the next round, too
-  PerPixel<std::uint64_t> place;
+  PerPixel<std::uint32_t> place;
   std::size_t count = 0;
 
   Lanes() { before.fill(1), after.fill(1); }
@@ -85,7 +85,6 @@ struct CleanPass::Block {
   void gather(const PixelArray& pixels, const Segment& segment, const EventPacking& packing, int y,
               std::span<const std::uint32_t> columns);
   void resume(const PixelArray& pixels, const Segment& segment);
-  void report(const Lanes& lanes, TimeNs start, PackedEvents& events) const;
   void hold(PixelArray& pixels, Lanes& lanes, const std::uint32_t* which, TimeNs t0, double duration);
   std::size_t take_rest();
   void settle(PixelArray& pixels);
@@ -111,7 +110,7 @@ void CleanPass::Block::gather(const PixelArray& pixels, const Segment& segment, 
     all.reference[i] = state.reference;
     all.on[i] = threshold_on + state.on;
     all.off[i] = threshold_off + state.off;
-    all.place[i] = packing.place(static_cast<int>(x), y);
+    all.place[i] = static_cast<std::uint32_t>(packing.place(static_cast<int>(x), y));
     pixel[i] = row + x;
     held |= state.reference == kHeld;
     ++i;
@@ -133,20 +132,6 @@ void CleanPass::Block::resume(const PixelArray& pixels, const Segment& segment) 
       all.reference[i] = all.before[i] + rise * static_cast<double>(until - segment.t0) * per_ns;
     }
   }
-}
-
-/// Packs the events of a round. Without branches: that a pixel fires again is as hard to foresee as an event.
-void CleanPass::Block::report(const Lanes& lanes, TimeNs start, PackedEvents& events) const {
-  std::vector<std::uint64_t>& out = *events.events;
-  const std::size_t first = out.size();
-  out.resize(first + lanes.count);
-  std::uint64_t* next = out.data() + first;
-  const EventPacking packing = *events.packing;
-  for (std::size_t i = 0; i < lanes.count; ++i) {
-    *next = packing.pack(start + static_cast<TimeNs>(lanes.crossing[i]), lanes.place[i], lanes.polarity[i] > 0);
-    next += lanes.polarity[i] != 0;
-  }
-  out.resize(static_cast<std::size_t>(next - out.data()));
 }
 
 /// Holds those in reset that fired and whose refractory period ends after the segment. `which` are their indices among
@@ -202,10 +187,10 @@ void CleanPass::run_block(PixelArray& pixels, const Segment& segment, PackedEven
 
   const double duration = static_cast<double>(segment.t1 - segment.t0);
   const double refractory = pixels.holds ? static_cast<double>(pixels.refractory) : 0.0;
-  const TimeNs start = segment.t0 - events.packing->origin;
   const auto round = [&](Lanes& lanes, const std::uint32_t* which) {
     const double last_reset = lanes.fire(duration, refractory);
-    block.report(lanes, start, events);
+    const double* const polarity = lanes.polarity.data();
+    events.add(lanes.count, segment.t0, lanes.crossing.data(), lanes.place.data(), polarity, polarity);
     if (pixels.holds && last_reset > duration) block.hold(pixels, lanes, which, segment.t0, duration);
   };
   // Most pixels that wake up fire once; the others go on among themselves.
@@ -247,7 +232,7 @@ void CleanPass::run(PixelArray& pixels, const Segment& segment, const PixelWatch
     std::span<const std::uint32_t> columns = watch.columns(y);
     while (!columns.empty()) {
       const std::size_t room = std::min(kBlock - block_->all.count, columns.size());
-      block_->gather(pixels, segment, *events.packing, y, columns.first(room));
+      block_->gather(pixels, segment, events.packing(), y, columns.first(room));
       columns = columns.subspan(room);
       if (block_->all.count == kBlock) run_block(pixels, segment, events);
     }

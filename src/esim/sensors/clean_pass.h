@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 
+#include "esim/events/packed_events.h"
 #include "esim/render/sample.h"
 #include "esim/sensors/pixel_array.h"
 #include "esim/sensors/pixel_watch.h"

@@ -55,7 +55,7 @@ struct EventCamera::State {
   std::optional<CenterSurround> surround;
   Image<float> brightness;                         // less the surround
   std::vector<PixelUpdate> updates;                // by worker
-  std::vector<std::vector<std::uint64_t>> events;  // by worker, packed
+  std::vector<PackedEvents> events;  // by worker
   EventQueue queue;
   std::optional<Readout> readout;
 
@@ -107,7 +107,7 @@ void EventCamera::State::integrate(const Segment& segment, const Workers& worker
   std::atomic<bool> good = true;
   workers.for_each_with_worker(pieces.count, [&](int piece, int worker) {
     PixelUpdate& update = updates[static_cast<std::size_t>(worker)];
-    PackedEvents out{&packing, &events[static_cast<std::size_t>(worker)]};
+    PackedEvents& out = events[static_cast<std::size_t>(worker)];
     const Rows rows{pieces.begin(piece), pieces.end(piece)};
     const bool done =
         first ? update.open(pixels, segment, given, rows) : update.advance(pixels, segment, given, rows, out);
@@ -128,8 +128,9 @@ void EventCamera::integrate(std::span<const Segment> segments, const Workers& wo
   for (const Segment& segment : segments) first = std::min(first, segment.t0), last = std::max(last, segment.t1);
   state.packing.origin = first;
   state.refuse_long_time(last - first);
+  for (PackedEvents& events : state.events) events.expect(state.packing, last - first);
   for (const Segment& segment : segments) state.integrate(segment, workers);
-  state.queue.add(state.events, state.packing, workers);
+  state.queue.add(state.events, workers);
 }
 
 void EventCamera::release_until(TimeNs watermark, std::vector<Event>& out) {

@@ -8,7 +8,6 @@
 #include "esim/core/large_vector.h"
 #include "esim/core/random.h"
 #include "esim/core/time.h"
-#include "esim/events/event_packing.h"
 #include "esim/sensors/event_camera_options.h"
 
 namespace esim {
@@ -21,16 +20,6 @@ inline constexpr TimeNs kAges = 100'000'000 * kNsPerSecond;
 
 /// In place of the reference of a pixel that is held in reset.
 inline constexpr double kHeld = std::numeric_limits<double>::infinity();
-
-/// Where a thread puts the events that it finds.
-struct PackedEvents {
-  const EventPacking* packing;
-  std::vector<std::uint64_t>* events;
-
-  void add(TimeNs t, int x, int y, bool on) {
-    events->push_back(packing->pack(t - packing->origin, packing->place(x, y), on));
-  }
-};
 
 /// What the pixels of a camera remember, and what makes them differ. Private to the event camera.
 ///

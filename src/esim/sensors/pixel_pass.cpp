@@ -58,8 +58,8 @@ void PixelPass<Signals>::run(PixelArray& pixels, PackedEvents& events) {
       passed_[i] = compare_.polarity[i] > 0 ? compare_.upper(i) : compare_.lower(i);
     }
     if (pixels.renews) renew(pixels);
-    fire(pixels, *events.packing);
-    report(events);
+    fire(pixels, events.packing());
+    events.add(compare_.count, t0_, stamp_.data(), place_.data(), compare_.polarity.data(), reports_.data());
     reset(pixels);
     sleep(pixels);
   }
@@ -170,22 +170,6 @@ void PixelPass<Signals>::delay(const PixelArray& pixels, const EventPacking& pac
     ns = ns < longest ? ns : longest;
     stamp_[i] += std::floor(ns + 0.5);
   }
-}
-
-/// Packs the events of a round. Without branches: that a pixel fires again is as hard to foresee as an event.
-template <class Signals>
-void PixelPass<Signals>::report(PackedEvents& events) const {
-  std::vector<std::uint64_t>& out = *events.events;
-  const std::size_t first = out.size();
-  out.resize(first + compare_.count);
-  std::uint64_t* next = out.data() + first;
-  const EventPacking packing = *events.packing;
-  const TimeNs start = t0_ - packing.origin;
-  for (std::size_t i = 0; i < compare_.count; ++i) {
-    *next = packing.pack(start + static_cast<TimeNs>(stamp_[i]), place_[i], compare_.polarity[i] > 0);
-    next += reports_[i] != 0;
-  }
-  out.resize(static_cast<std::size_t>(next - out.data()));
 }
 
 /// Sets the references behind the events, and finds the pixels that may fire again.

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "esim/events/packed_events.h"
 #include "esim/sensors/event_normals.h"
 #include "esim/sensors/linear_signals.h"
 #include "esim/sensors/pixel_array.h"
@@ -37,7 +38,6 @@ class PixelPass {
   void renew(const PixelArray& pixels);
   void fire(const PixelArray& pixels, const EventPacking& packing);
   void delay(const PixelArray& pixels, const EventPacking& packing);
-  void report(PackedEvents& events) const;
   void reset(const PixelArray& pixels);
   void sleep(PixelArray& pixels);
 

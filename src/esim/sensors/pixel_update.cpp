@@ -146,7 +146,7 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
   const auto filter_to = [&](auto d, int begin, int end) {
     const int lanes = static_cast<int>(hn::Lanes(d));
     for (int x = begin; x < end; x += lanes) {
-      filter_vector<kOrder>(d, pixels, segment, filter, brightness + (x - first), y, x, *events.packing);
+      filter_vector<kOrder>(d, pixels, segment, filter, brightness + (x - first), y, x, events.packing());
       if ((x & 31) < lanes) {
         for (; asked < awake_.count; ++asked) pixels.prefetch(awake_.pixel[asked]);
       }
@@ -197,7 +197,7 @@ bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, P
       const std::size_t i = awake_.count++;
       const int column = static_cast<int>(x);
       awake_.pixel[i] = static_cast<std::uint32_t>(index(pixels, column, y));
-      awake_.place[i] = static_cast<std::uint32_t>(events.packing->place(column, y));
+      awake_.place[i] = static_cast<std::uint32_t>(events.packing().place(column, y));
       awake_.light0[i] = segment.irradiance0->row(y)[x];
       awake_.light1[i] = segment.irradiance1->row(y)[x];
       if (!awake_.has_room()) run();

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "esim/events/event_packing.h"
+
+namespace esim {
+
+/// Events that one thread has found, packed, in any order but apart by range of their time, so that each range can be
+/// sorted by itself.
+class PackedEvents {
+ public:
+  static constexpr std::size_t kRanges = 16;
+
+  /// Expects events between packing.origin and `duration` later. Later ones are possible, but all in the last range.
+  void expect(const EventPacking& packing, TimeNs duration);
+
+  const EventPacking& packing() const { return packing_; }
+
+  /// Adds `count` events, except those where `reported` is 0: `time` is whole ns after `start`.
+  void add(std::size_t count, TimeNs start, const double* time, const std::uint32_t* place, const double* polarity,
+           const double* reported);
+
+  std::span<const std::uint64_t> range(std::size_t i) const { return {ranges_[i].data(), sizes_[i]}; }
+  std::size_t size() const;
+  void clear() { sizes_.fill(0); }
+
+ private:
+  EventPacking packing_{1, 1};
+  int shift_ = 0;
+  std::array<std::vector<std::uint64_t>, kRanges> ranges_;
+  std::array<std::size_t, kRanges> sizes_{};
+};
+
+}  // namespace esim

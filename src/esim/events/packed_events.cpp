@@ -9,8 +9,8 @@ namespace esim {
 void PackedEvents::expect(const EventPacking& packing, TimeNs duration) {
   packing_ = packing;
   constexpr int kRangeBits = std::bit_width(kRanges) - 1;
-  shift_ = packing.time_shift() + std::max(0, static_cast<int>(std::bit_width(static_cast<std::uint64_t>(duration))) -
-                                                  kRangeBits);
+  shift_ = packing.time_shift() +
+           std::max(0, static_cast<int>(std::bit_width(static_cast<std::uint64_t>(duration))) - kRangeBits);
 }
 
 void PackedEvents::add(std::size_t count, TimeNs start, const double* time, const std::uint32_t* place,

@@ -14,7 +14,7 @@ namespace esim {
 /// sorted by itself.
 class PackedEvents {
  public:
-  static constexpr std::size_t kRanges = 16;
+  static constexpr std::size_t kRanges = 8;
 
   /// Expects events between packing.origin and `duration` later. Later ones are possible, but all in the last range.
   void expect(const EventPacking& packing, TimeNs duration);

@@ -53,8 +53,8 @@ struct EventCamera::State {
   Tile size;
   bool spoiled = false;  // by a segment that was only partly integrated
   std::optional<CenterSurround> surround;
-  Image<float> brightness;                         // less the surround
-  std::vector<PixelUpdate> updates;                // by worker
+  Image<float> brightness;           // less the surround
+  std::vector<PixelUpdate> updates;  // by worker
   std::vector<PackedEvents> events;  // by worker
   EventQueue queue;
   std::optional<Readout> readout;

@@ -3,6 +3,7 @@
 #include "esim/backends/panorama/panorama_renderer.h"
 #include "esim/backends/plane/plane_renderer.h"
 #include "esim/backends/raycast/raycast_renderer.h"
+#include "esim/backends/sprites/sprites_renderer.h"
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
 #include "esim/scene/image_file.h"
@@ -13,6 +14,18 @@ namespace {
 
 void require_path(const std::filesystem::path& path, const char* key) {
   if (path.empty()) throw UserError(fmt::format("renderer.{}: is missing; name a file", key));
+}
+
+Sprite load_sprite(const LayerOptions& options) {
+  if (options.image.empty()) throw UserError("image is missing; name a file");
+  const TranslucentImage image = load_translucent(options.image, {options.median_px, options.gaussian_px});
+  const Wrap wrap = options.beyond == LayerBeyond::repeat ? Wrap::repeat : Wrap::clamp;
+  const auto texture = [&](const Image<float>& plane) {
+    return plane.empty() ? nullptr : std::make_shared<const Texture>(plane, wrap, wrap);
+  };
+  const auto keyframes = options.keyframes.empty() ? std::vector{LayerKeyframe{}} : options.keyframes;
+  return {texture(image.light), texture(image.alpha), options.units, options.beyond,
+          LayerMotion(keyframes, options.interpolation)};
 }
 
 // One overload per type of renderer: a new one is a line in RendererOptions and a function here.
@@ -42,6 +55,20 @@ RendererFactory factory(const PlaneRendererOptions& options, const Notices&) {
   const Poster poster{std::make_shared<const Texture>(load_luminance(options.image), wrap, wrap), pose_of(options.pose),
                       options.width_m, options.endless, static_cast<float>(options.background)};
   return [=](const Camera& camera, const Workers& workers) { return make_plane_renderer(poster, camera, workers); };
+}
+
+RendererFactory factory(const SpritesRendererOptions& options, const Notices&) {
+  if (options.layers.empty())
+    throw UserError("renderer: sprites without layers show nothing; list layers, or name a scene file in scene");
+  SpriteScene scene{{}, static_cast<float>(options.background)};
+  for (std::size_t i = 0; i < options.layers.size(); ++i) {
+    try {
+      scene.sprites.push_back(load_sprite(options.layers[i]));
+    } catch (const UserError& error) {
+      throw UserError(fmt::format("renderer.layers.{}: {}", i, error.what()));
+    }
+  }
+  return [=](const Camera& camera, const Workers& workers) { return make_sprites_renderer(scene, camera, workers); };
 }
 
 }  // namespace

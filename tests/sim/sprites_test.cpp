@@ -77,9 +77,10 @@ TEST_F(SpritesScenario, NamesTheLayerThatIsWrong) {
   };
   EXPECT_TRUE(test::contains(error("duration_s: 1\nrenderer: {type: sprites}\n"), "list layers"));
   EXPECT_TRUE(test::contains(error("renderer: {type: sprites, layers: [{image: a.png}]}\n"), "duration_s: is missing"));
-  EXPECT_TRUE(test::contains(error(of_layers("{}")), "renderer.layers.1: image is missing"));
+  EXPECT_TRUE(test::contains(error(of_layers("{}")), "renderer.layers.1.image: is missing"));
   EXPECT_TRUE(test::contains(error(of_layers("{image: b.png}")), "renderer.layers.1: image"));
   EXPECT_TRUE(test::contains(error(of_layers("{image: b.png}")), "no such file"));
+  EXPECT_TRUE(test::contains(error(of_layers("{image: a.png, keyframes: []}")), "renderer.layers.1: has no keyframes"));
   EXPECT_TRUE(test::contains(error(of_layers("{image: a.png, median_px: 4}")), "renderer.layers.1: image"));
   EXPECT_TRUE(test::contains(error(of_layers("{image: a.png, keyframes: [{t_s: 1}, {t_s: 1}]}")), "put them in order"));
 }

@@ -50,7 +50,7 @@ struct LayerOptions {
   int median_px = 0;
   double gaussian_px = 0;
   KeyframeInterpolation interpolation = KeyframeInterpolation::spline;
-  std::vector<LayerKeyframe> keyframes;  ///< none: at rest in the middle
+  std::vector<LayerKeyframe> keyframes{LayerKeyframe{}};  // at rest in the middle
 };
 
 /// Layers on the sensor itself. Where `scene` names a file, they come from there.

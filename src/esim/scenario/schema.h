@@ -50,7 +50,7 @@ void describe(Visitor& visit, LayerOptions& o) {
   visit("gaussian_px", o.gaussian_px, About{"standard deviation of a blur of the image; 0: none", "px", 0, 100});
   visit("interpolation", o.interpolation, About{"motion between keyframes: natural cubic splines, or constant rates"});
   visit("keyframes", o.keyframes,
-        About{"in order of time; the layer rests before the first and after the last (none: in the middle)"});
+        About{"in order of time; the layer rests before the first and after the last (default: in the middle)"});
 }
 
 template <class Visitor>

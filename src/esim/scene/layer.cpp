@@ -35,7 +35,7 @@ std::vector<Parameters> natural_spline(const std::vector<double>& t, const std::
 }  // namespace
 
 LayerMotion::LayerMotion(const std::vector<LayerKeyframe>& keyframes, KeyframeInterpolation interpolation) {
-  if (keyframes.empty()) throw UserError("has no keyframes; give it one at least");
+  if (keyframes.empty()) throw UserError("has no keyframes; give it one at least, or leave them out");
   for (const LayerKeyframe& key : keyframes) {
     if (!t_s_.empty() && !(key.t_s > t_s_.back())) {
       throw UserError(fmt::format("the keyframe at t_s = {} follows one at {}; put them in order, each time once",

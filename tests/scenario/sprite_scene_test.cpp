@@ -113,6 +113,7 @@ TEST_F(SceneFile, StandsInAScenarioForLayersSizeAndDuration) {
   EXPECT_EQ(read.cameras[0].height, 200);
   EXPECT_TRUE(std::holds_alternative<StaticTrajectoryOptions>(read.trajectory));
   EXPECT_EQ(scenario(yaml, {"start_s=0.5"}).duration_s, 2.0);
+  EXPECT_TRUE(contains(test::message_of<UserError>([&] { scenario(yaml, {"start_s=3"}); }), "last keyframe"));
   EXPECT_EQ(scenario(yaml + "duration_s: 1\ncamera: {width: 64}\n").duration_s, 1);
   EXPECT_EQ(scenario(yaml + "camera: {width: 64}\n").cameras[0].width, 64);
   EXPECT_FALSE(scenario(yaml + "trajectory: {type: file, path: p.txt}\n").duration_s) << "ends with the trajectory";

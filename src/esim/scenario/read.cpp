@@ -147,9 +147,15 @@ double last_keyframe_s(const SpritesRendererOptions& renderer) {
 /// with the layers' motion.
 void complete_for_layers(Scenario& scenario, const SpritesRendererOptions& renderer, bool has_trajectory) {
   if (!has_trajectory) scenario.trajectory = StaticTrajectoryOptions{};
-  const double left_s = last_keyframe_s(renderer) - scenario.start_s;
-  if (scenario.duration_s || left_s <= 0 || std::holds_alternative<FileTrajectoryOptions>(scenario.trajectory)) return;
-  scenario.duration_s = left_s;
+  const double end_s = last_keyframe_s(renderer);
+  if (scenario.duration_s || end_s <= 0 || std::holds_alternative<FileTrajectoryOptions>(scenario.trajectory)) return;
+  if (scenario.start_s >= end_s) {
+    throw UserError(
+        fmt::format("start_s: {} s is beyond the last keyframe of the layers, at {} s; start earlier, or set "
+                    "duration_s",
+                    scenario.start_s, end_s));
+  }
+  scenario.duration_s = end_s - scenario.start_s;
 }
 
 }  // namespace

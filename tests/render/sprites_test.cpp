@@ -159,7 +159,7 @@ TEST(SpritesRenderer, EdgesCoverTheirShareOfEveryPixel) {
           const Eigen::Vector2d point(x - 0.5 + (i % kFine + 0.5) / kFine, y - 0.5 + (i / kFine + 0.5) / kFine);
           inside += (uv_from_pixel * (point - at.centre)).cwiseAbs().maxCoeff() <= 0.5;
         }
-        largest = std::max(largest, std::fabs(sample.irradiance(x, y) - double{1} * inside / (kFine * kFine)));
+        largest = std::max(largest, std::fabs(sample.irradiance(x, y) - static_cast<double>(inside) / (kFine * kFine)));
         total += sample.irradiance(x, y);
       }
     }

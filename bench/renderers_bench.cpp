@@ -34,6 +34,20 @@ void plane(benchmark::State& state) {
   render_frames(state, *test::make_renderer("plane", kCamera, workers), test::moving_camera());
 }
 
+/// The layers of the tests, and ten translucent ones of 100 x 50 pixels in front of them.
+void sprites(benchmark::State& state) {
+  SpriteScene scene = test::test_sprites();
+  const auto light = test::smooth_texture(Wrap::clamp, Wrap::clamp);
+  const auto alpha = std::make_shared<const Texture>(Image<float>(1024, 512, 0.7F), Wrap::clamp, Wrap::clamp);
+  for (int i = 0; i < 10; ++i) {
+    const LayerKeyframe key{0, {32.0 * i - 150, 20.0 * i - 90}, 20.0 * i, {0.1, 0.1}};
+    scene.sprites.insert(scene.sprites.begin(), {light, alpha, LayerUnits::pixel, LayerBeyond::nothing,
+                                                 LayerMotion({key}, KeyframeInterpolation::linear)});
+  }
+  const Workers workers(static_cast<int>(state.range(0)));
+  render_frames(state, *make_sprites_renderer(scene, kCamera, workers), test::moving_camera());
+}
+
 void mesh_file(benchmark::State& state, const std::filesystem::path& file, const Eigen::Vector3d& position) {
   if (!std::filesystem::exists(file)) return state.SkipWithError("the scene is not there");
   const Workers workers(static_cast<int>(state.range(0)));
@@ -55,6 +69,7 @@ void flying_room(benchmark::State& state) {
 
 BENCHMARK(panorama)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(plane)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(sprites)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(room)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(flying_room)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 

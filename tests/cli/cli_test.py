@@ -89,6 +89,7 @@ class Recordings(Cli):
         result = run("check", SCENES / "poster.yaml", *FAST)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("64x48", result.stdout)
+        self.assertIn("duration: 2.000 s", run("check", SCENES / "sprites.yaml").stdout)
         reference = (SCENES.parent / "docs" / "scenario.md").read_text()
         self.assertIn(run("options").stdout, reference, "docs/scenario.md is out of date: scripts/update-docs")
         self.assertIn("Examples", run("--help").stdout)

@@ -8,6 +8,7 @@
 #include "esim/backends/panorama/panorama_renderer.h"
 #include "esim/backends/plane/plane_renderer.h"
 #include "esim/backends/raycast/raycast_renderer.h"
+#include "esim/backends/sprites/sprites_renderer.h"
 #include "esim/motion/trajectory.h"
 
 namespace esim::test {
@@ -72,11 +73,27 @@ inline Poster test_poster() {
   return {smooth_texture(Wrap::repeat, Wrap::repeat), pose, 5.0, true, 0.2F};
 }
 
+/// The layers of make_renderer("sprites"): a rectangle that turns and grows before a picture that fills the sensor.
+inline SpriteScene test_sprites() {
+  const auto texture = smooth_texture(Wrap::clamp, Wrap::clamp);
+  const auto spline = [](std::vector<LayerKeyframe> keyframes) {
+    return LayerMotion(keyframes, KeyframeInterpolation::spline);
+  };
+  Sprite near{
+      texture, nullptr, LayerUnits::pixel, LayerBeyond::nothing,
+      spline({{-1, {-60, -20}, -70, {0.04, 0.08}}, {0.1, {5, 3}, 12, {0.06, 0.1}}, {1, {70, 10}, 80, {0.1, 0.1}}})};
+  Sprite far{
+      texture, nullptr, LayerUnits::sensor, LayerBeyond::mirror,
+      spline({{-1, {-0.3, 0.2}, 20, {1.5, 2.1}}, {0, {0.05, 0.1}, 5, {1.6, 2}}, {1, {0.4, 0.1}, -20, {1.9, 2}}})};
+  return {{near, far}, 0.2F};
+}
+
 /// Every renderer on a scene that fills the view from near the origin.
 inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Camera& camera,
                                                const Workers& workers = two_threads()) {
   if (name == "panorama") return make_panorama_renderer({smooth_texture(Wrap::repeat, Wrap::clamp)}, camera, workers);
   if (name == "plane") return make_plane_renderer(test_poster(), camera, workers);
+  if (name == "sprites") return make_sprites_renderer(test_sprites(), camera, workers);
   return make_raycast_renderer(build_raycast_scene(box_mesh()), {}, camera, workers);
 }
 
@@ -102,10 +119,11 @@ inline Kinematics moving_camera() {
   return camera;
 }
 
-inline Sample render(Renderer& renderer, const Camera& model, const Kinematics& camera, std::vector<Tile> tiles = {}) {
+inline Sample render(Renderer& renderer, const Camera& model, const Kinematics& camera, std::vector<Tile> tiles = {},
+                     TimeNs t = 123) {
   if (tiles.empty()) tiles = {{0, 0, model.width, model.height}};
   Sample sample;
-  renderer.render({123, camera, std::move(tiles)}, sample);
+  renderer.render({t, camera, std::move(tiles)}, sample);
   return sample;
 }
 

@@ -1,8 +1,12 @@
 #include <fmt/format.h>
 
+#include <map>
+#include <tuple>
+
 #include "esim/backends/panorama/panorama_renderer.h"
 #include "esim/backends/plane/plane_renderer.h"
 #include "esim/backends/raycast/raycast_renderer.h"
+#include "esim/backends/sprites/sprites_renderer.h"
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
 #include "esim/scene/image_file.h"
@@ -11,7 +15,7 @@
 namespace esim {
 namespace {
 
-void require_path(const std::filesystem::path& path, const char* key) {
+void require_path(const std::filesystem::path& path, const std::string& key) {
   if (path.empty()) throw UserError(fmt::format("renderer.{}: is missing; name a file", key));
 }
 
@@ -42,6 +46,47 @@ RendererFactory factory(const PlaneRendererOptions& options, const Notices&) {
   const Poster poster{std::make_shared<const Texture>(load_luminance(options.image), wrap, wrap), pose_of(options.pose),
                       options.width_m, options.endless, static_cast<float>(options.background)};
   return [=](const Camera& camera, const Workers& workers) { return make_plane_renderer(poster, camera, workers); };
+}
+
+/// The textures of layers. Layers of the same image share them.
+class LayerTextures {
+ public:
+  struct Textures {
+    std::shared_ptr<const Texture> light, alpha;
+  };
+
+  const Textures& of(const LayerOptions& layer) {
+    const Wrap wrap = layer.beyond == LayerBeyond::repeat ? Wrap::repeat : Wrap::clamp;
+    const auto [entry, is_new] = loaded_.try_emplace({layer.image, layer.median_px, layer.gaussian_px, wrap});
+    if (is_new) {
+      const TranslucentImage image = load_translucent(layer.image, {layer.median_px, layer.gaussian_px});
+      entry->second.light = std::make_shared<const Texture>(image.light, wrap, wrap);
+      if (!image.alpha.empty()) entry->second.alpha = std::make_shared<const Texture>(image.alpha, wrap, wrap);
+    }
+    return entry->second;
+  }
+
+ private:
+  std::map<std::tuple<std::filesystem::path, int, double, Wrap>, Textures> loaded_;
+};
+
+RendererFactory factory(const SpritesRendererOptions& options, const Notices&) {
+  if (options.layers.empty())
+    throw UserError("renderer: sprites without layers show nothing; list layers, or name a scene file in scene");
+  SpriteScene scene{{}, static_cast<float>(options.background)};
+  LayerTextures textures;
+  for (std::size_t i = 0; i < options.layers.size(); ++i) {
+    const LayerOptions& layer = options.layers[i];
+    require_path(layer.image, fmt::format("layers.{}.image", i));
+    try {
+      const auto& [light, alpha] = textures.of(layer);
+      scene.sprites.push_back(
+          {light, alpha, layer.units, layer.beyond, LayerMotion(layer.keyframes, layer.interpolation)});
+    } catch (const UserError& error) {
+      throw UserError(fmt::format("renderer.layers.{}: {}", i, error.what()));
+    }
+  }
+  return [=](const Camera& camera, const Workers& workers) { return make_sprites_renderer(scene, camera, workers); };
 }
 
 }  // namespace

@@ -52,6 +52,20 @@ bool sees_something(const Sample& sample) {
   return std::any_of(depth.begin(), depth.end(), [](float z) { return std::isfinite(z); });
 }
 
+/// Says what a scenario asks for in vain of a renderer that draws on the sensor.
+void name_what_has_no_effect(const Scenario& scenario, const World& world, std::size_t index, const Notices& notices) {
+  if (!world.cameras[index].renderer->traits().on_sensor) return;
+  const CameraInfo& info = world.info.cameras[index];
+  if (!std::holds_alternative<NoDistortion>(info.model.distortion)) {
+    notices.warning(fmt::format("camera {}: the lens's distortion has no effect: {} are drawn on the sensor itself",
+                                info.name, world.cameras[index].renderer->traits().name));
+  }
+  if (index == 0 && !std::holds_alternative<StaticTrajectoryOptions>(scenario.trajectory)) {
+    notices.warning(fmt::format("trajectory: {} are drawn on the sensor itself; its motion is recorded, but not seen",
+                                world.cameras[index].renderer->traits().name));
+  }
+}
+
 /// Looks through a camera at a few times: one that never sees anything is a mistake of poses or frames.
 void require_a_view(const World& world, std::size_t index) {
   constexpr int kLooks = 9;
@@ -101,6 +115,7 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices)
          EventCamera(sensor, model.width, model.height, scenario.seed, static_cast<std::uint16_t>(i)),
          {}});
     require_a_view(world, i);
+    name_what_has_no_effect(scenario, world, i, notices);
   }
   return world;
 }

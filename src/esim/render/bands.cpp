@@ -23,16 +23,20 @@ std::vector<Tile> cut_into_bands(const std::vector<Tile>& tiles) {
 
 void render_in_bands(const RenderRequest& request, const PixelRays& rays, const Workers& workers, Sample& sample,
                      const std::function<void(const Tile& band)>& shade) {
-  sample.resize(rays.x.width(), rays.x.height());
+  render_in_bands(request, rays.x.width(), rays.x.height(), workers, sample, [&](const Tile& band) {
+    shade(band);
+    motion_field(rays, request.camera, band, sample);
+  });
+}
+
+void render_in_bands(const RenderRequest& request, int width, int height, const Workers& workers, Sample& sample,
+                     const std::function<void(const Tile& band)>& shade) {
+  sample.resize(width, height);
   sample.t = request.t;
   sample.tiles = request.tiles;
 
   const std::vector<Tile> bands = cut_into_bands(request.tiles);
-  workers.for_each(static_cast<int>(bands.size()), [&](int i) {
-    const Tile& band = bands[static_cast<std::size_t>(i)];
-    shade(band);
-    motion_field(rays, request.camera, band, sample);
-  });
+  workers.for_each(static_cast<int>(bands.size()), [&](int i) { shade(bands[static_cast<std::size_t>(i)]); });
 }
 
 }  // namespace esim

@@ -13,4 +13,8 @@ namespace esim {
 void render_in_bands(const RenderRequest& request, const PixelRays& rays, const Workers& workers, Sample& sample,
                      const std::function<void(const Tile& band)>& shade);
 
+/// The same for a `shade` that fills V as well.
+void render_in_bands(const RenderRequest& request, int width, int height, const Workers& workers, Sample& sample,
+                     const std::function<void(const Tile& band)>& shade);
+
 }  // namespace esim

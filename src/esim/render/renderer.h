@@ -24,6 +24,7 @@ struct RendererTraits {
   std::string name;                             ///< as in the scenario, for reports
   Granularity granularity = Granularity::tile;  ///< frame: asking for a tile costs as much as the whole image
   bool at_infinity = false;                     ///< everything that it shows is infinitely far away
+  bool on_sensor = false;  ///< drawn on the sensor: the camera's pose, twist and lens change nothing
 };
 
 /// Evaluates a scene as one camera sees it. A renderer is made for one camera and one scene, keeps no history, and

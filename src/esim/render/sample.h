@@ -15,8 +15,8 @@ struct Sample {
 
   Image<float> irradiance;  // E, linear, 1.0 = white       computed by the renderer
   Image<float> depth;       // Z, planar, m; +inf: nothing  computed by the renderer
-  Image<float> flow_x;      // V, px/s, to the right        computed by motion_field() from Z and the twist
-  Image<float> flow_y;      // V, px/s, downwards           computed by motion_field() from Z and the twist
+  Image<float> flow_x;      // V, px/s, to the right        computed by the renderer (motion_field() if static)
+  Image<float> flow_y;      // V, px/s, downwards           computed by the renderer (motion_field() if static)
 
   /// Makes room for width x height pixels; keeps the content if the size is right already.
   void resize(int width, int height) {

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <numbers>
 #include <set>
 
 #include "esim/scenario/calibration.h"
+#include "esim/scenario/sprite_scene.h"
 #include "esim/scenario/yaml_reader.h"
 
 namespace esim {
@@ -71,7 +73,9 @@ void refuse_geometry_beside_calibration(const YAML::Node& entry, const std::stri
   }
 }
 
-std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource& source) {
+/// `otherwise` holds what a camera is where it does not say.
+std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource& source,
+                                        const CameraOptions& otherwise) {
   const YAML::Node one = root["camera"], several = root["cameras"];
   if (one.IsDefined() && several.IsDefined())
     YamlReader::fail(source, several, "cameras", "camera is given as well; remove one of them");
@@ -91,7 +95,7 @@ std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource
       }
       refuse_geometry_beside_calibration(std::as_const(merged), key, source);
     }
-    CameraOptions options;
+    CameraOptions options = otherwise;
     YamlReader reader(merged, key, source);
     describe(reader, options);
     reader.finish();
@@ -116,6 +120,44 @@ void name_cameras(std::vector<CameraOptions>& cameras, const YamlSource& source)
   }
 }
 
+/// Puts the layers of a scene file, where one is named, in its place; the camera becomes as large as the file says.
+void read_layers(SpritesRendererOptions& renderer, const YAML::Node& node, const YamlSource& source,
+                 CameraOptions& camera) {
+  if (renderer.scene.empty()) return;
+  if (!renderer.layers.empty()) {
+    YamlReader::fail(source, node["layers"], "renderer.layers", "are given by the scene file as well; remove one");
+  }
+  SpriteSceneFile scene = read_sprite_scene(renderer.scene, renderer.search_path);
+  renderer.layers = std::move(scene.layers);
+  renderer.scene.clear();
+  renderer.search_path.clear();
+  camera.width = scene.width, camera.height = scene.height;
+}
+
+/// The last keyframe of any layer; 0 where there is none.
+double last_keyframe_s(const SpritesRendererOptions& renderer) {
+  double last = 0;
+  for (const LayerOptions& layer : renderer.layers) {
+    for (const LayerKeyframe& key : layer.keyframes) last = std::max(last, key.t_s);
+  }
+  return last;
+}
+
+/// Layers lie on the sensor: a scenario of them needs no trajectory, and where it has none that ends by itself, it ends
+/// with the layers' motion.
+void complete_for_layers(Scenario& scenario, const SpritesRendererOptions& renderer, bool has_trajectory) {
+  if (!has_trajectory) scenario.trajectory = StaticTrajectoryOptions{};
+  const double end_s = last_keyframe_s(renderer);
+  if (scenario.duration_s || end_s <= 0 || std::holds_alternative<FileTrajectoryOptions>(scenario.trajectory)) return;
+  if (scenario.start_s >= end_s) {
+    throw UserError(
+        fmt::format("start_s: {} s is beyond the last keyframe of the layers, at {} s; start earlier, or set "
+                    "duration_s",
+                    scenario.start_s, end_s));
+  }
+  scenario.duration_s = end_s - scenario.start_s;
+}
+
 }  // namespace
 
 Scenario read_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
@@ -129,11 +171,18 @@ Scenario read_scenario(const std::filesystem::path& file, const std::vector<std:
   describe(reader, scenario);
   for (const char* key : {"camera", "cameras", "sampling", "event_camera"}) reader.know(key);
   reader.finish();
+  const YAML::Node renderer = std::as_const(root)["renderer"], trajectory = std::as_const(root)["trajectory"];
+  auto* const sprites = std::get_if<SpritesRendererOptions>(&scenario.renderer);
   for (const char* required : {"renderer", "trajectory"}) {
-    if (!std::as_const(root)[required].IsDefined())
+    if (!std::as_const(root)[required].IsDefined() && sprites == nullptr)
       YamlReader::fail(source, YAML::Node(YAML::NodeType::Undefined), required, "is missing; every scenario needs one");
   }
-  scenario.cameras = read_cameras(std::as_const(root), source);
+  CameraOptions camera;
+  if (sprites != nullptr) {
+    read_layers(*sprites, renderer, source, camera);
+    complete_for_layers(scenario, *sprites, trajectory.IsDefined());
+  }
+  scenario.cameras = read_cameras(std::as_const(root), source, camera);
   name_cameras(scenario.cameras, source);
   return scenario;
 }

@@ -10,6 +10,7 @@
 #include "esim/geometry/camera.h"
 #include "esim/sampling/criterion.h"
 #include "esim/scenario/pose_options.h"
+#include "esim/scene/layer.h"
 #include "esim/sensors/event_camera.h"
 
 namespace esim {
@@ -41,7 +42,28 @@ struct PlaneRendererOptions {
   double background = 0.2;
 };
 
-using RendererOptions = std::variant<MeshRendererOptions, PanoramaRendererOptions, PlaneRendererOptions>;
+/// An image that moves over the sensor.
+struct LayerOptions {
+  std::filesystem::path image;
+  LayerUnits units = LayerUnits::pixel;
+  LayerBeyond beyond = LayerBeyond::nothing;
+  int median_px = 0;
+  double gaussian_px = 0;
+  KeyframeInterpolation interpolation = KeyframeInterpolation::spline;
+  std::vector<LayerKeyframe> keyframes{LayerKeyframe{}};  // at rest in the middle
+};
+
+/// Layers on the sensor itself. Where `scene` names a file, they come from there.
+struct SpritesRendererOptions {
+  static constexpr const char* kType = "sprites";
+  std::filesystem::path scene;
+  std::vector<std::filesystem::path> search_path;
+  std::vector<LayerOptions> layers;
+  double background = 0.2;
+};
+
+using RendererOptions =
+    std::variant<MeshRendererOptions, PanoramaRendererOptions, PlaneRendererOptions, SpritesRendererOptions>;
 
 // --- trajectories of the body ------------------------------------------------------------------------------------
 

@@ -31,6 +31,39 @@ void describe(Visitor& visit, PlaneRendererOptions& o) {
 }
 
 template <class Visitor>
+void describe(Visitor& visit, LayerKeyframe& o) {
+  visit("t_s", o.t_s,
+        About{"when, on the trajectory's clock; those of other trajectories than files start at 0", "s", -1e8, 1e8});
+  visit("position", o.position,
+        About{"of the layer's centre from the sensor's, to the right and downwards, in units", "", -1e6, 1e6});
+  visit("rotation_deg", o.rotation_deg, About{"about the layer's centre, clockwise", "deg", -1e9, 1e9});
+  visit("scale", o.scale, About{"of width and height; negative ones mirror", "", -1e6, 1e6});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, LayerOptions& o) {
+  visit("image", o.image, About{"image, with alpha or opaque"});
+  visit("units", o.units,
+        About{"pixel: scale 1 makes a texel a pixel; sensor: it fills the sensor, whose width and height are 1"});
+  visit("beyond", o.beyond, About{"what is seen beyond the image's edges"});
+  visit("median_px", o.median_px, About{"side of a median filter over the image, odd; 0: none", "px", 0, 255});
+  visit("gaussian_px", o.gaussian_px, About{"standard deviation of a blur of the image; 0: none", "px", 0, 100});
+  visit("interpolation", o.interpolation, About{"motion between keyframes: natural cubic splines, or constant rates"});
+  visit("keyframes", o.keyframes,
+        About{"in order of time; the layer rests before the first and after the last (default: in the middle)"});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, SpritesRendererOptions& o) {
+  visit("scene", o.scene,
+        About{"the original ESIM's .scene file, instead of layers: gives them, and where the scenario "
+              "does not, the duration and the camera's size"});
+  visit("search_path", o.search_path, About{"folders in which the scene file's images are looked for"});
+  visit("layers", o.layers, About{"images on the sensor, the nearest first"});
+  visit("background", o.background, About{"irradiance where no layer is", "", 0, 1e6});
+}
+
+template <class Visitor>
 void describe(Visitor& visit, FileTrajectoryOptions& o) {
   visit("path", o.path, About{"poses of the body: TUM text (s) or CSV (ns), told apart by content"});
   visit("time_scale", o.time_scale, About{"stretches time: 2 takes twice as long", "", 0, 1e6, true});
@@ -125,13 +158,20 @@ void describe(Visitor& visit, Scenario& o) {
   visit("seed", o.seed, About{"of all random numbers"});
   visit("start_s", o.start_s, About{"where to begin, after the trajectory's start", "s", 0, 1e9});
   visit("duration_s", o.duration_s,
-        About{"how long to simulate (default: to the trajectory's end)", "s", 0, 1e9, true});
+        About{"how long to simulate (default: to the end of the trajectory, or of the layers' keyframes)", "s", 0, 1e9,
+              true});
   visit("renderer", o.renderer, About{"what is seen"});
   visit("trajectory", o.trajectory, About{"how the body moves"});
   visit("truth", o.truth, About{"ground truth"});
   visit("output", o.output, About{"what is written, and how"});
 }
 
+template <>
+inline constexpr std::array<const char*, 2> kEnumNames<LayerUnits>{"pixel", "sensor"};
+template <>
+inline constexpr std::array<const char*, 4> kEnumNames<LayerBeyond>{"nothing", "clamp", "mirror", "repeat"};
+template <>
+inline constexpr std::array<const char*, 2> kEnumNames<KeyframeInterpolation>{"spline", "linear"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<EventTimeUnit>{"us", "ns"};
 template <>

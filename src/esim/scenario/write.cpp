@@ -34,6 +34,10 @@ class YamlWriter {
   static bool is_unset(const std::optional<T>& value) {
     return !value;
   }
+  template <typename T>
+  static bool is_unset(const std::vector<T>& value) {
+    return value.empty();
+  }
   static bool is_unset(const std::filesystem::path& value) { return value.empty(); }
   static bool is_unset(const std::string& value) { return value.empty(); }
 
@@ -48,6 +52,13 @@ class YamlWriter {
   void write(const Eigen::Matrix<double, N, 1>& value) {
     out_ << YAML::Flow << YAML::BeginSeq;
     for (int i = 0; i < N; ++i) write(value[i]);
+    out_ << YAML::EndSeq;
+  }
+
+  template <typename T>
+  void write(const std::vector<T>& value) {
+    out_ << YAML::BeginSeq;
+    for (const T& entry : value) write(entry);
     out_ << YAML::EndSeq;
   }
 
@@ -126,6 +137,10 @@ class ReferenceWriter {
     return " (unset)";
   }
   template <typename T>
+  static std::string default_of(const std::vector<T>&) {
+    return " a list of" + default_of(T{});
+  }
+  template <typename T>
   requires std::is_enum_v<T>
   static std::string default_of(T value) {
     std::string names;
@@ -152,6 +167,11 @@ class ReferenceWriter {
   void nested(T& options) {
     ReferenceWriter inner(out_, depth_ + 1);
     describe(inner, options);
+  }
+  template <typename T>
+  void nested(std::vector<T>&) {
+    T entry;
+    nested(entry);
   }
   template <typename... T>
   void nested(std::variant<T...>&) {

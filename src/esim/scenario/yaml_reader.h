@@ -79,6 +79,13 @@ class YamlReader {
   }
 
   template <typename T>
+  void read(const YAML::Node& node, const std::string& key, std::vector<T>& value, const About& about) {
+    if (!node.IsSequence()) fail(source_, node, key, "must be a list");
+    value.assign(node.size(), T{});
+    for (std::size_t i = 0; i < value.size(); ++i) read(node[i], key + "." + std::to_string(i), value[i], about);
+  }
+
+  template <typename T>
   requires std::is_enum_v<T>
   void read(const YAML::Node& node, const std::string& key, T& value, const About&) {
     value = static_cast<T>(index_of_name(node, key, {kEnumNames<T>.begin(), kEnumNames<T>.end()}));

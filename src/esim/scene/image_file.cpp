@@ -7,9 +7,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "esim/core/error.h"
@@ -97,20 +99,31 @@ PixelType pixel_type(const std::filesystem::path& path, const cv::Mat& image) {
   }
 }
 
-}  // namespace
-
-void load_planes(const std::filesystem::path& path, Encoding encoding, bool colour, Planes& planes) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) fail(path, "no such file");
+std::string lower_case_extension(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return std::tolower(c); });
-  if (extension == ".exr") return load_exr(path, encoding, colour, planes);
+  return extension;
+}
 
+/// Refuses a PNG file by the size in its first chunk, before the decoder takes memory for it.
+void check_png_size(const std::filesystem::path& path) {
+  std::array<unsigned char, 24> head{};
+  std::ifstream file(path, std::ios::binary);
+  if (!file.read(reinterpret_cast<char*>(head.data()), head.size()) || head[0] != 0x89 || head[1] != 'P') return;
+  const auto big_endian = [&](std::size_t at) {
+    return std::int64_t{head[at]} << 24 | head[at + 1] << 16 | head[at + 2] << 8 | head[at + 3];
+  };
+  check_size(path, big_endian(16), big_endian(20));
+}
+
+/// The pixels of a file that is not OpenEXR, as they are coded.
+cv::Mat read_pixels(const std::filesystem::path& path) {
+  check_png_size(path);
+  const std::string extension = lower_case_extension(path);
   if ((extension == ".jpg" || extension == ".jpeg") && !is_whole_jpeg(path)) {
     fail(path, "is no JPEG image, or is cut off");
   }
-
   cv::Mat image;
   try {
     image = cv::imread(path.string(), cv::IMREAD_UNCHANGED);
@@ -119,6 +132,11 @@ void load_planes(const std::filesystem::path& path, Encoding encoding, bool colo
   }
   if (image.empty()) fail(path, "cannot be decoded; is it a PNG, JPEG, TIFF, EXR or HDR image, and complete?");
   check_size(path, image.cols, image.rows);
+  return image;
+}
+
+void decode_pixels(const std::filesystem::path& path, const cv::Mat& image, Encoding encoding, bool colour,
+                   Planes& planes) {
   decode({.data = image.data,
           .row_bytes = static_cast<std::ptrdiff_t>(image.step[0]),
           .width = image.cols,
@@ -129,10 +147,69 @@ void load_planes(const std::filesystem::path& path, Encoding encoding, bool colo
          encoding, colour, planes);
 }
 
+void require_file(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) fail(path, "no such file");
+}
+
+constexpr const char* kMedianNeedsBytes = "is not of 8 bits, which a median needs; leave the median out";
+
+void take_median(const std::filesystem::path& path, int side, cv::Mat& image) {
+  if (side <= 1) return;
+  if (side % 2 == 0) fail(path, fmt::format("a median over {} px has no middle; use an odd number", side));
+  if (image.depth() != CV_8U) fail(path, kMedianNeedsBytes);
+  cv::medianBlur(image, image, side);
+}
+
+/// Decoding laid `coded` over white, light + (1 - alpha): takes the white away.
+void separate_alpha(const cv::Mat& coded, TranslucentImage& image) {
+  image.alpha = Image<float>(coded.cols, coded.rows);
+  cv::Mat channel, alpha(coded.rows, coded.cols, CV_32F, image.alpha.data());
+  cv::extractChannel(coded, channel, 3);
+  channel.convertTo(alpha, CV_32F, coded.depth() == CV_8U ? 1.0 / 255 : 1.0 / 65535);
+  for (std::size_t i = 0; i < image.light.size(); ++i) {
+    image.light.data()[i] = std::max(0.0F, image.light.data()[i] - (1.0F - image.alpha.data()[i]));
+  }
+}
+
+void blur(Image<float>& image, double sigma_px) {
+  const cv::Mat matrix(image.height(), image.width(), CV_32F, image.data());
+  cv::GaussianBlur(matrix, matrix, {0, 0}, sigma_px);
+}
+
+}  // namespace
+
+void load_planes(const std::filesystem::path& path, Encoding encoding, bool colour, Planes& planes) {
+  require_file(path);
+  if (lower_case_extension(path) == ".exr") return load_exr(path, encoding, colour, planes);
+  decode_pixels(path, read_pixels(path), encoding, colour, planes);
+}
+
 Image<float> load_luminance(const std::filesystem::path& path) {
   Planes planes;
   load_planes(path, Encoding::automatic, false, planes);
   return std::move(planes.front());
+}
+
+TranslucentImage load_translucent(const std::filesystem::path& path, const Softening& softening) {
+  require_file(path);
+  TranslucentImage result;
+  if (lower_case_extension(path) == ".exr") {
+    if (softening.median_px > 1) fail(path, kMedianNeedsBytes);
+    result.light = load_luminance(path);
+  } else {
+    cv::Mat image = read_pixels(path);
+    take_median(path, softening.median_px, image);
+    Planes planes;
+    decode_pixels(path, image, Encoding::automatic, false, planes);
+    result.light = std::move(planes.front());
+    if (image.channels() == 4 && image.depth() != CV_32F) separate_alpha(image, result);
+  }
+  if (softening.gaussian_px > 0) {
+    blur(result.light, softening.gaussian_px);
+    if (!result.alpha.empty()) blur(result.alpha, softening.gaussian_px);
+  }
+  return result;
 }
 
 }  // namespace esim

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "esim/core/parallel.h"
+#include "esim/geometry/camera.h"
+#include "esim/render/renderer.h"
+#include "esim/scene/layer.h"
+#include "esim/scene/texture.h"
+
+namespace esim {
+
+/// An image that moves over the sensor.
+struct Sprite {
+  std::shared_ptr<const Texture> light;  ///< linear luminance times alpha; repeats if `beyond` does, clamps otherwise
+  std::shared_ptr<const Texture> alpha;  ///< as `light`; null: opaque
+  LayerUnits units = LayerUnits::pixel;
+  LayerBeyond beyond = LayerBeyond::nothing;
+  LayerMotion motion;
+};
+
+/// Layers drawn straight onto the sensor, without a camera in three dimensions.
+struct SpriteScene {
+  std::vector<Sprite> sprites;  ///< the nearest first
+  float background = 0.2F;      ///< irradiance where no layer is
+};
+
+/// Shows the scene on a sensor of the camera's size; pose, twist and lens do not matter. With c_i the share of the
+/// pixel that layer i covers, P_i and a_i its light and its alpha, averaged over the pixel's footprint:
+///     E = sum_i T_i c_i P_i + T_end background,   T_i = product of (1 - c_j a_j) over the layers j in front of i.
+/// c_i is the area of the pixel on the inner side of the image's edges: exact where one of them crosses the pixel, the
+/// product of two such areas at a corner.
+/// V is the velocity of that point of a layer which lies under the pixel's centre, of the layer with the largest
+/// T_i c_i a_i; zero where the background has more than any. Z is +inf: layers have an order, but no distance.
+std::unique_ptr<Renderer> make_sprites_renderer(SpriteScene scene, const Camera& camera, const Workers& workers);
+
+}  // namespace esim

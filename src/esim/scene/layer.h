@@ -1,0 +1,69 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "esim/core/time.h"
+
+namespace esim {
+
+/// What positions and scales of a layer are measured in.
+enum class LayerUnits {
+  pixel,   ///< pixels; at scale 1 a texel is as large as a pixel
+  sensor,  ///< fractions of the sensor's width and height; at scale 1 the image fills the sensor
+};
+
+/// What is seen of a layer beyond its image's edges.
+enum class LayerBeyond { nothing, clamp, mirror, repeat };
+
+/// How a layer moves from one keyframe to the next.
+enum class KeyframeInterpolation {
+  spline,  ///< natural cubic splines of position, rotation and scale: continuous velocity and acceleration
+  linear,  ///< constant rates of position, rotation and scale
+};
+
+/// How a layer lies on the sensor at one time.
+struct LayerKeyframe {
+  double t_s = 0;
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();  ///< of the layer's centre from the sensor's, right and down
+  double rotation_deg = 0;                             ///< about the layer's centre, clockwise on the screen
+  Eigen::Vector2d scale = Eigen::Vector2d::Ones();     ///< along the image's rows and columns, before the rotation
+};
+
+/// Motion through keyframes. Before the first and after the last one the layer rests.
+class LayerMotion {
+ public:
+  /// Position (2), rotation in radians, scale (2).
+  using Parameters = Eigen::Matrix<double, 5, 1>;
+  struct State {
+    Parameters value;
+    Parameters rate;  ///< per second
+  };
+
+  /// Throws UserError unless there is at least one keyframe and their times increase.
+  LayerMotion(const std::vector<LayerKeyframe>& keyframes, KeyframeInterpolation interpolation);
+
+  State at(TimeNs t) const;
+
+ private:
+  std::vector<double> t_s_;
+  std::vector<Parameters> values_;
+  std::vector<Parameters> accelerations_;  // second derivatives at the keyframes, per s^2
+};
+
+/// An affine map from an image to the sensor, and how it changes:
+///     pixel = centre + A (uv - 1/2),   with (u, v) on [0, 1] x [0, 1] in the image.
+struct LayerPlacement {
+  Eigen::Matrix2d A, A_rate;
+  Eigen::Vector2d centre, centre_velocity;  ///< px, px/s
+};
+
+struct PixelSize {
+  int width = 0, height = 0;
+};
+
+/// Where a layer is. With U = 1 and I = diag(image's size) in units of pixels, U = diag(sensor's size) and I = 1 in
+/// units of the sensor:   A = U R(rotation) diag(scale) I,   centre = the sensor's centre + U position.
+LayerPlacement place(const LayerMotion::State& state, LayerUnits units, PixelSize image, PixelSize sensor);
+
+}  // namespace esim

@@ -37,7 +37,7 @@ void plane(benchmark::State& state) {
 void mesh_file(benchmark::State& state, const std::filesystem::path& file, const Eigen::Vector3d& position) {
   if (!std::filesystem::exists(file)) return state.SkipWithError("the scene is not there");
   const Workers workers(static_cast<int>(state.range(0)));
-  const auto scene = build_raycast_scene(load_mesh(file, [](const std::string&) {}));
+  const auto scene = build_raycast_scene(still_scene(load_mesh(file, [](const std::string&) {})));
   Kinematics camera = test::moving_camera();
   camera.T_world_body.translation = position;
   render_frames(state, *make_raycast_renderer(scene, {}, kCamera, workers), camera);

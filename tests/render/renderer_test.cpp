@@ -217,7 +217,8 @@ TEST(RaycastRenderer, MoreRaysPerPixelSmoothEdges) {
   mesh.materials = {{"black", nullptr, 0.0F}};
   const Camera model = test::distorted_camera(0);
   const auto values = [&](int rays) {
-    const auto renderer = make_raycast_renderer(build_raycast_scene(mesh), {1.0F, rays}, model, test::two_threads());
+    const auto renderer =
+        make_raycast_renderer(build_raycast_scene(still_scene(mesh)), {1.0F, rays}, model, test::two_threads());
     const Sample sample = test::render(*renderer, model, Kinematics{});
     int between = 0;
     double mean = 0;

@@ -37,7 +37,7 @@ inline std::shared_ptr<const Texture> smooth_texture(Wrap wrap_u, Wrap wrap_v) {
 /// A box of 8 x 6 x 4 m around the origin, seen from inside, each face textured.
 inline Mesh box_mesh() {
   Mesh mesh;
-  mesh.materials.push_back({"wall", smooth_texture(Wrap::repeat, Wrap::repeat), 0.5F});
+  mesh.materials.push_back({"wall", smooth_texture(Wrap::repeat, Wrap::repeat), 1.0F});
   const Eigen::Vector3f half(4, 3, 2);
   for (int axis = 0; axis < 3; ++axis) {
     for (const float side : {-1.0F, 1.0F}) {
@@ -77,7 +77,7 @@ inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Ca
                                                const Workers& workers = two_threads()) {
   if (name == "panorama") return make_panorama_renderer({smooth_texture(Wrap::repeat, Wrap::clamp)}, camera, workers);
   if (name == "plane") return make_plane_renderer(test_poster(), camera, workers);
-  return make_raycast_renderer(build_raycast_scene(box_mesh()), {}, camera, workers);
+  return make_raycast_renderer(build_raycast_scene(still_scene(box_mesh())), {}, camera, workers);
 }
 
 /// A camera with strong distortion of each kind, 120 x 90.

@@ -21,17 +21,20 @@ std::vector<Tile> cut_into_bands(const std::vector<Tile>& tiles) {
 
 }  // namespace
 
-void render_in_bands(const RenderRequest& request, const PixelRays& rays, const Workers& workers, Sample& sample,
-                     const std::function<void(const Tile& band)>& shade) {
-  sample.resize(rays.x.width(), rays.x.height());
+void prepare(const RenderRequest& request, int width, int height, Sample& sample) {
+  sample.resize(width, height, !request.objects.empty());
   sample.t = request.t;
   sample.tiles = request.tiles;
+}
 
+void render_in_bands(const RenderRequest& request, const PixelRays& rays, const Workers& workers, Sample& sample,
+                     const std::function<void(const Tile& band)>& shade) {
+  prepare(request, rays.x.width(), rays.x.height(), sample);
   const std::vector<Tile> bands = cut_into_bands(request.tiles);
   workers.for_each(static_cast<int>(bands.size()), [&](int i) {
     const Tile& band = bands[static_cast<std::size_t>(i)];
     shade(band);
-    motion_field(rays, request.camera, band, sample);
+    motion_field(rays, request, band, sample);
   });
 }
 

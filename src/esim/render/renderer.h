@@ -15,6 +15,8 @@ struct RenderRequest {
   TimeNs t = 0;
   Kinematics camera;        ///< pose and twist of the camera frame (x right, y down, z forward) at t
   std::vector<Tile> tiles;  ///< disjoint, inside the image, at least one
+  std::vector<Kinematics>
+      objects{};  ///< pose T_world_object and twist of each moving object at t, in the scene's order
 };
 
 /// The smallest thing that a renderer can evaluate at its proper cost.
@@ -35,7 +37,8 @@ class Renderer {
 
   virtual RendererTraits traits() const = 0;
 
-  /// Fills E, Z and V of the request's tiles in `sample`, which is resized to the camera's image.
+  /// Fills E, Z and V of the request's tiles in `sample`, which is resized to the camera's image. The request names as
+  /// many objects as move in the scene.
   virtual void render(const RenderRequest& request, Sample& sample) = 0;
 };
 

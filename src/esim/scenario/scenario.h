@@ -14,36 +14,7 @@
 
 namespace esim {
 
-// --- renderers ---------------------------------------------------------------------------------------------------
-
-/// Triangles, ray cast.
-struct MeshRendererOptions {
-  static constexpr const char* kType = "mesh";
-  std::filesystem::path scene;
-  int samples_per_pixel = 1;
-  double background = 0.2;
-};
-
-/// An equirectangular image at infinity.
-struct PanoramaRendererOptions {
-  static constexpr const char* kType = "panorama";
-  std::filesystem::path image;
-  Eigen::Vector4d orientation = {0, 0, 0, 1};
-};
-
-/// A textured rectangle.
-struct PlaneRendererOptions {
-  static constexpr const char* kType = "plane";
-  std::filesystem::path image;
-  double width_m = 1.0;
-  PoseOptions pose;
-  bool endless = false;
-  double background = 0.2;
-};
-
-using RendererOptions = std::variant<MeshRendererOptions, PanoramaRendererOptions, PlaneRendererOptions>;
-
-// --- trajectories of the body ------------------------------------------------------------------------------------
+// --- trajectories of the body and of objects -----------------------------------------------------------------------
 
 struct FileTrajectoryOptions {
   static constexpr const char* kType = "file";
@@ -69,6 +40,71 @@ struct StaticTrajectoryOptions {
 };
 
 using TrajectoryOptions = std::variant<FileTrajectoryOptions, RandomTrajectoryOptions, StaticTrajectoryOptions>;
+
+// --- renderers ---------------------------------------------------------------------------------------------------
+
+/// A thing in the scene that moves.
+struct ObjectOptions {
+  std::string name;
+  std::filesystem::path scene;
+  double scale = 1.0;
+  TrajectoryOptions trajectory;
+};
+
+struct SunOptions {
+  Eigen::Vector3d direction = {0, 0, -1};
+  double strength = 1.0;
+};
+
+struct PointLightOptions {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  double strength = 1.0;
+};
+
+/// Surfaces show their base colour, in whatever light.
+struct UnlitOptions {
+  static constexpr const char* kType = "unlit";
+};
+
+/// Diffuse surfaces under lights.
+struct LambertOptions {
+  static constexpr const char* kType = "lambert";
+  double ambient = 0.3;
+  std::vector<SunOptions> suns;
+  std::vector<PointLightOptions> points;
+  bool shadows = false;
+};
+
+using LightingOptions = std::variant<UnlitOptions, LambertOptions>;
+
+/// Triangles, ray cast.
+struct MeshRendererOptions {
+  static constexpr const char* kType = "mesh";
+  std::filesystem::path scene;
+  std::vector<ObjectOptions> objects;
+  LightingOptions lighting;
+  int samples_per_pixel = 1;
+  double background = 0.2;
+};
+
+/// An equirectangular image at infinity.
+struct PanoramaRendererOptions {
+  static constexpr const char* kType = "panorama";
+  std::filesystem::path image;
+  Eigen::Vector4d orientation = {0, 0, 0, 1};
+};
+
+/// A textured rectangle.
+struct PlaneRendererOptions {
+  static constexpr const char* kType = "plane";
+  std::filesystem::path image;
+  double width_m = 1.0;
+  PoseOptions pose;
+  bool endless = false;
+  double background = 0.2;
+};
+
+using RendererOptions = std::variant<MeshRendererOptions, PanoramaRendererOptions, PlaneRendererOptions>;
 
 // --- cameras -----------------------------------------------------------------------------------------------------
 

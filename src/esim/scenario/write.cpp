@@ -52,6 +52,13 @@ class YamlWriter {
   }
 
   template <typename T>
+  void write(const std::vector<T>& values) {
+    out_ << YAML::BeginSeq;
+    for (const T& value : values) write(value);
+    out_ << YAML::EndSeq;
+  }
+
+  template <typename T>
   void write(const std::optional<T>& value) {
     write(*value);
   }
@@ -133,6 +140,10 @@ class ReferenceWriter {
     return fmt::format(" {} ({})", kEnumNames<T>[static_cast<std::size_t>(value)], names);
   }
   template <typename T>
+  static std::string default_of(const std::vector<T>&) {
+    return " []";
+  }
+  template <typename T>
   requires std::is_class_v<T>
   static std::string default_of(const T&) { return ""; }
   template <typename... T>
@@ -152,6 +163,11 @@ class ReferenceWriter {
   void nested(T& options) {
     ReferenceWriter inner(out_, depth_ + 1);
     describe(inner, options);
+  }
+  template <typename T>
+  void nested(std::vector<T>&) {
+    T entry;
+    nested(entry);
   }
   template <typename... T>
   void nested(std::variant<T...>&) {

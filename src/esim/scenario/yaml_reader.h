@@ -79,6 +79,13 @@ class YamlReader {
   }
 
   template <typename T>
+  void read(const YAML::Node& node, const std::string& key, std::vector<T>& values, const About& about) {
+    if (!node.IsSequence()) fail(source_, node, key, "must be a list");
+    values.resize(node.size());
+    for (std::size_t i = 0; i < node.size(); ++i) read(node[i], key + "." + std::to_string(i), values[i], about);
+  }
+
+  template <typename T>
   requires std::is_enum_v<T>
   void read(const YAML::Node& node, const std::string& key, T& value, const About&) {
     value = static_cast<T>(index_of_name(node, key, {kEnumNames<T>.begin(), kEnumNames<T>.end()}));

@@ -179,7 +179,7 @@ class RaycastRenderer final : public Renderer {
       if (surface.texture != nullptr) {
         radiance = surface.texture->template sample<K>(at);
       } else {
-        radiance.fill(surface.radiance);
+        radiance.fill(surface.base);
       }
       for (unsigned i = 0; i < K; ++i) {
         if ((todo >> i & 1U) == 0 || triangles.material[i] != current) continue;

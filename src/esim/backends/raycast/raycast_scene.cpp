@@ -43,7 +43,11 @@ void throw_on_error(RTCDevice device, const char* what) {
 
 }  // namespace
 
-RaycastScene::RaycastScene(const Mesh& mesh) : materials_(mesh.materials) {
+RaycastScene::RaycastScene(const Scene& scene) {
+  if (scene.objects.size() != 1 || scene.objects[0].moves || scene.lighting)
+    throw UserError("mesh: moving objects and light are not there yet");
+  const Mesh& mesh = scene.objects[0].mesh;
+  materials_ = mesh.materials;
   device_ = rtcNewDevice(nullptr);
   if (device_ == nullptr) throw_on_error(nullptr, "start");
   if (rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0) packet_size_ = 8;
@@ -78,8 +82,8 @@ RaycastScene::~RaycastScene() {
   if (device_ != nullptr) rtcReleaseDevice(device_);
 }
 
-std::shared_ptr<const RaycastScene> build_raycast_scene(const Mesh& mesh) {
-  return std::make_shared<const RaycastScene>(mesh);
+std::shared_ptr<const RaycastScene> build_raycast_scene(const Scene& scene) {
+  return std::make_shared<const RaycastScene>(scene);
 }
 
 }  // namespace esim

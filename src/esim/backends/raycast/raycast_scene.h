@@ -18,7 +18,7 @@ struct TriangleShading {
 
 class RaycastScene {
  public:
-  explicit RaycastScene(const Mesh& mesh);
+  explicit RaycastScene(const Scene& scene);
   ~RaycastScene();
   RaycastScene(const RaycastScene&) = delete;
   RaycastScene& operator=(const RaycastScene&) = delete;

@@ -3,7 +3,9 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 
+#include "generated_room.h"
 #include "render/scenes.h"
 
 namespace esim {
@@ -11,15 +13,30 @@ namespace {
 
 const Camera kCamera = Camera::from_fov(346, 260, 75.0 * std::numbers::pi / 180.0);
 
-void render_frames(benchmark::State& state, Renderer& renderer, const Kinematics& start) {
+/// The whole image for n = 1; every n-th of its tiles of 32 x 20 pixels otherwise.
+std::vector<Tile> every_nth_tile(int n) {
+  if (n == 1) return {{0, 0, kCamera.width, kCamera.height}};
+  std::vector<Tile> tiles;
+  int i = 0;
+  for (int y = 0; y < kCamera.height; y += 20) {
+    for (int x = 0; x < kCamera.width; x += 32) {
+      if (i++ % n == 0) tiles.push_back({x, y, std::min(32, kCamera.width - x), std::min(20, kCamera.height - y)});
+    }
+  }
+  return tiles;
+}
+
+void render_frames(benchmark::State& state, Renderer& renderer, const Kinematics& start,
+                   const std::vector<Tile>& tiles = every_nth_tile(1)) {
   Kinematics camera = start;
   Sample sample;
   for (auto _ : state) {
     camera.T_world_body.translation.y() += 1e-4;
-    renderer.render({0, camera, {{0, 0, kCamera.width, kCamera.height}}}, sample);
+    renderer.render({0, camera, tiles}, sample);
     benchmark::DoNotOptimize(sample.irradiance.data());
   }
-  const double pixels = static_cast<double>(state.iterations()) * kCamera.width * kCamera.height;
+  double pixels = 0;
+  for (const Tile& tile : tiles) pixels += static_cast<double>(tile.area() * state.iterations());
   state.counters["ns/px"] =
       benchmark::Counter(pixels * 1e-9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
@@ -53,10 +70,28 @@ void flying_room(benchmark::State& state) {
             {-2.5, 0.0, -0.5});
 }
 
+/// Arguments: threads, triangles in thousands, tiles (every how manieth of 32 x 20 pixels).
+void generated_room(benchmark::State& state) {
+  const Workers workers(static_cast<int>(state.range(0)));
+  static std::map<std::int64_t, std::shared_ptr<const RaycastScene>> scenes;  // built once each
+  auto& scene = scenes[state.range(1)];
+  if (scene == nullptr)
+    scene = build_raycast_scene(still_scene(bench::generated_room(static_cast<int>(1000 * state.range(1)))));
+  const auto renderer = make_raycast_renderer(scene, {}, kCamera, workers);
+  render_frames(state, *renderer, test::moving_camera(), every_nth_tile(static_cast<int>(state.range(2))));
+}
+
 BENCHMARK(panorama)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(plane)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(room)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(flying_room)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+BENCHMARK(generated_room)
+    ->ArgNames({"threads", "thousands", "nth_tile"})
+    ->ArgsProduct({{1, 2}, {10, 127, 1000}, {1}})
+    ->Args({1, 127, 10})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace esim

@@ -57,6 +57,7 @@ inline Mesh generated_room(int triangles) {
   // Half of the triangles on six walls, half on twelve balls.
   const int wall = std::max(1, static_cast<int>(std::lround(std::sqrt(triangles / 24.0))));
   const int ball = std::max(4, static_cast<int>(std::lround(std::sqrt(triangles / 96.0))));
+  constexpr float kPi = std::numbers::pi_v<float>;
   const Eigen::Vector3f half(4, 3, 2);
   for (int axis = 0; axis < 3; ++axis) {
     for (const float side : {-1.0F, 1.0F}) {
@@ -64,12 +65,11 @@ inline Mesh generated_room(int triangles) {
         Eigen::Vector3f p;
         const int a = (axis + 1) % 3, b = (axis + 2) % 3;
         p[a] = (2 * s - 1) * half[a], p[b] = (2 * t - 1) * half[b];
-        p[axis] = side * (half[axis] + 0.03F * std::sin(9 * p[a]) * std::sin(7 * p[b]));
+        p[axis] = side * (half[axis] + 0.03F * std::sin(12 * kPi * s) * std::sin(8 * kPi * t));
         return p;
       });
     }
   }
-  constexpr float kPi = std::numbers::pi_v<float>;
   for (int i = 0; i < 12; ++i) {
     const float angle = static_cast<float>(i) * kPi / 6;
     const Eigen::Vector3f centre(2.6F * std::cos(angle), 2.0F * std::sin(angle), 0.9F * std::sin(5 * angle));

@@ -9,12 +9,13 @@ namespace {
 
 constexpr int kBandRows = 8;
 
+/// Bands end at multiples of kBandRows, wherever the tile begins: renderers may work in small blocks.
 std::vector<Tile> cut_into_bands(const std::vector<Tile>& tiles) {
   std::vector<Tile> bands;
   for (const Tile& tile : tiles) {
-    for (int y = 0; y < tile.height; y += kBandRows) {
-      bands.push_back({tile.x, tile.y + y, tile.width, std::min(kBandRows, tile.height - y)});
-    }
+    const int end = tile.y + tile.height;
+    for (int y = tile.y; y < end; y += bands.back().height)
+      bands.push_back({tile.x, y, tile.width, std::min(kBandRows - y % kBandRows, end - y)});
   }
   return bands;
 }

@@ -144,11 +144,11 @@ auto Texture::grid(D d, const std::int32_t* level) const {
       hn::GatherIndex(di, level_offset_.data(), index), hn::GatherIndex(di, level_stride_.data(), index)};
 }
 
-/// The coordinate within the image, where that does not depend on the level.
+/// The coordinate within the image, on [0, 1] whatever it was: what is no number becomes 0.
 template <class D, class V>
 V Texture::wrapped(D d, V coordinate, Wrap wrap) {
   namespace hn = hwy::HWY_NAMESPACE;
-  if (wrap == Wrap::repeat) return hn::Sub(coordinate, hn::Floor(coordinate));
+  if (wrap == Wrap::repeat) coordinate = hn::Sub(coordinate, hn::Floor(coordinate));
   return hn::Min(hn::Max(coordinate, hn::Zero(d)), hn::Set(d, 1.0F));
 }
 
@@ -160,7 +160,7 @@ V Texture::bilinear(D d, V u, V v, const Grid<V, I>& on) const {
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0F), half = hn::Set(d, 0.5F);
 
   // Texel centres are at half-integers of the level's grid. `first` is the one before the coordinate; the one after it
-  // follows in memory, also at the end. (The last bound matters for coordinates that are no numbers.)
+  // follows in memory, also at the end.
   const auto locate = [&](V unit, V size, Wrap wrap, V& first, V& fraction) {
     const V last = hn::Sub(size, one);
     V x = hn::MulSub(unit, size, half);
@@ -168,7 +168,6 @@ V Texture::bilinear(D d, V u, V v, const Grid<V, I>& on) const {
     first = hn::Floor(x);
     fraction = hn::Sub(x, first);
     first = hn::IfThenElse(hn::Lt(first, zero), last, first);
-    first = hn::Max(hn::Min(first, last), zero);
   };
   V x, y, fx, fy;
   locate(u, on.width, wrap_u_, x, fx);

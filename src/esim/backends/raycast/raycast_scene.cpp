@@ -11,13 +11,13 @@
 namespace esim {
 namespace {
 
-TriangleShading shading_of(const Mesh& mesh, std::size_t index) {
+TriangleShading shading_of(const Mesh& mesh, std::size_t index, std::uint32_t first_material) {
   const auto& [uv0, uv1, uv2] = mesh.texture_uv[index];
   TriangleShading shading{};
   shading.u0 = uv0.x(), shading.v0 = uv0.y();
   shading.u1 = uv1.x() - uv0.x(), shading.v1 = uv1.y() - uv0.y();
   shading.u2 = uv2.x() - uv0.x(), shading.v2 = uv2.y() - uv0.y();
-  shading.material = mesh.material[index];
+  shading.material = first_material + mesh.material[index];
 
   // The plane's dual basis gives barycentric coordinates per metre; a degenerate triangle is never hit.
   const auto& corner = mesh.triangles[index];
@@ -41,45 +41,110 @@ void throw_on_error(RTCDevice device, const char* what) {
                                                     : ": error code " + std::to_string(error)));
 }
 
-}  // namespace
+/// Builds the scene's tree on one thread, so that it is the same in every run. (The device's own limit on threads would
+/// hold for the whole process.)
+void commit(RTCScene scene) {
+  tbb::task_arena(1).execute([scene] { rtcJoinCommitScene(scene); });
+}
 
-RaycastScene::RaycastScene(const Scene& scene) {
-  if (scene.objects.size() != 1 || scene.objects[0].moves || scene.lighting)
-    throw UserError("mesh: moving objects and light are not there yet");
-  const Mesh& mesh = scene.objects[0].mesh;
-  materials_ = mesh.materials;
-  device_ = rtcNewDevice(nullptr);
-  if (device_ == nullptr) throw_on_error(nullptr, "start");
-  if (rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0) packet_size_ = 8;
-  if (rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0) packet_size_ = 16;
-
+void attach(RTCDevice device, RTCScene scene, const Mesh& mesh) {
   // Embree wants its buffers padded: it allocates them, and we copy.
-  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                            sizeof(Eigen::Vector3f), mesh.vertices.size());
   void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                             sizeof(mesh.triangles[0]), mesh.triangles.size());
-  throw_on_error(device_, "hold the mesh");
+  throw_on_error(device, "hold the mesh");
   std::memcpy(vertices, mesh.vertices.data(), mesh.vertices.size() * sizeof(Eigen::Vector3f));
   std::memcpy(triangles, mesh.triangles.data(), mesh.triangles.size() * sizeof(mesh.triangles[0]));
   rtcCommitGeometry(geometry);
-
-  scene_ = rtcNewScene(device_);
-  rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
-  rtcAttachGeometry(scene_, geometry);
+  rtcAttachGeometry(scene, geometry);
   rtcReleaseGeometry(geometry);
-  // One thread builds the tree, so that it is the same in every run. (The device's own limit on threads would hold for
-  // the whole process.)
-  tbb::task_arena(1).execute([this] { rtcJoinCommitScene(scene_); });
-  throw_on_error(device_, "build the scene");
-
-  triangles_.reserve(mesh.triangles.size());
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) triangles_.push_back(shading_of(mesh, i));
 }
 
-RaycastScene::~RaycastScene() {
-  if (scene_ != nullptr) rtcReleaseScene(scene_);
-  if (device_ != nullptr) rtcReleaseDevice(device_);
+/// All of them as one, so that a triangle's index is enough to find it. Materials stay each mesh's own.
+Mesh joined(const std::vector<const Mesh*>& meshes) {
+  Mesh all;
+  for (const Mesh* mesh : meshes) {
+    const auto first = static_cast<std::uint32_t>(all.vertices.size());
+    all.vertices.insert(all.vertices.end(), mesh->vertices.begin(), mesh->vertices.end());
+    for (const auto& [a, b, c] : mesh->triangles) all.triangles.push_back({first + a, first + b, first + c});
+  }
+  return all;
+}
+
+}  // namespace
+
+RaycastScene::RaycastScene(const Scene& scene) : lighting_(scene.lighting) {
+  device_.reset(rtcNewDevice("hugepages=1"));
+  if (device_ == nullptr) throw_on_error(nullptr, "start");
+  if (rtcGetDeviceProperty(device_.get(), RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0) packet_size_ = 8;
+  if (rtcGetDeviceProperty(device_.get(), RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0) packet_size_ = 16;
+
+  std::vector<const Mesh*> still;
+  for (const SceneObject& object : scene.objects) {
+    if (!object.moves) still.push_back(&object.mesh);
+  }
+  add_group(still);
+  for (const SceneObject& object : scene.objects) {
+    if (object.moves) add_group({&object.mesh});
+  }
+}
+
+void RaycastScene::add_group(const std::vector<const Mesh*>& meshes) {
+  Group& group = groups_.emplace_back();
+  group.first_triangle = static_cast<std::uint32_t>(triangles_.size());
+  for (const Mesh* mesh : meshes) append(*mesh);
+  if (triangles_.size() == group.first_triangle) return;
+  group.accelerator.reset(rtcNewScene(device_.get()));
+  rtcSetSceneFlags(group.accelerator.get(), RTC_SCENE_FLAG_ROBUST);
+  if (meshes.size() == 1) {
+    attach(device_.get(), group.accelerator.get(), *meshes[0]);
+  } else {
+    attach(device_.get(), group.accelerator.get(), joined(meshes));
+  }
+  commit(group.accelerator.get());
+  throw_on_error(device_.get(), "build the scene");
+}
+
+void RaycastScene::append(const Mesh& mesh) {
+  const auto first_material = static_cast<std::uint32_t>(materials_.size());
+  materials_.insert(materials_.end(), mesh.materials.begin(), mesh.materials.end());
+  const std::size_t first_triangle = triangles_.size();
+  triangles_.reserve(first_triangle + mesh.triangles.size());
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) triangles_.push_back(shading_of(mesh, i, first_material));
+
+  if (!lighting_ || mesh.normals.empty()) return;
+  const Eigen::Vector3f none = Eigen::Vector3f::Zero();
+  corner_normals_.resize(first_triangle, {none, none, none});  // of the flat ones before
+  for (const auto& [a, b, c] : mesh.triangles)
+    corner_normals_.push_back({mesh.normals[a], mesh.normals[b], mesh.normals[c]});
+}
+
+ScenePointer RaycastScene::place(std::span<const Kinematics> objects) const {
+  if (objects.size() != moving()) {
+    throw InternalError("a request names " + std::to_string(objects.size()) + " moving objects of a scene that has " +
+                        std::to_string(moving()));
+  }
+  if (objects.empty()) return nullptr;
+  ScenePointer placed(rtcNewScene(device_.get()));
+  rtcSetSceneFlags(placed.get(), RTC_SCENE_FLAG_ROBUST);
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const RTCScene accelerator = groups_[i + 1].accelerator.get();
+    if (accelerator == nullptr) continue;
+    const SE3& T_world_object = objects[i].T_world_body;
+    Eigen::Matrix<float, 3, 4> transform;  // column-major, as Eigen stores it
+    transform << T_world_object.rotation.toRotationMatrix().cast<float>(), T_world_object.translation.cast<float>();
+    RTCGeometry instance = rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE);
+    rtcSetGeometryInstancedScene(instance, accelerator);
+    rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, transform.data());
+    rtcCommitGeometry(instance);
+    rtcAttachGeometryByID(placed.get(), instance, static_cast<unsigned>(i));
+    rtcReleaseGeometry(instance);
+  }
+  commit(placed.get());
+  throw_on_error(device_.get(), "place the moving objects");
+  return placed;
 }
 
 std::shared_ptr<const RaycastScene> build_raycast_scene(const Scene& scene) {

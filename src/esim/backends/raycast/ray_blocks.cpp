@@ -1,0 +1,24 @@
+#include "esim/backends/raycast/ray_blocks.h"
+
+#include <algorithm>
+
+namespace esim {
+
+RayBlocks::RayBlocks(const PixelRays& rays) {
+  constexpr int kSide = RayBlock::kSide;
+  const int width = rays.x.width(), height = rays.x.height();
+  columns_ = (width + kSide - 1) / kSide;
+  for (int y = 0; y < height; y += kSide) {
+    for (int x = 0; x < width; x += kSide) {
+      RayBlock& block = blocks_.emplace_back();
+      for (int i = 0; i < RayBlock::kPixels; ++i) {
+        const int column = std::min(x + i % kSide, width - 1), row = std::min(y + i / kSide, height - 1);
+        block.x[i] = rays.x(column, row), block.y[i] = rays.y(column, row);
+        block.dx_du[i] = rays.dx_du(column, row), block.dx_dv[i] = rays.dx_dv(column, row);
+        block.dy_du[i] = rays.dy_du(column, row), block.dy_dv[i] = rays.dy_dv(column, row);
+      }
+    }
+  }
+}
+
+}  // namespace esim

@@ -65,6 +65,8 @@ void append(Mesh& mesh, const aiMesh& part, const std::filesystem::path& path) {
     if (!is_finite(v))
       throw UserError(fmt::format("mesh {}: a vertex of {} is not finite", path.string(), part.mName.C_Str()));
     mesh.vertices.emplace_back(v.x, v.y, v.z);
+    const aiVector3D n = part.HasNormals() && is_finite(part.mNormals[i]) ? part.mNormals[i] : aiVector3D();
+    mesh.normals.emplace_back(n.x, n.y, n.z);
   }
   for (unsigned f = 0; f < part.mNumFaces; ++f) {
     const aiFace& face = part.mFaces[f];

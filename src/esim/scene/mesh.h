@@ -27,7 +27,7 @@ struct Material {
 /// Textured triangles, in metres.
 struct Mesh {
   std::vector<Eigen::Vector3f> vertices;
-  std::vector<Eigen::Vector3f> normals;                    ///< per vertex, for shading only; empty: flat triangles
+  std::vector<Eigen::Vector3f> normals;                    ///< per vertex, for light only; none, or of no length: flat
   std::vector<std::array<std::uint32_t, 3>> triangles;     ///< indices of vertices
   std::vector<std::array<Eigen::Vector2f, 3>> texture_uv;  ///< per triangle and corner; u right, v down
   std::vector<std::uint32_t> material;                     ///< per triangle: index of materials

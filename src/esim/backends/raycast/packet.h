@@ -41,6 +41,7 @@ std::uint32_t lanes_equal(const std::uint32_t* values, std::uint32_t value) {
 /// A ray of each of K neighbouring pixels, and what they hit.
 template <int K>
 struct Packet {
+  using Ray = std::conditional_t<K == 16, RTCRay16, std::conditional_t<K == 8, RTCRay8, RTCRay4>>;
   using RayHit = std::conditional_t<K == 16, RTCRayHit16, std::conditional_t<K == 8, RTCRayHit8, RTCRayHit4>>;
 
   alignas(64) std::array<float, K> bearing_x, bearing_y;  // in the camera frame; z = 1
@@ -50,8 +51,9 @@ struct Packet {
   /// As bearings have z = 1 in the camera, the ray's parameter is the planar depth.
   void aim(const RayBlock& block, int first, const View& view, const Eigen::Vector2f& offset);
 
-  /// Finds the nearest surface that each ray hits, if it is nearer than what it has hit already.
-  void intersect(RTCScene scene);
+  /// Finds the nearest surface that each ray hits, if it is nearer than what it has hit already. Most packets should
+  /// meet the scene in whole for `flags` to say that they are coherent.
+  void intersect(RTCScene scene, RTCIntersectContextFlags flags);
 
   /// Which group of a RaycastScene a lane has hit; only where it has hit something.
   unsigned group(unsigned lane) const { return ray.hit.instID[0][lane] + 1; }  // RTC_INVALID_GEOMETRY_ID + 1 is 0
@@ -69,13 +71,6 @@ inline constexpr auto kAllLanes = [] {
   lanes.valid.fill(-1);
   return lanes;
 }();
-
-inline RTCIntersectContext coherent_rays() {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  return context;
-}
 
 template <int K>
 void Packet<K>::aim(const RayBlock& block, int first, const View& view, const Eigen::Vector2f& offset) {
@@ -111,8 +106,10 @@ void Packet<K>::aim(const RayBlock& block, int first, const View& view, const Ei
 }
 
 template <int K>
-void Packet<K>::intersect(RTCScene scene) {
-  RTCIntersectContext context = coherent_rays();
+void Packet<K>::intersect(RTCScene scene, RTCIntersectContextFlags flags) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = flags;
   const int* const valid = kAllLanes<K>.valid.data();
   if constexpr (K == 16) rtcIntersect16(valid, scene, &context, &ray);
   if constexpr (K == 8) rtcIntersect8(valid, scene, &context, &ray);

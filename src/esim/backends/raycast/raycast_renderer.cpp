@@ -5,9 +5,7 @@
 #include <span>
 #include <string>
 
-#include "esim/backends/raycast/packet.h"
-#include "esim/backends/raycast/raycast_scene.h"
-#include "esim/backends/raycast/surface.h"
+#include "esim/backends/raycast/lights.h"
 #include "esim/core/error.h"
 #include "esim/render/bands.h"
 
@@ -32,6 +30,7 @@ struct Moment {
   View view;
   ScenePointer moving;                          // null if nothing moves
   std::vector<Eigen::Matrix3f> R_camera_group;  // of every group of the scene
+  std::optional<Lighting> lighting;             // in the camera frame
 };
 
 Moment moment_of(const RaycastScene& scene, const RenderRequest& request) {
@@ -45,6 +44,7 @@ Moment moment_of(const RaycastScene& scene, const RenderRequest& request) {
     const Eigen::Quaterniond R_camera_object = R_world_camera.conjugate() * object.T_world_body.rotation;
     moment.R_camera_group.push_back(R_camera_object.toRotationMatrix().cast<float>());
   }
+  if (scene.lighting()) moment.lighting = in_camera_frame(*scene.lighting(), moment.view);
   return moment;
 }
 
@@ -141,7 +141,7 @@ class RaycastRenderer final : public Renderer {
       }
       GroupRotations<K> rotations;
       for (Work<K>& work : batch) locate(moment, rotations, work);
-      for (Work<K>& work : batch) shade(work);
+      for (Work<K>& work : batch) shade(moment, rotations, work);
     }
     const float mean = 1.0F / static_cast<float>(offsets_.size());
     for (Work<K>& work : batch) {
@@ -153,8 +153,8 @@ class RaycastRenderer final : public Renderer {
   template <int K>
   void trace(const Moment& moment, const Eigen::Vector2f& offset, Work<K>& work) const {
     work.packet.aim(*work.block, work.first, moment.view, offset);
-    if (scene_->still() != nullptr) work.packet.intersect(scene_->still());
-    if (moment.moving != nullptr) work.packet.intersect(moment.moving.get());
+    if (scene_->still() != nullptr) work.packet.intersect(scene_->still(), RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+    if (moment.moving != nullptr) work.packet.intersect(moment.moving.get(), RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
     work.hits = work.packet.hits();
     if (work.hits == 0) return;
     for (unsigned i = 0; i < K; ++i) work.triangle[i] = (work.hits >> i & 1U) != 0 ? work.packet.ray.hit.primID[i] : 0;
@@ -184,9 +184,18 @@ class RaycastRenderer final : public Renderer {
   }
 
   template <int K>
-  void shade(Work<K>& work) const {
+  void shade(const Moment& moment, GroupRotations<K>& rotations, Work<K>& work) const {
     SurfaceColours<K> colours;
     colours.look_up(*scene_, work.material, work.at, work.hits);
+    const std::uint32_t lit = moment.lighting ? work.hits & ~colours.unlit : 0;
+    if (lit != 0) {
+      rotations.select(work.packet, moment.R_camera_group);
+      SurfacePoints<K> surface;
+      surface.take(*scene_, work.packet, work.triangle, rotations);
+      const LightOnSurfaces<K> light(*moment.lighting, moment.view, scene_->still(), moment.moving.get());
+      const std::array<float, K> received = light.at(surface, lit);
+      for (unsigned i = 0; i < K; ++i) colours.base[i] *= (lit >> i & 1U) != 0 ? received[i] : 1.0F;
+    }
     for (unsigned i = 0; i < K; ++i)
       work.sum[i] += (work.hits >> i & 1U) != 0 ? colours.base[i] + colours.emission[i] : background_;
   }

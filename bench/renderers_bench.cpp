@@ -27,12 +27,12 @@ std::vector<Tile> every_nth_tile(int n) {
 }
 
 void render_frames(benchmark::State& state, Renderer& renderer, const Kinematics& start,
-                   const std::vector<Tile>& tiles = every_nth_tile(1)) {
+                   const std::vector<Tile>& tiles = every_nth_tile(1), const std::vector<Kinematics>& objects = {}) {
   Kinematics camera = start;
   Sample sample;
   for (auto _ : state) {
     camera.T_world_body.translation.y() += 1e-4;
-    renderer.render({0, camera, tiles}, sample);
+    renderer.render({0, camera, tiles, objects}, sample);
     benchmark::DoNotOptimize(sample.irradiance.data());
   }
   double pixels = 0;
@@ -70,6 +70,19 @@ void flying_room(benchmark::State& state) {
             {-2.5, 0.0, -0.5});
 }
 
+/// Arguments: threads, how many boxes move before the camera.
+void moving_objects(benchmark::State& state) {
+  const Workers workers(static_cast<int>(state.range(0)));
+  Scene scene = test::moving_scene();
+  scene.objects.resize(static_cast<std::size_t>(1 + state.range(1)), scene.objects.back());
+  std::vector<Kinematics> objects = test::moving_objects(0);
+  objects.resize(static_cast<std::size_t>(state.range(1)), objects[0]);
+  for (std::size_t i = 2; i < objects.size(); ++i)
+    objects[i].T_world_body.translation.z() += 0.1 * static_cast<double>(i);
+  const auto renderer = make_raycast_renderer(build_raycast_scene(scene), {}, kCamera, workers);
+  render_frames(state, *renderer, test::moving_camera(), every_nth_tile(1), objects);
+}
+
 /// Arguments: threads, triangles in thousands, tiles (every how manieth of 32 x 20 pixels).
 void generated_room(benchmark::State& state) {
   const Workers workers(static_cast<int>(state.range(0)));
@@ -86,6 +99,11 @@ BENCHMARK(plane)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(room)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(flying_room)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 
+BENCHMARK(moving_objects)
+    ->ArgNames({"threads", "objects"})
+    ->ArgsProduct({{1, 2}, {0, 1, 10}})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK(generated_room)
     ->ArgNames({"threads", "thousands", "nth_tile"})
     ->ArgsProduct({{1, 2}, {10, 127, 1000}, {1}})

@@ -7,12 +7,10 @@
 /// Light on the surfaces that a packet of rays has hit. All vectors are in the camera frame unless they say otherwise.
 namespace esim {
 
-/// A scene's lighting as one camera sees it.
-inline Lighting in_camera_frame(const Lighting& world, const View& view) {
-  Lighting lighting = world;
-  const Eigen::Matrix3f R_camera_world = view.R_world_camera.transpose();
-  for (SunLight& sun : lighting.suns) sun.direction = R_camera_world * sun.direction.normalized();
-  for (PointLight& point : lighting.points) point.position = R_camera_world * (point.position - view.origin);
+/// A scene's lighting as one camera sees it; `world` is the group of what stands still.
+inline Lighting in_camera_frame(Lighting lighting, const PlacedGroup& world) {
+  for (SunLight& sun : lighting.suns) sun.direction = world.R_camera_group * sun.direction.normalized();
+  for (PointLight& point : lighting.points) point.position = world.R_camera_group * (point.position - world.camera);
   return lighting;
 }
 
@@ -79,9 +77,9 @@ struct SurfacePoints {
 template <int K>
 class LightOnSurfaces {
  public:
-  /// `lighting` is in the camera frame; null for the moving triangles if nothing moves.
-  LightOnSurfaces(const Lighting& lighting, const View& view, RTCScene still, RTCScene moving)
-      : lighting_(lighting), view_(view), still_(still), moving_(moving) {}
+  /// `lighting` is in the camera frame.
+  LightOnSurfaces(const Lighting& lighting, const std::vector<PlacedGroup>& groups)
+      : lighting_(lighting), groups_(groups) {}
 
   std::array<float, K> at(const SurfacePoints<K>& surface, std::uint32_t hits) const {
     std::array<float, K> light;
@@ -129,20 +127,33 @@ class LightOnSurfaces {
   /// Those of `lanes` from whose points nothing stands before the light, up to `reach` times the vector to it.
   std::uint32_t visible(const SurfacePoints<K>& surface, const VectorLanes<K>& to_light, float reach,
                         std::uint32_t lanes) const {
-    if (lanes == 0) return 0;
-    const Eigen::Matrix3f& R = view_.R_world_camera;
+    // A little above the surface, by more than what rounding may have put the point below it.
+    VectorLanes<K> start;
+    const float to_origin = groups_[0].camera.template lpNorm<1>();
+    for (unsigned i = 0; i < K; ++i) {
+      const float x = surface.point.x[i], y = surface.point.y[i], z = surface.point.z[i];
+      const float gap = 2e-5F * (std::fabs(x) + std::fabs(y) + std::fabs(z) + to_origin);
+      start.x[i] = x + gap * surface.triangle_normal.x[i];
+      start.y[i] = y + gap * surface.triangle_normal.y[i];
+      start.z[i] = z + gap * surface.triangle_normal.z[i];
+    }
+    for (const PlacedGroup& group : groups_) {
+      if (lanes != 0 && group.triangles != nullptr) lanes &= ~occluded(group, start, to_light, reach, lanes);
+    }
+    return lanes;
+  }
+
+  /// Those of `lanes` whose rays meet a triangle of the group.
+  static std::uint32_t occluded(const PlacedGroup& group, const VectorLanes<K>& start, const VectorLanes<K>& to_light,
+                                float reach, std::uint32_t lanes) {
+    const Eigen::Matrix3f& R = group.R_group_camera;
     typename Packet<K>::Ray ray;
     alignas(64) std::array<int, K> wanted;
     for (unsigned i = 0; i < K; ++i) {
-      Eigen::Vector3f origin = Eigen::Vector3f::Zero(), direction = Eigen::Vector3f::UnitZ();
       wanted[i] = (lanes >> i & 1U) != 0 ? -1 : 0;
+      Eigen::Vector3f origin = Eigen::Vector3f::Zero(), direction = Eigen::Vector3f::UnitZ();
       if (wanted[i] != 0) {  // other lanes may hold what is no number
-        const Eigen::Vector3f point(surface.point.x[i], surface.point.y[i], surface.point.z[i]);
-        const Eigen::Vector3f up(surface.triangle_normal.x[i], surface.triangle_normal.y[i],
-                                 surface.triangle_normal.z[i]);
-        // A little above the surface, by more than what rounding may have put the point below it.
-        const float gap = 2e-5F * (point.template lpNorm<1>() + view_.origin.template lpNorm<1>());
-        origin = view_.origin + R * (point + gap * up);
+        origin = group.camera + R * Eigen::Vector3f(start.x[i], start.y[i], start.z[i]);
         direction = R * Eigen::Vector3f(to_light.x[i], to_light.y[i], to_light.z[i]);
       }
       ray.org_x[i] = origin.x(), ray.org_y[i] = origin.y(), ray.org_z[i] = origin.z();
@@ -150,26 +161,19 @@ class LightOnSurfaces {
       ray.tnear[i] = 0, ray.tfar[i] = reach, ray.time[i] = 0;
       ray.mask[i] = ~0U, ray.id[i] = 0, ray.flags[i] = 0;
     }
-    if (still_ != nullptr) occluded(wanted.data(), still_, ray);
-    if (moving_ != nullptr) occluded(wanted.data(), moving_, ray);
-    for (unsigned i = 0; i < K; ++i) {
-      if (ray.tfar[i] < 0) lanes &= ~(1U << i);  // so Embree marks what it finds occluded
-    }
-    return lanes;
-  }
-
-  static void occluded(const int* wanted, RTCScene scene, typename Packet<K>::Ray& ray) {
     // Not as coherent rays: with those Embree 3.13 has been seen not to end.
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    if constexpr (K == 16) rtcOccluded16(wanted, scene, &context, &ray);
-    if constexpr (K == 8) rtcOccluded8(wanted, scene, &context, &ray);
-    if constexpr (K == 4) rtcOccluded4(wanted, scene, &context, &ray);
+    if constexpr (K == 16) rtcOccluded16(wanted.data(), group.triangles, &context, &ray);
+    if constexpr (K == 8) rtcOccluded8(wanted.data(), group.triangles, &context, &ray);
+    if constexpr (K == 4) rtcOccluded4(wanted.data(), group.triangles, &context, &ray);
+    std::uint32_t found = 0;
+    for (unsigned i = 0; i < K; ++i) found |= (ray.tfar[i] < 0 ? 1U : 0U) << i;  // so Embree marks them
+    return found;
   }
 
   const Lighting& lighting_;
-  const View& view_;
-  RTCScene still_, moving_;
+  const std::vector<PlacedGroup>& groups_;
 };
 
 }  // namespace esim

@@ -8,17 +8,11 @@
 #include <limits>
 #include <type_traits>
 
-#include "esim/backends/raycast/ray_blocks.h"
+#include "esim/backends/raycast/raycast_scene.h"
 
 namespace esim {
 
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-/// Where the camera is, for rays in single precision.
-struct View {
-  Eigen::Matrix3f R_world_camera;
-  Eigen::Vector3f origin;
-};
 
 /// A bit for each of K lanes.
 template <int K>
@@ -48,15 +42,15 @@ struct Packet {
   RayHit ray;
 
   /// One ray per pixel of the block from its lane `first` on, through the point at `offset` from the pixel's centre.
-  /// As bearings have z = 1 in the camera, the ray's parameter is the planar depth.
-  void aim(const RayBlock& block, int first, const View& view, const Eigen::Vector2f& offset);
+  /// Nothing is hit yet.
+  void aim(const RayBlock& block, int first, const Eigen::Vector2f& offset);
 
-  /// Finds the nearest surface that each ray hits, if it is nearer than what it has hit already. Most packets should
-  /// meet the scene in whole for `flags` to say that they are coherent.
-  void intersect(RTCScene scene, RTCIntersectContextFlags flags);
+  /// Finds the nearest triangle of the group that each ray hits, where it is nearer than what has been hit already. As
+  /// bearings have z = 1 in the camera, the ray's parameter is the planar depth.
+  void intersect(const PlacedGroup& placed, unsigned group);
 
-  /// Which group of a RaycastScene a lane has hit; only where it has hit something.
-  unsigned group(unsigned lane) const { return ray.hit.instID[0][lane] + 1; }  // RTC_INVALID_GEOMETRY_ID + 1 is 0
+  /// Which group of a RaycastScene a lane has hit; 0 if nothing.
+  unsigned group(unsigned lane) const { return ray.hit.instID[0][lane]; }
 
   /// A bit per lane that has hit something.
   std::uint32_t hits() const { return ~lanes_equal<K>(ray.hit.geomID, RTC_INVALID_GEOMETRY_ID) & kEveryLane<K>; }
@@ -73,26 +67,13 @@ inline constexpr auto kAllLanes = [] {
 }();
 
 template <int K>
-void Packet<K>::aim(const RayBlock& block, int first, const View& view, const Eigen::Vector2f& offset) {
+void Packet<K>::aim(const RayBlock& block, int first, const Eigen::Vector2f& offset) {
   constexpr float kNearest = 1e-3F;  // m; what touches the lens is not seen
-  const Eigen::Matrix3f& R = view.R_world_camera;
-  const float r00 = R(0, 0), r01 = R(0, 1), r02 = R(0, 2);
-  const float r10 = R(1, 0), r11 = R(1, 1), r12 = R(1, 2);
-  const float r20 = R(2, 0), r21 = R(2, 1), r22 = R(2, 2);
-  const float ox = view.origin.x(), oy = view.origin.y(), oz = view.origin.z();
   const float sx = offset.x(), sy = offset.y();
 #pragma omp simd
   for (int i = 0; i < K; ++i) {
-    const float bx = block.x[first + i] + block.dx_du[first + i] * sx + block.dx_dv[first + i] * sy;
-    const float by = block.y[first + i] + block.dy_du[first + i] * sx + block.dy_dv[first + i] * sy;
-    bearing_x[i] = bx;
-    bearing_y[i] = by;
-    ray.ray.dir_x[i] = r00 * bx + r01 * by + r02;
-    ray.ray.dir_y[i] = r10 * bx + r11 * by + r12;
-    ray.ray.dir_z[i] = r20 * bx + r21 * by + r22;
-    ray.ray.org_x[i] = ox;
-    ray.ray.org_y[i] = oy;
-    ray.ray.org_z[i] = oz;
+    bearing_x[i] = block.x[first + i] + block.dx_du[first + i] * sx + block.dx_dv[first + i] * sy;
+    bearing_y[i] = block.y[first + i] + block.dy_du[first + i] * sx + block.dy_dv[first + i] * sy;
     ray.ray.tnear[i] = kNearest;
     ray.ray.tfar[i] = kInfinity;
     ray.ray.time[i] = 0;
@@ -101,19 +82,35 @@ void Packet<K>::aim(const RayBlock& block, int first, const View& view, const Ei
     ray.ray.flags[i] = 0;
     ray.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     ray.hit.primID[i] = RTC_INVALID_GEOMETRY_ID;
-    ray.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    ray.hit.instID[0][i] = 0;
   }
 }
 
 template <int K>
-void Packet<K>::intersect(RTCScene scene, RTCIntersectContextFlags flags) {
+void Packet<K>::intersect(const PlacedGroup& placed, unsigned group) {
+  const Eigen::Matrix3f& R = placed.R_group_camera;
+  const float r00 = R(0, 0), r01 = R(0, 1), r02 = R(0, 2);
+  const float r10 = R(1, 0), r11 = R(1, 1), r12 = R(1, 2);
+  const float r20 = R(2, 0), r21 = R(2, 1), r22 = R(2, 2);
+  const float ox = placed.camera.x(), oy = placed.camera.y(), oz = placed.camera.z();
+#pragma omp simd
+  for (int i = 0; i < K; ++i) {
+    const float bx = bearing_x[i], by = bearing_y[i];
+    ray.ray.dir_x[i] = r00 * bx + r01 * by + r02;
+    ray.ray.dir_y[i] = r10 * bx + r11 * by + r12;
+    ray.ray.dir_z[i] = r20 * bx + r21 * by + r22;
+    ray.ray.org_x[i] = ox;
+    ray.ray.org_y[i] = oy;
+    ray.ray.org_z[i] = oz;
+  }
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  context.flags = flags;
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  context.instID[0] = group;  // Embree writes it into the hits
   const int* const valid = kAllLanes<K>.valid.data();
-  if constexpr (K == 16) rtcIntersect16(valid, scene, &context, &ray);
-  if constexpr (K == 8) rtcIntersect8(valid, scene, &context, &ray);
-  if constexpr (K == 4) rtcIntersect4(valid, scene, &context, &ray);
+  if constexpr (K == 16) rtcIntersect16(valid, placed.triangles, &context, &ray);
+  if constexpr (K == 8) rtcIntersect8(valid, placed.triangles, &context, &ray);
+  if constexpr (K == 4) rtcIntersect4(valid, placed.triangles, &context, &ray);
 }
 
 }  // namespace esim

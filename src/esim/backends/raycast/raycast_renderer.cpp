@@ -27,31 +27,15 @@ std::vector<Eigen::Vector2f> ray_offsets(int count) {
 
 /// The scene at one time, seen from one pose.
 struct Moment {
-  View view;
-  ScenePointer moving;                          // null if nothing moves
-  std::vector<Eigen::Matrix3f> R_camera_group;  // of every group of the scene
-  std::optional<Lighting> lighting;             // in the camera frame
+  std::vector<PlacedGroup> groups;
+  std::optional<Lighting> lighting;  // in the camera frame
 };
-
-Moment moment_of(const RaycastScene& scene, const RenderRequest& request) {
-  const Eigen::Quaterniond& R_world_camera = request.camera.T_world_body.rotation;
-  Moment moment;
-  moment.view = {R_world_camera.toRotationMatrix().cast<float>(),
-                 request.camera.T_world_body.translation.cast<float>()};
-  moment.moving = scene.place(request.objects);
-  moment.R_camera_group.push_back(moment.view.R_world_camera.transpose());
-  for (const Kinematics& object : request.objects) {
-    const Eigen::Quaterniond R_camera_object = R_world_camera.conjugate() * object.T_world_body.rotation;
-    moment.R_camera_group.push_back(R_camera_object.toRotationMatrix().cast<float>());
-  }
-  if (scene.lighting()) moment.lighting = in_camera_frame(*scene.lighting(), moment.view);
-  return moment;
-}
 
 /// K pixels on their way through the stages of rendering.
 template <int K>
 struct Work {
   const RayBlock* block;
+  const BearingBounds* bounds;
   int x, y, first;  // the block's corner, and the first of its lanes
   Packet<K> packet;
   std::uint32_t hits;                                 // a bit per lane
@@ -95,7 +79,8 @@ class RaycastRenderer final : public Renderer {
   }
 
   void render(const RenderRequest& request, Sample& sample) override {
-    const Moment moment = moment_of(*scene_, request);
+    Moment moment{scene_->place(request), scene_->lighting()};
+    if (moment.lighting) moment.lighting = in_camera_frame(*moment.lighting, moment.groups[0]);
     render_in_bands(request, rays_, workers_, sample, [&](const Tile& band) {
       switch (scene_->packet_size()) {
         case 16:
@@ -120,6 +105,7 @@ class RaycastRenderer final : public Renderer {
         for (int first = 0; first < RayBlock::kPixels; first += K) {
           Work<K>& work = batch[count++];
           work.block = &blocks_.at(x, y);
+          work.bounds = &blocks_.bounds(x, y);
           work.x = x, work.y = y, work.first = first;
           if (count < batch.size()) continue;
           render_batch<K>(moment, std::span(batch), band, sample);
@@ -152,13 +138,15 @@ class RaycastRenderer final : public Renderer {
 
   template <int K>
   void trace(const Moment& moment, const Eigen::Vector2f& offset, Work<K>& work) const {
-    work.packet.aim(*work.block, work.first, moment.view, offset);
-    if (scene_->still() != nullptr) work.packet.intersect(scene_->still(), RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
-    if (moment.moving != nullptr) work.packet.intersect(moment.moving.get(), RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
+    work.packet.aim(*work.block, work.first, offset);
+    for (unsigned group = 0; group < moment.groups.size(); ++group) {
+      const PlacedGroup& placed = moment.groups[group];
+      if (placed.triangles != nullptr && placed.bounds.overlap(*work.bounds)) work.packet.intersect(placed, group);
+    }
     work.hits = work.packet.hits();
     if (work.hits == 0) return;
     for (unsigned i = 0; i < K; ++i) work.triangle[i] = (work.hits >> i & 1U) != 0 ? work.packet.ray.hit.primID[i] : 0;
-    if (moment.moving != nullptr) {
+    if (moment.groups.size() > 1) {
       for (unsigned i = 0; i < K; ++i) work.triangle[i] += scene_->first_triangle(work.packet.group(i));
     }
     for (const std::uint32_t triangle : work.triangle) __builtin_prefetch(&scene_->triangle(triangle));
@@ -178,7 +166,7 @@ class RaycastRenderer final : public Renderer {
     if (work.hits == 0) return;
     HitTriangles<K> triangles;
     triangles.gather(*scene_, work.triangle);
-    rotations.select(work.packet, moment.R_camera_group);
+    rotations.select(work.packet, moment.groups);
     locate_on_textures<K>(work.packet, *work.block, work.first, footprint_, rotations, triangles, work.at);
     work.material = triangles.material;
   }
@@ -189,10 +177,10 @@ class RaycastRenderer final : public Renderer {
     colours.look_up(*scene_, work.material, work.at, work.hits);
     const std::uint32_t lit = moment.lighting ? work.hits & ~colours.unlit : 0;
     if (lit != 0) {
-      rotations.select(work.packet, moment.R_camera_group);
+      rotations.select(work.packet, moment.groups);
       SurfacePoints<K> surface;
       surface.take(*scene_, work.packet, work.triangle, rotations);
-      const LightOnSurfaces<K> light(*moment.lighting, moment.view, scene_->still(), moment.moving.get());
+      const LightOnSurfaces<K> light(*moment.lighting, moment.groups);
       const std::array<float, K> received = light.at(surface, lit);
       for (unsigned i = 0; i < K; ++i) colours.base[i] *= (lit >> i & 1U) != 0 ? received[i] : 1.0F;
     }

@@ -3,7 +3,9 @@
 #include <tbb/task_arena.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cstring>
+#include <limits>
 #include <string>
 
 #include "esim/core/error.h"
@@ -41,12 +43,6 @@ void throw_on_error(RTCDevice device, const char* what) {
                                                     : ": error code " + std::to_string(error)));
 }
 
-/// Builds the scene's tree on one thread, so that it is the same in every run. (The device's own limit on threads would
-/// hold for the whole process.)
-void commit(RTCScene scene) {
-  tbb::task_arena(1).execute([scene] { rtcJoinCommitScene(scene); });
-}
-
 void attach(RTCDevice device, RTCScene scene, const Mesh& mesh) {
   // Embree wants its buffers padded: it allocates them, and we copy.
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -73,6 +69,24 @@ Mesh joined(const std::vector<const Mesh*>& meshes) {
   return all;
 }
 
+/// The bearings under which a box may be seen: all of them, unless it is before the camera in whole.
+BearingBounds bounds_in_view(const Eigen::AlignedBox3f& box, const SE3& T_group_camera) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  constexpr float kRounding = 1e-4F;
+  BearingBounds bounds{kInfinity, -kInfinity, kInfinity, -kInfinity};
+  if (box.isEmpty()) return bounds;
+  const SE3 T_camera_group = T_group_camera.inverse();
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3f corner = box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(i));
+    const Eigen::Vector3f point = (T_camera_group * corner.cast<double>()).cast<float>();
+    if (!(point.z() > 0.01F)) return {-kInfinity, kInfinity, -kInfinity, kInfinity};
+    const float x = point.x() / point.z(), y = point.y() / point.z();
+    bounds.left = std::min(bounds.left, x - kRounding), bounds.right = std::max(bounds.right, x + kRounding);
+    bounds.top = std::min(bounds.top, y - kRounding), bounds.bottom = std::max(bounds.bottom, y + kRounding);
+  }
+  return bounds;
+}
+
 }  // namespace
 
 RaycastScene::RaycastScene(const Scene& scene) : lighting_(scene.lighting) {
@@ -94,7 +108,10 @@ RaycastScene::RaycastScene(const Scene& scene) : lighting_(scene.lighting) {
 void RaycastScene::add_group(const std::vector<const Mesh*>& meshes) {
   Group& group = groups_.emplace_back();
   group.first_triangle = static_cast<std::uint32_t>(triangles_.size());
-  for (const Mesh* mesh : meshes) append(*mesh);
+  for (const Mesh* mesh : meshes) {
+    append(*mesh);
+    for (const Eigen::Vector3f& vertex : mesh->vertices) group.bounds.extend(vertex);
+  }
   if (triangles_.size() == group.first_triangle) return;
   group.accelerator.reset(rtcNewScene(device_.get()));
   rtcSetSceneFlags(group.accelerator.get(), RTC_SCENE_FLAG_ROBUST);
@@ -103,7 +120,9 @@ void RaycastScene::add_group(const std::vector<const Mesh*>& meshes) {
   } else {
     attach(device_.get(), group.accelerator.get(), joined(meshes));
   }
-  commit(group.accelerator.get());
+  // One thread builds the tree, so that it is the same in every run. (The device's own limit on threads would hold for
+  // the whole process.)
+  tbb::task_arena(1).execute([&group] { rtcJoinCommitScene(group.accelerator.get()); });
   throw_on_error(device_.get(), "build the scene");
 }
 
@@ -121,29 +140,19 @@ void RaycastScene::append(const Mesh& mesh) {
     corner_normals_.push_back({mesh.normals[a], mesh.normals[b], mesh.normals[c]});
 }
 
-ScenePointer RaycastScene::place(std::span<const Kinematics> objects) const {
-  if (objects.size() != moving()) {
-    throw InternalError("a request names " + std::to_string(objects.size()) + " moving objects of a scene that has " +
-                        std::to_string(moving()));
+std::vector<PlacedGroup> RaycastScene::place(const RenderRequest& request) const {
+  if (request.objects.size() + 1 != groups_.size()) {
+    throw InternalError("a request names " + std::to_string(request.objects.size()) +
+                        " moving objects of a scene that has " + std::to_string(groups_.size() - 1));
   }
-  if (objects.empty()) return nullptr;
-  ScenePointer placed(rtcNewScene(device_.get()));
-  rtcSetSceneFlags(placed.get(), RTC_SCENE_FLAG_ROBUST);
-  for (std::size_t i = 0; i < objects.size(); ++i) {
-    const RTCScene accelerator = groups_[i + 1].accelerator.get();
-    if (accelerator == nullptr) continue;
-    const SE3& T_world_object = objects[i].T_world_body;
-    Eigen::Matrix<float, 3, 4> transform;  // column-major, as Eigen stores it
-    transform << T_world_object.rotation.toRotationMatrix().cast<float>(), T_world_object.translation.cast<float>();
-    RTCGeometry instance = rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE);
-    rtcSetGeometryInstancedScene(instance, accelerator);
-    rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, transform.data());
-    rtcCommitGeometry(instance);
-    rtcAttachGeometryByID(placed.get(), instance, static_cast<unsigned>(i));
-    rtcReleaseGeometry(instance);
+  std::vector<PlacedGroup> placed;
+  for (const Group& group : groups_) {
+    const SE3 T_world_group = placed.empty() ? SE3() : request.objects[placed.size() - 1].T_world_body;
+    const SE3 T_group_camera = T_world_group.inverse() * request.camera.T_world_body;
+    const Eigen::Matrix3f R_group_camera = T_group_camera.rotation.toRotationMatrix().cast<float>();
+    placed.push_back({group.accelerator.get(), R_group_camera, R_group_camera.transpose(),
+                      T_group_camera.translation.cast<float>(), bounds_in_view(group.bounds, T_group_camera)});
   }
-  commit(placed.get());
-  throw_on_error(device_.get(), "place the moving objects");
   return placed;
 }
 

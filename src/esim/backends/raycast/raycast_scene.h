@@ -2,13 +2,13 @@
 
 #include <embree3/rtcore.h>
 
+#include <Eigen/Geometry>
 #include <memory>
 #include <optional>
-#include <span>
 #include <vector>
 
+#include "esim/backends/raycast/ray_blocks.h"
 #include "esim/backends/raycast/raycast_renderer.h"
-#include "esim/motion/trajectory.h"
 
 namespace esim {
 
@@ -29,6 +29,14 @@ struct ReleaseScene {
 using DevicePointer = std::unique_ptr<RTCDeviceTy, ReleaseDevice>;
 using ScenePointer = std::unique_ptr<RTCSceneTy, ReleaseScene>;
 
+/// A rigid group of triangles, as a camera sees it at one time.
+struct PlacedGroup {
+  RTCScene triangles;  // in the group's frame; null if there are none
+  Eigen::Matrix3f R_group_camera, R_camera_group;
+  Eigen::Vector3f camera;  // where the camera is, in the group's frame
+  BearingBounds bounds;    // what is seen of the group lies in there
+};
+
 /// The triangles of a scene in groups that are rigid: all that stands still is group 0, the i-th moving object group
 /// i + 1. Immutable, so that any number of threads may use it at any times of the scene.
 class RaycastScene {
@@ -36,14 +44,9 @@ class RaycastScene {
   explicit RaycastScene(const Scene& scene);
 
   int packet_size() const { return packet_size_; }
-  std::size_t moving() const { return groups_.size() - 1; }
 
-  /// The triangles of group 0; null if there are none.
-  RTCScene still() const { return groups_[0].accelerator.get(); }
-
-  /// The moving objects at their places: instance i of the result is group i + 1. Null if nothing moves. Throws
-  /// InternalError if `objects` are not as many as move.
-  ScenePointer place(std::span<const Kinematics> objects) const;
+  /// The groups as a camera sees them. Throws InternalError if the request does not name as many objects as move.
+  std::vector<PlacedGroup> place(const RenderRequest& request) const;
 
   /// Where the triangles of a group begin among all.
   std::uint32_t first_triangle(unsigned group) const { return groups_[group].first_triangle; }
@@ -59,7 +62,8 @@ class RaycastScene {
  private:
   struct Group {
     std::uint32_t first_triangle;
-    ScenePointer accelerator;  // null for no triangles
+    ScenePointer accelerator;    // null for no triangles
+    Eigen::AlignedBox3f bounds;  // of its vertices
   };
 
   void add_group(const std::vector<const Mesh*>& meshes);

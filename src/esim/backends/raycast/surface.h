@@ -13,17 +13,16 @@ namespace esim {
 template <int K>
 class GroupRotations {
  public:
-  /// `R_camera_group` has one for every group of the scene.
-  void select(const Packet<K>& packet, const std::vector<Eigen::Matrix3f>& R_camera_group) {
+  void select(const Packet<K>& packet, const std::vector<PlacedGroup>& groups) {
     const unsigned first = packet.group(0);
-    if (lanes_equal<K>(packet.ray.hit.instID[0], first - 1) == kEveryLane<K>) {
+    if (lanes_equal<K>(packet.ray.hit.instID[0], first) == kEveryLane<K>) {
       if (first == selected_) return;
-      for (int e = 0; e < 9; ++e) element[e].fill(R_camera_group[first](e / 3, e % 3));
+      for (int e = 0; e < 9; ++e) element[e].fill(groups[first].R_camera_group(e / 3, e % 3));
       selected_ = first;
       return;
     }
     for (unsigned i = 0; i < K; ++i) {
-      for (int e = 0; e < 9; ++e) element[e][i] = R_camera_group[packet.group(i)](e / 3, e % 3);
+      for (int e = 0; e < 9; ++e) element[e][i] = groups[packet.group(i)].R_camera_group(e / 3, e % 3);
     }
     selected_ = kSeveral;
   }

@@ -226,7 +226,8 @@ TEST(Light, LeavesNoShadowOfASurfaceOnItself) {
     scene.lighting = Lighting{0, {}, {{Eigen::Vector3f::Zero(), radius * radius}}, true};
     Kinematics camera;
     camera.T_world_body.translation = {0.2 * radius, -0.1 * radius, -0.3 * radius};
-    for (const float value : render_scene(scene, {}, camera).irradiance.pixels()) ASSERT_NEAR(value, 1.0, 0.1);
+    const Sample sample = render_scene(scene, {}, camera);
+    for (const float value : sample.irradiance.pixels()) ASSERT_NEAR(value, 1.0, 0.1);
   }
 }
 

@@ -18,12 +18,17 @@ class EveryRenderer : public testing::TestWithParam<std::tuple<const char*, int>
     return std::string(std::get<0>(test.param)) + "_" + distortions[std::get<1>(test.param)];
   }
 
+  void SetUp() override {
+    if (name_.ends_with("gl") && !test::has_gl()) GTEST_SKIP() << "no OpenGL: libegl1, libgl1-mesa-dri";
+    renderer_ = test::make_renderer(name_, model_);
+  }
+
  protected:
   const Camera model_ = test::distorted_camera(std::get<1>(GetParam()));
   const std::string name_ = std::get<0>(GetParam());
   const Kinematics camera_ = test::moving_camera();
   const std::vector<Kinematics> objects_ = test::objects_of(name_);
-  std::unique_ptr<Renderer> renderer_ = test::make_renderer(name_, model_);
+  std::unique_ptr<Renderer> renderer_;
 
   /// Where the camera is `dt` seconds later if its twist stays as it is.
   Kinematics later(double dt) const {
@@ -121,7 +126,7 @@ TEST_P(EveryRenderer, DoesNotDependOnThreadsOrHistory) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Renderers, EveryRenderer,
-                         testing::Combine(testing::Values("panorama", "plane", "mesh", "moving_mesh"),
+                         testing::Combine(testing::Values("panorama", "plane", "mesh", "moving_mesh", "gl", "moving_gl"),
                                           testing::Values(0, 1, 2, 3)),
                          EveryRenderer::name);
 

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <string>
 
+#include "esim/backends/opengl/gl_renderer.h"
 #include "esim/backends/panorama/panorama_renderer.h"
 #include "esim/backends/plane/plane_renderer.h"
 #include "esim/backends/raycast/raycast_renderer.h"
@@ -125,18 +126,22 @@ inline std::vector<Kinematics> moving_objects(double t_s) {
   return {left, right};
 }
 
+/// False where this machine has no OpenGL.
+inline bool has_gl() { return !gl_devices().empty(); }
+
 /// Every renderer on a scene that fills the view from near the origin.
 inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Camera& camera,
                                                const Workers& workers = two_threads()) {
   if (name == "panorama") return make_panorama_renderer({smooth_texture(Wrap::repeat, Wrap::clamp)}, camera, workers);
   if (name == "plane") return make_plane_renderer(test_poster(), camera, workers);
-  const Scene scene = name == "moving_mesh" ? moving_scene() : still_scene(box_mesh());
+  const Scene scene = name.starts_with("moving") ? moving_scene() : still_scene(box_mesh());
+  if (name.ends_with("gl")) return make_gl_renderer(std::make_shared<Scene>(scene), {}, camera, workers);
   return make_raycast_renderer(build_raycast_scene(scene), {}, camera, workers);
 }
 
 /// What moves in that scene.
 inline std::vector<Kinematics> objects_of(const std::string& name, double t_s = 0) {
-  return name == "moving_mesh" ? moving_objects(t_s) : std::vector<Kinematics>();
+  return name.starts_with("moving") ? moving_objects(t_s) : std::vector<Kinematics>();
 }
 
 /// A camera with strong distortion of each kind, 120 x 90.

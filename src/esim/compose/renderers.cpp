@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "esim/backends/opengl/gl_renderer.h"
 #include "esim/backends/panorama/panorama_renderer.h"
 #include "esim/backends/plane/plane_renderer.h"
 #include "esim/backends/raycast/raycast_renderer.h"
@@ -47,7 +50,20 @@ Scene load_scene(const MeshRendererOptions& options, const Notices& notices) {
 
 // One overload per type of renderer: a new one is a line in RendererOptions and a function here.
 
+/// OpenGL where there is a graphics card for it.
+MeshEngine choose_engine(const MeshRendererOptions& options) {
+  if (options.engine != MeshEngine::automatic) return options.engine;
+  const std::vector<GlDevice> devices = gl_devices();
+  const bool hardware = std::any_of(devices.begin(), devices.end(), [](const GlDevice& d) { return !d.software; });
+  return hardware ? MeshEngine::gl : MeshEngine::raycast;
+}
+
 RendererFactory factory(const MeshRendererOptions& options, const Notices& notices) {
+  if (choose_engine(options) == MeshEngine::gl) {
+    const auto scene = std::make_shared<const Scene>(load_scene(options, notices));
+    const GlOptions gl{static_cast<float>(options.background), options.samples_per_pixel, options.gl_device};
+    return [=](const Camera& camera, const Workers& workers) { return make_gl_renderer(scene, gl, camera, workers); };
+  }
   const auto scene = build_raycast_scene(load_scene(options, notices));
   const RaycastOptions raycast{static_cast<float>(options.background), options.samples_per_pixel};
   return [=](const Camera& camera, const Workers& workers) {

@@ -26,6 +26,10 @@ struct RendererTraits {
   std::string name;                             ///< as in the scenario, for reports
   Granularity granularity = Granularity::tile;  ///< frame: asking for a tile costs as much as the whole image
   bool at_infinity = false;                     ///< everything that it shows is infinitely far away
+  std::string device{};                         ///< that it runs on, where that is not simply the processor
+
+  /// For people.
+  std::string label() const { return device.empty() ? name : name + " on " + device; }
 };
 
 /// Evaluates a scene as one camera sees it. A renderer is made for one camera and one scene, keeps no history, and

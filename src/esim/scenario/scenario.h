@@ -77,9 +77,14 @@ struct LambertOptions {
 
 using LightingOptions = std::variant<UnlitOptions, LambertOptions>;
 
-/// Triangles, ray cast.
+/// What draws triangles.
+enum class MeshEngine { raycast, gl, automatic };
+
+/// Triangles.
 struct MeshRendererOptions {
   static constexpr const char* kType = "mesh";
+  MeshEngine engine = MeshEngine::raycast;
+  std::optional<int> gl_device;
   std::filesystem::path scene;
   std::vector<ObjectOptions> objects;
   LightingOptions lighting;

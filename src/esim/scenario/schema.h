@@ -37,6 +37,10 @@ void describe(Visitor& visit, StaticTrajectoryOptions& o) {
 template <class Visitor>
 void describe(Visitor& visit, ObjectOptions& o) {
   visit("name", o.name, About{"for messages (default: object0, object1, ...)"});
+  visit("engine", o.engine,
+        About{"raycast (Embree), gl (OpenGL), or auto: gl where there is a graphics card, raycast otherwise"});
+  visit("gl_device", o.gl_device,
+        About{"which graphics device, from 0 (default: the first that is no software)", "", 0, 31});
   visit("scene", o.scene, About{"mesh file (OBJ with MTL), in the object's own coordinates"});
   visit("scale", o.scale, About{"factor that makes its coordinates metres", "", 0, 1e6, true});
   visit("trajectory", o.trajectory, About{"how it moves: pose of its coordinates in the world"});
@@ -166,6 +170,8 @@ void describe(Visitor& visit, Scenario& o) {
   visit("output", o.output, About{"what is written, and how"});
 }
 
+template <>
+inline constexpr std::array<const char*, 3> kEnumNames<MeshEngine>{"raycast", "gl", "auto"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<EventTimeUnit>{"us", "ns"};
 template <>

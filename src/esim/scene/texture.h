@@ -41,6 +41,9 @@ class Texture {
   int width() const { return static_cast<int>(level_width_[0]); }
   int height() const { return static_cast<int>(level_height_[0]); }
 
+  Wrap wrap_u() const { return wrap_u_; }
+  Wrap wrap_v() const { return wrap_v_; }
+
   /// The texels as they are kept, at full resolution.
   Image<float> texels() const;
 
@@ -139,7 +142,14 @@ auto Texture::grid(D d, const std::int32_t* level) const {
   namespace hn = hwy::HWY_NAMESPACE;
   const hn::RebindToSigned<D> di;
   const auto index = hn::Load(di, level);
-  return Grid<hn::Vec<D>, hn::Vec<decltype(di)>>{
+  using AnyGrid = Grid<hn::Vec<D>, hn::Vec<decltype(di)>>;
+  // Neighbouring pixels mostly look at the same level, and broadcasts are far cheaper than gathers.
+  if (hn::AllTrue(di, hn::Eq(index, hn::Set(di, level[0])))) {
+    const auto i = static_cast<std::size_t>(level[0]);
+    return AnyGrid{hn::Set(d, level_width_[i]), hn::Set(d, level_height_[i]), hn::Set(di, level_offset_[i]),
+                   hn::Set(di, level_stride_[i])};
+  }
+  return AnyGrid{
       hn::GatherIndex(d, level_width_.data(), index), hn::GatherIndex(d, level_height_.data(), index),
       hn::GatherIndex(di, level_offset_.data(), index), hn::GatherIndex(di, level_stride_.data(), index)};
 }

@@ -35,7 +35,7 @@ class Run {
     for (std::size_t i = 0; i < world.cameras.size(); ++i) {
       const CameraInfo& info = world.info.cameras[i];
       summary_.cameras.push_back(
-          {info.name, world.cameras[i].renderer->traits().name, info.model.width, info.model.height, {}, 0, 0, {}});
+          {info.name, world.cameras[i].renderer->traits().label(), info.model.width, info.model.height, {}, 0, 0, {}});
     }
   }
 

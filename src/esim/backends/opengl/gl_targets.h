@@ -1,0 +1,21 @@
+#pragma once
+
+#include <epoxy/gl.h>
+
+namespace esim {
+
+/// A framebuffer of E and 1 / Z (two floats) and the object (16 bits) per pixel, on textures. Ends with its context.
+/// Private to the renderer.
+struct GlTarget {
+  GLuint framebuffer = 0, seen = 0, which = 0;
+  int width = 0, height = 0;
+
+  /// With more than one sample per pixel, that many of the next number that the driver offers; `with_depth` for
+  /// drawing surfaces.
+  static GlTarget make(int width, int height, int samples, bool with_depth);
+};
+
+/// The largest number of samples per pixel that the driver offers for a target, not above `wanted`.
+int offered_samples(int wanted);
+
+}  // namespace esim

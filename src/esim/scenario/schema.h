@@ -37,10 +37,6 @@ void describe(Visitor& visit, StaticTrajectoryOptions& o) {
 template <class Visitor>
 void describe(Visitor& visit, ObjectOptions& o) {
   visit("name", o.name, About{"for messages (default: object0, object1, ...)"});
-  visit("engine", o.engine,
-        About{"raycast (Embree), gl (OpenGL), or auto: gl where there is a graphics card, raycast otherwise"});
-  visit("gl_device", o.gl_device,
-        About{"which graphics device, from 0 (default: the first that is no software)", "", 0, 31});
   visit("scene", o.scene, About{"mesh file (OBJ with MTL), in the object's own coordinates"});
   visit("scale", o.scale, About{"factor that makes its coordinates metres", "", 0, 1e6, true});
   visit("trajectory", o.trajectory, About{"how it moves: pose of its coordinates in the world"});
@@ -71,6 +67,10 @@ void describe(Visitor& visit, LambertOptions& o) {
 
 template <class Visitor>
 void describe(Visitor& visit, MeshRendererOptions& o) {
+  visit("engine", o.engine,
+        About{"raycast (Embree), gl (OpenGL), or auto: gl where there is a graphics card, raycast otherwise"});
+  visit("gl_device", o.gl_device,
+        About{"which graphics device, from 0 (default: the first that is no software)", "", 0, 31});
   visit("scene", o.scene, About{"mesh file (OBJ with MTL), world coordinates in metres"});
   visit("objects", o.objects, About{"things that move through it: a list of maps of"});
   visit("lighting", o.lighting, About{"unlit: surfaces are as bright as their texture, as baked scenes want it"});

@@ -94,6 +94,17 @@ void generated_room(benchmark::State& state) {
   render_frames(state, *renderer, test::moving_camera(), every_nth_tile(static_cast<int>(state.range(2))));
 }
 
+/// The same with OpenGL, whatever device there is. Arguments: triangles in thousands, tiles.
+void generated_room_gl(benchmark::State& state) {
+  if (!test::has_gl()) return state.SkipWithError("there is no OpenGL");
+  const Workers workers(2);
+  const auto scene =
+      std::make_shared<Scene>(still_scene(bench::generated_room(static_cast<int>(1000 * state.range(0)))));
+  const auto renderer = make_gl_renderer(scene, {}, kCamera, workers);
+  state.SetLabel(renderer->traits().device);
+  render_frames(state, *renderer, test::moving_camera(), every_nth_tile(static_cast<int>(state.range(1))));
+}
+
 BENCHMARK(panorama)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(plane)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(room)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
@@ -108,6 +119,13 @@ BENCHMARK(generated_room)
     ->ArgNames({"threads", "thousands", "nth_tile"})
     ->ArgsProduct({{1, 2}, {10, 127, 1000}, {1}})
     ->Args({1, 127, 10})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+
+BENCHMARK(generated_room_gl)
+    ->ArgNames({"thousands", "nth_tile"})
+    ->ArgsProduct({{10, 127, 1000}, {1}})
+    ->Args({127, 10})
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 

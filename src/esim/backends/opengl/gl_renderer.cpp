@@ -63,7 +63,8 @@ class GlRenderer final : public Renderer {
     {
       const GlContext::Use use(context_);
       set_up(request);
-      for (const Tile& tile : request.tiles) draw(request, tile);
+      draw_surfaces(request);
+      for (const Tile& tile : request.tiles) finish(tile);
       fetch(request, sample);
       throw_on_gl_error("rendering");
     }
@@ -120,12 +121,11 @@ class GlRenderer final : public Renderer {
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, kLightsBinding, lights_);
   }
 
-  void draw(const RenderRequest& request, const Tile& tile) {
-    const Tile part = view_.part_for(tile);
-    draw_surfaces(request, part);
+  /// The passes after the surfaces, for a tile.
+  void finish(const Tile& tile) {
     const GlTarget* shown = &surfaces_;
     if (samples_ > 1) {
-      begin_pass(resolved_, part, resolve_program_);
+      begin_pass(resolved_, view_.part_for(tile), resolve_program_);
       bind(resolve_program_, "seen_samples", 0, surfaces_.seen);
       bind(resolve_program_, "which_samples", 1, surfaces_.which);
       set(resolve_program_, "samples", samples_);
@@ -141,13 +141,26 @@ class GlRenderer final : public Renderer {
     draw_whole();
   }
 
-  void draw_surfaces(const RenderRequest& request, const Tile& part) {
-    begin_pass(surfaces_, part, surface_program_);
-    const GLfloat background[] = {options_.background, 0, 0, 0}, farthest = 0;
+  /// Draws the scene once, wherever the request's tiles are: a stencil keeps pixels between them from being shaded.
+  void draw_surfaces(const RenderRequest& request) {
+    const GLuint target = surfaces_.framebuffer;
+    const GLfloat background[] = {options_.background, 0, 0, 0};
     const GLuint none[] = {0, 0, 0, 0};
-    glClearNamedFramebufferfv(surfaces_.framebuffer, GL_COLOR, 0, background);
-    glClearNamedFramebufferuiv(surfaces_.framebuffer, GL_COLOR, 1, none);
-    glClearNamedFramebufferfv(surfaces_.framebuffer, GL_DEPTH, 0, &farthest);
+    const Tile all{0, 0, view_.width, view_.height};
+    begin_pass(surfaces_, all, surface_program_);
+    if (request.tiles.size() > 1) glClearNamedFramebufferfi(target, GL_DEPTH_STENCIL, 0, 0, 0);
+    for (const Tile& tile : request.tiles) {
+      const Tile part = view_.part_for(tile);
+      glScissor(part.x, part.y, part.width, part.height);
+      glClearNamedFramebufferfv(target, GL_COLOR, 0, background);
+      glClearNamedFramebufferuiv(target, GL_COLOR, 1, none);
+      glClearNamedFramebufferfi(target, GL_DEPTH_STENCIL, 0, 0, 1);
+    }
+    if (request.tiles.size() > 1) {
+      glScissor(all.x, all.y, all.width, all.height);
+      glEnable(GL_STENCIL_TEST);
+      glStencilFunc(GL_EQUAL, 1, 1);
+    }
     glEnable(GL_DEPTH_TEST);
     glBindVertexArray(scene_->vertices());
     const GLuint program = surface_program_;
@@ -164,6 +177,7 @@ class GlRenderer final : public Renderer {
       for (const GlScene::Part& surface : object.parts) draw_part(surface);
     }
     glDisable(GL_DEPTH_TEST);
+    glDisable(GL_STENCIL_TEST);
   }
 
   void draw_part(const GlScene::Part& part) const {

@@ -34,8 +34,8 @@ GlTarget GlTarget::make(int width, int height, int samples, bool with_depth) {
   glNamedFramebufferTexture(target.framebuffer, GL_COLOR_ATTACHMENT0, target.seen, 0);
   glNamedFramebufferTexture(target.framebuffer, GL_COLOR_ATTACHMENT1, target.which, 0);
   if (with_depth) {
-    const GLuint depth = make_texture(GL_DEPTH_COMPONENT32F, width, height, samples);
-    glNamedFramebufferTexture(target.framebuffer, GL_DEPTH_ATTACHMENT, depth, 0);
+    const GLuint depth = make_texture(GL_DEPTH32F_STENCIL8, width, height, samples);
+    glNamedFramebufferTexture(target.framebuffer, GL_DEPTH_STENCIL_ATTACHMENT, depth, 0);
   }
   constexpr GLenum kBuffers[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
   glNamedFramebufferDrawBuffers(target.framebuffer, 2, kBuffers);
@@ -47,7 +47,7 @@ GlTarget GlTarget::make(int width, int height, int samples, bool with_depth) {
 
 int offered_samples(int wanted) {
   int best = 1;
-  for (const GLenum format : {GL_RG32F, GL_R16UI, GL_DEPTH_COMPONENT32F}) {
+  for (const GLenum format : {GL_RG32F, GL_R16UI, GL_DEPTH32F_STENCIL8}) {
     GLint count = 0;
     glGetInternalformativ(GL_TEXTURE_2D_MULTISAMPLE, format, GL_NUM_SAMPLE_COUNTS, 1, &count);
     std::vector<GLint> offered(static_cast<std::size_t>(count));

@@ -10,8 +10,8 @@ struct GlTarget {
   GLuint framebuffer = 0, seen = 0, which = 0;
   int width = 0, height = 0;
 
-  /// With more than one sample per pixel, that many of the next number that the driver offers; `with_depth` for
-  /// drawing surfaces.
+  /// With more than one sample per pixel, that many of the next number that the driver offers; `with_depth` (and a
+  /// stencil) for drawing surfaces.
   static GlTarget make(int width, int height, int samples, bool with_depth);
 };
 

@@ -126,7 +126,8 @@ TEST_P(EveryRenderer, DoesNotDependOnThreadsOrHistory) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Renderers, EveryRenderer,
-                         testing::Combine(testing::Values("panorama", "plane", "mesh", "moving_mesh", "gl", "moving_gl"),
+                         testing::Combine(testing::Values("panorama", "plane", "mesh", "moving_mesh", "gl",
+                                                          "moving_gl"),
                                           testing::Values(0, 1, 2, 3)),
                          EveryRenderer::name);
 

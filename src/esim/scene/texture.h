@@ -149,9 +149,8 @@ auto Texture::grid(D d, const std::int32_t* level) const {
     return AnyGrid{hn::Set(d, level_width_[i]), hn::Set(d, level_height_[i]), hn::Set(di, level_offset_[i]),
                    hn::Set(di, level_stride_[i])};
   }
-  return AnyGrid{
-      hn::GatherIndex(d, level_width_.data(), index), hn::GatherIndex(d, level_height_.data(), index),
-      hn::GatherIndex(di, level_offset_.data(), index), hn::GatherIndex(di, level_stride_.data(), index)};
+  return AnyGrid{hn::GatherIndex(d, level_width_.data(), index), hn::GatherIndex(d, level_height_.data(), index),
+                 hn::GatherIndex(di, level_offset_.data(), index), hn::GatherIndex(di, level_stride_.data(), index)};
 }
 
 /// The coordinate within the image, on [0, 1] whatever it was: what is no number becomes 0.

@@ -78,7 +78,7 @@ uniform bool lit;
 uniform float ambient;
 uniform int light_count;
 uniform uint object;
-layout(location = 0) out vec2 seen;  // E, 1 / Z
+layout(location = 0) out vec4 seen;  // E, 1 / Z, and how that changes to the right and downwards
 layout(location = 1) out uint which;
 
 // Mean over the pixel's footprint, as Texture::sample() computes it: up to four probes along the footprint's longer side,
@@ -119,7 +119,8 @@ void main() {
   float colour = base * (has_base_texture ? mean_colour(base_texture) : 1.0);
   if (lit) colour *= light_on_surface();
   colour += emission * (has_emission_texture ? mean_colour(emission_texture) : 1.0);
-  seen = vec2(colour, gl_FragCoord.w);
+  float w = gl_FragCoord.w;
+  seen = vec4(colour, w, dFdx(w), dFdy(w));
   which = object;
 }
 )";
@@ -135,19 +136,19 @@ const char* const kResolveFragmentShader = R"(#version 450 core
 uniform sampler2DMS seen_samples;
 uniform usampler2DMS which_samples;
 uniform int samples;
-layout(location = 0) out vec2 seen;
+layout(location = 0) out vec4 seen;
 layout(location = 1) out uint which;
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   float sum = 0;
   for (int i = 0; i < samples; ++i) sum += texelFetch(seen_samples, pixel, i).r;
-  seen = vec2(sum / float(samples), texelFetch(seen_samples, pixel, 0).g);
+  seen = vec4(sum / float(samples), texelFetch(seen_samples, pixel, 0).gba);
   which = texelFetch(which_samples, pixel, 0).r;
 }
 )";
 
-// Where each pixel's centre and footprint lie in the pinhole image is tabulated. 1 / Z is linear on planes, so that its
-// interpolation is exact there; across edges the nearest pixel speaks.
+// Where each pixel's centre and footprint lie in the pinhole image is tabulated. 1 / Z is linear on planes, so that Z
+// is exact there.
 const char* const kDistortFragmentShader = R"(#version 450 core
 uniform sampler2D pinhole_seen;
 uniform usampler2D pinhole_which;
@@ -165,18 +166,6 @@ float irradiance(vec2 at) {
   return mix(upper, lower, f.y);
 }
 
-float inverse_depth(vec2 at, ivec2 nearest) {
-  ivec2 corner = ivec2(floor(at));
-  vec2 f = at - vec2(corner);
-  float w00 = texelFetch(pinhole_seen, corner, 0).g, w10 = texelFetch(pinhole_seen, corner + ivec2(1, 0), 0).g;
-  float w01 = texelFetch(pinhole_seen, corner + ivec2(0, 1), 0).g;
-  float w11 = texelFetch(pinhole_seen, corner + ivec2(1, 1), 0).g;
-  // On a plane the two diagonals have the same mean.
-  float bend = abs(w00 + w11 - w10 - w01);
-  bool smooth_there = bend <= 1e-3 * max(max(w00, w11), max(w10, w01));
-  return smooth_there ? mix(mix(w00, w10, f.x), mix(w01, w11, f.x), f.y) : texelFetch(pinhole_seen, nearest, 0).g;
-}
-
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec2 centre = texelFetch(centres, pixel, 0).rg;
@@ -185,7 +174,9 @@ void main() {
   float sum = irradiance(centre - right - down) + irradiance(centre + right - down) +
               irradiance(centre - right + down) + irradiance(centre + right + down);
   ivec2 nearest = ivec2(floor(centre + 0.5));
-  seen = vec2(0.25 * sum, inverse_depth(centre, nearest));
+  vec4 there = texelFetch(pinhole_seen, nearest, 0);
+  float inverse_depth = there.g + dot(there.ba, centre - vec2(nearest));
+  seen = vec2(0.25 * sum, max(inverse_depth, 0));
   which = texelFetch(pinhole_which, nearest, 0).r;
 }
 )";

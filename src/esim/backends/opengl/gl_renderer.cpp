@@ -38,14 +38,14 @@ class GlRenderer final : public Renderer {
     require_size();
     samples_ = offered_samples(options.samples_per_pixel);
     scene_.emplace(*scene);
-    surfaces_ = GlTarget::make(view_.width, view_.height, samples_, true);
+    surfaces_ = GlTarget::make(view_.width, view_.height, samples_, true, view_.distorts);
     surface_program_ = make_program(kSurfaceVertexShader, kSurfaceFragmentShader);
     if (samples_ > 1) {
-      resolved_ = GlTarget::make(view_.width, view_.height, 1, false);
+      resolved_ = GlTarget::make(view_.width, view_.height, 1, false, view_.distorts);
       resolve_program_ = make_program(kWholeImageVertexShader, kResolveFragmentShader);
     }
     if (view_.distorts) {
-      distorted_ = GlTarget::make(camera.width, camera.height, 1, false);
+      distorted_ = GlTarget::make(camera.width, camera.height, 1, false, false);
       distort_program_ = make_program(kWholeImageVertexShader, kDistortFragmentShader);
       upload_view();
     }

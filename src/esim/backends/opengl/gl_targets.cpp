@@ -25,10 +25,10 @@ GLuint make_texture(GLenum format, int width, int height, int samples) {
 
 }  // namespace
 
-GlTarget GlTarget::make(int width, int height, int samples, bool with_depth) {
+GlTarget GlTarget::make(int width, int height, int samples, bool with_depth, bool with_slopes) {
   GlTarget target;
   target.width = width, target.height = height;
-  target.seen = make_texture(GL_RG32F, width, height, samples);
+  target.seen = make_texture(with_slopes ? GL_RGBA32F : GL_RG32F, width, height, samples);
   target.which = make_texture(GL_R16UI, width, height, samples);
   glCreateFramebuffers(1, &target.framebuffer);
   glNamedFramebufferTexture(target.framebuffer, GL_COLOR_ATTACHMENT0, target.seen, 0);
@@ -47,7 +47,7 @@ GlTarget GlTarget::make(int width, int height, int samples, bool with_depth) {
 
 int offered_samples(int wanted) {
   int best = 1;
-  for (const GLenum format : {GL_RG32F, GL_R16UI, GL_DEPTH32F_STENCIL8}) {
+  for (const GLenum format : {GL_RGBA32F, GL_R16UI, GL_DEPTH32F_STENCIL8}) {
     GLint count = 0;
     glGetInternalformativ(GL_TEXTURE_2D_MULTISAMPLE, format, GL_NUM_SAMPLE_COUNTS, 1, &count);
     std::vector<GLint> offered(static_cast<std::size_t>(count));
@@ -56,7 +56,7 @@ int offered_samples(int wanted) {
     for (const GLint samples : offered) {
       if (samples <= wanted) here = std::max(here, samples);
     }
-    best = format == GL_RG32F ? here : std::min(best, here);
+    best = format == GL_RGBA32F ? here : std::min(best, here);
   }
   return best;
 }

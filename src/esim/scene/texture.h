@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "esim/core/fast_log.h"
 #include "esim/core/image.h"
 
 namespace esim {
@@ -63,8 +62,10 @@ class Texture {
   };
 
   std::uint16_t encode(float value) const;
-  template <class D>
-  auto grid(D d, const std::int32_t* level) const;
+  template <class D, class I>
+  auto grid(D d, I level) const;
+  template <class D, class V>
+  static V binary_logarithm(D d, V x);
   template <class D, class V, class I>
   V bilinear(D d, V u, V v, const Grid<V, I>& on) const;
   template <class D, class V>
@@ -84,6 +85,7 @@ std::array<float, K> Texture::sample(const TextureLookup<K>& at, std::uint32_t l
   const hn::CappedTag<float, K> d;
   using V = hn::Vec<decltype(d)>;
   constexpr std::size_t kVector = hn::MaxLanes(decltype(d)());
+  const hn::RebindToSigned<decltype(d)> di;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0F);
   const V w = hn::Set(d, level_width_[0]), h = hn::Set(d, level_height_[0]);
   alignas(64) std::array<float, K> result;
@@ -108,18 +110,13 @@ std::array<float, K> Texture::sample(const TextureLookup<K>& at, std::uint32_t l
     const V per_probe = hn::Div(one, probes);
 
     // The two levels on either side of the blur.
-    alignas(64) std::array<float, kVector> blur, fraction_of;
-    alignas(64) std::array<std::int32_t, kVector> finer, coarser;
-    hn::Store(hn::Max(hn::Max(hn::Mul(major, per_probe), minor), one), d, blur.data());
-    for (std::size_t lane = 0; lane < kVector; ++lane) {
-      const float lod = std::min(fast_log2(blur[lane]), static_cast<float>(levels_ - 1));
-      finer[lane] = static_cast<std::int32_t>(lod);
-      coarser[lane] = std::min(finer[lane] + 1, levels_ - 1);
-      fraction_of[lane] = lod - static_cast<float>(finer[lane]);
-    }
-    const V fraction = hn::Load(d, fraction_of.data());
+    const V blur = hn::Max(hn::Max(hn::Mul(major, per_probe), minor), one);
+    const V lod = hn::Min(binary_logarithm(d, blur), hn::Set(d, static_cast<float>(levels_ - 1)));
+    const auto finer = hn::ConvertTo(di, lod);
+    const auto coarser = hn::Min(hn::Add(finer, hn::Set(di, 1)), hn::Set(di, levels_ - 1));
+    const V fraction = hn::Sub(lod, hn::ConvertTo(d, finer));
     const bool blend = !hn::AllTrue(d, hn::Eq(fraction, zero));
-    const auto fine = grid(d, finer.data()), coarse = grid(d, coarser.data());
+    const auto fine = grid(d, finer), coarse = grid(d, coarser);
 
     const V step_u = hn::IfThenElse(along_x, du_dx, du_dy), step_v = hn::IfThenElse(along_x, dv_dx, dv_dy);
     const float most_probes = hn::GetLane(hn::MaxOfLanes(d, probes));
@@ -137,20 +134,36 @@ std::array<float, K> Texture::sample(const TextureLookup<K>& at, std::uint32_t l
   return result;
 }
 
-template <class D>
-auto Texture::grid(D d, const std::int32_t* level) const {
+/// fast_log2() of each lane.
+template <class D, class V>
+V Texture::binary_logarithm(D d, V x) {
   namespace hn = hwy::HWY_NAMESPACE;
   const hn::RebindToSigned<D> di;
-  const auto index = hn::Load(di, level);
-  using AnyGrid = Grid<hn::Vec<D>, hn::Vec<decltype(di)>>;
+  const auto bits = hn::BitCast(di, x);
+  const V exponent = hn::ConvertTo(d, hn::Sub(hn::ShiftRight<23>(bits), hn::Set(di, 127)));
+  const V mantissa = hn::BitCast(d, hn::Or(hn::And(bits, hn::Set(di, 0x007fffff)), hn::Set(di, 0x3f800000)));
+  const V m = hn::Sub(mantissa, hn::Set(d, 1.0F));
+  V q = hn::MulAdd(m, hn::Set(d, 0.02584142F), hn::Set(d, -0.0959564F));
+  q = hn::MulAdd(m, q, hn::Set(d, 0.18194884F));
+  q = hn::MulAdd(m, q, hn::Set(d, -0.2756003F));
+  q = hn::MulAdd(m, q, hn::Set(d, 0.44254494F));
+  return hn::Add(hn::Add(exponent, m), hn::Mul(hn::NegMulAdd(m, m, m), q));
+}
+
+template <class D, class I>
+auto Texture::grid(D d, I level) const {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::RebindToSigned<D> di;
+  using AnyGrid = Grid<hn::Vec<D>, I>;
   // Neighbouring pixels mostly look at the same level, and broadcasts are far cheaper than gathers.
-  if (hn::AllTrue(di, hn::Eq(index, hn::Set(di, level[0])))) {
-    const auto i = static_cast<std::size_t>(level[0]);
+  const std::int32_t first = hn::GetLane(level);
+  if (hn::AllTrue(di, hn::Eq(level, hn::Set(di, first)))) {
+    const auto i = static_cast<std::size_t>(first);
     return AnyGrid{hn::Set(d, level_width_[i]), hn::Set(d, level_height_[i]), hn::Set(di, level_offset_[i]),
                    hn::Set(di, level_stride_[i])};
   }
-  return AnyGrid{hn::GatherIndex(d, level_width_.data(), index), hn::GatherIndex(d, level_height_.data(), index),
-                 hn::GatherIndex(di, level_offset_.data(), index), hn::GatherIndex(di, level_stride_.data(), index)};
+  return AnyGrid{hn::GatherIndex(d, level_width_.data(), level), hn::GatherIndex(d, level_height_.data(), level),
+                 hn::GatherIndex(di, level_offset_.data(), level), hn::GatherIndex(di, level_stride_.data(), level)};
 }
 
 /// The coordinate within the image, on [0, 1] whatever it was: what is no number becomes 0.

@@ -37,11 +37,12 @@ PinholeView pinhole_view(const Camera& camera, const PixelRays& rays) {
     return view;
   }
 
-  const auto [left, right] = std::ranges::minmax(rays.x.pixels());
-  const auto [top, bottom] = std::ranges::minmax(rays.y.pixels());
+  float left = std::numeric_limits<float>::max(), top = left, right = -left, bottom = -left;
   double finest = std::numeric_limits<double>::infinity();
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
+      left = std::min(left, rays.x(x, y)), right = std::max(right, rays.x(x, y));
+      top = std::min(top, rays.y(x, y)), bottom = std::max(bottom, rays.y(x, y));
       finest =
           std::min(finest, smaller_stretch(rays.dx_du(x, y), rays.dx_dv(x, y), rays.dy_du(x, y), rays.dy_dv(x, y)));
     }

@@ -66,6 +66,8 @@ class Texture {
   auto grid(D d, I level) const;
   template <class D, class V>
   static V binary_logarithm(D d, V x);
+  template <class D, class V>
+  static auto to_integer(D d, V x);
   template <class D, class V, class I>
   V bilinear(D d, V u, V v, const Grid<V, I>& on) const;
   template <class D, class V>
@@ -101,6 +103,12 @@ std::array<float, K> Texture::sample(const TextureLookup<K>& at, std::uint32_t l
       return hn::MulAdd(a, a, hn::Mul(b, b));
     };
     const V x2 = squared_length(du_dx, dv_dx), y2 = squared_length(du_dy, dv_dy);
+    if (hn::AllTrue(d, hn::Le(hn::Max(x2, y2), one))) {
+      // Seen from close by: footprints within a texel, where the rest comes to the same.
+      const V u = wrapped(d, hn::Load(d, &at.u[i]), wrap_u_), v = wrapped(d, hn::Load(d, &at.v[i]), wrap_v_);
+      hn::Store(hn::Mul(bilinear(d, u, v, grid(d, hn::Zero(di))), hn::Set(d, scale_)), d, &result[i]);
+      continue;
+    }
     const auto along_x = hn::Ge(x2, y2);
     // The upper bound keeps a degenerate footprint (a pole, a horizon) finite.
     const V major = hn::Min(hn::Sqrt(hn::IfThenElse(along_x, x2, y2)), hn::Set(d, 1e6F));
@@ -112,7 +120,7 @@ std::array<float, K> Texture::sample(const TextureLookup<K>& at, std::uint32_t l
     // The two levels on either side of the blur.
     const V blur = hn::Max(hn::Max(hn::Mul(major, per_probe), minor), one);
     const V lod = hn::Min(binary_logarithm(d, blur), hn::Set(d, static_cast<float>(levels_ - 1)));
-    const auto finer = hn::ConvertTo(di, lod);
+    const auto finer = to_integer(d, hn::Floor(lod));
     const auto coarser = hn::Min(hn::Add(finer, hn::Set(di, 1)), hn::Set(di, levels_ - 1));
     const V fraction = hn::Sub(lod, hn::ConvertTo(d, finer));
     const bool blend = !hn::AllTrue(d, hn::Eq(fraction, zero));
@@ -132,6 +140,15 @@ std::array<float, K> Texture::sample(const TextureLookup<K>& at, std::uint32_t l
     hn::Store(hn::Mul(sum, hn::Set(d, scale_)), d, &result[i]);
   }
   return result;
+}
+
+/// Of whole numbers from 0 to 2^22: those are the last bits of what is 2^23 larger. A general conversion takes thrice
+/// as long.
+template <class D, class V>
+auto Texture::to_integer(D d, V x) {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::RebindToSigned<D> di;
+  return hn::And(hn::BitCast(di, hn::Add(x, hn::Set(d, 8388608.0F))), hn::Set(di, 0x007fffff));
 }
 
 /// fast_log2() of each lane.
@@ -177,7 +194,6 @@ V Texture::wrapped(D d, V coordinate, Wrap wrap) {
 template <class D, class V, class I>
 V Texture::bilinear(D d, V u, V v, const Grid<V, I>& on) const {
   namespace hn = hwy::HWY_NAMESPACE;
-  const hn::RebindToSigned<D> di;
   const hn::RebindToUnsigned<D> du;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0F), half = hn::Set(d, 0.5F);
 
@@ -194,8 +210,8 @@ V Texture::bilinear(D d, V u, V v, const Grid<V, I>& on) const {
   V x, y, fx, fy;
   locate(u, on.width, wrap_u_, x, fx);
   locate(v, on.height, wrap_v_, y, fy);
-  const I column = hn::ConvertTo(di, hn::Add(x, x));  // in bytes
-  const I upper_row = hn::Add(hn::Add(on.offset, column), hn::Mul(hn::ConvertTo(di, y), on.row_stride));
+  const I column = to_integer(d, hn::Add(x, x));  // in bytes
+  const I upper_row = hn::Add(hn::Add(on.offset, column), hn::Mul(to_integer(d, y), on.row_stride));
   const I lower_row = hn::Add(upper_row, on.row_stride);
 
   // Two neighbouring texels come in one word.

@@ -3,7 +3,9 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 
+#include "generated_room.h"
 #include "render/scenes.h"
 
 namespace esim {
@@ -11,15 +13,30 @@ namespace {
 
 const Camera kCamera = Camera::from_fov(346, 260, 75.0 * std::numbers::pi / 180.0);
 
-void render_frames(benchmark::State& state, Renderer& renderer, const Kinematics& start) {
+/// The whole image for n = 1; every n-th of its tiles of 32 x 20 pixels otherwise.
+std::vector<Tile> every_nth_tile(int n) {
+  if (n == 1) return {{0, 0, kCamera.width, kCamera.height}};
+  std::vector<Tile> tiles;
+  int i = 0;
+  for (int y = 0; y < kCamera.height; y += 20) {
+    for (int x = 0; x < kCamera.width; x += 32) {
+      if (i++ % n == 0) tiles.push_back({x, y, std::min(32, kCamera.width - x), std::min(20, kCamera.height - y)});
+    }
+  }
+  return tiles;
+}
+
+void render_frames(benchmark::State& state, Renderer& renderer, const Kinematics& start,
+                   const std::vector<Tile>& tiles = every_nth_tile(1), const std::vector<Kinematics>& objects = {}) {
   Kinematics camera = start;
   Sample sample;
   for (auto _ : state) {
     camera.T_world_body.translation.y() += 1e-4;
-    renderer.render({0, camera, {{0, 0, kCamera.width, kCamera.height}}}, sample);
+    renderer.render({0, camera, tiles, objects}, sample);
     benchmark::DoNotOptimize(sample.irradiance.data());
   }
-  const double pixels = static_cast<double>(state.iterations()) * kCamera.width * kCamera.height;
+  double pixels = 0;
+  for (const Tile& tile : tiles) pixels += static_cast<double>(tile.area() * state.iterations());
   state.counters["ns/px"] =
       benchmark::Counter(pixels * 1e-9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
@@ -51,7 +68,7 @@ void sprites(benchmark::State& state) {
 void mesh_file(benchmark::State& state, const std::filesystem::path& file, const Eigen::Vector3d& position) {
   if (!std::filesystem::exists(file)) return state.SkipWithError("the scene is not there");
   const Workers workers(static_cast<int>(state.range(0)));
-  const auto scene = build_raycast_scene(load_mesh(file, [](const std::string&) {}));
+  const auto scene = build_raycast_scene(still_scene(load_mesh(file, [](const std::string&) {})));
   Kinematics camera = test::moving_camera();
   camera.T_world_body.translation = position;
   render_frames(state, *make_raycast_renderer(scene, {}, kCamera, workers), camera);
@@ -67,11 +84,65 @@ void flying_room(benchmark::State& state) {
             {-2.5, 0.0, -0.5});
 }
 
+/// Arguments: threads, how many boxes move before the camera.
+void moving_objects(benchmark::State& state) {
+  const Workers workers(static_cast<int>(state.range(0)));
+  Scene scene = test::moving_scene();
+  scene.objects.resize(static_cast<std::size_t>(1 + state.range(1)), scene.objects.back());
+  std::vector<Kinematics> objects = test::moving_objects(0);
+  objects.resize(static_cast<std::size_t>(state.range(1)), objects[0]);
+  for (std::size_t i = 2; i < objects.size(); ++i)
+    objects[i].T_world_body.translation.z() += 0.1 * static_cast<double>(i);
+  const auto renderer = make_raycast_renderer(build_raycast_scene(scene), {}, kCamera, workers);
+  render_frames(state, *renderer, test::moving_camera(), every_nth_tile(1), objects);
+}
+
+/// Arguments: threads, triangles in thousands, tiles (every how manieth of 32 x 20 pixels).
+void generated_room(benchmark::State& state) {
+  const Workers workers(static_cast<int>(state.range(0)));
+  static std::map<std::int64_t, std::shared_ptr<const RaycastScene>> scenes;  // built once each
+  auto& scene = scenes[state.range(1)];
+  if (scene == nullptr)
+    scene = build_raycast_scene(still_scene(bench::generated_room(static_cast<int>(1000 * state.range(1)))));
+  const auto renderer = make_raycast_renderer(scene, {}, kCamera, workers);
+  render_frames(state, *renderer, test::moving_camera(), every_nth_tile(static_cast<int>(state.range(2))));
+}
+
+/// The same with OpenGL, whatever device there is. Arguments: triangles in thousands, tiles.
+void generated_room_gl(benchmark::State& state) {
+  if (!test::has_gl()) return state.SkipWithError("there is no OpenGL");
+  const Workers workers(2);
+  const auto scene =
+      std::make_shared<Scene>(still_scene(bench::generated_room(static_cast<int>(1000 * state.range(0)))));
+  const auto renderer = make_gl_renderer(scene, {}, kCamera, workers);
+  state.SetLabel(renderer->traits().device);
+  render_frames(state, *renderer, test::moving_camera(), every_nth_tile(static_cast<int>(state.range(1))));
+}
+
 BENCHMARK(panorama)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(plane)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(sprites)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(room)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(flying_room)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+BENCHMARK(moving_objects)
+    ->ArgNames({"threads", "objects"})
+    ->ArgsProduct({{1, 2}, {0, 1, 10}})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(generated_room)
+    ->ArgNames({"threads", "thousands", "nth_tile"})
+    ->ArgsProduct({{1, 2}, {10, 127, 1000}, {1}})
+    ->Args({1, 127, 10})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+
+BENCHMARK(generated_room_gl)
+    ->ArgNames({"thousands", "nth_tile"})
+    ->ArgsProduct({{10, 127, 1000}, {1}})
+    ->Args({127, 10})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace esim

@@ -16,7 +16,7 @@ int run(const std::string& file, const std::vector<std::string>& overrides) {
   for (std::size_t i = 0; i < world.cameras.size(); ++i) {
     const CameraInfo& camera = world.info.cameras[i];
     fmt::print("camera {}: {}x{} px, fx {:.2f}, fy {:.2f}, renderer {}, {} sampling\n", camera.name, camera.model.width,
-               camera.model.height, camera.model.fx, camera.model.fy, world.cameras[i].renderer->traits().name,
+               camera.model.height, camera.model.fx, camera.model.fy, world.cameras[i].renderer->traits().label(),
                std::visit([](const auto& sampling) { return sampling.kType; }, scenario.cameras[i].sampling));
   }
   fmt::print("duration: {:.3f} s\n{}: ready to simulate\n", to_seconds(world.info.end - world.info.start), file);

@@ -5,10 +5,12 @@
 #include <numbers>
 #include <string>
 
+#include "esim/backends/opengl/gl_renderer.h"
 #include "esim/backends/panorama/panorama_renderer.h"
 #include "esim/backends/plane/plane_renderer.h"
 #include "esim/backends/raycast/raycast_renderer.h"
 #include "esim/backends/sprites/sprites_renderer.h"
+#include "esim/geometry/so3.h"
 #include "esim/motion/trajectory.h"
 
 namespace esim::test {
@@ -38,7 +40,7 @@ inline std::shared_ptr<const Texture> smooth_texture(Wrap wrap_u, Wrap wrap_v) {
 /// A box of 8 x 6 x 4 m around the origin, seen from inside, each face textured.
 inline Mesh box_mesh() {
   Mesh mesh;
-  mesh.materials.push_back({"wall", smooth_texture(Wrap::repeat, Wrap::repeat), 0.5F});
+  mesh.materials.push_back({"wall", smooth_texture(Wrap::repeat, Wrap::repeat), 1.0F});
   const Eigen::Vector3f half(4, 3, 2);
   for (int axis = 0; axis < 3; ++axis) {
     for (const float side : {-1.0F, 1.0F}) {
@@ -88,13 +90,75 @@ inline SpriteScene test_sprites() {
   return {{near, far}, 0.2F};
 }
 
+/// A white ball with the normals of a true one, of 2 n x n quadrilaterals.
+inline Mesh ball_mesh(float radius, int n) {
+  constexpr float kPi = std::numbers::pi_v<float>;
+  Mesh mesh;
+  mesh.materials = {{"white", nullptr, 1.0F}};
+  for (int j = 0; j <= n; ++j) {
+    for (int i = 0; i <= 2 * n; ++i) {
+      const float longitude = kPi * static_cast<float>(i) / static_cast<float>(n);
+      const float latitude = kPi * (static_cast<float>(j) / static_cast<float>(n) - 0.5F);
+      mesh.normals.emplace_back(std::cos(latitude) * std::cos(longitude), std::cos(latitude) * std::sin(longitude),
+                                std::sin(latitude));
+      mesh.vertices.push_back(radius * mesh.normals.back());
+      if (i == 0 || j == 0) continue;
+      const auto corner = static_cast<std::uint32_t>(mesh.vertices.size() - 1);
+      const auto above = corner - static_cast<std::uint32_t>(2 * n + 1);
+      mesh.triangles.push_back({above - 1, above, corner});
+      mesh.triangles.push_back({above - 1, corner, corner - 1});
+    }
+  }
+  const Eigen::Vector2f origin(0, 0);
+  mesh.texture_uv.resize(mesh.triangles.size(), {origin, origin, origin});
+  mesh.material.resize(mesh.triangles.size(), 0);
+  return mesh;
+}
+
+/// Small copies of the box, seen from outside, for a scene in which two things move.
+inline Scene moving_scene() {
+  Scene scene = still_scene(box_mesh());
+  for (const float scale : {0.15F, 0.2F}) {
+    SceneObject object{"small box", box_mesh(), true};
+    for (Eigen::Vector3f& vertex : object.mesh.vertices) vertex *= scale;
+    scene.objects.push_back(object);
+  }
+  return scene;
+}
+
+/// Their motion, of constant twists, before the moving camera.
+inline std::vector<Kinematics> moving_objects(double t_s) {
+  Kinematics left, right;
+  left.T_world_body = {so3_exp(Eigen::Vector3d(0.3, 0.5, -0.2)), {1.7, 0.4, 0.1}};
+  left.velocity_world = {-0.8, 0.3, 0.9};
+  left.omega_body = {0.5, -1.2, 0.8};
+  right.T_world_body = {so3_exp(Eigen::Vector3d(-0.1, 0.9, 1.2)), {2.4, -0.7, -0.2}};
+  right.velocity_world = {0.2, 1.1, -0.4};
+  right.omega_body = {-0.9, 0.3, 1.5};
+  for (Kinematics* object : {&left, &right}) {
+    object->T_world_body.translation += object->velocity_world * t_s;
+    object->T_world_body.rotation = object->T_world_body.rotation * so3_exp(object->omega_body * t_s);
+  }
+  return {left, right};
+}
+
+/// False where this machine has no OpenGL.
+inline bool has_gl() { return !gl_devices().empty(); }
+
 /// Every renderer on a scene that fills the view from near the origin.
 inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Camera& camera,
                                                const Workers& workers = two_threads()) {
   if (name == "panorama") return make_panorama_renderer({smooth_texture(Wrap::repeat, Wrap::clamp)}, camera, workers);
   if (name == "plane") return make_plane_renderer(test_poster(), camera, workers);
   if (name == "sprites") return make_sprites_renderer(test_sprites(), camera, workers);
-  return make_raycast_renderer(build_raycast_scene(box_mesh()), {}, camera, workers);
+  const Scene scene = name.starts_with("moving") ? moving_scene() : still_scene(box_mesh());
+  if (name.ends_with("gl")) return make_gl_renderer(std::make_shared<Scene>(scene), {}, camera, workers);
+  return make_raycast_renderer(build_raycast_scene(scene), {}, camera, workers);
+}
+
+/// What moves in that scene.
+inline std::vector<Kinematics> objects_of(const std::string& name, double t_s = 0) {
+  return name.starts_with("moving") ? moving_objects(t_s) : std::vector<Kinematics>();
 }
 
 /// A camera with strong distortion of each kind, 120 x 90.
@@ -119,11 +183,16 @@ inline Kinematics moving_camera() {
   return camera;
 }
 
-inline Sample render(Renderer& renderer, const Camera& model, const Kinematics& camera, std::vector<Tile> tiles = {},
-                     TimeNs t = 123) {
+/// When the test's camera is where it is.
+inline constexpr TimeNs kTime = 123;
+inline constexpr double kTime_s = 123e-9;
+
+/// The scene at a time that is `dt_s` seconds after that of the test.
+inline Sample render(Renderer& renderer, const Camera& model, const Kinematics& camera,
+                     const std::vector<Kinematics>& objects = {}, std::vector<Tile> tiles = {}, double dt_s = 0) {
   if (tiles.empty()) tiles = {{0, 0, model.width, model.height}};
   Sample sample;
-  renderer.render({t, camera, std::move(tiles)}, sample);
+  renderer.render({kTime + to_ns(dt_s), camera, std::move(tiles), objects}, sample);
   return sample;
 }
 

@@ -85,6 +85,36 @@ cameras:
   EXPECT_EQ(read(text).output.time_unit, EventTimeUnit::ns);
 }
 
+TEST_F(ScenarioFile, ReadsListsOfObjectsAndLights) {
+  const std::string yaml = R"(
+duration_s: 1
+trajectory: {type: static}
+renderer:
+  type: mesh
+  scene: room.obj
+  objects:
+    - {scene: ball.obj, scale: 0.5, trajectory: {type: file, path: ball.csv, time_scale: 2}}
+    - {name: fan, scene: fan.obj, trajectory: {type: random, rotation_amplitude_deg: [0, 0, 90]}}
+  lighting: {type: lambert, ambient: 0.1, suns: [{direction: [1, 0, -1]}], points: [{position: [0, 0, 2], strength: 9}]}
+)";
+  const auto renderer = std::get<MeshRendererOptions>(read(yaml).renderer);
+  ASSERT_EQ(renderer.objects.size(), 2U);
+  EXPECT_EQ(renderer.objects[0].scene, folder_.path() / "ball.obj") << "relative to the file";
+  EXPECT_EQ(std::get<FileTrajectoryOptions>(renderer.objects[0].trajectory).path, folder_.path() / "ball.csv");
+  EXPECT_DOUBLE_EQ(std::get<FileTrajectoryOptions>(renderer.objects[0].trajectory).time_scale, 2);
+  EXPECT_TRUE(std::holds_alternative<RandomTrajectoryOptions>(renderer.objects[1].trajectory));
+  const auto& lambert = std::get<LambertOptions>(renderer.lighting);
+  EXPECT_DOUBLE_EQ(lambert.suns.at(0).direction.x(), 1);
+  EXPECT_DOUBLE_EQ(lambert.points.at(0).strength, 9);
+  EXPECT_EQ(write_scenario(read(write_scenario(read(yaml)))), write_scenario(read(yaml)));
+
+  const auto scaled = read(yaml, {"renderer.objects.1.scale=3"});
+  EXPECT_DOUBLE_EQ(std::get<MeshRendererOptions>(scaled.renderer).objects[1].scale, 3);
+  EXPECT_TRUE(contains(error(yaml, {"renderer.objects.0.scale=0"}), "renderer.objects.0.scale"));
+  EXPECT_TRUE(contains(error(yaml, {"renderer.objects=3"}), "must be a list"));
+  EXPECT_TRUE(contains(error(yaml, {"renderer.lighting.type=phong"}), "is not one of unlit, lambert"));
+}
+
 TEST_F(ScenarioFile, TakesOverrides) {
   const Scenario scenario =
       read(kMinimal, {"event_camera.contrast_threshold=0.2", "sampling.type=flow", "sampling.lambda=0.25",

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "esim/scenario/conversion.h"
 #include "esim/scenario/scenario.h"
@@ -30,6 +31,13 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices)
 
 /// The motion of the body that a scenario describes.
 std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const Notices& notices);
+
+/// The motions of the moving objects that a scenario's renderer shows, in the order in which the renderer wants them.
+/// All cover `simulated`; what has no duration of its own begins with the body's trajectory.
+std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const Scenario& scenario,
+                                                                         const Trajectory& body,
+                                                                         const TimeSpan& simulated,
+                                                                         const Notices& notices);
 
 /// Makes the renderers of a scenario's cameras; what they show is loaded once and shared.
 using RendererFactory = std::function<std::unique_ptr<Renderer>(const Camera& camera, const Workers& workers)>;

@@ -74,12 +74,10 @@ void require_a_view(const World& world, std::size_t index) {
   Sample sample;
   for (int i = 0; i < kLooks; ++i) {
     const TimeNs t = world.info.start + (world.info.end - world.info.start) / (kLooks - 1) * i;
-    const Kinematics camera = rigidly_attached(world.trajectory->at(t), info.T_body_camera);
-    world.cameras[index].renderer->render({t, camera, {{0, 0, info.model.width, info.model.height}}}, sample);
+    world.cameras[index].renderer->render(view(world, index, t), sample);
     if (sees_something(sample)) return;
   }
-  const Eigen::Vector3d position =
-      rigidly_attached(world.trajectory->at(world.info.start), info.T_body_camera).T_world_body.translation;
+  const Eigen::Vector3d position = view(world, index, world.info.start).camera.T_world_body.translation;
   throw UserError(
       fmt::format("camera {} sees nothing of the scene on its whole way (it starts at {:.3g} {:.3g} {:.3g} m); check "
                   "the trajectory's frame and T_body_camera",
@@ -93,6 +91,7 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices)
   world.workers = std::make_unique<const Workers>(threads);
   world.trajectory = build_trajectory(scenario, notices);
   const TimeSpan span = simulated_span(scenario, *world.trajectory);
+  world.objects = build_object_trajectories(scenario, *world.trajectory, span, notices);
   world.info.start = span.start;
   world.info.end = span.end;
   world.info.truth_rate_hz = scenario.truth.rate_hz;

@@ -22,7 +22,7 @@ enum class Purpose : std::uint16_t {
 /// with the counter-based generator Philox4x32-10 (Salmon et al., SC 2011). No state, no order of calls, so
 /// results do not depend on threads or on what else was drawn.
 ///
-/// `stream` separates cameras, `item` pixels (or axes), `draw` successive draws of one item.
+/// `stream` separates cameras (or things that move), `item` pixels (or axes), `draw` successive draws of one item.
 class AddressedRandom {
  public:
   AddressedRandom(std::uint64_t seed, Purpose purpose, std::uint16_t stream = 0);

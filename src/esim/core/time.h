@@ -13,6 +13,11 @@ inline constexpr TimeNs kNsPerUs = 1'000;
 inline constexpr TimeNs kNsPerMs = 1'000'000;
 inline constexpr TimeNs kNsPerSecond = 1'000'000'000;
 
+/// From start to end, both included.
+struct TimeSpan {
+  TimeNs start = 0, end = 0;
+};
+
 constexpr double to_seconds(TimeNs t) { return static_cast<double>(t) * 1e-9; }
 
 /// Nearest nanosecond. `seconds` must be finite and within ±292 years.

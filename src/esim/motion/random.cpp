@@ -51,12 +51,12 @@ Eigen::Vector3d draw(const AddressedRandom& random, int control_point, const Eig
 }  // namespace
 
 SplineTrajectory random_trajectory(const RandomMotionOptions& options, TimeNs start, TimeNs duration,
-                                   std::uint64_t seed) {
+                                   std::uint64_t seed, std::uint16_t stream) {
   validate(options, duration);
   const int segments = static_cast<int>(std::ceil(to_seconds(duration) / options.knot_interval_s));
   const SE3 center{options.center.rotation.normalized(), options.center.translation};
-  const AddressedRandom position_random(seed, Purpose::trajectory_position);
-  const AddressedRandom rotation_random(seed, Purpose::trajectory_rotation);
+  const AddressedRandom position_random(seed, Purpose::trajectory_position, stream);
+  const AddressedRandom rotation_random(seed, Purpose::trajectory_rotation, stream);
 
   std::vector<Eigen::Quaterniond> rotations;
   std::vector<Eigen::Vector3d> positions;

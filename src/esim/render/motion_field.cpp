@@ -1,35 +1,73 @@
 #include "esim/render/motion_field.h"
 
+#include <Eigen/Geometry>
+#include <vector>
+
 namespace esim {
+namespace {
 
-void motion_field(const PixelRays& rays, const Kinematics& camera, const Tile& tile, Sample& sample) {
-  const Eigen::Vector3f v =
-      (camera.T_world_body.rotation.conjugate() * camera.velocity_world).cast<float>();  // in the camera frame
-  const Eigen::Vector3f omega = camera.omega_body.cast<float>();
-  const float vx = v.x(), vy = v.y(), vz = v.z();
-  const float ox = omega.x(), oy = omega.y(), oz = omega.z();
+/// Motion of the camera relative to something rigid, in the camera frame; m/s and rad/s.
+struct Twist {
+  Eigen::Vector3f v, omega;
+};
 
-  for (int row = tile.y; row < tile.y + tile.height; ++row) {
-    const float *const x = rays.x.row(row), *const y = rays.y.row(row);
-    const float *const du_dx = rays.du_dx.row(row), *const du_dy = rays.du_dy.row(row);
-    const float *const dv_dx = rays.dv_dx.row(row), *const dv_dy = rays.dv_dy.row(row);
-    const float* const depth = sample.depth.row(row);
-    float* const flow_x = sample.flow_x.row(row);
-    float* const flow_y = sample.flow_y.row(row);
+Twist relative_to_world(const Kinematics& camera) {
+  return {(camera.T_world_body.rotation.conjugate() * camera.velocity_world).cast<float>(),
+          camera.omega_body.cast<float>()};
+}
+
+/// The object moves the point at X of the camera frame by v_O + omega_O x (X - p), p being the object's origin there.
+Twist relative_to_object(const Kinematics& camera, const Kinematics& object) {
+  const Eigen::Quaterniond R_camera_world = camera.T_world_body.rotation.conjugate();
+  const Eigen::Vector3d omega_camera = R_camera_world * (object.T_world_body.rotation * object.omega_body);
+  const Eigen::Vector3d p = camera.T_world_body.inverse() * object.T_world_body.translation;
+  const Eigen::Vector3d v = R_camera_world * (camera.velocity_world - object.velocity_world) + omega_camera.cross(p);
+  return {v.cast<float>(), (camera.omega_body - omega_camera).cast<float>()};
+}
+
+/// Fills V of a row from column `begin` to `end`; `twist_at(column)` is the motion relative to what is seen there.
+template <typename TwistAt>
+inline void fill_row(const PixelRays& rays, int row, int begin, int end, Sample& sample, const TwistAt& twist_at) {
+  const float *const x = rays.x.row(row), *const y = rays.y.row(row);
+  const float *const du_dx = rays.du_dx.row(row), *const du_dy = rays.du_dy.row(row);
+  const float *const dv_dx = rays.dv_dx.row(row), *const dv_dy = rays.dv_dy.row(row);
+  const float* const depth = sample.depth.row(row);
+  float* const flow_x = sample.flow_x.row(row);
+  float* const flow_y = sample.flow_y.row(row);
 #pragma GCC ivdep
-    for (int i = tile.x; i < tile.x + tile.width; ++i) {
-      // Velocity of the point over its depth: -v/Z - omega x b.
-      const float inverse_depth = 1.0F / depth[i];
-      const float wx = -vx * inverse_depth - (oy - oz * y[i]);
-      const float wy = -vy * inverse_depth - (oz * x[i] - ox);
-      const float wz = -vz * inverse_depth - (ox * y[i] - oy * x[i]);
+  for (int i = begin; i < end; ++i) {
+    const auto& [v, omega] = twist_at(i);
 
-      // Velocity of the bearing, then of the pixel.
-      const float bearing_x = wx - x[i] * wz;
-      const float bearing_y = wy - y[i] * wz;
-      flow_x[i] = du_dx[i] * bearing_x + du_dy[i] * bearing_y;
-      flow_y[i] = dv_dx[i] * bearing_x + dv_dy[i] * bearing_y;
+    // Velocity of the point over its depth: -v/Z - omega x b.
+    const float inverse_depth = 1.0F / depth[i];
+    const float wx = -v.x() * inverse_depth - (omega.y() - omega.z() * y[i]);
+    const float wy = -v.y() * inverse_depth - (omega.z() * x[i] - omega.x());
+    const float wz = -v.z() * inverse_depth - (omega.x() * y[i] - omega.y() * x[i]);
+
+    // Velocity of the bearing, then of the pixel.
+    const float bearing_x = wx - x[i] * wz;
+    const float bearing_y = wy - y[i] * wz;
+    flow_x[i] = du_dx[i] * bearing_x + du_dy[i] * bearing_y;
+    flow_y[i] = dv_dx[i] * bearing_x + dv_dy[i] * bearing_y;
+  }
+}
+
+}  // namespace
+
+void motion_field(const PixelRays& rays, const RenderRequest& request, const Tile& tile, Sample& sample) {
+  const Twist world = relative_to_world(request.camera);
+  if (request.objects.empty()) {
+    for (int row = tile.y; row < tile.y + tile.height; ++row) {
+      fill_row(rays, row, tile.x, tile.x + tile.width, sample, [world](int) { return world; });
     }
+    return;
+  }
+
+  std::vector<Twist> twists = {world};
+  for (const Kinematics& object : request.objects) twists.push_back(relative_to_object(request.camera, object));
+  for (int row = tile.y; row < tile.y + tile.height; ++row) {
+    const std::uint16_t* const seen = sample.object.row(row);
+    fill_row(rays, row, tile.x, tile.x + tile.width, sample, [&](int i) -> const Twist& { return twists[seen[i]]; });
   }
 }
 

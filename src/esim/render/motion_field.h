@@ -1,17 +1,22 @@
 #pragma once
 
-#include "esim/motion/trajectory.h"
 #include "esim/render/pixel_rays.h"
-#include "esim/render/sample.h"
+#include "esim/render/renderer.h"
 
 namespace esim {
 
-/// Image velocity of a static scene as the camera moves (paper, Eq. 4): fills V of the tile's pixels from their Z.
+/// Image velocity of the scene as the camera and the scene's objects move (paper, Eq. 4, and V_dyn): fills V of the
+/// tile's pixels from their Z and from which object they see.
 ///
-/// A point at depth Z on the bearing b = (x, y, 1) has, in the camera frame, the velocity Z w with
-///     w = -v_C / Z - omega_C x b,
+/// A point at depth Z on the bearing b = (x, y, 1) has, in the camera frame C, the position Z b and the velocity Z w
+/// with
+///     w = -v / Z - omega x b,
 /// so the bearing moves by (w_x - x w_z, w_y - y w_z) per second, and the pixel by the camera model's Jacobian times
-/// that. With an undistorted unit camera this is the interaction matrix of the paper. Z = +inf leaves the rotation.
-void motion_field(const PixelRays& rays, const Kinematics& camera, const Tile& tile, Sample& sample);
+/// that. On what stands still, v and omega are the camera's twist; with an undistorted unit camera that is the
+/// interaction matrix of the paper, and Z = +inf leaves the rotation. On a moving object O they are the camera's twist
+/// relative to the object's rigid motion,
+///     v = v_C - (v_O - omega_O x p),   omega = omega_C - omega_O,
+/// all in the camera frame, p being the position of the object's origin there: the difference to the above is V_dyn.
+void motion_field(const PixelRays& rays, const RenderRequest& request, const Tile& tile, Sample& sample);
 
 }  // namespace esim

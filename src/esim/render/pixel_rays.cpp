@@ -1,16 +1,31 @@
 #include "esim/render/pixel_rays.h"
 
 #include <Eigen/LU>
+#include <array>
+#include <cstring>
 #include <string>
+#include <utility>
 
 #include "esim/core/error.h"
 
 namespace esim {
 
-PixelRays::PixelRays(const Camera& camera) {
-  for (Image<float>* table : {&x, &y, &du_dx, &du_dy, &dv_dx, &dv_dy, &dx_du, &dx_dv, &dy_du, &dy_dv}) {
-    *table = Image<float>(camera.width, camera.height);
+PixelTable::PixelTable(Image<float> values) : width_(values.width()), height_(values.height()) {
+  const auto width = static_cast<std::size_t>(width_);
+  one_row_ = height_ > 1;
+  for (int y = 1; y < height_ && one_row_; ++y)
+    one_row_ = std::memcmp(values.row(y), values.row(0), width * sizeof(float)) == 0;
+  if (one_row_) {
+    values_ = Image<float>(width_, 1);
+    std::copy_n(values.row(0), width, values_.row(0));
+  } else {
+    values_ = std::move(values);
   }
+}
+
+PixelRays::PixelRays(const Camera& camera) {
+  std::array<Image<float>, 10> values;
+  for (Image<float>& image : values) image = Image<float>(camera.width, camera.height);
   for (int v = 0; v < camera.height; ++v) {
     for (int u = 0; u < camera.width; ++u) {
       const auto ray = camera.back_project({u, v});
@@ -18,22 +33,17 @@ PixelRays::PixelRays(const Camera& camera) {
         throw UserError("camera: the distortion cannot be inverted at pixel (" + std::to_string(u) + ", " +
                         std::to_string(v) + "); check its coefficients or make the image smaller");
       }
-      x(u, v) = static_cast<float>(ray->bearing.x());
-      y(u, v) = static_cast<float>(ray->bearing.y());
-
       const Eigen::Matrix2d bearing_from_pixel = ray->jacobian.topRows<2>();
-      dx_du(u, v) = static_cast<float>(bearing_from_pixel(0, 0));
-      dx_dv(u, v) = static_cast<float>(bearing_from_pixel(0, 1));
-      dy_du(u, v) = static_cast<float>(bearing_from_pixel(1, 0));
-      dy_dv(u, v) = static_cast<float>(bearing_from_pixel(1, 1));
-
       const Eigen::Matrix2d pixel_from_bearing = bearing_from_pixel.inverse();
-      du_dx(u, v) = static_cast<float>(pixel_from_bearing(0, 0));
-      du_dy(u, v) = static_cast<float>(pixel_from_bearing(0, 1));
-      dv_dx(u, v) = static_cast<float>(pixel_from_bearing(1, 0));
-      dv_dy(u, v) = static_cast<float>(pixel_from_bearing(1, 1));
+      const double row[] = {ray->bearing.x(),         ray->bearing.y(),         pixel_from_bearing(0, 0),
+                            pixel_from_bearing(0, 1), pixel_from_bearing(1, 0), pixel_from_bearing(1, 1),
+                            bearing_from_pixel(0, 0), bearing_from_pixel(0, 1), bearing_from_pixel(1, 0),
+                            bearing_from_pixel(1, 1)};
+      for (std::size_t i = 0; i < values.size(); ++i) values[i](u, v) = static_cast<float>(row[i]);
     }
   }
+  PixelTable* const tables[] = {&x, &y, &du_dx, &du_dy, &dv_dx, &dv_dy, &dx_du, &dx_dv, &dy_du, &dy_dv};
+  for (std::size_t i = 0; i < values.size(); ++i) *tables[i] = PixelTable(std::move(values[i]));
 }
 
 }  // namespace esim

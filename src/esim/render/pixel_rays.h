@@ -8,18 +8,35 @@
 
 namespace esim {
 
+/// A value per pixel. Where all rows are the same, as without distortion, one is kept: rendering waits for memory.
+class PixelTable {
+ public:
+  PixelTable() = default;
+  explicit PixelTable(Image<float> values);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  const float* row(int y) const { return values_.row(one_row_ ? 0 : y); }
+  float operator()(int x, int y) const { return row(y)[x]; }
+
+ private:
+  int width_ = 0, height_ = 0;
+  bool one_row_ = false;
+  Image<float> values_;
+};
+
 /// A camera's geometry, tabulated once per pixel, lens distortion included.
 struct PixelRays {
   explicit PixelRays(const Camera& camera);
 
   // Bearing of the pixel's centre in the camera frame: (x, y, 1).
-  Image<float> x, y;
+  PixelTable x, y;
 
   // d(pixel) / d(bearing), px: how the image of a point moves when its bearing does.
-  Image<float> du_dx, du_dy, dv_dx, dv_dy;
+  PixelTable du_dx, du_dy, dv_dx, dv_dy;
 
   // d(bearing) / d(pixel): the pixel's footprint, the inverse of the above.
-  Image<float> dx_du, dx_dv, dy_du, dy_dv;
+  PixelTable dx_du, dx_dv, dy_du, dy_dv;
 };
 
 /// The rays of K pixels, one array per quantity, for loops that compile to SIMD code.
@@ -31,14 +48,14 @@ struct RayLanes {
   /// Takes Count pixels of a row, from column `first` on, into lanes [lane, lane + Count).
   template <int Count>
   void load(const PixelRays& rays, int first, int row, int lane) {
-    for_each_table(rays, [&](const Image<float>& table, std::array<float, K>& lanes) {
+    for_each_table(rays, [&](const PixelTable& table, std::array<float, K>& lanes) {
       std::copy_n(table.row(row) + first, Count, lanes.data() + lane);
     });
   }
 
   /// The same for any number of them; lanes up to lane + room repeat the last one.
   void load(const PixelRays& rays, int first, int row, int lane, int count, int room) {
-    for_each_table(rays, [&](const Image<float>& table, std::array<float, K>& lanes) {
+    for_each_table(rays, [&](const PixelTable& table, std::array<float, K>& lanes) {
       for (int i = 0; i < room; ++i)
         lanes[static_cast<unsigned>(lane + i)] = table(first + std::min(i, count - 1), row);
     });

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "esim/core/image.h"
@@ -15,13 +16,21 @@ struct Sample {
 
   Image<float> irradiance;  // E, linear, 1.0 = white       computed by the renderer
   Image<float> depth;       // Z, planar, m; +inf: nothing  computed by the renderer
-  Image<float> flow_x;      // V, px/s, to the right        computed by the renderer (motion_field() if static)
-  Image<float> flow_y;      // V, px/s, downwards           computed by the renderer (motion_field() if static)
+  Image<float> flow_x;      // V, px/s, to the right        by motion_field() from Z, object and the twists, or by the
+  Image<float> flow_y;      // V, px/s, downwards           renderer where there is no space
+
+  // Which moving object is seen: 0 none, i + 1 the i-th of the request. Computed by the renderer; has no size where the
+  // request names no objects.
+  Image<std::uint16_t> object;
 
   /// Makes room for width x height pixels; keeps the content if the size is right already.
-  void resize(int width, int height) {
-    if (irradiance.width() == width && irradiance.height() == height) return;
-    for (Image<float>* field : {&irradiance, &depth, &flow_x, &flow_y}) *field = Image<float>(width, height);
+  void resize(int width, int height, bool with_objects = false) {
+    if (irradiance.width() != width || irradiance.height() != height) {
+      for (Image<float>* field : {&irradiance, &depth, &flow_x, &flow_y}) *field = Image<float>(width, height);
+    }
+    const int object_width = with_objects ? width : 0, object_height = with_objects ? height : 0;
+    if (object.width() != object_width || object.height() != object_height)
+      object = Image<std::uint16_t>(object_width, object_height);
   }
 };
 

@@ -8,10 +8,6 @@
 
 namespace esim {
 
-struct TimeSpan {
-  TimeNs start = 0, end = 0;
-};
-
 /// Samples the whole image at once, as the paper does: the first sample at the span's start, the last one exactly at
 /// its end, and between them as the criterion says from each sample, within its bounds on the rate.
 std::unique_ptr<Sampler> make_frame_sampler(const SamplingOptions& options, const SensorTraits& sensor, int width,

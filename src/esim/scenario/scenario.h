@@ -15,12 +15,80 @@
 
 namespace esim {
 
+// --- trajectories of the body and of objects -----------------------------------------------------------------------
+
+struct FileTrajectoryOptions {
+  static constexpr const char* kType = "file";
+  std::filesystem::path path;
+  double time_scale = 1.0;
+  int order = 5;
+  double knot_interval_s = 0.0;
+  double smoothing_time_s = 0.0;
+};
+
+struct RandomTrajectoryOptions {
+  static constexpr const char* kType = "random";
+  Eigen::Vector3d position_amplitude_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rotation_amplitude_deg = Eigen::Vector3d::Zero();
+  double knot_interval_s = 0.25;
+  PoseOptions center;
+  int order = 5;
+};
+
+struct StaticTrajectoryOptions {
+  static constexpr const char* kType = "static";
+  PoseOptions pose;
+};
+
+using TrajectoryOptions = std::variant<FileTrajectoryOptions, RandomTrajectoryOptions, StaticTrajectoryOptions>;
+
 // --- renderers ---------------------------------------------------------------------------------------------------
 
-/// Triangles, ray cast.
+/// A thing in the scene that moves.
+struct ObjectOptions {
+  std::string name;
+  std::filesystem::path scene;
+  double scale = 1.0;
+  TrajectoryOptions trajectory;
+};
+
+struct SunOptions {
+  Eigen::Vector3d direction = {0, 0, -1};
+  double strength = 1.0;
+};
+
+struct PointLightOptions {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  double strength = 1.0;
+};
+
+/// Surfaces show their base colour, in whatever light.
+struct UnlitOptions {
+  static constexpr const char* kType = "unlit";
+};
+
+/// Diffuse surfaces under lights.
+struct LambertOptions {
+  static constexpr const char* kType = "lambert";
+  double ambient = 0.3;
+  std::vector<SunOptions> suns;
+  std::vector<PointLightOptions> points;
+  bool shadows = false;
+};
+
+using LightingOptions = std::variant<UnlitOptions, LambertOptions>;
+
+/// What draws triangles.
+enum class MeshEngine { raycast, gl, automatic };
+
+/// Triangles.
 struct MeshRendererOptions {
   static constexpr const char* kType = "mesh";
+  MeshEngine engine = MeshEngine::raycast;
+  std::optional<int> gl_device;
   std::filesystem::path scene;
+  std::vector<ObjectOptions> objects;
+  LightingOptions lighting;
   int samples_per_pixel = 1;
   double background = 0.2;
 };
@@ -64,33 +132,6 @@ struct SpritesRendererOptions {
 
 using RendererOptions =
     std::variant<MeshRendererOptions, PanoramaRendererOptions, PlaneRendererOptions, SpritesRendererOptions>;
-
-// --- trajectories of the body ------------------------------------------------------------------------------------
-
-struct FileTrajectoryOptions {
-  static constexpr const char* kType = "file";
-  std::filesystem::path path;
-  double time_scale = 1.0;
-  int order = 5;
-  double knot_interval_s = 0.0;
-  double smoothing_time_s = 0.0;
-};
-
-struct RandomTrajectoryOptions {
-  static constexpr const char* kType = "random";
-  Eigen::Vector3d position_amplitude_m = Eigen::Vector3d::Zero();
-  Eigen::Vector3d rotation_amplitude_deg = Eigen::Vector3d::Zero();
-  double knot_interval_s = 0.25;
-  PoseOptions center;
-  int order = 5;
-};
-
-struct StaticTrajectoryOptions {
-  static constexpr const char* kType = "static";
-  PoseOptions pose;
-};
-
-using TrajectoryOptions = std::variant<FileTrajectoryOptions, RandomTrajectoryOptions, StaticTrajectoryOptions>;
 
 // --- cameras -----------------------------------------------------------------------------------------------------
 

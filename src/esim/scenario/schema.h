@@ -7,8 +7,73 @@
 namespace esim {
 
 template <class Visitor>
+void describe(Visitor& visit, FileTrajectoryOptions& o) {
+  visit("path", o.path, About{"poses: TUM text (s) or CSV (ns), told apart by content"});
+  visit("time_scale", o.time_scale, About{"stretches time: 2 takes twice as long", "", 0, 1e6, true});
+  visit("order", o.order, About{"of the fitted spline: 4 (cubic) to 6", "", 4, 6});
+  visit("knot_interval_s", o.knot_interval_s,
+        About{"time between the spline's control points; 0: from the data", "s", 0, 1e6});
+  visit("smoothing_time_s", o.smoothing_time_s,
+        About{"motion faster than this is smoothed away; 0: none", "s", 0, 1e6});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, RandomTrajectoryOptions& o) {
+  visit("position_amplitude_m", o.position_amplitude_m,
+        About{"greatest displacement along the centre's axes x y z", "m", 0, 1e6});
+  visit("rotation_amplitude_deg", o.rotation_amplitude_deg,
+        About{"greatest rotation about its axes x y z (for a camera: pitch, yaw, roll)", "deg", 0, 36000});
+  visit("knot_interval_s", o.knot_interval_s, About{"time between random poses: smaller is faster", "s", 0, 1e6, true});
+  visit("center", o.center,
+        About{"pose that it moves about; a body looks along world x where no orientation is given"});
+  visit("order", o.order, About{"of the spline: 4 (cubic) to 6", "", 4, 6});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, StaticTrajectoryOptions& o) {
+  visit("pose", o.pose, About{"where it is; a body looks along world x where no orientation is given"});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, ObjectOptions& o) {
+  visit("name", o.name, About{"for messages (default: object0, object1, ...)"});
+  visit("scene", o.scene, About{"mesh file (OBJ with MTL), in the object's own coordinates"});
+  visit("scale", o.scale, About{"factor that makes its coordinates metres", "", 0, 1e6, true});
+  visit("trajectory", o.trajectory, About{"how it moves: pose of its coordinates in the world"});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, SunOptions& o) {
+  visit("direction", o.direction, About{"in which it shines, world frame"});
+  visit("strength", o.strength, About{"irradiance of a white surface that faces it", "", 0, 1e6});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, PointLightOptions& o) {
+  visit("position", o.position, About{"world frame", "m"});
+  visit("strength", o.strength, About{"irradiance of a white surface that faces it from 1 m away", "", 0, 1e9});
+}
+
+template <class Visitor>
+void describe(Visitor&, UnlitOptions&) {}
+
+template <class Visitor>
+void describe(Visitor& visit, LambertOptions& o) {
+  visit("ambient", o.ambient, About{"irradiance of a white surface that no light reaches", "", 0, 1e6});
+  visit("suns", o.suns, About{"parallel light: a list of maps of"});
+  visit("points", o.points, About{"light from points, falling with the squared distance: a list of maps of"});
+  visit("shadows", o.shadows, About{"light stops at the first surface"});
+}
+
+template <class Visitor>
 void describe(Visitor& visit, MeshRendererOptions& o) {
+  visit("engine", o.engine,
+        About{"raycast (Embree), gl (OpenGL), or auto: gl where there is a graphics card, raycast otherwise"});
+  visit("gl_device", o.gl_device,
+        About{"which graphics device, from 0 (default: the first that is no software)", "", 0, 31});
   visit("scene", o.scene, About{"mesh file (OBJ with MTL), world coordinates in metres"});
+  visit("objects", o.objects, About{"things that move through it: a list of maps of"});
+  visit("lighting", o.lighting, About{"unlit: surfaces are as bright as their texture, as baked scenes want it"});
   visit("samples_per_pixel", o.samples_per_pixel,
         About{"rays per pixel, 1, 5 or 13: more smooth the edges of objects", "", 1, 13});
   visit("background", o.background, About{"irradiance where nothing is seen", "", 0, 1e6});
@@ -61,33 +126,6 @@ void describe(Visitor& visit, SpritesRendererOptions& o) {
   visit("search_path", o.search_path, About{"folders in which the scene file's images are looked for"});
   visit("layers", o.layers, About{"images on the sensor, the nearest first"});
   visit("background", o.background, About{"irradiance where no layer is", "", 0, 1e6});
-}
-
-template <class Visitor>
-void describe(Visitor& visit, FileTrajectoryOptions& o) {
-  visit("path", o.path, About{"poses of the body: TUM text (s) or CSV (ns), told apart by content"});
-  visit("time_scale", o.time_scale, About{"stretches time: 2 takes twice as long", "", 0, 1e6, true});
-  visit("order", o.order, About{"of the fitted spline: 4 (cubic) to 6", "", 4, 6});
-  visit("knot_interval_s", o.knot_interval_s,
-        About{"time between the spline's control points; 0: from the data", "s", 0, 1e6});
-  visit("smoothing_time_s", o.smoothing_time_s,
-        About{"motion faster than this is smoothed away; 0: none", "s", 0, 1e6});
-}
-
-template <class Visitor>
-void describe(Visitor& visit, RandomTrajectoryOptions& o) {
-  visit("position_amplitude_m", o.position_amplitude_m,
-        About{"greatest displacement along the centre's axes x y z", "m", 0, 1e6});
-  visit("rotation_amplitude_deg", o.rotation_amplitude_deg,
-        About{"greatest rotation about the body's axes x y z (for a camera: pitch, yaw, roll)", "deg", 0, 36000});
-  visit("knot_interval_s", o.knot_interval_s, About{"time between random poses: smaller is faster", "s", 0, 1e6, true});
-  visit("center", o.center, About{"pose that the body moves about; looks along world x where no orientation is given"});
-  visit("order", o.order, About{"of the spline: 4 (cubic) to 6", "", 4, 6});
-}
-
-template <class Visitor>
-void describe(Visitor& visit, StaticTrajectoryOptions& o) {
-  visit("pose", o.pose, About{"of the body; looks along world x where no orientation is given"});
 }
 
 template <class Visitor>
@@ -172,6 +210,8 @@ template <>
 inline constexpr std::array<const char*, 4> kEnumNames<LayerBeyond>{"nothing", "clamp", "mirror", "repeat"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<KeyframeInterpolation>{"spline", "linear"};
+template <>
+inline constexpr std::array<const char*, 3> kEnumNames<MeshEngine>{"raycast", "gl", "auto"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<EventTimeUnit>{"us", "ns"};
 template <>

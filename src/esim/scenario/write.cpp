@@ -56,9 +56,9 @@ class YamlWriter {
   }
 
   template <typename T>
-  void write(const std::vector<T>& value) {
+  void write(const std::vector<T>& values) {
     out_ << YAML::BeginSeq;
-    for (const T& entry : value) write(entry);
+    for (const T& value : values) write(value);
     out_ << YAML::EndSeq;
   }
 

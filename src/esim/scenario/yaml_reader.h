@@ -79,10 +79,10 @@ class YamlReader {
   }
 
   template <typename T>
-  void read(const YAML::Node& node, const std::string& key, std::vector<T>& value, const About& about) {
+  void read(const YAML::Node& node, const std::string& key, std::vector<T>& values, const About& about) {
     if (!node.IsSequence()) fail(source_, node, key, "must be a list");
-    value.assign(node.size(), T{});
-    for (std::size_t i = 0; i < value.size(); ++i) read(node[i], key + "." + std::to_string(i), value[i], about);
+    values.assign(node.size(), T{});
+    for (std::size_t i = 0; i < values.size(); ++i) read(node[i], key + "." + std::to_string(i), values[i], about);
   }
 
   template <typename T>

@@ -14,7 +14,7 @@
 namespace esim {
 namespace {
 
-constexpr float kMissingTextureRadiance = 0.2F;  // a mid-grey surface: 18-20 % reflectance
+constexpr float kMissingTextureBase = 0.2F;  // a mid-grey surface: 18-20 % reflectance
 
 /// Loads each texture file once.
 class TextureCache {
@@ -47,12 +47,12 @@ Material convert(const aiMaterial& source, TextureCache& textures) {
   aiString file;
   if (source.GetTexture(aiTextureType_DIFFUSE, 0, &file) == AI_SUCCESS) {
     material.texture = textures.get(file.C_Str(), material.name);
-    material.radiance = kMissingTextureRadiance;
+    material.base = material.texture != nullptr ? 1.0F : kMissingTextureBase;
     return material;
   }
   aiColor3D colour(0.5F, 0.5F, 0.5F);
   source.Get(AI_MATKEY_COLOR_DIFFUSE, colour);
-  material.radiance = 0.2126F * colour.r + 0.7152F * colour.g + 0.0722F * colour.b;
+  material.base = luminance(colour.r, colour.g, colour.b);
   return material;
 }
 
@@ -65,6 +65,8 @@ void append(Mesh& mesh, const aiMesh& part, const std::filesystem::path& path) {
     if (!is_finite(v))
       throw UserError(fmt::format("mesh {}: a vertex of {} is not finite", path.string(), part.mName.C_Str()));
     mesh.vertices.emplace_back(v.x, v.y, v.z);
+    const aiVector3D n = part.HasNormals() && is_finite(part.mNormals[i]) ? part.mNormals[i] : aiVector3D();
+    mesh.normals.emplace_back(n.x, n.y, n.z);
   }
   for (unsigned f = 0; f < part.mNumFaces; ++f) {
     const aiFace& face = part.mFaces[f];

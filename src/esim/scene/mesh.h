@@ -13,16 +13,21 @@
 
 namespace esim {
 
-/// What a surface emits towards the camera: a texture, or one radiance where there is none.
+/// How a surface looks: its base colour, which is radiance where it is unlit and albedo where light falls on it (see
+/// Lighting), and what it emits by itself. Each is a factor times a texture, whose value counts as 1 where it is null.
 struct Material {
   std::string name;
-  std::shared_ptr<const Texture> texture;  ///< radiance; may be null
-  float radiance = 0.5F;                   ///< used where texture is null
+  std::shared_ptr<const Texture> texture;  ///< of the base colour
+  float base = 0.5F;
+  std::shared_ptr<const Texture> emission_texture{};
+  float emission = 0;  ///< radiance, added to that of the base
+  bool unlit = false;  ///< shows its base colour in whatever light
 };
 
-/// Textured triangles in world coordinates (m).
+/// Textured triangles, in metres.
 struct Mesh {
   std::vector<Eigen::Vector3f> vertices;
+  std::vector<Eigen::Vector3f> normals;                    ///< per vertex, for light only; none, or of no length: flat
   std::vector<std::array<std::uint32_t, 3>> triangles;     ///< indices of vertices
   std::vector<std::array<Eigen::Vector2f, 3>> texture_uv;  ///< per triangle and corner; u right, v down
   std::vector<std::uint32_t> material;                     ///< per triangle: index of materials
@@ -33,7 +38,7 @@ struct Mesh {
 using WarningHandler = std::function<void(const std::string&)>;
 
 /// Reads a textured mesh (OBJ with MTL). Textures are found relative to the file; one that is missing or unreadable is
-/// a warning, and its surfaces are grey. Where a material has a texture, the texture alone is the radiance ("unlit").
+/// a warning, and its surfaces are grey. Where a material has a texture, the texture alone is its base colour.
 /// Throws UserError naming the file when it cannot be read or has no triangles.
 Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn);
 

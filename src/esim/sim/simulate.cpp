@@ -35,7 +35,7 @@ class Run {
     for (std::size_t i = 0; i < world.cameras.size(); ++i) {
       const CameraInfo& info = world.info.cameras[i];
       summary_.cameras.push_back(
-          {info.name, world.cameras[i].renderer->traits().name, info.model.width, info.model.height, {}, 0, 0, {}});
+          {info.name, world.cameras[i].renderer->traits().label(), info.model.width, info.model.height, {}, 0, 0, {}});
     }
   }
 
@@ -43,7 +43,7 @@ class Run {
   void advance(CameraChannel& camera, const SampleRequest& request) {
     {
       Stopwatch stopwatch(summary_.seconds.render);
-      camera.renderer->render(view(index_of(camera), request.t, request.tiles), camera.sample);
+      camera.renderer->render(view(world_, index_of(camera), request.t, request.tiles), camera.sample);
     }
     std::span<const Segment> segments;
     {
@@ -96,10 +96,6 @@ class Run {
 
   double elapsed() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
 
-  RenderRequest view(std::size_t camera, TimeNs t, std::vector<Tile> tiles) const {
-    return {t, rigidly_attached(world_.trajectory->at(t), world_.info.cameras[camera].T_body_camera), std::move(tiles)};
-  }
-
   void deliver_events(TimeNs until) {
     for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
       events_.clear();
@@ -121,8 +117,7 @@ class Run {
 
   void deliver_truth(TimeNs t) {
     for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
-      const Camera& model = world_.info.cameras[i].model;
-      const RenderRequest request = view(i, t, {{0, 0, model.width, model.height}});
+      const RenderRequest request = view(world_, i, t);
       {
         Stopwatch stopwatch(summary_.seconds.truth);
         world_.cameras[i].renderer->render(request, truth_);

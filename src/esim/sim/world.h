@@ -24,10 +24,17 @@ struct CameraChannel {
 /// The state of a simulation. Its description is a RecordingInfo, which does not change.
 struct World {
   RecordingInfo info;
-  std::unique_ptr<const Workers> workers;        // outlives the channels
-  std::shared_ptr<const Trajectory> trajectory;  // of the body
-  std::vector<CameraChannel> cameras;            // as in info.cameras
+  std::unique_ptr<const Workers> workers;                  // outlives the channels
+  std::shared_ptr<const Trajectory> trajectory;            // of the body
+  std::vector<std::shared_ptr<const Trajectory>> objects;  // of the scene's moving objects, in its order
+  std::vector<CameraChannel> cameras;                      // as in info.cameras
   PeriodicClock truth_clock, pose_clock;
 };
+
+/// What a camera of the world is asked to show of `tiles` at `t`: here the motions are evaluated.
+RenderRequest view(const World& world, std::size_t camera, TimeNs t, std::vector<Tile> tiles);
+
+/// The same for its whole image.
+RenderRequest view(const World& world, std::size_t camera, TimeNs t);
 
 }  // namespace esim

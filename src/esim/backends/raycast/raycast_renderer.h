@@ -5,13 +5,13 @@
 #include "esim/core/parallel.h"
 #include "esim/geometry/camera.h"
 #include "esim/render/renderer.h"
-#include "esim/scene/mesh.h"
+#include "esim/scene/scene.h"
 
 namespace esim {
 
-/// A mesh with its ray-casting accelerator; may be shared by the renderers of several cameras.
+/// A scene with its ray-casting accelerator; may be shared by the renderers of several cameras.
 class RaycastScene;
-std::shared_ptr<const RaycastScene> build_raycast_scene(const Mesh& mesh);
+std::shared_ptr<const RaycastScene> build_raycast_scene(const Scene& scene);
 
 struct RaycastOptions {
   float background = 0.2F;    ///< irradiance where no surface is hit

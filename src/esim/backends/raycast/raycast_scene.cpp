@@ -3,7 +3,9 @@
 #include <tbb/task_arena.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cstring>
+#include <limits>
 #include <string>
 
 #include "esim/core/error.h"
@@ -11,13 +13,13 @@
 namespace esim {
 namespace {
 
-TriangleShading shading_of(const Mesh& mesh, std::size_t index) {
+TriangleShading shading_of(const Mesh& mesh, std::size_t index, std::uint32_t first_material) {
   const auto& [uv0, uv1, uv2] = mesh.texture_uv[index];
   TriangleShading shading{};
   shading.u0 = uv0.x(), shading.v0 = uv0.y();
   shading.u1 = uv1.x() - uv0.x(), shading.v1 = uv1.y() - uv0.y();
   shading.u2 = uv2.x() - uv0.x(), shading.v2 = uv2.y() - uv0.y();
-  shading.material = mesh.material[index];
+  shading.material = first_material + mesh.material[index];
 
   // The plane's dual basis gives barycentric coordinates per metre; a degenerate triangle is never hit.
   const auto& corner = mesh.triangles[index];
@@ -41,45 +43,121 @@ void throw_on_error(RTCDevice device, const char* what) {
                                                     : ": error code " + std::to_string(error)));
 }
 
-}  // namespace
-
-RaycastScene::RaycastScene(const Mesh& mesh) : materials_(mesh.materials) {
-  device_ = rtcNewDevice(nullptr);
-  if (device_ == nullptr) throw_on_error(nullptr, "start");
-  if (rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0) packet_size_ = 8;
-  if (rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0) packet_size_ = 16;
-
+void attach(RTCDevice device, RTCScene scene, const Mesh& mesh) {
   // Embree wants its buffers padded: it allocates them, and we copy.
-  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                            sizeof(Eigen::Vector3f), mesh.vertices.size());
   void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                             sizeof(mesh.triangles[0]), mesh.triangles.size());
-  throw_on_error(device_, "hold the mesh");
+  throw_on_error(device, "hold the mesh");
   std::memcpy(vertices, mesh.vertices.data(), mesh.vertices.size() * sizeof(Eigen::Vector3f));
   std::memcpy(triangles, mesh.triangles.data(), mesh.triangles.size() * sizeof(mesh.triangles[0]));
   rtcCommitGeometry(geometry);
-
-  scene_ = rtcNewScene(device_);
-  rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
-  rtcAttachGeometry(scene_, geometry);
+  rtcAttachGeometry(scene, geometry);
   rtcReleaseGeometry(geometry);
+}
+
+/// All of them as one, so that a triangle's index is enough to find it. Materials stay each mesh's own.
+Mesh joined(const std::vector<const Mesh*>& meshes) {
+  Mesh all;
+  for (const Mesh* mesh : meshes) {
+    const auto first = static_cast<std::uint32_t>(all.vertices.size());
+    all.vertices.insert(all.vertices.end(), mesh->vertices.begin(), mesh->vertices.end());
+    for (const auto& [a, b, c] : mesh->triangles) all.triangles.push_back({first + a, first + b, first + c});
+  }
+  return all;
+}
+
+/// The bearings under which a box may be seen: all of them, unless it is before the camera in whole.
+BearingBounds bounds_in_view(const Eigen::AlignedBox3f& box, const SE3& T_group_camera) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  constexpr float kRounding = 1e-4F;
+  BearingBounds bounds{kInfinity, -kInfinity, kInfinity, -kInfinity};
+  if (box.isEmpty()) return bounds;
+  const SE3 T_camera_group = T_group_camera.inverse();
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3f corner = box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(i));
+    const Eigen::Vector3f point = (T_camera_group * corner.cast<double>()).cast<float>();
+    if (!(point.z() > 0.01F)) return {-kInfinity, kInfinity, -kInfinity, kInfinity};
+    const float x = point.x() / point.z(), y = point.y() / point.z();
+    bounds.left = std::min(bounds.left, x - kRounding), bounds.right = std::max(bounds.right, x + kRounding);
+    bounds.top = std::min(bounds.top, y - kRounding), bounds.bottom = std::max(bounds.bottom, y + kRounding);
+  }
+  return bounds;
+}
+
+}  // namespace
+
+RaycastScene::RaycastScene(const Scene& scene) : lighting_(scene.lighting) {
+  device_.reset(rtcNewDevice("hugepages=1"));
+  if (device_ == nullptr) throw_on_error(nullptr, "start");
+  if (rtcGetDeviceProperty(device_.get(), RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0) packet_size_ = 8;
+  if (rtcGetDeviceProperty(device_.get(), RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0) packet_size_ = 16;
+
+  std::vector<const Mesh*> still;
+  for (const SceneObject& object : scene.objects) {
+    if (!object.moves) still.push_back(&object.mesh);
+  }
+  add_group(still);
+  for (const SceneObject& object : scene.objects) {
+    if (object.moves) add_group({&object.mesh});
+  }
+}
+
+void RaycastScene::add_group(const std::vector<const Mesh*>& meshes) {
+  Group& group = groups_.emplace_back();
+  group.first_triangle = static_cast<std::uint32_t>(triangles_.size());
+  for (const Mesh* mesh : meshes) {
+    append(*mesh);
+    for (const Eigen::Vector3f& vertex : mesh->vertices) group.bounds.extend(vertex);
+  }
+  if (triangles_.size() == group.first_triangle) return;
+  group.accelerator.reset(rtcNewScene(device_.get()));
+  rtcSetSceneFlags(group.accelerator.get(), RTC_SCENE_FLAG_ROBUST);
+  if (meshes.size() == 1) {
+    attach(device_.get(), group.accelerator.get(), *meshes[0]);
+  } else {
+    attach(device_.get(), group.accelerator.get(), joined(meshes));
+  }
   // One thread builds the tree, so that it is the same in every run. (The device's own limit on threads would hold for
   // the whole process.)
-  tbb::task_arena(1).execute([this] { rtcJoinCommitScene(scene_); });
-  throw_on_error(device_, "build the scene");
-
-  triangles_.reserve(mesh.triangles.size());
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) triangles_.push_back(shading_of(mesh, i));
+  tbb::task_arena(1).execute([&group] { rtcJoinCommitScene(group.accelerator.get()); });
+  throw_on_error(device_.get(), "build the scene");
 }
 
-RaycastScene::~RaycastScene() {
-  if (scene_ != nullptr) rtcReleaseScene(scene_);
-  if (device_ != nullptr) rtcReleaseDevice(device_);
+void RaycastScene::append(const Mesh& mesh) {
+  const auto first_material = static_cast<std::uint32_t>(materials_.size());
+  materials_.insert(materials_.end(), mesh.materials.begin(), mesh.materials.end());
+  const std::size_t first_triangle = triangles_.size();
+  triangles_.reserve(first_triangle + mesh.triangles.size());
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) triangles_.push_back(shading_of(mesh, i, first_material));
+
+  if (!lighting_ || mesh.normals.empty()) return;
+  const Eigen::Vector3f none = Eigen::Vector3f::Zero();
+  corner_normals_.resize(first_triangle, {none, none, none});  // of the flat ones before
+  for (const auto& [a, b, c] : mesh.triangles)
+    corner_normals_.push_back({mesh.normals[a], mesh.normals[b], mesh.normals[c]});
 }
 
-std::shared_ptr<const RaycastScene> build_raycast_scene(const Mesh& mesh) {
-  return std::make_shared<const RaycastScene>(mesh);
+std::vector<PlacedGroup> RaycastScene::place(const RenderRequest& request) const {
+  if (request.objects.size() + 1 != groups_.size()) {
+    throw InternalError("a request names " + std::to_string(request.objects.size()) +
+                        " moving objects of a scene that has " + std::to_string(groups_.size() - 1));
+  }
+  std::vector<PlacedGroup> placed;
+  for (const Group& group : groups_) {
+    const SE3 T_world_group = placed.empty() ? SE3() : request.objects[placed.size() - 1].T_world_body;
+    const SE3 T_group_camera = T_world_group.inverse() * request.camera.T_world_body;
+    const Eigen::Matrix3f R_group_camera = T_group_camera.rotation.toRotationMatrix().cast<float>();
+    placed.push_back({group.accelerator.get(), R_group_camera, R_group_camera.transpose(),
+                      T_group_camera.translation.cast<float>(), bounds_in_view(group.bounds, T_group_camera)});
+  }
+  return placed;
+}
+
+std::shared_ptr<const RaycastScene> build_raycast_scene(const Scene& scene) {
+  return std::make_shared<const RaycastScene>(scene);
 }
 
 }  // namespace esim

@@ -2,38 +2,80 @@
 
 #include <embree3/rtcore.h>
 
+#include <Eigen/Geometry>
+#include <memory>
+#include <optional>
 #include <vector>
 
+#include "esim/backends/raycast/ray_blocks.h"
 #include "esim/backends/raycast/raycast_renderer.h"
 
 namespace esim {
 
-/// What shading needs to know of a triangle. Texture coordinates are uv0 + b1 uv1 + b2 uv2 (barycentric b), and
-/// change by (gradient_u, gradient_v) per metre in its plane.
-struct TriangleShading {
+/// What shading needs to know of a triangle, in one line of the cache. Texture coordinates are uv0 + b1 uv1 + b2 uv2
+/// (barycentric b), and change by (gradient_u, gradient_v) per metre in its plane.
+struct alignas(64) TriangleShading {
   float u0, v0, u1, v1, u2, v2;
   float gradient_u[3], gradient_v[3];
   std::uint32_t material;
 };
 
+struct ReleaseDevice {
+  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+};
+struct ReleaseScene {
+  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+};
+using DevicePointer = std::unique_ptr<RTCDeviceTy, ReleaseDevice>;
+using ScenePointer = std::unique_ptr<RTCSceneTy, ReleaseScene>;
+
+/// A rigid group of triangles, as a camera sees it at one time.
+struct PlacedGroup {
+  RTCScene triangles;  // in the group's frame; null if there are none
+  Eigen::Matrix3f R_group_camera, R_camera_group;
+  Eigen::Vector3f camera;  // where the camera is, in the group's frame
+  BearingBounds bounds;    // what is seen of the group lies in there
+};
+
+/// The triangles of a scene in groups that are rigid: all that stands still is group 0, the i-th moving object group
+/// i + 1. Immutable, so that any number of threads may use it at any times of the scene.
 class RaycastScene {
  public:
-  explicit RaycastScene(const Mesh& mesh);
-  ~RaycastScene();
-  RaycastScene(const RaycastScene&) = delete;
-  RaycastScene& operator=(const RaycastScene&) = delete;
+  explicit RaycastScene(const Scene& scene);
 
-  RTCScene scene() const { return scene_; }
   int packet_size() const { return packet_size_; }
-  const TriangleShading& triangle(unsigned index) const { return triangles_[index]; }
+
+  /// The groups as a camera sees them. Throws InternalError if the request does not name as many objects as move.
+  std::vector<PlacedGroup> place(const RenderRequest& request) const;
+
+  /// Where the triangles of a group begin among all.
+  std::uint32_t first_triangle(unsigned group) const { return groups_[group].first_triangle; }
+  const TriangleShading& triangle(std::uint32_t index) const { return triangles_[index]; }
   const Material& material(unsigned index) const { return materials_[index]; }
+  const std::optional<Lighting>& lighting() const { return lighting_; }
+
+  /// The normals at a triangle's corners; null, or of no length, where it is flat.
+  const std::array<Eigen::Vector3f, 3>* corner_normals(std::uint32_t index) const {
+    return index < corner_normals_.size() ? &corner_normals_[index] : nullptr;
+  }
 
  private:
-  RTCDevice device_ = nullptr;
-  RTCScene scene_ = nullptr;
+  struct Group {
+    std::uint32_t first_triangle;
+    ScenePointer accelerator;    // null for no triangles
+    Eigen::AlignedBox3f bounds;  // of its vertices
+  };
+
+  void add_group(const std::vector<const Mesh*>& meshes);
+  void append(const Mesh& mesh);
+
+  DevicePointer device_;
   int packet_size_ = 4;
-  std::vector<TriangleShading> triangles_;
+  std::optional<Lighting> lighting_;
   std::vector<Material> materials_;
+  std::vector<Group> groups_;
+  std::vector<TriangleShading> triangles_;                      // of all groups
+  std::vector<std::array<Eigen::Vector3f, 3>> corner_normals_;  // likewise, as far as there are any that light needs
 };
 
 }  // namespace esim

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace esim {
+
+/// An OpenGL 4.5 context without a window. Private to the renderer.
+class GlContext {
+ public:
+  /// On the device of this index; where none is given, on the first that is no software. Throws UserError.
+  explicit GlContext(std::optional<int> device);
+  ~GlContext();
+  GlContext(const GlContext&) = delete;
+  GlContext& operator=(const GlContext&) = delete;
+
+  /// Makes the context that of the calling thread for as long as it lives.
+  class Use {
+   public:
+    explicit Use(const GlContext& context);
+    ~Use();
+    Use(const Use&) = delete;
+    Use& operator=(const Use&) = delete;
+
+   private:
+    struct Before;
+    void* display_;
+    std::unique_ptr<Before> before_;
+  };
+
+  /// The driver's name of the device.
+  const std::string& name() const;
+  bool software() const;
+
+ private:
+  struct Handles;
+  static std::unique_ptr<Handles> open(void* display);
+
+  std::unique_ptr<Handles> handles_;
+};
+
+/// Throws if OpenGL has reported an error since the last call.
+void throw_on_gl_error(const char* doing);
+
+}  // namespace esim

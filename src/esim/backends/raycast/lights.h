@@ -1,0 +1,179 @@
+#pragma once
+
+#include <optional>
+
+#include "esim/backends/raycast/surface.h"
+
+/// Light on the surfaces that a packet of rays has hit. All vectors are in the camera frame unless they say otherwise.
+namespace esim {
+
+/// A scene's lighting as one camera sees it; `world` is the group of what stands still.
+inline Lighting in_camera_frame(Lighting lighting, const PlacedGroup& world) {
+  for (SunLight& sun : lighting.suns) sun.direction = world.R_camera_group * sun.direction.normalized();
+  for (PointLight& point : lighting.points) point.position = world.R_camera_group * (point.position - world.camera);
+  return lighting;
+}
+
+/// A vector per lane.
+template <int K>
+struct VectorLanes {
+  alignas(64) std::array<float, K> x, y, z;
+};
+
+/// Places on surfaces: the points, and the unit normals on the side that is seen: the triangle's own, and the one for
+/// shading, interpolated where the mesh has normals.
+template <int K>
+struct SurfacePoints {
+  VectorLanes<K> point, triangle_normal, normal;
+
+  /// Those that the packet has hit; of no meaning in lanes that have hit nothing.
+  void take(const RaycastScene& scene, const Packet<K>& packet, const std::array<std::uint32_t, K>& triangles,
+            const GroupRotations<K>& rotations) {
+    normal = normals_of(scene, packet, triangles);
+    const auto& R = rotations.element;
+    const auto& hit = packet.ray.hit;
+#pragma omp simd
+    for (int i = 0; i < K; ++i) {
+      const float bx = packet.bearing_x[i], by = packet.bearing_y[i], depth = packet.ray.ray.tfar[i];
+      point.x[i] = depth * bx, point.y[i] = depth * by, point.z[i] = depth;
+
+      // Turned into the camera frame, to unit length, and to the side that is seen.
+      const float gx = R[0][i] * hit.Ng_x[i] + R[1][i] * hit.Ng_y[i] + R[2][i] * hit.Ng_z[i];
+      const float gy = R[3][i] * hit.Ng_x[i] + R[4][i] * hit.Ng_y[i] + R[5][i] * hit.Ng_z[i];
+      const float gz = R[6][i] * hit.Ng_x[i] + R[7][i] * hit.Ng_y[i] + R[8][i] * hit.Ng_z[i];
+      const float towards = gx * bx + gy * by + gz > 0 ? -1.0F : 1.0F;
+      const float g_scale = towards / std::sqrt(gx * gx + gy * gy + gz * gz);
+      triangle_normal.x[i] = g_scale * gx, triangle_normal.y[i] = g_scale * gy, triangle_normal.z[i] = g_scale * gz;
+
+      const float sx = R[0][i] * normal.x[i] + R[1][i] * normal.y[i] + R[2][i] * normal.z[i];
+      const float sy = R[3][i] * normal.x[i] + R[4][i] * normal.y[i] + R[5][i] * normal.z[i];
+      const float sz = R[6][i] * normal.x[i] + R[7][i] * normal.y[i] + R[8][i] * normal.z[i];
+      const float along = sx * triangle_normal.x[i] + sy * triangle_normal.y[i] + sz * triangle_normal.z[i];
+      const float s_scale = (along < 0 ? -1.0F : 1.0F) / std::sqrt(sx * sx + sy * sy + sz * sz);
+      normal.x[i] = s_scale * sx, normal.y[i] = s_scale * sy, normal.z[i] = s_scale * sz;
+    }
+  }
+
+ private:
+  /// Of any length and on either side, in the frames of what is hit.
+  static VectorLanes<K> normals_of(const RaycastScene& scene, const Packet<K>& packet,
+                                   const std::array<std::uint32_t, K>& triangles) {
+    const auto& hit = packet.ray.hit;
+    VectorLanes<K> normals;
+    for (unsigned i = 0; i < K; ++i) {
+      Eigen::Vector3f n = Eigen::Vector3f::Zero();
+      if (const auto* corner = scene.corner_normals(triangles[i])) {
+        const float b1 = hit.u[i], b2 = hit.v[i];
+        n = (1 - b1 - b2) * (*corner)[0] + b1 * (*corner)[1] + b2 * (*corner)[2];
+      }
+      if (!(n.squaredNorm() > 1e-12F)) n = {hit.Ng_x[i], hit.Ng_y[i], hit.Ng_z[i]};
+      normals.x[i] = n.x(), normals.y[i] = n.y(), normals.z[i] = n.z();
+    }
+    return normals;
+  }
+};
+
+/// How much light falls on surfaces: the bracket of the formula in Lighting.
+template <int K>
+class LightOnSurfaces {
+ public:
+  /// `lighting` is in the camera frame.
+  LightOnSurfaces(const Lighting& lighting, const std::vector<PlacedGroup>& groups)
+      : lighting_(lighting), groups_(groups) {}
+
+  std::array<float, K> at(const SurfacePoints<K>& surface, std::uint32_t hits) const {
+    std::array<float, K> light;
+    light.fill(lighting_.ambient);
+    VectorLanes<K> to_light;
+    alignas(64) std::array<float, K> received;
+    for (const SunLight& sun : lighting_.suns) {
+      to_light.x.fill(-sun.direction.x()), to_light.y.fill(-sun.direction.y()), to_light.z.fill(-sun.direction.z());
+      for (unsigned i = 0; i < K; ++i) received[i] = sun.strength * std::max(0.0F, cosine(surface.normal, to_light, i));
+      add_what_arrives(surface, to_light, kInfinity, received, hits, light);
+    }
+    for (const PointLight& lamp : lighting_.points) {
+      for (unsigned i = 0; i < K; ++i) {
+        const float x = lamp.position.x() - surface.point.x[i], y = lamp.position.y() - surface.point.y[i],
+                    z = lamp.position.z() - surface.point.z[i];
+        const float squared = std::max(x * x + y * y + z * z, kNearestLamp * kNearestLamp);
+        to_light.x[i] = x, to_light.y[i] = y, to_light.z[i] = z;
+        received[i] =
+            lamp.strength * std::max(0.0F, cosine(surface.normal, to_light, i)) / (squared * std::sqrt(squared));
+      }
+      add_what_arrives(surface, to_light, kToLamp, received, hits, light);
+    }
+    return light;
+  }
+
+ private:
+  static constexpr float kNearestLamp = 1e-3F;  // m
+  static constexpr float kToLamp = 0.9999F;     // of the way to it: the lamp itself casts no shadow
+
+  static float cosine(const VectorLanes<K>& n, const VectorLanes<K>& l, unsigned i) {
+    return n.x[i] * l.x[i] + n.y[i] * l.y[i] + n.z[i] * l.z[i];
+  }
+
+  void add_what_arrives(const SurfacePoints<K>& surface, const VectorLanes<K>& to_light, float reach,
+                        const std::array<float, K>& received, std::uint32_t hits, std::array<float, K>& light) const {
+    if (lighting_.shadows) {
+      for (unsigned i = 0; i < K; ++i) {
+        if (!(received[i] > 0)) hits &= ~(1U << i);
+      }
+      hits = visible(surface, to_light, reach, hits);
+    }
+    for (unsigned i = 0; i < K; ++i) light[i] += (hits >> i & 1U) != 0 ? received[i] : 0.0F;
+  }
+
+  /// Those of `lanes` from whose points nothing stands before the light, up to `reach` times the vector to it.
+  std::uint32_t visible(const SurfacePoints<K>& surface, const VectorLanes<K>& to_light, float reach,
+                        std::uint32_t lanes) const {
+    // A little above the surface, by more than what rounding may have put the point below it.
+    VectorLanes<K> start;
+    const float to_origin = groups_[0].camera.template lpNorm<1>();
+    for (unsigned i = 0; i < K; ++i) {
+      const float x = surface.point.x[i], y = surface.point.y[i], z = surface.point.z[i];
+      const float gap = 2e-5F * (std::fabs(x) + std::fabs(y) + std::fabs(z) + to_origin);
+      start.x[i] = x + gap * surface.triangle_normal.x[i];
+      start.y[i] = y + gap * surface.triangle_normal.y[i];
+      start.z[i] = z + gap * surface.triangle_normal.z[i];
+    }
+    for (const PlacedGroup& group : groups_) {
+      if (lanes != 0 && group.triangles != nullptr) lanes &= ~occluded(group, start, to_light, reach, lanes);
+    }
+    return lanes;
+  }
+
+  /// Those of `lanes` whose rays meet a triangle of the group.
+  static std::uint32_t occluded(const PlacedGroup& group, const VectorLanes<K>& start, const VectorLanes<K>& to_light,
+                                float reach, std::uint32_t lanes) {
+    const Eigen::Matrix3f& R = group.R_group_camera;
+    typename Packet<K>::Ray ray;
+    alignas(64) std::array<int, K> wanted;
+    for (unsigned i = 0; i < K; ++i) {
+      wanted[i] = (lanes >> i & 1U) != 0 ? -1 : 0;
+      Eigen::Vector3f origin = Eigen::Vector3f::Zero(), direction = Eigen::Vector3f::UnitZ();
+      if (wanted[i] != 0) {  // other lanes may hold what is no number
+        origin = group.camera + R * Eigen::Vector3f(start.x[i], start.y[i], start.z[i]);
+        direction = R * Eigen::Vector3f(to_light.x[i], to_light.y[i], to_light.z[i]);
+      }
+      ray.org_x[i] = origin.x(), ray.org_y[i] = origin.y(), ray.org_z[i] = origin.z();
+      ray.dir_x[i] = direction.x(), ray.dir_y[i] = direction.y(), ray.dir_z[i] = direction.z();
+      ray.tnear[i] = 0, ray.tfar[i] = reach, ray.time[i] = 0;
+      ray.mask[i] = ~0U, ray.id[i] = 0, ray.flags[i] = 0;
+    }
+    // Not as coherent rays: with those Embree 3.13 has been seen not to end.
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    if constexpr (K == 16) rtcOccluded16(wanted.data(), group.triangles, &context, &ray);
+    if constexpr (K == 8) rtcOccluded8(wanted.data(), group.triangles, &context, &ray);
+    if constexpr (K == 4) rtcOccluded4(wanted.data(), group.triangles, &context, &ray);
+    std::uint32_t found = 0;
+    for (unsigned i = 0; i < K; ++i) found |= (ray.tfar[i] < 0 ? 1U : 0U) << i;  // so Embree marks them
+    return found;
+  }
+
+  const Lighting& lighting_;
+  const std::vector<PlacedGroup>& groups_;
+};
+
+}  // namespace esim

@@ -1,0 +1,116 @@
+#pragma once
+
+#include <embree3/rtcore.h>
+#include <hwy/highway.h>
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <type_traits>
+
+#include "esim/backends/raycast/raycast_scene.h"
+
+namespace esim {
+
+inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+/// A bit for each of K lanes.
+template <int K>
+inline constexpr std::uint32_t kEveryLane = (1U << K) - 1;
+
+/// A bit per lane in which the value is there.
+template <int K>
+std::uint32_t lanes_equal(const std::uint32_t* values, std::uint32_t value) {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::CappedTag<std::uint32_t, K> d;
+  std::uint32_t lanes = 0;
+  for (std::size_t i = 0; i < K; i += hn::Lanes(d)) {
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, hn::Eq(hn::Load(d, values + i), hn::Set(d, value)), bits);
+    lanes |= static_cast<std::uint32_t>(bits[0]) << i;
+  }
+  return lanes;
+}
+
+/// A ray of each of K neighbouring pixels, and what they hit.
+template <int K>
+struct Packet {
+  using Ray = std::conditional_t<K == 16, RTCRay16, std::conditional_t<K == 8, RTCRay8, RTCRay4>>;
+  using RayHit = std::conditional_t<K == 16, RTCRayHit16, std::conditional_t<K == 8, RTCRayHit8, RTCRayHit4>>;
+
+  alignas(64) std::array<float, K> bearing_x, bearing_y;  // in the camera frame; z = 1
+  RayHit ray;
+
+  /// One ray per pixel of the block from its lane `first` on, through the point at `offset` from the pixel's centre.
+  /// Nothing is hit yet.
+  void aim(const RayBlock& block, int first, const Eigen::Vector2f& offset);
+
+  /// Finds the nearest triangle of the group that each ray hits, where it is nearer than what has been hit already. As
+  /// bearings have z = 1 in the camera, the ray's parameter is the planar depth.
+  void intersect(const PlacedGroup& placed, unsigned group);
+
+  /// Which group of a RaycastScene a lane has hit; 0 if nothing.
+  unsigned group(unsigned lane) const { return ray.hit.instID[0][lane]; }
+
+  /// A bit per lane that has hit something.
+  std::uint32_t hits() const { return ~lanes_equal<K>(ray.hit.geomID, RTC_INVALID_GEOMETRY_ID) & kEveryLane<K>; }
+};
+
+/// For Embree, every lane holds a ray.
+template <int K>
+inline constexpr auto kAllLanes = [] {
+  struct {
+    alignas(64) std::array<int, K> valid;
+  } lanes{};
+  lanes.valid.fill(-1);
+  return lanes;
+}();
+
+template <int K>
+void Packet<K>::aim(const RayBlock& block, int first, const Eigen::Vector2f& offset) {
+  constexpr float kNearest = 1e-3F;  // m; what touches the lens is not seen
+  const float sx = offset.x(), sy = offset.y();
+#pragma omp simd
+  for (int i = 0; i < K; ++i) {
+    bearing_x[i] = block.x[first + i] + block.dx_du[first + i] * sx + block.dx_dv[first + i] * sy;
+    bearing_y[i] = block.y[first + i] + block.dy_du[first + i] * sx + block.dy_dv[first + i] * sy;
+    ray.ray.tnear[i] = kNearest;
+    ray.ray.tfar[i] = kInfinity;
+    ray.ray.time[i] = 0;
+    ray.ray.mask[i] = ~0U;
+    ray.ray.id[i] = 0;
+    ray.ray.flags[i] = 0;
+    ray.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    ray.hit.primID[i] = RTC_INVALID_GEOMETRY_ID;
+    ray.hit.instID[0][i] = 0;
+  }
+}
+
+template <int K>
+void Packet<K>::intersect(const PlacedGroup& placed, unsigned group) {
+  const Eigen::Matrix3f& R = placed.R_group_camera;
+  const float r00 = R(0, 0), r01 = R(0, 1), r02 = R(0, 2);
+  const float r10 = R(1, 0), r11 = R(1, 1), r12 = R(1, 2);
+  const float r20 = R(2, 0), r21 = R(2, 1), r22 = R(2, 2);
+  const float ox = placed.camera.x(), oy = placed.camera.y(), oz = placed.camera.z();
+#pragma omp simd
+  for (int i = 0; i < K; ++i) {
+    const float bx = bearing_x[i], by = bearing_y[i];
+    ray.ray.dir_x[i] = r00 * bx + r01 * by + r02;
+    ray.ray.dir_y[i] = r10 * bx + r11 * by + r12;
+    ray.ray.dir_z[i] = r20 * bx + r21 * by + r22;
+    ray.ray.org_x[i] = ox;
+    ray.ray.org_y[i] = oy;
+    ray.ray.org_z[i] = oz;
+  }
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  context.instID[0] = group;  // Embree writes it into the hits
+  const int* const valid = kAllLanes<K>.valid.data();
+  if constexpr (K == 16) rtcIntersect16(valid, placed.triangles, &context, &ray);
+  if constexpr (K == 8) rtcIntersect8(valid, placed.triangles, &context, &ray);
+  if constexpr (K == 4) rtcIntersect4(valid, placed.triangles, &context, &ray);
+}
+
+}  // namespace esim

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <vector>
+
+#include "esim/render/pixel_rays.h"
+
+namespace esim {
+
+/// A block of 4 x 4 pixels, row-major. What lies outside of the image repeats its last row or column.
+struct RayBlock {
+  static constexpr int kSide = 4, kPixels = kSide * kSide;
+
+  // Bearing of the pixel's centre (x, y, 1) in the camera frame, and its change as the pixel (u, v) does.
+  alignas(64) float x[kPixels], y[kPixels];
+  alignas(64) float dx_du[kPixels], dx_dv[kPixels], dy_du[kPixels], dy_dv[kPixels];
+};
+
+/// A rectangle of bearings: x from left to right, y from top to bottom.
+struct BearingBounds {
+  float left, right, top, bottom;
+
+  bool overlap(const BearingBounds& other) const {
+    return left <= other.right && other.left <= right && top <= other.bottom && other.top <= bottom;
+  }
+};
+
+/// A camera's rays in blocks aligned with the image's corner: what is traced together lies together in memory, and it
+/// is the same pixels whatever tile is asked for.
+class RayBlocks {
+ public:
+  explicit RayBlocks(const PixelRays& rays);
+
+  /// The block that begins at column x and row y, multiples of kSide.
+  const RayBlock& at(int x, int y) const { return blocks_[index(x, y)]; }
+
+  /// What holds all the rays of that block, wherever in their pixels they lie.
+  const BearingBounds& bounds(int x, int y) const { return bounds_[index(x, y)]; }
+
+ private:
+  std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y / RayBlock::kSide * columns_ + x / RayBlock::kSide);
+  }
+
+  int columns_;
+  std::vector<RayBlock> blocks_;
+  std::vector<BearingBounds> bounds_;  // apart, since only moving objects ask for them
+};
+
+}  // namespace esim

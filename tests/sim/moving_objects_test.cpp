@@ -1,0 +1,145 @@
+// Moving objects from the scenario to the events.
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "esim/compose/compose.h"
+#include "esim/core/error.h"
+#include "support/errors.h"
+#include "support/temporary_directory.h"
+
+namespace esim {
+namespace {
+
+/// Counts events and keeps the motion field of the last ground truth.
+class Counter final : public Sink {
+ public:
+  void begin(const RecordingInfo&) override {}
+  void write(const Record& record) override {
+    if (const auto* part = std::get_if<EventsRecord>(&record))
+      events.insert(events.end(), part->events.begin(), part->events.end());
+    if (const auto* truth = std::get_if<TruthRecord>(&record)) flow_x = truth->flow_x;
+  }
+  void end(bool) override {}
+
+  std::vector<Event> events;
+  Image<float> flow_x;
+};
+
+/// A grey wall 3 m before a camera at rest, and a white card 2 m before it that crosses the view at 2 m/s.
+class MovingObjects : public testing::Test {
+ protected:
+  void SetUp() override {
+    write_square("wall.obj", 40, 0.2);
+    write_square("card.obj", 0.4, 1.0);
+    write("card.txt", "0 -1 -1 0 0 0 0 1\n0.5 -1 0 0 0 0 0 1\n1 -1 1 0 0 0 0 1\n");
+
+    MeshRendererOptions mesh;
+    mesh.scene = folder_.path() / "wall.obj";
+    FileTrajectoryOptions path;
+    path.path = folder_.path() / "card.txt";
+    mesh.objects = {{"card", folder_.path() / "card.obj", 1.0, path}};
+    scenario_.renderer = mesh;
+    StaticTrajectoryOptions still;
+    still.pose.position = {-3, 0, 0};
+    scenario_.trajectory = still;
+    scenario_.duration_s = 1.0;
+    CameraOptions camera;
+    camera.name = "cam0";
+    camera.width = 64, camera.height = 48;
+    camera.horizontal_fov_deg = 40;
+    scenario_.cameras = {camera};
+  }
+
+  void write(const char* name, const std::string& text) const { std::ofstream(folder_.path() / name) << text; }
+
+  /// A grey square in the plane x = 0, `side` metres wide.
+  void write_square(const std::string& name, double side, double grey) const {
+    std::string corners;
+    for (const auto& [y, z] : {std::pair(-1, -1), {1, -1}, {1, 1}, {-1, 1}})
+      corners += "v 0 " + std::to_string(y * side / 2) + " " + std::to_string(z * side / 2) + "\n";
+    write(name.c_str(), "mtllib " + name + ".mtl\n" + corners + "usemtl m\nf 1 2 3\nf 1 3 4\n");
+    const std::string kd = std::to_string(grey);
+    write((name + ".mtl").c_str(), "newmtl m\nKd " + kd + " " + kd + " " + kd + "\n");
+  }
+
+  MeshRendererOptions& mesh() { return std::get<MeshRendererOptions>(scenario_.renderer); }
+
+  Summary run(Counter& out, int threads = 1) {
+    World world = build_world(scenario_, threads, {[](const std::string&) {}, [](const std::string&) {}});
+    return simulate(world, out, [](const Progress&) { return true; });
+  }
+
+  std::string error() {
+    return test::message_of<UserError>([&] {
+      build_world(scenario_, 1, {[](const std::string&) {}, [](const std::string&) {}});
+    });
+  }
+
+  test::TemporaryDirectory folder_;
+  Scenario scenario_;
+};
+
+TEST_F(MovingObjects, FireEventsBeforeACameraAtRestAndDriveItsSampling) {
+  Counter out;
+  const Summary summary = run(out);
+  EXPECT_GT(out.events.size(), 500U);
+
+  // 2 m/s at 2 m are 1 rad/s times fx = 32 / tan 20 deg = 88 px/s: a sample per half a pixel while the card is in
+  // sight.
+  EXPECT_GT(summary.cameras[0].sampling.samples, 100);
+  mesh().objects.clear();
+  Counter nothing;
+  EXPECT_LT(run(nothing).cameras[0].sampling.samples, summary.cameras[0].sampling.samples / 2);
+  EXPECT_EQ(nothing.events.size(), 0U);
+}
+
+TEST_F(MovingObjects, AreTheSameWithAnyNumberOfThreads) {
+  RandomTrajectoryOptions random;
+  random.position_amplitude_m = {0.3, 0.5, 0.4};
+  random.rotation_amplitude_deg = {40, 40, 40};
+  random.center.position = {-1, 0, 0};
+  mesh().objects[0].trajectory = random;
+  mesh().objects.push_back(mesh().objects[0]);
+  mesh().lighting = LambertOptions{0.2, {{{1, 0.2, -0.5}, 1.0}}, {}, true};
+  scenario_.duration_s = 0.3;
+  Counter one, two, other_seed;
+  run(one, 1);
+  run(two, 2);
+  EXPECT_EQ(one.events, two.events);
+  EXPECT_GT(one.events.size(), 100U);
+  scenario_.seed = 1;
+  run(other_seed);
+  EXPECT_NE(one.events, other_seed.events);
+}
+
+TEST_F(MovingObjects, OfOneSeedMoveEachInTheirOwnWay) {
+  RandomTrajectoryOptions random;
+  random.position_amplitude_m = {1, 1, 1};
+  mesh().objects[0].trajectory = random;
+  mesh().objects.push_back(mesh().objects[0]);
+  const World world = build_world(scenario_, 1, {[](const std::string&) {}, [](const std::string&) {}});
+  const auto request = view(world, 0, 500 * kNsPerMs);
+  ASSERT_EQ(request.objects.size(), 2U);
+  EXPECT_GT((request.objects[0].T_world_body.translation - request.objects[1].T_world_body.translation).norm(), 1e-3);
+  EXPECT_TRUE(request.objects[0].T_world_body.rotation.isApprox(Eigen::Quaterniond::Identity()));
+}
+
+TEST_F(MovingObjects, AreRefusedWhereTheirMotionIsNot) {
+  scenario_.duration_s = 1.5;
+  EXPECT_TRUE(test::contains(error(), "renderer.objects.0.trajectory: lasts from 0 to 1 s"));
+  std::get<FileTrajectoryOptions>(mesh().objects[0].trajectory).time_scale = 2;
+  EXPECT_EQ(error(), "nothing was thrown");
+  std::get<FileTrajectoryOptions>(mesh().objects[0].trajectory).path.clear();
+  EXPECT_TRUE(test::contains(error(), "renderer.objects.0.trajectory.path: is missing"));
+  mesh().objects.clear();
+  mesh().objects.resize(1);
+  mesh().objects[0].trajectory = StaticTrajectoryOptions{};
+  EXPECT_TRUE(test::contains(error(), "renderer.objects.0.scene: is missing"));
+  mesh().objects.clear();
+  mesh().lighting = LambertOptions{0.2, {{{0, 0, 0}, 1.0}}, {}, false};
+  EXPECT_TRUE(test::contains(error(), "renderer.lighting.suns: [0, 0, 0] is no direction"));
+}
+
+}  // namespace
+}  // namespace esim

@@ -33,7 +33,8 @@ ALLOWED = {
 
 # Heavy libraries, and the headers of ours that may include them: private ones, which only .cpp files include.
 HEAVY = re.compile(r"^(embree3|assimp|opencv2|hdf5|yaml-cpp|nlohmann|fmt|tbb|libav|libsw|Imf)")
-PRIVATE_HEADERS = {"backends/raycast/lights.h", "backends/raycast/packet.h", "backends/raycast/raycast_scene.h", "backends/raycast/surface.h", "scenario/yaml_reader.h", "record/formats/hdf5_detail.h",
+PRIVATE_HEADERS = {"backends/raycast/lights.h", "backends/raycast/packet.h", "backends/raycast/raycast_scene.h",
+                   "backends/raycast/surface.h", "scenario/yaml_reader.h", "record/formats/hdf5_detail.h",
                    "record/formats/hdf5_input.h", "record/formats/hdf5_output_driver.h", "sensors/vector_math.h"}
 
 

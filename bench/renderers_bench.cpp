@@ -20,7 +20,7 @@ std::vector<Tile> every_nth_tile(int n) {
   int i = 0;
   for (int y = 0; y < kCamera.height; y += 20) {
     for (int x = 0; x < kCamera.width; x += 32) {
-      if (i++ % n == 0) tiles.push_back({x, y, std::min(32, kCamera.width - x), std::min(20, kCamera.height - y)});
+      if (i++ % n == n / 2) tiles.push_back({x, y, std::min(32, kCamera.width - x), std::min(20, kCamera.height - y)});
     }
   }
   return tiles;

@@ -25,7 +25,4 @@ struct Scene {
 /// A scene of one mesh that stands still, unlit.
 Scene still_scene(Mesh mesh);
 
-/// How many of the scene's objects move.
-std::size_t count_moving(const Scene& scene);
-
 }  // namespace esim

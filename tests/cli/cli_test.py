@@ -80,6 +80,27 @@ class Recordings(Cli):
         result = self.simulate(*FAST, "--quiet")
         self.assertEqual((result.returncode, result.stdout, result.stderr), (0, "", ""))
 
+    def test_opengl_shows_what_the_ray_caster_shows(self):
+        room = SCENES / "room.yaml"
+        options = ["--set", "duration_s=0.05", "--set", "output.preview=false"]
+        check = run("check", room, "--set", "renderer.engine=gl")
+        if "libegl1" in check.stderr:
+            self.skipTest("no OpenGL: libegl1, libgl1-mesa-dri")
+        self.assertIn("on OpenGL, ", check.stdout, check.stderr)
+        reports = {}
+        for engine in ("gl", "raycast", "auto"):
+            out = self.folder / engine
+            result = run("simulate", room, "--out", out, "--set", f"renderer.engine={engine}", *options)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            reports[engine] = json.loads((out / "report.json").read_text())["cameras"][0]
+        self.assertIn("OpenGL", reports["gl"]["renderer"])
+        self.assertEqual(reports["raycast"]["renderer"], "mesh")
+        events = [reports[engine]["events"] for engine in ("gl", "raycast")]
+        self.assertLess(abs(events[0] / events[1] - 1), 0.1)
+        self.assert_refused(run("check", room, "--set", "renderer.engine=gl", "--set", "renderer.gl_device=30"),
+                            "gl_device", "30")
+        self.assert_refused(run("check", room, "--set", "renderer.engine=vulkan"), "renderer.engine", "raycast, gl")
+
     def test_info_and_check_and_options(self):
         self.simulate(*FAST)
         for path in (self.out, self.out / "events.h5"):

@@ -110,16 +110,17 @@ std::array<float, K> Texture::sample(const TextureLookup<K>& at, std::uint32_t l
       continue;
     }
     const auto along_x = hn::Ge(x2, y2);
-    // The upper bound keeps a degenerate footprint (a pole, a horizon) finite.
-    const V major = hn::Min(hn::Sqrt(hn::IfThenElse(along_x, x2, y2)), hn::Set(d, 1e6F));
-    const V minor = hn::Max(hn::Sqrt(hn::IfThenElse(along_x, y2, x2)), hn::Set(d, 1e-6F));
-    const V ratio = hn::Min(major, hn::Div(major, minor));  // one texel is the finest that is resolved
+    // Squared, which spares roots. The upper bound keeps a degenerate footprint (a pole, a horizon) finite.
+    const V major2 = hn::Min(hn::IfThenElse(along_x, x2, y2), hn::Set(d, 1e12F));
+    const V minor2 = hn::Max(hn::IfThenElse(along_x, y2, x2), hn::Set(d, 1e-12F));
+    const V ratio = hn::Sqrt(hn::Min(major2, hn::Div(major2, minor2)));  // one texel is the finest that is resolved
     const V probes = hn::Min(hn::Max(hn::Ceil(hn::Sub(ratio, hn::Set(d, 0.25F))), one), hn::Set(d, kMaxProbes));
     const V per_probe = hn::Div(one, probes);
 
     // The two levels on either side of the blur.
-    const V blur = hn::Max(hn::Max(hn::Mul(major, per_probe), minor), one);
-    const V lod = hn::Min(binary_logarithm(d, blur), hn::Set(d, static_cast<float>(levels_ - 1)));
+    const V blur2 = hn::Max(hn::Max(hn::Mul(major2, hn::Mul(per_probe, per_probe)), minor2), one);
+    const V lod =
+        hn::Min(hn::Mul(binary_logarithm(d, blur2), hn::Set(d, 0.5F)), hn::Set(d, static_cast<float>(levels_ - 1)));
     const auto finer = to_integer(d, hn::Floor(lod));
     const auto coarser = hn::Min(hn::Add(finer, hn::Set(di, 1)), hn::Set(di, levels_ - 1));
     const V fraction = hn::Sub(lod, hn::ConvertTo(d, finer));

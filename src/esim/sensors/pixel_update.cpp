@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "esim/sensors/front_end.h"
@@ -9,13 +10,6 @@
 
 namespace esim {
 namespace {
-
-/// Lanes whose alarm goes off by `now`, in ticks.
-template <class D>
-hn::Mask<D> alarmed(D d, const std::int32_t* alarms, std::int32_t now) {
-  const hn::RebindToSigned<D> di;
-  return hn::RebindMask(d, hn::Lt(hn::LoadU(di, alarms), hn::Set(di, now + 1)));
-}
 
 std::size_t index(const PixelArray& pixels, int x, int y) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width) + static_cast<std::size_t>(x);
@@ -48,19 +42,31 @@ struct PixelUpdate::Filter {
   }
 };
 
+/// Where a row's pixels are in memory, from the tile's first on.
+struct PixelUpdate::FilterRow {
+  const float *light0, *light1, *end;    // irradiance at the segment's ends, brightness at its end
+  float *start, *filtered1, *filtered2;  // brightness at its start, and behind each pole: to be moved on
+  const float *band_low, *band_high;
+  const std::int32_t* alarms;  // or null
+  std::uint32_t pixel, place;  // of the first one
+};
+
 /// Moves some neighbouring pixels' low-passes to the segment's end, exactly for brightness that is linear in time and
 /// for the segment's mean intensity, and wakes those that may have left their band on the way.
 template <int kOrder, class D>
-HWY_INLINE void PixelUpdate::filter_vector(D d, PixelArray& pixels, const Segment& segment, const Filter& filter,
-                                           const float* brightness, int y, int x, const EventPacking& packing) {
+HWY_INLINE void PixelUpdate::filter_vector(D d, const FilterRow& row, const Filter& filter, int x) {
   using V = hn::Vec<D>;
-  const std::size_t i = index(pixels, x, y);
-  const V start = hn::LoadU(d, &pixels.brightness[i]), end = hn::LoadU(d, brightness);
-  hn::StoreU(end, d, &pixels.brightness[i]);
-  V lowest = hn::Min(start, end), highest = hn::Max(start, end);
+  const hn::RebindToSigned<D> di;
+  const V start = hn::LoadU(d, row.start + x), end = hn::LoadU(d, row.end + x);
+  const V low = hn::LoadU(d, row.band_low + x), high = hn::LoadU(d, row.band_high + x);
   V phase = hn::Zero(d), m = phase, f1 = start, f2 = start;
-  const V e0 = hn::LoadU(d, segment.irradiance0->row(y) + x), e1 = hn::LoadU(d, segment.irradiance1->row(y) + x);
+  const V e0 = hn::LoadU(d, row.light0 + x), e1 = hn::LoadU(d, row.light1 + x);
+  const auto alarm =
+      row.alarms != nullptr ? hn::LoadU(di, row.alarms + x) : hn::Set(di, std::numeric_limits<std::int32_t>::max());
+  if constexpr (kOrder > 0) f1 = hn::LoadU(d, row.filtered1 + x);
+  if constexpr (kOrder > 1) f2 = hn::LoadU(d, row.filtered2 + x);
 
+  V lowest = hn::Min(start, end), highest = hn::Max(start, end);
   if constexpr (kOrder > 0) {
     // How many time constants the segment lasts: of the mean light, by Simpson's rule for an exponential.
     const V sum = hn::MulAdd(hn::Set(d, 4.0F), hn::Sqrt(hn::Mul(e0, e1)), hn::Add(e0, e1));
@@ -70,35 +76,34 @@ HWY_INLINE void PixelUpdate::filter_vector(D d, PixelArray& pixels, const Segmen
     const V one = hn::Set(d, 1.0F), rise = hn::Sub(end, start);
     m = moved_after(d, phase);
     const V followed = hn::Div(m, phase);
-    f1 = hn::LoadU(d, &pixels.filtered1[i]);
     const V distance = hn::Sub(start, f1);
     const V f1_end = hn::Add(f1, hn::MulAdd(m, distance, hn::Mul(rise, hn::Sub(one, followed))));
-    hn::StoreU(f1_end, d, &pixels.filtered1[i]);
+    hn::StoreU(f1_end, d, row.filtered1 + x);
     if constexpr (kOrder == 1) {
       // Where F does not turn back, it stays between its ends.
       const auto turns = hn::Lt(hn::Mul(distance, hn::Sub(end, f1_end)), hn::Zero(d));
       lowest = hn::Min(hn::Min(f1, f1_end), hn::IfThenElse(turns, lowest, f1_end));
       highest = hn::Max(hn::Max(f1, f1_end), hn::IfThenElse(turns, highest, f1_end));
     } else {
-      f2 = hn::LoadU(d, &pixels.filtered2[i]);
       const V from_first = hn::Mul(hn::Mul(phase, hn::Sub(one, m)), hn::Neg(distance));
       const V from_rise = hn::Mul(rise, hn::Add(hn::MulAdd(hn::Set(d, -2.0F), followed, one), hn::Sub(one, m)));
       const V f2_end = hn::Add(hn::MulAdd(m, hn::Sub(start, f2), f2), hn::Add(from_first, from_rise));
-      hn::StoreU(f2_end, d, &pixels.filtered2[i]);
+      hn::StoreU(f2_end, d, row.filtered2 + x);
       lowest = hn::Min(hn::Min(f2, f2_end), hn::Min(f1, lowest));
       highest = hn::Max(hn::Max(f2, f2_end), hn::Max(f1, highest));
     }
   }
 
-  auto restless =
-      hn::Or(hn::Le(lowest, hn::LoadU(d, &pixels.band_low[i])), hn::Ge(highest, hn::LoadU(d, &pixels.band_high[i])));
-  if (pixels.alarmed) restless = hn::Or(restless, alarmed(d, &pixels.alarms[i], filter.now));
+  hn::StoreU(end, d, row.start + x);
+  auto restless = hn::Or(hn::Le(lowest, low), hn::Ge(highest, high));
+  restless = hn::Or(restless, hn::RebindMask(d, hn::Lt(alarm, hn::Set(di, filter.now + 1))));
   // Without a branch: that a pixel wakes is as hard to foresee as an event.
   const ChosenLanes chosen(d, restless);
   AwakePixels& a = awake_;
   const std::size_t at = a.count;
-  chosen.store_positions(static_cast<std::uint32_t>(i), 1, a.pixel.data() + at);
-  chosen.store_positions(static_cast<std::uint32_t>(packing.place(x, y)), 2, a.place.data() + at);
+  const auto column = static_cast<std::uint32_t>(x);
+  chosen.store_positions(row.pixel + column, 1, a.pixel.data() + at);
+  chosen.store_positions(row.place + 2 * column, 2, a.place.data() + at);
   chosen.store(e0, a.light0.data() + at);
   chosen.store(e1, a.light1.data() + at);
   chosen.store(start, a.start.data() + at);
@@ -109,7 +114,7 @@ HWY_INLINE void PixelUpdate::filter_vector(D d, PixelArray& pixels, const Segmen
     chosen.store(m, a.moved.data() + at);
   }
   if constexpr (kOrder == 2) chosen.store(f2, a.filtered2.data() + at);
-  a.count += chosen.count();
+  a.count = at + chosen.count();
 }
 
 /// Takes the pixels that woke up through the segment.
@@ -141,22 +146,34 @@ const float* PixelUpdate::brightness_row(const PixelArray& pixels, const Segment
 template <int kOrder>
 void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const Filter& filter, const float* brightness,
                              int y, PackedEvents& events) {
-  const int first = segment.tile.x, last = first + segment.tile.width;
+  const int left = segment.tile.x, width = segment.tile.width;
+  const std::size_t first = index(pixels, left, y);
+  const auto from = [&](auto& values) { return values.empty() ? nullptr : values.data() + first; };
+  const FilterRow row{.light0 = segment.irradiance0->row(y) + left,
+                      .light1 = segment.irradiance1->row(y) + left,
+                      .end = brightness,
+                      .start = from(pixels.brightness),
+                      .filtered1 = from(pixels.filtered1),
+                      .filtered2 = from(pixels.filtered2),
+                      .band_low = from(pixels.band_low),
+                      .band_high = from(pixels.band_high),
+                      .alarms = from(pixels.alarms),
+                      .pixel = static_cast<std::uint32_t>(first),
+                      .place = static_cast<std::uint32_t>(events.packing().place(left, y))};
   std::size_t asked = awake_.count;
   const auto filter_to = [&](auto d, int begin, int end) {
-    const int lanes = static_cast<int>(hn::Lanes(d));
-    for (int x = begin; x < end; x += lanes) {
-      filter_vector<kOrder>(d, pixels, segment, filter, brightness + (x - first), y, x, events.packing());
-      if ((x & 31) < lanes) {
-        for (; asked < awake_.count; ++asked) pixels.prefetch(awake_.pixel[asked]);
-      }
+    for (int x = begin; x < end; x += static_cast<int>(hn::Lanes(d))) {
+      filter_vector<kOrder>(d, row, filter, x);
+      // About as many as wake, and no branch on whether they do.
+      pixels.prefetch(awake_.pixel[asked]), pixels.prefetch(awake_.pixel[asked + 1]);
+      asked = std::min(asked + 2, awake_.count);
       if (!awake_.has_room()) run_awake<kOrder>(pixels, segment, events), asked = 0;
     }
   };
   const hn::CappedTag<float, 8> whole;
-  const int middle = last - segment.tile.width % static_cast<int>(hn::Lanes(whole));
-  filter_to(whole, first, middle);
-  filter_to(hn::CappedTag<float, 1>(), middle, last);
+  const int middle = width - width % static_cast<int>(hn::Lanes(whole));
+  filter_to(whole, 0, middle);
+  filter_to(hn::CappedTag<float, 1>(), middle, width);
 }
 
 /// Where bands are of brightness: moves all low-passes on, and takes those pixels through the segment whose filtered

@@ -33,12 +33,12 @@ class PixelUpdate {
               PackedEvents& events);
 
   struct Filter;
+  struct FilterRow;
   template <int kOrder>
   void filter_row(PixelArray& pixels, const Segment& segment, const Filter& filter, const float* brightness, int y,
                   PackedEvents& events);
   template <int kOrder, class D>
-  void filter_vector(D d, PixelArray& pixels, const Segment& segment, const Filter& filter, const float* brightness,
-                     int y, int x, const EventPacking& packing);
+  void filter_vector(D d, const FilterRow& row, const Filter& filter, int x);
   template <int kOrder>
   void run_awake(PixelArray& pixels, const Segment& segment, PackedEvents& events);
   const float* brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int y);

@@ -29,13 +29,32 @@ inline void exponentials(std::size_t count, float* values) {
   for_vectors(count, values, [](auto d, auto x) { return hn::Exp(d, x); });
 }
 
+/// ln(x) for x > 0, finite and not denormal, to a unit or two in the last place of a float.
+template <class D>
+HWY_INLINE hn::Vec<D> logarithm(D d, hn::Vec<D> x) {
+  // x = 2^n (1 + f) with 1 + f between sqrt(1/2) and sqrt(2); ln(1 + f) = f - f^2 / 2 + f^3 times a minimax polynomial.
+  const hn::RebindToSigned<D> di;
+  const auto bits = hn::BitCast(di, x);
+  const auto n = hn::ShiftRight<23>(hn::Sub(bits, hn::Set(di, 0x3f3504f3)));
+  const auto f = hn::Sub(hn::BitCast(d, hn::Sub(bits, hn::ShiftLeft<23>(n))), hn::Set(d, 1.0F));
+  const auto f2 = hn::Mul(f, f), f4 = hn::Mul(f2, f2), whole = hn::ConvertTo(d, n);
+  const auto pair = [&](float first, float second) { return hn::MulAdd(f, hn::Set(d, second), hn::Set(d, first)); };
+  const auto p03 = hn::MulAdd(pair(0.200012269F, -0.166233574F), f2, pair(0.333333317F, -0.25000821F));
+  const auto p47 = hn::MulAdd(pair(0.127615781F, -0.0763449927F), f2, pair(0.142017578F, -0.131601819F));
+  const auto cubic = hn::Mul(hn::Mul(f2, f), hn::MulAdd(p47, f4, p03));
+  const auto small = hn::MulAdd(whole, hn::Set(d, -2.12194440e-4F), hn::NegMulAdd(hn::Set(d, 0.5F), f2, cubic));
+  return hn::MulAdd(whole, hn::Set(d, 0.693359375F), hn::Add(f, small));
+}
+
 /// 1 - exp(-u) for u >= 0, to a few units in the last place of a float.
 template <class D>
 HWY_INLINE hn::Vec<D> moved_after(D d, hn::Vec<D> u) {
-  // u = n ln 2 - r with |r| <= ln 2 / 2; then 1 - exp(-u) = (1 - 2^-n) - 2^-n (exp(r) - 1).
+  // u = n ln 2 - r with |r| <= ln 2 / 2; then 1 - exp(-u) = (1 - 2^-n) - 2^-n (exp(r) - 1). Added to 1.5 * 2^23, n
+  // stands in the lowest bits of a float.
   const hn::RebindToSigned<D> di;
+  const auto rounder = hn::Set(d, 12582912.0F), one = hn::Set(d, 1.0F);
   u = hn::Min(u, hn::Set(d, 60.0F));  // where it has long been 1
-  const auto n = hn::Round(hn::Mul(u, hn::Set(d, 1.44269504F)));
+  const auto rounded = hn::MulAdd(u, hn::Set(d, 1.44269504F), rounder), n = hn::Sub(rounded, rounder);
   const auto r = hn::MulSub(n, hn::Set(d, 0.693359375F), hn::MulAdd(n, hn::Set(d, 2.12194440e-4F), u));
   const auto r2 = hn::Mul(r, r);
   const auto p01 = hn::MulAdd(r, hn::Set(d, 1.0F / 6), hn::Set(d, 0.5F));
@@ -43,8 +62,8 @@ HWY_INLINE hn::Vec<D> moved_after(D d, hn::Vec<D> u) {
   const auto p45 = hn::MulAdd(r, hn::Set(d, 1.0F / 5040), hn::Set(d, 1.0F / 720));
   const auto tail = hn::MulAdd(hn::MulAdd(p45, r2, p23), r2, p01);
   const auto grown = hn::MulAdd(tail, r2, r);
-  const auto scale = hn::BitCast(d, hn::ShiftLeft<23>(hn::Sub(hn::Set(di, 127), hn::ConvertTo(di, n))));
-  return hn::NegMulAdd(scale, grown, hn::Sub(hn::Set(d, 1.0F), scale));
+  const auto scale = hn::BitCast(d, hn::Sub(hn::BitCast(di, one), hn::ShiftLeft<23>(hn::BitCast(di, rounded))));
+  return hn::NegMulAdd(scale, grown, hn::Sub(one, scale));
 }
 
 /// For each set of eight lanes, as bits, the lanes in it, in order, then others.

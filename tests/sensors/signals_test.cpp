@@ -119,7 +119,7 @@ struct Block {
       compare.leak[i] = 3e-7 * uniform(random);
       compare.from[i] = i % 2 == 0 ? Case::kDuration * uniform(random) : 0;
     }
-    signals.take(awake, kPoles, Case::kDuration);
+    signals.take(awake, 0, kPoles, Case::kDuration);
     signals.advance(compare);
     for (std::size_t i = 0; i < kBlock; ++i) {
       compare.reference[i] = signals.value(i) + compare.leak[i] * compare.from[i];
@@ -180,7 +180,7 @@ TEST(RelaxingSignals, DoNotDependOnTheirNeighbours) {
     single.compare.reference[0] = block.compare.reference[i], single.compare.leak[0] = block.compare.leak[i];
     single.compare.from[0] = block.compare.from[i];
     single.awake.count = single.compare.count = 1;
-    single.signals.take(single.awake, 1, Case::kDuration);
+    single.signals.take(single.awake, 0, 1, Case::kDuration);
     single.signals.advance(single.compare);
     single.signals.find(single.compare);
     EXPECT_EQ(single.compare.polarity[0], block.compare.polarity[i]);
@@ -201,7 +201,7 @@ TEST(LinearSignals, FindTheirCrossings) {
     compare.from[i] = from[i];
   }
   compare.leak[4] = 2e-6;
-  signals.take(awake, 1e6);
+  signals.take(awake, 0, 1e6);
   signals.advance(compare);
   signals.find(compare);
   EXPECT_EQ(compare.polarity[0], 0);

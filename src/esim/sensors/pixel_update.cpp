@@ -117,21 +117,21 @@ HWY_INLINE void PixelUpdate::filter_vector(D d, const FilterRow& row, const Filt
   a.count = at + chosen.count();
 }
 
-/// Takes the pixels that woke up through the segment.
+/// Takes the pixels that woke up through the segment: all of them, or only so far that there is room for more.
 template <int kOrder>
-void PixelUpdate::run_awake(PixelArray& pixels, const Segment& segment, PackedEvents& events) {
+void PixelUpdate::run_awake(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events) {
   const auto duration = static_cast<double>(segment.t1 - segment.t0);
   const auto run = [&](auto& pass, const auto& take) {
-    pass.begin(pixels, awake_, segment.t0, segment.t1);
-    take(pass.signals);
-    pass.run(pixels, events);
+    take(pass.signals, pass.take(pixels, awake_, segment.t0, segment.t1));
+    do {
+      pass.round(pixels, awake_, events);
+    } while (all ? awake_.count > 0 : !awake_.has_room());
   };
   if constexpr (kOrder == 0) {
-    run(linear_, [&](LinearSignals& signals) { signals.take(awake_, duration); });
+    run(linear_, [&](LinearSignals& signals, std::size_t first) { signals.take(awake_, first, duration); });
   } else {
-    run(relaxing_, [&](RelaxingSignals& signals) { signals.take(awake_, kOrder, duration); });
+    run(relaxing_, [&](RelaxingSignals& signals, std::size_t first) { signals.take(awake_, first, kOrder, duration); });
   }
-  awake_.count = 0;
 }
 
 const float* PixelUpdate::brightness_row(const PixelArray& pixels, const Segment& segment,
@@ -167,7 +167,7 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
       // About as many as wake, and no branch on whether they do.
       pixels.prefetch(awake_.pixel[asked]), pixels.prefetch(awake_.pixel[asked + 1]);
       asked = std::min(asked + 2, awake_.count);
-      if (!awake_.has_room()) run_awake<kOrder>(pixels, segment, events), asked = 0;
+      if (!awake_.has_room()) run_awake<kOrder>(pixels, segment, false, events), asked = awake_.count;
     }
   };
   const hn::CappedTag<float, 8> whole;
@@ -190,9 +190,9 @@ bool PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image
     if (order == 1) filter_row<1>(pixels, segment, common, row, y, events);
     if (order == 2) filter_row<2>(pixels, segment, common, row, y, events);
   }
-  if (order == 0) run_awake<0>(pixels, segment, events);
-  if (order == 1) run_awake<1>(pixels, segment, events);
-  if (order == 2) run_awake<2>(pixels, segment, events);
+  if (order == 0) run_awake<0>(pixels, segment, true, events);
+  if (order == 1) run_awake<1>(pixels, segment, true, events);
+  if (order == 2) run_awake<2>(pixels, segment, true, events);
   return true;
 }
 
@@ -203,11 +203,13 @@ bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, P
     clean_.run(pixels, segment, watch_, rows, events);
     return true;
   }
-  const auto run = [&] {
-    linear_.begin(pixels, awake_, segment.t0, segment.t1);
-    linear_.signals.take_light(awake_, pixels.options.log_eps, static_cast<double>(segment.t1 - segment.t0));
-    linear_.run(pixels, events);
-    awake_.count = 0;
+  const auto duration = static_cast<double>(segment.t1 - segment.t0);
+  const auto run = [&](bool all) {
+    const std::size_t first = linear_.take(pixels, awake_, segment.t0, segment.t1);
+    linear_.signals.take_light(awake_, first, pixels.options.log_eps, duration);
+    do {
+      linear_.round(pixels, awake_, events);
+    } while (all ? awake_.count > 0 : !awake_.has_room());
   };
   for (int y = rows.first; y < rows.last; ++y) {
     for (const std::uint32_t x : watch_.columns(y)) {
@@ -217,10 +219,10 @@ bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, P
       awake_.place[i] = static_cast<std::uint32_t>(events.packing().place(column, y));
       awake_.light0[i] = segment.irradiance0->row(y)[x];
       awake_.light1[i] = segment.irradiance1->row(y)[x];
-      if (!awake_.has_room()) run();
+      if (!awake_.has_room()) run(false);
     }
   }
-  run();
+  run(true);
   return true;
 }
 
@@ -255,10 +257,9 @@ bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<f
       const std::size_t count = std::min(kBlock, width - begin);
       for (std::size_t i = 0; i < count; ++i) awake_.pixel[i] = static_cast<std::uint32_t>(first + begin + i);
       awake_.count = count;
-      linear_.begin(pixels, awake_, segment.t0, segment.t1);
+      linear_.take(pixels, awake_, segment.t0, segment.t1);
       for (std::size_t i = 0; i < count; ++i) linear_.signals.set(i, row_[begin + i], row_[begin + i]);
-      linear_.open(pixels);
-      awake_.count = 0;
+      linear_.open(pixels, awake_);
     }
   }
   return true;

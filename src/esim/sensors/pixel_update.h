@@ -40,7 +40,7 @@ class PixelUpdate {
   template <int kOrder, class D>
   void filter_vector(D d, const FilterRow& row, const Filter& filter, int x);
   template <int kOrder>
-  void run_awake(PixelArray& pixels, const Segment& segment, PackedEvents& events);
+  void run_awake(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events);
   const float* brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int y);
 
   PixelWatch watch_;

@@ -66,6 +66,23 @@ HWY_INLINE hn::Vec<D> moved_after(D d, hn::Vec<D> u) {
   return hn::NegMulAdd(scale, grown, hn::Sub(one, scale));
 }
 
+/// The same in doubles, to a dozen digits.
+template <class D>
+HWY_INLINE hn::Vec<D> precisely_moved_after(D d, hn::Vec<D> u) {
+  const hn::RebindToSigned<D> di;
+  const auto rounder = hn::Set(d, 0x1.8p52), one = hn::Set(d, 1.0);
+  u = hn::Min(u, hn::Set(d, 60.0));
+  const auto rounded = hn::MulAdd(u, hn::Set(d, 1.4426950408889634), rounder), n = hn::Sub(rounded, rounder);
+  const auto r = hn::MulSub(n, hn::Set(d, 0.69314718055994531), u), r2 = hn::Mul(r, r), r4 = hn::Mul(r2, r2);
+  const auto pair = [&](double first, double second) { return hn::MulAdd(r, hn::Set(d, second), hn::Set(d, first)); };
+  const auto p03 = hn::MulAdd(pair(1.0 / 24, 1.0 / 120), r2, pair(1.0 / 2, 1.0 / 6));
+  const auto p47 = hn::MulAdd(pair(1.0 / 40320, 1.0 / 362880), r2, pair(1.0 / 720, 1.0 / 5040));
+  const auto p89 = pair(1.0 / 3628800, 1.0 / 39916800);
+  const auto grown = hn::MulAdd(hn::MulAdd(hn::MulAdd(p89, r4, p47), r4, p03), r2, r);
+  const auto scale = hn::BitCast(d, hn::Sub(hn::BitCast(di, one), hn::ShiftLeft<52>(hn::BitCast(di, rounded))));
+  return hn::NegMulAdd(scale, grown, hn::Sub(one, scale));
+}
+
 /// For each set of eight lanes, as bits, the lanes in it, in order, then others.
 inline constexpr auto kLanesOf = [] {
   std::array<std::array<std::uint8_t, 8>, 256> lanes{};

@@ -28,7 +28,7 @@ void prefetch_row(const Segment& segment, int y) {
 struct PixelUpdate::Filter {
   float phase_per_light = 0, phase_in_dark = 0;  // time constants that the segment lasts: per 6 of light, and besides
   double duration = 0, per_duration = 0;         // ns
-  std::int32_t now = 0;                          // for the alarms, in ticks
+  std::int32_t later = 0;                        // than the alarms that go off, in ticks
 
   Filter(const PixelArray& pixels, const Segment& segment)
       : duration(static_cast<double>(segment.t1 - segment.t0)), per_duration(1 / duration) {
@@ -38,7 +38,7 @@ struct PixelUpdate::Filter {
     const double per_light = at_white / (1 + o.dark_irradiance);
     phase_per_light = static_cast<float>(per_light / 6);
     phase_in_dark = static_cast<float>(per_light * o.dark_irradiance);
-    if (pixels.alarmed) now = pixels.ticks(segment.t1);
+    if (pixels.alarmed) later = pixels.ticks(segment.t1) + 1;
   }
 };
 
@@ -51,70 +51,85 @@ struct PixelUpdate::FilterRow {
   std::uint32_t pixel, place;  // of the first one
 };
 
-/// Moves some neighbouring pixels' low-passes to the segment's end, exactly for brightness that is linear in time and
-/// for the segment's mean intensity, and wakes those that may have left their band on the way.
+/// Moves the low-passes of some neighbouring pixels to the segment's end, exactly for brightness that is linear in time
+/// and for the segment's mean intensity, and looks which pixels may have left their band on the way.
 template <int kOrder, class D>
-HWY_INLINE void PixelUpdate::filter_vector(D d, const FilterRow& row, const Filter& filter, int x) {
+HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter& filter, int x, int at) {
   using V = hn::Vec<D>;
   const hn::RebindToSigned<D> di;
   const V start = hn::LoadU(d, row.start + x), end = hn::LoadU(d, row.end + x);
-  const V low = hn::LoadU(d, row.band_low + x), high = hn::LoadU(d, row.band_high + x);
-  V phase = hn::Zero(d), m = phase, f1 = start, f2 = start;
-  const V e0 = hn::LoadU(d, row.light0 + x), e1 = hn::LoadU(d, row.light1 + x);
-  const auto alarm =
-      row.alarms != nullptr ? hn::LoadU(di, row.alarms + x) : hn::Set(di, std::numeric_limits<std::int32_t>::max());
-  if constexpr (kOrder > 0) f1 = hn::LoadU(d, row.filtered1 + x);
-  if constexpr (kOrder > 1) f2 = hn::LoadU(d, row.filtered2 + x);
-
   V lowest = hn::Min(start, end), highest = hn::Max(start, end);
   if constexpr (kOrder > 0) {
     // How many time constants the segment lasts: of the mean light, by Simpson's rule for an exponential.
+    const V e0 = hn::LoadU(d, row.light0 + x), e1 = hn::LoadU(d, row.light1 + x);
     const V sum = hn::MulAdd(hn::Set(d, 4.0F), hn::Sqrt(hn::Mul(e0, e1)), hn::Add(e0, e1));
-    phase = hn::MulAdd(sum, hn::Set(d, filter.phase_per_light), hn::Set(d, filter.phase_in_dark));
+    const V phase = hn::MulAdd(sum, hn::Set(d, filter.phase_per_light), hn::Set(d, filter.phase_in_dark));
 
     // With m = 1 - exp(-phase): F moves by m of its distance, and lags behind the rise of L.
-    const V one = hn::Set(d, 1.0F), rise = hn::Sub(end, start);
-    m = moved_after(d, phase);
-    const V followed = hn::Div(m, phase);
-    const V distance = hn::Sub(start, f1);
+    const V one = hn::Set(d, 1.0F), rise = hn::Sub(end, start), m = moved_after(d, phase), followed = hn::Div(m, phase);
+    const V f1 = hn::LoadU(d, row.filtered1 + x), distance = hn::Sub(start, f1);
     const V f1_end = hn::Add(f1, hn::MulAdd(m, distance, hn::Mul(rise, hn::Sub(one, followed))));
-    hn::StoreU(f1_end, d, row.filtered1 + x);
+    hn::StoreU(phase, d, moved_.phase.data() + at);
+    hn::StoreU(m, d, moved_.moved.data() + at);
+    hn::StoreU(f1_end, d, moved_.filtered1.data() + at);
     if constexpr (kOrder == 1) {
-      // Where F does not turn back, it stays between its ends.
-      const auto turns = hn::Lt(hn::Mul(distance, hn::Sub(end, f1_end)), hn::Zero(d));
-      lowest = hn::Min(hn::Min(f1, f1_end), hn::IfThenElse(turns, lowest, f1_end));
-      highest = hn::Max(hn::Max(f1, f1_end), hn::IfThenElse(turns, highest, f1_end));
+      // F stays between its ends, or turns back where it meets L: between L's start and the tangent at its end.
+      const V tangent = hn::NegMulAdd(hn::Sub(end, f1_end), phase, f1_end);
+      lowest = hn::Min(hn::Min(f1, f1_end), hn::Max(start, tangent));
+      highest = hn::Max(hn::Max(f1, f1_end), hn::Min(start, tangent));
     } else {
+      const V f2 = hn::LoadU(d, row.filtered2 + x);
       const V from_first = hn::Mul(hn::Mul(phase, hn::Sub(one, m)), hn::Neg(distance));
       const V from_rise = hn::Mul(rise, hn::Add(hn::MulAdd(hn::Set(d, -2.0F), followed, one), hn::Sub(one, m)));
       const V f2_end = hn::Add(hn::MulAdd(m, hn::Sub(start, f2), f2), hn::Add(from_first, from_rise));
-      hn::StoreU(f2_end, d, row.filtered2 + x);
+      hn::StoreU(f2_end, d, moved_.filtered2.data() + at);
       lowest = hn::Min(hn::Min(f2, f2_end), hn::Min(f1, lowest));
       highest = hn::Max(hn::Max(f2, f2_end), hn::Max(f1, highest));
     }
   }
-
-  hn::StoreU(end, d, row.start + x);
-  auto restless = hn::Or(hn::Le(lowest, low), hn::Ge(highest, high));
-  restless = hn::Or(restless, hn::RebindMask(d, hn::Lt(alarm, hn::Set(di, filter.now + 1))));
-  // Without a branch: that a pixel wakes is as hard to foresee as an event.
-  const ChosenLanes chosen(d, restless);
-  AwakePixels& a = awake_;
-  const std::size_t at = a.count;
-  const auto column = static_cast<std::uint32_t>(x);
-  chosen.store_positions(row.pixel + column, 1, a.pixel.data() + at);
-  chosen.store_positions(row.place + 2 * column, 2, a.place.data() + at);
-  chosen.store(e0, a.light0.data() + at);
-  chosen.store(e1, a.light1.data() + at);
-  chosen.store(start, a.start.data() + at);
-  chosen.store(end, a.end.data() + at);
-  if constexpr (kOrder > 0) {
-    chosen.store(f1, a.filtered1.data() + at);
-    chosen.store(phase, a.phase.data() + at);
-    chosen.store(m, a.moved.data() + at);
+  auto restless =
+      hn::Or(hn::Le(lowest, hn::LoadU(d, row.band_low + x)), hn::Ge(highest, hn::LoadU(d, row.band_high + x)));
+  if (row.alarms != nullptr) {
+    const auto alarmed = hn::Lt(hn::LoadU(di, row.alarms + x), hn::Set(di, filter.later));
+    restless = hn::Or(restless, hn::RebindMask(d, alarmed));
   }
-  if constexpr (kOrder == 2) chosen.store(f2, a.filtered2.data() + at);
-  a.count = at + chosen.count();
+  moved_.restless[static_cast<std::size_t>(at) / hn::Lanes(d)] = ChosenLanes<D>::bits_of(d, restless);
+}
+
+/// Moves the low-passes of pixels from x = begin on, and tells which columns wake up.
+template <int kOrder, class D>
+std::span<const std::uint32_t> PixelUpdate::move(D d, const FilterRow& row, const Filter& filter, int begin, int end) {
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  for (int x = begin; x < end; x += lanes) move_vector<kOrder>(d, row, filter, x, x - begin);
+  // Without a branch: that a pixel wakes is as hard to foresee as an event.
+  std::size_t count = 0, vector = 0;
+  for (int x = begin; x < end; x += lanes) {
+    const ChosenLanes<D> chosen(moved_.restless[vector++]);
+    chosen.store_positions(static_cast<std::uint32_t>(x), moved_.columns.data() + count);
+    count += chosen.count();
+  }
+  return {moved_.columns.data(), count};
+}
+
+/// Adds pixels of these columns to those that are awake.
+template <int kOrder>
+void PixelUpdate::wake(const FilterRow& row, int begin, std::span<const std::uint32_t> columns) {
+  AwakePixels& a = awake_;
+  std::size_t to = a.count;
+  for (const std::uint32_t x : columns) {
+    const std::size_t at = x - static_cast<std::uint32_t>(begin);
+    a.pixel[to] = row.pixel + x;
+    a.place[to] = row.place + 2 * x;
+    a.light0[to] = row.light0[x], a.light1[to] = row.light1[x];
+    a.start[to] = row.start[x], a.end[to] = row.end[x];
+    if constexpr (kOrder > 0) {
+      a.phase[to] = moved_.phase[at], a.moved[to] = moved_.moved[at];
+      a.filtered1[to] = row.filtered1[x];
+    }
+    if constexpr (kOrder == 2) a.filtered2[to] = row.filtered2[x];
+    ++to;
+  }
+  a.count = to;
 }
 
 /// Takes the pixels that woke up through the segment: all of them, or only so far that there is room for more.
@@ -125,7 +140,7 @@ void PixelUpdate::run_awake(PixelArray& pixels, const Segment& segment, bool all
     take(pass.signals, pass.take(pixels, awake_, segment.t0, segment.t1));
     do {
       pass.round(pixels, awake_, events);
-    } while (all ? awake_.count > 0 : !awake_.has_room());
+    } while (all ? awake_.count > 0 : awake_.count == kBlock);
   };
   if constexpr (kOrder == 0) {
     run(linear_, [&](LinearSignals& signals, std::size_t first) { signals.take(awake_, first, duration); });
@@ -160,20 +175,26 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
                       .alarms = from(pixels.alarms),
                       .pixel = static_cast<std::uint32_t>(first),
                       .place = static_cast<std::uint32_t>(events.packing().place(left, y))};
-  std::size_t asked = awake_.count;
   const auto filter_to = [&](auto d, int begin, int end) {
-    for (int x = begin; x < end; x += static_cast<int>(hn::Lanes(d))) {
-      filter_vector<kOrder>(d, row, filter, x);
-      // About as many as wake, and no branch on whether they do.
-      pixels.prefetch(awake_.pixel[asked]), pixels.prefetch(awake_.pixel[asked + 1]);
-      asked = std::min(asked + 2, awake_.count);
-      if (!awake_.has_room()) run_awake<kOrder>(pixels, segment, false, events), asked = awake_.count;
+    std::span<const std::uint32_t> columns = move<kOrder>(d, row, filter, begin, end);
+    for (const std::uint32_t x : columns) pixels.prefetch(first + x);
+    while (!columns.empty()) {
+      const std::size_t room = std::min(kBlock - awake_.count, columns.size());
+      wake<kOrder>(row, begin, columns.first(room));
+      columns = columns.subspan(room);
+      if (awake_.count == kBlock) run_awake<kOrder>(pixels, segment, false, events);
     }
+    const auto count = static_cast<std::size_t>(end - begin);
+    std::copy_n(row.end + begin, count, row.start + begin);
+    if constexpr (kOrder > 0) std::copy_n(moved_.filtered1.data(), count, row.filtered1 + begin);
+    if constexpr (kOrder == 2) std::copy_n(moved_.filtered2.data(), count, row.filtered2 + begin);
   };
   const hn::CappedTag<float, 8> whole;
   const int middle = width - width % static_cast<int>(hn::Lanes(whole));
-  filter_to(whole, 0, middle);
-  filter_to(hn::CappedTag<float, 1>(), middle, width);
+  for (int begin = 0; begin < middle; begin += kMovedTogether) {
+    filter_to(whole, begin, std::min(begin + kMovedTogether, middle));
+  }
+  if (middle < width) filter_to(hn::CappedTag<float, 1>(), middle, width);
 }
 
 /// Where bands are of brightness: moves all low-passes on, and takes those pixels through the segment whose filtered
@@ -209,7 +230,7 @@ bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, P
     linear_.signals.take_light(awake_, first, pixels.options.log_eps, duration);
     do {
       linear_.round(pixels, awake_, events);
-    } while (all ? awake_.count > 0 : !awake_.has_room());
+    } while (all ? awake_.count > 0 : awake_.count == kBlock);
   };
   for (int y = rows.first; y < rows.last; ++y) {
     for (const std::uint32_t x : watch_.columns(y)) {
@@ -219,7 +240,7 @@ bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, P
       awake_.place[i] = static_cast<std::uint32_t>(events.packing().place(column, y));
       awake_.light0[i] = segment.irradiance0->row(y)[x];
       awake_.light1[i] = segment.irradiance1->row(y)[x];
-      if (!awake_.has_room()) run(false);
+      if (awake_.count == kBlock) run(false);
     }
   }
   run(true);

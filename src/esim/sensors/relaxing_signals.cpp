@@ -172,7 +172,7 @@ void RelaxingSignals::guess(Comparators& c) {
     hn::StoreU(hn::PromoteTo(kD, hn::LowerHalf(hn::Half<F>(), polarity)), kD, c.polarity.data() + i);
     hn::StoreU(hn::PromoteTo(kD, hn::UpperHalf(hn::Half<F>(), polarity)), kD, c.polarity.data() + i + hn::Lanes(kD));
     const ChosenLanes chosen(kF, unclear);
-    chosen.store_positions(static_cast<std::uint32_t>(i), 1, unclear_.data() + unclear_count);
+    chosen.store_positions(static_cast<std::uint32_t>(i), unclear_.data() + unclear_count);
     unclear_count += chosen.count();
   }
   unclear_count_ = unclear_count;

@@ -100,26 +100,27 @@ inline constexpr auto kLanesOf = [] {
 template <class D>
 class ChosenLanes {
  public:
-  ChosenLanes(D d, hn::Mask<D> mask) {
+  explicit ChosenLanes(std::uint8_t bits)
+      : lanes_(
+            hn::PromoteTo(hn::RebindToUnsigned<D>(), hn::LoadU(hn::Rebind<std::uint8_t, D>(), kLanesOf[bits].data()))),
+        count_(static_cast<std::size_t>(std::popcount(bits))) {
     static_assert(hn::MaxLanes(D()) <= 8);
-    std::uint64_t bits = 0;
-    hn::StoreMaskBits(d, mask, reinterpret_cast<std::uint8_t*>(&bits));
-    count_ = static_cast<std::size_t>(std::popcount(bits));
-    lanes_ = hn::PromoteTo(hn::RebindToUnsigned<D>(), hn::LoadU(hn::Rebind<std::uint8_t, D>(), kLanesOf[bits].data()));
+  }
+  ChosenLanes(D d, hn::Mask<D> mask) : ChosenLanes(bits_of(d, mask)) {}
+
+  /// One bit for each lane of the mask.
+  static std::uint8_t bits_of(D d, hn::Mask<D> mask) {
+    std::array<std::uint8_t, 8> bits;
+    hn::StoreMaskBits(d, mask, bits.data());
+    return bits[0];
   }
 
   std::size_t count() const { return count_; }
 
-  /// Writes first + step * lane for each chosen lane, in order, and maybe more behind. The step is 1 or 2.
-  void store_positions(std::uint32_t first, int step, std::uint32_t* out) const {
+  /// Writes first + lane for each chosen lane, in order, and maybe more behind.
+  void store_positions(std::uint32_t first, std::uint32_t* out) const {
     const hn::RebindToUnsigned<D> du;
-    hn::StoreU(hn::Add(step == 2 ? hn::Add(lanes_, lanes_) : lanes_, hn::Set(du, first)), du, out);
-  }
-
-  /// Writes the values of the chosen lanes, in order, and maybe more behind.
-  void store(hn::Vec<D> values, float* out) const {
-    const D d;
-    hn::StoreU(hn::TableLookupLanes(values, hn::IndicesFromVec(d, lanes_)), d, out);
+    hn::StoreU(hn::Add(lanes_, hn::Set(du, first)), du, out);
   }
 
  private:

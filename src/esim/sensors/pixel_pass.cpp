@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace esim {
 namespace {
@@ -12,7 +13,7 @@ constexpr double kLeakPerBand = 0.05;
 // A pixel's time between leak events is never shorter than this share of the mean.
 constexpr double kMinLeakInterval = 0.05;
 
-constexpr double kPerNs = 1e-9;
+constexpr double kPerNs = 1e-9, kNsPerS = 1e9;
 
 }  // namespace
 
@@ -183,13 +184,12 @@ void PixelPass<Signals>::reset(const PixelArray& pixels) {
     compare_.reference[i] = compare_.polarity[i] != 0 ? next : compare_.reference[i];
   }
   signals.look_ahead(compare_, again_.data());
-  const double duration = duration_;
-  const bool holds = pixels.holds, shoots = pixels.shoots;
+  const double held_beyond = pixels.holds ? duration_ : kNever, shot_until = pixels.shoots ? duration_ : -kNever;
 #pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
-    const bool fired = compare_.polarity[i] != 0, held = holds && fired && until_[i] > duration;
-    const bool may = again_[i] != 0 || (shoots && shot_[i] <= duration);
-    again_[i] = fired && !held && may ? 1.0 : 0.0;
+    const bool fired = compare_.polarity[i] != 0, held = fired & (until_[i] > held_beyond);
+    const bool may = (again_[i] != 0) | (shot_[i] <= shot_until);
+    again_[i] = (fired & !held) & may ? 1.0 : 0.0;
     compare_.reference[i] = held ? kHeld : compare_.reference[i];
   }
 }
@@ -200,7 +200,7 @@ void PixelPass<Signals>::sleep(PixelArray& pixels, AwakePixels& awake) {
   constexpr double kForever = static_cast<double>(kAges);
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const double duration = duration_, since_epoch = epoch_ns_ + duration_;
-  const bool shoots = pixels.shoots;
+  const double no_shot = pixels.shoots ? 0.0 : kForever;
 #pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
     const double reference = compare_.reference[i], leak = compare_.leak[i];
@@ -213,7 +213,7 @@ void PixelPass<Signals>::sleep(PixelArray& pixels, AwakePixels& awake) {
     const double sinks = leak > 0 ? leak * (duration + valid) : 0.0;
     low_[i] = held ? kInfinity : static_cast<float>(lower - leak * duration);
     high_[i] = held ? -kInfinity : static_cast<float>(upper - sinks);
-    const double shot = shot_[i] - duration, alarm = shoots && shot < valid ? shot : valid;
+    const double shot = shot_[i] - duration + no_shot, alarm = shot < valid ? shot : valid;
     alarm_[i] = PixelArray::ticks_after_epoch(since_epoch + alarm);
   }
   std::size_t done = 0, kept = 0;
@@ -248,7 +248,7 @@ void PixelPass<Signals>::write_back(PixelArray::NoisyPixel& own, std::size_t i) 
   const double leak = compare_.leak[i];
   own.reference = compare_.reference[i] + leak * epoch_ns_;
   own.on = compare_.on[i], own.off = compare_.off[i];
-  own.leak = static_cast<float>(leak / kPerNs);
+  own.leak = static_cast<float>(leak * kNsPerS);
   own.draws = draws_[i], own.shots = shots_[i];
   own.shot_at = t0_ + static_cast<TimeNs>(shot_[i]);
   own.until = t0_ + static_cast<TimeNs>(until_[i]);

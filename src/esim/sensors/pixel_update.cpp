@@ -49,6 +49,18 @@ struct PixelUpdate::FilterRow {
   const float *band_low, *band_high;
   const std::int32_t* alarms;  // or null
   std::uint32_t pixel, place;  // of the first one
+
+  /// Asks memory for what is worked on next: processors that look ahead by themselves do so within a page only.
+  template <int kOrder>
+  void prefetch(int x) const {
+    constexpr int kAhead = 512;
+    for (const float* values : {static_cast<const float*>(start), band_low, band_high, light0}) {
+      __builtin_prefetch(values + x + kAhead);
+    }
+    if constexpr (kOrder > 0) __builtin_prefetch(filtered1 + x + kAhead);
+    if constexpr (kOrder > 1) __builtin_prefetch(filtered2 + x + kAhead);
+    if (alarms != nullptr) __builtin_prefetch(alarms + x + kAhead);
+  }
 };
 
 /// Moves the low-passes of some neighbouring pixels to the segment's end, exactly for brightness that is linear in time
@@ -100,7 +112,10 @@ HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter
 template <int kOrder, class D>
 std::span<const std::uint32_t> PixelUpdate::move(D d, const FilterRow& row, const Filter& filter, int begin, int end) {
   const int lanes = static_cast<int>(hn::Lanes(d));
-  for (int x = begin; x < end; x += lanes) move_vector<kOrder>(d, row, filter, x, x - begin);
+  for (int x = begin; x < end; x += lanes) {
+    move_vector<kOrder>(d, row, filter, x, x - begin);
+    row.prefetch<kOrder>(x);
+  }
   // Without a branch: that a pixel wakes is as hard to foresee as an event.
   std::size_t count = 0, vector = 0;
   for (int x = begin; x < end; x += lanes) {

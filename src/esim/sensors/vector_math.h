@@ -83,6 +83,28 @@ HWY_INLINE hn::Vec<D> precisely_moved_after(D d, hn::Vec<D> u) {
   return hn::NegMulAdd(scale, grown, hn::Sub(one, scale));
 }
 
+/// Cosine and sine of 2 pi `turns`, for turns between 0 and 1, to a few units in the last place of 1.
+template <class D>
+HWY_INLINE void cosine_and_sine(D d, hn::Vec<D> turns, hn::Vec<D>& cosine, hn::Vec<D>& sine) {
+  // Minimax polynomials within an eighth of a turn around a multiple of a quarter, n; n stands in the lowest bits.
+  const hn::RebindToSigned<D> di;
+  const auto rounder = hn::Set(d, 12582912.0F), rounded = hn::MulAdd(turns, hn::Set(d, 4.0F), rounder);
+  const auto x = hn::NegMulAdd(hn::Sub(rounded, rounder), hn::Set(d, 0.25F), turns), x2 = hn::Mul(x, x);
+  const auto pair = [&](float first, float second) { return hn::MulAdd(x2, hn::Set(d, second), hn::Set(d, first)); };
+  const auto x4 = hn::Mul(x2, x2);
+  const auto s = hn::Mul(x, hn::MulAdd(pair(81.5923536F, -75.3935628F), x4, pair(6.28318529F, -41.3416615F)));
+  const auto c67 = hn::MulAdd(hn::Set(d, 59.2027961F), x4, pair(64.9393107F, -85.442298F));
+  const auto c = hn::MulAdd(c67, x4, pair(1.0F, -19.7392086F));
+  // Odd quarters swap the two; the second and third turn the cosine's sign, the third and fourth the sine's.
+  const auto n = hn::BitCast(di, rounded);
+  const auto odd = hn::RebindMask(d, hn::Ne(hn::And(n, hn::Set(di, 1)), hn::Zero(di)));
+  const auto sign_of = [&](auto quarter) {
+    return hn::BitCast(d, hn::ShiftLeft<30>(hn::And(quarter, hn::Set(di, 2))));
+  };
+  cosine = hn::Xor(hn::IfThenElse(odd, s, c), sign_of(hn::Add(n, hn::Set(di, 1))));
+  sine = hn::Xor(hn::IfThenElse(odd, c, s), sign_of(n));
+}
+
 /// For each set of eight lanes, as bits, the lanes in it, in order, then others.
 inline constexpr auto kLanesOf = [] {
   std::array<std::array<std::uint8_t, 8>, 256> lanes{};

@@ -19,17 +19,18 @@ constexpr double kPerNs = 1e-9, kNsPerS = 1e9;
 
 template <class Signals>
 std::size_t PixelPass<Signals>::take(const PixelArray& pixels, AwakePixels& awake, TimeNs t0, TimeNs t1) {
-  t0_ = t0, t1_ = t1;
+  t0_ = t0;
   duration_ = static_cast<double>(t1 - t0);
   epoch_ns_ = static_cast<double>(t0 - pixels.epoch);
   compare_.threshold_on = pixels.threshold_on, compare_.threshold_off = pixels.threshold_off;
-  const double epoch_s = epoch_ns_ * kPerNs;
+  const double duration = duration_, epoch_ns = epoch_ns_, epoch_s = epoch_ns * kPerNs;
   const std::size_t first = compare_.count;
   std::size_t count = first, held_count = 0;
   for (std::size_t from = first; from < awake.count; ++from) {
     const PixelArray::NoisyPixel& own = pixels.noisy_pixels[awake.pixel[from]];
+    const double until = own.until - epoch_ns;
     const bool held = own.reference == kHeld;
-    if (held && own.until > t1) [[unlikely]]
+    if (held & (until > duration)) [[unlikely]]
       continue;
     const std::size_t i = count++;
     if (i != from) awake.copy(from, i);
@@ -41,8 +42,8 @@ std::size_t PixelPass<Signals>::take(const PixelArray& pixels, AwakePixels& awak
     compare_.from[i] = 0;
     mean_on_[i] = own.mean_on, mean_off_[i] = own.mean_off, mean_leak_[i] = own.mean_leak;
     draws_[i] = own.draws, shots_[i] = own.shots;
-    shot_[i] = static_cast<double>(own.shot_at - t0);
-    until_[i] = static_cast<double>(own.until - t0);
+    shot_[i] = own.shot_at - epoch_ns;
+    until_[i] = until;
   }
   awake.count = compare_.count = count;
   held_count_ = held_count;
@@ -197,7 +198,7 @@ void PixelPass<Signals>::reset(const PixelArray& pixels) {
 /// Puts the pixels that are done to sleep, and keeps the others.
 template <class Signals>
 void PixelPass<Signals>::sleep(PixelArray& pixels, AwakePixels& awake) {
-  constexpr double kForever = static_cast<double>(kAges);
+  constexpr double kForever = kAges;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const double duration = duration_, since_epoch = epoch_ns_ + duration_;
   const double no_shot = pixels.shoots ? 0.0 : kForever;
@@ -216,19 +217,17 @@ void PixelPass<Signals>::sleep(PixelArray& pixels, AwakePixels& awake) {
     const double shot = shot_[i] - duration + no_shot, alarm = shot < valid ? shot : valid;
     alarm_[i] = PixelArray::ticks_after_epoch(since_epoch + alarm);
   }
-  std::size_t done = 0, kept = 0;
-  for (std::size_t i = 0; i < compare_.count; ++i) {
-    if (again_[i] != 0) {
-      keep(awake, i, kept++);
-      continue;
-    }
-    write_back(pixels.noisy_pixels[awake.pixel[i]], i);
-    if (pixels.alarmed) pixels.alarms[awake.pixel[i]] = alarm_[i];
-    asleep_[done] = awake.pixel[i];
-    low_[done] = low_[i], high_[done] = high_[i];
-    ++done;
+  // Those that go on are put to sleep, too: they will be again.
+  for (std::size_t i = 0; i < compare_.count; ++i) write_back(pixels.noisy_pixels[awake.pixel[i]], i);
+  if (pixels.alarmed) {
+    for (std::size_t i = 0; i < compare_.count; ++i) pixels.alarms[awake.pixel[i]] = alarm_[i];
   }
-  pixels.set_bands(done, asleep_.data(), low_.data(), high_.data());
+  pixels.set_bands(compare_.count, awake.pixel.data(), low_.data(), high_.data());
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    if (again_[i] != 0) [[unlikely]]
+      keep(awake, i, kept++);
+  }
   compare_.count = awake.count = kept;
 }
 
@@ -250,8 +249,8 @@ void PixelPass<Signals>::write_back(PixelArray::NoisyPixel& own, std::size_t i) 
   own.on = compare_.on[i], own.off = compare_.off[i];
   own.leak = static_cast<float>(leak * kNsPerS);
   own.draws = draws_[i], own.shots = shots_[i];
-  own.shot_at = t0_ + static_cast<TimeNs>(shot_[i]);
-  own.until = t0_ + static_cast<TimeNs>(until_[i]);
+  own.shot_at = epoch_ns_ + shot_[i];
+  own.until = epoch_ns_ + until_[i];
 }
 
 template <class Signals>
@@ -268,7 +267,7 @@ void PixelPass<Signals>::open(PixelArray& pixels, AwakePixels& awake) {
     if (compare_.leak[i] > 0) compare_.reference[i] -= threshold * pixels.per_leak.uniforms(awake.pixel[i], 1)[0];
     if (!pixels.shoots) continue;
     const bool dead = std::isinf(compare_.on[i]);
-    shot_[i] = dead ? static_cast<double>(kAges) : pixels.shot_interval(pixels.per_shot.uniforms(awake.pixel[i], 0)[0]);
+    shot_[i] = dead ? kAges : pixels.shot_interval(pixels.per_shot.uniforms(awake.pixel[i], 0)[0]);
     shots_[i] = 1;
   }
   sleep(pixels, awake);

@@ -45,7 +45,7 @@ class PixelPass {
   void keep(AwakePixels& awake, std::size_t i, std::size_t to);
   void write_back(PixelArray::NoisyPixel& own, std::size_t i) const;
 
-  TimeNs t0_ = 0, t1_ = 0;
+  TimeNs t0_ = 0;
   double duration_ = 0;  // ns
   double epoch_ns_ = 0;  // from the epoch to t0
 
@@ -67,7 +67,6 @@ class PixelPass {
   EventNormals normals_{};
 
   // The levels that pixels sleep between.
-  PerPixel<std::uint32_t> asleep_{};
   PerPixel<float> low_{}, high_{};
   PerPixel<std::int32_t> alarm_{};
 };

@@ -110,11 +110,15 @@ HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter
 
 /// Moves the low-passes of pixels from x = begin on, and tells which columns wake up.
 template <int kOrder, class D>
-std::span<const std::uint32_t> PixelUpdate::move(D d, const FilterRow& row, const Filter& filter, int begin, int end) {
+std::span<const std::uint32_t> PixelUpdate::move(D d, const PixelArray& pixels, const FilterRow& row,
+                                                 const Filter& filter, int begin, int end) {
   const int lanes = static_cast<int>(hn::Lanes(d));
   for (int x = begin; x < end; x += lanes) {
     move_vector<kOrder>(d, row, filter, x, x - begin);
     row.prefetch<kOrder>(x);
+    // Memory is asked a little at a time for what is needed of those that woke up before.
+    pixels.prefetch(awake_.pixel[asked_]), pixels.prefetch(awake_.pixel[asked_ + 1]);
+    asked_ = std::min(asked_ + 2, awake_.count);
   }
   // Without a branch: that a pixel wakes is as hard to foresee as an event.
   std::size_t count = 0, vector = 0;
@@ -152,10 +156,12 @@ template <int kOrder>
 void PixelUpdate::run_awake(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events) {
   const auto duration = static_cast<double>(segment.t1 - segment.t0);
   const auto run = [&](auto& pass, const auto& take) {
+    for (; asked_ < awake_.count; ++asked_) pixels.prefetch(awake_.pixel[asked_]);
     take(pass.signals, pass.take(pixels, awake_, segment.t0, segment.t1));
     do {
       pass.round(pixels, awake_, events);
     } while (all ? awake_.count > 0 : awake_.count == kBlock);
+    asked_ = awake_.count;
   };
   if constexpr (kOrder == 0) {
     run(linear_, [&](LinearSignals& signals, std::size_t first) { signals.take(awake_, first, duration); });
@@ -191,8 +197,7 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
                       .pixel = static_cast<std::uint32_t>(first),
                       .place = static_cast<std::uint32_t>(events.packing().place(left, y))};
   const auto filter_to = [&](auto d, int begin, int end) {
-    std::span<const std::uint32_t> columns = move<kOrder>(d, row, filter, begin, end);
-    for (const std::uint32_t x : columns) pixels.prefetch(first + x);
+    std::span<const std::uint32_t> columns = move<kOrder>(d, pixels, row, filter, begin, end);
     while (!columns.empty()) {
       const std::size_t room = std::min(kBlock - awake_.count, columns.size());
       wake<kOrder>(row, begin, columns.first(room));

@@ -42,7 +42,8 @@ class PixelUpdate {
   template <int kOrder, class D>
   void move_vector(D d, const FilterRow& row, const Filter& filter, int x, int at);
   template <int kOrder, class D>
-  std::span<const std::uint32_t> move(D d, const FilterRow& row, const Filter& filter, int begin, int end);
+  std::span<const std::uint32_t> move(D d, const PixelArray& pixels, const FilterRow& row, const Filter& filter,
+                                      int begin, int end);
   template <int kOrder>
   void wake(const FilterRow& row, int begin, std::span<const std::uint32_t> columns);
   template <int kOrder>
@@ -50,7 +51,7 @@ class PixelUpdate {
   const float* brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int y);
 
   /// Where the low-passes of neighbouring pixels are at the segment's end, and which pixels wake up.
-  static constexpr int kMovedTogether = 256;
+  static constexpr int kMovedTogether = 128;
   struct MovedPixels {
     std::array<float, kMovedTogether> filtered1, filtered2, phase, moved;
     std::array<std::uint8_t, kMovedTogether> restless;  // a bit for each lane of a vector
@@ -61,6 +62,7 @@ class PixelUpdate {
   CleanPass clean_;
   MovedPixels moved_;
   AwakePixels awake_;
+  std::size_t asked_ = 0;  // of the awake pixels, those that memory has been asked for
   PixelPass<LinearSignals> linear_;
   PixelPass<RelaxingSignals> relaxing_;
   std::vector<double> row_;       // brightness at the first sample

@@ -253,6 +253,17 @@ void PixelPass<Signals>::write_back(PixelArray::NoisyPixel& own, std::size_t i) 
   own.until = epoch_ns_ + until_[i];
 }
 
+/// The first of random.uniforms(pixel, draw) for each pixel.
+template <class Signals>
+void PixelPass<Signals>::draw_uniforms(const AddressedRandom& random, const AwakePixels& awake, std::uint32_t draw) {
+  std::array<PerPixel<std::uint32_t>, 4> words;
+  PerPixel<std::uint32_t> draws;
+  draws.fill(draw);
+  random.bits(awake.count, awake.pixel.data(), draws.data(),
+              {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
+  for (std::size_t i = 0; i < awake.count; ++i) uniform_[i] = AddressedRandom::open_unit(words[0][i], words[1][i]);
+}
+
 template <class Signals>
 void PixelPass<Signals>::open(PixelArray& pixels, AwakePixels& awake) {
   const std::size_t count = compare_.count;
@@ -260,15 +271,22 @@ void PixelPass<Signals>::open(PixelArray& pixels, AwakePixels& awake) {
   std::fill_n(compare_.tau.begin(), count, 0.0);
   std::fill_n(again_.begin(), count, 0.0);
   if (pixels.renews) renew(pixels, awake);
-  for (std::size_t i = 0; i < count; ++i) {
-    const double threshold = pixels.threshold_on + compare_.on[i];
-    compare_.reference[i] = signals.end(i);
+  for (std::size_t i = 0; i < count; ++i) compare_.reference[i] = signals.end(i);
+  if (pixels.leaks) {
     // A sensor that leaks has been running before: it is anywhere between two leak events.
-    if (compare_.leak[i] > 0) compare_.reference[i] -= threshold * pixels.per_leak.uniforms(awake.pixel[i], 1)[0];
-    if (!pixels.shoots) continue;
-    const bool dead = std::isinf(compare_.on[i]);
-    shot_[i] = dead ? kAges : pixels.shot_interval(pixels.per_shot.uniforms(awake.pixel[i], 0)[0]);
-    shots_[i] = 1;
+    draw_uniforms(pixels.per_leak, awake, 1);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double threshold = pixels.threshold_on + compare_.on[i];
+      if (compare_.leak[i] > 0) compare_.reference[i] -= threshold * uniform_[i];
+    }
+  }
+  if (pixels.shoots) {
+    draw_uniforms(pixels.per_shot, awake, 0);
+    for (std::size_t i = 0; i < count; ++i) {
+      const bool dead = std::isinf(compare_.on[i]);
+      shot_[i] = dead ? kAges : pixels.shot_interval(uniform_[i]);
+      shots_[i] = 1;
+    }
   }
   sleep(pixels, awake);
 }

@@ -42,6 +42,7 @@ class PixelPass {
   void reset(const PixelArray& pixels);
   void sleep(PixelArray& pixels, AwakePixels& awake);
 
+  void draw_uniforms(const AddressedRandom& random, const AwakePixels& awake, std::uint32_t draw);
   void keep(AwakePixels& awake, std::size_t i, std::size_t to);
   void write_back(PixelArray::NoisyPixel& own, std::size_t i) const;
 
@@ -65,6 +66,7 @@ class PixelPass {
   PerPixel<double> reports_{};  // 0 where the event is lost
   PerPixel<double> again_{};    // 1 where another event may follow
   EventNormals normals_{};
+  PerPixel<double> uniform_{};
 
   // The levels that pixels sleep between.
   PerPixel<float> low_{}, high_{};

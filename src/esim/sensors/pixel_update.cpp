@@ -85,10 +85,11 @@ HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter
     hn::StoreU(m, d, moved_.moved.data() + at);
     hn::StoreU(f1_end, d, moved_.filtered1.data() + at);
     if constexpr (kOrder == 1) {
-      // F stays between its ends, or turns back where it meets L: between L's start and the tangent at its end.
-      const V tangent = hn::NegMulAdd(hn::Sub(end, f1_end), phase, f1_end);
-      lowest = hn::Min(hn::Min(f1, f1_end), hn::Max(start, tangent));
-      highest = hn::Max(hn::Max(f1, f1_end), hn::Min(start, tangent));
+      // F stays between its ends, or turns back where it meets L: before L's start, and before the tangents at its ends
+      // reach the other end.
+      const V tangent0 = hn::MulAdd(distance, phase, f1), tangent1 = hn::NegMulAdd(hn::Sub(end, f1_end), phase, f1_end);
+      lowest = hn::Min(hn::Min(f1, f1_end), hn::Max(hn::Max(start, tangent0), tangent1));
+      highest = hn::Max(hn::Max(f1, f1_end), hn::Min(hn::Min(start, tangent0), tangent1));
     } else {
       const V f2 = hn::LoadU(d, row.filtered2 + x);
       const V from_first = hn::Mul(hn::Mul(phase, hn::Sub(one, m)), hn::Neg(distance));

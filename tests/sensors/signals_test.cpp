@@ -104,7 +104,7 @@ struct Block {
   RelaxingSignals signals;
   Comparators compare;
 
-  explicit Block(std::mt19937& random) {
+  explicit Block(std::mt19937& random, double duration = Case::kDuration) {
     std::uniform_real_distribution<double> uniform;
     awake.count = compare.count = kBlock;
     compare.threshold_on = compare.threshold_off = 0.01;
@@ -116,10 +116,10 @@ struct Block {
       awake.filtered2[i] = static_cast<float>(c.filtered2);
       awake.phase[i] = static_cast<float>(c.rate * Case::kDuration);
       awake.moved[i] = static_cast<float>(-std::expm1(-awake.phase[i]));
-      compare.leak[i] = 3e-7 * uniform(random);
-      compare.from[i] = i % 2 == 0 ? Case::kDuration * uniform(random) : 0;
+      compare.leak[i] = 0.3 / duration * uniform(random);
+      compare.from[i] = i % 2 == 0 ? duration * uniform(random) : 0;
     }
-    signals.take(awake, kPoles, Case::kDuration);
+    signals.take(awake, 0, kPoles, duration);
     signals.advance(compare);
     for (std::size_t i = 0; i < kBlock; ++i) {
       compare.reference[i] = signals.value(i) + compare.leak[i] * compare.from[i];
@@ -130,11 +130,11 @@ struct Block {
 };
 
 template <int kPoles>
-void expect_the_same_as_one_by_one() {
+void expect_the_same_as_one_by_one(double duration) {
   std::mt19937 random(3);
   int crossed = 0, quiet = 0;
   for (int round = 0; round < 30; ++round) {
-    Block<kPoles> block(random);
+    Block<kPoles> block(random, duration);
     Comparators& compare = block.compare;
     block.signals.find(compare);
     PerPixel<double> again{};
@@ -143,9 +143,9 @@ void expect_the_same_as_one_by_one() {
       const RelaxingSignal one = block.signals.signal(compare, i);
       EXPECT_NEAR(block.signals.value(i) + compare.leak[i] * compare.from[i], one.value(),
                   1e-9 * (1 + std::fabs(one.value())));
-      EXPECT_NEAR(block.signals.end(i) + compare.leak[i] * Case::kDuration, one.value(Case::kDuration),
-                  1e-5 * (1 + std::fabs(one.value(Case::kDuration))));  // moved is a float
-      const Crossing expected = one.first_crossing(Case::kDuration, compare.lower(i), compare.upper(i));
+      EXPECT_NEAR(block.signals.end(i) + compare.leak[i] * duration, one.value(duration),
+                  1e-5 * (1 + std::fabs(one.value(duration))));  // moved is a float
+      const Crossing expected = one.first_crossing(duration, compare.lower(i), compare.upper(i));
       ASSERT_EQ(compare.polarity[i] == 0, expected.tau == kNever) << i;
       if (expected.tau == kNever) {
         quiet += again[i] == 0 ? 1 : 0;
@@ -162,8 +162,13 @@ void expect_the_same_as_one_by_one() {
 }
 
 TEST(RelaxingSignals, AreTheSameAsOneByOne) {
-  expect_the_same_as_one_by_one<1>();
-  expect_the_same_as_one_by_one<2>();
+  expect_the_same_as_one_by_one<1>(Case::kDuration);
+  expect_the_same_as_one_by_one<2>(Case::kDuration);
+}
+
+TEST(RelaxingSignals, AreAsPreciseInLongSegments) {
+  expect_the_same_as_one_by_one<1>(33e6);
+  expect_the_same_as_one_by_one<1>(1e9);
 }
 
 TEST(RelaxingSignals, DoNotDependOnTheirNeighbours) {
@@ -180,7 +185,7 @@ TEST(RelaxingSignals, DoNotDependOnTheirNeighbours) {
     single.compare.reference[0] = block.compare.reference[i], single.compare.leak[0] = block.compare.leak[i];
     single.compare.from[0] = block.compare.from[i];
     single.awake.count = single.compare.count = 1;
-    single.signals.take(single.awake, 1, Case::kDuration);
+    single.signals.take(single.awake, 0, 1, Case::kDuration);
     single.signals.advance(single.compare);
     single.signals.find(single.compare);
     EXPECT_EQ(single.compare.polarity[0], block.compare.polarity[i]);
@@ -201,7 +206,7 @@ TEST(LinearSignals, FindTheirCrossings) {
     compare.from[i] = from[i];
   }
   compare.leak[4] = 2e-6;
-  signals.take(awake, 1e6);
+  signals.take(awake, 0, 1e6);
   signals.advance(compare);
   signals.find(compare);
   EXPECT_EQ(compare.polarity[0], 0);

@@ -68,10 +68,6 @@ void AddressedRandom::bits(std::size_t count, const std::uint32_t* items, const 
 
 std::array<double, 2> AddressedRandom::uniforms(std::uint32_t item, std::uint64_t draw) const {
   const auto words = bits(item, draw);
-  const auto open_unit = [](std::uint32_t high, std::uint32_t low) {
-    const std::uint64_t word = (static_cast<std::uint64_t>(high) << 32) | low;
-    return (static_cast<double>(word >> 11) + 0.5) * 0x1.0p-53;
-  };
   return {open_unit(words[0], words[1]), open_unit(words[2], words[3])};
 }
 

@@ -35,7 +35,13 @@ class AddressedRandom {
   void bits(std::size_t count, const std::uint32_t* items, const std::uint32_t* draws,
             const std::array<std::uint32_t*, 4>& words) const;
 
-  /// Two independent uniforms on the open interval (0, 1), 53 bits each.
+  /// A uniform on the open interval (0, 1) from 53 bits of two words.
+  static double open_unit(std::uint32_t high, std::uint32_t low) {
+    const std::uint64_t word = (static_cast<std::uint64_t>(high) << 32) | low;
+    return (static_cast<double>(static_cast<std::int64_t>(word >> 11)) + 0.5) * 0x1.0p-53;
+  }
+
+  /// Two independent uniforms on the open interval (0, 1), 53 bits each: from the first two of bits(), and the last.
   std::array<double, 2> uniforms(std::uint32_t item, std::uint64_t draw = 0) const;
 
   /// Two independent standard normal deviates (Box-Muller).

@@ -13,10 +13,11 @@ void box_muller(D d, Words word0, Words word1, hn::Vec<D>& normal0, hn::Vec<D>& 
     const auto whole = hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<8>(word)));
     return hn::Mul(hn::Add(whole, hn::Set(d, 0.5F)), hn::Set(d, 0x1.0p-24F));
   };
-  const auto radius = hn::Sqrt(hn::Mul(hn::Set(d, -2.0F), hn::Log(d, open_unit(word0))));
-  const auto angle = hn::Mul(hn::Set(d, 6.2831853F), open_unit(word1));
-  normal0 = hn::Mul(radius, hn::Cos(d, angle));
-  normal1 = hn::Mul(radius, hn::Sin(d, angle));
+  const auto radius = hn::Sqrt(hn::Mul(hn::Set(d, -2.0F), logarithm(d, open_unit(word0))));
+  hn::Vec<D> cosine, sine;
+  cosine_and_sine(d, open_unit(word1), cosine, sine);
+  normal0 = hn::Mul(radius, cosine);
+  normal1 = hn::Mul(radius, sine);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "esim/sensors/front_end.h"
 
 #include <cmath>
+#include <limits>
 
 #include "esim/sensors/vector_math.h"
 
@@ -12,7 +13,7 @@ constexpr float kWhite = 255.0F;  // v2e counts in the steps of an 8-bit image
 /// L = ln(255 E) from the knee on; below, the straight line to L(0) = 0.
 template <class D, class V>
 V lin_log(D d, V irradiance, float knee) {
-  const auto logarithmic = hn::Log(d, hn::Mul(hn::Set(d, kWhite), hn::Max(irradiance, hn::Set(d, knee))));
+  const auto logarithmic = logarithm(d, hn::Mul(hn::Set(d, kWhite), hn::Max(irradiance, hn::Set(d, knee))));
   const auto linear = hn::Mul(irradiance, hn::Set(d, std::log(kWhite * knee) / knee));
   return hn::IfThenElse(hn::Gt(irradiance, hn::Set(d, knee)), logarithmic, linear);
 }
@@ -25,7 +26,7 @@ void respond(const EventCameraOptions& options, std::size_t count, const float* 
     for (std::size_t i = first; i + hn::Lanes(d) <= end; i += hn::Lanes(d)) {
       const auto e = hn::LoadU(d, irradiance + i);
       const auto value = options.response == PixelResponse::log
-                             ? hn::Log(d, hn::Add(e, eps))
+                             ? logarithm(d, hn::Max(hn::Add(e, eps), hn::Set(d, std::numeric_limits<float>::min())))
                              : lin_log(d, e, static_cast<float>(options.lin_log_knee));
       hn::StoreU(value, d, brightness + i);
     }

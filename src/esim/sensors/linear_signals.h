@@ -7,10 +7,10 @@ namespace esim {
 /// What comparators see where there is no low-pass: straight lines in brightness.
 class LinearSignals {
  public:
-  /// Of the brightness of these pixels.
-  void take(const AwakePixels& awake, double duration);
+  /// Of the brightness of `awake`, from the `first` one on.
+  void take(const AwakePixels& awake, std::size_t first, double duration);
   /// Of the logarithm of their irradiance plus eps.
-  void take_light(const AwakePixels& awake, double eps, double duration);
+  void take_light(const AwakePixels& awake, std::size_t first, double eps, double duration);
   void set(std::size_t i, double start, double end) { start_[i] = start, end_[i] = end; }
 
   /// Finds when each of the first `count` signals first leaves its levels, between `from` and the segment's end.

@@ -105,7 +105,7 @@ void PixelArray::set_bands(std::size_t count, const std::uint32_t* which, float*
 }
 
 double PixelArray::shot_interval(double uniform) const {
-  return std::floor(std::min(-std::log(uniform) / options.shot_noise_hz * 1e9, static_cast<double>(kAges))) + 1;
+  return std::floor(std::min(-std::log(uniform) / options.shot_noise_hz * 1e9, kAges)) + 1;
 }
 
 }  // namespace esim

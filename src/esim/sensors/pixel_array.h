@@ -15,8 +15,8 @@ namespace esim {
 /// Before every time, but so that differences do not overflow.
 inline constexpr TimeNs kLongAgo = std::numeric_limits<TimeNs>::min() / 2;
 
-/// As good as never: three years.
-inline constexpr TimeNs kAges = 100'000'000 * kNsPerSecond;
+/// As good as never, in ns: three years.
+inline constexpr double kAges = 1e17;
 
 /// In place of the reference of a pixel that is held in reset.
 inline constexpr double kHeld = std::numeric_limits<double>::infinity();
@@ -95,8 +95,8 @@ class PixelArray {
     float leak = 0, mean_leak = 0;  // 1/s, in brightness
     std::uint32_t draws = 0;        // for its events, so far
     std::uint32_t shots = 0;        // candidates of shot noise, so far
-    TimeNs shot_at = 0;             // the next of them
-    TimeNs until = kLongAgo;        // end of the last refractory period
+    double shot_at = 0;             // the next of them, ns after the epoch
+    double until = -kAges;          // end of the last refractory period, likewise
   };
   LargeVector<NoisyPixel> noisy_pixels;
 

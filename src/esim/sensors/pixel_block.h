@@ -25,8 +25,6 @@ struct AwakePixels {
   PerPixel<float> phase, moved;          ///< time constants that the segment lasts, and 1 - exp(-phase)
   std::size_t count = 0;
 
-  /// Whether eight more can be added.
-  bool has_room() const { return count + 8 <= kBlock; }
   void copy(std::size_t i, std::size_t to) {
     pixel[to] = pixel[i], place[to] = place[i];
     for (auto* values : {&light0, &light1, &start, &end, &filtered1, &filtered2, &phase, &moved})

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace esim {
 namespace {
@@ -12,89 +13,90 @@ constexpr double kLeakPerBand = 0.05;
 // A pixel's time between leak events is never shorter than this share of the mean.
 constexpr double kMinLeakInterval = 0.05;
 
-constexpr double kPerNs = 1e-9;
+constexpr double kPerNs = 1e-9, kNsPerS = 1e9;
 
 }  // namespace
 
 template <class Signals>
-void PixelPass<Signals>::begin(const PixelArray& pixels, AwakePixels& awake, TimeNs t0, TimeNs t1) {
-  t0_ = t0, t1_ = t1;
+std::size_t PixelPass<Signals>::take(const PixelArray& pixels, AwakePixels& awake, TimeNs t0, TimeNs t1) {
+  t0_ = t0;
   duration_ = static_cast<double>(t1 - t0);
   epoch_ns_ = static_cast<double>(t0 - pixels.epoch);
   compare_.threshold_on = pixels.threshold_on, compare_.threshold_off = pixels.threshold_off;
-  some_held_ = false;
-  const double epoch_s = epoch_ns_ * kPerNs;
-  std::size_t count = 0;
-  for (std::size_t from = 0; from < awake.count; ++from) {
+  const double duration = duration_, epoch_ns = epoch_ns_, epoch_s = epoch_ns * kPerNs;
+  const std::size_t first = compare_.count;
+  std::size_t count = first, held_count = 0;
+  for (std::size_t from = first; from < awake.count; ++from) {
     const PixelArray::NoisyPixel& own = pixels.noisy_pixels[awake.pixel[from]];
+    const double until = own.until - epoch_ns;
     const bool held = own.reference == kHeld;
-    if (held && own.until > t1) [[unlikely]]
+    if (held & (until > duration)) [[unlikely]]
       continue;
-    some_held_ |= held;
     const std::size_t i = count++;
     if (i != from) awake.copy(from, i);
-    pixel_[i] = awake.pixel[i], place_[i] = awake.place[i];
-    light0_[i] = awake.light0[i], light1_[i] = awake.light1[i];
+    held_[held_count] = static_cast<std::uint32_t>(i);
+    held_count += held ? 1 : 0;
     compare_.reference[i] = own.reference - own.leak * epoch_s;
     compare_.on[i] = own.on, compare_.off[i] = own.off;
     compare_.leak[i] = own.leak * kPerNs;
     compare_.from[i] = 0;
     mean_on_[i] = own.mean_on, mean_off_[i] = own.mean_off, mean_leak_[i] = own.mean_leak;
     draws_[i] = own.draws, shots_[i] = own.shots;
-    shot_[i] = static_cast<double>(own.shot_at - t0);
-    until_[i] = static_cast<double>(own.until - t0);
+    shot_[i] = own.shot_at - epoch_ns;
+    until_[i] = until;
   }
   awake.count = compare_.count = count;
+  held_count_ = held_count;
+  return first;
 }
 
 template <class Signals>
-void PixelPass<Signals>::run(PixelArray& pixels, PackedEvents& events) {
-  if (some_held_) resume_held();
-  while (compare_.count > 0) {
-    signals.find(compare_);
-    std::fill_n(anew_.begin(), compare_.count, pixels.holds ? 1.0 : 0.0);
-    if (pixels.shoots) find_shots(pixels);
-    for (std::size_t i = 0; i < compare_.count; ++i) {
-      passed_[i] = compare_.polarity[i] > 0 ? compare_.upper(i) : compare_.lower(i);
-    }
-    if (pixels.renews) renew(pixels);
-    fire(pixels, events.packing());
-    events.add(compare_.count, t0_, stamp_.data(), place_.data(), compare_.polarity.data(), reports_.data());
-    reset(pixels);
-    sleep(pixels);
+void PixelPass<Signals>::round(PixelArray& pixels, AwakePixels& awake, PackedEvents& events) {
+  resume_held();
+  signals.find(compare_);
+  std::fill_n(anew_.begin(), compare_.count, pixels.holds ? 1.0 : 0.0);
+  if (pixels.shoots) find_shots(pixels, awake);
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    passed_[i] = compare_.polarity[i] > 0 ? compare_.upper(i) : compare_.lower(i);
   }
+  if (pixels.renews) renew(pixels, awake);
+  fire(pixels, awake, events.packing());
+  events.add(compare_.count, t0_, stamp_.data(), awake.place.data(), compare_.polarity.data(), reports_.data());
+  reset(pixels);
+  sleep(pixels, awake);
 }
 
 /// Ends the refractory periods that end in this segment.
 template <class Signals>
 void PixelPass<Signals>::resume_held() {
-  for (std::size_t i = 0; i < compare_.count; ++i) {
-    if (compare_.reference[i] != kHeld) continue;
+  for (std::size_t k = 0; k < held_count_; ++k) {
+    const std::size_t i = held_[k];
     compare_.from[i] = until_[i];
     signals.advance(compare_, i);
     compare_.reference[i] = signals.value(i) + compare_.leak[i] * until_[i];
   }
+  held_count_ = 0;
 }
 
 /// Shot noise is a Poisson process at its highest rate, thinned by the light of the moment.
 template <class Signals>
-void PixelPass<Signals>::find_shots(const PixelArray& pixels) {
+void PixelPass<Signals>::find_shots(const PixelArray& pixels, const AwakePixels& awake) {
   for (std::size_t i = 0; i < compare_.count; ++i) {
     if (shot_[i] <= duration_) [[unlikely]]
-      find_shot(pixels, i);
+      find_shot(pixels, awake, i);
   }
 }
 
 /// The first candidate before the crossing that passes becomes the pixel's event.
 template <class Signals>
-void PixelPass<Signals>::find_shot(const PixelArray& pixels, std::size_t i) {
+void PixelPass<Signals>::find_shot(const PixelArray& pixels, const AwakePixels& awake, std::size_t i) {
   constexpr double kToUnit = 0x1.0p-32;
   while (shot_[i] <= duration_ && !(compare_.polarity[i] != 0 && shot_[i] >= compare_.tau[i])) {
     const double tau = shot_[i];
-    const auto bits = pixels.per_shot.bits(pixel_[i], shots_[i]++);
+    const auto bits = pixels.per_shot.bits(awake.pixel[i], shots_[i]++);
     shot_[i] += pixels.shot_interval((bits[0] + 0.5) * kToUnit);
     if (tau <= 0 || tau < compare_.from[i]) continue;  // it fell into a refractory period
-    const double light = light0_[i] + (light1_[i] - light0_[i]) * tau / duration_;
+    const double light = awake.light0[i] + (awake.light1[i] - awake.light0[i]) * tau / duration_;
     const double intensity = std::min(pixels.relative_intensity(light), 1.0);
     const double passes = 1.0 - (1.0 - pixels.options.shot_noise_at_white) * intensity;
     if (bits[1] * kToUnit >= passes) continue;
@@ -107,8 +109,8 @@ void PixelPass<Signals>::find_shot(const PixelArray& pixels, std::size_t i) {
 
 /// Draws the thresholds and leaks after the events that were found.
 template <class Signals>
-void PixelPass<Signals>::renew(const PixelArray& pixels) {
-  normals_.draw(pixels.per_event, compare_.count, pixel_, draws_);
+void PixelPass<Signals>::renew(const PixelArray& pixels, const AwakePixels& awake) {
+  normals_.draw(pixels.per_event, compare_.count, awake.pixel, draws_);
   const double sigma = pixels.options.threshold_noise, jitter = pixels.options.leak_jitter;
   const double least_on = kMinContrastThreshold - pixels.threshold_on;
   const double least_off = kMinContrastThreshold - pixels.threshold_off;
@@ -135,7 +137,7 @@ void PixelPass<Signals>::renew(const PixelArray& pixels) {
 
 /// Times of the events and of the refractory periods behind them.
 template <class Signals>
-void PixelPass<Signals>::fire(const PixelArray& pixels, const EventPacking& packing) {
+void PixelPass<Signals>::fire(const PixelArray& pixels, const AwakePixels& awake, const EventPacking& packing) {
   const double duration = duration_, refractory = static_cast<double>(pixels.refractory);
   const bool drops = pixels.refractory > 0 && !pixels.holds, holds = pixels.holds;
 #pragma omp simd
@@ -150,11 +152,11 @@ void PixelPass<Signals>::fire(const PixelArray& pixels, const EventPacking& pack
     const double resumes = holds ? until_[i] : compare_.tau[i];
     compare_.from[i] = fired ? resumes : compare_.from[i];
   }
-  if (pixels.delays) delay(pixels, packing);
+  if (pixels.delays) delay(pixels, awake, packing);
 }
 
 template <class Signals>
-void PixelPass<Signals>::delay(const PixelArray& pixels, const EventPacking& packing) {
+void PixelPass<Signals>::delay(const PixelArray& pixels, const AwakePixels& awake, const EventPacking& packing) {
   constexpr double kLongestNs = 1e17;
   const EventCameraOptions& o = pixels.options;
   const double mean = o.latency_us * 1e3, jitter = o.latency_jitter_us * 1e3, share = o.latency_light_share;
@@ -163,7 +165,7 @@ void PixelPass<Signals>::delay(const PixelArray& pixels, const EventPacking& pac
   const PerPixel<float>& normal = normals_[3];
 #pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
-    const double light = light0_[i] + (light1_[i] - light0_[i]) * compare_.tau[i] * per_duration;
+    const double light = awake.light0[i] + (awake.light1[i] - awake.light0[i]) * compare_.tau[i] * per_duration;
     const double slower = 1.0 - share + share * (1.0 + dark) / (light + dark);
     double ns = (mean + (jitter > 0 ? jitter * normal[i] : 0.0)) * (share > 0 ? slower : 1.0);
     ns = ns > 0 ? ns : 0.0;
@@ -183,24 +185,23 @@ void PixelPass<Signals>::reset(const PixelArray& pixels) {
     compare_.reference[i] = compare_.polarity[i] != 0 ? next : compare_.reference[i];
   }
   signals.look_ahead(compare_, again_.data());
-  const double duration = duration_;
-  const bool holds = pixels.holds, shoots = pixels.shoots;
+  const double held_beyond = pixels.holds ? duration_ : kNever, shot_until = pixels.shoots ? duration_ : -kNever;
 #pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
-    const bool fired = compare_.polarity[i] != 0, held = holds && fired && until_[i] > duration;
-    const bool may = again_[i] != 0 || (shoots && shot_[i] <= duration);
-    again_[i] = fired && !held && may ? 1.0 : 0.0;
+    const bool fired = compare_.polarity[i] != 0, held = fired & (until_[i] > held_beyond);
+    const bool may = (again_[i] != 0) | (shot_[i] <= shot_until);
+    again_[i] = (fired & !held) & may ? 1.0 : 0.0;
     compare_.reference[i] = held ? kHeld : compare_.reference[i];
   }
 }
 
 /// Puts the pixels that are done to sleep, and keeps the others.
 template <class Signals>
-void PixelPass<Signals>::sleep(PixelArray& pixels) {
-  constexpr double kForever = static_cast<double>(kAges);
+void PixelPass<Signals>::sleep(PixelArray& pixels, AwakePixels& awake) {
+  constexpr double kForever = kAges;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const double duration = duration_, since_epoch = epoch_ns_ + duration_;
-  const bool shoots = pixels.shoots;
+  const double no_shot = pixels.shoots ? 0.0 : kForever;
 #pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
     const double reference = compare_.reference[i], leak = compare_.leak[i];
@@ -213,66 +214,81 @@ void PixelPass<Signals>::sleep(PixelArray& pixels) {
     const double sinks = leak > 0 ? leak * (duration + valid) : 0.0;
     low_[i] = held ? kInfinity : static_cast<float>(lower - leak * duration);
     high_[i] = held ? -kInfinity : static_cast<float>(upper - sinks);
-    const double shot = shot_[i] - duration, alarm = shoots && shot < valid ? shot : valid;
+    const double shot = shot_[i] - duration + no_shot, alarm = shot < valid ? shot : valid;
     alarm_[i] = PixelArray::ticks_after_epoch(since_epoch + alarm);
   }
-  std::size_t done = 0, kept = 0;
-  for (std::size_t i = 0; i < compare_.count; ++i) {
-    if (again_[i] != 0) {
-      keep(i, kept++);
-      continue;
-    }
-    write_back(pixels, i);
-    if (pixels.alarmed) pixels.alarms[pixel_[i]] = alarm_[i];
-    asleep_[done] = pixel_[i];
-    low_[done] = low_[i], high_[done] = high_[i];
-    ++done;
+  // Those that go on are put to sleep, too: they will be again.
+  for (std::size_t i = 0; i < compare_.count; ++i) write_back(pixels.noisy_pixels[awake.pixel[i]], i);
+  if (pixels.alarmed) {
+    for (std::size_t i = 0; i < compare_.count; ++i) pixels.alarms[awake.pixel[i]] = alarm_[i];
   }
-  pixels.set_bands(done, asleep_.data(), low_.data(), high_.data());
-  compare_.count = kept;
+  pixels.set_bands(compare_.count, awake.pixel.data(), low_.data(), high_.data());
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    if (again_[i] != 0) [[unlikely]]
+      keep(awake, i, kept++);
+  }
+  compare_.count = awake.count = kept;
 }
 
 template <class Signals>
-void PixelPass<Signals>::keep(std::size_t i, std::size_t to) {
+void PixelPass<Signals>::keep(AwakePixels& awake, std::size_t i, std::size_t to) {
   if (i == to) return;
+  awake.copy(i, to);
   compare_.copy(i, to);
   signals.copy(i, to);
-  pixel_[to] = pixel_[i], place_[to] = place_[i], draws_[to] = draws_[i], shots_[to] = shots_[i];
-  light0_[to] = light0_[i], light1_[to] = light1_[i];
+  draws_[to] = draws_[i], shots_[to] = shots_[i];
   mean_on_[to] = mean_on_[i], mean_off_[to] = mean_off_[i], mean_leak_[to] = mean_leak_[i];
   shot_[to] = shot_[i], until_[to] = until_[i];
 }
 
 template <class Signals>
-void PixelPass<Signals>::write_back(PixelArray& pixels, std::size_t i) const {
-  PixelArray::NoisyPixel& own = pixels.noisy_pixels[pixel_[i]];
+void PixelPass<Signals>::write_back(PixelArray::NoisyPixel& own, std::size_t i) const {
   const double leak = compare_.leak[i];
   own.reference = compare_.reference[i] + leak * epoch_ns_;
   own.on = compare_.on[i], own.off = compare_.off[i];
-  own.leak = static_cast<float>(leak / kPerNs);
+  own.leak = static_cast<float>(leak * kNsPerS);
   own.draws = draws_[i], own.shots = shots_[i];
-  own.shot_at = t0_ + static_cast<TimeNs>(shot_[i]);
-  own.until = t0_ + static_cast<TimeNs>(until_[i]);
+  own.shot_at = epoch_ns_ + shot_[i];
+  own.until = epoch_ns_ + until_[i];
+}
+
+/// The first of random.uniforms(pixel, draw) for each pixel.
+template <class Signals>
+void PixelPass<Signals>::draw_uniforms(const AddressedRandom& random, const AwakePixels& awake, std::uint32_t draw) {
+  std::array<PerPixel<std::uint32_t>, 4> words;
+  PerPixel<std::uint32_t> draws;
+  draws.fill(draw);
+  random.bits(awake.count, awake.pixel.data(), draws.data(),
+              {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
+  for (std::size_t i = 0; i < awake.count; ++i) uniform_[i] = AddressedRandom::open_unit(words[0][i], words[1][i]);
 }
 
 template <class Signals>
-void PixelPass<Signals>::open(PixelArray& pixels) {
+void PixelPass<Signals>::open(PixelArray& pixels, AwakePixels& awake) {
   const std::size_t count = compare_.count;
   std::fill_n(compare_.polarity.begin(), count, 1.0);
   std::fill_n(compare_.tau.begin(), count, 0.0);
   std::fill_n(again_.begin(), count, 0.0);
-  if (pixels.renews) renew(pixels);
-  for (std::size_t i = 0; i < count; ++i) {
-    const double threshold = pixels.threshold_on + compare_.on[i];
-    compare_.reference[i] = signals.end(i);
+  if (pixels.renews) renew(pixels, awake);
+  for (std::size_t i = 0; i < count; ++i) compare_.reference[i] = signals.end(i);
+  if (pixels.leaks) {
     // A sensor that leaks has been running before: it is anywhere between two leak events.
-    if (compare_.leak[i] > 0) compare_.reference[i] -= threshold * pixels.per_leak.uniforms(pixel_[i], 1)[0];
-    if (!pixels.shoots) continue;
-    const bool dead = std::isinf(compare_.on[i]);
-    shot_[i] = dead ? static_cast<double>(kAges) : pixels.shot_interval(pixels.per_shot.uniforms(pixel_[i], 0)[0]);
-    shots_[i] = 1;
+    draw_uniforms(pixels.per_leak, awake, 1);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double threshold = pixels.threshold_on + compare_.on[i];
+      if (compare_.leak[i] > 0) compare_.reference[i] -= threshold * uniform_[i];
+    }
   }
-  sleep(pixels);
+  if (pixels.shoots) {
+    draw_uniforms(pixels.per_shot, awake, 0);
+    for (std::size_t i = 0; i < count; ++i) {
+      const bool dead = std::isinf(compare_.on[i]);
+      shot_[i] = dead ? kAges : pixels.shot_interval(uniform_[i]);
+      shots_[i] = 1;
+    }
+  }
+  sleep(pixels, awake);
 }
 
 template class PixelPass<LinearSignals>;

@@ -17,42 +17,47 @@ namespace esim {
 template <class Signals>
 class PixelPass {
  public:
-  /// What the comparators see of the pixels: to be set between begin() and what follows.
+  /// What the comparators see of the pixels: to be set for those that take() has taken.
   Signals signals;
 
-  /// Takes pixels that woke up between t0 and t1. Those that stay in reset are removed from `awake`.
-  void begin(const PixelArray& pixels, AwakePixels& awake, TimeNs t0, TimeNs t1);
+  /// Takes pixels that woke up between t0 and t1: those of `awake` behind the ones that the last round() left, in the
+  /// same segment. Removes from `awake` those that stay in reset. Returns the index of the first.
+  std::size_t take(const PixelArray& pixels, AwakePixels& awake, TimeNs t0, TimeNs t1);
 
-  /// Adds the events that they fire to `events`, in any order.
-  void run(PixelArray& pixels, PackedEvents& events);
+  /// Adds to `events`, in any order, the next event of each that fires. In `awake` are left those that may fire again.
+  void round(PixelArray& pixels, AwakePixels& awake, PackedEvents& events);
 
-  /// Instead of run() where the pixels are first seen, at t0 = t1: sets their references.
-  void open(PixelArray& pixels);
+  /// Instead of rounds where the pixels are first seen, at t0 = t1: sets their references.
+  void open(PixelArray& pixels, AwakePixels& awake);
 
  private:
   void resume_held();
 
   // The steps of a round, for all pixels that are left.
-  void find_shots(const PixelArray& pixels);
-  void find_shot(const PixelArray& pixels, std::size_t i);
-  void renew(const PixelArray& pixels);
-  void fire(const PixelArray& pixels, const EventPacking& packing);
-  void delay(const PixelArray& pixels, const EventPacking& packing);
+  void find_shots(const PixelArray& pixels, const AwakePixels& awake);
+  void find_shot(const PixelArray& pixels, const AwakePixels& awake, std::size_t i);
+  void renew(const PixelArray& pixels, const AwakePixels& awake);
+  void fire(const PixelArray& pixels, const AwakePixels& awake, const EventPacking& packing);
+  void delay(const PixelArray& pixels, const AwakePixels& awake, const EventPacking& packing);
   void reset(const PixelArray& pixels);
-  void sleep(PixelArray& pixels);
+  void sleep(PixelArray& pixels, AwakePixels& awake);
 
-  void keep(std::size_t i, std::size_t to);
-  void write_back(PixelArray& pixels, std::size_t i) const;
+  void draw_uniforms(const AddressedRandom& random, const AwakePixels& awake, std::uint32_t draw);
+  void keep(AwakePixels& awake, std::size_t i, std::size_t to);
+  void write_back(PixelArray::NoisyPixel& own, std::size_t i) const;
 
-  TimeNs t0_ = 0, t1_ = 0;
-  double duration_ = 0;     // ns
-  double epoch_ns_ = 0;     // from the epoch to t0
-  bool some_held_ = false;  // pixels whose refractory period ends in the segment
+  TimeNs t0_ = 0;
+  double duration_ = 0;  // ns
+  double epoch_ns_ = 0;  // from the epoch to t0
+
+  // Pixels whose refractory period ends in the segment, and that have not resumed yet.
+  PerPixel<std::uint32_t> held_{};
+  std::size_t held_count_ = 0;
 
   // By pixel that is left. Times are ns after t0.
   Comparators compare_{};
-  PerPixel<std::uint32_t> pixel_{}, place_{}, draws_{}, shots_{};
-  PerPixel<float> light0_{}, light1_{}, mean_on_{}, mean_off_{}, mean_leak_{};
+  PerPixel<std::uint32_t> draws_{}, shots_{};
+  PerPixel<float> mean_on_{}, mean_off_{}, mean_leak_{};
   PerPixel<double> shot_{};     // the next candidate of shot noise
   PerPixel<double> until_{};    // end of the last refractory period
   PerPixel<double> passed_{};   // the level that the event passed
@@ -61,9 +66,9 @@ class PixelPass {
   PerPixel<double> reports_{};  // 0 where the event is lost
   PerPixel<double> again_{};    // 1 where another event may follow
   EventNormals normals_{};
+  PerPixel<double> uniform_{};
 
   // The levels that pixels sleep between.
-  PerPixel<std::uint32_t> asleep_{};
   PerPixel<float> low_{}, high_{};
   PerPixel<std::int32_t> alarm_{};
 };

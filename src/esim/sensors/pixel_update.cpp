@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "esim/sensors/front_end.h"
@@ -9,13 +10,6 @@
 
 namespace esim {
 namespace {
-
-/// Lanes whose alarm goes off by `now`, in ticks.
-template <class D>
-hn::Mask<D> alarmed(D d, const std::int32_t* alarms, std::int32_t now) {
-  const hn::RebindToSigned<D> di;
-  return hn::RebindMask(d, hn::Lt(hn::LoadU(di, alarms), hn::Set(di, now + 1)));
-}
 
 std::size_t index(const PixelArray& pixels, int x, int y) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width) + static_cast<std::size_t>(x);
@@ -34,7 +28,7 @@ void prefetch_row(const Segment& segment, int y) {
 struct PixelUpdate::Filter {
   float phase_per_light = 0, phase_in_dark = 0;  // time constants that the segment lasts: per 6 of light, and besides
   double duration = 0, per_duration = 0;         // ns
-  std::int32_t now = 0;                          // for the alarms, in ticks
+  std::int32_t later = 0;                        // than the alarms that go off, in ticks
 
   Filter(const PixelArray& pixels, const Segment& segment)
       : duration(static_cast<double>(segment.t1 - segment.t0)), per_duration(1 / duration) {
@@ -44,89 +38,137 @@ struct PixelUpdate::Filter {
     const double per_light = at_white / (1 + o.dark_irradiance);
     phase_per_light = static_cast<float>(per_light / 6);
     phase_in_dark = static_cast<float>(per_light * o.dark_irradiance);
-    if (pixels.alarmed) now = pixels.ticks(segment.t1);
+    if (pixels.alarmed) later = pixels.ticks(segment.t1) + 1;
   }
 };
 
-/// Moves some neighbouring pixels' low-passes to the segment's end, exactly for brightness that is linear in time and
-/// for the segment's mean intensity, and wakes those that may have left their band on the way.
-template <int kOrder, class D>
-HWY_INLINE void PixelUpdate::filter_vector(D d, PixelArray& pixels, const Segment& segment, const Filter& filter,
-                                           const float* brightness, int y, int x, const EventPacking& packing) {
-  using V = hn::Vec<D>;
-  const std::size_t i = index(pixels, x, y);
-  const V start = hn::LoadU(d, &pixels.brightness[i]), end = hn::LoadU(d, brightness);
-  hn::StoreU(end, d, &pixels.brightness[i]);
-  V lowest = hn::Min(start, end), highest = hn::Max(start, end);
-  V phase = hn::Zero(d), m = phase, f1 = start, f2 = start;
-  const V e0 = hn::LoadU(d, segment.irradiance0->row(y) + x), e1 = hn::LoadU(d, segment.irradiance1->row(y) + x);
+/// Where a row's pixels are in memory, from the tile's first on.
+struct PixelUpdate::FilterRow {
+  const float *light0, *light1, *end;    // irradiance at the segment's ends, brightness at its end
+  float *start, *filtered1, *filtered2;  // brightness at its start, and behind each pole: to be moved on
+  const float *band_low, *band_high;
+  const std::int32_t* alarms;  // or null
+  std::uint32_t pixel, place;  // of the first one
 
+  /// Asks memory for what is worked on next: processors that look ahead by themselves do so within a page only.
+  template <int kOrder>
+  void prefetch(int x) const {
+    constexpr int kAhead = 512;
+    for (const float* values : {static_cast<const float*>(start), band_low, band_high, light0}) {
+      __builtin_prefetch(values + x + kAhead);
+    }
+    if constexpr (kOrder > 0) __builtin_prefetch(filtered1 + x + kAhead);
+    if constexpr (kOrder > 1) __builtin_prefetch(filtered2 + x + kAhead);
+    if (alarms != nullptr) __builtin_prefetch(alarms + x + kAhead);
+  }
+};
+
+/// Moves the low-passes of some neighbouring pixels to the segment's end, exactly for brightness that is linear in time
+/// and for the segment's mean intensity, and looks which pixels may have left their band on the way.
+template <int kOrder, class D>
+HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter& filter, int x, int at) {
+  using V = hn::Vec<D>;
+  const hn::RebindToSigned<D> di;
+  const V start = hn::LoadU(d, row.start + x), end = hn::LoadU(d, row.end + x);
+  V lowest = hn::Min(start, end), highest = hn::Max(start, end);
   if constexpr (kOrder > 0) {
     // How many time constants the segment lasts: of the mean light, by Simpson's rule for an exponential.
+    const V e0 = hn::LoadU(d, row.light0 + x), e1 = hn::LoadU(d, row.light1 + x);
     const V sum = hn::MulAdd(hn::Set(d, 4.0F), hn::Sqrt(hn::Mul(e0, e1)), hn::Add(e0, e1));
-    phase = hn::MulAdd(sum, hn::Set(d, filter.phase_per_light), hn::Set(d, filter.phase_in_dark));
+    const V phase = hn::MulAdd(sum, hn::Set(d, filter.phase_per_light), hn::Set(d, filter.phase_in_dark));
 
     // With m = 1 - exp(-phase): F moves by m of its distance, and lags behind the rise of L.
-    const V one = hn::Set(d, 1.0F), rise = hn::Sub(end, start);
-    m = moved_after(d, phase);
-    const V followed = hn::Div(m, phase);
-    f1 = hn::LoadU(d, &pixels.filtered1[i]);
-    const V distance = hn::Sub(start, f1);
+    const V one = hn::Set(d, 1.0F), rise = hn::Sub(end, start), m = moved_after(d, phase), followed = hn::Div(m, phase);
+    const V f1 = hn::LoadU(d, row.filtered1 + x), distance = hn::Sub(start, f1);
     const V f1_end = hn::Add(f1, hn::MulAdd(m, distance, hn::Mul(rise, hn::Sub(one, followed))));
-    hn::StoreU(f1_end, d, &pixels.filtered1[i]);
+    hn::StoreU(phase, d, moved_.phase.data() + at);
+    hn::StoreU(m, d, moved_.moved.data() + at);
+    hn::StoreU(f1_end, d, moved_.filtered1.data() + at);
     if constexpr (kOrder == 1) {
-      // Where F does not turn back, it stays between its ends.
-      const auto turns = hn::Lt(hn::Mul(distance, hn::Sub(end, f1_end)), hn::Zero(d));
-      lowest = hn::Min(hn::Min(f1, f1_end), hn::IfThenElse(turns, lowest, f1_end));
-      highest = hn::Max(hn::Max(f1, f1_end), hn::IfThenElse(turns, highest, f1_end));
+      // F stays between its ends, or turns back where it meets L: before L's start, and before the tangents at its ends
+      // reach the other end.
+      const V tangent0 = hn::MulAdd(distance, phase, f1), tangent1 = hn::NegMulAdd(hn::Sub(end, f1_end), phase, f1_end);
+      lowest = hn::Min(hn::Min(f1, f1_end), hn::Max(hn::Max(start, tangent0), tangent1));
+      highest = hn::Max(hn::Max(f1, f1_end), hn::Min(hn::Min(start, tangent0), tangent1));
     } else {
-      f2 = hn::LoadU(d, &pixels.filtered2[i]);
+      const V f2 = hn::LoadU(d, row.filtered2 + x);
       const V from_first = hn::Mul(hn::Mul(phase, hn::Sub(one, m)), hn::Neg(distance));
       const V from_rise = hn::Mul(rise, hn::Add(hn::MulAdd(hn::Set(d, -2.0F), followed, one), hn::Sub(one, m)));
       const V f2_end = hn::Add(hn::MulAdd(m, hn::Sub(start, f2), f2), hn::Add(from_first, from_rise));
-      hn::StoreU(f2_end, d, &pixels.filtered2[i]);
+      hn::StoreU(f2_end, d, moved_.filtered2.data() + at);
       lowest = hn::Min(hn::Min(f2, f2_end), hn::Min(f1, lowest));
       highest = hn::Max(hn::Max(f2, f2_end), hn::Max(f1, highest));
     }
   }
-
   auto restless =
-      hn::Or(hn::Le(lowest, hn::LoadU(d, &pixels.band_low[i])), hn::Ge(highest, hn::LoadU(d, &pixels.band_high[i])));
-  if (pixels.alarmed) restless = hn::Or(restless, alarmed(d, &pixels.alarms[i], filter.now));
-  // Without a branch: that a pixel wakes is as hard to foresee as an event.
-  const ChosenLanes chosen(d, restless);
-  AwakePixels& a = awake_;
-  const std::size_t at = a.count;
-  chosen.store_positions(static_cast<std::uint32_t>(i), 1, a.pixel.data() + at);
-  chosen.store_positions(static_cast<std::uint32_t>(packing.place(x, y)), 2, a.place.data() + at);
-  chosen.store(e0, a.light0.data() + at);
-  chosen.store(e1, a.light1.data() + at);
-  chosen.store(start, a.start.data() + at);
-  chosen.store(end, a.end.data() + at);
-  if constexpr (kOrder > 0) {
-    chosen.store(f1, a.filtered1.data() + at);
-    chosen.store(phase, a.phase.data() + at);
-    chosen.store(m, a.moved.data() + at);
+      hn::Or(hn::Le(lowest, hn::LoadU(d, row.band_low + x)), hn::Ge(highest, hn::LoadU(d, row.band_high + x)));
+  if (row.alarms != nullptr) {
+    const auto alarmed = hn::Lt(hn::LoadU(di, row.alarms + x), hn::Set(di, filter.later));
+    restless = hn::Or(restless, hn::RebindMask(d, alarmed));
   }
-  if constexpr (kOrder == 2) chosen.store(f2, a.filtered2.data() + at);
-  a.count += chosen.count();
+  moved_.restless[static_cast<std::size_t>(at) / hn::Lanes(d)] = ChosenLanes<D>::bits_of(d, restless);
 }
 
-/// Takes the pixels that woke up through the segment.
+/// Moves the low-passes of pixels from x = begin on, and tells which columns wake up.
+template <int kOrder, class D>
+std::span<const std::uint32_t> PixelUpdate::move(D d, const PixelArray& pixels, const FilterRow& row,
+                                                 const Filter& filter, int begin, int end) {
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  for (int x = begin; x < end; x += lanes) {
+    move_vector<kOrder>(d, row, filter, x, x - begin);
+    row.prefetch<kOrder>(x);
+    // Memory is asked a little at a time for what is needed of those that woke up before.
+    pixels.prefetch(awake_.pixel[asked_]), pixels.prefetch(awake_.pixel[asked_ + 1]);
+    asked_ = std::min(asked_ + 2, awake_.count);
+  }
+  // Without a branch: that a pixel wakes is as hard to foresee as an event.
+  std::size_t count = 0, vector = 0;
+  for (int x = begin; x < end; x += lanes) {
+    const ChosenLanes<D> chosen(moved_.restless[vector++]);
+    chosen.store_positions(static_cast<std::uint32_t>(x), moved_.columns.data() + count);
+    count += chosen.count();
+  }
+  return {moved_.columns.data(), count};
+}
+
+/// Adds pixels of these columns to those that are awake.
 template <int kOrder>
-void PixelUpdate::run_awake(PixelArray& pixels, const Segment& segment, PackedEvents& events) {
+void PixelUpdate::wake(const FilterRow& row, int begin, std::span<const std::uint32_t> columns) {
+  AwakePixels& a = awake_;
+  std::size_t to = a.count;
+  for (const std::uint32_t x : columns) {
+    const std::size_t at = x - static_cast<std::uint32_t>(begin);
+    a.pixel[to] = row.pixel + x;
+    a.place[to] = row.place + 2 * x;
+    a.light0[to] = row.light0[x], a.light1[to] = row.light1[x];
+    a.start[to] = row.start[x], a.end[to] = row.end[x];
+    if constexpr (kOrder > 0) {
+      a.phase[to] = moved_.phase[at], a.moved[to] = moved_.moved[at];
+      a.filtered1[to] = row.filtered1[x];
+    }
+    if constexpr (kOrder == 2) a.filtered2[to] = row.filtered2[x];
+    ++to;
+  }
+  a.count = to;
+}
+
+/// Takes the pixels that woke up through the segment: all of them, or only so far that there is room for more.
+template <int kOrder>
+void PixelUpdate::run_awake(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events) {
   const auto duration = static_cast<double>(segment.t1 - segment.t0);
   const auto run = [&](auto& pass, const auto& take) {
-    pass.begin(pixels, awake_, segment.t0, segment.t1);
-    take(pass.signals);
-    pass.run(pixels, events);
+    for (; asked_ < awake_.count; ++asked_) pixels.prefetch(awake_.pixel[asked_]);
+    take(pass.signals, pass.take(pixels, awake_, segment.t0, segment.t1));
+    do {
+      pass.round(pixels, awake_, events);
+    } while (all ? awake_.count > 0 : awake_.count == kBlock);
+    asked_ = awake_.count;
   };
   if constexpr (kOrder == 0) {
-    run(linear_, [&](LinearSignals& signals) { signals.take(awake_, duration); });
+    run(linear_, [&](LinearSignals& signals, std::size_t first) { signals.take(awake_, first, duration); });
   } else {
-    run(relaxing_, [&](RelaxingSignals& signals) { signals.take(awake_, kOrder, duration); });
+    run(relaxing_, [&](RelaxingSignals& signals, std::size_t first) { signals.take(awake_, first, kOrder, duration); });
   }
-  awake_.count = 0;
 }
 
 const float* PixelUpdate::brightness_row(const PixelArray& pixels, const Segment& segment,
@@ -141,22 +183,39 @@ const float* PixelUpdate::brightness_row(const PixelArray& pixels, const Segment
 template <int kOrder>
 void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const Filter& filter, const float* brightness,
                              int y, PackedEvents& events) {
-  const int first = segment.tile.x, last = first + segment.tile.width;
-  std::size_t asked = awake_.count;
+  const int left = segment.tile.x, width = segment.tile.width;
+  const std::size_t first = index(pixels, left, y);
+  const auto from = [&](auto& values) { return values.empty() ? nullptr : values.data() + first; };
+  const FilterRow row{.light0 = segment.irradiance0->row(y) + left,
+                      .light1 = segment.irradiance1->row(y) + left,
+                      .end = brightness,
+                      .start = from(pixels.brightness),
+                      .filtered1 = from(pixels.filtered1),
+                      .filtered2 = from(pixels.filtered2),
+                      .band_low = from(pixels.band_low),
+                      .band_high = from(pixels.band_high),
+                      .alarms = from(pixels.alarms),
+                      .pixel = static_cast<std::uint32_t>(first),
+                      .place = static_cast<std::uint32_t>(events.packing().place(left, y))};
   const auto filter_to = [&](auto d, int begin, int end) {
-    const int lanes = static_cast<int>(hn::Lanes(d));
-    for (int x = begin; x < end; x += lanes) {
-      filter_vector<kOrder>(d, pixels, segment, filter, brightness + (x - first), y, x, events.packing());
-      if ((x & 31) < lanes) {
-        for (; asked < awake_.count; ++asked) pixels.prefetch(awake_.pixel[asked]);
-      }
-      if (!awake_.has_room()) run_awake<kOrder>(pixels, segment, events), asked = 0;
+    std::span<const std::uint32_t> columns = move<kOrder>(d, pixels, row, filter, begin, end);
+    while (!columns.empty()) {
+      const std::size_t room = std::min(kBlock - awake_.count, columns.size());
+      wake<kOrder>(row, begin, columns.first(room));
+      columns = columns.subspan(room);
+      if (awake_.count == kBlock) run_awake<kOrder>(pixels, segment, false, events);
     }
+    const auto count = static_cast<std::size_t>(end - begin);
+    std::copy_n(row.end + begin, count, row.start + begin);
+    if constexpr (kOrder > 0) std::copy_n(moved_.filtered1.data(), count, row.filtered1 + begin);
+    if constexpr (kOrder == 2) std::copy_n(moved_.filtered2.data(), count, row.filtered2 + begin);
   };
   const hn::CappedTag<float, 8> whole;
-  const int middle = last - segment.tile.width % static_cast<int>(hn::Lanes(whole));
-  filter_to(whole, first, middle);
-  filter_to(hn::CappedTag<float, 1>(), middle, last);
+  const int middle = width - width % static_cast<int>(hn::Lanes(whole));
+  for (int begin = 0; begin < middle; begin += kMovedTogether) {
+    filter_to(whole, begin, std::min(begin + kMovedTogether, middle));
+  }
+  if (middle < width) filter_to(hn::CappedTag<float, 1>(), middle, width);
 }
 
 /// Where bands are of brightness: moves all low-passes on, and takes those pixels through the segment whose filtered
@@ -173,9 +232,9 @@ bool PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image
     if (order == 1) filter_row<1>(pixels, segment, common, row, y, events);
     if (order == 2) filter_row<2>(pixels, segment, common, row, y, events);
   }
-  if (order == 0) run_awake<0>(pixels, segment, events);
-  if (order == 1) run_awake<1>(pixels, segment, events);
-  if (order == 2) run_awake<2>(pixels, segment, events);
+  if (order == 0) run_awake<0>(pixels, segment, true, events);
+  if (order == 1) run_awake<1>(pixels, segment, true, events);
+  if (order == 2) run_awake<2>(pixels, segment, true, events);
   return true;
 }
 
@@ -186,11 +245,13 @@ bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, P
     clean_.run(pixels, segment, watch_, rows, events);
     return true;
   }
-  const auto run = [&] {
-    linear_.begin(pixels, awake_, segment.t0, segment.t1);
-    linear_.signals.take_light(awake_, pixels.options.log_eps, static_cast<double>(segment.t1 - segment.t0));
-    linear_.run(pixels, events);
-    awake_.count = 0;
+  const auto duration = static_cast<double>(segment.t1 - segment.t0);
+  const auto run = [&](bool all) {
+    const std::size_t first = linear_.take(pixels, awake_, segment.t0, segment.t1);
+    linear_.signals.take_light(awake_, first, pixels.options.log_eps, duration);
+    do {
+      linear_.round(pixels, awake_, events);
+    } while (all ? awake_.count > 0 : awake_.count == kBlock);
   };
   for (int y = rows.first; y < rows.last; ++y) {
     for (const std::uint32_t x : watch_.columns(y)) {
@@ -200,10 +261,10 @@ bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, P
       awake_.place[i] = static_cast<std::uint32_t>(events.packing().place(column, y));
       awake_.light0[i] = segment.irradiance0->row(y)[x];
       awake_.light1[i] = segment.irradiance1->row(y)[x];
-      if (!awake_.has_room()) run();
+      if (awake_.count == kBlock) run(false);
     }
   }
-  run();
+  run(true);
   return true;
 }
 
@@ -238,10 +299,9 @@ bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<f
       const std::size_t count = std::min(kBlock, width - begin);
       for (std::size_t i = 0; i < count; ++i) awake_.pixel[i] = static_cast<std::uint32_t>(first + begin + i);
       awake_.count = count;
-      linear_.begin(pixels, awake_, segment.t0, segment.t1);
+      linear_.take(pixels, awake_, segment.t0, segment.t1);
       for (std::size_t i = 0; i < count; ++i) linear_.signals.set(i, row_[begin + i], row_[begin + i]);
-      linear_.open(pixels);
-      awake_.count = 0;
+      linear_.open(pixels, awake_);
     }
   }
   return true;

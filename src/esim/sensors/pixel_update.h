@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "esim/core/image.h"
@@ -33,19 +35,34 @@ class PixelUpdate {
               PackedEvents& events);
 
   struct Filter;
+  struct FilterRow;
   template <int kOrder>
   void filter_row(PixelArray& pixels, const Segment& segment, const Filter& filter, const float* brightness, int y,
                   PackedEvents& events);
   template <int kOrder, class D>
-  void filter_vector(D d, PixelArray& pixels, const Segment& segment, const Filter& filter, const float* brightness,
-                     int y, int x, const EventPacking& packing);
+  void move_vector(D d, const FilterRow& row, const Filter& filter, int x, int at);
+  template <int kOrder, class D>
+  std::span<const std::uint32_t> move(D d, const PixelArray& pixels, const FilterRow& row, const Filter& filter,
+                                      int begin, int end);
   template <int kOrder>
-  void run_awake(PixelArray& pixels, const Segment& segment, PackedEvents& events);
+  void wake(const FilterRow& row, int begin, std::span<const std::uint32_t> columns);
+  template <int kOrder>
+  void run_awake(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events);
   const float* brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int y);
+
+  /// Where the low-passes of neighbouring pixels are at the segment's end, and which pixels wake up.
+  static constexpr int kMovedTogether = 128;
+  struct MovedPixels {
+    std::array<float, kMovedTogether> filtered1, filtered2, phase, moved;
+    std::array<std::uint8_t, kMovedTogether> restless;  // a bit for each lane of a vector
+    std::array<std::uint32_t, kMovedTogether + kVectorPadding> columns;
+  };
 
   PixelWatch watch_;
   CleanPass clean_;
+  MovedPixels moved_;
   AwakePixels awake_;
+  std::size_t asked_ = 0;  // of the awake pixels, those that memory has been asked for
   PixelPass<LinearSignals> linear_;
   PixelPass<RelaxingSignals> relaxing_;
   std::vector<double> row_;       // brightness at the first sample

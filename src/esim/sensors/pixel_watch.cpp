@@ -67,7 +67,7 @@ bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, i
         awake = hn::Or(awake, hn::RebindMask(d, alarmed));
       }
       const ChosenLanes chosen(d, awake);
-      chosen.store_positions(static_cast<std::uint32_t>(x), 1, columns + found);
+      chosen.store_positions(static_cast<std::uint32_t>(x), columns + found);
       found += chosen.count();
     }
     good &= hn::GetLane(hn::MaxOfLanes(du, largest)) <= kLargest;

@@ -30,22 +30,29 @@ class Readout {
   /// Times in 1/1024 ns: fine enough for any rate, and 104 days long.
   using FineTime = std::int64_t;
   static constexpr int kFineBits = 10;
+  static constexpr FineTime kNs = FineTime{1} << kFineBits;
+
+  /// The events of a row that wait: the first of them, and a list of slots.
+  struct Row {
+    std::uint32_t count = 0, others = 0;
+    std::uint16_t x = 0;
+    std::int8_t polarity = 0;
+  };
 
   void serve_until(TimeNs now, std::vector<Event>& out);
+  void serve(const Row& row, std::uint16_t y, TimeNs t, std::vector<Event>& out);
   void accept(const Event& event);
+  void occupy(TimeNs start, std::uint32_t count);
+  TimeNs free_from() const { return (free_at_ + kNs - 1) >> kFineBits; }  ///< first whole ns without work
 
   FineTime per_event_, per_row_;
   std::size_t capacity_;
   FineTime free_at_ = std::numeric_limits<FineTime>::min();  // when the reader is done
 
-  // The events that wait, by row: lists of slots.
   struct Slot {
     std::uint16_t x;
     std::int8_t polarity;
     std::uint32_t next;
-  };
-  struct Row {
-    std::uint32_t first = 0, count = 0;
   };
   std::vector<Slot> slots_;
   std::uint32_t free_slot_ = 0;  // first of the list of those that are free

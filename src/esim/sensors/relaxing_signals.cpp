@@ -1,172 +1,266 @@
 #include "esim/sensors/relaxing_signals.h"
 
 #include <algorithm>
-#include <cstdint>
 
 #include "esim/sensors/vector_math.h"
 
 namespace esim {
 namespace {
 
-using D = hn::ScalableTag<double>;
-using V = hn::Vec<D>;
+using F = hn::CappedTag<float, 8>;
+using V = hn::Vec<F>;
+using Mask = hn::Mask<F>;
+constexpr F kF;
+
+// Vectors of doubles, with half as many lanes.
+using D = hn::Rebind<double, hn::Half<F>>;
 constexpr D kD;
 
 constexpr double kToleranceNs = 0.05;
 constexpr int kMostSteps = 3;
 
-// Below, 1 - exp(-u) loses too many digits.
-constexpr double kSmallestSpan = 1e-5;
+// How close to its levels a signal may turn back for floats to say that it does not reach them.
+constexpr float kTooClose = 1e-5F;
 
-V set(double value) { return hn::Set(kD, value); }
+V set(float value) { return hn::Set(kF, value); }
+V load(const PerPixel<float>& values, std::size_t i) { return hn::LoadU(kF, values.data() + i); }
+hn::Vec<D> set_double(double value) { return hn::Set(kD, value); }
+hn::Vec<D> load_double(const PerPixel<double>& values, std::size_t i) { return hn::LoadU(kD, values.data() + i); }
 
-/// F behind one pole.
-V filtered_at(V u, V m, V filtered, V start, V rise) {
-  return hn::Add(hn::MulAdd(hn::Sub(start, filtered), m, filtered), hn::Mul(rise, hn::Sub(u, m)));
+/// As doubles.
+template <class To>
+hn::Vec<To> promoted(To d, const PerPixel<float>& values, std::size_t i) {
+  return hn::PromoteTo(d, hn::LoadU(hn::Rebind<float, To>(), values.data() + i));
+}
+
+/// filtered - reference, as floats.
+V relative(const PerPixel<float>& filtered, const PerPixel<double>& reference, std::size_t i) {
+  const auto part = [&](std::size_t k) {
+    return hn::DemoteTo(hn::Half<F>(), hn::Sub(promoted(kD, filtered, k), load_double(reference, k)));
+  };
+  return hn::Combine(kF, part(i + hn::Lanes(kD)), part(i));
 }
 
 }  // namespace
 
-void RelaxingSignals::take(const AwakePixels& awake, int poles, double duration) {
+void RelaxingSignals::take(const AwakePixels& awake, std::size_t first, int poles, double duration) {
+  awake_ = &awake;
   poles_ = poles;
   duration_ = duration;
-  const auto fill = [&](const PerPixel<float>& from, PerPixel<double>& to) {
-    for (std::size_t i = 0; i < awake.count; ++i) to[i] = from[i];
-  };
-  fill(awake.phase, phase_), fill(awake.moved, moved_);
-  fill(awake.start, start_), fill(awake.filtered1, filtered1_);
-  if (poles == 2) fill(awake.filtered2, filtered2_);
-  for (std::size_t i = 0; i < awake.count; ++i) {
-    const double end = awake.end[i], rise = (end - start_[i]) / phase_[i], distance = start_[i] - filtered1_[i];
+  for (std::size_t i = first; i < awake.count; ++i) {
+    const float rise = (awake.end[i] - awake.start[i]) / awake.phase[i], distance = awake.start[i] - awake.filtered1[i];
     rise_[i] = rise;
-    u_[i] = 0, value_[i] = filtered1_[i], slope_[i] = distance;
-    end_[i] = filtered1_[i] + distance * moved_[i] + rise * (phase_[i] - moved_[i]);
-    end_slope_[i] = end - end_[i];
+    u_[i] = moved_[i] = 0;
+    value_[i] = static_cast<double>(awake.filtered1[i]);
+    end_[i] = awake.filtered1[i] + (distance * awake.moved[i] + rise * (awake.phase[i] - awake.moved[i]));
   }
   if (poles == 1) return;
-  Comparators none;
-  for (std::size_t i = 0; i < awake.count; ++i) {
-    none.leak[i] = 0, none.from[i] = 0;
-    RelaxingSignal one = signal(none, i);
-    value_[i] = one.value(), slope_[i] = one.slope();
-    one.advance(duration);
-    end_[i] = one.value(), end_slope_[i] = one.slope();
+  const Comparators none{};
+  for (std::size_t i = first; i < awake.count; ++i) {
+    const RelaxingSignal one = signal(none, i);
+    value_[i] = one.value();
+    end_[i] = static_cast<float>(one.value(duration));
   }
 }
 
 RelaxingSignal RelaxingSignals::signal(const Comparators& c, std::size_t i) const {
-  const double rate = phase_[i] / duration_, slope = rise_[i] * rate;
+  const AwakePixels& a = *awake_;
+  const double rate = a.phase[i] / duration_, slope = rise_[i] * rate;
   RelaxingSignal one =
-      poles_ == 2 ? RelaxingSignal::second_order(rate, moved_[i], filtered1_[i], filtered2_[i], start_[i], slope)
-                  : RelaxingSignal::first_order(rate, moved_[i], filtered1_[i], start_[i], slope);
+      poles_ == 2 ? RelaxingSignal::second_order(rate, a.moved[i], a.filtered1[i], a.filtered2[i], a.start[i], slope)
+                  : RelaxingSignal::first_order(rate, a.moved[i], a.filtered1[i], a.start[i], slope);
   one.add(0, c.leak[i]);
   if (c.from[i] > 0) one.advance(c.from[i]);
   return one;
 }
 
 void RelaxingSignals::copy(std::size_t i, std::size_t to) {
-  for (auto* values :
-       {&phase_, &start_, &rise_, &filtered1_, &filtered2_, &moved_, &u_, &value_, &slope_, &end_, &end_slope_}) {
-    (*values)[to] = (*values)[i];
-  }
+  for (auto* values : {&rise_, &u_, &moved_, &end_}) (*values)[to] = (*values)[i];
+  value_[to] = value_[i];
 }
 
-/// Some neighbouring signals of one pole, as many as a vector has lanes.
-struct RelaxingSignals::Finder {
-  V filtered, start, rise, leak, first, last;  // leak is per u
+/// Some neighbouring signals of one pole above their references, plus what leaks, between `from` and the segment's end.
+/// Their slope moves one way only.
+struct RelaxingSignals::Span {
+  V filtered, distance, rise, leak;  // F at u = 0, and how far from its input; of the input, and of the leak, per u
+  V first, last;                     // u at `from` and at the end;
+  V v0, v1, g0, g1;                  // the signal there, and its slope
+  V upper, lower;
 
-  V level_at(V u, V m) const { return hn::MulAdd(leak, u, filtered_at(u, m, filtered, start, rise)); }
-
-  /// Where the signal turns back, is that between the levels, and between first and last?
-  hn::Mask<D> turns_inside(V upper, V lower) const {
-    const V distance = hn::Sub(start, filtered);
-    const V m = hn::Div(hn::Add(distance, leak), hn::Sub(distance, rise));
-    const V turn = hn::Neg(hn::Log(kD, hn::Max(hn::Sub(set(1), m), set(1e-300))));
-    const V value_there = level_at(turn, m);
-    const auto inside = hn::And(hn::Lt(value_there, upper), hn::Gt(value_there, lower));
-    return hn::And(inside, hn::And(hn::Gt(turn, first), hn::Lt(turn, last)));
+  Span(const RelaxingSignals& s, const Comparators& c, std::size_t i) {
+    const AwakePixels& a = *s.awake_;
+    const V m0 = load(s.moved_, i), m1 = load(a.moved, i), start = load(a.start, i), f1 = load(a.filtered1, i);
+    first = load(s.u_, i), last = load(a.phase, i);
+    filtered = relative(a.filtered1, c.reference, i);
+    distance = hn::Sub(start, f1), rise = load(s.rise_, i);
+    const auto part = [&](std::size_t k) { return hn::DemoteTo(hn::Half<F>(), load_double(c.leak, k)); };
+    leak =
+        hn::Div(hn::Mul(hn::Combine(kF, part(i + hn::Lanes(kD)), part(i)), set(static_cast<float>(s.duration_))), last);
+    v0 = value(first, m0), v1 = value(last, m1);
+    g0 = slope(m0), g1 = slope(m1);
+    upper = hn::Add(load(c.on, i), set(static_cast<float>(c.threshold_on)));
+    lower = hn::Neg(hn::Add(load(c.off, i), set(static_cast<float>(c.threshold_off))));
   }
 
-  /// Where the signal passes `level`, by a few steps of Halley's method from `guess`, where `wanted`. Clears `wanted`
-  /// where that was not found.
-  V halley(V guess, V level, V tolerance, hn::Mask<D>& wanted) const {
-    auto found = hn::Not(wanted);
-    V u = guess;
-    for (int i = 0; i < kMostSteps && !hn::AllTrue(kD, found); ++i) {
-      const V m = hn::Sub(set(1), hn::Exp(kD, hn::Neg(u)));
-      const V f = filtered_at(u, m, filtered, start, rise), own = hn::Sub(hn::MulAdd(rise, u, start), f);
-      const V slope = hn::Add(own, leak), miss = hn::Sub(hn::MulAdd(leak, u, f), level);
-      const V per_slope = hn::Div(set(1), slope);
-      const V newton = hn::Mul(miss, per_slope), bend = hn::Mul(hn::Sub(rise, own), per_slope);
-      V next = hn::Sub(u, hn::Div(newton, hn::NegMulAdd(hn::Mul(set(0.5), newton), bend, set(1))));
-      next = hn::Min(hn::Max(next, first), last);
-      // The next step would be about this one cubed, times what the bend makes of it.
-      const V step = hn::Abs(hn::Sub(next, u)), cube = hn::Mul(step, hn::Mul(step, step));
-      const V left = hn::Mul(cube, hn::MulAdd(bend, bend, set(1)));
-      u = hn::IfThenElse(found, u, next);  // no lane depends on its neighbours
-      found = hn::Or(found, hn::Le(left, tolerance));
-    }
-    wanted = hn::And(wanted, found);
-    return u;
+  V value(V u, V m) const {
+    const V light = hn::MulAdd(distance, m, hn::Mul(rise, hn::Sub(u, m)));
+    return hn::Add(filtered, hn::MulAdd(leak, u, light));
+  }
+  V slope(V m) const { return hn::Add(hn::MulAdd(hn::Sub(rise, distance), m, distance), leak); }
+  V bend(V m) const { return hn::NegMulAdd(hn::Sub(rise, distance), m, hn::Sub(rise, distance)); }
+
+  Mask between_levels(V value) const { return hn::And(hn::Lt(value, upper), hn::Gt(value, lower)); }
+
+  /// Where the tangents at both ends meet: the signal does not go beyond.
+  V farthest() const {
+    const V u = hn::Div(hn::NegMulAdd(g1, hn::Sub(last, first), hn::Sub(v1, v0)), hn::Sub(g0, g1));
+    return hn::MulAdd(g0, u, v0);
+  }
+
+  /// Where signals of different slopes at their ends turn back, is that surely between the levels?
+  Mask turns_inside() const {
+    const V m = hn::Div(hn::Add(distance, leak), hn::Sub(distance, rise));
+    const V q = hn::Max(hn::Sub(set(1), m), set(1e-30F)), there = value(hn::Neg(logarithm(kF, q)), m);
+    return hn::And(hn::Lt(there, hn::Sub(upper, set(kTooClose))), hn::Gt(there, hn::Add(lower, set(kTooClose))));
+  }
+
+  /// Near to where it passes `level`, for signals that do not turn back: the inverse cubic through the ends.
+  V guess_straight(V level) const {
+    const V rises = hn::Sub(v1, v0), part = hn::Div(hn::Sub(level, v0), rises), left = hn::Sub(set(1), part);
+    const V ends = hn::MulAdd(hn::Mul(hn::Mul(left, left), hn::MulAdd(set(2), part, set(1))), first,
+                              hn::Mul(hn::Mul(hn::Mul(part, part), hn::NegMulAdd(set(2), part, set(3))), last));
+    const V bow = hn::Div(hn::NegMulAdd(part, g0, hn::Mul(left, g1)), hn::Mul(g0, g1));
+    return hn::MulAdd(hn::Mul(hn::Mul(part, left), rises), bow, ends);
+  }
+
+  /// For those that do: from the end on whose side it passes the level, along the tangent, which does not go too far.
+  V guess_bent(V level, Mask on) const {
+    const auto at_last = hn::Xor(on, hn::Lt(g1, set(0)));
+    const V u = hn::IfThenElse(at_last, last, first), v = hn::IfThenElse(at_last, v1, v0);
+    return hn::Add(u, hn::Div(hn::Sub(level, v), hn::IfThenElse(at_last, g1, g0)));
+  }
+
+  /// A step of Halley's method.
+  V refined(V u, V level) const {
+    const V m = moved_after(kF, u), miss = hn::Sub(value(u, m), level), g = slope(m);
+    const V curved = hn::Mul(hn::Mul(miss, set(0.5F)), bend(m));
+    return hn::Sub(u, hn::Div(hn::Mul(miss, g), hn::MulSub(g, g, curved)));
   }
 };
 
-void RelaxingSignals::find(Comparators& c) const {
-  const auto at = [](const auto& values, std::size_t i) { return hn::LoadU(kD, values.data() + i); };
-  const auto thresholds = [](const PerPixel<float>& above, std::size_t i, double threshold) {
-    return hn::Add(hn::PromoteTo(kD, hn::LoadU(hn::Rebind<float, D>(), above.data() + i)), set(threshold));
-  };
-  for (std::size_t i = 0; i < c.count; i += hn::Lanes(kD)) {
-    const V last = at(phase_, i), per_u = hn::Div(set(duration_), last), leak = hn::Mul(at(c.leak, i), per_u);
-    const Finder s{at(filtered1_, i), at(start_, i), at(rise_, i), leak, at(u_, i), last};
-    const V reference = at(c.reference, i);
-    const V upper = hn::Add(reference, thresholds(c.on, i, c.threshold_on));
-    const V lower = hn::Sub(reference, thresholds(c.off, i, c.threshold_off));
-    const V v0 = hn::MulAdd(leak, s.first, at(value_, i)), v1 = hn::MulAdd(leak, last, at(end_, i));
-    const V g0 = hn::Add(at(slope_, i), leak), g1 = hn::Add(at(end_slope_, i), leak);
-    const auto on = hn::Ge(v1, upper), off = hn::Le(v1, lower), crosses = hn::Or(on, off);
+/// Decides which signals leave their levels, and nearly when, or that it is unclear.
+void RelaxingSignals::guess(Comparators& c) {
+  std::size_t unclear_count = 0;
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(kF)) {
+    const Span s(*this, c, i);
+    const auto on = hn::Ge(s.v1, s.upper), off = hn::Le(s.v1, s.lower), crosses = hn::Or(on, off);
+    const auto straight = hn::Gt(hn::Mul(s.g0, s.g1), set(0));
+    // What turns back may leave through the one level before the other. Then, or if outside already, it is unclear.
+    const V farthest = s.farthest();
+    const auto early_on = hn::AndNot(on, hn::Ge(farthest, s.upper)),
+               early_off = hn::AndNot(off, hn::Le(farthest, s.lower));
+    auto doubtful = hn::AndNot(straight, hn::Or(early_on, early_off));
+    if (!hn::AllFalse(kF, doubtful)) doubtful = hn::AndNot(s.turns_inside(), doubtful);
+    const auto unclear = hn::Or(doubtful, hn::Not(s.between_levels(s.v0)));
 
-    // Unclear is what turns back before it crosses, is outside already, or is not found in a few steps.
-    const auto straight = hn::Gt(hn::Mul(g0, g1), hn::Zero(kD));
-    auto clear = straight;
-    if (const auto bent = hn::Not(hn::Or(straight, crosses)); !hn::AllFalse(kD, bent)) {
-      clear = hn::Or(clear, hn::And(bent, s.turns_inside(upper, lower)));
-    }
-    clear = hn::And(clear, hn::And(hn::Lt(v0, upper), hn::Gt(v0, lower)));
-    auto wanted = hn::And(hn::And(clear, crosses), hn::Gt(last, set(kSmallestSpan)));
-
-    // Begin at the inverse cubic through the ends.
-    const V level = hn::IfThenElse(on, upper, lower), rises = hn::Sub(v1, v0);
-    const V part = hn::Div(hn::Sub(level, v0), rises), left = hn::Sub(set(1), part);
-    const V ends = hn::MulAdd(hn::Mul(hn::Mul(left, left), hn::MulAdd(set(2), part, set(1))), s.first,
-                              hn::Mul(hn::Mul(hn::Mul(part, part), hn::NegMulAdd(set(2), part, set(3))), last));
-    const V bow = hn::Div(hn::NegMulAdd(part, g0, hn::Mul(left, g1)), hn::Mul(g0, g1));
-    const V guess = hn::MulAdd(hn::Mul(hn::Mul(part, left), rises), bow, ends);
-    const V tolerance = hn::Mul(set(kToleranceNs / duration_), last);
-    const V u = s.halley(hn::Min(hn::Max(guess, s.first), last), level, tolerance, wanted);
-    clear = hn::And(clear, hn::Or(wanted, hn::Not(crosses)));
-
-    hn::StoreU(hn::Mul(u, per_u), kD, c.tau.data() + i);
+    const V level = hn::IfThenElse(on, s.upper, s.lower);
+    V u = hn::IfThenElse(straight, s.guess_straight(level), s.guess_bent(level, on));
+    u = hn::Min(hn::Max(u, s.first), s.last);
+    u = hn::Min(hn::Max(s.refined(u, level), s.first), s.last);
+    hn::StoreU(u, kF, guess_.data() + i);
     const V polarity = hn::IfThenElseZero(crosses, hn::IfThenElse(on, set(1), set(-1)));
-    hn::StoreU(polarity, kD, c.polarity.data() + i);
-    if (hn::AllTrue(kD, clear) && poles_ == 1) [[likely]]
+    hn::StoreU(hn::PromoteTo(kD, hn::LowerHalf(hn::Half<F>(), polarity)), kD, c.polarity.data() + i);
+    hn::StoreU(hn::PromoteTo(kD, hn::UpperHalf(hn::Half<F>(), polarity)), kD, c.polarity.data() + i + hn::Lanes(kD));
+    const ChosenLanes chosen(kF, unclear);
+    chosen.store_positions(static_cast<std::uint32_t>(i), unclear_.data() + unclear_count);
+    unclear_count += chosen.count();
+  }
+  unclear_count_ = unclear_count;
+}
+
+/// When signals reach their levels, from the guesses, by a step or a few of Halley's method in doubles.
+void RelaxingSignals::solve(Comparators& c) {
+  const AwakePixels& a = *awake_;
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(kD)) {
+    const auto polarity = load_double(c.polarity, i), zero = set_double(0);
+    const auto last = promoted(kD, a.phase, i), per_u = hn::Div(set_double(duration_), last);
+    const auto leak = hn::Mul(load_double(c.leak, i), per_u), first = promoted(kD, u_, i);
+    const auto f1 = promoted(kD, a.filtered1, i), rise = promoted(kD, rise_, i);
+    const auto distance = hn::Sub(promoted(kD, a.start, i), f1), steepens = hn::Sub(rise, distance);
+    const auto upper = hn::Add(promoted(kD, c.on, i), set_double(c.threshold_on));
+    const auto lower = hn::Add(promoted(kD, c.off, i), set_double(c.threshold_off));
+    const auto level = hn::IfThenElse(hn::Gt(polarity, zero), upper, hn::Neg(lower));
+    const auto above = hn::Sub(hn::Sub(f1, load_double(c.reference, i)), level);
+    const auto tolerance = hn::Mul(set_double(kToleranceNs / duration_), last);
+
+    const auto idle = hn::Eq(polarity, zero);
+    auto u = hn::IfThenElse(idle, first, promoted(kD, guess_, i));
+    auto found = idle;
+    for (int step = 0; step < kMostSteps; ++step) {
+      const auto m = precisely_moved_after(kD, u);
+      const auto light = hn::MulAdd(distance, m, hn::Mul(rise, hn::Sub(u, m)));
+      const auto miss = hn::Add(above, hn::MulAdd(leak, u, light));
+      const auto slope = hn::Add(hn::MulAdd(steepens, m, distance), leak), bend = hn::NegMulAdd(steepens, m, steepens);
+      const auto slope2 = hn::Mul(slope, slope), curved = hn::Mul(hn::Mul(miss, set_double(0.5)), bend);
+      auto next = hn::Sub(u, hn::Div(hn::Mul(miss, slope), hn::Sub(slope2, curved)));
+      next = hn::Min(hn::Max(next, first), last);
+      // The next step would be about this one cubed, times what the bend makes of it.
+      const auto moved = hn::Abs(hn::Sub(next, u)), cube = hn::Mul(moved, hn::Mul(moved, moved));
+      const auto precise = hn::Le(hn::Mul(cube, hn::MulAdd(bend, bend, slope2)), hn::Mul(tolerance, slope2));
+      u = hn::IfThenElse(found, u, next);  // no lane depends on its neighbours
+      found = hn::Or(found, precise);
+      if (hn::AllTrue(kD, found)) [[likely]]
+        break;
+    }
+    hn::StoreU(hn::Mul(u, per_u), kD, c.tau.data() + i);
+    if (hn::AllTrue(kD, found)) [[likely]]
       continue;
     std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(kD, clear, bits);
-    for (std::size_t k = i; k < std::min(i + hn::Lanes(kD), c.count); ++k) {
-      if (poles_ == 1 && (bits[0] >> (k - i) & 1U) != 0) continue;
-      const Crossing crossing = signal(c, k).first_crossing(duration_, c.lower(k), c.upper(k));
-      c.polarity[k] = crossing.tau == kNever ? 0.0 : (crossing.on ? 1.0 : -1.0);
-      if (crossing.tau != kNever) c.tau[k] = crossing.tau;
+    hn::StoreMaskBits(kD, found, bits);
+    for (std::size_t k = 0; k < hn::Lanes(kD); ++k) {
+      if ((bits[0] >> k & 1U) == 0 && i + k < c.count) find_one(c, i + k);
     }
   }
 }
 
+void RelaxingSignals::find_one(Comparators& c, std::size_t i) const {
+  const Crossing crossing = signal(c, i).first_crossing(duration_, c.lower(i), c.upper(i));
+  c.polarity[i] = crossing.tau == kNever ? 0.0 : (crossing.on ? 1.0 : -1.0);
+  if (crossing.tau != kNever) c.tau[i] = crossing.tau;
+}
+
+void RelaxingSignals::find(Comparators& c) {
+  if (poles_ == 2) {
+    for (std::size_t i = 0; i < c.count; ++i) find_one(c, i);
+    return;
+  }
+  guess(c);
+  solve(c);
+  for (std::size_t k = 0; k < unclear_count_; ++k) {
+    if (unclear_[k] < c.count) find_one(c, unclear_[k]);
+  }
+}
+
+/// As many as a vector has lanes.
+template <class D>
+void RelaxingSignals::advance(D d, const Comparators& c, std::size_t i) {
+  const AwakePixels& a = *awake_;
+  const hn::Rebind<float, D> narrow;
+  const auto start = promoted(d, a.start, i), f1 = promoted(d, a.filtered1, i), rise = promoted(d, rise_, i);
+  const auto part = hn::Mul(hn::LoadU(d, c.from.data() + i), hn::Set(d, 1 / duration_));
+  const auto u = hn::Mul(part, promoted(d, a.phase, i)), m = precisely_moved_after(d, u);
+  const auto value = hn::Add(f1, hn::MulAdd(hn::Sub(start, f1), m, hn::Mul(rise, hn::Sub(u, m))));
+  hn::StoreU(value, d, value_.data() + i);
+  hn::StoreU(hn::DemoteTo(narrow, u), narrow, u_.data() + i);
+  hn::StoreU(hn::DemoteTo(narrow, m), narrow, moved_.data() + i);
+}
+
 void RelaxingSignals::advance(const Comparators& c, std::size_t i) {
-  const RelaxingSignal one = signal(c, i);
-  u_[i] = c.from[i] * phase_[i] / duration_;
-  value_[i] = one.value() - c.leak[i] * c.from[i];
-  slope_[i] = one.slope() - c.leak[i] * duration_ / phase_[i];
+  if (poles_ == 1) {
+    advance(hn::CappedTag<double, 1>(), c, i);
+  } else {
+    value_[i] = signal(c, i).value() - c.leak[i] * c.from[i];
+  }
 }
 
 void RelaxingSignals::advance(const Comparators& c) {
@@ -174,32 +268,21 @@ void RelaxingSignals::advance(const Comparators& c) {
     for (std::size_t i = 0; i < c.count; ++i) advance(c, i);
     return;
   }
-  const auto at = [](const auto& values, std::size_t i) { return hn::LoadU(kD, values.data() + i); };
-  const V per_duration = set(1 / duration_);
-  for (std::size_t i = 0; i < c.count; i += hn::Lanes(kD)) {
-    const V u = hn::Mul(hn::Mul(at(c.from, i), per_duration), at(phase_, i));
-    const V m = hn::Sub(set(1), hn::Exp(kD, hn::Neg(u))), start = at(start_, i), rise = at(rise_, i);
-    const V value = filtered_at(u, m, at(filtered1_, i), start, rise);
-    hn::StoreU(u, kD, u_.data() + i);
-    hn::StoreU(value, kD, value_.data() + i);
-    hn::StoreU(hn::Sub(hn::MulAdd(rise, u, start), value), kD, slope_.data() + i);
-    const auto small = hn::And(hn::Gt(u, hn::Zero(kD)), hn::Lt(u, set(kSmallestSpan)));
-    if (hn::AllFalse(kD, small)) [[likely]]
-      continue;
-    for (std::size_t k = i; k < std::min(i + hn::Lanes(kD), c.count); ++k) {
-      if (u_[k] > 0 && u_[k] < kSmallestSpan) advance(c, k);
-    }
-  }
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(kD)) advance(kD, c, i);
 }
 
 void RelaxingSignals::look_ahead(const Comparators& c, double* again) const {
-  const bool may_turn_twice = poles_ == 2;
-#pragma omp simd
-  for (std::size_t i = 0; i < c.count; ++i) {
-    const double drift = c.leak[i] * duration_ / phase_[i], last = end_[i] + c.leak[i] * duration_;
-    const bool outside = last >= c.upper(i) || last <= c.lower(i);
-    const bool turns = !((slope_[i] + drift) * (end_slope_[i] + drift) > 0);
-    again[i] = outside || turns || may_turn_twice ? 1.0 : 0.0;
+  if (poles_ == 2) {  // they may turn back twice
+    std::fill_n(again, c.count, 1.0);
+    return;
+  }
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(kF)) {
+    const Span s(*this, c, i);
+    const auto straight = hn::Gt(hn::Mul(s.g0, s.g1), set(0));
+    const auto stays = hn::And(s.between_levels(s.v1), hn::Or(straight, s.between_levels(s.farthest())));
+    const V may = hn::IfThenZeroElse(stays, set(1));
+    hn::StoreU(hn::PromoteTo(kD, hn::LowerHalf(hn::Half<F>(), may)), kD, again + i);
+    hn::StoreU(hn::PromoteTo(kD, hn::UpperHalf(hn::Half<F>(), may)), kD, again + i + hn::Lanes(kD));
   }
 }
 

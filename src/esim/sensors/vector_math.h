@@ -29,13 +29,32 @@ inline void exponentials(std::size_t count, float* values) {
   for_vectors(count, values, [](auto d, auto x) { return hn::Exp(d, x); });
 }
 
+/// ln(x) for x > 0, finite and not denormal, to a unit or two in the last place of a float.
+template <class D>
+HWY_INLINE hn::Vec<D> logarithm(D d, hn::Vec<D> x) {
+  // x = 2^n (1 + f) with 1 + f between sqrt(1/2) and sqrt(2); ln(1 + f) = f - f^2 / 2 + f^3 times a minimax polynomial.
+  const hn::RebindToSigned<D> di;
+  const auto bits = hn::BitCast(di, x);
+  const auto n = hn::ShiftRight<23>(hn::Sub(bits, hn::Set(di, 0x3f3504f3)));
+  const auto f = hn::Sub(hn::BitCast(d, hn::Sub(bits, hn::ShiftLeft<23>(n))), hn::Set(d, 1.0F));
+  const auto f2 = hn::Mul(f, f), f4 = hn::Mul(f2, f2), whole = hn::ConvertTo(d, n);
+  const auto pair = [&](float first, float second) { return hn::MulAdd(f, hn::Set(d, second), hn::Set(d, first)); };
+  const auto p03 = hn::MulAdd(pair(0.200012269F, -0.166233574F), f2, pair(0.333333317F, -0.25000821F));
+  const auto p47 = hn::MulAdd(pair(0.127615781F, -0.0763449927F), f2, pair(0.142017578F, -0.131601819F));
+  const auto cubic = hn::Mul(hn::Mul(f2, f), hn::MulAdd(p47, f4, p03));
+  const auto small = hn::MulAdd(whole, hn::Set(d, -2.12194440e-4F), hn::NegMulAdd(hn::Set(d, 0.5F), f2, cubic));
+  return hn::MulAdd(whole, hn::Set(d, 0.693359375F), hn::Add(f, small));
+}
+
 /// 1 - exp(-u) for u >= 0, to a few units in the last place of a float.
 template <class D>
 HWY_INLINE hn::Vec<D> moved_after(D d, hn::Vec<D> u) {
-  // u = n ln 2 - r with |r| <= ln 2 / 2; then 1 - exp(-u) = (1 - 2^-n) - 2^-n (exp(r) - 1).
+  // u = n ln 2 - r with |r| <= ln 2 / 2; then 1 - exp(-u) = (1 - 2^-n) - 2^-n (exp(r) - 1). Added to 1.5 * 2^23, n
+  // stands in the lowest bits of a float.
   const hn::RebindToSigned<D> di;
+  const auto rounder = hn::Set(d, 12582912.0F), one = hn::Set(d, 1.0F);
   u = hn::Min(u, hn::Set(d, 60.0F));  // where it has long been 1
-  const auto n = hn::Round(hn::Mul(u, hn::Set(d, 1.44269504F)));
+  const auto rounded = hn::MulAdd(u, hn::Set(d, 1.44269504F), rounder), n = hn::Sub(rounded, rounder);
   const auto r = hn::MulSub(n, hn::Set(d, 0.693359375F), hn::MulAdd(n, hn::Set(d, 2.12194440e-4F), u));
   const auto r2 = hn::Mul(r, r);
   const auto p01 = hn::MulAdd(r, hn::Set(d, 1.0F / 6), hn::Set(d, 0.5F));
@@ -43,8 +62,47 @@ HWY_INLINE hn::Vec<D> moved_after(D d, hn::Vec<D> u) {
   const auto p45 = hn::MulAdd(r, hn::Set(d, 1.0F / 5040), hn::Set(d, 1.0F / 720));
   const auto tail = hn::MulAdd(hn::MulAdd(p45, r2, p23), r2, p01);
   const auto grown = hn::MulAdd(tail, r2, r);
-  const auto scale = hn::BitCast(d, hn::ShiftLeft<23>(hn::Sub(hn::Set(di, 127), hn::ConvertTo(di, n))));
-  return hn::NegMulAdd(scale, grown, hn::Sub(hn::Set(d, 1.0F), scale));
+  const auto scale = hn::BitCast(d, hn::Sub(hn::BitCast(di, one), hn::ShiftLeft<23>(hn::BitCast(di, rounded))));
+  return hn::NegMulAdd(scale, grown, hn::Sub(one, scale));
+}
+
+/// The same in doubles, to a dozen digits.
+template <class D>
+HWY_INLINE hn::Vec<D> precisely_moved_after(D d, hn::Vec<D> u) {
+  const hn::RebindToSigned<D> di;
+  const auto rounder = hn::Set(d, 0x1.8p52), one = hn::Set(d, 1.0);
+  u = hn::Min(u, hn::Set(d, 60.0));
+  const auto rounded = hn::MulAdd(u, hn::Set(d, 1.4426950408889634), rounder), n = hn::Sub(rounded, rounder);
+  const auto r = hn::MulSub(n, hn::Set(d, 0.69314718055994531), u), r2 = hn::Mul(r, r), r4 = hn::Mul(r2, r2);
+  const auto pair = [&](double first, double second) { return hn::MulAdd(r, hn::Set(d, second), hn::Set(d, first)); };
+  const auto p03 = hn::MulAdd(pair(1.0 / 24, 1.0 / 120), r2, pair(1.0 / 2, 1.0 / 6));
+  const auto p47 = hn::MulAdd(pair(1.0 / 40320, 1.0 / 362880), r2, pair(1.0 / 720, 1.0 / 5040));
+  const auto p89 = pair(1.0 / 3628800, 1.0 / 39916800);
+  const auto grown = hn::MulAdd(hn::MulAdd(hn::MulAdd(p89, r4, p47), r4, p03), r2, r);
+  const auto scale = hn::BitCast(d, hn::Sub(hn::BitCast(di, one), hn::ShiftLeft<52>(hn::BitCast(di, rounded))));
+  return hn::NegMulAdd(scale, grown, hn::Sub(one, scale));
+}
+
+/// Cosine and sine of 2 pi `turns`, for turns between 0 and 1, to a few units in the last place of 1.
+template <class D>
+HWY_INLINE void cosine_and_sine(D d, hn::Vec<D> turns, hn::Vec<D>& cosine, hn::Vec<D>& sine) {
+  // Minimax polynomials within an eighth of a turn around a multiple of a quarter, n; n stands in the lowest bits.
+  const hn::RebindToSigned<D> di;
+  const auto rounder = hn::Set(d, 12582912.0F), rounded = hn::MulAdd(turns, hn::Set(d, 4.0F), rounder);
+  const auto x = hn::NegMulAdd(hn::Sub(rounded, rounder), hn::Set(d, 0.25F), turns), x2 = hn::Mul(x, x);
+  const auto pair = [&](float first, float second) { return hn::MulAdd(x2, hn::Set(d, second), hn::Set(d, first)); };
+  const auto x4 = hn::Mul(x2, x2);
+  const auto s = hn::Mul(x, hn::MulAdd(pair(81.5923536F, -75.3935628F), x4, pair(6.28318529F, -41.3416615F)));
+  const auto c67 = hn::MulAdd(hn::Set(d, 59.2027961F), x4, pair(64.9393107F, -85.442298F));
+  const auto c = hn::MulAdd(c67, x4, pair(1.0F, -19.7392086F));
+  // Odd quarters swap the two; the second and third turn the cosine's sign, the third and fourth the sine's.
+  const auto n = hn::BitCast(di, rounded);
+  const auto odd = hn::RebindMask(d, hn::Ne(hn::And(n, hn::Set(di, 1)), hn::Zero(di)));
+  const auto sign_of = [&](auto quarter) {
+    return hn::BitCast(d, hn::ShiftLeft<30>(hn::And(quarter, hn::Set(di, 2))));
+  };
+  cosine = hn::Xor(hn::IfThenElse(odd, s, c), sign_of(hn::Add(n, hn::Set(di, 1))));
+  sine = hn::Xor(hn::IfThenElse(odd, c, s), sign_of(n));
 }
 
 /// For each set of eight lanes, as bits, the lanes in it, in order, then others.
@@ -64,26 +122,27 @@ inline constexpr auto kLanesOf = [] {
 template <class D>
 class ChosenLanes {
  public:
-  ChosenLanes(D d, hn::Mask<D> mask) {
+  explicit ChosenLanes(std::uint8_t bits)
+      : lanes_(
+            hn::PromoteTo(hn::RebindToUnsigned<D>(), hn::LoadU(hn::Rebind<std::uint8_t, D>(), kLanesOf[bits].data()))),
+        count_(static_cast<std::size_t>(std::popcount(bits))) {
     static_assert(hn::MaxLanes(D()) <= 8);
-    std::uint64_t bits = 0;
-    hn::StoreMaskBits(d, mask, reinterpret_cast<std::uint8_t*>(&bits));
-    count_ = static_cast<std::size_t>(std::popcount(bits));
-    lanes_ = hn::PromoteTo(hn::RebindToUnsigned<D>(), hn::LoadU(hn::Rebind<std::uint8_t, D>(), kLanesOf[bits].data()));
+  }
+  ChosenLanes(D d, hn::Mask<D> mask) : ChosenLanes(bits_of(d, mask)) {}
+
+  /// One bit for each lane of the mask.
+  static std::uint8_t bits_of(D d, hn::Mask<D> mask) {
+    std::array<std::uint8_t, 8> bits;
+    hn::StoreMaskBits(d, mask, bits.data());
+    return bits[0];
   }
 
   std::size_t count() const { return count_; }
 
-  /// Writes first + step * lane for each chosen lane, in order, and maybe more behind. The step is 1 or 2.
-  void store_positions(std::uint32_t first, int step, std::uint32_t* out) const {
+  /// Writes first + lane for each chosen lane, in order, and maybe more behind.
+  void store_positions(std::uint32_t first, std::uint32_t* out) const {
     const hn::RebindToUnsigned<D> du;
-    hn::StoreU(hn::Add(step == 2 ? hn::Add(lanes_, lanes_) : lanes_, hn::Set(du, first)), du, out);
-  }
-
-  /// Writes the values of the chosen lanes, in order, and maybe more behind.
-  void store(hn::Vec<D> values, float* out) const {
-    const D d;
-    hn::StoreU(hn::TableLookupLanes(values, hn::IndicesFromVec(d, lanes_)), d, out);
+    hn::StoreU(hn::Add(lanes_, hn::Set(du, first)), du, out);
   }
 
  private:

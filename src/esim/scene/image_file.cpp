@@ -9,10 +9,14 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string_view>
 #include <vector>
 
 #include "esim/core/error.h"
+#include "esim/scene/image_header.h"
 
 namespace esim {
 namespace {
@@ -84,6 +88,18 @@ bool is_whole_jpeg(const std::filesystem::path& path) {
   return tail.find("\xff\xd9") != std::string::npos;
 }
 
+/// Refuses an image by the size that it says it has, before a decoder takes memory for it.
+void check_header(const std::filesystem::path& path, std::span<const std::byte> head) {
+  if (const auto size = size_in_header(head)) check_size(path, size->width, size->height);
+}
+
+void check_header(const std::filesystem::path& path) {
+  std::vector<std::byte> head(kImageHeadBytes);
+  std::ifstream file(path, std::ios::binary);
+  file.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
+  check_header(path, std::span(head).first(static_cast<std::size_t>(file.gcount())));
+}
+
 PixelType pixel_type(const std::filesystem::path& path, const cv::Mat& image) {
   switch (image.depth()) {
     case CV_8U:
@@ -95,6 +111,32 @@ PixelType pixel_type(const std::filesystem::path& path, const cv::Mat& image) {
     default:
       fail(path, "has an unsupported pixel type; convert it to 8 or 16 bit, EXR or HDR");
   }
+}
+
+/// The pixels of a file that is not OpenEXR, as they are coded. `read` lets OpenCV decode it.
+template <typename Read>
+cv::Mat read_pixels(const std::filesystem::path& path, const Read& read) {
+  cv::Mat image;
+  try {
+    image = read();
+  } catch (const cv::Exception& exception) {
+    fail(path, "cannot be decoded: " + exception.err);
+  }
+  if (image.empty()) fail(path, "cannot be decoded; is it a PNG, JPEG, TIFF, EXR or HDR image, and complete?");
+  check_size(path, image.cols, image.rows);
+  return image;
+}
+
+void decode_pixels(const std::filesystem::path& path, const cv::Mat& image, Encoding encoding, bool colour,
+                   Planes& planes) {
+  decode({.data = image.data,
+          .row_bytes = static_cast<std::ptrdiff_t>(image.step[0]),
+          .width = image.cols,
+          .height = image.rows,
+          .channels = image.channels(),
+          .blue_first = true,
+          .type = pixel_type(path, image)},
+         encoding, colour, planes);
 }
 
 }  // namespace
@@ -111,22 +153,24 @@ void load_planes(const std::filesystem::path& path, Encoding encoding, bool colo
     fail(path, "is no JPEG image, or is cut off");
   }
 
-  cv::Mat image;
-  try {
-    image = cv::imread(path.string(), cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception& exception) {
-    fail(path, "cannot be decoded: " + exception.err);
-  }
-  if (image.empty()) fail(path, "cannot be decoded; is it a PNG, JPEG, TIFF, EXR or HDR image, and complete?");
-  check_size(path, image.cols, image.rows);
-  decode({.data = image.data,
-          .row_bytes = static_cast<std::ptrdiff_t>(image.step[0]),
-          .width = image.cols,
-          .height = image.rows,
-          .channels = image.channels(),
-          .blue_first = true,
-          .type = pixel_type(path, image)},
-         encoding, colour, planes);
+  check_header(path);
+  const cv::Mat image = read_pixels(path, [&] { return cv::imread(path.string(), cv::IMREAD_UNCHANGED); });
+  decode_pixels(path, image, encoding, colour, planes);
+}
+
+void decode_planes(std::span<const std::byte> content, const std::string& name, Encoding encoding, bool colour,
+                   Planes& planes) {
+  constexpr std::size_t kTailBytes = std::size_t{1} << 16;
+  check_header(name, content);
+  const std::string_view text(reinterpret_cast<const char*>(content.data()), content.size());
+  const std::string_view tail = text.substr(text.size() - std::min(text.size(), kTailBytes));
+  if (text.starts_with("\xff\xd8") && tail.find("\xff\xd9") == std::string_view::npos) fail(name, "is cut off");
+  if (content.size() > std::numeric_limits<int>::max()) fail(name, "is larger than 2 GiB");
+
+  const cv::Mat coded(1, static_cast<int>(content.size()), CV_8U, const_cast<std::byte*>(content.data()));
+  cv::Mat image = read_pixels(name, [&] { return cv::imdecode(coded, cv::IMREAD_UNCHANGED); });
+  if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);
+  decode_pixels(name, image, encoding, colour, planes);
 }
 
 Image<float> load_luminance(const std::filesystem::path& path) {

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "esim/blender/blender.h"
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
 
@@ -24,15 +25,25 @@ void require_path(const std::filesystem::path& path, const std::string& key) {
   if (path.empty()) throw UserError(fmt::format("renderer.{}: is missing; name a file", key));
 }
 
+/// The file that can be read for one that a scenario names.
+std::filesystem::path readable(const std::filesystem::path& scene, const Notices& notices) {
+  if (!is_blend(scene)) return scene;
+  BlenderWatch watch;
+  watch.warning = notices.warning;
+  std::filesystem::path glb = cached_glb(scene, watch);
+  notices.note(fmt::format("scene {}: read from Blender's export of it, {}", scene.filename().string(), glb.string()));
+  return glb;
+}
+
 SceneFile load(const MeshRendererOptions& options, const Notices& notices) {
   require_path(options.scene, "scene");
-  SceneFile file = load_scene_file(options.scene, notices.warning);
+  SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning);
   notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
   for (std::size_t i = 0; i < options.objects.size(); ++i) {
     const ObjectOptions& object = options.objects[i];
     require_path(object.scene, fmt::format("objects.{}.scene", i));
     SceneObject loaded{object.name.empty() ? fmt::format("object{}", i) : object.name,
-                       load_mesh(object.scene, notices.warning), true};
+                       load_mesh(readable(object.scene, notices), notices.warning), true};
     for (Eigen::Vector3f& vertex : loaded.mesh.vertices) vertex *= static_cast<float>(object.scale);
     file.scene.objects.push_back(std::move(loaded));
   }

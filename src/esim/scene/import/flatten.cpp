@@ -35,9 +35,6 @@ class MeshJoiner {
   explicit MeshJoiner(const std::filesystem::path& file) : file_(file) {}
 
   void append(const Mesh& part, const Eigen::Matrix4d& T_object_node) {
-    triangles_ += part.triangles.size(), vertices_ += part.vertices.size();
-    if (triangles_ > kMaxSceneTriangles || vertices_ > kMaxSceneVertices)
-      fail_scene(file_, fmt::format("shows more than {} triangles; simplify it", kMaxSceneTriangles));
     const Eigen::Matrix3f A = T_object_node.topLeftCorner<3, 3>().cast<float>();
     const Eigen::Matrix3f for_normals = cofactors(T_object_node.topLeftCorner<3, 3>()).cast<float>();
     const Eigen::Vector3f t = T_object_node.topRightCorner<3, 1>().cast<float>();
@@ -80,8 +77,20 @@ class MeshJoiner {
   const std::filesystem::path& file_;
   Mesh mesh_;
   bool any_normals_ = false;
-  std::size_t triangles_ = 0, vertices_ = 0;
 };
+
+/// Throws UserError where the nodes show nothing, or so much that it would not fit into memory.
+void check_size(const SceneGraph& graph, const std::filesystem::path& file) {
+  std::size_t triangles = 0, vertices = 0;
+  for (const GraphNode& node : graph.nodes) {
+    for (const std::uint32_t mesh : node.meshes) {
+      triangles += graph.meshes[mesh].triangles.size(), vertices += graph.meshes[mesh].vertices.size();
+      if (triangles > kMaxSceneTriangles || vertices > kMaxSceneVertices)
+        fail_scene(file, fmt::format("shows more than {} triangles; simplify it", kMaxSceneTriangles));
+    }
+  }
+  if (triangles == 0) fail_scene(file, "holds no triangles; export meshes, not only curves, points or instances");
+}
 
 /// For each node, the animated one that it moves with (itself, or its nearest animated ancestor), or the world.
 std::vector<int> movers(const SceneGraph& graph, const NodeTransforms& transforms) {
@@ -114,6 +123,7 @@ void give_warnings(const SceneGraph& graph, const std::filesystem::path& file, c
 }  // namespace
 
 SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn) {
+  check_size(graph, file);
   give_warnings(graph, file, warn);
   SceneFile result;
   const NodeTransforms transforms(graph, file);
@@ -129,7 +139,6 @@ SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, co
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     if (mover_of[i] == static_cast<int>(i)) objects.push_back(static_cast<int>(i));
   }
-  std::size_t triangles = 0;
   for (const int object : objects) {
     const bool moves = object != kWorld;
     SceneMotion motion;
@@ -147,14 +156,10 @@ SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, co
     }
     if (joiner.empty()) continue;
     Mesh mesh = joiner.take(materials);
-    triangles += mesh.triangles.size();
-    if (triangles > kMaxSceneTriangles)
-      fail_scene(file, fmt::format("shows more than {} triangles", kMaxSceneTriangles));
     const std::string name = moves ? graph.nodes[static_cast<std::size_t>(object)].name : "world";
     result.scene.objects.push_back({name, std::move(mesh), moves});
     if (moves) result.motions.push_back(std::move(motion));
   }
-  if (triangles == 0) fail_scene(file, "holds no triangles; export meshes, not only curves, points or instances");
 
   for (const GraphCamera& camera : graph.cameras) {
     SceneCamera converted{
@@ -166,6 +171,7 @@ SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, co
 }
 
 Mesh flatten_still(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn) {
+  check_size(graph, file);
   give_warnings(graph, file, warn);
   const NodeTransforms transforms(graph, file);
   TextureStore textures(graph, file.parent_path(), warn);
@@ -174,7 +180,6 @@ Mesh flatten_still(const SceneGraph& graph, const std::filesystem::path& file, c
     for (const std::uint32_t mesh : graph.nodes[i].meshes)
       joiner.append(graph.meshes[mesh], transforms.world(i, transforms.start_s()));
   }
-  if (joiner.empty()) fail_scene(file, "holds no triangles; export meshes, not only curves, points or instances");
   return joiner.take(convert_materials(graph, textures));
 }
 

@@ -47,9 +47,9 @@ path = lambda name: os.path.join(folder, name)
 bpy.ops.export_scene.gltf(filepath=path("a.glb"), export_format="GLB", export_cameras=True)
 bpy.ops.export_scene.gltf(filepath=path("b.gltf"), export_format="GLTF_SEPARATE", export_cameras=True)
 bpy.ops.export_scene.fbx(filepath=path("c.fbx"))
-bpy.ops.wm.collada_export(filepath=path("d.dae"))
 bpy.ops.wm.obj_export(filepath=path("e.obj"), forward_axis="Y", up_axis="Z")
 bpy.ops.export_mesh.ply(filepath=path("f.ply"))
+bpy.ops.wm.collada_export(filepath=path("d.dae"))
 )python";
 
 class BlenderFormats : public testing::Test {
@@ -58,8 +58,9 @@ class BlenderFormats : public testing::Test {
     if (std::system("command -v blender > /dev/null") != 0) return;
     folder_ = new test::TemporaryDirectory;
     const auto script = folder_->write("export.py", kScript);
-    const std::string command = "blender --background --factory-startup --python-exit-code 3 --python " +
-                                script.string() + " -- " + folder_->path().string() + " > /dev/null 2>&1";
+    const std::string command =
+        "PATH=/usr/bin:/bin:$PATH blender --background --factory-startup --python-exit-code 3 --python " +
+        script.string() + " -- " + folder_->path().string() + " > /dev/null 2>&1";
     exported_ = std::system(command.c_str()) == 0;
   }
   static void TearDownTestSuite() { delete std::exchange(folder_, nullptr); }
@@ -120,9 +121,10 @@ TEST_F(BlenderFormats, TheWorldIsBlendersInMetres) {
     ASSERT_EQ(file.scene.objects.size(), 2U) << name;
     expect_same_points(vertices_at(file.scene.objects[0].mesh, {}), still, name);
     const Mesh& mover = file.scene.objects[1].mesh;
-    expect_same_points(vertices_at(mover, file.motions.at(0).front().T_world_object), cube(1, {1, 1, 1}, 0, {0, 0, 1}), name);
-    expect_same_points(vertices_at(mover, pose_after(file.motions[0], 1).T_world_object), cube(1, {1, 1, 1}, 1, {2, 0, 1}),
+    expect_same_points(vertices_at(mover, file.motions.at(0).front().T_world_object), cube(1, {1, 1, 1}, 0, {0, 0, 1}),
                        name);
+    expect_same_points(vertices_at(mover, pose_after(file.motions[0], 1).T_world_object),
+                       cube(1, {1, 1, 1}, 1, {2, 0, 1}), name);
     EXPECT_NEAR(to_seconds(file.animation.end - file.animation.start), 2, 1e-6) << name;
     EXPECT_FALSE(mover.normals.empty()) << name;
   }
@@ -138,11 +140,14 @@ TEST_F(BlenderFormats, CamerasLookWhereBlendersDo) {
     const SceneFile file = load(name);
     ASSERT_EQ(file.cameras.size(), 1U) << name;
     EXPECT_NEAR(file.cameras[0].horizontal_fov_rad.value_or(0), std::numbers::pi / 3, 1e-5) << name;
-    const SE3 first = file.cameras[0].motion.front().T_world_object, last = file.cameras[0].motion.back().T_world_object;
+    const SE3 first = file.cameras[0].motion.front().T_world_object,
+              last = file.cameras[0].motion.back().T_world_object;
     EXPECT_LT(test::largest_difference(first.translation, Eigen::Vector3d(-5, 0, 1)), 1e-5) << name;
     EXPECT_LT(test::largest_difference(last.translation, Eigen::Vector3d(-5, 1, 1)), 1e-5) << name;
-    EXPECT_LT(test::largest_difference(first.rotation * Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitX()), 1e-5) << name;
-    EXPECT_LT(test::largest_difference(first.rotation * Eigen::Vector3d::UnitY(), -Eigen::Vector3d::UnitZ()), 1e-5) << name;
+    EXPECT_LT(test::largest_difference(first.rotation * Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitX()), 1e-5)
+        << name;
+    EXPECT_LT(test::largest_difference(first.rotation * Eigen::Vector3d::UnitY(), -Eigen::Vector3d::UnitZ()), 1e-5)
+        << name;
   }
 }
 

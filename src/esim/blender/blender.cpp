@@ -79,10 +79,14 @@ bool run_script(const fs::path& scene, const std::string& script, const std::vec
   const ScratchFolder scratch(folder);
   const fs::path script_file = scratch.path() / "script.py", result = scratch.path() / "scene.glb";
   std::ofstream(script_file) << script;
+  // Debian's Blender uses the first Python on PATH, which may be one that lacks the system's modules.
+  const char* const path = std::getenv("PATH");
   std::vector<std::string> command = {
-      program, "--background", "--factory-startup", "--disable-autoexec", "--python-exit-code", "3"};
-  command.insert(command.end(),
-                 {"--python", script_file.string(), "--", fs::absolute(scene).string(), result.string()});
+      "/usr/bin/env", "-u",         "PYTHONHOME",
+      "-u",           "PYTHONPATH", fmt::format("PATH=/usr/bin:/bin:{}", path != nullptr ? path : "")};
+  command.insert(command.end(), {program, "--background", "--factory-startup", "--disable-autoexec"});
+  command.insert(command.end(), {"--python-exit-code", "3", "--python", script_file.string(), "--"});
+  command.insert(command.end(), {fs::absolute(scene).string(), result.string()});
   command.insert(command.end(), arguments.begin(), arguments.end());
 
   double fraction = 0;

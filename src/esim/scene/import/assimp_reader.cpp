@@ -9,6 +9,8 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <span>
+#include <tuple>
 
 #include "esim/scene/import/folder.h"
 #include "esim/scene/import/graph_archive.h"
@@ -235,22 +237,44 @@ class Converter {
     return track;
   }
 
+  /// A node's motion in one of the file's animations.
+  struct Choice {
+    const aiAnimation* animation;
+    const aiNodeAnim* channel;
+    std::string action;  // "Thing|ThingAction" without its first part
+
+    /// Blender's FBX plays every action on every object: a thing's own is called like it.
+    auto rank(const std::string& node) const {
+      return std::tuple(action.starts_with(node), action == "Scene", animation->mNumChannels);
+    }
+  };
+
   void read_animations() {
-    for (unsigned a = 0; a < scene_.mNumAnimations; ++a) {
-      const aiAnimation& animation = *scene_.mAnimations[a];
-      const double ticks = animation.mTicksPerSecond > 0 ? animation.mTicksPerSecond : 1.0;
-      for (unsigned c = 0; c < animation.mNumChannels; ++c) {
-        const aiNodeAnim& channel = *animation.mChannels[c];
-        const auto found = node_of_.find(channel.mNodeName.C_Str());
-        if (found == node_of_.end() || channel.mNumPositionKeys + channel.mNumRotationKeys == 0) continue;
-        GraphNode& node = graph_.nodes[static_cast<std::size_t>(found->second)];
-        if (!node.matrix) continue;  // of another animation
-        decompose(node);
-        node.translation_track = track(channel.mPositionKeys, channel.mNumPositionKeys, ticks);
-        node.rotation_track = track(channel.mRotationKeys, channel.mNumRotationKeys, ticks);
-        node.scale_track = track(channel.mScalingKeys, channel.mNumScalingKeys, ticks);
+    std::map<int, std::vector<Choice>> choices;
+    for (const aiAnimation* const animation : std::span(scene_.mAnimations, scene_.mNumAnimations)) {
+      const std::string name = name_of(animation->mName);
+      for (const aiNodeAnim* const channel : std::span(animation->mChannels, animation->mNumChannels)) {
+        const auto found = node_of_.find(channel->mNodeName.C_Str());
+        if (found == node_of_.end() || channel->mNumPositionKeys + channel->mNumRotationKeys == 0) continue;
+        choices[found->second].push_back({animation, channel, name.substr(name.rfind('|') + 1)});
       }
     }
+    for (const auto& [index, of_node] : choices) {
+      GraphNode& node = graph_.nodes[static_cast<std::size_t>(index)];
+      const Choice& best = *std::max_element(of_node.begin(), of_node.end(), [&](const Choice& a, const Choice& b) {
+        return a.rank(node.name) < b.rank(node.name);
+      });
+      if (of_node.size() > 1 && !best.action.starts_with(node.name) && best.action != "Scene")
+        warn(fmt::format("object {}: of its {} animations, {} is shown", node.name, of_node.size(), best.action));
+      animate(node, *best.channel, best.animation->mTicksPerSecond > 0 ? best.animation->mTicksPerSecond : 1.0);
+    }
+  }
+
+  void animate(GraphNode& node, const aiNodeAnim& channel, double ticks_per_second) {
+    decompose(node);
+    node.translation_track = track(channel.mPositionKeys, channel.mNumPositionKeys, ticks_per_second);
+    node.rotation_track = track(channel.mRotationKeys, channel.mNumRotationKeys, ticks_per_second);
+    node.scale_track = track(channel.mScalingKeys, channel.mNumScalingKeys, ticks_per_second);
   }
 
   void decompose(GraphNode& node) const {

@@ -150,6 +150,7 @@ TEST(HostileImage, AbsurdSizesAreRefusedBeforeDecoding) {
     return test::message_of<UserError>([&] { load_luminance(folder.write(name, content)); });
   };
   EXPECT_TRUE(test::contains(message("a.png", png_header(100'000, 100'000)), "100000x100000 pixels"));
+  EXPECT_TRUE(test::contains(message("b.png", png_header(16'000, 16'000)), "cut off or damaged"));
 
   std::vector<unsigned char> jpeg;
   cv::imencode(".jpg", cv::Mat(8, 8, CV_8UC3, cv::Scalar(1, 2, 3)), jpeg);

@@ -33,6 +33,22 @@ void check_size(const std::filesystem::path& path, std::int64_t width, std::int6
   }
 }
 
+/// The same of a size that a file claims, which it must have the bytes for: no compression saves more than this.
+void check_claim(const std::filesystem::path& path, std::int64_t width, std::int64_t height, std::uintmax_t bytes) {
+  constexpr double kMaxPixelsPerByte = 10'000, kSmall = 1 << 20;
+  check_size(path, width, height);
+  const double pixels = static_cast<double>(width) * static_cast<double>(height);
+  if (pixels > kSmall && pixels > kMaxPixelsPerByte * static_cast<double>(bytes))
+    fail(path,
+         fmt::format("claims {}x{} pixels, but has {} bytes only; it is cut off or damaged", width, height, bytes));
+}
+
+std::uintmax_t size_of(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+  return error ? 0 : bytes;
+}
+
 /// The channels that hold the colour: R, G, B, or the luminance Y.
 std::vector<const char*> colour_channels(const std::filesystem::path& path, const Imf::ChannelList& channels) {
   const auto has = [&](const char* name) { return channels.findChannel(name) != nullptr; };
@@ -46,7 +62,7 @@ void read_exr(const std::filesystem::path& path, Encoding encoding, bool colour,
   const auto window = file.header().dataWindow();
   const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
   const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
-  check_size(path, width, height);
+  check_claim(path, width, height, size_of(path));
   const auto names = colour_channels(path, file.header().channels());
   const std::size_t count = names.size(), pixel_bytes = count * sizeof(float);
   const std::size_t row_bytes = static_cast<std::size_t>(width) * pixel_bytes;
@@ -89,15 +105,15 @@ bool is_whole_jpeg(const std::filesystem::path& path) {
 }
 
 /// Refuses an image by the size that it says it has, before a decoder takes memory for it.
-void check_header(const std::filesystem::path& path, std::span<const std::byte> head) {
-  if (const auto size = size_in_header(head)) check_size(path, size->width, size->height);
+void check_header(const std::filesystem::path& path, std::span<const std::byte> head, std::uintmax_t bytes) {
+  if (const auto size = size_in_header(head)) check_claim(path, size->width, size->height, bytes);
 }
 
 void check_header(const std::filesystem::path& path) {
   std::vector<std::byte> head(kImageHeadBytes);
   std::ifstream file(path, std::ios::binary);
   file.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
-  check_header(path, std::span(head).first(static_cast<std::size_t>(file.gcount())));
+  check_header(path, std::span(head).first(static_cast<std::size_t>(file.gcount())), size_of(path));
 }
 
 PixelType pixel_type(const std::filesystem::path& path, const cv::Mat& image) {
@@ -161,7 +177,7 @@ void load_planes(const std::filesystem::path& path, Encoding encoding, bool colo
 void decode_planes(std::span<const std::byte> content, const std::string& name, Encoding encoding, bool colour,
                    Planes& planes) {
   constexpr std::size_t kTailBytes = std::size_t{1} << 16;
-  check_header(name, content);
+  check_header(name, content, content.size());
   const std::string_view text(reinterpret_cast<const char*>(content.data()), content.size());
   const std::string_view tail = text.substr(text.size() - std::min(text.size(), kTailBytes));
   if (text.starts_with("\xff\xd8") && tail.find("\xff\xd9") == std::string_view::npos) fail(name, "is cut off");

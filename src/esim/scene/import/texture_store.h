@@ -27,7 +27,7 @@ class TextureStore {
   std::size_t image_count() const { return image_count_; }
 
  private:
-  Planes decoded(const GraphImage& image);
+  Planes decoded(const GraphImage& image, bool colour);
 
   const SceneGraph& graph_;
   std::filesystem::path folder_;

@@ -14,6 +14,7 @@ SOURCE = ROOT / "src" / "esim"
 # Which modules a module may include. compose alone knows every backend and format; sim knows none.
 ALLOWED = {
     "core": "",
+    "blender": "core",
     "geometry": "core",
     "events": "core",
     "motion": "core geometry",
@@ -28,14 +29,15 @@ ALLOWED = {
     "video": "core scene",
     "sim": "core events geometry motion render sampling sensors record truth video",
     "scenario": "core geometry sampling scene sensors video",
-    "compose": "core geometry motion scene render backends sampling sensors record truth video sim scenario",
+    "compose": "core blender geometry motion scene render backends sampling sensors record truth video sim scenario",
 }
 
 # Heavy libraries, and the headers of ours that may include them: private ones, which only .cpp files include.
 HEAVY = re.compile(r"^(embree3|assimp|epoxy|opencv2|hdf5|yaml-cpp|nlohmann|fmt|tbb|libav|libsw|Imf)")
 PRIVATE_HEADERS = {"backends/opengl/gl_program.h", "backends/opengl/gl_scene.h", "backends/opengl/gl_targets.h",
                    "backends/raycast/lights.h", "backends/raycast/packet.h", "backends/raycast/raycast_scene.h",
-                   "backends/raycast/surface.h", "scenario/yaml_reader.h", "record/formats/hdf5_detail.h",
+                   "backends/raycast/surface.h", "scenario/yaml_reader.h", "scene/import/gltf_document.h",
+                   "record/formats/hdf5_detail.h",
                    "record/formats/hdf5_input.h", "record/formats/hdf5_output_driver.h", "sensors/vector_math.h"}
 
 

@@ -9,6 +9,7 @@
 
 #include "esim/scenario/conversion.h"
 #include "esim/scenario/scenario.h"
+#include "esim/scene/scene_file.h"
 #include "esim/sim/convert.h"
 #include "esim/sim/simulate.h"
 #include "esim/sim/world.h"
@@ -29,19 +30,29 @@ struct Notices {
 /// repair.
 World build_world(const Scenario& scenario, int threads, const Notices& notices);
 
+/// What the scene files of a renderer hold: a mesh renderer's scene with all its objects, those that the scenario lists
+/// after the scene file's own. Empty for renderers without scene files. Notes say what was found.
+SceneFile load_scenes(const RendererOptions& options, const Notices& notices);
+
 /// The motion of the body that a scenario describes.
-std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const Notices& notices);
+std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const SceneFile& scene,
+                                                   const Notices& notices);
+
+/// The camera of the scene file that the scenario's trajectory follows; null for trajectories from elsewhere. Throws
+/// UserError naming those that there are.
+const SceneCamera* followed_camera(const Scenario& scenario, const SceneFile& scene);
 
 /// The motions of the moving objects that a scenario's renderer shows, in the order in which the renderer wants them.
-/// All cover `simulated`; what has no duration of its own begins with the body's trajectory.
+/// All cover `simulated`; what has no duration of its own, and the scene file's animation, begin with the body's
+/// trajectory. What is animated in the scene file rests after its animation's end.
 std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const Scenario& scenario,
-                                                                         const Trajectory& body,
+                                                                         const SceneFile& scene, const Trajectory& body,
                                                                          const TimeSpan& simulated,
                                                                          const Notices& notices);
 
 /// Makes the renderers of a scenario's cameras; what they show is loaded once and shared.
 using RendererFactory = std::function<std::unique_ptr<Renderer>(const Camera& camera, const Workers& workers)>;
-RendererFactory build_renderer_factory(const RendererOptions& options, const Notices& notices);
+RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene);
 
 /// The files of a recording, to be written into `folder`: at its top for a single camera, in a folder per camera
 /// otherwise.

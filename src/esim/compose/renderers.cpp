@@ -12,43 +12,12 @@
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
 #include "esim/scene/image_file.h"
-#include "esim/scene/scene.h"
 
 namespace esim {
 namespace {
 
 void require_path(const std::filesystem::path& path, const std::string& key) {
   if (path.empty()) throw UserError(fmt::format("renderer.{}: is missing; name a file", key));
-}
-
-Lighting lighting_of(const LambertOptions& options) {
-  Lighting lighting;
-  lighting.ambient = static_cast<float>(options.ambient);
-  for (const SunOptions& sun : options.suns) {
-    if (!(sun.direction.norm() > 1e-6))
-      throw UserError("renderer.lighting.suns: [0, 0, 0] is no direction; [0, 0, -1] shines straight down");
-    lighting.suns.push_back({sun.direction.cast<float>(), static_cast<float>(sun.strength)});
-  }
-  for (const PointLightOptions& point : options.points)
-    lighting.points.push_back({point.position.cast<float>(), static_cast<float>(point.strength)});
-  lighting.shadows = options.shadows;
-  return lighting;
-}
-
-/// The objects' meshes, each in its own coordinates but in metres.
-Scene load_scene(const MeshRendererOptions& options, const Notices& notices) {
-  require_path(options.scene, "scene");
-  Scene scene = still_scene(load_mesh(options.scene, notices.warning));
-  for (std::size_t i = 0; i < options.objects.size(); ++i) {
-    const ObjectOptions& object = options.objects[i];
-    require_path(object.scene, fmt::format("objects.{}.scene", i));
-    SceneObject loaded{object.name.empty() ? fmt::format("object{}", i) : object.name,
-                       load_mesh(object.scene, notices.warning), true};
-    for (Eigen::Vector3f& vertex : loaded.mesh.vertices) vertex *= static_cast<float>(object.scale);
-    scene.objects.push_back(std::move(loaded));
-  }
-  if (const auto* lambert = std::get_if<LambertOptions>(&options.lighting)) scene.lighting = lighting_of(*lambert);
-  return scene;
 }
 
 // One overload per type of renderer: a new one is a line in RendererOptions and a function here.
@@ -61,20 +30,20 @@ MeshEngine choose_engine(const MeshRendererOptions& options) {
   return hardware ? MeshEngine::gl : MeshEngine::raycast;
 }
 
-RendererFactory factory(const MeshRendererOptions& options, const Notices& notices) {
+RendererFactory factory(const MeshRendererOptions& options, const SceneFile& file) {
   if (choose_engine(options) == MeshEngine::gl) {
-    const auto scene = std::make_shared<const Scene>(load_scene(options, notices));
+    const auto scene = std::make_shared<const Scene>(file.scene);
     const GlOptions gl{static_cast<float>(options.background), options.samples_per_pixel, options.gl_device};
     return [=](const Camera& camera, const Workers& workers) { return make_gl_renderer(scene, gl, camera, workers); };
   }
-  const auto scene = build_raycast_scene(load_scene(options, notices));
+  const auto scene = build_raycast_scene(file.scene);
   const RaycastOptions raycast{static_cast<float>(options.background), options.samples_per_pixel};
   return [=](const Camera& camera, const Workers& workers) {
     return make_raycast_renderer(scene, raycast, camera, workers);
   };
 }
 
-RendererFactory factory(const PanoramaRendererOptions& options, const Notices&) {
+RendererFactory factory(const PanoramaRendererOptions& options, const SceneFile&) {
   require_path(options.image, "image");
   if (!(options.orientation.norm() > 1e-6))
     throw UserError("renderer.orientation: [0, 0, 0, 0] is no orientation; use [0, 0, 0, 1]");
@@ -84,7 +53,7 @@ RendererFactory factory(const PanoramaRendererOptions& options, const Notices&) 
       [=](const Camera& camera, const Workers& workers) { return make_panorama_renderer(panorama, camera, workers); };
 }
 
-RendererFactory factory(const PlaneRendererOptions& options, const Notices&) {
+RendererFactory factory(const PlaneRendererOptions& options, const SceneFile&) {
   require_path(options.image, "image");
   const Wrap wrap = options.endless ? Wrap::repeat : Wrap::clamp;
   const Poster poster{std::make_shared<const Texture>(load_luminance(options.image), wrap, wrap), pose_of(options.pose),
@@ -114,7 +83,7 @@ class LayerTextures {
   std::map<std::tuple<std::filesystem::path, int, double, Wrap>, Textures> loaded_;
 };
 
-RendererFactory factory(const SpritesRendererOptions& options, const Notices&) {
+RendererFactory factory(const SpritesRendererOptions& options, const SceneFile&) {
   if (options.layers.empty())
     throw UserError("renderer: sprites without layers show nothing; list layers, or name a scene file in scene");
   SpriteScene scene{{}, static_cast<float>(options.background)};
@@ -135,8 +104,8 @@ RendererFactory factory(const SpritesRendererOptions& options, const Notices&) {
 
 }  // namespace
 
-RendererFactory build_renderer_factory(const RendererOptions& options, const Notices& notices) {
-  return std::visit([&](const auto& renderer) { return factory(renderer, notices); }, options);
+RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene) {
+  return std::visit([&](const auto& renderer) { return factory(renderer, scene); }, options);
 }
 
 }  // namespace esim

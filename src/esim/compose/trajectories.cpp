@@ -6,6 +6,7 @@
 #include "esim/core/error.h"
 #include "esim/motion/fit.h"
 #include "esim/motion/random.h"
+#include "esim/motion/resting.h"
 #include "esim/motion/static.h"
 #include "esim/motion/trajectory_file.h"
 
@@ -21,7 +22,37 @@ struct Mover {
   std::uint64_t seed = 0;
   std::uint16_t stream = 0;  ///< of random numbers
   std::function<TimeSpan()> span;
+  const SceneFile* scene = nullptr;  ///< whose cameras it may follow
+  double time_scale = 1;             ///< of that file's animation
+  bool has_duration = false;         ///< whether the scenario gives one
 };
+
+std::shared_ptr<const Trajectory> fit(const std::vector<TimedPose>& poses, const FitOptions& options,
+                                      const std::string& name, const Notices& notices) {
+  const FittedTrajectory fitted = fit_trajectory(poses, options);
+  const FitReport& fit = fitted.report;
+  notices.note(
+      fmt::format("{}: {} poses fitted by a spline with a knot every {:.1f} ms; residual {:.3f} mm rms "
+                  "({:.3f} max), {:.4f} deg rms ({:.4f} max)",
+                  name, poses.size(), fit.knot_interval_s * 1e3, fit.rms_position_m * 1e3, fit.max_position_m * 1e3,
+                  fit.rms_rotation_rad / kDegree, fit.max_rotation_rad / kDegree));
+  return std::make_shared<const SplineTrajectory>(fitted.trajectory);
+}
+
+/// A motion of the scene file, which begins at `start`.
+std::shared_ptr<const Trajectory> fit_animation(const SceneMotion& motion, TimeNs start, double time_scale,
+                                                const std::string& name, const Notices& notices) {
+  std::vector<TimedPose> poses;
+  for (const ScenePose& pose : motion) {
+    const double since_start = static_cast<double>(pose.t - motion.front().t);
+    poses.push_back({start + std::llround(since_start * time_scale), pose.T_world_object});
+  }
+  try {
+    return fit(poses, {}, name, notices);
+  } catch (const UserError& error) {
+    throw UserError(fmt::format("{}: its animation cannot be followed: {}", name, error.what()));
+  }
+}
 
 std::shared_ptr<const Trajectory> build(const FileTrajectoryOptions& options, const Mover& mover,
                                         const Notices& notices) {
@@ -29,15 +60,7 @@ std::shared_ptr<const Trajectory> build(const FileTrajectoryOptions& options, co
   std::vector<TimedPose> poses = read_trajectory(options.path);
   for (TimedPose& pose : poses) pose.t = std::llround(static_cast<double>(pose.t) * options.time_scale);
   try {
-    const FittedTrajectory fitted =
-        fit_trajectory(poses, {options.order, options.knot_interval_s, options.smoothing_time_s});
-    const FitReport& fit = fitted.report;
-    notices.note(
-        fmt::format("{}: {} poses fitted by a spline with a knot every {:.1f} ms; residual {:.3f} mm rms "
-                    "({:.3f} max), {:.4f} deg rms ({:.4f} max)",
-                    mover.key, poses.size(), fit.knot_interval_s * 1e3, fit.rms_position_m * 1e3,
-                    fit.max_position_m * 1e3, fit.rms_rotation_rad / kDegree, fit.max_rotation_rad / kDegree));
-    return std::make_shared<const SplineTrajectory>(fitted.trajectory);
+    return fit(poses, {options.order, options.knot_interval_s, options.smoothing_time_s}, mover.key, notices);
   } catch (const UserError& error) {
     throw UserError(fmt::format("{}: {}", options.path.string(), error.what()));
   }
@@ -61,35 +84,103 @@ std::shared_ptr<const Trajectory> build(const StaticTrajectoryOptions& options, 
                                                   span.end - span.start);
 }
 
+const SceneCamera& find_camera(const SceneTrajectoryOptions& options, const Mover& mover) {
+  if (mover.scene == nullptr || mover.scene->scene.objects.empty()) {
+    throw UserError(
+        fmt::format("{}: type scene is for the body and a renderer of type mesh, whose scene file has the "
+                    "camera; use file, random or static",
+                    mover.key));
+  }
+  const std::vector<SceneCamera>& cameras = mover.scene->cameras;
+  std::string names;
+  for (const SceneCamera& camera : cameras) {
+    if (camera.name == options.camera || (cameras.size() == 1 && options.camera.empty())) return camera;
+    names += (names.empty() ? "" : ", ") + camera.name;
+  }
+  if (cameras.empty())
+    throw UserError(fmt::format("{}: the scene file has no camera; use file, random or static", mover.key));
+  if (options.camera.empty())
+    throw UserError(fmt::format("{}.camera: is missing; the scene file has several: {}", mover.key, names));
+  throw UserError(fmt::format("{}.camera: the scene file has no {}; it has {}", mover.key, options.camera, names));
+}
+
+std::shared_ptr<const Trajectory> build(const SceneTrajectoryOptions& options, const Mover& mover,
+                                        const Notices& notices) {
+  const SceneCamera& camera = find_camera(options, mover);
+  if (camera.motion.size() > 1) {
+    const TimeNs start = std::llround(static_cast<double>(camera.motion.front().t) * mover.time_scale);
+    return fit_animation(camera.motion, start, mover.time_scale, "camera " + camera.name, notices);
+  }
+  // A camera that stands still watches the whole animation.
+  const TimeSpan& animation = mover.scene->animation;
+  const auto scaled = [&](TimeNs t) { return std::llround(static_cast<double>(t) * mover.time_scale); };
+  const TimeSpan span = animation.end > animation.start && !mover.has_duration
+                            ? TimeSpan{scaled(animation.start), scaled(animation.end)}
+                            : mover.span();
+  return std::make_shared<const StaticTrajectory>(camera.motion.front().T_world_object, span.start,
+                                                  span.end - span.start);
+}
+
 std::shared_ptr<const Trajectory> build(const TrajectoryOptions& options, const Mover& mover, const Notices& notices) {
   return std::visit([&](const auto& alternative) { return build(alternative, mover, notices); }, options);
 }
 
 }  // namespace
 
-std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const Notices& notices) {
-  const auto span = [&]() -> TimeSpan {
+const SceneCamera* followed_camera(const Scenario& scenario, const SceneFile& scene) {
+  const auto* const options = std::get_if<SceneTrajectoryOptions>(&scenario.trajectory);
+  if (options == nullptr) return nullptr;
+  Mover mover;
+  mover.key = "trajectory";
+  mover.scene = &scene;
+  return &find_camera(*options, mover);
+}
+
+std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const SceneFile& scene,
+                                                   const Notices& notices) {
+  Mover mover;
+  mover.key = "trajectory";
+  mover.orientation = looking_along(Eigen::Vector3d::UnitX());
+  mover.seed = scenario.seed;
+  mover.span = [&]() -> TimeSpan {
     if (!scenario.duration_s)
       throw UserError("duration_s: is missing; a random or static trajectory has no end of its own");
     return {0, to_ns(scenario.start_s + *scenario.duration_s)};
   };
-  return build(scenario.trajectory, {"trajectory", looking_along(Eigen::Vector3d::UnitX()), scenario.seed, 0, span},
-               notices);
+  mover.scene = &scene;
+  if (const auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer))
+    mover.time_scale = mesh->time_scale;
+  mover.has_duration = scenario.duration_s.has_value();
+  return build(scenario.trajectory, mover, notices);
 }
 
 std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const Scenario& scenario,
-                                                                         const Trajectory& body,
+                                                                         const SceneFile& scene, const Trajectory& body,
                                                                          const TimeSpan& simulated,
                                                                          const Notices& notices) {
   std::vector<std::shared_ptr<const Trajectory>> trajectories;
   const auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
   if (mesh == nullptr) return trajectories;
+  std::size_t animated = 0;
+  for (const SceneObject& object : scene.scene.objects) {
+    if (!object.moves || animated == scene.motions.size()) continue;
+    auto animation =
+        fit_animation(scene.motions[animated++], body.start(), mesh->time_scale, "object " + object.name, notices);
+    if (animation->end() < simulated.end)
+      animation = std::make_shared<const RestingTrajectory>(std::move(animation), simulated.end);
+    trajectories.push_back(std::move(animation));
+  }
+
   const auto span = [&]() -> TimeSpan { return {body.start(), simulated.end}; };
   for (const ObjectOptions& object : mesh->objects) {
-    const std::string key = fmt::format("renderer.objects.{}.trajectory", trajectories.size());
-    const auto stream = static_cast<std::uint16_t>(trajectories.size() + 1);
-    auto trajectory =
-        build(object.trajectory, {key, Eigen::Quaterniond::Identity(), scenario.seed, stream, span}, notices);
+    const std::size_t index = trajectories.size() - animated;
+    const std::string key = fmt::format("renderer.objects.{}.trajectory", index);
+    Mover mover;
+    mover.key = key;
+    mover.seed = scenario.seed;
+    mover.stream = static_cast<std::uint16_t>(index + 1);
+    mover.span = span;
+    auto trajectory = build(object.trajectory, mover, notices);
     if (trajectory->start() > simulated.start || trajectory->end() < simulated.end) {
       throw UserError(
           fmt::format("{}: lasts from {:.9g} to {:.9g} s, but the simulation from {:.9g} to {:.9g} s; shorten "

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
@@ -89,20 +90,24 @@ void require_a_view(const World& world, std::size_t index) {
 World build_world(const Scenario& scenario, int threads, const Notices& notices) {
   World world;
   world.workers = std::make_unique<const Workers>(threads);
-  world.trajectory = build_trajectory(scenario, notices);
+  const SceneFile scene = load_scenes(scenario.renderer, notices);
+  world.trajectory = build_trajectory(scenario, scene, notices);
   const TimeSpan span = simulated_span(scenario, *world.trajectory);
-  world.objects = build_object_trajectories(scenario, *world.trajectory, span, notices);
+  world.objects = build_object_trajectories(scenario, scene, *world.trajectory, span, notices);
   world.info.start = span.start;
   world.info.end = span.end;
   world.info.truth_rate_hz = scenario.truth.rate_hz;
   world.truth_clock = PeriodicClock(span.start, span.end, scenario.truth.rate_hz);
   world.pose_clock = PeriodicClock(span.start, span.end, scenario.truth.pose_rate_hz);
 
-  for (const CameraOptions& options : scenario.cameras) {
+  const SceneCamera* const followed = followed_camera(scenario, scene);
+  for (CameraOptions options : scenario.cameras) {
     check_sampling(options, notices);
+    if (followed != nullptr && followed->horizontal_fov_rad && !options.horizontal_fov_deg)
+      options.horizontal_fov_deg = *followed->horizontal_fov_rad * 180.0 / std::numbers::pi;
     world.info.cameras.push_back({options.name, camera_model(options), pose_of(options.T_body_camera)});
   }
-  const RendererFactory make_renderer = build_renderer_factory(scenario.renderer, notices);
+  const RendererFactory make_renderer = build_renderer_factory(scenario.renderer, scene);
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
     const CameraOptions& options = scenario.cameras[i];
     const Camera& model = world.info.cameras[i].model;

@@ -188,8 +188,9 @@ Scenario read_scenario(const std::filesystem::path& file, const std::vector<std:
 }
 
 Camera camera_model(const CameraOptions& options) {
-  Camera camera =
-      Camera::from_fov(options.width, options.height, options.horizontal_fov_deg * std::numbers::pi / 180.0);
+  constexpr double kDefaultFov_deg = 75;
+  const double fov_deg = options.horizontal_fov_deg.value_or(kDefaultFov_deg);
+  Camera camera = Camera::from_fov(options.width, options.height, fov_deg * std::numbers::pi / 180.0);
   if (options.fx) camera.fx = camera.fy = *options.fx;
   if (options.fy) camera.fy = *options.fy;
   if (options.cx) camera.cx = *options.cx;

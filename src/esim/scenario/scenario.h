@@ -40,7 +40,14 @@ struct StaticTrajectoryOptions {
   PoseOptions pose;
 };
 
-using TrajectoryOptions = std::variant<FileTrajectoryOptions, RandomTrajectoryOptions, StaticTrajectoryOptions>;
+/// The motion of a camera in the renderer's scene file.
+struct SceneTrajectoryOptions {
+  static constexpr const char* kType = "scene";
+  std::string camera;
+};
+
+using TrajectoryOptions =
+    std::variant<FileTrajectoryOptions, RandomTrajectoryOptions, StaticTrajectoryOptions, SceneTrajectoryOptions>;
 
 // --- renderers ---------------------------------------------------------------------------------------------------
 
@@ -87,6 +94,7 @@ struct MeshRendererOptions {
   MeshEngine engine = MeshEngine::raycast;
   std::optional<int> gl_device;
   std::filesystem::path scene;
+  double time_scale = 1.0;
   std::vector<ObjectOptions> objects;
   LightingOptions lighting;
   int samples_per_pixel = 1;
@@ -155,7 +163,7 @@ struct CameraOptions {
   std::string name;
   std::filesystem::path calibration;
   int width = 346, height = 260;
-  double horizontal_fov_deg = 75.0;
+  std::optional<double> horizontal_fov_deg;
   std::optional<double> fx, fy, cx, cy;
   DistortionOptions distortion;
   PoseOptions T_body_camera;

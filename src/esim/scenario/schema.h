@@ -35,9 +35,15 @@ void describe(Visitor& visit, StaticTrajectoryOptions& o) {
 }
 
 template <class Visitor>
+void describe(Visitor& visit, SceneTrajectoryOptions& o) {
+  visit("camera", o.camera,
+        About{"of the renderer's scene file, whose motion and field of view are used (default: its only one)"});
+}
+
+template <class Visitor>
 void describe(Visitor& visit, ObjectOptions& o) {
   visit("name", o.name, About{"for messages (default: object0, object1, ...)"});
-  visit("scene", o.scene, About{"mesh file (OBJ with MTL), in the object's own coordinates"});
+  visit("scene", o.scene, About{"scene file, in the object's own coordinates"});
   visit("scale", o.scale, About{"factor that makes its coordinates metres", "", 0, 1e6, true});
   visit("trajectory", o.trajectory, About{"how it moves: pose of its coordinates in the world"});
 }
@@ -71,7 +77,10 @@ void describe(Visitor& visit, MeshRendererOptions& o) {
         About{"raycast (Embree), gl (OpenGL), or auto: gl where there is a graphics card, raycast otherwise"});
   visit("gl_device", o.gl_device,
         About{"which graphics device, from 0 (default: the first that is no software)", "", 0, 31});
-  visit("scene", o.scene, About{"mesh file (OBJ with MTL), world coordinates in metres"});
+  visit("scene", o.scene,
+        About{"scene file: GLB, glTF, Blender's .blend, OBJ, PLY, STL, FBX, Collada; what is animated in it moves"});
+  visit("time_scale", o.time_scale,
+        About{"stretches the scene file's animation: 2 takes twice as long", "", 0, 1e6, true});
   visit("objects", o.objects, About{"things that move through it: a list of maps of"});
   visit("lighting", o.lighting, About{"unlit: surfaces are as bright as their texture, as baked scenes want it"});
   visit("samples_per_pixel", o.samples_per_pixel,
@@ -162,7 +171,9 @@ void describe(Visitor& visit, CameraOptions& o) {
   visit("width", o.width, About{"columns", "px", 1, 16384});
   visit("height", o.height, About{"rows", "px", 1, 16384});
   visit("horizontal_fov_deg", o.horizontal_fov_deg,
-        About{"field of view between the image's sides, where fx is not given", "deg", 0.1, 170});
+        About{"field of view between the image's sides, where fx is not given (default: that of the scene's camera "
+              "for a trajectory of type scene, 75 otherwise)",
+              "deg", 0.1, 170});
   visit("fx", o.fx, About{"focal length, horizontal", "px", 0, 1e6, true});
   visit("fy", o.fy, About{"focal length, vertical (default: fx)", "px", 0, 1e6, true});
   visit("cx", o.cx, About{"principal point, column (default: the middle)", "px", -1e6, 1e6});

@@ -7,14 +7,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string_view>
 #include <vector>
 
 #include "esim/core/error.h"
+#include "esim/scene/image_header.h"
 
 namespace esim {
 namespace {
@@ -31,6 +33,22 @@ void check_size(const std::filesystem::path& path, std::int64_t width, std::int6
   }
 }
 
+/// The same of a size that a file claims, which it must have the bytes for: no compression saves more than this.
+void check_claim(const std::filesystem::path& path, std::int64_t width, std::int64_t height, std::uintmax_t bytes) {
+  constexpr double kMaxPixelsPerByte = 10'000, kSmall = 1 << 20;
+  check_size(path, width, height);
+  const double pixels = static_cast<double>(width) * static_cast<double>(height);
+  if (pixels > kSmall && pixels > kMaxPixelsPerByte * static_cast<double>(bytes))
+    fail(path,
+         fmt::format("claims {}x{} pixels, but has {} bytes only; it is cut off or damaged", width, height, bytes));
+}
+
+std::uintmax_t size_of(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+  return error ? 0 : bytes;
+}
+
 /// The channels that hold the colour: R, G, B, or the luminance Y.
 std::vector<const char*> colour_channels(const std::filesystem::path& path, const Imf::ChannelList& channels) {
   const auto has = [&](const char* name) { return channels.findChannel(name) != nullptr; };
@@ -44,7 +62,7 @@ void read_exr(const std::filesystem::path& path, Encoding encoding, bool colour,
   const auto window = file.header().dataWindow();
   const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
   const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
-  check_size(path, width, height);
+  check_claim(path, width, height, size_of(path));
   const auto names = colour_channels(path, file.header().channels());
   const std::size_t count = names.size(), pixel_bytes = count * sizeof(float);
   const std::size_t row_bytes = static_cast<std::size_t>(width) * pixel_bytes;
@@ -86,6 +104,18 @@ bool is_whole_jpeg(const std::filesystem::path& path) {
   return tail.find("\xff\xd9") != std::string::npos;
 }
 
+/// Refuses an image by the size that it says it has, before a decoder takes memory for it.
+void check_header(const std::filesystem::path& path, std::span<const std::byte> head, std::uintmax_t bytes) {
+  if (const auto size = size_in_header(head)) check_claim(path, size->width, size->height, bytes);
+}
+
+void check_header(const std::filesystem::path& path) {
+  std::vector<std::byte> head(kImageHeadBytes);
+  std::ifstream file(path, std::ios::binary);
+  file.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
+  check_header(path, std::span(head).first(static_cast<std::size_t>(file.gcount())), size_of(path));
+}
+
 PixelType pixel_type(const std::filesystem::path& path, const cv::Mat& image) {
   switch (image.depth()) {
     case CV_8U:
@@ -99,34 +129,12 @@ PixelType pixel_type(const std::filesystem::path& path, const cv::Mat& image) {
   }
 }
 
-std::string lower_case_extension(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return extension;
-}
-
-/// Refuses a PNG file by the size in its first chunk, before the decoder takes memory for it.
-void check_png_size(const std::filesystem::path& path) {
-  std::array<unsigned char, 24> head{};
-  std::ifstream file(path, std::ios::binary);
-  if (!file.read(reinterpret_cast<char*>(head.data()), head.size()) || head[0] != 0x89 || head[1] != 'P') return;
-  const auto big_endian = [&](std::size_t at) {
-    return std::int64_t{head[at]} << 24 | head[at + 1] << 16 | head[at + 2] << 8 | head[at + 3];
-  };
-  check_size(path, big_endian(16), big_endian(20));
-}
-
-/// The pixels of a file that is not OpenEXR, as they are coded.
-cv::Mat read_pixels(const std::filesystem::path& path) {
-  check_png_size(path);
-  const std::string extension = lower_case_extension(path);
-  if ((extension == ".jpg" || extension == ".jpeg") && !is_whole_jpeg(path)) {
-    fail(path, "is no JPEG image, or is cut off");
-  }
+/// The pixels of a file that is not OpenEXR, as they are coded. `read` lets OpenCV decode it.
+template <typename Read>
+cv::Mat read_pixels(const std::filesystem::path& path, const Read& read) {
   cv::Mat image;
   try {
-    image = cv::imread(path.string(), cv::IMREAD_UNCHANGED);
+    image = read();
   } catch (const cv::Exception& exception) {
     fail(path, "cannot be decoded: " + exception.err);
   }
@@ -145,6 +153,23 @@ void decode_pixels(const std::filesystem::path& path, const cv::Mat& image, Enco
           .blue_first = true,
           .type = pixel_type(path, image)},
          encoding, colour, planes);
+}
+
+std::string lower_case_extension(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  return extension;
+}
+
+/// The pixels of such a file on disk.
+cv::Mat read_pixels(const std::filesystem::path& path) {
+  const std::string extension = lower_case_extension(path);
+  if ((extension == ".jpg" || extension == ".jpeg") && !is_whole_jpeg(path)) {
+    fail(path, "is no JPEG image, or is cut off");
+  }
+  check_header(path);
+  return read_pixels(path, [&] { return cv::imread(path.string(), cv::IMREAD_UNCHANGED); });
 }
 
 void require_file(const std::filesystem::path& path) {
@@ -183,6 +208,21 @@ void load_planes(const std::filesystem::path& path, Encoding encoding, bool colo
   require_file(path);
   if (lower_case_extension(path) == ".exr") return load_exr(path, encoding, colour, planes);
   decode_pixels(path, read_pixels(path), encoding, colour, planes);
+}
+
+void decode_planes(std::span<const std::byte> content, const std::string& name, Encoding encoding, bool colour,
+                   Planes& planes) {
+  constexpr std::size_t kTailBytes = std::size_t{1} << 16;
+  check_header(name, content, content.size());
+  const std::string_view text(reinterpret_cast<const char*>(content.data()), content.size());
+  const std::string_view tail = text.substr(text.size() - std::min(text.size(), kTailBytes));
+  if (text.starts_with("\xff\xd8") && tail.find("\xff\xd9") == std::string_view::npos) fail(name, "is cut off");
+  if (content.size() > std::numeric_limits<int>::max()) fail(name, "is larger than 2 GiB");
+
+  const cv::Mat coded(1, static_cast<int>(content.size()), CV_8U, const_cast<std::byte*>(content.data()));
+  cv::Mat image = read_pixels(name, [&] { return cv::imdecode(coded, cv::IMREAD_UNCHANGED); });
+  if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);
+  decode_pixels(name, image, encoding, colour, planes);
 }
 
 Image<float> load_luminance(const std::filesystem::path& path) {

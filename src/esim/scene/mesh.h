@@ -37,9 +37,8 @@ struct Mesh {
 /// Receives what is wrong but can be lived with, as one line.
 using WarningHandler = std::function<void(const std::string&)>;
 
-/// Reads a textured mesh (OBJ with MTL). Textures are found relative to the file; one that is missing or unreadable is
-/// a warning, and its surfaces are grey. Where a material has a texture, the texture alone is its base colour.
-/// Throws UserError naming the file when it cannot be read or has no triangles.
+/// All that a scene file (see load_scene_file) shows, as one mesh that stands still: what is animated stays where it is
+/// at the beginning. Throws UserError naming the file when it cannot be read, is damaged, or has no triangles.
 Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn);
 
 }  // namespace esim

@@ -1,0 +1,108 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <vector>
+
+#include "esim/blender/blender.h"
+#include "esim/blender/scripts.h"
+#include "esim/core/error.h"
+
+namespace esim {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// FNV-1a over 128 bits: names files by content. Nobody gains by making two scenes collide in his own cache.
+class ContentHash {
+ public:
+  void add(const char* data, std::size_t size) {
+    for (std::size_t i = 0; i < size; ++i) state_ = (state_ ^ static_cast<unsigned char>(data[i])) * kPrime;
+  }
+
+  std::string text() const {
+    return fmt::format("{:016x}{:016x}", static_cast<std::uint64_t>(state_ >> 64), static_cast<std::uint64_t>(state_));
+  }
+
+ private:
+  __extension__ using Wide = unsigned __int128;
+  static constexpr Wide kPrime = Wide{1} << 88 | 0x13B;
+  Wide state_ = Wide{0x6c62272e07bb0142} << 64 | 0x62b821756295c58d;
+};
+
+std::string hash_of(const fs::path& blend) {
+  std::ifstream file(blend, std::ios::binary);
+  if (!file) throw UserError(fmt::format("scene {}: no such file, or not to be read", blend.string()));
+  ContentHash hash;
+  std::string buffer(1 << 20, '\0');
+  while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || file.gcount() > 0)
+    hash.add(buffer.data(), static_cast<std::size_t>(file.gcount()));
+  for (const std::string& part : {std::string(kLegacyScript), std::string(kExportScript), fs::absolute(blend).string()})
+    hash.add(part.data(), part.size());
+  return hash.text();
+}
+
+fs::path cache_folder() {
+  const auto variable = [](const char* name) {
+    const char* const value = std::getenv(name);
+    return fs::path(value != nullptr ? value : "");
+  };
+  fs::path base = variable("XDG_CACHE_HOME");
+  if (!base.is_absolute()) base = variable("HOME").empty() ? fs::path() : variable("HOME") / ".cache";
+  if (base.empty()) throw UserError("no place for a cache; set XDG_CACHE_HOME to a folder");
+  std::error_code error;
+  fs::create_directories(base / "esim", error);
+  if (error)
+    throw OutputError(fmt::format("cannot make {}: {}; set XDG_CACHE_HOME", (base / "esim").string(), error.message()));
+  return base / "esim";
+}
+
+/// What a file that a scene refers to is known by: size and time of its last change; "absent" where there is none.
+std::string state_of(const fs::path& file) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return "absent";
+  return fmt::format("{} {}", fs::file_size(file, error), fs::last_write_time(file, error).time_since_epoch().count());
+}
+
+/// Whether the files listed beside a cached scene are what they were: lines of "STATE<tab>PATH".
+bool is_current(const fs::path& list) {
+  std::ifstream file(list);
+  if (!file) return false;
+  for (std::string line; std::getline(file, line);) {
+    const std::size_t tab = line.find('\t');
+    if (tab == std::string::npos || state_of(line.substr(tab + 1)) != line.substr(0, tab)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+fs::path cached_glb(const fs::path& blend, const BlenderWatch& watch) {
+  const std::string hash = hash_of(blend);
+  const fs::path folder = cache_folder();
+  const fs::path glb = folder / (hash + ".glb"), list = folder / (hash + ".files");
+  std::error_code error;
+  if (fs::is_regular_file(glb, error) && is_current(list)) return glb;
+
+  // The exporter says which files the scene refers to. Without their list, the cached scene does not count.
+  std::vector<std::string> files;
+  BlenderWatch listening = watch;
+  listening.warning = [&](const std::string& text) {
+    constexpr std::string_view kFile = "file ";
+    if (text.starts_with(kFile)) return files.push_back(text.substr(kFile.size()));
+    watch.warning(text);
+  };
+  fs::remove(list, error);
+  if (!export_blend(blend, glb, listening)) throw UserError(fmt::format("scene {}: interrupted", blend.string()));
+  const fs::path draft = folder / fmt::format("{}.files.{}", hash, ::getpid());
+  std::ofstream out(draft);
+  for (const std::string& file : files) out << state_of(file) << '\t' << file << '\n';
+  out.close();
+  if (!out) throw OutputError(fmt::format("cannot write {}; is the disk full?", draft.string()));
+  fs::rename(draft, list, error);
+  return glb;
+}
+
+}  // namespace esim

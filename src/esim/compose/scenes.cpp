@@ -1,0 +1,65 @@
+#include <fmt/format.h>
+
+#include "esim/blender/blender.h"
+#include "esim/compose/compose.h"
+#include "esim/core/error.h"
+
+namespace esim {
+namespace {
+
+Lighting lighting_of(const LambertOptions& options) {
+  Lighting lighting;
+  lighting.ambient = static_cast<float>(options.ambient);
+  for (const SunOptions& sun : options.suns) {
+    if (!(sun.direction.norm() > 1e-6))
+      throw UserError("renderer.lighting.suns: [0, 0, 0] is no direction; [0, 0, -1] shines straight down");
+    lighting.suns.push_back({sun.direction.cast<float>(), static_cast<float>(sun.strength)});
+  }
+  for (const PointLightOptions& point : options.points)
+    lighting.points.push_back({point.position.cast<float>(), static_cast<float>(point.strength)});
+  lighting.shadows = options.shadows;
+  return lighting;
+}
+
+void require_path(const std::filesystem::path& path, const std::string& key) {
+  if (path.empty()) throw UserError(fmt::format("renderer.{}: is missing; name a file", key));
+}
+
+/// The file that can be read for one that a scenario names.
+std::filesystem::path readable(const std::filesystem::path& scene, const Notices& notices) {
+  if (!is_blend(scene)) return scene;
+  BlenderWatch watch;
+  watch.warning = notices.warning;
+  std::filesystem::path glb = cached_glb(scene, watch);
+  notices.note(fmt::format("scene {}: read from Blender's export of it, {}", scene.filename().string(), glb.string()));
+  return glb;
+}
+
+SceneFile load(const MeshRendererOptions& options, const Notices& notices) {
+  require_path(options.scene, "scene");
+  SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning);
+  notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
+  for (std::size_t i = 0; i < options.objects.size(); ++i) {
+    const ObjectOptions& object = options.objects[i];
+    require_path(object.scene, fmt::format("objects.{}.scene", i));
+    SceneObject loaded{object.name.empty() ? fmt::format("object{}", i) : object.name,
+                       load_mesh(readable(object.scene, notices), notices.warning), true};
+    for (Eigen::Vector3f& vertex : loaded.mesh.vertices) vertex *= static_cast<float>(object.scale);
+    file.scene.objects.push_back(std::move(loaded));
+  }
+  if (const auto* lambert = std::get_if<LambertOptions>(&options.lighting)) file.scene.lighting = lighting_of(*lambert);
+  return file;
+}
+
+template <typename Renderer>
+SceneFile load(const Renderer&, const Notices&) {
+  return {};
+}
+
+}  // namespace
+
+SceneFile load_scenes(const RendererOptions& options, const Notices& notices) {
+  return std::visit([&](const auto& renderer) { return load(renderer, notices); }, options);
+}
+
+}  // namespace esim

@@ -1,0 +1,186 @@
+#include "esim/scene/import/flatten.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "esim/scene/import/motion_samples.h"
+#include "esim/scene/import/texture_store.h"
+
+namespace esim {
+namespace {
+
+constexpr float kMissingTextureBase = 0.2F;  // a mid-grey surface: 18-20 % reflectance
+constexpr int kWorld = -1;
+
+Material convert(const GraphMaterial& source, TextureStore& textures) {
+  Material material;
+  material.name = source.name;
+  material.unlit = source.unlit;
+  material.texture = textures.get(source.base_texture, source.base, source.name);
+  material.base = luminance(source.base[0], source.base[1], source.base[2]);
+  if (source.base_texture.image >= 0) material.base = material.texture != nullptr ? 1.0F : kMissingTextureBase;
+  material.emission = luminance(source.emission[0], source.emission[1], source.emission[2]);
+  if (material.emission > 0 && source.emission_texture.image >= 0) {
+    material.emission_texture = textures.get(source.emission_texture, source.emission, source.name);
+    material.emission = material.emission_texture != nullptr ? 1.0F : 0.0F;
+  }
+  return material;
+}
+
+/// Turns a node's mesh into the frame of the object that it belongs to, and appends it.
+class MeshJoiner {
+ public:
+  explicit MeshJoiner(const std::filesystem::path& file) : file_(file) {}
+
+  void append(const Mesh& part, const Eigen::Matrix4d& T_object_node) {
+    const Eigen::Matrix3f A = T_object_node.topLeftCorner<3, 3>().cast<float>();
+    const Eigen::Matrix3f for_normals = cofactors(T_object_node.topLeftCorner<3, 3>()).cast<float>();
+    const Eigen::Vector3f t = T_object_node.topRightCorner<3, 1>().cast<float>();
+
+    const auto first = static_cast<std::uint32_t>(mesh_.vertices.size());
+    for (const Eigen::Vector3f& vertex : part.vertices) {
+      mesh_.vertices.emplace_back(A * vertex + t);
+      if (!mesh_.vertices.back().allFinite()) fail_scene(file_, "a vertex is not finite where its node puts it");
+    }
+    for (std::size_t i = 0; i < part.vertices.size(); ++i) {
+      const Eigen::Vector3f normal =
+          part.normals.empty() ? Eigen::Vector3f::Zero() : Eigen::Vector3f(for_normals * part.normals[i]);
+      const float length = normal.norm();
+      const bool usable = length > 1e-12F && std::isfinite(length);
+      mesh_.normals.push_back(usable ? Eigen::Vector3f(normal / length) : Eigen::Vector3f::Zero());
+      any_normals_ |= usable;
+    }
+    for (const auto& triangle : part.triangles)
+      mesh_.triangles.push_back({first + triangle[0], first + triangle[1], first + triangle[2]});
+    mesh_.texture_uv.insert(mesh_.texture_uv.end(), part.texture_uv.begin(), part.texture_uv.end());
+    mesh_.material.insert(mesh_.material.end(), part.material.begin(), part.material.end());
+  }
+
+  Mesh take(const std::vector<Material>& materials) {
+    if (!any_normals_) mesh_.normals.clear();
+    mesh_.materials = materials;
+    return std::move(mesh_);
+  }
+
+  bool empty() const { return mesh_.triangles.empty(); }
+
+ private:
+  /// det(A) A⁻ᵀ, which turns normals as A turns surfaces, also where A is singular.
+  static Eigen::Matrix3d cofactors(const Eigen::Matrix3d& A) {
+    Eigen::Matrix3d C;
+    for (int i = 0; i < 3; ++i) C.col(i) = A.col((i + 1) % 3).cross(A.col((i + 2) % 3));
+    return A.determinant() < 0 ? Eigen::Matrix3d(-C) : C;
+  }
+
+  const std::filesystem::path& file_;
+  Mesh mesh_;
+  bool any_normals_ = false;
+};
+
+/// Throws UserError where the nodes show nothing, or so much that it would not fit into memory.
+void check_size(const SceneGraph& graph, const std::filesystem::path& file) {
+  std::size_t triangles = 0, vertices = 0;
+  for (const GraphNode& node : graph.nodes) {
+    for (const std::uint32_t mesh : node.meshes) {
+      triangles += graph.meshes[mesh].triangles.size(), vertices += graph.meshes[mesh].vertices.size();
+      if (triangles > kMaxSceneTriangles || vertices > kMaxSceneVertices)
+        fail_scene(file, fmt::format("shows more than {} triangles; simplify it", kMaxSceneTriangles));
+    }
+  }
+  if (triangles == 0) fail_scene(file, "holds no triangles; export meshes, not only curves, points or instances");
+}
+
+/// For each node, the animated one that it moves with (itself, or its nearest animated ancestor), or the world.
+std::vector<int> movers(const SceneGraph& graph, const NodeTransforms& transforms) {
+  std::vector<int> result;
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    const int parent = graph.nodes[i].parent;
+    result.push_back(transforms.is_animated(i) ? static_cast<int>(i)
+                     : parent >= 0             ? result[static_cast<std::size_t>(parent)]
+                                               : kWorld);
+  }
+  return result;
+}
+
+std::vector<Material> convert_materials(const SceneGraph& graph, TextureStore& textures) {
+  std::vector<Material> materials;
+  for (const GraphMaterial& material : graph.materials) materials.push_back(convert(material, textures));
+  return materials;
+}
+
+void give_warnings(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn) {
+  constexpr std::size_t kMost = 10;  // a line each; scenes from elsewhere can have thousands of flaws
+  for (std::size_t i = 0; i < std::min(graph.warnings.size(), kMost); ++i) warn(graph.warnings[i]);
+  if (graph.warnings.size() > kMost)
+    warn(fmt::format("scene {}: and {} more of the kind", file.filename().string(), graph.warnings.size() - kMost));
+  if (graph.normal_maps > 0)
+    warn(fmt::format("scene {}: {} of its materials have a normal or bump map, which is not shown",
+                     file.filename().string(), graph.normal_maps));
+}
+
+}  // namespace
+
+SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn) {
+  check_size(graph, file);
+  give_warnings(graph, file, warn);
+  SceneFile result;
+  const NodeTransforms transforms(graph, file);
+  result.animation = transforms.span();
+  const double start_s = transforms.start_s();
+  TextureStore textures(graph, file.parent_path(), warn);
+  const std::vector<Material> materials = convert_materials(graph, textures);
+  result.image_count = textures.image_count();
+
+  // The geometry of each mover, in the order of the nodes.
+  const std::vector<int> mover_of = movers(graph, transforms);
+  std::vector<int> objects = {kWorld};
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    if (mover_of[i] == static_cast<int>(i)) objects.push_back(static_cast<int>(i));
+  }
+  for (const int object : objects) {
+    const bool moves = object != kWorld;
+    SceneMotion motion;
+    Eigen::Matrix4d T_object_world = Eigen::Matrix4d::Identity();
+    if (moves) {
+      const auto node = static_cast<std::size_t>(object);
+      motion = sample_motion(transforms, node, Eigen::Matrix4d::Identity(), graph.nodes[node].name, warn);
+      T_object_world = motion.front().T_world_object.inverse().matrix();
+    }
+    MeshJoiner joiner(file);
+    for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+      if (mover_of[i] != object) continue;
+      for (const std::uint32_t mesh : graph.nodes[i].meshes)
+        joiner.append(graph.meshes[mesh], T_object_world * transforms.world(i, start_s));
+    }
+    if (joiner.empty()) continue;
+    Mesh mesh = joiner.take(materials);
+    const std::string name = moves ? graph.nodes[static_cast<std::size_t>(object)].name : "world";
+    result.scene.objects.push_back({name, std::move(mesh), moves});
+    if (moves) result.motions.push_back(std::move(motion));
+  }
+
+  for (const GraphCamera& camera : graph.cameras) {
+    SceneCamera converted{
+        camera.name, {}, sample_motion(transforms, camera.node, camera.T_node_camera, camera.name, warn)};
+    if (camera.horizontal_fov_rad > 0) converted.horizontal_fov_rad = camera.horizontal_fov_rad;
+    result.cameras.push_back(std::move(converted));
+  }
+  return result;
+}
+
+Mesh flatten_still(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn) {
+  check_size(graph, file);
+  give_warnings(graph, file, warn);
+  const NodeTransforms transforms(graph, file);
+  TextureStore textures(graph, file.parent_path(), warn);
+  MeshJoiner joiner(file);
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    for (const std::uint32_t mesh : graph.nodes[i].meshes)
+      joiner.append(graph.meshes[mesh], transforms.world(i, transforms.start_s()));
+  }
+  return joiner.take(convert_materials(graph, textures));
+}
+
+}  // namespace esim

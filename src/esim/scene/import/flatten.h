@@ -1,0 +1,18 @@
+#pragma once
+
+#include "esim/scene/import/scene_graph.h"
+#include "esim/scene/scene_file.h"
+
+namespace esim {
+
+/// Geometry, materials and motions of a graph. What stands still becomes one object in the world's frame; every subtree
+/// whose root is animated becomes one of its own, less the subtrees in it that are animated themselves.
+///
+/// An animated node's transform M(t) is rigid up to a constant factor: M(t) = T(t) S, with T(t) the object's pose and
+/// S = T(0)⁻¹ M(0) applied to its vertices. Where the scale is animated too, its first value is kept, with a warning.
+SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn);
+
+/// The whole graph as one mesh that stands still, as it is at the start of its animation.
+Mesh flatten_still(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn);
+
+}  // namespace esim

@@ -1,0 +1,304 @@
+#include "esim/scene/import/gltf_document.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "esim/scene/import/folder.h"
+#include "esim/scene/import/scene_graph.h"
+
+namespace esim {
+namespace {
+
+using Json = GltfDocument::Json;
+
+constexpr std::uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
+
+enum ComponentType { kByte = 5120, kUnsignedByte, kShort, kUnsignedShort, kUnsignedInt = 5125, kFloat };
+
+std::size_t component_bytes(int type) {
+  switch (type) {
+    case kByte:
+    case kUnsignedByte:
+      return 1;
+    case kShort:
+    case kUnsignedShort:
+      return 2;
+    case kUnsignedInt:
+    case kFloat:
+      return 4;
+    default:
+      return 0;
+  }
+}
+
+std::size_t component_count(const std::string& type) {
+  static constexpr std::array<std::pair<const char*, std::size_t>, 7> kTypes{
+      {{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT2", 4}, {"MAT3", 9}, {"MAT4", 16}}};
+  for (const auto& [name, count] : kTypes) {
+    if (type == name) return count;
+  }
+  return 0;
+}
+
+template <typename T>
+T load(const std::byte* from) {
+  T value;
+  std::memcpy(&value, from, sizeof value);
+  return value;
+}
+
+float as_float(const std::byte* from, int type) {
+  switch (type) {
+    case kByte:
+      return std::max(static_cast<float>(load<std::int8_t>(from)) / 127.0F, -1.0F);
+    case kUnsignedByte:
+      return static_cast<float>(load<std::uint8_t>(from)) / 255.0F;
+    case kShort:
+      return std::max(static_cast<float>(load<std::int16_t>(from)) / 32767.0F, -1.0F);
+    case kUnsignedShort:
+      return static_cast<float>(load<std::uint16_t>(from)) / 65535.0F;
+    default:
+      return load<float>(from);
+  }
+}
+
+/// Also in single precision.
+bool is_finite_number(const Json& value) {
+  return value.is_number() && std::abs(value.get<double>()) <= double{std::numeric_limits<float>::max()};
+}
+
+/// Nothing for text that is no base64.
+std::vector<std::byte> base64_decoded(std::string_view text) {
+  static constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::array<std::int8_t, 256> value;
+  value.fill(-1);
+  for (std::size_t i = 0; i < kDigits.size(); ++i)
+    value[static_cast<unsigned char>(kDigits[i])] = static_cast<std::int8_t>(i);
+  std::vector<std::byte> bytes;
+  bytes.reserve(text.size() / 4 * 3);
+  std::uint32_t bits = 0;
+  int held = 0;
+  for (const char c : text) {
+    if (c == '=') break;
+    const int digit = value[static_cast<unsigned char>(c)];
+    if (digit < 0) return {};
+    bits = bits << 6 | static_cast<std::uint32_t>(digit);
+    held += 6;
+    if (held >= 8) bytes.push_back(static_cast<std::byte>(bits >> (held -= 8)));
+  }
+  return bytes;
+}
+
+}  // namespace
+
+GltfDocument::GltfDocument(const std::filesystem::path& file) : file_(file) {
+  std::vector<std::byte> content = read_bytes(file);
+  std::vector<std::byte> binary;
+  if (content.size() >= 4 && load<std::uint32_t>(content.data()) == kGlbMagic) {
+    constexpr std::size_t kHeader = 12, kChunkHeader = 8;
+    if (content.size() < kHeader + kChunkHeader || load<std::uint32_t>(&content[4]) != 2)
+      fail("is no GLB file of version 2, or is cut off");
+    if (load<std::uint32_t>(&content[8]) > content.size()) fail("is cut off: copy or export it again");
+    std::size_t at = kHeader;
+    for (int chunk = 0; at + kChunkHeader <= content.size(); ++chunk) {
+      const std::size_t bytes = load<std::uint32_t>(&content[at]);
+      const auto type = load<std::uint32_t>(&content[at + 4]);
+      at += kChunkHeader;
+      if (bytes > content.size() - at) fail("is cut off: copy or export it again");
+      const std::span<const std::byte> data(content.data() + at, bytes);
+      if (chunk == 0 && type != kJsonChunk) fail("is damaged: its first chunk is not JSON");
+      if (chunk == 0) parse(data);
+      if (chunk == 1 && type == kBinaryChunk) binary.assign(data.begin(), data.end());
+      at += bytes;
+    }
+  } else {
+    parse(content);
+  }
+  content = {};
+  load_buffers(std::move(binary));
+}
+
+void GltfDocument::parse(std::span<const std::byte> text) {
+  const auto* const begin = reinterpret_cast<const char*>(text.data());
+  try {
+    root_ = Json::parse(begin, begin + text.size());
+  } catch (const Json::exception& error) {
+    fail(fmt::format("is damaged: its JSON cannot be read ({})", error.what()));
+  }
+  const Json* const asset = find(root_, "asset");
+  if (asset == nullptr || text.empty() || !this->text(*asset, "version").starts_with("2"))
+    fail("is not glTF 2.0; export it anew as glTF 2.0");
+}
+
+void GltfDocument::load_buffers(std::vector<std::byte> binary) {
+  const Json& buffers = list("buffers");
+  for (std::size_t i = 0; i < buffers.size(); ++i) {
+    const std::string uri = text(buffers[i], "uri");
+    if (uri.empty()) {
+      buffers_.push_back(i == 0 ? std::move(binary) : std::vector<std::byte>{});
+    } else if (uri.starts_with("data:")) {
+      buffers_.push_back(data_uri(uri));
+    } else {
+      const FolderPath inside = path_inside(file_.parent_path(), percent_decoded(uri));
+      if (!inside.path) fail(fmt::format("its buffer '{}' {}; put it beside the file", uri, inside.reason));
+      buffers_.push_back(read_bytes(*inside.path));
+    }
+    if (buffers_.back().size() < whole(buffers[i], "byteLength", 0))
+      fail(fmt::format("buffer {} is cut off: it has {} bytes", i, buffers_.back().size()));
+  }
+}
+
+void GltfDocument::fail(const std::string& reason) const { fail_scene(file_, reason); }
+
+const Json& GltfDocument::list(const char* name) const {
+  static const Json kNone = Json::array();
+  const Json* const found = find(root_, name);
+  if (found == nullptr) return kNone;
+  if (!found->is_array()) fail(fmt::format("is damaged: {} is no list", name));
+  return *found;
+}
+
+std::size_t GltfDocument::first_scene() const {
+  return has_index(root_, "scene") ? index(root_, "scene", "scenes") : 0;
+}
+
+const Json* GltfDocument::find(const Json& object, const char* name) {
+  if (!object.is_object()) return nullptr;
+  const auto found = object.find(name);
+  return found == object.end() ? nullptr : &*found;
+}
+
+std::size_t GltfDocument::whole(const Json& object, const char* name, std::size_t otherwise) const {
+  const Json* const found = find(object, name);
+  if (found == nullptr) return otherwise;
+  if (!found->is_number_unsigned()) fail(fmt::format("is damaged: {} is no whole number", name));
+  const auto value = found->get<std::uint64_t>();
+  if (value > std::numeric_limits<std::uint32_t>::max()) fail(fmt::format("is damaged: {} is {}", name, value));
+  return value;
+}
+
+std::size_t GltfDocument::index(const Json& object, const char* name, const char* into) const {
+  const std::size_t value = whole(object, name, std::numeric_limits<std::size_t>::max());
+  const std::size_t count = list(into).size();
+  if (value >= count) fail(fmt::format("is damaged: {} is not one of the {} {}", name, count, into));
+  return value;
+}
+
+double GltfDocument::number(const Json& object, const char* name, double otherwise) const {
+  const Json* const found = find(object, name);
+  if (found == nullptr) return otherwise;
+  if (!is_finite_number(*found)) fail(fmt::format("is damaged: {} is no finite number", name));
+  return found->get<double>();
+}
+
+bool GltfDocument::flag(const Json& object, const char* name) const {
+  const Json* const found = find(object, name);
+  return found != nullptr && found->is_boolean() && found->get<bool>();
+}
+
+std::string GltfDocument::text(const Json& object, const char* name, const std::string& otherwise) const {
+  const Json* const found = find(object, name);
+  std::string value = found != nullptr && found->is_string() ? found->get<std::string>() : otherwise;
+  std::replace_if(
+      value.begin(), value.end(), [](unsigned char c) { return c < 0x20; }, '?');
+  return value;
+}
+
+std::vector<double> GltfDocument::numbers(const Json& object, const char* name, std::vector<double> otherwise) const {
+  const Json* const found = find(object, name);
+  if (found == nullptr) return otherwise;
+  if (!found->is_array() || found->size() != otherwise.size() ||
+      !std::all_of(found->begin(), found->end(), is_finite_number))
+    fail(fmt::format("is damaged: {} is not a list of {} finite numbers", name, otherwise.size()));
+  return found->get<std::vector<double>>();
+}
+
+std::span<const std::byte> GltfDocument::buffer_view(std::size_t index_of_view) const {
+  const Json& views = list("bufferViews");
+  if (index_of_view >= views.size()) fail("is damaged: it names a bufferView that is not there");
+  const Json& view = views[index_of_view];
+  const std::vector<std::byte>& buffer = buffers_[index(view, "buffer", "buffers")];
+  const std::size_t offset = whole(view, "byteOffset", 0), length = whole(view, "byteLength", 0);
+  if (offset > buffer.size() || length > buffer.size() - offset)
+    fail(fmt::format("is damaged: bufferView {} is beyond the end of its buffer", index_of_view));
+  return {buffer.data() + offset, length};
+}
+
+GltfDocument::Accessor GltfDocument::accessor(std::size_t index_of_accessor, std::size_t components) const {
+  const Json& json = list("accessors")[index_of_accessor];
+  if (find(json, "sparse") != nullptr) fail("has sparse accessors, which are not supported; export it without them");
+  Accessor result;
+  result.count = whole(json, "count", 0);
+  result.component_type = static_cast<int>(whole(json, "componentType", 0));
+  result.normalised = flag(json, "normalized");
+  const std::size_t element = component_bytes(result.component_type) * components;
+  if (element == 0 || component_count(text(json, "type")) != components)
+    fail(fmt::format("is damaged: accessor {} has not the type that its use needs", index_of_accessor));
+
+  const std::size_t view = index(json, "bufferView", "bufferViews");
+  const std::size_t stride = whole(list("bufferViews")[view], "byteStride", 0);
+  result.stride = stride == 0 ? element : stride;
+  result.bytes = buffer_view(view);
+  const std::size_t offset = whole(json, "byteOffset", 0);
+  const bool fits =
+      offset <= result.bytes.size() && result.stride >= element &&
+      (result.count == 0 || (result.bytes.size() - offset >= element &&
+                             result.count - 1 <= (result.bytes.size() - offset - element) / result.stride));
+  if (!fits) fail(fmt::format("is damaged: accessor {} is beyond the end of its bufferView", index_of_accessor));
+  result.bytes = result.bytes.subspan(offset);
+  return result;
+}
+
+std::vector<float> GltfDocument::floats(std::size_t index_of_accessor, std::size_t components) const {
+  const Accessor from = accessor(index_of_accessor, components);
+  if (from.component_type != kFloat && !from.normalised)
+    fail(fmt::format("is damaged: accessor {} holds whole numbers", index_of_accessor));
+  const std::size_t step = component_bytes(from.component_type);
+  std::vector<float> values;
+  values.reserve(from.count * components);
+  for (std::size_t i = 0; i < from.count; ++i) {
+    for (std::size_t c = 0; c < components; ++c) {
+      const float value = as_float(&from.bytes[i * from.stride + c * step], from.component_type);
+      if (!std::isfinite(value)) fail(fmt::format("accessor {} holds a number that is not finite", index_of_accessor));
+      values.push_back(value);
+    }
+  }
+  return values;
+}
+
+std::vector<std::uint32_t> GltfDocument::integers(std::size_t index_of_accessor) const {
+  const Accessor from = accessor(index_of_accessor, 1);
+  std::vector<std::uint32_t> values;
+  values.reserve(from.count);
+  for (std::size_t i = 0; i < from.count; ++i) {
+    const std::byte* const at = &from.bytes[i * from.stride];
+    switch (from.component_type) {
+      case kUnsignedByte:
+        values.push_back(load<std::uint8_t>(at));
+        break;
+      case kUnsignedShort:
+        values.push_back(load<std::uint16_t>(at));
+        break;
+      case kUnsignedInt:
+        values.push_back(load<std::uint32_t>(at));
+        break;
+      default:
+        fail(fmt::format("is damaged: accessor {} holds no indices", index_of_accessor));
+    }
+  }
+  return values;
+}
+
+std::vector<std::byte> GltfDocument::data_uri(const std::string& uri) const {
+  const std::size_t comma = uri.find(',');
+  if (comma == std::string::npos || !std::string_view(uri).substr(0, comma).ends_with(";base64"))
+    fail("has a data: URI that is not base64");
+  return base64_decoded(std::string_view(uri).substr(comma + 1));
+}
+
+}  // namespace esim

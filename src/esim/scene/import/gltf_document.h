@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace esim {
+
+/// A glTF 2.0 file as text and bytes. Nothing in it is trusted: whatever is missing, of the wrong type or out of range
+/// throws UserError with the file's name.
+class GltfDocument {
+ public:
+  using Json = nlohmann::json;
+
+  explicit GltfDocument(const std::filesystem::path& file);
+
+  /// A list at the top of the document; empty where there is none.
+  const Json& list(const char* name) const;
+
+  /// The scene that the file wants to be shown first, among its at least one.
+  std::size_t first_scene() const;
+
+  /// A member of an object, or null.
+  static const Json* find(const Json& object, const char* name);
+
+  /// The index that a member holds into a list at the top.
+  std::size_t index(const Json& object, const char* name, const char* into) const;
+  bool has_index(const Json& object, const char* name) const { return find(object, name) != nullptr; }
+
+  double number(const Json& object, const char* name, double otherwise) const;
+  bool flag(const Json& object, const char* name) const;
+
+  /// A member of text, without control characters.
+  std::string text(const Json& object, const char* name, const std::string& otherwise = {}) const;
+
+  /// A member of `count` numbers, or `otherwise`.
+  std::vector<double> numbers(const Json& object, const char* name, std::vector<double> otherwise) const;
+
+  /// The elements of an accessor of floating-point (or normalised integer) vectors, one after the other, all finite.
+  std::vector<float> floats(std::size_t accessor, std::size_t components) const;
+
+  /// The elements of an accessor of unsigned integers.
+  std::vector<std::uint32_t> integers(std::size_t accessor) const;
+
+  std::span<const std::byte> buffer_view(std::size_t index) const;
+
+  /// The bytes of a data: URI.
+  std::vector<std::byte> data_uri(const std::string& uri) const;
+
+  [[noreturn]] void fail(const std::string& reason) const;
+
+ private:
+  struct Accessor {
+    std::span<const std::byte> bytes;  // from the first element on
+    std::size_t count = 0, stride = 0;
+    int component_type = 0;
+    bool normalised = false;
+  };
+
+  std::size_t whole(const Json& object, const char* name, std::size_t otherwise) const;
+  Accessor accessor(std::size_t index, std::size_t components) const;
+  void parse(std::span<const std::byte> text);
+  void load_buffers(std::vector<std::byte> binary);
+
+  std::filesystem::path file_;
+  Json root_;
+  std::vector<std::vector<std::byte>> buffers_;
+};
+
+}  // namespace esim

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "esim/scene/import/scene_graph.h"
+
+namespace esim {
+
+/// A graph as bytes, to hand it from one process to another of the same program.
+std::string to_bytes(const SceneGraph& graph);
+
+/// Throws InternalError for bytes that are no graph.
+SceneGraph graph_from_bytes(std::string_view bytes);
+
+}  // namespace esim

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <tuple>
+#include <vector>
+
+#include "esim/scene/import/scene_graph.h"
+#include "esim/scene/planes.h"
+
+namespace esim {
+
+/// Decodes the images of a scene, each once per way in which it is used.
+class TextureStore {
+ public:
+  TextureStore(const SceneGraph& graph, std::filesystem::path folder, const WarningHandler& warn)
+      : graph_(graph), folder_(std::move(folder)), warn_(warn) {}
+
+  /// The luminance of an image whose colours are multiplied by `factor`. Null where the slot holds no texture, and,
+  /// after a warning that names the material, where its image is missing, forbidden or unreadable.
+  std::shared_ptr<const Texture> get(const GraphTexture& slot, const Eigen::Vector3f& factor,
+                                     const std::string& material);
+
+  /// Images that were decoded.
+  std::size_t image_count() const { return image_count_; }
+
+ private:
+  Planes decoded(const GraphImage& image, bool colour);
+
+  const SceneGraph& graph_;
+  std::filesystem::path folder_;
+  const WarningHandler& warn_;
+  std::map<std::tuple<std::int32_t, Wrap, Wrap, std::array<float, 3>>, std::shared_ptr<const Texture>> textures_;
+  std::size_t image_count_ = 0, texel_count_ = 0;
+};
+
+}  // namespace esim

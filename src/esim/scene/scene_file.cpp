@@ -1,0 +1,72 @@
+#include "esim/scene/scene_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numbers>
+#include <set>
+
+#include "esim/scene/import/flatten.h"
+
+namespace esim {
+namespace {
+
+SceneGraph read_graph(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) fail_scene(path, "no such file");
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  if (extension == ".gltf" || extension == ".glb") return read_gltf(path);
+  for (const char* const known : {".obj", ".ply", ".stl", ".fbx", ".dae"}) {
+    if (extension == known) return read_with_assimp(path);
+  }
+  fail_scene(path, "its format is not known; use GLB, glTF, OBJ, PLY, STL, FBX, Collada (.dae) or Blender's (.blend)");
+}
+
+std::string counted(std::size_t count, const char* singular, const char* plural) {
+  return fmt::format("{} {}", count, count == 1 ? singular : plural);
+}
+
+}  // namespace
+
+SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandler& warn) {
+  return flatten(read_graph(path), path, warn);
+}
+
+Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn) {
+  return flatten_still(read_graph(path), path, warn);
+}
+
+std::string summary(const SceneFile& file) {
+  std::size_t triangles = 0;
+  for (const SceneObject& object : file.scene.objects) triangles += object.mesh.triangles.size();
+  std::set<std::uint32_t> used;  // all objects have the same list
+  for (const SceneObject& object : file.scene.objects)
+    used.insert(object.mesh.material.begin(), object.mesh.material.end());
+  std::string text =
+      fmt::format("{}, {}, {}", counted(triangles, "triangle", "triangles"),
+                  counted(used.size(), "material", "materials"), counted(file.image_count, "texture", "textures"));
+
+  std::string names;
+  for (const SceneObject& object : file.scene.objects) {
+    if (object.moves) names += (names.empty() ? "" : ", ") + object.name;
+  }
+  text += names.empty() ? "; nothing moves"
+                        : fmt::format("; moving {}: {}", counted(file.motions.size(), "object", "objects"), names);
+  if (file.animation.end > file.animation.start) {
+    text += fmt::format("; animation from {:.3f} to {:.3f} s", to_seconds(file.animation.start),
+                        to_seconds(file.animation.end));
+  }
+  std::string cameras;
+  for (const SceneCamera& camera : file.cameras) {
+    cameras += (cameras.empty() ? "" : ", ") + camera.name;
+    if (camera.horizontal_fov_rad)
+      cameras += fmt::format(" ({:.1f} deg)", *camera.horizontal_fov_rad * 180 / std::numbers::pi);
+    if (camera.motion.size() > 1) cameras += " moving";
+  }
+  return text + (cameras.empty() ? "; no cameras"
+                                 : fmt::format("; {}: {}", file.cameras.size() == 1 ? "camera" : "cameras", cameras));
+}
+
+}  // namespace esim

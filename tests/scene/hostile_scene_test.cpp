@@ -1,0 +1,257 @@
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+
+#include "esim/core/error.h"
+#include "esim/scene/image_file.h"
+#include "esim/scene/scene_file.h"
+#include "glb_writer.h"
+#include "support/errors.h"
+#include "support/temporary_directory.h"
+
+namespace esim {
+namespace {
+
+using test::GlbWriter;
+using test::TemporaryDirectory;
+
+/// The one line with which a scene is refused.
+std::string refusal(const std::filesystem::path& path) {
+  const std::string message = test::message_of<UserError>([&] { load_scene_file(path, [](const std::string&) {}); });
+  EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+  EXPECT_TRUE(test::contains(message, path.filename().string()));
+  return message;
+}
+
+std::string refusal(const GlbWriter& glb) {
+  const TemporaryDirectory folder;
+  return refusal(folder.write("scene.glb", glb.bytes()));
+}
+
+GlbWriter plain() {
+  GlbWriter glb;
+  glb.add_node({{"mesh", glb.add_triangle()}});
+  return glb;
+}
+
+TEST(HostileScene, GltfThatLiesIsRefused) {
+  GlbWriter out_of_range = plain();
+  out_of_range.json["meshes"][0]["primitives"][0]["indices"] = out_of_range.indices({0, 1, 9});
+  EXPECT_TRUE(test::contains(refusal(out_of_range), "a vertex that is not there"));
+
+  GlbWriter absurd = plain();
+  absurd.json["accessors"][0]["count"] = 4'000'000'000U;
+  EXPECT_TRUE(test::contains(refusal(absurd), "beyond the end of its bufferView"));
+
+  GlbWriter beyond = plain();
+  beyond.json["bufferViews"][0]["byteOffset"] = 4'294'967'295U;
+  EXPECT_TRUE(test::contains(refusal(beyond), "beyond the end of its buffer"));
+
+  GlbWriter strange = plain();
+  strange.json["meshes"][0]["primitives"][0]["indices"] = -1;
+  EXPECT_TRUE(test::contains(refusal(strange), "is damaged"));
+
+  GlbWriter circular = plain();
+  circular.json["nodes"][0]["children"] = {0};
+  EXPECT_TRUE(test::contains(refusal(circular), "two parents"));
+
+  GlbWriter not_finite;
+  nlohmann::json primitive = {
+      {"attributes",
+       {{"POSITION", not_finite.floats({0, 0, 0, 1, 0, 0, 0, std::numeric_limits<float>::quiet_NaN(), 0}, "VEC3")}}}};
+  not_finite.add("meshes", {{"primitives", {primitive}}});
+  not_finite.add_node({{"mesh", 0}});
+  EXPECT_TRUE(test::contains(refusal(not_finite), "not finite"));
+
+  GlbWriter compressed = plain();
+  compressed.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
+  EXPECT_TRUE(test::contains(refusal(compressed), "KHR_draco_mesh_compression"));
+
+  GlbWriter empty;
+  EXPECT_TRUE(test::contains(refusal(empty), "no triangles"));
+}
+
+TEST(HostileScene, ASmallFileCannotAskForManyTriangles) {
+  GlbWriter glb;
+  std::vector<std::uint16_t> corners(30'000);
+  for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = static_cast<std::uint16_t>(i % 3);
+  const std::size_t mesh = glb.add_triangle();
+  glb.json["meshes"][mesh]["primitives"][0]["indices"] = glb.indices(corners);
+  for (int i = 0; i < 2000; ++i) glb.add_node({{"mesh", mesh}});  // 20 million triangles
+  EXPECT_TRUE(test::contains(refusal(glb), "triangles; simplify it"));
+}
+
+TEST(HostileScene, ObjThatLiesIsRefused) {
+  const TemporaryDirectory folder;
+  EXPECT_TRUE(test::contains(refusal(folder.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 900\n")), "a.obj"));
+  EXPECT_TRUE(test::contains(refusal(folder.write("b.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n")), "not finite"));
+  EXPECT_TRUE(test::contains(refusal(folder.write("c.obj", "")), "c.obj"));
+  EXPECT_TRUE(test::contains(refusal(folder.write("d.xyz", "")), "format is not known"));
+  EXPECT_TRUE(test::contains(refusal(folder.path() / "none.glb"), "no such file"));
+}
+
+/// Warnings of an OBJ file whose only texture has this name.
+std::vector<std::string> warnings_of_texture(const TemporaryDirectory& folder, const std::string& name) {
+  std::filesystem::create_directories(folder.path() / "scene");
+  folder.write("scene/a.mtl", "newmtl paint\nmap_Kd " + name + "\n");
+  const auto obj =
+      folder.write("scene/a.obj", "mtllib a.mtl\nusemtl paint\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n");
+  std::vector<std::string> warnings;
+  const SceneFile file = load_scene_file(obj, [&](const std::string& text) { warnings.push_back(text); });
+  EXPECT_FLOAT_EQ(file.scene.objects.at(0).mesh.materials.at(file.scene.objects[0].mesh.material[0]).base, 0.2F)
+      << name;
+  return warnings;
+}
+
+TEST(HostileScene, TexturesComeFromTheScenesFolderOnly) {
+  const TemporaryDirectory folder;
+  cv::imwrite((folder.path() / "secret.png").string(), cv::Mat(2, 2, CV_8UC3, cv::Scalar(1, 2, 3)));
+  const std::string absolute = (folder.path() / "secret.png").string();
+  for (const std::string& name : {std::string("../secret.png"), absolute, "file://" + absolute,
+                                  std::string("../../../../../etc/passwd"), std::string("x/../../secret.png")}) {
+    const auto warnings = warnings_of_texture(folder, name);
+    ASSERT_EQ(warnings.size(), 1U) << name;
+    EXPECT_TRUE(test::contains(warnings[0], "paint")) << name;
+  }
+  std::filesystem::create_symlink(absolute, folder.path() / "scene" / "link.png");
+  EXPECT_EQ(warnings_of_texture(folder, "link.png").size(), 1U);
+  EXPECT_TRUE(test::contains(warnings_of_texture(folder, "gone.png").at(0), "no such file"));
+}
+
+TEST(HostileScene, GltfReadsNoFilesElsewhere) {
+  const TemporaryDirectory folder;
+  folder.write("secret.bin", std::string(1000, '\0'));
+  std::filesystem::create_directories(folder.path() / "scene");
+  for (const char* const uri : {"../secret.bin", "%2e%2e/secret.bin", "file:///etc/passwd", "/etc/passwd"}) {
+    const nlohmann::json json = {{"asset", {{"version", "2.0"}}}, {"buffers", {{{"uri", uri}, {"byteLength", 4}}}}};
+    EXPECT_TRUE(test::contains(refusal(folder.write("scene/a.gltf", json.dump())), "its buffer")) << uri;
+  }
+}
+
+std::string png_header(std::uint32_t width, std::uint32_t height) {
+  const auto big_endian = [](std::uint32_t v) {
+    return std::string{static_cast<char>(v >> 24), static_cast<char>(v >> 16), static_cast<char>(v >> 8),
+                       static_cast<char>(v)};
+  };
+  return "\x89PNG\r\n\x1a\n" + std::string("\0\0\0\rIHDR", 8) + big_endian(width) + big_endian(height) +
+         std::string("\x08\x02\0\0\0", 5) + std::string(40, '\0');
+}
+
+TEST(HostileImage, AbsurdSizesAreRefusedBeforeDecoding) {
+  const TemporaryDirectory folder;
+  const auto message = [&](const std::string& name, const std::string& content) {
+    return test::message_of<UserError>([&] { load_luminance(folder.write(name, content)); });
+  };
+  EXPECT_TRUE(test::contains(message("a.png", png_header(100'000, 100'000)), "100000x100000 pixels"));
+  EXPECT_TRUE(test::contains(message("b.png", png_header(16'000, 16'000)), "cut off or damaged"));
+
+  std::vector<unsigned char> jpeg;
+  cv::imencode(".jpg", cv::Mat(8, 8, CV_8UC3, cv::Scalar(1, 2, 3)), jpeg);
+  std::string text(jpeg.begin(), jpeg.end());
+  const std::size_t frame = text.find("\xFF\xC0");
+  text.replace(frame + 5, 4, "\xFF\xFF\xFF\xFF");
+  EXPECT_TRUE(test::contains(message("a.jpg", text), "65535x65535 pixels"));
+
+  std::vector<unsigned char> tiff;
+  cv::imencode(".tif", cv::Mat(8, 8, CV_8UC3, cv::Scalar(1, 2, 3)), tiff);
+  std::string tiff_text(tiff.begin(), tiff.end());
+  const std::string width_entry("\x00\x01", 2);  // tag 256
+  std::size_t at = tiff_text.find(width_entry + std::string("\x03\x00\x01\x00\x00\x00\x08\x00", 8));
+  if (at != std::string::npos) {
+    tiff_text.replace(at + 2, 2, std::string("\x04\x00", 2));
+    tiff_text.replace(at + 8, 4, "\xFF\xFF\xFF\x7F");
+    EXPECT_TRUE(test::contains(message("a.tif", tiff_text), "pixels are not supported"));
+  }
+  EXPECT_TRUE(test::contains(message("a.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 100000 +X 100000\n"),
+                             "100000x100000 pixels"));
+}
+
+/// Reads damaged copies of a file in another process, which may take 2 GiB; each is read, or refused with one line.
+void survives_damage(const std::string& name, const std::string& content,
+                     const std::function<void(const std::filesystem::path&)>& read, int cases = 300) {
+  const TemporaryDirectory folder;
+  const pid_t copy = fork();
+  ASSERT_GE(copy, 0);
+  if (copy == 0) {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    const rlimit limit{rlim_t{1} << 31, rlim_t{1} << 31};
+    setrlimit(RLIMIT_AS, &limit);
+#endif
+    if (std::freopen("/dev/null", "w", stderr) == nullptr) _exit(4);  // decoders complain there
+    std::uint64_t state = 1;
+    const auto random = [&](std::size_t below) {
+      state = state * 6364136223846793005U + 1442695040888963407U;
+      return static_cast<std::size_t>(state >> 33) % below;
+    };
+    for (int i = 0; i < cases; ++i) {
+      std::string damaged = content;
+      if (i % 4 == 0) damaged.resize(random(damaged.size()));
+      for (std::size_t flips = i % 4 == 0 ? 0 : 1 + random(8); flips > 0; --flips)
+        damaged[random(damaged.size())] ^= static_cast<char>(1U << random(8));
+      const auto path = folder.write(name, damaged);
+      try {
+        read(path);
+      } catch (const UserError& error) {
+        if (std::string(error.what()).find('\n') != std::string::npos) _exit(2);
+      } catch (...) {
+        _exit(3);
+      }
+    }
+    _exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(copy, &status, 0), copy);
+  EXPECT_TRUE(WIFEXITED(status)) << "ended by signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), 0) << "2: more than one line; 3: not the user's fault";
+}
+
+void read_scene(const std::filesystem::path& path) {
+  load_scene_file(path, [](const std::string&) {});
+}
+
+std::string png() {
+  cv::Mat image(16, 16, CV_8UC3);
+  cv::randu(image, 0, 255);
+  std::vector<unsigned char> bytes;
+  cv::imencode(".png", image, bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
+TEST(HostileScene, DamagedGlbIsReadOrRefused) {
+  GlbWriter glb;
+  const std::string image = png();
+  glb.add("images", {{"bufferView", glb.add_view(image.data(), image.size())}});
+  glb.add("textures", {{"source", 0}});
+  glb.add("materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
+  glb.add("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", 1.0}, {"aspectRatio", 2.0}}}});
+  glb.add_node({{"camera", 0}});
+  const std::size_t node = glb.add_node({{"mesh", glb.add_triangle(0)}});
+  glb.animate(node, "rotation", {0, 1, 2}, {0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 1});
+  survives_damage("scene.glb", glb.bytes(), read_scene);
+}
+
+TEST(HostileScene, DamagedObjIsReadOrRefused) {
+  std::string obj = "mtllib none.mtl\no thing\n";
+  for (int i = 0; i < 20; ++i) obj += "v 0.5 " + std::to_string(i) + " 1\nvt 0.5 0.25\nvn 0 0 1\n";
+  for (int i = 1; i < 18; ++i) {
+    const auto corner = [&](int k) {
+      return " " + std::to_string(i + k) + "/" + std::to_string(i) + "/" + std::to_string(i);
+    };
+    obj += "f" + corner(0) + corner(1) + corner(2) + "\n";
+  }
+  survives_damage("scene.obj", obj, read_scene, 150);  // a process each
+}
+
+TEST(HostileImage, DamagedPngIsReadOrRefused) {
+  survives_damage("image.png", png(), [](const std::filesystem::path& path) { load_luminance(path); });
+}
+
+}  // namespace
+}  // namespace esim

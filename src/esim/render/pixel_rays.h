@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 
 #include "esim/core/image.h"
 #include "esim/geometry/camera.h"
@@ -39,42 +40,33 @@ struct PixelRays {
   PixelTable dx_du, dx_dv, dy_du, dy_dv;
 };
 
-/// The rays of K pixels, one array per quantity, for loops that compile to SIMD code.
+/// The rays of K neighbouring pixels of a row, one array per quantity, for loops that compile to SIMD code. Where a row
+/// has fewer, the last one is repeated.
 template <int K>
-struct RayLanes {
-  alignas(64) std::array<float, K> x, y;
-  alignas(64) std::array<float, K> dx_du, dx_dv, dy_du, dy_dv;
-
-  /// Takes Count pixels of a row, from column `first` on, into lanes [lane, lane + Count).
-  template <int Count>
-  void load(const PixelRays& rays, int first, int row, int lane) {
-    for_each_table(rays, [&](const PixelTable& table, std::array<float, K>& lanes) {
-      std::copy_n(table.row(row) + first, Count, lanes.data() + lane);
-    });
-  }
-
-  /// The same for any number of them; lanes up to lane + room repeat the last one.
-  void load(const PixelRays& rays, int first, int row, int lane, int count, int room) {
-    for_each_table(rays, [&](const PixelTable& table, std::array<float, K>& lanes) {
-      for (int i = 0; i < room; ++i)
-        lanes[static_cast<unsigned>(lane + i)] = table(first + std::min(i, count - 1), row);
-    });
-  }
-
-  /// Fills all lanes with a span of a row.
-  void load_span(const PixelRays& rays, int first, int row, int count) {
-    if (count == K) {
-      load<K>(rays, first, row, 0);
-    } else {
-      load(rays, first, row, 0, count, K);
-    }
-  }
+class RayLanes {
+ public:
+  RayLanes(const PixelRays& rays, int first, int row, int count)
+      : x(take(rays.x, first, row, count, 0)),
+        y(take(rays.y, first, row, count, 1)),
+        dx_du(take(rays.dx_du, first, row, count, 2)),
+        dx_dv(take(rays.dx_dv, first, row, count, 3)),
+        dy_du(take(rays.dy_du, first, row, count, 4)),
+        dy_dv(take(rays.dy_dv, first, row, count, 5)) {}
+  RayLanes(const RayLanes&) = delete;
+  RayLanes& operator=(const RayLanes&) = delete;
 
  private:
-  template <typename Body>
-  void for_each_table(const PixelRays& rays, const Body& body) {
-    body(rays.x, x), body(rays.y, y);
-    body(rays.dx_du, dx_du), body(rays.dx_dv, dx_dv), body(rays.dy_du, dy_du), body(rays.dy_dv, dy_dv);
+  std::array<std::array<float, K>, 6> copies_;
+
+ public:
+  const float *const x, *const y;
+  const float *const dx_du, *const dx_dv, *const dy_du, *const dy_dv;
+
+ private:
+  const float* take(const PixelTable& table, int first, int row, int count, std::size_t copy) {
+    if (count == K) return table.row(row) + first;
+    for (int i = 0; i < K; ++i) copies_[copy][static_cast<std::size_t>(i)] = table(first + std::min(i, count - 1), row);
+    return copies_[copy].data();
   }
 };
 

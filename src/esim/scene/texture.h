@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "esim/core/image.h"
@@ -48,7 +49,7 @@ class Texture {
 
  private:
   static constexpr int kMaxLevels = 18;
-  static constexpr float kMaxProbes = 4;
+  static constexpr int kMaxProbes = 4;
 
   // A code is the upper 16 bits of value / scale_ as a float, less those that are the same in all: see encode().
   static constexpr int kCodeShift = 12;
@@ -61,7 +62,21 @@ class Texture {
     I offset, row_stride;  // bytes
   };
 
+  /// How pixels' footprints lie on the texture.
+  template <class V>
+  struct Footprint {
+    V step_u, step_v;     // the longer side
+    V probes, per_probe;  // along it; 1 / probes
+    V lod;                // level of the mip pyramid
+  };
+
   std::uint16_t encode(float value) const;
+  template <class D, class Lookup>
+  auto sides2(D d, const Lookup& at, std::size_t i) const;
+  template <class D, class Lookup>
+  auto largest_side2(D d, const Lookup& at, std::size_t i) const;
+  template <class D, class Lookup>
+  auto footprint(D d, const Lookup& at, std::size_t i) const;
   template <class D, class I>
   auto grid(D d, I level) const;
   template <class D, class V>
@@ -89,58 +104,98 @@ std::array<float, K> Texture::sample(const TextureLookup<K>& at, std::uint32_t l
   constexpr std::size_t kVector = hn::MaxLanes(decltype(d)());
   const hn::RebindToSigned<decltype(d)> di;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0F);
-  const V w = hn::Set(d, level_width_[0]), h = hn::Set(d, level_height_[0]);
   alignas(64) std::array<float, K> result;
 
-  for (std::size_t i = 0; i < K; i += kVector) {
-    if ((lanes >> i & ((std::uint64_t{1} << kVector) - 1)) == 0) continue;
+  const auto skips = [lanes](std::size_t i) { return (lanes >> i & ((std::uint64_t{1} << kVector) - 1)) == 0; };
 
-    // The footprint's sides in texels; probes go along the longer one, the shorter one sets the blur.
-    const V du_dx = hn::Load(d, &at.du_dx[i]), dv_dx = hn::Load(d, &at.dv_dx[i]);
-    const V du_dy = hn::Load(d, &at.du_dy[i]), dv_dy = hn::Load(d, &at.dv_dy[i]);
-    const auto squared_length = [&](V du, V dv) {
-      const V a = hn::Mul(du, w), b = hn::Mul(dv, h);
-      return hn::MulAdd(a, a, hn::Mul(b, b));
-    };
-    const V x2 = squared_length(du_dx, dv_dx), y2 = squared_length(du_dy, dv_dy);
-    if (hn::AllTrue(d, hn::Le(hn::Max(x2, y2), one))) {
-      // Seen from close by: footprints within a texel, where the rest comes to the same.
+  V largest2 = zero;
+  for (std::size_t i = 0; i < K; i += kVector) largest2 = hn::Max(largest2, largest_side2(d, at, i));
+  if (hn::AllTrue(d, hn::Le(largest2, one))) {
+    // Seen from close by: footprints within a texel, where the rest comes to the same.
+    const auto finest = grid(d, hn::Zero(di));
+    for (std::size_t i = 0; i < K; i += kVector) {
+      if (skips(i)) continue;
       const V u = wrapped(d, hn::Load(d, &at.u[i]), wrap_u_), v = wrapped(d, hn::Load(d, &at.v[i]), wrap_v_);
-      hn::Store(hn::Mul(bilinear(d, u, v, grid(d, hn::Zero(di))), hn::Set(d, scale_)), d, &result[i]);
-      continue;
+      hn::Store(hn::Mul(bilinear(d, u, v, finest), hn::Set(d, scale_)), d, &result[i]);
     }
-    const auto along_x = hn::Ge(x2, y2);
-    // Squared, which spares roots. The upper bound keeps a degenerate footprint (a pole, a horizon) finite.
-    const V major2 = hn::Min(hn::IfThenElse(along_x, x2, y2), hn::Set(d, 1e12F));
-    const V minor2 = hn::Max(hn::IfThenElse(along_x, y2, x2), hn::Set(d, 1e-12F));
-    const V ratio = hn::Sqrt(hn::Min(major2, hn::Div(major2, minor2)));  // one texel is the finest that is resolved
-    const V probes = hn::Min(hn::Max(hn::Ceil(hn::Sub(ratio, hn::Set(d, 0.25F))), one), hn::Set(d, kMaxProbes));
-    const V per_probe = hn::Div(one, probes);
+    return result;
+  }
 
-    // The two levels on either side of the blur.
-    const V blur2 = hn::Max(hn::Max(hn::Mul(major2, hn::Mul(per_probe, per_probe)), minor2), one);
-    const V lod =
-        hn::Min(hn::Mul(binary_logarithm(d, blur2), hn::Set(d, 0.5F)), hn::Set(d, static_cast<float>(levels_ - 1)));
-    const auto finer = to_integer(d, hn::Floor(lod));
+  // Of all vectors first, so that none waits for the other.
+  std::array<Footprint<V>, K / kVector> footprints;
+  for (std::size_t i = 0; i < K; i += kVector) footprints[i / kVector] = footprint(d, at, i);
+  for (std::size_t i = 0; i < K; i += kVector) {
+    if (skips(i)) continue;
+    const Footprint<V>& f = footprints[i / kVector];
+    const V at_u = hn::Load(d, &at.u[i]), at_v = hn::Load(d, &at.v[i]);
+    const auto finer = to_integer(d, hn::Floor(f.lod));
     const auto coarser = hn::Min(hn::Add(finer, hn::Set(di, 1)), hn::Set(di, levels_ - 1));
-    const V fraction = hn::Sub(lod, hn::ConvertTo(d, finer));
+    const V fraction = hn::Sub(f.lod, hn::Floor(f.lod));
     const bool blend = !hn::AllTrue(d, hn::Eq(fraction, zero));
     const auto fine = grid(d, finer), coarse = grid(d, coarser);
 
-    const V step_u = hn::IfThenElse(along_x, du_dx, du_dy), step_v = hn::IfThenElse(along_x, dv_dx, dv_dy);
-    const float most_probes = hn::GetLane(hn::MaxOfLanes(d, probes));
+    const float most_probes = hn::GetLane(hn::MaxOfLanes(d, f.probes));
     V sum = zero;
     for (float probe = 0; probe < most_probes; ++probe) {
-      const V offset = hn::Sub(hn::Mul(hn::Set(d, probe + 0.5F), per_probe), hn::Set(d, 0.5F));
-      const V u = wrapped(d, hn::MulAdd(offset, step_u, hn::Load(d, &at.u[i])), wrap_u_);
-      const V v = wrapped(d, hn::MulAdd(offset, step_v, hn::Load(d, &at.v[i])), wrap_v_);
+      const V offset = hn::Sub(hn::Mul(hn::Set(d, probe + 0.5F), f.per_probe), hn::Set(d, 0.5F));
+      const V u = wrapped(d, hn::MulAdd(offset, f.step_u, at_u), wrap_u_);
+      const V v = wrapped(d, hn::MulAdd(offset, f.step_v, at_v), wrap_v_);
       V value = bilinear(d, u, v, fine);
       if (blend) value = hn::MulAdd(fraction, hn::Sub(bilinear(d, u, v, coarse), value), value);
-      sum = hn::MulAdd(hn::IfThenElseZero(hn::Lt(hn::Set(d, probe), probes), per_probe), value, sum);
+      sum = hn::MulAdd(hn::IfThenElseZero(hn::Lt(hn::Set(d, probe), f.probes), f.per_probe), value, sum);
     }
     hn::Store(hn::Mul(sum, hn::Set(d, scale_)), d, &result[i]);
   }
   return result;
+}
+
+/// Squares of the sides of the footprints of the lanes from i on, texels: rightwards and downwards.
+template <class D, class Lookup>
+auto Texture::sides2(D d, const Lookup& at, std::size_t i) const {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const auto squared_length = [&](const auto& du, const auto& dv) {
+    const auto a = hn::Mul(hn::Load(d, &du[i]), hn::Set(d, level_width_[0]));
+    const auto b = hn::Mul(hn::Load(d, &dv[i]), hn::Set(d, level_height_[0]));
+    return hn::MulAdd(a, a, hn::Mul(b, b));
+  };
+  return std::pair(squared_length(at.du_dx, at.dv_dx), squared_length(at.du_dy, at.dv_dy));
+}
+
+template <class D, class Lookup>
+auto Texture::largest_side2(D d, const Lookup& at, std::size_t i) const {
+  const auto [x2, y2] = sides2(d, at, i);
+  return hwy::HWY_NAMESPACE::Max(x2, y2);
+}
+
+/// Of the lanes from i on: probes go along the longer side, the shorter one sets the blur.
+template <class D, class Lookup>
+auto Texture::footprint(D d, const Lookup& at, std::size_t i) const {
+  namespace hn = hwy::HWY_NAMESPACE;
+  using V = hn::Vec<D>;
+  const V one = hn::Set(d, 1.0F);
+  const V du_dx = hn::Load(d, &at.du_dx[i]), dv_dx = hn::Load(d, &at.dv_dx[i]);
+  const V du_dy = hn::Load(d, &at.du_dy[i]), dv_dy = hn::Load(d, &at.dv_dy[i]);
+  const auto [x2, y2] = sides2(d, at, i);
+  const auto along_x = hn::Ge(x2, y2);
+  Footprint<V> f;
+  f.step_u = hn::IfThenElse(along_x, du_dx, du_dy), f.step_v = hn::IfThenElse(along_x, dv_dx, dv_dy);
+
+  // One texel is the finest that is resolved: a probe more when the longer side is 1.25, 2.25 and 3.25 times that or
+  // the shorter one. Squared, which spares roots. The upper bound keeps a degenerate footprint (a pole, a horizon)
+  // finite.
+  static_assert(kMaxProbes == 4);
+  const V major2 = hn::Min(hn::Max(x2, y2), hn::Set(d, 1e12F)), minor2 = hn::Max(hn::Min(x2, y2), one);
+  const auto longer_than = [&](float times) { return hn::Gt(major2, hn::Mul(minor2, hn::Set(d, times * times))); };
+  const auto two = longer_than(1.25F), three = longer_than(2.25F), four = longer_than(3.25F);
+  const auto choose = [&](float for_two, float for_three, float for_four) {
+    const V least = hn::IfThenElse(two, hn::Set(d, for_two), one);
+    return hn::IfThenElse(four, hn::Set(d, for_four), hn::IfThenElse(three, hn::Set(d, for_three), least));
+  };
+  f.probes = choose(2, 3, 4), f.per_probe = choose(1.0F / 2, 1.0F / 3, 1.0F / 4);
+  const V blur2 = hn::Max(hn::Mul(major2, hn::Mul(f.per_probe, f.per_probe)), minor2);
+  const V lod = hn::Mul(binary_logarithm(d, blur2), hn::Set(d, 0.5F));
+  f.lod = hn::Min(lod, hn::Set(d, static_cast<float>(levels_ - 1)));
+  return f;
 }
 
 /// Of whole numbers from 0 to 2^22: those are the last bits of what is 2^23 larger. A general conversion takes thrice

@@ -58,8 +58,7 @@ class PanoramaRenderer final : public Renderer {
 
  private:
   void shade(const Eigen::Matrix3f& R, int first, int row, int count, Sample& sample) const {
-    RayLanes<kLanes> rays;
-    rays.load_span(rays_, first, row, count);
+    const RayLanes<kLanes> rays(rays_, first, row, count);
     TextureLookup<kLanes> at;
     const float r00 = R(0, 0), r01 = R(0, 1), r02 = R(0, 2);
     const float r10 = R(1, 0), r11 = R(1, 1), r12 = R(1, 2);

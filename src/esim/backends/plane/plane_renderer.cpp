@@ -40,8 +40,7 @@ class PlaneRenderer final : public Renderer {
   };
 
   void shade(const View& view, int first, int row, int count, Sample& sample) const {
-    RayLanes<kLanes> rays;
-    rays.load_span(rays_, first, row, count);
+    const RayLanes<kLanes> rays(rays_, first, row, count);
     TextureLookup<kLanes> at;
     alignas(64) std::array<float, kLanes> depth;
     const Eigen::Matrix3f& R = view.R_poster_camera;

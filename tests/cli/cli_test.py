@@ -101,6 +101,14 @@ class Recordings(Cli):
                             "gl_device", "30")
         self.assert_refused(run("check", room, "--set", "renderer.engine=vulkan"), "renderer.engine", "raycast, gl")
 
+    def test_without_egl_says_what_to_install_and_the_ray_caster_works(self):
+        nothing = {**os.environ, "__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}
+        room = SCENES / "room.yaml"
+        self.assert_refused(run("check", room, "--set", "renderer.engine=gl", env=nothing), "libegl1", "raycast")
+        for engine in ("auto", "raycast"):
+            result = run("check", room, "--set", f"renderer.engine={engine}", env=nothing)
+            self.assertEqual(result.returncode, 0, result.stderr)
+
     def test_info_and_check_and_options(self):
         self.simulate(*FAST)
         for path in (self.out, self.out / "events.h5"):

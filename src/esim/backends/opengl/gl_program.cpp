@@ -8,17 +8,24 @@
 namespace esim {
 namespace {
 
+/// Throws unless `status` of a shader or program is good; `get` and `get_log` are OpenGL's functions for its kind.
+template <typename Get, typename GetLog>
+void require(GLuint name, GLenum status, const Get& get, const GetLog& get_log, const char* problem) {
+  GLint good = GL_FALSE, length = 0;
+  get(name, status, &good);
+  if (good == GL_TRUE) return;
+  get(name, GL_INFO_LOG_LENGTH, &length);
+  std::vector<char> log(static_cast<std::size_t>(length) + 1);
+  get_log(name, length, nullptr, log.data());
+  throw InternalError(std::string("gl: ") + problem + ": " + log.data());
+}
+
 GLuint compile(GLenum type, const char* source) {
   const GLuint shader = glCreateShader(type);
   glShaderSource(shader, 1, &source, nullptr);
   glCompileShader(shader);
-  GLint good = GL_FALSE, length = 0;
-  glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
-  if (good == GL_TRUE) return shader;
-  glGetShaderiv(shader, GL_INFO_LOG_LENGTH, &length);
-  std::vector<char> log(static_cast<std::size_t>(length) + 1);
-  glGetShaderInfoLog(shader, length, nullptr, log.data());
-  throw InternalError(std::string("gl: a shader does not compile: ") + log.data());
+  require(shader, GL_COMPILE_STATUS, glGetShaderiv, glGetShaderInfoLog, "a shader does not compile");
+  return shader;
 }
 
 }  // namespace
@@ -30,13 +37,8 @@ GLuint make_program(const char* vertex_source, const char* fragment_source) {
     glDeleteShader(shader);
   }
   glLinkProgram(program);
-  GLint good = GL_FALSE, length = 0;
-  glGetProgramiv(program, GL_LINK_STATUS, &good);
-  if (good == GL_TRUE) return program;
-  glGetProgramiv(program, GL_INFO_LOG_LENGTH, &length);
-  std::vector<char> log(static_cast<std::size_t>(length) + 1);
-  glGetProgramInfoLog(program, length, nullptr, log.data());
-  throw InternalError(std::string("gl: a program does not link: ") + log.data());
+  require(program, GL_LINK_STATUS, glGetProgramiv, glGetProgramInfoLog, "a program does not link");
+  return program;
 }
 
 // Row y of a target is row y of the image: nothing is turned over. Depth is reversed (1 at the near plane, 0 at

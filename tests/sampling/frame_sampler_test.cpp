@@ -1,9 +1,11 @@
-#include "esim/sampling/frame_sampler.h"
+#include "esim/sampling/make_sampler.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
+
+#include "esim/sampling/criterion.h"
 
 namespace esim {
 namespace {
@@ -32,7 +34,7 @@ class EverySampler : public testing::TestWithParam<SamplingOptions> {};
 // The contract of Sampler: first sample at the start, last at the end, contiguous segments, a watermark that keeps up.
 TEST_P(EverySampler, KeepsItsContract) {
   const TimeSpan span{-3 * kNsPerMs, 17 * kNsPerMs + 123};
-  const auto sampler = make_frame_sampler(GetParam(), {}, kWidth, kHeight, span, kWorkers);
+  const auto sampler = make_sampler(GetParam(), {{}, kWidth, kHeight, span, kWorkers});
   EXPECT_EQ(sampler->watermark(), span.start);
   TimeNs last = span.start;
   std::int64_t samples = 0;
@@ -92,7 +94,7 @@ TEST(BrightnessSampling, SeesTheImagesBorder) {
 }
 
 std::vector<TimeNs> sample_times(const SamplingOptions& options, float speed, TimeNs end) {
-  const auto sampler = make_frame_sampler(options, {}, kWidth, kHeight, {0, end}, kWorkers);
+  const auto sampler = make_sampler(options, {{}, kWidth, kHeight, {0, end}, kWorkers});
   std::vector<TimeNs> times;
   while (const auto request = sampler->next()) {
     Sample sample = moving_ramp(request->t, 0.1F, speed, 0, 0.001);
@@ -112,8 +114,7 @@ TEST(FrameSampler, KeepsToItsRates) {
 }
 
 TEST(FrameSampler, CountsIntervalsHeldToTheGreatestRate) {
-  const auto sampler =
-      make_frame_sampler(FlowSampling{0.5, {10, 1000}}, {}, kWidth, kHeight, {0, 5 * kNsPerMs}, kWorkers);
+  const auto sampler = make_sampler(FlowSampling{0.5, {10, 1000}}, {{}, kWidth, kHeight, {0, 5 * kNsPerMs}, kWorkers});
   while (const auto request = sampler->next()) {
     Sample sample = moving_ramp(request->t, 0.1F, 1e6F, 0, 0.001);
     sampler->accept(sample);

@@ -6,7 +6,7 @@
 
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
-#include "esim/sampling/frame_sampler.h"
+#include "esim/sampling/make_sampler.h"
 #include "esim/scenario/read.h"
 
 namespace esim {
@@ -115,7 +115,7 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices)
     const SensorTraits traits{std::min(sensor.threshold_on(), sensor.threshold_off()), sensor.log_eps};
     world.cameras.push_back(
         {make_renderer(model, *world.workers),
-         make_frame_sampler(options.sampling, traits, model.width, model.height, span, *world.workers),
+         make_sampler(options.sampling, {traits, model.width, model.height, span, *world.workers}),
          EventCamera(sensor, model.width, model.height, scenario.seed, static_cast<std::uint16_t>(i)),
          {}});
     require_a_view(world, i);

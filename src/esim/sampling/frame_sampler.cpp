@@ -3,20 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "esim/sampling/criterion.h"
+
 namespace esim {
 namespace {
 
 class FrameSampler final : public Sampler {
  public:
-  FrameSampler(const SamplingOptions& options, const SensorTraits& sensor, int width, int height, const TimeSpan& span,
-               const Workers& workers)
-      : options_(options),
-        sensor_(sensor),
-        image_{0, 0, width, height},
-        span_(span),
-        workers_(workers),
-        request_(SampleRequest{span.start, {image_}}),
-        watermark_(span.start) {}
+  FrameSampler(const FrameScheme& scheme, const SamplingContext& context)
+      : scheme_(scheme),
+        context_(context),
+        image_{0, 0, context.width, context.height},
+        request_(SampleRequest{context.span.start, {image_}}),
+        watermark_(context.span.start) {}
 
   std::optional<SampleRequest> next() const override { return request_; }
 
@@ -40,35 +39,33 @@ class FrameSampler final : public Sampler {
  private:
   /// Chooses the time of the next request from the current sample.
   void schedule() {
-    if (current_.t >= span_.end) {
+    if (current_.t >= context_.span.end) {
       request_.reset();
       return;
     }
-    const TimeNs t = std::visit([this](const auto& criterion) { return next_time(criterion); }, options_);
-    request_->t = std::clamp(t, current_.t + 1, span_.end);
+    const TimeNs t = std::visit([this](const auto& criterion) { return next_time(criterion); }, scheme_);
+    request_->t = std::clamp(t, current_.t + 1, context_.span.end);
   }
 
   // The k-th time is computed from k, so that rounding does not accumulate.
   TimeNs next_time(const UniformSampling& uniform) {
-    return span_.start + to_ns(static_cast<double>(statistics_.samples) / uniform.rate_hz);
+    return context_.span.start + to_ns(static_cast<double>(statistics_.samples) / uniform.rate_hz);
   }
 
   template <typename Adaptive>
   TimeNs next_time(const Adaptive& criterion) {
     const TimeNs shortest = std::max<TimeNs>(1, to_ns(1.0 / criterion.bounds.max_rate_hz));
     const TimeNs longest = std::max(shortest, to_ns(1.0 / criterion.bounds.min_rate_hz));
-    const double wanted_s = wanted_interval_s(criterion, sensor_, current_, workers_);
+    const double wanted_s = wanted_interval_s(criterion, context_.sensor, current_, context_.workers);
     // Rounded down, so that the criterion's bound holds to the nanosecond.
     const auto wanted = static_cast<TimeNs>(std::min(wanted_s * 1e9, static_cast<double>(longest)));
     if (wanted < shortest) ++statistics_.held_to_max_rate;
     return current_.t + std::max(wanted, shortest);
   }
 
-  SamplingOptions options_;
-  SensorTraits sensor_;
+  FrameScheme scheme_;
+  SamplingContext context_;
   Tile image_;
-  TimeSpan span_;
-  const Workers& workers_;
 
   std::optional<SampleRequest> request_;
   Sample previous_, current_;
@@ -79,9 +76,8 @@ class FrameSampler final : public Sampler {
 
 }  // namespace
 
-std::unique_ptr<Sampler> make_frame_sampler(const SamplingOptions& options, const SensorTraits& sensor, int width,
-                                            int height, const TimeSpan& span, const Workers& workers) {
-  return std::make_unique<FrameSampler>(options, sensor, width, height, span, workers);
+std::unique_ptr<Sampler> make_frame_sampler(const FrameScheme& scheme, const SamplingContext& context) {
+  return std::make_unique<FrameSampler>(scheme, context);
 }
 
 }  // namespace esim

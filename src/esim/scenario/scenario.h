@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "esim/geometry/camera.h"
-#include "esim/sampling/criterion.h"
+#include "esim/sampling/options.h"
 #include "esim/scenario/pose_options.h"
 #include "esim/scene/layer.h"
 #include "esim/sensors/event_camera.h"

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <variant>
+
+#include "esim/core/describe.h"
+
+namespace esim {
+
+/// Bounds on the interval between two samples, common to the criteria that adapt it.
+struct RateBounds {
+  double min_rate_hz = 50;
+  double max_rate_hz = 50000;
+};
+
+/// Samples at a fixed rate: the k-th one k / rate_hz after the start.
+struct UniformSampling {
+  static constexpr const char* kType = "uniform";
+  double rate_hz = 1000;
+};
+
+/// The brightness is expected to change by at most lambda C between two samples (paper, Eq. 2).
+struct BrightnessSampling {
+  static constexpr const char* kType = "brightness";
+  double lambda = 0.5;
+  RateBounds bounds;
+};
+
+/// A pixel is expected to move by at most lambda pixels between two samples (paper, Eq. 3).
+struct FlowSampling {
+  static constexpr const char* kType = "flow";
+  double lambda = 0.5;
+  RateBounds bounds;
+};
+
+using SamplingOptions = std::variant<FlowSampling, BrightnessSampling, UniformSampling>;
+
+template <class Visitor>
+void describe(Visitor& visit, UniformSampling& o) {
+  visit("rate_hz", o.rate_hz, About{"samples per second", "Hz", 0, 1e9, true});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, RateBounds& o) {
+  visit("min_rate_hz", o.min_rate_hz, About{"least samples per second, also where nothing moves", "Hz", 0, 1e9, true});
+  visit("max_rate_hz", o.max_rate_hz,
+        About{"most samples per second, also where the criterion asks for more", "Hz", 0, 1e9, true});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, BrightnessSampling& o) {
+  visit("lambda", o.lambda,
+        About{"expected change of brightness between two samples, in contrast thresholds (Eq. 2)", "", 0, 1e6, true});
+  describe(visit, o.bounds);
+}
+
+template <class Visitor>
+void describe(Visitor& visit, FlowSampling& o) {
+  visit("lambda", o.lambda, About{"expected motion between two samples (Eq. 3)", "px", 0, 1e6, true});
+  describe(visit, o.bounds);
+}
+
+}  // namespace esim

@@ -171,13 +171,14 @@ void PixelUpdate::run_awake(PixelArray& pixels, const Segment& segment, bool all
   }
 }
 
-const float* PixelUpdate::brightness_row(const PixelArray& pixels, const Segment& segment,
-                                         const Image<float>* brightness, int y) {
-  if (brightness != nullptr) return brightness->row(y) + segment.tile.x;
+/// Brightness of a row's pixels at the segment's end: `given`, or from their irradiance. Null where that is none.
+const float* PixelUpdate::brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* given,
+                                         int y) {
+  if (given != nullptr) return all_irradiance(segment, {y, y + 1}) ? given->row(y) + segment.tile.x : nullptr;
   const auto length = static_cast<std::size_t>(segment.tile.width);
   float_row_.resize(length);
-  respond(pixels.options, length, segment.irradiance1->row(y) + segment.tile.x, float_row_.data());
-  return float_row_.data();
+  const float* const irradiance = segment.irradiance1->row(y) + segment.tile.x;
+  return respond(pixels.options, length, irradiance, float_row_.data()) ? float_row_.data() : nullptr;
 }
 
 template <int kOrder>
@@ -225,9 +226,9 @@ bool PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image
   const Filter common(pixels, segment);
   const int order = pixels.options.low_pass_hz > 0 ? pixels.options.low_pass_order : 0;
   for (int y = rows.first; y < rows.last; ++y) {
-    if (!all_irradiance(segment, {y, y + 1})) return false;
     if (y + 1 < rows.last) prefetch_row(segment, y + 1);
     const float* const row = brightness_row(pixels, segment, brightness, y);
+    if (row == nullptr) return false;
     if (order == 0) filter_row<0>(pixels, segment, common, row, y, events);
     if (order == 1) filter_row<1>(pixels, segment, common, row, y, events);
     if (order == 2) filter_row<2>(pixels, segment, common, row, y, events);
@@ -281,7 +282,7 @@ bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<f
   for (int y = rows.first; y < rows.last; ++y) {
     const std::size_t first = index(pixels, segment.tile.x, y);
     if (pixels.in_brightness) {
-      const float* const row = brightness_row(pixels, segment, brightness, y);
+      const float* const row = brightness_row(pixels, segment, brightness, y);  // checked above
       std::copy_n(row, width, row_.data());
       for (auto* values : {&pixels.brightness, &pixels.filtered1, &pixels.filtered2}) {
         if (!values->empty()) std::copy_n(row, width, values->data() + first);

@@ -48,7 +48,7 @@ class PixelUpdate {
   void wake(const FilterRow& row, int begin, std::span<const std::uint32_t> columns);
   template <int kOrder>
   void run_awake(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events);
-  const float* brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* brightness, int y);
+  const float* brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* given, int y);
 
   /// Where the low-passes of neighbouring pixels are at the segment's end, and which pixels wake up.
   static constexpr int kMovedTogether = 128;

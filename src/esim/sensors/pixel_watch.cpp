@@ -1,7 +1,6 @@
 #include "esim/sensors/pixel_watch.h"
 
-#include <bit>
-#include <limits>
+#include <cmath>
 #include <string>
 
 #include "esim/core/error.h"
@@ -11,13 +10,9 @@
 namespace esim {
 namespace {
 
-// The floats that are finite and >= 0 are those whose bits, as unsigned numbers, are at most those of the largest one.
-// Adding zero makes minus zero one of them.
-constexpr std::uint32_t kLargest = std::bit_cast<std::uint32_t>(std::numeric_limits<float>::max());
-
 using WatchTag = hn::CappedTag<float, 8>;
 
-bool is_irradiance(float value) { return std::bit_cast<std::uint32_t>(value + 0.0F) <= kLargest; }
+bool is_irradiance(float value) { return std::isfinite(value) && value >= 0; }
 
 }  // namespace
 
@@ -54,13 +49,12 @@ bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, i
 
   // Without branches: that a pixel wakes is as hard to foresee as an event.
   const auto look_at = [&](auto d, int from, int to) {
-    const hn::RebindToUnsigned<decltype(d)> du;
     const hn::RebindToSigned<decltype(d)> di;
     const int lanes = static_cast<int>(hn::Lanes(d));
-    auto largest = hn::Zero(du);
+    IrradianceCheck check(d);
     for (int x = from; x + lanes <= to; x += lanes) {
       const auto value = hn::LoadU(d, irradiance + x);
-      largest = hn::Max(largest, hn::BitCast(du, hn::Add(value, hn::Zero(d))));
+      check.see(d, value);
       auto awake = hn::Not(hn::And(hn::Gt(value, hn::LoadU(d, low + x)), hn::Lt(value, hn::LoadU(d, high + x))));
       if (alarms != nullptr) {
         const auto alarmed = hn::Lt(hn::LoadU(di, alarms + x), hn::Set(di, now + 1));
@@ -70,7 +64,7 @@ bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, i
       chosen.store_positions(static_cast<std::uint32_t>(x), columns + found);
       found += chosen.count();
     }
-    good &= hn::GetLane(hn::MaxOfLanes(du, largest)) <= kLargest;
+    good &= check.passed();
   };
   const WatchTag whole;
   const int first = segment.tile.x, last = first + segment.tile.width;
@@ -83,18 +77,16 @@ bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, i
 
 bool all_irradiance(const Segment& segment, Rows rows) {
   const WatchTag d;
-  const hn::RebindToUnsigned<WatchTag> du;
   const int lanes = static_cast<int>(hn::Lanes(d)), width = segment.tile.width;
-  auto largest = hn::Zero(du);
+  IrradianceCheck check(d);
   bool good = true;
   for (int y = rows.first; y < rows.last; ++y) {
     const float* const row = segment.irradiance1->row(y) + segment.tile.x;
     int x = 0;
-    for (; x + lanes <= width; x += lanes)
-      largest = hn::Max(largest, hn::BitCast(du, hn::Add(hn::LoadU(d, row + x), hn::Zero(d))));
+    for (; x + lanes <= width; x += lanes) check.see(d, hn::LoadU(d, row + x));
     for (; x < width; ++x) good &= is_irradiance(row[x]);
   }
-  return good && hn::GetLane(hn::MaxOfLanes(du, largest)) <= kLargest;
+  return good && check.passed();
 }
 
 void check_irradiance(const Segment& segment) {

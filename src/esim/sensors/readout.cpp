@@ -79,11 +79,11 @@ void Readout::advance(EventSpan events, TimeNs until, std::vector<Event>& out) {
   for (std::size_t i = 0; i < events.size(); ++i) {
     const Event& event = events[i];
     if (request_count_ > 0) serve_until(event.t, out);
-    // Where nothing waits and nothing comes with it, it passes at once.
-    const TimeNs next = i + 1 < events.size() ? events[i + 1].t : until + 1;
-    if (request_count_ == 0 && free_from() <= event.t && event.t < next) {
-      out.push_back(event);
-      occupy(event.t, 1);
+    // Where nothing waits, and nothing comes until the reader turns to it, it does not wait in its row.
+    const TimeNs start = std::max(free_from(), event.t), next = i + 1 < events.size() ? events[i + 1].t : until + 1;
+    if (request_count_ == 0 && start < next) {
+      out.emplace_back(start, event.x, event.y, event.polarity);
+      occupy(start, 1);
     } else {
       accept(event);
     }

@@ -8,6 +8,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 // What is done with many values at once. Private: only .cpp files include it.
 namespace esim {
@@ -28,6 +29,25 @@ inline void logarithms(std::size_t count, double* values) {
 inline void exponentials(std::size_t count, float* values) {
   for_vectors(count, values, [](auto d, auto x) { return hn::Exp(d, x); });
 }
+
+/// Whether all of many values are irradiances: finite numbers >= 0. Their bits, as unsigned numbers, are at most those
+/// of the largest float; adding zero makes minus zero one of them.
+template <class D>
+class IrradianceCheck {
+ public:
+  explicit IrradianceCheck(D) : largest_(hn::Zero(hn::RebindToUnsigned<D>())) {}
+
+  HWY_INLINE void see(D d, hn::Vec<D> values) {
+    largest_ = hn::Max(largest_, hn::BitCast(hn::RebindToUnsigned<D>(), hn::Add(values, hn::Zero(d))));
+  }
+  bool passed() const {
+    constexpr std::uint32_t kLargest = std::bit_cast<std::uint32_t>(std::numeric_limits<float>::max());
+    return hn::GetLane(hn::MaxOfLanes(hn::RebindToUnsigned<D>(), largest_)) <= kLargest;
+  }
+
+ private:
+  hn::Vec<hn::RebindToUnsigned<D>> largest_;
+};
 
 /// ln(x) for x > 0, finite and not denormal, to a unit or two in the last place of a float.
 template <class D>

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 constexpr const char* kRotation = "rotation.txt";
 
 struct Arguments : RunOptions {
-  std::string scenario, panorama, out, pixels = "400";
+  std::string scenario = "scenes/panorama.yaml", panorama, out, pixels = "400";
   std::vector<std::string> schemes;
   SamplingEvaluationOptions options;
   bool quick = false;
@@ -32,6 +32,8 @@ struct Arguments : RunOptions {
 /// The scenario to evaluate. What the built-in one needs is written into `folder`.
 Scenario base_scenario(const Arguments& arguments, const fs::path& folder) {
   if (arguments.panorama.empty()) return read_scenario(arguments.scenario, arguments.overrides);
+  if (!arguments.overrides.empty())
+    throw UserError("--set: changes SCENARIO.yaml, but --panorama brings its own; leave one of them out");
   write_text(folder / kRotation, paper_rotation());
   return paper_scenario(fs::absolute(arguments.panorama), folder / kRotation);
 }
@@ -134,13 +136,15 @@ void add_sampling(CLI::App& evaluate, int& exit_code) {
   CLI::App* command = evaluate.add_subcommand(
       "sampling", "Measure the accuracy and cost of ways of sampling, as in the ESIM paper's Section 4.1");
   auto* file =
-      command->add_option("scenario", arguments->scenario, "Scenario file; its sampling is replaced by each scheme")
+      command
+          ->add_option("scenario", arguments->scenario,
+                       "Scenario file, whose sampling is replaced by each scheme (default: scenes/panorama.yaml)")
           ->type_name("SCENARIO.yaml");
-  auto* panorama = command
-                       ->add_option("--panorama", arguments->panorama,
-                                    "Instead: the paper's random rotations in this equirectangular image")
-                       ->type_name("IMAGE")
-                       ->excludes(file);
+  command
+      ->add_option("--panorama", arguments->panorama,
+                   "Instead: the paper's random rotations in this equirectangular image")
+      ->type_name("IMAGE")
+      ->excludes(file);
   command->add_option("-o,--out", arguments->out, "Folder to write")->required()->type_name("DIR");
   command
       ->add_option("--scheme", arguments->schemes,
@@ -169,12 +173,7 @@ void add_sampling(CLI::App& evaluate, int& exit_code) {
       ->capture_default_str();
   command->add_flag("--quick", arguments->quick, "A short run with few schemes and pixels");
   add_run_options(*command, *arguments, "Change one option of SCENARIO.yaml, for example --set duration_s=1");
-  command->callback([arguments, file, panorama, &exit_code] {
-    if (file->count() + panorama->count() == 0)
-      throw UserError(
-          "evaluate sampling: name a scenario, for example scenes/panorama.yaml, or an image with --panorama");
-    exit_code = run(*arguments);
-  });
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
   command->footer(
       "Examples:\n"
       "  esim evaluate sampling scenes/panorama.yaml --out out/sampling\n"

@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include "esim/evaluate/figures.h"
+#include "esim/evaluate/report_markdown.h"
 #include "esim/record/output_file.h"
+#include "esim/record/preview/canvas.h"
 
 namespace esim {
 namespace {
@@ -47,6 +50,12 @@ std::string samples_csv(const SamplingEvaluation& evaluation) {
 }  // namespace
 
 void write_report_files(const SamplingEvaluation& evaluation, const std::filesystem::path& folder) {
+  write_file_atomically(folder / "report.md", to_markdown(evaluation));
+  write_file_atomically(folder / "motion.png", encode_png(draw_motion(evaluation)));
+  write_file_atomically(folder / "rmse.png", encode_png(draw_error_boxes(evaluation)));
+  write_file_atomically(folder / "rmse_over_cost.png", encode_png(draw_error_over_cost(evaluation)));
+  if (!evaluation.event_spans.empty())
+    write_file_atomically(folder / "timing.png", encode_png(draw_timing(evaluation)));
   write_file_atomically(folder / "summary.csv", summary_csv(evaluation));
   write_file_atomically(folder / "samples.csv", samples_csv(evaluation));
 }

@@ -131,18 +131,25 @@ class Evaluation {
 
   void simulate_reference_events() {
     share_.start("reference of events", 1.5);
-    for (const TimeSpan& span : result_.event_spans) {
-      const Summary summary = simulate_span(UniformSampling{options().event_rate_hz}, span);
+    for (std::size_t i = 0; i < result_.event_spans.size(); ++i) {
+      const double all = static_cast<double>(result_.event_spans.size());
+      const Summary summary =
+          simulate_span(UniformSampling{options().event_rate_hz}, result_.event_spans[i],
+                        [&](double fraction) { share_.show((static_cast<double>(i) + fraction) / all); });
       result_.event_reference_seconds += summary.wall_seconds;
       result_.reference_events.push_back(static_cast<std::int64_t>(reference_events_.back().events()));
     }
   }
 
   /// Simulates a part of the time with fresh pixels, and appends the events to reference_events_.
-  Summary simulate_span(const SamplingOptions& scheme, const TimeSpan& span) {
+  Summary simulate_span(const SamplingOptions& scheme, const TimeSpan& span,
+                        const std::function<void(double fraction)>& show) {
     EventStore events(true);
     World world = build_world(part(scheme, span), options().threads, silent_);
-    const Summary summary = simulate(world, events, [&](const Progress&) { return share_.show(0), true; });
+    const Summary summary = simulate(world, events, [&](const Progress& progress) {
+      show(static_cast<double>(progress.now - progress.start) / static_cast<double>(progress.end - progress.start));
+      return true;
+    });
     reference_events_.emplace_back(events.events(), result_.width, result_.height);
     return summary;
   }
@@ -163,7 +170,7 @@ class Evaluation {
     share_.start(result.text, 1);
     simulate_whole(result);
     for (std::size_t i = 0; i < result_.event_spans.size(); ++i) {
-      simulate_span(scheme, result_.event_spans[i]);
+      simulate_span(scheme, result_.event_spans[i], [&](double) { share_.show(1); });
       result.windows[i].events = compare_events(reference_events_[i], reference_events_.back());
       reference_events_.pop_back();
     }

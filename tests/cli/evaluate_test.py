@@ -34,7 +34,7 @@ class EvaluateSampling(ProgramTest):
                 self.assertEqual(events["matched"] + events["missing"], events["reference"])
         finer = {s["scheme"]: s["windows"][-1]["rmse_mean"] for s in report["schemes"]}
         self.assertLess(finer["uniform rate_hz=1000"], finer["uniform rate_hz=250"])
-        rows = list(csv.DictReader((self.out / "summary.csv").open()))
+        rows = list(csv.DictReader((self.out / "summary.csv").read_text().splitlines()))
         self.assertEqual(len(rows), 3 * len(report["schemes"]))
         self.assertTrue((self.out / "samples.csv").stat().st_size > 0)
         for line in (self.out / "report.md").read_text().splitlines():

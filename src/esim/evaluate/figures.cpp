@@ -108,21 +108,25 @@ Image<Rgb> draw_motion(const SamplingEvaluation& evaluation) {
   double top = 1e-3;
   for (const double v : motion.mean_px_per_s) top = std::max(top, 1.1 * v);
   const double first = to_seconds(evaluation.span.start), last = to_seconds(evaluation.span.end);
-  Axes axes(canvas, {80, 62, kWidth - 110, kHeight - 120}, "Motion over time", linear_scale(first, last, "time, s"),
+  Axes axes(canvas, {80, 62, kWidth - 110, kHeight - 120}, "Motion over time",
+            linear_scale(first, last,
+                         evaluation.event_spans.empty() ? "time, s" : "time, s (dark: where events are compared)"),
             linear_scale(0, top, "mean motion field, px/s"));
+  for (const Window& window : evaluation.windows) {
+    if (window.name == "all") continue;
+    axes.fill(to_seconds(window.span.start), to_seconds(window.span.end), 0, top, mix(colour_of(window), kPaper, 0.8F));
+  }
+  for (std::size_t i = 0; i < evaluation.event_spans.size(); ++i) {
+    const TimeSpan& span = evaluation.event_spans[i];
+    axes.fill(to_seconds(span.start), to_seconds(span.end), 0, top,
+              mix(colour_of(evaluation.windows[i]), kPaper, 0.4F));
+  }
   int key = kWidth - 30;
   for (std::size_t i = evaluation.windows.size(); i-- > 0;) {
     const Window& window = evaluation.windows[i];
-    const Rgb colour = colour_of(window);
-    const double start = to_seconds(window.span.start), end = to_seconds(window.span.end);
-    if (window.name != "all") axes.fill(start, end, 0, top, mix(colour, kPaper, 0.8F));
-    if (i < evaluation.event_spans.size()) {
-      const TimeSpan& events = evaluation.event_spans[i];
-      axes.fill(to_seconds(events.start), to_seconds(events.end), 0, top, mix(colour, kPaper, 0.4F));
-    }
     const std::string label = fmt::format("{}: {:.0f} px/s", window.name, window.mean_px_per_s);
     key -= Canvas::text_width(label, kTextHeight) + 50;
-    draw_key(canvas, key, 40, mix(colour, kPaper, 0.5F), label);
+    draw_key(canvas, key, 40, mix(colour_of(window), kPaper, 0.5F), label);
   }
   std::vector<DataPoint> curve;
   for (std::size_t k = 0; k < motion.mean_px_per_s.size(); ++k)

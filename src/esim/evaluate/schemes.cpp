@@ -17,7 +17,7 @@ std::vector<SamplingOptions> read_all(const std::vector<std::string>& texts) {
 
 std::vector<SamplingOptions> default_schemes() {
   std::vector<SamplingOptions> schemes;
-  for (const double rate_hz : {100, 500, 1000, 2000, 3000, 4000}) schemes.push_back(UniformSampling{rate_hz});
+  for (const double rate_hz : {100, 500, 1000, 2000, 3000}) schemes.push_back(UniformSampling{rate_hz});
   for (const double lambda : {4.0, 2.0, 1.0, 0.5}) schemes.push_back(BrightnessSampling{lambda, {}});
   for (const double lambda : {4.0, 2.0, 1.0, 0.5, 0.35}) schemes.push_back(FlowSampling{lambda, {}});
   const std::size_t listed = schemes.size();

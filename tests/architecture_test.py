@@ -30,6 +30,7 @@ ALLOWED = {
     "sim": "core events geometry motion render sampling sensors record truth video",
     "scenario": "core geometry sampling scene sensors video",
     "compose": "core blender geometry motion scene render backends sampling sensors record truth video sim scenario",
+    "evaluate": "core events geometry motion render sampling sensors record stats sim scenario compose",
 }
 
 # Heavy libraries, and the headers of ours that may include them: private ones, which only .cpp files include.

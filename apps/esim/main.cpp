@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
       "  esim import room.blend --bake                     photorealistic light for fast rendering, by Blender\n"
       "  esim info out/room                                what a recording holds\n"
       "  esim stats out/room --plot                        rates, intervals, hot pixels, banding of its events\n"
+      "  esim evaluate sampling --out out/sampling         accuracy and cost of ways of sampling\n"
       "  esim options                                      every option of a scenario\n"
       "\n"
       "Exit status: 0 done, 1 a defect of esim, 2 something for you to repair, 130 interrupted.");
@@ -29,6 +30,7 @@ int main(int argc, char** argv) {
   add_import(app, exit_code);
   add_info(app, exit_code);
   add_stats(app, exit_code);
+  add_evaluate(app, exit_code);
   add_options(app, exit_code);
   try {
     app.parse(argc, argv);

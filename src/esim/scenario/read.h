@@ -21,6 +21,9 @@ Scenario read_scenario(const std::filesystem::path& file, const std::vector<std:
 /// The scenario in full, every option explicit, as YAML: reading it back gives the same scenario.
 std::string write_scenario(const Scenario& scenario);
 
+/// A way of sampling in full, as YAML.
+std::string write_sampling(const SamplingOptions& options);
+
 /// Every option with type, default, unit, range and help, as text for a person.
 std::string scenario_reference();
 

@@ -208,6 +208,15 @@ std::string write_scenario(const Scenario& scenario) {
   return std::string(out.c_str()) + "\n";
 }
 
+std::string write_sampling(const SamplingOptions& options) {
+  YAML::Emitter out;
+  YamlWriter writer(out);
+  out << YAML::BeginMap;
+  writer("sampling", options, About{});
+  out << YAML::EndMap;
+  return YAML::Dump(YAML::Load(out.c_str())["sampling"]);
+}
+
 std::string write_conversion(const ConversionOptions& options) {
   YAML::Emitter out;
   YamlWriter writer(out);

@@ -63,6 +63,11 @@ Axes::Axes(Canvas& canvas, const Tile& area, const std::string& title, Scale x, 
   for (const Tick& tick : y_.ticks) canvas_.fill({area_.x, row(tick.value), area_.width, 1}, kGrid);
 }
 
+Spot Axes::spot(const DataPoint& point) const {
+  return {area_.x + std::clamp(x_.position(point.x), 0.0, 1.0) * (area_.width - 1),
+          area_.y + (1 - std::clamp(y_.position(point.y), 0.0, 1.0)) * (area_.height - 1)};
+}
+
 int Axes::column(double x) const {
   const double position = std::clamp(x_.position(x), 0.0, 1.0);
   return area_.x + static_cast<int>(std::lround(position * (area_.width - 1)));
@@ -80,6 +85,19 @@ void Axes::fill(double x0, double x1, double y0, double y1, Rgb colour) {
 }
 
 void Axes::horizontal_line(double y, Rgb colour) { canvas_.fill({area_.x, row(y), area_.width, 1}, colour); }
+
+void Axes::line(std::span<const DataPoint> points, Rgb colour, double width) {
+  std::vector<Spot> spots;
+  for (const DataPoint& point : points) spots.push_back(spot(point));
+  canvas_.polyline(spots, width, colour);
+}
+
+void Axes::dot(const DataPoint& point, double radius, Rgb colour) { canvas_.disc(spot(point), radius, colour); }
+
+void Axes::label(const DataPoint& point, const std::string& text, Rgb colour) {
+  const Spot at = spot(point);
+  canvas_.text(static_cast<int>(at.x) + 5, static_cast<int>(at.y) - 6, text, kTextHeight, colour);
+}
 
 void Axes::vertical_line(double x, const std::string& label, Rgb colour) {
   canvas_.fill({column(x), area_.y, 1, area_.height}, colour);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,11 @@ Scale linear_scale(double low, double high, std::string title, bool absolute = f
 /// `seconds`, 1 us, 10 us ...
 Scale decade_scale(double low, double high, std::string title, bool seconds = false);
 
+/// A pair of values in a diagram.
+struct DataPoint {
+  double x = 0, y = 0;
+};
+
 /// A diagram with two axes on a part of a canvas. What is drawn beyond them is cut off.
 class Axes {
  public:
@@ -47,6 +53,10 @@ class Axes {
 
   void fill(double x0, double x1, double y0, double y1, Rgb colour);
   void horizontal_line(double y, Rgb colour);
+  void line(std::span<const DataPoint> points, Rgb colour, double width = 2);
+  void dot(const DataPoint& point, double radius, Rgb colour);
+  /// Text that begins at a place, to be read above the data.
+  void label(const DataPoint& point, const std::string& text, Rgb colour);
   /// With a label at the top.
   void vertical_line(double x, const std::string& label, Rgb colour);
 
@@ -54,6 +64,7 @@ class Axes {
   void finish();
 
  private:
+  Spot spot(const DataPoint& point) const;
   int column(double x) const;
   int row(double y) const;
 

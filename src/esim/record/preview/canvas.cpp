@@ -24,6 +24,16 @@ cv::Mat view(const Image<Rgb>& image) {
   return {image.height(), image.width(), CV_8UC3, const_cast<Rgb*>(image.data())};
 }
 
+// OpenCV takes places in fractions of a pixel as whole numbers.
+constexpr int kFractionBits = 4;
+cv::Point fixed_point(const Spot& spot) {
+  const auto fixed = [](double v) {
+    return static_cast<int>(std::lround(std::clamp(v, -1e4, 1e5) * (1 << kFractionBits)));
+  };
+  return {fixed(spot.x), fixed(spot.y)};
+}
+cv::Scalar scalar(Rgb colour) { return {double(colour.r), double(colour.g), double(colour.b)}; }
+
 Tile intersect(const Tile& a, const Tile& b) {
   const int x = std::max(a.x, b.x), y = std::max(a.y, b.y);
   return {x, y, std::max(0, std::min(a.x + a.width, b.x + b.width) - x),
@@ -51,6 +61,20 @@ void Canvas::outline(const Tile& area, Rgb colour) {
   fill({area.x, area.y + area.height - 1, area.width, 1}, colour);
   fill({area.x, area.y, 1, area.height}, colour);
   fill({area.x + area.width - 1, area.y, 1, area.height}, colour);
+}
+
+void Canvas::polyline(std::span<const Spot> points, double width, Rgb colour) {
+  cv::Mat pixels = view(pixels_);
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    cv::line(pixels, fixed_point(points[i - 1]), fixed_point(points[i]), scalar(colour),
+             std::max(1, static_cast<int>(std::lround(width))), cv::LINE_AA, kFractionBits);
+  }
+}
+
+void Canvas::disc(Spot centre, double radius, Rgb colour) {
+  cv::Mat pixels = view(pixels_);
+  cv::circle(pixels, fixed_point(centre), static_cast<int>(std::lround(radius * (1 << kFractionBits))), scalar(colour),
+             cv::FILLED, cv::LINE_AA, kFractionBits);
 }
 
 int Canvas::text_width(std::string_view line, int height) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -10,6 +11,11 @@
 namespace esim {
 
 enum class Align { left, centre, right };
+
+/// A place on a canvas, px.
+struct Spot {
+  double x = 0, y = 0;
+};
 
 /// Colour pixels to draw figures on. What lies outside is cut off.
 class Canvas {
@@ -22,6 +28,10 @@ class Canvas {
   void draw(const Image<Rgb>& image, int x, int y);
   void fill(const Tile& area, Rgb colour);
   void outline(const Tile& area, Rgb colour);
+
+  /// A line through points (columns and rows, pixel centres at whole numbers), smooth at its edges.
+  void polyline(std::span<const Spot> points, double width, Rgb colour);
+  void disc(Spot centre, double radius, Rgb colour);
 
   /// One line of ASCII text; capitals are `height` px tall and stand on `baseline`. Returns its width.
   int text(int x, int baseline, std::string_view line, int height, Rgb colour, Align align = Align::left);

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "esim/sampling/sampler.h"
+
+namespace esim {
+
+/// What passes between a sampler and the event camera, as somebody who listens in hears it.
+struct Tapped {
+  TimeNs t = 0;                        ///< of the sample that was accepted
+  std::int64_t pixel_evaluations = 0;  ///< that it cost
+  std::span<const Segment> segments;   ///< that followed from it
+};
+
+/// A sampler that does what another one does, and shows every step to a listener.
+class TappedSampler final : public Sampler {
+ public:
+  using Listener = std::function<void(const Tapped&)>;
+
+  TappedSampler(std::unique_ptr<Sampler> sampler, Listener listener)
+      : sampler_(std::move(sampler)), listener_(std::move(listener)) {}
+
+  std::optional<SampleRequest> next() const override { return sampler_->next(); }
+  TimeNs watermark() const override { return sampler_->watermark(); }
+  SamplingStatistics statistics() const override { return sampler_->statistics(); }
+
+  std::span<const Segment> accept(Sample& sample) override {
+    const TimeNs t = sample.t;
+    const std::int64_t before = sampler_->statistics().pixel_evaluations;
+    const std::span<const Segment> segments = sampler_->accept(sample);
+    listener_({t, sampler_->statistics().pixel_evaluations - before, segments});
+    return segments;
+  }
+
+ private:
+  std::unique_ptr<Sampler> sampler_;
+  Listener listener_;
+};
+
+}  // namespace esim

@@ -1,0 +1,91 @@
+#include "esim/evaluate/event_comparison.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace esim {
+namespace {
+
+/// Events at milliseconds, negative ones OFF: {1, -3} is ON at 1 ms and OFF at 3 ms.
+std::vector<PixelEvent> events(const std::vector<double>& signed_ms) {
+  std::vector<PixelEvent> all;
+  for (const double t : signed_ms) all.push_back({to_ns(std::abs(t) * 1e-3), static_cast<std::int8_t>(t > 0 ? 1 : -1)});
+  return all;
+}
+
+EventMatch match(const std::vector<double>& reference, const std::vector<double>& other) {
+  return match_events(events(reference), events(other));
+}
+
+void expect_differences_ms(EventMatch match, std::vector<double> expected) {
+  std::sort(match.differences_s.begin(), match.differences_s.end());
+  std::sort(expected.begin(), expected.end());
+  ASSERT_EQ(match.differences_s.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(match.differences_s[i] * 1e3, expected[i], 1e-9);
+}
+
+TEST(EventMatching, PairsIdenticalSequencesInOrder) {
+  const EventMatch found = match({1, 2, -40}, {1.5, 1.9, -80});  // however far apart
+  EXPECT_TRUE(found.identical);
+  EXPECT_EQ(found.missing + found.spurious, 0);
+  expect_differences_ms(found, {0.5, -0.1, 40});
+  EXPECT_TRUE(match({}, {}).identical);
+}
+
+TEST(EventMatching, FindsTheMissingOneOfMany) {
+  const EventMatch found = match({1, 2, 3, 4}, {1.1, 3.1, 4.1});
+  EXPECT_FALSE(found.identical);
+  EXPECT_EQ(found.missing, 1);
+  EXPECT_EQ(found.spurious, 0);
+  expect_differences_ms(found, {0.1, 0.1, 0.1});
+}
+
+TEST(EventMatching, FindsTheSpuriousPair) {
+  const EventMatch found = match({1, 5}, {1, 2, -3, 5});
+  EXPECT_EQ(found.missing, 0);
+  EXPECT_EQ(found.spurious, 2);
+  expect_differences_ms(found, {0, 0});
+}
+
+TEST(EventMatching, NeverPairsAcrossPolarities) {
+  const EventMatch found = match({1, -2}, {-1, 2});
+  EXPECT_FALSE(found.identical);
+  EXPECT_EQ(found.missing, 1);
+  EXPECT_EQ(found.spurious, 1);
+  EXPECT_EQ(found.differences_s.size(), 1U) << "the pairs would cross";
+}
+
+TEST(EventMatching, LeavesEventsAloneThatAreTooFarApart) {
+  EXPECT_EQ(match({1}, {20.9, 30}).differences_s.size(), 1U);
+  const EventMatch found = match({1}, {21.1, 30});
+  EXPECT_EQ(found.missing, 1);
+  EXPECT_EQ(found.spurious, 2);
+}
+
+TEST(EventMatching, OfNothingAndSomething) {
+  EXPECT_EQ(match({}, {1, 2}).spurious, 2);
+  EXPECT_EQ(match({1, -2, 3}, {}).missing, 3);
+}
+
+TEST(EventComparison, CountsOverPixels) {
+  const std::vector<Event> reference = {{1000, 0, 0, 1}, {2000, 1, 0, 1}, {3000, 0, 0, -1}, {4000, 2, 1, 1}};
+  const std::vector<Event> other = {
+      {1500, 0, 0, 1}, {2000, 1, 0, 1}, {3500, 0, 0, -1}, {5000, 1, 0, 1}, {6000, 1, 1, 1}};
+  const EventComparison found = compare_events(EventsByPixel(reference, 3, 2), EventsByPixel(other, 3, 2));
+  EXPECT_EQ(found.reference, 4);
+  EXPECT_EQ(found.events, 5);
+  EXPECT_EQ(found.matched, 3);
+  EXPECT_EQ(found.missing, 1);
+  EXPECT_EQ(found.spurious, 2);
+  EXPECT_EQ(found.active_pixels, 4);
+  EXPECT_EQ(found.identical_pixels, 1);
+  EXPECT_DOUBLE_EQ(found.median_s, 500e-9);
+  EXPECT_DOUBLE_EQ(found.count_ratio(), 1.25);
+  EXPECT_EQ(found.reference, found.matched + found.missing);
+  EXPECT_EQ(found.events, found.matched + found.spurious);
+}
+
+}  // namespace
+}  // namespace esim

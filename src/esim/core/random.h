@@ -15,6 +15,7 @@ enum class Purpose : std::uint16_t {
   leak_mismatch = 5,
   pixel_defects = 6,
   shot_noise = 7,
+  sampling_audit = 8,
   test = 1000,
 };
 

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "esim/evaluate/log_histogram.h"
+#include "esim/core/log_histogram.h"
 #include "esim/evaluate/reference_brightness.h"
 #include "esim/evaluate/windows.h"
 

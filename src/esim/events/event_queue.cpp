@@ -2,28 +2,72 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 namespace esim {
+namespace {
+
+void merge(EventSpan a, EventSpan b, EventBuffer& out) {
+  std::merge(a.begin(), a.end(), b.begin(), b.end(), out.make_room(a.size() + b.size()));
+}
+
+}  // namespace
+
+EventBuffer EventQueue::take_buffer() {
+  if (unused_.empty()) return {};
+  EventBuffer buffer = std::move(unused_.back());
+  unused_.pop_back();
+  return buffer;
+}
+
+void EventQueue::merge_last_two() {
+  Run &before = runs_[runs_.size() - 2], &last = runs_.back();
+  Run merged{take_buffer(), 0};
+  merge(before.rest(), last.rest(), merged.events);
+  unused_.push_back(std::move(before.events));
+  unused_.push_back(std::move(last.events));
+  runs_.pop_back();
+  runs_.back() = std::move(merged);
+}
 
 void EventQueue::add(std::span<PackedEvents> parts, const Workers& workers) {
-  sorter_.sort(parts, workers, added_);
-  if (size() == 0) {
-    pending_.swap(added_);
-  } else {
-    const EventSpan rest = pending_.events().subspan(released_), added = added_.events();
-    std::merge(rest.begin(), rest.end(), added.begin(), added.end(), merged_.make_room(rest.size() + added.size()));
-    pending_.swap(merged_);
+  std::size_t kept = 0;
+  for (Run& run : runs_) {
+    if (run.rest().empty()) {
+      unused_.push_back(std::move(run.events));
+    } else {
+      std::swap(runs_[kept++], run);
+    }
   }
-  released_ = 0;
+  runs_.resize(kept);
+  runs_.push_back({take_buffer(), 0});
+  sorter_.sort(parts, workers, runs_.back().events);
+  while (runs_.size() > 1 && runs_[runs_.size() - 2].rest().size() <= 2 * runs_.back().rest().size()) merge_last_two();
 }
 
 EventSpan EventQueue::release_until(TimeNs watermark) {
-  const EventSpan rest = pending_.events().subspan(released_);
-  const auto end =
-      std::upper_bound(rest.begin(), rest.end(), watermark, [](TimeNs t, const Event& event) { return t < event.t; });
-  const EventSpan released = rest.first(static_cast<std::size_t>(end - rest.begin()));
-  released_ += released.size();
+  EventSpan released;
+  for (Run& run : runs_) {
+    const EventSpan rest = run.rest();
+    const auto end =
+        std::upper_bound(rest.begin(), rest.end(), watermark, [](TimeNs t, const Event& event) { return t < event.t; });
+    const EventSpan part = rest.first(static_cast<std::size_t>(end - rest.begin()));
+    run.released += part.size();
+    if (released.empty()) {
+      released = part;
+    } else if (!part.empty()) {
+      merge(released, part, scratch_);
+      together_.swap(scratch_);
+      released = together_.events();
+    }
+  }
   return released;
+}
+
+std::size_t EventQueue::size() const {
+  std::size_t count = 0;
+  for (const Run& run : runs_) count += run.rest().size();
+  return count;
 }
 
 }  // namespace esim

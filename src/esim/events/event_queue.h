@@ -20,12 +20,23 @@ class EventQueue {
   /// Forgets every event with t <= watermark, and returns them in order: they are there until the next add().
   EventSpan release_until(TimeNs watermark);
 
-  std::size_t size() const { return pending_.size() - released_; }
+  std::size_t size() const;
 
  private:
-  EventBuffer pending_;       // ordered
-  std::size_t released_ = 0;  // of pending_, from its front
-  EventBuffer added_, merged_;
+  /// Ordered events, of which the first ones have been released.
+  struct Run {
+    EventBuffer events;
+    std::size_t released = 0;
+
+    EventSpan rest() const { return events.events().subspan(released); }
+  };
+
+  EventBuffer take_buffer();
+  void merge_last_two();
+
+  std::vector<Run> runs_;            // each more than twice as long as the next, so that an event is seldom moved
+  EventBuffer together_, scratch_;   // what is released from several runs
+  std::vector<EventBuffer> unused_;  // memory
   EventSorter sorter_;
 };
 

@@ -1,11 +1,25 @@
 #include "esim/sampling/make_sampler.h"
 
+#include "esim/sampling/adaptive.h"
 #include "esim/sampling/frame_sampler.h"
 
 namespace esim {
+namespace {
+
+// One overload per scheme.
+
+template <typename Scheme>
+std::unique_ptr<Sampler> make(const Scheme& scheme, const SamplingContext& context) {
+  return make_frame_sampler(scheme, context);
+}
+std::unique_ptr<Sampler> make(const AdaptiveSampling& scheme, const SamplingContext& context) {
+  return make_adaptive_sampler(scheme, context);
+}
+
+}  // namespace
 
 std::unique_ptr<Sampler> make_sampler(const SamplingOptions& options, const SamplingContext& context) {
-  return std::visit([&](const auto& scheme) { return make_frame_sampler(scheme, context); }, options);
+  return std::visit([&](const auto& scheme) { return make(scheme, context); }, options);
 }
 
 }  // namespace esim

@@ -32,7 +32,16 @@ struct FlowSampling {
   RateBounds bounds;
 };
 
-using SamplingOptions = std::variant<FlowSampling, BrightnessSampling, UniformSampling>;
+/// Tiles have times of their own, so that the brightness between two samples is off by no more than the tolerance.
+struct AdaptiveSampling {
+  static constexpr const char* kType = "adaptive";
+  double tolerance = 0.25;
+  int tile_px = 16;
+  double max_motion_px = 2;
+  RateBounds bounds;
+};
+
+using SamplingOptions = std::variant<FlowSampling, BrightnessSampling, UniformSampling, AdaptiveSampling>;
 
 template <class Visitor>
 void describe(Visitor& visit, UniformSampling& o) {
@@ -56,6 +65,17 @@ void describe(Visitor& visit, BrightnessSampling& o) {
 template <class Visitor>
 void describe(Visitor& visit, FlowSampling& o) {
   visit("lambda", o.lambda, About{"expected motion between two samples (Eq. 3)", "px", 0, 1e6, true});
+  describe(visit, o.bounds);
+}
+
+template <class Visitor>
+void describe(Visitor& visit, AdaptiveSampling& o) {
+  visit("tolerance", o.tolerance,
+        About{"error of the brightness between two samples, in contrast thresholds, that 99 % of it stay below", "", 0,
+              1e6, true});
+  visit("tile_px", o.tile_px, About{"side of the tiles that are sampled independently", "px", 4, 1024});
+  visit("max_motion_px", o.max_motion_px,
+        About{"most expected motion between two samples, however little brightness changes", "px", 0, 1e6, true});
   describe(visit, o.bounds);
 }
 

@@ -44,7 +44,10 @@ struct EventCamera::State {
     if (options.readout.limited()) readout.emplace(options.readout, height);
   }
 
-  void integrate(const Segment& segment, const Workers& workers);
+  bool integrate(std::span<const Segment> segments, const Workers& workers);
+  bool integrate(const Segment& segment, const Workers& workers);
+  bool integrate_tiles(std::span<const Segment> segments, const Workers& workers);
+  bool advance(const Segment& segment, const Image<float>* given, Rows rows, int worker);
   void refuse_long_time(TimeNs duration) const;
   void subtract_surround(const Segment& segment, const Workers& workers);
 
@@ -53,9 +56,10 @@ struct EventCamera::State {
   Tile size;
   bool spoiled = false;  // by a segment that was only partly integrated
   std::optional<CenterSurround> surround;
-  Image<float> brightness;           // less the surround
-  std::vector<PixelUpdate> updates;  // by worker
-  std::vector<PackedEvents> events;  // by worker
+  Image<float> brightness;               // less the surround
+  std::vector<PixelUpdate> updates;      // by worker
+  std::vector<PackedEvents> events;      // by worker
+  std::vector<std::size_t> tile_begins;  // where the segments of each tile begin, and the end
   EventQueue queue;
   std::optional<Readout> readout;
 
@@ -95,27 +99,49 @@ void EventCamera::State::refuse_long_time(TimeNs duration) const {
                   " s apart; give one at least every " + std::to_string(to_seconds(longest)) + " s");
 }
 
-void EventCamera::State::integrate(const Segment& segment, const Workers& workers) {
+bool EventCamera::State::advance(const Segment& segment, const Image<float>* given, Rows rows, int worker) {
+  PixelUpdate& update = updates[static_cast<std::size_t>(worker)];
+  if (segment.t0 == segment.t1) return update.open(pixels, segment, given, rows);
+  return update.advance(pixels, segment, given, rows, events[static_cast<std::size_t>(worker)]);
+}
+
+/// A segment's rows in parallel.
+bool EventCamera::State::integrate(const Segment& segment, const Workers& workers) {
   const Image<float>* given = nullptr;
   if (surround) {
     subtract_surround(segment, workers);
     given = &brightness;
   }
-  const bool first = segment.t0 == segment.t1;
-  if (first) pixels.set_epoch(segment.t0);
   const RowPieces pieces(segment.tile);
   std::atomic<bool> good = true;
   workers.for_each_with_worker(pieces.count, [&](int piece, int worker) {
-    PixelUpdate& update = updates[static_cast<std::size_t>(worker)];
-    PackedEvents& out = events[static_cast<std::size_t>(worker)];
-    const Rows rows{pieces.begin(piece), pieces.end(piece)};
-    const bool done =
-        first ? update.open(pixels, segment, given, rows) : update.advance(pixels, segment, given, rows, out);
-    if (!done) good = false;
+    if (!advance(segment, given, {pieces.begin(piece), pieces.end(piece)}, worker)) good = false;
   });
-  if (good) return;
-  spoiled = true;
-  check_irradiance(segment);
+  return good;
+}
+
+/// Several tiles in parallel.
+bool EventCamera::State::integrate_tiles(std::span<const Segment> segments, const Workers& workers) {
+  std::atomic<bool> good = true;
+  workers.for_each_with_worker(static_cast<int>(tile_begins.size()) - 1, [&](int i, int worker) {
+    const auto tile = static_cast<std::size_t>(i);
+    for (std::size_t k = tile_begins[tile]; k < tile_begins[tile + 1]; ++k) {
+      const Tile& where = segments[k].tile;
+      if (!advance(segments[k], nullptr, {where.y, where.y + where.height}, worker)) good = false;
+    }
+  });
+  return good;
+}
+
+bool EventCamera::State::integrate(std::span<const Segment> segments, const Workers& workers) {
+  tile_begins.clear();
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    if (segments[i].t0 == segments[i].t1) pixels.set_epoch(segments[i].t0);
+    if (i == 0 || segments[i].tile != segments[i - 1].tile) tile_begins.push_back(i);
+  }
+  tile_begins.push_back(segments.size());
+  if (tile_begins.size() > 2 && !surround) return integrate_tiles(segments, workers);
+  return std::ranges::all_of(segments, [&](const Segment& segment) { return integrate(segment, workers); });
 }
 
 void EventCamera::integrate(std::span<const Segment> segments, const Workers& workers) {
@@ -129,7 +155,10 @@ void EventCamera::integrate(std::span<const Segment> segments, const Workers& wo
   state.packing.origin = first;
   state.refuse_long_time(last - first);
   for (PackedEvents& events : state.events) events.expect(state.packing, last - first);
-  for (const Segment& segment : segments) state.integrate(segment, workers);
+  if (!state.integrate(segments, workers)) {
+    state.spoiled = true;
+    for (const Segment& segment : segments) check_irradiance(segment);
+  }
   state.queue.add(state.events, workers);
 }
 

@@ -45,9 +45,9 @@ class EventCamera {
   /// camera is then as it was before.
   void process(const Image<float>& irradiance, TimeNs t, std::vector<Event>& out, const Workers& workers);
 
-  /// Takes what is newly known of the pixels' irradiance: per tile, segments contiguous in time. Each pixel's first
-  /// segment is an instant, sets its reference, and fires nothing before. Throws UserError naming the pixel and the
-  /// time where an irradiance is not a finite number >= 0; nothing of that segment has then been seen.
+  /// Takes what is newly known of the pixels' irradiance: those of a tile one after the other, contiguous in time. Each
+  /// pixel's first segment is an instant, sets its reference, and fires nothing before. Throws UserError naming the
+  /// pixel and the time where an irradiance is not a finite number >= 0; nothing of that segment has then been seen.
   void integrate(std::span<const Segment> segments, const Workers& workers);
 
   /// Appends to `out`, in order, the events with t <= watermark that were not released before. Nothing at or before the

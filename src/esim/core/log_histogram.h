@@ -1,0 +1,38 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+namespace esim {
+
+/// Weights of values above 0 in bins a hundredth of a decade wide, 2.3 %, from 1e-9 to 1e3; those beyond belong to the
+/// outermost bins.
+class LogHistogram {
+ public:
+  void add(double value, double weight = 1) {
+    const double position = value > 0 ? (std::log10(value) - kLowest) * kPerDecade : 0.0;
+    weights_[static_cast<std::size_t>(std::fmin(std::fmax(position, 0.0), kBins - 1.0))] += weight;
+    total_ += weight;
+  }
+
+  double total() const { return total_; }
+
+  /// The value that a share of all, by weight, does not exceed: the upper edge of its bin. 0 where there are none.
+  double quantile(double share) const {
+    if (total_ == 0) return 0;
+    double below = 0;
+    for (std::size_t i = 0; i < weights_.size(); ++i) {
+      below += weights_[i];
+      if (below >= share * total_) return std::pow(10.0, kLowest + (static_cast<double>(i) + 1) / kPerDecade);
+    }
+    return 1e3;
+  }
+
+ private:
+  static constexpr int kLowest = -9, kPerDecade = 100, kBins = 12 * kPerDecade;
+  std::array<double, kBins> weights_{};
+  double total_ = 0;
+};
+
+}  // namespace esim

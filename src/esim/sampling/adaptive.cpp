@@ -1,0 +1,386 @@
+#include "esim/sampling/adaptive.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "esim/core/log_histogram.h"
+#include "esim/core/random.h"
+#include "esim/sampling/tile_timeline.h"
+
+namespace esim {
+namespace {
+
+constexpr double kNsPerS = 1e9;
+constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
+
+// One interval in so many is looked into.
+constexpr std::uint32_t kAuditOneIn = 64;
+
+// The next sample is meant to make this share of the tolerated error.
+constexpr double kAim = 0.6;
+
+// Tiles are sampled together if none comes earlier than it should by more than this share of its interval.
+constexpr double kSlack = 0.12;
+
+// Tiles whose motion is watched: those up to so many away.
+constexpr int kReach = 3;
+
+/// Fastest finite motion in a tile, px/s.
+float fastest_in(const Sample& sample, const Tile& tile) {
+  float most = 0;
+  for (int y = tile.y; y < tile.y + tile.height; ++y) {
+    const float *const vx = sample.flow_x.row(y) + tile.x, *const vy = sample.flow_y.row(y) + tile.x;
+#pragma omp simd reduction(max : most)
+    for (int x = 0; x < tile.width; ++x) {
+      const float v2 = vx[x] * vx[x] + vy[x] * vy[x];
+      most = v2 > most && v2 <= std::numeric_limits<float>::max() ? v2 : most;
+    }
+  }
+  return std::sqrt(most);
+}
+
+/// Why a tile asks for its next sample.
+enum class Reason { next, bisection, audit };
+
+/// A tile on its way through time.
+struct TileState {
+  TileState(const Tile& tile, float log_eps) : timeline(tile, log_eps) {}
+
+  TileTimeline timeline;
+  std::size_t done = 0;  // index of the sample up to which segments have been given
+  TimeNs due = 0;
+  Reason reason = Reason::next;
+  TimeNs audited = -1;  // begin of the interval that was audited last
+  TimeNs step = 0;      // from the last sample to the next
+  double speed = 0;     // fastest motion at the last sample, px/s
+  bool begun = false;   // the first segment, an instant, has been given
+
+  // What the last sample brought.
+  std::size_t until = 0;  // segments up to this sample are to be given
+  std::int64_t held = 0;
+  double audited_error = -1, expected_error = 0;
+  std::vector<float> audit;
+  TimeNs audit_duration = 0;
+};
+
+class AdaptiveSampler final : public Sampler {
+ public:
+  AdaptiveSampler(const AdaptiveSampling& options, const SamplingContext& context)
+      : options_(options),
+        context_(context),
+        tolerance_(options.tolerance * context.sensor.contrast_threshold),
+        shortest_(std::max<TimeNs>(1, to_ns(1.0 / options.bounds.max_rate_hz))),
+        longest_(std::max(shortest_, to_ns(1.0 / options.bounds.min_rate_hz))),
+        columns_((context.width + options.tile_px - 1) / options.tile_px),
+        rows_((context.height + options.tile_px - 1) / options.tile_px),
+        random_(0, Purpose::sampling_audit),
+        watermark_(context.span.start) {
+    statistics_.tolerance = options.tolerance;
+    const auto eps = static_cast<float>(context.sensor.log_eps);
+    for (int row = 0; row < rows_; ++row) {
+      for (int column = 0; column < columns_; ++column) {
+        const int x = column * options.tile_px, y = row * options.tile_px;
+        tiles_.emplace_back(
+            Tile{x, y, std::min(options.tile_px, context.width - x), std::min(options.tile_px, context.height - y)},
+            eps);
+        tiles_.back().due = context.span.start;
+      }
+    }
+    request();
+  }
+
+  std::optional<SampleRequest> next() const override { return request_; }
+
+  std::span<const Segment> accept(Sample& sample) override {
+    ++statistics_.samples;
+    for (const Tile& tile : sample.tiles) statistics_.pixel_evaluations += static_cast<std::int64_t>(tile.area());
+    const auto count = static_cast<int>(asked_.size());
+    constexpr int kTogether = 8;
+    const auto each = [&](const auto& body) {
+      context_.workers.for_each((count + kTogether - 1) / kTogether, [&](int piece) {
+        for (int i = piece * kTogether; i < std::min(count, (piece + 1) * kTogether); ++i)
+          body(static_cast<std::size_t>(i));
+      });
+    };
+    each([&](std::size_t i) { take(tiles_[asked_[i]], sample); });
+    account();
+    lay_out();
+    each([&](std::size_t i) { give(tiles_[asked_[i]], first_segment_[i]); });
+    if (!asked_.empty()) watch();
+    request();
+    return segments_;
+  }
+
+  TimeNs watermark() const override { return watermark_; }
+  SamplingStatistics statistics() const override { return statistics_; }
+
+ private:
+  void take(TileState& tile, const Sample& sample);
+  void audit(TileState& tile, TimeNs t) const;
+  void settle(TileState& tile) const;
+  double expected_error(const TileTimeline& timeline, std::size_t i) const;
+  void plan(TileState& tile) const;
+  TimeNs after(const TileState& tile, double step) const;
+
+  void account();
+  int pieces(const TileState& tile, std::size_t i) const;
+  void lay_out();
+  void give(TileState& tile, std::size_t first);
+  void watch();
+  void request();
+  bool nearly_due(const TileState& tile, TimeNs t) const;
+
+  AdaptiveSampling options_;
+  SamplingContext context_;
+  double tolerance_;  // of brightness
+  TimeNs shortest_, longest_;
+  int columns_, rows_;
+  AddressedRandom random_;
+
+  std::vector<TileState> tiles_;
+  std::optional<SampleRequest> request_;
+  std::vector<std::uint32_t> asked_;  // tiles of the request
+
+  std::vector<Image<float>> layers_;  // irradiance at the ends of segments: of each tile, one after the other
+  std::vector<Segment> segments_;
+  std::vector<std::size_t> first_segment_;  // of each tile that was asked for
+
+  double safety_ = 1;  // what audits find, relative to what checks let expect
+  double audited_ = 0, expected_ = 0;
+  LogHistogram errors_;
+  double error_sum_ = 0, error_weight_ = 0, error_max_ = 0;
+  TimeNs watermark_;
+  SamplingStatistics statistics_;
+};
+
+/// Takes a tile's new sample, and decides how far the tile is known and what it needs next.
+void AdaptiveSampler::take(TileState& tile, const Sample& sample) {
+  const bool ahead = tile.reason == Reason::next;
+  tile.timeline.insert(sample.t, sample.irradiance);
+  if (tile.reason == Reason::audit) audit(tile, sample.t);
+  if (ahead) tile.speed = fastest_in(sample, tile.timeline.tile());
+  settle(tile);
+}
+
+/// Looks what the error of the audited interval was: the sample at t was taken for that.
+void AdaptiveSampler::audit(TileState& tile, TimeNs t) const {
+  const TileTimeline& timeline = tile.timeline;
+  std::size_t i = tile.done;
+  while (timeline.time(i) != t) ++i;
+  timeline.errors(i, tile.audit);
+  tile.audited_error = timeline.surprise(i);
+  tile.audit_duration = timeline.time(i + 1) - timeline.time(i - 1);
+}
+
+/// The error between samples i and i + 1, as far as their own surprises tell, which belong to longer intervals: it goes
+/// with the second power of the length.
+double AdaptiveSampler::expected_error(const TileTimeline& timeline, std::size_t i) const {
+  const auto h = static_cast<double>(timeline.time(i + 1) - timeline.time(i));
+  double most = 0;
+  for (const std::size_t k : {i, i + 1}) {
+    if (k == 0 || k + 1 >= timeline.size()) continue;
+    const auto left = static_cast<double>(timeline.time(k) - timeline.time(k - 1));
+    const auto right = static_cast<double>(timeline.time(k + 1) - timeline.time(k));
+    most = std::max(most, timeline.surprise(k) * std::min(1.0, h * h / (4 * left * right)));
+  }
+  return most * safety_;
+}
+
+/// Finds how far the tile is known well enough, and its next sample.
+void AdaptiveSampler::settle(TileState& tile) const {
+  const TileTimeline& timeline = tile.timeline;
+  const bool complete = timeline.time(timeline.size() - 1) >= context_.span.end;
+  tile.until = tile.done;
+  for (std::size_t i = tile.done; i + 1 < timeline.size(); ++i) {
+    if (i + 2 >= timeline.size() && !complete) break;  // what comes behind is needed to judge it
+    const TimeNs t0 = timeline.time(i), h = timeline.time(i + 1) - t0;
+    const double error = expected_error(timeline, i);
+    if (error > tolerance_ && h >= 2 * shortest_) {
+      tile.reason = Reason::bisection, tile.due = t0 + h / 2;
+      return;
+    }
+    if (error > tolerance_) ++tile.held;
+    const auto draw = static_cast<std::uint64_t>(t0 - context_.span.start);
+    if (t0 > tile.audited && h >= 2 * shortest_ && i > 0 && random_.bits(0, draw)[0] % kAuditOneIn == 0) {
+      tile.reason = Reason::audit, tile.due = t0 + h / 2;
+      tile.audited = timeline.time(i + 1) - 1, tile.expected_error = error / safety_;
+      return;
+    }
+    tile.until = i + 1;
+  }
+  tile.reason = Reason::next;
+  if (complete) {
+    tile.due = kNever;
+  } else {
+    plan(tile);
+  }
+}
+
+/// Chooses the time of the tile's next sample.
+void AdaptiveSampler::plan(TileState& tile) const {
+  const TileTimeline& timeline = tile.timeline;
+  const std::size_t last = timeline.size() - 1;
+  double step = static_cast<double>(longest_);
+  if (last >= 2) {
+    const auto left = static_cast<double>(timeline.time(last - 1) - timeline.time(last - 2));
+    const auto right = static_cast<double>(timeline.time(last) - timeline.time(last - 1));
+    const double error = std::max(timeline.surprise(last - 1) * safety_, 1e-12);
+    const double wanted = 2 * std::sqrt(left * right * kAim * tolerance_ / error);
+    step = std::min(std::clamp(wanted, 0.5 * right, 2 * right), step);
+  } else {
+    step = std::min(step, 0.25 * options_.max_motion_px / tile.speed * kNsPerS);
+  }
+  tile.due = after(tile, std::min(step, options_.max_motion_px / tile.speed * kNsPerS));
+}
+
+/// The time `step` ns after the tile's last sample, within the bounds.
+TimeNs AdaptiveSampler::after(const TileState& tile, double step) const {
+  const auto h = std::clamp(static_cast<TimeNs>(std::min(step, 1e18)), shortest_, longest_);
+  return std::min(tile.timeline.time(tile.timeline.size() - 1) + h, context_.span.end);
+}
+
+/// Adds up what the tiles found.
+void AdaptiveSampler::account() {
+  for (const std::uint32_t index : asked_) {
+    TileState& tile = tiles_[index];
+    statistics_.held_to_max_rate += std::exchange(tile.held, 0);
+    if (tile.audited_error < 0) continue;
+    const auto weight = static_cast<double>(tile.audit_duration);
+    for (const float error : tile.audit) {
+      const double size = std::fabs(static_cast<double>(error));
+      errors_.add(size, weight);
+      error_sum_ += size * weight, error_weight_ += weight, error_max_ = std::max(error_max_, size);
+    }
+    // What is far below the tolerance tells nothing of what is near to it.
+    if (std::max(tile.audited_error, tile.expected_error) > 0.1 * tolerance_) {
+      constexpr double kMemory = 0.99;
+      audited_ = kMemory * audited_ + tile.audited_error, expected_ = kMemory * expected_ + tile.expected_error;
+      safety_ = std::clamp((audited_ + tolerance_) / (expected_ + tolerance_), 0.25, 4.0);
+    }
+    tile.audited_error = -1;
+    statistics_.measured_error = MeasuredError{error_sum_ / error_weight_, errors_.quantile(0.99), error_max_};
+  }
+}
+
+/// Into how many straight pieces the interval behind sample i is cut for the pixels.
+int AdaptiveSampler::pieces(const TileState& tile, std::size_t i) const {
+  const double bow = tile.timeline.bow(i), straight = 0.08 * tolerance_;
+  return bow <= straight ? 1 : (bow <= 4 * straight ? 2 : 4);
+}
+
+/// Makes the list of the segments to give.
+void AdaptiveSampler::lay_out() {
+  segments_.clear();
+  first_segment_.clear();
+  std::size_t layers = 0;
+  for (const std::uint32_t index : asked_) {
+    TileState& tile = tiles_[index];
+    first_segment_.push_back(segments_.size());
+    const TileTimeline& timeline = tile.timeline;
+    if (!tile.begun) segments_.push_back({timeline.tile(), timeline.time(0), timeline.time(0), nullptr, nullptr});
+    for (std::size_t i = tile.done; i < tile.until; ++i) {
+      const TimeNs t0 = timeline.time(i), h = timeline.time(i + 1) - t0;
+      const int count = h >= 4 ? pieces(tile, i) : 1;
+      for (int k = 0; k < count; ++k)
+        segments_.push_back({timeline.tile(), t0 + h * k / count, t0 + h * (k + 1) / count, nullptr, nullptr});
+    }
+    layers = std::max(layers, segments_.size() - first_segment_.back() + 1);
+  }
+  while (layers_.size() < layers) layers_.emplace_back(context_.width, context_.height);
+}
+
+/// Fills in the irradiance of a tile's segments, of which the first is given.
+void AdaptiveSampler::give(TileState& tile, std::size_t first) {
+  TileTimeline& timeline = tile.timeline;
+  std::size_t layer = 0, segment = first;
+  timeline.write(tile.done, layers_[0]);
+  if (!tile.begun) {
+    segments_[segment].irradiance0 = segments_[segment].irradiance1 = layers_.data();
+    ++segment;
+    tile.begun = true;
+  }
+  for (std::size_t i = tile.done; i < tile.until; ++i) {
+    const TimeNs t1 = timeline.time(i + 1);
+    int count = 0;
+    for (std::size_t s = segment; s < segments_.size() && segments_[s].tile == timeline.tile() && segments_[s].t1 <= t1;
+         ++s)
+      ++count;
+    for (int k = 1; k <= count; ++k) {
+      if (k < count) {
+        timeline.write_between(i, 4 * k / count, layers_[layer + 1]);
+      } else {
+        timeline.write(i + 1, layers_[layer + 1]);
+      }
+      segments_[segment].irradiance0 = &layers_[layer], segments_[segment].irradiance1 = &layers_[layer + 1];
+      ++segment, ++layer;
+    }
+  }
+  tile.done = timeline.forget_before(tile.until);
+}
+
+/// Brings forward the tiles that content of others may come into.
+void AdaptiveSampler::watch() {
+  const auto arrival = [&](const TileState& from, double gap) {
+    return from.timeline.time(from.timeline.size() - 1) +
+           static_cast<TimeNs>(std::min((gap + options_.max_motion_px) / from.speed * kNsPerS, 1e18));
+  };
+  for (const std::uint32_t index : asked_) {
+    TileState& own = tiles_[index];
+    const int column = static_cast<int>(index) % columns_, row = static_cast<int>(index) / columns_;
+    for (int y = std::max(row - kReach, 0); y <= std::min(row + kReach, rows_ - 1); ++y) {
+      for (int x = std::max(column - kReach, 0); x <= std::min(column + kReach, columns_ - 1); ++x) {
+        TileState& other = tiles_[static_cast<std::size_t>(y * columns_ + x)];
+        const double gap = options_.tile_px * std::max(std::max(std::abs(x - column), std::abs(y - row)) - 1, 0);
+        const auto bring_forward = [&](TileState& tile, TimeNs t) {
+          if (tile.reason != Reason::next || tile.due >= context_.span.end || t >= tile.due) return;
+          const TimeNs last = tile.timeline.time(tile.timeline.size() - 1);
+          tile.due = after(tile, static_cast<double>(std::max<TimeNs>(t - last, 0)));
+        };
+        if (own.speed > 0) bring_forward(other, arrival(own, gap));
+        if (other.speed > 0 && other.timeline.size() > 0) bring_forward(own, arrival(other, gap));
+      }
+    }
+  }
+}
+
+/// Is the tile's next sample due so soon after t that it can be taken with others?
+bool AdaptiveSampler::nearly_due(const TileState& tile, TimeNs t) const {
+  if (tile.due == kNever || tile.timeline.size() == 0) return false;
+  const TimeNs last = tile.timeline.time(tile.timeline.size() - 1);
+  return t - last >= shortest_ && static_cast<double>(tile.due - t) <= kSlack * static_cast<double>(tile.due - last);
+}
+
+/// Asks for the tiles that are due first.
+void AdaptiveSampler::request() {
+  TimeNs t = kNever, known = context_.span.end;
+  for (const TileState& tile : tiles_) {
+    t = std::min(t, tile.due);
+    known = std::min(known, tile.timeline.size() > 0 ? tile.timeline.time(tile.done) : context_.span.start);
+  }
+  watermark_ = known;
+  asked_.clear();
+  if (t == kNever) {
+    request_.reset();
+    return;
+  }
+  request_ = SampleRequest{t, {}};
+  for (std::size_t i = 0; i < tiles_.size(); ++i) {
+    TileState& tile = tiles_[i];
+    if (tile.due != t && !(tile.reason == Reason::next && nearly_due(tile, t))) continue;
+    asked_.push_back(static_cast<std::uint32_t>(i));
+    request_->tiles.push_back(tile.timeline.tile());
+    if (tile.reason == Reason::bisection) ++statistics_.bisections;
+    if (tile.reason == Reason::audit) ++statistics_.audits;
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<Sampler> make_adaptive_sampler(const AdaptiveSampling& options, const SamplingContext& context) {
+  return std::make_unique<AdaptiveSampler>(options, context);
+}
+
+}  // namespace esim

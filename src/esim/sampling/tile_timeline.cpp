@@ -1,0 +1,165 @@
+#include "esim/sampling/tile_timeline.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "esim/core/fast_log.h"
+
+namespace esim {
+namespace {
+
+/// exp(x) for the small x that bows are; beyond 4, as at 4.
+inline float small_exponential(float x) {
+  float y = 0.25F * x;
+  y = y < 1 ? y : 1;
+  y = y > -1 ? y : -1;
+  const float root = 1 + y * (1 + y * (0.5F + y * (1.0F / 6 + y * (1.0F / 24))));
+  return (root * root) * (root * root);
+}
+
+/// 2 (mean of fourth powers)^(1/4).
+double size_of_errors(float sum_of_fourth_powers, std::size_t count) {
+  return 2 * std::sqrt(std::sqrt(static_cast<double>(sum_of_fourth_powers) / static_cast<double>(count)));
+}
+
+}  // namespace
+
+/// The bow between two samples: per pixel, c h^2 as a weighted sum of the brightness at four samples.
+struct TileTimeline::Bow {
+  const float *before, *first, *last, *after;
+  float weight_before = 0, weight_first = 0, weight_last = 0, weight_after = 0;
+
+  float operator()(std::size_t k) const {
+    return weight_before * before[k] + weight_first * first[k] + weight_last * last[k] + weight_after * after[k];
+  }
+};
+
+TileTimeline::Bow TileTimeline::bow_between(std::size_t first, std::size_t last) const {
+  const bool has_before = first > 0, has_after = last + 1 < samples_.size();
+  const auto values = [&](std::size_t i) { return samples_[i].brightness.data(); };
+  Bow bow{values(has_before ? first - 1 : first), values(first), values(last), values(has_after ? last + 1 : last)};
+  const auto h = static_cast<double>(samples_[last].t - samples_[first].t);
+  const double share = has_before && has_after ? 0.5 : 1.0;
+  // h^2 times the second divided difference of three samples, one of them `gap` away from the interval.
+  const auto add = [&](double gap, float& outer, float& near, float& far) {
+    const double scale = share * 2 * h * h / (h + gap);
+    outer += static_cast<float>(scale / gap), far += static_cast<float>(scale / h);
+    near -= static_cast<float>(scale / gap + scale / h);
+  };
+  if (has_before) {
+    add(static_cast<double>(samples_[first].t - samples_[first - 1].t), bow.weight_before, bow.weight_first,
+        bow.weight_last);
+  }
+  if (has_after) {
+    add(static_cast<double>(samples_[last + 1].t - samples_[last].t), bow.weight_after, bow.weight_last,
+        bow.weight_first);
+  }
+  return bow;
+}
+
+void TileTimeline::insert(TimeNs t, const Image<float>& irradiance) {
+  Sample sample;
+  if (!unused_.empty()) sample = std::move(unused_.back()), unused_.pop_back();
+  const auto width = static_cast<std::size_t>(tile_.width);
+  sample.t = t, sample.surprise = 0;
+  sample.irradiance.resize(width * static_cast<std::size_t>(tile_.height));
+  sample.brightness.resize(sample.irradiance.size());
+  for (int y = 0; y < tile_.height; ++y) {
+    std::copy_n(irradiance.row(tile_.y + y) + tile_.x, width,
+                sample.irradiance.data() + static_cast<std::size_t>(y) * width);
+  }
+  const float eps = log_eps_;
+  for (std::size_t k = 0; k < sample.irradiance.size(); ++k) {
+    sample.brightness[k] = fast_log(std::max(sample.irradiance[k] + eps, 1e-30F));
+  }
+  auto place = samples_.end();
+  while (place != samples_.begin() && std::prev(place)->t > t) --place;
+  place = samples_.insert(place, std::move(sample));
+  const auto at = static_cast<std::size_t>(place - samples_.begin());
+  for (std::size_t i = at == 0 ? 0 : at - 1; i <= at + 1 && i < samples_.size(); ++i) measure(i);
+}
+
+std::size_t TileTimeline::forget_before(std::size_t i) {
+  if (i < 2) return i;
+  const auto last = samples_.begin() + static_cast<std::ptrdiff_t>(i) - 1;
+  std::move(samples_.begin(), last, std::back_inserter(unused_));
+  samples_.erase(samples_.begin(), last);
+  return 1;
+}
+
+void TileTimeline::errors(std::size_t i, std::vector<float>& out) const {
+  const Bow bow = bow_between(i - 1, i + 1);
+  const TimeNs t0 = samples_[i - 1].t, t1 = samples_[i + 1].t;
+  const auto f = static_cast<float>(static_cast<double>(samples_[i].t - t0) / static_cast<double>(t1 - t0));
+  const float g = 0.5F * f * (1 - f);
+  const float* const seen = samples_[i].brightness.data();
+  out.resize(samples_[i].brightness.size());
+#pragma omp simd
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    const float line = bow.first[k] + (bow.last[k] - bow.first[k]) * f;
+    out[k] = line - bow(k) * g - seen[k];
+  }
+}
+
+/// Computes the surprise of a sample.
+void TileTimeline::measure(std::size_t i) {
+  if (i == 0 || i + 1 >= samples_.size()) return;
+  errors(i, errors_);
+  float sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (std::size_t k = 0; k < errors_.size(); ++k) sum += (errors_[k] * errors_[k]) * (errors_[k] * errors_[k]);
+  samples_[i].surprise = size_of_errors(sum, errors_.size());
+}
+
+double TileTimeline::bow(std::size_t i) const {
+  const Bow bow = bow_between(i, i + 1);
+  const std::size_t count = samples_[i].brightness.size();
+  float sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (std::size_t k = 0; k < count; ++k) {
+    const float middle = bow(k) * 0.125F;
+    sum += (middle * middle) * (middle * middle);
+  }
+  return size_of_errors(sum, count);
+}
+
+void TileTimeline::write(std::size_t i, Image<float>& irradiance) const {
+  const auto width = static_cast<std::size_t>(tile_.width);
+  for (int y = 0; y < tile_.height; ++y) {
+    std::copy_n(samples_[i].irradiance.data() + static_cast<std::size_t>(y) * width, width,
+                irradiance.row(tile_.y + y) + tile_.x);
+  }
+}
+
+/// At kQuarter / 4 of the way.
+template <int kQuarter>
+void TileTimeline::write_quarter(std::size_t i, Image<float>& irradiance) const {
+  const Bow bow = bow_between(i, i + 1);
+  constexpr float f = 0.25F * kQuarter, g = 0.5F * f * (1 - f);
+  const float eps = log_eps_;
+  const float *const e0 = samples_[i].irradiance.data(), *const e1 = samples_[i + 1].irradiance.data();
+  const auto width = static_cast<std::size_t>(tile_.width);
+  for (int y = 0; y < tile_.height; ++y) {
+    float* const out = irradiance.row(tile_.y + y) + tile_.x;
+    const std::size_t first = static_cast<std::size_t>(y) * width;
+#pragma omp simd
+    for (std::size_t x = 0; x < width; ++x) {
+      // The line in ln(E + eps) by square roots: in the middle, then in a half.
+      const float from = e0[first + x] + eps, to = e1[first + x] + eps;
+      float line = std::sqrt(from * to);
+      if constexpr (kQuarter != 2) line = std::sqrt(line * (kQuarter < 2 ? from : to));
+      const float e = line * small_exponential(-bow(first + x) * g) - eps;
+      out[x] = e > 0 ? e : 0;
+    }
+  }
+}
+
+void TileTimeline::write_between(std::size_t i, int quarter, Image<float>& irradiance) const {
+  if (quarter == 1) write_quarter<1>(i, irradiance);
+  if (quarter == 2) write_quarter<2>(i, irradiance);
+  if (quarter == 3) write_quarter<3>(i, irradiance);
+}
+
+}  // namespace esim

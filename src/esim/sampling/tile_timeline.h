@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "esim/core/image.h"
+#include "esim/core/time.h"
+
+namespace esim {
+
+/// What is known of a tile's pixels: samples in order of time, and how well each of them could have been foretold from
+/// those around it. Brightness is L = ln(E + log_eps).
+///
+/// Between two samples at distance h, brightness is the straight line less a bow, L(f) = L0 + (L1 - L0) f - c h^2 f (1
+/// - f) / 2, where c is the mean of the second derivatives on both sides: the divided differences of three samples
+/// each. In the middle of samples at equal distances that is the cubic through all four.
+class TileTimeline {
+ public:
+  TileTimeline(const Tile& tile, float log_eps) : tile_(tile), log_eps_(log_eps) {}
+
+  const Tile& tile() const { return tile_; }
+
+  /// Adds a sample at a time of which there is none yet, from an image of the camera's size.
+  void insert(TimeNs t, const Image<float>& irradiance);
+
+  /// Forgets the samples before the one with this index, but for one that bows begin from.
+  /// Returns the index that the sample has then.
+  std::size_t forget_before(std::size_t i);
+
+  std::size_t size() const { return samples_.size(); }
+  TimeNs time(std::size_t i) const { return samples_[i].t; }
+
+  /// How far off brightness at sample i would be had it been interpolated from the others: a measure of the size of the
+  /// larger errors, 2 (mean e^4)^(1/4) over the tile's pixels, which is near the 99th percentile of normal ones. Only
+  /// for samples between others.
+  double surprise(std::size_t i) const { return samples_[i].surprise; }
+
+  /// Errors of that interpolation pixel by pixel, ln units.
+  void errors(std::size_t i, std::vector<float>& out) const;
+
+  /// The same measure of what the bow between samples i and i + 1 adds to the straight line in its middle.
+  double bow(std::size_t i) const;
+
+  /// Writes the irradiance at sample i into the tile's pixels of an image of the camera's size.
+  void write(std::size_t i, Image<float>& irradiance) const;
+
+  /// The same at the place `quarter` / 4 of the way from sample i to the next.
+  void write_between(std::size_t i, int quarter, Image<float>& irradiance) const;
+
+ private:
+  struct Sample {
+    TimeNs t = 0;
+    double surprise = 0;
+    std::vector<float> irradiance, brightness;
+  };
+  struct Bow;
+
+  Bow bow_between(std::size_t first, std::size_t last) const;
+  void measure(std::size_t i);
+  template <int kQuarter>
+  void write_quarter(std::size_t i, Image<float>& irradiance) const;
+
+  Tile tile_;
+  float log_eps_;
+  std::vector<Sample> samples_;
+  std::vector<Sample> unused_;  // memory
+  std::vector<float> errors_;   // likewise
+};
+
+}  // namespace esim

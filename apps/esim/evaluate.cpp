@@ -142,7 +142,7 @@ void add_sampling(CLI::App& evaluate, int& exit_code) {
           ->type_name("SCENARIO.yaml");
   command
       ->add_option("--panorama", arguments->panorama,
-                   "Instead: the paper's random rotations in this equirectangular image")
+                   "Instead: the paper's random rotations in this equirectangular image of 8 bits")
       ->type_name("IMAGE")
       ->excludes(file);
   command->add_option("-o,--out", arguments->out, "Folder to write")->required()->type_name("DIR");

@@ -115,6 +115,7 @@ TEST(PaperScenario, MovesAsThePaperSays) {
   EXPECT_NEAR(windows[2].mean_px_per_s, 580, 0.05 * 580);
   EXPECT_NEAR(motion.fastest_turn_deg_per_s, 1000, 50);
   EXPECT_NEAR(motion.greatest_px_per_s, 4500, 0.08 * 4500);
+  EXPECT_EQ(std::get<PanoramaRendererOptions>(scenario.renderer).median_px, 5) << "as the original's configuration";
 }
 
 SchemeResult scheme(const std::string& family, double frames, double samples, double rmse) {

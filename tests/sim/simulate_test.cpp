@@ -142,6 +142,29 @@ TEST_F(Simulation, EndsEarlyWhenAsked) {
   EXPECT_LE(out.events[0].back().t, summary.end);
 }
 
+TEST_F(Simulation, SeesNoDotsThatAMedianTakesFromThePanorama) {
+  cv::Mat dots(128, 256, CV_8U, cv::Scalar(127));
+  for (int y = 4; y < dots.rows; y += 8) {
+    for (int x = 0; x < dots.cols; x += 8) dots.at<unsigned char>(y, x) = (x / 8 + y / 8) % 2 == 0 ? 255 : 0;
+  }
+  PanoramaRendererOptions renderer;
+  renderer.image = folder_.path() / "dots.png";
+  cv::imwrite(renderer.image.string(), dots);
+  scenario_.renderer = renderer;
+  Collector raw, clean, blurred;
+  run(raw);
+  renderer.median_px = 3;
+  scenario_.renderer = renderer;
+  run(clean);
+  renderer.median_px = 0;
+  renderer.gaussian_px = 50;
+  scenario_.renderer = renderer;
+  run(blurred);
+  EXPECT_GT(raw.events[0].size(), 1000U);
+  EXPECT_EQ(clean.events[0].size(), 0U);
+  EXPECT_EQ(blurred.events[0].size(), 0U);
+}
+
 TEST_F(Simulation, RefusesWhatCannotBeSimulated) {
   const auto error = [&] {
     return test::message_of<UserError>([&] {
@@ -154,12 +177,17 @@ TEST_F(Simulation, RefusesWhatCannotBeSimulated) {
   scenario_.cameras[0].sampling = FlowSampling{0.5, {100, 50}};
   EXPECT_TRUE(test::contains(error(), "min_rate_hz"));
   scenario_.cameras[0].sampling = FlowSampling{};
+  std::get<PanoramaRendererOptions>(scenario_.renderer).median_px = 2;
+  EXPECT_TRUE(test::contains(error(), "use an odd number"));
   PlaneRendererOptions behind;
   behind.image = folder_.path() / "p.png";
   behind.pose.position = {-5, 0, 0};
   behind.pose.look_at = Eigen::Vector3d(0, 0, 0);
   scenario_.renderer = behind;
   EXPECT_TRUE(test::contains(error(), "sees nothing"));
+  behind.median_px = 2;
+  scenario_.renderer = behind;
+  EXPECT_TRUE(test::contains(error(), "use an odd number"));
   behind.image = folder_.path() / "q.png";
   scenario_.renderer = behind;
   EXPECT_TRUE(test::contains(error(), "no such file"));

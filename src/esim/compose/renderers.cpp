@@ -47,7 +47,8 @@ RendererFactory factory(const PanoramaRendererOptions& options, const SceneFile&
   require_path(options.image, "image");
   if (!(options.orientation.norm() > 1e-6))
     throw UserError("renderer.orientation: [0, 0, 0, 0] is no orientation; use [0, 0, 0, 1]");
-  const Panorama panorama{std::make_shared<const Texture>(load_luminance(options.image), Wrap::repeat, Wrap::clamp),
+  const Image<float> image = load_luminance(options.image, {options.median_px, options.gaussian_px, true});
+  const Panorama panorama{std::make_shared<const Texture>(image, Wrap::repeat, Wrap::clamp),
                           Eigen::Quaterniond(options.orientation.normalized())};
   return
       [=](const Camera& camera, const Workers& workers) { return make_panorama_renderer(panorama, camera, workers); };
@@ -56,8 +57,9 @@ RendererFactory factory(const PanoramaRendererOptions& options, const SceneFile&
 RendererFactory factory(const PlaneRendererOptions& options, const SceneFile&) {
   require_path(options.image, "image");
   const Wrap wrap = options.endless ? Wrap::repeat : Wrap::clamp;
-  const Poster poster{std::make_shared<const Texture>(load_luminance(options.image), wrap, wrap), pose_of(options.pose),
-                      options.width_m, options.endless, static_cast<float>(options.background)};
+  const Image<float> image = load_luminance(options.image, {options.median_px, options.gaussian_px});
+  const Poster poster{std::make_shared<const Texture>(image, wrap, wrap), pose_of(options.pose), options.width_m,
+                      options.endless, static_cast<float>(options.background)};
   return [=](const Camera& camera, const Workers& workers) { return make_plane_renderer(poster, camera, workers); };
 }
 

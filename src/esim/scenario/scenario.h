@@ -106,6 +106,8 @@ struct PanoramaRendererOptions {
   static constexpr const char* kType = "panorama";
   std::filesystem::path image;
   Eigen::Vector4d orientation = {0, 0, 0, 1};
+  int median_px = 0;
+  double gaussian_px = 0;
 };
 
 /// A textured rectangle.
@@ -115,6 +117,8 @@ struct PlaneRendererOptions {
   double width_m = 1.0;
   PoseOptions pose;
   bool endless = false;
+  int median_px = 0;
+  double gaussian_px = 0;
   double background = 0.2;
 };
 

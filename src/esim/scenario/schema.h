@@ -88,11 +88,19 @@ void describe(Visitor& visit, MeshRendererOptions& o) {
   visit("background", o.background, About{"irradiance where nothing is seen", "", 0, 1e6});
 }
 
+/// The filters of an image (scene/image_file.h, Softening).
+template <class Visitor, class Options>
+void describe_softening(Visitor& visit, Options& o) {
+  visit("median_px", o.median_px, About{"side of a median filter over the image, odd; 0: none", "px", 0, 255});
+  visit("gaussian_px", o.gaussian_px, About{"standard deviation of a blur of the image; 0: none", "px", 0, 100});
+}
+
 template <class Visitor>
 void describe(Visitor& visit, PanoramaRendererOptions& o) {
   visit("image", o.image,
         About{"equirectangular image: its centre is seen along world x, its upper edge at the zenith (z)"});
   visit("orientation", o.orientation, About{"of the panorama in the world, quaternion x y z w"});
+  describe_softening(visit, o);
 }
 
 template <class Visitor>
@@ -101,6 +109,7 @@ void describe(Visitor& visit, PlaneRendererOptions& o) {
   visit("width_m", o.width_m, About{"width of the poster; the height follows from the image", "m", 0, 1e6, true});
   visit("pose", o.pose, About{"of the poster: origin at its centre, x right and y down the image, z into the wall"});
   visit("endless", o.endless, About{"repeat the image over the whole plane"});
+  describe_softening(visit, o);
   visit("background", o.background, About{"irradiance beside the poster", "", 0, 1e6});
 }
 
@@ -120,8 +129,7 @@ void describe(Visitor& visit, LayerOptions& o) {
   visit("units", o.units,
         About{"pixel: scale 1 makes a texel a pixel; sensor: it fills the sensor, whose width and height are 1"});
   visit("beyond", o.beyond, About{"what is seen beyond the image's edges"});
-  visit("median_px", o.median_px, About{"side of a median filter over the image, odd; 0: none", "px", 0, 255});
-  visit("gaussian_px", o.gaussian_px, About{"standard deviation of a blur of the image; 0: none", "px", 0, 100});
+  describe_softening(visit, o);
   visit("interpolation", o.interpolation, About{"motion between keyframes: natural cubic splines, or constant rates"});
   visit("keyframes", o.keyframes,
         About{"in order of time; the layer rests before the first and after the last (default: in the middle)"});

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -179,11 +180,22 @@ void require_file(const std::filesystem::path& path) {
 
 constexpr const char* kMedianNeedsBytes = "is not of 8 bits, which a median needs; leave the median out";
 
-void take_median(const std::filesystem::path& path, int side, cv::Mat& image) {
+/// Applies a filter that reaches so many pixels far; `around`: across the left and right edge.
+template <typename Filter>
+void apply(cv::Mat& image, int reach, bool around, const Filter& filter) {
+  if (!around) return filter(image);
+  cv::Mat wide;
+  cv::copyMakeBorder(image, wide, 0, 0, reach, reach, cv::BORDER_WRAP);
+  filter(wide);
+  wide.colRange(reach, reach + image.cols).copyTo(image);
+}
+
+void take_median(const std::filesystem::path& path, const Softening& softening, cv::Mat& image) {
+  const int side = softening.median_px;
   if (side <= 1) return;
   if (side % 2 == 0) fail(path, fmt::format("a median over {} px has no middle; use an odd number", side));
   if (image.depth() != CV_8U) fail(path, kMedianNeedsBytes);
-  cv::medianBlur(image, image, side);
+  apply(image, side / 2, softening.around, [&](cv::Mat& pixels) { cv::medianBlur(pixels, pixels, side); });
 }
 
 /// Decoding laid `coded` over white, light + (1 - alpha): takes the white away.
@@ -197,9 +209,36 @@ void separate_alpha(const cv::Mat& coded, TranslucentImage& image) {
   }
 }
 
-void blur(Image<float>& image, double sigma_px) {
-  const cv::Mat matrix(image.height(), image.width(), CV_32F, image.data());
-  cv::GaussianBlur(matrix, matrix, {0, 0}, sigma_px);
+void blur(const Softening& softening, Image<float>& image) {
+  const double sigma = softening.gaussian_px;
+  if (image.empty() || !(sigma > 0)) return;
+  constexpr double kReach = 5;  // standard deviations: OpenCV's kernel ends before
+  cv::Mat matrix(image.height(), image.width(), CV_32F, image.data());
+  apply(matrix, static_cast<int>(std::ceil(kReach * sigma)), softening.around, [&](cv::Mat& pixels) {
+    cv::GaussianBlur(pixels, pixels, {0, 0}, sigma);
+  });
+}
+
+/// Luminance of an image after its median, and the pixels that it was decoded from: none of OpenEXR.
+struct Decoded {
+  Image<float> luminance;
+  cv::Mat pixels;
+};
+
+Decoded load_after_median(const std::filesystem::path& path, const Softening& softening) {
+  require_file(path);
+  Decoded result;
+  Planes planes;
+  if (lower_case_extension(path) == ".exr") {
+    if (softening.median_px > 1) fail(path, kMedianNeedsBytes);
+    load_exr(path, Encoding::automatic, false, planes);
+  } else {
+    result.pixels = read_pixels(path);
+    take_median(path, softening, result.pixels);
+    decode_pixels(path, result.pixels, Encoding::automatic, false, planes);
+  }
+  result.luminance = std::move(planes.front());
+  return result;
 }
 
 }  // namespace
@@ -225,30 +264,18 @@ void decode_planes(std::span<const std::byte> content, const std::string& name, 
   decode_pixels(name, image, encoding, colour, planes);
 }
 
-Image<float> load_luminance(const std::filesystem::path& path) {
-  Planes planes;
-  load_planes(path, Encoding::automatic, false, planes);
-  return std::move(planes.front());
+Image<float> load_luminance(const std::filesystem::path& path, const Softening& softening) {
+  Image<float> luminance = load_after_median(path, softening).luminance;
+  blur(softening, luminance);
+  return luminance;
 }
 
 TranslucentImage load_translucent(const std::filesystem::path& path, const Softening& softening) {
-  require_file(path);
-  TranslucentImage result;
-  if (lower_case_extension(path) == ".exr") {
-    if (softening.median_px > 1) fail(path, kMedianNeedsBytes);
-    result.light = load_luminance(path);
-  } else {
-    cv::Mat image = read_pixels(path);
-    take_median(path, softening.median_px, image);
-    Planes planes;
-    decode_pixels(path, image, Encoding::automatic, false, planes);
-    result.light = std::move(planes.front());
-    if (image.channels() == 4 && image.depth() != CV_32F) separate_alpha(image, result);
-  }
-  if (softening.gaussian_px > 0) {
-    blur(result.light, softening.gaussian_px);
-    if (!result.alpha.empty()) blur(result.alpha, softening.gaussian_px);
-  }
+  auto [luminance, pixels] = load_after_median(path, softening);
+  TranslucentImage result{std::move(luminance), {}};
+  if (pixels.channels() == 4 && pixels.depth() != CV_32F) separate_alpha(pixels, result);
+  blur(softening, result.light);
+  blur(softening, result.alpha);
   return result;
 }
 

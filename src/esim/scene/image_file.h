@@ -21,8 +21,16 @@ void load_planes(const std::filesystem::path& path, Encoding encoding, bool colo
 void decode_planes(std::span<const std::byte> content, const std::string& name, Encoding encoding, bool colour,
                    Planes& planes);
 
-/// The same as luminance, with automatic encoding.
-Image<float> load_luminance(const std::filesystem::path& path);
+/// Filters for an image that is noisy or too sharp.
+struct Softening {
+  int median_px = 0;       ///< side of a square, odd: each channel's median over it, before decoding; up to 1: none
+  double gaussian_px = 0;  ///< standard deviation of a blur of the light; 0: none
+  bool around = false;     ///< the image goes on at its left edge where it ends at the right, as a panorama does
+};
+
+/// The same as luminance, with automatic encoding. Throws UserError as well for a median of an image that is not of
+/// 8 bits, or over an even number of pixels.
+Image<float> load_luminance(const std::filesystem::path& path, const Softening& softening = {});
 
 /// An image that lets through what is behind it.
 struct TranslucentImage {
@@ -30,14 +38,7 @@ struct TranslucentImage {
   Image<float> alpha;  ///< share of what is behind that is covered, linear; empty: all of it, everywhere
 };
 
-/// Filters for an image that is noisy or too sharp.
-struct Softening {
-  int median_px = 0;       ///< side of a square, odd: each channel's median over it, before decoding; up to 1: none
-  double gaussian_px = 0;  ///< standard deviation of a blur of the light; 0: none
-};
-
-/// Reads an image file as luminance, like load_luminance, keeping the transparency of 8- and 16-bit files. Throws
-/// UserError as well for a median of an image that is not of 8 bits.
+/// Reads an image file as luminance, like load_luminance, keeping the transparency of 8- and 16-bit files.
 TranslucentImage load_translucent(const std::filesystem::path& path, const Softening& softening = {});
 
 }  // namespace esim

@@ -111,12 +111,27 @@ void generated_room(benchmark::State& state) {
 /// The same with OpenGL, whatever device there is. Arguments: triangles in thousands, tiles.
 void generated_room_gl(benchmark::State& state) {
   if (!test::has_gl()) return state.SkipWithError("there is no OpenGL");
-  const Workers workers(2);
-  const auto scene =
-      std::make_shared<Scene>(still_scene(bench::generated_room(static_cast<int>(1000 * state.range(0)))));
-  const auto renderer = make_gl_renderer(scene, {}, kCamera, workers);
+  const Scene scene = still_scene(bench::generated_room(static_cast<int>(1000 * state.range(0))));
+  const auto renderer = make_gl_renderer(scene, {}, kCamera);
   state.SetLabel(renderer->traits().device);
   render_frames(state, *renderer, test::moving_camera(), every_nth_tile(static_cast<int>(state.range(1))));
+}
+
+/// With light and shadows; argument: what casts them, 0 nothing, 1 a sun, 2 a lamp, 3 a sun on things that move.
+void shadows_gl(benchmark::State& state) {
+  if (!test::has_gl()) return state.SkipWithError("there is no OpenGL");
+  const bool moves = state.range(0) == 3;
+  Scene scene = moves ? test::moving_scene() : still_scene(bench::generated_room(10000));
+  scene.lighting = Lighting{};
+  scene.lighting->shadows = state.range(0) > 0;
+  if (state.range(0) == 2) {
+    scene.lighting->points.push_back({{0.5F, 0.5F, 0.5F}, 1});
+  } else {
+    scene.lighting->suns.push_back({{0.3F, 0.2F, -1}, 1});
+  }
+  const auto renderer = make_gl_renderer(scene, {}, kCamera);
+  const auto objects = moves ? test::moving_objects(0) : std::vector<Kinematics>();
+  render_frames(state, *renderer, test::moving_camera(), every_nth_tile(1), objects);
 }
 
 BENCHMARK(panorama)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
@@ -143,6 +158,7 @@ BENCHMARK(generated_room_gl)
     ->Args({127, 10})
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
+BENCHMARK(shadows_gl)->DenseRange(0, 3)->UseRealTime()->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace esim

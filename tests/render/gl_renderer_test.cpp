@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "esim/core/error.h"
+#include "esim/render/motion_field.h"
 #include "render/scenes.h"
 
 namespace esim {
@@ -75,7 +76,7 @@ Sample render(Renderer& renderer, const RenderRequest& request) {
 
 void expect_agreement(const Scene& scene, const RenderRequest& request, const Camera& model) {
   const auto cast = make_raycast_renderer(build_raycast_scene(scene), {}, model, test::two_threads());
-  const auto gl = make_gl_renderer(std::make_shared<Scene>(scene), {}, model, test::two_threads());
+  const auto gl = make_gl_renderer(scene, {}, model);
   const Sample expected = render(*cast, request), sample = render(*gl, request);
   const Difference difference = compare(expected, sample);
   EXPECT_LT(difference.mean_irradiance, 0.01);
@@ -123,14 +124,39 @@ TEST_F(GlRendererTest, AgreesWithTheRayCasterOnTheOriginalsRoom) {
   }
 }
 
+TEST_F(GlRendererTest, TheMotionFieldIsThatOfTheProcessor) {
+  Scene scene = test::moving_scene();
+  scene.objects[0].mesh.triangles.resize(6);  // three walls: there is an outside, too
+  for (int kind = 0; kind < 4; ++kind) {
+    for (const int samples : {1, 4}) {
+      SCOPED_TRACE(testing::Message() << "distortion " << kind << ", " << samples << " samples");
+      const Camera model = test::distorted_camera(kind);
+      const RenderRequest request = request_with_objects(model);
+      const Sample sample = render(*make_gl_renderer(scene, {0.2F, samples, {}}, model), request);
+      Sample expected = sample;
+      motion_field(PixelRays(model), request, request.tiles[0], expected);
+      int outside = 0;
+      for (int y = 0; y < model.height; ++y) {
+        for (int x = 0; x < model.width; ++x) {
+          const double off =
+              std::hypot(sample.flow_x(x, y) - expected.flow_x(x, y), sample.flow_y(x, y) - expected.flow_y(x, y));
+          ASSERT_LT(off, 0.01 + 1e-5 * std::hypot(expected.flow_x(x, y), expected.flow_y(x, y))) << x << ", " << y;
+          if (std::isinf(sample.depth(x, y))) ++outside;
+        }
+      }
+      EXPECT_GT(outside, 100);
+    }
+  }
+}
+
 TEST_F(GlRendererTest, SeveralSamplesPerPixelSmoothEdges) {
   const Camera model = test::distorted_camera(0);
   const RenderRequest request = request_with_objects(model);
-  const auto scene = std::make_shared<Scene>(test::moving_scene());
-  const auto exact = make_raycast_renderer(build_raycast_scene(*scene), {0.2F, 13}, model, test::two_threads());
+  const Scene scene = test::moving_scene();
+  const auto exact = make_raycast_renderer(build_raycast_scene(scene), {0.2F, 13}, model, test::two_threads());
   const Sample expected = render(*exact, request);
   const auto error = [&](int samples) {
-    const auto gl = make_gl_renderer(scene, {0.2F, samples, {}}, model, test::two_threads());
+    const auto gl = make_gl_renderer(scene, {0.2F, samples, {}}, model);
     const Sample sample = render(*gl, request);
     double sum = 0;
     for (std::size_t i = 0; i < sample.irradiance.size(); ++i)
@@ -143,15 +169,14 @@ TEST_F(GlRendererTest, SeveralSamplesPerPixelSmoothEdges) {
 TEST_F(GlRendererTest, RenderersInManyThreadsDoNotShareAContext) {
   const Camera model = test::distorted_camera(1);
   const RenderRequest request = request_with_objects(model);
-  const auto scene = std::make_shared<Scene>(test::moving_scene());
-  const auto alone = make_gl_renderer(scene, {}, model, test::two_threads());
+  const Scene scene = test::moving_scene();
+  const auto alone = make_gl_renderer(scene, {}, model);
   const Sample expected = render(*alone, request);
   std::vector<Sample> samples(4);
   std::vector<std::thread> threads;
   for (Sample& sample : samples) {
     threads.emplace_back([&] {
-      const Workers one(1);
-      const auto renderer = make_gl_renderer(scene, {}, model, one);
+      const auto renderer = make_gl_renderer(scene, {}, model);
       for (int i = 0; i < 5; ++i) renderer->render(request, sample);
     });
   }
@@ -169,14 +194,10 @@ TEST_F(GlRendererTest, RenderersInManyThreadsDoNotShareAContext) {
 
 TEST_F(GlRendererTest, SaysWhatItCannotDo) {
   const Camera model = test::distorted_camera(0);
-  const auto scene = std::make_shared<Scene>(test::moving_scene());
-  EXPECT_THROW(make_gl_renderer(scene, {0.2F, 1, 31}, model, test::two_threads()), UserError);
-  auto shadows = std::make_shared<Scene>(*scene);
-  shadows->lighting = Lighting{};
-  shadows->lighting->shadows = true;
-  EXPECT_THROW(make_gl_renderer(shadows, {}, model, test::two_threads()), UserError);
+  const Scene scene = test::moving_scene();
+  EXPECT_THROW(make_gl_renderer(scene, {0.2F, 1, 31}, model), UserError);
   Camera fisheye{346, 260, 110, 110, 172.5, 129.5, Equidistant{}};  // 180 degrees wide
-  EXPECT_THROW(make_gl_renderer(scene, {}, fisheye, test::two_threads()), UserError);
+  EXPECT_THROW(make_gl_renderer(scene, {}, fisheye), UserError);
 }
 
 TEST_F(GlRendererTest, NamesItsDevice) {

@@ -73,6 +73,33 @@ TEST_P(EveryRendererOfSpace, MotionFieldIsTheVelocityOfTheImageOfWhatIsSeen) {
   EXPECT_LT(rmse, 0.05);
 }
 
+TEST_P(EveryRenderer, SeveralRenderingsMayBeUnderWay) {
+  // Of one renderer and of two, finished in another order than started; one is never finished.
+  const auto other = test::make_renderer(name_, model_);
+  const auto request_at = [&](double dt) {
+    return RenderRequest{
+        test::kTime + to_ns(dt), later(dt), {{0, 0, model_.width, model_.height}}, test::objects_of(name_, dt)};
+  };
+  const auto expect_that_of = [&](double dt, Rendering& rendering) {
+    Sample sample, expected;
+    rendering.finish(sample);
+    renderer_->render(request_at(dt), expected);
+    EXPECT_EQ(sample.t, expected.t);
+    EXPECT_TRUE(std::ranges::equal(sample.irradiance.pixels(), expected.irradiance.pixels()));
+    EXPECT_TRUE(std::ranges::equal(sample.depth.pixels(), expected.depth.pixels()));
+    EXPECT_TRUE(std::ranges::equal(sample.flow_x.pixels(), expected.flow_x.pixels()));
+    EXPECT_TRUE(std::ranges::equal(sample.object.pixels(), expected.object.pixels()));
+  };
+  const auto first = renderer_->start(request_at(0));
+  const auto beside = other->start(request_at(0.1));
+  auto unwanted = renderer_->start(request_at(0.2));
+  const auto last = renderer_->start(request_at(0.3));
+  expect_that_of(0.3, *last);
+  unwanted.reset();
+  expect_that_of(0.1, *beside);
+  expect_that_of(0, *first);
+}
+
 TEST_P(EveryRenderer, BrightnessMovesWithTheMotionField) {
   // Brightness constancy, Eq. 1: dE/dt + <grad E, V> = 0 on a smooth texture. Ties E, Z and V together.
   const Sample sample = test::render(*renderer_, model_, camera_, objects_);

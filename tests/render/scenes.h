@@ -152,7 +152,7 @@ inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Ca
   if (name == "plane") return make_plane_renderer(test_poster(), camera, workers);
   if (name == "sprites") return make_sprites_renderer(test_sprites(), camera, workers);
   const Scene scene = name.starts_with("moving") ? moving_scene() : still_scene(box_mesh());
-  if (name.ends_with("gl")) return make_gl_renderer(std::make_shared<Scene>(scene), {}, camera, workers);
+  if (name.ends_with("gl")) return make_gl_renderer(scene, {}, camera);
   return make_raycast_renderer(build_raycast_scene(scene), {}, camera, workers);
 }
 

@@ -32,9 +32,10 @@ MeshEngine choose_engine(const MeshRendererOptions& options) {
 
 RendererFactory factory(const MeshRendererOptions& options, const SceneFile& file) {
   if (choose_engine(options) == MeshEngine::gl) {
-    const auto scene = std::make_shared<const Scene>(file.scene);
     const GlOptions gl{static_cast<float>(options.background), options.samples_per_pixel, options.gl_device};
-    return [=](const Camera& camera, const Workers& workers) { return make_gl_renderer(scene, gl, camera, workers); };
+    return [gl, scene = std::make_shared<const Scene>(file.scene)](const Camera& camera, const Workers&) {
+      return make_gl_renderer(*scene, gl, camera);
+    };
   }
   const auto scene = build_raycast_scene(file.scene);
   const RaycastOptions raycast{static_cast<float>(options.background), options.samples_per_pixel};

@@ -28,12 +28,6 @@ void prepare(const RenderRequest& request, int width, int height, Sample& sample
   sample.tiles = request.tiles;
 }
 
-void add_motion_field(const RenderRequest& request, const PixelRays& rays, const Workers& workers, Sample& sample) {
-  const std::vector<Tile> bands = cut_into_bands(request.tiles);
-  workers.for_each(static_cast<int>(bands.size()),
-                   [&](int i) { motion_field(rays, request, bands[static_cast<std::size_t>(i)], sample); });
-}
-
 void render_in_bands(const RenderRequest& request, const PixelRays& rays, const Workers& workers, Sample& sample,
                      const std::function<void(const Tile& band)>& shade) {
   render_in_bands(request, rays.x.width(), rays.x.height(), workers, sample, [&](const Tile& band) {

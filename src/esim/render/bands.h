@@ -11,10 +11,6 @@ namespace esim {
 /// What every renderer begins with: makes room in `sample`, and says in it what it answers.
 void prepare(const RenderRequest& request, int width, int height, Sample& sample);
 
-/// Derives V of the request's tiles from their Z, from which object is seen, and from the twists: for renderers that
-/// fill whole tiles at once.
-void add_motion_field(const RenderRequest& request, const PixelRays& rays, const Workers& workers, Sample& sample);
-
 /// What renderers on the CPU share: prepares `sample`, cuts the request's tiles into bands of a few rows, calls `shade`
 /// for each of them in parallel to fill E, Z and, where the request names objects, which of them is seen, and derives V
 /// from that and the twists.

@@ -1,15 +1,9 @@
 #include "esim/render/motion_field.h"
 
 #include <Eigen/Geometry>
-#include <vector>
 
 namespace esim {
 namespace {
-
-/// Motion of the camera relative to something rigid, in the camera frame; m/s and rad/s.
-struct Twist {
-  Eigen::Vector3f v, omega;
-};
 
 Twist relative_to_world(const Kinematics& camera) {
   return {(camera.T_world_body.rotation.conjugate() * camera.velocity_world).cast<float>(),
@@ -54,17 +48,22 @@ inline void fill_row(const PixelRays& rays, int row, int begin, int end, Sample&
 
 }  // namespace
 
+std::vector<Twist> relative_twists(const RenderRequest& request) {
+  std::vector<Twist> twists = {relative_to_world(request.camera)};
+  for (const Kinematics& object : request.objects) twists.push_back(relative_to_object(request.camera, object));
+  return twists;
+}
+
 void motion_field(const PixelRays& rays, const RenderRequest& request, const Tile& tile, Sample& sample) {
-  const Twist world = relative_to_world(request.camera);
+  const std::vector<Twist> twists = relative_twists(request);
   if (request.objects.empty()) {
+    const Twist world = twists[0];
     for (int row = tile.y; row < tile.y + tile.height; ++row) {
       fill_row(rays, row, tile.x, tile.x + tile.width, sample, [world](int) { return world; });
     }
     return;
   }
 
-  std::vector<Twist> twists = {world};
-  for (const Kinematics& object : request.objects) twists.push_back(relative_to_object(request.camera, object));
   for (int row = tile.y; row < tile.y + tile.height; ++row) {
     const std::uint16_t* const seen = sample.object.row(row);
     fill_row(rays, row, tile.x, tile.x + tile.width, sample, [&](int i) -> const Twist& { return twists[seen[i]]; });

@@ -1,9 +1,21 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <vector>
+
 #include "esim/render/pixel_rays.h"
 #include "esim/render/renderer.h"
 
 namespace esim {
+
+/// Motion of the camera relative to something rigid, in the camera frame; m/s and rad/s.
+struct Twist {
+  Eigen::Vector3f v, omega;
+};
+
+/// The camera's twist relative to what a request's pixels may see: to what stands still, then to each object (v and
+/// omega below).
+std::vector<Twist> relative_twists(const RenderRequest& request);
 
 /// Image velocity of the scene as the camera and the scene's objects move (paper, Eq. 4, and V_dyn): fills V of the
 /// tile's pixels from their Z and from which object they see.

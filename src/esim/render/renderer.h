@@ -1,6 +1,8 @@
 #pragma once
 
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "esim/core/image.h"
@@ -33,18 +35,43 @@ struct RendererTraits {
   std::string label() const { return device.empty() ? name : name + " on " + device; }
 };
 
+/// An evaluation under way. It ends before its renderer does; one that is no longer wanted need not be finished.
+class Rendering {
+ public:
+  virtual ~Rendering() = default;
+
+  /// Waits until it is done, and fills E, Z and V of the request's tiles in `sample`, which is resized to the camera's
+  /// image. To be called once at most.
+  virtual void finish(Sample& sample) = 0;
+};
+
 /// Evaluates a scene as one camera sees it. A renderer is made for one camera and one scene, keeps no history, and
-/// never chooses a time: the same request gives the same sample, whatever was asked before and with any number of
-/// threads, and a tile's pixels are the same as in the whole frame.
+/// never chooses a time: the same request gives the same sample, whatever was asked before, whatever else is under way,
+/// and with any number of threads, and a tile's pixels are the same as in the whole frame.
 class Renderer {
  public:
   virtual ~Renderer() = default;
 
   virtual RendererTraits traits() const = 0;
 
-  /// Fills E, Z and V of the request's tiles in `sample`, which is resized to the camera's image. The request names as
-  /// many objects as move in the scene.
-  virtual void render(const RenderRequest& request, Sample& sample) = 0;
+  /// Begins an evaluation, which a graphics card goes on with while the processor does other things. Any number may be
+  /// under way, and be finished in any order. The request names as many objects as move in the scene.
+  virtual std::unique_ptr<Rendering> start(RenderRequest request) = 0;
+
+  /// Starts and finishes at once.
+  void render(RenderRequest request, Sample& sample) { start(std::move(request))->finish(sample); }
+};
+
+/// What renderers on the processor derive from: they compute when the sample is wanted.
+class ProcessorRenderer : public Renderer {
+ public:
+  std::unique_ptr<Rendering> start(RenderRequest request) final;
+
+ private:
+  class Postponed;
+
+  /// Fills E, Z and V of the request's tiles in `sample`, which it resizes.
+  virtual void compute(const RenderRequest& request, Sample& sample) const = 0;
 };
 
 }  // namespace esim

@@ -8,13 +8,14 @@
 namespace esim {
 namespace {
 
-/// The camera whose next sample comes first, and that sample's request; null after the last one.
-CameraChannel* camera_due(World& world, SampleRequest& request) {
+/// The camera whose next sample comes first; null after the last one.
+CameraChannel* camera_due(World& world) {
   CameraChannel* due = nullptr;
+  TimeNs earliest = 0;
   for (CameraChannel& camera : world.cameras) {
-    auto next = camera.sampler->next();
-    if (!next || (due != nullptr && next->t >= request.t)) continue;
-    request = std::move(*next);
+    const auto next = camera.sampler->next();
+    if (!next || (due != nullptr && next->t >= earliest)) continue;
+    earliest = next->t;
     due = &camera;
   }
   return due;
@@ -36,20 +37,22 @@ class Run {
       const CameraInfo& info = world.info.cameras[i];
       summary_.cameras.push_back(
           {info.name, world.cameras[i].renderer->traits().label(), info.model.width, info.model.height, {}, 0, 0, {}});
+      start_next(world.cameras[i]);
     }
   }
 
-  /// Evaluates the scene as a camera asks for, and lets its pixels see the result.
-  void advance(CameraChannel& camera, const SampleRequest& request) {
+  /// Lets a camera's pixels see its next sample. A graphics card has had the time since its last one to render it.
+  void advance(CameraChannel& camera) {
     {
       Stopwatch stopwatch(summary_.seconds.render);
-      camera.renderer->render(view(world_, index_of(camera), request.t, request.tiles), camera.sample);
+      camera.rendering->finish(camera.sample);
     }
     std::span<const Segment> segments;
     {
       Stopwatch stopwatch(summary_.seconds.sampling);
       segments = camera.sampler->accept(camera.sample);
     }
+    start_next(camera);
     Stopwatch stopwatch(summary_.seconds.events);
     camera.event_camera.integrate(segments, *world_.workers);
   }
@@ -92,6 +95,14 @@ class Run {
  private:
   std::size_t index_of(const CameraChannel& camera) const {
     return static_cast<std::size_t>(&camera - world_.cameras.data());
+  }
+
+  /// Begins to evaluate the scene as the camera's sampler asks for next.
+  void start_next(CameraChannel& camera) {
+    Stopwatch stopwatch(summary_.seconds.render);
+    auto next = camera.sampler->next();
+    if (!next) return camera.rendering.reset();
+    camera.rendering = camera.renderer->start(view(world_, index_of(camera), next->t, std::move(next->tiles)));
   }
 
   double elapsed() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
@@ -147,10 +158,9 @@ class Run {
 Summary simulate(World& world, Sink& out, const Monitor& monitor) {
   Run run(world, out);
   out.begin(world.info);
-  SampleRequest request;
-  while (CameraChannel* camera = camera_due(world, request)) {  // the camera whose next sample comes first
-    run.advance(*camera, request);                              // render, choose the next time, cross the thresholds
-    run.deliver(watermark(world));                              // write what is now certain, in order of time
+  while (CameraChannel* camera = camera_due(world)) {  // the camera whose next sample comes first
+    run.advance(*camera);                              // take it, start the one after it, cross the thresholds
+    run.deliver(watermark(world));                     // write what is now certain, in order of time
     if (!monitor(run.progress())) return run.finish(false);
   }
   return run.finish(true);

@@ -18,7 +18,8 @@ struct CameraChannel {
   std::unique_ptr<Renderer> renderer;
   std::unique_ptr<Sampler> sampler;
   EventCamera event_camera;
-  Sample sample;  // the evaluation in progress; its buffers go round between renderer and sampler
+  Sample sample;                           // the latest evaluation; its buffers go round between renderer and sampler
+  std::unique_ptr<Rendering> rendering{};  // the one that the sampler wants next, under way
 };
 
 /// The state of a simulation. Its description is a RecordingInfo, which does not change.

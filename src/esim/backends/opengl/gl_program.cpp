@@ -20,9 +20,11 @@ void require(GLuint name, GLenum status, const Get& get, const GetLog& get_log, 
   throw InternalError(std::string("gl: ") + problem + ": " + log.data());
 }
 
-GLuint compile(GLenum type, const char* source) {
+GLuint compile(GLenum type, const ShaderSource& parts) {
+  std::vector<const char*> source = {"#version 450 core\n"};
+  source.insert(source.end(), parts.begin(), parts.end());
   const GLuint shader = glCreateShader(type);
-  glShaderSource(shader, 1, &source, nullptr);
+  glShaderSource(shader, static_cast<GLsizei>(source.size()), source.data(), nullptr);
   glCompileShader(shader);
   require(shader, GL_COMPILE_STATUS, glGetShaderiv, glGetShaderInfoLog, "a shader does not compile");
   return shader;
@@ -30,9 +32,9 @@ GLuint compile(GLenum type, const char* source) {
 
 }  // namespace
 
-GLuint make_program(const char* vertex_source, const char* fragment_source) {
+GLuint make_program(const ShaderSource& vertex, const ShaderSource& fragment) {
   const GLuint program = glCreateProgram();
-  for (const GLuint shader : {compile(GL_VERTEX_SHADER, vertex_source), compile(GL_FRAGMENT_SHADER, fragment_source)}) {
+  for (const GLuint shader : {compile(GL_VERTEX_SHADER, vertex), compile(GL_FRAGMENT_SHADER, fragment)}) {
     glAttachShader(program, shader);
     glDeleteShader(shader);
   }
@@ -40,147 +42,5 @@ GLuint make_program(const char* vertex_source, const char* fragment_source) {
   require(program, GL_LINK_STATUS, glGetProgramiv, glGetProgramInfoLog, "a program does not link");
   return program;
 }
-
-// Row y of a target is row y of the image: nothing is turned over. Depth is reversed (1 at the near plane, 0 at
-// infinity), which keeps floats precise far away; 1 / gl_FragCoord.w is Z.
-const char* const kSurfaceVertexShader = R"(#version 450 core
-layout(location = 0) in vec3 position;
-layout(location = 1) in vec3 normal;
-layout(location = 2) in vec2 texture_uv;
-uniform mat4 camera_from_object;
-uniform vec4 pinhole;  // clip x, y = (pinhole.xy) X, Y + (pinhole.zw) Z
-uniform float near;
-out vec3 point;        // in the camera frame
-out vec3 surface_normal;
-out vec2 uv;
-void main() {
-  point = (camera_from_object * vec4(position, 1)).xyz;
-  surface_normal = mat3(camera_from_object) * normal;
-  uv = texture_uv;
-  gl_Position = vec4(pinhole.xy * point.xy + pinhole.zw * point.z, near, point.z);
-}
-)";
-
-const char* const kSurfaceFragmentShader = R"(#version 450 core
-struct Light {
-  vec4 place;  // xyz: towards a sun, or the place of a point light (w = 1), in the camera frame
-  vec4 strength;
-};
-layout(std430, binding = 0) readonly buffer Lights { Light lights[]; };
-in vec3 point;
-in vec3 surface_normal;
-in vec2 uv;
-uniform sampler2D base_texture;
-uniform sampler2D emission_texture;
-uniform float base;
-uniform float emission;
-uniform bool has_base_texture;
-uniform bool has_emission_texture;
-uniform bool lit;
-uniform float ambient;
-uniform int light_count;
-uniform uint object;
-layout(location = 0) out vec4 seen;  // E, 1 / Z, and how that changes to the right and downwards
-layout(location = 1) out uint which;
-
-// Mean over the pixel's footprint, as Texture::sample() computes it: up to four probes along the footprint's longer side,
-// each between two levels of the mip pyramid. Drivers' own anisotropic filters take liberties.
-float mean_colour(sampler2D image) {
-  const float most_probes = 4;
-  vec2 size = vec2(textureSize(image, 0)), dx = dFdx(uv), dy = dFdy(uv);
-  float x = length(dx * size), y = length(dy * size);
-  float major = min(max(x, y), 1e6), minor = max(min(x, y), 1e-6);
-  float probes = clamp(ceil(min(major, major / minor) - 0.25), 1, most_probes);
-  float lod = min(log2(max(max(major / probes, minor), 1)), float(textureQueryLevels(image) - 1));
-  vec2 along = x >= y ? dx : dy;
-  float sum = 0;
-  for (float probe = 0; probe < probes; ++probe) {
-    vec2 at = uv + ((probe + 0.5) / probes - 0.5) * along;
-    sum += mix(textureLod(image, at, floor(lod)).r, textureLod(image, at, floor(lod) + 1).r, fract(lod));
-  }
-  return sum / probes;
-}
-
-float light_on_surface() {
-  // On the side that is seen. A vertex normal of zero stands for a flat triangle.
-  vec3 flat_normal = normalize(cross(dFdx(point), dFdy(point)));
-  vec3 n = dot(surface_normal, surface_normal) > 0 ? normalize(surface_normal) : flat_normal;
-  if (dot(flat_normal, point) > 0) flat_normal = -flat_normal;
-  if (dot(n, flat_normal) < 0) n = -n;
-  float sum = ambient;
-  for (int i = 0; i < light_count; ++i) {
-    vec3 to_light = lights[i].place.xyz - lights[i].place.w * point;
-    float distance2 = dot(to_light, to_light);
-    float fall_off = lights[i].place.w > 0 ? 1 / distance2 : 1.0;
-    sum += lights[i].strength.x * fall_off * max(dot(n, to_light) * inversesqrt(distance2), 0);
-  }
-  return sum;
-}
-
-void main() {
-  float colour = base * (has_base_texture ? mean_colour(base_texture) : 1.0);
-  if (lit) colour *= light_on_surface();
-  colour += emission * (has_emission_texture ? mean_colour(emission_texture) : 1.0);
-  float w = gl_FragCoord.w;
-  seen = vec4(colour, w, dFdx(w), dFdy(w));
-  which = object;
-}
-)";
-
-const char* const kWholeImageVertexShader = R"(#version 450 core
-void main() {
-  gl_Position = vec4(gl_VertexID == 1 ? 3 : -1, gl_VertexID == 2 ? 3 : -1, 0, 1);
-}
-)";
-
-// E is the mean of the samples; Z and the object are those of one.
-const char* const kResolveFragmentShader = R"(#version 450 core
-uniform sampler2DMS seen_samples;
-uniform usampler2DMS which_samples;
-uniform int samples;
-layout(location = 0) out vec4 seen;
-layout(location = 1) out uint which;
-void main() {
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
-  float sum = 0;
-  for (int i = 0; i < samples; ++i) sum += texelFetch(seen_samples, pixel, i).r;
-  seen = vec4(sum / float(samples), texelFetch(seen_samples, pixel, 0).gba);
-  which = texelFetch(which_samples, pixel, 0).r;
-}
-)";
-
-// Where each pixel's centre and footprint lie in the pinhole image is tabulated. 1 / Z is linear on planes, so that Z
-// is exact there.
-const char* const kDistortFragmentShader = R"(#version 450 core
-uniform sampler2D pinhole_seen;
-uniform usampler2D pinhole_which;
-uniform sampler2D centres;     // of each pixel, in pixels of the pinhole image
-uniform sampler2D footprints;  // dx/du, dx/dv, dy/du, dy/dv
-layout(location = 0) out vec2 seen;
-layout(location = 1) out uint which;
-
-float irradiance(vec2 at) {
-  ivec2 corner = ivec2(floor(at));
-  vec2 f = at - vec2(corner);
-  float upper = mix(texelFetch(pinhole_seen, corner, 0).r, texelFetch(pinhole_seen, corner + ivec2(1, 0), 0).r, f.x);
-  float lower = mix(texelFetch(pinhole_seen, corner + ivec2(0, 1), 0).r,
-                    texelFetch(pinhole_seen, corner + ivec2(1, 1), 0).r, f.x);
-  return mix(upper, lower, f.y);
-}
-
-void main() {
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
-  vec2 centre = texelFetch(centres, pixel, 0).rg;
-  vec4 footprint = texelFetch(footprints, pixel, 0);
-  vec2 right = 0.25 * footprint.xz, down = 0.25 * footprint.yw;
-  float sum = irradiance(centre - right - down) + irradiance(centre + right - down) +
-              irradiance(centre - right + down) + irradiance(centre + right + down);
-  ivec2 nearest = ivec2(floor(centre + 0.5));
-  vec4 there = texelFetch(pinhole_seen, nearest, 0);
-  float inverse_depth = there.g + dot(there.ba, centre - vec2(nearest));
-  seen = vec2(0.25 * sum, max(inverse_depth, 0));
-  which = texelFetch(pinhole_which, nearest, 0).r;
-}
-)";
 
 }  // namespace esim

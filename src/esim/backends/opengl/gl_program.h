@@ -2,20 +2,20 @@
 
 #include <epoxy/gl.h>
 
+#include <vector>
+
 namespace esim {
+
+/// The parts of a shader's source, in order, without the line that names the version.
+using ShaderSource = std::vector<const char*>;
 
 /// A shader program; belongs to the current context and ends with it. Throws InternalError with the driver's log where
 /// the source does not compile.
-GLuint make_program(const char* vertex_source, const char* fragment_source);
+GLuint make_program(const ShaderSource& vertex, const ShaderSource& fragment);
 
-/// Names of the inputs, outputs and bindings that the shaders and their users share.
-inline constexpr GLuint kPosition = 0, kNormal = 1, kTextureUv = 2;
-inline constexpr GLuint kLightsBinding = 0;
-
-extern const char* const kSurfaceVertexShader;
-extern const char* const kSurfaceFragmentShader;
-extern const char* const kWholeImageVertexShader;
-extern const char* const kResolveFragmentShader;
-extern const char* const kDistortFragmentShader;
+// A program's uniforms, by name.
+inline GLint location(GLuint program, const char* name) { return glGetUniformLocation(program, name); }
+inline void set(GLuint program, const char* name, float value) { glUniform1f(location(program, name), value); }
+inline void set(GLuint program, const char* name, int value) { glUniform1i(location(program, name), value); }
 
 }  // namespace esim

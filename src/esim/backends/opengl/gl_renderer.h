@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "esim/core/parallel.h"
 #include "esim/geometry/camera.h"
 #include "esim/render/renderer.h"
 #include "esim/scene/scene.h"
@@ -29,10 +28,10 @@ std::vector<GlDevice> gl_devices();
 
 /// Renders triangles with OpenGL 4.5, headless, through EGL: on a graphics card, or in software. What lens distortion
 /// shows is looked up in a wider pinhole image of at least the camera's resolution. Surfaces closer than 1 mm are cut.
+/// Lights cast shadows by maps of depth; see docs/rendering.md.
 /// Each renderer has a context of its own; it may be used by any one thread at a time.
-/// Throws UserError naming what to install or to change where there is no such device, where the camera's view is too
-/// wide for a pinhole, and for lights that cast shadows.
-std::unique_ptr<Renderer> make_gl_renderer(std::shared_ptr<const Scene> scene, const GlOptions& options,
-                                           const Camera& camera, const Workers& workers);
+/// Throws UserError naming what to install or to change where there is no such device, and where the camera's view is
+/// too wide for a pinhole.
+std::unique_ptr<Renderer> make_gl_renderer(const Scene& scene, const GlOptions& options, const Camera& camera);
 
 }  // namespace esim

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "esim/backends/opengl/gl_context.h"
-#include "esim/backends/opengl/gl_program.h"
+#include "esim/backends/opengl/gl_shaders.h"
 #include "esim/core/error.h"
 
 namespace esim {

@@ -25,10 +25,10 @@ GLuint make_texture(GLenum format, int width, int height, int samples) {
 
 }  // namespace
 
-GlTarget GlTarget::make(int width, int height, int samples, bool with_depth, bool with_slopes) {
+GlTarget GlTarget::make(int width, int height, int samples, bool with_depth, GLenum floats) {
   GlTarget target;
   target.width = width, target.height = height;
-  target.seen = make_texture(with_slopes ? GL_RGBA32F : GL_RG32F, width, height, samples);
+  target.seen = make_texture(floats, width, height, samples);
   target.which = make_texture(GL_R16UI, width, height, samples);
   glCreateFramebuffers(1, &target.framebuffer);
   glNamedFramebufferTexture(target.framebuffer, GL_COLOR_ATTACHMENT0, target.seen, 0);

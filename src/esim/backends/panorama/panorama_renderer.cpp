@@ -34,7 +34,7 @@ inline float arc_tangent(float y, float x) {
   return std::copysign(angle, y);
 }
 
-class PanoramaRenderer final : public Renderer {
+class PanoramaRenderer final : public ProcessorRenderer {
  public:
   PanoramaRenderer(Panorama panorama, const Camera& camera, const Workers& workers)
       : panorama_(std::move(panorama)), rays_(camera), workers_(workers) {}
@@ -43,7 +43,8 @@ class PanoramaRenderer final : public Renderer {
     return {.name = "panorama", .granularity = Granularity::tile, .at_infinity = true};
   }
 
-  void render(const RenderRequest& request, Sample& sample) override {
+ private:
+  void compute(const RenderRequest& request, Sample& sample) const override {
     const Eigen::Quaterniond R_panorama_camera =
         panorama_.R_world_panorama.conjugate() * request.camera.T_world_body.rotation;
     const Eigen::Matrix3f R = R_panorama_camera.toRotationMatrix().cast<float>();
@@ -56,7 +57,6 @@ class PanoramaRenderer final : public Renderer {
     });
   }
 
- private:
   void shade(const Eigen::Matrix3f& R, int first, int row, int count, Sample& sample) const {
     const RayLanes<kLanes> rays(rays_, first, row, count);
     TextureLookup<kLanes> at;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kLanes = 16;
 
-class PlaneRenderer final : public Renderer {
+class PlaneRenderer final : public ProcessorRenderer {
  public:
   PlaneRenderer(Poster poster, const Camera& camera, const Workers& workers)
       : poster_(std::move(poster)), rays_(camera), workers_(workers) {}
@@ -20,7 +20,8 @@ class PlaneRenderer final : public Renderer {
     return {.name = "plane", .granularity = Granularity::tile, .at_infinity = false};
   }
 
-  void render(const RenderRequest& request, Sample& sample) override {
+ private:
+  void compute(const RenderRequest& request, Sample& sample) const override {
     const SE3 T_poster_camera = poster_.T_world_poster.inverse() * request.camera.T_world_body;
     const View view{T_poster_camera.rotation.toRotationMatrix().cast<float>(),
                     T_poster_camera.translation.cast<float>()};
@@ -33,7 +34,6 @@ class PlaneRenderer final : public Renderer {
     });
   }
 
- private:
   struct View {
     Eigen::Matrix3f R_poster_camera;
     Eigen::Vector3f origin;  // of the camera, in the poster's frame

@@ -62,7 +62,7 @@ void store(const Work<K>& work, const T* values, const Tile& tile, Image<T>& ima
   }
 }
 
-class RaycastRenderer final : public Renderer {
+class RaycastRenderer final : public ProcessorRenderer {
  public:
   RaycastRenderer(std::shared_ptr<const RaycastScene> scene, const RaycastOptions& options, const Camera& camera,
                   const Workers& workers)
@@ -78,7 +78,8 @@ class RaycastRenderer final : public Renderer {
     return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false};
   }
 
-  void render(const RenderRequest& request, Sample& sample) override {
+ private:
+  void compute(const RenderRequest& request, Sample& sample) const override {
     Moment moment{scene_->place(request), scene_->lighting()};
     if (moment.lighting) moment.lighting = in_camera_frame(*moment.lighting, moment.groups[0]);
     render_in_bands(request, rays_, workers_, sample, [&](const Tile& band) {
@@ -93,7 +94,6 @@ class RaycastRenderer final : public Renderer {
     });
   }
 
- private:
   /// Blocks are traced in whole even if the band takes only a part of them, so that pixels do not depend on the tile.
   template <int K>
   void render_band(const Moment& moment, const Tile& band, Sample& sample) const {

@@ -168,7 +168,7 @@ void Span::lay_under(const PlacedSprite& placed) {
   }
 }
 
-class SpritesRenderer final : public Renderer {
+class SpritesRenderer final : public ProcessorRenderer {
  public:
   SpritesRenderer(SpriteScene scene, PixelSize sensor, const Workers& workers)
       : scene_(std::move(scene)), sensor_(sensor), workers_(workers) {}
@@ -177,7 +177,8 @@ class SpritesRenderer final : public Renderer {
     return {.name = "sprites", .granularity = Granularity::tile, .at_infinity = true, .on_sensor = true};
   }
 
-  void render(const RenderRequest& request, Sample& sample) override {
+ private:
+  void compute(const RenderRequest& request, Sample& sample) const override {
     std::vector<PlacedSprite> placed;
     for (const Sprite& sprite : scene_.sprites) {
       if (const auto here = place_on_sensor(sprite, request.t, sensor_)) placed.push_back(*here);
@@ -191,7 +192,6 @@ class SpritesRenderer final : public Renderer {
     });
   }
 
- private:
   void shade(const std::vector<PlacedSprite>& placed, int first, int row, int count, Sample& sample) const {
     Span span(first, row);
     for (const PlacedSprite& sprite : placed) {

@@ -47,14 +47,14 @@ enum class Reason { next, bisection, audit };
 
 /// A tile on its way through time.
 struct TileState {
-  TileState(const Tile& tile, float log_eps) : timeline(tile, log_eps) {}
+  TileState(const Tile& tile, float log_eps, float most) : timeline(tile, log_eps, most) {}
 
   TileTimeline timeline;
   std::size_t done = 0;  // index of the sample up to which segments have been given
   TimeNs due = 0;
   Reason reason = Reason::next;
   TimeNs audited = -1;  // begin of the interval that was audited last
-  TimeNs step = 0;      // from the last sample to the next
+  double step = 0;      // that was planned last, ns
   double speed = 0;     // fastest motion at the last sample, px/s
   bool begun = false;   // the first segment, an instant, has been given
 
@@ -85,7 +85,7 @@ class AdaptiveSampler final : public Sampler {
         const int x = column * options.tile_px, y = row * options.tile_px;
         tiles_.emplace_back(
             Tile{x, y, std::min(options.tile_px, context.width - x), std::min(options.tile_px, context.height - y)},
-            eps);
+            eps, static_cast<float>(tolerance_));
         tiles_.back().due = context.span.start;
       }
     }
@@ -105,7 +105,7 @@ class AdaptiveSampler final : public Sampler {
           body(static_cast<std::size_t>(i));
       });
     };
-    each([&](std::size_t i) { take(tiles_[asked_[i]], sample); });
+    each([&](std::size_t i) { take(tiles_[asked_[i]], asked_[i], sample); });
     account();
     lay_out();
     each([&](std::size_t i) { give(tiles_[asked_[i]], first_segment_[i]); });
@@ -118,10 +118,10 @@ class AdaptiveSampler final : public Sampler {
   SamplingStatistics statistics() const override { return statistics_; }
 
  private:
-  void take(TileState& tile, const Sample& sample);
+  void take(TileState& tile, std::uint32_t index, const Sample& sample);
   void audit(TileState& tile, TimeNs t) const;
-  void settle(TileState& tile) const;
-  double expected_error(const TileTimeline& timeline, std::size_t i) const;
+  void settle(TileState& tile, std::uint32_t index) const;
+  double expected_error(const TileState& tile, std::size_t i) const;
   void plan(TileState& tile) const;
   TimeNs after(const TileState& tile, double step) const;
 
@@ -157,12 +157,12 @@ class AdaptiveSampler final : public Sampler {
 };
 
 /// Takes a tile's new sample, and decides how far the tile is known and what it needs next.
-void AdaptiveSampler::take(TileState& tile, const Sample& sample) {
+void AdaptiveSampler::take(TileState& tile, std::uint32_t index, const Sample& sample) {
   const bool ahead = tile.reason == Reason::next;
   tile.timeline.insert(sample.t, sample.irradiance);
   if (tile.reason == Reason::audit) audit(tile, sample.t);
   if (ahead) tile.speed = fastest_in(sample, tile.timeline.tile());
-  settle(tile);
+  settle(tile, index);
 }
 
 /// Looks what the error of the audited interval was: the sample at t was taken for that.
@@ -176,35 +176,39 @@ void AdaptiveSampler::audit(TileState& tile, TimeNs t) const {
 }
 
 /// The error between samples i and i + 1, as far as their own surprises tell, which belong to longer intervals: it goes
-/// with the second power of the length.
-double AdaptiveSampler::expected_error(const TileTimeline& timeline, std::size_t i) const {
+/// with the second power of the length. Where nothing moves by more than lambda on the way, pixels that jump do not
+/// count: it would take ever more samples to find when.
+double AdaptiveSampler::expected_error(const TileState& tile, std::size_t i) const {
+  const TileTimeline& timeline = tile.timeline;
   const auto h = static_cast<double>(timeline.time(i + 1) - timeline.time(i));
+  const bool short_way = tile.speed * h <= options_.lambda * kNsPerS * 1.01;
   double most = 0;
   for (const std::size_t k : {i, i + 1}) {
     if (k == 0 || k + 1 >= timeline.size()) continue;
     const auto left = static_cast<double>(timeline.time(k) - timeline.time(k - 1));
     const auto right = static_cast<double>(timeline.time(k + 1) - timeline.time(k));
-    most = std::max(most, timeline.surprise(k) * std::min(1.0, h * h / (4 * left * right)));
+    const double surprise = short_way ? timeline.usual_surprise(k) : timeline.surprise(k);
+    most = std::max(most, surprise * std::min(1.0, h * h / (4 * left * right)));
   }
   return most * safety_;
 }
 
 /// Finds how far the tile is known well enough, and its next sample.
-void AdaptiveSampler::settle(TileState& tile) const {
+void AdaptiveSampler::settle(TileState& tile, std::uint32_t index) const {
   const TileTimeline& timeline = tile.timeline;
   const bool complete = timeline.time(timeline.size() - 1) >= context_.span.end;
   tile.until = tile.done;
   for (std::size_t i = tile.done; i + 1 < timeline.size(); ++i) {
     if (i + 2 >= timeline.size() && !complete) break;  // what comes behind is needed to judge it
     const TimeNs t0 = timeline.time(i), h = timeline.time(i + 1) - t0;
-    const double error = expected_error(timeline, i);
+    const double error = expected_error(tile, i);
     if (error > tolerance_ && h >= 2 * shortest_) {
       tile.reason = Reason::bisection, tile.due = t0 + h / 2;
       return;
     }
     if (error > tolerance_) ++tile.held;
     const auto draw = static_cast<std::uint64_t>(t0 - context_.span.start);
-    if (t0 > tile.audited && h >= 2 * shortest_ && i > 0 && random_.bits(0, draw)[0] % kAuditOneIn == 0) {
+    if (t0 > tile.audited && h >= 2 * shortest_ && i > 0 && random_.bits(index, draw)[0] % kAuditOneIn == 0) {
       tile.reason = Reason::audit, tile.due = t0 + h / 2;
       tile.audited = timeline.time(i + 1) - 1, tile.expected_error = error / safety_;
       return;
@@ -223,16 +227,19 @@ void AdaptiveSampler::settle(TileState& tile) const {
 void AdaptiveSampler::plan(TileState& tile) const {
   const TileTimeline& timeline = tile.timeline;
   const std::size_t last = timeline.size() - 1;
-  double step = static_cast<double>(longest_);
+  const double way = options_.lambda / tile.speed * kNsPerS;  // ns
+  double step = std::min(way, static_cast<double>(longest_));
   if (last >= 2) {
     const auto left = static_cast<double>(timeline.time(last - 1) - timeline.time(last - 2));
     const auto right = static_cast<double>(timeline.time(last) - timeline.time(last - 1));
-    const double error = std::max(timeline.surprise(last - 1) * safety_, 1e-12);
-    const double wanted = 2 * std::sqrt(left * right * kAim * tolerance_ / error);
-    step = std::min(std::clamp(wanted, 0.5 * right, 2 * right), step);
-  } else {
-    step = std::min(step, 0.25 * options_.max_motion_px / tile.speed * kNsPerS);
+    const auto wanted = [&](double surprise) {
+      return 2 * std::sqrt(left * right * kAim * tolerance_ / std::max(surprise * safety_, 1e-12));
+    };
+    const double cautious = wanted(timeline.surprise(last - 1)), bold = wanted(timeline.usual_surprise(last - 1));
+    // Bisections say nothing of what comes: steps change with the steps before.
+    step = std::clamp(std::max(cautious, std::min(bold, way)), 0.5 * tile.step, 2 * tile.step);
   }
+  tile.step = std::clamp(step, static_cast<double>(shortest_), static_cast<double>(longest_));
   tile.due = after(tile, std::min(step, options_.max_motion_px / tile.speed * kNsPerS));
 }
 

@@ -36,8 +36,9 @@ struct FlowSampling {
 struct AdaptiveSampling {
   static constexpr const char* kType = "adaptive";
   double tolerance = 0.25;
-  int tile_px = 16;
+  double lambda = 0.5;
   double max_motion_px = 2;
+  int tile_px = 16;
   RateBounds bounds;
 };
 
@@ -73,9 +74,12 @@ void describe(Visitor& visit, AdaptiveSampling& o) {
   visit("tolerance", o.tolerance,
         About{"error of the brightness between two samples, in contrast thresholds, that 99 % of it stay below", "", 0,
               1e6, true});
-  visit("tile_px", o.tile_px, About{"side of the tiles that are sampled independently", "px", 4, 1024});
+  visit("lambda", o.lambda,
+        About{"motion between two samples below which a few pixels that jump, at edges, ask for no further samples",
+              "px", 0, 1e6, true});
   visit("max_motion_px", o.max_motion_px,
         About{"most expected motion between two samples, however little brightness changes", "px", 0, 1e6, true});
+  visit("tile_px", o.tile_px, About{"side of the tiles that are sampled independently", "px", 4, 1024});
   describe(visit, o.bounds);
 }
 

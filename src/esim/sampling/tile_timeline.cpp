@@ -19,6 +19,13 @@ inline float small_exponential(float x) {
   return (root * root) * (root * root);
 }
 
+// Before a jump, the second difference on one side says nothing of the interval: the bow is never more than so many
+// times the smaller one.
+constexpr float kMostBend = 2;
+
+// Jumps of a fifth of the pixels by `most` or more make a surprise of `most`.
+constexpr double kUsual = 0.75;
+
 /// 2 (mean of fourth powers)^(1/4).
 double size_of_errors(float sum_of_fourth_powers, std::size_t count) {
   return 2 * std::sqrt(std::sqrt(static_cast<double>(sum_of_fourth_powers) / static_cast<double>(count)));
@@ -26,13 +33,21 @@ double size_of_errors(float sum_of_fourth_powers, std::size_t count) {
 
 }  // namespace
 
-/// The bow between two samples: per pixel, c h^2 as a weighted sum of the brightness at four samples.
+/// The bow between two samples: c h^2 from the second differences before and after, each a weighted sum of the
+/// brightness at three samples.
 struct TileTimeline::Bow {
   const float *before, *first, *last, *after;
-  float weight_before = 0, weight_first = 0, weight_last = 0, weight_after = 0;
+  float before_outer = 0, before_near = 0, before_far = 0;
+  float after_outer = 0, after_near = 0, after_far = 0;
 
+  /// Of pixel k.
   float operator()(std::size_t k) const {
-    return weight_before * before[k] + weight_first * first[k] + weight_last * last[k] + weight_after * after[k];
+    const float a = before_outer * before[k] + before_near * first[k] + before_far * last[k];
+    const float b = after_outer * after[k] + after_near * last[k] + after_far * first[k];
+    const float size_a = std::fabs(a), size_b = std::fabs(b), mean = 0.5F * (a + b);
+    const float most = kMostBend * (size_a < size_b ? size_a : size_b);
+    const float limited = mean > most ? most : (mean < -most ? -most : mean);
+    return a * b > 0 ? limited : 0.0F;
   }
 };
 
@@ -40,22 +55,17 @@ TileTimeline::Bow TileTimeline::bow_between(std::size_t first, std::size_t last)
   const bool has_before = first > 0, has_after = last + 1 < samples_.size();
   const auto values = [&](std::size_t i) { return samples_[i].brightness.data(); };
   Bow bow{values(has_before ? first - 1 : first), values(first), values(last), values(has_after ? last + 1 : last)};
+  if (!has_before || !has_after) return bow;
   const auto h = static_cast<double>(samples_[last].t - samples_[first].t);
-  const double share = has_before && has_after ? 0.5 : 1.0;
   // h^2 times the second divided difference of three samples, one of them `gap` away from the interval.
-  const auto add = [&](double gap, float& outer, float& near, float& far) {
-    const double scale = share * 2 * h * h / (h + gap);
-    outer += static_cast<float>(scale / gap), far += static_cast<float>(scale / h);
-    near -= static_cast<float>(scale / gap + scale / h);
+  const auto weigh = [&](double gap, float& outer, float& near, float& far) {
+    const double scale = 2 * h * h / (h + gap);
+    outer = static_cast<float>(scale / gap), far = static_cast<float>(scale / h);
+    near = -static_cast<float>(scale / gap + scale / h);
   };
-  if (has_before) {
-    add(static_cast<double>(samples_[first].t - samples_[first - 1].t), bow.weight_before, bow.weight_first,
-        bow.weight_last);
-  }
-  if (has_after) {
-    add(static_cast<double>(samples_[last + 1].t - samples_[last].t), bow.weight_after, bow.weight_last,
-        bow.weight_first);
-  }
+  weigh(static_cast<double>(samples_[first].t - samples_[first - 1].t), bow.before_outer, bow.before_near,
+        bow.before_far);
+  weigh(static_cast<double>(samples_[last + 1].t - samples_[last].t), bow.after_outer, bow.after_near, bow.after_far);
   return bow;
 }
 
@@ -63,7 +73,7 @@ void TileTimeline::insert(TimeNs t, const Image<float>& irradiance) {
   Sample sample;
   if (!unused_.empty()) sample = std::move(unused_.back()), unused_.pop_back();
   const auto width = static_cast<std::size_t>(tile_.width);
-  sample.t = t, sample.surprise = 0;
+  sample.t = t, sample.surprise = sample.usual_surprise = 0;
   sample.irradiance.resize(width * static_cast<std::size_t>(tile_.height));
   sample.brightness.resize(sample.irradiance.size());
   for (int y = 0; y < tile_.height; ++y) {
@@ -103,14 +113,19 @@ void TileTimeline::errors(std::size_t i, std::vector<float>& out) const {
   }
 }
 
-/// Computes the surprise of a sample.
+/// Computes the surprises of a sample.
 void TileTimeline::measure(std::size_t i) {
   if (i == 0 || i + 1 >= samples_.size()) return;
   errors(i, errors_);
-  float sum = 0;
-#pragma omp simd reduction(+ : sum)
-  for (std::size_t k = 0; k < errors_.size(); ++k) sum += (errors_[k] * errors_[k]) * (errors_[k] * errors_[k]);
-  samples_[i].surprise = size_of_errors(sum, errors_.size());
+  const float largest = most_ * most_;
+  float all = 0, usual = 0;
+#pragma omp simd reduction(+ : all, usual)
+  for (std::size_t k = 0; k < errors_.size(); ++k) {
+    const float square = errors_[k] * errors_[k], limited = square < largest ? square : largest;
+    all += square * square, usual += limited * limited;
+  }
+  samples_[i].surprise = size_of_errors(all, errors_.size());
+  samples_[i].usual_surprise = kUsual * size_of_errors(usual, errors_.size());
 }
 
 double TileTimeline::bow(std::size_t i) const {

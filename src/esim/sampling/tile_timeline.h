@@ -16,7 +16,7 @@ namespace esim {
 /// each. In the middle of samples at equal distances that is the cubic through all four.
 class TileTimeline {
  public:
-  TileTimeline(const Tile& tile, float log_eps) : tile_(tile), log_eps_(log_eps) {}
+  TileTimeline(const Tile& tile, float log_eps, float most) : tile_(tile), log_eps_(log_eps), most_(most) {}
 
   const Tile& tile() const { return tile_; }
 
@@ -35,6 +35,10 @@ class TileTimeline {
   /// for samples between others.
   double surprise(std::size_t i) const { return samples_[i].surprise; }
 
+  /// Three quarters of the same measure, with no error counted as more than `most`: pixels that jump do not speak for
+  /// all.
+  double usual_surprise(std::size_t i) const { return samples_[i].usual_surprise; }
+
   /// Errors of that interpolation pixel by pixel, ln units.
   void errors(std::size_t i, std::vector<float>& out) const;
 
@@ -50,7 +54,7 @@ class TileTimeline {
  private:
   struct Sample {
     TimeNs t = 0;
-    double surprise = 0;
+    double surprise = 0, usual_surprise = 0;
     std::vector<float> irradiance, brightness;
   };
   struct Bow;
@@ -61,7 +65,7 @@ class TileTimeline {
   void write_quarter(std::size_t i, Image<float>& irradiance) const;
 
   Tile tile_;
-  float log_eps_;
+  float log_eps_, most_;
   std::vector<Sample> samples_;
   std::vector<Sample> unused_;  // memory
   std::vector<float> errors_;   // likewise

@@ -31,6 +31,13 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
         {"events_dropped_by_readout", camera.sensor.dropped},
         {"events_per_second", simulated_s > 0 ? static_cast<double>(events) / simulated_s : 0.0},
     });
+    if (!sampling.measured_error) continue;
+    const auto& [mean, p99, max] = *sampling.measured_error;
+    cameras.back()["tolerance"] = sampling.tolerance;
+    cameras.back()["measured_error"] = {{"mean", mean}, {"p99", p99}, {"max", max}};
+    cameras.back()["reconstructions"] = sampling.reconstructions;
+    cameras.back()["bisections"] = sampling.bisections;
+    cameras.back()["unseen_share"] = sampling.unseen_share;
   }
 
   const StageSeconds& s = summary.seconds;

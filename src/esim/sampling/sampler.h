@@ -17,15 +17,28 @@ struct SampleRequest {
   std::vector<Tile> tiles;
 };
 
+/// Of the brightness between samples, as far as a scheme measures it; in ln(E + eps).
+struct MeasuredError {
+  double mean = 0, p99 = 0, max = 0;
+};
+
 /// What a sampler has decided so far, for the report.
 struct SamplingStatistics {
   std::int64_t samples = 0;            ///< requests answered
   std::int64_t pixel_evaluations = 0;  ///< pixels in them
   std::int64_t held_to_max_rate = 0;   ///< intervals that the criterion wanted shorter than 1 / max_rate_hz
+
+  // Of schemes that measure their error.
+  std::optional<MeasuredError> measured_error;
+  double tolerance = 0;              ///< that was asked for, in contrast thresholds
+  std::int64_t reconstructions = 0;  ///< images made between samples
+  std::int64_t bisections = 0;       ///< samples taken because their neighbours disagreed
+  double unseen_share = 0;           ///< of the reconstructed pixels: seen by no sample
 };
 
 /// Decides when which pixels of one camera are evaluated, and turns the samples into segments. A sampler never
-/// renders. Use: while next() gives a request, render it, and pass the sample to accept().
+/// renders. Use: while next() gives a request, render it, pass the sample to accept(), and ask for more() until there
+/// is none.
 class Sampler {
  public:
   virtual ~Sampler() = default;
@@ -34,8 +47,13 @@ class Sampler {
   virtual std::optional<SampleRequest> next() const = 0;
 
   /// Takes the evaluation that next() asked for. Returns the segments that are now known: per tile contiguous, in
-  /// order of time, valid until the next call. The sample's buffers are exchanged for used ones.
+  /// order of time, valid until the next call; none where it needs another evaluation first. The sample's buffers are
+  /// exchanged for used ones.
   virtual std::span<const Segment> accept(Sample& sample) = 0;
+
+  /// Further segments that the same evaluation has made known, a few at a time, likewise valid until the next call;
+  /// none after the last ones. To be asked until then, before next().
+  virtual std::span<const Segment> more() = 0;
 
   /// No segment that is still to come begins before this time. Never decreases; the end after the last sample.
   virtual TimeNs watermark() const = 0;

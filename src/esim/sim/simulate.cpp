@@ -43,15 +43,21 @@ class Run {
   void advance(CameraChannel& camera, const SampleRequest& request) {
     {
       Stopwatch stopwatch(summary_.seconds.render);
-      camera.renderer->render(view(world_, index_of(camera), request.t, request.tiles), camera.sample);
+      camera.sampled().render(view(world_, index_of(camera), request.t, request.tiles), camera.sample);
     }
     std::span<const Segment> segments;
     {
       Stopwatch stopwatch(summary_.seconds.sampling);
       segments = camera.sampler->accept(camera.sample);
     }
-    Stopwatch stopwatch(summary_.seconds.events);
-    camera.event_camera.integrate(segments, *world_.workers);
+    while (!segments.empty()) {
+      {
+        Stopwatch stopwatch(summary_.seconds.events);
+        camera.event_camera.integrate(segments, *world_.workers);
+      }
+      Stopwatch stopwatch(summary_.seconds.sampling);
+      segments = camera.sampler->more();
+    }
   }
 
   /// Writes everything up to `until`, all kinds of record together in order of time.

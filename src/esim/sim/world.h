@@ -19,6 +19,9 @@ struct CameraChannel {
   std::unique_ptr<Sampler> sampler;
   EventCamera event_camera;
   Sample sample;  // the evaluation in progress; its buffers go round between renderer and sampler
+  std::unique_ptr<Renderer> keyframes{};  // what the sampler asks, where its camera is denser than the sensor's
+
+  Renderer& sampled() { return keyframes != nullptr ? *keyframes : *renderer; }
 };
 
 /// The state of a simulation. Its description is a RecordingInfo, which does not change.

@@ -57,7 +57,7 @@ struct Cubic {
     w2 = 1 + g * g * (1.5F * g - 2.5F);
     w3 = -0.5F * g * f * f;
   }
-  float operator()(const float* p) const { return w0 * p[0] + w1 * p[1] + w2 * p[2] + w3 * p[3]; }
+  float operator()(float a, float b, float c, float d) const { return w0 * a + w1 * b + w2 * c + w3 * d; }
 };
 
 /// Looks the points up by cubics that overshoot the pixels around by little. `seen` is 1 where they lie in the image
@@ -79,20 +79,22 @@ void look_up_row(const Keyframe& keyframe, float offset, RowLookup& row) {
     const float clamped_line = std::min(std::max(line, 1.0F), bottom - 1.001F);
     const int i = static_cast<int>(clamped_column), j = static_cast<int>(clamped_line);
     const Cubic across(clamped_column - static_cast<float>(i)), down(clamped_line - static_cast<float>(j));
-    const float* const corner = pixels + (j - 1) * stride + (i - 1);
-    const float first = across(corner), second = across(corner + stride), third = across(corner + 2 * stride),
-                fourth = across(corner + 3 * stride);
-    const float* const middle = corner + stride + 1;
-    const float lowest = std::min(std::min(middle[0], middle[1]), std::min(middle[stride], middle[stride + 1]));
-    const float highest = std::max(std::max(middle[0], middle[1]), std::max(middle[stride], middle[stride + 1]));
+    const int r0 = (j - 1) * stride + (i - 1), r1 = r0 + stride, r2 = r1 + stride, r3 = r2 + stride;
+    const float p11 = pixels[r1 + 1], p12 = pixels[r1 + 2], p21 = pixels[r2 + 1], p22 = pixels[r2 + 2];
+    const float first = across(pixels[r0], pixels[r0 + 1], pixels[r0 + 2], pixels[r0 + 3]);
+    const float second = across(pixels[r1], p11, p12, pixels[r1 + 3]);
+    const float third = across(pixels[r2], p21, p22, pixels[r2 + 3]);
+    const float fourth = across(pixels[r3], pixels[r3 + 1], pixels[r3 + 2], pixels[r3 + 3]);
+    const float lowest = std::min(std::min(p11, p12), std::min(p21, p22));
+    const float highest = std::max(std::max(p11, p12), std::max(p21, p22));
     const float slack = 0.15F * (highest - lowest);
-    const float sum = down.w0 * first + down.w1 * second + down.w2 * third + down.w3 * fourth;
+    const float sum = down(first, second, third, fourth);
     value[x] = std::min(std::max(sum, std::max(lowest - slack, 0.5F * lowest)), highest + slack);
     if constexpr (depth) {
       const int k = static_cast<int>(std::min(std::max(u[x], 0.0F), right - 1e-3F));
       const int l = static_cast<int>(std::min(std::max(v[x], 0.0F), bottom - 1e-3F));
-      const float* const here = near + l * stride + k;
-      const float a = here[0], b = here[1], c = here[stride], d = here[stride + 1];
+      const int here = l * stride + k;
+      const float a = near[here], b = near[here + 1], c = near[here + stride], d = near[here + stride + 1];
       const float low = std::min(std::min(a, b), std::min(c, d)), high = std::max(std::max(a, b), std::max(c, d));
       same = w[x] >= low * (1 - kSameSurface) && w[x] <= high * (1 + kSameSurface);
     }

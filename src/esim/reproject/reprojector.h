@@ -23,6 +23,9 @@ class Reprojector {
   /// `at_infinity`: everything is infinitely far; depth is not looked at.
   Reprojector(const KeyframeLayout& layout, bool at_infinity, const Workers& workers);
 
+  Reprojector(const Reprojector&) = delete;
+  Reprojector& operator=(const Reprojector&) = delete;
+
   const KeyframeLayout& layout() const { return layout_; }
   bool at_infinity() const { return at_infinity_; }
 

@@ -12,7 +12,8 @@
 namespace esim {
 namespace {
 
-constexpr double kMostUnseen = 0.01;  // share of an image that no keyframe sees
+constexpr double kMostPerSecond = 50000;  // reconstructions, also where something moves faster
+constexpr double kMostUnseen = 0.01;      // share of an image that no keyframe sees
 
 /// A keyframe, and how fast its image moves.
 struct MovingKeyframe {
@@ -130,7 +131,7 @@ class KeyframeSampler final : public Sampler {
       ++statistics_.held_to_max_rate;
     }
     const double fastest = std::max(before_.fastest_px_per_s, ahead_.back().fastest_px_per_s);
-    const double steps = std::ceil(to_seconds(interval) * fastest / options_.lambda);
+    const double steps = std::ceil(to_seconds(interval) * std::min(fastest / options_.lambda, kMostPerSecond));
     steps_ = static_cast<TimeNs>(std::clamp(steps, 1.0, static_cast<double>(interval)));
     step_ = 1;
     errors_ = checked_;

@@ -52,7 +52,8 @@ float slope(float before, float here, float after) {
   return smooth ? smaller : 0.0F;
 }
 
-void invert_depth(const Image<float>& depth, const Workers& workers, Keyframe& keyframe) {
+/// `reach`: px from an edge at which the mean over a pixel of the sensor holds light from both of its sides.
+void invert_depth(const Image<float>& depth, int reach, const Workers& workers, Keyframe& keyframe) {
   const int width = depth.width(), height = depth.height();
   for (Image<float>* image : {&keyframe.nearness, &keyframe.front, &keyframe.slope_x, &keyframe.slope_y})
     if (image->bounds() != depth.bounds()) *image = Image<float>(width, height);
@@ -71,10 +72,12 @@ void invert_depth(const Image<float>& depth, const Workers& workers, Keyframe& k
       keyframe.slope_x(x, y) = slope(w(left, y), w(x, y), w(right, y));
       keyframe.slope_y(x, y) = slope(w(x, above), w(x, y), w(x, below));
       float nearest = w(x, y);
-      for (const int j : {above, y, below})
-        for (const int i : {left, x, right}) nearest = std::max(nearest, w(i, j));
+      for (int j = std::max(y - reach, 0); j <= std::min(y + reach, height - 1); ++j)
+        for (int i = std::max(x - reach, 0); i <= std::min(x + reach, width - 1); ++i)
+          nearest = std::max(nearest, w(i, j));
       const float ahead = nearest - w(x, y);
-      const float smooth = 1.5F * (std::fabs(keyframe.slope_x(x, y)) + std::fabs(keyframe.slope_y(x, y)));
+      const float smooth =
+          (static_cast<float>(reach) + 0.5F) * (std::fabs(keyframe.slope_x(x, y)) + std::fabs(keyframe.slope_y(x, y)));
       keyframe.front(x, y) = ahead > smooth + kDiscontinuity * w(x, y) ? nearest : w(x, y);
     }
   });
@@ -105,7 +108,7 @@ void prepare_keyframe(const KeyframeLayout& layout, bool at_infinity, RenderRequ
     box_mean(sample.irradiance, layout.supersampling, workers, keyframe.light);
   }
   if (at_infinity) return;
-  invert_depth(sample.depth, workers, keyframe);
+  invert_depth(sample.depth, layout.supersampling / 2 + 1, workers, keyframe);
   std::swap(keyframe.object, sample.object);
 }
 

@@ -30,7 +30,7 @@ struct Keyframe {
   RenderRequest view;             ///< its time, where the camera and the moving objects were
   Image<float> light;             ///< E, mean over the area of one of the sensor's pixels
   Image<float> nearness;          ///< 1 / Z, 1/m; 0 for what is infinitely far, and where Z is none
-  Image<float> front;             ///< nearness, where a nearer surface is at most one pixel away that surface's
+  Image<float> front;             ///< nearness; beside a nearer surface, whose light E holds too, that one's
   Image<float> slope_x, slope_y;  ///< of nearness per pixel, on the smooth surface that is seen; 0 where there is none
   Image<std::uint16_t> object;    ///< 0: what stands still, i + 1: object i; without size where nothing moves
 };

@@ -26,10 +26,10 @@ struct Plaid {
   }
 };
 
-class PlaidRenderer final : public Renderer {
+class PlaidRenderer final : public ProcessorRenderer {
  public:
   RendererTraits traits() const override { return {.name = "plaid"}; }
-  void render(const RenderRequest& request, Sample& sample) override {
+  void compute(const RenderRequest& request, Sample& sample) const override {
     sample.resize(kWidth, kHeight);
     sample.t = request.t;
     sample.tiles = request.tiles;

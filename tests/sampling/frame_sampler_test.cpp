@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -14,13 +15,14 @@ const Workers kWorkers(2);
 constexpr int kWidth = 50, kHeight = 70;
 
 /// A sample in which the brightness rises by `gradient` per pixel to the right and everything moves by (vx, vy).
-Sample moving_ramp(TimeNs t, float gradient, float vx, float vy, double log_eps) {
+Sample moving_ramp(TimeNs t, float gradient, float vx, float vy, double log_eps, int width = kWidth,
+                   int height = kHeight) {
   Sample sample;
-  sample.resize(kWidth, kHeight);
+  sample.resize(width, height);
   sample.t = t;
   sample.tiles = {sample.irradiance.bounds()};
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
       sample.irradiance(x, y) = static_cast<float>(std::exp(gradient * static_cast<float>(x - kWidth)) - log_eps);
       sample.flow_x(x, y) = vx;
       sample.flow_y(x, y) = vy;
@@ -29,39 +31,89 @@ Sample moving_ramp(TimeNs t, float gradient, float vx, float vy, double log_eps)
   return sample;
 }
 
+/// A camera at rest before something infinitely far away.
+SamplingContext context(const TimeSpan& span, const SensorTraits& sensor = {}) {
+  return {sensor,
+          kWidth,
+          kHeight,
+          span,
+          kWorkers,
+          Camera::from_fov(kWidth, kHeight, 1.0),
+          {.name = "test", .at_infinity = true, .wide_pixels = true},
+          [](TimeNs t) {
+            RenderRequest view;
+            view.t = t;
+            return view;
+          }};
+}
+
 class EverySampler : public testing::TestWithParam<SamplingOptions> {};
 
-// The contract of Sampler: first sample at the start, last at the end, contiguous segments, a watermark that keeps up.
+// The contract of Sampler: each pixel from an instant at the start to the end exactly, in contiguous segments, and a
+// watermark that keeps up.
 TEST_P(EverySampler, KeepsItsContract) {
   const TimeSpan span{-3 * kNsPerMs, 17 * kNsPerMs + 123};
-  const auto sampler = make_sampler(GetParam(), {{}, kWidth, kHeight, span, kWorkers});
+  const Camera camera = sampled_camera(GetParam(), context(span));
+  const auto sampler = make_sampler(GetParam(), context(span));
   EXPECT_EQ(sampler->watermark(), span.start);
-  TimeNs last = span.start;
-  std::int64_t samples = 0;
+  Image<TimeNs> known(kWidth, kHeight, span.start);
+  Image<int> segments(kWidth, kHeight, 0);
+  const auto take = [&](const Segment& segment) {
+    EXPECT_EQ(segment.irradiance0->bounds(), known.bounds());
+    EXPECT_EQ(segment.irradiance1->bounds(), known.bounds());
+    for (int y = segment.tile.y; y < segment.tile.y + segment.tile.height; ++y) {
+      for (int x = segment.tile.x; x < segment.tile.x + segment.tile.width; ++x) {
+        ASSERT_EQ(segment.t0, known(x, y));
+        ASSERT_TRUE(segments(x, y)++ == 0 ? segment.t1 == segment.t0 : segment.t1 > segment.t0);
+        known(x, y) = segment.t1;
+      }
+    }
+  };
+  std::int64_t samples = 0, evaluations = 0;
+  TimeNs watermark = span.start;
   while (const auto request = sampler->next()) {
     EXPECT_EQ(request->t, sampler->next()->t) << "next() is not idempotent";
-    ASSERT_EQ(request->tiles, (std::vector<Tile>{{0, 0, kWidth, kHeight}}));
-    ASSERT_TRUE(samples == 0 ? request->t == span.start : request->t > last);
-    Sample sample = moving_ramp(request->t, 0.05F, 100.0F, 200.0F, 0.001);
-    const Image<float> rendered = sample.irradiance;
-    const auto segments = sampler->accept(sample);
-    ASSERT_EQ(segments.size(), 1U);
-    EXPECT_EQ(segments[0].t0, last);
-    EXPECT_EQ(segments[0].t1, request->t);
-    EXPECT_EQ(segments[0].irradiance1->pixels()[5], rendered.pixels()[5]);
-    EXPECT_EQ(sampler->watermark(), request->t);
-    last = request->t;
+    ASSERT_TRUE(samples == 0 ? request->t == span.start : request->t > sampler->watermark())
+        << "asks for what is known";
+    ASSERT_LE(request->t, span.end);
+    Sample sample = moving_ramp(request->t, 0.05F, 100.0F, 200.0F, 0.001, camera.width, camera.height);
+    sample.tiles = request->tiles;
+    for (const Tile& tile : request->tiles) evaluations += static_cast<std::int64_t>(tile.area());
+    for (auto found = sampler->accept(sample); !found.empty(); found = sampler->more()) {
+      for (const Segment& segment : found) take(segment);
+    }
+    EXPECT_TRUE(sampler->more().empty());
+    const auto times = known.pixels();
+    EXPECT_LE(sampler->watermark(), *std::min_element(times.begin(), times.end()));
+    EXPECT_GE(sampler->watermark(), watermark);
+    watermark = sampler->watermark();
     ++samples;
   }
-  EXPECT_EQ(last, span.end);
+  EXPECT_EQ(watermark, span.end);
   EXPECT_EQ(sampler->statistics().samples, samples);
-  EXPECT_EQ(sampler->statistics().pixel_evaluations, samples * kWidth * kHeight);
+  EXPECT_EQ(sampler->statistics().pixel_evaluations, evaluations);
 }
 
 INSTANTIATE_TEST_SUITE_P(Options, EverySampler,
                          testing::Values(SamplingOptions(UniformSampling{1234}), SamplingOptions(FlowSampling{}),
                                          SamplingOptions(BrightnessSampling{}),
-                                         SamplingOptions(FlowSampling{0.5, {5000, 6000}})));
+                                         SamplingOptions(FlowSampling{0.5, {5000, 6000}}),
+                                         SamplingOptions(AdaptiveSampling{}),
+                                         SamplingOptions(AdaptiveSampling{.tolerance = 0, .tile_px = 7}),
+                                         SamplingOptions(KeyframeSampling{}),
+                                         SamplingOptions(KeyframeSampling{.tolerance = 0, .supersampling = 1})));
+
+TEST(FrameSampler, HandsOutWhatWasRendered) {
+  const auto sampler = make_sampler(FlowSampling{}, context({0, 5 * kNsPerMs}));
+  while (const auto request = sampler->next()) {
+    Sample sample = moving_ramp(request->t, 0.05F, 100.0F, 200.0F, 0.001);
+    const Image<float> rendered = sample.irradiance;
+    const auto segments = sampler->accept(sample);
+    ASSERT_EQ(segments.size(), 1U);
+    EXPECT_EQ(segments[0].t1, request->t);
+    EXPECT_EQ(segments[0].irradiance1->pixels()[5], rendered.pixels()[5]);
+  }
+}
 
 TEST(FlowSampling, BoundsTheMotionBetweenSamples) {
   Sample sample = moving_ramp(0, 0.1F, 30.0F, -40.0F, 0.001);

@@ -132,6 +132,21 @@ TEST_F(Simulation, RunsSeveralCamerasEachWithItsOwnClock) {
   EXPECT_EQ(rig.truth_times.size(), 16U);
 }
 
+TEST_F(Simulation, SeesTheSameThroughKeyframes) {
+  scenario_.cameras[0].event_camera.threshold_noise = 0;
+  Collector flow, keyframes, two_threads;
+  const std::int64_t dense = run(flow).cameras[0].sampling.samples;
+  scenario_.cameras[0].sampling = KeyframeSampling{};
+  const Summary summary = run(keyframes);
+  run(two_threads, 2);
+  EXPECT_LT(summary.cameras[0].sampling.samples, dense / 10);
+  EXPECT_GT(flow.events[0].size(), 10000U);
+  const double ratio = static_cast<double>(keyframes.events[0].size()) / static_cast<double>(flow.events[0].size());
+  EXPECT_NEAR(ratio, 1, 0.03);
+  EXPECT_EQ(keyframes.events, two_threads.events);
+  EXPECT_EQ(keyframes.truth_times, flow.truth_times);
+}
+
 TEST_F(Simulation, EndsEarlyWhenAsked) {
   Collector out;
   const Summary summary = run(out, 1, [](const Progress& progress) { return progress.now < 100 * kNsPerMs; });

@@ -37,6 +37,8 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
     cameras.back()["measured_error"] = {{"mean", mean}, {"p99", p99}, {"max", max}};
     cameras.back()["bisections"] = sampling.bisections;
     cameras.back()["audits"] = sampling.audits;
+    cameras.back()["reconstructions"] = sampling.reconstructions;
+    cameras.back()["unseen_share"] = sampling.unseen_share;
   }
 
   const StageSeconds& s = summary.seconds;

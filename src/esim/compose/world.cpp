@@ -48,6 +48,18 @@ void check_sampling(const CameraOptions& camera, const Notices& notices) {
   std::visit(check, camera.sampling);
 }
 
+/// The views of a camera; outlives the world.
+std::function<RenderRequest(TimeNs)> view_at(const World& world, std::size_t camera) {
+  return [trajectory = world.trajectory, objects = world.objects,
+          T_body_camera = world.info.cameras[camera].T_body_camera](TimeNs t) {
+    RenderRequest request;
+    request.t = t;
+    request.camera = rigidly_attached(trajectory->at(t), T_body_camera);
+    for (const auto& object : objects) request.objects.push_back(object->at(t));
+    return request;
+  };
+}
+
 bool sees_something(const Sample& sample) {
   const auto depth = sample.depth.pixels();
   return std::any_of(depth.begin(), depth.end(), [](float z) { return std::isfinite(z); });
@@ -113,11 +125,20 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices)
     const Camera& model = world.info.cameras[i].model;
     const EventCameraOptions& sensor = options.event_camera;
     const SensorTraits traits{std::min(sensor.threshold_on(), sensor.threshold_off()), sensor.log_eps};
+    std::unique_ptr<Renderer> renderer = make_renderer(model, *world.workers);
+    const SamplingContext context{traits,         model.width, model.height,       span,
+                                  *world.workers, model,       renderer->traits(), view_at(world, i)};
+    std::unique_ptr<Sampler> sampler = make_sampler(options.sampling, context);
+    std::unique_ptr<Renderer> keyframes;
+    if (std::holds_alternative<KeyframeSampling>(options.sampling))
+      keyframes = make_renderer(sampled_camera(options.sampling, context), *world.workers);
     world.cameras.push_back(
-        {make_renderer(model, *world.workers),
-         make_sampler(options.sampling, {traits, model.width, model.height, span, *world.workers}),
+        {std::move(renderer),
+         std::move(sampler),
          EventCamera(sensor, model.width, model.height, scenario.seed, static_cast<std::uint16_t>(i)),
-         {}});
+         {},
+         nullptr,
+         std::move(keyframes)});
     require_a_view(world, i);
     name_what_has_no_effect(scenario, world, i, notices);
   }

@@ -190,7 +190,7 @@ class Evaluation {
       for (std::size_t i = 0; i < result_.windows.size(); ++i) {
         const TimeSpan& span = result_.windows[i].span;
         if (tapped.t <= span.start || tapped.t > span.end) continue;
-        result.windows[i].samples_per_s += 1 / result.windows[i].duration_s;
+        result.windows[i].samples_per_s += static_cast<double>(tapped.samples) / result.windows[i].duration_s;
         result.windows[i].frame_equivalents_per_s +=
             static_cast<double>(tapped.pixel_evaluations) / pixels / result.windows[i].duration_s;
       }

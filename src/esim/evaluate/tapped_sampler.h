@@ -10,6 +10,7 @@ namespace esim {
 /// What passes between a sampler and the event camera, as somebody who listens in hears it.
 struct Tapped {
   TimeNs t = 0;                        ///< of the sample that was accepted
+  std::int64_t samples = 0;            ///< 1, or 0 where more segments follow from the one before
   std::int64_t pixel_evaluations = 0;  ///< that it cost
   std::span<const Segment> segments;   ///< that followed from it
 };
@@ -30,13 +31,21 @@ class TappedSampler final : public Sampler {
     const TimeNs t = sample.t;
     const std::int64_t before = sampler_->statistics().pixel_evaluations;
     const std::span<const Segment> segments = sampler_->accept(sample);
-    listener_({t, sampler_->statistics().pixel_evaluations - before, segments});
+    listener_({t, 1, sampler_->statistics().pixel_evaluations - before, segments});
+    t_ = t;
+    return segments;
+  }
+
+  std::span<const Segment> more() override {
+    const std::span<const Segment> segments = sampler_->more();
+    if (!segments.empty()) listener_({t_, 0, 0, segments});
     return segments;
   }
 
  private:
   std::unique_ptr<Sampler> sampler_;
   Listener listener_;
+  TimeNs t_ = 0;  // of the sample that was accepted last
 };
 
 }  // namespace esim

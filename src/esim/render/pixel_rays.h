@@ -36,7 +36,7 @@ struct PixelRays {
   // d(pixel) / d(bearing), px: how the image of a point moves when its bearing does.
   PixelTable du_dx, du_dy, dv_dx, dv_dy;
 
-  // d(bearing) / d(pixel): the pixel's footprint, the inverse of the above.
+  // d(bearing) / d(pixel) times the camera's footprint: the area that the pixel averages over.
   PixelTable dx_du, dx_dv, dy_du, dy_dv;
 };
 

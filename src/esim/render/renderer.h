@@ -28,8 +28,9 @@ struct RendererTraits {
   std::string name;                             ///< as in the scenario, for reports
   Granularity granularity = Granularity::tile;  ///< frame: asking for a tile costs as much as the whole image
   bool at_infinity = false;                     ///< everything that it shows is infinitely far away
-  bool on_sensor = false;  ///< drawn on the sensor: the camera's pose, twist and lens change nothing
-  std::string device{};    ///< that it runs on, where that is not simply the processor
+  bool on_sensor = false;    ///< drawn on the sensor: the camera's pose, twist and lens change nothing
+  bool wide_pixels = false;  ///< averages over the camera's footprint also where that is more than a pixel
+  std::string device{};      ///< that it runs on, where that is not simply the processor
 
   /// For people.
   std::string label() const { return device.empty() ? name : name + " on " + device; }

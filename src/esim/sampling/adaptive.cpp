@@ -85,7 +85,7 @@ class AdaptiveSampler final : public Sampler {
         const int x = column * options.tile_px, y = row * options.tile_px;
         tiles_.emplace_back(
             Tile{x, y, std::min(options.tile_px, context.width - x), std::min(options.tile_px, context.height - y)},
-            eps, static_cast<float>(tolerance_));
+            eps, static_cast<float>(4 * tolerance_));
         tiles_.back().due = context.span.start;
       }
     }
@@ -114,6 +114,7 @@ class AdaptiveSampler final : public Sampler {
     return segments_;
   }
 
+  std::span<const Segment> more() override { return {}; }
   TimeNs watermark() const override { return watermark_; }
   SamplingStatistics statistics() const override { return statistics_; }
 
@@ -228,7 +229,9 @@ void AdaptiveSampler::plan(TileState& tile) const {
   const TileTimeline& timeline = tile.timeline;
   const std::size_t last = timeline.size() - 1;
   const double way = options_.lambda / tile.speed * kNsPerS;  // ns
-  double step = std::min(way, static_cast<double>(longest_));
+  // At first nothing is known: short steps tell something soon.
+  double step = 0.25 * std::min({way, static_cast<double>(longest_),
+                                 static_cast<double>(context_.span.end - context_.span.start)});
   if (last >= 2) {
     const auto left = static_cast<double>(timeline.time(last - 1) - timeline.time(last - 2));
     const auto right = static_cast<double>(timeline.time(last) - timeline.time(last - 1));

@@ -1,7 +1,11 @@
 #pragma once
 
+#include <functional>
+
 #include "esim/core/parallel.h"
 #include "esim/core/time.h"
+#include "esim/geometry/camera.h"
+#include "esim/render/renderer.h"
 
 namespace esim {
 
@@ -17,6 +21,11 @@ struct SamplingContext {
   int width = 0, height = 0;  ///< of the image, px
   TimeSpan span;              ///< to sample: the first sample at its start, the last exactly at its end
   const Workers& workers;     ///< outlives the sampler
+
+  // What is known of the views beforehand, for schemes that reproject.
+  Camera camera{};                                 ///< the model
+  RendererTraits renderer{};                       ///< that shows the scene
+  std::function<RenderRequest(TimeNs)> view_at{};  ///< where the camera and the moving objects are; no tiles
 };
 
 }  // namespace esim

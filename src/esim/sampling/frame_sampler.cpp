@@ -33,6 +33,8 @@ class FrameSampler final : public Sampler {
     return {&segment_, 1};
   }
 
+  std::span<const Segment> more() override { return {}; }
+
   TimeNs watermark() const override { return watermark_; }
   SamplingStatistics statistics() const override { return statistics_; }
 

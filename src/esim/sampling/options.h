@@ -22,14 +22,14 @@ struct UniformSampling {
 struct BrightnessSampling {
   static constexpr const char* kType = "brightness";
   double lambda = 0.5;
-  RateBounds bounds;
+  RateBounds bounds{};
 };
 
 /// A pixel is expected to move by at most lambda pixels between two samples (paper, Eq. 3).
 struct FlowSampling {
   static constexpr const char* kType = "flow";
   double lambda = 0.5;
-  RateBounds bounds;
+  RateBounds bounds{};
 };
 
 /// Tiles have times of their own, so that the brightness between two samples is off by no more than the tolerance.
@@ -39,10 +39,22 @@ struct AdaptiveSampling {
   double lambda = 0.5;
   double max_motion_px = 2;
   int tile_px = 16;
-  RateBounds bounds;
+  RateBounds bounds{};
 };
 
-using SamplingOptions = std::variant<FlowSampling, BrightnessSampling, UniformSampling, AdaptiveSampling>;
+/// Few images of a denser camera, and between them what their pixels show from elsewhere.
+struct KeyframeSampling {
+  static constexpr const char* kType = "keyframes";
+  double tolerance = 0.5;
+  int supersampling = 0;
+  int margin_px = 16;
+  double max_displacement_px = 32;
+  double lambda = 0.5;
+  RateBounds bounds{2, 500};
+};
+
+using SamplingOptions =
+    std::variant<FlowSampling, BrightnessSampling, UniformSampling, AdaptiveSampling, KeyframeSampling>;
 
 template <class Visitor>
 void describe(Visitor& visit, UniformSampling& o) {
@@ -80,6 +92,21 @@ void describe(Visitor& visit, AdaptiveSampling& o) {
   visit("max_motion_px", o.max_motion_px,
         About{"most expected motion between two samples, however little brightness changes", "px", 0, 1e6, true});
   visit("tile_px", o.tile_px, About{"side of the tiles that are sampled independently", "px", 4, 1024});
+  describe(visit, o.bounds);
+}
+
+template <class Visitor>
+void describe(Visitor& visit, KeyframeSampling& o) {
+  visit(
+      "tolerance", o.tolerance,
+      About{"two keyframes may disagree on what lies between them by so many contrast thresholds, over blocks of 8 x 8 "
+            "pixels; a third one is rendered where they disagree more",
+            "", 0, 1e6, true});
+  visit("supersampling", o.supersampling,
+        About{"pixels of a keyframe to one of the sensor's, along each side; 0: from the tolerance", "", 0, 4});
+  visit("margin_px", o.margin_px, About{"that a keyframe shows around the sensor's image", "px", 0, 1024});
+  visit("max_displacement_px", o.max_displacement_px, About{"expected motion between two keyframes", "px", 1, 1024});
+  visit("lambda", o.lambda, About{"expected motion between two reconstructed images", "px", 0, 1e6, true});
   describe(visit, o.bounds);
 }
 

@@ -30,24 +30,32 @@ struct SamplingStatistics {
 
   // Of schemes that measure their error.
   std::optional<MeasuredError> measured_error;
-  double tolerance = 0;         ///< that was asked for, in contrast thresholds
-  std::int64_t bisections = 0;  ///< samples taken because those around them did not foretell each other
-  std::int64_t audits = 0;      ///< samples taken only to measure the error
+  double tolerance = 0;              ///< that was asked for, in contrast thresholds
+  std::int64_t bisections = 0;       ///< samples taken because their neighbours disagreed
+  std::int64_t audits = 0;           ///< samples taken only to measure the error
+  std::int64_t reconstructions = 0;  ///< images made between samples
+  double unseen_share = 0;           ///< of the reconstructed pixels: seen by no sample
 };
 
 /// Decides when which pixels of one camera are evaluated, and turns the samples into segments. A sampler never
-/// renders. Use: while next() gives a request, render it, and pass the sample to accept().
+/// renders. Use: while next() gives a request, render it, pass the sample to accept(), and ask for more() until there
+/// is none.
 class Sampler {
  public:
   virtual ~Sampler() = default;
 
-  /// The next evaluation wanted, empty after the last one; the same until accept() is called.
+  /// The next evaluation wanted, the same until accept() is called. Empty after the last one, and while more() has to
+  /// be asked before it is known.
   virtual std::optional<SampleRequest> next() const = 0;
 
   /// Takes the evaluation that next() asked for. Returns the segments that are now known: those of a tile one after the
   /// other, contiguous, in order of time, and valid until the next call; none where it needs another evaluation first.
   /// The sample's buffers are exchanged for used ones.
   virtual std::span<const Segment> accept(Sample& sample) = 0;
+
+  /// Further segments that the same evaluation has made known, a few at a time, likewise valid until the next call;
+  /// none after the last ones. To be asked until then.
+  virtual std::span<const Segment> more() = 0;
 
   /// No segment that is still to come begins before this time. Never decreases; the end after the last sample.
   virtual TimeNs watermark() const = 0;

@@ -53,8 +53,15 @@ class Run {
       segments = camera.sampler->accept(camera.sample);
     }
     start_next(camera);
-    Stopwatch stopwatch(summary_.seconds.events);
-    camera.event_camera.integrate(segments, *world_.workers);
+    while (!segments.empty()) {
+      {
+        Stopwatch stopwatch(summary_.seconds.events);
+        camera.event_camera.integrate(segments, *world_.workers);
+      }
+      Stopwatch stopwatch(summary_.seconds.sampling);
+      segments = camera.sampler->more();
+    }
+    if (camera.rendering == nullptr) start_next(camera);  // what comes next may have depended on more()
   }
 
   /// Writes everything up to `until`, all kinds of record together in order of time.
@@ -102,7 +109,7 @@ class Run {
     Stopwatch stopwatch(summary_.seconds.render);
     auto next = camera.sampler->next();
     if (!next) return camera.rendering.reset();
-    camera.rendering = camera.renderer->start(view(world_, index_of(camera), next->t, std::move(next->tiles)));
+    camera.rendering = camera.sampled().start(view(world_, index_of(camera), next->t, std::move(next->tiles)));
   }
 
   double elapsed() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }

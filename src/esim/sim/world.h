@@ -20,6 +20,9 @@ struct CameraChannel {
   EventCamera event_camera;
   Sample sample;                           // the latest evaluation; its buffers go round between renderer and sampler
   std::unique_ptr<Rendering> rendering{};  // the one that the sampler wants next, under way
+  std::unique_ptr<Renderer> keyframes{};   // what the sampler asks, where its camera is denser than the sensor's
+
+  Renderer& sampled() { return keyframes != nullptr ? *keyframes : *renderer; }
 };
 
 /// The state of a simulation. Its description is a RecordingInfo, which does not change.

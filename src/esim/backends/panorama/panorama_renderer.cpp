@@ -40,7 +40,7 @@ class PanoramaRenderer final : public ProcessorRenderer {
       : panorama_(std::move(panorama)), rays_(camera), workers_(workers) {}
 
   RendererTraits traits() const override {
-    return {.name = "panorama", .granularity = Granularity::tile, .at_infinity = true};
+    return {.name = "panorama", .granularity = Granularity::tile, .at_infinity = true, .wide_pixels = true};
   }
 
  private:

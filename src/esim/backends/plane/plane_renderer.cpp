@@ -17,7 +17,7 @@ class PlaneRenderer final : public ProcessorRenderer {
       : poster_(std::move(poster)), rays_(camera), workers_(workers) {}
 
   RendererTraits traits() const override {
-    return {.name = "plane", .granularity = Granularity::tile, .at_infinity = false};
+    return {.name = "plane", .granularity = Granularity::tile, .at_infinity = false, .wide_pixels = true};
   }
 
  private:

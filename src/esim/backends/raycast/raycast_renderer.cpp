@@ -75,7 +75,7 @@ class RaycastRenderer final : public ProcessorRenderer {
         workers_(workers) {}
 
   RendererTraits traits() const override {
-    return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false};
+    return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false, .wide_pixels = true};
   }
 
  private:

@@ -1,0 +1,66 @@
+#include "esim/sampling/disagreement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "esim/core/fast_log.h"
+
+namespace esim {
+namespace {
+
+constexpr double kLeast = 1e-6, kPerBin = 1.03;
+constexpr int kBlock = 8;         // px
+constexpr double kShare = 0.998;  // of the blocks, that disagree by less
+
+}  // namespace
+
+void ErrorHistogram::add(double error) {
+  const double bin = std::log(std::max(error, kLeast) / kLeast) / std::log(kPerBin);
+  ++counts_[static_cast<std::size_t>(std::min(bin, kBins - 1.0))];
+  ++count_;
+  sum_ += error;
+  max_ = std::max(max_, error);
+}
+
+MeasuredError ErrorHistogram::summary() const {
+  if (count_ == 0) return {};
+  MeasuredError result{sum_ / static_cast<double>(count_), max_, max_};
+  std::int64_t below = 0;
+  for (std::size_t bin = 0; bin < counts_.size(); ++bin) {
+    below += counts_[bin];
+    if (static_cast<double>(below) < 0.99 * static_cast<double>(count_)) continue;
+    result.p99 = std::min(max_, kLeast * std::pow(kPerBin, static_cast<double>(bin + 1)));
+    break;
+  }
+  return result;
+}
+
+double disagreement(const Reconstruction& apart, double log_eps, ErrorHistogram& pixels) {
+  const Image<float>&before = apart.from_before, &after = apart.from_after;
+  const float eps = static_cast<float>(log_eps);
+  std::vector<double> blocks;
+  for (int top = 0; top < before.height(); top += kBlock) {
+    for (int left = 0; left < before.width(); left += kBlock) {
+      const int bottom = std::min(top + kBlock, before.height()), right = std::min(left + kBlock, before.width());
+      double sum = 0;
+      int count = 0;
+      for (int y = top; y < bottom; ++y) {
+        for (int x = left; x < right; ++x) {
+          if (before(x, y) < 0 || after(x, y) < 0) continue;
+          const double difference = fast_log((before(x, y) + eps) / (after(x, y) + eps));
+          pixels.add(std::fabs(difference));
+          sum += difference;
+          ++count;
+        }
+      }
+      if (4 * count >= (bottom - top) * (right - left)) blocks.push_back(std::fabs(sum / count));
+    }
+  }
+  if (blocks.empty()) return 0;
+  const auto rank = static_cast<std::ptrdiff_t>(kShare * static_cast<double>(blocks.size() - 1));
+  std::nth_element(blocks.begin(), blocks.begin() + rank, blocks.end());
+  return blocks[static_cast<std::size_t>(rank)];
+}
+
+}  // namespace esim

@@ -1,0 +1,224 @@
+#include "esim/sampling/keyframes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "esim/core/error.h"
+#include "esim/sampling/disagreement.h"
+
+namespace esim {
+namespace {
+
+constexpr double kMostPerSecond = 50000;  // reconstructions, also where something moves faster
+constexpr double kMostUnseen = 0.01;      // share of an image that no keyframe sees
+
+/// A keyframe, and how fast its image moves.
+struct MovingKeyframe {
+  Keyframe keyframe;
+  double typical_px_per_s = 0;  ///< 99 % of the pixels are slower
+  double fastest_px_per_s = 0;  ///< 99.9 %
+
+  TimeNs t() const { return keyframe.view.t; }
+};
+
+/// The speeds below which these shares of the pixels stay, px/s. Those that are no numbers do not count.
+std::pair<double, double> speeds(const Sample& sample, double lower_share, double upper_share) {
+  std::vector<float> squared;
+  squared.reserve(sample.flow_x.size());
+  for (std::size_t i = 0; i < sample.flow_x.size(); ++i) {
+    const float vx = sample.flow_x.pixels()[i], vy = sample.flow_y.pixels()[i], v2 = vx * vx + vy * vy;
+    if (std::isfinite(v2)) squared.push_back(v2);
+  }
+  if (squared.empty()) return {0, 0};
+  const auto at = [&](double share) {
+    const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(squared.size() - 1));
+    std::nth_element(squared.begin(), squared.begin() + rank, squared.end());
+    return std::sqrt(double{squared[static_cast<std::size_t>(rank)]});
+  };
+  return {at(lower_share), at(upper_share)};
+}
+
+class KeyframeSampler final : public Sampler {
+ public:
+  KeyframeSampler(const KeyframeSampling& options, const SamplingContext& context)
+      : options_(options),
+        context_(context),
+        layout_(lay_out_keyframes(options, context)),
+        reprojector_(layout_, context.renderer.at_infinity, context.workers),
+        request_(SampleRequest{context.span.start, {{0, 0, layout_.camera.width, layout_.camera.height}}}),
+        watermark_(context.span.start) {
+    statistics_.tolerance = options.tolerance;
+  }
+
+  std::optional<SampleRequest> next() const override { return unsettled_ || step_ != steps_ ? std::nullopt : request_; }
+
+  std::span<const Segment> accept(Sample& sample) override {
+    take(sample);
+    if (statistics_.samples > 1) return settle();
+    before_ = std::move(ahead_.back());
+    ahead_.pop_back();
+    reprojector_.reconstruct(before_.keyframe, before_.keyframe, context_.view_at(before_.t()), false, later_);
+    ++statistics_.reconstructions;
+    segment_ = {sensor(), before_.t(), before_.t(), &later_.irradiance, &later_.irradiance};
+    if (before_.t() < context_.span.end) {
+      request(predicted());
+    } else {
+      request_.reset();
+    }
+    return {&segment_, 1};
+  }
+
+  std::span<const Segment> more() override {
+    if (unsettled_) {
+      unsettled_ = false;
+      return settle();
+    }
+    if (step_ == steps_) return {};
+    ++step_;
+    return reconstruct();
+  }
+
+  TimeNs watermark() const override { return watermark_; }
+
+  SamplingStatistics statistics() const override {
+    SamplingStatistics result = statistics_;
+    result.measured_error = errors_.summary();
+    const double pixels = static_cast<double>(sensor().area()) * static_cast<double>(statistics_.reconstructions);
+    result.unseen_share = pixels > 0 ? static_cast<double>(unseen_) / pixels : 0;
+    return result;
+  }
+
+ private:
+  Tile sensor() const { return {0, 0, layout_.sensor.width, layout_.sensor.height}; }
+
+  void request(TimeNs t) { request_ = SampleRequest{t, {{0, 0, layout_.camera.width, layout_.camera.height}}}; }
+
+  /// Puts a rendered keyframe in front of those that are ahead.
+  void take(Sample& sample) {
+    ++statistics_.samples;
+    statistics_.pixel_evaluations += static_cast<std::int64_t>(sample.irradiance.size());
+    MovingKeyframe& taken = ahead_.emplace_back();
+    std::tie(taken.typical_px_per_s, taken.fastest_px_per_s) = speeds(sample, 0.99, 0.999);
+    taken.typical_px_per_s /= layout_.supersampling;
+    taken.fastest_px_per_s /= layout_.supersampling;
+    prepare_keyframe(layout_, reprojector_.at_infinity(), context_.view_at(sample.t), sample, context_.workers,
+                     taken.keyframe);
+  }
+
+  TimeNs shortest() const { return std::max<TimeNs>(1, to_ns(1.0 / options_.bounds.max_rate_hz)); }
+
+  /// When the keyframe after `before_` is due.
+  TimeNs predicted() {
+    const TimeNs longest = std::max(shortest(), to_ns(1.0 / options_.bounds.min_rate_hz));
+    const double wanted_ns = 1e9 * options_.max_displacement_px / before_.typical_px_per_s;
+    const auto wanted = static_cast<TimeNs>(std::min(wanted_ns, static_cast<double>(longest)));
+    if (wanted < shortest()) ++statistics_.held_to_max_rate;
+    return std::min(before_.t() + std::max(wanted, shortest()), context_.span.end);
+  }
+
+  /// Begins with the interval up to the next keyframe, or asks for another one in its middle.
+  std::span<const Segment> settle() {
+    const TimeNs interval = ahead_.back().t() - before_.t();
+    if (!agree()) {
+      if (interval / 2 >= shortest()) {
+        ++statistics_.bisections;
+        request(before_.t() + interval / 2);
+        return {};
+      }
+      ++statistics_.held_to_max_rate;
+    }
+    const double fastest = std::max(before_.fastest_px_per_s, ahead_.back().fastest_px_per_s);
+    const double steps = std::ceil(to_seconds(interval) * std::min(fastest / options_.lambda, kMostPerSecond));
+    steps_ = static_cast<TimeNs>(std::clamp(steps, 1.0, static_cast<double>(interval)));
+    step_ = 1;
+    errors_ = checked_;
+    return reconstruct();
+  }
+
+  /// Whether the keyframes around an interval will do.
+  bool agree() {
+    const MovingKeyframe& after = ahead_.back();
+    const TimeNs interval = after.t() - before_.t();
+    const double moved = to_seconds(interval) * std::max(before_.typical_px_per_s, after.typical_px_per_s);
+    checked_ = errors_;
+    double worst = 0;
+    std::int64_t unseen = 0;
+    for (const int quarter : {1, 2, 3}) {
+      const TimeNs t = before_.t() + interval / 4 * quarter;
+      reprojector_.reconstruct(before_.keyframe, after.keyframe, context_.view_at(t), true, apart_);
+      worst = std::max(worst, disagreement(apart_, context_.sensor.log_eps, checked_));
+      unseen = std::max(unseen, apart_.unseen);
+    }
+    return worst <= options_.tolerance * context_.sensor.contrast_threshold &&
+           static_cast<double>(unseen) <= kMostUnseen * static_cast<double>(sensor().area()) &&
+           moved <= 2 * options_.max_displacement_px;
+  }
+
+  /// The segment up to `step_` of `steps_`; after the last one, the interval's later keyframe becomes the earlier one.
+  std::span<const Segment> reconstruct() {
+    const MovingKeyframe& after = ahead_.back();
+    const double share = static_cast<double>(step_) / static_cast<double>(steps_);
+    const TimeNs t = step_ == steps_
+                         ? after.t()
+                         : before_.t() + static_cast<TimeNs>(share * static_cast<double>(after.t() - before_.t()));
+    std::swap(earlier_, later_);
+    reprojector_.reconstruct(before_.keyframe, after.keyframe, context_.view_at(t), false, later_);
+    ++statistics_.reconstructions;
+    unseen_ += later_.unseen;
+    segment_ = {sensor(), watermark_, t, &earlier_.irradiance, &later_.irradiance};
+    watermark_ = t;
+    if (step_ == steps_) advance();
+    return {&segment_, 1};
+  }
+
+  void advance() {
+    before_ = std::move(ahead_.back());
+    ahead_.pop_back();
+    if (!ahead_.empty()) {
+      unsettled_ = true;
+    } else if (before_.t() < context_.span.end) {
+      request(predicted());
+    } else {
+      request_.reset();
+    }
+  }
+
+  KeyframeSampling options_;
+  SamplingContext context_;
+  KeyframeLayout layout_;
+  Reprojector reprojector_;
+
+  std::optional<SampleRequest> request_;
+  MovingKeyframe before_;              // the keyframe up to which everything is known
+  std::vector<MovingKeyframe> ahead_;  // later ones, the last one the next
+  TimeNs step_ = 0, steps_ = 0;        // of the interval that is being reconstructed
+  Reconstruction earlier_, later_, apart_;
+  Segment segment_;
+  TimeNs watermark_;
+  bool unsettled_ = false;
+
+  SamplingStatistics statistics_;
+  ErrorHistogram errors_, checked_;
+  std::int64_t unseen_ = 0;
+};
+
+}  // namespace
+
+KeyframeLayout lay_out_keyframes(const KeyframeSampling& options, const SamplingContext& context) {
+  if (context.renderer.on_sensor) {
+    throw UserError("sampling: keyframes cannot be seen from elsewhere where " + context.renderer.name +
+                    " are drawn on the sensor itself; use type flow or brightness");
+  }
+  const int chosen = options.tolerance >= 0.25 ? 2 : 3;
+  return lay_out_keyframes(context.camera, options.supersampling > 0 ? options.supersampling : chosen,
+                           options.margin_px, context.renderer.wide_pixels);
+}
+
+std::unique_ptr<Sampler> make_keyframe_sampler(const KeyframeSampling& options, const SamplingContext& context) {
+  return std::make_unique<KeyframeSampler>(options, context);
+}
+
+}  // namespace esim

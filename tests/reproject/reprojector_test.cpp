@@ -1,0 +1,188 @@
+#include "esim/reproject/reprojector.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "esim/core/error.h"
+#include "render/scenes.h"
+
+namespace esim {
+namespace {
+
+/// The camera `dt` seconds after test::moving_camera(), at a constant twist.
+Kinematics camera_at(double dt) {
+  Kinematics camera = test::moving_camera();
+  camera.T_world_body.translation += camera.velocity_world * dt;
+  camera.T_world_body.rotation = camera.T_world_body.rotation * so3_exp(camera.omega_body * dt);
+  return camera;
+}
+
+struct Difference {
+  double rms = 0, largest = 0;
+};
+
+Difference difference(const Image<float>& a, const Image<float>& b) {
+  Difference result;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double d = std::fabs(a.pixels()[i] - b.pixels()[i]);
+    result.rms += d * d / static_cast<double>(a.size());
+    result.largest = std::max(result.largest, d);
+  }
+  result.rms = std::sqrt(result.rms);
+  return result;
+}
+
+/// One of the test scenes, its keyframes, and what lies between them.
+class Between {
+ public:
+  Between(const std::string& name, int distortion, const Workers& workers = test::two_threads(), bool wide = true)
+      : name_(name),
+        sensor_(test::distorted_camera(distortion)),
+        workers_(workers),
+        layout_(lay_out_keyframes(sensor_, 2, 12, wide)),
+        renderer_(test::make_renderer(name, sensor_, workers)),
+        keyframes_(test::make_renderer(name, layout_.camera, workers)),
+        reprojector_(layout_, renderer_->traits().at_infinity, workers) {}
+
+  RenderRequest view(double dt, const Camera& camera) const {
+    return {test::kTime + to_ns(dt), camera_at(dt), {{0, 0, camera.width, camera.height}}, test::objects_of(name_, dt)};
+  }
+
+  Keyframe keyframe(double dt) const {
+    Sample sample;
+    const RenderRequest request = view(dt, layout_.camera);
+    keyframes_->render(request, sample);
+    Keyframe result;
+    prepare_keyframe(layout_, reprojector_.at_infinity(), request, sample, workers_, result);
+    return result;
+  }
+
+  Reconstruction reconstruct(const Keyframe& before, const Keyframe& after, double dt) {
+    Reconstruction result;
+    reprojector_.reconstruct(before, after, view(dt, sensor_), true, result);
+    return result;
+  }
+
+  Sample direct(double dt) const {
+    Sample sample;
+    renderer_->render(view(dt, sensor_), sample);
+    return sample;
+  }
+
+  const KeyframeLayout& layout() const { return layout_; }
+
+ private:
+  std::string name_;
+  Camera sensor_;
+  const Workers& workers_;
+  KeyframeLayout layout_;
+  std::unique_ptr<Renderer> renderer_, keyframes_;
+  Reprojector reprojector_;
+};
+
+class EveryLens : public testing::TestWithParam<std::tuple<const char*, int>> {};
+
+// Rotation, parallax and lenses: the texture is smooth, so that all that is left is what interpolation does; but where
+// walls meet, a ray per pixel sees the one or the other.
+TEST_P(EveryLens, ReprojectionIsDirectRendering) {
+  const auto [name, distortion] = GetParam();
+  Between scene(name, distortion);
+  const Keyframe before = scene.keyframe(0), after = scene.keyframe(0.06);
+  const double motion = difference(scene.direct(0).irradiance, scene.direct(0.06).irradiance).rms;
+  EXPECT_GT(motion, 0.01) << "the test's camera should move";
+  for (const double dt : {0.0, 0.02, 0.03, 0.06}) {
+    const Reconstruction found = scene.reconstruct(before, after, dt);
+    EXPECT_EQ(found.unseen, 0) << dt;
+    const auto [rms, largest] = difference(found.irradiance, scene.direct(dt).irradiance);
+    const bool has_edges = std::string(name) == "mesh";
+    EXPECT_LT(rms, (has_edges ? 0.15 : 0.02) * motion) << dt;
+    EXPECT_LT(largest, has_edges ? 0.5 : 0.02) << dt;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, EveryLens,
+                         testing::Combine(testing::Values("panorama", "plane", "mesh"), testing::Values(0, 1, 2, 3)));
+
+TEST(Reprojector, FollowsMovingObjectsAndWhatTheyHide) {
+  for (int distortion : {0, 1}) {
+    Between scene("moving_mesh", distortion);
+    const Keyframe before = scene.keyframe(0), after = scene.keyframe(0.1);
+    const Sample direct = scene.direct(0.05);
+    const Reconstruction found = scene.reconstruct(before, after, 0.05);
+
+    // On the objects, on the walls, and all but at their edges.
+    std::vector<float> on_objects, on_walls;
+    for (int y = 0; y < direct.irradiance.height(); ++y) {
+      for (int x = 0; x < direct.irradiance.width(); ++x) {
+        auto& errors = direct.object(x, y) > 0 ? on_objects : on_walls;
+        errors.push_back(std::fabs(found.irradiance(x, y) - direct.irradiance(x, y)));
+      }
+    }
+    for (auto* errors : {&on_objects, &on_walls}) {
+      ASSERT_GT(errors->size(), 500U);
+      const auto rank = errors->begin() + static_cast<std::ptrdiff_t>(errors->size() * 85 / 100);
+      std::nth_element(errors->begin(), rank, errors->end());
+      EXPECT_LT(*rank, 0.02);
+    }
+    // Without the objects' motion they would be elsewhere.
+    const Difference stayed = difference(scene.direct(0).irradiance, direct.irradiance);
+    EXPECT_LT(difference(found.irradiance, direct.irradiance).rms, 0.35 * stayed.rms);
+  }
+}
+
+TEST(Reprojector, DoesNotDependOnThreads) {
+  const Workers one(1);
+  Between a("moving_mesh", 1), b("moving_mesh", 1, one);
+  const Reconstruction x = a.reconstruct(a.keyframe(0), a.keyframe(0.1), 0.03),
+                       y = b.reconstruct(b.keyframe(0), b.keyframe(0.1), 0.03);
+  EXPECT_TRUE(std::equal(x.irradiance.pixels().begin(), x.irradiance.pixels().end(), y.irradiance.pixels().begin()));
+  EXPECT_EQ(x.unseen, y.unseen);
+}
+
+TEST(Reprojector, AveragesFinePixelsWhereTheRendererDoesNot) {
+  for (const char* name : {"panorama", "plane"}) {
+    Between scene(name, 0, test::two_threads(), false);
+    EXPECT_EQ(scene.layout().camera.footprint, 1.0);
+    const Reconstruction found = scene.reconstruct(scene.keyframe(0), scene.keyframe(0.06), 0.03);
+    EXPECT_LT(difference(found.irradiance, scene.direct(0.03).irradiance).rms, 0.003);
+  }
+}
+
+TEST(Reprojector, BearsDepthThatIsNoNumber) {
+  Between scene("mesh", 0);
+  const Workers& workers = test::two_threads();
+  Sample sample;
+  test::make_renderer("mesh", scene.layout().camera)->render(scene.view(0, scene.layout().camera), sample);
+  sample.depth(100, 80) = std::numeric_limits<float>::quiet_NaN();
+  sample.depth(101, 80) = std::numeric_limits<float>::infinity();
+  sample.depth(102, 80) = -1;
+  sample.depth(103, 80) = 0;
+  Keyframe damaged;
+  prepare_keyframe(scene.layout(), false, scene.view(0, scene.layout().camera), sample, workers, damaged);
+  const Reconstruction found = scene.reconstruct(damaged, scene.keyframe(0.05), 0.02);
+  for (const float light : found.irradiance.pixels()) EXPECT_TRUE(light > 0 && light < 2);
+}
+
+TEST(KeyframeLayout, PutsTheSensorsPixelsIntoItsMiddle) {
+  const Camera sensor = test::distorted_camera(2);
+  const KeyframeLayout layout = lay_out_keyframes(sensor, 3, 7, true);
+  EXPECT_EQ(layout.camera.width, 3 * (120 + 14));
+  EXPECT_EQ(layout.camera.footprint, 3);
+  const auto bearing = sensor.back_project({10, 20})->bearing;
+  const auto there = layout.camera.project(bearing)->pixel;
+  EXPECT_NEAR(there.x(), 3 * (10 + 7 + 0.5) - 0.5, 1e-9);
+  EXPECT_NEAR(there.y(), 3 * (20 + 7 + 0.5) - 0.5, 1e-9);
+}
+
+TEST(KeyframeLayout, EndsWhereTheLensDoes) {
+  Camera sensor = test::distorted_camera(1);
+  sensor.distortion = RadialTangential{-0.2, 0.0, 0, 0, 0};
+  const KeyframeLayout layout = lay_out_keyframes(sensor, 2, 500, true);
+  EXPECT_LT(layout.margin_px, 500);
+  EXPECT_NO_THROW(layout.camera.validate());
+}
+
+}  // namespace
+}  // namespace esim

@@ -1,0 +1,177 @@
+#include "esim/sampling/adaptive.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+namespace esim {
+namespace {
+
+constexpr int kWidth = 96, kHeight = 64;
+constexpr double kEps = 0.001, kThreshold = 0.3;
+
+/// Brightness and motion of a pixel at a time, in seconds.
+struct Movie {
+  std::function<double(double x, double y, double t)> brightness;
+  std::function<double(double x, double y, double t)> speed;  // to the right, px/s
+};
+
+/// A textured wall that passes from left to right.
+Movie passing_wall(double px_per_s) {
+  const auto turn = [](double x, double wavelength) { return std::sin(2 * std::numbers::pi * x / wavelength); };
+  return {[=](double x, double y, double t) {
+            return -1 + 0.6 * turn(x - px_per_s * t, 11) * turn(y, 17) + 0.4 * turn(x - px_per_s * t + y, 29);
+          },
+          [=](double, double, double) { return px_per_s; }};
+}
+
+/// A smooth bar that flies through the middle of a dark, motionless image.
+Movie flying_bar(double px_per_s) {
+  const auto offset = [=](double x, double t) { return (x + 20 - px_per_s * t) / 3; };
+  return {[=](double x, double y, double t) {
+            return std::abs(y - 32) < 6 ? -3 + 3 * std::exp(-offset(x, t) * offset(x, t)) : -3;
+          },
+          [=](double x, double y, double t) {
+            return std::abs(y - 32) < 6 && std::abs(offset(x, t)) < 3 ? px_per_s : 0.0;
+          }};
+}
+
+struct Outcome {
+  std::vector<double> errors;  // |L - truth| at random pixels and times, of what the sensor is given
+  SamplingStatistics statistics;
+  double digest = 0;
+
+  double quantile(double share) const {
+    std::vector<double> sorted = errors;
+    std::sort(sorted.begin(), sorted.end());
+    return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
+  }
+  double evaluations_per_pixel() const {
+    return static_cast<double>(statistics.pixel_evaluations) / (kWidth * kHeight);
+  }
+};
+
+Outcome sample(const AdaptiveSampling& options, const Movie& movie, TimeNs end, int threads = 2) {
+  const Workers workers(threads);
+  const auto sampler = make_adaptive_sampler(
+      options,
+      {{kThreshold, kEps}, kWidth, kHeight, {0, end}, workers, Camera::from_fov(kWidth, kHeight, 1.0), {}, {}});
+  Outcome outcome;
+  Sample sample;
+  while (const auto request = sampler->next()) {
+    sample.resize(kWidth, kHeight);
+    sample.t = request->t, sample.tiles = request->tiles;
+    for (const Tile& tile : request->tiles) {
+      for (int y = tile.y; y < tile.y + tile.height; ++y) {
+        for (int x = tile.x; x < tile.x + tile.width; ++x) {
+          const double t = to_seconds(request->t);
+          sample.irradiance(x, y) = static_cast<float>(std::exp(movie.brightness(x, y, t)) - kEps);
+          sample.flow_x(x, y) = static_cast<float>(movie.speed(x, y, t)), sample.flow_y(x, y) = 0;
+        }
+      }
+    }
+    for (const Segment& segment : sampler->accept(sample)) {
+      // A pixel of each segment, somewhere in it, so that each time counts alike.
+      const int x = segment.tile.x + static_cast<int>(segment.t1 / 7 % segment.tile.width);
+      const int y = segment.tile.y + static_cast<int>(segment.t1 / 13 % segment.tile.height);
+      const double l0 = std::log(double{(*segment.irradiance0)(x, y)} + kEps);
+      const double l1 = std::log(double{(*segment.irradiance1)(x, y)} + kEps);
+      outcome.digest += l1 * to_seconds(segment.t1 - segment.t0) + to_seconds(segment.t0);
+      constexpr TimeNs kEvery = 50 * kNsPerUs;
+      for (TimeNs t = segment.t0 / kEvery * kEvery + kEvery; t <= segment.t1; t += kEvery) {
+        const double share = static_cast<double>(t - segment.t0) / static_cast<double>(segment.t1 - segment.t0);
+        outcome.errors.push_back(std::abs(l0 + (l1 - l0) * share - movie.brightness(x, y, to_seconds(t))));
+      }
+    }
+  }
+  outcome.statistics = sampler->statistics();
+  return outcome;
+}
+
+TEST(AdaptiveSampling, WhatDoesNotChangeCostsTheMinimumRate) {
+  const Movie still{[](double x, double y, double) { return -2 + std::sin(x + y * y); },
+                    [](double, double, double) { return 0.0; }};
+  const Outcome outcome = sample({}, still, kNsPerSecond);
+  EXPECT_LE(outcome.evaluations_per_pixel(), 56);
+  EXPECT_GE(outcome.evaluations_per_pixel(), 50);
+  EXPECT_LE(outcome.quantile(1), 1e-5);
+}
+
+// 99 % of the true error stay below the tolerance, and a tolerance of a half makes half the error.
+TEST(AdaptiveSampling, KeepsTheTolerance) {
+  const Movie wall = passing_wall(400);
+  double error_before = 0, evaluations_before = 0;
+  for (const double tolerance : {0.4, 0.2, 0.1, 0.05}) {
+    const Outcome outcome = sample({.tolerance = tolerance}, wall, kNsPerSecond / 4);
+    EXPECT_LE(outcome.quantile(0.99), tolerance * kThreshold) << tolerance;
+    ASSERT_TRUE(outcome.statistics.measured_error.has_value());
+    EXPECT_LE(outcome.statistics.measured_error->p99, tolerance * kThreshold) << tolerance;
+    if (error_before > 0) {
+      EXPECT_LT(outcome.quantile(0.99), 0.75 * error_before) << tolerance;
+      EXPECT_LT(outcome.evaluations_per_pixel(), 2 * evaluations_before) << tolerance;
+    }
+    error_before = outcome.quantile(0.99), evaluations_before = outcome.evaluations_per_pixel();
+  }
+}
+
+TEST(AdaptiveSampling, MeasuresItsErrorHonestly) {
+  const Outcome outcome = sample({.tolerance = 0.2}, passing_wall(400), kNsPerSecond);
+  // Audits look into the middle of intervals, where errors are largest.
+  EXPECT_GT(outcome.statistics.measured_error->p99, 0.8 * outcome.quantile(0.99));
+  EXPECT_LT(outcome.statistics.measured_error->p99, 4 * outcome.quantile(0.99));
+  EXPECT_GT(outcome.statistics.audits, 20);
+}
+
+// Where one thing flies through a still image, only its surroundings are sampled, and it is missed nowhere.
+TEST(AdaptiveSampling, FollowsWhatMoves) {
+  const Movie bar = flying_bar(600);
+  const Outcome outcome = sample({.tolerance = 0.2}, bar, kNsPerSecond / 5);
+  EXPECT_LE(outcome.quantile(0.99), 0.2 * kThreshold);
+  EXPECT_LE(outcome.quantile(0.9995), kThreshold) << "the bar came into a tile unnoticed";
+  const double flow_half_px = 600 / 0.5 / 5;
+  EXPECT_LE(outcome.evaluations_per_pixel(), 0.4 * flow_half_px);
+}
+
+// The motion field says nothing of a light that flickers.
+TEST(AdaptiveSampling, NoticesFlicker) {
+  const Movie flicker{[](double, double, double t) { return -1 + 0.5 * std::sin(2 * std::numbers::pi * 23 * t); },
+                      [](double, double, double) { return 0.0; }};
+  const Outcome outcome = sample({.tolerance = 0.2}, flicker, kNsPerSecond);
+  EXPECT_LE(outcome.quantile(0.99), 0.2 * kThreshold);
+}
+
+TEST(AdaptiveSampling, IsTheSameWithAnyNumberOfThreads) {
+  const Outcome one = sample({}, passing_wall(300), kNsPerSecond / 10, 1);
+  const Outcome two = sample({}, passing_wall(300), kNsPerSecond / 10, 2);
+  EXPECT_EQ(one.digest, two.digest);
+  EXPECT_EQ(one.statistics.pixel_evaluations, two.statistics.pixel_evaluations);
+  EXPECT_EQ(one.errors, two.errors);
+}
+
+TEST(AdaptiveSampling, EndsWhereMotionIsNotFinite) {
+  Movie wall = passing_wall(100);
+  wall.speed = [](double x, double, double) {
+    return x < 10 ? std::numeric_limits<double>::infinity() : std::numeric_limits<double>::quiet_NaN();
+  };
+  EXPECT_LE(sample({.tolerance = 0.2}, wall, kNsPerSecond / 10).quantile(0.99), 0.2 * kThreshold);
+}
+
+// No budget makes the brightness of noise known in between: the highest rate is the end of it, and is reported.
+TEST(AdaptiveSampling, StopsAtTheHighestRate) {
+  const Movie noise{[](double x, double y, double t) {
+                      const double v = std::sin(x * 12.9898 + y * 78.233 + t * 1e7) * 43758.5453;
+                      return -1 + (v - std::floor(v));
+                    },
+                    [](double, double, double) { return 10.0; }};
+  const Outcome outcome = sample({.tolerance = 0.1, .bounds = {50, 2000}}, noise, kNsPerSecond / 50);
+  EXPECT_GT(outcome.statistics.held_to_max_rate, 0);
+  EXPECT_LE(outcome.evaluations_per_pixel(), 2000 / 50 * 1.1 + 3);
+}
+
+}  // namespace
+}  // namespace esim

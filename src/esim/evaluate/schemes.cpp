@@ -20,6 +20,7 @@ std::vector<SamplingOptions> default_schemes() {
   for (const double rate_hz : {100, 500, 1000, 2000, 3000}) schemes.push_back(UniformSampling{rate_hz});
   for (const double lambda : {4.0, 2.0, 1.0, 0.5}) schemes.push_back(BrightnessSampling{lambda, {}});
   for (const double lambda : {4.0, 2.0, 1.0, 0.5, 0.35}) schemes.push_back(FlowSampling{lambda, {}});
+  for (const double tolerance : {0.4, 0.2, 0.1}) schemes.push_back(AdaptiveSampling{.tolerance = tolerance});
   const std::size_t listed = schemes.size();
   for (const std::string& type : sampling_types()) {
     const SamplingOptions scheme = read_sampling(type);

@@ -14,7 +14,7 @@ namespace esim {
 namespace {
 
 constexpr double kNsPerS = 1e9;
-constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
+constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max(), kLongAgo = std::numeric_limits<TimeNs>::min();
 
 // One interval in so many is looked into.
 constexpr std::uint32_t kAuditOneIn = 64;
@@ -53,13 +53,14 @@ struct TileState {
   std::size_t done = 0;  // index of the sample up to which segments have been given
   TimeNs due = 0;
   Reason reason = Reason::next;
-  TimeNs audited = -1;  // begin of the interval that was audited last
+  TimeNs audited = kLongAgo;  // intervals that begin up to then are not audited any more
   double step = 0;      // that was planned last, ns
   double speed = 0;     // fastest motion at the last sample, px/s
   bool begun = false;   // the first segment, an instant, has been given
 
   // What the last sample brought.
-  std::size_t until = 0;  // segments up to this sample are to be given
+  std::size_t until = 0;    // segments up to this sample are to be given
+  std::vector<int> pieces;  // into which each interval until there is cut
   std::int64_t held = 0;
   double audited_error = -1, expected_error = 0;
   std::vector<float> audit;
@@ -127,7 +128,7 @@ class AdaptiveSampler final : public Sampler {
   TimeNs after(const TileState& tile, double step) const;
 
   void account();
-  int pieces(const TileState& tile, std::size_t i) const;
+  int pieces(const TileTimeline& timeline, std::size_t i) const;
   void lay_out();
   void give(TileState& tile, std::size_t first);
   void watch();
@@ -164,6 +165,8 @@ void AdaptiveSampler::take(TileState& tile, std::uint32_t index, const Sample& s
   if (tile.reason == Reason::audit) audit(tile, sample.t);
   if (ahead) tile.speed = fastest_in(sample, tile.timeline.tile());
   settle(tile, index);
+  tile.pieces.clear();
+  for (std::size_t i = tile.done; i < tile.until; ++i) tile.pieces.push_back(pieces(tile.timeline, i));
 }
 
 /// Looks what the error of the audited interval was: the sample at t was taken for that.
@@ -276,9 +279,11 @@ void AdaptiveSampler::account() {
 }
 
 /// Into how many straight pieces the interval behind sample i is cut for the pixels.
-int AdaptiveSampler::pieces(const TileState& tile, std::size_t i) const {
-  const double bow = tile.timeline.bow(i), straight = 0.08 * tolerance_;
-  return bow <= straight ? 1 : (bow <= 4 * straight ? 2 : 4);
+int AdaptiveSampler::pieces(const TileTimeline& timeline, std::size_t i) const {
+  constexpr TimeNs kMost = 4;
+  if (timeline.time(i + 1) - timeline.time(i) < kMost) return 1;
+  const double bow = timeline.bow(i), straight = 0.08 * tolerance_;
+  return bow <= straight ? 1 : (bow <= 4 * straight ? 2 : kMost);
 }
 
 /// Makes the list of the segments to give.
@@ -287,13 +292,13 @@ void AdaptiveSampler::lay_out() {
   first_segment_.clear();
   std::size_t layers = 0;
   for (const std::uint32_t index : asked_) {
-    TileState& tile = tiles_[index];
-    first_segment_.push_back(segments_.size());
+    const TileState& tile = tiles_[index];
     const TileTimeline& timeline = tile.timeline;
+    first_segment_.push_back(segments_.size());
     if (!tile.begun) segments_.push_back({timeline.tile(), timeline.time(0), timeline.time(0), nullptr, nullptr});
     for (std::size_t i = tile.done; i < tile.until; ++i) {
       const TimeNs t0 = timeline.time(i), h = timeline.time(i + 1) - t0;
-      const int count = h >= 4 ? pieces(tile, i) : 1;
+      const int count = tile.pieces[i - tile.done];
       for (int k = 0; k < count; ++k)
         segments_.push_back({timeline.tile(), t0 + h * k / count, t0 + h * (k + 1) / count, nullptr, nullptr});
     }
@@ -305,27 +310,23 @@ void AdaptiveSampler::lay_out() {
 /// Fills in the irradiance of a tile's segments, of which the first is given.
 void AdaptiveSampler::give(TileState& tile, std::size_t first) {
   TileTimeline& timeline = tile.timeline;
-  std::size_t layer = 0, segment = first;
-  timeline.write(tile.done, layers_[0]);
-  if (!tile.begun) {
-    segments_[segment].irradiance0 = segments_[segment].irradiance1 = layers_.data();
+  Image<float>* layer = layers_.data();
+  Segment* segment = segments_.data() + first;
+  timeline.write(tile.done, *layer);
+  if (!std::exchange(tile.begun, true)) {
+    segment->irradiance0 = segment->irradiance1 = layer;
     ++segment;
-    tile.begun = true;
   }
   for (std::size_t i = tile.done; i < tile.until; ++i) {
-    const TimeNs t1 = timeline.time(i + 1);
-    int count = 0;
-    for (std::size_t s = segment; s < segments_.size() && segments_[s].tile == timeline.tile() && segments_[s].t1 <= t1;
-         ++s)
-      ++count;
-    for (int k = 1; k <= count; ++k) {
+    const int count = tile.pieces[i - tile.done];
+    for (int k = 1; k <= count; ++k, ++segment) {
+      segment->irradiance0 = layer++;
+      segment->irradiance1 = layer;
       if (k < count) {
-        timeline.write_between(i, 4 * k / count, layers_[layer + 1]);
+        timeline.write_between(i, 4 * k / count, *layer);
       } else {
-        timeline.write(i + 1, layers_[layer + 1]);
+        timeline.write(i + 1, *layer);
       }
-      segments_[segment].irradiance0 = &layers_[layer], segments_[segment].irradiance1 = &layers_[layer + 1];
-      ++segment, ++layer;
     }
   }
   tile.done = timeline.forget_before(tile.until);
@@ -345,7 +346,7 @@ void AdaptiveSampler::watch() {
         TileState& other = tiles_[static_cast<std::size_t>(y * columns_ + x)];
         const double gap = options_.tile_px * std::max(std::max(std::abs(x - column), std::abs(y - row)) - 1, 0);
         const auto bring_forward = [&](TileState& tile, TimeNs t) {
-          if (tile.reason != Reason::next || tile.due >= context_.span.end || t >= tile.due) return;
+          if (tile.reason != Reason::next || tile.due == kNever || t >= tile.due) return;
           const TimeNs last = tile.timeline.time(tile.timeline.size() - 1);
           tile.due = after(tile, static_cast<double>(std::max<TimeNs>(t - last, 0)));
         };

@@ -115,6 +115,7 @@ void RaycastScene::add_group(const std::vector<const Mesh*>& meshes) {
   if (triangles_.size() == group.first_triangle) return;
   group.accelerator.reset(rtcNewScene(device_.get()));
   rtcSetSceneFlags(group.accelerator.get(), RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneBuildQuality(group.accelerator.get(), RTC_BUILD_QUALITY_HIGH);  // slower to build, faster to look at
   if (meshes.size() == 1) {
     attach(device_.get(), group.accelerator.get(), *meshes[0]);
   } else {

@@ -54,9 +54,9 @@ struct TileState {
   TimeNs due = 0;
   Reason reason = Reason::next;
   TimeNs audited = kLongAgo;  // intervals that begin up to then are not audited any more
-  double step = 0;      // that was planned last, ns
-  double speed = 0;     // fastest motion at the last sample, px/s
-  bool begun = false;   // the first segment, an instant, has been given
+  double step = 0;            // that was planned last, ns
+  double speed = 0;           // fastest motion at the last sample, px/s
+  bool begun = false;         // the first segment, an instant, has been given
 
   // What the last sample brought.
   std::size_t until = 0;    // segments up to this sample are to be given

@@ -141,13 +141,13 @@ TEST(Keyframes, AreRefusedOnTheSensor) {
   EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { run(scene, {}, 1.0); }), "use type flow or brightness"));
 }
 
-TEST(ErrorHistogram, KnowsMeanPercentileAndMaximum) {
-  ErrorHistogram histogram;
-  EXPECT_EQ(histogram.summary().max, 0);
+TEST(MeasuredError, KnowsMeanPercentileAndMaximum) {
+  LogHistogram histogram;
+  EXPECT_EQ(measured_error(histogram).max, 0);
   for (int i = 1; i <= 1000; ++i) histogram.add(i * 1e-3);
-  EXPECT_NEAR(histogram.summary().mean, 0.5005, 1e-9);
-  EXPECT_NEAR(histogram.summary().p99, 0.99, 0.03);
-  EXPECT_EQ(histogram.summary().max, 1.0);
+  EXPECT_NEAR(measured_error(histogram).mean, 0.5005, 1e-9);
+  EXPECT_NEAR(measured_error(histogram).p99, 0.99, 0.03);
+  EXPECT_EQ(measured_error(histogram).max, 1.0);
 }
 
 }  // namespace

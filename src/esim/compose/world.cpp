@@ -52,11 +52,7 @@ void check_sampling(const CameraOptions& camera, const Notices& notices) {
 std::function<RenderRequest(TimeNs)> view_at(const World& world, std::size_t camera) {
   return [trajectory = world.trajectory, objects = world.objects,
           T_body_camera = world.info.cameras[camera].T_body_camera](TimeNs t) {
-    RenderRequest request;
-    request.t = t;
-    request.camera = rigidly_attached(trajectory->at(t), T_body_camera);
-    for (const auto& object : objects) request.objects.push_back(object->at(t));
-    return request;
+    return view(*trajectory, T_body_camera, objects, t);
   };
 }
 

@@ -6,17 +6,19 @@
 
 namespace esim {
 
-/// Weights of values above 0 in bins a hundredth of a decade wide, 2.3 %, from 1e-9 to 1e3; those beyond belong to the
-/// outermost bins.
+/// Mean, greatest and quantiles of values >= 0. Their weights are in bins a hundredth of a decade wide, 2.3 %, from
+/// 1e-9 to 1e3; those beyond belong to the outermost bins.
 class LogHistogram {
  public:
   void add(double value, double weight = 1) {
     const double position = value > 0 ? (std::log10(value) - kLowest) * kPerDecade : 0.0;
     weights_[static_cast<std::size_t>(std::fmin(std::fmax(position, 0.0), kBins - 1.0))] += weight;
-    total_ += weight;
+    total_ += weight, sum_ += weight * value, max_ = std::fmax(max_, value);
   }
 
   double total() const { return total_; }
+  double mean() const { return total_ > 0 ? sum_ / total_ : 0; }
+  double max() const { return max_; }
 
   /// The value that a share of all, by weight, does not exceed: the upper edge of its bin. 0 where there are none.
   double quantile(double share) const {
@@ -32,7 +34,7 @@ class LogHistogram {
  private:
   static constexpr int kLowest = -9, kPerDecade = 100, kBins = 12 * kPerDecade;
   std::array<double, kBins> weights_{};
-  double total_ = 0;
+  double total_ = 0, sum_ = 0, max_ = 0;
 };
 
 }  // namespace esim

@@ -57,8 +57,6 @@ void BrightnessErrors::compare(WindowSums& window, const Segment& segment, std::
         const double share = static_cast<double>(reference_.time(k) - segment.t0) / duration;
         const double error = std::abs(line.before + share * (line.after - line.before) - row[k - origin]);
         sums.squares += error * error;
-        window.abs += error;
-        window.greatest = std::max(window.greatest, error);
         window.histogram.add(error);
       }
       sums.count += block_end - first;
@@ -76,9 +74,9 @@ std::vector<BrightnessError> BrightnessErrors::finish() const {
       error.rmse.push_back(sums.count > 0 ? std::sqrt(sums.squares / static_cast<double>(sums.count)) : 0.0);
       error.mean_rmse += error.rmse.back() / static_cast<double>(window.pixels.size());
     }
-    error.mean_abs = error.values > 0 ? window.abs / static_cast<double>(error.values) : 0.0;
+    error.mean_abs = window.histogram.mean();
     error.p99_abs = window.histogram.quantile(0.99);
-    error.max_abs = window.greatest;
+    error.max_abs = window.histogram.max();
     error.steps = window.steps;
     error.large_steps = window.large_steps;
     errors.push_back(std::move(error));

@@ -44,7 +44,6 @@ class BrightnessErrors {
     std::int64_t first = 0, end = 0;  // instants of the reference
     std::vector<PixelSums> pixels;
     LogHistogram histogram;
-    double abs = 0, greatest = 0;
     std::int64_t steps = 0, large_steps = 0;
   };
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "esim/core/fast_arc_tangent.h"
 #include "esim/geometry/camera.h"
 
 namespace esim {
@@ -39,19 +40,9 @@ class Lens<RadialTangential> {
   float k1_, k2_, k3_, p1_, p2_;
 };
 
-/// Arc tangent for t >= 0, within 3e-7 (Abramowitz and Stegun, 4.4.49).
+/// Arc tangent for t >= 0, within 3e-7.
 inline float arc_tangent(float t) {
-  const float ratio = t > 1 ? 1 / t : t;
-  const float s = ratio * ratio;
-  float angle = 0.0028662257F;
-  angle = angle * s - 0.0161657367F;
-  angle = angle * s + 0.0429096138F;
-  angle = angle * s - 0.0752896400F;
-  angle = angle * s + 0.1065626393F;
-  angle = angle * s - 0.1420889944F;
-  angle = angle * s + 0.1999355085F;
-  angle = angle * s - 0.3333314528F;
-  angle = (angle * s + 1.0F) * ratio;
+  const float angle = fast_arc_tangent(t > 1 ? 1 / t : t);
   return t > 1 ? 1.57079632679F - angle : angle;
 }
 

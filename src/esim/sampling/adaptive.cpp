@@ -153,7 +153,6 @@ class AdaptiveSampler final : public Sampler {
   double safety_ = 1;  // what audits find, relative to what checks let expect
   double audited_ = 0, expected_ = 0;
   LogHistogram errors_;
-  double error_sum_ = 0, error_weight_ = 0, error_max_ = 0;
   TimeNs watermark_;
   SamplingStatistics statistics_;
 };
@@ -257,15 +256,14 @@ TimeNs AdaptiveSampler::after(const TileState& tile, double step) const {
 
 /// Adds up what the tiles found.
 void AdaptiveSampler::account() {
+  bool audited = false;
   for (const std::uint32_t index : asked_) {
     TileState& tile = tiles_[index];
     statistics_.held_to_max_rate += std::exchange(tile.held, 0);
     if (tile.audited_error < 0) continue;
     const auto weight = static_cast<double>(tile.audit_duration);
     for (const float error : tile.audit) {
-      const double size = std::fabs(static_cast<double>(error));
-      errors_.add(size, weight);
-      error_sum_ += size * weight, error_weight_ += weight, error_max_ = std::max(error_max_, size);
+      errors_.add(std::fabs(static_cast<double>(error)), weight);
     }
     // What is far below the tolerance tells nothing of what is near to it.
     if (std::max(tile.audited_error, tile.expected_error) > 0.1 * tolerance_) {
@@ -274,8 +272,9 @@ void AdaptiveSampler::account() {
       safety_ = std::clamp((audited_ + tolerance_) / (expected_ + tolerance_), 0.25, 4.0);
     }
     tile.audited_error = -1;
-    statistics_.measured_error = MeasuredError{error_sum_ / error_weight_, errors_.quantile(0.99), error_max_};
+    audited = true;
   }
+  if (audited) statistics_.measured_error = measured_error(errors_);
 }
 
 /// Into how many straight pieces the interval behind sample i is cut for the pixels.

@@ -9,34 +9,12 @@
 namespace esim {
 namespace {
 
-constexpr double kLeast = 1e-6, kPerBin = 1.03;
 constexpr int kBlock = 8;         // px
 constexpr double kShare = 0.998;  // of the blocks, that disagree by less
 
 }  // namespace
 
-void ErrorHistogram::add(double error) {
-  const double bin = std::log(std::max(error, kLeast) / kLeast) / std::log(kPerBin);
-  ++counts_[static_cast<std::size_t>(std::min(bin, kBins - 1.0))];
-  ++count_;
-  sum_ += error;
-  max_ = std::max(max_, error);
-}
-
-MeasuredError ErrorHistogram::summary() const {
-  if (count_ == 0) return {};
-  MeasuredError result{sum_ / static_cast<double>(count_), max_, max_};
-  std::int64_t below = 0;
-  for (std::size_t bin = 0; bin < counts_.size(); ++bin) {
-    below += counts_[bin];
-    if (static_cast<double>(below) < 0.99 * static_cast<double>(count_)) continue;
-    result.p99 = std::min(max_, kLeast * std::pow(kPerBin, static_cast<double>(bin + 1)));
-    break;
-  }
-  return result;
-}
-
-double disagreement(const Reconstruction& apart, double log_eps, ErrorHistogram& pixels) {
+double disagreement(const Reconstruction& apart, double log_eps, LogHistogram& pixels) {
   const Image<float>&before = apart.from_before, &after = apart.from_after;
   const float eps = static_cast<float>(log_eps);
   std::vector<double> blocks;

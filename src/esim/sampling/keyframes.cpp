@@ -85,7 +85,7 @@ class KeyframeSampler final : public Sampler {
 
   SamplingStatistics statistics() const override {
     SamplingStatistics result = statistics_;
-    result.measured_error = errors_.summary();
+    result.measured_error = measured_error(errors_);
     const double pixels = static_cast<double>(sensor().area()) * static_cast<double>(statistics_.reconstructions);
     result.unseen_share = pixels > 0 ? static_cast<double>(unseen_) / pixels : 0;
     return result;
@@ -201,7 +201,7 @@ class KeyframeSampler final : public Sampler {
   bool unsettled_ = false;
 
   SamplingStatistics statistics_;
-  ErrorHistogram errors_, checked_;
+  LogHistogram errors_, checked_;
   std::int64_t unseen_ = 0;
 };
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "esim/core/image.h"
+#include "esim/core/log_histogram.h"
 #include "esim/core/time.h"
 #include "esim/render/sample.h"
 
@@ -21,6 +22,10 @@ struct SampleRequest {
 struct MeasuredError {
   double mean = 0, p99 = 0, max = 0;
 };
+
+inline MeasuredError measured_error(const LogHistogram& errors) {
+  return {errors.mean(), errors.quantile(0.99), errors.max()};
+}
 
 /// What a sampler has decided so far, for the report.
 struct SamplingStatistics {

@@ -2,12 +2,18 @@
 
 namespace esim {
 
-RenderRequest view(const World& world, std::size_t camera, TimeNs t, std::vector<Tile> tiles) {
+RenderRequest view(const Trajectory& body, const SE3& T_body_camera,
+                   std::span<const std::shared_ptr<const Trajectory>> objects, TimeNs t) {
   RenderRequest request;
   request.t = t;
-  request.camera = rigidly_attached(world.trajectory->at(t), world.info.cameras[camera].T_body_camera);
+  request.camera = rigidly_attached(body.at(t), T_body_camera);
+  for (const auto& object : objects) request.objects.push_back(object->at(t));
+  return request;
+}
+
+RenderRequest view(const World& world, std::size_t camera, TimeNs t, std::vector<Tile> tiles) {
+  RenderRequest request = view(*world.trajectory, world.info.cameras[camera].T_body_camera, world.objects, t);
   request.tiles = std::move(tiles);
-  for (const auto& object : world.objects) request.objects.push_back(object->at(t));
   return request;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "esim/core/parallel.h"
@@ -34,6 +35,10 @@ struct World {
   std::vector<CameraChannel> cameras;                      // as in info.cameras
   PeriodicClock truth_clock, pose_clock;
 };
+
+/// Where a camera and the moving objects are at `t`; no tiles.
+RenderRequest view(const Trajectory& body, const SE3& T_body_camera,
+                   std::span<const std::shared_ptr<const Trajectory>> objects, TimeNs t);
 
 /// What a camera of the world is asked to show of `tiles` at `t`: here the motions are evaluated.
 RenderRequest view(const World& world, std::size_t camera, TimeNs t, std::vector<Tile> tiles);

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "esim/core/fast_arc_tangent.h"
 #include "esim/render/bands.h"
 
 namespace esim {
@@ -13,22 +14,10 @@ namespace {
 constexpr int kLanes = 16;
 constexpr float kPi = std::numbers::pi_v<float>;
 
-/// Arc tangent of y/x on (-pi, pi], within 3e-7: the polynomial of Abramowitz and Stegun, 4.4.49, in a form that
-/// compiles to SIMD code.
+/// Arc tangent of y/x on (-pi, pi], within 3e-7.
 inline float arc_tangent(float y, float x) {
   const float abs_x = std::fabs(x), abs_y = std::fabs(y);
-  const float ratio = std::min(abs_x, abs_y) / std::max(std::max(abs_x, abs_y), 1e-30F);
-  const float s = ratio * ratio;
-  float angle = 0.0028662257F;
-  angle = angle * s - 0.0161657367F;
-  angle = angle * s + 0.0429096138F;
-  angle = angle * s - 0.0752896400F;
-  angle = angle * s + 0.1065626393F;
-  angle = angle * s - 0.1420889944F;
-  angle = angle * s + 0.1999355085F;
-  angle = angle * s - 0.3333314528F;
-  angle = angle * s + 1.0F;
-  angle *= ratio;
+  float angle = fast_arc_tangent(std::min(abs_x, abs_y) / std::max(std::max(abs_x, abs_y), 1e-30F));
   angle = abs_y > abs_x ? kPi / 2 - angle : angle;
   angle = x < 0 ? kPi - angle : angle;
   return std::copysign(angle, y);

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <map>
+#include <tuple>
 
 #include "esim/core/error.h"
 #include "render/scenes.h"
@@ -23,29 +24,93 @@ TEST(RaycastRenderer, MeasuresPlanarDepth) {
   }
 }
 
-TEST(RaycastRenderer, MoreRaysPerPixelSmoothEdges) {
-  // A black half-plane over white background: one ray gives two values only, five give the covered fraction.
+// --- edges ---------------------------------------------------------------------------------------------------------
+
+/// A black half-plane at z = 1 over a white background: where u cos(a) + v sin(a) < offset, px from the image's centre.
+Scene black_half_plane(double angle, double offset, const Camera& camera) {
   Mesh mesh;
-  mesh.vertices = {{-5, 0.0123F, 1}, {5, 0.31F, 1}, {0, 50, 1}};
+  const Eigen::Vector2d normal(std::cos(angle), std::sin(angle)), along(-normal.y(), normal.x());
+  for (const auto& [n, s] : {std::pair{offset, -1e4}, {offset, 1e4}, {-1e4, 0.0}}) {
+    const Eigen::Vector2d at = n * normal + s * along;
+    mesh.vertices.emplace_back(static_cast<float>(at.x() / camera.fx), static_cast<float>(at.y() / camera.fy), 1.0F);
+  }
   mesh.triangles = {{0, 1, 2}};
   mesh.texture_uv.resize(1);
   mesh.material = {0};
   mesh.materials = {{"black", nullptr, 0.0F}};
+  return still_scene(mesh);
+}
+
+Sample half_plane_seen(double angle, double offset, int rays) {
   const Camera model = test::distorted_camera(0);
-  const auto values = [&](int rays) {
-    const auto renderer =
-        make_raycast_renderer(build_raycast_scene(still_scene(mesh)), {1.0F, rays}, model, test::two_threads());
-    const Sample sample = test::render(*renderer, model, Kinematics{});
-    int between = 0;
-    double mean = 0;
-    for (const float value : sample.irradiance.pixels())
-      between += value > 0.01F && value < 0.99F, mean += value / static_cast<double>(sample.irradiance.size());
-    return std::pair(between, mean);
+  const auto renderer = make_raycast_renderer(build_raycast_scene(black_half_plane(angle, offset, model)), {1.0F, rays},
+                                              model, test::two_threads());
+  return test::render(*renderer, model, Kinematics{});
+}
+
+/// The share of a pixel that the half-plane leaves white, by a fine grid.
+double white_share(double x, double y, double angle, double offset) {
+  constexpr int kGrid = 40;
+  int white = 0;
+  for (int i = 0; i < kGrid * kGrid; ++i) {
+    const double u = x + (i % kGrid + 0.5) / kGrid - 0.5, v = y + (i / kGrid + 0.5) / kGrid - 0.5;
+    white += u * std::cos(angle) + v * std::sin(angle) >= offset;
+  }
+  return static_cast<double>(white) / (kGrid * kGrid);
+}
+
+TEST(RaycastRenderer, APixelOnAnEdgeIsTheMeanOverItsArea) {
+  const Camera model = test::distorted_camera(0);
+  for (const auto& [rays, typical, worst] : {std::tuple{16, 0.05, 2.0 / 16}, {64, 0.0125, 3.0 / 64}}) {
+    for (const double angle : {0.0, 0.3, 0.8, std::numbers::pi / 2, 2.0}) {
+      const double offset = 1.37;
+      const Sample sample = half_plane_seen(angle, offset, rays);
+      double squares = 0;
+      int between = 0;
+      for (int y = 0; y < model.height; ++y) {
+        for (int x = 0; x < model.width; ++x) {
+          const double expected = white_share(x - model.cx, y - model.cy, angle, offset);
+          const double error = sample.irradiance(x, y) - expected;
+          EXPECT_NEAR(error, 0, worst) << x << ", " << y << " at " << angle;
+          if (expected > 0.01 && expected < 0.99) squares += error * error, ++between;
+        }
+      }
+      ASSERT_GT(between, 50);
+      EXPECT_LT(std::sqrt(squares / between), typical);
+    }
+  }
+}
+
+TEST(RaycastRenderer, AnEdgeThatMovesComesInSmallSteps) {
+  for (const auto& [rays, steps] : {std::pair{1, 1}, {16, 16}, {64, 64}}) {
+    for (const double angle : {0.0, std::numbers::pi / 2, 0.6}) {
+      Sample before;
+      float largest = 0;
+      for (int i = 0; i <= 100; ++i) {
+        Sample now = half_plane_seen(angle, 0.4 + 0.01 * i, rays);
+        for (std::size_t k = 0; k < now.irradiance.size() && i > 0; ++k) {
+          largest = std::max(largest, std::fabs(now.irradiance.data()[k] - before.irradiance.data()[k]));
+        }
+        before = std::move(now);
+      }
+      EXPECT_GT(largest, 0.9 / steps);
+      EXPECT_LT(largest, 2.1 / steps) << "one ray or two at a time";
+    }
+  }
+}
+
+TEST(RaycastRenderer, SeamsBetweenTrianglesOfOneSurfaceAreNoEdges) {
+  // A finely cut ball with a texture: where no outline is near, more rays change nothing at all.
+  Scene scene = still_scene(test::ball_mesh(3, 60));
+  const Camera model = test::distorted_camera(1);
+  const auto shared = build_raycast_scene(scene);
+  const auto seen = [&](int rays) {
+    return test::render(*make_raycast_renderer(shared, {1.0F, rays}, model, test::two_threads()), model, Kinematics{});
   };
-  EXPECT_EQ(values(1).first, 0);
-  EXPECT_GT(values(5).first, 60);
-  EXPECT_GT(values(13).first, 60);
-  EXPECT_NEAR(values(13).second, values(1).second, 2e-3);
+  const Sample one = seen(1), many = seen(16);
+  for (std::size_t k = 0; k < one.irradiance.size(); ++k) {
+    ASSERT_EQ(one.irradiance.data()[k], many.irradiance.data()[k]) << k;
+  }
 }
 
 // --- moving objects
@@ -219,6 +284,31 @@ TEST(Light, StopsAtAnObjectWhereGeometrySays) {
   }
 }
 
+TEST(Light, ShadowsOfStraightEdgesAreSmooth) {
+  // A shadow in a wall of one surface: 16 rays give its pixels' means, one gives light or none.
+  Lighting lighting;
+  lighting.suns = {{{0.5F, 0.3F, 1}, 1.0F}};
+  lighting.shadows = true;
+  Scene scene = lit_wall(lighting);
+  Mesh square = square_mesh(0.5F);  // of the wall's colour, in full light
+  for (Eigen::Vector3f& vertex : square.vertices) vertex = 0.1F * vertex + Eigen::Vector3f(0.0123F, 0.0071F, -1);
+  scene.objects.push_back({"square", square, false});
+  const Camera model = test::distorted_camera(0);
+  std::map<int, int> between;
+  std::map<int, double> mean;
+  for (const int rays : {1, 16}) {
+    const auto renderer = make_raycast_renderer(build_raycast_scene(scene), {0, rays}, model, test::two_threads());
+    const Sample sample = test::render(*renderer, model, Kinematics{});
+    for (const float value : sample.irradiance.pixels()) {
+      between[rays] += value > 0.02F && value < 0.4F;
+      mean[rays] += value / static_cast<double>(sample.irradiance.size());
+    }
+  }
+  EXPECT_EQ(between[1], 0);
+  EXPECT_GT(between[16], 40);
+  EXPECT_NEAR(mean[1], mean[16], 0.01);
+}
+
 TEST(Light, LeavesNoShadowOfASurfaceOnItself) {
   // Inside of a ball with a lamp in the middle, at many scales: no triangle shadows itself or its neighbours.
   for (const float radius : {0.1F, 3.0F, 1000.0F}) {
@@ -264,8 +354,8 @@ TEST(Light, IsTheSameForAnyTilesAndThreads) {
   const Camera model = test::distorted_camera(2);
   const Workers one(1);
   const auto shared = build_raycast_scene(scene);
-  const auto a = make_raycast_renderer(shared, {0.2F, 5}, model, test::two_threads());
-  const auto b = make_raycast_renderer(shared, {0.2F, 5}, model, one);
+  const auto a = make_raycast_renderer(shared, {0.2F, 16}, model, test::two_threads());
+  const auto b = make_raycast_renderer(shared, {0.2F, 16}, model, one);
   const Sample whole = test::render(*a, model, test::moving_camera(), test::moving_objects(0));
   const Tile tile{13, 5, 50, 61};
   const Sample part = test::render(*b, model, test::moving_camera(), test::moving_objects(0), {tile});

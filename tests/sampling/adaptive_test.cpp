@@ -97,8 +97,8 @@ TEST(AdaptiveSampling, WhatDoesNotChangeCostsTheMinimumRate) {
   const Movie still{[](double x, double y, double) { return -2 + std::sin(x + y * y); },
                     [](double, double, double) { return 0.0; }};
   const Outcome outcome = sample({}, still, kNsPerSecond);
-  EXPECT_LE(outcome.evaluations_per_pixel(), 56);
-  EXPECT_GE(outcome.evaluations_per_pixel(), 50);
+  EXPECT_GE(outcome.evaluations_per_pixel(), 20);
+  EXPECT_LE(outcome.evaluations_per_pixel(), 27) << "times on a grid are up to an eighth earlier";
   EXPECT_LE(outcome.quantile(1), 1e-5);
 }
 

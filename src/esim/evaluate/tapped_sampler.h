@@ -23,7 +23,7 @@ class TappedSampler final : public Sampler {
   TappedSampler(std::unique_ptr<Sampler> sampler, Listener listener)
       : sampler_(std::move(sampler)), listener_(std::move(listener)) {}
 
-  std::optional<SampleRequest> next() const override { return sampler_->next(); }
+  const SampleRequest* next() const override { return sampler_->next(); }
   TimeNs watermark() const override { return sampler_->watermark(); }
   SamplingStatistics statistics() const override { return sampler_->statistics(); }
 

@@ -1,6 +1,7 @@
 #include "esim/sampling/adaptive.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -19,11 +20,23 @@ constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max(), kLongAgo = std::nu
 // One interval in so many is looked into.
 constexpr std::uint32_t kAuditOneIn = 64;
 
-// The next sample is meant to make this share of the tolerated error.
+// The next sample is meant to make this share of the error that is let pass.
 constexpr double kAim = 0.6;
 
 // Tiles are sampled together if none comes earlier than it should by more than this share of its interval.
 constexpr double kSlack = 0.12;
+
+// Times are multiples of a power of two, at least this share of the interval that they end: so tiles meet.
+constexpr double kGrid = 0.125;
+
+// The limit of a tile's error is the tolerance; where 99 % of all errors are not below this share of it, a lower one.
+constexpr double kTarget = 0.9, kLeastGain = 0.25;
+
+// Tiles in which no pixel changes by more than this share of the tolerance say nothing of errors.
+constexpr double kActive = 0.25;
+
+// So many audits make a measurement that the limit follows.
+constexpr int kAuditsPerStep = 48;
 
 // Tiles whose motion is watched: those up to so many away.
 constexpr int kReach = 3;
@@ -47,7 +60,7 @@ enum class Reason { next, bisection, audit };
 
 /// A tile on its way through time.
 struct TileState {
-  TileState(const Tile& tile, float log_eps, float most) : timeline(tile, log_eps, most) {}
+  TileState(const Tile& tile, float log_eps) : timeline(tile, log_eps) {}
 
   TileTimeline timeline;
   std::size_t done = 0;  // index of the sample up to which segments have been given
@@ -62,8 +75,8 @@ struct TileState {
   std::size_t until = 0;    // segments up to this sample are to be given
   std::vector<int> pieces;  // into which each interval until there is cut
   std::int64_t held = 0;
-  double audited_error = -1, expected_error = 0;
-  std::vector<float> audit;
+  std::vector<float> audit;   // errors of the audited interval; empty for none
+  std::vector<float> change;  // of brightness in it
   TimeNs audit_duration = 0;
 };
 
@@ -86,14 +99,14 @@ class AdaptiveSampler final : public Sampler {
         const int x = column * options.tile_px, y = row * options.tile_px;
         tiles_.emplace_back(
             Tile{x, y, std::min(options.tile_px, context.width - x), std::min(options.tile_px, context.height - y)},
-            eps, static_cast<float>(4 * tolerance_));
+            eps);
         tiles_.back().due = context.span.start;
       }
     }
     request();
   }
 
-  std::optional<SampleRequest> next() const override { return request_; }
+  const SampleRequest* next() const override { return asked_.empty() ? nullptr : &request_; }
 
   std::span<const Segment> accept(Sample& sample) override {
     ++statistics_.samples;
@@ -123,11 +136,16 @@ class AdaptiveSampler final : public Sampler {
   void take(TileState& tile, std::uint32_t index, const Sample& sample);
   void audit(TileState& tile, TimeNs t) const;
   void settle(TileState& tile, std::uint32_t index) const;
-  double expected_error(const TileState& tile, std::size_t i) const;
+  double error_energy(const TileTimeline& timeline, std::size_t i) const;
+  double most_energy() const;
   void plan(TileState& tile) const;
   TimeNs after(const TileState& tile, double step) const;
 
+  TimeNs middle(TimeNs t, TimeNs h) const;
+  TimeNs on_grid(TimeNs t, TimeNs h) const;
+
   void account();
+  void steer();
   int pieces(const TileTimeline& timeline, std::size_t i) const;
   void lay_out();
   void give(TileState& tile, std::size_t first);
@@ -143,16 +161,17 @@ class AdaptiveSampler final : public Sampler {
   AddressedRandom random_;
 
   std::vector<TileState> tiles_;
-  std::optional<SampleRequest> request_;
+  SampleRequest request_;
   std::vector<std::uint32_t> asked_;  // tiles of the request
 
   std::vector<Image<float>> layers_;  // irradiance at the ends of segments: of each tile, one after the other
   std::vector<Segment> segments_;
   std::vector<std::size_t> first_segment_;  // of each tile that was asked for
 
-  double safety_ = 1;  // what audits find, relative to what checks let expect
-  double audited_ = 0, expected_ = 0;
-  LogHistogram errors_;
+  double gain_ = 1;                           // of the limit of a tile's error over the tolerance
+  double log_intervals_ = 0, intervals_ = 0;  // of those given lately: ln ns added up, and how many
+  LogHistogram all_, active_;  // errors of audits: of all; since the last measurement, of tiles that change
+  int audits_in_active_ = 0;
   TimeNs watermark_;
   SamplingStatistics statistics_;
 };
@@ -174,26 +193,35 @@ void AdaptiveSampler::audit(TileState& tile, TimeNs t) const {
   std::size_t i = tile.done;
   while (timeline.time(i) != t) ++i;
   timeline.errors(i, tile.audit);
-  tile.audited_error = timeline.surprise(i);
   tile.audit_duration = timeline.time(i + 1) - timeline.time(i - 1);
+  const std::vector<float>&l0 = timeline.brightness(i - 1), &l1 = timeline.brightness(i),
+        &l2 = timeline.brightness(i + 1);
+  tile.change.resize(l1.size());
+  for (std::size_t k = 0; k < l1.size(); ++k) {
+    tile.change[k] = std::max({l0[k], l1[k], l2[k]}) - std::min({l0[k], l1[k], l2[k]});
+  }
 }
 
-/// The error between samples i and i + 1, as far as their own surprises tell, which belong to longer intervals: it goes
-/// with the second power of the length. Where nothing moves by more than lambda on the way, pixels that jump do not
-/// count: it would take ever more samples to find when.
-double AdaptiveSampler::expected_error(const TileState& tile, std::size_t i) const {
-  const TileTimeline& timeline = tile.timeline;
+/// The mean square error between samples i and i + 1 times its duration, as far as their own surprises tell, which
+/// belong to longer intervals: errors go with the second power of the length.
+double AdaptiveSampler::error_energy(const TileTimeline& timeline, std::size_t i) const {
   const auto h = static_cast<double>(timeline.time(i + 1) - timeline.time(i));
-  const bool short_way = tile.speed * h <= options_.lambda * kNsPerS * 1.01;
   double most = 0;
   for (const std::size_t k : {i, i + 1}) {
     if (k == 0 || k + 1 >= timeline.size()) continue;
     const auto left = static_cast<double>(timeline.time(k) - timeline.time(k - 1));
     const auto right = static_cast<double>(timeline.time(k + 1) - timeline.time(k));
-    const double surprise = short_way ? timeline.usual_surprise(k) : timeline.surprise(k);
-    most = std::max(most, surprise * std::min(1.0, h * h / (4 * left * right)));
+    most = std::max(most, timeline.surprise(k) * std::min(1.0, h * h / (4 * left * right)));
   }
-  return most * safety_;
+  return most * most * h;
+}
+
+/// That an interval may have. A sample more takes much of an interval's energy away, and costs the same wherever it is:
+/// least samples make a mean square error if all intervals of all tiles have the same.
+double AdaptiveSampler::most_energy() const {
+  constexpr double kP99OfNormal = 2.576;
+  const double error = gain_ * tolerance_ / kP99OfNormal;
+  return error * error * std::exp(log_intervals_ / intervals_);
 }
 
 /// Finds how far the tile is known well enough, and its next sample.
@@ -204,16 +232,16 @@ void AdaptiveSampler::settle(TileState& tile, std::uint32_t index) const {
   for (std::size_t i = tile.done; i + 1 < timeline.size(); ++i) {
     if (i + 2 >= timeline.size() && !complete) break;  // what comes behind is needed to judge it
     const TimeNs t0 = timeline.time(i), h = timeline.time(i + 1) - t0;
-    const double error = expected_error(tile, i);
-    if (error > tolerance_ && h >= 2 * shortest_) {
-      tile.reason = Reason::bisection, tile.due = t0 + h / 2;
+    const bool too_much = error_energy(timeline, i) > most_energy();
+    if (too_much && h >= 2 * shortest_) {
+      tile.reason = Reason::bisection, tile.due = middle(t0, h);
       return;
     }
-    if (error > tolerance_) ++tile.held;
+    if (too_much) ++tile.held;
     const auto draw = static_cast<std::uint64_t>(t0 - context_.span.start);
     if (t0 > tile.audited && h >= 2 * shortest_ && i > 0 && random_.bits(index, draw)[0] % kAuditOneIn == 0) {
-      tile.reason = Reason::audit, tile.due = t0 + h / 2;
-      tile.audited = timeline.time(i + 1) - 1, tile.expected_error = error / safety_;
+      tile.reason = Reason::audit, tile.due = middle(t0, h);
+      tile.audited = timeline.time(i + 1) - 1;
       return;
     }
     tile.until = i + 1;
@@ -230,58 +258,83 @@ void AdaptiveSampler::settle(TileState& tile, std::uint32_t index) const {
 void AdaptiveSampler::plan(TileState& tile) const {
   const TileTimeline& timeline = tile.timeline;
   const std::size_t last = timeline.size() - 1;
-  const double way = options_.lambda / tile.speed * kNsPerS;  // ns
+  const double way = options_.max_motion_px / tile.speed * kNsPerS;  // ns
   // At first nothing is known: short steps tell something soon.
   double step = 0.25 * std::min({way, static_cast<double>(longest_),
                                  static_cast<double>(context_.span.end - context_.span.start)});
   if (last >= 2) {
     const auto left = static_cast<double>(timeline.time(last - 1) - timeline.time(last - 2));
     const auto right = static_cast<double>(timeline.time(last) - timeline.time(last - 1));
-    const auto wanted = [&](double surprise) {
-      return 2 * std::sqrt(left * right * kAim * tolerance_ / std::max(surprise * safety_, 1e-12));
-    };
-    const double cautious = wanted(timeline.surprise(last - 1)), bold = wanted(timeline.usual_surprise(last - 1));
+    // The energy goes with the fifth power of the length.
+    const double square =
+        timeline.surprise(last - 1) * timeline.surprise(last - 1) / (16 * left * left * right * right);
+    step = std::pow(kAim * kAim * most_energy() / std::max(square, 1e-300), 0.2);
     // Bisections say nothing of what comes: steps change with the steps before.
-    step = std::clamp(std::max(cautious, std::min(bold, way)), 0.5 * tile.step, 2 * tile.step);
+    step = std::clamp(step, 0.5 * tile.step, 2 * tile.step);
   }
   tile.step = std::clamp(step, static_cast<double>(shortest_), static_cast<double>(longest_));
-  tile.due = after(tile, std::min(step, options_.max_motion_px / tile.speed * kNsPerS));
+  tile.due = after(tile, std::min(step, way));
 }
 
-/// The time `step` ns after the tile's last sample, within the bounds.
+/// The time `step` ns after the tile's last sample, or a little less, within the bounds.
 TimeNs AdaptiveSampler::after(const TileState& tile, double step) const {
   const auto h = std::clamp(static_cast<TimeNs>(std::min(step, 1e18)), shortest_, longest_);
-  return std::min(tile.timeline.time(tile.timeline.size() - 1) + h, context_.span.end);
+  const TimeNs last = tile.timeline.time(tile.timeline.size() - 1);
+  return std::min(std::max(on_grid(last + h, h), last + shortest_), context_.span.end);
+}
+
+/// A time in the middle of the h from t on, or a little before.
+TimeNs AdaptiveSampler::middle(TimeNs t, TimeNs h) const { return std::max(on_grid(t + h / 2, h), t + h / 4); }
+
+/// The last time not after t that is a multiple of the largest power of two within kGrid of h.
+TimeNs AdaptiveSampler::on_grid(TimeNs t, TimeNs h) const {
+  const auto grid = std::bit_floor(static_cast<std::uint64_t>(std::max(1.0, kGrid * static_cast<double>(h))));
+  const TimeNs since = t - context_.span.start;
+  return t - since % static_cast<TimeNs>(grid);
 }
 
 /// Adds up what the tiles found.
 void AdaptiveSampler::account() {
+  const auto remember = [&](double interval) {
+    constexpr double kMemory = 0.999;
+    log_intervals_ = kMemory * log_intervals_ + std::log(interval), intervals_ = kMemory * intervals_ + 1;
+  };
   bool audited = false;
   for (const std::uint32_t index : asked_) {
     TileState& tile = tiles_[index];
     statistics_.held_to_max_rate += std::exchange(tile.held, 0);
-    if (tile.audited_error < 0) continue;
+    for (std::size_t i = tile.done; i < tile.until; ++i) {
+      remember(static_cast<double>(tile.timeline.time(i + 1) - tile.timeline.time(i)));
+    }
+    if (!tile.begun) remember(4 * tile.step);  // first steps are shorter than what is wanted
+    if (tile.audit.empty()) continue;
     const auto weight = static_cast<double>(tile.audit_duration);
-    for (const float error : tile.audit) {
-      errors_.add(std::fabs(static_cast<double>(error)), weight);
+    const bool active = *std::max_element(tile.change.begin(), tile.change.end()) > kActive * tolerance_;
+    for (const float value : tile.audit) {
+      const double error = std::fabs(static_cast<double>(value));
+      all_.add(error, weight);
+      if (active) active_.add(error, weight);
     }
-    // What is far below the tolerance tells nothing of what is near to it.
-    if (std::max(tile.audited_error, tile.expected_error) > 0.1 * tolerance_) {
-      constexpr double kMemory = 0.99;
-      audited_ = kMemory * audited_ + tile.audited_error, expected_ = kMemory * expected_ + tile.expected_error;
-      safety_ = std::clamp((audited_ + tolerance_) / (expected_ + tolerance_), 0.25, 4.0);
-    }
-    tile.audited_error = -1;
+    tile.audit.clear();
+    if (active && ++audits_in_active_ == kAuditsPerStep) steer();
     audited = true;
   }
-  if (audited) statistics_.measured_error = measured_error(errors_);
+  if (audited) statistics_.measured_error = measured_error(all_);
+}
+
+/// Follows what audits measured: where something changes, 99 % of the errors are to stay below the tolerance.
+void AdaptiveSampler::steer() {
+  const double wanted = kTarget * tolerance_ / std::max(active_.quantile(0.99), 1e-12);
+  gain_ = std::clamp(gain_ * std::clamp(std::sqrt(wanted), 0.8, 1.25), kLeastGain, 1.0);
+  active_ = LogHistogram();
+  audits_in_active_ = 0;
 }
 
 /// Into how many straight pieces the interval behind sample i is cut for the pixels.
 int AdaptiveSampler::pieces(const TileTimeline& timeline, std::size_t i) const {
   constexpr TimeNs kMost = 4;
   if (timeline.time(i + 1) - timeline.time(i) < kMost) return 1;
-  const double bow = timeline.bow(i), straight = 0.08 * tolerance_;
+  const double bow = timeline.bow(i), straight = 0.05 * gain_ * tolerance_;
   return bow <= straight ? 1 : (bow <= 4 * straight ? 2 : kMost);
 }
 
@@ -372,16 +425,14 @@ void AdaptiveSampler::request() {
   }
   watermark_ = known;
   asked_.clear();
-  if (t == kNever) {
-    request_.reset();
-    return;
-  }
-  request_ = SampleRequest{t, {}};
+  request_.t = t;
+  request_.tiles.clear();
+  if (t == kNever) return;
   for (std::size_t i = 0; i < tiles_.size(); ++i) {
     TileState& tile = tiles_[i];
     if (tile.due != t && !(tile.reason == Reason::next && nearly_due(tile, t))) continue;
     asked_.push_back(static_cast<std::uint32_t>(i));
-    request_->tiles.push_back(tile.timeline.tile());
+    request_.tiles.push_back(tile.timeline.tile());
     if (tile.reason == Reason::bisection) ++statistics_.bisections;
     if (tile.reason == Reason::audit) ++statistics_.audits;
   }

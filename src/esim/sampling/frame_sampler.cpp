@@ -17,7 +17,7 @@ class FrameSampler final : public Sampler {
         request_(SampleRequest{context.span.start, {image_}}),
         watermark_(context.span.start) {}
 
-  std::optional<SampleRequest> next() const override { return request_; }
+  const SampleRequest* next() const override { return request_ ? &*request_ : nullptr; }
 
   std::span<const Segment> accept(Sample& sample) override {
     const bool first = statistics_.samples == 0;

@@ -53,7 +53,9 @@ class KeyframeSampler final : public Sampler {
     statistics_.tolerance = options.tolerance;
   }
 
-  std::optional<SampleRequest> next() const override { return unsettled_ || step_ != steps_ ? std::nullopt : request_; }
+  const SampleRequest* next() const override {
+    return unsettled_ || step_ != steps_ || !request_ ? nullptr : &*request_;
+  }
 
   std::span<const Segment> accept(Sample& sample) override {
     take(sample);

@@ -36,10 +36,9 @@ struct FlowSampling {
 struct AdaptiveSampling {
   static constexpr const char* kType = "adaptive";
   double tolerance = 0.25;
-  double lambda = 0.5;
-  double max_motion_px = 2;
+  double max_motion_px = 3;
   int tile_px = 16;
-  RateBounds bounds{};
+  RateBounds bounds{20, 50000};
 };
 
 /// Few images of a denser camera, and between them what their pixels show from elsewhere.
@@ -84,11 +83,9 @@ void describe(Visitor& visit, FlowSampling& o) {
 template <class Visitor>
 void describe(Visitor& visit, AdaptiveSampling& o) {
   visit("tolerance", o.tolerance,
-        About{"error of the brightness between two samples, in contrast thresholds, that 99 % of it stay below", "", 0,
-              1e6, true});
-  visit("lambda", o.lambda,
-        About{"motion between two samples below which a few pixels that jump, at edges, ask for no further samples",
-              "px", 0, 1e6, true});
+        About{"that 99 % of the errors of brightness between samples stay below, in contrast thresholds, where "
+              "something changes",
+              "", 0, 1e6, true});
   visit("max_motion_px", o.max_motion_px,
         About{"most expected motion between two samples, however little brightness changes", "px", 0, 1e6, true});
   visit("tile_px", o.tile_px, About{"side of the tiles that are sampled independently", "px", 4, 1024});

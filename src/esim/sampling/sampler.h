@@ -49,9 +49,9 @@ class Sampler {
  public:
   virtual ~Sampler() = default;
 
-  /// The next evaluation wanted, the same until accept() is called. Empty after the last one, and while more() has to
+  /// The next evaluation wanted, the same until accept() is called. Null after the last one, and while more() has to
   /// be asked before it is known.
-  virtual std::optional<SampleRequest> next() const = 0;
+  virtual const SampleRequest* next() const = 0;
 
   /// Takes the evaluation that next() asked for. Returns the segments that are now known: those of a tile one after the
   /// other, contiguous, in order of time, and valid until the next call; none where it needs another evaluation first.

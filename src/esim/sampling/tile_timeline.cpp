@@ -10,31 +10,18 @@
 namespace esim {
 namespace {
 
-/// exp(x) for the small x that bows are; beyond 4, as at 4.
-inline float small_exponential(float x) {
-  float y = 0.25F * x;
-  y = y < 1 ? y : 1;
-  y = y > -1 ? y : -1;
-  const float root = 1 + y * (1 + y * (0.5F + y * (1.0F / 6 + y * (1.0F / 24))));
-  return (root * root) * (root * root);
-}
-
 // Before a jump, the second difference on one side says nothing of the interval: the bow is never more than so many
 // times the smaller one.
 constexpr float kMostBend = 2;
 
-// Jumps of a fifth of the pixels by `most` or more make a surprise of `most`.
-constexpr double kUsual = 0.75;
-
-/// 2 (mean of fourth powers)^(1/4).
-double size_of_errors(float sum_of_fourth_powers, std::size_t count) {
-  return 2 * std::sqrt(std::sqrt(static_cast<double>(sum_of_fourth_powers) / static_cast<double>(count)));
+double root_mean(float sum, std::size_t count) {
+  return std::sqrt(static_cast<double>(sum) / static_cast<double>(count));
 }
 
 }  // namespace
 
 /// The bow between two samples: c h^2 from the second differences before and after, each a weighted sum of the
-/// brightness at three samples.
+/// irradiance at three samples.
 struct TileTimeline::Bow {
   const float *before, *first, *last, *after;
   float before_outer = 0, before_near = 0, before_far = 0;
@@ -49,11 +36,18 @@ struct TileTimeline::Bow {
     const float limited = mean > most ? most : (mean < -most ? -most : mean);
     return a * b > 0 ? limited : 0.0F;
   }
+
+  /// Irradiance of pixel k at f of the way. Never less than a quarter of the lower end.
+  float irradiance(std::size_t k, float f) const {
+    const float e0 = first[k], e1 = last[k];
+    const float e = e0 + (e1 - e0) * f - (*this)(k) * (0.5F * f * (1 - f)), least = 0.25F * (e0 < e1 ? e0 : e1);
+    return e > least ? e : least;
+  }
 };
 
 TileTimeline::Bow TileTimeline::bow_between(std::size_t first, std::size_t last) const {
   const bool has_before = first > 0, has_after = last + 1 < samples_.size();
-  const auto values = [&](std::size_t i) { return samples_[i].brightness.data(); };
+  const auto values = [&](std::size_t i) { return samples_[i].irradiance.data(); };
   Bow bow{values(has_before ? first - 1 : first), values(first), values(last), values(has_after ? last + 1 : last)};
   if (!has_before || !has_after) return bow;
   const auto h = static_cast<double>(samples_[last].t - samples_[first].t);
@@ -73,7 +67,7 @@ void TileTimeline::insert(TimeNs t, const Image<float>& irradiance) {
   Sample sample;
   if (!unused_.empty()) sample = std::move(unused_.back()), unused_.pop_back();
   const auto width = static_cast<std::size_t>(tile_.width);
-  sample.t = t, sample.surprise = sample.usual_surprise = 0;
+  sample.t = t, sample.surprise = 0;
   sample.irradiance.resize(width * static_cast<std::size_t>(tile_.height));
   sample.brightness.resize(sample.irradiance.size());
   for (int y = 0; y < tile_.height; ++y) {
@@ -103,41 +97,37 @@ void TileTimeline::errors(std::size_t i, std::vector<float>& out) const {
   const Bow bow = bow_between(i - 1, i + 1);
   const TimeNs t0 = samples_[i - 1].t, t1 = samples_[i + 1].t;
   const auto f = static_cast<float>(static_cast<double>(samples_[i].t - t0) / static_cast<double>(t1 - t0));
-  const float g = 0.5F * f * (1 - f);
   const float* const seen = samples_[i].brightness.data();
+  const float eps = log_eps_;
   out.resize(samples_[i].brightness.size());
 #pragma omp simd
   for (std::size_t k = 0; k < out.size(); ++k) {
-    const float line = bow.first[k] + (bow.last[k] - bow.first[k]) * f;
-    out[k] = line - bow(k) * g - seen[k];
+    out[k] = fast_log(std::max(bow.irradiance(k, f) + eps, 1e-30F)) - seen[k];
   }
 }
 
-/// Computes the surprises of a sample.
+/// Computes the surprise of a sample.
 void TileTimeline::measure(std::size_t i) {
   if (i == 0 || i + 1 >= samples_.size()) return;
   errors(i, errors_);
-  const float largest = most_ * most_;
-  float all = 0, usual = 0;
-#pragma omp simd reduction(+ : all, usual)
-  for (std::size_t k = 0; k < errors_.size(); ++k) {
-    const float square = errors_[k] * errors_[k], limited = square < largest ? square : largest;
-    all += square * square, usual += limited * limited;
-  }
-  samples_[i].surprise = size_of_errors(all, errors_.size());
-  samples_[i].usual_surprise = kUsual * size_of_errors(usual, errors_.size());
+  float sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (std::size_t k = 0; k < errors_.size(); ++k) sum += errors_[k] * errors_[k];
+  samples_[i].surprise = root_mean(sum, errors_.size());
 }
 
 double TileTimeline::bow(std::size_t i) const {
   const Bow bow = bow_between(i, i + 1);
+  const float *const l0 = samples_[i].brightness.data(), *const l1 = samples_[i + 1].brightness.data();
+  const float eps = log_eps_;
   const std::size_t count = samples_[i].brightness.size();
   float sum = 0;
 #pragma omp simd reduction(+ : sum)
   for (std::size_t k = 0; k < count; ++k) {
-    const float middle = bow(k) * 0.125F;
-    sum += (middle * middle) * (middle * middle);
+    const float off = fast_log(std::max(bow.irradiance(k, 0.5F) + eps, 1e-30F)) - 0.5F * (l0[k] + l1[k]);
+    sum += off * off;
   }
-  return size_of_errors(sum, count);
+  return root_mean(sum, count);
 }
 
 void TileTimeline::write(std::size_t i, Image<float>& irradiance) const {
@@ -148,33 +138,16 @@ void TileTimeline::write(std::size_t i, Image<float>& irradiance) const {
   }
 }
 
-/// At kQuarter / 4 of the way.
-template <int kQuarter>
-void TileTimeline::write_quarter(std::size_t i, Image<float>& irradiance) const {
+void TileTimeline::write_between(std::size_t i, int quarter, Image<float>& irradiance) const {
   const Bow bow = bow_between(i, i + 1);
-  constexpr float f = 0.25F * kQuarter, g = 0.5F * f * (1 - f);
-  const float eps = log_eps_;
-  const float *const e0 = samples_[i].irradiance.data(), *const e1 = samples_[i + 1].irradiance.data();
+  const float f = 0.25F * static_cast<float>(quarter);
   const auto width = static_cast<std::size_t>(tile_.width);
   for (int y = 0; y < tile_.height; ++y) {
     float* const out = irradiance.row(tile_.y + y) + tile_.x;
     const std::size_t first = static_cast<std::size_t>(y) * width;
 #pragma omp simd
-    for (std::size_t x = 0; x < width; ++x) {
-      // The line in ln(E + eps) by square roots: in the middle, then in a half.
-      const float from = e0[first + x] + eps, to = e1[first + x] + eps;
-      float line = std::sqrt(from * to);
-      if constexpr (kQuarter != 2) line = std::sqrt(line * (kQuarter < 2 ? from : to));
-      const float e = line * small_exponential(-bow(first + x) * g) - eps;
-      out[x] = e > 0 ? e : 0;
-    }
+    for (std::size_t x = 0; x < width; ++x) out[x] = bow.irradiance(first + x, f);
   }
-}
-
-void TileTimeline::write_between(std::size_t i, int quarter, Image<float>& irradiance) const {
-  if (quarter == 1) write_quarter<1>(i, irradiance);
-  if (quarter == 2) write_quarter<2>(i, irradiance);
-  if (quarter == 3) write_quarter<3>(i, irradiance);
 }
 
 }  // namespace esim

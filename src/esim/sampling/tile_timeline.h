@@ -9,14 +9,15 @@
 namespace esim {
 
 /// What is known of a tile's pixels: samples in order of time, and how well each of them could have been foretold from
-/// those around it. Brightness is L = ln(E + log_eps).
+/// those around it.
 ///
-/// Between two samples at distance h, brightness is the straight line less a bow, L(f) = L0 + (L1 - L0) f - c h^2 f (1
+/// Between two samples at distance h, irradiance is the straight line less a bow, E(f) = E0 + (E1 - E0) f - c h^2 f (1
 /// - f) / 2, where c is the mean of the second derivatives on both sides: the divided differences of three samples
-/// each. In the middle of samples at equal distances that is the cubic through all four.
+/// each. In the middle of samples at equal distances that is the cubic through all four. Errors are of brightness,
+/// L = ln(E + log_eps).
 class TileTimeline {
  public:
-  TileTimeline(const Tile& tile, float log_eps, float most) : tile_(tile), log_eps_(log_eps), most_(most) {}
+  TileTimeline(const Tile& tile, float log_eps) : tile_(tile), log_eps_(log_eps) {}
 
   const Tile& tile() const { return tile_; }
 
@@ -30,19 +31,17 @@ class TileTimeline {
   std::size_t size() const { return samples_.size(); }
   TimeNs time(std::size_t i) const { return samples_[i].t; }
 
-  /// How far off brightness at sample i would be had it been interpolated from the others: a measure of the size of the
-  /// larger errors, 2 (mean e^4)^(1/4) over the tile's pixels, which is near the 99th percentile of normal ones. Only
-  /// for samples between others.
+  /// How far off brightness at sample i would be had it been interpolated from the others: the root of the mean square
+  /// over the tile's pixels. Only for samples between others.
   double surprise(std::size_t i) const { return samples_[i].surprise; }
-
-  /// Three quarters of the same measure, with no error counted as more than `most`: pixels that jump do not speak for
-  /// all.
-  double usual_surprise(std::size_t i) const { return samples_[i].usual_surprise; }
 
   /// Errors of that interpolation pixel by pixel, ln units.
   void errors(std::size_t i, std::vector<float>& out) const;
 
-  /// The same measure of what the bow between samples i and i + 1 adds to the straight line in its middle.
+  /// Of each pixel at sample i.
+  const std::vector<float>& brightness(std::size_t i) const { return samples_[i].brightness; }
+
+  /// How far brightness between samples i and i + 1 is from its own straight line, in the middle, likewise.
   double bow(std::size_t i) const;
 
   /// Writes the irradiance at sample i into the tile's pixels of an image of the camera's size.
@@ -54,18 +53,16 @@ class TileTimeline {
  private:
   struct Sample {
     TimeNs t = 0;
-    double surprise = 0, usual_surprise = 0;
+    double surprise = 0;
     std::vector<float> irradiance, brightness;
   };
   struct Bow;
 
   Bow bow_between(std::size_t first, std::size_t last) const;
   void measure(std::size_t i);
-  template <int kQuarter>
-  void write_quarter(std::size_t i, Image<float>& irradiance) const;
 
   Tile tile_;
-  float log_eps_, most_;
+  float log_eps_;
   std::vector<Sample> samples_;
   std::vector<Sample> unused_;  // memory
   std::vector<float> errors_;   // likewise

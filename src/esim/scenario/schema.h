@@ -84,7 +84,8 @@ void describe(Visitor& visit, MeshRendererOptions& o) {
   visit("objects", o.objects, About{"things that move through it: a list of maps of"});
   visit("lighting", o.lighting, About{"unlit: surfaces are as bright as their texture, as baked scenes want it"});
   visit("samples_per_pixel", o.samples_per_pixel,
-        About{"rays per pixel, 1, 5 or 13: more smooth the edges of objects", "", 1, 13});
+        About{"rays where an edge crosses a pixel, 1, 16 or 64: more smooth the edges of objects and shadows", "", 1,
+              64});
   visit("background", o.background, About{"irradiance where nothing is seen", "", 0, 1e6});
 }
 

@@ -13,8 +13,8 @@ CameraChannel* camera_due(World& world) {
   CameraChannel* due = nullptr;
   TimeNs earliest = 0;
   for (CameraChannel& camera : world.cameras) {
-    const auto next = camera.sampler->next();
-    if (!next || (due != nullptr && next->t >= earliest)) continue;
+    const SampleRequest* const next = camera.sampler->next();
+    if (next == nullptr || (due != nullptr && next->t >= earliest)) continue;
     earliest = next->t;
     due = &camera;
   }
@@ -107,9 +107,9 @@ class Run {
   /// Begins to evaluate the scene as the camera's sampler asks for next.
   void start_next(CameraChannel& camera) {
     Stopwatch stopwatch(summary_.seconds.render);
-    auto next = camera.sampler->next();
-    if (!next) return camera.rendering.reset();
-    camera.rendering = camera.sampled().start(view(world_, index_of(camera), next->t, std::move(next->tiles)));
+    const SampleRequest* const next = camera.sampler->next();
+    if (next == nullptr) return camera.rendering.reset();
+    camera.rendering = camera.sampled().start(view(world_, index_of(camera), next->t, next->tiles));
   }
 
   double elapsed() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }

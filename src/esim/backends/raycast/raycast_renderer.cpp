@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <bit>
+#include <numeric>
 #include <span>
 #include <string>
 
+#include "esim/backends/raycast/edges.h"
 #include "esim/backends/raycast/lights.h"
 #include "esim/core/error.h"
 #include "esim/render/bands.h"
@@ -12,17 +14,17 @@
 namespace esim {
 namespace {
 
-/// Places of the rays in a pixel: a rank-1 lattice around its centre, which comes first.
-std::vector<Eigen::Vector2f> ray_offsets(int count) {
-  const int generator = count == 13 ? 5 : 2;
-  std::vector<Eigen::Vector2f> offsets;
+/// Places of rays in a pixel, from its centre: a rank-1 lattice, in which no two are in a line with the pixel's sides.
+std::vector<Eigen::Vector2f> lattice(int count) {
+  const int generator = count == 64 ? 19 : 5;
+  std::vector<Eigen::Vector2f> places;
   for (int i = 0; i < count; ++i) {
-    const auto centred = [count](int k) {
-      return static_cast<float>(k > count / 2 ? k - count : k) / static_cast<float>(count);
+    const auto place = [count](int k) {
+      return (static_cast<float>(k % count) + 0.5F) / static_cast<float>(count) - 0.5F;
     };
-    offsets.emplace_back(centred(i), centred((generator * i) % count));
+    places.emplace_back(place(i), place(generator * i));
   }
-  return offsets;
+  return places;
 }
 
 /// The scene at one time, seen from one pose.
@@ -31,25 +33,42 @@ struct Moment {
   std::optional<Lighting> lighting;  // in the camera frame
 };
 
-/// K pixels on their way through the stages of rendering.
+/// K rays on their way through the stages of rendering.
 template <int K>
-struct Work {
+struct Rays {
   const RayBlock* block;
-  const BearingBounds* bounds;
-  int x, y, first;  // the block's corner, and the first of its lanes
+  int first;  // of the block's lanes
   Packet<K> packet;
   std::uint32_t hits;                                 // a bit per lane
   alignas(64) std::array<std::uint32_t, K> triangle;  // among all of the scene; any where nothing is hit
   TextureLookup<K> at;
   alignas(64) std::array<std::uint32_t, K> material;
-  alignas(64) std::array<float, K> sum;
+  alignas(64) std::array<float, K> light;  // that the surface receives
+  alignas(64) std::array<float, K> irradiance;
+};
+
+/// K pixels, seen by the rays through their centres.
+template <int K>
+struct Work {
+  int x, y;  // the block's corner
+  const BearingBounds* bounds;
+  Rays<K> rays;
+};
+
+/// A pixel that an edge crosses, and the rays that look closer.
+template <int K>
+struct EdgeWork {
+  Work<K>* pixel;
+  unsigned lane;
+  RayBlock block;
+  Rays<K> rays;
 };
 
 /// Writes the values of those of the K pixels that lie in the tile.
 template <int K, typename T>
 void store(const Work<K>& work, const T* values, const Tile& tile, Image<T>& image) {
   constexpr int kSide = RayBlock::kSide;
-  const int top = work.y + work.first / kSide;
+  const int top = work.y + work.rays.first / kSide;
   const int end_row = std::min(top + K / kSide, tile.y + tile.height);
   const int left = std::max(work.x, tile.x), right = std::min(work.x + kSide, tile.x + tile.width);
   for (int row = std::max(top, tile.y); row < end_row; ++row) {
@@ -68,8 +87,7 @@ class RaycastRenderer final : public ProcessorRenderer {
                   const Workers& workers)
       : scene_(std::move(scene)),
         background_(options.background),
-        offsets_(ray_offsets(options.samples_per_pixel)),
-        footprint_(1.0F / std::sqrt(static_cast<float>(options.samples_per_pixel))),
+        places_(lattice(options.samples_per_pixel)),
         rays_(camera),
         blocks_(rays_),
         workers_(workers) {}
@@ -104,9 +122,9 @@ class RaycastRenderer final : public ProcessorRenderer {
       for (int x = band.x / kSide * kSide; x < band.x + band.width; x += kSide) {
         for (int first = 0; first < RayBlock::kPixels; first += K) {
           Work<K>& work = batch[count++];
-          work.block = &blocks_.at(x, y);
+          work.x = x, work.y = y;
           work.bounds = &blocks_.bounds(x, y);
-          work.x = x, work.y = y, work.first = first;
+          work.rays.block = &blocks_.at(x, y), work.rays.first = first;
           if (count < batch.size()) continue;
           render_batch<K>(moment, std::span(batch), band, sample);
           count = 0;
@@ -116,82 +134,157 @@ class RaycastRenderer final : public ProcessorRenderer {
     render_batch<K>(moment, std::span(batch).first(count), band, sample);
   }
 
-  /// Stage by stage, so that what a stage waits for in memory comes while others are in the one before.
   template <int K>
   void render_batch(const Moment& moment, std::span<Work<K>> batch, const Tile& band, Sample& sample) const {
-    for (Work<K>& work : batch) work.sum.fill(0);
-    for (std::size_t i = 0; i < offsets_.size(); ++i) {
-      for (Work<K>& work : batch) trace(moment, offsets_[i], work);
-      if (i == 0) {
-        for (Work<K>& work : batch) store_geometry(work, band, sample);
-      }
-      GroupRotations<K> rotations;
-      for (Work<K>& work : batch) locate(moment, rotations, work);
-      for (Work<K>& work : batch) shade(moment, rotations, work);
-    }
-    const float mean = 1.0F / static_cast<float>(offsets_.size());
+    for (Work<K>& work : batch) trace(moment, *work.bounds, {0, 0}, work.rays);
+    for (Work<K>& work : batch) store_geometry(work, band, sample);
+    shade<K>(moment, batch, 1);
+    if (places_.size() > 1) smooth_edges(moment, batch);
+    for (Work<K>& work : batch) store(work, work.rays.irradiance.data(), band, sample.irradiance);
+  }
+
+  /// Looks closer at the pixels that edges cross.
+  template <int K>
+  void smooth_edges(const Moment& moment, std::span<Work<K>> batch) const {
+    std::array<EdgeWork<K>, 8> closer;
+    std::size_t count = 0;
     for (Work<K>& work : batch) {
-      for (float& irradiance : work.sum) irradiance *= mean;
-      store(work, work.sum.data(), band, sample.irradiance);
+      for (std::uint32_t edges = edges_of(moment, work); edges != 0; edges &= edges - 1) {
+        const auto lane = static_cast<unsigned>(std::countr_zero(edges));
+        work.rays.irradiance[lane] = 0;
+        for (std::size_t ray = 0; ray < places_.size(); ray += K) {
+          EdgeWork<K>& edge = closer[count++];
+          edge.pixel = &work, edge.lane = lane;
+          edge.rays.block = &edge.block, edge.rays.first = 0;
+          spread<K>(*work.rays.block, work.rays.first + static_cast<int>(lane), ray, edge.block);
+          if (count < closer.size()) continue;
+          look_closer<K>(moment, std::span(closer));
+          count = 0;
+        }
+      }
+    }
+    look_closer<K>(moment, std::span(closer).first(count));
+  }
+
+  /// Pixels of the work that edges cross, a bit per lane.
+  template <int K>
+  std::uint32_t edges_of(const Moment& moment, const Work<K>& work) const {
+    const bool shadows = moment.lighting && moment.lighting->shadows;
+    const SeenSurfaces<K> centre{work.rays.packet, work.rays.triangle, work.rays.light};
+    Rays<K> corner;
+    corner.block = work.rays.block, corner.first = work.rays.first;
+    GroupRotations<K> rotations;
+    std::uint32_t edges = 0;
+    for (const Eigen::Vector2f& place : kCorners) {
+      trace(moment, *work.bounds, place, corner);
+      corner.light = work.rays.light;
+      if (shadows) corner.light = light_on(moment, rotations, corner, corner.hits);
+      edges |= pixels_on_edges<K>(*scene_, *corner.block, corner.first, centre,
+                                  {corner.packet, corner.triangle, corner.light});
+    }
+    return edges;
+  }
+
+  /// Makes a block of the pixel in lane `lane` of `from`: K times, seen from the lattice's places `first` and on.
+  template <int K>
+  void spread(const RayBlock& from, int lane, std::size_t first, RayBlock& to) const {
+    for (std::size_t i = 0; i < K; ++i) {
+      const Eigen::Vector2f& place = places_[first + i];
+      to.x[i] = from.x[lane] + from.dx_du[lane] * place.x() + from.dx_dv[lane] * place.y();
+      to.y[i] = from.y[lane] + from.dy_du[lane] * place.x() + from.dy_dv[lane] * place.y();
+      to.dx_du[i] = from.dx_du[lane], to.dx_dv[i] = from.dx_dv[lane];
+      to.dy_du[i] = from.dy_du[lane], to.dy_dv[i] = from.dy_dv[lane];
     }
   }
 
   template <int K>
-  void trace(const Moment& moment, const Eigen::Vector2f& offset, Work<K>& work) const {
-    work.packet.aim(*work.block, work.first, offset);
+  void look_closer(const Moment& moment, std::span<EdgeWork<K>> edges) const {
+    for (EdgeWork<K>& edge : edges) trace(moment, *edge.pixel->bounds, {0, 0}, edge.rays);
+    shade<K>(moment, edges, 1 / std::sqrt(static_cast<float>(places_.size())));
+    for (EdgeWork<K>& edge : edges) {
+      const float sum = std::accumulate(edge.rays.irradiance.begin(), edge.rays.irradiance.end(), 0.0F);
+      edge.pixel->rays.irradiance[edge.lane] += sum / static_cast<float>(places_.size());
+    }
+  }
+
+  template <int K>
+  void trace(const Moment& moment, const BearingBounds& bounds, const Eigen::Vector2f& place, Rays<K>& rays) const {
+    rays.packet.aim(*rays.block, rays.first, place);
     for (unsigned group = 0; group < moment.groups.size(); ++group) {
       const PlacedGroup& placed = moment.groups[group];
-      if (placed.triangles != nullptr && placed.bounds.overlap(*work.bounds)) work.packet.intersect(placed, group);
+      if (placed.triangles != nullptr && placed.bounds.overlap(bounds)) rays.packet.intersect(placed, group);
     }
-    work.hits = work.packet.hits();
-    if (work.hits == 0) return;
-    for (unsigned i = 0; i < K; ++i) work.triangle[i] = (work.hits >> i & 1U) != 0 ? work.packet.ray.hit.primID[i] : 0;
+    rays.hits = rays.packet.hits();
+    if (rays.hits == 0) return;
+    for (unsigned i = 0; i < K; ++i) rays.triangle[i] = (rays.hits >> i & 1U) != 0 ? rays.packet.ray.hit.primID[i] : 0;
     if (moment.groups.size() > 1) {
-      for (unsigned i = 0; i < K; ++i) work.triangle[i] += scene_->first_triangle(work.packet.group(i));
+      for (unsigned i = 0; i < K; ++i) rays.triangle[i] += scene_->first_triangle(rays.packet.group(i));
     }
-    for (const std::uint32_t triangle : work.triangle) __builtin_prefetch(&scene_->triangle(triangle));
+    for (const std::uint32_t triangle : rays.triangle) __builtin_prefetch(&scene_->triangle(triangle));
   }
 
   template <int K>
   static void store_geometry(const Work<K>& work, const Tile& band, Sample& sample) {
-    store(work, work.packet.ray.ray.tfar, band, sample.depth);
+    const Packet<K>& packet = work.rays.packet;
+    store(work, packet.ray.ray.tfar, band, sample.depth);
     if (sample.object.empty()) return;
     std::array<std::uint16_t, K> objects;
-    for (unsigned i = 0; i < K; ++i) objects[i] = static_cast<std::uint16_t>(work.packet.group(i));
+    for (unsigned i = 0; i < K; ++i) objects[i] = static_cast<std::uint16_t>(packet.group(i));
     store(work, objects.data(), band, sample.object);
   }
 
+  /// Stage by stage, so that what a stage waits for in memory comes while others are in the one before. Each ray sees
+  /// `footprint` pixels along each side.
+  template <int K, typename W>
+  void shade(const Moment& moment, std::span<W> batch, float footprint) const {
+    GroupRotations<K> rotations;
+    for (W& work : batch) locate(moment, rotations, footprint, work.rays);
+    for (W& work : batch) shade(moment, rotations, work.rays);
+  }
   template <int K>
-  void locate(const Moment& moment, GroupRotations<K>& rotations, Work<K>& work) const {
-    if (work.hits == 0) return;
+  void locate(const Moment& moment, GroupRotations<K>& rotations, float footprint, Rays<K>& rays) const {
+    if (rays.hits == 0) return;
     HitTriangles<K> triangles;
-    triangles.gather(*scene_, work.triangle);
-    rotations.select(work.packet, moment.groups);
-    locate_on_textures<K>(work.packet, *work.block, work.first, footprint_, rotations, triangles, work.at);
-    work.material = triangles.material;
+    triangles.gather(*scene_, rays.triangle);
+    rotations.select(rays.packet, moment.groups);
+    locate_on_textures<K>(rays.packet, *rays.block, rays.first, footprint, rotations, triangles, rays.at);
+    rays.material = triangles.material;
   }
 
   template <int K>
-  void shade(const Moment& moment, GroupRotations<K>& rotations, Work<K>& work) const {
+  void shade(const Moment& moment, GroupRotations<K>& rotations, Rays<K>& rays) const {
     SurfaceColours<K> colours;
-    colours.look_up(*scene_, work.material, work.at, work.hits);
-    const std::uint32_t lit = moment.lighting ? work.hits & ~colours.unlit : 0;
+    colours.look_up(*scene_, rays.material, rays.at, rays.hits);
+    rays.light.fill(1);
+    const std::uint32_t lit = moment.lighting ? rays.hits & ~colours.unlit : 0;
     if (lit != 0) {
-      rotations.select(work.packet, moment.groups);
-      SurfacePoints<K> surface;
-      surface.take(*scene_, work.packet, work.triangle, rotations);
-      const LightOnSurfaces<K> light(*moment.lighting, moment.groups);
-      const std::array<float, K> received = light.at(surface, lit);
-      for (unsigned i = 0; i < K; ++i) colours.base[i] *= (lit >> i & 1U) != 0 ? received[i] : 1.0F;
+      const std::array<float, K> received = light_on(moment, rotations, rays, lit);
+      for (unsigned i = 0; i < K; ++i) rays.light[i] = (lit >> i & 1U) != 0 ? received[i] : 1.0F;
     }
-    for (unsigned i = 0; i < K; ++i)
-      work.sum[i] += (work.hits >> i & 1U) != 0 ? colours.base[i] + colours.emission[i] : background_;
+    for (unsigned i = 0; i < K; ++i) {
+      rays.irradiance[i] =
+          (rays.hits >> i & 1U) != 0 ? colours.base[i] * rays.light[i] + colours.emission[i] : background_;
+    }
   }
+
+  /// Light on the surfaces that the lanes of `lit` have hit.
+  template <int K>
+  std::array<float, K> light_on(const Moment& moment, GroupRotations<K>& rotations, const Rays<K>& rays,
+                                std::uint32_t lit) const {
+    rotations.select(rays.packet, moment.groups);
+    SurfacePoints<K> surface;
+    surface.take(*scene_, rays.packet, rays.triangle, rotations);
+    return LightOnSurfaces<K>(*moment.lighting, moment.groups).at(surface, lit);
+  }
+
+  static constexpr float kHalf = 0.5F;
+  inline static const std::array<Eigen::Vector2f, 4> kCorners = {
+      Eigen::Vector2f{-kHalf, -kHalf}, Eigen::Vector2f{kHalf, -kHalf}, Eigen::Vector2f{-kHalf, kHalf},
+      Eigen::Vector2f{kHalf, kHalf}};
 
   std::shared_ptr<const RaycastScene> scene_;
   float background_;
-  std::vector<Eigen::Vector2f> offsets_;
-  float footprint_;  // of one ray, in pixels
+  std::vector<Eigen::Vector2f> places_;  // of the rays in a pixel that an edge crosses
   PixelRays rays_;
   RayBlocks blocks_;
   const Workers& workers_;
@@ -203,8 +296,8 @@ std::unique_ptr<Renderer> make_raycast_renderer(std::shared_ptr<const RaycastSce
                                                 const RaycastOptions& options, const Camera& camera,
                                                 const Workers& workers) {
   const int n = options.samples_per_pixel;
-  if (n != 1 && n != 5 && n != 13) {
-    throw UserError("samples_per_pixel: " + std::to_string(n) + " is not supported; use 1, 5 or 13");
+  if (n != 1 && n != 16 && n != 64) {
+    throw UserError("samples_per_pixel: " + std::to_string(n) + " is not supported; use 1, 16 or 64");
   }
   return std::make_unique<RaycastRenderer>(std::move(scene), options, camera, workers);
 }

@@ -35,19 +35,26 @@ void Exposure::open(Image<float> memory) {
   mean_.fill(0);
 }
 
+/// What a segment's ends weigh in the mean of a row whose exposure begins at `begin`.
+Exposure::Weights Exposure::weigh(const Segment& segment, TimeNs begin) const {
+  const TimeNs from = std::max(segment.t0, begin), to = std::min(segment.t1, begin + duration_);
+  if (from >= to) return {begin, 0, 0};
+  // The mean over the overlap is E at its middle.
+  const double share = static_cast<double>(to - from) / static_cast<double>(duration_);
+  const double twice_middle = static_cast<double>(from - segment.t0) + static_cast<double>(to - segment.t0);
+  const double middle = twice_middle / (2 * static_cast<double>(segment.t1 - segment.t0));
+  return {begin, static_cast<float>(share * (1 - middle)), static_cast<float>(share * middle)};
+}
+
 bool Exposure::add(const Segment& segment, Rows rows, int left, int top) {
-  const auto length = static_cast<double>(segment.t1 - segment.t0);
+  const auto width = static_cast<std::size_t>(segment.tile.width);
+  Weights weights = weigh(segment, first_row_);
   bool good = true;
   for (int y = rows.first; y < rows.last; ++y) {
     const TimeNs begin = first_row_ + row_delays_[static_cast<std::size_t>(y)];
-    const TimeNs from = std::max(segment.t0, begin), to = std::min(segment.t1, begin + duration_);
-    if (from >= to) continue;
-    // The mean over the overlap is E at its middle.
-    const double share = static_cast<double>(to - from) / static_cast<double>(duration_);
-    const double middle =
-        (static_cast<double>(from - segment.t0) + static_cast<double>(to - segment.t0)) / (2 * length);
-    good &= add_row(static_cast<std::size_t>(segment.tile.width), static_cast<float>(share * (1 - middle)),
-                    segment.irradiance0->row(y - top) + segment.tile.x - left, static_cast<float>(share * middle),
+    if (begin != weights.begin) weights = weigh(segment, begin);
+    if (weights.first + weights.last == 0) continue;
+    good &= add_row(width, weights.first, segment.irradiance0->row(y - top) + segment.tile.x - left, weights.last,
                     segment.irradiance1->row(y - top) + segment.tile.x - left, mean_.row(y) + segment.tile.x);
   }
   return good;

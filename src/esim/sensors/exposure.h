@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 
 #include "esim/core/image.h"
 #include "esim/core/time.h"
@@ -39,6 +40,12 @@ class Exposure {
   Image<float> take_memory() { return std::move(mean_); }
 
  private:
+  struct Weights {
+    TimeNs begin;  // of the row's exposure
+    float first, last;
+  };
+  Weights weigh(const Segment& segment, TimeNs begin) const;
+
   std::int64_t number_;
   TimeNs first_row_, duration_;
   std::span<const TimeNs> row_delays_;

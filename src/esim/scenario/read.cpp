@@ -29,8 +29,8 @@ YAML::Node load(const std::filesystem::path& file) {
 /// What a camera inherits for `key`: the shared map, overridden entry by entry by its own. A map of another type
 /// replaces the shared one.
 YAML::Node inherit(const YAML::Node& shared, const YAML::Node& own) {
-  if (!shared.IsDefined() || !shared.IsMap()) return own;
-  if (!own.IsDefined() || !own.IsMap()) return own.IsDefined() ? own : shared;
+  if (!shared.IsDefined() || !own.IsDefined()) return own.IsDefined() ? own : shared;
+  if (!shared.IsMap() || !own.IsMap()) return own;
   const YAML::Node own_type = own["type"], shared_type = shared["type"];
   if (own_type.IsDefined() && (!shared_type.IsDefined() || own_type.Scalar() != shared_type.Scalar())) return own;
   YAML::Node merged = YAML::Clone(shared);

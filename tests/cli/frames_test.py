@@ -51,8 +51,13 @@ class Frames(ProgramTest):
         self.assertEqual(result.returncode, 0, result.stderr)
         return json.loads((self.out / "report.json").read_text())
 
+    @property
+    def place(self):
+        """The files of the only camera."""
+        return self.out
+
     def frames(self):
-        with open(self.out / "frames.csv", newline="") as file:
+        with open(self.place / "frames.csv", newline="") as file:
             return list(csv.DictReader(file))
 
     def test_a_recording_holds_what_the_manual_says(self):
@@ -63,19 +68,19 @@ class Frames(ProgramTest):
         self.assertEqual([b - a for a, b in zip(times, times[1:])], [20_000_000] * 8)
         self.assertEqual({frame["exposure_ns"] for frame in listed}, {"4000000"})
         self.assertEqual({frame["gain"] for frame in listed}, {"1.5"})
-        names = sorted(p.name for p in (self.out / "frames").iterdir())
+        names = sorted(p.name for p in (self.place / "frames").iterdir())
         self.assertEqual(names, [f"{i:06}.png" for i in range(9)])
         self.assertEqual(report["cameras"][0]["frames_written"], 9)
         self.assertGreater(report["wall_s_by_stage"]["frames"], 0)
-        bits, rows = read_png(self.out / "frames" / "000003.png")
+        bits, rows = read_png(self.place / "frames" / "000003.png")
         self.assertEqual((bits, len(rows[0]), len(rows)), (8, 64, 48))
         self.assertGreater(len({number for row in rows for number in row}), 50, "hardly an image")
 
     def test_more_than_eight_bits_are_in_files_of_sixteen(self):
         self.simulate("--set", "frame_camera={bits: 8}")
-        narrow = read_png(self.out / "frames" / "000002.png")[1]
+        narrow = read_png(self.place / "frames" / "000002.png")[1]
         self.simulate("--set", "frame_camera={bits: 12}")
-        bits, wide = read_png(self.out / "frames" / "000002.png")
+        bits, wide = read_png(self.place / "frames" / "000002.png")
         self.assertEqual(bits, 16)
         self.assertGreater(max(map(max, wide)), 1000)
         for y in range(48):
@@ -84,7 +89,7 @@ class Frames(ProgramTest):
 
     def test_without_one_there_are_no_frames(self):
         report = self.simulate()
-        self.assertFalse((self.out / "frames").exists() or (self.out / "frames.csv").exists())
+        self.assertFalse((self.place / "frames").exists() or (self.place / "frames.csv").exists())
         self.assertNotIn("frames_written", report["cameras"][0])
 
     def test_the_same_bytes_with_any_number_of_threads_and_from_the_resolved_scenario(self):
@@ -97,8 +102,8 @@ class Frames(ProgramTest):
                 again = self.folder / "again"
                 self.assertEqual(run("simulate", self.out / "scenario.yaml", "--out", again).returncode, 0)
                 self.out = again
-            recordings.append([p.read_bytes() for p in sorted((self.out / "frames").iterdir())] +
-                              [(self.out / "frames.csv").read_bytes()])
+            recordings.append([p.read_bytes() for p in sorted((self.place / "frames").iterdir())] +
+                              [(self.place / "frames.csv").read_bytes()])
         self.assertEqual(recordings[0], recordings[1])
         self.assertEqual(recordings[0], recordings[2])
         self.assertGreater(len({frame["exposure_ns"] for frame in self.frames()}), 1)

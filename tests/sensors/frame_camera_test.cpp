@@ -422,6 +422,21 @@ TEST(FrameCamera, RefusesAnIrradianceThatIsNone) {
   }
 }
 
+TEST(FrameCamera, RefusesAnIrradianceThatIsNoneAheadOfItsTime) {
+  // A tile has come so far that the exposures are not known yet.
+  FrameCameraOptions options = precise(100, 0.004);
+  options.auto_exposure = AutoExposureOptions{};
+  FrameCamera camera(options, 4, 4, {0, kNsPerSecond});
+  Image<float> good(4, 4, 0.5F), bad = good;
+  bad(1, 0) = std::nanf("");
+  const Tile tile{0, 0, 2, 2};
+  const std::vector<Segment> first = {{tile, 0, 0, &good, &good}, {tile, 0, 60 * kNsPerMs, &good, &good}};
+  camera.integrate(first, 0, kOneThread);
+  const Segment next{tile, 60 * kNsPerMs, 70 * kNsPerMs, &good, &bad};
+  EXPECT_TRUE(contains(message_of<UserError>([&] { camera.integrate({&next, 1}, 0, kOneThread); }), "pixel (1, 0)"));
+  EXPECT_TRUE(contains(message_of<UserError>([&] { camera.integrate(first, 0, kOneThread); }), "cannot go on"));
+}
+
 TEST(FrameCamera, RefusesOptionsThatContradictEachOther) {
   const auto message = [](const FrameCameraOptions& options) {
     return message_of<UserError>([&] { FrameCamera(options, 32, 100, {0, kNsPerSecond}); });

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
+#include <cassert>
 #include <cstddef>
 #include <deque>
 #include <utility>
@@ -198,7 +198,6 @@ void FrameCamera::State::expose(std::span<const Segment> segments, const Workers
     }
   });
   if (good) return;
-  spoiled = true;
   for (const Segment& segment : segments) check_both_ends(segment);
 }
 
@@ -258,11 +257,13 @@ void FrameCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
   State& state = *state_;
   if (state.spoiled)
     throw UserError("frame camera: it has seen an irradiance that is none, and cannot go on; begin with a new one");
+  state.spoiled = true;  // unless all goes well
   state.expose(segments, workers);
   for (const Segment& segment : segments) {
     if (segment.t1 > state.horizon) state.hold(segment);
   }
   while (!state.exposing.empty() && state.exposing.front().end() <= watermark) state.finish_first(workers);
+  state.spoiled = false;
 }
 
 TimeNs FrameCamera::due() const {
@@ -273,6 +274,7 @@ TimeNs FrameCamera::due() const {
 const FrameCameraOptions& FrameCamera::options() const { return state_->options; }
 
 CameraFrame FrameCamera::take() {
+  assert(!state_->finished.empty());
   CameraFrame frame = std::move(state_->finished.front());
   state_->finished.pop_front();
   return frame;

@@ -35,15 +35,8 @@ class Run {
     summary_.start = summary_.end = world.info.start;
     for (std::size_t i = 0; i < world.cameras.size(); ++i) {
       const CameraInfo& info = world.info.cameras[i];
-      summary_.cameras.push_back({info.name,
-                                  world.cameras[i].renderer->traits().label(),
-                                  info.model.width,
-                                  info.model.height,
-                                  {},
-                                  0,
-                                  0,
-                                  {},
-                                  0});
+      summary_.cameras.push_back(
+          {info.name, world.cameras[i].renderer->traits().label(), info.model.width, info.model.height, {}, 0, 0, {}});
       start_next(world.cameras[i]);
     }
   }

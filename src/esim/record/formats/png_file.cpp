@@ -1,5 +1,6 @@
 #include "esim/record/formats/png_file.h"
 
+#include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 

@@ -85,6 +85,30 @@ cameras:
   EXPECT_DOUBLE_EQ(scenario.cameras[1].event_camera.threshold_noise, 0.01);
 }
 
+TEST_F(ScenarioFile, GivesFramesToTheCamerasThatAskForThem) {
+  EXPECT_FALSE(read(kMinimal).cameras[0].frame_camera);
+  const std::string yaml = std::string(kMinimal) + R"(
+frame_camera: {rate_hz: 20, response: {type: gamma, gamma: 1.8}, auto_exposure: {target: 0.3}}
+cameras:
+  - {width: 10}
+  - {frame_camera: {exposure_s: 0.002, response: {type: measured, path: r.txt}, auto_exposure: null}}
+  - {frame_camera: null}
+)";
+  const Scenario scenario = read(yaml);
+  ASSERT_TRUE(scenario.cameras[0].frame_camera && scenario.cameras[1].frame_camera);
+  EXPECT_FALSE(scenario.cameras[2].frame_camera);
+  EXPECT_DOUBLE_EQ(scenario.cameras[0].frame_camera->rate_hz, 20);
+  EXPECT_DOUBLE_EQ(scenario.cameras[0].frame_camera->exposure_s, 0.01);
+  EXPECT_DOUBLE_EQ(scenario.cameras[0].frame_camera->auto_exposure.value().target, 0.3);
+  EXPECT_DOUBLE_EQ(scenario.cameras[1].frame_camera->rate_hz, 20);
+  EXPECT_DOUBLE_EQ(scenario.cameras[1].frame_camera->exposure_s, 0.002);
+  EXPECT_FALSE(scenario.cameras[1].frame_camera->auto_exposure);
+  EXPECT_EQ(std::get<MeasuredResponse>(scenario.cameras[1].frame_camera->response).path, folder_.path() / "r.txt");
+  EXPECT_EQ(write_scenario(read(write_scenario(scenario))), write_scenario(scenario));
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "frame_camera: 5\n"), "camera.frame_camera: must be a map"));
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "event_camera: [1]\n"), "camera.event_camera: must be a map"));
+}
+
 TEST_F(ScenarioFile, IsTheSameAfterWritingAndReading) {
   const Scenario scenario = read(std::string(kMinimal) + R"(
 seed: 18446744073709551615

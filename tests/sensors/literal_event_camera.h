@@ -11,7 +11,7 @@
 #include "esim/core/random.h"
 #include "esim/events/event.h"
 #include "esim/sensors/event_camera.h"
-#include "esim/sensors/event_normals.h"
+#include "esim/sensors/pixel_normals.h"
 
 namespace esim::test {
 
@@ -184,7 +184,7 @@ class LiteralEventCamera {
   int width_;
   std::vector<Pixel> pixels_;
   std::vector<std::uint32_t> draws_;
-  EventNormals normals_;
+  PixelNormals normals_;
   AddressedRandom mismatch_, per_event_, leak_, shot_, defects_;
   std::optional<TimeNs> last_t_;
 };

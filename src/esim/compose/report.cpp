@@ -31,6 +31,7 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
         {"events_dropped_by_readout", camera.sensor.dropped},
         {"events_per_second", simulated_s > 0 ? static_cast<double>(events) / simulated_s : 0.0},
     });
+    if (scenario.cameras[i].frame_camera) cameras.back()["frames_written"] = camera.frames;
     if (!sampling.measured_error) continue;
     const auto& [mean, p99, max] = *sampling.measured_error;
     cameras.back()["tolerance"] = sampling.tolerance;
@@ -42,7 +43,7 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
   }
 
   const StageSeconds& s = summary.seconds;
-  const double other = summary.wall_seconds - (s.render + s.sampling + s.events + s.truth + s.write);
+  const double other = summary.wall_seconds - (s.render + s.sampling + s.events + s.frames + s.truth + s.write);
   const Json report = {
       {"status", summary.complete ? "complete" : "interrupted"},
       {"esim_version", ESIM_VERSION},
@@ -56,6 +57,7 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
        {{"render", s.render},
         {"sampling", s.sampling},
         {"events", s.events},
+        {"frames", s.frames},
         {"truth", s.truth},
         {"write", s.write},
         {"other", other}}},

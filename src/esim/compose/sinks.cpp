@@ -3,6 +3,7 @@
 #include "esim/record/fan_out.h"
 #include "esim/record/formats/events_hdf5.h"
 #include "esim/record/formats/events_text.h"
+#include "esim/record/formats/frames_png.h"
 #include "esim/record/formats/images_png.h"
 #include "esim/record/formats/poses_tum.h"
 #include "esim/record/formats/truth_hdf5.h"
@@ -38,6 +39,7 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
     std::filesystem::create_directories(place);
     sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", camera, EventsHdf5Options{unit, compression}));
     if (output.events_txt) sinks->add(std::make_unique<EventsTextWriter>(place / "events.txt", camera));
+    if (scenario.cameras[i].frame_camera) sinks->add(std::make_unique<FramesPngWriter>(place, camera));
     if (truth.rate_hz <= 0) continue;
     if (truth.images) sinks->add(std::make_unique<ImagesPngWriter>(place / "images", camera));
     if (truth.depth || truth.flow) {

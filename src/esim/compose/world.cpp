@@ -48,6 +48,22 @@ void check_sampling(const CameraOptions& camera, const Notices& notices) {
   std::visit(check, camera.sampling);
 }
 
+/// The frame camera that a camera has.
+FrameCamera build_frame_camera(const CameraOptions& options, const Camera& model, const TimeSpan& span,
+                               std::uint64_t seed, std::size_t index, const Notices& notices) {
+  try {
+    FrameCamera camera(*options.frame_camera, model.width, model.height, span, seed, static_cast<std::uint16_t>(index));
+    if (camera.due() == FrameCamera::kNever) {
+      notices.warning(
+          fmt::format("camera {}: frame_camera: no exposure lies wholly within the simulated time, {:.6g} s",
+                      options.name, to_seconds(span.end - span.start)));
+    }
+    return camera;
+  } catch (const UserError& error) {
+    throw UserError(fmt::format("camera {}: {}", options.name, error.what()));
+  }
+}
+
 /// The views of a camera; outlives the world.
 std::function<RenderRequest(TimeNs)> view_at(const World& world, std::size_t camera) {
   return [trajectory = world.trajectory, objects = world.objects,
@@ -135,6 +151,8 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices)
          {},
          nullptr,
          std::move(keyframes)});
+    if (options.frame_camera)
+      world.cameras.back().frame_camera = build_frame_camera(options, model, span, scenario.seed, i, notices);
     require_a_view(world, i);
     name_what_has_no_effect(scenario, world, i, notices);
   }

@@ -16,6 +16,7 @@ enum class Purpose : std::uint16_t {
   pixel_defects = 6,
   shot_noise = 7,
   sampling_audit = 8,
+  frame_noise = 16,
   test = 1000,
 };
 

@@ -33,7 +33,7 @@ class EventStore final : public Sink {
   std::vector<Event> events_;
 };
 
-/// Camera 0 alone, ideal but for its thresholds, without ground truth.
+/// Camera 0 alone, ideal but for its thresholds, without frames and ground truth.
 Scenario bare(const Scenario& scenario) {
   Scenario bare = scenario;
   bare.cameras.resize(1);
@@ -44,6 +44,7 @@ Scenario bare(const Scenario& scenario) {
   sensor.contrast_threshold_on = given.contrast_threshold_on;
   sensor.contrast_threshold_off = given.contrast_threshold_off;
   sensor.log_eps = given.log_eps;
+  bare.cameras[0].frame_camera.reset();
   bare.truth.rate_hz = bare.truth.pose_rate_hz = 0;
   return bare;
 }

@@ -38,6 +38,15 @@ Copy copy_of(const ImageRecord& record) {
           image->size() * sizeof(float)};
 }
 
+Copy copy_of(const FrameRecord& record) {
+  auto image = std::make_shared<const Image<std::uint16_t>>(record.image);
+  return {[camera = record.camera, t = record.t, start = record.exposure_start, duration = record.exposure_duration,
+           gain = record.gain, bits = record.bits, image](Sink& sink) {
+            sink.write(FrameRecord{camera, t, start, duration, gain, *image, bits});
+          },
+          image->size() * sizeof(std::uint16_t)};
+}
+
 Copy copy_of(const PoseRecord& record) {
   return {[record](Sink& sink) { sink.write(record); }, sizeof record};
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <variant>
@@ -52,13 +53,24 @@ struct ImageRecord {
   const Image<float>& irradiance;  ///< E, 1.0 = white
 };
 
+/// A frame of a frame camera, reported when its exposure has ended. The image is borrowed for the duration of the call.
+struct FrameRecord {
+  int camera = 0;
+  TimeNs t = 0;                       ///< middle of the exposure; of the middle row, with a rolling shutter
+  TimeNs exposure_start = 0;          ///< of the first row
+  TimeNs exposure_duration = 0;       ///< of each row
+  double gain = 1;                    ///< 1: a full pixel is full scale
+  const Image<std::uint16_t>& image;  ///< digital numbers
+  int bits = 8;                       ///< of each number
+};
+
 /// Pose of the body.
 struct PoseRecord {
   TimeNs t = 0;
   SE3 T_world_body;
 };
 
-using Record = std::variant<EventsRecord, TruthRecord, ImageRecord, PoseRecord>;
+using Record = std::variant<EventsRecord, TruthRecord, ImageRecord, FrameRecord, PoseRecord>;
 
 /// Where a simulation goes: one class per format, each taking the kinds of record that it can hold.
 /// Calls come from one thread: begin, then write in time order per camera, then end.

@@ -29,8 +29,8 @@ YAML::Node load(const std::filesystem::path& file) {
 /// What a camera inherits for `key`: the shared map, overridden entry by entry by its own. A map of another type
 /// replaces the shared one.
 YAML::Node inherit(const YAML::Node& shared, const YAML::Node& own) {
-  if (!shared.IsDefined() || !shared.IsMap()) return own;
-  if (!own.IsDefined() || !own.IsMap()) return own.IsDefined() ? own : shared;
+  if (!shared.IsDefined() || !own.IsDefined()) return own.IsDefined() ? own : shared;
+  if (!shared.IsMap() || !own.IsMap()) return own;
   const YAML::Node own_type = own["type"], shared_type = shared["type"];
   if (own_type.IsDefined() && (!shared_type.IsDefined() || own_type.Scalar() != shared_type.Scalar())) return own;
   YAML::Node merged = YAML::Clone(shared);
@@ -89,7 +89,7 @@ std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource
     const YAML::Node entry = several.IsDefined() ? several[i] : one;
     YAML::Node merged = entry.IsDefined() ? YAML::Clone(entry) : YAML::Node(YAML::NodeType::Map);
     if (merged.IsMap()) {
-      for (const char* part : {"sampling", "event_camera"}) {
+      for (const char* part : {"sampling", "event_camera", "frame_camera"}) {
         const YAML::Node inherited = inherit(root[part], std::as_const(merged)[part]);
         if (inherited.IsDefined()) merged[part] = inherited;
       }
@@ -169,7 +169,7 @@ Scenario read_scenario(const std::filesystem::path& file, const std::vector<std:
   Scenario scenario;
   YamlReader reader(root, "", source);
   describe(reader, scenario);
-  for (const char* key : {"camera", "cameras", "sampling", "event_camera"}) reader.know(key);
+  for (const char* key : {"camera", "cameras", "sampling", "event_camera", "frame_camera"}) reader.know(key);
   reader.finish();
   const YAML::Node renderer = std::as_const(root)["renderer"], trajectory = std::as_const(root)["trajectory"];
   auto* const sprites = std::get_if<SpritesRendererOptions>(&scenario.renderer);

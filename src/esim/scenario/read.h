@@ -12,8 +12,8 @@ namespace esim {
 /// environment variable.
 ///
 /// Cameras are a list under `cameras`, or a single one under `camera` (default: one camera of default values); the keys
-/// `sampling` and `event_camera` at the top hold for every camera that does not set them itself. A camera's calibration
-/// file is read here: the result holds explicit geometry only.
+/// `sampling`, `event_camera` and `frame_camera` at the top hold for every camera that does not set them itself. A
+/// camera's calibration file is read here: the result holds explicit geometry only.
 ///
 /// `overrides` are "dotted.key=value" and come last. Throws UserError with file, line, key, and what would be right.
 Scenario read_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides = {});

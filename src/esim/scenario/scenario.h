@@ -12,6 +12,7 @@
 #include "esim/scenario/pose_options.h"
 #include "esim/scene/layer.h"
 #include "esim/sensors/event_camera.h"
+#include "esim/sensors/frame_camera_options.h"
 
 namespace esim {
 
@@ -173,6 +174,7 @@ struct CameraOptions {
   PoseOptions T_body_camera;
   SamplingOptions sampling;
   EventCameraOptions event_camera;
+  std::optional<FrameCameraOptions> frame_camera;  ///< none where not set
 };
 
 // --- what is written -----------------------------------------------------------------------------------------------

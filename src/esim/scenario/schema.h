@@ -191,6 +191,7 @@ void describe(Visitor& visit, CameraOptions& o) {
   visit("T_body_camera", o.T_body_camera, About{"pose of the camera (x right, y down, z forward) in the body"});
   visit("sampling", o.sampling, About{"when the scene is evaluated"});
   visit("event_camera", o.event_camera, About{"the event sensor"});
+  visit("frame_camera", o.frame_camera, About{"a standard camera in the same place (default: none)"});
 }
 
 template <class Visitor>

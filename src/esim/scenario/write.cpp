@@ -169,6 +169,11 @@ class ReferenceWriter {
     describe(inner, options);
   }
   template <typename T>
+  void nested(std::optional<T>&) {
+    T value{};
+    nested(value);
+  }
+  template <typename T>
   void nested(std::vector<T>&) {
     T entry;
     nested(entry);

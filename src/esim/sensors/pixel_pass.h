@@ -4,10 +4,10 @@
 #include <cstdint>
 
 #include "esim/events/packed_events.h"
-#include "esim/sensors/event_normals.h"
 #include "esim/sensors/linear_signals.h"
 #include "esim/sensors/pixel_array.h"
 #include "esim/sensors/pixel_block.h"
+#include "esim/sensors/pixel_normals.h"
 #include "esim/sensors/relaxing_signals.h"
 
 namespace esim {
@@ -65,7 +65,7 @@ class PixelPass {
   PerPixel<double> stamp_{};    // of the event
   PerPixel<double> reports_{};  // 0 where the event is lost
   PerPixel<double> again_{};    // 1 where another event may follow
-  EventNormals normals_{};
+  PixelNormals normals_{};
   PerPixel<double> uniform_{};
 
   // The levels that pixels sleep between.

@@ -58,20 +58,23 @@ class Run {
         Stopwatch stopwatch(summary_.seconds.events);
         camera.event_camera.integrate(segments, *world_.workers);
       }
+      expose(camera, segments);
       Stopwatch stopwatch(summary_.seconds.sampling);
       segments = camera.sampler->more();
     }
+    expose(camera, {});                                   // what is complete after the last segment
     if (camera.rendering == nullptr) start_next(camera);  // what comes next may have depended on more()
   }
 
   /// Writes everything up to `until`, all kinds of record together in order of time.
   void deliver(TimeNs until) {
     while (true) {
-      const TimeNs t = std::min({until, world_.truth_clock.due(), world_.pose_clock.due()});
+      const TimeNs t = std::min(until, next_due());
       deliver_events(t);
       if (world_.pose_clock.due() == t) deliver_pose(t);
       if (world_.truth_clock.due() == t) deliver_truth(t);
-      if (t == until && std::min(world_.truth_clock.due(), world_.pose_clock.due()) > until) break;
+      deliver_frames(t);
+      if (t == until && next_due() > until) break;
     }
     summary_.end = until;
   }
@@ -112,6 +115,22 @@ class Run {
     camera.rendering = camera.sampled().start(view(world_, index_of(camera), next->t, next->tiles));
   }
 
+  /// Lets the frame camera see what the event camera has seen.
+  void expose(CameraChannel& camera, std::span<const Segment> segments) {
+    if (!camera.frame_camera) return;
+    Stopwatch stopwatch(summary_.seconds.frames);
+    camera.frame_camera->integrate(segments, camera.sampler->watermark(), *world_.workers);
+  }
+
+  /// When the next record is due that is none of events. A frame is due when its exposure ends.
+  TimeNs next_due() const {
+    TimeNs due = std::min(world_.truth_clock.due(), world_.pose_clock.due());
+    for (const CameraChannel& camera : world_.cameras) {
+      if (camera.frame_camera) due = std::min(due, camera.frame_camera->due());
+    }
+    return due;
+  }
+
   double elapsed() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
 
   void deliver_events(TimeNs until) {
@@ -145,6 +164,17 @@ class Run {
       ++summary_.truth_frames;
     }
     world_.truth_clock.advance();
+  }
+
+  void deliver_frames(TimeNs t) {
+    for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
+      std::optional<FrameCamera>& camera = world_.cameras[i].frame_camera;
+      if (!camera || camera->due() != t) continue;
+      const CameraFrame frame = camera->take();
+      write(FrameRecord{static_cast<int>(i), frame.t, frame.exposure_start, frame.exposure, camera->options().gain,
+                        frame.numbers, camera->options().bits});
+      ++summary_.cameras[i].frames;
+    }
   }
 
   void write(const Record& record) {

@@ -15,6 +15,7 @@ struct StageSeconds {
   double render = 0;    ///< samples for the event cameras
   double sampling = 0;  ///< choosing times, reconstructing between keyframes
   double events = 0;    ///< pixels, and ordering of events
+  double frames = 0;    ///< exposing and reading out frame cameras
   double truth = 0;     ///< rendering of ground truth
   double write = 0;     ///< handing over to sinks; what they do on threads of their own does not count
 };
@@ -27,6 +28,7 @@ struct CameraSummary {
   SamplingStatistics sampling;
   std::int64_t events_on = 0, events_off = 0;
   EventCameraStatistics sensor;
+  std::int64_t frames = 0;  ///< of the frame camera
 };
 
 /// What a simulation did, for the report.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "esim/render/renderer.h"
 #include "esim/sampling/sampler.h"
 #include "esim/sensors/event_camera.h"
+#include "esim/sensors/frame_camera.h"
 #include "esim/truth/clock.h"
 
 namespace esim {
@@ -22,6 +24,7 @@ struct CameraChannel {
   Sample sample;                           // the latest evaluation; its buffers go round between renderer and sampler
   std::unique_ptr<Rendering> rendering{};  // the one that the sampler wants next, under way
   std::unique_ptr<Renderer> keyframes{};   // what the sampler asks, where its camera is denser than the sensor's
+  std::optional<FrameCamera> frame_camera{};
 
   Renderer& sampled() { return keyframes != nullptr ? *keyframes : *renderer; }
 };

@@ -5,9 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
-#include <vector>
 
+#include "esim/record/formats/png_file.h"
 #include "esim/record/number_text.h"
 
 namespace esim {
@@ -65,16 +64,8 @@ void ImagesPngWriter::write(const Record& record) {
   const auto* truth = std::get_if<TruthRecord>(&record);
   if (truth == nullptr || truth->camera != camera_) return;
 
-  // Fast compression: the images' noise-free gradients shrink well with any.
-  Image<std::uint8_t> grey = encode_srgb(truth->irradiance);
-  const cv::Mat view(grey.height(), grey.width(), CV_8UC1, grey.data());
-  std::vector<unsigned char> png;
-  cv::imencode(".png", view, png, {cv::IMWRITE_PNG_COMPRESSION, 1});
-
   const std::string name = fmt::format("{:06}.png", count_);
-  OutputFile file(folder_ / name);
-  file.append({reinterpret_cast<const char*>(png.data()), png.size()});
-  file.flush();
+  write_png(folder_ / name, encode_srgb(truth->irradiance));
 
   std::string& line = timestamps_->buffer();
   fmt::format_to(std::back_inserter(line), "{} ", count_);

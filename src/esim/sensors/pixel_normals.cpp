@@ -1,4 +1,4 @@
-#include "esim/sensors/event_normals.h"
+#include "esim/sensors/pixel_normals.h"
 
 #include "esim/sensors/vector_math.h"
 
@@ -22,7 +22,7 @@ void box_muller(D d, Words word0, Words word1, hn::Vec<D>& normal0, hn::Vec<D>& 
 
 }  // namespace
 
-void EventNormals::draw(const AddressedRandom& random, std::size_t count, const PerPixel<std::uint32_t>& pixel,
+void PixelNormals::draw(const AddressedRandom& random, std::size_t count, const PerPixel<std::uint32_t>& pixel,
                         const PerPixel<std::uint32_t>& draws) {
   random.bits(count, pixel.data(), draws.data(),
               {words_[0].data(), words_[1].data(), words_[2].data(), words_[3].data()});

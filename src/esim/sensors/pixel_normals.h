@@ -7,9 +7,9 @@
 
 namespace esim {
 
-/// Four standard normal deviates for the next event of each pixel of a block: Box-Muller on the 32-bit words of
+/// Four standard normal deviates for the next draw of each pixel of a block: Box-Muller on the 32-bit words of
 /// AddressedRandom::bits(pixel, draw), in floats. Those of a pixel do not depend on the others.
-class EventNormals {
+class PixelNormals {
  public:
   /// Draws for `count` pixels, each of which has had draws[i] before.
   void draw(const AddressedRandom& random, std::size_t count, const PerPixel<std::uint32_t>& pixel,

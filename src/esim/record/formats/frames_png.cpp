@@ -1,0 +1,44 @@
+#include "esim/record/formats/frames_png.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+
+#include "esim/record/formats/png_file.h"
+
+namespace esim {
+
+void FramesPngWriter::begin(const RecordingInfo&) {
+  std::error_code error;
+  std::filesystem::create_directories(folder_ / "frames", error);
+  if (error) throw_cannot_write(folder_ / "frames", error.message());
+  list_.emplace(folder_ / "frames.csv");
+  list_->append("index,t_ns,exposure_ns,gain\n");
+}
+
+void FramesPngWriter::write(const Record& record) {
+  const auto* frame = std::get_if<FrameRecord>(&record);
+  if (frame == nullptr || frame->camera != camera_) return;
+
+  const std::filesystem::path path = folder_ / "frames" / fmt::format("{:06}.png", count_);
+  if (frame->bits > 8) {
+    write_png(path, frame->image);
+  } else {
+    Image<std::uint8_t> narrow(frame->image.width(), frame->image.height());
+    std::transform(frame->image.pixels().begin(), frame->image.pixels().end(), narrow.pixels().begin(),
+                   [](std::uint16_t number) { return static_cast<std::uint8_t>(number); });
+    write_png(path, narrow);
+  }
+  fmt::format_to(std::back_inserter(list_->buffer()), "{},{},{},{}\n", count_, frame->t, frame->exposure_duration,
+                 frame->gain);
+  list_->flush();
+  ++count_;
+}
+
+void FramesPngWriter::end(bool) {
+  if (list_) list_->close();
+  list_.reset();
+}
+
+}  // namespace esim

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <utility>
+
+#include "esim/record/output_file.h"
+#include "esim/record/record.h"
+
+namespace esim {
+
+/// Frames of one camera as grey PNG: frames/000000.png and so on in a folder, beside frames.csv with lines
+/// `index,t_ns,exposure_ns,gain`, t_ns in the middle of the exposure. Digital numbers are written as they are, of 8
+/// bits in files of 8 bits, of more in files of 16.
+class FramesPngWriter final : public Sink {
+ public:
+  FramesPngWriter(std::filesystem::path folder, int camera) : folder_(std::move(folder)), camera_(camera) {}
+
+  void begin(const RecordingInfo& info) override;
+  void write(const Record& record) override;
+  void end(bool complete) override;
+
+ private:
+  std::filesystem::path folder_;
+  int camera_;
+  std::int64_t count_ = 0;
+  std::optional<OutputFile> list_;
+};
+
+}  // namespace esim

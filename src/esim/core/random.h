@@ -16,6 +16,8 @@ enum class Purpose : std::uint16_t {
   pixel_defects = 6,
   shot_noise = 7,
   sampling_audit = 8,
+  imu_noise = 20,
+  imu_bias = 21,
   test = 1000,
 };
 

@@ -39,6 +39,10 @@ Copy copy_of(const ImageRecord& record) {
 }
 
 Copy copy_of(const PoseRecord& record) {
+  return {[record](Sink& sink) { sink.write(record); }, sizeof record + record.objects.size() * sizeof(Kinematics)};
+}
+
+Copy copy_of(const ImuRecord& record) {
   return {[record](Sink& sink) { sink.write(record); }, sizeof record};
 }
 

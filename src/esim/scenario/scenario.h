@@ -12,6 +12,7 @@
 #include "esim/scenario/pose_options.h"
 #include "esim/scene/layer.h"
 #include "esim/sensors/event_camera.h"
+#include "esim/sensors/imu_options.h"
 
 namespace esim {
 
@@ -175,6 +176,14 @@ struct CameraOptions {
   EventCameraOptions event_camera;
 };
 
+// --- the inertial measurement unit --------------------------------------------------------------------------------
+
+/// The IMU of the rig. Where `calibration` names a file, its rate and noise come from there.
+struct RigImuOptions : ImuOptions {
+  std::filesystem::path calibration;
+  PoseOptions T_body_imu;
+};
+
 // --- what is written -----------------------------------------------------------------------------------------------
 
 struct TruthOptions {
@@ -206,6 +215,7 @@ struct Scenario {
   RendererOptions renderer;
   TrajectoryOptions trajectory;
   std::vector<CameraOptions> cameras;
+  std::optional<RigImuOptions> imu;
   TruthOptions truth;
   OutputOptions output;
 };

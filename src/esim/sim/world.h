@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "esim/render/renderer.h"
 #include "esim/sampling/sampler.h"
 #include "esim/sensors/event_camera.h"
+#include "esim/sensors/imu.h"
 #include "esim/truth/clock.h"
 
 namespace esim {
@@ -26,6 +28,13 @@ struct CameraChannel {
   Renderer& sampled() { return keyframes != nullptr ? *keyframes : *renderer; }
 };
 
+/// The rig's inertial measurement unit.
+struct ImuChannel {
+  Imu sensor;
+  SE3 T_body_imu;
+  PeriodicClock clock;
+};
+
 /// The state of a simulation. Its description is a RecordingInfo, which does not change.
 struct World {
   RecordingInfo info;
@@ -34,6 +43,7 @@ struct World {
   std::vector<std::shared_ptr<const Trajectory>> objects;  // of the scene's moving objects, in its order
   std::vector<CameraChannel> cameras;                      // as in info.cameras
   PeriodicClock truth_clock, pose_clock;
+  std::optional<ImuChannel> imu{};
 };
 
 /// Where a camera and the moving objects are at `t`; no tiles.

@@ -41,12 +41,12 @@ double allan_variance(const std::vector<double>& samples, double interval_s, std
 
 TEST(Imu, AnHourAtRestHasTheAllanDeviationsOfItsNoise) {
   ImuOptions options;
-  options.rate_hz = 250;
+  options.rate_hz = 125;
   constexpr int kSeconds = 3600;
   Imu imu(options, 0, 11);
   std::vector<double> gyroscope[3], accelerometer[3];
-  for (TimeNs k = 0; k < kSeconds * 250; ++k) {
-    const InertialSignals measured = imu.measure(k * 4 * kNsPerMs, {});
+  for (TimeNs k = 0; k < kSeconds * 125; ++k) {
+    const InertialSignals measured = imu.measure(k * 8 * kNsPerMs, {});
     for (int axis = 0; axis < 3; ++axis) {
       gyroscope[axis].push_back(measured.angular_rate[axis]);
       accelerometer[axis].push_back(measured.specific_force[axis]);
@@ -54,22 +54,22 @@ TEST(Imu, AnHourAtRestHasTheAllanDeviationsOfItsNoise) {
   }
   const auto deviation = [&](const std::vector<double>(&axes)[3], std::size_t tau_s) {
     double variance = 0;
-    for (const auto& samples : axes) variance += allan_variance(samples, 0.004, 250 * tau_s) / 3;
+    for (const auto& samples : axes) variance += allan_variance(samples, 0.008, 125 * tau_s) / 3;
     return std::sqrt(variance);
   };
   // White noise N and a random walk K: N²/tau + K² tau/3, of which the first rules at 1 s and the second at 60 s.
   const auto expected = [](const InertialAxesOptions& axes, double tau_s) {
     return std::sqrt(axes.noise_density * axes.noise_density / tau_s + axes.random_walk * axes.random_walk * tau_s / 3);
   };
-  const auto expect = [&](const std::vector<double>(&axes)[3], const InertialAxesOptions& options) {
+  const auto expect = [&](const std::vector<double>(&axes)[3], const InertialAxesOptions& sensor) {
     const double at_1_s = deviation(axes, 1);
-    EXPECT_NEAR(at_1_s / options.noise_density, 1, 0.03);
-    EXPECT_NEAR(at_1_s / expected(options, 1), 1, 0.02);
+    EXPECT_NEAR(at_1_s / sensor.noise_density, 1, 0.03);
+    EXPECT_NEAR(at_1_s / expected(sensor, 1), 1, 0.02);
     for (const std::size_t tau_s : {30U, 60U}) {
       const auto tau = static_cast<double>(tau_s);
       const double at_tau = deviation(axes, tau_s);
-      EXPECT_NEAR(at_tau / (options.random_walk * std::sqrt(tau / 3)), 1, 0.15) << tau;
-      EXPECT_NEAR(at_tau / expected(options, tau), 1, 0.12) << tau;
+      EXPECT_NEAR(at_tau / (sensor.random_walk * std::sqrt(tau / 3)), 1, 0.15) << tau;
+      EXPECT_NEAR(at_tau / expected(sensor, tau), 1, 0.12) << tau;
     }
   };
   expect(gyroscope, options.gyroscope);

@@ -59,17 +59,17 @@ struct InertialState {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
 };
 
-/// Integrates what an IMU at `T_body_imu` feels on a trajectory from its start, for `duration_s`, by the fourth-order
-/// scheme of Runge and Kutta, each step using the measurements at its ends and in its middle.
+/// Integrates what an IMU at `T_body_imu` measures at `rate_hz` on a trajectory from its start, for `duration_s`, by
+/// the fourth-order scheme of Runge and Kutta, each step using the measurements at its ends and in its middle.
 InertialState integrate(const Trajectory& trajectory, const SE3& T_body_imu, double duration_s, double rate_hz) {
-  const auto felt = [&](int half_step) {
-    const TimeNs t = trajectory.start() + to_ns(half_step / (2 * rate_hz));
+  const auto felt = [&](int measurement) {
+    const TimeNs t = trajectory.start() + to_ns(measurement / rate_hz);
     return inertial_signals(trajectory.at(t), T_body_imu, kGravity);
   };
   const Kinematics first = rigidly_attached(trajectory.at(trajectory.start()), T_body_imu);
   InertialState state{first.T_world_body, first.velocity_world};
-  const double h = 1 / rate_hz;
-  for (int k = 0; k < static_cast<int>(duration_s * rate_hz); ++k) {
+  const double h = 2 / rate_hz;
+  for (int k = 0; k < static_cast<int>(duration_s * rate_hz / 2); ++k) {
     const InertialSignals a = felt(2 * k), b = felt(2 * k + 1), c = felt(2 * k + 2);
     // The rotation vector θ since the step's beginning obeys θ' = Jr⁻¹(θ) ω.
     const auto rate = [](const Eigen::Vector3d& theta, const InertialSignals& s) {

@@ -124,6 +124,12 @@ TEST_F(ImuSimulation, MeasuresTheRigsMotionAtItsOwnRate) {
   EXPECT_EQ(out.poses[50].body.alpha_body, trajectory_->at(out.poses[50].t).alpha_body);
 }
 
+TEST_F(ImuSimulation, MeasuresOnceAtARateBeyondTheRangeOfTimes) {
+  scenario_.imu->rate_hz = 1e-12;
+  Logbook out;
+  EXPECT_EQ(run(out).imu_samples, 1);
+}
+
 TEST_F(ImuSimulation, IsTheSameWithAnyNumberOfThreadsAndChangesNoEvent) {
   Logbook one, two, without;
   run(one, 1);

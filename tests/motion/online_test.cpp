@@ -112,6 +112,7 @@ TEST(OnlineErrors, RefusesWhatIsNoMotion) {
   EXPECT_TRUE(contains(message({}, {Eigen::Quaterniond(2, 0, 0, 0), {0, 0, 0}}), "unit norm"));
   EXPECT_TRUE(contains(message({}, {Eigen::Quaterniond(0, 1, 0, 0), {0, 0, 0}}), "180 deg"));
   EXPECT_EQ(message({}, {}), "nothing was thrown");
+  EXPECT_THROW(OnlineTrajectory({}, {Eigen::Quaterniond::Identity(), {kNan, 0, 0}}), UserError);
 }
 
 }  // namespace

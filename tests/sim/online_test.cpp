@@ -128,6 +128,23 @@ TEST_P(OnlineSimulation, EndsEarlyAsInterrupted) {
   EXPECT_LE(summary.end, motion->final_until());
 }
 
+TEST_P(OnlineSimulation, WaitsForAStartThatComesLater) {
+  scenario_.start_s = 0.1;
+  scenario_.duration_s = 0.1;
+  auto motion = std::make_shared<OnlineTrajectory>(OnlineMotionOptions{.interval = kInterval}, pose(0));
+  World world = build_world(scenario_, motion, 1, kQuiet);
+  Logbook out;
+  Simulator simulator(world, out);
+  for (int k = 1; k <= 20; ++k) {
+    motion->push(pose(k));
+    EXPECT_TRUE(simulator.advance_until(motion->final_until(), kOn));
+    EXPECT_EQ(out.imu.empty(), k < 10);
+  }
+  EXPECT_TRUE(simulator.finish().complete);
+  EXPECT_EQ(out.imu.front().t, 100 * kNsPerMs);
+  EXPECT_EQ(out.imu.back().t, 200 * kNsPerMs);
+}
+
 TEST_P(OnlineSimulation, NeedsADuration) {
   scenario_.duration_s.reset();
   const auto motion = std::make_shared<OnlineTrajectory>(OnlineMotionOptions{}, pose(0));

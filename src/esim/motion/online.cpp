@@ -21,18 +21,21 @@ OnlineMotionOptions checked(const OnlineMotionOptions& options) {
   return options;
 }
 
+const SE3& checked(const SE3& pose) {
+  if (!pose.translation.allFinite() || !(std::abs(pose.rotation.norm() - 1) < 1e-6))
+    throw UserError("online motion: a pose is not finite, or its quaternion has not unit norm");
+  return pose;
+}
+
 }  // namespace
 
 OnlineTrajectory::OnlineTrajectory(const OnlineMotionOptions& options, const SE3& T_world_body)
-    : options_(checked(options)), controls_(static_cast<std::size_t>(options.order - 1), T_world_body) {}
+    : options_(checked(options)), controls_(static_cast<std::size_t>(options.order - 1), checked(T_world_body)) {}
 
 void OnlineTrajectory::push(const SE3& T_world_body) {
   constexpr double kLargestTurn_rad = 0.999 * std::numbers::pi;
-  const Eigen::Quaterniond& rotation = T_world_body.rotation;
-  if (!T_world_body.translation.allFinite() || !(std::abs(rotation.norm() - 1) < 1e-6))
-    throw UserError("online motion: a pushed pose is not finite, or its quaternion has not unit norm");
   const SE3& last = controls_.back();
-  if (so3_log((last.rotation.conjugate() * rotation).normalized()).norm() > kLargestTurn_rad)
+  if (so3_log((last.rotation.conjugate() * checked(T_world_body).rotation).normalized()).norm() > kLargestTurn_rad)
     throw UserError("online motion: the body turns by 180 deg from one pushed pose to the next; push more often");
   velocity_ = (T_world_body.translation - last.translation) / to_seconds(options_.interval);
   controls_.push_back(T_world_body);

@@ -25,7 +25,8 @@ struct OnlineMotionOptions {
 /// Pushing must not run concurrently with at().
 class OnlineTrajectory final : public Trajectory {
  public:
-  /// Throws UserError for an interval that is not positive, and an order other than 4 and 6.
+  /// Throws UserError for an interval that is not positive, an order other than 4 and 6, and a pose that push()
+  /// refuses.
   OnlineTrajectory(const OnlineMotionOptions& options, const SE3& T_world_body);
 
   /// The pose at newest() + interval. Throws UserError unless it is finite with a rotation of unit norm, by less than

@@ -34,7 +34,8 @@ TimeNs watermark(const World& world) {
 /// One run of a world: what it does with each piece of time, and the account of it.
 class Simulator::Run {
  public:
-  Run(World& world, Sink& out) : world_(world), out_(out), known_until_(world.info.start) {
+  Run(World& world, Sink& out)
+      : world_(world), out_(out), known_until_(std::min(world.info.start, world.trajectory->end())) {
     summary_.start = summary_.end = world.info.start;
     for (std::size_t i = 0; i < world.cameras.size(); ++i) {
       const CameraInfo& info = world.info.cameras[i];

@@ -5,6 +5,7 @@
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
 #include "esim/motion/imu_kinematics.h"
+#include "esim/record/formats/kalibr.h"
 #include "esim/scenario/calibration.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
@@ -171,6 +172,22 @@ TEST_F(ImuSimulation, RecordingsHoldCalibrationsThatReadBackToTheSameRig) {
   EXPECT_EQ(imu.accelerometer.random_walk, scenario_.imu->accelerometer.random_walk);
   EXPECT_TRUE(std::filesystem::exists(folder_.path() / "out/imu.csv"));
   EXPECT_TRUE(std::filesystem::exists(folder_.path() / "out/states.csv"));
+}
+
+TEST_F(ImuSimulation, CalibrationsHoldEveryDistortion) {
+  World world = build_world(scenario_, 1, kQuiet);
+  Camera& model = world.info.cameras[0].model;
+  const auto read_back = [&](const Distortion& distortion) {
+    model.distortion = distortion;
+    const auto file = folder_.write("camchain.yaml", kalibr_camchain(world.info));
+    return read_calibration(file)[0].model.distortion;
+  };
+  EXPECT_TRUE(std::holds_alternative<NoDistortion>(read_back(NoDistortion{})));
+  const auto radial = std::get<RadialTangential>(read_back(RadialTangential{-0.1, 0.01, 1e-3, 2e-3, 1.0 / 3000}));
+  EXPECT_EQ(radial.p1, 1e-3);
+  EXPECT_EQ(radial.k3, 1.0 / 3000);
+  EXPECT_EQ(std::get<Equidistant>(read_back(Equidistant{-0.1, 0.01, 0.002, 0.1 / 3})).k4, 0.1 / 3);
+  EXPECT_EQ(std::get<Fov>(read_back(Fov{0.93})).w, 0.93);
 }
 
 TEST_F(ImuSimulation, WithoutAnImuTheFirstCameraIsTheReference) {

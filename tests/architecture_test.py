@@ -23,7 +23,7 @@ ALLOWED = {
     "backends": "core geometry motion scene render",
     "reproject": "core geometry motion render",
     "sampling": "core geometry render reproject",
-    "sensors": "core events render",
+    "sensors": "core events geometry render",
     "record": "core events geometry",
     "stats": "core events record",
     "truth": "core",

@@ -19,6 +19,7 @@ int run(const std::string& file, const std::vector<std::string>& overrides) {
                camera.model.height, camera.model.fx, camera.model.fy, world.cameras[i].renderer->traits().label(),
                std::visit([](const auto& sampling) { return sampling.kType; }, scenario.cameras[i].sampling));
   }
+  if (world.info.imu) fmt::print("imu: {} Hz\n", world.info.imu->rate_hz);
   fmt::print("duration: {:.3f} s\n{}: ready to simulate\n", to_seconds(world.info.end - world.info.start), file);
   return kOk;
 }

@@ -7,6 +7,7 @@ import json
 import os
 import pathlib
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -44,8 +45,8 @@ class Recordings(Cli):
         result = self.simulate(*FAST, "--set", "output.events_txt=true")
         self.assertEqual(result.returncode, 0, result.stderr)
         names = {p.name for p in self.out.iterdir()}
-        self.assertEqual(names, {"events.h5", "events.txt", "images", "poses.txt", "preview.mp4", "preview.png",
-                                 "report.json", "scenario.yaml", "truth.h5"})
+        self.assertEqual(names, {"calibration", "events.h5", "events.txt", "images", "poses.txt", "preview.mp4", "preview.png",
+                                 "report.json", "scenario.yaml", "states.csv", "truth.h5"})
         report = json.loads((self.out / "report.json").read_text())
         self.assertEqual(report["status"], "complete")
         self.assertAlmostEqual(report["simulated_s"], 0.2, places=9)
@@ -75,6 +76,23 @@ class Recordings(Cli):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertTrue((self.out / "cam0" / "events.h5").exists() and (self.out / "right" / "preview.png").exists())
         self.assertIn("right", run("info", self.out).stdout)
+
+    def test_an_imu_is_written_the_same_again_from_the_resolved_scenario(self):
+        imu = ["--set", "imu={rate_hz: 400, T_body_imu: {position: [0.1, 0, 0]}, gyroscope: {random_walk: 0.1}}"]
+        self.assertEqual(self.simulate(*FAST, *imu, "--threads", "1").returncode, 0)
+        rows = [line.split(",") for line in (self.out / "imu.csv").read_text().splitlines()]
+        self.assertEqual(rows[0][0], "#timestamp [ns]")
+        self.assertEqual([int(row[0]) for row in rows[1:]], [2_500_000 * k for k in range(81)])
+        self.assertTrue(all(len(row) == 7 for row in rows))
+        self.assertEqual(json.loads((self.out / "report.json").read_text())["imu_samples"], 81)
+        self.assertIn("update_rate: 400", (self.out / "calibration" / "imu.yaml").read_text())
+        again = self.folder / "again"
+        self.assertEqual(run("simulate", self.out / "scenario.yaml", "--out", again, "--threads", "2").returncode, 0)
+        for name in ("imu.csv", "imu_truth.csv", "states.csv", "events.h5", "calibration/camchain.yaml"):
+            self.assertEqual((again / name).read_bytes(), (self.out / name).read_bytes(), name)
+        self.assertIn("imu: 400 Hz", run("check", self.out / "scenario.yaml").stdout)
+        shutil.rmtree(self.out)
+        self.assert_refused(self.simulate(*FAST, "--set", "imu.rate_hz=2e9"), "imu.rate_hz", "out of range")
 
     def test_quiet_says_nothing(self):
         result = self.simulate(*FAST, "--quiet")

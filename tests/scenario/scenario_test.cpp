@@ -291,6 +291,103 @@ TEST(Calibration, RefusesWhatItCannotHold) {
   EXPECT_TRUE(contains(test::message_of<UserError>([] { read_calibration("/no/such.yaml"); }), "no such file"));
 }
 
+TEST(Calibration, RefusesHostileNumbersNamingTheCameraAndTheKey) {
+  const test::TemporaryDirectory folder;
+  const auto message = [&](std::string from, const std::string& to) {
+    std::string text = kCamchain;
+    text.replace(text.find(from), from.size(), to);
+    std::ofstream(folder.path() / "chain.yaml") << text;
+    return test::message_of<UserError>([&] { read_calibration(folder.path() / "chain.yaml"); });
+  };
+  const auto names = [](const std::string& text, const std::string& camera, const std::string& key) {
+    return text.find("chain.yaml: " + camera + ": ") != std::string::npos && text.find(key) != std::string::npos;
+  };
+  EXPECT_PRED3(names, message("235.9", "-235.9"), "cam0", "fx is -235.9 px; it must be positive");
+  EXPECT_PRED3(names, message("130.1", ".inf"), "cam0", "cy");
+  EXPECT_PRED3(names, message("231", ".nan"), "cam1", "fy");
+  EXPECT_PRED3(names, message("-0.3, 0.1", ".nan, 0.1"), "cam1", "k1");
+  EXPECT_PRED3(names, message("-0.3, 0.1, 0.001, 0.002", "-0.3, 0.1"), "cam1", "distortion_coeffs needs 4 numbers");
+  EXPECT_PRED3(names, message("distortion_coeffs: [-0.1, 0.01, 0.0, 0.0]", "x: 1"), "cam0", "distortion_coeffs");
+  for (const char* size : {"[-346, 260]", "[346.5, 260]", "[1e9, 260]", "[.nan, 260]", "[0, 260]"})
+    EXPECT_PRED3(names, message("[346, 260]", size), "cam0", "the image's size");
+  EXPECT_PRED3(names, message("[1, 0, 0, -0.11]", "[-1, 0, 0, -0.11]"), "cam1", "T_cn_cnm1: pose matrix");
+  EXPECT_PRED3(names, message("[1, 0, 0, -0.11]", "[.nan, 0, 0, -0.11]"), "cam1", "T_cn_cnm1: pose matrix");
+  EXPECT_PRED3(names, message("[0, 1, 0, 0.1]", "[0, 1, 0, .inf]"), "cam0", "T_cam_imu: pose matrix");
+  EXPECT_PRED3(names, message("  T_cam_imu", "  timeshift_cam_imu: -8.1e-05\n  T_cam_imu"), "cam0",
+               "timeshift_cam_imu is -8.1e-05 s, but all simulated sensors share one clock; set it to 0");
+  EXPECT_EQ(message("  T_cam_imu", "  timeshift_cam_imu: 0.0\n  T_cam_imu"), "nothing was thrown");
+}
+
+constexpr const char* kImuYaml = R"(
+accelerometer_noise_density: 0.006
+accelerometer_random_walk: 0.0002
+gyroscope_noise_density: 0.0004
+gyroscope_random_walk: 4.0e-06
+rostopic: /imu0
+update_rate: 200.0
+)";
+
+TEST(Calibration, ReadsKalibrsImu) {
+  const test::TemporaryDirectory folder;
+  std::string nested = "imu0:\n  T_i_b: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
+  nested += "  model: calibrated\n  time_offset: 0.0\n";
+  std::istringstream lines(kImuYaml);
+  for (std::string line; std::getline(lines, line);) nested += "  " + line + "\n";
+  for (const std::string& text : {std::string(kImuYaml), nested}) {
+    const ImuOptions imu = read_imu_calibration(folder.write("imu.yaml", text));
+    EXPECT_EQ(imu.rate_hz, 200);
+    EXPECT_EQ(imu.gyroscope.noise_density, 0.0004);
+    EXPECT_EQ(imu.gyroscope.random_walk, 4e-6);
+    EXPECT_EQ(imu.accelerometer.noise_density, 0.006);
+    EXPECT_EQ(imu.accelerometer.random_walk, 0.0002);
+  }
+  const auto message = [&](const std::string& text) {
+    return test::message_of<UserError>([&] { read_imu_calibration(folder.write("imu.yaml", text)); });
+  };
+  const std::string yaml = kImuYaml;
+  EXPECT_TRUE(contains(message(""), "imu.yaml: is no imu.yaml"));
+  EXPECT_TRUE(contains(message("update_rate: 200\n"), "imu.yaml: imu0: gyroscope_noise_density is missing"));
+  EXPECT_TRUE(contains(message(yaml + "time_offset: 0.01\n"), "imu0: time_offset is 0.01 s"));
+  EXPECT_TRUE(contains(message(yaml + "model: scale-misalignment\n"), "'scale-misalignment' is not supported"));
+  EXPECT_TRUE(contains(message(yaml + "imu1: {}\n"), "there is an imu1 as well"));
+  EXPECT_TRUE(contains(message(yaml + "T_i_b: [1, 0, 0, 0]\n"), "T_i_b needs 16 numbers and has 4"));
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string text = yaml;
+    text.replace(text.find(from), from.size(), to);
+    return message(text);
+  };
+  EXPECT_TRUE(contains(changed("0.0004", "-0.0004"), "gyroscope_noise_density is -0.0004; it must be from 0"));
+  EXPECT_TRUE(contains(changed("0.006", ".nan"), "accelerometer_noise_density is nan"));
+  EXPECT_TRUE(contains(changed("200.0", "2e9"), "update_rate is 2000000000; it must be from 0 to 1000000000"));
+  EXPECT_TRUE(contains(changed("200.0", "0"), "update_rate is 0 Hz; it must be positive"));
+  EXPECT_TRUE(contains(changed("200.0", "fast"), "update_rate has the wrong type"));
+}
+
+TEST_F(ScenarioFile, DescribesAnImuWhereThereIsOne) {
+  EXPECT_FALSE(read(kMinimal).imu);
+  EXPECT_TRUE(read(std::string(kMinimal) + "imu: {}\n").imu);
+  folder_.write("imu.yaml", kImuYaml);
+  const std::string yaml = std::string(kMinimal) +
+                           "imu: {calibration: imu.yaml, T_body_imu: {position: [0.1, 0, 0]}, "
+                           "gyroscope: {misalignment: [0, 0, 0.01, 0, 0, 0], range: 8.7}}\n";
+  const Scenario scenario = read(yaml);
+  EXPECT_EQ(scenario.imu->rate_hz, 200);
+  EXPECT_EQ(scenario.imu->accelerometer.noise_density, 0.006);
+  EXPECT_EQ(scenario.imu->gyroscope.misalignment[2], 0.01);
+  EXPECT_EQ(scenario.imu->gyroscope.range, 8.7);
+  EXPECT_EQ(scenario.imu->T_body_imu.position.x(), 0.1);
+  EXPECT_EQ(write_scenario(read(write_scenario(scenario))), write_scenario(scenario));
+  EXPECT_EQ(read(write_scenario(scenario)).imu->gyroscope.random_walk, 4e-6);
+
+  EXPECT_TRUE(contains(error(yaml, {"imu.rate_hz=100"}), "imu.rate_hz: is given by the calibration file as well"));
+  EXPECT_TRUE(contains(error(yaml, {"imu.gyroscope.noise_density=0"}), "imu.gyroscope.noise_density: is given"));
+  const auto imu = [&](const std::string& text) { return error(std::string(kMinimal) + "imu: {" + text + "}\n"); };
+  EXPECT_TRUE(contains(imu("rate_hz: 1.1e9"), "imu.rate_hz: 1.1e9 is out of range"));
+  EXPECT_TRUE(contains(imu("accelerometer: {random_walk: -1}"), "imu.accelerometer.random_walk: -1 is out of range"));
+  EXPECT_TRUE(contains(imu("gyroscope: {misalignment: [1]}"), "must be a list of 6 numbers"));
+  EXPECT_TRUE(contains(imu("acelerometer: {}"), "did you mean accelerometer?"));
+}
+
 TEST(Suggest, FindsTheNearestWord) {
   EXPECT_EQ(nearest("lamda", {"lambda", "rate_hz"}), "lambda");
   EXPECT_EQ(nearest("rate", {"lambda", "pose_rate_hz", "rate_hz"}), "rate_hz");

@@ -14,15 +14,18 @@ namespace {
 /// Counts events and keeps the motion field of the last ground truth.
 class Counter final : public Sink {
  public:
-  void begin(const RecordingInfo&) override {}
+  void begin(const RecordingInfo& recording) override { info = recording; }
   void write(const Record& record) override {
     if (const auto* part = std::get_if<EventsRecord>(&record))
       events.insert(events.end(), part->events.begin(), part->events.end());
     if (const auto* truth = std::get_if<TruthRecord>(&record)) flow_x = truth->flow_x;
+    if (const auto* pose = std::get_if<PoseRecord>(&record)) poses.push_back(*pose);
   }
   void end(bool) override {}
 
+  RecordingInfo info;
   std::vector<Event> events;
+  std::vector<PoseRecord> poses;
   Image<float> flow_x;
 };
 
@@ -92,6 +95,19 @@ TEST_F(MovingObjects, FireEventsBeforeACameraAtRestAndDriveItsSampling) {
   Counter nothing;
   EXPECT_LT(run(nothing).cameras[0].sampling.samples, summary.cameras[0].sampling.samples / 2);
   EXPECT_EQ(nothing.events.size(), 0U);
+}
+
+TEST_F(MovingObjects, AreInTheRecordWithTheirMotion) {
+  Counter out;
+  run(out);
+  EXPECT_EQ(out.info.objects, std::vector<std::string>{"card"});
+  ASSERT_EQ(out.poses.size(), 201U);
+  for (const PoseRecord& pose : out.poses) {
+    ASSERT_EQ(pose.objects.size(), 1U);
+    const double y = -1 + 2 * to_seconds(pose.t);
+    EXPECT_LT((pose.objects[0].T_world_body.translation - Eigen::Vector3d(-1, y, 0)).norm(), 1e-6);
+    EXPECT_LT((pose.objects[0].velocity_world - Eigen::Vector3d(0, 2, 0)).norm(), 1e-4);
+  }
 }
 
 TEST_F(MovingObjects, AreTheSameWithAnyNumberOfThreads) {

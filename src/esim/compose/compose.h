@@ -30,6 +30,11 @@ struct Notices {
 /// repair.
 World build_world(const Scenario& scenario, int threads, const Notices& notices);
 
+/// The same for a body that moves as `body`, of which only the beginning may be known yet, whatever the scenario's
+/// trajectory. The scenario needs a duration_s.
+World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> body, int threads,
+                  const Notices& notices);
+
 /// What the scene files of a renderer hold: a mesh renderer's scene with all its objects, those that the scenario lists
 /// after the scene file's own. Empty for renderers without scene files. Notes say what was found.
 SceneFile load_scenes(const RendererOptions& options, const Notices& notices);

@@ -62,6 +62,7 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
         {"write", s.write},
         {"other", other}}},
       {"truth_frames", summary.truth_frames},
+      {"imu_samples", summary.imu_samples},
       {"cameras", cameras},
       {"notices", notices},
   };

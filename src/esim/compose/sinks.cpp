@@ -5,7 +5,10 @@
 #include "esim/record/formats/events_text.h"
 #include "esim/record/formats/frames_png.h"
 #include "esim/record/formats/images_png.h"
+#include "esim/record/formats/imu_csv.h"
+#include "esim/record/formats/kalibr.h"
 #include "esim/record/formats/poses_tum.h"
+#include "esim/record/formats/states_csv.h"
 #include "esim/record/formats/truth_hdf5.h"
 #include "esim/record/preview/preview_writer.h"
 
@@ -32,7 +35,12 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
   const TimeUnit unit = output.time_unit == EventTimeUnit::us ? TimeUnit::us : TimeUnit::ns;
 
   auto sinks = std::make_unique<FanOut>();
-  if (truth.pose_rate_hz > 0) sinks->add(std::make_unique<PosesTumWriter>(folder / "poses.txt"));
+  sinks->add(std::make_unique<KalibrWriter>(folder / "calibration"));
+  if (scenario.imu) sinks->add(std::make_unique<ImuCsvWriter>(folder));
+  if (truth.pose_rate_hz > 0) {
+    sinks->add(std::make_unique<PosesTumWriter>(folder / "poses.txt"));
+    sinks->add(std::make_unique<StatesCsvWriter>(folder));
+  }
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
     const int camera = static_cast<int>(i);
     const auto place = scenario.cameras.size() == 1 ? folder : folder / scenario.cameras[i].name;

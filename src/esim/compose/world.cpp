@@ -64,6 +64,26 @@ FrameCamera build_frame_camera(const CameraOptions& options, const Camera& model
   }
 }
 
+SE3 pose_named(const std::string& key, const PoseOptions& options) {
+  try {
+    return pose_of(options);
+  } catch (const UserError& error) {
+    throw UserError(fmt::format("{}: {}", key, error.what()));
+  }
+}
+
+void add_imu(const RigImuOptions& options, std::uint64_t seed, World& world) {
+  const SE3 T_body_imu = pose_named("imu.T_body_imu", options.T_body_imu);
+  const TimeSpan span{world.info.start, world.info.end};
+  world.imu = {Imu(options, span.start, seed), T_body_imu, PeriodicClock(span.start, span.end, options.rate_hz)};
+  world.info.imu = {T_body_imu,
+                    options.rate_hz,
+                    options.gyroscope.noise_density,
+                    options.gyroscope.random_walk,
+                    options.accelerometer.noise_density,
+                    options.accelerometer.random_walk};
+}
+
 /// The views of a camera; outlives the world.
 std::function<RenderRequest(TimeNs)> view_at(const World& world, std::size_t camera) {
   return [trajectory = world.trajectory, objects = world.objects,
@@ -91,14 +111,16 @@ void name_what_has_no_effect(const Scenario& scenario, const World& world, std::
   }
 }
 
-/// Looks through a camera at a few times: one that never sees anything is a mistake of poses or frames.
+/// Looks through a camera at a few times while its motion is known: one that never sees anything is a mistake of poses
+/// or frames.
 void require_a_view(const World& world, std::size_t index) {
   constexpr int kLooks = 9;
   if (world.cameras[index].renderer->traits().at_infinity) return;
   const CameraInfo& info = world.info.cameras[index];
   Sample sample;
   for (int i = 0; i < kLooks; ++i) {
-    const TimeNs t = world.info.start + (world.info.end - world.info.start) / (kLooks - 1) * i;
+    const TimeNs t =
+        std::min(world.info.start + (world.info.end - world.info.start) / (kLooks - 1) * i, world.trajectory->end());
     world.cameras[index].renderer->render(view(world, index, t), sample);
     if (sees_something(sample)) return;
   }
@@ -109,14 +131,11 @@ void require_a_view(const World& world, std::size_t index) {
                   info.name, position.x(), position.y(), position.z()));
 }
 
-}  // namespace
-
-World build_world(const Scenario& scenario, int threads, const Notices& notices) {
+World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<const Trajectory> body,
+            const TimeSpan& span, int threads, const Notices& notices) {
   World world;
   world.workers = std::make_unique<const Workers>(threads);
-  const SceneFile scene = load_scenes(scenario.renderer, notices);
-  world.trajectory = build_trajectory(scenario, scene, notices);
-  const TimeSpan span = simulated_span(scenario, *world.trajectory);
+  world.trajectory = std::move(body);
   world.objects = build_object_trajectories(scenario, scene, *world.trajectory, span, notices);
   world.info.start = span.start;
   world.info.end = span.end;
@@ -124,12 +143,19 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices)
   world.truth_clock = PeriodicClock(span.start, span.end, scenario.truth.rate_hz);
   world.pose_clock = PeriodicClock(span.start, span.end, scenario.truth.pose_rate_hz);
 
+  if (scenario.imu) add_imu(*scenario.imu, scenario.seed, world);
+  for (const SceneObject& object : scene.scene.objects) {
+    if (object.moves) world.info.objects.push_back(object.name);
+  }
+
   const SceneCamera* const followed = followed_camera(scenario, scene);
   for (CameraOptions options : scenario.cameras) {
     check_sampling(options, notices);
     if (followed != nullptr && followed->horizontal_fov_rad && !options.horizontal_fov_deg)
       options.horizontal_fov_deg = *followed->horizontal_fov_rad * 180.0 / std::numbers::pi;
-    world.info.cameras.push_back({options.name, camera_model(options), pose_of(options.T_body_camera)});
+    world.info.cameras.push_back(
+        {options.name, camera_model(options),
+         pose_named(fmt::format("camera {}: T_body_camera", options.name), options.T_body_camera)});
   }
   const RendererFactory make_renderer = build_renderer_factory(scenario.renderer, scene);
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
@@ -157,6 +183,23 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices)
     name_what_has_no_effect(scenario, world, i, notices);
   }
   return world;
+}
+
+}  // namespace
+
+World build_world(const Scenario& scenario, int threads, const Notices& notices) {
+  const SceneFile scene = load_scenes(scenario.renderer, notices);
+  auto trajectory = build_trajectory(scenario, scene, notices);
+  const TimeSpan span = simulated_span(scenario, *trajectory);
+  return build(scenario, scene, std::move(trajectory), span, threads, notices);
+}
+
+World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> body, int threads,
+                  const Notices& notices) {
+  if (!scenario.duration_s) throw UserError("duration_s: is missing; a motion that goes on has no end of its own");
+  const TimeNs start = body->start() + to_ns(scenario.start_s);
+  const TimeSpan span{start, start + to_ns(*scenario.duration_s)};
+  return build(scenario, load_scenes(scenario.renderer, notices), std::move(body), span, threads, notices);
 }
 
 }  // namespace esim

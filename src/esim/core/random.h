@@ -17,6 +17,8 @@ enum class Purpose : std::uint16_t {
   shot_noise = 7,
   sampling_audit = 8,
   frame_noise = 16,
+  imu_noise = 20,
+  imu_bias = 21,
   test = 1000,
 };
 

@@ -48,6 +48,10 @@ Copy copy_of(const FrameRecord& record) {
 }
 
 Copy copy_of(const PoseRecord& record) {
+  return {[record](Sink& sink) { sink.write(record); }, sizeof record + record.objects.size() * sizeof(Kinematics)};
+}
+
+Copy copy_of(const ImuRecord& record) {
   return {[record](Sink& sink) { sink.write(record); }, sizeof record};
 }
 

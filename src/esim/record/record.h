@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
@@ -10,6 +11,7 @@
 #include "esim/core/time.h"
 #include "esim/events/event.h"
 #include "esim/geometry/camera.h"
+#include "esim/geometry/kinematics.h"
 #include "esim/geometry/se3.h"
 
 namespace esim {
@@ -21,12 +23,24 @@ struct CameraInfo {
   SE3 T_body_camera;  ///< pose of the camera in the body frame
 };
 
+/// The inertial measurement unit of the recording. Densities are continuous-time.
+struct ImuInfo {
+  SE3 T_body_imu;  ///< pose of the IMU in the body frame
+  double rate_hz = 0;
+  double gyroscope_noise_density = 0;      ///< rad/s/sqrt(Hz)
+  double gyroscope_random_walk = 0;        ///< rad/s²/sqrt(Hz)
+  double accelerometer_noise_density = 0;  ///< m/s²/sqrt(Hz)
+  double accelerometer_random_walk = 0;    ///< m/s³/sqrt(Hz)
+};
+
 /// What is true of a recording from its start to its end.
 struct RecordingInfo {
   std::vector<CameraInfo> cameras;
   TimeNs start = 0;          ///< time of the first sample
   TimeNs end = 0;            ///< time of the last sample, if the recording becomes complete
   double truth_rate_hz = 0;  ///< frames of ground truth, or of a video, per second; 0: none
+  std::optional<ImuInfo> imu{};
+  std::vector<std::string> objects{};  ///< names of the moving objects
 };
 
 /// Events of one camera, in order, none at or before what the same camera reported earlier.
@@ -65,12 +79,22 @@ struct FrameRecord {
 };
 
 /// Pose of the body.
+/// Where the body and the moving objects are, and how they move.
 struct PoseRecord {
   TimeNs t = 0;
-  SE3 T_world_body;
+  Kinematics body{};
+  std::vector<Kinematics> objects{};          ///< as in RecordingInfo::objects
+  std::optional<InertialSignals> imu_bias{};  ///< where there is an IMU
 };
 
-using Record = std::variant<EventsRecord, TruthRecord, ImageRecord, FrameRecord, PoseRecord>;
+
+/// One measurement of the inertial measurement unit, and the biases in it.
+struct ImuRecord {
+  TimeNs t = 0;
+  InertialSignals measured{}, bias{};
+};
+
+using Record = std::variant<EventsRecord, TruthRecord, ImageRecord, FrameRecord, PoseRecord, ImuRecord>;
 
 /// Where a simulation goes: one class per format, each taking the kinds of record that it can hold.
 /// Calls come from one thread: begin, then write in time order per camera, then end.

@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include <cmath>
+
 #include "esim/core/error.h"
 
 namespace esim {
 namespace {
 
-/// One camera's part of a file, for reading and for messages.
+/// One sensor's part of a file, for reading and for messages.
 struct Section {
   const std::filesystem::path& file;
   std::string name;
@@ -30,6 +32,13 @@ struct Section {
       return at(key).as<T>();
     } catch (const YAML::Exception&) {
       fail(fmt::format("{} has the wrong type", key));
+    }
+  }
+
+  /// A time difference that must be nothing, or absent.
+  void require_no_shift(const char* key) const {
+    if (node[key].IsDefined() && as<double>(key) != 0) {
+      fail(fmt::format("{} is {} s, but all simulated sensors share one clock; set it to 0", key, as<double>(key)));
     }
   }
 
@@ -81,11 +90,18 @@ Distortion distortion_of(const Section& camera, const std::string& model, const 
       "distortion model '{}' is not supported; use none, radial-tangential (radtan), equidistant or fov", model));
 }
 
-Camera camera_of(const Section& camera, const std::string& projection, int width, int height,
+Camera camera_of(const Section& camera, const std::string& projection, double width, double height,
                  const YAML::Node& intrinsics, const char* intrinsics_key, const Distortion& distortion) {
+  const auto side = [&](double pixels) {
+    constexpr double kMaxSide = 16384;
+    if (!(pixels >= 1 && pixels <= kMaxSide) || pixels != std::floor(pixels))
+      camera.fail(
+          fmt::format("the image's size is {} x {} px; it must be whole numbers up to {}", width, height, kMaxSide));
+    return static_cast<int>(pixels);
+  };
   if (projection != "pinhole") camera.fail(fmt::format("camera model '{}' is not supported; use pinhole", projection));
   const auto f = camera.numbers(intrinsics, intrinsics_key, 4);
-  Camera model{width, height, f[0], f[1], f[2], f[3], distortion};
+  Camera model{side(width), side(height), f[0], f[1], f[2], f[3], distortion};
   try {
     model.validate();
   } catch (const UserError& error) {
@@ -105,8 +121,8 @@ std::vector<CalibratedCamera> read_rig(const YAML::Node& root, const std::filesy
     const YAML::Node parameters =
         distortion.node["parameters"].IsDefined() ? distortion.node["parameters"]["data"] : YAML::Node();
     const Camera model =
-        camera_of(camera, camera.as<std::string>("type"), camera.as<int>("image_width"), camera.as<int>("image_height"),
-                  camera.at("intrinsics")["data"], "intrinsics",
+        camera_of(camera, camera.as<std::string>("type"), camera.as<double>("image_width"),
+                  camera.as<double>("image_height"), camera.at("intrinsics")["data"], "intrinsics",
                   distortion_of(distortion, distortion.as<std::string>("type"), parameters, "parameters"));
     const std::string name =
         camera.node["label"].IsDefined() ? camera.as<std::string>("label") : fmt::format("cam{}", i);
@@ -123,11 +139,11 @@ std::vector<CalibratedCamera> read_camchain(const YAML::Node& root, const std::f
     const auto resolution = camera.numbers(camera.at("resolution"), "resolution", 2);
     const std::string distortion_model =
         camera.node["distortion_model"].IsDefined() ? camera.as<std::string>("distortion_model") : "none";
-    const Camera model =
-        camera_of(camera, camera.as<std::string>("camera_model"), static_cast<int>(resolution[0]),
-                  static_cast<int>(resolution[1]), camera.at("intrinsics"), "intrinsics",
-                  distortion_of(camera, distortion_model, camera.node["distortion_coeffs"], "distortion_coeffs"));
+    const Camera model = camera_of(
+        camera, camera.as<std::string>("camera_model"), resolution[0], resolution[1], camera.at("intrinsics"),
+        "intrinsics", distortion_of(camera, distortion_model, camera.node["distortion_coeffs"], "distortion_coeffs"));
 
+    camera.require_no_shift("timeshift_cam_imu");
     SE3 T_body_camera;
     if (const YAML::Node T_cam_imu = camera.node["T_cam_imu"]; T_cam_imu.IsDefined()) {
       T_body_camera = camera.pose(T_cam_imu, "T_cam_imu").inverse();
@@ -139,18 +155,21 @@ std::vector<CalibratedCamera> read_camchain(const YAML::Node& root, const std::f
   return cameras;
 }
 
-}  // namespace
-
-std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file) {
+YAML::Node load(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error))
     throw UserError(fmt::format("calibration {}: no such file", file.string()));
-  YAML::Node root;
   try {
-    root = YAML::LoadFile(file.string());
+    return YAML::LoadFile(file.string());
   } catch (const YAML::Exception& exception) {
     throw UserError(fmt::format("calibration {}:{}: {}", file.string(), exception.mark.line + 1, exception.msg));
   }
+}
+
+}  // namespace
+
+std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file) {
+  const YAML::Node root = load(file);
   std::vector<CalibratedCamera> cameras;
   try {
     if (root.IsMap() && root["cameras"].IsDefined() && root["cameras"].IsSequence()) cameras = read_rig(root, file);
@@ -164,6 +183,37 @@ std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file
         file.string()));
   }
   return cameras;
+}
+
+ImuOptions read_imu_calibration(const std::filesystem::path& file) {
+  const YAML::Node root = load(file);
+  if (!root.IsMap()) throw UserError(fmt::format("calibration {}: is no imu.yaml of Kalibr's", file.string()));
+  const bool nested = root["imu0"].IsDefined();
+  const Section imu{file, "imu0", nested ? root["imu0"] : root};
+  if (!imu.node.IsMap()) imu.fail("must be a map of keys and values");
+  if (root["imu1"].IsDefined()) imu.fail("there is an imu1 as well; a rig has one IMU: remove the others");
+  if (imu.node["model"].IsDefined() && imu.as<std::string>("model") != "calibrated") {
+    imu.fail(fmt::format("model '{}' is not supported; use calibrated, and give scale and misalignment in the scenario",
+                         imu.as<std::string>("model")));
+  }
+  imu.require_no_shift("time_offset");
+  if (imu.node["T_i_b"].IsDefined() && !imu.pose(imu.node["T_i_b"], "T_i_b").matrix().isIdentity(1e-9))
+    imu.fail("T_i_b is not the identity; remove it, and give the IMU's pose in the scenario as imu.T_body_imu");
+
+  const auto not_negative = [&](const char* key, double limit) {
+    const double value = imu.as<double>(key);
+    if (!(value >= 0 && value <= limit)) imu.fail(fmt::format("{} is {}; it must be from 0 to {}", key, value, limit));
+    return value;
+  };
+  constexpr double kMaxDensity = 1e6;
+  ImuOptions options;
+  options.rate_hz = not_negative("update_rate", kMaxImuRate_hz);
+  options.gyroscope.noise_density = not_negative("gyroscope_noise_density", kMaxDensity);
+  options.gyroscope.random_walk = not_negative("gyroscope_random_walk", kMaxDensity);
+  options.accelerometer.noise_density = not_negative("accelerometer_noise_density", kMaxDensity);
+  options.accelerometer.random_walk = not_negative("accelerometer_random_walk", kMaxDensity);
+  if (options.rate_hz == 0) imu.fail("update_rate is 0 Hz; it must be positive");
+  return options;
 }
 
 }  // namespace esim

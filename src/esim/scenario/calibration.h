@@ -6,6 +6,7 @@
 
 #include "esim/geometry/camera.h"
 #include "esim/geometry/se3.h"
+#include "esim/sensors/imu_options.h"
 
 namespace esim {
 
@@ -18,9 +19,14 @@ struct CalibratedCamera {
 
 /// Reads the cameras of a rig, in the file's order, from
 ///  - a Kalibr camchain (`cam0: {camera_model: pinhole, intrinsics, distortion_model, ...}`): the body is the IMU where
-///    the file has T_cam_imu, and cam0 otherwise;
+///    the file has T_cam_imu, and cam0 otherwise. All sensors share one clock: a timeshift_cam_imu must be 0;
 ///  - the original ESIM's rig file (`cameras: - camera: {...}  T_B_C: {...}`).
-/// Throws UserError naming the file and the camera for anything missing, inconsistent or not supported.
+/// Throws UserError naming the file, the camera and the key for anything missing, inconsistent or not supported.
 std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file);
+
+/// Reads Kalibr's imu.yaml: rate, noise densities and random walks, at the top or under `imu0`; everything else is at
+/// its default. The body of a camchain with T_cam_imu is this IMU. Throws UserError as above, also for models with
+/// misalignment, several IMUs, and time offsets.
+ImuOptions read_imu_calibration(const std::filesystem::path& file);
 
 }  // namespace esim

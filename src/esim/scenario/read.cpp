@@ -104,6 +104,27 @@ std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource
   return cameras;
 }
 
+/// Puts what an IMU's calibration file says in its place.
+void read_imu(RigImuOptions& imu, const YAML::Node& node, const YamlSource& source) {
+  if (imu.calibration.empty()) return;
+  const auto refuse = [&](const YAML::Node& given, const std::string& key) {
+    if (given.IsDefined())
+      YamlReader::fail(source, given, "imu." + key, "is given by the calibration file as well; remove one of them");
+  };
+  refuse(node["rate_hz"], "rate_hz");
+  for (const std::string sensor : {"gyroscope", "accelerometer"}) {
+    if (!node[sensor].IsDefined()) continue;
+    for (const std::string key : {"noise_density", "random_walk"}) refuse(node[sensor][key], sensor + "." + key);
+  }
+  const ImuOptions calibrated = read_imu_calibration(imu.calibration);
+  imu.calibration.clear();
+  imu.rate_hz = calibrated.rate_hz;
+  imu.gyroscope.noise_density = calibrated.gyroscope.noise_density;
+  imu.gyroscope.random_walk = calibrated.gyroscope.random_walk;
+  imu.accelerometer.noise_density = calibrated.accelerometer.noise_density;
+  imu.accelerometer.random_walk = calibrated.accelerometer.random_walk;
+}
+
 /// Gives every camera a name of its own, fit for a folder.
 void name_cameras(std::vector<CameraOptions>& cameras, const YamlSource& source) {
   std::set<std::string> names;
@@ -177,6 +198,7 @@ Scenario read_scenario(const std::filesystem::path& file, const std::vector<std:
     if (!std::as_const(root)[required].IsDefined() && sprites == nullptr)
       YamlReader::fail(source, YAML::Node(YAML::NodeType::Undefined), required, "is missing; every scenario needs one");
   }
+  if (scenario.imu) read_imu(*scenario.imu, std::as_const(root)["imu"], source);
   CameraOptions camera;
   if (sprites != nullptr) {
     read_layers(*sprites, renderer, source, camera);

@@ -13,6 +13,7 @@
 #include "esim/scene/layer.h"
 #include "esim/sensors/event_camera.h"
 #include "esim/sensors/frame_camera_options.h"
+#include "esim/sensors/imu_options.h"
 
 namespace esim {
 
@@ -177,6 +178,14 @@ struct CameraOptions {
   std::optional<FrameCameraOptions> frame_camera;  ///< none where not set
 };
 
+// --- the inertial measurement unit --------------------------------------------------------------------------------
+
+/// The IMU of the rig. Where `calibration` names a file, its rate and noise come from there.
+struct RigImuOptions : ImuOptions {
+  std::filesystem::path calibration;
+  PoseOptions T_body_imu;
+};
+
 // --- what is written -----------------------------------------------------------------------------------------------
 
 struct TruthOptions {
@@ -208,6 +217,7 @@ struct Scenario {
   RendererOptions renderer;
   TrajectoryOptions trajectory;
   std::vector<CameraOptions> cameras;
+  std::optional<RigImuOptions> imu;
   TruthOptions truth;
   OutputOptions output;
 };

@@ -195,12 +195,19 @@ void describe(Visitor& visit, CameraOptions& o) {
 }
 
 template <class Visitor>
+void describe(Visitor& visit, RigImuOptions& o) {
+  visit("calibration", o.calibration, About{"Kalibr's imu.yaml: gives rate_hz, noise densities and random walks"});
+  visit("T_body_imu", o.T_body_imu, About{"pose of the IMU in the body"});
+  describe(visit, static_cast<ImuOptions&>(o));
+}
+
+template <class Visitor>
 void describe(Visitor& visit, TruthOptions& o) {
   visit("rate_hz", o.rate_hz, About{"ground-truth frames per second; 0: none", "Hz", 0, 1e6});
   visit("images", o.images, About{"write images/, 8-bit sRGB"});
   visit("depth", o.depth, About{"write depth to truth.h5"});
   visit("flow", o.flow, About{"write the motion field to truth.h5"});
-  visit("pose_rate_hz", o.pose_rate_hz, About{"poses per second in poses.txt; 0: none", "Hz", 0, 1e6});
+  visit("pose_rate_hz", o.pose_rate_hz, About{"poses per second in poses.txt and states.csv; 0: none", "Hz", 0, 1e6});
 }
 
 template <class Visitor>
@@ -221,6 +228,7 @@ void describe(Visitor& visit, Scenario& o) {
               true});
   visit("renderer", o.renderer, About{"what is seen"});
   visit("trajectory", o.trajectory, About{"how the body moves"});
+  visit("imu", o.imu, About{"inertial measurement unit; {} for one of default values (default: none)"});
   visit("truth", o.truth, About{"ground truth"});
   visit("output", o.output, About{"what is written, and how"});
 }

@@ -3,18 +3,19 @@
 #include <algorithm>
 #include <chrono>
 
+#include "esim/motion/imu_kinematics.h"
 #include "esim/sim/stopwatch.h"
 
 namespace esim {
 namespace {
 
-/// The camera whose next sample comes first; null after the last one.
-CameraChannel* camera_due(World& world) {
+/// The camera whose next sample comes first; null where none comes by `until`.
+CameraChannel* camera_due(World& world, TimeNs until) {
   CameraChannel* due = nullptr;
   TimeNs earliest = 0;
   for (CameraChannel& camera : world.cameras) {
     const SampleRequest* const next = camera.sampler->next();
-    if (next == nullptr || (due != nullptr && next->t >= earliest)) continue;
+    if (next == nullptr || next->t > until || (due != nullptr && next->t >= earliest)) continue;
     earliest = next->t;
     due = &camera;
   }
@@ -28,10 +29,13 @@ TimeNs watermark(const World& world) {
   return earliest;
 }
 
+}  // namespace
+
 /// One run of a world: what it does with each piece of time, and the account of it.
-class Run {
+class Simulator::Run {
  public:
-  Run(World& world, Sink& out) : world_(world), out_(out) {
+  Run(World& world, Sink& out)
+      : world_(world), out_(out), known_until_(std::min(world.info.start, world.trajectory->end())) {
     summary_.start = summary_.end = world.info.start;
     for (std::size_t i = 0; i < world.cameras.size(); ++i) {
       const CameraInfo& info = world.info.cameras[i];
@@ -41,8 +45,12 @@ class Run {
     }
   }
 
+  /// The body's motion is known until then: samples until then may be started.
+  void know(TimeNs until) { known_until_ = until; }
+
   /// Lets a camera's pixels see its next sample. A graphics card has had the time since its last one to render it.
   void advance(CameraChannel& camera) {
+    if (camera.rendering == nullptr) start_next(camera);  // its motion was not yet known
     {
       Stopwatch stopwatch(summary_.seconds.render);
       camera.rendering->finish(camera.sample);
@@ -69,14 +77,20 @@ class Run {
   /// Writes everything up to `until`, all kinds of record together in order of time.
   void deliver(TimeNs until) {
     while (true) {
-      const TimeNs t = std::min(until, next_due());
+      const TimeNs t = std::min(until, due());
       deliver_events(t);
+      if (imu_due() == t) deliver_imu(t);
       if (world_.pose_clock.due() == t) deliver_pose(t);
       if (world_.truth_clock.due() == t) deliver_truth(t);
       deliver_frames(t);
-      if (t == until && next_due() > until) break;
+      if (t == until && due() > until) break;
     }
     summary_.end = until;
+  }
+
+  /// Writes the IMU's measurements up to `until`, ahead of what has to wait for cameras.
+  void deliver_imu_until(TimeNs until) {
+    while (imu_due() <= until) deliver_imu(imu_due());
   }
 
   Progress progress() const {
@@ -111,7 +125,7 @@ class Run {
   void start_next(CameraChannel& camera) {
     Stopwatch stopwatch(summary_.seconds.render);
     const SampleRequest* const next = camera.sampler->next();
-    if (next == nullptr) return camera.rendering.reset();
+    if (next == nullptr || next->t > known_until_) return camera.rendering.reset();
     camera.rendering = camera.sampled().start(view(world_, index_of(camera), next->t, next->tiles));
   }
 
@@ -122,9 +136,11 @@ class Run {
     camera.frame_camera->integrate(segments, camera.sampler->watermark(), *world_.workers);
   }
 
+  TimeNs imu_due() const { return world_.imu ? world_.imu->clock.due() : PeriodicClock::kNever; }
+
   /// When the next record is due that is none of events. A frame is due when its exposure ends.
-  TimeNs next_due() const {
-    TimeNs due = std::min(world_.truth_clock.due(), world_.pose_clock.due());
+  TimeNs due() const {
+    TimeNs due = std::min({world_.truth_clock.due(), world_.pose_clock.due(), imu_due()});
     for (const CameraChannel& camera : world_.cameras) {
       if (camera.frame_camera) due = std::min(due, camera.frame_camera->due());
     }
@@ -148,8 +164,20 @@ class Run {
   }
 
   void deliver_pose(TimeNs t) {
-    write(PoseRecord{t, world_.trajectory->at(t).T_world_body});
+    PoseRecord pose{t, world_.trajectory->at(t)};
+    for (const auto& object : world_.objects) pose.objects.push_back(object->at(t));
+    if (world_.imu) pose.imu_bias = world_.imu->sensor.bias(t);
+    write(pose);
     world_.pose_clock.advance();
+  }
+
+  void deliver_imu(TimeNs t) {
+    ImuChannel& imu = *world_.imu;
+    const InertialSignals truth =
+        inertial_signals(world_.trajectory->at(t), imu.T_body_imu, imu.sensor.options().gravity);
+    write(ImuRecord{t, imu.sensor.measure(t, truth), imu.sensor.bias(t)});
+    ++summary_.imu_samples;
+    imu.clock.advance();
   }
 
   void deliver_truth(TimeNs t) {
@@ -184,23 +212,37 @@ class Run {
 
   World& world_;
   Sink& out_;
+  TimeNs known_until_;
   Summary summary_;
   std::vector<Event> events_;
   Sample truth_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-}  // namespace
+Simulator::Simulator(World& world, Sink& out) : world_(world), run_(std::make_unique<Run>(world, out)) {
+  out.begin(world.info);
+}
+
+Simulator::~Simulator() = default;
+
+bool Simulator::advance_until(TimeNs t, const Monitor& monitor) {
+  const TimeNs known = std::min({t, world_.trajectory->end(), world_.info.end});
+  run_->know(known);
+  while (CameraChannel* camera = camera_due(world_, known)) {  // the camera whose next sample comes first
+    run_->advance(*camera);                                    // take it, start the one after it, cross the thresholds
+    run_->deliver(watermark(world_));                          // write what is now certain, in order of time
+    if (!monitor(run_->progress())) return false;
+  }
+  run_->deliver_imu_until(known);
+  return true;
+}
+
+Summary Simulator::finish() { return run_->finish(camera_due(world_, world_.info.end) == nullptr); }
 
 Summary simulate(World& world, Sink& out, const Monitor& monitor) {
-  Run run(world, out);
-  out.begin(world.info);
-  while (CameraChannel* camera = camera_due(world)) {  // the camera whose next sample comes first
-    run.advance(*camera);                              // take it, start the one after it, cross the thresholds
-    run.deliver(watermark(world));                     // write what is now certain, in order of time
-    if (!monitor(run.progress())) return run.finish(false);
-  }
-  return run.finish(true);
+  Simulator simulator(world, out);
+  simulator.advance_until(world.info.end, monitor);
+  return simulator.finish();
 }
 
 }  // namespace esim

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,7 @@ struct Summary {
   TimeNs start = 0, end = 0;  ///< of the time that was simulated
   std::vector<CameraSummary> cameras;
   std::int64_t truth_frames = 0;
+  std::int64_t imu_samples = 0;
   StageSeconds seconds;
   double wall_seconds = 0;
 };
@@ -50,6 +52,30 @@ struct Progress {
 
 /// Called after every sample; returns false to end the simulation early.
 using Monitor = std::function<bool(const Progress&)>;
+
+/// A simulation that goes on as far as it is told, for bodies whose motion becomes known on the way (motion/online.h).
+class Simulator {
+ public:
+  /// Begins the recording.
+  Simulator(World& world, Sink& out);
+  ~Simulator();
+  Simulator(const Simulator&) = delete;
+  Simulator& operator=(const Simulator&) = delete;
+
+  /// Takes every sample that is due until `t`, or until the end of the body's trajectory where that comes earlier, and
+  /// writes what is then certain: of the IMU, everything until then; of all else, everything until the time before
+  /// which every camera's events are known. That is behind by less than a sampler's longest interval (min_rate_hz). The
+  /// monitor is called after every sample; false once it has ended the simulation.
+  bool advance_until(TimeNs t, const Monitor& monitor);
+
+  /// Ends the recording, complete if it has reached the world's end.
+  Summary finish();
+
+ private:
+  class Run;
+  World& world_;
+  std::unique_ptr<Run> run_;
+};
 
 /// Runs `world` from its start to its end and writes everything to `out`. The spine of the program: time moves only
 /// here.

@@ -12,6 +12,7 @@
 #include "esim/sampling/sampler.h"
 #include "esim/sensors/event_camera.h"
 #include "esim/sensors/frame_camera.h"
+#include "esim/sensors/imu.h"
 #include "esim/truth/clock.h"
 
 namespace esim {
@@ -29,6 +30,13 @@ struct CameraChannel {
   Renderer& sampled() { return keyframes != nullptr ? *keyframes : *renderer; }
 };
 
+/// The rig's inertial measurement unit.
+struct ImuChannel {
+  Imu sensor;
+  SE3 T_body_imu;
+  PeriodicClock clock;
+};
+
 /// The state of a simulation. Its description is a RecordingInfo, which does not change.
 struct World {
   RecordingInfo info;
@@ -37,6 +45,7 @@ struct World {
   std::vector<std::shared_ptr<const Trajectory>> objects;  // of the scene's moving objects, in its order
   std::vector<CameraChannel> cameras;                      // as in info.cameras
   PeriodicClock truth_clock, pose_clock;
+  std::optional<ImuChannel> imu{};
 };
 
 /// Where a camera and the moving objects are at `t`; no tiles.

@@ -16,8 +16,8 @@ void PosesTumWriter::begin(const RecordingInfo&) {
 void PosesTumWriter::write(const Record& record) {
   const auto* pose = std::get_if<PoseRecord>(&record);
   if (pose == nullptr) return;
-  const Eigen::Vector3d& p = pose->T_world_body.translation;
-  const Eigen::Quaterniond& q = pose->T_world_body.rotation;
+  const Eigen::Vector3d& p = pose->body.T_world_body.translation;
+  const Eigen::Quaterniond& q = pose->body.T_world_body.rotation;
   append_seconds(file_->buffer(), pose->t);
   fmt::format_to(std::back_inserter(file_->buffer()), " {:.12f} {:.12f} {:.12f} {:.12f} {:.12f} {:.12f} {:.12f}\n",
                  p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w());

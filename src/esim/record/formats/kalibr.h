@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+
+#include "esim/record/record.h"
+
+namespace esim {
+
+/// The cameras of a recording as a Kalibr camchain: `cam0`, `cam1`, ... in their order. With an IMU, each has T_cam_imu
+/// (p_cam = T_cam_imu p_imu) and a time shift of 0; each but the first has T_cn_cnm1, from the camera before it.
+/// Numbers read back as they are. Kalibr itself knows four coefficients of radtan: a fifth, k3, is written where it is
+/// not 0.
+std::string kalibr_camchain(const RecordingInfo& info);
+
+/// An IMU as Kalibr's imu.yaml.
+std::string kalibr_imu(const ImuInfo& imu);
+
+/// Writes camchain.yaml and, with an IMU, imu.yaml into a folder when a recording begins.
+class KalibrWriter final : public Sink {
+ public:
+  explicit KalibrWriter(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  void begin(const RecordingInfo& info) override;
+  void write(const Record&) override {}
+  void end(bool) override {}
+
+ private:
+  std::filesystem::path folder_;
+};
+
+}  // namespace esim

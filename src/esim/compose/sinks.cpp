@@ -34,7 +34,7 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
   if (truth.pose_rate_hz > 0) sinks->add(std::make_unique<PosesTumWriter>(folder / "poses.txt"));
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
     const int camera = static_cast<int>(i);
-    const auto place = scenario.cameras.size() == 1 ? folder : folder / scenario.cameras[i].name;
+    const auto place = folder / scenario.cameras[i].name;
     std::filesystem::create_directories(place);
     sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", camera, EventsHdf5Options{unit, compression}));
     if (output.events_txt) sinks->add(std::make_unique<EventsTextWriter>(place / "events.txt", camera));
@@ -50,9 +50,11 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
 }
 
 std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& folder) {
+  const auto place = folder / kConversionCamera;
+  std::filesystem::create_directories(place);
   auto sinks = std::make_unique<FanOut>();
-  sinks->add(std::make_unique<EventsHdf5Writer>(folder / "events.h5", 0));
-  sinks->add(std::make_unique<PreviewWriter>(folder, 0));
+  sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", 0));
+  sinks->add(std::make_unique<PreviewWriter>(place, 0));
   return std::make_unique<BackgroundSink>(std::move(sinks));
 }
 

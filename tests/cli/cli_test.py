@@ -72,9 +72,15 @@ class Recordings(Cli):
         scenario = self.folder / "s.yaml"
         text = (SCENES / "poster.yaml").read_text().replace("poster/", str(SCENES / "poster") + "/")
         scenario.write_text("\n".join(line for line in text.splitlines() if not line.startswith("camera:")))
-        result = self.simulate("--set", cameras, "--set", "duration_s=0.1", scenario=scenario)
+        truth = "truth={objects: true, displacement: true, event_points: true}"
+        result = self.simulate("--set", cameras, "--set", truth, "--set", "duration_s=0.1", scenario=scenario)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertTrue((self.out / "cam0" / "events.h5").exists() and (self.out / "right" / "preview.png").exists())
+        for camera in json.loads((self.out / "report.json").read_text())["cameras"]:
+            header = (self.out / camera["name"] / "event_points.ply").read_bytes().split(b"end_header")[0]
+            points = int(header.split(b"element vertex ")[1].split()[0])
+            self.assertLessEqual(points, camera["events"])
+            self.assertGreater(points, 0.7 * camera["events"], "most are on the poster")
         self.assertIn("right", run("info", self.out).stdout)
 
     def test_quiet_says_nothing(self):
@@ -152,6 +158,8 @@ class BadInput(Cli):
             "sampling.lambda=.inf": "must be a number",
             "camera.width=0": "at least 1",
             "duration_s=-1": "above 0",
+            "truth.rate_hz=-1": "at least 0",
+            "truth={rate_hz: 0, displacement: true}": "joins two frames",
             "renderer.image=none.jpg": "no such file",
             "trajectory={type: file, path: none.txt}": "none.txt",
             "renderer.pose.look_at=[-5, 0, 0]": "sees nothing",

@@ -1,6 +1,7 @@
 #include "esim/compose/compose.h"
 #include "esim/record/background_sink.h"
 #include "esim/record/fan_out.h"
+#include "esim/record/formats/event_points_ply.h"
 #include "esim/record/formats/events_hdf5.h"
 #include "esim/record/formats/events_text.h"
 #include "esim/record/formats/images_png.h"
@@ -38,12 +39,12 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
     std::filesystem::create_directories(place);
     sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", camera, EventsHdf5Options{unit, compression}));
     if (output.events_txt) sinks->add(std::make_unique<EventsTextWriter>(place / "events.txt", camera));
+    if (truth.event_points) sinks->add(std::make_unique<EventPointsPlyWriter>(place / "event_points.ply", camera));
     if (truth.rate_hz <= 0) continue;
     if (truth.images) sinks->add(std::make_unique<ImagesPngWriter>(place / "images", camera));
-    if (truth.depth || truth.flow) {
-      sinks->add(std::make_unique<TruthHdf5Writer>(place / "truth.h5", camera,
-                                                   TruthHdf5Options{truth.depth, truth.flow, compression}));
-    }
+    const TruthHdf5Options datasets{truth.depth, truth.flow, compression, truth.objects, truth.displacement};
+    if (datasets.depth || datasets.flow || datasets.objects || datasets.displacement)
+      sinks->add(std::make_unique<TruthHdf5Writer>(place / "truth.h5", camera, datasets));
     if (output.preview) sinks->add(std::make_unique<PreviewWriter>(place, camera));
   }
   return std::make_unique<BackgroundSink>(std::move(sinks));

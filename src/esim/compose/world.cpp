@@ -48,14 +48,6 @@ void check_sampling(const CameraOptions& camera, const Notices& notices) {
   std::visit(check, camera.sampling);
 }
 
-/// The views of a camera; outlives the world.
-std::function<RenderRequest(TimeNs)> view_at(const World& world, std::size_t camera) {
-  return [trajectory = world.trajectory, objects = world.objects,
-          T_body_camera = world.info.cameras[camera].T_body_camera](TimeNs t) {
-    return view(*trajectory, T_body_camera, objects, t);
-  };
-}
-
 bool sees_something(const Sample& sample) {
   const auto depth = sample.depth.pixels();
   return std::any_of(depth.begin(), depth.end(), [](float z) { return std::isfinite(z); });
@@ -138,6 +130,7 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices)
     require_a_view(world, i);
     name_what_has_no_effect(scenario, world, i, notices);
   }
+  prepare_truth(scenario, scene, make_renderer, notices, world);
   return world;
 }
 

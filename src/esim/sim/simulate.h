@@ -15,7 +15,7 @@ struct StageSeconds {
   double render = 0;    ///< samples for the event cameras
   double sampling = 0;  ///< choosing times, reconstructing between keyframes
   double events = 0;    ///< pixels, and ordering of events
-  double truth = 0;     ///< rendering of ground truth
+  double truth = 0;     ///< making of ground truth
   double write = 0;     ///< handing over to sinks; what they do on threads of their own does not count
 };
 

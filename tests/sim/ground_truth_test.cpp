@@ -240,6 +240,15 @@ TEST_F(GroundTruth, SaysWhyItCannotBeHad) {
   panorama.image = folder_.path() / "sky.pgm";
   scenario_.renderer = panorama;
   EXPECT_TRUE(test::contains(error(), "truth.event_points: all that panorama shows is infinitely far"));
+
+  scenario_.truth = {};
+  scenario_.truth.displacement = true;
+  EXPECT_EQ(error(), "nothing was thrown") << "directions move in the image, too";
+  SpritesRendererOptions sprites;
+  sprites.layers.resize(1);
+  sprites.layers[0].image = folder_.path() / "sky.pgm";
+  scenario_.renderer = sprites;
+  EXPECT_TRUE(test::contains(error(), "truth.displacement: sprites are drawn on the sensor"));
 }
 
 }  // namespace

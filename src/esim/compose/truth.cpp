@@ -20,20 +20,20 @@ std::vector<std::string> object_names(const RendererOptions& renderer, const Sce
   return names;
 }
 
-double frames(const TruthOptions& truth, double duration_s) { return std::floor(duration_s * truth.rate_hz) + 1; }
-
-void check_displacement(const TruthOptions& truth, double duration_s, const RendererTraits& renderer) {
+void check_displacement(const TruthOptions& truth, PeriodicClock clock, double duration_s,
+                        const RendererTraits& renderer) {
   if (!truth.displacement) return;
   if (renderer.on_sensor) {
     throw UserError(fmt::format("truth.displacement: {} are drawn on the sensor, where nothing has depth; remove it",
                                 renderer.name));
   }
-  if (truth.rate_hz <= 0 || frames(truth, duration_s) < 2) {
-    throw UserError(
-        fmt::format("truth.displacement: joins two frames of ground truth, but rate_hz = {} gives {} in "
-                    "{:.6g} s; raise truth.rate_hz",
-                    truth.rate_hz, truth.rate_hz <= 0 ? 0 : 1, duration_s));
-  }
+  const bool has_frames = clock.due() != PeriodicClock::kNever;
+  if (has_frames) clock.advance();
+  if (clock.due() != PeriodicClock::kNever) return;
+  throw UserError(
+      fmt::format("truth.displacement: joins two frames of ground truth, but rate_hz = {} gives {} in {:.6g} s; raise "
+                  "truth.rate_hz",
+                  truth.rate_hz, has_frames ? 1 : 0, duration_s));
 }
 
 void check_event_points(const TruthOptions& truth, const RendererTraits& renderer) {
@@ -51,13 +51,12 @@ void warn_of_much(const Scenario& scenario, double duration_s, const Notices& no
   for (const CameraOptions& camera : scenario.cameras) pixels += static_cast<double>(camera.width) * camera.height;
   const int bytes_per_pixel = (truth.images ? 1 : 0) + (truth.depth ? 4 : 0) + (truth.flow ? 8 : 0) +
                               (truth.displacement ? 9 : 0) + (truth.objects ? 2 : 0);
-  const double bytes = frames(truth, duration_s) * pixels * bytes_per_pixel;
-  if (bytes > kMuch) {
-    notices.warning(
-        fmt::format("truth.rate_hz = {} makes {:.0f} frames for each camera, {:.0f} GB before compression; "
-                    "is it meant?",
-                    truth.rate_hz, frames(truth, duration_s), bytes * 1e-9));
-  }
+  const double frames = std::floor(duration_s * truth.rate_hz) + 1, bytes = frames * pixels * bytes_per_pixel;
+  if (bytes <= kMuch) return;
+  notices.warning(
+      fmt::format("truth.rate_hz = {} makes {:.0f} frames for each camera, {:.0f} GB before compression; "
+                  "is it meant?",
+                  truth.rate_hz, frames, bytes * 1e-9));
 }
 
 /// Renderers of the same scene on the processor, as fast as they are for single pixels where depth is all that counts:
@@ -78,7 +77,7 @@ void prepare_truth(const Scenario& scenario, const SceneFile& scene, const Rende
   const TruthOptions& truth = scenario.truth;
   const double duration_s = to_seconds(world.info.end - world.info.start);
   const RendererTraits traits = world.cameras.front().renderer->traits();
-  check_displacement(truth, duration_s, traits);
+  check_displacement(truth, world.truth_clock, duration_s, traits);
   check_event_points(truth, traits);
   warn_of_much(scenario, duration_s, notices);
 

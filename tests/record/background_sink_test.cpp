@@ -79,7 +79,10 @@ class Summer final : public Sink {
       for (const auto value : image.pixels()) sum += value;
       sums_.push_back(sum);
     };
-    if (const auto* truth = std::get_if<TruthRecord>(&record)) truth->object ? add(*truth->object) : add(truth->depth);
+    if (const auto* truth = std::get_if<TruthRecord>(&record)) {
+      truth->object ? add(*truth->object) : add(truth->depth);
+      for (const SE3& pose : truth->T_world_objects) sums_.push_back(pose.translation.sum());
+    }
     if (const auto* part = std::get_if<DisplacementRecord>(&record)) {
       add(part->x), add(part->y), add(part->visible);
       sums_.push_back(static_cast<double>(part->t0 + 10 * part->t1));
@@ -105,13 +108,14 @@ TEST(BackgroundSink, KeepsCopiesOfGroundTruth) {
   std::vector<Event> events = {{1, 7, 0, 1}};
   std::vector<Eigen::Vector3f> points = {{1, 2, 3}};
   sink.write(TruthRecord{0, 1, {}, image, image, image, image});
-  sink.write(TruthRecord{0, 2, {}, image, image, image, image, &object});
+  std::vector<SE3> poses = {{Eigen::Quaterniond::Identity(), {1, 2, 3}}};
+  sink.write(TruthRecord{0, 2, {}, image, image, image, image, &object, poses});
   sink.write(DisplacementRecord{0, 1, 2, image, other, visible});
   sink.write(EventPointsRecord{0, events, points});
   image.fill(-1), other.fill(-1), object.fill(9), visible.fill(9);
-  points[0].setZero(), events[0].x = 0;
+  points[0].setZero(), poses[0].translation.setZero(), events[0].x = 0;
   sink.end(true);
-  EXPECT_EQ(sums, (std::vector<double>{2, 12, 2, 1, 4, 21, 13}));
+  EXPECT_EQ(sums, (std::vector<double>{2, 12, 6, 2, 1, 4, 21, 13}));
 }
 
 TEST(BackgroundSink, ReportsFailuresOfTheInnerSink) {

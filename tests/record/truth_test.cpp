@@ -104,7 +104,8 @@ TEST(TruthHdf5, HoldsObjectsByNameAndDisplacementsBetweenFrames) {
     object(k, 1) = k;
     TruthRecord truth = images.at(k);
     EXPECT_THROW(writer.write(truth), InternalError) << "objects are missing";
-    const TruthRecord complete{0, k, {}, images.irradiance, images.depth, images.flow_x, images.flow_y, &object};
+    const SE3 poses[] = {some_pose(k), some_pose(k + 0.5)};
+    const TruthRecord complete{0, k, {}, images.irradiance, images.depth, images.flow_x, images.flow_y, &object, poses};
     writer.write(complete);
     visible(0, 0) = static_cast<std::uint8_t>(k % 2);
     if (k > 0) writer.write(DisplacementRecord{0, k - 1, k, images.flow_x, images.flow_y, visible});
@@ -116,6 +117,9 @@ TEST(TruthHdf5, HoldsObjectsByNameAndDisplacementsBetweenFrames) {
   EXPECT_EQ(objects[12 + 4 + 1], 1);
   EXPECT_EQ(objects[24 + 4 + 2], 2);
   EXPECT_EQ(objects[24 + 4 + 3], 0);
+  const auto poses = read_dataset<double>(path, "T_world_objects", H5T_NATIVE_DOUBLE, {3, 2, 7});
+  EXPECT_EQ(poses[14 + 7], some_pose(1.5).translation.x());
+  EXPECT_EQ(poses[28 + 6], some_pose(2).rotation.w());
   const auto displacement = read_dataset<float>(path, "displacement", H5T_NATIVE_FLOAT, {2, 2, 3, 4});
   EXPECT_EQ(displacement[12], images.flow_y(0, 0));
   EXPECT_EQ(displacement[24 + 5], images.flow_x(1, 1));

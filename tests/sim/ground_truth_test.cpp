@@ -21,6 +21,7 @@ class Collector final : public Sink {
     SE3 T_world_camera;
     Image<float> depth, flow_x;
     Image<std::uint16_t> object;
+    std::vector<SE3> T_world_objects;
   };
   struct Interval {
     TimeNs t0, t1;
@@ -31,7 +32,8 @@ class Collector final : public Sink {
   void begin(const RecordingInfo& recording) override { info = recording; }
   void write(const Record& record) override {
     if (const auto* truth = std::get_if<TruthRecord>(&record)) {
-      frames.push_back({truth->camera, truth->t, truth->T_world_camera, truth->depth, truth->flow_x, {}});
+      frames.push_back({truth->camera, truth->t, truth->T_world_camera, truth->depth, truth->flow_x, {}, {}});
+      frames.back().T_world_objects.assign(truth->T_world_objects.begin(), truth->T_world_objects.end());
       if (truth->object != nullptr) frames.back().object = *truth->object;
     }
     if (const auto* part = std::get_if<DisplacementRecord>(&record)) {
@@ -147,6 +149,8 @@ TEST_F(GroundTruth, KnowsTheCardWhereverItIs) {
       }
     }
     EXPECT_GT(on_card, 100);
+    ASSERT_EQ(frame.T_world_objects.size(), 1U);
+    EXPECT_NEAR(frame.T_world_objects[0].translation.y(), 2 * (to_seconds(frame.t) - 0.5), 1e-6);
   }
 }
 

@@ -50,6 +50,9 @@ struct TruthRecord {
 
   /// Where wanted: 0, or i + 1 where moving object i is seen.
   const Image<std::uint16_t>* object = nullptr;
+
+  /// Poses of the moving objects; none of layers, which are not in the world.
+  std::span<const SE3> T_world_objects{};
 };
 
 /// Where what one camera saw at t0 is at t1, the times of consecutive TruthRecords; follows the later one of them. The

@@ -147,6 +147,8 @@ class Run {
     for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
       RenderRequest request = view(world_, i, t);
       request.which_objects = world_.truth_objects;
+      object_poses_.clear();
+      for (const Kinematics& object : request.objects) object_poses_.push_back(object.T_world_body);
       const Displacement* displacement = nullptr;
       {
         Stopwatch stopwatch(summary_.seconds.truth);
@@ -154,7 +156,7 @@ class Run {
         if (world_.cameras[i].displacement) displacement = world_.cameras[i].displacement->advance(request, truth_);
       }
       write(TruthRecord{static_cast<int>(i), t, request.camera.T_world_body, truth_.irradiance, truth_.depth,
-                        truth_.flow_x, truth_.flow_y, world_.truth_objects ? &truth_.object : nullptr});
+                        truth_.flow_x, truth_.flow_y, world_.truth_objects ? &truth_.object : nullptr, object_poses_});
       if (displacement != nullptr) {
         write(DisplacementRecord{static_cast<int>(i), displacement->t0, displacement->t1, displacement->x,
                                  displacement->y, displacement->visible});
@@ -174,6 +176,7 @@ class Run {
   Summary summary_;
   std::vector<Event> events_;
   std::vector<Eigen::Vector3f> event_points_;
+  std::vector<SE3> object_poses_;
   Sample truth_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };

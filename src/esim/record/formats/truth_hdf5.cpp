@@ -1,8 +1,7 @@
 #include "esim/record/formats/truth_hdf5.h"
 
-#include <algorithm>
-#include <array>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "esim/core/error.h"
@@ -23,9 +22,12 @@ struct TruthHdf5Writer::Impl {
   void append(const TruthRecord& truth);
   void append(const DisplacementRecord& displacement);
   void append(hdf5::Series& series, const Image<float>& x, const Image<float>& y);
+  void append(hdf5::Series& series, std::span<const SE3> poses);
+  void append_object_poses(std::span<const SE3> poses);
+  void describe(const hdf5::Series& series, const char* unit, const char* convention) const;
   void close_series() {
     esim_complete.reset();
-    for (hdf5::Series* series : {&t, &pose, &depth, &flow, &objects, &displacement, &displacement_valid})
+    for (hdf5::Series* series : {&t, &pose, &depth, &flow, &objects, &object_poses, &displacement, &displacement_valid})
       *series = hdf5::Series();
   }
   template <typename T>
@@ -40,7 +42,7 @@ struct TruthHdf5Writer::Impl {
   // The series close before the file.
   std::optional<hdf5::Output> file;
   hdf5::Handle esim_complete;
-  hdf5::Series t, pose, depth, flow, objects, displacement, displacement_valid;
+  hdf5::Series t, pose, depth, flow, objects, object_poses, displacement, displacement_valid;
 };
 
 void TruthHdf5Writer::Impl::create(const RecordingInfo& recording) {
@@ -51,10 +53,6 @@ void TruthHdf5Writer::Impl::create(const RecordingInfo& recording) {
 
   const hdf5::Quiet quiet;
   file.emplace(path);
-  const auto describe = [&](const hdf5::Series& series, const char* unit, const char* convention) {
-    file->create_text_attribute(series.id(), "unit", unit);
-    file->create_text_attribute(series.id(), "convention", convention);
-  };
   t = hdf5::Series(*file, "t", {H5T_STD_I64LE, {}, 256, Compression::none});
   describe(t, "ns", "time of the frame");
   pose = hdf5::Series(*file, "T_world_camera", {H5T_IEEE_F64LE, {7}, 64, Compression::none});
@@ -92,6 +90,11 @@ void TruthHdf5Writer::Impl::create(const RecordingInfo& recording) {
   file->flush();
 }
 
+void TruthHdf5Writer::Impl::describe(const hdf5::Series& series, const char* unit, const char* convention) const {
+  file->create_text_attribute(series.id(), "unit", unit);
+  file->create_text_attribute(series.id(), "convention", convention);
+}
+
 template <typename T>
 void TruthHdf5Writer::Impl::check_size(const Image<T>& image) const {
   if (image.width() == width && image.height() == height) return;
@@ -111,11 +114,9 @@ void TruthHdf5Writer::Impl::append(const TruthRecord& truth) {
     if (truth.object == nullptr) throw InternalError(path.string() + ": a ground-truth frame does not say its objects");
     check_size(*truth.object);
     objects.append(truth.object->pixels());
+    append_object_poses(truth.T_world_objects);
   }
-  const Eigen::Vector3d& p = truth.T_world_camera.translation;
-  const Eigen::Quaterniond& q = truth.T_world_camera.rotation;
-  const std::array<double, 7> numbers = {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
-  pose.append(std::span<const double>(numbers));
+  append(pose, {&truth.T_world_camera, 1});
   const std::int64_t time = truth.t;
   t.append(std::span<const std::int64_t>(&time, 1));
   file->flush();
@@ -135,6 +136,24 @@ void TruthHdf5Writer::Impl::append(hdf5::Series& series, const Image<float>& x, 
   vector_frame.assign(x.pixels().begin(), x.pixels().end());
   vector_frame.insert(vector_frame.end(), y.pixels().begin(), y.pixels().end());
   series.append(std::span<const float>(vector_frame));
+}
+
+void TruthHdf5Writer::Impl::append(hdf5::Series& series, std::span<const SE3> poses) {
+  std::vector<double> numbers;
+  for (const auto& [q, p] : poses) numbers.insert(numbers.end(), {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()});
+  series.append(std::span<const double>(numbers));
+}
+
+/// How many there are, the first frame says.
+void TruthHdf5Writer::Impl::append_object_poses(std::span<const SE3> poses) {
+  if (poses.empty()) return;
+  if (object_poses.id() < 0) {
+    object_poses = hdf5::Series(*file, "T_world_objects", {H5T_IEEE_F64LE, {poses.size(), 7}, 64, Compression::none});
+    describe(object_poses, "m",
+             "[frame, object]: tx ty tz qx qy qz qw: p_world = R(q) p_object + t; in the order of the names of "
+             "`objects`, without the first, static");
+  }
+  append(object_poses, poses);
 }
 
 TruthHdf5Writer::TruthHdf5Writer(std::filesystem::path path, int camera, TruthHdf5Options options)

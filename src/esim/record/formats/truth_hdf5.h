@@ -23,6 +23,7 @@ struct TruthHdf5Options {
 ///   depth               float32 [N, H, W]      m, planar; +inf where nothing is seen
 ///   flow                float32 [N, 2, H, W]   px/s, x to the right, then y downwards
 ///   objects             uint16 [N, H, W]       index of its attribute `names`; 0: what stands still
+///   T_world_objects     float64 [N, K, 7]      of the K objects with a pose in the world, without [0]
 ///   displacement        float32 [N-1, 2, H, W] px, from frame k to frame k + 1; NaN where there is no image
 ///   displacement_valid  uint8 [N-1, H, W]      1: seen in frame k + 1 as well
 ///

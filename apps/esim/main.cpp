@@ -11,7 +11,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "Examples:\n"
-      "  esim simulate scenes/room.yaml --out out/room     simulate; then look at out/room/preview.png\n"
+      "  esim simulate scenes/room.yaml --out out/room     simulate; then look at out/room/cam0/preview.png\n"
       "  esim simulate scenes/room.yaml --out out/low --set event_camera.contrast_threshold=0.2\n"
       "  esim check scenes/room.yaml                       is the scenario right? nothing is written\n"
       "  esim video clip.mp4 --out out/clip                events of a video, or of a folder of images\n"

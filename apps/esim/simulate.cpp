@@ -18,7 +18,7 @@ struct Arguments : RunOptions {
   std::optional<std::uint64_t> seed;
 };
 
-void print_summary(const Summary& summary, const std::filesystem::path& out, bool preview) {
+void print_summary(const Summary& summary, const std::filesystem::path& out, bool previews) {
   std::int64_t events = 0, samples = 0;
   for (const CameraSummary& camera : summary.cameras) {
     events += camera.events_on + camera.events_off;
@@ -29,7 +29,9 @@ void print_summary(const Summary& summary, const std::filesystem::path& out, boo
              summary.complete ? "done" : "interrupted", simulated_s, summary.wall_seconds,
              simulated_s / summary.wall_seconds, samples, events);
   fmt::print(stderr, "recording: {}\n", out.string());
-  if (preview) fmt::print(stderr, "look at:   {}\n", (out / "preview.png").string());
+  for (const CameraSummary& camera : summary.cameras) {
+    if (previews) fmt::print(stderr, "look at:   {}\n", (out / camera.name / "preview.png").string());
+  }
 }
 
 int run(const Arguments& arguments) {
@@ -56,8 +58,7 @@ int run(const Arguments& arguments) {
   });
   bar.clear();
   directory.finish(report_json(scenario, summary, world.workers->threads(), given));
-  if (!arguments.quiet)
-    print_summary(summary, out, scenario.output.preview && scenario.truth.rate_hz > 0 && scenario.cameras.size() == 1);
+  if (!arguments.quiet) print_summary(summary, out, scenario.output.preview && scenario.truth.rate_hz > 0);
   return summary.complete ? kOk : kInterrupted;
 }
 

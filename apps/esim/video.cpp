@@ -156,7 +156,8 @@ int convert_to_folder(const Arguments& arguments, const fs::path& out, const Not
   directory.finish(report_json(arguments.options, summary, converter.threads(), given));
   if (!arguments.quiet) {
     print_summary(summary);
-    fmt::print(stderr, "recording: {}\nlook at:   {}\n", out.string(), (out / "preview.png").string());
+    fmt::print(stderr, "recording: {}\nlook at:   {}\n", out.string(),
+               (out / kConversionCamera / "preview.png").string());
   }
   return outcome(summary, out);
 }
@@ -198,7 +199,7 @@ void add_video(CLI::App& app, int& exit_code) {
                   "Change one option of the event camera, for example --set contrast_threshold=0.2");
   command->footer(
       "Examples:\n"
-      "  esim video clip.mp4 --out out/clip                        then look at out/clip/preview.png\n"
+      "  esim video clip.mp4 --out out/clip                        then look at out/clip/cam0/preview.png\n"
       "  esim video clip.mp4 --out events.h5 --set contrast_threshold=0.2\n"
       "  esim video images/ --fps 240 --out out/images\n"
       "  esim video slow.mp4 --slow-motion 8 --start 2 --duration 1.5 --out out/slow");

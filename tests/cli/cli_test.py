@@ -31,7 +31,7 @@ class Cli(ProgramTest):
     def start_and_wait_for_events(self):
         process = subprocess.Popen([ESIM, "simulate", SCENES / "poster.yaml", "--out", self.out, *ENDLESS],
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        events = pathlib.Path(str(self.out) + ".incomplete") / "events.h5"
+        events = pathlib.Path(str(self.out) + ".incomplete") / "cam0" / "events.h5"
         deadline = time.time() + 60
         while not (events.exists() and events.stat().st_size > 500_000):
             self.assertIsNone(process.poll(), "ended early")
@@ -44,37 +44,45 @@ class Recordings(Cli):
     def test_a_recording_holds_what_the_manual_says(self):
         result = self.simulate(*FAST, "--set", "output.events_txt=true")
         self.assertEqual(result.returncode, 0, result.stderr)
-        names = {p.name for p in self.out.iterdir()}
-        self.assertEqual(names, {"calibration", "events.h5", "events.txt", "images", "poses.txt", "preview.mp4", "preview.png",
-                                 "report.json", "scenario.yaml", "states.csv", "truth.h5"})
+        self.assertEqual({p.name for p in self.out.iterdir()},
+                         {"calibration", "cam0", "poses.txt", "report.json", "scenario.yaml", "states.csv"})
+        self.assertEqual({p.name for p in (self.out / "cam0").iterdir()},
+                         {"events.h5", "events.txt", "images", "preview.mp4", "preview.png", "truth.h5"})
+        self.assertIn(str(self.out / "cam0" / "preview.png"), result.stderr)
         report = json.loads((self.out / "report.json").read_text())
         self.assertEqual(report["status"], "complete")
         self.assertAlmostEqual(report["simulated_s"], 0.2, places=9)
         camera = report["cameras"][0]
         self.assertEqual(camera["pixel_evaluations"], camera["frames"] * 64 * 48)
-        self.assertEqual(camera["events"], len((self.out / "events.txt").read_text().splitlines()))
+        self.assertEqual(camera["events"], len((self.out / "cam0" / "events.txt").read_text().splitlines()))
         self.assertEqual(len((self.out / "poses.txt").read_text().splitlines()), 1 + 41)
         self.assertFalse(any("\r" in line or "\033" in line for line in result.stderr.splitlines()), "a progress bar off a terminal")
 
     def test_the_same_bytes_with_one_thread_and_two_and_from_the_resolved_scenario(self):
         noise = ["--set", "event_camera.threshold_mismatch=0.02", "--seed", "3"]
         self.assertEqual(self.simulate(*FAST, *noise, "--threads", "1").returncode, 0)
-        first = (self.out / "events.h5").read_bytes()
+        first = (self.out / "cam0" / "events.h5").read_bytes()
         other = self.folder / "other"
         for arguments in ([SCENES / "poster.yaml", *FAST, *noise, "--threads", "2"], [self.out / "scenario.yaml"]):
             self.assertEqual(run("simulate", *arguments, "--out", other, "--force").returncode, 0)
-            self.assertEqual((other / "events.h5").read_bytes(), first)
+            self.assertEqual((other / "cam0" / "events.h5").read_bytes(), first)
         self.assertEqual(self.simulate(*FAST, "--seed", "4", "--force").returncode, 0)
-        self.assertNotEqual((self.out / "events.h5").read_bytes(), first)
+        self.assertNotEqual((self.out / "cam0" / "events.h5").read_bytes(), first)
 
     def test_several_cameras_have_folders(self):
         cameras = "cameras=[{width: 32, height: 24}, {name: right, width: 48, height: 32}]"
         scenario = self.folder / "s.yaml"
         text = (SCENES / "poster.yaml").read_text().replace("poster/", str(SCENES / "poster") + "/")
         scenario.write_text("\n".join(line for line in text.splitlines() if not line.startswith("camera:")))
-        result = self.simulate("--set", cameras, "--set", "duration_s=0.1", scenario=scenario)
+        truth = "truth={objects: true, displacement: true, event_points: true}"
+        result = self.simulate("--set", cameras, "--set", truth, "--set", "duration_s=0.1", scenario=scenario)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertTrue((self.out / "cam0" / "events.h5").exists() and (self.out / "right" / "preview.png").exists())
+        for camera in json.loads((self.out / "report.json").read_text())["cameras"]:
+            header = (self.out / camera["name"] / "event_points.ply").read_bytes().split(b"end_header")[0]
+            points = int(header.split(b"element vertex ")[1].split()[0])
+            self.assertLessEqual(points, camera["events"])
+            self.assertGreater(points, 0.7 * camera["events"], "most are on the poster")
         self.assertIn("right", run("info", self.out).stdout)
 
     def test_an_imu_is_written_the_same_again_from_the_resolved_scenario(self):
@@ -129,7 +137,7 @@ class Recordings(Cli):
 
     def test_info_and_check_and_options(self):
         self.simulate(*FAST)
-        for path in (self.out, self.out / "events.h5"):
+        for path in (self.out, self.out / "cam0", self.out / "cam0" / "events.h5"):
             result = run("info", path)
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertIn("64", result.stdout)
@@ -169,6 +177,8 @@ class BadInput(Cli):
             "sampling.lambda=.inf": "must be a number",
             "camera.width=0": "at least 1",
             "duration_s=-1": "above 0",
+            "truth.rate_hz=-1": "at least 0",
+            "truth={rate_hz: 0, displacement: true}": "joins two frames",
             "renderer.image=none.jpg": "no such file",
             "trajectory={type: file, path: none.txt}": "none.txt",
             "renderer.pose.look_at=[-5, 0, 0]": "sees nothing",

@@ -54,7 +54,7 @@ class Frames(ProgramTest):
     @property
     def place(self):
         """The files of the only camera."""
-        return self.out
+        return self.out / "cam0"
 
     def frames(self):
         with open(self.place / "frames.csv", newline="") as file:

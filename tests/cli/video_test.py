@@ -39,8 +39,8 @@ class Video(ProgramTest):
     def test_a_recording_holds_what_the_manual_says(self):
         result = self.video("--fps", "50", "--seed", "7", "--set", "event_camera.contrast_threshold=0.2")
         self.assertEqual(result.returncode, 0, result.stderr)
-        names = {p.name for p in self.out.iterdir()}
-        self.assertEqual(names, {"events.h5", "preview.mp4", "preview.png", "report.json", "video.yaml"})
+        self.assertEqual({p.name for p in self.out.iterdir()}, {"cam0", "report.json", "video.yaml"})
+        self.assertEqual({p.name for p in (self.out / "cam0").iterdir()}, {"events.h5", "preview.mp4", "preview.png"})
         report = json.loads((self.out / "report.json").read_text())
         self.assertEqual((report["status"], report["frames"], report["seed"]), ("complete", 6, 7))
         self.assertAlmostEqual(report["simulated_s"], 0.1)
@@ -55,7 +55,7 @@ class Video(ProgramTest):
         self.assertEqual(self.video("--fps", "50", "--force", "--quiet").stderr, "")
 
         # The preview is itself a video.
-        result = self.video("--no-interpolation", source=self.out / "preview.mp4", out=self.folder / "again")
+        result = self.video("--no-interpolation", source=self.out / "cam0" / "preview.mp4", out=self.folder / "again")
         self.assertEqual(result.returncode, 0, result.stderr)
 
     def test_one_file_of_events(self):
@@ -111,7 +111,7 @@ class Video(ProgramTest):
         lines = [f"{20_000_000 * i}, {i % 6}.pgm" for i in range(200_000)]
         (self.images / "images.csv").write_text("\n".join(lines))
         process = subprocess.Popen([ESIM, "video", self.images, "--out", self.out], stderr=subprocess.PIPE, text=True)
-        events = pathlib.Path(str(self.out) + ".incomplete") / "events.h5"
+        events = pathlib.Path(str(self.out) + ".incomplete") / "cam0" / "events.h5"
         deadline = time.time() + 60
         while not (events.exists() and events.stat().st_size > 50_000):
             self.assertIsNone(process.poll(), "ended early")

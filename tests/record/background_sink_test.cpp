@@ -68,6 +68,56 @@ TEST(BackgroundSink, PassesEverythingOnInOrder) {
   }
 }
 
+/// Keeps the sums of what ground truth consists of.
+class Summer final : public Sink {
+ public:
+  explicit Summer(std::vector<double>& sums) : sums_(sums) {}
+  void begin(const RecordingInfo&) override {}
+  void write(const Record& record) override {
+    const auto add = [&](const auto& image) {
+      double sum = 0;
+      for (const auto value : image.pixels()) sum += value;
+      sums_.push_back(sum);
+    };
+    if (const auto* truth = std::get_if<TruthRecord>(&record)) {
+      truth->object ? add(*truth->object) : add(truth->depth);
+      for (const SE3& pose : truth->T_world_objects) sums_.push_back(pose.translation.sum());
+    }
+    if (const auto* part = std::get_if<DisplacementRecord>(&record)) {
+      add(part->x), add(part->y), add(part->visible);
+      sums_.push_back(static_cast<double>(part->t0 + 10 * part->t1));
+    }
+    if (const auto* part = std::get_if<EventPointsRecord>(&record)) {
+      for (std::size_t i = 0; i < part->events.size(); ++i)
+        sums_.push_back(double{part->points[i].sum()} + part->events[i].x);
+    }
+  }
+  void end(bool) override {}
+
+ private:
+  std::vector<double>& sums_;
+};
+
+TEST(BackgroundSink, KeepsCopiesOfGroundTruth) {
+  std::vector<double> sums;
+  BackgroundSink sink(std::make_unique<Summer>(sums));
+  sink.begin({});
+  Image<float> image(2, 2, 0.5F), other(2, 2, 0.25F);
+  Image<std::uint16_t> object(2, 2, 3);
+  Image<std::uint8_t> visible(2, 2, 1);
+  std::vector<Event> events = {{1, 7, 0, 1}};
+  std::vector<Eigen::Vector3f> points = {{1, 2, 3}};
+  sink.write(TruthRecord{0, 1, {}, image, image, image, image});
+  std::vector<SE3> poses = {{Eigen::Quaterniond::Identity(), {1, 2, 3}}};
+  sink.write(TruthRecord{0, 2, {}, image, image, image, image, &object, poses});
+  sink.write(DisplacementRecord{0, 1, 2, image, other, visible});
+  sink.write(EventPointsRecord{0, events, points});
+  image.fill(-1), other.fill(-1), object.fill(9), visible.fill(9);
+  points[0].setZero(), poses[0].translation.setZero(), events[0].x = 0;
+  sink.end(true);
+  EXPECT_EQ(sums, (std::vector<double>{2, 12, 6, 2, 1, 4, 21, 13}));
+}
+
 TEST(BackgroundSink, ReportsFailuresOfTheInnerSink) {
   for (const int fail_at : {0, 1, 150, 300, 301}) {
     Log log;

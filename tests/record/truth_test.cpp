@@ -90,6 +90,58 @@ TEST(TruthHdf5, OptionsAndBytes) {
   EXPECT_EQ(bytes[0].find("flow"), std::string::npos);
 }
 
+TEST(TruthHdf5, HoldsObjectsByNameAndDisplacementsBetweenFrames) {
+  const TemporaryDirectory directory;
+  const auto path = directory.path() / "truth.h5";
+  TruthHdf5Writer writer(path, 0, {false, false, Compression::gzip, true, true});
+  RecordingInfo info = test::recording_info(4, 3, 0, kNsPerSecond);
+  info.objects = {"a car", "bird"};
+  writer.begin(info);
+  Image<std::uint16_t> object(4, 3);
+  Image<std::uint8_t> visible(4, 3, 1);
+  const TruthImages images(4, 3, 0);
+  for (std::uint16_t k = 0; k < 3; ++k) {
+    object(k, 1) = k;
+    TruthRecord truth = images.at(k);
+    EXPECT_THROW(writer.write(truth), InternalError) << "objects are missing";
+    const SE3 poses[] = {some_pose(k), some_pose(k + 0.5)};
+    const TruthRecord complete{0, k, {}, images.irradiance, images.depth, images.flow_x, images.flow_y, &object, poses};
+    writer.write(complete);
+    visible(0, 0) = static_cast<std::uint8_t>(k % 2);
+    if (k > 0) writer.write(DisplacementRecord{0, k - 1, k, images.flow_x, images.flow_y, visible});
+    writer.write(DisplacementRecord{1, 0, 1, images.flow_x, images.flow_y, visible});  // another camera's
+  }
+  writer.end(true);
+
+  const auto objects = read_dataset<std::uint16_t>(path, "objects", H5T_NATIVE_UINT16, {3, 3, 4});
+  EXPECT_EQ(objects[12 + 4 + 1], 1);
+  EXPECT_EQ(objects[24 + 4 + 2], 2);
+  EXPECT_EQ(objects[24 + 4 + 3], 0);
+  const auto poses = read_dataset<double>(path, "T_world_objects", H5T_NATIVE_DOUBLE, {3, 2, 7});
+  EXPECT_EQ(poses[14 + 7], some_pose(1.5).translation.x());
+  EXPECT_EQ(poses[28 + 6], some_pose(2).rotation.w());
+  const auto displacement = read_dataset<float>(path, "displacement", H5T_NATIVE_FLOAT, {2, 2, 3, 4});
+  EXPECT_EQ(displacement[12], images.flow_y(0, 0));
+  EXPECT_EQ(displacement[24 + 5], images.flow_x(1, 1));
+  const auto valid = read_dataset<std::uint8_t>(path, "displacement_valid", H5T_NATIVE_UINT8, {2, 3, 4});
+  EXPECT_EQ(valid[0], 1);
+  EXPECT_EQ(valid[12], 0);
+
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  const hid_t dataset = H5Dopen2(file, "objects", H5P_DEFAULT), names = H5Aopen(dataset, "names", H5P_DEFAULT);
+  const hid_t type = H5Aget_type(names), space = H5Aget_space(names);
+  EXPECT_EQ(H5Sget_simple_extent_npoints(space), 3);
+  EXPECT_EQ(H5Tget_size(type), 7U);
+  std::string cells(21, 'x');
+  H5Aread(names, type, cells.data());
+  EXPECT_EQ(cells, std::string("static\0a car\0\0bird\0\0\0", 21));
+  H5Sclose(space);
+  H5Tclose(type);
+  H5Aclose(names);
+  H5Dclose(dataset);
+  H5Fclose(file);
+}
+
 TEST(TruthHdf5, FullDisk) {
   const TemporaryDirectory directory;
   testing::internal::CaptureStderr();

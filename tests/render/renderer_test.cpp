@@ -147,6 +147,42 @@ TEST_P(EveryRenderer, ATileIsTheSameAsInTheWholeFrame) {
   EXPECT_EQ(sample.irradiance(60, 60), 0.0F) << "a pixel outside the tiles was touched";
 }
 
+TEST_P(EveryRenderer, SaysWhichObjectEachPixelSeesWhereAsked) {
+  const Sample plain = test::render(*renderer_, model_, camera_, objects_);
+  EXPECT_EQ(plain.object.empty(), objects_.empty());
+  RenderRequest request{test::kTime, camera_, {{0, 0, model_.width, model_.height}}, objects_, true};
+  Sample whole, tile;
+  renderer_->render(request, whole);
+  EXPECT_TRUE(std::ranges::equal(whole.irradiance.pixels(), plain.irradiance.pixels()));
+  EXPECT_TRUE(std::ranges::equal(whole.flow_x.pixels(), plain.flow_x.pixels()));
+  request.tiles = {{17, 3, 35, 21}};
+  renderer_->render(request, tile);
+
+  const bool misses_edges = name_ == "moving_gl" && std::get<1>(GetParam()) > 0;  // by half a pixel, through a lens
+  std::vector<int> count(3);
+  for (int y = 0; y < model_.height; ++y) {
+    for (int x = 0; x < model_.width; ++x) {
+      const int object = whole.object(x, y);
+      ASSERT_LE(object, 2);
+      ++count[static_cast<std::size_t>(object)];
+      ASSERT_TRUE(x < 17 || x >= 52 || y < 3 || y >= 24 || tile.object(x, y) == object);
+      if (objects_.empty()) continue;
+      // On the surface of that one of the test's boxes: 1 in the largest coordinate, relative to the box's half.
+      const Eigen::Vector3d point =
+          camera_.T_world_body * (double{whole.depth(x, y)} * model_.back_project(Eigen::Vector2d(x, y))->bearing);
+      const auto in_box = [&](const Eigen::Vector3d& p, double scale) {
+        return p.cwiseQuotient(scale * Eigen::Vector3d(4, 3, 2)).cwiseAbs().maxCoeff();
+      };
+      const double at[] = {in_box(point, 1), in_box(objects_[0].T_world_body.inverse() * point, 0.15),
+                           in_box(objects_[1].T_world_body.inverse() * point, 0.2)};
+      ASSERT_NEAR(at[object], 1, misses_edges ? 0.2 : 0.01) << x << ", " << y;
+    }
+  }
+  const bool has_objects = !objects_.empty() || name_ == "sprites";
+  EXPECT_EQ(std::min(count[1], count[2]) > 50, has_objects);
+  EXPECT_EQ(count[0] == model_.width * model_.height, !has_objects);
+}
+
 TEST_P(EveryRenderer, DoesNotDependOnThreadsOrHistory) {
   const Workers one(1);
   const auto other = test::make_renderer(name_, model_, one);
@@ -209,6 +245,28 @@ TEST(PanoramaRenderer, IsFiniteAtThePoles) {
   const Camera model = test::distorted_camera(0);
   const Sample sample = test::render(*test::make_renderer("panorama", model), model, camera);
   for (const float value : sample.irradiance.pixels()) EXPECT_TRUE(value > 0 && value < 1);
+}
+
+TEST(SpritesRenderer, SaysWhoseMotionEachPixelHas) {
+  const Camera model = test::distorted_camera(0);
+  const SpriteScene both = test::test_sprites();
+  const auto render = [&](const SpriteScene& scene) {
+    Sample sample;
+    make_sprites_renderer(scene, model, test::two_threads())
+        ->render({test::kTime, {}, {{0, 0, model.width, model.height}}, {}, true}, sample);
+    return sample;
+  };
+  const Sample found = render(both);
+  const Sample alone[] = {render({{both.sprites[0]}, 0.2F}), render({{both.sprites[1]}, 0.2F})};
+  bool uncovered = false;
+  for (int y = 0; y < model.height; ++y) {
+    for (int x = 0; x < model.width; ++x) {
+      const Sample& layer = alone[found.object(x, y) - 1];
+      ASSERT_EQ(found.flow_x(x, y), layer.flow_x(x, y)) << x << ", " << y;
+      uncovered = uncovered || alone[0].object(x, y) == 0;
+    }
+  }
+  EXPECT_TRUE(uncovered) << "0 beside the only layer";
 }
 
 TEST(PlaneRenderer, ShowsEachPointWhereItIs) {

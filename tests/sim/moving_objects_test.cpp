@@ -117,6 +117,7 @@ TEST_F(MovingObjects, AreTheSameWithAnyNumberOfThreads) {
   random.center.position = {-1, 0, 0};
   mesh().objects[0].trajectory = random;
   mesh().objects.push_back(mesh().objects[0]);
+  mesh().objects[1].name = "other card";
   mesh().lighting = LambertOptions{0.2, {{{1, 0.2, -0.5}, 1.0}}, {}, true};
   scenario_.duration_s = 0.3;
   Counter one, two, other_seed;
@@ -134,6 +135,7 @@ TEST_F(MovingObjects, OfOneSeedMoveEachInTheirOwnWay) {
   random.position_amplitude_m = {1, 1, 1};
   mesh().objects[0].trajectory = random;
   mesh().objects.push_back(mesh().objects[0]);
+  mesh().objects[1].name = "other card";
   const World world = build_world(scenario_, 1, {[](const std::string&) {}, [](const std::string&) {}});
   const auto request = view(world, 0, 500 * kNsPerMs);
   ASSERT_EQ(request.objects.size(), 2U);
@@ -148,6 +150,8 @@ TEST_F(MovingObjects, AreRefusedWhereTheirMotionIsNot) {
   EXPECT_EQ(error(), "nothing was thrown");
   std::get<FileTrajectoryOptions>(mesh().objects[0].trajectory).path.clear();
   EXPECT_TRUE(test::contains(error(), "renderer.objects.0.trajectory.path: is missing"));
+  mesh().objects.push_back(mesh().objects[0]);
+  EXPECT_TRUE(test::contains(error(), "renderer.objects.1.name: another object is named card too"));
   mesh().objects.clear();
   mesh().objects.resize(1);
   mesh().objects[0].trajectory = StaticTrajectoryOptions{};

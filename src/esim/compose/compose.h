@@ -59,11 +59,15 @@ std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const S
 using RendererFactory = std::function<std::unique_ptr<Renderer>(const Camera& camera, const Workers& workers)>;
 RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene);
 
-/// The files of a recording, to be written into `folder`: at its top for a single camera, in a folder per camera
-/// otherwise.
+/// Gives a world with cameras the ground truth that its scenario asks for. Throws UserError where that cannot be had.
+void prepare_truth(const Scenario& scenario, const SceneFile& scene, const RendererFactory& make_renderer,
+                   const Notices& notices, World& world);
+
+/// The files of a recording, to be written into `folder`: those of the rig at its top, those of a camera in a folder of
+/// its name.
 std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem::path& folder);
 
-/// The files of a converted video, to be written into `folder`.
+/// The files of a converted video, to be written into `folder`, likewise.
 std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& folder);
 
 /// A file of events alone, text if `text` and HDF5 otherwise.

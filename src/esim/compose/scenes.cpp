@@ -44,6 +44,11 @@ SceneFile load(const MeshRendererOptions& options, const Notices& notices) {
     require_path(object.scene, fmt::format("objects.{}.scene", i));
     SceneObject loaded{object.name.empty() ? fmt::format("object{}", i) : object.name,
                        load_mesh(readable(object.scene, notices), notices.warning), true};
+    for (const SceneObject& other : file.scene.objects) {
+      if (!other.moves || other.name != loaded.name) continue;
+      throw UserError(
+          fmt::format("renderer.objects.{}.name: another object is named {} too; name them apart", i, loaded.name));
+    }
     for (Eigen::Vector3f& vertex : loaded.mesh.vertices) vertex *= static_cast<float>(object.scale);
     file.scene.objects.push_back(std::move(loaded));
   }

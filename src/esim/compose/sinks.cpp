@@ -1,6 +1,7 @@
 #include "esim/compose/compose.h"
 #include "esim/record/background_sink.h"
 #include "esim/record/fan_out.h"
+#include "esim/record/formats/event_points_ply.h"
 #include "esim/record/formats/events_hdf5.h"
 #include "esim/record/formats/events_text.h"
 #include "esim/record/formats/frames_png.h"
@@ -43,26 +44,28 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
   }
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
     const int camera = static_cast<int>(i);
-    const auto place = scenario.cameras.size() == 1 ? folder : folder / scenario.cameras[i].name;
+    const auto place = folder / scenario.cameras[i].name;
     std::filesystem::create_directories(place);
     sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", camera, EventsHdf5Options{unit, compression}));
     if (output.events_txt) sinks->add(std::make_unique<EventsTextWriter>(place / "events.txt", camera));
     if (scenario.cameras[i].frame_camera) sinks->add(std::make_unique<FramesPngWriter>(place, camera));
+    if (truth.event_points) sinks->add(std::make_unique<EventPointsPlyWriter>(place / "event_points.ply", camera));
     if (truth.rate_hz <= 0) continue;
     if (truth.images) sinks->add(std::make_unique<ImagesPngWriter>(place / "images", camera));
-    if (truth.depth || truth.flow) {
-      sinks->add(std::make_unique<TruthHdf5Writer>(place / "truth.h5", camera,
-                                                   TruthHdf5Options{truth.depth, truth.flow, compression}));
-    }
+    const TruthHdf5Options datasets{truth.depth, truth.flow, compression, truth.objects, truth.displacement};
+    if (datasets.depth || datasets.flow || datasets.objects || datasets.displacement)
+      sinks->add(std::make_unique<TruthHdf5Writer>(place / "truth.h5", camera, datasets));
     if (output.preview) sinks->add(std::make_unique<PreviewWriter>(place, camera));
   }
   return std::make_unique<BackgroundSink>(std::move(sinks));
 }
 
 std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& folder) {
+  const auto place = folder / kConversionCamera;
+  std::filesystem::create_directories(place);
   auto sinks = std::make_unique<FanOut>();
-  sinks->add(std::make_unique<EventsHdf5Writer>(folder / "events.h5", 0));
-  sinks->add(std::make_unique<PreviewWriter>(folder, 0));
+  sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", 0));
+  sinks->add(std::make_unique<PreviewWriter>(place, 0));
   return std::make_unique<BackgroundSink>(std::move(sinks));
 }
 

@@ -84,14 +84,6 @@ void add_imu(const RigImuOptions& options, std::uint64_t seed, World& world) {
                     options.accelerometer.random_walk};
 }
 
-/// The views of a camera; outlives the world.
-std::function<RenderRequest(TimeNs)> view_at(const World& world, std::size_t camera) {
-  return [trajectory = world.trajectory, objects = world.objects,
-          T_body_camera = world.info.cameras[camera].T_body_camera](TimeNs t) {
-    return view(*trajectory, T_body_camera, objects, t);
-  };
-}
-
 bool sees_something(const Sample& sample) {
   const auto depth = sample.depth.pixels();
   return std::any_of(depth.begin(), depth.end(), [](float z) { return std::isfinite(z); });
@@ -131,6 +123,16 @@ void require_a_view(const World& world, std::size_t index) {
                   info.name, position.x(), position.y(), position.z()));
 }
 
+/// In the order in which renderers number it.
+void name_what_moves(const RendererOptions& renderer, const SceneFile& scene, RecordingInfo& info) {
+  for (const SceneObject& object : scene.scene.objects) {
+    if (object.moves) info.objects.push_back(object.name);
+  }
+  if (const auto* const sprites = std::get_if<SpritesRendererOptions>(&renderer)) {
+    for (std::size_t i = 0; i < sprites->layers.size(); ++i) info.layers.push_back(fmt::format("layer{}", i));
+  }
+}
+
 World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<const Trajectory> body,
             const TimeSpan& span, int threads, const Notices& notices) {
   World world;
@@ -144,9 +146,7 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
   world.pose_clock = PeriodicClock(span.start, span.end, scenario.truth.pose_rate_hz);
 
   if (scenario.imu) add_imu(*scenario.imu, scenario.seed, world);
-  for (const SceneObject& object : scene.scene.objects) {
-    if (object.moves) world.info.objects.push_back(object.name);
-  }
+  name_what_moves(scenario.renderer, scene, world.info);
 
   const SceneCamera* const followed = followed_camera(scenario, scene);
   for (CameraOptions options : scenario.cameras) {
@@ -182,6 +182,7 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
     require_a_view(world, i);
     name_what_has_no_effect(scenario, world, i, notices);
   }
+  prepare_truth(scenario, scene, make_renderer, notices, world);
   return world;
 }
 

@@ -1,5 +1,6 @@
 #include "esim/record/background_sink.h"
 
+#include <optional>
 #include <vector>
 
 namespace esim {
@@ -22,12 +23,47 @@ Copy copy_of(const EventsRecord& record) {
 Copy copy_of(const TruthRecord& record) {
   struct Images {
     Image<float> irradiance, depth, flow_x, flow_y;
+    std::optional<Image<std::uint16_t>> object;
+    std::vector<SE3> T_world_objects;
   };
-  auto images = std::make_shared<const Images>(Images{record.irradiance, record.depth, record.flow_x, record.flow_y});
-  return {[camera = record.camera, t = record.t, pose = record.T_world_camera, images](Sink& sink) {
-            sink.write(TruthRecord{camera, t, pose, images->irradiance, images->depth, images->flow_x, images->flow_y});
+  auto images = std::make_shared<Images>(Images{record.irradiance,
+                                                record.depth,
+                                                record.flow_x,
+                                                record.flow_y,
+                                                {},
+                                                {record.T_world_objects.begin(), record.T_world_objects.end()}});
+  if (record.object != nullptr) images->object = *record.object;
+  return {[camera = record.camera, t = record.t, pose = record.T_world_camera,
+           images = std::shared_ptr<const Images>(images)](Sink& sink) {
+            sink.write(TruthRecord{camera, t, pose, images->irradiance, images->depth, images->flow_x, images->flow_y,
+                                   images->object ? &*images->object : nullptr, images->T_world_objects});
           },
           4 * record.irradiance.size() * sizeof(float)};
+}
+
+Copy copy_of(const DisplacementRecord& record) {
+  struct Images {
+    Image<float> x, y;
+    Image<std::uint8_t> visible;
+  };
+  auto images = std::make_shared<const Images>(Images{record.x, record.y, record.visible});
+  return {[camera = record.camera, t0 = record.t0, t1 = record.t1, images](Sink& sink) {
+            sink.write(DisplacementRecord{camera, t0, t1, images->x, images->y, images->visible});
+          },
+          2 * record.x.size() * sizeof(float)};
+}
+
+Copy copy_of(const EventPointsRecord& record) {
+  struct Seen {
+    std::vector<Event> events;
+    std::vector<Eigen::Vector3f> points;
+  };
+  auto seen = std::make_shared<const Seen>(
+      Seen{{record.events.begin(), record.events.end()}, {record.points.begin(), record.points.end()}});
+  return {[camera = record.camera, seen](Sink& sink) {
+            sink.write(EventPointsRecord{camera, seen->events, seen->points});
+          },
+          record.events.size_bytes() + record.points.size_bytes()};
 }
 
 Copy copy_of(const ImageRecord& record) {

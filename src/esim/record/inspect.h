@@ -20,7 +20,7 @@ enum class RecordingStatus {
 
 /// What one stream of events holds.
 struct EventsSummary {
-  std::string camera;                ///< empty where there is only one
+  std::string camera;                ///< the folder in the recording; empty for a file, or the folder itself
   std::optional<int> width, height;  ///< px
   std::uint64_t events = 0, on = 0;
   TimeNs first = 0, last = 0;  ///< of the events; meaningless if there are none

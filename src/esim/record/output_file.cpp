@@ -40,6 +40,15 @@ void OutputFile::flush_if_full() {
   if (buffer_.size() >= kBufferBytes) flush();
 }
 
+void OutputFile::overwrite_start(std::string_view text) {
+  for (std::size_t done = 0; done < text.size();) {
+    const ssize_t written = ::pwrite(descriptor_, text.data() + done, text.size() - done, static_cast<off_t>(done));
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) throw_cannot_write(path_, system_reason(errno));
+    done += static_cast<std::size_t>(written);
+  }
+}
+
 void OutputFile::flush() {
   std::string_view rest = buffer_;
   while (!rest.empty()) {

@@ -22,6 +22,9 @@ class OutputFile {
   void append(std::string_view text);
   void flush_if_full();
 
+  /// Replaces the first bytes of what has been flushed, as many as `text` has.
+  void overwrite_start(std::string_view text);
+
   /// Hands what is buffered to the system, so that it survives the end of this process.
   void flush();
 

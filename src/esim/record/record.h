@@ -40,7 +40,10 @@ struct RecordingInfo {
   TimeNs end = 0;            ///< time of the last sample, if the recording becomes complete
   double truth_rate_hz = 0;  ///< frames of ground truth, or of a video, per second; 0: none
   std::optional<ImuInfo> imu{};
-  std::vector<std::string> objects{};  ///< names of the moving objects
+
+  // Names of what moves, in the order of its numbers: objects of the scene, or layers on the sensor.
+  std::vector<std::string> objects{};
+  std::vector<std::string> layers{};
 };
 
 /// Events of one camera, in order, none at or before what the same camera reported earlier.
@@ -58,6 +61,29 @@ struct TruthRecord {
   const Image<float>& depth;       ///< Z, planar, m; +inf where nothing is seen
   const Image<float>& flow_x;      ///< motion field, px/s, positive to the right
   const Image<float>& flow_y;      ///< motion field, px/s, positive downwards
+
+  /// Where wanted: 0, or i + 1 where moving object i is seen.
+  const Image<std::uint16_t>* object = nullptr;
+
+  /// Poses of the moving objects; none of layers, which are not in the world.
+  std::span<const SE3> T_world_objects{};
+};
+
+/// Where what one camera saw at t0 is at t1, the times of consecutive TruthRecords; follows the later one of them. The
+/// images are borrowed for the duration of the call.
+struct DisplacementRecord {
+  int camera = 0;
+  TimeNs t0 = 0, t1 = 0;
+  const Image<float>& x;               ///< px, positive to the right; NaN where there is no image of it at t1
+  const Image<float>& y;               ///< px, positive downwards
+  const Image<std::uint8_t>& visible;  ///< 1: seen at t1 as well; 0: hidden then, or outside the image
+};
+
+/// What the events of one camera saw; as many points as events.
+struct EventPointsRecord {
+  int camera = 0;
+  EventSpan events;
+  std::span<const Eigen::Vector3f> points;  ///< world frame, m; NaN: none
 };
 
 /// A frame of a video, as one camera sees it. The image is borrowed for the duration of the call.
@@ -78,7 +104,6 @@ struct FrameRecord {
   int bits = 8;                       ///< of each number
 };
 
-/// Pose of the body.
 /// Where the body and the moving objects are, and how they move.
 struct PoseRecord {
   TimeNs t = 0;
@@ -87,14 +112,14 @@ struct PoseRecord {
   std::optional<InertialSignals> imu_bias{};  ///< where there is an IMU
 };
 
-
 /// One measurement of the inertial measurement unit, and the biases in it.
 struct ImuRecord {
   TimeNs t = 0;
   InertialSignals measured{}, bias{};
 };
 
-using Record = std::variant<EventsRecord, TruthRecord, ImageRecord, FrameRecord, PoseRecord, ImuRecord>;
+using Record = std::variant<EventsRecord, TruthRecord, DisplacementRecord, EventPointsRecord, ImageRecord, FrameRecord,
+                            PoseRecord, ImuRecord>;
 
 /// Where a simulation goes: one class per format, each taking the kinds of record that it can hold.
 /// Calls come from one thread: begin, then write in time order per camera, then end.

@@ -23,7 +23,8 @@ std::vector<Tile> cut_into_bands(const std::vector<Tile>& tiles) {
 }  // namespace
 
 void prepare(const RenderRequest& request, int width, int height, Sample& sample) {
-  sample.resize(width, height, !request.objects.empty());
+  sample.resize(width, height, request.wants_objects());
+  if (request.objects.empty()) sample.object.fill(0);
   sample.t = request.t;
   sample.tiles = request.tiles;
 }

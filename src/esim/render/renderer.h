@@ -18,7 +18,10 @@ struct RenderRequest {
   Kinematics camera;        ///< pose and twist of the camera frame (x right, y down, z forward) at t
   std::vector<Tile> tiles;  ///< disjoint, inside the image, at least one
   std::vector<Kinematics>
-      objects{};  ///< pose T_world_object and twist of each moving object at t, in the scene's order
+      objects{};               ///< pose T_world_object and twist of each moving object at t, in the scene's order
+  bool which_objects = false;  ///< say which object each pixel sees also where that is not needed for V
+
+  bool wants_objects() const { return which_objects || !objects.empty(); }
 };
 
 /// The smallest thing that a renderer can evaluate at its proper cost.

@@ -19,8 +19,8 @@ struct Sample {
   Image<float> flow_x;      // V, px/s, to the right        by motion_field() from Z, object and the twists, or by the
   Image<float> flow_y;      // V, px/s, downwards           renderer where there is no space
 
-  // Which moving object is seen: 0 none, i + 1 the i-th of the request. Computed by the renderer; has no size where the
-  // request names no objects.
+  // Which moving object is seen: 0 none, i + 1 the i-th of the request, or of the layers that are drawn on the sensor.
+  // Computed by the renderer; has no size unless the request wants_objects().
   Image<std::uint16_t> object;
 
   /// Makes room for width x height pixels; keeps the content if the size is right already.

@@ -193,6 +193,9 @@ struct TruthOptions {
   bool images = true;
   bool depth = true;
   bool flow = true;
+  bool displacement = false;
+  bool objects = false;
+  bool event_points = false;
   double pose_rate_hz = 200;
 };
 

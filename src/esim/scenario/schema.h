@@ -42,7 +42,7 @@ void describe(Visitor& visit, SceneTrajectoryOptions& o) {
 
 template <class Visitor>
 void describe(Visitor& visit, ObjectOptions& o) {
-  visit("name", o.name, About{"for messages (default: object0, object1, ...)"});
+  visit("name", o.name, About{"in messages and ground truth; unique (default: object0, object1, ...)"});
   visit("scene", o.scene, About{"scene file, in the object's own coordinates"});
   visit("scale", o.scale, About{"factor that makes its coordinates metres", "", 0, 1e6, true});
   visit("trajectory", o.trajectory, About{"how it moves: pose of its coordinates in the world"});
@@ -207,6 +207,10 @@ void describe(Visitor& visit, TruthOptions& o) {
   visit("images", o.images, About{"write images/, 8-bit sRGB"});
   visit("depth", o.depth, About{"write depth to truth.h5"});
   visit("flow", o.flow, About{"write the motion field to truth.h5"});
+  visit("displacement", o.displacement,
+        About{"write optical flow from each frame to the next to truth.h5, with what is hidden"});
+  visit("objects", o.objects, About{"write which moving object, or layer, each pixel sees to truth.h5"});
+  visit("event_points", o.event_points, About{"write the point of the scene that each event sees to event_points.ply"});
   visit("pose_rate_hz", o.pose_rate_hz, About{"poses per second in poses.txt and states.csv; 0: none", "Hz", 0, 1e6});
 }
 

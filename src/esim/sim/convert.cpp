@@ -89,7 +89,7 @@ class Run {
     const double duration_s = to_seconds(info.end - info.start);
     info.truth_rate_hz = duration_s > 0 ? static_cast<double>(frames.frames() - 1) / duration_s : 0;
     CameraInfo camera;
-    camera.name = "cam0";
+    camera.name = kConversionCamera;
     camera.model.width = summary_.width;
     camera.model.height = summary_.height;
     info.cameras.push_back(camera);

@@ -12,6 +12,9 @@
 
 namespace esim {
 
+/// Name of the camera that sees the video.
+inline constexpr const char* kConversionCamera = "cam0";
+
 /// What a conversion did, for the report.
 struct ConversionSummary {
   bool complete = false;

@@ -159,8 +159,18 @@ class Simulator::Run {
         summary_.cameras[i].events_on += on;
         summary_.cameras[i].events_off += static_cast<std::int64_t>(events_.size()) - on;
       }
-      if (!events_.empty()) write(EventsRecord{static_cast<int>(i), events_});
+      if (events_.empty()) continue;
+      write(EventsRecord{static_cast<int>(i), events_});
+      if (world_.cameras[i].event_points) deliver_event_points(i);
     }
+  }
+
+  void deliver_event_points(std::size_t camera) {
+    {
+      Stopwatch stopwatch(summary_.seconds.truth);
+      world_.cameras[camera].event_points->locate(events_, event_points_);
+    }
+    write(EventPointsRecord{static_cast<int>(camera), events_, event_points_});
   }
 
   void deliver_pose(TimeNs t) {
@@ -182,13 +192,22 @@ class Simulator::Run {
 
   void deliver_truth(TimeNs t) {
     for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
-      const RenderRequest request = view(world_, i, t);
+      RenderRequest request = view(world_, i, t);
+      request.which_objects = world_.truth_objects;
+      object_poses_.clear();
+      for (const Kinematics& object : request.objects) object_poses_.push_back(object.T_world_body);
+      const Displacement* displacement = nullptr;
       {
         Stopwatch stopwatch(summary_.seconds.truth);
         world_.cameras[i].renderer->render(request, truth_);
+        if (world_.cameras[i].displacement) displacement = world_.cameras[i].displacement->advance(request, truth_);
       }
       write(TruthRecord{static_cast<int>(i), t, request.camera.T_world_body, truth_.irradiance, truth_.depth,
-                        truth_.flow_x, truth_.flow_y});
+                        truth_.flow_x, truth_.flow_y, world_.truth_objects ? &truth_.object : nullptr, object_poses_});
+      if (displacement != nullptr) {
+        write(DisplacementRecord{static_cast<int>(i), displacement->t0, displacement->t1, displacement->x,
+                                 displacement->y, displacement->visible});
+      }
       ++summary_.truth_frames;
     }
     world_.truth_clock.advance();
@@ -215,6 +234,8 @@ class Simulator::Run {
   TimeNs known_until_;
   Summary summary_;
   std::vector<Event> events_;
+  std::vector<Eigen::Vector3f> event_points_;
+  std::vector<SE3> object_poses_;
   Sample truth_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };

@@ -17,7 +17,7 @@ struct StageSeconds {
   double sampling = 0;  ///< choosing times, reconstructing between keyframes
   double events = 0;    ///< pixels, and ordering of events
   double frames = 0;    ///< exposing and reading out frame cameras
-  double truth = 0;     ///< rendering of ground truth
+  double truth = 0;     ///< making of ground truth
   double write = 0;     ///< handing over to sinks; what they do on threads of their own does not count
 };
 

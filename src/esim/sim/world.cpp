@@ -11,6 +11,13 @@ RenderRequest view(const Trajectory& body, const SE3& T_body_camera,
   return request;
 }
 
+std::function<RenderRequest(TimeNs)> view_at(const World& world, std::size_t camera) {
+  return [trajectory = world.trajectory, objects = world.objects,
+          T_body_camera = world.info.cameras[camera].T_body_camera](TimeNs t) {
+    return view(*trajectory, T_body_camera, objects, t);
+  };
+}
+
 RenderRequest view(const World& world, std::size_t camera, TimeNs t, std::vector<Tile> tiles) {
   RenderRequest request = view(*world.trajectory, world.info.cameras[camera].T_body_camera, world.objects, t);
   request.tiles = std::move(tiles);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -14,6 +15,8 @@
 #include "esim/sensors/frame_camera.h"
 #include "esim/sensors/imu.h"
 #include "esim/truth/clock.h"
+#include "esim/truth/displacement.h"
+#include "esim/truth/event_points.h"
 
 namespace esim {
 
@@ -26,6 +29,10 @@ struct CameraChannel {
   std::unique_ptr<Rendering> rendering{};  // the one that the sampler wants next, under way
   std::unique_ptr<Renderer> keyframes{};   // what the sampler asks, where its camera is denser than the sensor's
   std::optional<FrameCamera> frame_camera{};
+
+  // Ground truth, where it is wanted.
+  std::unique_ptr<DisplacementField> displacement{};
+  std::unique_ptr<EventPoints> event_points{};
 
   Renderer& sampled() { return keyframes != nullptr ? *keyframes : *renderer; }
 };
@@ -46,11 +53,15 @@ struct World {
   std::vector<CameraChannel> cameras;                      // as in info.cameras
   PeriodicClock truth_clock, pose_clock;
   std::optional<ImuChannel> imu{};
+  bool truth_objects = false;  // ground truth says which object each pixel sees
 };
 
 /// Where a camera and the moving objects are at `t`; no tiles.
 RenderRequest view(const Trajectory& body, const SE3& T_body_camera,
                    std::span<const std::shared_ptr<const Trajectory>> objects, TimeNs t);
+
+/// The same for a camera of the world, as a function that may outlive it.
+std::function<RenderRequest(TimeNs)> view_at(const World& world, std::size_t camera);
 
 /// What a camera of the world is asked to show of `tiles` at `t`: here the motions are evaluated.
 RenderRequest view(const World& world, std::size_t camera, TimeNs t, std::vector<Tile> tiles);

@@ -71,7 +71,7 @@ class GlRenderer final : public Renderer {
     for (const Tile& tile : request.tiles) complete(tile);
     auto under_way = std::make_unique<UnderWay>(*this, std::move(request));
     under_way->read_back->start(view_.distorts ? distorted_ : resolved_, under_way->request.tiles,
-                                !under_way->request.objects.empty());
+                                under_way->request.wants_objects());
     throw_on_gl_error("rendering");
     return under_way;
   }

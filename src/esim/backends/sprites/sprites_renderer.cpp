@@ -50,6 +50,7 @@ inline float mirrored(float coordinate) {
 /// A layer as it lies on the sensor at one time.
 struct PlacedSprite {
   const Sprite* sprite;
+  std::uint16_t number;           // in the scene, from 1
   Eigen::Matrix2d uv_from_pixel;  // (u, v) = 1/2 + uv_from_pixel (pixel - centre)
   Eigen::Matrix2d flow_gradient;  // V = velocity + flow_gradient (pixel - centre)
   Eigen::Vector2d centre, velocity;
@@ -63,7 +64,7 @@ struct PlacedSprite {
 };
 
 /// Nothing where the layer is degenerate: seen from its edge, or too small to be seen.
-std::optional<PlacedSprite> place_on_sensor(const Sprite& sprite, TimeNs t, PixelSize sensor) {
+std::optional<PlacedSprite> place_on_sensor(const Sprite& sprite, std::uint16_t number, TimeNs t, PixelSize sensor) {
   constexpr double kLeastArea_px2 = 1e-6;
   const LayerPlacement at =
       place(sprite.motion.at(t), sprite.units, {sprite.light->width(), sprite.light->height()}, sensor);
@@ -74,6 +75,7 @@ std::optional<PlacedSprite> place_on_sensor(const Sprite& sprite, TimeNs t, Pixe
   Eigen::Vector2d reach = 0.5 * at.A.cwiseAbs().rowwise().sum() + Eigen::Vector2d::Constant(1.0);
   if (sprite.beyond != LayerBeyond::nothing) reach.setConstant(std::numeric_limits<double>::infinity());
   return PlacedSprite{&sprite,
+                      number,
                       inverse,
                       at.A_rate * inverse,
                       at.centre,
@@ -86,14 +88,17 @@ std::optional<PlacedSprite> place_on_sensor(const Sprite& sprite, TimeNs t, Pixe
 /// Some pixels of a row while layers are laid on them, from front to back.
 class Span {
  public:
-  Span(int first, int row) : first_(first), row_(row) { transmittance_.fill(1.0F); }
+  /// `which`: find out which layer each pixel sees.
+  Span(int first, int row, bool which) : first_(first), row_(row), which_(which) { transmittance_.fill(1.0F); }
 
   void lay_under(const PlacedSprite& placed);
 
   void lay_background(float irradiance) {
     for (unsigned i = 0; i < kLanes; ++i) {
       irradiance_[i] += transmittance_[i] * irradiance;
-      if (transmittance_[i] > weight_[i]) flow_x_[i] = flow_y_[i] = 0.0F;
+      if (transmittance_[i] <= weight_[i]) continue;
+      flow_x_[i] = flow_y_[i] = 0.0F;
+      number_[i] = 0;
     }
   }
 
@@ -106,16 +111,19 @@ class Span {
     std::copy_n(flow_x_.begin(), count, sample.flow_x.row(row_) + first_);
     std::copy_n(flow_y_.begin(), count, sample.flow_y.row(row_) + first_);
     std::fill_n(sample.depth.row(row_) + first_, count, std::numeric_limits<float>::infinity());
+    if (which_) std::copy_n(number_.begin(), count, sample.object.row(row_) + first_);
   }
 
  private:
   TextureLookup<kLanes> lookup(const PlacedSprite& placed) const;
 
   int first_, row_;
+  bool which_;
   alignas(64) Lanes transmittance_{};  // of all layers so far
   alignas(64) Lanes irradiance_{};
   alignas(64) Lanes weight_{};  // the largest share of a layer in its pixel
   alignas(64) Lanes flow_x_{}, flow_y_{};
+  std::array<std::uint16_t, kLanes> number_{};  // of the layer with that share
 };
 
 TextureLookup<kLanes> Span::lookup(const PlacedSprite& placed) const {
@@ -155,6 +163,7 @@ void Span::lay_under(const PlacedSprite& placed) {
   const Eigen::Vector2d pixel(0, row_);
   const Eigen::Vector2f origin = (placed.velocity + placed.flow_gradient * (pixel - placed.centre)).cast<float>();
   const float fx_x = G(0, 0), fy_x = G(1, 0), fx_0 = origin.x(), fy_0 = origin.y();
+  const Lanes before = weight_;
   for (int i = 0; i < kLanes; ++i) {
     const auto lane = static_cast<unsigned>(i);
     const auto x = static_cast<float>(first_ + i);
@@ -166,6 +175,7 @@ void Span::lay_under(const PlacedSprite& placed) {
     weight_[lane] = std::max(weight, weight_[lane]);
     transmittance_[lane] *= std::max(0.0F, 1.0F - covers);
   }
+  for (unsigned i = 0; which_ && i < kLanes; ++i) number_[i] = weight_[i] > before[i] ? placed.number : number_[i];
 }
 
 class SpritesRenderer final : public ProcessorRenderer {
@@ -180,8 +190,9 @@ class SpritesRenderer final : public ProcessorRenderer {
  private:
   void compute(const RenderRequest& request, Sample& sample) const override {
     std::vector<PlacedSprite> placed;
+    std::uint16_t number = 0;
     for (const Sprite& sprite : scene_.sprites) {
-      if (const auto here = place_on_sensor(sprite, request.t, sensor_)) placed.push_back(*here);
+      if (const auto here = place_on_sensor(sprite, ++number, request.t, sensor_)) placed.push_back(*here);
     }
     render_in_bands(request, sensor_.width, sensor_.height, workers_, sample, [&](const Tile& band) {
       for (int y = band.y; y < band.y + band.height; ++y) {
@@ -193,7 +204,7 @@ class SpritesRenderer final : public ProcessorRenderer {
   }
 
   void shade(const std::vector<PlacedSprite>& placed, int first, int row, int count, Sample& sample) const {
-    Span span(first, row);
+    Span span(first, row, !sample.object.empty());
     for (const PlacedSprite& sprite : placed) {
       if (!sprite.reaches(first, row)) continue;
       span.lay_under(sprite);

@@ -1,5 +1,6 @@
 #include "esim/record/formats/hdf5_detail.h"
 
+#include <algorithm>
 #include <array>
 
 #include "esim/core/error.h"
@@ -160,6 +161,21 @@ void Output::create_text_attribute(hid_t object, const char* name, const std::st
   const Handle attribute(H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
   check(static_cast<hid_t>(attribute));
   check(H5Awrite(attribute, type, value.c_str()));
+}
+
+void Output::create_text_attribute(hid_t object, const char* name, const std::vector<std::string>& values) const {
+  std::size_t longest = 0;
+  for (const std::string& value : values) longest = std::max(longest, value.size());
+  std::string cells;  // of one size each, filled up with zeros
+  for (const std::string& value : values) cells += value + std::string(longest + 1 - value.size(), '\0');
+  const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  check(H5Tset_size(type, longest + 1));
+  check(H5Tset_cset(type, H5T_CSET_UTF8));
+  const hsize_t count = values.size();
+  const Handle space(H5Screate_simple(1, &count, nullptr), H5Sclose);
+  const Handle attribute(H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  check(static_cast<hid_t>(attribute));
+  check(H5Awrite(attribute, type, cells.data()));
 }
 
 void Output::create_scalar(const char* name, std::int64_t value) const {

@@ -99,6 +99,7 @@ class Output {
   template <typename T>
   Handle create_attribute(hid_t object, const char* name, T value) const;
   void create_text_attribute(hid_t object, const char* name, const std::string& value) const;
+  void create_text_attribute(hid_t object, const char* name, const std::vector<std::string>& values) const;
   void create_scalar(const char* name, std::int64_t value) const;
 
  private:

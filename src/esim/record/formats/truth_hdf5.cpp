@@ -1,8 +1,7 @@
 #include "esim/record/formats/truth_hdf5.h"
 
-#include <algorithm>
-#include <array>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "esim/core/error.h"
@@ -19,37 +18,41 @@ struct TruthHdf5Writer::Impl {
     file.reset();
   }
 
-  void create(const CameraInfo& info);
+  void create(const RecordingInfo& recording);
   void append(const TruthRecord& truth);
+  void append(const DisplacementRecord& displacement);
+  void append(hdf5::Series& series, const Image<float>& x, const Image<float>& y);
+  void append(hdf5::Series& series, std::span<const SE3> poses);
+  void append_object_poses(std::span<const SE3> poses);
+  void describe(const hdf5::Series& series, const char* unit, const char* convention) const;
   void close_series() {
     esim_complete.reset();
-    for (hdf5::Series* series : {&t, &pose, &depth, &flow}) *series = hdf5::Series();
+    for (hdf5::Series* series : {&t, &pose, &depth, &flow, &objects, &object_poses, &displacement, &displacement_valid})
+      *series = hdf5::Series();
   }
-  void check_size(const Image<float>& image) const;
+  template <typename T>
+  void check_size(const Image<T>& image) const;
 
   std::filesystem::path path;
   int camera;
   TruthHdf5Options options;
   int width = 0, height = 0;
-  std::vector<float> flow_frame;
+  std::vector<float> vector_frame;
 
   // The series close before the file.
   std::optional<hdf5::Output> file;
   hdf5::Handle esim_complete;
-  hdf5::Series t, pose, depth, flow;
+  hdf5::Series t, pose, depth, flow, objects, object_poses, displacement, displacement_valid;
 };
 
-void TruthHdf5Writer::Impl::create(const CameraInfo& info) {
+void TruthHdf5Writer::Impl::create(const RecordingInfo& recording) {
+  const CameraInfo& info = recording.cameras.at(static_cast<std::size_t>(camera));
   width = info.model.width;
   height = info.model.height;
   const auto rows = static_cast<hsize_t>(height), columns = static_cast<hsize_t>(width);
 
   const hdf5::Quiet quiet;
   file.emplace(path);
-  const auto describe = [&](const hdf5::Series& series, const char* unit, const char* convention) {
-    file->create_text_attribute(series.id(), "unit", unit);
-    file->create_text_attribute(series.id(), "convention", convention);
-  };
   t = hdf5::Series(*file, "t", {H5T_STD_I64LE, {}, 256, Compression::none});
   describe(t, "ns", "time of the frame");
   pose = hdf5::Series(*file, "T_world_camera", {H5T_IEEE_F64LE, {7}, 64, Compression::none});
@@ -63,7 +66,24 @@ void TruthHdf5Writer::Impl::create(const CameraInfo& info) {
   if (options.flow) {
     flow = hdf5::Series(*file, "flow", {H5T_IEEE_F32LE, {2, rows, columns}, 1, options.compression});
     describe(flow, "px/s", "[frame, component, y, x]: velocity of the image point, x to the right, then y downwards");
-    flow_frame.resize(2 * rows * columns);
+  }
+  if (options.objects) {
+    objects = hdf5::Series(*file, "objects", {H5T_STD_U16LE, {rows, columns}, 1, options.compression});
+    describe(objects, "index of names", "[frame, y, x]: which object is seen; 0: what stands still, or nothing");
+    std::vector<std::string> names = {"static"};
+    names.insert(names.end(), recording.objects.begin(), recording.objects.end());
+    names.insert(names.end(), recording.layers.begin(), recording.layers.end());
+    file->create_text_attribute(objects.id(), "names", names);
+  }
+  if (options.displacement) {
+    displacement = hdf5::Series(*file, "displacement", {H5T_IEEE_F32LE, {2, rows, columns}, 1, options.compression});
+    describe(displacement, "px",
+             "[frame k, component, y, x]: where the point seen in frame k is in frame k + 1, less where it is in frame "
+             "k; x to the right, then y downwards; NaN where there is no image of it");
+    displacement_valid =
+        hdf5::Series(*file, "displacement_valid", {H5T_STD_U8LE, {rows, columns}, 1, options.compression});
+    describe(displacement_valid, "1",
+             "[frame k, y, x]: 1 where frame k + 1 shows the point; 0 where something hides it, or outside the image");
   }
   file->create_attribute(file->id(), "width", static_cast<std::uint32_t>(width));
   file->create_attribute(file->id(), "height", static_cast<std::uint32_t>(height));
@@ -71,7 +91,13 @@ void TruthHdf5Writer::Impl::create(const CameraInfo& info) {
   file->flush();
 }
 
-void TruthHdf5Writer::Impl::check_size(const Image<float>& image) const {
+void TruthHdf5Writer::Impl::describe(const hdf5::Series& series, const char* unit, const char* convention) const {
+  file->create_text_attribute(series.id(), "unit", unit);
+  file->create_text_attribute(series.id(), "convention", convention);
+}
+
+template <typename T>
+void TruthHdf5Writer::Impl::check_size(const Image<T>& image) const {
   if (image.width() == width && image.height() == height) return;
   throw InternalError(path.string() + ": a ground-truth image has " + std::to_string(image.width()) + "x" +
                       std::to_string(image.height()) + " pixels, its camera " + std::to_string(width) + "x" +
@@ -84,20 +110,51 @@ void TruthHdf5Writer::Impl::append(const TruthRecord& truth) {
     check_size(truth.depth);
     depth.append(truth.depth.pixels());
   }
-  if (options.flow) {
-    check_size(truth.flow_x);
-    check_size(truth.flow_y);
-    const auto middle = std::copy(truth.flow_x.pixels().begin(), truth.flow_x.pixels().end(), flow_frame.begin());
-    std::copy(truth.flow_y.pixels().begin(), truth.flow_y.pixels().end(), middle);
-    flow.append(std::span<const float>(flow_frame));
+  if (options.flow) append(flow, truth.flow_x, truth.flow_y);
+  if (options.objects) {
+    if (truth.object == nullptr) throw InternalError(path.string() + ": a ground-truth frame does not say its objects");
+    check_size(*truth.object);
+    objects.append(truth.object->pixels());
+    append_object_poses(truth.T_world_objects);
   }
-  const Eigen::Vector3d& p = truth.T_world_camera.translation;
-  const Eigen::Quaterniond& q = truth.T_world_camera.rotation;
-  const std::array<double, 7> numbers = {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
-  pose.append(std::span<const double>(numbers));
+  append(pose, {&truth.T_world_camera, 1});
   const std::int64_t time = truth.t;
   t.append(std::span<const std::int64_t>(&time, 1));
   file->flush();
+}
+
+void TruthHdf5Writer::Impl::append(const DisplacementRecord& record) {
+  const hdf5::Quiet quiet;
+  append(displacement, record.x, record.y);
+  check_size(record.visible);
+  displacement_valid.append(record.visible.pixels());
+  file->flush();
+}
+
+void TruthHdf5Writer::Impl::append(hdf5::Series& series, const Image<float>& x, const Image<float>& y) {
+  check_size(x);
+  check_size(y);
+  vector_frame.assign(x.pixels().begin(), x.pixels().end());
+  vector_frame.insert(vector_frame.end(), y.pixels().begin(), y.pixels().end());
+  series.append(std::span<const float>(vector_frame));
+}
+
+void TruthHdf5Writer::Impl::append(hdf5::Series& series, std::span<const SE3> poses) {
+  std::vector<double> numbers;
+  for (const auto& [q, p] : poses) numbers.insert(numbers.end(), {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()});
+  series.append(std::span<const double>(numbers));
+}
+
+/// How many there are, the first frame says.
+void TruthHdf5Writer::Impl::append_object_poses(std::span<const SE3> poses) {
+  if (poses.empty()) return;
+  if (object_poses.id() < 0) {
+    object_poses = hdf5::Series(*file, "T_world_objects", {H5T_IEEE_F64LE, {poses.size(), 7}, 64, Compression::none});
+    describe(object_poses, "m",
+             "[frame, object]: tx ty tz qx qy qz qw: p_world = R(q) p_object + t; in the order of the names of "
+             "`objects`, without the first, static");
+  }
+  append(object_poses, poses);
 }
 
 TruthHdf5Writer::TruthHdf5Writer(std::filesystem::path path, int camera, TruthHdf5Options options)
@@ -107,13 +164,14 @@ TruthHdf5Writer::TruthHdf5Writer(std::filesystem::path path, int camera, TruthHd
 
 TruthHdf5Writer::~TruthHdf5Writer() = default;
 
-void TruthHdf5Writer::begin(const RecordingInfo& info) {
-  impl_->create(info.cameras.at(static_cast<std::size_t>(impl_->camera)));
-}
+void TruthHdf5Writer::begin(const RecordingInfo& info) { impl_->create(info); }
 
 void TruthHdf5Writer::write(const Record& record) {
   const auto* truth = std::get_if<TruthRecord>(&record);
   if (truth != nullptr && truth->camera == impl_->camera) impl_->append(*truth);
+  const auto* displacement = std::get_if<DisplacementRecord>(&record);
+  if (displacement != nullptr && displacement->camera == impl_->camera && impl_->options.displacement)
+    impl_->append(*displacement);
 }
 
 void TruthHdf5Writer::end(bool complete) {

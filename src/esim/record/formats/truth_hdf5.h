@@ -12,14 +12,20 @@ struct TruthHdf5Options {
   bool depth = true;
   bool flow = true;
   Compression compression = Compression::blosc;
+  bool objects = false;
+  bool displacement = false;
 };
 
 /// Ground truth of one camera:
 ///
-///   t               int64 [N]           ns
-///   T_world_camera  float64 [N, 7]      tx ty tz (m) qx qy qz qw
-///   depth           float32 [N, H, W]   m, planar; +inf where nothing is seen
-///   flow            float32 [N, 2, H, W]  px/s, x to the right, then y downwards
+///   t                   int64 [N]              ns
+///   T_world_camera      float64 [N, 7]         tx ty tz (m) qx qy qz qw
+///   depth               float32 [N, H, W]      m, planar; +inf where nothing is seen
+///   flow                float32 [N, 2, H, W]   px/s, x to the right, then y downwards
+///   objects             uint16 [N, H, W]       index of its attribute `names`; 0: what stands still
+///   T_world_objects     float64 [N, K, 7]      of the K objects with a pose in the world, without [0]
+///   displacement        float32 [N-1, 2, H, W] px, from frame k to frame k + 1; NaN where there is no image
+///   displacement_valid  uint8 [N-1, H, W]      1: seen in frame k + 1 as well
 ///
 /// with units and conventions as attributes of each. One frame is one chunk, and is in the file as soon as write()
 /// returns.

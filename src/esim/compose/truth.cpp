@@ -1,0 +1,86 @@
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "esim/compose/compose.h"
+#include "esim/core/error.h"
+
+namespace esim {
+namespace {
+
+void check_displacement(const TruthOptions& truth, PeriodicClock clock, double duration_s,
+                        const RendererTraits& renderer) {
+  if (!truth.displacement) return;
+  if (renderer.on_sensor) {
+    throw UserError(fmt::format("truth.displacement: {} are drawn on the sensor, where nothing has depth; remove it",
+                                renderer.name));
+  }
+  const bool has_frames = clock.due() != PeriodicClock::kNever;
+  if (has_frames) clock.advance();
+  if (clock.due() != PeriodicClock::kNever) return;
+  throw UserError(
+      fmt::format("truth.displacement: joins two frames of ground truth, but rate_hz = {} gives {} in {:.6g} s; raise "
+                  "truth.rate_hz",
+                  truth.rate_hz, has_frames ? 1 : 0, duration_s));
+}
+
+void check_event_points(const TruthOptions& truth, const RendererTraits& renderer) {
+  if (truth.event_points && renderer.at_infinity) {
+    throw UserError(fmt::format("truth.event_points: all that {} shows is infinitely far; remove it", renderer.name));
+  }
+}
+
+/// A rate in the wrong unit fills the disk.
+void warn_of_much(const Scenario& scenario, double duration_s, const Notices& notices) {
+  constexpr double kMuch = 1e11;
+  const TruthOptions& truth = scenario.truth;
+  if (truth.rate_hz <= 0) return;
+  double pixels = 0;
+  for (const CameraOptions& camera : scenario.cameras) pixels += static_cast<double>(camera.width) * camera.height;
+  const int bytes_per_pixel = (truth.images ? 1 : 0) + (truth.depth ? 4 : 0) + (truth.flow ? 8 : 0) +
+                              (truth.displacement ? 9 : 0) + (truth.objects ? 2 : 0);
+  const double frames = std::floor(duration_s * truth.rate_hz) + 1, bytes = frames * pixels * bytes_per_pixel;
+  if (bytes <= kMuch) return;
+  notices.warning(
+      fmt::format("truth.rate_hz = {} makes {:.0f} frames for each camera, {:.0f} GB before compression; "
+                  "is it meant?",
+                  truth.rate_hz, frames, bytes * 1e-9));
+}
+
+/// Renderers of the same scene on the processor, as fast as they are for single pixels where depth is all that counts:
+/// a graphics card would draw everything for each.
+RendererFactory for_single_pixels(const RendererFactory& make_renderer, RendererOptions options, SceneFile scene) {
+  auto* const mesh = std::get_if<MeshRendererOptions>(&options);
+  if (mesh == nullptr) return make_renderer;
+  mesh->engine = MeshEngine::raycast;
+  mesh->samples_per_pixel = 1;
+  scene.scene.lighting.reset();
+  return build_renderer_factory(options, scene);
+}
+
+}  // namespace
+
+void prepare_truth(const Scenario& scenario, const SceneFile& scene, const RendererFactory& make_renderer,
+                   const Notices& notices, World& world) {
+  const TruthOptions& truth = scenario.truth;
+  const double duration_s = to_seconds(world.info.end - world.info.start);
+  const RendererTraits traits = world.cameras.front().renderer->traits();
+  check_displacement(truth, world.truth_clock, duration_s, traits);
+  check_event_points(truth, traits);
+  warn_of_much(scenario, duration_s, notices);
+
+  world.truth_objects = truth.objects;
+  RendererFactory make_pixel_renderer;
+  if (truth.event_points) make_pixel_renderer = for_single_pixels(make_renderer, scenario.renderer, scene);
+  for (std::size_t i = 0; i < world.cameras.size(); ++i) {
+    CameraChannel& camera = world.cameras[i];
+    const Camera& model = world.info.cameras[i].model;
+    if (truth.displacement) camera.displacement = std::make_unique<DisplacementField>(model, *world.workers);
+    if (truth.event_points) {
+      camera.event_points = std::make_unique<EventPoints>(model, make_pixel_renderer, view_at(world, i),
+                                                          TimeSpan{world.info.start, world.info.end}, *world.workers);
+    }
+  }
+}
+
+}  // namespace esim

@@ -109,7 +109,8 @@ class Run {
     Stopwatch stopwatch(summary_.seconds.render);
     auto next = camera.sampler->next();
     if (!next) return camera.rendering.reset();
-    camera.rendering = camera.sampled().start(view(world_, index_of(camera), next->t, std::move(next->tiles)));
+    Renderer& renderer = camera.asked_for(*next);
+    camera.rendering = renderer.start(view(world_, index_of(camera), next->t, std::move(next->tiles)));
   }
 
   double elapsed() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }

@@ -23,7 +23,9 @@ struct CameraChannel {
   std::unique_ptr<Rendering> rendering{};  // the one that the sampler wants next, under way
   std::unique_ptr<Renderer> keyframes{};   // what the sampler asks, where its camera is denser than the sensor's
 
-  Renderer& sampled() { return keyframes != nullptr ? *keyframes : *renderer; }
+  Renderer& asked_for(const SampleRequest& request) {
+    return keyframes != nullptr && !request.of_sensor ? *keyframes : *renderer;
+  }
 };
 
 /// The state of a simulation. Its description is a RecordingInfo, which does not change.

@@ -127,6 +127,28 @@ class Recordings(Cli):
                             "gl_device", "30")
         self.assert_refused(run("check", room, "--set", "renderer.engine=vulkan"), "renderer.engine", "raycast, gl")
 
+    def test_opengl_renders_keyframes(self):
+        room = SCENES / "room.yaml"
+        if "libegl1" in run("check", room, "--set", "renderer.engine=gl").stderr:
+            self.skipTest("no OpenGL: libegl1, libgl1-mesa-dri")
+        cameras = {}
+        for sampling in ("{type: flow, lambda: 1}", "{type: keyframes, supersampling: 2}"):
+            out = self.folder / sampling[7:11]
+            result = run("simulate", room, "--out", out, "--set", "renderer.engine=gl", "--set", f"sampling={sampling}",
+                         "--set", "duration_s=0.1", "--set", "output.preview=false",
+                         "--set", "camera={width: 120, height: 90, horizontal_fov_deg: 75}")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            cameras[sampling[7:11]] = json.loads((out / "report.json").read_text())["cameras"][0]
+        flow, keyframes = cameras["flow"], cameras["keyf"]
+        self.assertIn("OpenGL", keyframes["renderer"])
+        self.assertEqual(keyframes["supersampling"], 2)
+        self.assertEqual(keyframes["audits"], 1)
+        self.assertLess(keyframes["frames"], flow["frames"])
+        self.assertLess(abs(keyframes["events"] / flow["events"] - 1), 0.15)
+        self.assertEqual(keyframes["bisections"], 0)
+        self.assertLess(keyframes["measured_error"]["mean"], 0.1)
+        self.assertGreater(keyframes["resampling_floor"]["p99"], 0)
+
     def test_without_egl_says_what_to_install_and_the_ray_caster_works(self):
         nothing = {**os.environ, "__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}
         room = SCENES / "room.yaml"

@@ -76,7 +76,8 @@ TEST_P(EverySampler, KeepsItsContract) {
     ASSERT_TRUE(samples == 0 ? request->t == span.start : request->t > sampler->watermark())
         << "asks for what is known";
     ASSERT_LE(request->t, span.end);
-    Sample sample = moving_ramp(request->t, 0.05F, 100.0F, 200.0F, 0.001, camera.width, camera.height);
+    const int width = request->of_sensor ? kWidth : camera.width, height = request->of_sensor ? kHeight : camera.height;
+    Sample sample = moving_ramp(request->t, 0.05F, 100.0F, 200.0F, 0.001, width, height);
     sample.tiles = request->tiles;
     for (const Tile& tile : request->tiles) evaluations += static_cast<std::int64_t>(tile.area());
     for (auto found = sampler->accept(sample); !found.empty(); found = sampler->more()) {

@@ -139,7 +139,10 @@ TEST_F(Simulation, SeesTheSameThroughKeyframes) {
   scenario_.cameras[0].sampling = KeyframeSampling{};
   const Summary summary = run(keyframes);
   run(two_threads, 2);
-  EXPECT_LT(summary.cameras[0].sampling.samples, dense / 10);
+  const SamplingStatistics& sampling = summary.cameras[0].sampling;
+  EXPECT_LT(sampling.samples - sampling.audits, dense / 10);
+  EXPECT_EQ(sampling.audits, 1);
+  EXPECT_TRUE(sampling.resampling_floor.has_value());
   EXPECT_GT(flow.events[0].size(), 10000U);
   const double ratio = static_cast<double>(keyframes.events[0].size()) / static_cast<double>(flow.events[0].size());
   EXPECT_NEAR(ratio, 1, 0.03);

@@ -32,6 +32,11 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
         {"events_per_second", simulated_s > 0 ? static_cast<double>(events) / simulated_s : 0.0},
     });
     if (scenario.cameras[i].frame_camera) cameras.back()["frames_written"] = camera.frames;
+    if (sampling.resampling_floor) {
+      const auto& [mean, p99, max] = *sampling.resampling_floor;
+      cameras.back()["supersampling"] = sampling.supersampling;
+      cameras.back()["resampling_floor"] = {{"mean", mean}, {"p99", p99}, {"max", max}};
+    }
     if (!sampling.measured_error) continue;
     const auto& [mean, p99, max] = *sampling.measured_error;
     cameras.back()["tolerance"] = sampling.tolerance;

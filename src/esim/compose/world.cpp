@@ -7,6 +7,7 @@
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
 #include "esim/sampling/make_sampler.h"
+#include "esim/sampling/supersampling.h"
 #include "esim/scenario/read.h"
 
 namespace esim {
@@ -164,12 +165,16 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
     const EventCameraOptions& sensor = options.event_camera;
     const SensorTraits traits{std::min(sensor.threshold_on(), sensor.threshold_off()), sensor.log_eps};
     std::unique_ptr<Renderer> renderer = make_renderer(model, *world.workers);
-    const SamplingContext context{traits,         model.width, model.height,       span,
-                                  *world.workers, model,       renderer->traits(), view_at(world, i)};
-    std::unique_ptr<Sampler> sampler = make_sampler(options.sampling, context);
+    SamplingContext context{traits,         model.width, model.height,       span,
+                            *world.workers, model,       renderer->traits(), view_at(world, i)};
+    SamplingOptions sampling = options.sampling;
     std::unique_ptr<Renderer> keyframes;
-    if (std::holds_alternative<KeyframeSampling>(options.sampling))
-      keyframes = make_renderer(sampled_camera(options.sampling, context), *world.workers);
+    if (auto* const wanted = std::get_if<KeyframeSampling>(&sampling)) {
+      const auto make = [&](const Camera& camera) { return make_renderer(camera, *world.workers); };
+      *wanted = decide_supersampling(*wanted, context, *renderer, make);
+      keyframes = make(sampled_camera(sampling, context));
+    }
+    std::unique_ptr<Sampler> sampler = make_sampler(sampling, context);
     world.cameras.push_back(
         {std::move(renderer),
          std::move(sampler),

@@ -24,22 +24,28 @@ std::vector<ViewChange> view_changes(const RenderRequest& from, const RenderRequ
 DepthSplat::DepthSplat(const KeyframeLayout& layout, const PixelRays& rays, double greatest_radius,
                        const Workers& workers)
     : layout_(layout),
-      rays_(rays),
       greatest_radius_(greatest_radius),
       workers_(workers),
-      step_(layout.supersampling),
-      first_(step_ / 2),
-      chunks_((layout.camera.width + kChunk - 1) / kChunk),
-      column_(layout.camera.width, layout.camera.height),
-      row_(layout.camera.width, layout.camera.height),
-      inverse_z_(layout.camera.width, layout.camera.height),
-      first_row_(chunks_, layout.camera.height),
-      last_row_(chunks_, layout.camera.height) {}
+      chunks_((layout.columns() + kChunk - 1) / kChunk),
+      x_(layout.columns(), layout.rows()),
+      y_(x_),
+      column_(x_),
+      row_(x_),
+      inverse_z_(x_),
+      first_row_(chunks_, layout.rows()),
+      last_row_(chunks_, layout.rows()) {
+  for (int row = 0; row < layout.rows(); ++row) {
+    for (int column = 0; column < layout.columns(); ++column) {
+      const int x = layout.first() + layout.supersampling * column, y = layout.first() + layout.supersampling * row;
+      x_(column, row) = rays.x(x, y), y_(column, row) = rays.y(x, y);
+    }
+  }
+}
 
 void DepthSplat::throw_row(const Keyframe& keyframe, const std::vector<ViewChange>& changes, int row) {
-  const int width = layout_.camera.width;
+  const int width = x_.width();
   const std::uint16_t* const object = keyframe.object.empty() ? nullptr : keyframe.object.row(row);
-  const float *const bx = rays_.x.row(row), *const by = rays_.y.row(row), *const w = keyframe.nearness.row(row);
+  const float *const bx = x_.row(row), *const by = y_.row(row), *const w = keyframe.nearness.row(row);
   float *const column_at = column_.row(row), *const row_at = row_.row(row), *const inverse_z = inverse_z_.row(row);
 
   std::visit(
@@ -79,14 +85,14 @@ void DepthSplat::throw_row(const Keyframe& keyframe, const std::vector<ViewChang
 
 /// Fills the rows [begin, end) of the surface.
 void DepthSplat::collect(const Keyframe& keyframe, int begin, int end, VisibleSurface& surface) const {
-  const int width = surface.nearness.width(), keyframe_width = layout_.camera.width;
+  const int width = surface.nearness.width(), thrown_width = x_.width();
   const bool objects = !keyframe.object.empty();
   const auto scale = static_cast<float>(layout_.supersampling);
   const auto low = static_cast<float>(begin - 1), high = static_cast<float>(end);
-  for (int row = first_; row < layout_.camera.height; row += step_) {
+  for (int row = 0; row < x_.height(); ++row) {
     for (int chunk = 0; chunk < chunks_; ++chunk) {
       if (!(last_row_(chunk, row) > low && first_row_(chunk, row) < high)) continue;
-      for (int x = chunk * kChunk + first_; x < std::min(keyframe_width, (chunk + 1) * kChunk); x += step_) {
+      for (int x = chunk * kChunk; x < std::min(thrown_width, (chunk + 1) * kChunk); ++x) {
         const float u = column_(x, row), v = row_(x, row);
         if (!(v > low && v < high && u > -1 && u < static_cast<float>(width))) continue;
         const int left = static_cast<int>(std::floor(u)), top = static_cast<int>(std::floor(v));
@@ -124,8 +130,7 @@ void DepthSplat::splat(const std::vector<const Keyframe*>& keyframes, const Rend
   if (objects) surface.object.fill(0);
   for (const Keyframe* const keyframe : keyframes) {
     const std::vector<ViewChange> changes = view_changes(keyframe->view, view);
-    workers_.for_each((layout_.camera.height - first_ + step_ - 1) / step_,
-                      [&](int i) { throw_row(*keyframe, changes, first_ + i * step_); });
+    workers_.for_each(x_.height(), [&](int row) { throw_row(*keyframe, changes, row); });
     workers_.for_each((height + kBandRows - 1) / kBandRows, [&](int band) {
       collect(*keyframe, band * kBandRows, std::min(height, (band + 1) * kBandRows), surface);
     });

@@ -32,24 +32,24 @@ struct VisibleSurface {
 /// stays.
 class DepthSplat {
  public:
+  /// `rays`: of the keyframes' camera.
   DepthSplat(const KeyframeLayout& layout, const PixelRays& rays, double greatest_radius, const Workers& workers);
 
   /// Throws `keyframes` into `view`.
   void splat(const std::vector<const Keyframe*>& keyframes, const RenderRequest& view, VisibleSurface& surface);
 
  private:
-  static constexpr int kChunk = 60;     // pixels of a row that are thrown together
+  static constexpr int kChunk = 32;     // pixels of a row that are thrown together
   static constexpr int kBandRows = 16;  // rows of the view that one thread fills
 
   void throw_row(const Keyframe& keyframe, const std::vector<ViewChange>& changes, int row);
   void collect(const Keyframe& keyframe, int begin, int end, VisibleSurface& surface) const;
 
   const KeyframeLayout& layout_;
-  const PixelRays& rays_;
   double greatest_radius_;
   const Workers& workers_;
-  int step_, first_;                       // of the rows and columns that are thrown
   int chunks_;                             // of a row
+  Image<float> x_, y_;                     // bearings (x, y, 1) of the pixels that are thrown
   Image<float> column_, row_, inverse_z_;  // where each pixel falls, and 1 / y_z there
   Image<float> first_row_, last_row_;      // of the pixels of each chunk
 };

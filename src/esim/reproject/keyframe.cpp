@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/reproject/spline_coefficients.h"
 
 namespace esim {
 namespace {
@@ -52,35 +53,54 @@ float slope(float before, float here, float after) {
   return smooth ? smaller : 0.0F;
 }
 
-/// `reach`: px from an edge at which the mean over a pixel of the sensor holds light from both of its sides.
-void invert_depth(const Image<float>& depth, int reach, const Workers& workers, Keyframe& keyframe) {
-  const int width = depth.width(), height = depth.height();
-  for (Image<float>* image : {&keyframe.nearness, &keyframe.front, &keyframe.slope_x, &keyframe.slope_y})
-    if (image->bounds() != depth.bounds()) *image = Image<float>(width, height);
-  workers.for_each(height, [&](int y) {
-    for (int x = 0; x < width; ++x) {
-      const float z = depth(x, y);
-      const float w = z > 0 ? 1.0F / z : 0.0F;  // no number: as good as nothing
-      keyframe.nearness(x, y) = w <= std::numeric_limits<float>::max() ? w : 0.0F;
+/// Nearness of each pixel.
+Image<float> inverse(const Image<float>& depth, const Workers& workers) {
+  Image<float> nearness(depth.width(), depth.height());
+  workers.for_each(depth.height(), [&](int y) {
+    for (int x = 0; x < depth.width(); ++x) {
+      const float z = depth(x, y), w = z > 0 ? 1.0F / z : 0.0F;  // no number: as good as nothing
+      nearness(x, y) = w <= std::numeric_limits<float>::max() ? w : 0.0F;
     }
   });
+  return nearness;
+}
+
+/// Fills in everything that follows from depth.
+void find_surfaces(const KeyframeLayout& layout, const Image<float>& w, const Workers& workers, Keyframe& keyframe) {
+  const int width = w.width(), height = w.height(), s = layout.supersampling;
+  const int reach = s / 2 + 1;  // px from an edge at which the mean over a pixel of the sensor holds both of its sides
+  if (keyframe.front.bounds() != w.bounds()) {
+    keyframe.front = Image<float>(width, height);
+    for (Image<float>* image : {&keyframe.nearness, &keyframe.slope_x, &keyframe.slope_y})
+      *image = Image<float>(layout.columns(), layout.rows());
+  }
   workers.for_each(height, [&](int y) {
-    const Image<float>& w = keyframe.nearness;
     const int above = std::max(y - 1, 0), below = std::min(y + 1, height - 1);
     for (int x = 0; x < width; ++x) {
       const int left = std::max(x - 1, 0), right = std::min(x + 1, width - 1);
-      keyframe.slope_x(x, y) = slope(w(left, y), w(x, y), w(right, y));
-      keyframe.slope_y(x, y) = slope(w(x, above), w(x, y), w(x, below));
+      const float slope_x = slope(w(left, y), w(x, y), w(right, y)), slope_y = slope(w(x, above), w(x, y), w(x, below));
       float nearest = w(x, y);
       for (int j = std::max(y - reach, 0); j <= std::min(y + reach, height - 1); ++j)
         for (int i = std::max(x - reach, 0); i <= std::min(x + reach, width - 1); ++i)
           nearest = std::max(nearest, w(i, j));
       const float ahead = nearest - w(x, y);
-      const float smooth =
-          (static_cast<float>(reach) + 0.5F) * (std::fabs(keyframe.slope_x(x, y)) + std::fabs(keyframe.slope_y(x, y)));
+      const float smooth = (static_cast<float>(reach) + 0.5F) * (std::fabs(slope_x) + std::fabs(slope_y));
       keyframe.front(x, y) = ahead > smooth + kDiscontinuity * w(x, y) ? nearest : w(x, y);
+      const int column = (x - layout.first()) / s, row = (y - layout.first()) / s;
+      if (x != layout.first() + s * column || y != layout.first() + s * row) continue;
+      keyframe.nearness(column, row) = w(x, y);
+      keyframe.slope_x(column, row) = slope_x, keyframe.slope_y(column, row) = slope_y;
     }
   });
+}
+
+/// Keeps which object those pixels see that are thrown.
+void thin_out(const KeyframeLayout& layout, const Image<std::uint16_t>& object, Image<std::uint16_t>& kept) {
+  const int columns = object.empty() ? 0 : layout.columns(), rows = object.empty() ? 0 : layout.rows();
+  if (kept.width() != columns || kept.height() != rows) kept = Image<std::uint16_t>(columns, rows);
+  const int s = layout.supersampling, first = layout.first();
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) kept(column, row) = object(first + s * column, first + s * row);
 }
 
 }  // namespace
@@ -103,13 +123,21 @@ void prepare_keyframe(const KeyframeLayout& layout, bool at_infinity, RenderRequ
                       const Workers& workers, Keyframe& keyframe) {
   keyframe.view = std::move(view);
   if (layout.wide_pixels) {
-    std::swap(keyframe.light, sample.irradiance);
+    std::swap(keyframe.root, sample.irradiance);
   } else {
-    box_mean(sample.irradiance, layout.supersampling, workers, keyframe.light);
+    box_mean(sample.irradiance, layout.supersampling, workers, keyframe.root);
   }
+  workers.for_each(keyframe.root.height(), [&](int y) {
+    float* const row = keyframe.root.row(y);
+    for (int x = 0; x < keyframe.root.width(); ++x) {
+      const bool is_number = row[x] >= 0 && row[x] <= std::numeric_limits<float>::max();
+      row[x] = is_number ? std::sqrt(row[x]) : 0.0F;
+    }
+  });
+  to_spline_coefficients(keyframe.root, workers);
   if (at_infinity) return;
-  invert_depth(sample.depth, layout.supersampling / 2 + 1, workers, keyframe);
-  std::swap(keyframe.object, sample.object);
+  find_surfaces(layout, inverse(sample.depth, workers), workers, keyframe);
+  thin_out(layout, sample.object, keyframe.object);
 }
 
 }  // namespace esim

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "esim/reproject/lens.h"
+#include "esim/reproject/spline_coefficients.h"
 
 namespace esim {
 namespace {
@@ -46,27 +47,13 @@ void project_row(const Projector<Model>& project, const ViewChange& c, const flo
   }
 }
 
-/// Weights of Catmull and Rom's cubic at a place f between the second and the third of four pixels.
-struct Cubic {
-  float w0, w1, w2, w3;
-
-  explicit Cubic(float f) {
-    const float g = 1 - f;
-    w0 = -0.5F * f * g * g;
-    w1 = 1 + f * f * (1.5F * f - 2.5F);
-    w2 = 1 + g * g * (1.5F * g - 2.5F);
-    w3 = -0.5F * g * f * f;
-  }
-  float operator()(float a, float b, float c, float d) const { return w0 * a + w1 * b + w2 * c + w3 * d; }
-};
-
-/// Looks the points up by cubics that overshoot the pixels around by little. `seen` is 1 where they lie in the image
-/// and, with `depth`, on the surface there.
+/// Looks the points up by the spline. `seen` is 1 where they lie in the
+/// image and, with `depth`, on the surface there.
 template <bool depth>
 void look_up_row(const Keyframe& keyframe, float offset, RowLookup& row) {
-  const int stride = keyframe.light.width(), count = static_cast<int>(row.u.size());
-  const float right = static_cast<float>(stride - 1), bottom = static_cast<float>(keyframe.light.height() - 1);
-  const float* const pixels = keyframe.light.data();
+  const int stride = keyframe.root.width(), count = static_cast<int>(row.u.size());
+  const float right = static_cast<float>(stride - 1), bottom = static_cast<float>(keyframe.root.height() - 1);
+  const float* const c = keyframe.root.data();
   const float* const near = keyframe.front.data();
   const float *const u = row.u.data(), *const v = row.v.data(), *const w = row.nearness.data();
   float *const value = row.value.data(), *const seen = row.seen.data();
@@ -78,24 +65,19 @@ void look_up_row(const Keyframe& keyframe, float offset, RowLookup& row) {
     const float clamped_column = std::min(std::max(column, 1.0F), right - 1.001F);
     const float clamped_line = std::min(std::max(line, 1.0F), bottom - 1.001F);
     const int i = static_cast<int>(clamped_column), j = static_cast<int>(clamped_line);
-    const Cubic across(clamped_column - static_cast<float>(i)), down(clamped_line - static_cast<float>(j));
+    const CubicSpline across(clamped_column - static_cast<float>(i)), down(clamped_line - static_cast<float>(j));
     const int r0 = (j - 1) * stride + (i - 1), r1 = r0 + stride, r2 = r1 + stride, r3 = r2 + stride;
-    const float p11 = pixels[r1 + 1], p12 = pixels[r1 + 2], p21 = pixels[r2 + 1], p22 = pixels[r2 + 2];
-    const float first = across(pixels[r0], pixels[r0 + 1], pixels[r0 + 2], pixels[r0 + 3]);
-    const float second = across(pixels[r1], p11, p12, pixels[r1 + 3]);
-    const float third = across(pixels[r2], p21, p22, pixels[r2 + 3]);
-    const float fourth = across(pixels[r3], pixels[r3 + 1], pixels[r3 + 2], pixels[r3 + 3]);
-    const float lowest = std::min(std::min(p11, p12), std::min(p21, p22));
-    const float highest = std::max(std::max(p11, p12), std::max(p21, p22));
-    const float slack = 0.15F * (highest - lowest);
-    const float sum = down(first, second, third, fourth);
-    value[x] = std::min(std::max(sum, std::max(lowest - slack, 0.5F * lowest)), highest + slack);
+    const float root =
+        down(across(c[r0], c[r0 + 1], c[r0 + 2], c[r0 + 3]), across(c[r1], c[r1 + 1], c[r1 + 2], c[r1 + 3]),
+             across(c[r2], c[r2 + 1], c[r2 + 2], c[r2 + 3]), across(c[r3], c[r3 + 1], c[r3 + 2], c[r3 + 3]));
+    value[x] = root * root;
     if constexpr (depth) {
       const int k = static_cast<int>(std::min(std::max(u[x], 0.0F), right - 1e-3F));
       const int l = static_cast<int>(std::min(std::max(v[x], 0.0F), bottom - 1e-3F));
-      const int here = l * stride + k;
-      const float a = near[here], b = near[here + 1], c = near[here + stride], d = near[here + stride + 1];
-      const float low = std::min(std::min(a, b), std::min(c, d)), high = std::max(std::max(a, b), std::max(c, d));
+      const int n = l * stride + k;
+      const float w0 = near[n], w1 = near[n + 1], w2 = near[n + stride], w3 = near[n + stride + 1];
+      const float low = std::min(std::min(w0, w1), std::min(w2, w3)),
+                  high = std::max(std::max(w0, w1), std::max(w2, w3));
       same = w[x] >= low * (1 - kSameSurface) && w[x] <= high * (1 + kSameSurface);
     }
     seen[x] = inside && same ? 1.0F : 0.0F;
@@ -109,9 +91,8 @@ float share_of_later(const Keyframe& before, const Keyframe& after, TimeNs t) {
   return static_cast<float>(std::clamp(share, 1e-4, 1 - 1e-4));
 }
 
-/// Where no keyframe's pixel fell, the farther one of the surfaces beside. Returns how many places those are.
-std::int64_t fill_gaps(float* nearness, int width) {
-  std::int64_t filled = 0;
+/// Where no keyframe's pixel fell, the farther one of the surfaces beside.
+void fill_gaps(float* nearness, int width) {
   for (int x = 0; x < width;) {
     if (nearness[x] >= 0) {
       ++x;
@@ -122,10 +103,8 @@ std::int64_t fill_gaps(float* nearness, int width) {
     const float right = end < width ? nearness[end] : (x > 0 ? nearness[x - 1] : 0.0F);
     const float left = x > 0 ? nearness[x - 1] : right;
     std::fill(nearness + x, nearness + end, std::min(left, right));
-    filled += end - x;
     x = end;
   }
-  return filled;
 }
 
 }  // namespace
@@ -164,7 +143,7 @@ void Reprojector::reconstruct(const Keyframe& before, const Keyframe& after, con
           float* const w = surface_.nearness.row(y);
           const std::uint16_t* const object = view.objects.empty() || at_infinity_ ? nullptr : surface_.object.row(y);
           std::int64_t& nowhere = unseen[static_cast<std::size_t>(y)];
-          nowhere = fill_gaps(w, width);
+          fill_gaps(w, width);
           for (int begin = 0; begin < width;) {
             int end = object != nullptr ? begin + 1 : width;
             while (end < width && object[end] == object[begin]) ++end;

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "esim/core/parallel.h"
 #include "esim/core/time.h"
 #include "esim/geometry/camera.h"
 #include "esim/render/renderer.h"
+#include "esim/sampling/measured_error.h"
 
 namespace esim {
 
@@ -23,9 +25,10 @@ struct SamplingContext {
   const Workers& workers;     ///< outlives the sampler
 
   // What is known of the views beforehand, for schemes that reproject.
-  Camera camera{};                                 ///< the model
-  RendererTraits renderer{};                       ///< that shows the scene
-  std::function<RenderRequest(TimeNs)> view_at{};  ///< where the camera and the moving objects are; no tiles
+  Camera camera{};                                  ///< the model
+  RendererTraits renderer{};                        ///< that shows the scene
+  std::function<RenderRequest(TimeNs)> view_at{};   ///< where the camera and the moving objects are; no tiles
+  std::optional<MeasuredError> resampling_floor{};  ///< of keyframes, where it was measured
 };
 
 }  // namespace esim

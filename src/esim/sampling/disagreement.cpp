@@ -14,7 +14,7 @@ constexpr double kShare = 0.998;  // of the blocks, that disagree by less
 
 }  // namespace
 
-double disagreement(const Reconstruction& apart, double log_eps, LogHistogram& pixels) {
+double disagreement(const Reconstruction& apart, double log_eps) {
   const Image<float>&before = apart.from_before, &after = apart.from_after;
   const float eps = static_cast<float>(log_eps);
   std::vector<double> blocks;
@@ -26,9 +26,7 @@ double disagreement(const Reconstruction& apart, double log_eps, LogHistogram& p
       for (int y = top; y < bottom; ++y) {
         for (int x = left; x < right; ++x) {
           if (before(x, y) < 0 || after(x, y) < 0) continue;
-          const double difference = fast_log((before(x, y) + eps) / (after(x, y) + eps));
-          pixels.add(std::fabs(difference));
-          sum += difference;
+          sum += fast_log((before(x, y) + eps) / (after(x, y) + eps));
           ++count;
         }
       }

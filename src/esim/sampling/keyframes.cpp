@@ -7,19 +7,25 @@
 #include <vector>
 
 #include "esim/core/error.h"
+#include "esim/core/fast_log.h"
+#include "esim/core/random.h"
 #include "esim/sampling/disagreement.h"
 
 namespace esim {
 namespace {
 
 constexpr double kMostPerSecond = 50000;  // reconstructions, also where something moves faster
-constexpr double kMostUnseen = 0.01;      // share of an image that no keyframe sees
+constexpr double kMostUnseen = 0.01;      // share of an image that no keyframe sees, but would from its own place
+
+// One interval between keyframes in so many is held against the truth, from the first on.
+constexpr std::int64_t kAuditOneIn = 6;
 
 /// A keyframe, and how fast its image moves.
 struct MovingKeyframe {
   Keyframe keyframe;
   double typical_px_per_s = 0;  ///< 99 % of the pixels are slower
   double fastest_px_per_s = 0;  ///< 99.9 %
+  std::int64_t unseen = 0;      ///< of the sensor's pixels, even from where it was taken: on edges
 
   TimeNs t() const { return keyframe.view.t; }
 };
@@ -48,18 +54,27 @@ class KeyframeSampler final : public Sampler {
         context_(context),
         layout_(lay_out_keyframes(options, context)),
         reprojector_(layout_, context.renderer.at_infinity, context.workers),
-        request_(SampleRequest{context.span.start, {{0, 0, layout_.camera.width, layout_.camera.height}}}),
+        random_(0, Purpose::sampling_audit),
         watermark_(context.span.start) {
     statistics_.tolerance = options.tolerance;
+    statistics_.supersampling = layout_.supersampling;
+    statistics_.resampling_floor = context.resampling_floor;
+    request(context.span.start);
   }
 
-  const SampleRequest* next() const override {
-    return unsettled_ || step_ != steps_ || !request_ ? nullptr : &*request_;
-  }
+  const SampleRequest* next() const override { return unsettled_ || step_ > 0 || !request_ ? nullptr : &*request_; }
 
   std::span<const Segment> accept(Sample& sample) override {
+    const bool first = statistics_.samples == 0, audit = request_->of_sensor;
+    ++statistics_.samples;
+    for (const Tile& tile : sample.tiles) statistics_.pixel_evaluations += static_cast<std::int64_t>(tile.area());
+    if (audit) {
+      std::swap(truth_, sample);
+      ++statistics_.audits;
+      return reconstruct();
+    }
     take(sample);
-    if (statistics_.samples > 1) return settle();
+    if (!first) return settle();
     before_ = std::move(ahead_.back());
     ahead_.pop_back();
     reprojector_.reconstruct(before_.keyframe, before_.keyframe, context_.view_at(before_.t()), false, later_);
@@ -78,16 +93,14 @@ class KeyframeSampler final : public Sampler {
       unsettled_ = false;
       return settle();
     }
-    if (step_ == steps_) return {};
-    ++step_;
-    return reconstruct();
+    return step_ > 0 ? reconstruct() : std::span<const Segment>{};
   }
 
   TimeNs watermark() const override { return watermark_; }
 
   SamplingStatistics statistics() const override {
     SamplingStatistics result = statistics_;
-    result.measured_error = measured_error(errors_);
+    if (statistics_.audits > 0) result.measured_error = measured_error(errors_);
     const double pixels = static_cast<double>(sensor().area()) * static_cast<double>(statistics_.reconstructions);
     result.unseen_share = pixels > 0 ? static_cast<double>(unseen_) / pixels : 0;
     return result;
@@ -100,14 +113,14 @@ class KeyframeSampler final : public Sampler {
 
   /// Puts a rendered keyframe in front of those that are ahead.
   void take(Sample& sample) {
-    ++statistics_.samples;
-    statistics_.pixel_evaluations += static_cast<std::int64_t>(sample.irradiance.size());
     MovingKeyframe& taken = ahead_.emplace_back();
     std::tie(taken.typical_px_per_s, taken.fastest_px_per_s) = speeds(sample, 0.99, 0.999);
     taken.typical_px_per_s /= layout_.supersampling;
     taken.fastest_px_per_s /= layout_.supersampling;
-    prepare_keyframe(layout_, reprojector_.at_infinity(), context_.view_at(sample.t), sample, context_.workers,
-                     taken.keyframe);
+    const RenderRequest view = context_.view_at(sample.t);
+    prepare_keyframe(layout_, reprojector_.at_infinity(), view, sample, context_.workers, taken.keyframe);
+    reprojector_.reconstruct(taken.keyframe, taken.keyframe, view, false, apart_);
+    taken.unseen = apart_.unseen;
   }
 
   TimeNs shortest() const { return std::max<TimeNs>(1, to_ns(1.0 / options_.bounds.max_rate_hz)); }
@@ -135,8 +148,13 @@ class KeyframeSampler final : public Sampler {
     const double fastest = std::max(before_.fastest_px_per_s, ahead_.back().fastest_px_per_s);
     const double steps = std::ceil(to_seconds(interval) * std::min(fastest / options_.lambda, kMostPerSecond));
     steps_ = static_cast<TimeNs>(std::clamp(steps, 1.0, static_cast<double>(interval)));
-    step_ = 1;
-    errors_ = checked_;
+    step_ = 0;
+    if (intervals_++ % kAuditOneIn == 0 && interval > 1) {
+      const auto [share, unused] = random_.uniforms(0, static_cast<std::uint64_t>(intervals_));
+      const TimeNs t = before_.t() + 1 + static_cast<TimeNs>(share * static_cast<double>(interval - 1));
+      request_ = SampleRequest{t, {sensor()}, true};
+      return {};
+    }
     return reconstruct();
   }
 
@@ -145,22 +163,23 @@ class KeyframeSampler final : public Sampler {
     const MovingKeyframe& after = ahead_.back();
     const TimeNs interval = after.t() - before_.t();
     const double moved = to_seconds(interval) * std::max(before_.typical_px_per_s, after.typical_px_per_s);
-    checked_ = errors_;
     double worst = 0;
     std::int64_t unseen = 0;
     for (const int quarter : {1, 2, 3}) {
       const TimeNs t = before_.t() + interval / 4 * quarter;
       reprojector_.reconstruct(before_.keyframe, after.keyframe, context_.view_at(t), true, apart_);
-      worst = std::max(worst, disagreement(apart_, context_.sensor.log_eps, checked_));
+      worst = std::max(worst, disagreement(apart_, context_.sensor.log_eps));
       unseen = std::max(unseen, apart_.unseen);
     }
     return worst <= options_.tolerance * context_.sensor.contrast_threshold &&
-           static_cast<double>(unseen) <= kMostUnseen * static_cast<double>(sensor().area()) &&
+           static_cast<double>(unseen - std::max(before_.unseen, after.unseen)) <=
+               kMostUnseen * static_cast<double>(sensor().area()) &&
            moved <= 2 * options_.max_displacement_px;
   }
 
-  /// The segment up to `step_` of `steps_`; after the last one, the interval's later keyframe becomes the earlier one.
+  /// The next of the `steps_` segments; after the last one, the interval's later keyframe becomes the earlier one.
   std::span<const Segment> reconstruct() {
+    ++step_;
     const MovingKeyframe& after = ahead_.back();
     const double share = static_cast<double>(step_) / static_cast<double>(steps_);
     const TimeNs t = step_ == steps_
@@ -171,12 +190,27 @@ class KeyframeSampler final : public Sampler {
     ++statistics_.reconstructions;
     unseen_ += later_.unseen;
     segment_ = {sensor(), watermark_, t, &earlier_.irradiance, &later_.irradiance};
+    if (watermark_ < truth_.t && truth_.t <= t) audit();
     watermark_ = t;
     if (step_ == steps_) advance();
     return {&segment_, 1};
   }
 
+  /// Holds the segment against the truth, all of its interval's length counting.
+  void audit() {
+    const auto eps = static_cast<float>(context_.sensor.log_eps);
+    const auto share = static_cast<float>(to_seconds(truth_.t - segment_.t0) / to_seconds(segment_.t1 - segment_.t0));
+    const double weight = to_seconds(ahead_.back().t() - before_.t());
+    const auto earlier = earlier_.irradiance.pixels(), later = later_.irradiance.pixels();
+    const auto truth = truth_.irradiance.pixels();
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      const float told = (1 - share) * fast_log(earlier[i] + eps) + share * fast_log(later[i] + eps);
+      errors_.add(std::fabs(told - fast_log(truth[i] + eps)), weight);
+    }
+  }
+
   void advance() {
+    step_ = steps_ = 0;
     before_ = std::move(ahead_.back());
     ahead_.pop_back();
     if (!ahead_.empty()) {
@@ -196,14 +230,17 @@ class KeyframeSampler final : public Sampler {
   std::optional<SampleRequest> request_;
   MovingKeyframe before_;              // the keyframe up to which everything is known
   std::vector<MovingKeyframe> ahead_;  // later ones, the last one the next
-  TimeNs step_ = 0, steps_ = 0;        // of the interval that is being reconstructed
+  TimeNs step_ = 0, steps_ = 0;        // of the interval that is being reconstructed: done, and in all; else 0
+  std::int64_t intervals_ = 0;         // settled so far
+  Sample truth_;                       // of the latest audit
+  AddressedRandom random_;
   Reconstruction earlier_, later_, apart_;
   Segment segment_;
   TimeNs watermark_;
   bool unsettled_ = false;
 
   SamplingStatistics statistics_;
-  LogHistogram errors_, checked_;
+  LogHistogram errors_;
   std::int64_t unseen_ = 0;
 };
 
@@ -214,8 +251,7 @@ KeyframeLayout lay_out_keyframes(const KeyframeSampling& options, const Sampling
     throw UserError("sampling: keyframes cannot be seen from elsewhere where " + context.renderer.name +
                     " are drawn on the sensor itself; use type flow or brightness");
   }
-  const int chosen = options.tolerance >= 0.25 ? 2 : 3;
-  return lay_out_keyframes(context.camera, options.supersampling > 0 ? options.supersampling : chosen,
+  return lay_out_keyframes(context.camera, options.supersampling > 0 ? options.supersampling : kLeastSupersampling,
                            options.margin_px, context.renderer.wide_pixels);
 }
 

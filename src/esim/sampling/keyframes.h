@@ -15,11 +15,16 @@ namespace esim {
 /// lies between them, that leave more than a hundredth of it unseen, or between which the image has moved by more than
 /// twice that, get a third one in the middle, again and again, down to 1 / max_rate_hz.
 ///
+/// One interval between keyframes in six, from the first on, is audited: the sensor's own image at a random time in it
+/// is compared with what the segments say of that time.
+///
 /// Needs the context's camera, renderer and view_at. Throws UserError for renderers that draw on the sensor.
 std::unique_ptr<Sampler> make_keyframe_sampler(const KeyframeSampling& options, const SamplingContext& context);
 
-/// The keyframes' camera. Where the options leave it open, 2 x 2 pixels to one of the sensor's for tolerances from a
-/// quarter of a threshold on, 3 x 3 below: resampling has a floor that no number of keyframes lowers.
+/// What is chosen from where the options leave the supersampling open.
+constexpr int kLeastSupersampling = 2, kMostSupersampling = 4;
+
+/// The keyframes' camera. Throws UserError for renderers that draw on the sensor.
 KeyframeLayout lay_out_keyframes(const KeyframeSampling& options, const SamplingContext& context);
 
 }  // namespace esim

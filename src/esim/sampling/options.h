@@ -46,7 +46,7 @@ struct KeyframeSampling {
   static constexpr const char* kType = "keyframes";
   double tolerance = 0.5;
   int supersampling = 0;
-  int margin_px = 16;
+  int margin_px = 8;
   double max_displacement_px = 32;
   double lambda = 0.5;
   RateBounds bounds{2, 500};
@@ -100,7 +100,9 @@ void describe(Visitor& visit, KeyframeSampling& o) {
             "pixels; a third one is rendered where they disagree more",
             "", 0, 1e6, true});
   visit("supersampling", o.supersampling,
-        About{"pixels of a keyframe to one of the sensor's, along each side; 0: from the tolerance", "", 0, 4});
+        About{"pixels of a keyframe to one of the sensor's, along each side; 0: as many, from 2 to 4, as the tolerance "
+              "needs",
+              "", 0, 4});
   visit("margin_px", o.margin_px, About{"that a keyframe shows around the sensor's image", "px", 0, 1024});
   visit("max_displacement_px", o.max_displacement_px, About{"expected motion between two keyframes", "px", 1, 1024});
   visit("lambda", o.lambda, About{"expected motion between two reconstructed images", "px", 0, 1e6, true});

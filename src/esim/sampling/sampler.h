@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "esim/core/image.h"
-#include "esim/core/log_histogram.h"
 #include "esim/core/time.h"
 #include "esim/render/sample.h"
+#include "esim/sampling/measured_error.h"
 
 namespace esim {
 
@@ -16,16 +16,8 @@ namespace esim {
 struct SampleRequest {
   TimeNs t = 0;
   std::vector<Tile> tiles;
+  bool of_sensor = false;  ///< by the sensor's own camera, where the sampler otherwise asks another (sampled_camera)
 };
-
-/// Of the brightness between samples, as far as a scheme measures it; in ln(E + eps).
-struct MeasuredError {
-  double mean = 0, p99 = 0, max = 0;
-};
-
-inline MeasuredError measured_error(const LogHistogram& errors) {
-  return {errors.mean(), errors.quantile(0.99), errors.max()};
-}
 
 /// What a sampler has decided so far, for the report.
 struct SamplingStatistics {
@@ -35,11 +27,13 @@ struct SamplingStatistics {
 
   // Of schemes that measure their error.
   std::optional<MeasuredError> measured_error;
-  double tolerance = 0;              ///< that was asked for, in contrast thresholds
-  std::int64_t bisections = 0;       ///< samples taken because their neighbours disagreed
-  std::int64_t audits = 0;           ///< samples taken only to measure the error
-  std::int64_t reconstructions = 0;  ///< images made between samples
-  double unseen_share = 0;           ///< of the reconstructed pixels: seen by no sample
+  double tolerance = 0;                           ///< that was asked for, in contrast thresholds
+  std::int64_t bisections = 0;                    ///< samples taken because their neighbours disagreed
+  std::int64_t audits = 0;                        ///< samples taken only to measure the error
+  std::int64_t reconstructions = 0;               ///< images made between samples
+  double unseen_share = 0;                        ///< of the reconstructed pixels: seen by no sample
+  int supersampling = 1;                          ///< pixels of a sample to one of the sensor's, along each side
+  std::optional<MeasuredError> resampling_floor;  ///< of the brightness: what no number of samples gets below
 };
 
 /// Decides when which pixels of one camera are evaluated, and turns the samples into segments. A sampler never

@@ -126,7 +126,7 @@ class Simulator::Run {
     Stopwatch stopwatch(summary_.seconds.render);
     const SampleRequest* const next = camera.sampler->next();
     if (next == nullptr || next->t > known_until_) return camera.rendering.reset();
-    camera.rendering = camera.sampled().start(view(world_, index_of(camera), next->t, next->tiles));
+    camera.rendering = camera.asked_for(*next).start(view(world_, index_of(camera), next->t, next->tiles));
   }
 
   /// Lets the frame camera see what the event camera has seen.

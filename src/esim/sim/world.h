@@ -34,7 +34,9 @@ struct CameraChannel {
   std::unique_ptr<DisplacementField> displacement{};
   std::unique_ptr<EventPoints> event_points{};
 
-  Renderer& sampled() { return keyframes != nullptr ? *keyframes : *renderer; }
+  Renderer& asked_for(const SampleRequest& request) {
+    return keyframes != nullptr && !request.of_sensor ? *keyframes : *renderer;
+  }
 };
 
 /// The rig's inertial measurement unit.

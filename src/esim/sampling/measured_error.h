@@ -1,0 +1,16 @@
+#pragma once
+
+#include "esim/core/log_histogram.h"
+
+namespace esim {
+
+/// Of the brightness between samples, as far as a scheme measures it; in ln(E + eps).
+struct MeasuredError {
+  double mean = 0, p99 = 0, max = 0;
+};
+
+inline MeasuredError measured_error(const LogHistogram& errors) {
+  return {errors.mean(), errors.quantile(0.99), errors.max()};
+}
+
+}  // namespace esim

@@ -1,0 +1,54 @@
+#include "esim/sampling/supersampling.h"
+
+#include <cmath>
+
+#include "esim/core/fast_log.h"
+#include "esim/geometry/so3.h"
+#include "esim/reproject/reprojector.h"
+#include "esim/sampling/keyframes.h"
+
+namespace esim {
+
+MeasuredError measure_resampling_floor(const KeyframeLayout& layout, const SamplingContext& context, Renderer& sensor,
+                                       Renderer& keyframes) {
+  RenderRequest request = context.view_at(context.span.start);
+  request.tiles = {{0, 0, layout.camera.width, layout.camera.height}};
+  Sample sample;
+  keyframes.render(request, sample);
+  Keyframe keyframe;
+  prepare_keyframe(layout, context.renderer.at_infinity, request, sample, context.workers, keyframe);
+
+  // Where s is odd, the sensor's pixels have their centres on those of the keyframe's: the view turns away by half a
+  // one.
+  if (layout.supersampling % 2 == 1) {
+    SE3& pose = request.camera.T_world_body;
+    const double half = 0.5 / layout.supersampling;
+    pose.rotation = pose.rotation * so3_exp(Eigen::Vector3d(-half / layout.sensor.fy, half / layout.sensor.fx, 0));
+  }
+  request.tiles = {{0, 0, layout.sensor.width, layout.sensor.height}};
+  sensor.render(request, sample);
+  Reprojector reprojector(layout, context.renderer.at_infinity, context.workers);
+  Reconstruction found;
+  reprojector.reconstruct(keyframe, keyframe, request, false, found);
+
+  LogHistogram errors;
+  const auto eps = static_cast<float>(context.sensor.log_eps);
+  for (std::size_t i = 0; i < sample.irradiance.size(); ++i)
+    errors.add(std::fabs(fast_log((found.irradiance.pixels()[i] + eps) / (sample.irradiance.pixels()[i] + eps))));
+  return measured_error(errors);
+}
+
+KeyframeSampling decide_supersampling(const KeyframeSampling& options, SamplingContext& context, Renderer& sensor,
+                                      const MakeRenderer& make_renderer) {
+  KeyframeSampling decided = options;
+  const double most = options.tolerance * context.sensor.contrast_threshold;
+  for (int s = kLeastSupersampling; s <= kMostSupersampling; ++s) {
+    if (options.supersampling == 0) decided.supersampling = s;
+    const KeyframeLayout layout = lay_out_keyframes(decided, context);
+    context.resampling_floor = measure_resampling_floor(layout, context, sensor, *make_renderer(layout.camera));
+    if (options.supersampling > 0 || context.resampling_floor->p99 <= most) break;
+  }
+  return decided;
+}
+
+}  // namespace esim

@@ -291,7 +291,7 @@ TEST(Light, ShadowsOfStraightEdgesAreSmooth) {
   lighting.shadows = true;
   Scene scene = lit_wall(lighting);
   Mesh square = square_mesh(0.5F);  // of the wall's colour, in full light
-  for (Eigen::Vector3f& vertex : square.vertices) vertex = 0.1F * vertex + Eigen::Vector3f(0.0123F, 0.0071F, -1);
+  for (Eigen::Vector3f& vertex : square.vertices) vertex = 0.1F * vertex + Eigen::Vector3f(0.0123F, 0.0071F, 1);
   scene.objects.push_back({"square", square, false});
   const Camera model = test::distorted_camera(0);
   std::map<int, int> between;

@@ -107,11 +107,12 @@ INSTANTIATE_TEST_SUITE_P(Options, EverySampler,
 TEST(FrameSampler, HandsOutWhatWasRendered) {
   const auto sampler = make_sampler(FlowSampling{}, context({0, 5 * kNsPerMs}));
   while (const auto request = sampler->next()) {
-    Sample sample = moving_ramp(request->t, 0.05F, 100.0F, 200.0F, 0.001);
+    const TimeNs t = request->t;
+    Sample sample = moving_ramp(t, 0.05F, 100.0F, 200.0F, 0.001);
     const Image<float> rendered = sample.irradiance;
     const auto segments = sampler->accept(sample);
     ASSERT_EQ(segments.size(), 1U);
-    EXPECT_EQ(segments[0].t1, request->t);
+    EXPECT_EQ(segments[0].t1, t);
     EXPECT_EQ(segments[0].irradiance1->pixels()[5], rendered.pixels()[5]);
   }
 }

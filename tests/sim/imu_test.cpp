@@ -41,7 +41,8 @@ class Logbook final : public Sink {
   void keep(const ImuRecord& record) { imu.push_back(record), pass(record.t); }
   void keep(const PoseRecord& record) { poses.push_back(record), pass(record.t); }
   void keep(const TruthRecord& record) { pass(record.t); }
-  void keep(const ImageRecord&) {}
+  template <typename Other>
+  void keep(const Other&) {}
   void pass(TimeNs t) {
     EXPECT_GE(t, now_);
     EXPECT_GE(t, last_event_);

@@ -334,7 +334,7 @@ void AdaptiveSampler::steer() {
 int AdaptiveSampler::pieces(const TileTimeline& timeline, std::size_t i) const {
   constexpr TimeNs kMost = 4;
   if (timeline.time(i + 1) - timeline.time(i) < kMost) return 1;
-  const double bow = timeline.bow(i), straight = 0.05 * gain_ * tolerance_;
+  const double bow = timeline.bow(i), straight = 0.15 * gain_ * tolerance_;
   return bow <= straight ? 1 : (bow <= 4 * straight ? 2 : kMost);
 }
 

@@ -178,11 +178,6 @@ class ReferenceWriter {
     T entry;
     nested(entry);
   }
-  template <typename T>
-  void nested(std::optional<T>&) {
-    T value;
-    nested(value);
-  }
   template <typename... T>
   void nested(std::variant<T...>&) {
     (alternative<T>(), ...);

@@ -96,7 +96,7 @@ class Recordings(Cli):
         self.assertIn("update_rate: 400", (self.out / "calibration" / "imu.yaml").read_text())
         again = self.folder / "again"
         self.assertEqual(run("simulate", self.out / "scenario.yaml", "--out", again, "--threads", "2").returncode, 0)
-        for name in ("imu.csv", "imu_truth.csv", "states.csv", "events.h5", "calibration/camchain.yaml"):
+        for name in ("imu.csv", "imu_truth.csv", "states.csv", "cam0/events.h5", "calibration/camchain.yaml"):
             self.assertEqual((again / name).read_bytes(), (self.out / name).read_bytes(), name)
         self.assertIn("imu: 400 Hz", run("check", self.out / "scenario.yaml").stdout)
         shutil.rmtree(self.out)

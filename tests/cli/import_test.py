@@ -117,7 +117,7 @@ class Import(ProgramTest):
         result = self.esim("simulate", self.scenario(baked), "--out", self.out, "--set", "duration_s=0.3")
         self.assertEqual(result.returncode, 0, result.stderr)
         # A room that were black, as the outside of its walls is, would compress to nearly nothing.
-        image = min((self.out / "images").glob("*.png"))
+        image = min((self.out / "cam0" / "images").glob("*.png"))
         self.assertGreater(image.stat().st_size, 800)
 
     @unittest.skipUnless(BLENDER, "there is no blender; apt install blender")

@@ -153,7 +153,7 @@ TEST_F(GlRendererTest, SeveralSamplesPerPixelSmoothEdges) {
   const Camera model = test::distorted_camera(0);
   const RenderRequest request = request_with_objects(model);
   const Scene scene = test::moving_scene();
-  const auto exact = make_raycast_renderer(build_raycast_scene(scene), {0.2F, 13}, model, test::two_threads());
+  const auto exact = make_raycast_renderer(build_raycast_scene(scene), {0.2F, 64}, model, test::two_threads());
   const Sample expected = render(*exact, request);
   const auto error = [&](int samples) {
     const auto gl = make_gl_renderer(scene, {0.2F, samples, {}}, model);

@@ -183,7 +183,7 @@ TEST_F(GlShadowsTest, HaveSmoothEdges) {
     const Eigen::Vector3d edge(-0.1, 0.5, -2);
     const RenderRequest request =
         request_of(kCamera, looking(edge + distance * Eigen::Vector3d(-0.5, -0.4, 0.7), edge));
-    const Sample exact = rendered(*make_raycast_renderer(built, {0.2F, 13}, kCamera, test::two_threads()), request);
+    const Sample exact = rendered(*make_raycast_renderer(built, {0.2F, 64}, kCamera, test::two_threads()), request);
     const Sample steps = rendered(*make_raycast_renderer(built, {}, kCamera, test::two_threads()), request);
     const Sample smooth = rendered(*make_gl_renderer(scene, {}, kCamera), request);
     double error_steps = 0, error_smooth = 0;

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "esim/core/log_histogram.h"
 #include "esim/core/random.h"
+#include "esim/sampling/error_budget.h"
 #include "esim/sampling/tile_timeline.h"
 
 namespace esim {
@@ -28,15 +28,6 @@ constexpr double kSlack = 0.12;
 
 // Times are multiples of a power of two, at least this share of the interval that they end: so tiles meet.
 constexpr double kGrid = 0.125;
-
-// The limit of a tile's error is the tolerance; where 99 % of all errors are not below this share of it, a lower one.
-constexpr double kTarget = 0.9, kLeastGain = 0.25;
-
-// Tiles in which no pixel changes by more than this share of the tolerance say nothing of errors.
-constexpr double kActive = 0.25;
-
-// So many audits make a measurement that the limit follows.
-constexpr int kAuditsPerStep = 48;
 
 // Tiles whose motion is watched: those up to so many away.
 constexpr int kReach = 3;
@@ -75,8 +66,8 @@ struct TileState {
   std::size_t until = 0;    // segments up to this sample are to be given
   std::vector<int> pieces;  // into which each interval until there is cut
   std::int64_t held = 0;
-  std::vector<float> audit;   // errors of the audited interval; empty for none
-  std::vector<float> change;  // of brightness in it
+  std::vector<float> audit;  // errors of the audited interval; empty for none
+  float most_change = 0;     // of a pixel's brightness in it
   TimeNs audit_duration = 0;
 };
 
@@ -85,12 +76,12 @@ class AdaptiveSampler final : public Sampler {
   AdaptiveSampler(const AdaptiveSampling& options, const SamplingContext& context)
       : options_(options),
         context_(context),
-        tolerance_(options.tolerance * context.sensor.contrast_threshold),
         shortest_(std::max<TimeNs>(1, to_ns(1.0 / options.bounds.max_rate_hz))),
         longest_(std::max(shortest_, to_ns(1.0 / options.bounds.min_rate_hz))),
         columns_((context.width + options.tile_px - 1) / options.tile_px),
         rows_((context.height + options.tile_px - 1) / options.tile_px),
         random_(0, Purpose::sampling_audit),
+        budget_(options.tolerance * context.sensor.contrast_threshold),
         watermark_(context.span.start) {
     statistics_.tolerance = options.tolerance;
     const auto eps = static_cast<float>(context.sensor.log_eps);
@@ -112,7 +103,7 @@ class AdaptiveSampler final : public Sampler {
     ++statistics_.samples;
     for (const Tile& tile : sample.tiles) statistics_.pixel_evaluations += static_cast<std::int64_t>(tile.area());
     const auto count = static_cast<int>(asked_.size());
-    constexpr int kTogether = 8;
+    constexpr int kTogether = 2;
     const auto each = [&](const auto& body) {
       context_.workers.for_each((count + kTogether - 1) / kTogether, [&](int piece) {
         for (int i = piece * kTogether; i < std::min(count, (piece + 1) * kTogether); ++i)
@@ -130,14 +121,17 @@ class AdaptiveSampler final : public Sampler {
 
   std::span<const Segment> more() override { return {}; }
   TimeNs watermark() const override { return watermark_; }
-  SamplingStatistics statistics() const override { return statistics_; }
+  SamplingStatistics statistics() const override {
+    SamplingStatistics statistics = statistics_;
+    if (budget_.audited()) statistics.measured_error = budget_.measured();
+    return statistics;
+  }
 
  private:
   void take(TileState& tile, std::uint32_t index, const Sample& sample);
   void audit(TileState& tile, TimeNs t) const;
   void settle(TileState& tile, std::uint32_t index) const;
   double error_energy(const TileTimeline& timeline, std::size_t i) const;
-  double most_energy() const;
   void plan(TileState& tile) const;
   TimeNs after(const TileState& tile, double step) const;
 
@@ -145,7 +139,6 @@ class AdaptiveSampler final : public Sampler {
   TimeNs on_grid(TimeNs t, TimeNs h) const;
 
   void account();
-  void steer();
   int pieces(const TileTimeline& timeline, std::size_t i) const;
   void lay_out();
   void give(TileState& tile, std::size_t first);
@@ -155,7 +148,6 @@ class AdaptiveSampler final : public Sampler {
 
   AdaptiveSampling options_;
   SamplingContext context_;
-  double tolerance_;  // of brightness
   TimeNs shortest_, longest_;
   int columns_, rows_;
   AddressedRandom random_;
@@ -168,10 +160,7 @@ class AdaptiveSampler final : public Sampler {
   std::vector<Segment> segments_;
   std::vector<std::size_t> first_segment_;  // of each tile that was asked for
 
-  double gain_ = 1;                           // of the limit of a tile's error over the tolerance
-  double log_intervals_ = 0, intervals_ = 0;  // of those given lately: ln ns added up, and how many
-  LogHistogram all_, active_;  // errors of audits: of all; since the last measurement, of tiles that change
-  int audits_in_active_ = 0;
+  ErrorBudget budget_;
   TimeNs watermark_;
   SamplingStatistics statistics_;
 };
@@ -196,9 +185,10 @@ void AdaptiveSampler::audit(TileState& tile, TimeNs t) const {
   tile.audit_duration = timeline.time(i + 1) - timeline.time(i - 1);
   const std::vector<float>&l0 = timeline.brightness(i - 1), &l1 = timeline.brightness(i),
         &l2 = timeline.brightness(i + 1);
-  tile.change.resize(l1.size());
+  tile.most_change = 0;
   for (std::size_t k = 0; k < l1.size(); ++k) {
-    tile.change[k] = std::max({l0[k], l1[k], l2[k]}) - std::min({l0[k], l1[k], l2[k]});
+    const float change = std::max({l0[k], l1[k], l2[k]}) - std::min({l0[k], l1[k], l2[k]});
+    tile.most_change = std::max(tile.most_change, change);
   }
 }
 
@@ -216,14 +206,6 @@ double AdaptiveSampler::error_energy(const TileTimeline& timeline, std::size_t i
   return most * most * h;
 }
 
-/// That an interval may have. A sample more takes much of an interval's energy away, and costs the same wherever it is:
-/// least samples make a mean square error if all intervals of all tiles have the same.
-double AdaptiveSampler::most_energy() const {
-  constexpr double kP99OfNormal = 2.576;
-  const double error = gain_ * tolerance_ / kP99OfNormal;
-  return error * error * std::exp(log_intervals_ / intervals_);
-}
-
 /// Finds how far the tile is known well enough, and its next sample.
 void AdaptiveSampler::settle(TileState& tile, std::uint32_t index) const {
   const TileTimeline& timeline = tile.timeline;
@@ -232,7 +214,7 @@ void AdaptiveSampler::settle(TileState& tile, std::uint32_t index) const {
   for (std::size_t i = tile.done; i + 1 < timeline.size(); ++i) {
     if (i + 2 >= timeline.size() && !complete) break;  // what comes behind is needed to judge it
     const TimeNs t0 = timeline.time(i), h = timeline.time(i + 1) - t0;
-    const bool too_much = error_energy(timeline, i) > most_energy();
+    const bool too_much = error_energy(timeline, i) > budget_.most_energy();
     if (too_much && h >= 2 * shortest_) {
       tile.reason = Reason::bisection, tile.due = middle(t0, h);
       return;
@@ -268,7 +250,7 @@ void AdaptiveSampler::plan(TileState& tile) const {
     // The energy goes with the fifth power of the length.
     const double square =
         timeline.surprise(last - 1) * timeline.surprise(last - 1) / (16 * left * left * right * right);
-    step = std::pow(kAim * kAim * most_energy() / std::max(square, 1e-300), 0.2);
+    step = std::pow(kAim * kAim * budget_.most_energy() / std::max(square, 1e-300), 0.2);
     // Bisections say nothing of what comes: steps change with the steps before.
     step = std::clamp(step, 0.5 * tile.step, 2 * tile.step);
   }
@@ -295,46 +277,23 @@ TimeNs AdaptiveSampler::on_grid(TimeNs t, TimeNs h) const {
 
 /// Adds up what the tiles found.
 void AdaptiveSampler::account() {
-  const auto remember = [&](double interval) {
-    constexpr double kMemory = 0.999;
-    log_intervals_ = kMemory * log_intervals_ + std::log(interval), intervals_ = kMemory * intervals_ + 1;
-  };
-  bool audited = false;
   for (const std::uint32_t index : asked_) {
     TileState& tile = tiles_[index];
     statistics_.held_to_max_rate += std::exchange(tile.held, 0);
-    for (std::size_t i = tile.done; i < tile.until; ++i) {
-      remember(static_cast<double>(tile.timeline.time(i + 1) - tile.timeline.time(i)));
-    }
-    if (!tile.begun) remember(4 * tile.step);  // first steps are shorter than what is wanted
+    for (std::size_t i = tile.done; i < tile.until; ++i)
+      budget_.remember(static_cast<double>(tile.timeline.time(i + 1) - tile.timeline.time(i)));
+    if (!tile.begun) budget_.remember(4 * tile.step);  // first steps are shorter than what is wanted
     if (tile.audit.empty()) continue;
-    const auto weight = static_cast<double>(tile.audit_duration);
-    const bool active = *std::max_element(tile.change.begin(), tile.change.end()) > kActive * tolerance_;
-    for (const float value : tile.audit) {
-      const double error = std::fabs(static_cast<double>(value));
-      all_.add(error, weight);
-      if (active) active_.add(error, weight);
-    }
+    budget_.audit(tile.audit, tile.most_change, static_cast<double>(tile.audit_duration));
     tile.audit.clear();
-    if (active && ++audits_in_active_ == kAuditsPerStep) steer();
-    audited = true;
   }
-  if (audited) statistics_.measured_error = measured_error(all_);
-}
-
-/// Follows what audits measured: where something changes, 99 % of the errors are to stay below the tolerance.
-void AdaptiveSampler::steer() {
-  const double wanted = kTarget * tolerance_ / std::max(active_.quantile(0.99), 1e-12);
-  gain_ = std::clamp(gain_ * std::clamp(std::sqrt(wanted), 0.8, 1.25), kLeastGain, 1.0);
-  active_ = LogHistogram();
-  audits_in_active_ = 0;
 }
 
 /// Into how many straight pieces the interval behind sample i is cut for the pixels.
 int AdaptiveSampler::pieces(const TileTimeline& timeline, std::size_t i) const {
   constexpr TimeNs kMost = 4;
   if (timeline.time(i + 1) - timeline.time(i) < kMost) return 1;
-  const double bow = timeline.bow(i), straight = 0.15 * gain_ * tolerance_;
+  const double bow = timeline.bow(i), straight = 0.15 * budget_.limit();
   return bow <= straight ? 1 : (bow <= 4 * straight ? 2 : kMost);
 }
 

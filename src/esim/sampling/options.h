@@ -37,7 +37,7 @@ struct AdaptiveSampling {
   static constexpr const char* kType = "adaptive";
   double tolerance = 0.25;
   double max_motion_px = 3;
-  int tile_px = 16;
+  int tile_px = 32;
   RateBounds bounds{20, 50000};
 };
 

@@ -14,6 +14,21 @@ namespace {
 // times the smaller one.
 constexpr float kMostBend = 2;
 
+// One row in so many is watched: errors of neighbours are alike.
+constexpr int kRowsPerWatched = 2;
+
+std::size_t watched_rows(const Tile& tile) {
+  return static_cast<std::size_t>((tile.height + kRowsPerWatched - 1) / kRowsPerWatched);
+}
+
+/// Calls row(k, watched) for each row of a tile that is watched: its first pixel is number k among all, number
+/// `watched` among those of such rows.
+template <typename Row>
+void for_watched(const Tile& tile, const Row& row) {
+  const auto width = static_cast<std::size_t>(tile.width);
+  for (std::size_t i = 0; i < watched_rows(tile); ++i) row(i * kRowsPerWatched * width, i * width);
+}
+
 double root_mean(float sum, std::size_t count) {
   return std::sqrt(static_cast<double>(sum) / static_cast<double>(count));
 }
@@ -69,15 +84,17 @@ void TileTimeline::insert(TimeNs t, const Image<float>& irradiance) {
   const auto width = static_cast<std::size_t>(tile_.width);
   sample.t = t, sample.surprise = 0;
   sample.irradiance.resize(width * static_cast<std::size_t>(tile_.height));
-  sample.brightness.resize(sample.irradiance.size());
+  sample.brightness.resize(width * watched_rows(tile_));
   for (int y = 0; y < tile_.height; ++y) {
     std::copy_n(irradiance.row(tile_.y + y) + tile_.x, width,
                 sample.irradiance.data() + static_cast<std::size_t>(y) * width);
   }
   const float eps = log_eps_;
-  for (std::size_t k = 0; k < sample.irradiance.size(); ++k) {
-    sample.brightness[k] = fast_log(std::max(sample.irradiance[k] + eps, 1e-30F));
-  }
+  for_watched(tile_, [&](std::size_t k, std::size_t watched) {
+#pragma omp simd
+    for (std::size_t x = 0; x < width; ++x)
+      sample.brightness[watched + x] = fast_log(std::max(sample.irradiance[k + x] + eps, 1e-30F));
+  });
   auto place = samples_.end();
   while (place != samples_.begin() && std::prev(place)->t > t) --place;
   place = samples_.insert(place, std::move(sample));
@@ -99,11 +116,14 @@ void TileTimeline::errors(std::size_t i, std::vector<float>& out) const {
   const auto f = static_cast<float>(static_cast<double>(samples_[i].t - t0) / static_cast<double>(t1 - t0));
   const float* const seen = samples_[i].brightness.data();
   const float eps = log_eps_;
+  const auto width = static_cast<std::size_t>(tile_.width);
   out.resize(samples_[i].brightness.size());
+  for_watched(tile_, [&](std::size_t k, std::size_t watched) {
 #pragma omp simd
-  for (std::size_t k = 0; k < out.size(); ++k) {
-    out[k] = fast_log(std::max(bow.irradiance(k, f) + eps, 1e-30F)) - seen[k];
-  }
+    for (std::size_t x = 0; x < width; ++x) {
+      out[watched + x] = fast_log(std::max(bow.irradiance(k + x, f) + eps, 1e-30F)) - seen[watched + x];
+    }
+  });
 }
 
 /// Computes the surprise of a sample.
@@ -120,14 +140,17 @@ double TileTimeline::bow(std::size_t i) const {
   const Bow bow = bow_between(i, i + 1);
   const float *const l0 = samples_[i].brightness.data(), *const l1 = samples_[i + 1].brightness.data();
   const float eps = log_eps_;
-  const std::size_t count = samples_[i].brightness.size();
+  const auto width = static_cast<std::size_t>(tile_.width);
   float sum = 0;
+  for_watched(tile_, [&](std::size_t k, std::size_t watched) {
 #pragma omp simd reduction(+ : sum)
-  for (std::size_t k = 0; k < count; ++k) {
-    const float off = fast_log(std::max(bow.irradiance(k, 0.5F) + eps, 1e-30F)) - 0.5F * (l0[k] + l1[k]);
-    sum += off * off;
-  }
-  return root_mean(sum, count);
+    for (std::size_t x = 0; x < width; ++x) {
+      const float middle = fast_log(std::max(bow.irradiance(k + x, 0.5F) + eps, 1e-30F));
+      const float off = middle - 0.5F * (l0[watched + x] + l1[watched + x]);
+      sum += off * off;
+    }
+  });
+  return root_mean(sum, samples_[i].brightness.size());
 }
 
 void TileTimeline::write(std::size_t i, Image<float>& irradiance) const {

@@ -32,13 +32,13 @@ class TileTimeline {
   TimeNs time(std::size_t i) const { return samples_[i].t; }
 
   /// How far off brightness at sample i would be had it been interpolated from the others: the root of the mean square
-  /// over the tile's pixels. Only for samples between others.
+  /// over every second row of the tile. Only for samples between others.
   double surprise(std::size_t i) const { return samples_[i].surprise; }
 
-  /// Errors of that interpolation pixel by pixel, ln units.
+  /// Errors of that interpolation for each pixel of those rows, ln units.
   void errors(std::size_t i, std::vector<float>& out) const;
 
-  /// Of each pixel at sample i.
+  /// Of each of those pixels at sample i.
   const std::vector<float>& brightness(std::size_t i) const { return samples_[i].brightness; }
 
   /// How far brightness between samples i and i + 1 is from its own straight line, in the middle, likewise.
@@ -54,7 +54,8 @@ class TileTimeline {
   struct Sample {
     TimeNs t = 0;
     double surprise = 0;
-    std::vector<float> irradiance, brightness;
+    std::vector<float> irradiance;
+    std::vector<float> brightness;  // of watched rows
   };
   struct Bow;
 

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <span>
+
+#include "esim/core/log_histogram.h"
+#include "esim/sampling/measured_error.h"
+
+namespace esim {
+
+/// How much error a tile's interval between two samples may have, and what audits say of what came of it.
+///
+/// The energy of an interval is its mean square error e^2, of brightness, times its duration h. A sample more takes
+/// much of an interval's energy away, and costs the same wherever it is: a mean square error is had with the fewest
+/// samples if all intervals have the same energy, e_0^2 h_0. Here h_0 is the typical interval of late, and e_0 is the
+/// tolerance over the 99th percentile of a normal deviate, or less where audits find that this is not enough.
+class ErrorBudget {
+ public:
+  /// 99 % of the errors are to stay below `tolerance`, ln units.
+  explicit ErrorBudget(double tolerance) : tolerance_(tolerance) {}
+
+  /// That an interval may have, ns.
+  double most_energy() const;
+
+  /// e_0 times the 99th percentile of a normal deviate: the tolerance, or less.
+  double limit() const { return gain_ * tolerance_; }
+
+  /// Takes note of the length of an interval, ns.
+  void remember(double interval);
+
+  /// Takes an audit of a tile: the error of each pixel in the middle of an interval that lasts `duration`, and by how
+  /// much the brightness of the one that changes most does in it.
+  void audit(std::span<const float> errors, float most_change, double duration);
+
+  bool audited() const { return audits_ > 0; }
+  MeasuredError measured() const { return measured_error(all_); }
+
+ private:
+  void steer();
+
+  double tolerance_;
+  double gain_ = 1;
+  double log_intervals_ = 0, intervals_ = 0;  // of late: ln ns added up, and how many
+  LogHistogram all_,
+      active_;  // errors: of all audits; of those since the last step, of tiles in which something changes
+  int audits_ = 0, active_audits_ = 0;
+};
+
+}  // namespace esim

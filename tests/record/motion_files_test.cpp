@@ -99,7 +99,7 @@ TEST_F(MotionFiles, StatesHoldBiasesAndObjectsWhereThereAreSome) {
 }
 
 TEST_F(MotionFiles, WithoutAnImuThereIsNoImuCalibration) {
-  KalibrWriter writer(folder_.path() / "calibration");
+  CalibrationWriter writer(folder_.path() / "calibration");
   writer.begin(info_);
   EXPECT_TRUE(std::filesystem::exists(folder_.path() / "calibration/camchain.yaml"));
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "calibration/imu.yaml"));

@@ -6,6 +6,7 @@
 #include "esim/core/error.h"
 #include "esim/motion/imu_kinematics.h"
 #include "esim/record/formats/kalibr.h"
+#include "esim/record/formats/rig_yaml.h"
 #include "esim/scenario/calibration.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
@@ -178,17 +179,32 @@ TEST_F(ImuSimulation, RecordingsHoldCalibrationsThatReadBackToTheSameRig) {
 TEST_F(ImuSimulation, CalibrationsHoldEveryDistortion) {
   World world = build_world(scenario_, 1, kQuiet);
   Camera& model = world.info.cameras[0].model;
-  const auto read_back = [&](const Distortion& distortion) {
-    model.distortion = distortion;
-    const auto file = folder_.write("camchain.yaml", kalibr_camchain(world.info));
-    return read_calibration(file)[0].model.distortion;
-  };
-  EXPECT_TRUE(std::holds_alternative<NoDistortion>(read_back(NoDistortion{})));
-  const auto radial = std::get<RadialTangential>(read_back(RadialTangential{-0.1, 0.01, 1e-3, 2e-3, 1.0 / 3000}));
-  EXPECT_EQ(radial.p1, 1e-3);
-  EXPECT_EQ(radial.k3, 1.0 / 3000);
-  EXPECT_EQ(std::get<Equidistant>(read_back(Equidistant{-0.1, 0.01, 0.002, 0.1 / 3})).k4, 0.1 / 3);
-  EXPECT_EQ(std::get<Fov>(read_back(Fov{0.93})).w, 0.93);
+  for (const auto& as_text : {kalibr_camchain, rig_yaml}) {
+    const auto read_back = [&](const Distortion& distortion) {
+      model.distortion = distortion;
+      return read_calibration(folder_.write("calibration.yaml", as_text(world.info)))[0].model.distortion;
+    };
+    EXPECT_TRUE(std::holds_alternative<NoDistortion>(read_back(NoDistortion{})));
+    const auto radial = std::get<RadialTangential>(read_back(RadialTangential{-0.1, 0.01, 1e-3, 2e-3, 1.0 / 3000}));
+    EXPECT_EQ(radial.p1, 1e-3);
+    EXPECT_EQ(radial.k3, 1.0 / 3000);
+    EXPECT_EQ(std::get<Equidistant>(read_back(Equidistant{-0.1, 0.01, 0.002, 0.1 / 3})).k4, 0.1 / 3);
+    EXPECT_EQ(std::get<Fov>(read_back(Fov{0.93})).w, 0.93);
+  }
+}
+
+TEST_F(ImuSimulation, RigFilesHoldTheCameras) {
+  const World world = build_world(scenario_, 1, kQuiet);
+  const auto cameras = read_calibration(folder_.write("rig.yaml", rig_yaml(world.info)));
+  ASSERT_EQ(cameras.size(), world.info.cameras.size());
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const CameraInfo& camera = world.info.cameras[i];
+    EXPECT_EQ(cameras[i].name, camera.name);
+    EXPECT_EQ(cameras[i].model.fx, camera.model.fx);
+    EXPECT_EQ(cameras[i].model.cy, camera.model.cy);
+    EXPECT_EQ(cameras[i].model.height, camera.model.height);
+    EXPECT_LT((cameras[i].T_body_camera.matrix() - camera.T_body_camera.matrix()).cwiseAbs().maxCoeff(), 1e-12);
+  }
 }
 
 TEST_F(ImuSimulation, WithoutAnImuTheFirstCameraIsTheReference) {

@@ -36,7 +36,7 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
   const TimeUnit unit = output.time_unit == EventTimeUnit::us ? TimeUnit::us : TimeUnit::ns;
 
   auto sinks = std::make_unique<FanOut>();
-  sinks->add(std::make_unique<KalibrWriter>(folder / "calibration"));
+  sinks->add(std::make_unique<CalibrationWriter>(folder / "calibration"));
   if (scenario.imu) sinks->add(std::make_unique<ImuCsvWriter>(folder));
   if (truth.pose_rate_hz > 0) {
     sinks->add(std::make_unique<PosesTumWriter>(folder / "poses.txt"));
@@ -46,10 +46,13 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
     const int camera = static_cast<int>(i);
     const auto place = folder / scenario.cameras[i].name;
     std::filesystem::create_directories(place);
-    sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", camera, EventsHdf5Options{unit, compression}));
-    if (output.events_txt) sinks->add(std::make_unique<EventsTextWriter>(place / "events.txt", camera));
+    const bool events = scenario.cameras[i].events;
+    if (events)
+      sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", camera, EventsHdf5Options{unit, compression}));
+    if (events && output.events_txt) sinks->add(std::make_unique<EventsTextWriter>(place / "events.txt", camera));
     if (scenario.cameras[i].frame_camera) sinks->add(std::make_unique<FramesPngWriter>(place, camera));
-    if (truth.event_points) sinks->add(std::make_unique<EventPointsPlyWriter>(place / "event_points.ply", camera));
+    if (events && truth.event_points)
+      sinks->add(std::make_unique<EventPointsPlyWriter>(place / "event_points.ply", camera));
     if (truth.rate_hz <= 0) continue;
     if (truth.images) sinks->add(std::make_unique<ImagesPngWriter>(place / "images", camera));
     const TruthHdf5Options datasets{truth.depth, truth.flow, compression, truth.objects, truth.displacement};

@@ -175,13 +175,11 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
       keyframes = make(sampled_camera(sampling, context));
     }
     std::unique_ptr<Sampler> sampler = make_sampler(sampling, context);
-    world.cameras.push_back(
-        {std::move(renderer),
-         std::move(sampler),
-         EventCamera(sensor, model.width, model.height, scenario.seed, static_cast<std::uint16_t>(i)),
-         {},
-         nullptr,
-         std::move(keyframes)});
+    world.cameras.push_back({std::move(renderer), std::move(sampler), std::nullopt, {}, nullptr, std::move(keyframes)});
+    if (options.events) {
+      world.cameras.back().event_camera.emplace(sensor, model.width, model.height, scenario.seed,
+                                                static_cast<std::uint16_t>(i));
+    }
     if (options.frame_camera)
       world.cameras.back().frame_camera = build_frame_camera(options, model, span, scenario.seed, i, notices);
     require_a_view(world, i);

@@ -174,6 +174,7 @@ struct CameraOptions {
   DistortionOptions distortion;
   PoseOptions T_body_camera;
   SamplingOptions sampling;
+  bool events = true;
   EventCameraOptions event_camera;
   std::optional<FrameCameraOptions> frame_camera;  ///< none where not set
 };

@@ -190,6 +190,7 @@ void describe(Visitor& visit, CameraOptions& o) {
   visit("distortion", o.distortion, About{"of the lens"});
   visit("T_body_camera", o.T_body_camera, About{"pose of the camera (x right, y down, z forward) in the body"});
   visit("sampling", o.sampling, About{"when the scene is evaluated"});
+  visit("events", o.events, About{"whether the camera has an event sensor; without, it is a standard camera"});
   visit("event_camera", o.event_camera, About{"the event sensor"});
   visit("frame_camera", o.frame_camera, About{"a standard camera in the same place (default: none)"});
 }

@@ -62,9 +62,9 @@ class Simulator::Run {
     }
     start_next(camera);
     while (!segments.empty()) {
-      {
+      if (camera.event_camera) {
         Stopwatch stopwatch(summary_.seconds.events);
-        camera.event_camera.integrate(segments, *world_.workers);
+        camera.event_camera->integrate(segments, *world_.workers);
       }
       expose(camera, segments);
       Stopwatch stopwatch(summary_.seconds.sampling);
@@ -109,7 +109,7 @@ class Simulator::Run {
     }
     for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
       summary_.cameras[i].sampling = world_.cameras[i].sampler->statistics();
-      summary_.cameras[i].sensor = world_.cameras[i].event_camera.statistics();
+      if (world_.cameras[i].event_camera) summary_.cameras[i].sensor = world_.cameras[i].event_camera->statistics();
     }
     summary_.complete = complete;
     summary_.wall_seconds = elapsed();
@@ -151,10 +151,11 @@ class Simulator::Run {
 
   void deliver_events(TimeNs until) {
     for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
+      if (!world_.cameras[i].event_camera) continue;
       events_.clear();
       {
         Stopwatch stopwatch(summary_.seconds.events);
-        world_.cameras[i].event_camera.release_until(until, events_);
+        world_.cameras[i].event_camera->release_until(until, events_);
         const auto on = std::count_if(events_.begin(), events_.end(), [](const Event& e) { return e.polarity > 0; });
         summary_.cameras[i].events_on += on;
         summary_.cameras[i].events_off += static_cast<std::int64_t>(events_.size()) - on;

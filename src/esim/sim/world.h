@@ -24,7 +24,7 @@ namespace esim {
 struct CameraChannel {
   std::unique_ptr<Renderer> renderer;
   std::unique_ptr<Sampler> sampler;
-  EventCamera event_camera;
+  std::optional<EventCamera> event_camera;
   Sample sample;                           // the latest evaluation; its buffers go round between renderer and sampler
   std::unique_ptr<Rendering> rendering{};  // the one that the sampler wants next, under way
   std::unique_ptr<Renderer> keyframes{};   // what the sampler asks, where its camera is denser than the sensor's

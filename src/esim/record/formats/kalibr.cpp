@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "esim/record/formats/rig_yaml.h"
 #include "esim/record/output_file.h"
 
 namespace esim {
@@ -67,9 +68,10 @@ std::string kalibr_imu(const ImuInfo& imu) {
       imu.gyroscope_random_walk, imu.rate_hz);
 }
 
-void KalibrWriter::begin(const RecordingInfo& info) {
+void CalibrationWriter::begin(const RecordingInfo& info) {
   std::filesystem::create_directories(folder_);
   write_file_atomically(folder_ / "camchain.yaml", kalibr_camchain(info));
+  write_file_atomically(folder_ / "rig.yaml", rig_yaml(info));
   if (info.imu) write_file_atomically(folder_ / "imu.yaml", kalibr_imu(*info.imu));
 }
 

@@ -17,10 +17,11 @@ std::string kalibr_camchain(const RecordingInfo& info);
 /// An IMU as Kalibr's imu.yaml.
 std::string kalibr_imu(const ImuInfo& imu);
 
-/// Writes camchain.yaml and, with an IMU, imu.yaml into a folder when a recording begins.
-class KalibrWriter final : public Sink {
+/// Writes camchain.yaml, rig.yaml (the original ESIM's) and, with an IMU, imu.yaml into a folder when a recording
+/// begins.
+class CalibrationWriter final : public Sink {
  public:
-  explicit KalibrWriter(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  explicit CalibrationWriter(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   void begin(const RecordingInfo& info) override;
   void write(const Record&) override {}

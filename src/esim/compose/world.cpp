@@ -59,7 +59,8 @@ bool sees_colour(const Scenario& scenario) {
 
 std::unique_ptr<Renderer> build_renderer(const RendererFactory& make_renderer, const CameraOptions& options,
                                          const Camera& model, const Workers& workers) {
-  if (sees_colour(options) && std::holds_alternative<KeyframeSampling>(options.sampling)) {
+  if (!sees_colour(options)) return make_renderer(model, ColourFilters::none, workers);
+  if (std::holds_alternative<KeyframeSampling>(options.sampling)) {
     throw UserError(
         fmt::format("camera {}: sampling: keyframes joins what neighbouring pixels see, which is not the same colour; "
                     "use adaptive or flow, or colour: none",

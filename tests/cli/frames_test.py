@@ -19,7 +19,7 @@ FAST = ["--set", "camera.width=64", "--set", "camera.height=48", "--set", "durat
 
 
 def read_png(path):
-    """Bits per number and the rows of a grey PNG."""
+    """Bits per number and the rows of a PNG: numbers if it is grey, three per pixel if it is in colour."""
     data = path.read_bytes()
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     at, compressed = 8, b""
@@ -28,10 +28,10 @@ def read_png(path):
         body = data[at + 8:at + 8 + length]
         if kind == b"IHDR":
             width, height, bits, colour = struct.unpack(">IIBB", body[:10])
-            assert colour == 0, "grey"
+            channels = {0: 1, 2: 3}[colour]
         compressed += body if kind == b"IDAT" else b""
         at += length + 12
-    raw, step = zlib.decompress(compressed), bits // 8
+    raw, step = zlib.decompress(compressed), channels * bits // 8
     before, rows = bytes(width * step), []
     for y in range(height):
         kind, line = raw[y * (width * step + 1)], bytearray(raw[y * (width * step + 1) + 1:(y + 1) * (width * step + 1)])
@@ -40,7 +40,7 @@ def read_png(path):
             b, c = before[i], before[i - step] if i >= step else 0
             paeth = min((a, b, c), key=lambda v: abs(a + b - c - v))
             line[i] = (line[i] + [0, a, b, (a + b) // 2, paeth][kind]) % 256
-        rows.append(struct.unpack(f">{width}{'B' if bits == 8 else 'H'}", line))
+        rows.append(struct.unpack(f">{channels * width}{'B' if bits == 8 else 'H'}", line))
         before = bytes(line)
     return bits, rows
 
@@ -124,6 +124,27 @@ frame_camera: {rate_hz: 20, bits: 16}
         self.assertEqual(len(list((self.out / "fast" / "frames").iterdir())), 19)
         self.assertEqual(read_png(self.out / "fast" / "frames" / "000000.png")[0], 16, "shared by the cameras")
         self.assertFalse((self.out / "blind" / "frames").exists())
+
+    def test_colour_cameras_write_colour_frames_with_any_number_of_threads(self):
+        place, recordings = self.place / "frames" / "000002.png", []
+        for frame_camera in ("{}", "{demosaic: false}"):
+            for threads in (1, 2):
+                self.simulate("--set", "camera.colour=rggb", "--set", f"frame_camera={frame_camera}",
+                              "--threads", threads)
+                recordings.append((read_png(place), (self.place / "events.h5").read_bytes()))
+        (colours, events), again, (mosaic, same_events), _ = recordings
+        self.assertEqual((colours, events), again)
+        self.assertEqual(events, same_events)
+        for y, row in enumerate(mosaic[1]):  # each pixel keeps what it saw
+            for x, number in enumerate(row):
+                self.assertEqual(colours[1][y][3 * x + x % 2 + y % 2], number)
+
+    def test_colour_is_refused_where_it_cannot_be(self):
+        colour = ["--set", "camera.colour=rggb"]
+        self.assert_refused(run("check", SCENES / "sprites.yaml", *FAST, *colour), "camera cam0: colour", "grey only")
+        self.assert_refused(run("check", SCENES / "poster.yaml", *FAST, *colour, "--set", "sampling={type: keyframes}"),
+                            "camera cam0: sampling: keyframes", "colour: none")
+        self.assert_refused(run("check", SCENES / "poster.yaml", *FAST, "--set", "camera.colour=bayer"), "rggb")
 
     def test_bad_options_are_one_line_that_names_them(self):
         for options, parts in (

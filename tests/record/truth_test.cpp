@@ -8,6 +8,7 @@
 #include "esim/core/error.h"
 #include "esim/record/fan_out.h"
 #include "esim/record/formats/images_png.h"
+#include "esim/record/formats/png_file.h"
 #include "esim/record/formats/poses_tum.h"
 #include "esim/record/formats/truth_hdf5.h"
 #include "record/recordings.h"
@@ -228,6 +229,48 @@ TEST(ImagesPng, FilesAndTimestamps) {
   ASSERT_EQ(image.size(), cv::Size(20, 10));
   const auto expected = encode_srgb(second.irradiance);
   EXPECT_TRUE(std::equal(image.begin<std::uint8_t>(), image.end<std::uint8_t>(), expected.data()));
+}
+
+// --- colour frames --------------------------------------------------------------------------------------------------
+
+/// Decodes what a mosaic of uniform light becomes.
+template <typename T>
+cv::Mat demosaicked(int width, int height, const std::array<T, 3>& light) {
+  Image<T> mosaic(width, height);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) mosaic(x, y) = light[static_cast<std::size_t>(x % 2 + y % 2)];
+  }
+  const TemporaryDirectory folder;
+  write_demosaicked_png(folder.path() / "a.png", mosaic);
+  return cv::imread((folder.path() / "a.png").string(), cv::IMREAD_UNCHANGED);
+}
+
+TEST(DemosaickedPng, GivesEveryPixelTheColoursOfUniformLight) {
+  for (const auto& [width, height] : {std::pair(16, 12), {7, 5}, {3, 2}, {2, 2}}) {
+    const cv::Mat narrow = demosaicked<std::uint8_t>(width, height, {200, 90, 30});
+    const cv::Mat wide = demosaicked<std::uint16_t>(width, height, {50'000, 9'000, 300});
+    ASSERT_EQ(narrow.type(), CV_8UC3);
+    ASSERT_EQ(wide.type(), CV_16UC3);
+    ASSERT_EQ(narrow.size(), cv::Size(width, height));
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {  // blue first
+        ASSERT_EQ(narrow.at<cv::Vec3b>(y, x), cv::Vec3b(30, 90, 200)) << x << ", " << y << " of " << width;
+        ASSERT_EQ(wide.at<cv::Vec3w>(y, x), cv::Vec3w(300, 9'000, 50'000)) << x << ", " << y << " of " << width;
+      }
+    }
+  }
+}
+
+TEST(DemosaickedPng, KeepsWhatEachPixelSaw) {
+  Image<std::uint8_t> mosaic(12, 10);
+  for (std::size_t i = 0; i < mosaic.size(); ++i) mosaic.data()[i] = static_cast<std::uint8_t>(i * 37);
+  const TemporaryDirectory folder;
+  write_demosaicked_png(folder.path() / "a.png", mosaic);
+  const cv::Mat image = cv::imread((folder.path() / "a.png").string(), cv::IMREAD_UNCHANGED);
+  for (int y = 0; y < 10; ++y) {
+    for (int x = 0; x < 12; ++x)
+      ASSERT_EQ(image.at<cv::Vec3b>(y, x)[2 - x % 2 - y % 2], mosaic(x, y)) << x << ", " << y;
+  }
 }
 
 // Notes what happens to it.

@@ -147,6 +147,18 @@ TEST(BrightnessSampling, SeesTheImagesBorder) {
   EXPECT_NEAR(fastest_brightness_change_per_s(sample, 0.001, kWorkers), 10.0, 0.05);
 }
 
+TEST(BrightnessSampling, ComparesPixelsOfTheSameColourInAMosaic) {
+  // Uniform red light: what differs between neighbours is no edge, at the border either.
+  Sample sample = moving_ramp(0, 0.0F, 10.0F, 12.0F, 0.001);
+  for (int y = 0; y < sample.irradiance.height(); ++y) {
+    for (int x = 0; x < sample.irradiance.width(); ++x) sample.irradiance(x, y) = x % 2 + y % 2 == 0 ? 0.9F : 0.1F;
+  }
+  EXPECT_EQ(fastest_brightness_change_per_s(sample, 0.001, kWorkers, true), 0);
+  EXPECT_GT(fastest_brightness_change_per_s(sample, 0.001, kWorkers, false), 10);
+  const Sample ramp = moving_ramp(0, 0.07F, -90.0F, 12.0F, 0.01);
+  EXPECT_NEAR(fastest_brightness_change_per_s(ramp, 0.01, kWorkers, true), 0.07 * 90, 1e-3);
+}
+
 std::vector<TimeNs> sample_times(const SamplingOptions& options, float speed, TimeNs end) {
   const auto sampler = make_sampler(options, {{}, kWidth, kHeight, {0, end}, kWorkers});
   std::vector<TimeNs> times;

@@ -188,6 +188,28 @@ TEST(SceneFile, TexturesAreSrgbAndFactorsLinear) {
   EXPECT_FALSE(material.unlit);
 }
 
+TEST(SceneFile, KeepsColoursWhereTheyAreWanted) {
+  GlbWriter glb = textured({{"baseColorFactor", {0.5, 1.0, 0.25, 1.0}}}, cv::Vec4b(255, 128, 188, 10));
+  glb.add("materials",
+          {{"pbrMetallicRoughness", {{"baseColorFactor", {0.1, 0.2, 0.3, 1.0}}}}, {"emissiveFactor", {0.0, 0.4, 0.8}}});
+  const test::TemporaryDirectory folder;
+  const auto path = folder.write("scene.glb", glb.bytes());
+  const Mesh mesh = load_mesh(path, Warnings().handler(), true), grey = load_mesh(path, Warnings().handler());
+  const std::array<double, 3> paint = {0.5 * linear_from_srgb(188.0F / 255), linear_from_srgb(128.0F / 255), 0.25};
+  for (std::size_t colour = 0; colour < 3; ++colour) {
+    EXPECT_TRUE(grey.coloured[colour].empty());
+    ASSERT_EQ(mesh.coloured[colour].size(), 2U);
+    const Material &textured = mesh.coloured[colour][0], &plain = mesh.coloured[colour][1];
+    ASSERT_NE(textured.texture, nullptr);
+    EXPECT_NEAR(textured.base * textured.texture->texels()(1, 1), paint[colour], 1e-3 * paint[colour]);
+    EXPECT_FLOAT_EQ(plain.base, 0.1F * static_cast<float>(colour + 1));
+    EXPECT_FLOAT_EQ(plain.emission, 0.4F * static_cast<float>(colour));
+  }
+  // Luminance is what it is without colours.
+  EXPECT_EQ(mesh.materials[0].texture->texels()(0, 0), grey.materials[0].texture->texels()(0, 0));
+  EXPECT_EQ(mesh.materials[1].base, grey.materials[1].base);
+}
+
 TEST(SceneFile, UnlitEmissionAndBakedRadiance) {
   GlbWriter glb;
   glb.add("materials", {{"pbrMetallicRoughness", {{"baseColorFactor", {0.5, 0.5, 0.5, 1.0}}}},

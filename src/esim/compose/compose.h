@@ -36,8 +36,9 @@ World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> bo
                   const Notices& notices);
 
 /// What the scene files of a renderer hold: a mesh renderer's scene with all its objects, those that the scenario lists
-/// after the scene file's own. Empty for renderers without scene files. Notes say what was found.
-SceneFile load_scenes(const RendererOptions& options, const Notices& notices);
+/// after the scene file's own. Empty for renderers without scene files. With colours if `colour`. Notes say what was
+/// found.
+SceneFile load_scenes(const RendererOptions& options, bool colour, const Notices& notices);
 
 /// The motion of the body that a scenario describes.
 std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const SceneFile& scene,
@@ -55,9 +56,13 @@ std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const S
                                                                          const TimeSpan& simulated,
                                                                          const Notices& notices);
 
-/// Makes the renderers of a scenario's cameras; what they show is loaded once and shared.
-using RendererFactory = std::function<std::unique_ptr<Renderer>(const Camera& camera, const Workers& workers)>;
-RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene);
+/// Makes the renderers of a scenario's cameras; what they show is loaded once and shared. Throws UserError for filters
+/// that the renderer cannot look through.
+using RendererFactory =
+    std::function<std::unique_ptr<Renderer>(const Camera& camera, ColourFilters filters, const Workers& workers)>;
+
+/// Cameras may have colour filters if `colour`.
+RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene, bool colour);
 
 /// Gives a world with cameras the ground truth that its scenario asks for. Throws UserError where that cannot be had.
 void prepare_truth(const Scenario& scenario, const SceneFile& scene, const RendererFactory& make_renderer,

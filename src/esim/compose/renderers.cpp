@@ -20,48 +20,62 @@ void require_path(const std::filesystem::path& path, const std::string& key) {
   if (path.empty()) throw UserError(fmt::format("renderer.{}: is missing; name a file", key));
 }
 
+void refuse(ColourFilters filters, const char* renderer, const char* instead) {
+  if (filters != ColourFilters::none)
+    throw UserError(fmt::format("colour: {} shows grey only; use {}, or colour: none", renderer, instead));
+}
+
 // One overload per type of renderer: a new one is a line in RendererOptions and a function here.
 
-/// OpenGL where there is a graphics card for it.
-MeshEngine choose_engine(const MeshRendererOptions& options) {
+/// OpenGL where there is a graphics card for it, and no need of colour.
+MeshEngine choose_engine(const MeshRendererOptions& options, bool colour) {
   if (options.engine != MeshEngine::automatic) return options.engine;
+  if (colour) return MeshEngine::raycast;
   const std::vector<GlDevice> devices = gl_devices();
   const bool hardware = std::any_of(devices.begin(), devices.end(), [](const GlDevice& d) { return !d.software; });
   return hardware ? MeshEngine::gl : MeshEngine::raycast;
 }
 
-RendererFactory factory(const MeshRendererOptions& options, const SceneFile& file) {
-  if (choose_engine(options) == MeshEngine::gl) {
+RendererFactory factory(const MeshRendererOptions& options, const SceneFile& file, bool colour) {
+  if (choose_engine(options, colour) == MeshEngine::gl) {
     const GlOptions gl{static_cast<float>(options.background), options.samples_per_pixel, options.gl_device};
-    return [gl, scene = std::make_shared<const Scene>(file.scene)](const Camera& camera, const Workers&) {
+    return [gl, scene = std::make_shared<const Scene>(file.scene)](const Camera& camera, ColourFilters filters,
+                                                                   const Workers&) {
+      refuse(filters, "engine: gl", "engine: raycast");
       return make_gl_renderer(*scene, gl, camera);
     };
   }
   const auto scene = build_raycast_scene(file.scene);
   const RaycastOptions raycast{static_cast<float>(options.background), options.samples_per_pixel};
-  return [=](const Camera& camera, const Workers& workers) {
-    return make_raycast_renderer(scene, raycast, camera, workers);
+  return [=](const Camera& camera, ColourFilters filters, const Workers& workers) {
+    return make_raycast_renderer(scene, raycast, camera, workers, filters);
   };
 }
 
-RendererFactory factory(const PanoramaRendererOptions& options, const SceneFile&) {
+RendererFactory factory(const PanoramaRendererOptions& options, const SceneFile&, bool colour) {
   require_path(options.image, "image");
   if (!(options.orientation.norm() > 1e-6))
     throw UserError("renderer.orientation: [0, 0, 0, 0] is no orientation; use [0, 0, 0, 1]");
-  const Image<float> image = load_luminance(options.image, {options.median_px, options.gaussian_px, true});
-  const Panorama panorama{std::make_shared<const Texture>(image, Wrap::repeat, Wrap::clamp),
-                          Eigen::Quaterniond(options.orientation.normalized())};
-  return
-      [=](const Camera& camera, const Workers& workers) { return make_panorama_renderer(panorama, camera, workers); };
+  const Softening softening{options.median_px, options.gaussian_px, true};
+  Panorama panorama{
+      std::make_shared<const Texture>(load_luminance(options.image, softening), Wrap::repeat, Wrap::clamp),
+      Eigen::Quaterniond(options.orientation.normalized())};
+  if (colour) panorama.colours = colour_textures(load_colours(options.image, softening), Wrap::repeat, Wrap::clamp);
+  return [=](const Camera& camera, ColourFilters filters, const Workers& workers) {
+    return make_panorama_renderer(panorama, camera, workers, filters);
+  };
 }
 
-RendererFactory factory(const PlaneRendererOptions& options, const SceneFile&) {
+RendererFactory factory(const PlaneRendererOptions& options, const SceneFile&, bool colour) {
   require_path(options.image, "image");
   const Wrap wrap = options.endless ? Wrap::repeat : Wrap::clamp;
-  const Image<float> image = load_luminance(options.image, {options.median_px, options.gaussian_px});
-  const Poster poster{std::make_shared<const Texture>(image, wrap, wrap), pose_of(options.pose), options.width_m,
-                      options.endless, static_cast<float>(options.background)};
-  return [=](const Camera& camera, const Workers& workers) { return make_plane_renderer(poster, camera, workers); };
+  const Softening softening{options.median_px, options.gaussian_px};
+  Poster poster{std::make_shared<const Texture>(load_luminance(options.image, softening), wrap, wrap),
+                pose_of(options.pose), options.width_m, options.endless, static_cast<float>(options.background)};
+  if (colour) poster.colours = colour_textures(load_colours(options.image, softening), wrap, wrap);
+  return [=](const Camera& camera, ColourFilters filters, const Workers& workers) {
+    return make_plane_renderer(poster, camera, workers, filters);
+  };
 }
 
 /// The textures of layers. Layers of the same image share them.
@@ -86,7 +100,7 @@ class LayerTextures {
   std::map<std::tuple<std::filesystem::path, int, double, Wrap>, Textures> loaded_;
 };
 
-RendererFactory factory(const SpritesRendererOptions& options, const SceneFile&) {
+RendererFactory factory(const SpritesRendererOptions& options, const SceneFile&, bool) {
   if (options.layers.empty())
     throw UserError("renderer: sprites without layers show nothing; list layers, or name a scene file in scene");
   SpriteScene scene{{}, static_cast<float>(options.background)};
@@ -102,13 +116,16 @@ RendererFactory factory(const SpritesRendererOptions& options, const SceneFile&)
       throw UserError(fmt::format("renderer.layers.{}: {}", i, error.what()));
     }
   }
-  return [=](const Camera& camera, const Workers& workers) { return make_sprites_renderer(scene, camera, workers); };
+  return [=](const Camera& camera, ColourFilters filters, const Workers& workers) {
+    refuse(filters, "the renderer sprites", "a mesh, a plane or a panorama");
+    return make_sprites_renderer(scene, camera, workers);
+  };
 }
 
 }  // namespace
 
-RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene) {
-  return std::visit([&](const auto& renderer) { return factory(renderer, scene); }, options);
+RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene, bool colour) {
+  return std::visit([&](const auto& renderer) { return factory(renderer, scene, colour); }, options);
 }
 
 }  // namespace esim

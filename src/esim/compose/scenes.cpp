@@ -35,15 +35,15 @@ std::filesystem::path readable(const std::filesystem::path& scene, const Notices
   return glb;
 }
 
-SceneFile load(const MeshRendererOptions& options, const Notices& notices) {
+SceneFile load(const MeshRendererOptions& options, bool colour, const Notices& notices) {
   require_path(options.scene, "scene");
-  SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning);
+  SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning, colour);
   notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
   for (std::size_t i = 0; i < options.objects.size(); ++i) {
     const ObjectOptions& object = options.objects[i];
     require_path(object.scene, fmt::format("objects.{}.scene", i));
     SceneObject loaded{object.name.empty() ? fmt::format("object{}", i) : object.name,
-                       load_mesh(readable(object.scene, notices), notices.warning), true};
+                       load_mesh(readable(object.scene, notices), notices.warning, colour), true};
     for (const SceneObject& other : file.scene.objects) {
       if (!other.moves || other.name != loaded.name) continue;
       throw UserError(
@@ -57,14 +57,14 @@ SceneFile load(const MeshRendererOptions& options, const Notices& notices) {
 }
 
 template <typename Renderer>
-SceneFile load(const Renderer&, const Notices&) {
+SceneFile load(const Renderer&, bool, const Notices&) {
   return {};
 }
 
 }  // namespace
 
-SceneFile load_scenes(const RendererOptions& options, const Notices& notices) {
-  return std::visit([&](const auto& renderer) { return load(renderer, notices); }, options);
+SceneFile load_scenes(const RendererOptions& options, bool colour, const Notices& notices) {
+  return std::visit([&](const auto& renderer) { return load(renderer, colour, notices); }, options);
 }
 
 }  // namespace esim

@@ -50,7 +50,10 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
     if (events)
       sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", camera, EventsHdf5Options{unit, compression}));
     if (events && output.events_txt) sinks->add(std::make_unique<EventsTextWriter>(place / "events.txt", camera));
-    if (scenario.cameras[i].frame_camera) sinks->add(std::make_unique<FramesPngWriter>(place, camera));
+    if (const auto& frames = scenario.cameras[i].frame_camera) {
+      const bool in_colour = scenario.cameras[i].colour != ColourFilters::none && frames->demosaic;
+      sinks->add(std::make_unique<FramesPngWriter>(place, camera, in_colour));
+    }
     if (events && truth.event_points)
       sinks->add(std::make_unique<EventPointsPlyWriter>(place / "event_points.ply", camera));
     if (truth.rate_hz <= 0) continue;

@@ -49,13 +49,16 @@ void warn_of_much(const Scenario& scenario, double duration_s, const Notices& no
 
 /// Renderers of the same scene on the processor, as fast as they are for single pixels where depth is all that counts:
 /// a graphics card would draw everything for each.
-RendererFactory for_single_pixels(const RendererFactory& make_renderer, RendererOptions options, SceneFile scene) {
-  auto* const mesh = std::get_if<MeshRendererOptions>(&options);
-  if (mesh == nullptr) return make_renderer;
-  mesh->engine = MeshEngine::raycast;
-  mesh->samples_per_pixel = 1;
-  scene.scene.lighting.reset();
-  return build_renderer_factory(options, scene);
+EventPoints::MakeRenderer for_single_pixels(RendererFactory make_renderer, RendererOptions options, SceneFile scene) {
+  if (auto* const mesh = std::get_if<MeshRendererOptions>(&options)) {
+    mesh->engine = MeshEngine::raycast;
+    mesh->samples_per_pixel = 1;
+    scene.scene.lighting.reset();
+    make_renderer = build_renderer_factory(options, scene, false);
+  }
+  return [make_renderer = std::move(make_renderer)](const Camera& camera, const Workers& workers) {
+    return make_renderer(camera, ColourFilters::none, workers);
+  };
 }
 
 }  // namespace
@@ -70,7 +73,7 @@ void prepare_truth(const Scenario& scenario, const SceneFile& scene, const Rende
   warn_of_much(scenario, duration_s, notices);
 
   world.truth_objects = truth.objects;
-  RendererFactory make_pixel_renderer;
+  EventPoints::MakeRenderer make_pixel_renderer;
   if (truth.event_points) make_pixel_renderer = for_single_pixels(make_renderer, scenario.renderer, scene);
   for (std::size_t i = 0; i < world.cameras.size(); ++i) {
     CameraChannel& camera = world.cameras[i];

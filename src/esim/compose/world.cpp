@@ -49,6 +49,30 @@ void check_sampling(const CameraOptions& camera, const Notices& notices) {
   std::visit(check, camera.sampling);
 }
 
+bool sees_colour(const CameraOptions& camera) { return camera.colour != ColourFilters::none; }
+
+/// Whether any camera does.
+bool sees_colour(const Scenario& scenario) {
+  return std::any_of(scenario.cameras.begin(), scenario.cameras.end(),
+                     [](const CameraOptions& camera) { return sees_colour(camera); });
+}
+
+std::unique_ptr<Renderer> build_renderer(const RendererFactory& make_renderer, const CameraOptions& options,
+                                         const Camera& model, const Workers& workers) {
+  if (!sees_colour(options)) return make_renderer(model, ColourFilters::none, workers);
+  if (std::holds_alternative<KeyframeSampling>(options.sampling)) {
+    throw UserError(
+        fmt::format("camera {}: sampling: keyframes joins what neighbouring pixels see, which is not the same colour; "
+                    "use adaptive or flow, or colour: none",
+                    options.name));
+  }
+  try {
+    return make_renderer(model, options.colour, workers);
+  } catch (const UserError& error) {
+    throw UserError(fmt::format("camera {}: {}", options.name, error.what()));
+  }
+}
+
 /// The frame camera that a camera has.
 FrameCamera build_frame_camera(const CameraOptions& options, const Camera& model, const TimeSpan& span,
                                std::uint64_t seed, std::size_t index, const Notices& notices) {
@@ -158,19 +182,20 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
         {options.name, camera_model(options),
          pose_named(fmt::format("camera {}: T_body_camera", options.name), options.T_body_camera)});
   }
-  const RendererFactory make_renderer = build_renderer_factory(scenario.renderer, scene);
+  const RendererFactory make_renderer = build_renderer_factory(scenario.renderer, scene, sees_colour(scenario));
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
     const CameraOptions& options = scenario.cameras[i];
     const Camera& model = world.info.cameras[i].model;
     const EventCameraOptions& sensor = options.event_camera;
-    const SensorTraits traits{std::min(sensor.threshold_on(), sensor.threshold_off()), sensor.log_eps};
-    std::unique_ptr<Renderer> renderer = make_renderer(model, *world.workers);
+    const SensorTraits traits{std::min(sensor.threshold_on(), sensor.threshold_off()), sensor.log_eps,
+                              sees_colour(options)};
+    std::unique_ptr<Renderer> renderer = build_renderer(make_renderer, options, model, *world.workers);
     SamplingContext context{traits,         model.width, model.height,       span,
                             *world.workers, model,       renderer->traits(), view_at(world, i)};
     SamplingOptions sampling = options.sampling;
     std::unique_ptr<Renderer> keyframes;
     if (auto* const wanted = std::get_if<KeyframeSampling>(&sampling)) {
-      const auto make = [&](const Camera& camera) { return make_renderer(camera, *world.workers); };
+      const auto make = [&](const Camera& camera) { return make_renderer(camera, options.colour, *world.workers); };
       *wanted = decide_supersampling(*wanted, context, *renderer, make);
       keyframes = make(sampled_camera(sampling, context));
     }
@@ -192,7 +217,7 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
 }  // namespace
 
 World build_world(const Scenario& scenario, int threads, const Notices& notices) {
-  const SceneFile scene = load_scenes(scenario.renderer, notices);
+  const SceneFile scene = load_scenes(scenario.renderer, sees_colour(scenario), notices);
   auto trajectory = build_trajectory(scenario, scene, notices);
   const TimeSpan span = simulated_span(scenario, *trajectory);
   return build(scenario, scene, std::move(trajectory), span, threads, notices);
@@ -203,7 +228,8 @@ World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> bo
   if (!scenario.duration_s) throw UserError("duration_s: is missing; a motion that goes on has no end of its own");
   const TimeNs start = body->start() + to_ns(scenario.start_s);
   const TimeSpan span{start, start + to_ns(*scenario.duration_s)};
-  return build(scenario, load_scenes(scenario.renderer, notices), std::move(body), span, threads, notices);
+  const SceneFile scene = load_scenes(scenario.renderer, sees_colour(scenario), notices);
+  return build(scenario, scene, std::move(body), span, threads, notices);
 }
 
 }  // namespace esim

@@ -7,13 +7,16 @@
 
 namespace esim {
 
-double fastest_brightness_change_per_s(const Sample& sample, double log_eps, const Workers& workers) {
+double fastest_brightness_change_per_s(const Sample& sample, double log_eps, const Workers& workers, bool mosaic) {
   const Image<float>& irradiance = sample.irradiance;
   const int width = irradiance.width(), height = irradiance.height();
   const float eps = static_cast<float>(log_eps);
+  const int reach = mosaic ? 2 : 1;  // at the border
   return row_maximum(height, workers, [&](int y) {
-    // Central differences of L = ln(E + eps), as logarithms of ratios; one-sided at the image's border.
-    const int above = std::max(y - 1, 0), below = std::min(y + 1, height - 1);
+    // Central differences of L = ln(E + eps), as logarithms of ratios; one-sided at the image's border, in a mosaic
+    // between pixels of the same colour there too.
+    const int above = std::max(y == height - 1 ? y - reach : y - 1, 0);
+    const int below = std::min(y == 0 ? y + reach : y + 1, height - 1);
     const float *const row = irradiance.row(y), *const row_above = irradiance.row(above),
                        *const row_below = irradiance.row(below);
     const float *const vx = sample.flow_x.row(y), *const vy = sample.flow_y.row(y);
@@ -30,8 +33,10 @@ double fastest_brightness_change_per_s(const Sample& sample, double log_eps, con
       const float rate = rate_at(x, x - 1, x + 1, 0.5F);
       maximum = rate > maximum ? rate : maximum;
     }
-    if (width > 1) {
-      maximum = std::max({maximum, rate_at(0, 0, 1, 1.0F), rate_at(width - 1, width - 2, width - 1, 1.0F)});
+    if (width > reach) {
+      const float per_dx = 1.0F / static_cast<float>(reach);
+      maximum =
+          std::max({maximum, rate_at(0, 0, reach, per_dx), rate_at(width - 1, width - 1 - reach, width - 1, per_dx)});
     }
     return maximum;
   });
@@ -39,7 +44,8 @@ double fastest_brightness_change_per_s(const Sample& sample, double log_eps, con
 
 double wanted_interval_s(const BrightnessSampling& options, const SensorTraits& sensor, const Sample& sample,
                          const Workers& workers) {
-  return options.lambda * sensor.contrast_threshold / fastest_brightness_change_per_s(sample, sensor.log_eps, workers);
+  return options.lambda * sensor.contrast_threshold /
+         fastest_brightness_change_per_s(sample, sensor.log_eps, workers, sensor.mosaic);
 }
 
 }  // namespace esim

@@ -15,6 +15,7 @@ namespace esim {
 struct SensorTraits {
   double contrast_threshold = 0.5;  ///< C of Eq. 2: the smaller one of C+ and C-
   double log_eps = 0.001;           ///< L = ln(E + log_eps)
+  bool mosaic = false;              ///< the pixels have colour filters
 };
 
 /// What a sampler is told of the camera that it serves.

@@ -14,7 +14,9 @@ double wanted_interval_s(const FlowSampling& options, const SensorTraits&, const
 /// Fastest motion in the image, max |V| over the pixels, px/s. Pixels whose motion is not finite do not count.
 double fastest_motion_px_per_s(const Sample& sample, const Workers& workers);
 
-/// Fastest expected change of brightness, max |dL/dt| = max |<grad L, V>| over the pixels (Eq. 1), 1/s.
-double fastest_brightness_change_per_s(const Sample& sample, double log_eps, const Workers& workers);
+/// Fastest expected change of brightness, max |dL/dt| = max |<grad L, V>| over the pixels (Eq. 1), 1/s. In a
+/// `mosaic` differences are between pixels of the same colour.
+double fastest_brightness_change_per_s(const Sample& sample, double log_eps, const Workers& workers,
+                                       bool mosaic = false);
 
 }  // namespace esim

@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "esim/core/colour.h"
 #include "esim/geometry/camera.h"
 #include "esim/sampling/options.h"
 #include "esim/scenario/pose_options.h"
@@ -173,6 +174,7 @@ struct CameraOptions {
   std::optional<double> fx, fy, cx, cy;
   DistortionOptions distortion;
   PoseOptions T_body_camera;
+  ColourFilters colour = ColourFilters::none;
   SamplingOptions sampling;
   bool events = true;
   EventCameraOptions event_camera;

@@ -189,6 +189,8 @@ void describe(Visitor& visit, CameraOptions& o) {
   visit("cy", o.cy, About{"principal point, row (default: the middle)", "px", -1e6, 1e6});
   visit("distortion", o.distortion, About{"of the lens"});
   visit("T_body_camera", o.T_body_camera, About{"pose of the camera (x right, y down, z forward) in the body"});
+  visit("colour", o.colour,
+        About{"filters on the pixels; rggb: red at even columns and rows, green, green, blue; none: luminance"});
   visit("sampling", o.sampling, About{"when the scene is evaluated"});
   visit("events", o.events, About{"whether the camera has an event sensor; without, it is a standard camera"});
   visit("event_camera", o.event_camera, About{"the event sensor"});
@@ -246,6 +248,8 @@ template <>
 inline constexpr std::array<const char*, 2> kEnumNames<KeyframeInterpolation>{"spline", "linear"};
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<MeshEngine>{"raycast", "gl", "auto"};
+template <>
+inline constexpr std::array<const char*, 2> kEnumNames<ColourFilters>{"none", "rggb"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<EventTimeUnit>{"us", "ns"};
 template <>

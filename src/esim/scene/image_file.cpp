@@ -219,25 +219,23 @@ void blur(const Softening& softening, Image<float>& image) {
   });
 }
 
-/// Luminance of an image after its median, and the pixels that it was decoded from: none of OpenEXR.
+/// An image after its median, and the pixels that it was decoded from: none of OpenEXR.
 struct Decoded {
-  Image<float> luminance;
+  Planes planes;
   cv::Mat pixels;
 };
 
-Decoded load_after_median(const std::filesystem::path& path, const Softening& softening) {
+Decoded load_after_median(const std::filesystem::path& path, const Softening& softening, bool colour) {
   require_file(path);
   Decoded result;
-  Planes planes;
   if (lower_case_extension(path) == ".exr") {
     if (softening.median_px > 1) fail(path, kMedianNeedsBytes);
-    load_exr(path, Encoding::automatic, false, planes);
+    load_exr(path, Encoding::automatic, colour, result.planes);
   } else {
     result.pixels = read_pixels(path);
     take_median(path, softening, result.pixels);
-    decode_pixels(path, result.pixels, Encoding::automatic, false, planes);
+    decode_pixels(path, result.pixels, Encoding::automatic, colour, result.planes);
   }
-  result.luminance = std::move(planes.front());
   return result;
 }
 
@@ -265,14 +263,20 @@ void decode_planes(std::span<const std::byte> content, const std::string& name, 
 }
 
 Image<float> load_luminance(const std::filesystem::path& path, const Softening& softening) {
-  Image<float> luminance = load_after_median(path, softening).luminance;
+  Image<float> luminance = std::move(load_after_median(path, softening, false).planes.front());
   blur(softening, luminance);
   return luminance;
 }
 
+Planes load_colours(const std::filesystem::path& path, const Softening& softening) {
+  Planes planes = load_after_median(path, softening, true).planes;
+  for (Image<float>& plane : planes) blur(softening, plane);
+  return planes;
+}
+
 TranslucentImage load_translucent(const std::filesystem::path& path, const Softening& softening) {
-  auto [luminance, pixels] = load_after_median(path, softening);
-  TranslucentImage result{std::move(luminance), {}};
+  auto [planes, pixels] = load_after_median(path, softening, false);
+  TranslucentImage result{std::move(planes.front()), {}};
   if (pixels.channels() == 4 && pixels.depth() != CV_32F) separate_alpha(pixels, result);
   blur(softening, result.light);
   blur(softening, result.alpha);

@@ -32,6 +32,9 @@ struct Softening {
 /// 8 bits, or over an even number of pixels.
 Image<float> load_luminance(const std::filesystem::path& path, const Softening& softening = {});
 
+/// The same in colour: three planes of R, G and B.
+Planes load_colours(const std::filesystem::path& path, const Softening& softening = {});
+
 /// An image that lets through what is behind it.
 struct TranslucentImage {
   Image<float> light;  ///< linear luminance times alpha

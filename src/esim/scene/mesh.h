@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "esim/core/colour.h"
 #include "esim/scene/texture.h"
 
 namespace esim {
@@ -31,14 +32,16 @@ struct Mesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;     ///< indices of vertices
   std::vector<std::array<Eigen::Vector2f, 3>> texture_uv;  ///< per triangle and corner; u right, v down
   std::vector<std::uint32_t> material;                     ///< per triangle: index of materials
-  std::vector<Material> materials;
+  std::vector<Material> materials;                         ///< in luminance
+  PerColour<std::vector<Material>> coloured;               ///< the same in each colour; empty where that is not known
 };
 
 /// Receives what is wrong but can be lived with, as one line.
 using WarningHandler = std::function<void(const std::string&)>;
 
 /// All that a scene file (see load_scene_file) shows, as one mesh that stands still: what is animated stays where it is
-/// at the beginning. Throws UserError naming the file when it cannot be read, is damaged, or has no triangles.
-Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn);
+/// at the beginning. With materials in each colour if `colour`. Throws UserError naming the file when it cannot be
+/// read, is damaged, or has no triangles.
+Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, bool colour = false);
 
 }  // namespace esim

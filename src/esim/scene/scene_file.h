@@ -38,8 +38,9 @@ struct SceneFile {
 
 /// Reads a scene: OBJ with MTL, PLY, STL, glTF 2.0 (.gltf, .glb), FBX, Collada (.dae). Textures are read from the
 /// scene's own folder and below; one that is missing, elsewhere or unreadable is a warning, and its surfaces are grey.
+/// Meshes have materials in each colour if `colour`, beside those in luminance.
 /// Throws UserError naming the file when it cannot be read, is damaged, or has no triangles.
-SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandler& warn);
+SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandler& warn, bool colour = false);
 
 /// One line for a person: objects, triangles, materials, textures, cameras, animation.
 std::string summary(const SceneFile& file);

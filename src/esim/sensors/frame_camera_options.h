@@ -47,6 +47,7 @@ struct FrameCameraOptions {
   ResponseOptions response{};
   double black_level = 0;
   int bits = 8;
+  bool demosaic = true;
 
   int largest_number() const { return (1 << bits) - 1; }
 };
@@ -87,6 +88,7 @@ void describe(Visitor& visit, FrameCameraOptions& o) {
   visit("response", o.response, About{"how the signal becomes a level, both 1 at full scale"});
   visit("black_level", o.black_level, About{"digital number in the dark", "DN", 0, 65534});
   visit("bits", o.bits, About{"of a digital number; more than 8 are written to PNG of 16", "", 8, 16});
+  visit("demosaic", o.demosaic, About{"colour cameras: write frames in colour; false: the numbers of the mosaic"});
 }
 
 }  // namespace esim

@@ -25,8 +25,8 @@ inline float arc_tangent(float y, float x) {
 
 class PanoramaRenderer final : public ProcessorRenderer {
  public:
-  PanoramaRenderer(Panorama panorama, const Camera& camera, const Workers& workers)
-      : panorama_(std::move(panorama)), rays_(camera), workers_(workers) {}
+  PanoramaRenderer(Panorama panorama, const Camera& camera, const Workers& workers, bool mosaic)
+      : panorama_(std::move(panorama)), rays_(camera), workers_(workers), mosaic_(mosaic) {}
 
   RendererTraits traits() const override {
     return {.name = "panorama", .granularity = Granularity::tile, .at_infinity = true, .wide_pixels = true};
@@ -77,7 +77,7 @@ class PanoramaRenderer final : public ProcessorRenderer {
       at.du_dy[i] = u_x * down_x + u_y * down_y;
       at.dv_dy[i] = v_x * down_x + v_y * down_y + v_z * down_z;
     }
-    const auto radiance = panorama_.radiance->sample(at);
+    const auto radiance = mosaic_ ? sample_mosaic(panorama_.colours, first, row, at) : panorama_.radiance->sample(at);
     std::copy_n(radiance.begin(), count, sample.irradiance.row(row) + first);
     std::fill_n(sample.depth.row(row) + first, count, std::numeric_limits<float>::infinity());
   }
@@ -85,12 +85,15 @@ class PanoramaRenderer final : public ProcessorRenderer {
   Panorama panorama_;
   PixelRays rays_;
   const Workers& workers_;
+  bool mosaic_;
 };
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_panorama_renderer(Panorama panorama, const Camera& camera, const Workers& workers) {
-  return std::make_unique<PanoramaRenderer>(std::move(panorama), camera, workers);
+std::unique_ptr<Renderer> make_panorama_renderer(Panorama panorama, const Camera& camera, const Workers& workers,
+                                                 ColourFilters filters) {
+  const bool mosaic = filters == ColourFilters::rggb && panorama.colours[0] != nullptr;
+  return std::make_unique<PanoramaRenderer>(std::move(panorama), camera, workers, mosaic);
 }
 
 }  // namespace esim

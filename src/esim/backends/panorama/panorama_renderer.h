@@ -6,7 +6,7 @@
 #include "esim/geometry/camera.h"
 #include "esim/geometry/se3.h"
 #include "esim/render/renderer.h"
-#include "esim/scene/texture.h"
+#include "esim/scene/colour_textures.h"
 
 namespace esim {
 
@@ -18,8 +18,10 @@ namespace esim {
 struct Panorama {
   std::shared_ptr<const Texture> radiance;  ///< wraps in u
   Eigen::Quaterniond R_world_panorama = Eigen::Quaterniond::Identity();
+  ColourTextures colours{};  ///< for cameras with colour filters, which otherwise see luminance
 };
 
-std::unique_ptr<Renderer> make_panorama_renderer(Panorama panorama, const Camera& camera, const Workers& workers);
+std::unique_ptr<Renderer> make_panorama_renderer(Panorama panorama, const Camera& camera, const Workers& workers,
+                                                 ColourFilters filters = ColourFilters::none);
 
 }  // namespace esim

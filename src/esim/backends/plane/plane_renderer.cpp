@@ -13,8 +13,8 @@ constexpr int kLanes = 16;
 
 class PlaneRenderer final : public ProcessorRenderer {
  public:
-  PlaneRenderer(Poster poster, const Camera& camera, const Workers& workers)
-      : poster_(std::move(poster)), rays_(camera), workers_(workers) {}
+  PlaneRenderer(Poster poster, const Camera& camera, const Workers& workers, bool mosaic)
+      : poster_(std::move(poster)), rays_(camera), workers_(workers), mosaic_(mosaic) {}
 
   RendererTraits traits() const override {
     return {.name = "plane", .granularity = Granularity::tile, .at_infinity = false, .wide_pixels = true};
@@ -82,7 +82,7 @@ class PlaneRenderer final : public ProcessorRenderer {
       at.du_dy[i] = per_u * (down_x - dx * down_along);
       at.dv_dy[i] = per_v * (down_y - dy * down_along);
     }
-    const auto radiance = poster_.radiance->sample(at);
+    const auto radiance = mosaic_ ? sample_mosaic(poster_.colours, first, row, at) : poster_.radiance->sample(at);
     float* const irradiance = sample.irradiance.row(row) + first;
     for (int i = 0; i < count; ++i) {
       const auto lane = static_cast<unsigned>(i);
@@ -94,12 +94,15 @@ class PlaneRenderer final : public ProcessorRenderer {
   Poster poster_;
   PixelRays rays_;
   const Workers& workers_;
+  bool mosaic_;
 };
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_plane_renderer(Poster poster, const Camera& camera, const Workers& workers) {
-  return std::make_unique<PlaneRenderer>(std::move(poster), camera, workers);
+std::unique_ptr<Renderer> make_plane_renderer(Poster poster, const Camera& camera, const Workers& workers,
+                                              ColourFilters filters) {
+  const bool mosaic = filters == ColourFilters::rggb && poster.colours[0] != nullptr;
+  return std::make_unique<PlaneRenderer>(std::move(poster), camera, workers, mosaic);
 }
 
 }  // namespace esim

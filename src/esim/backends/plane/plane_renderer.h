@@ -6,7 +6,7 @@
 #include "esim/geometry/camera.h"
 #include "esim/geometry/se3.h"
 #include "esim/render/renderer.h"
-#include "esim/scene/texture.h"
+#include "esim/scene/colour_textures.h"
 
 namespace esim {
 
@@ -16,11 +16,13 @@ namespace esim {
 struct Poster {
   std::shared_ptr<const Texture> radiance;
   SE3 T_world_poster;
-  double width_m = 1.0;     ///< the height follows from the image's aspect
-  bool endless = false;     ///< the image repeats over the whole plane
-  float background = 0.2F;  ///< irradiance where the poster is not hit
+  double width_m = 1.0;      ///< the height follows from the image's aspect
+  bool endless = false;      ///< the image repeats over the whole plane
+  float background = 0.2F;   ///< irradiance where the poster is not hit
+  ColourTextures colours{};  ///< for cameras with colour filters, which otherwise see luminance
 };
 
-std::unique_ptr<Renderer> make_plane_renderer(Poster poster, const Camera& camera, const Workers& workers);
+std::unique_ptr<Renderer> make_plane_renderer(Poster poster, const Camera& camera, const Workers& workers,
+                                              ColourFilters filters = ColourFilters::none);
 
 }  // namespace esim

@@ -37,7 +37,8 @@ struct Moment {
 template <int K>
 struct Rays {
   const RayBlock* block;
-  int first;  // of the block's lanes
+  int first;                            // of the block's lanes
+  const std::uint32_t* first_material;  // per lane, of its pixel's colour; null: of luminance
   Packet<K> packet;
   std::uint32_t hits;                                 // a bit per lane
   alignas(64) std::array<std::uint32_t, K> triangle;  // among all of the scene; any where nothing is hit
@@ -84,13 +85,20 @@ void store(const Work<K>& work, const T* values, const Tile& tile, Image<T>& ima
 class RaycastRenderer final : public ProcessorRenderer {
  public:
   RaycastRenderer(std::shared_ptr<const RaycastScene> scene, const RaycastOptions& options, const Camera& camera,
-                  const Workers& workers)
+                  const Workers& workers, ColourFilters filters)
       : scene_(std::move(scene)),
         background_(options.background),
         places_(lattice(options.samples_per_pixel)),
         rays_(camera),
         blocks_(rays_),
-        workers_(workers) {}
+        workers_(workers),
+        mosaic_(filters == ColourFilters::rggb && scene_->has_colours()) {
+    for (int i = 0; i < RayBlock::kPixels; ++i) {
+      const std::size_t colour = colour_at(i % RayBlock::kSide, i / RayBlock::kSide);
+      first_material_[static_cast<std::size_t>(i)] = scene_->first_material(colour);
+      first_material_of_edges_[colour].fill(scene_->first_material(colour));
+    }
+  }
 
   RendererTraits traits() const override {
     return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false, .wide_pixels = true};
@@ -125,6 +133,7 @@ class RaycastRenderer final : public ProcessorRenderer {
           work.x = x, work.y = y;
           work.bounds = &blocks_.bounds(x, y);
           work.rays.block = &blocks_.at(x, y), work.rays.first = first;
+          work.rays.first_material = mosaic_ ? &first_material_[static_cast<std::size_t>(first)] : nullptr;
           if (count < batch.size()) continue;
           render_batch<K>(moment, std::span(batch), band, sample);
           count = 0;
@@ -156,6 +165,8 @@ class RaycastRenderer final : public ProcessorRenderer {
           EdgeWork<K>& edge = closer[count++];
           edge.pixel = &work, edge.lane = lane;
           edge.rays.block = &edge.block, edge.rays.first = 0;
+          edge.rays.first_material =
+              mosaic_ ? first_material_of_edge(work.rays.first + static_cast<int>(lane)) : nullptr;
           spread<K>(*work.rays.block, work.rays.first + static_cast<int>(lane), ray, edge.block);
           if (count < closer.size()) continue;
           look_closer<K>(moment, std::span(closer));
@@ -249,6 +260,8 @@ class RaycastRenderer final : public ProcessorRenderer {
     rotations.select(rays.packet, moment.groups);
     locate_on_textures<K>(rays.packet, *rays.block, rays.first, footprint, rotations, triangles, rays.at);
     rays.material = triangles.material;
+    if (rays.first_material == nullptr) return;
+    for (unsigned i = 0; i < K; ++i) rays.material[i] += rays.first_material[i];
   }
 
   template <int K>
@@ -265,6 +278,11 @@ class RaycastRenderer final : public ProcessorRenderer {
       rays.irradiance[i] =
           (rays.hits >> i & 1U) != 0 ? colours.base[i] * rays.light[i] + colours.emission[i] : background_;
     }
+  }
+
+  /// For rays that all lie in the pixel `lane` of a block.
+  const std::uint32_t* first_material_of_edge(int lane) const {
+    return first_material_of_edges_[colour_at(lane % RayBlock::kSide, lane / RayBlock::kSide)].data();
   }
 
   /// Light on the surfaces that the lanes of `lit` have hit.
@@ -288,18 +306,23 @@ class RaycastRenderer final : public ProcessorRenderer {
   PixelRays rays_;
   RayBlocks blocks_;
   const Workers& workers_;
+
+  // Behind colour filters: where the materials of their colours begin, for the pixels of a block and for each colour.
+  bool mosaic_;
+  std::array<std::uint32_t, RayBlock::kPixels> first_material_;
+  PerColour<std::array<std::uint32_t, RayBlock::kPixels>> first_material_of_edges_;
 };
 
 }  // namespace
 
 std::unique_ptr<Renderer> make_raycast_renderer(std::shared_ptr<const RaycastScene> scene,
                                                 const RaycastOptions& options, const Camera& camera,
-                                                const Workers& workers) {
+                                                const Workers& workers, ColourFilters filters) {
   const int n = options.samples_per_pixel;
   if (n != 1 && n != 16 && n != 64) {
     throw UserError("samples_per_pixel: " + std::to_string(n) + " is not supported; use 1, 16 or 64");
   }
-  return std::make_unique<RaycastRenderer>(std::move(scene), options, camera, workers);
+  return std::make_unique<RaycastRenderer>(std::move(scene), options, camera, workers, filters);
 }
 
 }  // namespace esim

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "esim/core/colour.h"
 #include "esim/core/parallel.h"
 #include "esim/geometry/camera.h"
 #include "esim/render/renderer.h"
@@ -19,9 +20,10 @@ struct RaycastOptions {
 };
 
 /// Renders triangles by ray casting with Embree: any tile at its own cost, lens distortion exact, textures averaged
-/// over the pixel's footprint.
+/// over the pixel's footprint. Behind colour filters a pixel sees its colour of the materials, with all of its rays,
+/// and luminance where the scene has no colours.
 std::unique_ptr<Renderer> make_raycast_renderer(std::shared_ptr<const RaycastScene> scene,
                                                 const RaycastOptions& options, const Camera& camera,
-                                                const Workers& workers);
+                                                const Workers& workers, ColourFilters filters = ColourFilters::none);
 
 }  // namespace esim

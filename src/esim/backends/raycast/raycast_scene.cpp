@@ -100,8 +100,25 @@ RaycastScene::RaycastScene(const Scene& scene) : lighting_(scene.lighting) {
     if (!object.moves) still.push_back(&object.mesh);
   }
   add_group(still);
+  std::vector<const Mesh*> all = still;
   for (const SceneObject& object : scene.objects) {
-    if (object.moves) add_group({&object.mesh});
+    if (!object.moves) continue;
+    add_group({&object.mesh});
+    all.push_back(&object.mesh);
+  }
+  material_count_ = materials_.size();
+  append_colours(all);
+}
+
+/// Of all meshes, in the order in which they were appended; those without colours are grey.
+void RaycastScene::append_colours(const std::vector<const Mesh*>& meshes) {
+  const auto is_coloured = [](const Mesh* mesh) { return !mesh->coloured[0].empty(); };
+  if (std::none_of(meshes.begin(), meshes.end(), is_coloured)) return;
+  for (std::size_t colour = 0; colour < 3; ++colour) {
+    for (const Mesh* mesh : meshes) {
+      const std::vector<Material>& seen = is_coloured(mesh) ? mesh->coloured[colour] : mesh->materials;
+      materials_.insert(materials_.end(), seen.begin(), seen.end());
+    }
   }
 }
 

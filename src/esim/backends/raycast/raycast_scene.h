@@ -52,6 +52,14 @@ class RaycastScene {
   std::uint32_t first_triangle(unsigned group) const { return groups_[group].first_triangle; }
   const TriangleShading& triangle(std::uint32_t index) const { return triangles_[index]; }
   const Material& material(unsigned index) const { return materials_[index]; }
+
+  /// Whether materials are known in each colour: then index + first_material(colour) is the one of a colour for that of
+  /// luminance.
+  bool has_colours() const { return material_count_ < materials_.size(); }
+  std::uint32_t first_material(std::size_t colour) const {
+    return static_cast<std::uint32_t>((1 + colour) * material_count_);
+  }
+
   const std::optional<Lighting>& lighting() const { return lighting_; }
 
   /// The normals at a triangle's corners; null, or of no length, where it is flat.
@@ -68,11 +76,13 @@ class RaycastScene {
 
   void add_group(const std::vector<const Mesh*>& meshes);
   void append(const Mesh& mesh);
+  void append_colours(const std::vector<const Mesh*>& meshes);
 
   DevicePointer device_;
   int packet_size_ = 4;
   std::optional<Lighting> lighting_;
-  std::vector<Material> materials_;
+  std::vector<Material> materials_;  // in luminance, then in each colour, if there are any
+  std::size_t material_count_ = 0;   // of luminance
   std::vector<Group> groups_;
   std::vector<TriangleShading> triangles_;                      // of all groups
   std::vector<std::array<Eigen::Vector3f, 3>> corner_normals_;  // likewise, as far as there are any that light needs

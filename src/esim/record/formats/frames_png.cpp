@@ -22,13 +22,16 @@ void FramesPngWriter::write(const Record& record) {
   if (frame == nullptr || frame->camera != camera_) return;
 
   const std::filesystem::path path = folder_ / "frames" / fmt::format("{:06}.png", count_);
+  const auto write = [&](const auto& image) {
+    in_colour_ ? write_demosaicked_png(path, image) : write_png(path, image);
+  };
   if (frame->bits > 8) {
-    write_png(path, frame->image);
+    write(frame->image);
   } else {
     Image<std::uint8_t> narrow(frame->image.width(), frame->image.height());
     std::transform(frame->image.pixels().begin(), frame->image.pixels().end(), narrow.pixels().begin(),
                    [](std::uint16_t number) { return static_cast<std::uint8_t>(number); });
-    write_png(path, narrow);
+    write(narrow);
   }
   fmt::format_to(std::back_inserter(list_->buffer()), "{},{},{},{}\n", count_, frame->t, frame->exposure_duration,
                  frame->gain);

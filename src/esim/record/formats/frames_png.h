@@ -12,10 +12,11 @@ namespace esim {
 
 /// Frames of one camera as grey PNG: frames/000000.png and so on in a folder, beside frames.csv with lines
 /// `index,t_ns,exposure_ns,gain`, t_ns in the middle of the exposure. Digital numbers are written as they are, of 8
-/// bits in files of 8 bits, of more in files of 16.
+/// bits in files of 8 bits, of more in files of 16. Numbers of an RGGB mosaic become colour PNG if `in_colour`.
 class FramesPngWriter final : public Sink {
  public:
-  FramesPngWriter(std::filesystem::path folder, int camera) : folder_(std::move(folder)), camera_(camera) {}
+  FramesPngWriter(std::filesystem::path folder, int camera, bool in_colour = false)
+      : folder_(std::move(folder)), camera_(camera), in_colour_(in_colour) {}
 
   void begin(const RecordingInfo& info) override;
   void write(const Record& record) override;
@@ -24,6 +25,7 @@ class FramesPngWriter final : public Sink {
  private:
   std::filesystem::path folder_;
   int camera_;
+  bool in_colour_;
   std::int64_t count_ = 0;
   std::optional<OutputFile> list_;
 };

@@ -14,20 +14,31 @@ namespace {
 constexpr float kMissingTextureBase = 0.2F;  // a mid-grey surface: 18-20 % reflectance
 constexpr int kWorld = -1;
 
-Material convert(const GraphMaterial& source, TextureStore& textures) {
+float seen(const Eigen::Vector3f& colour, View view) {
+  if (view == View::luminance) return luminance(colour[0], colour[1], colour[2]);
+  return colour[static_cast<int>(view)];
+}
+
+Material convert(const GraphMaterial& source, TextureStore& textures, View view) {
   Material material;
   material.name = source.name;
   material.unlit = source.unlit;
-  material.texture = textures.get(source.base_texture, source.base, source.name);
-  material.base = luminance(source.base[0], source.base[1], source.base[2]);
+  material.texture = textures.get(source.base_texture, source.base, source.name, view);
+  material.base = seen(source.base, view);
   if (source.base_texture.image >= 0) material.base = material.texture != nullptr ? 1.0F : kMissingTextureBase;
-  material.emission = luminance(source.emission[0], source.emission[1], source.emission[2]);
+  material.emission = seen(source.emission, view);
   if (material.emission > 0 && source.emission_texture.image >= 0) {
-    material.emission_texture = textures.get(source.emission_texture, source.emission, source.name);
+    material.emission_texture = textures.get(source.emission_texture, source.emission, source.name, view);
     material.emission = material.emission_texture != nullptr ? 1.0F : 0.0F;
   }
   return material;
 }
+
+/// A scene's materials, as in Mesh.
+struct Materials {
+  std::vector<Material> luminance;
+  PerColour<std::vector<Material>> coloured;
+};
 
 /// Turns a node's mesh into the frame of the object that it belongs to, and appends it.
 class MeshJoiner {
@@ -58,9 +69,10 @@ class MeshJoiner {
     mesh_.material.insert(mesh_.material.end(), part.material.begin(), part.material.end());
   }
 
-  Mesh take(const std::vector<Material>& materials) {
+  Mesh take(const Materials& materials) {
     if (!any_normals_) mesh_.normals.clear();
-    mesh_.materials = materials;
+    mesh_.materials = materials.luminance;
+    mesh_.coloured = materials.coloured;
     return std::move(mesh_);
   }
 
@@ -104,9 +116,14 @@ std::vector<int> movers(const SceneGraph& graph, const NodeTransforms& transform
   return result;
 }
 
-std::vector<Material> convert_materials(const SceneGraph& graph, TextureStore& textures) {
-  std::vector<Material> materials;
-  for (const GraphMaterial& material : graph.materials) materials.push_back(convert(material, textures));
+Materials convert_materials(const SceneGraph& graph, TextureStore& textures, bool colour) {
+  Materials materials;
+  for (const GraphMaterial& source : graph.materials) {
+    materials.luminance.push_back(convert(source, textures, View::luminance));
+    if (!colour) continue;
+    for (const View view : {View::red, View::green, View::blue})
+      materials.coloured[static_cast<std::size_t>(view)].push_back(convert(source, textures, view));
+  }
   return materials;
 }
 
@@ -122,15 +139,15 @@ void give_warnings(const SceneGraph& graph, const std::filesystem::path& file, c
 
 }  // namespace
 
-SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn) {
+SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn, bool colour) {
   check_size(graph, file);
   give_warnings(graph, file, warn);
   SceneFile result;
   const NodeTransforms transforms(graph, file);
   result.animation = transforms.span();
   const double start_s = transforms.start_s();
-  TextureStore textures(graph, file.parent_path(), warn);
-  const std::vector<Material> materials = convert_materials(graph, textures);
+  TextureStore textures(graph, file.parent_path(), warn, colour);
+  const Materials materials = convert_materials(graph, textures, colour);
   result.image_count = textures.image_count();
 
   // The geometry of each mover, in the order of the nodes.
@@ -170,17 +187,18 @@ SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, co
   return result;
 }
 
-Mesh flatten_still(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn) {
+Mesh flatten_still(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
+                   bool colour) {
   check_size(graph, file);
   give_warnings(graph, file, warn);
   const NodeTransforms transforms(graph, file);
-  TextureStore textures(graph, file.parent_path(), warn);
+  TextureStore textures(graph, file.parent_path(), warn, colour);
   MeshJoiner joiner(file);
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     for (const std::uint32_t mesh : graph.nodes[i].meshes)
       joiner.append(graph.meshes[mesh], transforms.world(i, transforms.start_s()));
   }
-  return joiner.take(convert_materials(graph, textures));
+  return joiner.take(convert_materials(graph, textures, colour));
 }
 
 }  // namespace esim

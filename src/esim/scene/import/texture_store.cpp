@@ -15,13 +15,18 @@ constexpr double kMaxTexels = 8192.0 * 8192.0;
 
 bool is_grey(const Eigen::Vector3f& factor) { return factor[0] == factor[1] && factor[1] == factor[2]; }
 
+Image<float> times(float factor, Image<float> image) {
+  for (float& value : image.pixels()) value *= factor;
+  return image;
+}
+
 Image<float> luminance_of(Planes& planes, const Eigen::Vector3f& factor) {
-  Image<float> result = std::move(planes[0]);
+  if (planes.size() == 1) return times(factor[0], std::move(planes[0]));
+  Image<float> result(planes[0].width(), planes[0].height());
   for (std::size_t i = 0; i < result.size(); ++i) {
-    float& value = result.data()[i];
-    value = planes.size() == 1
-                ? factor[0] * value
-                : luminance(factor[0] * value, factor[1] * planes[1].data()[i], factor[2] * planes[2].data()[i]);
+    const float red = planes[0].data()[i], green = planes[1].data()[i], blue = planes[2].data()[i];
+    result.data()[i] = is_grey(factor) ? factor[0] * luminance(red, green, blue)
+                                       : luminance(factor[0] * red, factor[1] * green, factor[2] * blue);
   }
   return result;
 }
@@ -54,23 +59,37 @@ Planes TextureStore::decoded(const GraphImage& image, bool colour) {
   return planes;
 }
 
+TextureStore::Views TextureStore::views_of(const GraphTexture& slot, const Eigen::Vector3f& factor) {
+  Planes planes = decoded(graph_.images[static_cast<std::size_t>(slot.image)], colour_ || !is_grey(factor));
+  texel_count_ += planes[0].size();
+  if (texel_count_ > kMaxSceneTexels)
+    throw UserError(fmt::format("its textures have more than {} texels in all; make them smaller", kMaxSceneTexels));
+  Views views;
+  const auto keep = [&](View view, const Image<float>& image) {
+    views[static_cast<std::size_t>(view)] = std::make_shared<const Texture>(image, slot.wrap_u, slot.wrap_v);
+  };
+  keep(View::luminance, luminance_of(planes, factor));
+  if (!colour_) return views;
+  keep(View::red, times(factor[0], std::move(planes[0])));
+  keep(View::green, times(factor[1], std::move(planes[1])));
+  keep(View::blue, times(factor[2], std::move(planes[2])));
+  return views;
+}
+
 std::shared_ptr<const Texture> TextureStore::get(const GraphTexture& slot, const Eigen::Vector3f& factor,
-                                                 const std::string& material) {
+                                                 const std::string& material, View view) {
   if (slot.image < 0) return nullptr;
   const std::array<float, 3> factors{factor[0], factor[1], factor[2]};
   const auto [entry, is_new] = textures_.try_emplace({slot.image, slot.wrap_u, slot.wrap_v, factors});
-  if (!is_new) return entry->second;
+  const auto& wanted = entry->second[static_cast<std::size_t>(view)];
+  if (!is_new) return wanted;
   try {
-    Planes planes = decoded(graph_.images[static_cast<std::size_t>(slot.image)], !is_grey(factor));
-    texel_count_ += planes[0].size();
-    if (texel_count_ > kMaxSceneTexels)
-      throw UserError(fmt::format("its textures have more than {} texels in all; make them smaller", kMaxSceneTexels));
-    entry->second = std::make_shared<const Texture>(luminance_of(planes, factor), slot.wrap_u, slot.wrap_v);
+    entry->second = views_of(slot, factor);
     ++image_count_;
   } catch (const UserError& error) {
     warn_(fmt::format("material {}: {}; its surfaces are grey", material, error.what()));
   }
-  return entry->second;
+  return wanted;
 }
 
 }  // namespace esim

@@ -7,32 +7,41 @@
 #include <tuple>
 #include <vector>
 
+#include "esim/core/colour.h"
 #include "esim/scene/import/scene_graph.h"
 #include "esim/scene/planes.h"
 
 namespace esim {
 
+/// What of an image or a material is wanted.
+enum class View { red, green, blue, luminance };
+
 /// Decodes the images of a scene, each once per way in which it is used.
 class TextureStore {
  public:
-  TextureStore(const SceneGraph& graph, std::filesystem::path folder, const WarningHandler& warn)
-      : graph_(graph), folder_(std::move(folder)), warn_(warn) {}
+  /// Views other than luminance are had if `colour`.
+  TextureStore(const SceneGraph& graph, std::filesystem::path folder, const WarningHandler& warn, bool colour)
+      : graph_(graph), folder_(std::move(folder)), warn_(warn), colour_(colour) {}
 
-  /// The luminance of an image whose colours are multiplied by `factor`. Null where the slot holds no texture, and,
-  /// after a warning that names the material, where its image is missing, forbidden or unreadable.
+  /// A view of an image whose colours are multiplied by `factor`. Null where the slot holds no texture, and, after a
+  /// warning that names the material, where its image is missing, forbidden or unreadable.
   std::shared_ptr<const Texture> get(const GraphTexture& slot, const Eigen::Vector3f& factor,
-                                     const std::string& material);
+                                     const std::string& material, View view);
 
   /// Images that were decoded.
   std::size_t image_count() const { return image_count_; }
 
  private:
+  using Views = std::array<std::shared_ptr<const Texture>, 4>;
+
+  Views views_of(const GraphTexture& slot, const Eigen::Vector3f& factor);
   Planes decoded(const GraphImage& image, bool colour);
 
   const SceneGraph& graph_;
   std::filesystem::path folder_;
   const WarningHandler& warn_;
-  std::map<std::tuple<std::int32_t, Wrap, Wrap, std::array<float, 3>>, std::shared_ptr<const Texture>> textures_;
+  bool colour_;
+  std::map<std::tuple<std::int32_t, Wrap, Wrap, std::array<float, 3>>, Views> textures_;
   std::size_t image_count_ = 0, texel_count_ = 0;
 };
 

@@ -12,8 +12,8 @@ namespace esim {
 /// Makes a renderer of the scene for a camera.
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const Camera&)>;
 
-/// What remains of the error of brightness however near a keyframe is: a keyframe of this view, looked up
-/// halfway between its pixels, where that is worst, against the sensor's own image. Renders both.
+/// What remains of the error of brightness however near a keyframe is: a keyframe of this view, looked up halfway
+/// between its pixels, where that is worst, against the sensor's own image. Renders both.
 MeasuredError measure_resampling_floor(const KeyframeLayout& layout, RenderRequest request,
                                        const SamplingContext& context, Renderer& sensor, Renderer& keyframes);
 

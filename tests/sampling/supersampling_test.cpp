@@ -54,7 +54,7 @@ struct Setting {
   Stripes renderer{sensor, period};
 
   KeyframeSampling decide(const KeyframeSampling& options) {
-    return decide_supersampling(options, context, renderer,
+    return decide_supersampling(options, RenderRequest{}, context, renderer,
                                 [&](const Camera& camera) { return std::make_unique<Stripes>(camera, period); });
   }
 };

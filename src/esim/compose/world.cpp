@@ -128,20 +128,31 @@ void name_what_has_no_effect(const Scenario& scenario, const World& world, std::
   }
 }
 
-/// Looks through a camera at a few times while its motion is known: one that never sees anything is a mistake of poses
-/// or frames.
+/// Where a camera and the moving objects are at a time of the simulation; the body where it is last known to be, if its
+/// motion becomes known on the way.
+RenderRequest known_view(const World& world, std::size_t index, TimeNs t) {
+  RenderRequest request;
+  request.t = t;
+  request.camera = rigidly_attached(world.trajectory->at(std::min(t, world.trajectory->end())),
+                                    world.info.cameras[index].T_body_camera);
+  for (const auto& object : world.objects) request.objects.push_back(object->at(t));
+  return request;
+}
+
+/// Looks through a camera at a few times: one that never sees anything is a mistake of poses or frames.
 void require_a_view(const World& world, std::size_t index) {
   constexpr int kLooks = 9;
   if (world.cameras[index].renderer->traits().at_infinity) return;
   const CameraInfo& info = world.info.cameras[index];
   Sample sample;
   for (int i = 0; i < kLooks; ++i) {
-    const TimeNs t =
-        std::min(world.info.start + (world.info.end - world.info.start) / (kLooks - 1) * i, world.trajectory->end());
-    world.cameras[index].renderer->render(view(world, index, t), sample);
+    RenderRequest request =
+        known_view(world, index, world.info.start + (world.info.end - world.info.start) / (kLooks - 1) * i);
+    request.tiles = {{0, 0, info.model.width, info.model.height}};
+    world.cameras[index].renderer->render(request, sample);
     if (sees_something(sample)) return;
   }
-  const Eigen::Vector3d position = view(world, index, world.info.start).camera.T_world_body.translation;
+  const Eigen::Vector3d position = known_view(world, index, world.info.start).camera.T_world_body.translation;
   throw UserError(
       fmt::format("camera {} sees nothing of the scene on its whole way (it starts at {:.3g} {:.3g} {:.3g} m); check "
                   "the trajectory's frame and T_body_camera",
@@ -196,7 +207,7 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
     std::unique_ptr<Renderer> keyframes;
     if (auto* const wanted = std::get_if<KeyframeSampling>(&sampling)) {
       const auto make = [&](const Camera& camera) { return make_renderer(camera, options.colour, *world.workers); };
-      *wanted = decide_supersampling(*wanted, context, *renderer, make);
+      *wanted = decide_supersampling(*wanted, known_view(world, i, span.start), context, *renderer, make);
       keyframes = make(sampled_camera(sampling, context));
     }
     std::unique_ptr<Sampler> sampler = make_sampler(sampling, context);

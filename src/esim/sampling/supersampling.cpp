@@ -9,9 +9,8 @@
 
 namespace esim {
 
-MeasuredError measure_resampling_floor(const KeyframeLayout& layout, const SamplingContext& context, Renderer& sensor,
-                                       Renderer& keyframes) {
-  RenderRequest request = context.view_at(context.span.start);
+MeasuredError measure_resampling_floor(const KeyframeLayout& layout, RenderRequest request,
+                                       const SamplingContext& context, Renderer& sensor, Renderer& keyframes) {
   request.tiles = {{0, 0, layout.camera.width, layout.camera.height}};
   Sample sample;
   keyframes.render(request, sample);
@@ -38,14 +37,14 @@ MeasuredError measure_resampling_floor(const KeyframeLayout& layout, const Sampl
   return measured_error(errors);
 }
 
-KeyframeSampling decide_supersampling(const KeyframeSampling& options, SamplingContext& context, Renderer& sensor,
-                                      const MakeRenderer& make_renderer) {
+KeyframeSampling decide_supersampling(const KeyframeSampling& options, const RenderRequest& view,
+                                      SamplingContext& context, Renderer& sensor, const MakeRenderer& make_renderer) {
   KeyframeSampling decided = options;
   const double most = options.tolerance * context.sensor.contrast_threshold;
   for (int s = kLeastSupersampling; s <= kMostSupersampling; ++s) {
     if (options.supersampling == 0) decided.supersampling = s;
     const KeyframeLayout layout = lay_out_keyframes(decided, context);
-    context.resampling_floor = measure_resampling_floor(layout, context, sensor, *make_renderer(layout.camera));
+    context.resampling_floor = measure_resampling_floor(layout, view, context, sensor, *make_renderer(layout.camera));
     if (options.supersampling > 0 || context.resampling_floor->p99 <= most) break;
   }
   return decided;

@@ -24,10 +24,10 @@ constexpr std::uint32_t kAuditOneIn = 64;
 constexpr double kAim = 0.6;
 
 // Tiles are sampled together if none comes earlier than it should by more than this share of its interval.
-constexpr double kSlack = 0.12;
+constexpr double kSlack = 0.1;
 
 // Times are multiples of a power of two, at least this share of the interval that they end: so tiles meet.
-constexpr double kGrid = 0.125;
+constexpr double kGrid = 0.03125;
 
 // Tiles whose motion is watched: those up to so many away.
 constexpr int kReach = 3;
@@ -293,7 +293,7 @@ void AdaptiveSampler::account() {
 int AdaptiveSampler::pieces(const TileTimeline& timeline, std::size_t i) const {
   constexpr TimeNs kMost = 4;
   if (timeline.time(i + 1) - timeline.time(i) < kMost) return 1;
-  const double bow = timeline.bow(i), straight = 0.15 * budget_.limit();
+  const double bow = timeline.bow(i), straight = 0.05 * budget_.limit();
   return bow <= straight ? 1 : (bow <= 4 * straight ? 2 : kMost);
 }
 

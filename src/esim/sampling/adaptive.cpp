@@ -26,7 +26,7 @@ constexpr double kAim = 0.6;
 // Tiles are sampled together if none comes earlier than it should by more than this share of its interval.
 constexpr double kSlack = 0.1;
 
-// Times are multiples of a power of two, at least this share of the interval that they end: so tiles meet.
+// Times are multiples of a power of two, at most this share of the interval that they end: so tiles meet.
 constexpr double kGrid = 0.03125;
 
 // Tiles whose motion is watched: those up to so many away.

@@ -198,8 +198,7 @@ TEST(RaycastRenderer, ShowsTheBackgroundOfAnEmptyScene) {
   for (const float value : sample.irradiance.pixels()) ASSERT_EQ(value, 0.2F);
 }
 
-// --- light
-// ------------------------------------------------------------------------------------------------------------
+// --- light ---------------------------------------------------------------------------------------------------------
 
 /// A wall of albedo 0.5 at z = 2 m, as seen from the origin along z.
 Scene lit_wall(const Lighting& lighting) {
@@ -307,6 +306,25 @@ TEST(Light, ShadowsOfStraightEdgesAreSmooth) {
   EXPECT_EQ(between[1], 0);
   EXPECT_GT(between[16], 20);
   EXPECT_NEAR(mean[1], mean[16], 0.01);
+}
+
+TEST(Light, MakesNoEdgesOnWhatItDoesNotFallOn) {
+  Lighting lighting;
+  lighting.suns = {{{0, 0, 1}, 0.3F}};
+  lighting.shadows = true;
+  Scene scene = lit_wall(lighting);
+  Mesh& wall = scene.objects[0].mesh;
+  const Eigen::Vector2f a(0, 0), b(9, 0), c(9, 9), d(0, 9);
+  wall.texture_uv = {{a, b, c}, {a, c, d}};
+  wall.materials[0] = {"screen", test::smooth_texture(Wrap::repeat, Wrap::repeat), 1.0F};
+  wall.materials[0].unlit = true;
+  const Camera model = test::distorted_camera(0);
+  const auto seen = [&](int rays) {
+    const auto renderer = make_raycast_renderer(build_raycast_scene(scene), {0, rays}, model, test::two_threads());
+    const Sample sample = test::render(*renderer, model, Kinematics{});
+    return std::vector<float>(sample.irradiance.pixels().begin(), sample.irradiance.pixels().end());
+  };
+  EXPECT_EQ(seen(1), seen(16));
 }
 
 TEST(Light, LeavesNoShadowOfASurfaceOnItself) {

@@ -192,8 +192,12 @@ TEST_F(Simulation, RefusesWhatCannotBeSimulated) {
   scenario_.duration_s.reset();
   EXPECT_TRUE(test::contains(error(), "duration_s"));
   scenario_.duration_s = 1;
-  scenario_.cameras[0].sampling = FlowSampling{0.5, {100, 50}};
-  EXPECT_TRUE(test::contains(error(), "min_rate_hz"));
+  AdaptiveSampling adaptive;
+  adaptive.bounds = {100, 50};
+  for (const SamplingOptions& sampling : {SamplingOptions(FlowSampling{0.5, {100, 50}}), SamplingOptions(adaptive)}) {
+    scenario_.cameras[0].sampling = sampling;
+    EXPECT_TRUE(test::contains(error(), "min_rate_hz")) << sampling.index();
+  }
   scenario_.cameras[0].sampling = FlowSampling{};
   std::get<PanoramaRendererOptions>(scenario_.renderer).median_px = 2;
   EXPECT_TRUE(test::contains(error(), "use an odd number"));

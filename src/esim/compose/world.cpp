@@ -40,6 +40,8 @@ void check_sampling(const CameraOptions& camera, const Notices& notices) {
             fmt::format("camera {}: sampling.lambda = {} is above 1: changes between two samples are no longer bounded",
                         camera.name, criterion.lambda));
       }
+    }
+    if constexpr (requires { criterion.bounds; }) {
       if (criterion.bounds.min_rate_hz > criterion.bounds.max_rate_hz) {
         throw UserError(fmt::format("camera {}: sampling.min_rate_hz = {} is above max_rate_hz = {}; swap them",
                                     camera.name, criterion.bounds.min_rate_hz, criterion.bounds.max_rate_hz));

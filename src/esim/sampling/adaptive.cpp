@@ -121,11 +121,7 @@ class AdaptiveSampler final : public Sampler {
 
   std::span<const Segment> more() override { return {}; }
   TimeNs watermark() const override { return watermark_; }
-  SamplingStatistics statistics() const override {
-    SamplingStatistics statistics = statistics_;
-    if (budget_.audited()) statistics.measured_error = budget_.measured();
-    return statistics;
-  }
+  SamplingStatistics statistics() const override { return statistics_; }
 
  private:
   void take(TileState& tile, std::uint32_t index, const Sample& sample);
@@ -285,6 +281,7 @@ void AdaptiveSampler::account() {
     if (!tile.begun) budget_.remember(4 * tile.step);  // first steps are shorter than what is wanted
     if (tile.audit.empty()) continue;
     budget_.audit(tile.audit, tile.most_change, static_cast<double>(tile.audit_duration));
+    statistics_.measured_error = budget_.measured();
     tile.audit.clear();
   }
 }

@@ -35,7 +35,6 @@ void ErrorBudget::audit(std::span<const float> errors, float most_change, double
     all_.add(error, duration);
     if (active) active_.add(error, duration);
   }
-  ++audits_;
   if (active && ++active_audits_ == kAuditsPerStep) steer();
 }
 

@@ -31,7 +31,6 @@ class ErrorBudget {
   /// much the brightness of the one that changes most does in it.
   void audit(std::span<const float> errors, float most_change, double duration);
 
-  bool audited() const { return audits_ > 0; }
   MeasuredError measured() const { return measured_error(all_); }
 
  private:
@@ -42,7 +41,7 @@ class ErrorBudget {
   double log_intervals_ = 0, intervals_ = 0;  // of late: ln ns added up, and how many
   LogHistogram all_,
       active_;  // errors: of all audits; of those since the last step, of tiles in which something changes
-  int audits_ = 0, active_audits_ = 0;
+  int active_audits_ = 0;
 };
 
 }  // namespace esim

@@ -40,8 +40,9 @@ struct Rays {
   int first;                            // of the block's lanes
   const std::uint32_t* first_material;  // per lane, of its pixel's colour; null: of luminance
   Packet<K> packet;
-  std::uint32_t hits;                                 // a bit per lane
-  alignas(64) std::array<std::uint32_t, K> triangle;  // among all of the scene; any where nothing is hit
+  std::uint32_t hits;                                 // a bit per lane, like `lit`
+  std::uint32_t lit;                                  // those that light of the scene falls on
+  alignas(64) std::array<std::uint32_t, K> triangle;  // among all of the scene; 0 where nothing is hit
   TextureLookup<K> at;
   alignas(64) std::array<std::uint32_t, K> material;
   alignas(64) std::array<float, K> light;  // that the surface receives
@@ -189,7 +190,8 @@ class RaycastRenderer final : public ProcessorRenderer {
     for (const Eigen::Vector2f& place : kCorners) {
       trace(moment, *work.bounds, place, corner);
       corner.light = work.rays.light;
-      if (shadows) corner.light = light_on(moment, rotations, corner, corner.hits);
+      if (const std::uint32_t lit = corner.hits & work.rays.lit; shadows && lit != 0)
+        light_up(moment, rotations, lit, corner);
       edges |= pixels_on_edges<K>(*scene_, *corner.block, corner.first, centre,
                                   {corner.packet, corner.triangle, corner.light});
     }
@@ -226,6 +228,7 @@ class RaycastRenderer final : public ProcessorRenderer {
       if (placed.triangles != nullptr && placed.bounds.overlap(bounds)) rays.packet.intersect(placed, group);
     }
     rays.hits = rays.packet.hits();
+    rays.triangle.fill(0);
     if (rays.hits == 0) return;
     for (unsigned i = 0; i < K; ++i) rays.triangle[i] = (rays.hits >> i & 1U) != 0 ? rays.packet.ray.hit.primID[i] : 0;
     if (moment.groups.size() > 1) {
@@ -269,11 +272,8 @@ class RaycastRenderer final : public ProcessorRenderer {
     SurfaceColours<K> colours;
     colours.look_up(*scene_, rays.material, rays.at, rays.hits);
     rays.light.fill(1);
-    const std::uint32_t lit = moment.lighting ? rays.hits & ~colours.unlit : 0;
-    if (lit != 0) {
-      const std::array<float, K> received = light_on(moment, rotations, rays, lit);
-      for (unsigned i = 0; i < K; ++i) rays.light[i] = (lit >> i & 1U) != 0 ? received[i] : 1.0F;
-    }
+    rays.lit = moment.lighting ? rays.hits & ~colours.unlit : 0;
+    if (rays.lit != 0) light_up(moment, rotations, rays.lit, rays);
     for (unsigned i = 0; i < K; ++i) {
       rays.irradiance[i] =
           (rays.hits >> i & 1U) != 0 ? colours.base[i] * rays.light[i] + colours.emission[i] : background_;
@@ -285,14 +285,14 @@ class RaycastRenderer final : public ProcessorRenderer {
     return first_material_of_edges_[colour_at(lane % RayBlock::kSide, lane / RayBlock::kSide)].data();
   }
 
-  /// Light on the surfaces that the lanes of `lit` have hit.
+  /// Computes the light on the surfaces that the lanes of `lit` have hit.
   template <int K>
-  std::array<float, K> light_on(const Moment& moment, GroupRotations<K>& rotations, const Rays<K>& rays,
-                                std::uint32_t lit) const {
+  void light_up(const Moment& moment, GroupRotations<K>& rotations, std::uint32_t lit, Rays<K>& rays) const {
     rotations.select(rays.packet, moment.groups);
     SurfacePoints<K> surface;
     surface.take(*scene_, rays.packet, rays.triangle, rotations);
-    return LightOnSurfaces<K>(*moment.lighting, moment.groups).at(surface, lit);
+    const std::array<float, K> light = LightOnSurfaces<K>(*moment.lighting, moment.groups).at(surface, lit);
+    for (unsigned i = 0; i < K; ++i) rays.light[i] = (lit >> i & 1U) != 0 ? light[i] : rays.light[i];
   }
 
   static constexpr float kHalf = 0.5F;

@@ -25,9 +25,9 @@ struct Arguments {
 };
 
 NamedStatistics compute(const std::string& path, const Arguments& arguments) {
-  std::optional<SensorSize> sensor;
-  if (arguments.width && arguments.height) sensor = SensorSize{*arguments.width, *arguments.height};
-  EventsFile file(path, sensor);
+  ReadOptions reading;
+  if (arguments.width && arguments.height) reading.sensor = {*arguments.width, *arguments.height};
+  EventsFile file(path, reading);
   EventStatistics statistics(file.sensor());
   std::vector<Event> events;
   while (file.read(events, kPortion)) statistics.add(events);

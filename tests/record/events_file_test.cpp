@@ -1,9 +1,11 @@
-#include "esim/record/formats/events_file.h"
+#include "esim/record/events_file.h"
 
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
 #include "esim/core/error.h"
+#include "esim/record/formats/events_hdf5.h"
+#include "esim/record/formats/events_text.h"
 #include "record/recordings.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
@@ -17,7 +19,7 @@ using test::message_of;
 
 std::vector<Event> read_all(const fs::path& path, std::size_t portion = 1000,
                             std::optional<SensorSize> sensor = std::nullopt) {
-  EventsFile file(path, sensor);
+  EventsFile file(path, ReadOptions{sensor});
   std::vector<Event> all, events;
   while (file.read(events, portion)) {
     EXPECT_LE(events.size(), portion);
@@ -122,7 +124,8 @@ TEST_F(EventsFileTest, EventsOutOfOrder) {
 }
 
 TEST_F(EventsFileTest, FilesOfOtherKindsAndDamagedOnes) {
-  EXPECT_TRUE(contains(error_of(base_.write("a.png", std::string("\x89PNG\r\n\x1a\n\0\0", 10))), "neither HDF5 nor"));
+  EXPECT_TRUE(
+      contains(error_of(base_.write("a.png", std::string("\x89PNG\r\n\x1a\n\0\0", 10))), "none of the formats"));
   EXPECT_TRUE(contains(error_of(base_.write("junk.txt", "0.1 1 2 1\n0.2 1 2 1\n0.3 one 2 1\n")), "line 3: \"one\""));
   EXPECT_TRUE(contains(error_of(base_.write("far.txt", "9000000000 1 2 1\n")), "no time of a recording"));
   write_hdf5(base_.path() / "whole.h5", events_);

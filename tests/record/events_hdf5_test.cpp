@@ -83,8 +83,8 @@ TEST_P(EventsHdf5, RoundTrip) {
     EXPECT_EQ(reader.complete(), true);
     EXPECT_EQ(reader.read(0, events.size() + 7), floored(events));
     EXPECT_EQ(reader.read(events.size(), 5).size(), 0u);
-    EXPECT_EQ(reader.time_span()->first, floored(events.front().t));
-    EXPECT_EQ(reader.time_span()->last, floored(events.back().t));
+    EXPECT_EQ(reader.time_span()->start, floored(events.front().t));
+    EXPECT_EQ(reader.time_span()->end, floored(events.back().t));
     const auto on = std::count_if(events.begin(), events.end(), [](const Event& e) { return e.polarity > 0; });
     EXPECT_EQ(reader.count_on(), static_cast<std::uint64_t>(on));
   }

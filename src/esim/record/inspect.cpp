@@ -28,8 +28,8 @@ EventsSummary summarise_hdf5(const fs::path& path, RecordingStatus* status = nul
   summary.height = reader.height();
   summary.events = reader.size();
   if (const auto span = reader.time_span()) {
-    summary.first = span->first;
-    summary.last = span->last;
+    summary.first = span->start;
+    summary.last = span->end;
   }
   summary.on = reader.count_on();
   if (status != nullptr && reader.complete()) {

@@ -19,7 +19,7 @@ namespace esim {
 /// One camera of the recording.
 struct CameraInfo {
   std::string name;   ///< unique within the rig: `cam0`, ...
-  Camera model;       ///< intrinsics and distortion
+  Camera model;       ///< intrinsics and distortion; 0 where they are not known, as of files by others
   SE3 T_body_camera;  ///< pose of the camera in the body frame
 };
 
@@ -37,7 +37,7 @@ struct ImuInfo {
 struct RecordingInfo {
   std::vector<CameraInfo> cameras;
   TimeNs start = 0;          ///< time of the first sample
-  TimeNs end = 0;            ///< time of the last sample, if the recording becomes complete
+  TimeNs end = 0;            ///< time of the last sample, if the recording becomes complete; the start: not known yet
   double truth_rate_hz = 0;  ///< frames of ground truth, or of a video, per second; 0: none
   std::optional<ImuInfo> imu{};
 

@@ -6,7 +6,7 @@
 
 #include "esim/core/image.h"
 #include "esim/events/event.h"
-#include "esim/record/formats/events_file.h"
+#include "esim/record/events_file.h"
 #include "esim/stats/hot_pixels.h"
 #include "esim/stats/interval_histogram.h"
 #include "esim/stats/periodicity.h"

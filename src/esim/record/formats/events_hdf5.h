@@ -8,12 +8,9 @@
 
 #include "esim/core/time.h"
 #include "esim/events/event.h"
-#include "esim/record/formats/compression.h"
-#include "esim/record/record.h"
+#include "esim/record/format.h"
 
 namespace esim {
-
-enum class TimeUnit { us, ns };
 
 struct EventsHdf5Options {
   TimeUnit unit = TimeUnit::us;
@@ -30,8 +27,8 @@ struct EventsHdf5Options {
 ///
 /// and, beyond DSEC, the attributes unit ("us" or "ns"), width, height and esim_complete of the file: 0 while it is
 /// being written or if the recording was interrupted, 1 if it ran to its end. t is uint32 where the planned duration
-/// in µs fits. Memory does not grow with the recording; the same events give the same bytes however they arrive;
-/// a killed process loses at most its last 65536 events.
+/// in µs is known and fits. Memory does not grow with the recording; the same events give the same bytes however they
+/// arrive; a killed process loses at most its last 65536 events.
 class EventsHdf5Writer final : public Sink {
  public:
   /// Throws UserError if the compression is not available.
@@ -46,6 +43,8 @@ class EventsHdf5Writer final : public Sink {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+Format dsec_format();
 
 /// Reads what EventsHdf5Writer writes, and DSEC's own files, which lack the attributes. Files that are something else,
 /// damaged or cut are a UserError that names the file.
@@ -63,9 +62,6 @@ class EventsHdf5Reader {
   TimeNs t_offset() const;               ///< ns, whatever the file's unit
   std::optional<bool> complete() const;  ///< esim_complete, if the file says
 
-  struct TimeSpan {
-    TimeNs first = 0, last = 0;
-  };
   std::optional<TimeSpan> time_span() const;  ///< of the events; nothing if there are none
 
   /// Up to `count` events from index `first` on; fewer at the end.

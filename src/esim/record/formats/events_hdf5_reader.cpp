@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/record/events_reader.h"
 #include "esim/record/formats/events_hdf5.h"
 #include "esim/record/formats/hdf5_input.h"
 
@@ -135,7 +136,7 @@ TimeUnit EventsHdf5Reader::unit() const { return impl_->unit; }
 TimeNs EventsHdf5Reader::t_offset() const { return impl_->to_ns(0); }
 std::optional<bool> EventsHdf5Reader::complete() const { return impl_->complete; }
 
-std::optional<EventsHdf5Reader::TimeSpan> EventsHdf5Reader::time_span() const {
+std::optional<TimeSpan> EventsHdf5Reader::time_span() const {
   if (impl_->size == 0) return std::nullopt;
   return TimeSpan{impl_->to_ns(impl_->stored_time(0)), impl_->to_ns(impl_->stored_time(impl_->size - 1))};
 }
@@ -186,6 +187,55 @@ std::uint64_t EventsHdf5Reader::count_on() const {
     on += static_cast<std::uint64_t>(std::count_if(p.begin(), p.end(), [](std::int8_t value) { return value > 0; }));
   }
   return on;
+}
+
+namespace {
+
+class WholeFile final : public EventsReader {
+ public:
+  explicit WholeFile(const std::filesystem::path& path) : reader_(path) {}
+
+  SensorSize sensor() const override { return {reader_.width().value_or(0), reader_.height().value_or(0)}; }
+  std::optional<TimeSpan> time_span() const override { return reader_.time_span(); }
+  double progress() const override {
+    return reader_.size() > 0 ? static_cast<double>(done_) / static_cast<double>(reader_.size()) : 1.0;
+  }
+
+  /// Of a portion that cannot be read whole, half, and so on.
+  bool read(std::vector<Event>& events) override {
+    for (std::uint64_t count = kBlock;; count /= 2) {
+      try {
+        const std::vector<Event> portion = reader_.read(done_, count);
+        events.insert(events.end(), portion.begin(), portion.end());
+        done_ += portion.size();
+        return !portion.empty();
+      } catch (const UserError&) {
+        if (count == 1) throw;
+      }
+    }
+  }
+
+ private:
+  EventsHdf5Reader reader_;
+  std::uint64_t done_ = 0;  // events
+};
+
+}  // namespace
+
+Format dsec_format() {
+  return {
+      .name = "dsec",
+      .description = "HDF5 in DSEC's layout",
+      .extensions = {".h5", ".hdf5"},
+      .holds = {Content::events},
+      .recognises = [](const auto&, std::string_view head) { return head.starts_with("\x89HDF\r\n\x1a\n"); },
+      .open = [](const auto& path,
+                 const ReadOptions& options) { return make_events_source(std::make_unique<WholeFile>(path), options); },
+      .create =
+          [](const auto& path, const WriteOptions& options) {
+            return std::make_unique<EventsHdf5Writer>(path, 0, EventsHdf5Options{options.unit, options.compression});
+          },
+  };
 }
 
 }  // namespace esim

@@ -46,7 +46,7 @@ struct EventsHdf5Writer::Impl {
   TimeNs last_seen = 0;  // latest time of any record
   int width = 0, height = 0;
   bool narrow_t = false;  // uint32
-  Event last{std::numeric_limits<TimeNs>::min()};
+  TimeNs last_t = std::numeric_limits<TimeNs>::min();
 
   std::uint64_t events_seen = 0;
   std::uint64_t next_ms_ns = 0;  // first millisecond without an entry in ms_to_idx, ns since origin
@@ -75,7 +75,7 @@ void EventsHdf5Writer::Impl::create(const RecordingInfo& info) {
   origin = t_offset * ns_per_unit;
   planned_end = info.end;
   last_seen = info.start;
-  narrow_t = options.unit == TimeUnit::us &&
+  narrow_t = options.unit == TimeUnit::us && info.end > info.start &&
              floor_divide(info.end, kNsPerUs) - t_offset <= std::numeric_limits<std::uint32_t>::max();
 
   (narrow_t ? t32.resize(kChunkEvents) : t64.resize(kChunkEvents));
@@ -96,20 +96,21 @@ void EventsHdf5Writer::Impl::create(const RecordingInfo& info) {
   ms_series = hdf5::Series(*file, "ms_to_idx", {H5T_STD_U64LE, {}, kChunkMs, Compression::none});
   file->create_scalar("t_offset", t_offset);
   file->create_text_attribute(file->id(), "unit", options.unit == TimeUnit::us ? "us" : "ns");
-  file->create_attribute(file->id(), "width", static_cast<std::uint32_t>(width));
-  file->create_attribute(file->id(), "height", static_cast<std::uint32_t>(height));
+  if (width > 0) file->create_attribute(file->id(), "width", static_cast<std::uint32_t>(width));
+  if (height > 0) file->create_attribute(file->id(), "height", static_cast<std::uint32_t>(height));
   esim_complete = file->create_attribute(file->id(), "esim_complete", std::uint8_t{0});
   file->flush();
 }
 
 void EventsHdf5Writer::Impl::append(EventSpan events) {
   for (const Event& event : events) {
-    if (event < last || event.t < origin || event.x >= width || event.y >= height) {
+    const bool inside = (width == 0 || event.x < width) && (height == 0 || event.y < height);
+    if (event.t < last_t || event.t < origin || !inside) {
       throw InternalError(path.string() + ": event (t, x, y) = (" + std::to_string(event.t) + " ns, " +
                           std::to_string(event.x) + ", " + std::to_string(event.y) +
                           ") is out of order or outside the image");
     }
-    last = event;
+    last_t = event.t;
     store(event);
     if (fill == kChunkEvents) write_chunk();
   }

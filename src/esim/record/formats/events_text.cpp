@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/record/events_reader.h"
 #include "esim/record/number_text.h"
 
 namespace esim {
@@ -57,7 +58,36 @@ bool parse_seconds(std::string_view word, TimeNs& t) {
   return true;
 }
 
+class LinesReader final : public EventsReader {
+ public:
+  explicit LinesReader(const std::filesystem::path& path) : reader_(path) {}
+
+  bool read(std::vector<Event>& events) override { return reader_.read(events, kPortion); }
+  double progress() const override { return reader_.progress(); }
+
+ private:
+  static constexpr std::size_t kPortion = 1 << 16;
+  EventsTextReader reader_;
+};
+
+bool is_printable(std::string_view text) { return text.find('\0') == std::string_view::npos; }
+
 }  // namespace
+
+Format events_text_format() {
+  return {
+      .name = "text",
+      .description = "lines `t x y p`: s, px, px, 1 or 0",
+      .extensions = {".txt", ".csv"},
+      .holds = {Content::events},
+      .recognises = [](const auto&, std::string_view head) { return is_printable(head); },
+      .open =
+          [](const auto& path, const ReadOptions& options) {
+            return make_events_source(std::make_unique<LinesReader>(path), options);
+          },
+      .create = [](const auto& path, const WriteOptions&) { return std::make_unique<EventsTextWriter>(path, 0); },
+  };
+}
 
 void EventsTextWriter::begin(const RecordingInfo&) { file_.emplace(path_); }
 
@@ -92,6 +122,7 @@ EventsTextReader::EventsTextReader(std::filesystem::path path) : path_(std::move
   file_.open(path_, std::ios::binary);
   if (!file_) throw UserError("cannot read " + path_.string() + ": " + system_reason(errno));
   block_.resize(kBlockBytes);
+  if (const std::uintmax_t size = std::filesystem::file_size(path_, error); !error) size_ = size;
 }
 
 void EventsTextReader::fail(const std::string& what) const {
@@ -106,7 +137,7 @@ bool EventsTextReader::next_line(std::string_view& line) {
     std::memmove(block_.data(), block_.data() + begin_, end_ - begin_);
     end_ -= std::exchange(begin_, 0);
     file_.read(block_.data() + end_, static_cast<std::streamsize>(block_.size() - end_));
-    end_ += static_cast<std::size_t>(file_.gcount());
+    end_ += static_cast<std::size_t>(file_.gcount()), read_ += static_cast<std::uintmax_t>(file_.gcount());
     if (file_.bad()) fail("the file cannot be read further");
     newline = find_newline();
   }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "esim/events/event.h"
+#include "esim/record/format.h"
 #include "esim/record/output_file.h"
 #include "esim/record/record.h"
 
@@ -31,6 +32,8 @@ class EventsTextWriter final : public Sink {
   std::optional<OutputFile> file_;
 };
 
+Format events_text_format();
+
 /// Reads such lines, also with fewer or more decimals, exponents aside; empty lines and those starting with # are
 /// passed over. Digits beyond the nanosecond are dropped. Throws UserError, with file and line, for anything else and
 /// for times that decrease.
@@ -38,8 +41,12 @@ class EventsTextReader {
  public:
   explicit EventsTextReader(std::filesystem::path path);
 
-  /// Replaces `events` by the next ones, at most `count`; false if there are none left.
+  /// Replaces `events` by the next ones, at most `count`; false if there are none left. Where it throws, they are those
+  /// above the line that is wrong.
   bool read(std::vector<Event>& events, std::size_t count);
+
+  /// The share of the file that has been read.
+  double progress() const { return size_ > 0 ? static_cast<double>(read_) / static_cast<double>(size_) : 1.0; }
 
  private:
   bool next_line(std::string_view& line);
@@ -48,6 +55,7 @@ class EventsTextReader {
 
   std::filesystem::path path_;
   std::ifstream file_;
+  std::uintmax_t size_ = 0, read_ = 0;  // bytes
   std::vector<char> block_;
   std::size_t begin_ = 0, end_ = 0;  // what of the block is not read yet
   std::uint64_t line_number_ = 0;

@@ -1,24 +1,20 @@
-#include "esim/record/formats/events_file.h"
+#include "esim/record/events_file.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <fstream>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "esim/core/error.h"
-#include "esim/record/number_text.h"
 
 namespace esim {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMaxExtent = 65536;                                    // px
-constexpr TimeNs kMaxTime = std::numeric_limits<TimeNs>::max() / 2;  // differences of times stay representable
+constexpr int kMaxExtent = 65536;  // px
 constexpr std::uintmax_t kMaxReportBytes = std::uintmax_t{1} << 24;
 
 std::optional<fs::path> events_in(const fs::path& folder) {
@@ -79,61 +75,37 @@ std::optional<SensorSize> reported_sensor(const fs::path& folder) {
 
 }  // namespace
 
-EventsFile::Reader EventsFile::open(const fs::path& path) {
-  constexpr std::string_view kHdf5Signature = "\x89HDF\r\n\x1a\n";
-  std::array<char, 4096> head{};
-  std::ifstream file(path, std::ios::binary);
-  file.read(head.data(), head.size());
-  const std::string_view start(head.data(), static_cast<std::size_t>(file.gcount()));
-  if (start.starts_with(kHdf5Signature)) return EventsHdf5Reader(path);
-  if (start.find('\0') != std::string_view::npos) {
-    throw UserError("cannot read " + path.string() + ": it is neither HDF5 nor lines of text `t x y p`");
+EventsFile::EventsFile(const fs::path& path, const ReadOptions& options) : path_(find_file(path)) {
+  ReadOptions told = options;
+  // What the file itself says of the sensor counts for more than the report beside it.
+  source_ = open_source(path_, told);
+  const auto size_of = [](const Source& source) { return source.info().cameras.front().model; };
+  if (source_->info().cameras.size() != 1) {
+    std::string names;
+    for (const CameraInfo& camera : source_->info().cameras) names += (names.empty() ? "" : ", ") + camera.name;
+    throw UserError(
+        fmt::format("{} holds several cameras ({}): take one out with esim convert --camera", path_.string(), names));
   }
-  return EventsTextReader(path);
-}
-
-EventsFile::EventsFile(const fs::path& path, std::optional<SensorSize> sensor)
-    : path_(find_file(path)), reader_(open(path_)), sensor_(sensor) {
-  if (sensor_) return;
-  if (const auto* hdf5 = std::get_if<EventsHdf5Reader>(&reader_); hdf5 && hdf5->width() && hdf5->height()) {
-    sensor_ = SensorSize{*hdf5->width(), *hdf5->height()};
-  } else {
-    sensor_ = reported_sensor(path_.parent_path());
+  if (size_of(*source_).width == 0) {
+    told.sensor = reported_sensor(path_.parent_path());
+    if (told.sensor) source_ = open_source(path_, told);
   }
+  const Camera model = size_of(*source_);
+  if (model.width > 0) sensor_ = SensorSize{model.width, model.height};
 }
 
 bool EventsFile::read(std::vector<Event>& events, std::size_t count) {
-  if (auto* text = std::get_if<EventsTextReader>(&reader_)) {
-    text->read(events, count);
-  } else {
-    events = std::get<EventsHdf5Reader>(reader_).read(done_, count);
+  events.clear();
+  while (events.size() < count) {
+    const std::size_t taken = std::min(count - events.size(), portion_.size());
+    events.insert(events.end(), portion_.begin(), portion_.begin() + static_cast<std::ptrdiff_t>(taken));
+    portion_ = portion_.subspan(taken);
+    if (!portion_.empty()) break;
+    const Record* record = source_->next();
+    if (record == nullptr) break;
+    if (const auto* found = std::get_if<EventsRecord>(record)) portion_ = found->events;
   }
-  check(events);
-  done_ += events.size();
   return !events.empty();
-}
-
-void EventsFile::check(const std::vector<Event>& events) {
-  const int width = sensor_ ? sensor_->width : kMaxExtent, height = sensor_ ? sensor_->height : kMaxExtent;
-  for (std::size_t i = 0; i < events.size(); ++i) {
-    const Event& event = events[i];
-    if (event.x >= width || event.y >= height) {
-      throw UserError(fmt::format("{}: event {} at ({}, {}) is outside the sensor of {} x {} px", path_.string(),
-                                  done_ + i, event.x, event.y, width, height));
-    }
-    if (event.t > kMaxTime || event.t < -kMaxTime) {
-      throw UserError(fmt::format("{}: event {} at {:.3g} s, which is no time of a recording", path_.string(),
-                                  done_ + i, to_seconds(event.t)));
-    }
-    if (last_t_ && event.t < *last_t_) {
-      std::string at, before;
-      append_seconds(at, event.t);
-      append_seconds(before, *last_t_);
-      throw UserError(fmt::format("{}: event {} at {} s is before event {} at {} s: sort the events by time",
-                                  path_.string(), done_ + i, at, done_ + i - 1, before));
-    }
-    last_t_ = event.t;
-  }
 }
 
 }  // namespace esim

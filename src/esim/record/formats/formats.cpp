@@ -1,0 +1,116 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "esim/core/error.h"
+#include "esim/record/checked_source.h"
+#include "esim/record/format.h"
+#include "esim/record/formats/events_hdf5.h"
+#include "esim/record/formats/events_text.h"
+#include "esim/record/input_file.h"
+
+namespace esim {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kHeadBytes = 4096;
+
+std::string names() {
+  std::string text;
+  for (const Format& format : formats()) text += (text.empty() ? "" : ", ") + format.name;
+  return text;
+}
+
+/// Of the path as it will be when it is whole.
+std::string extension_of(const fs::path& path) {
+  return (path.extension() == ".incomplete" ? path.stem() : path).extension().string();
+}
+
+}  // namespace
+
+// In order: of those that recognise a file the first reads it, of those with its extension the first writes it.
+const std::vector<Format>& formats() {
+  static const std::vector<Format> all = {
+      dsec_format(),
+      events_text_format(),
+  };
+  return all;
+}
+
+const Format& format_named(std::string_view name) {
+  for (const Format& format : formats()) {
+    if (format.name == name) return format;
+  }
+  throw UserError(fmt::format("there is no format \"{}\"; use one of {}", name, names()));
+}
+
+const Format& format_of(const fs::path& path) {
+  std::error_code error;
+  if (!fs::exists(path, error))
+    throw UserError(path.string() + ": " + (error ? error.message() : "no such file or directory"));
+  const bool folder = fs::is_directory(path, error);
+  const std::string head = folder ? std::string() : read_head(path, kHeadBytes);
+  for (const Format& format : formats()) {
+    if (format.folder == folder && format.recognises(path, head)) return format;
+  }
+  throw UserError(fmt::format("cannot read {}: it is of none of the formats {}", path.string(), names()));
+}
+
+const Format& format_for(const fs::path& path) {
+  const std::string extension = extension_of(path);
+  std::string known;
+  for (const Format& format : formats()) {
+    if (!format.create) continue;
+    for (const std::string& own : format.extensions) {
+      if (own == extension) return format;
+      if (known.find(own + " ") == std::string::npos) known += own + " ";
+    }
+  }
+  throw UserError(fmt::format("{}: no format has the extension \"{}\"; use one of {}or --format with one of {}",
+                              path.string(), extension, known, names()));
+}
+
+std::unique_ptr<Source> open_source(const fs::path& path, const ReadOptions& options) {
+  const Format& format = format_of(path);
+  return std::make_unique<CheckedSource>(format.open(path, options), path, options);
+}
+
+Content content_of(const Record& record) {
+  const auto kind = [](const auto& alternative) {
+    using Kind = std::decay_t<decltype(alternative)>;
+    if constexpr (std::is_same_v<Kind, EventsRecord>) return Content::events;
+    if constexpr (std::is_same_v<Kind, FrameRecord>) return Content::frames;
+    if constexpr (std::is_same_v<Kind, ImageRecord>) return Content::images;
+    if constexpr (std::is_same_v<Kind, ImuRecord>) return Content::imu;
+    if constexpr (std::is_same_v<Kind, PoseRecord>) return Content::poses;
+    if constexpr (std::is_same_v<Kind, TruthRecord>) return Content::truth;
+    if constexpr (std::is_same_v<Kind, DisplacementRecord>) return Content::displacement;
+    if constexpr (std::is_same_v<Kind, EventPointsRecord>) return Content::event_points;
+  };
+  return std::visit(kind, record);
+}
+
+std::string_view describe(Content content) {
+  switch (content) {
+    case Content::events:
+      return "events";
+    case Content::frames:
+      return "frames";
+    case Content::images:
+      return "images";
+    case Content::imu:
+      return "measurements of the IMU";
+    case Content::poses:
+      return "poses";
+    case Content::truth:
+      return "depth and motion field";
+    case Content::displacement:
+      return "displacement";
+    case Content::event_points:
+      return "points of events";
+  }
+  return "";
+}
+
+}  // namespace esim

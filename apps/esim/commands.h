@@ -11,6 +11,7 @@ enum ExitCode : int { kOk = 0, kOurFault = 1, kUsersFault = 2, kInterrupted = 13
 void add_simulate(CLI::App& app, int& exit_code);
 void add_video(CLI::App& app, int& exit_code);
 void add_check(CLI::App& app, int& exit_code);
+void add_convert(CLI::App& app, int& exit_code);
 void add_import(CLI::App& app, int& exit_code);
 void add_info(CLI::App& app, int& exit_code);
 void add_stats(CLI::App& app, int& exit_code);

@@ -8,7 +8,9 @@ namespace esim::app {
 void add_info(CLI::App& app, int& exit_code) {
   auto path = std::make_shared<std::string>();
   CLI::App* command = app.add_subcommand("info", "Say what a recording or a file of events holds");
-  command->add_option("file", *path, "Recording folder, events.h5 or events.txt")->required()->type_name("FILE");
+  command->add_option("file", *path, "Recording folder, or file of any format that esim convert --list names")
+      ->required()
+      ->type_name("FILE");
   command->footer("Examples:\n  esim info out/room\n  esim info out/room/cam0/events.h5");
   command->callback([path, &exit_code] {
     fmt::print("{}", describe(inspect(*path)));

@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
       "  esim simulate scenes/room.yaml --out out/low --set event_camera.contrast_threshold=0.2\n"
       "  esim check scenes/room.yaml                       is the scenario right? nothing is written\n"
       "  esim video clip.mp4 --out out/clip                events of a video, or of a folder of images\n"
+      "  esim convert out/room room.bag                    other formats: esim convert --list\n"
       "  esim import room.blend --bake                     photorealistic light for fast rendering, by Blender\n"
       "  esim info out/room                                what a recording holds\n"
       "  esim stats out/room --plot                        rates, intervals, hot pixels, banding of its events\n"
@@ -27,6 +28,7 @@ int main(int argc, char** argv) {
   add_simulate(app, exit_code);
   add_video(app, exit_code);
   add_check(app, exit_code);
+  add_convert(app, exit_code);
   add_import(app, exit_code);
   add_info(app, exit_code);
   add_stats(app, exit_code);

@@ -131,10 +131,10 @@ int outcome(const ConversionSummary& summary, const fs::path& out) {
   return summary.complete ? kOk : kInterrupted;
 }
 
-int convert_to_file(const Arguments& arguments, const fs::path& out, bool text, const Notices& notices) {
+int convert_to_file(const Arguments& arguments, const fs::path& out, const Format& format, const Notices& notices) {
   RecordingFile file(out, arguments.force);
   Converter converter(arguments);
-  const std::unique_ptr<Sink> sink = build_events_sink(file.path(), text);
+  const std::unique_ptr<Sink> sink = build_conversion_sink(file.path(), format);
   const ConversionSummary summary = converter.run(*sink);
   file.finish();
   report_held(summary, arguments.options.interpolation.max_steps, notices);
@@ -173,9 +173,8 @@ int run(Arguments& arguments) {
   const fs::path name = fs::path(arguments.input).lexically_normal();
   const fs::path out = arguments.out.empty() ? "out" / (name.has_filename() ? name : name.parent_path()).stem()
                                              : fs::path(arguments.out);
-  const std::string extension = out.extension().string();
-  const bool text = extension == ".txt";
-  if (text || extension == ".h5" || extension == ".hdf5") return convert_to_file(arguments, out, text, notices);
+  const Format* format = find_format_for(out);
+  if (format != nullptr && !format->folder) return convert_to_file(arguments, out, *format, notices);
   return convert_to_folder(arguments, out, notices, given);
 }
 
@@ -191,7 +190,7 @@ void add_video(CLI::App& app, int& exit_code) {
       ->type_name("INPUT");
   command
       ->add_option("-o,--out", arguments->out,
-                   "Folder to write, or file of events: .h5 or .txt (default: out/NAME of the input)")
+                   "Folder to write, or file of events: .h5, .txt, ... (default: out/NAME of the input)")
       ->type_name("FILE_OR_DIR");
   CommandLine options(*command);
   describe_command_line(options, arguments->options);

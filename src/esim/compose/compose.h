@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "esim/record/format.h"
 #include "esim/scenario/conversion.h"
 #include "esim/scenario/scenario.h"
 #include "esim/scene/scene_file.h"
@@ -75,8 +76,8 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
 /// The files of a converted video, to be written into `folder`, likewise.
 std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& folder);
 
-/// A file of events alone, text if `text` and HDF5 otherwise.
-std::unique_ptr<Sink> build_events_sink(const std::filesystem::path& file, bool text);
+/// One file of a format.
+std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& file, const Format& format);
 
 /// report.json: what was done, at which cost, where the time went, and the notices given on the way.
 std::string report_json(const Scenario& scenario, const Summary& summary, int threads,

@@ -75,9 +75,8 @@ std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& folder)
   return std::make_unique<BackgroundSink>(std::move(sinks));
 }
 
-std::unique_ptr<Sink> build_events_sink(const std::filesystem::path& file, bool text) {
-  if (text) return std::make_unique<BackgroundSink>(std::make_unique<EventsTextWriter>(file, 0));
-  return std::make_unique<BackgroundSink>(std::make_unique<EventsHdf5Writer>(file, 0));
+std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& file, const Format& format) {
+  return std::make_unique<BackgroundSink>(format.create(file, {}));
 }
 
 }  // namespace esim

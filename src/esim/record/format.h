@@ -28,7 +28,7 @@ struct ReadOptions {
 enum class TimeUnit { us, ns };
 
 struct WriteOptions {
-  TimeUnit unit = TimeUnit::us;  ///< where the format leaves the choice
+  TimeUnit unit = TimeUnit::us;  ///< of the times of events, where the format leaves the choice
   Compression compression = Compression::blosc;
 };
 
@@ -44,6 +44,7 @@ struct Format {
   bool several_cameras = false;               ///< else records of camera 0 are all there is
   bool folder = false;                        ///< a recording is a folder of files, not a file
   TimeNs resolution = 1;                      ///< times of events are rounded down to multiples of it, ns
+  bool either_unit = false;                   ///< and to multiples of WriteOptions::unit
   int max_width = 65536, max_height = 65536;  ///< px: larger sensors do not fit
 
   /// Is it a file (or folder) of this format? By its content, of which `head` is the first 4096 bytes, or less.
@@ -65,7 +66,9 @@ const Format& format_named(std::string_view name);
 /// The format of what is there. Throws UserError for paths that are not there and for unknown content.
 const Format& format_of(const std::filesystem::path& path);
 
-/// The format that is written to a path, by its extension. Throws UserError for unknown ones.
+/// The format that is written to a path, by its extension; null for unknown ones, of which format_for() throws
+/// UserError.
+const Format* find_format_for(const std::filesystem::path& path);
 const Format& format_for(const std::filesystem::path& path);
 
 /// Opens a file of any format, and holds it to what a Source promises: events that are out of order or outside the

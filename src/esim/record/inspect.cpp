@@ -9,7 +9,6 @@
 
 #include "esim/core/error.h"
 #include "esim/record/formats/events_hdf5.h"
-#include "esim/record/formats/events_text.h"
 #include "esim/record/number_text.h"
 #include "esim/record/recording_directory.h"
 
@@ -19,7 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxReportBytes = std::size_t{1} << 24;
-constexpr std::size_t kTextBlockEvents = 1 << 16;
 
 EventsSummary summarise_hdf5(const fs::path& path, RecordingStatus* status = nullptr) {
   const EventsHdf5Reader reader(path);
@@ -38,23 +36,38 @@ EventsSummary summarise_hdf5(const fs::path& path, RecordingStatus* status = nul
   return summary;
 }
 
-EventsSummary summarise_text(const fs::path& path) {
-  EventsTextReader reader(path);
-  EventsSummary summary;
-  std::vector<Event> events;
-  while (reader.read(events, kTextBlockEvents)) {
-    if (summary.events == 0) summary.first = events.front().t;
-    summary.last = events.back().t;
-    summary.events += events.size();
-    summary.on += static_cast<std::uint64_t>(
-        std::count_if(events.begin(), events.end(), [](const Event& event) { return event.polarity > 0; }));
-  }
-  return summary;
+void add(EventSpan events, EventsSummary& summary) {
+  if (events.empty()) return;
+  if (summary.events == 0) summary.first = events.front().t;
+  summary.last = events.back().t;
+  summary.events += events.size();
+  summary.on += static_cast<std::uint64_t>(
+      std::count_if(events.begin(), events.end(), [](const Event& event) { return event.polarity > 0; }));
 }
 
-bool is_text(const fs::path& path) {
-  const fs::path extension = (path.extension() == ".incomplete" ? path.stem() : path).extension();
-  return extension == ".txt" || extension == ".csv";
+// Of any format, by reading all of it.
+void summarise(Source& source, Inspection& inspection) {
+  const RecordingInfo& info = source.info();
+  for (const CameraInfo& camera : info.cameras) {
+    EventsSummary& summary = inspection.cameras.emplace_back();
+    if (info.cameras.size() > 1) summary.camera = camera.name;
+    if (camera.model.width > 0) summary.width = camera.model.width, summary.height = camera.model.height;
+  }
+  while (const Record* record = source.next()) {
+    if (const auto* events = std::get_if<EventsRecord>(record)) {
+      add(events->events, inspection.cameras[static_cast<std::size_t>(events->camera)]);
+    } else {
+      ++inspection.others[content_of(*record)];
+    }
+  }
+}
+
+// A file of events, without what else it holds.
+EventsSummary summarise_events(const fs::path& path) {
+  if (format_of(path).name == "dsec") return summarise_hdf5(path);
+  Inspection inspection;
+  summarise(*open_source(path), inspection);
+  return inspection.cameras.front();
 }
 
 // One camera's folder; nothing if it holds no events.
@@ -65,7 +78,7 @@ std::optional<EventsSummary> summarise_folder(const fs::path& folder, const std:
     if (!fs::is_regular_file(path, error)) continue;
     EventsSummary summary;
     try {
-      summary = is_text(path) ? summarise_text(path) : summarise_hdf5(path);
+      summary = summarise_events(path);
     } catch (const UserError& problem) {
       summary.problem = problem.what();
     }
@@ -168,7 +181,13 @@ Inspection inspect_directory(const fs::path& directory) {
 Inspection inspect_file(const fs::path& path) {
   Inspection inspection;
   inspection.path = path;
-  inspection.cameras.push_back(is_text(path) ? summarise_text(path) : summarise_hdf5(path, &inspection.status));
+  const Format& format = format_of(path);
+  inspection.format = format.description;
+  if (format.name == "dsec") {
+    inspection.cameras.push_back(summarise_hdf5(path, &inspection.status));
+  } else {
+    summarise(*open_source(path), inspection);
+  }
   std::error_code error;
   inspection.files.push_back({path.filename(), fs::file_size(path, error)});
   return inspection;
@@ -240,9 +259,14 @@ Inspection inspect(const fs::path& path) {
 
 std::string describe(const Inspection& inspection) {
   std::string text = fmt::format("{}\n", inspection.path.string());
-  text += fmt::format("  {:<12}{}\n", "status", status_word(inspection.status));
+  if (!inspection.format.empty()) text += fmt::format("  {:<12}{}\n", "format", inspection.format);
+  if (inspection.format.empty() || inspection.status != RecordingStatus::unknown)
+    text += fmt::format("  {:<12}{}\n", "status", status_word(inspection.status));
   if (!inspection.reason.empty()) text += fmt::format("  {:<12}{}\n", "reason", inspection.reason);
   for (const EventsSummary& camera : inspection.cameras) describe_events(camera, text);
+  if (!inspection.others.empty()) text += "also\n";
+  for (const auto& [content, count] : inspection.others)
+    text += fmt::format("  {:<12}{}\n", grouped(count), describe(content));
 
   std::size_t width = 0;
   for (const FileSize& file : inspection.files) width = std::max(width, file.name.string().size());

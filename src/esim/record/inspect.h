@@ -2,11 +2,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "esim/core/time.h"
+#include "esim/record/format.h"
 
 namespace esim {
 
@@ -37,12 +39,14 @@ struct FileSize {
   std::uint64_t files = 1;  ///< more for a folder
 };
 
-/// What `esim info PATH` tells about a recording, whole or not, or about one file of events.
+/// What `esim info PATH` tells about a recording, whole or not, or about one file of any format.
 struct Inspection {
   std::filesystem::path path;  ///< what was looked at: X.incomplete if there is no X
   RecordingStatus status = RecordingStatus::unknown;
   std::string reason;  ///< as the report has it
+  std::string format;  ///< of a file
   std::vector<EventsSummary> cameras;
+  std::map<Content, std::uint64_t> others;  ///< what else a file holds: how many
   std::vector<FileSize> files;
 };
 

@@ -228,6 +228,7 @@ Format dsec_format() {
       .description = "HDF5 in DSEC's layout",
       .extensions = {".h5", ".hdf5"},
       .holds = {Content::events},
+      .either_unit = true,
       .recognises = [](const auto&, std::string_view head) { return head.starts_with("\x89HDF\r\n\x1a\n"); },
       .open = [](const auto& path,
                  const ReadOptions& options) { return make_events_source(std::make_unique<WholeFile>(path), options); },

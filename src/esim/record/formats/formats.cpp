@@ -57,18 +57,18 @@ const Format& format_of(const fs::path& path) {
   throw UserError(fmt::format("cannot read {}: it is of none of the formats {}", path.string(), names()));
 }
 
-const Format& format_for(const fs::path& path) {
+const Format* find_format_for(const fs::path& path) {
   const std::string extension = extension_of(path);
-  std::string known;
   for (const Format& format : formats()) {
-    if (!format.create) continue;
-    for (const std::string& own : format.extensions) {
-      if (own == extension) return format;
-      if (known.find(own + " ") == std::string::npos) known += own + " ";
-    }
+    if (format.create && std::count(format.extensions.begin(), format.extensions.end(), extension) > 0) return &format;
   }
-  throw UserError(fmt::format("{}: no format has the extension \"{}\"; use one of {}or --format with one of {}",
-                              path.string(), extension, known, names()));
+  return nullptr;
+}
+
+const Format& format_for(const fs::path& path) {
+  if (const Format* format = find_format_for(path)) return *format;
+  throw UserError(
+      fmt::format("{}: no format has the extension \"{}\"; name one: {}", path.string(), extension_of(path), names()));
 }
 
 std::unique_ptr<Source> open_source(const fs::path& path, const ReadOptions& options) {

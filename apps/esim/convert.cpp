@@ -1,0 +1,152 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "commands.h"
+#include "esim/core/error.h"
+#include "esim/record/copy_recording.h"
+#include "esim/record/number_text.h"
+#include "esim/record/recording_directory.h"
+#include "esim/record/recording_file.h"
+#include "progress_bar.h"
+#include "support.h"
+
+namespace esim::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::string input, out, format;
+  CopyOptions copy;
+  std::optional<int> width, height;
+  bool recover = false, list = false, quiet = false, force = false;
+};
+
+int list_formats() {
+  for (const Format& format : formats()) {
+    std::string extensions;
+    for (const std::string& extension : format.extensions) extensions += extension + " ";
+    fmt::print("{:<12} {:<16} {}{}\n", format.name, extensions, format.description,
+               format.create ? "" : " (is only read)");
+  }
+  return kOk;
+}
+
+/// What a folder needs besides the files of its format to be known as a recording.
+std::string report(const RecordingInfo& info, const CopySummary& summary, const std::string& input) {
+  auto cameras = nlohmann::ordered_json::array();
+  for (const CameraInfo& camera : info.cameras) {
+    cameras.push_back({{"name", camera.name}, {"width", camera.model.width}, {"height", camera.model.height}});
+  }
+  const nlohmann::ordered_json report = {
+      {"status", summary.complete ? "complete" : "interrupted"}, {"converted_from", input}, {"cameras", cameras}};
+  return report.dump(2) + "\n";
+}
+
+void print_summary(const CopySummary& summary, const Arguments& arguments, double wall_s) {
+  std::string copied;
+  for (const auto& [content, count] : summary.copied)
+    copied += fmt::format("{}{} {}", copied.empty() ? "" : ", ", grouped(count), describe(content));
+  fmt::print(stderr, "{}: {} in {:.1f} s: {}\n", summary.complete ? "done" : "interrupted",
+             copied.empty() ? "nothing" : copied, wall_s, arguments.out);
+}
+
+const Format& writable(const Format& format) {
+  if (format.create) return format;
+  throw UserError(
+      fmt::format("{} is only read; choose another --format of those that esim convert --list names", format.name));
+}
+
+int run(const Arguments& arguments) {
+  if (arguments.list) return list_formats();
+  if (arguments.out.empty()) throw UserError("give what to read and what to write: esim convert IN OUT");
+  const auto start = std::chrono::steady_clock::now();
+  const fs::path out = arguments.out;
+  const Format& format = writable(arguments.format.empty() ? format_for(out) : format_named(arguments.format));
+
+  bool damaged = false;
+  ReadOptions reading;
+  if (arguments.width && arguments.height) reading.sensor = {*arguments.width, *arguments.height};
+  if (arguments.recover) {
+    reading.recover = [&damaged](const std::string& problem) {
+      damaged = true;
+      fmt::print(stderr, "warning: {}; what comes before is converted\n", problem);
+    };
+  }
+  catch_interrupts();
+  const std::unique_ptr<Source> source = open_source(arguments.input, reading);
+  ProgressBar bar(!arguments.quiet);
+  const auto copy_to = [&](const fs::path& path) {
+    CopySummary summary = copy_recording(*source, format, path, arguments.copy, [&](double share) {
+      bar.show(share, [&] { return fmt::format("{:.0f} %", 100 * share); });
+      return !interrupted();
+    });
+    bar.clear();
+    summary.complete &= !damaged;
+    return summary;
+  };
+  CopySummary summary;
+  if (format.folder) {
+    RecordingDirectory directory(out, arguments.force);
+    summary = copy_to(directory.path());
+    directory.finish(report(source->info(), summary, arguments.input));
+  } else {
+    RecordingFile file(out, arguments.force);
+    summary = copy_to(file.path());
+    file.finish();
+  }
+  for (const std::string& loss : losses(summary, format)) fmt::print(stderr, "warning: {}\n", loss);
+  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
+  if (!arguments.quiet) print_summary(summary, arguments, wall.count());
+  return interrupted() ? kInterrupted : kOk;
+}
+
+}  // namespace
+
+void add_convert(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("convert", "Convert recordings and event files between formats");
+  command->add_flag("--list", arguments->list, "List the formats");
+  command->add_option("in", arguments->input, "What to read, of any format: recognised by its content")
+      ->type_name("IN");
+  command->add_option("out", arguments->out, "What to write")->type_name("OUT");
+  command->add_option("-f,--format", arguments->format, "Format to write (default: by the extension of OUT)")
+      ->type_name("NAME");
+  command->add_option("--camera", arguments->copy.camera, "Convert this one only")->type_name("NAME");
+  command->add_flag("--from-zero", arguments->copy.from_zero, "Let times count from the start of the recording");
+  command
+      ->add_option("--time-unit", arguments->copy.write.unit,
+                   "Of the times of events, where the format leaves the choice")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, TimeUnit>{{"us", TimeUnit::us}, {"ns", TimeUnit::ns}})
+                      .description(""))
+      ->type_name("us|ns");
+  command->add_option("--compression", arguments->copy.write.compression, "Of HDF5")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Compression>{{"blosc", Compression::blosc},
+                                                                             {"gzip", Compression::gzip},
+                                                                             {"none", Compression::none}})
+                      .description(""))
+      ->type_name("blosc|gzip|none");
+  auto* width = command->add_option("--width", arguments->width, "Sensor, px (default: as the file says)")
+                    ->type_name("PX")
+                    ->check(CLI::Range(1, 65536));
+  auto* height = command->add_option("--height", arguments->height, "Sensor, px")
+                     ->type_name("PX")
+                     ->check(CLI::Range(1, 65536))
+                     ->needs(width);
+  width->needs(height);
+  command->add_flag("--recover", arguments->recover, "Convert what can be read of a damaged file");
+  command->add_flag("-q,--quiet", arguments->quiet, "Print warnings and errors only");
+  command->add_flag("--force", arguments->force, "Replace an earlier OUT");
+  command->footer(
+      "Examples:\n"
+      "  esim convert out/room/cam0/events.h5 events.txt\n"
+      "  esim convert events.txt events.h5 --width 640 --height 480 --time-unit ns\n"
+      "  esim convert cut.h5 whole.h5 --recover                          as far as it can be read\n"
+      "  esim convert --list");
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace esim::app

@@ -1,0 +1,134 @@
+#include "esim/record/copy_recording.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "esim/core/error.h"
+#include "esim/record/adapters.h"
+#include "esim/record/number_text.h"
+
+namespace esim {
+namespace {
+
+std::string names_of(const std::vector<CameraInfo>& cameras) {
+  std::string names;
+  for (const CameraInfo& camera : cameras) names += (names.empty() ? "" : ", ") + camera.name;
+  return names;
+}
+
+/// The camera to take out; nothing: all.
+std::optional<int> chosen_camera(const RecordingInfo& info, const Format& format, const std::string& name) {
+  const auto& cameras = info.cameras;
+  if (name.empty()) {
+    if (cameras.size() <= 1 || format.several_cameras) return std::nullopt;
+    throw UserError(
+        fmt::format("{} holds one camera, and there are {}: choose one with --camera", format.name, names_of(cameras)));
+  }
+  const auto found =
+      std::find_if(cameras.begin(), cameras.end(), [&](const CameraInfo& camera) { return camera.name == name; });
+  if (found == cameras.end())
+    throw UserError(fmt::format("there is no camera {}; the recording has {}", name, names_of(cameras)));
+  return static_cast<int>(found - cameras.begin());
+}
+
+std::uint64_t size_of(const Record& record) {
+  const auto* events = std::get_if<EventsRecord>(&record);
+  return events != nullptr ? events->events.size() : 1;
+}
+
+std::optional<int> camera_of(const Record& record) {
+  return std::visit(
+      [](const auto& kind) -> std::optional<int> {
+        if constexpr (requires { kind.camera; }) {
+          return kind.camera;
+        } else {
+          return std::nullopt;
+        }
+      },
+      record);
+}
+
+class Copy {
+ public:
+  Copy(Source& from, const Format& format, const std::filesystem::path& to, const CopyOptions& options)
+      : from_(from),
+        format_(format),
+        resolution_(format.either_unit && options.write.unit == TimeUnit::us ? kNsPerUs : format.resolution),
+        camera_(chosen_camera(from.info(), format, options.camera)),
+        to_(format.create(to, options.write)) {
+    if (camera_) to_ = std::make_unique<OneCamera>(std::move(to_), *camera_);
+    if (options.from_zero) {
+      to_ = std::make_unique<FromZero>(std::move(to_));
+      shift_ = from.info().start;
+    }
+  }
+
+  CopySummary run(const std::function<bool(double)>& go_on) {
+    to_->begin(from_.info());
+    try {
+      while (const Record* record = from_.next()) {
+        take(*record);
+        if (!go_on(from_.progress())) {
+          summary_.complete = false;
+          break;
+        }
+      }
+    } catch (const UserError&) {
+      to_->end(false);
+      throw;
+    }
+    to_->end(summary_.complete);
+    return summary_;
+  }
+
+ private:
+  void take(const Record& record) {
+    const Content content = content_of(record);
+    const std::optional<int> camera = camera_of(record);
+    if (camera_ && camera && camera != camera_) return;
+    const bool held = std::find(format_.holds.begin(), format_.holds.end(), content) != format_.holds.end();
+    (held ? summary_.copied : summary_.left_out)[content] += size_of(record);
+    if (!held) return;
+    if (const auto* events = std::get_if<EventsRecord>(&record)) note_rounding(*events);
+    to_->write(record);
+  }
+
+  void note_rounding(const EventsRecord& record) {
+    if (resolution_ <= 1 || summary_.rounded_to > 0) return;
+    const bool off = std::any_of(record.events.begin(), record.events.end(),
+                                 [&](const Event& event) { return (event.t - shift_) % resolution_ != 0; });
+    if (off) summary_.rounded_to = resolution_;
+  }
+
+  Source& from_;
+  const Format& format_;
+  TimeNs resolution_;
+  std::optional<int> camera_;
+  std::unique_ptr<Sink> to_;
+  TimeNs shift_ = 0;
+  CopySummary summary_;
+};
+
+}  // namespace
+
+CopySummary copy_recording(Source& from, const Format& format, const std::filesystem::path& to,
+                           const CopyOptions& options, const std::function<bool(double)>& go_on) {
+  return Copy(from, format, to, options).run(go_on);
+}
+
+std::vector<std::string> losses(const CopySummary& summary, const Format& format) {
+  std::vector<std::string> lines;
+  for (const auto& [content, count] : summary.left_out) {
+    lines.push_back(fmt::format("{} does not hold {}: {} left out", format.name, describe(content), grouped(count)));
+  }
+  if (summary.rounded_to > 0) {
+    lines.push_back(fmt::format("times of events are rounded down to {} us{}",
+                                static_cast<double>(summary.rounded_to) / static_cast<double>(kNsPerUs),
+                                format.either_unit ? "; --time-unit ns keeps them" : ""));
+  }
+  return lines;
+}
+
+}  // namespace esim

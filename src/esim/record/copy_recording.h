@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "esim/record/format.h"
+
+namespace esim {
+
+struct CopyOptions {
+  std::string camera{};    ///< only this one, by its name; empty: all, or the only one
+  bool from_zero = false;  ///< times count from the start of the recording
+  WriteOptions write{};
+};
+
+/// What was copied, and what the target's format could not hold.
+struct CopySummary {
+  std::map<Content, std::uint64_t> copied{}, left_out{};  ///< events, frames, ...: how many
+  TimeNs rounded_to = 0;  ///< ns; times of events were rounded down to multiples of it; 0: they were not
+  bool complete = true;   ///< else it was stopped
+};
+
+/// Copies a recording, record by record, to a path in a format that is written. `go_on` is asked after each, with the
+/// share that has been read. Throws UserError if the format holds one camera and none of several has been chosen, or if
+/// there is no camera of that name; what cannot be read or written throws too, when all that came before has been
+/// handed on and the target has ended incomplete.
+CopySummary copy_recording(Source& from, const Format& format, const std::filesystem::path& to,
+                           const CopyOptions& options, const std::function<bool(double)>& go_on);
+
+/// A line for each thing that was left out or changed, for people.
+std::vector<std::string> losses(const CopySummary& summary, const Format& format);
+
+}  // namespace esim

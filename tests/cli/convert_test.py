@@ -1,0 +1,69 @@
+"""`esim convert` as its users meet it: exit codes, messages, and what is left on disk.
+
+Run as: convert_test.py ESIM_PROGRAM, with the standard library of Python alone.
+"""
+
+import sys
+import unittest
+
+from program import ProgramTest, run
+
+LINES = "".join(f"{i // 100}.{i % 100:02}0001500 {i % 64} {i % 48} {i % 2}\n" for i in range(500))
+
+
+class Convert(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self.text = self.folder / "events.txt"
+        self.text.write_text(LINES)
+
+    def convert(self, *arguments, code=0):
+        result = run("convert", *arguments)
+        self.assertEqual(result.returncode, code, result.stderr)
+        return result
+
+    def test_there_and_back(self):
+        for extension in (".h5", ".csv"):
+            other, back = self.folder / f"other{extension}", self.folder / f"back{extension}.txt"
+            result = self.convert(self.text, other, "--time-unit", "ns", "--width", "64", "--height", "48")
+            self.assertIn("500 events", result.stderr)
+            self.assertNotIn("warning", result.stderr)
+            self.assertEqual(result.stdout, "")
+            self.convert(other, back, "--quiet")
+            self.assertEqual(back.read_text(), LINES)
+        self.assertIn("64 x 48 px", run("info", self.folder / "other.h5").stdout)
+
+    def test_says_what_is_lost(self):
+        self.assertIn("rounded down to 1 us", self.convert(self.text, self.folder / "a.h5").stderr)
+
+    def test_replaces_nothing_unasked(self):
+        out = self.folder / "a.h5"
+        out.write_text("precious")
+        self.assertIn("--force", self.convert(self.text, out, code=2).stderr)
+        self.assertEqual(out.read_text(), "precious")
+        self.convert(self.text, out, "--force")
+
+    def test_damaged_files_with_and_without_recovery(self):
+        out = self.folder / "a.h5"
+        self.text.write_text(LINES + "5.1 3 what 1\n" + LINES)
+        self.assertIn("line 501", self.convert(self.text, out, code=2).stderr)
+        self.assertEqual({p.name for p in self.folder.iterdir()}, {"events.txt"}, "nothing is left of a failure")
+        self.assertIn("line 501", self.convert(self.text, out, "--recover").stderr)
+        self.assertIn("500", run("info", out).stdout)
+
+    def test_what_cannot_be(self):
+        self.assertIn(".xyz", self.convert(self.text, self.folder / "a.xyz", code=2).stderr)
+        self.assertIn("no format \"xyz\"", self.convert(self.text, self.out, "--format", "xyz", code=2).stderr)
+        self.assertIn("no such file", self.convert(self.folder / "none.h5", self.out, "-f", "text", code=2).stderr)
+        self.assertIn("esim convert IN OUT", self.convert(self.text, code=2).stderr)
+        self.assertIn("outside the sensor", self.convert(self.text, self.folder / "a.h5", "--width", "32", "--height",
+                                                         "48", code=2).stderr)
+
+    def test_the_list_names_every_format(self):
+        listed = self.convert("--list").stdout
+        for name in ("dsec", "text"):
+            self.assertRegex(listed, rf"(?m)^{name} ")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=1)

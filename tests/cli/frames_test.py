@@ -162,6 +162,16 @@ frame_camera: {rate_hz: 20, bits: 16}
         measured = f"frame_camera={{response: {{type: measured, path: {response}}}}}"
         self.assert_refused(run("check", SCENES / "poster.yaml", *FAST, "--set", measured), "response.csv:3", "monotonic")
 
+    def test_a_camera_without_events_takes_the_same_frames(self):
+        frames = ["--set", "frame_camera={rate_hz: 50}", "--set", "truth.event_points=true"]
+        self.simulate(*frames)
+        expected = [p.read_bytes() for p in sorted((self.place / "frames").iterdir())]
+        self.assertTrue((self.place / "event_points.ply").exists())
+        report = self.simulate(*frames, "--set", "camera.events=false")
+        self.assertEqual([p.read_bytes() for p in sorted((self.place / "frames").iterdir())], expected)
+        self.assertEqual([name for name in ("events.h5", "event_points.ply") if (self.place / name).exists()], [])
+        self.assertEqual(report["cameras"][0]["events"], 0)
+
     def test_says_so_where_no_frame_fits(self):
         result = run("check", SCENES / "poster.yaml", "--set", "duration_s=0.02", "--set", "frame_camera={rate_hz: 30}")
         self.assertIn("no exposure lies wholly within the simulated time, 0.02 s", result.stderr)

@@ -5,38 +5,15 @@
 
 #include "esim/geometry/so3.h"
 #include "esim/scene/texture.h"
-#include "render/scenes.h"
+#include "render/every_renderer.h"
 
 namespace esim {
 namespace {
 
-/// (name of the renderer, kind of distortion)
-class EveryRenderer : public testing::TestWithParam<std::tuple<const char*, int>> {
- public:
-  static std::string name(const testing::TestParamInfo<std::tuple<const char*, int>>& test) {
-    const char* distortions[] = {"none", "radtan", "equidistant", "fov"};
-    return std::string(std::get<0>(test.param)) + "_" + distortions[std::get<1>(test.param)];
-  }
-
-  void SetUp() override {
-    if (name_.ends_with("gl") && !test::has_gl()) GTEST_SKIP() << "no OpenGL: libegl1, libgl1-mesa-dri";
-    renderer_ = test::make_renderer(name_, model_);
-  }
-
+class EveryRenderer : public test::EveryRenderer {
  protected:
-  const Camera model_ = test::distorted_camera(std::get<1>(GetParam()));
-  const std::string name_ = std::get<0>(GetParam());
   const Kinematics camera_ = test::moving_camera();
   const std::vector<Kinematics> objects_ = test::objects_of(name_);
-  std::unique_ptr<Renderer> renderer_;
-
-  /// Where the camera is `dt` seconds later if its twist stays as it is.
-  Kinematics later(double dt) const {
-    Kinematics moved = camera_;
-    moved.T_world_body.translation += camera_.velocity_world * dt;
-    moved.T_world_body.rotation = camera_.T_world_body.rotation * so3_exp(camera_.omega_body * dt);
-    return moved;
-  }
 };
 
 /// Those whose scene is one of space.
@@ -57,7 +34,7 @@ TEST_P(EveryRendererOfSpace, MotionFieldIsTheVelocityOfTheImageOfWhatIsSeen) {
         const Eigen::Vector3d moved = seen == 0 ? point
                                                 : test::objects_of(name_, dt)[seen - 1].T_world_body *
                                                       (objects_[seen - 1].T_world_body.inverse() * point);
-        return model_.project(later(dt).T_world_body.inverse() * moved);
+        return model_.project(test::moving_camera(dt).T_world_body.inverse() * moved);
       };
       const auto before = image_of_it(-kStep), after = image_of_it(kStep);
       ASSERT_TRUE(before && after);
@@ -76,24 +53,20 @@ TEST_P(EveryRendererOfSpace, MotionFieldIsTheVelocityOfTheImageOfWhatIsSeen) {
 TEST_P(EveryRenderer, SeveralRenderingsMayBeUnderWay) {
   // Of one renderer and of two, finished in another order than started; one is never finished.
   const auto other = test::make_renderer(name_, model_);
-  const auto request_at = [&](double dt) {
-    return RenderRequest{
-        test::kTime + to_ns(dt), later(dt), {{0, 0, model_.width, model_.height}}, test::objects_of(name_, dt)};
-  };
   const auto expect_that_of = [&](double dt, Rendering& rendering) {
     Sample sample, expected;
     rendering.finish(sample);
-    renderer_->render(request_at(dt), expected);
+    renderer_->render(view(dt), expected);
     EXPECT_EQ(sample.t, expected.t);
     EXPECT_TRUE(std::ranges::equal(sample.irradiance.pixels(), expected.irradiance.pixels()));
     EXPECT_TRUE(std::ranges::equal(sample.depth.pixels(), expected.depth.pixels()));
     EXPECT_TRUE(std::ranges::equal(sample.flow_x.pixels(), expected.flow_x.pixels()));
     EXPECT_TRUE(std::ranges::equal(sample.object.pixels(), expected.object.pixels()));
   };
-  const auto first = renderer_->start(request_at(0));
-  const auto beside = other->start(request_at(0.1));
-  auto unwanted = renderer_->start(request_at(0.2));
-  const auto last = renderer_->start(request_at(0.3));
+  const auto first = renderer_->start(view(0));
+  const auto beside = other->start(view(0.1));
+  auto unwanted = renderer_->start(view(0.2));
+  const auto last = renderer_->start(view(0.3));
   expect_that_of(0.3, *last);
   unwanted.reset();
   expect_that_of(0.1, *beside);
@@ -105,7 +78,7 @@ TEST_P(EveryRenderer, BrightnessMovesWithTheMotionField) {
   const Sample sample = test::render(*renderer_, model_, camera_, objects_);
   constexpr double kStep = 2e-3;
   const auto at = [&](double dt) {
-    return test::render(*renderer_, model_, later(dt), test::objects_of(name_, dt), {}, dt);
+    return test::render(*renderer_, model_, test::moving_camera(dt), test::objects_of(name_, dt), {}, dt);
   };
   const Sample before = at(-kStep), after = at(kStep);
   std::vector<double> errors;
@@ -186,7 +159,7 @@ TEST_P(EveryRenderer, SaysWhichObjectEachPixelSeesWhereAsked) {
 TEST_P(EveryRenderer, DoesNotDependOnThreadsOrHistory) {
   const Workers one(1);
   const auto other = test::make_renderer(name_, model_, one);
-  test::render(*renderer_, model_, later(0.3), test::objects_of(name_, 0.3));
+  test::render(*renderer_, model_, test::moving_camera(0.3), test::objects_of(name_, 0.3));
   const Sample a = test::render(*renderer_, model_, camera_, objects_),
                b = test::render(*other, model_, camera_, objects_);
   EXPECT_TRUE(std::equal(a.irradiance.pixels().begin(), a.irradiance.pixels().end(), b.irradiance.pixels().begin()));

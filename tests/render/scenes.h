@@ -170,8 +170,9 @@ inline Camera distorted_camera(int kind) {
   return camera;
 }
 
-/// Near the origin, looking along world x, and moving in all six degrees of freedom.
-inline Kinematics moving_camera() {
+/// Near the origin, looking along world x, and moving in all six degrees of freedom; `dt_s` later, its twist being
+/// constant.
+inline Kinematics moving_camera(double dt_s = 0) {
   Kinematics camera;
   Eigen::Matrix3d R;
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -180,6 +181,8 @@ inline Kinematics moving_camera() {
   camera.T_world_body.translation = {0.2, -0.1, 0.15};
   camera.velocity_world = {0.4, -0.7, 0.5};
   camera.omega_body = {0.8, -0.5, 1.1};
+  camera.T_world_body.translation += camera.velocity_world * dt_s;
+  camera.T_world_body.rotation = camera.T_world_body.rotation * so3_exp(camera.omega_body * dt_s);
   return camera;
 }
 

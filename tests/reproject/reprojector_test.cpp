@@ -11,14 +11,6 @@
 namespace esim {
 namespace {
 
-/// The camera `dt` seconds after test::moving_camera(), at a constant twist.
-Kinematics camera_at(double dt) {
-  Kinematics camera = test::moving_camera();
-  camera.T_world_body.translation += camera.velocity_world * dt;
-  camera.T_world_body.rotation = camera.T_world_body.rotation * so3_exp(camera.omega_body * dt);
-  return camera;
-}
-
 struct Difference {
   double rms = 0, largest = 0;
 };
@@ -47,7 +39,10 @@ class Between {
         reprojector_(layout_, renderer_->traits().at_infinity, workers) {}
 
   RenderRequest view(double dt, const Camera& camera) const {
-    return {test::kTime + to_ns(dt), camera_at(dt), {{0, 0, camera.width, camera.height}}, test::objects_of(name_, dt)};
+    return {test::kTime + to_ns(dt),
+            test::moving_camera(dt),
+            {{0, 0, camera.width, camera.height}},
+            test::objects_of(name_, dt)};
   }
 
   Keyframe keyframe(double dt) const {

@@ -2,12 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 
-#include "esim/compose/compose.h"
-#include "esim/core/error.h"
-#include "support/errors.h"
-#include "support/temporary_directory.h"
+#include "sim/card_scene.h"
 
 namespace esim {
 namespace {
@@ -56,60 +52,19 @@ class Collector final : public Sink {
   std::vector<Eigen::Vector3f> points;
 };
 
-/// A grey wall 3 m before a camera at rest, and a white card 2 m before it that crosses the view at 2 m/s.
-class GroundTruth : public testing::Test {
+class GroundTruth : public test::CardScene {
  protected:
-  void SetUp() override {
-    write_square("wall.obj", 40, 0.2);
-    write_square("card.obj", 0.4, 1.0);
-    write("card.txt", "0 -1 -1 0 0 0 0 1\n0.5 -1 0 0 0 0 0 1\n1 -1 1 0 0 0 0 1\n");
-    MeshRendererOptions mesh;
-    mesh.scene = folder_.path() / "wall.obj";
-    FileTrajectoryOptions path;
-    path.path = folder_.path() / "card.txt";
-    mesh.objects = {{"card", folder_.path() / "card.obj", 1.0, path}};
-    scenario_.renderer = mesh;
-    StaticTrajectoryOptions still;
-    still.pose.position = {-3, 0, 0};
-    scenario_.trajectory = still;
+  GroundTruth() {
     scenario_.start_s = 0.4;
     scenario_.duration_s = 0.2;
     scenario_.truth.rate_hz = 100;
-    CameraOptions camera;
-    camera.name = "cam0";
-    camera.width = 64, camera.height = 48;
-    camera.horizontal_fov_deg = 40;
-    scenario_.cameras = {camera};
   }
-
-  void write(const std::string& name, const std::string& text) const { std::ofstream(folder_.path() / name) << text; }
-
-  /// A square of one grey in the plane x = 0, `side` metres wide.
-  void write_square(const std::string& name, double side, double grey) const {
-    const std::string h = std::to_string(side / 2), kd = std::to_string(grey);
-    write(name, "mtllib " + name + ".mtl\nv 0 -" + h + " -" + h + "\nv 0 " + h + " -" + h + "\nv 0 " + h + " " + h +
-                    "\nv 0 -" + h + " " + h + "\nusemtl m\nf 1 2 3\nf 1 3 4\n");
-    write(name + ".mtl", "newmtl m\nKd " + kd + " " + kd + " " + kd + "\n");
-  }
-
-  MeshRendererOptions& mesh() { return std::get<MeshRendererOptions>(scenario_.renderer); }
 
   Collector run(int threads = 2) {
     Collector out;
-    World world = build_world(scenario_, threads, {[](const std::string&) {}, [](const std::string&) {}});
-    simulate(world, out, [](const Progress&) { return true; });
+    simulate_into(out, threads);
     return out;
   }
-
-  std::string error() {
-    return test::message_of<UserError>([&] {
-      build_world(scenario_, 1, {[&](const std::string& line) { warnings_ += line; }, [](const std::string&) {}});
-    });
-  }
-
-  test::TemporaryDirectory folder_;
-  Scenario scenario_;
-  std::string warnings_;
 };
 
 TEST_F(GroundTruth, IsWhatIsAskedForAndChangesNoEvent) {
@@ -239,7 +194,7 @@ TEST_F(GroundTruth, SaysWhyItCannotBeHad) {
 
   scenario_.truth = {};
   scenario_.truth.event_points = true;
-  write("sky.pgm", "P2 4 2 255\n1 2 3 4\n5 6 7 8\n");
+  folder_.write("sky.pgm", "P2 4 2 255\n1 2 3 4\n5 6 7 8\n");
   PanoramaRendererOptions panorama;
   panorama.image = folder_.path() / "sky.pgm";
   scenario_.renderer = panorama;

@@ -1,12 +1,7 @@
 // Moving objects from the scenario to the events.
 #include <gtest/gtest.h>
 
-#include <fstream>
-
-#include "esim/compose/compose.h"
-#include "esim/core/error.h"
-#include "support/errors.h"
-#include "support/temporary_directory.h"
+#include "sim/card_scene.h"
 
 namespace esim {
 namespace {
@@ -29,58 +24,11 @@ class Counter final : public Sink {
   Image<float> flow_x;
 };
 
-/// A grey wall 3 m before a camera at rest, and a white card 2 m before it that crosses the view at 2 m/s.
-class MovingObjects : public testing::Test {
+class MovingObjects : public test::CardScene {
  protected:
-  void SetUp() override {
-    write_square("wall.obj", 40, 0.2);
-    write_square("card.obj", 0.4, 1.0);
-    write("card.txt", "0 -1 -1 0 0 0 0 1\n0.5 -1 0 0 0 0 0 1\n1 -1 1 0 0 0 0 1\n");
+  MovingObjects() { scenario_.duration_s = 1.0; }
 
-    MeshRendererOptions mesh;
-    mesh.scene = folder_.path() / "wall.obj";
-    FileTrajectoryOptions path;
-    path.path = folder_.path() / "card.txt";
-    mesh.objects = {{"card", folder_.path() / "card.obj", 1.0, path}};
-    scenario_.renderer = mesh;
-    StaticTrajectoryOptions still;
-    still.pose.position = {-3, 0, 0};
-    scenario_.trajectory = still;
-    scenario_.duration_s = 1.0;
-    CameraOptions camera;
-    camera.name = "cam0";
-    camera.width = 64, camera.height = 48;
-    camera.horizontal_fov_deg = 40;
-    scenario_.cameras = {camera};
-  }
-
-  void write(const char* name, const std::string& text) const { std::ofstream(folder_.path() / name) << text; }
-
-  /// A grey square in the plane x = 0, `side` metres wide.
-  void write_square(const std::string& name, double side, double grey) const {
-    std::string corners;
-    for (const auto& [y, z] : {std::pair(-1, -1), {1, -1}, {1, 1}, {-1, 1}})
-      corners += "v 0 " + std::to_string(y * side / 2) + " " + std::to_string(z * side / 2) + "\n";
-    write(name.c_str(), "mtllib " + name + ".mtl\n" + corners + "usemtl m\nf 1 2 3\nf 1 3 4\n");
-    const std::string kd = std::to_string(grey);
-    write((name + ".mtl").c_str(), "newmtl m\nKd " + kd + " " + kd + " " + kd + "\n");
-  }
-
-  MeshRendererOptions& mesh() { return std::get<MeshRendererOptions>(scenario_.renderer); }
-
-  Summary run(Counter& out, int threads = 1) {
-    World world = build_world(scenario_, threads, {[](const std::string&) {}, [](const std::string&) {}});
-    return simulate(world, out, [](const Progress&) { return true; });
-  }
-
-  std::string error() {
-    return test::message_of<UserError>([&] {
-      build_world(scenario_, 1, {[](const std::string&) {}, [](const std::string&) {}});
-    });
-  }
-
-  test::TemporaryDirectory folder_;
-  Scenario scenario_;
+  Summary run(Counter& out, int threads = 1) { return simulate_into(out, threads); }
 };
 
 TEST_F(MovingObjects, FireEventsBeforeACameraAtRestAndDriveItsSampling) {

@@ -5,18 +5,10 @@
 #include <cmath>
 #include <limits>
 
-#include "render/scenes.h"
+#include "render/every_renderer.h"
 
 namespace esim {
 namespace {
-
-/// The camera `dt` seconds after test::moving_camera(), at a constant twist.
-Kinematics camera_at(double dt) {
-  Kinematics camera = test::moving_camera();
-  camera.T_world_body.translation += camera.velocity_world * dt;
-  camera.T_world_body.rotation = camera.T_world_body.rotation * so3_exp(camera.omega_body * dt);
-  return camera;
-}
 
 /// Value between the pixels; NaN outside their centres.
 float bilinear(const Image<float>& image, double u, double v) {
@@ -48,23 +40,8 @@ bool is_smooth_around(const Sample& sample, double u, double v) {
   return true;
 }
 
-class EveryRendererOfSpace : public testing::TestWithParam<std::tuple<const char*, int>> {
- public:
-  static std::string name(const testing::TestParamInfo<std::tuple<const char*, int>>& test) {
-    const char* distortions[] = {"none", "radtan", "equidistant", "fov"};
-    return std::string(std::get<0>(test.param)) + "_" + distortions[std::get<1>(test.param)];
-  }
-
-  void SetUp() override {
-    if (name_.ends_with("gl") && !test::has_gl()) GTEST_SKIP() << "no OpenGL: libegl1, libgl1-mesa-dri";
-    renderer_ = test::make_renderer(name_, model_);
-  }
-
+class EveryRendererOfSpace : public test::EveryRenderer {
  protected:
-  RenderRequest view(double dt) const {
-    return {test::kTime + to_ns(dt), camera_at(dt), {{0, 0, model_.width, model_.height}}, test::objects_of(name_, dt)};
-  }
-
   Sample render(double dt) const {
     Sample sample;
     renderer_->render(view(dt), sample);
@@ -77,10 +54,6 @@ class EveryRendererOfSpace : public testing::TestWithParam<std::tuple<const char
     EXPECT_EQ(field.advance(view(0), render(0)), nullptr);
     return *field.advance(view(dt), render(dt));
   }
-
-  const Camera model_ = test::distorted_camera(std::get<1>(GetParam()));
-  const std::string name_ = std::get<0>(GetParam());
-  std::unique_ptr<Renderer> renderer_;
 };
 
 TEST_P(EveryRendererOfSpace, DisplacementIsTheIntegralOfTheMotionFieldAlongThePath) {

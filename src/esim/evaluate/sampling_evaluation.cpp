@@ -44,6 +44,7 @@ Scenario bare(const Scenario& scenario) {
   sensor.contrast_threshold_on = given.contrast_threshold_on;
   sensor.contrast_threshold_off = given.contrast_threshold_off;
   sensor.log_eps = given.log_eps;
+  bare.cameras[0].events = true;
   bare.cameras[0].frame_camera.reset();
   bare.truth.rate_hz = bare.truth.pose_rate_hz = 0;
   return bare;

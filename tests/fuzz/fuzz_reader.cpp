@@ -1,0 +1,50 @@
+// Reads whatever libFuzzer makes up as a file of one format: everything is handed out or a UserError, in bounded memory
+// and time.
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <string>
+
+#include "esim/core/error.h"
+#include "esim/record/checked_source.h"
+#include "esim/record/format.h"
+
+namespace {
+
+/// A file in memory, which has a path.
+class MemoryFile {
+ public:
+  MemoryFile(const std::uint8_t* data, std::size_t size) : descriptor_(memfd_create("fuzz", MFD_CLOEXEC)) {
+    if (descriptor_ < 0 || write(descriptor_, data, size) != static_cast<ssize_t>(size)) std::abort();
+  }
+  ~MemoryFile() { close(descriptor_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+
+ private:
+  int descriptor_;
+};
+
+void read(const std::string& path, const esim::ReadOptions& options) {
+  const esim::Format& format = esim::format_named(ESIM_FUZZED_FORMAT);
+  try {
+    esim::CheckedSource source(format.open(path, options), path, options);
+    while (source.next() != nullptr) {
+    }
+  } catch (const esim::UserError&) {  // what a damaged file is meant to be
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const MemoryFile file(data, size);
+  esim::ReadOptions tolerant;
+  tolerant.recover = [](const std::string&) {};
+  read(file.path(), {});
+  read(file.path(), tolerant);
+  return 0;
+}

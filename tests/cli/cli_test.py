@@ -41,8 +41,20 @@ class Cli(ProgramTest):
 
 
 class Recordings(Cli):
+    def test_formats_beside_the_recordings_own(self):
+        for name in ("xyz", "recording"):
+            self.assert_refused(run("check", SCENES / "poster.yaml", "--set", f"output.formats=[{name}]"),
+                                "output.formats", name)
+        result = self.simulate(*FAST, "--set", "output.formats=[text, dsec]")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        back = self.folder / "back.txt"
+        for name in ("events.dsec.h5", "events.h5"):
+            self.assertEqual(run("convert", self.out / "cam0" / name, back, "--force").returncode, 0)
+            text = (self.out / "cam0" / "events.txt").read_text()
+            self.assertEqual(len(back.read_text().splitlines()), len(text.splitlines()))
+
     def test_a_recording_holds_what_the_manual_says(self):
-        result = self.simulate(*FAST, "--set", "output.events_txt=true")
+        result = self.simulate(*FAST, "--set", "output.formats=[text]")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual({p.name for p in self.out.iterdir()},
                          {"calibration", "cam0", "poses.txt", "report.json", "scenario.yaml", "states.csv"})

@@ -34,7 +34,7 @@ class Stats(ProgramTest):
     def test_a_recording(self):
         out = self.out
         self.assertEqual(run("simulate", SCENES / "poster.yaml", "--out", out, "--set", "camera.width=64", "--set", "camera.height=48",
-                             "--set", "duration_s=0.3", "--set", "output.events_txt=true", "--set", "output.preview=false").returncode, 0)
+                             "--set", "duration_s=0.3", "--set", "output.formats=[text]", "--set", "output.preview=false").returncode, 0)
         report = json.loads((out / "report.json").read_text())
         for path in (out, out / "cam0" / "events.h5", out / "cam0" / "events.txt"):
             result = run("stats", path, "--json")

@@ -69,6 +69,9 @@ RendererFactory build_renderer_factory(const RendererOptions& options, const Sce
 void prepare_truth(const Scenario& scenario, const SceneFile& scene, const RendererFactory& make_renderer,
                    const Notices& notices, World& world);
 
+/// Throws UserError for formats that a scenario asks for and that there are not.
+void check_output(const Scenario& scenario);
+
 /// The files of a recording, to be written into `folder`: those of the rig at its top, those of a camera in a folder of
 /// its name.
 std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem::path& folder);

@@ -1,9 +1,14 @@
+#include <fmt/format.h>
+
+#include <set>
+
 #include "esim/compose/compose.h"
+#include "esim/core/error.h"
+#include "esim/record/adapters.h"
 #include "esim/record/background_sink.h"
 #include "esim/record/fan_out.h"
 #include "esim/record/formats/event_points_ply.h"
 #include "esim/record/formats/events_hdf5.h"
-#include "esim/record/formats/events_text.h"
 #include "esim/record/formats/frames_png.h"
 #include "esim/record/formats/images_png.h"
 #include "esim/record/formats/imu_csv.h"
@@ -27,7 +32,51 @@ Compression compression_of(EventCompression compression) {
   }
 }
 
+const Format& written(const std::string& name) {
+  try {
+    const Format& format = format_named(name);
+    if (format.create && format.name != "recording") return format;
+  } catch (const UserError& error) {
+    throw UserError(fmt::format("output.formats: {}", error.what()));
+  }
+  throw UserError(fmt::format("output.formats: {} is not written beside a recording; remove it", name));
+}
+
+/// Where a format goes: `stem` with its extension, or with its name before that if the extension is taken already.
+std::filesystem::path place_for(const Format& format, const std::filesystem::path& stem,
+                                std::set<std::filesystem::path>& taken) {
+  if (format.folder) return stem.parent_path() / format.name;
+  const std::string extension = format.extensions.empty() ? "" : format.extensions.front();
+  std::filesystem::path path = stem.string() + extension;
+  if (!taken.insert(path).second) path = fmt::format("{}.{}{}", stem.string(), format.name, extension);
+  return path;
+}
+
+/// The formats that a scenario asks for: those of several cameras at the top, others in the cameras' folders.
+void add_formats(const Scenario& scenario, const std::filesystem::path& folder, const WriteOptions& options,
+                 FanOut& sinks) {
+  std::set<std::filesystem::path> taken;
+  for (const CameraOptions& camera : scenario.cameras) taken.insert(folder / camera.name / "events.h5");
+  for (const std::string& name : scenario.output.formats) {
+    const Format& format = written(name);
+    if (format.several_cameras) {
+      sinks.add(format.create(place_for(format, folder / "recording", taken), options));
+      continue;
+    }
+    const bool events_alone = format.holds == std::vector{Content::events};
+    for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
+      if (events_alone && !scenario.cameras[i].events) continue;
+      const auto place = place_for(format, folder / scenario.cameras[i].name / "events", taken);
+      sinks.add(std::make_unique<OneCamera>(format.create(place, options), static_cast<int>(i)));
+    }
+  }
+}
+
 }  // namespace
+
+void check_output(const Scenario& scenario) {
+  for (const std::string& name : scenario.output.formats) written(name);
+}
 
 std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem::path& folder) {
   const TruthOptions& truth = scenario.truth;
@@ -49,7 +98,6 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
     const bool events = scenario.cameras[i].events;
     if (events)
       sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", camera, EventsHdf5Options{unit, compression}));
-    if (events && output.events_txt) sinks->add(std::make_unique<EventsTextWriter>(place / "events.txt", camera));
     if (const auto& frames = scenario.cameras[i].frame_camera) {
       const bool in_colour = scenario.cameras[i].colour != ColourFilters::none && frames->demosaic;
       sinks->add(std::make_unique<FramesPngWriter>(place, camera, in_colour));
@@ -63,6 +111,7 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
       sinks->add(std::make_unique<TruthHdf5Writer>(place / "truth.h5", camera, datasets));
     if (output.preview) sinks->add(std::make_unique<PreviewWriter>(place, camera));
   }
+  add_formats(scenario, folder, {unit, compression}, *sinks);
   return std::make_unique<BackgroundSink>(std::move(sinks));
 }
 

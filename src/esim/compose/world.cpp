@@ -187,6 +187,7 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
   name_what_moves(scenario.renderer, scene, world.info);
 
   const SceneCamera* const followed = followed_camera(scenario, scene);
+  check_output(scenario);
   for (CameraOptions options : scenario.cameras) {
     check_sampling(options, notices);
     if (followed != nullptr && followed->horizontal_fov_rad && !options.horizontal_fov_deg)

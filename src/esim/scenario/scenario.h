@@ -208,7 +208,7 @@ enum class EventCompression { blosc, gzip, none };
 struct OutputOptions {
   EventTimeUnit time_unit = EventTimeUnit::us;
   EventCompression compression = EventCompression::blosc;
-  bool events_txt = false;
+  std::vector<std::string> formats{};
   bool preview = true;
 };
 

@@ -221,7 +221,8 @@ template <class Visitor>
 void describe(Visitor& visit, OutputOptions& o) {
   visit("time_unit", o.time_unit, About{"of the times in events.h5"});
   visit("compression", o.compression, About{"of events.h5 and truth.h5"});
-  visit("events_txt", o.events_txt, About{"write events.txt as well"});
+  visit("formats", o.formats,
+        About{"write these as well: names that esim convert --list prints, such as text, rosbag"});
   visit("preview", o.preview, About{"write preview.mp4 and preview.png"});
 }
 

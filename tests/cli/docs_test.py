@@ -1,8 +1,8 @@
 """The documentation as its readers meet it: its commands run, its scenarios are right, its options exist.
 
 Run as: docs_test.py ESIM_PROGRAM PROJECT_FOLDER, with the standard library of Python alone. Of a page, blocks of `sh` are run one after
-the other in a folder that holds `scenes`, `clip.mp4` and a program `esim`, which simulates a short time only; blocks that begin with
-`# NAME.yaml` or `# NAME.txt` are files of that folder. What is not to be run is a block of `console`.
+the other in a folder that holds `scenes`, `clip.mp4` and a program `esim`, which simulates a short time and few pixels; blocks that begin
+with `# NAME.yaml` or `# NAME.txt` are files of that folder. What is not to be run is a block of `console`.
 """
 
 import os
@@ -16,7 +16,7 @@ import unittest
 from program import ESIM, ProgramTest, run
 
 PROJECT = pathlib.Path(sys.argv[2]).absolute()
-SHORT = "--set duration_s=0.1"
+SMALL = "--set duration_s=0.1 --set camera.width=64 --set camera.height=48"
 WIDTH, HEIGHT, FRAMES, FPS = 64, 48, 31, 30
 
 
@@ -28,6 +28,12 @@ def blocks(page):
 def file_of(block):
     name = re.match(r"# ([\w-]+\.(?:yaml|txt))\b", block)
     return name and name[1]
+
+
+def option_in(token):
+    """The key and the value that `--set key=value` or `path.to.key=value` name, if it is one."""
+    setting = re.fullmatch(r"--set ([a-z_]+)(?:=(.*))?|((?!.*\.(?:csv|txt|mp4|conf)$)[a-z_]+(?:\.[a-z_]+)+)(?:=(.*))?", token)
+    return (setting[1] or setting[3], setting[2] or setting[4]) if setting else (None, None)
 
 
 def video():
@@ -46,7 +52,7 @@ class Pages(ProgramTest):
         (self.folder / "clip.mp4").write_bytes(video())
         program = self.folder / "bin" / "esim"
         program.parent.mkdir()
-        program.write_text(f'#!/bin/sh\ncase "$1" in simulate) exec {shlex.quote(ESIM)} "$@" {SHORT} ;; esac\nexec {shlex.quote(ESIM)} "$@"\n')
+        program.write_text(f'#!/bin/sh\ncase "$1" in simulate) exec {shlex.quote(ESIM)} "$@" {SMALL} ;; esac\nexec {shlex.quote(ESIM)} "$@"\n')
         program.chmod(0o755)
 
     def run_page(self, page):
@@ -82,13 +88,11 @@ class Options(unittest.TestCase):
         found = 0
         for row in rows:
             for token in re.findall(r"`([^`]+)`", row[1]):
-                words = token.split()
-                for word in words:
-                    if word.startswith("--"):
-                        self.assertIn(word, flags, row)
-                        found += 1
-                key, _, value = words[-1 if words[0] == "--set" else 0].partition("=")
-                if re.fullmatch(r"[a-z_]+(\.[a-z_]+)+", key) and not key.startswith(("images.", "timestamps.", "preview.")) or words[0] == "--set":
+                for flag in re.findall(r"--[a-z-]+", token):
+                    self.assertIn(flag, flags, row)
+                    found += 1
+                key, value = option_in(token)
+                if key:
                     self.assertIn(key.split(".")[-1], names, row)
                     self.assertTrue(not value or value in values, row)
                     found += 1

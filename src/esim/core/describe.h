@@ -6,7 +6,7 @@
 namespace esim {
 
 /// What a user may need to know of an option. Every struct of options has a function template
-///     template <class Visitor> void describe(Visitor& visit, Options& options)
+/// `template <class Visitor> void describe(Visitor& visit, Options& options)`
 /// that calls visit("name", options.name, About{...}) for each of its members: the one place where the option's
 /// name, unit, range and help stand. Reading and writing scenarios, checking them and documenting them all come
 /// from it; the default is the member's initial value.

@@ -17,8 +17,8 @@ class StatesCsvWriter final : public Sink {
  public:
   explicit StatesCsvWriter(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  /// Objects whose names are no file names, or the same, get ones that are: other characters than letters, digits, `.`,
-  /// `_` and `-` become `_`, and names already taken an appended number.
+  /// Objects whose names are no file names, or the same, get ones that are: other characters than letters, digits, dot,
+  /// underscore and hyphen become underscores, and names already taken get an appended number.
   void begin(const RecordingInfo& info) override;
   void write(const Record& record) override;
   void end(bool complete) override;

@@ -90,11 +90,7 @@ void McapInput::open_chunk(const Record& record) {
   const auto crc = content.number<std::uint32_t>();
   const ros::ChunkCodec codec = codec_named(ros::as_text(content.counted()));
   const ros::Bytes packed = content.take(content.number<std::uint64_t>());
-  ros::Bytes raw = packed;
-  if (codec != ros::ChunkCodec::none) {
-    ros::decompress(codec, packed, size, unpacked_);
-    raw = unpacked_;
-  }
+  const ros::Bytes raw = ros::decompress(codec, packed, size, unpacked_);
   if (crc != 0 && crc != crc32_z(0, reinterpret_cast<const unsigned char*>(raw.data()), raw.size())) {
     throw ros::Malformed("its checksum is wrong");
   }

@@ -110,20 +110,24 @@ void compress(ChunkCodec codec, std::string_view raw, std::string& packed) {
   }
 }
 
-void decompress(ChunkCodec codec, std::span<const std::byte> packed, std::uint64_t size, std::vector<std::byte>& raw) {
+std::span<const std::byte> decompress(ChunkCodec codec, std::span<const std::byte> packed, std::uint64_t size,
+                                      std::vector<std::byte>& buffer) {
   if (size > kMaxChunkBytes) throw Malformed("it says that it is larger than any chunk");
   switch (codec) {
     case ChunkCodec::none:
       if (packed.size() != size) throw Malformed("its size is not the one that it says");
-      raw.assign(packed.begin(), packed.end());
-      return;
+      return packed;
     case ChunkCodec::lz4:
-      return decompress_lz4(packed, size, raw);
+      decompress_lz4(packed, size, buffer);
+      break;
     case ChunkCodec::zstd:
-      return decompress_zstd(packed, size, raw);
+      decompress_zstd(packed, size, buffer);
+      break;
     case ChunkCodec::bz2:
-      return decompress_bz2(packed, size, raw);
+      decompress_bz2(packed, size, buffer);
+      break;
   }
+  return buffer;
 }
 
 }  // namespace esim::ros

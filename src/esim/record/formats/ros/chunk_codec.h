@@ -18,8 +18,9 @@ inline constexpr std::uint64_t kMaxChunkBytes = 1U << 28;
 /// reads. Not for bz2, which is only read.
 void compress(ChunkCodec codec, std::string_view raw, std::string& packed);
 
-/// Replaces `raw` by what was packed. Throws Malformed unless it is exactly `size` bytes, and kMaxChunkBytes at most.
-/// Takes no more memory than twice what is really there.
-void decompress(ChunkCodec codec, std::span<const std::byte> packed, std::uint64_t size, std::vector<std::byte>& raw);
+/// What was packed: `packed` itself, or what it becomes in `buffer`. Throws Malformed unless it is exactly `size`
+/// bytes, and kMaxChunkBytes at most. Takes no more memory than twice what is really there.
+std::span<const std::byte> decompress(ChunkCodec codec, std::span<const std::byte> packed, std::uint64_t size,
+                                      std::vector<std::byte>& buffer);
 
 }  // namespace esim::ros

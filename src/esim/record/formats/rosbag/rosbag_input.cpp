@@ -86,14 +86,8 @@ bool RosbagInput::next_in_chunk(Record& record) {
 }
 
 void RosbagInput::open_chunk(const Record& record) {
-  const ros::ChunkCodec codec = codec_of(record.header);
   const std::uint64_t size = field<std::uint32_t>(record.header, "size");
-  std::span<const std::byte> raw = record.data;
-  if (codec != ros::ChunkCodec::none) {
-    ros::decompress(codec, record.data, size, unpacked_);
-    raw = unpacked_;
-  }
-  chunk_ = ros::ByteReader(raw);
+  chunk_ = ros::ByteReader(ros::decompress(codec_of(record.header), record.data, size, unpacked_));
   chunk_offset_ = record.offset;
 }
 

@@ -220,7 +220,7 @@ TEST_P(RosFormats, ACutFileGivesWhatIsInItOnlyIfAskedTo) {
 
 TEST_P(RosFormats, TopicsOfOthers) {
   const auto file = output();
-  const std::vector<Event> events{{kNsPerSecond, 1, 2, 1}, {kNsPerSecond + 1, 3, 2, -1}};
+  const std::vector<Event> events{{kNsPerSecond, 1, 2, 1}, {kNsPerSecond + 1, 2, 2, -1}};
   const std::string rgb("\x64\x00\x00\x00\x64\x00\x00\x00\x64", 9);
   for (const std::string side : {"left", "right"}) {
     send_events(*file, "/davis/" + side + "/events", events, 3 + (side == "left"), 3);
@@ -232,7 +232,7 @@ TEST_P(RosFormats, TopicsOfOthers) {
        ros::ImageMessage{{2, ""}, 3, 4, "mono8", 0, 4, ros::as_bytes(grey)});
   send(*file, "/davis/left/image_raw", MessageType::image, 3,
        ros::ImageMessage{{3, ""}, 3, 4, "mono8", 0, 4, ros::as_bytes(grey)});
-  send(*file, "/vicon/pose", MessageType::pose, 4, ros::PoseMessage{{4, "w"}, {{2, 0, 0, 0}, {1, 2, 3}}});
+  send(*file, "/vicon/pose", MessageType::pose, 4, ros::PoseMessage{{4, "w"}, {{1.25, 0, 0, 0}, {1, 2, 3}}});
   send(*file, "/davis/left/imu", MessageType::imu, 5, ros::ImuMessage{.header = {5, ""}});
   const std::string millimetres("\xe8\x03\x00\x00", 4);
   send(*file, "/depth_camera/depth/image", MessageType::image, 6,
@@ -376,7 +376,9 @@ TEST(RosMessages, ColoursBecomeLuma) {
 }
 
 TEST(RosMessages, DistortionsThatAreNotKnownLeaveNoIntrinsics) {
-  ros::CameraInfoMessage message = ros::to_message(Camera{.width = 4, .height = 3, .fx = 2, .fy = 2, .cx = 1, .cy = 1});
+  Camera camera;
+  camera.width = 4, camera.height = 3, camera.fx = camera.fy = 2;
+  ros::CameraInfoMessage message = ros::to_message(camera);
   EXPECT_EQ(ros::to_camera(message).fx, 2);
   message.distortion_model = "rational_polynomial", message.d = {0, 0, 0, 0, 0, 0.1, 0, 0};
   EXPECT_EQ(ros::to_camera(message).fx, 0);

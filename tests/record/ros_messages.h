@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "esim/record/format.h"
-#include "esim/record/formats/ros/message_codec.h"
+#include "esim/record/formats/ros/messages.h"
 #include "record/recordings.h"
 
 namespace esim::test {

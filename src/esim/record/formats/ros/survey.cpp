@@ -12,6 +12,7 @@ namespace esim::ros {
 namespace {
 
 constexpr std::uint64_t kMaxBytes = 1U << 26;
+constexpr std::uint32_t kMaxExtent = 65536;  // px
 
 /// What the first message of a channel tells.
 struct Facts {
@@ -72,6 +73,9 @@ void Surveyor::look_at_first(const Channel& channel, Bytes payload, Facts& facts
   } else if (channel.type == MessageType::image) {
     const auto message = decode<ImageMessage>(channel, payload);
     facts = {message.header.stamp, message.width, message.height};
+  } else if (channel.type == MessageType::flow) {
+    const auto message = decode<FlowMessage>(channel, payload);
+    facts = {message.header.stamp, message.width, message.height};
   } else if (channel.type == MessageType::camera_info) {
     const auto message = decode<CameraInfoMessage>(channel, payload);
     facts = {message.header.stamp, message.width, message.height, to_camera(message)};
@@ -110,9 +114,9 @@ CameraInfo Surveyor::camera(const std::string& name, int index, const std::vecto
     return nullptr;
   };
   if (const Facts* facts = facts_of(Role::camera_info); facts != nullptr && facts->camera) info.model = *facts->camera;
-  for (const Role role : {Role::events, Role::camera_info, Role::frame, Role::irradiance, Role::depth}) {
+  for (const Role role : {Role::events, Role::camera_info, Role::frame, Role::irradiance, Role::depth, Role::flow}) {
     const Facts* facts = facts_of(role);
-    if (facts == nullptr || facts->width == 0 || facts->width > 65536 || facts->height > 65536) continue;
+    if (facts == nullptr || facts->width == 0 || facts->width > kMaxExtent || facts->height > kMaxExtent) continue;
     info.model.width = static_cast<int>(facts->width), info.model.height = static_cast<int>(facts->height);
     break;
   }

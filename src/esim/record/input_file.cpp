@@ -111,6 +111,12 @@ void InputFile::seek(std::uint64_t offset) {
   begin_ = end_ = 0;
 }
 
+void InputFile::skip(std::uint64_t count) {
+  const std::size_t there = end_ - begin_;
+  if (count > there) return seek(offset_ + count);
+  begin_ += static_cast<std::size_t>(count), offset_ += count;
+}
+
 void InputFile::fail(std::uint64_t offset, std::string_view reason) const {
   throw UserError(fmt::format("cannot read {}: at byte {}: {}", path_.string(), offset, reason));
 }

@@ -35,6 +35,9 @@ class InputFile {
   /// Continues at another place; not after the file's end.
   void seek(std::uint64_t offset);
 
+  /// Passes over the next bytes.
+  void skip(std::uint64_t count);
+
   /// The share of the file before the next byte.
   double progress() const { return size_ > 0 ? static_cast<double>(offset_) / static_cast<double>(size_) : 1.0; }
 

@@ -7,6 +7,8 @@
 #include "esim/record/format.h"
 #include "esim/record/formats/events_hdf5.h"
 #include "esim/record/formats/events_text.h"
+#include "esim/record/formats/mcap/mcap_format.h"
+#include "esim/record/formats/rosbag/rosbag_format.h"
 #include "esim/record/input_file.h"
 
 namespace esim {
@@ -33,6 +35,8 @@ std::string extension_of(const fs::path& path) {
 const std::vector<Format>& formats() {
   static const std::vector<Format> all = {
       dsec_format(),
+      rosbag_format(),
+      mcap_format(),
       events_text_format(),
   };
   return all;

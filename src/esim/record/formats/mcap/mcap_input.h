@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "esim/record/formats/mcap/mcap_records.h"
+#include "esim/record/formats/ros/message_file.h"
+#include "esim/record/input_file.h"
+
+namespace esim::mcap {
+
+/// Reads MCAP files from front to back, chunk by chunk: the summary only tells beforehand which channels there are.
+/// Messages of ROS 1 and ROS 2 are read, those of other encodings are passed over.
+class McapInput final : public ros::MessageInput {
+ public:
+  explicit McapInput(std::filesystem::path path);
+
+  const std::vector<ros::Channel>& channels() const override { return channels_; }
+  std::optional<TimeNs> last_time() const override { return last_time_; }
+  bool next(ros::Message& message) override;
+  double progress() const override { return file_.progress(); }
+  [[noreturn]] void fail(std::uint64_t offset, std::string_view reason) const override { file_.fail(offset, reason); }
+
+ private:
+  struct Record {
+    std::uint64_t offset = 0;
+    Op op{};
+    ros::Bytes content{};  // borrowed; empty of records in the file that are not read
+  };
+
+  void read_summary();
+  Record next_in_file();
+  Record next_in_chunk();
+  void open_chunk(const Record& record);
+  void add_schema(ros::Bytes content);
+  void add_channel(ros::Bytes content);
+
+  InputFile file_;
+  std::optional<TimeNs> last_time_;
+  bool ended_ = false;
+  std::map<std::uint16_t, std::string> schemas_;  // their names
+  std::vector<ros::Channel> channels_;
+  std::map<std::uint16_t, std::size_t> channel_of_id_;
+  std::vector<std::byte> unpacked_;
+  ros::ByteReader chunk_{{}};
+  std::uint64_t chunk_offset_ = 0;
+};
+
+}  // namespace esim::mcap

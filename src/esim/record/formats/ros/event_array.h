@@ -1,0 +1,27 @@
+#pragma once
+
+#include <vector>
+
+#include "esim/events/event.h"
+#include "esim/record/formats/ros/messages.h"
+
+namespace esim::ros {
+
+/// dvs_msgs/EventArray, but for its events.
+struct EventArrayHead {
+  Header header{};
+  std::uint32_t height = 0, width = 0;  // px
+
+  template <typename Self, typename Archive>
+  static void fields(Self& self, Archive& archive) {
+    archive(self.header, self.height, self.width);
+  }
+};
+
+/// The fields after the head.
+void write_events(MessageWriter& writer, EventSpan events);
+
+/// Replaces `events` by those after the head.
+void read_events(MessageReader& reader, std::vector<Event>& events);
+
+}  // namespace esim::ros

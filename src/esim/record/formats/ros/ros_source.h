@@ -1,0 +1,15 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "esim/record/format.h"
+#include "esim/record/formats/ros/message_file.h"
+
+namespace esim::ros {
+
+/// A recording from a file of ROS messages, on whatever topics they are (topics.h). `open` opens the file anew.
+std::unique_ptr<Source> make_source(const std::function<std::unique_ptr<MessageInput>()>& open,
+                                    const ReadOptions& options);
+
+}  // namespace esim::ros

@@ -7,6 +7,7 @@
 #include "esim/record/format.h"
 #include "esim/record/formats/events_hdf5.h"
 #include "esim/record/formats/events_text.h"
+#include "esim/record/formats/recording.h"
 #include "esim/record/input_file.h"
 
 namespace esim {
@@ -34,6 +35,7 @@ const std::vector<Format>& formats() {
   static const std::vector<Format> all = {
       dsec_format(),
       events_text_format(),
+      recording_format(),
   };
   return all;
 }

@@ -7,6 +7,7 @@
 #include "esim/record/format.h"
 #include "esim/record/formats/events_hdf5.h"
 #include "esim/record/formats/events_text.h"
+#include "esim/record/formats/image_sequences.h"
 #include "esim/record/formats/recording.h"
 #include "esim/record/input_file.h"
 
@@ -33,9 +34,8 @@ std::string extension_of(const fs::path& path) {
 // In order: of those that recognise a file the first reads it, of those with its extension the first writes it.
 const std::vector<Format>& formats() {
   static const std::vector<Format> all = {
-      dsec_format(),
-      events_text_format(),
-      recording_format(),
+      dsec_format(),  events_text_format(), recording_format(), flo_format(),
+      kitti_format(), dsec_flow_format(),   exr_format(),       npy_truth_format(),
   };
   return all;
 }

@@ -26,8 +26,10 @@ class PosesStream final : public RecordStream {
 
   const Record* next(TimeNs) override {
     PoseRecord pose{body_.t(), motion(body_)};
-    if (body_.columns() >= kStateColumns + 6)
+    if (body_.columns() > kStateColumns) {
+      if (body_.columns() < kStateColumns + 6) body_.fail("the line ends within the biases");
       pose.imu_bias = InertialSignals{body_.vector(kStateColumns), body_.vector(kStateColumns + 3)};
+    }
     for (CsvReader& object : objects_) {
       if (!object.next() || object.t() != pose.t)
         object.fail(fmt::format("expected the motion at {} ns, as in states.csv", pose.t));

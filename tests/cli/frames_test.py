@@ -63,7 +63,7 @@ class Frames(ProgramTest):
     def test_a_recording_holds_what_the_manual_says(self):
         report = self.simulate("--set", "frame_camera={rate_hz: 50, exposure_s: 0.004, gain: 1.5}")
         listed = self.frames()
-        self.assertEqual(list(listed[0]), ["index", "t_ns", "exposure_ns", "gain"])
+        self.assertEqual(list(listed[0]), ["index", "t_ns", "exposure_ns", "gain", "exposure_start_ns", "bits"])
         times = [int(frame["t_ns"]) for frame in listed]
         self.assertEqual([b - a for a, b in zip(times, times[1:])], [20_000_000] * 8)
         self.assertEqual({frame["exposure_ns"] for frame in listed}, {"4000000"})

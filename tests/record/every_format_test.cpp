@@ -46,6 +46,17 @@ class EveryFormat : public testing::TestWithParam<std::string> {
     return path;
   }
 
+  /// The file that holds the events: that itself, or the largest in a folder.
+  fs::path file_of(const fs::path& path) const {
+    if (!format_.folder) return path;
+    fs::path largest;
+    for (const auto& entry : fs::recursive_directory_iterator(path)) {
+      if (entry.is_regular_file() && (largest.empty() || entry.file_size() > fs::file_size(largest)))
+        largest = entry.path();
+    }
+    return largest;
+  }
+
   /// All events of a file, up to where it is damaged; what is wrong with it, if anything.
   static std::vector<Event> read(const fs::path& path, std::string* problem = nullptr) {
     ReadOptions options;
@@ -61,10 +72,9 @@ class EveryFormat : public testing::TestWithParam<std::string> {
     return all;
   }
 
-  /// Reads a damaged file, with and without recovery: it is a UserError that names the file, or it is not noticed.
-  void expect_no_harm(const std::string& bytes, const std::vector<Event>& events, bool is_prefix) const {
-    const fs::path path =
-        base_.write("damaged" + (format_.extensions.empty() ? "" : format_.extensions.front()), bytes);
+  /// Reads what has been damaged, with and without recovery: it is a UserError that names the file, or it is not
+  /// noticed.
+  static void expect_no_harm(const fs::path& path, const std::vector<Event>& events, bool is_prefix) {
     try {
       read(path);
     } catch (const UserError& error) {
@@ -75,7 +85,7 @@ class EveryFormat : public testing::TestWithParam<std::string> {
       const std::vector<Event> found = read(path, &problem);
       if (!is_prefix) return;
       ASSERT_LE(found.size(), events.size());
-      EXPECT_TRUE(std::equal(found.begin(), found.end(), events.begin())) << bytes.size() << " bytes";
+      EXPECT_TRUE(std::equal(found.begin(), found.end(), events.begin())) << found.size() << " events";
     } catch (const UserError& error) {
       EXPECT_TRUE(test::contains(error.what(), path.filename().string())) << error.what();
     }
@@ -127,19 +137,25 @@ TEST_P(EveryFormat, PausesOfSecondsAndMinutes) {
 
 TEST_P(EveryFormat, CutAnywhereItGivesWhatComesBefore) {
   const std::vector<Event> events = random_events(300);
-  const std::string bytes = test::content(write(events));
+  const fs::path path = write(events), file = file_of(path);
+  const std::string bytes = test::content(file);
   const std::size_t step = std::max<std::size_t>(1, bytes.size() / 300);
-  for (std::size_t size = 0; size < bytes.size(); size += step) expect_no_harm(bytes.substr(0, size), events, true);
+  for (std::size_t size = 0; size < bytes.size(); size += step) {
+    std::ofstream(file, std::ios::binary) << bytes.substr(0, size);
+    expect_no_harm(path, events, true);
+  }
 }
 
 TEST_P(EveryFormat, DamagedAnywhereItDoesNoHarm) {
   const std::vector<Event> events = random_events(300);
-  const std::string bytes = test::content(write(events));
+  const fs::path path = write(events), file = file_of(path);
+  const std::string bytes = test::content(file);
   std::mt19937_64 random(7);
   for (int i = 0; i < 100; ++i) {
     std::string damaged = bytes;
     for (std::uint64_t k = random() % 4 + 1; k > 0; --k) damaged[random() % bytes.size()] = static_cast<char>(random());
-    expect_no_harm(damaged, events, false);
+    std::ofstream(file, std::ios::binary) << damaged;
+    expect_no_harm(path, events, false);
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "esim/core/error.h"
 #include "esim/record/formats/events_hdf5.h"
+#include "esim/record/formats/truth_hdf5.h"
 #include "record/recordings.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
@@ -26,10 +27,22 @@ void read_everything(const std::filesystem::path& path) {
   reader.read_window(reader.t_offset() + 3'000'000, reader.t_offset() + 9'000'000);
 }
 
+void read_truth(const std::filesystem::path& path) {
+  const TruthHdf5Reader reader(path);
+  TruthHdf5Reader::Frame frame;
+  TruthHdf5Reader::Displacement displacement;
+  for (std::uint64_t i = 0; i < reader.size(); ++i) {
+    reader.t(i);
+    reader.read(i, frame);
+  }
+  for (std::uint64_t i = 0; i < reader.displacements(); ++i) reader.read(i, displacement);
+}
+
 // Either all is well or the file is at fault, by name.
-void expect_no_worse_than_user_error(const std::filesystem::path& path, const std::string& what) {
+void expect_no_worse_than_user_error(const std::filesystem::path& path, const std::string& what,
+                                     void (*read)(const std::filesystem::path&) = read_everything) {
   try {
-    read_everything(path);
+    read(path);
   } catch (const UserError& error) {
     EXPECT_TRUE(contains(error.what(), path.string())) << what;
   }
@@ -42,12 +55,36 @@ std::string valid_file(const TemporaryDirectory& directory, Compression compress
   return test::content(path);
 }
 
+std::string valid_truth(const TemporaryDirectory& directory, Compression compression) {
+  const auto path = directory.path() / "valid.h5";
+  TruthHdf5Writer writer(path, 0, {true, true, compression, true, true});
+  RecordingInfo info = test::recording_info(9, 7, 0, kNsPerSecond);
+  info.objects = {"a car"};
+  writer.begin(info);
+  const test::TruthImages images(9, 7, 0);
+  const Image<std::uint16_t> object(9, 7);
+  const Image<std::uint8_t> visible(9, 7);
+  const SE3 pose;
+  for (TimeNs t = 0; t < 3; ++t) {
+    writer.write(TruthRecord{0, t, pose, images.irradiance, images.depth, images.flow_x, images.flow_y, &object,
+                             std::span(&pose, 1)});
+    if (t > 0) writer.write(DisplacementRecord{0, t - 1, t, images.flow_x, images.flow_y, visible});
+  }
+  writer.end(true);
+  return test::content(path);
+}
+
 TEST(HostileHdf5, CutFiles) {
   const TemporaryDirectory directory;
   const std::string bytes = valid_file(directory, Compression::blosc);
   for (std::size_t length = 0; length < bytes.size(); length += std::max<std::size_t>(1, bytes.size() / 150)) {
     const auto path = directory.write("cut.h5", bytes.substr(0, length));
     EXPECT_NE(message_of<UserError>([&] { read_everything(path); }), "nothing was thrown") << length;
+  }
+  const std::string truth = valid_truth(directory, Compression::blosc);
+  for (std::size_t length = 0; length < truth.size(); length += std::max<std::size_t>(1, truth.size() / 150)) {
+    const auto path = directory.write("cut.h5", truth.substr(0, length));
+    EXPECT_NE(message_of<UserError>([&] { read_truth(path); }), "nothing was thrown") << length;
   }
 }
 
@@ -64,6 +101,14 @@ TEST(HostileHdf5, FlippedBytes) {
         const std::size_t at = random() % damaged.size();
         damaged[at] = static_cast<char>(random());
         expect_no_worse_than_user_error(directory.write("flipped.h5", damaged), "byte " + std::to_string(at));
+      }
+      const std::string truth = valid_truth(directory, compression);
+      for (int i = 0; i < 300; ++i) {
+        std::string damaged = truth;
+        const std::size_t at = random() % damaged.size();
+        damaged[at] = static_cast<char>(random());
+        expect_no_worse_than_user_error(directory.write("flipped.h5", damaged), "byte " + std::to_string(at),
+                                        read_truth);
       }
     }
     std::fflush(stdout);

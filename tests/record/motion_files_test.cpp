@@ -3,8 +3,8 @@
 #include <sstream>
 
 #include "esim/geometry/so3.h"
+#include "esim/record/formats/calibration_files.h"
 #include "esim/record/formats/imu_csv.h"
-#include "esim/record/formats/kalibr.h"
 #include "esim/record/formats/states_csv.h"
 #include "record/recordings.h"
 #include "support/temporary_directory.h"

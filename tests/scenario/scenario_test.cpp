@@ -3,7 +3,7 @@
 #include <fstream>
 
 #include "esim/core/error.h"
-#include "esim/scenario/calibration.h"
+#include "esim/geometry/calibration.h"
 #include "esim/scenario/read.h"
 #include "esim/scenario/suggest.h"
 #include "support/errors.h"
@@ -334,12 +334,12 @@ TEST(Calibration, ReadsKalibrsImu) {
   std::istringstream lines(kImuYaml);
   for (std::string line; std::getline(lines, line);) nested += "  " + line + "\n";
   for (const std::string& text : {std::string(kImuYaml), nested}) {
-    const ImuOptions imu = read_imu_calibration(folder.write("imu.yaml", text));
+    const CalibratedImu imu = read_imu_calibration(folder.write("imu.yaml", text));
     EXPECT_EQ(imu.rate_hz, 200);
-    EXPECT_EQ(imu.gyroscope.noise_density, 0.0004);
-    EXPECT_EQ(imu.gyroscope.random_walk, 4e-6);
-    EXPECT_EQ(imu.accelerometer.noise_density, 0.006);
-    EXPECT_EQ(imu.accelerometer.random_walk, 0.0002);
+    EXPECT_EQ(imu.gyroscope_noise_density, 0.0004);
+    EXPECT_EQ(imu.gyroscope_random_walk, 4e-6);
+    EXPECT_EQ(imu.accelerometer_noise_density, 0.006);
+    EXPECT_EQ(imu.accelerometer_random_walk, 0.0002);
   }
   const auto message = [&](const std::string& text) {
     return test::message_of<UserError>([&] { read_imu_calibration(folder.write("imu.yaml", text)); });
@@ -380,10 +380,10 @@ TEST_F(ScenarioFile, DescribesAnImuWhereThereIsOne) {
   EXPECT_EQ(read(write_scenario(scenario)).imu->gyroscope.random_walk, 4e-6);
 
   EXPECT_TRUE(contains(error(yaml, {"imu.rate_hz=100"}), "imu.rate_hz: is given by the calibration file as well"));
-  EXPECT_TRUE(contains(error(yaml, {"imu.gyroscope.noise_density=0"}), "imu.gyroscope.noise_density: is given"));
+  EXPECT_TRUE(contains(error(yaml, {"imu.gyroscope_noise_density=0"}), "imu.gyroscope_noise_density: is given"));
   const auto imu = [&](const std::string& text) { return error(std::string(kMinimal) + "imu: {" + text + "}\n"); };
   EXPECT_TRUE(contains(imu("rate_hz: 1.1e9"), "imu.rate_hz: 1.1e9 is out of range"));
-  EXPECT_TRUE(contains(imu("accelerometer: {random_walk: -1}"), "imu.accelerometer.random_walk: -1 is out of range"));
+  EXPECT_TRUE(contains(imu("accelerometer: {random_walk: -1}"), "imu.accelerometer_random_walk: -1 is out of range"));
   EXPECT_TRUE(contains(imu("gyroscope: {misalignment: [1]}"), "must be a list of 6 numbers"));
   EXPECT_TRUE(contains(imu("acelerometer: {}"), "did you mean accelerometer?"));
 }

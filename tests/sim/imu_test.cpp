@@ -4,10 +4,9 @@
 
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
+#include "esim/geometry/calibration.h"
 #include "esim/motion/imu_kinematics.h"
-#include "esim/record/formats/kalibr.h"
-#include "esim/record/formats/rig_yaml.h"
-#include "esim/scenario/calibration.h"
+#include "esim/record/formats/calibration_files.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
 
@@ -166,12 +165,12 @@ TEST_F(ImuSimulation, RecordingsHoldCalibrationsThatReadBackToTheSameRig) {
     EXPECT_EQ(cameras[i].model.distortion.index(), camera.model.distortion.index());
   }
   EXPECT_EQ(std::get<RadialTangential>(cameras[1].model.distortion).p2, 2e-3);
-  const ImuOptions imu = read_imu_calibration(folder_.path() / "out/calibration/imu.yaml");
+  const CalibratedImu imu = read_imu_calibration(folder_.path() / "out/calibration/imu.yaml");
   EXPECT_EQ(imu.rate_hz, scenario_.imu->rate_hz);
-  EXPECT_EQ(imu.gyroscope.noise_density, scenario_.imu->gyroscope.noise_density);
-  EXPECT_EQ(imu.gyroscope.random_walk, scenario_.imu->gyroscope.random_walk);
-  EXPECT_EQ(imu.accelerometer.noise_density, scenario_.imu->accelerometer.noise_density);
-  EXPECT_EQ(imu.accelerometer.random_walk, scenario_.imu->accelerometer.random_walk);
+  EXPECT_EQ(imu.gyroscope_noise_density, scenario_.imu->gyroscope.noise_density);
+  EXPECT_EQ(imu.gyroscope_random_walk, scenario_.imu->gyroscope.random_walk);
+  EXPECT_EQ(imu.accelerometer_noise_density, scenario_.imu->accelerometer.noise_density);
+  EXPECT_EQ(imu.accelerometer_random_walk, scenario_.imu->accelerometer.random_walk);
   EXPECT_TRUE(std::filesystem::exists(folder_.path() / "out/imu.csv"));
   EXPECT_TRUE(std::filesystem::exists(folder_.path() / "out/states.csv"));
 }

@@ -7,15 +7,16 @@
 #include "esim/record/adapters.h"
 #include "esim/record/background_sink.h"
 #include "esim/record/fan_out.h"
+#include "esim/record/formats/calibration_files.h"
 #include "esim/record/formats/event_points_ply.h"
 #include "esim/record/formats/events_hdf5.h"
 #include "esim/record/formats/frames_png.h"
 #include "esim/record/formats/images_png.h"
 #include "esim/record/formats/imu_csv.h"
-#include "esim/record/formats/kalibr.h"
 #include "esim/record/formats/poses_tum.h"
 #include "esim/record/formats/states_csv.h"
 #include "esim/record/formats/truth_hdf5.h"
+#include "esim/record/output_file.h"
 #include "esim/record/preview/preview_writer.h"
 
 namespace esim {
@@ -94,7 +95,7 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
     const int camera = static_cast<int>(i);
     const auto place = folder / scenario.cameras[i].name;
-    std::filesystem::create_directories(place);
+    create_folder(place);
     const bool events = scenario.cameras[i].events;
     if (events)
       sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", camera, EventsHdf5Options{unit, compression}));
@@ -117,7 +118,7 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
 
 std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& folder) {
   const auto place = folder / kConversionCamera;
-  std::filesystem::create_directories(place);
+  create_folder(place);
   auto sinks = std::make_unique<FanOut>();
   sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", 0));
   sinks->add(std::make_unique<PreviewWriter>(place, 0));

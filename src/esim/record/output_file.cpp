@@ -79,6 +79,12 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
   if (error) throw_cannot_write(path, error.message());
 }
 
+void create_folder(const std::filesystem::path& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error) throw OutputError("cannot create the folder " + path.string() + ": " + error.message());
+}
+
 void sync_directory(const std::filesystem::path& directory) {
   const int descriptor = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return;

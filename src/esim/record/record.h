@@ -52,7 +52,8 @@ struct EventsRecord {
   EventSpan events;
 };
 
-/// Ground truth of one camera at one instant. The images are borrowed for the duration of the call.
+/// Ground truth of one camera at one instant. The images are borrowed for the duration of the call; those that a
+/// recording lacks are empty, the same ones in all of its frames (the irradiance may come and go).
 struct TruthRecord {
   int camera = 0;
   TimeNs t = 0;

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <set>
 
-#include "esim/scenario/calibration.h"
+#include "esim/geometry/calibration.h"
 #include "esim/scenario/sprite_scene.h"
 #include "esim/scenario/yaml_reader.h"
 
@@ -116,13 +116,13 @@ void read_imu(RigImuOptions& imu, const YAML::Node& node, const YamlSource& sour
     if (!node[sensor].IsDefined()) continue;
     for (const std::string key : {"noise_density", "random_walk"}) refuse(node[sensor][key], sensor + "." + key);
   }
-  const ImuOptions calibrated = read_imu_calibration(imu.calibration);
+  const CalibratedImu calibrated = read_imu_calibration(imu.calibration);
   imu.calibration.clear();
   imu.rate_hz = calibrated.rate_hz;
-  imu.gyroscope.noise_density = calibrated.gyroscope.noise_density;
-  imu.gyroscope.random_walk = calibrated.gyroscope.random_walk;
-  imu.accelerometer.noise_density = calibrated.accelerometer.noise_density;
-  imu.accelerometer.random_walk = calibrated.accelerometer.random_walk;
+  imu.gyroscope.noise_density = calibrated.gyroscope_noise_density;
+  imu.gyroscope.random_walk = calibrated.gyroscope_random_walk;
+  imu.accelerometer.noise_density = calibrated.accelerometer_noise_density;
+  imu.accelerometer.random_walk = calibrated.accelerometer_random_walk;
 }
 
 /// Gives every camera a name of its own, fit for a folder.

@@ -2,8 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
+#include <cmath>
 #include <iterator>
 #include <utility>
+
+#include "esim/record/number_text.h"
 
 namespace esim {
 
@@ -26,6 +31,44 @@ void CsvFile::append(const Eigen::Vector4d& value) {
 void CsvFile::end_line() {
   file_.buffer().push_back('\n');
   file_.flush_if_full();
+}
+
+bool CsvReader::next() {
+  constexpr std::size_t kMaxLineBytes = 1 << 12;
+  while (file_.offset() < file_.size()) {
+    line_start_ = file_.offset();
+    std::string_view line = file_.read_line(kMaxLineBytes, "a line");
+    if (line.empty() || (line[0] != '-' && std::isdigit(static_cast<unsigned char>(line[0])) == 0)) continue;
+    fields_.clear();
+    while (!line.empty()) {
+      std::string_view field = line.substr(0, line.find(','));
+      line.remove_prefix(std::min(field.size() + 1, line.size()));
+      fields_.push_back(take_word(field));
+    }
+    if (fields_.size() < columns_) fail(fmt::format("the line has {} numbers, and needs {}", fields_.size(), columns_));
+    const TimeNs t = integer(time_column_);
+    if (const auto problem = problem_of_time(t_, t); !problem.empty()) fail(problem);
+    t_ = t;
+    return true;
+  }
+  return false;
+}
+
+std::int64_t CsvReader::integer(std::size_t column) const {
+  std::int64_t value = 0;
+  if (!parse_number(fields_[column], value)) fail(fmt::format("\"{}\" is not a whole number", fields_[column]));
+  return value;
+}
+
+double CsvReader::value(std::size_t column) const {
+  double value = 0;
+  if (!parse_number(fields_[column], value) || !std::isfinite(value))
+    fail(fmt::format("\"{}\" is not a finite number", fields_[column]));
+  return value;
+}
+
+Eigen::Vector3d CsvReader::vector(std::size_t first_column) const {
+  return {value(first_column), value(first_column + 1), value(first_column + 2)};
 }
 
 }  // namespace esim

@@ -1,10 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string_view>
+#include <vector>
 
 #include "esim/core/time.h"
+#include "esim/record/input_file.h"
 #include "esim/record/output_file.h"
 
 namespace esim {
@@ -23,6 +27,33 @@ class CsvFile {
 
  private:
   OutputFile file_;
+};
+
+/// Reads such files, in order of time: every line that does not begin with a digit or a minus is a header and passed
+/// over. Failures are UserErrors with the file and the byte at which the line begins.
+class CsvReader {
+ public:
+  /// Of at least so many columns, the time among them.
+  CsvReader(const std::filesystem::path& path, std::size_t columns, std::size_t time_column = 0)
+      : file_(path), columns_(columns), time_column_(time_column) {}
+
+  /// Goes to the next line; false where there is none left.
+  bool next();
+
+  TimeNs t() const { return *t_; }
+  std::size_t columns() const { return fields_.size(); }  ///< that this line has
+  std::int64_t integer(std::size_t column) const;
+  double value(std::size_t column) const;  ///< finite
+  Eigen::Vector3d vector(std::size_t first_column) const;
+
+  [[noreturn]] void fail(std::string_view reason) const { file_.fail(line_start_, reason); }
+
+ private:
+  InputFile file_;
+  std::size_t columns_, time_column_;
+  std::uint64_t line_start_ = 0;
+  std::optional<TimeNs> t_;
+  std::vector<std::string_view> fields_;  // of the line, which the file holds
 };
 
 }  // namespace esim

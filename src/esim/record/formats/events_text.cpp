@@ -4,7 +4,6 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <limits>
 #include <utility>
 
 #include "esim/core/error.h"
@@ -20,42 +19,6 @@ constexpr std::size_t kMaxLineBytes = 1 << 12;
 template <typename Integer>
 char* put(char* out, Integer value) {
   return std::to_chars(out, out + 24, value).ptr;
-}
-
-bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
-std::string_view next_word(std::string_view& line) {
-  std::size_t begin = 0;
-  while (begin < line.size() && is_blank(line[begin])) ++begin;
-  std::size_t end = begin;
-  while (end < line.size() && !is_blank(line[end])) ++end;
-  const std::string_view word = line.substr(begin, end - begin);
-  line.remove_prefix(end);
-  return word;
-}
-
-template <typename Integer>
-bool parse_integer(std::string_view word, Integer& value) {
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  return error == std::errc() && end == word.data() + word.size();
-}
-
-// Exact: no detour through floating point.
-bool parse_seconds(std::string_view word, TimeNs& t) {
-  const bool negative = !word.empty() && word[0] == '-';
-  if (negative) word.remove_prefix(1);
-  const std::size_t point = std::min(word.find('.'), word.size());
-  std::int64_t seconds = 0;
-  if (point == 0 || !is_digit(word[0]) || !parse_integer(word.substr(0, point), seconds)) return false;
-  const std::string_view decimals = word.substr(std::min(point + 1, word.size()));
-  if (!std::all_of(decimals.begin(), decimals.end(), is_digit)) return false;
-  std::int64_t ns = 0;
-  for (std::size_t i = 0; i < 9; ++i) ns = 10 * ns + (i < decimals.size() ? decimals[i] - '0' : 0);
-  if (seconds > std::numeric_limits<TimeNs>::max() / kNsPerSecond - 1) return false;
-  t = seconds * kNsPerSecond + ns;
-  if (negative) t = -t;
-  return true;
 }
 
 class LinesReader final : public EventsReader {
@@ -152,12 +115,12 @@ bool EventsTextReader::next_line(std::string_view& line) {
 Event EventsTextReader::parse(std::string_view line) const {
   Event event;
   int polarity = 0;
-  const std::string_view t = next_word(line), x = next_word(line), y = next_word(line), p = next_word(line);
-  if (p.empty() || !next_word(line).empty()) fail("expected four numbers: t x y p");
+  const std::string_view t = take_word(line), x = take_word(line), y = take_word(line), p = take_word(line);
+  if (p.empty() || !take_word(line).empty()) fail("expected four numbers: t x y p");
   if (!parse_seconds(t, event.t)) fail("\"" + std::string(t) + "\" is not a time in seconds");
-  if (!parse_integer(x, event.x)) fail("\"" + std::string(x) + "\" is not a column");
-  if (!parse_integer(y, event.y)) fail("\"" + std::string(y) + "\" is not a row");
-  if (!parse_integer(p, polarity) || polarity < -1 || polarity > 1) {
+  if (!parse_number(x, event.x)) fail("\"" + std::string(x) + "\" is not a column");
+  if (!parse_number(y, event.y)) fail("\"" + std::string(y) + "\" is not a row");
+  if (!parse_number(p, polarity) || polarity < -1 || polarity > 1) {
     fail("\"" + std::string(p) + "\" is not a polarity: 1 (ON) or 0 (OFF)");
   }
   event.polarity = polarity > 0 ? 1 : -1;
@@ -169,7 +132,7 @@ bool EventsTextReader::read(std::vector<Event>& events, std::size_t count) {
   std::string_view line;
   while (events.size() < count && next_line(line)) {
     std::string_view rest = line;
-    const std::string_view first = next_word(rest);
+    const std::string_view first = take_word(rest);
     if (first.empty() || first[0] == '#') continue;
     const Event event = parse(line);
     if (last_t_ && event.t < *last_t_) {

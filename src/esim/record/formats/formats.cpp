@@ -9,6 +9,8 @@
 #include "esim/record/formats/events_text.h"
 #include "esim/record/formats/mcap/mcap_format.h"
 #include "esim/record/formats/rosbag/rosbag_format.h"
+#include "esim/record/formats/image_sequences.h"
+#include "esim/record/formats/recording.h"
 #include "esim/record/input_file.h"
 
 namespace esim {
@@ -38,6 +40,12 @@ const std::vector<Format>& formats() {
       rosbag_format(),
       mcap_format(),
       events_text_format(),
+      recording_format(),
+      flo_format(),
+      kitti_format(),
+      dsec_flow_format(),
+      exr_format(),
+      npy_truth_format(),
   };
   return all;
 }

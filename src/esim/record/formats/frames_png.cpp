@@ -10,11 +10,9 @@
 namespace esim {
 
 void FramesPngWriter::begin(const RecordingInfo&) {
-  std::error_code error;
-  std::filesystem::create_directories(folder_ / "frames", error);
-  if (error) throw_cannot_write(folder_ / "frames", error.message());
+  create_folder(folder_ / "frames");
   list_.emplace(folder_ / "frames.csv");
-  list_->append("index,t_ns,exposure_ns,gain\n");
+  list_->append("index,t_ns,exposure_ns,gain,exposure_start_ns,bits\n");
 }
 
 void FramesPngWriter::write(const Record& record) {
@@ -33,8 +31,8 @@ void FramesPngWriter::write(const Record& record) {
                    [](std::uint16_t number) { return static_cast<std::uint8_t>(number); });
     write(narrow);
   }
-  fmt::format_to(std::back_inserter(list_->buffer()), "{},{},{},{}\n", count_, frame->t, frame->exposure_duration,
-                 frame->gain);
+  fmt::format_to(std::back_inserter(list_->buffer()), "{},{},{},{},{},{}\n", count_, frame->t, frame->exposure_duration,
+                 frame->gain, frame->exposure_start, frame->bits);
   list_->flush();
   ++count_;
 }

@@ -11,7 +11,8 @@
 namespace esim {
 
 /// Frames of one camera as grey PNG: frames/000000.png and so on in a folder, beside frames.csv with lines
-/// `index,t_ns,exposure_ns,gain`, t_ns in the middle of the exposure. Digital numbers are written as they are, of 8
+/// `index,t_ns,exposure_ns,gain,exposure_start_ns,bits`, t_ns in the middle of the exposure (of the middle row), the
+/// start that of the first row. Digital numbers are written as they are, of 8
 /// bits in files of 8 bits, of more in files of 16. Numbers of an RGGB mosaic become colour PNG if `in_colour`.
 class FramesPngWriter final : public Sink {
  public:

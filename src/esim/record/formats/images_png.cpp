@@ -1,13 +1,11 @@
 #include "esim/record/formats/images_png.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "esim/record/formats/png_file.h"
-#include "esim/record/number_text.h"
 
 namespace esim {
 namespace {
@@ -52,32 +50,36 @@ Image<std::uint8_t> encode_srgb(const Image<float>& irradiance) {
   return encoded;
 }
 
-void ImagesPngWriter::begin(const RecordingInfo&) {
-  std::error_code error;
-  std::filesystem::create_directories(folder_, error);
-  if (error) throw_cannot_write(folder_, error.message());
-  timestamps_.emplace(folder_ / "timestamps.txt");
-  timestamps_->append("# index t_s file\n");
+Image<float> decode_srgb(const Image<std::uint16_t>& encoded, int bits) {
+  const double full_scale = static_cast<double>((1 << bits) - 1);
+  std::vector<float> levels(std::size_t{1} << bits);
+  for (std::size_t i = 0; i < levels.size(); ++i)
+    levels[i] = static_cast<float>(linear_from_srgb(static_cast<double>(i) / full_scale));
+  Image<float> irradiance(encoded.width(), encoded.height());
+  std::transform(encoded.pixels().begin(), encoded.pixels().end(), irradiance.pixels().begin(),
+                 [&](std::uint16_t level) { return levels[level]; });
+  return irradiance;
 }
 
+void ImagesPngWriter::begin(const RecordingInfo&) { files_.emplace(folder_, ".png"); }
+
 void ImagesPngWriter::write(const Record& record) {
+  if (const auto* image = std::get_if<ImageRecord>(&record); image != nullptr && image->camera == camera_) {
+    from_images_ = true;
+    write(image->t, image->irradiance);
+  }
   const auto* truth = std::get_if<TruthRecord>(&record);
-  if (truth == nullptr || truth->camera != camera_) return;
+  if (truth != nullptr && truth->camera == camera_ && !from_images_) write(truth->t, truth->irradiance);
+}
 
-  const std::string name = fmt::format("{:06}.png", count_);
-  write_png(folder_ / name, encode_srgb(truth->irradiance));
-
-  std::string& line = timestamps_->buffer();
-  fmt::format_to(std::back_inserter(line), "{} ", count_);
-  append_seconds(line, truth->t);
-  line += " " + name + "\n";
-  timestamps_->flush();
-  ++count_;
+void ImagesPngWriter::write(TimeNs t, const Image<float>& irradiance) {
+  write_png(files_->next_path(), encode_srgb(irradiance));
+  files_->add(t);
 }
 
 void ImagesPngWriter::end(bool) {
-  if (timestamps_) timestamps_->close();
-  timestamps_.reset();
+  if (files_) files_->close();
+  files_.reset();
 }
 
 }  // namespace esim

@@ -6,13 +6,13 @@
 #include <utility>
 
 #include "esim/core/image.h"
-#include "esim/record/output_file.h"
+#include "esim/record/formats/timed_files.h"
 #include "esim/record/record.h"
 
 namespace esim {
 
-/// Irradiance of one camera's ground-truth frames as 8-bit grey PNG, sRGB-encoded: 000000.png and so on in a folder,
-/// beside timestamps.txt with lines `index t_s file`.
+/// Irradiance of one camera, of its images, or where there are none of its ground truth, as 8-bit grey PNG,
+/// sRGB-encoded: 000000.png and so on in a folder, beside timestamps.txt with lines `index t_s file`.
 class ImagesPngWriter final : public Sink {
  public:
   ImagesPngWriter(std::filesystem::path folder, int camera) : folder_(std::move(folder)), camera_(camera) {}
@@ -22,11 +22,16 @@ class ImagesPngWriter final : public Sink {
   void end(bool complete) override;
 
  private:
+  void write(TimeNs t, const Image<float>& irradiance);
+
   std::filesystem::path folder_;
   int camera_;
-  std::int64_t count_ = 0;
-  std::optional<OutputFile> timestamps_;
+  bool from_images_ = false;
+  std::optional<TimedFilesWriter> files_;
 };
+
+/// The irradiance, to the nearest level, that is encoded like this in so many bits.
+Image<float> decode_srgb(const Image<std::uint16_t>& encoded, int bits);
 
 /// Linear irradiance in 8-bit sRGB (IEC 61966-2-1): 0 and below, and NaN, to 0; 1 and above to 255.
 Image<std::uint8_t> encode_srgb(const Image<float>& irradiance);

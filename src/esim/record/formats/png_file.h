@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <vector>
 
+#include "esim/core/colour.h"
 #include "esim/core/image.h"
 
 namespace esim {
@@ -15,5 +17,18 @@ void write_png(const std::filesystem::path& path, const Image<std::uint16_t>& im
 /// of the other two from its neighbours, along edges.
 void write_demosaicked_png(const std::filesystem::path& path, const Image<std::uint8_t>& mosaic);
 void write_demosaicked_png(const std::filesystem::path& path, const Image<std::uint16_t>& mosaic);
+
+/// Writes a colour PNG of 16 bits, its channels of the same size.
+void write_png(const std::filesystem::path& path, const PerColour<Image<std::uint16_t>>& channels);
+
+/// What a PNG holds: one channel, or red, green and blue.
+struct PngImage {
+  int bits = 8;  ///< 8 or 16
+  std::vector<Image<std::uint16_t>> channels{};
+};
+
+/// Reads a PNG without an alpha channel. What the file says of its size is not trusted: memory is taken only for what
+/// its bytes can hold. Throws UserError that names the file.
+PngImage read_png(const std::filesystem::path& path);
 
 }  // namespace esim

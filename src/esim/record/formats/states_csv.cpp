@@ -40,10 +40,17 @@ std::string file_name(std::string name, std::set<std::string>& taken) {
 void StatesCsvWriter::begin(const RecordingInfo& info) {
   body_.emplace(folder_ / "states.csv", info.imu ? kHeader + kBiasHeader : kHeader);
   if (info.objects.empty()) return;
-  std::filesystem::create_directories(folder_ / "objects");
+  create_folder(folder_ / "objects");
   std::set<std::string> taken;
-  for (const std::string& name : info.objects)
-    objects_.emplace_back(folder_ / "objects" / file_name(name, taken), kHeader);
+  std::string names;
+  for (const std::string& name : info.objects) {
+    const std::string file = file_name(name, taken);
+    objects_.emplace_back(folder_ / "objects" / file, kHeader);
+    std::string line = name;
+    std::replace(line.begin(), line.end(), '\n', ' ');
+    names += file + " " + line + "\n";
+  }
+  write_file_atomically(folder_ / "objects" / "names.txt", names);
 }
 
 void StatesCsvWriter::write(const Record& record) {

@@ -19,6 +19,7 @@ struct TruthHdf5Writer::Impl {
   }
 
   void create(const RecordingInfo& recording);
+  void create_displacement();
   void append(const TruthRecord& truth);
   void append(const DisplacementRecord& displacement);
   void append(hdf5::Series& series, const Image<float>& x, const Image<float>& y);
@@ -75,20 +76,23 @@ void TruthHdf5Writer::Impl::create(const RecordingInfo& recording) {
     names.insert(names.end(), recording.layers.begin(), recording.layers.end());
     file->create_text_attribute(objects.id(), "names", names);
   }
-  if (options.displacement) {
-    displacement = hdf5::Series(*file, "displacement", {H5T_IEEE_F32LE, {2, rows, columns}, 1, options.compression});
-    describe(displacement, "px",
-             "[frame k, component, y, x]: where the point seen in frame k is in frame k + 1, less where it is in frame "
-             "k; x to the right, then y downwards; NaN where there is no image of it");
-    displacement_valid =
-        hdf5::Series(*file, "displacement_valid", {H5T_STD_U8LE, {rows, columns}, 1, options.compression});
-    describe(displacement_valid, "1",
-             "[frame k, y, x]: 1 where frame k + 1 shows the point; 0 where something hides it, or outside the image");
-  }
+  if (options.displacement) create_displacement();
   file->create_attribute(file->id(), "width", static_cast<std::uint32_t>(width));
   file->create_attribute(file->id(), "height", static_cast<std::uint32_t>(height));
   esim_complete = file->create_attribute(file->id(), "esim_complete", std::uint8_t{0});
   file->flush();
+}
+
+void TruthHdf5Writer::Impl::create_displacement() {
+  const auto rows = static_cast<hsize_t>(height), columns = static_cast<hsize_t>(width);
+  displacement = hdf5::Series(*file, "displacement", {H5T_IEEE_F32LE, {2, rows, columns}, 1, options.compression});
+  describe(displacement, "px",
+           "[frame k, component, y, x]: where the point seen in frame k is in frame k + 1, less where it is in frame "
+           "k; x to the right, then y downwards; NaN where there is no image of it");
+  displacement_valid =
+      hdf5::Series(*file, "displacement_valid", {H5T_STD_U8LE, {rows, columns}, 1, options.compression});
+  describe(displacement_valid, "1",
+           "[frame k, y, x]: 1 where frame k + 1 shows the point; 0 where something hides it, or outside the image");
 }
 
 void TruthHdf5Writer::Impl::describe(const hdf5::Series& series, const char* unit, const char* convention) const {
@@ -125,6 +129,7 @@ void TruthHdf5Writer::Impl::append(const TruthRecord& truth) {
 
 void TruthHdf5Writer::Impl::append(const DisplacementRecord& record) {
   const hdf5::Quiet quiet;
+  if (displacement.id() < 0) create_displacement();
   append(displacement, record.x, record.y);
   check_size(record.visible);
   displacement_valid.append(record.visible.pixels());
@@ -170,8 +175,7 @@ void TruthHdf5Writer::write(const Record& record) {
   const auto* truth = std::get_if<TruthRecord>(&record);
   if (truth != nullptr && truth->camera == impl_->camera) impl_->append(*truth);
   const auto* displacement = std::get_if<DisplacementRecord>(&record);
-  if (displacement != nullptr && displacement->camera == impl_->camera && impl_->options.displacement)
-    impl_->append(*displacement);
+  if (displacement != nullptr && displacement->camera == impl_->camera) impl_->append(*displacement);
 }
 
 void TruthHdf5Writer::end(bool complete) {

@@ -1,8 +1,12 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <string>
+#include <vector>
 
+#include "esim/record/format.h"
 #include "esim/record/formats/compression.h"
 #include "esim/record/record.h"
 
@@ -13,7 +17,7 @@ struct TruthHdf5Options {
   bool flow = true;
   Compression compression = Compression::blosc;
   bool objects = false;
-  bool displacement = false;
+  bool displacement = false;  ///< else the dataset is there only if a displacement comes
 };
 
 /// Ground truth of one camera:
@@ -38,6 +42,41 @@ class TruthHdf5Writer final : public Sink {
   void begin(const RecordingInfo& info) override;
   void write(const Record& record) override;
   void end(bool complete) override;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Reads such files, frame by frame. Files that are something else, damaged or cut are a UserError that names the file.
+class TruthHdf5Reader {
+ public:
+  /// One frame; what the file does not hold is empty.
+  struct Frame {
+    SE3 T_world_camera;
+    Image<float> depth, flow_x, flow_y;
+    Image<std::uint16_t> object;
+    std::vector<SE3> T_world_objects;
+  };
+  struct Displacement {
+    Image<float> x, y;
+    Image<std::uint8_t> visible;
+  };
+
+  explicit TruthHdf5Reader(std::filesystem::path path);
+  ~TruthHdf5Reader();
+
+  std::uint64_t size() const;           ///< number of frames
+  std::uint64_t displacements() const;  ///< from frame 0, 1, ... to the next one
+  SensorSize sensor() const;            ///< 0 x 0 where there are no images
+
+  /// Of the numbers in Frame::object: "static", then those of objects, then those of layers.
+  const std::vector<std::string>& names() const;
+  std::size_t objects() const;  ///< with a pose
+
+  TimeNs t(std::uint64_t frame) const;
+  void read(std::uint64_t frame, Frame& out) const;
+  void read(std::uint64_t frame, Displacement& out) const;
 
  private:
   struct Impl;

@@ -1,4 +1,4 @@
-#include "esim/scenario/calibration.h"
+#include "esim/geometry/calibration.h"
 
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
@@ -185,7 +185,7 @@ std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file
   return cameras;
 }
 
-ImuOptions read_imu_calibration(const std::filesystem::path& file) {
+CalibratedImu read_imu_calibration(const std::filesystem::path& file) {
   const YAML::Node root = load(file);
   if (!root.IsMap()) throw UserError(fmt::format("calibration {}: is no imu.yaml of Kalibr's", file.string()));
   const bool nested = root["imu0"].IsDefined();
@@ -205,15 +205,15 @@ ImuOptions read_imu_calibration(const std::filesystem::path& file) {
     if (!(value >= 0 && value <= limit)) imu.fail(fmt::format("{} is {}; it must be from 0 to {}", key, value, limit));
     return value;
   };
-  constexpr double kMaxDensity = 1e6;
-  ImuOptions options;
-  options.rate_hz = not_negative("update_rate", kMaxImuRate_hz);
-  options.gyroscope.noise_density = not_negative("gyroscope_noise_density", kMaxDensity);
-  options.gyroscope.random_walk = not_negative("gyroscope_random_walk", kMaxDensity);
-  options.accelerometer.noise_density = not_negative("accelerometer_noise_density", kMaxDensity);
-  options.accelerometer.random_walk = not_negative("accelerometer_random_walk", kMaxDensity);
-  if (options.rate_hz == 0) imu.fail("update_rate is 0 Hz; it must be positive");
-  return options;
+  constexpr double kMaxRate_hz = 1e9, kMaxDensity = 1e6;
+  const CalibratedImu calibrated{
+      .rate_hz = not_negative("update_rate", kMaxRate_hz),
+      .gyroscope_noise_density = not_negative("gyroscope_noise_density", kMaxDensity),
+      .gyroscope_random_walk = not_negative("gyroscope_random_walk", kMaxDensity),
+      .accelerometer_noise_density = not_negative("accelerometer_noise_density", kMaxDensity),
+      .accelerometer_random_walk = not_negative("accelerometer_random_walk", kMaxDensity)};
+  if (calibrated.rate_hz == 0) imu.fail("update_rate is 0 Hz; it must be positive");
+  return calibrated;
 }
 
 }  // namespace esim

@@ -6,7 +6,6 @@
 
 #include "esim/geometry/camera.h"
 #include "esim/geometry/se3.h"
-#include "esim/sensors/imu_options.h"
 
 namespace esim {
 
@@ -24,9 +23,18 @@ struct CalibratedCamera {
 /// Throws UserError naming the file, the camera and the key for anything missing, inconsistent or not supported.
 std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file);
 
-/// Reads Kalibr's imu.yaml: rate, noise densities and random walks, at the top or under `imu0`; everything else is at
-/// its default. The body of a camchain with T_cam_imu is this IMU. Throws UserError as above, also for models with
-/// misalignment, several IMUs, and time offsets.
-ImuOptions read_imu_calibration(const std::filesystem::path& file);
+/// The noise of an inertial measurement unit. Densities are continuous-time.
+struct CalibratedImu {
+  double rate_hz = 0;
+  double gyroscope_noise_density = 0;      ///< rad/s/sqrt(Hz)
+  double gyroscope_random_walk = 0;        ///< rad/s²/sqrt(Hz)
+  double accelerometer_noise_density = 0;  ///< m/s²/sqrt(Hz)
+  double accelerometer_random_walk = 0;    ///< m/s³/sqrt(Hz)
+};
+
+/// Reads Kalibr's imu.yaml: rate, noise densities and random walks, at the top or under `imu0`. The body of a camchain
+/// with T_cam_imu is this IMU. Throws UserError as above, also for models with misalignment, several IMUs, and time
+/// offsets.
+CalibratedImu read_imu_calibration(const std::filesystem::path& file);
 
 }  // namespace esim

@@ -17,6 +17,10 @@ std::string kalibr_camchain(const RecordingInfo& info);
 /// An IMU as Kalibr's imu.yaml.
 std::string kalibr_imu(const ImuInfo& imu);
 
+/// The cameras of a recording as a rig file of the original ESIM: each with its model and T_B_C, the pose of the camera
+/// in the body frame. Numbers read back as they are. The format has no place for an IMU.
+std::string rig_yaml(const RecordingInfo& info);
+
 /// Writes camchain.yaml, rig.yaml (the original ESIM's) and, with an IMU, imu.yaml into a folder when a recording
 /// begins.
 class CalibrationWriter final : public Sink {

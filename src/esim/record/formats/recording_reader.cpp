@@ -1,0 +1,282 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
+
+#include "esim/core/error.h"
+#include "esim/geometry/calibration.h"
+#include "esim/record/checked_source.h"
+#include "esim/record/formats/events_hdf5.h"
+#include "esim/record/formats/events_text.h"
+#include "esim/record/formats/recording.h"
+#include "esim/record/formats/recording_streams.h"
+#include "esim/record/formats/timed_files.h"
+#include "esim/record/input_file.h"
+
+namespace esim {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_file(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+bool is_camera_folder(const fs::path& folder) {
+  return is_file(folder / "events.h5") || is_file(folder / "truth.h5") || is_file(folder / "frames.csv") ||
+         is_file(folder / "images" / kTimedFilesList);
+}
+
+std::vector<fs::path> sorted_entries(const fs::path& folder) {
+  std::vector<fs::path> paths;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+    paths.push_back(entry->path());
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+std::vector<CameraInfo> cameras_in_folders(const fs::path& root) {
+  std::vector<CameraInfo> cameras;
+  for (const fs::path& folder : sorted_entries(root)) {
+    if (!is_camera_folder(folder)) continue;
+    cameras.emplace_back();
+    cameras.back().name = folder.filename().string();
+  }
+  return cameras;
+}
+
+bool is_recording(const fs::path& path) {
+  return is_file(path / "report.json") || is_file(path / "calibration" / "rig.yaml") || is_camera_folder(path) ||
+         !cameras_in_folders(path).empty();
+}
+
+/// Reads one folder: first what is known of the recording, then its streams.
+class Folder {
+ public:
+  Folder(const fs::path& path, const ReadOptions& options) : options_(options) {
+    if (!is_camera_folder(path)) {
+      root_ = path;
+      attempt([&] { read_rig(); });
+      for (CameraInfo& camera : info_.cameras) folders_.push_back(root_ / camera.name);
+      return;
+    }
+    // A camera's folder alone. "DIR/cam0/" and "DIR/cam0" are the same.
+    const fs::path folder = fs::absolute(path / ".").lexically_normal().parent_path();
+    root_ = folder.parent_path();
+    attempt([&] { read_rig(); });
+    CameraInfo own;
+    own.name = folder.filename().string();
+    for (const CameraInfo& camera : info_.cameras) {
+      if (camera.name == own.name) own = camera;
+    }
+    info_.cameras = {own};
+    info_.imu.reset();
+    folders_ = {path};
+    alone_ = true;
+  }
+
+  std::unique_ptr<Source> open() {
+    if (!alone_) open_body();
+    for (std::size_t i = 0; i < folders_.size(); ++i) {
+      attempt([&] { open_events(i); });
+      attempt([&] { open_truth(i); });
+    }
+    std::vector<std::unique_ptr<RecordStream>> streams;
+    for (auto* group : {&body_, &events_, &frames_, &truth_})
+      std::move(group->begin(), group->end(), std::back_inserter(streams));
+    return merge_streams(std::move(info_), std::move(streams), options_, start_);
+  }
+
+ private:
+  /// With `recover`, goes on where a part cannot be read.
+  template <typename Part>
+  void attempt(const Part& read) {
+    try {
+      read();
+    } catch (const UserError& error) {
+      if (!options_.recover) throw;
+      options_.recover(error.what());
+    }
+  }
+
+  void read_rig() {
+    if (is_file(root_ / "report.json")) attempt([&] { read_report(root_ / "report.json"); });
+    const fs::path calibration = root_ / "calibration";
+    if (is_file(calibration / "rig.yaml")) attempt([&] { read_calibrations(calibration); });
+    if (info_.cameras.empty()) info_.cameras = cameras_in_folders(root_);
+    std::set<std::string> names;
+    for (CameraInfo& camera : info_.cameras) {
+      if (camera.name.empty() || camera.name.find('/') != std::string::npos || camera.name == ".." ||
+          !names.insert(camera.name).second)
+        throw UserError(fmt::format("cannot read {}: \"{}\" is no name of a camera's folder, or of two", root_.string(),
+                                    camera.name));
+      if (!options_.sensor) continue;
+      camera.model.width = options_.sensor->width, camera.model.height = options_.sensor->height;
+    }
+  }
+
+  void read_report(const fs::path& path) {
+    constexpr std::size_t kMaxBytes = std::size_t{1} << 24;
+    InputFile file(path);
+    const auto bytes = file.read(kMaxBytes);
+    try {
+      const auto report = nlohmann::json::parse(reinterpret_cast<const char*>(bytes.data()),
+                                                reinterpret_cast<const char*>(bytes.data()) + bytes.size());
+      if (report.contains("start_s")) {
+        const double start_s = report.at("start_s"), length_s = report.value("simulated_s", 0.0);
+        constexpr double kMax_s = 4e9;
+        if (!(std::abs(start_s) <= kMax_s) || !(length_s >= 0 && length_s <= kMax_s))
+          file.fail(0, "its times are none");
+        start_ = to_ns(start_s);
+        info_.end = *start_ + to_ns(length_s);
+      }
+      for (const auto& entry : report.value("cameras", nlohmann::json::array())) {
+        CameraInfo camera;
+        camera.name = entry.at("name");
+        camera.model.width = entry.at("width"), camera.model.height = entry.at("height");
+        constexpr int kMaxExtent = 65536;
+        if (std::min(camera.model.width, camera.model.height) < 0 ||
+            std::max(camera.model.width, camera.model.height) > kMaxExtent)
+          file.fail(0, "the size of a camera is none");
+        info_.cameras.push_back(std::move(camera));
+      }
+    } catch (const nlohmann::json::exception& error) {
+      info_.cameras.clear();
+      file.fail(0, fmt::format("it is no report of a recording ({})", error.what()));
+    }
+  }
+
+  /// rig.yaml has the cameras in the body's frame; camchain.yaml, from the IMU's.
+  void read_calibrations(const fs::path& folder) {
+    std::vector<CameraInfo> cameras;
+    for (auto& [name, model, T_body_camera] : read_calibration(folder / "rig.yaml"))
+      cameras.push_back({name, model, T_body_camera});
+    info_.cameras = std::move(cameras);
+    if (!is_file(folder / "imu.yaml")) return;
+    const CalibratedImu imu = read_imu_calibration(folder / "imu.yaml");
+    const SE3 T_imu_camera = read_calibration(folder / "camchain.yaml").front().T_body_camera;
+    info_.imu = ImuInfo{info_.cameras.front().T_body_camera * T_imu_camera.inverse(),
+                        imu.rate_hz,
+                        imu.gyroscope_noise_density,
+                        imu.gyroscope_random_walk,
+                        imu.accelerometer_noise_density,
+                        imu.accelerometer_random_walk};
+  }
+
+  void open_body() {
+    if (is_file(root_ / "states.csv")) {
+      attempt([&] {
+        const std::vector<fs::path> objects = read_objects(root_ / "objects");
+        body_.push_back(poses_stream(root_ / "states.csv", objects));
+      });
+    }
+    if (is_file(root_ / "imu.csv")) {
+      if (!info_.imu) info_.imu.emplace();
+      attempt([&] { body_.push_back(imu_stream(root_ / "imu.csv", root_ / "imu_truth.csv")); });
+    }
+  }
+
+  /// The files of the moving objects, whose names become known; without names.txt, in the order of the files' names.
+  std::vector<fs::path> read_objects(const fs::path& folder) {
+    std::vector<fs::path> files;
+    if (is_file(folder / "names.txt")) {
+      constexpr std::size_t kMaxLineBytes = 1 << 12;
+      for (InputFile list(folder / "names.txt"); list.offset() < list.size();) {
+        const std::uint64_t offset = list.offset();
+        const std::string_view line = list.read_line(kMaxLineBytes, "a line");
+        const std::size_t end = line.find(' ');
+        const std::string_view name = line.substr(0, end);
+        if (end == std::string_view::npos || name.find('/') != std::string_view::npos)
+          list.fail(offset, "expected the name of a file in this folder, then that of the object");
+        files.push_back(folder / name);
+        info_.objects.emplace_back(line.substr(end + 1));
+      }
+      return files;
+    }
+    for (const fs::path& file : sorted_entries(folder)) {
+      if (file.extension() != ".csv") continue;
+      files.push_back(file);
+      info_.objects.push_back(file.stem().string());
+    }
+    return files;
+  }
+
+  void open_events(std::size_t i) {
+    const bool text = !is_file(folders_[i] / "events.h5");
+    const fs::path file = folders_[i] / (text ? "events.txt" : "events.h5");
+    if (!is_file(file)) return;
+    const ReadOptions told{.sensor = options_.sensor};
+    auto events =
+        std::make_unique<CheckedSource>((text ? events_text_format() : dsec_format()).open(file, told), file, told);
+    const Camera& found = events->info().cameras.front().model;
+    learn_size(i, {found.width, found.height});
+    info_.end = std::max(info_.end, events->info().end);
+    events_.push_back(events_stream(std::move(events), static_cast<int>(i)));
+  }
+
+  void open_truth(std::size_t i) {
+    const int camera = static_cast<int>(i);
+    if (is_file(folders_[i] / "frames.csv")) attempt([&] { frames_.push_back(frames_stream(folders_[i], camera)); });
+    const ImagesStream* images = nullptr;
+    if (is_file(folders_[i] / "images" / kTimedFilesList)) {
+      attempt([&] {
+        auto stream = std::make_unique<ImagesStream>(folders_[i] / "images", camera);
+        images = stream.get();
+        truth_.push_back(std::move(stream));
+      });
+    }
+    if (!is_file(folders_[i] / "truth.h5")) return;
+    const auto truth = std::make_shared<TruthHdf5Reader>(folders_[i] / "truth.h5");
+    learn_size(i, truth->sensor());
+    if (truth->size() > 0) info_.end = std::max(info_.end, truth->t(truth->size() - 1));
+    if (truth->size() > 1 && truth->t(1) > truth->t(0)) info_.truth_rate_hz = 1 / to_seconds(truth->t(1) - truth->t(0));
+    learn_names(*truth);
+    truth_.push_back(truth_stream(truth, camera, images));
+  }
+
+  void learn_size(std::size_t i, SensorSize size) {
+    Camera& model = info_.cameras[i].model;
+    if (model.width == 0) model.width = size.width, model.height = size.height;
+  }
+
+  /// After "static" come the objects, then the layers.
+  void learn_names(const TruthHdf5Reader& truth) {
+    const std::vector<std::string>& names = truth.names();
+    const std::size_t objects = info_.objects.empty() ? truth.objects() : info_.objects.size();
+    if (names.size() < 1 + objects) return;
+    const auto layers = names.begin() + 1 + static_cast<std::ptrdiff_t>(objects);
+    info_.objects.assign(names.begin() + 1, layers);
+    info_.layers.assign(layers, names.end());
+  }
+
+  ReadOptions options_;
+  fs::path root_;
+  std::vector<fs::path> folders_;  // of the cameras
+  bool alone_ = false;             // one camera's, without what is the rig's
+  RecordingInfo info_;
+  std::optional<TimeNs> start_;
+  std::vector<std::unique_ptr<RecordStream>> body_, events_, frames_, truth_;
+};
+
+}  // namespace
+
+Format recording_format() {
+  return {
+      .name = "recording",
+      .description = "the folder of a recording, or of one of its cameras",
+      .holds = {Content::events, Content::frames, Content::images, Content::imu, Content::poses, Content::truth,
+                Content::displacement},
+      .several_cameras = true,
+      .folder = true,
+      .recognises = [](const auto& path, std::string_view) { return is_recording(path); },
+      .open = [](const auto& path, const ReadOptions& options) { return Folder(path, options).open(); },
+      .create = [](const auto& path,
+                   const WriteOptions& options) { return std::make_unique<RecordingWriter>(path, options); },
+  };
+}
+
+}  // namespace esim

@@ -1,0 +1,238 @@
+#include "esim/record/formats/recording_streams.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "esim/core/error.h"
+#include "esim/record/formats/csv.h"
+#include "esim/record/formats/images_png.h"
+#include "esim/record/formats/png_file.h"
+
+namespace esim {
+namespace {
+
+namespace fs = std::filesystem;
+
+class PosesStream final : public RecordStream {
+ public:
+  PosesStream(const fs::path& states, const std::vector<fs::path>& objects) : body_(states, kStateColumns) {
+    for (const fs::path& file : objects) objects_.emplace_back(file, kStateColumns);
+  }
+
+  std::optional<TimeNs> due() override { return body_.next() ? std::optional(body_.t()) : std::nullopt; }
+
+  const Record* next(TimeNs) override {
+    PoseRecord pose{body_.t(), motion(body_)};
+    if (body_.columns() > kStateColumns) {
+      if (body_.columns() < kStateColumns + 6) body_.fail("the line ends within the biases");
+      pose.imu_bias = InertialSignals{body_.vector(kStateColumns), body_.vector(kStateColumns + 3)};
+    }
+    for (CsvReader& object : objects_) {
+      if (!object.next() || object.t() != pose.t)
+        object.fail(fmt::format("expected the motion at {} ns, as in states.csv", pose.t));
+      pose.objects.push_back(motion(object));
+    }
+    return &record_.emplace(std::move(pose));
+  }
+
+ private:
+  static constexpr std::size_t kStateColumns = 20;
+
+  static Kinematics motion(const CsvReader& line) {
+    const Eigen::Quaterniond q(line.value(7), line.value(4), line.value(5), line.value(6));
+    if (!(std::abs(q.norm() - 1) < 1e-3)) line.fail("the quaternion is not of unit length");
+    return {{q, line.vector(1)}, line.vector(8), line.vector(14), line.vector(11), line.vector(17)};
+  }
+
+  CsvReader body_;
+  std::vector<CsvReader> objects_;
+  std::optional<Record> record_;
+};
+
+class ImuStream final : public RecordStream {
+ public:
+  ImuStream(const fs::path& measured, const fs::path& biases) : measured_(measured, kColumns) {
+    std::error_code error;
+    if (fs::exists(biases, error)) biases_.emplace(biases, kColumns);
+  }
+
+  std::optional<TimeNs> due() override { return measured_.next() ? std::optional(measured_.t()) : std::nullopt; }
+
+  const Record* next(TimeNs) override {
+    ImuRecord imu{measured_.t(), signals(measured_)};
+    if (biases_) {
+      if (!biases_->next() || biases_->t() != imu.t)
+        biases_->fail(fmt::format("expected the biases at {} ns, as in imu.csv", imu.t));
+      imu.bias = signals(*biases_);
+    }
+    return &record_.emplace(imu);
+  }
+
+ private:
+  static constexpr std::size_t kColumns = 7;
+
+  static InertialSignals signals(const CsvReader& line) { return {line.vector(1), line.vector(4)}; }
+
+  CsvReader measured_;
+  std::optional<CsvReader> biases_;
+  std::optional<Record> record_;
+};
+
+/// Portions are cut where other streams have their turn.
+class EventsStream final : public RecordStream {
+ public:
+  EventsStream(std::unique_ptr<Source> events, int camera) : events_(std::move(events)), camera_(camera) {}
+
+  std::optional<TimeNs> due() override {
+    while (rest_.empty()) {
+      const Record* const record = events_->next();
+      if (record == nullptr) return std::nullopt;
+      rest_ = std::get<EventsRecord>(*record).events;
+    }
+    return rest_.front().t;
+  }
+
+  const Record* next(TimeNs until) override {
+    const auto later =
+        std::upper_bound(rest_.begin(), rest_.end(), until, [](TimeNs t, const Event& event) { return t < event.t; });
+    const std::size_t count = std::max<std::size_t>(1, static_cast<std::size_t>(later - rest_.begin()));
+    record_.emplace(EventsRecord{camera_, rest_.first(count)});
+    rest_ = rest_.subspan(count);
+    return &*record_;
+  }
+
+ private:
+  std::unique_ptr<Source> events_;
+  int camera_;
+  EventSpan rest_;
+  std::optional<Record> record_;
+};
+
+class FramesStream final : public RecordStream {
+ public:
+  FramesStream(const fs::path& folder, int camera)
+      : folder_(folder), camera_(camera), list_(folder / "frames.csv", 4, 1) {}
+
+  std::optional<TimeNs> due() override { return list_.next() ? std::optional(list_.t()) : std::nullopt; }
+
+  const Record* next(TimeNs) override {
+    const PngImage png = read_png(folder_ / "frames" / fmt::format("{:06}.png", list_.integer(0)));
+    image_ = png.channels.front();
+    if (png.channels.size() > 1) {
+      for (int y = 0; y < image_.height(); ++y) {
+        for (int x = 0; x < image_.width(); ++x) image_(x, y) = png.channels[colour_at(x, y)](x, y);
+      }
+    }
+    // Lists of four columns do not say when the first row began: as if the shutter were global.
+    const TimeNs exposure = list_.integer(2);
+    const bool full = list_.columns() > 4;
+    if (list_.columns() == 5) list_.fail("the line has 5 numbers, and needs 6");
+    const TimeNs start = full ? list_.integer(4) : list_.t() - exposure / 2;
+    const std::int64_t bits = full ? list_.integer(5) : png.bits;
+    if (bits < 1 || bits > png.bits) list_.fail(fmt::format("{} bits are not those of the image", bits));
+    return &record_.emplace(
+        FrameRecord{camera_, list_.t(), start, exposure, list_.value(3), image_, static_cast<int>(bits)});
+  }
+
+ private:
+  fs::path folder_;
+  int camera_;
+  CsvReader list_;
+  Image<std::uint16_t> image_;
+  std::optional<Record> record_;
+};
+
+/// A displacement follows the frame that it leads to.
+class TruthStream final : public RecordStream {
+ public:
+  TruthStream(std::shared_ptr<const TruthHdf5Reader> truth, int camera, const ImagesStream* images)
+      : truth_(std::move(truth)), camera_(camera), images_(images) {}
+
+  std::optional<TimeNs> due() override {
+    if (displacement_due_) return truth_->t(frame_ - 1);
+    if (frame_ == truth_->size()) return std::nullopt;
+    return truth_->t(frame_);
+  }
+
+  const Record* next(TimeNs) override {
+    if (std::exchange(displacement_due_, false)) {
+      truth_->read(frame_ - 2, displacement_);
+      return &record_.emplace(DisplacementRecord{camera_, truth_->t(frame_ - 2), truth_->t(frame_ - 1), displacement_.x,
+                                                 displacement_.y, displacement_.visible});
+    }
+    const TimeNs t = truth_->t(frame_);
+    truth_->read(frame_++, images_of_frame_);
+    displacement_due_ = frame_ >= 2 && frame_ - 2 < truth_->displacements();
+    const auto& [T_world_camera, depth, flow_x, flow_y, object, T_world_objects] = images_of_frame_;
+    return &record_.emplace(TruthRecord{camera_, t, T_world_camera, images_ != nullptr ? images_->at(t) : kNoImage,
+                                        depth, flow_x, flow_y, object.empty() ? nullptr : &object, T_world_objects});
+  }
+
+ private:
+  static inline const Image<float> kNoImage;
+
+  std::shared_ptr<const TruthHdf5Reader> truth_;
+  int camera_;
+  const ImagesStream* images_;
+  std::uint64_t frame_ = 0;        // that is read next
+  bool displacement_due_ = false;  // to the frame before it
+  TruthHdf5Reader::Frame images_of_frame_;
+  TruthHdf5Reader::Displacement displacement_;
+  std::optional<Record> record_;
+};
+
+}  // namespace
+
+struct ImagesStream::Impl {
+  TimedFilesReader files;
+  int camera;
+  Image<float> image{}, none{};
+  std::optional<TimeNs> t{};  // of the image
+  std::optional<Record> record{};
+};
+
+ImagesStream::ImagesStream(const fs::path& folder, int camera) : impl_(new Impl{TimedFilesReader(folder), camera}) {}
+
+ImagesStream::~ImagesStream() = default;
+
+std::optional<TimeNs> ImagesStream::due() {
+  return impl_->files.next() ? std::optional(impl_->files.span().start) : std::nullopt;
+}
+
+const Record* ImagesStream::next(TimeNs) {
+  impl_->t.reset();
+  const PngImage png = read_png(impl_->files.file());
+  if (png.channels.size() != 1)
+    throw UserError(fmt::format("cannot read {}: it is in colour, not grey", impl_->files.file().string()));
+  impl_->image = decode_srgb(png.channels.front(), png.bits);
+  impl_->t = impl_->files.span().start;
+  return &impl_->record.emplace(ImageRecord{impl_->camera, *impl_->t, impl_->image});
+}
+
+const Image<float>& ImagesStream::at(TimeNs t) const { return impl_->t == t ? impl_->image : impl_->none; }
+
+std::unique_ptr<RecordStream> poses_stream(const fs::path& states, const std::vector<fs::path>& objects) {
+  return std::make_unique<PosesStream>(states, objects);
+}
+
+std::unique_ptr<RecordStream> imu_stream(const fs::path& measured, const fs::path& biases) {
+  return std::make_unique<ImuStream>(measured, biases);
+}
+
+std::unique_ptr<RecordStream> events_stream(std::unique_ptr<Source> events, int camera) {
+  return std::make_unique<EventsStream>(std::move(events), camera);
+}
+
+std::unique_ptr<RecordStream> frames_stream(const fs::path& folder, int camera) {
+  return std::make_unique<FramesStream>(folder, camera);
+}
+
+std::unique_ptr<RecordStream> truth_stream(std::shared_ptr<const TruthHdf5Reader> truth, int camera,
+                                           const ImagesStream* images) {
+  return std::make_unique<TruthStream>(std::move(truth), camera, images);
+}
+
+}  // namespace esim

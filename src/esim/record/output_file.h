@@ -42,6 +42,9 @@ class OutputFile {
 /// Puts `text` into the file at once: readers see the old content or the new one, never a part.
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
 
+/// Makes a file that is whole durable.
+void sync_file(const std::filesystem::path& path);
+
 /// Makes the names in a directory durable. Silent where the file system cannot do that.
 void sync_directory(const std::filesystem::path& directory);
 

@@ -8,6 +8,7 @@
 #include "esim/record/formats/events_hdf5.h"
 #include "esim/record/formats/events_text.h"
 #include "esim/record/formats/nmnist.h"
+#include "esim/record/formats/npy.h"
 #include "esim/record/formats/prophesee.h"
 #include "esim/record/input_file.h"
 
@@ -34,7 +35,8 @@ std::string extension_of(const fs::path& path) {
 // In order: of those that recognise a file the first reads it, of those with its extension the first writes it.
 const std::vector<Format>& formats() {
   static const std::vector<Format> all = {
-      dsec_format(), evt3_format(), evt2_format(), dat_format(), nmnist_format(), events_text_format(),
+      dsec_format(), evt3_format(), evt2_format(),   dat_format(),
+      npy_format(),  npz_format(),  nmnist_format(), events_text_format(),
   };
   return all;
 }

@@ -103,14 +103,21 @@ std::optional<Field> field_of(std::string_view type) {
   return field;
 }
 
-/// How many numbers an array of this shape has, if it has one dimension that matters.
-std::optional<std::uint64_t> count_of(const Literal& shape) {
+/// How many numbers an array has.
+struct Count {
+  std::uint64_t numbers = 1;
+  bool one_dimension = true;  ///< that matters
+};
+
+/// Nothing where it is no shape, or where the numbers cannot be counted.
+std::optional<Count> count_of(const Literal& shape) {
   if (!shape.sequence) return std::nullopt;
-  std::uint64_t count = 1;
+  Count count;
   for (const Literal& item : shape.items) {
     const auto extent = natural(item.text);
-    if (!extent || (*extent != 1 && count != 1)) return std::nullopt;
-    count *= *extent;
+    if (!extent) return std::nullopt;
+    count.one_dimension = count.one_dimension && (*extent == 1 || count.numbers == 1);
+    if (__builtin_mul_overflow(count.numbers, *extent, &count.numbers)) return std::nullopt;
   }
   return count;
 }
@@ -194,14 +201,14 @@ void Array::parse(std::string_view description) {
   const auto dictionary = take_literal(description);
   if (!dictionary || dictionary->items.size() % 2 != 0) fail("its header is damaged");
   const Literal* descr = nullptr;
-  std::optional<std::uint64_t> count;
+  std::optional<Count> count;
   for (std::size_t i = 0; i < dictionary->items.size(); i += 2) {
     if (dictionary->items[i].text == "descr") descr = &dictionary->items[i + 1];
     if (dictionary->items[i].text == "shape") count = count_of(dictionary->items[i + 1]);
   }
-  if (descr == nullptr) fail("its header is damaged");
-  if (!count) fail("it has not one dimension");
-  count_ = *count;
+  if (descr == nullptr || !count) fail("its header is damaged");
+  count_ = count->numbers;
+  one_dimension_ = count->one_dimension;
 
   const auto add = [&](const Literal& type, std::string name, std::uint64_t repeats) {
     auto field = type.sequence ? std::nullopt : field_of(type.text);
@@ -215,14 +222,15 @@ void Array::parse(std::string_view description) {
     fields_.push_back(*field);
   };
   if (!descr->sequence) {
-    add(*descr, "", 1);
+    fields_ = {field_of(descr->text).value_or(Field{.kind = 'V', .bytes = 1})};
+    item_bytes_ = fields_[0].bytes;
   } else {
     for (const Literal& item : descr->items) {
       if (item.items.size() < 2) fail("its header is damaged");
       const Literal& name = item.items[0];  // or title and name
-      const auto repeats = item.items.size() > 2 ? count_of(item.items[2]) : 1;
-      add(item.items[1], name.sequence && !name.items.empty() ? name.items.back().text : name.text,
-          repeats.value_or(0));
+      const auto repeats = item.items.size() > 2 ? count_of(item.items[2]) : Count{};
+      if (!repeats) fail("its header is damaged");
+      add(item.items[1], name.sequence && !name.items.empty() ? name.items.back().text : name.text, repeats->numbers);
     }
   }
   if (item_bytes_ == 0) fail("its items are empty");

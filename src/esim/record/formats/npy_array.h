@@ -47,11 +47,12 @@ class Array {
   /// The next bytes, fewer only at the end. Throws UserError where they cannot be read.
   using Read = std::function<std::size_t(std::span<std::byte>)>;
 
-  /// Throws UserError where it is not an array of this kind. `name` is that of the file, for people.
+  /// Throws UserError where it is no array. `name` is that of the file, for people.
   Array(std::string name, Read read);
 
   const std::vector<Field>& fields() const { return fields_; }  ///< one without a name, where items are no records
   std::uint64_t count() const { return count_; }
+  bool one_dimension() const { return one_dimension_; }  ///< or others of one item only
   std::size_t item_bytes() const { return item_bytes_; }
 
   /// Replaces what is held by the next items; how many of them there are.
@@ -74,6 +75,7 @@ class Array {
   Read read_;
   std::vector<Field> fields_;
   std::uint64_t count_ = 0;
+  bool one_dimension_ = false;
   std::size_t item_bytes_ = 0;
   std::vector<std::byte> items_;
   std::size_t held_ = 0;

@@ -18,6 +18,7 @@ class ColumnsReader final : public EventsReader {
     for (const auto* column : all()) {
       if (std::find(arrays_.begin(), arrays_.end(), column->array) == arrays_.end()) arrays_.push_back(column->array);
       portion_ = std::min(portion_, std::max<std::size_t>(1, kMaxBufferBytes / column->array->item_bytes()));
+      if (!column->array->one_dimension()) column->array->fail("it has more than one dimension");
       if (column->array->count() != count_) column->array->fail("its length is not that of the other arrays");
     }
   }

@@ -15,7 +15,7 @@ using prophesee::WordFile;
 
 constexpr int kMaxExtent = 2048;  // px
 
-// Of the 24 bits of the camera's clock, in us, two words hold twelve each: it is full after 16.7 s. Files are longer
+// Of the 24 bits of the camera's clock, in us, two words hold twelve each: it is full after 16.8 s. Files are longer
 // than that, up to what EVT 2.0 can tell as well.
 constexpr int kTimeBits = 12;
 constexpr std::int64_t kMaxUs = (std::int64_t{1} << 34) - 1;

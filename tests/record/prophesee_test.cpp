@@ -211,17 +211,18 @@ TEST_F(Prophesee, WhatDoesNotFitIsRefused) {
   for (const char* format : {"evt3", "evt2", "dat"}) {
     const auto refusal = [&](std::vector<Event> events, SensorSize sensor = {}) {
       const std::string message = message_of<UserError>([&] { write(format, events, 1, sensor); });
-      EXPECT_TRUE(contains(message, "written: ") && contains(message, "write another format")) << message;
+      EXPECT_TRUE(contains(message, "written: event ")) << message;
       return message;
     };
     const Event good = at(0, 0, 0, 1);
     EXPECT_TRUE(contains(refusal({{-1, 0, 0, 1}}), "event 0 is at -0.000000001 s"));
+    EXPECT_TRUE(contains(refusal({{-1, 0, 0, 1}}), "write another format"));
     const TimeNs latest = format_named(format).max_time + kNsPerUs - 1;
     EXPECT_TRUE(contains(refusal({good, good, {latest + 1, 0, 0, 1}}), "event 2 is at ")) << format;
     EXPECT_NO_THROW(write(format, {good, {latest, 0, 0, 1}})) << format;
     const int extent = format_named(format).max_width;
     EXPECT_TRUE(contains(refusal({good, at(0, extent, 7, 1)}), "event 1 is at (" + std::to_string(extent) + ", 7)"));
-    EXPECT_TRUE(contains(refusal({at(0, 30, 7, 1)}, {30, 8}), "outside the 30 x 8 px of the sensor"));
+    EXPECT_TRUE(contains(refusal({at(0, 30, 7, 1)}, {30, 8}), "outside the sensor of 30 x 8 px"));
   }
 }
 

@@ -25,8 +25,8 @@ class EventsSink final : public Sink {
   void begin(const RecordingInfo& info) override {
     const Camera& camera = info.cameras.at(0).model;
     if (camera.width > limits_.max_width || camera.height > limits_.max_height) {
-      fail(fmt::format("the sensor has {} x {} px, and format {} has room for {} x {}", camera.width, camera.height,
-                       format_, limits_.max_width, limits_.max_height));
+      fail_limits(fmt::format("the sensor has {} x {} px, and format {} has room for {} x {}", camera.width,
+                              camera.height, format_, limits_.max_width, limits_.max_height));
     }
     const bool known = camera.width > 0 && camera.height > 0;
     width_ = known ? camera.width : limits_.max_width;
@@ -59,22 +59,33 @@ class EventsSink final : public Sink {
   [[noreturn]] void fail_time(EventSpan events) const {
     const auto fits = [&](const Event& event) { return event.t >= limits_.min_time && event.t <= limits_.max_time; };
     const auto wrong = std::find_if_not(events.begin(), events.end(), fits);
-    fail(fmt::format("event {} is at {} s, and format {} has room for times from {} to {} s",
-                     count_ + static_cast<std::uint64_t>(wrong - events.begin()), seconds(wrong->t), format_,
-                     seconds(limits_.min_time), seconds(limits_.max_time)));
+    fail_limits(fmt::format("event {} is at {} s, and format {} has room for times from {} to {} s",
+                            index_of(wrong, events), seconds(wrong->t), format_, seconds(limits_.min_time),
+                            seconds(limits_.max_time)));
   }
 
   [[noreturn]] void fail_place(EventSpan events) const {
     const auto fits = [&](const Event& event) { return event.x < width_ && event.y < height_; };
     const auto wrong = std::find_if_not(events.begin(), events.end(), fits);
-    fail(fmt::format("event {} is at ({}, {}), outside the {} x {} px {}",
-                     count_ + static_cast<std::uint64_t>(wrong - events.begin()), wrong->x, wrong->y, width_, height_,
-                     width_ == limits_.max_width ? "of format " + format_ : "of the sensor"));
+    const std::string where =
+        fmt::format("event {} is at ({}, {}), outside", index_of(wrong, events), wrong->x, wrong->y);
+    if (wrong->x >= limits_.max_width || wrong->y >= limits_.max_height) {
+      fail_limits(fmt::format("{} the {} x {} px that format {} has room for", where, limits_.max_width,
+                              limits_.max_height, format_));
+    }
+    fail(fmt::format("{} the sensor of {} x {} px: say its true size", where, width_, height_));
+  }
+
+  std::uint64_t index_of(EventSpan::iterator event, EventSpan events) const {
+    return count_ + static_cast<std::uint64_t>(event - events.begin());
+  }
+
+  [[noreturn]] void fail_limits(const std::string& what) const {
+    fail(what + "; write another format, such as dsec or text");
   }
 
   [[noreturn]] void fail(const std::string& what) const {
-    throw UserError(
-        fmt::format("cannot write {}: {}; write another format, such as dsec or text", path_.string(), what));
+    throw UserError(fmt::format("cannot write {}: {}", path_.string(), what));
   }
 
   std::unique_ptr<EventsWriter> writer_;

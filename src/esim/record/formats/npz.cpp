@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <zip.h>
 
-#include <array>
 #include <cstring>
 #include <optional>
 
@@ -9,7 +8,6 @@
 #include "esim/record/events_writer.h"
 #include "esim/record/formats/npy.h"
 #include "esim/record/formats/npy_array.h"
-#include "esim/record/input_file.h"
 #include "esim/record/output_file.h"
 
 namespace esim {

@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "esim/record/format.h"
 #include "esim/record/input_file.h"

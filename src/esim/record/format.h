@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -46,6 +47,7 @@ struct Format {
   TimeNs resolution = 1;                      ///< times of events are rounded down to multiples of it, ns
   bool either_unit = false;                   ///< and to multiples of WriteOptions::unit
   int max_width = 65536, max_height = 65536;  ///< px: larger sensors do not fit
+  TimeNs max_time = std::numeric_limits<TimeNs>::max();  ///< of events: later ones do not fit
 
   /// Is it a file (or folder) of this format? By its content, of which `head` is the first 4096 bytes, or less.
   std::function<bool(const std::filesystem::path& path, std::string_view head)> recognises{};

@@ -85,6 +85,14 @@ void create_folder(const std::filesystem::path& path) {
   if (error) throw OutputError("cannot create the folder " + path.string() + ": " + error.message());
 }
 
+void sync_file(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) throw_cannot_write(path, system_reason(errno));
+  const int error = ::fsync(descriptor) != 0 ? errno : 0;
+  ::close(descriptor);
+  if (error != 0) throw_cannot_write(path, system_reason(error));
+}
+
 void sync_directory(const std::filesystem::path& directory) {
   const int descriptor = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return;

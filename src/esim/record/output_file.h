@@ -45,6 +45,9 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
 /// Creates a folder, and those that it is in, where they are missing. Throws OutputError.
 void create_folder(const std::filesystem::path& path);
 
+/// Makes a file that is whole durable.
+void sync_file(const std::filesystem::path& path);
+
 /// Makes the names in a directory durable. Silent where the file system cannot do that.
 void sync_directory(const std::filesystem::path& directory);
 

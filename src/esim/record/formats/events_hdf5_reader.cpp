@@ -203,14 +203,14 @@ class WholeFile final : public EventsReader {
 
   /// Of a portion that cannot be read whole, half, and so on.
   bool read(std::vector<Event>& events) override {
-    for (std::uint64_t count = kBlock;; count /= 2) {
+    for (std::uint64_t count = std::min(kBlock, reader_.size() - done_);; count /= 2) {
       try {
         const std::vector<Event> portion = reader_.read(done_, count);
         events.insert(events.end(), portion.begin(), portion.end());
         done_ += portion.size();
         return !portion.empty();
       } catch (const UserError&) {
-        if (count == 1) throw;
+        if (count <= 1) throw;
       }
     }
   }

@@ -11,6 +11,9 @@
 #include "esim/record/formats/rosbag/rosbag_format.h"
 #include "esim/record/formats/image_sequences.h"
 #include "esim/record/formats/recording.h"
+#include "esim/record/formats/nmnist.h"
+#include "esim/record/formats/npy.h"
+#include "esim/record/formats/prophesee.h"
 #include "esim/record/input_file.h"
 
 namespace esim {
@@ -35,10 +38,17 @@ std::string extension_of(const fs::path& path) {
 
 // In order: of those that recognise a file the first reads it, of those with its extension the first writes it.
 const std::vector<Format>& formats() {
+  // clang-format off
   static const std::vector<Format> all = {
-      dsec_format(),
+      evt3_format(),
+      evt2_format(),
+      dat_format(),
+      npy_format(),
+      npz_format(),
+      nmnist_format(),
       rosbag_format(),
       mcap_format(),
+      dsec_format(),
       events_text_format(),
       recording_format(),
       flo_format(),
@@ -47,6 +57,7 @@ const std::vector<Format>& formats() {
       exr_format(),
       npy_truth_format(),
   };
+  // clang-format on
   return all;
 }
 

@@ -1,0 +1,107 @@
+#include "esim/record/events_writer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "esim/core/error.h"
+#include "esim/record/number_text.h"
+
+namespace esim {
+namespace {
+
+std::string seconds(TimeNs t) {
+  std::string text;
+  append_seconds(text, t);
+  return text;
+}
+
+class EventsSink final : public Sink {
+ public:
+  EventsSink(std::unique_ptr<EventsWriter> writer, std::filesystem::path path, std::string format, EventLimits limits)
+      : writer_(std::move(writer)), path_(std::move(path)), format_(std::move(format)), limits_(limits) {}
+
+  void begin(const RecordingInfo& info) override {
+    const Camera& camera = info.cameras.at(0).model;
+    if (camera.width > limits_.max_width || camera.height > limits_.max_height) {
+      fail_limits(fmt::format("the sensor has {} x {} px, and format {} has room for {} x {}", camera.width,
+                              camera.height, format_, limits_.max_width, limits_.max_height));
+    }
+    const bool known = camera.width > 0 && camera.height > 0;
+    width_ = known ? camera.width : limits_.max_width;
+    height_ = known ? camera.height : limits_.max_height;
+    writer_->begin(path_, known ? SensorSize{camera.width, camera.height} : SensorSize{});
+    open_ = true;
+  }
+
+  void write(const Record& record) override {
+    const auto* events = std::get_if<EventsRecord>(&record);
+    if (events == nullptr || events->camera != 0 || events->events.empty()) return;
+    check(events->events);
+    writer_->write(events->events);
+    count_ += events->events.size();
+  }
+
+  void end(bool) override {
+    if (std::exchange(open_, false)) writer_->end();
+  }
+
+ private:
+  /// They are in order of time: the first and the last tell.
+  void check(EventSpan events) const {
+    int x = 0, y = 0;
+    for (const Event& event : events) x = std::max<int>(x, event.x), y = std::max<int>(y, event.y);
+    if (events.front().t < limits_.min_time || events.back().t > limits_.max_time) fail_time(events);
+    if (x >= width_ || y >= height_) fail_place(events);
+  }
+
+  [[noreturn]] void fail_time(EventSpan events) const {
+    const auto fits = [&](const Event& event) { return event.t >= limits_.min_time && event.t <= limits_.max_time; };
+    const auto wrong = std::find_if_not(events.begin(), events.end(), fits);
+    fail_limits(fmt::format("event {} is at {} s, and format {} has room for times from {} to {} s",
+                            index_of(wrong, events), seconds(wrong->t), format_, seconds(limits_.min_time),
+                            seconds(limits_.max_time)));
+  }
+
+  [[noreturn]] void fail_place(EventSpan events) const {
+    const auto fits = [&](const Event& event) { return event.x < width_ && event.y < height_; };
+    const auto wrong = std::find_if_not(events.begin(), events.end(), fits);
+    const std::string where =
+        fmt::format("event {} is at ({}, {}), outside", index_of(wrong, events), wrong->x, wrong->y);
+    if (wrong->x >= limits_.max_width || wrong->y >= limits_.max_height) {
+      fail_limits(fmt::format("{} the {} x {} px that format {} has room for", where, limits_.max_width,
+                              limits_.max_height, format_));
+    }
+    fail(fmt::format("{} the sensor of {} x {} px: say its true size", where, width_, height_));
+  }
+
+  std::uint64_t index_of(EventSpan::iterator event, EventSpan events) const {
+    return count_ + static_cast<std::uint64_t>(event - events.begin());
+  }
+
+  [[noreturn]] void fail_limits(const std::string& what) const {
+    fail(what + "; write another format, such as dsec or text");
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw UserError(fmt::format("cannot write {}: {}", path_.string(), what));
+  }
+
+  std::unique_ptr<EventsWriter> writer_;
+  std::filesystem::path path_;
+  std::string format_;
+  EventLimits limits_;
+  int width_ = 0, height_ = 0;
+  std::uint64_t count_ = 0;
+  bool open_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Sink> make_events_sink(std::unique_ptr<EventsWriter> writer, std::filesystem::path path,
+                                       std::string format, EventLimits limits) {
+  return std::make_unique<EventsSink>(std::move(writer), std::move(path), std::move(format), limits);
+}
+
+}  // namespace esim

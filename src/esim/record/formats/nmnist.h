@@ -1,0 +1,12 @@
+#pragma once
+
+#include "esim/record/format.h"
+
+namespace esim {
+
+/// Five bytes an event, as in N-MNIST and N-Caltech101 (Orchard et al., Frontiers in Neuroscience 2015): x, y, then the
+/// polarity and 23 bits of the time in us, the highest first. An event in row 240 is none: from there on, times are
+/// 8192 us later than they say.
+Format nmnist_format();
+
+}  // namespace esim

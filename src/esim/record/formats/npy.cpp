@@ -1,0 +1,89 @@
+#include "esim/record/formats/npy.h"
+
+#include <fmt/format.h>
+
+#include <cstring>
+#include <optional>
+
+#include "esim/record/events_writer.h"
+#include "esim/record/formats/npy_array.h"
+#include "esim/record/input_file.h"
+#include "esim/record/output_file.h"
+
+namespace esim {
+namespace {
+
+class NpyWriter final : public EventsWriter {
+ public:
+  explicit NpyWriter(TimeUnit unit)
+      : unit_(unit),
+        descr_(fmt::format("[('t', '{}'), ('x', '<u2'), ('y', '<u2'), ('p', '|u1')]", npy::time_type(unit))) {}
+
+  void begin(const std::filesystem::path& path, SensorSize) override {
+    file_.emplace(path);
+    file_->append(npy::header_text(descr_, 0));
+  }
+
+  void write(EventSpan events) override {
+    std::string& bytes = file_->buffer();
+    const std::size_t before = bytes.size();
+    bytes.resize(before + events.size() * kItemBytes);
+    char* out = bytes.data() + before;
+    for (const Event& event : events) {
+      const std::int64_t t = unit_ == TimeUnit::us ? npy::microseconds(event.t) : event.t;
+      std::memcpy(out, &t, 8);
+      std::memcpy(out + 8, &event.x, 2);
+      std::memcpy(out + 10, &event.y, 2);
+      out[12] = event.polarity > 0 ? 1 : 0;
+      out += kItemBytes;
+    }
+    count_ += events.size();
+    file_->flush_if_full();
+  }
+
+  void end() override {
+    file_->flush();
+    file_->overwrite_start(npy::header_text(descr_, count_));
+    file_->close();
+    file_.reset();
+  }
+
+ private:
+  static constexpr std::size_t kItemBytes = 13;
+
+  TimeUnit unit_;
+  std::string descr_;
+  std::optional<OutputFile> file_;
+  std::uint64_t count_ = 0;
+};
+
+std::unique_ptr<EventsReader> open_npy(const std::filesystem::path& path) {
+  const auto file = std::make_shared<InputFile>(path);
+  const auto array = std::make_shared<npy::Array>(path.string(), [file](std::span<std::byte> out) {
+    const std::span<const std::byte> bytes = file->read(out.size());
+    std::memcpy(out.data(), bytes.data(), bytes.size());
+    return bytes.size();
+  });
+  npy::EventColumns columns;
+  for (const npy::Field& field : array->fields()) npy::take_column(field.name, {array, field}, columns);
+  return npy::make_columns_reader(path.string(), std::move(columns));
+}
+
+}  // namespace
+
+Format npy_format() {
+  return {
+      .name = "npy",
+      .description = "NumPy array of records t, x, y, p",
+      .extensions = {".npy"},
+      .holds = {Content::events},
+      .recognises = [](const auto&, std::string_view head) { return head.starts_with(npy::kMagic); },
+      .open = [](const auto& path, const ReadOptions& options) { return make_events_source(open_npy(path), options); },
+      .create =
+          [](const auto& path, const WriteOptions& options) {
+            return make_events_sink(std::make_unique<NpyWriter>(options.unit), path, "npy", {});
+          },
+  };
+}
+
+}  // namespace esim

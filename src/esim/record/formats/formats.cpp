@@ -5,6 +5,7 @@
 #include "esim/core/error.h"
 #include "esim/record/checked_source.h"
 #include "esim/record/format.h"
+#include "esim/record/formats/aedat4/aedat4.h"
 #include "esim/record/formats/events_hdf5.h"
 #include "esim/record/formats/events_text.h"
 #include "esim/record/input_file.h"
@@ -32,6 +33,8 @@ std::string extension_of(const fs::path& path) {
 // In order: of those that recognise a file the first reads it, of those with its extension the first writes it.
 const std::vector<Format>& formats() {
   static const std::vector<Format> all = {
+      aedat4_zstd_format(),
+      aedat4_format(),
       dsec_format(),
       events_text_format(),
   };

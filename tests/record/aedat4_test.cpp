@@ -63,7 +63,7 @@ class Aedat4 : public testing::Test {
 };
 
 TEST_F(Aedat4, TwoCamerasFramesAndTheImuReadBack) {
-  for (const char* format : {"aedat4", "aedat4_zstd"}) {
+  for (const char* format : {"aedat4", "aedat4-zstd"}) {
     for (const Compression compression : {Compression::blosc, Compression::none}) {
       const test::Recorded found = test::read_all(write(format, compression));
       ASSERT_EQ(found.info.cameras.size(), 2U);

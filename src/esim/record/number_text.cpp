@@ -1,8 +1,16 @@
 #include "esim/record/number_text.h"
 
+#include <algorithm>
 #include <charconv>
+#include <limits>
 
 namespace esim {
+namespace {
+
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+}  // namespace
 
 std::string grouped(std::uint64_t number) {
   std::string reversed;
@@ -29,6 +37,39 @@ char* put_seconds(char* out, TimeNs t) {
 void append_seconds(std::string& text, TimeNs t) {
   char digits[kMaxSecondsText];
   text.append(digits, put_seconds(digits, t));
+}
+
+bool parse_seconds(std::string_view word, TimeNs& t) {
+  const bool negative = !word.empty() && word[0] == '-';
+  if (negative) word.remove_prefix(1);
+  const std::size_t point = std::min(word.find('.'), word.size());
+  std::int64_t seconds = 0;
+  if (point == 0 || !is_digit(word[0]) || !parse_number(word.substr(0, point), seconds)) return false;
+  const std::string_view decimals = word.substr(std::min(point + 1, word.size()));
+  if (!std::all_of(decimals.begin(), decimals.end(), is_digit)) return false;
+  std::int64_t ns = 0;
+  for (std::size_t i = 0; i < 9; ++i) ns = 10 * ns + (i < decimals.size() ? decimals[i] - '0' : 0);
+  if (seconds > std::numeric_limits<TimeNs>::max() / kNsPerSecond - 1) return false;
+  t = seconds * kNsPerSecond + ns;
+  if (negative) t = -t;
+  return true;
+}
+
+std::string_view problem_of_time(std::optional<TimeNs> last, TimeNs t) {
+  constexpr TimeNs kMaxTime = std::numeric_limits<TimeNs>::max() / 2;  // differences of times stay representable
+  if (t > kMaxTime || t < -kMaxTime) return "the time is none of a recording";
+  if (last && t < *last) return "the time is before that above: sort by time";
+  return "";
+}
+
+std::string_view take_word(std::string_view& line) {
+  std::size_t begin = 0;
+  while (begin < line.size() && is_blank(line[begin])) ++begin;
+  std::size_t end = begin;
+  while (end < line.size() && !is_blank(line[end])) ++end;
+  const std::string_view word = line.substr(begin, end - begin);
+  line.remove_prefix(end);
+  return word;
 }
 
 }  // namespace esim

@@ -1,7 +1,11 @@
 #pragma once
 
+#include <charconv>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
+#include <system_error>
 
 #include "esim/core/time.h"
 
@@ -17,5 +21,22 @@ inline constexpr int kMaxSecondsText = 24;
 char* put_seconds(char* out, TimeNs t);
 
 void append_seconds(std::string& text, TimeNs t);
+
+/// Reads such a time, with any number of decimals, exactly: digits beyond the nanosecond are dropped. False where it is
+/// something else, an exponent included.
+bool parse_seconds(std::string_view word, TimeNs& t);
+
+/// Reads a number that is all there is in a word; false where it is something else, or out of range.
+template <typename Number>
+bool parse_number(std::string_view word, Number& value) {
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return error == std::errc() && end == word.data() + word.size();
+}
+
+/// What is wrong with a time that follows another one in a recording: "" where nothing is.
+std::string_view problem_of_time(std::optional<TimeNs> last, TimeNs t);
+
+/// Takes the next word, up to a blank, off the start of a line; empty where there is none left.
+std::string_view take_word(std::string_view& line);
 
 }  // namespace esim

@@ -6,8 +6,12 @@
 #include "esim/record/checked_source.h"
 #include "esim/record/format.h"
 #include "esim/record/formats/aedat4/aedat4.h"
+#include "esim/record/formats/dataset/dataset.h"
 #include "esim/record/formats/events_hdf5.h"
 #include "esim/record/formats/events_text.h"
+#include "esim/record/formats/hdf5_columns.h"
+#include "esim/record/formats/m3ed.h"
+#include "esim/record/formats/v2e.h"
 #include "esim/record/input_file.h"
 
 namespace esim {
@@ -33,9 +37,9 @@ std::string extension_of(const fs::path& path) {
 // In order: of those that recognise a file the first reads it, of those with its extension the first writes it.
 const std::vector<Format>& formats() {
   static const std::vector<Format> all = {
-      aedat4_zstd_format(),
-      aedat4_format(),
-      dsec_format(),
+      aedat4_zstd_format(), aedat4_format(), dataset_format(), dataset_folder_format(),
+      m3ed_format(),        v2e_format(),    e2vid_format(),   e2calib_format(),
+      dsec_format(),  // takes every HDF5 that is left
       events_text_format(),
   };
   return all;

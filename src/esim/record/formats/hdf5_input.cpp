@@ -13,6 +13,7 @@ namespace {
 
 constexpr hsize_t kMaxChunkNumbers = hsize_t{1} << 25;
 constexpr std::size_t kMaxTextBytes = 256;
+constexpr hssize_t kMaxTexts = 1 << 16;
 constexpr std::size_t kBloscHead = 16;
 
 bool is_integer(hid_t type) { return H5Tget_class(type) == H5T_INTEGER && H5Tget_size(type) <= 8; }
@@ -42,7 +43,7 @@ bool Input::has(const char* name) const {
   return H5Lexists(file_, name, H5P_DEFAULT) > 0;
 }
 
-Column Input::open_column(const char* name) const {
+Column Input::open(const char* name, std::size_t item_rank, bool integers) const {
   const Quiet quiet;
   if (!has(name)) fail(std::string("there is no dataset ") + name);
   Column column;
@@ -50,10 +51,21 @@ Column Input::open_column(const char* name) const {
   if (!column.dataset.valid()) fail(std::string(name) + " is not a readable dataset (" + last_error() + ")");
   const Handle type(H5Dget_type(column.dataset), H5Tclose);
   const Handle space(H5Dget_space(column.dataset), H5Sclose);
-  if (!is_integer(type)) fail(std::string(name) + " does not hold integers");
-  if (H5Sget_simple_extent_ndims(space) != 1) fail(std::string(name) + " does not have one dimension");
-  if (H5Sget_simple_extent_dims(space, &column.size, nullptr) < 0) fail(last_error());
+  if (integers && !is_integer(type)) fail(std::string(name) + " does not hold integers");
+  if (!is_integer(type) && H5Tget_class(type) != H5T_FLOAT) fail(std::string(name) + " does not hold numbers");
+  if (H5Sget_simple_extent_ndims(space) != static_cast<int>(item_rank + 1))
+    fail(std::string(name) + (item_rank == 0 ? " does not have one dimension"
+                                             : " does not have " + std::to_string(item_rank + 1) + " dimensions"));
+  std::vector<hsize_t> shape(item_rank + 1);
+  if (H5Sget_simple_extent_dims(space, shape.data(), nullptr) < 0) fail(last_error());
+  column.size = shape[0];
+  column.item_shape.assign(shape.begin() + 1, shape.end());
   column.number_bytes = H5Tget_size(type);
+  hsize_t numbers = 1;
+  for (const hsize_t extent : column.item_shape) {
+    if (extent == 0 || __builtin_mul_overflow(numbers, extent, &numbers) || numbers > kMaxChunkNumbers)
+      fail(std::string(name) + " has items of a size that this reader does not take");
+  }
   require_storage(column, name);
   const Handle creation(H5Dget_create_plist(column.dataset), H5Pclose);
   if (H5Pget_layout(creation) == H5D_CHUNKED) open_chunks(creation, column, name);
@@ -70,13 +82,23 @@ void Input::require_storage(const Column& column, const std::string& name) const
     fail(name + " is stored in a way that this reader does not know");
   std::error_code error;
   const std::uintmax_t file_bytes = std::filesystem::file_size(path_, error);
-  if (H5Dget_storage_size(column.dataset) < column.size || column.size > file_bytes) fail_short(column, name);
+  if (column.size > file_bytes / column.item_numbers() ||
+      H5Dget_storage_size(column.dataset) < column.size * column.item_numbers()) {
+    fail_short(column, name);
+  }
 }
 
 void Input::open_chunks(hid_t creation, Column& column, const std::string& name) const {
-  if (H5Pget_chunk(creation, 1, &column.chunk) != 1 || column.chunk == 0 || column.chunk > kMaxChunkNumbers) {
-    fail(name + " has chunks of " + std::to_string(column.chunk) + " numbers, which is more than this reader takes");
+  std::vector<hsize_t> shape(column.item_shape.size() + 1);
+  const int rank = static_cast<int>(shape.size());
+  if (H5Pget_chunk(creation, rank, shape.data()) != rank) fail(name + ": " + last_error());
+  column.chunk = shape[0];
+  if (column.chunk == 0 || column.chunk > kMaxChunkNumbers / column.item_numbers()) {
+    fail(name + " has chunks of " + std::to_string(column.chunk) + (rank == 1 ? " numbers" : " items") +
+         ", which is more than this reader takes");
   }
+  if (!std::equal(column.item_shape.begin(), column.item_shape.end(), shape.begin() + 1))
+    fail(name + " has chunks that are parts of items, which this reader does not know");
   // Blosc's filter takes four values without looking whether there are so many.
   const int filters = H5Pget_nfilters(creation);
   for (int i = 0; i < filters; ++i) {
@@ -103,21 +125,23 @@ void Input::require_sound_chunks(const Column& column, hsize_t first, hsize_t co
   if (!column.only_blosc) return;
   std::vector<std::uint8_t> packed;
   for (hsize_t chunk = first / column.chunk; chunk <= (first + count - 1) / column.chunk; ++chunk) {
-    const hsize_t offset = chunk * column.chunk;
+    std::vector<hsize_t> offset(column.item_shape.size() + 1);
+    offset[0] = chunk * column.chunk;
     hsize_t bytes = 0;
-    if (H5Dget_chunk_storage_size(column.dataset, &offset, &bytes) < 0) fail(last_error());
-    const std::size_t chunk_bytes = column.chunk * column.number_bytes;
+    if (H5Dget_chunk_storage_size(column.dataset, offset.data(), &bytes) < 0) fail(last_error());
+    const std::size_t chunk_bytes = column.chunk * column.item_numbers() * column.number_bytes;
     bool sound = bytes > 0 && bytes <= chunk_bytes + kBloscHead;
     if (sound) {
       packed.resize(std::max<std::size_t>(bytes, kBloscHead));
       std::uint32_t skipped_filters = 0;
-      if (H5Dread_chunk(column.dataset, H5P_DEFAULT, &offset, &skipped_filters, packed.data()) < 0) fail(last_error());
+      if (H5Dread_chunk(column.dataset, H5P_DEFAULT, offset.data(), &skipped_filters, packed.data()) < 0)
+        fail(last_error());
       std::uint32_t unpacked_bytes = 0, packed_bytes = 0;  // both little-endian
       std::memcpy(&unpacked_bytes, &packed[4], sizeof(unpacked_bytes));
       std::memcpy(&packed_bytes, &packed[12], sizeof(packed_bytes));
       sound = skipped_filters != 0 ? bytes == chunk_bytes : unpacked_bytes == chunk_bytes && packed_bytes == bytes;
     }
-    if (!sound) fail("the packed numbers from number " + std::to_string(offset) + " on are damaged");
+    if (!sound) fail("the packed numbers from number " + std::to_string(offset[0]) + " on are damaged");
   }
 }
 
@@ -126,8 +150,11 @@ void Input::read(const Column& column, hsize_t first, hsize_t count, hid_t type,
   const Quiet quiet;
   require_sound_chunks(column, first, count);
   const Handle in_file(H5Dget_space(column.dataset), H5Sclose);
-  const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
-  if (H5Sselect_hyperslab(in_file, H5S_SELECT_SET, &first, nullptr, &count, nullptr) < 0 ||
+  std::vector<hsize_t> start(column.item_shape.size() + 1), shape = column.item_shape;
+  start[0] = first;
+  shape.insert(shape.begin(), count);
+  const Handle in_memory(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose);
+  if (H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, shape.data(), nullptr) < 0 ||
       H5Dread(column.dataset, type, in_memory, in_file, H5P_DEFAULT, out) < 0) {
     const std::string reason = last_error();
     require_available(Compression::blosc);  // the usual cause has a remedy
@@ -181,6 +208,29 @@ std::optional<std::string> Input::text_attribute(const char* name) const {
   if (H5Aread(attribute, type, text.data()) < 0) fail(std::string("attribute ") + name + ": " + last_error());
   text.resize(std::min(text.size(), text.find('\0')));
   return text;
+}
+
+std::vector<std::string> Input::text_list_attribute(const Column& column, const char* name) const {
+  const Quiet quiet;
+  if (H5Aexists(column.dataset, name) <= 0) return {};
+  const Handle attribute(H5Aopen(column.dataset, name, H5P_DEFAULT), H5Aclose);
+  if (!attribute.valid()) fail(std::string("attribute ") + name + ": " + last_error());
+  const Handle type(H5Aget_type(attribute), H5Tclose);
+  const Handle space(H5Aget_space(attribute), H5Sclose);
+  const std::size_t size = H5Tget_size(type);
+  const hssize_t count = H5Sget_simple_extent_npoints(space);
+  if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || size > kMaxTextBytes || count < 0 ||
+      count > kMaxTexts) {
+    fail(std::string("attribute ") + name + " is not a list of short texts");
+  }
+  std::string cells(size * static_cast<std::size_t>(count), '\0');
+  if (H5Aread(attribute, type, cells.data()) < 0) fail(std::string("attribute ") + name + ": " + last_error());
+  std::vector<std::string> texts;
+  for (std::size_t at = 0; at < cells.size(); at += size) {
+    const std::string cell = cells.substr(at, size);
+    texts.push_back(cell.substr(0, cell.find('\0')));
+  }
+  return texts;
 }
 
 }  // namespace esim::hdf5

@@ -167,6 +167,20 @@ TEST(DatasetLayout, AnImageThatClaimsToBeHugeTakesNoMemory) {
   EXPECT_TRUE(test::contains(problem_of(folder), "not a PNG, or it is damaged"));
 }
 
+TEST(DatasetLayout, ACutZipIsToldAsThat) {
+  const test::TemporaryDirectory base;
+  const fs::path path = base.path() / "a.zip";
+  const auto frame = test::gradient_frame(0, 0, 64, 48, 8, 1);
+  const auto sink = format_named("dataset").create(path, {});
+  sink->begin(test::recording_info(64, 48, 0, kEnd));
+  sink->write(frame.record());
+  sink->end(true);
+  const std::string bytes = test::content(path);
+  const fs::path cut = base.write("cut.zip", bytes.substr(0, bytes.size() - 30));
+  EXPECT_TRUE(test::contains(problem_of(cut), "cut.zip"));
+  EXPECT_TRUE(test::contains(problem_of(cut), "it is cut off"));
+}
+
 std::string content_of(const FilesInput& files, const std::string& name) {
   const auto text = files.open(name);
   return {std::istreambuf_iterator<char>(*text), {}};

@@ -26,7 +26,12 @@ class FolderOutput final : public FilesOutput {
   }
 
   void append(const std::string& name, std::string_view text) override {
-    texts_.try_emplace(name, folder_ / name).first->second.append(text);
+    auto found = texts_.find(name);
+    if (found == texts_.end()) {
+      make((folder_ / name).parent_path());
+      found = texts_.try_emplace(name, folder_ / name).first;
+    }
+    found->second.append(text);
   }
 
   void close() override {

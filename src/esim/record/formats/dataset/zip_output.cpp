@@ -90,7 +90,10 @@ class ZipOutput final : public FilesOutput {
 
   void append(const std::string& name, std::string_view text) override {
     auto found = texts_.find(name);
-    if (found == texts_.end()) found = texts_.try_emplace(name, file_.path().string() + "." + name + ".part").first;
+    if (found == texts_.end()) {
+      const std::string part = file_.path().string() + ".part" + std::to_string(texts_.size());
+      found = texts_.try_emplace(name, part).first;
+    }
     found->second.append(text);
   }
 

@@ -169,8 +169,11 @@ TEST_P(EveryFormat, AFullDiskIsNamed) {
   EXPECT_THROW(test::record(*sink, info_, events), OutputError);
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, EveryFormat, testing::ValuesIn(event_formats()),
-                         [](const auto& test) { return test.param; });
+INSTANTIATE_TEST_SUITE_P(Formats, EveryFormat, testing::ValuesIn(event_formats()), [](const auto& test) {
+  std::string name = test.param;
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+});
 
 }  // namespace
 }  // namespace esim

@@ -2,8 +2,9 @@
 #include <utility>
 
 #include "esim/core/error.h"
-#include "esim/record/events_reader.h"
+#include "esim/record/formats/event_blocks.h"
 #include "esim/record/formats/events_hdf5.h"
+#include "esim/record/formats/hdf5_columns.h"
 #include "esim/record/formats/hdf5_input.h"
 
 namespace esim {
@@ -191,33 +192,21 @@ std::uint64_t EventsHdf5Reader::count_on() const {
 
 namespace {
 
-class WholeFile final : public EventsReader {
+class WholeFile final : public EventBlocksReader {
  public:
   explicit WholeFile(const std::filesystem::path& path) : reader_(path) {}
 
   SensorSize sensor() const override { return {reader_.width().value_or(0), reader_.height().value_or(0)}; }
   std::optional<TimeSpan> time_span() const override { return reader_.time_span(); }
-  double progress() const override {
-    return reader_.size() > 0 ? static_cast<double>(done_) / static_cast<double>(reader_.size()) : 1.0;
-  }
-
-  /// Of a portion that cannot be read whole, half, and so on.
-  bool read(std::vector<Event>& events) override {
-    for (std::uint64_t count = std::min(kBlock, reader_.size() - done_);; count /= 2) {
-      try {
-        const std::vector<Event> portion = reader_.read(done_, count);
-        events.insert(events.end(), portion.begin(), portion.end());
-        done_ += portion.size();
-        return !portion.empty();
-      } catch (const UserError&) {
-        if (count <= 1) throw;
-      }
-    }
-  }
 
  private:
+  std::uint64_t event_count() const override { return reader_.size(); }
+  void read_block(std::uint64_t first, std::uint64_t count, std::vector<Event>& events) override {
+    const std::vector<Event> block = reader_.read(first, count);
+    events.insert(events.end(), block.begin(), block.end());
+  }
+
   EventsHdf5Reader reader_;
-  std::uint64_t done_ = 0;  // events
 };
 
 }  // namespace
@@ -229,7 +218,7 @@ Format dsec_format() {
       .extensions = {".h5", ".hdf5"},
       .holds = {Content::events},
       .either_unit = true,
-      .recognises = [](const auto&, std::string_view head) { return head.starts_with("\x89HDF\r\n\x1a\n"); },
+      .recognises = [](const auto&, std::string_view head) { return is_hdf5(head); },
       .open = [](const auto& path,
                  const ReadOptions& options) { return make_events_source(std::make_unique<WholeFile>(path), options); },
       .create =

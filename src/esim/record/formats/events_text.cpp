@@ -1,20 +1,13 @@
 #include "esim/record/formats/events_text.h"
 
-#include <algorithm>
-#include <cerrno>
 #include <charconv>
-#include <cstring>
 #include <utility>
 
-#include "esim/core/error.h"
 #include "esim/record/events_reader.h"
 #include "esim/record/number_text.h"
 
 namespace esim {
 namespace {
-
-constexpr std::size_t kBlockBytes = 1 << 18;
-constexpr std::size_t kMaxLineBytes = 1 << 12;
 
 template <typename Integer>
 char* put(char* out, Integer value) {
@@ -77,51 +70,16 @@ void EventsTextWriter::end(bool) {
   file_.reset();
 }
 
-EventsTextReader::EventsTextReader(std::filesystem::path path) : path_(std::move(path)) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path_, error)) {
-    throw UserError("cannot read " + path_.string() + ": it is a directory");
-  }
-  file_.open(path_, std::ios::binary);
-  if (!file_) throw UserError("cannot read " + path_.string() + ": " + system_reason(errno));
-  block_.resize(kBlockBytes);
-  if (const std::uintmax_t size = std::filesystem::file_size(path_, error); !error) size_ = size;
-}
-
-void EventsTextReader::fail(const std::string& what) const {
-  throw UserError(path_.string() + ", line " + std::to_string(line_number_) + ": " + what);
-}
-
-bool EventsTextReader::next_line(std::string_view& line) {
-  const auto find_newline = [&] { return std::find(block_.begin() + begin_, block_.begin() + end_, '\n'); };
-  auto newline = find_newline();
-  if (newline == block_.begin() + end_ && file_) {
-    // The rest of the block moves to its start, and more of the file follows it.
-    std::memmove(block_.data(), block_.data() + begin_, end_ - begin_);
-    end_ -= std::exchange(begin_, 0);
-    file_.read(block_.data() + end_, static_cast<std::streamsize>(block_.size() - end_));
-    end_ += static_cast<std::size_t>(file_.gcount()), read_ += static_cast<std::uintmax_t>(file_.gcount());
-    if (file_.bad()) fail("the file cannot be read further");
-    newline = find_newline();
-  }
-  if (begin_ == end_) return false;
-  ++line_number_;
-  line = std::string_view(block_.data() + begin_, static_cast<std::size_t>(newline - block_.begin()) - begin_);
-  if (line.size() > kMaxLineBytes) fail("the line is longer than any event's");
-  begin_ += std::min(line.size() + 1, end_ - begin_);
-  return true;
-}
-
 Event EventsTextReader::parse(std::string_view line) const {
   Event event;
   int polarity = 0;
   const std::string_view t = take_word(line), x = take_word(line), y = take_word(line), p = take_word(line);
-  if (p.empty() || !take_word(line).empty()) fail("expected four numbers: t x y p");
-  if (!parse_seconds(t, event.t)) fail("\"" + std::string(t) + "\" is not a time in seconds");
-  if (!parse_number(x, event.x)) fail("\"" + std::string(x) + "\" is not a column");
-  if (!parse_number(y, event.y)) fail("\"" + std::string(y) + "\" is not a row");
+  if (p.empty() || !take_word(line).empty()) lines_.fail("expected four numbers: t x y p");
+  if (!parse_seconds(t, event.t)) lines_.fail("\"" + std::string(t) + "\" is not a time in seconds");
+  if (!parse_number(x, event.x)) lines_.fail("\"" + std::string(x) + "\" is not a column");
+  if (!parse_number(y, event.y)) lines_.fail("\"" + std::string(y) + "\" is not a row");
   if (!parse_number(p, polarity) || polarity < -1 || polarity > 1) {
-    fail("\"" + std::string(p) + "\" is not a polarity: 1 (ON) or 0 (OFF)");
+    lines_.fail("\"" + std::string(p) + "\" is not a polarity: 1 (ON) or 0 (OFF)");
   }
   event.polarity = polarity > 0 ? 1 : -1;
   return event;
@@ -130,7 +88,7 @@ Event EventsTextReader::parse(std::string_view line) const {
 bool EventsTextReader::read(std::vector<Event>& events, std::size_t count) {
   events.clear();
   std::string_view line;
-  while (events.size() < count && next_line(line)) {
+  while (events.size() < count && lines_.next(line)) {
     std::string_view rest = line;
     const std::string_view first = take_word(rest);
     if (first.empty() || first[0] == '#') continue;
@@ -138,7 +96,7 @@ bool EventsTextReader::read(std::vector<Event>& events, std::size_t count) {
     if (last_t_ && event.t < *last_t_) {
       std::string above;
       append_seconds(above, *last_t_);
-      fail("the time is before that of the line above, " + above + " s: sort the events by time");
+      lines_.fail("the time is before that of the line above, " + above + " s: sort the events by time");
     }
     last_t_ = event.t;
     events.push_back(event);

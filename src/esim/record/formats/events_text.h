@@ -1,8 +1,6 @@
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,6 +9,7 @@
 
 #include "esim/events/event.h"
 #include "esim/record/format.h"
+#include "esim/record/line_reader.h"
 #include "esim/record/output_file.h"
 #include "esim/record/record.h"
 
@@ -39,26 +38,20 @@ Format events_text_format();
 /// for times that decrease.
 class EventsTextReader {
  public:
-  explicit EventsTextReader(std::filesystem::path path);
+  explicit EventsTextReader(std::filesystem::path path) : lines_(std::move(path)) {}
+  explicit EventsTextReader(LineReader lines) : lines_(std::move(lines)) {}
 
   /// Replaces `events` by the next ones, at most `count`; false if there are none left. Where it throws, they are those
   /// above the line that is wrong.
   bool read(std::vector<Event>& events, std::size_t count);
 
   /// The share of the file that has been read.
-  double progress() const { return size_ > 0 ? static_cast<double>(read_) / static_cast<double>(size_) : 1.0; }
+  double progress() const { return lines_.progress(); }
 
  private:
-  bool next_line(std::string_view& line);
-  [[noreturn]] void fail(const std::string& what) const;
   Event parse(std::string_view line) const;
 
-  std::filesystem::path path_;
-  std::ifstream file_;
-  std::uintmax_t size_ = 0, read_ = 0;  // bytes
-  std::vector<char> block_;
-  std::size_t begin_ = 0, end_ = 0;  // what of the block is not read yet
-  std::uint64_t line_number_ = 0;
+  LineReader lines_;
   std::optional<TimeNs> last_t_;
 };
 

@@ -5,15 +5,20 @@
 #include "esim/core/error.h"
 #include "esim/record/checked_source.h"
 #include "esim/record/format.h"
+#include "esim/record/formats/aedat4/aedat4.h"
+#include "esim/record/formats/dataset/dataset.h"
 #include "esim/record/formats/events_hdf5.h"
 #include "esim/record/formats/events_text.h"
-#include "esim/record/formats/mcap/mcap_format.h"
-#include "esim/record/formats/rosbag/rosbag_format.h"
+#include "esim/record/formats/hdf5_columns.h"
 #include "esim/record/formats/image_sequences.h"
-#include "esim/record/formats/recording.h"
+#include "esim/record/formats/m3ed.h"
+#include "esim/record/formats/mcap/mcap_format.h"
 #include "esim/record/formats/nmnist.h"
 #include "esim/record/formats/npy.h"
 #include "esim/record/formats/prophesee.h"
+#include "esim/record/formats/recording.h"
+#include "esim/record/formats/rosbag/rosbag_format.h"
+#include "esim/record/formats/v2e.h"
 #include "esim/record/input_file.h"
 
 namespace esim {
@@ -46,10 +51,18 @@ const std::vector<Format>& formats() {
       npy_format(),
       npz_format(),
       nmnist_format(),
+      aedat4_zstd_format(),
+      aedat4_format(),
       rosbag_format(),
       mcap_format(),
-      dsec_format(),
-      events_text_format(),
+      dataset_format(),
+      dataset_folder_format(),
+      m3ed_format(),
+      v2e_format(),
+      e2vid_format(),
+      e2calib_format(),
+      dsec_format(),  // takes every HDF5 that is left
+      events_text_format(),  // and every text
       recording_format(),
       flo_format(),
       kitti_format(),

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "esim/record/formats/aedat4/description.h"
+#include "esim/record/formats/aedat4/packing.h"
+#include "esim/record/input_file.h"
+
+namespace esim::aedat4 {
+
+struct Packet {
+  int stream = 0;
+  std::uint64_t offset = 0;            ///< of its header, byte of the file
+  std::span<const std::byte> plain{};  ///< unpacked; borrowed until the next packet
+};
+
+/// The packets of a file in their order. The table at its end is not needed for that.
+class PacketReader {
+ public:
+  explicit PacketReader(const std::filesystem::path& path);
+
+  Packing packing() const { return packing_; }
+  const std::vector<Stream>& streams() const { return streams_; }
+
+  /// The earliest time and the latest in the table of packets, us, if there is a sound one.
+  struct Times {
+    std::int64_t start_us = 0, end_us = 0;
+  };
+  std::optional<Times> times() const { return times_; }
+
+  /// Passes over the packets of other streams than those that are `wanted`.
+  std::optional<Packet> next(std::span<const int> wanted);
+
+  double progress() const { return file_.progress(); }
+  [[noreturn]] void fail(const Packet& packet, std::string_view reason) const { file_.fail(packet.offset, reason); }
+
+ private:
+  void read_header();
+  void read_data_table();
+
+  InputFile file_;
+  Packing packing_ = Packing::none;
+  std::vector<Stream> streams_;
+  std::optional<Unpacker> unpacker_;
+  std::optional<std::uint64_t> data_table_;  // where it begins
+  std::optional<Times> times_;
+};
+
+bool is_aedat4(std::string_view head);
+
+}  // namespace esim::aedat4

@@ -1,0 +1,66 @@
+#include "esim/record/formats/dataset/dataset.h"
+
+#include "esim/core/error.h"
+#include "esim/record/formats/dataset/dataset_files.h"
+#include "esim/record/formats/dataset/dataset_reader.h"
+#include "esim/record/formats/dataset/dataset_writer.h"
+
+namespace esim {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::vector<Content> kContents = {Content::events, Content::frames, Content::imu, Content::poses};
+
+/// Those that only datasets have: events alone may be anything's.
+bool is_dataset(const FilesInput& files) {
+  if (!files.has(kEventsTxt)) return false;
+  for (const char* name : {kImagesTxt, kImuTxt, kGroundTruthTxt, kCalibTxt}) {
+    if (files.has(name)) return true;
+  }
+  return false;
+}
+
+/// A zip with an events.txt. One that is cut off is recognised by its beginning, so that its damage can be told.
+bool is_zipped_dataset(const fs::path& path, std::string_view head) {
+  if (!head.starts_with("PK\x03\x04")) return false;
+  try {
+    return open_zip_input(path, kEventsTxt)->has(kEventsTxt);
+  } catch (const UserError&) {
+    constexpr std::size_t kFirstName = 30;
+    const std::string_view first = head.substr(std::min(kFirstName, head.size()), 64);
+    return first.starts_with("events.txt") || first.starts_with("images/frame_") || first.starts_with("calib.txt");
+  }
+}
+
+}  // namespace
+
+Format dataset_format() {
+  return {
+      .name = "dataset",
+      .description = "the Event Camera Dataset's zip",
+      .extensions = {".zip"},
+      .holds = kContents,
+      .recognises = is_zipped_dataset,
+      .open = [](const fs::path& path,
+                 const ReadOptions& options) { return open_dataset(open_zip_input(path, kEventsTxt), options); },
+      .create = [](const fs::path& path,
+                   const WriteOptions&) { return make_dataset_writer([path] { return make_zip_output(path); }); },
+  };
+}
+
+Format dataset_folder_format() {
+  return {
+      .name = "dataset-folder",
+      .description = "a folder in the layout of the Event Camera Dataset",
+      .holds = kContents,
+      .folder = true,
+      .recognises = [](const fs::path& path, std::string_view) { return is_dataset(*open_folder_input(path)); },
+      .open = [](const fs::path& path,
+                 const ReadOptions& options) { return open_dataset(open_folder_input(path), options); },
+      .create = [](const fs::path& path,
+                   const WriteOptions&) { return make_dataset_writer([path] { return make_folder_output(path); }); },
+  };
+}
+
+}  // namespace esim

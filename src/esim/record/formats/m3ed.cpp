@@ -1,0 +1,178 @@
+#include "esim/record/formats/m3ed.h"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <string>
+
+#include "esim/core/error.h"
+#include "esim/record/formats/hdf5_columns.h"
+#include "esim/record/formats/hdf5_detail.h"
+
+namespace esim {
+namespace {
+
+constexpr EventColumns kColumns = {"prophesee/left/t", "prophesee/left/x", "prophesee/left/y", "prophesee/left/p",
+                                   "prophesee/left/calib/resolution"};
+constexpr std::size_t kChunk = 1 << 16;                 // events, and milliseconds
+constexpr TimeNs kLatest = 30 * 86'400 * kNsPerSecond;  // an index of its milliseconds fits anywhere
+
+void create_text(const hdf5::Output& file, const char* name, const std::string& text) {
+  const hdf5::Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  file.check(H5Tset_size(type, text.size()));
+  const hdf5::Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  const hdf5::Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  file.check(H5Pset_obj_track_times(creation, false));
+  const hdf5::Handle dataset(H5Dcreate2(file.id(), name, type, space, H5P_DEFAULT, creation, H5P_DEFAULT), H5Dclose);
+  file.check(static_cast<hid_t>(dataset));
+  file.check(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()));
+}
+
+template <typename T>
+void create_list(const hdf5::Output& file, const char* name, hid_t type, std::span<const T> numbers) {
+  hdf5::Series(file, name, {type, {}, numbers.size(), Compression::none}).append(numbers);
+}
+
+class M3edWriter final : public Sink {
+ public:
+  M3edWriter(std::filesystem::path path, Compression compression) : path_(std::move(path)), compression_(compression) {
+    hdf5::require_available(compression);
+  }
+  ~M3edWriter() override {
+    const hdf5::Quiet quiet;
+    close_series();
+  }
+
+  void begin(const RecordingInfo& info) override;
+  void write(const Record& record) override;
+  void end(bool complete) override;
+
+ private:
+  void write_calibration(const Camera& camera);
+  void index_milliseconds_until(std::int64_t us);
+  void write_chunk();
+  void write_milliseconds();
+  void close_series();
+
+  std::filesystem::path path_;
+  Compression compression_;
+  std::uint64_t events_seen_ = 0;
+
+  // What has not been written yet.
+  std::vector<std::int64_t> t_;
+  std::vector<std::uint16_t> x_, y_;
+  std::vector<std::int8_t> p_;
+  std::vector<std::uint64_t> milliseconds_;
+  std::int64_t next_millisecond_ = 0;
+
+  // The series close before the file.
+  std::optional<hdf5::Output> file_;
+  hdf5::Series t_series_, x_series_, y_series_, p_series_, ms_series_;
+};
+
+void M3edWriter::begin(const RecordingInfo& info) {
+  const hdf5::Quiet quiet;
+  file_.emplace(path_);
+  for (const char* group : {"prophesee", "prophesee/left", "prophesee/left/calib"}) file_->create_group(group);
+  const auto series = [&](const char* name, hid_t type) {
+    return hdf5::Series(*file_, name, {type, {}, kChunk, compression_});
+  };
+  t_series_ = series(kColumns.t, H5T_STD_I64LE);
+  x_series_ = series(kColumns.x, H5T_STD_U16LE);
+  y_series_ = series(kColumns.y, H5T_STD_U16LE);
+  p_series_ = series(kColumns.p, H5T_STD_I8LE);
+  ms_series_ = series("prophesee/left/ms_map_idx", H5T_STD_U64LE);
+  if (!info.cameras.empty()) write_calibration(info.cameras.front().model);
+  file_->flush();
+}
+
+void M3edWriter::write_calibration(const Camera& camera) {
+  if (camera.width > 0 && camera.height > 0) {
+    const std::array<std::int64_t, 2> size = {camera.width, camera.height};
+    create_list<std::int64_t>(*file_, kColumns.resolution, H5T_STD_I64LE, size);
+  }
+  RadialTangential d;
+  if (const auto* known = std::get_if<RadialTangential>(&camera.distortion)) d = *known;
+  const bool fits = std::holds_alternative<NoDistortion>(camera.distortion) ||
+                    (std::holds_alternative<RadialTangential>(camera.distortion) && d.k3 == 0);
+  if (camera.fx <= 0 || camera.fy <= 0 || !fits) return;
+  const std::array<double, 4> intrinsics = {camera.fx, camera.fy, camera.cx, camera.cy};
+  const std::array<double, 4> coefficients = {d.k1, d.k2, d.p1, d.p2};
+  create_text(*file_, "prophesee/left/calib/camera_model", "pinhole");
+  create_text(*file_, "prophesee/left/calib/distortion_model", "radtan");
+  create_list<double>(*file_, "prophesee/left/calib/intrinsics", H5T_IEEE_F64LE, intrinsics);
+  create_list<double>(*file_, "prophesee/left/calib/distortion_coeffs", H5T_IEEE_F64LE, coefficients);
+}
+
+void M3edWriter::write(const Record& record) {
+  const auto* events = std::get_if<EventsRecord>(&record);
+  if (events == nullptr || events->camera != 0) return;
+  for (const Event& event : events->events) {
+    if (event.t < 0 || event.t > kLatest) {
+      throw UserError(path_.string() + ": M3ED counts times from the start of the recording, so that an event at " +
+                      std::to_string(event.t / kNsPerSecond) + " s does not fit: convert with --from-zero");
+    }
+    const std::int64_t us = event.t / kNsPerUs;
+    index_milliseconds_until(us);
+    t_.push_back(us);
+    x_.push_back(event.x), y_.push_back(event.y);
+    p_.push_back(event.polarity > 0 ? 1 : 0);
+    ++events_seen_;
+    if (t_.size() == kChunk) write_chunk();
+  }
+}
+
+/// Milliseconds at or before this time start at the next event.
+void M3edWriter::index_milliseconds_until(std::int64_t us) {
+  for (; next_millisecond_ * 1000 <= us; ++next_millisecond_) {
+    milliseconds_.push_back(events_seen_);
+    if (milliseconds_.size() == kChunk) write_milliseconds();
+  }
+}
+
+void M3edWriter::write_milliseconds() {
+  const hdf5::Quiet quiet;
+  ms_series_.append(std::span<const std::uint64_t>(milliseconds_));
+  milliseconds_.clear();
+}
+
+void M3edWriter::write_chunk() {
+  const hdf5::Quiet quiet;
+  t_series_.append(std::span<const std::int64_t>(t_));
+  x_series_.append(std::span<const std::uint16_t>(x_));
+  y_series_.append(std::span<const std::uint16_t>(y_));
+  p_series_.append(std::span<const std::int8_t>(p_));
+  t_.clear(), x_.clear(), y_.clear(), p_.clear();
+  file_->flush();
+}
+
+void M3edWriter::end(bool) {
+  if (!file_) return;
+  const hdf5::Quiet quiet;
+  write_chunk();
+  write_milliseconds();
+  close_series();
+  file_->close();
+  file_.reset();
+}
+
+void M3edWriter::close_series() {
+  for (hdf5::Series* series : {&t_series_, &x_series_, &y_series_, &p_series_, &ms_series_}) *series = hdf5::Series();
+}
+
+}  // namespace
+
+Format m3ed_format() {
+  return {
+      .name = "m3ed",
+      .description = "HDF5 in M3ED's layout",
+      .holds = {Content::events},
+      .resolution = kNsPerUs,
+      .recognises = [](const auto& path, std::string_view head) { return has_event_columns(kColumns, path, head); },
+      .open = [](const auto& path, const ReadOptions& options) { return open_event_columns(kColumns, path, options); },
+      .create = [](const auto& path,
+                   const WriteOptions& options) { return std::make_unique<M3edWriter>(path, options.compression); },
+  };
+}
+
+}  // namespace esim

@@ -42,11 +42,11 @@ struct Format {
   std::string description{};              ///< a line for people
   std::vector<std::string> extensions{};  ///< ".raw"; the first format that has a path's extension writes it
   std::vector<Content> holds{};
-  bool several_cameras = false;               ///< else records of camera 0 are all there is
-  bool folder = false;                        ///< a recording is a folder of files, not a file
-  TimeNs resolution = 1;                      ///< times of events are rounded down to multiples of it, ns
-  bool either_unit = false;                   ///< and to multiples of WriteOptions::unit
-  int max_width = 65536, max_height = 65536;  ///< px: larger sensors do not fit
+  bool several_cameras = false;                          ///< else records of camera 0 are all there is
+  bool folder = false;                                   ///< a recording is a folder of files, not a file
+  TimeNs resolution = 1;                                 ///< times of events are rounded down to multiples of it, ns
+  bool either_unit = false;                              ///< and to multiples of WriteOptions::unit
+  int max_width = 65536, max_height = 65536;             ///< px: larger sensors do not fit
   TimeNs max_time = std::numeric_limits<TimeNs>::max();  ///< of events: later ones do not fit
 
   /// Is it a file (or folder) of this format? By its content, of which `head` is the first 4096 bytes, or less.

@@ -1,0 +1,7 @@
+#include "bindings.h"
+
+namespace esim::python {
+
+void bind_representations(nanobind::module_&) {}
+
+}  // namespace esim::python

@@ -8,6 +8,7 @@ x y z w. The guide is `docs/python.md`, the options of scenarios are in `docs/sc
 from ._errors import Error, InternalError, OutputError
 from ._event_camera import EventCamera, linear_light
 from ._files import EventsIterator, formats, info, load_events, save_events
+from ._represent import event_count, event_frame, event_tensor, time_surface, voxel_grid
 from ._scenario import Scenario
 from ._simulate import CameraPacket, Packet, Renderer, Simulation, simulate
 from ._trajectory import Trajectory
@@ -28,10 +29,15 @@ __all__ = [
     "Scenario",
     "Simulation",
     "Trajectory",
+    "event_count",
+    "event_frame",
+    "event_tensor",
     "formats",
     "info",
     "linear_light",
     "load_events",
     "save_events",
     "simulate",
+    "time_surface",
+    "voxel_grid",
 ]

@@ -119,6 +119,7 @@ int traverse(PyObject* self, visitproc visit, void* arg) {
 }
 
 int clear(PyObject* self) {
+  if (!nb::inst_ready(self)) return 0;
   std::optional<PythonFunction>& render = nb::inst_ptr<Simulation>(self)->render();
   if (render) render->clear();
   return 0;

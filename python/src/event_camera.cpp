@@ -5,6 +5,7 @@
 
 #include "arrays.h"
 #include "bindings.h"
+#include "esim/core/error.h"
 #include "esim/core/parallel.h"
 #include "esim/scenario/conversion.h"
 
@@ -19,6 +20,11 @@ struct OwnedEventCamera {
       : width(columns), height(rows), workers(threads), camera(read_event_camera(options, ""), columns, rows, seed) {}
 
   nb::object process(const Frame& frame, TimeNs t) {
+    if (frame.shape(0) != static_cast<std::size_t>(height) || frame.shape(1) != static_cast<std::size_t>(width)) {
+      throw UserError("a frame of " + std::to_string(frame.shape(1)) + " x " + std::to_string(frame.shape(0)) +
+                      " px (width x height), but the camera has " + std::to_string(width) + " x " +
+                      std::to_string(height) + "; give an array of shape (height, width)");
+    }
     std::vector<Event> events;
     {
       const nb::gil_scoped_release released;

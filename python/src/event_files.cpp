@@ -104,6 +104,8 @@ void check(EventSpan events, int width, int height) {
                       ", y = " + std::to_string(event.y) + " is outside the sensor, " + std::to_string(width) + " x " +
                       std::to_string(height) + " px");
     }
+    if (event.polarity != 1 && event.polarity != -1)
+      throw UserError("event " + std::to_string(i) + ": p = " + std::to_string(event.polarity) + "; give 1 or -1");
     if (i > 0 && event.t < events[i - 1].t) {
       throw UserError("event " + std::to_string(i) + ": its time, " + std::to_string(event.t) +
                       " ns, is before that of the event before, " + std::to_string(events[i - 1].t) +

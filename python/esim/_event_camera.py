@@ -58,7 +58,9 @@ class EventCamera:
         esim.Error
             For frames of another size, values that are no irradiance, times out of order. The camera is then as before.
         """
-        if not (isinstance(frame, np.ndarray) and frame.dtype == _FLOAT32 and frame.flags.c_contiguous):
+        if not (
+            isinstance(frame, np.ndarray) and frame.dtype == _FLOAT32 and frame.ndim == 2 and frame.flags.c_contiguous
+        ):
             frame = _to_frame(frame)
         return self._core.process(frame, to_ns(t)).view(EVENT_DTYPE)
 

@@ -164,6 +164,15 @@ class Simulation:
     """A simulation under way: an iterator over its packets. Made by `simulate`.
 
     Also a context manager, which ends it: a recording that is being written is then finished as an interrupted one.
+
+    Attributes
+    ----------
+    start, end : int
+        Of the time that is simulated, ns.
+    cameras : dict of str to dict
+        Of each camera `width` and `height` (px), `K` (3, 3, px, without distortion) and `T_body_camera` (4, 4).
+    objects : list of str
+        Names of what moves, in the order of its numbers.
     """
 
     def __init__(self, core):

@@ -3,6 +3,7 @@
 import ast
 import inspect
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -32,7 +33,7 @@ def real_parameters(function):
 
 
 def compare(stub, real, name):
-    assert real.__doc__ or name.startswith("__") or "__" in name, f"{name} has no docstring"
+    assert real.__doc__ or "__" in name, f"{name} has no docstring"
     expected = stubbed_parameters(stub)
     if expected and expected[0][0] in ("self", "cls"):
         expected = expected[1:]
@@ -72,6 +73,13 @@ def test_stubs_and_package_agree():
 def test_the_fields_of_packets_are_those_of_the_stubs():
     (stub,) = [n for n in STUBS.body if isinstance(n, ast.ClassDef) and n.name == "CameraPacket"]
     assert [m.target.id for m in stub.body] == list(esim.CameraPacket.__slots__)
+
+
+def test_requirements_are_those_of_the_wheel():
+    root = pathlib.Path(__file__).parents[2]
+    wheels = re.search(r"^requires = \[(.*)\]", (root / "pyproject.toml").read_text(), re.MULTILINE).group(1)
+    pinned = re.findall(r'"([^"]+==[^"]+)"', wheels)
+    assert len(pinned) == 2 and set(pinned) <= set((root / "python" / "requirements.txt").read_text().split())
 
 
 def test_importing_loads_nothing_but_numpy():

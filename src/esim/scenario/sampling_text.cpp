@@ -75,7 +75,7 @@ std::vector<std::string> types_of(const std::variant<T...>&) {
 SamplingOptions read_sampling(const std::string& text) {
   YAML::Node root(YAML::NodeType::Map);
   root["sampling"] = map_of(text);
-  const YamlSource source{fmt::format("scheme '{}'", text), {}, kSetter, true};
+  const YamlSource source{fmt::format("scheme '{}'", text), {}};
   SamplingOptions options;
   YamlReader reader(root, "", source);
   reader("sampling", options, About{});

@@ -25,6 +25,7 @@ ALLOWED = {
     "sampling": "core geometry render reproject",
     "sensors": "core events geometry render",
     "record": "core events geometry",
+    "represent": "core events",
     "stats": "core events record",
     "truth": "core events geometry motion render",
     "video": "core scene",

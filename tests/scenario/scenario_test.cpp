@@ -215,6 +215,33 @@ TEST_F(ScenarioFile, RefusesFilesThatAreNoScenario) {
                        "environment variable ESIM_NO_SUCH is not set"));
 }
 
+TEST_F(ScenarioFile, MayBeTextThatAProgramHasPutTogether) {
+  ScenarioText text;
+  text.yaml = kMinimal;
+  text.file = folder_.path() / "nowhere.yaml";
+  text.overrides = {"seed=4"};
+  const Scenario scenario = read_scenario(text);
+  EXPECT_EQ(scenario.seed, 4U);
+  EXPECT_EQ(std::get<PanoramaRendererOptions>(scenario.renderer).image, folder_.path() / "p.jpg");
+
+  const auto refusal = [&] { return test::message_of<UserError>([&] { read_scenario(text); }); };
+  text.setter = "";
+  text.overrides = {"seed=-4"};
+  EXPECT_TRUE(refusal().starts_with("seed: "));
+  text.overrides.clear();
+  text.yaml = "duration_s: -1\ntrajectory: {type: static}";
+  EXPECT_TRUE(contains(refusal(), "nowhere.yaml:1: duration_s"));
+  text.has_lines = false;
+  EXPECT_TRUE(contains(refusal(), "nowhere.yaml: duration_s"));
+
+  text.yaml = "duration_s: 1";
+  EXPECT_TRUE(contains(refusal(), "renderer: is missing"));
+  text.needs_renderer = false;
+  EXPECT_TRUE(contains(refusal(), "trajectory: is missing"));
+  text.needs_trajectory = false;
+  EXPECT_EQ(read_scenario(text).duration_s, 1);
+}
+
 TEST_F(ScenarioFile, RefusesOverridesThatAreNone) {
   EXPECT_TRUE(contains(error(kMinimal, {"seed"}), "expected key=value"));
   EXPECT_TRUE(contains(error(kMinimal, {"seed.x=1"}), "--set"));

@@ -337,15 +337,17 @@ TEST(EventCamera, TimeStampsDoNotBandAtTheFrames) {
 TEST(EventCamera, TakesFramesChunkByChunk) {
   const EventCameraOptions options{.contrast_threshold = 0.2, .threshold_noise = 0.02, .refractory_period_us = 50};
   Feed feed(options, 37, 11, 3);
-  EventCamera camera(options, 37, 11, 3);
-  std::vector<Event> events;
+  EventCamera camera(options, 37, 11, 3), of_memory(options, 37, 11, 3);
+  std::vector<Event> events, same;
   TimeNs t = 5;
   for (const Image<float>& frame : random_frames(37, 11, 20, 8)) {
     feed.frame(frame, t);
     camera.process(frame, t, events, test::kOneThread);
+    of_memory.process(frame.pixels(), t, same, test::kOneThread);
     t += kNsPerMs;
   }
   EXPECT_GT(events.size(), 1000U);
+  EXPECT_EQ(events, same);
   EXPECT_EQ(events, feed.events(t));
 }
 

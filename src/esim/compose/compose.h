@@ -36,6 +36,24 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices)
 World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> body, int threads,
                   const Notices& notices);
 
+/// What stands in place of what a scenario says, where it is set.
+struct Substitutes {
+  std::shared_ptr<const Trajectory> body;  ///< known from its start to its end
+
+  /// Beside it, the scenario's renderer counts for nothing: neither its scenes nor its objects.
+  std::function<std::unique_ptr<Renderer>(const Camera& camera)> make_renderer;
+
+  /// Of make_renderer's: what moves, in the order of RenderRequest::objects. Trajectories cover the simulated time.
+  struct Object {
+    std::string name;
+    std::shared_ptr<const Trajectory> trajectory;
+  };
+  std::vector<Object> objects;
+};
+
+/// The same with substitutes. Throws UserError where the scenario asks for what a renderer of somebody else cannot do.
+World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices);
+
 /// What the scene files of a renderer hold: a mesh renderer's scene with all its objects, those that the scenario lists
 /// after the scene file's own. Empty for renderers without scene files. With colours if `colour`. Notes say what was
 /// found.

@@ -171,12 +171,31 @@ void name_what_moves(const RendererOptions& renderer, const SceneFile& scene, Re
   }
 }
 
+/// What a renderer that is not ours cannot do.
+void check_substitutes(const Scenario& scenario, const Substitutes& substitutes, const TimeSpan& span) {
+  if (!substitutes.make_renderer) return;
+  if (sees_colour(scenario)) throw UserError("colour: a renderer of your own shows grey only; use colour: none");
+  if (scenario.truth.event_points) {
+    throw UserError(
+        "truth.event_points: asks for single pixels at the time of each event, which a renderer of your own cannot "
+        "give; remove it");
+  }
+  for (const Substitutes::Object& object : substitutes.objects) {
+    if (object.trajectory->start() <= span.start && object.trajectory->end() >= span.end) continue;
+    throw UserError(
+        fmt::format("object {}: its trajectory lasts from {:.9g} to {:.9g} s, but the simulation from "
+                    "{:.9g} to {:.9g} s; shorten the simulation, or give it a longer trajectory",
+                    object.name, to_seconds(object.trajectory->start()), to_seconds(object.trajectory->end()),
+                    to_seconds(span.start), to_seconds(span.end)));
+  }
+}
+
 World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<const Trajectory> body,
-            const TimeSpan& span, int threads, const Notices& notices) {
+            const TimeSpan& span, const Substitutes& substitutes, int threads, const Notices& notices) {
+  check_substitutes(scenario, substitutes, span);
   World world;
   world.workers = std::make_unique<const Workers>(threads);
   world.trajectory = std::move(body);
-  world.objects = build_object_trajectories(scenario, scene, *world.trajectory, span, notices);
   world.info.start = span.start;
   world.info.end = span.end;
   world.info.truth_rate_hz = scenario.truth.rate_hz;
@@ -184,9 +203,17 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
   world.pose_clock = PeriodicClock(span.start, span.end, scenario.truth.pose_rate_hz);
 
   if (scenario.imu) add_imu(*scenario.imu, scenario.seed, world);
-  name_what_moves(scenario.renderer, scene, world.info);
+  if (substitutes.make_renderer) {
+    for (const Substitutes::Object& object : substitutes.objects) {
+      world.objects.push_back(object.trajectory);
+      world.info.objects.push_back(object.name);
+    }
+  } else {
+    world.objects = build_object_trajectories(scenario, scene, *world.trajectory, span, notices);
+    name_what_moves(scenario.renderer, scene, world.info);
+  }
 
-  const SceneCamera* const followed = followed_camera(scenario, scene);
+  const SceneCamera* const followed = substitutes.body != nullptr ? nullptr : followed_camera(scenario, scene);
   check_output(scenario);
   for (CameraOptions options : scenario.cameras) {
     check_sampling(options, notices);
@@ -196,7 +223,10 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
         {options.name, camera_model(options),
          pose_named(fmt::format("camera {}: T_body_camera", options.name), options.T_body_camera)});
   }
-  const RendererFactory make_renderer = build_renderer_factory(scenario.renderer, scene, sees_colour(scenario));
+  const RendererFactory make_renderer =
+      substitutes.make_renderer
+          ? [&](const Camera& camera, ColourFilters, const Workers&) { return substitutes.make_renderer(camera); }
+          : build_renderer_factory(scenario.renderer, scene, sees_colour(scenario));
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
     const CameraOptions& options = scenario.cameras[i];
     const Camera& model = world.info.cameras[i].model;
@@ -231,10 +261,16 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
 }  // namespace
 
 World build_world(const Scenario& scenario, int threads, const Notices& notices) {
-  const SceneFile scene = load_scenes(scenario.renderer, sees_colour(scenario), notices);
-  auto trajectory = build_trajectory(scenario, scene, notices);
-  const TimeSpan span = simulated_span(scenario, *trajectory);
-  return build(scenario, scene, std::move(trajectory), span, threads, notices);
+  return build_world(scenario, Substitutes{}, threads, notices);
+}
+
+World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices) {
+  const SceneFile scene =
+      substitutes.make_renderer ? SceneFile{} : load_scenes(scenario.renderer, sees_colour(scenario), notices);
+  std::shared_ptr<const Trajectory> body =
+      substitutes.body != nullptr ? substitutes.body : build_trajectory(scenario, scene, notices);
+  const TimeSpan span = simulated_span(scenario, *body);
+  return build(scenario, scene, std::move(body), span, substitutes, threads, notices);
 }
 
 World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> body, int threads,
@@ -243,7 +279,7 @@ World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> bo
   const TimeNs start = body->start() + to_ns(scenario.start_s);
   const TimeSpan span{start, start + to_ns(*scenario.duration_s)};
   const SceneFile scene = load_scenes(scenario.renderer, sees_colour(scenario), notices);
-  return build(scenario, scene, std::move(body), span, threads, notices);
+  return build(scenario, scene, std::move(body), span, Substitutes{}, threads, notices);
 }
 
 }  // namespace esim

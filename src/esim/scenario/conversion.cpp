@@ -4,12 +4,13 @@
 
 namespace esim {
 
-EventCameraOptions read_event_camera(const std::vector<std::string>& overrides) {
+EventCameraOptions read_event_camera(const std::vector<std::string>& overrides, const std::string& setter) {
   const std::string prefix = "event_camera.";
   YAML::Node root(YAML::NodeType::Map);
   YamlSource source;
+  source.setter = setter;
   for (const std::string& text : overrides) {
-    source.changed.push_back(apply_override(root, text.starts_with(prefix) ? text : prefix + text));
+    source.changed.push_back(apply_override(root, text.starts_with(prefix) ? text : prefix + text, setter));
   }
   EventCameraOptions options;
   YamlReader reader(root, "", source);

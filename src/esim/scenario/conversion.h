@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
 #include "esim/sensors/event_camera.h"
 #include "esim/video/frame_sequence.h"
@@ -43,8 +44,8 @@ template <>
 inline constexpr std::array<const char*, 3> kEnumNames<Encoding>{"auto", "srgb", "linear"};
 
 /// The event camera that "event_camera.key=value", or "key=value" for short, make of the default one. Throws UserError
-/// with key and what would be right.
-EventCameraOptions read_event_camera(const std::vector<std::string>& overrides);
+/// with key and what would be right, beginning with `setter`.
+EventCameraOptions read_event_camera(const std::vector<std::string>& overrides, const std::string& setter = kSetter);
 
 /// The options in full as YAML.
 std::string write_conversion(const ConversionOptions& options);

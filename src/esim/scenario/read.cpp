@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <numbers>
 #include <set>
 
@@ -13,16 +15,22 @@
 namespace esim {
 namespace {
 
-YAML::Node load(const std::filesystem::path& file) {
+std::string text_of(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error))
     throw UserError(fmt::format("{}: no such scenario file", file.string()));
+  std::ifstream stream(file, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream) throw UserError(fmt::format("{}: cannot be read; check its permissions", file.string()));
+  return text;
+}
+
+YAML::Node parse(const ScenarioText& text) {
   try {
-    return YAML::LoadFile(file.string());
-  } catch (const YAML::BadFile&) {
-    throw UserError(fmt::format("{}: cannot be read; check its permissions", file.string()));
+    return YAML::Load(text.yaml);
   } catch (const YAML::Exception& exception) {
-    throw UserError(fmt::format("{}:{}: not valid YAML: {}", file.string(), exception.mark.line + 1, exception.msg));
+    throw UserError(
+        fmt::format("{}:{}: not valid YAML: {}", text.file.string(), exception.mark.line + 1, exception.msg));
   }
 }
 
@@ -182,10 +190,18 @@ void complete_for_layers(Scenario& scenario, const SpritesRendererOptions& rende
 }  // namespace
 
 Scenario read_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
-  YAML::Node root = load(file);
-  YamlSource source{file, {}};
+  ScenarioText text;
+  text.yaml = text_of(file);
+  text.file = file;
+  text.overrides = overrides;
+  return read_scenario(text);
+}
+
+Scenario read_scenario(const ScenarioText& text) {
+  YAML::Node root = parse(text);
+  YamlSource source{text.file, {}, text.setter, text.has_lines};
   if (!root.IsMap()) YamlReader(root, "", source);
-  for (const std::string& text : overrides) source.changed.push_back(apply_override(root, text));
+  for (const std::string& change : text.overrides) source.changed.push_back(apply_override(root, change, text.setter));
 
   Scenario scenario;
   YamlReader reader(root, "", source);
@@ -194,10 +210,12 @@ Scenario read_scenario(const std::filesystem::path& file, const std::vector<std:
   reader.finish();
   const YAML::Node renderer = std::as_const(root)["renderer"], trajectory = std::as_const(root)["trajectory"];
   auto* const sprites = std::get_if<SpritesRendererOptions>(&scenario.renderer);
-  for (const char* required : {"renderer", "trajectory"}) {
-    if (!std::as_const(root)[required].IsDefined() && sprites == nullptr)
-      YamlReader::fail(source, YAML::Node(YAML::NodeType::Undefined), required, "is missing; every scenario needs one");
-  }
+  const auto require = [&](const char* key, bool needed) {
+    if (needed && !std::as_const(root)[key].IsDefined() && sprites == nullptr)
+      YamlReader::fail(source, YAML::Node(YAML::NodeType::Undefined), key, "is missing; every scenario needs one");
+  };
+  require("renderer", text.needs_renderer);
+  require("trajectory", text.needs_trajectory);
   if (scenario.imu) read_imu(*scenario.imu, std::as_const(root)["imu"], source);
   CameraOptions camera;
   if (sprites != nullptr) {

@@ -18,6 +18,23 @@ namespace esim {
 /// `overrides` are "dotted.key=value" and come last. Throws UserError with file, line, key, and what would be right.
 Scenario read_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides = {});
 
+/// What messages about overrides begin with, unless told otherwise: they are options of a command.
+inline constexpr const char* kSetter = "--set ";
+
+/// A scenario that a program has put together.
+struct ScenarioText {
+  std::string yaml;
+  std::filesystem::path file;  ///< names it in messages; relative paths are taken from its folder; it need not exist
+  bool has_lines = true;       ///< messages name the lines of `yaml`
+  std::vector<std::string> overrides;
+  std::string setter = kSetter;  ///< what messages about overrides begin with
+  bool needs_renderer = true;    ///< false: whoever simulates it brings its own, and the key may be missing
+  bool needs_trajectory = true;  ///< likewise
+};
+
+/// The same from text.
+Scenario read_scenario(const ScenarioText& text);
+
 /// The scenario in full, every option explicit, as YAML: reading it back gives the same scenario.
 std::string write_scenario(const Scenario& scenario);
 

@@ -33,10 +33,11 @@ std::string scalar(const YamlSource& source, const YAML::Node& node, const std::
 
 }  // namespace
 
-std::string apply_override(YAML::Node root, const std::string& text) {
+std::string apply_override(YAML::Node root, const std::string& text, const std::string& setter) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) {
-    throw UserError(fmt::format("--set {}: expected key=value, for example event_camera.contrast_threshold=0.2", text));
+    throw UserError(
+        fmt::format("{}{}: expected key=value, for example event_camera.contrast_threshold=0.2", setter, text));
   }
   const std::string key = text.substr(0, equals);
   try {
@@ -55,9 +56,9 @@ std::string apply_override(YAML::Node root, const std::string& text) {
       begin = dot + 1;
     }
   } catch (const YAML::Exception& exception) {
-    throw UserError(fmt::format("--set {}: cannot be set: {}", text, exception.msg));
+    throw UserError(fmt::format("{}{}: cannot be set: {}", setter, text, exception.msg));
   } catch (const std::logic_error&) {
-    throw UserError(fmt::format("--set {}: entries of a list are named by their number", text));
+    throw UserError(fmt::format("{}{}: entries of a list are named by their number", setter, text));
   }
 }
 
@@ -84,9 +85,9 @@ void YamlReader::fail(const YamlSource& source, const YAML::Node& node, const st
   const bool from_command_line = std::any_of(changed.begin(), changed.end(), [&](const std::string& set) {
     return key == set || key.starts_with(set + ".") || set.starts_with(key + ".");
   });
-  if (from_command_line) throw UserError(fmt::format("--set {}: {}", key, message));
+  if (from_command_line) throw UserError(fmt::format("{}{}: {}", source.setter, key, message));
   const YAML::Mark mark = node.IsDefined() ? node.Mark() : YAML::Mark::null_mark();
-  const std::string line = mark.line >= 0 ? fmt::format(":{}", mark.line + 1) : "";
+  const std::string line = source.has_lines && mark.line >= 0 ? fmt::format(":{}", mark.line + 1) : "";
   throw UserError(fmt::format("{}{}: {}: {}", source.file.string(), line, key, message));
 }
 

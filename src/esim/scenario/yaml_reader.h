@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "esim/core/error.h"
+#include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
 #include "esim/scenario/suggest.h"
 
@@ -20,10 +21,13 @@ namespace esim {
 struct YamlSource {
   std::filesystem::path file;        ///< of the scenario
   std::vector<std::string> changed;  ///< dotted keys that were set on the command line
+  std::string setter = kSetter;      ///< what messages about those begin with
+  bool has_lines = true;             ///< a person has written the lines, and finds them by their numbers
 };
 
-/// Sets root[a][b][c] for "a.b.c=value" and returns the key; list entries are named by their index.
-std::string apply_override(YAML::Node root, const std::string& text);
+/// Sets root[a][b][c] for "a.b.c=value" and returns the key; list entries are named by their index. Messages begin with
+/// `setter`.
+std::string apply_override(YAML::Node root, const std::string& text, const std::string& setter = kSetter);
 
 template <typename T>
 inline constexpr bool kIsVariant = false;

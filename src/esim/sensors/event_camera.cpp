@@ -172,19 +172,30 @@ void EventCamera::release_until(TimeNs watermark, std::vector<Event>& out) {
 }
 
 void EventCamera::process(const Image<float>& irradiance, TimeNs t, std::vector<Event>& out, const Workers& workers) {
+  const State& state = *state_;
+  if (irradiance.bounds() != state.size) {
+    throw UserError("frame " + std::to_string(state.frames) + ": its size is " + std::to_string(irradiance.width()) +
+                    " x " + std::to_string(irradiance.height()) + ", the camera's " + std::to_string(state.size.width) +
+                    " x " + std::to_string(state.size.height) + "; give frames of the camera's size");
+  }
+  process(irradiance.pixels(), t, out, workers);
+}
+
+void EventCamera::process(std::span<const float> irradiance, TimeNs t, std::vector<Event>& out,
+                          const Workers& workers) {
   State& state = *state_;
   const std::string frame = "frame " + std::to_string(state.frames);
-  if (irradiance.bounds() != state.size) {
-    throw UserError(frame + ": its size is " + std::to_string(irradiance.width()) + " x " +
-                    std::to_string(irradiance.height()) + ", the camera's " + std::to_string(state.size.width) + " x " +
-                    std::to_string(state.size.height) + "; give frames of the camera's size");
+  if (irradiance.size() != state.size.area()) {
+    throw UserError(frame + ": it has " + std::to_string(irradiance.size()) + " pixels, the camera " +
+                    std::to_string(state.size.area()) + "; give frames of the camera's size");
   }
   const bool first = state.frames == 0;
   if (!first && t <= state.last_time) {
     throw UserError(frame + ": its time, " + std::to_string(t) + " ns, does not come after that of the frame before, " +
                     std::to_string(state.last_time) + " ns; give frames in order");
   }
-  state.next_frame = irradiance;
+  if (state.next_frame.empty()) state.next_frame = Image<float>(state.size.width, state.size.height);
+  std::copy(irradiance.begin(), irradiance.end(), state.next_frame.data());
   const Image<float>& before = first ? state.next_frame : state.last_frame;
   const Segment segment{state.size, first ? t : state.last_time, t, &before, &state.next_frame};
   try {

@@ -45,6 +45,9 @@ class EventCamera {
   /// camera is then as it was before.
   void process(const Image<float>& irradiance, TimeNs t, std::vector<Event>& out, const Workers& workers);
 
+  /// The same from the memory of somebody else: rows one after the other, without padding.
+  void process(std::span<const float> irradiance, TimeNs t, std::vector<Event>& out, const Workers& workers);
+
   /// Takes what is newly known of the pixels' irradiance: those of a tile one after the other, contiguous in time. Each
   /// pixel's first segment is an instant, sets its reference, and fires nothing before. Throws UserError naming the
   /// pixel and the time where an irradiance is not a finite number >= 0; nothing of that segment has then been seen.

@@ -65,7 +65,7 @@ class Simulator {
   /// Takes every sample that is due until `t`, or until the end of the body's trajectory where that comes earlier, and
   /// writes what is then certain: of the IMU, everything until then; of all else, everything until the time before
   /// which every camera's events are known. That is behind by less than a sampler's longest interval (min_rate_hz). The
-  /// monitor is called after every sample; false once it has ended the simulation.
+  /// monitor is called after every sample; false where it stopped there, and another call goes on from there.
   bool advance_until(TimeNs t, const Monitor& monitor);
 
   /// Ends the recording, complete if it has reached the world's end.

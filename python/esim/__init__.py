@@ -1,0 +1,43 @@
+"""esim: an open event-camera simulator.
+
+Times are ints in nanoseconds; where a time is asked for, a float is taken as seconds. Irradiance is linear light with
+1 = white; pixel centres are at integer coordinates; T_A_B maps points from frame B to frame A; quaternions are Hamilton,
+x y z w. The guide is `docs/python.md`, the options of scenarios are in `docs/scenario.md`.
+"""
+
+from ._errors import Error, InternalError, OutputError
+from ._event_camera import EventCamera, linear_light
+from ._files import EventsIterator, formats, info, load_events, save_events
+from ._represent import event_count, event_frame, event_tensor, time_surface, voxel_grid
+from ._scenario import Scenario
+from ._simulate import CameraPacket, Packet, Renderer, Simulation, simulate
+from ._trajectory import Trajectory
+from ._types import EVENT_DTYPE, IMU_DTYPE, STATE_DTYPE
+
+__all__ = [
+    "EVENT_DTYPE",
+    "IMU_DTYPE",
+    "STATE_DTYPE",
+    "CameraPacket",
+    "Error",
+    "EventCamera",
+    "EventsIterator",
+    "InternalError",
+    "OutputError",
+    "Packet",
+    "Renderer",
+    "Scenario",
+    "Simulation",
+    "Trajectory",
+    "event_count",
+    "event_frame",
+    "event_tensor",
+    "formats",
+    "info",
+    "linear_light",
+    "load_events",
+    "save_events",
+    "simulate",
+    "time_surface",
+    "voxel_grid",
+]

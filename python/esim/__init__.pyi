@@ -1,0 +1,169 @@
+# The public surface, kept by hand; tests/test_stubs.py holds it against the package. Docstrings have shapes and units.
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from os import PathLike
+from types import TracebackType
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Path: TypeAlias = str | PathLike[str]
+Time: TypeAlias = int | float  # int ns, or float s
+Events: TypeAlias = NDArray[np.void]  # of EVENT_DTYPE, or with the fields t, x, y and p
+
+EVENT_DTYPE: np.dtype[np.void]
+IMU_DTYPE: np.dtype[np.void]
+STATE_DTYPE: np.dtype[np.void]
+
+class Error(ValueError): ...
+class OutputError(Error, OSError): ...
+class InternalError(RuntimeError): ...
+
+class Scenario:
+    def __init__(self, options: Mapping[str, Any], *, folder: Path | None = None) -> None: ...
+    @classmethod
+    def load(cls, path: Path) -> Scenario: ...
+    def set(self, key: str, value: Any) -> Scenario: ...
+    def to_yaml(self) -> str: ...
+
+class Trajectory:
+    @classmethod
+    def from_poses(
+        cls,
+        t: ArrayLike,
+        poses: ArrayLike | tuple[ArrayLike, ArrayLike],
+        *,
+        order: int = 5,
+        knot_interval_s: float = 0.0,
+        smoothing_time_s: float = 0.0,
+    ) -> Trajectory: ...
+    @classmethod
+    def load(
+        cls, path: Path, *, order: int = 5, knot_interval_s: float = 0.0, smoothing_time_s: float = 0.0
+    ) -> Trajectory: ...
+    @property
+    def start(self) -> int: ...
+    @property
+    def end(self) -> int: ...
+    @property
+    def fit(self) -> dict[str, float]: ...
+    def at(self, t: ArrayLike) -> NDArray[np.void]: ...
+    def pose(self, t: ArrayLike) -> NDArray[np.float64]: ...
+
+class EventCamera:
+    def __init__(
+        self, width: int, height: int, preset: str | None = None, *, seed: int = 0, threads: int = 0, **options: Any
+    ) -> None: ...
+    def process(self, frame: NDArray[np.floating], t: Time) -> Events: ...
+    @property
+    def dropped(self) -> int: ...
+
+def linear_light(image: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.float32]: ...
+
+class CameraPacket:
+    events: Events
+    truth_t: NDArray[np.int64]
+    pose: NDArray[np.float64]
+    irradiance: NDArray[np.float32]
+    depth: NDArray[np.float32]
+    flow: NDArray[np.float32]
+    object: NDArray[np.uint16]
+    displacement: NDArray[np.float32]
+    displacement_t: NDArray[np.int64]
+    visible: NDArray[np.uint8]
+    event_points: NDArray[np.float32]
+    images: NDArray[np.uint8] | NDArray[np.uint16]
+    image_t: NDArray[np.int64]
+    exposure_start: NDArray[np.int64]
+    exposure: NDArray[np.int64]
+
+class Packet(CameraPacket):  # of the only camera, where there is one
+    t0: int
+    t1: int
+    cameras: dict[str, CameraPacket]
+    body: NDArray[np.void]
+    objects: NDArray[np.float64]
+    imu: NDArray[np.void]
+    def __getitem__(self, name: str) -> CameraPacket: ...
+
+class Renderer:
+    def __init__(
+        self,
+        render: Callable[[int, NDArray[np.float64], list[NDArray[np.float64]]], Mapping[str, ArrayLike]],
+        *,
+        objects: Mapping[str, Trajectory] | None = None,
+    ) -> None: ...
+
+class Simulation(Iterator[Packet]):
+    start: int
+    end: int
+    cameras: dict[str, dict[str, Any]]
+    objects: list[str]
+    def __iter__(self) -> Simulation: ...
+    def __next__(self) -> Packet: ...
+    def run(self) -> dict[str, Any]: ...
+    def close(self) -> None: ...
+    @property
+    def report(self) -> dict[str, Any] | None: ...
+    def __enter__(self) -> Simulation: ...
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+def simulate(
+    scenario: Path | Mapping[str, Any] | Scenario,
+    *,
+    overrides: Mapping[str, Any] | Iterable[str] | None = None,
+    threads: int = 0,
+    seed: int | None = None,
+    out: Path | None = None,
+    force: bool = False,
+    packet_s: Time | None = None,
+    trajectory: Trajectory | None = None,
+    renderer: Renderer | Callable[..., Mapping[str, ArrayLike]] | None = None,
+) -> Simulation: ...
+
+class EventsIterator(Iterator[Events]):
+    def __init__(
+        self,
+        path: Path,
+        delta_t: Time | None = None,
+        n_events: int | None = None,
+        *,
+        start: Time | None = None,
+        width: int | None = None,
+        height: int | None = None,
+    ) -> None: ...
+    @property
+    def size(self) -> tuple[int, int] | None: ...
+    def __iter__(self) -> EventsIterator: ...
+    def __next__(self) -> Events: ...
+
+def load_events(path: Path, *, width: int | None = None, height: int | None = None) -> Events: ...
+def save_events(path: Path, events: Events, width: int, height: int, *, format: str | None = None) -> None: ...
+def info(path: Path) -> dict[str, Any]: ...
+def formats() -> list[dict[str, Any]]: ...
+def event_count(events: Events, width: int, height: int) -> NDArray[np.int32]: ...
+def event_tensor(
+    events: Events,
+    width: int,
+    height: int,
+    *,
+    t0: Time | None = None,
+    t1: Time | None = None,
+    stamp: Literal["last", "mean"] = "last",
+) -> NDArray[np.float32]: ...
+def voxel_grid(
+    events: Events,
+    width: int,
+    height: int,
+    bins: int,
+    *,
+    t0: Time | None = None,
+    t1: Time | None = None,
+    normalise: bool = False,
+) -> NDArray[np.float32]: ...
+def time_surface(
+    events: Events, width: int, height: int, *, t: Time | None = None, tau_s: float = 0.03
+) -> NDArray[np.float32]: ...
+def event_frame(events: Events, width: int, height: int) -> NDArray[np.uint8]: ...

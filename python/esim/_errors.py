@@ -1,0 +1,13 @@
+"""What esim raises; the module in C++ finds the classes here."""
+
+
+class Error(ValueError):
+    """Something that the caller can repair. The message is one line: what is wrong, where, what to do."""
+
+
+class OutputError(Error, OSError):
+    """An output could not be written, for example because the disk is full."""
+
+
+class InternalError(RuntimeError):
+    """A defect of esim."""

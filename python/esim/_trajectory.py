@@ -1,0 +1,141 @@
+"""Motions of bodies."""
+
+import os
+
+import numpy as np
+
+from . import _core
+from ._types import STATE_DTYPE, to_ns_array
+
+
+def matrices(position, orientation):
+    """Homogeneous matrices (..., 4, 4) of positions (..., 3) and unit quaternions x y z w (..., 4)."""
+    x, y, z, w = np.moveaxis(orientation, -1, 0)
+    T = np.zeros((*x.shape, 4, 4))
+    T[..., 0, 0], T[..., 0, 1], T[..., 0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
+    T[..., 1, 0], T[..., 1, 1], T[..., 1, 2] = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
+    T[..., 2, 0], T[..., 2, 1], T[..., 2, 2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
+    T[..., :3, 3] = position
+    T[..., 3, 3] = 1
+    return T
+
+
+class Trajectory:
+    """A smooth motion, T_world_body over time. Made by `from_poses` and `load`."""
+
+    def __init__(self):
+        raise TypeError("use Trajectory.from_poses() or Trajectory.load()")
+
+    @classmethod
+    def _of(cls, core):
+        self = cls.__new__(cls)
+        self._core = core
+        return self
+
+    @classmethod
+    def from_poses(cls, t, poses, *, order=5, knot_interval_s=0.0, smoothing_time_s=0.0):
+        """A spline through, or near, poses.
+
+        Parameters
+        ----------
+        t : array_like, shape (N,)
+            Times, increasing: ints are ns, floats are s.
+        poses : array_like, shape (N, 4, 4), or a pair of shapes (N, 3) and (N, 4)
+            T_world_body: homogeneous matrices, or positions (m) and quaternions (Hamilton, x y z w; any length but 0).
+            A camera looks along its z axis, x to the right.
+        order : int
+            Of the spline, 4 (cubic) to 6.
+        knot_interval_s : float
+            Between the spline's control points, s; 0: from the data.
+        smoothing_time_s : float
+            Faster motion is smoothed away, s; 0: none but what determines the spline.
+
+        Returns
+        -------
+        Trajectory
+
+        Raises
+        ------
+        esim.Error
+            For fewer than two poses, times that do not increase, matrices that are no poses.
+        """
+        t = to_ns_array(t)
+        if isinstance(poses, tuple):
+            position, orientation = (np.asarray(part, np.float64) for part in poses)
+            norm = np.linalg.norm(orientation, axis=-1, keepdims=True)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                T = matrices(position, orientation / norm)
+        else:
+            T = np.ascontiguousarray(poses, np.float64)
+        if t.ndim != 1 or T.shape != (len(t), 4, 4):
+            raise ValueError(f"{t.shape} times do not fit poses of shape {T.shape}; give (N,) and (N, 4, 4)")
+        return cls._of(_core.Trajectory.from_matrices(t, T, order, knot_interval_s, smoothing_time_s))
+
+    @classmethod
+    def load(cls, path, *, order=5, knot_interval_s=0.0, smoothing_time_s=0.0):
+        """A spline through the poses of a file, TUM's text or the original ESIM's CSV.
+
+        Parameters
+        ----------
+        path : path
+        order, knot_interval_s, smoothing_time_s
+            As in `from_poses`.
+
+        Returns
+        -------
+        Trajectory
+        """
+        return cls._of(_core.Trajectory.from_file(os.fspath(path), order, knot_interval_s, smoothing_time_s))
+
+    @property
+    def start(self):
+        """int: first time, ns."""
+        return self._core.start
+
+    @property
+    def end(self):
+        """int: last time, ns."""
+        return self._core.end
+
+    @property
+    def fit(self):
+        """dict: how far the spline stays from the poses, and what was chosen."""
+        return self._core.fit_report()
+
+    def at(self, t):
+        """The motion at times.
+
+        Parameters
+        ----------
+        t : int (ns), float (s), or an array of either
+
+        Returns
+        -------
+        numpy.ndarray of esim.STATE_DTYPE, shaped as t
+            Pose, twist and accelerations; gravity is not part of them.
+
+        Raises
+        ------
+        esim.Error
+            For times outside the trajectory.
+        """
+        times = to_ns_array(t)
+        states = self._core.states(times.reshape(-1)).view(STATE_DTYPE)
+        return states.reshape(times.shape)
+
+    def pose(self, t):
+        """T_world_body at times, as homogeneous matrices.
+
+        Parameters
+        ----------
+        t : int (ns), float (s), or an array of either
+
+        Returns
+        -------
+        numpy.ndarray, shape (..., 4, 4)
+        """
+        states = self.at(t)
+        return matrices(states["position"], states["orientation"])
+
+    def __repr__(self):
+        return f"<esim.Trajectory from {self.start * 1e-9:g} s to {self.end * 1e-9:g} s>"

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+/// Each file adds its part to the module. What Python's users see is written in Python, on top of this.
+namespace esim::python {
+
+void bind_errors(nanobind::module_& module);
+void bind_scenario(nanobind::module_& module);
+void bind_trajectory(nanobind::module_& module);
+void bind_event_camera(nanobind::module_& module);
+void bind_simulation(nanobind::module_& module);
+void bind_event_files(nanobind::module_& module);
+void bind_representations(nanobind::module_& module);
+
+}  // namespace esim::python

@@ -1,0 +1,12 @@
+#include "bindings.h"
+
+NB_MODULE(_core, module) {
+  using namespace esim::python;
+  bind_errors(module);
+  bind_scenario(module);
+  bind_trajectory(module);
+  bind_event_camera(module);
+  bind_simulation(module);
+  bind_event_files(module);
+  bind_representations(module);
+}

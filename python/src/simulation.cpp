@@ -1,0 +1,140 @@
+#include "simulation.h"
+
+#include <utility>
+
+#include "esim/core/error.h"
+#include "esim/record/fan_out.h"
+#include "esim/record/output_file.h"
+#include "esim/scenario/read.h"
+
+namespace esim::python {
+namespace {
+
+namespace nb = nanobind;
+
+constexpr double kSignalInterval_s = 0.02;
+constexpr double kUsualPacketRate_hz = 30;
+
+/// Passes everything on to sinks that others own.
+class Both final : public Sink {
+ public:
+  Both(Sink& first, Sink* second) : first_(first), second_(second) {}
+
+  void begin(const RecordingInfo& info) override {
+    first_.begin(info);
+    if (second_ != nullptr) second_->begin(info);
+  }
+  void write(const Record& record) override {
+    first_.write(record);
+    if (second_ != nullptr) second_->write(record);
+  }
+  void end(bool complete) override {
+    first_.end(complete);
+    if (second_ != nullptr) second_->end(complete);
+  }
+
+ private:
+  Sink& first_;
+  Sink* second_;
+};
+
+PeriodicClock packet_clock(const World& world, TimeNs packet) {
+  if (packet > 0) return {world.info.start, world.info.end, 1 / to_seconds(packet)};
+  if (world.info.truth_rate_hz > 0) return world.truth_clock;
+  return {world.info.start, world.info.end, kUsualPacketRate_hz};
+}
+
+}  // namespace
+
+Simulation::Simulation(Scenario scenario, const Substitutes& substitutes, std::optional<PythonFunction> render,
+                       const std::string& origin, const SimulationOptions& options)
+    : scenario_(std::move(scenario)), render_(std::move(render)) {
+  const nb::gil_scoped_release released;
+  build(substitutes, origin, options);
+}
+
+Simulation::~Simulation() {
+  try {
+    close();
+  } catch (const std::exception&) {  // nobody is left to be told
+  }
+  const nb::gil_scoped_release released;  // a recorder's thread may be waited for
+  simulator_.reset();
+  sink_.reset();
+  recorder_.reset();
+  world_.reset();
+  directory_.reset();
+}
+
+void Simulation::build(const Substitutes& substitutes, const std::string& origin, const SimulationOptions& options) {
+  if (!options.out.empty()) directory_ = std::make_unique<RecordingDirectory>(options.out, options.force);
+  Notices notices;
+  notices.warning = [this](const std::string& text) {
+    warnings_.push_back(text);
+    notices_.push_back("warning: " + text);
+  };
+  notices.note = [this](const std::string& text) { notices_.push_back(text); };
+  world_ = std::make_unique<World>(build_world(scenario_, substitutes, options.threads, notices));
+  packets_ = std::make_unique<PacketSink>(packet_clock(*world_, options.packet));
+  if (directory_ != nullptr) {
+    write_file_atomically(directory_->path() / "scenario.yaml", origin + write_scenario(scenario_));
+    recorder_ = build_sink(scenario_, directory_->path());
+  }
+  sink_ = std::make_unique<Both>(*packets_, recorder_.get());
+  simulator_ = std::make_unique<Simulator>(*world_, *sink_);
+}
+
+/// Whether a signal's handler, as Ctrl-C's, raised an exception. Looking costs Python's lock.
+bool Simulation::signal_came() {
+  const nb::gil_scoped_acquire acquired;
+  if (PyErr_CheckSignals() == 0) return false;
+  signal_.emplace();
+  return true;
+}
+
+/// Until there is a packet or an end; false where a signal came before.
+bool Simulation::advance() {
+  const bool at_end = simulator_->advance_until(world_->info.end, [this](const Progress& progress) {
+    packets_->know(progress.now);
+    if (progress.wall_seconds - looked_at_ >= kSignalInterval_s) {
+      looked_at_ = progress.wall_seconds;
+      if (signal_came()) return false;
+    }
+    return !packets_->has_packet();
+  });
+  if (at_end) finish();
+  return !signal_;
+}
+
+/// Ends the recording where it is.
+void Simulation::finish() {
+  over_ = true;
+  const Summary summary = simulator_->finish();
+  simulator_.reset();
+  report_ = report_json(scenario_, summary, world_->workers->threads(), notices_);
+  if (directory_ != nullptr) directory_->finish(report_);
+}
+
+std::optional<Packet> Simulation::next() {
+  if (!packets_->has_packet() && !over_) {
+    bool undisturbed = true;
+    try {
+      const nb::gil_scoped_release released;
+      undisturbed = advance();
+    } catch (...) {
+      over_ = true;  // what is half done cannot be finished: the recording is left to its destructor, which removes it
+      throw;
+    }
+    if (!undisturbed) throw *std::exchange(signal_, std::nullopt);
+  }
+  if (!packets_->has_packet()) return std::nullopt;
+  return packets_->take();
+}
+
+void Simulation::close() {
+  if (over_) return;
+  const nb::gil_scoped_release released;
+  finish();
+}
+
+}  // namespace esim::python

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "esim/compose/compose.h"
+#include "esim/record/recording_directory.h"
+#include "packet_sink.h"
+#include "python_renderer.h"
+
+namespace esim::python {
+
+/// What a simulation is made of, beside its scenario.
+struct SimulationOptions {
+  int threads = 0;
+  TimeNs packet = 0;          ///< length of packets; 0: from one frame of ground truth to the next
+  std::filesystem::path out;  ///< where to write a recording; empty: nowhere
+  bool force = false;         ///< replace an earlier recording there
+};
+
+/// A simulation that goes on packet by packet. Used by those who hold Python's lock, which is let go of while it works.
+class Simulation {
+ public:
+  /// `origin` are lines above the written scenario, if any; `render` is what the substitutes render with.
+  Simulation(Scenario scenario, const Substitutes& substitutes, std::optional<PythonFunction> render,
+             const std::string& origin, const SimulationOptions& options);
+  ~Simulation();
+
+  /// The next packet; none after the last. Throws Python's exception where a signal handler or a renderer raised one;
+  /// after the former it can go on.
+  std::optional<Packet> next();
+
+  /// Ends the simulation, and the recording, wherever they are.
+  void close();
+
+  const RecordingInfo& info() const { return world_->info; }
+  bool colour(std::size_t camera) const { return scenario_.cameras[camera].colour != ColourFilters::none; }
+  const std::vector<std::string>& warnings() const { return warnings_; }
+
+  /// What of Python's is held here, for its garbage collector.
+  std::optional<PythonFunction>& render() { return render_; }
+
+  /// The report as JSON; empty before the end.
+  const std::string& report() const { return report_; }
+
+ private:
+  void build(const Substitutes& substitutes, const std::string& origin, const SimulationOptions& options);
+  bool advance();
+  void finish();
+  bool signal_came();
+
+  Scenario scenario_;
+  std::optional<PythonFunction> render_;
+  std::vector<std::string> warnings_, notices_;
+  std::unique_ptr<RecordingDirectory> directory_;
+  std::unique_ptr<World> world_;
+  std::unique_ptr<PacketSink> packets_;
+  std::unique_ptr<Sink> recorder_, sink_;
+  std::unique_ptr<Simulator> simulator_;
+  std::optional<nanobind::python_error> signal_;
+  double looked_at_ = 0;  // wall clock of the last look for signals, s
+  std::string report_;
+  bool over_ = false;
+};
+
+}  // namespace esim::python

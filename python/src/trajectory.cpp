@@ -1,0 +1,90 @@
+#include "trajectory.h"
+
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/string.h>
+
+#include <span>
+
+#include "arrays.h"
+#include "bindings.h"
+#include "esim/core/error.h"
+#include "esim/motion/trajectory_file.h"
+
+namespace esim::python {
+namespace {
+
+using Times = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Matrices = nb::ndarray<const double, nb::shape<-1, 4, 4>, nb::c_contig, nb::device::cpu>;
+
+/// A motion through poses.
+SharedTrajectory fit(std::span<const TimedPose> poses, int order, double knot_interval_s, double smoothing_time_s) {
+  const nb::gil_scoped_release released;
+  const FittedTrajectory fitted = fit_trajectory(poses, {order, knot_interval_s, smoothing_time_s});
+  return {std::make_shared<const SplineTrajectory>(fitted.trajectory), fitted.report};
+}
+
+SharedTrajectory from_matrices(const Times& times, const Matrices& matrices, int order, double knot_interval_s,
+                               double smoothing_time_s) {
+  std::vector<TimedPose> poses(times.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    using Matrix = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
+    try {
+      poses[i] = {times.data()[i], SE3::from_matrix(Eigen::Map<const Matrix>(matrices.data() + 16 * i))};
+    } catch (const UserError& error) {
+      throw UserError("pose " + std::to_string(i) + ": " + error.what());
+    }
+  }
+  return fit(poses, order, knot_interval_s, smoothing_time_s);
+}
+
+SharedTrajectory from_file(const std::filesystem::path& path, int order, double knot_interval_s,
+                           double smoothing_time_s) {
+  try {
+    return fit(read_trajectory(path), order, knot_interval_s, smoothing_time_s);
+  } catch (const UserError& error) {
+    const std::string message = error.what();
+    throw UserError(message.starts_with(path.string()) ? message : path.string() + ": " + message);
+  }
+}
+
+nb::object states(const SharedTrajectory& self, const Times& times) {
+  std::vector<State> states;
+  states.reserve(times.size());
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const TimeNs t = times.data()[i];
+    if (t < self.motion->start() || t > self.motion->end()) {
+      throw UserError("t = " + std::to_string(t) + " ns is outside the trajectory, which lasts from " +
+                      std::to_string(self.motion->start()) + " to " + std::to_string(self.motion->end()) + " ns");
+    }
+    states.push_back(to_state(t, self.motion->at(t)));
+  }
+  return bytes_to_numpy(std::move(states));
+}
+
+nb::dict report(const SharedTrajectory& self) {
+  nb::dict report;
+  report["rms_position_m"] = self.fit.rms_position_m;
+  report["max_position_m"] = self.fit.max_position_m;
+  report["rms_rotation_rad"] = self.fit.rms_rotation_rad;
+  report["max_rotation_rad"] = self.fit.max_rotation_rad;
+  report["knot_interval_s"] = self.fit.knot_interval_s;
+  report["smoothing_time_s"] = self.fit.smoothing_time_s;
+  report["control_points"] = self.fit.control_points;
+  return report;
+}
+
+}  // namespace
+
+void bind_trajectory(nb::module_& module) {
+  nb::class_<SharedTrajectory>(module, "Trajectory")
+      .def_static("from_matrices", &from_matrices, nb::arg("times"), nb::arg("matrices"), nb::arg("order"),
+                  nb::arg("knot_interval_s"), nb::arg("smoothing_time_s"))
+      .def_static("from_file", &from_file, nb::arg("path"), nb::arg("order"), nb::arg("knot_interval_s"),
+                  nb::arg("smoothing_time_s"))
+      .def("states", &states, nb::arg("times"))
+      .def("fit_report", &report)
+      .def_prop_ro("start", [](const SharedTrajectory& self) { return self.motion->start(); })
+      .def_prop_ro("end", [](const SharedTrajectory& self) { return self.motion->end(); });
+}
+
+}  // namespace esim::python

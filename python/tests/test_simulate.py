@@ -1,0 +1,304 @@
+import filecmp
+import gc
+import os
+import signal
+import subprocess
+import time
+import weakref
+
+import numpy as np
+import pytest
+
+import esim
+from conftest import ROOT
+
+
+def joined(packets, name="events"):
+    return np.concatenate([getattr(packet, name) for packet in packets])
+
+
+def test_packets_end_at_frames_of_ground_truth(poster):
+    packets = list(esim.simulate(poster, overrides={"truth.rate_hz": 50}))
+    assert [packet.t1 for packet in packets] == [20_000_000 * k for k in range(1, 11)]
+    assert [packet.t0 for packet in packets] == [20_000_000 * k for k in range(10)]
+    assert packets[0].truth_t.tolist() == [0, 20_000_000]
+    for packet in packets[1:]:
+        assert packet.truth_t.tolist() == [packet.t1]
+        assert ((packet.events["t"] > packet.t0) & (packet.events["t"] <= packet.t1)).all()
+        assert packet.irradiance.shape == packet.depth.shape == (1, 30, 40)
+        assert packet.flow.shape == (1, 2, 30, 40) and packet.pose.shape == (1, 4, 4)
+        assert len(packet.imu) == 10 and len(packet.body) == 4
+    assert len(joined(packets)) > 1000
+
+
+def test_packets_of_any_length_hold_the_same(poster):
+    usual = list(esim.simulate(poster))
+    for packet_s in (0.007, 12_345_678, 1.0):
+        others = list(esim.simulate(poster, packet_s=packet_s))
+        for name in ("events", "truth_t", "depth", "flow", "irradiance", "pose", "body", "imu"):
+            np.testing.assert_array_equal(joined(usual, name), joined(others, name))
+        assert others[0].t0 == 0 and others[-1].t1 == 200_000_000
+        for packet in others:
+            for t in (packet.events["t"], packet.truth_t, packet.imu["t"], packet.body["t"]):
+                assert ((t > packet.t0) | (t == 0)).all() and (t <= packet.t1).all()
+
+
+def test_seed_and_threads(poster):
+    noisy = {"event_camera.threshold_noise": 0.05}
+    runs = [joined(esim.simulate(poster, overrides=noisy, seed=seed, threads=threads)) for seed, threads in [(1, 1), (1, 2), (2, 1)]]
+    np.testing.assert_array_equal(runs[0], runs[1])
+    assert len(runs[0]) != len(runs[2]) or (runs[0] != runs[2]).any()
+
+
+def test_poses_and_states_agree(poster):
+    packet = next(esim.simulate(poster))
+    x, y, z, w = packet.body["orientation"][0]
+    np.testing.assert_allclose(packet.pose[0][:3, 3], packet.body["position"][0], atol=1e-12)
+    assert packet.pose[0][2, 2] == pytest.approx(1 - 2 * (x * x + y * y))
+    # Z of a wall at x = 1 m, on the optical axis: the distance along it.
+    axis, position = packet.pose[0][:3, 2], packet.pose[0][:3, 3]
+    assert packet.depth[0].mean() == pytest.approx((1 - position[0]) / axis[0], rel=0.05)
+
+
+def test_a_recording_is_that_of_the_program(poster, tmp_path):
+    program = os.environ.get("ESIM_PROGRAM")
+    if program is None:
+        pytest.skip("ESIM_PROGRAM does not name the program")
+    scenario = tmp_path / "s.yaml"
+    scenario.write_text(esim.Scenario(poster).to_yaml())
+    esim.simulate(scenario, out=tmp_path / "here", overrides=["seed=7"]).run()
+    subprocess.run([program, "simulate", scenario, "-o", tmp_path / "there", "--set", "seed=7", "-q"], check=True)
+    files = {str(p.relative_to(tmp_path / "there")) for p in (tmp_path / "there").rglob("*") if p.is_file()}
+    assert {"report.json", "scenario.yaml", "imu.csv", "poses.txt"} < files
+    same, different, missing = filecmp.cmpfiles(tmp_path / "here", tmp_path / "there", files, shallow=False)
+    assert not missing and set(different) <= {"report.json"}  # which has times of the clock on the wall
+
+
+def test_a_recording_holds_the_packets_events(poster, tmp_path):
+    out = tmp_path / "out"
+    with esim.simulate(poster, out=out, overrides={"output.time_unit": "ns"}) as simulation:
+        events = joined(simulation)
+        assert simulation.report["status"] == "complete"
+        assert simulation.report["cameras"][0]["events"] == len(events)
+    np.testing.assert_array_equal(esim.load_events(out), events)
+    with pytest.raises(esim.Error, match="exists"):
+        esim.simulate(poster, out=out)
+    esim.simulate(poster, out=out, force=True, overrides={"duration_s": 0.1}).run()
+    assert esim.info(out)["status"] == "complete"
+
+
+def test_closing_early_finishes_an_interrupted_recording(poster, tmp_path):
+    with esim.simulate(poster, out=tmp_path / "out") as simulation:
+        next(simulation)
+    assert esim.info(tmp_path / "out")["status"] == "interrupted"
+    assert simulation.report["status"] == "interrupted"
+    simulation.close()
+    remaining = list(simulation)
+    assert len(remaining) <= 1
+
+
+def test_a_failed_recording_leaves_nothing(poster, tmp_path):
+    def render(t, T, objects):
+        if t > 50_000_000:
+            raise KeyError("on the way")
+        return {"irradiance": np.full((30, 40), 0.5), "depth": np.ones((30, 40))}
+
+    simulation = esim.simulate(poster, out=tmp_path / "out", renderer=render, overrides={"duration_s": 0.1})
+    with pytest.raises(KeyError, match="on the way"):
+        simulation.run()
+    with pytest.raises(StopIteration):
+        while True:
+            next(simulation)
+    del simulation
+    gc.collect()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_rigs_have_packets_by_name(poster):
+    rig = {key: value for key, value in poster.items() if key != "camera"}
+    rig["cameras"] = [{"name": "left", "width": 40, "height": 30}, {"name": "right", "width": 20, "height": 16, "T_body_camera": {"position": [0.1, 0, 0]}}]
+    simulation = esim.simulate(rig)
+    assert list(simulation.cameras) == ["left", "right"] and simulation.cameras["right"]["width"] == 20
+    packet = next(simulation)
+    assert packet["left"].depth.shape == (2, 30, 40) and packet["right"].depth.shape == (2, 16, 20)
+    assert (packet["right"].events["x"] < 20).all()
+    with pytest.raises(esim.Error, match="several cameras"):
+        packet.events
+    with pytest.raises(AttributeError):
+        packet.evnts
+
+
+def test_frames_of_the_frame_camera(poster):
+    packets = list(esim.simulate(poster, overrides={"frame_camera": {"rate_hz": 100, "exposure_s": 0.002}}))
+    images, t = joined(packets, "images"), joined(packets, "image_t")
+    assert images.dtype == np.uint8 and images.shape == (19, 30, 40) and 0 < images.mean() < 255
+    np.testing.assert_array_equal(t, 10_000_000 * np.arange(1, 20))
+    assert (joined(packets, "exposure") == 2_000_000).all()
+    assert (joined(packets, "exposure_start") == t - 1_000_000).all()
+    for packet in packets:
+        ends = packet.image_t + 1_000_000
+        assert ((ends > packet.t0) & (ends <= packet.t1)).all()
+    deep = next(esim.simulate(poster, overrides={"frame_camera": {"rate_hz": 100, "exposure_s": 0.002, "bits": 12}}))
+    assert deep.images.dtype == np.uint16 and deep.images.max() > 255
+
+
+def test_further_ground_truth(poster):
+    wanted = {"truth.displacement": True, "truth.objects": True, "truth.event_points": True, "truth.rate_hz": 50}
+    packets = list(esim.simulate(poster, overrides=wanted, packet_s=0.013))
+    assert joined(packets, "event_points").shape == (len(joined(packets)), 3)
+    for packet in packets:
+        assert len(packet.event_points) == len(packet.events)
+        np.testing.assert_allclose(packet.event_points[:, 0], 1, atol=1e-3)  # the wall
+    assert joined(packets, "object").shape == (11, 30, 40) and not joined(packets, "object").any()
+    displacement, times = joined(packets, "displacement"), joined(packets, "displacement_t")
+    assert displacement.shape == (10, 2, 30, 40) and joined(packets, "visible").shape == (10, 30, 40)
+    np.testing.assert_array_equal(times[:, 1] - times[:, 0], 20_000_000)
+
+
+def test_trajectories_from_arrays(poster):
+    t = np.linspace(0, 0.5, 101)
+    forward = np.array([[0, 0, 1.0, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])  # looks along world x
+    T = np.repeat(forward[None], len(t), 0)
+    T[:, 1, 3] = 0.3 * t
+    trajectory = esim.Trajectory.from_poses(t, T)
+    scenario = {key: value for key, value in poster.items() if key not in ("trajectory", "imu")}
+    packets = list(esim.simulate(scenario, trajectory=trajectory))
+    np.testing.assert_allclose(packets[-1].pose[-1], trajectory.pose(0.2), atol=1e-12)
+    # 0.3 m/s to the left, a wall 1 m away: the image moves to the right.
+    fx = 20 / np.tan(np.deg2rad(37.5))
+    np.testing.assert_allclose(packets[-1].flow[0, 0], 0.3 * fx, rtol=1e-3)
+    with pytest.raises(esim.Error, match="duration_s"):
+        esim.simulate(scenario, trajectory=trajectory, overrides={"duration_s": 3})
+
+
+def wall(t, T, objects):
+    """The texture sin(20 y) on a wall at x = 1 m, for a camera of 40 x 30 px that looks along world x."""
+    fx = 20 / np.tan(np.deg2rad(37.5))
+    v, u = np.mgrid[:30, :40]
+    rays = np.stack([(u - 19.5) / fx, (v - 14.5) / fx, np.ones_like(u, float)], -1) @ T[:3, :3].T
+    depth = (1 - T[0, 3]) / rays[..., 0]
+    y = T[1, 3] + depth * rays[..., 1]
+    return {"irradiance": 0.5 + 0.3 * np.sin(20 * y), "depth": depth}
+
+
+def test_a_renderer_of_ones_own(poster):
+    own = list(esim.simulate(poster, renderer=wall))
+    ours = list(esim.simulate(poster))
+    for a, b in zip(own, ours):
+        np.testing.assert_allclose(a.depth, b.depth, rtol=1e-5)
+        np.testing.assert_allclose(a.flow, b.flow, atol=2e-3 * np.abs(b.flow).max())
+    np.testing.assert_array_equal(own[0].irradiance[0], np.float32(wall(0, own[0].pose[0], [])["irradiance"]))
+    assert len(joined(own)) > 1000
+
+
+def test_flow_of_ones_own_is_taken(poster):
+    def render(t, T, objects):
+        return {**wall(t, T, objects), "flow": np.stack([np.full((30, 40), 3), np.full((30, 40), -4)])}
+
+    packet = next(esim.simulate(poster, renderer=esim.Renderer(render)))
+    assert (packet.flow[:, 0] == 3).all() and (packet.flow[:, 1] == -4).all()
+
+
+def test_objects_of_ones_own(poster):
+    t = np.linspace(0, 0.2, 41)
+    T = np.repeat(np.eye(4)[None], len(t), 0)
+    T[:, 1, 3] = -0.5 * t
+    ball = esim.Trajectory.from_poses(t, T)
+    seen = np.zeros((30, 40), int)
+    seen[10:20, 15:25] = 1
+
+    def render(t, T, objects):
+        np.testing.assert_allclose(objects[0], ball.pose(t), atol=1e-12)
+        return {**wall(t, T, objects), "object": seen}
+
+    still = {**poster, "trajectory": {"type": "static"}}
+    renderer = esim.Renderer(render, objects={"ball": ball})
+    simulation = esim.simulate(still, renderer=renderer, overrides={"truth.objects": True})
+    assert simulation.objects == ["ball"]
+    packet = next(simulation)
+    np.testing.assert_array_equal(packet.object[-1], seen)
+    assert packet.objects.shape == (len(packet.body), 1, 4, 4)
+    # It moves to the right at 0.5 m/s, 1 m away; the rest stands still.
+    fx = 20 / np.tan(np.deg2rad(37.5))
+    np.testing.assert_allclose(packet.flow[-1, 0], np.where(seen == 1, 0.5 * fx, 0), atol=0.05)
+
+
+@pytest.mark.parametrize(
+    "images, message",
+    [
+        ([1], "dict"),
+        ({"depth": np.ones((30, 40))}, "gives no irradiance"),
+        ({"irradiance": np.ones((40, 30)), "depth": np.ones((30, 40))}, r"irradiance of shape \(40, 30\)"),
+        ({"irradiance": np.ones((30, 40)), "depth": np.zeros((30, 40))}, "depth is above 0"),
+        ({"irradiance": np.ones((30, 40)), "depth": np.ones((30, 40)), "flows": 1}, "not flows"),
+        ({"irradiance": np.ones((30, 40)), "depth": np.full((30, 40), np.inf)}, "sees nothing"),
+        ({"irradiance": np.ones((30, 40)), "depth": np.ones((30, 40)), "object": np.ones((30, 40))}, "object 1 of 0"),
+    ],
+)
+def test_wrong_images_are_refused(poster, images, message):
+    with pytest.raises((esim.Error, TypeError), match=message):
+        esim.simulate(poster, renderer=lambda t, T, objects: images).run()
+
+
+def test_what_renderers_cannot_do(poster):
+    for option, message in [("truth.event_points", "event_points"), ("camera.colour", "colour")]:
+        value = True if option.startswith("truth") else "rggb"
+        with pytest.raises(esim.Error, match=message):
+            esim.simulate(poster, renderer=wall, overrides={option: value})
+
+
+def test_ctrl_c_interrupts_and_leaves_a_simulation_that_goes_on(poster):
+    long = {"duration_s": 0.5, "camera.width": 320, "camera.height": 240}
+    uninterrupted = joined(esim.simulate(poster, overrides=long))
+    simulation = esim.simulate(poster, overrides=long, packet_s=10.0)
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, 0.05)
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        next(simulation)
+    assert time.monotonic() - began < 5  # far less, but on a busy machine
+    np.testing.assert_array_equal(joined(simulation), uninterrupted)
+
+
+def test_other_threads_run_meanwhile(poster):
+    import threading
+
+    ticks, over = [], threading.Event()
+
+    def tick():
+        while not over.is_set():
+            ticks.append(time.monotonic())
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    esim.simulate(poster, packet_s=10.0, overrides={"duration_s": 1.0, "camera.width": 320, "camera.height": 240}).run()
+    over.set()
+    thread.join()
+    assert len(ticks) > 5
+
+
+def test_a_simulation_and_its_owner_are_collected(poster):
+    class Owner:
+        def __init__(self):
+            self.simulation = esim.simulate(poster, renderer=self.render)
+
+        def render(self, t, T, objects):
+            return wall(t, T, objects)
+
+    owner = Owner()
+    next(owner.simulation)
+    gone = weakref.ref(owner)
+    del owner
+    gc.collect()
+    assert gone() is None
+
+
+def test_warnings_are_warnings(poster):
+    with pytest.warns(UserWarning, match="lambda"):
+        esim.simulate(poster, overrides={"sampling": {"type": "flow", "lambda": 2}})
+
+
+def test_scenes_of_the_repository():
+    packet = next(esim.simulate(ROOT / "scenes" / "poster.yaml"))
+    assert packet.depth.shape == (2, 180, 240) and len(packet.events) > 10000

@@ -1,12 +1,35 @@
 #include "esim/render/renderer.h"
 
-#include "esim/core/error.h"
-
 namespace esim {
+namespace {
+
+/// Evaluations of disjoint tiles, one after the other.
+class InTurn final : public Rendering {
+ public:
+  InTurn(Renderer& renderer, std::vector<RenderRequest> requests) : t_(requests[0].t) {
+    for (RenderRequest& request : requests) {
+      tiles_.insert(tiles_.end(), request.tiles.begin(), request.tiles.end());
+      renderings_.push_back(renderer.start(std::move(request)));
+    }
+  }
+
+  void finish(Sample& sample) override {
+    for (const auto& rendering : renderings_) rendering->finish(sample);
+    sample.t = t_;
+    sample.tiles = tiles_;
+  }
+
+ private:
+  TimeNs t_;
+  std::vector<Tile> tiles_;
+  std::vector<std::unique_ptr<Rendering>> renderings_;
+};
+
+}  // namespace
 
 std::unique_ptr<Rendering> Renderer::start_together(std::vector<RenderRequest> requests) {
-  if (requests.size() != 1) throw InternalError("renderer " + traits().name + ": it evaluates one request at a time");
-  return start(std::move(requests[0]));
+  if (requests.size() == 1) return start(std::move(requests[0]));
+  return std::make_unique<InTurn>(*this, std::move(requests));
 }
 
 class ProcessorRenderer::Postponed final : public Rendering {

@@ -64,7 +64,7 @@ class Renderer {
   /// under way, and be finished in any order. The request names as many objects as move in the scene.
   virtual std::unique_ptr<Rendering> start(RenderRequest request) = 0;
 
-  /// Begins to evaluate disjoint tiles of several times, into one sample. Of renderers that evaluate tiles.
+  /// Begins to evaluate disjoint tiles of several times, into one sample.
   virtual std::unique_ptr<Rendering> start_together(std::vector<RenderRequest> requests);
 
   /// Starts and finishes at once.

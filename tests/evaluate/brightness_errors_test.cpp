@@ -29,7 +29,8 @@ struct Plaid {
 class PlaidRenderer final : public ProcessorRenderer {
  public:
   RendererTraits traits() const override { return {.name = "plaid"}; }
-  void compute(const RenderRequest& request, Sample& sample) const override {
+  void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
+    const RenderRequest& request = requests[0];
     sample.resize(kWidth, kHeight);
     sample.t = request.t;
     sample.tiles = request.tiles;

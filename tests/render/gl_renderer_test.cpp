@@ -134,7 +134,7 @@ TEST_F(GlRendererTest, TheMotionFieldIsThatOfTheProcessor) {
       const RenderRequest request = request_with_objects(model);
       const Sample sample = render(*make_gl_renderer(scene, {0.2F, samples, {}}, model), request);
       Sample expected = sample;
-      motion_field(PixelRays(model), request, request.tiles[0], expected);
+      motion_field(PixelRays(model), relative_twists(request), request.tiles[0], expected);
       int outside = 0;
       for (int y = 0; y < model.height; ++y) {
         for (int x = 0; x < model.width; ++x) {

@@ -42,10 +42,10 @@ TEST_P(MotionField, IsTheVelocityOfTheImageOfAPointOfWhateverIsSeen) {
   RenderRequest request{0, test::moving_camera(), {{0, 0, model.width, model.height}}, {}};
   for (int i = 0; i < 3; ++i) request.objects.push_back(random_motion(random));
   Sample sample;
-  prepare(request, model.width, model.height, sample);
+  prepare({&request, 1}, model.width, model.height, sample);
   for (float& z : sample.depth.pixels()) z = static_cast<float>(depth_m(random));
   for (std::uint16_t& seen : sample.object.pixels()) seen = static_cast<std::uint16_t>(random() % 4);
-  motion_field(rays, request, request.tiles[0], sample);
+  motion_field(rays, relative_twists(request), request.tiles[0], sample);
 
   constexpr double kStep = 1e-4;
   double greatest_dynamic = 0;
@@ -78,10 +78,10 @@ TEST(MotionField, VanishesOnWhatMovesWithTheCamera) {
   const Kinematics companion = rigidly_attached(camera, {so3_exp(Eigen::Vector3d(0.3, 2, -1)), {0.2, -0.1, 1.5}});
   RenderRequest request{0, camera, {{0, 0, model.width, model.height}}, {companion}};
   Sample sample;
-  prepare(request, model.width, model.height, sample);
+  prepare({&request, 1}, model.width, model.height, sample);
   sample.depth.fill(1.5F);
   sample.object.fill(1);
-  motion_field(PixelRays(model), request, request.tiles[0], sample);
+  motion_field(PixelRays(model), relative_twists(request), request.tiles[0], sample);
   for (const float v : sample.flow_x.pixels()) ASSERT_NEAR(v, 0, 1e-4);
   for (const float v : sample.flow_y.pixels()) ASSERT_NEAR(v, 0, 1e-4);
 }
@@ -91,9 +91,9 @@ TEST(MotionField, IsTheSameWhetherOrNotThereAreObjectsOutOfSight) {
   RenderRequest request{0, test::moving_camera(), {{0, 0, model.width, model.height}}, {}};
   Sample without, with;
   for (Sample* sample : {&without, &with}) {
-    prepare(request, model.width, model.height, *sample);
+    prepare({&request, 1}, model.width, model.height, *sample);
     sample->depth.fill(2.0F);
-    motion_field(PixelRays(model), request, request.tiles[0], *sample);
+    motion_field(PixelRays(model), relative_twists(request), request.tiles[0], *sample);
     request.objects.resize(2);
   }
   EXPECT_TRUE(std::equal(with.flow_x.pixels().begin(), with.flow_x.pixels().end(), without.flow_x.pixels().begin(),

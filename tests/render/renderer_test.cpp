@@ -73,6 +73,34 @@ TEST_P(EveryRenderer, SeveralRenderingsMayBeUnderWay) {
   expect_that_of(0, *first);
 }
 
+TEST_P(EveryRenderer, EvaluatesTilesOfSeveralTimesTogether) {
+  const Tile parts[] = {{0, 0, model_.width, 21}, {0, 21, 17, model_.height - 21}};
+  std::vector<RenderRequest> requests;
+  for (const Tile& part : parts) {
+    const double dt = 0.05 * static_cast<double>(requests.size());
+    requests.push_back({test::kTime + to_ns(dt), later(dt), {part}, test::objects_of(name_, dt), false, 4});
+  }
+  Sample together;
+  renderer_->start_together(requests)->finish(together);
+  EXPECT_EQ(together.t, test::kTime);
+  EXPECT_EQ(together.tiles, std::vector<Tile>({parts[0], parts[1]}));
+  for (RenderRequest request : requests) {
+    request.motion_rows = 1;
+    Sample alone;
+    renderer_->render(request, alone);
+    const Tile part = request.tiles[0];
+    for (int y = part.y; y < part.y + part.height; ++y) {
+      for (int x = part.x; x < part.x + part.width; ++x) {
+        ASSERT_EQ(together.irradiance(x, y), alone.irradiance(x, y)) << x << ", " << y;
+        ASSERT_EQ(together.depth(x, y), alone.depth(x, y)) << x << ", " << y;
+        if (y % 4 == 0) {
+          ASSERT_EQ(together.flow_x(x, y), alone.flow_x(x, y)) << x << ", " << y;
+        }
+      }
+    }
+  }
+}
+
 TEST_P(EveryRenderer, BrightnessMovesWithTheMotionField) {
   // Brightness constancy, Eq. 1: dE/dt + <grad E, V> = 0 on a smooth texture. Ties E, Z and V together.
   const Sample sample = test::render(*renderer_, model_, camera_, objects_);

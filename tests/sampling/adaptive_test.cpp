@@ -56,6 +56,27 @@ struct Outcome {
   }
 };
 
+/// Evaluates tiles of one time.
+void evaluate(const TilesAt& wanted, const Movie& movie, Sample& sample) {
+  const double t = to_seconds(wanted.t);
+  for (const Tile& tile : wanted.tiles) {
+    sample.tiles.push_back(tile);
+    for (int y = tile.y; y < tile.y + tile.height; ++y) {
+      for (int x = tile.x; x < tile.x + tile.width; ++x) {
+        sample.irradiance(x, y) = static_cast<float>(std::exp(movie.brightness(x, y, t)) - kEps);
+        sample.flow_x(x, y) = static_cast<float>(movie.speed(x, y, t)), sample.flow_y(x, y) = 0;
+      }
+    }
+  }
+}
+
+void answer(const SampleRequest& request, const Movie& movie, Sample& sample) {
+  sample.resize(kWidth, kHeight);
+  sample.t = request.t, sample.tiles.clear();
+  evaluate({request.t, request.tiles}, movie, sample);
+  for (const TilesAt& wanted : request.later) evaluate(wanted, movie, sample);
+}
+
 Outcome sample(const AdaptiveSampling& options, const Movie& movie, TimeNs end, int threads = 2) {
   const Workers workers(threads);
   const auto sampler = make_adaptive_sampler(
@@ -64,17 +85,7 @@ Outcome sample(const AdaptiveSampling& options, const Movie& movie, TimeNs end, 
   Outcome outcome;
   Sample sample;
   while (const auto request = sampler->next()) {
-    sample.resize(kWidth, kHeight);
-    sample.t = request->t, sample.tiles = request->tiles;
-    for (const Tile& tile : request->tiles) {
-      for (int y = tile.y; y < tile.y + tile.height; ++y) {
-        for (int x = tile.x; x < tile.x + tile.width; ++x) {
-          const double t = to_seconds(request->t);
-          sample.irradiance(x, y) = static_cast<float>(std::exp(movie.brightness(x, y, t)) - kEps);
-          sample.flow_x(x, y) = static_cast<float>(movie.speed(x, y, t)), sample.flow_y(x, y) = 0;
-        }
-      }
-    }
+    answer(*request, movie, sample);
     for (const Segment& segment : sampler->accept(sample)) {
       // A pixel of each segment, somewhere in it, so that each time counts alike.
       const int x = segment.tile.x + static_cast<int>(segment.t1 / 7 % segment.tile.width);

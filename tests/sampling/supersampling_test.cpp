@@ -20,7 +20,8 @@ class Stripes final : public ProcessorRenderer {
   RendererTraits traits() const override { return kTraits; }
 
  private:
-  void compute(const RenderRequest& request, Sample& sample) const override {
+  void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
+    const RenderRequest& request = requests[0];
     sample.resize(camera_.width, camera_.height);
     sample.t = request.t, sample.tiles = request.tiles;
     sample.depth.fill(std::numeric_limits<float>::infinity());

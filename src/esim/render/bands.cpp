@@ -1,6 +1,7 @@
 #include "esim/render/bands.h"
 
 #include <algorithm>
+#include <vector>
 
 #include "esim/render/motion_field.h"
 
@@ -9,39 +10,70 @@ namespace {
 
 constexpr int kBandRows = 8;
 
+// Of a parallel loop: bands of small tiles are too little work to hand over one by one.
+constexpr std::size_t kPixelsPerPiece = 1024;
+
+struct Band {
+  std::size_t which;  // request
+  Tile tile;
+};
+
 /// Bands end at multiples of kBandRows, wherever the tile begins: renderers may work in small blocks.
-std::vector<Tile> cut_into_bands(const std::vector<Tile>& tiles) {
-  std::vector<Tile> bands;
-  for (const Tile& tile : tiles) {
-    const int end = tile.y + tile.height;
-    for (int y = tile.y; y < end; y += bands.back().height)
-      bands.push_back({tile.x, y, tile.width, std::min(kBandRows - y % kBandRows, end - y)});
+std::vector<Band> cut_into_bands(std::span<const RenderRequest> requests) {
+  std::vector<Band> bands;
+  for (std::size_t which = 0; which < requests.size(); ++which) {
+    for (const Tile& tile : requests[which].tiles) {
+      const int end = tile.y + tile.height;
+      for (int y = tile.y; y < end; y += bands.back().tile.height)
+        bands.push_back({which, {tile.x, y, tile.width, std::min(kBandRows - y % kBandRows, end - y)}});
+    }
   }
   return bands;
 }
 
-}  // namespace
-
-void prepare(const RenderRequest& request, int width, int height, Sample& sample) {
-  sample.resize(width, height, request.wants_objects());
-  if (request.objects.empty()) sample.object.fill(0);
-  sample.t = request.t;
-  sample.tiles = request.tiles;
+/// Where the pieces of a parallel loop over bands begin, and the end.
+std::vector<std::size_t> cut_into_pieces(const std::vector<Band>& bands) {
+  std::vector<std::size_t> begins;
+  std::size_t pixels = kPixelsPerPiece;  // of the current piece
+  for (std::size_t i = 0; i < bands.size(); ++i) {
+    if (pixels >= kPixelsPerPiece) begins.push_back(i), pixels = 0;
+    pixels += bands[i].tile.area();
+  }
+  begins.push_back(bands.size());
+  return begins;
 }
 
-void render_in_bands(const RenderRequest& request, const PixelRays& rays, const Workers& workers, Sample& sample,
-                     const std::function<void(const Tile& band)>& shade) {
-  render_in_bands(request, rays.x.width(), rays.x.height(), workers, sample, [&](const Tile& band) {
-    shade(band);
-    motion_field(rays, request, band, sample);
+}  // namespace
+
+void prepare(std::span<const RenderRequest> requests, int width, int height, Sample& sample) {
+  const RenderRequest& first = requests[0];
+  sample.resize(width, height, first.wants_objects());
+  if (first.objects.empty()) sample.object.fill(0);
+  sample.t = first.t;
+  sample.tiles = first.tiles;
+  for (const RenderRequest& request : requests.subspan(1))
+    sample.tiles.insert(sample.tiles.end(), request.tiles.begin(), request.tiles.end());
+}
+
+void render_in_bands(std::span<const RenderRequest> requests, const PixelRays& rays, const Workers& workers,
+                     Sample& sample, const std::function<void(std::size_t which, const Tile& band)>& shade) {
+  std::vector<std::vector<Twist>> twists;
+  for (const RenderRequest& request : requests) twists.push_back(relative_twists(request));
+  render_in_bands(requests, rays.x.width(), rays.x.height(), workers, sample, [&](std::size_t which, const Tile& band) {
+    shade(which, band);
+    motion_field(rays, twists[which], band, sample, requests[which].motion_rows);
   });
 }
 
-void render_in_bands(const RenderRequest& request, int width, int height, const Workers& workers, Sample& sample,
-                     const std::function<void(const Tile& band)>& shade) {
-  prepare(request, width, height, sample);
-  const std::vector<Tile> bands = cut_into_bands(request.tiles);
-  workers.for_each(static_cast<int>(bands.size()), [&](int i) { shade(bands[static_cast<std::size_t>(i)]); });
+void render_in_bands(std::span<const RenderRequest> requests, int width, int height, const Workers& workers,
+                     Sample& sample, const std::function<void(std::size_t which, const Tile& band)>& shade) {
+  prepare(requests, width, height, sample);
+  const std::vector<Band> bands = cut_into_bands(requests);
+  const std::vector<std::size_t> begins = cut_into_pieces(bands);
+  workers.for_each(static_cast<int>(begins.size()) - 1, [&](int piece) {
+    const auto p = static_cast<std::size_t>(piece);
+    for (std::size_t i = begins[p]; i < begins[p + 1]; ++i) shade(bands[i].which, bands[i].tile);
+  });
 }
 
 }  // namespace esim

@@ -54,17 +54,18 @@ std::vector<Twist> relative_twists(const RenderRequest& request) {
   return twists;
 }
 
-void motion_field(const PixelRays& rays, const RenderRequest& request, const Tile& tile, Sample& sample) {
-  const std::vector<Twist> twists = relative_twists(request);
-  if (request.objects.empty()) {
+void motion_field(const PixelRays& rays, const std::vector<Twist>& twists, const Tile& tile, Sample& sample,
+                  int every) {
+  const int first = (tile.y + every - 1) / every * every;
+  if (twists.size() == 1) {
     const Twist world = twists[0];
-    for (int row = tile.y; row < tile.y + tile.height; ++row) {
+    for (int row = first; row < tile.y + tile.height; row += every) {
       fill_row(rays, row, tile.x, tile.x + tile.width, sample, [world](int) { return world; });
     }
     return;
   }
 
-  for (int row = tile.y; row < tile.y + tile.height; ++row) {
+  for (int row = first; row < tile.y + tile.height; row += every) {
     const std::uint16_t* const seen = sample.object.row(row);
     fill_row(rays, row, tile.x, tile.x + tile.width, sample, [&](int i) -> const Twist& { return twists[seen[i]]; });
   }

@@ -18,7 +18,7 @@ struct Twist {
 std::vector<Twist> relative_twists(const RenderRequest& request);
 
 /// Image velocity of the scene as the camera and the scene's objects move (paper, Eq. 4, and V_dyn): fills V of the
-/// tile's pixels from their Z and from which object they see.
+/// tile's pixels from their Z and from which object they see, and from the twists relative to those.
 ///
 /// A point at depth Z on the bearing b = (x, y, 1) has, in the camera frame C, the position Z b and the velocity Z w
 /// with
@@ -29,6 +29,9 @@ std::vector<Twist> relative_twists(const RenderRequest& request);
 /// relative to the object's rigid motion,
 ///     v = v_C - (v_O - omega_O x p),   omega = omega_C - omega_O,
 /// all in the camera frame, p being the position of the object's origin there: the difference to the above is V_dyn.
-void motion_field(const PixelRays& rays, const RenderRequest& request, const Tile& tile, Sample& sample);
+///
+/// Of rows whose number is not a multiple of `every`, V is left as it is.
+void motion_field(const PixelRays& rays, const std::vector<Twist>& twists, const Tile& tile, Sample& sample,
+                  int every = 1);
 
 }  // namespace esim

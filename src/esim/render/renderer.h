@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,6 +21,7 @@ struct RenderRequest {
   std::vector<Kinematics>
       objects{};               ///< pose T_world_object and twist of each moving object at t, in the scene's order
   bool which_objects = false;  ///< say which object each pixel sees also where that is not needed for V
+  int motion_rows = 1;         ///< V is wanted of one row in so many, from the image's first on
 
   bool wants_objects() const { return which_objects || !objects.empty(); }
 };
@@ -62,6 +64,9 @@ class Renderer {
   /// under way, and be finished in any order. The request names as many objects as move in the scene.
   virtual std::unique_ptr<Rendering> start(RenderRequest request) = 0;
 
+  /// Begins to evaluate disjoint tiles of several times, into one sample.
+  virtual std::unique_ptr<Rendering> start_together(std::vector<RenderRequest> requests);
+
   /// Starts and finishes at once.
   void render(RenderRequest request, Sample& sample) { start(std::move(request))->finish(sample); }
 };
@@ -70,12 +75,13 @@ class Renderer {
 class ProcessorRenderer : public Renderer {
  public:
   std::unique_ptr<Rendering> start(RenderRequest request) final;
+  std::unique_ptr<Rendering> start_together(std::vector<RenderRequest> requests) final;
 
  private:
   class Postponed;
 
-  /// Fills E, Z and V of the request's tiles in `sample`, which it resizes.
-  virtual void compute(const RenderRequest& request, Sample& sample) const = 0;
+  /// Fills E, Z and V of the requests' tiles, which are disjoint, in `sample`, which it resizes.
+  virtual void compute(std::span<const RenderRequest> requests, Sample& sample) const = 0;
 };
 
 }  // namespace esim

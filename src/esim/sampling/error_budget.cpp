@@ -17,15 +17,18 @@ constexpr int kAuditsPerStep = 48;
 
 }  // namespace
 
-double ErrorBudget::most_energy() const {
+ErrorLimits ErrorBudget::limits() const {
   constexpr double kP99OfNormal = 2.576;
-  const double error = limit() / kP99OfNormal;
-  return error * error * std::exp(log_intervals_ / intervals_);
+  const double limit = gain_ * tolerance_, error = limit / kP99OfNormal;
+  return {limit, error * error * typical_interval()};
 }
 
-void ErrorBudget::remember(double interval) {
+double ErrorBudget::typical_interval() const { return intervals_ > 0 ? std::exp(log_intervals_ / intervals_) : 0; }
+
+void ErrorBudget::remember(double log_intervals, int count) {
   constexpr double kMemory = 0.999;
-  log_intervals_ = kMemory * log_intervals_ + std::log(interval), intervals_ = kMemory * intervals_ + 1;
+  for (int i = 0; i < count; ++i) log_intervals_ *= kMemory, intervals_ *= kMemory;
+  log_intervals_ += log_intervals, intervals_ += count;
 }
 
 void ErrorBudget::audit(std::span<const float> errors, float most_change, double duration) {

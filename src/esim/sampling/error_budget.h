@@ -7,6 +7,12 @@
 
 namespace esim {
 
+/// What an interval may have: ln units, and those squared times ns.
+struct ErrorLimits {
+  double error = 0;   ///< e_0 times the 99th percentile of a normal deviate: the tolerance, or less
+  double energy = 0;  ///< e_0^2 h_0
+};
+
 /// How much error a tile's interval between two samples may have, and what audits say of what came of it.
 ///
 /// The energy of an interval is its mean square error e^2, of brightness, times its duration h. A sample more takes
@@ -18,14 +24,13 @@ class ErrorBudget {
   /// 99 % of the errors are to stay below `tolerance`, ln units.
   explicit ErrorBudget(double tolerance) : tolerance_(tolerance) {}
 
-  /// That an interval may have, ns.
-  double most_energy() const;
+  ErrorLimits limits() const;
 
-  /// e_0 times the 99th percentile of a normal deviate: the tolerance, or less.
-  double limit() const { return gain_ * tolerance_; }
+  /// h_0, ns; 0 before any interval was remembered.
+  double typical_interval() const;
 
-  /// Takes note of the length of an interval, ns.
-  void remember(double interval);
+  /// Takes note of the lengths of some intervals: ln ns, added up.
+  void remember(double log_intervals, int count);
 
   /// Takes an audit of a tile: the error of each pixel in the middle of an interval that lasts `duration`, and by how
   /// much the brightness of the one that changes most does in it.

@@ -12,11 +12,21 @@
 
 namespace esim {
 
+/// Pixels at a time.
+struct TilesAt {
+  TimeNs t = 0;
+  std::vector<Tile> tiles;
+};
+
 /// Which pixels to evaluate at which time.
 struct SampleRequest {
   TimeNs t = 0;
   std::vector<Tile> tiles;
   bool of_sensor = false;  ///< by the sensor's own camera, where the sampler otherwise asks another (sampled_camera)
+  int motion_rows = 1;     ///< V is wanted of one row in so many, from the image's first on
+  std::vector<TilesAt> later{};  ///< other tiles that go into the same sample, in order of time
+
+  TimeNs last() const { return later.empty() ? t : later.back().t; }
 };
 
 /// What a sampler has decided so far, for the report.

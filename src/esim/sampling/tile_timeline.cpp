@@ -14,19 +14,28 @@ namespace {
 // times the smaller one.
 constexpr float kMostBend = 2;
 
-// One row in so many is watched: errors of neighbours are alike.
-constexpr int kRowsPerWatched = 2;
+// Every second row is watched, the left half of one and the right half of the next: errors of neighbours are alike.
+constexpr int kRowsPerRun = 2;
 
-std::size_t watched_rows(const Tile& tile) {
-  return static_cast<std::size_t>((tile.height + kRowsPerWatched - 1) / kRowsPerWatched);
+std::size_t run_length(const Tile& tile) { return static_cast<std::size_t>((tile.width + 1) / 2); }
+
+std::size_t watched_pixels(const Tile& tile) {
+  return static_cast<std::size_t>((tile.height + kRowsPerRun - 1) / kRowsPerRun) * run_length(tile);
 }
 
-/// Calls row(k, watched) for each row of a tile that is watched: its first pixel is number k among all, number
-/// `watched` among those of such rows.
-template <typename Row>
-void for_watched(const Tile& tile, const Row& row) {
+/// Calls run(k, watched) for each run of pixels of a tile that are watched: its first pixel is number k among all,
+/// number `watched` among those.
+template <typename Run>
+void for_watched(const Tile& tile, const Run& run) {
   const auto width = static_cast<std::size_t>(tile.width);
-  for (std::size_t i = 0; i < watched_rows(tile); ++i) row(i * kRowsPerWatched * width, i * width);
+  const std::size_t length = run_length(tile), count = watched_pixels(tile) / length;
+  for (std::size_t i = 0; i < count; ++i) run(i * kRowsPerRun * width + (i % 2 == 0 ? 0 : width - length), i * length);
+}
+
+/// Of a few pixels, in place: a call would take longer than the copy.
+void copy(const float* from, std::size_t count, float* to) {
+#pragma omp simd
+  for (std::size_t x = 0; x < count; ++x) to[x] = from[x];
 }
 
 double root_mean(float sum, std::size_t count) {
@@ -53,9 +62,12 @@ struct TileTimeline::Bow {
   }
 
   /// Irradiance of pixel k at f of the way. Never less than a quarter of the lower end.
-  float irradiance(std::size_t k, float f) const {
+  float irradiance(std::size_t k, float f) const { return irradiance(k, (*this)(k), f); }
+
+  /// The same, its bow being `c`.
+  float irradiance(std::size_t k, float c, float f) const {
     const float e0 = first[k], e1 = last[k];
-    const float e = e0 + (e1 - e0) * f - (*this)(k) * (0.5F * f * (1 - f)), least = 0.25F * (e0 < e1 ? e0 : e1);
+    const float e = e0 + (e1 - e0) * f - c * (0.5F * f * (1 - f)), least = 0.25F * (e0 < e1 ? e0 : e1);
     return e > least ? e : least;
   }
 };
@@ -84,15 +96,15 @@ void TileTimeline::insert(TimeNs t, const Image<float>& irradiance) {
   const auto width = static_cast<std::size_t>(tile_.width);
   sample.t = t, sample.surprise = 0;
   sample.irradiance.resize(width * static_cast<std::size_t>(tile_.height));
-  sample.brightness.resize(width * watched_rows(tile_));
+  sample.brightness.resize(watched_pixels(tile_));
   for (int y = 0; y < tile_.height; ++y) {
-    std::copy_n(irradiance.row(tile_.y + y) + tile_.x, width,
-                sample.irradiance.data() + static_cast<std::size_t>(y) * width);
+    copy(irradiance.row(tile_.y + y) + tile_.x, width, sample.irradiance.data() + static_cast<std::size_t>(y) * width);
   }
   const float eps = log_eps_;
+  const std::size_t length = run_length(tile_);
   for_watched(tile_, [&](std::size_t k, std::size_t watched) {
 #pragma omp simd
-    for (std::size_t x = 0; x < width; ++x)
+    for (std::size_t x = 0; x < length; ++x)
       sample.brightness[watched + x] = fast_log(std::max(sample.irradiance[k + x] + eps, 1e-30F));
   });
   auto place = samples_.end();
@@ -100,6 +112,14 @@ void TileTimeline::insert(TimeNs t, const Image<float>& irradiance) {
   place = samples_.insert(place, std::move(sample));
   const auto at = static_cast<std::size_t>(place - samples_.begin());
   for (std::size_t i = at == 0 ? 0 : at - 1; i <= at + 1 && i < samples_.size(); ++i) measure(i);
+}
+
+void TileTimeline::prefetch() const {
+  constexpr std::size_t kPerLine = 64 / sizeof(float), kWanted = 3;
+  for (std::size_t i = samples_.size() - std::min(samples_.size(), kWanted); i < samples_.size(); ++i) {
+    for (const std::vector<float>* values : {&samples_[i].irradiance, &samples_[i].brightness})
+      for (std::size_t k = 0; k < values->size(); k += kPerLine) __builtin_prefetch(values->data() + k);
+  }
 }
 
 std::size_t TileTimeline::forget_before(std::size_t i) {
@@ -116,11 +136,11 @@ void TileTimeline::errors(std::size_t i, std::vector<float>& out) const {
   const auto f = static_cast<float>(static_cast<double>(samples_[i].t - t0) / static_cast<double>(t1 - t0));
   const float* const seen = samples_[i].brightness.data();
   const float eps = log_eps_;
-  const auto width = static_cast<std::size_t>(tile_.width);
+  const std::size_t length = run_length(tile_);
   out.resize(samples_[i].brightness.size());
   for_watched(tile_, [&](std::size_t k, std::size_t watched) {
 #pragma omp simd
-    for (std::size_t x = 0; x < width; ++x) {
+    for (std::size_t x = 0; x < length; ++x) {
       out[watched + x] = fast_log(std::max(bow.irradiance(k + x, f) + eps, 1e-30F)) - seen[watched + x];
     }
   });
@@ -140,11 +160,11 @@ double TileTimeline::bow(std::size_t i) const {
   const Bow bow = bow_between(i, i + 1);
   const float *const l0 = samples_[i].brightness.data(), *const l1 = samples_[i + 1].brightness.data();
   const float eps = log_eps_;
-  const auto width = static_cast<std::size_t>(tile_.width);
+  const std::size_t length = run_length(tile_);
   float sum = 0;
   for_watched(tile_, [&](std::size_t k, std::size_t watched) {
 #pragma omp simd reduction(+ : sum)
-    for (std::size_t x = 0; x < width; ++x) {
+    for (std::size_t x = 0; x < length; ++x) {
       const float middle = fast_log(std::max(bow.irradiance(k + x, 0.5F) + eps, 1e-30F));
       const float off = middle - 0.5F * (l0[watched + x] + l1[watched + x]);
       sum += off * off;
@@ -156,20 +176,37 @@ double TileTimeline::bow(std::size_t i) const {
 void TileTimeline::write(std::size_t i, Image<float>& irradiance) const {
   const auto width = static_cast<std::size_t>(tile_.width);
   for (int y = 0; y < tile_.height; ++y) {
-    std::copy_n(samples_[i].irradiance.data() + static_cast<std::size_t>(y) * width, width,
-                irradiance.row(tile_.y + y) + tile_.x);
+    const float* const from = samples_[i].irradiance.data() + static_cast<std::size_t>(y) * width;
+    copy(from, width, irradiance.row(tile_.y + y) + tile_.x);
   }
 }
 
-void TileTimeline::write_between(std::size_t i, int quarter, Image<float>& irradiance) const {
+void TileTimeline::write_half(std::size_t i, Image<float>& half) const {
   const Bow bow = bow_between(i, i + 1);
-  const float f = 0.25F * static_cast<float>(quarter);
   const auto width = static_cast<std::size_t>(tile_.width);
   for (int y = 0; y < tile_.height; ++y) {
-    float* const out = irradiance.row(tile_.y + y) + tile_.x;
+    float* const out = half.row(tile_.y + y) + tile_.x;
     const std::size_t first = static_cast<std::size_t>(y) * width;
 #pragma omp simd
-    for (std::size_t x = 0; x < width; ++x) out[x] = bow.irradiance(first + x, f);
+    for (std::size_t x = 0; x < width; ++x) out[x] = bow.irradiance(first + x, 0.5F);
+  }
+}
+
+void TileTimeline::write_quarters(std::size_t i, std::span<Image<float>, 3> quarters) const {
+  const Bow bow = bow_between(i, i + 1);
+  const auto width = static_cast<std::size_t>(tile_.width);
+  for (int y = 0; y < tile_.height; ++y) {
+    float* out[3];
+    for (std::size_t k = 0; k < 3; ++k) out[k] = quarters[k].row(tile_.y + y) + tile_.x;
+    float *const out0 = out[0], *const out1 = out[1], *const out2 = out[2];
+    const std::size_t first = static_cast<std::size_t>(y) * width;
+#pragma omp simd
+    for (std::size_t x = 0; x < width; ++x) {
+      const float c = bow(first + x);
+      out0[x] = bow.irradiance(first + x, c, 0.25F);
+      out1[x] = bow.irradiance(first + x, c, 0.5F);
+      out2[x] = bow.irradiance(first + x, c, 0.75F);
+    }
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "esim/core/image.h"
@@ -28,14 +29,17 @@ class TileTimeline {
   /// Returns the index that the sample has then.
   std::size_t forget_before(std::size_t i);
 
+  /// Asks memory for the last samples: since they were taken, the caches have been full of other tiles.
+  void prefetch() const;
+
   std::size_t size() const { return samples_.size(); }
   TimeNs time(std::size_t i) const { return samples_[i].t; }
 
   /// How far off brightness at sample i would be had it been interpolated from the others: the root of the mean square
-  /// over every second row of the tile. Only for samples between others.
+  /// over a quarter of the tile's pixels, those that are watched. Only for samples between others.
   double surprise(std::size_t i) const { return samples_[i].surprise; }
 
-  /// Errors of that interpolation for each pixel of those rows, ln units.
+  /// Errors of that interpolation for each pixel that is watched, ln units.
   void errors(std::size_t i, std::vector<float>& out) const;
 
   /// Of each of those pixels at sample i.
@@ -47,15 +51,16 @@ class TileTimeline {
   /// Writes the irradiance at sample i into the tile's pixels of an image of the camera's size.
   void write(std::size_t i, Image<float>& irradiance) const;
 
-  /// The same at the place `quarter` / 4 of the way from sample i to the next.
-  void write_between(std::size_t i, int quarter, Image<float>& irradiance) const;
+  /// The same half of the way from sample i to the next, and in each quarter of it.
+  void write_half(std::size_t i, Image<float>& half) const;
+  void write_quarters(std::size_t i, std::span<Image<float>, 3> quarters) const;
 
  private:
   struct Sample {
     TimeNs t = 0;
     double surprise = 0;
     std::vector<float> irradiance;
-    std::vector<float> brightness;  // of watched rows
+    std::vector<float> brightness;  // of watched pixels
   };
   struct Bow;
 

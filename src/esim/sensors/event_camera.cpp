@@ -59,7 +59,7 @@ struct EventCamera::State {
   Image<float> brightness;               // less the surround
   std::vector<PixelUpdate> updates;      // by worker
   std::vector<PackedEvents> events;      // by worker
-  std::vector<std::size_t> tile_begins;  // where the segments of each tile begin, and the end
+  std::vector<std::size_t> tile_begins;  // where the segments of some tiles begin, and the end
   EventQueue queue;
   std::optional<Readout> readout;
 
@@ -135,9 +135,12 @@ bool EventCamera::State::integrate_tiles(std::span<const Segment> segments, cons
 
 bool EventCamera::State::integrate(std::span<const Segment> segments, const Workers& workers) {
   tile_begins.clear();
+  int pixels_seen = 0;  // since the last of them
   for (std::size_t i = 0; i < segments.size(); ++i) {
     if (segments[i].t0 == segments[i].t1) pixels.set_epoch(segments[i].t0);
-    if (i == 0 || segments[i].tile != segments[i - 1].tile) tile_begins.push_back(i);
+    if (i == 0 || (segments[i].tile != segments[i - 1].tile && pixels_seen >= kPixelsPerPiece))
+      tile_begins.push_back(i), pixels_seen = 0;
+    pixels_seen += static_cast<int>(segments[i].tile.area());
   }
   tile_begins.push_back(segments.size());
   if (tile_begins.size() > 2 && !surround) return integrate_tiles(segments, workers);

@@ -15,7 +15,7 @@ CameraChannel* camera_due(World& world, TimeNs until) {
   TimeNs earliest = 0;
   for (CameraChannel& camera : world.cameras) {
     const SampleRequest* const next = camera.sampler->next();
-    if (next == nullptr || next->t > until || (due != nullptr && next->t >= earliest)) continue;
+    if (next == nullptr || next->last() > until || (due != nullptr && next->t >= earliest)) continue;
     earliest = next->t;
     due = &camera;
   }
@@ -125,8 +125,11 @@ class Simulator::Run {
   void start_next(CameraChannel& camera) {
     Stopwatch stopwatch(summary_.seconds.render);
     const SampleRequest* const next = camera.sampler->next();
-    if (next == nullptr || next->t > known_until_) return camera.rendering.reset();
-    camera.rendering = camera.asked_for(*next).start(view(world_, index_of(camera), next->t, next->tiles));
+    if (next == nullptr || next->last() > known_until_) return camera.rendering.reset();
+    std::vector<RenderRequest> views = {view(world_, index_of(camera), next->t, next->tiles)};
+    for (const auto& [t, tiles] : next->later) views.push_back(view(world_, index_of(camera), t, tiles));
+    for (RenderRequest& view : views) view.motion_rows = next->motion_rows;
+    camera.rendering = camera.asked_for(*next).start_together(std::move(views));
   }
 
   /// Lets the frame camera see what the event camera has seen.

@@ -89,7 +89,7 @@ class GlRenderer final : public Renderer {
     UnderWay& operator=(const UnderWay&) = delete;
 
     void finish(Sample& sample) override {
-      prepare(request, renderer.camera_.width, renderer.camera_.height, sample);
+      prepare({&request, 1}, renderer.camera_.width, renderer.camera_.height, sample);
       const GlContext::Use use(renderer.context_);
       read_back->finish(sample);
       throw_on_gl_error("reading an image back");

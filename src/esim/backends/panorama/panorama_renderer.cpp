@@ -33,14 +33,16 @@ class PanoramaRenderer final : public ProcessorRenderer {
   }
 
  private:
-  void compute(const RenderRequest& request, Sample& sample) const override {
-    const Eigen::Quaterniond R_panorama_camera =
-        panorama_.R_world_panorama.conjugate() * request.camera.T_world_body.rotation;
-    const Eigen::Matrix3f R = R_panorama_camera.toRotationMatrix().cast<float>();
-    render_in_bands(request, rays_, workers_, sample, [&](const Tile& band) {
+  void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
+    std::vector<Eigen::Matrix3f> R_panorama_camera;
+    for (const RenderRequest& request : requests) {
+      const Eigen::Quaterniond rotation = panorama_.R_world_panorama.conjugate() * request.camera.T_world_body.rotation;
+      R_panorama_camera.emplace_back(rotation.toRotationMatrix().cast<float>());
+    }
+    render_in_bands(requests, rays_, workers_, sample, [&](std::size_t which, const Tile& band) {
       for (int y = band.y; y < band.y + band.height; ++y) {
         for (int x = band.x; x < band.x + band.width; x += kLanes) {
-          shade(R, x, y, std::min(kLanes, band.x + band.width - x), sample);
+          shade(R_panorama_camera[which], x, y, std::min(kLanes, band.x + band.width - x), sample);
         }
       }
     });

@@ -21,14 +21,17 @@ class PlaneRenderer final : public ProcessorRenderer {
   }
 
  private:
-  void compute(const RenderRequest& request, Sample& sample) const override {
-    const SE3 T_poster_camera = poster_.T_world_poster.inverse() * request.camera.T_world_body;
-    const View view{T_poster_camera.rotation.toRotationMatrix().cast<float>(),
-                    T_poster_camera.translation.cast<float>()};
-    render_in_bands(request, rays_, workers_, sample, [&](const Tile& band) {
+  void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
+    std::vector<View> views;
+    for (const RenderRequest& request : requests) {
+      const SE3 T_poster_camera = poster_.T_world_poster.inverse() * request.camera.T_world_body;
+      views.push_back(
+          {T_poster_camera.rotation.toRotationMatrix().cast<float>(), T_poster_camera.translation.cast<float>()});
+    }
+    render_in_bands(requests, rays_, workers_, sample, [&](std::size_t which, const Tile& band) {
       for (int y = band.y; y < band.y + band.height; ++y) {
         for (int x = band.x; x < band.x + band.width; x += kLanes) {
-          shade(view, x, y, std::min(kLanes, band.x + band.width - x), sample);
+          shade(views[which], x, y, std::min(kLanes, band.x + band.width - x), sample);
         }
       }
     });

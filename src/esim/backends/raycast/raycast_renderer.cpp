@@ -106,17 +106,21 @@ class RaycastRenderer final : public ProcessorRenderer {
   }
 
  private:
-  void compute(const RenderRequest& request, Sample& sample) const override {
-    Moment moment{scene_->place(request), scene_->lighting()};
-    if (moment.lighting) moment.lighting = in_camera_frame(*moment.lighting, moment.groups[0]);
-    render_in_bands(request, rays_, workers_, sample, [&](const Tile& band) {
+  void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
+    std::vector<Moment> moments;
+    for (const RenderRequest& request : requests) {
+      moments.push_back({scene_->place(request), scene_->lighting()});
+      Moment& moment = moments.back();
+      if (moment.lighting) moment.lighting = in_camera_frame(*moment.lighting, moment.groups[0]);
+    }
+    render_in_bands(requests, rays_, workers_, sample, [&](std::size_t which, const Tile& band) {
       switch (scene_->packet_size()) {
         case 16:
-          return render_band<16>(moment, band, sample);
+          return render_band<16>(moments[which], band, sample);
         case 8:
-          return render_band<8>(moment, band, sample);
+          return render_band<8>(moments[which], band, sample);
         default:
-          return render_band<4>(moment, band, sample);
+          return render_band<4>(moments[which], band, sample);
       }
     });
   }

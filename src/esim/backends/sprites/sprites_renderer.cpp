@@ -188,19 +188,23 @@ class SpritesRenderer final : public ProcessorRenderer {
   }
 
  private:
-  void compute(const RenderRequest& request, Sample& sample) const override {
-    std::vector<PlacedSprite> placed;
-    std::uint16_t number = 0;
-    for (const Sprite& sprite : scene_.sprites) {
-      if (const auto here = place_on_sensor(sprite, ++number, request.t, sensor_)) placed.push_back(*here);
-    }
-    render_in_bands(request, sensor_.width, sensor_.height, workers_, sample, [&](const Tile& band) {
-      for (int y = band.y; y < band.y + band.height; ++y) {
-        for (int x = band.x; x < band.x + band.width; x += kLanes) {
-          shade(placed, x, y, std::min(kLanes, band.x + band.width - x), sample);
-        }
+  void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
+    std::vector<std::vector<PlacedSprite>> placed;
+    for (const RenderRequest& request : requests) {
+      std::vector<PlacedSprite>& there = placed.emplace_back();
+      std::uint16_t number = 0;
+      for (const Sprite& sprite : scene_.sprites) {
+        if (const auto here = place_on_sensor(sprite, ++number, request.t, sensor_)) there.push_back(*here);
       }
-    });
+    }
+    render_in_bands(requests, sensor_.width, sensor_.height, workers_, sample,
+                    [&](std::size_t which, const Tile& band) {
+                      for (int y = band.y; y < band.y + band.height; ++y) {
+                        for (int x = band.x; x < band.x + band.width; x += kLanes) {
+                          shade(placed[which], x, y, std::min(kLanes, band.x + band.width - x), sample);
+                        }
+                      }
+                    });
   }
 
   void shade(const std::vector<PlacedSprite>& placed, int first, int row, int count, Sample& sample) const {

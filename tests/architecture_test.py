@@ -26,6 +26,7 @@ ALLOWED = {
     "sensors": "core events geometry render",
     "record": "core events geometry",
     "stats": "core events record",
+    "visualise": "core events record stats",
     "truth": "core events geometry motion render",
     "video": "core scene",
     "sim": "core events geometry motion render reproject sampling sensors record truth video",

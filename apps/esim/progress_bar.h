@@ -1,20 +1,27 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
+#include <string>
 
 #include "esim/sim/simulate.h"
 
 namespace esim::app {
 
-/// One line on a terminal that says how far a simulation is; on anything else, nothing until clear().
+/// One line on a terminal that says how far something is; on anything else, nothing.
 class ProgressBar {
  public:
   explicit ProgressBar(bool wanted);
   void show(const Progress& progress);
+
+  /// `fraction` of it is done; `what` says how far that is, and is asked only when the line is drawn.
+  void show(double fraction, const std::function<std::string()>& what);
+
   void clear();
 
  private:
   bool on_terminal_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point last_shown_;
 };
 

@@ -164,6 +164,7 @@ class Showing {
       show(i + 1, kCount);
     }
     bar_.clear();
+    if (pictures.empty()) return kInterrupted;
     write_png(draw_contact_sheet(pictures, kSheetColumns, options_.theme));
     say(fmt::format("{} moments", pictures.size()));
     return interrupted() ? kInterrupted : kOk;
@@ -221,7 +222,8 @@ int run(Arguments& arguments) {
   bar.clear();
   if (!found) return kInterrupted;
   Showing showing(arguments, input, *found, out);
-  return extension == ".png" ? showing.still() : showing.video(extension == ".gif" ? VideoKind::gif : VideoKind::mp4);
+  return extension == ".png" ? showing.still()
+                             : showing.video(extension == ".gif" ? VideoKind::gif : VideoKind::compact_mp4);
 }
 
 }  // namespace
@@ -248,16 +250,17 @@ void add_play(CLI::App& app, int& exit_code) {
       ->type_name("VIEW,...")
       ->delimiter(',');
   positive("--fps", arguments->fps, "Frames per second of the video (default: 30, of GIFs 20)", "F", 1, 240);
-  positive("--slow-motion", arguments->play.slow_motion,
-           "How many times slower than real time; below 1 faster (default: so that the video lasts at least 5 s)", "F",
-           1e-3, 1e6);
+  positive(
+      "--slow-motion", arguments->play.slow_motion,
+      "How many times slower than real time; below 1 faster (default: so that the video lasts about 5 s or longer)",
+      "F", 1e-3, 1e6);
   auto* window =
       positive("--window-ms", arguments->window_ms,
                "Time whose events a picture of events shows (default: by their rate, 1 to 50 ms)", "MS", 1e-3, 1e6);
   positive("--window-events", arguments->play.window_events, "Shows the latest N events instead", "N", 1, 8e6)
       ->excludes(window);
   positive("--tau-ms", arguments->tau_ms, "Decay of the time surface (default: 1.5 windows)", "MS", 1e-3, 1e6);
-  positive("--span-ms", arguments->span_ms, "Time that the plot of space and time spans (default: 8 windows)", "MS",
+  positive("--span-ms", arguments->span_ms, "Time that the plot of space and time spans (default: 20 windows)", "MS",
            1e-3, 1e6);
   positive("--start", arguments->extent.start_s, "Begins there, since the start of the recording", "S", 0, 1e9);
   positive("--duration", arguments->extent.duration_s, "Ends so much later", "S", 1e-6, 1e9);

@@ -17,9 +17,9 @@
 namespace esim {
 namespace {
 
-constexpr double kLeastVideo_s = 5;
+constexpr double kLeastVideo_s = 4.9;
 constexpr double kLeastWindow_s = 1e-3, kMostWindow_s = 50e-3, kEventsPerPixel = 1.0 / 12;
-constexpr double kWindowsPerTau = 1.5, kWindowsPerSpan = 8;
+constexpr double kWindowsPerTau = 1.5, kWindowsPerSpan = 20;
 constexpr std::size_t kMostEventsCounted = std::size_t{1} << 23;
 constexpr std::size_t kMostPoints = 160'000;
 constexpr std::size_t kMostEventsWaiting = std::size_t{1} << 22, kMostPicturesWaiting = 64;

@@ -16,7 +16,7 @@ namespace {
 constexpr double kTimeLength = 1.5;    // of the box, in longer sides of the sensor, as all lengths here
 constexpr double kViewerDistance = 5;  // from the middle of the box
 constexpr double kMiddleYaw_deg = -40, kSwing_deg = 18, kPitch_deg = 19;
-constexpr double kLabelSpace = 52;  // px around the box
+constexpr double kLabelSpace = 50;  // px around the box
 constexpr int kTextHeight = 10;
 constexpr float kNewOpacity = 0.95f, kOldOpacity = 0.45f;
 constexpr float kFade = 0.45f;   // of the most distant points towards the ground
@@ -189,13 +189,18 @@ class Plot {
     return ticks.size() > 1 ? ticks[1].value - ticks[0].value : 1;
   }
 
+  int widest_label(std::size_t axis) const {
+    int widest = 0;
+    for (const Tick& tick : axes_[axis].scale.ticks)
+      widest = std::max(widest, Canvas::text_width(tick.label, kTextHeight));
+    return widest;
+  }
+
   // Every how many-th tick of an edge has room for its label; the same ones while time goes on.
   long labelled_ticks(std::size_t axis, const std::array<double, 3>& from, const std::array<double, 3>& to) const {
     const Spot first = place(from).spot, last = place(to).spot;
     const double across = std::abs(last.x - first.x), down = std::abs(last.y - first.y);
-    int widest = 0;
-    for (const Tick& tick : axes_[axis].scale.ticks)
-      widest = std::max(widest, Canvas::text_width(tick.label, kTextHeight));
+    const int widest = widest_label(axis);
     const double spaces = (axes_[axis].scale.high - axes_[axis].scale.low) / tick_step(axis);
     for (const long every : {1, 2, 5}) {
       const double share = static_cast<double>(every) / spaces;
@@ -240,7 +245,7 @@ class Plot {
       write(at, 11, tick.label, theme_.ink);
     }
     if (outward) {
-      write(middle()[axis], 44, axes_[axis].scale.title, theme_.faint_ink);
+      write(middle()[axis], 28 + 0.7 * widest_label(axis), axes_[axis].scale.title, theme_.faint_ink);
     } else {
       const Spot top = place(from).spot;
       canvas_.text(static_cast<int>(top.x), static_cast<int>(top.y) - 14, axes_[axis].scale.title, kTextHeight,

@@ -63,7 +63,7 @@ struct VideoFile::Impl {
 };
 
 void VideoFile::Impl::open_encoder(VideoKind kind, int width, int height, double frames_per_s) {
-  const bool gif = kind == VideoKind::gif;
+  const bool gif = kind == VideoKind::gif, compact = kind == VideoKind::compact_mp4;
   const AVCodec* codec = avcodec_find_encoder_by_name(gif ? "gif" : "libx264");
   if (codec == nullptr) {
     throw_cannot_write(
@@ -77,8 +77,8 @@ void VideoFile::Impl::open_encoder(VideoKind kind, int width, int height, double
   encoder->thread_count = 1;  // the same file on every machine, and processors left for the simulation
   encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
   if (!gif) {
-    av_opt_set(encoder->priv_data, "preset", "ultrafast", 0);
-    av_opt_set(encoder->priv_data, "crf", "20", 0);
+    av_opt_set(encoder->priv_data, "preset", compact ? "veryfast" : "ultrafast", 0);
+    av_opt_set(encoder->priv_data, "crf", compact ? "23" : "20", 0);
   }
   check(avcodec_open2(encoder.get(), codec, nullptr));
 

@@ -20,6 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kSheetColumns = 3, kSheetRows = 3;
+constexpr int kWidthOfGif = 960;            // px: they are large files
 constexpr double kMostFramesOfGif_hz = 50;  // faster ones are shown slowly by browsers
 
 struct Arguments {
@@ -207,6 +208,7 @@ int run(Arguments& arguments) {
   play.frames_per_s = arguments.fps.value_or(extension == ".gif" ? 20 : 30);
   if (extension == ".gif" && play.frames_per_s > kMostFramesOfGif_hz)
     throw UserError(fmt::format("GIFs have at most {} frames per second: lower --fps", kMostFramesOfGif_hz));
+  if (extension == ".gif" && play.width == 0) play.width = kWidthOfGif;
   play.theme = arguments.light ? kLightTheme : kDarkTheme;
   const fs::path name = fs::path(arguments.input).lexically_normal();
   play.name = (name.has_filename() ? name : name.parent_path()).filename().string();
@@ -265,7 +267,8 @@ void add_play(CLI::App& app, int& exit_code) {
   positive("--start", arguments->extent.start_s, "Begins there, since the start of the recording", "S", 0, 1e9);
   positive("--duration", arguments->extent.duration_s, "Ends so much later", "S", 1e-6, 1e9);
   positive("--at", arguments->at_s, "The moment of a still, since the start of the recording", "S", 0, 1e9);
-  positive("--size", arguments->play.width, "Width of the picture (default: 960 to 1920)", "PX", 128, 7680);
+  positive("--size", arguments->play.width, "Width of the picture (default: 960 to 1920, of GIFs 960)", "PX", 128,
+           7680);
   command->add_option("--camera", arguments->camera, "Of several cameras, the one to show")->type_name("NAME");
   auto* width = positive("--width", arguments->width,
                          "Sensor (default: as the file says, or as far as its events reach)", "PX", 1, 65536);

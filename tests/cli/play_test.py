@@ -107,10 +107,11 @@ class Play(ProgramTest):
         self.assert_refused(run("play", events, "--at", "7", "--out", self.folder / "a.png"), "--at 7")
         self.assert_refused(run("play", events, "--out", self.folder / "a.png", "--view", "events,space-time"), "one view")
         self.assert_refused(run("play", events, "--out", self.folder / "a.gif", "--fps", "60"), "50")
+        self.assert_refused(run("play", self.write("d.txt", "0 1 2 1\n1600000000 1 2 1\n")), "too long", "--duration")
         self.assert_refused(run("play", events, "--camera", "left"), "no camera left")
         self.assert_refused(run("play", events, "--width", "20", "--height", "20"), "outside the sensor")
         self.assert_refused(run("play", self.write("b.txt", "0.1 1 2 1\n0.2 1 2\n")), "b.txt, line 2")
-        self.assertEqual(self.names(), {"a.txt", "b.txt"})
+        self.assertEqual(self.names(), {"a.txt", "b.txt", "d.txt"})
 
     def test_interrupted(self):
         events = self.write("a.txt", stream(20000, 2))

@@ -46,8 +46,9 @@ void draw_motion_legend(Canvas& canvas, int x, int baseline, const Panel& panel,
 }
 
 void draw_panel(Canvas& canvas, const Tile& place, View view, const Panel& panel, const Theme& theme) {
-  canvas.text(place.x, place.y - 10, title_of(view), kTextHeight, theme.ink);
-  canvas.text(place.x + place.width, place.y - 10, panel.note, kSmallTextHeight, theme.faint_ink, Align::right);
+  const int used = canvas.text(place.x, place.y - 10, title_of(view), kTextHeight, theme.ink);
+  if (used + Canvas::text_width(panel.note, kSmallTextHeight) + kGap < place.width)
+    canvas.text(place.x + place.width, place.y - 10, panel.note, kSmallTextHeight, theme.faint_ink, Align::right);
   if (panel.picture.empty()) {
     canvas.fill(place, theme.ground);
   } else {

@@ -17,6 +17,7 @@
 namespace esim {
 namespace {
 
+constexpr double kMostFrames = 1e6;
 constexpr double kLeastVideo_s = 4.9;
 constexpr double kLeastWindow_s = 1e-3, kMostWindow_s = 50e-3, kEventsPerPixel = 1.0 / 12;
 constexpr double kWindowsPerTau = 1.5, kWindowsPerSpan = 20;
@@ -121,6 +122,11 @@ PlayOptions choose_missing(PlayOptions options, const Survey& survey) {
 Instants video_instants(const Survey& survey, const PlayOptions& options) {
   const double step_ns = 1e9 / (options.frames_per_s * options.slow_motion);
   const double steps = static_cast<double>(survey.end - survey.start) / step_ns;
+  if (!(steps < kMostFrames)) {
+    throw UserError(
+        fmt::format("{} lasts {:.4g} s, too long for a video: choose a part with --duration, or --slow-motion",
+                    options.name, to_seconds(survey.end - survey.start)));
+  }
   return {survey.start, step_ns, static_cast<std::size_t>(std::ceil(steps - 1e-6)) + 1};
 }
 
@@ -144,6 +150,7 @@ struct Player::Impl {
   TimeNs known_until() const;
   bool read();
   TimeNs advance();
+  void add_image(TimeNs t, Image<Rgb> picture);
   void add(const TruthRecord& truth);
   void pass_events(TimeNs until);
   Panel draw(View view, TimeNs t);
@@ -195,24 +202,21 @@ bool Player::Impl::read() {
   } else if (const auto* truth = std::get_if<TruthRecord>(record)) {
     add(*truth);
   } else if (const auto* image = std::get_if<ImageRecord>(record); image != nullptr && image_from == Content::images) {
-    const Image<float> small = reduced(image->irradiance, grid);
-    images.add(image->t, esim::grey(small));
-    backgrounds.add(image->t, dimmed_grey(small));
+    add_image(image->t, esim::grey(reduced(image->irradiance, grid)));
   } else if (const auto* frame = std::get_if<FrameRecord>(record); frame != nullptr && image_from == Content::frames) {
-    Image<Rgb> picture = grey(*frame, grid);
-    Image<Rgb> background = picture;
-    for (Rgb& pixel : background.pixels()) pixel = mix({}, pixel, 0.45f);
-    images.add(frame->t, std::move(picture));
-    backgrounds.add(frame->t, std::move(background));
+    add_image(frame->t, grey(*frame, grid));
   }
   return true;
 }
 
+void Player::Impl::add_image(TimeNs t, Image<Rgb> picture) {
+  if (shows(View::events)) backgrounds.add(t, dimmed(picture));
+  if (shows(View::image)) images.add(t, std::move(picture));
+}
+
 void Player::Impl::add(const TruthRecord& truth) {
   if (image_from == Content::truth) {
-    const Image<float> small = reduced(truth.irradiance, grid);
-    images.add(truth.t, esim::grey(small));
-    backgrounds.add(truth.t, dimmed_grey(small));
+    add_image(truth.t, esim::grey(reduced(truth.irradiance, grid)));
   }
   if (shows(View::depth))
     depths.add(truth.t, colour_depth(picked(truth.depth, grid), survey.depth.near_m(), survey.depth.far_m()));

@@ -39,7 +39,7 @@ struct Instants {
   TimeNs at(std::size_t index) const { return first + static_cast<TimeNs>(step_ns * static_cast<double>(index)); }
 };
 
-/// Those of a video.
+/// Those of a video. Throws UserError where there are more than a million.
 Instants video_instants(const Survey& survey, const PlayOptions& options);
 
 /// Shows one camera of a recording, instant by instant: events up to it and the pictures that are due. Memory is

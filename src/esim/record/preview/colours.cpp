@@ -64,10 +64,9 @@ Rgb mix(Rgb from, Rgb to, float amount) {
   return {blend(from.r, to.r), blend(from.g, to.g), blend(from.b, to.b)};
 }
 
-Image<Rgb> dimmed_grey(const Image<float>& irradiance) {
-  Image<Rgb> out = grey(irradiance);
-  for (Rgb& pixel : out.pixels()) pixel = mix({}, pixel, kBackgroundLevel);
-  return out;
+Image<Rgb> dimmed(Image<Rgb> image) {
+  for (Rgb& pixel : image.pixels()) pixel = mix({}, pixel, kBackgroundLevel);
+  return image;
 }
 
 Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, Image<Rgb> background) {
@@ -84,7 +83,7 @@ Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, Image<
 }
 
 Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, const Image<float>& irradiance) {
-  return render_events(on, off, dimmed_grey(irradiance));
+  return render_events(on, off, dimmed(grey(irradiance)));
 }
 
 Image<Rgb> grey(const Image<float>& irradiance) {

@@ -28,8 +28,8 @@ Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, Image<
 /// The same over the dimmed image; irradiance is linear.
 Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, const Image<float>& irradiance);
 
-/// Irradiance in grey, sRGB-encoded, so dark that events are seen well above it.
-Image<Rgb> dimmed_grey(const Image<float>& irradiance);
+/// So dark that events are seen well above it.
+Image<Rgb> dimmed(Image<Rgb> image);
 
 /// Irradiance in grey, sRGB-encoded.
 Image<Rgb> grey(const Image<float>& irradiance);

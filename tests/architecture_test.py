@@ -27,6 +27,7 @@ ALLOWED = {
     "record": "core events geometry",
     "represent": "core events",
     "stats": "core events record",
+    "visualise": "core events record stats",
     "truth": "core events geometry motion render",
     "video": "core scene",
     "sim": "core events geometry motion render reproject sampling sensors record truth video",

@@ -14,6 +14,7 @@ void add_check(CLI::App& app, int& exit_code);
 void add_convert(CLI::App& app, int& exit_code);
 void add_import(CLI::App& app, int& exit_code);
 void add_info(CLI::App& app, int& exit_code);
+void add_play(CLI::App& app, int& exit_code);
 void add_stats(CLI::App& app, int& exit_code);
 void add_evaluate(CLI::App& app, int& exit_code);
 void add_options(CLI::App& app, int& exit_code);

@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
       "  esim convert out/room room.bag                    other formats: esim convert --list\n"
       "  esim import room.blend --bake                     photorealistic light for fast rendering, by Blender\n"
       "  esim info out/room                                what a recording holds\n"
+      "  esim play out/room                                a video of a recording or of a file of events\n"
       "  esim stats out/room --plot                        rates, intervals, hot pixels, banding of its events\n"
       "  esim evaluate sampling --out out/sampling         accuracy and cost of ways of sampling\n"
       "  esim options                                      every option of a scenario\n"
@@ -31,6 +32,7 @@ int main(int argc, char** argv) {
   add_convert(app, exit_code);
   add_import(app, exit_code);
   add_info(app, exit_code);
+  add_play(app, exit_code);
   add_stats(app, exit_code);
   add_evaluate(app, exit_code);
   add_options(app, exit_code);

@@ -21,6 +21,7 @@ struct Spot {
 class Canvas {
  public:
   Canvas(int width, int height, Rgb background) : pixels_(width, height, background) {}
+  explicit Canvas(Image<Rgb> pixels) : pixels_(std::move(pixels)) {}
 
   const Image<Rgb>& pixels() const { return pixels_; }
   Image<Rgb> take() && { return std::move(pixels_); }

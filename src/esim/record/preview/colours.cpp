@@ -64,24 +64,26 @@ Rgb mix(Rgb from, Rgb to, float amount) {
   return {blend(from.r, to.r), blend(from.g, to.g), blend(from.b, to.b)};
 }
 
-Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, const Image<float>& irradiance) {
-  const Image<std::uint8_t> levels = encode_srgb(irradiance);
-  Image<Rgb> out(levels.width(), levels.height());
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    const std::uint8_t level = to_byte(kBackgroundLevel * static_cast<float>(levels.pixels()[i]));
-    const Rgb background{level, level, level};
+Image<Rgb> dimmed(Image<Rgb> image) {
+  for (Rgb& pixel : image.pixels()) pixel = mix({}, pixel, kBackgroundLevel);
+  return image;
+}
+
+Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, Image<Rgb> background) {
+  for (std::size_t i = 0; i < background.size(); ++i) {
     const float count = on.pixels()[i] + off.pixels()[i];
-    if (!(count > 0.0f)) {
-      out.pixels()[i] = background;
-      continue;
-    }
+    if (!(count > 0.0f)) continue;
     // One event is seen well; each doubling adds the same, up to the saturating number.
     const float strength = std::log2(1.0f + count) / std::log2(1.0f + kSaturatingEvents);
     const float opacity = std::min({1.0f, 0.35f + 0.65f * strength, 0.6f * count});
     const Rgb hue = mix(kOffColour, kOnColour, on.pixels()[i] / count);
-    out.pixels()[i] = mix(background, hue, opacity);
+    background.pixels()[i] = mix(background.pixels()[i], hue, opacity);
   }
-  return out;
+  return background;
+}
+
+Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, const Image<float>& irradiance) {
+  return render_events(on, off, dimmed(grey(irradiance)));
 }
 
 Image<Rgb> grey(const Image<float>& irradiance) {

@@ -21,9 +21,15 @@ inline constexpr Rgb kOffColour{40, 140, 255};
 /// Where nothing is seen; not a colour of the depth map.
 inline constexpr Rgb kNoDepthColour{196, 196, 196};
 
-/// Events counted per pixel over the dimmed image: hue by the share of ON, opacity by the number, full from 8 events
-/// on. Counts may be fractions, as resampled ones are. Irradiance is linear; all images have the same size.
+/// Events counted per pixel over a picture: hue by the share of ON, opacity by the number, full from 8 events on.
+/// Counts may be fractions, as resampled ones are. All images have the same size.
+Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, Image<Rgb> background);
+
+/// The same over the dimmed image; irradiance is linear.
 Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, const Image<float>& irradiance);
+
+/// So dark that events are seen well above it.
+Image<Rgb> dimmed(Image<Rgb> image);
 
 /// Irradiance in grey, sRGB-encoded.
 Image<Rgb> grey(const Image<float>& irradiance);

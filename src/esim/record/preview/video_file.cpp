@@ -7,10 +7,13 @@ extern "C" {
 #include <libswscale/swscale.h>
 }
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <string>
 
 #include "esim/record/output_file.h"
+#include "esim/record/preview/palette.h"
 
 namespace esim {
 namespace {
@@ -53,23 +56,30 @@ struct VideoFile::Impl {
     return result;
   }
 
-  void open_encoder(int width, int height, double frames_per_s);
-  void open_file();
+  void open_encoder(VideoKind kind, int width, int height, double frames_per_s);
+  void open_file(VideoKind kind);
+  void fill(const Image<Rgb>& image);
   void encode(const AVFrame* image);
 };
 
-void VideoFile::Impl::open_encoder(int width, int height, double frames_per_s) {
-  const AVCodec* codec = avcodec_find_encoder_by_name("libx264");
-  if (codec == nullptr) throw_cannot_write(path, "FFmpeg has no H.264 encoder (libx264); record without the preview");
+void VideoFile::Impl::open_encoder(VideoKind kind, int width, int height, double frames_per_s) {
+  const bool gif = kind == VideoKind::gif, compact = kind == VideoKind::compact_mp4;
+  const AVCodec* codec = avcodec_find_encoder_by_name(gif ? "gif" : "libx264");
+  if (codec == nullptr) {
+    throw_cannot_write(
+        path, gif ? "FFmpeg has no GIF encoder" : "FFmpeg has no H.264 encoder (libx264); record without the preview");
+  }
   encoder.reset(avcodec_alloc_context3(codec));
   encoder->width = width;
   encoder->height = height;
-  encoder->pix_fmt = AV_PIX_FMT_YUV420P;
+  encoder->pix_fmt = gif ? AV_PIX_FMT_PAL8 : AV_PIX_FMT_YUV420P;
   encoder->time_base = av_inv_q(av_d2q(frames_per_s, 100000));
   encoder->thread_count = 1;  // the same file on every machine, and processors left for the simulation
   encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
-  av_opt_set(encoder->priv_data, "preset", "ultrafast", 0);
-  av_opt_set(encoder->priv_data, "crf", "20", 0);
+  if (!gif) {
+    av_opt_set(encoder->priv_data, "preset", compact ? "veryfast" : "ultrafast", 0);
+    av_opt_set(encoder->priv_data, "crf", compact ? "23" : "20", 0);
+  }
   check(avcodec_open2(encoder.get(), codec, nullptr));
 
   frame.reset(av_frame_alloc());
@@ -78,13 +88,14 @@ void VideoFile::Impl::open_encoder(int width, int height, double frames_per_s) {
   frame->height = height;
   check(av_frame_get_buffer(frame.get(), 0));
   packet.reset(av_packet_alloc());
+  if (gif) return;
   converter.reset(sws_getContext(width, height, AV_PIX_FMT_RGB24, width, height, encoder->pix_fmt, SWS_BILINEAR,
                                  nullptr, nullptr, nullptr));
 }
 
-void VideoFile::Impl::open_file() {
+void VideoFile::Impl::open_file(VideoKind kind) {
   AVFormatContext* context = nullptr;
-  check(avformat_alloc_output_context2(&context, nullptr, "mp4", nullptr));
+  check(avformat_alloc_output_context2(&context, nullptr, kind == VideoKind::gif ? "gif" : "mp4", nullptr));
   format.reset(context);
   format->flags |= AVFMT_FLAG_BITEXACT;
   stream = avformat_new_stream(format.get(), nullptr);
@@ -93,6 +104,24 @@ void VideoFile::Impl::open_file() {
   check(avcodec_parameters_from_context(stream->codecpar, encoder.get()));
   check(avio_open(&format->pb, ("file:" + path.string()).c_str(), AVIO_FLAG_WRITE));
   check(avformat_write_header(format.get(), nullptr));
+}
+
+void VideoFile::Impl::fill(const Image<Rgb>& image) {
+  if (converter) {
+    const std::uint8_t* const source[] = {reinterpret_cast<const std::uint8_t*>(image.data())};
+    const int source_stride[] = {3 * image.width()};
+    sws_scale(converter.get(), source, source_stride, 0, image.height(), frame->data, frame->linesize);
+    return;
+  }
+  const PaletteImage reduced = reduce_colours(image);
+  for (int y = 0; y < image.height(); ++y)
+    std::copy_n(reduced.indices.row(y), image.width(), frame->data[0] + std::ptrdiff_t{y} * frame->linesize[0]);
+  for (std::size_t i = 0; i < reduced.colours.size(); ++i) {
+    const Rgb colour = reduced.colours[i];
+    const std::uint32_t opaque =
+        0xff000000u | static_cast<std::uint32_t>(colour.r) << 16 | static_cast<std::uint32_t>(colour.g) << 8 | colour.b;
+    std::memcpy(frame->data[1] + sizeof opaque * i, &opaque, sizeof opaque);
+  }
 }
 
 void VideoFile::Impl::encode(const AVFrame* image) {
@@ -107,23 +136,20 @@ void VideoFile::Impl::encode(const AVFrame* image) {
   }
 }
 
-VideoFile::VideoFile(std::filesystem::path path, int width, int height, double frames_per_s)
+VideoFile::VideoFile(std::filesystem::path path, int width, int height, double frames_per_s, VideoKind kind)
     : impl_(std::make_unique<Impl>()) {
   av_log_set_level(AV_LOG_QUIET);  // what fails becomes an exception
   impl_->path = std::move(path);
   OutputFile(impl_->path).close();  // says why, if the file cannot be created
-  impl_->open_encoder(width, height, frames_per_s);
-  impl_->open_file();
+  impl_->open_encoder(kind, width, height, frames_per_s);
+  impl_->open_file(kind);
 }
 
 VideoFile::~VideoFile() = default;
 
-void VideoFile::append(const Image<Rgb>& frame) {
+void VideoFile::append(const Image<Rgb>& image) {
   impl_->check(av_frame_make_writable(impl_->frame.get()));
-  const std::uint8_t* const source[] = {reinterpret_cast<const std::uint8_t*>(frame.data())};
-  const int source_stride[] = {3 * frame.width()};
-  sws_scale(impl_->converter.get(), source, source_stride, 0, frame.height(), impl_->frame->data,
-            impl_->frame->linesize);
+  impl_->fill(image);
   impl_->frame->pts = impl_->frames++;
   impl_->encode(impl_->frame.get());
 }

@@ -9,14 +9,18 @@
 
 namespace esim {
 
-/// An MP4 with H.264 in yuv420p, which browsers play. Throws OutputError if it cannot be written.
+/// MP4 with H.264 in yuv420p, which browsers play, made fast or of about a third of the bytes; or a GIF that repeats
+/// for ever, with 256 colours for each frame.
+enum class VideoKind { mp4, compact_mp4, gif };
+
+/// A video being written. Throws OutputError if it cannot be.
 class VideoFile {
  public:
-  /// Width and height must be even.
-  VideoFile(std::filesystem::path path, int width, int height, double frames_per_s);
+  /// Width and height must be even. GIFs know times in 1/100 s.
+  VideoFile(std::filesystem::path path, int width, int height, double frames_per_s, VideoKind kind = VideoKind::mp4);
   ~VideoFile();
 
-  void append(const Image<Rgb>& frame);
+  void append(const Image<Rgb>& image);
 
   /// Writes the rest, and looks whether all frames are in the file.
   void close();

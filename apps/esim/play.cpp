@@ -1,0 +1,289 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "commands.h"
+#include "esim/core/error.h"
+#include "esim/record/events_file.h"
+#include "esim/record/number_text.h"
+#include "esim/record/output_file.h"
+#include "esim/record/preview/video_file.h"
+#include "esim/record/recording_file.h"
+#include "esim/visualise/player.h"
+#include "progress_bar.h"
+#include "support.h"
+
+namespace esim::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kSheetColumns = 3, kSheetRows = 3;
+constexpr int kWidthOfGif = 960;            // px: they are large files
+constexpr double kMostFramesOfGif_hz = 50;  // faster ones are shown slowly by browsers
+
+struct Arguments {
+  std::string input, out, camera;
+  std::vector<std::string> views;
+  double window_ms = 0, tau_ms = 0, span_ms = 0;
+  std::optional<double> fps, at_s;
+  std::optional<int> width, height;
+  Extent extent;
+  PlayOptions play;
+  bool light = false, quiet = false, force = false;
+};
+
+// Beside what is shown, as other figures are: FILE.h5 has FILE.play.mp4, and a folder FOLDER.play.mp4.
+fs::path out_path(const Arguments& arguments) {
+  if (!arguments.out.empty()) return arguments.out;
+  const fs::path file = fs::path(arguments.input + "/").parent_path();  // without a slash at its end
+  if (fs::is_directory(file)) return fs::path(file) += ".play.mp4";
+  return fs::path(file).replace_extension(".play.mp4");
+}
+
+bool is_format(const fs::path& folder) {
+  for (const Format& format : formats()) {
+    if (format.folder && format.recognises(folder, "")) return true;
+  }
+  return false;
+}
+
+/// What can be opened again and again: of a folder that is of no format, the events in it.
+class Input {
+ public:
+  explicit Input(const Arguments& arguments) : path_(arguments.input) {
+    if (arguments.width && arguments.height) reading_.sensor = {*arguments.width, *arguments.height};
+    std::error_code error;
+    const bool folder = fs::is_directory(path_, error);
+    if (folder && !is_format(path_)) {
+      const EventsFile events(path_, reading_);
+      path_ = events.path();
+      reading_.sensor = events.sensor();
+    } else if (!folder && !reading_.sensor && open()->info().cameras.size() == 1) {
+      reading_.sensor = EventsFile(path_, reading_).sensor();  // as a report beside it may say
+    }
+  }
+
+  std::unique_ptr<Source> open() const { return open_source(path_, reading_); }
+
+  int camera(const std::string& name) const {
+    std::string names;
+    const auto source = open();
+    const auto& cameras = source->info().cameras;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      if (name.empty() ? cameras.size() == 1 : cameras[i].name == name) return static_cast<int>(i);
+      names += (names.empty() ? "" : ", ") + cameras[i].name;
+    }
+    if (name.empty())
+      throw UserError(fmt::format("{} holds several cameras: choose one of {} with --camera", path_.string(), names));
+    throw UserError(fmt::format("{} has no camera {}; there is {}", path_.string(), name, names));
+  }
+
+ private:
+  fs::path path_;
+  ReadOptions reading_;
+};
+
+std::vector<View> views_named(const std::vector<std::string>& names) {
+  std::vector<View> views;
+  for (const std::string& name : names) {
+    if (name == "all") return {};
+    std::optional<View> found;
+    std::string known = "all";
+    for (int i = 0; i < kViews; ++i) {
+      const auto view = static_cast<View>(i);
+      if (name == name_of(view)) found = view;
+      known += fmt::format(", {}", name_of(view));
+    }
+    if (!found) throw UserError(fmt::format("--view {}: it is one of {}", name, known));
+    if (std::find(views.begin(), views.end(), *found) == views.end()) views.push_back(*found);
+  }
+  return views;
+}
+
+/// One showing, from the survey to the finished file.
+class Showing {
+ public:
+  Showing(const Arguments& arguments, const Input& input, const Survey& found, const fs::path& out)
+      : arguments_(arguments), survey_(found), source_(input.open()), bar_(!arguments.quiet), out_(out) {
+    options_ = choose_missing(arguments.play, found);
+  }
+
+  int still() {
+    if (!arguments_.at_s) return contact_sheet();
+    const TimeNs t = survey_.origin + to_ns(*arguments_.at_s);
+    if (t < survey_.start || t > survey_.end) {
+      throw UserError(fmt::format("--at {} is outside what is shown, from {} to {} s", *arguments_.at_s,
+                                  to_seconds(survey_.start - survey_.origin),
+                                  to_seconds(survey_.end - survey_.origin)));
+    }
+    Player player(*source_, arguments_.extent.camera, survey_, options_, {.first = t});
+    write_png(*player.next());
+    say(fmt::format("t = {:g} s", *arguments_.at_s));
+    return kOk;
+  }
+
+  int video(VideoKind kind) {
+    const Instants instants = video_instants(survey_, options_);
+    Player player(*source_, arguments_.extent.camera, survey_, options_, instants);
+    RecordingFile file(out_, arguments_.force);
+    VideoFile video(file.path(), player.layout().width, player.layout().height, options_.frames_per_s, kind);
+    std::size_t frames = 0;
+    while (!interrupted()) {
+      const auto image = player.next();
+      if (!image) break;
+      video.append(*image);
+      ++frames;
+      show(frames, instants.count);
+    }
+    video.close();
+    file.finish();
+    bar_.clear();
+    const bool complete = frames == instants.count;
+    say(fmt::format(
+        "{}{} frames, {:.2f} s at {}", complete ? "" : "interrupted, ", frames,
+        static_cast<double>(frames) / options_.frames_per_s,
+        options_.slow_motion == 1 ? "real time" : fmt::format("1/{:g} of real time", options_.slow_motion)));
+    return complete ? kOk : kInterrupted;
+  }
+
+ private:
+  int contact_sheet() {
+    if (arguments_.play.views.empty()) options_.views = {View::events};
+    if (options_.views.size() != 1) throw UserError("a contact sheet shows one view: name one, or a moment with --at");
+    options_.width = options_.width > 0 ? options_.width : 620;
+    constexpr std::size_t kCount = kSheetColumns * kSheetRows;
+    // The middles of equal parts.
+    const double step_ns = static_cast<double>(survey_.end - survey_.start) / kCount;
+    const Instants instants{survey_.start + static_cast<TimeNs>(0.5 * step_ns), step_ns, kCount};
+    Player player(*source_, arguments_.extent.camera, survey_, options_, instants);
+    std::vector<CaptionedPicture> pictures;
+    for (std::size_t i = 0; i < kCount && !interrupted(); ++i) {
+      pictures.push_back(
+          {*player.next_picture(), fmt::format("t = {:.4f} s", to_seconds(instants.at(i) - survey_.origin))});
+      show(i + 1, kCount);
+    }
+    bar_.clear();
+    if (pictures.empty()) return kInterrupted;
+    write_png(draw_contact_sheet(pictures, kSheetColumns, options_.theme));
+    say(fmt::format("{} moments", pictures.size()));
+    return interrupted() ? kInterrupted : kOk;
+  }
+
+  void write_png(const Image<Rgb>& image) { write_file_atomically(out_, encode_png(image)); }
+
+  void show(std::size_t frame, std::size_t of) {
+    bar_.show(static_cast<double>(frame) / static_cast<double>(of),
+              [&] { return fmt::format("{}/{} frames", frame, of); });
+  }
+
+  void say(const std::string& what) {
+    if (arguments_.quiet) return;
+    fmt::print(stderr, "{}: {}; {} events\n", out_.string(), what, grouped(survey_.events));
+  }
+
+  const Arguments& arguments_;
+  const Survey& survey_;
+  PlayOptions options_;
+  std::unique_ptr<Source> source_;
+  ProgressBar bar_;
+  fs::path out_;
+};
+
+int run(Arguments& arguments) {
+  const fs::path out = out_path(arguments);
+  const std::string extension = out.extension().string();
+  if (extension != ".mp4" && extension != ".gif" && extension != ".png")
+    throw UserError(fmt::format("{}: give --out a name that ends in .mp4, .gif or .png", out.string()));
+  if (fs::exists(out) && (!arguments.force || fs::is_directory(out)))
+    throw UserError(out.string() + " exists: choose another --out, or replace a file with --force");
+  if (arguments.at_s && extension != ".png") throw UserError("--at gives a still: name it with --out FILE.png");
+
+  PlayOptions& play = arguments.play;
+  play.views = views_named(arguments.views);
+  play.window_s = 1e-3 * arguments.window_ms;
+  play.tau_s = 1e-3 * arguments.tau_ms;
+  play.span_s = 1e-3 * arguments.span_ms;
+  play.frames_per_s = arguments.fps.value_or(extension == ".gif" ? 20 : 30);
+  if (extension == ".gif" && play.frames_per_s > kMostFramesOfGif_hz)
+    throw UserError(fmt::format("GIFs have at most {} frames per second: lower --fps", kMostFramesOfGif_hz));
+  if (extension == ".gif" && play.width == 0) play.width = kWidthOfGif;
+  play.theme = arguments.light ? kLightTheme : kDarkTheme;
+  const fs::path name = fs::path(arguments.input).lexically_normal();
+  play.name = (name.has_filename() ? name : name.parent_path()).filename().string();
+
+  catch_interrupts();
+  const Input input(arguments);
+  arguments.extent.camera = input.camera(arguments.camera);
+  ProgressBar bar(!arguments.quiet);
+  const auto found = survey(*input.open(), arguments.extent, [&](double share) {
+    bar.show(share, [&] { return fmt::format("reading, {:.0f} %", 100 * share); });
+    return !interrupted();
+  });
+  bar.clear();
+  if (!found) return kInterrupted;
+  Showing showing(arguments, input, *found, out);
+  return extension == ".png" ? showing.still()
+                             : showing.video(extension == ".gif" ? VideoKind::gif : VideoKind::compact_mp4);
+}
+
+}  // namespace
+
+void add_play(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("play", "Make a video or a picture of events, to look at");
+  const auto positive = [&](const char* name, auto& value, const char* help, const char* unit, double least,
+                            double most) {
+    return command->add_option(name, value, help)->type_name(unit)->check(CLI::Range(least, most));
+  };
+  command->add_option("in", arguments->input, "Recording folder, or file of events of any format")
+      ->required()
+      ->type_name("IN");
+  command
+      ->add_option("-o,--out", arguments->out,
+                   "What to write (default: NAME.play.mp4 beside IN). A picture (.png) is a contact sheet, or one "
+                   "moment with --at")
+      ->type_name("FILE.mp4|.gif|.png");
+  command
+      ->add_option(
+          "--view", arguments->views,
+          "What to show side by side: events, time-surface, space-time, image, depth, motion; all there is without")
+      ->type_name("VIEW,...")
+      ->delimiter(',');
+  positive("--fps", arguments->fps, "Frames per second of the video (default: 30, of GIFs 20)", "F", 1, 240);
+  positive(
+      "--slow-motion", arguments->play.slow_motion,
+      "How many times slower than real time; below 1 faster (default: so that the video lasts about 5 s or longer)",
+      "F", 1e-3, 1e6);
+  auto* window =
+      positive("--window-ms", arguments->window_ms,
+               "Time whose events a picture of events shows (default: by their rate, 1 to 50 ms)", "MS", 1e-3, 1e6);
+  positive("--window-events", arguments->play.window_events, "Shows the latest N events instead", "N", 1, 8e6)
+      ->excludes(window);
+  positive("--tau-ms", arguments->tau_ms, "Decay of the time surface (default: 1.5 windows)", "MS", 1e-3, 1e6);
+  positive("--span-ms", arguments->span_ms, "Time that the plot of space and time spans (default: 20 windows)", "MS",
+           1e-3, 1e6);
+  positive("--start", arguments->extent.start_s, "Begins there, since the start of the recording", "S", 0, 1e9);
+  positive("--duration", arguments->extent.duration_s, "Ends so much later", "S", 1e-6, 1e9);
+  positive("--at", arguments->at_s, "The moment of a still, since the start of the recording", "S", 0, 1e9);
+  positive("--size", arguments->play.width, "Width of the picture (default: 960 to 1920, of GIFs 960)", "PX", 128,
+           7680);
+  command->add_option("--camera", arguments->camera, "Of several cameras, the one to show")->type_name("NAME");
+  auto* width = positive("--width", arguments->width,
+                         "Sensor (default: as the file says, or as far as its events reach)", "PX", 1, 65536);
+  auto* height = positive("--height", arguments->height, "Sensor", "PX", 1, 65536)->needs(width);
+  width->needs(height);
+  command->add_flag("--light", arguments->light, "On white, for paper");
+  command->add_flag("-q,--quiet", arguments->quiet, "Print warnings and errors only");
+  command->add_flag("--force", arguments->force, "Replace an earlier file");
+  command->footer(
+      "Examples:\n"
+      "  esim play out/room                                      then look at out/room.play.mp4\n"
+      "  esim play events.h5 --view space-time --out cube.gif --duration 0.5\n"
+      "  esim play events.txt --out sheet.png                    nine moments\n"
+      "  esim play out/room --out moment.png --at 0.25 --light   one, for paper");
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace esim::app

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "esim/events/event.h"
+
+namespace esim {
+
+/// The latest events of a stream, in order, in bounded memory.
+class EventWindow {
+ public:
+  /// Holds at most `most` events at a time. Where more come, `thin` leaves out all but every 2nd, 4th, 8th ... of the
+  /// stream, evenly over the window; otherwise the oldest are forgotten.
+  explicit EventWindow(std::size_t most, bool thin = false) : most_(most), thin_(thin) {}
+
+  void add(EventSpan events);
+
+  /// Forgets those at or before `t`.
+  void forget_until(TimeNs t);
+
+  EventSpan events() const { return EventSpan(events_).subspan(head_); }
+
+  /// Every how many-th event of the stream is kept.
+  std::size_t stride() const { return stride_; }
+
+ private:
+  void make_room();
+
+  std::size_t most_;
+  bool thin_;
+  std::vector<Event> events_;
+  std::vector<std::uint64_t> numbers_;  // of the events in the stream; only with thin_
+  std::size_t head_ = 0;                // the events before it are forgotten
+  std::size_t stride_ = 1;
+  std::uint64_t seen_ = 0;
+};
+
+}  // namespace esim

@@ -1,0 +1,326 @@
+#include "esim/visualise/space_time.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include "esim/stats/axes.h"
+
+namespace esim {
+namespace {
+
+constexpr double kTimeLength = 1.5;    // of the box, in longer sides of the sensor, as all lengths here
+constexpr double kViewerDistance = 5;  // from the middle of the box
+constexpr double kMiddleYaw_deg = -40, kSwing_deg = 18, kPitch_deg = 19;
+constexpr double kLabelSpace = 50;  // px around the box
+constexpr int kTextHeight = 10;
+constexpr float kNewOpacity = 0.95f, kOldOpacity = 0.45f;
+constexpr float kFade = 0.45f;   // of the most distant points towards the ground
+constexpr double kRecent = 0.1;  // share of the time in which points lose most of their opacity
+
+// A point relative to the middle of the box: to the right, down, and away from who looks along the time axis.
+struct Point {
+  double x = 0, y = 0, z = 0;
+};
+
+Point half_extent(SensorSize sensor) {
+  const double longer = std::max(sensor.width, sensor.height);
+  return {0.5 * sensor.width / longer, 0.5 * sensor.height / longer, 0.5 * kTimeLength};
+}
+
+// As the viewer sees it at scale 1.
+struct Seen {
+  double u = 0, v = 0, distance = 0;
+};
+
+Seen see(const Point& point, const SpaceTimeView& view) {
+  constexpr double kRadians = std::numbers::pi / 180;
+  const double sin_yaw = std::sin(view.yaw_deg * kRadians), cos_yaw = std::cos(view.yaw_deg * kRadians);
+  const double sin_pitch = std::sin(view.pitch_deg * kRadians), cos_pitch = std::cos(view.pitch_deg * kRadians);
+  const double right = point.x * cos_yaw + point.z * sin_yaw, away = point.z * cos_yaw - point.x * sin_yaw;
+  const double down = point.y * cos_pitch - away * sin_pitch;
+  const double distance = kViewerDistance + point.y * sin_pitch + away * cos_pitch;
+  return {right * kViewerDistance / distance, down * kViewerDistance / distance, distance};
+}
+
+// The eight corners: bit 0, 1, 2 for the greater x, y, z.
+Point corner(const Point& half, int index) {
+  return {(index & 1) != 0 ? half.x : -half.x, (index & 2) != 0 ? half.y : -half.y,
+          (index & 4) != 0 ? half.z : -half.z};
+}
+
+/// The box, its axes and what is in it.
+class Plot {
+ public:
+  Plot(const SpaceTimeBox& box, const SpaceTimeView& view, int width, int height, const Theme& theme)
+      : box_(box),
+        theme_(theme),
+        projection_(box, view, {0, 0, width, height}),
+        canvas_(width, height, theme.ground),
+        axes_{{{linear_scale(0, box.sensor.width, "x, px"), -0.5, box.sensor.width - 0.5},
+               {linear_scale(0, box.sensor.height, "y, px"), -0.5, box.sensor.height - 0.5},
+               {time_scale(box), double(box.start), double(box.end)}}} {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      // Of two opposite sides, the one whose middle is farther away is behind everything.
+      std::array<double, 3> low = middle(), high = middle();
+      low[axis] = axes_[axis].low;
+      high[axis] = axes_[axis].high;
+      const bool low_is_farther = place(low).distance > place(high).distance;
+      back_[axis] = low_is_farther ? axes_[axis].low : axes_[axis].high;
+      front_[axis] = low_is_farther ? axes_[axis].high : axes_[axis].low;
+    }
+  }
+
+  void draw_back() {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (const Tick& tick : axes_[axis].scale.ticks) {
+        const double at = value_of(axis, tick);
+        if (at < axes_[axis].low || at > axes_[axis].high) continue;
+        // On the two sides behind that this axis runs along.
+        for (const std::size_t other : {(axis + 1) % 3, (axis + 2) % 3}) {
+          std::array<double, 3> from = back_, to = back_;
+          from[axis] = to[axis] = at;
+          from[other] = axes_[other].low;
+          to[other] = axes_[other].high;
+          line(from, to, theme_.grid);
+        }
+      }
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (const std::size_t other : {(axis + 1) % 3, (axis + 2) % 3}) {
+        std::array<double, 3> from = back_, to = back_;
+        from[other] = to[other] = front_[other];
+        from[axis] = axes_[axis].low;
+        to[axis] = axes_[axis].high;
+        line(from, to, mix(theme_.grid, theme_.faint_ink, 0.6f));
+      }
+      std::array<double, 3> from = back_, to = back_;
+      to[axis] = front_[axis];
+      line(from, to, mix(theme_.grid, theme_.faint_ink, 0.3f));
+    }
+  }
+
+  void draw_points(EventSpan events) {
+    struct Dot {
+      SpaceTimeProjection::Place place;
+      bool on = false;
+      float opacity = 1;
+    };
+    std::vector<Dot> dots;
+    double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
+    for (int i = 0; i < 8; ++i) {
+      const double distance =
+          place({(i & 1) != 0 ? axes_[0].low : axes_[0].high, (i & 2) != 0 ? axes_[1].low : axes_[1].high,
+                 (i & 4) != 0 ? axes_[2].low : axes_[2].high})
+              .distance;
+      nearest = std::min(nearest, distance);
+      farthest = std::max(farthest, distance);
+    }
+    for (const Event& event : events) {
+      if (event.t < box_.start || event.t > box_.end) continue;
+      const double age = static_cast<double>(box_.end - event.t) / static_cast<double>(box_.end - box_.start);
+      dots.push_back({projection_.place(event.x, event.y, static_cast<double>(event.t)), event.polarity > 0,
+                      kOldOpacity + (kNewOpacity - kOldOpacity) * static_cast<float>(std::exp(-age / kRecent))});
+    }
+    std::stable_sort(dots.begin(), dots.end(),
+                     [](const Dot& a, const Dot& b) { return a.place.distance > b.place.distance; });
+    Image<Rgb> pixels = std::move(canvas_).take();
+    for (const Dot& dot : dots) {
+      const auto depth = static_cast<float>((dot.place.distance - nearest) / (farthest - nearest));
+      const Rgb colour = mix(dot.on ? kOnColour : kOffColour, theme_.ground, kFade * depth);
+      draw_dot(pixels, dot.place.spot, std::clamp(0.62 * dot.place.scale, 0.75, 8.0), colour, dot.opacity);
+    }
+    canvas_ = Canvas(std::move(pixels));
+  }
+
+  void draw_labels() {
+    // Those of x and time stand at the lower edges in front, those of y at the edge that is leftmost.
+    const double bottom = axes_[1].high;
+    label_axis(0, {0, bottom, front_[2]}, std::array{0.0, 0.0, front_[2] - back_[2]});
+    label_axis(2, {front_[0], bottom, 0}, std::array{front_[0] - back_[0], 0.0, 0.0});
+    std::array<double, 3> leftmost{};
+    double least = std::numeric_limits<double>::infinity();
+    for (const double x : {axes_[0].low, axes_[0].high}) {
+      for (const double t : {axes_[2].low, axes_[2].high}) {
+        const double column = place({x, bottom, t}).spot.x;
+        if (column < least) leftmost = {x, 0, t};
+        least = std::min(least, column);
+      }
+    }
+    label_axis(1, leftmost, std::nullopt);
+  }
+
+  Image<Rgb> take() && { return std::move(canvas_).take(); }
+
+ private:
+  struct Axis {
+    Scale scale;  // as labelled
+    double low = 0, high = 1;
+  };
+
+  static Scale time_scale(const SpaceTimeBox& box) {
+    const double low = to_seconds(box.start - box.origin), high = to_seconds(box.end - box.origin);
+    const bool too_fine = high - low < 1e-9 * std::max(std::abs(low), std::abs(high));  // for numbers on ticks
+    return too_fine ? Scale{low, high, false, {}, "t, s"} : linear_scale(low, high, "t, s");
+  }
+
+  // Ticks of time are labelled in seconds, and stand at ns.
+  double value_of(std::size_t axis, const Tick& tick) const {
+    return axis == 2 ? static_cast<double>(box_.origin) + 1e9 * tick.value : tick.value;
+  }
+  std::array<double, 3> middle() const {
+    return {0.5 * (axes_[0].low + axes_[0].high), 0.5 * (axes_[1].low + axes_[1].high),
+            0.5 * (axes_[2].low + axes_[2].high)};
+  }
+  SpaceTimeProjection::Place place(const std::array<double, 3>& at) const {
+    return projection_.place(at[0], at[1], at[2]);
+  }
+  void line(const std::array<double, 3>& from, const std::array<double, 3>& to, Rgb colour) {
+    const std::array<Spot, 2> ends = {place(from).spot, place(to).spot};
+    canvas_.polyline(ends, 1, colour);
+  }
+
+  double tick_step(std::size_t axis) const {
+    const std::vector<Tick>& ticks = axes_[axis].scale.ticks;
+    return ticks.size() > 1 ? ticks[1].value - ticks[0].value : 1;
+  }
+
+  int widest_label(std::size_t axis) const {
+    int widest = 0;
+    for (const Tick& tick : axes_[axis].scale.ticks)
+      widest = std::max(widest, Canvas::text_width(tick.label, kTextHeight));
+    return widest;
+  }
+
+  // Every how many-th tick of an edge has room for its label; the same ones while time goes on.
+  long labelled_ticks(std::size_t axis, const std::array<double, 3>& from, const std::array<double, 3>& to) const {
+    const Spot first = place(from).spot, last = place(to).spot;
+    const double across = std::abs(last.x - first.x), down = std::abs(last.y - first.y);
+    const int widest = widest_label(axis);
+    const double spaces = (axes_[axis].scale.high - axes_[axis].scale.low) / tick_step(axis);
+    for (const long every : {1, 2, 5}) {
+      const double share = static_cast<double>(every) / spaces;
+      if (share * across > 0.7 * widest + 4 || share * down > kTextHeight + 4) return every;
+    }
+    return 10;
+  }
+
+  // Ticks and title of an axis along an edge, on the side to which `outward` points; without, to the left.
+  void label_axis(std::size_t axis, std::array<double, 3> edge, std::optional<std::array<double, 3>> outward) {
+    const auto direction = [&](const std::array<double, 3>& at) {
+      if (!outward) return Spot{-1, 0};
+      std::array<double, 3> beyond = at;
+      for (std::size_t i = 0; i < 3; ++i) beyond[i] += 0.05 * (*outward)[i];
+      const Spot from = place(at).spot, to = place(beyond).spot;
+      const double length = std::max(std::hypot(to.x - from.x, to.y - from.y), 1e-9);
+      return Spot{(to.x - from.x) / length, (to.y - from.y) / length};
+    };
+    const auto write = [&](double at, double away, const std::string& text, Rgb colour) {
+      edge[axis] = at;
+      const Spot spot = place(edge).spot, out = direction(edge);
+      const Align align = out.x < -0.7 ? Align::right : out.x > 0.7 ? Align::left : Align::centre;
+      canvas_.text(static_cast<int>(std::lround(spot.x + away * out.x)),
+                   static_cast<int>(std::lround(spot.y + away * out.y)) + kTextHeight / 2 + (outward ? 3 : 0), text,
+                   kTextHeight, colour, align);
+    };
+    std::array<double, 3> from = edge, to = edge;
+    from[axis] = axes_[axis].low;
+    to[axis] = axes_[axis].high;
+    line(from, to, theme_.faint_ink);
+    const long every = labelled_ticks(axis, from, to);
+    for (const Tick& tick : axes_[axis].scale.ticks) {
+      const double at = value_of(axis, tick);
+      if (at < axes_[axis].low || at > axes_[axis].high) continue;
+      edge[axis] = at;
+      const Spot spot = place(edge).spot, out = direction(edge);
+      const std::array<Spot, 2> ends = {spot, Spot{spot.x + 4 * out.x, spot.y + 4 * out.y}};
+      canvas_.polyline(ends, 1, theme_.faint_ink);
+      const bool at_corner = axis == 2 && at - axes_[axis].low < 0.04 * (axes_[axis].high - axes_[axis].low);
+      if (at_corner) continue;  // where those of y end
+      if (every > 1 && std::lround(tick.value / tick_step(axis)) % every != 0) continue;
+      write(at, 11, tick.label, theme_.ink);
+    }
+    if (outward) {
+      write(middle()[axis], 28 + 0.7 * widest_label(axis), axes_[axis].scale.title, theme_.faint_ink);
+    } else {
+      const Spot top = place(from).spot;
+      canvas_.text(static_cast<int>(top.x), static_cast<int>(top.y) - 14, axes_[axis].scale.title, kTextHeight,
+                   theme_.faint_ink, Align::centre);
+    }
+  }
+
+  static void draw_dot(Image<Rgb>& pixels, Spot at, double radius, Rgb colour, float opacity) {
+    const double reach = radius + 0.5;
+    const int left = std::max(0, static_cast<int>(std::ceil(at.x - reach)));
+    const int right = std::min(pixels.width() - 1, static_cast<int>(std::floor(at.x + reach)));
+    const int top = std::max(0, static_cast<int>(std::ceil(at.y - reach)));
+    const int bottom = std::min(pixels.height() - 1, static_cast<int>(std::floor(at.y + reach)));
+    for (int y = top; y <= bottom; ++y) {
+      for (int x = left; x <= right; ++x) {
+        const double covered = std::clamp(reach - std::hypot(x - at.x, y - at.y), 0.0, 1.0);
+        pixels(x, y) = mix(pixels(x, y), colour, opacity * static_cast<float>(covered));
+      }
+    }
+  }
+
+  SpaceTimeBox box_;
+  Theme theme_;
+  SpaceTimeProjection projection_;
+  Canvas canvas_;
+  std::array<Axis, 3> axes_;                // x, y, time
+  std::array<double, 3> back_{}, front_{};  // where each axis ends on the far and on the near side
+};
+
+}  // namespace
+
+SpaceTimeView turned_view(double share) {
+  return {kMiddleYaw_deg - kSwing_deg * std::cos(2 * std::numbers::pi * share), kPitch_deg};
+}
+
+SpaceTimeProjection::SpaceTimeProjection(const SpaceTimeBox& box, const SpaceTimeView& view, const Tile& area)
+    : box_(box), view_(view) {
+  constexpr int kTurns = 8;
+  const Point half = half_extent(box.sensor);
+  double left = 0, right = 0, top = 0, bottom = 0;
+  for (int turn = 0; turn <= kTurns; ++turn) {
+    const SpaceTimeView other = turned_view(0.5 * turn / kTurns);
+    for (int i = 0; i < 8; ++i) {
+      const Seen seen = see(corner(half, i), other);
+      left = std::min(left, seen.u);
+      right = std::max(right, seen.u);
+      top = std::min(top, seen.v);
+      bottom = std::max(bottom, seen.v);
+    }
+  }
+  const double width = std::max(area.width - 2 * kLabelSpace, 0.5 * area.width);
+  const double height = std::max(area.height - 2 * kLabelSpace, 0.5 * area.height);
+  scale_ = std::min(width / (right - left), height / (bottom - top));
+  centre_ = {area.x + 0.5 * area.width - 0.5 * scale_ * (left + right),
+             area.y + 0.5 * area.height - 0.5 * scale_ * (top + bottom)};
+}
+
+SpaceTimeProjection::Place SpaceTimeProjection::place(double x, double y, double t_ns) const {
+  const double longer = std::max(box_.sensor.width, box_.sensor.height);
+  const double share = (t_ns - static_cast<double>(box_.start)) / static_cast<double>(box_.end - box_.start);
+  const Seen seen = see({(x + 0.5 - 0.5 * box_.sensor.width) / longer, (y + 0.5 - 0.5 * box_.sensor.height) / longer,
+                         kTimeLength * (0.5 - share)},
+                        view_);
+  return {{centre_.x + scale_ * seen.u, centre_.y + scale_ * seen.v},
+          seen.distance,
+          scale_ / longer * kViewerDistance / seen.distance};
+}
+
+Image<Rgb> draw_space_time(EventSpan events, const SpaceTimeBox& box, const SpaceTimeView& view, int width, int height,
+                           const Theme& theme) {
+  Plot plot(box, view, width, height, theme);
+  plot.draw_back();
+  plot.draw_points(events);
+  plot.draw_labels();
+  return std::move(plot).take();
+}
+
+}  // namespace esim

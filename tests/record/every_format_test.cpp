@@ -3,6 +3,7 @@
 
 #include "esim/core/error.h"
 #include "esim/record/format.h"
+#include "record/event_formats.h"
 #include "record/recordings.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
@@ -11,19 +12,6 @@ namespace esim {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool holds(const Format& format, Content content) {
-  return std::find(format.holds.begin(), format.holds.end(), content) != format.holds.end();
-}
-
-/// All that hold events, and are written and read.
-std::vector<std::string> event_formats() {
-  std::vector<std::string> names;
-  for (const Format& format : formats()) {
-    if (holds(format, Content::events) && format.create && format.open) names.push_back(format.name);
-  }
-  return names;
-}
 
 class EveryFormat : public testing::TestWithParam<std::string> {
  protected:
@@ -169,11 +157,7 @@ TEST_P(EveryFormat, AFullDiskIsNamed) {
   EXPECT_THROW(test::record(*sink, info_, events), OutputError);
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, EveryFormat, testing::ValuesIn(event_formats()), [](const auto& test) {
-  std::string name = test.param;
-  std::replace(name.begin(), name.end(), '-', '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Formats, EveryFormat, testing::ValuesIn(test::event_formats(true)), test::name_of_test);
 
 }  // namespace
 }  // namespace esim

@@ -113,7 +113,7 @@ TEST_F(InspectTest, SingleFiles) {
 
 TEST_F(InspectTest, DamageIsReportedNotFatal) {
   RecordingDirectory directory(out_, false);
-  std::ofstream(directory.path() / "events.h5") << "not HDF5";
+  std::ofstream(directory.path() / "events.h5") << std::string("\x89HDF\r\n\x1a\n\0\0", 10);
   directory.finish("{ broken");
   const Inspection found = inspect(out_);
   EXPECT_EQ(found.status, RecordingStatus::unknown);

@@ -78,7 +78,8 @@ TEST_P(EveryRenderer, EvaluatesTilesOfSeveralTimesTogether) {
   std::vector<RenderRequest> requests;
   for (const Tile& part : parts) {
     const double dt = 0.05 * static_cast<double>(requests.size());
-    requests.push_back({test::kTime + to_ns(dt), test::moving_camera(dt), {part}, test::objects_of(name_, dt), false, 4});
+    requests.push_back(
+        {test::kTime + to_ns(dt), test::moving_camera(dt), {part}, test::objects_of(name_, dt), false, 4});
   }
   Sample together;
   renderer_->start_together(requests)->finish(together);

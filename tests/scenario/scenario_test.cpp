@@ -407,10 +407,10 @@ TEST_F(ScenarioFile, DescribesAnImuWhereThereIsOne) {
   EXPECT_EQ(read(write_scenario(scenario)).imu->gyroscope.random_walk, 4e-6);
 
   EXPECT_TRUE(contains(error(yaml, {"imu.rate_hz=100"}), "imu.rate_hz: is given by the calibration file as well"));
-  EXPECT_TRUE(contains(error(yaml, {"imu.gyroscope_noise_density=0"}), "imu.gyroscope_noise_density: is given"));
+  EXPECT_TRUE(contains(error(yaml, {"imu.gyroscope.noise_density=0"}), "imu.gyroscope.noise_density: is given"));
   const auto imu = [&](const std::string& text) { return error(std::string(kMinimal) + "imu: {" + text + "}\n"); };
   EXPECT_TRUE(contains(imu("rate_hz: 1.1e9"), "imu.rate_hz: 1.1e9 is out of range"));
-  EXPECT_TRUE(contains(imu("accelerometer: {random_walk: -1}"), "imu.accelerometer_random_walk: -1 is out of range"));
+  EXPECT_TRUE(contains(imu("accelerometer: {random_walk: -1}"), "imu.accelerometer.random_walk: -1 is out of range"));
   EXPECT_TRUE(contains(imu("gyroscope: {misalignment: [1]}"), "must be a list of 6 numbers"));
   EXPECT_TRUE(contains(imu("acelerometer: {}"), "did you mean accelerometer?"));
 }

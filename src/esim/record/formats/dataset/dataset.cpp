@@ -12,13 +12,13 @@ namespace fs = std::filesystem;
 
 const std::vector<Content> kContents = {Content::events, Content::frames, Content::imu, Content::poses};
 
-/// Those that only datasets have: events alone may be anything's.
+/// One with an events.txt that is not a recording's.
 bool is_dataset(const FilesInput& files) {
   if (!files.has(kEventsTxt)) return false;
-  for (const char* name : {kImagesTxt, kImuTxt, kGroundTruthTxt, kCalibTxt}) {
-    if (files.has(name)) return true;
+  for (const char* name : {"report.json", "events.h5", "truth.h5"}) {
+    if (files.has(name)) return false;
   }
-  return false;
+  return true;
 }
 
 /// A zip with an events.txt. One that is cut off is recognised by its beginning, so that its damage can be told.

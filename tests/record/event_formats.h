@@ -1,0 +1,34 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "esim/record/format.h"
+
+namespace esim::test {
+
+inline bool holds(const Format& format, Content content) {
+  return std::find(format.holds.begin(), format.holds.end(), content) != format.holds.end();
+}
+
+/// Names of all that hold events, and are written and read.
+inline std::vector<std::string> event_formats(bool folders) {
+  std::vector<std::string> names;
+  for (const Format& format : formats()) {
+    if (holds(format, Content::events) && format.create && format.open && (folders || !format.folder))
+      names.push_back(format.name);
+  }
+  return names;
+}
+
+/// A name without what names of tests cannot have.
+inline std::string name_of_test(const testing::TestParamInfo<std::string>& test) {
+  std::string name = test.param;
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+}
+
+}  // namespace esim::test

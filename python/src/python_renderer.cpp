@@ -22,9 +22,13 @@ nb::object matrix(const SE3& pose) {
   return to_numpy(std::move(values), {4, 4});
 }
 
+/// Copies the tiles of an image of the same size.
 template <typename T>
-void copy(const T* from, Image<T>& to) {
-  std::copy_n(from, to.size(), to.data());
+void copy(const T* from, const std::vector<Tile>& tiles, Image<T>& to) {
+  for (const Tile& tile : tiles) {
+    for (int y = tile.y; y < tile.y + tile.height; ++y)
+      std::copy_n(from + std::ptrdiff_t{y} * to.width() + tile.x, tile.width, to.row(y) + tile.x);
+  }
 }
 
 class PythonRenderer final : public ProcessorRenderer {
@@ -40,11 +44,14 @@ class PythonRenderer final : public ProcessorRenderer {
   }
 
  private:
-  void compute(const RenderRequest& request, Sample& sample) const override {
-    prepare(request, width_, height_, sample);
-    const bool has_flow = ask(request, sample);
-    if (has_flow) return;
-    for (const Tile& tile : request.tiles) motion_field(rays_, request, tile, sample);
+  void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
+    prepare(requests, width_, height_, sample);
+    for (const RenderRequest& request : requests) {
+      const bool has_flow = ask(request, sample);
+      if (has_flow) continue;
+      const std::vector<Twist> twists = relative_twists(request);
+      for (const Tile& tile : request.tiles) motion_field(rays_, twists, tile, sample);
+    }
   }
 
   /// Fills E, Z, and which object is seen; V as well where it returns true.
@@ -54,15 +61,15 @@ class PythonRenderer final : public ProcessorRenderer {
     for (const Kinematics& object : request.objects) objects.append(matrix(object.T_world_body));
     const nb::object rendered =
         render_.get()(request.t, matrix(request.camera.T_world_body), objects, nb::make_tuple(height_, width_));
-    copy(nb::cast<Plane<float>>(rendered[0]).data(), sample.irradiance);
-    copy(nb::cast<Plane<float>>(rendered[1]).data(), sample.depth);
+    copy(nb::cast<Plane<float>>(rendered[0]).data(), request.tiles, sample.irradiance);
+    copy(nb::cast<Plane<float>>(rendered[1]).data(), request.tiles, sample.depth);
     const nb::object flow = rendered[2], object = rendered[3];
     if (request.wants_objects() && !object.is_none())
-      copy(nb::cast<Plane<std::uint16_t>>(object).data(), sample.object);
+      copy(nb::cast<Plane<std::uint16_t>>(object).data(), request.tiles, sample.object);
     if (flow.is_none()) return false;
     const auto planes = nb::cast<TwoPlanes>(flow);
-    copy(planes.data(), sample.flow_x);
-    copy(planes.data() + sample.flow_x.size(), sample.flow_y);
+    copy(planes.data(), request.tiles, sample.flow_x);
+    copy(planes.data() + sample.flow_x.size(), request.tiles, sample.flow_y);
     return true;
   }
 

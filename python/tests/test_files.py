@@ -12,7 +12,7 @@ EXTENSIONS = {f["name"]: f["extensions"][0] for f in esim.formats() if f["extens
 def test_every_format_gives_back_what_it_was_given(name, tmp_path):
     resolution = {f["name"]: f["resolution_ns"] for f in esim.formats()}[name]
     events = random_events(3000, 100, 80, last=2_000_000_000)
-    path = tmp_path / f"events{EXTENSIONS[name]}"
+    path = tmp_path / f"events{EXTENSIONS.get(name, '')}"
     esim.save_events(path, events, 100, 80, format=name)
     expected = events.copy()
     expected["t"] -= expected["t"] % max(resolution, 1000)

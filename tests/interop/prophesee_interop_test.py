@@ -24,7 +24,7 @@ def package(name):
 
 
 def convert(source, target, *arguments):
-    result = subprocess.run([ESIM, "convert", str(source), str(target), *arguments], capture_output=True, text=True)
+    result = subprocess.run([ESIM, "convert", str(source), str(target), "--force", *arguments], capture_output=True, text=True)
     if result.returncode != 0:
         raise AssertionError(result.stderr)
 

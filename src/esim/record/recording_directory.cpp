@@ -45,7 +45,7 @@ bool is_home(const fs::path& directory) {
 // --force deletes: only what is surely a recording.
 void require_replaceable(const fs::path& directory) {
   const auto refuse = [&](const std::string& why) {
-    throw UserError(directory.string() + " " + why + ": not replaced, choose another --out");
+    throw UserError(directory.string() + " " + why + ": not replaced, choose another name");
   };
   std::error_code error;
   const fs::file_status status = fs::symlink_status(directory, error);
@@ -105,9 +105,9 @@ RecordingDirectory::RecordingDirectory(const fs::path& out, bool force)
   const fs::file_status status = fs::symlink_status(out_, error);
   if (fs::exists(status)) {
     if (!fs::is_directory(status) && !fs::is_symlink(status)) {
-      throw UserError(out_.string() + " is a file: choose another --out");
+      throw UserError(out_.string() + " is a file: choose another name");
     }
-    if (!force) throw UserError(out_.string() + " exists already: pass --force to replace it, or choose another --out");
+    if (!force) throw UserError(out_.string() + " exists already: pass --force to replace it, or choose another name");
     require_replaceable(out_);
     replace_ = true;
   } else if (status.type() == fs::file_type::none) {
@@ -145,12 +145,12 @@ void RecordingDirectory::create_working_directory(bool force) {
   std::error_code error;
   if (fs::exists(fs::symlink_status(working_, error))) {
     if (is_being_written(working_)) {
-      throw UserError(working_.string() + " is being written by another process: choose another --out");
+      throw UserError(working_.string() + " is being written by another process: choose another name");
     }
     if (!force) {
       throw UserError(working_.string() +
                       " is left from a run that was killed: look at it with `esim info`, pass --force to replace it, "
-                      "or choose another --out");
+                      "or choose another name");
     }
     require_replaceable(working_);
     fs::remove_all(working_, error);

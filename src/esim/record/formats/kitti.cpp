@@ -16,7 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr float kMaxNumber = 65535, kOffset = 32768;
+constexpr float kMaxNumber = 65535;
+constexpr int kOffset = 32768;
 constexpr float kKittiPerPixel = 64, kDsecPerPixel = 128;  // numbers for a pixel of flow
 constexpr float kPerMetre = 256;                           // and for a metre of depth
 
@@ -25,8 +26,8 @@ void write_flow(const fs::path& path, const Image<float>& x, const Image<float>&
   PerColour<Image<std::uint16_t>> channels;
   channels.fill(Image<std::uint16_t>(x.width(), x.height()));
   for (std::size_t i = 0; i < x.size(); ++i) {
-    const float red = std::round(x.data()[i] * per_pixel + kOffset),
-                green = std::round(y.data()[i] * per_pixel + kOffset);
+    const double red = std::round(double{x.data()[i]} * per_pixel) + kOffset,
+                 green = std::round(double{y.data()[i]} * per_pixel) + kOffset;
     if (!(red >= 0 && red <= kMaxNumber && green >= 0 && green <= kMaxNumber)) continue;
     channels[0].data()[i] = static_cast<std::uint16_t>(red);
     channels[1].data()[i] = static_cast<std::uint16_t>(green);
@@ -50,8 +51,8 @@ void read_flow(const fs::path& path, SequenceImages& images, float per_pixel) {
   images.flow_x = images.flow_y = Image<float>(known.width(), known.height(), std::numeric_limits<float>::quiet_NaN());
   for (std::size_t i = 0; i < known.size(); ++i) {
     if (known.data()[i] == 0) continue;
-    images.flow_x.data()[i] = (static_cast<float>(png.channels[0].data()[i]) - kOffset) / per_pixel;
-    images.flow_y.data()[i] = (static_cast<float>(png.channels[1].data()[i]) - kOffset) / per_pixel;
+    images.flow_x.data()[i] = static_cast<float>(png.channels[0].data()[i] - kOffset) / per_pixel;
+    images.flow_y.data()[i] = static_cast<float>(png.channels[1].data()[i] - kOffset) / per_pixel;
   }
 }
 

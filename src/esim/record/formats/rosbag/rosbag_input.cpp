@@ -93,9 +93,10 @@ void RosbagInput::open_chunk(const Record& record) {
 
 void RosbagInput::add_connection(const Record& record) {
   const auto id = field<std::uint32_t>(record.header, "conn");
-  if (!channel_of_connection_.try_emplace(id, channels_.size()).second) return;
+  if (channel_of_connection_.contains(id)) return;
   channels_.push_back({std::string(text_field(record.header, "topic")),
                        ros::type_named(text_field(record.data, "type")), ros::Encoding::ros1});
+  channel_of_connection_[id] = channels_.size() - 1;
 }
 
 bool RosbagInput::next(ros::Message& message) {

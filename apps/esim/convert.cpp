@@ -27,9 +27,9 @@ struct Arguments {
 
 int list_formats() {
   for (const Format& format : formats()) {
-    std::string extensions;
-    for (const std::string& extension : format.extensions) extensions += extension + " ";
-    fmt::print("{:<12} {:<16} {}{}\n", format.name, extensions, format.description,
+    std::string extensions = format.folder ? "folder" : "";
+    for (const std::string& extension : format.extensions) extensions += format.folder ? "" : extension + " ";
+    fmt::print("{:<14} {:<10} {}{}\n", format.name, extensions, format.description,
                format.create ? "" : " (is only read)");
   }
   return kOk;
@@ -142,7 +142,9 @@ void add_convert(CLI::App& app, int& exit_code) {
   command->add_flag("--force", arguments->force, "Replace an earlier OUT");
   command->footer(
       "Examples:\n"
-      "  esim convert out/room/cam0/events.h5 events.txt\n"
+      "  esim convert out/room room.bag                                  all of a recording, for ROS\n"
+      "  esim convert out/room/cam0/events.h5 events.raw                 Prophesee's EVT 3.0\n"
+      "  esim convert out/room flow --format kitti                       optical flow and depth as images\n"
       "  esim convert events.txt events.h5 --width 640 --height 480 --time-unit ns\n"
       "  esim convert cut.h5 whole.h5 --recover                          as far as it can be read\n"
       "  esim convert --list");

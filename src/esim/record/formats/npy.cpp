@@ -77,6 +77,7 @@ Format npy_format() {
       .description = "NumPy array of records t, x, y, p",
       .extensions = {".npy"},
       .holds = {Content::events},
+      .either_unit = true,
       .recognises = [](const auto&, std::string_view head) { return head.starts_with(npy::kMagic); },
       .open = [](const auto& path, const ReadOptions& options) { return make_events_source(open_npy(path), options); },
       .create =

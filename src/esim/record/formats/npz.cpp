@@ -216,6 +216,7 @@ Format npz_format() {
       .description = "NumPy arrays t, x, y, p in a zip file",
       .extensions = {".npz"},
       .holds = {Content::events},
+      .either_unit = true,
       .recognises = [](const auto&, std::string_view head) { return is_npz(head); },
       .open = [](const auto& path, const ReadOptions& options) { return make_events_source(open_npz(path), options); },
       .create =

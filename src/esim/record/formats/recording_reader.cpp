@@ -268,10 +268,12 @@ Format recording_format() {
   return {
       .name = "recording",
       .description = "the folder of a recording, or of one of its cameras",
+      .extensions = {""},
       .holds = {Content::events, Content::frames, Content::images, Content::imu, Content::poses, Content::truth,
                 Content::displacement},
       .several_cameras = true,
       .folder = true,
+      .either_unit = true,
       .recognises = [](const auto& path, std::string_view) { return is_recording(path); },
       .open = [](const auto& path, const ReadOptions& options) { return Folder(path, options).open(); },
       .create = [](const auto& path,

@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "commands.h"
 #include "esim/core/error.h"
@@ -33,17 +32,6 @@ int list_formats() {
                format.create ? "" : " (is only read)");
   }
   return kOk;
-}
-
-/// What a folder needs besides the files of its format to be known as a recording.
-std::string report(const RecordingInfo& info, const CopySummary& summary, const std::string& input) {
-  auto cameras = nlohmann::ordered_json::array();
-  for (const CameraInfo& camera : info.cameras) {
-    cameras.push_back({{"name", camera.name}, {"width", camera.model.width}, {"height", camera.model.height}});
-  }
-  const nlohmann::ordered_json report = {
-      {"status", summary.complete ? "complete" : "interrupted"}, {"converted_from", input}, {"cameras", cameras}};
-  return report.dump(2) + "\n";
 }
 
 void print_summary(const CopySummary& summary, const Arguments& arguments, double wall_s) {
@@ -92,7 +80,7 @@ int run(const Arguments& arguments) {
   if (format.folder) {
     RecordingDirectory directory(out, arguments.force);
     summary = copy_to(directory.path());
-    directory.finish(report(source->info(), summary, arguments.input));
+    directory.finish(conversion_report(source->info(), arguments.input, summary.complete));
   } else {
     RecordingFile file(out, arguments.force);
     summary = copy_to(file.path());

@@ -8,7 +8,16 @@ x y z w. The guide is `docs/python.md`, the options of scenarios are in `docs/sc
 from ._errors import Error, InternalError, OutputError
 from ._event_camera import EventCamera, linear_light
 from ._files import EventsIterator, formats, info, load_events, save_events
-from ._represent import event_count, event_frame, event_tensor, time_surface, voxel_grid
+from ._recordings import Recording, convert
+from ._represent import (
+    event_count,
+    event_frame,
+    event_tensor,
+    space_time_plot,
+    time_surface,
+    time_surface_picture,
+    voxel_grid,
+)
 from ._scenario import Scenario
 from ._simulate import CameraPacket, Packet, Renderer, Simulation, simulate
 from ._trajectory import Trajectory
@@ -25,10 +34,12 @@ __all__ = [
     "InternalError",
     "OutputError",
     "Packet",
+    "Recording",
     "Renderer",
     "Scenario",
     "Simulation",
     "Trajectory",
+    "convert",
     "event_count",
     "event_frame",
     "event_tensor",
@@ -38,6 +49,8 @@ __all__ = [
     "load_events",
     "save_events",
     "simulate",
+    "space_time_plot",
     "time_surface",
+    "time_surface_picture",
     "voxel_grid",
 ]

@@ -139,6 +139,32 @@ class EventsIterator(Iterator[Events]):
     def __iter__(self) -> EventsIterator: ...
     def __next__(self) -> Events: ...
 
+class Recording(Iterator[Packet]):
+    def __init__(
+        self,
+        path: Path,
+        packet_s: Time = 0.1,
+        *,
+        width: int | None = None,
+        height: int | None = None,
+        recover: bool = False,
+    ) -> None: ...
+    @property
+    def info(self) -> dict[str, Any]: ...
+    def __iter__(self) -> Recording: ...
+    def __next__(self) -> Packet: ...
+
+def convert(
+    source: Path,
+    target: Path,
+    *,
+    format: str | None = None,
+    camera: str | None = None,
+    from_zero: bool = False,
+    time_unit: Literal["us", "ns"] = "us",
+    recover: bool = False,
+    force: bool = False,
+) -> dict[str, int]: ...
 def load_events(path: Path, *, width: int | None = None, height: int | None = None) -> Events: ...
 def save_events(path: Path, events: Events, width: int, height: int, *, format: str | None = None) -> None: ...
 def info(path: Path) -> dict[str, Any]: ...
@@ -167,3 +193,15 @@ def time_surface(
     events: Events, width: int, height: int, *, t: Time | None = None, tau_s: float = 0.03
 ) -> NDArray[np.float32]: ...
 def event_frame(events: Events, width: int, height: int) -> NDArray[np.uint8]: ...
+def time_surface_picture(
+    events: Events, width: int, height: int, *, t: Time | None = None, tau_s: float = 0.03
+) -> NDArray[np.uint8]: ...
+def space_time_plot(
+    events: Events,
+    width: int,
+    height: int,
+    *,
+    size: tuple[int, int] = (960, 720),
+    yaw_deg: float = 35.0,
+    pitch_deg: float = 20.0,
+) -> NDArray[np.uint8]: ...

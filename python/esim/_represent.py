@@ -114,3 +114,42 @@ def event_frame(events, width, height):
         Red, green, blue.
     """
     return _core.event_frame(as_bytes(events), width, height)
+
+
+def time_surface_picture(events, width, height, *, t=None, tau_s=0.03):
+    """A time surface for people: each pixel in the colour of its last event until t, ON orange and OFF blue, faded.
+
+    Parameters
+    ----------
+    events, width, height
+        As in `event_count`, in order of time.
+    t, tau_s
+        As in `time_surface`.
+
+    Returns
+    -------
+    numpy.ndarray, uint8, shape (height, width, 3)
+        Red, green, blue.
+    """
+    events = to_events(events)
+    return _core.time_surface_picture(as_bytes(events), width, height, _span(events, None, t)[1], float(tau_s))
+
+
+def space_time_plot(events, width, height, *, size=(960, 720), yaw_deg=35.0, pitch_deg=20.0):
+    """Events as points in x, y and time, between axes, as `esim play` shows them.
+
+    Parameters
+    ----------
+    events, width, height
+        As in `event_count`, in order of time.
+    size : (int, int)
+        Width and height of the picture, px.
+    yaw_deg, pitch_deg : float
+        From where it is seen: at yaw 0 along the time axis, and from above. Best from -60 to 60, and from 0 to 40.
+
+    Returns
+    -------
+    numpy.ndarray, uint8, shape (size[1], size[0], 3)
+        Red, green, blue.
+    """
+    return _core.space_time_plot(as_bytes(to_events(events)), width, height, *size, float(yaw_deg), float(pitch_deg))

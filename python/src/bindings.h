@@ -11,6 +11,7 @@ void bind_trajectory(nanobind::module_& module);
 void bind_event_camera(nanobind::module_& module);
 void bind_simulation(nanobind::module_& module);
 void bind_event_files(nanobind::module_& module);
+void bind_recording_files(nanobind::module_& module);
 void bind_representations(nanobind::module_& module);
 
 }  // namespace esim::python

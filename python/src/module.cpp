@@ -8,5 +8,6 @@ NB_MODULE(_core, module) {
   bind_event_camera(module);
   bind_simulation(module);
   bind_event_files(module);
+  bind_recording_files(module);
   bind_representations(module);
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "esim/core/error.h"
@@ -116,6 +117,18 @@ class Copy {
 CopySummary copy_recording(Source& from, const Format& format, const std::filesystem::path& to,
                            const CopyOptions& options, const std::function<bool(double)>& go_on) {
   return Copy(from, format, to, options).run(go_on);
+}
+
+std::string conversion_report(const RecordingInfo& info, const std::string& from, bool complete) {
+  auto cameras = nlohmann::ordered_json::array();
+  for (const CameraInfo& camera : info.cameras) {
+    cameras.push_back({{"name", camera.name}, {"width", camera.model.width}, {"height", camera.model.height}});
+  }
+  const nlohmann::ordered_json report = {{"status", complete ? "complete" : "interrupted"},
+                                         {"converted_from", from},
+                                         {"start_s", to_seconds(info.start)},
+                                         {"cameras", cameras}};
+  return report.dump(2) + "\n";
 }
 
 std::vector<std::string> losses(const CopySummary& summary, const Format& format) {

@@ -31,6 +31,9 @@ struct CopySummary {
 CopySummary copy_recording(Source& from, const Format& format, const std::filesystem::path& to,
                            const CopyOptions& options, const std::function<bool(double)>& go_on);
 
+/// What a folder that was copied needs, besides the files of its format, to be known as a recording: a report.json.
+std::string conversion_report(const RecordingInfo& info, const std::string& from, bool complete);
+
 /// A line for each thing that was left out or changed, for people.
 std::vector<std::string> losses(const CopySummary& summary, const Format& format);
 

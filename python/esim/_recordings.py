@@ -1,0 +1,98 @@
+"""Recordings from files, of every format that esim knows."""
+
+import os
+import warnings
+
+from . import _core
+from ._simulate import Packet
+from ._types import to_ns
+
+
+class Recording:
+    """A recording from a file or folder, packet by packet, as `simulate` gives them; memory does not grow with it.
+
+    Parameters
+    ----------
+    path : path
+        Of any format in `esim.formats()` that is read.
+    packet_s : int or float
+        Length of packets, int ns or float s.
+    width, height : int, optional
+        Of the sensor, in place of what the file says.
+    recover : bool
+        Read what can be read of a damaged file, and warn.
+
+    Yields
+    ------
+    Packet
+
+    Raises
+    ------
+    esim.Error
+        Naming file and place, for damaged ones.
+    """
+
+    def __init__(self, path, packet_s=0.1, *, width=None, height=None, recover=False):
+        packet = to_ns(packet_s)
+        if packet <= 0:
+            raise ValueError("packet_s is above 0")
+        self._core = _core.RecordingReader(os.fspath(path), packet, width, height, recover)
+        self._warned = 0
+
+    @property
+    def info(self):
+        """dict: `start` and `end` (ns; the end is the start where it is not known beforehand), `cameras`: a dict by
+        name with width, height, K and T_body_camera, and names of moving `objects`."""
+        return self._core.info()
+
+    def __iter__(self):
+        return self
+
+    def __next__(self):
+        parts = self._core.next()
+        for problem in self._core.problems()[self._warned :]:
+            self._warned += 1
+            warnings.warn(problem, stacklevel=2)
+        if parts is None:
+            raise StopIteration
+        return Packet(parts)
+
+
+def convert(
+    source, target, *, format=None, camera=None, from_zero=False, time_unit="us", recover=False, force=False
+):
+    """Copies a recording or a file of events into another format.
+
+    Parameters
+    ----------
+    source, target : path
+    format : str, optional
+        A name from `esim.formats()`; by the extension of the target otherwise, where none is a folder.
+    camera : str, optional
+        This one only.
+    from_zero : bool
+        Times count from the start of the recording.
+    time_unit : str
+        "us" or "ns": of the times of events, where the format leaves the choice.
+    recover : bool
+        Convert what can be read of a damaged file, and warn.
+    force : bool
+        Replace what is there.
+
+    Returns
+    -------
+    dict of str to int
+        What was copied: events, frames, ...: how many. What the format does not hold is a warning.
+
+    Raises
+    ------
+    esim.Error, esim.OutputError
+    """
+    if time_unit not in ("us", "ns"):
+        raise ValueError('time_unit is "us" or "ns"')
+    copied, lost = _core.convert(
+        os.fspath(source), os.fspath(target), format, camera or "", from_zero, time_unit == "ns", recover, force
+    )
+    for loss in lost:
+        warnings.warn(loss, stacklevel=2)
+    return copied

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 #include <optional>
 
@@ -61,7 +62,7 @@ std::unique_ptr<EventsReader> open_npy(const std::filesystem::path& path) {
   const auto file = std::make_shared<InputFile>(path);
   const auto array = std::make_shared<npy::Array>(path.string(), [file](std::span<std::byte> out) {
     const std::span<const std::byte> bytes = file->read(out.size());
-    std::memcpy(out.data(), bytes.data(), bytes.size());
+    std::copy(bytes.begin(), bytes.end(), out.begin());
     return bytes.size();
   });
   npy::EventColumns columns;

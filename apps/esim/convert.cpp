@@ -7,20 +7,16 @@
 #include "esim/core/error.h"
 #include "esim/record/copy_recording.h"
 #include "esim/record/number_text.h"
-#include "esim/record/recording_directory.h"
-#include "esim/record/recording_file.h"
 #include "progress_bar.h"
 #include "support.h"
 
 namespace esim::app {
 namespace {
 
-namespace fs = std::filesystem;
-
 struct Arguments {
   std::string input, out, format;
   CopyOptions copy;
-  std::optional<int> width, height;
+  std::optional<SensorSize> sensor;
   bool recover = false, list = false, quiet = false, force = false;
 };
 
@@ -42,50 +38,24 @@ void print_summary(const CopySummary& summary, const Arguments& arguments, doubl
              copied.empty() ? "nothing" : copied, wall_s, arguments.out);
 }
 
-const Format& writable(const Format& format) {
-  if (format.create) return format;
-  throw UserError(
-      fmt::format("{} is only read; choose another --format of those that esim convert --list names", format.name));
-}
-
 int run(const Arguments& arguments) {
   if (arguments.list) return list_formats();
   if (arguments.out.empty()) throw UserError("give what to read and what to write: esim convert IN OUT");
   const auto start = std::chrono::steady_clock::now();
-  const fs::path out = arguments.out;
-  const Format& format = writable(arguments.format.empty() ? format_for(out) : format_named(arguments.format));
-
-  bool damaged = false;
-  ReadOptions reading;
-  if (arguments.width && arguments.height) reading.sensor = {*arguments.width, *arguments.height};
+  const Format& format = arguments.format.empty() ? format_for(arguments.out) : format_named(arguments.format);
+  ConvertOptions options{arguments.copy, {arguments.sensor, {}}, arguments.force};
   if (arguments.recover) {
-    reading.recover = [&damaged](const std::string& problem) {
-      damaged = true;
+    options.read.recover = [](const std::string& problem) {
       fmt::print(stderr, "warning: {}; what comes before is converted\n", problem);
     };
   }
   catch_interrupts();
-  const std::unique_ptr<Source> source = open_source(arguments.input, reading);
   ProgressBar bar(!arguments.quiet);
-  const auto copy_to = [&](const fs::path& path) {
-    CopySummary summary = copy_recording(*source, format, path, arguments.copy, [&](double share) {
-      bar.show(share, [&] { return fmt::format("{:.0f} %", 100 * share); });
-      return !interrupted();
-    });
-    bar.clear();
-    summary.complete &= !damaged;
-    return summary;
-  };
-  CopySummary summary;
-  if (format.folder) {
-    RecordingDirectory directory(out, arguments.force);
-    summary = copy_to(directory.path());
-    directory.finish(conversion_report(source->info(), arguments.input, summary.complete));
-  } else {
-    RecordingFile file(out, arguments.force);
-    summary = copy_to(file.path());
-    file.finish();
-  }
+  const CopySummary summary = convert_recording(arguments.input, format, arguments.out, options, [&](double share) {
+    bar.show(share, [&] { return fmt::format("{:.0f} %", 100 * share); });
+    return !interrupted();
+  });
+  bar.clear();
   for (const std::string& loss : losses(summary, format)) fmt::print(stderr, "warning: {}\n", loss);
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
   if (!arguments.quiet) print_summary(summary, arguments, wall.count());
@@ -117,14 +87,7 @@ void add_convert(CLI::App& app, int& exit_code) {
                                                                              {"none", Compression::none}})
                       .description(""))
       ->type_name("blosc|gzip|none");
-  auto* width = command->add_option("--width", arguments->width, "Sensor, px (default: as the file says)")
-                    ->type_name("PX")
-                    ->check(CLI::Range(1, 65536));
-  auto* height = command->add_option("--height", arguments->height, "Sensor, px")
-                     ->type_name("PX")
-                     ->check(CLI::Range(1, 65536))
-                     ->needs(width);
-  width->needs(height);
+  add_sensor_options(*command, arguments->sensor);
   command->add_flag("--recover", arguments->recover, "Convert what can be read of a damaged file");
   command->add_flag("-q,--quiet", arguments->quiet, "Print warnings and errors only");
   command->add_flag("--force", arguments->force, "Replace an earlier OUT");

@@ -28,7 +28,7 @@ struct Arguments {
   std::vector<std::string> views;
   double window_ms = 0, tau_ms = 0, span_ms = 0;
   std::optional<double> fps, at_s;
-  std::optional<int> width, height;
+  std::optional<SensorSize> sensor;
   Extent extent;
   PlayOptions play;
   bool light = false, quiet = false, force = false;
@@ -53,7 +53,7 @@ bool is_format(const fs::path& folder) {
 class Input {
  public:
   explicit Input(const Arguments& arguments) : path_(arguments.input) {
-    if (arguments.width && arguments.height) reading_.sensor = {*arguments.width, *arguments.height};
+    reading_.sensor = arguments.sensor;
     std::error_code error;
     const bool folder = fs::is_directory(path_, error);
     if (folder && !is_format(path_)) {
@@ -270,10 +270,7 @@ void add_play(CLI::App& app, int& exit_code) {
   positive("--size", arguments->play.width, "Width of the picture (default: 960 to 1920, of GIFs 960)", "PX", 128,
            7680);
   command->add_option("--camera", arguments->camera, "Of several cameras, the one to show")->type_name("NAME");
-  auto* width = positive("--width", arguments->width,
-                         "Sensor (default: as the file says, or as far as its events reach)", "PX", 1, 65536);
-  auto* height = positive("--height", arguments->height, "Sensor", "PX", 1, 65536)->needs(width);
-  width->needs(height);
+  add_sensor_options(*command, arguments->sensor);
   command->add_flag("--light", arguments->light, "On white, for paper");
   command->add_flag("-q,--quiet", arguments->quiet, "Print warnings and errors only");
   command->add_flag("--force", arguments->force, "Replace an earlier file");

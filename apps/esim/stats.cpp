@@ -7,6 +7,7 @@
 #include "esim/record/output_file.h"
 #include "esim/record/preview/canvas.h"
 #include "esim/stats/figure.h"
+#include "support.h"
 
 namespace esim::app {
 namespace {
@@ -18,16 +19,14 @@ constexpr std::size_t kPortion = 1 << 20;
 struct Arguments {
   std::vector<std::string> files;
   std::optional<double> fps, frame_period_s;
-  std::optional<int> width, height;
+  std::optional<SensorSize> sensor;
   double hot_sigmas = 5;
   std::string out;
   bool plot = false, json = false, force = false;
 };
 
 NamedStatistics compute(const std::string& path, const Arguments& arguments) {
-  ReadOptions reading;
-  if (arguments.width && arguments.height) reading.sensor = {*arguments.width, *arguments.height};
-  EventsFile file(path, reading);
+  EventsFile file(path, {arguments.sensor, {}});
   EventStatistics statistics(file.sensor());
   std::vector<Event> events;
   while (file.read(events, kPortion)) statistics.add(events);
@@ -87,14 +86,7 @@ void add_stats(CLI::App& app, int& exit_code) {
       ->type_name("S")
       ->check(CLI::Range(1e-6, 1e3))
       ->excludes(fps);
-  auto* width = command->add_option("--width", arguments->width, "Sensor, px (default: as the recording says)")
-                    ->type_name("PX")
-                    ->check(CLI::Range(1, 65536));
-  auto* height = command->add_option("--height", arguments->height, "Sensor, px")
-                     ->type_name("PX")
-                     ->check(CLI::Range(1, 65536))
-                     ->needs(width);
-  width->needs(height);
+  add_sensor_options(*command, arguments->sensor);
   command->add_option("--hot-sigmas", arguments->hot_sigmas, "How far above the median a hot pixel is, robust sigmas")
       ->type_name("K")
       ->check(CLI::Range(1.0, 1e6))

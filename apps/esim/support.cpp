@@ -46,6 +46,20 @@ void add_run_options(CLI::App& command, RunOptions& options, const std::string& 
   command.add_flag("--force", options.force, "Replace an earlier recording in --out");
 }
 
+void add_sensor_options(CLI::App& command, std::optional<SensorSize>& sensor) {
+  const auto add = [&](const char* name, int SensorSize::*side, const char* help) {
+    const auto set = [&sensor, side](int px) {
+      if (!sensor) sensor.emplace();
+      (*sensor).*side = px;
+    };
+    return command.add_option_function<int>(name, set, help)->type_name("PX")->check(CLI::Range(1, 65536));
+  };
+  CLI::Option* width = add("--width", &SensorSize::width, "Sensor (default: as the file says)");
+  CLI::Option* height = add("--height", &SensorSize::height, "Sensor");
+  width->needs(height);
+  height->needs(width);
+}
+
 void write_text(const std::filesystem::path& path, const std::string& text) {
   std::ofstream file(path, std::ios::binary);
   file << text;

@@ -2,10 +2,12 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "esim/compose/compose.h"
+#include "esim/record/format.h"
 
 namespace esim::app {
 
@@ -26,6 +28,9 @@ struct RunOptions {
 
 /// Adds them to a command; `set_help` says what --set changes.
 void add_run_options(CLI::App& command, RunOptions& options, const std::string& set_help);
+
+/// Adds --width and --height of the sensor, for files that do not tell.
+void add_sensor_options(CLI::App& command, std::optional<SensorSize>& sensor);
 
 void write_text(const std::filesystem::path& path, const std::string& text);
 

@@ -120,7 +120,7 @@ void save(const fs::path& path, const Bytes& bytes, int width, int height, const
   check(events, width, height);
   const Format& format = name ? format_named(*name) : format_for(path);
   if (!format.create) throw UserError("format " + format.name + " can only be read; see esim.formats()");
-  if (std::find(format.holds.begin(), format.holds.end(), Content::events) == format.holds.end())
+  if (!format.can_hold(Content::events))
     throw UserError("format " + format.name + " holds no events; see esim.formats()");
   if (width > format.max_width || height > format.max_height) {
     throw UserError("format " + format.name + " holds sensors of " + std::to_string(format.max_width) + " x " +

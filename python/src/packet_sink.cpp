@@ -1,6 +1,10 @@
 #include "packet_sink.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+
+#include "esim/core/error.h"
 
 namespace esim::python {
 namespace {
@@ -16,6 +20,7 @@ PacketSink::PacketSink(const PeriodicClock& clock) : clock_(clock) {}
 
 void PacketSink::begin(const RecordingInfo& info) {
   end_ = info.end;
+  cameras_ = info.cameras;
   open_.cameras.resize(info.cameras.size());
   if (clock_.due() == info.start) clock_.advance();
   open_packet(info.start);
@@ -87,7 +92,19 @@ void PacketSink::write(const EventPointsRecord& record) {
   take(open_);
 }
 
+template <typename T>
+void PacketSink::require_size(const Image<T>& image, int camera, TimeNs t) const {
+  const CameraInfo& info = cameras_[static_cast<std::size_t>(camera)];
+  if (image.width() == info.model.width && image.height() == info.model.height) return;
+  throw UserError(fmt::format("the image of {} at {} s has {} x {} px, and the camera {} x {}: give width and height",
+                              info.name, to_seconds(t), image.width(), image.height(), info.model.width,
+                              info.model.height));
+}
+
 void PacketSink::write(const TruthRecord& record) {
+  for (const Image<float>* image : {&record.irradiance, &record.depth, &record.flow_x, &record.flow_y}) {
+    if (!image->empty()) require_size(*image, record.camera, record.t);
+  }
   advance_to(record.t);
   CameraPart& camera = part(record.camera);
   camera.t.push_back(record.t);
@@ -110,6 +127,7 @@ void PacketSink::write(const DisplacementRecord& record) {
 
 void PacketSink::write(const FrameRecord& record) {
   // The exposure's middle is rounded: a nanosecond is no reason to end a packet that the frame still belongs to.
+  require_size(record.image, record.camera, record.t);
   advance_to(2 * record.t - record.exposure_start - 1);
   CameraPart& camera = part(record.camera);
   camera.image_t.push_back(record.t);

@@ -65,6 +65,10 @@ class PacketSink final : public Sink {
   void write(const PoseRecord& record);
   void write(const ImuRecord& record);
 
+  /// Throws UserError unless the image is as large as the camera's, since a packet's images make one array.
+  template <typename T>
+  void require_size(const Image<T>& image, int camera, TimeNs t) const;
+
   /// Makes the open packet the one that `t` belongs to.
   void advance_to(TimeNs t);
   void close_packet();
@@ -72,6 +76,7 @@ class PacketSink final : public Sink {
   CameraPart& part(int camera) { return open_.cameras[static_cast<std::size_t>(camera)]; }
 
   PeriodicClock clock_;
+  std::vector<CameraInfo> cameras_;
   TimeNs end_ = 0, known_ = 0;
   Packet open_;
   std::deque<Packet> ready_;

@@ -7,10 +7,7 @@
 #include <limits>
 
 #include "bindings.h"
-#include "esim/core/error.h"
 #include "esim/record/copy_recording.h"
-#include "esim/record/recording_directory.h"
-#include "esim/record/recording_file.h"
 #include "packet_views.h"
 
 namespace esim::python {
@@ -86,25 +83,11 @@ nb::tuple convert(const fs::path& from, const fs::path& to, const std::optional<
   {
     const nb::gil_scoped_release released;
     const Format& format = name ? format_named(*name) : format_for(to);
-    if (!format.create) throw UserError("format " + format.name + " can only be read; see esim.formats()");
-    ReadOptions reading;
-    if (recover) reading.recover = [&lost](const std::string& problem) { lost.push_back(problem); };
-    const std::unique_ptr<Source> source = open_source(from, reading);
-    const CopyOptions options{camera, from_zero, {nanoseconds ? TimeUnit::ns : TimeUnit::us}};
-    const auto copy_to = [&](const fs::path& path) {
-      const CopySummary summary = copy_recording(*source, format, path, options, [](double) { return true; });
-      for (const auto& [content, count] : summary.copied) copied.emplace(describe(content), count);
-      for (std::string& loss : losses(summary, format)) lost.push_back(std::move(loss));
-    };
-    if (format.folder) {
-      RecordingDirectory directory(to, force);
-      copy_to(directory.path());
-      directory.finish(conversion_report(source->info(), from.string(), true));
-    } else {
-      RecordingFile file(to, force);
-      copy_to(file.path());
-      file.finish();
-    }
+    ConvertOptions options{{camera, from_zero, {nanoseconds ? TimeUnit::ns : TimeUnit::us}}, {}, force};
+    if (recover) options.read.recover = [&lost](const std::string& problem) { lost.push_back(problem); };
+    const CopySummary summary = convert_recording(from, format, to, options, [](double) { return true; });
+    for (const auto& [content, count] : summary.copied) copied.emplace(describe(content), count);
+    for (std::string& loss : losses(summary, format)) lost.push_back(std::move(loss));
   }
   return nb::make_tuple(copied, lost);
 }

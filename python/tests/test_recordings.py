@@ -1,3 +1,4 @@
+import json
 import pathlib
 
 import numpy as np
@@ -64,6 +65,22 @@ def test_damaged_files_with_and_without_recovery(tmp_path):
         esim.convert(tmp_path / "e.npz", path)
     with pytest.raises(ValueError):
         esim.Recording(path, 0)
+
+
+def test_images_of_another_size_than_the_sensor_are_refused(recorded):
+    out, _ = recorded
+    with pytest.raises(esim.Error, match="has 64 x 48 px, and the camera 80 x 60"):
+        list(esim.Recording(out, width=80, height=60))
+
+
+def test_what_was_recovered_is_not_called_complete(recorded, tmp_path):
+    out, _ = recorded
+    bag = tmp_path / "poster.bag"
+    esim.convert(out, bag)
+    bag.write_bytes(bag.read_bytes()[: bag.stat().st_size * 2 // 3])
+    with pytest.warns(UserWarning, match="poster.bag"):
+        esim.convert(bag, tmp_path / "again", format="recording", recover=True)
+    assert json.loads((tmp_path / "again" / "report.json").read_text())["status"] == "interrupted"
 
 
 def test_pictures_show_every_event_and_refuse_others():

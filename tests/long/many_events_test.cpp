@@ -37,7 +37,7 @@ TEST_P(ManyEvents, ReadBackAsTheyWere) {
   for (const TimeNs duration : {kNsPerSecond, std::min(format.max_time, 3600 * kNsPerSecond)}) {
     const std::vector<Event> events = random_events(format, sensor, duration);
     const test::TemporaryDirectory base;
-    const auto path = base.path() / ("events" + (format.extensions.empty() ? "" : format.extensions.front()));
+    const auto path = base.path() / ("events" + format.extension());
     test::record(*format.create(path, {.unit = TimeUnit::ns}),
                  test::recording_info(sensor.width, sensor.height, 0, duration), events);
     const auto source = open_source(path);

@@ -10,15 +10,11 @@
 
 namespace esim::test {
 
-inline bool holds(const Format& format, Content content) {
-  return std::find(format.holds.begin(), format.holds.end(), content) != format.holds.end();
-}
-
 /// Names of all that hold events, and are written and read.
 inline std::vector<std::string> event_formats(bool folders) {
   std::vector<std::string> names;
   for (const Format& format : formats()) {
-    if (holds(format, Content::events) && format.create && format.open && (folders || !format.folder))
+    if (format.can_hold(Content::events) && format.create && format.open && (folders || !format.folder))
       names.push_back(format.name);
   }
   return names;

@@ -29,7 +29,7 @@ class EveryFormat : public testing::TestWithParam<std::string> {
   }
 
   fs::path write(const std::vector<Event>& events) const {
-    const fs::path path = base_.path() / ("events" + (format_.extensions.empty() ? "" : format_.extensions.front()));
+    const fs::path path = base_.path() / ("events" + format_.extension());
     test::record(*format_.create(path, WriteOptions{TimeUnit::ns, Compression::blosc}), info_, events);
     return path;
   }

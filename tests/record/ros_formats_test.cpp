@@ -21,7 +21,7 @@ class RosFormats : public testing::TestWithParam<const char*> {
  protected:
   bool is_bag() const { return format_.name == "rosbag"; }
   ros::Encoding encoding() const { return is_bag() ? ros::Encoding::ros1 : ros::Encoding::cdr; }
-  fs::path path() const { return base_.path() / ("recording" + format_.extensions.front()); }
+  fs::path path() const { return base_.path() / ("recording" + format_.extension()); }
 
   std::unique_ptr<ros::MessageOutput> output() const {
     if (is_bag()) return std::make_unique<rosbag::RosbagOutput>(path(), ros::ChunkCodec::lz4);

@@ -47,9 +47,8 @@ const Format& written(const std::string& name) {
 std::filesystem::path place_for(const Format& format, const std::filesystem::path& stem,
                                 std::set<std::filesystem::path>& taken) {
   if (format.folder) return stem.parent_path() / format.name;
-  const std::string extension = format.extensions.empty() ? "" : format.extensions.front();
-  std::filesystem::path path = stem.string() + extension;
-  if (!taken.insert(path).second) path = fmt::format("{}.{}{}", stem.string(), format.name, extension);
+  std::filesystem::path path = stem.string() + format.extension();
+  if (!taken.insert(path).second) path = fmt::format("{}.{}{}", stem.string(), format.name, format.extension());
   return path;
 }
 

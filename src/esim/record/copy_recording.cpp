@@ -9,9 +9,13 @@
 #include "esim/core/error.h"
 #include "esim/record/adapters.h"
 #include "esim/record/number_text.h"
+#include "esim/record/recording_directory.h"
+#include "esim/record/recording_file.h"
 
 namespace esim {
 namespace {
+
+namespace fs = std::filesystem;
 
 std::string names_of(const std::vector<CameraInfo>& cameras) {
   std::string names;
@@ -53,7 +57,7 @@ std::optional<int> camera_of(const Record& record) {
 
 class Copy {
  public:
-  Copy(Source& from, const Format& format, const std::filesystem::path& to, const CopyOptions& options)
+  Copy(Source& from, const Format& format, const fs::path& to, const CopyOptions& options)
       : from_(from),
         format_(format),
         resolution_(format.either_unit && options.write.unit == TimeUnit::us ? kNsPerUs : format.resolution),
@@ -89,7 +93,7 @@ class Copy {
     const Content content = content_of(record);
     const std::optional<int> camera = camera_of(record);
     if (camera_ && camera && camera != camera_) return;
-    const bool held = std::find(format_.holds.begin(), format_.holds.end(), content) != format_.holds.end();
+    const bool held = format_.can_hold(content);
     (held ? summary_.copied : summary_.left_out)[content] += size_of(record);
     if (!held) return;
     if (const auto* events = std::get_if<EventsRecord>(&record)) note_rounding(*events);
@@ -112,13 +116,7 @@ class Copy {
   CopySummary summary_;
 };
 
-}  // namespace
-
-CopySummary copy_recording(Source& from, const Format& format, const std::filesystem::path& to,
-                           const CopyOptions& options, const std::function<bool(double)>& go_on) {
-  return Copy(from, format, to, options).run(go_on);
-}
-
+/// What a folder needs, besides the files of its format, to be known as a recording: a report.json.
 std::string conversion_report(const RecordingInfo& info, const std::string& from, bool complete) {
   auto cameras = nlohmann::ordered_json::array();
   for (const CameraInfo& camera : info.cameras) {
@@ -129,6 +127,50 @@ std::string conversion_report(const RecordingInfo& info, const std::string& from
                                          {"start_s", to_seconds(info.start)},
                                          {"cameras", cameras}};
   return report.dump(2) + "\n";
+}
+
+std::string written_formats() {
+  std::string names;
+  for (const Format& format : formats()) {
+    if (format.create) names += (names.empty() ? "" : ", ") + format.name;
+  }
+  return names;
+}
+
+}  // namespace
+
+CopySummary copy_recording(Source& from, const Format& format, const fs::path& to, const CopyOptions& options,
+                           const std::function<bool(double)>& go_on) {
+  return Copy(from, format, to, options).run(go_on);
+}
+
+CopySummary convert_recording(const fs::path& from, const Format& format, const fs::path& to,
+                              const ConvertOptions& options, const std::function<bool(double)>& go_on) {
+  if (!format.create) throw UserError(fmt::format("{} is only read; write one of {}", format.name, written_formats()));
+  bool damaged = false;
+  ReadOptions reading = options.read;
+  if (options.read.recover) {
+    reading.recover = [&](const std::string& problem) {
+      damaged = true;
+      options.read.recover(problem);
+    };
+  }
+  const std::unique_ptr<Source> source = open_source(from, reading);
+  const auto copy_to = [&](const fs::path& path) {
+    CopySummary summary = copy_recording(*source, format, path, options.copy, go_on);
+    summary.complete &= !damaged;
+    return summary;
+  };
+  if (format.folder) {
+    RecordingDirectory directory(to, options.replace);
+    const CopySummary summary = copy_to(directory.path());
+    directory.finish(conversion_report(source->info(), from.string(), summary.complete));
+    return summary;
+  }
+  RecordingFile file(to, options.replace);
+  const CopySummary summary = copy_to(file.path());
+  file.finish();
+  return summary;
 }
 
 std::vector<std::string> losses(const CopySummary& summary, const Format& format) {

@@ -31,8 +31,17 @@ struct CopySummary {
 CopySummary copy_recording(Source& from, const Format& format, const std::filesystem::path& to,
                            const CopyOptions& options, const std::function<bool(double)>& go_on);
 
-/// What a folder that was copied needs, besides the files of its format, to be known as a recording: a report.json.
-std::string conversion_report(const RecordingInfo& info, const std::string& from, bool complete);
+struct ConvertOptions {
+  CopyOptions copy{};
+  ReadOptions read{};
+  bool replace = false;  ///< what is there already
+};
+
+/// Opens what is at `from`, and makes the file or the folder `to` of it, which is there only when it is whole; see
+/// copy_recording(). What has been recovered from a damaged file is not `complete`. Throws UserError for a format that
+/// is only read, and for a `to` that is there and not to be replaced.
+CopySummary convert_recording(const std::filesystem::path& from, const Format& format, const std::filesystem::path& to,
+                              const ConvertOptions& options, const std::function<bool(double)>& go_on);
 
 /// A line for each thing that was left out or changed, for people.
 std::vector<std::string> losses(const CopySummary& summary, const Format& format);

@@ -19,18 +19,18 @@ std::string seconds(TimeNs t) {
 
 class EventsSink final : public Sink {
  public:
-  EventsSink(std::unique_ptr<EventsWriter> writer, std::filesystem::path path, std::string format, EventLimits limits)
-      : writer_(std::move(writer)), path_(std::move(path)), format_(std::move(format)), limits_(limits) {}
+  EventsSink(std::unique_ptr<EventsWriter> writer, std::filesystem::path path, const Format& format)
+      : writer_(std::move(writer)), path_(std::move(path)), format_(format) {}
 
   void begin(const RecordingInfo& info) override {
     const Camera& camera = info.cameras.at(0).model;
-    if (camera.width > limits_.max_width || camera.height > limits_.max_height) {
+    if (camera.width > format_.max_width || camera.height > format_.max_height) {
       fail_limits(fmt::format("the sensor has {} x {} px, and format {} has room for {} x {}", camera.width,
-                              camera.height, format_, limits_.max_width, limits_.max_height));
+                              camera.height, format_.name, format_.max_width, format_.max_height));
     }
     const bool known = camera.width > 0 && camera.height > 0;
-    width_ = known ? camera.width : limits_.max_width;
-    height_ = known ? camera.height : limits_.max_height;
+    width_ = known ? camera.width : format_.max_width;
+    height_ = known ? camera.height : format_.max_height;
     writer_->begin(path_, known ? SensorSize{camera.width, camera.height} : SensorSize{});
     open_ = true;
   }
@@ -52,16 +52,16 @@ class EventsSink final : public Sink {
   void check(EventSpan events) const {
     int x = 0, y = 0;
     for (const Event& event : events) x = std::max<int>(x, event.x), y = std::max<int>(y, event.y);
-    if (events.front().t < limits_.min_time || events.back().t > limits_.max_time) fail_time(events);
+    if (events.front().t < format_.min_time || events.back().t > format_.max_time) fail_time(events);
     if (x >= width_ || y >= height_) fail_place(events);
   }
 
   [[noreturn]] void fail_time(EventSpan events) const {
-    const auto fits = [&](const Event& event) { return event.t >= limits_.min_time && event.t <= limits_.max_time; };
+    const auto fits = [&](const Event& event) { return event.t >= format_.min_time && event.t <= format_.max_time; };
     const auto wrong = std::find_if_not(events.begin(), events.end(), fits);
     fail_limits(fmt::format("event {} is at {} s, and format {} has room for times from {} to {} s",
-                            index_of(wrong, events), seconds(wrong->t), format_, seconds(limits_.min_time),
-                            seconds(limits_.max_time)));
+                            index_of(wrong, events), seconds(wrong->t), format_.name, seconds(format_.min_time),
+                            seconds(format_.max_time)));
   }
 
   [[noreturn]] void fail_place(EventSpan events) const {
@@ -69,9 +69,9 @@ class EventsSink final : public Sink {
     const auto wrong = std::find_if_not(events.begin(), events.end(), fits);
     const std::string where =
         fmt::format("event {} is at ({}, {}), outside", index_of(wrong, events), wrong->x, wrong->y);
-    if (wrong->x >= limits_.max_width || wrong->y >= limits_.max_height) {
-      fail_limits(fmt::format("{} the {} x {} px that format {} has room for", where, limits_.max_width,
-                              limits_.max_height, format_));
+    if (wrong->x >= format_.max_width || wrong->y >= format_.max_height) {
+      fail_limits(fmt::format("{} the {} x {} px that format {} has room for", where, format_.max_width,
+                              format_.max_height, format_.name));
     }
     fail(fmt::format("{} the sensor of {} x {} px: say its true size", where, width_, height_));
   }
@@ -90,8 +90,7 @@ class EventsSink final : public Sink {
 
   std::unique_ptr<EventsWriter> writer_;
   std::filesystem::path path_;
-  std::string format_;
-  EventLimits limits_;
+  const Format& format_;
   int width_ = 0, height_ = 0;
   std::uint64_t count_ = 0;
   bool open_ = false;
@@ -100,8 +99,8 @@ class EventsSink final : public Sink {
 }  // namespace
 
 std::unique_ptr<Sink> make_events_sink(std::unique_ptr<EventsWriter> writer, std::filesystem::path path,
-                                       std::string format, EventLimits limits) {
-  return std::make_unique<EventsSink>(std::move(writer), std::move(path), std::move(format), limits);
+                                       std::string_view format) {
+  return std::make_unique<EventsSink>(std::move(writer), std::move(path), format_named(format));
 }
 
 }  // namespace esim

@@ -1,9 +1,8 @@
 #pragma once
 
 #include <filesystem>
-#include <limits>
 #include <memory>
-#include <string>
+#include <string_view>
 
 #include "esim/record/format.h"
 
@@ -25,15 +24,9 @@ class EventsWriter {
   virtual void end() = 0;
 };
 
-/// What a format has no room beyond.
-struct EventLimits {
-  int max_width = 65536, max_height = 65536;  ///< px
-  TimeNs min_time = std::numeric_limits<TimeNs>::min(), max_time = std::numeric_limits<TimeNs>::max();
-};
-
-/// A Sink of the events of camera 0. What is beyond the limits of the format of that name, or outside the camera, is a
+/// A Sink of the events of camera 0. What is beyond the limits of the Format of that name, or outside the camera, is a
 /// UserError that says what, and what else would hold it.
 std::unique_ptr<Sink> make_events_sink(std::unique_ptr<EventsWriter> writer, std::filesystem::path path,
-                                       std::string format, EventLimits limits);
+                                       std::string_view format);
 
 }  // namespace esim

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <functional>
 #include <limits>
@@ -47,7 +48,8 @@ struct Format {
   TimeNs resolution = 1;                                 ///< times of events are rounded down to multiples of it, ns
   bool either_unit = false;                              ///< and to multiples of WriteOptions::unit
   int max_width = 65536, max_height = 65536;             ///< px: larger sensors do not fit
-  TimeNs max_time = std::numeric_limits<TimeNs>::max();  ///< of events: later ones do not fit
+  TimeNs min_time = std::numeric_limits<TimeNs>::min();  ///< of events: earlier ones do not fit
+  TimeNs max_time = std::numeric_limits<TimeNs>::max();  ///< and neither do later ones
 
   /// Is it a file (or folder) of this format? By its content, of which `head` is the first 4096 bytes, or less.
   std::function<bool(const std::filesystem::path& path, std::string_view head)> recognises{};
@@ -57,6 +59,11 @@ struct Format {
 
   /// Nothing where the format is only read. `path` is where to write; a file there is replaced.
   std::function<std::unique_ptr<Sink>(const std::filesystem::path& path, const WriteOptions& options)> create{};
+
+  bool can_hold(Content content) const { return std::find(holds.begin(), holds.end(), content) != holds.end(); }
+
+  /// The usual one: ".raw"; empty where there is none.
+  std::string extension() const { return extensions.empty() ? std::string() : extensions.front(); }
 };
 
 /// All formats.

@@ -9,6 +9,7 @@
 
 #include "esim/core/error.h"
 #include "esim/record/formats/events_hdf5.h"
+#include "esim/record/formats/recording.h"
 #include "esim/record/number_text.h"
 #include "esim/record/recording_directory.h"
 
@@ -124,14 +125,6 @@ FileSize folder_size(const fs::path& folder, const fs::path& name) {
     ++total.files;
   }
   return total;
-}
-
-bool is_camera_folder(const fs::path& folder) {
-  std::error_code error;
-  for (const char* name : {"events.h5", "events.txt", "truth.h5", "preview.mp4", "images"}) {
-    if (fs::exists(folder / name, error)) return true;
-  }
-  return false;
 }
 
 // Files of a folder, by name; folders of images count as one, those of cameras are looked into.

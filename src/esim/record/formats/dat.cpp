@@ -97,15 +97,13 @@ Format dat_format() {
       .resolution = kNsPerUs,
       .max_width = kMaxExtent,
       .max_height = kMaxExtent,
-      .max_time = kMaxUs * kNsPerUs,
+      .min_time = 0,
+      .max_time = kMaxUs * kNsPerUs + kNsPerUs - 1,
       .recognises = [](const auto&, std::string_view head) { return is_dat(head); },
       .open = [](const auto& path,
                  const ReadOptions& options) { return make_events_source(std::make_unique<DatReader>(path), options); },
-      .create =
-          [](const auto& path, const WriteOptions&) {
-            return make_events_sink(std::make_unique<DatWriter>(), path, "dat",
-                                    {kMaxExtent, kMaxExtent, 0, kMaxUs * kNsPerUs + kNsPerUs - 1});
-          },
+      .create = [](const auto& path,
+                   const WriteOptions&) { return make_events_sink(std::make_unique<DatWriter>(), path, "dat"); },
   };
 }
 

@@ -137,18 +137,16 @@ Format evt2_format() {
       .resolution = kNsPerUs,
       .max_width = kMaxExtent,
       .max_height = kMaxExtent,
-      .max_time = kMaxUs * kNsPerUs,
+      .min_time = 0,
+      .max_time = kMaxUs * kNsPerUs + kNsPerUs - 1,
       .recognises =
           [](const auto&, std::string_view head) {
             const std::string encoding = prophesee::parse_header(head).encoding;
             return encoding == "EVT2" || encoding == "EVT21";
           },
       .open = [](const auto& path, const ReadOptions& options) { return make_events_source(open_evt2(path), options); },
-      .create =
-          [](const auto& path, const WriteOptions&) {
-            return make_events_sink(std::make_unique<Evt2Writer>(), path, "evt2",
-                                    {kMaxExtent, kMaxExtent, 0, kMaxUs * kNsPerUs + kNsPerUs - 1});
-          },
+      .create = [](const auto& path,
+                   const WriteOptions&) { return make_events_sink(std::make_unique<Evt2Writer>(), path, "evt2"); },
   };
 }
 

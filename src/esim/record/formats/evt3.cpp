@@ -219,17 +219,15 @@ Format evt3_format() {
       .resolution = kNsPerUs,
       .max_width = kMaxExtent,
       .max_height = kMaxExtent,
-      .max_time = kMaxUs * kNsPerUs,
+      .min_time = 0,
+      .max_time = kMaxUs * kNsPerUs + kNsPerUs - 1,
       .recognises = [](const auto&, std::string_view head) { return prophesee::parse_header(head).encoding == "EVT3"; },
       .open =
           [](const auto& path, const ReadOptions& options) {
             return make_events_source(std::make_unique<Evt3Reader>(path), options);
           },
-      .create =
-          [](const auto& path, const WriteOptions&) {
-            return make_events_sink(std::make_unique<Evt3Writer>(), path, "evt3",
-                                    {kMaxExtent, kMaxExtent, 0, kMaxUs * kNsPerUs + kNsPerUs - 1});
-          },
+      .create = [](const auto& path,
+                   const WriteOptions&) { return make_events_sink(std::make_unique<Evt3Writer>(), path, "evt3"); },
   };
 }
 

@@ -117,17 +117,15 @@ Format nmnist_format() {
       .resolution = kNsPerUs,
       .max_width = kMaxWidth,
       .max_height = kMaxHeight,
-      .max_time = kMaxUs * kNsPerUs,
+      .min_time = 0,
+      .max_time = kMaxUs * kNsPerUs + kNsPerUs - 1,
       .recognises = is_nmnist,
       .open =
           [](const auto& path, const ReadOptions& options) {
             return make_events_source(std::make_unique<NmnistReader>(path), options);
           },
-      .create =
-          [](const auto& path, const WriteOptions&) {
-            return make_events_sink(std::make_unique<NmnistWriter>(), path, "nmnist",
-                                    {kMaxWidth, kMaxHeight, 0, kMaxUs * kNsPerUs + kNsPerUs - 1});
-          },
+      .create = [](const auto& path,
+                   const WriteOptions&) { return make_events_sink(std::make_unique<NmnistWriter>(), path, "nmnist"); },
   };
 }
 

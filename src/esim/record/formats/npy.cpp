@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <array>
 #include <cstring>
 #include <optional>
 
@@ -22,7 +22,7 @@ class NpyWriter final : public EventsWriter {
 
   void begin(const std::filesystem::path& path, SensorSize) override {
     file_.emplace(path);
-    file_->append(npy::header_text(descr_, 0));
+    file_->append(npy::header_text(descr_, std::array{std::uint64_t{0}}));
   }
 
   void write(EventSpan events) override {
@@ -44,7 +44,7 @@ class NpyWriter final : public EventsWriter {
 
   void end() override {
     file_->flush();
-    file_->overwrite_start(npy::header_text(descr_, count_));
+    file_->overwrite_start(npy::header_text(descr_, std::array{count_}));
     file_->close();
     file_.reset();
   }
@@ -60,11 +60,8 @@ class NpyWriter final : public EventsWriter {
 
 std::unique_ptr<EventsReader> open_npy(const std::filesystem::path& path) {
   const auto file = std::make_shared<InputFile>(path);
-  const auto array = std::make_shared<npy::Array>(path.string(), [file](std::span<std::byte> out) {
-    const std::span<const std::byte> bytes = file->read(out.size());
-    std::copy(bytes.begin(), bytes.end(), out.begin());
-    return bytes.size();
-  });
+  const auto array = std::make_shared<npy::Array>(
+      path.string(), [file](std::span<std::byte> out) { return npy::read_some(*file, out); });
   npy::EventColumns columns;
   for (const npy::Field& field : array->fields()) npy::take_column(field.name, {array, field}, columns);
   return npy::make_columns_reader(path.string(), std::move(columns));
@@ -83,7 +80,7 @@ Format npy_format() {
       .open = [](const auto& path, const ReadOptions& options) { return make_events_source(open_npy(path), options); },
       .create =
           [](const auto& path, const WriteOptions& options) {
-            return make_events_sink(std::make_unique<NpyWriter>(options.unit), path, "npy", {});
+            return make_events_sink(std::make_unique<NpyWriter>(options.unit), path, "npy");
           },
   };
 }

@@ -12,24 +12,16 @@
 
 #include "esim/core/time.h"
 #include "esim/record/events_reader.h"
+#include "esim/record/formats/npy_header.h"
 
-/// NumPy's file format (https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html), of arrays of numbers
-/// and of records of numbers, with one dimension or none.
+/// Arrays of numbers and of records of numbers, with one dimension or none.
 namespace esim::npy {
-
-inline constexpr std::string_view kMagic = "\x93NUMPY";
 
 /// The time as NumPy types it: a plain number of us, which is what others take it for, or a timedelta64[ns].
 std::string_view time_type(TimeUnit unit);
 
 /// Rounded down.
 constexpr std::int64_t microseconds(TimeNs t) { return t / kNsPerUs - (t % kNsPerUs < 0 ? 1 : 0); }
-
-/// What stands before the numbers. As long for any count, so that it can be replaced. `descr` is Python.
-std::string header_text(std::string_view descr, std::uint64_t count);
-
-/// Of an array without dimensions: one number.
-std::string scalar_header_text(std::string_view descr);
 
 /// One number of each item of an array.
 struct Field {
@@ -44,9 +36,6 @@ struct Field {
 /// An array as it is read, item by item.
 class Array {
  public:
-  /// The next bytes, fewer only at the end. Throws UserError where they cannot be read.
-  using Read = std::function<std::size_t(std::span<std::byte>)>;
-
   /// Throws UserError where it is no array. `name` is that of the file, for people.
   Array(std::string name, Read read);
 
@@ -69,7 +58,7 @@ class Array {
   [[noreturn]] void fail(const std::string& what) const;
 
  private:
-  void parse(std::string_view description);
+  void take_fields(const Literal& descr);
 
   std::string name_;
   Read read_;

@@ -3,69 +3,114 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
+#include <utility>
 
+#include "esim/core/error.h"
 #include "esim/record/number_text.h"
 
-namespace esim {
+namespace esim::npy {
 namespace {
 
-constexpr std::string_view kMagic = "\x93NUMPY";
-constexpr std::size_t kHeaderBytes = 128, kPrefixBytes = 10;
+constexpr std::size_t kHeaderBytes = 192;
+constexpr std::size_t kMaxHeaderBytes = 1 << 16;
+constexpr int kMaxDepth = 8;
 
-/// What follows 'key': in the dictionary.
-std::string_view value_of(const InputFile& file, std::string_view text, std::string_view key) {
-  const std::string quoted = fmt::format("'{}'", key);
-  const std::size_t at = text.find(quoted),
-                    colon = text.find(':', at == std::string_view::npos ? at : at + quoted.size());
-  if (at == std::string_view::npos || colon == std::string_view::npos)
-    file.fail(0, fmt::format("its header does not tell the {}", key));
-  text.remove_prefix(colon + 1);
-  text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
-  return text;
+/// Leaves what follows the literal; nothing where there is none.
+std::optional<Literal> take_literal(std::string_view& source, int depth = 0) {
+  const auto skip = [&](std::string_view these) {
+    source.remove_prefix(std::min(source.find_first_not_of(these), source.size()));
+  };
+  skip(" \n");
+  if (source.empty() || depth > kMaxDepth) return std::nullopt;
+  Literal literal;
+  const char first = source.front();
+  if (first == '\'' || first == '"') {
+    const std::size_t end = source.find(first, 1);
+    if (end == std::string_view::npos) return std::nullopt;
+    literal.text = source.substr(1, end - 1);
+    source.remove_prefix(end + 1);
+    return literal;
+  }
+  if (first == '(' || first == '[' || first == '{') {
+    literal.sequence = true;
+    source.remove_prefix(1);
+    for (skip(" \n,:"); !source.empty(); skip(" \n,:")) {
+      if (std::string_view(")]}").find(source.front()) != std::string_view::npos) {
+        source.remove_prefix(1);
+        return literal;
+      }
+      auto item = take_literal(source, depth + 1);
+      if (!item) return std::nullopt;
+      literal.items.push_back(std::move(*item));
+    }
+    return std::nullopt;
+  }
+  const std::size_t end = std::min(source.find_first_of(" \n,:()[]{}"), source.size());
+  if (end == 0) return std::nullopt;
+  literal.text = source.substr(0, end);
+  source.remove_prefix(end);
+  return literal;
 }
 
 }  // namespace
 
-std::string npy_header(std::string_view type, std::span<const std::uint64_t> shape) {
-  std::string extents;
-  for (const std::uint64_t extent : shape) extents += (extents.empty() ? "" : ", ") + std::to_string(extent);
-  if (shape.size() == 1) extents += ",";
-  std::string text = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}", type, extents);
-  text.resize(kHeaderBytes - kPrefixBytes - 1, ' ');
-  std::string header(kMagic);
-  header += {'\x01', '\x00', static_cast<char>(kHeaderBytes - kPrefixBytes), '\x00'};
-  return header + text + "\n";
+std::string header_text(std::string_view descr, std::span<const std::uint64_t> shape) {
+  const auto length = static_cast<std::uint16_t>(kHeaderBytes - kMagic.size() - 4);
+  std::string text(kMagic);
+  text += {'\1', '\0', static_cast<char>(length & 0xFF), static_cast<char>(length >> 8)};
+  text += fmt::format("{{'descr': {}, 'fortran_order': False, 'shape': (", descr);
+  for (std::size_t i = 0; i < shape.size(); ++i) text += (i > 0 ? ", " : "") + std::to_string(shape[i]);
+  text += shape.size() == 1 ? ",), }" : "), }";
+  text.resize(kHeaderBytes - 1, ' ');
+  return text + '\n';
 }
 
-NpyHeader read_npy_header(InputFile& file) {
-  constexpr std::size_t kMaxBytes = 1 << 16;
-  const auto prefix = file.read_exactly(kMagic.size() + 2, "the header");
-  if (!std::equal(kMagic.begin(), kMagic.end(), reinterpret_cast<const char*>(prefix.data())))
-    file.fail(0, "it is no NumPy array file");
-  const std::size_t length_bytes = prefix[kMagic.size()] == std::byte{1} ? 2 : 4;
-  std::size_t length = 0;
-  const auto digits = file.read_exactly(length_bytes, "the header");
-  for (std::size_t i = 0; i < length_bytes; ++i) length |= std::to_integer<std::size_t>(digits[i]) << 8 * i;
-  if (length > kMaxBytes) file.fail(kMagic.size() + 2, fmt::format("a header of {} bytes is none", length));
-  const auto bytes = file.read_exactly(length, "the header");
-  const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-
-  NpyHeader header;
-  if (!value_of(file, text, "fortran_order").starts_with("False")) file.fail(0, "it is not in C order");
-  const std::string_view type = value_of(file, text, "descr"), shape = value_of(file, text, "shape");
-  if (!type.starts_with('\'') || type.find('\'', 1) == std::string_view::npos)
-    file.fail(0, "its type is not one of numbers");
-  header.type = type.substr(1, type.find('\'', 1) - 1);
-  if (!shape.starts_with('(') || shape.find(')') == std::string_view::npos) file.fail(0, "its shape is none");
-  for (std::string_view rest = shape.substr(1, shape.find(')') - 1); !rest.empty();) {
-    std::string_view word = rest.substr(0, rest.find(','));
-    rest.remove_prefix(std::min(word.size() + 1, rest.size()));
-    word = take_word(word);
-    if (word.empty()) continue;
-    if (!parse_number(word, header.shape.emplace_back())) file.fail(0, "its shape is none");
+std::optional<std::vector<std::uint64_t>> shape_of(const Literal& literal) {
+  if (!literal.sequence) return std::nullopt;
+  std::vector<std::uint64_t> shape;
+  for (const Literal& item : literal.items) {
+    if (!parse_number(item.text, shape.emplace_back())) return std::nullopt;
   }
+  return shape;
+}
+
+std::size_t read_some(InputFile& file, std::span<std::byte> out) {
+  const std::span<const std::byte> bytes = file.read(out.size());
+  std::copy(bytes.begin(), bytes.end(), out.begin());
+  return bytes.size();
+}
+
+Header read_header(std::string_view name, const Read& read) {
+  const auto fail = [&](const std::string& what) { throw UserError(fmt::format("cannot read {}: {}", name, what)); };
+  const auto take = [&](std::size_t bytes) {
+    std::string text(bytes, '\0');
+    if (read(std::as_writable_bytes(std::span(text))) < bytes) fail("it ends within its header");
+    return text;
+  };
+  if (take(kMagic.size()) != kMagic) fail("it does not begin as NumPy's files do");
+  const bool first_version = take(2)[0] == 1;  // the version decides on the length of the length
+  const std::string digits = take(first_version ? 2 : 4);
+  std::size_t length = 0;
+  for (std::size_t i = 0; i < digits.size(); ++i) length |= std::size_t{static_cast<unsigned char>(digits[i])} << 8 * i;
+  if (length > kMaxHeaderBytes) fail(fmt::format("its header of {} bytes is too long", length));
+
+  const std::string description = take(length);
+  std::string_view rest = description;
+  auto dictionary = take_literal(rest);
+  if (!dictionary || dictionary->items.size() % 2 != 0) fail("its header is damaged");
+  Header header;
+  bool typed = false, ordered = false;
+  std::optional<std::vector<std::uint64_t>> shape;
+  for (std::size_t i = 0; i < dictionary->items.size(); i += 2) {
+    const std::string& key = dictionary->items[i].text;
+    Literal& value = dictionary->items[i + 1];
+    if (key == "shape") shape = shape_of(value);
+    if (key == "fortran_order") header.fortran_order = value.text != "False", ordered = true;
+    if (key == "descr") header.descr = std::move(value), typed = true;
+  }
+  if (!typed || !ordered || !shape) fail("its header is damaged");
+  header.shape = std::move(*shape);
   return header;
 }
 
-}  // namespace esim
+}  // namespace esim::npy

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <filesystem>
+#include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -9,18 +11,40 @@
 
 #include "esim/record/input_file.h"
 
-namespace esim {
+/// The head of NumPy's files (https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html).
+namespace esim::npy {
 
-/// The header of a NumPy array file, version 1.0, in C order, always of 128 bytes, so that it can be replaced when the
-/// array has grown. `type` as NumPy writes it: "<f4".
-std::string npy_header(std::string_view type, std::span<const std::uint64_t> shape);
+inline constexpr std::string_view kMagic = "\x93NUMPY";
 
-struct NpyHeader {
-  std::string type{};
+/// What stands before the numbers, in C order. As long for any extents, so that it can be replaced when the array has
+/// grown. `descr` is Python: "'<f4'".
+std::string header_text(std::string_view descr, std::span<const std::uint64_t> shape);
+
+/// A Python literal: a text, a word, or a sequence of literals. Of dictionaries, keys and values in turn.
+struct Literal {
+  std::string text{};
+  bool sequence = false;
+  std::vector<Literal> items{};
+};
+
+/// Extents; nothing where it is no sequence of natural numbers.
+std::optional<std::vector<std::uint64_t>> shape_of(const Literal& literal);
+
+struct Header {
+  Literal descr{};  ///< the type of the items
+  bool fortran_order = false;
   std::vector<std::uint64_t> shape{};
 };
 
-/// Reads the header of versions 1 to 3, up to the first number. Fails for Fortran order and for structured arrays.
-NpyHeader read_npy_header(InputFile& file);
+/// Fills as much as there is; returns how many bytes, fewer only at the end. Throws UserError where they cannot be
+/// read.
+using Read = std::function<std::size_t(std::span<std::byte>)>;
 
-}  // namespace esim
+/// Is a Read of a file.
+std::size_t read_some(InputFile& file, std::span<std::byte> out);
+
+/// Reads the header, of versions 1 to 3, up to the first number. Throws UserError in the name of the file where it is
+/// none.
+Header read_header(std::string_view name, const Read& read);
+
+}  // namespace esim::npy

@@ -33,13 +33,15 @@ constexpr std::string_view kType<std::uint16_t> = "<u2";
 template <>
 constexpr std::string_view kType<std::uint8_t> = "|u1";
 
+std::string quoted(std::string_view type) { return fmt::format("'{}'", type); }
+
 /// An array that grows along its first dimension.
 template <typename T>
 class NpyWriter {
  public:
   NpyWriter(const fs::path& path, std::vector<std::uint64_t> item_shape) : file_(path), shape_(std::move(item_shape)) {
     shape_.insert(shape_.begin(), 0);
-    file_.append(npy_header(kType<T>, shape_));
+    file_.append(npy::header_text(quoted(kType<T>), shape_));
   }
 
   /// One item, in parts. The file is whole after the last one.
@@ -49,7 +51,7 @@ class NpyWriter {
     }
     ++shape_[0];
     file_.flush();
-    file_.overwrite_start(npy_header(kType<T>, shape_));
+    file_.overwrite_start(npy::header_text(quoted(kType<T>), shape_));
   }
   void close() { file_.close(); }
 
@@ -63,8 +65,11 @@ template <typename T>
 class NpyReader {
  public:
   NpyReader(const fs::path& path, std::size_t item_rank) : file_(path) {
-    const NpyHeader header = read_npy_header(file_);
-    if (header.type != kType<T>) file_.fail(0, fmt::format("its type is {}, not {}", header.type, kType<T>));
+    const npy::Header header =
+        npy::read_header(file_.path().string(), [&](std::span<std::byte> out) { return npy::read_some(file_, out); });
+    if (header.fortran_order) file_.fail(0, "it is not in C order");
+    if (header.descr.text != kType<T>)
+      file_.fail(0, fmt::format("its type is {}, not {}", header.descr.text, kType<T>));
     if (header.shape.size() != item_rank + 1) file_.fail(0, fmt::format("it has not {} dimensions", item_rank + 1));
     items_ = header.shape[0];
     item_shape_.assign(header.shape.begin() + 1, header.shape.end());

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <zip.h>
 
+#include <array>
 #include <cstring>
 #include <optional>
 
@@ -40,7 +41,7 @@ class ColumnFile {
  public:
   ColumnFile(const fs::path& archive, std::string name, std::string descr)
       : name_(std::move(name)), descr_(std::move(descr)), path_(archive.string() + "." + name_ + ".tmp"), file_(path_) {
-    file_.append(npy::header_text(descr_, 0));
+    file_.append(npy::header_text(descr_, std::array{std::uint64_t{0}}));
   }
   ~ColumnFile() {
     std::error_code ignored;
@@ -64,7 +65,7 @@ class ColumnFile {
 
   void close(std::uint64_t count) {
     file_.flush();
-    file_.overwrite_start(npy::header_text(descr_, count));
+    file_.overwrite_start(npy::header_text(descr_, std::array{count}));
     file_.close();
   }
 
@@ -125,7 +126,7 @@ class NpzWriter final : public EventsWriter {
 
  private:
   static std::string scalar(std::int32_t value) {
-    return npy::scalar_header_text("'<i4'") + std::string(reinterpret_cast<const char*>(&value), sizeof(value));
+    return npy::header_text("'<i4'", {}) + std::string(reinterpret_cast<const char*>(&value), sizeof(value));
   }
 
   void add(const std::string& name, zip_source_t* source) {
@@ -221,7 +222,7 @@ Format npz_format() {
       .open = [](const auto& path, const ReadOptions& options) { return make_events_source(open_npz(path), options); },
       .create =
           [](const auto& path, const WriteOptions& options) {
-            return make_events_sink(std::make_unique<NpzWriter>(options), path, "npz", {});
+            return make_events_sink(std::make_unique<NpzWriter>(options), path, "npz");
           },
   };
 }

@@ -15,15 +15,6 @@ namespace {
 
 constexpr std::size_t kMaxFileBytes = std::size_t{1} << 30;
 
-// Compressed fast: the gradients of simulated images shrink well with any effort.
-void write(const std::filesystem::path& path, const cv::Mat& image) {
-  std::vector<unsigned char> png;
-  cv::imencode(".png", image, png, {cv::IMWRITE_PNG_COMPRESSION, 1});
-  OutputFile file(path);
-  file.append({reinterpret_cast<const char*>(png.data()), png.size()});
-  file.flush();
-}
-
 template <typename T>
 cv::Mat copy_of(const Image<T>& image, int type) {
   cv::Mat copy(image.height(), image.width(), type);
@@ -40,24 +31,59 @@ cv::Mat demosaicked(const cv::Mat& mosaic) {
   return colours({kBorder, kBorder, mosaic.cols, mosaic.rows});
 }
 
-/// Refuses a PNG by the size that it says it has: no compression saves more than deflate's factor of about 1000.
-void require_credible_size(InputFile& file) {
+// Compressed fast: the gradients of simulated images shrink well with any effort.
+std::string encode(const cv::Mat& image) {
+  std::vector<unsigned char> png;
+  cv::imencode(".png", image, png, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  return {png.begin(), png.end()};
+}
+
+void write(const std::filesystem::path& path, const cv::Mat& image) {
+  OutputFile file(path);
+  file.append(encode(image));
+  file.flush();
+}
+
+std::uint64_t big_endian(std::string_view bytes) {
+  std::uint64_t value = 0;
+  for (const char byte : bytes) value = value << 8 | static_cast<std::uint8_t>(byte);
+  return value;
+}
+
+/// Why the bytes are no PNG, or one that claims a size which they cannot have; empty: neither.
+std::string problem_of(std::string_view bytes) {
   constexpr std::size_t kHeadBytes = 24;  // signature, then the IHDR chunk: length, name, width, height
-  constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28, kMaxPixelsPerByte = 10'000;  // 1 bit each at least
-  const auto head = file.read_exactly(kHeadBytes, "the header");
-  const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
-  if (!text.starts_with("\x89PNG\r\n\x1a\n") || text.substr(12, 4) != "IHDR") file.fail(0, "it is not a PNG image");
-  const auto big_endian = [&head](std::size_t at) {
-    std::uint64_t value = 0;
-    for (std::size_t i = 0; i < 4; ++i) value = value << 8 | std::to_integer<std::uint64_t>(head[at + i]);
-    return value;
-  };
-  const std::uint64_t width = big_endian(16), height = big_endian(20);
-  if (width == 0 || height == 0 || width > kMaxPixels || height > kMaxPixels || width * height > kMaxPixels ||
-      width * height > kMaxPixelsPerByte * file.size() || file.size() > kMaxFileBytes) {
-    file.fail(16, fmt::format("{} x {} px in {} bytes: it is damaged", width, height, file.size()));
+  constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;
+  constexpr std::uint64_t kMaxPixelsPerByte = 8'300;  // deflate's 1032 times, of eight pixels of one bit each
+  if (!bytes.starts_with("\x89PNG\r\n\x1a\n")) return "it is not a PNG image";
+  if (bytes.size() < kHeadBytes || bytes.substr(12, 4) != "IHDR") return "the header is damaged or cut off";
+  const std::uint64_t width = big_endian(bytes.substr(16, 4)), height = big_endian(bytes.substr(20, 4));
+  const std::uint64_t most = std::min(kMaxPixels, bytes.size() * kMaxPixelsPerByte);
+  if (width > 0 && height > 0 && width <= most && height <= most / width) return "";
+  return fmt::format("{} x {} px in {} bytes: it is damaged", width, height, bytes.size());
+}
+
+/// Empty where it is damaged.
+cv::Mat decode(std::string_view bytes, int mode) {
+  const cv::Mat coded(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
+  try {
+    return cv::imdecode(coded, mode);
+  } catch (const cv::Exception&) {
+    return {};
   }
-  file.seek(0);
+}
+
+PngImage to_png_image(cv::Mat image) {
+  PngImage result{image.depth() == CV_16U ? 16 : 8, {}};
+  image.convertTo(image, CV_16U);
+  std::vector<cv::Mat> channels;
+  cv::split(image, channels);
+  std::reverse(channels.begin(), channels.end());  // blue is first
+  for (const cv::Mat& channel : channels) {
+    result.channels.emplace_back(channel.cols, channel.rows);
+    std::copy_n(channel.ptr<std::uint16_t>(), channel.total(), result.channels.back().data());
+  }
+  return result;
 }
 
 }  // namespace
@@ -87,28 +113,28 @@ void write_png(const std::filesystem::path& path, const PerColour<Image<std::uin
 
 PngImage read_png(const std::filesystem::path& path) {
   InputFile file(path);
-  require_credible_size(file);
-  const auto bytes = file.read(kMaxFileBytes);
-  const cv::Mat coded(1, static_cast<int>(bytes.size()), CV_8U, const_cast<std::byte*>(bytes.data()));
-  cv::Mat image;
-  try {
-    image = cv::imdecode(coded, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {  // the same as an empty image
-  }
+  if (file.size() > kMaxFileBytes) file.fail(0, fmt::format("{} bytes are no image", file.size()));
+  const auto content = file.read(kMaxFileBytes);
+  const std::string_view bytes(reinterpret_cast<const char*>(content.data()), content.size());
+  if (const std::string problem = problem_of(bytes); !problem.empty()) file.fail(0, problem);
+  const cv::Mat image = decode(bytes, cv::IMREAD_UNCHANGED);
   if (image.empty()) file.fail(0, "it cannot be decoded: cut off, or damaged");
   if (image.channels() != 1 && image.channels() != 3)
     file.fail(0, fmt::format("it has {} channels, not 1 or 3", image.channels()));
+  return to_png_image(image);
+}
 
-  PngImage result{image.depth() == CV_16U ? 16 : 8, {}};
-  image.convertTo(image, CV_16U);
-  std::vector<cv::Mat> channels;
-  cv::split(image, channels);
-  std::reverse(channels.begin(), channels.end());  // blue is first
-  for (const cv::Mat& channel : channels) {
-    result.channels.emplace_back(channel.cols, channel.rows);
-    std::copy_n(channel.ptr<std::uint16_t>(), channel.total(), result.channels.back().data());
-  }
-  return result;
+std::string encode_png(const Image<std::uint16_t>& image, int bits) {
+  cv::Mat numbers = copy_of(image, CV_16UC1);
+  if (bits <= 8) numbers.convertTo(numbers, CV_8U);
+  return encode(numbers);
+}
+
+std::optional<PngImage> decode_grey_png(std::string_view bytes) {
+  if (!problem_of(bytes).empty()) return std::nullopt;
+  const cv::Mat image = decode(bytes, cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);
+  if (image.empty()) return std::nullopt;
+  return to_png_image(image);
 }
 
 }  // namespace esim

@@ -2,6 +2,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "esim/core/colour.h"
@@ -30,5 +33,12 @@ struct PngImage {
 /// Reads a PNG without an alpha channel. What the file says of its size is not trusted: memory is taken only for what
 /// its bytes can hold. Throws UserError that names the file.
 PngImage read_png(const std::filesystem::path& path);
+
+/// The bytes of a grey PNG, of 8 bits or, where `bits` are more, 16.
+std::string encode_png(const Image<std::uint16_t>& image, int bits);
+
+/// The one channel of a PNG in memory; colours become grey. Nothing where it is none, damaged, or claims to be larger
+/// than its bytes can tell of.
+std::optional<PngImage> decode_grey_png(std::string_view bytes);
 
 }  // namespace esim

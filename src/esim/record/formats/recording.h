@@ -13,6 +13,9 @@ namespace esim {
 /// A recording's folder, as `esim simulate` writes it, or that of one of its cameras.
 Format recording_format();
 
+/// Is it the folder of a camera, by the names of its files?
+bool is_camera_folder(const std::filesystem::path& folder);
+
 /// Writes any records as such a folder: the calibration where the intrinsics are known, then each file when the first
 /// record comes that belongs into it, and report.json at the end. Points of events come with the events themselves.
 class RecordingWriter final : public Sink {

@@ -16,19 +16,24 @@
 #include "esim/record/input_file.h"
 
 namespace esim {
-namespace {
 
 namespace fs = std::filesystem;
+
+namespace {
 
 bool is_file(const fs::path& path) {
   std::error_code error;
   return fs::is_regular_file(path, error);
 }
 
+}  // namespace
+
 bool is_camera_folder(const fs::path& folder) {
   return is_file(folder / "events.h5") || is_file(folder / "truth.h5") || is_file(folder / "frames.csv") ||
          is_file(folder / "images" / kTimedFilesList);
 }
+
+namespace {
 
 std::vector<fs::path> sorted_entries(const fs::path& folder) {
   std::vector<fs::path> paths;

@@ -13,8 +13,8 @@
 
 #include "esim/core/error.h"
 #include "esim/record/formats/dataset/dataset_files.h"
-#include "esim/record/formats/dataset/png_bytes.h"
 #include "esim/record/formats/events_text.h"
+#include "esim/record/formats/png_file.h"
 #include "esim/record/line_reader.h"
 #include "esim/record/number_text.h"
 
@@ -167,15 +167,15 @@ class FramesPart final : public LinesPart {
     std::string bytes(static_cast<std::size_t>(files_.size(name)), '\0');
     file->read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     bytes.resize(static_cast<std::size_t>(file->gcount()));
-    auto png = decode_png(bytes);
+    auto png = decode_grey_png(bytes);
     if (!png) throw UserError(fmt::format("cannot read {}: it is not a PNG, or it is damaged", shown));
     image_ = std::move(*png);
     record.emplace(
-        FrameRecord{.t = lines.t(), .exposure_start = lines.t(), .image = image_.image, .bits = image_.bits});
+        FrameRecord{.t = lines.t(), .exposure_start = lines.t(), .image = image_.channels[0], .bits = image_.bits});
   }
 
   const FilesInput& files_;
-  GreyPng image_;
+  PngImage image_;
 };
 
 class ImuPart final : public LinesPart {

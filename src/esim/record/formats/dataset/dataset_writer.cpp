@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "esim/record/formats/dataset/dataset_files.h"
-#include "esim/record/formats/dataset/png_bytes.h"
+#include "esim/record/formats/png_file.h"
 #include "esim/record/number_text.h"
 
 namespace esim {

@@ -5,11 +5,11 @@
 
 #include "commands.h"
 #include "esim/core/error.h"
-#include "esim/record/events_file.h"
 #include "esim/record/number_text.h"
 #include "esim/record/output_file.h"
 #include "esim/record/preview/video_file.h"
 #include "esim/record/recording_file.h"
+#include "esim/visualise/playable.h"
 #include "esim/visualise/player.h"
 #include "progress_bar.h"
 #include "support.h"
@@ -42,70 +42,10 @@ fs::path out_path(const Arguments& arguments) {
   return fs::path(file).replace_extension(".play.mp4");
 }
 
-bool is_format(const fs::path& folder) {
-  for (const Format& format : formats()) {
-    if (format.folder && format.recognises(folder, "")) return true;
-  }
-  return false;
-}
-
-/// What can be opened again and again: of a folder that is of no format, the events in it.
-class Input {
- public:
-  explicit Input(const Arguments& arguments) : path_(arguments.input) {
-    reading_.sensor = arguments.sensor;
-    std::error_code error;
-    const bool folder = fs::is_directory(path_, error);
-    if (folder && !is_format(path_)) {
-      const EventsFile events(path_, reading_);
-      path_ = events.path();
-      reading_.sensor = events.sensor();
-    } else if (!folder && !reading_.sensor && open()->info().cameras.size() == 1) {
-      reading_.sensor = EventsFile(path_, reading_).sensor();  // as a report beside it may say
-    }
-  }
-
-  std::unique_ptr<Source> open() const { return open_source(path_, reading_); }
-
-  int camera(const std::string& name) const {
-    std::string names;
-    const auto source = open();
-    const auto& cameras = source->info().cameras;
-    for (std::size_t i = 0; i < cameras.size(); ++i) {
-      if (name.empty() ? cameras.size() == 1 : cameras[i].name == name) return static_cast<int>(i);
-      names += (names.empty() ? "" : ", ") + cameras[i].name;
-    }
-    if (name.empty())
-      throw UserError(fmt::format("{} holds several cameras: choose one of {} with --camera", path_.string(), names));
-    throw UserError(fmt::format("{} has no camera {}; there is {}", path_.string(), name, names));
-  }
-
- private:
-  fs::path path_;
-  ReadOptions reading_;
-};
-
-std::vector<View> views_named(const std::vector<std::string>& names) {
-  std::vector<View> views;
-  for (const std::string& name : names) {
-    if (name == "all") return {};
-    std::optional<View> found;
-    std::string known = "all";
-    for (int i = 0; i < kViews; ++i) {
-      const auto view = static_cast<View>(i);
-      if (name == name_of(view)) found = view;
-      known += fmt::format(", {}", name_of(view));
-    }
-    if (!found) throw UserError(fmt::format("--view {}: it is one of {}", name, known));
-    if (std::find(views.begin(), views.end(), *found) == views.end()) views.push_back(*found);
-  }
-  return views;
-}
-
 /// One showing, from the survey to the finished file.
 class Showing {
  public:
-  Showing(const Arguments& arguments, const Input& input, const Survey& found, const fs::path& out)
+  Showing(const Arguments& arguments, const Playable& input, const Survey& found, const fs::path& out)
       : arguments_(arguments), survey_(found), source_(input.open()), bar_(!arguments.quiet), out_(out) {
     options_ = choose_missing(arguments.play, found);
   }
@@ -210,11 +150,10 @@ int run(Arguments& arguments) {
     throw UserError(fmt::format("GIFs have at most {} frames per second: lower --fps", kMostFramesOfGif_hz));
   if (extension == ".gif" && play.width == 0) play.width = kWidthOfGif;
   play.theme = arguments.light ? kLightTheme : kDarkTheme;
-  const fs::path name = fs::path(arguments.input).lexically_normal();
-  play.name = (name.has_filename() ? name : name.parent_path()).filename().string();
 
   catch_interrupts();
-  const Input input(arguments);
+  const Playable input(arguments.input, arguments.sensor);
+  play.name = input.name();
   arguments.extent.camera = input.camera(arguments.camera);
   ProgressBar bar(!arguments.quiet);
   const auto found = survey(*input.open(), arguments.extent, [&](double share) {

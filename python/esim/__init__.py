@@ -8,14 +8,13 @@ x y z w. The guide is `docs/python.md`, the options of scenarios are in `docs/sc
 from ._errors import Error, InternalError, OutputError
 from ._event_camera import EventCamera, linear_light
 from ._files import EventsIterator, formats, info, load_events, save_events
+from ._pictures import play, space_time_plot, time_surface_picture
 from ._recordings import Recording, convert
 from ._represent import (
     event_count,
     event_frame,
     event_tensor,
-    space_time_plot,
     time_surface,
-    time_surface_picture,
     voxel_grid,
 )
 from ._scenario import Scenario
@@ -47,6 +46,7 @@ __all__ = [
     "info",
     "linear_light",
     "load_events",
+    "play",
     "save_events",
     "simulate",
     "space_time_plot",

@@ -76,6 +76,8 @@ class CameraPacket:
     image_t: NDArray[np.int64]
     exposure_start: NDArray[np.int64]
     exposure: NDArray[np.int64]
+    trigger_t: NDArray[np.int64]
+    trigger_kind: NDArray[np.uint8]
 
 class Packet(CameraPacket):  # of the only camera, where there is one
     t0: int
@@ -205,3 +207,28 @@ def space_time_plot(
     yaw_deg: float = 35.0,
     pitch_deg: float = 20.0,
 ) -> NDArray[np.uint8]: ...
+
+class play(Iterator[NDArray[np.uint8]]):
+    times: NDArray[np.int64]
+    def __init__(
+        self,
+        path: Path,
+        *,
+        views: list[str] | None = None,
+        camera: str | None = None,
+        at_s: float | None = None,
+        fps: float = 30.0,
+        slow_motion: float | None = None,
+        start_s: float = 0.0,
+        duration_s: float | None = None,
+        window_s: float | None = None,
+        window_events: int | None = None,
+        tau_s: float | None = None,
+        span_s: float | None = None,
+        size: int | None = None,
+        light: bool = False,
+        width: int | None = None,
+        height: int | None = None,
+    ) -> None: ...
+    def __len__(self) -> int: ...
+    def __next__(self) -> NDArray[np.uint8]: ...

@@ -45,11 +45,14 @@ class CameraPacket:
         its exposure ends.
     image_t, exposure_start, exposure : int64, shape (M,)
         Middle of the exposure, its start, and its duration, ns.
+    trigger_t, trigger_kind : int64, uint8, shape (number of triggers,)
+        Of files that hold triggers: when, ns, and what, numbered as in AEDAT 4 (1, 2: rising, falling edge of the
+        external signal).
     """
 
     __slots__ = (
         "events truth_t pose irradiance depth flow object displacement displacement_t visible event_points "
-        "images image_t exposure_start exposure"
+        "images image_t exposure_start exposure trigger_t trigger_kind"
     ).split()
 
     def __init__(self, parts):

@@ -13,5 +13,6 @@ void bind_simulation(nanobind::module_& module);
 void bind_event_files(nanobind::module_& module);
 void bind_recording_files(nanobind::module_& module);
 void bind_representations(nanobind::module_& module);
+void bind_pictures(nanobind::module_& module);
 
 }  // namespace esim::python

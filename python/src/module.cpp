@@ -10,4 +10,5 @@ NB_MODULE(_core, module) {
   bind_event_files(module);
   bind_recording_files(module);
   bind_representations(module);
+  bind_pictures(module);
 }

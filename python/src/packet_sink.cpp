@@ -148,6 +148,12 @@ void PacketSink::write(const ImuRecord& record) {
   open_.imu.push_back(to_imu_sample(record.t, record.measured, record.bias));
 }
 
+void PacketSink::write(const TriggerRecord& record) {
+  advance_to(record.t);
+  part(record.camera).trigger_t.push_back(record.t);
+  part(record.camera).trigger_kind.push_back(static_cast<std::uint8_t>(record.kind));
+}
+
 void PacketSink::write(const ImageRecord&) {}  // of videos only
 
 }  // namespace esim::python

@@ -28,6 +28,9 @@ struct CameraPart {
   std::vector<TimeNs> image_t, exposure_start, exposure;
   std::vector<std::uint16_t> images;
   int image_bits = 8;
+
+  std::vector<TimeNs> trigger_t;
+  std::vector<std::uint8_t> trigger_kind;
 };
 
 /// Everything that was recorded in a step of time: after t0 until t1, both included in the first one.
@@ -64,6 +67,7 @@ class PacketSink final : public Sink {
   void write(const FrameRecord& record);
   void write(const PoseRecord& record);
   void write(const ImuRecord& record);
+  void write(const TriggerRecord& record);
 
   /// Throws UserError unless the image is as large as the camera's, since a packet's images make one array.
   template <typename T>

@@ -41,6 +41,8 @@ nb::dict to_dict(CameraPart part, const Camera& model) {
   view["image_t"] = to_numpy(std::move(part.image_t));
   view["exposure_start"] = to_numpy(std::move(part.exposure_start));
   view["exposure"] = to_numpy(std::move(part.exposure));
+  view["trigger_t"] = to_numpy(std::move(part.trigger_t));
+  view["trigger_kind"] = to_numpy(std::move(part.trigger_kind));
   if (part.image_bits > 8) {
     view["images"] = images(std::move(part.images), model);
   } else {

@@ -96,3 +96,21 @@ def test_pictures_show_every_event_and_refuse_others():
     for draw in (esim.time_surface_picture, esim.space_time_plot):
         with pytest.raises(esim.Error, match="outside the sensor"):
             draw(events, 50, 80)
+
+
+def test_play_shows_what_there_is_side_by_side(recorded):
+    out, packets = recorded
+    pages = esim.play(out, fps=20, slow_motion=1, size=900)
+    pictures = list(pages)
+    assert len(pictures) == len(pages) == 5
+    assert all(picture.shape == pictures[0].shape and picture.dtype == np.uint8 for picture in pictures)
+    assert any((a != b).any() for a, b in zip(pictures, pictures[1:]))
+    np.testing.assert_array_equal(np.diff(pages.times), 50_000_000)
+    (alone,) = esim.play(out, at_s=0.1, views=["image"], size=400, light=True)
+    assert 350 < alone.shape[1] < 450
+    assert (alone[:10] > 200).all() and (pictures[0][:10] < 100).all()
+    for wrong, match in (({"views": ["cube"]}, "no view cube"), ({"camera": "left"}, "no camera left"), ({"at_s": 9.0}, "at_s")):
+        with pytest.raises(esim.Error, match=match):
+            esim.play(out, **wrong)
+    with pytest.raises(ValueError, match="fps"):
+        esim.play(out, fps=0)

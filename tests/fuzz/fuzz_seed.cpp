@@ -36,6 +36,7 @@ void write(const Format& format, const std::filesystem::path& folder) {
   PoseRecord pose;
   sink->write(pose);
   sink->write(ImuRecord{kNsPerMs, {}, {}});
+  sink->write(TriggerRecord{0, kNsPerMs, TriggerKind::external_rising});
   sink->write(TruthRecord{0, kNsPerMs, SE3{}, image, image, image, image});
   sink->write(EventsRecord{0, events});
   sink->write(FrameRecord{0, kNsPerSecond / 2, kNsPerSecond / 2, kNsPerMs, 1, frame, 8});

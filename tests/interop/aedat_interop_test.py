@@ -50,14 +50,16 @@ def write_theirs(path, compression):
 
 def read_by_dv(path):
     recording = dv.io.MonoCameraRecording(str(path))
-    batches, frames, imu = [], [], []
+    batches, frames, imu, triggers = [], [], [], []
     while (events := recording.getNextEventBatch()) is not None:
         batches.append(events.numpy())
     while (frame := recording.getNextFrame()) is not None:
         frames.append(frame)
     while (batch := recording.getNextImuBatch()) is not None:
         imu.extend(batch)
-    return recording, np.concatenate(batches), frames, imu
+    while (batch := recording.getNextTriggerBatch()) is not None:
+        triggers.extend((trigger.timestamp, trigger.type) for trigger in batch)
+    return recording, np.concatenate(batches), frames, imu, triggers
 
 
 class Aedat(unittest.TestCase):
@@ -75,7 +77,7 @@ class Aedat(unittest.TestCase):
                         path.unlink(missing_ok=True)
                     write_theirs(self.theirs, getattr(dv.CompressionType, name))
                     convert(self.theirs, self.ours, "--format", written)
-                    recording, events, frames, imu = read_by_dv(self.ours)
+                    recording, events, frames, imu, triggers = read_by_dv(self.ours)
                     self.assertEqual(tuple(recording.getEventResolution()), SIZE)
                     self.assertEqual(tuple(recording.getFrameResolution()), SIZE)
                     self.assertEqual(recording.getCameraName(), "DAVIS346_test")
@@ -83,6 +85,10 @@ class Aedat(unittest.TestCase):
                     self.assertEqual([frame.timestamp for frame in frames], [1_005_000])
                     self.assertEqual(frames[0].exposure, datetime.timedelta(microseconds=2000))
                     np.testing.assert_array_equal(frames[0].image, IMAGE)
+                    kinds = dv.TriggerType
+                    signal = (1_002_000, kinds.EXTERNAL_SIGNAL_RISING_EDGE)
+                    exposure = [(1_005_000, kinds.APS_EXPOSURE_START), (1_007_000, kinds.APS_EXPOSURE_END)]
+                    self.assertEqual(triggers, [signal, *exposure])
                     self.assertEqual([m.timestamp for m in imu], [1_001_000])
                     np.testing.assert_allclose(imu[0].getAccelerations(), [9.81007, 0, -4.905035], rtol=1e-6)
                     np.testing.assert_allclose(imu[0].getAngularVelocities(), [0, np.pi / 2, 0], rtol=1e-6)
@@ -96,7 +102,7 @@ class Aedat(unittest.TestCase):
                 convert(self.theirs, self.ours, "--format", written)
                 decoder = aedat.Decoder(str(self.ours))
                 kinds = {stream["type"] for stream in decoder.id_to_stream().values()}
-                self.assertEqual(kinds, {"events", "frame", "imus"})
+                self.assertEqual(kinds, {"events", "frame", "imus", "triggers"})
                 packets = list(decoder)
                 t = np.concatenate([packet["events"]["t"] for packet in packets if "events" in packet])
                 np.testing.assert_array_equal(t, 1_000_000 + 10 * np.arange(COUNT))

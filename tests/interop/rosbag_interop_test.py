@@ -35,6 +35,42 @@ with rosbag.Bag(sys.argv[1]) as bag:
 print(json.dumps({"events": events, "topics": topics}))
 """
 
+# Plays a bag to a listener, with a master of its own. Prints how many messages came on each topic.
+PLAY = r"""
+import json, os, socket, subprocess, sys, time
+with socket.socket() as free:
+    free.bind(("127.0.0.1", 0))
+    port = free.getsockname()[1]
+os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1", ROS_HOME=sys.argv[2])
+quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], **quiet)
+try:
+    import rosbag, rosgraph, rospy
+    deadline = time.time() + 20
+    while not rosgraph.is_master_online() and time.time() < deadline:
+        time.sleep(0.05)
+    rospy.init_node("listener", disable_signals=True)
+    counts = {}
+    def listen(topic):
+        def count(message):
+            counts[topic] = counts.get(topic, 0) + 1
+        return rospy.Subscriber(topic, rospy.AnyMsg, count)
+    with rosbag.Bag(sys.argv[1]) as bag:
+        wanted = {topic: found.message_count for topic, found in bag.get_type_and_topic_info().topics.items()}
+    listeners = [listen(topic) for topic in wanted]
+    subprocess.run(["/usr/lib/rosbag/play", "--wait-for-subscribers", "--delay=0.5", sys.argv[1]], check=True, timeout=60, **quiet)
+    while counts != wanted and time.time() < deadline + 20:
+        time.sleep(0.05)
+finally:
+    master.terminate()
+print(json.dumps({"wanted": wanted, "came": counts}))
+"""
+
+
+def debian_has(*modules):
+    imports = "import " + ", ".join(modules)
+    return subprocess.run(["/usr/bin/python3", "-c", imports], capture_output=True).returncode == 0
+
 
 def types():
     store = get_typestore(Stores.ROS1_NOETIC)
@@ -100,7 +136,7 @@ def write_bag(path, events, compression=None):
 
 class RosbagInterop(InteropTest):
     def test_ours_by_debians_rosbag(self):
-        if subprocess.run(["/usr/bin/python3", "-c", "import rosbag"], capture_output=True).returncode != 0:
+        if not debian_has("rosbag"):
             self.skipTest("python3-rosbag is not installed")
         events = random_events()
         bag = self.convert(self.write_events(events), "ours.bag")
@@ -109,6 +145,16 @@ class RosbagInterop(InteropTest):
         found = json.loads(result.stdout)
         self.assertEqual([tuple(event) for event in found["events"]], events)
         self.assertEqual(found["topics"]["/cam0/camera_info"], 1)
+
+    def test_ours_is_played_by_debians_rosbag(self):
+        if not debian_has("rosbag", "rosmaster", "rospy"):
+            self.skipTest("python3-rosbag, python3-rosmaster or python3-rospy is not installed")
+        bag = self.convert(self.write_events(random_events()), "ours.bag")
+        result = subprocess.run(["/usr/bin/python3", "-c", PLAY, bag, self.folder], capture_output=True, text=True)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        found = json.loads(result.stdout)
+        self.assertEqual(found["came"], found["wanted"])
+        self.assertIn("/cam0/events", found["came"])
 
     def test_ours_by_rosbags(self):
         events = random_events()

@@ -51,6 +51,7 @@ class Aedat4 : public testing::Test {
     for (const int camera : {0, 1}) sink->write(EventsRecord{camera, events_[camera]});
     for (const test::OwnedFrame& frame : frames_) sink->write(frame.record());
     for (const ImuRecord& imu : imu_) sink->write(imu);
+    for (const TriggerRecord& trigger : triggers_) sink->write(trigger);
     sink->end(true);
     return path;
   }
@@ -60,6 +61,9 @@ class Aedat4 : public testing::Test {
   std::vector<Event> events_[2] = {events(1), events(2)};
   std::vector<test::OwnedFrame> frames_;
   std::vector<ImuRecord> imu_;
+  std::vector<TriggerRecord> triggers_ = {{0, 20 * kNsPerMs, TriggerKind::external_rising},
+                                          {1, 30 * kNsPerMs, TriggerKind::timestamp_reset},
+                                          {0, 40 * kNsPerMs, TriggerKind::external_falling}};
 };
 
 TEST_F(Aedat4, TwoCamerasFramesAndTheImuReadBack) {
@@ -85,6 +89,14 @@ TEST_F(Aedat4, TwoCamerasFramesAndTheImuReadBack) {
         EXPECT_EQ(found.frames[i].exposure_duration, frames_[i].exposure_duration);
         EXPECT_EQ(found.frames[i].bits, frames_[i].bits > 8 ? 16 : 8);
         EXPECT_TRUE(std::ranges::equal(found.frames[i].image.pixels(), frames_[i].image.pixels())) << i;
+      }
+      // Each camera's are in order; those of exposures are the frames' own.
+      const auto same = [](const TriggerRecord& a, const TriggerRecord& b) { return a.t == b.t && a.kind == b.kind; };
+      for (const int camera : {0, 1}) {
+        std::vector<TriggerRecord> expected = triggers_, triggers = found.triggers;
+        for (auto* all : {&expected, &triggers})
+          std::erase_if(*all, [&](const TriggerRecord& trigger) { return trigger.camera != camera; });
+        EXPECT_TRUE(std::ranges::equal(triggers, expected, same)) << camera;
       }
       ASSERT_EQ(found.imu.size(), imu_.size());
       for (std::size_t i = 0; i < imu_.size(); ++i) {

@@ -31,6 +31,7 @@ struct Recorded {
   std::vector<std::vector<Event>> events;  ///< of each camera
   std::vector<OwnedFrame> frames;
   std::vector<ImuRecord> imu;
+  std::vector<TriggerRecord> triggers;
   std::vector<PoseRecord> poses;
 };
 
@@ -49,6 +50,7 @@ inline Recorded read_all(const std::filesystem::path& path, const ReadOptions& o
           {frame->camera, frame->t, frame->exposure_start, frame->exposure_duration, frame->bits, frame->image});
     }
     if (const auto* imu = std::get_if<ImuRecord>(record)) all.imu.push_back(*imu);
+    if (const auto* trigger = std::get_if<TriggerRecord>(record)) all.triggers.push_back(*trigger);
     if (const auto* pose = std::get_if<PoseRecord>(record)) all.poses.push_back(*pose);
   }
   return all;

@@ -218,6 +218,7 @@ class Checker {
     expect_same(record.y, displacement_at(i, -3));
     EXPECT_EQ(record.visible(0, 0), i % 2);
   }
+  void check_kind(const TriggerRecord&) { ADD_FAILURE() << "points of events are not read"; }
   void check_kind(const EventPointsRecord&) { ADD_FAILURE() << "points of events are not read"; }
 
   int camera_ = 0;

@@ -91,6 +91,10 @@ Copy copy_of(const ImuRecord& record) {
   return {[record](Sink& sink) { sink.write(record); }, sizeof record};
 }
 
+Copy copy_of(const TriggerRecord& record) {
+  return {[record](Sink& sink) { sink.write(record); }, sizeof record};
+}
+
 }  // namespace
 
 BackgroundSink::BackgroundSink(std::unique_ptr<Sink> inner, std::size_t capacity_bytes)

@@ -35,7 +35,7 @@ struct WriteOptions {
 };
 
 /// Kinds of record.
-enum class Content { events, frames, images, imu, poses, truth, displacement, event_points };
+enum class Content { events, frames, images, imu, poses, truth, displacement, event_points, triggers };
 
 /// What a format is, and what it can hold. One file in `formats/` describes each; `formats/formats.cpp` lists them.
 struct Format {

@@ -119,8 +119,28 @@ struct ImuRecord {
   InertialSignals measured{}, bias{};
 };
 
+enum class TriggerKind : std::uint8_t {
+  timestamp_reset,
+  external_rising,
+  external_falling,
+  external_pulse,
+  generator_rising,
+  generator_falling,
+  frame_start,
+  frame_end,
+  exposure_start,
+  exposure_end
+};
+
+/// A signal that a camera took note of. Frames tell of their exposures themselves.
+struct TriggerRecord {
+  int camera = 0;
+  TimeNs t = 0;
+  TriggerKind kind = TriggerKind::external_rising;
+};
+
 using Record = std::variant<EventsRecord, TruthRecord, DisplacementRecord, EventPointsRecord, ImageRecord, FrameRecord,
-                            PoseRecord, ImuRecord>;
+                            PoseRecord, ImuRecord, TriggerRecord>;
 
 /// Where a simulation goes: one class per format, each taking the kinds of record that it can hold.
 /// Calls come from one thread: begin, then write in time order per camera, then end.

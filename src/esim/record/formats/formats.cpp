@@ -123,6 +123,7 @@ Content content_of(const Record& record) {
     if constexpr (std::is_same_v<Kind, TruthRecord>) return Content::truth;
     if constexpr (std::is_same_v<Kind, DisplacementRecord>) return Content::displacement;
     if constexpr (std::is_same_v<Kind, EventPointsRecord>) return Content::event_points;
+    if constexpr (std::is_same_v<Kind, TriggerRecord>) return Content::triggers;
   };
   return std::visit(kind, record);
 }
@@ -145,6 +146,8 @@ std::string_view describe(Content content) {
       return "displacement";
     case Content::event_points:
       return "points of events";
+    case Content::triggers:
+      return "triggers";
   }
   return "";
 }

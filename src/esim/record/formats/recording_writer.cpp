@@ -115,6 +115,8 @@ std::unique_ptr<Sink> RecordingWriter::make_sink(Content content, const Record& 
       both->add(std::make_unique<StatesCsvWriter>(place));
       return both;
     }
+    case Content::triggers:
+      throw InternalError("recordings have no file of triggers");
     case Content::truth:
     case Content::displacement:
       break;

@@ -10,7 +10,7 @@ namespace {
 
 Format format(aedat4::Packing packing) {
   return {
-      .holds = {Content::events, Content::frames, Content::imu},
+      .holds = {Content::events, Content::frames, Content::imu, Content::triggers},
       .several_cameras = true,
       .resolution = kNsPerUs,
       .max_width = 32768,

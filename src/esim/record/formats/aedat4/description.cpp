@@ -73,6 +73,7 @@ void take(Stream& stream, bool of_info, std::string_view key, std::string_view v
 std::string_view words(std::string_view type) {
   if (type == "EVTS") return "events";
   if (type == "FRME") return "frames";
+  if (type == "TRIG") return "triggers";
   return "imu";
 }
 

@@ -45,7 +45,7 @@ void decode_pixels(const std::uint8_t* bytes, int number_bytes, int channels, st
 /// The streams of one camera; -1: none.
 struct CameraStreams {
   std::string source{};
-  int events = -1, frames = -1;
+  int events = -1, frames = -1, triggers = -1;
 };
 
 class Reader final : public Source {
@@ -63,6 +63,7 @@ class Reader final : public Source {
   void open(const Packet& packet);
   void take_events();
   void take_measurement();
+  void take_trigger();
   void take_frame(const fb::Frame& frame, int camera);
   TimeNs time(std::int64_t us) const;
   [[noreturn]] void fail(std::string_view reason) const { packets_.fail(packet_, reason); }
@@ -77,6 +78,7 @@ class Reader final : public Source {
   int camera_ = 0;
   const flatbuffers::Vector<const fb::Event*>* elements_ = nullptr;
   const flatbuffers::Vector<flatbuffers::Offset<fb::Imu>>* measurements_ = nullptr;
+  const flatbuffers::Vector<flatbuffers::Offset<fb::Trigger>>* triggers_ = nullptr;
   flatbuffers::uoffset_t taken_ = 0;
 
   std::vector<Event> events_;
@@ -135,6 +137,13 @@ void Reader::find_cameras(const std::optional<SensorSize>& sensor) {
     // Frames may be of another size than the events of the same camera.
     if (events || model.width == 0) model.width = size.width, model.height = size.height;
   }
+  for (const Stream& stream : packets_.streams()) {
+    const auto of_stream = [&](const CameraStreams& camera) { return camera.source == stream.source; };
+    const auto camera = std::find_if(cameras_.begin(), cameras_.end(), of_stream);
+    if (stream.type != "TRIG" || camera == cameras_.end() || camera->triggers >= 0) continue;
+    camera->triggers = stream.id;
+    wanted_.push_back(stream.id);
+  }
   if (info_.cameras.empty()) info_.cameras.emplace_back();
 }
 
@@ -170,6 +179,8 @@ bool Reader::read() {
       take_events();
     } else if (measurements_ != nullptr) {
       take_measurement();
+    } else if (triggers_ != nullptr) {
+      take_trigger();
     } else {
       const auto packet = packets_.next(wanted_);
       if (!packet) return false;
@@ -194,6 +205,12 @@ void Reader::open(const Packet& packet) {
       const auto* frame = verified<fb::Frame>(packet.plain, "FRME");
       if (frame == nullptr) fail("the frame is damaged");
       take_frame(*frame, camera_);
+      return;
+    }
+    if (cameras_[i].triggers == packet.stream) {
+      const auto* triggers = verified<fb::TriggerPacket>(packet.plain, "TRIG");
+      if (triggers == nullptr) fail("the packet of triggers is damaged");
+      triggers_ = triggers->elements();
       return;
     }
   }
@@ -236,6 +253,21 @@ void Reader::take_measurement() {
   record.measured.angular_rate =
       Eigen::Vector3d(imu.gyroscope_x(), imu.gyroscope_y(), imu.gyroscope_z()) / kDegreesPerRadian;
   record_.emplace(record);
+}
+
+/// Those of frames are left to the frames, where there are some.
+void Reader::take_trigger() {
+  if (taken_ == triggers_->size()) {
+    triggers_ = nullptr;
+    return;
+  }
+  const fb::Trigger& trigger = *triggers_->Get(taken_++);
+  const auto last = static_cast<std::int8_t>(TriggerKind::exposure_end);
+  if (trigger.kind() < 0 || trigger.kind() > last) fail(fmt::format("a trigger of kind {}", trigger.kind()));
+  const auto kind = static_cast<TriggerKind>(trigger.kind());
+  const bool of_frames = kind >= TriggerKind::frame_start;
+  if (of_frames && cameras_[static_cast<std::size_t>(camera_)].frames >= 0) return;
+  record_.emplace(TriggerRecord{camera_, time(trigger.timestamp()), kind});
 }
 
 void Reader::take_frame(const fb::Frame& frame, int camera) {

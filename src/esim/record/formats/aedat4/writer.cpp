@@ -43,16 +43,19 @@ class Writer final : public Sink {
   void end(bool complete) override;
 
  private:
-  int events_stream(std::size_t camera) const { return static_cast<int>(2 * camera); }
-  int frames_stream(std::size_t camera) const { return static_cast<int>(2 * camera + 1); }
-  int imu_stream() const { return static_cast<int>(2 * events_.size()); }
+  int events_stream(std::size_t camera) const { return static_cast<int>(3 * camera); }
+  int frames_stream(std::size_t camera) const { return static_cast<int>(3 * camera + 1); }
+  int triggers_stream(std::size_t camera) const { return static_cast<int>(3 * camera + 2); }
+  int imu_stream() const { return static_cast<int>(3 * events_.size()); }
 
   std::string header(std::int64_t data_table_position) const;
   void append(std::string_view bytes);
   void take(const EventsRecord& record);
   void take(const FrameRecord& frame);
   void take(const ImuRecord& imu);
+  void take(const TriggerRecord& trigger);
   void flush_events(std::size_t camera);
+  void flush_triggers(std::size_t camera);
   void flush_imu();
   template <typename Table>
   void write_packet(int stream, flatbuffers::Offset<Table> root, const char* identifier, Entry entry);
@@ -66,12 +69,14 @@ class Writer final : public Sink {
   std::string description_;
   std::vector<std::vector<fb::Event>> events_;  // of each camera, not written yet
   std::vector<ImuRecord> imu_;                  // likewise
+  std::vector<std::vector<TriggerRecord>> triggers_;
   std::vector<Entry> table_;
   flatbuffers::FlatBufferBuilder builder_;
 };
 
 void Writer::begin(const RecordingInfo& info) {
   events_.assign(info.cameras.size(), {});
+  triggers_.assign(info.cameras.size(), {});
   std::vector<Stream> streams;
   for (std::size_t i = 0; i < info.cameras.size(); ++i) {
     const CameraInfo& camera = info.cameras[i];
@@ -82,6 +87,7 @@ void Writer::begin(const RecordingInfo& info) {
     }
     streams.push_back({events_stream(i), "EVTS", camera.name, width, height});
     streams.push_back({frames_stream(i), "FRME", camera.name, width, height});
+    streams.push_back({triggers_stream(i), "TRIG", camera.name});
   }
   streams.push_back({imu_stream(), "IMUS", info.cameras.empty() ? "imu" : info.cameras.front().name});
   description_ = describe(streams, name_of(packing_));
@@ -110,6 +116,7 @@ void Writer::write(const Record& record) {
   if (const auto* events = std::get_if<EventsRecord>(&record)) take(*events);
   if (const auto* frame = std::get_if<FrameRecord>(&record)) take(*frame);
   if (const auto* imu = std::get_if<ImuRecord>(&record)) take(*imu);
+  if (const auto* trigger = std::get_if<TriggerRecord>(&record)) take(*trigger);
 }
 
 void Writer::take(const EventsRecord& record) {
@@ -131,6 +138,28 @@ void Writer::flush_events(std::size_t camera) {
                     .end_us = pending.back().timestamp()};
   const auto elements = builder_.CreateVectorOfStructs(pending);
   write_packet(events_stream(camera), fb::CreateEventPacket(builder_, elements), "EVTS", entry);
+  pending.clear();
+}
+
+void Writer::take(const TriggerRecord& trigger) {
+  const auto camera = static_cast<std::size_t>(trigger.camera);
+  triggers_.at(camera).push_back(trigger);
+  if (triggers_[camera].size() == kPacketMeasurements) flush_triggers(camera);
+}
+
+/// In order of time: a frame is known when it ends, and what came meanwhile before it.
+void Writer::flush_triggers(std::size_t camera) {
+  std::vector<TriggerRecord>& pending = triggers_[camera];
+  if (pending.empty()) return;
+  std::ranges::stable_sort(pending, {}, &TriggerRecord::t);
+  std::vector<flatbuffers::Offset<fb::Trigger>> elements;
+  for (const TriggerRecord& trigger : pending)
+    elements.push_back(fb::CreateTrigger(builder_, to_us(trigger.t), static_cast<std::int8_t>(trigger.kind)));
+  const Entry entry{.elements = static_cast<std::int64_t>(pending.size()),
+                    .start_us = to_us(pending.front().t),
+                    .end_us = to_us(pending.back().t)};
+  write_packet(triggers_stream(camera), fb::CreateTriggerPacket(builder_, builder_.CreateVector(elements)), "TRIG",
+               entry);
   pending.clear();
 }
 
@@ -163,6 +192,8 @@ void Writer::take(const FrameRecord& frame) {
   const auto root = builder.Finish();
   write_packet(frames_stream(static_cast<std::size_t>(frame.camera)), root, "FRME",
                {.elements = 1, .start_us = start, .end_us = start});
+  take(TriggerRecord{frame.camera, frame.exposure_start, TriggerKind::exposure_start});
+  take(TriggerRecord{frame.camera, 2 * frame.t - frame.exposure_start, TriggerKind::exposure_end});
 }
 
 void Writer::take(const ImuRecord& imu) {
@@ -211,7 +242,7 @@ void Writer::write_data_table() {
 
 void Writer::end(bool) {
   if (!file_) return;
-  for (std::size_t i = 0; i < events_.size(); ++i) flush_events(i);
+  for (std::size_t i = 0; i < events_.size(); ++i) flush_events(i), flush_triggers(i);
   flush_imu();
   const std::int64_t data_table_position = position_;
   write_data_table();

@@ -38,6 +38,7 @@ class RosSink final : public Sink {
   void put(const ImuRecord& record);
   void put(const DisplacementRecord&) {}
   void put(const EventPointsRecord&) {}
+  void put(const TriggerRecord&) {}
 
   template <typename T>
   void send(std::string_view topic, MessageType type, TimeNs t, const T& message);

@@ -6,8 +6,9 @@
 #include <random>
 
 #include "esim/core/error.h"
+#include "esim/core/npy_header.h"
 #include "esim/record/format.h"
-#include "esim/record/formats/npy_header.h"
+#include "esim/record/input_file.h"
 #include "record/recordings.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
@@ -230,7 +231,8 @@ TEST(NpyHeader, ReadsOtherVersionsAndRefusesDamage) {
   const test::TemporaryDirectory directory;
   const auto read_text = [&](const std::string& prefix, const std::string& text) {
     InputFile file(directory.write("a.npy", "\x93NUMPY" + prefix + text));
-    return npy::read_header("a.npy", [&](std::span<std::byte> out) { return npy::read_some(file, out); });
+    return npy::read_header([&](std::span<std::byte> out) { return file.read_into(out); },
+                            [&](const std::string& problem) { file.fail(0, problem); });
   };
   const std::string dictionary = "{'shape': (3,7), 'fortran_order': False, 'descr': '<f8'}";
   const auto length = static_cast<char>(dictionary.size());

@@ -84,6 +84,12 @@ std::span<const std::byte> InputFile::read(std::size_t most) {
   return bytes;
 }
 
+std::size_t InputFile::read_into(std::span<std::byte> out) {
+  const std::span<const std::byte> bytes = read(out.size());
+  std::copy(bytes.begin(), bytes.end(), out.begin());
+  return bytes.size();
+}
+
 std::span<const std::byte> InputFile::read_exactly(std::size_t count, std::string_view what) {
   const std::uint64_t start = offset_;
   const std::span<const std::byte> bytes = read(count);

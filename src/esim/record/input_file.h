@@ -25,6 +25,9 @@ class InputFile {
   /// The next bytes, at most so many; fewer only where the file ends. Borrowed until the next call.
   std::span<const std::byte> read(std::size_t most);
 
+  /// Fills `out` with the next bytes; how many, fewer only where the file ends.
+  std::size_t read_into(std::span<std::byte> out);
+
   /// Exactly so many; fails where the file ends before, saying that `what` is cut off there.
   std::span<const std::byte> read_exactly(std::size_t count, std::string_view what);
 

@@ -60,8 +60,8 @@ class NpyWriter final : public EventsWriter {
 
 std::unique_ptr<EventsReader> open_npy(const std::filesystem::path& path) {
   const auto file = std::make_shared<InputFile>(path);
-  const auto array = std::make_shared<npy::Array>(
-      path.string(), [file](std::span<std::byte> out) { return npy::read_some(*file, out); });
+  const auto array =
+      std::make_shared<npy::Array>(path.string(), [file](std::span<std::byte> out) { return file->read_into(out); });
   npy::EventColumns columns;
   for (const npy::Field& field : array->fields()) npy::take_column(field.name, {array, field}, columns);
   return npy::make_columns_reader(path.string(), std::move(columns));

@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
+#include "esim/core/npy_header.h"
 #include "esim/core/time.h"
 #include "esim/record/events_reader.h"
-#include "esim/record/formats/npy_header.h"
 
 /// Arrays of numbers and of records of numbers, with one dimension or none.
 namespace esim::npy {

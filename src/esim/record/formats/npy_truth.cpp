@@ -8,8 +8,9 @@
 #include <limits>
 
 #include "esim/core/error.h"
+#include "esim/core/npy_header.h"
 #include "esim/record/formats/image_sequences.h"
-#include "esim/record/formats/npy_header.h"
+#include "esim/record/input_file.h"
 #include "esim/record/number_text.h"
 #include "esim/record/output_file.h"
 #include "esim/record/record_stream.h"
@@ -65,8 +66,8 @@ template <typename T>
 class NpyReader {
  public:
   NpyReader(const fs::path& path, std::size_t item_rank) : file_(path) {
-    const npy::Header header =
-        npy::read_header(file_.path().string(), [&](std::span<std::byte> out) { return npy::read_some(file_, out); });
+    const npy::Header header = npy::read_header([&](std::span<std::byte> out) { return file_.read_into(out); },
+                                                [&](const std::string& problem) { file_.fail(0, problem); });
     if (header.fortran_order) file_.fail(0, "it is not in C order");
     if (header.descr.text != kType<T>)
       file_.fail(0, fmt::format("its type is {}, not {}", header.descr.text, kType<T>));

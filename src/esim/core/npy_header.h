@@ -9,8 +9,6 @@
 #include <string_view>
 #include <vector>
 
-#include "esim/record/input_file.h"
-
 /// The head of NumPy's files (https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html).
 namespace esim::npy {
 
@@ -36,15 +34,13 @@ struct Header {
   std::vector<std::uint64_t> shape{};
 };
 
-/// Fills as much as there is; returns how many bytes, fewer only at the end. Throws UserError where they cannot be
-/// read.
+/// Fills as much as there is; returns how many bytes, fewer only at the end.
 using Read = std::function<std::size_t(std::span<std::byte>)>;
 
-/// Is a Read of a file.
-std::size_t read_some(InputFile& file, std::span<std::byte> out);
+/// Throws what the caller throws: it is told what is wrong with the file, "it ends within its header".
+using Fail = std::function<void(const std::string& problem)>;
 
-/// Reads the header, of versions 1 to 3, up to the first number. Throws UserError in the name of the file where it is
-/// none.
-Header read_header(std::string_view name, const Read& read);
+/// Reads the header, of versions 1 to 3, up to the first number.
+Header read_header(const Read& read, const Fail& fail);
 
 }  // namespace esim::npy

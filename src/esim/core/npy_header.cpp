@@ -1,12 +1,8 @@
-#include "esim/record/formats/npy_header.h"
-
-#include <fmt/format.h>
+#include "esim/core/npy_header.h"
 
 #include <algorithm>
+#include <charconv>
 #include <utility>
-
-#include "esim/core/error.h"
-#include "esim/record/number_text.h"
 
 namespace esim::npy {
 namespace {
@@ -58,7 +54,7 @@ std::string header_text(std::string_view descr, std::span<const std::uint64_t> s
   const auto length = static_cast<std::uint16_t>(kHeaderBytes - kMagic.size() - 4);
   std::string text(kMagic);
   text += {'\1', '\0', static_cast<char>(length & 0xFF), static_cast<char>(length >> 8)};
-  text += fmt::format("{{'descr': {}, 'fortran_order': False, 'shape': (", descr);
+  text += "{'descr': " + std::string(descr) + ", 'fortran_order': False, 'shape': (";
   for (std::size_t i = 0; i < shape.size(); ++i) text += (i > 0 ? ", " : "") + std::to_string(shape[i]);
   text += shape.size() == 1 ? ",), }" : "), }";
   text.resize(kHeaderBytes - 1, ' ');
@@ -69,19 +65,14 @@ std::optional<std::vector<std::uint64_t>> shape_of(const Literal& literal) {
   if (!literal.sequence) return std::nullopt;
   std::vector<std::uint64_t> shape;
   for (const Literal& item : literal.items) {
-    if (!parse_number(item.text, shape.emplace_back())) return std::nullopt;
+    const char* const end = item.text.data() + item.text.size();
+    const auto [stop, error] = std::from_chars(item.text.data(), end, shape.emplace_back());
+    if (error != std::errc() || stop != end) return std::nullopt;
   }
   return shape;
 }
 
-std::size_t read_some(InputFile& file, std::span<std::byte> out) {
-  const std::span<const std::byte> bytes = file.read(out.size());
-  std::copy(bytes.begin(), bytes.end(), out.begin());
-  return bytes.size();
-}
-
-Header read_header(std::string_view name, const Read& read) {
-  const auto fail = [&](const std::string& what) { throw UserError(fmt::format("cannot read {}: {}", name, what)); };
+Header read_header(const Read& read, const Fail& fail) {
   const auto take = [&](std::size_t bytes) {
     std::string text(bytes, '\0');
     if (read(std::as_writable_bytes(std::span(text))) < bytes) fail("it ends within its header");
@@ -92,7 +83,7 @@ Header read_header(std::string_view name, const Read& read) {
   const std::string digits = take(first_version ? 2 : 4);
   std::size_t length = 0;
   for (std::size_t i = 0; i < digits.size(); ++i) length |= std::size_t{static_cast<unsigned char>(digits[i])} << 8 * i;
-  if (length > kMaxHeaderBytes) fail(fmt::format("its header of {} bytes is too long", length));
+  if (length > kMaxHeaderBytes) fail("its header of " + std::to_string(length) + " bytes is too long");
 
   const std::string description = take(length);
   std::string_view rest = description;
@@ -108,7 +99,8 @@ Header read_header(std::string_view name, const Read& read) {
     if (key == "fortran_order") header.fortran_order = value.text != "False", ordered = true;
     if (key == "descr") header.descr = std::move(value), typed = true;
   }
-  if (!typed || !ordered || !shape) fail("its header is damaged");
+  if (!typed || !ordered) fail("its header is damaged");
+  if (!shape) fail("its shape is none");
   header.shape = std::move(*shape);
   return header;
 }

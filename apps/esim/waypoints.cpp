@@ -1,23 +1,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <chrono>
-#include <cmath>
 #include <filesystem>
-#include <numbers>
 
 #include "commands.h"
-#include "esim/compose/waypoints.h"
 #include "esim/core/error.h"
-#include "esim/record/output_file.h"
-#include "esim/record/preview/canvas.h"
 #include "esim/scenario/read.h"
-#include "esim/scenario/waypoint_file.h"
-#include "esim/walk/walker.h"
-#include "scene_view.h"
 #include "support.h"
 #include "terminal.h"
+#include "walk.h"
 
 namespace esim::app {
 namespace {
@@ -25,7 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 using Effect = Walker::Effect;
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr int kLinesBelow = 2;
 constexpr int kWait_ms = 200;   // after which the terminal's size is looked at
 constexpr int kEscape_ms = 40;  // after which an escape character is no part of a longer key
@@ -36,7 +27,7 @@ struct Arguments {
   std::vector<std::string> overrides;
   std::optional<std::string> keys;
   std::vector<double> start;
-  double speed = 1.0;
+  double speed_m_per_s = 1.0;
   int threads = 0;
   bool append = false, force = false;
 };
@@ -57,167 +48,6 @@ Scenario read_input(const Arguments& arguments) {
   std::get<MeshRendererOptions>(scenario.renderer).scene = fs::absolute(arguments.input);
   return scenario;
 }
-
-/// The points of a walk and the file that holds them, which is written with every change.
-class WalkFile {
- public:
-  WalkFile(const fs::path& path, bool append, bool force) : path_(path) {
-    std::error_code error;
-    const fs::path folder = fs::absolute(path).parent_path();
-    if (!fs::is_directory(folder, error))
-      throw UserError(fmt::format("--out {}: there is no folder {}; make it", path.string(), folder.string()));
-    if (!fs::exists(path, error) || (force && !append)) return;
-    if (!append) {
-      throw UserError(
-          fmt::format("--out {}: exists; go on where it ends with --append, replace it with --force, or "
-                      "name another file",
-                      path.string()));
-    }
-    points_ = read_waypoints(path);
-    for (const WaypointPointOptions& point : points_) {
-      if (!point.t) continue;
-      throw UserError(fmt::format("--out {}: its points have times, which those of a walk have not; name another file",
-                                  path.string()));
-    }
-  }
-
-  void add(const SE3& T_world_body) {
-    static_cast<PoseOptions&>(points_.emplace_back()) = options_of(T_world_body);
-    write();
-  }
-
-  void remove_last() {
-    points_.pop_back();
-    write();
-  }
-
-  const fs::path& path() const { return path_; }
-  const std::vector<WaypointPointOptions>& points() const { return points_; }
-
- private:
-  void write() const {
-    write_file_atomically(path_, "# Poses of the body: trajectory: {type: waypoints, file: " +
-                                     path_.filename().string() + "}\n" + write_waypoints(points_));
-  }
-
-  fs::path path_;
-  std::vector<WaypointPointOptions> points_;
-};
-
-/// A text as YAML, in quotes where it might be read as anything else.
-std::string in_quotes(const std::string& text) {
-  const bool plain = std::all_of(text.begin(), text.end(), [](unsigned char c) {
-    return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.' || c == '/';
-  });
-  if (plain) return text;
-  std::string quoted = "'";
-  for (const char c : text) quoted += c == '\'' ? "''" : std::string(1, c);
-  return quoted + "'";
-}
-
-/// The walk from its first key to its last.
-class Walk {
- public:
-  Walk(const Arguments& arguments, const Scenario& scenario, WalkFile file, const Notices& notices)
-      : file_(std::move(file)),
-        view_(scenario, arguments.threads, notices),
-        walker_(start_of(arguments), arguments.speed) {
-    for (const Waypoint& point : waypoints_of(file_.points(), view_.T_body_camera()))
-      walker_.add_point(point.T_world_body * view_.T_body_camera());
-  }
-
-  Effect press(Key key) {
-    const Effect effect = walker_.press(key);
-    switch (effect) {
-      case Effect::dropped:
-        file_.add(walker_.points().back() * view_.T_body_camera().inverse());
-        message_ = fmt::format("way point {} is in {}", file_.points().size(), file_.path().string());
-        break;
-      case Effect::removed:
-        file_.remove_last();
-        message_ = fmt::format("removed; {} left", file_.points().size());
-        break;
-      case Effect::stands_there:
-        message_ = "the last way point is here; move on first";
-        break;
-      case Effect::nothing:
-        message_ = "there is no way point yet";
-        break;
-      case Effect::preview:
-        write_picture();
-        break;
-      default:
-        message_.clear();
-    }
-    return effect;
-  }
-
-  SE3 T_world_camera() const { return walker_.T_world_camera(); }
-  Image<Rgb> look(const SE3& T_world_camera, int width, int height) {
-    return view_.look(T_world_camera, width, height);
-  }
-  const std::string& message() const { return message_; }
-  void say(const std::string& message) { message_ = message; }
-
-  std::string status() const {
-    const Eigen::Vector3d p = T_world_camera().translation;
-    return fmt::format("{:.2f} {:.2f} {:.2f} m  heading {:.0f}, up {:.0f} deg  {:.3g} m/s  {} way point{}", p.x(),
-                       p.y(), p.z(), walker_.yaw_rad() / kDegree, walker_.pitch_rad() / kDegree,
-                       walker_.speed_m_per_s(), file_.points().size(), file_.points().size() == 1 ? "" : "s");
-  }
-
-  /// The motion through the points so far.
-  WaypointTrajectory motion() const {
-    WaypointTrajectoryOptions options;
-    options.points = file_.points();
-    options.points_file = file_.path();
-    return waypoint_trajectory(options, view_.T_body_camera(), "");
-  }
-
-  SE3 T_world_camera(const WaypointTrajectory& motion, TimeNs t) const {
-    return motion.at(t).T_world_body * view_.T_body_camera();
-  }
-
-  /// What to do with the file.
-  void print_summary(const fs::path& scenario) const {
-    const std::size_t count = file_.points().size();
-    if (count == 0) return;
-    fmt::print(stderr, "{}: {} way point{}\n", file_.path().string(), count, count == 1 ? "" : "s");
-    if (count < 2) {
-      fmt::print(stderr, "a motion needs two; go on with --append\n");
-      return;
-    }
-    const WaypointTrajectory whole = motion();
-    const fs::path folder = fs::absolute(scenario).parent_path();
-    fmt::print(stderr, "in the scenario:\n");
-    fmt::print("trajectory: {{type: waypoints, file: {}}}\nduration_s: {:.3f}\n",
-               in_quotes(fs::absolute(file_.path()).lexically_proximate(folder).generic_string()),
-               std::floor(to_seconds(whole.end()) * 1e3) / 1e3);
-  }
-
- private:
-  SE3 start_of(const Arguments& arguments) const {
-    if (!arguments.start.empty())
-      return {view_.start().rotation, {arguments.start[0], arguments.start[1], arguments.start[2]}};
-    if (file_.points().empty()) return view_.start();
-    return waypoints_of(file_.points(), view_.T_body_camera()).back().T_world_body * view_.T_body_camera();
-  }
-
-  /// Beside the way points, under a name of its own.
-  void write_picture() {
-    fs::path path;
-    std::error_code error;
-    for (int i = 1; path.empty() || fs::exists(path, error); ++i)
-      path = fs::path(file_.path()).replace_extension(fmt::format(".{}.png", i));
-    write_file_atomically(path, encode_png(view_.picture(T_world_camera())));
-    message_ = fmt::format("picture: {}", path.string());
-  }
-
-  WalkFile file_;
-  SceneView view_;
-  Walker walker_;
-  std::string message_;
-};
 
 /// Keys from a text, without a terminal.
 void walk_by_keys(Walk& walk, const std::vector<Key>& keys) {
@@ -343,7 +173,10 @@ int run(const Arguments& arguments) {
   const Scenario scenario = read_input(arguments);
   catch_interrupts();
   std::vector<std::string> given;
-  Walk walk(arguments, scenario, std::move(file), print_and_keep(given, true));
+  SceneView view(scenario, arguments.threads, print_and_keep(given, true));
+  std::optional<Eigen::Vector3d> start;
+  if (!arguments.start.empty()) start = Eigen::Vector3d::Map(arguments.start.data());
+  Walk walk(std::move(file), view, start, arguments.speed_m_per_s);
   if (keys) {
     walk_by_keys(walk, *keys);
   } else {
@@ -370,7 +203,7 @@ void add_waypoints(CLI::App& app, int& exit_code) {
       ->type_name("X Y Z")
       ->expected(3)
       ->check(CLI::Range(-1e6, 1e6));
-  command->add_option("--speed", arguments->speed, "Of walking, m/s: a key is a step of 0.1 s")
+  command->add_option("--speed", arguments->speed_m_per_s, "Of walking, m/s: a key is a step of 0.1 s")
       ->capture_default_str()
       ->type_name("V")
       ->check(CLI::Range(0.01, 100.0));

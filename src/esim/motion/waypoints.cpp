@@ -2,26 +2,21 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/SparseCore>
-#include <Eigen/SparseLU>
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "esim/core/error.h"
-#include "esim/geometry/so3.h"
+#include "esim/motion/waypoint_path.h"
 
 namespace esim {
 
 namespace {
 
-using Rate = Eigen::Matrix<double, 6, 1>;  // velocity and angular velocity in the world frame
-
 constexpr double kSamePlace_m = 1e-6;
 constexpr double kSameRotation_rad = 1e-9;
 constexpr double kShortestLeg_s = 1e-6;
 constexpr double kMostTime_s = 1e8;
-constexpr double kLargestRateInMeans = 2.0;  // more would lead past the point and back
 constexpr double kLargestRampOfLeg = 1.0 / 3.0;
 
 [[noreturn]] void fail(std::size_t point, const std::string& message) {
@@ -78,45 +73,8 @@ void validate(std::span<const Waypoint> points, const WaypointOptions& options) 
   }
 }
 
-/// What the path is made of: the poses that it joins, and where the body stops.
-struct Course {
-  std::vector<SE3> nodes;   // the points; of a closed motion the first one again
-  std::vector<bool> stops;  // one per node
-  bool periodic = false;    // goes on smoothly from the last node to the first
-  std::vector<double> leg_s;
-
-  std::size_t legs() const { return nodes.size() - 1; }
-
-  Eigen::Vector3d displacement(std::size_t leg) const { return nodes[leg + 1].translation - nodes[leg].translation; }
-
-  /// In the world frame.
-  Eigen::Vector3d turn(std::size_t leg) const {
-    const Eigen::Quaterniond& from = nodes[leg].rotation;
-    return from * so3_log((from.conjugate() * nodes[leg + 1].rotation).normalized());
-  }
-
-  bool on_the_spot(std::size_t leg) const { return displacement(leg).norm() < kSamePlace_m; }
-
-  Rate mean_rate(std::size_t leg) const {
-    Rate rate;
-    rate.head<3>() = displacement(leg) / leg_s[leg];
-    rate.tail<3>() = turn(leg) / leg_s[leg];
-    return rate;
-  }
-
-  /// The leg that one goes on from smoothly, if any.
-  std::optional<std::size_t> joined_before(std::size_t leg) const {
-    if (stops[leg] || (leg == 0 && !periodic)) return std::nullopt;
-    return leg == 0 ? legs() - 1 : leg - 1;
-  }
-  std::optional<std::size_t> joined_after(std::size_t leg) const {
-    if (leg + 1 < legs()) return stops[leg + 1] ? std::nullopt : std::optional(leg + 1);
-    return periodic ? std::optional(std::size_t{0}) : std::nullopt;
-  }
-};
-
-Course course_of(std::span<const Waypoint> points, const WaypointOptions& options) {
-  Course course;
+WaypointCourse course_of(std::span<const Waypoint> points, const WaypointOptions& options) {
+  WaypointCourse course;
   for (const Waypoint& point : points) {
     course.nodes.push_back({point.T_world_body.rotation.normalized(), point.T_world_body.translation});
     course.stops.push_back(point.pause_s > 0.0);
@@ -127,7 +85,7 @@ Course course_of(std::span<const Waypoint> points, const WaypointOptions& option
   }
   if (options.rest) course.stops.front() = course.stops.back() = true;
   for (std::size_t i = 0; i < course.legs(); ++i) {
-    if (course.on_the_spot(i)) course.stops[i] = course.stops[i + 1] = true;
+    if (course.displacement(i).norm() < kSamePlace_m) course.stops[i] = course.stops[i + 1] = true;
   }
   if (options.closed) {
     const bool stop = course.stops.front() || course.stops.back();
@@ -135,105 +93,6 @@ Course course_of(std::span<const Waypoint> points, const WaypointOptions& option
     course.periodic = !stop;
   }
   return course;
-}
-
-/// Velocities and accelerations at the two ends of a leg, in the world frame.
-struct LegEnds {
-  Rate rate[2], acceleration[2];
-};
-
-/// Rate and acceleration at the end of a leg that is not joined there, by those of its other end.
-void free_end(const Rate& mean, LegEnds& leg, int end, int part) {
-  leg.rate[end].segment<3>(part) = 1.5 * mean.segment<3>(part) - 0.5 * leg.rate[1 - end].segment<3>(part);
-  leg.acceleration[end].segment<3>(part).setZero();
-}
-
-/// The interpolating cubic spline: on a leg of duration h and mean rate d with rates v and w at its ends, the
-/// acceleration is 6 d/h − (4 v + 2 w)/h at its start and −6 d/h + (2 v + 4 w)/h at its end. Rates and accelerations
-/// are continuous where legs are joined; accelerations vanish elsewhere.
-std::vector<LegEnds> spline_ends(const Course& course) {
-  const auto legs = static_cast<Eigen::Index>(course.legs());
-  std::vector<Eigen::Triplet<double>> entries;
-  Eigen::Matrix<double, Eigen::Dynamic, 6> right = Eigen::Matrix<double, Eigen::Dynamic, 6>::Zero(2 * legs, 6);
-  std::vector<Rate> mean;
-  for (std::size_t i = 0; i < course.legs(); ++i) mean.push_back(course.mean_rate(i));
-
-  for (std::size_t i = 0; i < course.legs(); ++i) {
-    const int start = static_cast<int>(2 * i), end = start + 1;  // unknowns; each end of a leg has an equation
-    const double h = course.leg_s[i];
-    entries.emplace_back(start, start, 4.0);
-    entries.emplace_back(start, end, 2.0);
-    right.row(start) = 6.0 * mean[i].transpose();
-    if (const auto before = course.joined_before(i)) {
-      const int k = static_cast<int>(2 * *before);
-      const double ratio = h / course.leg_s[*before];
-      entries.emplace_back(start, k, 2.0 * ratio);
-      entries.emplace_back(start, k + 1, 4.0 * ratio);
-      right.row(start) += 6.0 * ratio * mean[*before].transpose();
-    }
-    if (const auto after = course.joined_after(i)) {
-      entries.emplace_back(end, end, 1.0);
-      entries.emplace_back(end, static_cast<int>(2 * *after), -1.0);
-    } else {
-      entries.emplace_back(end, start, 2.0);
-      entries.emplace_back(end, end, 4.0);
-      right.row(end) = 6.0 * mean[i].transpose();
-    }
-  }
-  Eigen::SparseMatrix<double> matrix(2 * legs, 2 * legs);
-  matrix.setFromTriplets(entries.begin(), entries.end());
-  const Eigen::SparseLU<Eigen::SparseMatrix<double>> factor(matrix);
-  if (factor.info() != Eigen::Success) throw InternalError("waypoints: the spline's equations have no solution");
-  const Eigen::Matrix<double, Eigen::Dynamic, 6> rates = factor.solve(right);
-
-  std::vector<LegEnds> ends(course.legs());
-  for (std::size_t i = 0; i < ends.size(); ++i) {
-    const Rate v = rates.row(static_cast<Eigen::Index>(2 * i)), w = rates.row(static_cast<Eigen::Index>(2 * i + 1));
-    const double h = course.leg_s[i];
-    ends[i].rate[0] = v;
-    ends[i].rate[1] = w;
-    ends[i].acceleration[0] = (6.0 * mean[i] - 4.0 * v - 2.0 * w) / h;
-    ends[i].acceleration[1] = (-6.0 * mean[i] + 2.0 * v + 4.0 * w) / h;
-  }
-
-  // Where two legs are joined: no more than the slower one stands, of positions and of rotations. Both get the very
-  // same values. What a leg has that is joined at one end only follows from there.
-  for (std::size_t i = 0; i < ends.size(); ++i) {
-    const auto before = course.joined_before(i);
-    if (!before) continue;
-    for (const int part : {0, 3}) {
-      auto rate = ends[i].rate[0].segment<3>(part);
-      const double largest =
-          kLargestRateInMeans * std::min(mean[i].segment<3>(part).norm(), mean[*before].segment<3>(part).norm());
-      const double norm = rate.norm();
-      if (norm < largest) continue;
-      rate *= norm > 0.0 ? largest / norm : 0.0;
-      ends[i].acceleration[0].segment<3>(part).setZero();
-      if (!course.joined_after(i)) free_end(mean[i], ends[i], 1, part);
-      if (!course.joined_before(*before)) {
-        ends[*before].rate[1].segment<3>(part) = rate;
-        free_end(mean[*before], ends[*before], 0, part);
-      }
-    }
-    ends[*before].rate[1] = ends[i].rate[0];
-    ends[*before].acceleration[1] = ends[i].acceleration[0];
-  }
-  return ends;
-}
-
-SplineValue state(const SE3& pose, const Rate& rate, const Rate& acceleration) {
-  const Eigen::Quaterniond to_body = pose.rotation.conjugate();
-  return {pose, rate.head<3>(), acceleration.head<3>(), to_body * rate.tail<3>(), to_body * acceleration.tail<3>()};
-}
-
-std::vector<QuinticBezier> path_of(const Course& course) {
-  const std::vector<LegEnds> ends = spline_ends(course);
-  std::vector<QuinticBezier> path;
-  for (std::size_t i = 0; i < ends.size(); ++i) {
-    path.emplace_back(state(course.nodes[i], ends[i].rate[0], ends[i].acceleration[0]),
-                      state(course.nodes[i + 1], ends[i].rate[1], ends[i].acceleration[1]), course.leg_s[i]);
-  }
-  return path;
 }
 
 /// Length and angle along a curve.
@@ -253,7 +112,7 @@ Extent extent_of(const QuinticBezier& curve) {
 
 /// How long each leg takes without standing still at its ends: first along its chord, then along the curve that this
 /// makes.
-void set_leg_times_by_speed(std::span<const Waypoint> points, const WaypointOptions& options, Course& course) {
+void set_leg_times_by_speed(std::span<const Waypoint> points, const WaypointOptions& options, WaypointCourse& course) {
   constexpr int kRounds = 6;
   const auto time_of = [&](std::size_t leg, const Extent& extent) {
     return std::max(extent.length_m / points[leg].speed_m_per_s.value_or(options.speed_m_per_s),
@@ -275,7 +134,7 @@ void set_leg_times_by_speed(std::span<const Waypoint> points, const WaypointOpti
       fail(i, fmt::format("is left so slowly that the motion takes more than {:g} s; raise speed", kMostTime_s));
   }
   for (int round = 0; round < kRounds; ++round) {
-    const std::vector<QuinticBezier> path = path_of(course);
+    const std::vector<QuinticBezier> path = smooth_path(course);
     for (std::size_t i = 0; i < path.size(); ++i) course.leg_s[i] = time_of(i, extent_of(path[i]));
   }
 }
@@ -306,7 +165,7 @@ Clock clock(double t_s, double leg_s, double ramp_in_s, double ramp_out_s) {
 WaypointTrajectory::WaypointTrajectory(std::span<const Waypoint> points, const WaypointOptions& options) {
   validate(options);
   validate(points, options);
-  Course course = course_of(points, options);
+  WaypointCourse course = course_of(points, options);
   const bool timed = points[0].t_s.has_value();
   if (!timed) set_leg_times_by_speed(points, options, course);
 
@@ -335,7 +194,7 @@ WaypointTrajectory::WaypointTrajectory(std::span<const Waypoint> points, const W
   // A closed motion has stood at its first point already.
   end_ = arrived + (options.closed ? 0 : to_ns(points.back().pause_s));
 
-  const std::vector<QuinticBezier> path = path_of(course);
+  const std::vector<QuinticBezier> path = smooth_path(course);
   for (std::size_t i = 0; i < path.size(); ++i) {
     legs_.push_back({schedule[i].leave, schedule[i].arrive, schedule[i].ramp_in_s, schedule[i].ramp_out_s, path[i]});
   }

@@ -27,12 +27,10 @@ struct WaypointOptions {
 
 /// A smooth motion through poses, with twist and acceleration continuous throughout.
 ///
-/// Between two stops the path is the C² cubic spline that interpolates the points, of positions and, by the same
-/// equations for world-frame rates, of rotations; each leg is kept as a QuinticBezier. Where a leg is so much slower
-/// than its neighbour that the spline would overshoot (rate at the point above twice a leg's mean), the rate is
-/// lowered to that and its derivative set to zero; so what does not change along a leg stands still there. The body
-/// stops at the ends (`rest`), where it pauses, and before and after turning on the spot; a path may have a corner at a
-/// stop. There the path's parameter τ follows a clock with τ̇ = 3 x² − 2 x³, x = t/ramp, from 0 to 1.
+/// Between two stops the path is an interpolating spline (waypoint_path.h); what does not change from one point to the
+/// next stands still there. The body stops at the ends (`rest`), where it pauses, and before and after turning on the
+/// spot; a path may have a corner at a stop. There the path's parameter τ follows a clock with τ̇ = 3 x² − 2 x³,
+/// x = t/ramp, from 0 to 1.
 ///
 /// With times, each point is reached exactly when it says, and left after its pause; a ramp takes at most a third of
 /// its leg. With speeds, a leg lasts length/speed or angle/turn rate, whichever is longer, measured along the curve,

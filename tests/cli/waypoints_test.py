@@ -71,15 +71,19 @@ class Waypoints(ProgramTest):
         super().setUp()
         (self.folder / "scenes").symlink_to(SCENES)
         self.scenario = self.folder / "s.yaml"
-        self.scenario.write_text("renderer: {type: mesh, scene: scenes/room/room.obj}\n"
-                                 "trajectory: {type: static, pose: {position: [1, -1, 1.4], look_at: [-1, 1, 1]}}\n"
-                                 "camera: {width: 64, height: 48}\nduration_s: 1\noutput: {preview: false}\n")
+        self.write_scenario("{type: plane, image: scenes/poster/poster.jpg, width_m: 1.2, pose: {position: [2, 0, 0], look_at: [3, 0, 0]}}",
+                            "{position: [0, 0.1, 0]}")
         self.walk = self.folder / "walk.yaml"
+
+    def write_scenario(self, renderer, pose):
+        self.scenario.write_text(f"renderer: {renderer}\ntrajectory: {{type: static, pose: {pose}}}\n"
+                                 "camera: {width: 64, height: 48}\nduration_s: 1\noutput: {preview: false}\n")
 
     def points(self):
         return self.walk.read_text().count("position:")
 
     def test_in_a_terminal(self):
+        self.write_scenario("{type: mesh, scene: scenes/room/room.obj}", "{position: [1, -1, 1.4], look_at: [-1, 1, 1]}")
         session = Session(self.scenario, "--out", self.walk)
         first = session.wait_for(rb"1\.00 -1\.00 1\.40 m .* 0 way points")
         self.assertIn("\u2580".encode(), first)
@@ -191,7 +195,7 @@ class Waypoints(ProgramTest):
         self.assertIn("position: [0, 0, 1.5]", self.walk.read_text())
         self.scenario.write_text(self.scenario.read_text().replace("{type: static", "{type: waypoints, file: new.yaml} #"))
         new = self.folder / "new.yaml"
-        self.assertEqual(run("waypoints", self.scenario, "--out", new, "--start", "0", "0", "1", "--keys", " w ").returncode, 0)
+        self.assertEqual(run("waypoints", self.scenario, "--out", new, "--start", "0", "0", "0.1", "--keys", " w ").returncode, 0)
         result = run("check", self.scenario, "--set", "duration_s=0.1")
         self.assertEqual(result.returncode, 0, result.stderr)
         for name in ("poster", "panorama"):

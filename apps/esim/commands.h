@@ -16,6 +16,7 @@ void add_import(CLI::App& app, int& exit_code);
 void add_info(CLI::App& app, int& exit_code);
 void add_play(CLI::App& app, int& exit_code);
 void add_stats(CLI::App& app, int& exit_code);
+void add_waypoints(CLI::App& app, int& exit_code);
 void add_evaluate(CLI::App& app, int& exit_code);
 void add_options(CLI::App& app, int& exit_code);
 

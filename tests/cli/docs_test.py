@@ -76,6 +76,9 @@ class Pages(ProgramTest):
     def test_migrating(self):
         self.run_page("docs/migrating.md")
 
+    def test_waypoints(self):
+        self.run_page("docs/waypoints.md")
+
 
 class Options(unittest.TestCase):
     def test_every_option_that_migrating_names_exists(self):

@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "esim/compose/compose.h"
+#include "esim/compose/waypoints.h"
 #include "esim/core/error.h"
 #include "esim/motion/fit.h"
 #include "esim/motion/random.h"
@@ -25,6 +26,7 @@ struct Mover {
   const SceneFile* scene = nullptr;  ///< whose cameras it may follow
   double time_scale = 1;             ///< of that file's animation
   bool has_duration = false;         ///< whether the scenario gives one
+  SE3 T_body_camera;                 ///< of the camera that way points aim
 };
 
 std::shared_ptr<const Trajectory> fit(const std::vector<TimedPose>& poses, const FitOptions& options,
@@ -121,6 +123,15 @@ std::shared_ptr<const Trajectory> build(const SceneTrajectoryOptions& options, c
                                                   span.end - span.start);
 }
 
+std::shared_ptr<const Trajectory> build(const WaypointTrajectoryOptions& options, const Mover& mover,
+                                        const Notices& notices) {
+  auto trajectory =
+      std::make_shared<const WaypointTrajectory>(waypoint_trajectory(options, mover.T_body_camera, mover.key));
+  notices.note(fmt::format("{}: {} way points in {:.3f} s", mover.key, options.points.size(),
+                           to_seconds(trajectory->end() - trajectory->start())));
+  return trajectory;
+}
+
 std::shared_ptr<const Trajectory> build(const TrajectoryOptions& options, const Mover& mover, const Notices& notices) {
   return std::visit([&](const auto& alternative) { return build(alternative, mover, notices); }, options);
 }
@@ -171,6 +182,10 @@ std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, con
   if (const auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer))
     mover.time_scale = mesh->time_scale;
   mover.has_duration = scenario.duration_s.has_value();
+  if (!scenario.cameras.empty()) {
+    const CameraOptions& camera = scenario.cameras.front();
+    mover.T_body_camera = pose_named(fmt::format("camera {}: T_body_camera", camera.name), camera.T_body_camera);
+  }
   return build(scenario.trajectory, mover, notices);
 }
 

@@ -25,8 +25,8 @@ TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory) 
   const TimeNs end = start + to_ns(*scenario.duration_s);
   if (end > trajectory.end()) {
     throw UserError(
-        fmt::format("duration_s: {} s is longer than the trajectory, which has {:.9g} s left; shorten it, or stretch "
-                    "the trajectory with trajectory.time_scale",
+        fmt::format("duration_s: {} s is longer than the trajectory, which has {:.9g} s left; shorten it, or make the "
+                    "trajectory longer (that of a file with trajectory.time_scale)",
                     *scenario.duration_s, available_s));
   }
   return {start, end};
@@ -88,14 +88,6 @@ FrameCamera build_frame_camera(const CameraOptions& options, const Camera& model
     return camera;
   } catch (const UserError& error) {
     throw UserError(fmt::format("camera {}: {}", options.name, error.what()));
-  }
-}
-
-SE3 pose_named(const std::string& key, const PoseOptions& options) {
-  try {
-    return pose_of(options);
-  } catch (const UserError& error) {
-    throw UserError(fmt::format("{}: {}", key, error.what()));
   }
 }
 

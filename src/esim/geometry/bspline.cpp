@@ -32,6 +32,23 @@ double blending_coefficient(int order, int s, int n) {
 
 }  // namespace
 
+RotationValue cumulative_rotation(const Eigen::Quaterniond& first, std::span<const Eigen::Vector3d> increments,
+                                  const BasisWeights& lambda) {
+  RotationValue result{first, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  for (std::size_t j = 1; j <= increments.size(); ++j) {
+    const Eigen::Vector3d& increment = increments[j - 1];
+    const Eigen::Quaterniond factor = so3_exp(lambda.value[j] * increment);
+    const Eigen::Quaterniond back = factor.conjugate();
+    result.rotation = result.rotation * factor;
+    result.angular_velocity = back * result.angular_velocity + lambda.first_derivative[j] * increment;
+    result.angular_acceleration = back * result.angular_acceleration +
+                                  lambda.first_derivative[j] * result.angular_velocity.cross(increment) +
+                                  lambda.second_derivative[j] * increment;
+  }
+  result.rotation.normalize();
+  return result;
+}
+
 UniformBasis::UniformBasis(int order, double start_s, double knot_interval_s, int control_points)
     : order_(order), start_s_(start_s), knot_interval_s_(knot_interval_s), control_points_(control_points) {
   if (order < kMinSplineOrder || order > kMaxSplineOrder) {
@@ -105,19 +122,8 @@ So3Spline::So3Spline(const UniformBasis& basis, std::vector<Eigen::Quaterniond> 
 
 RotationValue So3Spline::at(double t_s) const {
   const BasisWeights lambda = basis_.cumulative_weights(t_s);
-  RotationValue result{rotations_[lambda.first], Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
-  for (int j = 1; j < basis_.order(); ++j) {
-    const Eigen::Vector3d& increment = increments_[lambda.first + j - 1];
-    const Eigen::Quaterniond factor = so3_exp(lambda.value[j] * increment);
-    const Eigen::Quaterniond back = factor.conjugate();
-    result.rotation = result.rotation * factor;
-    result.angular_velocity = back * result.angular_velocity + lambda.first_derivative[j] * increment;
-    result.angular_acceleration = back * result.angular_acceleration +
-                                  lambda.first_derivative[j] * result.angular_velocity.cross(increment) +
-                                  lambda.second_derivative[j] * increment;
-  }
-  result.rotation.normalize();
-  return result;
+  const auto first = static_cast<std::size_t>(lambda.first), count = static_cast<std::size_t>(basis_.order() - 1);
+  return cumulative_rotation(rotations_[first], std::span(increments_).subspan(first, count), lambda);
 }
 
 RotationSensitivity So3Spline::sensitivity(double t_s) const {

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <array>
+#include <span>
 #include <vector>
 
 #include "esim/geometry/se3.h"
@@ -70,6 +71,11 @@ struct RotationValue {
   Eigen::Vector3d angular_acceleration;  // rad/s²
 };
 
+/// R = first ∏_{j≥1} Exp(λ_j d_j) with its derivatives, where d_j = increments[j − 1] and λ are cumulative weights,
+/// which are functions of time: the recurrences of Sommer et al., section 4, linear in the number of increments.
+RotationValue cumulative_rotation(const Eigen::Quaterniond& first, std::span<const Eigen::Vector3d> increments,
+                                  const BasisWeights& lambda);
+
 /// How an orientation reacts to its control rotations: with R[first + j] replaced by R[first + j] Exp(ε_j),
 /// R(t) becomes R(t) Exp(Σ jacobian[j] ε_j + O(ε²)).
 struct RotationSensitivity {
@@ -92,7 +98,6 @@ class So3Spline {
   /// increments()[j] = Log(R[j]⁻¹ R[j+1]).
   const std::vector<Eigen::Vector3d>& increments() const { return increments_; }
 
-  /// Value and derivatives by the recurrences of Sommer et al., section 4: linear in the order.
   RotationValue at(double t_s) const;
 
   RotationSensitivity sensitivity(double t_s) const;

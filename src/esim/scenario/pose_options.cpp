@@ -1,5 +1,7 @@
 #include "esim/scenario/pose_options.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 
 #include "esim/core/error.h"
@@ -32,6 +34,14 @@ SE3 pose_of(const PoseOptions& options, const Eigen::Quaterniond& otherwise) {
     pose.rotation = looking_along(direction);
   }
   return pose;
+}
+
+SE3 pose_named(const std::string& key, const PoseOptions& options) {
+  try {
+    return pose_of(options);
+  } catch (const UserError& error) {
+    throw UserError(fmt::format("{}: {}", key, error.what()));
+  }
 }
 
 PoseOptions options_of(const SE3& pose) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <string>
 
 #include "esim/core/describe.h"
 #include "esim/geometry/se3.h"
@@ -28,6 +29,9 @@ void describe(Visitor& visit, PoseOptions& o) {
 /// Throws UserError where the quaternion is zero, both ways of giving an orientation are used, or the point to look at
 /// is the position itself.
 SE3 pose_of(const PoseOptions& options, const Eigen::Quaterniond& otherwise = Eigen::Quaterniond::Identity());
+
+/// The same; what it throws begins with the options' key.
+SE3 pose_named(const std::string& key, const PoseOptions& options);
 
 /// Options that describe `pose` exactly.
 PoseOptions options_of(const SE3& pose);

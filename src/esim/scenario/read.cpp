@@ -3,36 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <numbers>
 #include <set>
 
 #include "esim/geometry/calibration.h"
 #include "esim/scenario/sprite_scene.h"
+#include "esim/scenario/waypoint_file.h"
 #include "esim/scenario/yaml_reader.h"
 
 namespace esim {
 namespace {
-
-std::string text_of(const std::filesystem::path& file) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error))
-    throw UserError(fmt::format("{}: no such scenario file", file.string()));
-  std::ifstream stream(file, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream) throw UserError(fmt::format("{}: cannot be read; check its permissions", file.string()));
-  return text;
-}
-
-YAML::Node parse(const ScenarioText& text) {
-  try {
-    return YAML::Load(text.yaml);
-  } catch (const YAML::Exception& exception) {
-    throw UserError(
-        fmt::format("{}:{}: not valid YAML: {}", text.file.string(), exception.mark.line + 1, exception.msg));
-  }
-}
 
 /// What a camera inherits for `key`: the shared map, overridden entry by entry by its own. A map of another type
 /// replaces the shared one.
@@ -163,6 +143,22 @@ void read_layers(SpritesRendererOptions& renderer, const YAML::Node& node, const
   camera.width = scene.width, camera.height = scene.height;
 }
 
+/// Puts the points of a file, where one is named, in its place.
+void read_points(TrajectoryOptions& trajectory, const YAML::Node& node, const std::string& key,
+                 const YamlSource& source, bool may_be_missing) {
+  auto* const options = std::get_if<WaypointTrajectoryOptions>(&trajectory);
+  if (options == nullptr) return;
+  if (!options->file.empty() && !options->points.empty())
+    YamlReader::fail(source, node["points"], key + ".points", "are given by the file as well; remove one of them");
+  if (options->file.empty() && options->points.empty())
+    YamlReader::fail(source, node, key, "has no points; list them, or name a file of them in file");
+  std::error_code error;
+  if (options->file.empty() || (may_be_missing && !std::filesystem::exists(options->file, error))) return;
+  options->points = read_waypoints(options->file);
+  options->points_file = options->file;
+  options->file.clear();
+}
+
 /// The last keyframe of any layer; 0 where there is none.
 double last_keyframe_s(const SpritesRendererOptions& renderer) {
   double last = 0;
@@ -177,7 +173,9 @@ double last_keyframe_s(const SpritesRendererOptions& renderer) {
 void complete_for_layers(Scenario& scenario, const SpritesRendererOptions& renderer, bool has_trajectory) {
   if (!has_trajectory) scenario.trajectory = StaticTrajectoryOptions{};
   const double end_s = last_keyframe_s(renderer);
-  if (scenario.duration_s || end_s <= 0 || std::holds_alternative<FileTrajectoryOptions>(scenario.trajectory)) return;
+  const bool has_end = std::holds_alternative<FileTrajectoryOptions>(scenario.trajectory) ||
+                       std::holds_alternative<WaypointTrajectoryOptions>(scenario.trajectory);
+  if (scenario.duration_s || end_s <= 0 || has_end) return;
   if (scenario.start_s >= end_s) {
     throw UserError(
         fmt::format("start_s: {} s is beyond the last keyframe of the layers, at {} s; start earlier, or set "
@@ -191,14 +189,18 @@ void complete_for_layers(Scenario& scenario, const SpritesRendererOptions& rende
 
 Scenario read_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
   ScenarioText text;
-  text.yaml = text_of(file);
-  text.file = file;
   text.overrides = overrides;
-  return read_scenario(text);
+  return read_scenario(file, text);
+}
+
+Scenario read_scenario(const std::filesystem::path& file, ScenarioText otherwise) {
+  otherwise.yaml = text_of(file, "scenario file");
+  otherwise.file = file;
+  return read_scenario(otherwise);
 }
 
 Scenario read_scenario(const ScenarioText& text) {
-  YAML::Node root = parse(text);
+  YAML::Node root = parse_yaml(text.yaml, text.file);
   YamlSource source{text.file, {}, text.setter, text.has_lines};
   if (!root.IsMap()) YamlReader(root, "", source);
   for (const std::string& change : text.overrides) source.changed.push_back(apply_override(root, change, text.setter));
@@ -217,6 +219,13 @@ Scenario read_scenario(const ScenarioText& text) {
   require("renderer", text.needs_renderer);
   require("trajectory", text.needs_trajectory);
   if (scenario.imu) read_imu(*scenario.imu, std::as_const(root)["imu"], source);
+  read_points(scenario.trajectory, trajectory, "trajectory", source, !text.needs_waypoints);
+  if (auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer)) {
+    for (std::size_t i = 0; i < mesh->objects.size(); ++i) {
+      read_points(mesh->objects[i].trajectory, renderer["objects"][i]["trajectory"],
+                  fmt::format("renderer.objects.{}.trajectory", i), source, false);
+    }
+  }
   CameraOptions camera;
   if (std::holds_alternative<UnrealcvRendererOptions>(scenario.renderer)) camera.sampling = KeyframeSampling{};
   if (sprites != nullptr) {

@@ -30,10 +30,14 @@ struct ScenarioText {
   std::string setter = kSetter;  ///< what messages about overrides begin with
   bool needs_renderer = true;    ///< false: whoever simulates it brings its own, and the key may be missing
   bool needs_trajectory = true;  ///< likewise
+  bool needs_waypoints = true;   ///< false: a file of way points may be missing, since it is yet to be written
 };
 
 /// The same from text.
 Scenario read_scenario(const ScenarioText& text);
+
+/// The same from a file, whose text and name replace those of `otherwise`.
+Scenario read_scenario(const std::filesystem::path& file, ScenarioText otherwise);
 
 /// The scenario in full, every option explicit, as YAML: reading it back gives the same scenario.
 std::string write_scenario(const Scenario& scenario);

@@ -50,8 +50,29 @@ struct SceneTrajectoryOptions {
   std::string camera;
 };
 
-using TrajectoryOptions =
-    std::variant<FileTrajectoryOptions, RandomTrajectoryOptions, StaticTrajectoryOptions, SceneTrajectoryOptions>;
+/// A pose that the body passes through, and when or how.
+struct WaypointPointOptions : PoseOptions {
+  std::optional<Eigen::Vector3d> up;
+  std::optional<double> t, speed, pause_s;
+};
+
+/// Where `file` names a file, the points come from there.
+struct WaypointTrajectoryOptions {
+  static constexpr const char* kType = "waypoints";
+  std::filesystem::path file;
+  std::vector<WaypointPointOptions> points;
+  double speed = 1.0;
+  double turn_deg_per_s = 45.0;
+  double ramp_s = 0.5;
+  bool rest = true;
+  bool closed = false;
+
+  /// The file that the points were read from, for messages; empty where they stand in the scenario.
+  std::filesystem::path points_file;
+};
+
+using TrajectoryOptions = std::variant<FileTrajectoryOptions, RandomTrajectoryOptions, StaticTrajectoryOptions,
+                                       SceneTrajectoryOptions, WaypointTrajectoryOptions>;
 
 // --- renderers ---------------------------------------------------------------------------------------------------
 

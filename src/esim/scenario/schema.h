@@ -41,6 +41,34 @@ void describe(Visitor& visit, SceneTrajectoryOptions& o) {
 }
 
 template <class Visitor>
+void describe(Visitor& visit, WaypointPointOptions& o) {
+  visit("position", o.position, About{"of the body", "m", -1e6, 1e6});
+  visit("quaternion", o.quaternion, About{"orientation of the body, Hamilton, x y z w"});
+  visit("look_at", o.look_at,
+        About{"instead of a quaternion: point on the optical axis of the first camera (for an object: on its z axis)",
+              "m", -1e6, 1e6});
+  visit("up", o.up, About{"with look_at: what is upwards in the image (default: world z)"});
+  visit("t", o.t, About{"when it is reached; of all points or of none", "s", -1e8, 1e8});
+  visit("speed", o.speed,
+        About{"on the way to the next point, without times (default: the trajectory's)", "m/s", 0, 1e6, true});
+  visit("pause_s", o.pause_s, About{"for which the body stands still there (default: 0)", "s", 0, 1e8});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, WaypointTrajectoryOptions& o) {
+  visit("file", o.file, About{"instead of points: a YAML file that has them, as esim waypoints writes it"});
+  visit("points", o.points, About{"two or more, passed through in this order: a list of maps of"});
+  visit("speed", o.speed, About{"along the path, where the points have no times", "m/s", 0, 1e6, true});
+  visit("turn_deg_per_s", o.turn_deg_per_s,
+        About{"rate of turning on the spot, and the highest mean rate between two points, where they have no times",
+              "deg/s", 0, 1e6, true});
+  visit("ramp_s", o.ramp_s,
+        About{"time to gather speed after standing still, and to lose it before", "s", 0, 1e6, true});
+  visit("rest", o.rest, About{"the body stands still at the start and at the end"});
+  visit("closed", o.closed, About{"it returns to the first point; without times only"});
+}
+
+template <class Visitor>
 void describe(Visitor& visit, ObjectOptions& o) {
   visit("name", o.name, About{"in messages and ground truth; unique (default: object0, object1, ...)"});
   visit("scene", o.scene, About{"scene file, in the object's own coordinates"});

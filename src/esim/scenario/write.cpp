@@ -9,6 +9,7 @@
 #include "esim/scenario/conversion.h"
 #include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
+#include "esim/scenario/waypoint_file.h"
 
 namespace esim {
 namespace {
@@ -220,6 +221,19 @@ std::string write_sampling(const SamplingOptions& options) {
   writer("sampling", options, About{});
   out << YAML::EndMap;
   return YAML::Dump(YAML::Load(out.c_str())["sampling"]);
+}
+
+std::string write_waypoints(std::span<const WaypointPointOptions> points) {
+  std::string text = points.empty() ? "points: []\n" : "points:\n";
+  for (WaypointPointOptions point : points) {
+    YAML::Emitter out;
+    out << YAML::Flow << YAML::BeginMap;
+    YamlWriter writer(out);
+    describe(writer, point);
+    out << YAML::EndMap;
+    text += fmt::format("  - {}\n", out.c_str());
+  }
+  return text;
 }
 
 std::string write_conversion(const ConversionOptions& options) {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 
 namespace esim {
 namespace {
@@ -32,6 +34,24 @@ std::string scalar(const YamlSource& source, const YAML::Node& node, const std::
 }
 
 }  // namespace
+
+std::string text_of(const std::filesystem::path& file, const char* kind) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error))
+    throw UserError(fmt::format("{}: no such {}", file.string(), kind));
+  std::ifstream stream(file, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream) throw UserError(fmt::format("{}: cannot be read; check its permissions", file.string()));
+  return text;
+}
+
+YAML::Node parse_yaml(const std::string& yaml, const std::filesystem::path& file) {
+  try {
+    return YAML::Load(yaml);
+  } catch (const YAML::Exception& exception) {
+    throw UserError(fmt::format("{}:{}: not valid YAML: {}", file.string(), exception.mark.line + 1, exception.msg));
+  }
+}
 
 std::string apply_override(YAML::Node root, const std::string& text, const std::string& setter) {
   const std::size_t equals = text.find('=');

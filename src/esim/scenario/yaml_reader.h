@@ -25,6 +25,12 @@ struct YamlSource {
   bool has_lines = true;             ///< a person has written the lines, and finds them by their numbers
 };
 
+/// What a file holds. Throws UserError where it cannot be read; `kind` says what it should be.
+std::string text_of(const std::filesystem::path& file, const char* kind);
+
+/// Throws UserError with file and line for text that is not YAML.
+YAML::Node parse_yaml(const std::string& yaml, const std::filesystem::path& file);
+
 /// Sets root[a][b][c] for "a.b.c=value" and returns the key; list entries are named by their index. Messages begin with
 /// `setter`.
 std::string apply_override(YAML::Node root, const std::string& text, const std::string& setter = kSetter);

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "esim/geometry/se3.h"
+#include "esim/walk/keys.h"
+
+namespace esim {
+
+/// A camera that keys move through a scene, and the way points that it drops. It keeps level: its x axis is horizontal
+/// (world z is up), and it looks up and down by at most 89°.
+class Walker {
+ public:
+  /// What a key has led to, and what is to be done by whoever shows the scene.
+  enum class Effect {
+    nothing,
+    moved,          ///< also by going to a way point
+    speed_changed,  ///< of the steps
+    dropped,        ///< points() has one more
+    stands_there,   ///< nothing was dropped: the last way point is here
+    removed,        ///< points() has one less
+    preview,
+    play,
+    help,
+    leave,
+  };
+
+  /// At a camera's pose, of which the roll is left out.
+  explicit Walker(const SE3& T_world_camera, double speed_m_per_s = 1.0);
+
+  Effect press(Key key);
+
+  /// A way point that is there already.
+  void add_point(const SE3& T_world_camera) { points_.push_back(T_world_camera); }
+
+  SE3 T_world_camera() const;
+  double yaw_rad() const { return yaw_rad_; }      ///< from world x to y
+  double pitch_rad() const { return pitch_rad_; }  ///< upwards
+  double speed_m_per_s() const { return speed_m_per_s_; }
+  const std::vector<SE3>& points() const { return points_; }  ///< T_world_camera
+
+ private:
+  Effect step(double forward, double left, double up);
+  Effect turn(double left_steps, double up_steps);
+  Effect go_to_next();
+  void stand_at(const SE3& T_world_camera);
+
+  Eigen::Vector3d position_;
+  double yaw_rad_ = 0.0, pitch_rad_ = 0.0;
+  double speed_m_per_s_;
+  std::vector<SE3> points_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace esim

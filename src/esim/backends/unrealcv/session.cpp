@@ -10,6 +10,7 @@
 namespace esim {
 namespace {
 
+constexpr const char* kOneAtATime = "a server of UnrealCV serves one client at a time";
 constexpr std::uint32_t kMostIds = 100'000'000;  // eight digits
 
 /// The id at the beginning of an answer, and where its body begins. A notification has none.
@@ -43,9 +44,9 @@ void EngineSession::require_greeting(SteadyTime deadline) {
   try {
     came = connection_.receive(message_, kMostGreeting, deadline);
   } catch (const ConnectionLost&) {
-    throw ConnectionLost("it hangs up at once; a server of UnrealCV serves one client at a time");
+    throw ConnectionLost(std::string("it hangs up at once; ") + kOneAtATime);
   }
-  if (!came) throw ConnectionLost(fmt::format("it does not greet within {:g} s", options_.timeout_s));
+  if (!came) throw ConnectionLost(fmt::format("it does not greet within {:g} s; {}", options_.timeout_s, kOneAtATime));
   if (!message_.starts_with("connected")) throw ProtocolError("does not greet as UnrealCV does");
 }
 

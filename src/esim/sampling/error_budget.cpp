@@ -14,7 +14,7 @@ constexpr double kLeastGain = 0.25, kMostGain = 2;
 
 // An audit of a typical interval all of whose errors are above the tolerance changes ln(e_0) by the first step, later
 // by the last; so many audits halve it. One of a longer interval counts at most as so many.
-constexpr double kFirstStep = 1, kLastStep = 0.25, kHalfLife = 64, kMostWeight = 4;
+constexpr double kFirstStep = 1, kLastStep = 0.25, kHalvedAfter = 64, kMostWeight = 4;
 
 // Tiles in which no pixel changes by more than this share of the tolerance say nothing of errors.
 constexpr double kActive = 0.25;
@@ -45,7 +45,7 @@ void ErrorBudget::audit(std::span<const float> errors, float most_change, double
   if (static_cast<double>(most_change) <= kActive * tolerance_) return;
   const double excess = static_cast<double>(above) / static_cast<double>(errors.size()) - kShareAbove;
   const double weight = std::min(duration / typical_interval(), kMostWeight);
-  const double step = std::max(kLastStep, kFirstStep / (1 + steering_audits_++ / kHalfLife));
+  const double step = std::max(kLastStep, kFirstStep / (1 + steering_audits_++ / kHalvedAfter));
   gain_ = std::clamp(gain_ * std::exp(-step * weight * excess), kLeastGain, kMostGain);
 }
 

@@ -17,8 +17,9 @@ struct ErrorLimits {
 ///
 /// The energy of an interval is its mean square error e^2, of brightness, times its duration h. A sample more takes
 /// much of an interval's energy away, and costs the same wherever it is: a mean square error is had with the fewest
-/// samples if all intervals have the same energy, e_0^2 h_0. Here h_0 is the typical interval of late, and e_0 is what
-/// audits find to put the 99th percentile of the errors a little below the tolerance.
+/// samples if all intervals have the same energy, e_0^2 h_0. Here h_0 is the typical interval of late. Each audit
+/// moves e_0 towards where 1 % of the audited errors, in tiles in which something changes, are above the tolerance: how
+/// e^2 is spread over pixels and time, no mean square tells.
 class ErrorBudget {
  public:
   /// 99 % of the errors are to stay below `tolerance`, ln units.
@@ -43,7 +44,7 @@ class ErrorBudget {
   double gain_ = 0.5;                         // e_0 over what it would be for normal errors; careful at first
   double log_intervals_ = 0, intervals_ = 0;  // of late: ln ns added up, and how many
   LogHistogram audited_;
-  double steering_audits_ = 0;
+  double steering_audits_ = 0;  // of tiles in which something changes
 };
 
 }  // namespace esim

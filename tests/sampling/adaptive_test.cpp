@@ -41,6 +41,21 @@ Movie flying_bar(double px_per_s) {
           }};
 }
 
+/// Bright lines, a pixel wide and without any blur but the pixels' own, pass over a dark and flat image: few pixels at
+/// a time change at all, and those abruptly.
+Movie passing_lines(double px_per_s, double distance_px) {
+  // How much of [0, x] is covered by lines.
+  const auto covered = [=](double x) {
+    const double lines = std::floor(x / distance_px);
+    return lines + std::min(x - lines * distance_px, 1.0);
+  };
+  return {[=](double x, double y, double t) {
+            const double left = x + 0.1 * y - px_per_s * t - 0.5;
+            return std::log(0.1 + 0.15 * (covered(left + 1) - covered(left)));
+          },
+          [=](double, double, double) { return px_per_s; }};
+}
+
 struct Outcome {
   std::vector<double> errors;  // |L - truth| at random pixels and times, of what the sensor is given
   SamplingStatistics statistics;
@@ -127,6 +142,24 @@ TEST(AdaptiveSampling, KeepsTheTolerance) {
       EXPECT_LT(outcome.evaluations_per_pixel(), 2 * evaluations_before) << tolerance;
     }
     error_before = outcome.quantile(0.99), evaluations_before = outcome.evaluations_per_pixel();
+  }
+}
+
+// The same where few pixels have most of the error, as in a room with edges: the errors of a tile are far from normal.
+TEST(AdaptiveSampling, KeepsTheToleranceWhereOnlyEdgesChange) {
+  for (const double tolerance : {0.4, 0.2, 0.1}) {
+    const Outcome outcome = sample({.tolerance = tolerance}, passing_lines(400, 24), kNsPerSecond / 4);
+    EXPECT_LE(outcome.quantile(0.99), tolerance * kThreshold) << tolerance;
+  }
+}
+
+// Before any audit has said how errors are spread.
+TEST(AdaptiveSampling, KeepsTheToleranceFromTheStart) {
+  for (const double tolerance : {0.4, 0.2, 0.1}) {
+    for (const double distance_px : {6, 12, 24}) {
+      const Outcome start = sample({.tolerance = tolerance}, passing_lines(400, distance_px), kNsPerSecond / 40);
+      EXPECT_LE(start.quantile(0.99), tolerance * kThreshold) << tolerance << ", lines every " << distance_px << " px";
+    }
   }
 }
 

@@ -6,14 +6,18 @@
 namespace esim {
 namespace {
 
-// Where 99 % of the errors are not below this share of the tolerance, the limit becomes a lower one.
-constexpr double kTarget = 0.9, kLeastGain = 0.25;
+// Of the errors, this share is to be above the tolerance.
+constexpr double kShareAbove = 0.01;
+
+// e_0 over what it would be for normal errors.
+constexpr double kLeastGain = 0.25, kMostGain = 2;
+
+// An audit of a typical interval all of whose errors are above the tolerance changes ln(e_0) by the first step, later
+// by the last; so many audits halve it. One of a longer interval counts at most as so many.
+constexpr double kFirstStep = 1, kLastStep = 0.25, kHalvedAfter = 64, kMostWeight = 4;
 
 // Tiles in which no pixel changes by more than this share of the tolerance say nothing of errors.
 constexpr double kActive = 0.25;
-
-// So many audits make a measurement that the limit follows.
-constexpr int kAuditsPerStep = 48;
 
 }  // namespace
 
@@ -32,21 +36,17 @@ void ErrorBudget::remember(double log_intervals, int count) {
 }
 
 void ErrorBudget::audit(std::span<const float> errors, float most_change, double duration) {
-  const bool active = static_cast<double>(most_change) > kActive * tolerance_;
+  std::size_t above = 0;
   for (const float value : errors) {
     const double error = std::fabs(static_cast<double>(value));
-    all_.add(error, duration);
-    if (active) active_.add(error, duration);
+    audited_.add(error, duration);
+    if (error > tolerance_) ++above;
   }
-  if (active && ++active_audits_ == kAuditsPerStep) steer();
-}
-
-/// Follows what audits measured.
-void ErrorBudget::steer() {
-  const double wanted = kTarget * tolerance_ / std::max(active_.quantile(0.99), 1e-12);
-  gain_ = std::clamp(gain_ * std::clamp(std::sqrt(wanted), 0.8, 1.25), kLeastGain, 1.0);
-  active_ = LogHistogram();
-  active_audits_ = 0;
+  if (static_cast<double>(most_change) <= kActive * tolerance_) return;
+  const double excess = static_cast<double>(above) / static_cast<double>(errors.size()) - kShareAbove;
+  const double weight = std::min(duration / typical_interval(), kMostWeight);
+  const double step = std::max(kLastStep, kFirstStep / (1 + steering_audits_++ / kHalvedAfter));
+  gain_ = std::clamp(gain_ * std::exp(-step * weight * excess), kLeastGain, kMostGain);
 }
 
 }  // namespace esim

@@ -17,8 +17,9 @@ struct ErrorLimits {
 ///
 /// The energy of an interval is its mean square error e^2, of brightness, times its duration h. A sample more takes
 /// much of an interval's energy away, and costs the same wherever it is: a mean square error is had with the fewest
-/// samples if all intervals have the same energy, e_0^2 h_0. Here h_0 is the typical interval of late, and e_0 is the
-/// tolerance over the 99th percentile of a normal deviate, or less where audits find that this is not enough.
+/// samples if all intervals have the same energy, e_0^2 h_0. Here h_0 is the typical interval of late. Each audit
+/// moves e_0 towards where 1 % of the audited errors, in tiles in which something changes, are above the tolerance: how
+/// e^2 is spread over pixels and time, no mean square tells.
 class ErrorBudget {
  public:
   /// 99 % of the errors are to stay below `tolerance`, ln units.
@@ -36,17 +37,14 @@ class ErrorBudget {
   /// much the brightness of the one that changes most does in it.
   void audit(std::span<const float> errors, float most_change, double duration);
 
-  MeasuredError measured() const { return measured_error(all_); }
+  MeasuredError measured() const { return measured_error(audited_); }
 
  private:
-  void steer();
-
   double tolerance_;
-  double gain_ = 1;
+  double gain_ = 0.5;                         // e_0 over what it would be for normal errors; careful at first
   double log_intervals_ = 0, intervals_ = 0;  // of late: ln ns added up, and how many
-  LogHistogram all_,
-      active_;  // errors: of all audits; of those since the last step, of tiles in which something changes
-  int active_audits_ = 0;
+  LogHistogram audited_;
+  double steering_audits_ = 0;  // of tiles in which something changes
 };
 
 }  // namespace esim

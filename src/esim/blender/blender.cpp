@@ -116,11 +116,11 @@ bool run_script(const fs::path& scene, const std::string& script, const std::vec
 bool is_blend(const fs::path& file) { return file.extension() == ".blend"; }
 
 bool export_blend(const fs::path& blend, const fs::path& glb, const BlenderWatch& watch) {
-  return run_script(blend, std::string(kLegacyScript) + kExportScript, {}, glb, watch);
+  return run_script(blend, std::string(kCommonScript) + kExportScript, {}, glb, watch);
 }
 
 bool bake_scene(const fs::path& scene, const fs::path& glb, const BakeOptions& options, const BlenderWatch& watch) {
-  return run_script(scene, std::string(kLegacyScript) + kBakeScript,
+  return run_script(scene, std::string(kCommonScript) + kBakeScript,
                     {std::to_string(options.samples), std::to_string(options.size_px)}, glb, watch);
 }
 

@@ -44,7 +44,7 @@ def spell(*values):
 
 
 class Commands:
-    """Answers requests with text or bytes."""
+    """Answers requests with text, bytes, or bytes in parts."""
 
     def __init__(self, engine):
         self.engine = engine
@@ -138,9 +138,10 @@ class Commands:
 
     @staticmethod
     def npy(array):
-        file = io.BytesIO()
-        np.save(file, array, allow_pickle=False)
-        return file.getbuffer()
+        """A NumPy file in two parts, of which the pixels are not copied."""
+        head = io.BytesIO()
+        np.lib.format.write_array_header_1_0(head, np.lib.format.header_data_from_array_1_0(array))
+        return head.getvalue(), array.data.cast("B")
 
     def lit_png(self, camera):
         return esim_png(np.round(esim_srgb(self.render(camera)["lit"]) * 255).astype(np.uint8))
@@ -173,8 +174,8 @@ class Client:
 
     def send(self, *parts):
         head = struct.pack("<II", MAGIC, sum(len(part) for part in parts))
-        for part in (head + bytes(parts[0]), *parts[1:]):
-            self.connection.sendall(part)
+        self.connection.sendall(b"".join((head, *parts[:-1])))
+        self.connection.sendall(parts[-1])
 
     def serve(self):
         """Answers what has come. False when the client has gone, or sends what is not the protocol."""
@@ -192,7 +193,8 @@ class Client:
             match = re.match(rb"(\d{1,8}):(.*)\Z", message, re.DOTALL)
             if match:
                 answer = self.commands.answer(match[2].decode("utf-8", "replace"))
-                self.send(match[1] + b":", answer.encode() if isinstance(answer, str) else answer)
+                parts = answer if isinstance(answer, tuple) else (answer.encode() if isinstance(answer, str) else answer,)
+                self.send(match[1], b":", *parts)
         return len(data) > 0
 
 

@@ -1,0 +1,318 @@
+"""The script with which Blender speaks UnrealCV's protocol, in a room of six walls that shine each with its own light.
+
+Run as: blender_serve_test.py FOLDER_OF_SCRIPTS, with the standard library of Python alone. Skips without Blender.
+"""
+
+import ast
+import os
+import pathlib
+import re
+import select
+import shutil
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+
+BLENDER = shutil.which("blender")
+SCRIPTS = pathlib.Path(sys.argv[1])
+MAGIC = 0x9E2B83C1
+ENVIRONMENT = {**os.environ, "PATH": "/usr/bin:/bin:" + os.environ["PATH"]}
+
+# Walls at 4 m; a box of 0.4 m in front of +x, right and up of the middle, and a small one that hangs on it.
+SCENE = """
+import bpy, sys
+bpy.ops.wm.read_factory_settings(use_empty=True)
+
+def shining(name, strength):
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    tree = material.node_tree
+    emission = tree.nodes.new("ShaderNodeEmission")
+    emission.inputs["Color"].default_value = (1, 1, 1, 1)
+    emission.inputs["Strength"].default_value = strength
+    tree.links.new(tree.nodes["Material Output"].inputs["Surface"], emission.outputs["Emission"])
+    return material
+
+def box(name, size, place, light):
+    bpy.ops.mesh.primitive_cube_add(size=1, location=place)
+    thing = bpy.context.object
+    thing.name, thing.scale = name, size
+    thing.data.materials.append(shining(name, light))
+    return thing
+
+bright = sys.argv[sys.argv.index("--") + 2] == "bright"
+if bright:
+    for axis in range(3):
+        for sign in (1, -1):
+            size, place = [8.2] * 3, [0.0] * 3
+            size[axis], place[axis] = 0.2, sign * 4.1
+            box("wall " + "xyz"[axis] + "+-"[sign < 0], size, place, 0.1 + 0.2 * axis + (0.1 if sign < 0 else 0))
+    target = box("Box", (0.4, 0.4, 0.4), (2.2, -1, 1), 2.0)
+    part = box("Part", (0.1, 0.1, 0.1), (2.2, -1, 1.3), 2.0)
+    part.parent = target
+    part.matrix_parent_inverse = target.matrix_world.inverted()
+    for thing in bpy.context.scene.objects:
+        if thing.name.startswith("wall"):
+            thing.keyframe_insert("location", frame=1)
+else:
+    bpy.ops.mesh.primitive_cube_add(size=1)
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[sys.argv.index("--") + 1])
+"""
+
+
+class Client:
+    def __init__(self, port):
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=60)
+        self.id = 0
+
+    def take(self, size):
+        data = b""
+        while len(data) < size:
+            part = self.socket.recv(size - len(data))
+            if not part:
+                raise EOFError
+            data += part
+        return data
+
+    def receive(self):
+        magic, size = struct.unpack("<II", self.take(8))
+        assert magic == MAGIC
+        return self.take(size)
+
+    def ask_all(self, commands):
+        """Sends all at once, then takes the answers."""
+        first, message = self.id, b""
+        for command in commands:
+            payload = f"{self.id}:{command}".encode()
+            message += struct.pack("<II", MAGIC, len(payload)) + payload
+            self.id += 1
+        self.socket.sendall(message)
+        answers = []
+        for number in range(first, self.id):
+            head, body = self.receive().split(b":", 1)
+            assert int(head) == number
+            answers.append(body)
+        return answers
+
+    def ask(self, command):
+        return self.ask_all([command])[0]
+
+    def text(self, command):
+        return self.ask(command).decode()
+
+    def numbers(self, command):
+        return [float(part) for part in self.text(command).split()]
+
+    def array(self, command):
+        """Rows of pixels; a pixel with several channels is a tuple."""
+        data = self.ask(command)
+        if data[:6] != b"\x93NUMPY":
+            raise AssertionError(data[:200])
+        size, = struct.unpack("<H", data[8:10])
+        head = ast.literal_eval(data[10:10 + size].decode())
+        kind = {"<f4": "f", "<u2": "H"}[head["descr"]]
+        values = struct.unpack(f"<{(len(data) - 10 - size) // struct.calcsize(kind)}{kind}", data[10 + size:])
+        height, width, *channels = head["shape"]
+        if channels:
+            values = list(zip(*[iter(values)] * channels[0]))
+        return [list(values[row * width:(row + 1) * width]) for row in range(height)]
+
+
+class Serving:
+    """Blender with the script. Its first words are awaited."""
+
+    def __init__(self, scene, *arguments):
+        command = [BLENDER, "--background", "--factory-startup", *([scene] if scene else []), "--python-exit-code", "3",
+                   "--python", SCRIPTS / "serve.py", "--", "--port", "0", "--size", "33x25", "--samples", "2", *arguments]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
+        self.said, self.port = "", None
+        while self.port is None:
+            if not select.select([self.process.stdout], [], [], 60)[0]:
+                raise TimeoutError
+            line = self.process.stdout.readline()
+            if not line:
+                break
+            self.said += line
+            match = re.match(r"esim serving 127\.0\.0\.1:(\d+)$", line)
+            self.port = int(match[1]) if match else None
+
+    def end(self):
+        self.process.terminate()
+        self.process.communicate(timeout=20)
+
+
+@unittest.skipUnless(BLENDER, "there is no blender; apt install blender")
+class Serve(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="esim_blender_test_"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        script = cls.folder / "scene.py"
+        script.write_text(SCENE)
+        for light in ("bright", "dark"):
+            subprocess.run([BLENDER, "--background", "--factory-startup", "--python", script, "--", cls.folder / f"{light}.blend", light],
+                           check=True, capture_output=True, env=ENVIRONMENT)
+        cls.server = Serving(cls.folder / "bright.blend")
+        cls.addClassCleanup(cls.server.end)
+
+    def setUp(self):
+        self.client = Client(self.server.port)
+        self.addCleanup(self.client.socket.close)
+        self.assertTrue(self.client.receive().startswith(b"connected"))
+        self.look("0 0 0 0 0 0")
+
+    def look(self, pose):
+        self.assertEqual(self.client.ask_all(["vset /camera/0/horizontal_fieldofview 90", "vrun r.setres 33x25", "vset /camera/0/pose " + pose]),
+                         [b"ok"] * 3)
+
+    def test_light_is_linear_and_each_wall_is_where_unreals_frames_put_it(self):
+        # Pitch is upwards, yaw to the right, Unreal's right is Blender's -y.
+        for pose, light in (("0 0 0 0 0 0", 0.1), ("0 0 0 0 180 0", 0.2), ("0 0 0 0 -90 0", 0.3), ("0 0 0 0 90 0", 0.4),
+                            ("0 0 0 90 0 0", 0.5), ("0 0 0 -90 0 0", 0.6)):
+            self.look(pose)
+            for value in self.client.array("vget /camera/0/lit npy")[12][16]:
+                self.assertAlmostEqual(value, light, 5, pose)
+
+    def test_depth_is_of_the_plane_or_of_the_ray_in_metres(self):
+        self.look("50 20 10 0 0 0")
+        planar, ray = (self.client.array(f"vget /camera/0/{kind} npy") for kind in ("plane_depth", "depth"))
+        for row in (0, 7, 12, 24):
+            for column in (0, 5, 16):
+                right, down = (column - 16) / 16.5, (row - 12) / 16.5
+                self.assertAlmostEqual(planar[row][column], 3.5, 4)
+                self.assertAlmostEqual(ray[row][column], 3.5 * (1 + right ** 2 + down ** 2) ** 0.5, 4)
+
+    def test_objects_are_seen_where_they_are_also_when_the_camera_rolls(self):
+        number = self.client.text("vget /objects").split().index("Box") + 1
+        self.assertEqual(self.client.text("vget /object/Box/color"), f"(R={number},G=0,B=0,A=255)")
+
+        def middle():
+            mask = self.client.array("vget /camera/0/object_mask npy")
+            seen = [(row, column) for row in range(25) for column in range(33) if mask[row][column] == number]
+            return sum(row for row, _ in seen) / len(seen) - 12, sum(column for _, column in seen) / len(seen) - 16
+
+        down, right = middle()
+        self.assertAlmostEqual(right, 16.5 * 0.5, delta=1.0)  # 1 m right and up, its front 2 m away
+        self.assertAlmostEqual(down, -16.5 * 0.5, delta=1.5)
+        self.look("0 0 0 0 0 90")  # the right wing is down: what was right and up is left and up
+        down, right = middle()
+        self.assertAlmostEqual(right, -16.5 * 0.5, delta=1.5)
+        self.assertAlmostEqual(down, -16.5 * 0.5, delta=1.0)
+
+    def test_objects_move_with_what_hangs_on_them_and_come_back(self):
+        names = self.client.text("vget /objects").split()
+        self.assertIn("wall_x+", names)
+        self.assertNotIn("Part", names)
+        self.assertTrue(self.client.text("vset /object/Part/location 0 0 0").startswith("error"))
+        where = self.client.text("vget /object/Box/location")
+        for value, expected in zip(map(float, where.split()), (220, 100, 100)):
+            self.assertAlmostEqual(value, expected, 3)
+        before = self.client.ask("vget /camera/0/plane_depth npy")
+        self.assertEqual(self.client.ask_all(["vset /object/Box/location 150 0 0", "vset /object/Box/rotation 0 0 90"]), [b"ok"] * 2)
+        depth = self.client.array("vget /camera/0/plane_depth npy")
+        self.assertAlmostEqual(depth[12][16], 1.3, 4)
+        # The part was above, and is on the right: right wing down.
+        self.assertAlmostEqual(self.client.array("vget /camera/0/object_mask npy")[12][16], names.index("Box") + 1)
+        right = [column for column in range(33) if depth[12][column] < 3.99]
+        self.assertGreater(max(right) - 16, 16 - min(right))
+        self.client.ask_all([f"vset /object/Box/location {where}", "vset /object/Box/rotation 0 0 0"])
+        self.assertEqual(self.client.ask("vget /camera/0/plane_depth npy"), before)
+        # What an animation holds in place moves all the same.
+        self.client.ask("vset /object/wall_x+/location 390 0 0")
+        self.assertAlmostEqual(self.client.array("vget /camera/0/plane_depth npy")[24][0], 3.8, 4)
+        self.client.ask("vset /object/wall_x+/location 410 0 0")
+
+    def test_one_state_is_rendered_once_and_the_same_state_gives_the_same_bytes(self):
+        def renderings():
+            return int(re.search(r"(\d+) renderings", self.client.text("vget /unrealcv/status"))[1])
+
+        images = [f"vget /camera/0/{what} npy" for what in ("lit", "depth", "object_mask")]
+        self.look("10 0 0 5 0 0")
+        first = self.client.ask_all(images)
+        count = renderings()
+        self.assertEqual(self.client.ask_all(images), first)
+        self.assertEqual(renderings(), count)
+        self.look("20 0 0 5 0 0")
+        self.assertNotEqual(self.client.ask_all(images), first)
+        self.look("10 0 0 5 0 0")
+        self.assertEqual(self.client.ask_all(images), first)
+        self.assertEqual(renderings(), count + 2)
+
+    def test_what_is_set_is_told(self):
+        self.client.ask("vset /camera/0/pose 1.5 -2.25 3 10 20 30")
+        self.assertEqual(self.client.numbers("vget /camera/0/pose"), [1.5, -2.25, 3, 10, 20, 30])
+        self.client.ask_all(["vset /camera/0/location 4 5 6", "vset /camera/0/rotation 7 8 9"])
+        self.assertEqual(self.client.numbers("vget /camera/0/location"), [4, 5, 6])
+        self.assertEqual(self.client.numbers("vget /camera/0/rotation"), [7, 8, 9])
+        self.client.ask("vset /camera/0/fov 60")
+        self.assertEqual(self.client.numbers("vget /camera/0/horizontal_fieldofview"), [60])
+        self.client.ask("vset /camera/0/size 48 36")
+        self.assertEqual(self.client.numbers("vget /camera/0/size"), [48, 36])
+        self.assertIn("esim", self.client.text("vget /unrealcv/version"))
+        # Also where the nose points straight up, where only yaw - roll is known.
+        for pitch in (30, 90, -90):
+            self.client.ask(f"vset /object/Box/rotation {pitch} 40 0")
+            told = self.client.numbers("vget /object/Box/rotation")
+            for value, expected in zip(told, (pitch, 40, 0)):
+                self.assertAlmostEqual(value, expected, delta=0.05)
+        self.client.ask("vset /object/Box/rotation 0 0 0")
+
+    def test_pictures_are_srgb_png(self):
+        picture = self.client.ask("vget /camera/0/lit png")
+        self.assertEqual(picture[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(struct.unpack(">II", picture[16:24]), (33, 25))
+        self.assertEqual(self.client.ask("vget /camera/0/object_mask png")[:8], b"\x89PNG\r\n\x1a\n")
+
+    def test_what_cannot_be_done_is_an_error_and_the_rest_goes_on(self):
+        for command in ("nonsense", "", "vset /camera/0/pose 1 2 3", "vset /camera/0/pose nan 0 0 0 0 0", "vset /camera/0/fov 180",
+                        "vrun r.setres 99999x99999", "vrun r.setres 0x5", "vset /object/Nobody/location 0 0 0", "vget /camera/0/lit tiff",
+                        "vset /object/Box/location inf 0 0", "vrun esim.samples 0x"):
+            self.assertTrue(self.client.text(command).startswith("error"), command)
+        self.assertEqual(self.client.text("vrun r.setres 40x30"), "ok")
+
+    def test_what_is_not_the_protocol_ends_the_connection_and_not_the_server(self):
+        for head in (struct.pack("<II", 1, 5), struct.pack("<II", MAGIC, 0), struct.pack("<II", MAGIC, 0xFFFFFFFF)):
+            self.client.socket.sendall(head)
+            self.assertRaises((EOFError, ConnectionResetError), self.client.receive)
+            self.client = Client(self.server.port)
+            self.client.receive()
+            self.addCleanup(self.client.socket.close)
+        # A message in pieces, and one without an id, which has no answer.
+        payload = b"7:vget /camera/0/size"
+        message = struct.pack("<II", MAGIC, 5) + b"hello" + struct.pack("<II", MAGIC, len(payload)) + payload
+        for byte in message:
+            self.client.socket.sendall(bytes([byte]))
+        self.assertTrue(self.client.receive().startswith(b"7:"))
+
+    def test_a_second_client_is_turned_away(self):
+        second = Client(self.server.port)
+        self.assertRaises((EOFError, ConnectionResetError), second.receive)
+        second.socket.close()
+        self.assertTrue(self.client.text("vget /unrealcv/status").startswith("Blender"))
+
+    def test_a_dark_scene_is_warned_of_and_once_ends_with_the_client(self):
+        server = Serving(self.folder / "dark.blend", "--once")
+        self.assertIn("no light", server.said)
+        client = Client(server.port)
+        client.receive()
+        client.socket.close()
+        self.assertEqual(server.process.wait(timeout=20), 0)
+        server.process.communicate()
+        self.assertNotIn("no light", self.server.said)
+
+    def test_a_scene_that_cannot_be_opened_is_an_error(self):
+        broken = self.folder / "broken.blend"
+        broken.write_bytes((self.folder / "bright.blend").read_bytes()[:500])
+        for scene, arguments in ((None, ()), (None, ("--scene", str(self.folder / "missing.blend"))), (None, ("--scene", str(broken)))):
+            server = Serving(scene, *arguments)
+            self.assertIsNone(server.port, arguments)
+            _, error = server.process.communicate(timeout=20)
+            self.assertNotEqual(server.process.returncode, 0)
+            self.assertIn("Error", error + server.said)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=1)

@@ -1,5 +1,6 @@
 # Renders the scene that is open in Blender, from poses in Unreal's units and frames; common.py stands before it.
 import math
+import mmap
 import os
 import struct
 import tempfile
@@ -70,32 +71,33 @@ def pose_of(thing):
 # --- OpenEXR ----------------------------------------------------------------------------------------------------------
 
 def read_exr(data):
-    """Channels by their name without the layer's, such as Depth.Z, of a file without compression, as views of it."""
+    """Channels by their name without the layer's, such as Depth.Z, of a file without compression, as views of its bytes."""
     channels, at = [], 8
+    head = bytes(data[:65536])
 
     def text(begin):
-        end = data.index(b"\0", begin)
-        return data[begin:end].decode(), end + 1
+        end = head.index(b"\0", begin)
+        return head[begin:end].decode(), end + 1
 
-    while data[at] != 0:
+    while head[at] != 0:
         name, at = text(at)
         _, at = text(at)
-        size, = struct.unpack_from("<i", data, at)
+        size, = struct.unpack_from("<i", head, at)
         at += 4
         if name == "channels":
             inner = at
-            while data[inner] != 0:
+            while head[inner] != 0:
                 channel, inner = text(inner)
-                kind, = struct.unpack_from("<i", data, inner)
+                kind, = struct.unpack_from("<i", head, inner)
                 if kind != 2:
                     raise RuntimeError("a channel of the rendering is not of 32-bit floats")
                 channels.append(channel)
                 inner += 16
         elif name == "dataWindow":
-            left, top, right, bottom = struct.unpack_from("<4i", data, at)
+            left, top, right, bottom = struct.unpack_from("<4i", head, at)
         at += size
     width, height = right - left + 1, bottom - top + 1
-    start, = struct.unpack_from("<Q", data, at + 1)  # of the first row, of all alike
+    start, = struct.unpack_from("<Q", head, at + 1)  # of the first row, of all alike
     stride = 2 + width * len(channels)
     rows = np.frombuffer(data, "<f4", stride * height, start).reshape(height, stride)
     return {channel.split(".", 1)[1]: rows[:, 2 + k * width:2 + (k + 1) * width]
@@ -146,9 +148,11 @@ class Engine:
         self.cached_key, self.cached = None, None
         self.seconds_rendering = self.seconds_reading = 0.0
         self.renders = 0
+        # Blender gives its floats away in files alone; memory is the place for these.
         memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
-        self.folder = tempfile.TemporaryDirectory(prefix="esim_blender_", dir=memory)
-        self.file = os.path.join(self.folder.name, "frame.exr")
+        self.folder = None if options.scratch else tempfile.TemporaryDirectory(prefix="esim_blender_", dir=memory)
+        self.file = os.path.join(options.scratch or self.folder.name, "frame.exr")
+        self.arrays = {}
         self._own_camera()
         self._settings(options)
         self._name_objects()
@@ -230,7 +234,7 @@ class Engine:
         thing.matrix_world = object_matrix(location, rotation, scale)
 
     def render(self, view):
-        """The passes of the current state: lit (RGB), depth (planar, m), and with Cycles ids."""
+        """The passes of the current state: lit (RGB), depth (planar, m), and with Cycles ids. Valid until the next call."""
         key = (view.key(), self.size, self.samples, tuple((name, pose) for name, (pose, _) in sorted(self.moved.items())))
         if key == self.cached_key:
             return self.cached
@@ -243,17 +247,32 @@ class Engine:
         start = time.perf_counter()
         bpy.ops.render.render(write_still=True)
         rendered = time.perf_counter()
-        with open(self.file, "rb") as file:
-            channels = read_exr(file.read())
-        depth = channels["Depth.Z"].copy()
-        depth[depth > FARTHEST] = np.inf
-        self.cached = {"lit": np.stack([channels["Combined." + c] for c in "RGB"], axis=2), "depth": depth}
-        if "IndexOB.X" in channels:
-            self.cached["ids"] = channels["IndexOB.X"].astype(np.uint16)
-        if self.cached["lit"].shape[:2] != self.size[::-1]:
-            raise RuntimeError("Blender rendered an image of another size than it was asked for")
+        self.cached = self._passes()
         self.cached_key = key
         self.renders += 1
         self.seconds_rendering += rendered - start
         self.seconds_reading += time.perf_counter() - rendered
         return self.cached
+
+    def _passes(self):
+        """Of the file that Blender has written, in arrays that are used again and again: fresh memory costs time."""
+        width, height = self.size
+        if "depth" not in self.arrays or self.arrays["depth"].shape != (height, width):
+            self.arrays = {"lit": np.empty((height, width, 3), np.float32), "depth": np.empty((height, width), np.float32),
+                           "ids": np.empty((height, width), np.uint16)}
+        with open(self.file, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            self._copy_passes(read_exr(data))
+        return self.arrays
+
+    def _copy_passes(self, channels):
+        depth = self.arrays["depth"]
+        if channels["Depth.Z"].shape != depth.shape:
+            raise RuntimeError("Blender rendered an image of another size than it was asked for")
+        for k, channel in enumerate("RGB"):
+            self.arrays["lit"][:, :, k] = channels["Combined." + channel]
+        np.copyto(depth, channels["Depth.Z"])
+        depth[depth > FARTHEST] = np.inf
+        if "IndexOB.X" in channels:
+            self.arrays["ids"][...] = channels["IndexOB.X"]
+        else:
+            self.arrays.pop("ids", None)

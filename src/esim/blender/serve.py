@@ -7,6 +7,7 @@ import math
 import os
 import re
 import select
+import signal
 import socket
 import struct
 import sys
@@ -244,6 +245,7 @@ def parse(arguments):
     parser.add_argument("--threads", type=int, default=0, help="0: as many as there are processors")
     parser.add_argument("--persistent", action=argparse.BooleanOptionalAction, default=True,
                         help="keep the scene's data from one rendering to the next: faster, more memory")
+    parser.add_argument("--scratch", help="a folder, best in memory, through which renderings pass")
     parser.add_argument("--once", action="store_true",
                         help="end when the first client goes, or the program that started this")
     return parser.parse_args(arguments)
@@ -271,6 +273,7 @@ def main():
     print(f"esim serving 127.0.0.1:{listener.getsockname()[1]}", flush=True)
     # From here on, what Blender says of every rendering would fill a pipe that nobody reads.
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         serve(listener, Commands(engine), options.once, parent)
     except KeyboardInterrupt:

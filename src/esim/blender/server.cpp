@@ -13,15 +13,24 @@ namespace esim {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+fs::path place_in_memory() {
+  std::error_code error;
+  return fs::is_directory("/dev/shm", error) ? fs::path("/dev/shm") : fs::temp_directory_path();
+}
+
+}  // namespace
+
 struct BlenderServer::Parts {
   explicit Parts(const BlenderServerOptions& options)
       : process(blender_command(blender_program(options.scene), scratch, std::string(kCommonScript) + kServeScript,
                                 {"--scene", fs::absolute(options.scene).string(), "--port", "0", "--engine",
                                  options.eevee ? "eevee" : "cycles", "--samples", std::to_string(options.samples),
-                                 "--seed", std::to_string(options.seed), "--threads",
-                                 std::to_string(options.threads)})) {}
+                                 "--seed", std::to_string(options.seed), "--threads", std::to_string(options.threads),
+                                 "--scratch", scratch.path().string()})) {}
 
-  ScratchFolder scratch{fs::temp_directory_path()};  // Blender reads its script there
+  ScratchFolder scratch{place_in_memory()};  // of the script, and of what Blender renders
   RunningProcess process;
 };
 

@@ -223,8 +223,8 @@ def lights():
               (z1 - z0, y1 - y0))
     sun = add_light("Sun", "SUN", 6.5, (1.0, 0.87, 0.68), (0, 0, 3), (0, math.radians(-52), math.radians(-17)), 0)
     sun.data.angle = math.radians(1.2)
-    for name, energy, colour, height, turn in (("From ceiling", 75, (1.0, 0.98, 0.95), HEIGHT - 0.03, 0),
-                                               ("From floor", 70, (1.0, 0.93, 0.82), 0.03, math.pi)):
+    for name, energy, colour, height, turn in (("From ceiling", 90, (1.0, 0.98, 0.95), HEIGHT - 0.03, 0),
+                                               ("From floor", 50, (1.0, 0.93, 0.82), 0.03, math.pi)):
         panel = add_light(name, "AREA", energy, colour, (0, 0, height), (turn, 0, 0), 0, (2 * HALF_X - 0.4, 2 * HALF_Y - 0.4))
         panel.visible_glossy = False
     garden = box("Garden", (0.02, 12, 7), (-7.5, 0, 1.6), materials.garden())

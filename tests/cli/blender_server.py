@@ -1,0 +1,96 @@
+"""Blender with the script that serves, and a client of UnrealCV's protocol."""
+
+import ast
+import os
+import re
+import select
+import shutil
+import socket
+import struct
+import subprocess
+
+BLENDER = shutil.which("blender")
+MAGIC = 0x9E2B83C1
+# Debian's Blender takes the first Python on PATH, which may be one that lacks the system's modules.
+ENVIRONMENT = {**os.environ, "PATH": "/usr/bin:/bin:" + os.environ["PATH"]}
+
+
+class Client:
+    def __init__(self, port):
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=60)
+        self.id = 0
+
+    def take(self, size):
+        data = b""
+        while len(data) < size:
+            part = self.socket.recv(size - len(data))
+            if not part:
+                raise EOFError
+            data += part
+        return data
+
+    def receive(self):
+        magic, size = struct.unpack("<II", self.take(8))
+        assert magic == MAGIC
+        return self.take(size)
+
+    def ask_all(self, commands):
+        """Sends all at once, then takes the answers."""
+        first, message = self.id, b""
+        for command in commands:
+            payload = f"{self.id}:{command}".encode()
+            message += struct.pack("<II", MAGIC, len(payload)) + payload
+            self.id += 1
+        self.socket.sendall(message)
+        answers = []
+        for number in range(first, self.id):
+            head, body = self.receive().split(b":", 1)
+            assert int(head) == number
+            answers.append(body)
+        return answers
+
+    def ask(self, command):
+        return self.ask_all([command])[0]
+
+    def text(self, command):
+        return self.ask(command).decode()
+
+    def numbers(self, command):
+        return [float(part) for part in self.text(command).split()]
+
+    def array(self, command):
+        """Rows of pixels; a pixel with several channels is a tuple."""
+        data = self.ask(command)
+        if data[:6] != b"\x93NUMPY":
+            raise AssertionError(data[:200])
+        size, = struct.unpack("<H", data[8:10])
+        head = ast.literal_eval(data[10:10 + size].decode())
+        kind = {"<f4": "f", "<u2": "H"}[head["descr"]]
+        values = struct.unpack(f"<{(len(data) - 10 - size) // struct.calcsize(kind)}{kind}", data[10 + size:])
+        height, width, *channels = head["shape"]
+        if channels:
+            values = list(zip(*[iter(values)] * channels[0]))
+        return [list(values[row * width:(row + 1) * width]) for row in range(height)]
+
+
+class Serving:
+    """Blender with the script. Its first words are awaited."""
+
+    def __init__(self, scripts, scene, *arguments):
+        command = [BLENDER, "--background", "--factory-startup", *([scene] if scene else []), "--python-exit-code", "3",
+                   "--python", scripts / "serve.py", "--", "--port", "0", "--size", "33x25", "--samples", "2", *arguments]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
+        self.said, self.port = "", None
+        while self.port is None:
+            if not select.select([self.process.stdout], [], [], 60)[0]:
+                raise TimeoutError
+            line = self.process.stdout.readline()
+            if not line:
+                break
+            self.said += line
+            match = re.match(r"esim serving 127\.0\.0\.1:(\d+)$", line)
+            self.port = int(match[1]) if match else None
+
+    def end(self):
+        self.process.terminate()
+        self.process.communicate(timeout=20)

@@ -15,6 +15,7 @@ import unittest
 from blender_server import BLENDER, ENVIRONMENT, MAGIC, Client, Serving
 
 SCRIPTS = pathlib.Path(sys.argv[1])
+SMALL = ("--size", "33x25", "--samples", "2")
 
 # Walls at 4 m; a box of 0.4 m in front of +x, right and up of the middle, and a small one that hangs on it.
 SCENE = """
@@ -69,7 +70,7 @@ class Serve(unittest.TestCase):
         for light in ("bright", "dark"):
             subprocess.run([BLENDER, "--background", "--factory-startup", "--python", script, "--", cls.folder / f"{light}.blend", light],
                            check=True, capture_output=True, env=ENVIRONMENT)
-        cls.server = Serving(SCRIPTS, cls.folder / "bright.blend")
+        cls.server = Serving(SCRIPTS, cls.folder / "bright.blend", *SMALL)
         cls.addClassCleanup(cls.server.end)
 
     def setUp(self):
@@ -208,7 +209,7 @@ class Serve(unittest.TestCase):
         self.assertTrue(self.client.text("vget /unrealcv/status").startswith("Blender"))
 
     def test_a_dark_scene_is_warned_of_and_once_ends_with_the_client(self):
-        server = Serving(SCRIPTS, self.folder / "dark.blend", "--once")
+        server = Serving(SCRIPTS, self.folder / "dark.blend", *SMALL, "--once")
         self.assertIn("no light", server.said)
         client = Client(server.port)
         client.receive()

@@ -21,13 +21,13 @@ class Client:
         self.id = 0
 
     def take(self, size):
-        data = b""
-        while len(data) < size:
-            part = self.socket.recv(size - len(data))
-            if not part:
+        data, have = bytearray(size), 0
+        while have < size:
+            count = self.socket.recv_into(memoryview(data)[have:])
+            if count == 0:
                 raise EOFError
-            data += part
-        return data
+            have += count
+        return bytes(data)
 
     def receive(self):
         magic, size = struct.unpack("<II", self.take(8))
@@ -78,7 +78,7 @@ class Serving:
 
     def __init__(self, scripts, scene, *arguments):
         command = [BLENDER, "--background", "--factory-startup", *([scene] if scene else []), "--python-exit-code", "3",
-                   "--python", scripts / "serve.py", "--", "--port", "0", "--size", "33x25", "--samples", "2", *arguments]
+                   "--python", scripts / "serve.py", "--", "--port", "0", *arguments]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
         self.said, self.port = "", None
         while self.port is None:

@@ -7,56 +7,14 @@ import pathlib
 import re
 import shutil
 import struct
-import subprocess
 import sys
 import tempfile
 import unittest
 
-from blender_server import BLENDER, ENVIRONMENT, MAGIC, Client, Serving
+from blender_server import BLENDER, MAGIC, Client, Serving, make_scene
 
 SCRIPTS = pathlib.Path(sys.argv[1])
 SMALL = ("--size", "33x25", "--samples", "2")
-
-# Walls at 4 m; a box of 0.4 m in front of +x, right and up of the middle, and a small one that hangs on it.
-SCENE = """
-import bpy, sys
-bpy.ops.wm.read_factory_settings(use_empty=True)
-
-def shining(name, strength):
-    material = bpy.data.materials.new(name)
-    material.use_nodes = True
-    tree = material.node_tree
-    emission = tree.nodes.new("ShaderNodeEmission")
-    emission.inputs["Color"].default_value = (1, 1, 1, 1)
-    emission.inputs["Strength"].default_value = strength
-    tree.links.new(tree.nodes["Material Output"].inputs["Surface"], emission.outputs["Emission"])
-    return material
-
-def box(name, size, place, light):
-    bpy.ops.mesh.primitive_cube_add(size=1, location=place)
-    thing = bpy.context.object
-    thing.name, thing.scale = name, size
-    thing.data.materials.append(shining(name, light))
-    return thing
-
-bright = sys.argv[sys.argv.index("--") + 2] == "bright"
-if bright:
-    for axis in range(3):
-        for sign in (1, -1):
-            size, place = [8.2] * 3, [0.0] * 3
-            size[axis], place[axis] = 0.2, sign * 4.1
-            box("wall " + "xyz"[axis] + "+-"[sign < 0], size, place, 0.1 + 0.2 * axis + (0.1 if sign < 0 else 0))
-    target = box("Box", (0.4, 0.4, 0.4), (2.2, -1, 1), 2.0)
-    part = box("Part", (0.1, 0.1, 0.1), (2.2, -1, 1.3), 2.0)
-    part.parent = target
-    part.matrix_parent_inverse = target.matrix_world.inverted()
-    for thing in bpy.context.scene.objects:
-        if thing.name.startswith("wall"):
-            thing.keyframe_insert("location", frame=1)
-else:
-    bpy.ops.mesh.primitive_cube_add(size=1)
-bpy.ops.wm.save_as_mainfile(filepath=sys.argv[sys.argv.index("--") + 1])
-"""
 
 
 @unittest.skipUnless(BLENDER, "there is no blender; apt install blender")
@@ -65,11 +23,8 @@ class Serve(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="esim_blender_test_"))
         cls.addClassCleanup(shutil.rmtree, cls.folder)
-        script = cls.folder / "scene.py"
-        script.write_text(SCENE)
         for light in ("bright", "dark"):
-            subprocess.run([BLENDER, "--background", "--factory-startup", "--python", script, "--", cls.folder / f"{light}.blend", light],
-                           check=True, capture_output=True, env=ENVIRONMENT)
+            make_scene(cls.folder, light)
         cls.server = Serving(SCRIPTS, cls.folder / "bright.blend", *SMALL)
         cls.addClassCleanup(cls.server.end)
 

@@ -1,4 +1,4 @@
-"""Blender with the script that serves, and a client of UnrealCV's protocol."""
+"""Blender with the script that serves, a scene for it, and a client of UnrealCV's protocol."""
 
 import ast
 import os
@@ -13,6 +13,57 @@ BLENDER = shutil.which("blender")
 MAGIC = 0x9E2B83C1
 # Debian's Blender takes the first Python on PATH, which may be one that lacks the system's modules.
 ENVIRONMENT = {**os.environ, "PATH": "/usr/bin:/bin:" + os.environ["PATH"]}
+
+
+# Walls at 4 m; a box of 0.4 m in front of +x, right and up of the middle, and a small one that hangs on it.
+SCENE = """
+import bpy, sys
+bpy.ops.wm.read_factory_settings(use_empty=True)
+
+def shining(name, strength):
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    tree = material.node_tree
+    emission = tree.nodes.new("ShaderNodeEmission")
+    emission.inputs["Color"].default_value = (1, 1, 1, 1)
+    emission.inputs["Strength"].default_value = strength
+    tree.links.new(tree.nodes["Material Output"].inputs["Surface"], emission.outputs["Emission"])
+    return material
+
+def box(name, size, place, light):
+    bpy.ops.mesh.primitive_cube_add(size=1, location=place)
+    thing = bpy.context.object
+    thing.name, thing.scale = name, size
+    thing.data.materials.append(shining(name, light))
+    return thing
+
+bright = sys.argv[sys.argv.index("--") + 2] == "bright"
+if bright:
+    for axis in range(3):
+        for sign in (1, -1):
+            size, place = [8.2] * 3, [0.0] * 3
+            size[axis], place[axis] = 0.2, sign * 4.1
+            box("wall " + "xyz"[axis] + "+-"[sign < 0], size, place, 0.1 + 0.2 * axis + (0.1 if sign < 0 else 0))
+    target = box("Box", (0.4, 0.4, 0.4), (2.2, -1, 1), 2.0)
+    part = box("Part", (0.1, 0.1, 0.1), (2.2, -1, 1.3), 2.0)
+    part.parent = target
+    part.matrix_parent_inverse = target.matrix_world.inverted()
+    for thing in bpy.context.scene.objects:
+        if thing.name.startswith("wall"):
+            thing.keyframe_insert("location", frame=1)
+else:
+    bpy.ops.mesh.primitive_cube_add(size=1)
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[sys.argv.index("--") + 1])
+"""
+
+
+def make_scene(folder, light):
+    """FOLDER/LIGHT.blend; a bright one has the walls and the box, a dark one a cube without light."""
+    script, blend = folder / "scene.py", folder / f"{light}.blend"
+    script.write_text(SCENE)
+    subprocess.run([BLENDER, "--background", "--factory-startup", "--python", script, "--", blend, light], check=True, capture_output=True,
+                   env=ENVIRONMENT)
+    return blend
 
 
 class Client:

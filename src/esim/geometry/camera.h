@@ -57,7 +57,6 @@ struct Camera {
   double cx = 0.0, cy = 0.0;  // px
   Distortion distortion;
   double footprint = 1.0;  // px: side of the square that a pixel averages over
-  int density = 1;         // pixels, along each side, that stand for one of a sensor's: a renderer may spend less on each
 
   /// An ideal camera with square pixels, its optical axis through the middle of the image, that sees
   /// horizontal_fov_rad between its left and right borders. Throws UserError unless 0 < horizontal_fov_rad < π and

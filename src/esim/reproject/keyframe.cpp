@@ -115,7 +115,6 @@ KeyframeLayout lay_out_keyframes(const Camera& sensor, int supersampling, int ma
       layout.camera = widened(sensor, supersampling, --layout.margin_px);
     }
   }
-  layout.camera.density = supersampling * sensor.density;
   if (wide_pixels) layout.camera.footprint = supersampling * sensor.footprint;
   return layout;
 }

@@ -41,7 +41,8 @@ HEAVY = re.compile(r"^(embree3|assimp|epoxy|opencv2|hdf5|yaml-cpp|nlohmann|fmt|t
 PRIVATE_HEADERS = {"backends/opengl/gl_program.h", "backends/opengl/gl_read_back.h", "backends/opengl/gl_scene.h",
                    "backends/opengl/gl_shaders.h", "backends/opengl/gl_shadows.h", "backends/opengl/gl_targets.h",
                    "backends/raycast/edges.h", "backends/raycast/lights.h", "backends/raycast/packet.h", "backends/raycast/raycast_scene.h",
-                   "backends/raycast/surface.h", "scenario/yaml_reader.h", "scene/import/gltf_document.h",
+                   "backends/raycast/surface.h", "backends/unrealcv/client.h", "backends/unrealcv/connection.h", "backends/unrealcv/dialect.h",
+                   "backends/unrealcv/engine_image.h", "backends/unrealcv/session.h", "scenario/yaml_reader.h", "scene/import/gltf_document.h",
                    "record/formats/aedat4/buffers.h", "record/formats/hdf5_detail.h",
                    "record/formats/hdf5_input.h", "record/formats/hdf5_output_driver.h", "sensors/vector_math.h"}
 

@@ -4,6 +4,7 @@
 
 #include "commands.h"
 #include "esim/compose/compose.h"
+#include "esim/core/error.h"
 #include "esim/record/recording_directory.h"
 #include "esim/scenario/read.h"
 #include "progress_bar.h"
@@ -59,6 +60,10 @@ int run(const Arguments& arguments) {
   bar.clear();
   directory.finish(report_json(scenario, summary, world.workers->threads(), given));
   if (!arguments.quiet) print_summary(summary, out, scenario.output.preview && scenario.truth.rate_hz > 0);
+  if (!summary.problem.empty()) {
+    throw UserError(fmt::format("{}; the {:.3f} s before it are simulated: {}, marked incomplete", summary.problem,
+                                to_seconds(summary.end - summary.start), out.string()));
+  }
   return summary.complete ? kOk : kInterrupted;
 }
 

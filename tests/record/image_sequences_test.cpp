@@ -234,7 +234,7 @@ TEST(NpyHeader, ReadsOtherVersionsAndRefusesOtherLayouts) {
   };
   const std::string dictionary = "{'shape': (3,7), 'fortran_order': False, 'descr': '<f8'}";
   const auto length = static_cast<char>(dictionary.size());
-  const NpyHeader header = read_text(std::string{'\2', '\0', length, '\0', '\0', '\0'}, dictionary);
+  const NpyDescription header = read_text(std::string{'\2', '\0', length, '\0', '\0', '\0'}, dictionary);
   EXPECT_EQ(header.type, "<f8");
   EXPECT_EQ(header.shape, (std::vector<std::uint64_t>{3, 7}));
   for (const char* text :

@@ -9,6 +9,7 @@
 #include "esim/backends/plane/plane_renderer.h"
 #include "esim/backends/raycast/raycast_renderer.h"
 #include "esim/backends/sprites/sprites_renderer.h"
+#include "esim/backends/unrealcv/unrealcv_renderer.h"
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
 #include "esim/scene/image_file.h"
@@ -119,6 +120,25 @@ RendererFactory factory(const SpritesRendererOptions& options, const SceneFile&,
   return [=](const Camera& camera, ColourFilters filters, const Workers& workers) {
     refuse(filters, "the renderer sprites", "a mesh, a plane or a panorama");
     return make_sprites_renderer(scene, camera, workers);
+  };
+}
+
+RendererFactory factory(const UnrealcvRendererOptions& options, const SceneFile&, bool) {
+  UnrealcvOptions engine;
+  engine.host = options.host;
+  engine.port = options.port;
+  engine.timeout_s = options.timeout_s;
+  engine.camera = options.camera;
+  engine.pipelined = options.pipelined;
+  engine.lag_frames = options.lag_frames;
+  engine.light = options.light;
+  engine.exposure = options.exposure;
+  engine.depth = options.depth;
+  engine.mask = options.object_mask;
+  for (const EngineObjectOptions& object : options.objects) engine.objects.push_back(object.name);
+  return [client = make_unrealcv_client(engine)](const Camera& camera, ColourFilters filters, const Workers& workers) {
+    refuse(filters, "the renderer unrealcv", "a mesh, a plane or a panorama");
+    return make_unrealcv_renderer(client, camera, workers);
   };
 }
 

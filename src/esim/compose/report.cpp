@@ -49,7 +49,7 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
 
   const StageSeconds& s = summary.seconds;
   const double other = summary.wall_seconds - (s.render + s.sampling + s.events + s.frames + s.truth + s.write);
-  const Json report = {
+  Json report = {
       {"status", summary.complete ? "complete" : "interrupted"},
       {"esim_version", ESIM_VERSION},
       {"seed", scenario.seed},
@@ -71,7 +71,8 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
       {"cameras", cameras},
       {"notices", notices},
   };
-  return report.dump(2) + "\n";
+  if (!summary.problem.empty()) report["reason"] = summary.problem;
+  return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,

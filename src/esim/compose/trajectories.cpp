@@ -125,6 +125,26 @@ std::shared_ptr<const Trajectory> build(const TrajectoryOptions& options, const 
   return std::visit([&](const auto& alternative) { return build(alternative, mover, notices); }, options);
 }
 
+/// The motion of the renderer's object of this index, over `span` where it has no duration of its own.
+std::shared_ptr<const Trajectory> build_for_object(const TrajectoryOptions& options, std::size_t index,
+                                                   const Scenario& scenario, const TimeSpan& span,
+                                                   const TimeSpan& simulated, const Notices& notices) {
+  Mover mover;
+  mover.key = fmt::format("renderer.objects.{}.trajectory", index);
+  mover.seed = scenario.seed;
+  mover.stream = static_cast<std::uint16_t>(index + 1);
+  mover.span = [&] { return span; };
+  auto trajectory = build(options, mover, notices);
+  if (trajectory->start() > simulated.start || trajectory->end() < simulated.end) {
+    throw UserError(
+        fmt::format("{}: lasts from {:.9g} to {:.9g} s, but the simulation from {:.9g} to {:.9g} s; shorten "
+                    "the simulation with start_s and duration_s, or stretch the trajectory with its time_scale",
+                    mover.key, to_seconds(trajectory->start()), to_seconds(trajectory->end()),
+                    to_seconds(simulated.start), to_seconds(simulated.end)));
+  }
+  return trajectory;
+}
+
 }  // namespace
 
 const SceneCamera* followed_camera(const Scenario& scenario, const SceneFile& scene) {
@@ -159,6 +179,11 @@ std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const S
                                                                          const TimeSpan& simulated,
                                                                          const Notices& notices) {
   std::vector<std::shared_ptr<const Trajectory>> trajectories;
+  const TimeSpan span{body.start(), simulated.end};
+  if (const auto* const engine = std::get_if<UnrealcvRendererOptions>(&scenario.renderer)) {
+    for (std::size_t i = 0; i < engine->objects.size(); ++i)
+      trajectories.push_back(build_for_object(engine->objects[i].trajectory, i, scenario, span, simulated, notices));
+  }
   const auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
   if (mesh == nullptr) return trajectories;
   std::size_t animated = 0;
@@ -170,26 +195,8 @@ std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const S
       animation = std::make_shared<const RestingTrajectory>(std::move(animation), simulated.end);
     trajectories.push_back(std::move(animation));
   }
-
-  const auto span = [&]() -> TimeSpan { return {body.start(), simulated.end}; };
-  for (const ObjectOptions& object : mesh->objects) {
-    const std::size_t index = trajectories.size() - animated;
-    const std::string key = fmt::format("renderer.objects.{}.trajectory", index);
-    Mover mover;
-    mover.key = key;
-    mover.seed = scenario.seed;
-    mover.stream = static_cast<std::uint16_t>(index + 1);
-    mover.span = span;
-    auto trajectory = build(object.trajectory, mover, notices);
-    if (trajectory->start() > simulated.start || trajectory->end() < simulated.end) {
-      throw UserError(
-          fmt::format("{}: lasts from {:.9g} to {:.9g} s, but the simulation from {:.9g} to {:.9g} s; shorten "
-                      "the simulation with start_s and duration_s, or stretch the trajectory with its time_scale",
-                      key, to_seconds(trajectory->start()), to_seconds(trajectory->end()), to_seconds(simulated.start),
-                      to_seconds(simulated.end)));
-    }
-    trajectories.push_back(std::move(trajectory));
-  }
+  for (std::size_t i = 0; i < mesh->objects.size(); ++i)
+    trajectories.push_back(build_for_object(mesh->objects[i].trajectory, i, scenario, span, simulated, notices));
   return trajectories;
 }
 

@@ -25,6 +25,11 @@ void check_displacement(const TruthOptions& truth, PeriodicClock clock, double d
 }
 
 void check_event_points(const TruthOptions& truth, const RendererTraits& renderer) {
+  if (truth.event_points && renderer.granularity == Granularity::frame) {
+    throw UserError(fmt::format(
+        "truth.event_points: asks for single pixels at the time of each event, which {} cannot give; remove it",
+        renderer.name));
+  }
   if (truth.event_points && renderer.at_infinity) {
     throw UserError(fmt::format("truth.event_points: all that {} shows is infinitely far; remove it", renderer.name));
   }

@@ -169,6 +169,9 @@ void name_what_moves(const RendererOptions& renderer, const SceneFile& scene, Re
   if (const auto* const sprites = std::get_if<SpritesRendererOptions>(&renderer)) {
     for (std::size_t i = 0; i < sprites->layers.size(); ++i) info.layers.push_back(fmt::format("layer{}", i));
   }
+  if (const auto* const engine = std::get_if<UnrealcvRendererOptions>(&renderer)) {
+    for (const EngineObjectOptions& object : engine->objects) info.objects.push_back(object.name);
+  }
 }
 
 /// What a renderer that is not ours cannot do.

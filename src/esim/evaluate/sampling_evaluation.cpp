@@ -152,6 +152,7 @@ class Evaluation {
       show(static_cast<double>(progress.now - progress.start) / static_cast<double>(progress.end - progress.start));
       return true;
     });
+    if (!summary.problem.empty()) throw UserError(summary.problem);
     reference_events_.emplace_back(events.events(), result_.width, result_.height);
     return summary;
   }
@@ -208,6 +209,7 @@ class Evaluation {
       share_.show(to_seconds(progress.now - progress.start) / all_s);
       return true;
     });
+    if (!summary.problem.empty()) throw UserError(summary.problem);
 
     std::vector<BrightnessError> brightness = errors.finish();
     for (std::size_t i = 0; i < brightness.size(); ++i) result.windows[i].brightness = std::move(brightness[i]);

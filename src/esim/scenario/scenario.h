@@ -11,6 +11,7 @@
 #include "esim/geometry/camera.h"
 #include "esim/sampling/options.h"
 #include "esim/scenario/pose_options.h"
+#include "esim/scene/engine_images.h"
 #include "esim/scene/layer.h"
 #include "esim/sensors/event_camera.h"
 #include "esim/sensors/frame_camera_options.h"
@@ -145,8 +146,30 @@ struct SpritesRendererOptions {
   double background = 0.2;
 };
 
-using RendererOptions =
-    std::variant<MeshRendererOptions, PanoramaRendererOptions, PlaneRendererOptions, SpritesRendererOptions>;
+/// A thing in another program's scene that is moved.
+struct EngineObjectOptions {
+  std::string name;
+  TrajectoryOptions trajectory;
+};
+
+/// A program that speaks UnrealCV's protocol.
+struct UnrealcvRendererOptions {
+  static constexpr const char* kType = "unrealcv";
+  std::string host = "127.0.0.1";
+  int port = 9000;
+  double timeout_s = 10;
+  int camera = 0;
+  std::vector<EngineObjectOptions> objects;
+  EngineLight light = EngineLight::automatic;
+  double exposure = 1.0;
+  EngineDepth depth = EngineDepth::automatic;
+  EngineMask object_mask = EngineMask::automatic;
+  bool pipelined = true;
+  int lag_frames = 0;
+};
+
+using RendererOptions = std::variant<MeshRendererOptions, PanoramaRendererOptions, PlaneRendererOptions,
+                                     SpritesRendererOptions, UnrealcvRendererOptions>;
 
 // --- cameras -----------------------------------------------------------------------------------------------------
 

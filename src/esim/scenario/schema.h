@@ -147,6 +147,33 @@ void describe(Visitor& visit, SpritesRendererOptions& o) {
 }
 
 template <class Visitor>
+void describe(Visitor& visit, EngineObjectOptions& o) {
+  visit("name", o.name, About{"that the program knows it by"});
+  visit("trajectory", o.trajectory, About{"how it moves: pose of its frame (x forward, y left, z up) in the world"});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, UnrealcvRendererOptions& o) {
+  visit("host", o.host, About{"where the program runs"});
+  visit("port", o.port, About{"on which it listens", "", 1, 65535});
+  visit("timeout_s", o.timeout_s,
+        About{"longest wait for the connection, for each answer, and for a program that has gone away", "s", 0, 86400,
+              true});
+  visit("camera", o.camera, About{"id of the program's camera that is moved, for all cameras of the rig", "", 0, 1e6});
+  visit("objects", o.objects, About{"things of its scene that are moved: a list of maps of"});
+  visit("light", o.light, About{"how images are asked for; auto: npy where it is offered, png otherwise"});
+  visit("exposure", o.exposure, About{"factor from its light to irradiance", "", 0, 1e6, true});
+  visit("depth", o.depth,
+        About{"which depth is asked for, and what it is; auto: plane_depth where it is offered, otherwise what the "
+              "version suggests"});
+  visit("object_mask", o.object_mask,
+        About{"how is asked which object a pixel sees; none: the motion field takes all for standing still"});
+  visit("pipelined", o.pipelined, About{"send the commands of a frame together, not each after the last one's answer"});
+  visit("lag_frames", o.lag_frames,
+        About{"images to throw away after each move, for programs that show it late", "", 0, 100});
+}
+
+template <class Visitor>
 void describe(Visitor&, NoDistortionOptions&) {}
 
 template <class Visitor>
@@ -191,7 +218,8 @@ void describe(Visitor& visit, CameraOptions& o) {
   visit("T_body_camera", o.T_body_camera, About{"pose of the camera (x right, y down, z forward) in the body"});
   visit("colour", o.colour,
         About{"filters on the pixels; rggb: red at even columns and rows, green, green, blue; none: luminance"});
-  visit("sampling", o.sampling, About{"when the scene is evaluated"});
+  visit("sampling", o.sampling,
+        About{"when the scene is evaluated (default: flow; keyframes where another program renders)"});
   visit("events", o.events, About{"whether the camera has an event sensor; without, it is a standard camera"});
   visit("event_camera", o.event_camera, About{"the event sensor"});
   visit("frame_camera", o.frame_camera, About{"a standard camera in the same place (default: none)"});
@@ -249,6 +277,13 @@ template <>
 inline constexpr std::array<const char*, 2> kEnumNames<KeyframeInterpolation>{"spline", "linear"};
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<MeshEngine>{"raycast", "gl", "auto"};
+template <>
+inline constexpr std::array<const char*, 3> kEnumNames<EngineLight>{"auto", "png", "npy"};
+template <>
+inline constexpr std::array<const char*, 6> kEnumNames<EngineDepth>{"auto",   "plane_depth", "ray_m",
+                                                                    "ray_cm", "planar_m",    "planar_cm"};
+template <>
+inline constexpr std::array<const char*, 4> kEnumNames<EngineMask>{"auto", "png", "npy", "none"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<ColourFilters>{"none", "rggb"};
 template <>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "esim/core/engine_error.h"
 #include "esim/motion/imu_kinematics.h"
 #include "esim/sim/stopwatch.h"
 
@@ -266,8 +267,15 @@ Summary Simulator::finish() { return run_->finish(camera_due(world_, world_.info
 
 Summary simulate(World& world, Sink& out, const Monitor& monitor) {
   Simulator simulator(world, out);
-  simulator.advance_until(world.info.end, monitor);
-  return simulator.finish();
+  std::string problem;
+  try {
+    simulator.advance_until(world.info.end, monitor);
+  } catch (const EngineError& error) {
+    problem = error.what();
+  }
+  Summary summary = simulator.finish();
+  summary.problem = problem;
+  return summary;
 }
 
 }  // namespace esim

@@ -35,6 +35,7 @@ struct CameraSummary {
 /// What a simulation did, for the report.
 struct Summary {
   bool complete = false;
+  std::string problem;        ///< why it ended before its end; empty: it did not, or was interrupted
   TimeNs start = 0, end = 0;  ///< of the time that was simulated
   std::vector<CameraSummary> cameras;
   std::int64_t truth_frames = 0;
@@ -78,7 +79,7 @@ class Simulator {
 };
 
 /// Runs `world` from its start to its end and writes everything to `out`. The spine of the program: time moves only
-/// here.
+/// here. What comes before an EngineError is kept: the summary names the problem. Other errors are thrown.
 Summary simulate(World& world, Sink& out, const Monitor& monitor);
 
 }  // namespace esim

@@ -3,6 +3,7 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -15,10 +16,10 @@
 #include "esim/backends/opengl/gl_shaders.h"
 #include "esim/backends/opengl/gl_shadows.h"
 #include "esim/backends/opengl/gl_targets.h"
-#include "esim/backends/opengl/pinhole_view.h"
 #include "esim/core/error.h"
 #include "esim/render/bands.h"
 #include "esim/render/motion_field.h"
+#include "esim/render/pinhole_view.h"
 
 namespace esim {
 namespace {
@@ -35,6 +36,22 @@ struct ShaderLight {
   float strength[4];
 };
 
+PinholeView require_pinhole(const Camera& camera, const PixelRays& rays) {
+  try {
+    return pinhole_view(camera, rays, Pinhole::any);
+  } catch (const UserError& error) {
+    throw UserError(std::string("gl: ") + error.what() + "; use engine: raycast");
+  }
+}
+
+/// Clip coordinates x, y = (clip[0], clip[1]) X, Y + (clip[2], clip[3]) Z.
+std::array<float, 4> clip_of(const PinholeView& view) {
+  // Pixel centres are at integers: pixel u spans [u - 0.5, u + 0.5].
+  return {static_cast<float>(2 * view.fx / view.width), static_cast<float>(2 * view.fy / view.height),
+          static_cast<float>((2 * view.cx + 1) / view.width - 1),
+          static_cast<float>((2 * view.cy + 1) / view.height - 1)};
+}
+
 /// Passes one after the other: surfaces into a pinhole image; its samples into pixels; these into the distorted image,
 /// where the lens distorts. The last of them writes E, Z and V, once per pixel however many triangles were drawn there.
 class GlRenderer final : public Renderer {
@@ -42,14 +59,15 @@ class GlRenderer final : public Renderer {
   GlRenderer(const Scene& scene, const GlOptions& options, const Camera& camera)
       : lighting_(scene.lighting), camera_(camera), options_(options), context_(options.device) {
     const PixelRays rays(camera);
-    view_ = pinhole_view(camera, rays);
+    view_ = require_pinhole(camera, rays);
+    clip_ = clip_of(view_);
     const GlContext::Use use(context_);
     require_size();
     samples_ = offered_samples(options.samples_per_pixel);
     scene_.emplace(scene);
     if (lighting_ && lighting_->shadows) shadows_.emplace(scene, *scene_);
     make_passes();
-    if (view_.distorts) upload_lens(rays);
+    if (view_.looked_up) upload_lens(rays);
     glCreateVertexArrays(1, &no_vertices_);
     glCreateBuffers(1, &lights_);
     glCreateBuffers(1, &twists_);
@@ -70,7 +88,7 @@ class GlRenderer final : public Renderer {
     draw_surfaces(request);
     for (const Tile& tile : request.tiles) complete(tile);
     auto under_way = std::make_unique<UnderWay>(*this, std::move(request));
-    under_way->read_back->start(view_.distorts ? distorted_ : resolved_, under_way->request.tiles,
+    under_way->read_back->start(view_.looked_up ? distorted_ : resolved_, under_way->request.tiles,
                                 under_way->request.wants_objects());
     throw_on_gl_error("rendering");
     return under_way;
@@ -116,23 +134,23 @@ class GlRenderer final : public Renderer {
   }
 
   void make_passes() {
-    const GLenum floats = view_.distorts ? GL_RGBA32F : GL_RG32F;  // a lens needs to know how 1 / Z changes
+    const GLenum floats = view_.looked_up ? GL_RGBA32F : GL_RG32F;  // a lens needs to know how 1 / Z changes
     ShaderSource surfaces = {kSurfaceFragmentShader}, resolve = {kResolveFragmentShader};
     if (shadows_) surfaces.insert(surfaces.begin(), kShadowShader);
     surface_program_ = make_program({kSurfaceVertexShader}, surfaces);
     surfaces_ = GlTarget::make(view_.width, view_.height, samples_, true, floats);
     if (resolves()) {
-      if (!view_.distorts) resolve.insert(resolve.begin(), kLastPassShader);
+      if (!view_.looked_up) resolve.insert(resolve.begin(), kLastPassShader);
       if (samples_ > 1) resolve.insert(resolve.begin(), kSeveralSamples);
       resolve_program_ = make_program({kWholeImageVertexShader}, resolve);
       resolved_ = GlTarget::make(view_.width, view_.height, 1, false, GL_RGBA32F);
     }
-    if (view_.distorts) {
+    if (view_.looked_up) {
       distort_program_ = make_program({kWholeImageVertexShader}, {kLastPassShader, kDistortFragmentShader});
       distorted_ = GlTarget::make(camera_.width, camera_.height, 1, false, GL_RGBA32F);
     }
   }
-  bool resolves() const { return samples_ > 1 || !view_.distorts; }
+  bool resolves() const { return samples_ > 1 || !view_.looked_up; }
 
   void upload_lens(const PixelRays& rays) {
     const auto upload = [&](GLenum format, GLenum layout, const std::vector<float>& values) {
@@ -211,7 +229,7 @@ class GlRenderer final : public Renderer {
       draw_whole();
       shown = &resolved_;
     }
-    if (!view_.distorts) return;
+    if (!view_.looked_up) return;
     begin_pass(distorted_, tile, distort_program_);
     glBindTextureUnit(kSeen, shown->seen);
     glBindTextureUnit(kWhich, shown->which);
@@ -229,7 +247,7 @@ class GlRenderer final : public Renderer {
     glUseProgram(program);
     glEnable(GL_DEPTH_TEST);
     glBindVertexArray(scene_->vertices());
-    glUniform4fv(location(program, "clip"), 1, view_.clip.data());
+    glUniform4fv(location(program, "clip"), 1, clip_.data());
     set(program, "near", kNear);
     set(program, "ambient", lighting_ ? lighting_->ambient : 0.0F);
     set(program, "light_count", light_count_);
@@ -296,6 +314,7 @@ class GlRenderer final : public Renderer {
   GlOptions options_;
   GlContext context_;
   PinholeView view_;
+  std::array<float, 4> clip_{};
   int samples_ = 1;
   std::optional<GlScene> scene_;
   std::optional<GlShadows> shadows_;

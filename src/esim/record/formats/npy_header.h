@@ -5,8 +5,8 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
+#include "esim/core/npy_description.h"
 #include "esim/record/input_file.h"
 
 namespace esim {
@@ -15,12 +15,7 @@ namespace esim {
 /// array has grown. `type` as NumPy writes it: "<f4".
 std::string npy_header(std::string_view type, std::span<const std::uint64_t> shape);
 
-struct NpyHeader {
-  std::string type{};
-  std::vector<std::uint64_t> shape{};
-};
-
 /// Reads the header of versions 1 to 3, up to the first number. Fails for Fortran order and for structured arrays.
-NpyHeader read_npy_header(InputFile& file);
+NpyDescription read_npy_header(InputFile& file);
 
 }  // namespace esim

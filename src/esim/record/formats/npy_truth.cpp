@@ -63,7 +63,7 @@ template <typename T>
 class NpyReader {
  public:
   NpyReader(const fs::path& path, std::size_t item_rank) : file_(path) {
-    const NpyHeader header = read_npy_header(file_);
+    const NpyDescription header = read_npy_header(file_);
     if (header.type != kType<T>) file_.fail(0, fmt::format("its type is {}, not {}", header.type, kType<T>));
     if (header.shape.size() != item_rank + 1) file_.fail(0, fmt::format("it has not {} dimensions", item_rank + 1));
     items_ = header.shape[0];

@@ -1,4 +1,4 @@
-#include "esim/backends/opengl/pinhole_view.h"
+#include "esim/render/pinhole_view.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,21 +19,27 @@ double smaller_stretch(double a, double b, double c, double d) {
   return std::sqrt(std::max(0.0, 0.5 * (sum - root)));
 }
 
-std::array<float, 4> clip_of(double fx, double fy, double cx, double cy, int width, int height) {
-  // Pixel centres are at integers: pixel u spans [u - 0.5, u + 0.5].
-  return {static_cast<float>(2 * fx / width), static_cast<float>(2 * fy / height),
-          static_cast<float>((2 * cx + 1) / width - 1), static_cast<float>((2 * cy + 1) / height - 1)};
+/// Whether such a renderer draws the camera's own image.
+bool is_drawn(const Camera& camera, Pinhole which) {
+  if (!std::holds_alternative<NoDistortion>(camera.distortion)) return false;
+  constexpr double kNothing_px = 1e-6;
+  return which == Pinhole::any ||
+         (std::fabs(camera.cx - 0.5 * (camera.width - 1)) < kNothing_px &&
+          std::fabs(camera.cy - 0.5 * (camera.height - 1)) < kNothing_px &&
+          std::fabs(camera.fx - camera.fy) * std::max(camera.width, camera.height) < kNothing_px * camera.fx);
 }
 
 }  // namespace
 
-PinholeView pinhole_view(const Camera& camera, const PixelRays& rays) {
+double PinholeView::horizontal_fov_rad() const { return 2 * std::atan2(0.5 * width, fx); }
+
+PinholeView pinhole_view(const Camera& camera, const PixelRays& rays, Pinhole which) {
   PinholeView view;
   view.camera_width_ = camera.width;
-  view.distorts = !std::holds_alternative<NoDistortion>(camera.distortion);
-  if (!view.distorts) {
+  view.looked_up = !is_drawn(camera, which);
+  if (!view.looked_up) {
     view.width = camera.width, view.height = camera.height;
-    view.clip = clip_of(camera.fx, camera.fy, camera.cx, camera.cy, view.width, view.height);
+    view.fx = camera.fx, view.fy = camera.fy, view.cx = camera.cx, view.cy = camera.cy;
     return view;
   }
 
@@ -47,16 +53,22 @@ PinholeView pinhole_view(const Camera& camera, const PixelRays& rays) {
           std::min(finest, smaller_stretch(rays.dx_du(x, y), rays.dx_dv(x, y), rays.dy_du(x, y), rays.dy_dv(x, y)));
     }
   }
+  if (which == Pinhole::centred) {
+    right = std::max(-left, right), left = -right;
+    bottom = std::max(-top, bottom), top = -bottom;
+  }
   const double focal = 1 / finest;  // px: nowhere coarser than the camera's pixels
   const double width = focal * (right - left) + 2 * kMargin + 1, height = focal * (bottom - top) + 2 * kMargin + 1;
   constexpr double kLargest = 32768;
   if (!(width < kLargest && height < kLargest)) {
-    throw UserError("gl: the camera sees too wide for OpenGL's pinhole (" + std::to_string(std::lround(width)) + " x " +
-                    std::to_string(std::lround(height)) + " pixels would be needed); use engine: raycast");
+    throw UserError("the camera sees too wide for a pinhole image (" + std::to_string(std::lround(width)) + " x " +
+                    std::to_string(std::lround(height)) + " pixels would be needed)");
   }
   view.width = static_cast<int>(std::ceil(width)), view.height = static_cast<int>(std::ceil(height));
-  const double cx = kMargin - focal * left, cy = kMargin - focal * top;
-  view.clip = clip_of(focal, focal, cx, cy, view.width, view.height);
+  const bool centred = which == Pinhole::centred;
+  const double cx = centred ? 0.5 * (view.width - 1) : kMargin - focal * left;
+  const double cy = centred ? 0.5 * (view.height - 1) : kMargin - focal * top;
+  view.fx = view.fy = focal, view.cx = cx, view.cy = cy;
   const auto scaled = [focal](float value) { return static_cast<float>(focal * value); };
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
@@ -70,7 +82,7 @@ PinholeView pinhole_view(const Camera& camera, const PixelRays& rays) {
 }
 
 Tile PinholeView::part_for(const Tile& tile) const {
-  if (!distorts) return tile;
+  if (!looked_up) return tile;
   float left = std::numeric_limits<float>::max(), top = left, right = -left, bottom = -left;
   const auto look_at = [&](int x, int y) {
     const std::size_t i =

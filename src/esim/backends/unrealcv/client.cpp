@@ -1,0 +1,129 @@
+#include "esim/backends/unrealcv/client.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "esim/backends/unrealcv/engine_image.h"
+#include "esim/core/error.h"
+
+namespace esim {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+bool is_answered(const EngineBatch& batch) {
+  return !batch.empty() &&
+         std::all_of(batch.begin(), batch.end(), [](const EngineRequest& request) { return request.answer; });
+}
+
+}  // namespace
+
+/// Tells the program of a view and asks for its images. Throws ConnectionLost.
+void UnrealcvClient::submit(Asked& asked) {
+  // Four channels of eight bytes for each pixel.
+  constexpr std::size_t kPixel = 32;
+  session_->expect_up_to(kPixel * static_cast<std::size_t>(asked.view.width) *
+                         static_cast<std::size_t>(asked.view.height));
+  asked.batch = dialect_->commands_for(asked.view, state_);
+  session_->send(asked.batch);
+}
+
+std::shared_ptr<UnrealcvClient::Asked> UnrealcvClient::start(EngineView view) {
+  const std::lock_guard lock(mutex_);
+  forget_answered();
+  auto asked = std::make_shared<Asked>(Asked{std::move(view)});
+  asked_.push_back(asked);
+  if (session_) submit_or_lose(*asked);
+  return asked;
+}
+
+/// What is lost is submitted after connecting again.
+void UnrealcvClient::submit_or_lose(Asked& asked) {
+  try {
+    submit(asked);
+  } catch (const ConnectionLost&) {
+    session_.reset();
+  }
+}
+
+void UnrealcvClient::abandon(const std::shared_ptr<Asked>& asked) {
+  const std::lock_guard lock(mutex_);
+  asked->is_wanted = false;
+  if (!session_) asked_.remove(asked);
+  forget_answered();
+}
+
+/// Others are kept: the session writes answers into them.
+void UnrealcvClient::forget_answered() {
+  asked_.remove_if([](const auto& asked) { return !asked->is_wanted && is_answered(asked->batch); });
+}
+
+/// Connects, and asks again for what has no answer yet.
+void UnrealcvClient::connect(const EngineView& view, SteadyTime give_up) {
+  session_.emplace(options_, give_up);
+  state_ = {};
+  if (!dialect_) dialect_.emplace(options_, *session_, view, state_);
+  asked_.remove_if([](const auto& asked) { return !asked->is_wanted; });
+  for (const auto& asked : asked_) {
+    if (!is_answered(asked->batch)) submit(*asked);
+  }
+}
+
+/// The answers to what is asked, whatever connections that takes.
+void UnrealcvClient::wait_for(const Asked& asked) {
+  SteadyTime give_up = seconds_from_now(options_.timeout_s);
+  while (true) {
+    const bool was_connected = session_.has_value();
+    try {
+      if (!session_) connect(asked.view, give_up);
+      session_->wait_for(asked.batch);
+      return;
+    } catch (const ConnectionLost& lost) {
+      const bool never_there = !dialect_ && !session_;
+      session_.reset();
+      if (never_there) {
+        fail(options_, fmt::format("cannot be connected to: {}", lost.what()),
+             "start the program, or change renderer.host and renderer.port");
+      }
+      if (was_connected) give_up = seconds_from_now(options_.timeout_s);
+      if (Clock::now() >= give_up) {
+        fail(options_,
+             fmt::format("is gone ({}), and did not come back within {:g} s", lost.what(), options_.timeout_s),
+             "see why it ended");
+      }
+      constexpr int kBetweenTries_ms = 20;
+      ::poll(nullptr, 0, kBetweenTries_ms);
+    } catch (...) {
+      session_.reset();
+      throw;
+    }
+  }
+}
+
+void UnrealcvClient::finish(const std::shared_ptr<Asked>& asked, PinholeImage& image) {
+  const std::lock_guard lock(mutex_);
+  const SteadyTime give_up = seconds_from_now(options_.timeout_s);
+  for (bool first = true;; first = false) {
+    wait_for(*asked);
+    try {
+      dialect_->decode(asked->batch, asked->view, image);
+      break;
+    } catch (const OtherSize& other) {
+      // The window may take some frames to change.
+      if (!first && Clock::now() >= give_up) {
+        fail(options_,
+             fmt::format("was set to {} x {} pixels, but sends images of {} x {} for {:g} s", asked->view.width,
+                         asked->view.height, other.width, other.height, options_.timeout_s),
+             "let its window have any size, or change the camera's");
+      }
+      state_ = {};
+      submit_or_lose(*asked);
+    }
+  }
+  asked_.remove(asked);
+}
+
+}  // namespace esim

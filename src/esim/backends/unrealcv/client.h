@@ -1,0 +1,54 @@
+#pragma once
+
+#include <list>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "esim/backends/unrealcv/dialect.h"
+#include "esim/backends/unrealcv/session.h"
+
+namespace esim {
+
+/// A program that speaks UnrealCV's protocol, of which one camera is sent about. It is connected to when it is first
+/// waited for, and again when the connection is lost: then it is told and asked anew what is under way. May be used by
+/// several threads.
+class UnrealcvClient {
+ public:
+  explicit UnrealcvClient(UnrealcvOptions options) : options_(std::move(options)) {}
+
+  const UnrealcvOptions& options() const { return options_; }
+
+  /// A view that is under way.
+  struct Asked {
+    EngineView view;
+    EngineBatch batch{};
+    bool is_wanted = true;
+  };
+
+  /// Asks for a view; neither waits nor fails.
+  std::shared_ptr<Asked> start(EngineView view);
+
+  /// Waits for it. Throws EngineError naming the host, the port, what was asked, and what to do.
+  void finish(const std::shared_ptr<Asked>& asked, PinholeImage& image);
+
+  /// It need not be finished.
+  void abandon(const std::shared_ptr<Asked>& asked);
+
+ private:
+  void submit(Asked& asked);
+  void submit_or_lose(Asked& asked);
+  void connect(const EngineView& view, SteadyTime give_up);
+  void wait_for(const Asked& asked);
+  void forget_answered();
+
+  UnrealcvOptions options_;
+  std::mutex mutex_;
+  std::list<std::shared_ptr<Asked>> asked_;  // in the order in which the program is told of them; outlive the session
+  std::optional<EngineSession> session_;
+  std::optional<Dialect> dialect_;
+  EngineState state_;
+};
+
+}  // namespace esim

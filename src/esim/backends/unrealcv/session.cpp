@@ -1,0 +1,106 @@
+#include "esim/backends/unrealcv/session.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+
+#include "esim/core/engine_error.h"
+
+namespace esim {
+namespace {
+
+constexpr const char* kWrongServer = "change renderer.host and renderer.port";
+constexpr std::uint32_t kMostIds = 100'000'000;  // eight digits
+
+/// The id at the beginning of an answer, and where its body begins. A notification has none.
+std::optional<std::pair<std::uint32_t, std::size_t>> id_of(std::string_view message) {
+  constexpr std::size_t kMostDigits = 8;
+  const std::size_t digits = std::min(message.find_first_not_of("0123456789"), message.size());
+  if (digits == 0 || digits > kMostDigits || digits == message.size() || message[digits] != ':') return std::nullopt;
+  std::uint32_t id = 0;
+  std::from_chars(message.data(), message.data() + digits, id);
+  return std::pair{id, digits + 1};
+}
+
+}  // namespace
+
+void fail(const UnrealcvOptions& options, const std::string& problem, const std::string& remedy) {
+  throw EngineError(fmt::format("{} {}:{}: {}; {}", options.name, options.host, options.port, problem, remedy));
+}
+
+EngineSession::EngineSession(const UnrealcvOptions& options, SteadyTime deadline)
+    : options_(options), connection_(options.host, options.port, deadline) {
+  constexpr std::size_t kMostGreeting = 4096;
+  bool came = false;
+  try {
+    came = connection_.receive(message_, kMostGreeting, deadline);
+  } catch (const ConnectionLost&) {
+    throw ConnectionLost("it hangs up at once; a server of UnrealCV serves one client at a time");
+  } catch (const EngineError& error) {
+    fail(options, error.what(), kWrongServer);
+  }
+  if (!came) {
+    fail(options, fmt::format("does not greet within {:g} s", options.timeout_s),
+         "is it a server of UnrealCV, without another client?");
+  }
+  if (!message_.starts_with("connected")) fail(options, "does not greet as UnrealCV does", kWrongServer);
+}
+
+void EngineSession::send(EngineBatch& batch) {
+  for (EngineRequest& request : batch) waiting_.push_back(&request);
+  send_waiting();
+}
+
+void EngineSession::send_waiting() {
+  while (!waiting_.empty() && (options_.pipelined || pending_.empty())) {
+    last_id_ = (last_id_ + 1) % kMostIds;
+    EngineRequest& request = *waiting_.front();
+    waiting_.pop_front();
+    pending_[last_id_] = &request;
+    connection_.send(fmt::format("{}:{}", last_id_, request.command));
+  }
+}
+
+/// Whether it was an answer that somebody waits for.
+bool EngineSession::take(const std::string& message) {
+  const auto id = id_of(message);
+  if (!id) return false;
+  const auto found = pending_.find(id->first);
+  if (found == pending_.end()) throw EngineError(fmt::format("answers request {}, which was not made", id->first));
+  found->second->answer = message.substr(id->second);
+  pending_.erase(found);
+  return true;
+}
+
+void EngineSession::wait_for(const EngineBatch& batch) {
+  const EngineRequest* asked = nullptr;
+  SteadyTime patience = seconds_from_now(options_.timeout_s);
+  try {
+    for (const EngineRequest& request : batch) {
+      asked = &request;
+      while (!request.answer) {
+        send_waiting();
+        const bool came = connection_.receive(message_, most_bytes_, patience);
+        if (came && take(message_)) {
+          patience = seconds_from_now(options_.timeout_s);
+        } else if (!came || std::chrono::steady_clock::now() >= patience) {
+          throw EngineError(fmt::format("does not answer within {:g} s", options_.timeout_s));
+        }
+      }
+    }
+  } catch (const EngineError& error) {
+    fail(options_, fmt::format("asked for '{}', it {}", asked->command, error.what()),
+         "restart it, or raise renderer.timeout_s if it is slow");
+  }
+}
+
+EngineBatch EngineSession::ask(std::vector<std::string> commands) {
+  EngineBatch batch;
+  for (std::string& command : commands) batch.push_back({std::move(command)});
+  send(batch);
+  wait_for(batch);
+  return batch;
+}
+
+}  // namespace esim

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "esim/backends/unrealcv/connection.h"
+#include "esim/backends/unrealcv/unrealcv_options.h"
+
+namespace esim {
+
+/// Throws EngineError: "unrealcv 127.0.0.1:9000: PROBLEM; REMEDY".
+[[noreturn]] void fail(const UnrealcvOptions& options, const std::string& problem, const std::string& remedy);
+
+/// A command of UnrealCV, and what came back.
+struct EngineRequest {
+  std::string command;
+  std::optional<std::string> answer{};
+
+  bool is_refused() const { return answer && answer->starts_with("error"); }
+};
+
+using EngineBatch = std::vector<EngineRequest>;
+
+/// One connection with a server of UnrealCV's protocol: requests go out with ids, answers find them by these. After an
+/// exception it is of no further use.
+class EngineSession {
+ public:
+  /// Connects, and waits for the greeting. Throws ConnectionLost where nobody listens, or the server hangs up.
+  EngineSession(const UnrealcvOptions& options, SteadyTime deadline);
+
+  /// Answers may have as many bytes as that.
+  void expect_up_to(std::size_t bytes) { most_bytes_ = std::max(most_bytes_, bytes); }
+
+  /// Sends a batch, or puts it in the queue; it must live until it is answered, or the session ends.
+  void send(EngineBatch& batch);
+
+  /// Waits until all of it is answered. Throws ConnectionLost, and EngineError where no answer has come for too long.
+  void wait_for(const EngineBatch& batch);
+
+  /// Sends commands and waits for their answers.
+  EngineBatch ask(std::vector<std::string> commands);
+
+ private:
+  void send_waiting();
+  bool take(const std::string& message);
+
+  const UnrealcvOptions& options_;
+  MessageConnection connection_;
+  std::size_t most_bytes_ = std::size_t{1} << 27;  // of a message; more is refused
+  std::string message_;
+  std::uint32_t last_id_ = 0;
+  std::deque<EngineRequest*> waiting_;               // to be sent
+  std::map<std::uint32_t, EngineRequest*> pending_;  // sent, without answer
+};
+
+}  // namespace esim

@@ -1,0 +1,83 @@
+#include "esim/backends/unrealcv/unrealcv_renderer.h"
+
+#include <utility>
+
+#include "esim/backends/unrealcv/client.h"
+#include "esim/core/error.h"
+#include "esim/render/bands.h"
+
+namespace esim {
+namespace {
+
+PinholeView require_pinhole(const Camera& camera, const PixelRays& rays, const std::string& name) {
+  try {
+    return pinhole_view(camera, rays, Pinhole::centred);
+  } catch (const UserError& error) {
+    throw UserError(name + ": " + error.what() + "; use a camera with a narrower view");
+  }
+}
+
+class UnrealcvRenderer final : public Renderer {
+ public:
+  UnrealcvRenderer(std::shared_ptr<UnrealcvClient> client, const Camera& camera, const Workers& workers)
+      : client_(std::move(client)),
+        rays_(camera),
+        view_(require_pinhole(camera, rays_, client_->options().name)),
+        workers_(workers) {}
+
+  RendererTraits traits() const override {
+    const UnrealcvOptions& options = client_->options();
+    return {.name = options.name,
+            .granularity = Granularity::frame,
+            .device = options.host + ":" + std::to_string(options.port)};
+  }
+
+  std::unique_ptr<Rendering> start(RenderRequest request) override {
+    if (request.objects.size() != client_->options().objects.size())
+      throw InternalError("a request does not name as many objects as move in the scene");
+    EngineView view{view_.width, view_.height, view_.fx, request.camera.T_world_body};
+    for (const Kinematics& object : request.objects) view.objects.push_back(object.T_world_body);
+    return std::make_unique<UnderWay>(*this, std::move(request), client_->start(std::move(view)));
+  }
+
+ private:
+  struct UnderWay final : Rendering {
+    UnderWay(UnrealcvRenderer& from, RenderRequest what, std::shared_ptr<UnrealcvClient::Asked> engine)
+        : renderer(from), request(std::move(what)), asked(std::move(engine)) {}
+    ~UnderWay() override {
+      if (asked) renderer.client_->abandon(asked);
+    }
+    UnderWay(const UnderWay&) = delete;
+    UnderWay& operator=(const UnderWay&) = delete;
+
+    void finish(Sample& sample) override {
+      renderer.client_->finish(asked, renderer.image_);
+      asked.reset();
+      render_in_bands({&request, 1}, renderer.rays_, renderer.workers_, sample,
+                      [&](std::size_t, const Tile& band) { look_up(renderer.view_, renderer.image_, band, sample); });
+    }
+
+    UnrealcvRenderer& renderer;
+    RenderRequest request;
+    std::shared_ptr<UnrealcvClient::Asked> asked;
+  };
+
+  std::shared_ptr<UnrealcvClient> client_;
+  PixelRays rays_;
+  PinholeView view_;
+  const Workers& workers_;
+  PinholeImage image_;
+};
+
+}  // namespace
+
+std::shared_ptr<UnrealcvClient> make_unrealcv_client(UnrealcvOptions options) {
+  return std::make_shared<UnrealcvClient>(std::move(options));
+}
+
+std::unique_ptr<Renderer> make_unrealcv_renderer(std::shared_ptr<UnrealcvClient> client, const Camera& camera,
+                                                 const Workers& workers) {
+  return std::make_unique<UnrealcvRenderer>(std::move(client), camera, workers);
+}
+
+}  // namespace esim

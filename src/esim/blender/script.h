@@ -24,8 +24,8 @@ class ScratchFolder {
 /// Where Blender is. Throws UserError, which names the scene and says how to install it, where there is none.
 std::string blender_program(const std::filesystem::path& scene);
 
-/// What to run so that Blender runs a script with arguments; writes it into the folder. Blender then has no display, none
-/// of the user's settings, and runs no scripts of scenes; it ends with status 3 where the script fails.
+/// What to run so that Blender runs a script with arguments; writes it into the folder. Blender then has no display,
+/// none of the user's settings, and runs no scripts of scenes; it ends with status 3 where the script fails.
 std::vector<std::string> blender_command(const std::string& program, const ScratchFolder& folder,
                                          const std::string& script, const std::vector<std::string>& arguments);
 

@@ -45,15 +45,17 @@ BlenderServer::BlenderServer(const BlenderServerOptions& options, const BlenderN
         constexpr std::string_view kServing = "esim serving 127.0.0.1:", kWarning = "esim warning ";
         const bool names_file = line.starts_with("esim warning file ");  // for the cache of exports
         if (line.starts_with(kWarning) && !names_file) warning(line.substr(kWarning.size()));
-        if (line.starts_with(kServing)) std::from_chars(line.data() + kServing.size(), line.data() + line.size(), port_);
+        if (line.starts_with(kServing))
+          std::from_chars(line.data() + kServing.size(), line.data() + line.size(), port_);
         return port_ == 0;
       },
       options.timeout_s);
   if (serves) return;
   if (const auto why = why_ended()) throw UserError(fmt::format("scene {}: {}", options.scene.string(), *why));
-  throw UserError(fmt::format("scene {}: Blender does not show it within {:g} s; raise renderer.timeout_s, or look at it "
-                              "in Blender: {}",
-                              options.scene.string(), options.timeout_s, reason_in(parts_->process.output_tail())));
+  throw UserError(
+      fmt::format("scene {}: Blender does not show it within {:g} s; raise renderer.timeout_s, or look at it "
+                  "in Blender: {}",
+                  options.scene.string(), options.timeout_s, reason_in(parts_->process.output_tail())));
 }
 
 BlenderServer::~BlenderServer() = default;

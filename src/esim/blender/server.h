@@ -11,10 +11,10 @@ namespace esim {
 
 struct BlenderServerOptions {
   std::filesystem::path scene;
-  bool eevee = false;    ///< Blender's rasteriser instead of its path tracer, Cycles
-  int samples = 16;      ///< per pixel, until a client says otherwise
-  int seed = 0;          ///< of the path tracer's noise
-  int threads = 0;       ///< 0: as many as there are processors
+  bool eevee = false;      ///< Blender's rasteriser instead of its path tracer, Cycles
+  int samples = 16;        ///< per pixel, until a client says otherwise
+  int seed = 0;            ///< of the path tracer's noise
+  int threads = 0;         ///< 0: as many as there are processors
   double timeout_s = 120;  ///< longest wait for Blender to open the scene
 };
 

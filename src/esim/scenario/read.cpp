@@ -218,7 +218,7 @@ Scenario read_scenario(const ScenarioText& text) {
   require("trajectory", text.needs_trajectory);
   if (scenario.imu) read_imu(*scenario.imu, std::as_const(root)["imu"], source);
   CameraOptions camera;
-  if (std::holds_alternative<UnrealcvRendererOptions>(scenario.renderer)) camera.sampling = KeyframeSampling{};
+  if (engine_objects(scenario.renderer) != nullptr) camera.sampling = KeyframeSampling{};
   if (sprites != nullptr) {
     read_layers(*sprites, renderer, source, camera);
     complete_for_layers(scenario, *sprites, trajectory.IsDefined());

@@ -82,6 +82,7 @@ void UnrealcvClient::wait_for(const Asked& asked) {
       session_->wait_for(asked.batch);
       return;
     } catch (const ConnectionLost& lost) {
+      if (const auto why = options_.why_ended()) fail(options_, *why, "what was simulated until then is kept");
       const bool never_there = !dialect_ && !session_;
       session_.reset();
       if (never_there) {

@@ -1,7 +1,7 @@
 """Measures the studio room in Blender's Cycles: what the server adds to each image, the path tracer's noise, a second
 simulated with keyframes, and its brightness against a rendering at 1 kHz.
 
-    python3 bench/blender_room.py build/release/esim [OUT]
+    python3 bench/blender_room.py build/release/esim [OUT [overhead] [noise] [keyframes] [accuracy]]
 
 Takes some ten minutes on two processors. Needs Blender; Python's standard library alone.
 """
@@ -112,10 +112,9 @@ def main():
     if not (ROOM / "studio_room.blend").exists():
         subprocess.run([BLENDER, "--background", "--factory-startup", "--python", ROOM / "make_room.py"], check=True,
                        capture_output=True, env=ENVIRONMENT)
-    overhead()
-    noise(16)
-    keyframes(esim, out)
-    accuracy(esim, out)
+    steps = {"overhead": overhead, "noise": lambda: noise(16), "keyframes": lambda: keyframes(esim, out), "accuracy": lambda: accuracy(esim, out)}
+    for step in sys.argv[3:] or steps:
+        steps[step]()
 
 
 main()

@@ -89,7 +89,7 @@ class Blender(ProgramTest):
         dark = make_scene(self.folder, "dark")
         result = run("check", self.scenario(dark))
         self.assertIn("no light", result.stderr)
-        self.assert_refused(run("simulate", self.scenario(dark), "--out", self.out), "Box", "Cube")
+        self.assert_refused(run("simulate", self.scenario(dark), "--out", self.out), "no object Box", "Cube")
 
     @unittest.skipUnless(BLENDER, "there is no blender; apt install blender")
     def test_blender_ends_with_esim_and_its_end_is_told(self):

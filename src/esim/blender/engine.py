@@ -218,24 +218,23 @@ class Engine:
     def object(self, name):
         thing = self.objects.get(name)
         if thing is None:
-            raise CommandError(f"there is no object {name}, or it hangs on another; vget /objects lists them")
+            raise CommandError(f"there is no object {name} that hangs on no other, among {' '.join(self.objects)}")
         return thing
 
     def move(self, name, location=None, rotation=None):
         thing = self.object(name)
-        was = pose_of(thing)
-        if name not in self.moved:  # what else would move it
-            thing.animation_data_clear()
+        if name not in self.moved:
+            self.moved[name] = (*pose_of(thing), thing.matrix_world.to_scale())
+            thing.animation_data_clear()  # what else would move it
             thing.constraints.clear()
-            self.moved[name] = (was, thing.matrix_world.to_scale())
-        location, rotation = location or self.moved[name][0][0], rotation or self.moved[name][0][1]
-        scale = self.moved[name][1]
-        self.moved[name] = ((location, rotation), scale)
+        old_location, old_rotation, scale = self.moved[name]
+        location, rotation = location or old_location, rotation or old_rotation
+        self.moved[name] = (location, rotation, scale)
         thing.matrix_world = object_matrix(location, rotation, scale)
 
     def render(self, view):
         """The passes of the current state: lit (RGB), depth (planar, m), and with Cycles ids. Valid until the next call."""
-        key = (view.key(), self.size, self.samples, tuple((name, pose) for name, (pose, _) in sorted(self.moved.items())))
+        key = (view.key(), self.size, self.samples, tuple((name, *pose[:2]) for name, pose in sorted(self.moved.items())))
         if key == self.cached_key:
             return self.cached
         self.cached_key = None

@@ -88,8 +88,8 @@ class Commands:
                     result = answer(*match.groups())
                     return "ok" if result is None else result
                 except (CommandError, ValueError, RuntimeError, MemoryError) as error:
-                    return f"error {command[:200]}: {error}"
-        return f"error {command[:200]}: no such command"
+                    return f"error {error}"
+        return f"error there is no command '{command[:200]}'"
 
     def status(self):
         engine = self.engine

@@ -89,7 +89,7 @@ def keyframes(esim, out):
     recording = out / "second"
     start = time.perf_counter()
     subprocess.run([esim, "simulate", PROJECT / "scenes" / "studio_room.yaml", "--out", recording, "--force", "--quiet", "--set",
-                    "duration_s=1", "--set", f"renderer.address=127.0.0.1:{session.server.port}"], check=True)
+                    "duration_s=1", "--set", "truth.rate_hz=0", "--set", f"renderer.address=127.0.0.1:{session.server.port}"], check=True)
     wall = time.perf_counter() - start
     session.connect()
     renderings, rendering, _ = session.seconds()

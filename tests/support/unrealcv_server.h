@@ -30,8 +30,8 @@ namespace esim::test {
 struct ServedView {
   int width = 64, height = 48;
   double fov_deg = 90;
-  UnrealPose camera;
-  std::map<std::string, UnrealPose> objects;
+  UnrealPose camera{};
+  std::map<std::string, UnrealPose> objects{};
 
   Camera model() const { return Camera::from_fov(width, height, fov_deg * std::numbers::pi / 180); }
 };

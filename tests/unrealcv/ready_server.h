@@ -9,8 +9,8 @@ namespace esim::test {
 inline std::unique_ptr<UnrealcvServer> ready_server(const Camera& camera, bool png) {
   const PixelRays rays(camera);
   const PinholeView view = pinhole_view(camera, rays, Pinhole::centred);
-  const auto server = std::make_unique<UnrealcvServer>(show_ramp, std::vector<std::string>{},
-                                                       UnrealcvServer::Version{.npy_light = !png});
+  auto server = std::make_unique<UnrealcvServer>(show_ramp, std::vector<std::string>{},
+                                                 UnrealcvServer::Version{.npy_light = !png});
   Image<float> light(view.width, view.height);
   std::uint32_t noise = 1;
   for (int y = 0; y < view.height; ++y) {

@@ -154,7 +154,7 @@ void describe(Visitor& visit, EngineObjectOptions& o) {
 
 template <class Visitor>
 void describe(Visitor& visit, UnrealcvRendererOptions& o) {
-  visit("host", o.host, About{"where the program runs"});
+  visit("host", o.host, About{"where the program runs (default: 127.0.0.1)"});
   visit("port", o.port, About{"on which it listens", "", 1, 65535});
   visit("timeout_s", o.timeout_s,
         About{"longest wait for the connection, for each answer, and for a program that has gone away", "s", 0, 86400,

@@ -82,7 +82,8 @@ void UnrealcvClient::wait_for(const Asked& asked) {
       session_->wait_for(asked.batch);
       return;
     } catch (const ConnectionLost& lost) {
-      if (const auto why = options_.why_ended()) fail(options_, *why, "see what it says of the scene, and whether memory sufficed");
+      if (const auto why = options_.why_ended())
+        fail(options_, *why, "see what it says of the scene, and whether memory sufficed");
       const bool never_there = !dialect_ && !session_;
       session_.reset();
       if (never_there) {

@@ -18,6 +18,12 @@ class ConnectionLost : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What comes is not what the protocol says; the message is the end of a sentence about the server.
+class ProtocolError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// Messages over TCP, as UnrealCV frames them: a magic number and the payload's size, 32 bits each, little-endian, then
 /// the payload. Nothing here blocks beyond the deadline that it is given.
 class MessageConnection {
@@ -33,7 +39,7 @@ class MessageConnection {
   void send(std::string_view payload);
 
   /// The next message, of at most `most_bytes`; false where none has come by the deadline. Throws ConnectionLost, and
-  /// EngineError, which names no address, for what is no such message.
+  /// ProtocolError for what is no such message.
   bool receive(std::string& payload, std::size_t most_bytes, SteadyTime deadline);
 
  private:

@@ -40,12 +40,12 @@ std::string shortened(const std::string& text) {
 Dialect::Dialect(const UnrealcvOptions& options, EngineSession& session, const EngineView& view, EngineState& state)
     : options_(options), light_(options.light), depth_(options.depth), mask_(options.mask) {
   learn_commands(session);
+  if (!options.objects.empty()) learn_objects(session);
   EngineBatch settings = setting_commands(view, state);
   session.send(settings);
   session.wait_for(settings);
   require_done(settings);
   learn_images(session);
-  if (!options.objects.empty()) learn_objects(session);
 }
 
 std::string Dialect::camera(const char* verb, const std::string& rest) const {

@@ -10,7 +10,6 @@
 namespace esim {
 namespace {
 
-constexpr const char* kWrongServer = "change renderer.host and renderer.port";
 constexpr std::uint32_t kMostIds = 100'000'000;  // eight digits
 
 /// The id at the beginning of an answer, and where its body begins. A notification has none.
@@ -31,20 +30,23 @@ void fail(const UnrealcvOptions& options, const std::string& problem, const std:
 
 EngineSession::EngineSession(const UnrealcvOptions& options, SteadyTime deadline)
     : options_(options), connection_(options.host, options.port, deadline) {
+  try {
+    require_greeting(deadline);
+  } catch (const ProtocolError& error) {
+    fail(options, error.what(), "change renderer.host and renderer.port");
+  }
+}
+
+void EngineSession::require_greeting(SteadyTime deadline) {
   constexpr std::size_t kMostGreeting = 4096;
   bool came = false;
   try {
     came = connection_.receive(message_, kMostGreeting, deadline);
   } catch (const ConnectionLost&) {
     throw ConnectionLost("it hangs up at once; a server of UnrealCV serves one client at a time");
-  } catch (const EngineError& error) {
-    fail(options, error.what(), kWrongServer);
   }
-  if (!came) {
-    fail(options, fmt::format("does not greet within {:g} s", options.timeout_s),
-         "is it a server of UnrealCV, without another client?");
-  }
-  if (!message_.starts_with("connected")) fail(options, "does not greet as UnrealCV does", kWrongServer);
+  if (!came) throw ConnectionLost(fmt::format("it does not greet within {:g} s", options_.timeout_s));
+  if (!message_.starts_with("connected")) throw ProtocolError("does not greet as UnrealCV does");
 }
 
 void EngineSession::send(EngineBatch& batch) {
@@ -67,31 +69,32 @@ bool EngineSession::take(const std::string& message) {
   const auto id = id_of(message);
   if (!id) return false;
   const auto found = pending_.find(id->first);
-  if (found == pending_.end()) throw EngineError(fmt::format("answers request {}, which was not made", id->first));
+  if (found == pending_.end()) throw ProtocolError(fmt::format("answers request {}, which was not made", id->first));
   found->second->answer = message.substr(id->second);
   pending_.erase(found);
   return true;
 }
 
 void EngineSession::wait_for(const EngineBatch& batch) {
-  const EngineRequest* asked = nullptr;
   SteadyTime patience = seconds_from_now(options_.timeout_s);
-  try {
-    for (const EngineRequest& request : batch) {
-      asked = &request;
-      while (!request.answer) {
+  for (const EngineRequest& request : batch) {
+    while (!request.answer) {
+      bool is_answer = false, came = false;
+      try {
         send_waiting();
-        const bool came = connection_.receive(message_, most_bytes_, patience);
-        if (came && take(message_)) {
-          patience = seconds_from_now(options_.timeout_s);
-        } else if (!came || std::chrono::steady_clock::now() >= patience) {
-          throw EngineError(fmt::format("does not answer within {:g} s", options_.timeout_s));
-        }
+        came = connection_.receive(message_, most_bytes_, patience);
+        is_answer = came && take(message_);
+      } catch (const ProtocolError& error) {
+        fail(options_, fmt::format("asked for '{}', it {}", request.command, error.what()),
+             "restart it; is it a server of UnrealCV?");
+      }
+      if (is_answer) patience = seconds_from_now(options_.timeout_s);
+      if (!came || std::chrono::steady_clock::now() >= patience) {
+        fail(options_,
+             fmt::format("asked for '{}', it does not answer within {:g} s", request.command, options_.timeout_s),
+             "restart it, or raise renderer.timeout_s if it is slow");
       }
     }
-  } catch (const EngineError& error) {
-    fail(options_, fmt::format("asked for '{}', it {}", asked->command, error.what()),
-         "restart it, or raise renderer.timeout_s if it is slow");
   }
 }
 

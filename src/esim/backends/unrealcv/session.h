@@ -48,6 +48,7 @@ class EngineSession {
   EngineBatch ask(std::vector<std::string> commands);
 
  private:
+  void require_greeting(SteadyTime deadline);
   void send_waiting();
   bool take(const std::string& message);
 

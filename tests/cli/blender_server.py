@@ -78,7 +78,7 @@ class Client:
             if count == 0:
                 raise EOFError
             have += count
-        return bytes(data)
+        return data
 
     def receive(self):
         magic, size = struct.unpack("<II", self.take(8))

@@ -158,8 +158,8 @@ class UnrealcvServer {
     pollfd sockets[] = {{listener_, POLLIN, 0}, {client_, POLLIN, 0}};
     constexpr int kPatience_ms = 10;
     if (::poll(sockets, client_ < 0 ? 1 : 2, kPatience_ms) <= 0) return;
+    if (client_ >= 0 && sockets[1].revents != 0) receive();
     if (sockets[0].revents != 0) accept();
-    if (client_ >= 0 && sockets[1].fd == client_ && sockets[1].revents != 0) receive();
   }
 
   void accept() {

@@ -228,7 +228,7 @@ TEST_F(HostileServer, RandomDamageIsNeverMoreThanAnError) {
   // Of every byte of the image's header, and of what frames it. The image may survive, or the server seem silent.
   const Camera camera = test::small_camera();
   int errors = 0;
-  for (std::size_t at = 12; at < 140; at += 5) {
+  for (std::size_t at = 12; at < 140; at += 9) {
     server_.emplace(test::show_ramp);
     server_->tamper = [at](const std::string& command, std::string& bytes, bool&) {
       if (command.find("plane_depth") != std::string::npos) bytes[at] = static_cast<char>(bytes[at] ^ (1 + at % 255));
@@ -238,7 +238,7 @@ TEST_F(HostileServer, RandomDamageIsNeverMoreThanAnError) {
     const auto renderer = test::renderer_for(options, camera);
     errors += test::message_of<EngineError>([&] { test::render(*renderer, camera, {}); }) != "nothing was thrown";
   }
-  EXPECT_GT(errors, 10);
+  EXPECT_GT(errors, 5);
 }
 
 TEST_F(HostileServer, ObjectsThatItDoesNotKnow) {

@@ -53,6 +53,16 @@ class UnrealcvSimulation : public testing::Test {
   std::string timeout_ = "60", objects_;
 };
 
+/// Light that moves as the camera does.
+PinholeImage show_wave(const test::ServedView& view) {
+  PinholeImage image{Image<float>(view.width, view.height), Image<float>(view.width, view.height, 2.0F), {}};
+  for (int y = 0; y < view.height; ++y) {
+    for (int x = 0; x < view.width; ++x)
+      image.irradiance(x, y) = static_cast<float>(0.5 + 0.4 * std::sin(0.3 * x + 0.2 * view.camera.location_cm.y()));
+  }
+  return image;
+}
+
 constexpr const char* kSmall = "camera: {width: 80, height: 60}\n";
 
 TEST_F(UnrealcvSimulation, KeyframesAreTheDefaultAndAgreeWithDenseSampling) {
@@ -96,7 +106,7 @@ TEST_F(UnrealcvSimulation, ObjectsAreMovedAndSeen) {
       "[1.7, 0.4, 0.1], quaternion: [0, 0, 0, 1]}}}, {name: right, trajectory: {type: static, pose: {position: [2.4, "
       "-0.7, -0.2]}}}]";
   CountingSink out;
-  EXPECT_TRUE(run(scenario(kSmall), out).complete);
+  EXPECT_TRUE(run(scenario(std::string(kSmall) + "sampling: {type: uniform, rate_hz: 50}\n"), out).complete);
   EXPECT_EQ(out.info.objects, (std::vector<std::string>{"left", "right"}));
   std::set<std::string> places;
   for (const std::string& command : server_->commands())
@@ -106,8 +116,8 @@ TEST_F(UnrealcvSimulation, ObjectsAreMovedAndSeen) {
 }
 
 TEST_F(UnrealcvSimulation, WhatWasSimulatedBeforeTheServerDiedIsKept) {
-  serve("mesh");
-  timeout_ = "0.3";
+  server_.emplace(show_wave);
+  timeout_ = "1";
   const test::TemporaryDirectory folder;
   const Scenario dense = scenario(std::string(kSmall) + "sampling: {type: uniform, rate_hz: 500}\n");
   World world = build(dense);
@@ -141,7 +151,8 @@ TEST_F(UnrealcvSimulation, RefusesWhatItCannotDo) {
   EXPECT_TRUE(test::contains(refusal("camera: {width: 32, height: 24, colour: rggb}\nsampling: {type: flow}\n"),
                              "unrealcv shows grey only"));
   EXPECT_TRUE(
-      test::contains(refusal("camera: {width: 32, height: 24}\ntruth: {event_points: true}\n"), "truth.event_points"));
+      test::contains(refusal("camera: {width: 32, height: 24}\nsampling: {type: flow}\ntruth: {event_points: true}\n"),
+                     "truth.event_points"));
   server_->stop();
   EXPECT_TRUE(test::contains(refusal(kSmall), "cannot be connected to"));
 }

@@ -84,18 +84,10 @@ void UnrealcvClient::wait_for(const Asked& asked) {
     } catch (const ConnectionLost& lost) {
       if (const auto why = options_.why_ended())
         fail(options_, *why, "see what it says of the scene, and whether memory sufficed");
-      const bool never_there = !dialect_ && !session_;
       session_.reset();
-      if (never_there) {
-        fail(options_, fmt::format("cannot be connected to: {}", lost.what()),
-             "start the program, or change renderer.host and renderer.port");
-      }
       if (was_connected) give_up = seconds_from_now(options_.timeout_s);
-      if (Clock::now() >= give_up) {
-        fail(options_,
-             fmt::format("is gone ({}), and did not come back within {:g} s", lost.what(), options_.timeout_s),
-             "see why it ended");
-      }
+      const bool is_absent = !dialect_ && dynamic_cast<const ConnectionRefused*>(&lost) != nullptr;
+      if (is_absent || Clock::now() >= give_up) fail_to_connect(lost.what());
       constexpr int kBetweenTries_ms = 20;
       ::poll(nullptr, 0, kBetweenTries_ms);
     } catch (...) {
@@ -103,6 +95,14 @@ void UnrealcvClient::wait_for(const Asked& asked) {
       throw;
     }
   }
+}
+
+void UnrealcvClient::fail_to_connect(const std::string& reason) const {
+  if (!dialect_) {
+    fail(options_, "cannot be connected to: " + reason, "start the program, or change renderer.host and renderer.port");
+  }
+  fail(options_, fmt::format("is gone ({}), and did not come back within {:g} s", reason, options_.timeout_s),
+       "see why it ended");
 }
 
 void UnrealcvClient::finish(const std::shared_ptr<Asked>& asked, PinholeImage& image) {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "esim/backends/unrealcv/dialect.h"
@@ -41,6 +42,7 @@ class UnrealcvClient {
   void submit_or_lose(Asked& asked);
   void connect(const EngineView& view, SteadyTime give_up);
   void wait_for(const Asked& asked);
+  [[noreturn]] void fail_to_connect(const std::string& reason) const;
   void forget_answered();
 
   UnrealcvOptions options_;

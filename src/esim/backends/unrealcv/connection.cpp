@@ -80,7 +80,7 @@ MessageConnection::MessageConnection(const std::string& host, int port, SteadyTi
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* list = nullptr;
   const int failure = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &list);
-  if (failure != 0) throw ConnectionLost(std::string("no such host: ") + ::gai_strerror(failure));
+  if (failure != 0) throw ConnectionRefused(std::string("no such host: ") + ::gai_strerror(failure));
   const std::unique_ptr<addrinfo, FreeAddresses> addresses(list);
   std::string problem;
   for (const addrinfo* address = list; address != nullptr; address = address->ai_next) {
@@ -88,7 +88,7 @@ MessageConnection::MessageConnection(const std::string& host, int port, SteadyTi
     if (problem.empty()) break;
     if (socket_ >= 0) ::close(std::exchange(socket_, -1));
   }
-  if (!problem.empty()) throw ConnectionLost(problem);
+  if (!problem.empty()) throw ConnectionRefused(problem);
   const int on = 1;
   ::setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
 }

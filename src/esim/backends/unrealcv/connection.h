@@ -18,6 +18,12 @@ class ConnectionLost : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The other side does not want us; it may later.
+class ConnectionRefused : public ConnectionLost {
+ public:
+  using ConnectionLost::ConnectionLost;
+};
+
 /// What comes is not what the protocol says; the message is the end of a sentence about the server.
 class ProtocolError : public std::runtime_error {
  public:
@@ -28,7 +34,7 @@ class ProtocolError : public std::runtime_error {
 /// the payload. Nothing here blocks beyond the deadline that it is given.
 class MessageConnection {
  public:
-  /// Throws ConnectionLost where nobody listens there, or there is no such host.
+  /// Throws ConnectionRefused where nobody listens there, or there is no such host.
   MessageConnection(const std::string& host, int port, SteadyTime deadline);
   ~MessageConnection();
   MessageConnection(const MessageConnection&) = delete;

@@ -32,7 +32,8 @@ using EngineBatch = std::vector<EngineRequest>;
 /// exception it is of no further use.
 class EngineSession {
  public:
-  /// Connects, and waits for the greeting. Throws ConnectionLost where nobody listens, or the server hangs up.
+  /// Connects, and waits for the greeting. Throws ConnectionRefused where nobody listens, ConnectionLost where the
+  /// server hangs up, as it does while it has another client.
   EngineSession(const UnrealcvOptions& options, SteadyTime deadline);
 
   /// Answers may have as many bytes as that.

@@ -2,33 +2,10 @@
 # Arguments: the scene, the GLB, light paths per texel, largest side of a texture.
 import sys
 import tempfile
-import zlib
 
 import numpy as np
 
 LARGEST_AREA = 64.0  # m²; a surface of this size, or the largest of a smaller scene, gets a texture of the full size
-
-
-def png_chunk(kind, data):
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-
-def write_png(path, srgb):
-    """16 bits per channel, rows from the top."""
-    height, width, _ = srgb.shape
-    codes = np.round(np.clip(srgb, 0, 1) * 65535).astype(">u2")
-    rows = np.zeros((height, 1 + width * 6), np.uint8)  # each row begins with its filter: none
-    rows[:, 1:] = codes.reshape(height, -1).view(np.uint8)
-    with open(path, "wb") as file:
-        file.write(b"\x89PNG\r\n\x1a\n")
-        file.write(png_chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 16, 2, 0, 0, 0)))
-        file.write(png_chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)))
-        file.write(png_chunk(b"IEND", b""))
-
-
-def srgb_of(linear):
-    linear = np.clip(linear, 0, 1)
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.power(linear, 1 / 2.4) - 0.055)
 
 
 def area_of(thing):
@@ -155,7 +132,8 @@ def show_baked(thing, radiance, folder, number):
     """Replaces the materials by one that shows its texture in whatever light: a colour without a shader is unlit."""
     scale = radiance_scale(radiance)
     path = f"{folder}/{number}.png"
-    write_png(path, srgb_of(radiance / scale))
+    with open(path, "wb") as file:
+        file.write(esim_png(np.round(esim_srgb(radiance / scale) * 65535).astype(np.uint16)))
     image = bpy.data.images.load(path)
     image.pack()
     material = bpy.data.materials.new("baked_" + thing.name)

@@ -1,14 +1,12 @@
 #include "esim/blender/blender.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
-#include <cstdlib>
-#include <fstream>
 
 #include "esim/blender/process.h"
+#include "esim/blender/script.h"
 #include "esim/blender/scripts.h"
 #include "esim/core/error.h"
 
@@ -16,57 +14,6 @@ namespace esim {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A folder of its own for one run, gone with the object.
-class ScratchFolder {
- public:
-  explicit ScratchFolder(const fs::path& beside) {
-    std::string name = (beside / ".esim_XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr)
-      throw OutputError(fmt::format("{}: cannot be written to; check that it exists, its permissions, and the disk",
-                                    beside.string()));
-    path_ = name;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
-std::string blender_program(const fs::path& scene) {
-  const char* const chosen = std::getenv("ESIM_BLENDER");
-  const std::string name = chosen != nullptr && *chosen != '\0' ? chosen : "blender";
-  std::string program = find_program(name);
-  if (!program.empty()) return program;
-  throw UserError(
-      fmt::format("scene {}: needs Blender, but there is no program {}; install it with 'sudo apt install blender', or "
-                  "export the scene as GLB on a machine that has it",
-                  scene.string(), name));
-}
-
-/// The last of what Blender said that sounds like a reason, on one line.
-std::string reason_in(const std::string& output) {
-  std::string reason, last;
-  std::size_t begin = 0;
-  while (begin < output.size()) {
-    const std::size_t end = std::min(output.find('\n', begin), output.size());
-    const std::string line = output.substr(begin, end - begin);
-    begin = end + 1;
-    const bool says_nothing = line.find_first_not_of(' ') == std::string::npos || line.starts_with("Blender quit") ||
-                              line.find("script failed") != std::string::npos;
-    if (says_nothing) continue;
-    last = line;
-    if (line.find("Error") != std::string::npos || line.find("rror:") != std::string::npos) reason = line;
-  }
-  return reason.empty() ? last : reason;
-}
 
 /// Lets Blender run a script that writes `glb`. What it prints is "esim progress FRACTION WHAT" or "esim warning TEXT".
 bool run_script(const fs::path& scene, const std::string& script, const std::vector<std::string>& arguments,
@@ -77,17 +24,10 @@ bool run_script(const fs::path& scene, const std::string& script, const std::vec
 
   const fs::path folder = fs::absolute(glb).parent_path();
   const ScratchFolder scratch(folder);
-  const fs::path script_file = scratch.path() / "script.py", result = scratch.path() / "scene.glb";
-  std::ofstream(script_file) << script;
-  // Debian's Blender uses the first Python on PATH, which may be one that lacks the system's modules.
-  const char* const path = std::getenv("PATH");
-  std::vector<std::string> command = {
-      "/usr/bin/env", "-u",         "PYTHONHOME",
-      "-u",           "PYTHONPATH", fmt::format("PATH=/usr/bin:/bin:{}", path != nullptr ? path : "")};
-  command.insert(command.end(), {program, "--background", "--factory-startup", "--disable-autoexec"});
-  command.insert(command.end(), {"--python-exit-code", "3", "--python", script_file.string(), "--"});
-  command.insert(command.end(), {fs::absolute(scene).string(), result.string()});
-  command.insert(command.end(), arguments.begin(), arguments.end());
+  const fs::path result = scratch.path() / "scene.glb";
+  std::vector<std::string> all = {fs::absolute(scene).string(), result.string()};
+  all.insert(all.end(), arguments.begin(), arguments.end());
+  const std::vector<std::string> command = blender_command(program, scratch, script, all);
 
   double fraction = 0;
   std::string what = "starting Blender";
@@ -116,11 +56,11 @@ bool run_script(const fs::path& scene, const std::string& script, const std::vec
 bool is_blend(const fs::path& file) { return file.extension() == ".blend"; }
 
 bool export_blend(const fs::path& blend, const fs::path& glb, const BlenderWatch& watch) {
-  return run_script(blend, std::string(kLegacyScript) + kExportScript, {}, glb, watch);
+  return run_script(blend, std::string(kCommonScript) + kExportScript, {}, glb, watch);
 }
 
 bool bake_scene(const fs::path& scene, const fs::path& glb, const BakeOptions& options, const BlenderWatch& watch) {
-  return run_script(scene, std::string(kLegacyScript) + kBakeScript,
+  return run_script(scene, std::string(kCommonScript) + kBakeScript,
                     {std::to_string(options.samples), std::to_string(options.size_px)}, glb, watch);
 }
 

@@ -39,7 +39,7 @@ std::string hash_of(const fs::path& blend) {
   std::string buffer(1 << 20, '\0');
   while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || file.gcount() > 0)
     hash.add(buffer.data(), static_cast<std::size_t>(file.gcount()));
-  for (const std::string& part : {std::string(kLegacyScript), std::string(kExportScript), fs::absolute(blend).string()})
+  for (const std::string& part : {std::string(kCommonScript), std::string(kExportScript), fs::absolute(blend).string()})
     hash.add(part.data(), part.size());
   return hash.text();
 }

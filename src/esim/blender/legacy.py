@@ -1,18 +1,9 @@
 # Blender forgets the textures of materials made for its internal renderer (before 2.80) when it opens them. They still
 # stand in the file, whose layout it describes itself: this reads them there.
 import gzip
-import os
 import struct
 
 import bpy
-
-
-def esim_warn(text):
-    print("esim warning " + text.replace("\n", " "), flush=True)
-
-
-def esim_progress(fraction, what):
-    print(f"esim progress {fraction:.4f} {what}", flush=True)
 
 
 class BlendFile:
@@ -134,52 +125,3 @@ def esim_restore_legacy_materials(path):
         texture = material.node_tree.nodes.new("ShaderNodeTexImage")
         texture.image = image
         material.node_tree.links.new(shader.inputs["Base Color"], texture.outputs["Color"])
-
-
-def esim_find_images(folder):
-    """Images whose file is missing are looked for in the scene's own folder. Names the files that the scene uses."""
-    for image in bpy.data.images:
-        if image.source != "FILE" or image.packed_file is not None:
-            continue
-        path = os.path.abspath(bpy.path.abspath(image.filepath, library=image.library))
-        if not os.path.isfile(path):
-            beside = os.path.join(folder, os.path.basename(image.filepath.replace("\\", "/")))
-            print("esim warning file " + path, flush=True)
-            if os.path.isfile(beside):
-                image.filepath = path = beside
-                image.reload()
-            else:
-                esim_warn(f"image {image.name}: there is no {image.filepath}")
-        print("esim warning file " + path, flush=True)
-    for library in bpy.data.libraries:
-        print("esim warning file " + os.path.abspath(bpy.path.abspath(library.filepath)), flush=True)
-
-
-def esim_open(path):
-    """Shows the scene of a file, whatever its format."""
-    extension = os.path.splitext(path)[1].lower()
-    if extension == ".blend":
-        bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
-        esim_restore_legacy_materials(path)
-        esim_find_images(os.path.dirname(path))
-        return
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    if extension in (".glb", ".gltf"):
-        bpy.ops.import_scene.gltf(filepath=path)
-    elif extension == ".obj":
-        bpy.ops.wm.obj_import(filepath=path, forward_axis="Y", up_axis="Z")
-    elif extension == ".ply":
-        bpy.ops.import_mesh.ply(filepath=path)
-    elif extension == ".fbx":
-        bpy.ops.import_scene.fbx(filepath=path)
-    elif extension == ".dae":
-        bpy.ops.wm.collada_import(filepath=path)
-    else:
-        raise RuntimeError("Error: Blender does not know the format " + extension)
-
-
-def esim_export(path):
-    bpy.ops.export_scene.gltf(
-        filepath=path, export_format="GLB", export_yup=True, export_apply=True, export_cameras=True,
-        export_extras=True, export_animations=True, export_force_sampling=True, export_morph=False,
-        export_nla_strips=False, export_skins=False)

@@ -7,12 +7,16 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <deque>
+#include <mutex>
 #include <sstream>
+#include <thread>
+#include <utility>
 
 #include "esim/core/error.h"
 
@@ -37,7 +41,7 @@ constexpr std::size_t kTailLines = 40, kLongestLine = 2000;
 /// Splits what a program writes into lines, and keeps the last of them.
 class Lines {
  public:
-  explicit Lines(const LineHandler& on_line) : on_line_(on_line) {}
+  explicit Lines(LineHandler on_line) : on_line_(std::move(on_line)) {}
 
   bool take(const char* data, std::size_t size) {
     bool go_on = true;
@@ -53,24 +57,72 @@ class Lines {
 
   bool finish() {
     if (line_.empty()) return true;
-    tail_.push_back(line_);
-    if (tail_.size() > kTailLines) tail_.pop_front();
+    {
+      const std::lock_guard lock(mutex_);
+      tail_.push_back(line_);
+      if (tail_.size() > kTailLines) tail_.pop_front();
+    }
     const bool go_on = on_line_(line_);
     line_.clear();
     return go_on;
   }
 
   std::string tail() const {
+    const std::lock_guard lock(mutex_);
     std::string text;
     for (const std::string& line : tail_) text += line + "\n";
     return text;
   }
 
  private:
-  const LineHandler& on_line_;
+  LineHandler on_line_;
   std::string line_;
+  mutable std::mutex mutex_;  // of what is below
   std::deque<std::string> tail_;
 };
+
+struct Started {
+  pid_t child = -1;
+  int output = -1;  ///< the reading end of both its output streams
+};
+
+Started start(const std::vector<std::string>& command) {
+  int pipe[2];
+  if (::pipe2(pipe, O_CLOEXEC) != 0) throw InternalError(std::string("cannot make a pipe: ") + std::strerror(errno));
+  std::vector<char*> arguments;
+  for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
+  arguments.push_back(nullptr);
+  const pid_t child = ::fork();
+  if (child == 0) become(arguments.data(), pipe[1]);
+  ::close(pipe[1]);
+  if (child >= 0) return {child, pipe[0]};
+  ::close(pipe[0]);
+  throw UserError(command.front() + ": cannot be started: " + std::strerror(errno));
+}
+
+enum class Came { nothing, something, end };
+
+/// Waits for output of a program, for a tenth of a second; what `lines` says of it is and-ed to `go_on`.
+Came read_some(int output, Lines& lines, bool& go_on) {
+  constexpr int kPatience_ms = 100;
+  char buffer[1 << 14];
+  pollfd waiting{output, POLLIN, 0};
+  if (::poll(&waiting, 1, kPatience_ms) <= 0) return Came::nothing;
+  const ssize_t count = ::read(output, buffer, sizeof(buffer));
+  if (count == 0) return Came::end;
+  if (count > 0) go_on = lines.take(buffer, static_cast<std::size_t>(count)) && go_on;
+  return Came::something;
+}
+
+/// As in ProcessResult.
+int exit_status_of(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
+
+int wait_for_end(pid_t child) {
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return exit_status_of(status);
+}
 
 /// Ends a process and those that it started: politely first.
 void end_group(pid_t leader) {
@@ -97,46 +149,73 @@ std::string find_program(const std::string& name) {
 }
 
 ProcessResult run_process(const std::vector<std::string>& command, const LineHandler& on_line) {
-  int pipe[2];
-  if (::pipe2(pipe, O_CLOEXEC) != 0) throw InternalError(std::string("cannot make a pipe: ") + std::strerror(errno));
-  std::vector<char*> arguments;
-  for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
-  arguments.push_back(nullptr);
-  const pid_t child = ::fork();
-  if (child == 0) become(arguments.data(), pipe[1]);
-  ::close(pipe[1]);
-  if (child < 0) {
-    ::close(pipe[0]);
-    throw UserError(command.front() + ": cannot be started: " + std::strerror(errno));
-  }
-
-  // Until the program has closed its output, which it does when it ends.
+  const Started program = start(command);
   Lines lines(on_line);
   ProcessResult result;
-  std::string buffer(1 << 16, '\0');
+  // Until the program has closed its output, which it does when it ends.
   while (true) {
-    pollfd waiting{pipe[0], POLLIN, 0};
-    const int ready = ::poll(&waiting, 1, 100);
     bool go_on = on_line("");
-    if (ready > 0) {
-      const ssize_t count = ::read(pipe[0], buffer.data(), buffer.size());
-      if (count == 0) break;
-      if (count > 0) go_on = lines.take(buffer.data(), static_cast<std::size_t>(count)) && go_on;
-    }
+    if (read_some(program.output, lines, go_on) == Came::end) break;
     if (go_on) continue;
     result.cancelled = true;
-    end_group(child);
+    end_group(program.child);
     break;
   }
-  ::close(pipe[0]);
+  ::close(program.output);
   lines.finish();
-
-  int status = 0;
-  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  result.exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  result.exit_status = wait_for_end(program.child);
   result.output_tail = lines.tail();
   return result;
 }
+
+struct RunningProcess::State {
+  explicit State(const std::vector<std::string>& command) : program(start(command)) {}
+
+  Started program;
+  LineHandler on_line = [](const std::string&) { return true; };
+  Lines lines{[this](const std::string& line) { return on_line(line); }};
+  std::optional<int> exit_status;
+  std::atomic<bool> stop = false;
+  std::thread reader;
+};
+
+RunningProcess::RunningProcess(const std::vector<std::string>& command) : state_(std::make_unique<State>(command)) {}
+
+RunningProcess::~RunningProcess() {
+  if (!exit_status()) {
+    end_group(state_->program.child);
+    wait_for_end(state_->program.child);
+  }
+  state_->stop = true;
+  if (state_->reader.joinable()) state_->reader.join();
+  ::close(state_->program.output);
+}
+
+bool RunningProcess::read_until(const LineHandler& on_line, double timeout_s) {
+  const auto give_up = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout_s);
+  bool go_on = true;
+  state_->on_line = on_line;
+  while (go_on && std::chrono::steady_clock::now() < give_up) {
+    // A program that has closed its output is about to end.
+    if (read_some(state_->program.output, state_->lines, go_on) == Came::end && exit_status()) break;
+  }
+  state_->on_line = [](const std::string&) { return true; };
+  if (go_on) return false;
+  state_->reader = std::thread([state = state_.get()] {
+    bool unused = true;
+    while (!state->stop && read_some(state->program.output, state->lines, unused) != Came::end) {
+    }
+  });
+  return true;
+}
+
+std::optional<int> RunningProcess::exit_status() {
+  int status = 0;
+  if (!state_->exit_status && ::waitpid(state_->program.child, &status, WNOHANG) == state_->program.child)
+    state_->exit_status = exit_status_of(status);
+  return state_->exit_status;
+}
+
+std::string RunningProcess::output_tail() const { return state_->lines.tail(); }
 
 }  // namespace esim

@@ -80,8 +80,13 @@ std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const S
 using RendererFactory =
     std::function<std::unique_ptr<Renderer>(const Camera& camera, ColourFilters filters, const Workers& workers)>;
 
-/// Cameras may have colour filters if `colour`.
-RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene, bool colour);
+/// Cameras may have colour filters if `colour`. Renderers are made for the sensors, and for cameras that are denser.
+RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene, bool colour,
+                                       const std::vector<CameraInfo>& sensors, const Notices& notices);
+
+/// Starts Blender, which runs as long as any renderer of the factory's, or finds the one that runs already.
+RendererFactory start_blender(const BlenderRendererOptions& options, const std::vector<CameraInfo>& sensors,
+                              const Notices& notices);
 
 /// Gives a world with cameras the ground truth that its scenario asks for. Throws UserError where that cannot be had.
 void prepare_truth(const Scenario& scenario, const SceneFile& scene, const RendererFactory& make_renderer,

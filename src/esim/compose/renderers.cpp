@@ -144,8 +144,17 @@ RendererFactory factory(const UnrealcvRendererOptions& options, const SceneFile&
 
 }  // namespace
 
-RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene, bool colour) {
-  return std::visit([&](const auto& renderer) { return factory(renderer, scene, colour); }, options);
+RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene, bool colour,
+                                       const std::vector<CameraInfo>& sensors, const Notices& notices) {
+  return std::visit(
+      [&]<typename Options>(const Options& renderer) {
+        if constexpr (std::is_same_v<Options, BlenderRendererOptions>) {
+          return start_blender(renderer, sensors, notices);
+        } else {
+          return factory(renderer, scene, colour);
+        }
+      },
+      options);
 }
 
 }  // namespace esim

@@ -195,9 +195,9 @@ std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const S
                                                                          const Notices& notices) {
   std::vector<std::shared_ptr<const Trajectory>> trajectories;
   const TimeSpan span{body.start(), simulated.end};
-  if (const auto* const engine = std::get_if<UnrealcvRendererOptions>(&scenario.renderer)) {
-    for (std::size_t i = 0; i < engine->objects.size(); ++i)
-      trajectories.push_back(build_for_object(engine->objects[i].trajectory, i, scenario, span, simulated, notices));
+  if (const auto* const objects = engine_objects(scenario.renderer)) {
+    for (std::size_t i = 0; i < objects->size(); ++i)
+      trajectories.push_back(build_for_object((*objects)[i].trajectory, i, scenario, span, simulated, notices));
   }
   const auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
   if (mesh == nullptr) return trajectories;

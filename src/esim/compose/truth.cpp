@@ -54,12 +54,13 @@ void warn_of_much(const Scenario& scenario, double duration_s, const Notices& no
 
 /// Renderers of the same scene on the processor, as fast as they are for single pixels where depth is all that counts:
 /// a graphics card would draw everything for each.
-EventPoints::MakeRenderer for_single_pixels(RendererFactory make_renderer, RendererOptions options, SceneFile scene) {
+EventPoints::MakeRenderer for_single_pixels(RendererFactory make_renderer, RendererOptions options, SceneFile scene,
+                                            const World& world, const Notices& notices) {
   if (auto* const mesh = std::get_if<MeshRendererOptions>(&options)) {
     mesh->engine = MeshEngine::raycast;
     mesh->samples_per_pixel = 1;
     scene.scene.lighting.reset();
-    make_renderer = build_renderer_factory(options, scene, false);
+    make_renderer = build_renderer_factory(options, scene, false, world.info.cameras, notices);
   }
   return [make_renderer = std::move(make_renderer)](const Camera& camera, const Workers& workers) {
     return make_renderer(camera, ColourFilters::none, workers);
@@ -79,7 +80,8 @@ void prepare_truth(const Scenario& scenario, const SceneFile& scene, const Rende
 
   world.truth_objects = truth.objects;
   EventPoints::MakeRenderer make_pixel_renderer;
-  if (truth.event_points) make_pixel_renderer = for_single_pixels(make_renderer, scenario.renderer, scene);
+  if (truth.event_points)
+    make_pixel_renderer = for_single_pixels(make_renderer, scenario.renderer, scene, world, notices);
   for (std::size_t i = 0; i < world.cameras.size(); ++i) {
     CameraChannel& camera = world.cameras[i];
     const Camera& model = world.info.cameras[i].model;

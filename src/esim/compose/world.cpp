@@ -161,8 +161,8 @@ void name_what_moves(const RendererOptions& renderer, const SceneFile& scene, Re
   if (const auto* const sprites = std::get_if<SpritesRendererOptions>(&renderer)) {
     for (std::size_t i = 0; i < sprites->layers.size(); ++i) info.layers.push_back(fmt::format("layer{}", i));
   }
-  if (const auto* const engine = std::get_if<UnrealcvRendererOptions>(&renderer)) {
-    for (const EngineObjectOptions& object : engine->objects) info.objects.push_back(object.name);
+  if (const auto* const objects = engine_objects(renderer)) {
+    for (const EngineObjectOptions& object : *objects) info.objects.push_back(object.name);
   }
 }
 
@@ -221,7 +221,7 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
   const RendererFactory make_renderer =
       substitutes.make_renderer
           ? [&](const Camera& camera, ColourFilters, const Workers&) { return substitutes.make_renderer(camera); }
-          : build_renderer_factory(scenario.renderer, scene, sees_colour(scenario));
+          : build_renderer_factory(scenario.renderer, scene, sees_colour(scenario), world.info.cameras, notices);
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
     const CameraOptions& options = scenario.cameras[i];
     const Camera& model = world.info.cameras[i].model;

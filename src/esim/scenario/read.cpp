@@ -227,7 +227,7 @@ Scenario read_scenario(const ScenarioText& text) {
     }
   }
   CameraOptions camera;
-  if (std::holds_alternative<UnrealcvRendererOptions>(scenario.renderer)) camera.sampling = KeyframeSampling{};
+  if (engine_objects(scenario.renderer) != nullptr) camera.sampling = KeyframeSampling{};
   if (sprites != nullptr) {
     read_layers(*sprites, renderer, source, camera);
     complete_for_layers(scenario, *sprites, trajectory.IsDefined());

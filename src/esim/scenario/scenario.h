@@ -189,8 +189,31 @@ struct UnrealcvRendererOptions {
   int lag_frames = 0;
 };
 
+enum class BlenderEngine { cycles, eevee };
+
+/// Blender, which is started to render a scene, or runs already.
+struct BlenderRendererOptions {
+  static constexpr const char* kType = "blender";
+  std::filesystem::path scene;
+  std::string address;
+  BlenderEngine engine = BlenderEngine::cycles;
+  int samples = 16;
+  int noise_seed = 0;
+  int threads = 0;
+  std::vector<EngineObjectOptions> objects;
+  double exposure = 1.0;
+  double timeout_s = 600;
+};
+
 using RendererOptions = std::variant<MeshRendererOptions, PanoramaRendererOptions, PlaneRendererOptions,
-                                     SpritesRendererOptions, UnrealcvRendererOptions>;
+                                     SpritesRendererOptions, UnrealcvRendererOptions, BlenderRendererOptions>;
+
+/// What moves in the scene of another program that renders; null where none does.
+inline const std::vector<EngineObjectOptions>* engine_objects(const RendererOptions& renderer) {
+  if (const auto* const unrealcv = std::get_if<UnrealcvRendererOptions>(&renderer)) return &unrealcv->objects;
+  if (const auto* const blender = std::get_if<BlenderRendererOptions>(&renderer)) return &blender->objects;
+  return nullptr;
+}
 
 // --- cameras -----------------------------------------------------------------------------------------------------
 

@@ -202,6 +202,24 @@ void describe(Visitor& visit, UnrealcvRendererOptions& o) {
 }
 
 template <class Visitor>
+void describe(Visitor& visit, BlenderRendererOptions& o) {
+  visit("scene", o.scene, About{"what Blender opens: .blend, or .glb, .obj, .ply, .fbx, .dae"});
+  visit(
+      "address", o.address,
+      About{"HOST:PORT of a Blender that serves already, instead of one that is started; scene, engine, noise_seed and "
+            "threads are its own"});
+  visit("engine", o.engine, About{"cycles: path tracing; eevee: Blender's rasteriser"});
+  visit("samples", o.samples,
+        About{"light paths per pixel of the sensor; the pixels of denser keyframes share them", "", 1, 65536});
+  visit("noise_seed", o.noise_seed, About{"of the path tracer", "", 0, 2147483647});
+  visit("threads", o.threads, About{"that Blender renders with; 0: all processors", "", 0, 1024});
+  visit("objects", o.objects, About{"things of the scene that are moved: a list of maps of"});
+  visit("exposure", o.exposure, About{"factor from Blender's linear light to irradiance", "", 0, 1e6, true});
+  visit("timeout_s", o.timeout_s,
+        About{"longest wait for Blender to open the scene, and for each image", "s", 0, 86400, true});
+}
+
+template <class Visitor>
 void describe(Visitor&, NoDistortionOptions&) {}
 
 template <class Visitor>
@@ -305,6 +323,8 @@ template <>
 inline constexpr std::array<const char*, 2> kEnumNames<KeyframeInterpolation>{"spline", "linear"};
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<MeshEngine>{"raycast", "gl", "auto"};
+template <>
+inline constexpr std::array<const char*, 2> kEnumNames<BlenderEngine>{"cycles", "eevee"};
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<EngineLight>{"auto", "png", "npy"};
 template <>

@@ -121,6 +121,10 @@ EngineBatch Dialect::setting_commands(const EngineView& view, EngineState& state
     add(camera("vset", fmt::format("{} {:.8f}", fov_command_, fov_deg)));
     state.horizontal_fov_deg = fov_deg;
   }
+  if (state.samples != view.samples) {
+    add(fmt::format("vrun esim.samples {}", view.samples));
+    state.samples = view.samples;
+  }
   const UnrealPose pose = unreal_camera_pose_of(view.T_world_camera);
   if (has_pose_) {
     add(camera("vset", fmt::format("pose {} {}", location_text(pose), rotation_text(pose))));

@@ -16,12 +16,14 @@ struct EngineView {
   double focal_px = 0;  ///< the principal point is in the middle
   SE3 T_world_camera;
   std::vector<SE3> objects{};  ///< T_world_object
+  int samples = 0;             ///< per pixel; 0: as many as the program likes
 };
 
 /// What a program was last told of its camera; nothing after connecting.
 struct EngineState {
   int width = 0, height = 0;
   double horizontal_fov_deg = 0;
+  int samples = 0;
 };
 
 /// The commands that one server understands, among those that versions of UnrealCV differ in.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +23,9 @@ struct UnrealcvOptions {
   EngineMask mask = EngineMask::automatic;
   double exposure = 1;               ///< factor from the program's light to irradiance
   std::vector<std::string> objects;  ///< names of what moves, in the order of RenderRequest::objects
+
+  /// Why the program has ended; nothing while it runs, or where that is not known.
+  std::function<std::optional<std::string>()> why_ended = [] { return std::nullopt; };
 };
 
 }  // namespace esim

@@ -19,10 +19,11 @@ PinholeView require_pinhole(const Camera& camera, const PixelRays& rays, const s
 
 class UnrealcvRenderer final : public Renderer {
  public:
-  UnrealcvRenderer(std::shared_ptr<UnrealcvClient> client, const Camera& camera, const Workers& workers)
+  UnrealcvRenderer(std::shared_ptr<UnrealcvClient> client, const Camera& camera, const Workers& workers, int samples)
       : client_(std::move(client)),
         rays_(camera),
         view_(require_pinhole(camera, rays_, client_->options().name)),
+        samples_(samples),
         workers_(workers) {}
 
   RendererTraits traits() const override {
@@ -36,6 +37,7 @@ class UnrealcvRenderer final : public Renderer {
     if (request.objects.size() != client_->options().objects.size())
       throw InternalError("a request does not name as many objects as move in the scene");
     EngineView view{view_.width, view_.height, view_.fx, request.camera.T_world_body};
+    view.samples = samples_;
     for (const Kinematics& object : request.objects) view.objects.push_back(object.T_world_body);
     return std::make_unique<UnderWay>(*this, std::move(request), client_->start(std::move(view)));
   }
@@ -65,6 +67,7 @@ class UnrealcvRenderer final : public Renderer {
   std::shared_ptr<UnrealcvClient> client_;
   PixelRays rays_;
   PinholeView view_;
+  int samples_;
   const Workers& workers_;
   PinholeImage image_;
 };
@@ -76,8 +79,8 @@ std::shared_ptr<UnrealcvClient> make_unrealcv_client(UnrealcvOptions options) {
 }
 
 std::unique_ptr<Renderer> make_unrealcv_renderer(std::shared_ptr<UnrealcvClient> client, const Camera& camera,
-                                                 const Workers& workers) {
-  return std::make_unique<UnrealcvRenderer>(std::move(client), camera, workers);
+                                                 const Workers& workers, int samples) {
+  return std::make_unique<UnrealcvRenderer>(std::move(client), camera, workers, samples);
 }
 
 }  // namespace esim

@@ -1,0 +1,75 @@
+#include "esim/blender/script.h"
+
+#include <fmt/format.h>
+#include <stdlib.h>  // mkdtemp
+
+#include <algorithm>
+#include <fstream>
+
+#include "esim/blender/process.h"
+#include "esim/core/error.h"
+
+namespace esim {
+
+namespace fs = std::filesystem;
+
+ScratchFolder::ScratchFolder(const fs::path& beside) {
+  std::string name = (beside / ".esim_XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) {
+    throw OutputError(
+        fmt::format("{}: cannot be written to; check that it exists, its permissions, and the disk", beside.string()));
+  }
+  path_ = name;
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+std::string blender_program(const fs::path& scene) {
+  const char* const chosen = std::getenv("ESIM_BLENDER");
+  const std::string name = chosen != nullptr && *chosen != '\0' ? chosen : "blender";
+  std::string program = find_program(name);
+  if (!program.empty()) return program;
+  throw UserError(
+      fmt::format("scene {}: needs Blender, but there is no program {}; install it with 'sudo apt install blender', or "
+                  "export the scene as GLB on a machine that has it",
+                  scene.string(), name));
+}
+
+std::vector<std::string> blender_command(const std::string& program, const ScratchFolder& folder,
+                                         const std::string& script, const std::vector<std::string>& arguments) {
+  const fs::path script_file = folder.path() / "script.py";
+  std::ofstream out(script_file);
+  out << script;
+  out.close();
+  if (!out) throw OutputError(fmt::format("cannot write {}; is the disk full?", script_file.string()));
+  // Debian's Blender uses the first Python on PATH, which may be one that lacks the system's modules.
+  const char* const path = std::getenv("PATH");
+  std::vector<std::string> command = {
+      "/usr/bin/env", "-u",         "PYTHONHOME",
+      "-u",           "PYTHONPATH", fmt::format("PATH=/usr/bin:/bin:{}", path != nullptr ? path : "")};
+  command.insert(command.end(), {program, "--background", "--factory-startup", "--disable-autoexec"});
+  command.insert(command.end(), {"--python-exit-code", "3", "--python", script_file.string(), "--"});
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  return command;
+}
+
+std::string reason_in(const std::string& output) {
+  std::string reason, last;
+  std::size_t begin = 0;
+  while (begin < output.size()) {
+    const std::size_t end = std::min(output.find('\n', begin), output.size());
+    const std::string line = output.substr(begin, end - begin);
+    begin = end + 1;
+    const bool says_nothing = line.find_first_not_of(' ') == std::string::npos || line.starts_with("Blender quit") ||
+                              line.find("script failed") != std::string::npos;
+    if (says_nothing) continue;
+    last = line;
+    if (line.find("Error") != std::string::npos || line.find("rror:") != std::string::npos) reason = line;
+  }
+  return reason.empty() ? last : reason;
+}
+
+}  // namespace esim

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+/// How Blender is made to run a script; shared by what does so.
+namespace esim {
+
+/// A folder of its own for one run, gone with the object.
+class ScratchFolder {
+ public:
+  explicit ScratchFolder(const std::filesystem::path& beside);
+  ~ScratchFolder();
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// Where Blender is. Throws UserError, which names the scene and says how to install it, where there is none.
+std::string blender_program(const std::filesystem::path& scene);
+
+/// What to run so that Blender runs a script with arguments; writes it into the folder. Blender then has no display,
+/// none of the user's settings, and runs no scripts of scenes; it ends with status 3 where the script fails.
+std::vector<std::string> blender_command(const std::string& program, const ScratchFolder& folder,
+                                         const std::string& script, const std::vector<std::string>& arguments);
+
+/// The last of what Blender said that sounds like a reason, on one line.
+std::string reason_in(const std::string& output);
+
+}  // namespace esim

@@ -1,0 +1,283 @@
+# Shows the scene that is open in Blender to programs that speak the protocol of UnrealCV, on this machine alone:
+#   blender --background room.blend --python serve.py -- --port 9000
+# docs/blender.md lists the commands. What Blender renders for them: engine.py.
+import argparse
+import io
+import math
+import os
+import re
+import select
+import signal
+import socket
+import struct
+import sys
+
+if "esim_open" not in globals():  # run by hand: esim itself puts the files one behind the other
+    for _part in ("legacy.py", "common.py", "engine.py"):
+        with open(os.path.join(os.path.dirname(os.path.realpath(__file__)), _part)) as _file:
+            exec(_file.read())
+
+import bpy
+import numpy as np
+
+MAGIC = 0x9E2B83C1
+LONGEST_REQUEST = 1 << 16  # bytes
+LARGEST_SIDE, MOST_PIXELS = 16384, 1 << 26
+
+
+# --- commands ---------------------------------------------------------------------------------------------------------
+
+def colour_of(number):
+    """The colour of an object in masks: its number, in red and green. What is no object is black."""
+    return number & 255, number >> 8, 0
+
+
+def numbers(text, count):
+    parts = text.split()
+    values = tuple(float(part) for part in parts) if len(parts) == count else ()
+    if len(values) != count or not all(math.isfinite(value) for value in values):
+        raise CommandError(f"wants {count} numbers")
+    return values
+
+
+def spell(*values):
+    return " ".join(f"{value:.9g}" for value in values)
+
+
+class Commands:
+    """Answers requests with text, bytes, or bytes in parts."""
+
+    def __init__(self, engine):
+        self.engine = engine
+        self.views = {"0": engine.first}
+        number = r"/camera/(\d{1,2})"
+        self.table = [(re.compile(pattern + r"\Z", re.IGNORECASE), answer) for pattern, answer in (
+            (r"vget /unrealcv/status", self.status),
+            (r"vget /unrealcv/version", lambda: "esim for Blender " + bpy.app.version_string),
+            (r"vget /objects", lambda: " ".join(engine.objects)),
+            (r"vget /object/(.+)/location", lambda name: spell(*pose_of(self.object(name))[0])),
+            (r"vget /object/(.+)/rotation", lambda name: spell(*pose_of(self.object(name))[1])),
+            (r"vget /object/(.+)/color", self.colour),
+            (r"vset /object/(.+)/location (.+)", lambda name, text: self.move(name, location=text)),
+            (r"vset /object/(.+)/rotation (.+)", lambda name, text: self.move(name, rotation=text)),
+            (r"vrun r\.setres (\d{1,5})x(\d{1,5})[wf]?", self.resize),
+            (r"vrun esim\.samples (\d{1,5})", self.set_samples),
+            (rf"vset {number}/size (\d{{1,5}}) (\d{{1,5}})", lambda _, width, height: self.resize(width, height)),
+            (rf"vget {number}/size", lambda _: spell(*engine.size)),
+            (rf"vget {number}/pose", lambda i: spell(*self.view(i).location, *self.view(i).rotation)),
+            (rf"vget {number}/location", lambda i: spell(*self.view(i).location)),
+            (rf"vget {number}/rotation", lambda i: spell(*self.view(i).rotation)),
+            (rf"vget {number}/(?:horizontal_fieldofview|fov)", lambda i: spell(self.view(i).field_of_view)),
+            (rf"vset {number}/pose (.+)", self.set_pose),
+            (rf"vset {number}/location (.+)", lambda i, text: self.set(i, "location", numbers(text, 3))),
+            (rf"vset {number}/rotation (.+)", lambda i, text: self.set(i, "rotation", numbers(text, 3))),
+            (rf"vset {number}/(?:horizontal_fieldofview|fov) (.+)", self.set_field_of_view),
+            (rf"vget {number}/lit npy", lambda i: self.npy(self.render(i)["lit"])),
+            (rf"vget {number}/lit png", self.lit_png),
+            (rf"vget {number}/plane_depth npy", lambda i: self.npy(self.render(i)["depth"])),
+            (rf"vget {number}/depth npy", self.ray_length),
+            (rf"vget {number}/object_mask npy", lambda i: self.npy(self.ids(i))),
+            (rf"vget {number}/object_mask png", self.mask_png),
+        )]
+
+    def answer(self, command):
+        for pattern, answer in self.table:
+            match = pattern.match(command.strip())
+            if match:
+                try:
+                    result = answer(*match.groups())
+                    return "ok" if result is None else result
+                except (CommandError, ValueError, RuntimeError, MemoryError) as error:
+                    return f"error {error}"
+        return f"error there is no command '{command[:200]}'"
+
+    def status(self):
+        engine = self.engine
+        return (f"Blender {bpy.app.version_string}, {engine.scene.render.engine.lower()}, {engine.samples} samples, "
+                f"{engine.size[0]}x{engine.size[1]}; {engine.renders} renderings in {engine.seconds_rendering:.6f} s, "
+                f"read in {engine.seconds_reading:.6f} s")
+
+    def view(self, camera):
+        return self.views.setdefault(camera, View())
+
+    def render(self, camera):
+        return self.engine.render(self.view(camera))
+
+    def set(self, camera, what, value):
+        setattr(self.view(camera), what, value)
+
+    def set_pose(self, camera, text):
+        values = numbers(text, 6)
+        view = self.view(camera)
+        view.location, view.rotation = values[:3], values[3:]
+
+    def set_field_of_view(self, camera, text):
+        degrees, = numbers(text, 1)
+        if not 0.5 <= degrees <= 172:
+            raise CommandError("Blender's cameras see from 0.5 to 172 degrees")
+        self.view(camera).field_of_view = degrees
+
+    def resize(self, width, height):
+        width, height = int(width), int(height)
+        if not (4 <= width <= LARGEST_SIDE and 4 <= height <= LARGEST_SIDE and width * height <= MOST_PIXELS):
+            raise CommandError(f"images have from 4x4 to {MOST_PIXELS} pixels, {LARGEST_SIDE} along a side at most")
+        self.engine.size = width, height
+
+    def set_samples(self, count):
+        self.engine.samples = max(1, int(count))
+
+    def move(self, name, location=None, rotation=None):
+        self.engine.move(spoken_name(name), location and numbers(location, 3), rotation and numbers(rotation, 3))
+
+    def object(self, name):
+        return self.engine.object(spoken_name(name))
+
+    def colour(self, name):
+        self.object(name)
+        red, green, blue = colour_of(self.engine.ids[spoken_name(name)])
+        return f"(R={red},G={green},B={blue},A=255)"
+
+    @staticmethod
+    def npy(array):
+        """A NumPy file in two parts, of which the pixels are not copied."""
+        head = io.BytesIO()
+        np.lib.format.write_array_header_1_0(head, np.lib.format.header_data_from_array_1_0(array))
+        return head.getvalue(), array.data.cast("B")
+
+    def lit_png(self, camera):
+        return esim_png(np.round(esim_srgb(self.render(camera)["lit"]) * 255).astype(np.uint8))
+
+    def ray_length(self, camera):
+        depth = self.render(camera)["depth"]
+        height, width = depth.shape
+        focal = width / 2 / math.tan(math.radians(self.view(camera).field_of_view) / 2)
+        x = (np.arange(width, dtype=np.float32) - (width - 1) / 2) / focal
+        y = (np.arange(height, dtype=np.float32) - (height - 1) / 2) / focal
+        return self.npy(depth * np.sqrt(1 + x[None, :] ** 2 + y[:, None] ** 2).astype(np.float32))
+
+    def ids(self, camera):
+        if "ids" not in self.render(camera):
+            raise CommandError("Eevee does not say which object a pixel sees; use the engine cycles")
+        return self.render(camera)["ids"]
+
+    def mask_png(self, camera):
+        colours = np.array([colour_of(number) for number in range(len(self.engine.ids) + 1)], np.uint8)
+        return esim_png(colours[self.ids(camera)])
+
+
+# --- connections ------------------------------------------------------------------------------------------------------
+
+class Client:
+    def __init__(self, connection, commands):
+        self.connection, self.commands, self.received = connection, commands, bytearray()
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.send(b"connected to Blender")
+
+    def send(self, *parts):
+        head = struct.pack("<II", MAGIC, sum(len(part) for part in parts))
+        self.connection.sendall(b"".join((head, *parts[:-1])))
+        self.connection.sendall(parts[-1])
+
+    def serve(self):
+        """Answers what has come. False when the client has gone, or sends what is not the protocol."""
+        data = self.connection.recv(1 << 16)
+        self.received += data
+        while len(self.received) >= 8:
+            magic, size = struct.unpack_from("<II", self.received)
+            if magic != MAGIC or not 0 < size <= LONGEST_REQUEST:
+                print(f"esim: a client sent magic {magic:#x} and size {size}; closing", file=sys.stderr)
+                return False
+            if len(self.received) < 8 + size:
+                break
+            message = bytes(self.received[8:8 + size])
+            del self.received[:8 + size]
+            match = re.match(rb"(\d{1,8}):(.*)\Z", message, re.DOTALL)
+            if match:
+                answer = self.commands.answer(match[2].decode("utf-8", "replace"))
+                parts = answer if isinstance(answer, tuple) else (answer.encode() if isinstance(answer, str) else answer,)
+                self.send(match[1], b":", *parts)
+        return len(data) > 0
+
+
+def serve(listener, commands, once, parent):
+    """One client at a time; another's connection is closed."""
+    client = None
+    while os.getppid() == parent or not once:
+        ready = select.select([listener] + ([client.connection] if client else []), [], [], 1.0)[0]
+        try:
+            if client and client.connection in ready and not client.serve():
+                raise ConnectionError
+        except OSError:
+            client.connection.close()
+            client = None
+            if once:
+                return
+        if listener in ready:
+            connection, _ = listener.accept()
+            if client is None:
+                try:
+                    client = Client(connection, commands)
+                except OSError:
+                    connection.close()
+            else:
+                connection.close()
+
+
+def parse(arguments):
+    def size(text):
+        match = re.match(r"(\d{1,5})x(\d{1,5})\Z", text)
+        if not match:
+            raise argparse.ArgumentTypeError("is WIDTHxHEIGHT, such as 640x480")
+        return int(match[1]), int(match[2])
+
+    def count(text):
+        if not 1 <= int(text) <= 65536:
+            raise argparse.ArgumentTypeError("is from 1 to 65536")
+        return int(text)
+
+    parser = argparse.ArgumentParser(prog="serve.py", description="Shows a scene to clients of UnrealCV's protocol.")
+    parser.add_argument("--scene", help="a scene file, if Blender has not opened one already")
+    parser.add_argument("--port", type=int, default=9000, help="0: any that is free")
+    parser.add_argument("--engine", choices=("cycles", "eevee"), default="cycles")
+    parser.add_argument("--samples", type=count, default=16, help="per pixel")
+    parser.add_argument("--size", type=size, default=(640, 480), help="WIDTHxHEIGHT until a client sets it")
+    parser.add_argument("--seed", type=int, default=0, help="of the path tracer's noise")
+    parser.add_argument("--threads", type=int, default=0, help="0: as many as there are processors")
+    parser.add_argument("--persistent", action=argparse.BooleanOptionalAction, default=True,
+                        help="keep the scene's data from one rendering to the next: faster, more memory")
+    parser.add_argument("--scratch", help="a folder, best in memory, through which renderings pass")
+    parser.add_argument("--once", action="store_true",
+                        help="end when the first client goes, or the program that started this")
+    return parser.parse_args(arguments)
+
+
+def main():
+    parent = os.getppid()
+    options = parse(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
+    if options.scene:
+        if not os.path.isfile(options.scene):
+            raise RuntimeError(f"Error: {options.scene}: no such file")
+        esim_open(options.scene)
+    elif not bpy.data.filepath:
+        raise RuntimeError("Error: no scene is open; name a .blend file that Blender can read, or give --scene")
+    if not has_light(bpy.context.scene):
+        esim_warn("the scene has no light: everything will be black")
+    engine = Engine(options)
+    listener = socket.socket()
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind(("127.0.0.1", options.port))
+    except (OSError, OverflowError) as error:
+        raise RuntimeError(f"Error: port {options.port} of 127.0.0.1: {error}; choose another with --port") from None
+    listener.listen(8)
+    print(f"esim serving 127.0.0.1:{listener.getsockname()[1]}", flush=True)
+    # From here on, what Blender says of every rendering would fill a pipe that nobody reads.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        serve(listener, Commands(engine), options.once, parent)
+    except KeyboardInterrupt:
+        pass
+
+
+main()

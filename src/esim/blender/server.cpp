@@ -1,0 +1,69 @@
+#include "esim/blender/server.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "esim/blender/process.h"
+#include "esim/blender/script.h"
+#include "esim/blender/scripts.h"
+#include "esim/core/error.h"
+
+namespace esim {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+fs::path place_in_memory() {
+  std::error_code error;
+  return fs::is_directory("/dev/shm", error) ? fs::path("/dev/shm") : fs::temp_directory_path();
+}
+
+}  // namespace
+
+struct BlenderServer::Parts {
+  explicit Parts(const BlenderServerOptions& options)
+      : process(blender_command(blender_program(options.scene), scratch, std::string(kCommonScript) + kServeScript,
+                                {"--scene", fs::absolute(options.scene).string(), "--port", "0", "--engine",
+                                 options.eevee ? "eevee" : "cycles", "--samples", std::to_string(options.samples),
+                                 "--seed", std::to_string(options.seed), "--threads", std::to_string(options.threads),
+                                 "--scratch", scratch.path().string()})) {}
+
+  ScratchFolder scratch{place_in_memory()};  // of the script, and of what Blender renders
+  RunningProcess process;
+};
+
+BlenderServer::BlenderServer(const BlenderServerOptions& options, const BlenderNotice& warning) {
+  std::error_code error;
+  blender_program(options.scene);
+  if (!fs::is_regular_file(options.scene, error))
+    throw UserError(fmt::format("scene {}: no such file", options.scene.string()));
+  parts_ = std::make_unique<Parts>(options);
+  const bool serves = parts_->process.read_until(
+      [&](const std::string& line) {
+        constexpr std::string_view kServing = "esim serving 127.0.0.1:", kWarning = "esim warning ";
+        const bool names_file = line.starts_with("esim warning file ");  // for the cache of exports
+        if (line.starts_with(kWarning) && !names_file) warning(line.substr(kWarning.size()));
+        if (line.starts_with(kServing))
+          std::from_chars(line.data() + kServing.size(), line.data() + line.size(), port_);
+        return port_ == 0;
+      },
+      options.timeout_s);
+  if (serves) return;
+  if (const auto why = why_ended()) throw UserError(fmt::format("scene {}: {}", options.scene.string(), *why));
+  throw UserError(
+      fmt::format("scene {}: Blender does not show it within {:g} s; raise renderer.timeout_s, or look at it "
+                  "in Blender: {}",
+                  options.scene.string(), options.timeout_s, reason_in(parts_->process.output_tail())));
+}
+
+BlenderServer::~BlenderServer() = default;
+
+std::optional<std::string> BlenderServer::why_ended() {
+  const auto status = parts_->process.exit_status();
+  if (!status) return std::nullopt;
+  return fmt::format("Blender failed (exit status {}): {}", *status, reason_in(parts_->process.output_tail()));
+}
+
+}  // namespace esim

@@ -120,10 +120,26 @@ TEST(PreviewLayoutTest, FitsAnyCamera) {
     }
     const TruthImages images(width, height, 0);
     const Image<float> none(width, height);
-    const auto image = compose_preview(layout, {0, 0, none, none, images.irradiance, &images.depth, &images.flow_x,
-                                                &images.flow_y, 1, 3, 100, "caption"});
+    const auto image = PreviewPage(layout).compose(
+        {0, 0, none, none, images.irradiance, &images.depth, &images.flow_x, &images.flow_y, 1, 3, 100, "caption"});
     EXPECT_EQ(image.width(), layout.width);
     EXPECT_EQ(image.height(), layout.height);
+  }
+}
+
+TEST(PreviewPageTest, KeepsNothingOfThePreviousFrame) {
+  const PreviewLayout layout(64, 48);
+  const TruthImages images(64, 48, 0);
+  Image<float> none(64, 48), many(64, 48, 3);
+  const auto frame = [&](TimeNs t, const Image<float>& on, float far_m, float full_flow) {
+    return PreviewFrame{t, 0,     on,       none, images.irradiance, &images.depth, &images.flow_x, &images.flow_y,
+                        1, far_m, full_flow};
+  };
+  PreviewPage page(layout);
+  page.compose(frame(0, many, 3, 100));
+  for (const auto& next : {frame(kNsPerMs, none, 3, 100), frame(2 * kNsPerMs, none, 4, 100), frame(0, many, 4, 200)}) {
+    const Image<Rgb> drawn = page.compose(next), fresh = PreviewPage(layout).compose(next);
+    EXPECT_TRUE(std::ranges::equal(drawn.pixels(), fresh.pixels()));
   }
 }
 

@@ -132,6 +132,7 @@ std::string encode_png(const Image<Rgb>& image) {
 }
 
 Image<Rgb> enlarge(const Image<Rgb>& image, int width, int height) {
+  if (width == image.width() && height == image.height()) return image;
   const int factor =
       std::max((width + image.width() - 1) / image.width(), (height + image.height() - 1) / image.height());
   cv::Mat repeated;

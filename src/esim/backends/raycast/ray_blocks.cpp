@@ -38,6 +38,17 @@ RayBlocks::RayBlocks(const PixelRays& rays) {
       bounds_.push_back(bounds_of(block));
     }
   }
+
+  cell_columns_ = (width + kCellWidth - 1) / kCellWidth;
+  for (int y = 0; y < height; y += kCellHeight) {
+    for (int x = 0; x < width; x += kCellWidth) {
+      BearingBounds& cell = cells_.emplace_back(bounds(x, y));
+      for (int row = y; row < std::min(y + kCellHeight, height); row += kSide) {
+        for (int column = x; column < std::min(x + kCellWidth, width); column += kSide)
+          cell = cell.with(bounds(column, row));
+      }
+    }
+  }
 }
 
 }  // namespace esim

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "esim/backends/raycast/ray_blocks.h"
+
+namespace esim {
+
+/// A triangle as a camera sees it. Of the ray r = (x, y, 1) and the triangle with the corners p0, p1, p2, all in the
+/// camera frame, weight k is the triple product of r with the two other corners: where none is negative r goes through
+/// the triangle, at the barycentric coordinates weight k / (facing . r), at the depth distance / (facing . r).
+struct SeenTriangle {
+  std::array<std::array<float, 3>, 3> weight;
+  std::array<float, 3> tolerance;  ///< of the weights' rounding: a ray between two triangles meets at least one
+  std::array<float, 3> facing;     ///< normal to the plane, away from the camera
+  float distance;
+  float least_facing;           ///< what facing . r is at least unless the triangle is seen edge-on
+  std::array<float, 3> normal;  ///< (p1 - p0) x (p2 - p0) in the triangles' own frame
+  std::uint32_t index;
+};
+
+/// A few triangles, all that may be seen within some bounds.
+class SeenTriangles {
+ public:
+  static constexpr std::size_t kMost = 32;
+
+  std::span<const SeenTriangle> all() const { return std::span(triangles_).first(count_); }
+  bool full() const { return count_ == kMost; }
+  void add(const SeenTriangle& triangle) { triangles_[count_++] = triangle; }
+  void clear() { count_ = 0; }
+
+ private:
+  std::array<SeenTriangle, kMost> triangles_;
+  std::size_t count_ = 0;
+};
+
+/// Triangles in a hierarchy of boxes, eight to a node, to find those that a small part of an image may see. Where these
+/// are few it is faster to hold each ray against all of them than to find each ray's.
+class TriangleTree {
+ public:
+  TriangleTree() = default;
+  TriangleTree(std::span<const Eigen::Vector3f> vertices, std::span<const std::array<std::uint32_t, 3>> triangles);
+
+  /// Finds the triangles that a camera may see in these bounds, in an order that depends on nothing else. False if they
+  /// are more than SeenTriangles may hold, or if there is no tree.
+  bool find(const BearingBounds& bounds, const Eigen::Matrix3f& R_tree_camera, const Eigen::Vector3f& camera,
+            SeenTriangles& found) const;
+
+ private:
+  static constexpr int kWide = 8;
+  using Lanes = std::array<float, kWide>;
+
+  /// The boxes of eight nodes or leaves: middles, and half of their sides.
+  struct alignas(64) Node {
+    std::array<Lanes, 3> middle, half;
+    std::array<std::uint32_t, kWide> child;  // kLeaf: of leaves_
+  };
+  /// Eight triangles: corner by corner, coordinate by coordinate.
+  struct alignas(64) Leaf {
+    std::array<std::array<Lanes, 3>, 3> corner;
+    std::array<std::uint32_t, kWide> index;
+    int count;
+  };
+  static constexpr std::uint32_t kLeaf = 1U << 31;
+
+  struct Pyramid;
+  class Builder;
+
+  std::vector<Node> nodes_;  // the root first
+  std::vector<Leaf> leaves_;
+  float extent_ = 0;  // largest coordinate
+};
+
+}  // namespace esim

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 namespace esim {
 namespace {
@@ -199,24 +200,32 @@ struct TriangleTree::Pyramid {
 
 namespace {
 
+/// p x q, to the last bit opposite to q x p.
+Vector edge_normal(const Vector& p, const Vector& q) {
+  const bool in_order = std::tie(p.x(), p.y(), p.z()) < std::tie(q.x(), q.y(), q.z());
+  const Vector &from = in_order ? p : q, edge = (in_order ? q : p) - from;
+  // In double precision products are exact, so that nothing depends on how the compiler puts them together.
+  const Vector normal = from.cast<double>().cross(edge.cast<double>()).cast<float>();
+  return in_order ? normal : -normal;
+}
+
 SeenTriangle seen(const std::array<Vector, 3>& corners, std::uint32_t index, const Eigen::Matrix3f& R_tree_camera,
                   const Vector& camera) {
-  // Weights have relative errors of a few times 6e-8.
-  constexpr float kRounding = 1e-6F;
+  constexpr float kRounding = 3e-7F;
   std::array<Vector, 3> p;
   for (std::size_t i = 0; i < 3; ++i) p[i].noalias() = R_tree_camera.transpose() * (corners[i] - camera);
   const Vector facing = (p[1] - p[0]).cross(p[2] - p[0]);
   const float distance = facing.dot(p[0]), side = distance < 0 ? -1.0F : 1.0F;
   SeenTriangle triangle;
   const auto set = [](std::array<float, 3>& to, const Vector& v) { to = {v.x(), v.y(), v.z()}; };
+  triangle.least_facing = 0;
   for (std::size_t k = 0; k < 3; ++k) {
-    const Vector &from = p[(k + 1) % 3], edge = p[(k + 2) % 3] - from;
-    set(triangle.weight[k], side * from.cross(edge));
-    triangle.tolerance[k] = kRounding * from.lpNorm<1>() * edge.lpNorm<1>();
+    const Vector &from = p[(k + 1) % 3], &to = p[(k + 2) % 3];
+    set(triangle.weight[k], side * edge_normal(from, to));
+    triangle.least_facing += kRounding * from.lpNorm<1>() * (to - from).lpNorm<1>();
   }
   set(triangle.facing, side * facing);
   triangle.distance = side * distance;
-  triangle.least_facing = triangle.tolerance[0] + triangle.tolerance[1] + triangle.tolerance[2];
   set(triangle.normal, (corners[1] - corners[0]).cross(corners[2] - corners[0]));
   triangle.index = index;
   return triangle;

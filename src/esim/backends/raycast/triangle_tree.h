@@ -12,13 +12,13 @@ namespace esim {
 
 /// A triangle as a camera sees it. Of the ray r = (x, y, 1) and the triangle with the corners p0, p1, p2, all in the
 /// camera frame, weight k is the triple product of r with the two other corners: where none is negative r goes through
-/// the triangle, at the barycentric coordinates weight k / (facing . r), at the depth distance / (facing . r).
+/// the triangle, at the barycentric coordinates weight k / (facing . r), at the depth distance / (facing . r). The
+/// weights of two triangles at their common edge are opposite to the last bit: no ray passes between them.
 struct SeenTriangle {
   std::array<std::array<float, 3>, 3> weight;
-  std::array<float, 3> tolerance;  ///< of the weights' rounding: a ray between two triangles meets at least one
-  std::array<float, 3> facing;     ///< normal to the plane, away from the camera
+  std::array<float, 3> facing;  ///< normal to the plane, away from the camera
   float distance;
-  float least_facing;           ///< what facing . r is at least unless the triangle is seen edge-on
+  float least_facing;           ///< facing . r is at least that unless the triangle is seen edge-on
   std::array<float, 3> normal;  ///< (p1 - p0) x (p2 - p0) in the triangles' own frame
   std::uint32_t index;
 };

@@ -68,46 +68,47 @@ class FlowColours {
     return colour;
   }
 
-  /// Of `count` pixels, a few at a time, so that the compiler makes SIMD code of all but the last step.
+  /// Of `count` pixels, a few at a time: all but the last step becomes SIMD code.
   void row(const float* x, const float* y, std::size_t count, Rgb* out) const {
     constexpr std::size_t kTogether = 64;
-    std::array<std::int32_t, kTogether> red, green, blue;
+    std::array<float, kTogether> hue, strength, white;
+    const float per_scale = per_scale_;
     for (std::size_t first = 0; first < count; first += kTogether) {
       const std::size_t n = std::min(kTogether, count - first);
 #pragma omp simd
       for (std::size_t i = 0; i < n; ++i) {
-        const float vx = x[first + i], vy = y[first + i], radius = per_scale_ * std::sqrt(vx * vx + vy * vy);
+        const float vx = x[first + i], vy = y[first + i], radius = per_scale * std::sqrt(vx * vx + vy * vy);
         const bool known = radius <= std::numeric_limits<float>::max();
-        const auto hue = static_cast<std::int32_t>(known ? turn(vx, vy) * (0.5f * kHues) + 0.5f * (kHues + 1) : 0.0f);
-        const auto component = [&](float pure) {
-          return static_cast<std::int32_t>((radius <= 1.0f ? 255.0f - radius * (255.0f - pure) : 0.75f * pure) + 0.5f);
-        };
-        red[i] = known ? component(hues_[hue]) : 0;
-        green[i] = known ? component(hues_[kHues + 1 + hue]) : 0;
-        blue[i] = known ? component(hues_[2 * (kHues + 1) + hue]) : 0;
+        // Pure on the rim, white in the middle, darker beyond.
+        hue[i] = known ? turn(vx, vy) * (0.5f * kHues) + 0.5f * (kHues + 1) : 0.0f;
+        strength[i] = radius <= 1.0f ? radius : (known ? 0.75f : 0.0f);
+        white[i] = radius <= 1.0f ? 255.5f - 255.0f * radius : 0.5f;
       }
       for (std::size_t i = 0; i < n; ++i) {
-        out[first + i] = {static_cast<std::uint8_t>(red[i]), static_cast<std::uint8_t>(green[i]),
-                          static_cast<std::uint8_t>(blue[i])};
+        const std::array<float, 3>& pure = hues_[static_cast<std::size_t>(hue[i])];
+        const auto component = [&](std::size_t c) {
+          return static_cast<std::uint8_t>(strength[i] * pure[c] + white[i]);
+        };
+        out[first + i] = {component(0), component(1), component(2)};
       }
     }
   }
 
  private:
   static constexpr int kHues = 2048;
-  using Hues = std::array<float, std::size_t{3} * (kHues + 1)>;
+  using Hues = std::array<std::array<float, 3>, kHues + 1>;
 
   /// The angle of -(x, y), in half turns: atan2(-y, -x) / pi.
   static float turn(float x, float y) {
     const float size_x = std::fabs(x), size_y = std::fabs(y);
-    const float larger = std::max(size_x, size_y), smaller = std::min(size_x, size_y);
-    const float within = fast_arc_tangent(smaller / (larger > 0 ? larger : 1.0f)) / std::numbers::pi_v<float>;
+    const float larger = size_x > size_y ? size_x : size_y, smaller = size_x > size_y ? size_y : size_x;
+    const float within = fast_arc_tangent(smaller / (larger > 0 ? larger : 1.0f)) * std::numbers::inv_pi_v<float>;
     const float from_axis = size_y > size_x ? 0.5f - within : within;
     const float half_turn = x > 0 ? 1.0f - from_axis : from_axis;
     return y > 0 ? -half_turn : half_turn;
   }
 
-  /// The wheel's hues from one end to the other, one component after the other.
+  /// The wheel's from one end to the other.
   static const Hues& hues() {
     static const Hues kTable = [] {
       const std::vector<std::array<float, 3>> wheel = flow_wheel();
@@ -117,14 +118,14 @@ class FlowColours {
         const std::size_t before = std::min(static_cast<std::size_t>(position), wheel.size() - 2);
         const float fraction = position - static_cast<float>(before);
         for (std::size_t c = 0; c < 3; ++c)
-          table[c * (kHues + 1) + i] = wheel[before][c] + fraction * (wheel[before + 1][c] - wheel[before][c]);
+          table[i][c] = wheel[before][c] + fraction * (wheel[before + 1][c] - wheel[before][c]);
       }
       return table;
     }();
     return kTable;
   }
 
-  const float* hues_ = hues().data();
+  const Hues& hues_ = hues();
   float per_scale_;
 };
 

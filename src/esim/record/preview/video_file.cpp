@@ -10,6 +10,7 @@ extern "C" {
 #include <cmath>
 #include <cstring>
 #include <string>
+#include <vector>
 
 #include "esim/record/output_file.h"
 #include "esim/record/preview/palette.h"
@@ -57,13 +58,16 @@ void fill_planes(const Image<Rgb>& image, const AVFrame& frame) {
       luma[x] = static_cast<std::uint8_t>((sum + (16 << kBits) + kHalf) >> kBits);
     }
   }
+  const auto components = static_cast<std::size_t>(3 * image.width());
+  std::vector<std::uint16_t> pair(components);  // sums over two rows
   for (int y = 0; y + 1 < image.height(); y += 2) {
-    const Rgb *const upper = image.row(y), *const lower = image.row(y + 1);
-    std::uint8_t *const u = row_of(1, y / 2), *const v = row_of(2, y / 2);
+    const std::uint8_t *const upper = &image.row(y)->r, *const lower = &image.row(y + 1)->r;
 #pragma omp simd
-    for (int x = 0; x < image.width() / 2; ++x) {
-      const Rgb &a = upper[2 * x], &b = upper[2 * x + 1], &c = lower[2 * x], &d = lower[2 * x + 1];
-      const int red = a.r + b.r + c.r + d.r, green = a.g + b.g + c.g + d.g, blue = a.b + b.b + c.b + d.b;
+    for (std::size_t i = 0; i < components; ++i) pair[i] = static_cast<std::uint16_t>(upper[i] + lower[i]);
+    std::uint8_t *const u = row_of(1, y / 2), *const v = row_of(2, y / 2);
+    const std::uint16_t* from = pair.data();
+    for (int x = 0; x < image.width() / 2; ++x, from += 6) {
+      const int red = from[0] + from[3], green = from[1] + from[4], blue = from[2] + from[5];
       constexpr int kMiddle = (128 << (kBits + 2)) + (kHalf << 2);
       u[x] = static_cast<std::uint8_t>((u_r * red + u_g * green + u_b * blue + kMiddle) >> (kBits + 2));
       v[x] = static_cast<std::uint8_t>((v_r * red + v_g * green + v_b * blue + kMiddle) >> (kBits + 2));

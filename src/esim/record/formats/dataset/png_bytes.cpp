@@ -25,7 +25,7 @@ std::string encode_png(const Image<std::uint16_t>& image, int bits) {
   std::copy_n(image.data(), image.size(), numbers.ptr<std::uint16_t>());
   if (bits <= 8) numbers.convertTo(numbers, CV_8U);
   std::vector<unsigned char> png;
-  cv::imencode(".png", numbers, png, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  cv::imencode(".png", numbers, png);
   return {png.begin(), png.end()};
 }
 

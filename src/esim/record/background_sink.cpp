@@ -1,5 +1,6 @@
 #include "esim/record/background_sink.h"
 
+#include <algorithm>
 #include <optional>
 #include <vector>
 #ifdef __linux__
@@ -8,6 +9,9 @@
 
 namespace esim {
 namespace {
+
+// To wake a thread takes longer than to copy a record: it is let sleep until there are some to write.
+constexpr std::size_t kWorthWaking_bytes = std::size_t{64} << 10;
 
 /// A copy of a record that lives as long as it is needed, and what it weighs.
 struct Copy {
@@ -137,8 +141,9 @@ void BackgroundSink::submit(Job job) {
   changed_.wait(lock, [this] { return waiting_bytes_ <= capacity_bytes_ || failure_; });
   if (failure_) std::rethrow_exception(failure_);
   waiting_bytes_ += job.bytes;
+  const bool urgent = job.bytes == 0 || waiting_bytes_ >= std::min(kWorthWaking_bytes, capacity_bytes_);
   jobs_.push_back(std::move(job));
-  changed_.notify_all();
+  if (urgent) changed_.notify_all();
 }
 
 void BackgroundSink::stop() {

@@ -1,6 +1,7 @@
 #include "esim/sampling/adaptive.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -201,22 +202,28 @@ void AdaptiveSampler::collect(const std::vector<std::uint32_t>& indices) {
 
 /// Brings forward the tiles that content of others may come into.
 void AdaptiveSampler::watch() {
-  const auto arrival = [&](const TileCourse& from, double gap) {
-    return from.last() + static_cast<TimeNs>(std::min((gap + options_.max_motion_px) / from.speed * kNsPerS, 1e18));
+  // By how many px a tile that is so many away is apart.
+  const auto gap = [&](int distance) { return static_cast<double>(options_.tile_px * std::max(distance - 1, 0)); };
+  const auto arrival = [&](const TileCourse& from, int distance) {
+    const double way = gap(distance) + options_.max_motion_px;
+    return from.last() + static_cast<TimeNs>(std::min(way / from.speed * kNsPerS, 1e18));
+  };
+  const auto bring_forward = [&](TileCourse& tile, TimeNs t) {
+    if (tile.reason != Reason::next || tile.due == kNever || t >= tile.due) return;
+    tile.due = planner_.after(tile, static_cast<double>(std::max<TimeNs>(t - tile.last(), 0)));
   };
   for (const std::uint32_t index : asked_) {
     TileCourse& own = tiles_[index];
+    std::array<TimeNs, kReach + 1> own_arrival;
+    for (int distance = 0; distance <= kReach; ++distance)
+      own_arrival[static_cast<std::size_t>(distance)] = own.speed > 0 ? arrival(own, distance) : kNever;
     const int column = static_cast<int>(index) % columns_, row = static_cast<int>(index) / columns_;
     for (int y = std::max(row - kReach, 0); y <= std::min(row + kReach, rows_ - 1); ++y) {
       for (int x = std::max(column - kReach, 0); x <= std::min(column + kReach, columns_ - 1); ++x) {
         TileCourse& other = tiles_[static_cast<std::size_t>(y * columns_ + x)];
-        const double gap = options_.tile_px * std::max(std::max(std::abs(x - column), std::abs(y - row)) - 1, 0);
-        const auto bring_forward = [&](TileCourse& tile, TimeNs t) {
-          if (tile.reason != Reason::next || tile.due == kNever || t >= tile.due) return;
-          tile.due = planner_.after(tile, static_cast<double>(std::max<TimeNs>(t - tile.last(), 0)));
-        };
-        if (own.speed > 0) bring_forward(other, arrival(own, gap));
-        if (other.speed > 0 && other.timeline.size() > 0) bring_forward(own, arrival(other, gap));
+        const int distance = std::max(std::abs(x - column), std::abs(y - row));
+        bring_forward(other, own_arrival[static_cast<std::size_t>(distance)]);
+        if (other.speed > 0 && other.timeline.size() > 0) bring_forward(own, arrival(other, distance));
       }
     }
   }

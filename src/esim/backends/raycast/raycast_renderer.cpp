@@ -53,7 +53,7 @@ struct Rays {
 struct CellView {
   bool any = false;  // otherwise none
   bool few = false;  // `triangles` are all of them
-  SeenTriangles triangles;
+  std::span<const SeenTriangle> triangles;
 };
 
 /// K pixels, seen by the rays through their centres.
@@ -135,7 +135,8 @@ class RaycastRenderer final : public ProcessorRenderer {
   template <int K>
   void render_band(const Moment& moment, const Tile& band, Sample& sample) const {
     constexpr int kSide = RayBlock::kSide, kWidth = RayBlocks::kCellWidth, kHeight = RayBlocks::kCellHeight;
-    const auto views = std::make_unique_for_overwrite<CellView[]>(moment.groups.size());
+    SeenTriangles seen;
+    std::vector<CellView> views(moment.groups.size());
     std::array<Work<K>, kWidth * kHeight / K> batch;
     for (int top = band.y / kHeight * kHeight; top < band.y + band.height; top += kHeight) {
       for (int left = band.x / kWidth * kWidth; left < band.x + band.width; left += kWidth) {
@@ -151,8 +152,8 @@ class RaycastRenderer final : public ProcessorRenderer {
             blocks_.at(x, y).prefetch();
           }
         }
-        look(moment, blocks_.cell(left, top), views.get());
-        render_batch<K>(moment, views.get(), std::span(batch).first(count), band, sample);
+        look(moment, blocks_.cell(left, top), seen, views);
+        render_batch<K>(moment, views, std::span(batch).first(count), band, sample);
       }
     }
   }
@@ -161,19 +162,22 @@ class RaycastRenderer final : public ProcessorRenderer {
   static int first_block(int cell, int band) { return std::max(cell, band / RayBlock::kSide * RayBlock::kSide); }
 
   /// Finds what a cell may see of each group.
-  static void look(const Moment& moment, const BearingBounds& cell, CellView* views) {
-    for (std::size_t i = 0; i < moment.groups.size(); ++i) {
+  static void look(const Moment& moment, const BearingBounds& cell, SeenTriangles& seen, std::span<CellView> views) {
+    seen.shrink(0);
+    for (std::size_t i = 0; i < views.size(); ++i) {
       const PlacedGroup& placed = moment.groups[i];
       CellView& view = views[i];
       view.any = placed.triangles != nullptr && placed.bounds.overlap(cell);
       if (!view.any) continue;
-      view.triangles.clear();
-      view.few = placed.tree->find(cell, placed.R_group_camera, placed.camera, view.triangles);
+      const std::size_t first = seen.size();
+      view.few = placed.tree->find(cell, placed.R_group_camera, placed.camera, seen);
+      if (!view.few) seen.shrink(first);
+      view.triangles = seen.from(first);
     }
   }
 
   template <int K>
-  void render_batch(const Moment& moment, const CellView* views, std::span<Work<K>> batch, const Tile& band,
+  void render_batch(const Moment& moment, std::span<const CellView> views, std::span<Work<K>> batch, const Tile& band,
                     Sample& sample) const {
     for (Work<K>& work : batch) trace(moment, views, {0, 0}, work.rays);
     for (Work<K>& work : batch) store_geometry(work, band, sample);
@@ -184,7 +188,7 @@ class RaycastRenderer final : public ProcessorRenderer {
 
   /// Looks closer at the pixels that edges cross.
   template <int K>
-  void smooth_edges(const Moment& moment, const CellView* views, std::span<Work<K>> batch) const {
+  void smooth_edges(const Moment& moment, std::span<const CellView> views, std::span<Work<K>> batch) const {
     std::array<EdgeWork<K>, 8> closer;
     std::size_t count = 0;
     for (Work<K>& work : batch) {
@@ -209,7 +213,7 @@ class RaycastRenderer final : public ProcessorRenderer {
 
   /// Pixels of the work that edges cross, a bit per lane.
   template <int K>
-  std::uint32_t edges_of(const Moment& moment, const CellView* views, const Work<K>& work) const {
+  std::uint32_t edges_of(const Moment& moment, std::span<const CellView> views, const Work<K>& work) const {
     const bool shadows = moment.lighting && moment.lighting->shadows;
     const SeenSurfaces<K> centre{work.rays.packet, work.rays.triangle, work.rays.light};
     Rays<K> corner;
@@ -240,7 +244,7 @@ class RaycastRenderer final : public ProcessorRenderer {
   }
 
   template <int K>
-  void look_closer(const Moment& moment, const CellView* views, std::span<EdgeWork<K>> edges) const {
+  void look_closer(const Moment& moment, std::span<const CellView> views, std::span<EdgeWork<K>> edges) const {
     for (EdgeWork<K>& edge : edges) trace(moment, views, {0, 0}, edge.rays);
     shade<K>(moment, edges, 1 / std::sqrt(static_cast<float>(places_.size())));
     for (EdgeWork<K>& edge : edges) {
@@ -250,13 +254,13 @@ class RaycastRenderer final : public ProcessorRenderer {
   }
 
   template <int K>
-  void trace(const Moment& moment, const CellView* views, const Eigen::Vector2f& place, Rays<K>& rays) const {
+  void trace(const Moment& moment, std::span<const CellView> views, const Eigen::Vector2f& place, Rays<K>& rays) const {
     rays.packet.aim(*rays.block, rays.first, place);
     for (unsigned group = 0; group < moment.groups.size(); ++group) {
       const CellView& view = views[group];
       if (!view.any) continue;
       if (view.few) {
-        rays.packet.intersect(moment.groups[group], group, view.triangles.all());
+        rays.packet.intersect(moment.groups[group], group, view.triangles);
       } else {
         rays.packet.intersect(moment.groups[group], group);
       }

@@ -23,15 +23,22 @@ struct SeenTriangle {
   std::uint32_t index;
 };
 
-/// A few triangles, all that may be seen within some bounds.
+/// Room for a few triangles.
 class SeenTriangles {
  public:
-  static constexpr std::size_t kMost = 32;
+  static constexpr std::size_t kMost = 48;
 
-  std::span<const SeenTriangle> all() const { return std::span(triangles_).first(count_); }
+  std::size_t size() const { return count_; }
   bool full() const { return count_ == kMost; }
   void add(const SeenTriangle& triangle) { triangles_[count_++] = triangle; }
-  void clear() { count_ = 0; }
+
+  /// Forgets all but the first ones.
+  void shrink(std::size_t count) { count_ = count; }
+
+  /// Those from one on.
+  std::span<const SeenTriangle> from(std::size_t first) const {
+    return std::span(triangles_).first(count_).subspan(first);
+  }
 
  private:
   std::array<SeenTriangle, kMost> triangles_;
@@ -45,8 +52,8 @@ class TriangleTree {
   TriangleTree() = default;
   TriangleTree(std::span<const Eigen::Vector3f> vertices, std::span<const std::array<std::uint32_t, 3>> triangles);
 
-  /// Finds the triangles that a camera may see in these bounds, in an order that depends on nothing else. False if they
-  /// are more than SeenTriangles may hold, or if there is no tree.
+  /// Adds the triangles that a camera may see in these bounds, in an order that depends on nothing else. False if there
+  /// is no room for all of them, or if there is no tree.
   bool find(const BearingBounds& bounds, const Eigen::Matrix3f& R_tree_camera, const Eigen::Vector3f& camera,
             SeenTriangles& found) const;
 

@@ -216,7 +216,12 @@ TEST_F(PreviewWriterTest, OneFrameAndNone) {
   PreviewWriter one(directory_.path(), 0);
   write_frames(one, 1);
   one.end(true);
-  EXPECT_TRUE(std::filesystem::exists(directory_.path() / "preview.png"));
+  const cv::Mat picture = cv::imread((directory_.path() / "preview.png").string());
+  cv::VideoCapture video((directory_.path() / "preview.mp4").string(), cv::CAP_FFMPEG);
+  cv::Mat frame;
+  ASSERT_TRUE(video.read(frame));
+  ASSERT_EQ(frame.size(), picture.size());
+  EXPECT_LT(cv::norm(frame, picture, cv::NORM_L1) / static_cast<double>(3 * frame.total()), 2);  // levels
   std::filesystem::remove(directory_.path() / "preview.png");
   std::filesystem::remove(directory_.path() / "preview.mp4");
   PreviewWriter none(directory_.path(), 0);

@@ -48,10 +48,7 @@ class RayBlocks {
   /// The block that begins at column x and row y, multiples of kSide.
   const RayBlock& at(int x, int y) const { return blocks_[index(x, y)]; }
 
-  /// What holds all the rays of that block, wherever in their pixels they lie.
-  const BearingBounds& bounds(int x, int y) const { return bounds_[index(x, y)]; }
-
-  /// What holds all the rays of the cell that begins there.
+  /// What holds all the rays of the cell that begins there, wherever in their pixels they lie.
   const BearingBounds& cell(int x, int y) const {
     return cells_[static_cast<std::size_t>(y / kCellHeight * cell_columns_ + x / kCellWidth)];
   }
@@ -63,7 +60,7 @@ class RayBlocks {
 
   int columns_, cell_columns_;
   std::vector<RayBlock> blocks_;
-  std::vector<BearingBounds> bounds_, cells_;  // apart, since they are not always asked for
+  std::vector<BearingBounds> cells_;
 };
 
 }  // namespace esim

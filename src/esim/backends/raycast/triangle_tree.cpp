@@ -34,7 +34,8 @@ std::span<Piece>::iterator cut(std::span<Piece> pieces) {
   for (const Piece& piece : pieces) middles.extend(piece.box.center());
   const auto bin_of = [&](const Piece& piece, int axis) {
     const float along = (piece.box.center()[axis] - middles.min()[axis]) / middles.sizes()[axis];
-    return along > 0 ? std::min(static_cast<int>(along * kBins), kBins - 1) : 0;
+    if (!(along > 0)) return 0;  // where it is no number, too
+    return along < 1 ? static_cast<int>(along * kBins) : kBins - 1;
   };
 
   float least = std::numeric_limits<float>::infinity();
@@ -87,19 +88,15 @@ class TriangleTree::Builder {
       *largest = part.first(middle);
       parts.push_back(part.subspan(middle));
     }
-    Node node;
-    for (std::size_t i = 0; i < kWide; ++i) {
+    Node node{};
+    node.count = static_cast<int>(parts.size());
+    for (std::size_t i = 0; i < parts.size(); ++i) {
       Eigen::AlignedBox3f box;
-      if (i < parts.size()) {
-        for (const Piece& piece : parts[i]) box.extend(piece.box);
-      }
+      for (const Piece& piece : parts[i]) box.extend(piece.box);
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        constexpr float kNothing = -1e30F;  // no pyramid reaches into it
         const auto a = static_cast<Eigen::Index>(axis);
-        node.middle[axis][i] = box.isEmpty() ? 0 : box.center()[a];
-        node.half[axis][i] = box.isEmpty() ? kNothing : 0.5F * box.sizes()[a];
+        node.middle[axis][i] = box.center()[a], node.half[axis][i] = 0.5F * box.sizes()[a];
       }
-      if (i >= parts.size()) continue;
       node.child[i] = parts[i].size() <= kWide ? add_leaf(parts[i]) : add_node(parts[i]);
     }
     tree_.nodes_[index] = node;
@@ -171,7 +168,7 @@ struct TriangleTree::Pyramid {
         inside[i] = std::min(inside[i], middle + reach);
       }
     }
-    return not_negative(inside);
+    return not_negative(inside) & ((1U << node.count) - 1);
   }
 
   /// A bit for each of the triangles that may.

@@ -65,6 +65,7 @@ class TriangleTree {
   struct alignas(64) Node {
     std::array<Lanes, 3> middle, half;
     std::array<std::uint32_t, kWide> child;  // kLeaf: of leaves_
+    int count;
   };
   /// Eight triangles: corner by corner, coordinate by coordinate.
   struct alignas(64) Leaf {

@@ -120,10 +120,26 @@ TEST(PreviewLayoutTest, FitsAnyCamera) {
     }
     const TruthImages images(width, height, 0);
     const Image<float> none(width, height);
-    const auto image = compose_preview(layout, {0, 0, none, none, images.irradiance, &images.depth, &images.flow_x,
-                                                &images.flow_y, 1, 3, 100, "caption"});
+    const auto image = PreviewPage(layout).compose(
+        {0, 0, none, none, images.irradiance, &images.depth, &images.flow_x, &images.flow_y, 1, 3, 100, "caption"});
     EXPECT_EQ(image.width(), layout.width);
     EXPECT_EQ(image.height(), layout.height);
+  }
+}
+
+TEST(PreviewPageTest, KeepsNothingOfThePreviousFrame) {
+  const PreviewLayout layout(64, 48);
+  const TruthImages images(64, 48, 0);
+  Image<float> none(64, 48), many(64, 48, 3);
+  const auto frame = [&](TimeNs t, const Image<float>& on, float far_m, float full_flow) {
+    return PreviewFrame{t, 0,     on,       none, images.irradiance, &images.depth, &images.flow_x, &images.flow_y,
+                        1, far_m, full_flow};
+  };
+  PreviewPage page(layout);
+  page.compose(frame(0, many, 3, 100));
+  for (const auto& next : {frame(kNsPerMs, none, 3, 100), frame(2 * kNsPerMs, none, 4, 100), frame(0, many, 4, 200)}) {
+    const Image<Rgb> drawn = page.compose(next), fresh = PreviewPage(layout).compose(next);
+    EXPECT_TRUE(std::ranges::equal(drawn.pixels(), fresh.pixels()));
   }
 }
 
@@ -200,7 +216,12 @@ TEST_F(PreviewWriterTest, OneFrameAndNone) {
   PreviewWriter one(directory_.path(), 0);
   write_frames(one, 1);
   one.end(true);
-  EXPECT_TRUE(std::filesystem::exists(directory_.path() / "preview.png"));
+  const cv::Mat picture = cv::imread((directory_.path() / "preview.png").string());
+  cv::VideoCapture video((directory_.path() / "preview.mp4").string(), cv::CAP_FFMPEG);
+  cv::Mat frame;
+  ASSERT_TRUE(video.read(frame));
+  ASSERT_EQ(frame.size(), picture.size());
+  EXPECT_LT(cv::norm(frame, picture, cv::NORM_L1) / static_cast<double>(3 * frame.total()), 2);  // levels
   std::filesystem::remove(directory_.path() / "preview.png");
   std::filesystem::remove(directory_.path() / "preview.mp4");
   PreviewWriter none(directory_.path(), 0);

@@ -1,10 +1,17 @@
 #include "esim/record/background_sink.h"
 
+#include <algorithm>
 #include <optional>
 #include <vector>
+#ifdef __linux__
+#include <sys/resource.h>
+#endif
 
 namespace esim {
 namespace {
+
+// To wake a thread takes longer than to copy a record: it is let sleep until there are some to write.
+constexpr std::size_t kWorthWaking_bytes = std::size_t{64} << 10;
 
 /// A copy of a record that lives as long as it is needed, and what it weighs.
 struct Copy {
@@ -95,6 +102,16 @@ Copy copy_of(const TriggerRecord& record) {
   return {[record](Sink& sink) { sink.write(record); }, sizeof record};
 }
 
+/// Lets other threads go first where processors are scarce: the simulation waits for each of its own, and for this one
+/// only at the end.
+void stand_back() {
+#ifdef __linux__
+  constexpr int kNicer = 5;
+  const int now = getpriority(PRIO_PROCESS, 0);  // of this thread
+  static_cast<void>(setpriority(PRIO_PROCESS, 0, now + kNicer));
+#endif
+}
+
 }  // namespace
 
 BackgroundSink::BackgroundSink(std::unique_ptr<Sink> inner, std::size_t capacity_bytes)
@@ -128,8 +145,9 @@ void BackgroundSink::submit(Job job) {
   changed_.wait(lock, [this] { return waiting_bytes_ <= capacity_bytes_ || failure_; });
   if (failure_) std::rethrow_exception(failure_);
   waiting_bytes_ += job.bytes;
+  const bool urgent = job.bytes == 0 || waiting_bytes_ >= std::min(kWorthWaking_bytes, capacity_bytes_);
   jobs_.push_back(std::move(job));
-  changed_.notify_all();
+  if (urgent) changed_.notify_all();
 }
 
 void BackgroundSink::stop() {
@@ -142,6 +160,7 @@ void BackgroundSink::stop() {
 }
 
 void BackgroundSink::work() {
+  stand_back();
   std::unique_lock lock(mutex_);
   while (true) {
     changed_.wait(lock, [this] { return !jobs_.empty() || stopping_; });

@@ -14,8 +14,8 @@
 namespace esim {
 
 /// Hands everything to another sink on a thread of its own, so that compressing and writing do not hold up the
-/// simulation. Records are copied; at most `capacity_bytes` of them wait, and then write() does. A failure of the inner
-/// sink is thrown by the next call.
+/// simulation. Records are copied; a few wait for others, at most `capacity_bytes` of them, and then write() does. A
+/// failure of the inner sink is thrown by the next call.
 class BackgroundSink final : public Sink {
  public:
   explicit BackgroundSink(std::unique_ptr<Sink> inner, std::size_t capacity_bytes = std::size_t{64} << 20);

@@ -1,6 +1,7 @@
 #include "esim/sampling/adaptive.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -31,8 +32,8 @@ constexpr int kLayers = 10;
 // Tiles whose motion is watched: those up to so many away.
 constexpr int kReach = 3;
 
-// Tiles of a parallel loop that go to one thread together: handing over work takes about as long as a tile.
-constexpr int kTogether = 16;
+// Tiles of a parallel loop that go to one thread together: a round has a few tens.
+constexpr int kTogether = 3;
 
 class AdaptiveSampler final : public Sampler {
  public:
@@ -137,23 +138,29 @@ class AdaptiveSampler final : public Sampler {
 void AdaptiveSampler::give(TileCourse& tile) {
   TileTimeline& timeline = tile.timeline;
   tile.segments.clear();
-  Image<float>* layer = layers_.data();
-  const Image<float>* const last_layer = layer + kLayers - 1;
-  timeline.write(tile.done, *layer);
-  if (!std::exchange(tile.begun, true))
-    tile.segments.push_back({timeline.tile(), timeline.time(0), timeline.time(0), layer, layer});
+  // What was given last still stands in its layer. Of the others the first ones are taken: they are in the caches.
+  const auto number = [&](int k) { return k == 0 ? tile.layer : (k <= tile.layer ? k - 1 : k); };
+  const auto layer = [&](int k) -> Image<float>& { return layers_[static_cast<std::size_t>(number(k))]; };
+  if (!std::exchange(tile.begun, true)) {
+    timeline.write(0, layer(0));
+    tile.segments.push_back({timeline.tile(), timeline.time(0), timeline.time(0), &layer(0), &layer(0)});
+  }
+  int used = 0;
   std::size_t i = tile.done;
   for (; i < tile.until; ++i) {
     const TimeNs t0 = timeline.time(i), h = timeline.time(i + 1) - t0;
     const int count = pieces(timeline, i);
-    if (layer + count > last_layer) break;
-    if (count == 2) timeline.write_half(i, layer[1]);
-    if (count == 4) timeline.write_quarters(i, std::span<Image<float>, 3>(layer + 1, 3));
-    timeline.write(i + 1, layer[count]);
-    for (int k = 0; k < count; ++k, ++layer)
-      tile.segments.push_back({timeline.tile(), t0 + h * k / count, t0 + h * (k + 1) / count, layer, layer + 1});
+    if (used + count >= kLayers) break;
+    if (count == 2) timeline.write_half(i, layer(used + 1));
+    if (count == 4) timeline.write_quarters(i, {&layer(used + 1), &layer(used + 2), &layer(used + 3)});
+    timeline.write(i + 1, layer(used + count));
+    for (int k = 0; k < count; ++k, ++used) {
+      tile.segments.push_back(
+          {timeline.tile(), t0 + h * k / count, t0 + h * (k + 1) / count, &layer(used), &layer(used + 1)});
+    }
     tile.log_intervals += std::log(static_cast<double>(h)), ++tile.intervals;
   }
+  tile.layer = number(used);
   tile.until -= i;
   tile.done = timeline.forget_before(i);
   tile.until += tile.done;
@@ -195,22 +202,28 @@ void AdaptiveSampler::collect(const std::vector<std::uint32_t>& indices) {
 
 /// Brings forward the tiles that content of others may come into.
 void AdaptiveSampler::watch() {
-  const auto arrival = [&](const TileCourse& from, double gap) {
-    return from.last() + static_cast<TimeNs>(std::min((gap + options_.max_motion_px) / from.speed * kNsPerS, 1e18));
+  // By how many px a tile that is so many away is apart.
+  const auto gap = [&](int distance) { return static_cast<double>(options_.tile_px * std::max(distance - 1, 0)); };
+  const auto arrival = [&](const TileCourse& from, int distance) {
+    const double way = gap(distance) + options_.max_motion_px;
+    return from.last() + static_cast<TimeNs>(std::min(way / from.speed * kNsPerS, 1e18));
+  };
+  const auto bring_forward = [&](TileCourse& tile, TimeNs t) {
+    if (tile.reason != Reason::next || tile.due == kNever || t >= tile.due) return;
+    tile.due = planner_.after(tile, static_cast<double>(std::max<TimeNs>(t - tile.last(), 0)));
   };
   for (const std::uint32_t index : asked_) {
     TileCourse& own = tiles_[index];
+    std::array<TimeNs, kReach + 1> own_arrival;
+    for (int distance = 0; distance <= kReach; ++distance)
+      own_arrival[static_cast<std::size_t>(distance)] = own.speed > 0 ? arrival(own, distance) : kNever;
     const int column = static_cast<int>(index) % columns_, row = static_cast<int>(index) / columns_;
     for (int y = std::max(row - kReach, 0); y <= std::min(row + kReach, rows_ - 1); ++y) {
       for (int x = std::max(column - kReach, 0); x <= std::min(column + kReach, columns_ - 1); ++x) {
         TileCourse& other = tiles_[static_cast<std::size_t>(y * columns_ + x)];
-        const double gap = options_.tile_px * std::max(std::max(std::abs(x - column), std::abs(y - row)) - 1, 0);
-        const auto bring_forward = [&](TileCourse& tile, TimeNs t) {
-          if (tile.reason != Reason::next || tile.due == kNever || t >= tile.due) return;
-          tile.due = planner_.after(tile, static_cast<double>(std::max<TimeNs>(t - tile.last(), 0)));
-        };
-        if (own.speed > 0) bring_forward(other, arrival(own, gap));
-        if (other.speed > 0 && other.timeline.size() > 0) bring_forward(own, arrival(other, gap));
+        const int distance = std::max(std::abs(x - column), std::abs(y - row));
+        bring_forward(other, own_arrival[static_cast<std::size_t>(distance)]);
+        if (other.speed > 0 && other.timeline.size() > 0) bring_forward(own, arrival(other, distance));
       }
     }
   }

@@ -73,8 +73,7 @@ void TilePlanner::audit(TileCourse& tile) const {
   while (timeline.time(i) != tile.due) ++i;
   timeline.errors(i, tile.audit);
   tile.audit_duration = timeline.time(i + 1) - timeline.time(i - 1);
-  const std::vector<float>&l0 = timeline.brightness(i - 1), &l1 = timeline.brightness(i),
-        &l2 = timeline.brightness(i + 1);
+  const auto l0 = timeline.brightness(i - 1), l1 = timeline.brightness(i), l2 = timeline.brightness(i + 1);
   tile.most_change = 0;
   for (std::size_t k = 0; k < l1.size(); ++k) {
     const float change = std::max({l0[k], l1[k], l2[k]}) - std::min({l0[k], l1[k], l2[k]});

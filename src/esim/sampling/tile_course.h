@@ -26,6 +26,7 @@ struct TileCourse {
 
   TileTimeline timeline;
   std::size_t done = 0;  // index of the sample up to which segments have been given
+  int layer = 0;         // of the sampler's images, in which that sample stands
   TimeNs due = 0;        // the next sample; kNever after the last
   Reason reason = Reason::next;
   TimeNs audited = std::numeric_limits<TimeNs>::min();  // intervals that begin up to then are not audited any more

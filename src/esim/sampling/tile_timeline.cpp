@@ -117,7 +117,7 @@ void TileTimeline::insert(TimeNs t, const Image<float>& irradiance) {
 void TileTimeline::prefetch() const {
   constexpr std::size_t kPerLine = 64 / sizeof(float), kWanted = 3;
   for (std::size_t i = samples_.size() - std::min(samples_.size(), kWanted); i < samples_.size(); ++i) {
-    for (const std::vector<float>* values : {&samples_[i].irradiance, &samples_[i].brightness})
+    for (const LargeVector<float>* values : {&samples_[i].irradiance, &samples_[i].brightness})
       for (std::size_t k = 0; k < values->size(); k += kPerLine) __builtin_prefetch(values->data() + k);
   }
 }
@@ -192,12 +192,12 @@ void TileTimeline::write_half(std::size_t i, Image<float>& half) const {
   }
 }
 
-void TileTimeline::write_quarters(std::size_t i, std::span<Image<float>, 3> quarters) const {
+void TileTimeline::write_quarters(std::size_t i, const std::array<Image<float>*, 3>& quarters) const {
   const Bow bow = bow_between(i, i + 1);
   const auto width = static_cast<std::size_t>(tile_.width);
   for (int y = 0; y < tile_.height; ++y) {
     float* out[3];
-    for (std::size_t k = 0; k < 3; ++k) out[k] = quarters[k].row(tile_.y + y) + tile_.x;
+    for (std::size_t k = 0; k < 3; ++k) out[k] = quarters[k]->row(tile_.y + y) + tile_.x;
     float *const out0 = out[0], *const out1 = out[1], *const out2 = out[2];
     const std::size_t first = static_cast<std::size_t>(y) * width;
 #pragma omp simd

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
 
 #include "esim/core/image.h"
+#include "esim/core/large_vector.h"
 #include "esim/core/time.h"
 
 namespace esim {
@@ -43,7 +45,7 @@ class TileTimeline {
   void errors(std::size_t i, std::vector<float>& out) const;
 
   /// Of each of those pixels at sample i.
-  const std::vector<float>& brightness(std::size_t i) const { return samples_[i].brightness; }
+  std::span<const float> brightness(std::size_t i) const { return samples_[i].brightness; }
 
   /// How far brightness between samples i and i + 1 is from its own straight line, in the middle, likewise.
   double bow(std::size_t i) const;
@@ -53,14 +55,14 @@ class TileTimeline {
 
   /// The same half of the way from sample i to the next, and in each quarter of it.
   void write_half(std::size_t i, Image<float>& half) const;
-  void write_quarters(std::size_t i, std::span<Image<float>, 3> quarters) const;
+  void write_quarters(std::size_t i, const std::array<Image<float>*, 3>& quarters) const;
 
  private:
   struct Sample {
     TimeNs t = 0;
     double surprise = 0;
-    std::vector<float> irradiance;
-    std::vector<float> brightness;  // of watched pixels
+    LargeVector<float> irradiance;
+    LargeVector<float> brightness;  // of watched pixels
   };
   struct Bow;
 

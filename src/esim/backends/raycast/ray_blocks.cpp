@@ -35,7 +35,17 @@ RayBlocks::RayBlocks(const PixelRays& rays) {
         block.dx_du[i] = rays.dx_du(column, row), block.dx_dv[i] = rays.dx_dv(column, row);
         block.dy_du[i] = rays.dy_du(column, row), block.dy_dv[i] = rays.dy_dv(column, row);
       }
-      bounds_.push_back(bounds_of(block));
+    }
+  }
+
+  cell_columns_ = (width + kCellWidth - 1) / kCellWidth;
+  for (int y = 0; y < height; y += kCellHeight) {
+    for (int x = 0; x < width; x += kCellWidth) {
+      BearingBounds& cell = cells_.emplace_back(bounds_of(at(x, y)));
+      for (int row = y; row < std::min(y + kCellHeight, height); row += kSide) {
+        for (int column = x; column < std::min(x + kCellWidth, width); column += kSide)
+          cell = cell.with(bounds_of(at(column, row)));
+      }
     }
   }
 }

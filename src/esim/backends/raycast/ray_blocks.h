@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "esim/render/pixel_rays.h"
@@ -13,11 +14,22 @@ struct RayBlock {
   // Bearing of the pixel's centre (x, y, 1) in the camera frame, and its change as the pixel (u, v) does.
   alignas(64) float x[kPixels], y[kPixels];
   alignas(64) float dx_du[kPixels], dx_dv[kPixels], dy_du[kPixels], dy_dv[kPixels];
+
+  /// Asks memory for it: there are more blocks than fit into the caches.
+  void prefetch() const {
+    for (const float* values : {x, y, dx_du, dx_dv, dy_du, dy_dv}) __builtin_prefetch(values);
+  }
 };
 
 /// A rectangle of bearings: x from left to right, y from top to bottom.
 struct BearingBounds {
   float left, right, top, bottom;
+
+  /// The smallest rectangle that holds this one and another.
+  BearingBounds with(const BearingBounds& other) const {
+    return {std::min(left, other.left), std::max(right, other.right), std::min(top, other.top),
+            std::max(bottom, other.bottom)};
+  }
 
   bool overlap(const BearingBounds& other) const {
     return left <= other.right && other.left <= right && top <= other.bottom && other.top <= bottom;
@@ -28,22 +40,27 @@ struct BearingBounds {
 /// is the same pixels whatever tile is asked for.
 class RayBlocks {
  public:
+  /// Blocks that lie in the same cell of the image, so many pixels wide and high, see nearly the same.
+  static constexpr int kCellWidth = 16, kCellHeight = 8;
+
   explicit RayBlocks(const PixelRays& rays);
 
   /// The block that begins at column x and row y, multiples of kSide.
   const RayBlock& at(int x, int y) const { return blocks_[index(x, y)]; }
 
-  /// What holds all the rays of that block, wherever in their pixels they lie.
-  const BearingBounds& bounds(int x, int y) const { return bounds_[index(x, y)]; }
+  /// What holds all the rays of the cell that begins there, wherever in their pixels they lie.
+  const BearingBounds& cell(int x, int y) const {
+    return cells_[static_cast<std::size_t>(y / kCellHeight * cell_columns_ + x / kCellWidth)];
+  }
 
  private:
   std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y / RayBlock::kSide * columns_ + x / RayBlock::kSide);
   }
 
-  int columns_;
+  int columns_, cell_columns_;
   std::vector<RayBlock> blocks_;
-  std::vector<BearingBounds> bounds_;  // apart, since only moving objects ask for them
+  std::vector<BearingBounds> cells_;
 };
 
 }  // namespace esim

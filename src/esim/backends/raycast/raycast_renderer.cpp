@@ -49,11 +49,17 @@ struct Rays {
   alignas(64) std::array<float, K> irradiance;
 };
 
+/// Which triangles of a group a cell of the image may see.
+struct CellView {
+  bool any = false;  // otherwise none
+  bool few = false;  // `triangles` are all of them
+  std::span<const SeenTriangle> triangles;
+};
+
 /// K pixels, seen by the rays through their centres.
 template <int K>
 struct Work {
   int x, y;  // the block's corner
-  const BearingBounds* bounds;
   Rays<K> rays;
 };
 
@@ -128,42 +134,65 @@ class RaycastRenderer final : public ProcessorRenderer {
   /// Blocks are traced in whole even if the band takes only a part of them, so that pixels do not depend on the tile.
   template <int K>
   void render_band(const Moment& moment, const Tile& band, Sample& sample) const {
-    constexpr int kSide = RayBlock::kSide, kBatch = 8 * 16 / K;
-    std::array<Work<K>, kBatch> batch;
-    std::size_t count = 0;
-    for (int y = band.y / kSide * kSide; y < band.y + band.height; y += kSide) {
-      for (int x = band.x / kSide * kSide; x < band.x + band.width; x += kSide) {
-        for (int first = 0; first < RayBlock::kPixels; first += K) {
-          Work<K>& work = batch[count++];
-          work.x = x, work.y = y;
-          work.bounds = &blocks_.bounds(x, y);
-          work.rays.block = &blocks_.at(x, y), work.rays.first = first;
-          work.rays.first_material = mosaic_ ? &first_material_[static_cast<std::size_t>(first)] : nullptr;
-          if (count < batch.size()) continue;
-          render_batch<K>(moment, std::span(batch), band, sample);
-          count = 0;
+    constexpr int kSide = RayBlock::kSide, kWidth = RayBlocks::kCellWidth, kHeight = RayBlocks::kCellHeight;
+    SeenTriangles seen;
+    std::vector<CellView> views(moment.groups.size());
+    std::array<Work<K>, kWidth * kHeight / K> batch;
+    for (int top = band.y / kHeight * kHeight; top < band.y + band.height; top += kHeight) {
+      for (int left = band.x / kWidth * kWidth; left < band.x + band.width; left += kWidth) {
+        std::size_t count = 0;
+        for (int y = first_block(top, band.y); y < std::min(top + kHeight, band.y + band.height); y += kSide) {
+          for (int x = first_block(left, band.x); x < std::min(left + kWidth, band.x + band.width); x += kSide) {
+            for (int first = 0; first < RayBlock::kPixels; first += K) {
+              Work<K>& work = batch[count++];
+              work.x = x, work.y = y;
+              work.rays.block = &blocks_.at(x, y), work.rays.first = first;
+              work.rays.first_material = mosaic_ ? &first_material_[static_cast<std::size_t>(first)] : nullptr;
+            }
+            blocks_.at(x, y).prefetch();
+          }
         }
+        look(moment, blocks_.cell(left, top), seen, views);
+        render_batch<K>(moment, views, std::span(batch).first(count), band, sample);
       }
     }
-    render_batch<K>(moment, std::span(batch).first(count), band, sample);
+  }
+
+  /// Where the first block of a cell begins that has pixels in a band.
+  static int first_block(int cell, int band) { return std::max(cell, band / RayBlock::kSide * RayBlock::kSide); }
+
+  /// Finds what a cell may see of each group.
+  static void look(const Moment& moment, const BearingBounds& cell, SeenTriangles& seen, std::span<CellView> views) {
+    seen.shrink(0);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const PlacedGroup& placed = moment.groups[i];
+      CellView& view = views[i];
+      view.any = placed.triangles != nullptr && placed.bounds.overlap(cell);
+      if (!view.any) continue;
+      const std::size_t first = seen.size();
+      view.few = placed.tree->find(cell, placed.R_group_camera, placed.camera, seen);
+      if (!view.few) seen.shrink(first);
+      view.triangles = seen.from(first);
+    }
   }
 
   template <int K>
-  void render_batch(const Moment& moment, std::span<Work<K>> batch, const Tile& band, Sample& sample) const {
-    for (Work<K>& work : batch) trace(moment, *work.bounds, {0, 0}, work.rays);
+  void render_batch(const Moment& moment, std::span<const CellView> views, std::span<Work<K>> batch, const Tile& band,
+                    Sample& sample) const {
+    for (Work<K>& work : batch) trace(moment, views, {0, 0}, work.rays);
     for (Work<K>& work : batch) store_geometry(work, band, sample);
     shade<K>(moment, batch, 1);
-    if (places_.size() > 1) smooth_edges(moment, batch);
+    if (places_.size() > 1) smooth_edges<K>(moment, views, batch);
     for (Work<K>& work : batch) store(work, work.rays.irradiance.data(), band, sample.irradiance);
   }
 
   /// Looks closer at the pixels that edges cross.
   template <int K>
-  void smooth_edges(const Moment& moment, std::span<Work<K>> batch) const {
+  void smooth_edges(const Moment& moment, std::span<const CellView> views, std::span<Work<K>> batch) const {
     std::array<EdgeWork<K>, 8> closer;
     std::size_t count = 0;
     for (Work<K>& work : batch) {
-      for (std::uint32_t edges = edges_of(moment, work); edges != 0; edges &= edges - 1) {
+      for (std::uint32_t edges = edges_of(moment, views, work); edges != 0; edges &= edges - 1) {
         const auto lane = static_cast<unsigned>(std::countr_zero(edges));
         work.rays.irradiance[lane] = 0;
         for (std::size_t ray = 0; ray < places_.size(); ray += K) {
@@ -174,17 +203,17 @@ class RaycastRenderer final : public ProcessorRenderer {
               mosaic_ ? first_material_of_edge(work.rays.first + static_cast<int>(lane)) : nullptr;
           spread<K>(*work.rays.block, work.rays.first + static_cast<int>(lane), ray, edge.block);
           if (count < closer.size()) continue;
-          look_closer<K>(moment, std::span(closer));
+          look_closer<K>(moment, views, std::span(closer));
           count = 0;
         }
       }
     }
-    look_closer<K>(moment, std::span(closer).first(count));
+    look_closer<K>(moment, views, std::span(closer).first(count));
   }
 
   /// Pixels of the work that edges cross, a bit per lane.
   template <int K>
-  std::uint32_t edges_of(const Moment& moment, const Work<K>& work) const {
+  std::uint32_t edges_of(const Moment& moment, std::span<const CellView> views, const Work<K>& work) const {
     const bool shadows = moment.lighting && moment.lighting->shadows;
     const SeenSurfaces<K> centre{work.rays.packet, work.rays.triangle, work.rays.light};
     Rays<K> corner;
@@ -192,7 +221,7 @@ class RaycastRenderer final : public ProcessorRenderer {
     GroupRotations<K> rotations;
     std::uint32_t edges = 0;
     for (const Eigen::Vector2f& place : kCorners) {
-      trace(moment, *work.bounds, place, corner);
+      trace(moment, views, place, corner);
       corner.light = work.rays.light;
       if (const std::uint32_t lit = corner.hits & work.rays.lit; shadows && lit != 0)
         light_up(moment, rotations, lit, corner);
@@ -215,8 +244,8 @@ class RaycastRenderer final : public ProcessorRenderer {
   }
 
   template <int K>
-  void look_closer(const Moment& moment, std::span<EdgeWork<K>> edges) const {
-    for (EdgeWork<K>& edge : edges) trace(moment, *edge.pixel->bounds, {0, 0}, edge.rays);
+  void look_closer(const Moment& moment, std::span<const CellView> views, std::span<EdgeWork<K>> edges) const {
+    for (EdgeWork<K>& edge : edges) trace(moment, views, {0, 0}, edge.rays);
     shade<K>(moment, edges, 1 / std::sqrt(static_cast<float>(places_.size())));
     for (EdgeWork<K>& edge : edges) {
       const float sum = std::accumulate(edge.rays.irradiance.begin(), edge.rays.irradiance.end(), 0.0F);
@@ -225,11 +254,16 @@ class RaycastRenderer final : public ProcessorRenderer {
   }
 
   template <int K>
-  void trace(const Moment& moment, const BearingBounds& bounds, const Eigen::Vector2f& place, Rays<K>& rays) const {
+  void trace(const Moment& moment, std::span<const CellView> views, const Eigen::Vector2f& place, Rays<K>& rays) const {
     rays.packet.aim(*rays.block, rays.first, place);
     for (unsigned group = 0; group < moment.groups.size(); ++group) {
-      const PlacedGroup& placed = moment.groups[group];
-      if (placed.triangles != nullptr && placed.bounds.overlap(bounds)) rays.packet.intersect(placed, group);
+      const CellView& view = views[group];
+      if (!view.any) continue;
+      if (view.few) {
+        rays.packet.intersect(moment.groups[group], group, view.triangles);
+      } else {
+        rays.packet.intersect(moment.groups[group], group);
+      }
     }
     rays.hits = rays.packet.hits();
     rays.triangle.fill(0);
@@ -278,9 +312,12 @@ class RaycastRenderer final : public ProcessorRenderer {
     rays.light.fill(1);
     rays.lit = moment.lighting ? rays.hits & ~colours.unlit : 0;
     if (rays.lit != 0) light_up(moment, rotations, rays.lit, rays);
+    const std::uint32_t hits = rays.hits;
+    const float background = background_;
+#pragma omp simd
     for (unsigned i = 0; i < K; ++i) {
-      rays.irradiance[i] =
-          (rays.hits >> i & 1U) != 0 ? colours.base[i] * rays.light[i] + colours.emission[i] : background_;
+      const float seen = colours.base[i] * rays.light[i] + colours.emission[i];
+      rays.irradiance[i] = (hits >> i & 1U) != 0 ? seen : background;
     }
   }
 

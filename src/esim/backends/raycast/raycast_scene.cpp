@@ -35,6 +35,9 @@ TriangleShading shading_of(const Mesh& mesh, std::size_t index, std::uint32_t fi
   return shading;
 }
 
+// Of more triangles, too many lie in most parts of an image.
+constexpr std::size_t kMostInTree = 20'000;
+
 void throw_on_error(RTCDevice device, const char* what) {
   const RTCError error = rtcGetDeviceError(device);
   if (error == RTC_ERROR_NONE) return;
@@ -133,11 +136,10 @@ void RaycastScene::add_group(const std::vector<const Mesh*>& meshes) {
   group.accelerator.reset(rtcNewScene(device_.get()));
   rtcSetSceneFlags(group.accelerator.get(), RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(group.accelerator.get(), RTC_BUILD_QUALITY_HIGH);  // slower to build, faster to look at
-  if (meshes.size() == 1) {
-    attach(device_.get(), group.accelerator.get(), *meshes[0]);
-  } else {
-    attach(device_.get(), group.accelerator.get(), joined(meshes));
-  }
+  const Mesh all = meshes.size() == 1 ? Mesh() : joined(meshes);
+  const Mesh& mesh = meshes.size() == 1 ? *meshes[0] : all;
+  attach(device_.get(), group.accelerator.get(), mesh);
+  if (mesh.triangles.size() <= kMostInTree) group.tree = TriangleTree(mesh.vertices, mesh.triangles);
   // One thread builds the tree, so that it is the same in every run. (The device's own limit on threads would hold for
   // the whole process.)
   tbb::task_arena(1).execute([&group] { rtcJoinCommitScene(group.accelerator.get()); });
@@ -168,7 +170,7 @@ std::vector<PlacedGroup> RaycastScene::place(const RenderRequest& request) const
     const SE3 T_world_group = placed.empty() ? SE3() : request.objects[placed.size() - 1].T_world_body;
     const SE3 T_group_camera = T_world_group.inverse() * request.camera.T_world_body;
     const Eigen::Matrix3f R_group_camera = T_group_camera.rotation.toRotationMatrix().cast<float>();
-    placed.push_back({group.accelerator.get(), R_group_camera, R_group_camera.transpose(),
+    placed.push_back({group.accelerator.get(), &group.tree, R_group_camera, R_group_camera.transpose(),
                       T_group_camera.translation.cast<float>(), bounds_in_view(group.bounds, T_group_camera)});
   }
   return placed;

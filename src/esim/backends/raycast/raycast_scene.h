@@ -9,6 +9,7 @@
 
 #include "esim/backends/raycast/ray_blocks.h"
 #include "esim/backends/raycast/raycast_renderer.h"
+#include "esim/backends/raycast/triangle_tree.h"
 
 namespace esim {
 
@@ -31,7 +32,8 @@ using ScenePointer = std::unique_ptr<RTCSceneTy, ReleaseScene>;
 
 /// A rigid group of triangles, as a camera sees it at one time.
 struct PlacedGroup {
-  RTCScene triangles;  // in the group's frame; null if there are none
+  RTCScene triangles;        // in the group's frame; null if there are none
+  const TriangleTree* tree;  // of the same
   Eigen::Matrix3f R_group_camera, R_camera_group;
   Eigen::Vector3f camera;  // where the camera is, in the group's frame
   BearingBounds bounds;    // what is seen of the group lies in there
@@ -71,6 +73,7 @@ class RaycastScene {
   struct Group {
     std::uint32_t first_triangle;
     ScenePointer accelerator;    // null for no triangles
+    TriangleTree tree;           // empty for many
     Eigen::AlignedBox3f bounds;  // of its vertices
   };
 

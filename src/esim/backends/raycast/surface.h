@@ -141,10 +141,12 @@ struct SurfaceColours {
   static void fill(const Texture* texture, float factor, const TextureLookup<K>& at, std::uint32_t lanes,
                    std::array<float, K>& out) {
     if (texture == nullptr || factor == 0) {
+#pragma omp simd
       for (unsigned i = 0; i < K; ++i) out[i] = (lanes >> i & 1U) != 0 ? factor : out[i];
       return;
     }
     const std::array<float, K> light = texture->template sample<K>(at, lanes);
+#pragma omp simd
     for (unsigned i = 0; i < K; ++i) out[i] = (lanes >> i & 1U) != 0 ? factor * light[i] : out[i];
   }
 };

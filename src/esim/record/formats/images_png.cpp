@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <vector>
 
@@ -9,10 +10,6 @@
 
 namespace esim {
 namespace {
-
-double srgb_from_linear(double linear) {
-  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1.0 / 2.4) - 0.055;
-}
 
 double linear_from_srgb(double srgb) { return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4); }
 
@@ -25,11 +22,18 @@ std::array<float, 255> level_bounds() {
   return bounds;
 }
 
-// Level at the start of each 4096th of [0, 1]: from there the exact one is at most a few bounds away.
-std::array<std::uint8_t, 4097> level_starts() {
-  std::array<std::uint8_t, 4097> starts;
-  for (std::size_t i = 0; i < starts.size(); ++i) {
-    starts[i] = static_cast<std::uint8_t>(std::floor(255.0 * srgb_from_linear(static_cast<double>(i) / 4096.0)));
+// A table's entry for each float on [2^-13, 1) that begins with the same kCodeBits of mantissa: so short a piece that
+// at most one bound lies in it. What is below has level 0.
+constexpr int kCodeBits = 9, kOctaves = 13;
+constexpr std::uint32_t kFirstCode = (127U - kOctaves) << kCodeBits;
+std::uint32_t code_of(float e) { return std::bit_cast<std::uint32_t>(e) >> (23 - kCodeBits); }
+
+// Level at the start of each of those pieces.
+std::array<std::uint8_t, std::size_t{kOctaves} << kCodeBits> level_starts(const std::array<float, 255>& bounds) {
+  std::array<std::uint8_t, std::size_t{kOctaves} << kCodeBits> starts;
+  for (std::uint32_t i = 0; i < starts.size(); ++i) {
+    const auto start = std::bit_cast<float>((kFirstCode + i) << (23 - kCodeBits));
+    starts[i] = static_cast<std::uint8_t>(std::upper_bound(bounds.begin(), bounds.end(), start) - bounds.begin());
   }
   return starts;
 }
@@ -38,14 +42,13 @@ std::array<std::uint8_t, 4097> level_starts() {
 
 Image<std::uint8_t> encode_srgb(const Image<float>& irradiance) {
   static const auto kBounds = level_bounds();
-  static const auto kStarts = level_starts();
+  static const auto kStarts = level_starts(kBounds);
   Image<std::uint8_t> encoded(irradiance.width(), irradiance.height());
   std::transform(irradiance.pixels().begin(), irradiance.pixels().end(), encoded.pixels().begin(), [](float e) {
-    if (!(e > 0.0f)) return std::uint8_t{0};
-    if (e >= 1.0f) return std::uint8_t{255};
-    std::size_t level = kStarts[static_cast<std::size_t>(e * 4096.0f)];
-    while (level < 255 && e >= kBounds[level]) ++level;
-    return static_cast<std::uint8_t>(level);
+    if (!(e >= kBounds.front())) return std::uint8_t{0};
+    if (e >= kBounds.back()) return std::uint8_t{255};
+    const std::uint8_t start = kStarts[code_of(e) - kFirstCode];
+    return static_cast<std::uint8_t>(start + (e >= kBounds[start]));
   });
   return encoded;
 }

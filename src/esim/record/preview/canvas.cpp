@@ -100,7 +100,9 @@ int Canvas::text(int x, int baseline, std::string_view line, int height, Rgb col
   const Tile visible = intersect(box, pixels_.bounds());
   for (int row = visible.y; row < visible.y + visible.height; ++row) {
     for (int column = visible.x; column < visible.x + visible.width; ++column) {
-      const float amount = static_cast<float>(coverage.at<std::uint8_t>(row - box.y, column - box.x)) / 255.0f;
+      const std::uint8_t covered = coverage.at<std::uint8_t>(row - box.y, column - box.x);
+      if (covered == 0) continue;
+      const float amount = static_cast<float>(covered) / 255.0f;
       pixels_(column, row) = mix(pixels_(column, row), colour, amount);
     }
   }
@@ -132,6 +134,7 @@ std::string encode_png(const Image<Rgb>& image) {
 }
 
 Image<Rgb> enlarge(const Image<Rgb>& image, int width, int height) {
+  if (width == image.width() && height == image.height()) return image;
   const int factor =
       std::max((width + image.width() - 1) / image.width(), (height + image.height() - 1) / image.height());
   cv::Mat repeated;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "esim/record/number_text.h"
 #include "esim/record/preview/canvas.h"
@@ -34,7 +33,10 @@ std::string short_number(float value) {
 }
 
 std::uint64_t sum(const Image<float>& image) {
-  return static_cast<std::uint64_t>(std::llround(std::accumulate(image.pixels().begin(), image.pixels().end(), 0.0)));
+  double total = 0;
+#pragma omp simd reduction(+ : total)
+  for (std::size_t i = 0; i < image.size(); ++i) total += static_cast<double>(image.data()[i]);
+  return static_cast<std::uint64_t>(std::llround(total));
 }
 
 std::string duration(TimeNs ns) {
@@ -89,10 +91,9 @@ class Panels {
   float pixels_per_pixel_ = 1.0f;
 };
 
-void draw_panel(Canvas& canvas, const PreviewLayout& layout, int panel, const char* title, const Image<Rgb>& image) {
+void draw_panel_frame(Canvas& canvas, const PreviewLayout& layout, int panel, const char* title) {
   const int x = layout.panel_x(panel), y = layout.panel_y();
   canvas.text(x, y - 10, title, kTextHeight + 1, kInk);
-  canvas.draw(image, x, y);
   canvas.outline({x - 1, y - 1, layout.panel_width + 2, layout.panel_height + 2}, kFaintInk);
 }
 
@@ -160,6 +161,24 @@ void draw_flow_legend(Canvas& canvas, const PreviewLayout& layout, const Preview
   canvas.text(text_x, y + 50, "hue: direction of motion", kSmallTextHeight, kFaintInk);
 }
 
+/// What does not change from frame to frame.
+Image<Rgb> draw_backdrop(const PreviewLayout& layout, const PreviewFrame& frame) {
+  Canvas canvas(layout.width, layout.height, kPaper);
+  const int right = layout.panel_x(layout.panels - 1) + layout.column_width;
+  canvas.text(right, 30, frame.caption, kSmallTextHeight, kFaintInk, Align::right);
+  canvas.fill({kMargin, kHeader - 4, right - kMargin, 1}, {210, 210, 210});
+  draw_panel_frame(canvas, layout, 0, "Events");
+  if (frame.depth_m == nullptr) {
+    draw_panel_frame(canvas, layout, 1, "Image");
+  } else {
+    draw_panel_frame(canvas, layout, 1, "Depth");
+    draw_panel_frame(canvas, layout, 2, "Motion field");
+    draw_depth_legend(canvas, layout, frame);
+    draw_flow_legend(canvas, layout, frame);
+  }
+  return std::move(canvas).take();
+}
+
 }  // namespace
 
 PreviewLayout::PreviewLayout(int camera_width, int camera_height, int panel_count) : panels(panel_count) {
@@ -181,24 +200,25 @@ int PreviewLayout::panel_x(int panel) const { return kMargin + panel * (column_w
 int PreviewLayout::panel_y() const { return kHeader + kTitle; }
 int PreviewLayout::legend_y() const { return panel_y() + panel_height + 16; }
 
-Image<Rgb> compose_preview(const PreviewLayout& layout, const PreviewFrame& frame) {
-  Canvas canvas(layout.width, layout.height, kPaper);
-  canvas.text(kMargin, 30, fmt::format("t = {:.4f} s", to_seconds(frame.t)), kTextHeight + 2, kInk);
-  const int right = layout.panel_x(layout.panels - 1) + layout.column_width;
-  canvas.text(right, 30, frame.caption, kSmallTextHeight, kFaintInk, Align::right);
-  canvas.fill({kMargin, kHeader - 4, right - kMargin, 1}, {210, 210, 210});
+Image<Rgb> PreviewPage::compose(const PreviewFrame& frame) {
+  const Scales scales{frame.near_m, frame.far_m, frame.full_flow_px_per_s};
+  if (backdrop_.empty() || scales != scales_) backdrop_ = draw_backdrop(layout_, frame);
+  scales_ = scales;
 
-  const Panels panels(layout, frame);
-  draw_panel(canvas, layout, 0, "Events", panels.events());
-  draw_events_legend(canvas, layout, frame);
+  Canvas canvas(backdrop_);
+  canvas.text(kMargin, 30, fmt::format("t = {:.4f} s", to_seconds(frame.t)), kTextHeight + 2, kInk);
+  const auto draw = [&](int panel, const Image<Rgb>& image) {
+    canvas.draw(image, layout_.panel_x(panel), layout_.panel_y());
+  };
+  const Panels panels(layout_, frame);
+  draw(0, panels.events());
+  draw_events_legend(canvas, layout_, frame);
   if (frame.depth_m == nullptr) {
-    draw_panel(canvas, layout, 1, "Image", panels.image());
-    return std::move(canvas).take();
+    draw(1, panels.image());
+  } else {
+    draw(1, panels.depth());
+    draw(2, panels.flow());
   }
-  draw_panel(canvas, layout, 1, "Depth", panels.depth());
-  draw_panel(canvas, layout, 2, "Motion field", panels.flow());
-  draw_depth_legend(canvas, layout, frame);
-  draw_flow_legend(canvas, layout, frame);
   return std::move(canvas).take();
 }
 

@@ -40,7 +40,24 @@ struct PreviewLayout {
   int legend_y() const;
 };
 
-/// The panels side by side, with their legends.
-Image<Rgb> compose_preview(const PreviewLayout& layout, const PreviewFrame& frame);
+/// Makes pictures of the frames of one video, which share their size and caption: the panels side by side, with their
+/// legends. What stays the same is drawn once.
+class PreviewPage {
+ public:
+  explicit PreviewPage(const PreviewLayout& layout) : layout_(layout) {}
+
+  Image<Rgb> compose(const PreviewFrame& frame);
+
+ private:
+  /// What the legends say.
+  struct Scales {
+    float near_m = 0, far_m = 0, full_flow_px_per_s = 0;
+    bool operator==(const Scales&) const = default;
+  };
+
+  PreviewLayout layout_;
+  Scales scales_;
+  Image<Rgb> backdrop_;
+};
 
 }  // namespace esim

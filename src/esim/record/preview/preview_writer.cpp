@@ -90,7 +90,7 @@ struct PreviewWriter::Impl {
   int camera;
   Playback playback;
   std::string caption;
-  std::optional<PreviewLayout> layout;
+  std::optional<PreviewPage> page;
   std::optional<VideoFile> video;
 
   // Since the previous frame.
@@ -132,11 +132,11 @@ void PreviewWriter::Impl::add_frame(const ImageRecord& image) {
 
 void PreviewWriter::Impl::show(PreviewFrame frame) {
   constexpr int kPanels = 3, kPanelsOfImages = 2;
-  if (!layout) layout.emplace(on.width(), on.height(), frame.depth_m != nullptr ? kPanels : kPanelsOfImages);
+  if (!page) page.emplace(PreviewLayout(on.width(), on.height(), frame.depth_m != nullptr ? kPanels : kPanelsOfImages));
   frame.since_previous = previous ? frame.t - *previous : 0;
   frame.caption = caption;
-  Image<Rgb> image = compose_preview(*layout, frame);
-  if (!video) video.emplace(folder / "preview.mp4", layout->width, layout->height, playback.frames_per_s);
+  Image<Rgb> image = page->compose(frame);
+  if (!video) video.emplace(folder / "preview.mp4", image.width(), image.height(), playback.frames_per_s);
   video->append(image);
   if (candidates.wants_next()) {
     candidates.add(events, std::move(image));

@@ -67,7 +67,8 @@ void SceneView::make_factory(const Scenario& scenario, const Notices& notices) {
     try {
       colour_ = colour;
       scene_ = load_scenes(scenario.renderer, colour, notices);
-      factory_ = build_renderer_factory(scenario.renderer, scene_, colour);
+      factory_ = build_renderer_factory(scenario.renderer, scene_, colour,
+                                        {{scenario.cameras.front().name, camera_, T_body_camera_}}, notices);
       const RendererTraits traits = renderer_for(camera_)->traits();
       if (traits.on_sensor) {
         throw UserError(

@@ -82,9 +82,9 @@ void UnrealcvClient::wait_for(const Asked& asked) {
       session_->wait_for(asked.batch);
       return;
     } catch (const ConnectionLost& lost) {
+      session_.reset();
       if (const auto why = options_.why_ended())
         fail(options_, *why, "see what it says of the scene, and whether memory sufficed");
-      session_.reset();
       if (was_connected) give_up = seconds_from_now(options_.timeout_s);
       const bool is_absent = !dialect_ && dynamic_cast<const ConnectionRefused*>(&lost) != nullptr;
       if (is_absent || Clock::now() >= give_up) fail_to_connect(lost.what());

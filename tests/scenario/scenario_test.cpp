@@ -43,7 +43,7 @@ TEST_F(ScenarioFile, GivesDefaultsToWhatItDoesNotName) {
   EXPECT_EQ(scenario.cameras[0].name, "cam0");
   EXPECT_EQ(scenario.cameras[0].width, 346);
   EXPECT_DOUBLE_EQ(scenario.cameras[0].event_camera.threshold_on(), 0.5);
-  EXPECT_DOUBLE_EQ(std::get<FlowSampling>(scenario.cameras[0].sampling).lambda, 0.5);
+  EXPECT_DOUBLE_EQ(std::get<AdaptiveSampling>(scenario.cameras[0].sampling).tolerance, 0.25);
   EXPECT_EQ(std::get<PanoramaRendererOptions>(scenario.renderer).image, folder_.path() / "p.jpg")
       << "relative to the file";
   EXPECT_EQ(std::get<PanoramaRendererOptions>(scenario.renderer).median_px, 0);

@@ -10,7 +10,7 @@ namespace {
 constexpr double kNsPerS = 1e9;
 
 // One interval in so many is looked into.
-constexpr std::uint32_t kAuditOneIn = 32;
+constexpr std::uint32_t kAuditOneIn = 96;
 
 // The next sample is meant to make this share of the error that is let pass.
 constexpr double kAim = 0.6;

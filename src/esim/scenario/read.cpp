@@ -61,6 +61,16 @@ void refuse_geometry_beside_calibration(const YAML::Node& entry, const std::stri
   }
 }
 
+/// Where a scenario does not say. Whole images are sampled by flow, and so is what is not `described`: a renderer of
+/// the user's own, and motion that becomes known on the way.
+SamplingOptions usual_sampling(const RendererOptions& renderer, bool described) {
+  if (engine_objects(renderer) != nullptr) return KeyframeSampling{};
+  const auto* const mesh = std::get_if<MeshRendererOptions>(&renderer);
+  const bool tiles = described && (mesh == nullptr || mesh->engine == MeshEngine::raycast);
+  if (tiles) return AdaptiveSampling{};
+  return FlowSampling{};
+}
+
 /// `otherwise` holds what a camera is where it does not say.
 std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource& source,
                                         const CameraOptions& otherwise) {
@@ -227,7 +237,7 @@ Scenario read_scenario(const ScenarioText& text) {
     }
   }
   CameraOptions camera;
-  if (engine_objects(scenario.renderer) != nullptr) camera.sampling = KeyframeSampling{};
+  camera.sampling = usual_sampling(scenario.renderer, text.needs_renderer && text.needs_trajectory);
   if (sprites != nullptr) {
     read_layers(*sprites, renderer, source, camera);
     complete_for_layers(scenario, *sprites, trajectory.IsDefined());

@@ -265,7 +265,8 @@ void describe(Visitor& visit, CameraOptions& o) {
   visit("colour", o.colour,
         About{"filters on the pixels; rggb: red at even columns and rows, green, green, blue; none: luminance"});
   visit("sampling", o.sampling,
-        About{"when the scene is evaluated (default: flow; keyframes where another program renders)"});
+        About{"when the scene is evaluated (default: adaptive; flow where whole images are rendered, as by OpenGL; "
+              "keyframes where another program renders)"});
   visit("events", o.events, About{"whether the camera has an event sensor; without, it is a standard camera"});
   visit("event_camera", o.event_camera, About{"the event sensor"});
   visit("frame_camera", o.frame_camera, About{"a standard camera in the same place (default: none)"});

@@ -214,7 +214,7 @@ class play(Iterator[NDArray[np.uint8]]):
         self,
         path: Path,
         *,
-        views: list[str] | None = None,
+        views: str | list[str] | None = None,
         camera: str | None = None,
         at_s: float | None = None,
         fps: float = 30.0,

@@ -53,7 +53,7 @@ class play:
     ----------
     path : path
         A recording's folder or a file of events, of any format in `esim.formats()`.
-    views : list of str, optional
+    views : str or list of str, optional
         Of "events", "time-surface", "space-time", "image", "depth" and "motion"; all there is without.
     camera : str, optional
         Of several cameras, the one to show.
@@ -111,7 +111,7 @@ class play:
                 raise ValueError(f"{name} is above 0")
         self._core = _core.open_pages(
             os.fspath(path),
-            list(views or []),
+            [views] if isinstance(views, str) else list(views or []),
             camera or "",
             fps=float(fps),
             slow_motion=float(slow_motion or 0),

@@ -11,6 +11,7 @@
 #include "esim/record/events_file.h"
 #include "esim/record/format.h"
 #include "esim/record/inspect.h"
+#include "sensor_size.h"
 
 namespace esim::python {
 namespace {
@@ -19,17 +20,11 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kPortion = 1 << 17;
 
-ReadOptions options_for(std::optional<int> width, std::optional<int> height) {
-  ReadOptions options;
-  if (width && height) options.sensor = SensorSize{*width, *height};
-  return options;
-}
-
 /// A file's events, by number or by time.
 class EventReader {
  public:
   EventReader(const fs::path& path, std::optional<int> width, std::optional<int> height)
-      : file_(path, options_for(width, height)) {}
+      : file_(path, {sensor_size(width, height), {}}) {}
 
   /// The next `count` events, or as many as are left.
   nb::object take(std::size_t count) {

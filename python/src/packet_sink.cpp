@@ -117,6 +117,7 @@ void PacketSink::write(const TruthRecord& record) {
 }
 
 void PacketSink::write(const DisplacementRecord& record) {
+  require_size(record.x, record.camera, record.t1);
   advance_to(record.t1);
   CameraPart& camera = part(record.camera);
   camera.displacement_span.insert(camera.displacement_span.end(), {record.t0, record.t1});
@@ -126,8 +127,8 @@ void PacketSink::write(const DisplacementRecord& record) {
 }
 
 void PacketSink::write(const FrameRecord& record) {
-  // The exposure's middle is rounded: a nanosecond is no reason to end a packet that the frame still belongs to.
   require_size(record.image, record.camera, record.t);
+  // The exposure's middle is rounded: a nanosecond is no reason to end a packet that the frame still belongs to.
   advance_to(2 * record.t - record.exposure_start - 1);
   CameraPart& camera = part(record.camera);
   camera.image_t.push_back(record.t);

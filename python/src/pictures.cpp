@@ -13,6 +13,7 @@
 #include "esim/visualise/playable.h"
 #include "esim/visualise/player.h"
 #include "esim/visualise/space_time.h"
+#include "sensor_size.h"
 
 namespace esim::python {
 namespace {
@@ -119,9 +120,8 @@ std::unique_ptr<Pages> open(const fs::path& path, const std::vector<std::string>
   options.span_s = span_s;
   options.width = size;
   options.theme = light ? kLightTheme : kDarkTheme;
-  std::optional<SensorSize> sensor;
-  if (width && height) sensor = SensorSize{*width, *height};
-  return std::make_unique<Pages>(path, sensor, camera, options, Extent{0, start_s, duration_s}, at_s);
+  return std::make_unique<Pages>(path, sensor_size(width, height), camera, options, Extent{0, start_s, duration_s},
+                                 at_s);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "bindings.h"
 #include "esim/record/copy_recording.h"
 #include "packet_views.h"
+#include "sensor_size.h"
 
 namespace esim::python {
 namespace {
@@ -33,7 +34,7 @@ class RecordingReader {
   RecordingReader(const fs::path& path, TimeNs packet, std::optional<int> width, std::optional<int> height,
                   bool recover) {
     ReadOptions options;
-    if (width && height) options.sensor = SensorSize{*width, *height};
+    options.sensor = sensor_size(width, height);
     if (recover) options.recover = [this](const std::string& problem) { problems_.push_back(problem); };
     source_ = open_source(path, options);
     info_ = source_->info();

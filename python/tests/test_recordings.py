@@ -112,5 +112,10 @@ def test_play_shows_what_there_is_side_by_side(recorded):
     for wrong, match in (({"views": ["cube"]}, "no view cube"), ({"camera": "left"}, "no camera left"), ({"at_s": 9.0}, "at_s")):
         with pytest.raises(esim.Error, match=match):
             esim.play(out, **wrong)
+    (same,) = esim.play(out, at_s=0.1, views="image", size=400, light=True)
+    np.testing.assert_array_equal(same, alone)
+    for read in (esim.play, esim.Recording):
+        with pytest.raises(esim.Error, match="width and height"):
+            read(out, width=64)
     with pytest.raises(ValueError, match="fps"):
         esim.play(out, fps=0)

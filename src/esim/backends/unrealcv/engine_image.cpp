@@ -18,8 +18,6 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "numbers are taken as they come");
 
-constexpr std::string_view kNpyMagic = "\x93NUMPY";
-
 /// An array of H x W x channels numbers, borrowed.
 struct NpyImage {
   int width = 0, height = 0;
@@ -155,7 +153,7 @@ std::uint32_t code_at(const NpyImage& image, std::size_t pixel) {
 
 }  // namespace
 
-bool is_npy(std::string_view body) { return body.starts_with(kNpyMagic); }
+bool is_npy(std::string_view body) { return body.starts_with(npy::kMagic); }
 bool is_png(std::string_view body) { return body.starts_with("\x89PNG"); }
 
 void decode_light(std::string_view body, ImageExtent expected, Image<float>& irradiance) {

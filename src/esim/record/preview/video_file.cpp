@@ -4,13 +4,13 @@ extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include <libavutil/opt.h>
+#include <libswscale/swscale.h>
 }
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <string>
-#include <vector>
 
 #include "esim/record/output_file.h"
 #include "esim/record/preview/palette.h"
@@ -22,6 +22,7 @@ struct Deleter {
   void operator()(AVCodecContext* context) const { avcodec_free_context(&context); }
   void operator()(AVFrame* frame) const { av_frame_free(&frame); }
   void operator()(AVPacket* packet) const { av_packet_free(&packet); }
+  void operator()(SwsContext* context) const { sws_freeContext(context); }
   void operator()(AVFormatContext* context) const {
     if (context->pb != nullptr) avio_closep(&context->pb);
     avformat_free_context(context);
@@ -37,50 +38,13 @@ std::string reason_of(int error) {
   return text;
 }
 
-/// Rows of an image of even size as Y, and of a pair of them as U and V, in the range of ITU-R BT.601: Y from 16 to
-/// 235, U and V from 16 to 240.
-void fill_planes(const Image<Rgb>& image, const AVFrame& frame) {
-  constexpr int kBits = 15, kHalf = 1 << (kBits - 1);
-  const auto fixed = [](double factor) { return static_cast<int>(factor * (1 << kBits) + (factor < 0 ? -0.5 : 0.5)); };
-  constexpr double kRed = 0.299, kBlue = 0.114, kGreen = 1 - kRed - kBlue, kLuma = 219.0 / 255, kChroma = 112.0 / 255;
-  const int y_r = fixed(kLuma * kRed), y_g = fixed(kLuma * kGreen), y_b = fixed(kLuma * kBlue);
-  const int u_r = fixed(-kChroma * kRed / (1 - kBlue)), u_g = fixed(-kChroma * kGreen / (1 - kBlue));
-  const int v_g = fixed(-kChroma * kGreen / (1 - kRed)), v_b = fixed(-kChroma * kBlue / (1 - kRed));
-  const int u_b = fixed(kChroma), v_r = fixed(kChroma);
-  const auto row_of = [&](int plane, int y) { return frame.data[plane] + std::ptrdiff_t{y} * frame.linesize[plane]; };
-
-  for (int y = 0; y < image.height(); ++y) {
-    const Rgb* const from = image.row(y);
-    std::uint8_t* const luma = row_of(0, y);
-#pragma omp simd
-    for (int x = 0; x < image.width(); ++x) {
-      const int sum = y_r * from[x].r + y_g * from[x].g + y_b * from[x].b;
-      luma[x] = static_cast<std::uint8_t>((sum + (16 << kBits) + kHalf) >> kBits);
-    }
-  }
-  const auto components = static_cast<std::size_t>(3 * image.width());
-  std::vector<std::uint16_t> pair(components);  // sums over two rows
-  for (int y = 0; y + 1 < image.height(); y += 2) {
-    const std::uint8_t *const upper = &image.row(y)->r, *const lower = &image.row(y + 1)->r;
-#pragma omp simd
-    for (std::size_t i = 0; i < components; ++i) pair[i] = static_cast<std::uint16_t>(upper[i] + lower[i]);
-    std::uint8_t *const u = row_of(1, y / 2), *const v = row_of(2, y / 2);
-    const std::uint16_t* from = pair.data();
-    for (int x = 0; x < image.width() / 2; ++x, from += 6) {
-      const int red = from[0] + from[3], green = from[1] + from[4], blue = from[2] + from[5];
-      constexpr int kMiddle = (128 << (kBits + 2)) + (kHalf << 2);
-      u[x] = static_cast<std::uint8_t>((u_r * red + u_g * green + u_b * blue + kMiddle) >> (kBits + 2));
-      v[x] = static_cast<std::uint8_t>((v_r * red + v_g * green + v_b * blue + kMiddle) >> (kBits + 2));
-    }
-  }
-}
-
 }  // namespace
 
 struct VideoFile::Impl {
   std::filesystem::path path;
   Owned<AVFormatContext> format;
   Owned<AVCodecContext> encoder;
+  Owned<SwsContext> converter;
   Owned<AVFrame> frame;
   Owned<AVPacket> packet;
   AVStream* stream = nullptr;  // belongs to format
@@ -124,6 +88,9 @@ void VideoFile::Impl::open_encoder(VideoKind kind, int width, int height, double
   frame->height = height;
   check(av_frame_get_buffer(frame.get(), 0));
   packet.reset(av_packet_alloc());
+  if (gif) return;
+  converter.reset(sws_getContext(width, height, AV_PIX_FMT_RGB24, width, height, encoder->pix_fmt, SWS_BILINEAR,
+                                 nullptr, nullptr, nullptr));
 }
 
 void VideoFile::Impl::open_file(VideoKind kind) {
@@ -140,7 +107,12 @@ void VideoFile::Impl::open_file(VideoKind kind) {
 }
 
 void VideoFile::Impl::fill(const Image<Rgb>& image) {
-  if (frame->format == AV_PIX_FMT_YUV420P) return fill_planes(image, *frame);
+  if (converter) {
+    const std::uint8_t* const source[] = {reinterpret_cast<const std::uint8_t*>(image.data())};
+    const int source_stride[] = {3 * image.width()};
+    sws_scale(converter.get(), source, source_stride, 0, image.height(), frame->data, frame->linesize);
+    return;
+  }
   const PaletteImage reduced = reduce_colours(image);
   for (int y = 0; y < image.height(); ++y)
     std::copy_n(reduced.indices.row(y), image.width(), frame->data[0] + std::ptrdiff_t{y} * frame->linesize[0]);

@@ -105,8 +105,8 @@ Outcome sample(const AdaptiveSampling& options, const Movie& movie, TimeNs end, 
       // A pixel of each segment, somewhere in it, so that each time counts alike.
       const int x = segment.tile.x + static_cast<int>(segment.t1 / 7 % segment.tile.width);
       const int y = segment.tile.y + static_cast<int>(segment.t1 / 13 % segment.tile.height);
-      const double l0 = std::log(double{(*segment.irradiance0)(x, y)} + kEps);
-      const double l1 = std::log(double{(*segment.irradiance1)(x, y)} + kEps);
+      const double l0 = std::log(double{segment.irradiance0(x, y)} + kEps);
+      const double l1 = std::log(double{segment.irradiance1(x, y)} + kEps);
       outcome.digest += l1 * to_seconds(segment.t1 - segment.t0) + to_seconds(segment.t0);
       constexpr TimeNs kEvery = 50 * kNsPerUs;
       for (TimeNs t = segment.t0 / kEvery * kEvery + kEvery; t <= segment.t1; t += kEvery) {

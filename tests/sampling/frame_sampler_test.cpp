@@ -59,8 +59,6 @@ TEST_P(EverySampler, KeepsItsContract) {
   Image<TimeNs> known(kWidth, kHeight, span.start);
   Image<int> segments(kWidth, kHeight, 0);
   const auto take = [&](const Segment& segment) {
-    EXPECT_EQ(segment.irradiance0->bounds(), known.bounds());
-    EXPECT_EQ(segment.irradiance1->bounds(), known.bounds());
     for (int y = segment.tile.y; y < segment.tile.y + segment.tile.height; ++y) {
       for (int x = segment.tile.x; x < segment.tile.x + segment.tile.width; ++x) {
         ASSERT_EQ(segment.t0, known(x, y));
@@ -113,7 +111,7 @@ TEST(FrameSampler, HandsOutWhatWasRendered) {
     const auto segments = sampler->accept(sample);
     ASSERT_EQ(segments.size(), 1U);
     EXPECT_EQ(segments[0].t1, t);
-    EXPECT_EQ(segments[0].irradiance1->pixels()[5], rendered.pixels()[5]);
+    EXPECT_EQ(segments[0].irradiance1.row(0)[5], rendered.pixels()[5]);
   }
 }
 

@@ -77,14 +77,14 @@ Outcome run(const Turning& scene, const KeyframeSampling& options, double durati
         const Sample truth = scene.render(scene.sensor, segment.t1);
         for (std::size_t i = 0; i < truth.irradiance.size(); ++i) {
           const double error =
-              std::log((segment.irradiance1->pixels()[i] + 0.001) / (truth.irradiance.pixels()[i] + 0.001));
+              std::log((segment.irradiance1.row(0)[i] + 0.001) / (truth.irradiance.pixels()[i] + 0.001));
           squared += error * error;
           ++count;
         }
         const Sample halfway = scene.render(scene.sensor, (segment.t0 + segment.t1) / 2);
         for (std::size_t i = 0; i < halfway.irradiance.size(); ++i) {
           const auto L = [](float irradiance) { return std::log(irradiance + 0.001); };
-          const double told = (L(segment.irradiance0->pixels()[i]) + L(segment.irradiance1->pixels()[i])) / 2;
+          const double told = (L(segment.irradiance0.row(0)[i]) + L(segment.irradiance1.row(0)[i])) / 2;
           errors.add(std::fabs(told - L(halfway.irradiance.pixels()[i])));
         }
       }

@@ -56,4 +56,23 @@ class Image {
   std::vector<T> data_;
 };
 
+/// Borrowed pixels of an image, all of them or those of a tile that is stored apart. Coordinates are the image's.
+template <typename T>
+class ImageView {
+ public:
+  ImageView() = default;
+  ImageView(const Image<T>* image) : ImageView(image->data(), image->bounds()) {}
+  /// `pixels`: the tile's, rows contiguous, no padding.
+  ImageView(const T* pixels, const Tile& tile)
+      : pixels_(pixels), stride_(tile.width), first_(tile.y * static_cast<std::ptrdiff_t>(tile.width) + tile.x) {}
+
+  /// Only elements inside the tile may be read.
+  const T* row(int y) const { return pixels_ + (y * stride_ - first_); }
+  const T& operator()(int x, int y) const { return row(y)[x]; }
+
+ private:
+  const T* pixels_ = nullptr;
+  std::ptrdiff_t stride_ = 0, first_ = 0;
+};
+
 }  // namespace esim

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <mutex>
 #include <utility>
 #include <vector>
 
+#include "esim/core/large_vector.h"
 #include "esim/sampling/error_budget.h"
 #include "esim/sampling/tile_course.h"
 
@@ -24,16 +26,28 @@ constexpr double kRound = 0.5;
 constexpr double kSlack = 0.1;
 
 // An interval's bow that is less than this share of the tolerance is left out.
-constexpr double kStraight = 0.05;
-
-// Between two samples there are up to four segments: room for those of two or more intervals of a tile at once.
-constexpr int kLayers = 10;
-
-// Tiles whose motion is watched: those up to so many away.
-constexpr int kReach = 3;
+constexpr double kStraight = 0.08;
 
 // Tiles of a parallel loop that go to one thread together: a round has a few tens.
-constexpr int kTogether = 3;
+constexpr int kTogether = 4;
+
+/// Memory for the pixels of tiles, handed out to several threads and taken back all at once.
+class TileMemory {
+ public:
+  explicit TileMemory(std::size_t pixels) : pixels_(pixels) {}
+
+  float* take() {
+    const std::lock_guard lock(mutex_);
+    if (taken_ == blocks_.size()) blocks_.emplace_back(pixels_);
+    return blocks_[taken_++].data();
+  }
+  void take_back() { taken_ = 0; }
+
+ private:
+  std::size_t pixels_, taken_ = 0;
+  std::vector<LargeVector<float>> blocks_;
+  std::mutex mutex_;
+};
 
 class AdaptiveSampler final : public Sampler {
  public:
@@ -43,7 +57,7 @@ class AdaptiveSampler final : public Sampler {
         columns_((context.width + options.tile_px - 1) / options.tile_px),
         rows_((context.height + options.tile_px - 1) / options.tile_px),
         planner_(options, context.span),
-        layers_(kLayers, Image<float>(context.width, context.height)),
+        between_(static_cast<std::size_t>(options.tile_px) * static_cast<std::size_t>(options.tile_px)),
         budget_(options.tolerance * context.sensor.contrast_threshold) {
     statistics_.tolerance = options.tolerance;
     const auto eps = static_cast<float>(context.sensor.log_eps);
@@ -64,24 +78,19 @@ class AdaptiveSampler final : public Sampler {
     for (const Tile& tile : sample.tiles) statistics_.pixel_evaluations += static_cast<std::int64_t>(tile.area());
     const ErrorLimits limits = budget_.limits();
     straight_ = kStraight * limits.error;
+    between_.take_back();
     for_each(asked_, [&](TileCourse& tile, std::uint32_t index) {
       planner_.take(tile, index, sample, limits);
       give(tile);
     });
     account();
-    collect(asked_);
+    collect();
     if (!asked_.empty()) watch();
     request();
     return segments_;
   }
 
-  std::span<const Segment> more() override {
-    if (unfinished_.empty()) return {};
-    const std::vector<std::uint32_t> tiles = unfinished_;
-    for_each(tiles, [&](TileCourse& tile, std::uint32_t) { give(tile); });
-    collect(tiles);
-    return segments_;
-  }
+  std::span<const Segment> more() override { return {}; }
 
   TimeNs watermark() const override {
     TimeNs known = context_.span.end;
@@ -110,7 +119,7 @@ class AdaptiveSampler final : public Sampler {
   void give(TileCourse& tile);
   int pieces(const TileTimeline& timeline, std::size_t i) const;
   void account();
-  void collect(const std::vector<std::uint32_t>& indices);
+  void collect();
   void watch();
   void request();
   void choose_round();
@@ -125,45 +134,47 @@ class AdaptiveSampler final : public Sampler {
   SampleRequest request_;
   std::vector<std::uint32_t> asked_;  // tiles of the request
 
-  std::vector<Image<float>> layers_;  // irradiance at the ends of segments: of each tile, one after the other
+  TileMemory between_;  // irradiance between samples
   std::vector<Segment> segments_;
-  std::vector<std::uint32_t> unfinished_;  // tiles that have more segments to give than there are layers
 
   ErrorBudget budget_;
   double straight_ = 0;  // a bow that does not matter, ln units
   SamplingStatistics statistics_;
 };
 
-/// Makes a tile's segments of the intervals that are known well enough, as far as there are layers for them.
+/// Makes a tile's segments of the intervals that are known well enough.
 void AdaptiveSampler::give(TileCourse& tile) {
   TileTimeline& timeline = tile.timeline;
   tile.segments.clear();
-  // What was given last still stands in its layer. Of the others the first ones are taken: they are in the caches.
-  const auto number = [&](int k) { return k == 0 ? tile.layer : (k <= tile.layer ? k - 1 : k); };
-  const auto layer = [&](int k) -> Image<float>& { return layers_[static_cast<std::size_t>(number(k))]; };
+  const ImageView<float> start(timeline.irradiance(tile.done), timeline.tile());
   if (!std::exchange(tile.begun, true)) {
-    timeline.write(0, layer(0));
-    tile.segments.push_back({timeline.tile(), timeline.time(0), timeline.time(0), &layer(0), &layer(0)});
+    tile.segments.push_back({timeline.tile(), timeline.time(0), timeline.time(0), start, start});
   }
-  int used = 0;
-  std::size_t i = tile.done;
-  for (; i < tile.until; ++i) {
+  for (std::size_t i = tile.done; i < tile.until; ++i) {
     const TimeNs t0 = timeline.time(i), h = timeline.time(i + 1) - t0;
     const int count = pieces(timeline, i);
-    if (used + count >= kLayers) break;
-    if (count == 2) timeline.write_half(i, layer(used + 1));
-    if (count == 4) timeline.write_quarters(i, {&layer(used + 1), &layer(used + 2), &layer(used + 3)});
-    timeline.write(i + 1, layer(used + count));
-    for (int k = 0; k < count; ++k, ++used) {
-      tile.segments.push_back(
-          {timeline.tile(), t0 + h * k / count, t0 + h * (k + 1) / count, &layer(used), &layer(used + 1)});
+    std::array<const float*, 5> ends = {timeline.irradiance(i)};
+    if (count == 2) {
+      float* const half = between_.take();
+      timeline.write_half(i, half);
+      ends[1] = half;
+    } else if (count == 4) {
+      const std::array<float*, 3> quarters = {between_.take(), between_.take(), between_.take()};
+      timeline.write_quarters(i, quarters);
+      std::copy(quarters.begin(), quarters.end(), ends.begin() + 1);
+    }
+    ends[static_cast<std::size_t>(count)] = timeline.irradiance(i + 1);
+    for (int k = 0; k < count; ++k) {
+      const auto end = ends.begin() + k;
+      tile.segments.push_back({timeline.tile(),
+                               t0 + h * k / count,
+                               t0 + h * (k + 1) / count,
+                               {end[0], timeline.tile()},
+                               {end[1], timeline.tile()}});
     }
     tile.log_intervals += std::log(static_cast<double>(h)), ++tile.intervals;
   }
-  tile.layer = number(used);
-  tile.until -= i;
-  tile.done = timeline.forget_before(i);
-  tile.until += tile.done;
+  tile.done = timeline.forget_before(tile.until);
 }
 
 /// Into how many straight pieces the interval behind sample i is cut for the pixels.
@@ -189,14 +200,12 @@ void AdaptiveSampler::account() {
   }
 }
 
-/// Puts the segments of these tiles together.
-void AdaptiveSampler::collect(const std::vector<std::uint32_t>& indices) {
+/// Puts the segments of the tiles together.
+void AdaptiveSampler::collect() {
   segments_.clear();
-  unfinished_.clear();
-  for (const std::uint32_t index : indices) {
+  for (const std::uint32_t index : asked_) {
     const TileCourse& tile = tiles_[index];
     segments_.insert(segments_.end(), tile.segments.begin(), tile.segments.end());
-    if (tile.done < tile.until) unfinished_.push_back(index);
   }
 }
 
@@ -204,28 +213,31 @@ void AdaptiveSampler::collect(const std::vector<std::uint32_t>& indices) {
 void AdaptiveSampler::watch() {
   // By how many px a tile that is so many away is apart.
   const auto gap = [&](int distance) { return static_cast<double>(options_.tile_px * std::max(distance - 1, 0)); };
-  const auto arrival = [&](const TileCourse& from, int distance) {
-    const double way = gap(distance) + options_.max_motion_px;
-    return from.last() + static_cast<TimeNs>(std::min(way / from.speed * kNsPerS, 1e18));
-  };
   const auto bring_forward = [&](TileCourse& tile, TimeNs t) {
-    if (tile.reason != Reason::next || tile.due == kNever || t >= tile.due) return;
+    if (tile.reason != Reason::next || t >= tile.due) return;
     tile.due = planner_.after(tile, static_cast<double>(std::max<TimeNs>(t - tile.last(), 0)));
   };
   for (const std::uint32_t index : asked_) {
+    TileCourse& tile = tiles_[index];
+    for (int distance = 0; distance <= kReach; ++distance) {
+      const double way = gap(distance) + options_.max_motion_px;
+      tile.arrival[static_cast<std::size_t>(distance)] =
+          tile.speed > 0 ? tile.last() + static_cast<TimeNs>(std::min(way / tile.speed * kNsPerS, 1e18)) : kNever;
+    }
+  }
+  for (const std::uint32_t index : asked_) {
     TileCourse& own = tiles_[index];
-    std::array<TimeNs, kReach + 1> own_arrival;
-    for (int distance = 0; distance <= kReach; ++distance)
-      own_arrival[static_cast<std::size_t>(distance)] = own.speed > 0 ? arrival(own, distance) : kNever;
     const int column = static_cast<int>(index) % columns_, row = static_cast<int>(index) / columns_;
+    TimeNs first = kNever;
     for (int y = std::max(row - kReach, 0); y <= std::min(row + kReach, rows_ - 1); ++y) {
       for (int x = std::max(column - kReach, 0); x <= std::min(column + kReach, columns_ - 1); ++x) {
         TileCourse& other = tiles_[static_cast<std::size_t>(y * columns_ + x)];
-        const int distance = std::max(std::abs(x - column), std::abs(y - row));
-        bring_forward(other, own_arrival[static_cast<std::size_t>(distance)]);
-        if (other.speed > 0 && other.timeline.size() > 0) bring_forward(own, arrival(other, distance));
+        const auto distance = static_cast<std::size_t>(std::max(std::abs(x - column), std::abs(y - row)));
+        if (other.due != kNever) bring_forward(other, own.arrival[distance]);
+        first = std::min(first, other.arrival[distance]);
       }
     }
+    if (own.due != kNever) bring_forward(own, first);
   }
 }
 

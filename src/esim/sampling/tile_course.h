@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -14,6 +15,9 @@ namespace esim {
 
 inline constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
 
+/// Tiles whose motion is watched: those up to so many away.
+inline constexpr int kReach = 3;
+
 /// A tile on its way through time.
 struct TileCourse {
   /// Why it asks for its next sample.
@@ -26,13 +30,14 @@ struct TileCourse {
 
   TileTimeline timeline;
   std::size_t done = 0;  // index of the sample up to which segments have been given
-  int layer = 0;         // of the sampler's images, in which that sample stands
   TimeNs due = 0;        // the next sample; kNever after the last
   Reason reason = Reason::next;
   TimeNs audited = std::numeric_limits<TimeNs>::min();  // intervals that begin up to then are not audited any more
   double step = 0;                                      // that was planned last, ns
   double speed = 0;                                     // fastest motion at the last sample, px/s
-  bool begun = false;                                   // the first segment, an instant, has been given
+  // When what the tile showed last may come into a tile so many away; kNever where nothing moves.
+  std::array<TimeNs, kReach + 1> arrival = {kNever, kNever, kNever, kNever};
+  bool begun = false;  // the first segment, an instant, has been given
 
   // What the last sample brought.
   std::size_t until = 0;          // segments up to this sample are to be given

@@ -50,6 +50,7 @@ struct TileTimeline::Bow {
   const float *before, *first, *last, *after;
   float before_outer = 0, before_near = 0, before_far = 0;
   float after_outer = 0, after_near = 0, after_far = 0;
+  bool straight = true;  // nothing is known on one side
 
   /// Of pixel k.
   float operator()(std::size_t k) const {
@@ -77,6 +78,7 @@ TileTimeline::Bow TileTimeline::bow_between(std::size_t first, std::size_t last)
   const auto values = [&](std::size_t i) { return samples_[i].irradiance.data(); };
   Bow bow{values(has_before ? first - 1 : first), values(first), values(last), values(has_after ? last + 1 : last)};
   if (!has_before || !has_after) return bow;
+  bow.straight = false;
   const auto h = static_cast<double>(samples_[last].t - samples_[first].t);
   // h^2 times the second divided difference of three samples, one of them `gap` away from the interval.
   const auto weigh = [&](double gap, float& outer, float& near, float& far) {
@@ -138,75 +140,69 @@ void TileTimeline::errors(std::size_t i, std::vector<float>& out) const {
   const float eps = log_eps_;
   const std::size_t length = run_length(tile_);
   out.resize(samples_[i].brightness.size());
-  for_watched(tile_, [&](std::size_t k, std::size_t watched) {
+  const auto compare = [&](const auto& irradiance) {
+    for_watched(tile_, [&](std::size_t k, std::size_t watched) {
 #pragma omp simd
-    for (std::size_t x = 0; x < length; ++x) {
-      out[watched + x] = fast_log(std::max(bow.irradiance(k + x, f) + eps, 1e-30F)) - seen[watched + x];
-    }
-  });
+      for (std::size_t x = 0; x < length; ++x) {
+        out[watched + x] = fast_log(std::max(irradiance(k + x) + eps, 1e-30F)) - seen[watched + x];
+      }
+    });
+  };
+  if (bow.straight) {
+    compare([&](std::size_t k) { return bow.first[k] + (bow.last[k] - bow.first[k]) * f; });
+  } else {
+    compare([&](std::size_t k) { return bow.irradiance(k, f); });
+  }
 }
 
-/// Computes the surprise of a sample.
+/// Computes the surprise of a sample, and its bend.
 void TileTimeline::measure(std::size_t i) {
   if (i == 0 || i + 1 >= samples_.size()) return;
   errors(i, errors_);
-  float sum = 0;
-#pragma omp simd reduction(+ : sum)
-  for (std::size_t k = 0; k < errors_.size(); ++k) sum += errors_[k] * errors_[k];
-  samples_[i].surprise = root_mean(sum, errors_.size());
+  const Sample &before = samples_[i - 1], &after = samples_[i + 1];
+  Sample& sample = samples_[i];
+  const auto f = static_cast<float>(static_cast<double>(sample.t - before.t) / static_cast<double>(after.t - before.t));
+  const float *const l0 = before.brightness.data(), *const l = sample.brightness.data(),
+                     *const l1 = after.brightness.data();
+  float error = 0, bend = 0;
+#pragma omp simd reduction(+ : error, bend)
+  for (std::size_t k = 0; k < errors_.size(); ++k) {
+    const float off = l[k] - (l0[k] + (l1[k] - l0[k]) * f);
+    error += errors_[k] * errors_[k], bend += off * off;
+  }
+  sample.surprise = root_mean(error, errors_.size()), sample.bend = root_mean(bend, errors_.size());
 }
 
 double TileTimeline::bow(std::size_t i) const {
-  const Bow bow = bow_between(i, i + 1);
-  const float *const l0 = samples_[i].brightness.data(), *const l1 = samples_[i + 1].brightness.data();
-  const float eps = log_eps_;
-  const std::size_t length = run_length(tile_);
-  float sum = 0;
-  for_watched(tile_, [&](std::size_t k, std::size_t watched) {
-#pragma omp simd reduction(+ : sum)
-    for (std::size_t x = 0; x < length; ++x) {
-      const float middle = fast_log(std::max(bow.irradiance(k + x, 0.5F) + eps, 1e-30F));
-      const float off = middle - 0.5F * (l0[watched + x] + l1[watched + x]);
-      sum += off * off;
-    }
-  });
-  return root_mean(sum, samples_[i].brightness.size());
+  const auto h = static_cast<double>(time(i + 1) - time(i));
+  // What a sample's bend, over the intervals on both sides, makes of this one: it goes with the square of the length.
+  const auto of = [&](std::size_t k) {
+    const auto left = static_cast<double>(time(k) - time(k - 1)), right = static_cast<double>(time(k + 1) - time(k));
+    return samples_[k].bend * h * h / (4 * left * right);
+  };
+  const bool has_before = i > 0, has_after = i + 2 < size();
+  if (!has_before || !has_after) return has_before ? of(i) : (has_after ? of(i + 1) : 0);
+  const double a = of(i), b = of(i + 1);
+  return std::min(a, b);
 }
 
-void TileTimeline::write(std::size_t i, Image<float>& irradiance) const {
-  const auto width = static_cast<std::size_t>(tile_.width);
-  for (int y = 0; y < tile_.height; ++y) {
-    const float* const from = samples_[i].irradiance.data() + static_cast<std::size_t>(y) * width;
-    copy(from, width, irradiance.row(tile_.y + y) + tile_.x);
-  }
-}
-
-void TileTimeline::write_half(std::size_t i, Image<float>& half) const {
+void TileTimeline::write_half(std::size_t i, float* half) const {
   const Bow bow = bow_between(i, i + 1);
-  const auto width = static_cast<std::size_t>(tile_.width);
-  for (int y = 0; y < tile_.height; ++y) {
-    float* const out = half.row(tile_.y + y) + tile_.x;
-    const std::size_t first = static_cast<std::size_t>(y) * width;
+  const std::size_t count = samples_[i].irradiance.size();
 #pragma omp simd
-    for (std::size_t x = 0; x < width; ++x) out[x] = bow.irradiance(first + x, 0.5F);
-  }
+  for (std::size_t k = 0; k < count; ++k) half[k] = bow.irradiance(k, 0.5F);
 }
 
-void TileTimeline::write_quarters(std::size_t i, const std::array<Image<float>*, 3>& quarters) const {
+void TileTimeline::write_quarters(std::size_t i, const std::array<float*, 3>& quarters) const {
   const Bow bow = bow_between(i, i + 1);
-  const auto width = static_cast<std::size_t>(tile_.width);
-  for (int y = 0; y < tile_.height; ++y) {
-    float* out[3];
-    for (std::size_t k = 0; k < 3; ++k) out[k] = quarters[k]->row(tile_.y + y) + tile_.x;
-    float *const out0 = out[0], *const out1 = out[1], *const out2 = out[2];
-    const std::size_t first = static_cast<std::size_t>(y) * width;
+  const std::size_t count = samples_[i].irradiance.size();
+  float *const first = quarters[0], *const half = quarters[1], *const last = quarters[2];
 #pragma omp simd
-    for (std::size_t x = 0; x < width; ++x) {
-      const float c = bow(first + x);
-      out0[x] = bow.irradiance(first + x, c, 0.25F);
-      out1[x] = bow.irradiance(first + x, c, 0.5F);
-      out2[x] = bow.irradiance(first + x, c, 0.75F);
-    }
+  for (std::size_t k = 0; k < count; ++k) {
+    const float c = bow(k);
+    first[k] = bow.irradiance(k, c, 0.25F);
+    half[k] = bow.irradiance(k, c, 0.5F);
+    last[k] = bow.irradiance(k, c, 0.75F);
   }
 }
 

@@ -31,7 +31,8 @@ class TileTimeline {
   /// Returns the index that the sample has then.
   std::size_t forget_before(std::size_t i);
 
-  /// Asks memory for the last samples: since they were taken, the caches have been full of other tiles.
+  /// Asks memory for the last samples, and for the place of the next: since they were taken, the caches have been full
+  /// of other tiles.
   void prefetch() const;
 
   std::size_t size() const { return samples_.size(); }
@@ -47,20 +48,23 @@ class TileTimeline {
   /// Of each of those pixels at sample i.
   std::span<const float> brightness(std::size_t i) const { return samples_[i].brightness; }
 
-  /// How far brightness between samples i and i + 1 is from its own straight line, in the middle, likewise.
+  /// How far brightness between samples i and i + 1 is from its own straight line, in the middle, likewise: by the
+  /// second differences of brightness at both samples, and no more than twice what the smaller one says.
   double bow(std::size_t i) const;
 
-  /// Writes the irradiance at sample i into the tile's pixels of an image of the camera's size.
-  void write(std::size_t i, Image<float>& irradiance) const;
+  /// Irradiance of the tile's pixels at sample i, row by row. It stays until the next insert(), even if the sample is
+  /// forgotten.
+  const float* irradiance(std::size_t i) const { return samples_[i].irradiance.data(); }
 
-  /// The same half of the way from sample i to the next, and in each quarter of it.
-  void write_half(std::size_t i, Image<float>& half) const;
-  void write_quarters(std::size_t i, const std::array<Image<float>*, 3>& quarters) const;
+  /// Writes the same half of the way from sample i to the next, and after each quarter of it.
+  void write_half(std::size_t i, float* half) const;
+  void write_quarters(std::size_t i, const std::array<float*, 3>& quarters) const;
 
  private:
   struct Sample {
     TimeNs t = 0;
     double surprise = 0;
+    double bend = 0;  // how far brightness is from the straight line between its neighbours, root of the mean square
     LargeVector<float> irradiance;
     LargeVector<float> brightness;  // of watched pixels
   };

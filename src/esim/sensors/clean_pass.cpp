@@ -98,7 +98,7 @@ CleanPass& CleanPass::operator=(CleanPass&&) noexcept = default;
 void CleanPass::Block::gather(const PixelArray& pixels, const Segment& segment, const EventPacking& packing, int y,
                               std::span<const std::uint32_t> columns) {
   const double eps = pixels.options.log_eps, threshold_on = pixels.threshold_on, threshold_off = pixels.threshold_off;
-  const float *const light0 = segment.irradiance0->row(y), *const light1 = segment.irradiance1->row(y);
+  const float *const light0 = segment.irradiance0.row(y), *const light1 = segment.irradiance1.row(y);
   const std::uint32_t row = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(pixels.width);
   const PixelArray::CleanPixel* const states = pixels.clean_pixels.data() + row;
   std::size_t i = all.count;

@@ -82,7 +82,7 @@ void EventCamera::State::subtract_surround(const Segment& segment, const Workers
     throw UserError("event camera: surround_px needs samples of whole images; choose a sampling that gives them");
   if (brightness.empty()) brightness = Image<float>(size.width, size.height);
   workers.for_each(size.height, [&](int y) {
-    respond(pixels.options, static_cast<std::size_t>(size.width), segment.irradiance1->row(y), brightness.row(y));
+    respond(pixels.options, static_cast<std::size_t>(size.width), segment.irradiance1.row(y), brightness.row(y));
   });
   if (segment.t0 == segment.t1) {
     surround->open(brightness);

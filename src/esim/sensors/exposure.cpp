@@ -46,7 +46,7 @@ Exposure::Weights Exposure::weigh(const Segment& segment, TimeNs begin) const {
   return {begin, static_cast<float>(share * (1 - middle)), static_cast<float>(share * middle)};
 }
 
-bool Exposure::add(const Segment& segment, Rows rows, int left, int top) {
+bool Exposure::add(const Segment& segment, Rows rows) {
   const auto width = static_cast<std::size_t>(segment.tile.width);
   Weights weights = weigh(segment, first_row_);
   bool good = true;
@@ -54,8 +54,8 @@ bool Exposure::add(const Segment& segment, Rows rows, int left, int top) {
     const TimeNs begin = first_row_ + row_delays_[static_cast<std::size_t>(y)];
     if (begin != weights.begin) weights = weigh(segment, begin);
     if (weights.first + weights.last == 0) continue;
-    good &= add_row(width, weights.first, segment.irradiance0->row(y - top) + segment.tile.x - left, weights.last,
-                    segment.irradiance1->row(y - top) + segment.tile.x - left, mean_.row(y) + segment.tile.x);
+    good &= add_row(width, weights.first, segment.irradiance0.row(y) + segment.tile.x, weights.last,
+                    segment.irradiance1.row(y) + segment.tile.x, mean_.row(y) + segment.tile.x);
   }
   return good;
 }

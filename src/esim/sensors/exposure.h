@@ -32,9 +32,8 @@ class Exposure {
   void open(Image<float> memory);
   bool is_open() const { return !mean_.empty(); }
 
-  /// Adds rows of a segment, whose images begin at the pixel (left, top) of the camera's. False where an irradiance is
-  /// not a finite number >= 0.
-  bool add(const Segment& segment, Rows rows, int left = 0, int top = 0);
+  /// Adds rows of a segment. False where an irradiance is not a finite number >= 0.
+  bool add(const Segment& segment, Rows rows);
 
   const Image<float>& mean() const { return mean_; }
   Image<float> take_memory() { return std::move(mean_); }

@@ -65,7 +65,7 @@ void check_both_ends(const Segment& segment) {
 }
 
 /// A tile's part of an image.
-Image<float> part(const Image<float>& image, const Tile& tile) {
+Image<float> part(const ImageView<float>& image, const Tile& tile) {
   Image<float> copy(tile.width, tile.height);
   for (int y = 0; y < tile.height; ++y)
     std::copy_n(image.row(tile.y + y) + tile.x, static_cast<std::size_t>(tile.width), copy.row(y));
@@ -204,8 +204,8 @@ void FrameCamera::State::expose(std::span<const Segment> segments, const Workers
 /// Keeps a copy of what a tile has seen of the time behind the horizon.
 void FrameCamera::State::hold(const Segment& segment) {
   check_both_ends(segment);
-  held.push_back({segment.tile, segment.t0, segment.t1, part(*segment.irradiance0, segment.tile),
-                  part(*segment.irradiance1, segment.tile)});
+  held.push_back({segment.tile, segment.t0, segment.t1, part(segment.irradiance0, segment.tile),
+                  part(segment.irradiance1, segment.tile)});
 }
 
 /// Reads out the exposure that ends first, and begins with another one.
@@ -232,7 +232,8 @@ void FrameCamera::State::expose_held(Exposure& exposure) {
   for (const auto& [tile, t0, t1, irradiance0, irradiance1] : held) {
     if (!exposure.overlaps(t0, t1)) continue;
     open(exposure);
-    exposure.add({tile, t0, t1, &irradiance0, &irradiance1}, {tile.y, tile.y + tile.height}, tile.x, tile.y);
+    exposure.add({tile, t0, t1, {irradiance0.data(), tile}, {irradiance1.data(), tile}},
+                 {tile.y, tile.y + tile.height});
   }
 }
 

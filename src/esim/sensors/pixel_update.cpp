@@ -18,7 +18,7 @@ std::size_t index(const PixelArray& pixels, int x, int y) {
 /// Asks memory for a row of the new irradiance while the row before is worked on.
 void prefetch_row(const Segment& segment, int y) {
   constexpr int kPerLine = 64 / sizeof(float);
-  const float* const row = segment.irradiance1->row(y) + segment.tile.x;
+  const float* const row = segment.irradiance1.row(y) + segment.tile.x;
   for (int x = 0; x < segment.tile.width; x += kPerLine) __builtin_prefetch(row + x);
 }
 
@@ -177,7 +177,7 @@ const float* PixelUpdate::brightness_row(const PixelArray& pixels, const Segment
   if (given != nullptr) return all_irradiance(segment, {y, y + 1}) ? given->row(y) + segment.tile.x : nullptr;
   const auto length = static_cast<std::size_t>(segment.tile.width);
   float_row_.resize(length);
-  const float* const irradiance = segment.irradiance1->row(y) + segment.tile.x;
+  const float* const irradiance = segment.irradiance1.row(y) + segment.tile.x;
   return respond(pixels.options, length, irradiance, float_row_.data()) ? float_row_.data() : nullptr;
 }
 
@@ -187,8 +187,8 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
   const int left = segment.tile.x, width = segment.tile.width;
   const std::size_t first = index(pixels, left, y);
   const auto from = [&](auto& values) { return values.empty() ? nullptr : values.data() + first; };
-  const FilterRow row{.light0 = segment.irradiance0->row(y) + left,
-                      .light1 = segment.irradiance1->row(y) + left,
+  const FilterRow row{.light0 = segment.irradiance0.row(y) + left,
+                      .light1 = segment.irradiance1.row(y) + left,
                       .end = brightness,
                       .start = from(pixels.brightness),
                       .filtered1 = from(pixels.filtered1),
@@ -260,8 +260,8 @@ bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, P
       const int column = static_cast<int>(x);
       awake_.pixel[i] = static_cast<std::uint32_t>(index(pixels, column, y));
       awake_.place[i] = static_cast<std::uint32_t>(events.packing().place(column, y));
-      awake_.light0[i] = segment.irradiance0->row(y)[x];
-      awake_.light1[i] = segment.irradiance1->row(y)[x];
+      awake_.light0[i] = segment.irradiance0.row(y)[x];
+      awake_.light1[i] = segment.irradiance1.row(y)[x];
       if (awake_.count == kBlock) run(false);
     }
   }
@@ -288,7 +288,7 @@ bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<f
         if (!values->empty()) std::copy_n(row, width, values->data() + first);
       }
     } else {
-      const float* const row = segment.irradiance1->row(y) + segment.tile.x;
+      const float* const row = segment.irradiance1.row(y) + segment.tile.x;
       for (std::size_t i = 0; i < width; ++i) row_[i] = row[i] + pixels.options.log_eps;
       logarithms(width, row_.data());
     }

@@ -28,7 +28,7 @@ bool PixelWatch::look(const PixelArray& pixels, const Segment& segment, Rows row
     ends_.push_back(count);
     // What is needed next of the pixels comes from memory while the rows behind are looked at.
     const std::size_t row = static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width);
-    const float* const light0 = segment.irradiance0->row(y);
+    const float* const light0 = segment.irradiance0.row(y);
     for (std::size_t i = before; i < count; ++i) {
       pixels.prefetch(row + columns_[i]);
       __builtin_prefetch(light0 + columns_[i]);
@@ -39,7 +39,7 @@ bool PixelWatch::look(const PixelArray& pixels, const Segment& segment, Rows row
 
 bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, int y, std::size_t& count) {
   const std::size_t row = static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width);
-  const float* const irradiance = segment.irradiance1->row(y);
+  const float* const irradiance = segment.irradiance1.row(y);
   const float *const low = pixels.band_low.data() + row, *const high = pixels.band_high.data() + row;
   const std::int32_t* const alarms = pixels.alarmed ? pixels.alarms.data() + row : nullptr;
   const std::int32_t now = pixels.alarmed ? pixels.ticks(segment.t1) : 0;
@@ -81,7 +81,7 @@ bool all_irradiance(const Segment& segment, Rows rows) {
   IrradianceCheck check(d);
   bool good = true;
   for (int y = rows.first; y < rows.last; ++y) {
-    const float* const row = segment.irradiance1->row(y) + segment.tile.x;
+    const float* const row = segment.irradiance1.row(y) + segment.tile.x;
     int x = 0;
     for (; x + lanes <= width; x += lanes) check.see(d, hn::LoadU(d, row + x));
     for (; x < width; ++x) good &= is_irradiance(row[x]);
@@ -93,7 +93,7 @@ void check_irradiance(const Segment& segment) {
   const Tile& tile = segment.tile;
   if (all_irradiance(segment, {tile.y, tile.y + tile.height})) return;
   for (int y = tile.y; y < tile.y + tile.height; ++y) {
-    const float* const row = segment.irradiance1->row(y);
+    const float* const row = segment.irradiance1.row(y);
     for (int x = tile.x; x < tile.x + tile.width; ++x) {
       if (is_irradiance(row[x])) continue;
       throw UserError("irradiance " + std::to_string(row[x]) + " of pixel (" + std::to_string(x) + ", " +

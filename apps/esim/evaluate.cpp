@@ -155,6 +155,10 @@ void add_sampling(CLI::App& evaluate, int& exit_code) {
   command->add_option("--pixels", arguments->pixels, "Pixels at which brightness is compared, or all")
       ->type_name("N")
       ->capture_default_str();
+  command
+      ->add_option("--truth-rays", options.truth_rays,
+                   "samples_per_pixel of the brightness to compare with (default: the scenario's)")
+      ->check(CLI::IsMember({1, 16, 64}));
   command->add_option("--truth-rate", options.truth_rate_hz, "Of the brightness to compare with, Hz")
       ->check(CLI::Range(100.0, 1e7))
       ->capture_default_str();

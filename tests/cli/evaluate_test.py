@@ -63,6 +63,8 @@ class EvaluateSampling(ProgramTest):
         self.assert_refused(self.evaluate("--panorama", "nowhere.jpg", "--quick"), "nowhere.jpg")
         self.assert_refused(self.evaluate(scene, "--scheme", "flwo lambda=1"), "did you mean flow?")
         self.assert_refused(self.evaluate(scene, "--pixels", "many"), "--pixels")
+        self.assert_refused(self.evaluate(scene, "--quick", "--truth-rays", 64), "casts no rays")
+        self.assert_refused(self.evaluate(scene, "--truth-rays", 17), "--truth-rays")
         self.assert_refused(self.evaluate("--panorama", "a.jpg", "--set", "seed=1"), "--set")
 
 

@@ -7,6 +7,8 @@
 #include "esim/evaluate/paper_scenario.h"
 #include "esim/evaluate/schemes.h"
 #include "esim/scenario/sampling_text.h"
+#include "sim/card_scene.h"
+#include "support/errors.h"
 #include "support/temporary_directory.h"
 
 namespace esim {
@@ -89,6 +91,66 @@ TEST(SamplingEvaluation, TakesEveryWayOfSampling) {
     EXPECT_EQ(all.brightness.values, 30 * 800) << scheme.text << " leaves pixels or times out";
     EXPECT_FALSE(all.events);
   }
+}
+
+/// A card that crosses the view before a wall, both of one grey.
+class PlacesOfErrors : public test::CardScene {
+ protected:
+  PlacesOfErrors() {
+    mesh().samples_per_pixel = 16;
+    scenario_.duration_s = 0.1;
+    options_ = small_options();
+    options_.pixels = 0;
+    options_.truth_rate_hz = 500;
+    options_.event_span_s = 0;
+  }
+
+  /// In the window "all".
+  BrightnessError errors_of(const SamplingOptions& scheme) {
+    options_.schemes = {scheme};
+    return evaluate(scenario_, options_).schemes[0].windows.back().brightness;
+  }
+  static double squares_at(const BrightnessError& error, Place place) {
+    return error.places[static_cast<std::size_t>(place)].squares;
+  }
+
+  SamplingEvaluationOptions options_;
+};
+
+TEST_F(PlacesOfErrors, AddUp) {
+  const BrightnessError error = errors_of(UniformSampling{100});
+  double squares = 0, of_pixels = 0;
+  std::int64_t values = 0;
+  for (const PlaceError& place : error.places) squares += place.squares, values += place.values;
+  for (const double rmse : error.rmse) of_pixels += rmse * rmse;
+  EXPECT_EQ(values, error.values);
+  EXPECT_NEAR(squares, of_pixels * static_cast<double>(error.values) / static_cast<double>(error.rmse.size()),
+              1e-6 * squares);
+  EXPECT_EQ(squares_at(error, Place::crease), 0);
+  EXPECT_GT(squares_at(error, Place::depth_edge), 0) << "where the card's edge is";
+  EXPECT_GT(squares_at(error, Place::surface), 0) << "where it was or will be, at the next sample";
+}
+
+TEST_F(PlacesOfErrors, AreOnEdgesWhereTheTruthAloneHasMoreRays) {
+  EXPECT_LT(errors_of(UniformSampling{500}).max_abs, 1e-6);
+  options_.truth_rays = 64;
+  const BrightnessError error = errors_of(UniformSampling{500});
+  const double on_edges = squares_at(error, Place::depth_edge) + squares_at(error, Place::near_edge);
+  EXPECT_GT(on_edges, 0);
+  EXPECT_LT(squares_at(error, Place::surface), 0.2 * on_edges) << "of the card as it enters, at the image's border";
+  EXPECT_LT(error.max_abs, 0.25) << "16 rays against 64 of an edge";
+}
+
+TEST(SamplingEvaluation, KnowsNoPlacesOfSomePixels) {
+  const TemporaryDirectory folder;
+  SamplingEvaluationOptions options = small_options();
+  options.event_span_s = 0;
+  options.schemes = {UniformSampling{250}};
+  const SamplingEvaluation found = evaluate(small_paper_scenario(folder), options);
+  for (const PlaceError& place : found.schemes[0].windows[0].brightness.places) EXPECT_EQ(place.values, 0);
+  options.truth_rays = 64;
+  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { evaluate(small_paper_scenario(folder), options); }),
+                             "casts no rays"));
 }
 
 TEST(SamplingEvaluation, StopsWhereTheMonitorSaysSo) {

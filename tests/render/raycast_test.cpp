@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <map>
+#include <random>
 #include <tuple>
 
 #include "esim/core/error.h"
@@ -111,6 +112,46 @@ TEST(RaycastRenderer, SeamsBetweenTrianglesOfOneSurfaceAreNoEdges) {
   for (std::size_t k = 0; k < one.irradiance.size(); ++k) {
     ASSERT_EQ(one.irradiance.data()[k], many.irradiance.data()[k]) << k;
   }
+}
+
+TEST(RaycastRenderer, SurfacesAreNoSharperWhereAnEdgeIs) {
+  // A wall of noise, cut into stripes of two materials that look the same: their seams are edges, but show nothing.
+  constexpr int kTexels = 256, kStripes = 40;
+  Image<float> noise(kTexels, kTexels);
+  std::mt19937 random(1);
+  for (float& value : noise.pixels()) value = std::uniform_real_distribution<float>(0, 1)(random);
+  const auto texture = std::make_shared<const Texture>(noise, Wrap::repeat, Wrap::repeat);
+  const Camera model = test::distorted_camera(0);
+  const float size = 0.6F * static_cast<float>(kTexels / model.fx);  // at 1 m: texels of 0.6 px
+  Mesh mesh;
+  mesh.materials = {{"odd", texture, 1.0F}, {"even", texture, 1.0F}};
+  for (int i = 0; i < kStripes; ++i) {
+    const float u0 = static_cast<float>(i) / kStripes, u1 = static_cast<float>(i + 1) / kStripes;
+    const auto corner = [&](float u, float v) { return Eigen::Vector3f((u - 0.5F) * size, (v - 0.5F) * size, 1); };
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (const auto& [u, v] : {std::pair{u0, 0.0F}, {u1, 0.0F}, {u1, 1.0F}, {u0, 1.0F}})
+      mesh.vertices.push_back(corner(u, v));
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    mesh.triangles.push_back({first, first + 2, first + 3});
+    mesh.texture_uv.push_back({Eigen::Vector2f(u0, 0), Eigen::Vector2f(u1, 0), Eigen::Vector2f(u1, 1)});
+    mesh.texture_uv.push_back({Eigen::Vector2f(u0, 0), Eigen::Vector2f(u1, 1), Eigen::Vector2f(u0, 1)});
+    mesh.material.insert(mesh.material.end(), 2, static_cast<std::uint32_t>(i % 2));
+  }
+  const auto shared = build_raycast_scene(still_scene(mesh));
+  const auto seen = [&](int rays) {
+    return test::render(*make_raycast_renderer(shared, {0.5F, rays}, model, test::two_threads()), model, Kinematics{});
+  };
+  const Sample one = seen(1), many = seen(16);
+  double sum_one = 0, sum_many = 0, squares_one = 0, squares_many = 0;
+  int crossed = 0;
+  for (std::size_t k = 0; k < one.irradiance.size(); ++k) {
+    const double a = one.irradiance.data()[k], b = many.irradiance.data()[k];
+    if (a == b) continue;  // no edge there
+    sum_one += a, sum_many += b, squares_one += a * a, squares_many += b * b, ++crossed;
+  }
+  ASSERT_GT(crossed, 300);
+  const auto variance = [&](double sum, double squares) { return squares / crossed - sum * sum / crossed / crossed; };
+  EXPECT_NEAR(variance(sum_many, squares_many) / variance(sum_one, squares_one), 1, 0.1);
 }
 
 // --- moving objects

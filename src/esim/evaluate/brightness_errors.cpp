@@ -28,7 +28,7 @@ void BrightnessErrors::add(const Segment& segment) {
   lines_.clear();
   index_.for_each_in(segment.tile, [&](int i) {
     const PixelPosition& p = reference_.pixels()[static_cast<std::size_t>(i)];
-    const double before = (*segment.irradiance0)(p.x, p.y), after = (*segment.irradiance1)(p.x, p.y);
+    const double before = segment.irradiance0(p.x, p.y), after = segment.irradiance1(p.x, p.y);
     lines_.push_back({i, std::log(before + reference_.log_eps()), std::log(after + reference_.log_eps())});
   });
   if (lines_.empty()) return;
@@ -50,6 +50,7 @@ void BrightnessErrors::compare(WindowSums& window, const Segment& segment, std::
     const std::int64_t block = first / ReferenceBrightness::kBlock, origin = block * ReferenceBrightness::kBlock;
     const std::int64_t block_end = std::min(end, origin + ReferenceBrightness::kBlock);
     const Image<float>& truth = reference_.block(block);
+    const Image<Place>& places = reference_.places(block);
     for (const Line& line : lines_) {
       PixelSums& sums = window.pixels[static_cast<std::size_t>(line.pixel)];
       const float* const row = truth.row(line.pixel);
@@ -58,6 +59,10 @@ void BrightnessErrors::compare(WindowSums& window, const Segment& segment, std::
         const double error = std::abs(line.before + share * (line.after - line.before) - row[k - origin]);
         sums.squares += error * error;
         window.histogram.add(error);
+        if (places.empty()) continue;
+        PlaceError& place = window.places[static_cast<std::size_t>(places(static_cast<int>(k - origin), line.pixel))];
+        place.squares += error * error;
+        ++place.values;
       }
       sums.count += block_end - first;
     }
@@ -79,6 +84,7 @@ std::vector<BrightnessError> BrightnessErrors::finish() const {
     error.max_abs = window.histogram.max();
     error.steps = window.steps;
     error.large_steps = window.large_steps;
+    error.places = window.places;
     errors.push_back(std::move(error));
   }
   return errors;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -9,6 +10,12 @@
 
 namespace esim {
 
+/// The errors at pixels that lie alike.
+struct PlaceError {
+  double squares = 0;  ///< sum of the squared errors
+  std::int64_t values = 0;
+};
+
 /// How far the brightness that a sampler's segments say is from the truth, in one window.
 struct BrightnessError {
   std::vector<double> rmse;  ///< of each pixel, over the reference's instants in the window
@@ -16,8 +23,9 @@ struct BrightnessError {
   double mean_abs = 0;       ///< of |error|, over pixels and instants
   double p99_abs = 0;        ///< within 2.3 %
   double max_abs = 0;
-  std::int64_t values = 0;       ///< pixels times instants
-  std::int64_t steps = 0;        ///< segments of a pixel that end in the window
+  std::int64_t values = 0;                              ///< pixels times instants
+  std::array<PlaceError, kPlaceNames.size()> places{};  ///< by Place; all 0 unless all pixels are compared
+  std::int64_t steps = 0;                               ///< segments of a pixel that end in the window
   std::int64_t large_steps = 0;  ///< those over which its brightness changes by more than the contrast threshold
 };
 
@@ -44,6 +52,7 @@ class BrightnessErrors {
     std::int64_t first = 0, end = 0;  // instants of the reference
     std::vector<PixelSums> pixels;
     LogHistogram histogram;
+    std::array<PlaceError, kPlaceNames.size()> places{};
     std::int64_t steps = 0, large_steps = 0;
   };
 

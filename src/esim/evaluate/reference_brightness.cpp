@@ -17,7 +17,7 @@ ReferenceBrightness::ReferenceBrightness(const World& world, std::vector<PixelPo
   }
   instants_ = static_cast<std::int64_t>(to_seconds(world.info.end - world.info.start) * rate_hz) + 2;
   while (instants_ > 1 && time(instants_ - 1) > world.info.end) --instants_;
-  const std::size_t block_bytes = pixels_.size() * kBlock * sizeof(float);
+  const std::size_t block_bytes = pixels_.size() * kBlock * (sizeof(float) + sizeof(Place));
   capacity_ = std::max<std::size_t>(2, memory_bytes / block_bytes);
 }
 
@@ -28,22 +28,31 @@ std::int64_t ReferenceBrightness::first_after(TimeNs t) const {
   return k;
 }
 
-const Image<float>& ReferenceBrightness::block(std::int64_t block) {
+const Image<float>& ReferenceBrightness::block(std::int64_t block) { return entry(block).brightness; }
+
+const Image<Place>& ReferenceBrightness::places(std::int64_t block) { return entry(block).places; }
+
+ReferenceBrightness::Entry& ReferenceBrightness::entry(std::int64_t block) {
   Entry& entry = kept_[block];
   entry.used = ++clock_;
-  if (!entry.brightness.empty()) return entry.brightness;
+  if (!entry.brightness.empty()) return entry;
   if (kept_.size() > capacity_) {
     const auto oldest = std::min_element(kept_.begin(), kept_.end(),
                                          [](const auto& a, const auto& b) { return a.second.used < b.second.used; });
     std::swap(entry.brightness, oldest->second.brightness);
+    std::swap(entry.places, oldest->second.places);
     kept_.erase(oldest);
   }
-  render(block, entry.brightness);
-  return entry.brightness;
+  render(block, entry);
+  return entry;
 }
 
-void ReferenceBrightness::render(std::int64_t block, Image<float>& brightness) {
+void ReferenceBrightness::render(std::int64_t block, Entry& entry) {
+  const Camera& model = world_.info.cameras[0].model;
+  const bool whole = tiles_[0].area() == pixels_.size();
+  Image<float>& brightness = entry.brightness;
   if (brightness.empty()) brightness = Image<float>(kBlock, static_cast<int>(pixels_.size()));
+  if (whole && entry.places.empty()) entry.places = Image<Place>(kBlock, static_cast<int>(pixels_.size()));
   const std::int64_t first = block * kBlock, count = std::min(kBlock, instants_ - first);
   for (std::int64_t j = 0; j < count; ++j) {
     world_.cameras[0].renderer->render(view(world_, 0, time(first + j), tiles_), sample_);
@@ -51,6 +60,10 @@ void ReferenceBrightness::render(std::int64_t block, Image<float>& brightness) {
       const double irradiance = sample_.irradiance(pixels_[i].x, pixels_[i].y);
       brightness(static_cast<int>(j), static_cast<int>(i)) = static_cast<float>(std::log(irradiance + log_eps_));
     }
+    if (!whole) continue;
+    const Image<Place> places = places_of(sample_.depth, std::sqrt(model.fx * model.fy));
+    for (std::size_t i = 0; i < pixels_.size(); ++i)
+      entry.places(static_cast<int>(j), static_cast<int>(i)) = places(pixels_[i].x, pixels_[i].y);
   }
 }
 

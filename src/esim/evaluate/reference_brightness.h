@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "esim/evaluate/pixels.h"
+#include "esim/evaluate/places.h"
 #include "esim/sim/world.h"
 
 namespace esim {
@@ -30,6 +31,9 @@ class ReferenceBrightness {
 
   /// L at the instants block * kBlock + j, a row per pixel; valid until the next call.
   const Image<float>& block(std::int64_t block);
+
+  /// Where those pixels lie at these instants, likewise; without size unless all pixels are there.
+  const Image<Place>& places(std::int64_t block);
   std::int64_t blocks() const { return (instants_ + kBlock - 1) / kBlock; }
 
   /// Whether all blocks can be kept at once.
@@ -38,10 +42,12 @@ class ReferenceBrightness {
  private:
   struct Entry {
     Image<float> brightness;
+    Image<Place> places;
     std::int64_t used = 0;
   };
 
-  void render(std::int64_t block, Image<float>& brightness);
+  Entry& entry(std::int64_t block);
+  void render(std::int64_t block, Entry& entry);
 
   const World& world_;
   std::vector<PixelPosition> pixels_;

@@ -42,6 +42,10 @@ Json json_of(const Window& window, const WindowResult& result) {
       {"steps", brightness.steps},
       {"steps_above_threshold", brightness.large_steps},
   };
+  for (std::size_t i = 0; i < kPlaceNames.size(); ++i) {
+    const auto& [squares, values] = brightness.places[i];
+    if (values > 0) json["by_place"][kPlaceNames[i]] = {{"values", values}, {"sum_of_squares", squares}};
+  }
   if (result.events) json["events"] = json_of(*result.events);
   return json;
 }
@@ -102,6 +106,7 @@ std::string to_json(const SamplingEvaluation& evaluation) {
       {"log_eps", evaluation.log_eps},
       {"pixels", evaluation.pixels.size()},
       {"truth_rate_hz", options.truth_rate_hz},
+      {"truth_rays", options.truth_rays},
       {"event_reference_rate_hz", options.event_rate_hz},
       {"motion",
        {{"rate_hz", evaluation.motion.rate_hz},

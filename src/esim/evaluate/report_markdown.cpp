@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace esim {
 namespace {
@@ -17,9 +18,10 @@ std::string setup(const SamplingEvaluation& e) {
       "- Scene: renderer {}, {} x {} px, {:.3f} s. Motion field: {:.0f} px/s on average, at most {:.0f} px/s; the "
       "camera "
       "turns at up to {:.0f} deg/s.\n"
-      "- Brightness: L = ln(E + {:g}) of {} pixels, against renderings at {:g} Hz.\n",
+      "- Brightness: L = ln(E + {:g}) of {} pixels, against renderings at {:g} Hz{}.\n",
       e.renderer, e.width, e.height, to_seconds(e.span.end - e.span.start), e.motion.mean(e.span),
-      e.motion.greatest_px_per_s, e.motion.fastest_turn_deg_per_s, e.log_eps, e.pixels.size(), options.truth_rate_hz);
+      e.motion.greatest_px_per_s, e.motion.fastest_turn_deg_per_s, e.log_eps, e.pixels.size(), options.truth_rate_hz,
+      options.truth_rays > 0 ? fmt::format(", with {} rays where edges are", options.truth_rays) : "");
   if (!e.event_spans.empty()) {
     text += fmt::format("- Events: all pixels, C = {:g}, otherwise ideal, against uniform sampling at {:g} Hz.\n",
                         e.contrast_threshold, options.event_rate_hz);
@@ -56,6 +58,33 @@ std::string brightness_table(const SamplingEvaluation& e, std::size_t w) {
     text += fmt::format("| {} | {:.0f} | {:.0f} | {:.5f} | {:.5f} | {:.4f} | {:.3f} | {:.3f} |\n", scheme.text,
                         result.frame_equivalents_per_s, result.samples_per_s, b.mean_rmse, b.mean_abs, b.p99_abs,
                         b.max_abs, large);
+  }
+  return text;
+}
+
+/// Where the squared errors are; empty unless all pixels were compared.
+std::string places_table(const SamplingEvaluation& e, std::size_t w) {
+  const auto& first = e.schemes.front().windows[w].brightness;
+  if (first.places[0].values == 0) return {};
+  std::string text = "\n| share of the squared error, % (root mean square) |", line = "\n|---|",
+              pixels = "\n| pixels, % |";
+  const auto percent = [](double part, double all) { return all > 0 ? 100 * part / all : 0.0; };
+  for (std::size_t i = 0; i < kPlaceNames.size(); ++i) {
+    text += fmt::format(" {} |", kPlaceNames[i]), line += "---|";
+    pixels += fmt::format(" {:.1f} |",
+                          percent(static_cast<double>(first.places[i].values), static_cast<double>(first.values)));
+  }
+  text += line + pixels + "\n";
+  for (const SchemeResult& scheme : e.schemes) {
+    const auto& places = scheme.windows[w].brightness.places;
+    double all = 0;
+    for (const PlaceError& place : places) all += place.squares;
+    text += fmt::format("| {} |", scheme.text);
+    for (const PlaceError& place : places) {
+      const double count = static_cast<double>(std::max<std::int64_t>(1, place.values));
+      text += fmt::format(" {:.0f} ({:.4f}) |", percent(place.squares, all), std::sqrt(place.squares / count));
+    }
+    text += "\n";
   }
   return text;
 }
@@ -109,7 +138,7 @@ std::string to_markdown(const SamplingEvaluation& e) {
                      "first falls below it. The paper: 1260 (flow), 2060 (uniform) for .01, in its own motion.\n\n"
                      "![RMSE over cost](rmse_over_cost.png)\n\n![RMSE of the pixels](rmse.png)\n";
   for (std::size_t w = e.windows.size(); w-- > 0;) {
-    text += fmt::format("\n## Window {}\n\n{}", e.windows[w].name, brightness_table(e, w));
+    text += fmt::format("\n## Window {}\n\n{}", e.windows[w].name, brightness_table(e, w) + places_table(e, w));
     if (events) text += "\n" + events_table(e, w);
   }
   if (events) text += "\n![Timing of events](timing.png)\n";

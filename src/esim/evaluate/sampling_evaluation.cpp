@@ -50,6 +50,14 @@ Scenario bare(const Scenario& scenario) {
   return bare;
 }
 
+/// The same scenario with other rays for pixels that edges cross.
+Scenario with_rays(Scenario scenario, int samples_per_pixel) {
+  auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
+  if (mesh == nullptr) throw UserError("--truth-rays: the renderer casts no rays; leave it out");
+  mesh->samples_per_pixel = samples_per_pixel;
+  return scenario;
+}
+
 /// How the work is shared among its parts, for the progress.
 class Share {
  public:
@@ -120,8 +128,11 @@ class Evaluation {
   }
 
   void render_truth() {
-    reference_ = std::make_unique<ReferenceBrightness>(world_, result_.pixels, options().truth_rate_hz, result_.log_eps,
-                                                       options().memory_bytes);
+    if (options().truth_rays > 0)
+      truth_world_ = build_world(with_rays(scenario_, options().truth_rays), options().threads, silent_);
+    reference_ =
+        std::make_unique<ReferenceBrightness>(truth_world_ ? *truth_world_ : world_, result_.pixels,
+                                              options().truth_rate_hz, result_.log_eps, options().memory_bytes);
     share_.start("true brightness", 0.5);
     if (!reference_->fits()) return;  // it will be rendered piece by piece, for each scheme
     Stopwatch stopwatch(result_.truth_seconds);
@@ -227,6 +238,7 @@ class Evaluation {
   const EvaluationMonitor& monitor_;
   Share share_;
   World world_;
+  std::optional<World> truth_world_;  // where the truth has rays of its own
   SamplingEvaluation result_;
   std::unique_ptr<ReferenceBrightness> reference_;
   std::vector<EventsByPixel> reference_events_;                                 // of each of event_spans

@@ -16,6 +16,7 @@ struct SamplingEvaluationOptions {
   std::vector<SamplingOptions> schemes;
   int pixels = 400;                                 ///< at which brightness is compared; 0: all
   double truth_rate_hz = 10000;                     ///< of the brightness to compare with
+  int truth_rays = 0;                               ///< samples_per_pixel of that; 0: the scenario's
   double motion_rate_hz = 200;                      ///< at which the motion field is measured
   double window_s = 1;                              ///< length of the slow and the fast window
   double event_span_s = 0.05;                       ///< of which events are compared, in each window; 0: no events

@@ -14,6 +14,12 @@
 namespace esim {
 namespace {
 
+// What each of many rays of a pixel sees of a texture, in pixels. Alone, a ray sees its surface through the triangle
+// that bilinear interpolation between texels of a pixel's size makes, whose variance is 1/6 of a pixel's square. That
+// of rays spread over the pixel is 1/12, and half the area in each makes up for the rest: where an edge comes into a
+// pixel, the surfaces that it shows do not become sharper at once.
+constexpr float kEdgeFootprint = 0.70710678F;
+
 /// Places of rays in a pixel, from its centre: a rank-1 lattice, in which no two are in a line with the pixel's sides.
 std::vector<Eigen::Vector2f> lattice(int count) {
   const int generator = count == 64 ? 19 : 5;
@@ -246,7 +252,7 @@ class RaycastRenderer final : public ProcessorRenderer {
   template <int K>
   void look_closer(const Moment& moment, std::span<const CellView> views, std::span<EdgeWork<K>> edges) const {
     for (EdgeWork<K>& edge : edges) trace(moment, views, {0, 0}, edge.rays);
-    shade<K>(moment, edges, 1 / std::sqrt(static_cast<float>(places_.size())));
+    shade<K>(moment, edges, kEdgeFootprint);
     for (EdgeWork<K>& edge : edges) {
       const float sum = std::accumulate(edge.rays.irradiance.begin(), edge.rays.irradiance.end(), 0.0F);
       edge.pixel->rays.irradiance[edge.lane] += sum / static_cast<float>(places_.size());

@@ -2,6 +2,8 @@
 // ready, from asking to E, Z and V. Argument: light as PNG.
 #include <benchmark/benchmark.h>
 
+#include <string>
+
 #include "unrealcv/ready_server.h"
 
 namespace esim {
@@ -10,6 +12,8 @@ namespace {
 void frames(benchmark::State& state, const Camera& camera) {
   const bool png = state.range(0) != 0;
   const auto server = test::ready_server(camera, png);
+  const PinholeView view = pinhole_view(camera, PixelRays(camera), Pinhole::centred);
+  state.SetLabel(std::to_string(view.width) + " x " + std::to_string(view.height) + " px are sent");
   const auto renderer = test::renderer_for(test::options_for(*server), camera);
   Kinematics at = test::moving_camera();
   Sample sample;

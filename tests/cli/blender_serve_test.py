@@ -130,6 +130,20 @@ class Serve(unittest.TestCase):
                 self.assertAlmostEqual(value, expected, delta=0.05)
         self.client.ask("vset /object/Box/rotation 0 0 0")
 
+    def test_luminance_is_that_of_the_light(self):
+        light = self.client.array("vget /camera/0/lit npy")
+        for row, colours in zip(self.client.array("vget /camera/0/luminance npy"), light):
+            for value, (red, green, blue) in zip(row, colours):
+                self.assertAlmostEqual(value, 0.2126 * red + 0.7152 * green + 0.0722 * blue, 5)
+
+    def test_noise_is_another_with_another_seed(self):
+        first = self.client.ask("vget /camera/0/lit npy")
+        self.client.ask("vrun esim.seed 5")
+        other = self.client.ask("vget /camera/0/lit npy")
+        self.client.ask("vrun esim.seed 0")
+        self.assertNotEqual(first, other)
+        self.assertEqual(self.client.ask("vget /camera/0/lit npy"), first)
+
     def test_pictures_are_srgb_png(self):
         picture = self.client.ask("vget /camera/0/lit png")
         self.assertEqual(picture[:8], b"\x89PNG\r\n\x1a\n")
@@ -172,6 +186,26 @@ class Serve(unittest.TestCase):
         self.assertEqual(server.process.wait(timeout=20), 0)
         server.process.communicate()
         self.assertNotIn("no light", self.server.said)
+
+    def test_eevee_shows_the_same_light_and_depth_but_no_objects(self):
+        server = Serving(SCRIPTS, self.folder / "bright.blend", *SMALL, "--engine", "eevee")
+        self.addCleanup(server.end)
+        client = Client(server.port)
+        self.addCleanup(client.socket.close)
+        client.receive()
+        client.ask("vset /camera/0/pose 0 0 0 0 0 0")
+        self.assertAlmostEqual(client.array("vget /camera/0/luminance npy")[12][16], 0.1, 3)
+        self.assertAlmostEqual(client.array("vget /camera/0/plane_depth npy")[12][16], 4.0, 3)
+        self.assertIn("use the engine cycles", client.text("vget /camera/0/object_mask npy"))
+
+    def test_a_scene_without_a_camera_is_shown_from_the_origin(self):
+        server = Serving(SCRIPTS, self.folder / "bright.blend", *SMALL)
+        self.addCleanup(server.end)
+        client = Client(server.port)
+        self.addCleanup(client.socket.close)
+        client.receive()
+        self.assertEqual(client.numbers("vget /camera/0/pose"), [0] * 6)
+        self.assertAlmostEqual(client.array("vget /camera/0/lit npy")[12][16][0], 0.1, 5)
 
     def test_a_scene_that_cannot_be_opened_is_an_error(self):
         broken = self.folder / "broken.blend"

@@ -37,8 +37,19 @@ def box(name, size, place, light):
     thing.data.materials.append(shining(name, light))
     return thing
 
-bright = sys.argv[sys.argv.index("--") + 2] == "bright"
-if bright:
+kind = sys.argv[sys.argv.index("--") + 2]
+if kind == "filmed":
+    bpy.ops.object.camera_add(rotation=(1.5707963, 0, -1.5707963))  # along x, z is up
+    camera = bpy.context.object
+    camera.data.angle = 1.5707963
+    for frame, y in ((1, 0.0), (25, 0.5)):
+        camera.location[1] = y
+        camera.keyframe_insert("location", frame=frame)
+    for curve in camera.animation_data.action.fcurves:
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    bpy.context.scene.frame_end = 25
+if kind != "dark":
     for axis in range(3):
         for sign in (1, -1):
             size, place = [8.2] * 3, [0.0] * 3
@@ -57,11 +68,12 @@ bpy.ops.wm.save_as_mainfile(filepath=sys.argv[sys.argv.index("--") + 1])
 """
 
 
-def make_scene(folder, light):
-    """FOLDER/LIGHT.blend; a bright one has the walls and the box, a dark one a cube without light."""
-    script, blend = folder / "scene.py", folder / f"{light}.blend"
+def make_scene(folder, kind):
+    """FOLDER/KIND.blend; a bright one has the walls and the box, a filmed one also a camera that moves 0.5 m along y in a
+    second, a dark one a cube without light."""
+    script, blend = folder / "scene.py", folder / f"{kind}.blend"
     script.write_text(SCENE)
-    subprocess.run([BLENDER, "--background", "--factory-startup", "--python", script, "--", blend, light], check=True, capture_output=True,
+    subprocess.run([BLENDER, "--background", "--factory-startup", "--python", script, "--", blend, kind], check=True, capture_output=True,
                    env=ENVIRONMENT)
     return blend
 

@@ -27,11 +27,16 @@ def running_blenders():
     found = set()
     for entry in pathlib.Path("/proc").iterdir():
         try:
-            if b".esim_" in (command := (entry / "cmdline").read_bytes()) and b"--scratch" in command:
+            if b"/proc/self/fd/" in (command := (entry / "cmdline").read_bytes()) and b"--port" in command:
                 found.add(entry.name)
         except OSError:
             pass
     return found
+
+
+def leftovers(folder):
+    """What esim and Blender have put where files are kept for a while, and not removed."""
+    return [*folder.iterdir(), *pathlib.Path("/dev/shm").glob(".esim_*")]
 
 
 class Blender(ProgramTest):
@@ -92,12 +97,45 @@ class Blender(ProgramTest):
         self.assert_refused(run("simulate", self.scenario(dark), "--out", self.out), "no object Box", "Cube")
 
     @unittest.skipUnless(BLENDER, "there is no blender; apt install blender")
+    def test_follows_the_camera_of_the_scene(self):
+        scenario = self.folder / "filmed.yaml"
+        scenario.write_text(f"renderer: {{type: blender, scene: {make_scene(self.folder, 'filmed')}, samples: 1}}\n"
+                            "trajectory: {type: scene}\nduration_s: 0.2\nstart_s: 0.4\ncamera: {width: 32, height: 24}\n"
+                            "output: {preview: false}\ntruth: {rate_hz: 0, pose_rate_hz: 10}\nsampling: {type: uniform, rate_hz: 20}\n")
+        environment = {**os.environ, "XDG_CACHE_HOME": str(self.folder / "cache")}
+        result = run("simulate", scenario, "--out", self.out, env=environment)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        poses = [[float(part) for part in line.split()] for line in (self.out / "poses.txt").read_text().splitlines() if line[0] != "#"]
+        self.assertGreater(len(poses), 2)
+        start = 1 / 24  # of the first frame, by Blender's count
+        for t, x, y, z, *_ in poses:
+            self.assertAlmostEqual(x, 0, 4)
+            self.assertAlmostEqual(y, 0.5 * (t - start), 2)
+            self.assertAlmostEqual(z, 0, 4)
+        self.assertRegex((self.out / "calibration" / "camchain.yaml").read_text(), r"intrinsics: \[(16\.0000|15\.9999)")  # 90 degrees
+        scenario.write_text(scenario.read_text().replace("filmed.blend", "bright.blend"))
+        make_scene(self.folder, "bright")
+        self.out = self.folder / "out_of_no_camera"
+        result = run("check", scenario, env=environment)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("bright.blend has no camera", result.stderr)
+
+    @unittest.skipUnless(BLENDER, "there is no blender; apt install blender")
+    def test_eevee_without_opengl_says_what_to_install(self):
+        scenario = self.scenario(make_scene(self.folder, "bright"), ", engine: eevee")
+        result = run("simulate", scenario, "--out", self.out,
+                     env={**os.environ, "__EGL_VENDOR_LIBRARY_FILENAMES": "/nowhere.json", "DISPLAY": "", "WAYLAND_DISPLAY": ""})
+        self.assert_refused(result, "libegl1", "engine: cycles")
+
+    @unittest.skipUnless(BLENDER, "there is no blender; apt install blender")
     def test_blender_ends_with_esim_and_its_end_is_told(self):
-        blend, before = make_scene(self.folder, "bright"), running_blenders()
+        blend, before, temporary = make_scene(self.folder, "bright"), running_blenders(), self.folder / "temporary"
+        temporary.mkdir()
+        left_before = leftovers(temporary)
         for victim in ("esim", "blender"):
             out = self.folder / victim
             process = subprocess.Popen([ESIM, "simulate", self.scenario(blend), "--out", out, "--set", "sampling={type: uniform, rate_hz: 2000}"],
-                                       stderr=subprocess.PIPE, text=True)
+                                       stderr=subprocess.PIPE, text=True, env={**os.environ, "TMPDIR": str(temporary)})
             deadline = time.monotonic() + 60
             while not (out / "cam0" / "images").exists() and not list(self.folder.glob(f"{victim}*/cam0")) and time.monotonic() < deadline:
                 time.sleep(0.05)
@@ -113,9 +151,17 @@ class Blender(ProgramTest):
             while running_blenders() - before and time.monotonic() < deadline:
                 time.sleep(0.05)
             self.assertEqual(running_blenders(), before)
+            self.assertEqual(leftovers(temporary), left_before)
             if victim == "blender":
                 self.assertEqual(process.returncode, 2, error)
                 self.assertIn("Blender failed", error)
+                self.assertIn("marked incomplete", error)
+                report = json.loads((out / "report.json").read_text())
+                self.assertEqual(report["status"], "interrupted")
+                self.assertIn("Blender failed", report["reason"])
+                info = run("info", out)
+                self.assertEqual(info.returncode, 0, info.stderr)
+                self.assertIn("interrupted", info.stdout)
 
 
 if __name__ == "__main__":

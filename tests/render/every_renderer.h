@@ -16,10 +16,12 @@ class EveryRenderer : public testing::TestWithParam<std::tuple<const char*, int>
 
   void SetUp() override {
     if (name_.ends_with("gl") && !has_gl()) GTEST_SKIP() << "no OpenGL: libegl1, libgl1-mesa-dri";
-    renderer_ = make_renderer(name_, model_);
+    renderer_ = make(two_threads());
   }
 
  protected:
+  virtual std::unique_ptr<Renderer> make(const Workers& workers) const { return make_renderer(name_, model_, workers); }
+
   /// What moving_camera() and moving_objects() see `dt` seconds later.
   RenderRequest view(double dt) const {
     return {kTime + to_ns(dt), moving_camera(dt), {{0, 0, model_.width, model_.height}}, objects_of(name_, dt)};

@@ -5,6 +5,7 @@
 
 #include "esim/geometry/so3.h"
 #include "esim/scene/texture.h"
+#include "render/engines.h"
 #include "render/every_renderer.h"
 
 namespace esim {
@@ -12,6 +13,10 @@ namespace {
 
 class EveryRenderer : public test::EveryRenderer {
  protected:
+  std::unique_ptr<Renderer> make(const Workers& workers) const final {
+    return test::make_any_renderer(name_, model_, workers);
+  }
+
   const Kinematics camera_ = test::moving_camera();
   const std::vector<Kinematics> objects_ = test::objects_of(name_);
 };
@@ -52,7 +57,7 @@ TEST_P(EveryRendererOfSpace, MotionFieldIsTheVelocityOfTheImageOfWhatIsSeen) {
 
 TEST_P(EveryRenderer, SeveralRenderingsMayBeUnderWay) {
   // Of one renderer and of two, finished in another order than started; one is never finished.
-  const auto other = test::make_renderer(name_, model_);
+  const auto other = make(test::two_threads());
   const auto expect_that_of = [&](double dt, Rendering& rendering) {
     Sample sample, expected;
     rendering.finish(sample);
@@ -160,7 +165,10 @@ TEST_P(EveryRenderer, SaysWhichObjectEachPixelSeesWhereAsked) {
   request.tiles = {{17, 3, 35, 21}};
   renderer_->render(request, tile);
 
-  const bool misses_edges = name_ == "moving_gl" && std::get<1>(GetParam()) > 0;  // by half a pixel, through a lens
+  // Where a pinhole's image is looked up, edges are missed by half a pixel, and now and then the slope of the surface.
+  const bool of_engine = name_ == "moving_unrealcv";
+  const double tolerance = of_engine || (name_ == "moving_gl" && std::get<1>(GetParam()) > 0) ? 0.2 : 0.01;
+  int astray = 0;
   std::vector<int> count(3);
   for (int y = 0; y < model_.height; ++y) {
     for (int x = 0; x < model_.width; ++x) {
@@ -177,9 +185,12 @@ TEST_P(EveryRenderer, SaysWhichObjectEachPixelSeesWhereAsked) {
       };
       const double at[] = {in_box(point, 1), in_box(objects_[0].T_world_body.inverse() * point, 0.15),
                            in_box(objects_[1].T_world_body.inverse() * point, 0.2)};
-      ASSERT_NEAR(at[object], 1, misses_edges ? 0.2 : 0.01) << x << ", " << y;
+      const bool is_on_it = std::fabs(at[object] - 1) <= tolerance;
+      astray += !is_on_it;
+      ASSERT_TRUE(is_on_it || of_engine) << x << ", " << y << ": " << at[object];
     }
   }
+  EXPECT_LE(astray, model_.width * model_.height / 500);
   const bool has_objects = !objects_.empty() || name_ == "sprites";
   EXPECT_EQ(std::min(count[1], count[2]) > 50, has_objects);
   EXPECT_EQ(count[0] == model_.width * model_.height, !has_objects);
@@ -187,7 +198,7 @@ TEST_P(EveryRenderer, SaysWhichObjectEachPixelSeesWhereAsked) {
 
 TEST_P(EveryRenderer, DoesNotDependOnThreadsOrHistory) {
   const Workers one(1);
-  const auto other = test::make_renderer(name_, model_, one);
+  const auto other = make(one);
   test::render(*renderer_, model_, test::moving_camera(0.3), test::objects_of(name_, 0.3));
   const Sample a = test::render(*renderer_, model_, camera_, objects_),
                b = test::render(*other, model_, camera_, objects_);
@@ -197,12 +208,12 @@ TEST_P(EveryRenderer, DoesNotDependOnThreadsOrHistory) {
 
 INSTANTIATE_TEST_SUITE_P(Renderers, EveryRenderer,
                          testing::Combine(testing::Values("panorama", "plane", "mesh", "moving_mesh", "gl", "moving_gl",
-                                                          "sprites"),
+                                                          "sprites", "unrealcv", "moving_unrealcv"),
                                           testing::Values(0, 1, 2, 3)),
                          EveryRenderer::name);
 INSTANTIATE_TEST_SUITE_P(Renderers, EveryRendererOfSpace,
-                         testing::Combine(testing::Values("panorama", "plane", "mesh", "moving_mesh", "gl",
-                                                          "moving_gl"),
+                         testing::Combine(testing::Values("panorama", "plane", "mesh", "moving_mesh", "gl", "moving_gl",
+                                                          "unrealcv", "moving_unrealcv"),
                                           testing::Values(0, 1, 2, 3)),
                          EveryRenderer::name);
 

@@ -1,4 +1,4 @@
-// The contract of renderers, and what a lens sees of a pinhole's image; the server shows the tests' scenes.
+// What a lens sees of a pinhole's image; the server shows the tests' scenes. The contract: render/renderer_test.cpp.
 #include "unrealcv/shown.h"
 
 namespace esim {
@@ -60,35 +60,6 @@ TEST_P(UnrealcvRenderer, ShowsWhatTheRayCasterShows) {
   EXPECT_LT(flow, looked_up ? 1.0 : 0.05) << "px/s; the camera moves by hundreds, and edges are other objects'";
   EXPECT_LE(other_object, looked_up ? count / 50 : count / 500) << "on edges";
   EXPECT_EQ(sample.object.empty(), names().empty());
-}
-
-TEST_P(UnrealcvRenderer, SeveralMayBeUnderWayAndTilesAreThoseOfTheWhole) {
-  UnrealcvServer server(show(), names());
-  const auto under_test = renderer(server);
-  const auto first = under_test->start(view(0));
-  auto unwanted = under_test->start(view(0.1));
-  const auto last = under_test->start(view(0.2));
-  unwanted.reset();
-  Sample samples[2], alone;
-  last->finish(samples[1]);
-  first->finish(samples[0]);
-  for (int i = 0; i < 2; ++i) {
-    under_test->render(view(0.2 * i), alone);
-    EXPECT_TRUE(std::ranges::equal(samples[i].irradiance.pixels(), alone.irradiance.pixels()));
-    EXPECT_TRUE(std::ranges::equal(samples[i].flow_y.pixels(), alone.flow_y.pixels()));
-    EXPECT_EQ(samples[i].t, test::kTime + to_ns(0.2 * i));
-  }
-  RenderRequest part = view(0.2);
-  part.tiles = {{17, 3, 35, 21}};
-  Sample tile;
-  under_test->render(part, tile);
-  for (int y = 3; y < 24; ++y) {
-    for (int x = 17; x < 52; ++x) {
-      ASSERT_EQ(tile.irradiance(x, y), alone.irradiance(x, y));
-      ASSERT_EQ(tile.flow_x(x, y), alone.flow_x(x, y));
-    }
-  }
-  EXPECT_EQ(tile.irradiance(60, 60), 0.0F) << "a pixel outside the tile was touched";
 }
 
 INSTANTIATE_TEST_SUITE_P(Cameras, UnrealcvRenderer, testing::Combine(testing::Bool(), testing::Range(0, 6)));

@@ -27,7 +27,8 @@ bool run_script(const fs::path& scene, const std::string& script, const std::vec
   const fs::path result = scratch.path() / "scene.glb";
   std::vector<std::string> all = {fs::absolute(scene).string(), result.string()};
   all.insert(all.end(), arguments.begin(), arguments.end());
-  const std::vector<std::string> command = blender_command(program, scratch, script, all);
+  const ScriptInMemory in_memory(script);
+  const std::vector<std::string> command = blender_command(program, in_memory, all);
 
   double fraction = 0;
   std::string what = "starting Blender";

@@ -3,14 +3,12 @@ import math
 import mmap
 import os
 import struct
-import tempfile
 import time
 
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-FARTHEST = 1e9  # m; Blender writes 1e10 where nothing is seen
 
 
 class CommandError(Exception):
@@ -70,38 +68,42 @@ def pose_of(thing):
 
 # --- OpenEXR ----------------------------------------------------------------------------------------------------------
 
-def read_exr(data):
-    """Channels by their name without the layer's, such as Depth.Z, of a file without compression, as views of its bytes."""
-    channels, at = [], 8
-    head = bytes(data[:65536])
+class ExrLayout:
+    """Where the numbers are in an OpenEXR file without compression."""
 
-    def text(begin):
-        end = head.index(b"\0", begin)
-        return head[begin:end].decode(), end + 1
+    def __init__(self, data):
+        self.channels, at = [], 8
+        head = bytes(data[:65536])
 
-    while head[at] != 0:
-        name, at = text(at)
-        _, at = text(at)
-        size, = struct.unpack_from("<i", head, at)
-        at += 4
-        if name == "channels":
-            inner = at
-            while head[inner] != 0:
-                channel, inner = text(inner)
-                kind, = struct.unpack_from("<i", head, inner)
-                if kind != 2:
-                    raise RuntimeError("a channel of the rendering is not of 32-bit floats")
-                channels.append(channel)
-                inner += 16
-        elif name == "dataWindow":
-            left, top, right, bottom = struct.unpack_from("<4i", head, at)
-        at += size
-    width, height = right - left + 1, bottom - top + 1
-    start, = struct.unpack_from("<Q", head, at + 1)  # of the first row, of all alike
-    stride = 2 + width * len(channels)
-    rows = np.frombuffer(data, "<f4", stride * height, start).reshape(height, stride)
-    return {channel.split(".", 1)[1]: rows[:, 2 + k * width:2 + (k + 1) * width]
-            for k, channel in enumerate(channels)}
+        def text(begin):
+            end = head.index(b"\0", begin)
+            return head[begin:end].decode(), end + 1
+
+        while head[at] != 0:
+            name, at = text(at)
+            _, at = text(at)
+            size, = struct.unpack_from("<i", head, at)
+            at += 4
+            if name == "channels":
+                inner = at
+                while head[inner] != 0:
+                    channel, inner = text(inner)
+                    kind, = struct.unpack_from("<i", head, inner)
+                    if kind != 2:
+                        raise RuntimeError("a channel of the rendering is not of 32-bit floats")
+                    self.channels.append(channel.split(".", 1)[1])  # without the layer's name
+                    inner += 16
+            elif name == "dataWindow":
+                left, top, right, bottom = struct.unpack_from("<4i", head, at)
+            at += size
+        self.width, self.height = right - left + 1, bottom - top + 1
+        self.start, = struct.unpack_from("<Q", head, at + 1)  # of the first row, of all alike
+
+    def read(self, data):
+        """height x channels x width, not copied."""
+        count, stride = len(self.channels), 2 + self.width * len(self.channels)
+        rows = np.frombuffer(data, "<f4", stride * self.height, self.start).reshape(self.height, stride)
+        return rows[:, 2:].reshape(self.height, count, self.width)
 
 
 # --- the scene --------------------------------------------------------------------------------------------------------
@@ -144,15 +146,13 @@ class Engine:
 
     def __init__(self, options):
         self.scene = scene = bpy.context.scene
-        self.size, self.samples = options.size, options.samples
+        self.size, self.samples, self.seed = options.size, options.samples, options.seed
         self.cached_key, self.cached = None, None
-        self.seconds_rendering = self.seconds_reading = 0.0
+        self.seconds_rendering = 0.0  # by Blender, with writing its file
         self.renders = 0
-        # Blender gives its floats away in files alone; memory is the place for these.
-        memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
-        self.folder = None if options.scratch else tempfile.TemporaryDirectory(prefix="esim_blender_", dir=memory)
-        self.file = os.path.join(options.scratch or self.folder.name, "frame.exr")
-        self.arrays = {}
+        # Blender gives its floats away in files alone. This one has no name, and is gone with the process.
+        self.file = os.memfd_create("esim frame")
+        self.settings = self.layout_key = self.layout = None
         self._own_camera()
         self._settings(options)
         self._name_objects()
@@ -185,7 +185,7 @@ class Engine:
         # requests give the same bytes. Blender's denoiser, where there is one, would smear what is to be seen.
         scene.cycles.device, scene.cycles.pixel_filter_type = "CPU", "BOX"
         scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = scene.cycles.use_auto_tile = False
-        scene.cycles.seed, scene.cycles.use_animated_seed = options.seed, False
+        scene.cycles.use_animated_seed = False
         scene.cycles.time_limit = 0
         render.filter_size = 1.0  # of Eevee, px
         render.threads_mode = "FIXED" if options.threads > 0 else "AUTO"
@@ -199,7 +199,7 @@ class Engine:
         image.file_format, image.color_depth, image.exr_codec, image.color_mode = (
             "OPEN_EXR_MULTILAYER", "32", "NONE", "RGBA")
         image.color_management = "FOLLOW_SCENE"
-        render.filepath, render.use_file_extension = self.file, False
+        render.filepath, render.use_file_extension = f"/proc/self/fd/{self.file}", False
         render.use_overwrite, render.use_placeholder = True, False
 
     def _name_objects(self):
@@ -233,45 +233,41 @@ class Engine:
         thing.matrix_world = object_matrix(location, rotation, scale)
 
     def render(self, view):
-        """The passes of the current state: lit (RGB), depth (planar, m), and with Cycles ids. Valid until the next call."""
-        key = (view.key(), self.size, self.samples, tuple((name, *pose[:2]) for name, pose in sorted(self.moved.items())))
+        """The passes of the current state, 32-bit floats: light (height x B, G, R x width), depth (planar, m), and with Cycles
+        ids. Valid until the next call."""
+        moved = tuple((name, *pose[:2]) for name, pose in sorted(self.moved.items()))
+        key = view.key(), self.size, self.samples, self.seed, moved
         if key == self.cached_key:
             return self.cached
         self.cached_key = None
         self.camera.matrix_world = camera_matrix(view.location, view.rotation)
-        self.camera.data.angle = math.radians(view.field_of_view)
-        render = self.scene.render
-        render.resolution_x, render.resolution_y = self.size
-        self.scene.cycles.samples = self.scene.eevee.taa_render_samples = self.samples
+        settings = view.field_of_view, self.size, self.samples, self.seed
+        if settings != self.settings:
+            self.settings = settings
+            self.camera.data.angle = math.radians(view.field_of_view)
+            self.scene.render.resolution_x, self.scene.render.resolution_y = self.size
+            self.scene.cycles.samples = self.scene.eevee.taa_render_samples = self.samples
+            self.scene.cycles.seed = self.seed
         start = time.perf_counter()
         bpy.ops.render.render(write_still=True)
-        rendered = time.perf_counter()
+        self.seconds_rendering += time.perf_counter() - start
+        self.renders += 1
         self.cached = self._passes()
         self.cached_key = key
-        self.renders += 1
-        self.seconds_rendering += rendered - start
-        self.seconds_reading += time.perf_counter() - rendered
         return self.cached
 
     def _passes(self):
-        """Of the file that Blender has written, in arrays that are used again and again: fresh memory costs time."""
-        width, height = self.size
-        if "depth" not in self.arrays or self.arrays["depth"].shape != (height, width):
-            self.arrays = {"lit": np.empty((height, width, 3), np.float32), "depth": np.empty((height, width), np.float32),
-                           "ids": np.empty((height, width), np.uint16)}
-        with open(self.file, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            self._copy_passes(read_exr(data))
-        return self.arrays
-
-    def _copy_passes(self, channels):
-        depth = self.arrays["depth"]
-        if channels["Depth.Z"].shape != depth.shape:
+        """Of the file that Blender has written, as views of it, which it overwrites at the next rendering."""
+        data = mmap.mmap(self.file, 0, flags=mmap.MAP_SHARED | mmap.MAP_POPULATE, prot=mmap.PROT_READ)
+        key = len(data), self.size  # the header says when it was rendered: its length may change
+        if key != self.layout_key:
+            self.layout_key, self.layout = key, ExrLayout(data)
+        layout = self.layout
+        if (layout.width, layout.height) != self.size:
             raise RuntimeError("Blender rendered an image of another size than it was asked for")
-        for k, channel in enumerate("RGB"):
-            self.arrays["lit"][:, :, k] = channels["Combined." + channel]
-        np.copyto(depth, channels["Depth.Z"])
-        depth[depth > FARTHEST] = np.inf
-        if "IndexOB.X" in channels:
-            self.arrays["ids"][...] = channels["IndexOB.X"]
-        else:
-            self.arrays.pop("ids", None)
+        rows, at = layout.read(data), layout.channels.index
+        first = at("Combined.B")  # channels stand in the order of their names
+        passes = {"light": rows[:, first:first + 3], "depth": rows[:, at("Depth.Z")]}
+        if "IndexOB.X" in layout.channels:
+            passes["ids"] = rows[:, at("IndexOB.X")]
+        return passes

@@ -2,9 +2,13 @@
 
 #include <fmt/format.h>
 #include <stdlib.h>  // mkdtemp
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <fstream>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
 
 #include "esim/blender/process.h"
 #include "esim/core/error.h"
@@ -38,20 +42,26 @@ std::string blender_program(const fs::path& scene) {
                   scene.string(), name));
 }
 
-std::vector<std::string> blender_command(const std::string& program, const ScratchFolder& folder,
-                                         const std::string& script, const std::vector<std::string>& arguments) {
-  const fs::path script_file = folder.path() / "script.py";
-  std::ofstream out(script_file);
-  out << script;
-  out.close();
-  if (!out) throw OutputError(fmt::format("cannot write {}; is the disk full?", script_file.string()));
+ScriptInMemory::ScriptInMemory(const std::string& script) : file_(::memfd_create("script.py", 0)) {
+  if (file_ < 0 || ::write(file_, script.data(), script.size()) != static_cast<ssize_t>(script.size()))
+    throw OutputError(std::string("cannot keep a script in memory: ") + std::strerror(errno));
+}
+
+ScriptInMemory::~ScriptInMemory() {
+  if (file_ >= 0) ::close(file_);
+}
+
+std::string ScriptInMemory::path() const { return fmt::format("/proc/self/fd/{}", file_); }
+
+std::vector<std::string> blender_command(const std::string& program, const ScriptInMemory& script,
+                                         const std::vector<std::string>& arguments) {
   // Debian's Blender uses the first Python on PATH, which may be one that lacks the system's modules.
   const char* const path = std::getenv("PATH");
   std::vector<std::string> command = {
       "/usr/bin/env", "-u",         "PYTHONHOME",
       "-u",           "PYTHONPATH", fmt::format("PATH=/usr/bin:/bin:{}", path != nullptr ? path : "")};
   command.insert(command.end(), {program, "--background", "--factory-startup", "--disable-autoexec"});
-  command.insert(command.end(), {"--python-exit-code", "3", "--python", script_file.string(), "--"});
+  command.insert(command.end(), {"--python-exit-code", "3", "--python", script.path(), "--"});
   command.insert(command.end(), arguments.begin(), arguments.end());
   return command;
 }

@@ -1,7 +1,8 @@
 # Shows the scene that is open in Blender to programs that speak the protocol of UnrealCV, on this machine alone:
 #   blender --background room.blend --python serve.py -- --port 9000
-# docs/blender.md lists the commands. What Blender renders for them: engine.py.
+# docs/engines.md lists the commands. What Blender renders for them: engine.py.
 import argparse
+import contextlib
 import io
 import math
 import os
@@ -11,6 +12,7 @@ import signal
 import socket
 import struct
 import sys
+import time
 
 if "esim_open" not in globals():  # run by hand: esim itself puts the files one behind the other
     for _part in ("legacy.py", "common.py", "engine.py"):
@@ -23,6 +25,8 @@ import numpy as np
 MAGIC = 0x9E2B83C1
 LONGEST_REQUEST = 1 << 16  # bytes
 LARGEST_SIDE, MOST_PIXELS = 16384, 1 << 26
+MOST_HEADS = 64  # of arrays, that are remembered
+FARTHEST = 1e9  # m; Blender writes 1e10 where nothing is seen
 
 
 # --- commands ---------------------------------------------------------------------------------------------------------
@@ -50,6 +54,8 @@ class Commands:
     def __init__(self, engine):
         self.engine = engine
         self.views = {"0": engine.first}
+        self.buffers, self.heads = {}, {}
+        self.seconds_answering = 0.0  # from when a request has come to when the socket has taken its answer
         number = r"/camera/(\d{1,2})"
         self.table = [(re.compile(pattern + r"\Z", re.IGNORECASE), answer) for pattern, answer in (
             (r"vget /unrealcv/status", self.status),
@@ -62,6 +68,7 @@ class Commands:
             (r"vset /object/(.+)/rotation (.+)", lambda name, text: self.move(name, rotation=text)),
             (r"vrun r\.setres (\d{1,5})x(\d{1,5})[wf]?", self.resize),
             (r"vrun esim\.samples (\d{1,5})", self.set_samples),
+            (r"vrun esim\.seed (\d{1,9})", self.set_seed),
             (rf"vset {number}/size (\d{{1,5}}) (\d{{1,5}})", lambda _, width, height: self.resize(width, height)),
             (rf"vget {number}/size", lambda _: spell(*engine.size)),
             (rf"vget {number}/pose", lambda i: spell(*self.view(i).location, *self.view(i).rotation)),
@@ -72,9 +79,10 @@ class Commands:
             (rf"vset {number}/location (.+)", lambda i, text: self.set(i, "location", numbers(text, 3))),
             (rf"vset {number}/rotation (.+)", lambda i, text: self.set(i, "rotation", numbers(text, 3))),
             (rf"vset {number}/(?:horizontal_fieldofview|fov) (.+)", self.set_field_of_view),
-            (rf"vget {number}/lit npy", lambda i: self.npy(self.render(i)["lit"])),
+            (rf"vget {number}/lit npy", lambda i: self.npy(self.lit(i))),
+            (rf"vget {number}/luminance npy", self.luminance),
             (rf"vget {number}/lit png", self.lit_png),
-            (rf"vget {number}/plane_depth npy", lambda i: self.npy(self.render(i)["depth"])),
+            (rf"vget {number}/plane_depth npy", lambda i: self.npy(self.depth(i))),
             (rf"vget {number}/depth npy", self.ray_length),
             (rf"vget {number}/object_mask npy", lambda i: self.npy(self.ids(i))),
             (rf"vget {number}/object_mask png", self.mask_png),
@@ -95,7 +103,7 @@ class Commands:
         engine = self.engine
         return (f"Blender {bpy.app.version_string}, {engine.scene.render.engine.lower()}, {engine.samples} samples, "
                 f"{engine.size[0]}x{engine.size[1]}; {engine.renders} renderings in {engine.seconds_rendering:.6f} s, "
-                f"read in {engine.seconds_reading:.6f} s")
+                f"{self.seconds_answering - engine.seconds_rendering:.6f} s beside")
 
     def view(self, camera):
         return self.views.setdefault(camera, View())
@@ -126,6 +134,9 @@ class Commands:
     def set_samples(self, count):
         self.engine.samples = max(1, int(count))
 
+    def set_seed(self, seed):
+        self.engine.seed = int(seed)
+
     def move(self, name, location=None, rotation=None):
         self.engine.move(spoken_name(name), location and numbers(location, 3), rotation and numbers(rotation, 3))
 
@@ -137,18 +148,43 @@ class Commands:
         red, green, blue = colour_of(self.engine.ids[spoken_name(name)])
         return f"(R={red},G={green},B={blue},A=255)"
 
-    @staticmethod
-    def npy(array):
-        """A NumPy file in two parts, of which the pixels are not copied."""
-        head = io.BytesIO()
-        np.lib.format.write_array_header_1_0(head, np.lib.format.header_data_from_array_1_0(array))
-        return head.getvalue(), array.data.cast("B")
+    def npy(self, array):
+        """A NumPy file in two parts, of which the pixels are copied only where they do not lie together."""
+        array, kind = np.ascontiguousarray(array), (array.dtype, array.shape)
+        if kind not in self.heads:
+            head = io.BytesIO()
+            np.lib.format.write_array_header_1_0(head, np.lib.format.header_data_from_array_1_0(array))
+            if len(self.heads) == MOST_HEADS:
+                self.heads.clear()
+            self.heads[kind] = head.getvalue()
+        return self.heads[kind], array.data.cast("B")
+
+    def lit(self, camera):
+        return self.render(camera)["light"][:, ::-1].swapaxes(1, 2)
+
+    def buffer(self, name):
+        """A float for each pixel, in memory that is used again and again: fresh memory costs time."""
+        shape = self.engine.size[::-1]
+        if name not in self.buffers or self.buffers[name].shape != shape:
+            self.buffers[name] = np.empty(shape, np.float32)
+        return self.buffers[name]
+
+    def luminance(self, camera):
+        """Of Rec. 709, in one channel: a third to send."""
+        shares = np.array([0.0722, 0.7152, 0.2126], np.float32)
+        return self.npy(np.matmul(shares, self.render(camera)["light"], out=self.buffer("luminance")))
+
+    def depth(self, camera):
+        depth = self.buffer("depth")
+        np.copyto(depth, self.render(camera)["depth"])
+        depth[depth > FARTHEST] = np.inf
+        return depth
 
     def lit_png(self, camera):
-        return esim_png(np.round(esim_srgb(self.render(camera)["lit"]) * 255).astype(np.uint8))
+        return esim_png(np.round(esim_srgb(self.lit(camera)) * 255).astype(np.uint8))
 
     def ray_length(self, camera):
-        depth = self.render(camera)["depth"]
+        depth = self.depth(camera)
         height, width = depth.shape
         focal = width / 2 / math.tan(math.radians(self.view(camera).field_of_view) / 2)
         x = (np.arange(width, dtype=np.float32) - (width - 1) / 2) / focal
@@ -158,7 +194,7 @@ class Commands:
     def ids(self, camera):
         if "ids" not in self.render(camera):
             raise CommandError("Eevee does not say which object a pixel sees; use the engine cycles")
-        return self.render(camera)["ids"]
+        return self.render(camera)["ids"].astype(np.uint16)
 
     def mask_png(self, camera):
         colours = np.array([colour_of(number) for number in range(len(self.engine.ids) + 1)], np.uint8)
@@ -181,6 +217,7 @@ class Client:
     def serve(self):
         """Answers what has come. False when the client has gone, or sends what is not the protocol."""
         data = self.connection.recv(1 << 16)
+        begin = time.perf_counter()
         self.received += data
         while len(self.received) >= 8:
             magic, size = struct.unpack_from("<II", self.received)
@@ -196,6 +233,7 @@ class Client:
                 answer = self.commands.answer(match[2].decode("utf-8", "replace"))
                 parts = answer if isinstance(answer, tuple) else (answer.encode() if isinstance(answer, str) else answer,)
                 self.send(match[1], b":", *parts)
+        self.commands.seconds_answering += time.perf_counter() - begin
         return len(data) > 0
 
 
@@ -245,7 +283,6 @@ def parse(arguments):
     parser.add_argument("--threads", type=int, default=0, help="0: as many as there are processors")
     parser.add_argument("--persistent", action=argparse.BooleanOptionalAction, default=True,
                         help="keep the scene's data from one rendering to the next: faster, more memory")
-    parser.add_argument("--scratch", help="a folder, best in memory, through which renderings pass")
     parser.add_argument("--once", action="store_true",
                         help="end when the first client goes, or the program that started this")
     return parser.parse_args(arguments)
@@ -253,6 +290,8 @@ def parse(arguments):
 
 def main():
     parent = os.getppid()
+    with contextlib.suppress(OSError):
+        os.rmdir(bpy.app.tempdir)  # empty; Blender leaves it if it is killed
     options = parse(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
     if options.scene:
         if not os.path.isfile(options.scene):

@@ -15,23 +15,23 @@ namespace fs = std::filesystem;
 
 namespace {
 
-fs::path place_in_memory() {
-  std::error_code error;
-  return fs::is_directory("/dev/shm", error) ? fs::path("/dev/shm") : fs::temp_directory_path();
-}
+constexpr const char* kHowToGetOpenGl =
+    " (Eevee needs OpenGL, if in software: install libegl1 and libgl1-mesa-dri, or use engine: cycles)";
 
 }  // namespace
 
 struct BlenderServer::Parts {
   explicit Parts(const BlenderServerOptions& options)
-      : process(blender_command(blender_program(options.scene), scratch, std::string(kCommonScript) + kServeScript,
-                                {"--scene", fs::absolute(options.scene).string(), "--port", "0", "--engine",
-                                 options.eevee ? "eevee" : "cycles", "--samples", std::to_string(options.samples),
-                                 "--seed", std::to_string(options.seed), "--threads", std::to_string(options.threads),
-                                 "--scratch", scratch.path().string()})) {}
+      : process(
+            blender_command(blender_program(options.scene), script,
+                            {"--scene", fs::absolute(options.scene).string(), "--port", "0", "--engine",
+                             options.eevee ? "eevee" : "cycles", "--samples", std::to_string(options.samples), "--seed",
+                             std::to_string(options.seed), "--threads", std::to_string(options.threads)})),
+        needs_opengl(options.eevee) {}
 
-  ScratchFolder scratch{place_in_memory()};  // of the script, and of what Blender renders
+  ScriptInMemory script{std::string(kCommonScript) + kServeScript};
   RunningProcess process;
+  bool needs_opengl;
 };
 
 BlenderServer::BlenderServer(const BlenderServerOptions& options, const BlenderNotice& warning) {
@@ -63,7 +63,9 @@ BlenderServer::~BlenderServer() = default;
 std::optional<std::string> BlenderServer::why_ended() {
   const auto status = parts_->process.exit_status();
   if (!status) return std::nullopt;
-  return fmt::format("Blender failed (exit status {}): {}", *status, reason_in(parts_->process.output_tail()));
+  const std::string reason = reason_in(parts_->process.output_tail());
+  return fmt::format("Blender failed (exit status {}): {}{}", *status, reason,
+                     parts_->needs_opengl && reason.find("GL") != std::string::npos ? kHowToGetOpenGl : "");
 }
 
 }  // namespace esim

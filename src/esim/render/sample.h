@@ -40,8 +40,8 @@ struct Sample {
 struct Segment {
   Tile tile;
   TimeNs t0 = 0, t1 = 0;
-  const Image<float>* irradiance0 = nullptr;  ///< E at t0; borrowed, of the whole image's size
-  const Image<float>* irradiance1 = nullptr;  ///< E at t1
+  ImageView<float> irradiance0;  ///< E at t0; borrowed, of the tile's pixels at least
+  ImageView<float> irradiance1;  ///< E at t1
 };
 
 }  // namespace esim

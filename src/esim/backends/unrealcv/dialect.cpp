@@ -69,7 +69,7 @@ void Dialect::learn_commands(EngineSession& session) {
 
 void Dialect::learn_images(EngineSession& session) {
   const EngineBatch answers = session.ask({
-      camera("vget", light_ == EngineLight::automatic ? "lit npy" : "location"),
+      camera("vget", light_ == EngineLight::automatic ? options_.light_image + " npy" : "location"),
       camera("vget", depth_ == EngineDepth::automatic ? "plane_depth npy" : "location"),
       camera("vget", masks() && mask_ == EngineMask::automatic ? "object_mask npy" : "location"),
   });
@@ -143,7 +143,7 @@ EngineBatch Dialect::setting_commands(const EngineView& view, EngineState& state
 /// Light, depth and, where they are wanted, masks.
 std::vector<std::string> Dialect::image_commands() const {
   std::vector<std::string> commands = {
-      camera("vget", light_ == EngineLight::npy ? "lit npy" : "lit png"),
+      camera("vget", options_.light_image + (light_ == EngineLight::npy ? " npy" : " png")),
       camera("vget", depth_ == EngineDepth::plane_depth ? "plane_depth npy" : "depth npy")};
   if (masks()) commands.push_back(camera("vget", mask_ == EngineMask::npy ? "object_mask npy" : "object_mask png"));
   return commands;

@@ -98,18 +98,14 @@ void light_of_floats(const NpyImage& image, Image<float>& irradiance) {
 }
 
 void light_of_bytes(const NpyImage& image, Image<float>& irradiance) {
-  std::vector<unsigned char> opaque;  // whatever alpha is
-  const std::size_t channels = image.channels < 3 ? 1 : 3;
-  opaque.reserve(image.pixels() * channels);
-  for (std::size_t i = 0; i < image.pixels(); ++i)
-    for (std::size_t c = 0; c < channels; ++c) opaque.push_back(image.at<unsigned char>(i * image.channels + c));
   Planes planes(1);
   std::swap(planes[0], irradiance);
-  decode({.data = opaque.data(),
-          .row_bytes = static_cast<std::ptrdiff_t>(static_cast<std::size_t>(image.width) * channels),
+  decode({.data = image.numbers.data(),
+          .row_bytes = static_cast<std::ptrdiff_t>(static_cast<std::size_t>(image.width) * image.channels),
           .width = image.width,
           .height = image.height,
-          .channels = static_cast<int>(channels)},
+          .channels = static_cast<int>(image.channels),
+          .opaque = true},
          Encoding::srgb, false, planes);
   std::swap(planes[0], irradiance);
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <utility>
 
 #include "esim/core/engine_error.h"
 
@@ -65,13 +66,14 @@ void EngineSession::send_waiting() {
   }
 }
 
-/// Whether it was an answer that somebody waits for.
-bool EngineSession::take(const std::string& message) {
+/// Whether it was an answer that somebody waits for, who then has it.
+bool EngineSession::take(std::string& message) {
   const auto id = id_of(message);
   if (!id) return false;
   const auto found = pending_.find(id->first);
   if (found == pending_.end()) throw ProtocolError(fmt::format("answers request {}, which was not made", id->first));
-  found->second->answer = message.substr(id->second);
+  message.erase(0, id->second);
+  found->second->answer = std::move(message);
   pending_.erase(found);
   return true;
 }

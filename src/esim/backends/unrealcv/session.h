@@ -51,7 +51,7 @@ class EngineSession {
  private:
   void require_greeting(SteadyTime deadline);
   void send_waiting();
-  bool take(const std::string& message);
+  bool take(std::string& message);
 
   const UnrealcvOptions& options_;
   MessageConnection connection_;

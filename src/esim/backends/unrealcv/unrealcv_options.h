@@ -18,6 +18,7 @@ struct UnrealcvOptions {
   int camera = 0;         ///< id of the camera there that is moved about
   bool pipelined = true;  ///< a frame's commands are sent together, not each after the answer to the one before
   int lag_frames = 0;     ///< images that are asked for and thrown away after each pose
+  std::string light_image = "lit";  ///< what light is called; our server in Blender has "luminance" as well
   EngineLight light = EngineLight::automatic;
   EngineDepth depth = EngineDepth::automatic;
   EngineMask mask = EngineMask::automatic;

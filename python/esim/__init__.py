@@ -5,6 +5,7 @@ Times are ints in nanoseconds; where a time is asked for, a float is taken as se
 x y z w. The guide is `docs/python.md`, the options of scenarios are in `docs/scenario.md`.
 """
 
+from . import dataset
 from ._errors import Error, InternalError, OutputError
 from ._event_camera import EventCamera, linear_light
 from ._files import EventsIterator, formats, info, load_events, save_events

@@ -7,6 +7,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import dataset as dataset
+
 Path: TypeAlias = str | PathLike[str]
 Time: TypeAlias = int | float  # int ns, or float s
 Events: TypeAlias = NDArray[np.void]  # of EVENT_DTYPE, or with the fields t, x, y and p

@@ -14,5 +14,6 @@ void bind_event_files(nanobind::module_& module);
 void bind_recording_files(nanobind::module_& module);
 void bind_representations(nanobind::module_& module);
 void bind_pictures(nanobind::module_& module);
+void bind_dataset(nanobind::module_& module);
 
 }  // namespace esim::python

@@ -11,4 +11,5 @@ NB_MODULE(_core, module) {
   bind_recording_files(module);
   bind_representations(module);
   bind_pictures(module);
+  bind_dataset(module);
 }

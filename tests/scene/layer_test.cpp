@@ -12,10 +12,10 @@
 namespace esim {
 namespace {
 
-const std::vector<LayerKeyframe> kKeyframes = {{-0.4, {10, -20}, -30, {1, 1}},
-                                               {0.1, {-5, 7}, 45, {0.5, 1.5}},
-                                               {0.7, {30, 3}, 400, {-0.5, 2}},
-                                               {1.5, {0, 0}, 90, {1.2, 0.9}}};
+const std::vector<LayerKeyframe> kKeyframes = {{-0.4, {10, -20}, -30, {1, 1}, 0},
+                                               {0.1, {-5, 7}, 45, {0.5, 1.5}, 0.3},
+                                               {0.7, {30, 3}, 400, {-0.5, 2}, -0.2},
+                                               {1.5, {0, 0}, 90, {1.2, 0.9}, 0.5}};
 
 LayerMotion::Parameters value_at(const LayerMotion& motion, double t_s) { return motion.at(to_ns(t_s)).value; }
 
@@ -26,7 +26,8 @@ TEST(LayerMotion, PassesThroughItsKeyframes) {
       const LayerMotion::Parameters value = value_at(motion, key.t_s);
       EXPECT_LT((value.head<2>() - key.position).norm(), 1e-12);
       EXPECT_NEAR(value[2], key.rotation_deg * std::numbers::pi / 180, 1e-12);
-      EXPECT_LT((value.tail<2>() - key.scale).norm(), 1e-12);
+      EXPECT_LT((value.segment<2>(3) - key.scale).norm(), 1e-12);
+      EXPECT_NEAR(value[5], key.shear, 1e-12);
     }
   }
 }
@@ -76,23 +77,46 @@ TEST(LayerMotion, RefusesKeyframesWithoutOrder) {
 
 TEST(LayerPlacement, PutsTheImageWhereTheKeyframeSays) {
   LayerMotion::State state{LayerMotion::Parameters::Zero(), LayerMotion::Parameters::Zero()};
-  state.value << 10, -4, std::numbers::pi / 2, 2, 1;
+  state.value << 10, -4, std::numbers::pi / 2, 2, 1, 0;
   const LayerPlacement in_pixels = place(state, LayerUnits::pixel, {30, 20}, {101, 51});
   EXPECT_LT((in_pixels.centre - Eigen::Vector2d(60, 21)).norm(), 1e-12) << "the sensor's middle is pixel (50, 25)";
   EXPECT_LT((in_pixels.A * Eigen::Vector2d(1, 0) - Eigen::Vector2d(0, 60)).norm(), 1e-12)
       << "a quarter turn, clockwise";
   EXPECT_LT((in_pixels.A * Eigen::Vector2d(0, 1) - Eigen::Vector2d(-20, 0)).norm(), 1e-12);
 
-  state.value << 0.5, -0.5, 0, 1, 1;
+  state.value << 0.5, -0.5, 0, 1, 1, 0;
   const LayerPlacement filling = place(state, LayerUnits::sensor, {30, 20}, {101, 51});
   EXPECT_LT((filling.centre - Eigen::Vector2d(100.5, -0.5)).norm(), 1e-12) << "the sensor's upper right corner";
   EXPECT_LT((filling.A - Eigen::Matrix2d(Eigen::Vector2d(101, 51).asDiagonal())).norm(), 1e-12);
 }
 
+TEST(LayerPlacement, ShearMovesWhatIsBelowToTheRight) {
+  LayerMotion::State state{LayerMotion::Parameters::Zero(), LayerMotion::Parameters::Zero()};
+  state.value << 0, 0, 0, 1, 2, 0.5;
+  const LayerPlacement placement = place(state, LayerUnits::pixel, {30, 20}, {101, 51});
+  EXPECT_LT((placement.A * Eigen::Vector2d(1, 0) - Eigen::Vector2d(30, 0)).norm(), 1e-12);
+  EXPECT_LT((placement.A * Eigen::Vector2d(0, 1) - Eigen::Vector2d(20, 40)).norm(), 1e-12)
+      << "of what is 40 px further down, by half of that";
+}
+
+TEST(LayerPlacement, ItsPivotIsAtThePosition) {
+  const LayerMotion motion(kKeyframes, KeyframeInterpolation::spline);
+  const Eigen::Vector2d pivot(0.2, 1.1), middle(50, 25), size(101, 51);
+  for (const double t_s : {-0.4, 0.3, 1.5}) {
+    const LayerMotion::State state = motion.at(to_ns(t_s));
+    const LayerPlacement in_pixels = place(state, LayerUnits::pixel, {30, 20}, {101, 51}, pivot);
+    const Eigen::Vector2d seen = in_pixels.centre + in_pixels.A * (pivot - Eigen::Vector2d(0.5, 0.5));
+    EXPECT_LT((seen - middle - state.value.head<2>()).norm(), 1e-12);
+    const LayerPlacement on_sensor = place(state, LayerUnits::sensor, {30, 20}, {101, 51}, pivot);
+    const Eigen::Vector2d seen_there = on_sensor.centre + on_sensor.A * (pivot - Eigen::Vector2d(0.5, 0.5));
+    EXPECT_LT((seen_there - middle - size.cwiseProduct(state.value.head<2>())).norm(), 1e-10);
+  }
+}
+
 TEST(LayerPlacement, ItsRatesAreTheDerivatives) {
   const LayerMotion motion(kKeyframes, KeyframeInterpolation::spline);
   for (const auto units : {LayerUnits::pixel, LayerUnits::sensor}) {
-    const auto at = [&](double t_s) { return place(motion.at(to_ns(t_s)), units, {30, 20}, {101, 51}); };
+    const auto at = [&](double t_s) { return place(motion.at(to_ns(t_s)), units, {30, 20}, {101, 51}, {0.1, 0.7}); };
     const auto A_rate = test::numeric_derivative([&](double t_s) -> Eigen::Matrix2d { return at(t_s).A; }, 0.3);
     const auto velocity = test::numeric_derivative([&](double t_s) -> Eigen::Vector2d { return at(t_s).centre; }, 0.3);
     EXPECT_LT(test::largest_difference(A_rate, at(0.3).A_rate), 1e-3);

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "esim/core/error.h"
+#include "esim/core/png_pixels.h"
 #include "esim/scene/image_header.h"
 
 namespace esim {
@@ -156,6 +157,17 @@ void decode_pixels(const std::filesystem::path& path, const cv::Mat& image, Enco
          encoding, colour, planes);
 }
 
+/// Whatever alpha it has.
+CodedImage coded_image(const PngPixels& png) {
+  return {.data = png.bytes.data(),
+          .row_bytes = static_cast<std::ptrdiff_t>(png.row_bytes),
+          .width = png.width,
+          .height = png.height,
+          .channels = png.channels,
+          .opaque = true,
+          .type = png.bits == 8 ? PixelType::uint8 : PixelType::uint16};
+}
+
 std::string lower_case_extension(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
@@ -256,6 +268,11 @@ void decode_planes(std::span<const std::byte> content, const std::string& name, 
   if (text.starts_with("\xff\xd8") && tail.find("\xff\xd9") == std::string_view::npos) fail(name, "is cut off");
   if (content.size() > std::numeric_limits<int>::max()) fail(name, "is larger than 2 GiB");
 
+  thread_local PngPixels png;
+  if (decode_png_pixels(content, png)) {
+    check_size(name, png.width, png.height);
+    return decode(coded_image(png), encoding, colour, planes);
+  }
   const cv::Mat coded(1, static_cast<int>(content.size()), CV_8U, const_cast<std::byte*>(content.data()));
   cv::Mat image = read_pixels(name, [&] { return cv::imdecode(coded, cv::IMREAD_UNCHANGED); });
   if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);

@@ -43,7 +43,7 @@ LayerMotion::LayerMotion(const std::vector<LayerKeyframe>& keyframes, KeyframeIn
     }
     t_s_.push_back(key.t_s);
     Parameters value;
-    value << key.position, key.rotation_deg * kRadiansPerDegree, key.scale;
+    value << key.position, key.rotation_deg * kRadiansPerDegree, key.scale, key.shear;
     values_.push_back(value);
   }
   if (interpolation == KeyframeInterpolation::spline) {
@@ -67,7 +67,8 @@ LayerMotion::State LayerMotion::at(TimeNs t) const {
           (values_[i + 1] - values_[i]) / h + h / 6 * ((1 - 3 * p * p) * a + (3 * q * q - 1) * b)};
 }
 
-LayerPlacement place(const LayerMotion::State& state, LayerUnits units, PixelSize image, PixelSize sensor) {
+LayerPlacement place(const LayerMotion::State& state, LayerUnits units, PixelSize image, PixelSize sensor,
+                     const Eigen::Vector2d& pivot) {
   const Eigen::Vector2d sensor_size(sensor.width, sensor.height);
   Eigen::Vector2d unit = Eigen::Vector2d::Ones(), extent(image.width, image.height);
   if (units == LayerUnits::sensor) unit = sensor_size, extent = Eigen::Vector2d::Ones();
@@ -79,13 +80,20 @@ LayerPlacement place(const LayerMotion::State& state, LayerUnits units, PixelSiz
   R_rate *= state.rate[2];
 
   const auto U = unit.asDiagonal(), I = extent.asDiagonal();
-  const auto S = state.value.tail<2>().asDiagonal(), S_rate = state.rate.tail<2>().asDiagonal();
+  // K diag(scale), and its rate.
+  const Eigen::Vector2d scale = state.value.segment<2>(3), scale_rate = state.rate.segment<2>(3);
+  const double shear = state.value[5], shear_rate = state.rate[5];
+  Eigen::Matrix2d S, S_rate;
+  S << scale.x(), shear * scale.y(), 0, scale.y();
+  S_rate << scale_rate.x(), shear_rate * scale.y() + shear * scale_rate.y(), 0, scale_rate.y();
+
   LayerPlacement placement;
   placement.A = U * R * S * I;
   placement.A_rate = U * R_rate * S * I;
   placement.A_rate += U * R * S_rate * I;
-  placement.centre = (sensor_size - Eigen::Vector2d::Ones()) / 2 + U * state.value.head<2>();
-  placement.centre_velocity = U * state.rate.head<2>();
+  const Eigen::Vector2d to_middle = Eigen::Vector2d::Constant(0.5) - pivot;
+  placement.centre = (sensor_size - Eigen::Vector2d::Ones()) / 2 + U * state.value.head<2>() + placement.A * to_middle;
+  placement.centre_velocity = U * state.rate.head<2>() + placement.A_rate * to_middle;
   return placement;
 }
 

@@ -25,16 +25,17 @@ enum class KeyframeInterpolation {
 /// How a layer lies on the sensor at one time.
 struct LayerKeyframe {
   double t_s = 0;
-  Eigen::Vector2d position = Eigen::Vector2d::Zero();  ///< of the layer's centre from the sensor's, right and down
-  double rotation_deg = 0;                             ///< about the layer's centre, clockwise on the screen
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();  ///< of the layer's pivot from the sensor's centre, right, down
+  double rotation_deg = 0;                             ///< about the pivot, clockwise on the screen
   Eigen::Vector2d scale = Eigen::Vector2d::Ones();     ///< along the image's rows and columns, before the rotation
+  double shear = 0;  ///< shift to the right over distance downwards, after the scale and before the rotation
 };
 
 /// Motion through keyframes. Before the first and after the last one the layer rests.
 class LayerMotion {
  public:
-  /// Position (2), rotation in radians, scale (2).
-  using Parameters = Eigen::Matrix<double, 5, 1>;
+  /// Position (2), rotation in radians, scale (2), shear.
+  using Parameters = Eigen::Matrix<double, 6, 1>;
   struct State {
     Parameters value;
     Parameters rate;  ///< per second
@@ -62,8 +63,10 @@ struct PixelSize {
   int width = 0, height = 0;
 };
 
-/// Where a layer is. With U = 1 and I = diag(image's size) in units of pixels, U = diag(sensor's size) and I = 1 in
-/// units of the sensor:   A = U R(rotation) diag(scale) I,   centre = the sensor's centre + U position.
-LayerPlacement place(const LayerMotion::State& state, LayerUnits units, PixelSize image, PixelSize sensor);
+/// Where a layer is whose point `pivot`, in (u, v), is at the position. With U = 1 and I = diag(image's size) in units
+/// of pixels, U = diag(sensor's size) and I = 1 in units of the sensor, and K = (1 shear; 0 1):
+///     A = U R(rotation) K diag(scale) I,   centre = the sensor's centre + U position + A (1/2 - pivot).
+LayerPlacement place(const LayerMotion::State& state, LayerUnits units, PixelSize image, PixelSize sensor,
+                     const Eigen::Vector2d& pivot = {0.5, 0.5});
 
 }  // namespace esim

@@ -35,31 +35,51 @@ struct Light {
   float red, green, blue;
 };
 
-template <typename T, typename Linear>
-Light light_of(const T* channel, const CodedImage& image, float full_scale, const Linear& linear) {
-  const bool grey = image.channels < 3;
-  const T* const last = channel + (grey ? 0 : 2);
-  Light light{linear(channel[0]), linear(channel[grey ? 0 : 1]), linear(*last)};
-  if (image.blue_first) std::swap(light.red, light.blue);
-  if (image.channels == 2 || image.channels == 4) {
-    const float alpha = static_cast<float>(channel[image.channels - 1]) / full_scale, white = 1.0F - alpha;
+/// Of a pixel with so many channels.
+template <int kChannels, typename T, typename Linear>
+Light light_of(const T* channel, bool opaque, float full_scale, const Linear& linear) {
+  constexpr bool kGrey = kChannels < 3;
+  const float first = linear(channel[0]);
+  Light light{first, first, first};
+  if constexpr (!kGrey) light = {first, linear(channel[1]), linear(channel[2])};
+  if constexpr (kChannels == 2 || kChannels == 4) {
+    if (opaque) return light;
+    const float alpha = static_cast<float>(channel[kChannels - 1]) / full_scale, white = 1.0F - alpha;
     light = {alpha * light.red + white, alpha * light.green + white, alpha * light.blue + white};
   }
   return light;
 }
 
-template <typename T, typename Linear>
-void decode_as(const CodedImage& image, float full_scale, const Linear& linear, Planes& planes) {
+template <int kChannels, typename T, typename Linear>
+void decode_pixels(const CodedImage& image, float full_scale, const Linear& linear, Planes& planes) {
   for (int y = 0; y < image.height; ++y) {
     const T* pixel = reinterpret_cast<const T*>(static_cast<const std::byte*>(image.data) + y * image.row_bytes);
-    for (int x = 0; x < image.width; ++x, pixel += image.channels) {
-      const Light light = light_of(pixel, image, full_scale, linear);
-      if (planes.size() == 1) {
-        planes[0](x, y) = luminance(light.red, light.green, light.blue);
+    float* const red = planes[0].row(y);
+    float* const green = planes.size() == 1 ? nullptr : planes[1].row(y);
+    float* const blue = planes.size() == 1 ? nullptr : planes[2].row(y);
+    for (int x = 0; x < image.width; ++x, pixel += kChannels) {
+      Light light = light_of<kChannels>(pixel, image.opaque, full_scale, linear);
+      if (image.blue_first) std::swap(light.red, light.blue);
+      if (green == nullptr) {
+        red[x] = luminance(light.red, light.green, light.blue);
       } else {
-        planes[0](x, y) = light.red, planes[1](x, y) = light.green, planes[2](x, y) = light.blue;
+        red[x] = light.red, green[x] = light.green, blue[x] = light.blue;
       }
     }
+  }
+}
+
+template <typename T, typename Linear>
+void decode_as(const CodedImage& image, float full_scale, const Linear& linear, Planes& planes) {
+  switch (image.channels) {
+    case 1:
+      return decode_pixels<1, T>(image, full_scale, linear, planes);
+    case 2:
+      return decode_pixels<2, T>(image, full_scale, linear, planes);
+    case 3:
+      return decode_pixels<3, T>(image, full_scale, linear, planes);
+    default:
+      return decode_pixels<4, T>(image, full_scale, linear, planes);
   }
 }
 

@@ -27,6 +27,7 @@ struct CodedImage {
   int width = 0, height = 0;
   int channels = 1;  ///< 1: grey, 2: grey and alpha, 3: colour, 4: colour and alpha
   bool blue_first = false;
+  bool opaque = false;  ///< whatever alpha says
   PixelType type = PixelType::uint8;
 };
 

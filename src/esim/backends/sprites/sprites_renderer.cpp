@@ -67,7 +67,7 @@ struct PlacedSprite {
 std::optional<PlacedSprite> place_on_sensor(const Sprite& sprite, std::uint16_t number, TimeNs t, PixelSize sensor) {
   constexpr double kLeastArea_px2 = 1e-6;
   const LayerPlacement at =
-      place(sprite.motion.at(t), sprite.units, {sprite.light->width(), sprite.light->height()}, sensor);
+      place(sprite.motion.at(t), sprite.units, {sprite.light->width(), sprite.light->height()}, sensor, sprite.pivot);
   if (!(std::fabs(at.A.determinant()) > kLeastArea_px2)) return std::nullopt;
   const Eigen::Matrix2d inverse = at.A.inverse();
 

@@ -18,6 +18,7 @@ struct Sprite {
   LayerUnits units = LayerUnits::pixel;
   LayerBeyond beyond = LayerBeyond::nothing;
   LayerMotion motion;
+  Eigen::Vector2d pivot{0.5, 0.5};  ///< the point of the image that `motion` tells the place of, in (u, v)
 };
 
 /// Layers drawn straight onto the sensor, without a camera in three dimensions.

@@ -77,6 +77,13 @@ class EventsHdf5Reader {
   /// Number of ON events; reads nothing but the polarities.
   std::uint64_t count_on() const;
 
+  /// Up to `count` polarities from index `first` on: above 0 where ON. Reads nothing else.
+  std::vector<std::int8_t> read_polarities(std::uint64_t first, std::uint64_t count) const;
+
+  /// For each ms since t_offset the index of the first event at or after it; none where the file has no such index.
+  /// Throws UserError where they do not increase.
+  std::vector<std::uint64_t> ms_to_idx() const;
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

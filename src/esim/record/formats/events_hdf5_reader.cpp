@@ -181,13 +181,27 @@ std::vector<Event> EventsHdf5Reader::read_window(TimeNs t0, TimeNs t1) const {
 
 std::uint64_t EventsHdf5Reader::count_on() const {
   std::uint64_t on = 0;
-  std::vector<std::int8_t> p;
-  for (std::uint64_t done = 0; done < impl_->size; done += p.size()) {
-    p.resize(std::min(impl_->size - done, kBlock));
-    impl_->file.read(impl_->p, done, std::span(p));
+  for (std::uint64_t done = 0; done < impl_->size; done += kBlock) {
+    const std::vector<std::int8_t> p = read_polarities(done, kBlock);
     on += static_cast<std::uint64_t>(std::count_if(p.begin(), p.end(), [](std::int8_t value) { return value > 0; }));
   }
   return on;
+}
+
+std::vector<std::int8_t> EventsHdf5Reader::read_polarities(std::uint64_t first, std::uint64_t count) const {
+  if (first >= impl_->size) return {};
+  std::vector<std::int8_t> p(std::min(count, impl_->size - first));
+  impl_->file.read(impl_->p, first, std::span(p));
+  return p;
+}
+
+std::vector<std::uint64_t> EventsHdf5Reader::ms_to_idx() const {
+  if (!impl_->ms_to_idx) return {};
+  std::vector<std::uint64_t> index(impl_->ms_to_idx->size);
+  impl_->file.read(*impl_->ms_to_idx, 0, std::span(index));
+  if (!std::is_sorted(index.begin(), index.end())) impl_->file.fail("ms_to_idx decreases");
+  for (std::uint64_t& first : index) first = std::min(first, impl_->size);
+  return index;
 }
 
 namespace {

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <span>
 #include <vector>
 
+#include "esim/core/png_pixels.h"
 #include "esim/record/input_file.h"
 #include "esim/record/output_file.h"
 
@@ -66,6 +68,16 @@ std::string problem_of(std::string_view bytes) {
 
 /// Empty where it is damaged.
 cv::Mat decode(std::string_view bytes, int mode) {
+  thread_local PngPixels png;
+  const bool decoded = decode_png_pixels(std::as_bytes(std::span(bytes)), png);
+  if (decoded && (png.channels == 1 || (png.channels == 3 && mode == cv::IMREAD_UNCHANGED))) {
+    const cv::Mat pixels(png.height, png.width, CV_MAKETYPE(png.bits == 8 ? CV_8U : CV_16U, png.channels),
+                         png.bytes.data(), png.row_bytes);
+    if (png.channels == 1) return pixels.clone();
+    cv::Mat blue_first;
+    cv::cvtColor(pixels, blue_first, cv::COLOR_RGB2BGR);
+    return blue_first;
+  }
   const cv::Mat coded(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
   try {
     return cv::imdecode(coded, mode);

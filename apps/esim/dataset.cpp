@@ -1,0 +1,265 @@
+#include <fmt/format.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "commands.h"
+#include "esim/core/error.h"
+#include "esim/dataset/affine_sequences.h"
+#include "esim/dataset/cluster.h"
+#include "esim/dataset/manifest.h"
+#include "esim/dataset/produce.h"
+#include "esim/dataset/scenario_sequences.h"
+#include "esim/record/number_text.h"
+#include "esim/record/output_file.h"
+#include "esim/scenario/conversion.h"
+#include "esim/scenario/sampling_text.h"
+#include "progress_bar.h"
+#include "support.h"
+
+namespace esim::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kAffine = "affine";
+
+struct Arguments {
+  std::string what, out, check, share;
+  std::uint32_t count = 10'000, shard_size = 0;
+  std::uint64_t seed = 1;
+  std::string format = "hdf5";
+  std::vector<std::string> contents, overrides;
+  int workers = 0;
+  bool quiet = false;
+
+  // Of affine motion.
+  AffineOptions affine;
+  std::string images, histogram, flow_at = "middle", sampling;
+  std::vector<double> thresholds, mix;
+
+  // Of Slurm.
+  bool slurm = false;
+  std::uint32_t slurm_tasks = 8;
+  std::string slurm_options;
+};
+
+std::unique_ptr<SequenceMaker> make_affine(const Arguments& arguments) {
+  AffineOptions options = arguments.affine;
+  options.images = arguments.images;
+  options.seed = arguments.seed;
+  if (!arguments.histogram.empty()) options.magnitudes = read_magnitudes(arguments.histogram);
+  if (!arguments.sampling.empty()) options.sampling = read_sampling(arguments.sampling);
+  if (!arguments.thresholds.empty())
+    options.contrast_threshold = {arguments.thresholds.front(), arguments.thresholds.back()};
+  if (!arguments.mix.empty()) options.mix = {arguments.mix[0], arguments.mix[1], arguments.mix[2], arguments.mix[3]};
+  for (std::size_t i = 0; i < kEnumNames<FlowTime>.size(); ++i) {
+    if (arguments.flow_at == kEnumNames<FlowTime>[i]) options.flow_at = static_cast<FlowTime>(i);
+  }
+  options.event_camera = read_event_camera(arguments.overrides);
+  return std::make_unique<AffineSequences>(std::move(options));
+}
+
+/// The words that this program was started with, without those about Slurm.
+std::vector<std::string> own_command() {
+  std::ifstream file("/proc/self/cmdline", std::ios::binary);
+  std::vector<std::string> words;
+  for (std::string word; std::getline(file, word, '\0');) {
+    if (word == "--slurm-tasks" || word == "--slurm-options") {
+      std::getline(file, word, '\0');  // its value
+    } else if (!word.starts_with("--slurm")) {
+      words.push_back(word);
+    }
+  }
+  words.front() = fs::read_symlink("/proc/self/exe").string();
+  return words;
+}
+
+int submit(const Arguments& arguments, const DatasetFolder& folder) {
+  SlurmJob job;
+  job.tasks = std::min(arguments.slurm_tasks, folder.plan().shards());
+  job.folder = fs::absolute(folder.path());
+  job.working_folder = fs::current_path();
+  job.command = own_command();
+  std::istringstream options(arguments.slurm_options);
+  for (std::string option; options >> option;) job.options.push_back(option);
+  const fs::path script = job.folder / "slurm.sh";
+  write_file_atomically(script, slurm_script(job));
+  const int status = std::system(("sbatch " + shell_quoted(script.string())).c_str());
+  if (status == -1 || !WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+    throw UserError(fmt::format("sbatch did not take {}; submit it where Slurm is, or change it with --slurm-options",
+                                script.string()));
+  }
+  return kOk;
+}
+
+int check(const Arguments& arguments) {
+  const DatasetFolder folder(arguments.check);
+  const std::vector<std::string> problems = check_dataset(folder);
+  for (const std::string& problem : problems) fmt::print(stderr, "{}\n", problem);
+  if (!problems.empty()) {
+    fmt::print(stderr, "esim: {}: {} problem{}\n", arguments.check, problems.size(), problems.size() == 1 ? "" : "s");
+    return kUsersFault;
+  }
+  const DatasetState state = survey_dataset(folder);
+  fmt::print("{}: whole: {} sequences, each once, {} events, {:.1f} GB in {} files\n", arguments.check,
+             grouped(state.sequences), grouped(state.events), static_cast<double>(state.bytes) * 1e-9,
+             state.shards.size());
+  return kOk;
+}
+
+void report(const DatasetState& state, const fs::path& out) {
+  std::map<std::string, std::string> passed_over;
+  for (const ShardRecord& record : state.shards)
+    passed_over.insert(record.passed_over.begin(), record.passed_over.end());
+  if (!passed_over.empty()) {
+    fmt::print(stderr, "warning: {} image{} could not be used; for one, {}\n", passed_over.size(),
+               passed_over.size() == 1 ? "" : "s", passed_over.begin()->second);
+  }
+  fmt::print(stderr, "{}: whole; look at {}\n", out.string(), (out / "preview.png").string());
+}
+
+int run(Arguments arguments) {
+  if (!arguments.check.empty()) return check(arguments);
+  if (arguments.what.empty()) throw UserError("say what to make: affine, or a scenario's file");
+  if (arguments.out.empty()) throw UserError("--out: is missing; name a folder");
+  const bool affine = arguments.what == kAffine;
+  std::vector<std::string> names = arguments.contents;
+  if (names.empty()) names = {"flow", "displacement"};
+  DatasetPlan plan{.count = arguments.count,
+                   .shard_size = arguments.shard_size > 0 ? arguments.shard_size : usual_shard_size(arguments.count),
+                   .format = arguments.format == "hdf5" ? ShardFormat::hdf5 : ShardFormat::webdataset,
+                   .contents = contents_named(names)};
+  const Share share = share_named(arguments.share);
+  const std::unique_ptr<SequenceMaker> maker =
+      affine ? make_affine(arguments)
+             : std::make_unique<ScenarioSequences>(arguments.what, arguments.overrides, arguments.seed,
+                                                   plan.contents.displacement);
+  plan.maker = maker->options();
+  if (share.part == 0) SequenceArrays(maker->make(0), plan.contents);  // a sample, before anything is written
+  const DatasetFolder folder(arguments.out, plan, ESIM_VERSION);
+  if (arguments.slurm) return submit(arguments, folder);
+
+  catch_interrupts();
+  const int workers = arguments.workers > 0    ? arguments.workers
+                      : slurm_processors() > 0 ? slurm_processors()
+                                               : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  ProgressBar bar(!arguments.quiet);
+  const auto begun = std::chrono::steady_clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(); };
+  const Production production = produce(folder, *maker, share, workers, [&](const ProductionProgress& p) {
+    const std::uint32_t wanted = p.all - (p.done - p.made);
+    bar.show(wanted > 0 ? static_cast<double>(p.made) / wanted : 1.0, [&] {
+      return fmt::format("{}/{} sequences  {:.1f}/s  {} events", p.done, p.all, p.made / std::max(seconds(), 1e-9),
+                         grouped(p.events));
+    });
+    return !interrupted();
+  });
+  bar.clear();
+  if (!arguments.quiet) {
+    fmt::print(stderr, "{}: made {} sequences in {:.1f} s, {:.1f} per second\n", arguments.out,
+               production.progress.made, seconds(), production.progress.made / std::max(seconds(), 1e-9));
+  }
+  if (interrupted()) return kInterrupted;
+  if (!production.complete() && !arguments.quiet)
+    fmt::print(stderr, "{}: {} files are being written by another process\n", arguments.out, production.elsewhere);
+  const DatasetState state = survey_dataset(folder);
+  if (!state.complete()) return kOk;
+  write_manifest(folder, state, maker->magnitudes(), maker->is_target());
+  if (!arguments.quiet) report(state, arguments.out);
+  return kOk;
+}
+
+void add_affine_options(CLI::App& command, Arguments& arguments) {
+  const char* const kGroup = "Of affine motion";
+  AffineOptions& affine = arguments.affine;
+  const auto add = [&](const char* name, auto& value, const char* help, const char* type) {
+    return command.add_option(name, value, help)->type_name(type)->group(kGroup);
+  };
+  add("--images", arguments.images, "Folder of images to move; without, collages of dead leaves are made", "DIR");
+  add("--duration", affine.duration_s, "Of a sequence (default: 0.04)", "S");
+  add("--width", affine.width, "Sensor (default: 240)", "PX");
+  add("--height", affine.height, "Sensor (default: 180)", "PX");
+  add("--flow-histogram", arguments.histogram,
+      "What displacements over the duration follow: lines LOW HIGH WEIGHT, px (default: MPI Sintel's)", "FILE");
+  add("--flow-scale", affine.flow_scale, "Times the histogram's magnitudes", "F");
+  add("--flow-at", arguments.flow_at, "Time of the motion field: start, middle (default) or end", "TIME")
+      ->check(CLI::IsMember({"start", "middle", "end"}));
+  add("--threshold", arguments.thresholds, "Contrast threshold of each sequence, drawn between two (default: 0.2 0.5)",
+      "LOW [HIGH]")
+      ->expected(1, 2);
+  add("--mix", arguments.mix, "Shares of translation, rotation, scale and shear (default: 1 0.5 0.3 0.2)", "T R S H")
+      ->expected(4);
+  add("--sampling", arguments.sampling, "As of a scenario (default: 'flow lambda=0.5')", "SAMPLING");
+}
+
+}  // namespace
+
+void add_dataset(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("dataset", "Make many labelled sequences for learning");
+  command->add_option("what", arguments->what, "affine: random affine motion of images. Or a scenario with randomise")
+      ->type_name("affine|SCENARIO.yaml");
+  command->add_option("-o,--out", arguments->out, "Folder to write, or to go on with")->type_name("DIR");
+  command->add_option("-n,--count", arguments->count, "Sequences (default: 10000)")
+      ->type_name("N")
+      ->check(CLI::Range(1U, 4'000'000'000U));
+  command
+      ->add_option("--contents", arguments->contents,
+                   "Beside events: flow, displacement (both the default), images, tensor, voxels=BINS, depth")
+      ->type_name("NAME,...")
+      ->delimiter(',');
+  command->add_option("--format", arguments->format, "Of the files: hdf5 (default) or webdataset")
+      ->type_name("FORMAT")
+      ->check(CLI::IsMember({"hdf5", "webdataset"}));
+  command->add_option("--shard-size", arguments->shard_size, "Sequences in a file (default: up to 100)")
+      ->type_name("N")
+      ->check(CLI::Range(1U, 1'000'000U));
+  command->add_option("--seed", arguments->seed, "Of everything that is drawn (default: 1)")->type_name("N");
+  command
+      ->add_option("--set", arguments->overrides,
+                   "Changes an option of the scenario; of affine motion, one of its event_camera")
+      ->type_name("KEY=VALUE")
+      ->expected(1)
+      ->take_all();
+  command
+      ->add_option("-j,--workers", arguments->workers,
+                   "Sequences made at a time; 0 takes every processor. The result does not depend on it")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1024));
+  command->add_flag("-q,--quiet", arguments->quiet, "Print warnings and errors only");
+  command->add_option("--check", arguments->check, "Instead: is the dataset in DIR whole? Reads all of it")
+      ->type_name("DIR");
+  add_affine_options(*command, *arguments);
+  const char* const kCluster = "On a cluster";
+  command
+      ->add_option("--shard", arguments->share,
+                   "Make part I of N of the files, I from 0 on; auto/N: I is SLURM_ARRAY_TASK_ID or "
+                   "JOB_COMPLETION_INDEX. In a Slurm array, that is the default")
+      ->type_name("I/N")
+      ->group(kCluster);
+  command->add_flag("--slurm", arguments->slurm, "Submit the work to Slurm as an array of tasks, and return")
+      ->group(kCluster);
+  command->add_option("--slurm-tasks", arguments->slurm_tasks, "Tasks of the array (default: 8)")
+      ->type_name("N")
+      ->check(CLI::Range(1U, 100'000U))
+      ->group(kCluster);
+  command->add_option("--slurm-options", arguments->slurm_options, "Further options of sbatch")
+      ->type_name("\"--time=1:00:00 ...\"")
+      ->group(kCluster);
+  command->footer(
+      "Examples:\n"
+      "  esim dataset affine --out flow                              10,000 sequences of 0.04 s, as in the paper\n"
+      "  esim dataset affine --out flow --images photographs --contents flow,tensor --format webdataset\n"
+      "  esim dataset room.yaml --count 500 --out rooms              of a scenario with randomise\n"
+      "  esim dataset affine --out flow --slurm --slurm-tasks 50 --slurm-options \"--cpus-per-task=8\"\n"
+      "  esim dataset --check flow                                   is every sequence there, once?\n"
+      "The same command again makes what is missing. Look at preview.png and magnitudes.png in the folder.");
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace esim::app

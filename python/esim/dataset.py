@@ -1,0 +1,148 @@
+"""Labelled sequences for learning, made on the fly. `esim dataset` on the command line writes them to disk."""
+
+import json
+import operator
+import os
+
+from . import _core
+from ._represent import event_tensor, voxel_grid
+from ._scenario import to_overrides
+from ._types import EVENT_DTYPE
+
+__all__ = ["AffineSequence", "AffineSequences"]
+
+
+class AffineSequence:
+    """A sequence with its labels. All but the tensors is exact.
+
+    Attributes
+    ----------
+    index : int
+    duration : int
+        ns; it begins at 0.
+    events : numpy.ndarray of esim.EVENT_DTYPE
+    flow : numpy.ndarray, float32, shape (2, height, width)
+        Motion field, px/s, to the right and downwards, at the time `flow_t` (ns).
+    displacement : numpy.ndarray, float32, shape (2, height, width)
+        Where the points that the pixels see at the start are at the end, less where they were: px, also outside the image.
+    images : numpy.ndarray, float32, shape (2, height, width)
+        Irradiance at the start and at the end: linear light, 1 = white.
+    info : dict
+        What was drawn: image, contrast_threshold, displacement_rms_px, and the motion as the pivot and keyframes of a layer
+        (`docs/sprites.md`).
+    """
+
+    __slots__ = ("index", "duration", "events", "flow", "flow_t", "displacement", "images", "info")
+
+    def __init__(self, index, made):
+        events, self.duration, self.flow_t, self.flow, self.displacement, self.images, info = made
+        self.index = index
+        self.events = events.view(EVENT_DTYPE)
+        self.info = json.loads(info)
+
+    def tensor(self, stamp="last"):
+        """The four channels of EV-FlowNet of all events: `esim.event_tensor`.
+
+        Parameters
+        ----------
+        stamp : {"last", "mean"}
+
+        Returns
+        -------
+        numpy.ndarray, float32, shape (4, height, width)
+        """
+        height, width = self.flow.shape[1:]
+        return event_tensor(self.events, width, height, t0=0, t1=self.duration, stamp=stamp)
+
+    def voxels(self, bins=5, normalise=False):
+        """All events as `esim.voxel_grid`.
+
+        Parameters
+        ----------
+        bins : int
+        normalise : bool
+
+        Returns
+        -------
+        numpy.ndarray, float32, shape (bins, height, width)
+        """
+        height, width = self.flow.shape[1:]
+        return voxel_grid(self.events, width, height, bins, t0=0, t1=self.duration, normalise=normalise)
+
+
+class AffineSequences:
+    """Random affine motions of images over the sensor: `sequences[i]` is the i-th, for any i from 0 to 2**32 - 1.
+
+    A sequence depends on nothing but these options and its index. Threads may make sequences at the same time.
+
+    Parameters
+    ----------
+    images : path, optional
+        Folder of images, with the folders in it. Otherwise textures are made on the fly: collages of dead leaves.
+    width, height : int
+        Of the sensor, px.
+    duration : float
+        Of a sequence, s.
+    seed : int
+    contrast_threshold : float or (float, float)
+        Each sequence draws its own between the two.
+    flow_histogram : path, optional
+        What magnitudes of displacement over the duration follow: lines "LOW HIGH WEIGHT", px. MPI Sintel's otherwise.
+    flow_scale : float
+        Times the magnitudes of the histogram.
+    flow_at : {"start", "middle", "end"}
+        The time that `flow` is of.
+    event_camera : dict, optional
+        Further options by their names in a scenario's `event_camera`: {"threshold_mismatch": 0.03}.
+
+    Raises
+    ------
+    esim.Error
+        For options that are impossible, and where there is no usable image.
+    """
+
+    def __init__(
+        self,
+        images=None,
+        *,
+        width=240,
+        height=180,
+        duration=0.04,
+        seed=1,
+        contrast_threshold=(0.2, 0.5),
+        flow_histogram=None,
+        flow_scale=1.0,
+        flow_at="middle",
+        event_camera=None,
+    ):
+        least, greatest = contrast_threshold if isinstance(contrast_threshold, (tuple, list)) else (contrast_threshold,) * 2
+        named = {f"event_camera.{key}": value for key, value in (event_camera or {}).items()}
+        self._core = _core.AffineSequences(
+            "" if images is None else os.fspath(images),
+            operator.index(width),
+            operator.index(height),
+            float(duration),
+            operator.index(seed),
+            float(least),
+            float(greatest),
+            "" if flow_histogram is None else os.fspath(flow_histogram),
+            float(flow_scale),
+            flow_at,
+            to_overrides(named),
+        )
+
+    def __getitem__(self, index):
+        """The sequence with this index.
+
+        Parameters
+        ----------
+        index : int
+
+        Returns
+        -------
+        AffineSequence
+        """
+        index = operator.index(index)
+        if not 0 <= index < 2**32:
+            raise IndexError(f"sequences have numbers from 0 to 2**32 - 1, not {index}")
+        return AffineSequence(index, self._core.make(index))

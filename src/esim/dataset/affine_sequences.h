@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "esim/core/describe.h"
+#include "esim/dataset/affine_motion.h"
+#include "esim/dataset/magnitudes.h"
+#include "esim/dataset/sequence_maker.h"
+#include "esim/sampling/options.h"
+#include "esim/sensors/event_camera_options.h"
+
+namespace esim {
+
+/// The time that the motion field is of.
+enum class FlowTime { start, middle, end };
+template <>
+inline constexpr std::array<const char*, 3> kEnumNames<FlowTime>{"start", "middle", "end"};
+
+struct Range {
+  double low = 0, high = 0;
+};
+
+struct AffineOptions {
+  std::filesystem::path images{};  ///< a folder; empty: dead leaves
+  int width = 240, height = 180;   ///< px
+  double duration_s = 0.04;
+  std::uint64_t seed = 1;
+  MagnitudeHistogram magnitudes = sintel_magnitudes();  ///< of displacements over the duration
+  double flow_scale = 1;                                ///< times their magnitudes
+  MotionMix mix{};
+  FlowTime flow_at = FlowTime::middle;
+  Range contrast_threshold{0.2, 0.5};  ///< C+ = C-, drawn for each sequence
+  EventCameraOptions event_camera{};   ///< the rest of it
+  SamplingOptions sampling = FlowSampling{};
+};
+
+/// Random affine motions of images over the sensor, with events and exact optical flow: the dataset of the paper's
+/// Section 5. A sequence is a function of the options and its index. Any number of threads may make sequences.
+class AffineSequences final : public SequenceMaker {
+ public:
+  /// Throws UserError for options that are impossible, and for a folder without images.
+  explicit AffineSequences(AffineOptions options);
+  ~AffineSequences() override;
+
+  std::string options() const override;
+  const MagnitudeHistogram& magnitudes() const override { return options_.magnitudes; }
+  bool is_target() const override { return true; }
+
+  /// The sequence from 0 to the duration. Throws UserError where no image is left.
+  Sequence make(std::uint32_t index) const override;
+
+ private:
+  struct Impl;
+  AffineOptions options_;
+  std::unique_ptr<const Impl> impl_;
+};
+
+}  // namespace esim

@@ -8,6 +8,8 @@ install(TARGETS ${targets} esim_build_flags EXPORT esimTargets ARCHIVE DESTINATI
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/esim DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/esim PATTERN "*.py" EXCLUDE PATTERN "__pycache__" EXCLUDE)
 
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/studio/dist/ DESTINATION ${CMAKE_INSTALL_DATADIR}/esim/studio OPTIONAL)  # if scripts/studio has built it
+
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/esim)
 install(EXPORT esimTargets NAMESPACE esim:: DESTINATION ${package_dir})
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/esimConfig.cmake.in ${PROJECT_BINARY_DIR}/esimConfig.cmake
@@ -15,6 +17,7 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/esimConfig.cmake.in ${
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/esimConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/esimConfig.cmake ${PROJECT_BINARY_DIR}/esimConfigVersion.cmake
               ${PROJECT_SOURCE_DIR}/cmake/FindOpenCVModules.cmake ${PROJECT_SOURCE_DIR}/cmake/FindFFmpegLibraries.cmake ${PROJECT_SOURCE_DIR}/cmake/FindEpoxy.cmake
+              ${PROJECT_SOURCE_DIR}/cmake/FindDeflate.cmake
               ${PROJECT_SOURCE_DIR}/cmake/FindLZ4.cmake ${PROJECT_SOURCE_DIR}/cmake/FindZstd.cmake
               ${PROJECT_SOURCE_DIR}/cmake/FindLibZip.cmake
               ${PROJECT_SOURCE_DIR}/cmake/EsimDependencies.cmake

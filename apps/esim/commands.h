@@ -11,11 +11,13 @@ enum ExitCode : int { kOk = 0, kOurFault = 1, kUsersFault = 2, kInterrupted = 13
 void add_simulate(CLI::App& app, int& exit_code);
 void add_video(CLI::App& app, int& exit_code);
 void add_check(CLI::App& app, int& exit_code);
+void add_dataset(CLI::App& app, int& exit_code);
 void add_convert(CLI::App& app, int& exit_code);
 void add_import(CLI::App& app, int& exit_code);
 void add_info(CLI::App& app, int& exit_code);
 void add_play(CLI::App& app, int& exit_code);
 void add_stats(CLI::App& app, int& exit_code);
+void add_studio(CLI::App& app, int& exit_code);
 void add_waypoints(CLI::App& app, int& exit_code);
 void add_evaluate(CLI::App& app, int& exit_code);
 void add_options(CLI::App& app, int& exit_code);

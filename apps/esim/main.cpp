@@ -21,6 +21,8 @@ int main(int argc, char** argv) {
       "  esim play out/room                                a video of a recording or of a file of events\n"
       "  esim stats out/room --plot                        rates, intervals, hot pixels, banding of its events\n"
       "  esim waypoints scenes/room.yaml --out walk.yaml   walk through a scene, drop way points for a trajectory\n"
+      "  esim dataset affine --out out/flow                10,000 sequences with optical flow, for learning\n"
+      "  esim studio scenes/room.yaml                      design, make and look at recordings in a browser\n"
       "  esim evaluate sampling --out out/sampling         accuracy and cost of ways of sampling\n"
       "  esim options                                      every option of a scenario\n"
       "\n"
@@ -35,7 +37,9 @@ int main(int argc, char** argv) {
   add_info(app, exit_code);
   add_play(app, exit_code);
   add_stats(app, exit_code);
+  add_studio(app, exit_code);
   add_waypoints(app, exit_code);
+  add_dataset(app, exit_code);
   add_evaluate(app, exit_code);
   add_options(app, exit_code);
   try {

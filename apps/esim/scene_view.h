@@ -1,11 +1,8 @@
 #pragma once
 
-#include <memory>
-#include <optional>
 #include <vector>
 
-#include "esim/compose/compose.h"
-#include "esim/record/preview/colours.h"
+#include "esim/compose/scene_pictures.h"
 
 namespace esim::app {
 
@@ -28,21 +25,14 @@ class SceneView {
   Image<Rgb> picture(const SE3& T_world_camera);
 
  private:
-  void make_factory(const Scenario& scenario, const Notices& notices);
   void find_start(const Scenario& scenario, const Notices& notices);
-  std::unique_ptr<Renderer> renderer_for(const Camera& camera) const;
-  Image<Rgb> render(Renderer& renderer, const Camera& camera, int finer, const SE3& T_world_camera) const;
+  RenderRequest seen_from(const SE3& T_world_camera) const;
 
-  Workers workers_;
+  ScenePictures pictures_;
   Camera camera_;
   SE3 T_body_camera_, start_;
-  SceneFile scene_;
-  bool colour_ = true;
-  RendererFactory factory_;
   TimeNs t_ = 0;                     // the beginning
   std::vector<Kinematics> objects_;  // at t_
-  Camera view_camera_;               // of the latest look
-  std::unique_ptr<Renderer> view_;
 };
 
 }  // namespace esim::app

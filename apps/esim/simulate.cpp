@@ -5,7 +5,6 @@
 #include "commands.h"
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
-#include "esim/record/recording_directory.h"
 #include "esim/scenario/read.h"
 #include "progress_bar.h"
 #include "support.h"
@@ -38,27 +37,20 @@ void print_summary(const Summary& summary, const std::filesystem::path& out, boo
 int run(const Arguments& arguments) {
   Scenario scenario = read_scenario(arguments.scenario, arguments.overrides);
   if (arguments.seed) scenario.seed = *arguments.seed;
-  std::vector<std::string> given;
-  const Notices notices = print_and_keep(given, arguments.quiet);
   const std::filesystem::path out =
       arguments.out.empty() ? std::filesystem::path("out") / std::filesystem::path(arguments.scenario).stem()
                             : std::filesystem::path(arguments.out);
 
   catch_interrupts();
-  // The directory comes first: finding out that it exists should not take loading a scene.
-  RecordingDirectory directory(out, arguments.force);
-  World world = build_world(scenario, arguments.threads, notices);
-  write_text(directory.path() / "scenario.yaml", write_scenario(scenario));
-  const std::unique_ptr<Sink> sink = build_sink(scenario, directory.path());
-
-  if (interrupted()) return kInterrupted;  // while loading: nothing is worth keeping
   ProgressBar bar(!arguments.quiet);
-  const Summary summary = simulate(world, *sink, [&](const Progress& progress) {
-    bar.show(progress);
-    return !interrupted();
-  });
+  const auto made = make_recording(scenario, {out, arguments.force, arguments.threads, nullptr},
+                                   printing(arguments.quiet), [&](const Progress& progress) {
+                                     bar.show(progress);
+                                     return !interrupted();
+                                   });
   bar.clear();
-  directory.finish(report_json(scenario, summary, world.workers->threads(), given));
+  if (!made) return kInterrupted;  // while loading: nothing was worth keeping
+  const Summary& summary = *made;
   if (!arguments.quiet) print_summary(summary, out, scenario.output.preview && scenario.truth.rate_hz > 0);
   if (!summary.problem.empty()) {
     throw UserError(fmt::format("{}; the {:.3f} s before it are simulated: {}, marked incomplete", summary.problem,

@@ -23,18 +23,14 @@ void catch_interrupts() {
 
 bool interrupted() { return signal_came != 0; }
 
-Notices print_and_keep(std::vector<std::string>& given, bool quiet) {
-  Notices notices;
-  notices.warning = [&given](const std::string& text) {
-    given.push_back("warning: " + text);
-    fmt::print(stderr, "warning: {}\n", text);
-  };
-  notices.note = [&given, quiet](const std::string& text) {
-    given.push_back(text);
-    if (!quiet) fmt::print(stderr, "{}\n", text);
-  };
-  return notices;
+Notices printing(bool quiet) {
+  return {[](const std::string& text) { fmt::print(stderr, "warning: {}\n", text); },
+          [quiet](const std::string& text) {
+            if (!quiet) fmt::print(stderr, "{}\n", text);
+          }};
 }
+
+Notices print_and_keep(std::vector<std::string>& given, bool quiet) { return keeping(printing(quiet), given); }
 
 void add_run_options(CLI::App& command, RunOptions& options, const std::string& set_help) {
   command.add_option("--set", options.overrides, set_help)->type_name("KEY=VALUE")->expected(1)->take_all();

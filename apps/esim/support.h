@@ -15,7 +15,10 @@ namespace esim::app {
 void catch_interrupts();
 bool interrupted();
 
-/// Prints warnings and, unless `quiet`, notes; keeps both in `given` for the report.
+/// Prints warnings and, unless `quiet`, notes.
+Notices printing(bool quiet);
+
+/// The same; keeps both in `given` for the report.
 Notices print_and_keep(std::vector<std::string>& given, bool quiet);
 
 /// What the commands that make recordings have in common.

@@ -52,6 +52,8 @@ RendererFactory start_blender(const BlenderRendererOptions& options, const std::
   engine.name = "blender";
   engine.timeout_s = options.timeout_s;
   engine.exposure = options.exposure;
+  engine.light_image = "luminance";
+  engine.light = EngineLight::npy;
   if (options.engine == BlenderEngine::eevee) engine.mask = EngineMask::none;
   for (const EngineObjectOptions& object : options.objects) engine.objects.push_back(object.name);
   auto blender = std::make_shared<StartedBlender>();

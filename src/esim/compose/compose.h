@@ -26,6 +26,9 @@ struct Notices {
   NoticeHandler note;     ///< something was chosen or measured
 };
 
+/// Passes notices on, and keeps them in `given`, for reports.
+Notices keeping(Notices notify, std::vector<std::string>& given);
+
 /// Builds everything that a scenario describes, ready to simulate on `threads` threads (0: every processor). Loads
 /// scenes and trajectories, and checks what can be checked beforehand. Throws UserError for whatever the user can
 /// repair.
@@ -54,18 +57,25 @@ struct Substitutes {
 /// The same with substitutes. Throws UserError where the scenario asks for what a renderer of somebody else cannot do.
 World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices);
 
-/// What the scene files of a renderer hold: a mesh renderer's scene with all its objects, those that the scenario lists
-/// after the scene file's own. Empty for renderers without scene files. With colours if `colour`. Notes say what was
-/// found.
-SceneFile load_scenes(const RendererOptions& options, bool colour, const Notices& notices);
+/// What the scene files of a scenario's renderer hold: a mesh renderer's scene with all its objects, those that the
+/// scenario lists after the scene file's own; of what Blender renders, the cameras, where the trajectory follows one.
+/// Empty for renderers without scene files. With colours if `colour`. Notes say what was found.
+SceneFile load_scenes(const Scenario& scenario, bool colour, const Notices& notices);
 
 /// The motion of the body that a scenario describes.
 std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const SceneFile& scene,
                                                    const Notices& notices);
 
+/// The part of the body's trajectory that a scenario simulates. Throws UserError where it is not within it.
+TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory);
+
 /// The camera of the scene file that the scenario's trajectory follows; null for trajectories from elsewhere. Throws
 /// UserError naming those that there are.
 const SceneCamera* followed_camera(const Scenario& scenario, const SceneFile& scene);
+
+/// A camera as it is recorded: its field of view is that of the scene's camera, where it follows one (null: none) and
+/// says nothing itself.
+CameraInfo camera_info(CameraOptions options, const SceneCamera* followed);
 
 /// The motions of the moving objects that a scenario's renderer shows, in the order in which the renderer wants them.
 /// All cover `simulated`; what has no duration of its own, and the scene file's animation, begin with the body's
@@ -108,6 +118,22 @@ std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& file, c
 /// report.json: what was done, at which cost, where the time went, and the notices given on the way.
 std::string report_json(const Scenario& scenario, const Summary& summary, int threads,
                         const std::vector<std::string>& notices);
+
+/// How a recording is made.
+struct RecordingOptions {
+  std::filesystem::path out{};  ///< the recording's folder
+  bool replace = false;         ///< what is there already
+  int threads = 0;              ///< 0: every processor
+
+  std::unique_ptr<Sink> beside{};  ///< sees all that is recorded, where set
+};
+
+/// Simulates a scenario into a recording's folder, with its scenario.yaml and its report.json: what `esim simulate`
+/// does. The monitor, which ends it early, is asked once more when everything has been loaded, with a progress of
+/// nothing: nothing is kept then, and nothing is returned. The folder is there only when the recording is; see
+/// RecordingDirectory. What is notified stands in the report too.
+std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions options, const Notices& notify,
+                                      const Monitor& monitor);
 
 /// The same of a conversion.
 std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,

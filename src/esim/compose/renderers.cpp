@@ -112,7 +112,7 @@ RendererFactory factory(const SpritesRendererOptions& options, const SceneFile&,
     try {
       const auto& [light, alpha] = textures.of(layer);
       scene.sprites.push_back(
-          {light, alpha, layer.units, layer.beyond, LayerMotion(layer.keyframes, layer.interpolation)});
+          {light, alpha, layer.units, layer.beyond, LayerMotion(layer.keyframes, layer.interpolation), layer.pivot});
     } catch (const UserError& error) {
       throw UserError(fmt::format("renderer.layers.{}: {}", i, error.what()));
     }

@@ -61,10 +61,29 @@ SceneFile load(const Renderer&, bool, const Notices&) {
   return {};
 }
 
+/// The cameras alone of what Blender renders, and when its animation is.
+SceneFile load_cameras(const BlenderRendererOptions& options, const Notices& notices) {
+  if (options.scene.empty()) {
+    throw UserError(
+        "trajectory: follows a camera of the scene, but renderer.scene names none; name the file that the Blender at "
+        "renderer.address has opened");
+  }
+  SceneFile file = load_scene_file(readable(options.scene, notices), [](const std::string&) {});
+  if (file.cameras.empty())
+    throw UserError(fmt::format("trajectory: {} has no camera; use file, random or static", options.scene.string()));
+  SceneFile cameras;
+  cameras.cameras = std::move(file.cameras);
+  cameras.animation = file.animation;
+  return cameras;
+}
+
 }  // namespace
 
-SceneFile load_scenes(const RendererOptions& options, bool colour, const Notices& notices) {
-  return std::visit([&](const auto& renderer) { return load(renderer, colour, notices); }, options);
+SceneFile load_scenes(const Scenario& scenario, bool colour, const Notices& notices) {
+  const auto* const blender = std::get_if<BlenderRendererOptions>(&scenario.renderer);
+  if (blender != nullptr && std::holds_alternative<SceneTrajectoryOptions>(scenario.trajectory))
+    return load_cameras(*blender, notices);
+  return std::visit([&](const auto& renderer) { return load(renderer, colour, notices); }, scenario.renderer);
 }
 
 }  // namespace esim

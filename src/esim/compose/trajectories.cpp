@@ -87,9 +87,9 @@ std::shared_ptr<const Trajectory> build(const StaticTrajectoryOptions& options, 
 }
 
 const SceneCamera& find_camera(const SceneTrajectoryOptions& options, const Mover& mover) {
-  if (mover.scene == nullptr || mover.scene->scene.objects.empty()) {
+  if (mover.scene == nullptr || (mover.scene->scene.objects.empty() && mover.scene->cameras.empty())) {
     throw UserError(
-        fmt::format("{}: type scene is for the body and a renderer of type mesh, whose scene file has the "
+        fmt::format("{}: type scene is for the body and a renderer of type mesh or blender, whose scene file has the "
                     "camera; use file, random or static",
                     mover.key));
   }

@@ -13,25 +13,6 @@
 namespace esim {
 namespace {
 
-/// The part of the trajectory that is simulated.
-TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory) {
-  const TimeNs start = trajectory.start() + to_ns(scenario.start_s);
-  const double available_s = to_seconds(trajectory.end() - start);
-  if (available_s <= 0) {
-    throw UserError(fmt::format("start_s: {} s is beyond the end of the trajectory, which lasts {:.3f} s",
-                                scenario.start_s, to_seconds(trajectory.end() - trajectory.start())));
-  }
-  if (!scenario.duration_s) return {start, trajectory.end()};
-  const TimeNs end = start + to_ns(*scenario.duration_s);
-  if (end > trajectory.end()) {
-    throw UserError(
-        fmt::format("duration_s: {} s is longer than the trajectory, which has {:.9g} s left; shorten it, or make the "
-                    "trajectory longer (that of a file with trajectory.time_scale)",
-                    *scenario.duration_s, available_s));
-  }
-  return {start, end};
-}
-
 void check_sampling(const CameraOptions& camera, const Notices& notices) {
   const auto check = [&]<typename Criterion>(const Criterion& criterion) {
     if constexpr (requires { criterion.lambda; }) {
@@ -210,13 +191,9 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
 
   const SceneCamera* const followed = substitutes.body != nullptr ? nullptr : followed_camera(scenario, scene);
   check_output(scenario);
-  for (CameraOptions options : scenario.cameras) {
+  for (const CameraOptions& options : scenario.cameras) {
     check_sampling(options, notices);
-    if (followed != nullptr && followed->horizontal_fov_rad && !options.horizontal_fov_deg)
-      options.horizontal_fov_deg = *followed->horizontal_fov_rad * 180.0 / std::numbers::pi;
-    world.info.cameras.push_back(
-        {options.name, camera_model(options),
-         pose_named(fmt::format("camera {}: T_body_camera", options.name), options.T_body_camera)});
+    world.info.cameras.push_back(camera_info(options, followed));
   }
   const RendererFactory make_renderer =
       substitutes.make_renderer
@@ -255,13 +232,38 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
 
 }  // namespace
 
+TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory) {
+  const TimeNs start = trajectory.start() + to_ns(scenario.start_s);
+  const double available_s = to_seconds(trajectory.end() - start);
+  if (available_s <= 0) {
+    throw UserError(fmt::format("start_s: {} s is beyond the end of the trajectory, which lasts {:.3f} s",
+                                scenario.start_s, to_seconds(trajectory.end() - trajectory.start())));
+  }
+  if (!scenario.duration_s) return {start, trajectory.end()};
+  const TimeNs end = start + to_ns(*scenario.duration_s);
+  if (end > trajectory.end()) {
+    throw UserError(
+        fmt::format("duration_s: {} s is longer than the trajectory, which has {:.9g} s left; shorten it, or make the "
+                    "trajectory longer (that of a file with trajectory.time_scale)",
+                    *scenario.duration_s, available_s));
+  }
+  return {start, end};
+}
+
+CameraInfo camera_info(CameraOptions options, const SceneCamera* followed) {
+  if (followed != nullptr && followed->horizontal_fov_rad && !options.horizontal_fov_deg)
+    options.horizontal_fov_deg = *followed->horizontal_fov_rad * 180.0 / std::numbers::pi;
+  return {options.name, camera_model(options),
+          pose_named(fmt::format("camera {}: T_body_camera", options.name), options.T_body_camera)};
+}
+
 World build_world(const Scenario& scenario, int threads, const Notices& notices) {
   return build_world(scenario, Substitutes{}, threads, notices);
 }
 
 World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices) {
   const SceneFile scene =
-      substitutes.make_renderer ? SceneFile{} : load_scenes(scenario.renderer, sees_colour(scenario), notices);
+      substitutes.make_renderer ? SceneFile{} : load_scenes(scenario, sees_colour(scenario), notices);
   std::shared_ptr<const Trajectory> body =
       substitutes.body != nullptr ? substitutes.body : build_trajectory(scenario, scene, notices);
   const TimeSpan span = simulated_span(scenario, *body);
@@ -273,7 +275,7 @@ World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> bo
   if (!scenario.duration_s) throw UserError("duration_s: is missing; a motion that goes on has no end of its own");
   const TimeNs start = body->start() + to_ns(scenario.start_s);
   const TimeSpan span{start, start + to_ns(*scenario.duration_s)};
-  const SceneFile scene = load_scenes(scenario.renderer, sees_colour(scenario), notices);
+  const SceneFile scene = load_scenes(scenario, sees_colour(scenario), notices);
   return build(scenario, scene, std::move(body), span, Substitutes{}, threads, notices);
 }
 

@@ -47,6 +47,9 @@ inline constexpr std::array<const char*, 3> kEnumNames<Encoding>{"auto", "srgb",
 /// with key and what would be right, beginning with `setter`.
 EventCameraOptions read_event_camera(const std::vector<std::string>& overrides, const std::string& setter = kSetter);
 
+/// A camera's options in full as YAML.
+std::string write_event_camera(const EventCameraOptions& options);
+
 /// The options in full as YAML.
 std::string write_conversion(const ConversionOptions& options);
 

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
+#include "esim/core/error.h"
 #include "esim/scenario/scenario.h"
 
 namespace esim {
@@ -15,8 +17,22 @@ namespace esim {
 /// `sampling`, `event_camera` and `frame_camera` at the top hold for every camera that does not set them itself. A
 /// camera's calibration file is read here: the result holds explicit geometry only.
 ///
-/// `overrides` are "dotted.key=value" and come last. Throws UserError with file, line, key, and what would be right.
+/// `overrides` are "dotted.key=value" and come last. Throws UserError, most often an OptionError, with file, line, key,
+/// and what would be right.
 Scenario read_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides = {});
+
+/// What is wrong with one option of a scenario. The message has the file and the line too.
+class OptionError : public UserError {
+ public:
+  OptionError(const std::string& message, std::string key, std::string problem)
+      : UserError(message), key_(std::move(key)), problem_(std::move(problem)) {}
+
+  const std::string& key() const { return key_; }          ///< dotted
+  const std::string& problem() const { return problem_; }  ///< without the file and the key
+
+ private:
+  std::string key_, problem_;
+};
 
 /// What messages about overrides begin with, unless told otherwise: they are options of a command.
 inline constexpr const char* kSetter = "--set ";
@@ -31,6 +47,10 @@ struct ScenarioText {
   bool needs_renderer = true;    ///< false: whoever simulates it brings its own, and the key may be missing
   bool needs_trajectory = true;  ///< likewise
   bool needs_waypoints = true;   ///< false: a file of way points may be missing, since it is yet to be written
+
+  /// Where set: told of every file that the text names, before it is read; what it returns, if anything, is what is
+  /// wrong with naming it.
+  std::function<std::string(const std::filesystem::path& file)> refuses{};
 };
 
 /// The same from text.

@@ -154,6 +154,7 @@ struct LayerOptions {
   LayerBeyond beyond = LayerBeyond::nothing;
   int median_px = 0;
   double gaussian_px = 0;
+  Eigen::Vector2d pivot{0.5, 0.5};
   KeyframeInterpolation interpolation = KeyframeInterpolation::spline;
   std::vector<LayerKeyframe> keyframes{LayerKeyframe{}};  // at rest in the middle
 };

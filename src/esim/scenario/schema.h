@@ -147,9 +147,11 @@ void describe(Visitor& visit, LayerKeyframe& o) {
   visit("t_s", o.t_s,
         About{"when, on the trajectory's clock; those of other trajectories than files start at 0", "s", -1e8, 1e8});
   visit("position", o.position,
-        About{"of the layer's centre from the sensor's, to the right and downwards, in units", "", -1e6, 1e6});
-  visit("rotation_deg", o.rotation_deg, About{"about the layer's centre, clockwise", "deg", -1e9, 1e9});
+        About{"of the layer's pivot from the sensor's centre, to the right and downwards, in units", "", -1e6, 1e6});
+  visit("rotation_deg", o.rotation_deg, About{"about the layer's pivot, clockwise", "deg", -1e9, 1e9});
   visit("scale", o.scale, About{"of width and height; negative ones mirror", "", -1e6, 1e6});
+  visit("shear", o.shear,
+        About{"shift to the right over distance downwards, after the scale and before the rotation", "", -1e6, 1e6});
 }
 
 template <class Visitor>
@@ -159,6 +161,10 @@ void describe(Visitor& visit, LayerOptions& o) {
         About{"pixel: scale 1 makes a texel a pixel; sensor: it fills the sensor, whose width and height are 1"});
   visit("beyond", o.beyond, About{"what is seen beyond the image's edges"});
   describe_softening(visit, o);
+  visit("pivot", o.pivot,
+        About{"point of the image that keyframes give the place of: [0, 0] its upper left corner, [1, 1] its lower "
+              "right one",
+              "", -1e3, 1e3});
   visit("interpolation", o.interpolation, About{"motion between keyframes: natural cubic splines, or constant rates"});
   visit("keyframes", o.keyframes,
         About{"in order of time; the layer rests before the first and after the last (default: in the middle)"});

@@ -214,14 +214,24 @@ std::string write_scenario(const Scenario& scenario) {
   return std::string(out.c_str()) + "\n";
 }
 
-std::string write_sampling(const SamplingOptions& options) {
+namespace {
+
+/// One option of a scenario, in full.
+template <typename Options>
+std::string write_option(const Options& options) {
   YAML::Emitter out;
   YamlWriter writer(out);
   out << YAML::BeginMap;
-  writer("sampling", options, About{});
+  writer("option", options, About{});
   out << YAML::EndMap;
-  return YAML::Dump(YAML::Load(out.c_str())["sampling"]);
+  return YAML::Dump(YAML::Load(out.c_str())["option"]);
 }
+
+}  // namespace
+
+std::string write_sampling(const SamplingOptions& options) { return write_option(options); }
+
+std::string write_event_camera(const EventCameraOptions& options) { return write_option(options); }
 
 std::string write_waypoints(std::span<const WaypointPointOptions> points) {
   std::string text = points.empty() ? "points: []\n" : "points:\n";

@@ -105,10 +105,10 @@ void YamlReader::fail(const YamlSource& source, const YAML::Node& node, const st
   const bool from_command_line = std::any_of(changed.begin(), changed.end(), [&](const std::string& set) {
     return key == set || key.starts_with(set + ".") || set.starts_with(key + ".");
   });
-  if (from_command_line) throw UserError(fmt::format("{}{}: {}", source.setter, key, message));
+  if (from_command_line) throw OptionError(fmt::format("{}{}: {}", source.setter, key, message), key, message);
   const YAML::Mark mark = node.IsDefined() ? node.Mark() : YAML::Mark::null_mark();
   const std::string line = source.has_lines && mark.line >= 0 ? fmt::format(":{}", mark.line + 1) : "";
-  throw UserError(fmt::format("{}{}: {}: {}", source.file.string(), line, key, message));
+  throw OptionError(fmt::format("{}{}: {}: {}", source.file.string(), line, key, message), key, message);
 }
 
 void YamlReader::finish() const {
@@ -176,6 +176,8 @@ void YamlReader::read(const YAML::Node& node, const std::string& key, std::files
     return;
   }
   value = (std::filesystem::absolute(source_.file).parent_path() / text).lexically_normal();
+  if (!source_.refuses) return;
+  if (const std::string problem = source_.refuses(value); !problem.empty()) fail(source_, node, key, problem);
 }
 
 std::size_t YamlReader::index_of_name(const YAML::Node& node, const std::string& key,

@@ -23,6 +23,9 @@ struct YamlSource {
   std::vector<std::string> changed;  ///< dotted keys that were set on the command line
   std::string setter = kSetter;      ///< what messages about those begin with
   bool has_lines = true;             ///< a person has written the lines, and finds them by their numbers
+
+  /// As in ScenarioText.
+  std::function<std::string(const std::filesystem::path& file)> refuses{};
 };
 
 /// What a file holds. Throws UserError where it cannot be read; `kind` says what it should be.
@@ -61,7 +64,7 @@ class YamlReader {
   /// Throws UserError if the map has a key that was not visited.
   void finish() const;
 
-  /// Throws UserError: what is wrong with the value of a key.
+  /// Throws OptionError: what is wrong with the value of a key.
   [[noreturn]] static void fail(const YamlSource& source, const YAML::Node& node, const std::string& key,
                                 const std::string& message);
 

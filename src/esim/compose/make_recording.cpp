@@ -1,0 +1,40 @@
+#include "esim/compose/compose.h"
+#include "esim/record/fan_out.h"
+#include "esim/record/output_file.h"
+#include "esim/record/recording_directory.h"
+#include "esim/scenario/read.h"
+
+namespace esim {
+Notices keeping(Notices notify, std::vector<std::string>& given) {
+  return {[warning = std::move(notify.warning), &given](const std::string& text) {
+            given.push_back("warning: " + text);
+            warning(text);
+          },
+          [note = std::move(notify.note), &given](const std::string& text) {
+            given.push_back(text);
+            note(text);
+          }};
+}
+
+std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions options, const Notices& notify,
+                                      const Monitor& monitor) {
+  std::vector<std::string> given;
+  const Notices notices = keeping(notify, given);
+  // The directory comes first: finding out that it exists should not take loading a scene.
+  RecordingDirectory directory(options.out, options.replace);
+  World world = build_world(scenario, options.threads, notices);
+  write_file_atomically(directory.path() / "scenario.yaml", write_scenario(scenario));
+  std::unique_ptr<Sink> sink = build_sink(scenario, directory.path());
+  if (options.beside != nullptr) {
+    auto both = std::make_unique<FanOut>();
+    both->add(std::move(sink));
+    both->add(std::move(options.beside));
+    sink = std::move(both);
+  }
+  if (!monitor({world.info.start, world.info.start, world.info.end, 0, 0, 0})) return std::nullopt;
+  Summary summary = simulate(world, *sink, monitor);
+  directory.finish(report_json(scenario, summary, world.workers->threads(), given));
+  return summary;
+}
+
+}  // namespace esim

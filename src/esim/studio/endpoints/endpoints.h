@@ -1,0 +1,29 @@
+#pragma once
+
+#include "esim/studio/recordings.h"
+#include "esim/studio/roots.h"
+#include "esim/studio/router.h"
+#include "esim/studio/runs.h"
+#include "esim/studio/scenes.h"
+#include "esim/studio/studio.h"
+
+namespace esim::studio {
+
+/// What the requests work on.
+struct Workshop {
+  const Roots& roots;
+  SceneStore& scenes;
+  Runs& runs;
+  Recordings& recordings;
+};
+
+// Each adds the routes of its topic; docs/studio.md has the table.
+void add_files(Router& router, const Roots& roots, const StudioOptions& options);
+void add_pages(Router& router, const std::filesystem::path& folder);
+void add_scenarios(Router& router, const Roots& roots);
+void add_scenes(Router& router, const Workshop& workshop);
+void add_motion(Router& router, const Workshop& workshop);
+void add_runs(Router& router, const Workshop& workshop);
+void add_recordings(Router& router, const Workshop& workshop);
+
+}  // namespace esim::studio

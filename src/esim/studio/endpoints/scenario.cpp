@@ -1,0 +1,146 @@
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iterator>
+#include <mutex>
+
+#include "esim/record/output_file.h"
+#include "esim/studio/endpoints/endpoints.h"
+#include "esim/studio/scenario_check.h"
+#include "esim/studio/schema_json.h"
+#include "esim/studio/yaml_text.h"
+
+namespace esim::studio {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uintmax_t kMostBytes = std::uintmax_t{8} << 20;
+
+std::string read(const fs::path& file, const std::string& name) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) throw HttpError(404, name + ": no such file");
+  if (fs::file_size(file, error) > kMostBytes) throw HttpError(413, name + ": is too large for a scenario");
+  std::ifstream stream(file, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream) throw UserError(name + ": cannot be read; check its permissions");
+  return text;
+}
+
+/// FNV-1a: the same for the same bytes, and for others practically never.
+std::string revision_of(const std::string& text) {
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const unsigned char byte : text) hash = (hash ^ byte) * 0x100000001b3U;
+  return fmt::format("{:016x}-{}", hash, text.size());
+}
+
+/// {yaml, values, problems}, also of what is no YAML.
+Json checked(const std::string& yaml, const fs::path& file, const Roots& roots) {
+  Json answer{{"yaml", yaml}, {"values", Json::object()}, {"problems", Json::array()}};
+  try {
+    CheckedScenario result = check_scenario(yaml, file, roots);
+    answer["values"] = std::move(result.values);
+    answer["problems"] = std::move(result.problems);
+  } catch (const UserError& error) {
+    answer["problems"].push_back({{"where", ""}, {"what", error.what()}});
+  }
+  return answer;
+}
+
+std::string new_scenario(const std::string& scene) {
+  const std::string renderer = scene.empty() ? "renderer:\n  type: mesh\n  scene: \"\"\n"
+                                             : fmt::format("renderer:\n  type: mesh\n  scene: {}\n", yaml_of(scene));
+  return renderer +
+         "trajectory:\n  type: waypoints\n  speed: 1\n  points: []\n"
+         "camera: {width: 346, height: 260, horizontal_fov_deg: 75}\n"
+         "event_camera: {contrast_threshold: 0.3}\n";
+}
+
+Response save(const Json& request, const Roots& roots) {
+  static std::mutex one_at_a_time;  // between looking and writing
+  const std::string path = text_member(request, "path"), yaml = text_member(request, "yaml");
+  const std::string extension = fs::path(path).extension().string();
+  if (extension != ".yaml" && extension != ".yml") throw HttpError(400, path + ": give it a name that ends in .yaml");
+  const fs::path file = roots.resolve(path);
+  std::error_code error;
+  if (!fs::is_directory(file.parent_path(), error)) throw HttpError(404, path + ": there is no such folder");
+  const auto known = request.find("revision");
+  const bool is_new = known == request.end() || known->is_null();
+
+  const std::lock_guard lock(one_at_a_time);
+  const bool exists = fs::exists(file, error);
+  if (!flag_member(request, "overwrite") && (exists || !is_new)) {
+    const std::string there = exists ? read(file, path) : "";
+    const std::string revision = exists ? revision_of(there) : "";
+    if (is_new || text_member(request, "revision") != revision) {
+      Json conflict{{"error", is_new   ? path + ": exists already; replace it, or choose another name"
+                              : exists ? path + ": was changed meanwhile, by another window or program"
+                                       : path + ": was removed meanwhile"},
+                    {"yaml", there},
+                    {"revision", revision}};
+      Response response = json_response(conflict);
+      response.status = 409;
+      return response;
+    }
+  }
+  // What is written first has a name of its own, which may be a link to elsewhere.
+  const fs::path temporary = fs::path(file) += ".tmp";
+  fs::remove(temporary, error);
+  try {
+    write_file_atomically(file, yaml);
+  } catch (const OutputError&) {
+    fs::remove(temporary, error);
+    throw;
+  }
+  sync_directory(file.parent_path());
+  return json_response({{"revision", revision_of(yaml)}});
+}
+
+}  // namespace
+
+void add_scenarios(Router& router, const Roots& roots) {
+  router.add("GET", "/api/schema", [body = text_of(schema_json())](const Request&) {
+    Response response;
+    response.body = body;
+    return response;
+  });
+  router.add("GET", "/api/presets", [](const Request&) { return json_response(presets_json()); });
+  router.add("GET", "/api/scenario", [&roots](const Request& request) {
+    const auto path = request.query.find("path");
+    if (path == request.query.end()) throw HttpError(400, "the request lacks path");
+    const fs::path file = roots.existing(path->second);
+    const std::string yaml = read(file, path->second);
+    Json answer{{"path", path->second}};
+    answer["revision"] = revision_of(yaml);
+    answer.update(checked(yaml, file, roots));
+    return json_response(answer);
+  });
+  router.add("POST", "/api/scenario/new", [&roots](const Request& request) {
+    const Json body = parse_object(request.body);
+    const std::string scene = text_member(body, "scene", "");
+    const fs::path place = scene.empty() ? roots.list().front().folder / "scene" : roots.existing(scene);
+    const std::string yaml = new_scenario(scene.empty() ? "" : place.filename().string());
+    Json answer = checked(yaml, place.parent_path() / "scenario.yaml", roots);
+    answer["dir"] = roots.name_of(place.parent_path());
+    return json_response(answer);
+  });
+  router.add("POST", "/api/scenario/check", [&roots](const Request& request) {
+    const Json body = parse_object(request.body);
+    return json_response(checked(text_member(body, "yaml"), place_of(body, roots), roots));
+  });
+  router.add("POST", "/api/scenario/edit", [&roots](const Request& request) {
+    const Json body = parse_object(request.body);
+    std::string yaml = text_member(body, "yaml");
+    const auto changes = body.find("set");
+    if (changes == body.end() || !changes->is_array()) throw HttpError(400, "the request lacks the list set");
+    for (const Json& change : *changes) {
+      if (!change.is_object() || !change.contains("value")) throw HttpError(400, "set: wants {where, value}");
+      yaml = with_option(yaml, text_member(change, "where"), change["value"]);
+    }
+    return json_response(checked(yaml, place_of(body, roots), roots));
+  });
+  router.add("PUT", "/api/scenario",
+             [&roots](const Request& request) { return save(parse_object(request.body), roots); });
+}
+
+}  // namespace esim::studio

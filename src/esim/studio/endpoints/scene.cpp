@@ -1,0 +1,178 @@
+#include <algorithm>
+#include <cmath>
+
+#include "esim/record/preview/canvas.h"
+#include "esim/scenario/read.h"
+#include "esim/studio/endpoints/endpoints.h"
+#include "esim/studio/scenario_check.h"
+
+namespace esim::studio {
+namespace {
+
+Json bounds_of(const Scene& scene) {
+  Eigen::AlignedBox3d still, all;
+  for (const SceneObject& object : scene.objects) {
+    for (const Eigen::Vector3f& vertex : object.mesh.vertices) {
+      all.extend(vertex.cast<double>());
+      if (!object.moves) still.extend(vertex.cast<double>());
+    }
+  }
+  const Eigen::AlignedBox3d& box = still.isEmpty() ? all : still;
+  if (box.isEmpty()) return nullptr;
+  return {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
+}
+
+/// What kind of scene it is, and how a panorama or a plane lies in the world.
+void describe_kind(const RendererOptions& renderer, const StudioScene& scene, Json& answer) {
+  struct Visit {
+    const StudioScene& scene;
+    Json& answer;
+    void operator()(const MeshRendererOptions&) const { answer["kind"] = "mesh"; }
+    void operator()(const PanoramaRendererOptions& panorama) const {
+      const Eigen::Vector4d q = panorama.orientation.normalized();
+      answer["kind"] = "panorama";
+      answer["world"]["panorama"] = {{"orientation", {q.x(), q.y(), q.z(), q.w()}}};
+    }
+    void operator()(const PlaneRendererOptions& plane) const {
+      const SE3 pose = pose_named("renderer.pose", plane.pose);
+      const double height_m = plane.width_m * scene.texture_aspect();
+      answer["kind"] = "plane";
+      answer["world"]["plane"] = {
+          {"pose", json_of(pose)}, {"width_m", plane.width_m}, {"height_m", height_m}, {"endless", plane.endless}};
+      Eigen::AlignedBox3d box;
+      for (const double x : {-0.5, 0.5}) {
+        for (const double y : {-0.5, 0.5}) box.extend(pose * Eigen::Vector3d(x * plane.width_m, y * height_m, 0));
+      }
+      answer["bounds"] = {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
+    }
+    void operator()(const SpritesRendererOptions&) const { answer["kind"] = "layers"; }
+    void operator()(const UnrealcvRendererOptions&) const {}
+    void operator()(const BlenderRendererOptions&) const {}
+  };
+  std::visit(Visit{scene, answer}, renderer);
+}
+
+Json camera_json(const CameraInfo& camera) {
+  return {{"name", camera.name},           {"width", camera.model.width},
+          {"height", camera.model.height}, {"fx", camera.model.fx},
+          {"fy", camera.model.fy},         {"cx", camera.model.cx},
+          {"cy", camera.model.cy},         {"T_body_camera", json_of(camera.T_body_camera)}};
+}
+
+/// Of another program that renders, nothing is known before it does.
+Json engine_json(const Scenario& scenario) {
+  return {{"kind", "engine"},        {"glb", nullptr},    {"texture", nullptr},
+          {"triangles", 0},          {"bounds", nullptr}, {"camera", camera_json(camera_of(scenario, {}))},
+          {"objects", Json::array()}};
+}
+
+Json scene_json(const Scenario& scenario, SceneStore& scenes) {
+  if (engine_objects(scenario.renderer) != nullptr) return engine_json(scenario);
+  const auto scene = scenes.of(scenario);
+  const std::string base = "/api/scenes/" + scene->id();
+  Json answer{{"kind", ""},
+              {"glb", scene->glb() ? Json(base + ".glb") : Json()},
+              {"texture", scene->texture() ? Json(base + ".jpg") : Json()},
+              {"triangles", scene->triangles()},
+              {"bounds", bounds_of(scene->file().scene)}};
+  describe_kind(scenario.renderer, *scene, answer);
+  const CameraInfo camera = camera_of(scenario, scene->file());
+  answer["camera"] = camera_json(camera);
+  answer["start"] =
+      json_of(scene->file().cameras.empty() ? before_the_meshes(scene->file().scene, camera.model)
+                                            : scene->file().cameras.front().motion.front().T_world_object);
+  answer["objects"] = Json::array();
+  for (std::size_t i = 0; i < scene->file().scene.objects.size(); ++i) {
+    const SceneObject& object = scene->file().scene.objects[i];
+    answer["objects"].push_back(
+        {{"name", object.name}, {"glb_node", scene->glb() ? scene->glb()->nodes[i] : ""}, {"moving", object.moves}});
+  }
+  answer["cameras"] = Json::array();
+  for (const SceneCamera& other : scene->file().cameras)
+    answer["cameras"].push_back({{"name", other.name}, {"moving", other.motion.size() > 1}});
+  return answer;
+}
+
+Response scene_file(const Request& request, SceneStore& scenes) {
+  const std::string& name = request.captured.front();
+  const std::size_t dot = std::min(name.find('.'), name.size());
+  const auto scene = scenes.find(name.substr(0, dot));
+  if (scene == nullptr) throw HttpError(404, "this scene has been forgotten; ask for it anew");
+  Response response;
+  response.content_type = content_type_of(name);
+  response.headers = {{"Cache-Control", "private, max-age=3600"}};
+  if (name.ends_with(".glb") && scene->glb()) {
+    response.body = scene->glb()->bytes;
+  } else if (name.ends_with(".jpg") && scene->texture()) {
+    response.body = *scene->texture();
+  } else {
+    throw HttpError(404, request.path + ": there is no such file");
+  }
+  return response;
+}
+
+SE3 pose_in(const Json& numbers) {
+  constexpr std::size_t kNumbers = 7;
+  std::array<double, kNumbers> p{};
+  bool sound = numbers.is_array() && numbers.size() == kNumbers;
+  for (std::size_t i = 0; i < kNumbers && sound; ++i) {
+    sound = numbers[i].is_number();
+    if (sound) p[i] = numbers[i].get<double>();
+    sound = sound && std::abs(p[i]) < 1e9;
+  }
+  const Eigen::Quaterniond q(p[6], p[3], p[4], p[5]);
+  if (!sound || !(q.norm() > 1e-6)) throw HttpError(400, "pose: must be [x, y, z, qx, qy, qz, qw]");
+  return {q.normalized(), {p[0], p[1], p[2]}};
+}
+
+/// What the first camera sees at a time of the motion, or from a pose of its own.
+Response view(const Json& request, const Workshop& workshop) {
+  constexpr double kMostPixels = 4096, kMostTime_ns = 9e15;
+  const bool free = request.contains("pose") && !request["pose"].is_null();
+  const Scenario scenario = scenario_of(request, workshop.roots, free ? ScenarioNeeds::scene : ScenarioNeeds::motion);
+  const auto scene = workshop.scenes.of(scenario);
+  const CameraInfo info = camera_of(scenario, scene->file());
+  Camera camera = info.model;
+  if (!scene->on_sensor()) {
+    const auto width = static_cast<int>(number_member(request, "width", camera.width, 16, kMostPixels));
+    const double height = std::round(static_cast<double>(camera.height) * width / camera.width);
+    camera = scaled(camera, width, static_cast<int>(std::clamp(height, 1.0, kMostPixels)));
+  }
+  RenderRequest look;
+  std::optional<StudioMotion> motion;
+  try {
+    motion = motion_of(scenario, scene->file());
+  } catch (const UserError&) {
+    if (!free) throw;
+  }
+  if (motion) {
+    const double start = static_cast<double>(motion->simulated.start);
+    const auto t = static_cast<TimeNs>(number_member(request, "t", start, -kMostTime_ns, kMostTime_ns));
+    look.t = std::clamp(t, motion->body->start(), motion->body->end());
+    look.camera = rigidly_attached(motion->body->at(look.t), info.T_body_camera);
+    const TimeNs within = std::clamp(look.t, motion->simulated.start, motion->simulated.end);
+    for (const auto& object : motion->objects) look.objects.push_back(object->at(within));
+  } else {
+    for (const SceneMotion& object : scene->file().motions) look.objects.push_back({object.front().T_world_object});
+    look.objects.resize(
+        static_cast<std::size_t>(std::count_if(scene->file().scene.objects.begin(), scene->file().scene.objects.end(),
+                                               [](const SceneObject& o) { return o.moves; })));
+  }
+  if (free) look.camera = Kinematics{pose_in(request["pose"])};
+  return png_response(encode_png(scene->render(camera, look)));
+}
+
+}  // namespace
+
+void add_scenes(Router& router, const Workshop& workshop) {
+  router.add("POST", "/api/scene", [workshop](const Request& request) {
+    const Json body = parse_object(request.body);
+    return json_response(scene_json(scenario_of(body, workshop.roots, ScenarioNeeds::scene), workshop.scenes));
+  });
+  router.add("GET", "/api/scenes/*",
+             [workshop](const Request& request) { return scene_file(request, workshop.scenes); });
+  router.add("POST", "/api/view",
+             [workshop](const Request& request) { return view(parse_object(request.body), workshop); });
+}
+
+}  // namespace esim::studio

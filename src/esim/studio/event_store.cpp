@@ -1,0 +1,169 @@
+#include "esim/studio/event_store.h"
+
+#include <algorithm>
+#include <mutex>
+#include <optional>
+
+namespace esim::studio {
+namespace {
+
+constexpr std::uint64_t kBlock = std::uint64_t{1} << 20;
+constexpr TimeNs kCoarseBin = 4 * kNsPerMs;
+
+void count(EventSpan events, TimeNs from, TimeNs to, EventRate& rate) {
+  const double per_ns = static_cast<double>(rate.on.size()) / static_cast<double>(to - from);
+  for (const Event& event : events) {
+    const auto bin = static_cast<std::size_t>(static_cast<double>(event.t - from) * per_ns);
+    ++(event.polarity > 0 ? rate.on : rate.off)[std::min(bin, rate.on.size() - 1)];
+  }
+}
+
+class MemoryStore final : public EventStore {
+ public:
+  explicit MemoryStore(std::vector<Event> events) : events_(std::move(events)) {}
+
+  std::uint64_t size() const override { return events_.size(); }
+
+  Range find(TimeNs t0, TimeNs t1) const override {
+    const auto before = [](const Event& event, TimeNs t) { return event.t < t; };
+    const auto first = std::lower_bound(events_.begin(), events_.end(), t0, before);
+    const auto end = std::lower_bound(first, events_.end(), std::max(t0, t1), before);
+    return {static_cast<std::uint64_t>(first - events_.begin()), static_cast<std::uint64_t>(end - events_.begin())};
+  }
+
+  std::vector<Event> read(std::uint64_t first, std::uint64_t count) const override {
+    first = std::min<std::uint64_t>(first, events_.size());
+    const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(first);
+    return {begin, begin + static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(count, events_.size() - first))};
+  }
+
+ private:
+  std::vector<Event> events_;
+};
+
+class FileStore final : public EventStore {
+ public:
+  explicit FileStore(EventsHdf5Reader reader) : reader_(std::move(reader)), span_(reader_.time_span()) {}
+
+  std::uint64_t size() const override { return reader_.size(); }
+
+  Range find(TimeNs t0, TimeNs t1) const override {
+    const std::lock_guard lock(mutex_);
+    return reader_.find(t0, t1);
+  }
+
+  std::vector<Event> read(std::uint64_t first, std::uint64_t count) const override {
+    const std::lock_guard lock(mutex_);
+    return reader_.read(first, count);
+  }
+
+  EventRate rate(TimeNs from, TimeNs to, std::size_t bins) const override {
+    if ((to - from) / static_cast<TimeNs>(bins) < kCoarseBin) return EventStore::rate(from, to, bins);
+    const std::lock_guard lock(mutex_);
+    if (until_ms_.empty()) make_index();
+    EventRate rate{std::vector<std::uint64_t>(bins), std::vector<std::uint64_t>(bins)};
+    Counts before = until(from);
+    for (std::size_t i = 0; i < bins; ++i) {
+      const double share = static_cast<double>(i + 1) / static_cast<double>(bins);
+      const Counts after = until(from + static_cast<TimeNs>(share * static_cast<double>(to - from)));
+      rate.on[i] = after.on - before.on;
+      rate.off[i] = after.all - before.all - rate.on[i];
+      before = after;
+    }
+    return rate;
+  }
+
+ private:
+  struct Counts {
+    std::uint64_t all = 0, on = 0;
+  };
+
+  /// Before the ms that is nearest to a time; before and after all events, none and all.
+  Counts until(TimeNs t) const {
+    if (!span_ || t <= span_->start) return {};
+    if (t > span_->end) return until_ms_.back();
+    const TimeNs ms = (t - reader_.t_offset() + kNsPerMs / 2) / kNsPerMs;
+    if (ms <= 0) return {};
+    return until_ms_[std::min(static_cast<std::size_t>(ms), until_ms_.size() - 1)];
+  }
+
+  /// What there has been before each ms, and at last all, by reading the polarities once; the times too where the file
+  /// has no index of its own.
+  void make_index() const {
+    std::vector<std::uint64_t> first = reader_.ms_to_idx();
+    if (first.empty()) first = index_by_reading();
+    first.push_back(reader_.size());
+    std::vector<Counts> counts(first.size());
+    std::uint64_t on = 0, at = 0;
+    std::size_t ms = 0;
+    while (ms < first.size() && first[ms] == 0) ++ms;
+    while (at < reader_.size()) {
+      const std::vector<std::int8_t> block = reader_.read_polarities(at, kBlock);
+      for (const std::int8_t p : block) {
+        on += p > 0 ? 1 : 0;
+        ++at;
+        for (; ms < first.size() && first[ms] == at; ++ms) counts[ms] = {at, on};
+      }
+    }
+    until_ms_ = std::move(counts);
+  }
+
+  std::vector<std::uint64_t> index_by_reading() const {
+    constexpr std::size_t kMostMs = std::size_t{1} << 25;  // nine hours: what a damaged time asks for has an end
+    std::vector<std::uint64_t> first;
+    for (std::uint64_t at = 0; at < reader_.size(); at += kBlock) {
+      const std::vector<Event> block = reader_.read(at, kBlock);
+      for (std::size_t i = 0; i < block.size(); ++i) {
+        const TimeNs ms = (block[i].t - reader_.t_offset()) / kNsPerMs;
+        while (static_cast<TimeNs>(first.size()) <= ms && first.size() < kMostMs) first.push_back(at + i);
+      }
+    }
+    return first;
+  }
+
+  EventsHdf5Reader reader_;
+  std::optional<TimeSpan> span_;  // of the events
+  mutable std::mutex mutex_;
+  mutable std::vector<Counts> until_ms_;  // made when it is first wanted
+};
+
+}  // namespace
+
+EventRate EventStore::rate(TimeNs from, TimeNs to, std::size_t bins) const {
+  EventRate rate{std::vector<std::uint64_t>(bins), std::vector<std::uint64_t>(bins)};
+  const Range range = find(from, to);
+  for (std::uint64_t at = range.first; at < range.end; at += kBlock)
+    count(read(at, std::min(kBlock, range.end - at)), from, to, rate);
+  return rate;
+}
+
+std::vector<Event> EventStore::thinned(Range range, std::uint64_t most) const {
+  const std::uint64_t all = range.end - range.first;
+  if (all <= most) return read(range.first, all);
+  std::vector<Event> kept;
+  kept.reserve(most);
+  // Few enough to read are read; of more, runs of neighbours are taken.
+  constexpr std::uint64_t kReadAll = std::uint64_t{1} << 22, kRun = 64;
+  const std::uint64_t run = all <= kReadAll ? 1 : kRun;
+  const std::uint64_t runs = std::max<std::uint64_t>(1, most / run);
+  const std::vector<Event> events = run == 1 ? read(range.first, all) : std::vector<Event>();
+  for (std::uint64_t i = 0; i < runs; ++i) {
+    const auto at =
+        static_cast<std::uint64_t>(static_cast<double>(all) * static_cast<double>(i) / static_cast<double>(runs));
+    if (run == 1) {
+      kept.push_back(events[at]);
+    } else {
+      const std::vector<Event> neighbours = read(range.first + at, std::min(run, all - at));
+      kept.insert(kept.end(), neighbours.begin(), neighbours.end());
+    }
+  }
+  return kept;
+}
+
+std::unique_ptr<EventStore> store_of(EventsHdf5Reader reader) { return std::make_unique<FileStore>(std::move(reader)); }
+
+std::unique_ptr<EventStore> store_of(std::vector<Event> events) {
+  return std::make_unique<MemoryStore>(std::move(events));
+}
+
+}  // namespace esim::studio

@@ -1,0 +1,259 @@
+#include "esim/studio/glb.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <set>
+#include <unordered_map>
+
+#include "esim/core/error.h"
+#include "esim/record/formats/images_png.h"
+#include "esim/record/preview/canvas.h"
+#include "esim/studio/json.h"
+
+namespace esim::studio {
+namespace {
+
+constexpr int kLongestTexture = 2048;
+// Of glTF: types of numbers, what a buffer is for, how a texture goes on.
+constexpr int kUint32 = 5125, kFloat = 5126, kVertices = 34962, kIndices = 34963, kClamp = 33071, kRepeat = 10497;
+
+Image<float> at_most(const Image<float>& image, int longest) {
+  const int side = std::max(image.width(), image.height());
+  if (side <= longest) return image;
+  const auto scaled = [&](int px) { return std::max(1, static_cast<int>(std::int64_t{px} * longest / side)); };
+  return reduce_mean(image, scaled(image.width()), scaled(image.height()));
+}
+
+/// A material in the three colours; in luminance three times where there are none.
+PerColour<const Material*> in_colour(const Mesh& mesh, std::size_t index) {
+  PerColour<const Material*> channels{};
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    const auto& coloured = mesh.coloured[c];
+    channels[c] = coloured.empty() ? &mesh.materials[index] : &coloured[index];
+  }
+  return channels;
+}
+
+/// What a colour or an emission is: a factor, and a texture in three colours, null where there is none.
+struct Look {
+  PerColour<double> factor{};
+  PerColour<const Texture*> texture{};
+};
+
+Look base_of(const PerColour<const Material*>& material) {
+  Look look;
+  for (std::size_t c = 0; c < 3; ++c) {
+    look.factor[c] = material[c]->base;
+    look.texture[c] = material[c]->texture.get();
+  }
+  return look;
+}
+
+Look emission_of(const PerColour<const Material*>& material) {
+  Look look;
+  for (std::size_t c = 0; c < 3; ++c) {
+    look.factor[c] = material[c]->emission;
+    look.texture[c] = material[c]->emission_texture.get();
+  }
+  return look;
+}
+
+bool is_dark(const Look& look) {
+  return std::all_of(look.factor.begin(), look.factor.end(), [](double f) { return f <= 0; });
+}
+
+class Writer {
+ public:
+  explicit Writer(const Scene& scene) : lit_(scene.lighting.has_value()) {
+    for (const SceneObject& object : scene.objects) add(object);
+    if (!lit_) gltf_["extensionsUsed"] = {"KHR_materials_unlit"};
+  }
+
+  Glb finish() {
+    gltf_["scenes"] = Json::array({{{"nodes", roots_}}});
+    gltf_["buffers"] = Json::array({{{"byteLength", binary_.size()}}});
+    std::string json = text_of(gltf_);
+    json.resize((json.size() + 3) / 4 * 4, ' ');
+    binary_.resize((binary_.size() + 3) / 4 * 4, '\0');
+    constexpr std::size_t kHeads = 12 + 8 + 8;
+    const std::size_t size = kHeads + json.size() + binary_.size();
+    if (size > std::numeric_limits<std::uint32_t>::max()) throw UserError("the scene is too large for a browser");
+    std::string bytes = "glTF";
+    const auto put = [&](std::size_t value) {
+      for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(value >> shift & 0xff);
+    };
+    put(2), put(size);
+    put(json.size()), bytes += "JSON" + json;
+    put(binary_.size()), bytes += std::string("BIN\0", 4) + binary_;
+    return {std::move(bytes), std::move(names_)};
+  }
+
+ private:
+  void add(const SceneObject& object) {
+    const std::string name = fmt::format("object_{}", names_.size());
+    names_.push_back(name);
+    Json node{{"name", name}};
+    if (!object.mesh.triangles.empty()) {
+      Json primitives = primitives_of(object.mesh);
+      node["mesh"] = gltf_["meshes"].size();
+      gltf_["meshes"].push_back({{"primitives", std::move(primitives)}});
+    }
+    roots_.push_back(gltf_["nodes"].size());
+    gltf_["nodes"].push_back(std::move(node));
+  }
+
+  /// One per material.
+  Json primitives_of(const Mesh& mesh) {
+    std::map<std::uint32_t, std::vector<std::uint32_t>> triangles;
+    for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) triangles[mesh.material[i]].push_back(i);
+    Json primitives = Json::array();
+    for (const auto& [material, of] : triangles) {
+      Json primitive = geometry(mesh, of);
+      primitive["material"] = material_of(mesh, material);
+      primitives.push_back(std::move(primitive));
+    }
+    return primitives;
+  }
+
+  /// Corners of triangles are vertices of their own only where their texture coordinates are.
+  Json geometry(const Mesh& mesh, const std::vector<std::uint32_t>& triangles) {
+    struct Corner {
+      std::uint32_t vertex;
+      float u, v;
+      bool operator==(const Corner&) const = default;
+    };
+    struct Hash {
+      std::size_t operator()(const Corner& c) const {
+        std::uint32_t u = 0, v = 0;
+        std::memcpy(&u, &c.u, sizeof u), std::memcpy(&v, &c.v, sizeof v);
+        return (c.vertex * 0x9e3779b97f4a7c15U) ^ (u * 0xc2b2ae3d27d4eb4fU) ^ (std::uint64_t{v} << 20);
+      }
+    };
+    const bool shaded = lit_ && mesh.normals.size() == mesh.vertices.size();
+    std::unordered_map<Corner, std::uint32_t, Hash> known;
+    known.reserve(2 * triangles.size());
+    std::vector<float> positions, normals, uvs;
+    std::vector<std::uint32_t> indices;
+    for (const std::uint32_t triangle : triangles) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Eigen::Vector2f& uv = mesh.texture_uv[triangle][k];
+        const Corner corner{mesh.triangles[triangle][k], uv.x() + 0.0F, uv.y() + 0.0F};
+        const auto [entry, is_new] = known.try_emplace(corner, static_cast<std::uint32_t>(known.size()));
+        indices.push_back(entry->second);
+        if (!is_new) continue;
+        const Eigen::Vector3f& at = mesh.vertices[corner.vertex];
+        positions.insert(positions.end(), {at.x(), at.y(), at.z()});
+        uvs.insert(uvs.end(), {uv.x(), uv.y()});
+        if (!shaded) continue;
+        Eigen::Vector3f n = mesh.normals[corner.vertex];
+        n = n.norm() > 0 ? Eigen::Vector3f(n.normalized()) : Eigen::Vector3f::UnitZ();
+        normals.insert(normals.end(), {n.x(), n.y(), n.z()});
+      }
+    }
+    Json attributes{{"POSITION", accessor(positions, "VEC3", kFloat, kVertices)},
+                    {"TEXCOORD_0", accessor(uvs, "VEC2", kFloat, kVertices)}};
+    if (shaded) attributes["NORMAL"] = accessor(normals, "VEC3", kFloat, kVertices);
+    add_bounds(positions, gltf_["accessors"][attributes["POSITION"].get<std::size_t>()]);
+    return {{"attributes", attributes}, {"indices", accessor(indices, "SCALAR", kUint32, kIndices)}};
+  }
+
+  static void add_bounds(const std::vector<float>& positions, Json& accessor) {
+    Eigen::AlignedBox3f box;
+    for (std::size_t i = 0; i < positions.size(); i += 3) box.extend(Eigen::Map<const Eigen::Vector3f>(&positions[i]));
+    accessor["min"] = {box.min().x(), box.min().y(), box.min().z()};
+    accessor["max"] = {box.max().x(), box.max().y(), box.max().z()};
+  }
+
+  template <typename T>
+  std::size_t accessor(const std::vector<T>& numbers, const char* type, int component, int target) {
+    const std::size_t per_item = std::strcmp(type, "SCALAR") == 0 ? 1 : static_cast<std::size_t>(type[3] - '0');
+    const auto view = add_view({reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(T)}, target);
+    gltf_["accessors"].push_back(
+        {{"bufferView", view}, {"componentType", component}, {"count", numbers.size() / per_item}, {"type", type}});
+    return gltf_["accessors"].size() - 1;
+  }
+
+  std::size_t add_view(std::string_view bytes, std::optional<int> target) {
+    binary_.resize((binary_.size() + 3) / 4 * 4, '\0');
+    Json view{{"buffer", 0}, {"byteOffset", binary_.size()}, {"byteLength", bytes.size()}};
+    if (target) view["target"] = *target;
+    binary_ += bytes;
+    gltf_["bufferViews"].push_back(std::move(view));
+    return gltf_["bufferViews"].size() - 1;
+  }
+
+  std::size_t material_of(const Mesh& mesh, std::uint32_t index) {
+    const auto channels = in_colour(mesh, index);
+    const auto [entry, is_new] = materials_.try_emplace(channels, gltf_["materials"].size());
+    if (!is_new) return entry->second;
+    const bool unlit = !lit_ || channels[0]->unlit;
+    Look base = base_of(channels), emission = emission_of(channels);
+    if (unlit && is_dark(base)) std::swap(base, emission);
+    Json surface{{"baseColorFactor", factor(base, 1)}, {"metallicFactor", 0}, {"roughnessFactor", 1}};
+    if (const auto texture = texture_of(base)) surface["baseColorTexture"] = {{"index", *texture}};
+    Json material{{"name", mesh.materials[index].name}, {"doubleSided", true}, {"pbrMetallicRoughness", surface}};
+    if (unlit) material["extensions"] = {{"KHR_materials_unlit", Json::object()}};
+    if (!unlit && !is_dark(emission)) {
+      material["emissiveFactor"] = factor(emission, std::nullopt);
+      if (const auto texture = texture_of(emission)) material["emissiveTexture"] = {{"index", *texture}};
+    }
+    gltf_["materials"].push_back(std::move(material));
+    return entry->second;
+  }
+
+  static Json factor(const Look& look, std::optional<double> alpha) {
+    Json numbers = Json::array();
+    for (const double value : look.factor) numbers.push_back(std::clamp(value, 0.0, 1.0));
+    if (alpha) numbers.push_back(*alpha);
+    return numbers;
+  }
+
+  std::optional<std::size_t> texture_of(const Look& look) {
+    if (look.texture[0] == nullptr || look.texture[1] == nullptr || look.texture[2] == nullptr) return std::nullopt;
+    const auto [entry, is_new] = textures_.try_emplace(look.texture, gltf_["textures"].size());
+    if (!is_new) return entry->second;
+    Planes planes;
+    for (const Texture* texture : look.texture) planes.push_back(texture->texels());
+    const std::size_t view = add_view(make_jpeg(planes, kLongestTexture), std::nullopt);
+    const auto wrap = [](Wrap w) { return w == Wrap::repeat ? kRepeat : kClamp; };
+    gltf_["images"].push_back({{"bufferView", view}, {"mimeType", "image/jpeg"}});
+    gltf_["samplers"].push_back(
+        {{"wrapS", wrap(look.texture[0]->wrap_u())}, {"wrapT", wrap(look.texture[0]->wrap_v())}});
+    gltf_["textures"].push_back({{"source", gltf_["images"].size() - 1}, {"sampler", gltf_["samplers"].size() - 1}});
+    return entry->second;
+  }
+
+  bool lit_;
+  Json gltf_{{"asset", {{"version", "2.0"}, {"generator", "esim"}}}, {"scene", 0}};
+  std::string binary_;
+  Json roots_ = Json::array();
+  std::vector<std::string> names_;
+  std::map<PerColour<const Material*>, std::size_t> materials_;
+  std::map<PerColour<const Texture*>, std::size_t> textures_;
+};
+
+}  // namespace
+
+std::string make_jpeg(const Planes& linear, int longest) {
+  std::vector<Image<std::uint8_t>> channels;
+  for (const Image<float>& plane : linear) channels.push_back(encode_srgb(at_most(plane, longest)));
+  const Image<std::uint8_t>&red = channels.front(), &green = channels[channels.size() / 2], &blue = channels.back();
+  cv::Mat bgr(red.height(), red.width(), CV_8UC3);
+  for (int y = 0; y < red.height(); ++y) {
+    auto* out = bgr.ptr<cv::Vec3b>(y);
+    for (int x = 0; x < red.width(); ++x) out[x] = {blue(x, y), green(x, y), red(x, y)};
+  }
+  constexpr int kQuality = 90;
+  std::vector<unsigned char> jpeg;
+  cv::imencode(".jpg", bgr, jpeg, {cv::IMWRITE_JPEG_QUALITY, kQuality});
+  return {jpeg.begin(), jpeg.end()};
+}
+
+Glb make_glb(const Scene& scene) { return Writer(scene).finish(); }
+
+}  // namespace esim::studio

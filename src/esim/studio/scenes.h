@@ -1,0 +1,76 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "esim/compose/scene_pictures.h"
+#include "esim/studio/glb.h"
+
+namespace esim::studio {
+
+/// What a renderer shows, loaded, and as a browser draws it.
+class StudioScene {
+ public:
+  StudioScene(const Scenario& scenario, std::string id, int threads);
+
+  const std::string& id() const { return id_; }
+  const SceneFile& file() const { return pictures_.scene(); }
+  bool on_sensor() const { return pictures_.traits().on_sensor; }
+
+  /// Of meshes; nothing of others, and where there are more triangles than a browser is asked to draw.
+  const std::optional<Glb>& glb() const { return glb_; }
+
+  /// Of panoramas and planes: a JPEG.
+  const std::optional<std::string>& texture() const { return texture_; }
+  double texture_aspect() const { return texture_aspect_; }  ///< height / width
+
+  std::size_t triangles() const;
+
+  /// ScenePictures::render, from any thread.
+  Image<Rgb> render(const Camera& camera, const RenderRequest& view);
+
+ private:
+  std::string id_;
+  std::mutex mutex_;
+  ScenePictures pictures_;
+  std::optional<Glb> glb_;
+  std::optional<std::string> texture_;
+  double texture_aspect_ = 1;
+};
+
+/// The scenes that were looked at last.
+class SceneStore {
+ public:
+  explicit SceneStore(int threads) : threads_(threads) {}
+
+  /// Loads what a scenario shows, unless that has been done and its files have not changed since. Throws UserError
+  /// where it cannot be loaded, and for engines, which render in recordings only.
+  std::shared_ptr<StudioScene> of(const Scenario& scenario);
+
+  /// Null where it has been forgotten.
+  std::shared_ptr<StudioScene> find(const std::string& id);
+
+ private:
+  int threads_;
+  std::mutex mutex_;
+  std::map<std::string, std::shared_ptr<StudioScene>> scenes_;  // by id
+  std::vector<std::string> order_;                              // the latest last
+};
+
+/// Where the body and what moves are, as the simulator has them.
+struct StudioMotion {
+  std::shared_ptr<const Trajectory> body;
+  TimeSpan simulated;
+  std::vector<std::shared_ptr<const Trajectory>> objects;  ///< over the simulated time
+  std::vector<std::string> names;                          ///< of the objects
+};
+
+StudioMotion motion_of(const Scenario& scenario, const SceneFile& scene);
+
+/// The first camera, as it is simulated.
+CameraInfo camera_of(const Scenario& scenario, const SceneFile& scene);
+
+}  // namespace esim::studio

@@ -1,0 +1,134 @@
+import { Signal } from "../ui/signal.ts";
+
+/** An answer of the server that is not a success; `where` is the option that it is about. */
+export class ApiError extends Error {
+  constructor(
+    message: string,
+    readonly status: number,
+    readonly where: string | undefined,
+    /** The whole answer: a conflict carries the file's present text. */
+    readonly body: Record<string, unknown>,
+  ) {
+    super(message);
+  }
+}
+
+/** The server did not answer at all. */
+export class ServerGone extends Error {
+  constructor() {
+    super("The server does not answer. The page goes on trying; what you design stays here.");
+  }
+}
+
+export type Connection = "there" | "gone" | "denied";
+export const connection = new Signal<Connection>("there");
+
+const retry_ms = 1000;
+let retrying = false;
+
+/** Asks for the session until the server answers again. */
+async function waitForServer(): Promise<void> {
+  if (retrying) return;
+  retrying = true;
+  while (connection.value === "gone") {
+    await new Promise((resolve) => setTimeout(resolve, retry_ms));
+    try {
+      const answer = await fetch("/api/session");
+      connection.set(answer.status === 401 ? "denied" : "there");
+    } catch {
+      // still gone
+    }
+  }
+  retrying = false;
+}
+
+/** Tells that the server went away, also where this was not seen by a request of this file. */
+export function serverIsGone(): void {
+  if (connection.value !== "gone") connection.set("gone");
+  void waitForServer();
+}
+
+async function failure(answer: Response): Promise<ApiError> {
+  let body: Record<string, unknown> = {};
+  try {
+    body = (await answer.json()) as Record<string, unknown>;
+  } catch {
+    // no JSON: the status must do
+  }
+  const text =
+    typeof body["error"] === "string" ? body["error"] : `the server answered ${answer.status} ${answer.statusText}`;
+  return new ApiError(text, answer.status, typeof body["where"] === "string" ? body["where"] : undefined, body);
+}
+
+async function request(path: string, init: RequestInit): Promise<Response> {
+  let answer: Response;
+  try {
+    answer = await fetch(path, init);
+  } catch (error) {
+    if (error instanceof DOMException && error.name === "AbortError") throw error;
+    serverIsGone();
+    throw new ServerGone();
+  }
+  if (answer.status === 401) connection.set("denied");
+  else if (connection.value !== "there") connection.set("there");
+  if (!answer.ok) throw await failure(answer);
+  return answer;
+}
+
+export type Query = Record<string, string | number | boolean | undefined>;
+
+/** A path with its query. */
+export function url(path: string, query: Query = {}): string {
+  const parts = new URLSearchParams();
+  for (const [name, value] of Object.entries(query)) if (value !== undefined) parts.set(name, String(value));
+  const text = parts.toString();
+  return text ? `${path}?${text}` : path;
+}
+
+export async function getJson<T>(path: string, query?: Query, signal?: AbortSignal): Promise<T> {
+  return (await (await request(url(path, query), { signal: signal ?? null })).json()) as T;
+}
+
+export async function sendJson<T>(
+  method: "POST" | "PUT" | "DELETE",
+  path: string,
+  body: unknown,
+  signal?: AbortSignal,
+): Promise<T> {
+  const answer = await request(path, {
+    method,
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(body),
+    signal: signal ?? null,
+  });
+  const text = await answer.text();
+  return (text ? JSON.parse(text) : {}) as T;
+}
+
+export async function getBytes(path: string, query: Query, signal?: AbortSignal): Promise<ArrayBuffer> {
+  return (await request(url(path, query), { signal: signal ?? null })).arrayBuffer();
+}
+
+/** A picture and the time that it was taken at (X-Time-Ns), where the server says so. */
+export async function getPicture(
+  path: string,
+  query: Query,
+  signal?: AbortSignal,
+): Promise<{ picture: ImageBitmap; time_ns: number | null }> {
+  return asPicture(await request(url(path, query), { signal: signal ?? null }));
+}
+
+export async function postForPicture(path: string, body: unknown, signal?: AbortSignal): Promise<ImageBitmap> {
+  const answer = await request(path, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(body),
+    signal: signal ?? null,
+  });
+  return (await asPicture(answer)).picture;
+}
+
+async function asPicture(answer: Response): Promise<{ picture: ImageBitmap; time_ns: number | null }> {
+  const time = answer.headers.get("X-Time-Ns");
+  return { picture: await createImageBitmap(await answer.blob()), time_ns: time === null ? null : Number(time) };
+}

@@ -1,0 +1,152 @@
+/** What the server speaks: docs/studio-api.md. Times in nanoseconds, lengths in metres, poses x y z qx qy qz qw. */
+
+export type Pose = [number, number, number, number, number, number, number];
+export type Json = null | boolean | number | string | Json[] | { [key: string]: Json };
+export type JsonMap = { [key: string]: Json };
+
+export interface Session {
+  version: string;
+  opened: { kind: "scenario" | "scene" | "recording" | "nothing"; path: string };
+  roots: { name: string }[];
+  cores: number;
+}
+
+export interface FileEntry {
+  name: string;
+  path: string;
+  kind: "folder" | "scenario" | "scene" | "recording" | "image" | "trajectory" | "other";
+  bytes: number;
+}
+
+export interface Problem {
+  where: string;
+  what: string;
+}
+
+export interface ScenarioState {
+  yaml: string;
+  values: JsonMap;
+  problems: Problem[];
+}
+
+export interface SchemaNode {
+  name?: string;
+  kind: string;
+  help?: string;
+  unit?: string;
+  low?: number;
+  high?: number;
+  positive?: boolean;
+  default?: Json;
+  choices?: string[];
+  members?: SchemaNode[];
+  tag?: string;
+  options?: SchemaNode[];
+  element?: SchemaNode;
+  optional?: boolean;
+  /** Of a vector. */
+  size?: number;
+}
+
+export interface Preset {
+  name: string;
+  help: string;
+  values: JsonMap;
+}
+
+export interface CameraModel {
+  name: string;
+  width: number;
+  height: number;
+  fx: number;
+  fy: number;
+  cx: number;
+  cy: number;
+  T_body_camera: Pose;
+}
+
+export interface SceneInfo {
+  kind: "mesh" | "panorama" | "plane" | "layers" | "engine";
+  glb: string | null;
+  texture: string | null;
+  triangles: number;
+  /** Of what stands still; null where there is none. */
+  bounds: [[number, number, number], [number, number, number]] | null;
+  camera: CameraModel;
+  objects: { name: string; glb_node: string; moving: boolean }[];
+  world?: {
+    plane?: { pose: Pose; width_m: number; height_m: number; endless: boolean };
+    panorama?: { orientation: [number, number, number, number] };
+  };
+  /** T_world_camera of a view that shows the scene. */
+  start?: Pose;
+}
+
+export interface Trajectory {
+  start: number;
+  end: number;
+  t: number[];
+  poses: Pose[];
+  speed_m_per_s: number[];
+  turn_deg_per_s: number[];
+  acceleration: number[];
+  warnings: { from: number; to: number; what: string }[];
+  waypoints: { pose: Pose; t: number }[] | null;
+  objects: { name: string; t: number[]; poses: Pose[] }[];
+}
+
+export interface RunState {
+  id: string;
+  scenario: string;
+  out: string;
+  state: "waiting" | "running" | "done" | "failed" | "cancelled";
+  error?: string;
+  /** Null where nothing was kept. */
+  recording?: string | null;
+  t?: number;
+  start?: number;
+  end?: number;
+  /** The scene is still being read. */
+  loading?: boolean;
+  samples?: number;
+  events?: number;
+  elapsed_s?: number;
+  left_s?: number | null;
+}
+
+export interface RecordingInfo {
+  id: string;
+  path: string;
+  format: string;
+  incomplete: boolean;
+  note?: string;
+  start: number;
+  end: number;
+  cameras: {
+    name: string;
+    width: number;
+    height: number;
+    events: number;
+    has: { events: boolean; images: boolean; depth: boolean; flow: boolean };
+    /** What the colours of depth go from and to [m]. */
+    depth_m?: [number, number];
+    /** The speed whose colour is saturated. */
+    flow_px_per_s?: number;
+  }[];
+  imu: boolean;
+  poses: boolean;
+  indexing?: number;
+}
+
+export interface Rate {
+  from: number;
+  to: number;
+  on: number[];
+  off: number[];
+}
+
+export interface ImuData {
+  t: number[];
+  angular_velocity: [number, number, number][];
+  linear_acceleration: [number, number, number][];
+}

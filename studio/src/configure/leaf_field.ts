@@ -1,0 +1,146 @@
+import type { Json, SchemaNode } from "../api/types.ts";
+import { button, h } from "../ui/dom.ts";
+import { shortNumber } from "../ui/format.ts";
+import { type FieldView, type FormContext, idOf } from "./field.ts";
+import { rangeText, readValue, relativePath, valueText } from "./field_text.ts";
+
+/** One value: typed, ticked or chosen. */
+export class LeafField implements FieldView {
+  readonly element: HTMLElement;
+  private inputs: (HTMLInputElement | HTMLSelectElement)[] = [];
+  private reset: HTMLButtonElement;
+  private problem = h("span", { class: "problem", attrs: { role: "alert" } });
+  private own = "";
+
+  constructor(
+    private node: SchemaNode,
+    private where: string,
+    private context: FormContext,
+  ) {
+    const id = idOf(where);
+    const control = this.makeControl(id);
+    this.reset = button("", () => this.set(null), { icon: "undo", class: "plain small", title: "Back to the default" });
+    const range = rangeText(node);
+    this.element = h(
+      "div",
+      { class: "option" },
+      h(
+        "label",
+        { class: "option-name", attrs: { for: id } },
+        h("code", { text: node.name ?? where.split(".").at(-1)! }),
+        h("span", { class: "quiet", text: node.help ?? "" }),
+      ),
+      control,
+      h("span", { class: "option-range quiet", text: range }),
+      this.reset,
+      this.problem,
+    );
+  }
+
+  private makeControl(id: string): HTMLElement {
+    const { node } = this;
+    const described = {
+      "aria-describedby": `${id}-problem`,
+      "aria-label": `${this.where}${node.unit ? `, ${node.unit}` : ""}`,
+    };
+    this.problem.id = `${id}-problem`;
+    if (node.kind === "boolean" || node.kind === "choice") {
+      const choices = node.kind === "boolean" ? ["true", "false"] : (node.choices ?? []);
+      const select = h(
+        "select",
+        { id, attrs: described, on: { change: () => this.choose(select.value) } },
+        h("option", { value: "" }),
+        ...choices.map((choice) => h("option", { value: choice, text: choice })),
+      );
+      this.inputs = [select];
+      return h("span", { class: "option-control" }, select);
+    }
+    const many = node.kind === "vector" ? (node.size ?? 3) : 1;
+    for (let i = 0; i < many; ++i) {
+      const label = many > 1 ? `${this.where} ${i + 1}` : described["aria-label"];
+      const input = h("input", {
+        id: i === 0 ? id : `${id}-${i}`,
+        attrs: { ...described, "aria-label": label, spellcheck: "false", autocomplete: "off" },
+        on: { change: () => this.typed() },
+      });
+      this.inputs.push(input);
+    }
+    const browse =
+      node.kind === "path" && button("…", () => void this.browse(), { class: "small", title: "Choose a file" });
+    return h(
+      "span",
+      { class: `option-control${many > 1 ? " many" : node.kind === "path" || node.kind === "text" ? " long" : ""}` },
+      ...this.inputs,
+      node.unit ? h("span", { class: "field-unit", text: node.unit }) : null,
+      browse || null,
+    );
+  }
+
+  private set(value: Json): void {
+    this.own = "";
+    const { document } = this.context;
+    if (value === null && document.get(this.where) === undefined) return this.update();
+    document.edit(`Change ${this.where}`, [{ where: this.where, value }], this.where);
+  }
+
+  private choose(text: string): void {
+    this.set(text === "" ? null : this.node.kind === "boolean" ? text === "true" : text);
+  }
+
+  private async browse(): Promise<void> {
+    const path = await this.context.chooseFile();
+    if (path) this.set(relativePath(this.context.document.dir, path));
+  }
+
+  private typed(): void {
+    const { node } = this;
+    const texts = this.inputs.map((input) => input.value);
+    if (texts.every((text) => text.trim() === "")) return this.set(null);
+    const element = node.kind === "vector" ? { ...node, kind: "number" } : node;
+    const held = this.context.defaultOf(this.where, node);
+    const read = texts.map((text, i) =>
+      text.trim() === "" && Array.isArray(held) ? { value: held[i]! } : readValue(element, text),
+    );
+    const wrong = read.find((one): one is { problem: string } => "problem" in one);
+    this.own = wrong?.problem ?? "";
+    if (wrong) return this.showProblem();
+    const values = read.map((one) => (one as { value: Json }).value);
+    this.set(node.kind === "vector" ? values : values[0]!);
+  }
+
+  update(): void {
+    const value = this.context.document.get(this.where);
+    const held = this.context.defaultOf(this.where, this.node);
+    this.inputs.forEach((input, i) => {
+      const own = valueText(Array.isArray(value) && this.node.kind === "vector" ? value[i] : value);
+      const preset = valueText(Array.isArray(held) ? held[i] : held);
+      if (input instanceof HTMLSelectElement) {
+        input.options[0]!.text = preset === "" ? "unset" : `${preset} (default)`;
+        input.value = own;
+      } else if (!this.own) {
+        if (
+          document.activeElement !== input ||
+          input.value.trim() === "" ||
+          this.context.document.get(this.where) !== undefined
+        )
+          input.value = own;
+        input.placeholder =
+          (typeof held === "number" ? shortNumber(held) : preset) || (this.node.optional ? "unset" : "");
+      }
+    });
+    this.element.classList.toggle("given", value !== undefined);
+    this.reset.classList.toggle("unseen", value === undefined);
+    this.showProblem();
+  }
+
+  private showProblem(): void {
+    const reported = this.context.document.problems.filter(
+      ({ where }) => where === this.where || where.startsWith(`${this.where}.`),
+    );
+    this.problem.textContent = this.own || reported.map(({ what }) => what).join("; ");
+    for (const input of this.inputs) {
+      input.classList.toggle("invalid", this.problem.textContent !== "");
+      input.setAttribute("aria-invalid", String(this.problem.textContent !== ""));
+    }
+  }
+}

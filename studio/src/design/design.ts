@@ -1,0 +1,190 @@
+import type { ScenarioDocument } from "../document/document.ts";
+import type { Place } from "../ui/place.ts";
+import { h, Segmented } from "../ui/dom.ts";
+import { count, shortNumber } from "../ui/format.ts";
+import { NumberField } from "../ui/number_field.ts";
+import { addShortcuts } from "../ui/shortcuts.ts";
+import type { ClickMode } from "./dropping.ts";
+import { Inspector } from "./inspector.ts";
+import { DesignState } from "./state.ts";
+import { Timeline } from "./timeline.ts";
+import { Viewport } from "./viewport.ts";
+import { WaypointPanel } from "./waypoint_panel.ts";
+
+/** Where the motion is designed: the scene, its way points, and the time line. */
+export class DesignPlace implements Place {
+  readonly element: HTMLElement;
+  readonly state: DesignState;
+  private viewport: Viewport;
+  private timeline: Timeline;
+
+  constructor(document: ScenarioDocument) {
+    this.state = new DesignState(document);
+    this.viewport = new Viewport(this.state);
+    this.timeline = new Timeline(this.state, () => this.viewport.stage.invalidate());
+    const waypoints = new WaypointPanel(this.state, (index) => this.viewport.goTo(index));
+    const inspector = new Inspector(this.state);
+    this.element = h(
+      "main",
+      { class: "place design", attrs: { "aria-label": "Design" } },
+      h("div", { class: "view" }, this.toolbar(), this.viewport.stage.element),
+      h("aside", { class: "panel", attrs: { "aria-label": "Way points" } }, waypoints.element, inspector.element),
+      this.timeline.element,
+    );
+    this.shortcuts(waypoints);
+  }
+
+  show(visible: boolean): void {
+    this.element.hidden = !visible;
+    this.state.active = visible;
+    if (!visible) this.state.playing.set(false);
+    if (visible) {
+      void this.state.refresh();
+      this.viewport.stage.invalidate();
+    }
+  }
+
+  private toolbar(): HTMLElement {
+    const { viewport, state } = this;
+    const above = new NumberField({
+      label: "Height of the way point above the clicked surface",
+      unit: "m",
+      step: 0.1,
+      change: (value) => (viewport.dropper.height_above_m = value ?? 1.4),
+    });
+    above.set(viewport.dropper.height_above_m);
+    above.element.classList.add("hidden");
+    const click = new Segmented<ClickMode>(
+      "A click drops a way point",
+      [
+        { value: "aim", label: "Aimed at click", title: "Where you are, aimed at the point that is clicked" },
+        { value: "along", label: "Along view", title: "Where you are, looking as you look" },
+        {
+          value: "above",
+          label: "Above click",
+          title: "Above the surface that is clicked, looking as you look",
+        },
+      ],
+      "aim",
+      (mode) => {
+        viewport.dropper.mode = mode;
+        above.element.classList.toggle("hidden", mode !== "above");
+      },
+    );
+    const gizmo = new Segmented<"translate" | "rotate">(
+      "Handles",
+      [
+        { value: "translate", label: "Move", title: "Drag the selected way point (T)" },
+        { value: "rotate", label: "Rotate", title: "Turn the selected way point (R)" },
+      ],
+      "translate",
+      (mode) => (viewport.gizmoMode = mode),
+    );
+    this.setGizmo = (mode) => {
+      gizmo.set(mode);
+      viewport.gizmoMode = mode;
+    };
+    const drag = new Segmented<"look" | "orbit">(
+      "Dragging the picture",
+      [
+        {
+          value: "look",
+          label: "Look",
+          title: "Dragging looks around; right button orbits, middle or Shift pans, wheel moves",
+        },
+        {
+          value: "orbit",
+          label: "Orbit",
+          title: "Dragging turns about what is under the pointer; right button looks around",
+        },
+      ],
+      "look",
+      (mode) => (viewport.navigation.dragMode = mode),
+    );
+    const speed = h("span", { class: "quiet fly-speed", title: "Speed of flying (+ and -)" });
+    viewport.navigation.speed_m_per_s.watch((value) => (speed.textContent = `Fly ${shortNumber(value, 2)} m/s`));
+    const size = h("span", { class: "quiet triangles" });
+    state.scene.listen((info) => (size.textContent = info?.triangles ? `${count(info.triangles)} triangles` : ""));
+    return h(
+      "div",
+      { class: "toolbar row", attrs: { role: "toolbar", "aria-label": "View" } },
+      h("span", { class: "quiet", text: "Drop" }),
+      click.element,
+      above.element,
+      gizmo.element,
+      drag.element,
+      h("span", { class: "grow" }),
+      size,
+      speed,
+    );
+  }
+
+  private setGizmo: (mode: "translate" | "rotate") => void = () => undefined;
+
+  private shortcuts(waypoints: WaypointPanel): void {
+    const here = (act: (event: KeyboardEvent) => void) => (event: KeyboardEvent) => {
+      if (this.element.hidden) return false;
+      act(event);
+      return true;
+    };
+    const inView = (act: () => void) => (event: KeyboardEvent) => {
+      if (this.element.hidden || (event.target !== this.viewport.stage.element && event.target !== document.body))
+        return false;
+      act();
+      return true;
+    };
+    const select = (step: number) => {
+      const last = (this.state.points?.length ?? 0) - 1;
+      if (last >= 0) this.state.selected.set(Math.min(last, Math.max(0, this.state.selected.value + step)));
+    };
+    addShortcuts(
+      { group: "Design: view", keys: "W A S D", help: "fly forward, left, back, right (Shift: faster)" },
+      { group: "Design: view", keys: "Q E", help: "down and up" },
+      { group: "Design: view", keys: "← → ↑ ↓", help: "turn, look up and down" },
+      { group: "Design: view", keys: "+ or -", help: "fly faster, slower" },
+      {
+        group: "Design: view",
+        keys: "V",
+        help: "focus the view",
+        act: here(() => this.viewport.stage.element.focus()),
+      },
+      {
+        group: "Design: view",
+        keys: "C",
+        help: "look through the camera",
+        act: here(() => this.viewport.eye.setLarge(!this.viewport.eye.large)),
+      },
+      {
+        group: "Design: way points",
+        keys: "Space",
+        help: "drop one that looks along the view",
+        act: inView(() => this.viewport.dropper.drop(false)),
+      },
+      {
+        group: "Design: way points",
+        keys: "Shift+Space or Enter",
+        help: "drop one aimed at the middle of the view",
+        act: inView(() => this.viewport.dropper.drop(true)),
+      },
+      { group: "Design: way points", keys: "N", help: "select the next one", act: here(() => select(1)) },
+      { group: "Design: way points", keys: "B", help: "select the one before", act: here(() => select(-1)) },
+      {
+        group: "Design: way points",
+        keys: "G",
+        help: "go to the selected one",
+        act: here(() => this.viewport.goTo(this.state.selected.value)),
+      },
+      { group: "Design: way points", keys: "T", help: "handles move", act: here(() => this.setGizmo("translate")) },
+      { group: "Design: way points", keys: "R", help: "handles rotate", act: here(() => this.setGizmo("rotate")) },
+      {
+        group: "Design: way points",
+        keys: "Delete",
+        help: "remove the selected one",
+        act: inView(() => waypoints.remove()),
+      },
+      { group: "Design: way points", keys: "Alt+↑ or Alt+↓", help: "reorder, in the list" },
+      { group: "Design: time", keys: "P", help: "play the flight, pause", act: here(() => this.timeline.togglePlay()) },
+      { group: "Design: time", keys: "← or →", help: "step, on the time line (Shift: further)" },
+    );
+  }
+}

@@ -1,0 +1,185 @@
+import { ApiError, connection, ServerGone } from "../api/http.ts";
+import * as server from "../api/server.ts";
+import type { Json, JsonMap, Problem, ScenarioState } from "../api/types.ts";
+import { Signal } from "../ui/signal.ts";
+import { complain } from "../ui/status.ts";
+import { History } from "./history.ts";
+import { getIn, setIn } from "./values.ts";
+
+/** One state of the design. Its text comes from the server, a moment after its values. */
+export interface Revision {
+  values: JsonMap;
+  problems: Problem[];
+  /** Null while the server has not written it. */
+  yaml: string | null;
+  /** The text, as soon as it is there. */
+  settled: Promise<string>;
+}
+
+export interface Change {
+  where: string;
+  value: Json;
+}
+
+function revisionOf(state: ScenarioState): Revision {
+  return { ...state, settled: Promise.resolve(state.yaml) };
+}
+
+async function untilConnected(): Promise<void> {
+  if (connection.value === "there") return;
+  await new Promise<void>((resolve) => {
+    const stop = connection.listen((now) => {
+      if (now !== "there") return;
+      stop();
+      resolve();
+    });
+  });
+}
+
+/** Asks until there is an answer, however long the server is away. */
+async function persistently<T>(question: () => Promise<T>): Promise<T> {
+  for (;;) {
+    try {
+      return await question();
+    } catch (error) {
+      if (!(error instanceof ServerGone)) throw error;
+      await untilConnected();
+    }
+  }
+}
+
+/** The scenario that is designed: its text, its values, its past. Every part of the page edits it through here. */
+export class ScenarioDocument {
+  /** Notified at every change of the current revision or of what is known of it. */
+  readonly changed: Signal<Revision>;
+  /** Where it is saved, and what stood there when it was read; null for one that has never been saved. */
+  path: string | null = null;
+  onDisk: string | null = null;
+  private savedYaml: string | null = null;
+  private untitledFolder = "";
+  private history: History<Revision>;
+
+  constructor() {
+    const empty = revisionOf({ yaml: "", values: {}, problems: [] });
+    this.history = new History(empty);
+    this.changed = new Signal(empty);
+  }
+
+  get revision(): Revision {
+    return this.history.current;
+  }
+  get values(): JsonMap {
+    return this.revision.values;
+  }
+  get problems(): Problem[] {
+    return this.revision.problems;
+  }
+  get undoLabel(): string | null {
+    return this.history.undoLabel;
+  }
+  get redoLabel(): string | null {
+    return this.history.redoLabel;
+  }
+
+  /** In which relative paths begin. */
+  get dir(): string {
+    return this.path === null ? this.untitledFolder : this.path.split("/").slice(0, -1).join("/");
+  }
+
+  get dirty(): boolean {
+    return this.revision.yaml === null || this.revision.yaml !== this.savedYaml;
+  }
+
+  get(where: string): Json | undefined {
+    return getIn(this.values, where);
+  }
+
+  /** What the server works on: the present text. */
+  async source(): Promise<server.Source> {
+    return { yaml: await this.revision.settled, dir: this.dir };
+  }
+
+  /** Begins with another scenario: the past is forgotten. */
+  begin(state: ScenarioState, path: string | null, onDisk: string | null, folder: string): void {
+    this.path = path;
+    this.onDisk = onDisk;
+    this.savedYaml = path === null ? null : state.yaml;
+    this.untitledFolder = folder;
+    this.history = new History(revisionOf(state));
+    this.show();
+  }
+
+  saved(path: string, onDisk: string, yaml: string): void {
+    this.path = path;
+    this.onDisk = onDisk;
+    this.savedYaml = yaml;
+    this.show();
+  }
+
+  /** Sets options, seen at once; the server then writes the text. Edits with the same `merge` in a row are one step of undo. */
+  edit(label: string, changes: Change[], merge: string | null = null): void {
+    const base = this.revision;
+    let values = base.values;
+    for (const { where, value } of changes) values = setIn(values, where, value);
+    const settled = base.settled.then((yaml) =>
+      persistently(() => server.editScenario({ yaml, dir: this.dir }, changes)),
+    );
+    this.push(
+      { values, problems: base.problems, yaml: null, settled: settled.then((state) => state.yaml) },
+      settled,
+      label,
+      merge,
+    );
+  }
+
+  /** Takes a text as it was typed. */
+  type(yaml: string): void {
+    const base = this.revision;
+    if (base.yaml === yaml) return;
+    const settled = persistently(() => server.checkScenario({ yaml, dir: this.dir })).catch((error: unknown) => {
+      if (!(error instanceof ApiError) || error.status !== 400) throw error;
+      return { yaml, values: base.values, problems: [{ where: error.where ?? "", what: error.message }] };
+    });
+    this.push(
+      { values: base.values, problems: base.problems, yaml, settled: Promise.resolve(yaml) },
+      settled.then((state) => ({ ...state, yaml })),
+      "Edit text",
+      "text",
+    );
+  }
+
+  undo(): void {
+    if (this.history.undo()) this.show();
+  }
+
+  redo(): void {
+    if (this.history.redo()) this.show();
+  }
+
+  /** The next edit is a step of its own. */
+  seal(): void {
+    this.history.seal();
+  }
+
+  private push(revision: Revision, settled: Promise<ScenarioState>, label: string, merge: string | null): void {
+    this.history.push(revision, label, merge);
+    this.show();
+    revision.settled.catch(() => undefined);
+    settled.then(
+      (state) => {
+        Object.assign(revision, { yaml: state.yaml, values: state.values, problems: state.problems });
+        if (this.revision === revision) this.changed.notify();
+      },
+      (error: unknown) => {
+        this.history.drop(revision);
+        complain(error);
+        this.show();
+      },
+    );
+  }
+
+  private show(): void {
+    if (this.changed.value === this.revision) this.changed.notify();
+    else this.changed.set(this.revision);
+  }
+}

@@ -1,0 +1,158 @@
+import { ApiError } from "../api/http.ts";
+import * as server from "../api/server.ts";
+import type { FileEntry } from "../api/types.ts";
+import { ask, type Answer } from "../ui/dialog.ts";
+import { diffLines } from "../ui/diff.ts";
+import { h } from "../ui/dom.ts";
+import { chooseFile } from "../ui/files_dialog.ts";
+import { complain, say } from "../ui/status.ts";
+import type { ScenarioDocument } from "./document.ts";
+
+const draftKey = "esim-studio-draft";
+
+/** Opening, saving, and what to do when somebody else has saved meanwhile. */
+export class ScenarioFile {
+  constructor(
+    private document: ScenarioDocument,
+    private roots: string[],
+  ) {
+    // What is not saved survives a reload of the page.
+    document.changed.listen((revision) => {
+      if (revision.yaml === null) return;
+      if (document.dirty)
+        sessionStorage.setItem(
+          draftKey,
+          JSON.stringify({ path: document.path, yaml: revision.yaml, folder: document.dir }),
+        );
+      else sessionStorage.removeItem(draftKey);
+    });
+    addEventListener("beforeunload", (event) => {
+      if (document.dirty && document.undoLabel !== null) event.preventDefault();
+    });
+  }
+
+  async open(path: string): Promise<void> {
+    const draft = this.draft(path);
+    const read = await server.openScenario(path);
+    this.document.begin(read, path, read.revision, "");
+    if (draft !== null && draft !== read.yaml) {
+      this.document.type(draft);
+      say(`${path}: what was not saved is here again; Ctrl+Z returns to the file`);
+    } else {
+      say(`Opened ${path}`);
+    }
+  }
+
+  async create(scene?: string): Promise<void> {
+    const state = await server.newScenario(scene);
+    const draft = this.draft(null);
+    this.document.begin(state, null, null, state.dir);
+    if (draft !== null) this.document.type(draft);
+  }
+
+  async chooseAndOpen(): Promise<FileEntry | null> {
+    return chooseFile(
+      {
+        title: "Open a scenario, a scene or a recording",
+        kinds: ["scenario", "scene", "recording"],
+        folder: this.document.dir || (this.roots[0] ?? ""),
+        accept: "Open",
+      },
+      this.roots,
+    );
+  }
+
+  /** Whether it was saved. */
+  async save(): Promise<boolean> {
+    return this.document.path === null ? this.saveAs() : this.write(this.document.path, this.document.onDisk, false);
+  }
+
+  async saveAs(): Promise<boolean> {
+    const proposal = this.document.path?.split("/").at(-1) ?? "scenario.yaml";
+    const entry = await chooseFile(
+      {
+        title: "Save the scenario",
+        kinds: ["scenario"],
+        folder: this.document.dir || (this.roots[0] ?? ""),
+        saveAs: proposal,
+        accept: "Save",
+      },
+      this.roots,
+    );
+    if (!entry) return false;
+    const path = /\.ya?ml$/.test(entry.path) ? entry.path : `${entry.path}.yaml`;
+    return this.write(path, path === this.document.path ? this.document.onDisk : null, false);
+  }
+
+  private async write(path: string, onDisk: string | null, overwrite: boolean): Promise<boolean> {
+    const yaml = await this.document.revision.settled;
+    try {
+      const { revision } = await server.saveScenario(path, yaml, onDisk, overwrite);
+      this.document.saved(path, revision, yaml);
+      say(`Saved ${path}`);
+      return true;
+    } catch (error) {
+      if (error instanceof ApiError && error.status === 409) return this.resolve(path, yaml, error);
+      complain(error);
+      return false;
+    }
+  }
+
+  /** The file is not what it was: keep ours, take theirs, or look at both. */
+  private async resolve(path: string, mine: string, conflict: ApiError): Promise<boolean> {
+    const theirs = String(conflict.body["yaml"] ?? "");
+    const revision = String(conflict.body["revision"] ?? "");
+    let answers: Answer<"mine" | "theirs" | "both" | "cancel">[] = [
+      { label: "Cancel", value: "cancel" },
+      { label: "Look at both", value: "both" },
+      { label: "Take theirs", value: "theirs" },
+      { label: "Keep mine", value: "mine", primary: true },
+    ];
+    const why = h("p", {
+      text: `${path} was changed by somebody else since it was opened here, or is there already. Which of the two shall stand in the file?`,
+    });
+    let answer = await ask("Two versions of one file", [why], answers);
+    if (answer === "both") {
+      answers = answers.filter((one) => one.value !== "both");
+      answer = await ask("Two versions of one file", [showBoth(mine, theirs)], answers, { wide: true });
+    }
+    if (answer === "mine") return this.write(path, revision, true);
+    if (answer === "theirs") {
+      this.document.saved(path, revision, theirs);
+      this.document.seal();
+      this.document.type(theirs);
+      say(`${path}: theirs is here; Ctrl+Z brings yours back`);
+      return true;
+    }
+    return false;
+  }
+
+  private draft(path: string | null): string | null {
+    try {
+      const draft = JSON.parse(sessionStorage.getItem(draftKey) ?? "null") as {
+        path: string | null;
+        yaml: string;
+      } | null;
+      return draft && draft.path === path ? draft.yaml : null;
+    } catch {
+      return null;
+    }
+  }
+}
+
+function showBoth(mine: string, theirs: string): HTMLElement {
+  const element = h(
+    "div",
+    { class: "diff" },
+    h("h2", { text: "Mine", class: "mine" }),
+    h("h2", { text: "Theirs, in the file" }),
+  );
+  for (const row of diffLines(mine, theirs)) {
+    const differs = row.same ? "" : " differs";
+    element.append(
+      h("pre", { class: `mine${row.mine === null ? "" : differs}`, text: row.mine ?? "" }),
+      h("pre", { class: row.theirs === null ? "" : differs.trim(), text: row.theirs ?? "" }),
+    );
+  }
+  return element;
+}

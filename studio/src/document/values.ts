@@ -1,0 +1,34 @@
+import type { Json, JsonMap } from "../api/types.ts";
+
+/** The option at a dotted path ("trajectory.points.2.t"), or undefined. */
+export function getIn(values: Json | undefined, where: string): Json | undefined {
+  let at: Json | undefined = values;
+  for (const key of where ? where.split(".") : []) {
+    if (Array.isArray(at)) at = at[Number(key)];
+    else if (at !== null && typeof at === "object") at = at[key];
+    else return undefined;
+  }
+  return at;
+}
+
+/** The values with one option set, or removed by null; what leads there is made where it is missing. Changes nothing in place. */
+export function setIn(values: JsonMap, where: string, value: Json): JsonMap {
+  return set(values, where.split("."), value) as JsonMap;
+}
+
+function set(at: Json | undefined, keys: string[], value: Json): Json {
+  const [key, ...rest] = keys as [string, ...string[]];
+  if (Array.isArray(at)) {
+    const copy = [...at];
+    const i = Number(key);
+    if (rest.length > 0) copy[i] = set(copy[i], rest, value);
+    else if (value === null) copy.splice(i, 1);
+    else copy[i] = value;
+    return copy;
+  }
+  const copy: JsonMap = at !== null && typeof at === "object" ? { ...at } : {};
+  if (rest.length > 0) copy[key] = set(copy[key], rest, value);
+  else if (value === null) delete copy[key];
+  else copy[key] = value;
+  return copy;
+}

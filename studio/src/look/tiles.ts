@@ -1,0 +1,46 @@
+import type { RecordingInfo } from "../api/types.ts";
+
+export type TileKind = "events" | "image" | "depth" | "flow" | "space" | "path";
+
+export const tileNames: Record<TileKind, string> = {
+  events: "Events",
+  image: "Image",
+  depth: "Depth",
+  flow: "Flow",
+  space: "Space-time",
+  path: "Path",
+};
+
+/** What is chosen for all tiles. */
+export interface Display {
+  view: "onoff" | "counts" | "time_surface";
+  over: "image" | "none";
+  /** Span of time whose events are shown [ns]. */
+  window: number;
+  /** Span of time of the cloud [ns]. */
+  span: number;
+}
+
+export interface Tile {
+  readonly element: HTMLElement;
+  /** Shows a time since the recording's start [ns]. */
+  show(time: number): void;
+  dispose(): void;
+}
+
+export interface TileSource {
+  recording: RecordingInfo;
+  camera: RecordingInfo["cameras"][number];
+}
+
+/** Whether a recording can show a tile. */
+export function has(
+  recording: RecordingInfo,
+  camera: RecordingInfo["cameras"][number] | undefined,
+  kind: TileKind,
+): boolean {
+  if (kind === "path") return recording.poses;
+  if (!camera) return false;
+  if (kind === "events" || kind === "space") return camera.has.events;
+  return kind === "image" ? camera.has.images : camera.has[kind];
+}

@@ -1,0 +1,175 @@
+import {
+  BufferAttribute,
+  BufferGeometry,
+  CanvasTexture,
+  Color,
+  Group,
+  LineBasicMaterial,
+  LineSegments,
+  type Matrix4,
+  Sprite,
+  SpriteMaterial,
+  Vector3,
+  type PerspectiveCamera,
+} from "three";
+import type { CameraModel } from "../api/types.ts";
+import { colour } from "../ui/theme.ts";
+import { imageCorners } from "./frames.ts";
+
+/** Lines of a camera's frustum of depth 1 in its own frame: its edges, the image, and a tick for what is up. */
+export function frustumLines(model: CameraModel | null): Float32Array {
+  const origin = new Vector3();
+  if (!model) {
+    // an object: its axes
+    const [x, y, z] = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1)];
+    return flat([origin, x, origin, y, origin, z]);
+  }
+  const corners = imageCorners(model);
+  const [a, b, c, d] = corners as [Vector3, Vector3, Vector3, Vector3];
+  const tick = a.clone().lerp(b, 0.5).addScaledVector(a.clone().sub(d), 0.18);
+  return flat([
+    origin,
+    a,
+    origin,
+    b,
+    origin,
+    c,
+    origin,
+    d,
+    a,
+    b,
+    b,
+    c,
+    c,
+    d,
+    d,
+    a,
+    a.clone().lerp(b, 0.35),
+    tick,
+    tick,
+    a.clone().lerp(b, 0.65),
+  ]);
+}
+
+function flat(points: Vector3[]): Float32Array {
+  return new Float32Array(points.flatMap((point) => point.toArray()));
+}
+
+export interface Marker {
+  /** T_world_camera, or T_world_object. */
+  matrix: Matrix4;
+  label: string;
+  selected: boolean;
+  /** Where the label stands (default: at the frustum's tip). */
+  anchor?: Vector3;
+}
+
+/** Frusta and numbered dots: way points of a motion. */
+export class Markers {
+  readonly group = new Group();
+  private lines = new LineSegments(
+    new BufferGeometry(),
+    new LineBasicMaterial({ vertexColors: true, transparent: true }),
+  );
+  private sprites: Sprite[] = [];
+  private textures = new Map<string, CanvasTexture>();
+  private places: Vector3[] = [];
+
+  constructor() {
+    this.lines.frustumCulled = false;
+    this.lines.renderOrder = 2;
+    this.group.add(this.lines);
+  }
+
+  /** `depth` is how far the frusta reach [m]. */
+  show(markers: Marker[], model: CameraModel | null, depth: number): void {
+    const shape = frustumLines(model);
+    const positions = new Float32Array(markers.length * shape.length);
+    const colours = new Float32Array(positions.length);
+    const [plain, strong] = [new Color(colour("text")), new Color(colour("accent"))];
+    const point = new Vector3();
+    markers.forEach((marker, k) => {
+      const paint = marker.selected ? strong : plain;
+      for (let i = 0; i < shape.length; i += 3) {
+        point
+          .fromArray(shape, i)
+          .multiplyScalar(depth)
+          .applyMatrix4(marker.matrix)
+          .toArray(positions, k * shape.length + i);
+        paint.toArray(colours, k * shape.length + i);
+      }
+    });
+    this.lines.geometry.dispose();
+    this.lines.geometry = new BufferGeometry();
+    this.lines.geometry.setAttribute("position", new BufferAttribute(positions, 3));
+    this.lines.geometry.setAttribute("color", new BufferAttribute(colours, 3));
+    this.places = markers.map((marker) => marker.anchor ?? new Vector3().setFromMatrixPosition(marker.matrix));
+    this.label(markers);
+  }
+
+  private label(markers: Marker[]): void {
+    while (this.sprites.length > markers.length) this.group.remove(this.sprites.pop()!);
+    while (this.sprites.length < markers.length) {
+      const sprite = new Sprite(new SpriteMaterial({ depthTest: false, sizeAttenuation: false, transparent: true }));
+      sprite.renderOrder = 3;
+      this.sprites.push(sprite);
+      this.group.add(sprite);
+    }
+    markers.forEach((marker, i) => {
+      const sprite = this.sprites[i]!;
+      sprite.position.copy(this.places[i]!);
+      sprite.material.map = this.texture(marker.label, marker.selected);
+      sprite.renderOrder = marker.selected ? 4 : 3;
+    });
+  }
+
+  /** Keeps the dots' size on the screen, whatever its height [px] and the camera's field of view. */
+  scale(height_px: number, fov_deg: number): void {
+    const size = (22 / height_px) * 2 * Math.tan((fov_deg * Math.PI) / 360);
+    for (const sprite of this.sprites) sprite.scale.setScalar(size);
+  }
+
+  /** The marker within a few pixels of a point of the picture (-1 to 1), the nearest to it; -1: none. */
+  at(x: number, y: number, camera: PerspectiveCamera, width: number, height: number): number {
+    let [best, nearest] = [-1, 14];
+    const point = new Vector3();
+    this.places.forEach((place, i) => {
+      point.copy(place).project(camera);
+      if (point.z > 1) return;
+      const apart = Math.hypot(((point.x - x) * width) / 2, ((point.y - y) * height) / 2);
+      if (apart < nearest) [best, nearest] = [i, apart];
+    });
+    return best;
+  }
+
+  /** After a change of theme. */
+  forgetColours(): void {
+    for (const texture of this.textures.values()) texture.dispose();
+    this.textures.clear();
+  }
+
+  private texture(label: string, selected: boolean): CanvasTexture {
+    const key = `${label} ${selected}`;
+    const known = this.textures.get(key);
+    if (known) return known;
+    const canvas = document.createElement("canvas");
+    canvas.width = canvas.height = 64;
+    const pen = canvas.getContext("2d")!;
+    pen.beginPath();
+    pen.arc(32, 32, 27, 0, 2 * Math.PI);
+    pen.fillStyle = selected ? colour("accent") : colour("panel");
+    pen.fill();
+    pen.lineWidth = 4;
+    pen.strokeStyle = selected ? colour("accent-text") : colour("text");
+    pen.stroke();
+    pen.fillStyle = selected ? colour("accent-text") : colour("text");
+    pen.font = `600 ${label.length > 2 ? 24 : 32}px system-ui, sans-serif`;
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    pen.fillText(label, 32, 34);
+    const texture = new CanvasTexture(canvas);
+    texture.colorSpace = "srgb";
+    this.textures.set(key, texture);
+    return texture;
+  }
+}

@@ -1,0 +1,77 @@
+import { h } from "./dom.ts";
+import { shortNumber } from "./format.ts";
+
+export interface NumberFieldOptions {
+  label: string;
+  unit?: string;
+  /** Digits shown. */
+  digits?: number;
+  /** What arrow up and down change it by; with Shift tenfold. */
+  step?: number;
+  /** Reads what was typed; NaN: it is not valid. */
+  parse?: (text: string) => number;
+  /** Called with a valid number, or null for an emptied field. */
+  change: (value: number | null) => void;
+}
+
+/** A number with its unit: typed, or stepped by the arrow keys. */
+export class NumberField {
+  readonly element: HTMLElement;
+  readonly input: HTMLInputElement;
+  private value: number | null = null;
+
+  constructor(private options: NumberFieldOptions) {
+    this.input = h("input", {
+      attrs: { "aria-label": options.label, inputmode: "decimal", autocomplete: "off", spellcheck: "false" },
+    });
+    this.element = h(
+      "span",
+      { class: "number-field" },
+      this.input,
+      options.unit ? h("span", { class: "field-unit", text: options.unit }) : null,
+    );
+    this.input.addEventListener("change", () => this.commit());
+    this.input.addEventListener("keydown", (event) => this.key(event));
+    this.input.addEventListener("focus", () => this.input.select());
+  }
+
+  /** Shows a value, unless another one is being typed. */
+  set(value: number | null | undefined, placeholder = ""): void {
+    this.value = value ?? null;
+    this.input.placeholder = placeholder;
+    if (document.activeElement === this.input && this.input.value !== this.text() && this.input.dataset["typing"])
+      return;
+    this.input.value = this.text();
+    this.input.classList.remove("invalid");
+  }
+
+  private text(): string {
+    return this.value === null ? "" : shortNumber(this.value, this.options.digits ?? 6);
+  }
+
+  private commit(): void {
+    delete this.input.dataset["typing"];
+    const text = this.input.value.trim();
+    if (text === this.text()) return;
+    const value = text === "" ? null : (this.options.parse ?? Number)(text);
+    this.input.classList.toggle("invalid", value !== null && Number.isNaN(value));
+    if (value !== null && Number.isNaN(value)) return;
+    this.value = value;
+    this.options.change(value);
+  }
+
+  private key(event: KeyboardEvent): void {
+    const direction = event.key === "ArrowUp" ? 1 : event.key === "ArrowDown" ? -1 : 0;
+    if (event.key === "Enter") this.commit();
+    else if (event.key === "Escape") this.input.value = this.text();
+    else if (direction !== 0 && this.options.step) {
+      event.preventDefault();
+      const step = this.options.step * (event.shiftKey ? 10 : 1);
+      const from = Number(this.input.value || this.input.placeholder) || 0;
+      this.input.value = shortNumber(Math.round((from + direction * step) / step) * step, 9);
+      this.commit();
+    } else if (event.key.length === 1 && !event.ctrlKey && !event.metaKey) {
+      this.input.dataset["typing"] = "1";
+    }
+  }
+}

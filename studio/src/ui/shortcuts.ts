@@ -1,0 +1,42 @@
+import { typing } from "./dom.ts";
+
+export interface Shortcut {
+  /** As it is shown: "Ctrl+Z", "W A S D". */
+  keys: string;
+  help: string;
+  /** Where it works; shown as heading. */
+  group: string;
+  /** Answers whether it took the event; shortcuts that a part of the page handles itself have none. */
+  act?: (event: KeyboardEvent) => boolean | void;
+  /** Works in fields too. */
+  always?: boolean;
+}
+
+const shortcuts: Shortcut[] = [];
+
+export function addShortcuts(...added: Shortcut[]): void {
+  shortcuts.push(...added);
+}
+
+export function allShortcuts(): readonly Shortcut[] {
+  return shortcuts;
+}
+
+/** "Ctrl+Shift+Z" and so on; letters are upper-case, Meta counts as Ctrl. */
+export function keyName(event: KeyboardEvent): string {
+  const plain = event.key.length === 1 ? event.key.toUpperCase() : event.key;
+  const shifted = event.shiftKey && (event.key.length > 1 || /[a-z]/i.test(event.key) || event.key === " ");
+  return `${event.ctrlKey || event.metaKey ? "Ctrl+" : ""}${event.altKey ? "Alt+" : ""}${shifted ? "Shift+" : ""}${plain === " " ? "Space" : plain}`;
+}
+
+document.addEventListener("keydown", (event) => {
+  if (event.defaultPrevented || document.querySelector("dialog[open]")) return;
+  const name = keyName(event);
+  for (const shortcut of shortcuts) {
+    if (!shortcut.act || !shortcut.keys.split(" or ").includes(name) || (typing(event.target) && !shortcut.always))
+      continue;
+    if (shortcut.act(event) === false) continue;
+    event.preventDefault();
+    return;
+  }
+});

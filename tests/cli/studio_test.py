@@ -1,0 +1,512 @@
+"""`esim studio` as a browser meets it, and as what is not a browser does.
+
+Run as: studio_test.py ESIM_PROGRAM SCENES_FOLDER, with the standard library of Python alone.
+"""
+
+import http.client
+import json
+import os
+import pathlib
+import re
+import resource
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+from program import ESIM, ProgramTest, run
+
+SCENES = pathlib.Path(sys.argv[2]).absolute()
+SMALL = """renderer: {type: plane, image: poster/poster.png, width_m: 2, pose: {position: [1, 0, 0], look_at: [3, 0, 0]}}
+trajectory:
+  type: waypoints   # to and fro
+  points:
+    - {position: [0, -0.1, 0], look_at: [1, 0, 0]}
+    - {position: [0, 0.1, 0], look_at: [1, 0, 0]}
+camera: {width: 64, height: 48}
+event_camera: {contrast_threshold: 0.2}
+"""
+
+
+class Server:
+    """A studio on a folder with one small scenario, and a page of one file."""
+
+    def __init__(self, folder, *arguments, **options):
+        self.folder = folder
+        page = folder / "page"
+        page.mkdir(exist_ok=True)
+        (page / "index.html").write_text("<!doctype html><title>page</title>")
+        self.log = open(folder / "log", "w+")
+        self.process = subprocess.Popen([ESIM, "studio", "--page", str(page), "-j", "2", *map(str, arguments)], stdout=subprocess.PIPE,
+                                        stderr=self.log, text=True, **options)
+        self.url = self.process.stdout.readline().strip()
+        found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\?token=([0-9a-f]{48}|\S+)", self.url)
+        if not found:
+            raise AssertionError(f"no address, but {self.url!r}: {open(folder / 'log').read()}")
+        self.port, self.token = int(found[1]), found[2]
+
+    def request(self, method, target, body=None, headers=None, token=True):
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        given = {"Authorization": f"Bearer {self.token}"} if token else {}
+        if body is not None or method != "GET":
+            given["Content-Type"] = "application/json"
+        given.update(headers or {})
+        try:
+            connection.request(method, target, None if body is None else json.dumps(body), given)
+            response = connection.getresponse()
+            return response.status, dict(response.getheaders()), response.read()
+        finally:
+            connection.close()
+
+    def json(self, method, target, body=None, status=200):
+        got, _, content = self.request(method, target, body)
+        if got != status:
+            raise AssertionError(f"{method} {target}: {got} {content[:500]}")
+        return json.loads(content)
+
+    def raw(self, data, wait=5):
+        with socket.create_connection(("127.0.0.1", self.port), timeout=wait) as connection:
+            connection.sendall(data)
+            answer = b""
+            try:
+                while part := connection.recv(65536):
+                    answer += part
+            except (TimeoutError, ConnectionResetError):
+                pass
+            return answer
+
+    def events_of(self, run_id, until):
+        """Messages of a run's stream until one of the kind `until`."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        connection.request("GET", f"/api/runs/{run_id}/stream", headers={"Authorization": f"Bearer {self.token}"})
+        response = connection.getresponse()
+        messages, kind = [], None
+        for line in response:
+            line = line.decode().rstrip("\n")
+            if line.startswith("event: "):
+                kind = line[7:]
+            elif line.startswith("data: "):
+                messages.append((kind, json.loads(line[6:])))
+                if kind in until:
+                    break
+        connection.close()
+        return messages
+
+    def cpu_seconds(self):
+        fields = pathlib.Path(f"/proc/{self.process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    def stop(self, number=signal.SIGINT):
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        status = self.process.wait(timeout=60)
+        if self.log.closed:
+            return status, ""
+        self.process.stdout.close()
+        self.log.seek(0)
+        text = self.log.read()
+        self.log.close()
+        return status, text
+
+
+class StudioTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="esim_studio_test_"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        cls.work = cls.folder / "work"
+        (cls.work / "poster").mkdir(parents=True)
+        image = next((SCENES / "poster").glob("*.[jp][pn]g"))
+        cls.image = f"poster/{image.name}"
+        shutil.copy(image, cls.work / "poster")
+        cls.yaml = SMALL.replace("poster/poster.png", cls.image)
+        (cls.work / "small.yaml").write_text(cls.yaml)
+        (cls.folder / "secret.yaml").write_text("seed: 1\n")
+        cls.server = Server(cls.folder, cls.work / "small.yaml")
+
+    @classmethod
+    def tearDownClass(cls):
+        status, log = cls.server.stop()
+        assert status == 0, (status, log)
+        assert cls.server.token not in log, "the token is in the log"
+
+    def ask(self, method, target, body=None, status=200):
+        return self.server.json(method, target, body, status)
+
+    def scenario(self, **more):
+        return {"yaml": self.yaml, "dir": "work", **more}
+
+
+class Answers(StudioTest):
+    def test_session_and_files(self):
+        session = self.ask("GET", "/api/session")
+        self.assertEqual(session["opened"], {"kind": "scenario", "path": "work/small.yaml"})
+        self.assertEqual(session["roots"], [{"name": "work"}])
+        kinds = {entry["name"]: entry["kind"] for entry in self.ask("GET", "/api/files?dir=work")["entries"]}
+        self.assertEqual(kinds["small.yaml"], "scenario")
+        self.assertEqual(kinds["poster"], "folder")
+
+    def test_the_page_and_its_headers(self):
+        status, headers, body = self.server.request("GET", "/")
+        self.assertEqual((status, body), (200, b"<!doctype html><title>page</title>"))
+        self.assertIn("default-src 'self'", headers["Content-Security-Policy"])
+        self.assertEqual(headers["X-Content-Type-Options"], "nosniff")
+        self.assertEqual(self.server.request("GET", "/api/session")[1]["Cache-Control"], "no-store")
+
+    def test_the_schema_is_that_of_the_program(self):
+        members = {member["name"]: member for member in self.ask("GET", "/api/schema")["members"]}
+        threshold = next(m for m in members["event_camera"]["members"] if m["name"] == "contrast_threshold")
+        self.assertEqual((threshold["kind"], threshold["default"], threshold["low"]), ("number", 0.5, 0.01))
+        names = [option["name"] for option in members["trajectory"]["options"]]
+        self.assertEqual(names, ["file", "random", "static", "scene", "waypoints"])
+        reference = run("options").stdout
+
+        def check(member):
+            if "name" in member:
+                self.assertRegex(reference, rf"(?m)^ *{re.escape(member['name'])}:")
+            for inner in member.get("members", []) + [m for o in member.get("options", []) for m in o["members"]]:
+                check(inner)
+
+        for member in members.values():
+            check(member)
+        presets = {preset["name"]: preset for preset in self.ask("GET", "/api/presets")}
+        self.assertEqual(presets["davis346"]["values"]["contrast_threshold"], 0.2)
+
+    def test_problems_are_told_together_and_name_their_options(self):
+        yaml = self.yaml.replace("width: 64", "width: -3").replace("contrast_threshold: 0.2", "contrast_treshold: 0.2") + "sed: 1\n"
+        problems = {p["where"]: p["what"] for p in self.ask("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]}
+        self.assertEqual(set(problems), {"camera.width", "event_camera.contrast_treshold", "sed"})
+        self.assertIn("did you mean contrast_threshold?", problems["event_camera.contrast_treshold"])
+        self.assertEqual(self.ask("POST", "/api/scenario/check", self.scenario())["problems"], [])
+        broken = self.ask("POST", "/api/scenario/check", {"yaml": "a: [", "dir": "work"})
+        self.assertIn("not valid YAML", broken["problems"][0]["what"])
+
+    def test_an_edit_keeps_comments(self):
+        edited = self.ask("POST", "/api/scenario/edit", self.scenario(set=[{"where": "camera.width", "value": 80}]))
+        self.assertEqual(edited["yaml"], self.yaml.replace("width: 64", "width: 80"))
+        self.assertEqual(edited["values"]["camera"]["width"], 80)
+
+    def test_two_windows_do_not_undo_each_other(self):
+        saved = self.ask("PUT", "/api/scenario", {"path": "work/two.yaml", "yaml": "seed: 1\n", "revision": None})
+        self.ask("PUT", "/api/scenario", {"path": "work/two.yaml", "yaml": "seed: 9\n", "revision": None}, 409)
+        other = self.ask("PUT", "/api/scenario", {"path": "work/two.yaml", "yaml": "seed: 2\n", "revision": saved["revision"]})
+        conflict = self.ask("PUT", "/api/scenario", {"path": "work/two.yaml", "yaml": "seed: 3\n", "revision": saved["revision"]}, 409)
+        self.assertEqual((conflict["yaml"], conflict["revision"]), ("seed: 2\n", other["revision"]))
+        self.assertEqual((self.work / "two.yaml").read_text(), "seed: 2\n")
+        self.ask("PUT", "/api/scenario", {"path": "work/two.yaml", "yaml": "seed: 3\n", "revision": saved["revision"], "overwrite": True})
+        self.assertEqual(self.ask("GET", "/api/scenario?path=work/two.yaml")["yaml"], "seed: 3\n")
+        self.assertEqual([p.name for p in self.work.iterdir() if p.name.endswith(".tmp")], [])
+
+    def test_the_scene_and_its_picture(self):
+        scene = self.ask("POST", "/api/scene", self.scenario())
+        self.assertEqual(scene["kind"], "plane")
+        self.assertEqual((scene["camera"]["width"], scene["camera"]["height"]), (64, 48))
+        status, headers, jpeg = self.server.request("GET", scene["texture"])
+        self.assertEqual((status, headers["Content-Type"], jpeg[:2]), (200, "image/jpeg", b"\xff\xd8"))
+        for where in ({"t": 0}, {"pose": [0, 0, 0, 0.5, 0.5, 0.5, 0.5]}):
+            status, headers, png = self.server.request("POST", "/api/view", self.scenario(width=120, **where))
+            self.assertEqual(status, 200, png)
+            self.assertEqual(struct.unpack(">II", png[16:24]), (120, 90))
+
+    def test_a_mesh_is_a_sound_glb(self):
+        cube = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1)) + "f 1 2 3\nf 5 6 7\n"
+        (self.work / "cube.obj").write_text(cube)
+        new = self.ask("POST", "/api/scenario/new", {"scene": "work/cube.obj"})
+        scene = self.ask("POST", "/api/scene", {"yaml": new["yaml"], "dir": new["dir"]})
+        self.assertEqual((scene["kind"], scene["triangles"]), ("mesh", 2))
+        _, headers, glb = self.server.request("GET", scene["glb"])
+        self.assertEqual(headers["Content-Type"], "model/gltf-binary")
+        magic, version, length, json_length = struct.unpack("<4sIII", glb[:16])
+        self.assertEqual((magic, version, length), (b"glTF", 2, len(glb)))
+        gltf = json.loads(glb[20:20 + json_length])
+        self.assertEqual([node["name"] for node in gltf["nodes"]], [o["glb_node"] for o in scene["objects"]])
+        self.assertEqual(gltf["accessors"][0]["min"] + gltf["accessors"][0]["max"], [0, 0, 0, 1, 1, 1])
+        binary = len(glb) - 28 - json_length
+        for view in gltf["bufferViews"]:
+            self.assertLessEqual(view["byteOffset"] + view["byteLength"], binary)
+
+    def test_the_motion_is_the_simulators(self):
+        motion = self.ask("POST", "/api/trajectory", self.scenario(samples=11))
+        self.assertEqual(len(motion["poses"]), 11)
+        self.assertEqual([p["t"] for p in motion["waypoints"]], [motion["start"], motion["end"]])
+        self.assertAlmostEqual(motion["poses"][0][1], -0.1)
+        self.assertAlmostEqual(motion["poses"][-1][1], 0.1)
+        self.assertEqual(max(motion["speed_m_per_s"][0], motion["speed_m_per_s"][-1]), 0)
+        one = self.yaml.replace("    - {position: [0, 0.1, 0], look_at: [1, 0, 0]}\n", "")
+        refused = self.ask("POST", "/api/trajectory", {"yaml": one, "dir": "work"}, 400)
+        self.assertTrue(refused["where"].startswith("trajectory"), refused)
+
+    def test_a_run_makes_the_bytes_of_esim_simulate(self):
+        started = self.ask("POST", "/api/runs", {"path": "work/small.yaml", "out": "work/made"})
+        messages = self.server.events_of(started["id"], ("done", "failed"))
+        self.assertEqual(messages[-1], ("done", {"recording": "work/made"}))
+        self.assertIn("progress", {kind for kind, _ in messages})
+        self.assertEqual(self.server.events_of(started["id"], ("done",))[-1], messages[-1])  # whoever comes later learns it too
+        self.assertEqual(self.server.request("GET", f"/api/runs/{started['id']}/picture.png?n=1")[2][1:4], b"PNG")
+        result = run("simulate", self.work / "small.yaml", "--out", self.folder / "cli", "-q")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for name in ("scenario.yaml", "cam0/events.h5", "cam0/truth.h5", "poses.txt", "states.csv"):
+            self.assertEqual((self.work / "made" / name).read_bytes(), (self.folder / "cli" / name).read_bytes(), name)
+        self.ask("POST", "/api/runs", {"path": "work/small.yaml", "out": "work/made"}, 409)
+        self.check_recording("work/made")
+        converted = run("convert", self.work / "made" / "cam0" / "events.h5", self.work / "made.raw")
+        self.assertEqual(converted.returncode, 0, converted.stderr)
+        self.check_other_format("work/made.raw")
+        self.check_cut_recording(self.work / "made")
+
+    def check_cut_recording(self, made):
+        """What can still be read of a recording whose events are cut is shown, with what is wrong."""
+        shutil.copytree(made, self.work / "cut")
+        events = self.work / "cut" / "cam0" / "events.h5"
+        events.write_bytes(events.read_bytes()[:events.stat().st_size // 2])
+        recording = self.ask("POST", "/api/recordings", {"path": "work/cut"})
+        self.assertIn("events.h5", recording["note"])
+        self.assertEqual(recording["cameras"][0]["has"], {"events": False, "images": True, "depth": True, "flow": True})
+        self.ask("GET", f"/api/recordings/{recording['id']}/rate", status=404)
+
+    def check_recording(self, path):
+        recording = self.ask("POST", "/api/recordings", {"path": path})
+        camera = recording["cameras"][0]
+        self.assertEqual((camera["width"], camera["height"], recording["incomplete"], recording["indexing"]), (64, 48, False, 1))
+        self.assertEqual(camera["has"], {"events": True, "images": True, "depth": True, "flow": True})
+        base = f"/api/recordings/{recording['id']}"
+        start, end = recording["start"], recording["end"]
+        rate = self.ask("GET", f"{base}/rate?bins=7")
+        self.assertEqual(sum(rate["on"]) + sum(rate["off"]), camera["events"])
+        _, _, binary = self.server.request("GET", f"{base}/events.bin?from={start}&to={end}&max=500000")
+        first, last, count, total = struct.unpack("<QQII", binary[:24])
+        self.assertEqual((first, last, count, total), (start, end, camera["events"], camera["events"]))
+        events = list(struct.iter_unpack("<IHH", binary[24:]))
+        self.assertEqual(len(events), count)
+        self.assertEqual(sum(y >> 15 for _, _, y in events), sum(rate["on"]))
+        self.assertTrue(all(x < 64 and (y & 0x7FFF) < 48 for _, x, y in events))
+        for query in ("picture.png?view=counts&over=image", "picture.png?view=onoff", "picture.png?view=time_surface", "image.png?kind=image",
+                      "image.png?kind=depth", "image.png?kind=flow"):
+            status, headers, png = self.server.request("GET", f"{base}/{query}&t={(start + end) // 2}")
+            self.assertEqual((status, png[1:4], struct.unpack(">II", png[16:24])), (200, b"PNG", (64, 48)), query)
+        self.assertLessEqual(int(headers["X-Time-Ns"]), (start + end) // 2)
+        poses = self.ask("GET", f"{base}/poses?max=5")
+        self.assertEqual(len(poses["poses"]), 5)
+        self.ask("GET", f"{base}/imu", status=404)
+        self.ask("GET", f"{base}/events.bin?camera=none", status=404)
+        self.ask("GET", f"{base}/events.bin?from=x", status=400)
+
+    def check_other_format(self, path):
+        recording = self.ask("POST", "/api/recordings", {"path": path})
+        self.assertEqual(recording["format"], "evt3")
+        base = f"/api/recordings/{recording['id']}"
+        self.assertEqual(self.server.request("GET", f"{base}/picture.png?t={recording['end']}")[2][1:4], b"PNG")
+        for _ in range(100):
+            recording = self.ask("GET", base)
+            if recording["indexing"] == 1:
+                break
+            time.sleep(0.05)
+        self.assertEqual(recording["indexing"], 1)
+        self.assertNotIn("note", recording)
+        rate = self.ask("GET", f"{base}/rate?bins=3")
+        self.assertEqual(sum(rate["on"]) + sum(rate["off"]), recording["cameras"][0]["events"])
+
+    def test_what_is_damaged_is_one_line(self):
+        (self.work / "no.glb").write_bytes(b"glTF no")
+        yaml = "renderer: {type: mesh, scene: no.glb}\ntrajectory: {type: static}\nduration_s: 1\n"
+        self.assertIn("no.glb", self.ask("POST", "/api/scene", {"yaml": yaml, "dir": "work"}, 400)["error"])
+        (self.work / "no.raw").write_bytes(b"% evt 3.0\n")
+        (self.work / "no.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
+        self.assertIn("no.h5", self.ask("POST", "/api/recordings", {"path": "work/no.h5"}, 400)["error"])
+        self.ask("POST", "/api/recordings", {"path": "work/small.yaml"}, 400)
+        self.ask("POST", "/api/recordings", {"path": "work/none"}, 404)
+        self.ask("GET", "/api/recordings/99/rate", status=404)
+        self.ask("GET", "/api/nothing", status=404)
+        self.ask("DELETE", "/api/schema", status=405)
+
+
+class Refusals(StudioTest):
+    def get(self, target, host=None, headers="", method="GET"):
+        host = host or f"127.0.0.1:{self.server.port}"
+        text = f"{method} {target} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\nAuthorization: Bearer {self.server.token}\r\n{headers}\r\n"
+        answer = self.server.raw(text.encode())
+        return int(answer.split(b" ", 2)[1]) if answer else 0
+
+    def test_only_with_the_token(self):
+        for target in ("/", "/api/session", "/assets/x.js", "/api/scenes/x.glb", "/?token=wrong"):
+            self.assertEqual(self.server.request("GET", target, token=False)[0], 401, target)
+        status, headers, _ = self.server.request("GET", f"/?token={self.server.token}", token=False)
+        self.assertEqual((status, headers["Location"]), (303, "/"))
+        cookie = headers["Set-Cookie"]
+        self.assertIn("HttpOnly; SameSite=Strict", cookie)
+        self.assertEqual(self.server.request("GET", "/api/session", headers={"Cookie": cookie.split(";")[0]}, token=False)[0], 200)
+
+    def test_names_that_were_made_to_point_here(self):
+        self.assertEqual(self.get("/api/session"), 200)
+        for host in ("evil.example", f"evil.example:{self.server.port}", "127.0.0.1", f"127.0.0.1:{self.server.port + 1}"):
+            self.assertEqual(self.get("/api/session", host), 403, host)
+
+    def test_other_sites(self):
+        self.assertEqual(self.get("/api/session", headers="Origin: http://evil.example\r\n"), 403)
+        self.assertEqual(self.get("/api/session", headers="Sec-Fetch-Site: cross-site\r\n"), 403)
+        self.assertEqual(self.get("/api/session", headers=f"Origin: http://127.0.0.1:{self.server.port}\r\n"), 200)
+        form = "Content-Type: application/x-www-form-urlencoded\r\nContent-Length: 0\r\n"
+        self.assertEqual(self.get("/api/runs", headers=form, method="POST"), 400)
+
+    def test_only_this_machine_reaches_it(self):
+        listening = pathlib.Path("/proc/net/tcp").read_text() + pathlib.Path("/proc/net/tcp6").read_text()
+        places = [line.split()[1] for line in listening.splitlines() if line.split()[1].endswith(f":{self.server.port:04X}") and line.split()[3] == "0A"]
+        self.assertEqual(places, [f"0100007F:{self.server.port:04X}"])
+        refused = run("studio", self.work, "--host", "0.0.0.0", "--page", self.folder / "page")
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn("--token", refused.stderr)
+
+    def test_nothing_outside_the_roots(self):
+        (self.work / "link.yaml").unlink(missing_ok=True)
+        (self.work / "link.yaml").symlink_to(self.folder / "secret.yaml")
+        for path in ("../secret.yaml", "work/../secret.yaml", "work/link.yaml", "/etc/passwd", "work/%2e%2e/secret.yaml", "work/..%2fsecret.yaml",
+                     "work/%2e%2e%2fsecret.yaml", "work//../secret.yaml", "work/poster/../../secret.yaml", "secret.yaml", ""):
+            status, _, body = self.server.request("GET", f"/api/scenario?path={path}")
+            self.assertIn(status, (400, 403, 404), path)
+            self.assertNotIn(b"seed", body, path)
+            self.assertNotEqual(self.server.request("GET", f"/api/files?dir={path.rsplit('/', 1)[0]}/..")[0], 200)
+        for path in ("../new.yaml", "work/../new.yaml", "/tmp/new.yaml", "work/poster/../../new.yaml"):
+            self.assertIn(self.server.request("PUT", "/api/scenario", {"path": path, "yaml": "", "revision": None})[0], (400, 403), path)
+            self.assertIn(self.server.request("POST", "/api/runs", {"path": "work/small.yaml", "out": path})[0], (400, 403), path)
+        self.assertFalse((self.folder / "new.yaml").exists())
+        (self.work / "up").unlink(missing_ok=True)
+        (self.work / "up").symlink_to(self.folder)
+        self.assertEqual(self.server.request("PUT", "/api/scenario", {"path": "work/up/x.yaml", "yaml": "", "revision": None})[0], 403)
+        for page in ("/../secret.yaml", "/%2e%2e/secret.yaml", "/..%2f..%2fetc/passwd", "//etc/passwd", "/index.html/..", "/log"):
+            self.assertNotEqual(self.get(page), 200, page)
+
+    def test_files_that_scenarios_name(self):
+        outside = self.folder / "secret.yaml"
+        for yaml, where in ((f"renderer: {{type: plane, image: {outside}}}\n", "renderer.image"),
+                            (f"renderer: {{type: mesh, scene: ../secret.yaml}}\n", "renderer.scene"),
+                            (f"camera: {{calibration: {outside}}}\n", "camera.calibration"),
+                            (f"trajectory: {{type: waypoints, file: up/secret.yaml}}\n", "trajectory.file"),
+                            (f"imu: {{calibration: {outside}}}\n", "imu.calibration")):
+            problems = {p["where"]: p["what"] for p in self.server.json("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]}
+            if "up/" in yaml and not (self.work / "up").exists():
+                continue
+            self.assertIn("outside the folders", problems.get(where, ""), (yaml, problems))
+
+    def test_nonsense(self):
+        for data in (b"", b"\r\n\r\n", b"\0" * 5000, b"GET", b"GET / HTTP/9.9\r\n\r\n", b"GET /%zz HTTP/1.1\r\n\r\n", bytes(range(256)) * 100,
+                     b"POST /api/scene HTTP/1.1\r\nHost: x\r\nContent-Length: -1\r\n\r\n", b"GET / HTTP/1.1\r\n" + b"a: b\r\n" * 10000):
+            self.server.raw(data, 1)
+        for body in (b"", b"[]", b"null", b"{", b"[" * 100000, b'{"yaml": 5}', b'{"yaml": "' + b"[" * 3000 + b'"}', b'{"yaml": "a: &a [*a]"}', b'\xff\xfe',
+                     b'{"yaml": "camera: &a {x: *a}", "dir": "work"}', b'{"path": "\\u0000"}'):
+            for target in ("/api/scene", "/api/scenario/check", "/api/scenario/edit", "/api/trajectory", "/api/view", "/api/runs", "/api/recordings"):
+                connection = http.client.HTTPConnection("127.0.0.1", self.server.port, timeout=20)
+                connection.request("POST", target, body, {"Authorization": f"Bearer {self.server.token}", "Content-Type": "application/json"})
+                response = connection.getresponse()
+                text = response.read()
+                self.assertIn(response.status, (200, 400, 403, 404), (target, body[:40], text[:200]))
+                connection.close()
+        self.assertEqual(self.server.request("GET", "/api/session")[0], 200)
+
+    def test_large_bodies_are_not_read(self):
+        head = (f"POST /api/scene HTTP/1.1\r\nHost: 127.0.0.1:{self.server.port}\r\nAuthorization: Bearer {self.server.token}\r\n"
+                "Content-Type: application/json\r\nContent-Length: 100000000\r\n\r\n")
+        self.assertIn(b" 413 ", self.server.raw(head.encode())[:20])
+
+
+class Lives(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self.work = self.folder / "work"
+        (self.work / "poster").mkdir(parents=True)
+        image = next((SCENES / "poster").glob("*.[jp][pn]g"))
+        shutil.copy(image, self.work / "poster")
+        (self.work / "small.yaml").write_text(SMALL.replace("poster.png", image.name))
+
+    def server(self, *arguments, **options):
+        server = Server(self.folder, *arguments, **options)
+        self.addCleanup(server.stop)
+        return server
+
+    def test_idle_it_costs_nothing(self):
+        server = self.server(self.work)
+        server.json("GET", "/api/session")
+        time.sleep(0.3)
+        before = server.cpu_seconds()
+        time.sleep(2)
+        self.assertLessEqual(server.cpu_seconds() - before, 0.02)
+
+    def test_an_interrupt_ends_a_run_in_order(self):
+        long = (self.work / "small.yaml").read_text().replace("type: waypoints", "type: waypoints\n  speed: 0.0005")
+        (self.work / "long.yaml").write_text(long)
+        server = self.server(self.work / "long.yaml")
+        server.json("POST", "/api/runs", {"path": "work/long.yaml", "out": "work/cut"})
+        for _ in range(600):
+            status = server.json("GET", "/api/runs")[0]
+            if status["t"] > status["start"]:
+                break
+            time.sleep(0.02)
+        self.assertEqual(status["state"], "running")
+        self.assertEqual(server.stop()[0], 0)
+        self.assertEqual(json.loads((self.work / "cut" / "report.json").read_text())["status"], "interrupted")
+        self.assertEqual(run("info", self.work / "cut").returncode, 0)
+        again = self.server(self.work / "cut")
+        self.assertEqual(again.json("GET", "/api/session")["opened"], {"kind": "recording", "path": "work/cut"})
+        self.assertTrue(again.json("POST", "/api/recordings", {"path": "work/cut"})["incomplete"])
+
+    def test_a_run_outlives_its_watchers_and_can_be_cancelled(self):
+        long = (self.work / "small.yaml").read_text().replace("type: waypoints", "type: waypoints\n  speed: 0.0005")
+        (self.work / "long.yaml").write_text(long)
+        server = self.server(self.work)
+        run_id = server.json("POST", "/api/runs", {"path": "work/long.yaml"})["id"]
+        server.events_of(run_id, ("progress",))  # and is gone
+        waiting = server.json("POST", "/api/runs", {"path": "work/small.yaml"})["id"]
+        self.assertEqual([r["state"] for r in server.json("GET", "/api/runs")], ["running", "waiting"])
+        server.json("DELETE", f"/api/runs/{waiting}")
+        for _ in range(600):
+            if not server.json("GET", f"/api/runs/{run_id}")["loading"]:
+                break
+            time.sleep(0.02)
+        server.json("DELETE", f"/api/runs/{run_id}")
+        self.assertEqual(server.events_of(run_id, ("cancelled",))[-1], ("cancelled", {"recording": "work/out/long"}))
+        self.assertEqual([r["state"] for r in server.json("GET", "/api/runs")], ["cancelled", "cancelled"])
+        server.json("DELETE", f"/api/runs/{run_id}", status=409)
+
+    def test_a_port_that_is_taken(self):
+        with socket.socket() as taken:
+            taken.bind(("127.0.0.1", 0))
+            taken.listen()
+            port = taken.getsockname()[1]
+            self.assert_refused(run("studio", self.work, "--port", port, "--page", self.page()), str(port), "another program has it")
+        first, second = self.server(self.work), self.server(self.work)
+        self.assertNotEqual(first.port, second.port)
+
+    def page(self):
+        page = self.folder / "page"
+        page.mkdir(exist_ok=True)
+        (page / "index.html").write_text("")
+        return page
+
+    def test_what_is_not_there(self):
+        self.assert_refused(run("studio", self.folder / "none.yaml", "--page", self.page()), "none.yaml")
+        self.assert_refused(run("studio", self.work, "--page", self.work), "scripts/studio")
+        self.assert_refused(run("studio", self.work, "--root", "nowhere", "--page", self.page()), "nowhere")
+        self.assert_refused(run("studio", self.work, "--token", "short", "--page", self.page()), "--token")
+
+    def test_a_full_disk_keeps_what_was_saved(self):
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
+
+        server = self.server(self.work, preexec_fn=limit, restore_signals=False)
+        saved = server.json("PUT", "/api/scenario", {"path": "work/kept.yaml", "yaml": "seed: 1\n", "revision": None})
+        large = {"path": "work/kept.yaml", "yaml": "#" * 5000, "revision": saved["revision"]}
+        self.assertIn("cannot write", server.json("PUT", "/api/scenario", large, 507)["error"])
+        self.assertEqual((self.work / "kept.yaml").read_text(), "seed: 1\n")
+        self.assertEqual([p.name for p in self.work.iterdir() if p.name.endswith(".tmp")], [])
+        run_id = server.json("POST", "/api/runs", {"path": "work/small.yaml"})["id"]
+        self.assertEqual(server.events_of(run_id, ("failed", "done"))[-1][0], "failed")
+        self.assertEqual(server.json("GET", "/api/session")["opened"]["kind"], "folder")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=1)

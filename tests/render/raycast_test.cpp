@@ -154,6 +154,35 @@ TEST(RaycastRenderer, SurfacesAreNoSharperWhereAnEdgeIs) {
   EXPECT_NEAR(variance(sum_many, squares_many) / variance(sum_one, squares_one), 1, 0.1);
 }
 
+TEST(RaycastRenderer, NarrowPixelsAverageToWideOnes) {
+  constexpr int kWide = 3;
+  Camera model = test::distorted_camera(1);
+  const auto scene = build_raycast_scene(test::plain_moving_scene());
+  const auto see = [&] {
+    const auto renderer = make_raycast_renderer(scene, {0.5F, 64}, model, test::two_threads());
+    Sample sample;
+    renderer->render({test::kTime, test::moving_camera(), {{0, 0, model.width, model.height}}, test::moving_objects(0)},
+                     sample);
+    return sample;
+  };
+  EXPECT_TRUE(see().narrow.empty());
+  model.footprint = kWide;
+  const Sample sample = see();
+  double squares = 0, unlike = 0;
+  int count = 0;
+  for (int y = 1; y + 1 < model.height; ++y) {
+    for (int x = 1; x + 1 < model.width; ++x, ++count) {
+      double mean = 0;
+      for (int j = -1; j <= 1; ++j)
+        for (int i = -1; i <= 1; ++i) mean += sample.narrow(x + i, y + j) / (kWide * kWide);
+      squares += std::pow(mean - sample.irradiance(x, y), 2);
+      unlike += std::pow(sample.narrow(x, y) - sample.irradiance(x, y), 2);
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / count), 0.003);
+  EXPECT_GT(std::sqrt(unlike / count), 0.015) << "edges should be narrower";
+}
+
 // --- moving objects
 // ---------------------------------------------------------------------------------------------------
 

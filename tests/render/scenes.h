@@ -4,6 +4,7 @@
 #include <memory>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "esim/backends/opengl/gl_renderer.h"
 #include "esim/backends/panorama/panorama_renderer.h"
@@ -123,6 +124,15 @@ inline Scene moving_scene() {
     for (Eigen::Vector3f& vertex : object.mesh.vertices) vertex *= scale;
     scene.objects.push_back(object);
   }
+  return scene;
+}
+
+/// The same, one black and one white: nothing to be seen on them but their outlines.
+inline Scene plain_moving_scene() {
+  Scene scene = moving_scene();
+  float base = 0;
+  for (SceneObject& object : scene.objects)
+    if (object.moves) object.mesh.materials = {{"plain", nullptr, std::exchange(base, 1.0F)}};
   return scene;
 }
 

@@ -26,6 +26,14 @@ Difference difference(const Image<float>& a, const Image<float>& b) {
   return result;
 }
 
+/// What a camera in one of the test scenes sees `dt` seconds later.
+RenderRequest view_of(const std::string& scene, const Camera& camera, double dt) {
+  return {test::kTime + to_ns(dt),
+          test::moving_camera(dt),
+          {{0, 0, camera.width, camera.height}},
+          test::objects_of(scene, dt)};
+}
+
 /// One of the test scenes, its keyframes, and what lies between them.
 class Between {
  public:
@@ -38,25 +46,24 @@ class Between {
         keyframes_(test::make_renderer(name, layout_.camera, workers)),
         reprojector_(layout_, renderer_->traits().at_infinity, workers) {}
 
-  RenderRequest view(double dt, const Camera& camera) const {
-    return {test::kTime + to_ns(dt),
-            test::moving_camera(dt),
-            {{0, 0, camera.width, camera.height}},
-            test::objects_of(name_, dt)};
-  }
+  RenderRequest view(double dt, const Camera& camera) const { return view_of(name_, camera, dt); }
 
   Keyframe keyframe(double dt) const {
     Sample sample;
     const RenderRequest request = view(dt, layout_.camera);
     keyframes_->render(request, sample);
     Keyframe result;
-    prepare_keyframe(layout_, reprojector_.at_infinity(), request, sample, workers_, result);
+    reprojector_.prepare(request, sample, result);
     return result;
+  }
+
+  void prepare(const RenderRequest& view, Sample& sample, Keyframe& keyframe) const {
+    reprojector_.prepare(view, sample, keyframe);
   }
 
   Reconstruction reconstruct(const Keyframe& before, const Keyframe& after, double dt) {
     Reconstruction result;
-    reprojector_.reconstruct(before, after, view(dt, sensor_), true, result);
+    reprojector_.reconstruct(before, after, view(dt, sensor_), Detail::apart, result);
     return result;
   }
 
@@ -147,7 +154,6 @@ TEST(Reprojector, AveragesFinePixelsWhereTheRendererDoesNot) {
 
 TEST(Reprojector, BearsDepthThatIsNoNumber) {
   Between scene("mesh", 0);
-  const Workers& workers = test::two_threads();
   Sample sample;
   test::make_renderer("mesh", scene.layout().camera)->render(scene.view(0, scene.layout().camera), sample);
   sample.depth(100, 80) = std::numeric_limits<float>::quiet_NaN();
@@ -155,9 +161,61 @@ TEST(Reprojector, BearsDepthThatIsNoNumber) {
   sample.depth(102, 80) = -1;
   sample.depth(103, 80) = 0;
   Keyframe damaged;
-  prepare_keyframe(scene.layout(), false, scene.view(0, scene.layout().camera), sample, workers, damaged);
+  scene.prepare(scene.view(0, scene.layout().camera), sample, damaged);
   const Reconstruction found = scene.reconstruct(damaged, scene.keyframe(0.05), 0.02);
   for (const float light : found.irradiance.pixels()) EXPECT_TRUE(light > 0 && light < 2);
+}
+
+/// Dark bars, 1 px to 3 px wide at 1 m before the camera, and the test scenes' wall behind them.
+Scene bars(const Camera& camera) {
+  Mesh mesh;
+  mesh.materials = {{"dark", nullptr, 0.1F}};
+  for (int i = 0; i < 12; ++i) {
+    const float y = 0.1F * static_cast<float>(i) - 0.55F, width = static_cast<float>((1 + 0.2 * i) / camera.fx);
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (const auto& [across, up] : {std::pair{0.0F, -1.0F}, {width, -1.0F}, {width, 1.0F}, {0.0F, 1.0F}})
+      mesh.vertices.emplace_back(1.0F, y + across + 0.3F * up, up);
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    mesh.triangles.push_back({first, first + 2, first + 3});
+  }
+  const Eigen::Vector2f origin(0, 0);
+  mesh.texture_uv.resize(mesh.triangles.size(), {origin, origin, origin});
+  mesh.material.resize(mesh.triangles.size(), 0);
+  Scene scene = still_scene(test::box_mesh());
+  scene.objects.push_back({"bars", mesh, false});
+  return scene;
+}
+
+TEST(Reprojector, SeesEdgesAsFinelyAsItsKeyframes) {
+  const Workers& workers = test::two_threads();
+  double fine = 0, coarse = 0;
+  for (const int distortion : {0, 2}) {
+    const Camera sensor = test::distorted_camera(distortion);
+    const auto scene = build_raycast_scene(bars(sensor));
+    const KeyframeLayout layout = lay_out_keyframes(sensor, 3, 8, true);
+    Reprojector reprojector(layout, false, workers);
+    const auto render = [&](const Camera& camera, double dt) {
+      Sample sample;
+      make_raycast_renderer(scene, {0.5F, 64}, camera, workers)->render(view_of("mesh", camera, dt), sample);
+      return sample;
+    };
+    Keyframe before, after;
+    for (auto [keyframe, dt] : {std::pair{&before, 0.0}, {&after, 0.06}}) {
+      Sample sample = render(layout.camera, dt);
+      reprojector.prepare(view_of("mesh", layout.camera, dt), sample, *keyframe);
+    }
+    for (const double dt : {0.01, 0.03, 0.05}) {
+      const Sample direct = render(sensor, dt);
+      const auto error = [&](Detail detail) {
+        Reconstruction found;
+        reprojector.reconstruct(before, after, view_of("mesh", sensor, dt), detail, found);
+        return difference(found.irradiance, direct.irradiance).rms;
+      };
+      fine += std::pow(error(Detail::whole), 2);
+      coarse += std::pow(error(Detail::apart), 2);
+    }
+  }
+  EXPECT_LT(fine, 0.75 * coarse);
 }
 
 TEST(KeyframeLayout, PutsTheSensorsPixelsIntoItsMiddle) {

@@ -19,6 +19,10 @@ struct Sample {
   Image<float> flow_x;      // V, px/s, to the right        by motion_field() from Z, object and the twists, or by the
   Image<float> flow_y;      // V, px/s, downwards           renderer where there is no space
 
+  // E over the area of one pixel where the camera's footprint is wider, whose mean over the footprint is E. Has no size
+  // elsewhere, and where edges do not matter: of panorama and plane.
+  Image<float> narrow;
+
   // Which moving object is seen: 0 none, i + 1 the i-th of the request, or of the layers that are drawn on the sensor.
   // Computed by the renderer; has no size unless the request wants_objects().
   Image<std::uint16_t> object;

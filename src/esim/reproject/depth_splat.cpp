@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "esim/reproject/lens.h"
 
@@ -21,118 +22,111 @@ std::vector<ViewChange> view_changes(const RenderRequest& from, const RenderRequ
   return changes;
 }
 
-DepthSplat::DepthSplat(const KeyframeLayout& layout, const PixelRays& rays, double greatest_radius,
-                       const Workers& workers)
-    : layout_(layout),
+DepthSplat::DepthSplat(Camera camera, int scale, double greatest_radius, const Workers& workers)
+    : camera_(std::move(camera)),
+      scale_(static_cast<float>(scale)),
       greatest_radius_(greatest_radius),
-      workers_(workers),
-      chunks_((layout.columns() + kChunk - 1) / kChunk),
-      x_(layout.columns(), layout.rows()),
-      y_(x_),
-      column_(x_),
-      row_(x_),
-      inverse_z_(x_),
-      first_row_(chunks_, layout.rows()),
-      last_row_(chunks_, layout.rows()) {
-  for (int row = 0; row < layout.rows(); ++row) {
-    for (int column = 0; column < layout.columns(); ++column) {
-      const int x = layout.first() + layout.supersampling * column, y = layout.first() + layout.supersampling * row;
-      x_(column, row) = rays.x(x, y), y_(column, row) = rays.y(x, y);
-    }
-  }
+      workers_(workers) {}
+
+void DepthSplat::resize(int points) {
+  for (std::vector<float>* values : {&column_, &row_, &inverse_z_}) values->resize(static_cast<std::size_t>(points));
+  for (std::vector<float>* values : {&first_row_, &last_row_})
+    values->resize(static_cast<std::size_t>((points + kChunk - 1) / kChunk));
 }
 
-void DepthSplat::throw_row(const Keyframe& keyframe, const std::vector<ViewChange>& changes, int row) {
-  const int width = x_.width();
-  const std::uint16_t* const object = keyframe.object.empty() ? nullptr : keyframe.object.row(row);
-  const float *const bx = x_.row(row), *const by = y_.row(row), *const w = keyframe.nearness.row(row);
-  float *const column_at = column_.row(row), *const row_at = row_.row(row), *const inverse_z = inverse_z_.row(row);
+/// Finds where the points [begin, end) fall; begin is a chunk's first.
+void DepthSplat::throw_run(const SurfacePoints& points, const std::vector<ViewChange>& changes, int begin, int end) {
+  const std::uint16_t* const object = points.object.empty() ? nullptr : points.object.data();
+  const float *const bx = points.x.data(), *const by = points.y.data(), *const w = points.nearness.data();
+  float *const column_at = column_.data(), *const row_at = row_.data(), *const inverse_z = inverse_z_.data();
 
   std::visit(
       [&](const auto& model) {
-        const Projector project(layout_.sensor, model, greatest_radius_);
-        for (int begin = 0; begin < width;) {
-          // Pixels in a row that belong to the same object.
-          int end = object == nullptr ? width : begin + 1;
-          while (end < width && object[end] == object[begin]) ++end;
-          const ViewChange c = changes[object == nullptr ? 0 : object[begin]];
+        const Projector project(camera_, model, greatest_radius_);
+        for (int first = begin; first < end;) {
+          // Points in a row that belong to the same object.
+          int last = object == nullptr ? end : first + 1;
+          while (last < end && object[last] == object[first]) ++last;
+          const ViewChange c = changes[object == nullptr ? 0 : object[first]];
           const float r00 = c.R(0, 0), r01 = c.R(0, 1), r02 = c.R(0, 2), r10 = c.R(1, 0), r11 = c.R(1, 1),
                       r12 = c.R(1, 2), r20 = c.R(2, 0), r21 = c.R(2, 1), r22 = c.R(2, 2);
           const float t0 = c.t.x(), t1 = c.t.y(), t2 = c.t.z();
 #pragma omp simd
-          for (int x = begin; x < end; ++x) {
-            const float y0 = r00 * bx[x] + r01 * by[x] + r02 + w[x] * t0;
-            const float y1 = r10 * bx[x] + r11 * by[x] + r12 + w[x] * t1;
-            const float y2 = r20 * bx[x] + r21 * by[x] + r22 + w[x] * t2;
+          for (int i = first; i < last; ++i) {
+            const float y0 = r00 * bx[i] + r01 * by[i] + r02 + w[i] * t0;
+            const float y1 = r10 * bx[i] + r11 * by[i] + r12 + w[i] * t1;
+            const float y2 = r20 * bx[i] + r21 * by[i] + r22 + w[i] * t2;
             float u, v;
             project(y0, y1, y2, u, v);
-            column_at[x] = u;
-            row_at[x] = v;
-            inverse_z[x] = 1.0F / y2;
+            column_at[i] = u;
+            row_at[i] = v;
+            inverse_z[i] = 1.0F / y2;
           }
-          begin = end;
+          first = last;
         }
       },
-      layout_.camera.distortion);
+      camera_.distortion);
 
-  for (int chunk = 0; chunk < chunks_; ++chunk) {
-    const auto [first, last] =
-        std::minmax_element(row_at + chunk * kChunk, row_at + std::min(width, (chunk + 1) * kChunk));
-    first_row_(chunk, row) = *first;
-    last_row_(chunk, row) = *last;
+  for (int first = begin; first < end; first += kChunk) {
+    const auto [lowest, highest] = std::minmax_element(row_at + first, row_at + std::min(end, first + kChunk));
+    first_row_[static_cast<std::size_t>(first / kChunk)] = *lowest;
+    last_row_[static_cast<std::size_t>(first / kChunk)] = *highest;
   }
 }
 
 /// Fills the rows [begin, end) of the surface.
-void DepthSplat::collect(const Keyframe& keyframe, int begin, int end, VisibleSurface& surface) const {
-  const int width = surface.nearness.width(), thrown_width = x_.width();
-  const bool objects = !keyframe.object.empty();
-  const auto scale = static_cast<float>(layout_.supersampling);
+void DepthSplat::collect(const SurfacePoints& points, int begin, int end, VisibleSurface& surface) const {
+  const int width = surface.nearness.width();
+  const bool objects = !points.object.empty();
   const auto low = static_cast<float>(begin - 1), high = static_cast<float>(end);
-  for (int row = 0; row < x_.height(); ++row) {
-    for (int chunk = 0; chunk < chunks_; ++chunk) {
-      if (!(last_row_(chunk, row) > low && first_row_(chunk, row) < high)) continue;
-      for (int x = chunk * kChunk; x < std::min(thrown_width, (chunk + 1) * kChunk); ++x) {
-        const float u = column_(x, row), v = row_(x, row);
-        if (!(v > low && v < high && u > -1 && u < static_cast<float>(width))) continue;
-        const int left = static_cast<int>(std::floor(u)), top = static_cast<int>(std::floor(v));
-        const float du = scale * (static_cast<float>(left) - u), dv = scale * (static_cast<float>(top) - v);
-        const float inverse_z = inverse_z_(x, row);
-        const float slope_x = keyframe.slope_x(x, row), slope_y = keyframe.slope_y(x, row);
-        const float here = keyframe.nearness(x, row) + slope_x * du + slope_y * dv;
-        const std::uint16_t object = objects ? keyframe.object(x, row) : 0;
-        const auto put = [&](int column, int line, float w) {
-          if (column < 0 || column >= width || line < begin || line >= end) return;
-          float& there = surface.nearness(column, line);
-          const float nearness = std::max(0.0F, w * inverse_z);
-          if (!(nearness > there)) return;
-          there = nearness;
-          if (objects) surface.object(column, line) = object;
-        };
-        put(left, top, here);
-        if (du < 0) put(left + 1, top, here + scale * slope_x);
-        if (dv < 0) put(left, top + 1, here + scale * slope_y);
-        if (du < 0 && dv < 0) put(left + 1, top + 1, here + scale * (slope_x + slope_y));
-      }
+  for (std::size_t chunk = 0; chunk < first_row_.size(); ++chunk) {
+    if (!(last_row_[chunk] > low && first_row_[chunk] < high)) continue;
+    const std::size_t last = std::min(column_.size(), (chunk + 1) * kChunk);
+    for (std::size_t i = chunk * kChunk; i < last; ++i) {
+      const float u = column_[i], v = row_[i];
+      if (!(v > low && v < high && u > -1 && u < static_cast<float>(width))) continue;
+      const int left = static_cast<int>(std::floor(u)), top = static_cast<int>(std::floor(v));
+      const float du = scale_ * (static_cast<float>(left) - u), dv = scale_ * (static_cast<float>(top) - v);
+      const float inverse_z = inverse_z_[i], slope_x = points.slope_x[i], slope_y = points.slope_y[i];
+      const float here = points.nearness[i] + slope_x * du + slope_y * dv;
+      const std::uint16_t object = objects ? points.object[i] : 0;
+      const auto put = [&](int column, int line, float w) {
+        if (column < 0 || column >= width || line < begin || line >= end) return;
+        float& there = surface.nearness(column, line);
+        const float nearness = std::max(0.0F, w * inverse_z);
+        if (!(nearness > there)) return;
+        there = nearness;
+        if (objects) surface.object(column, line) = object;
+        surface.crossed(column, line) = points.crossed[i];
+      };
+      put(left, top, here);
+      if (du < 0) put(left + 1, top, here + scale_ * slope_x);
+      if (dv < 0) put(left, top + 1, here + scale_ * slope_y);
+      if (du < 0 && dv < 0) put(left + 1, top + 1, here + scale_ * (slope_x + slope_y));
     }
   }
 }
 
-void DepthSplat::splat(const std::vector<const Keyframe*>& keyframes, const RenderRequest& view,
-                       VisibleSurface& surface) {
-  const int width = layout_.sensor.width, height = layout_.sensor.height;
-  if (surface.nearness.width() != width || surface.nearness.height() != height)
+void DepthSplat::splat(const std::vector<SeenPoints>& keyframes, const RenderRequest& view, VisibleSurface& surface) {
+  const int width = camera_.width, height = camera_.height;
+  if (surface.nearness.width() != width || surface.nearness.height() != height) {
     surface.nearness = Image<float>(width, height);
+    surface.crossed = Image<std::uint8_t>(width, height);
+  }
   const bool objects = !view.objects.empty();
   if (objects && surface.object.bounds() != surface.nearness.bounds())
     surface.object = Image<std::uint16_t>(width, height);
   surface.nearness.fill(VisibleSurface::kNothing);
+  surface.crossed.fill(0);
   if (objects) surface.object.fill(0);
-  for (const Keyframe* const keyframe : keyframes) {
-    const std::vector<ViewChange> changes = view_changes(keyframe->view, view);
-    workers_.for_each(x_.height(), [&](int row) { throw_row(*keyframe, changes, row); });
+  for (const auto& [seen_from, points] : keyframes) {
+    const std::vector<ViewChange> changes = view_changes(seen_from, view);
+    resize(points.size());
+    workers_.for_each((points.size() + kRun - 1) / kRun, [&](int run) {
+      throw_run(points, changes, run * kRun, std::min(points.size(), (run + 1) * kRun));
+    });
     workers_.for_each((height + kBandRows - 1) / kBandRows, [&](int band) {
-      collect(*keyframe, band * kBandRows, std::min(height, (band + 1) * kBandRows), surface);
+      collect(points, band * kBandRows, std::min(height, (band + 1) * kBandRows), surface);
     });
   }
 }

@@ -5,7 +5,6 @@
 
 #include "esim/core/image.h"
 #include "esim/core/parallel.h"
-#include "esim/render/pixel_rays.h"
 #include "esim/reproject/keyframe.h"
 
 namespace esim {
@@ -20,38 +19,45 @@ struct ViewChange {
 /// From view `from` to view `to`: of what stands still at [0], of object i at [i + 1].
 std::vector<ViewChange> view_changes(const RenderRequest& from, const RenderRequest& to);
 
-/// What a view would see of keyframes, at the resolution of keyframes and without their margin.
+/// What a view would see of keyframes' points.
 struct VisibleSurface {
-  Image<float> nearness;        ///< 1/Z in the view; kNothing where no keyframe's pixel falls
-  Image<std::uint16_t> object;  ///< as in Keyframe
+  Image<float> nearness;        ///< 1/Z in the view; kNothing where no point falls
+  Image<std::uint16_t> object;  ///< as in SurfacePoints; where nothing moves, not current
+  Image<std::uint8_t> crossed;  ///< as in SurfacePoints
 
   static constexpr float kNothing = -1.0F;
 };
 
-/// Throws the pixels of keyframes into a view, each onto the up to four places around where it falls; the nearest
-/// stays.
+/// Points, and the view that they were seen from.
+struct SeenPoints {
+  const RenderRequest& view;
+  const SurfacePoints& points;
+};
+
+/// Throws points of keyframes into a view, each onto the up to four pixels around where it falls; the nearest stays.
 class DepthSplat {
  public:
-  /// `rays`: of the keyframes' camera.
-  DepthSplat(const KeyframeLayout& layout, const PixelRays& rays, double greatest_radius, const Workers& workers);
+  /// `camera`: of the view, whose pixels are `scale` of the keyframes' pixels wide. `greatest_radius`: of bearings
+  /// that its lens takes.
+  DepthSplat(Camera camera, int scale, double greatest_radius, const Workers& workers);
 
-  /// Throws `keyframes` into `view`.
-  void splat(const std::vector<const Keyframe*>& keyframes, const RenderRequest& view, VisibleSurface& surface);
+  void splat(const std::vector<SeenPoints>& keyframes, const RenderRequest& view, VisibleSurface& surface);
 
  private:
-  static constexpr int kChunk = 32;     // pixels of a row that are thrown together
+  static constexpr int kChunk = 32;     // points that are skipped together where none of them falls into a band
+  static constexpr int kRun = 1024;     // points that one thread throws
   static constexpr int kBandRows = 16;  // rows of the view that one thread fills
 
-  void throw_row(const Keyframe& keyframe, const std::vector<ViewChange>& changes, int row);
-  void collect(const Keyframe& keyframe, int begin, int end, VisibleSurface& surface) const;
+  void resize(int points);
+  void throw_run(const SurfacePoints& points, const std::vector<ViewChange>& changes, int begin, int end);
+  void collect(const SurfacePoints& points, int begin, int end, VisibleSurface& surface) const;
 
-  const KeyframeLayout& layout_;
+  Camera camera_;
+  float scale_;
   double greatest_radius_;
   const Workers& workers_;
-  int chunks_;                             // of a row
-  Image<float> x_, y_;                     // bearings (x, y, 1) of the pixels that are thrown
-  Image<float> column_, row_, inverse_z_;  // where each pixel falls, and 1 / y_z there
-  Image<float> first_row_, last_row_;      // of the pixels of each chunk
+  std::vector<float> column_, row_, inverse_z_;  // where each point falls, and 1 / y_z there
+  std::vector<float> first_row_, last_row_;      // of the points of each chunk
 };
 
 }  // namespace esim

@@ -77,7 +77,7 @@ class KeyframeSampler final : public Sampler {
     if (!first) return settle();
     before_ = std::move(ahead_.back());
     ahead_.pop_back();
-    reprojector_.reconstruct(before_.keyframe, before_.keyframe, context_.view_at(before_.t()), false, later_);
+    reprojector_.reconstruct(before_.keyframe, before_.keyframe, context_.view_at(before_.t()), Detail::whole, later_);
     ++statistics_.reconstructions;
     segment_ = {sensor(), before_.t(), before_.t(), &later_.irradiance, &later_.irradiance};
     if (before_.t() < context_.span.end) {
@@ -118,8 +118,8 @@ class KeyframeSampler final : public Sampler {
     taken.typical_px_per_s /= layout_.supersampling;
     taken.fastest_px_per_s /= layout_.supersampling;
     const RenderRequest view = context_.view_at(sample.t);
-    prepare_keyframe(layout_, reprojector_.at_infinity(), view, sample, context_.workers, taken.keyframe);
-    reprojector_.reconstruct(taken.keyframe, taken.keyframe, view, false, apart_);
+    reprojector_.prepare(view, sample, taken.keyframe);
+    reprojector_.reconstruct(taken.keyframe, taken.keyframe, view, Detail::apart, apart_);
     taken.unseen = apart_.unseen;
   }
 
@@ -167,7 +167,7 @@ class KeyframeSampler final : public Sampler {
     std::int64_t unseen = 0;
     for (const int quarter : {1, 2, 3}) {
       const TimeNs t = before_.t() + interval / 4 * quarter;
-      reprojector_.reconstruct(before_.keyframe, after.keyframe, context_.view_at(t), true, apart_);
+      reprojector_.reconstruct(before_.keyframe, after.keyframe, context_.view_at(t), Detail::apart, apart_);
       worst = std::max(worst, disagreement(apart_, context_.sensor.log_eps));
       unseen = std::max(unseen, apart_.unseen);
     }
@@ -186,7 +186,7 @@ class KeyframeSampler final : public Sampler {
                          ? after.t()
                          : before_.t() + static_cast<TimeNs>(share * static_cast<double>(after.t() - before_.t()));
     std::swap(earlier_, later_);
-    reprojector_.reconstruct(before_.keyframe, after.keyframe, context_.view_at(t), false, later_);
+    reprojector_.reconstruct(before_.keyframe, after.keyframe, context_.view_at(t), Detail::whole, later_);
     ++statistics_.reconstructions;
     unseen_ += later_.unseen;
     segment_ = {sensor(), watermark_, t, &earlier_.irradiance, &later_.irradiance};

@@ -15,7 +15,8 @@ MeasuredError measure_resampling_floor(const KeyframeLayout& layout, RenderReque
   Sample sample;
   keyframes.render(request, sample);
   Keyframe keyframe;
-  prepare_keyframe(layout, context.renderer.at_infinity, request, sample, context.workers, keyframe);
+  Reprojector reprojector(layout, context.renderer.at_infinity, context.workers);
+  reprojector.prepare(request, sample, keyframe);
 
   // Where s is odd, the sensor's pixels have their centres on those of the keyframe's: the view turns away by half a
   // one.
@@ -26,9 +27,8 @@ MeasuredError measure_resampling_floor(const KeyframeLayout& layout, RenderReque
   }
   request.tiles = {{0, 0, layout.sensor.width, layout.sensor.height}};
   sensor.render(request, sample);
-  Reprojector reprojector(layout, context.renderer.at_infinity, context.workers);
   Reconstruction found;
-  reprojector.reconstruct(keyframe, keyframe, request, false, found);
+  reprojector.reconstruct(keyframe, keyframe, request, Detail::whole, found);
 
   LogHistogram errors;
   const auto eps = static_cast<float>(context.sensor.log_eps);

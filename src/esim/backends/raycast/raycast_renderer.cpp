@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <numeric>
 #include <span>
 #include <string>
@@ -14,11 +15,18 @@
 namespace esim {
 namespace {
 
-// What each of many rays of a pixel sees of a texture, in pixels. Alone, a ray sees its surface through the triangle
-// that bilinear interpolation between texels of a pixel's size makes, whose variance is 1/6 of a pixel's square. That
-// of rays spread over the pixel is 1/12, and half the area in each makes up for the rest: where an edge comes into a
-// pixel, the surfaces that it shows do not become sharper at once.
-constexpr float kEdgeFootprint = 0.70710678F;
+/// The square that pixels average over, and what rays see of textures. Alone, a ray sees its surface through the
+/// triangle that bilinear interpolation between texels of a pixel's size makes, whose variance is 1/6 of a pixel's
+/// square. That of rays spread over the pixel is 1/12, and half the area in each makes up for the rest: where an edge
+/// comes into a pixel, the surfaces that it shows do not become sharper at once. Of pixels that are narrower than the
+/// camera's footprint, the mean over the footprint is as sharp.
+struct Area {
+  float side;  // of the square, in footprints
+
+  /// In footprints: what a ray sees of a texture, alone and where it is one of many.
+  float alone() const { return std::sqrt(0.5F * (1 + side * side)); }
+  static float together() { return 0.70710678F; }
+};
 
 /// Places of rays in a pixel, from its centre: a rank-1 lattice, in which no two are in a line with the pixel's sides.
 std::vector<Eigen::Vector2f> lattice(int count) {
@@ -102,6 +110,7 @@ class RaycastRenderer final : public ProcessorRenderer {
       : scene_(std::move(scene)),
         background_(options.background),
         places_(lattice(options.samples_per_pixel)),
+        footprint_(static_cast<float>(camera.footprint)),
         rays_(camera),
         blocks_(rays_),
         workers_(workers),
@@ -119,6 +128,9 @@ class RaycastRenderer final : public ProcessorRenderer {
 
  private:
   void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
+    const bool narrow = footprint_ > 1;
+    if (sample.narrow.empty() == narrow)
+      sample.narrow = narrow ? Image<float>(rays_.x.width(), rays_.x.height()) : Image<float>();
     std::vector<Moment> moments;
     for (const RenderRequest& request : requests) {
       moments.push_back({scene_->place(request), scene_->lighting()});
@@ -187,18 +199,23 @@ class RaycastRenderer final : public ProcessorRenderer {
                     Sample& sample) const {
     for (Work<K>& work : batch) trace(moment, views, {0, 0}, work.rays);
     for (Work<K>& work : batch) store_geometry(work, band, sample);
-    shade<K>(moment, batch, 1);
-    if (places_.size() > 1) smooth_edges<K>(moment, views, batch);
-    for (Work<K>& work : batch) store(work, work.rays.irradiance.data(), band, sample.irradiance);
+    const auto average = [&](const Area& area, Image<float>& image) {
+      shade<K>(moment, batch, area.alone());
+      if (places_.size() > 1) smooth_edges<K>(moment, views, area, batch);
+      for (Work<K>& work : batch) store(work, work.rays.irradiance.data(), band, image);
+    };
+    average({1}, sample.irradiance);
+    if (!sample.narrow.empty()) average({1 / footprint_}, sample.narrow);
   }
 
   /// Looks closer at the pixels that edges cross.
   template <int K>
-  void smooth_edges(const Moment& moment, std::span<const CellView> views, std::span<Work<K>> batch) const {
+  void smooth_edges(const Moment& moment, std::span<const CellView> views, const Area& area,
+                    std::span<Work<K>> batch) const {
     std::array<EdgeWork<K>, 8> closer;
     std::size_t count = 0;
     for (Work<K>& work : batch) {
-      for (std::uint32_t edges = edges_of(moment, views, work); edges != 0; edges &= edges - 1) {
+      for (std::uint32_t edges = edges_of(moment, views, area, work); edges != 0; edges &= edges - 1) {
         const auto lane = static_cast<unsigned>(std::countr_zero(edges));
         work.rays.irradiance[lane] = 0;
         for (std::size_t ray = 0; ray < places_.size(); ray += K) {
@@ -207,7 +224,7 @@ class RaycastRenderer final : public ProcessorRenderer {
           edge.rays.block = &edge.block, edge.rays.first = 0;
           edge.rays.first_material =
               mosaic_ ? first_material_of_edge(work.rays.first + static_cast<int>(lane)) : nullptr;
-          spread<K>(*work.rays.block, work.rays.first + static_cast<int>(lane), ray, edge.block);
+          spread<K>(*work.rays.block, work.rays.first + static_cast<int>(lane), area, ray, edge.block);
           if (count < closer.size()) continue;
           look_closer<K>(moment, views, std::span(closer));
           count = 0;
@@ -219,7 +236,8 @@ class RaycastRenderer final : public ProcessorRenderer {
 
   /// Pixels of the work that edges cross, a bit per lane.
   template <int K>
-  std::uint32_t edges_of(const Moment& moment, std::span<const CellView> views, const Work<K>& work) const {
+  std::uint32_t edges_of(const Moment& moment, std::span<const CellView> views, const Area& area,
+                         const Work<K>& work) const {
     const bool shadows = moment.lighting && moment.lighting->shadows;
     const SeenSurfaces<K> centre{work.rays.packet, work.rays.triangle, work.rays.light};
     Rays<K> corner;
@@ -227,7 +245,7 @@ class RaycastRenderer final : public ProcessorRenderer {
     GroupRotations<K> rotations;
     std::uint32_t edges = 0;
     for (const Eigen::Vector2f& place : kCorners) {
-      trace(moment, views, place, corner);
+      trace(moment, views, area.side * place, corner);
       corner.light = work.rays.light;
       if (const std::uint32_t lit = corner.hits & work.rays.lit; shadows && lit != 0)
         light_up(moment, rotations, lit, corner);
@@ -239,9 +257,9 @@ class RaycastRenderer final : public ProcessorRenderer {
 
   /// Makes a block of the pixel in lane `lane` of `from`: K times, seen from the lattice's places `first` and on.
   template <int K>
-  void spread(const RayBlock& from, int lane, std::size_t first, RayBlock& to) const {
+  void spread(const RayBlock& from, int lane, const Area& area, std::size_t first, RayBlock& to) const {
     for (std::size_t i = 0; i < K; ++i) {
-      const Eigen::Vector2f& place = places_[first + i];
+      const Eigen::Vector2f place = area.side * places_[first + i];
       to.x[i] = from.x[lane] + from.dx_du[lane] * place.x() + from.dx_dv[lane] * place.y();
       to.y[i] = from.y[lane] + from.dy_du[lane] * place.x() + from.dy_dv[lane] * place.y();
       to.dx_du[i] = from.dx_du[lane], to.dx_dv[i] = from.dx_dv[lane];
@@ -252,7 +270,7 @@ class RaycastRenderer final : public ProcessorRenderer {
   template <int K>
   void look_closer(const Moment& moment, std::span<const CellView> views, std::span<EdgeWork<K>> edges) const {
     for (EdgeWork<K>& edge : edges) trace(moment, views, {0, 0}, edge.rays);
-    shade<K>(moment, edges, kEdgeFootprint);
+    shade<K>(moment, edges, Area::together());
     for (EdgeWork<K>& edge : edges) {
       const float sum = std::accumulate(edge.rays.irradiance.begin(), edge.rays.irradiance.end(), 0.0F);
       edge.pixel->rays.irradiance[edge.lane] += sum / static_cast<float>(places_.size());
@@ -350,6 +368,7 @@ class RaycastRenderer final : public ProcessorRenderer {
   std::shared_ptr<const RaycastScene> scene_;
   float background_;
   std::vector<Eigen::Vector2f> places_;  // of the rays in a pixel that an edge crosses
+  float footprint_;                      // of the camera, px
   PixelRays rays_;
   RayBlocks blocks_;
   const Workers& workers_;

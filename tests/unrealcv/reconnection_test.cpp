@@ -88,6 +88,24 @@ TEST(UnrealcvReconnection, GivesUpOnOneThatFallsOverEachTime) {
   EXPECT_GE(server.connections(), 2);
 }
 
+TEST(UnrealcvReconnection, GivesUpOnOneThatFallsOverBehindLightThatCannotBeUsed) {
+  // Light is decoded while depth is waited for: whatever is wrong with it must not hide that nobody is there.
+  const Camera camera = test::small_camera();
+  UnrealcvServer server(test::show_ramp);
+  UnrealcvOptions options = test::options_for(server, 0.3);
+  options.light = EngineLight::npy, options.depth = EngineDepth::plane_depth;
+  const Image<float> old(640, 480, 1.0F);
+  server.tamper = [&](const std::string& command, std::string& bytes, bool& hang_up) {
+    if (command.find("plane_depth") != std::string::npos) bytes.clear(), hang_up = true;
+    if (command.find("lit npy") == std::string::npos) return;
+    const std::string payload = bytes.substr(8);
+    bytes = UnrealcvServer::framed(payload.substr(0, payload.find(':') + 1) + UnrealcvServer::npy("<f4", old));
+  };
+  const auto renderer = test::renderer_for(options, camera);
+  EXPECT_TRUE(test::contains(test::message_of<EngineError>([&] { test::render(*renderer, camera, {}); }), "is gone"));
+  EXPECT_GE(server.connections(), 2);
+}
+
 TEST(UnrealcvReconnection, WhatIsNotWantedIsForgotten) {
   const Camera camera = test::small_camera();
   UnrealcvServer server(test::show_ramp);

@@ -9,6 +9,8 @@
 #include <memory>
 #include <string_view>
 
+#include "esim/core/inflate.h"
+
 namespace esim {
 namespace {
 
@@ -54,24 +56,20 @@ bool read_header(const Chunk& chunk, PngPixels& pixels) {
   return (pixels.bits == 8 || pixels.bits == 16) && pixels.channels > 0 && known_methods;
 }
 
-/// The compressed bytes: those of the only IDAT chunk, or of all in `joined`. Empty where anything is wrong, or the
-/// image has a transparent colour.
-std::span<const std::uint8_t> compressed_bytes(std::span<const std::uint8_t> rest, std::vector<std::uint8_t>& joined) {
-  std::span<const std::uint8_t> all;
+/// Joins the compressed bytes, those of all IDAT chunks, and returns how many they are. None where anything is wrong,
+/// or the image has a transparent colour.
+std::size_t join_compressed(std::span<const std::uint8_t> rest, std::vector<std::uint8_t>& joined) {
+  joined.resize(rest.size() + kInflateMargin);
+  std::size_t size = 0;
   Chunk chunk;
   while (take_chunk(rest, chunk)) {
-    if (chunk.name == "IEND") return all;
-    if (chunk.name == "tRNS") return {};
+    if (chunk.name == "IEND") return size;
+    if (chunk.name == "tRNS") return 0;
     if (chunk.name != "IDAT") continue;
-    if (all.empty()) {
-      all = chunk.data;
-      continue;
-    }
-    if (joined.empty()) joined.assign(all.begin(), all.end());
-    joined.insert(joined.end(), chunk.data.begin(), chunk.data.end());
-    all = joined;
+    std::copy(chunk.data.begin(), chunk.data.end(), joined.begin() + static_cast<std::ptrdiff_t>(size));
+    size += chunk.data.size();
   }
-  return {};
+  return 0;
 }
 
 // A pixel's bytes as 16-bit numbers.
@@ -103,6 +101,29 @@ Pixel paeth(Pixel left, Pixel above, Pixel corner) {
   return hn::IfThenElse(hn::Eq(nearest, to_left), left, hn::IfThenElse(hn::Eq(nearest, to_above), above, corner));
 }
 
+/// A pixel's bytes are the sums of all to the left: those of a vector, in the logarithm of their number of steps.
+template <std::size_t kBytes>
+void undo_sub(const std::uint8_t* coded, std::uint8_t* out, std::size_t size) {
+  const hn::FixedTag<std::uint8_t, 16> d;
+  constexpr std::size_t kVector = 16, kWhole = kVector / kBytes * kBytes;  // bytes of whole pixels
+  alignas(kVector) std::uint8_t last[kVector];
+  for (std::size_t i = 0; i < kVector; ++i) last[i] = static_cast<std::uint8_t>(kWhole - kBytes + i % kBytes);
+  const auto of_last = hn::Load(d, last);
+  auto left = hn::Zero(d);
+  std::size_t i = 0;
+  for (; i + kVector <= size; i += kWhole) {
+    auto sum = hn::LoadU(d, coded + i);
+    sum = hn::Add(sum, hn::ShiftLeftBytes<kBytes>(sum));
+    if constexpr (2 * kBytes < kVector) sum = hn::Add(sum, hn::ShiftLeftBytes<2 * kBytes>(sum));
+    if constexpr (4 * kBytes < kVector) sum = hn::Add(sum, hn::ShiftLeftBytes<4 * kBytes>(sum));
+    if constexpr (8 * kBytes < kVector) sum = hn::Add(sum, hn::ShiftLeftBytes<8 * kBytes>(sum));
+    sum = hn::Add(sum, left);
+    hn::StoreU(sum, d, out + i);
+    left = hn::TableLookupBytes(sum, of_last);
+  }
+  for (; i < size; ++i) out[i] = static_cast<std::uint8_t>(coded[i] + (i < kBytes ? 0 : out[i - kBytes]));
+}
+
 enum Filter : std::uint8_t { kNone, kSub, kUp, kAverage, kPaeth, kFilters };
 
 /// Undoes the filter of a row of pixels that have so many bytes each; `above` is the finished row before, or zeros.
@@ -112,8 +133,7 @@ void unfilter(std::uint8_t filter, const std::uint8_t* coded, const std::uint8_t
   Pixel left = hn::Zero(Lanes()), corner = left;
   switch (filter) {
     case kSub:
-      for (std::size_t i = 0; i < size; i += kBytes)
-        left = store<kBytes>(hn::Add(load<kBytes>(coded + i), left), out + i);
+      undo_sub<kBytes>(coded, out, size);
       break;
     case kUp:
       for (std::size_t i = 0; i < size; ++i) out[i] = static_cast<std::uint8_t>(coded[i] + above[i]);
@@ -163,7 +183,9 @@ struct FreeDecompressor {
   void operator()(libdeflate_decompressor* decompressor) const { libdeflate_free_decompressor(decompressor); }
 };
 
+/// As inflate_zlib(), after which libdeflate has the last word on what is damaged.
 bool inflate(std::span<const std::uint8_t> compressed, std::span<std::uint8_t> out) {
+  if (inflate_zlib(compressed, out)) return true;
   thread_local const std::unique_ptr<libdeflate_decompressor, FreeDecompressor> kDecompressor(
       libdeflate_alloc_decompressor());
   // Without a place for the number of bytes, exactly as many as there is room for are a success.
@@ -183,16 +205,16 @@ bool decode_png_pixels(std::span<const std::byte> file, PngPixels& pixels) {
   rest = rest.subspan(kSignature.size());
   Chunk header;
   if (!take_chunk(rest, header) || !read_header(header, pixels)) return false;
-  std::vector<std::uint8_t> joined;
-  const std::span<const std::uint8_t> compressed = compressed_bytes(rest, joined);
+  thread_local std::vector<std::uint8_t> joined;
+  const std::size_t compressed = join_compressed(rest, joined);
 
   // Each row stands behind the number of its filter.
   constexpr std::size_t kMostPerByte = 1040;  // deflate's limit, and a little
   const std::size_t stride = pixels.row_bytes + 1, height = static_cast<std::size_t>(pixels.height);
-  if (stride > kMostPerByte * compressed.size() / height) return false;
+  if (stride > kMostPerByte * compressed / height) return false;
   thread_local std::vector<std::uint8_t> filtered;
-  filtered.resize(stride * height);
-  if (!inflate(compressed, filtered)) return false;
+  filtered.resize(stride * height + kInflateMargin);
+  if (!inflate(std::span(joined).first(compressed), std::span(filtered).first(stride * height))) return false;
 
   pixels.bytes.resize(pixels.row_bytes * height);
   const Unfilter undo = unfilter_for(static_cast<std::size_t>(pixels.channels * pixels.bits / 8));

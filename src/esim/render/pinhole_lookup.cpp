@@ -8,16 +8,9 @@
 namespace esim {
 namespace {
 
-void copy(const PinholeImage& image, const Tile& tile, Sample& sample) {
-  const int end = tile.x + tile.width;
-  for (int y = tile.y; y < tile.y + tile.height; ++y) {
-    const auto copy_row = [&](const auto& from, auto& to) {
-      std::copy(from.row(y) + tile.x, from.row(y) + end, to.row(y) + tile.x);
-    };
-    copy_row(image.irradiance, sample.irradiance);
-    copy_row(image.depth, sample.depth);
-    if (!sample.object.empty() && !image.object.empty()) copy_row(image.object, sample.object);
-  }
+template <typename T>
+void copy(const Image<T>& from, const Tile& tile, Image<T>& to) {
+  for (int y = tile.y; y < tile.y + tile.height; ++y) std::copy_n(from.row(y) + tile.x, tile.width, to.row(y) + tile.x);
 }
 
 namespace hn = hwy::HWY_NAMESPACE;
@@ -68,10 +61,12 @@ Vector slope(const Image<float>& depth, const Place& place, Vector here, int dx,
 
 constexpr float kHalf = 0.5F;  // added, lets cutting off round
 
-/// E and Z of as many pixels as a vector has. Not inlined: all pixels go through the same instructions, whether they
-/// stand at the end of a row or not, so that tiles equal whole images.
-HWY_NOINLINE void look_up_vector(const PinholeImage& image, const float* centres, const float* footprints,
-                                 float* irradiance, float* depth) {
+// Of as many pixels as a vector has. Not inlined: all pixels go through the same instructions, whether they stand at
+// the end of a row or not, so that tiles equal whole images.
+
+/// E.
+HWY_NOINLINE void light_of_vector(const Image<float>& image, const float* centres, const float* footprints,
+                                  float* irradiance) {
   const Floats d;
   Vector cx, cy, right_x, down_x, right_y, down_y;
   hn::LoadInterleaved2(d, centres, cx, cy);
@@ -80,60 +75,86 @@ HWY_NOINLINE void look_up_vector(const PinholeImage& image, const float* centres
   for (const float a : {-0.25F, 0.25F}) {
     for (const float b : {-0.25F, 0.25F}) {
       const Vector right = hn::Set(d, a), down = hn::Set(d, b);
-      sum = hn::Add(sum, interpolate(image.irradiance, hn::MulAdd(right, right_x, hn::MulAdd(down, down_x, cx)),
+      sum = hn::Add(sum, interpolate(image, hn::MulAdd(right, right_x, hn::MulAdd(down, down_x, cx)),
                                      hn::MulAdd(right, right_y, hn::MulAdd(down, down_y, cy))));
     }
   }
   hn::StoreU(hn::Mul(hn::Set(d, 0.25F), sum), d, irradiance);
+}
 
+/// Z.
+HWY_NOINLINE void depth_of_vector(const Image<float>& image, const float* centres, float* depth) {
+  const Floats d;
+  Vector cx, cy;
+  hn::LoadInterleaved2(d, centres, cx, cy);
   const Vector half = hn::Set(d, kHalf);
-  const Place place(image.depth, hn::ConvertTo(Ints(), hn::Add(cx, half)), hn::ConvertTo(Ints(), hn::Add(cy, half)), 1,
-                    2);
-  const Vector here = inverse(place.value(image.depth, 0, 0));
-  const Vector along_x = hn::Mul(hn::Sub(cx, hn::ConvertTo(d, place.x)), slope(image.depth, place, here, 1, 0));
-  const Vector along_y = hn::Mul(hn::Sub(cy, hn::ConvertTo(d, place.y)), slope(image.depth, place, here, 0, 1));
+  const Place place(image, hn::ConvertTo(Ints(), hn::Add(cx, half)), hn::ConvertTo(Ints(), hn::Add(cy, half)), 1, 2);
+  const Vector here = inverse(place.value(image, 0, 0));
+  const Vector along_x = hn::Mul(hn::Sub(cx, hn::ConvertTo(d, place.x)), slope(image, place, here, 1, 0));
+  const Vector along_y = hn::Mul(hn::Sub(cy, hn::ConvertTo(d, place.y)), slope(image, place, here, 0, 1));
   const Vector nearest = hn::Add(here, hn::Add(along_x, along_y));
   const Vector nothing = hn::Set(d, std::numeric_limits<float>::infinity());
   hn::StoreU(hn::IfThenElse(hn::Gt(nearest, hn::Zero(d)), inverse(nearest), nothing), d, depth);
 }
 
-/// Copies what a vector of pixels needs, and back, where fewer are left.
-void look_up_rest(const PinholeImage& image, const float* centres, const float* footprints, std::size_t count,
-                  float* irradiance, float* depth) {
-  float own_centres[2 * kMostLanes] = {}, own_footprints[4 * kMostLanes] = {}, light[kMostLanes], z[kMostLanes];
-  std::copy_n(centres, 2 * count, own_centres);
-  std::copy_n(footprints, 4 * count, own_footprints);
-  look_up_vector(image, own_centres, own_footprints, light, z);
-  std::copy_n(light, count, irradiance);
-  std::copy_n(z, count, depth);
+/// Calls look_up(centres, footprints, out) for the vectors of pixels of a tile. Where fewer pixels are left in a row,
+/// what they need is copied, and back.
+template <typename LookUp>
+void for_each_vector(const PinholeView& view, const Tile& tile, Image<float>& out, const LookUp& look_up) {
+  const std::size_t lanes = hn::Lanes(Floats()), width = static_cast<std::size_t>(tile.width);
+  for (int y = tile.y; y < tile.y + tile.height; ++y) {
+    float* const to = out.row(y) + tile.x;
+    const auto first = static_cast<std::size_t>(to - out.data());
+    for (std::size_t x = 0; x < width; x += lanes) {
+      const float *const centres = &view.centres[2 * (first + x)], *const footprints =
+                                                                       &view.footprints[4 * (first + x)];
+      if (x + lanes <= width) {
+        look_up(centres, footprints, to + x);
+        continue;
+      }
+      const std::size_t count = width - x;
+      float own_centres[2 * kMostLanes] = {}, own_footprints[4 * kMostLanes] = {}, own[kMostLanes];
+      std::copy_n(centres, 2 * count, own_centres);
+      std::copy_n(footprints, 4 * count, own_footprints);
+      look_up(own_centres, own_footprints, own);
+      std::copy_n(own, count, to + x);
+    }
+  }
 }
 
-void look_up_objects(const PinholeImage& image, const float* centres, std::size_t count, std::uint16_t* object) {
-  for (std::size_t k = 0; k < count; ++k) {
-    const int i = std::clamp(static_cast<int>(centres[2 * k] + kHalf), 1, image.depth.width() - 2);
-    const int j = std::clamp(static_cast<int>(centres[2 * k + 1] + kHalf), 1, image.depth.height() - 2);
-    object[k] = image.object(i, j);
+void look_up_objects(const PinholeView& view, const PinholeImage& image, const Tile& tile,
+                     Image<std::uint16_t>& object) {
+  for (int y = tile.y; y < tile.y + tile.height; ++y) {
+    std::uint16_t* const to = object.row(y) + tile.x;
+    const float* const centres = &view.centres[2 * static_cast<std::size_t>(to - object.data())];
+    for (int k = 0; k < tile.width; ++k) {
+      const int i = std::clamp(static_cast<int>(centres[2 * k] + kHalf), 1, image.depth.width() - 2);
+      const int j = std::clamp(static_cast<int>(centres[2 * k + 1] + kHalf), 1, image.depth.height() - 2);
+      to[k] = image.object(i, j);
+    }
   }
 }
 
 }  // namespace
 
-void look_up(const PinholeView& view, const PinholeImage& image, const Tile& tile, Sample& sample) {
-  if (!view.looked_up) return copy(image, tile, sample);
-  const std::size_t lanes = hn::Lanes(Floats()), width = static_cast<std::size_t>(tile.width);
-  for (int y = tile.y; y < tile.y + tile.height; ++y) {
-    const auto first =
-        static_cast<std::size_t>(y) * static_cast<std::size_t>(sample.depth.width()) + static_cast<std::size_t>(tile.x);
-    const float* const centres = &view.centres[2 * first];
-    const float* const footprints = &view.footprints[4 * first];
-    float *const irradiance = sample.irradiance.row(y) + tile.x, *const depth = sample.depth.row(y) + tile.x;
-    std::size_t x = 0;
-    for (; x + lanes <= width; x += lanes)
-      look_up_vector(image, centres + 2 * x, footprints + 4 * x, irradiance + x, depth + x);
-    if (x < width) look_up_rest(image, centres + 2 * x, footprints + 4 * x, width - x, irradiance + x, depth + x);
-    if (!sample.object.empty() && !image.object.empty())
-      look_up_objects(image, centres, width, sample.object.row(y) + tile.x);
+void look_up_light(const PinholeView& view, const PinholeImage& image, const Tile& tile, Sample& sample) {
+  if (!view.looked_up) return copy(image.irradiance, tile, sample.irradiance);
+  for_each_vector(view, tile, sample.irradiance, [&](const float* centres, const float* footprints, float* irradiance) {
+    light_of_vector(image.irradiance, centres, footprints, irradiance);
+  });
+}
+
+void look_up_geometry(const PinholeView& view, const PinholeImage& image, const Tile& tile, Sample& sample) {
+  const bool with_objects = !sample.object.empty() && !image.object.empty();
+  if (!view.looked_up) {
+    copy(image.depth, tile, sample.depth);
+    if (with_objects) copy(image.object, tile, sample.object);
+    return;
   }
+  for_each_vector(view, tile, sample.depth, [&](const float* centres, const float*, float* depth) {
+    depth_of_vector(image.depth, centres, depth);
+  });
+  if (with_objects) look_up_objects(view, image, tile, sample.object);
 }
 
 }  // namespace esim

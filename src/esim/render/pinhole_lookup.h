@@ -15,10 +15,14 @@ struct PinholeImage {
   Image<std::uint16_t> object;  ///< as in Sample; without size where nobody asked
 };
 
-/// Fills E, Z and, where the sample has room for it, the object of a tile of the camera's pixels from the image that
-/// `view` describes. Where that is not the camera's own, E is the mean of four places in the pixel's footprint, each
-/// between four pixels: blurred by less than a pixel. Z follows from the plane that the nearest pixel sees, on which
-/// 1 / Z is linear: exact away from edges. The object is that of the nearest pixel.
-void look_up(const PinholeView& view, const PinholeImage& image, const Tile& tile, Sample& sample);
+// For a tile of the camera's pixels, from the image that `view` describes. Where that is not the camera's own, it is
+// looked up in.
+
+/// Fills E: the mean of four places in the pixel's footprint, each between four pixels: blurred by less than a pixel.
+void look_up_light(const PinholeView& view, const PinholeImage& image, const Tile& tile, Sample& sample);
+
+/// Fills Z and, where the sample has room for it, the object. Z follows from the plane that the nearest pixel sees, on
+/// which 1 / Z is linear: exact away from edges. The object is that of the nearest pixel.
+void look_up_geometry(const PinholeView& view, const PinholeImage& image, const Tile& tile, Sample& sample);
 
 }  // namespace esim

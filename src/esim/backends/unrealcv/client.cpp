@@ -4,6 +4,8 @@
 #include <poll.h>
 
 #include <algorithm>
+#include <exception>
+#include <span>
 #include <utility>
 
 #include "esim/backends/unrealcv/engine_image.h"
@@ -73,13 +75,14 @@ void UnrealcvClient::connect(const EngineView& view, SteadyTime give_up) {
 }
 
 /// The answers to what is asked, whatever connections that takes.
-void UnrealcvClient::wait_for(const Asked& asked) {
+void UnrealcvClient::wait_for(const Asked& asked, Until until) {
   SteadyTime give_up = seconds_from_now(options_.timeout_s);
   while (true) {
     const bool was_connected = session_.has_value();
     try {
       if (!session_) connect(asked.view, give_up);
-      session_->wait_for(asked.batch);
+      const std::size_t later = until == Until::light ? dialect_->images() - 1 : 0;
+      session_->wait_for(std::span(asked.batch).first(asked.batch.size() - later));
       return;
     } catch (const ConnectionLost& lost) {
       session_.reset();
@@ -105,13 +108,36 @@ void UnrealcvClient::fail_to_connect(const std::string& reason) const {
        "see why it ended");
 }
 
-void UnrealcvClient::finish(const std::shared_ptr<Asked>& asked, PinholeImage& image) {
+/// Waits for a view once. Throws OtherSize; whatever is wrong with the light, what is wrong with the connection or the
+/// depth comes first.
+void UnrealcvClient::receive(Asked& asked, const Workers& workers, PinholeImage& image,
+                             const std::function<void()>& take_geometry) {
+  wait_for(asked, Until::light);
+  // Taken out, for the batch is another if the connection is lost now.
+  const EngineRequest light = dialect_->take_light(asked.batch);
+  std::exception_ptr failed[2];
+  workers.for_each(2, [&](int part) {
+    try {
+      if (part == 0) return dialect_->decode_light(light, asked.view, image);
+      wait_for(asked, Until::all);
+      dialect_->decode_geometry(asked.batch, asked.view, image);
+      take_geometry();
+    } catch (...) {
+      failed[part] = std::current_exception();
+    }
+  });
+  for (const int part : {1, 0}) {
+    if (failed[part]) std::rethrow_exception(failed[part]);
+  }
+}
+
+void UnrealcvClient::finish(const std::shared_ptr<Asked>& asked, const Workers& workers, PinholeImage& image,
+                            const std::function<void()>& take_geometry) {
   const std::lock_guard lock(mutex_);
   const SteadyTime give_up = seconds_from_now(options_.timeout_s);
   for (bool first = true;; first = false) {
-    wait_for(*asked);
     try {
-      dialect_->decode(asked->batch, asked->view, image);
+      receive(*asked, workers, image, take_geometry);
       break;
     } catch (const OtherSize& other) {
       // The window may take some frames to change.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -9,6 +10,7 @@
 
 #include "esim/backends/unrealcv/dialect.h"
 #include "esim/backends/unrealcv/session.h"
+#include "esim/core/parallel.h"
 
 namespace esim {
 
@@ -31,8 +33,11 @@ class UnrealcvClient {
   /// Asks for a view; neither waits nor fails.
   std::shared_ptr<Asked> start(EngineView view);
 
-  /// Waits for it. Throws EngineError naming the host, the port, what was asked, and what to do.
-  void finish(const std::shared_ptr<Asked>& asked, PinholeImage& image);
+  /// Waits for it. Light is decoded while depth and objects are on their way; meanwhile `take_geometry` is called, once
+  /// these are in the image, and again where the program had to be asked again. Throws EngineError naming the host, the
+  /// port, what was asked, and what to do.
+  void finish(const std::shared_ptr<Asked>& asked, const Workers& workers, PinholeImage& image,
+              const std::function<void()>& take_geometry);
 
   /// It need not be finished.
   void abandon(const std::shared_ptr<Asked>& asked);
@@ -41,7 +46,9 @@ class UnrealcvClient {
   void submit(Asked& asked);
   void submit_or_lose(Asked& asked);
   void connect(const EngineView& view, SteadyTime give_up);
-  void wait_for(const Asked& asked);
+  enum class Until { light, all };
+  void wait_for(const Asked& asked, Until until);
+  void receive(Asked& asked, const Workers& workers, PinholeImage& image, const std::function<void()>& take_geometry);
   [[noreturn]] void fail_to_connect(const std::string& reason) const;
   void forget_answered();
 

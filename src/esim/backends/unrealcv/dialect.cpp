@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "esim/backends/unrealcv/engine_image.h"
 #include "esim/backends/unrealcv/unreal_pose.h"
@@ -157,7 +158,7 @@ EngineBatch Dialect::commands_for(const EngineView& view, EngineState& state) co
   return batch;
 }
 
-void Dialect::require_done(const EngineBatch& batch) const {
+void Dialect::require_done(std::span<const EngineRequest> batch) const {
   for (const EngineRequest& request : batch) {
     if (!request.is_refused()) continue;
     fail(options_, fmt::format("told '{}', it answers '{}'", request.command, shortened(*request.answer)),
@@ -165,30 +166,42 @@ void Dialect::require_done(const EngineBatch& batch) const {
   }
 }
 
-void Dialect::decode(const EngineBatch& answered, const EngineView& view, PinholeImage& image) const {
+EngineRequest Dialect::take_light(EngineBatch& batch) const {
+  const std::size_t light = batch.size() - images();
+  require_done(std::span(batch).first(light + 1));
+  return std::exchange(batch[light], {batch[light].command, ""});
+}
+
+/// Names the command in what goes wrong.
+template <typename Decode>
+void Dialect::decode(const EngineRequest& answered, const Decode& decode) const {
+  try {
+    decode(*answered.answer);
+  } catch (const EngineError& error) {
+    fail(options_, fmt::format("what it answers to '{}' {}", answered.command, error.what()),
+         "renderer.light, renderer.depth and renderer.object_mask say how images are asked for");
+  }
+}
+
+void Dialect::decode_light(const EngineRequest& answered, const EngineView& view, PinholeImage& image) const {
+  decode(answered, [&](const std::string& body) {
+    esim::decode_light(body, {view.width, view.height}, image.irradiance);
+  });
+  if (options_.exposure == 1) return;
+  for (float& light : image.irradiance.pixels()) light *= static_cast<float>(options_.exposure);
+}
+
+void Dialect::decode_geometry(const EngineBatch& answered, const EngineView& view, PinholeImage& image) const {
   require_done(answered);
-  const std::size_t images = masks() ? 3 : 2, first = answered.size() - images;
   const ImageExtent extent{view.width, view.height};
-  const auto decode_answer = [&](std::size_t which, const auto& decode) {
-    const EngineRequest& request = answered[first + which];
-    try {
-      decode(*request.answer);
-    } catch (const EngineError& error) {
-      fail(options_, fmt::format("what it answers to '{}' {}", request.command, error.what()),
-           "renderer.light, renderer.depth and renderer.object_mask say how images are asked for");
-    }
-  };
-  decode_answer(0, [&](const std::string& body) { decode_light(body, extent, image.irradiance); });
-  decode_answer(1, [&](const std::string& body) { decode_depth(body, extent, image.depth); });
+  const std::size_t depth = answered.size() - images() + 1;
+  decode(answered[depth], [&](const std::string& body) { decode_depth(body, extent, image.depth); });
   if (masks()) {
-    decode_answer(2, [&](const std::string& body) { decode_mask(body, extent, mask_codes_, image.object); });
+    decode(answered[depth + 1], [&](const std::string& body) { decode_mask(body, extent, mask_codes_, image.object); });
   } else if (!options_.objects.empty() && image.object.bounds() != image.depth.bounds()) {
     image.object = Image<std::uint16_t>(view.width, view.height);
   }
   convert_depth(view, image.depth);
-  if (options_.exposure != 1) {
-    for (float& light : image.irradiance.pixels()) light *= static_cast<float>(options_.exposure);
-  }
 }
 
 void Dialect::convert_depth(const EngineView& view, Image<float>& depth) const {

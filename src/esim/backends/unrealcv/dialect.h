@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -36,15 +38,27 @@ class Dialect {
   /// What to send so that it shows a view. Then `state` is what it was told.
   EngineBatch commands_for(const EngineView& view, EngineState& state) const;
 
-  /// The image in the answers to these commands: E, Z in metres, and the object where any are known. Throws OtherSize,
-  /// and EngineError naming the command that failed.
-  void decode(const EngineBatch& answered, const EngineView& view, PinholeImage& image) const;
+  /// How many of the last answers to these commands are images. The first of them is light.
+  std::size_t images() const { return masks() ? 3 : 2; }
+
+  /// Takes the answer that is light out of a batch in which no more need be answered. Throws EngineError naming a
+  /// command that failed.
+  EngineRequest take_light(EngineBatch& batch) const;
+
+  /// E in that answer. Throws OtherSize, and EngineError naming the command.
+  void decode_light(const EngineRequest& answered, const EngineView& view, PinholeImage& image) const;
+
+  /// Z in metres, and the object where any are known, in the answers to all commands. Throws OtherSize, and EngineError
+  /// naming the command that failed.
+  void decode_geometry(const EngineBatch& answered, const EngineView& view, PinholeImage& image) const;
 
  private:
   void learn_commands(EngineSession& session);
   void learn_images(EngineSession& session);
   void learn_objects(EngineSession& session);
-  void require_done(const EngineBatch& batch) const;
+  void require_done(std::span<const EngineRequest> batch) const;
+  template <typename Decode>
+  void decode(const EngineRequest& answered, const Decode& decode) const;
   std::string camera(const char* verb, const std::string& rest) const;
   EngineBatch setting_commands(const EngineView& view, EngineState& state) const;
   std::vector<std::string> image_commands() const;

@@ -78,7 +78,7 @@ bool EngineSession::take(std::string& message) {
   return true;
 }
 
-void EngineSession::wait_for(const EngineBatch& batch) {
+void EngineSession::wait_for(std::span<const EngineRequest> batch) {
   SteadyTime patience = seconds_from_now(options_.timeout_s);
   for (const EngineRequest& request : batch) {
     while (!request.answer) {

@@ -5,6 +5,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -42,8 +43,9 @@ class EngineSession {
   /// Sends a batch, or puts it in the queue; it must live until it is answered, or the session ends.
   void send(EngineBatch& batch);
 
-  /// Waits until all of it is answered. Throws ConnectionLost, and EngineError where no answer has come for too long.
-  void wait_for(const EngineBatch& batch);
+  /// Waits until all of a batch, or of a part of it, is answered. Throws ConnectionLost, and EngineError where no
+  /// answer has come for too long.
+  void wait_for(std::span<const EngineRequest> batch);
 
   /// Sends commands and waits for their answers.
   EngineBatch ask(std::vector<std::string> commands);

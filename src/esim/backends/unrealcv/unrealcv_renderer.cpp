@@ -53,10 +53,14 @@ class UnrealcvRenderer final : public Renderer {
     UnderWay& operator=(const UnderWay&) = delete;
 
     void finish(Sample& sample) override {
-      renderer.client_->finish(asked, renderer.image_);
+      UnrealcvRenderer& r = renderer;
+      r.client_->finish(asked, r.workers_, r.image_, [&] {
+        render_in_bands({&request, 1}, r.rays_, r.workers_, sample,
+                        [&](std::size_t, const Tile& band) { look_up_geometry(r.view_, r.image_, band, sample); });
+      });
       asked.reset();
-      render_in_bands({&request, 1}, renderer.rays_, renderer.workers_, sample,
-                      [&](std::size_t, const Tile& band) { look_up(renderer.view_, renderer.image_, band, sample); });
+      render_in_bands({&request, 1}, r.rays_.x.width(), r.rays_.x.height(), r.workers_, sample,
+                      [&](std::size_t, const Tile& band) { look_up_light(r.view_, r.image_, band, sample); });
     }
 
     UnrealcvRenderer& renderer;

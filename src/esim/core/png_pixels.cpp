@@ -1,15 +1,15 @@
 #include "esim/core/png_pixels.h"
 
 #include <hwy/highway.h>
-#include <libdeflate.h>
+#include <isa-l/crc.h>
+#include <isa-l/igzip_lib.h>
 
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <string_view>
-
-#include "esim/core/inflate.h"
 
 namespace esim {
 namespace {
@@ -35,7 +35,7 @@ bool take_chunk(std::span<const std::uint8_t>& rest, Chunk& chunk) {
   if (size > rest.size() - kHead - kChecksum) return false;
   chunk.name = {reinterpret_cast<const char*>(rest.data()) + 4, 4};
   chunk.data = rest.subspan(kHead, size);
-  if (libdeflate_crc32(0, rest.data() + 4, size + 4) != big_endian(rest.data() + kHead + size)) return false;
+  if (crc32_gzip_refl(0, rest.data() + 4, size + 4) != big_endian(rest.data() + kHead + size)) return false;
   rest = rest.subspan(kHead + size + kChecksum);
   return true;
 }
@@ -56,20 +56,24 @@ bool read_header(const Chunk& chunk, PngPixels& pixels) {
   return (pixels.bits == 8 || pixels.bits == 16) && pixels.channels > 0 && known_methods;
 }
 
-/// Joins the compressed bytes, those of all IDAT chunks, and returns how many they are. None where anything is wrong,
-/// or the image has a transparent colour.
-std::size_t join_compressed(std::span<const std::uint8_t> rest, std::vector<std::uint8_t>& joined) {
-  joined.resize(rest.size() + kInflateMargin);
-  std::size_t size = 0;
+/// The compressed bytes: those of the only IDAT chunk, or of all in `joined`. Empty where anything is wrong, or the
+/// image has a transparent colour.
+std::span<const std::uint8_t> compressed_bytes(std::span<const std::uint8_t> rest, std::vector<std::uint8_t>& joined) {
+  std::span<const std::uint8_t> all;
   Chunk chunk;
   while (take_chunk(rest, chunk)) {
-    if (chunk.name == "IEND") return size;
-    if (chunk.name == "tRNS") return 0;
+    if (chunk.name == "IEND") return all;
+    if (chunk.name == "tRNS") return {};
     if (chunk.name != "IDAT") continue;
-    std::copy(chunk.data.begin(), chunk.data.end(), joined.begin() + static_cast<std::ptrdiff_t>(size));
-    size += chunk.data.size();
+    if (all.empty()) {
+      all = chunk.data;
+      continue;
+    }
+    if (joined.empty()) joined.assign(all.begin(), all.end());
+    joined.insert(joined.end(), chunk.data.begin(), chunk.data.end());
+    all = joined;
   }
-  return 0;
+  return {};
 }
 
 // A pixel's bytes as 16-bit numbers.
@@ -179,19 +183,19 @@ void swap_bytes(std::vector<std::uint8_t>& bytes) {
   for (std::size_t i = 0; i + 1 < bytes.size(); i += 2) std::swap(bytes[i], bytes[i + 1]);
 }
 
-struct FreeDecompressor {
-  void operator()(libdeflate_decompressor* decompressor) const { libdeflate_free_decompressor(decompressor); }
-};
-
-/// As inflate_zlib(), after which libdeflate has the last word on what is damaged.
+/// False where the stream is damaged or is not of as many bytes as there is room for.
 bool inflate(std::span<const std::uint8_t> compressed, std::span<std::uint8_t> out) {
-  if (inflate_zlib(compressed, out)) return true;
-  thread_local const std::unique_ptr<libdeflate_decompressor, FreeDecompressor> kDecompressor(
-      libdeflate_alloc_decompressor());
-  // Without a place for the number of bytes, exactly as many as there is room for are a success.
-  return kDecompressor != nullptr &&
-         libdeflate_zlib_decompress(kDecompressor.get(), compressed.data(), compressed.size(), out.data(), out.size(),
-                                    nullptr) == LIBDEFLATE_SUCCESS;
+  constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
+  if (compressed.size() > kMost || out.size() > kMost) return false;
+  thread_local const auto kState = std::make_unique<inflate_state>();
+  isal_inflate_init(kState.get());
+  kState->crc_flag = ISAL_ZLIB;  // with its header and its checksum
+  kState->next_in = const_cast<std::uint8_t*>(compressed.data());
+  kState->avail_in = static_cast<std::uint32_t>(compressed.size());
+  kState->next_out = out.data();
+  kState->avail_out = static_cast<std::uint32_t>(out.size());
+  return isal_inflate(kState.get()) == ISAL_DECOMP_OK && kState->block_state == ISAL_BLOCK_FINISH &&
+         kState->avail_out == 0;
 }
 
 }  // namespace
@@ -205,16 +209,16 @@ bool decode_png_pixels(std::span<const std::byte> file, PngPixels& pixels) {
   rest = rest.subspan(kSignature.size());
   Chunk header;
   if (!take_chunk(rest, header) || !read_header(header, pixels)) return false;
-  thread_local std::vector<std::uint8_t> joined;
-  const std::size_t compressed = join_compressed(rest, joined);
+  std::vector<std::uint8_t> joined;
+  const std::span<const std::uint8_t> compressed = compressed_bytes(rest, joined);
 
   // Each row stands behind the number of its filter.
   constexpr std::size_t kMostPerByte = 1040;  // deflate's limit, and a little
   const std::size_t stride = pixels.row_bytes + 1, height = static_cast<std::size_t>(pixels.height);
-  if (stride > kMostPerByte * compressed / height) return false;
+  if (stride > kMostPerByte * compressed.size() / height) return false;
   thread_local std::vector<std::uint8_t> filtered;
-  filtered.resize(stride * height + kInflateMargin);
-  if (!inflate(std::span(joined).first(compressed), std::span(filtered).first(stride * height))) return false;
+  filtered.resize(stride * height);
+  if (!inflate(compressed, filtered)) return false;
 
   pixels.bytes.resize(pixels.row_bytes * height);
   const Unfilter undo = unfilter_for(static_cast<std::size_t>(pixels.channels * pixels.bits / 8));

@@ -18,11 +18,12 @@ MeasuredError measure_resampling_floor(const KeyframeLayout& layout, RenderReque
   Reprojector reprojector(layout, context.renderer.at_infinity, context.workers);
   reprojector.prepare(request, sample, keyframe);
 
-  // The view turns away such that its pixels are far from the keyframe's. Where s is odd, both the sensor's pixels and
-  // the places within them have their centres on pixels of the keyframe: by half of one. Where s is even, the sensor's
-  // pixels have theirs between two already, and the places have not: by a quarter.
+  // The view turns away such that its pixels are far from the keyframe's. Where s is odd, the sensor's pixels and the
+  // places within them have their centres on pixels of the keyframe: by half of one. Where s is even, the sensor's
+  // pixels have theirs between two already, and the places, if they are looked at, have not: by a quarter.
+  const double even = keyframe.narrow.root.empty() ? 0 : 0.25;
+  const double turn = (layout.supersampling % 2 == 1 ? 0.5 : even) / layout.supersampling;
   SE3& pose = request.camera.T_world_body;
-  const double turn = (layout.supersampling % 2 == 1 ? 0.5 : 0.25) / layout.supersampling;
   pose.rotation = pose.rotation * so3_exp(Eigen::Vector3d(-turn / layout.sensor.fy, turn / layout.sensor.fx, 0));
   request.tiles = {{0, 0, layout.sensor.width, layout.sensor.height}};
   sensor.render(request, sample);

@@ -56,6 +56,11 @@ export function makeFiles() {
     `${room}duration_s: 0.6\ntrajectory: {type: file, path: room/trajectory.txt}\n${camera}imu: {rate_hz: 200}\n`,
   );
   writeFileSync(join(folder, "room.yaml"), `${room}trajectory: {type: file, path: room/trajectory.txt}\n${camera}`);
+  // Longer than anybody waits: it is there to be cancelled.
+  writeFileSync(
+    join(folder, "long.yaml"),
+    `${room}duration_s: 600\ntrajectory: {type: random, center: {position: [0, 0, 1.5]}, position_amplitude_m: [0.2, 0.2, 0.1]}\n${camera}`,
+  );
   writeFileSync(
     join(folder, "poster.yaml"),
     `renderer: {type: plane, image: poster/poster.jpg, width_m: 1.2, pose: {position: [1, 0, 0], look_at: [2, 0, 0]}}\nduration_s: 0.4\ntrajectory: {type: random, position_amplitude_m: [0.1, 0.1, 0.1]}\n${camera}`,

@@ -128,6 +128,15 @@ export async function openPage(browser, server, options = {}) {
   await page.addInitScript(() => {
     const original = window.requestAnimationFrame.bind(window);
     window.framesAsked = 0;
+    // Jumps of the page: how much of it moved by itself, and what did.
+    window.jumps = [];
+    new PerformanceObserver((list) => {
+      for (const shift of list.getEntries())
+        if (!shift.hadRecentInput && shift.value > 0.002)
+          window.jumps.push(
+            `${shift.value.toFixed(4)}: ${shift.sources.map(({ node }) => node?.outerHTML?.slice(0, 80) ?? node?.textContent?.slice(0, 40)).join(" | ")}`,
+          );
+    }).observe({ type: "layout-shift", buffered: true });
     window.requestAnimationFrame = (callback) => (++window.framesAsked, original(callback));
   });
   page.setDefaultTimeout(60_000);

@@ -23,6 +23,30 @@ export const press = async (page, key, ms) => {
   await page.keyboard.up(key);
   await page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
 };
+/** Presses Tab until what has the focus is called so. */
+export const tabTo = async (page, name) => {
+  for (let i = 0; i < 80; ++i) {
+    await page.keyboard.press("Tab");
+    const here = await page.evaluate(() => {
+      const at = document.activeElement;
+      return at?.getAttribute("aria-label") || at?.textContent || "";
+    });
+    if (name.test(here)) return;
+  }
+  throw new Error(`no stop of the Tab key is called ${name}`);
+};
+/** What does not fit: the page itself, and rows of controls whose end is cut off. */
+export const cramped = (page) =>
+  page.evaluate(() => {
+    const rows = [...document.querySelectorAll(".bar, .toolbar, .transport, .row, .status, .segmented, .run-foot")];
+    return [document.documentElement, ...rows]
+      .filter((e) => e.offsetParent !== null || e === document.documentElement)
+      .filter(
+        (e) => e.scrollWidth > e.clientWidth + 1 || (e === document.documentElement && e.scrollHeight > innerHeight),
+      )
+      .map((e) => `${e.tagName.toLowerCase()}.${e.className}: ${e.scrollWidth} px in ${e.clientWidth} px`);
+  });
+
 /** Pixels of a canvas that are clearly orange or blue. */
 export const colouredPixels = (page, selector) =>
   page

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { openPage, until } from "../harness.mjs";
-import { clock, press, ready, rows, shot, stage, visit, yaml } from "../page.mjs";
+import { clock, press, ready, rows, shot, stage, tabTo, visit, yaml } from "../page.mjs";
 import { browser, main, read, server } from "../session.mjs";
 
 test("by keyboard alone: fly, drop, save, run", async () => {
@@ -13,6 +13,12 @@ test("by keyboard alone: fly, drop, save, run", async () => {
   await visit(page, server, "#/design?scenario=project/room.yaml");
   await ready(page);
   await until(async () => / of /.test(await clock(page).textContent()), "the flight of the file");
+  const jumps = await page.evaluate(() => window.jumps);
+  assert.deepEqual(
+    jumps.filter((jump) => !/class="eye/.test(jump)),
+    [],
+    "nothing but the camera's picture, which comes with the flight, moves by itself",
+  );
   await page.keyboard.press("?");
   assert.match(await page.locator("dialog").textContent(), /drop one that looks along the view/);
   await shot(page, "keys-dark");
@@ -60,6 +66,22 @@ test("by keyboard alone: fly, drop, save, run", async () => {
     "the end of the run",
     300_000,
   );
+  await tabTo(page, /Look at the recording/);
+  await page.keyboard.press("Enter");
+  const time = page.locator(".look .clock");
+  await until(async () => /of/.test(await time.textContent()), "the recording");
+  const before = await time.textContent();
+  await page.keyboard.press(".");
+  assert.notEqual(await time.textContent(), before, "a step on");
+  await page.keyboard.press("p");
+  const stepped = await time.textContent();
+  await until(async () => (await time.textContent()) !== stepped, "it plays");
+  await page.keyboard.press("p");
+  await tabTo(page, /^Time of the recording/);
+  await page.keyboard.press("End");
+  const plot = page.locator(".look .plot");
+  assert.equal(await plot.getAttribute("aria-valuenow"), await plot.getAttribute("aria-valuemax"));
+  await shot(page, "keyboard-look-dark");
   assert.deepEqual(state.faults, []);
   await state.context.close();
 });

@@ -4,7 +4,7 @@ import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
 import { esim, until } from "../harness.mjs";
-import { colouredPixels, place, shot, visit } from "../page.mjs";
+import { colouredPixels, cramped, place, shot, visit } from "../page.mjs";
 import { files, main, read, server } from "../session.mjs";
 
 test("run, see events, look at the recording; the command line makes the same bytes", async () => {
@@ -58,6 +58,7 @@ test("playing slowly, other pictures, the plots", async () => {
   );
   await page.keyboard.press("End");
   await page.waitForTimeout(800);
+  assert.deepEqual(await cramped(page), []);
   await shot(page, "look-all-dark");
 });
 

@@ -53,9 +53,12 @@ export function makeFiles() {
   const room = "# A walk that is yet to be designed.\nrenderer: {type: mesh, scene: room/room.obj}\n";
   writeFileSync(
     join(folder, "walk.yaml"),
-    `${room}duration_s: 0.6\ntrajectory: {type: file, path: room/trajectory.txt}\n${camera}imu: {rate_hz: 200}\n`,
+    `${room}duration_s: 0.4\ntrajectory: {type: file, path: room/trajectory.txt}\n${camera}imu: {rate_hz: 200}\n`,
   );
-  writeFileSync(join(folder, "room.yaml"), `${room}trajectory: {type: file, path: room/trajectory.txt}\n${camera}`);
+  writeFileSync(
+    join(folder, "room.yaml"),
+    `${room}trajectory: {type: file, path: room/trajectory.txt}\n${camera}sampling: {type: uniform, rate_hz: 100}\n`,
+  );
   // Longer than anybody waits: it is there to be cancelled.
   writeFileSync(
     join(folder, "long.yaml"),

@@ -40,9 +40,9 @@ test("times are edited, undone and redone", async () => {
   await page.getByRole("radio", { name: "Times" }).click();
   const third = page.getByLabel("Time of way point 3, seconds");
   await until(async () => Number(await third.inputValue()) > 0 && (await third.isEnabled()), "times");
-  const last = Number(await page.getByLabel("Time of way point 4, seconds").inputValue());
+  const timeOf = async (i) => Number(await page.getByLabel(`Time of way point ${i}, seconds`).inputValue());
   const original = await third.inputValue();
-  const wanted = String(Number((last - 0.1).toFixed(3)));
+  const wanted = String(Number((0.3 * (await timeOf(2)) + 0.7 * (await timeOf(4))).toFixed(3)));
   await third.fill(wanted);
   await third.press("Enter");
   await until(async () => (await yaml(page)).includes(`t: ${wanted}`), "the time in the text");

@@ -116,8 +116,8 @@ export class SpaceTile implements Tile {
     const z = -this.aspect / 2 - 0.08;
     this.labels = [
       text(`x, ${camera.width} px`, new Vector3(0, -0.06, z)),
-      text(`y, ${camera.height} px`, new Vector3(0.76, 0, 0)),
-      text("now", new Vector3(0.56, 0, z)),
+      text(`y, ${camera.height} px`, new Vector3(0.54, 0, 0), 0),
+      text("now", new Vector3(0.54, 0, z + 0.1), 0),
       text(`${duration(this.display.span)} ago`, new Vector3(0.5, depth, this.aspect / 2 + 0.09)),
     ];
     this.stage.scene.add(...this.labels);
@@ -212,7 +212,8 @@ export class SpaceTile implements Tile {
   }
 }
 
-function text(words: string, at: Vector3): Sprite {
+/** `anchor` is where in the text its place is: 0 to the left, 1 to the right. */
+function text(words: string, at: Vector3, anchor = 0.5): Sprite {
   const canvas = document.createElement("canvas");
   const pen = canvas.getContext("2d")!;
   pen.font = "26px system-ui, sans-serif";
@@ -228,6 +229,7 @@ function text(words: string, at: Vector3): Sprite {
     new SpriteMaterial({ map: texture, transparent: true, depthTest: false, sizeAttenuation: false }),
   );
   sprite.position.copy(at);
+  sprite.center.set(anchor, 0.5);
   sprite.renderOrder = 2;
   return sprite;
 }

@@ -121,13 +121,15 @@ StudioMotion motion_of(const Scenario& scenario, const SceneFile& scene) {
   return motion;
 }
 
-CameraInfo camera_of(const Scenario& scenario, const SceneFile& scene) {
+std::vector<CameraInfo> cameras_of(const Scenario& scenario, const SceneFile& scene) {
   const SceneCamera* followed = nullptr;
   try {
     followed = followed_camera(scenario, scene);
   } catch (const UserError&) {  // the motion will say what is wrong with it
   }
-  return camera_info(scenario.cameras.front(), followed);
+  std::vector<CameraInfo> cameras;
+  for (const CameraOptions& options : scenario.cameras) cameras.push_back(camera_info(options, followed));
+  return cameras;
 }
 
 }  // namespace esim::studio

@@ -70,7 +70,7 @@ struct StudioMotion {
 
 StudioMotion motion_of(const Scenario& scenario, const SceneFile& scene);
 
-/// The first camera, as it is simulated.
-CameraInfo camera_of(const Scenario& scenario, const SceneFile& scene);
+/// The rig's cameras, as they are simulated; the first is the one by which way points are aimed.
+std::vector<CameraInfo> cameras_of(const Scenario& scenario, const SceneFile& scene);
 
 }  // namespace esim::studio

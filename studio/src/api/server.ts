@@ -41,8 +41,8 @@ export const scene = (source: Source, signal?: AbortSignal) =>
   sendJson<SceneInfo>("POST", "/api/scene", source, signal);
 export const trajectory = (source: Source, signal?: AbortSignal) =>
   sendJson<Trajectory>("POST", "/api/trajectory", { ...source, samples: 400 }, signal);
-export const view = (source: Source, at: { t: number } | { pose: Pose }, signal?: AbortSignal) =>
-  postForPicture("/api/view", { ...source, ...at }, signal);
+export const view = (source: Source, camera: string, at: { t: number } | { pose: Pose }, signal?: AbortSignal) =>
+  postForPicture("/api/view", { ...source, camera, ...at }, signal);
 
 export const startRun = (path: string, out: string | undefined, overwrite: boolean) =>
   sendJson<{ id: string }>("POST", "/api/runs", { path, ...(out ? { out } : {}), overwrite });
@@ -60,6 +60,7 @@ export interface PictureQuery {
   window: number;
   view: "onoff" | "counts" | "time_surface";
   over: "image" | "none";
+  theme: "light" | "dark";
 }
 const recording = (id: string, rest: string) => `/api/recordings/${id}/${rest}`;
 export const eventPicture = (id: string, query: PictureQuery, signal?: AbortSignal) =>

@@ -72,7 +72,8 @@ export interface SceneInfo {
   triangles: number;
   /** Of what stands still; null where there is none. */
   bounds: [[number, number, number], [number, number, number]] | null;
-  camera: CameraModel;
+  /** The rig's; way points are aimed by the first. */
+  cameras: [CameraModel, ...CameraModel[]];
   objects: { name: string; glb_node: string; moving: boolean }[];
   world?: {
     plane?: { pose: Pose; width_m: number; height_m: number; endless: boolean };

@@ -56,8 +56,8 @@ export class Dropper {
       const turned = turn.multiply(new Quaternion(view[3], view[4], view[5], view[6]));
       view = [view[0], view[1], view[2], turned.x, turned.y, turned.z, turned.w];
     }
-    const scene = this.state.scene.value;
-    const body = scene ? product(view, inverse(scene.camera.T_body_camera)) : view;
+    const { aim } = this.state;
+    const body = aim ? product(view, inverse(aim.T_body_camera)) : view;
     return {
       position: this.panorama ? [0, 0, 0] : roundPosition(body.slice(0, 3)),
       quaternion: roundQuaternion(body.slice(3)),

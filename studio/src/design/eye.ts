@@ -9,7 +9,7 @@ type Source = "preview" | "simulator";
 const inset_width_px = 294;
 const tallest_inset_px = 222;
 
-/** What the scenario's camera sees: drawn by the browser, or by the simulator's own renderer; small in a corner or large. */
+/** What a camera of the rig sees: drawn by the browser, or by the simulator's own renderer; small in a corner or large. */
 export class Eye {
   readonly element: HTMLElement;
   large = false;
@@ -20,6 +20,7 @@ export class Eye {
     attrs: { role: "img", "aria-label": "The view of the scenario's camera, as the simulator renders it" },
   });
   private caption = h("span", { class: "grow", text: "Camera" });
+  private choice = h("select", { class: "small hidden", attrs: { "aria-label": "Camera of the rig" } });
   private source: Segmented<Source>;
   private enlarge: HTMLButtonElement;
   private pose = new Matrix4();
@@ -32,7 +33,9 @@ export class Eye {
   constructor(
     private text: () => Promise<server.Source>,
     private changed: () => void,
+    choose: (camera: string) => void,
   ) {
+    this.choice.addEventListener("change", () => choose(this.choice.value));
     this.source = new Segmented<Source>(
       "Picture of the camera",
       [
@@ -52,7 +55,7 @@ export class Eye {
     this.element = h(
       "div",
       { class: "eye" },
-      h("header", { class: "row" }, this.caption, this.source.element, this.enlarge),
+      h("header", { class: "row" }, this.caption, this.choice, this.source.element, this.enlarge),
       this.view,
     );
   }
@@ -72,8 +75,12 @@ export class Eye {
     this.refresh();
   }
 
-  setCamera(model: CameraModel): void {
+  /** Looks through one of the rig's cameras. */
+  setCamera(model: CameraModel, rig: CameraModel[]): void {
     this.model = model;
+    this.choice.replaceChildren(...rig.map(({ name }) => h("option", { value: name, text: name })));
+    this.choice.value = model.name;
+    this.choice.classList.toggle("hidden", rig.length < 2);
     this.fit();
     this.refresh();
   }
@@ -97,6 +104,7 @@ export class Eye {
   place(T_world_camera: Matrix4 | null, caption: string, time: number | null = null): void {
     this.caption.textContent = caption;
     this.placed = T_world_camera !== null;
+    this.element.classList.toggle("unplaced", !this.placed);
     if (T_world_camera) this.pose.copy(T_world_camera);
     this.time = time;
     ++this.version;
@@ -113,14 +121,15 @@ export class Eye {
   /** One question at a time; what has changed meanwhile is asked next. */
   private async ask(): Promise<void> {
     const at = this.time !== null ? { t: Math.round(this.time) } : this.placed ? { pose: poseOf(this.pose) } : null;
-    if (this.busy || !at) return;
+    if (this.busy || !at || !this.model) return;
     this.busy = true;
     const { version } = this;
+    const { name } = this.model;
     try {
       const source = await this.text();
-      const key = JSON.stringify([source.yaml, at]);
+      const key = JSON.stringify([source.yaml, name, at]);
       if (key !== this.shown) {
-        const picture = await server.view(source, at);
+        const picture = await server.view(source, name, at);
         this.shown = key;
         this.canvas.width = picture.width;
         this.canvas.height = picture.height;
@@ -131,7 +140,7 @@ export class Eye {
       complain(error);
     }
     this.busy = false;
-    if (this.source.value === "simulator" && this.version !== version) void this.ask();
+    if (this.source.value === "simulator" && (this.version !== version || this.model.name !== name)) void this.ask();
   }
 
   /** Asks again although the camera did not move: the scenario has changed. */

@@ -157,7 +157,7 @@ export class Inspector {
 
   /** Of the scenario's camera, for the camera's motion; of the object itself otherwise. */
   private axisRotation(body: Quaternion): Quaternion {
-    const mount = this.state.mover.value === null ? this.state.scene.value?.camera.T_body_camera : undefined;
+    const mount = this.state.mover.value === null ? this.state.aim?.T_body_camera : undefined;
     return mount ? body.clone().multiply(new Quaternion(mount[3], mount[4], mount[5], mount[6])) : body;
   }
 

@@ -1,7 +1,7 @@
 import { Matrix4, Quaternion, Vector3 } from "three";
 import { ApiError } from "../api/http.ts";
 import * as server from "../api/server.ts";
-import type { Pose, Problem, SceneInfo, Trajectory } from "../api/types.ts";
+import type { CameraModel, Pose, Problem, SceneInfo, Trajectory } from "../api/types.ts";
 import type { ScenarioDocument } from "../document/document.ts";
 import { getIn } from "../document/values.ts";
 import { lookRotation, matrixOf, PoseTrack } from "../stage/frames.ts";
@@ -21,6 +21,8 @@ export class DesignState {
   readonly trajectoryProblem = new Signal("");
   readonly mover = new Signal<Mover>(null);
   readonly selected = new Signal(-1);
+  /** Name of the camera that is looked through; where the rig has none of it, that is the first. */
+  readonly lookedThrough = new Signal("");
   /** Where the preview stands, on the trajectory's clock. */
   readonly playhead = new Signal(0);
   readonly playing = new Signal(false);
@@ -35,7 +37,7 @@ export class DesignState {
   private trajectoryRequest: AbortController | null = null;
   private position = new Vector3();
   private rotation = new Quaternion();
-  /** T_body_camera. */
+  /** T_body_camera of the camera that is looked through. */
   private mount = new Matrix4();
   private seen = "";
   private sceneSeen = "";
@@ -48,6 +50,20 @@ export class DesignState {
       refresh();
     });
     this.mover.listen(() => this.selected.set(-1));
+    const mount = () => this.eye && matrixOf(this.eye.T_body_camera, this.mount);
+    this.scene.listen(mount);
+    this.lookedThrough.listen(mount);
+  }
+
+  /** The camera that is looked through. */
+  get eye(): CameraModel | null {
+    const cameras = this.scene.value?.cameras;
+    return cameras?.find(({ name }) => name === this.lookedThrough.value) ?? cameras?.[0] ?? null;
+  }
+
+  /** The camera by which way points are aimed. */
+  get aim(): CameraModel | null {
+    return this.scene.value?.cameras[0] ?? null;
   }
 
   /** Names of the objects that the scenario moves, in its order. */
@@ -93,7 +109,6 @@ export class DesignState {
     this.sceneRequest = new AbortController();
     try {
       const scene = await server.scene(source, this.sceneRequest.signal);
-      matrixOf(scene.camera.T_body_camera, this.mount);
       this.scene.set(scene);
       this.sceneSeen = key;
       this.sceneProblem.set("");
@@ -145,7 +160,7 @@ export class DesignState {
     return this.document.problems.find(({ where }) => where === "" || groups.includes(where.split(".")[0]!));
   }
 
-  /** T_world_camera of the first camera at a time; false where there is no flight. */
+  /** T_world_camera of the camera that is looked through at a time; false where there is no flight. */
   eyeAt(time: number, into: Matrix4): boolean {
     if (!this.cameraTrack || !this.scene.value) return false;
     this.cameraTrack.at(time, this.position, this.rotation);
@@ -170,9 +185,7 @@ export class DesignState {
     ];
     const camera = lookRotation(from, to, point.up ? new Vector3(...point.up) : undefined);
     const body =
-      this.mover.value === null && this.scene.value
-        ? camera.multiply(rotationOf(this.scene.value.camera.T_body_camera).invert())
-        : camera;
+      this.mover.value === null && this.aim ? camera.multiply(rotationOf(this.aim.T_body_camera).invert()) : camera;
     return [...point.position, body.x, body.y, body.z, body.w];
   }
 

@@ -3,7 +3,7 @@ import { duration, seconds } from "../ui/format.ts";
 import { TimePlot } from "../ui/plot.ts";
 import { colour } from "../ui/theme.ts";
 import type { DesignState } from "./state.ts";
-import { timed, withTime } from "./waypoints.ts";
+import { timed, waypointsIn, withTime } from "./waypoints.ts";
 
 const mark_reach_px = 8;
 
@@ -86,10 +86,12 @@ export class Timeline {
       : [];
     const problem = this.state.trajectoryProblem.value;
     const doubts = flight?.warnings ?? [];
-    this.warnings.className = `warnings grow ${problem ? "problem" : ""}`;
+    // A motion that is yet to be designed is no fault.
+    const begun = problem !== "" && (waypointsIn(this.state.document.values, null)?.length ?? 2) < 2;
+    this.warnings.className = `warnings grow ${begun ? "quiet" : problem ? "problem" : ""}`;
     this.warnings.replaceChildren(
       ...(problem
-        ? [problem]
+        ? [begun ? "a motion needs two way points" : problem]
         : doubts.slice(0, 3).map((doubt) => {
             const element = button(`${seconds(doubt.from, 1)}: ${doubt.what}`, () => this.jump(doubt.from), {
               icon: "warning",

@@ -53,6 +53,7 @@ export class Viewport {
     this.eye = new Eye(
       () => state.document.source(),
       () => stage.invalidate(),
+      (name) => state.lookedThrough.set(name),
     );
     stage.element.append(
       h("div", { class: "crosshair", attrs: { "aria-hidden": "true" } }),
@@ -93,6 +94,10 @@ export class Viewport {
     state.mover.listen(() => this.showMotion());
     state.dragged.listen(() => this.showMarkers());
     state.playhead.listen(() => this.showNow());
+    state.lookedThrough.listen(() => {
+      this.showEye();
+      this.showMotion();
+    });
     theme.listen(() => {
       this.markers.forgetColours();
       this.showMotion();
@@ -167,8 +172,9 @@ export class Viewport {
   /** Flies to a way point and looks as it does. */
   goTo(index: number): void {
     const pose = this.state.poseOfPoint(index);
-    if (!pose || !this.info) return;
-    const view = this.state.mover.value === null ? product(pose, this.info.camera.T_body_camera) : pose;
+    const { aim } = this.state;
+    if (!pose || !aim) return;
+    const view = this.state.mover.value === null ? product(pose, aim.T_body_camera) : pose;
     const matrix = matrixOf(view);
     const from = new Vector3().setFromMatrixPosition(matrix);
     const ahead = new Vector3().setFromMatrixColumn(matrix, 2);
@@ -179,7 +185,7 @@ export class Viewport {
     if (!info) return;
     const first = !this.placed || this.info?.kind !== info.kind;
     this.info = info;
-    this.eye.setCamera(info.camera);
+    this.showEye();
     const flat = info.kind === "layers" || info.kind === "engine";
     this.eye.onlySimulator(flat);
     if (flat !== this.eye.large && (flat || first)) this.eye.setLarge(flat);
@@ -196,6 +202,11 @@ export class Viewport {
       this.stage.element.dataset["scene"] = info.kind;
     }
     this.showMotion();
+  }
+
+  private showEye(): void {
+    const { eye, scene } = this.state;
+    if (eye && scene.value) this.eye.setCamera(eye, scene.value.cameras);
   }
 
   private showNote(): void {
@@ -220,13 +231,16 @@ export class Viewport {
       return;
     }
     this.placed = true;
-    const inside = this.content.bounds.clone().expandByScalar(-0.05 * Math.min(size, 4));
     if (start) {
       const ahead = new Vector3().setFromMatrixColumn(matrix, 2);
       const from = new Vector3().setFromMatrixPosition(matrix);
       const target = from.clone().addScaledVector(ahead, 2);
-      if (info.kind !== "panorama") from.addScaledVector(ahead, -0.9).add(new Vector3(0, 0, 0.45));
-      if (info.kind === "mesh") inside.clampPoint(from, from);
+      if (info.kind !== "panorama") {
+        const back = ahead.multiplyScalar(-0.9).add(new Vector3(0, 0, 0.45));
+        const length = back.length();
+        back.divideScalar(length);
+        from.addScaledVector(back, Math.min(length, 0.8 * this.content.free(from, back)));
+      }
       this.navigation.look(from, target);
     } else if (info.start) {
       matrixOf(info.start, matrix);
@@ -254,11 +268,12 @@ export class Viewport {
     const panorama = info?.kind === "panorama";
     const object = mover === null ? null : flight?.objects.find((one) => one.name === state.moverName);
     let poses = mover === null ? (flight?.poses ?? []) : (object?.poses ?? []);
-    if (panorama && info) poses = poses.map((pose) => this.ahead(product(pose, info.camera.T_body_camera)));
+    const { eye } = state;
+    if (panorama && eye) poses = poses.map((pose) => this.ahead(product(pose, eye.T_body_camera)));
     const warnings = mover === null ? (flight?.warnings ?? []) : [];
     this.path.show(poses, (i) => warnings.some(({ from, to }) => flight!.t[i]! >= from && flight!.t[i]! <= to));
     const shape = new BufferGeometry();
-    shape.setAttribute("position", new BufferAttribute(frustumLines(info?.camera ?? null), 3));
+    shape.setAttribute("position", new BufferAttribute(frustumLines(eye), 3));
     this.now.geometry.dispose();
     this.now.geometry = shape;
     this.now.material.color = new Color(colour("on"));
@@ -282,12 +297,12 @@ export class Viewport {
   private showMarkers(): void {
     const { state, info } = this;
     const points = state.points ?? [];
-    const mount = state.mover.value === null && info ? info.camera.T_body_camera : null;
+    const camera = state.mover.value === null ? state.aim : null;
     const selected = state.selected.value;
     const marks = points.flatMap((_, i) => {
       const pose = state.poseOfPoint(i);
       if (!pose) return [];
-      const seen = mount ? product(pose, mount) : pose;
+      const seen = camera ? product(pose, camera.T_body_camera) : pose;
       const anchor =
         info?.kind === "panorama"
           ? new Vector3(...(this.ahead(seen).slice(0, 3) as [number, number, number]))
@@ -296,7 +311,7 @@ export class Viewport {
         { matrix: matrixOf(seen), label: String(i + 1), selected: i === selected, ...(anchor ? { anchor } : {}) },
       ];
     });
-    this.markers.show(marks, state.mover.value === null ? (info?.camera ?? null) : null, this.depth);
+    this.markers.show(marks, camera, this.depth);
     const held = state.poseOfPoint(selected);
     if (!this.gizmo) return;
     if (held && info?.kind !== "panorama") {
@@ -324,18 +339,16 @@ export class Viewport {
   }
 
   private placeEye(): void {
-    const { state, info } = this;
+    const { state } = this;
+    const { eye } = state;
     const dragged = state.dragged.value;
-    if (dragged && state.mover.value === null && info)
-      return this.eye.place(
-        matrixOf(product(dragged.pose, info.camera.T_body_camera)),
-        `Way point ${dragged.index + 1}`,
-      );
+    if (dragged && state.mover.value === null && eye)
+      return this.eye.place(matrixOf(product(dragged.pose, eye.T_body_camera)), `Way point ${dragged.index + 1}`);
     if (state.eyeAt(state.playhead.value, this.eyePose))
-      return this.eye.place(this.eyePose, `Camera at ${seconds(state.playhead.value)}`, state.playhead.value);
+      return this.eye.place(this.eyePose, `At ${seconds(state.playhead.value)}`, state.playhead.value);
     const pose = state.mover.value === null ? state.poseOfPoint(state.selected.value) : null;
     this.eye.place(
-      pose && info ? matrixOf(product(pose, info.camera.T_body_camera)) : null,
+      pose && eye ? matrixOf(product(pose, eye.T_body_camera)) : null,
       pose ? `Way point ${state.selected.value + 1}` : "Camera",
     );
   }

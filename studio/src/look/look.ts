@@ -6,6 +6,7 @@ import type { Place } from "../ui/place.ts";
 import { TimePlot } from "../ui/plot.ts";
 import { addShortcuts } from "../ui/shortcuts.ts";
 import { complain } from "../ui/status.ts";
+import { theme } from "../ui/theme.ts";
 import { Clock, speeds } from "./clock.ts";
 import { factsOf } from "./facts.ts";
 import { Slot } from "./slot.ts";
@@ -50,6 +51,7 @@ export class LookPlace implements Place {
       this.play.setAttribute("aria-label", playing ? "Pause" : "Play");
     });
     this.plot.decorate = (pen) => this.drawWindow(pen);
+    theme.listen(() => this.renew());
     this.handlePlot();
     this.shortcuts();
     this.refresh();
@@ -64,7 +66,12 @@ export class LookPlace implements Place {
   /** Opens a recording in the first place, or beside the first. */
   async open(path: string, which = 0): Promise<void> {
     try {
-      await this.slots[which]!.open(path);
+      const slot = this.slots[which]!;
+      await slot.open(path);
+      const all = Object.keys(tileNames) as TileKind[];
+      const fits = (kind: TileKind) => has(slot.info!, slot.camera, kind);
+      // What there is, where nothing of what is chosen is left of a recording.
+      if (![...this.kinds].some(fits)) for (const kind of all.filter(fits)) this.kinds.add(kind);
       if (which === 0) this.clock.set(Math.min(this.slots[0]!.length * 0.5, this.clock.time.value || Infinity));
       this.refresh();
       this.opened(this.slots.flatMap((slot) => (slot.info ? [slot.info.path] : [])));
@@ -253,7 +260,7 @@ export class LookPlace implements Place {
 
   private showPlots(open: Slot[]): void {
     this.plot.from = 0;
-    this.plot.to = Math.max(1, this.clock.length.value);
+    this.plot.to = this.clock.length.value || 1e9;
     this.plot.strips = [
       ...open.flatMap((slot, i) => rateStrip(slot, open.length > 1 ? ` ${"AB"[i]}` : "")),
       ...open.slice(0, 1).flatMap(imuStrips),

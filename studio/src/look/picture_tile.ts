@@ -3,6 +3,7 @@ import { ApiError } from "../api/http.ts";
 import { h } from "../ui/dom.ts";
 import { seconds, shortNumber } from "../ui/format.ts";
 import { complain } from "../ui/status.ts";
+import { theme } from "../ui/theme.ts";
 import { Latest } from "./latest.ts";
 import { type Display, type Tile, type TileKind, tileNames, type TileSource } from "./tiles.ts";
 
@@ -34,7 +35,7 @@ export class PictureTile implements Tile {
     const { recording, camera } = this.source;
     const t = Math.round(recording.start + time);
     const { view, over, window } = this.display;
-    const key = this.kind === "events" ? JSON.stringify([t, view, over, window]) : String(t);
+    const key = this.kind === "events" ? JSON.stringify([t, view, over, window, theme.value]) : String(t);
     if (key === this.shown) return;
     try {
       const { picture, time_ns } =
@@ -45,6 +46,7 @@ export class PictureTile implements Tile {
               window,
               view,
               over: camera.has.images ? over : "none",
+              theme: theme.value,
             })
           : await server.image(recording.id, camera.name, this.kind, t);
       this.shown = key;

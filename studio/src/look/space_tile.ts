@@ -26,6 +26,7 @@ import { Latest } from "./latest.ts";
 import type { Display, Tile, TileSource } from "./tiles.ts";
 
 const most_points = 200_000;
+const label_px = 15;
 /** Length of the axis of time, in image widths. */
 const depth = 1.6;
 
@@ -58,6 +59,7 @@ export class SpaceTile implements Tile {
     this.aspect = camera.height / camera.width;
     this.element = h("figure", { class: "tile" }, this.stage.element, this.caption);
     this.stage.animate = (dt) => this.navigation.frame(dt);
+    this.stage.resized = () => this.scaleLabels();
     this.navigation.dragMode = "orbit";
     this.stage.camera.fov = 42;
     this.navigation.speed_m_per_s.set(0.7);
@@ -114,12 +116,23 @@ export class SpaceTile implements Tile {
     const z = -this.aspect / 2 - 0.08;
     this.labels = [
       text(`x, ${camera.width} px`, new Vector3(0, -0.06, z)),
-      text(`y, ${camera.height} px`, new Vector3(-0.66, 0, 0)),
-      text("now", new Vector3(0.56, 0, z)),
+      text(`y, ${camera.height} px`, new Vector3(0.54, 0, 0), 0),
+      text("now", new Vector3(0.54, 0, z + 0.1), 0),
       text(`${duration(this.display.span)} ago`, new Vector3(0.5, depth, this.aspect / 2 + 0.09)),
     ];
     this.stage.scene.add(...this.labels);
+    this.scaleLabels();
     this.stage.invalidate();
+  }
+
+  /** Keeps the labels as large as other small text, however large the tile is. */
+  private scaleLabels(): void {
+    const { height, camera } = this.stage;
+    const size = (label_px / height) * 2 * Math.tan((camera.fov * Math.PI) / 360);
+    for (const { scale, material } of this.labels) {
+      const { width, height } = material.map!.image as HTMLCanvasElement;
+      scale.set((size * width) / height, size, 1);
+    }
   }
 
   show(time: number): void {
@@ -199,7 +212,8 @@ export class SpaceTile implements Tile {
   }
 }
 
-function text(words: string, at: Vector3): Sprite {
+/** `anchor` is where in the text its place is: 0 to the left, 1 to the right. */
+function text(words: string, at: Vector3, anchor = 0.5): Sprite {
   const canvas = document.createElement("canvas");
   const pen = canvas.getContext("2d")!;
   pen.font = "26px system-ui, sans-serif";
@@ -211,9 +225,11 @@ function text(words: string, at: Vector3): Sprite {
   pen.fillText(words, 4, 19);
   const texture = new CanvasTexture(canvas);
   texture.colorSpace = "srgb";
-  const sprite = new Sprite(new SpriteMaterial({ map: texture, transparent: true, depthTest: false }));
+  const sprite = new Sprite(
+    new SpriteMaterial({ map: texture, transparent: true, depthTest: false, sizeAttenuation: false }),
+  );
   sprite.position.copy(at);
+  sprite.center.set(anchor, 0.5);
   sprite.renderOrder = 2;
-  sprite.scale.set((0.075 * canvas.width) / canvas.height, 0.075, 1);
   return sprite;
 }

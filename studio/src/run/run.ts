@@ -170,7 +170,14 @@ export class RunPlace implements Place {
     this.stream?.close();
     this.stream = null;
     this.advance({ left_s: 0, ...change });
-    if (this.current?.state === "done") say(`Done: ${this.current.recording ?? this.current.out}`);
+    const run = this.current;
+    if (run?.state === "done") say(`Done: ${run.recording ?? run.out}`);
+    if (run?.state === "cancelled")
+      say(
+        run.recording
+          ? `Cancelled; what was simulated is kept: ${run.recording}`
+          : "Cancelled before anything was kept",
+      );
   }
 
   private async showPicture(id: string, n: number): Promise<void> {

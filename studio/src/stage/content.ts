@@ -86,6 +86,12 @@ export class SceneContent {
     return this.raycaster.intersectObject(this.group, true)[0]?.point ?? null;
   }
 
+  /** How far one gets from a point along a direction of unit length before a surface is in the way. */
+  free(from: Vector3, direction: Vector3): number {
+    this.raycaster.set(from, direction);
+    return this.raycaster.intersectObject(this.group, true)[0]?.distance ?? Infinity;
+  }
+
   /** The direction under a point of the picture. */
   direction(x: number, y: number, camera: Camera): Vector3 {
     this.raycaster.setFromCamera(new Vector2(x, y), camera);

@@ -53,9 +53,17 @@ export function makeFiles() {
   const room = "# A walk that is yet to be designed.\nrenderer: {type: mesh, scene: room/room.obj}\n";
   writeFileSync(
     join(folder, "walk.yaml"),
-    `${room}duration_s: 0.6\ntrajectory: {type: file, path: room/trajectory.txt}\n${camera}imu: {rate_hz: 200}\n`,
+    `${room}duration_s: 0.4\ntrajectory: {type: file, path: room/trajectory.txt}\n${camera}imu: {rate_hz: 200}\n`,
   );
-  writeFileSync(join(folder, "room.yaml"), `${room}trajectory: {type: file, path: room/trajectory.txt}\n${camera}`);
+  writeFileSync(
+    join(folder, "room.yaml"),
+    `${room}trajectory: {type: file, path: room/trajectory.txt}\n${camera}sampling: {type: uniform, rate_hz: 100}\n`,
+  );
+  // Longer than anybody waits: it is there to be cancelled.
+  writeFileSync(
+    join(folder, "long.yaml"),
+    `${room}duration_s: 600\ntrajectory: {type: random, center: {position: [0, 0, 1.5]}, position_amplitude_m: [0.2, 0.2, 0.1]}\n${camera}`,
+  );
   writeFileSync(
     join(folder, "poster.yaml"),
     `renderer: {type: plane, image: poster/poster.jpg, width_m: 1.2, pose: {position: [1, 0, 0], look_at: [2, 0, 0]}}\nduration_s: 0.4\ntrajectory: {type: random, position_amplitude_m: [0.1, 0.1, 0.1]}\n${camera}`,
@@ -123,6 +131,15 @@ export async function openPage(browser, server, options = {}) {
   await page.addInitScript(() => {
     const original = window.requestAnimationFrame.bind(window);
     window.framesAsked = 0;
+    // Jumps of the page: how much of it moved by itself, and what did.
+    window.jumps = [];
+    new PerformanceObserver((list) => {
+      for (const shift of list.getEntries())
+        if (!shift.hadRecentInput && shift.value > 0.002)
+          window.jumps.push(
+            `${shift.value.toFixed(4)}: ${shift.sources.map(({ node }) => node?.outerHTML?.slice(0, 80) ?? node?.textContent?.slice(0, 40)).join(" | ")}`,
+          );
+    }).observe({ type: "layout-shift", buffered: true });
     window.requestAnimationFrame = (callback) => (++window.framesAsked, original(callback));
   });
   page.setDefaultTimeout(60_000);

@@ -159,7 +159,7 @@ struct TriangleTree::Pyramid {
     alignas(32) std::array<float, kWide> inside;
     inside.fill(1);
     for (std::size_t p = 0; p < 4; ++p) {
-      const auto [x, y, z] = normal[p];
+      const float x = normal[p][0], y = normal[p][1], z = normal[p][2];
       const float size_x = std::fabs(x), size_y = std::fabs(y), size_z = std::fabs(z);
 #pragma omp simd
       for (std::size_t i = 0; i < kWide; ++i) {
@@ -176,7 +176,7 @@ struct TriangleTree::Pyramid {
     alignas(32) std::array<float, kWide> inside;
     inside.fill(1);
     for (std::size_t p = 0; p < 4; ++p) {
-      const auto [x, y, z] = normal[p];
+      const float x = normal[p][0], y = normal[p][1], z = normal[p][2];
 #pragma omp simd
       for (std::size_t i = 0; i < kWide; ++i) {
         const auto side = [&](std::size_t c) {

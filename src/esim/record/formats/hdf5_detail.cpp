@@ -83,7 +83,11 @@ Quiet::Quiet() {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
 
-Quiet::~Quiet() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
+Quiet::~Quiet() {
+  H5Eset_auto2(H5E_DEFAULT, print_, data_);
+  // Errors that a thread leaves behind when it ends keep the library from closing.
+  if (print_ != nullptr) H5Eclear2(H5E_DEFAULT);
+}
 
 std::string last_error() {
   std::string text = "no further information";

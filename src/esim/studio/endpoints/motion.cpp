@@ -65,7 +65,7 @@ Json trajectory_json(const Json& request, const Workshop& workshop) {
   answer["speed_m_per_s"] = std::move(speed);
   answer["turn_deg_per_s"] = std::move(turn);
   answer["acceleration"] = std::move(acceleration);
-  const CameraInfo camera = camera_of(scenario, file);
+  const CameraInfo camera = cameras_of(scenario, file).front();
   answer["T_body_camera"] = json_of(camera.T_body_camera);
   answer["warnings"] = Json::array();
   for (const MotionWarning& warning : motion_warnings(course, camera.T_body_camera, file.scene))

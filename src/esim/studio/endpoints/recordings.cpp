@@ -92,6 +92,14 @@ const TimedFile* image_at(const CameraView& camera, TimeNs t) {
   return later == camera.images.begin() ? &camera.images.front() : &*std::prev(later);
 }
 
+/// What is behind the events where there is no image.
+Rgb ground_in(const Request& request) {
+  const std::string theme = text_in(request, "theme", "dark");
+  if (theme != "dark" && theme != "light")
+    throw HttpError(400, fmt::format("theme: '{}' is none of dark, light", theme));
+  return (theme == "light" ? kLightTheme : kDarkTheme).ground;
+}
+
 /// What is behind the events: the image, or the ground.
 Image<Rgb> background_of(const Request& request, const Asked& asked, const CameraView& camera, TimeNs t) {
   const Camera& model = camera.info.model;
@@ -103,7 +111,7 @@ Image<Rgb> background_of(const Request& request, const Asked& asked, const Camer
     const Image<Rgb> image = dimmed(grey(planes.front()));
     if (image.width() == model.width && image.height() == model.height) return image;
   }
-  return {model.width, model.height, kDarkTheme.ground};
+  return {model.width, model.height, ground_in(request)};
 }
 
 Response picture(const Request& request, const Asked& asked) {
@@ -127,7 +135,7 @@ Response picture(const Request& request, const Asked& asked) {
   if (surface) {
     TimeSurface latest(grid);
     latest.add(events);
-    image = latest.draw(t, kWindowsPerTau * static_cast<double>(window), kDarkTheme.ground);
+    image = latest.draw(t, kWindowsPerTau * static_cast<double>(window), ground_in(request));
   } else if (view == "onoff") {
     image = background_of(request, asked, camera, t);
     for (const Event& event : events) image(event.x, event.y) = event.polarity > 0 ? kOnColour : kOffColour;

@@ -4,6 +4,7 @@
 #include "esim/record/preview/canvas.h"
 #include "esim/scenario/read.h"
 #include "esim/studio/endpoints/endpoints.h"
+#include "esim/studio/first_view.h"
 #include "esim/studio/scenario_check.h"
 
 namespace esim::studio {
@@ -52,17 +53,25 @@ void describe_kind(const RendererOptions& renderer, const StudioScene& scene, Js
   std::visit(Visit{scene, answer}, renderer);
 }
 
-Json camera_json(const CameraInfo& camera) {
-  return {{"name", camera.name},           {"width", camera.model.width},
-          {"height", camera.model.height}, {"fx", camera.model.fx},
-          {"fy", camera.model.fy},         {"cx", camera.model.cx},
-          {"cy", camera.model.cy},         {"T_body_camera", json_of(camera.T_body_camera)}};
+Json cameras_json(const std::vector<CameraInfo>& cameras) {
+  Json all = Json::array();
+  for (const CameraInfo& camera : cameras) {
+    all.push_back({{"name", camera.name},
+                   {"width", camera.model.width},
+                   {"height", camera.model.height},
+                   {"fx", camera.model.fx},
+                   {"fy", camera.model.fy},
+                   {"cx", camera.model.cx},
+                   {"cy", camera.model.cy},
+                   {"T_body_camera", json_of(camera.T_body_camera)}});
+  }
+  return all;
 }
 
 /// Of another program that renders, nothing is known before it does.
 Json engine_json(const Scenario& scenario) {
   return {{"kind", "engine"},        {"glb", nullptr},    {"texture", nullptr},
-          {"triangles", 0},          {"bounds", nullptr}, {"camera", camera_json(camera_of(scenario, {}))},
+          {"triangles", 0},          {"bounds", nullptr}, {"cameras", cameras_json(cameras_of(scenario, {}))},
           {"objects", Json::array()}};
 }
 
@@ -76,10 +85,9 @@ Json scene_json(const Scenario& scenario, SceneStore& scenes) {
               {"triangles", scene->triangles()},
               {"bounds", bounds_of(scene->file().scene)}};
   describe_kind(scenario.renderer, *scene, answer);
-  const CameraInfo camera = camera_of(scenario, scene->file());
-  answer["camera"] = camera_json(camera);
+  answer["cameras"] = cameras_json(cameras_of(scenario, scene->file()));
   answer["start"] =
-      json_of(scene->file().cameras.empty() ? before_the_meshes(scene->file().scene, camera.model)
+      json_of(scene->file().cameras.empty() ? first_view(scene->file().scene)
                                             : scene->file().cameras.front().motion.front().T_world_object);
   answer["objects"] = Json::array();
   for (std::size_t i = 0; i < scene->file().scene.objects.size(); ++i) {
@@ -87,9 +95,6 @@ Json scene_json(const Scenario& scenario, SceneStore& scenes) {
     answer["objects"].push_back(
         {{"name", object.name}, {"glb_node", scene->glb() ? scene->glb()->nodes[i] : ""}, {"moving", object.moves}});
   }
-  answer["cameras"] = Json::array();
-  for (const SceneCamera& other : scene->file().cameras)
-    answer["cameras"].push_back({{"name", other.name}, {"moving", other.motion.size() > 1}});
   return answer;
 }
 
@@ -125,13 +130,22 @@ SE3 pose_in(const Json& numbers) {
   return {q.normalized(), {p[0], p[1], p[2]}};
 }
 
-/// What the first camera sees at a time of the motion, or from a pose of its own.
+/// The camera that a request names, or the first.
+CameraInfo camera_in(const Json& request, const std::vector<CameraInfo>& cameras) {
+  const std::string name = text_member(request, "camera", cameras.front().name);
+  for (const CameraInfo& camera : cameras) {
+    if (camera.name == name) return camera;
+  }
+  throw HttpError(400, name + ": the rig has no camera of that name");
+}
+
+/// What a camera sees at a time of the motion, or from a pose of its own.
 Response view(const Json& request, const Workshop& workshop) {
   constexpr double kMostPixels = 4096, kMostTime_ns = 9e15;
   const bool free = request.contains("pose") && !request["pose"].is_null();
   const Scenario scenario = scenario_of(request, workshop.roots, free ? ScenarioNeeds::scene : ScenarioNeeds::motion);
   const auto scene = workshop.scenes.of(scenario);
-  const CameraInfo info = camera_of(scenario, scene->file());
+  const CameraInfo info = camera_in(request, cameras_of(scenario, scene->file()));
   Camera camera = info.model;
   if (!scene->on_sensor()) {
     const auto width = static_cast<int>(number_member(request, "width", camera.width, 16, kMostPixels));

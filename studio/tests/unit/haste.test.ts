@@ -31,6 +31,13 @@ test("where frames are very slow the next movements are hurried from their begin
   assert.deepEqual(movement(haste, 500, 17), [false, false]);
 });
 
+test("what is known to be slow is hurried at once, once", () => {
+  const haste = new Haste();
+  haste.hurry();
+  assert.deepEqual(movement(haste, 16, 17), [true, true]);
+  assert.deepEqual(movement(haste, 16, 17), [false, false]);
+});
+
 test("that the page was hidden is not taken for slowness", () => {
   assert.deepEqual(movement(new Haste(), 16, 60_000, 17, 16), Array(4).fill(false));
 });

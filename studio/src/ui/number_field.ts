@@ -31,6 +31,7 @@ export class NumberField {
       options.unit ? h("span", { class: "field-unit", text: options.unit }) : null,
     );
     this.input.addEventListener("change", () => this.commit());
+    this.input.addEventListener("input", () => (this.input.dataset["typing"] = "1"));
     this.input.addEventListener("keydown", (event) => this.key(event));
     this.input.addEventListener("focus", () => this.input.select());
   }
@@ -60,18 +61,21 @@ export class NumberField {
     this.options.change(value);
   }
 
+  private forget(): void {
+    delete this.input.dataset["typing"];
+    this.input.value = this.text();
+  }
+
   private key(event: KeyboardEvent): void {
     const direction = event.key === "ArrowUp" ? 1 : event.key === "ArrowDown" ? -1 : 0;
     if (event.key === "Enter") this.commit();
-    else if (event.key === "Escape") this.input.value = this.text();
+    else if (event.key === "Escape") this.forget();
     else if (direction !== 0 && this.options.step) {
       event.preventDefault();
       const step = this.options.step * (event.shiftKey ? 10 : 1);
       const from = Number(this.input.value || this.input.placeholder) || 0;
       this.input.value = shortNumber(Math.round((from + direction * step) / step) * step, 9);
       this.commit();
-    } else if (event.key.length === 1 && !event.ctrlKey && !event.metaKey) {
-      this.input.dataset["typing"] = "1";
     }
   }
 }

@@ -3,16 +3,30 @@ import "./ui/styles/layout.css";
 import "./ui/styles/design.css";
 import "./ui/styles/configure.css";
 import "./ui/styles/look.css";
-import { connection } from "./api/http.ts";
+import { askAhead, connection } from "./api/http.ts";
 import * as server from "./api/server.ts";
+import type { Session } from "./api/types.ts";
+import { readAddress } from "./ui/address.ts";
 import { h } from "./ui/dom.ts";
 import { Shell } from "./shell.ts";
+
+/** The server reads the scene while the page is still being built. */
+async function askForScene({ opened }: Session): Promise<void> {
+  const { place, scenario } = readAddress(location.hash);
+  const path = scenario ?? (opened.kind === "scenario" ? opened.path : null);
+  if (!path || !["", "design"].includes(place)) return;
+  const { yaml } = await askAhead(() => server.openScenario(path));
+  const source = { yaml, dir: path.split("/").slice(0, -1).join("/") };
+  askAhead(() => server.scene(source)).catch(() => undefined);
+  askAhead(() => server.trajectory(source)).catch(() => undefined);
+}
 
 /** Waits for the server, so that a page that is loaded while it starts finds its way. */
 async function begin(): Promise<void> {
   const app = document.getElementById("app")!;
   try {
     const session = await server.session();
+    await askForScene(session).catch(() => undefined); // the design place says what is wrong
     await new Shell(app, session).begin();
   } catch (error) {
     const text =

@@ -243,6 +243,49 @@ class Answers(StudioTest):
         for view in gltf["bufferViews"]:
             self.assertLessEqual(view["byteOffset"] + view["byteLength"], binary)
 
+    def glb_of(self, scene_file):
+        """The scene, the description in its GLB, and what the description describes."""
+        new = self.ask("POST", "/api/scenario/new", {"scene": f"work/{scene_file}"})
+        scene = self.ask("POST", "/api/scene", {"yaml": new["yaml"], "dir": new["dir"]})
+        glb = self.server.request("GET", scene["glb"])[2]
+        json_length = struct.unpack("<I", glb[12:16])[0]
+        return scene, json.loads(glb[20:20 + json_length]), glb[28 + json_length:]
+
+    def test_textures_come_small_and_whole(self):
+        (self.work / "card.mtl").write_text(f"newmtl a\nmap_Kd {self.image}\nnewmtl b\nmap_Kd none.png\n")
+        (self.work / "card.obj").write_text("mtllib card.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n"
+                                            "usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 3/3 2/2\n")
+        scene, gltf, binary = self.glb_of("card.obj")
+        self.assertEqual([image["extras"] for image in gltf["images"]], [{"image": 0}])
+        view = gltf["bufferViews"][gltf["images"][0]["bufferView"]]
+        small = binary[view["byteOffset"]:][:view["byteLength"]]
+        whole = (self.work / self.image).read_bytes()
+        self.assertLess(len(small), len(whole) / 4)
+        texture = scene["glb"].removesuffix(".glb") + "/0"
+        status, headers, got = self.server.request("GET", texture)
+        self.assertEqual((status, headers["Content-Type"], got), (200, "image/jpeg", whole))
+        self.assertEqual([round(m["pbrMetallicRoughness"]["baseColorFactor"][0], 3) for m in gltf["materials"]], [1, 0.2])
+        for wrong in ("1", "-1", "x", "0x", "18446744073709551616"):
+            self.assertEqual(self.server.request("GET", texture[:-1] + wrong)[0], 404, wrong)
+
+    def test_large_meshes_have_coarse_ones(self):
+        n = 240
+        vertices = "".join(f"v {x / n} {y / n} {(x * y % 7) / 1000}\n" for y in range(n + 1) for x in range(n + 1))
+        corners = [(y * (n + 1) + x + 1, y * (n + 1) + x + n + 2) for y in range(n) for x in range(n)]
+        (self.work / "large.obj").write_text(vertices + "".join(f"f {a} {a + 1} {b + 1}\nf {a} {b + 1} {b}\n" for a, b in corners))
+        scene, gltf, binary = self.glb_of("large.obj")
+        self.assertEqual(scene["triangles"], 2 * n * n)
+        primitive = gltf["meshes"][0]["primitives"][0]
+        counts = {}
+        for name, index in (("whole", primitive["indices"]), ("coarse", primitive["extras"]["coarse"])):
+            accessor = gltf["accessors"][index]
+            view = gltf["bufferViews"][accessor["bufferView"]]
+            indices = struct.unpack(f"<{accessor['count']}I", binary[view["byteOffset"]:][:view["byteLength"]])
+            self.assertLess(max(indices), gltf["accessors"][primitive["attributes"]["POSITION"]]["count"])
+            counts[name] = len(indices) / 3
+        self.assertEqual(counts["whole"], 2 * n * n)
+        self.assertTrue(5000 < counts["coarse"] < 30000, counts)
+
     def test_the_motion_is_the_simulators(self):
         motion = self.ask("POST", "/api/trajectory", self.scenario(samples=11))
         self.assertEqual(len(motion["poses"]), 11)

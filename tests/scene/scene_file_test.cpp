@@ -194,7 +194,8 @@ TEST(SceneFile, KeepsColoursWhereTheyAreWanted) {
           {{"pbrMetallicRoughness", {{"baseColorFactor", {0.1, 0.2, 0.3, 1.0}}}}, {"emissiveFactor", {0.0, 0.4, 0.8}}});
   const test::TemporaryDirectory folder;
   const auto path = folder.write("scene.glb", glb.bytes());
-  const Mesh mesh = load_mesh(path, Warnings().handler(), true), grey = load_mesh(path, Warnings().handler());
+  const Mesh mesh = load_mesh(path, Warnings().handler(), SceneLook::colour),
+             grey = load_mesh(path, Warnings().handler());
   const std::array<double, 3> paint = {0.5 * linear_from_srgb(188.0F / 255), linear_from_srgb(128.0F / 255), 0.25};
   for (std::size_t colour = 0; colour < 3; ++colour) {
     EXPECT_TRUE(grey.coloured[colour].empty());

@@ -59,8 +59,8 @@ World build_world(const Scenario& scenario, const Substitutes& substitutes, int 
 
 /// What the scene files of a scenario's renderer hold: a mesh renderer's scene with all its objects, those that the
 /// scenario lists after the scene file's own; of what Blender renders, the cameras, where the trajectory follows one.
-/// Empty for renderers without scene files. With colours if `colour`. Notes say what was found.
-SceneFile load_scenes(const Scenario& scenario, bool colour, const Notices& notices);
+/// Empty for renderers without scene files. Notes say what was found.
+SceneFile load_scenes(const Scenario& scenario, SceneLook look, const Notices& notices);
 
 /// The motion of the body that a scenario describes.
 std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const SceneFile& scene,

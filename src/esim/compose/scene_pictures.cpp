@@ -56,7 +56,7 @@ ScenePictures::ScenePictures(const Scenario& scenario, int threads, const Notice
   for (const bool colour : {true, false}) {
     try {
       colour_ = colour;
-      scene_ = load_scenes(scenario, colour, notices);
+      scene_ = load_scenes(scenario, colour ? SceneLook::colour : SceneLook::luminance, notices);
       factory_ =
           build_renderer_factory(scenario.renderer, scene_, colour,
                                  {{options.name, camera, pose_named("T_body_camera", options.T_body_camera)}}, notices);

@@ -35,15 +35,15 @@ std::filesystem::path readable(const std::filesystem::path& scene, const Notices
   return glb;
 }
 
-SceneFile load(const MeshRendererOptions& options, bool colour, const Notices& notices) {
+SceneFile load(const MeshRendererOptions& options, SceneLook look, const Notices& notices) {
   require_path(options.scene, "scene");
-  SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning, colour);
+  SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning, look);
   notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
   for (std::size_t i = 0; i < options.objects.size(); ++i) {
     const ObjectOptions& object = options.objects[i];
     require_path(object.scene, fmt::format("objects.{}.scene", i));
     SceneObject loaded{object.name.empty() ? fmt::format("object{}", i) : object.name,
-                       load_mesh(readable(object.scene, notices), notices.warning, colour), true};
+                       load_mesh(readable(object.scene, notices), notices.warning, look), true};
     for (const SceneObject& other : file.scene.objects) {
       if (!other.moves || other.name != loaded.name) continue;
       throw UserError(
@@ -57,7 +57,7 @@ SceneFile load(const MeshRendererOptions& options, bool colour, const Notices& n
 }
 
 template <typename Renderer>
-SceneFile load(const Renderer&, bool, const Notices&) {
+SceneFile load(const Renderer&, SceneLook, const Notices&) {
   return {};
 }
 
@@ -79,11 +79,11 @@ SceneFile load_cameras(const BlenderRendererOptions& options, const Notices& not
 
 }  // namespace
 
-SceneFile load_scenes(const Scenario& scenario, bool colour, const Notices& notices) {
+SceneFile load_scenes(const Scenario& scenario, SceneLook look, const Notices& notices) {
   const auto* const blender = std::get_if<BlenderRendererOptions>(&scenario.renderer);
   if (blender != nullptr && std::holds_alternative<SceneTrajectoryOptions>(scenario.trajectory))
     return load_cameras(*blender, notices);
-  return std::visit([&](const auto& renderer) { return load(renderer, colour, notices); }, scenario.renderer);
+  return std::visit([&](const auto& renderer) { return load(renderer, look, notices); }, scenario.renderer);
 }
 
 }  // namespace esim

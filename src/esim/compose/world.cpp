@@ -40,6 +40,8 @@ bool sees_colour(const Scenario& scenario) {
                      [](const CameraOptions& camera) { return sees_colour(camera); });
 }
 
+SceneLook look_of(const Scenario& scenario) { return sees_colour(scenario) ? SceneLook::colour : SceneLook::luminance; }
+
 std::unique_ptr<Renderer> build_renderer(const RendererFactory& make_renderer, const CameraOptions& options,
                                          const Camera& model, const Workers& workers) {
   if (!sees_colour(options)) return make_renderer(model, ColourFilters::none, workers);
@@ -262,8 +264,7 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices)
 }
 
 World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices) {
-  const SceneFile scene =
-      substitutes.make_renderer ? SceneFile{} : load_scenes(scenario, sees_colour(scenario), notices);
+  const SceneFile scene = substitutes.make_renderer ? SceneFile{} : load_scenes(scenario, look_of(scenario), notices);
   std::shared_ptr<const Trajectory> body =
       substitutes.body != nullptr ? substitutes.body : build_trajectory(scenario, scene, notices);
   const TimeSpan span = simulated_span(scenario, *body);
@@ -275,7 +276,7 @@ World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> bo
   if (!scenario.duration_s) throw UserError("duration_s: is missing; a motion that goes on has no end of its own");
   const TimeNs start = body->start() + to_ns(scenario.start_s);
   const TimeSpan span{start, start + to_ns(*scenario.duration_s)};
-  const SceneFile scene = load_scenes(scenario, sees_colour(scenario), notices);
+  const SceneFile scene = load_scenes(scenario, look_of(scenario), notices);
   return build(scenario, scene, std::move(body), span, Substitutes{}, threads, notices);
 }
 

@@ -10,9 +10,30 @@
 #include <vector>
 
 #include "esim/core/colour.h"
+#include "esim/scene/planes.h"
 #include "esim/scene/texture.h"
 
 namespace esim {
+
+/// In which form a scene is loaded.
+enum class SceneLook {
+  luminance,  ///< materials in luminance
+  colour,     ///< in each colour beside
+  coded,  ///< factors in each colour; textures as they stand in their files, for others to decode (see CodedTexture)
+};
+
+/// An image as it stands in a file.
+struct CodedTexture {
+  std::string name;                ///< for messages
+  std::filesystem::path file{};    ///< none: the image is a part of the scene's own file
+  std::vector<std::byte> bytes{};  ///< of a PNG, a JPEG, ...
+  bool opaque = false;             ///< transparency is ignored; else it is laid over white
+  Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
+};
+
+/// Linear light in three planes if `colour`, luminance otherwise. Throws UserError naming the image where it cannot be
+/// decoded, or is larger than 8192 x 8192.
+Planes decoded(const CodedTexture& texture, bool colour);
 
 /// How a surface looks: its base colour, which is radiance where it is unlit and albedo where light falls on it (see
 /// Lighting), and what it emits by itself. Each is a factor times a texture, whose value counts as 1 where it is null.
@@ -21,8 +42,9 @@ struct Material {
   std::shared_ptr<const Texture> texture;  ///< of the base colour
   float base = 0.5F;
   std::shared_ptr<const Texture> emission_texture{};
-  float emission = 0;  ///< radiance, added to that of the base
-  bool unlit = false;  ///< shows its base colour in whatever light
+  float emission = 0;                                             ///< radiance, added to that of the base
+  bool unlit = false;                                             ///< shows its base colour in whatever light
+  std::shared_ptr<const CodedTexture> coded{}, coded_emission{};  ///< of SceneLook::coded, instead of the textures
 };
 
 /// Textured triangles, in metres.
@@ -40,8 +62,7 @@ struct Mesh {
 using WarningHandler = std::function<void(const std::string&)>;
 
 /// All that a scene file (see load_scene_file) shows, as one mesh that stands still: what is animated stays where it is
-/// at the beginning. With materials in each colour if `colour`. Throws UserError naming the file when it cannot be
-/// read, is damaged, or has no triangles.
-Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, bool colour = false);
+/// at the beginning. Throws UserError naming the file when it cannot be read, is damaged, or has no triangles.
+Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look = SceneLook::luminance);
 
 }  // namespace esim

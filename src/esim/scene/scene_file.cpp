@@ -30,12 +30,12 @@ std::string counted(std::size_t count, const char* singular, const char* plural)
 
 }  // namespace
 
-SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandler& warn, bool colour) {
-  return flatten(read_graph(path), path, warn, colour);
+SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look) {
+  return flatten(read_graph(path), path, warn, look);
 }
 
-Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, bool colour) {
-  return flatten_still(read_graph(path), path, warn, colour);
+Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look) {
+  return flatten_still(read_graph(path), path, warn, look);
 }
 
 std::string summary(const SceneFile& file) {

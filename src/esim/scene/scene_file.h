@@ -33,14 +33,14 @@ struct SceneFile {
   std::vector<SceneMotion> motions;  ///< of the scene's moving objects, in their order
   std::vector<SceneCamera> cameras;
   TimeSpan animation;           ///< of the file; empty where nothing moves
-  std::size_t image_count = 0;  ///< images that were decoded
+  std::size_t image_count = 0;  ///< images that were read
 };
 
 /// Reads a scene: OBJ with MTL, PLY, STL, glTF 2.0 (.gltf, .glb), FBX, Collada (.dae). Textures are read from the
 /// scene's own folder and below; one that is missing, elsewhere or unreadable is a warning, and its surfaces are grey.
-/// Meshes have materials in each colour if `colour`, beside those in luminance.
 /// Throws UserError naming the file when it cannot be read, is damaged, or has no triangles.
-SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandler& warn, bool colour = false);
+SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandler& warn,
+                          SceneLook look = SceneLook::luminance);
 
 /// One line for a person: objects, triangles, materials, textures, cameras, animation.
 std::string summary(const SceneFile& file);

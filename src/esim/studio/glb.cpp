@@ -6,60 +6,48 @@
 #include <cstring>
 #include <limits>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
-#include <set>
 #include <unordered_map>
 
 #include "esim/core/error.h"
-#include "esim/record/formats/images_png.h"
-#include "esim/record/preview/canvas.h"
+#include "esim/studio/coarse.h"
 #include "esim/studio/json.h"
+#include "esim/studio/page_images.h"
 
 namespace esim::studio {
 namespace {
 
-constexpr int kLongestTexture = 2048;
+constexpr int kThumbnail = 128;  // px
 // Of glTF: types of numbers, what a buffer is for, how a texture goes on.
 constexpr int kUint32 = 5125, kFloat = 5126, kVertices = 34962, kIndices = 34963, kClamp = 33071, kRepeat = 10497;
+// What a browser without a graphics card draws ten times a second, twice over: in the view and in the camera's.
+constexpr std::size_t kFewTriangles = 100'000, kCoarseTriangles = 24'000;
+constexpr std::uint32_t kNone = ~0U;
+constexpr double kMissingTexture = 0.2;  // as esim shows it
 
-Image<float> at_most(const Image<float>& image, int longest) {
-  const int side = std::max(image.width(), image.height());
-  if (side <= longest) return image;
-  const auto scaled = [&](int px) { return std::max(1, static_cast<int>(std::int64_t{px} * longest / side)); };
-  return reduce_mean(image, scaled(image.width()), scaled(image.height()));
-}
-
-/// A material in the three colours; in luminance three times where there are none.
+/// A material in the three colours.
 PerColour<const Material*> in_colour(const Mesh& mesh, std::size_t index) {
   PerColour<const Material*> channels{};
-  for (std::size_t c = 0; c < channels.size(); ++c) {
-    const auto& coloured = mesh.coloured[c];
-    channels[c] = coloured.empty() ? &mesh.materials[index] : &coloured[index];
-  }
+  for (std::size_t c = 0; c < channels.size(); ++c) channels[c] = &mesh.coloured[c][index];
   return channels;
 }
 
-/// What a colour or an emission is: a factor, and a texture in three colours, null where there is none.
+/// What a colour or an emission is: a factor, and a texture, null where there is none.
 struct Look {
   PerColour<double> factor{};
-  PerColour<const Texture*> texture{};
+  const CodedTexture* texture = nullptr;
 };
 
 Look base_of(const PerColour<const Material*>& material) {
   Look look;
-  for (std::size_t c = 0; c < 3; ++c) {
-    look.factor[c] = material[c]->base;
-    look.texture[c] = material[c]->texture.get();
-  }
+  for (std::size_t c = 0; c < 3; ++c) look.factor[c] = material[c]->base;
+  look.texture = material[0]->coded.get();
   return look;
 }
 
 Look emission_of(const PerColour<const Material*>& material) {
   Look look;
-  for (std::size_t c = 0; c < 3; ++c) {
-    look.factor[c] = material[c]->emission;
-    look.texture[c] = material[c]->emission_texture.get();
-  }
+  for (std::size_t c = 0; c < 3; ++c) look.factor[c] = material[c]->emission;
+  look.texture = material[0]->coded_emission.get();
   return look;
 }
 
@@ -69,9 +57,11 @@ bool is_dark(const Look& look) {
 
 class Writer {
  public:
-  explicit Writer(const Scene& scene) : lit_(scene.lighting.has_value()) {
+  Writer(const Scene& scene, const Workers& workers) : lit_(scene.lighting.has_value()) {
+    make_thumbnails(scene, workers);
+    for (const SceneObject& object : scene.objects) triangles_ += object.mesh.triangles.size();
     for (const SceneObject& object : scene.objects) add(object);
-    if (!lit_) gltf_["extensionsUsed"] = {"KHR_materials_unlit"};
+    if (any_unlit_) gltf_["extensionsUsed"] = {"KHR_materials_unlit"};
   }
 
   Glb finish() {
@@ -90,10 +80,33 @@ class Writer {
     put(2), put(size);
     put(json.size()), bytes += "JSON" + json;
     put(binary_.size()), bytes += std::string("BIN\0", 4) + binary_;
-    return {std::move(bytes), std::move(names_)};
+    return {std::move(bytes), std::move(names_), std::move(images_)};
   }
 
  private:
+  /// Of all textures, and at once: that is what takes time.
+  void make_thumbnails(const Scene& scene, const Workers& workers) {
+    std::vector<std::shared_ptr<const CodedTexture>> all;
+    for (const SceneObject& object : scene.objects) {
+      for (const Material& material : object.mesh.coloured[0]) {
+        for (const auto& texture : {material.coded, material.coded_emission}) {
+          if (texture != nullptr && textures_.try_emplace(texture.get()).second) all.push_back(texture);
+        }
+      }
+    }
+    std::vector<std::optional<Thumbnail>> made(all.size());
+    workers.for_each(static_cast<int>(all.size()), [&](int index) {
+      const auto i = static_cast<std::size_t>(index);
+      try {
+        made[i] = thumbnail(*all[i], kThumbnail);
+      } catch (const UserError&) {  // the renderer will say so
+      }
+    });
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (made[i]) textures_[all[i].get()] = add_texture(all[i], *made[i]);
+    }
+  }
+
   void add(const SceneObject& object) {
     const std::string name = fmt::format("object_{}", names_.size());
     names_.push_back(name);
@@ -112,16 +125,21 @@ class Writer {
     std::map<std::uint32_t, std::vector<std::uint32_t>> triangles;
     for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) triangles[mesh.material[i]].push_back(i);
     Json primitives = Json::array();
+    std::vector<std::uint32_t> first_of(mesh.vertices.size(), kNone);
     for (const auto& [material, of] : triangles) {
-      Json primitive = geometry(mesh, of);
+      Json primitive = geometry(mesh, of, first_of);
+      for (const std::uint32_t triangle : of) {
+        for (const std::uint32_t vertex : mesh.triangles[triangle]) first_of[vertex] = kNone;
+      }
       primitive["material"] = material_of(mesh, material);
       primitives.push_back(std::move(primitive));
     }
     return primitives;
   }
 
-  /// Corners of triangles are vertices of their own only where their texture coordinates are.
-  Json geometry(const Mesh& mesh, const std::vector<std::uint32_t>& triangles) {
+  /// Corners of triangles are vertices of their own only where their texture coordinates are. `first_of`: none yet of
+  /// each of the mesh's vertices.
+  Json geometry(const Mesh& mesh, const std::vector<std::uint32_t>& triangles, std::vector<std::uint32_t>& first_of) {
     struct Corner {
       std::uint32_t vertex;
       float u, v;
@@ -135,16 +153,23 @@ class Writer {
       }
     };
     const bool shaded = lit_ && mesh.normals.size() == mesh.vertices.size();
-    std::unordered_map<Corner, std::uint32_t, Hash> known;
-    known.reserve(2 * triangles.size());
+    std::unordered_map<Corner, std::uint32_t, Hash> others;
     std::vector<float> positions, normals, uvs;
     std::vector<std::uint32_t> indices;
+    indices.reserve(3 * triangles.size());
+    const auto index_of = [&](const Corner& corner) {
+      const auto next = static_cast<std::uint32_t>(positions.size() / 3);
+      std::uint32_t& first = first_of[corner.vertex];
+      if (first == kNone) return first = next;
+      if (uvs[2 * first] == corner.u && uvs[2 * first + 1] == corner.v) return first;
+      return others.try_emplace(corner, next).first->second;
+    };
     for (const std::uint32_t triangle : triangles) {
       for (std::size_t k = 0; k < 3; ++k) {
         const Eigen::Vector2f& uv = mesh.texture_uv[triangle][k];
         const Corner corner{mesh.triangles[triangle][k], uv.x() + 0.0F, uv.y() + 0.0F};
-        const auto [entry, is_new] = known.try_emplace(corner, static_cast<std::uint32_t>(known.size()));
-        indices.push_back(entry->second);
+        indices.push_back(index_of(corner));
+        const bool is_new = indices.back() == positions.size() / 3;
         if (!is_new) continue;
         const Eigen::Vector3f& at = mesh.vertices[corner.vertex];
         positions.insert(positions.end(), {at.x(), at.y(), at.z()});
@@ -159,7 +184,13 @@ class Writer {
                     {"TEXCOORD_0", accessor(uvs, "VEC2", kFloat, kVertices)}};
     if (shaded) attributes["NORMAL"] = accessor(normals, "VEC3", kFloat, kVertices);
     add_bounds(positions, gltf_["accessors"][attributes["POSITION"].get<std::size_t>()]);
-    return {{"attributes", attributes}, {"indices", accessor(indices, "SCALAR", kUint32, kIndices)}};
+    Json primitive{{"attributes", attributes}, {"indices", accessor(indices, "SCALAR", kUint32, kIndices)}};
+    if (triangles_ > kFewTriangles) {
+      const std::size_t share = kCoarseTriangles * triangles.size() / triangles_;
+      const std::vector<std::uint32_t> coarse = coarse_indices({positions, uvs, indices}, share);
+      if (!coarse.empty()) primitive["extras"] = {{"coarse", accessor(coarse, "SCALAR", kUint32, kIndices)}};
+    }
+    return primitive;
   }
 
   static void add_bounds(const std::vector<float>& positions, Json& accessor) {
@@ -192,10 +223,16 @@ class Writer {
     const auto [entry, is_new] = materials_.try_emplace(channels, gltf_["materials"].size());
     if (!is_new) return entry->second;
     const bool unlit = !lit_ || channels[0]->unlit;
+    any_unlit_ = any_unlit_ || unlit;
     Look base = base_of(channels), emission = emission_of(channels);
     if (unlit && is_dark(base)) std::swap(base, emission);
     Json surface{{"baseColorFactor", factor(base, 1)}, {"metallicFactor", 0}, {"roughnessFactor", 1}};
-    if (const auto texture = texture_of(base)) surface["baseColorTexture"] = {{"index", *texture}};
+    if (const auto texture = texture_of(base)) {
+      surface["baseColorTexture"] = {{"index", *texture}};
+    } else if (base.texture != nullptr) {
+      base.factor.fill(kMissingTexture);
+      surface["baseColorFactor"] = factor(base, 1);
+    }
     Json material{{"name", mesh.materials[index].name}, {"doubleSided", true}, {"pbrMetallicRoughness", surface}};
     if (unlit) material["extensions"] = {{"KHR_materials_unlit", Json::object()}};
     if (!unlit && !is_dark(emission)) {
@@ -213,47 +250,36 @@ class Writer {
     return numbers;
   }
 
-  std::optional<std::size_t> texture_of(const Look& look) {
-    if (look.texture[0] == nullptr || look.texture[1] == nullptr || look.texture[2] == nullptr) return std::nullopt;
-    const auto [entry, is_new] = textures_.try_emplace(look.texture, gltf_["textures"].size());
-    if (!is_new) return entry->second;
-    Planes planes;
-    for (const Texture* texture : look.texture) planes.push_back(texture->texels());
-    const std::size_t view = add_view(make_jpeg(planes, kLongestTexture), std::nullopt);
-    const auto wrap = [](Wrap w) { return w == Wrap::repeat ? kRepeat : kClamp; };
-    gltf_["images"].push_back({{"bufferView", view}, {"mimeType", "image/jpeg"}});
-    gltf_["samplers"].push_back(
-        {{"wrapS", wrap(look.texture[0]->wrap_u())}, {"wrapT", wrap(look.texture[0]->wrap_v())}});
-    gltf_["textures"].push_back({{"source", gltf_["images"].size() - 1}, {"sampler", gltf_["samplers"].size() - 1}});
-    return entry->second;
+  std::optional<std::size_t> texture_of(const Look& look) const {
+    return look.texture == nullptr ? std::nullopt : textures_.at(look.texture);
   }
 
-  bool lit_;
+  std::size_t add_texture(const std::shared_ptr<const CodedTexture>& texture, const Thumbnail& thumbnail) {
+    const std::size_t view = add_view(thumbnail.jpeg, std::nullopt);
+    const auto wrap = [](Wrap w) { return w == Wrap::repeat ? kRepeat : kClamp; };
+    Json image{{"bufferView", view}, {"mimeType", "image/jpeg"}};
+    if (!thumbnail.whole) image["extras"] = {{"image", images_.size()}};
+    gltf_["images"].push_back(std::move(image));
+    gltf_["samplers"].push_back({{"wrapS", wrap(texture->wrap_u)}, {"wrapT", wrap(texture->wrap_v)}});
+    const std::size_t index = gltf_["textures"].size();
+    gltf_["textures"].push_back({{"source", index}, {"sampler", index}});
+    images_.push_back(texture);
+    return index;
+  }
+
+  bool lit_, any_unlit_ = false;
+  std::size_t triangles_ = 0;
   Json gltf_{{"asset", {{"version", "2.0"}, {"generator", "esim"}}}, {"scene", 0}};
   std::string binary_;
   Json roots_ = Json::array();
   std::vector<std::string> names_;
   std::map<PerColour<const Material*>, std::size_t> materials_;
-  std::map<PerColour<const Texture*>, std::size_t> textures_;
+  std::map<const CodedTexture*, std::optional<std::size_t>> textures_;  // nothing where it cannot be decoded
+  std::vector<std::shared_ptr<const CodedTexture>> images_;
 };
 
 }  // namespace
 
-std::string make_jpeg(const Planes& linear, int longest) {
-  std::vector<Image<std::uint8_t>> channels;
-  for (const Image<float>& plane : linear) channels.push_back(encode_srgb(at_most(plane, longest)));
-  const Image<std::uint8_t>&red = channels.front(), &green = channels[channels.size() / 2], &blue = channels.back();
-  cv::Mat bgr(red.height(), red.width(), CV_8UC3);
-  for (int y = 0; y < red.height(); ++y) {
-    auto* out = bgr.ptr<cv::Vec3b>(y);
-    for (int x = 0; x < red.width(); ++x) out[x] = {blue(x, y), green(x, y), red(x, y)};
-  }
-  constexpr int kQuality = 90;
-  std::vector<unsigned char> jpeg;
-  cv::imencode(".jpg", bgr, jpeg, {cv::IMWRITE_JPEG_QUALITY, kQuality});
-  return {jpeg.begin(), jpeg.end()};
-}
-
-Glb make_glb(const Scene& scene) { return Writer(scene).finish(); }
+Glb make_glb(const Scene& scene, const Workers& workers) { return Writer(scene, workers).finish(); }
 
 }  // namespace esim::studio

@@ -10,7 +10,8 @@ namespace {
 
 // A person's hand shakes and turns less than that.
 constexpr double kFastTurn_rad_per_s = 720 * std::numbers::pi / 180, kFast_m_per_s2 = 50;
-constexpr double kMostTests = 4e8;  // of a segment with a triangle: about a second
+constexpr double kMostTests = 4e8;    // of a triangle's box with another: about a second
+constexpr std::size_t kStretch = 16;  // intervals of the course that are tested together first
 
 /// Whether the segment from a to b meets a triangle (Möller and Trumbore 1997).
 bool meets(const Eigen::Vector3f& a, const Eigen::Vector3f& along, const Eigen::Vector3f& p, const Eigen::Vector3f& q,
@@ -41,6 +42,48 @@ void add_stretches(const std::vector<MotionSample>& course, const std::function<
   }
 }
 
+/// For each of the ways between consecutive eyes whether it goes through a triangle that stands still; none where
+/// finding out would take too long.
+std::vector<bool> ways_through(const std::vector<Eigen::Vector3f>& eyes, const Scene& scene) {
+  const std::size_t count = eyes.empty() ? 0 : eyes.size() - 1;
+  std::vector<bool> through(count);
+  std::vector<Eigen::AlignedBox3f> stretches(count / kStretch + 1);
+  Eigen::AlignedBox3f whole;
+  for (std::size_t i = 0; i <= count && !eyes.empty(); ++i) {
+    whole.extend(eyes[i]);
+    stretches[std::min(i, count - 1) / kStretch].extend(eyes[i]);
+    if (i > 0) stretches[(i - 1) / kStretch].extend(eyes[i]);
+  }
+  double triangles = 0;
+  for (const SceneObject& object : scene.objects)
+    triangles += object.moves ? 0 : static_cast<double>(object.mesh.triangles.size());
+  if (count == 0 || triangles * static_cast<double>(stretches.size()) > kMostTests) return through;
+
+  const auto test = [&](const Eigen::AlignedBox3f& around, const std::array<Eigen::Vector3f, 3>& triangle,
+                        std::size_t from) {
+    for (std::size_t i = from; i < std::min(from + kStretch, count); ++i) {
+      Eigen::AlignedBox3f way(eyes[i]);
+      way.extend(eyes[i + 1]);
+      const Eigen::Vector3f along = eyes[i + 1] - eyes[i];
+      if (through[i] || along.squaredNorm() == 0 || !around.intersects(way)) continue;
+      through[i] = meets(eyes[i], along, triangle[0], triangle[1], triangle[2]);
+    }
+  };
+  for (const SceneObject& object : scene.objects) {
+    if (object.moves) continue;
+    const auto& v = object.mesh.vertices;
+    for (const auto& [p, q, r] : object.mesh.triangles) {
+      Eigen::AlignedBox3f around(v[p]);
+      around.extend(v[q]), around.extend(v[r]);
+      if (!around.intersects(whole)) continue;
+      for (std::size_t k = 0; k < stretches.size(); ++k) {
+        if (around.intersects(stretches[k])) test(around, {v[p], v[q], v[r]}, k * kStretch);
+      }
+    }
+  }
+  return through;
+}
+
 }  // namespace
 
 std::vector<MotionWarning> motion_warnings(const std::vector<MotionSample>& course, const SE3& T_body_camera,
@@ -50,35 +93,15 @@ std::vector<MotionWarning> motion_warnings(const std::vector<MotionSample>& cour
     eyes.push_back((sample.body.T_world_body * T_body_camera.translation).cast<float>());
 
   Eigen::AlignedBox3f box;
-  double triangles = 0;
   for (const SceneObject& object : scene.objects) {
     if (object.moves) continue;
-    triangles += static_cast<double>(object.mesh.triangles.size());
     for (const Eigen::Vector3f& vertex : object.mesh.vertices) box.extend(vertex);
   }
 
   std::vector<MotionWarning> warnings;
-  if (triangles > 0 && triangles * static_cast<double>(course.size()) <= kMostTests) {
-    add_stretches(
-        course,
-        [&](std::size_t i) {
-          const Eigen::Vector3f along = eyes[i + 1] - eyes[i];
-          if (along.squaredNorm() == 0) return false;
-          Eigen::AlignedBox3f way(eyes[i]);
-          way.extend(eyes[i + 1]);
-          for (const SceneObject& object : scene.objects) {
-            if (object.moves) continue;
-            const auto& v = object.mesh.vertices;
-            for (const auto& [p, q, r] : object.mesh.triangles) {
-              Eigen::AlignedBox3f around(v[p]);
-              around.extend(v[q]), around.extend(v[r]);
-              if (around.intersects(way) && meets(eyes[i], along, v[p], v[q], v[r])) return true;
-            }
-          }
-          return false;
-        },
-        "the camera passes through a surface", warnings);
-  }
+  const std::vector<bool> through = ways_through(eyes, scene);
+  add_stretches(
+      course, [&](std::size_t i) { return through[i]; }, "the camera passes through a surface", warnings);
   if (!box.isEmpty()) {
     add_stretches(
         course, [&](std::size_t i) { return !box.contains(eyes[i]) && box.contains(eyes.front()); },

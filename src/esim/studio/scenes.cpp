@@ -50,6 +50,12 @@ std::string key_of(const RendererOptions& renderer) {
   return files + write_scenario(bare);
 }
 
+/// Whether making the renderer may fail for another reason than that its scene cannot be read.
+bool fails_when_made(const RendererOptions& renderer) {
+  const auto* const mesh = std::get_if<MeshRendererOptions>(&renderer);
+  return mesh == nullptr || mesh->engine == MeshEngine::gl;
+}
+
 void refuse_engines(const Scenario& scenario) {
   if (engine_objects(scenario.renderer) != nullptr)
     throw UserError("renderer: another program renders this scene; it is seen in recordings only");
@@ -58,9 +64,13 @@ void refuse_engines(const Scenario& scenario) {
 }  // namespace
 
 StudioScene::StudioScene(const Scenario& scenario, std::string id, int threads)
-    : id_(std::move(id)), pictures_(scenario, threads, kSilent) {
+    : id_(std::move(id)),
+      scenario_(scenario),
+      threads_(threads),
+      file_(load_scenes(scenario, SceneLook::coded, kSilent)) {
+  if (fails_when_made(scenario.renderer)) pictures();
   if (std::holds_alternative<MeshRendererOptions>(scenario.renderer)) {
-    if (triangles() <= kMostTriangles) glb_ = make_glb(file().scene);
+    if (triangles() <= kMostTriangles) glb_ = make_glb(file_.scene, Workers(threads));
     return;
   }
   const auto show = [&](const std::filesystem::path& image, const Softening& softening) {
@@ -80,9 +90,27 @@ std::size_t StudioScene::triangles() const {
   return count;
 }
 
-Image<Rgb> StudioScene::render(const Camera& camera, const RenderRequest& view) {
+std::shared_ptr<const PageImage> StudioScene::image(std::size_t index) {
+  if (!glb_ || index >= glb_->images.size()) return nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto known = images_.find(index); known != images_.end()) return known->second;
+  }
+  auto made = std::make_shared<const PageImage>(page_image(*glb_->images[index]));
   const std::lock_guard lock(mutex_);
-  return pictures_.render(camera, on_sensor() ? 1 : kFiner, view);
+  return images_.try_emplace(index, std::move(made)).first->second;
+}
+
+ScenePictures& StudioScene::pictures() {
+  const std::lock_guard lock(mutex_);
+  if (!pictures_) pictures_.emplace(scenario_, threads_, kSilent);
+  return *pictures_;
+}
+
+Image<Rgb> StudioScene::render(const Camera& camera, const RenderRequest& view) {
+  ScenePictures& pictures = this->pictures();
+  const std::lock_guard lock(mutex_);
+  return pictures.render(camera, pictures.traits().on_sensor ? 1 : kFiner, view);
 }
 
 std::shared_ptr<StudioScene> SceneStore::of(const Scenario& scenario) {

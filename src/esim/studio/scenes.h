@@ -8,17 +8,19 @@
 
 #include "esim/compose/scene_pictures.h"
 #include "esim/studio/glb.h"
+#include "esim/studio/page_images.h"
 
 namespace esim::studio {
 
-/// What a renderer shows, loaded, and as a browser draws it.
+/// What a renderer shows, as a browser draws it; the renderer itself is made when its first picture is asked for.
 class StudioScene {
  public:
   StudioScene(const Scenario& scenario, std::string id, int threads);
 
   const std::string& id() const { return id_; }
-  const SceneFile& file() const { return pictures_.scene(); }
-  bool on_sensor() const { return pictures_.traits().on_sensor; }
+
+  /// Its textures are coded (see SceneLook).
+  const SceneFile& file() const { return file_; }
 
   /// Of meshes; nothing of others, and where there are more triangles than a browser is asked to draw.
   const std::optional<Glb>& glb() const { return glb_; }
@@ -29,13 +31,24 @@ class StudioScene {
 
   std::size_t triangles() const;
 
-  /// ScenePictures::render, from any thread.
-  Image<Rgb> render(const Camera& camera, const RenderRequest& view);
+  /// One of the GLB's textures, whole; null where there is none of that number. Throws UserError where it cannot be
+  /// decoded. From any thread.
+  std::shared_ptr<const PageImage> image(std::size_t index);
+
+  /// From here on from any thread. Both throw UserError where the renderer cannot be made.
+  bool on_sensor() { return pictures().traits().on_sensor; }
+  Image<Rgb> render(const Camera& camera, const RenderRequest& view);  ///< ScenePictures::render
 
  private:
+  ScenePictures& pictures();
+
   std::string id_;
-  std::mutex mutex_;
-  ScenePictures pictures_;
+  Scenario scenario_;
+  int threads_;
+  SceneFile file_;
+  std::mutex mutex_;  // of what follows
+  std::optional<ScenePictures> pictures_;
+  std::map<std::size_t, std::shared_ptr<const PageImage>> images_;
   std::optional<Glb> glb_;
   std::optional<std::string> texture_;
   double texture_aspect_ = 1;

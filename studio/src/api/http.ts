@@ -75,6 +75,33 @@ async function request(path: string, init: RequestInit): Promise<Response> {
   return answer;
 }
 
+const kept_ms = 10_000;
+/** Answers that were asked for ahead, by their question. */
+const answers = new Map<string, Promise<unknown>>();
+let isAhead = false;
+
+/** Asks now for what another part of the page will ask for in a moment, and then gets this answer. */
+export function askAhead<T>(question: () => Promise<T>): Promise<T> {
+  isAhead = true;
+  try {
+    return question();
+  } finally {
+    isAhead = false;
+  }
+}
+
+function answerTo<T>(key: string, ask: () => Promise<T>): Promise<T> {
+  const known = answers.get(key) as Promise<T> | undefined;
+  answers.delete(key);
+  if (known) return known;
+  const answer = ask();
+  if (!isAhead) return answer;
+  answers.set(key, answer);
+  answer.catch(() => answers.delete(key));
+  setTimeout(() => answers.delete(key), kept_ms);
+  return answer;
+}
+
 export type Query = Record<string, string | number | boolean | undefined>;
 
 /** A path with its query. */
@@ -85,24 +112,23 @@ export function url(path: string, query: Query = {}): string {
   return text ? `${path}?${text}` : path;
 }
 
-export async function getJson<T>(path: string, query?: Query, signal?: AbortSignal): Promise<T> {
-  return (await (await request(url(path, query), { signal: signal ?? null })).json()) as T;
+export function getJson<T>(path: string, query?: Query, signal?: AbortSignal): Promise<T> {
+  const address = url(path, query);
+  return answerTo(address, async () => (await (await request(address, { signal: signal ?? null })).json()) as T);
 }
 
-export async function sendJson<T>(
+export function sendJson<T>(
   method: "POST" | "PUT" | "DELETE",
   path: string,
   body: unknown,
   signal?: AbortSignal,
 ): Promise<T> {
-  const answer = await request(path, {
-    method,
-    headers: { "Content-Type": "application/json" },
-    body: JSON.stringify(body),
-    signal: signal ?? null,
+  const content = JSON.stringify(body);
+  const headers = { "Content-Type": "application/json" };
+  return answerTo(`${method} ${path} ${content}`, async () => {
+    const text = await (await request(path, { method, headers, body: content, signal: signal ?? null })).text();
+    return (text ? JSON.parse(text) : {}) as T;
   });
-  const text = await answer.text();
-  return (text ? JSON.parse(text) : {}) as T;
 }
 
 export async function getBytes(path: string, query: Query, signal?: AbortSignal): Promise<ArrayBuffer> {

@@ -34,7 +34,7 @@ export class Viewport {
   readonly navigation = new Navigation(this.stage);
   readonly eye: Eye;
   readonly dropper: Dropper;
-  private content = new SceneContent();
+  private content = new SceneContent(() => this.stage.invalidate());
   private markers = new Markers();
   private path = new PathLine();
   private now = new LineSegments(new BufferGeometry(), new LineBasicMaterial());
@@ -65,6 +65,7 @@ export class Viewport {
     this.overlays.add(this.markers.group, this.path.group, this.now, this.handle);
     stage.scene.add(this.content.group, this.overlays);
     stage.animate = (dt) => this.animate(dt);
+    stage.hurried = (hurried) => this.content.coarsen(hurried);
     stage.draw = (renderer) => {
       if (!this.eye.large) {
         this.markers.scale(stage.height, stage.camera.fov);
@@ -117,6 +118,7 @@ export class Viewport {
           index,
           pose: [...this.handle.position.toArray(), ...this.handle.quaternion.toArray()] as Pose,
         });
+      this.stage.moved();
     });
     gizmo.addEventListener("mouseUp", () => this.finishDrag());
   }
@@ -194,6 +196,8 @@ export class Viewport {
     try {
       this.stage.element.classList.add("loading");
       const changed = await this.content.show(info, this.state.document.get("renderer.lighting"));
+      if (changed) this.stage.forgetPace();
+      if (changed && this.content.slow) this.stage.hurry();
       if (changed || first) this.findView(info, first);
     } catch (error) {
       complain(error);
@@ -235,18 +239,19 @@ export class Viewport {
       const ahead = new Vector3().setFromMatrixColumn(matrix, 2);
       const from = new Vector3().setFromMatrixPosition(matrix);
       const target = from.clone().addScaledVector(ahead, 2);
-      if (info.kind !== "panorama") {
-        const back = ahead.multiplyScalar(-0.9).add(new Vector3(0, 0, 0.45));
-        const length = back.length();
-        back.divideScalar(length);
-        from.addScaledVector(back, Math.min(length, 0.8 * this.content.free(from, back)));
-      }
+      if (info.kind !== "panorama") this.stepBack(from, ahead.multiplyScalar(-0.9).add(new Vector3(0, 0, 0.45)));
       this.navigation.look(from, target);
     } else if (info.start) {
       matrixOf(info.start, matrix);
       const from = new Vector3().setFromMatrixPosition(matrix);
       this.navigation.look(from, from.clone().add(new Vector3().setFromMatrixColumn(matrix, 2)));
     }
+  }
+
+  /** By so much, or less where a surface is in the way. */
+  private stepBack(from: Vector3, by: Vector3): void {
+    const free = this.content.distance(from, by) / by.length();
+    from.addScaledVector(by, Math.min(1, 0.7 * free));
   }
 
   private viewWhenKnown(): void {

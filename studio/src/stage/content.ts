@@ -1,20 +1,16 @@
 import {
-  AmbientLight,
   Box3,
   BufferGeometry,
-  DirectionalLight,
   Float32BufferAttribute,
   Group,
+  type Intersection,
   LinearFilter,
   LinearMipmapLinearFilter,
   Material,
   Mesh,
   MeshBasicMaterial,
-  MeshLambertMaterial,
-  type MeshStandardMaterial,
   type Object3D,
   PlaneGeometry,
-  PointLight,
   Quaternion,
   Raycaster,
   RepeatWrapping,
@@ -25,11 +21,15 @@ import {
   Vector3,
   type Camera,
 } from "three";
-import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import type { Json, SceneInfo } from "../api/types.ts";
-import { getIn } from "../document/values.ts";
-import { anisotropy } from "./gpu.ts";
+import { anisotropy, drawnBySoftware } from "./gpu.ts";
 import { matrixOf, PoseTrack } from "./frames.ts";
+import { loadMesh, loadWhole, type Made } from "./mesh.ts";
+
+/** So many frames later. */
+async function frames(count: number): Promise<void> {
+  for (let i = 0; i < count; ++i) await new Promise(requestAnimationFrame);
+}
 
 /** What stands in the scene, as the server describes it. */
 export class SceneContent {
@@ -37,25 +37,60 @@ export class SceneContent {
   readonly bounds = new Box3();
   private nodes: (Object3D | null)[] = [];
   private key = "";
+  private coarse = false;
+  private made: Made = { group: new Group(), details: [], small: [] };
   private raycaster = new Raycaster();
 
-  /** Loads what is not there yet; answers whether anything changed. */
+  /** `changed` is called when something of it looks different. */
+  constructor(private changed: () => void) {}
+
+  /** Loads what is not there yet; answers whether anything changed. Textures come small at first, whole by and by. */
   async show(info: SceneInfo, lighting: Json | undefined): Promise<boolean> {
     const key = JSON.stringify([info.kind, info.glb, info.texture, info.world, info.kind === "mesh" ? lighting : null]);
     if (key === this.key) return false;
     const made = await make(info, lighting);
     this.clear();
     this.key = key;
-    this.group.add(made);
-    this.nodes = info.objects.map((object) => made.getObjectByName(object.glb_node) ?? null);
+    this.made = made;
+    this.group.add(made.group);
+    this.nodes = info.objects.map((object) => made.group.getObjectByName(object.glb_node) ?? null);
     this.group.updateMatrixWorld(true);
     this.bounds.makeEmpty();
     if (info.bounds) this.bounds.set(new Vector3(...info.bounds[0]), new Vector3(...info.bounds[1]));
+    if (made.small.length > 0) void this.sharpen(made);
     return true;
+  }
+
+  /** Whether drawing it takes so long that its first picture should be a coarse one. */
+  get slow(): boolean {
+    return drawnBySoftware() && this.made.details.length > 0;
+  }
+
+  /** Shows few triangles in place of many, or all of them again. */
+  coarsen(coarse: boolean): void {
+    this.coarse = coarse;
+    for (const detail of this.made.details) detail.mesh.geometry = coarse ? detail.coarse : detail.whole;
+  }
+
+  /** Puts the whole textures in the place of the small ones, as they come; one a frame, since each takes a while. */
+  private async sharpen(made: Made): Promise<void> {
+    await frames(2);
+    for (const { texture, url, materials } of made.small) {
+      const whole = await loadWhole(texture, url).catch(() => null);
+      if (this.made !== made) return whole?.dispose();
+      if (!whole) continue;
+      for (const material of materials) material.map = whole;
+      texture.dispose();
+      this.changed();
+      await frames(1);
+    }
+    made.small = [];
   }
 
   clear(): void {
     this.key = "";
+    for (const { coarse } of this.made.details) coarse.dispose();
+    this.coarsen(false);
     this.group.traverse((object) => {
       if (!(object instanceof Mesh)) return;
       object.geometry.dispose();
@@ -66,6 +101,7 @@ export class SceneContent {
     });
     this.group.clear();
     this.nodes = [];
+    this.made = { group: new Group(), details: [], small: [] };
   }
 
   /** Moves the objects to where they are at a time. */
@@ -80,16 +116,24 @@ export class SceneContent {
     }
   }
 
-  /** The first surface under a point of the picture, -1 to 1 to the right and up. */
+  /** The first surface under a point of the picture, -1 to 1 to the right and up: of the scene as it is, never coarse. */
   pick(x: number, y: number, camera: Camera): Vector3 | null {
     this.raycaster.setFromCamera(new Vector2(x, y), camera);
-    return this.raycaster.intersectObject(this.group, true)[0]?.point ?? null;
+    return this.firstHit()?.point ?? null;
   }
 
-  /** How far one gets from a point along a direction of unit length before a surface is in the way. */
-  free(from: Vector3, direction: Vector3): number {
-    this.raycaster.set(from, direction);
-    return this.raycaster.intersectObject(this.group, true)[0]?.distance ?? Infinity;
+  /** How far a surface lies from a point in a direction, m; infinite where there is none. */
+  distance(from: Vector3, direction: Vector3): number {
+    this.raycaster.set(from, direction.clone().normalize());
+    return this.firstHit()?.distance ?? Infinity;
+  }
+
+  private firstHit(): Intersection | undefined {
+    const { coarse } = this;
+    this.coarsen(false);
+    const [hit] = this.raycaster.intersectObject(this.group, true);
+    this.coarsen(coarse);
+    return hit;
   }
 
   /** The direction under a point of the picture. */
@@ -99,57 +143,18 @@ export class SceneContent {
   }
 }
 
-async function make(info: SceneInfo, lighting: Json | undefined): Promise<Group> {
-  if (info.glb) return makeMesh(info.glb, lighting);
+async function make(info: SceneInfo, lighting: Json | undefined): Promise<Made> {
+  if (info.glb) return loadMesh(info.glb, lighting);
   const group = new Group();
-  if (!info.texture) return group;
+  const made: Made = { group, details: [], small: [] };
+  if (!info.texture) return made;
   const texture = await new TextureLoader().loadAsync(info.texture);
   texture.colorSpace = SRGBColorSpace;
   texture.minFilter = LinearMipmapLinearFilter;
-  texture.anisotropy = anisotropy;
+  texture.anisotropy = anisotropy();
   if (info.kind === "panorama") group.add(makePanorama(texture, info));
   else if (info.kind === "plane") group.add(makePlane(texture, info));
-  return group;
-}
-
-async function makeMesh(url: string, lighting: Json | undefined): Promise<Group> {
-  const { scene } = await new GLTFLoader().loadAsync(url);
-  const lit = getIn(lighting, "type") === "lambert";
-  scene.traverse((object) => {
-    if (!(object instanceof Mesh)) return;
-    const given = object.material as MeshStandardMaterial;
-    const options = {
-      map: given.map,
-      color: given.color,
-      side: given.side,
-      vertexColors: given.vertexColors,
-      alphaTest: given.alphaTest,
-    };
-    object.material = lit ? new MeshLambertMaterial(options) : new MeshBasicMaterial(options);
-    if (given.map) given.map.anisotropy = anisotropy;
-    if (lit && !object.geometry.getAttribute("normal")) object.geometry.computeVertexNormals();
-    given.dispose();
-  });
-  const group = new Group();
-  group.add(scene);
-  if (lit) group.add(...lights(lighting));
-  return group;
-}
-
-/** Lambertian irradiance of a white surface is `strength`; three.js divides by pi. */
-function lights(lighting: Json | undefined): Object3D[] {
-  const result: Object3D[] = [new AmbientLight(0xffffff, Number(getIn(lighting, "ambient") ?? 0.3) * Math.PI)];
-  for (const sun of (getIn(lighting, "suns") as Json[] | undefined) ?? []) {
-    const light = new DirectionalLight(0xffffff, Number(getIn(sun, "strength") ?? 1) * Math.PI);
-    light.position.fromArray((getIn(sun, "direction") as number[] | undefined) ?? [0, 0, -1]).negate();
-    result.push(light);
-  }
-  for (const point of (getIn(lighting, "points") as Json[] | undefined) ?? []) {
-    const light = new PointLight(0xffffff, Number(getIn(point, "strength") ?? 1) * Math.PI, 0, 2);
-    light.position.fromArray((getIn(point, "position") as number[] | undefined) ?? [0, 0, 0]);
-    result.push(light);
-  }
-  return result;
+  return made;
 }
 
 const panorama_radius_m = 200;

@@ -133,7 +133,7 @@ export class Navigation {
     this.camera.quaternion.setFromEuler(this.angles.set(this.pitch, 0, this.yaw)).multiply(upright);
     this.camera.updateMatrixWorld();
     this.moved();
-    this.stage.invalidate();
+    this.stage.moved();
   }
 
   private at(event: MouseEvent): [number, number] {

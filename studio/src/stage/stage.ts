@@ -1,11 +1,12 @@
-import { Color, PerspectiveCamera, Scene, WebGLRenderer } from "three";
+import { Color, PerspectiveCamera, Scene, type WebGLRenderer } from "three";
 import { h } from "../ui/dom.ts";
-import { software } from "./gpu.ts";
+import { makeRenderer } from "./gpu.ts";
+import { Haste } from "./haste.ts";
 import { colour, theme } from "../ui/theme.ts";
 
-/** Frames slower than this while something moves are drawn with fewer pixels. */
-const slow_frame_ms = 45;
+/** Of the pixels along each side, where frames are slow. */
 const coarsest = 0.5;
+const rest_ms = 250;
 
 /** A picture of a three.js scene that is drawn when something has changed, and at no other time. */
 export class Stage {
@@ -19,14 +20,18 @@ export class Stage {
   draw: (renderer: WebGLRenderer) => void = (renderer) => renderer.render(this.scene, this.camera);
   /** Called when the size has changed. */
   resized: () => void = () => undefined;
+  /** Called with true when frames become slow while something moves, and with false when all of it rests again. */
+  hurried: (hurried: boolean) => void = () => undefined;
   width = 1;
   height = 1;
   private scheduled = false;
+  private asked_ms = 0;
   private last = 0;
+  private animating = false;
   private moving = false;
+  private haste = new Haste();
   private ratio = 1;
-  private cost_ms = 0;
-  private sharpen: ReturnType<typeof setTimeout> | undefined;
+  private rest: ReturnType<typeof setTimeout> | undefined;
 
   constructor(label: string) {
     this.element = h("div", { class: "stage", tabIndex: 0, attrs: { role: "application", "aria-label": label } });
@@ -54,34 +59,58 @@ export class Stage {
   invalidate(): void {
     if (this.scheduled || !this.renderer) return;
     this.scheduled = true;
+    this.asked_ms = performance.now();
     requestAnimationFrame((now) => this.frame(now));
+  }
+
+  /** Asks for a frame because something moves: where frames are slow it is drawn coarsely until all rests. */
+  moved(): void {
+    this.moving = true;
+    this.invalidate();
+  }
+
+  /** Draws coarsely now, and all of it in a moment: for what is known to be slow. */
+  hurry(): void {
+    this.haste.hurry();
+    this.setHurried(true);
+  }
+
+  /** What is shown is another thing: how slow it is remains to be seen. */
+  forgetPace(): void {
+    this.haste = new Haste();
   }
 
   private frame(now: number): void {
     this.scheduled = false;
     if (!this.renderer || this.element.offsetParent === null) return;
-    const dt_s = this.moving ? (now - this.last) / 1000 : 1 / 60;
-    if (this.moving) this.adapt(now - this.last);
+    const begun_ms = performance.now();
+    const waited_ms = begun_ms - this.asked_ms;
+    const dt_s = this.animating ? (now - this.last) / 1000 : 1 / 60;
     this.last = now;
-    this.moving = this.animate(dt_s);
+    const moved = this.moving;
+    this.moving = this.animating = this.animate(dt_s);
+    if (moved || this.animating) this.setHurried(this.haste.frame(waited_ms));
+    if (moved || this.animating || this.ratio < 1) this.restSoon();
     this.renderer.clear();
     this.draw(this.renderer);
-    if (this.moving) this.invalidate();
+    if (!this.animating) return;
+    this.invalidate();
+    this.asked_ms = begun_ms;
   }
 
-  /** Fewer pixels while frames are slow; all of them as soon as nothing moves. */
-  private adapt(frame_ms: number): void {
-    this.cost_ms = this.cost_ms === 0 ? frame_ms : 0.8 * this.cost_ms + 0.2 * frame_ms;
-    if (this.cost_ms > slow_frame_ms && this.ratio > coarsest) this.setRatio(coarsest);
-    clearTimeout(this.sharpen);
-    this.sharpen = setTimeout(() => {
-      this.cost_ms = 0;
-      if (this.ratio < 1) this.setRatio(1);
-    }, 250);
+  private restSoon(): void {
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => {
+      this.haste.rest();
+      this.setHurried(false);
+    }, rest_ms);
   }
 
-  private setRatio(ratio: number): void {
+  private setHurried(hurried: boolean): void {
+    const ratio = hurried ? coarsest : 1;
+    if (this.ratio === ratio) return;
     this.ratio = ratio;
+    this.hurried(hurried);
     this.renderer?.setPixelRatio(Math.min(devicePixelRatio, 2) * ratio);
     this.invalidate();
   }
@@ -97,13 +126,5 @@ export class Stage {
     this.renderer?.setSize(clientWidth, clientHeight);
     this.resized();
     this.invalidate();
-  }
-}
-
-function makeRenderer(): WebGLRenderer | null {
-  try {
-    return new WebGLRenderer({ antialias: !software, powerPreference: "high-performance" });
-  } catch {
-    return null;
   }
 }

@@ -62,13 +62,16 @@ export class NumberField {
     this.options.change(value);
   }
 
+  private forget(): void {
+    delete this.input.dataset["typing"];
+    this.input.value = this.text();
+  }
+
   private key(event: KeyboardEvent): void {
     const direction = event.key === "ArrowUp" ? 1 : event.key === "ArrowDown" ? -1 : 0;
     if (event.key === "Enter") this.commit();
-    else if (event.key === "Escape") {
-      delete this.input.dataset["typing"];
-      this.input.value = this.text();
-    } else if (direction !== 0 && this.options.step) {
+    else if (event.key === "Escape") this.forget();
+    else if (direction !== 0 && this.options.step) {
       event.preventDefault();
       const step = this.options.step * (event.shiftKey ? 10 : 1);
       const from = Number(this.input.value || this.input.placeholder) || 0;

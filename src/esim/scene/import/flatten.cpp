@@ -23,10 +23,18 @@ Material convert(const GraphMaterial& source, TextureStore& textures, View view)
   Material material;
   material.name = source.name;
   material.unlit = source.unlit;
-  material.texture = textures.get(source.base_texture, source.base, source.name, view);
   material.base = seen(source.base, view);
-  if (source.base_texture.image >= 0) material.base = material.texture != nullptr ? 1.0F : kMissingTextureBase;
   material.emission = seen(source.emission, view);
+  if (textures.look() == SceneLook::coded) {
+    material.coded = textures.coded(source.base_texture, source.name);
+    if (source.base_texture.image >= 0 && material.coded == nullptr) material.base = kMissingTextureBase;
+    if (source.emission.maxCoeff() <= 0 || source.emission_texture.image < 0) return material;
+    material.coded_emission = textures.coded(source.emission_texture, source.name);
+    if (material.coded_emission == nullptr) material.emission = 0;
+    return material;
+  }
+  material.texture = textures.get(source.base_texture, source.base, source.name, view);
+  if (source.base_texture.image >= 0) material.base = material.texture != nullptr ? 1.0F : kMissingTextureBase;
   if (material.emission > 0 && source.emission_texture.image >= 0) {
     material.emission_texture = textures.get(source.emission_texture, source.emission, source.name, view);
     material.emission = material.emission_texture != nullptr ? 1.0F : 0.0F;
@@ -116,11 +124,11 @@ std::vector<int> movers(const SceneGraph& graph, const NodeTransforms& transform
   return result;
 }
 
-Materials convert_materials(const SceneGraph& graph, TextureStore& textures, bool colour) {
+Materials convert_materials(const SceneGraph& graph, TextureStore& textures) {
   Materials materials;
   for (const GraphMaterial& source : graph.materials) {
     materials.luminance.push_back(convert(source, textures, View::luminance));
-    if (!colour) continue;
+    if (textures.look() == SceneLook::luminance) continue;
     for (const View view : {View::red, View::green, View::blue})
       materials.coloured[static_cast<std::size_t>(view)].push_back(convert(source, textures, view));
   }
@@ -139,15 +147,16 @@ void give_warnings(const SceneGraph& graph, const std::filesystem::path& file, c
 
 }  // namespace
 
-SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn, bool colour) {
+SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
+                  SceneLook look) {
   check_size(graph, file);
   give_warnings(graph, file, warn);
   SceneFile result;
   const NodeTransforms transforms(graph, file);
   result.animation = transforms.span();
   const double start_s = transforms.start_s();
-  TextureStore textures(graph, file.parent_path(), warn, colour);
-  const Materials materials = convert_materials(graph, textures, colour);
+  TextureStore textures(graph, file.parent_path(), warn, look);
+  const Materials materials = convert_materials(graph, textures);
   result.image_count = textures.image_count();
 
   // The geometry of each mover, in the order of the nodes.
@@ -188,17 +197,17 @@ SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, co
 }
 
 Mesh flatten_still(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
-                   bool colour) {
+                   SceneLook look) {
   check_size(graph, file);
   give_warnings(graph, file, warn);
   const NodeTransforms transforms(graph, file);
-  TextureStore textures(graph, file.parent_path(), warn, colour);
+  TextureStore textures(graph, file.parent_path(), warn, look);
   MeshJoiner joiner(file);
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     for (const std::uint32_t mesh : graph.nodes[i].meshes)
       joiner.append(graph.meshes[mesh], transforms.world(i, transforms.start_s()));
   }
-  return joiner.take(convert_materials(graph, textures, colour));
+  return joiner.take(convert_materials(graph, textures));
 }
 
 }  // namespace esim

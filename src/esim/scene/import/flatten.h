@@ -10,10 +10,11 @@ namespace esim {
 ///
 /// An animated node's transform M(t) is rigid up to a constant factor: M(t) = T(t) S, with T(t) the object's pose and
 /// S = T(0)⁻¹ M(0) applied to its vertices. Where the scale is animated too, its first value is kept, with a warning.
-/// Meshes have materials in each colour as well if `colour`.
-SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn, bool colour);
+SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
+                  SceneLook look);
 
 /// The whole graph as one mesh that stands still, as it is at the start of its animation.
-Mesh flatten_still(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn, bool colour);
+Mesh flatten_still(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
+                   SceneLook look);
 
 }  // namespace esim

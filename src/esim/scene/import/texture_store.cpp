@@ -40,27 +40,33 @@ void check_size(std::span<const std::byte> content, const std::string& name) {
 
 }  // namespace
 
-Planes TextureStore::decoded(const GraphImage& image, bool colour) {
+Planes decoded(const CodedTexture& texture, bool colour) {
   Planes planes;
-  if (!image.bytes.empty()) {
-    check_size(image.bytes, image.name);
-    decode_planes(image.bytes, image.name, Encoding::automatic, colour, planes);
-    return planes;
-  }
-  const FolderPath inside = path_inside(folder_, image.name);
-  if (!inside.path) throw UserError(fmt::format("texture '{}' {}", image.name, inside.reason));
-  const std::vector<std::byte> content = read_bytes(*inside.path);
-  check_size(content, image.name);
-  if (graph_.ignores_alpha) {
-    decode_planes(content, inside.path->string(), Encoding::automatic, colour, planes);
+  check_size(texture.bytes, texture.name);
+  if (texture.file.empty() || texture.opaque) {
+    const std::string name = texture.file.empty() ? texture.name : texture.file.string();
+    decode_planes(texture.bytes, name, Encoding::automatic, colour, planes);
   } else {
-    load_planes(*inside.path, Encoding::automatic, colour, planes);
+    load_planes(texture.file, Encoding::automatic, colour, planes);
   }
   return planes;
 }
 
+CodedTexture TextureStore::read(const GraphTexture& slot) const {
+  const GraphImage& image = graph_.images[static_cast<std::size_t>(slot.image)];
+  CodedTexture texture{image.name, {}, image.bytes, true, slot.wrap_u, slot.wrap_v};
+  if (!image.bytes.empty()) return texture;
+  const FolderPath inside = path_inside(folder_, image.name);
+  if (!inside.path) throw UserError(fmt::format("texture '{}' {}", image.name, inside.reason));
+  texture.file = *inside.path;
+  texture.bytes = read_bytes(texture.file);
+  texture.opaque = graph_.ignores_alpha;
+  return texture;
+}
+
 TextureStore::Views TextureStore::views_of(const GraphTexture& slot, const Eigen::Vector3f& factor) {
-  Planes planes = decoded(graph_.images[static_cast<std::size_t>(slot.image)], colour_ || !is_grey(factor));
+  const bool colour = look_ == SceneLook::colour;
+  Planes planes = decoded(read(slot), colour || !is_grey(factor));
   texel_count_ += planes[0].size();
   if (texel_count_ > kMaxSceneTexels)
     throw UserError(fmt::format("its textures have more than {} texels in all; make them smaller", kMaxSceneTexels));
@@ -69,7 +75,7 @@ TextureStore::Views TextureStore::views_of(const GraphTexture& slot, const Eigen
     views[static_cast<std::size_t>(view)] = std::make_shared<const Texture>(image, slot.wrap_u, slot.wrap_v);
   };
   keep(View::luminance, luminance_of(planes, factor));
-  if (!colour_) return views;
+  if (!colour) return views;
   keep(View::red, times(factor[0], std::move(planes[0])));
   keep(View::green, times(factor[1], std::move(planes[1])));
   keep(View::blue, times(factor[2], std::move(planes[2])));
@@ -87,9 +93,26 @@ std::shared_ptr<const Texture> TextureStore::get(const GraphTexture& slot, const
     entry->second = views_of(slot, factor);
     ++image_count_;
   } catch (const UserError& error) {
-    warn_(fmt::format("material {}: {}; its surfaces are grey", material, error.what()));
+    warn_failed(material, error);
   }
   return wanted;
+}
+
+std::shared_ptr<const CodedTexture> TextureStore::coded(const GraphTexture& slot, const std::string& material) {
+  if (slot.image < 0) return nullptr;
+  const auto [entry, is_new] = coded_.try_emplace({slot.image, slot.wrap_u, slot.wrap_v});
+  if (!is_new) return entry->second;
+  try {
+    entry->second = std::make_shared<const CodedTexture>(read(slot));
+    ++image_count_;
+  } catch (const UserError& error) {
+    warn_failed(material, error);
+  }
+  return entry->second;
+}
+
+void TextureStore::warn_failed(const std::string& material, const UserError& error) const {
+  warn_(fmt::format("material {}: {}; its surfaces are grey", material, error.what()));
 }
 
 }  // namespace esim

@@ -16,32 +16,39 @@ namespace esim {
 /// What of an image or a material is wanted.
 enum class View { red, green, blue, luminance };
 
-/// Decodes the images of a scene, each once per way in which it is used.
+/// Reads the images of a scene, each once per way in which it is used.
 class TextureStore {
  public:
-  /// Views other than luminance are had if `colour`.
-  TextureStore(const SceneGraph& graph, std::filesystem::path folder, const WarningHandler& warn, bool colour)
-      : graph_(graph), folder_(std::move(folder)), warn_(warn), colour_(colour) {}
+  /// Views other than luminance are had if `look` has colours.
+  TextureStore(const SceneGraph& graph, std::filesystem::path folder, const WarningHandler& warn, SceneLook look)
+      : graph_(graph), folder_(std::move(folder)), warn_(warn), look_(look) {}
+
+  SceneLook look() const { return look_; }
 
   /// A view of an image whose colours are multiplied by `factor`. Null where the slot holds no texture, and, after a
   /// warning that names the material, where its image is missing, forbidden or unreadable.
   std::shared_ptr<const Texture> get(const GraphTexture& slot, const Eigen::Vector3f& factor,
                                      const std::string& material, View view);
 
-  /// Images that were decoded.
+  /// The image itself, not decoded. Null as above; that its bytes are no image is not noticed.
+  std::shared_ptr<const CodedTexture> coded(const GraphTexture& slot, const std::string& material);
+
+  /// Images that were read.
   std::size_t image_count() const { return image_count_; }
 
  private:
   using Views = std::array<std::shared_ptr<const Texture>, 4>;
 
   Views views_of(const GraphTexture& slot, const Eigen::Vector3f& factor);
-  Planes decoded(const GraphImage& image, bool colour);
+  CodedTexture read(const GraphTexture& slot) const;
+  void warn_failed(const std::string& material, const UserError& error) const;
 
   const SceneGraph& graph_;
   std::filesystem::path folder_;
   const WarningHandler& warn_;
-  bool colour_;
+  SceneLook look_;
   std::map<std::tuple<std::int32_t, Wrap, Wrap, std::array<float, 3>>, Views> textures_;
+  std::map<std::tuple<std::int32_t, Wrap, Wrap>, std::shared_ptr<const CodedTexture>> coded_;
   std::size_t image_count_ = 0, texel_count_ = 0;
 };
 

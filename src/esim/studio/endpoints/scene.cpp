@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 
 #include "esim/record/preview/canvas.h"
@@ -9,6 +10,9 @@
 
 namespace esim::studio {
 namespace {
+
+constexpr const char* kForgotten = "this scene has been forgotten; ask for it anew";
+constexpr const char* kKept = "private, max-age=3600";
 
 Json bounds_of(const Scene& scene) {
   Eigen::AlignedBox3d still, all;
@@ -102,10 +106,10 @@ Response scene_file(const Request& request, SceneStore& scenes) {
   const std::string& name = request.captured.front();
   const std::size_t dot = std::min(name.find('.'), name.size());
   const auto scene = scenes.find(name.substr(0, dot));
-  if (scene == nullptr) throw HttpError(404, "this scene has been forgotten; ask for it anew");
+  if (scene == nullptr) throw HttpError(404, kForgotten);
   Response response;
   response.content_type = content_type_of(name);
-  response.headers = {{"Cache-Control", "private, max-age=3600"}};
+  response.headers = {{"Cache-Control", kKept}};
   if (name.ends_with(".glb") && scene->glb()) {
     response.body = scene->glb()->bytes;
   } else if (name.ends_with(".jpg") && scene->texture()) {
@@ -113,6 +117,23 @@ Response scene_file(const Request& request, SceneStore& scenes) {
   } else {
     throw HttpError(404, request.path + ": there is no such file");
   }
+  return response;
+}
+
+/// A texture of a mesh, whole.
+Response scene_image(const Request& request, SceneStore& scenes) {
+  const auto scene = scenes.find(request.captured[0]);
+  if (scene == nullptr) throw HttpError(404, kForgotten);
+  const std::string& number = request.captured[1];
+  std::size_t index = 0;
+  const auto [end, failure] = std::from_chars(number.data(), number.data() + number.size(), index);
+  const bool is_number = failure == std::errc() && end == number.data() + number.size();
+  const auto image = is_number ? scene->image(index) : nullptr;
+  if (image == nullptr) throw HttpError(404, request.path + ": there is no such texture");
+  Response response;
+  response.content_type = image->type;
+  response.headers = {{"Cache-Control", kKept}};
+  response.body = image->bytes;
   return response;
 }
 
@@ -185,6 +206,8 @@ void add_scenes(Router& router, const Workshop& workshop) {
   });
   router.add("GET", "/api/scenes/*",
              [workshop](const Request& request) { return scene_file(request, workshop.scenes); });
+  router.add("GET", "/api/scenes/*/*",
+             [workshop](const Request& request) { return scene_image(request, workshop.scenes); });
   router.add("POST", "/api/view",
              [workshop](const Request& request) { return view(parse_object(request.body), workshop); });
 }

@@ -202,10 +202,11 @@ export class RunPlace implements Place {
   }
 
   private async cancelRun(): Promise<void> {
-    if (!this.current) return;
+    const run = this.current;
+    if (!run) return;
     try {
-      await server.cancelRun(this.current.id);
-      say("The run is being cancelled; what was simulated until now is kept");
+      await server.cancelRun(run.id);
+      if (!ended(run.state)) say("The run is being cancelled; what was simulated until now is kept");
     } catch (error) {
       complain(error);
     }

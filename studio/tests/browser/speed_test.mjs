@@ -19,8 +19,11 @@ function expectQuick(context, is_so, what) {
   else context.diagnostic("the machine is busy: that says little");
 }
 
+const servers = [];
+
 after(async () => {
   await browser.close();
+  for (const server of servers) await server.stop().catch(() => undefined);
   files.remove();
 });
 
@@ -51,6 +54,7 @@ function watchDrawing() {
 /** The page of a studio that was started on a scenario, and how long that took from the command to the first picture. */
 async function open(scenario) {
   const server = new Server(files.folder);
+  servers.push(server);
   const begin = Date.now();
   await server.start(scenario);
   const state = await openPage(browser, server);
@@ -121,9 +125,10 @@ test("half a million triangles: flown through in few, rested on in all, picked e
 
   await stage(page).focus();
   await press(page, "s", 1500); // a graphics card would not need to find out
+  await page.keyboard.down("w");
+  await until(async () => (await corners()) < all / 5, "few triangles");
   const asked = await page.evaluate(() => window.framesAsked);
   const begin = Date.now();
-  await page.keyboard.down("w");
   await page.waitForTimeout(3000);
   const drawn = await corners();
   const rate = ((await page.evaluate(() => window.framesAsked)) - asked) / ((Date.now() - begin) / 1000);
@@ -132,8 +137,6 @@ test("half a million triangles: flown through in few, rested on in all, picked e
   await page.mouse.click(box.x + 0.4 * box.width, box.y + 0.95 * box.height);
   await page.keyboard.up("w");
   expectQuick(context, rate > 5, `${rate.toFixed(1)} frames/s while flying, of ${drawn / 3} triangles`);
-  assert.ok(drawn < all / 5, `${drawn / 3} triangles`);
-
   await until(async () => (await rows(page).count()) === 3, "a way point");
   const yaml = await until(async () => {
     const text = await page.locator(".yaml-editor textarea").inputValue();

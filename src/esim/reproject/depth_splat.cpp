@@ -119,8 +119,9 @@ void DepthSplat::splat(const std::vector<SeenPoints>& keyframes, const RenderReq
   surface.nearness.fill(VisibleSurface::kNothing);
   surface.crossed.fill(0);
   if (objects) surface.object.fill(0);
-  for (const auto& [seen_from, points] : keyframes) {
-    const std::vector<ViewChange> changes = view_changes(seen_from, view);
+  for (const SeenPoints& keyframe : keyframes) {
+    const SurfacePoints& points = keyframe.points;
+    const std::vector<ViewChange> changes = view_changes(keyframe.view, view);
     resize(points.size());
     workers_.for_each((points.size() + kRun - 1) / kRun, [&](int run) {
       throw_run(points, changes, run * kRun, std::min(points.size(), (run + 1) * kRun));

@@ -23,10 +23,10 @@ inline void Readout::occupy(TimeNs start, std::uint32_t count) {
 /// Reads out a row with several events.
 void Readout::serve(const Row& row, std::uint16_t y, TimeNs t, std::vector<Event>& out) {
   const std::size_t first = out.size();
-  out.emplace_back(t, row.x, y, row.polarity);
+  out.push_back({t, row.x, y, row.polarity});
   for (std::uint32_t i = 1, slot = row.others; i < row.count; ++i) {
     const Slot event = slots_[slot];
-    out.emplace_back(t, event.x, y, event.polarity);
+    out.push_back({t, event.x, y, event.polarity});
     slots_[slot].next = free_slot_;
     free_slot_ = slot;
     slot = event.next;
@@ -43,7 +43,7 @@ inline void Readout::serve_until(TimeNs now, std::vector<Event>& out) {
     Row& row = rows_[request.row];
     occupy(start, row.count);
     if (row.count == 1) [[likely]] {
-      out.emplace_back(start, row.x, request.row, row.polarity);
+      out.push_back({start, row.x, request.row, row.polarity});
     } else {
       serve(row, request.row, start, out);
     }
@@ -82,7 +82,7 @@ void Readout::advance(EventSpan events, TimeNs until, std::vector<Event>& out) {
     // Where nothing waits, and nothing comes until the reader turns to it, it does not wait in its row.
     const TimeNs start = std::max(free_from(), event.t), next = i + 1 < events.size() ? events[i + 1].t : until + 1;
     if (request_count_ == 0 && start < next) {
-      out.emplace_back(start, event.x, event.y, event.polarity);
+      out.push_back({start, event.x, event.y, event.polarity});
       occupy(start, 1);
     } else {
       accept(event);

@@ -494,17 +494,22 @@ class Lives(ProgramTest):
         time.sleep(2)
         self.assertLessEqual(server.cpu_seconds() - before, 0.02)
 
+    def wait_for(self, server, run_id, is_so):
+        """Until that is so of the run, which goes on."""
+        for _ in range(3000):
+            status = server.json("GET", f"/api/runs/{run_id}")
+            if status["state"] == "running" and is_so(status):
+                return
+            self.assertIn(status["state"], ("waiting", "running"))
+            time.sleep(0.02)
+        self.fail(f"waited in vain: {status}")
+
     def test_an_interrupt_ends_a_run_in_order(self):
         long = (self.work / "small.yaml").read_text().replace("type: waypoints", "type: waypoints\n  speed: 0.0005")
         (self.work / "long.yaml").write_text(long)
         server = self.server(self.work / "long.yaml")
-        server.json("POST", "/api/runs", {"path": "work/long.yaml", "out": "work/cut"})
-        for _ in range(600):
-            status = server.json("GET", "/api/runs")[0]
-            if status["t"] > status["start"]:
-                break
-            time.sleep(0.02)
-        self.assertEqual(status["state"], "running")
+        run_id = server.json("POST", "/api/runs", {"path": "work/long.yaml", "out": "work/cut"})["id"]
+        self.wait_for(server, run_id, lambda status: status["t"] > status["start"])
         self.assertEqual(server.stop()[0], 0)
         self.assertEqual(json.loads((self.work / "cut" / "report.json").read_text())["status"], "interrupted")
         self.assertEqual(run("info", self.work / "cut").returncode, 0)
@@ -518,13 +523,10 @@ class Lives(ProgramTest):
         server = self.server(self.work)
         run_id = server.json("POST", "/api/runs", {"path": "work/long.yaml"})["id"]
         server.events_of(run_id, ("progress",))  # and is gone
+        self.wait_for(server, run_id, lambda status: not status["loading"])
         waiting = server.json("POST", "/api/runs", {"path": "work/small.yaml"})["id"]
         self.assertEqual([r["state"] for r in server.json("GET", "/api/runs")], ["running", "waiting"])
         server.json("DELETE", f"/api/runs/{waiting}")
-        for _ in range(600):
-            if not server.json("GET", f"/api/runs/{run_id}")["loading"]:
-                break
-            time.sleep(0.02)
         server.json("DELETE", f"/api/runs/{run_id}")
         self.assertEqual(server.events_of(run_id, ("cancelled",))[-1], ("cancelled", {"recording": "work/out/long"}))
         self.assertEqual([r["state"] for r in server.json("GET", "/api/runs")], ["cancelled", "cancelled"])

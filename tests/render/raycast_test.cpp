@@ -183,6 +183,25 @@ TEST(RaycastRenderer, NarrowPixelsAverageToWideOnes) {
   EXPECT_GT(std::sqrt(unlike / count), 0.015) << "edges should be narrower";
 }
 
+TEST(RaycastRenderer, MakesRoomForNarrowPixelsInAnySample) {
+  Camera model = test::distorted_camera(1);
+  const auto scene = build_raycast_scene(test::plain_moving_scene());
+  Sample sample;
+  const auto see = [&] {
+    make_raycast_renderer(scene, {0.5F, 16}, model, test::two_threads())
+        ->render({test::kTime, test::moving_camera(), {{0, 0, model.width, model.height}}, test::moving_objects(0)},
+                 sample);
+  };
+  model.footprint = 2;
+  see();
+  model.width += 40, model.height += 30;
+  see();
+  EXPECT_EQ(sample.narrow.bounds(), sample.irradiance.bounds());
+  model.footprint = 1;
+  see();
+  EXPECT_TRUE(sample.narrow.empty());
+}
+
 // --- moving objects
 // ---------------------------------------------------------------------------------------------------
 

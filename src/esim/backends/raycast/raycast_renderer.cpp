@@ -128,9 +128,8 @@ class RaycastRenderer final : public ProcessorRenderer {
 
  private:
   void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
-    const bool narrow = footprint_ > 1;
-    if (sample.narrow.empty() == narrow)
-      sample.narrow = narrow ? Image<float>(rays_.x.width(), rays_.x.height()) : Image<float>();
+    const Tile narrow = footprint_ > 1 ? Tile{0, 0, rays_.x.width(), rays_.x.height()} : Tile{};
+    if (sample.narrow.bounds() != narrow) sample.narrow = Image<float>(narrow.width, narrow.height);
     std::vector<Moment> moments;
     for (const RenderRequest& request : requests) {
       moments.push_back({scene_->place(request), scene_->lighting()});

@@ -22,6 +22,14 @@ std::vector<ViewChange> view_changes(const RenderRequest& from, const RenderRequ
   return changes;
 }
 
+void VisibleSurface::resize(int width, int height, bool objects) {
+  if (nearness.width() != width || nearness.height() != height) {
+    nearness = Image<float>(width, height);
+    edge = Image<Edge>(width, height);
+  }
+  if (objects && object.bounds() != nearness.bounds()) object = Image<std::uint16_t>(width, height);
+}
+
 DepthSplat::DepthSplat(Camera camera, int scale, double greatest_radius, const Workers& workers)
     : camera_(std::move(camera)),
       scale_(static_cast<float>(scale)),
@@ -97,7 +105,10 @@ void DepthSplat::collect(const SurfacePoints& points, int begin, int end, Visibl
         if (!(nearness > there)) return;
         there = nearness;
         if (objects) surface.object(column, line) = object;
-        surface.crossed(column, line) = points.crossed[i];
+        // An outline covers all that its surface does. A crease is where it is.
+        const auto apart = [](int a, float b) { return std::fabs(static_cast<float>(a) - b) > 0.5F; };
+        const bool beside = points.edge[i] == Edge::crease && (apart(column, u) || apart(line, v));
+        surface.edge(column, line) = beside ? Edge::none : points.edge[i];
       };
       put(left, top, here);
       if (du < 0) put(left + 1, top, here + scale_ * slope_x);
@@ -109,15 +120,10 @@ void DepthSplat::collect(const SurfacePoints& points, int begin, int end, Visibl
 
 void DepthSplat::splat(const std::vector<SeenPoints>& keyframes, const RenderRequest& view, VisibleSurface& surface) {
   const int width = camera_.width, height = camera_.height;
-  if (surface.nearness.width() != width || surface.nearness.height() != height) {
-    surface.nearness = Image<float>(width, height);
-    surface.crossed = Image<std::uint8_t>(width, height);
-  }
   const bool objects = !view.objects.empty();
-  if (objects && surface.object.bounds() != surface.nearness.bounds())
-    surface.object = Image<std::uint16_t>(width, height);
+  surface.resize(width, height, objects);
   surface.nearness.fill(VisibleSurface::kNothing);
-  surface.crossed.fill(0);
+  surface.edge.fill(Edge::none);
   if (objects) surface.object.fill(0);
   for (const SeenPoints& keyframe : keyframes) {
     const SurfacePoints& points = keyframe.points;

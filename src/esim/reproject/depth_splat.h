@@ -23,9 +23,12 @@ std::vector<ViewChange> view_changes(const RenderRequest& from, const RenderRequ
 struct VisibleSurface {
   Image<float> nearness;        ///< 1/Z in the view; kNothing where no point falls
   Image<std::uint16_t> object;  ///< as in SurfacePoints; where nothing moves, not current
-  Image<std::uint8_t> crossed;  ///< as in SurfacePoints
+  Image<Edge> edge;             ///< as in SurfacePoints; creases where the point falls next to the pixel's centre
 
   static constexpr float kNothing = -1.0F;
+
+  /// Makes it one of a view in which, with `objects`, something moves, where it is not yet.
+  void resize(int width, int height, bool objects);
 };
 
 /// Points, and the view that they were seen from.

@@ -47,19 +47,19 @@ void find_surfaces(const KeyframeLayout& layout, const PixelRays& rays, const Sa
                    Keyframe& keyframe) {
   const Surfaces surfaces(sample.depth, layout.camera.fx, workers);
   const int width = layout.camera.width, height = layout.camera.height, s = layout.supersampling;
-  keyframe.sparse = keyframe.edges = {};
+  keyframe.sparse = keyframe.dense = {};
   for (int y = layout.first(); y < height; y += s)
     for (int x = layout.first(); x < width; x += s)
-      surfaces.add_point(rays, sample.object, false, x, y, keyframe.sparse);
+      surfaces.add_point(rays, sample.object, Edge::none, x, y, keyframe.sparse);
   // At that many pixels from an edge the mean over a pixel of the sensor holds both of its sides.
   keyframe.wide.front = surfaces.front(s / 2 + 1);
   if (keyframe.narrow.root.empty()) return;
   keyframe.narrow.front = surfaces.front(1);
-  const Image<std::uint8_t> crossed = surfaces.crossed(), near = surfaces.beside_others(s + 1);
+  const Image<Edge> edges = surfaces.edges();
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
-      if (crossed(x, y) + near(x, y) > 0)
-        surfaces.add_point(rays, sample.object, crossed(x, y) != 0, x, y, keyframe.edges);
+      if (edges(x, y) != Edge::none || (x % 2 == 0 && y % 2 == 0))
+        surfaces.add_point(rays, sample.object, edges(x, y), x, y, keyframe.dense);
 }
 
 }  // namespace

@@ -46,7 +46,8 @@ struct Keyframe {
   Light narrow;  ///< each pixel the mean over its own area; without size where the renderer does not tell
 
   SurfacePoints sparse;  ///< of every s-th pixel of every s-th row, from KeyframeLayout::first() on
-  SurfacePoints edges;   ///< of all pixels on and near edges; none without `narrow`
+  SurfacePoints dense;   ///< of all pixels that edges cross and of every second pixel of every second row: each covers
+                         ///< the four around it; none without `narrow`
 };
 
 /// Prepares a sample of the whole keyframe, whose buffers are taken. `rays`: of the layout's camera.

@@ -63,42 +63,6 @@ void for_each_run(const RowPoints& points, const Body& body) {
   }
 }
 
-/// The narrow pixels within one of the sensor's, and what they see of the points on and near edges.
-class Cells {
- public:
-  /// A surface's nearness, and the object that it is on.
-  struct Seen {
-    float nearness;
-    std::uint16_t object;
-  };
-
-  /// `pixels`: what the sensor's pixels see; with `objects` something moves.
-  Cells(const VisibleSurface& cells, const VisibleSurface& pixels, int s, bool objects)
-      : cells_(cells), pixels_(pixels), s_(s), objects_(objects) {}
-
-  /// Whether an edge crosses the pixel.
-  bool crossed(int x, int y) const {
-    for (int j = y * s_; j < (y + 1) * s_; ++j)
-      for (int i = x * s_; i < (x + 1) * s_; ++i)
-        if (cells_.crossed(i, j) != 0) return true;
-    return false;
-  }
-
-  /// What the cell (i, j) sees; where no point fell, what its pixel sees.
-  Seen at(int i, int j) const {
-    return cells_.nearness(i, j) >= 0 ? seen(cells_, i, j) : seen(pixels_, i / s_, j / s_);
-  }
-
- private:
-  Seen seen(const VisibleSurface& surface, int x, int y) const {
-    return {surface.nearness(x, y), objects_ ? surface.object(x, y) : std::uint16_t{0}};
-  }
-
-  const VisibleSurface &cells_, &pixels_;
-  int s_;
-  bool objects_;
-};
-
 }  // namespace
 
 /// Two keyframes and a view between them.
@@ -142,7 +106,7 @@ Reprojector::Reprojector(const KeyframeLayout& layout, bool at_infinity, const W
       greatest_radius_(greatest_radius(keyframe_rays_)),
       workers_(workers),
       splat_(layout.sensor, layout.supersampling, greatest_radius_, workers),
-      fine_splat_(denser(layout.sensor, layout.supersampling, 0), 1, greatest_radius_, workers) {}
+      cells_(layout, greatest_radius_, workers) {}
 
 void Reprojector::prepare(RenderRequest view, Sample& sample, Keyframe& keyframe) const {
   prepare_keyframe(layout_, keyframe_rays_, at_infinity_, std::move(view), sample, workers_, keyframe);
@@ -156,8 +120,12 @@ void Reprojector::reconstruct(const Keyframe& before, const Keyframe& after, con
   };
   fit(result.irradiance);
   if (detail == Detail::apart) fit(result.from_before), fit(result.from_after);
+  const bool closely = detail == Detail::whole && before.dense.size() + after.dense.size() > 0;
   if (at_infinity_) {
-    if (surface_.nearness.empty()) surface_.nearness = Image<float>(width, height, 0.0F);
+    surface_.resize(width, height, false);
+    surface_.nearness.fill(0);
+  } else if (closely) {
+    cells_.look({{before.view, before.dense}, {after.view, after.dense}}, view, surface_);
   } else {
     splat_.splat({{before.view, before.sparse}, {after.view, after.sparse}}, view, surface_);
   }
@@ -165,7 +133,7 @@ void Reprojector::reconstruct(const Keyframe& before, const Keyframe& after, con
   std::visit(
       [&](const auto& model) {
         look_up(between, model, detail, result);
-        if (detail == Detail::whole && before.edges.size() + after.edges.size() > 0) refine(between, model, result);
+        if (closely) refine(between, model, result);
       },
       layout_.camera.distortion);
 }
@@ -193,7 +161,9 @@ void Reprojector::look_up(const Between& between, const Model& model, Detail det
     std::int64_t& nowhere = unseen[static_cast<std::size_t>(y)];
     for (int x = 0; x < width; ++x) {
       const auto i = static_cast<std::size_t>(x);
-      nowhere += row0.seen[i] + row1.seen[i] == 0;
+      const bool hidden = row0.seen[i] + row1.seen[i] == 0;
+      nowhere += hidden;
+      if (hidden) surface_.edge(x, y) = Edge::outline;  // it is beside one, for both
       out[x] = between.blend(row0, row1, i);
     }
     if (detail != Detail::apart) return;
@@ -206,19 +176,17 @@ void Reprojector::look_up(const Between& between, const Model& model, Detail det
   result.unseen = std::accumulate(unseen.begin(), unseen.end(), std::int64_t{0});
 }
 
-/// Pixels that edges cross, at supersampling^2 places each.
+/// Pixels that edges cross, or that are hidden behind the blur of edges from both keyframes, at supersampling^2 places
+/// each. Places that neither keyframe sees do not count beside others that one does.
 template <typename Model>
 void Reprojector::refine(const Between& between, const Model& model, Reconstruction& result) {
   const int s = layout_.supersampling, margin = s * layout_.margin_px, places = s * s;
   const Projector project(layout_.camera, model, greatest_radius_);
   const bool objects = !between.view.objects.empty();
-  fine_splat_.splat({{between.before.view, between.before.edges}, {between.after.view, between.after.edges}},
-                    between.view, fine_surface_);
-  const Cells cells(fine_surface_, surface_, s, objects);
   workers_.for_each(layout_.sensor.height, [&](int y) {
     std::vector<int> pixels;
     for (int x = 0; x < layout_.sensor.width; ++x)
-      if (cells.crossed(x, y)) pixels.push_back(x);
+      if (surface_.edge(x, y) != Edge::none) pixels.push_back(x);
     std::vector<float> bx, by, w;
     std::vector<std::uint16_t> object;
     for (const int x : pixels) {
@@ -226,9 +194,10 @@ void Reprojector::refine(const Between& between, const Model& model, Reconstruct
         for (int i = s * x; i < s * (x + 1); ++i) {
           bx.push_back(keyframe_rays_.x(i + margin, j + margin)),
               by.push_back(keyframe_rays_.y(i + margin, j + margin));
-          const Cells::Seen seen = cells.at(i, j);
-          w.push_back(seen.nearness);
-          if (objects) object.push_back(seen.object);
+          const Cells::Seen seen = cells_.at(i, j);
+          const bool nothing = seen.nearness < 0;  // no point falls there
+          w.push_back(nothing ? surface_.nearness(x, y) : seen.nearness);
+          if (objects) object.push_back(nothing ? surface_.object(x, y) : seen.object);
         }
       }
     }
@@ -240,9 +209,13 @@ void Reprojector::refine(const Between& between, const Model& model, Reconstruct
     look_up_row<true>(between.after.narrow, 0, row1);
     std::size_t i = 0;
     for (const int x : pixels) {
-      float sum = 0;
-      for (int place = 0; place < places; ++place) sum += between.blend(row0, row1, i++);
-      result.irradiance(x, y) = sum / static_cast<float>(places);
+      float seen = 0, all = 0, count = 0;
+      for (int place = 0; place < places; ++place, ++i) {
+        const float e = between.blend(row0, row1, i);
+        all += e;
+        if (row0.seen[i] + row1.seen[i] > 0) seen += e, count += 1;
+      }
+      result.irradiance(x, y) = count > 0 ? seen / count : all / static_cast<float>(places);
     }
   });
 }

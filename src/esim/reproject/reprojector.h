@@ -1,5 +1,6 @@
 #pragma once
 
+#include "esim/reproject/cells.h"
 #include "esim/reproject/depth_splat.h"
 #include "esim/reproject/keyframe.h"
 
@@ -54,8 +55,9 @@ class Reprojector {
   PixelRays rays_, keyframe_rays_;
   double greatest_radius_;  // of the keyframe's bearings
   const Workers& workers_;
-  DepthSplat splat_, fine_splat_;
-  VisibleSurface surface_, fine_surface_;  // of the sensor's pixels, and of keyframes' within the sensor's image
+  DepthSplat splat_;
+  Cells cells_;
+  VisibleSurface surface_;  // of the sensor's pixels
 };
 
 }  // namespace esim

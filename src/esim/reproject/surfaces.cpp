@@ -113,36 +113,25 @@ Image<float> Surfaces::front(int reach) const {
   return front;
 }
 
-Image<std::uint8_t> Surfaces::crossed() const {
+Image<Edge> Surfaces::edges() const {
   const Image<float> nearest = nearest_around(nearness_, 1, workers_),
                      farthest = farthest_around(nearness_, 1, workers_);
-  Image<std::uint8_t> crossed(nearness_.width(), nearness_.height());
+  Image<Edge> edges(nearness_.width(), nearness_.height());
   for_each_pixel([&](int x, int y) {
     const float here = nearness_(x, y), least = unlike(x, y, 1);
     const bool outline = here - farthest(x, y) > least, outlined = nearest(x, y) - here > least;
-    crossed(x, y) = outline || (!outlined && is_crease(x, y)) ? 1 : 0;
+    edges(x, y) = outline ? Edge::outline : (!outlined && is_crease(x, y) ? Edge::crease : Edge::none);
   });
-  return crossed;
+  return edges;
 }
 
-Image<std::uint8_t> Surfaces::beside_others(int reach) const {
-  const Image<float> nearest = nearest_around(nearness_, reach, workers_),
-                     farthest = farthest_around(nearness_, reach, workers_);
-  Image<std::uint8_t> beside(nearness_.width(), nearness_.height());
-  for_each_pixel([&](int x, int y) {
-    const float here = nearness_(x, y);
-    beside(x, y) = std::max(nearest(x, y) - here, here - farthest(x, y)) > unlike(x, y, reach) ? 1 : 0;
-  });
-  return beside;
-}
-
-void Surfaces::add_point(const PixelRays& rays, const Image<std::uint16_t>& object, bool crossed, int x, int y,
+void Surfaces::add_point(const PixelRays& rays, const Image<std::uint16_t>& object, Edge edge, int x, int y,
                          SurfacePoints& to) const {
   to.x.push_back(rays.x(x, y)), to.y.push_back(rays.y(x, y));
   to.nearness.push_back(nearness_(x, y));
   to.slope_x.push_back(slope_x_(x, y)), to.slope_y.push_back(slope_y_(x, y));
   if (!object.empty()) to.object.push_back(object(x, y));
-  to.crossed.push_back(crossed ? 1 : 0);
+  to.edge.push_back(edge);
 }
 
 }  // namespace esim

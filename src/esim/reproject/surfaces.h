@@ -9,13 +9,20 @@
 
 namespace esim {
 
+/// What depth shows of an edge in a pixel.
+enum class Edge : std::uint8_t {
+  none,
+  outline,  ///< of a surface, of which the pixel sees the nearer side
+  crease,   ///< of a surface
+};
+
 /// Points on the surfaces that an image sees, an array per quantity.
 struct SurfacePoints {
   std::vector<float> x, y;              ///< bearing (x, y, 1)
   std::vector<float> nearness;          ///< 1 / Z, 1/m; 0 for what is infinitely far, and where Z is none
   std::vector<float> slope_x, slope_y;  ///< of nearness per pixel, on the smooth surface; 0 where there is none
   std::vector<std::uint16_t> object;    ///< 0: what stands still, i + 1: object i; empty where nothing moves
-  std::vector<std::uint8_t> crossed;    ///< whether an edge that depth shows crosses the pixel
+  std::vector<Edge> edge;               ///< that crosses the pixel
 
   int size() const { return static_cast<int>(x.size()); }
 };
@@ -29,15 +36,12 @@ class Surfaces {
   /// Nearness; beside a surface that is nearer and at most `reach` pixels away, that one's.
   Image<float> front(int reach) const;
 
-  /// 1 where the outline of a surface, or a crease of one, is; 0 elsewhere. Of an outline the nearer surface's pixels:
-  /// those of the farther one see no edge once the nearer one has moved away.
-  Image<std::uint8_t> crossed() const;
-
-  /// 1 where other surfaces are at most `reach` pixels away.
-  Image<std::uint8_t> beside_others(int reach) const;
+  /// The edges that cross the pixels. Of an outline the nearer surface's pixels have it: those of the farther one see
+  /// no edge once the nearer one has moved away.
+  Image<Edge> edges() const;
 
   /// Adds what the pixel (x, y) sees, by the image's rays; `object` as in Sample.
-  void add_point(const PixelRays& rays, const Image<std::uint16_t>& object, bool crossed, int x, int y,
+  void add_point(const PixelRays& rays, const Image<std::uint16_t>& object, Edge edge, int x, int y,
                  SurfacePoints& to) const;
 
  private:

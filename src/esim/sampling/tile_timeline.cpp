@@ -14,8 +14,8 @@ namespace {
 // times the smaller one.
 constexpr float kMostBend = 2;
 
-// Every second row is watched, the left half of one and the right half of the next: errors of neighbours are alike.
-constexpr int kRowsPerRun = 2;
+// Every fourth row is watched, the left half of one and the right half of the next: errors of neighbours are alike.
+constexpr int kRowsPerRun = 4;
 
 std::size_t run_length(const Tile& tile) { return static_cast<std::size_t>((tile.width + 1) / 2); }
 

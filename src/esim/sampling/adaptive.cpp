@@ -23,10 +23,10 @@ constexpr double kRound = 0.5;
 
 // In a round, tiles are sampled at one time if none comes earlier than it should by more than this share of its
 // interval: a time has a price, too.
-constexpr double kSlack = 0.1;
+constexpr double kSlack = 0.06;
 
 // An interval's bow that is less than this share of the tolerance is left out.
-constexpr double kStraight = 0.08;
+constexpr double kStraight = 0.07;
 
 // Tiles of a parallel loop that go to one thread together: a round has a few tens.
 constexpr int kTogether = 4;

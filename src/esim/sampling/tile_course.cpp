@@ -10,10 +10,10 @@ namespace {
 constexpr double kNsPerS = 1e9;
 
 // One interval in so many is looked into.
-constexpr std::uint32_t kAuditOneIn = 96;
+constexpr std::uint32_t kAuditOneIn = 128;
 
 // The next sample is meant to make this share of the error that is let pass.
-constexpr double kAim = 0.6;
+constexpr double kAim = 0.65;
 
 // Of the motion field, which is smooth, one row in so many is looked at, the first of each tile among them.
 constexpr int kMotionRows = 4;

@@ -14,8 +14,8 @@ namespace {
 // times the smaller one.
 constexpr float kMostBend = 2;
 
-// Every fourth row is watched, the left half of one and the right half of the next: errors of neighbours are alike.
-constexpr int kRowsPerRun = 4;
+// Every third row is watched, the left half of one and the right half of the next: errors of neighbours are alike.
+constexpr int kRowsPerRun = 3;
 
 std::size_t run_length(const Tile& tile) { return static_cast<std::size_t>((tile.width + 1) / 2); }
 
@@ -117,7 +117,7 @@ void TileTimeline::insert(TimeNs t, const Image<float>& irradiance) {
 }
 
 void TileTimeline::prefetch() const {
-  constexpr std::size_t kPerLine = 64 / sizeof(float), kWanted = 3;
+  constexpr std::size_t kPerLine = 64 / sizeof(float), kWanted = 2;
   for (std::size_t i = samples_.size() - std::min(samples_.size(), kWanted); i < samples_.size(); ++i) {
     for (const LargeVector<float>* values : {&samples_[i].irradiance, &samples_[i].brightness})
       for (std::size_t k = 0; k < values->size(); k += kPerLine) __builtin_prefetch(values->data() + k);

@@ -39,7 +39,7 @@ class TileTimeline {
   TimeNs time(std::size_t i) const { return samples_[i].t; }
 
   /// How far off brightness at sample i would be had it been interpolated from the others: the root of the mean square
-  /// over an eighth of the tile's pixels, those that are watched. Only for samples between others.
+  /// over about a sixth of the tile's pixels, those that are watched. Only for samples between others.
   double surprise(std::size_t i) const { return samples_[i].surprise; }
 
   /// Errors of that interpolation for each pixel that is watched, ln units.

@@ -93,6 +93,7 @@ export class Server {
 
   stop() {
     return new Promise((resolve) => {
+      if (this.process.exitCode !== null || this.process.signalCode !== null) return resolve(); // it has ended already
       this.process.once("exit", resolve);
       this.process.kill("SIGTERM");
     });

@@ -25,7 +25,7 @@ void Cells::look(const std::vector<SeenPoints>& keyframes, const RenderRequest& 
       const Seen seen = at_centre(x, y);
       pixels.nearness(x, y) = seen.nearness;
       if (objects) pixels.object(x, y) = seen.object;
-      pixels.edge(x, y) = crossed(x, y) ? Edge::outline : Edge::none;
+      pixels.edge(x, y) = edge_in(x, y);
     }
   });
 }
@@ -55,11 +55,12 @@ Cells::Seen Cells::nearest_of(int left, int top, int width) const {
   return nearest;
 }
 
-bool Cells::crossed(int x, int y) const {
+/// An edge in one of the pixel's cells.
+Edge Cells::edge_in(int x, int y) const {
   for (int j = y * s_; j < (y + 1) * s_; ++j)
     for (int i = x * s_; i < (x + 1) * s_; ++i)
-      if (cells_.edge(i, j) != Edge::none) return true;
-  return false;
+      if (cells_.edge(i, j) != Edge::none) return cells_.edge(i, j);
+  return Edge::none;
 }
 
 }  // namespace esim

@@ -17,7 +17,7 @@ class Cells {
   Cells(const KeyframeLayout& layout, double greatest_radius, const Workers& workers);
 
   /// Finds what the cells see of the keyframes' dense points, and what the pixels do at their centres: kNothing where
-  /// no point falls into any of their cells. A pixel is crossed by an edge where one of its cells is.
+  /// no point falls into any of their cells. An edge crosses a pixel where it crosses one of its cells.
   void look(const std::vector<SeenPoints>& keyframes, const RenderRequest& view, VisibleSurface& pixels);
 
   /// A surface's nearness, and the object that it is on.
@@ -34,7 +34,7 @@ class Cells {
  private:
   Seen at_centre(int x, int y) const;
   Seen nearest_of(int left, int top, int width) const;
-  bool crossed(int x, int y) const;
+  Edge edge_in(int x, int y) const;
 
   int s_;  // cells along a pixel's side
   const Workers& workers_;

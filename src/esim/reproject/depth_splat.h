@@ -23,7 +23,7 @@ std::vector<ViewChange> view_changes(const RenderRequest& from, const RenderRequ
 struct VisibleSurface {
   Image<float> nearness;        ///< 1/Z in the view; kNothing where no point falls
   Image<std::uint16_t> object;  ///< as in SurfacePoints; where nothing moves, not current
-  Image<Edge> edge;             ///< as in SurfacePoints; creases where the point falls next to the pixel's centre
+  Image<Edge> edge;             ///< as in SurfacePoints; a crease in the one pixel that its point falls into
 
   static constexpr float kNothing = -1.0F;
 

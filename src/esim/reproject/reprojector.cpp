@@ -106,7 +106,9 @@ Reprojector::Reprojector(const KeyframeLayout& layout, bool at_infinity, const W
       greatest_radius_(greatest_radius(keyframe_rays_)),
       workers_(workers),
       splat_(layout.sensor, layout.supersampling, greatest_radius_, workers),
-      cells_(layout, greatest_radius_, workers) {}
+      cells_(layout, greatest_radius_, workers) {
+  surface_.resize(layout.sensor.width, layout.sensor.height, false);  // all of it infinitely far, until one looks
+}
 
 void Reprojector::prepare(RenderRequest view, Sample& sample, Keyframe& keyframe) const {
   prepare_keyframe(layout_, keyframe_rays_, at_infinity_, std::move(view), sample, workers_, keyframe);
@@ -121,12 +123,9 @@ void Reprojector::reconstruct(const Keyframe& before, const Keyframe& after, con
   fit(result.irradiance);
   if (detail == Detail::apart) fit(result.from_before), fit(result.from_after);
   const bool closely = detail == Detail::whole && before.dense.size() + after.dense.size() > 0;
-  if (at_infinity_) {
-    surface_.resize(width, height, false);
-    surface_.nearness.fill(0);
-  } else if (closely) {
+  if (closely) {
     cells_.look({{before.view, before.dense}, {after.view, after.dense}}, view, surface_);
-  } else {
+  } else if (!at_infinity_) {
     splat_.splat({{before.view, before.sparse}, {after.view, after.sparse}}, view, surface_);
   }
   const Between between(before, after, view);

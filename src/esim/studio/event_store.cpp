@@ -10,12 +10,8 @@ namespace {
 constexpr std::uint64_t kBlock = std::uint64_t{1} << 20;
 constexpr TimeNs kCoarseBin = 4 * kNsPerMs;
 
-void count(EventSpan events, TimeNs from, TimeNs to, EventRate& rate) {
-  const double per_ns = static_cast<double>(rate.on.size()) / static_cast<double>(to - from);
-  for (const Event& event : events) {
-    const auto bin = static_cast<std::size_t>(static_cast<double>(event.t - from) * per_ns);
-    ++(event.polarity > 0 ? rate.on : rate.off)[std::min(bin, rate.on.size() - 1)];
-  }
+bool is_coarse(TimeNs from, TimeNs to, std::size_t bins) {
+  return (to - from) / static_cast<TimeNs>(bins) >= kCoarseBin;
 }
 
 class MemoryStore final : public EventStore {
@@ -57,20 +53,20 @@ class FileStore final : public EventStore {
     return reader_.read(first, count);
   }
 
-  EventRate rate(TimeNs from, TimeNs to, std::size_t bins) const override {
-    if ((to - from) / static_cast<TimeNs>(bins) < kCoarseBin) return EventStore::rate(from, to, bins);
+ protected:
+  TimeNs origin() const override { return reader_.t_offset(); }
+
+  void count(EventRate& rate) const override {
+    if (!is_coarse(rate.edges.front(), rate.edges.back(), rate.on.size())) return EventStore::count(rate);
     const std::lock_guard lock(mutex_);
     if (until_ms_.empty()) make_index();
-    EventRate rate{std::vector<std::uint64_t>(bins), std::vector<std::uint64_t>(bins)};
-    Counts before = until(from);
-    for (std::size_t i = 0; i < bins; ++i) {
-      const double share = static_cast<double>(i + 1) / static_cast<double>(bins);
-      const Counts after = until(from + static_cast<TimeNs>(share * static_cast<double>(to - from)));
+    Counts before = until(rate.edges.front());
+    for (std::size_t i = 0; i < rate.on.size(); ++i) {
+      const Counts after = until(rate.edges[i + 1]);
       rate.on[i] = after.on - before.on;
-      rate.off[i] = after.all - before.all - rate.on[i];
+      rate.off[i] = (after.all - after.on) - (before.all - before.on);
       before = after;
     }
-    return rate;
   }
 
  private:
@@ -78,13 +74,23 @@ class FileStore final : public EventStore {
     std::uint64_t all = 0, on = 0;
   };
 
-  /// Before the ms that is nearest to a time; before and after all events, none and all.
+  /// What there is before a time: by the index up to the ms in which it lies, and counted from there.
   Counts until(TimeNs t) const {
     if (!span_ || t <= span_->start) return {};
     if (t > span_->end) return until_ms_.back();
-    const TimeNs ms = (t - reader_.t_offset() + kNsPerMs / 2) / kNsPerMs;
-    if (ms <= 0) return {};
-    return until_ms_[std::min(static_cast<std::size_t>(ms), until_ms_.size() - 1)];
+    const TimeNs ms = std::max<TimeNs>(0, (t - reader_.t_offset()) / kNsPerMs);
+    const std::size_t last = until_ms_.size() - std::min<std::size_t>(2, until_ms_.size());
+    Counts counts = until_ms_[std::min(static_cast<std::size_t>(ms), last)];
+    if (static_cast<std::size_t>(ms) <= last && reader_.t_offset() + ms * kNsPerMs == t) return counts;
+    const std::size_t next = std::min(static_cast<std::size_t>(ms) + 1, until_ms_.size() - 1);
+    const std::uint64_t end = std::min(reader_.find(t, t).first, until_ms_[next].all);
+    while (counts.all < end) {
+      for (const std::int8_t p : reader_.read_polarities(counts.all, std::min(kBlock, end - counts.all))) {
+        counts.on += p > 0 ? 1 : 0;
+        ++counts.all;
+      }
+    }
+    return counts;
   }
 
   /// What there has been before each ms, and at last all, by reading the polarities once; the times too where the file
@@ -129,12 +135,39 @@ class FileStore final : public EventStore {
 
 }  // namespace
 
-EventRate EventStore::rate(TimeNs from, TimeNs to, std::size_t bins) const {
-  EventRate rate{std::vector<std::uint64_t>(bins), std::vector<std::uint64_t>(bins)};
-  const Range range = find(from, to);
-  for (std::uint64_t at = range.first; at < range.end; at += kBlock)
-    count(read(at, std::min(kBlock, range.end - at)), from, to, rate);
+std::vector<TimeNs> bin_edges(TimeNs from, TimeNs to, std::size_t most, TimeNs unit, TimeNs origin) {
+  const auto up = [](TimeNs value, TimeNs step) { return value / step * step + (value % step > 0 ? step : 0); };
+  TimeNs width = std::max(unit, up((to - from + static_cast<TimeNs>(most) - 1) / static_cast<TimeNs>(most), unit));
+  std::vector<TimeNs> edges;
+  do {  // again where the parts of a bin at both ends are one too many
+    edges.assign(1, from);
+    for (TimeNs edge = origin + up(from + width / 2 - origin, width); edge + width / 2 <= to; edge += width)
+      edges.push_back(edge);
+    edges.push_back(to);
+    width += unit;
+  } while (edges.size() - 1 > most);
+  return edges;
+}
+
+EventRate EventStore::rate(TimeNs from, TimeNs to, std::size_t most) const {
+  const TimeNs unit = is_coarse(from, to, most) ? kNsPerMs : kNsPerUs;
+  EventRate rate;
+  rate.edges = bin_edges(from, to, most, unit, origin());
+  rate.on.resize(rate.edges.size() - 1);
+  rate.off.resize(rate.on.size());
+  count(rate);
   return rate;
+}
+
+void EventStore::count(EventRate& rate) const {
+  const Range range = find(rate.edges.front(), rate.edges.back());
+  std::size_t bin = 0;
+  for (std::uint64_t at = range.first; at < range.end; at += kBlock) {
+    for (const Event& event : read(at, std::min(kBlock, range.end - at))) {
+      while (bin + 1 < rate.on.size() && event.t >= rate.edges[bin + 1]) ++bin;
+      ++(event.polarity > 0 ? rate.on : rate.off)[bin];
+    }
+  }
 }
 
 std::vector<Event> EventStore::thinned(Range range, std::uint64_t most) const {

@@ -102,6 +102,8 @@ export interface RunState {
   out: string;
   state: "waiting" | "running" | "done" | "failed" | "cancelled";
   error?: string;
+  /** The option that the error is about. */
+  where?: string;
   /** Null where nothing was kept. */
   recording?: string | null;
   t?: number;
@@ -139,9 +141,9 @@ export interface RecordingInfo {
   indexing?: number;
 }
 
+/** Events per second between the edges of bins, of which there is one more. */
 export interface Rate {
-  from: number;
-  to: number;
+  edges: number[];
   on: number[];
   off: number[];
 }

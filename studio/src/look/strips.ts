@@ -5,15 +5,14 @@ import type { Slot } from "./slot.ts";
 export function rateStrip(slot: Slot, suffix: string): Strip[] {
   const { rate, info } = slot;
   if (!rate || !info || rate.on.length === 0) return [];
-  const bin_ns = (rate.to - rate.from) / rate.on.length;
-  const highest = (Math.max(...rate.on, ...rate.off) / bin_ns) * 1e9;
+  const highest = Math.max(...rate.on, ...rate.off);
   const [scale, unit] = highest >= 1e6 ? [1e6, "Mev/s"] : highest >= 1e3 ? [1e3, "kev/s"] : [1, "ev/s"];
-  const t = rate.on.map((_, i) => rate.from - info.start + (i + 0.5) * bin_ns);
-  const perSecond = (values: number[], sign: 1 | -1) => values.map((value) => (sign * (value / bin_ns) * 1e9) / scale);
+  const t = rate.on.map((_, i) => (rate.edges[i]! + rate.edges[i + 1]!) / 2 - info.start);
+  const scaled = (values: number[], sign: 1 | -1) => values.map((value) => (sign * value) / scale);
   // ON upwards and OFF downwards, on one scale.
   const curves = [
-    { colour: "on", t, values: perSecond(rate.on, 1), filled: true },
-    { colour: "off", t, values: perSecond(rate.off, -1), filled: true },
+    { colour: "on", t, values: scaled(rate.on, 1), filled: true },
+    { colour: "off", t, values: scaled(rate.off, -1), filled: true },
   ];
   return [{ label: `Rate${suffix} ±`, unit, low: -highest / scale, high: highest / scale, curves }];
 }

@@ -13,7 +13,7 @@
 namespace esim::studio {
 namespace {
 
-constexpr TimeNs kMostTime = TimeNs{1} << 62;
+constexpr TimeNs kMostTime = TimeNs{1} << 61;
 
 std::string text_in(const Request& request, const char* name, const std::string& otherwise) {
   const auto found = request.query.find(name);
@@ -212,32 +212,58 @@ Response rate(const Request& request, const Asked& asked) {
   const TimeNs to = std::max(from + 1, number_in(request, "to", span.end + 1, -kMostTime, kMostTime));
   const auto bins = static_cast<std::size_t>(number_in(request, "bins", 500, 1, 10'000));
   const EventRate counted = events_of(camera_in(request, asked)).rate(from, to, bins);
-  return json_response({{"from", from}, {"to", to}, {"on", counted.on}, {"off", counted.off}});
+  Json on = Json::array(), off = on;
+  for (std::size_t i = 0; i < counted.on.size(); ++i) {
+    const double width_s = to_seconds(counted.edges[i + 1] - counted.edges[i]);
+    on.push_back(static_cast<double>(counted.on[i]) / width_s);
+    off.push_back(static_cast<double>(counted.off[i]) / width_s);
+  }
+  return json_response({{"edges", counted.edges}, {"on", on}, {"off", off}});
 }
 
-/// The records from one time to another, at most so many, evenly.
+/// The records from one time to another.
 template <typename T>
-std::vector<const T*> part_of(const std::vector<T>& records, const Request& request, const TimeSpan& span) {
+std::span<const T> part_of(const std::vector<T>& records, const Request& request, const TimeSpan& span) {
   const TimeNs from = number_in(request, "from", span.start, -kMostTime, kMostTime);
   const TimeNs to = number_in(request, "to", span.end, -kMostTime, kMostTime);
-  const auto most = static_cast<std::size_t>(number_in(request, "max", 2000, 1, 100'000));
   const auto before = [](const T& record, TimeNs t) { return record.t < t; };
   const auto first = std::lower_bound(records.begin(), records.end(), from, before);
-  const auto end = std::lower_bound(first, records.end(), std::max(from, to + 1), before);
-  const auto count = static_cast<std::size_t>(end - first);
-  std::vector<const T*> part;
-  const std::size_t kept = std::min(count, most);
-  for (std::size_t i = 0; i < kept; ++i) part.push_back(&*(first + static_cast<std::ptrdiff_t>(i * count / kept)));
-  return part;
+  return {first, std::lower_bound(first, records.end(), std::max(from, to + 1), before)};
+}
+
+std::size_t most_in(const Request& request) {
+  return static_cast<std::size_t>(number_in(request, "max", 2000, 1, 100'000));
+}
+
+/// What is drawn in place of more than `most` measurements: of each stretch of them the least of every axis, at its
+/// beginning, and the greatest, at its end. Some picked out of them would show vibrations slower than they are.
+std::vector<ImuRecord> envelope(std::span<const ImuRecord> records, std::size_t most) {
+  if (records.size() <= most) return {records.begin(), records.end()};
+  const std::size_t stretches = std::max<std::size_t>(1, most / 2);
+  std::vector<ImuRecord> drawn;
+  for (std::size_t i = 0; i < stretches; ++i) {
+    const std::size_t first = i * records.size() / stretches, end = (i + 1) * records.size() / stretches;
+    ImuRecord least = records[first], greatest = records[first];
+    greatest.t = records[end - 1].t;
+    for (const ImuRecord& record : records.subspan(first, end - first)) {
+      for (auto signal : {&InertialSignals::angular_rate, &InertialSignals::specific_force}) {
+        least.measured.*signal = (least.measured.*signal).cwiseMin(record.measured.*signal);
+        greatest.measured.*signal = (greatest.measured.*signal).cwiseMax(record.measured.*signal);
+      }
+    }
+    drawn.push_back(least);
+    drawn.push_back(greatest);
+  }
+  return drawn;
 }
 
 Response imu(const Request& request, const Asked& asked) {
   if (!asked.view->has_imu()) throw HttpError(404, "the recording has no IMU");
   Json t = Json::array(), rates = t, forces = t;
-  for (const ImuRecord* record : part_of(asked.view->imu(), request, asked.view->span())) {
-    t.push_back(record->t);
-    rates.push_back(json_of(record->measured.angular_rate));
-    forces.push_back(json_of(record->measured.specific_force));
+  for (const ImuRecord& record : envelope(part_of(asked.view->imu(), request, asked.view->span()), most_in(request))) {
+    t.push_back(record.t);
+    rates.push_back(json_of(record.measured.angular_rate));
+    forces.push_back(json_of(record.measured.specific_force));
   }
   return json_response({{"t", t}, {"angular_velocity", rates}, {"linear_acceleration", forces}});
 }
@@ -245,9 +271,12 @@ Response imu(const Request& request, const Asked& asked) {
 Response poses(const Request& request, const Asked& asked) {
   if (!asked.view->has_poses()) throw HttpError(404, "the recording has no poses");
   Json t = Json::array(), poses = t;
-  for (const PoseRecord* record : part_of(asked.view->poses(), request, asked.view->span())) {
-    t.push_back(record->t);
-    poses.push_back(json_of(record->body.T_world_body));
+  const std::span<const PoseRecord> all = part_of(asked.view->poses(), request, asked.view->span());
+  const std::size_t kept = std::min(all.size(), most_in(request));
+  for (std::size_t i = 0; i < kept; ++i) {
+    const PoseRecord& record = all[i * all.size() / kept];
+    t.push_back(record.t);
+    poses.push_back(json_of(record.body.T_world_body));
   }
   return json_response({{"t", t}, {"poses", poses}});
 }

@@ -34,6 +34,24 @@ TEST(IntervalHistogram, EveryIntervalIsBetweenTheEdgesOfItsBin) {
   }
 }
 
+TEST(IntervalHistogram, WholeMicrosecondsShowNoComb) {
+  // As many intervals of each number of us: as many per us in every bar, however few us it holds.
+  IntervalHistogram whole, finer;
+  constexpr int kLongest_us = 3000;
+  for (int us = 1; us < kLongest_us; ++us) whole.add(us * kNsPerUs);
+  for (int i = 4; i < 4 * kLongest_us; ++i) finer.add(i * kNsPerUs / 4);
+  const std::vector<double> bars = whole.bars(2);
+  double all = 0;
+  for (int bar = 0; IntervalHistogram::edge_s(2 * bar + 2) < 1e-6 * kLongest_us; ++bar) {
+    const double width_us = 1e6 * (IntervalHistogram::edge_s(2 * bar + 2) - IntervalHistogram::edge_s(2 * bar));
+    EXPECT_NEAR(bars[static_cast<std::size_t>(bar)] * (kLongest_us - 1) / width_us, 1, 1e-9) << bar;
+    all += bars[static_cast<std::size_t>(bar)];
+  }
+  EXPECT_NEAR(all, IntervalHistogram::edge_s(2 * 69) / (1e-6 * kLongest_us), 1e-3);
+  // What is finer stands where it is.
+  EXPECT_NEAR(finer.bars(2)[6], 1.0 / static_cast<double>(finer.total()), 1e-12);  // 1.995 to 2.24 us: 2 us alone
+}
+
 TEST(IntervalHistogram, QuantilesAreThoseOfTheSortedIntervals) {
   std::mt19937_64 random(2);
   std::lognormal_distribution<double> seconds(std::log(3e-3), 1.5);

@@ -95,7 +95,6 @@ void draw_rate(Canvas& canvas, const Cell& cell, const Statistics& s) {
 void draw_intervals(Canvas& canvas, const Cell& cell, const Statistics& s) {
   constexpr int kBinsPerBar = 2;
   const IntervalHistogram& intervals = s.intervals;
-  const double total = static_cast<double>(std::max<std::uint64_t>(1, intervals.total()));
   const auto decade = [](double value, auto round) { return std::pow(10.0, round(std::log10(value))); };
   double low = 1e-6, high = 1e2;
   if (intervals.total() > 0) {
@@ -103,20 +102,16 @@ void draw_intervals(Canvas& canvas, const Cell& cell, const Statistics& s) {
         std::clamp(decade(to_seconds(intervals.shortest()) + 1e-9, [](double x) { return std::floor(x); }), 1e-6, 10.0);
     high = std::clamp(decade(to_seconds(intervals.longest()), [](double x) { return std::ceil(x); }), 10 * low, 1e2);
   }
-  std::array<double, IntervalHistogram::kBins / kBinsPerBar> shares{};
-  double largest = 0;
-  for (std::size_t i = 0; i < IntervalHistogram::kBins; ++i) {
-    double& share = shares[i / kBinsPerBar];
-    share += 100 * static_cast<double>(intervals.bins()[i]) / total;
-    largest = std::max(largest, share);
-  }
+  std::vector<double> bars = intervals.bars(kBinsPerBar);
+  for (double& bar : bars) bar *= 100;
+  const double largest = *std::max_element(bars.begin(), bars.end());
   Axes axes(canvas, cell.diagram(), "Time between events of a pixel",
             decade_scale(low, high, "interval (20 bins per decade)", true),
             linear_scale(0, largest > 0 ? 1.15 * largest : 1.0, "% of the intervals"));
-  for (std::size_t i = 0; i < shares.size(); ++i) {
+  for (std::size_t i = 0; i < bars.size(); ++i) {
     const int bin = static_cast<int>(i) * kBinsPerBar;
     if (IntervalHistogram::edge_s(bin + kBinsPerBar) <= low || IntervalHistogram::edge_s(bin) >= high) continue;
-    axes.fill(IntervalHistogram::edge_s(bin), IntervalHistogram::edge_s(bin + kBinsPerBar), 0, shares[i], kBarColour);
+    axes.fill(IntervalHistogram::edge_s(bin), IntervalHistogram::edge_s(bin + kBinsPerBar), 0, bars[i], kBarColour);
   }
   if (intervals.total() > 0) {
     axes.vertical_line(intervals.quantile_s(0.01), "1 %", kFaintInk);

@@ -35,6 +35,25 @@ std::uint64_t IntervalHistogram::total() const {
   return std::accumulate(counts_.begin(), counts_.end(), std::uint64_t{0});
 }
 
+std::vector<double> IntervalHistogram::bars(int bins_per_bar) const {
+  const int count = kBins / bins_per_bar;
+  const double all = static_cast<double>(std::max<std::uint64_t>(1, total()));
+  const auto edge_us = [&](int bar) { return 1e6 * edge_s(bar * bins_per_bar); };
+  const auto first_us = [&](int bar) { return std::ceil(edge_us(bar) - 1e-6); };  // the first whole one
+  std::vector<double> fractions(static_cast<std::size_t>(count));
+  double per_us = 0;  // of the last bar that holds a whole us
+  for (int bar = 0; bar < count; ++bar) {
+    const auto held =
+        bins().subspan(static_cast<std::size_t>(bar * bins_per_bar), static_cast<std::size_t>(bins_per_bar));
+    double fraction = static_cast<double>(std::accumulate(held.begin(), held.end(), std::uint64_t{0})) / all;
+    const double whole_us = first_us(bar + 1) - first_us(bar);
+    if (whole_us > 0) per_us = fraction / whole_us;
+    if (part_of_us_ == 0) fraction = per_us * (edge_us(bar + 1) - edge_us(bar));
+    fractions[static_cast<std::size_t>(bar)] = fraction;
+  }
+  return fractions;
+}
+
 double IntervalHistogram::quantile_s(double fraction) const {
   const std::uint64_t intervals = total();
   if (intervals == 0) return std::numeric_limits<double>::quiet_NaN();

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <vector>
 
 #include "esim/core/time.h"
 
@@ -25,6 +26,7 @@ class IntervalHistogram {
     ++counts_[bin_of(interval)];
     shortest_ = std::min(shortest_, interval);
     longest_ = std::max(longest_, interval);
+    part_of_us_ |= interval % kNsPerUs;
   }
 
   std::uint64_t total() const;
@@ -37,6 +39,11 @@ class IntervalHistogram {
 
   /// Lower edge of a bin, s; edge_s(kBins) = 100 s.
   static double edge_s(int bin);
+
+  /// The fraction of all intervals in bars of `bins_per_bar` bins each, which divides kBins. Where all are whole us, as
+  /// in most files, each is spread over the us that it begins: otherwise bars of a few us, which hold one or none of
+  /// these, would show a comb.
+  std::vector<double> bars(int bins_per_bar) const;
 
   /// The interval that `fraction` of all are shorter than, s, taking the intervals of a bin as spread evenly in the
   /// logarithm: wrong by at most a bin's width, 6 %. Below 1 us it is no more than that; NaN if there are none.
@@ -63,6 +70,7 @@ class IntervalHistogram {
   const Lookup* lookup_;
   std::array<std::uint64_t, kBins + 2> counts_{};
   TimeNs shortest_ = std::numeric_limits<TimeNs>::max(), longest_ = 0;
+  TimeNs part_of_us_ = 0;  // 0: all are whole us
 };
 
 }  // namespace esim

@@ -18,12 +18,16 @@ struct Arguments : studio::StudioOptions {
   std::vector<std::string> folders;
 };
 
-/// Where the page lies: beside the installed program, or in the source's folder that it was built from.
+/// Where the page lies as seen from this program, wherever it was moved: as it is installed, beside it in an unpacked
+/// archive, or in the tree that it was built in.
 fs::path page_folder() {
   std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  const fs::path installed = program.parent_path().parent_path() / "share" / "esim" / "studio";
-  return fs::is_directory(installed, error) ? installed : fs::path(ESIM_STUDIO_DIST);
+  const fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
+  const fs::path installed = (folder / ESIM_PAGE_INSTALLED).lexically_normal();
+  for (const fs::path& page : {installed, folder / "share/esim/studio", folder / ESIM_PAGE_BUILT}) {
+    if (fs::is_regular_file(page / "index.html", error)) return page.lexically_normal();
+  }
+  return installed;
 }
 
 int run(Arguments& arguments) {
@@ -68,7 +72,9 @@ void add_studio(CLI::App& app, int& exit_code) {
       ->type_name("ADDRESS");
   command->add_option("--token", arguments->token, "Whoever knows it may use the studio (default: new, random)")
       ->type_name("TEXT");
-  command->add_option("--page", arguments->page, "Folder of the page (default: as scripts/studio builds it)")
+  command
+      ->add_option("--page", arguments->page,
+                   "Folder of the page (default: share/esim/studio beside the program, or as scripts/studio builds it)")
       ->type_name("DIR");
   command->add_option("-j,--threads", arguments->threads, "Threads; 0 takes every processor")
       ->type_name("N")

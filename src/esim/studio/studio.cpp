@@ -48,8 +48,10 @@ std::string token_of(const StudioOptions& options) {
 void require_pages(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_regular_file(folder / "index.html", error))
-    throw UserError(fmt::format("the studio's page is not built ({} is missing): run scripts/studio, which needs npm",
-                                (folder / "index.html").string()));
+    throw UserError(
+        fmt::format("the studio's page is not there ({} is missing): build it with scripts/studio, which needs npm, or "
+                    "name its folder with --page",
+                    (folder / "index.html").string()));
 }
 
 }  // namespace

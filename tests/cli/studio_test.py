@@ -332,14 +332,14 @@ class Answers(StudioTest):
         self.assertEqual(camera["has"], {"events": True, "images": True, "depth": True, "flow": True})
         base = f"/api/recordings/{recording['id']}"
         start, end = recording["start"], recording["end"]
-        rate = self.ask("GET", f"{base}/rate?bins=7")
-        self.assertEqual(sum(rate["on"]) + sum(rate["off"]), camera["events"])
+        on, off = self.counts(self.ask("GET", f"{base}/rate?bins=7"))
+        self.assertEqual(on + off, camera["events"])
         _, _, binary = self.server.request("GET", f"{base}/events.bin?from={start}&to={end}&max=500000")
         first, last, count, total = struct.unpack("<QQII", binary[:24])
         self.assertEqual((first, last, count, total), (start, end, camera["events"], camera["events"]))
         events = list(struct.iter_unpack("<IHH", binary[24:]))
         self.assertEqual(len(events), count)
-        self.assertEqual(sum(y >> 15 for _, _, y in events), sum(rate["on"]))
+        self.assertEqual(sum(y >> 15 for _, _, y in events), on)
         self.assertTrue(all(x < 64 and (y & 0x7FFF) < 48 for _, x, y in events))
         for query in ("picture.png?view=counts&over=image", "picture.png?view=onoff&theme=light", "picture.png?view=time_surface", "image.png?kind=image",
                       "image.png?kind=depth", "image.png?kind=flow"):
@@ -367,8 +367,44 @@ class Answers(StudioTest):
             time.sleep(0.05)
         self.assertEqual(recording["indexing"], 1)
         self.assertNotIn("note", recording)
-        rate = self.ask("GET", f"{base}/rate?bins=3")
-        self.assertEqual(sum(rate["on"]) + sum(rate["off"]), recording["cameras"][0]["events"])
+        self.assertEqual(sum(self.counts(self.ask("GET", f"{base}/rate?bins=3"))), recording["cameras"][0]["events"])
+
+    @staticmethod
+    def counts(rate):
+        """ON and OFF events of rates in bins."""
+        widths_s = [(after - before) / 1e9 for before, after in zip(rate["edges"], rate["edges"][1:])]
+        return tuple(sum(round(hz * width) for hz, width in zip(rate[polarity], widths_s)) for polarity in ("on", "off"))
+
+    def test_a_constant_rate_is_drawn_as_one(self):
+        (self.work / "even.txt").write_text("".join(f"{i * 1e-4:.6f} {i % 64} 1 1\n" for i in range(50_000)))
+        converted = run("convert", self.work / "even.txt", self.work / "even.h5")
+        self.assertEqual(converted.returncode, 0, converted.stderr)
+        recording = self.ask("POST", "/api/recordings", {"path": "work/even.h5"})
+        rate = self.ask("GET", f"/api/recordings/{recording['id']}/rate?bins=800")
+        self.assertGreater(len(rate["on"]), 400)
+        for hz in rate["on"][1:-1]:
+            self.assertAlmostEqual(hz, 1e4, places=6)
+
+    def test_vibrations_stay_fast_where_measurements_are_many(self):
+        """1 kHz with a vibration of 250 Hz, drawn by fewer values than there are: its amplitude is seen everywhere."""
+        yaml = self.yaml.replace("type: waypoints", "type: waypoints\n  speed: 0.05") + "imu: {rate_hz: 1000}\n"
+        (self.work / "imu.yaml").write_text(yaml)
+        result = run("simulate", self.work / "imu.yaml", "--out", self.work / "imu", "-q")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        file = self.work / "imu" / "imu.csv"
+        head, *lines = file.read_text().splitlines()
+        shaken = [line.split(",") for line in lines]
+        for i, values in enumerate(shaken):
+            values[1] = str(2.0 if i % 4 < 2 else -2.0)
+        file.write_text("\n".join([head, *map(",".join, shaken)]) + "\n")
+        recording = self.ask("POST", "/api/recordings", {"path": "work/imu"})
+        drawn = self.ask("GET", f"/api/recordings/{recording['id']}/imu?max=300")
+        self.assertGreater(len(shaken), 2000)
+        self.assertLessEqual(len(drawn["t"]), 300)
+        self.assertEqual(drawn["t"], sorted(drawn["t"]))
+        self.assertEqual([rate[0] for rate in drawn["angular_velocity"]], [-2.0, 2.0] * (len(drawn["t"]) // 2))
+        whole = self.ask("GET", f"/api/recordings/{recording['id']}/imu?max=100000")
+        self.assertEqual(len(whole["t"]), len(shaken))
 
     def test_what_is_damaged_is_one_line(self):
         (self.work / "no.glb").write_bytes(b"glTF no")
@@ -540,6 +576,59 @@ class Lives(ProgramTest):
             self.assert_refused(run("studio", self.work, "--port", port, "--page", self.page()), str(port), "another program has it")
         first, second = self.server(self.work), self.server(self.work)
         self.assertNotEqual(first.port, second.port)
+
+    def test_what_is_in_the_way_of_a_run(self):
+        long = (self.work / "small.yaml").read_text().replace("type: waypoints", "type: waypoints\n  speed: 0.0005")
+        (self.work / "long.yaml").write_text(long)
+        server = self.server(self.work)
+        run_id = server.json("POST", "/api/runs", {"path": "work/long.yaml"})["id"]
+        for overwrite in (False, True):  # what a run is writing cannot be replaced
+            refused = server.json("POST", "/api/runs", {"path": "work/long.yaml", "overwrite": overwrite}, 409)
+            self.assertTrue(refused["running"], refused)
+            self.assertIn("a run is writing there", refused["error"])
+        self.wait_for(server, run_id, lambda status: not status["loading"])
+        server.json("DELETE", f"/api/runs/{run_id}")
+        server.events_of(run_id, ("cancelled",))
+        refused = server.json("POST", "/api/runs", {"path": "work/long.yaml"}, 409)
+        self.assertFalse(refused["running"], refused)
+        self.assertIn("exists already", refused["error"])
+
+    def test_a_run_that_fails_names_its_option(self):
+        (self.work / "still.yaml").write_text((self.work / "small.yaml").read_text().replace("    - {position: [0, 0.1, 0], look_at: [1, 0, 0]}\n", ""))
+        server = self.server(self.work)
+        run_id = server.json("POST", "/api/runs", {"path": "work/still.yaml"})["id"]
+        kind, message = server.events_of(run_id, ("failed", "done"))[-1]
+        self.assertEqual((kind, message["where"]), ("failed", "trajectory"), message)
+        self.assertEqual(server.json("GET", f"/api/runs/{run_id}")["where"], "trajectory")
+
+    def moved_program(self, place, **pages):
+        """The program in a folder of its own, and pages, each with its name in it, in others."""
+        program = self.folder / place
+        program.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ESIM, program)
+        for name, page in pages.items():
+            (self.folder / page).mkdir(parents=True)
+            (self.folder / page / "index.html").write_text(name)
+        return program
+
+    def test_a_program_that_was_moved_finds_the_page_beside_it(self):
+        for place, page in (("usr/bin/esim", "usr/share/esim/studio"), ("archive/esim", "archive/share/esim/studio"),
+                            ("tree/build/release/esim", "tree/studio/dist")):
+            program = self.moved_program(place, **{place: page})
+            with subprocess.Popen([program, "studio", self.work], stdout=subprocess.PIPE, text=True) as process:
+                port, token = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)", process.stdout.readline().strip()).groups()
+                try:
+                    connection = http.client.HTTPConnection("127.0.0.1", int(port), timeout=60)
+                    connection.request("GET", "/", headers={"Authorization": f"Bearer {token}"})
+                    self.assertEqual(connection.getresponse().read().decode(), place)
+                    connection.close()
+                finally:
+                    process.terminate()
+
+    def test_a_program_without_its_page_says_how_to_name_one(self):
+        program = self.moved_program("lonely/bin/esim")
+        result = subprocess.run([program, "studio", self.work], capture_output=True, text=True, timeout=60)
+        self.assert_refused(result, "--page", str(self.folder / "lonely/share/esim/studio"))
 
     def page(self):
         page = self.folder / "page"

@@ -25,12 +25,20 @@ Json progress_json(const RunStatus& run) {
           {"left_s", share > 0 ? Json(p.wall_seconds * (1 - share) / share) : Json()}};
 }
 
+/// What went wrong, and the option that it is about; nothing where nothing went wrong.
+Json error_json(const RunStatus& run) {
+  Json json = Json::object();
+  if (!run.error.empty()) json["error"] = run.error;
+  if (const std::string where = option_in(run.error); !where.empty()) json["where"] = where;
+  return json;
+}
+
 Json run_json(const RunStatus& run, const Roots& roots) {
   Json json{{"id", std::to_string(run.id)},  {"scenario", roots.name_of(run.scenario)},
             {"out", roots.name_of(run.out)}, {"state", name_of(run.state)},
             {"pictures", run.pictures},      {"notices", run.notices}};
   json.update(progress_json(run));
-  if (!run.error.empty()) json["error"] = run.error;
+  json.update(error_json(run));
   return json;
 }
 
@@ -50,8 +58,15 @@ Response start(const Json& request, const Workshop& workshop) {
     throw OptionError(problem["what"], problem["where"], problem["what"]);
   }
   std::error_code error;
-  if (workshop.runs.writes_to(out) || (fs::exists(out, error) && !replace))
-    throw HttpError(409, out_name + ": exists already; replace it, or choose another name");
+  const bool running = workshop.runs.writes_to(out);
+  if (running || (fs::exists(out, error) && !replace)) {
+    Response response =
+        json_response({{"error", out_name + (running ? ": a run is writing there; cancel it, or choose another name"
+                                                     : ": exists already; replace it, or choose another name")},
+                       {"running", running}});
+    response.status = 409;
+    return response;
+  }
   const int id = workshop.runs.start(*checked.scenario, file, out, replace);
   return json_response({{"id", std::to_string(id)}, {"out", out_name}});
 }
@@ -97,7 +112,7 @@ Response stream(const Request& request, const Workshop& workshop) {
     sent.over = true;
     const std::string recording = workshop.roots.name_of(run->out);
     if (run->state == RunState::done) return text + message("done", {{"recording", recording}});
-    if (run->state == RunState::failed) return text + message("failed", {{"error", run->error}});
+    if (run->state == RunState::failed) return text + message("failed", error_json(*run));
     std::error_code error;
     const bool kept = fs::exists(run->out, error);
     return text + message("cancelled", {{"recording", kept ? Json(recording) : Json()}});

@@ -4,11 +4,12 @@ import { ConfigurePlace } from "./configure/configure.ts";
 import { DesignPlace } from "./design/design.ts";
 import { ScenarioDocument } from "./document/document.ts";
 import { ScenarioFile } from "./document/file.ts";
+import { refuseFor } from "./document/problems.ts";
 import { LookPlace } from "./look/look.ts";
 import { RunPlace } from "./run/run.ts";
 import { type Address, readAddress, writeAddress } from "./ui/address.ts";
 import { showShortcuts } from "./ui/dialog.ts";
-import { button, h } from "./ui/dom.ts";
+import { button, commitTyping, h } from "./ui/dom.ts";
 import { chooseFile } from "./ui/files_dialog.ts";
 import type { Place } from "./ui/place.ts";
 import { addShortcuts } from "./ui/shortcuts.ts";
@@ -25,12 +26,17 @@ export class Shell {
   private roots: string[];
   private run: RunPlace;
   private look: LookPlace;
+  private configure: ConfigurePlace;
   private places: Record<PlaceName, Place>;
   private tabs = new Map<PlaceName, HTMLButtonElement>();
   private current: PlaceName = "design";
   private address: Address = { place: "design", recordings: [] };
   private title = h("bdi");
-  private undo = button("", () => this.document.undo(), { icon: "undo", class: "small" });
+  private problems = button("", () => this.reveal(this.document.problems[0]?.where ?? ""), {
+    class: "plain small problem",
+    title: "Go to the first problem",
+  });
+  private undo = button("", () => this.undoEdit(), { icon: "undo", class: "small" });
   private redo = button("", () => this.document.redo(), { icon: "redo", class: "small" });
 
   constructor(
@@ -38,15 +44,18 @@ export class Shell {
     private session: Session,
   ) {
     this.roots = session.roots.map((root) => root.name);
-    this.file = new ScenarioFile(this.document, this.roots);
-    this.run = new RunPlace(
-      () => this.saved(),
-      (path) => void this.openRecording(path),
-    );
+    this.file = new ScenarioFile(this.document, this.roots, (where) => this.reveal(where));
+    this.run = new RunPlace({
+      saved: () => this.saved(),
+      look: (path) => void this.openRecording(path),
+      reveal: (where) => this.reveal(where),
+      isOpen: (scenario) => scenario === this.document.path,
+    });
+    this.configure = new ConfigurePlace(this.document, () => this.choosePath());
     this.look = new LookPlace(() => this.chooseRecording());
     this.places = {
       design: new DesignPlace(this.document),
-      configure: new ConfigurePlace(this.document, () => this.choosePath()),
+      configure: this.configure,
       run: this.run,
       look: this.look,
     };
@@ -97,10 +106,15 @@ export class Shell {
     return h(
       "header",
       { class: "bar" },
-      h("span", { class: "name" }, h("img", { attrs: { src: "/favicon.svg", alt: "" } }), "esim studio"),
+      h(
+        "span",
+        { class: "name" },
+        h("img", { attrs: { src: "/favicon.svg", alt: "" } }),
+        h("span", { text: "esim studio" }),
+      ),
       button("Open…", () => void this.chooseAndOpen(), { title: "Open a scenario, a scene or a recording (Ctrl+O)" }),
-      button("Save", () => void this.file.save(), { title: "Save (Ctrl+S)" }),
-      button("Save as…", () => void this.file.saveAs(), { title: "Save under another name (Ctrl+Shift+S)" }),
+      button("Save", () => void this.save(), { title: "Save (Ctrl+S)" }),
+      button("Save as…", () => void this.saveAs(), { title: "Save under another name (Ctrl+Shift+S)" }),
       this.undo,
       this.redo,
       h("span", { class: "document quiet" }, this.title),
@@ -138,7 +152,14 @@ export class Shell {
       if (before === "gone" && state === "there") say("The server is there again");
       before = state;
     });
-    return h("footer", { class: "status" }, text, h("span", { text: `esim ${this.session.version}` }), server);
+    return h(
+      "footer",
+      { class: "status" },
+      text,
+      this.problems,
+      h("span", { text: `esim ${this.session.version}` }),
+      server,
+    );
   }
 
   private tabKey(event: KeyboardEvent): void {
@@ -162,6 +183,11 @@ export class Shell {
     this.remember({ place: name });
   }
 
+  private undoEdit(): void {
+    commitTyping();
+    this.document.undo();
+  }
+
   private remember(change: Partial<Address>): void {
     this.address = { ...this.address, ...change };
     history.replaceState(null, "", writeAddress(this.address));
@@ -178,6 +204,9 @@ export class Shell {
     this.undo.title = `Undo${undoLabel ? `: ${undoLabel}` : ""} (Ctrl+Z)`;
     this.redo.title = `Redo${redoLabel ? `: ${redoLabel}` : ""} (Ctrl+Shift+Z)`;
     for (const element of [this.undo, this.redo]) element.setAttribute("aria-label", element.title);
+    const wrong = this.document.problems.length;
+    this.problems.hidden = wrong === 0;
+    this.problems.textContent = wrong === 1 ? "1 problem" : `${wrong} problems`;
     if (path && this.address.scenario !== path) this.remember({ scenario: path });
   }
 
@@ -229,14 +258,38 @@ export class Shell {
     return entry?.path ?? null;
   }
 
+  private async save(): Promise<boolean> {
+    commitTyping();
+    return this.file.save();
+  }
+
+  private async saveAs(): Promise<boolean> {
+    commitTyping();
+    return this.file.saveAs();
+  }
+
   /** The path of the scenario once it is saved, or null. */
   private async saved(): Promise<string | null> {
     await this.document.revision.settled.catch(() => undefined);
-    if ((this.document.dirty || this.document.path === null) && !(await this.file.save())) return null;
+    if ((this.document.dirty || this.document.path === null) && !(await this.save())) return null;
     return this.document.path;
   }
 
+  /** Shows an option in the form. */
+  private reveal(where: string): void {
+    this.go("configure");
+    void this.configure.reveal(where);
+  }
+
+  /** Runs what the page shows, or says why that cannot be. */
   private async startRun(): Promise<void> {
+    commitTyping();
+    await this.document.revision.checked;
+    const { problems } = this.document;
+    if (problems.length > 0) {
+      const where = await refuseFor("Not run", "The scenario cannot be simulated as it is.", problems);
+      return where === null ? undefined : this.reveal(where);
+    }
     this.go("run");
     await this.run.start();
   }
@@ -258,15 +311,15 @@ export class Shell {
         always: true,
         act: () => void this.chooseAndOpen(),
       },
-      { group: "Everywhere", keys: "Ctrl+S", help: "save", always: true, act: () => void this.file.save() },
+      { group: "Everywhere", keys: "Ctrl+S", help: "save", always: true, act: () => void this.save() },
       {
         group: "Everywhere",
         keys: "Ctrl+Shift+S",
         help: "save under another name",
         always: true,
-        act: () => void this.file.saveAs(),
+        act: () => void this.saveAs(),
       },
-      { group: "Everywhere", keys: "Ctrl+Z", help: "undo", always: true, act: () => this.document.undo() },
+      { group: "Everywhere", keys: "Ctrl+Z", help: "undo", always: true, act: () => this.undoEdit() },
       {
         group: "Everywhere",
         keys: "Ctrl+Shift+Z or Ctrl+Y",

@@ -1,22 +1,35 @@
 import * as server from "../api/server.ts";
 import type { Json, Preset, SchemaNode } from "../api/types.ts";
 import type { ScenarioDocument } from "../document/document.ts";
+import { problemEntries } from "../document/problems.ts";
 import { getIn } from "../document/values.ts";
-import { h } from "../ui/dom.ts";
+import { button, h } from "../ui/dom.ts";
 import type { Place } from "../ui/place.ts";
+import { addShortcuts } from "../ui/shortcuts.ts";
 import { complain } from "../ui/status.ts";
 import { type FieldView, type FormContext, idOf } from "./field.ts";
 import { makeField } from "./fields.ts";
+import { findOptions, type Hit } from "./search.ts";
 import { YamlEditor } from "./yaml_editor.ts";
 
 /** Options that stand at the scenario's top, without a group. */
 const general = "general";
+const most_hits = 40;
 
 /** Every option of the scenario as a form, beside its text. */
 export class ConfigurePlace implements Place {
   readonly element: HTMLElement;
   private nav = h("nav", { class: "groups", attrs: { "aria-label": "Groups of options" } });
   private form = h("div", { class: "form", attrs: { role: "region", "aria-label": "Options" } });
+  private search = h("input", {
+    type: "search",
+    attrs: { "aria-label": "Search the options", placeholder: "Search the options  ( / )", spellcheck: "false" },
+    on: { input: () => this.showHits(), keydown: (event) => this.searchKey(event) },
+  });
+  private found = h("span", { class: "quiet found", attrs: { role: "status" } });
+  private hits = "";
+  private text: YamlEditor;
+  private loading: Promise<void> | null = null;
   private problems = h("ul", { class: "problems", attrs: { "aria-label": "Problems" } });
   private summary = h("p", { class: "problem-summary", attrs: { role: "status" } });
   private schema: SchemaNode | null = null;
@@ -30,11 +43,12 @@ export class ConfigurePlace implements Place {
     chooseFile: () => Promise<string | null>,
   ) {
     this.context = { document, chooseFile, defaultOf: (where, node) => this.defaultOf(where, node) };
+    this.text = new YamlEditor(document);
     this.element = h(
       "main",
       { class: "place configure", attrs: { "aria-label": "Configure" } },
       this.nav,
-      this.form,
+      h("div", { class: "form-side" }, h("div", { class: "search row" }, this.search, this.found), this.form),
       h(
         "aside",
         { class: "panel text-panel", attrs: { "aria-label": "Text and problems" } },
@@ -42,7 +56,7 @@ export class ConfigurePlace implements Place {
           "section",
           { class: "yaml-section" },
           h("header", {}, h("h2", { text: "Scenario" }), h("span", { class: "quiet", text: "YAML" })),
-          new YamlEditor(document).element,
+          this.text.element,
         ),
         h(
           "section",
@@ -54,11 +68,21 @@ export class ConfigurePlace implements Place {
       ),
     );
     document.changed.watch(() => this.update());
+    addShortcuts({
+      group: "Configure",
+      keys: "/",
+      help: "search the options (Escape: all of them again)",
+      act: () => {
+        if (this.element.hidden) return false;
+        this.search.focus();
+        return true;
+      },
+    });
   }
 
   show(visible: boolean): void {
     this.element.hidden = !visible;
-    if (visible && !this.schema) void this.load();
+    if (visible && !this.schema) this.loading = this.load();
     if (visible) this.update();
   }
 
@@ -102,6 +126,7 @@ export class ConfigurePlace implements Place {
   private open(name: string): void {
     const entry = this.groups.find((one) => one.name === name) ?? this.groups[0];
     if (!entry) return;
+    this.search.value = this.hits = this.found.textContent = "";
     this.group = entry.name;
     // The group's own frame would only repeat its name: its members stand alone.
     this.fields =
@@ -113,8 +138,63 @@ export class ConfigurePlace implements Place {
     this.update();
   }
 
+  /** Shows what is searched for, or the group again where that is nothing. */
+  private showHits(): void {
+    const text = this.search.value.trim();
+    if (text === "") {
+      if (this.hits !== "") this.open(this.group);
+      return;
+    }
+    const hits = findOptions(
+      this.groups.flatMap(({ name, node }) => (name === general ? (node.members ?? []) : [node])),
+      this.document.values,
+      text,
+    );
+    const key = JSON.stringify(hits.map(({ where, needs }) => [where, needs]));
+    this.found.textContent =
+      hits.length === 0
+        ? "nothing found"
+        : `${hits.length} found${hits.length > most_hits ? `, ${most_hits} shown` : ""}`;
+    if (key === this.hits) return;
+    this.hits = key;
+    const shown = hits.slice(0, most_hits);
+    this.fields = shown
+      .filter(({ needs }) => !needs)
+      .map(({ where, node }) => makeField({ ...node, name: where }, where, this.context));
+    this.form.replaceChildren(
+      ...this.fields.map((field) => field.element),
+      ...shown.filter(({ needs }) => needs).map((hit) => this.elsewhere(hit)),
+    );
+    this.form.scrollTop = 0;
+    for (const field of this.fields) field.update();
+  }
+
+  /** An option that the scenario has only when another one is chosen. */
+  private elsewhere({ where, node, needs }: Hit): HTMLElement {
+    return h(
+      "div",
+      { class: "option elsewhere" },
+      h(
+        "span",
+        { class: "option-name" },
+        h("code", { text: where }),
+        h("span", { class: "quiet", text: node.help ?? "" }),
+      ),
+      button(needs!.how, () => void this.reveal(needs!.where), { class: "small", title: `Go to ${needs!.where}` }),
+    );
+  }
+
+  private searchKey(event: KeyboardEvent): void {
+    if (event.key === "Escape") this.open(this.group);
+    else if (event.key === "Enter" || event.key === "ArrowDown")
+      this.form.querySelector<HTMLElement>("input, select, button")?.focus();
+    else return;
+    event.preventDefault();
+  }
+
   private update(): void {
     if (this.element.hidden) return;
+    if (this.hits !== "") this.showHits();
     for (const field of this.fields) field.update();
     const { problems } = this.document;
     for (const element of this.nav.children) {
@@ -124,25 +204,13 @@ export class ConfigurePlace implements Place {
       element.classList.toggle("wrong", wrong);
       element.classList.toggle("given", this.document.get(name) !== undefined);
     }
-    this.summary.textContent = problems.length === 0 ? "None: the scenario can be simulated." : "";
-    this.problems.replaceChildren(
-      ...problems.map(({ where, what }) =>
-        h(
-          "li",
-          {},
-          h(
-            "button",
-            { type: "button", class: "plain", on: { click: () => this.reveal(where) } },
-            where ? h("code", { text: where }) : null,
-            h("span", { class: "problem", text: what }),
-          ),
-        ),
-      ),
-    );
+    this.summary.textContent = problems.length === 0 ? "None." : "";
+    this.problems.replaceChildren(...problemEntries(problems, (where) => void this.reveal(where)));
   }
 
-  /** Opens the group of an option and puts the focus there. */
-  private reveal(where: string): void {
+  /** Opens the group of an option and puts the focus there; into the text where the form has no such option. */
+  async reveal(where: string): Promise<void> {
+    await this.loading;
     this.open(
       where.includes(".") ? where.split(".")[0]! : this.groups.some(({ name }) => name === where) ? where : general,
     );
@@ -155,6 +223,7 @@ export class ConfigurePlace implements Place {
       field.scrollIntoView({ block: "center" });
       return;
     }
+    this.text.reveal(where);
   }
 
   private defaultOf(where: string, node: SchemaNode): Json | undefined {

@@ -28,8 +28,9 @@ export function readValue(node: SchemaNode, text: string): { value: Json } | { p
   const trimmed = text.trim();
   if (node.kind !== "number" && node.kind !== "integer") return { value: trimmed };
   const value = Number(trimmed.replace(",", "."));
-  if (trimmed === "" || Number.isNaN(value)) return { problem: "wants a number" };
-  if (node.kind === "integer" && !Number.isInteger(value)) return { problem: "wants a whole number" };
+  if (trimmed === "") return { problem: "needs a number in every field" };
+  if (!Number.isFinite(value)) return { problem: `must be a number, not '${trimmed}'` };
+  if (node.kind === "integer" && !Number.isInteger(value)) return { problem: `must be a whole number, not ${trimmed}` };
   if (node.kind === "integer" && !Number.isSafeInteger(value))
     return { problem: "is too large for the form: write it into the text" };
   const { low, high } = node;
@@ -37,7 +38,7 @@ export function readValue(node: SchemaNode, text: string): { value: Json } | { p
     (low !== undefined && (value < low || (node.positive && value === low))) ||
     (high !== undefined && value > high)
   ) {
-    return { problem: `must be ${rangeText(node) || `${low ?? "-∞"} to ${high ?? "∞"}`}` };
+    return { problem: `must be ${rangeText(node) || `${low ?? "-∞"} to ${high ?? "∞"}`}, not ${trimmed}` };
   }
   return { value };
 }

@@ -10,7 +10,8 @@ export class LeafField implements FieldView {
   private inputs: (HTMLInputElement | HTMLSelectElement)[] = [];
   private reset: HTMLButtonElement;
   private problem = h("span", { class: "problem", attrs: { role: "alert" } });
-  private own = "";
+  /** Typed since the fields were last read: what the document says must wait. */
+  private typing = false;
 
   constructor(
     private node: SchemaNode,
@@ -61,7 +62,12 @@ export class LeafField implements FieldView {
       const input = h("input", {
         id: i === 0 ? id : `${id}-${i}`,
         attrs: { ...described, "aria-label": label, spellcheck: "false", autocomplete: "off" },
-        on: { change: () => this.typed() },
+        on: {
+          input: () => (this.typing = true),
+          change: () => this.typed(),
+          blur: () => this.left(),
+          keydown: (event) => event.key === "Escape" && this.forget(),
+        },
       });
       this.inputs.push(input);
     }
@@ -77,10 +83,26 @@ export class LeafField implements FieldView {
   }
 
   private set(value: Json): void {
-    this.own = "";
+    this.typing = false;
     const { document } = this.context;
-    if (value === null && document.get(this.where) === undefined) return this.update();
-    document.edit(`Change ${this.where}`, [{ where: this.where, value }], this.where);
+    const before = document.get(this.where) ?? null;
+    if (JSON.stringify(value) !== JSON.stringify(before))
+      document.edit(`Change ${this.where}`, [{ where: this.where, value }], this.where);
+    else this.forget();
+  }
+
+  /** Back to what the document says. */
+  private forget(): void {
+    this.typing = false;
+    this.context.document.refuse(this.where, null);
+    this.update();
+  }
+
+  /** What was typed is taken by now, or is what stood there before. */
+  private left(): void {
+    if (!this.typing) return;
+    this.typing = false;
+    this.update();
   }
 
   private choose(text: string): void {
@@ -102,8 +124,10 @@ export class LeafField implements FieldView {
       text.trim() === "" && Array.isArray(held) ? { value: held[i]! } : readValue(element, text),
     );
     const wrong = read.find((one): one is { problem: string } => "problem" in one);
-    this.own = wrong?.problem ?? "";
-    if (wrong) return this.showProblem();
+    if (wrong) {
+      this.typing = false;
+      return this.context.document.refuse(this.where, { texts, what: wrong.problem });
+    }
     const values = read.map((one) => (one as { value: Json }).value);
     this.set(node.kind === "vector" ? values : values[0]!);
   }
@@ -111,25 +135,21 @@ export class LeafField implements FieldView {
   update(): void {
     const value = this.context.document.get(this.where);
     const held = this.context.defaultOf(this.where, this.node);
+    const refused = this.context.document.refused.get(this.where);
     this.inputs.forEach((input, i) => {
       const own = valueText(Array.isArray(value) && this.node.kind === "vector" ? value[i] : value);
       const preset = valueText(Array.isArray(held) ? held[i] : held);
       if (input instanceof HTMLSelectElement) {
         input.options[0]!.text = preset === "" ? "unset" : `${preset} (default)`;
         input.value = own;
-      } else if (!this.own) {
-        if (
-          document.activeElement !== input ||
-          input.value.trim() === "" ||
-          this.context.document.get(this.where) !== undefined
-        )
-          input.value = own;
-        input.placeholder =
-          (typeof held === "number" ? shortNumber(held) : preset) || (this.node.optional ? "unset" : "");
+        return;
       }
+      if (!this.typing) input.value = refused?.texts[i] ?? own;
+      input.placeholder =
+        (typeof held === "number" ? shortNumber(held) : preset) || (this.node.optional ? "unset" : "");
     });
     this.element.classList.toggle("given", value !== undefined);
-    this.reset.classList.toggle("unseen", value === undefined);
+    this.reset.classList.toggle("unseen", value === undefined && !refused);
     this.showProblem();
   }
 
@@ -137,7 +157,7 @@ export class LeafField implements FieldView {
     const reported = this.context.document.problems.filter(
       ({ where }) => where === this.where || where.startsWith(`${this.where}.`),
     );
-    this.problem.textContent = this.own || reported.map(({ what }) => what).join("; ");
+    this.problem.textContent = reported.map(({ what }) => what).join("; ");
     for (const input of this.inputs) {
       input.classList.toggle("invalid", this.problem.textContent !== "");
       input.setAttribute("aria-invalid", String(this.problem.textContent !== ""));

@@ -39,6 +39,17 @@ export class YamlEditor {
     });
   }
 
+  /** Selects the key of an option, or what is nearest to it, and takes the focus. */
+  reveal(where: string): void {
+    this.area.focus();
+    for (const key of where.split(".").reverse()) {
+      const found = key && new RegExp(`(^|[\\s{,])${key}(?=\\s*:)`, "m").exec(this.area.value);
+      if (!found) continue;
+      const start = found.index + found[1]!.length;
+      return this.area.setSelectionRange(start, start + key.length);
+    }
+  }
+
   private take(): void {
     if (!this.pending) return;
     this.pending = false;

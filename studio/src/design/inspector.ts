@@ -30,7 +30,7 @@ export class Inspector {
           label: `Position ${axis}, metres`,
           step: 0.05,
           digits: 5,
-          change: (value) => this.setPosition(i, value),
+          change: (value) => this.setPosition(i, value!),
         }),
     );
     this.target = axes.map(
@@ -39,12 +39,12 @@ export class Inspector {
           label: `Looks at ${axis}, metres`,
           step: 0.05,
           digits: 5,
-          change: (value) => this.setTarget(i, value),
+          change: (value) => this.setTarget(i, value!),
         }),
     );
     this.angles = ["Heading", "Elevation", "Roll"].map(
       (name, i) =>
-        new NumberField({ label: `${name}, degrees`, step: 1, digits: 5, change: (value) => this.setAngle(i, value) }),
+        new NumberField({ label: `${name}, degrees`, step: 1, digits: 5, change: (value) => this.setAngle(i, value!) }),
     );
     this.aim = new Segmented<"point" | "free">(
       "Aim",
@@ -86,6 +86,7 @@ export class Inspector {
         label: `${label} of the motion`,
         unit,
         step,
+        optional: true,
         ...(unit === "s" ? { parse: parseSeconds } : {}),
         change: (value) => this.setMotion(key, value),
       }),
@@ -173,25 +174,23 @@ export class Inspector {
       );
   }
 
-  private setPosition(axis: number, value: number | null): void {
-    if (value !== null)
-      this.change("Move way point", "position", (point) => ({
-        ...point,
-        position: roundPosition(point.position.map((old, i) => (i === axis ? value : old))),
-      }));
+  private setPosition(axis: number, value: number): void {
+    this.change("Move way point", "position", (point) => ({
+      ...point,
+      position: roundPosition(point.position.map((old, i) => (i === axis ? value : old))),
+    }));
   }
 
-  private setTarget(axis: number, value: number | null): void {
-    if (value !== null)
-      this.change("Aim way point", "aim", (point) => ({
-        ...point,
-        look_at: roundPosition((point.look_at ?? point.position).map((old, i) => (i === axis ? value : old))),
-      }));
+  private setTarget(axis: number, value: number): void {
+    this.change("Aim way point", "aim", (point) => ({
+      ...point,
+      look_at: roundPosition((point.look_at ?? point.position).map((old, i) => (i === axis ? value : old))),
+    }));
   }
 
-  private setAngle(which: number, value: number | null): void {
+  private setAngle(which: number, value: number): void {
     const pose = this.state.poseOfPoint(this.state.selected.value);
-    if (value === null || !pose) return;
+    if (!pose) return;
     const body = new Quaternion(pose[3], pose[4], pose[5], pose[6]);
     const camera = this.axisRotation(body);
     const mount = camera.clone().invert().multiply(body);

@@ -213,18 +213,19 @@ export class WaypointPanel {
       step: 0.1,
       parse: parseSeconds,
       change: (value) =>
-        value !== null &&
-        this.state.change("Time of way point", withTime(this.state.points!, index, value), index, `time ${index}`),
+        this.state.change("Time of way point", withTime(this.state.points!, index, value!), index, `time ${index}`),
     });
     const speed = new NumberField({
       label: `Speed ${named}, metres per second`,
       step: 0.1,
+      optional: true,
       change: set("Speed of way point", "speed", (point, value) => without(point, "speed", value)),
     });
     const pause = new NumberField({
       label: `Pause ${named}, seconds`,
       step: 0.1,
       parse: parseSeconds,
+      optional: true,
       change: set("Pause of way point", "pause", (point, value) => without(point, "pause_s", value)),
     });
     const aim = h("span", { class: "quiet" });

@@ -4,16 +4,28 @@ import type { Json, JsonMap, Problem, ScenarioState } from "../api/types.ts";
 import { Signal } from "../ui/signal.ts";
 import { complain } from "../ui/status.ts";
 import { History } from "./history.ts";
-import { getIn, setIn } from "./values.ts";
+import { getIn, samePlace, setIn } from "./values.ts";
+
+/** What was typed into the fields of an option and is not a value of it. */
+export interface Refused {
+  /** As typed, one per field. */
+  texts: string[];
+  what: string;
+}
 
 /** One state of the design. Its text comes from the server, a moment after its values. */
 export interface Revision {
   values: JsonMap;
+  /** What the server finds wrong with the text. */
   problems: Problem[];
+  /** Entries of the form that are not in the text, by option: what the fields show is not what would run. */
+  refused: ReadonlyMap<string, Refused>;
   /** Null while the server has not written it. */
   yaml: string | null;
   /** The text, as soon as it is there. */
   settled: Promise<string>;
+  /** Resolves when `problems` are those of the text. */
+  checked: Promise<void>;
 }
 
 export interface Change {
@@ -22,7 +34,12 @@ export interface Change {
 }
 
 function revisionOf(state: ScenarioState): Revision {
-  return { ...state, settled: Promise.resolve(state.yaml) };
+  return { ...state, refused: new Map(), settled: Promise.resolve(state.yaml), checked: Promise.resolve() };
+}
+
+/** Whether one option stands within the other, or is it. */
+function related(a: string, b: string): boolean {
+  return a === b || a.startsWith(`${b}.`) || b.startsWith(`${a}.`);
 }
 
 async function untilConnected(): Promise<void> {
@@ -71,8 +88,14 @@ export class ScenarioDocument {
   get values(): JsonMap {
     return this.revision.values;
   }
+  /** What is wrong with entries of the form and with the text, by option. */
   get problems(): Problem[] {
-    return this.revision.problems;
+    const { refused, problems } = this.revision;
+    const entries = [...refused].map(([where, { what }]) => ({ where, what }));
+    return [...entries, ...problems.filter(({ where }) => !refused.has(where))];
+  }
+  get refused(): ReadonlyMap<string, Refused> {
+    return this.revision.refused;
   }
   get undoLabel(): string | null {
     return this.history.undoLabel;
@@ -87,7 +110,8 @@ export class ScenarioDocument {
   }
 
   get dirty(): boolean {
-    return this.revision.yaml === null || this.revision.yaml !== this.savedYaml;
+    const { yaml, refused } = this.revision;
+    return yaml === null || yaml !== this.savedYaml || refused.size > 0;
   }
 
   get(where: string): Json | undefined {
@@ -124,28 +148,33 @@ export class ScenarioDocument {
     const settled = base.settled.then((yaml) =>
       persistently(() => server.editScenario({ yaml, dir: this.dir }, changes)),
     );
-    this.push(
-      { values, problems: base.problems, yaml: null, settled: settled.then((state) => state.yaml) },
-      settled,
-      label,
-      merge,
-    );
+    const refused = new Map([...base.refused].filter(([entry]) => !changes.some(({ where }) => related(entry, where))));
+    this.push({ ...base, values, refused, yaml: null }, settled, label, merge);
+  }
+
+  /** Keeps what was typed into an option's fields and is not a value of it; without `entry`, forgets it. */
+  refuse(where: string, entry: Refused | null): void {
+    const base = this.revision;
+    const refused = new Map(base.refused);
+    if (entry) refused.set(where, entry);
+    else if (!refused.delete(where)) return;
+    const settled = base.settled.then(async (yaml) => {
+      await base.checked;
+      return { yaml, values: base.values, problems: base.problems };
+    });
+    this.push({ ...base, refused }, settled, `Type into ${where}`, `entry ${where}`);
   }
 
   /** Takes a text as it was typed. */
   type(yaml: string): void {
     const base = this.revision;
     if (base.yaml === yaml) return;
-    const settled = persistently(() => server.checkScenario({ yaml, dir: this.dir })).catch((error: unknown) => {
+    const checked = persistently(() => server.checkScenario({ yaml, dir: this.dir })).catch((error: unknown) => {
       if (!(error instanceof ApiError) || error.status !== 400) throw error;
-      return { yaml, values: base.values, problems: [{ where: error.where ?? "", what: error.message }] };
+      return { values: base.values, problems: [{ where: error.where ?? "", what: error.message }] };
     });
-    this.push(
-      { values: base.values, problems: base.problems, yaml, settled: Promise.resolve(yaml) },
-      settled.then((state) => ({ ...state, yaml })),
-      "Edit text",
-      "text",
-    );
+    const settled = checked.then((state) => ({ ...state, yaml }));
+    this.push({ ...base, yaml }, settled, "Edit text", "text");
   }
 
   undo(): void {
@@ -161,13 +190,21 @@ export class ScenarioDocument {
     this.history.seal();
   }
 
-  private push(revision: Revision, settled: Promise<ScenarioState>, label: string, merge: string | null): void {
+  /** A new state, of which the server's answer tells the rest; text that is there already need not wait for it. */
+  private push(known: Revision, answer: Promise<ScenarioState>, label: string, merge: string | null): void {
+    const settled = known.yaml === null ? answer.then((state) => state.yaml) : Promise.resolve(known.yaml);
+    const checked = answer.then(
+      () => undefined,
+      () => undefined,
+    );
+    const revision = { ...known, settled, checked };
     this.history.push(revision, label, merge);
     this.show();
-    revision.settled.catch(() => undefined);
-    settled.then(
+    settled.catch(() => undefined);
+    answer.then(
       (state) => {
-        Object.assign(revision, { yaml: state.yaml, values: state.values, problems: state.problems });
+        const refused = [...revision.refused].filter(([where]) => samePlace(revision.values, state.values, where));
+        Object.assign(revision, state, { refused: new Map(refused) });
         if (this.revision === revision) this.changed.notify();
       },
       (error: unknown) => {

@@ -7,6 +7,7 @@ import { h } from "../ui/dom.ts";
 import { chooseFile } from "../ui/files_dialog.ts";
 import { complain, say } from "../ui/status.ts";
 import type { ScenarioDocument } from "./document.ts";
+import { refuseFor } from "./problems.ts";
 
 const draftKey = "esim-studio-draft";
 
@@ -15,6 +16,8 @@ export class ScenarioFile {
   constructor(
     private document: ScenarioDocument,
     private roots: string[],
+    /** Shows an option in the form. */
+    private reveal: (where: string) => void,
   ) {
     // What is not saved survives a reload of the page.
     document.changed.listen((revision) => {
@@ -62,12 +65,23 @@ export class ScenarioFile {
     );
   }
 
-  /** Whether it was saved. */
+  /** Whether it was saved: not while a field of the form shows what the text does not say. */
   async save(): Promise<boolean> {
+    if (await this.refused()) return false;
     return this.document.path === null ? this.saveAs() : this.write(this.document.path, this.document.onDisk, false);
   }
 
+  private async refused(): Promise<boolean> {
+    const entries = this.document.problems.filter(({ where }) => this.document.refused.has(where));
+    if (entries.length === 0) return false;
+    const why = "What was typed is not in the scenario; saved, it would hold other values than the form shows.";
+    const where = await refuseFor("Not saved", why, entries);
+    if (where !== null) this.reveal(where);
+    return true;
+  }
+
   async saveAs(): Promise<boolean> {
+    if (await this.refused()) return false;
     const proposal = this.document.path?.split("/").at(-1) ?? "scenario.yaml";
     const entry = await chooseFile(
       {
@@ -104,9 +118,9 @@ export class ScenarioFile {
     const revision = String(conflict.body["revision"] ?? "");
     let answers: Answer<"mine" | "theirs" | "both" | "cancel">[] = [
       { label: "Cancel", value: "cancel" },
-      { label: "Look at both", value: "both" },
-      { label: "Take theirs", value: "theirs" },
-      { label: "Keep mine", value: "mine", primary: true },
+      { label: "Take theirs", value: "theirs", kind: "danger" },
+      { label: "Keep mine", value: "mine", kind: "danger" },
+      { label: "Look at both", value: "both", kind: "primary" },
     ];
     const why = h("p", {
       text: `${path} was changed by somebody else since it was opened here, or is there already. Which of the two shall stand in the file?`,

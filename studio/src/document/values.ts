@@ -32,3 +32,14 @@ function set(at: Json | undefined, keys: string[], value: Json): Json {
   else copy[key] = value;
   return copy;
 }
+
+/** Whether an option has the same value in both, and stands among the same kinds and in lists of the same length. */
+export function samePlace(before: JsonMap, after: JsonMap, where: string): boolean {
+  let [a, b]: (Json | undefined)[] = [before, after];
+  for (const key of where.split(".")) {
+    if (Array.isArray(a) !== Array.isArray(b) || getIn(a, "type") !== getIn(b, "type")) return false;
+    if (Array.isArray(a) && a.length !== (b as Json[]).length) return false;
+    [a, b] = [getIn(a, key), getIn(b, key)];
+  }
+  return JSON.stringify(a) === JSON.stringify(b);
+}

@@ -111,8 +111,9 @@ export class LookPlace implements Place {
       label: "Window of events, milliseconds",
       unit: "ms",
       step: 5,
+      low: 1e-3,
       change: (value) => {
-        display.window = Math.max(1e3, (value ?? 20) * 1e6);
+        display.window = value! * 1e6;
         this.renew();
       },
     });
@@ -161,8 +162,10 @@ export class LookPlace implements Place {
       label: "Span of the cloud, milliseconds",
       unit: "ms",
       step: 50,
+      low: 0.1,
+      high: 4000,
       change: (value) => {
-        this.display.span = Math.min(4e9, Math.max(1e5, (value ?? 200) * 1e6));
+        this.display.span = value! * 1e6;
         this.renew();
       },
     });
@@ -172,7 +175,10 @@ export class LookPlace implements Place {
       parse: parseSeconds,
       digits: 9,
       unit: "s",
-      change: (value) => value !== null && this.clock.set(value * 1e9),
+      change: (value) => {
+        this.clock.set(value! * 1e9);
+        go.set(this.clock.time.value / 1e9);
+      },
     });
     return h(
       "section",

@@ -1,7 +1,7 @@
 import { ApiError, connection, serverIsGone } from "../api/http.ts";
 import * as server from "../api/server.ts";
 import type { RunState } from "../api/types.ts";
-import { ask, askText } from "../ui/dialog.ts";
+import { type Answer, ask, askText } from "../ui/dialog.ts";
 import { button, h } from "../ui/dom.ts";
 import { count, duration, magnitude, seconds } from "../ui/format.ts";
 import type { Place } from "../ui/place.ts";
@@ -15,6 +15,16 @@ const stateNames = {
   failed: "failed",
   cancelled: "cancelled",
 };
+
+/** What the place of runs needs of the page. */
+export interface RunContext {
+  /** Saves; the path of the scenario, or null where it is not saved. */
+  saved: () => Promise<string | null>;
+  look: (path: string) => void;
+  /** Shows an option in the form. */
+  reveal: (where: string) => void;
+  isOpen: (scenario: string) => boolean;
+}
 
 /** The server's runs: how far they are, and what their cameras see. */
 export class RunPlace implements Place {
@@ -32,6 +42,10 @@ export class RunPlace implements Place {
   private title = h("h1", { text: "No run yet" });
   private figures = h("dl", { class: "figures" });
   private error = h("p", { class: "problem", attrs: { role: "alert" } });
+  private refusal: ApiError | null = null;
+  /** The option for which a run was refused or failed. */
+  private wrong = "";
+  private toOption = button("", () => this.context.reveal(this.wrong), { class: "small" });
   private cancel = button("Cancel the run", () => void this.cancelRun(), { class: "danger" });
   private lookButton: HTMLButtonElement;
   private runs: RunState[] = [];
@@ -41,13 +55,10 @@ export class RunPlace implements Place {
   private pictureWanted = -1;
   private pictureShown = -1;
 
-  constructor(
-    private saveFirst: () => Promise<string | null>,
-    private look: (path: string) => void,
-  ) {
+  constructor(private context: RunContext) {
     this.lookButton = button(
       "Look at the recording",
-      () => this.current && look(this.current.recording ?? this.current.out),
+      () => this.current && context.look(this.current.recording ?? this.current.out),
       { class: "primary" },
     );
     this.element = h(
@@ -56,7 +67,7 @@ export class RunPlace implements Place {
       h(
         "section",
         { class: "run-view" },
-        h("header", { class: "run-head" }, this.title, this.error),
+        h("header", { class: "run-head" }, this.title, this.error, this.toOption),
         h("div", { class: "run-picture-frame" }, this.picture),
         h(
           "footer",
@@ -83,39 +94,53 @@ export class RunPlace implements Place {
 
   /** Saves, and starts a run; asks where a recording is in the way. */
   async start(): Promise<void> {
-    const path = await this.saveFirst();
+    const path = await this.context.saved();
     if (!path) return;
     await this.launch(path, undefined, false);
   }
 
   private async launch(path: string, out: string | undefined, overwrite: boolean): Promise<void> {
+    this.refusal = null;
     try {
       const { id } = await server.startRun(path, out, overwrite);
       await this.refresh();
       this.watch(id);
     } catch (error) {
-      if (!(error instanceof ApiError) || error.status !== 409) return complain(error);
-      const answer = await ask<"over" | "other">(
-        "There is a recording already",
-        [h("p", { text: error.message })],
-        [
-          { label: "Cancel", value: null as never },
-          { label: "Another folder…", value: "other" },
-          { label: "Replace it", value: "over", primary: true },
-        ],
-      );
-      if (answer === "over") return this.launch(path, out, true);
-      if (answer === "other") {
-        const proposal = `${out ?? path.replace(/([^/]*)\.ya?ml$/, "out/$1")}-2`;
-        const other = await askText(
-          "Where shall the recording go?",
-          "A folder below the server's roots",
-          proposal,
-          "Run",
-        );
-        if (other) return this.launch(path, other, false);
-      }
+      if (error instanceof ApiError && error.status === 409) return this.askWhere(path, out, error);
+      complain(error);
+      this.refusal = error instanceof ApiError ? error : null;
+      this.showCurrent();
     }
+  }
+
+  /** Something is in the way: a recording, or a run that still writes one. Only the first can be replaced. */
+  private async askWhere(path: string, out: string | undefined, { message, body }: ApiError): Promise<void> {
+    const running = body["running"] === true;
+    const replace: Answer<"over" | "other">[] = running ? [] : [{ label: "Replace it", value: "over", kind: "danger" }];
+    const answer = await ask<"over" | "other">(
+      running ? "A run is writing there" : "There is a recording already",
+      [h("p", { text: message })],
+      [
+        { label: "Cancel", value: null as never },
+        ...replace,
+        { label: "Another folder…", value: "other", kind: "primary" },
+      ],
+    );
+    if (answer === "over") return this.launch(path, out, true);
+    if (answer !== "other") return;
+    const proposal = `${out ?? path.replace(/([^/]*)\.ya?ml$/, "out/$1")}-2`;
+    const other = await askText("Where shall the recording go?", "A folder below the server's roots", proposal, "Run");
+    if (other) return this.launch(path, other, false);
+  }
+
+  /** Why the last run was not begun, or failed, and the way to the option where it is about one. */
+  private showError(run: RunState | null): void {
+    const { refusal } = this;
+    this.error.textContent = this.error.title = refusal?.message ?? run?.error ?? "";
+    const where = refusal ? refusal.where : run && this.context.isOpen(run.scenario) ? run.where : undefined;
+    this.wrong = where ?? "";
+    this.toOption.hidden = !where;
+    this.toOption.textContent = `Go to ${where}`;
   }
 
   /** Rejoins a run, also after the page was loaded again. */
@@ -140,7 +165,10 @@ export class RunPlace implements Place {
     this.stream = null;
     const run = this.runs.find((one) => one.id === id);
     if (!id || !run) return;
-    if (this.current?.id !== id) this.pictureShown = this.pictureWanted = -1;
+    if (this.current?.id !== id) {
+      this.pictureShown = this.pictureWanted = -1;
+      this.picture.width = this.picture.height = 1; // that of another run
+    }
     this.current = run;
     this.watched(id);
     const stream = new EventSource(`/api/runs/${id}/stream`);
@@ -215,7 +243,7 @@ export class RunPlace implements Place {
   private showCurrent(): void {
     const run = this.current;
     this.title.textContent = run ? run.scenario : "No run yet";
-    this.error.textContent = run?.error ?? "";
+    this.showError(run);
     this.cancel.disabled = !run || ended(run.state);
     this.lookButton.disabled = !run || !(run.state === "done" || (run.state === "cancelled" && run.recording));
     const share = shareOf(run);
@@ -258,8 +286,11 @@ export class RunPlace implements Place {
               class: "plain run-entry",
               attrs: { "aria-current": String(run.id === this.current?.id) },
               on: {
-                click: () => this.watch(run.id),
-                dblclick: () => run.state === "done" && this.look(run.recording ?? run.out),
+                click: () => {
+                  this.refusal = null;
+                  this.watch(run.id);
+                },
+                dblclick: () => run.state === "done" && this.context.look(run.recording ?? run.out),
               },
             },
             h("span", { class: "grow", text: run.out || run.scenario }),

@@ -4,11 +4,14 @@ import { allShortcuts } from "./shortcuts.ts";
 export interface Answer<T> {
   label: string;
   value: T;
-  primary?: boolean;
-  danger?: boolean;
+  /** Primary: Enter gives this answer. What destroys something is in danger, and never that answer. */
+  kind?: "primary" | "danger";
 }
 
-/** A question in a dialog: resolves to the answer's value, or null when the dialog was left by Escape. */
+/**
+ * A question in a dialog: resolves to the answer's value, or null when the dialog was left by Escape. The focus is on
+ * the first field, on the primary answer, or on the first answer that destroys nothing.
+ */
 export function ask<T>(
   title: string,
   body: (Node | string)[],
@@ -26,7 +29,7 @@ export function ask<T>(
     for (const answer of answers) {
       footer.append(
         button(answer.label, () => finish(answer.value), {
-          class: answer.primary ? "primary" : answer.danger ? "danger" : "",
+          class: answer.kind ?? "",
         }),
       );
     }
@@ -37,7 +40,7 @@ export function ask<T>(
         on: {
           submit: (event) => {
             event.preventDefault();
-            const primary = answers.find((answer) => answer.primary);
+            const primary = answers.find((answer) => answer.kind === "primary");
             if (primary) finish(primary.value);
           },
         },
@@ -53,7 +56,9 @@ export function ask<T>(
     });
     document.body.append(dialog);
     dialog.showModal();
-    const first = dialog.querySelector<HTMLElement>("input, select, .primary");
+    const first =
+      dialog.querySelector<HTMLElement>("input, select, .primary") ??
+      footer.querySelector<HTMLElement>("button:not(.danger)");
     first?.focus();
     if (first instanceof HTMLInputElement) first.select();
   });
@@ -67,7 +72,7 @@ export async function askText(title: string, label: string, value: string, accep
     [h("p", { class: "quiet", text: label }), input],
     [
       { label: "Cancel", value: null as unknown as true },
-      { label: accept, value: true, primary: true },
+      { label: accept, value: true, kind: "primary" },
     ],
   );
   return answer && input.value.trim() ? input.value.trim() : null;
@@ -91,7 +96,7 @@ export async function showShortcuts(): Promise<void> {
   await ask<true>(
     "Keys",
     [h("div", { class: "shortcut-list" }, ...groups.values())],
-    [{ label: "Close", value: true, primary: true }],
+    [{ label: "Close", value: true, kind: "primary" }],
     { wide: true },
   );
 }

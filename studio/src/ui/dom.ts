@@ -155,6 +155,13 @@ export function icon(name: IconName): SVGSVGElement {
   return svg;
 }
 
+/** Takes what is being typed into a field, as leaving the field would. */
+export function commitTyping(): void {
+  const at = document.activeElement;
+  if (at instanceof HTMLTextAreaElement || (at instanceof HTMLInputElement && typing(at)))
+    at.dispatchEvent(new Event("change"));
+}
+
 /** Whether keys typed now belong to a field. */
 export function typing(target: EventTarget | null): boolean {
   return (

@@ -1,5 +1,6 @@
 import { h } from "./dom.ts";
 import { shortNumber } from "./format.ts";
+import { complain } from "./status.ts";
 
 export interface NumberFieldOptions {
   label: string;
@@ -10,11 +11,18 @@ export interface NumberFieldOptions {
   step?: number;
   /** Reads what was typed; NaN: it is not valid. */
   parse?: (text: string) => number;
+  low?: number;
+  high?: number;
+  /** An emptied field means that there is no number; otherwise it must hold one. */
+  optional?: boolean;
   /** Called with a valid number, or null for an emptied field. */
   change: (value: number | null) => void;
 }
 
-/** A number with its unit: typed, or stepped by the arrow keys. */
+/**
+ * A number with its unit: typed, or stepped by the arrow keys. It shows the number in use: what is typed and cannot be
+ * used is said to be so, and the number in use comes back.
+ */
 export class NumberField {
   readonly element: HTMLElement;
   readonly input: HTMLInputElement;
@@ -44,7 +52,6 @@ export class NumberField {
     if (document.activeElement === this.input && this.input.value !== this.text() && this.input.dataset["typing"])
       return;
     this.input.value = this.text();
-    this.input.classList.remove("invalid");
   }
 
   private text(): string {
@@ -55,11 +62,28 @@ export class NumberField {
     delete this.input.dataset["typing"];
     const text = this.input.value.trim();
     if (text === this.text()) return;
-    const value = text === "" ? null : (this.options.parse ?? Number)(text);
-    this.input.classList.toggle("invalid", value !== null && Number.isNaN(value));
-    if (value !== null && Number.isNaN(value)) return;
+    const value = text === "" ? null : (this.options.parse ?? plainNumber)(text);
+    const wrong = this.wrong(text, value);
+    if (wrong) {
+      this.forget();
+      const now = this.text();
+      return complain(new Error(`${this.options.label}: ${wrong}${now ? `; it is still ${now}` : ""}`));
+    }
     this.value = value;
     this.options.change(value);
+  }
+
+  /** What is wrong with a number that was typed. */
+  private wrong(text: string, value: number | null): string {
+    const { low = -Infinity, high = Infinity, optional } = this.options;
+    if (value === null) return optional ? "" : "must be a number";
+    if (!Number.isFinite(value)) return `must be a number, not '${text}'`;
+    if (value >= low && value <= high) return "";
+    const range = [
+      low > -Infinity ? `at least ${shortNumber(low)}` : "",
+      high < Infinity ? `at most ${shortNumber(high)}` : "",
+    ];
+    return `must be ${range.filter(Boolean).join(" and ")}, not ${text}`;
   }
 
   private forget(): void {
@@ -80,3 +104,5 @@ export class NumberField {
     }
   }
 }
+
+const plainNumber = (text: string) => Number(text.replace(",", "."));

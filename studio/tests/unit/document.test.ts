@@ -105,3 +105,53 @@ test("typed text that is no scenario stays as it is, with what is wrong, and und
   document.undo();
   assert.equal(document.revision.yaml, before);
 });
+
+const threshold = "event_camera.contrast_threshold";
+const entry = { texts: ["abc"], what: "must be a number, not 'abc'" };
+const settled = () => new Promise((resolve) => setTimeout(resolve, 60));
+
+test("an entry that is no value is a problem and not saved, until it is replaced or undone", async () => {
+  const [document] = begin();
+  const text = document.revision.yaml;
+  document.refuse(threshold, entry);
+  assert.deepEqual(document.problems, [{ where: threshold, what: entry.what }]);
+  assert.ok(document.dirty, "what the form shows is not what is saved");
+  assert.equal((await document.source()).yaml, text, "the text is as before");
+  document.edit("elsewhere", [{ where: "seed", value: 2 }]);
+  await settled();
+  assert.equal(document.problems.length, 1, "an edit elsewhere leaves it");
+  document.edit("a value", [{ where: threshold, value: 0.4 }]);
+  assert.deepEqual(document.problems, []);
+  document.undo();
+  assert.deepEqual(document.refused.get(threshold), entry);
+  document.undo();
+  document.undo();
+  assert.deepEqual(document.problems, []);
+  assert.equal(document.dirty, false);
+});
+
+test("an entry is forgotten with its option, and when the text gives the option another value", async () => {
+  const [document] = begin();
+  document.edit("a", [{ where: "renderer", value: { type: "mesh", scale: 1 } }]);
+  document.refuse("renderer.scale", entry);
+  document.edit("b", [{ where: "renderer", value: { type: "plane" } }]);
+  assert.deepEqual(document.problems, [], "the option is gone");
+  document.refuse(threshold, entry);
+  await settled();
+  document.type(JSON.stringify({ ...document.values, seed: 7 }));
+  await settled();
+  assert.equal(document.problems.length, 1, "the text says nothing of it");
+  document.type(JSON.stringify({ ...document.values, event_camera: { contrast_threshold: 0.2 } }));
+  await settled();
+  assert.deepEqual(document.problems, [], "the text gives it a value");
+});
+
+test("problems are those of the text once it is checked", async () => {
+  const [document] = begin();
+  globalThis.fetch = async () =>
+    Response.json({ yaml: "", values: {}, problems: [{ where: "seed", what: "must be a whole number" }] });
+  document.type("seed: x");
+  await document.revision.settled;
+  await document.revision.checked;
+  assert.deepEqual(document.problems, [{ where: "seed", what: "must be a whole number" }]);
+});

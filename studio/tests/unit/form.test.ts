@@ -7,10 +7,11 @@ import { readAddress, writeAddress } from "../../src/ui/address.ts";
 test("fields read what they may hold, and say what is wrong", () => {
   const rate = { kind: "number", low: 0, high: 1000, positive: true, unit: "Hz" };
   assert.deepEqual(readValue(rate, "2,5"), { value: 2.5 });
-  assert.deepEqual(readValue(rate, "0"), { problem: "must be > 0 to 1000 Hz" });
-  assert.deepEqual(readValue(rate, "1001"), { problem: "must be > 0 to 1000 Hz" });
-  assert.deepEqual(readValue(rate, "fast"), { problem: "wants a number" });
-  assert.deepEqual(readValue({ kind: "integer" }, "1.5"), { problem: "wants a whole number" });
+  assert.deepEqual(readValue(rate, "0"), { problem: "must be > 0 to 1000 Hz, not 0" });
+  assert.deepEqual(readValue(rate, "1001"), { problem: "must be > 0 to 1000 Hz, not 1001" });
+  assert.deepEqual(readValue(rate, "fast"), { problem: "must be a number, not 'fast'" });
+  assert.deepEqual(readValue({ kind: "number" }, "Infinity"), { problem: "must be a number, not 'Infinity'" });
+  assert.deepEqual(readValue({ kind: "integer" }, "1.5"), { problem: "must be a whole number, not 1.5" });
   assert.ok("problem" in readValue({ kind: "integer" }, "18446744073709551615"));
   assert.deepEqual(readValue({ kind: "text" }, " a b "), { value: "a b" });
   assert.equal(rangeText({ kind: "number", low: 0, high: 1e9 }), "≥ 0");

@@ -2,8 +2,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { until } from "../harness.mjs";
-import { clock, cramped, place, press, rows, shot, stage, yaml } from "../page.mjs";
-import { main } from "../session.mjs";
+import { clock, cramped, differing, place, press, rows, shot, stage, yaml } from "../page.mjs";
+import { main, read } from "../session.mjs";
 
 test("fly, and drop four way points by clicking", async () => {
   const { page } = main;
@@ -100,6 +100,40 @@ test("the flight plays through the camera's eyes, and the simulator shows what i
   await page.getByRole("radio", { name: "Preview" }).click();
 });
 
+test("a number that cannot be used is said to be so, and the number in use comes back", async () => {
+  const { page } = main;
+  await rows(page).nth(1).click();
+  const x = page.getByLabel("Position x, metres");
+  const before = await x.inputValue();
+  for (const typed of ["abc", "", "1e999"]) {
+    await x.fill(typed);
+    await x.press("Tab");
+    assert.equal(await x.inputValue(), before);
+    assert.match(await page.locator(".status .message.bad").textContent(), /Position x, metres: must be a number/);
+  }
+});
+
+test("the ground can be hidden, and the axes turn with the view", async () => {
+  const { page } = main;
+  const grid = page.getByRole("button", { name: /^Grid/ });
+  assert.match(await grid.textContent(), /^Grid (1|2|5|0\.5) m$/);
+  const axes = () => page.locator(".axes").innerHTML();
+  const before = await axes();
+  await stage(page).focus();
+  await press(page, "ArrowLeft", 200);
+  assert.notEqual(await axes(), before);
+  await press(page, "ArrowRight", 200);
+  const pictures = [];
+  for (const shown of ["false", "true"]) {
+    await grid.click();
+    assert.equal(await grid.getAttribute("aria-pressed"), shown);
+    await page.waitForTimeout(600);
+    const box = await stage(page).boundingBox();
+    pictures.push(await page.screenshot({ clip: { ...box, width: 0.6 * box.width } }));
+  }
+  assert.ok((await differing(page, pictures[0], pictures[1])) > 0.0003, "lines are drawn");
+});
+
 test("nothing is drawn while nothing happens", async () => {
   const { page } = main;
   await page.waitForTimeout(800);
@@ -144,4 +178,96 @@ test("the form shows a problem where it is, and the text goes both ways", async 
   await until(async () => /preset: davis346/.test(await text.inputValue()), "the preset in the text");
   await page.keyboard.press("Control+z");
   await until(async () => !/preset/.test(await text.inputValue()), "undo of the preset");
+});
+
+const runs = (page) => page.evaluate(async () => (await (await fetch("/api/runs")).json()).length);
+const focused = (page) => page.evaluate(() => document.activeElement?.textContent || document.activeElement?.id);
+const isFocused = (field) => field.evaluate((element) => element === document.activeElement).catch(() => false);
+const dialog = (page) => page.locator("dialog");
+
+test("an entry that is no value is a problem, and is neither saved nor run as another", async () => {
+  const { page } = main;
+  const threshold = page.locator("#option-event_camera-contrast_threshold");
+  const problems = page.locator(".problem-section li");
+  const saved = read("walk.yaml");
+  const text = await yaml(page);
+  for (const typed of ["-1", "abc"]) {
+    await threshold.fill(typed); // and not left
+    await page.keyboard.press("Control+Enter");
+    await dialog(page).waitFor();
+    assert.match(await dialog(page).textContent(), /Not run.*event_camera\.contrast_threshold/);
+    assert.ok((await dialog(page).textContent()).includes(typed), "what was typed");
+    await page.keyboard.press("Enter"); // goes to the field
+    await until(() => isFocused(threshold), "the field");
+    assert.equal(await threshold.getAttribute("aria-invalid"), "true");
+    assert.equal(await threshold.inputValue(), typed);
+    assert.equal(await problems.count(), 1);
+    assert.match(await problems.textContent(), /event_camera\.contrast_threshold/);
+    await page.keyboard.press("Control+s");
+    await dialog(page).waitFor();
+    assert.match(await dialog(page).textContent(), /Not saved/);
+    if (typed === "-1") await shot(page, "refused-dark");
+    await page.keyboard.press("Escape");
+  }
+  assert.equal(await runs(page), 0);
+  assert.equal(read("walk.yaml"), saved);
+  assert.equal(await yaml(page), text);
+
+  await page.locator(".groups button", { hasText: /^camera$/ }).click();
+  await place(page, "Design");
+  await page.getByRole("button", { name: "1 problem" }).click();
+  await until(() => isFocused(threshold), "the field");
+  assert.equal(await threshold.inputValue(), "abc", "the form still shows what was typed");
+  await shot(page, "problem-dark");
+  await page.keyboard.press("Control+z");
+  await until(async () => (await problems.count()) === 0, "undo");
+  assert.equal(await threshold.inputValue(), "0.3");
+  assert.equal(await page.getByRole("button", { name: /problem/ }).count(), 0);
+});
+
+test("Escape takes an entry back", async () => {
+  const { page } = main;
+  const threshold = page.locator("#option-event_camera-contrast_threshold");
+  for (const leave of [false, true]) {
+    await threshold.fill("7e9");
+    if (leave) await threshold.press("Tab");
+    await threshold.press("Escape");
+    assert.equal(await threshold.inputValue(), "0.3");
+    assert.equal(await page.locator(".problem-section li").count(), 0);
+  }
+});
+
+test("what is typed and not left is saved as it is shown, in the form and in the text", async () => {
+  const { page } = main;
+  await page.locator("#option-event_camera-contrast_threshold").fill("0.31");
+  await page.keyboard.press("Control+s");
+  await until(() => /contrast_threshold: 0\.31/.test(read("walk.yaml")), "the form's value in the file");
+  const text = page.locator(".yaml-editor textarea");
+  await text.fill((await text.inputValue()).replace("0.31", "0.3"));
+  await page.keyboard.press("Control+s");
+  await until(() => /contrast_threshold: 0\.3\b/.test(read("walk.yaml")), "the text's value in the file");
+});
+
+test("options are searched for by name and description, and lead to what they need", async () => {
+  const { page } = main;
+  await page.locator(".groups button", { hasText: /^camera$/ }).click();
+  await page.keyboard.press("/");
+  await page.keyboard.type("refractory");
+  const names = page.locator(".form .option-name code");
+  await until(async () => (await names.count()) > 0, "what is found");
+  for (const name of await names.allTextContents()) assert.match(name, /event_camera\..*refractory/);
+  await page.keyboard.press("Control+a");
+  await page.keyboard.type("rate_hz");
+  await until(async () => (await names.count()) > 3, "what is found now");
+  await shot(page, "search-dark");
+  await page.keyboard.press("Control+a");
+  await page.keyboard.type("sampling rate_hz");
+  const needed = page.getByRole("button", { name: /with sampling\.type/ }).first();
+  await needed.click();
+  await until(
+    async () => (await focused(page))?.startsWith("option-sampling") || /adaptive/.test(await focused(page)),
+    "the choice",
+  );
+  await page.keyboard.press("Escape");
+  assert.equal(await page.getByLabel("Search the options").inputValue(), "");
 });

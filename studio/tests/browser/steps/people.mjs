@@ -105,10 +105,16 @@ test("two tabs: the second one to save is asked", async () => {
   await until(async () => read("poster.yaml").includes("0.21"), "the first save");
   await set(second, "0.42");
   await second.waitForSelector("dialog");
+  assert.match(
+    await second.evaluate(() => document.activeElement.textContent),
+    /Look at both/,
+    "Enter overwrites nothing",
+  );
   await second.getByRole("button", { name: "Look at both" }).click();
   await second.waitForSelector(".diff");
   assert.match(await second.locator(".diff").textContent(), /0\.42[\s\S]*0\.21|0\.21[\s\S]*0\.42/);
   await shot(second, "conflict-dark");
+  assert.match(await second.evaluate(() => document.activeElement.textContent), /Cancel/);
   assert.ok(read("poster.yaml").includes("0.21"), "nothing is written before the answer");
   await second.getByRole("button", { name: "Keep mine" }).click();
   await until(async () => read("poster.yaml").includes("0.42"), "mine in the file");

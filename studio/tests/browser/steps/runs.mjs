@@ -1,6 +1,6 @@
 // Runs that are left alone, rejoined, cancelled and made again.
 import assert from "node:assert/strict";
-import { existsSync } from "node:fs";
+import { existsSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
 import { openPage, until } from "../harness.mjs";
@@ -43,6 +43,17 @@ test("the browser is closed in mid-run: the run goes on, and is joined again", a
   await until(async () => /running/.test(await figures(page)), "the run after a reload");
 });
 
+test("what a run is writing cannot be replaced", async () => {
+  const { page } = state;
+  await visit(page, server, "#/run?scenario=project/long.yaml");
+  await page.waitForSelector(".run");
+  await page.keyboard.press("Control+Enter");
+  await page.locator("dialog").waitFor();
+  assert.match(await page.locator("dialog").textContent(), /A run is writing there/);
+  assert.equal(await page.getByRole("button", { name: "Replace it" }).count(), 0);
+  await page.keyboard.press("Escape");
+});
+
 test("a run is cancelled: what there is of it is kept, shown as cut short, and can be made again", async () => {
   const { page } = state;
   const out = join(files.folder, "out/long");
@@ -68,6 +79,12 @@ test("a run is cancelled: what there is of it is kept, shown as cut short, and c
   await visit(page, server, "#/run?scenario=project/long.yaml");
   await page.waitForSelector(".run");
   await page.getByRole("button", { name: "Run", exact: true }).click();
+  const focus = await until(
+    () => page.evaluate(() => document.activeElement?.closest("dialog") && document.activeElement.textContent),
+    "the question",
+  );
+  assert.match(focus, /Another folder/, "Enter destroys nothing");
+  await shot(page, "replace-dark");
   await page.getByRole("button", { name: "Replace it" }).click();
   await until(async () => /running/.test(await figures(page)), "the second run");
   await until(async () => (await eventsOf(page)) > 0, "its events");
@@ -77,4 +94,24 @@ test("a run is cancelled: what there is of it is kept, shown as cut short, and c
   assert.ok(existsSync(join(out, "cam0/events.h5")));
   assert.deepEqual(state.faults, []);
   await state.context.close();
+});
+
+test("a run that fails for an option leads back to it", async () => {
+  const one = "trajectory:\n  type: waypoints\n  points:\n    - {position: [0, 0, 1.5], look_at: [1, 0, 1.5]}\n";
+  writeFileSync(
+    join(files.folder, "one.yaml"),
+    `renderer: {type: mesh, scene: room/room.obj}\n${one}camera: {width: 64, height: 48}\n`,
+  );
+  const { page, faults, context } = await enter();
+  await visit(page, server, "#/run?scenario=project/one.yaml");
+  await page.waitForSelector(".run");
+  await page.keyboard.press("Control+Enter");
+  await until(async () => /failed/.test(await figures(page)), "the failure");
+  assert.deepEqual(await colouredPixels(page, ".run-picture"), { on: 0, off: 0 }, "no picture of another run");
+  await shot(page, "run-failed-dark");
+  await page.getByRole("button", { name: "Go to trajectory" }).click();
+  await until(() => page.evaluate(() => document.activeElement?.id === "option-trajectory"), "the option");
+  assert.equal(await page.getByRole("tab", { name: "Configure" }).getAttribute("aria-selected"), "true");
+  assert.deepEqual(faults, []);
+  await context.close();
 });

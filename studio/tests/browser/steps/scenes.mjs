@@ -102,6 +102,20 @@ test("an object moves by way points of its own: dropped, drawn, flown and saved"
   assert.ok(Math.hypot(...from.slice(0, 3).map((value, i) => value - to[i])) > 0.2, "the simulator flies it too");
 });
 
+test("the flight of a file becomes waypoints, the selected one with its handles", async () => {
+  const page = await design("room.yaml");
+  await until(async () => / of /.test(await clock(page).textContent()), "the flight");
+  await page.getByRole("button", { name: "Make way points of it" }).click();
+  await until(async () => (await rows(page).count()) === 11, "a waypoint every half second");
+  await rows(page).nth(4).click();
+  await until(async () => /^2\.000/.test(await clock(page).textContent()), "the time of the fifth");
+  await page.waitForTimeout(1500);
+  await shot(page, "flight-dark");
+  await stage(page).focus();
+  await page.keyboard.press("Control+z");
+  await until(async () => (await rows(page).count()) === 0, "the file again");
+});
+
 test("each camera of a rig can be looked through", async () => {
   write(
     "rig.yaml",

@@ -1,6 +1,6 @@
 import type { ScenarioDocument } from "../document/document.ts";
 import type { Place } from "../ui/place.ts";
-import { h, Segmented } from "../ui/dom.ts";
+import { button, h, Segmented } from "../ui/dom.ts";
 import { count, shortNumber } from "../ui/format.ts";
 import { NumberField } from "../ui/number_field.ts";
 import { addShortcuts } from "../ui/shortcuts.ts";
@@ -50,7 +50,7 @@ export class DesignPlace implements Place {
       label: "Height of the way point above the clicked surface",
       unit: "m",
       step: 0.1,
-      change: (value) => (viewport.dropper.height_above_m = value ?? 1.4),
+      change: (value) => (viewport.dropper.height_above_m = value!),
     });
     above.set(viewport.dropper.height_above_m);
     above.element.classList.add("hidden");
@@ -101,6 +101,19 @@ export class DesignPlace implements Place {
       "look",
       (mode) => (viewport.navigation.dragMode = mode),
     );
+    const grid = button(
+      "Grid",
+      () => {
+        viewport.grid = !viewport.grid;
+        grid.setAttribute("aria-pressed", String(viewport.grid));
+      },
+      { class: "small", title: "Show the ground, z = 0, in cells of this width" },
+    );
+    grid.setAttribute("aria-pressed", String(viewport.grid));
+    viewport.cell.watch((width) => {
+      grid.disabled = width === "";
+      grid.textContent = `Grid ${width}`;
+    });
     const speed = h("span", { class: "quiet fly-speed", title: "Speed of flying (+ and -)" });
     viewport.navigation.speed_m_per_s.watch((value) => (speed.textContent = `Fly ${shortNumber(value, 2)} m/s`));
     const size = h("span", { class: "quiet triangles" });
@@ -108,11 +121,12 @@ export class DesignPlace implements Place {
     return h(
       "div",
       { class: "toolbar row", attrs: { role: "toolbar", "aria-label": "View" } },
-      h("span", { class: "quiet", text: "Drop" }),
+      h("span", { class: "quiet drop", text: "Drop" }),
       click.element,
       above.element,
       gizmo.element,
       drag.element,
+      grid,
       h("span", { class: "grow" }),
       size,
       speed,

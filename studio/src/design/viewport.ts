@@ -11,14 +11,17 @@ import {
 } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 import type { Pose, SceneInfo } from "../api/types.ts";
+import { AxesGizmo } from "../stage/axes.ts";
 import { SceneContent } from "../stage/content.ts";
+import { Ground } from "../stage/ground.ts";
 import { frustumLines, Markers } from "../stage/markers.ts";
 import { matrixOf, product } from "../stage/frames.ts";
 import { Navigation } from "../stage/navigation.ts";
 import { PathLine } from "../stage/path.ts";
 import { Stage } from "../stage/stage.ts";
 import { h } from "../ui/dom.ts";
-import { seconds } from "../ui/format.ts";
+import { seconds, shortNumber } from "../ui/format.ts";
+import { Signal } from "../ui/signal.ts";
 import { colour, theme } from "../ui/theme.ts";
 import { complain } from "../ui/status.ts";
 import { Dropper } from "./dropping.ts";
@@ -37,8 +40,13 @@ export class Viewport {
   private content = new SceneContent(() => this.stage.invalidate());
   private markers = new Markers();
   private path = new PathLine();
+  private ground = new Ground();
+  private axes = new AxesGizmo();
+  /** The width of the ground's cells, as it is shown; "" where there is no ground. */
+  readonly cell = new Signal("");
   private now = new LineSegments(new BufferGeometry(), new LineBasicMaterial());
   private gizmo: TransformControls | null = null;
+  private gridWanted = true;
   private handle = new Object3D();
   private overlays = new Object3D();
   private eyePose = new Matrix4();
@@ -57,18 +65,20 @@ export class Viewport {
     );
     stage.element.append(
       h("div", { class: "crosshair", attrs: { "aria-hidden": "true" } }),
+      this.axes.element,
       this.eye.element,
       this.note,
     );
     this.now.matrixAutoUpdate = false;
     this.now.frustumCulled = false;
-    this.overlays.add(this.markers.group, this.path.group, this.now, this.handle);
+    this.overlays.add(this.ground.lines, this.markers.group, this.path.group, this.now, this.handle);
     stage.scene.add(this.content.group, this.overlays);
     stage.animate = (dt) => this.animate(dt);
     stage.hurried = (hurried) => this.content.coarsen(hurried);
     stage.draw = (renderer) => {
       if (!this.eye.large) {
-        this.markers.scale(stage.height, stage.camera.fov);
+        this.markers.face(stage.camera, stage.height);
+        this.axes.show(stage.camera);
         renderer.render(stage.scene, stage.camera);
       }
       this.overlays.visible = false;
@@ -101,8 +111,31 @@ export class Viewport {
     });
     theme.listen(() => {
       this.markers.forgetColours();
+      this.ground.draw();
       this.showMotion();
     });
+  }
+
+  /** The grid on the ground, z = 0. */
+  get grid(): boolean {
+    return this.gridWanted;
+  }
+
+  set grid(shown: boolean) {
+    this.gridWanted = shown;
+    this.ground.lines.visible = shown && this.cell.value !== "";
+    this.stage.invalidate();
+  }
+
+  private showGround(info: SceneInfo): void {
+    const flat = info.kind === "mesh" || info.kind === "plane";
+    const { bounds } = this.content;
+    const [size, middle] = [bounds.getSize(new Vector3()), bounds.getCenter(new Vector3())];
+    const known = !bounds.isEmpty() && Number.isFinite(size.length());
+    const room = info.kind === "plane" ? 3 : 1; // a camera stands before a poster, not in it
+    this.ground.fit(known ? room * Math.max(size.x, size.y) : 10, known ? [middle.x, middle.y] : [0, 0]);
+    this.cell.set(flat ? `${shortNumber(this.ground.cell_m)} m` : "");
+    this.grid = this.gridWanted;
   }
 
   private makeGizmo(canvas: HTMLCanvasElement): void {
@@ -197,6 +230,7 @@ export class Viewport {
       this.stage.element.classList.add("loading");
       const changed = await this.content.show(info, this.state.document.get("renderer.lighting"));
       if (changed) this.stage.forgetPace();
+      if (changed || first) this.showGround(info);
       if (changed && this.content.slow) this.stage.hurry();
       if (changed || first) this.findView(info, first);
     } catch (error) {

@@ -1,22 +1,13 @@
-import {
-  Box3,
-  BufferAttribute,
-  BufferGeometry,
-  Color,
-  GridHelper,
-  LineBasicMaterial,
-  LineSegments,
-  Matrix4,
-  Vector3,
-} from "three";
+import { Box3, BufferAttribute, BufferGeometry, Color, LineBasicMaterial, LineSegments, Matrix4, Vector3 } from "three";
 import * as server from "../api/server.ts";
 import { matrixOf, PoseTrack } from "../stage/frames.ts";
+import { Ground } from "../stage/ground.ts";
 import { frustumLines } from "../stage/markers.ts";
 import { Navigation } from "../stage/navigation.ts";
 import { PathLine } from "../stage/path.ts";
 import { Stage } from "../stage/stage.ts";
 import { h } from "../ui/dom.ts";
-import { shortNumber, ticks } from "../ui/format.ts";
+import { shortNumber } from "../ui/format.ts";
 import { complain } from "../ui/status.ts";
 import { colour, theme } from "../ui/theme.ts";
 import type { Tile, TileSource } from "./tiles.ts";
@@ -68,19 +59,13 @@ export class PathTile implements Tile {
       const box = new Box3().setFromPoints(poses.map((pose) => new Vector3(pose[0], pose[1], pose[2])));
       const middle = box.getCenter(new Vector3());
       this.size = Math.max(0.2, box.getSize(new Vector3()).length());
-      const cell = ticks(0, this.size, 6)[1]!;
+      const ground = new Ground();
+      ground.fit(this.size, [middle.x, middle.y], box.min.z - 0.1 * this.size);
+      const cell = ground.cell_m;
       this.caption.textContent = `Path; a square is ${cell >= 1 ? `${cell} m` : `${shortNumber(cell * 100)} cm`} wide`;
-      let grid: GridHelper | null = null;
+      this.stage.scene.add(ground.lines);
       this.stopTheme = theme.watch(() => {
-        if (grid) this.stage.scene.remove(grid);
-        grid = new GridHelper(cell * 20, 20, new Color(colour("line")), new Color(colour("line")));
-        grid.rotation.x = Math.PI / 2;
-        grid.position.set(
-          Math.round(middle.x / cell) * cell,
-          Math.round(middle.y / cell) * cell,
-          box.min.z - 0.1 * this.size,
-        );
-        this.stage.scene.add(grid);
+        ground.draw();
         this.path.show(poses);
         this.now.material.color = new Color(colour("on"));
         this.stage.invalidate();

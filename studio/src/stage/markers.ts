@@ -15,6 +15,7 @@ import {
 import type { CameraModel } from "../api/types.ts";
 import { colour } from "../ui/theme.ts";
 import { imageCorners } from "./frames.ts";
+import { frustumOpacity } from "./sizes.ts";
 
 /** Lines of a camera's frustum of depth 1 in its own frame: its edges, the image, and a tick for what is up. */
 export function frustumLines(model: CameraModel | null): Float32Array {
@@ -74,6 +75,10 @@ export class Markers {
   private sprites: Sprite[] = [];
   private textures = new Map<string, CanvasTexture>();
   private places: Vector3[] = [];
+  private tips: Vector3[] = [];
+  private selected: boolean[] = [];
+  private opacities: number[] = [];
+  private depth = 1;
 
   constructor() {
     this.lines.frustumCulled = false;
@@ -85,7 +90,7 @@ export class Markers {
   show(markers: Marker[], model: CameraModel | null, depth: number): void {
     const shape = frustumLines(model);
     const positions = new Float32Array(markers.length * shape.length);
-    const colours = new Float32Array(positions.length);
+    const colours = new Float32Array((positions.length / 3) * 4);
     const [plain, strong] = [new Color(colour("text")), new Color(colour("accent"))];
     const point = new Vector3();
     markers.forEach((marker, k) => {
@@ -96,13 +101,17 @@ export class Markers {
           .multiplyScalar(depth)
           .applyMatrix4(marker.matrix)
           .toArray(positions, k * shape.length + i);
-        paint.toArray(colours, k * shape.length + i);
+        paint.toArray(colours, ((k * shape.length + i) / 3) * 4);
       }
     });
     this.lines.geometry.dispose();
     this.lines.geometry = new BufferGeometry();
     this.lines.geometry.setAttribute("position", new BufferAttribute(positions, 3));
-    this.lines.geometry.setAttribute("color", new BufferAttribute(colours, 3));
+    this.lines.geometry.setAttribute("color", new BufferAttribute(colours, 4));
+    this.depth = depth;
+    this.selected = markers.map((marker) => marker.selected);
+    this.tips = markers.map((marker) => new Vector3().setFromMatrixPosition(marker.matrix));
+    this.opacities = [];
     this.places = markers.map((marker) => marker.anchor ?? new Vector3().setFromMatrixPosition(marker.matrix));
     this.label(markers);
   }
@@ -123,10 +132,21 @@ export class Markers {
     });
   }
 
-  /** Keeps the dots' size on the screen, whatever its height [px] and the camera's field of view. */
-  scale(height_px: number, fov_deg: number): void {
-    const size = (22 / height_px) * 2 * Math.tan((fov_deg * Math.PI) / 360);
+  /** Before a frame: keeps the dots' size on the screen, whatever its height [px], and lets far frusta fade. */
+  face(camera: PerspectiveCamera, height_px: number): void {
+    const size = (22 / height_px) * 2 * Math.tan((camera.fov * Math.PI) / 360);
     for (const sprite of this.sprites) sprite.scale.setScalar(size);
+    const colours = this.lines.geometry.getAttribute("color") as BufferAttribute | undefined;
+    this.tips.forEach((tip, k) => {
+      const distance = tip.distanceTo(camera.position);
+      const opacity = Math.round(100 * frustumOpacity(this.selected[k]!, distance, this.depth)) / 100;
+      if (!colours || opacity === this.opacities[k]) return;
+      this.opacities[k] = opacity;
+      const each = colours.count / this.tips.length;
+      for (let i = k * each; i < (k + 1) * each; ++i) colours.setW(i, opacity);
+      colours.needsUpdate = true;
+      this.sprites[k]!.material.opacity = Math.min(1, 0.4 + opacity);
+    });
   }
 
   /** The marker within a few pixels of a point of the picture (-1 to 1), the nearest to it; -1: none. */

@@ -3,6 +3,7 @@ import "./ui/styles/layout.css";
 import "./ui/styles/design.css";
 import "./ui/styles/configure.css";
 import "./ui/styles/look.css";
+import "./ui/styles/narrow.css";
 import { askAhead, connection } from "./api/http.ts";
 import * as server from "./api/server.ts";
 import type { Session } from "./api/types.ts";

@@ -7,6 +7,8 @@ import { complain } from "../ui/status.ts";
 
 type Source = "preview" | "simulator";
 const inset_width_px = 294;
+/** Of the stage's width at most. */
+const inset_share = 0.5;
 const tallest_inset_px = 222;
 
 /** What a camera of the rig sees: drawn by the browser, or by the simulator's own renderer; small in a corner or large. */
@@ -89,7 +91,9 @@ export class Eye {
   fit(): void {
     if (!this.model) return;
     const aspect = this.model.width / this.model.height;
-    let [width, height] = [inset_width_px, inset_width_px / aspect];
+    const stage_px = this.element.parentElement?.clientWidth || Infinity;
+    const inset_px = Math.min(inset_width_px, inset_share * stage_px);
+    let [width, height] = [inset_px, inset_px / aspect];
     if (height > tallest_inset_px) [width, height] = [tallest_inset_px * aspect, tallest_inset_px];
     if (this.large) {
       const [room_x, room_y] = [this.element.clientWidth, this.element.clientHeight - 34];

@@ -8,6 +8,7 @@ after(end);
 
 await import("./steps/design.mjs");
 await import("./steps/record.mjs");
+await import("./steps/narrow.mjs");
 await import("./steps/runs.mjs");
 await import("./steps/scenes.mjs");
 await import("./steps/people.mjs");

@@ -1,13 +1,16 @@
-# What the libraries are made of; also read by find_package(esim). Everything comes from Debian 12's packages:
-# scripts/setup lists them.
+# What the libraries are made of; also read by find_package(esim). Everything comes from the packages of
+# Debian 12 and 13: scripts/setup lists them.
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(fmt 9 REQUIRED)
 find_package(Threads REQUIRED)
-find_package(Boost 1.74 REQUIRED)
+find_package(Boost 1.74 REQUIRED CONFIG)
 find_package(TBB REQUIRED)
 find_package(yaml-cpp 0.7 REQUIRED)
 find_package(nlohmann_json 3.11 REQUIRED)
-find_package(embree 3.13 REQUIRED)
+find_package(embree REQUIRED)
+if(embree_VERSION VERSION_LESS 3.13 OR embree_VERSION VERSION_GREATER_EQUAL 5)
+  message(FATAL_ERROR "Embree 3.13 to 4 is needed; ${embree_DIR} has ${embree_VERSION}. Set embree_DIR to the folder of another version's embree-config.cmake")
+endif()
 find_package(assimp 5.2 REQUIRED)
 find_package(Epoxy REQUIRED)
 find_package(OpenCVModules REQUIRED COMPONENTS core imgproc imgcodecs video)

@@ -41,10 +41,10 @@ ALLOWED = {
 }
 
 # Heavy libraries, and the headers of ours that may include them: private ones, which only .cpp files include.
-HEAVY = re.compile(r"^(embree3|assimp|epoxy|opencv2|hdf5|yaml-cpp|nlohmann|boost|fmt|tbb|libav|libsw|Imf|flatbuffers|aedat4_generated|lz4|zstd|zlib)")
+HEAVY = re.compile(r"^(embree[34]|assimp|epoxy|opencv2|hdf5|yaml-cpp|nlohmann|boost|fmt|tbb|libav|libsw|Imf|flatbuffers|aedat4_generated|lz4|zstd|zlib)")
 PRIVATE_HEADERS = {"backends/opengl/gl_program.h", "backends/opengl/gl_read_back.h", "backends/opengl/gl_scene.h",
                    "backends/opengl/gl_shaders.h", "backends/opengl/gl_shadows.h", "backends/opengl/gl_targets.h",
-                   "backends/raycast/edges.h", "backends/raycast/lights.h", "backends/raycast/packet.h", "backends/raycast/raycast_scene.h",
+                   "backends/raycast/edges.h", "backends/raycast/embree.h", "backends/raycast/lights.h", "backends/raycast/packet.h", "backends/raycast/raycast_scene.h",
                    "backends/raycast/surface.h", "backends/unrealcv/client.h", "backends/unrealcv/connection.h", "backends/unrealcv/dialect.h",
                    "backends/unrealcv/engine_image.h", "backends/unrealcv/session.h", "scenario/yaml_reader.h", "scene/import/gltf_document.h",
                    "record/formats/aedat4/buffers.h", "record/formats/hdf5_detail.h",

@@ -1,6 +1,7 @@
 // AEDAT 4 beyond the events of one camera, which every_format_test.cpp looks at.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "esim/core/error.h"

@@ -1,6 +1,7 @@
 // The Event Camera Dataset's layout beyond events, which every_format_test.cpp looks at: as a zip and as a folder.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <random>
 

@@ -1,6 +1,8 @@
 // What every format of events promises. A new one is tested by being in the list of formats().
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "esim/core/error.h"
 #include "esim/record/format.h"
 #include "record/event_formats.h"

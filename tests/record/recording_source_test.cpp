@@ -1,6 +1,7 @@
 // A recording's folder, written by way of RecordingWriter and read back as records.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 
 #include "esim/core/error.h"

@@ -1,6 +1,8 @@
 // What recordings become as ROS messages, in bags and in MCAP files alike.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "esim/core/error.h"
 #include "esim/record/formats/mcap/mcap_output.h"
 #include "esim/record/formats/ros/event_array.h"

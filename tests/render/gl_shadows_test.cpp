@@ -1,6 +1,7 @@
 // Shadows by maps of depth against those by rays.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "render/scenes.h"

@@ -1,6 +1,7 @@
 // What every renderer promises. A new one is tested by adding its name to the list at the end.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "esim/geometry/so3.h"

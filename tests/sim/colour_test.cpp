@@ -1,6 +1,7 @@
 // Colour cameras within simulations: what a scenario's files show through filters, and what is refused.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 

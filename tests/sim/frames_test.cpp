@@ -1,6 +1,7 @@
 // Frame cameras within simulations: what they see, and when it is delivered.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 

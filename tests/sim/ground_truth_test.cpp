@@ -1,6 +1,7 @@
 // Ground truth from the scenario to the sink.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "sim/card_scene.h"

@@ -1,6 +1,7 @@
 // Whole simulations of layers on the sensor, from a scenario's file.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 
 #include "esim/compose/compose.h"

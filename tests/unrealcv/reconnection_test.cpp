@@ -1,4 +1,5 @@
 // Servers that go away and come back.
+#include <algorithm>
 #include <thread>
 
 #include "unrealcv/shown.h"

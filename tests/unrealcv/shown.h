@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "esim/backends/unrealcv/unrealcv_renderer.h"
 #include "esim/core/engine_error.h"
 #include "render/scenes.h"

@@ -1,6 +1,7 @@
 #include "esim/dataset/affine_motion.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>

@@ -147,7 +147,7 @@ class LightOnSurfaces {
   static std::uint32_t occluded(const PlacedGroup& group, const VectorLanes<K>& start, const VectorLanes<K>& to_light,
                                 float reach, std::uint32_t lanes) {
     const Eigen::Matrix3f& R = group.R_group_camera;
-    typename Packet<K>::Ray ray;
+    embree::Rays<K> ray;
     alignas(64) std::array<int, K> wanted;
     for (unsigned i = 0; i < K; ++i) {
       wanted[i] = (lanes >> i & 1U) != 0 ? -1 : 0;
@@ -161,12 +161,7 @@ class LightOnSurfaces {
       ray.tnear[i] = 0, ray.tfar[i] = reach, ray.time[i] = 0;
       ray.mask[i] = ~0U, ray.id[i] = 0, ray.flags[i] = 0;
     }
-    // Not as coherent rays: with those Embree 3.13 has been seen not to end.
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    if constexpr (K == 16) rtcOccluded16(wanted.data(), group.triangles, &context, &ray);
-    if constexpr (K == 8) rtcOccluded8(wanted.data(), group.triangles, &context, &ray);
-    if constexpr (K == 4) rtcOccluded4(wanted.data(), group.triangles, &context, &ray);
+    embree::occlude<K>(wanted.data(), group.triangles, ray);
     std::uint32_t found = 0;
     for (unsigned i = 0; i < K; ++i) found |= (ray.tfar[i] < 0 ? 1U : 0U) << i;  // so Embree marks them
     return found;

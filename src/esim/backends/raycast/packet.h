@@ -1,14 +1,13 @@
 #pragma once
 
-#include <embree3/rtcore.h>
 #include <hwy/highway.h>
 
 #include <array>
 #include <cstdint>
 #include <limits>
 #include <span>
-#include <type_traits>
 
+#include "esim/backends/raycast/embree.h"
 #include "esim/backends/raycast/raycast_scene.h"
 
 namespace esim {
@@ -36,11 +35,8 @@ std::uint32_t lanes_equal(const std::uint32_t* values, std::uint32_t value) {
 /// A ray of each of K neighbouring pixels, and what they hit.
 template <int K>
 struct Packet {
-  using Ray = std::conditional_t<K == 16, RTCRay16, std::conditional_t<K == 8, RTCRay8, RTCRay4>>;
-  using RayHit = std::conditional_t<K == 16, RTCRayHit16, std::conditional_t<K == 8, RTCRayHit8, RTCRayHit4>>;
-
   alignas(64) std::array<float, K> bearing_x, bearing_y;  // in the camera frame; z = 1
-  RayHit ray;
+  embree::RayHits<K> ray;
 
   /// One ray per pixel of the block from its lane `first` on, through the point at `offset` from the pixel's centre.
   /// Nothing is hit yet.
@@ -117,14 +113,7 @@ void Packet<K>::intersect(const PlacedGroup& placed, unsigned group) {
     ray.ray.id[i] = 0;
     ray.ray.flags[i] = 0;
   }
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  context.instID[0] = group;  // Embree writes it into the hits
-  const int* const valid = kAllLanes<K>.valid.data();
-  if constexpr (K == 16) rtcIntersect16(valid, placed.triangles, &context, &ray);
-  if constexpr (K == 8) rtcIntersect8(valid, placed.triangles, &context, &ray);
-  if constexpr (K == 4) rtcIntersect4(valid, placed.triangles, &context, &ray);
+  embree::intersect<K>(kAllLanes<K>.valid.data(), placed.triangles, group, ray);
 }
 
 template <int K>

@@ -1,12 +1,11 @@
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <Eigen/Geometry>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "esim/backends/raycast/embree.h"
 #include "esim/backends/raycast/ray_blocks.h"
 #include "esim/backends/raycast/raycast_renderer.h"
 #include "esim/backends/raycast/triangle_tree.h"

@@ -143,6 +143,10 @@ herr_t truncate_file(H5FD_t* base, hid_t, hbool_t) {
 H5FD_class_t driver_class() {
   constexpr H5FD_mem_t kOneFreeListForMetadata[H5FD_MEM_NTYPES] = H5FD_FLMAP_DICHOTOMY;
   H5FD_class_t driver{};
+#ifdef H5FD_CLASS_VERSION  // from HDF5 1.14 on, which refuses to register a class that does not state it
+  driver.version = H5FD_CLASS_VERSION;
+  driver.value = H5_VFD_RESERVED;  // the first that is not HDF5's own; 256 to 511 are free for unregistered drivers
+#endif
   driver.name = "esim_output";
   driver.maxaddr = (haddr_t{1} << 62) - 1;
   driver.fc_degree = H5F_CLOSE_WEAK;
@@ -169,6 +173,7 @@ herr_t set_output_driver(hid_t access_list, OutputState& state) {
   static hid_t driver = -1;
   const std::lock_guard lock(mutex);
   if (driver < 0 || H5Iget_type(driver) != H5I_VFL) driver = H5FDregister(&kClass);
+  if (driver < 0) return -1;
   const DriverInfo info{&state};
   return H5Pset_driver(access_list, driver, &info);
 }

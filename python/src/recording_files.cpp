@@ -9,6 +9,7 @@
 #include "bindings.h"
 #include "esim/record/copy_recording.h"
 #include "packet_views.h"
+#include "remedies.h"
 #include "sensor_size.h"
 
 namespace esim::python {
@@ -88,7 +89,7 @@ nb::tuple convert(const fs::path& from, const fs::path& to, const std::optional<
     if (recover) options.read.recover = [&lost](const std::string& problem) { lost.push_back(problem); };
     const CopySummary summary = convert_recording(from, format, to, options, [](double) { return true; });
     for (const auto& [content, count] : summary.copied) copied.emplace(describe(content), count);
-    for (std::string& loss : losses(summary, format)) lost.push_back(std::move(loss));
+    for (const Loss& loss : losses(summary, format)) lost.push_back(with_remedy(loss.what, loss.remedy));
   }
   return nb::make_tuple(copied, lost);
 }

@@ -13,7 +13,6 @@ namespace {
 namespace nb = nanobind;
 
 constexpr double kSignalInterval_s = 0.02;
-constexpr double kUsualPacketRate_hz = 30;
 
 /// Passes everything on to sinks that others own.
 class Both final : public Sink {

@@ -104,6 +104,17 @@ class Architecture(unittest.TestCase):
             found = re.search(r"std::c(out|err)|\bprintf\(|fmt::print|std::exit|\babort\(", path.read_text())
             self.assertIsNone(found, f"{path}: {found and found.group()}")
 
+    def test_messages_of_the_library_name_no_flags(self):
+        """Python's users read them too: a RemediableError lets each interface name its own way out (core/remedy.h)."""
+        commands = {"blender", "dataset", "evaluate", "studio", "video"}  # that only the command line runs, or other programs
+        manual = {"read.h", "schema.h"}  # kSetter, for those who name no other; help of the options, in docs/scenario.md
+        for path in files("*.h") + files("*.cpp"):
+            if module_of(path) in commands or path.name in manual:
+                continue
+            code = re.sub(r"^\s*//.*$", "", path.read_text(), flags=re.MULTILINE)
+            found = re.search(r'"(?:[^"\\\n]|\\.)*(?<![\w-])--[a-z][^"\n]*"', code)
+            self.assertIsNone(found, f"{path}: {found and found.group()}")
+
 
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1], verbosity=1)

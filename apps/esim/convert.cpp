@@ -8,6 +8,7 @@
 #include "esim/record/copy_recording.h"
 #include "esim/record/number_text.h"
 #include "progress_bar.h"
+#include "remedies.h"
 #include "support.h"
 
 namespace esim::app {
@@ -38,7 +39,7 @@ void print_summary(const CopySummary& summary, const Arguments& arguments, doubl
              copied.empty() ? "nothing" : copied, wall_s, arguments.out);
 }
 
-int run(const Arguments& arguments) {
+int run(const Arguments& arguments, const CLI::App& command) {
   if (arguments.list) return list_formats();
   if (arguments.out.empty()) throw UserError("give what to read and what to write: esim convert IN OUT");
   const auto start = std::chrono::steady_clock::now();
@@ -56,7 +57,8 @@ int run(const Arguments& arguments) {
     return !interrupted();
   });
   bar.clear();
-  for (const std::string& loss : losses(summary, format)) fmt::print(stderr, "warning: {}\n", loss);
+  for (const Loss& loss : losses(summary, format))
+    fmt::print(stderr, "warning: {}\n", with_remedy(loss.what, loss.remedy, command));
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
   if (!arguments.quiet) print_summary(summary, arguments, wall.count());
   return interrupted() ? kInterrupted : kOk;
@@ -99,7 +101,7 @@ void add_convert(CLI::App& app, int& exit_code) {
       "  esim convert events.txt events.h5 --width 640 --height 480 --time-unit ns\n"
       "  esim convert cut.h5 whole.h5 --recover                          as far as it can be read\n"
       "  esim convert --list");
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+  command->callback([arguments, command, &exit_code] { exit_code = run(*arguments, *command); });
 }
 
 }  // namespace esim::app

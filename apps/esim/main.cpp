@@ -3,6 +3,7 @@
 
 #include "commands.h"
 #include "esim/core/error.h"
+#include "remedies.h"
 
 int main(int argc, char** argv) {
   using namespace esim::app;
@@ -49,6 +50,9 @@ int main(int argc, char** argv) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
     std::fprintf(stderr, "esim: %s (see esim --help)\n", error.what());
+    return kUsersFault;
+  } catch (const esim::RemediableError& error) {
+    std::fprintf(stderr, "esim: %s\n", with_remedy(error.what(), error.remedy(), app).c_str());
     return kUsersFault;
   } catch (const esim::UserError& error) {
     std::fprintf(stderr, "esim: %s\n", error.what());

@@ -95,12 +95,12 @@ def evaluate(events_path, calibration, gyroscope, predict=None, *, window_s=0.04
     shape = calibration.width, calibration.height
     check, rows, kept = AxesCheck(calibration, gyroscope), [], []
     every = max(1, count // max(keep, 1))
-    reader = esim.EventsIterator(events_path, delta_t=window, start=start, width=shape[0], height=shape[1])
+    reader = esim.EventsIterator(events_path, delta_t=esim.ns(window), start=esim.ns(start), width=shape[0], height=shape[1])
     for index, events in enumerate(itertools.islice(reader, count)):
         if not len(events):
             continue
         t0, t1 = start + index * window, start + (index + 1) * window
-        tensor = esim.event_tensor(events, *shape, t0=t0, t1=t1)
+        tensor = esim.event_tensor(events, *shape, t0=esim.ns(t0), t1=esim.ns(t1))
         truth = calibration.displacement(gyroscope.rotation(t0, t1))
         predicted = np.zeros_like(truth) if predict is None else predict(tensor)
         fired = tensor[:2].sum(axis=0) > 0

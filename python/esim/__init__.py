@@ -1,13 +1,17 @@
 """esim: an open event-camera simulator.
 
-Times are ints in nanoseconds; where a time is asked for, a float is taken as seconds. Irradiance is linear light with
-1 = white; pixel centres are at integer coordinates; T_A_B maps points from frame B to frame A; quaternions are Hamilton,
-x y z w. The guide is `docs/python.md`, the options of scenarios are in `docs/scenario.md`.
+Times that esim gives are ints in nanoseconds. Where it asks for a time, give a float in seconds, or nanoseconds as
+`esim.ns(...)`; a bare int is refused, since it does not say its unit. Irradiance is linear light with 1 = white; pixel
+centres are at integer coordinates; T_A_B maps points from frame B to frame A; quaternions are Hamilton, x y z w. The
+guide is `docs/python.md`, the options of scenarios are in `docs/scenario.md`.
 """
 
 from . import dataset
-from ._errors import Error, InternalError, OutputError
+from ._checks import ns
+from ._core import __version__
+from ._errors import DroppedEventsWarning, Error, InternalError, OutputError
 from ._event_camera import EventCamera, linear_light
+from ._events import Events
 from ._files import EventsIterator, formats, info, load_events, save_events
 from ._pictures import play, space_time_plot, time_surface_picture
 from ._recordings import Recording, convert
@@ -19,7 +23,7 @@ from ._represent import (
     voxel_grid,
 )
 from ._scenario import Scenario
-from ._simulate import CameraPacket, Packet, Renderer, Simulation, simulate
+from ._simulate import CameraPacket, Packet, Renderer, Report, Simulation, simulate
 from ._trajectory import Trajectory
 from ._types import EVENT_DTYPE, IMU_DTYPE, STATE_DTYPE
 
@@ -28,17 +32,21 @@ __all__ = [
     "IMU_DTYPE",
     "STATE_DTYPE",
     "CameraPacket",
+    "DroppedEventsWarning",
     "Error",
     "EventCamera",
+    "Events",
     "EventsIterator",
     "InternalError",
     "OutputError",
     "Packet",
     "Recording",
     "Renderer",
+    "Report",
     "Scenario",
     "Simulation",
     "Trajectory",
+    "__version__",
     "convert",
     "event_count",
     "event_frame",
@@ -47,6 +55,7 @@ __all__ = [
     "info",
     "linear_light",
     "load_events",
+    "ns",
     "play",
     "save_events",
     "simulate",

@@ -1,4 +1,5 @@
 # The public surface, kept by hand; tests/test_stubs.py holds it against the package. Docstrings have shapes and units.
+import datetime
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from os import PathLike
 from types import TracebackType
@@ -10,8 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from . import dataset as dataset
 
 Path: TypeAlias = str | PathLike[str]
-Time: TypeAlias = int | float  # int ns, or float s
-Events: TypeAlias = NDArray[np.void]  # of EVENT_DTYPE, or with the fields t, x, y and p
+Int: TypeAlias = int | np.integer[Any]
+Number: TypeAlias = float | np.floating[Any] | np.integer[Any]
+Duration: TypeAlias = np.timedelta64 | datetime.timedelta
+Time: TypeAlias = float | np.floating[Any] | Duration  # float s; esim.ns() for ints
+EventsLike: TypeAlias = NDArray[np.void]  # of EVENT_DTYPE, or with the fields t, x, y and p
+
+__version__: str
 
 EVENT_DTYPE: np.dtype[np.void]
 IMU_DTYPE: np.dtype[np.void]
@@ -20,6 +26,14 @@ STATE_DTYPE: np.dtype[np.void]
 class Error(ValueError): ...
 class OutputError(Error, OSError): ...
 class InternalError(RuntimeError): ...
+class DroppedEventsWarning(UserWarning): ...
+
+class Events(NDArray[np.void]):
+    width: int | None
+    height: int | None
+    def __new__(cls, events: EventsLike, width: Int | None = None, height: Int | None = None) -> Events: ...
+
+def ns(t: ArrayLike) -> Any: ...
 
 class Scenario:
     def __init__(self, options: Mapping[str, Any], *, folder: Path | None = None) -> None: ...
@@ -35,13 +49,13 @@ class Trajectory:
         t: ArrayLike,
         poses: ArrayLike | tuple[ArrayLike, ArrayLike],
         *,
-        order: int = 5,
-        knot_interval_s: float = 0.0,
-        smoothing_time_s: float = 0.0,
+        order: Int = 5,
+        knot_interval_s: Number = 0.0,
+        smoothing_time_s: Number = 0.0,
     ) -> Trajectory: ...
     @classmethod
     def load(
-        cls, path: Path, *, order: int = 5, knot_interval_s: float = 0.0, smoothing_time_s: float = 0.0
+        cls, path: Path, *, order: Int = 5, knot_interval_s: Number = 0.0, smoothing_time_s: Number = 0.0
     ) -> Trajectory: ...
     @property
     def start(self) -> int: ...
@@ -54,7 +68,7 @@ class Trajectory:
 
 class EventCamera:
     def __init__(
-        self, width: int, height: int, preset: str | None = None, *, seed: int = 0, threads: int = 0, **options: Any
+        self, width: Int, height: Int, preset: str | None = None, *, seed: Int = 0, threads: Int = 0, **options: Any
     ) -> None: ...
     def process(self, frame: NDArray[np.floating], t: Time) -> Events: ...
     @property
@@ -98,6 +112,12 @@ class Renderer:
         objects: Mapping[str, Trajectory] | None = None,
     ) -> None: ...
 
+class Report(dict[str, Any]):
+    @property
+    def dropped(self) -> dict[str, int]: ...
+    @property
+    def notices(self) -> list[str]: ...
+
 class Simulation(Iterator[Packet]):
     start: int
     end: int
@@ -105,10 +125,10 @@ class Simulation(Iterator[Packet]):
     objects: list[str]
     def __iter__(self) -> Simulation: ...
     def __next__(self) -> Packet: ...
-    def run(self) -> dict[str, Any]: ...
+    def run(self) -> Report: ...
     def close(self) -> None: ...
     @property
-    def report(self) -> dict[str, Any] | None: ...
+    def report(self) -> Report | None: ...
     def __enter__(self) -> Simulation: ...
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -118,11 +138,11 @@ def simulate(
     scenario: Path | Mapping[str, Any] | Scenario,
     *,
     overrides: Mapping[str, Any] | Iterable[str] | None = None,
-    threads: int = 0,
-    seed: int | None = None,
+    threads: Int = 0,
+    seed: Int | None = None,
     out: Path | None = None,
     force: bool = False,
-    packet_s: Time | None = None,
+    packet_s: Number | None = None,
     trajectory: Trajectory | None = None,
     renderer: Renderer | Callable[..., Mapping[str, ArrayLike]] | None = None,
 ) -> Simulation: ...
@@ -132,11 +152,11 @@ class EventsIterator(Iterator[Events]):
         self,
         path: Path,
         delta_t: Time | None = None,
-        n_events: int | None = None,
+        n_events: Int | None = None,
         *,
         start: Time | None = None,
-        width: int | None = None,
-        height: int | None = None,
+        width: Int | None = None,
+        height: Int | None = None,
     ) -> None: ...
     @property
     def size(self) -> tuple[int, int] | None: ...
@@ -147,10 +167,10 @@ class Recording(Iterator[Packet]):
     def __init__(
         self,
         path: Path,
-        packet_s: Time = 0.1,
+        packet_s: Number | None = None,
         *,
-        width: int | None = None,
-        height: int | None = None,
+        width: Int | None = None,
+        height: Int | None = None,
         recover: bool = False,
     ) -> None: ...
     @property
@@ -169,45 +189,57 @@ def convert(
     recover: bool = False,
     force: bool = False,
 ) -> dict[str, int]: ...
-def load_events(path: Path, *, width: int | None = None, height: int | None = None) -> Events: ...
-def save_events(path: Path, events: Events, width: int, height: int, *, format: str | None = None) -> None: ...
+def load_events(path: Path, *, width: Int | None = None, height: Int | None = None) -> Events: ...
+def save_events(
+    path: Path, events: EventsLike, width: Int | None = None, height: Int | None = None, *, format: str | None = None
+) -> None: ...
 def info(path: Path) -> dict[str, Any]: ...
 def formats() -> list[dict[str, Any]]: ...
-def event_count(events: Events, width: int, height: int) -> NDArray[np.int32]: ...
+def event_count(events: EventsLike, width: Int | None = None, height: Int | None = None) -> NDArray[np.int32]: ...
 def event_tensor(
-    events: Events,
-    width: int,
-    height: int,
+    events: EventsLike,
+    width: Int | None = None,
+    height: Int | None = None,
     *,
     t0: Time | None = None,
     t1: Time | None = None,
     stamp: Literal["last", "mean"] = "last",
 ) -> NDArray[np.float32]: ...
 def voxel_grid(
-    events: Events,
-    width: int,
-    height: int,
-    bins: int,
+    events: EventsLike,
+    width: Int | None = None,
+    height: Int | None = None,
+    bins: Int = 5,
     *,
     t0: Time | None = None,
     t1: Time | None = None,
     normalise: bool = False,
 ) -> NDArray[np.float32]: ...
 def time_surface(
-    events: Events, width: int, height: int, *, t: Time | None = None, tau_s: float = 0.03
+    events: EventsLike,
+    width: Int | None = None,
+    height: Int | None = None,
+    *,
+    t: Time | None = None,
+    tau_s: Number = 0.03,
 ) -> NDArray[np.float32]: ...
-def event_frame(events: Events, width: int, height: int) -> NDArray[np.uint8]: ...
+def event_frame(events: EventsLike, width: Int | None = None, height: Int | None = None) -> NDArray[np.uint8]: ...
 def time_surface_picture(
-    events: Events, width: int, height: int, *, t: Time | None = None, tau_s: float = 0.03
+    events: EventsLike,
+    width: Int | None = None,
+    height: Int | None = None,
+    *,
+    t: Time | None = None,
+    tau_s: Number = 0.03,
 ) -> NDArray[np.uint8]: ...
 def space_time_plot(
-    events: Events,
-    width: int,
-    height: int,
+    events: EventsLike,
+    width: Int | None = None,
+    height: Int | None = None,
     *,
     size: tuple[int, int] = (960, 720),
-    yaw_deg: float = 35.0,
-    pitch_deg: float = 20.0,
+    yaw_deg: Number = 35.0,
+    pitch_deg: Number = 20.0,
 ) -> NDArray[np.uint8]: ...
 
 class play(Iterator[NDArray[np.uint8]]):
@@ -218,19 +250,19 @@ class play(Iterator[NDArray[np.uint8]]):
         *,
         views: str | list[str] | None = None,
         camera: str | None = None,
-        at_s: float | None = None,
-        fps: float = 30.0,
-        slow_motion: float | None = None,
-        start_s: float = 0.0,
-        duration_s: float | None = None,
-        window_s: float | None = None,
-        window_events: int | None = None,
-        tau_s: float | None = None,
-        span_s: float | None = None,
-        size: int | None = None,
+        at_s: Number | None = None,
+        fps: Number = 30.0,
+        slow_motion: Number | None = None,
+        start_s: Number = 0.0,
+        duration_s: Number | None = None,
+        window_s: Number | None = None,
+        window_events: Int | None = None,
+        tau_s: Number | None = None,
+        span_s: Number | None = None,
+        size: Int | None = None,
         light: bool = False,
-        width: int | None = None,
-        height: int | None = None,
+        width: Int | None = None,
+        height: Int | None = None,
     ) -> None: ...
     def __len__(self) -> int: ...
     def __next__(self) -> NDArray[np.uint8]: ...

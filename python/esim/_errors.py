@@ -9,5 +9,9 @@ class OutputError(Error, OSError):
     """An output could not be written, for example because the disk is full."""
 
 
+class DroppedEventsWarning(UserWarning):
+    """A simulation lost events; the message says how many, and which options govern it."""
+
+
 class InternalError(RuntimeError):
     """A defect of esim."""

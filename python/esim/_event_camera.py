@@ -2,15 +2,19 @@
 
 import numpy as np
 
-from . import _core
+from . import _checks, _core
+from ._errors import Error
+from ._events import of_bytes
 from ._scenario import to_overrides
-from ._types import EVENT_DTYPE, to_ns
 
 _FLOAT32 = np.dtype(np.float32)
 
 
 class EventCamera:
     """An event camera that is given frames: between two of them, brightness goes straight.
+
+    A copy, of `copy.copy` or of a pickle, goes on where the camera is: given the same frames, both give the same events.
+    A pickle is for the version of esim that made it.
 
     Parameters
     ----------
@@ -34,8 +38,18 @@ class EventCamera:
     def __init__(self, width, height, preset=None, *, seed=0, threads=0, **options):
         if preset is not None:
             options = {"preset": preset, **options}
-        named = {f"event_camera.{key}": value for key, value in options.items()}
-        self._core = _core.EventCamera(width, height, to_overrides(named), seed, threads)
+        self._options = dict(options)
+        self._make(
+            _checks.sensor_size(width, height),
+            to_overrides({f"event_camera.{key}": value for key, value in options.items()}),
+            _checks.seed(seed),
+            _checks.threads(threads),
+        )
+
+    def _make(self, size, overrides, seed, threads):
+        self._made = size, overrides, seed, threads
+        self._shape = size[::-1]
+        self._core = _core.EventCamera(*size, overrides, seed, threads)
 
     def process(self, frame, t):
         """The events since the frame before; none for the first one.
@@ -45,12 +59,12 @@ class EventCamera:
         frame : numpy.ndarray, float32, shape (height, width)
             Irradiance: linear light, 0 and above, 1 = white. Read in place where it is C-contiguous float32; other
             floats are converted. Pictures of 8 bits are not linear light: `esim.linear_light` makes it of them.
-        t : int or float
-            Time of the frame, int ns or float s, after the one before.
+        t : float, or numpy.timedelta64 such as esim.ns()
+            Time of the frame, s, after the one before.
 
         Returns
         -------
-        numpy.ndarray of esim.EVENT_DTYPE, shape (N,)
+        esim.Events, shape (N,)
             In order of time; a view of memory that belongs to the array.
 
         Raises
@@ -59,24 +73,36 @@ class EventCamera:
             For frames of another size, values that are no irradiance, times out of order. The camera is then as before.
         """
         if not (
-            isinstance(frame, np.ndarray) and frame.dtype == _FLOAT32 and frame.ndim == 2 and frame.flags.c_contiguous
+            isinstance(frame, np.ndarray)
+            and frame.dtype == _FLOAT32
+            and frame.shape == self._shape
+            and frame.flags.c_contiguous
         ):
-            frame = _to_frame(frame)
-        return self._core.process(frame, to_ns(t)).view(EVENT_DTYPE)
+            frame = _checks.irradiance(frame, "frame", self._shape)
+        return of_bytes(self._core.process(frame, _checks.time(t)), *self._made[0])
 
     @property
     def dropped(self):
         """int: events that the readout has dropped, because its queue was full."""
         return self._core.statistics()[0]
 
+    def __getstate__(self):
+        return {"version": _core.__version__, "options": self._options, "made": self._made, "state": self._core.state()}
 
-def _to_frame(frame):
-    frame = np.asarray(frame)
-    if frame.dtype.kind != "f":
-        raise TypeError(f"a frame is float32, linear light with 1 = white, not {frame.dtype}; see esim.linear_light()")
-    if frame.ndim != 2:
-        raise ValueError(f"a frame has the shape (height, width), not {frame.shape}")
-    return np.ascontiguousarray(frame, np.float32)
+    def __setstate__(self, state):
+        if state["version"] != _core.__version__:
+            raise Error(
+                f"an event camera that esim {state['version']} pickled cannot go on in esim {_core.__version__}; "
+                "make a new one"
+            )
+        self._options = state["options"]
+        self._make(*state["made"])
+        self._core.restore(state["state"])
+
+    def __repr__(self):
+        (width, height), _, seed, _ = self._made
+        options = "".join(f", {name}={value!r}" for name, value in self._options.items())
+        return f"<esim.EventCamera {width} x {height} px{options}, seed={seed}>"
 
 
 def linear_light(image):
@@ -92,11 +118,7 @@ def linear_light(image):
     numpy.ndarray, float32, shape (height, width)
         Linear light, 1 = white.
     """
-    image = np.asarray(image)
-    if image.dtype not in (np.uint8, np.uint16):
-        raise TypeError(f"a picture is uint8 or uint16, not {image.dtype}")
-    if not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)):
-        raise ValueError(f"a picture has the shape (height, width) or (height, width, 3), not {image.shape}")
+    image = _checks.picture(image)
     code = np.arange(np.iinfo(image.dtype).max + 1) / np.iinfo(image.dtype).max
     light = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(np.float32)[image]
     return light if image.ndim == 2 else light @ np.float32([0.2126, 0.7152, 0.0722])

@@ -2,8 +2,11 @@
 
 import os
 
-from . import _core
-from ._types import EVENT_DTYPE, as_bytes, to_ns
+from . import _checks, _core
+from ._errors import Error
+from ._events import as_bytes, of_bytes, size_of
+
+_ALL = (1 << 63) - 1
 
 
 class EventsIterator:
@@ -13,18 +16,18 @@ class EventsIterator:
     ----------
     path : path
         A file of any format in `esim.formats()` that is read, a recording of one camera, or a camera's folder in it.
-    delta_t : int or float, optional
-        Portions are [start + k delta_t, start + (k + 1) delta_t), also where nothing happened; int ns or float s.
+    delta_t : float, or numpy.timedelta64 such as esim.ns(), optional
+        Portions are [start + k delta_t, start + (k + 1) delta_t), also where nothing happened; s.
     n_events : int, optional
         Portions are of so many events, the last one of fewer. Without either, portions are as they come.
-    start : int or float, optional
-        Where portions of delta_t begin; events before are passed over. The first event's time otherwise.
+    start : float, or numpy.timedelta64 such as esim.ns(), optional
+        Where portions of delta_t begin, s; events before are passed over. The first event's time otherwise.
     width, height : int, optional
         Of the sensor, in place of what the file says.
 
     Yields
     ------
-    numpy.ndarray of esim.EVENT_DTYPE, shape (N,)
+    esim.Events, shape (N,)
 
     Raises
     ------
@@ -34,17 +37,16 @@ class EventsIterator:
 
     def __init__(self, path, delta_t=None, n_events=None, *, start=None, width=None, height=None):
         if delta_t is not None and n_events is not None:
-            raise ValueError("give delta_t or n_events, not both")
-        if delta_t is not None and to_ns(delta_t) <= 0:
-            raise ValueError("delta_t is above 0")
-        if n_events is not None and n_events <= 0:
-            raise ValueError("n_events is above 0")
+            raise Error("give delta_t or n_events, not both")
         if start is not None and delta_t is None:
-            raise ValueError("start goes with delta_t")
-        self._core = _core.EventReader(os.fspath(path), width, height)
-        self._delta_t = None if delta_t is None else to_ns(delta_t)
-        self._count = 1 << 17 if n_events is None else n_events
-        self._start = None if start is None else to_ns(start)
+            raise Error("start goes with delta_t")
+        self._delta_t = None if delta_t is None else _checks.time(delta_t, "delta_t")
+        if self._delta_t is not None and self._delta_t <= 0:
+            raise Error("delta_t must be above 0")
+        self._count = 1 << 17 if n_events is None else _checks.whole(n_events, "n_events", 1, _ALL)
+        self._start = None if start is None else _checks.time(start, "start")
+        self._core = _core.EventReader(os.fspath(path), *_checks.optional_sensor_size(width, height))
+        self._size = self._core.sensor() or (None, None)
 
     @property
     def size(self):
@@ -59,7 +61,7 @@ class EventsIterator:
             events = self._core.take(self._count)
             if not len(events):
                 raise StopIteration
-            return events.view(EVENT_DTYPE)
+            return of_bytes(events, *self._size)
         first = self._core.next_time()
         if first is None:
             raise StopIteration
@@ -69,7 +71,7 @@ class EventsIterator:
             self._core.skip_before(self._start)
             return next(self)
         self._start += self._delta_t
-        return self._core.take_before(self._start).view(EVENT_DTYPE)
+        return of_bytes(self._core.take_before(self._start), *self._size)
 
 
 def load_events(path, *, width=None, height=None):
@@ -82,12 +84,14 @@ def load_events(path, *, width=None, height=None):
 
     Returns
     -------
-    numpy.ndarray of esim.EVENT_DTYPE, shape (N,)
+    esim.Events, shape (N,)
+        With the size of the sensor, where it is known.
     """
-    return _core.EventReader(os.fspath(path), width, height).take((1 << 63) - 1).view(EVENT_DTYPE)
+    reader = _core.EventReader(os.fspath(path), *_checks.optional_sensor_size(width, height))
+    return of_bytes(reader.take(_ALL), *(reader.sensor() or (None, None)))
 
 
-def save_events(path, events, width, height, *, format=None):
+def save_events(path, events, width=None, height=None, *, format=None):
     """Writes events to a file; one that is there is replaced.
 
     Parameters
@@ -95,8 +99,8 @@ def save_events(path, events, width, height, *, format=None):
     path : path
     events : numpy.ndarray, shape (N,)
         Structured, with the fields t (int, ns), x, y and p, in order of time.
-    width, height : int
-        Of the sensor, px.
+    width, height : int, optional
+        Of the sensor, px; of `esim.Events`, what they know otherwise.
     format : str, optional
         A name from `esim.formats()`; by the path's extension otherwise.
 
@@ -107,7 +111,7 @@ def save_events(path, events, width, height, *, format=None):
     esim.OutputError
         Where the file cannot be written.
     """
-    _core.save_events(os.fspath(path), as_bytes(events), width, height, format)
+    _core.save_events(os.fspath(path), as_bytes(events), *size_of(events, width, height), format)
 
 
 def info(path):

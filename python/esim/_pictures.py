@@ -2,12 +2,12 @@
 
 import os
 
-from . import _core
-from ._represent import _span
-from ._types import as_bytes, to_events
+from . import _checks, _core
+from ._events import as_bytes, size_of, to_layout
+from ._represent import moment
 
 
-def time_surface_picture(events, width, height, *, t=None, tau_s=0.03):
+def time_surface_picture(events, width=None, height=None, *, t=None, tau_s=0.03):
     """A time surface for people: each pixel in the colour of its last event until t, ON orange and OFF blue, faded.
 
     Parameters
@@ -22,11 +22,12 @@ def time_surface_picture(events, width, height, *, t=None, tau_s=0.03):
     numpy.ndarray, uint8, shape (height, width, 3)
         Red, green, blue.
     """
-    events = to_events(events)
-    return _core.time_surface_picture(as_bytes(events), width, height, _span(events, None, t)[1], float(tau_s))
+    size, tau = size_of(events, width, height), _checks.seconds(tau_s, "tau_s", above=0)
+    events = to_layout(events)
+    return _core.time_surface_picture(as_bytes(events), *size, moment(events, t), tau)
 
 
-def space_time_plot(events, width, height, *, size=(960, 720), yaw_deg=35.0, pitch_deg=20.0):
+def space_time_plot(events, width=None, height=None, *, size=(960, 720), yaw_deg=35.0, pitch_deg=20.0):
     """Events as points in x, y and time, between axes, as `esim play` shows them.
 
     Parameters
@@ -43,7 +44,15 @@ def space_time_plot(events, width, height, *, size=(960, 720), yaw_deg=35.0, pit
     numpy.ndarray, uint8, shape (size[1], size[0], 3)
         Red, green, blue.
     """
-    return _core.space_time_plot(as_bytes(to_events(events)), width, height, *size, float(yaw_deg), float(pitch_deg))
+    columns, rows = size
+    return _core.space_time_plot(
+        as_bytes(events),
+        *size_of(events, width, height),
+        _checks.whole(columns, "width in size", 64, 16384),
+        _checks.whole(rows, "height in size", 64, 16384),
+        _checks.number(yaw_deg, "yaw_deg"),
+        _checks.number(pitch_deg, "pitch_deg"),
+    )
 
 
 class play:
@@ -106,24 +115,26 @@ class play:
         width=None,
         height=None,
     ):
-        for name, value in (("fps", fps), ("slow_motion", slow_motion), ("duration_s", duration_s)):
-            if value is not None and not 0 < value < 1e9:
-                raise ValueError(f"{name} is above 0")
+        width, height = _checks.optional_sensor_size(width, height)
+
+        def seconds(value, name):
+            return None if value is None else _checks.seconds(value, name, above=0)
+
         self._core = _core.open_pages(
             os.fspath(path),
             [views] if isinstance(views, str) else list(views or []),
             camera or "",
-            fps=float(fps),
-            slow_motion=float(slow_motion or 0),
-            window_s=float(window_s or 0),
-            window_events=int(window_events or 0),
-            tau_s=float(tau_s or 0),
-            span_s=float(span_s or 0),
-            start_s=float(start_s),
-            duration_s=duration_s,
-            at_s=at_s,
-            size=int(size or 0),
-            light=bool(light),
+            fps=_checks.number(fps, "fps", above=0, high=1e9),
+            slow_motion=0.0 if slow_motion is None else _checks.number(slow_motion, "slow_motion", above=0, high=1e9),
+            window_s=seconds(window_s, "window_s") or 0.0,
+            window_events=0 if window_events is None else _checks.whole(window_events, "window_events", 1, 2**40),
+            tau_s=seconds(tau_s, "tau_s") or 0.0,
+            span_s=seconds(span_s, "span_s") or 0.0,
+            start_s=_checks.seconds(start_s, "start_s", low=0),
+            duration_s=seconds(duration_s, "duration_s"),
+            at_s=None if at_s is None else _checks.seconds(at_s, "at_s", low=0),
+            size=0 if size is None else _checks.whole(size, "size", 1, 16384),
+            light=_checks.flag(light, "light"),
             width=width,
             height=height,
         )

@@ -3,9 +3,8 @@
 import os
 import warnings
 
-from . import _core
+from . import _checks, _core
 from ._simulate import Packet
-from ._types import to_ns
 
 
 class Recording:
@@ -15,8 +14,9 @@ class Recording:
     ----------
     path : path
         Of any format in `esim.formats()` that is read.
-    packet_s : int or float
-        Length of packets, int ns or float s.
+    packet_s : float, optional
+        Length of packets, s. Otherwise as of a simulation: each lasts until the next frame of ground truth where the
+        recording is a folder that has some, and 1/30 s elsewhere.
     width, height : int, optional
         Of the sensor, in place of what the file says.
     recover : bool
@@ -32,11 +32,14 @@ class Recording:
         Naming file and place, for damaged ones.
     """
 
-    def __init__(self, path, packet_s=0.1, *, width=None, height=None, recover=False):
-        packet = to_ns(packet_s)
-        if packet <= 0:
-            raise ValueError("packet_s is above 0")
-        self._core = _core.RecordingReader(os.fspath(path), packet, width, height, recover)
+    def __init__(self, path, packet_s=None, *, width=None, height=None, recover=False):
+        self._core = _core.RecordingReader(
+            os.fspath(path),
+            _checks.packet_length(packet_s),
+            *_checks.optional_sensor_size(width, height),
+            _checks.flag(recover, "recover"),
+        )
+        self._cameras = self.info["cameras"]
         self._warned = 0
 
     @property
@@ -55,7 +58,7 @@ class Recording:
             warnings.warn(problem, stacklevel=2)
         if parts is None:
             raise StopIteration
-        return Packet(parts)
+        return Packet(parts, self._cameras)
 
 
 def convert(
@@ -88,10 +91,15 @@ def convert(
     ------
     esim.Error, esim.OutputError
     """
-    if time_unit not in ("us", "ns"):
-        raise ValueError('time_unit is "us" or "ns"')
     copied, lost = _core.convert(
-        os.fspath(source), os.fspath(target), format, camera or "", from_zero, time_unit == "ns", recover, force
+        os.fspath(source),
+        os.fspath(target),
+        format,
+        camera or "",
+        _checks.flag(from_zero, "from_zero"),
+        _checks.one_of(time_unit, "time_unit", ("us", "ns")) == "ns",
+        _checks.flag(recover, "recover"),
+        _checks.flag(force, "force"),
     )
     for loss in lost:
         warnings.warn(loss, stacklevel=2)

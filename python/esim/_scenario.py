@@ -37,6 +37,9 @@ def to_overrides(options):
 class Scenario:
     """Everything that determines a simulation; `docs/scenario.md` lists the options.
 
+    A copy is independent. A pickle holds what was given, text and changes, and reads it again: relative paths are those
+    of the process that does so.
+
     Parameters
     ----------
     options : dict
@@ -118,8 +121,16 @@ class Scenario:
         """
         return self._values.to_yaml()
 
+    def __getstate__(self):
+        return {"text": self._text, "overrides": list(self._overrides)}
+
+    def __setstate__(self, state):
+        self._text, self._overrides = state["text"], list(state["overrides"])
+        self._values = self._read([])
+
     def __repr__(self):
-        return f"<esim.Scenario {self._text[1]}>"
+        changes = "".join(f", {override}" for override in self._overrides)
+        return f"<esim.Scenario {self._text[1]}: {self._values.describe()}{changes}>"
 
 
 def to_scenario(scenario):

@@ -4,12 +4,11 @@ import json
 import os
 import warnings
 
-import numpy as np
-
-from . import _core
-from ._errors import Error
+from . import _checks, _core
+from ._errors import DroppedEventsWarning, Error
+from ._events import of_bytes
 from ._scenario import to_overrides, to_scenario
-from ._types import EVENT_DTYPE, IMU_DTYPE, STATE_DTYPE, to_ns
+from ._types import IMU_DTYPE, STATE_DTYPE
 
 
 class CameraPacket:
@@ -17,7 +16,7 @@ class CameraPacket:
 
     Attributes
     ----------
-    events : numpy.ndarray of esim.EVENT_DTYPE
+    events : esim.Events
     truth_t : int64, shape (N,)
         Times of ground truth, ns.
     pose : float64, shape (N, 4, 4)
@@ -55,8 +54,8 @@ class CameraPacket:
         "images image_t exposure_start exposure trigger_t trigger_kind"
     ).split()
 
-    def __init__(self, parts):
-        self.events = parts["events"].view(EVENT_DTYPE)
+    def __init__(self, parts, width, height):
+        self.events = of_bytes(parts["events"], width, height)
         self.truth_t = parts["t"]
         self.displacement_t = parts["displacement_span"]
         for name in self.__slots__:
@@ -66,6 +65,8 @@ class CameraPacket:
 
 class Packet:
     """What happened after `t0`, until `t1`; the first packet includes t0. Arrays own their memory.
+
+    The first packet begins at the start, each other one where the one before ends, and the last one ends at the end.
 
     What a camera recorded is an attribute of the packet itself where there is one camera: `packet.events`; with several
     it is that of `packet["name"].events`.
@@ -83,9 +84,12 @@ class Packet:
         Empty where there is no IMU.
     """
 
-    def __init__(self, parts):
+    def __init__(self, parts, cameras):
         self.t0, self.t1 = parts["t0"], parts["t1"]
-        self.cameras = {name: CameraPacket(camera) for name, camera in parts["cameras"].items()}
+        self.cameras = {
+            name: CameraPacket(camera, cameras[name]["width"], cameras[name]["height"])
+            for name, camera in parts["cameras"].items()
+        }
         self.body = parts["body"].view(STATE_DTYPE)
         self.objects = parts["objects"]
         self.imu = parts["imu"].view(IMU_DTYPE)
@@ -118,8 +122,8 @@ class Renderer:
         `render(t, T_world_camera, T_world_objects)` with t in ns, a matrix (4, 4), and a list of one for each object.
         Returns a dict of arrays of the camera's size:
 
-        - `irradiance`, (height, width): linear light, 1 = white;
-        - `depth`, (height, width): along the optical axis, m; inf where nothing is seen;
+        - `irradiance`, (height, width) floats: linear light, 1 = white; `esim.linear_light` makes it of 8-bit pictures;
+        - `depth`, (height, width) floats: along the optical axis, m; inf where nothing is seen;
         - `flow`, (2, height, width), optional: the motion field, px/s. Without, it is computed from depth and motion;
         - `object`, (height, width) ints, where objects move and flow is not given: 0, or i + 1 where object i is seen.
 
@@ -141,32 +145,50 @@ class Renderer:
         unknown = set(images) - {"irradiance", "depth", "flow", "object"}
         if unknown:
             raise Error(f"render() gives irradiance, depth, flow and object, not {', '.join(sorted(unknown))}")
-        irradiance = _image(images, "irradiance", shape)
-        depth = _image(images, "depth", shape)
-        if not (depth > 0).all():
-            raise Error(f"render() at {t} ns: depth is above 0 everywhere; inf where nothing is seen")
-        flow = _image(images, "flow", (2, *shape)) if "flow" in images else None
-        seen = _image(images, "object", shape, np.uint16) if "object" in images else None
-        if self.objects and flow is None and seen is None:
+        missing = {"irradiance", "depth"} - set(images)
+        if missing:
+            raise Error(f"render() gives no {' and no '.join(sorted(missing))}")
+        if self.objects and not {"flow", "object"} & set(images):
             raise Error("render() gives neither flow nor object: which pixels see what moves?")
-        if seen is not None and seen.max() > len(self.objects):
-            raise Error(f"render() at {t} ns: object {seen.max()} of {len(self.objects)}; 0 stands for none")
-        return irradiance, depth, flow, seen
+
+        def checked(name, check, *arguments):
+            return check(images[name], f"render() at {t} ns: {name}", *arguments) if name in images else None
+
+        return (
+            checked("irradiance", _checks.rendered_irradiance, shape),
+            checked("depth", _checks.depth, shape),
+            checked("flow", _checks.motion_field, (2, *shape)),
+            checked("object", _checks.labels, shape, len(self.objects)),
+        )
 
 
-def _image(images, name, shape, dtype=np.float32):
-    if name not in images:
-        raise Error(f"render() gives no {name}")
-    image = np.asarray(images[name])
-    if image.shape != shape:
-        raise Error(f"render() gives {name} of shape {image.shape}, but the camera's is {shape}")
-    return np.ascontiguousarray(image, dtype)
+class Report(dict):
+    """What a simulation did, and at which cost: the content of a recording's `report.json`.
+
+    Attributes
+    ----------
+    dropped : dict of str to int
+        Of each camera, by its name, the events that its readout has dropped, because its queue was full.
+    notices : list of str
+        What was warned of or noted.
+    """
+
+    @property
+    def dropped(self):
+        """dict of str to int: events that the readout of each camera has dropped."""
+        return {camera["name"]: camera["events_dropped_by_readout"] for camera in self["cameras"]}
+
+    @property
+    def notices(self):
+        """list of str: what was warned of or noted."""
+        return self["notices"]
 
 
 class Simulation:
     """A simulation under way: an iterator over its packets. Made by `simulate`.
 
     Also a context manager, which ends it: a recording that is being written is then finished as an interrupted one.
+    Where events were lost, the end is a `DroppedEventsWarning`.
 
     Attributes
     ----------
@@ -180,6 +202,7 @@ class Simulation:
 
     def __init__(self, core):
         self._core = core
+        self._told = 0
         for text in core.warnings():
             warnings.warn(text, stacklevel=3)
         info = core.info()
@@ -193,36 +216,46 @@ class Simulation:
     def __next__(self):
         parts = self._core.next()
         if parts is None:
+            self._warn_of_losses()
             raise StopIteration
-        return Packet(parts)
+        return Packet(parts, self.cameras)
 
     def run(self):
         """Simulates to the end, keeping nothing but the recording that is being written.
 
         Returns
         -------
-        dict
-            The report.
+        Report
         """
-        for _ in self:
+        while self._core.next() is not None:
             pass
+        self._warn_of_losses()
         return self.report
 
     def close(self):
         """Ends the simulation where it is."""
         self._core.close()
+        self._warn_of_losses()
+
+    def _warn_of_losses(self):
+        """Once; called by what users call."""
+        losses = self._core.losses()[self._told :]
+        self._told += len(losses)
+        for loss in losses:
+            warnings.warn(loss, DroppedEventsWarning, stacklevel=3)
 
     @property
     def report(self):
-        """dict or None: what was done, and at which cost (`report.json` of recordings); None before the end."""
+        """Report or None: what was done, and at which cost (`report.json` of recordings); None before the end."""
         text = self._core.report()
-        return json.loads(text) if text else None
+        return Report(json.loads(text)) if text else None
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
-        self.close()
+        self._core.close()
+        self._warn_of_losses()
 
 
 def simulate(
@@ -253,9 +286,9 @@ def simulate(
         Folder to write a recording to, as `esim simulate` does.
     force : bool
         Replace an earlier recording there.
-    packet_s : int or float, optional
-        Length of packets (int ns, float s). Otherwise each lasts until the next frame of ground truth, or 1/30 s where
-        the scenario has none.
+    packet_s : float, optional
+        Length of packets, s. Otherwise each lasts until the next frame of ground truth, or 1/30 s where the scenario has
+        none.
     trajectory : Trajectory, optional
         Of the body, in place of the scenario's, which need not have one.
     renderer : Renderer or callable, optional
@@ -277,12 +310,9 @@ def simulate(
         renderer = Renderer(renderer)
     values = to_scenario(scenario)._read(to_overrides(overrides), renderer is None, trajectory is None)
     if seed is not None:
-        values.seed = seed
+        values.seed = _checks.seed(seed)
     given = [name for name, part in (("renderer", renderer), ("trajectory", trajectory)) if part is not None]
     origin = "".join(f"# The {name} was given by a program: what stands under {name} was not used.\n" for name in given)
-    packet = 0 if packet_s is None else to_ns(packet_s)
-    if packet_s is not None and packet <= 0:
-        raise ValueError("packet_s is above 0")
     return Simulation(
         _core.Simulation(
             values,
@@ -290,9 +320,9 @@ def simulate(
             None if renderer is None else renderer._checked,
             [] if renderer is None else [(name, motion._core) for name, motion in renderer.objects.items()],
             origin,
-            threads,
-            packet,
+            _checks.threads(threads),
+            _checks.packet_length(packet_s),
             "" if out is None else os.fspath(out),
-            force,
+            _checks.flag(force, "force"),
         )
     )

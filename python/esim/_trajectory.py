@@ -4,8 +4,9 @@ import os
 
 import numpy as np
 
-from . import _core
-from ._types import STATE_DTYPE, to_ns_array
+from . import _checks, _core
+from ._errors import Error
+from ._types import STATE_DTYPE
 
 
 def matrices(position, orientation):
@@ -21,7 +22,10 @@ def matrices(position, orientation):
 
 
 class Trajectory:
-    """A smooth motion, T_world_body over time. Made by `from_poses` and `load`."""
+    """A smooth motion, T_world_body over time. Made by `from_poses` and `load`.
+
+    It never changes. A pickle holds the poses that it was made of, and fits them again.
+    """
 
     def __init__(self):
         raise TypeError("use Trajectory.from_poses() or Trajectory.load()")
@@ -39,7 +43,7 @@ class Trajectory:
         Parameters
         ----------
         t : array_like, shape (N,)
-            Times, increasing: ints are ns, floats are s.
+            Times, increasing: floats, s, or numpy.timedelta64 such as esim.ns().
         poses : array_like, shape (N, 4, 4), or a pair of shapes (N, 3) and (N, 4)
             T_world_body: homogeneous matrices, or positions (m) and quaternions (Hamilton, x y z w; any length but 0).
             A camera looks along its z axis, x to the right.
@@ -59,7 +63,7 @@ class Trajectory:
         esim.Error
             For fewer than two poses, times that do not increase, matrices that are no poses.
         """
-        t = to_ns_array(t)
+        t = _checks.times(t)
         if isinstance(poses, tuple):
             position, orientation = (np.asarray(part, np.float64) for part in poses)
             norm = np.linalg.norm(orientation, axis=-1, keepdims=True)
@@ -68,8 +72,8 @@ class Trajectory:
         else:
             T = np.ascontiguousarray(poses, np.float64)
         if t.ndim != 1 or T.shape != (len(t), 4, 4):
-            raise ValueError(f"{t.shape} times do not fit poses of shape {T.shape}; give (N,) and (N, 4, 4)")
-        return cls._of(_core.Trajectory.from_matrices(t, T, order, knot_interval_s, smoothing_time_s))
+            raise Error(f"{t.shape} times do not fit poses of shape {T.shape}; give (N,) and (N, 4, 4)")
+        return cls._of(_core.Trajectory.from_matrices(t, T, *_fit(order, knot_interval_s, smoothing_time_s)))
 
     @classmethod
     def load(cls, path, *, order=5, knot_interval_s=0.0, smoothing_time_s=0.0):
@@ -85,7 +89,7 @@ class Trajectory:
         -------
         Trajectory
         """
-        return cls._of(_core.Trajectory.from_file(os.fspath(path), order, knot_interval_s, smoothing_time_s))
+        return cls._of(_core.Trajectory.from_file(os.fspath(path), *_fit(order, knot_interval_s, smoothing_time_s)))
 
     @property
     def start(self):
@@ -107,7 +111,7 @@ class Trajectory:
 
         Parameters
         ----------
-        t : int (ns), float (s), or an array of either
+        t : float (s), numpy.timedelta64 such as esim.ns(), or an array of either
 
         Returns
         -------
@@ -119,7 +123,7 @@ class Trajectory:
         esim.Error
             For times outside the trajectory.
         """
-        times = to_ns_array(t)
+        times = _checks.times(t)
         states = self._core.states(times.reshape(-1)).view(STATE_DTYPE)
         return states.reshape(times.shape)
 
@@ -128,7 +132,7 @@ class Trajectory:
 
         Parameters
         ----------
-        t : int (ns), float (s), or an array of either
+        t : float (s), numpy.timedelta64 such as esim.ns(), or an array of either
 
         Returns
         -------
@@ -137,5 +141,27 @@ class Trajectory:
         states = self.at(t)
         return matrices(states["position"], states["orientation"])
 
+    def __copy__(self):
+        return self
+
+    def __deepcopy__(self, _):
+        return self
+
+    def __reduce__(self):
+        return _restored, (type(self), *self._core.state())
+
     def __repr__(self):
         return f"<esim.Trajectory from {self.start * 1e-9:g} s to {self.end * 1e-9:g} s>"
+
+
+def _fit(order, knot_interval_s, smoothing_time_s):
+    """The options of a fit, whose range it checks itself."""
+    return (
+        _checks.whole(order, "order", 2, 6),
+        _checks.seconds(knot_interval_s, "knot_interval_s", low=0),
+        _checks.seconds(smoothing_time_s, "smoothing_time_s", low=0),
+    )
+
+
+def _restored(cls, poses, *options):
+    return cls._of(_core.Trajectory.from_state(poses, *options))

@@ -4,10 +4,10 @@ import json
 import operator
 import os
 
-from . import _core
+from . import _checks, _core
+from ._events import of_bytes
 from ._represent import event_tensor, voxel_grid
 from ._scenario import to_overrides
-from ._types import EVENT_DTYPE
 
 __all__ = ["AffineSequence", "AffineSequences"]
 
@@ -20,7 +20,7 @@ class AffineSequence:
     index : int
     duration : int
         ns; it begins at 0.
-    events : numpy.ndarray of esim.EVENT_DTYPE
+    events : esim.Events
     flow : numpy.ndarray, float32, shape (2, height, width)
         Motion field, px/s, to the right and downwards, at the time `flow_t` (ns).
     displacement : numpy.ndarray, float32, shape (2, height, width)
@@ -37,7 +37,7 @@ class AffineSequence:
     def __init__(self, index, made):
         events, self.duration, self.flow_t, self.flow, self.displacement, self.images, info = made
         self.index = index
-        self.events = events.view(EVENT_DTYPE)
+        self.events = of_bytes(events, *self.flow.shape[:0:-1])
         self.info = json.loads(info)
 
     def tensor(self, stamp="last"):
@@ -51,8 +51,7 @@ class AffineSequence:
         -------
         numpy.ndarray, float32, shape (4, height, width)
         """
-        height, width = self.flow.shape[1:]
-        return event_tensor(self.events, width, height, t0=0, t1=self.duration, stamp=stamp)
+        return event_tensor(self.events, t0=0, t1=_checks.ns(self.duration), stamp=stamp)
 
     def voxels(self, bins=5, normalise=False):
         """All events as `esim.voxel_grid`.
@@ -66,8 +65,7 @@ class AffineSequence:
         -------
         numpy.ndarray, float32, shape (bins, height, width)
         """
-        height, width = self.flow.shape[1:]
-        return voxel_grid(self.events, width, height, bins, t0=0, t1=self.duration, normalise=normalise)
+        return voxel_grid(self.events, bins=bins, t0=0, t1=_checks.ns(self.duration), normalise=normalise)
 
 
 class AffineSequences:
@@ -81,7 +79,7 @@ class AffineSequences:
         Folder of images, with the folders in it. Otherwise textures are made on the fly: collages of dead leaves.
     width, height : int
         Of the sensor, px.
-    duration : float
+    duration : float, or numpy.timedelta64
         Of a sequence, s.
     seed : int
     contrast_threshold : float or (float, float)
@@ -119,14 +117,13 @@ class AffineSequences:
         named = {f"event_camera.{key}": value for key, value in (event_camera or {}).items()}
         self._core = _core.AffineSequences(
             "" if images is None else os.fspath(images),
-            operator.index(width),
-            operator.index(height),
-            float(duration),
-            operator.index(seed),
-            float(least),
-            float(greatest),
+            *_checks.sensor_size(width, height),
+            _checks.time(duration, "duration") / 1e9,
+            _checks.seed(seed),
+            _checks.number(least, "contrast_threshold"),
+            _checks.number(greatest, "contrast_threshold"),
             "" if flow_histogram is None else os.fspath(flow_histogram),
-            float(flow_scale),
+            _checks.number(flow_scale, "flow_scale"),
             flow_at,
             to_overrides(named),
         )

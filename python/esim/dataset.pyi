@@ -6,10 +6,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from . import Events, Int, Number, Time
+
 class AffineSequence:
     index: int
     duration: int
-    events: NDArray[np.void]
+    events: Events
     flow: NDArray[np.float32]
     flow_t: int
     displacement: NDArray[np.float32]
@@ -24,13 +26,13 @@ class AffineSequences:
         self,
         images: str | PathLike[str] | None = None,
         *,
-        width: int = 240,
-        height: int = 180,
-        duration: float = 0.04,
-        seed: int = 1,
-        contrast_threshold: float | tuple[float, float] = (0.2, 0.5),
+        width: Int = 240,
+        height: Int = 180,
+        duration: Time = 0.04,
+        seed: Int = 1,
+        contrast_threshold: Number | tuple[Number, Number] = (0.2, 0.5),
         flow_histogram: str | PathLike[str] | None = None,
-        flow_scale: float = 1.0,
+        flow_scale: Number = 1.0,
         flow_at: Literal["start", "middle", "end"] = "middle",
         event_camera: Mapping[str, Any] | None = None,
     ) -> None: ...

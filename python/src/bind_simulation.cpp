@@ -66,6 +66,7 @@ void bind_simulation(nb::module_& module) {
       .def("close", &Simulation::close)
       .def("info", [](const Simulation& self) { return to_dict(self.info()); })
       .def("warnings", &Simulation::warnings)
+      .def("losses", &Simulation::losses)
       .def("report", &Simulation::report);
 }
 

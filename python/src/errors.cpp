@@ -1,7 +1,7 @@
 #include <cstring>
 
 #include "bindings.h"
-#include "esim/core/error.h"
+#include "remedies.h"
 
 namespace esim::python {
 namespace {
@@ -18,12 +18,34 @@ void raise(const char* type, const char* message) {
 
 }  // namespace
 
+std::string with_remedy(const std::string& message, Remedy remedy) {
+  switch (remedy) {
+    case Remedy::replace_output:
+      return message + ", or pass force=True to replace it";
+    case Remedy::choose_camera:
+      return message + " with camera=";
+    case Remedy::extract_camera:
+      return message + ", with esim.convert(..., camera=...)";
+    case Remedy::times_from_zero:
+      return message + ", or let times begin at 0, as esim.convert(..., from_zero=True) does";
+    case Remedy::nanoseconds:
+      return message + "; time_unit=\"ns\" keeps them";
+    case Remedy::shorter_video:
+      return message + " (start_s=, duration_s=, slow_motion=)";
+    case Remedy::none:
+      break;
+  }
+  return message;
+}
+
 void bind_errors(nb::module_&) {
   nb::register_exception_translator([](const std::exception_ptr& exception, void*) {
     try {
       std::rethrow_exception(exception);
     } catch (const OutputError& error) {
       raise("OutputError", error.what());
+    } catch (const RemediableError& error) {
+      raise("Error", with_remedy(error.what(), error.remedy()).c_str());
     } catch (const UserError& error) {
       raise("Error", error.what());
     } catch (const Error& error) {

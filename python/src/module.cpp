@@ -2,6 +2,7 @@
 
 NB_MODULE(_core, module) {
   using namespace esim::python;
+  module.attr("__version__") = ESIM_VERSION;
   bind_errors(module);
   bind_scenario(module);
   bind_trajectory(module);

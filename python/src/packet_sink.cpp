@@ -20,45 +20,59 @@ PacketSink::PacketSink(const PeriodicClock& clock) : clock_(clock) {}
 
 void PacketSink::begin(const RecordingInfo& info) {
   end_ = info.end;
+  known_ = reached_ = filled_ = info.start;
   cameras_ = info.cameras;
-  open_.cameras.resize(info.cameras.size());
   if (clock_.due() == info.start) clock_.advance();
-  open_packet(info.start);
+  begin_packet(info.start);
 }
 
-void PacketSink::open_packet(TimeNs t0) {
-  const std::size_t cameras = open_.cameras.size();
-  open_ = Packet{};
-  open_.cameras.resize(cameras);
-  open_.t0 = t0;
-  open_.t1 = std::min(clock_.due(), end_);
-  if (clock_.due() <= open_.t1) clock_.advance();
+void PacketSink::begin_packet(TimeNs t0) {
+  Packet& packet = packets_.emplace_back();
+  packet.cameras.resize(cameras_.size());
+  packet.t0 = t0;
+  packet.t1 = std::min(clock_.due(), end_);
+  if (clock_.due() <= packet.t1) clock_.advance();
 }
 
-void PacketSink::close_packet() {
-  const TimeNs t1 = open_.t1;
-  ready_.push_back(std::move(open_));
-  open_.cameras.resize(ready_.back().cameras.size());
-  open_packet(t1);
+/// Makes the packets until `t`.
+void PacketSink::cover(TimeNs t) {
+  while (covered() < t && covered() < end_) begin_packet(covered());
 }
 
-void PacketSink::advance_to(TimeNs t) {
-  while (open_.t1 < t && open_.t1 < end_) close_packet();
+Packet& PacketSink::at(TimeNs t) {
+  cover(t);
+  filled_ = std::max(filled_, t);
+  written_ = true;
+  // Almost always the last one, or one of the last.
+  auto packet = packets_.rbegin();
+  while (t <= packet->t0 && packet + 1 != packets_.rend()) ++packet;
+  return *packet;
 }
 
 void PacketSink::know(TimeNs t) {
   known_ = t;
-  while (open_.t1 <= t && open_.t1 < end_) close_packet();
+  cover(t);
+  if (covered() <= t && covered() < end_) begin_packet(covered());
+}
+
+void PacketSink::set_end(TimeNs t) {
+  end_ = std::max(t, filled_);
+  packets_.back().t1 = std::min(packets_.back().t1, end_);
 }
 
 void PacketSink::end(bool complete) {
-  if (!complete) open_.t1 = std::max(open_.t0, std::min(open_.t1, known_));
-  ready_.push_back(std::move(open_));
+  if (!complete) end_ = std::min(end_, std::max(known_, filled_));
+  cover(end_);
+  while (packets_.size() > 1 && packets_.back().t0 >= end_) packets_.pop_back();
+  Packet& last = packets_.back();
+  last.t1 = std::clamp(end_, last.t0, last.t1);
+  if (last.t0 == last.t1 && (packets_.size() > 1 || !written_)) packets_.pop_back();
+  ended_ = true;
 }
 
 Packet PacketSink::take() {
-  Packet packet = std::move(ready_.front());
-  ready_.pop_front();
+  Packet packet = std::move(packets_.front());
+  packets_.pop_front();
   return packet;
 }
 
@@ -67,15 +81,19 @@ void PacketSink::write(const Record& record) {
 }
 
 void PacketSink::write(const EventsRecord& record) {
-  EventSpan rest = record.events;
-  while (!rest.empty()) {
-    advance_to(rest.front().t);
-    const auto beyond = std::upper_bound(rest.begin(), rest.end(), open_.t1,
-                                         [](TimeNs t1, const Event& event) { return t1 < event.t; });
-    std::vector<Event>& events = part(record.camera).events;
+  if (record.events.empty()) return;
+  cover(record.events.back().t);
+  for (EventSpan rest = record.events; !rest.empty();) {
+    Packet& packet = at(rest.front().t);
+    const auto is_later = [](TimeNs t1, const Event& event) { return t1 < event.t; };
+    const bool is_last = &packet == &packets_.back();
+    const auto beyond = is_last ? rest.end() : std::upper_bound(rest.begin(), rest.end(), packet.t1, is_later);
+    std::vector<Event>& events = packet.cameras[static_cast<std::size_t>(record.camera)].events;
     events.insert(events.end(), rest.begin(), beyond);
     rest = rest.subspan(static_cast<std::size_t>(beyond - rest.begin()));
   }
+  filled_ = std::max(filled_, record.events.back().t);
+  reached_ = std::max(reached_, record.events.back().t);
 }
 
 void PacketSink::write(const EventPointsRecord& record) {
@@ -88,8 +106,7 @@ void PacketSink::write(const EventPointsRecord& record) {
       camera.event_points.insert(camera.event_points.end(), point.data(), point.data() + 3);
     }
   };
-  for (Packet& packet : ready_) take(packet);
-  take(open_);
+  for (Packet& packet : packets_) take(packet);
 }
 
 template <typename T>
@@ -105,8 +122,8 @@ void PacketSink::write(const TruthRecord& record) {
   for (const Image<float>* image : {&record.irradiance, &record.depth, &record.flow_x, &record.flow_y}) {
     if (!image->empty()) require_size(*image, record.camera, record.t);
   }
-  advance_to(record.t);
-  CameraPart& camera = part(record.camera);
+  reached_ = std::max(reached_, record.t);
+  CameraPart& camera = part(record.camera, record.t);
   camera.t.push_back(record.t);
   append_matrix(record.T_world_camera, camera.poses);
   append(record.irradiance, camera.irradiance);
@@ -118,8 +135,7 @@ void PacketSink::write(const TruthRecord& record) {
 
 void PacketSink::write(const DisplacementRecord& record) {
   require_size(record.x, record.camera, record.t1);
-  advance_to(record.t1);
-  CameraPart& camera = part(record.camera);
+  CameraPart& camera = part(record.camera, record.t1);
   camera.displacement_span.insert(camera.displacement_span.end(), {record.t0, record.t1});
   append(record.x, camera.displacement);
   append(record.y, camera.displacement);
@@ -128,9 +144,9 @@ void PacketSink::write(const DisplacementRecord& record) {
 
 void PacketSink::write(const FrameRecord& record) {
   require_size(record.image, record.camera, record.t);
-  // The exposure's middle is rounded: a nanosecond is no reason to end a packet that the frame still belongs to.
-  advance_to(2 * record.t - record.exposure_start - 1);
-  CameraPart& camera = part(record.camera);
+  reached_ = std::max(reached_, record.t);
+  // It belongs where its exposure ends. The middle of that is rounded: a nanosecond is no reason to leave a packet.
+  CameraPart& camera = part(record.camera, std::max(record.t, 2 * record.t - record.exposure_start - 1));
   camera.image_t.push_back(record.t);
   camera.exposure_start.push_back(record.exposure_start);
   camera.exposure.push_back(record.exposure_duration);
@@ -139,20 +155,22 @@ void PacketSink::write(const FrameRecord& record) {
 }
 
 void PacketSink::write(const PoseRecord& record) {
-  advance_to(record.t);
-  open_.body.push_back(to_state(record.t, record.body));
-  for (const Kinematics& object : record.objects) append_matrix(object.T_world_body, open_.objects);
+  reached_ = std::max(reached_, record.t);
+  Packet& packet = at(record.t);
+  packet.body.push_back(to_state(record.t, record.body));
+  for (const Kinematics& object : record.objects) append_matrix(object.T_world_body, packet.objects);
 }
 
 void PacketSink::write(const ImuRecord& record) {
-  advance_to(record.t);
-  open_.imu.push_back(to_imu_sample(record.t, record.measured, record.bias));
+  reached_ = std::max(reached_, record.t);
+  at(record.t).imu.push_back(to_imu_sample(record.t, record.measured, record.bias));
 }
 
 void PacketSink::write(const TriggerRecord& record) {
-  advance_to(record.t);
-  part(record.camera).trigger_t.push_back(record.t);
-  part(record.camera).trigger_kind.push_back(static_cast<std::uint8_t>(record.kind));
+  reached_ = std::max(reached_, record.t);
+  CameraPart& camera = part(record.camera, record.t);
+  camera.trigger_t.push_back(record.t);
+  camera.trigger_kind.push_back(static_cast<std::uint8_t>(record.kind));
 }
 
 void PacketSink::write(const ImageRecord&) {}  // of videos only

@@ -4,11 +4,15 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <exception>
 #include <limits>
+#include <utility>
 
 #include "bindings.h"
+#include "esim/core/error.h"
 #include "esim/record/copy_recording.h"
 #include "packet_views.h"
+#include "remedies.h"
 #include "sensor_size.h"
 
 namespace esim::python {
@@ -16,21 +20,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-TimeNs last_time(const Record& record) {
-  const auto* events = std::get_if<EventsRecord>(&record);
-  if (events != nullptr && !events->events.empty()) return events->events.back().t;
-  return std::visit(
-      [](const auto& kind) {
-        if constexpr (requires { kind.t; }) return kind.t;
-        if constexpr (requires { kind.t1; }) return kind.t1;
-        return std::numeric_limits<TimeNs>::min();
-      },
-      record);
-}
+constexpr TimeNs kEndless = std::numeric_limits<TimeNs>::max() / 2;
+
+/// Sources give records of a camera and kind in order. Those of others are mixed with them, and come this much later at
+/// most: as long as the messages of drivers last, or half an exposure.
+constexpr TimeNs kMostDisorder = 500 * kNsPerMs;
 
 /// A file's recording, packet by packet.
 class RecordingReader {
  public:
+  /// `packet`: length of packets; 0: from one frame of ground truth to the next, where the file says their rate.
   RecordingReader(const fs::path& path, TimeNs packet, std::optional<int> width, std::optional<int> height,
                   bool recover) {
     ReadOptions options;
@@ -39,8 +38,9 @@ class RecordingReader {
     source_ = open_source(path, options);
     info_ = source_->info();
     RecordingInfo endless = info_;
-    endless.end = std::numeric_limits<TimeNs>::max() / 2;  // the end is known when it is there
-    packets_.emplace(PeriodicClock(info_.start, endless.end, 1e9 / static_cast<double>(packet)));
+    endless.end = kEndless;  // the end is known when it is there
+    const double usual_hz = info_.truth_rate_hz > 0 ? info_.truth_rate_hz : kUsualPacketRate_hz;
+    packets_.emplace(PeriodicClock(info_.start, kEndless, packet > 0 ? 1 / to_seconds(packet) : usual_hz));
     packets_->begin(endless);
   }
 
@@ -49,8 +49,9 @@ class RecordingReader {
       const nb::gil_scoped_release released;
       while (!packets_->has_packet() && !ended_) advance();
     }
-    if (!packets_->has_packet()) return std::nullopt;
-    return to_dict(packets_->take(), info_);
+    if (packets_->has_packet()) return to_dict(packets_->take(), info_);
+    if (damage_) std::rethrow_exception(std::exchange(damage_, nullptr));
+    return std::nullopt;
   }
 
   const RecordingInfo& info() const { return info_; }
@@ -58,13 +59,28 @@ class RecordingReader {
 
  private:
   void advance() {
-    if (const Record* record = source_->next()) {
-      last_ = std::max(last_, last_time(*record));
-      packets_->write(*record);
+    if (!read_) {
+      read_ = !take();
+      if (read_) packets_->set_end(damage_ || !problems_.empty() ? info_.start : info_.end);
+    } else if (packets_->covered() < packets_->end()) {
+      packets_->know(packets_->covered());  // one packet at a time
     } else {
+      packets_->end(true);
       ended_ = true;
-      packets_->know(std::max(last_, info_.start));
-      packets_->end(false);
+    }
+  }
+
+  /// False after the last record. What comes before a damaged place is handed out before it is told of.
+  bool take() {
+    try {
+      const Record* const record = source_->next();
+      if (record == nullptr) return false;
+      packets_->write(*record);
+      packets_->know(packets_->reached() - kMostDisorder);
+      return true;
+    } catch (const UserError&) {
+      damage_ = std::current_exception();
+      return false;
     }
   }
 
@@ -72,8 +88,9 @@ class RecordingReader {
   RecordingInfo info_;
   std::optional<PacketSink> packets_;
   std::vector<std::string> problems_;
-  TimeNs last_ = std::numeric_limits<TimeNs>::min();
-  bool ended_ = false;
+  std::exception_ptr damage_;
+  bool read_ = false;   // all of the source
+  bool ended_ = false;  // and all packets are made
 };
 
 /// Copies a recording into another format; returns how many of what, and what was lost.
@@ -88,7 +105,7 @@ nb::tuple convert(const fs::path& from, const fs::path& to, const std::optional<
     if (recover) options.read.recover = [&lost](const std::string& problem) { lost.push_back(problem); };
     const CopySummary summary = convert_recording(from, format, to, options, [](double) { return true; });
     for (const auto& [content, count] : summary.copied) copied.emplace(describe(content), count);
-    for (std::string& loss : losses(summary, format)) lost.push_back(std::move(loss));
+    for (const Loss& loss : losses(summary, format)) lost.push_back(with_remedy(loss.what, loss.remedy));
   }
   return nb::make_tuple(copied, lost);
 }

@@ -1,5 +1,6 @@
 #include "scenario.h"
 
+#include <fmt/format.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -10,6 +11,20 @@
 namespace esim::python {
 
 namespace nb = nanobind;
+
+namespace {
+
+/// A few words for people: "cam0 240 x 180 px, 2 s".
+std::string describe(const Scenario& scenario) {
+  std::string text;
+  for (const CameraOptions& camera : scenario.cameras) {
+    const auto size = camera_model(camera);
+    text += fmt::format("{}{} {} x {} px", text.empty() ? "" : ", ", camera.name, size.width, size.height);
+  }
+  return scenario.duration_s ? fmt::format("{}, {:g} s", text, *scenario.duration_s) : text;
+}
+
+}  // namespace
 
 void bind_scenario(nb::module_& module) {
   nb::class_<CheckedScenario>(module, "Scenario")
@@ -32,6 +47,7 @@ void bind_scenario(nb::module_& module) {
       .def_prop_rw(
           "seed", [](const CheckedScenario& self) { return self.value.seed; },
           [](CheckedScenario& self, std::uint64_t seed) { self.value.seed = seed; })
+      .def("describe", [](const CheckedScenario& self) { return describe(self.value); })
       .def("to_yaml", [](const CheckedScenario& self) { return write_scenario(self.value); });
   module.def("scenario_reference", &scenario_reference);
 }

@@ -2,15 +2,13 @@
 
 #include <optional>
 
-#include "esim/core/error.h"
 #include "esim/record/format.h"
 
 namespace esim::python {
 
-/// Of both, or of neither. Throws UserError where one is missing.
+/// Of both, or of neither: _checks.py sees to that.
 inline std::optional<SensorSize> sensor_size(std::optional<int> width, std::optional<int> height) {
-  if (width.has_value() != height.has_value()) throw UserError("give width and height of the sensor, or neither");
-  if (!width) return std::nullopt;
+  if (!width || !height) return std::nullopt;
   return SensorSize{*width, *height};
 }
 

@@ -6,6 +6,7 @@
 #include "esim/record/fan_out.h"
 #include "esim/record/output_file.h"
 #include "esim/scenario/read.h"
+#include "losses.h"
 
 namespace esim::python {
 namespace {
@@ -13,7 +14,6 @@ namespace {
 namespace nb = nanobind;
 
 constexpr double kSignalInterval_s = 0.02;
-constexpr double kUsualPacketRate_hz = 30;
 
 /// Passes everything on to sinks that others own.
 class Both final : public Sink {
@@ -111,6 +111,8 @@ void Simulation::finish() {
   over_ = true;
   const Summary summary = simulator_->finish();
   simulator_.reset();
+  losses_ = python::losses(summary);
+  for (const std::string& loss : losses_) notices_.push_back("warning: " + loss);
   report_ = report_json(scenario_, summary, world_->workers->threads(), notices_);
   if (directory_ != nullptr) directory_->finish(report_);
 }

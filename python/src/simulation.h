@@ -45,6 +45,9 @@ class Simulation {
   /// What of Python's is held here, for its garbage collector.
   std::optional<PythonFunction>& render() { return render_; }
 
+  /// A line on each thing that was lost; none before the end.
+  const std::vector<std::string>& losses() const { return losses_; }
+
   /// The report as JSON; empty before the end.
   const std::string& report() const { return report_; }
 
@@ -56,7 +59,7 @@ class Simulation {
 
   Scenario scenario_;
   std::optional<PythonFunction> render_;
-  std::vector<std::string> warnings_, notices_;
+  std::vector<std::string> warnings_, notices_, losses_;
   std::unique_ptr<RecordingDirectory> directory_;
   std::unique_ptr<World> world_;
   std::unique_ptr<PacketSink> packets_;

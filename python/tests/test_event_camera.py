@@ -1,4 +1,7 @@
+import copy
+import datetime
 import gc
+import pickle
 
 import numpy as np
 import pytest
@@ -9,7 +12,7 @@ import esim
 def test_a_ramp_fires_at_every_threshold():
     camera = esim.EventCamera(4, 3, contrast_threshold=0.25, log_eps=1e-3)
     assert len(camera.process(np.full((3, 4), 0.1, np.float32), 0)) == 0
-    events = camera.process(np.full((3, 4), 0.1 * np.exp(1.1), np.float32), 1_000_000)
+    events = camera.process(np.full((3, 4), 0.1 * np.exp(1.1), np.float32), 1e-3)
     assert events.dtype == esim.EVENT_DTYPE and len(events) == 4 * 12
     assert (events["p"] == 1).all()
     # Brightness goes straight from the first frame to the second.
@@ -22,7 +25,7 @@ def test_a_ramp_fires_at_every_threshold():
 def test_events_outlive_their_camera():
     camera = esim.EventCamera(50, 40, contrast_threshold=0.1)
     camera.process(np.full((40, 50), 0.1, np.float32), 0)
-    events = camera.process(np.full((40, 50), 0.5, np.float32), 1000)
+    events = camera.process(np.full((40, 50), 0.5, np.float32), 1e-6)
     assert not events.flags.owndata  # a view of the memory in C++
     kept = events.copy()
     del camera
@@ -38,26 +41,42 @@ def test_other_layouts_are_converted(view):
     frames = random.random((5, 30, 40), dtype=np.float32)
     plain, other = (esim.EventCamera(40, 30, "davis346", seed=3) for _ in range(2))
     for k, frame in enumerate(frames):
-        np.testing.assert_array_equal(plain.process(frame, k * 1000), other.process(view(frame), k * 1000))
+        np.testing.assert_array_equal(plain.process(frame, 1e-6 * k), other.process(view(frame), 1e-6 * k))
 
 
-def test_times_are_nanoseconds_or_seconds():
+def test_times_say_their_unit():
     frames = np.random.default_rng(1).random((5, 30, 40), dtype=np.float32)
-    by_int, by_float = (esim.EventCamera(40, 30) for _ in range(2))
+    ways = [
+        lambda k: 0.125 * k,
+        lambda k: np.float64(0.125 * k),
+        lambda k: np.float32(0.125 * k),
+        lambda k: np.array(0.125 * k),
+        lambda k: esim.ns(125_000_000 * k),
+        lambda k: esim.ns(np.int64(125_000_000) * k),
+        lambda k: np.timedelta64(125 * k, "ms"),
+        lambda k: datetime.timedelta(milliseconds=125 * k),
+    ]
+    cameras = [esim.EventCamera(40, 30, shot_noise_hz=10) for _ in ways]
     for k, frame in enumerate(frames):
-        np.testing.assert_array_equal(by_int.process(frame, np.int32(k * 1000)), by_float.process(frame, k * 1e-6))
-    for wrong in ("0", True, None, np.float32(3)):
-        with pytest.raises(TypeError, match="int .ns. or a float .s."):
-            by_int.process(frames[0], wrong)
-    with pytest.raises(ValueError, match="292 years"):
-        by_int.process(frames[0], float("nan"))
+        first, *others = (camera.process(frame, way(k)) for camera, way in zip(cameras, ways))
+        for events in others:
+            np.testing.assert_array_equal(first, events)
+    for int_time in (1, np.int64(1), np.uint8(1), 10**30, np.array(1)):
+        with pytest.raises(TypeError, match=r"1\d*\.0 for seconds, or esim\.ns\(1\d*\)"):
+            cameras[0].process(frames[0], int_time)
+    for wrong in ("0", True, None, 1j, [1.0], np.zeros(2), np.timedelta64(5), np.timedelta64(1, "Y")):
+        with pytest.raises(TypeError, match="^t"):
+            cameras[0].process(frames[0], wrong)
+    for wrong in (float("nan"), 1e10, np.float32("inf"), np.timedelta64("NaT", "ns"), np.timedelta64(7, "ps"), np.timedelta64(10**12, "s")):
+        with pytest.raises(esim.Error, match="^t"):
+            cameras[0].process(frames[0], wrong)
 
 
 def test_threads_do_not_matter():
     frames = np.random.default_rng(1).random((4, 200, 300), dtype=np.float32)
     cameras = [esim.EventCamera(300, 200, "davis346", seed=5, threads=threads) for threads in (1, 2)]
     for k, frame in enumerate(frames):
-        one, two = (camera.process(frame, k * 100_000) for camera in cameras)
+        one, two = (camera.process(frame, 1e-4 * k) for camera in cameras)
         np.testing.assert_array_equal(one, two)
     assert len(one) > 1000
 
@@ -66,17 +85,85 @@ def test_what_is_refused_leaves_the_camera_as_it_was():
     good = np.random.default_rng(1).random((2, 30, 40), dtype=np.float32)
     camera, undisturbed = esim.EventCamera(40, 30), esim.EventCamera(40, 30)
     for c in (camera, undisturbed):
-        c.process(good[0], 10)
+        c.process(good[0], esim.ns(10))
     bad = good[1].copy()
     bad[3, 7] = -1
     for frame, t, message in [(good[1][:20], 20, "40 x 20"), (good[1], 10, "does not come after"), (bad, 20, "frame 1")]:
         with pytest.raises(esim.Error, match=message):
-            camera.process(frame, t)
+            camera.process(frame, esim.ns(t))
     with pytest.raises(TypeError, match="linear_light"):
-        camera.process(np.zeros((30, 40), np.uint8), 20)
+        camera.process(np.zeros((30, 40), np.uint8), 1.0)
     with pytest.raises(ValueError, match="shape"):
-        camera.process(np.zeros((30, 40, 3), np.float32), 20)
-    np.testing.assert_array_equal(camera.process(good[1], 20), undisturbed.process(good[1], 20))
+        camera.process(np.zeros((30, 40, 3), np.float32), 1.0)
+    np.testing.assert_array_equal(camera.process(good[1], esim.ns(20)), undisturbed.process(good[1], esim.ns(20)))
+
+
+@pytest.mark.parametrize("size", [(0, 0), (0, 3), (4, -1), (65537, 1), (4.0, 3), ("4", 3), (True, 3), (None, 3)])
+def test_sizes_that_are_no_sensor(size):
+    with pytest.raises((esim.Error, TypeError), match="width|height"):
+        esim.EventCamera(*size)
+    assert len(esim.EventCamera(np.int64(4), np.uint8(3)).process(np.ones((3, 4)), 0)) == 0
+
+
+@pytest.mark.parametrize("wrong", [{"seed": -1}, {"seed": 2**64}, {"seed": 1.5}, {"threads": -1}, {"threads": "2"}])
+def test_numbers_that_are_none(wrong):
+    (name,) = wrong
+    with pytest.raises((esim.Error, TypeError), match=name):
+        esim.EventCamera(4, 3, **wrong)
+
+
+STATES = {
+    "ideal": {},
+    "davis346": {"preset": "davis346", "latency_us": 2500.0, "latency_jitter_us": 900.0},
+    "surround": {"surround_px": 2.0, "surround_ms": 3.0},
+    "readout": {"contrast_threshold": 0.1, "readout": {"rate_mev_per_s": 0.7, "row_time_us": 5, "queue_events": 500}},
+}
+
+
+@pytest.mark.parametrize("options", STATES.values(), ids=STATES)
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda camera: pickle.loads(pickle.dumps(camera))])
+def test_a_copy_goes_on_where_the_camera_is(options, duplicate):
+    frames = np.random.default_rng(1).random((12, 30, 40), dtype=np.float32)
+    camera = esim.EventCamera(40, 30, seed=5, **options)
+    count = 0
+    for k, frame in enumerate(frames):
+        if k in (0, 1, 7):
+            other = duplicate(camera)
+        there = other.process(frame, 1e-3 * k)
+        here = camera.process(frame, 1e-3 * k)
+        np.testing.assert_array_equal(here, there)
+        assert other.dropped == camera.dropped
+        count += len(here)
+    assert count > 3000
+    if "readout" in options:
+        assert camera.dropped > 0
+    with pytest.raises(esim.Error, match="frame 12"):  # copies know how far they are
+        other.process(frames[0], 0.011)
+
+
+def test_a_copy_is_independent():
+    frames = np.random.default_rng(1).random((3, 30, 40), dtype=np.float32)
+    camera, undisturbed = esim.EventCamera(40, 30), esim.EventCamera(40, 30)
+    for c in (camera, undisturbed):
+        c.process(frames[0], 0)
+    copy.copy(camera).process(frames[1], 1.0)
+    np.testing.assert_array_equal(camera.process(frames[2], 2.0), undisturbed.process(frames[2], 2.0))
+
+
+def test_a_pickle_of_another_version_is_refused():
+    camera = esim.EventCamera(4, 3)
+    state = {**camera.__getstate__(), "version": "0.0.1"}
+    with pytest.raises(esim.Error, match="0.0.1"):
+        esim.EventCamera.__new__(esim.EventCamera).__setstate__(state)
+    damaged = {**camera.__getstate__(), "state": b"short"}
+    with pytest.raises(esim.Error, match="damaged"):
+        esim.EventCamera.__new__(esim.EventCamera).__setstate__(damaged)
+
+
+def test_a_camera_prints_what_it_is():
+    assert repr(esim.EventCamera(4, 3, "davis346", seed=7, shot_noise_hz=1)) == (
+        "<esim.EventCamera 4 x 3 px, preset='davis346', shot_noise_hz=1, seed=7>"
+    )
 
 
 def test_options_have_the_schema_names():
@@ -91,7 +178,7 @@ def test_options_have_the_schema_names():
     assert own.dropped == 0
     limited = esim.EventCamera(40, 30, contrast_threshold=0.01, readout={"rate_mev_per_s": 0.001, "queue_events": 10})
     limited.process(np.full((30, 40), 0.1, np.float32), 0)
-    limited.process(np.full((30, 40), 1, np.float32), 1000)
+    limited.process(np.full((30, 40), 1, np.float32), 1e-6)
     assert limited.dropped > 0
 
 

@@ -1,3 +1,6 @@
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -40,10 +43,10 @@ def test_portions_by_number(file):
     np.testing.assert_array_equal(np.concatenate(list(esim.EventsIterator(path))), events)
 
 
-@pytest.mark.parametrize("delta_t", [100_000, 7e-5])
+@pytest.mark.parametrize("delta_t", [esim.ns(100_000), 7e-5, np.float32(7e-5)])
 def test_portions_by_time(file, delta_t):
     path, events = file
-    ns = delta_t if isinstance(delta_t, int) else round(delta_t * 1e9)
+    ns = delta_t.astype(int) if isinstance(delta_t, np.timedelta64) else round(delta_t * 1e9)
     first = int(events["t"][0])
     for k, portion in enumerate(esim.EventsIterator(path, delta_t)):
         inside = (events["t"] >= first + k * ns) & (events["t"] < first + (k + 1) * ns)
@@ -55,18 +58,18 @@ def test_portions_of_no_events_and_a_start(tmp_path):
     events = random_events(4, 10, 10)
     events["t"] = [1000, 2000, 5000, 5000]
     esim.save_events(tmp_path / "e.txt", events, 10, 10)
-    lengths = lambda **options: [len(portion) for portion in esim.EventsIterator(tmp_path / "e.txt", 1000, **options)]
+    lengths = lambda **options: [len(portion) for portion in esim.EventsIterator(tmp_path / "e.txt", 1e-6, **options)]
     assert lengths() == [1, 1, 0, 0, 2]
     assert lengths(start=0) == [0, 1, 1, 0, 0, 2]
     assert lengths(start=2e-6) == [1, 0, 0, 2]
-    assert lengths(start=6000) == []
+    assert lengths(start=esim.ns(6000)) == []
 
 
 def test_no_events_are_a_file_too(tmp_path):
     for name in ("e.txt", "e.h5"):
         esim.save_events(tmp_path / name, np.empty(0, esim.EVENT_DTYPE), 10, 10)
         assert len(esim.load_events(tmp_path / name)) == 0
-        assert list(esim.EventsIterator(tmp_path / name, 1000)) == []
+        assert list(esim.EventsIterator(tmp_path / name, 1e-6)) == []
         assert esim.info(tmp_path / name)["cameras"][0]["t_first"] is None
 
 
@@ -124,3 +127,86 @@ def test_a_damaged_file_names_the_place_after_what_is_whole(file):
         for portion in esim.EventsIterator(path, n_events=1000):
             read.append(portion)
     assert len(read) <= 4
+
+
+@pytest.fixture
+def sized(tmp_path):
+    events = random_events(3000, 100, 80)
+    esim.save_events(tmp_path / "sized.h5", events, 100, 80)
+    return tmp_path / "sized.h5"
+
+
+def test_events_know_their_sensor(sized, tmp_path):
+    events = esim.load_events(sized)
+    assert isinstance(events, esim.Events) and (events.width, events.height) == (100, 80)
+    plain = np.array(events, subok=False)
+    for make in (esim.event_count, esim.event_tensor, esim.voxel_grid, esim.time_surface, esim.event_frame, esim.time_surface_picture):
+        np.testing.assert_array_equal(make(events), make(plain, 100, 80))
+    assert esim.voxel_grid(events, bins=3).shape == (3, 80, 100)
+    assert esim.event_count(events, 200, 90).shape == (2, 90, 200)  # what is given counts
+    assert (esim.space_time_plot(events, size=(320, 240)) == esim.space_time_plot(plain, 100, 80, size=(320, 240))).all()
+    esim.save_events(tmp_path / "again.h5", events)
+    again = esim.load_events(tmp_path / "again.h5")
+    np.testing.assert_array_equal(again, events)
+    assert (again.width, again.height) == (100, 80)
+    told = esim.load_events(sized, width=120, height=90)
+    assert (told.width, told.height) == (120, 90)
+    for part in esim.EventsIterator(sized, 1e-3):
+        assert (part.width, part.height) == (100, 80)
+
+
+def test_events_whose_sensor_is_not_known(tmp_path):
+    (tmp_path / "e.txt").write_text("0.1 1 2 1\n0.2 3 2 0\n")
+    events = esim.load_events(tmp_path / "e.txt")
+    assert events.width is None and events.height is None
+    plain = np.array(events, subok=False)
+    for them in (events, plain):
+        for use in (esim.event_count, esim.voxel_grid, esim.space_time_plot, lambda e: esim.save_events(tmp_path / "f.txt", e)):
+            with pytest.raises(esim.Error, match="give width and height of the sensor"):
+                use(them)
+        with pytest.raises(esim.Error, match="or neither"):
+            esim.event_count(them, width=10)
+    known = esim.Events(plain, 10, 9)
+    assert esim.event_count(known).shape == (2, 9, 10)
+    with pytest.raises(esim.Error, match="width"):
+        esim.Events(plain, 0, 9)
+    with pytest.raises(TypeError, match="fields"):
+        esim.Events(np.zeros(3), 4, 4)
+
+
+def test_what_keeps_the_sensor(sized):
+    events = esim.load_events(sized)
+    keeping = [
+        events[10:20], events[events["p"] > 0], events[::-1], events.copy(), np.sort(events, order="x"),
+        copy.copy(events), copy.deepcopy(events), pickle.loads(pickle.dumps(events)), pickle.loads(pickle.dumps(events, 5)),
+        np.concatenate([events, events[:3]]), np.repeat(events, 2),
+    ]
+    for part in keeping:
+        assert isinstance(part, esim.Events) and (part.width, part.height) == (100, 80)
+        assert esim.event_count(part).sum() == len(part)
+    np.testing.assert_array_equal(keeping[7], events)
+    other = esim.Events(events, 200, 80)
+    assert (events.width, other.width) == (100, 200)
+    for mixed in ([events, other], [events, np.array(events, subok=False)]):
+        assert np.concatenate(mixed).width is None
+
+
+def test_fields_of_events_are_plain_arrays(sized):
+    events = esim.load_events(sized)
+    for plain in (events["t"], np.diff(events["t"]), events["p"] > 0, events[["x", "y"]], events == events, events["x"].mean(keepdims=True)):
+        assert type(plain) is np.ndarray
+    assert type(events[3]) is np.void and type(events["t"].max()) is np.int64
+    assert (events == events).all() and not (events != events).any()
+    events["t"][0] = -5  # a view
+    assert events[0]["t"] == -5
+
+
+def test_events_of_simulations_and_cameras_know_their_sensor(poster, tmp_path):
+    packets = list(esim.simulate(poster, out=tmp_path / "out"))
+    events = np.concatenate([packet.events for packet in packets])
+    assert (events.width, events.height) == (40, 30) and esim.voxel_grid(events).shape == (5, 30, 40)
+    assert {(p.events.width, p.events.height) for p in esim.Recording(tmp_path / "out")} == {(40, 30)}
+    camera = esim.EventCamera(4, 3)
+    assert camera.process(np.ones((3, 4), np.float32), 0).width == 4
+    sequence = esim.dataset.AffineSequences(width=48, height=32, flow_scale=0.2)[0]
+    assert (sequence.events.width, sequence.events.height) == (48, 32)

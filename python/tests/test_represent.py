@@ -22,7 +22,7 @@ def test_event_count(events):
 
 
 @pytest.mark.parametrize("stamp", ["last", "mean"])
-@pytest.mark.parametrize("span", [(None, None), (2_000_000, 0.008)])
+@pytest.mark.parametrize("span", [(None, None), (esim.ns(2_000_000), 0.008)])
 def test_event_tensor(events, stamp, span):
     t0 = events["t"][0] if span[0] is None else 2_000_000
     t1 = events["t"][-1] if span[1] is None else 8_000_000
@@ -61,7 +61,7 @@ def test_time_surface(events):
     for e in events:
         if e["t"] <= t:
             slow[0 if e["p"] > 0 else 1, e["y"], e["x"]] = np.exp(-(t - int(e["t"])) * 1e-9 / tau)
-    np.testing.assert_allclose(esim.time_surface(events, WIDTH, HEIGHT, t=t, tau_s=tau), slow, atol=1e-6)
+    np.testing.assert_allclose(esim.time_surface(events, WIDTH, HEIGHT, t=esim.ns(t), tau_s=tau), slow, atol=1e-6)
     newest = esim.time_surface(events, WIDTH, HEIGHT)
     assert newest.max() == 1 and newest.dtype == np.float32
 
@@ -96,7 +96,7 @@ def test_what_is_refused(events):
     with pytest.raises(esim.Error, match="tau"):
         esim.time_surface(events, WIDTH, HEIGHT, tau_s=0)
     with pytest.raises(esim.Error, match="ends before it starts"):
-        esim.event_tensor(events, WIDTH, HEIGHT, t0=5, t1=4)
+        esim.event_tensor(events, WIDTH, HEIGHT, t0=5.0, t1=4.0)
     with pytest.raises(ValueError, match="last"):
         esim.event_tensor(events, WIDTH, HEIGHT, stamp="first")
     with pytest.raises(esim.Error, match="between 1 and"):

@@ -1,3 +1,5 @@
+import copy
+import pickle
 import re
 
 import numpy as np
@@ -69,3 +71,30 @@ def test_a_scenario_that_is_simulated_needs_what_is_not_brought(poster):
         esim.Scenario(options)
         with pytest.raises(esim.Error, match=f"{key}: is missing"):
             esim.simulate(options)
+
+
+DUPLICATES = [copy.copy, copy.deepcopy, lambda scenario: pickle.loads(pickle.dumps(scenario))]
+
+
+@pytest.mark.parametrize("duplicate", DUPLICATES)
+def test_copies_are_the_same_and_independent(poster, duplicate):
+    for scenario in (esim.Scenario(poster), esim.Scenario.load(ROOT / "scenes" / "poster.yaml")):
+        scenario.set("event_camera.contrast_threshold", 0.31)
+        other = duplicate(scenario)
+        assert other is not scenario and other.to_yaml() == scenario.to_yaml() and repr(other) == repr(scenario)
+        other.set("camera.width", 44)
+        assert "width: 44" in other.to_yaml() and "width: 44" not in scenario.to_yaml()
+        scenario.set("camera.width", 46).set("camera.height", 48)
+        assert "width: 44" in other.to_yaml() and "height: 48" not in other.set("seed", 3).to_yaml()
+
+
+def test_copies_simulate_the_same(poster):
+    scenario = esim.Scenario(poster)
+    packets = [next(esim.simulate(s, packet_s=0.1)) for s in (scenario, pickle.loads(pickle.dumps(scenario)))]
+    np.testing.assert_array_equal(packets[0].events, packets[1].events)
+
+
+def test_a_scenario_prints_what_it_is(poster):
+    scenario = esim.Scenario(poster).set("seed", 7)
+    assert repr(scenario) == "<esim.Scenario scenario: cam0 40 x 30 px, 0.2 s, seed=7>"
+    assert "poster.yaml: cam0 240 x 180 px" in repr(esim.Scenario.load(ROOT / "scenes" / "poster.yaml"))

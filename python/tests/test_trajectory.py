@@ -1,3 +1,6 @@
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -36,7 +39,7 @@ def test_quaternions_matrices_and_units_of_time_are_the_same():
     angle = np.pi * t
     quaternions = 3 * np.stack([0 * t, 0 * t, np.sin(angle / 2), np.cos(angle / 2)], 1)  # of any length
     a = esim.Trajectory.from_poses(t, T)
-    b = esim.Trajectory.from_poses(np.rint(t * 1e9).astype(np.int64), (T[:, :3, 3], quaternions))
+    b = esim.Trajectory.from_poses(esim.ns(np.rint(t * 1e9).astype(np.int64)), (T[:, :3, 3], quaternions))
     np.testing.assert_allclose(a.pose(t), b.pose(t), atol=1e-9)
 
 
@@ -74,3 +77,20 @@ def test_what_is_no_motion_is_refused():
         esim.Trajectory.from_poses(t, (T[:, :3, 3], np.zeros((len(t), 4))))
     with pytest.raises(TypeError, match="from_poses"):
         esim.Trajectory()
+
+
+def test_copies_move_the_same(tmp_path):
+    t, T = circle()
+    angle = np.pi * t
+    rows = np.stack([t, *T[:, :3, 3].T, 0 * t, 0 * t, np.sin(angle / 2), np.cos(angle / 2)], 1)
+    np.savetxt(tmp_path / "poses.txt", rows)
+    for trajectory in (
+        esim.Trajectory.from_poses(t, T),
+        esim.Trajectory.from_poses(t, T, order=4, knot_interval_s=0.05, smoothing_time_s=0.01),
+        esim.Trajectory.load(tmp_path / "poses.txt"),
+    ):
+        pickled = pickle.dumps(trajectory)
+        for other in (copy.copy(trajectory), copy.deepcopy(trajectory), pickle.loads(pickled)):
+            assert (other.start, other.end, other.fit) == (trajectory.start, trajectory.end, trajectory.fit)
+            np.testing.assert_array_equal(other.at(t), trajectory.at(t))  # every bit
+        assert repr(trajectory) == repr(pickle.loads(pickled)) == "<esim.Trajectory from 0 s to 2 s>"

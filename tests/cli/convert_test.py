@@ -34,7 +34,32 @@ class Convert(ProgramTest):
         self.assertIn("64 x 48 px", run("info", self.folder / "other.h5").stdout)
 
     def test_says_what_is_lost(self):
-        self.assertIn("rounded down to 1 us", self.convert(self.text, self.folder / "a.h5").stderr)
+        self.assertRegex(self.convert(self.text, self.folder / "a.h5").stderr, "rounded down to 1 us; --time-unit ns keeps them")
+
+    def test_messages_name_the_flag_that_helps(self):
+        """Where the command has it; the library leaves it to the command."""
+        self.assertRegex(self.convert(self.text, self.text, code=2).stderr, "exists already: .*pass --force to replace it")
+        late = self.folder / "late.txt"
+        late.write_text("9999.5 1 1 1\n9999.6 1 2 0\n")
+        self.assertIn("--from-zero", self.convert(late, self.folder / "v.h5", "-f", "v2e", code=2).stderr)
+        self.convert(late, self.folder / "v.h5", "-f", "v2e", "--from-zero")
+        rig = self.folder / "rig"
+        for camera in ("left", "right"):
+            (rig / camera).mkdir(parents=True)
+            (rig / camera / "events.txt").write_text(LINES)
+        (rig / "report.json").write_text(
+            '{"cameras": [{"name": "left", "width": 64, "height": 48}, {"name": "right", "width": 64, "height": 48}]}')
+        self.assertIn("choose one with --camera", self.convert(rig, self.folder / "rig.txt", code=2).stderr)
+        bag = self.folder / "rig.bag"
+        self.convert(rig, bag)
+        refused = run("stats", bag)
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn("esim convert --camera", refused.stderr)
+        long = self.folder / "long.txt"
+        long.write_text("0.5 1 1 1\n999999.5 1 2 0\n")
+        refused = run("play", long, "--slow-motion", "1", "--width", "64", "--height", "48")
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn("(--start, --duration, --slow-motion)", refused.stderr)
 
     def test_replaces_nothing_unasked(self):
         out = self.folder / "a.h5"

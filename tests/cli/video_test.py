@@ -63,7 +63,7 @@ class Video(ProgramTest):
             out = self.folder / name
             self.assertEqual(self.video("--fps", "50", out=out).returncode, 0)
             self.assertIn("ON", run("info", out).stdout)
-            self.assertIn("exists already: pass --force", self.video("--fps", "50", out=out).stderr)
+            self.assertRegex(self.video("--fps", "50", out=out).stderr, "exists already: .*pass --force to replace it")
             self.assertEqual(self.video("--fps", "50", "--force", out=out).returncode, 0)
             self.assertFalse((self.folder / (name + ".incomplete")).exists())
 

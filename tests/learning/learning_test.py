@@ -206,7 +206,7 @@ class Datasets(unittest.TestCase):
     def test_samples_are_the_sequences(self):
         tensor, target, fired = next(iter(esim.torch.AffineFlowDataset(first=2, **self.OPTIONS)))
         sequence = esim.dataset.AffineSequences(**self.OPTIONS)[2]
-        np.testing.assert_array_equal(tensor, esim.event_tensor(sequence.events, 24, 16, t0=0, t1=sequence.duration))
+        np.testing.assert_array_equal(tensor, esim.event_tensor(sequence.events, 24, 16, t0=0, t1=esim.ns(sequence.duration)))
         np.testing.assert_array_equal(target, sequence.displacement)
         np.testing.assert_array_equal(fired[0], tensor[0] + tensor[1] > 0)
         self.assertEqual({part.dtype for part in (tensor, target, fired)}, {torch.float32})
@@ -252,7 +252,7 @@ class Stored(Temporary):
             events["t"] = np.sort(random.integers(0, 40_000_001, len(events)))
             events["x"], events["y"] = random.integers(0, self.WIDTH, len(events)), random.integers(0, self.HEIGHT, len(events))
             events["p"] = random.choice([-1, 1], len(events))
-            tensor = esim.event_tensor(events, self.WIDTH, self.HEIGHT, t0=0, t1=40_000_000)
+            tensor = esim.event_tensor(events, self.WIDTH, self.HEIGHT, t0=0, t1=0.04)
             displacement, flow = random.normal(size=(2, 2, self.HEIGHT, self.WIDTH)).astype(np.float32)
             displacement[:, 0, 0] = np.nan
             sequences.append({**{f"events/{name}": events[name] for name in "txyp"},

@@ -103,13 +103,14 @@ TEST_F(Mcap, TheSummaryTellsTheEndAndTheChannels) {
   for (TimeNs t = 1; t <= 9; ++t) output.write(t % 2 == 0 ? "/even" : "/odd", ros::MessageType::imu, t, payload);
   output.close();
   const mcap::McapInput whole(path);
-  EXPECT_EQ(whole.last_time(), 9);
+  EXPECT_EQ(whole.times()->start, 1);
+  EXPECT_EQ(whole.times()->end, 9);
   EXPECT_EQ(whole.channels().size(), 2U);
 
   std::string bytes = test::content(path);
   bytes[bytes.size() - mcap::kMagic.size() - mcap::kFooterBytes] = 0;
   const mcap::McapInput without(base_.write("without.mcap", bytes));
-  EXPECT_FALSE(without.last_time());
+  EXPECT_FALSE(without.times());
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "esim/core/error.h"
+#include "esim/core/remedy.h"
 #include "record/recordings.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
@@ -22,6 +23,16 @@ class RecordingDirectoryTest : public testing::Test {
  protected:
   std::string refusal(const fs::path& path, bool force) {
     return message_of<UserError>([&] { RecordingDirectory directory(path, force); });
+  }
+  /// That of a path that is refused because something is there.
+  Remedy remedy() {
+    try {
+      RecordingDirectory directory(out_, false);
+    } catch (const RemediableError& error) {
+      EXPECT_FALSE(contains(error.what(), "--")) << "the library names no flags";
+      return error.remedy();
+    }
+    return Remedy::none;
   }
   void make_recording(const std::string& marker) {
     RecordingDirectory directory(out_, fs::exists(out_));
@@ -86,8 +97,9 @@ TEST_F(RecordingDirectoryTest, ParentsAreCreatedAndNamesNormalised) {
 
 TEST_F(RecordingDirectoryTest, ExistingRecordingNeedsForce) {
   make_recording("old");
-  EXPECT_TRUE(contains(refusal(out_, false), "pass --force"));
+  EXPECT_TRUE(contains(refusal(out_, false), "exists already"));
   EXPECT_TRUE(contains(refusal(out_, false), out_.string()));
+  EXPECT_EQ(remedy(), Remedy::replace_output);
   EXPECT_TRUE(fs::exists(out_ / "old"));
   make_recording("new");
   EXPECT_TRUE(fs::exists(out_ / "new"));
@@ -107,6 +119,7 @@ TEST_F(RecordingDirectoryTest, KilledRunStaysAndNeedsForce) {
   ASSERT_TRUE(fs::exists(incomplete_ / "part"));
   EXPECT_FALSE(is_being_written(incomplete_));
   EXPECT_TRUE(contains(refusal(out_, false), "killed"));
+  EXPECT_EQ(remedy(), Remedy::replace_output);
   EXPECT_TRUE(fs::exists(incomplete_ / "part"));
   {
     RecordingDirectory directory(out_, true);
@@ -156,7 +169,7 @@ TEST_F(RecordingDirectoryTest, ForceSparesHomeAndLinks) {
 
 TEST_F(RecordingDirectoryTest, EmptyDirectoryIsReplacedWithForceOnly) {
   fs::create_directory(out_);
-  EXPECT_TRUE(contains(refusal(out_, false), "pass --force"));
+  EXPECT_EQ(remedy(), Remedy::replace_output);
   RecordingDirectory directory(out_, true);
   directory.finish("{}");
   EXPECT_TRUE(fs::exists(out_ / "report.json"));
@@ -174,8 +187,11 @@ TEST_F(RecordingDirectoryTest, WhatAppearedMeanwhileIsSpared) {
 }
 
 TEST_F(RecordingDirectoryTest, UnwritableParentIsNamed) {
-  EXPECT_TRUE(contains(refusal("/proc/out", false), "cannot create the directory /proc/out.incomplete: "));
-  EXPECT_TRUE(contains(refusal("/proc/a/out", false), "cannot create the directory /proc/a: "));
+  const auto failure = [](const fs::path& path) {
+    return message_of<OutputError>([&] { RecordingDirectory directory(path, false); });
+  };
+  EXPECT_TRUE(contains(failure("/proc/out"), "cannot create the directory /proc/out.incomplete: "));
+  EXPECT_TRUE(contains(failure("/proc/a/out"), "cannot create the directory /proc/a: "));
 }
 
 TEST_F(RecordingDirectoryTest, FullDiskAtTheReport) {

@@ -152,7 +152,8 @@ TEST_F(Rosbag, TheIndexLeadsToEveryMessage) {
   }
   EXPECT_EQ(std::tuple(chunks, messages, connections), std::tuple(3U, 9U, 2U));
   EXPECT_EQ(indexed_positions, chunk_positions);
-  EXPECT_EQ(rosbag::RosbagInput(path).last_time(), 9);
+  EXPECT_EQ(rosbag::RosbagInput(path).times()->start, 1);
+  EXPECT_EQ(rosbag::RosbagInput(path).times()->end, 9);
 }
 
 }  // namespace

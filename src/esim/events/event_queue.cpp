@@ -64,6 +64,19 @@ EventSpan EventQueue::release_until(TimeNs watermark) {
   return released;
 }
 
+std::vector<Event> EventQueue::waiting() const {
+  std::vector<Event> events;
+  for (const Run& run : runs_) events.insert(events.end(), run.rest().begin(), run.rest().end());
+  std::sort(events.begin(), events.end());
+  return events;
+}
+
+void EventQueue::restore(EventSpan waiting) {
+  runs_.clear();
+  if (waiting.empty()) return;
+  std::copy(waiting.begin(), waiting.end(), runs_.emplace_back().events.make_room(waiting.size()));
+}
+
 std::size_t EventQueue::size() const {
   std::size_t count = 0;
   for (const Run& run : runs_) count += run.rest().size();

@@ -22,6 +22,10 @@ class EventQueue {
 
   std::size_t size() const;
 
+  /// All events that wait, in order, and a queue's beginning with such events.
+  std::vector<Event> waiting() const;
+  void restore(EventSpan waiting);
+
  private:
   /// Ordered events, of which the first ones have been released.
   struct Run {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/core/remedy.h"
 #include "esim/record/adapters.h"
 #include "esim/record/number_text.h"
 #include "esim/record/recording_directory.h"
@@ -28,8 +29,9 @@ std::optional<int> chosen_camera(const RecordingInfo& info, const Format& format
   const auto& cameras = info.cameras;
   if (name.empty()) {
     if (cameras.size() <= 1 || format.several_cameras) return std::nullopt;
-    throw UserError(
-        fmt::format("{} holds one camera, and there are {}: choose one with --camera", format.name, names_of(cameras)));
+    throw RemediableError(
+        fmt::format("{} holds one camera, and there are {}: choose one", format.name, names_of(cameras)),
+        Remedy::choose_camera);
   }
   const auto found =
       std::find_if(cameras.begin(), cameras.end(), [&](const CameraInfo& camera) { return camera.name == name; });
@@ -173,17 +175,17 @@ CopySummary convert_recording(const fs::path& from, const Format& format, const 
   return summary;
 }
 
-std::vector<std::string> losses(const CopySummary& summary, const Format& format) {
-  std::vector<std::string> lines;
+std::vector<Loss> losses(const CopySummary& summary, const Format& format) {
+  std::vector<Loss> losses;
   for (const auto& [content, count] : summary.left_out) {
-    lines.push_back(fmt::format("{} does not hold {}: {} left out", format.name, describe(content), grouped(count)));
+    losses.push_back({fmt::format("{} does not hold {}: {} left out", format.name, describe(content), grouped(count))});
   }
   if (summary.rounded_to > 0) {
-    lines.push_back(fmt::format("times of events are rounded down to {} us{}",
-                                static_cast<double>(summary.rounded_to) / static_cast<double>(kNsPerUs),
-                                format.either_unit ? "; --time-unit ns keeps them" : ""));
+    losses.push_back({fmt::format("times of events are rounded down to {} us",
+                                  static_cast<double>(summary.rounded_to) / static_cast<double>(kNsPerUs)),
+                      format.either_unit ? Remedy::nanoseconds : Remedy::none});
   }
-  return lines;
+  return losses;
 }
 
 }  // namespace esim

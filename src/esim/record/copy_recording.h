@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "esim/core/remedy.h"
 #include "esim/record/format.h"
 
 namespace esim {
@@ -43,7 +44,14 @@ struct ConvertOptions {
 CopySummary convert_recording(const std::filesystem::path& from, const Format& format, const std::filesystem::path& to,
                               const ConvertOptions& options, const std::function<bool(double)>& go_on);
 
-/// A line for each thing that was left out or changed, for people.
-std::vector<std::string> losses(const CopySummary& summary, const Format& format);
+/// Something that was left out or changed: a line for people, and how to keep it.
+struct Loss {
+  std::string what{};
+  Remedy remedy = Remedy::none;
+
+  bool operator==(const Loss&) const = default;
+};
+
+std::vector<Loss> losses(const CopySummary& summary, const Format& format);
 
 }  // namespace esim

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "esim/core/error.h"
+#include "esim/core/remedy.h"
 
 namespace esim {
 namespace {
@@ -83,8 +84,9 @@ EventsFile::EventsFile(const fs::path& path, const ReadOptions& options) : path_
   if (source_->info().cameras.size() != 1) {
     std::string names;
     for (const CameraInfo& camera : source_->info().cameras) names += (names.empty() ? "" : ", ") + camera.name;
-    throw UserError(
-        fmt::format("{} holds several cameras ({}): take one out with esim convert --camera", path_.string(), names));
+    throw RemediableError(
+        fmt::format("{} holds several cameras ({}): copy one into a file first", path_.string(), names),
+        Remedy::extract_camera);
   }
   if (size_of(*source_).width == 0) {
     told.sensor = reported_sensor(path_.parent_path());

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/core/remedy.h"
 #include "esim/record/output_file.h"
 
 namespace esim {
@@ -25,7 +26,7 @@ fs::path normalised(const fs::path& out) {
   fs::path path = out.lexically_normal();
   if (path.has_relative_path() && !path.has_filename()) path = path.parent_path();
   if (!path.has_filename() || path.filename() == "." || path.filename() == "..") {
-    throw UserError("cannot record to \"" + out.string() + "\": name a new directory with --out");
+    throw UserError("cannot record to \"" + out.string() + "\": give the path of a new directory");
   }
   return path;
 }
@@ -42,7 +43,7 @@ bool is_home(const fs::path& directory) {
   return home != nullptr && *home != '\0' && fs::equivalent(directory, home, error);
 }
 
-// --force deletes: only what is surely a recording.
+// Replacing deletes: only what is surely a recording.
 void require_replaceable(const fs::path& directory) {
   const auto refuse = [&](const std::string& why) {
     throw UserError(directory.string() + " " + why + ": not replaced, choose another name");
@@ -107,11 +108,11 @@ RecordingDirectory::RecordingDirectory(const fs::path& out, bool force)
     if (!fs::is_directory(status) && !fs::is_symlink(status)) {
       throw UserError(out_.string() + " is a file: choose another name");
     }
-    if (!force) throw UserError(out_.string() + " exists already: pass --force to replace it, or choose another name");
+    if (!force) throw RemediableError(out_.string() + " exists already: choose another name", Remedy::replace_output);
     require_replaceable(out_);
     replace_ = true;
   } else if (status.type() == fs::file_type::none) {
-    throw UserError("cannot record to " + out_.string() + ": " + error.message());
+    throw OutputError("cannot record to " + out_.string() + ": " + error.message());
   }
 
   try {
@@ -136,7 +137,7 @@ void RecordingDirectory::create_parents() {
     if (::mkdir(parent->c_str(), 0777) == 0) {
       created_parents_.push_back(*parent);
     } else if (errno != EEXIST) {
-      throw UserError("cannot create the directory " + parent->string() + ": " + system_reason(errno));
+      throw OutputError("cannot create the directory " + parent->string() + ": " + system_reason(errno));
     }
   }
 }
@@ -148,16 +149,16 @@ void RecordingDirectory::create_working_directory(bool force) {
       throw UserError(working_.string() + " is being written by another process: choose another name");
     }
     if (!force) {
-      throw UserError(working_.string() +
-                      " is left from a run that was killed: look at it with `esim info`, pass --force to replace it, "
-                      "or choose another name");
+      throw RemediableError(
+          working_.string() + " is left from a run that was killed: look at what it holds, or choose another name",
+          Remedy::replace_output);
     }
     require_replaceable(working_);
     fs::remove_all(working_, error);
-    if (error) throw UserError("cannot remove " + working_.string() + ": " + error.message());
+    if (error) throw OutputError("cannot remove " + working_.string() + ": " + error.message());
   }
   if (::mkdir(working_.c_str(), 0777) != 0) {
-    throw UserError("cannot create the directory " + working_.string() + ": " + system_reason(errno));
+    throw OutputError("cannot create the directory " + working_.string() + ": " + system_reason(errno));
   }
   owned_ = true;
   lock_ = lock_directory(working_);

@@ -15,7 +15,8 @@ namespace esim {
 class RecordingDirectory {
  public:
   /// Throws UserError if OUT exists or OUT.incomplete is left from a killed run, unless `force`; with it, still if what
-  /// would be replaced does not look like a recording, or is being written by a running process.
+  /// would be replaced does not look like a recording, or is being written by a running process. Throws OutputError
+  /// where the folders cannot be made.
   RecordingDirectory(const std::filesystem::path& out, bool force);
   ~RecordingDirectory();
   RecordingDirectory(const RecordingDirectory&) = delete;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/core/remedy.h"
 #include "esim/record/output_file.h"
 #include "esim/record/recording_directory.h"
 
@@ -15,14 +16,14 @@ RecordingFile::RecordingFile(fs::path out, bool force) : out_(std::move(out)), w
   const fs::path folder = out_.has_parent_path() ? out_.parent_path() : fs::path(".");
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
-    throw UserError(folder.string() + " is no folder: create it, or choose another name");
+    throw OutputError("cannot write " + out_.string() + ": " + folder.string() + " is not a folder; create it");
   }
   for (const fs::path& path : {out_, working_}) {
     const fs::file_status status = fs::symlink_status(path, error);
     if (!fs::exists(status)) continue;
     if (!fs::is_regular_file(status)) throw UserError(path.string() + " is not a file: choose another name");
     if (!force) {
-      throw UserError(path.string() + " exists already: pass --force to replace it, or choose another name");
+      throw RemediableError(path.string() + " exists already: choose another name", Remedy::replace_output);
     }
   }
 }

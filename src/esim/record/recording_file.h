@@ -8,7 +8,8 @@ namespace esim {
 /// without finish() it is removed. A killed process leaves OUT.incomplete.
 class RecordingFile {
  public:
-  /// Throws UserError if OUT or OUT.incomplete exists, unless `force`, or if OUT is a folder or has no folder to be in.
+  /// Throws UserError if OUT or OUT.incomplete exists, unless `force`, or if OUT is a folder; OutputError if the folder
+  /// that it is to be in is missing.
   RecordingFile(std::filesystem::path out, bool force);
   ~RecordingFile();
   RecordingFile(const RecordingFile&) = delete;

@@ -22,6 +22,13 @@ class CenterSurround {
   /// Moves on to `brightness`, `duration_s` later, and subtracts the surround from it.
   void advance(Image<float>& brightness, double duration_s);
 
+  /// What it remembers, for state_archive.h.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.image(self.wave_);
+    archive.image(self.surround_);
+  }
+
  private:
   void subtract(Image<float>& brightness);
 

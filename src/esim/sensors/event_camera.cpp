@@ -15,6 +15,7 @@
 #include "esim/sensors/pixel_update.h"
 #include "esim/sensors/pixel_watch.h"
 #include "esim/sensors/readout.h"
+#include "esim/sensors/state_archive.h"
 
 namespace esim {
 namespace {
@@ -50,6 +51,18 @@ struct EventCamera::State {
   bool advance(const Segment& segment, const Image<float>* given, Rows rows, int worker);
   void refuse_long_time(TimeNs duration) const;
   void subtract_surround(const Segment& segment, const Workers& workers);
+
+  /// All but memory to work in, and the queue.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    PixelArray::transfer(archive, self.pixels);
+    if (self.surround) CenterSurround::transfer(archive, *self.surround);
+    if (self.readout) Readout::transfer(archive, *self.readout);
+    archive.value(self.spoiled);
+    archive.value(self.last_time);
+    archive.value(self.frames);
+    if (self.frames > 0) archive.image(self.last_frame);
+  }
 
   PixelArray pixels;
   EventPacking packing;
@@ -217,6 +230,24 @@ EventCameraStatistics EventCamera::statistics() const {
   const Readout* readout = state_->readout ? &*state_->readout : nullptr;
   return {readout != nullptr ? readout->dropped() : 0,
           static_cast<std::int64_t>(state_->queue.size() + (readout != nullptr ? readout->waiting() : 0))};
+}
+
+std::vector<std::byte> EventCamera::state() const {
+  std::vector<std::byte> bytes;
+  StateWriter archive(bytes);
+  State::transfer(archive, *state_);
+  archive.list(state_->queue.waiting());
+  return bytes;
+}
+
+void EventCamera::restore(std::span<const std::byte> state) {
+  StateReader archive(state);
+  state_->last_frame = Image<float>(state_->size.width, state_->size.height);
+  State::transfer(archive, *state_);
+  std::vector<Event> waiting;
+  archive.list(waiting);
+  if (!archive.at_end()) StateReader::fail();
+  state_->queue.restore(waiting);
 }
 
 }  // namespace esim

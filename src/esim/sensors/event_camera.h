@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -58,6 +59,14 @@ class EventCamera {
   void release_until(TimeNs watermark, std::vector<Event>& out);
 
   EventCameraStatistics statistics() const;
+
+  /// All that the camera remembers, as bytes for restore(), by the same build of esim. They do not say how the camera
+  /// was made: neither options, size, seed nor stream.
+  std::vector<std::byte> state() const;
+
+  /// Makes a camera go on where one that was made alike was: it will give the same events. Throws UserError for bytes
+  /// of another length; the camera is then of no use.
+  void restore(std::span<const std::byte> state);
 
  private:
   struct State;

@@ -109,6 +109,21 @@ class PixelArray {
 
   AddressedRandom per_event, per_shot, per_leak;
 
+  /// What changes while the pixels watch, for state_archive.h.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.value(self.epoch);
+    archive.fixed(self.clean_pixels);
+    archive.fixed(self.until);
+    archive.fixed(self.noisy_pixels);
+    archive.fixed(self.band_low);
+    archive.fixed(self.band_high);
+    archive.fixed(self.alarms);
+    archive.fixed(self.brightness);
+    archive.fixed(self.filtered1);
+    archive.fixed(self.filtered2);
+  }
+
  private:
   static constexpr double kTicksPerNs = 1.0 / 65536;  // 39 hours fit
   static constexpr double kLastTick = 2147483646.0;

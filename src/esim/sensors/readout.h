@@ -26,6 +26,20 @@ class Readout {
   std::int64_t dropped() const { return dropped_; }
   std::size_t waiting() const { return waiting_; }
 
+  /// What it remembers, for state_archive.h.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.value(self.free_at_);
+    archive.list(self.slots_);
+    archive.value(self.free_slot_);
+    archive.fixed(self.rows_);
+    archive.fixed(self.requests_);
+    archive.value(self.first_request_);
+    archive.value(self.request_count_);
+    archive.value(self.waiting_);
+    archive.value(self.dropped_);
+  }
+
  private:
   /// Times in 1/1024 ns: fine enough for any rate, and 104 days long.
   using FineTime = std::int64_t;

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "esim/core/error.h"
+#include "esim/core/remedy.h"
 #include "esim/record/number_text.h"
 #include "esim/visualise/event_pictures.h"
 #include "esim/visualise/event_window.h"
@@ -123,9 +124,9 @@ Instants video_instants(const Survey& survey, const PlayOptions& options) {
   const double step_ns = 1e9 / (options.frames_per_s * options.slow_motion);
   const double steps = static_cast<double>(survey.end - survey.start) / step_ns;
   if (!(steps < kMostFrames)) {
-    throw UserError(
-        fmt::format("{} lasts {:.4g} s, too long for a video: choose a part with --duration, or --slow-motion",
-                    options.name, to_seconds(survey.end - survey.start)));
+    throw RemediableError(fmt::format("{} lasts {:.4g} s, too long for a video: choose a part of it, or show it faster",
+                                      options.name, to_seconds(survey.end - survey.start)),
+                          Remedy::shorter_video);
   }
   return {survey.start, step_ns, static_cast<std::size_t>(std::ceil(steps - 1e-6)) + 1};
 }

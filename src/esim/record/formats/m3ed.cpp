@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "esim/core/error.h"
+#include "esim/core/remedy.h"
 #include "esim/record/formats/hdf5_columns.h"
 #include "esim/record/formats/hdf5_detail.h"
 
@@ -109,8 +109,10 @@ void M3edWriter::write(const Record& record) {
   if (events == nullptr || events->camera != 0) return;
   for (const Event& event : events->events) {
     if (event.t < 0 || event.t > kLatest) {
-      throw UserError(path_.string() + ": M3ED counts times from the start of the recording, so that an event at " +
-                      std::to_string(event.t / kNsPerSecond) + " s does not fit: convert with --from-zero");
+      throw RemediableError(path_.string() +
+                                ": M3ED counts times from the start of the recording, so that an event at " +
+                                std::to_string(event.t / kNsPerSecond) + " s does not fit: choose another format",
+                            Remedy::times_from_zero);
     }
     const std::int64_t us = event.t / kNsPerUs;
     index_milliseconds_until(us);

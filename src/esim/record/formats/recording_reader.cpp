@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <utility>
@@ -57,6 +58,22 @@ std::vector<CameraInfo> cameras_in_folders(const fs::path& root) {
 bool is_recording(const fs::path& path) {
   return is_file(path / "report.json") || is_file(path / "calibration" / "rig.yaml") || is_camera_folder(path) ||
          !cameras_in_folders(path).empty();
+}
+
+/// Frames per second: the shortest number that gives just these times, where there is one. 0: unknown.
+double rate_of(const TruthHdf5Reader& truth) {
+  const std::uint64_t frames = truth.size();
+  if (frames < 2 || truth.t(frames - 1) <= truth.t(0)) return 0;
+  const double rate_hz = static_cast<double>(frames - 1) / to_seconds(truth.t(frames - 1) - truth.t(0));
+  for (double unit = 1; unit < 1e9; unit *= 10) {
+    const double shorter_hz = std::round(rate_hz * unit) / unit;
+    if (!(shorter_hz > 0)) continue;
+    const auto due = [&](std::uint64_t k) { return truth.t(0) + to_ns(static_cast<double>(k) / shorter_hz); };
+    std::uint64_t same = 0;
+    while (same < frames && truth.t(same) == due(same)) ++same;
+    if (same == frames) return shorter_hz;
+  }
+  return rate_hz;
 }
 
 /// Reads one folder: first what is known of the recording, then its streams.
@@ -238,7 +255,7 @@ class Folder {
     const auto truth = std::make_shared<TruthHdf5Reader>(folders_[i] / "truth.h5");
     learn_size(i, truth->sensor());
     if (truth->size() > 0) info_.end = std::max(info_.end, truth->t(truth->size() - 1));
-    if (truth->size() > 1 && truth->t(1) > truth->t(0)) info_.truth_rate_hz = 1 / to_seconds(truth->t(1) - truth->t(0));
+    if (const double rate_hz = rate_of(*truth); rate_hz > 0) info_.truth_rate_hz = rate_hz;
     learn_names(*truth);
     truth_.push_back(truth_stream(truth, camera, images));
   }

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "esim/core/error.h"
+#include "esim/core/remedy.h"
 #include "esim/record/formats/event_blocks.h"
 #include "esim/record/formats/hdf5_columns.h"
 #include "esim/record/formats/hdf5_input.h"
@@ -66,9 +67,9 @@ class V2eWriter final : public Sink {
     if (events == nullptr || events->camera != 0) return;
     for (const Event& event : events->events) {
       if (event.t < 0 || event.t / kNsPerUs > kLatestUs) {
-        throw UserError(path_.string() + ": v2e's times are from 0 to 71 minutes, so that an event at " +
-                        std::to_string(event.t / kNsPerSecond) +
-                        " s does not fit: convert with --from-zero, or choose another format");
+        throw RemediableError(path_.string() + ": v2e's times are from 0 to 71 minutes, so that an event at " +
+                                  std::to_string(event.t / kNsPerSecond) + " s does not fit: choose another format",
+                              Remedy::times_from_zero);
       }
       for (const std::int64_t number :
            {event.t / kNsPerUs, std::int64_t{event.x}, std::int64_t{event.y}, std::int64_t{event.polarity > 0}}) {

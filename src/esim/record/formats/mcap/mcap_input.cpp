@@ -47,13 +47,14 @@ void McapInput::read_summary() {
       if (record.op == Op::channel) add_channel(record.content);
       if (record.op != Op::statistics) continue;
       ros::ByteReader statistics(record.content);
-      statistics.take(8 + 2 + 4 + 4 + 4 + 4 + 8);  // counts, and the time of the first message
-      last_time_ = statistics.number<TimeNs>();
+      statistics.take(8 + 2 + 4 + 4 + 4 + 4);  // counts
+      const auto first = statistics.number<TimeNs>();
+      times_ = TimeSpan{first, statistics.number<TimeNs>()};
     }
   } catch (const UserError&) {
-    last_time_.reset();
+    times_.reset();
   } catch (const ros::Malformed&) {
-    last_time_.reset();
+    times_.reset();
   }
 }
 

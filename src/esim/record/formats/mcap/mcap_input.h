@@ -19,7 +19,7 @@ class McapInput final : public ros::MessageInput {
   explicit McapInput(std::filesystem::path path);
 
   const std::vector<ros::Channel>& channels() const override { return channels_; }
-  std::optional<TimeNs> last_time() const override { return last_time_; }
+  std::optional<TimeSpan> times() const override { return times_; }
   bool next(ros::Message& message) override;
   double progress() const override { return file_.progress(); }
   [[noreturn]] void fail(std::uint64_t offset, std::string_view reason) const override { file_.fail(offset, reason); }
@@ -39,7 +39,7 @@ class McapInput final : public ros::MessageInput {
   void add_channel(ros::Bytes content);
 
   InputFile file_;
-  std::optional<TimeNs> last_time_;
+  std::optional<TimeSpan> times_;
   bool ended_ = false;
   std::map<std::uint16_t, std::string> schemas_;  // their names
   std::vector<ros::Channel> channels_;

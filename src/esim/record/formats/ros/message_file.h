@@ -43,8 +43,9 @@ class MessageInput {
   /// Those in the file's index, where there is one; otherwise those up to the message read last.
   virtual const std::vector<Channel>& channels() const = 0;
 
-  /// Time of the last message; nothing where the file has no index: it was cut, or its writer was killed.
-  virtual std::optional<TimeNs> last_time() const = 0;
+  /// When the first and the last message were written, by the writer's clock, which need not be that of their stamps;
+  /// nothing where the file has no index: it was cut, or its writer was killed.
+  virtual std::optional<TimeSpan> times() const = 0;
 
   /// False at the end. Throws UserError where the file is damaged, and at the end of one that is not whole.
   virtual bool next(Message& message) = 0;

@@ -1,6 +1,7 @@
 #include "esim/record/formats/ros/survey.h"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <optional>
 
@@ -55,7 +56,7 @@ bool Surveyor::look(const MessageInput& input, const Message& message) {
   if (channel.type && !facts_.contains(message.channel)) {
     look_at_first(channel, message.payload, facts_[message.channel]);
   }
-  if (!input.last_time()) return true;
+  if (!input.times()) return true;
   const auto known = std::count_if(input.channels().begin(), input.channels().end(),
                                    [](const Channel& other) { return other.type.has_value(); });
   return bytes_ < kMaxBytes && facts_.size() < static_cast<std::size_t>(known);
@@ -147,7 +148,10 @@ Survey Surveyor::conclude(const MessageInput& input, const ReadOptions& options)
     if (channel.role == Role::imu) info.imu.emplace().T_body_imu = pose_in_body(std::string(frame::kImu));
   }
   info.start = start.value_or(0);
-  info.end = std::max(info.start, input.last_time().value_or(info.start));
+  const TimeSpan written = input.times().value_or(TimeSpan{});
+  info.end = info.start;
+  if (written.start >= 0 && written.end >= written.start)
+    info.end += std::min(written.end - written.start, std::numeric_limits<TimeNs>::max() / 4);
   const auto is_camera = [&](const std::string& name) {
     return std::find(roles.cameras.begin(), roles.cameras.end(), name) != roles.cameras.end();
   };

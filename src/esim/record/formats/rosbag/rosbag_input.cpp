@@ -51,14 +51,16 @@ void RosbagInput::read_bag_header() {
 void RosbagInput::read_index() {
   try {
     file_.seek(index_position_);
-    TimeNs last = 0;
+    std::optional<TimeSpan> times;
     for (Record record; next_in_file(record);) {
       if (op_of(record.header) == Op::connection) add_connection(record);
-      if (op_of(record.header) == Op::chunk_info) {
-        last = std::max(last, from_ros(field<std::uint64_t>(record.header, "end_time")));
-      }
+      if (op_of(record.header) != Op::chunk_info) continue;
+      const TimeSpan chunk{from_ros(field<std::uint64_t>(record.header, "start_time")),
+                           from_ros(field<std::uint64_t>(record.header, "end_time"))};
+      if (!times) times = chunk;
+      times = {std::min(times->start, chunk.start), std::max(times->end, chunk.end)};
     }
-    last_time_ = last;
+    times_ = times.value_or(TimeSpan{});
   } catch (const UserError&) {
   } catch (const ros::Malformed&) {
   }
@@ -104,7 +106,7 @@ bool RosbagInput::next(ros::Message& message) {
   try {
     for (;;) {
       const bool chunked = next_in_chunk(record);
-      if (!chunked && last_time_ && file_.offset() >= index_position_) return false;
+      if (!chunked && times_ && file_.offset() >= index_position_) return false;
       if (!chunked && !next_in_file(record)) {
         fail(record.offset, "the bag ends without an index: it was cut, or not finished");
       }

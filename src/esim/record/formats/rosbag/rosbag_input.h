@@ -18,7 +18,7 @@ class RosbagInput final : public ros::MessageInput {
   explicit RosbagInput(std::filesystem::path path);
 
   const std::vector<ros::Channel>& channels() const override { return channels_; }
-  std::optional<TimeNs> last_time() const override { return last_time_; }
+  std::optional<TimeSpan> times() const override { return times_; }
   bool next(ros::Message& message) override;
   double progress() const override { return file_.progress(); }
   [[noreturn]] void fail(std::uint64_t offset, std::string_view reason) const override { file_.fail(offset, reason); }
@@ -38,7 +38,7 @@ class RosbagInput final : public ros::MessageInput {
 
   InputFile file_;
   std::uint64_t index_position_ = 0;  // 0: there is none
-  std::optional<TimeNs> last_time_;
+  std::optional<TimeSpan> times_;
   std::vector<ros::Channel> channels_;
   std::map<std::uint32_t, std::size_t> channel_of_connection_;
   std::string header_;  // of the record in the file

@@ -1,0 +1,260 @@
+"""The checks of what users hand in: numbers, sizes, times, images. Every entry of the package uses these.
+
+What is of the wrong kind is a TypeError, and a value that is out of range an esim.Error. Both name the argument.
+"""
+
+import datetime
+import math
+import numbers
+import operator
+
+import numpy as np
+
+from ._errors import Error
+
+MAX_EXTENT = 65536  # px
+MAX_TIME_S = 9.2e9  # within what 64 bits of nanoseconds hold
+
+
+def _kind(value):
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype}, shape {value.shape}"
+    return f"{value!r}, a {type(value).__name__}"
+
+
+def whole(value, name, low, high):
+    """An int from low to high; numpy's too."""
+    try:
+        if isinstance(value, (bool, np.bool_)):
+            raise TypeError
+        number = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} must be an int, not {_kind(value)}") from None
+    if not low <= number <= high:
+        raise Error(f"{name} must be between {low} and {high}, not {number}")
+    return number
+
+
+def number(value, name, *, above=None, low=-math.inf, high=math.inf):
+    """A finite float, of an int or a float; numpy's too."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):
+        raise TypeError(f"{name} must be a number, not {_kind(value)}")
+    try:
+        real = float(value)
+    except OverflowError:
+        real = math.inf
+    if not math.isfinite(real):
+        raise Error(f"{name} must be finite, not {value}")
+    if above is not None and not real > above:
+        raise Error(f"{name} must be above {above:g}, not {value}")
+    if not low <= real <= high:
+        raise Error(f"{name} must be between {low:g} and {high:g}, not {value}")
+    return real
+
+
+def flag(value, name):
+    """A bool."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{name} must be True or False, not {_kind(value)}")
+    return bool(value)
+
+
+def one_of(value, name, choices):
+    """One of some words."""
+    if not isinstance(value, str) or value not in choices:
+        raise Error(f"{name} must be one of {', '.join(map(repr, choices))}, not {value!r}")
+    return value
+
+
+def seed(value):
+    """What random numbers begin with."""
+    return whole(value, "seed", 0, 2**64 - 1)
+
+
+def threads(value):
+    """A number of threads; 0: one for every processor."""
+    return whole(value, "threads", 0, 1024)
+
+
+def sensor_size(width, height):
+    """Width and height of a sensor, px."""
+    return whole(width, "width", 1, MAX_EXTENT), whole(height, "height", 1, MAX_EXTENT)
+
+
+def optional_sensor_size(width, height):
+    """The same, or None for both."""
+    if (width is None) != (height is None):
+        raise Error("give width and height of the sensor, or neither")
+    return (None, None) if width is None else sensor_size(width, height)
+
+
+# Times. What an argument takes does not depend on whether a number is written as an int or as a float by accident: where
+# the name does not say the unit, a bare int is refused.
+
+
+def seconds(value, name, *, above=None, low=-MAX_TIME_S):
+    """What the name says is in seconds, as a float: any number."""
+    return number(value, name, above=above, low=low, high=MAX_TIME_S)
+
+
+def packet_length(packet_s):
+    """Length of packets as int ns; 0 where it is not given."""
+    if packet_s is None:
+        return 0
+    return max(1, round(seconds(packet_s, "packet_s", above=0) * 1e9))
+
+
+def ns(t):
+    """Nanoseconds, as esim gives times, for where it asks for a time.
+
+    Parameters
+    ----------
+    t : int, or an array of ints
+        ns: `packet.t1`, `events["t"]`, ....
+
+    Returns
+    -------
+    numpy.timedelta64 of unit "ns", or an array of them
+
+    Raises
+    ------
+    TypeError
+        For anything but ints.
+    """
+    array = np.asarray(t)
+    if array.dtype.kind not in "iu":
+        raise TypeError(f"esim.ns() takes ints, not {_kind(t)}; a time in seconds is a float")
+    _require_range(array.astype(np.float64) * 1e-9, "t")
+    return array.astype("m8[ns]")[()]
+
+
+def time(t, name="t"):
+    """A time as int ns: of a float, s, or of what has a unit, such as esim.ns()."""
+    if isinstance(t, float) and abs(t) < MAX_TIME_S:  # the usual case, faster
+        return round(t * 1e9)
+    value = times(t, name)
+    if value.ndim != 0:
+        raise TypeError(f"{name} must be one time, not {_kind(t)}")
+    return int(value)
+
+
+def times(t, name="t"):
+    """Times as an array of int64 ns, contiguous, likewise."""
+    array = np.asarray(np.timedelta64(t) if isinstance(t, datetime.timedelta) else t)
+    kind = array.dtype.kind
+    if kind == "f":
+        array = array.astype(np.float64)
+        _require_range(array, name)
+        return np.asarray(np.rint(array * 1e9), np.int64, order="C")
+    if kind == "m":
+        return _of_timedelta(array, name)
+    if kind in "iu" and not array.any():  # 0 is 0 in any unit
+        return np.asarray(array, np.int64, order="C")
+    if kind in "iu" or (array.ndim == 0 and isinstance(t, numbers.Integral) and not isinstance(t, bool)):
+        example = array[array != 0].flat[0] if array.dtype.kind != "O" else t
+        raise TypeError(
+            f"{name} must be a float (s), or esim.ns(...) for an int (ns): the int {example} does not say which it is; "
+            f"write {example}.0 for seconds, or esim.ns({example}) for nanoseconds"
+        )
+    raise TypeError(f"{name} must be a float (s), or esim.ns(...) for an int (ns), not {_kind(t)}")
+
+
+def _require_range(array_s, name):
+    if not (np.abs(array_s) < MAX_TIME_S).all():
+        raise Error(f"{name} must be finite, and within 292 years of 0")
+
+
+def _of_timedelta(array, name):
+    unit = np.datetime_data(array.dtype)[0]
+    if unit in ("generic", "Y", "M"):
+        raise TypeError(f"{name}: a timedelta64 of unit {unit!r} is not a number of nanoseconds")
+    if np.isnat(array).any():
+        raise Error(f"{name} must be finite, not NaT")
+    _require_range(array / np.timedelta64(1, "s"), name)
+    exact = array.astype("m8[ns]")
+    if (exact.astype(array.dtype) != array).any():
+        raise Error(f"{name} must be a whole number of nanoseconds")
+    return np.asarray(exact.view(np.int64), order="C")
+
+
+# Images.
+
+
+def _require_shape(image, name, shape):
+    if image.shape == shape:
+        return
+    height, width = shape[-2:]
+    given = f"{image.shape[1]} x {image.shape[0]} pixels" if image.ndim == 2 else f"{image.ndim} dimensions"
+    raise Error(f"{name} of shape {image.shape} must be {width} x {height} pixels, shape {shape}, not {given}")
+
+
+def _to_float32(image):
+    with np.errstate(over="ignore"):  # infinite then, which is told
+        return np.ascontiguousarray(image, np.float32)
+
+
+def irradiance(image, name, shape):
+    """Linear light as contiguous float32. EventCamera sees for itself whether its values are finite and 0 or above."""
+    image = np.asarray(image)
+    if image.dtype.kind != "f":
+        raise TypeError(
+            f"{name} must be floats, linear light with 1 = white, not {image.dtype}; esim.linear_light() makes it of the "
+            "codes of a picture"
+        )
+    _require_shape(image, name, shape)
+    return _to_float32(image)
+
+
+def rendered_irradiance(image, name, shape):
+    """The same, with its values checked."""
+    image = irradiance(image, name, shape)
+    wrong = ~((image >= 0) & (image < np.inf))
+    if wrong.any():
+        y, x = np.argwhere(wrong)[0]
+        raise Error(f"{name} must be finite and 0 or above, not {image[y, x]} at pixel ({x}, {y})")
+    return image
+
+
+def depth(image, name, shape):
+    """Depth, m, as contiguous float32; inf where there is nothing."""
+    image = np.asarray(image)
+    if image.dtype.kind != "f":
+        raise TypeError(f"{name} must be floats, m along the optical axis, not {image.dtype}")
+    _require_shape(image, name, shape)
+    image = _to_float32(image)
+    if not (image > 0).all():
+        raise Error(f"{name} must be above 0 everywhere: depth is above 0, and inf where nothing is seen")
+    return image
+
+
+def motion_field(image, name, shape):
+    """A motion field, px/s, as contiguous float32."""
+    image = np.asarray(image)
+    if image.dtype.kind not in "fi":
+        raise TypeError(f"{name} must be signed numbers, px/s, not {image.dtype}")
+    _require_shape(image, name, shape)
+    return _to_float32(image)
+
+
+def labels(image, name, shape, count):
+    """Numbers from 0 to count as contiguous uint16."""
+    image = np.asarray(image)
+    if image.dtype.kind not in "iuf":
+        raise TypeError(f"{name} must be ints, not {image.dtype}")
+    _require_shape(image, name, shape)
+    wrong = image[~((image >= 0) & (image <= count) & (image == np.floor(image)))]
+    if wrong.size:
+        raise Error(f"{name} {wrong.flat[0]:g} of {count}: must be ints from 0, which stands for none, to {count}")
+    return np.ascontiguousarray(image, np.uint16)
+
+
+def picture(image):
+    """The codes of a picture, uint8 or uint16, grey or with three colours."""
+    image = np.asarray(image)
+    if image.dtype not in (np.uint8, np.uint16):
+        raise TypeError(f"a picture must be uint8 or uint16, not {image.dtype}")
+    if not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)):
+        raise Error(f"a picture must have the shape (height, width) or (height, width, 3), not {image.shape}")
+    return image

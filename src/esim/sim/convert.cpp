@@ -74,6 +74,7 @@ class Run {
       Stopwatch stopwatch(summary_.seconds.write);
       out_.end(complete);
     }
+    summary_.sensor = conversion_.event_camera.statistics();
     summary_.complete = complete;
     summary_.problem = std::move(problem);
     summary_.wall_seconds = elapsed();

@@ -101,7 +101,7 @@ void run_event_camera(benchmark::State& state, EventCameraOptions options, int t
       const Image<float>& before = images[static_cast<std::size_t>(std::max(k - 1, 0))];
       const Image<float>& after = images[static_cast<std::size_t>(k)];
       const Segment segment{after.bounds(), std::max(k - 1, 0) * kInterval, k * kInterval, &before, &after};
-      camera.integrate(std::span(&segment, 1), workers);
+      camera.integrate(std::span(&segment, 1), segment.t1, workers);
       events.clear();
       camera.release_until(k * kInterval, events);
       count += events.size();

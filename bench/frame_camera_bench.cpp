@@ -40,7 +40,7 @@ void frames(benchmark::State& state) {
       const Segment segment{images[0].bounds(), sample == 0 ? t : t - kInterval, t,
                             &image(sample == 0 ? 0 : sample - 1), &image(sample)};
       const double start = seconds();
-      event_camera.integrate({&segment, 1}, workers);
+      event_camera.integrate({&segment, 1}, t, workers);
       events.clear();
       event_camera.release_until(t, events);
       const double between = seconds();

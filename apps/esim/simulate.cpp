@@ -51,7 +51,14 @@ int run(const Arguments& arguments) {
   bar.clear();
   if (!made) return kInterrupted;  // while loading: nothing was worth keeping
   const Summary& summary = *made;
-  if (!arguments.quiet) print_summary(summary, out, scenario.output.preview && scenario.truth.rate_hz > 0);
+  for (const std::string& loss : losses(scenario, summary)) fmt::print(stderr, "warning: {}\n", loss);
+  if (!arguments.quiet) {
+    print_summary(summary, out, scenario.output.preview && scenario.truth.rate_hz > 0);
+    for (const std::string& hint : hints(scenario, summary)) {
+      fmt::print(stderr, "hint:      {}, for example esim simulate {} --set 'sampling={{type: flow}}'\n", hint,
+                 arguments.scenario);
+    }
+  }
   if (!summary.problem.empty()) {
     throw UserError(fmt::format("{}; the {:.3f} s before it are simulated: {}, marked incomplete", summary.problem,
                                 to_seconds(summary.end - summary.start), out.string()));

@@ -77,12 +77,14 @@ class CommandLine {
   CLI::App& command_;
 };
 
-void report_held(const ConversionSummary& summary, int max_steps, const Notices& notices) {
-  if (summary.held == 0) return;
-  notices.warning(
-      fmt::format("between {} of {} pairs of frames, something moves too far for {} steps (up to {:.0f} px); "
-                  "raise --lambda or --max-steps, or give a video with more frames per second",
-                  summary.held, summary.frames - 1, max_steps, summary.displacement_px));
+void report_losses(const ConversionSummary& summary, const ConversionOptions& options, const Notices& notices) {
+  if (summary.held > 0) {
+    notices.warning(
+        fmt::format("between {} of {} pairs of frames, something moves too far for {} steps (up to {:.0f} px); "
+                    "raise --lambda or --max-steps, or give a video with more frames per second",
+                    summary.held, summary.frames - 1, options.interpolation.max_steps, summary.displacement_px));
+  }
+  std::ranges::for_each(losses(options, summary), notices.warning);
 }
 
 void print_summary(const ConversionSummary& summary) {
@@ -137,7 +139,7 @@ int convert_to_file(const Arguments& arguments, const fs::path& out, const Forma
   const std::unique_ptr<Sink> sink = build_conversion_sink(file.path(), format);
   const ConversionSummary summary = converter.run(*sink);
   file.finish();
-  report_held(summary, arguments.options.interpolation.max_steps, notices);
+  report_losses(summary, arguments.options, notices);
   if (!arguments.quiet) {
     print_summary(summary);
     fmt::print(stderr, "events: {}\n", out.string());
@@ -152,7 +154,7 @@ int convert_to_folder(const Arguments& arguments, const fs::path& out, const Not
   write_text(directory.path() / "video.yaml", write_conversion(arguments.options));
   const std::unique_ptr<Sink> sink = build_conversion_sink(directory.path());
   const ConversionSummary summary = converter.run(*sink);
-  report_held(summary, arguments.options.interpolation.max_steps, notices);
+  report_losses(summary, arguments.options, notices);
   directory.finish(report_json(arguments.options, summary, converter.threads(), given));
   if (!arguments.quiet) {
     print_summary(summary);

@@ -53,6 +53,38 @@ class Recordings(Cli):
             text = (self.out / "cam0" / "events.txt").read_text()
             self.assertEqual(len(back.read_text().splitlines()), len(text.splitlines()))
 
+    def test_a_saturated_readout_is_reported(self):
+        result = self.simulate(*FAST, "--set", "event_camera.contrast_threshold=0.1",
+                               "--set", "event_camera.readout.rate_mev_per_s=0.05", "--set", "output.formats=[text]")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stderr, r"warning: cam0: the readout was saturated: .* % of the events waited")
+        self.assertIn("event_camera.readout.rate_mev_per_s (0.05 Mev/s)", result.stderr)
+        report = json.loads((self.out / "report.json").read_text())
+        camera = report["cameras"][0]
+        self.assertGreater(camera["events_delayed_by_readout"], camera["events"] / 100)
+        self.assertGreater(camera["longest_readout_delay_s"], 1e-4)
+        self.assertTrue(any("the readout was saturated" in notice for notice in report["notices"]), report["notices"])
+        # One pixel is never reported twice at once.
+        lines = (self.out / "cam0" / "events.txt").read_text().splitlines()
+        at_once = {(int(float(t) * 1e6), x, y) for t, x, y, _ in (line.split() for line in lines)}
+        self.assertGreater(len(at_once), 1000)
+        self.assertEqual(len(at_once), len(lines))
+
+        result = self.simulate(*FAST, "--force", "--set", "event_camera.contrast_threshold=0.1",
+                               "--set", "event_camera.readout={rate_mev_per_s: 0.05, queue_events: 10}")
+        self.assertRegex(result.stderr, r"warning: cam0: the readout dropped [\d,]+ of [\d,]+ events .*queue_events")
+
+    def test_a_run_that_misses_nothing_warns_of_nothing(self):
+        result = self.simulate(*FAST)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertNotIn("warning", result.stderr)
+
+    def test_samples_held_to_the_maximum_rate_are_reported(self):
+        result = self.simulate(*FAST, "--set", "sampling={type: flow, lambda: 0.1, max_rate_hz: 100}")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stderr, r"warning: cam0: \d+ intervals between samples were held to sampling.max_rate_hz "
+                                        r"\(100 Hz\)")
+
     def test_a_recording_holds_what_the_manual_says(self):
         result = self.simulate(*FAST, "--set", "output.formats=[text]")
         self.assertEqual(result.returncode, 0, result.stderr)

@@ -9,8 +9,8 @@ int main() {
   esim::EventCamera camera({.contrast_threshold = 0.2}, 4, 3, 0, 0);
   const esim::Image<float> dark(4, 3, 0.1F), bright(4, 3, 0.3F);
   const esim::Segment first{dark.bounds(), 0, 0, &dark, &dark}, second{dark.bounds(), 0, 1'000'000, &dark, &bright};
-  camera.integrate(std::span(&first, 1), workers);
-  camera.integrate(std::span(&second, 1), workers);
+  camera.integrate(std::span(&first, 1), 0, workers);
+  camera.integrate(std::span(&second, 1), second.t1, workers);
   std::vector<esim::Event> events;
   camera.release_until(1'000'000, events);
   std::printf("%zu events, %zu bytes of options\n", events.size(), sizeof(esim::Scenario));

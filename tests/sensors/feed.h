@@ -24,7 +24,7 @@ class Feed {
     std::vector<Segment> segments;
     const bool first = last_.empty();
     for (const Tile& tile : tiles) segments.push_back({tile, first ? t : last_t_, t, first ? &frame : &last_, &frame});
-    camera_.integrate(segments, workers);
+    camera_.integrate(segments, t, workers);
     last_ = frame;
     last_t_ = t;
   }

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "esim/core/image.h"
@@ -15,9 +17,9 @@
 
 namespace esim::test {
 
-/// The event camera as its options word it, without low-pass, surround and readout: pixel by pixel and event by event,
-/// in double precision and without a shortcut. Slow, and simple enough to be believed. It draws the same random
-/// numbers. Frames are whole images at increasing times.
+/// The event camera as its options word it, without low-pass and surround: pixel by pixel and event by event, in double
+/// precision and without a shortcut. Slow, and simple enough to be believed. It draws the same random numbers. Frames
+/// are whole images at increasing times.
 class LiteralEventCamera {
  public:
   LiteralEventCamera(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream)
@@ -33,14 +35,18 @@ class LiteralEventCamera {
 
   std::vector<Event> process(const Image<float>& frame, TimeNs t) {
     std::vector<Event> events;
+    if (last_t_ && options_.readout.limited()) {
+      read_out(frame, *last_t_, t, events);
+    } else if (last_t_) {
+      for (std::size_t i = 0; i < pixels_.size(); ++i) {
+        while (const auto event = next_event(i, *last_t_, t, frame.pixels()[i])) events.push_back(*event);
+      }
+    }
     for (std::size_t i = 0; i < pixels_.size(); ++i) {
       const double light = frame.pixels()[i];
-      if (last_t_) {
-        walk(i, *last_t_, t, light, events);
-      } else {
-        open(i, t, light);
-      }
+      if (!last_t_) open(i, t, light);
       pixels_[i].light = light;
+      pixels_[i].from = 0;
     }
     last_t_ = t;
     std::sort(events.begin(), events.end());
@@ -54,7 +60,8 @@ class LiteralEventCamera {
     std::array<float, 4> normals{};
     std::uint64_t shots = 0;
     TimeNs shot_at = std::numeric_limits<TimeNs>::max();
-    std::optional<TimeNs> busy_until;  // refractory
+    std::optional<TimeNs> busy_until;  // refractory, or waiting for the readout
+    double from = 0;                   // s after the frame before: what lies before is done
   };
 
   static constexpr double kNever = std::numeric_limits<double>::infinity();
@@ -118,22 +125,23 @@ class LiteralEventCamera {
     if (dead < options_.dead_pixels) pixel.on = pixel.off = kNever, pixel.leak = 0;
   }
 
-  void walk(std::size_t i, TimeNs t0, TimeNs t1, double light1, std::vector<Event>& events) {
+  /// The next event of a pixel on the way from the frame at t0 to that at t1.
+  std::optional<Event> next_event(std::size_t i, TimeNs t0, TimeNs t1, double light1) {
     Pixel& pixel = pixels_[i];
     const double start = brightness(pixel.light), end = brightness(light1), duration = to_seconds(t1 - t0);
     const double slope = (end - start) / duration;
     const auto level_at = [&](double tau) { return start + slope * tau; };  // tau in s after t0
     const auto light_at = [&](double tau) { return pixel.light + (light1 - pixel.light) * tau / duration; };
-    const bool holds = options_.refractory_mode == RefractoryMode::hold;
-    double from = 0;
+    const bool holds = options_.refractory_mode == RefractoryMode::hold, read_out = options_.readout.limited();
     while (true) {
       if (holds && pixel.busy_until) {
-        if (*pixel.busy_until > t1) return;
-        from = to_seconds(*pixel.busy_until - t0);
-        pixel.reference = level_at(from);
-        pixel.reference_t = to_seconds(t0) + from;
+        if (*pixel.busy_until > t1) return std::nullopt;
+        pixel.from = to_seconds(*pixel.busy_until - t0);
+        pixel.reference = level_at(pixel.from);
+        pixel.reference_t = to_seconds(t0) + pixel.from;
         pixel.busy_until.reset();
       }
+      const double from = pixel.from;
       // The levels fall with the reference.
       const double reference_at_start = pixel.reference - pixel.leak * (to_seconds(t0) - pixel.reference_t);
       double tau = kNever;
@@ -155,22 +163,75 @@ class LiteralEventCamera {
         tau = at, noise = true, polarity = (bits[2] & 1U) != 0 ? 1 : -1;
         break;
       }
-      if (tau == kNever) return;
+      if (tau == kNever) return std::nullopt;
 
       const TimeNs t = std::clamp<TimeNs>(t0 + std::llround(tau * 1e9), t0 + 1, t1);
       const double passed = reference_at_start - pixel.leak * tau + (polarity > 0 ? pixel.on : -pixel.off);
       draw(i);
-      const bool lost = !holds && pixel.busy_until && t < *pixel.busy_until;
-      if (!lost) {
-        events.push_back(
-            {t + delay(pixel, light_at(tau)), static_cast<std::uint16_t>(i % static_cast<std::size_t>(width_)),
-             static_cast<std::uint16_t>(i / static_cast<std::size_t>(width_)), static_cast<std::int8_t>(polarity)});
-        if (options_.refractory_period_us > 0) pixel.busy_until = t + to_ns(options_.refractory_period_us * 1e-6);
-      }
+      const bool lost = !holds && !read_out && pixel.busy_until && t < *pixel.busy_until;
+      if (!lost && options_.refractory_period_us > 0) pixel.busy_until = t + refractory();
       pixel.reference = noise ? level_at(tau) : passed;
       pixel.reference_t = to_seconds(t0) + tau;
-      from = tau;
+      pixel.from = tau;
+      if (!lost) {
+        return Event{t + delay(pixel, light_at(tau)),
+                     static_cast<std::uint16_t>(i % static_cast<std::size_t>(width_)),
+                     static_cast<std::uint16_t>(i / static_cast<std::size_t>(width_)),
+                     static_cast<std::int8_t>(polarity)};
+      }
     }
+  }
+
+  TimeNs refractory() const { return to_ns(options_.refractory_period_us * 1e-6); }
+
+  /// One request, one row and one acknowledgement after the other.
+  void read_out(const Image<float>& frame, TimeNs t0, TimeNs t1, std::vector<Event>& events) {
+    constexpr TimeNs kNoTime = std::numeric_limits<TimeNs>::max();
+    const ReadoutOptions& o = options_.readout;
+    const bool holds = options_.refractory_mode == RefractoryMode::hold;
+    const TimeNs per_event = o.rate_mev_per_s > 0 ? std::llround(1e3 / o.rate_mev_per_s) : 0;
+    const TimeNs per_row = std::llround(o.row_time_us * 1e3), prompt = std::min<TimeNs>(1000, refractory() / 100);
+    const auto look = [&](std::size_t i) {
+      while (const auto event = next_event(i, t0, t1, frame.pixels()[i])) {
+        requests_.insert(*event);
+        if (!holds) continue;
+        pixels_[i].busy_until = kNoTime;  // until it is read out
+        return;
+      }
+    };
+    blind_until_.resize(pixels_.size(), std::numeric_limits<TimeNs>::min());
+    for (std::size_t i = 0; i < pixels_.size(); ++i) look(i);
+    while (true) {
+      const TimeNs arrival = requests_.empty() ? kNoTime : requests_.begin()->t;
+      const TimeNs service = waiting_.empty() ? kNoTime : std::max(free_at_, waiting_[0].t);
+      if (std::min(arrival, service) > t1) return;
+      if (arrival <= service) {  // what arrives at the time of a service is still taken
+        const Event request = *requests_.begin();
+        requests_.erase(requests_.begin());
+        const auto same = [&](const Event& e) { return e.x == request.x && e.y == request.y; };
+        const bool blind = arrival < blind_until_[pixel_of(request)] || std::ranges::any_of(waiting_, same);
+        if (holds || !blind) waiting_.push_back(request);
+        continue;
+      }
+      std::vector<Event> served;
+      std::ranges::copy_if(waiting_, std::back_inserter(served), [&](const Event& e) { return e.y == waiting_[0].y; });
+      const int row = waiting_[0].y;
+      std::erase_if(waiting_, [&](const Event& e) { return e.y == row; });
+      free_at_ = service + std::max<TimeNs>(1, per_row + per_event * static_cast<TimeNs>(served.size()));
+      for (const Event& request : served) {
+        events.push_back({service, request.x, request.y, request.polarity});
+        const std::size_t i = pixel_of(request);
+        const TimeNs until = (service - request.t > prompt ? service : request.t) + refractory();
+        blind_until_[i] = service + refractory();
+        if (!holds) continue;
+        pixels_[i].busy_until = until;
+        look(i);
+      }
+    }
+  }
+
+  std::size_t pixel_of(const Event& event) const {
+    return static_cast<std::size_t>(event.y) * static_cast<std::size_t>(width_) + event.x;
   }
 
   TimeNs delay(const Pixel& pixel, double light) const {
@@ -187,6 +248,12 @@ class LiteralEventCamera {
   PixelNormals normals_;
   AddressedRandom mismatch_, per_event_, leak_, shot_, defects_;
   std::optional<TimeNs> last_t_;
+
+  // The readout: requests that are still to come, requests that wait, and when the reader is free.
+  std::set<Event> requests_;
+  std::vector<Event> waiting_;
+  std::vector<TimeNs> blind_until_;
+  TimeNs free_at_ = std::numeric_limits<TimeNs>::min();
 };
 
 }  // namespace esim::test

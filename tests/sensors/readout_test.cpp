@@ -7,8 +7,6 @@
 #include <random>
 #include <vector>
 
-#include "sensors/feed.h"
-
 namespace esim {
 namespace {
 
@@ -61,6 +59,20 @@ std::vector<Event> by_the_rules(const std::vector<Event>& events, TimeNs per_eve
   return out;
 }
 
+/// Gives requests to the readout, and serves its rows when they are due, until a time.
+void run(Readout& readout, EventSpan events, TimeNs until, std::vector<Event>& out) {
+  const auto serve_before = [&](TimeNs t) {
+    for (TimeNs service = readout.next_service(); service < t; service = readout.next_service()) {
+      for (const Event& request : readout.serve()) out.push_back({service, request.x, request.y, request.polarity});
+    }
+  };
+  for (const Event& event : events) {
+    serve_before(event.t);
+    readout.take(event);
+  }
+  serve_before(until + 1);
+}
+
 TEST(Readout, FollowsItsRules) {
   unsigned seed = 0;
   for (const TimeNs span : {TimeNs{2'000'000}, TimeNs{100'000}, TimeNs{20'000}}) {
@@ -77,16 +89,16 @@ TEST(Readout, FollowsItsRules) {
         for (TimeNs until = 0; begin < events.size() || readout.waiting() > 0; until += 1 + random() % 30'000) {
           std::size_t end = begin;
           while (end < events.size() && events[end].t <= until) ++end;
-          readout.advance(EventSpan(events).subspan(begin, end - begin), until, out);
+          run(readout, EventSpan(events).subspan(begin, end - begin), until, out);
           begin = end;
         }
         std::int64_t dropped = 0;
-        const std::vector<Event> expected =
+        std::vector<Event> expected =
             by_the_rules(events, 10, per_row, static_cast<std::size_t>(capacity), dropped);
+        std::ranges::sort(out), std::ranges::sort(expected);  // here a pixel may have several requests in its row
         EXPECT_EQ(out, expected);
         EXPECT_EQ(readout.dropped(), dropped);
         EXPECT_EQ(out.size() + static_cast<std::size_t>(dropped), events.size());
-        EXPECT_TRUE(std::is_sorted(out.begin(), out.end()));
       }
     }
   }
@@ -96,27 +108,10 @@ TEST(Readout, KeepsToItsRateUnderLoad) {
   const std::vector<Event> events = random_events(50'000, 1'000'000, 3);  // 50 events per us
   Readout readout({.rate_mev_per_s = 3, .queue_events = 200}, kHeight);
   std::vector<Event> out;
-  readout.advance(events, 1'000'000, out);
+  run(readout, events, 1'000'000, out);
   EXPECT_NEAR(static_cast<double>(out.size()), 3000, 30);
   EXPECT_EQ(out.size() + readout.waiting() + static_cast<std::size_t>(readout.dropped()), events.size());
   EXPECT_LE(readout.waiting(), 200U);
-}
-
-TEST(Readout, OfACameraLosesNothingThatItDoesNotCount) {
-  EventCameraOptions options;
-  options.contrast_threshold = 0.1;
-  EventCameraOptions limited = options;
-  limited.readout = {.rate_mev_per_s = 2, .row_time_us = 1, .queue_events = 300};
-  test::Feed free(options, 64, 48), narrow(limited, 64, 48);
-  std::size_t all = 0, read = 0;
-  for (int k = 0; k <= 20; ++k) {
-    const Image<float> frame(64, 48, 0.1F * static_cast<float>(1 + k % 3));
-    free.frame(frame, k * kNsPerMs), narrow.frame(frame, k * kNsPerMs);
-    all += free.events(k * kNsPerMs).size(), read += narrow.events(k * kNsPerMs).size();
-  }
-  const EventCameraStatistics statistics = narrow.camera().statistics();
-  EXPECT_GT(statistics.dropped, 1000);
-  EXPECT_EQ(all, read + static_cast<std::size_t>(statistics.dropped + statistics.in_flight));
 }
 
 }  // namespace

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <iterator>
+
 #include "esim/compose/compose.h"
 #include "esim/record/fan_out.h"
 #include "esim/record/output_file.h"
@@ -33,6 +36,8 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
   }
   if (!monitor({world.info.start, world.info.start, world.info.end, 0, 0, 0})) return std::nullopt;
   Summary summary = simulate(world, *sink, monitor);
+  for (const std::string& loss : losses(scenario, summary)) given.push_back("warning: " + loss);
+  std::ranges::copy(hints(scenario, summary), std::back_inserter(given));
   directory.finish(report_json(scenario, summary, world.workers->threads(), given));
   return summary;
 }

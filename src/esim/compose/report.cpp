@@ -29,6 +29,8 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
         {"events_on", camera.events_on},
         {"events_off", camera.events_off},
         {"events_dropped_by_readout", camera.sensor.dropped},
+        {"events_delayed_by_readout", camera.sensor.delayed},
+        {"longest_readout_delay_s", to_seconds(camera.sensor.longest_delay)},
         {"events_per_second", simulated_s > 0 ? static_cast<double>(events) / simulated_s : 0.0},
     });
     if (scenario.cameras[i].frame_camera) cameras.back()["frames_written"] = camera.frames;
@@ -108,6 +110,9 @@ std::string report_json(const ConversionOptions& options, const ConversionSummar
       {"events", events},
       {"events_on", summary.events_on},
       {"events_off", summary.events_off},
+      {"events_dropped_by_readout", summary.sensor.dropped},
+      {"events_delayed_by_readout", summary.sensor.delayed},
+      {"longest_readout_delay_s", to_seconds(summary.sensor.longest_delay)},
       {"events_per_second", converted_s > 0 ? static_cast<double>(events) / converted_s : 0.0},
       {"notices", notices},
   };

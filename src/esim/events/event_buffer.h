@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <type_traits>
 #include <utility>
@@ -31,6 +32,12 @@ class EventBuffer {
     }
     size_ = count;
     return events_;
+  }
+
+  /// Removes those from the first-th on for which predicate(event).
+  template <typename Predicate>
+  void remove_if(std::size_t first, const Predicate& predicate) {
+    size_ = static_cast<std::size_t>(std::remove_if(events_ + first, events_ + size_, predicate) - events_);
   }
 
   EventSpan events() const { return {events_, size_}; }

@@ -66,7 +66,7 @@ EventSpan EventQueue::release_until(TimeNs watermark) {
 
 std::vector<Event> EventQueue::waiting() const {
   std::vector<Event> events;
-  for (const Run& run : runs_) events.insert(events.end(), run.rest().begin(), run.rest().end());
+  for_each([&](const Event& event) { events.push_back(event); });
   std::sort(events.begin(), events.end());
   return events;
 }

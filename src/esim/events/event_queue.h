@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -25,6 +26,17 @@ class EventQueue {
   /// All events that wait, in order, and a queue's beginning with such events.
   std::vector<Event> waiting() const;
   void restore(EventSpan waiting);
+
+  /// Calls body(event) for each event that has not been released, in any order.
+  template <typename Body>
+  void for_each(const Body& body) const {
+    for (const Run& run : runs_) std::ranges::for_each(run.rest(), body);
+  }
+  /// Forgets the events that have not been released and for which predicate(event).
+  template <typename Predicate>
+  void remove_if(const Predicate& predicate) {
+    for (Run& run : runs_) run.events.remove_if(run.released, predicate);
+  }
 
  private:
   /// Ordered events, of which the first ones have been released.

@@ -26,8 +26,9 @@ struct Lanes {
 
   Lanes() { before.fill(1), after.fill(1); }
 
-  /// One round: each pixel passes its next level, if it does, and takes its reference behind that. Returns when the
-  /// last refractory period ends.
+  /// One round: each pixel passes its next level, if it does, and takes its reference behind that: the level, or where
+  /// it is held in reset (refractory >= 0) the brightness at the end of the refractory period. Returns when the last of
+  /// these ends.
   double fire(double duration, double refractory) {
     const double per_duration = 1 / duration;
     double last = 0;
@@ -41,7 +42,7 @@ struct Lanes {
       t = t > 1.0 ? t : 1.0;
       t = t < duration ? t : duration;
       const double until = t + refractory;
-      const double next = refractory > 0 ? start + rise * (until * per_duration) : passed;
+      const double next = refractory >= 0 ? start + rise * (until * per_duration) : passed;
       crossing[i] = t;
       resumes[i] = until;
       polarity[i] = up ? 1.0 : (down ? -1.0 : 0.0);
@@ -84,6 +85,7 @@ struct CleanPass::Block {
 
   void gather(const PixelArray& pixels, const Segment& segment, const EventPacking& packing, int y,
               std::span<const std::uint32_t> columns);
+  void wait(PixelArray& pixels);
   void resume(const PixelArray& pixels, const Segment& segment);
   void hold(PixelArray& pixels, Lanes& lanes, const std::uint32_t* which, TimeNs t0, double duration);
   std::size_t take_rest();
@@ -147,6 +149,15 @@ void CleanPass::Block::hold(PixelArray& pixels, Lanes& lanes, const std::uint32_
   }
 }
 
+/// Leaves those in reset that fired, for as long as nothing else is said.
+void CleanPass::Block::wait(PixelArray& pixels) {
+  for (std::size_t i = 0; i < all.count; ++i) {
+    if (all.polarity[i] == 0) continue;
+    pixels.until[pixel[i]] = kFarAhead;
+    all.reference[i] = kHeld;
+  }
+}
+
 /// Copies those pixels to `rest` that fire again.
 std::size_t CleanPass::Block::take_rest() {
   std::size_t count = 0;
@@ -178,7 +189,7 @@ void CleanPass::Block::settle(PixelArray& pixels) {
   some_held = false;
 }
 
-void CleanPass::run_block(PixelArray& pixels, const Segment& segment, PackedEvents& events) {
+void CleanPass::run_block(PixelArray& pixels, const Segment& segment, PackedEvents& events, bool wait) {
   Block& block = *block_;
   if (block.all.count == 0) return;
   logarithms(block.all.count, block.all.before.data());
@@ -186,15 +197,19 @@ void CleanPass::run_block(PixelArray& pixels, const Segment& segment, PackedEven
   if (block.some_held) block.resume(pixels, segment);
 
   const double duration = static_cast<double>(segment.t1 - segment.t0);
-  const double refractory = pixels.holds ? static_cast<double>(pixels.refractory) : 0.0;
+  const double refractory = pixels.holds ? static_cast<double>(pixels.refractory) : -1.0;
   const auto round = [&](Lanes& lanes, const std::uint32_t* which) {
     const double last_reset = lanes.fire(duration, refractory);
     const double* const polarity = lanes.polarity.data();
     events.add(lanes.count, segment.t0, lanes.crossing.data(), lanes.place.data(), polarity, polarity);
-    if (pixels.holds && last_reset > duration) block.hold(pixels, lanes, which, segment.t0, duration);
+    if (pixels.holds && !wait && last_reset > duration) block.hold(pixels, lanes, which, segment.t0, duration);
   };
   // Most pixels that wake up fire once; the others go on among themselves.
   round(block.all, nullptr);
+  if (wait) {
+    block.wait(pixels);
+    return block.settle(pixels);
+  }
   for (std::size_t left = block.take_rest(); left > 0;) {
     Lanes& rest = block.rest;
     round(rest, block.origin.data());
@@ -224,6 +239,17 @@ void CleanPass::open(PixelArray& pixels, std::uint32_t first, std::span<const do
     block.all.count = count;
     block.settle(pixels);
   }
+}
+
+void CleanPass::resume(PixelArray& pixels, const Segment& segment, std::span<const std::uint32_t> which,
+                       PackedEvents& events) {
+  const auto width = static_cast<std::uint32_t>(pixels.width);
+  for (const std::uint32_t index : which) {
+    const std::uint32_t column = index % width;
+    block_->gather(pixels, segment, events.packing(), static_cast<int>(index / width), {&column, 1});
+    if (block_->all.count == kBlock) run_block(pixels, segment, events, true);
+  }
+  run_block(pixels, segment, events, true);
 }
 
 void CleanPass::run(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, Rows rows,

@@ -28,9 +28,13 @@ class CleanPass {
   /// What `watch` found in rows of the segment.
   void run(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, Rows rows, PackedEvents& events);
 
+  /// Lets pixels that are held in reset resume in the segment, and take their next event at most. Those that fire wait
+  /// in reset.
+  void resume(PixelArray& pixels, const Segment& segment, std::span<const std::uint32_t> which, PackedEvents& events);
+
  private:
   struct Block;
-  void run_block(PixelArray& pixels, const Segment& segment, PackedEvents& events);
+  void run_block(PixelArray& pixels, const Segment& segment, PackedEvents& events, bool wait = false);
 
   std::unique_ptr<Block> block_;  // small enough for the first level of cache
 };

@@ -12,9 +12,9 @@
 #include "esim/sensors/center_surround.h"
 #include "esim/sensors/front_end.h"
 #include "esim/sensors/pixel_array.h"
+#include "esim/sensors/pixel_readout.h"
 #include "esim/sensors/pixel_update.h"
 #include "esim/sensors/pixel_watch.h"
-#include "esim/sensors/readout.h"
 #include "esim/sensors/state_archive.h"
 
 namespace esim {
@@ -42,13 +42,13 @@ struct EventCamera::State {
   State(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream)
       : pixels(options, width, height, seed, stream), packing(width, height), size{0, 0, width, height} {
     if (options.surround_px > 0) surround.emplace(options.surround_px, options.surround_ms * 1e-3, width, height);
-    if (options.readout.limited()) readout.emplace(options.readout, height);
+    if (options.readout.limited()) readout.emplace(options, width, height);
   }
 
-  bool integrate(std::span<const Segment> segments, const Workers& workers);
-  bool integrate(const Segment& segment, const Workers& workers);
-  bool integrate_tiles(std::span<const Segment> segments, const Workers& workers);
-  bool advance(const Segment& segment, const Image<float>* given, Rows rows, int worker);
+  bool integrate(const Workers& workers);
+  bool integrate_one(std::size_t i, const Workers& workers);
+  bool integrate_tiles(const Workers& workers);
+  bool advance(std::size_t i, const Image<float>* given, Rows rows, int worker);
   void refuse_long_time(TimeNs duration) const;
   void subtract_surround(const Segment& segment, const Workers& workers);
 
@@ -57,7 +57,7 @@ struct EventCamera::State {
   static void transfer(Archive& archive, Self& self) {
     PixelArray::transfer(archive, self.pixels);
     if (self.surround) CenterSurround::transfer(archive, *self.surround);
-    if (self.readout) Readout::transfer(archive, *self.readout);
+    if (self.readout) PixelReadout::transfer(archive, *self.readout);
     archive.value(self.spoiled);
     archive.value(self.last_time);
     archive.value(self.frames);
@@ -72,9 +72,10 @@ struct EventCamera::State {
   Image<float> brightness;               // less the surround
   std::vector<PixelUpdate> updates;      // by worker
   std::vector<PackedEvents> events;      // by worker
+  std::span<const Segment> segments;     // that are being integrated
   std::vector<std::size_t> tile_begins;  // where the segments of some tiles begin, and the end
   EventQueue queue;
-  std::optional<Readout> readout;
+  std::optional<PixelReadout> readout;
 
   // Of process().
   Image<float> last_frame, next_frame;
@@ -112,14 +113,18 @@ void EventCamera::State::refuse_long_time(TimeNs duration) const {
                   " s apart; give one at least every " + std::to_string(to_seconds(longest)) + " s");
 }
 
-bool EventCamera::State::advance(const Segment& segment, const Image<float>* given, Rows rows, int worker) {
+/// Rows of the i-th segment.
+bool EventCamera::State::advance(std::size_t i, const Image<float>* given, Rows rows, int worker) {
+  const Segment& segment = segments[i];
   PixelUpdate& update = updates[static_cast<std::size_t>(worker)];
   if (segment.t0 == segment.t1) return update.open(pixels, segment, given, rows);
-  return update.advance(pixels, segment, given, rows, events[static_cast<std::size_t>(worker)]);
+  PastSegment* const past = readout ? &readout->history.added(i) : nullptr;
+  return update.advance(pixels, segment, given, rows, past, events[static_cast<std::size_t>(worker)]);
 }
 
-/// A segment's rows in parallel.
-bool EventCamera::State::integrate(const Segment& segment, const Workers& workers) {
+/// The rows of the i-th segment in parallel.
+bool EventCamera::State::integrate_one(std::size_t i, const Workers& workers) {
+  const Segment& segment = segments[i];
   const Image<float>* given = nullptr;
   if (surround) {
     subtract_surround(segment, workers);
@@ -128,25 +133,25 @@ bool EventCamera::State::integrate(const Segment& segment, const Workers& worker
   const RowPieces pieces(segment.tile);
   std::atomic<bool> good = true;
   workers.for_each_with_worker(pieces.count, [&](int piece, int worker) {
-    if (!advance(segment, given, {pieces.begin(piece), pieces.end(piece)}, worker)) good = false;
+    if (!advance(i, given, {pieces.begin(piece), pieces.end(piece)}, worker)) good = false;
   });
   return good;
 }
 
 /// Several tiles in parallel.
-bool EventCamera::State::integrate_tiles(std::span<const Segment> segments, const Workers& workers) {
+bool EventCamera::State::integrate_tiles(const Workers& workers) {
   std::atomic<bool> good = true;
   workers.for_each_with_worker(static_cast<int>(tile_begins.size()) - 1, [&](int i, int worker) {
     const auto tile = static_cast<std::size_t>(i);
     for (std::size_t k = tile_begins[tile]; k < tile_begins[tile + 1]; ++k) {
       const Tile& where = segments[k].tile;
-      if (!advance(segments[k], nullptr, {where.y, where.y + where.height}, worker)) good = false;
+      if (!advance(k, nullptr, {where.y, where.y + where.height}, worker)) good = false;
     }
   });
   return good;
 }
 
-bool EventCamera::State::integrate(std::span<const Segment> segments, const Workers& workers) {
+bool EventCamera::State::integrate(const Workers& workers) {
   tile_begins.clear();
   int pixels_seen = 0;  // since the last of them
   for (std::size_t i = 0; i < segments.size(); ++i) {
@@ -156,11 +161,14 @@ bool EventCamera::State::integrate(std::span<const Segment> segments, const Work
     pixels_seen += static_cast<int>(segments[i].tile.area());
   }
   tile_begins.push_back(segments.size());
-  if (tile_begins.size() > 2 && !surround) return integrate_tiles(segments, workers);
-  return std::ranges::all_of(segments, [&](const Segment& segment) { return integrate(segment, workers); });
+  if (tile_begins.size() > 2 && !surround) return integrate_tiles(workers);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    if (!integrate_one(i, workers)) return false;
+  }
+  return true;
 }
 
-void EventCamera::integrate(std::span<const Segment> segments, const Workers& workers) {
+void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark, const Workers& workers) {
   State& state = *state_;
   if (state.spoiled)
     throw UserError("event camera: it has seen an irradiance that is none, and cannot go on; begin with a new one");
@@ -171,20 +179,20 @@ void EventCamera::integrate(std::span<const Segment> segments, const Workers& wo
   state.packing.origin = first;
   state.refuse_long_time(last - first);
   for (PackedEvents& events : state.events) events.expect(state.packing, last - first);
-  if (!state.integrate(segments, workers)) {
+  state.segments = segments;
+  if (state.readout) state.readout->history.add(segments, state.pixels);
+  if (!state.integrate(workers)) {
     state.spoiled = true;
     for (const Segment& segment : segments) check_irradiance(segment);
   }
   state.queue.add(state.events, workers);
+  if (state.readout) state.readout->advance(state.pixels, state.updates[0], state.queue, watermark);
 }
 
-void EventCamera::release_until(TimeNs watermark, std::vector<Event>& out) {
-  const EventSpan arrived = state_->queue.release_until(watermark);
-  if (state_->readout) {
-    state_->readout->advance(arrived, watermark, out);
-  } else {
-    out.insert(out.end(), arrived.begin(), arrived.end());
-  }
+void EventCamera::release_until(TimeNs until, std::vector<Event>& out) {
+  if (state_->readout) return state_->readout->release_until(until, out);
+  const EventSpan released = state_->queue.release_until(until);
+  out.insert(out.end(), released.begin(), released.end());
 }
 
 void EventCamera::process(const Image<float>& irradiance, TimeNs t, std::vector<Event>& out, const Workers& workers) {
@@ -216,7 +224,7 @@ void EventCamera::process(std::span<const float> irradiance, TimeNs t, std::vect
   const Segment segment{state.size, first ? t : state.last_time, t, &before, &state.next_frame};
   try {
     check_irradiance(segment);
-    integrate(std::span(&segment, 1), workers);
+    integrate(std::span(&segment, 1), t, workers);
   } catch (const UserError& error) {
     throw UserError(frame + ": " + error.what());
   }
@@ -227,12 +235,21 @@ void EventCamera::process(std::span<const float> irradiance, TimeNs t, std::vect
 }
 
 EventCameraStatistics EventCamera::statistics() const {
-  const Readout* readout = state_->readout ? &*state_->readout : nullptr;
-  return {readout != nullptr ? readout->dropped() : 0,
-          static_cast<std::int64_t>(state_->queue.size() + (readout != nullptr ? readout->waiting() : 0))};
+  const auto found = static_cast<std::int64_t>(state_->queue.size());
+  if (!state_->readout) return {.in_flight = found};
+  const PixelReadout& readout = *state_->readout;
+  return {.dropped = readout.dropped(),
+          .delayed = readout.delayed(),
+          .longest_delay = readout.longest_delay(),
+          .in_flight = found + static_cast<std::int64_t>(readout.waiting())};
 }
 
 std::vector<std::byte> EventCamera::state() const {
+  if (state_->readout && !state_->readout->history.empty()) {
+    throw UserError(
+        "event camera: its state cannot be saved while tiles are known until different times; save it where the "
+        "watermark is the end of every segment");
+  }
   std::vector<std::byte> bytes;
   StateWriter archive(bytes);
   State::transfer(archive, *state_);

@@ -17,6 +17,8 @@ namespace esim {
 /// What became of a camera's events.
 struct EventCameraStatistics {
   std::int64_t dropped = 0;    ///< by the readout, whose queue was full
+  std::int64_t delayed = 0;    ///< read out more than 1 us after the request, or 1 % of the refractory period if shorter
+  TimeNs longest_delay = 0;    ///< from a pixel's request to its readout
   std::int64_t in_flight = 0;  ///< fired, but not read out by the last watermark
 };
 
@@ -52,11 +54,12 @@ class EventCamera {
   /// Takes what is newly known of the pixels' irradiance: those of a tile one after the other, contiguous in time. Each
   /// pixel's first segment is an instant, sets its reference, and fires nothing before. Throws UserError naming the
   /// pixel and the time where an irradiance is not a finite number >= 0; nothing of that segment has then been seen.
-  void integrate(std::span<const Segment> segments, const Workers& workers);
+  /// `watermark`: no segment that is still to come begins before it. It must not decrease.
+  void integrate(std::span<const Segment> segments, TimeNs watermark, const Workers& workers);
 
-  /// Appends to `out`, in order, the events with t <= watermark that were not released before. Nothing at or before the
-  /// watermark may be integrated afterwards.
-  void release_until(TimeNs watermark, std::vector<Event>& out);
+  /// Appends to `out`, in order, the events with t <= until that were not released before. `until` must not be later
+  /// than the watermark of the last integrate().
+  void release_until(TimeNs until, std::vector<Event>& out);
 
   EventCameraStatistics statistics() const;
 

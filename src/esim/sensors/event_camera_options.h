@@ -22,11 +22,12 @@ enum class RefractoryMode {
 };
 
 /// The way from the pixels to the outside: rows with events wait, first come first served, for one reader that takes
-/// all of a row's events at once and stamps them with the time at which it does.
+/// all of a row's events at once and stamps them with the time at which it does. A pixel waits until its event has been
+/// read; its refractory period begins then.
 struct ReadoutOptions {
   double rate_mev_per_s = 0.0;
   double row_time_us = 0.0;
-  int queue_events = 65536;
+  int queue_events = 0;
 
   bool limited() const { return rate_mev_per_s > 0 || row_time_us > 0; }
 };
@@ -91,7 +92,7 @@ template <class Visitor>
 void describe(Visitor& visit, ReadoutOptions& o) {
   visit("rate_mev_per_s", o.rate_mev_per_s, About{"events read out at most; 0: no limit", "Mev/s", 0, 1e6});
   visit("row_time_us", o.row_time_us, About{"time that reading a row takes beside its events", "us", 0, 1e6});
-  visit("queue_events", o.queue_events, About{"events that can wait; more are dropped, and counted", "", 1, 1e9});
+  visit("queue_events", o.queue_events, About{"events that can wait at the same time; more are dropped and counted; 0: one per pixel", "", 0, 1e9});
 }
 
 template <class Visitor>

@@ -15,27 +15,30 @@ float above(double nominal, double deviation) {
 
 }  // namespace
 
-PixelArray::PixelArray(const EventCameraOptions& o, int width_px, int height, std::uint64_t seed, std::uint16_t stream)
+PixelArray::PixelArray(const EventCameraOptions& o, int width_px, int height_px, std::uint64_t seed, std::uint16_t stream)
     : options(o),
       width(width_px),
+      height(height_px),
       threshold_on(o.threshold_on()),
       threshold_off(o.threshold_off()),
       refractory(to_ns(o.refractory_period_us * 1e-6)),
-      holds(refractory > 0 && o.refractory_mode == RefractoryMode::hold),
+      acknowledged(o.readout.limited()),
+      holds((refractory > 0 || acknowledged) && o.refractory_mode == RefractoryMode::hold),
+      drops(refractory > 0 && !acknowledged && !holds),
       in_brightness(o.low_pass_hz > 0 || o.response != PixelResponse::log || o.surround_px > 0),
       leaks(o.leak_rate_hz > 0 || (o.hot_pixels > 0 && o.hot_pixel_rate_hz > 0)),
       shoots(o.shot_noise_hz > 0),
       alarmed(leaks || shoots),
       renews(o.threshold_noise > 0 || (leaks && o.leak_jitter > 0) || o.latency_jitter_us > 0),
       delays(o.latency_us > 0 || o.latency_jitter_us > 0),
-      clean(!in_brightness && !alarmed && !renews && !delays && (refractory == 0 || holds)),
+      clean(!in_brightness && !alarmed && !renews && !delays && !drops),
       per_event(seed, Purpose::threshold_noise, stream),
       per_shot(seed, Purpose::shot_noise, stream),
       per_leak(seed, Purpose::leak_mismatch, stream) {
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   if (clean) {
     clean_pixels.resize(pixels);
-    if (refractory > 0) until.assign(pixels, kLongAgo);
+    if (holds) until.assign(pixels, kLongAgo);
   } else {
     noisy_pixels.resize(pixels);
   }
@@ -101,6 +104,34 @@ void PixelArray::set_bands(std::size_t count, const std::uint32_t* which, float*
   for (std::size_t i = 0; i < count; ++i) {
     band_low[which[i]] = low[i] * (1 + kGuard) - eps;
     band_high[which[i]] = high[i] * (1 - kGuard) - eps;
+  }
+}
+
+void PixelArray::hold(std::uint32_t pixel, TimeNs end) {
+  if (clean) {
+    clean_pixels[pixel].reference = kHeld;
+    until[pixel] = end;
+  } else {
+    noisy_pixels[pixel].reference = kHeld;
+    noisy_pixels[pixel].until = static_cast<double>(end - epoch);
+  }
+  empty_band(pixel);
+  if (alarmed) alarms[pixel] = std::numeric_limits<std::int32_t>::max();
+}
+
+void PixelArray::take_back(std::uint32_t pixel, std::uint32_t events, TimeNs end) {
+  if (clean) return;
+  NoisyPixel& own = noisy_pixels[pixel];
+  if (renews) own.draws -= events;
+  if (!shoots) return;
+  // Back to the first candidate that does not fall into the refractory period.
+  constexpr double kToUnit = 0x1.0p-32;
+  while (own.shots > 1) {
+    const auto bits = per_shot.bits(pixel, own.shots - 1);
+    const double before = own.shot_at - shot_interval((bits[0] + 0.5) * kToUnit);
+    if (before < static_cast<double>(end - epoch)) break;
+    own.shot_at = before;
+    --own.shots;
   }
 }
 

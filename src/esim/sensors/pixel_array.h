@@ -15,6 +15,9 @@ namespace esim {
 /// Before every time, but so that differences do not overflow.
 inline constexpr TimeNs kLongAgo = std::numeric_limits<TimeNs>::min() / 2;
 
+/// After every time, likewise.
+inline constexpr TimeNs kFarAhead = std::numeric_limits<TimeNs>::max() / 2;
+
 /// As good as never, in ns: three years.
 inline constexpr double kAges = 1e17;
 
@@ -37,6 +40,12 @@ class PixelArray {
 
   /// Gives pixels the bands between these levels. The arrays have kVectorPadding elements more, and are overwritten.
   void set_bands(std::size_t count, const std::uint32_t* which, float* low, float* high);
+
+  /// Holds a pixel in reset until then, whatever it did before.
+  void hold(std::uint32_t pixel, TimeNs until);
+  /// Takes a pixel back to where it was when it had fired `events` events less. It must be held afterwards, until
+  /// `until`: its reference is lost.
+  void take_back(std::uint32_t pixel, std::uint32_t events, TimeNs until);
 
   /// Asks memory for what is needed of a pixel that wakes up.
   void prefetch(std::size_t pixel) const {
@@ -66,10 +75,12 @@ class PixelArray {
   }
 
   EventCameraOptions options;
-  int width;
+  int width, height;
   double threshold_on, threshold_off;
   TimeNs refractory;
-  bool holds;               // refractory pixels are held in reset
+  bool acknowledged;        // by a readout: refractory periods begin when an event has been read out
+  bool holds;               // pixels are held in reset from their event to the end of the refractory period
+  bool drops;               // events that fall into a refractory period are lost
   TimeNs epoch = kLongAgo;  // of leaks and alarms: the first sample
 
   // Which parts of the model are in use.
@@ -87,7 +98,7 @@ class PixelArray {
     float on = 0, off = 0;  // what the pixel's thresholds are above threshold_on and threshold_off
   };
   LargeVector<CleanPixel> clean_pixels;
-  LargeVector<TimeNs> until;  // end of the last refractory period of clean pixels
+  LargeVector<TimeNs> until;  // of clean pixels that are held in reset
 
   struct alignas(64) NoisyPixel {
     double reference = 0;

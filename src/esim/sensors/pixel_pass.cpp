@@ -51,7 +51,7 @@ std::size_t PixelPass<Signals>::take(const PixelArray& pixels, AwakePixels& awak
 }
 
 template <class Signals>
-void PixelPass<Signals>::round(PixelArray& pixels, AwakePixels& awake, PackedEvents& events) {
+void PixelPass<Signals>::round(PixelArray& pixels, AwakePixels& awake, PackedEvents& events, bool wait) {
   resume_held();
   signals.find(compare_);
   std::fill_n(anew_.begin(), compare_.count, pixels.holds ? 1.0 : 0.0);
@@ -62,8 +62,30 @@ void PixelPass<Signals>::round(PixelArray& pixels, AwakePixels& awake, PackedEve
   if (pixels.renews) renew(pixels, awake);
   fire(pixels, awake, events.packing());
   events.add(compare_.count, t0_, stamp_.data(), awake.place.data(), compare_.polarity.data(), reports_.data());
-  reset(pixels);
+  reset(pixels, wait);
   sleep(pixels, awake);
+}
+
+template <class Signals>
+void PixelPass<Signals>::draw_again(PixelArray& pixels, const AwakePixels& awake) {
+  if (!pixels.renews) return;
+  const std::size_t count = awake.count;
+  for (std::size_t i = 0; i < count; ++i) {
+    const PixelArray::NoisyPixel& own = pixels.noisy_pixels[awake.pixel[i]];
+    mean_on_[i] = own.mean_on, mean_off_[i] = own.mean_off, mean_leak_[i] = own.mean_leak;
+    draws_[i] = own.draws - 1;
+  }
+  std::fill_n(compare_.polarity.begin(), count, 1.0);
+  std::fill_n(compare_.tau.begin(), count, 0.0);
+  compare_.threshold_on = pixels.threshold_on, compare_.threshold_off = pixels.threshold_off;
+  compare_.count = count;
+  renew(pixels, awake);
+  for (std::size_t i = 0; i < count; ++i) {
+    PixelArray::NoisyPixel& own = pixels.noisy_pixels[awake.pixel[i]];
+    own.on = compare_.on[i], own.off = compare_.off[i];
+    if (pixels.leaks) own.leak = static_cast<float>(compare_.leak[i] * kNsPerS);
+  }
+  compare_.count = 0;
 }
 
 /// Ends the refractory periods that end in this segment.
@@ -139,7 +161,7 @@ void PixelPass<Signals>::renew(const PixelArray& pixels, const AwakePixels& awak
 template <class Signals>
 void PixelPass<Signals>::fire(const PixelArray& pixels, const AwakePixels& awake, const EventPacking& packing) {
   const double duration = duration_, refractory = static_cast<double>(pixels.refractory);
-  const bool drops = pixels.refractory > 0 && !pixels.holds, holds = pixels.holds;
+  const bool drops = pixels.drops, holds = pixels.holds;
 #pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
     double t = std::floor(compare_.tau[i] + 0.5);
@@ -152,7 +174,16 @@ void PixelPass<Signals>::fire(const PixelArray& pixels, const AwakePixels& awake
     const double resumes = holds ? until_[i] : compare_.tau[i];
     compare_.from[i] = fired ? resumes : compare_.from[i];
   }
-  if (pixels.delays) delay(pixels, awake, packing);
+  if (!pixels.delays) return;
+  delay(pixels, awake, packing);
+  if (!pixels.acknowledged || !holds) return;
+  // The request is raised at the time of the stamp, and not acknowledged before.
+#pragma omp simd
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    const bool fired = compare_.polarity[i] != 0;
+    until_[i] = fired ? stamp_[i] + refractory : until_[i];
+    compare_.from[i] = fired ? until_[i] : compare_.from[i];
+  }
 }
 
 template <class Signals>
@@ -176,7 +207,7 @@ void PixelPass<Signals>::delay(const PixelArray& pixels, const AwakePixels& awak
 
 /// Sets the references behind the events, and finds the pixels that may fire again.
 template <class Signals>
-void PixelPass<Signals>::reset(const PixelArray& pixels) {
+void PixelPass<Signals>::reset(const PixelArray& pixels, bool wait) {
   signals.advance(compare_);
 #pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
@@ -185,13 +216,18 @@ void PixelPass<Signals>::reset(const PixelArray& pixels) {
     compare_.reference[i] = compare_.polarity[i] != 0 ? next : compare_.reference[i];
   }
   signals.look_ahead(compare_, again_.data());
-  const double held_beyond = pixels.holds ? duration_ : kNever, shot_until = pixels.shoots ? duration_ : -kNever;
+  const double held_beyond = wait ? -kNever : (pixels.holds ? duration_ : kNever);
+  const double shot_until = pixels.shoots ? duration_ : -kNever;
 #pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
     const bool fired = compare_.polarity[i] != 0, held = fired & (until_[i] > held_beyond);
     const bool may = (again_[i] != 0) | (shot_[i] <= shot_until);
     again_[i] = (fired & !held) & may ? 1.0 : 0.0;
     compare_.reference[i] = held ? kHeld : compare_.reference[i];
+  }
+  if (!wait) return;
+  for (std::size_t i = 0; i < compare_.count; ++i) {
+    if (compare_.polarity[i] != 0) until_[i] = kAges;
   }
 }
 

@@ -24,8 +24,12 @@ class PixelPass {
   /// same segment. Removes from `awake` those that stay in reset. Returns the index of the first.
   std::size_t take(const PixelArray& pixels, AwakePixels& awake, TimeNs t0, TimeNs t1);
 
-  /// Adds to `events`, in any order, the next event of each that fires. In `awake` are left those that may fire again.
-  void round(PixelArray& pixels, AwakePixels& awake, PackedEvents& events);
+  /// Adds to `events`, in any order, the next event of each that fires. In `awake` are left those that may fire again:
+  /// none where pixels wait after their event, in reset, until they are told that it has been read out.
+  void round(PixelArray& pixels, AwakePixels& awake, PackedEvents& events, bool wait = false);
+
+  /// Gives pixels what was drawn after the last of the events that they have drawn for.
+  void draw_again(PixelArray& pixels, const AwakePixels& awake);
 
   /// Instead of rounds where the pixels are first seen, at t0 = t1: sets their references.
   void open(PixelArray& pixels, AwakePixels& awake);
@@ -39,7 +43,7 @@ class PixelPass {
   void renew(const PixelArray& pixels, const AwakePixels& awake);
   void fire(const PixelArray& pixels, const AwakePixels& awake, const EventPacking& packing);
   void delay(const PixelArray& pixels, const AwakePixels& awake, const EventPacking& packing);
-  void reset(const PixelArray& pixels);
+  void reset(const PixelArray& pixels, bool wait);
   void sleep(PixelArray& pixels, AwakePixels& awake);
 
   void draw_uniforms(const AddressedRandom& random, const AwakePixels& awake, std::uint32_t draw);

@@ -40,6 +40,13 @@ struct PixelUpdate::Filter {
     phase_in_dark = static_cast<float>(per_light * o.dark_irradiance);
     if (pixels.alarmed) later = pixels.ticks(segment.t1) + 1;
   }
+
+  /// How many time constants the segment lasts: of the mean light, by Simpson's rule for an exponential.
+  template <class D>
+  hn::Vec<D> phase(D d, hn::Vec<D> light0, hn::Vec<D> light1) const {
+    const auto sum = hn::MulAdd(hn::Set(d, 4.0F), hn::Sqrt(hn::Mul(light0, light1)), hn::Add(light0, light1));
+    return hn::MulAdd(sum, hn::Set(d, phase_per_light), hn::Set(d, phase_in_dark));
+  }
 };
 
 /// Where a row's pixels are in memory, from the tile's first on.
@@ -49,6 +56,15 @@ struct PixelUpdate::FilterRow {
   const float *band_low, *band_high;
   const std::int32_t* alarms;  // or null
   std::uint32_t pixel, place;  // of the first one
+
+  /// Copies some pixels to a row of the past segment.
+  void keep(PastSegment& past, int row, int begin, std::size_t count) const {
+    const auto copy = [&](const float* from, Image<float>& to) {
+      if (!to.empty()) std::copy_n(from + begin, count, to.row(row) + begin);
+    };
+    copy(filtered1, past.filtered1), copy(filtered2, past.filtered2);
+    copy(start, past.start), copy(end, past.end);
+  }
 
   /// Asks memory for what is worked on next: processors that look ahead by themselves do so within a page only.
   template <int kOrder>
@@ -72,10 +88,7 @@ HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter
   const V start = hn::LoadU(d, row.start + x), end = hn::LoadU(d, row.end + x);
   V lowest = hn::Min(start, end), highest = hn::Max(start, end);
   if constexpr (kOrder > 0) {
-    // How many time constants the segment lasts: of the mean light, by Simpson's rule for an exponential.
-    const V e0 = hn::LoadU(d, row.light0 + x), e1 = hn::LoadU(d, row.light1 + x);
-    const V sum = hn::MulAdd(hn::Set(d, 4.0F), hn::Sqrt(hn::Mul(e0, e1)), hn::Add(e0, e1));
-    const V phase = hn::MulAdd(sum, hn::Set(d, filter.phase_per_light), hn::Set(d, filter.phase_in_dark));
+    const V phase = filter.phase(d, hn::LoadU(d, row.light0 + x), hn::LoadU(d, row.light1 + x));
 
     // With m = 1 - exp(-phase): F moves by m of its distance, and lags behind the rise of L.
     const V one = hn::Set(d, 1.0F), rise = hn::Sub(end, start), m = moved_after(d, phase), followed = hn::Div(m, phase);
@@ -92,9 +105,10 @@ HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter
       highest = hn::Max(hn::Max(f1, f1_end), hn::Min(hn::Min(start, tangent0), tangent1));
     } else {
       const V f2 = hn::LoadU(d, row.filtered2 + x);
-      const V from_first = hn::Mul(hn::Mul(phase, hn::Sub(one, m)), hn::Neg(distance));
       const V from_rise = hn::Mul(rise, hn::Add(hn::MulAdd(hn::Set(d, -2.0F), followed, one), hn::Sub(one, m)));
-      const V f2_end = hn::Add(hn::MulAdd(m, hn::Sub(start, f2), f2), hn::Add(from_first, from_rise));
+      // Never as a sum of two products, of which compilers fuse one or the other.
+      const V from_both = hn::NegMulAdd(hn::Mul(phase, hn::Sub(one, m)), distance, from_rise);
+      const V f2_end = hn::Add(hn::MulAdd(m, hn::Sub(start, f2), f2), from_both);
       hn::StoreU(f2_end, d, moved_.filtered2.data() + at);
       lowest = hn::Min(hn::Min(f2, f2_end), hn::Min(f1, lowest));
       highest = hn::Max(hn::Max(f2, f2_end), hn::Max(f1, highest));
@@ -183,7 +197,7 @@ const float* PixelUpdate::brightness_row(const PixelArray& pixels, const Segment
 
 template <int kOrder>
 void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const Filter& filter, const float* brightness,
-                             int y, PackedEvents& events) {
+                             int y, PastSegment* past, PackedEvents& events) {
   const int left = segment.tile.x, width = segment.tile.width;
   const std::size_t first = index(pixels, left, y);
   const auto from = [&](auto& values) { return values.empty() ? nullptr : values.data() + first; };
@@ -207,6 +221,7 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
       if (awake_.count == kBlock) run_awake<kOrder>(pixels, segment, false, events);
     }
     const auto count = static_cast<std::size_t>(end - begin);
+    if (past != nullptr) row.keep(*past, y - segment.tile.y, begin, count);
     std::copy_n(row.end + begin, count, row.start + begin);
     if constexpr (kOrder > 0) std::copy_n(moved_.filtered1.data(), count, row.filtered1 + begin);
     if constexpr (kOrder == 2) std::copy_n(moved_.filtered2.data(), count, row.filtered2 + begin);
@@ -222,16 +237,16 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
 /// Where bands are of brightness: moves all low-passes on, and takes those pixels through the segment whose filtered
 /// brightness may leave its band.
 bool PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
-                         PackedEvents& events) {
+                         PastSegment* past, PackedEvents& events) {
   const Filter common(pixels, segment);
   const int order = pixels.options.low_pass_hz > 0 ? pixels.options.low_pass_order : 0;
   for (int y = rows.first; y < rows.last; ++y) {
     if (y + 1 < rows.last) prefetch_row(segment, y + 1);
     const float* const row = brightness_row(pixels, segment, brightness, y);
     if (row == nullptr) return false;
-    if (order == 0) filter_row<0>(pixels, segment, common, row, y, events);
-    if (order == 1) filter_row<1>(pixels, segment, common, row, y, events);
-    if (order == 2) filter_row<2>(pixels, segment, common, row, y, events);
+    if (order == 0) filter_row<0>(pixels, segment, common, row, y, past, events);
+    if (order == 1) filter_row<1>(pixels, segment, common, row, y, past, events);
+    if (order == 2) filter_row<2>(pixels, segment, common, row, y, past, events);
   }
   if (order == 0) run_awake<0>(pixels, segment, true, events);
   if (order == 1) run_awake<1>(pixels, segment, true, events);
@@ -270,9 +285,78 @@ bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, P
 }
 
 bool PixelUpdate::advance(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
-                          PackedEvents& events) {
-  return pixels.in_brightness ? filter(pixels, segment, brightness, rows, events)
+                          PastSegment* past, PackedEvents& events) {
+  return pixels.in_brightness ? filter(pixels, segment, brightness, rows, past, events)
                               : cross(pixels, segment, rows, events);
+}
+
+/// Makes those pixels the awake ones, as they were at the segment's start.
+void PixelUpdate::gather(const PixelArray& pixels, const PastSegment& past, std::span<const std::uint32_t> which,
+                         const EventPacking& packing) {
+  const Segment& segment = past.segment;
+  AwakePixels& a = awake_;
+  for (std::size_t i = 0; i < which.size(); ++i) {
+    const int x = static_cast<int>(which[i]) % pixels.width, y = static_cast<int>(which[i]) / pixels.width;
+    const auto at = [&](const Image<float>& image) {
+      return image.empty() ? 0.0F : image(x - segment.tile.x, y - segment.tile.y);
+    };
+    a.pixel[i] = which[i];
+    a.place[i] = static_cast<std::uint32_t>(packing.place(x, y));
+    a.light0[i] = segment.irradiance0(x, y), a.light1[i] = segment.irradiance1(x, y);
+    a.filtered1[i] = at(past.filtered1), a.filtered2[i] = at(past.filtered2);
+    a.start[i] = at(past.start), a.end[i] = at(past.end);
+  }
+  a.count = asked_ = which.size();
+  if (!pixels.in_brightness || !past.start.empty()) return;
+  respond(pixels.options, a.count, a.light0.data(), a.start.data());
+  respond(pixels.options, a.count, a.light1.data(), a.end.data());
+}
+
+/// How far the low-passes of the awake pixels move in the segment.
+void PixelUpdate::find_phases(const Filter& filter) {
+  const hn::CappedTag<float, 8> d;
+  for (std::size_t i = 0; i < awake_.count; i += hn::Lanes(d)) {
+    const auto light0 = hn::LoadU(d, awake_.light0.data() + i), light1 = hn::LoadU(d, awake_.light1.data() + i);
+    const auto phase = filter.phase(d, light0, light1);
+    hn::StoreU(phase, d, awake_.phase.data() + i);
+    hn::StoreU(moved_after(d, phase), d, awake_.moved.data() + i);
+  }
+}
+
+void PixelUpdate::resume(PixelArray& pixels, const PastSegment& past, std::span<const std::uint32_t> which,
+                         PackedEvents& events) {
+  const Segment& segment = past.segment;
+  if (pixels.clean) return clean_.resume(pixels, segment, which, events);
+  const auto duration = static_cast<double>(segment.t1 - segment.t0);
+  const int order = pixels.options.low_pass_hz > 0 ? pixels.options.low_pass_order : 0;
+  const Filter filter(pixels, segment);
+  for (; !which.empty(); which = which.subspan(std::min(kBlock, which.size()))) {
+    gather(pixels, past, which.first(std::min(kBlock, which.size())), events.packing());
+    const auto run = [&](auto& pass, const auto& take) {
+      take(pass.signals, pass.take(pixels, awake_, segment.t0, segment.t1));
+      pass.round(pixels, awake_, events, true);
+      awake_.count = asked_ = 0;
+    };
+    if (order > 0) {
+      find_phases(filter);
+      run(relaxing_, [&](RelaxingSignals& signals, std::size_t i) { signals.take(awake_, i, order, duration); });
+    } else if (pixels.in_brightness) {
+      run(linear_, [&](LinearSignals& signals, std::size_t i) { signals.take(awake_, i, duration); });
+    } else {
+      const double eps = pixels.options.log_eps;
+      run(linear_, [&](LinearSignals& signals, std::size_t i) { signals.take_light(awake_, i, eps, duration); });
+    }
+  }
+}
+
+void PixelUpdate::draw_again(PixelArray& pixels, std::span<const std::uint32_t> which) {
+  if (pixels.clean) return;
+  for (; !which.empty(); which = which.subspan(std::min(kBlock, which.size()))) {
+    awake_.count = std::min(kBlock, which.size());
+    std::copy_n(which.begin(), awake_.count, awake_.pixel.begin());
+    linear_.draw_again(pixels, awake_);
+    awake_.count = 0;
+  }
 }
 
 bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows) {

@@ -12,6 +12,7 @@
 #include "esim/sensors/pixel_block.h"
 #include "esim/sensors/pixel_pass.h"
 #include "esim/sensors/pixel_watch.h"
+#include "esim/sensors/segment_history.h"
 
 namespace esim {
 
@@ -25,20 +26,27 @@ class PixelUpdate {
   /// Of a segment that is an instant: sets the references.
   bool open(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows);
 
-  /// Of any other: adds what the pixels fire to `events`.
-  bool advance(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
+  /// Of any other: adds what the pixels fire to `events`. `past`, where not null, gets the state at its start.
+  bool advance(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows, PastSegment* past,
                PackedEvents& events);
+
+  /// Lets pixels that are held in reset resume in a segment through which their tile has been advanced before. Each
+  /// fires once at most, and then waits in reset; the others are where they are at the segment's end.
+  void resume(PixelArray& pixels, const PastSegment& past, std::span<const std::uint32_t> which, PackedEvents& events);
+
+  /// Gives pixels what they drew after the last of the events that they have drawn for.
+  void draw_again(PixelArray& pixels, std::span<const std::uint32_t> which);
 
  private:
   bool cross(PixelArray& pixels, const Segment& segment, Rows rows, PackedEvents& events);
-  bool filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
+  bool filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows, PastSegment* past,
               PackedEvents& events);
 
   struct Filter;
   struct FilterRow;
   template <int kOrder>
   void filter_row(PixelArray& pixels, const Segment& segment, const Filter& filter, const float* brightness, int y,
-                  PackedEvents& events);
+                  PastSegment* past, PackedEvents& events);
   template <int kOrder, class D>
   void move_vector(D d, const FilterRow& row, const Filter& filter, int x, int at);
   template <int kOrder, class D>
@@ -46,6 +54,9 @@ class PixelUpdate {
                                       int begin, int end);
   template <int kOrder>
   void wake(const FilterRow& row, int begin, std::span<const std::uint32_t> columns);
+  void gather(const PixelArray& pixels, const PastSegment& past, std::span<const std::uint32_t> which,
+              const EventPacking& packing);
+  void find_phases(const Filter& filter);
   template <int kOrder>
   void run_awake(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events);
   const float* brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* given, int y);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -12,16 +13,30 @@
 namespace esim {
 
 /// The arbiter between the pixels and the outside. Pixels with an event raise a request in their row. One reader serves
-/// the rows in the order of their first requests: it takes all of a row's events that have arrived, stamps them with
-/// the time at which it does, and is then busy for the row's time plus that of its events. Requests beyond the length
-/// of the queue are lost.
+/// the rows in the order of their first requests: it takes all of a row's requests that have arrived, and is then busy
+/// for the row's time plus that of its events. Requests beyond the length of the queue are lost.
+///
+/// Private to the event camera. A pixel must not raise a second request before its first is served (PixelReadout).
 class Readout {
  public:
   Readout(const ReadoutOptions& options, int height);
 
-  /// Takes events in their order, none later than `until`, and appends to `out` those that are read out by then, in
-  /// order of their new stamps. Every event up to `until` must have been given.
-  void advance(EventSpan events, TimeNs until, std::vector<Event>& out);
+  /// Takes a request; they come in order of time, each after every row that is served before it. False where the queue
+  /// is full and the request is lost.
+  bool take(const Event& request);
+
+  /// When the next row is served, if no request comes before; the largest time where none waits.
+  TimeNs next_service() const {
+    if (queue_length_ == 0) return std::numeric_limits<TimeNs>::max();
+    return std::max(free_from(), rows_[queue_[first_in_queue_]].first.t);
+  }
+  /// Serves the next row. Returns its requests, in their order, with the times at which they were raised.
+  EventSpan serve();
+
+  /// When a single request that is raised at t is served, where none waits.
+  TimeNs service_of_one(TimeNs t) const { return std::max(free_from(), t); }
+  /// The reader is busy from `start` on with one event of a row.
+  void occupy_with_one(TimeNs start) { occupy(start, 1); }
 
   std::int64_t dropped() const { return dropped_; }
   std::size_t waiting() const { return waiting_; }
@@ -30,12 +45,12 @@ class Readout {
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     archive.value(self.free_at_);
+    archive.fixed(self.rows_);
     archive.list(self.slots_);
     archive.value(self.free_slot_);
-    archive.fixed(self.rows_);
-    archive.fixed(self.requests_);
-    archive.value(self.first_request_);
-    archive.value(self.request_count_);
+    archive.fixed(self.queue_);
+    archive.value(self.first_in_queue_);
+    archive.value(self.queue_length_);
     archive.value(self.waiting_);
     archive.value(self.dropped_);
   }
@@ -46,40 +61,36 @@ class Readout {
   static constexpr int kFineBits = 10;
   static constexpr FineTime kNs = FineTime{1} << kFineBits;
 
-  /// The events of a row that wait: the first of them, and a list of slots.
-  struct Row {
-    std::uint32_t count = 0, others = 0;
-    std::uint16_t x = 0;
-    std::int8_t polarity = 0;
-  };
-
-  void serve_until(TimeNs now, std::vector<Event>& out);
-  void serve(const Row& row, std::uint16_t y, TimeNs t, std::vector<Event>& out);
-  void accept(const Event& event);
-  void occupy(TimeNs start, std::uint32_t count);
+  /// From `start` on, the reader is busy with `count` events of a row.
+  void occupy(TimeNs start, std::uint32_t count) {
+    const FineTime busy = std::max(per_row_ + per_event_ * static_cast<FineTime>(count), kNs);
+    // Fractions of a nanosecond are kept while there is always something to do.
+    free_at_ = (start > free_from() ? start << kFineBits : free_at_) + busy;
+  }
   TimeNs free_from() const { return (free_at_ + kNs - 1) >> kFineBits; }  ///< first whole ns without work
 
   FineTime per_event_, per_row_;
   std::size_t capacity_;
   FineTime free_at_ = std::numeric_limits<FineTime>::min();  // when the reader is done
 
+  /// The requests of a row that wait: the first of them, and a list of slots.
+  struct Row {
+    Event first;
+    std::uint32_t count = 0, others = 0;
+  };
   struct Slot {
-    std::uint16_t x;
-    std::int8_t polarity;
+    Event request;
     std::uint32_t next;
   };
+  std::vector<Row> rows_;
   std::vector<Slot> slots_;
   std::uint32_t free_slot_ = 0;  // first of the list of those that are free
-  std::vector<Row> rows_;
 
-  // Rows with events, in the order of their first: a ring.
-  struct Request {
-    TimeNs t;
-    std::uint16_t row;
-  };
-  std::vector<Request> requests_;
-  std::size_t first_request_ = 0, request_count_ = 0;
+  // Rows with requests, in the order of their first: a ring.
+  std::vector<std::uint16_t> queue_;
+  std::size_t first_in_queue_ = 0, queue_length_ = 0;
 
+  std::vector<Event> served_;  // by the last serve()
   std::size_t waiting_ = 0;
   std::int64_t dropped_ = 0;
 };

@@ -74,6 +74,7 @@ class Run {
       Stopwatch stopwatch(summary_.seconds.write);
       out_.end(complete);
     }
+    summary_.sensor = conversion_.event_camera.statistics();
     summary_.complete = complete;
     summary_.problem = std::move(problem);
     summary_.wall_seconds = elapsed();
@@ -109,7 +110,7 @@ class Run {
     Stopwatch stopwatch(summary_.seconds.events);
     const bool first = before_.empty();
     const Segment segment{after_.bounds(), summary_.end, t, first ? &after_ : &before_, &after_};
-    conversion_.event_camera.integrate({&segment, 1}, conversion_.workers);
+    conversion_.event_camera.integrate({&segment, 1}, t, conversion_.workers);
     std::swap(before_, after_);
     summary_.end = t;
   }

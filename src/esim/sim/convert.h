@@ -26,6 +26,7 @@ struct ConversionSummary {
   std::int64_t held = 0;       ///< intervals that needed more than max_steps
   double displacement_px = 0;  ///< greatest between two frames
   std::int64_t events_on = 0, events_off = 0;
+  EventCameraStatistics sensor;
 
   /// Wall-clock seconds by stage.
   struct Seconds {

@@ -65,7 +65,7 @@ class Simulator::Run {
     while (!segments.empty()) {
       if (camera.event_camera) {
         Stopwatch stopwatch(summary_.seconds.events);
-        camera.event_camera->integrate(segments, *world_.workers);
+        camera.event_camera->integrate(segments, camera.sampler->watermark(), *world_.workers);
       }
       expose(camera, segments);
       Stopwatch stopwatch(summary_.seconds.sampling);

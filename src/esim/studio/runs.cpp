@@ -147,6 +147,8 @@ void Runs::make(Run& run) {
   RecordingOptions options{run.status.out, run.replace, threads_, std::make_unique<LiveSink>(run.picture)};
   const std::optional<Summary> summary = make_recording(run.scenario, std::move(options), notices, monitor);
 
+  if (summary) std::ranges::for_each(losses(run.scenario, *summary), notices.warning);
+
   const std::lock_guard lock(mutex_);
   ++run.status.pictures;
   run.status.state = RunState::cancelled;

@@ -9,7 +9,7 @@ guide is `docs/python.md`, the options of scenarios are in `docs/scenario.md`.
 from . import dataset
 from ._checks import ns
 from ._core import __version__
-from ._errors import DroppedEventsWarning, Error, InternalError, OutputError
+from ._errors import LossWarning, Error, InternalError, OutputError
 from ._event_camera import EventCamera, linear_light
 from ._events import Events
 from ._files import EventsIterator, formats, info, load_events, save_events
@@ -32,7 +32,7 @@ __all__ = [
     "IMU_DTYPE",
     "STATE_DTYPE",
     "CameraPacket",
-    "DroppedEventsWarning",
+    "LossWarning",
     "Error",
     "EventCamera",
     "Events",

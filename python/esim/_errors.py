@@ -9,8 +9,8 @@ class OutputError(Error, OSError):
     """An output could not be written, for example because the disk is full."""
 
 
-class DroppedEventsWarning(UserWarning):
-    """A simulation lost events; the message says how many, and which options govern it."""
+class LossWarning(UserWarning):
+    """Something was dropped, delayed, held to a maximum rate or off its tolerance. The message names the options that govern it."""
 
 
 class InternalError(RuntimeError):

@@ -86,6 +86,11 @@ class EventCamera:
         """int: events that the readout has dropped, because its queue was full."""
         return self._core.statistics()[0]
 
+    @property
+    def delayed(self):
+        """int: events whose pixels had to wait for the readout, by more than 1 us."""
+        return self._core.statistics()[1]
+
     def __getstate__(self):
         return {"version": _core.__version__, "options": self._options, "made": self._made, "state": self._core.state()}
 

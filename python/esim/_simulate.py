@@ -5,7 +5,7 @@ import os
 import warnings
 
 from . import _checks, _core
-from ._errors import DroppedEventsWarning, Error
+from ._errors import LossWarning, Error
 from ._events import of_bytes
 from ._scenario import to_overrides, to_scenario
 from ._types import IMU_DTYPE, STATE_DTYPE
@@ -169,6 +169,8 @@ class Report(dict):
     ----------
     dropped : dict of str to int
         Of each camera, by its name, the events that its readout has dropped, because its queue was full.
+    delayed : dict of str to int
+        Of each camera, the events whose pixels had to wait for the readout.
     notices : list of str
         What was warned of or noted.
     """
@@ -177,6 +179,11 @@ class Report(dict):
     def dropped(self):
         """dict of str to int: events that the readout of each camera has dropped."""
         return {camera["name"]: camera["events_dropped_by_readout"] for camera in self["cameras"]}
+
+    @property
+    def delayed(self):
+        """dict of str to int: events of each camera whose pixels had to wait for the readout."""
+        return {camera["name"]: camera["events_delayed_by_readout"] for camera in self["cameras"]}
 
     @property
     def notices(self):
@@ -188,7 +195,7 @@ class Simulation:
     """A simulation under way: an iterator over its packets. Made by `simulate`.
 
     Also a context manager, which ends it: a recording that is being written is then finished as an interrupted one.
-    Where events were lost, the end is a `DroppedEventsWarning`.
+    Where events were lost, the end is a `LossWarning`.
 
     Attributes
     ----------
@@ -242,7 +249,7 @@ class Simulation:
         losses = self._core.losses()[self._told :]
         self._told += len(losses)
         for loss in losses:
-            warnings.warn(loss, DroppedEventsWarning, stacklevel=3)
+            warnings.warn(loss, LossWarning, stacklevel=3)
 
     @property
     def report(self):

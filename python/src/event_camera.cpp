@@ -52,7 +52,7 @@ void bind_event_camera(nb::module_& module) {
       .def("restore", &OwnedEventCamera::restore, nb::arg("state"))
       .def("statistics", [](const OwnedEventCamera& self) {
         const EventCameraStatistics statistics = self.camera.statistics();
-        return nb::make_tuple(statistics.dropped, statistics.in_flight);
+        return nb::make_tuple(statistics.dropped, statistics.delayed);
       });
 }
 

@@ -1,12 +1,13 @@
 #include "simulation.h"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "esim/core/error.h"
 #include "esim/record/fan_out.h"
 #include "esim/record/output_file.h"
 #include "esim/scenario/read.h"
-#include "losses.h"
 
 namespace esim::python {
 namespace {
@@ -111,8 +112,9 @@ void Simulation::finish() {
   over_ = true;
   const Summary summary = simulator_->finish();
   simulator_.reset();
-  losses_ = python::losses(summary);
+  losses_ = esim::losses(scenario_, summary);
   for (const std::string& loss : losses_) notices_.push_back("warning: " + loss);
+  std::ranges::copy(hints(scenario_, summary), std::back_inserter(notices_));
   report_ = report_json(scenario_, summary, world_->workers->threads(), notices_);
   if (directory_ != nullptr) directory_->finish(report_);
 }

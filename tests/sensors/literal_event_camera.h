@@ -174,8 +174,7 @@ class LiteralEventCamera {
       pixel.reference_t = to_seconds(t0) + tau;
       pixel.from = tau;
       if (!lost) {
-        return Event{t + delay(pixel, light_at(tau)),
-                     static_cast<std::uint16_t>(i % static_cast<std::size_t>(width_)),
+        return Event{t + delay(pixel, light_at(tau)), static_cast<std::uint16_t>(i % static_cast<std::size_t>(width_)),
                      static_cast<std::uint16_t>(i / static_cast<std::size_t>(width_)),
                      static_cast<std::int8_t>(polarity)};
       }

@@ -169,8 +169,8 @@ TEST_P(PixelReadoutTest, DoesNotDependOnTilesAndWatermarks) {
       const std::vector<Event> tiles = feed_tiles(options, frames);
       const auto [first, other] = std::ranges::mismatch(whole, tiles);
       EXPECT_TRUE(first == whole.end() && other == tiles.end())
-          << low_pass_hz << " Hz, " << order << " poles: " << whole.size() << " and " << tiles.size() << " events, from "
-          << first - whole.begin() << " on";
+          << low_pass_hz << " Hz, " << order << " poles: " << whole.size() << " and " << tiles.size()
+          << " events, from " << first - whole.begin() << " on";
     }
   }
 }

@@ -93,8 +93,7 @@ TEST(Readout, FollowsItsRules) {
           begin = end;
         }
         std::int64_t dropped = 0;
-        std::vector<Event> expected =
-            by_the_rules(events, 10, per_row, static_cast<std::size_t>(capacity), dropped);
+        std::vector<Event> expected = by_the_rules(events, 10, per_row, static_cast<std::size_t>(capacity), dropped);
         std::ranges::sort(out), std::ranges::sort(expected);  // here a pixel may have several requests in its row
         EXPECT_EQ(out, expected);
         EXPECT_EQ(readout.dropped(), dropped);

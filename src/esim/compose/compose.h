@@ -119,14 +119,14 @@ std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& file, c
 std::string report_json(const Scenario& scenario, const Summary& summary, int threads,
                         const std::vector<std::string>& notices);
 
-/// What a simulation, or a conversion, left out or missed: events that the readout dropped or that waited for it, samples
-/// held to the maximum rate, a tolerance that was not met. One line each, with the option that governs it; none where
-/// everything is as asked for.
+/// What a simulation, or a conversion, left out or missed: events that the readout dropped or that waited for it,
+/// samples held to the maximum rate, a tolerance that was not met. One line each, with the option that governs it; none
+/// where everything is as asked for.
 std::vector<std::string> losses(const Scenario& scenario, const Summary& summary);
 std::vector<std::string> losses(const ConversionOptions& options, const ConversionSummary& summary);
 
-/// What would have been faster, one line each: flow sampling, where adaptive sampling of a mesh was slower than real time
-/// because of rendering.
+/// What would have been faster, one line each: flow sampling, where adaptive sampling of a mesh was slower than real
+/// time because of rendering.
 std::vector<std::string> hints(const Scenario& scenario, const Summary& summary);
 
 /// How a recording is made.
@@ -141,7 +141,8 @@ struct RecordingOptions {
 /// Simulates a scenario into a recording's folder, with its scenario.yaml and its report.json: what `esim simulate`
 /// does. The monitor, which ends it early, is asked once more when everything has been loaded, with a progress of
 /// nothing: nothing is kept then, and nothing is returned. The folder is there only when the recording is; see
-/// RecordingDirectory. What is notified stands in the report too, and losses and hints beside it, which are not notified.
+/// RecordingDirectory. What is notified stands in the report too, and losses and hints beside it, which are not
+/// notified.
 std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions options, const Notices& notify,
                                       const Monitor& monitor);
 

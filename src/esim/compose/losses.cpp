@@ -21,11 +21,11 @@ std::string grouped(std::int64_t count) { return esim::grouped(static_cast<std::
 void add_readout(const std::string& name, const ReadoutOptions& readout, const EventCameraStatistics& sensor,
                  std::int64_t events, std::vector<std::string>& lines) {
   if (sensor.dropped > 0) {
-    lines.push_back(fmt::format(
-        "{}the readout dropped {} of {} events ({:.3g} %), because {} were waiting already: raise "
-        "event_camera.readout.queue_events, or set it to 0 for one per pixel",
-        name, grouped(sensor.dropped), grouped(events + sensor.dropped), percent(sensor.dropped, events + sensor.dropped),
-        readout.queue_events));
+    lines.push_back(
+        fmt::format("{}the readout dropped {} of {} events ({:.3g} %), because {} were waiting already: raise "
+                    "event_camera.readout.queue_events, or set it to 0 for one per pixel",
+                    name, grouped(sensor.dropped), grouped(events + sensor.dropped),
+                    percent(sensor.dropped, events + sensor.dropped), readout.queue_events));
   }
   if (static_cast<double>(sensor.delayed) > kSaturated * static_cast<double>(events)) {
     lines.push_back(fmt::format(

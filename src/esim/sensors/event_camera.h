@@ -16,9 +16,9 @@ namespace esim {
 
 /// What became of a camera's events.
 struct EventCameraStatistics {
-  std::int64_t dropped = 0;    ///< by the readout, whose queue was full
-  std::int64_t delayed = 0;    ///< read out more than 1 us after the request, or 1 % of the refractory period if shorter
-  TimeNs longest_delay = 0;    ///< from a pixel's request to its readout
+  std::int64_t dropped = 0;  ///< by the readout, whose queue was full
+  std::int64_t delayed = 0;  ///< read out more than 1 us after the request, or 1 % of the refractory period if shorter
+  TimeNs longest_delay = 0;  ///< from a pixel's request to its readout
   std::int64_t in_flight = 0;  ///< fired, but not read out by the last watermark
 };
 

@@ -92,7 +92,8 @@ template <class Visitor>
 void describe(Visitor& visit, ReadoutOptions& o) {
   visit("rate_mev_per_s", o.rate_mev_per_s, About{"events read out at most; 0: no limit", "Mev/s", 0, 1e6});
   visit("row_time_us", o.row_time_us, About{"time that reading a row takes beside its events", "us", 0, 1e6});
-  visit("queue_events", o.queue_events, About{"events that can wait at the same time; more are dropped and counted; 0: one per pixel", "", 0, 1e9});
+  visit("queue_events", o.queue_events,
+        About{"events that can wait at the same time; more are dropped and counted; 0: one per pixel", "", 0, 1e9});
 }
 
 template <class Visitor>

@@ -15,7 +15,8 @@ float above(double nominal, double deviation) {
 
 }  // namespace
 
-PixelArray::PixelArray(const EventCameraOptions& o, int width_px, int height_px, std::uint64_t seed, std::uint16_t stream)
+PixelArray::PixelArray(const EventCameraOptions& o, int width_px, int height_px, std::uint64_t seed,
+                       std::uint16_t stream)
     : options(o),
       width(width_px),
       height(height_px),

@@ -177,7 +177,7 @@ void PixelPass<Signals>::fire(const PixelArray& pixels, const AwakePixels& awake
   if (!pixels.delays) return;
   delay(pixels, awake, packing);
   if (!pixels.acknowledged || !holds) return;
-  // The request is raised at the time of the stamp, and not acknowledged before.
+    // The request is raised at the time of the stamp, and not acknowledged before.
 #pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
     const bool fired = compare_.polarity[i] != 0;

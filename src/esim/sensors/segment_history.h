@@ -15,7 +15,7 @@ namespace esim {
 /// What the pixels of a tile saw between two samples, as far as it is needed to let some of them resume there.
 struct PastSegment {
   Segment segment;
-  Image<float> light0, light1;        // copies of the segment's irradiance where it is kept, of the tile's size
+  Image<float> light0, light1;  // copies of the segment's irradiance where it is kept, of the tile's size
   // Filled in by PixelUpdate::advance(), of the tile's size where they are needed:
   Image<float> filtered1, filtered2;  // behind each pole at t0
   Image<float> start, end;            // brightness at t0 and t1 where a surround is subtracted

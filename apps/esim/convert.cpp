@@ -34,8 +34,8 @@ void print_summary(const CopySummary& summary, const Arguments& arguments, doubl
   std::string copied;
   for (const auto& [content, count] : summary.copied)
     copied += fmt::format("{}{} {}", copied.empty() ? "" : ", ", grouped(count), describe(content));
-  fmt::print(stderr, "{}: {} in {:.1f} s: {}\n", summary.complete ? "done" : "interrupted",
-             copied.empty() ? "nothing" : copied, wall_s, arguments.out);
+  tell(stderr, "{}: {} in {:.1f} s: {}\n", summary.complete ? "done" : "interrupted",
+       copied.empty() ? "nothing" : copied, wall_s, arguments.out);
 }
 
 int run(const Arguments& arguments) {
@@ -46,7 +46,7 @@ int run(const Arguments& arguments) {
   ConvertOptions options{arguments.copy, {arguments.sensor, {}}, arguments.force};
   if (arguments.recover) {
     options.read.recover = [](const std::string& problem) {
-      fmt::print(stderr, "warning: {}; what comes before is converted\n", problem);
+      tell(stderr, "warning: {}; what comes before is converted\n", problem);
     };
   }
   catch_interrupts();
@@ -56,7 +56,7 @@ int run(const Arguments& arguments) {
     return !interrupted();
   });
   bar.clear();
-  for (const std::string& loss : losses(summary, format)) fmt::print(stderr, "warning: {}\n", loss);
+  for (const std::string& loss : losses(summary, format)) tell(stderr, "warning: {}\n", loss);
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
   if (!arguments.quiet) print_summary(summary, arguments, wall.count());
   return interrupted() ? kInterrupted : kOk;

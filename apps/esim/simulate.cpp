@@ -25,12 +25,12 @@ void print_summary(const Summary& summary, const std::filesystem::path& out, boo
     samples += camera.sampling.samples;
   }
   const double simulated_s = to_seconds(summary.end - summary.start);
-  fmt::print(stderr, "{}: {:.3f} s simulated in {:.1f} s ({:.2f}x real time), {} samples, {} events\n",
-             summary.complete ? "done" : "interrupted", simulated_s, summary.wall_seconds,
-             simulated_s / summary.wall_seconds, samples, events);
-  fmt::print(stderr, "recording: {}\n", out.string());
+  tell(stderr, "{}: {:.3f} s simulated in {:.1f} s ({:.2f}x real time), {} samples, {} events\n",
+       summary.complete ? "done" : "interrupted", simulated_s, summary.wall_seconds, simulated_s / summary.wall_seconds,
+       samples, events);
+  tell(stderr, "recording: {}\n", out.string());
   for (const CameraSummary& camera : summary.cameras) {
-    if (previews) fmt::print(stderr, "look at:   {}\n", (out / camera.name / "preview.png").string());
+    if (previews) tell(stderr, "look at:   {}\n", (out / camera.name / "preview.png").string());
   }
 }
 

@@ -35,8 +35,8 @@ void print_summary(const CopySummary& summary, const Arguments& arguments, doubl
   std::string copied;
   for (const auto& [content, count] : summary.copied)
     copied += fmt::format("{}{} {}", copied.empty() ? "" : ", ", grouped(count), describe(content));
-  fmt::print(stderr, "{}: {} in {:.1f} s: {}\n", summary.complete ? "done" : "interrupted",
-             copied.empty() ? "nothing" : copied, wall_s, arguments.out);
+  tell(stderr, "{}: {} in {:.1f} s: {}\n", summary.complete ? "done" : "interrupted",
+       copied.empty() ? "nothing" : copied, wall_s, arguments.out);
 }
 
 int run(const Arguments& arguments, const CLI::App& command) {
@@ -47,7 +47,7 @@ int run(const Arguments& arguments, const CLI::App& command) {
   ConvertOptions options{arguments.copy, {arguments.sensor, {}}, arguments.force};
   if (arguments.recover) {
     options.read.recover = [](const std::string& problem) {
-      fmt::print(stderr, "warning: {}; what comes before is converted\n", problem);
+      tell(stderr, "warning: {}; what comes before is converted\n", problem);
     };
   }
   catch_interrupts();
@@ -58,7 +58,7 @@ int run(const Arguments& arguments, const CLI::App& command) {
   });
   bar.clear();
   for (const Loss& loss : losses(summary, format))
-    fmt::print(stderr, "warning: {}\n", with_remedy(loss.what, loss.remedy, command));
+    tell(stderr, "warning: {}\n", with_remedy(loss.what, loss.remedy, command));
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
   if (!arguments.quiet) print_summary(summary, arguments, wall.count());
   return interrupted() ? kInterrupted : kOk;

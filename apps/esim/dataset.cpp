@@ -100,9 +100,9 @@ int submit(const Arguments& arguments, const DatasetFolder& folder) {
 int check(const Arguments& arguments) {
   const DatasetFolder folder(arguments.check);
   const std::vector<std::string> problems = check_dataset(folder);
-  for (const std::string& problem : problems) fmt::print(stderr, "{}\n", problem);
+  for (const std::string& problem : problems) tell(stderr, "{}\n", problem);
   if (!problems.empty()) {
-    fmt::print(stderr, "esim: {}: {} problem{}\n", arguments.check, problems.size(), problems.size() == 1 ? "" : "s");
+    tell(stderr, "esim: {}: {} problem{}\n", arguments.check, problems.size(), problems.size() == 1 ? "" : "s");
     return kUsersFault;
   }
   const DatasetState state = survey_dataset(folder);
@@ -117,10 +117,10 @@ void report(const DatasetState& state, const fs::path& out) {
   for (const ShardRecord& record : state.shards)
     passed_over.insert(record.passed_over.begin(), record.passed_over.end());
   if (!passed_over.empty()) {
-    fmt::print(stderr, "warning: {} image{} could not be used; for one, {}\n", passed_over.size(),
-               passed_over.size() == 1 ? "" : "s", passed_over.begin()->second);
+    tell(stderr, "warning: {} image{} could not be used; for one, {}\n", passed_over.size(),
+         passed_over.size() == 1 ? "" : "s", passed_over.begin()->second);
   }
-  fmt::print(stderr, "{}: whole; look at {}\n", out.string(), (out / "preview.png").string());
+  tell(stderr, "{}: whole; look at {}\n", out.string(), (out / "preview.png").string());
 }
 
 int run(Arguments arguments) {
@@ -161,12 +161,12 @@ int run(Arguments arguments) {
   });
   bar.clear();
   if (!arguments.quiet) {
-    fmt::print(stderr, "{}: made {} sequences in {:.1f} s, {:.1f} per second\n", arguments.out,
-               production.progress.made, seconds(), production.progress.made / std::max(seconds(), 1e-9));
+    tell(stderr, "{}: made {} sequences in {:.1f} s, {:.1f} per second\n", arguments.out, production.progress.made,
+         seconds(), production.progress.made / std::max(seconds(), 1e-9));
   }
   if (interrupted()) return kInterrupted;
   if (!production.complete() && !arguments.quiet)
-    fmt::print(stderr, "{}: {} files are being written by another process\n", arguments.out, production.elsewhere);
+    tell(stderr, "{}: {} files are being written by another process\n", arguments.out, production.elsewhere);
   const DatasetState state = survey_dataset(folder);
   if (!state.complete()) return kOk;
   write_manifest(folder, state, maker->magnitudes(), maker->is_target());

@@ -10,6 +10,7 @@
 #include "esim/evaluate/report.h"
 #include "esim/evaluate/report_files.h"
 #include "esim/evaluate/schemes.h"
+#include "esim/record/keep_on_failure.h"
 #include "esim/record/recording_directory.h"
 #include "esim/scenario/read.h"
 #include "esim/scenario/sampling_text.h"
@@ -65,11 +66,11 @@ class StatusLine {
     const double elapsed_s = std::chrono::duration<double>(now - start_).count();
     const int left_s = fraction > 0.01 ? static_cast<int>(elapsed_s * (1 - fraction) / fraction) : -1;
     const std::string left = left_s < 0 ? "-:--" : fmt::format("{}:{:02}", left_s / 60, left_s % 60);
-    fmt::print(stderr, "\r\033[K[{:3.0f} %] {}  {} left", 100 * fraction, what, left);
+    tell(stderr, "\r\033[K[{:3.0f} %] {}  {} left", 100 * fraction, what, left);
     std::fflush(stderr);
   }
   void clear() const {
-    if (on_terminal_) fmt::print(stderr, "\r\033[K");
+    if (on_terminal_) tell(stderr, "\r\033[K");
   }
 
  private:
@@ -84,8 +85,8 @@ class Table {
 
   void add_line(const SamplingEvaluation& so_far) const {
     if (!wanted_) return;
-    if (so_far.schemes.size() == 1) fmt::print("{}", text_header(so_far));
-    fmt::print("{}", text_line(so_far.schemes.back()));
+    if (so_far.schemes.size() == 1) tell(stdout, "{}", text_header(so_far));
+    tell(stdout, "{}", text_line(so_far.schemes.back()));
     std::fflush(stdout);
   }
 
@@ -120,12 +121,15 @@ int run(Arguments arguments) {
   const auto evaluation = evaluate_sampling(scenario, options, notices, monitor);
   status.clear();
   if (!evaluation) return kInterrupted;
-  write_text(directory.path() / "scenario.yaml", write_scenario(to_keep(scenario, arguments, directory.final_path())));
-  write_report_files(*evaluation, directory.path());
-  directory.finish(to_json(*evaluation));
+  keep_on_failure(directory, true, [&] {
+    write_text(directory.path() / "scenario.yaml",
+               write_scenario(to_keep(scenario, arguments, directory.final_path())));
+    write_report_files(*evaluation, directory.path());
+    directory.finish(to_json(*evaluation));
+  });
   if (!arguments.quiet) {
-    fmt::print("{}", goal_text(*evaluation));
-    fmt::print(stderr, "report: {}\n", (fs::path(arguments.out) / "report.md").string());
+    tell(stdout, "{}", goal_text(*evaluation));
+    tell(stderr, "report: {}\n", (fs::path(arguments.out) / "report.md").string());
   }
   return kOk;
 }

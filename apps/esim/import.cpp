@@ -29,13 +29,13 @@ class Steps {
   void show(double fraction, const std::string& what) {
     const std::string line = fmt::format("[{:3.0f} %] {}", 100 * fraction, what);
     if (!wanted_ || line == shown_) return;
-    fmt::print(stderr, "{}{}{}", on_terminal_ ? "\r\033[K" : "", line, on_terminal_ ? "" : "\n");
+    tell(stderr, "{}{}{}", on_terminal_ ? "\r\033[K" : "", line, on_terminal_ ? "" : "\n");
     std::fflush(stderr);
     shown_ = line;
   }
 
   void clear() {
-    if (wanted_ && on_terminal_) fmt::print(stderr, "\r\033[K");
+    if (wanted_ && on_terminal_) tell(stderr, "\r\033[K");
   }
 
  private:
@@ -64,7 +64,7 @@ int run(const Arguments& arguments) {
   const auto warn = [&](const std::string& text) {
     if (text.starts_with("file ")) return;  // that the scene refers to
     steps.clear();
-    fmt::print(stderr, "warning: {}\n", text);
+    tell(stderr, "warning: {}\n", text);
   };
   BlenderWatch watch;
   watch.warning = warn;
@@ -76,7 +76,7 @@ int run(const Arguments& arguments) {
                                    : export_blend(arguments.scene, out, watch);
   steps.clear();
   if (!done) return kInterrupted;
-  fmt::print("{}: {}\n", out.string(), summary(load_scene_file(out, warn)));
+  tell(stdout, "{}: {}\n", out.string(), summary(load_scene_file(out, warn)));
   return kOk;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <future>
 
 #include "commands.h"
 #include "esim/core/error.h"
@@ -70,13 +71,16 @@ class Showing {
     RecordingFile file(out_, arguments_.force);
     VideoFile video(file.path(), player.layout().width, player.layout().height, options_.frames_per_s, kind);
     std::size_t frames = 0;
+    std::future<void> encoding;  // of one picture, while the next is drawn
     while (!interrupted()) {
-      const auto image = player.next();
+      auto image = player.next();
+      if (encoding.valid()) encoding.get();
       if (!image) break;
-      video.append(*image);
+      encoding = std::async(std::launch::async, [&video, picture = *std::move(image)] { video.append(picture); });
       ++frames;
       show(frames, instants.count);
     }
+    if (encoding.valid()) encoding.get();
     video.close();
     file.finish();
     bar_.clear();
@@ -120,7 +124,7 @@ class Showing {
 
   void say(const std::string& what) {
     if (arguments_.quiet) return;
-    fmt::print(stderr, "{}: {}; {} events\n", out_.string(), what, grouped(survey_.events));
+    tell(stderr, "{}: {}; {} events\n", out_.string(), what, grouped(survey_.events));
   }
 
   const Arguments& arguments_;
@@ -193,7 +197,7 @@ void add_play(CLI::App& app, int& exit_code) {
   positive("--fps", arguments->fps, "Frames per second of the video (default: 30, of GIFs 20)", "F", 1, 240);
   positive(
       "--slow-motion", arguments->play.slow_motion,
-      "How many times slower than real time; below 1 faster (default: so that the video lasts about 5 s or longer)",
+      "How many times slower than real time; below 1 faster (default: so that the video lasts about 4 s or longer)",
       "F", 1e-3, 1e6);
   auto* window =
       positive("--window-ms", arguments->window_ms,

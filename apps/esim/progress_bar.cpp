@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "support.h"
+
 namespace esim::app {
 namespace {
 
@@ -44,14 +46,14 @@ void ProgressBar::show(double fraction, const std::function<std::string()>& what
   const int full = std::clamp(static_cast<int>(fraction * kCells), 0, kCells);
   const double wall_s = std::chrono::duration<double>(now - start_).count();
   const double left_s = fraction > 0 ? wall_s * (1.0 - fraction) / fraction : 0.0;
-  fmt::print(stderr, "\r\033[K[{}{}] {}  {} left", std::string(static_cast<std::size_t>(full), '#'),
-             std::string(static_cast<std::size_t>(kCells - full), '.'), what(),
-             fraction > 0 ? minutes_and_seconds(left_s) : "-:--");
+  tell(stderr, "\r\033[K[{}{}] {}  {} left", std::string(static_cast<std::size_t>(full), '#'),
+       std::string(static_cast<std::size_t>(kCells - full), '.'), what(),
+       fraction > 0 ? minutes_and_seconds(left_s) : "-:--");
   std::fflush(stderr);
 }
 
 void ProgressBar::clear() {
-  if (on_terminal_) fmt::print(stderr, "\r\033[K");
+  if (on_terminal_) tell(stderr, "\r\033[K");
 }
 
 }  // namespace esim::app

@@ -25,12 +25,12 @@ void print_summary(const Summary& summary, const std::filesystem::path& out, boo
     samples += camera.sampling.samples;
   }
   const double simulated_s = to_seconds(summary.end - summary.start);
-  fmt::print(stderr, "{}: {:.3f} s simulated in {:.1f} s ({:.2f}x real time), {} samples, {} events\n",
-             summary.complete ? "done" : "interrupted", simulated_s, summary.wall_seconds,
-             simulated_s / summary.wall_seconds, samples, events);
-  fmt::print(stderr, "recording: {}\n", out.string());
+  tell(stderr, "{}: {:.3f} s simulated in {:.1f} s ({:.2f}x real time), {} samples, {} events\n",
+       summary.complete ? "done" : "interrupted", simulated_s, summary.wall_seconds, simulated_s / summary.wall_seconds,
+       samples, events);
+  tell(stderr, "recording: {}\n", out.string());
   for (const CameraSummary& camera : summary.cameras) {
-    if (previews) fmt::print(stderr, "look at:   {}\n", (out / camera.name / "preview.png").string());
+    if (previews) tell(stderr, "look at:   {}\n", (out / camera.name / "preview.png").string());
   }
 }
 
@@ -51,12 +51,12 @@ int run(const Arguments& arguments) {
   bar.clear();
   if (!made) return kInterrupted;  // while loading: nothing was worth keeping
   const Summary& summary = *made;
-  for (const std::string& loss : losses(scenario, summary)) fmt::print(stderr, "warning: {}\n", loss);
+  for (const std::string& loss : losses(scenario, summary)) tell(stderr, "warning: {}\n", loss);
   if (!arguments.quiet) {
     print_summary(summary, out, scenario.output.preview && scenario.truth.rate_hz > 0);
     for (const std::string& hint : hints(scenario, summary)) {
-      fmt::print(stderr, "hint:      {}, for example esim simulate {} --set 'sampling={{type: flow}}'\n", hint,
-                 arguments.scenario);
+      tell(stderr, "hint:      {}, for example esim simulate {} --set 'sampling={{type: flow}}'\n", hint,
+           arguments.scenario);
     }
   }
   if (!summary.problem.empty()) {

@@ -7,6 +7,7 @@
 
 #include "commands.h"
 #include "esim/core/error.h"
+#include "support.h"
 
 namespace esim::app {
 namespace {
@@ -40,6 +41,7 @@ int run(Arguments& arguments) {
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
+  if (!is_ignored(SIGHUP)) sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 
   const studio::Studio studio(arguments);

@@ -19,14 +19,23 @@ void on_signal(int) { signal_came = 1; }
 void catch_interrupts() {
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
+  if (!is_ignored(SIGHUP)) std::signal(SIGHUP, on_signal);
+  std::signal(SIGPIPE, SIG_IGN);
 }
+
+bool is_ignored(int signal) {
+  struct sigaction now {};
+  return sigaction(signal, nullptr, &now) == 0 && now.sa_handler == SIG_IGN;
+}
+
+void write_or_not(std::FILE* file, const std::string& text) noexcept { std::fputs(text.c_str(), file); }
 
 bool interrupted() { return signal_came != 0; }
 
 Notices printing(bool quiet) {
-  return {[](const std::string& text) { fmt::print(stderr, "warning: {}\n", text); },
+  return {[](const std::string& text) { tell(stderr, "warning: {}\n", text); },
           [quiet](const std::string& text) {
-            if (!quiet) fmt::print(stderr, "{}\n", text);
+            if (!quiet) tell(stderr, "{}\n", text);
           }};
 }
 

@@ -1,9 +1,13 @@
 #pragma once
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "esim/compose/compose.h"
@@ -11,9 +15,22 @@
 
 namespace esim::app {
 
-/// From now on, Ctrl-C and SIGTERM are only remembered.
+/// From now on, Ctrl-C, SIGTERM and, unless nohup has let it be ignored, SIGHUP (a lost connection) are only
+/// remembered; that nobody reads what is printed any more ends nothing.
 void catch_interrupts();
 bool interrupted();
+
+/// Whether this process ignores a signal.
+bool is_ignored(int signal);
+
+void write_or_not(std::FILE* file, const std::string& text) noexcept;
+
+/// Prints for people. Unlike fmt::print, does not throw where the terminal is gone or the pipe closed: what is being
+/// written to files matters more.
+template <typename... Arguments>
+void tell(std::FILE* file, fmt::format_string<Arguments...> format, Arguments&&... arguments) {
+  write_or_not(file, fmt::format(format, std::forward<Arguments>(arguments)...));
+}
 
 /// Prints warnings and, unless `quiet`, notes.
 Notices printing(bool quiet);

@@ -18,8 +18,8 @@ namespace {
 constexpr std::string_view kEnter = "\033[?1049h\033[?25l\033[2J";  // alternate screen, no cursor, clear
 constexpr std::string_view kLeave = "\033[0m\033[?25h\033[?1049l";
 
-// Signals that end the process without unwinding it; Ctrl-C and SIGTERM are caught elsewhere.
-constexpr std::array kDeadly{SIGABRT, SIGBUS, SIGFPE, SIGHUP, SIGILL, SIGQUIT, SIGSEGV};
+// Signals that end the process without unwinding it; Ctrl-C, SIGTERM and SIGHUP are caught elsewhere.
+constexpr std::array kDeadly{SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGQUIT, SIGSEGV};
 
 termios before;
 std::array<struct sigaction, kDeadly.size()> handlers_before;

@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "esim/core/error.h"
+#include "esim/record/keep_on_failure.h"
 #include "esim/record/recording_directory.h"
 #include "esim/record/recording_file.h"
 #include "progress_bar.h"
@@ -89,9 +90,9 @@ void report_losses(const ConversionSummary& summary, const ConversionOptions& op
 
 void print_summary(const ConversionSummary& summary) {
   const double converted_s = to_seconds(summary.end - summary.start);
-  fmt::print(stderr, "{}: {} frames, {:.3f} s, converted in {:.1f} s ({:.2f}x real time), {} steps, {} events\n",
-             summary.complete ? "done" : "interrupted", summary.frames, converted_s, summary.wall_seconds,
-             converted_s / summary.wall_seconds, summary.steps, summary.events_on + summary.events_off);
+  tell(stderr, "{}: {} frames, {:.3f} s, converted in {:.1f} s ({:.2f}x real time), {} steps, {} events\n",
+       summary.complete ? "done" : "interrupted", summary.frames, converted_s, summary.wall_seconds,
+       converted_s / summary.wall_seconds, summary.steps, summary.events_on + summary.events_off);
 }
 
 /// A conversion from the opened input to the summary of what was written.
@@ -110,6 +111,7 @@ class Converter {
     ConversionSummary summary =
         convert({frames_, interpolator, event_camera, workers_}, out, [&](const Progress& progress) {
           bar.show(progress);
+          has_converted_ = true;
           return !interrupted();
         });
     bar.clear();
@@ -118,10 +120,14 @@ class Converter {
 
   int threads() const { return workers_.threads(); }
 
+  /// Anything yet.
+  const bool& has_converted() const { return has_converted_; }
+
  private:
   const Arguments& arguments_;
   Workers workers_;
   FrameSequence frames_;
+  bool has_converted_ = false;
 };
 
 /// What the shell gets; throws what ended the conversion early.
@@ -137,12 +143,15 @@ int convert_to_file(const Arguments& arguments, const fs::path& out, const Forma
   RecordingFile file(out, arguments.force);
   Converter converter(arguments);
   const std::unique_ptr<Sink> sink = build_conversion_sink(file.path(), format);
-  const ConversionSummary summary = converter.run(*sink);
-  file.finish();
+  const ConversionSummary summary = keep_on_failure(file, converter.has_converted(), [&] {
+    ConversionSummary converted = converter.run(*sink);
+    file.finish();
+    return converted;
+  });
   report_losses(summary, arguments.options, notices);
   if (!arguments.quiet) {
     print_summary(summary);
-    fmt::print(stderr, "events: {}\n", out.string());
+    tell(stderr, "events: {}\n", out.string());
   }
   return outcome(summary, out);
 }
@@ -153,13 +162,15 @@ int convert_to_folder(const Arguments& arguments, const fs::path& out, const Not
   Converter converter(arguments);
   write_text(directory.path() / "video.yaml", write_conversion(arguments.options));
   const std::unique_ptr<Sink> sink = build_conversion_sink(directory.path());
-  const ConversionSummary summary = converter.run(*sink);
-  report_losses(summary, arguments.options, notices);
-  directory.finish(report_json(arguments.options, summary, converter.threads(), given));
+  const ConversionSummary summary = keep_on_failure(directory, converter.has_converted(), [&] {
+    ConversionSummary converted = converter.run(*sink);
+    report_losses(converted, arguments.options, notices);
+    directory.finish(report_json(arguments.options, converted, converter.threads(), given));
+    return converted;
+  });
   if (!arguments.quiet) {
     print_summary(summary);
-    fmt::print(stderr, "recording: {}\nlook at:   {}\n", out.string(),
-               (out / kConversionCamera / "preview.png").string());
+    tell(stderr, "recording: {}\nlook at:   {}\n", out.string(), (out / kConversionCamera / "preview.png").string());
   }
   return outcome(summary, out);
 }

@@ -12,6 +12,7 @@
 #include "esim/record/output_file.h"
 #include "esim/record/preview/canvas.h"
 #include "esim/scenario/waypoint_file.h"
+#include "support.h"
 
 namespace esim::app {
 namespace {
@@ -128,17 +129,17 @@ SE3 Walk::T_world_camera(const WaypointTrajectory& motion, TimeNs t) const {
 void Walk::print_summary(const fs::path& scenario) const {
   const std::size_t count = file_.points().size();
   if (count == 0) return;
-  fmt::print(stderr, "{}: {} way point{}\n", file_.path().string(), count, count == 1 ? "" : "s");
+  tell(stderr, "{}: {} way point{}\n", file_.path().string(), count, count == 1 ? "" : "s");
   if (count < 2) {
-    fmt::print(stderr, "a motion needs two; go on with --append\n");
+    tell(stderr, "a motion needs two; go on with --append\n");
     return;
   }
   const WaypointTrajectory whole = motion();
   const fs::path folder = fs::absolute(scenario).parent_path();
-  fmt::print(stderr, "in the scenario:\n");
-  fmt::print("trajectory: {{type: waypoints, file: {}}}\nduration_s: {:.3f}\n",
-             in_quotes(fs::absolute(file_.path()).lexically_proximate(folder).generic_string()),
-             std::floor(to_seconds(whole.end()) * 1e3) / 1e3);
+  tell(stderr, "in the scenario:\n");
+  tell(stdout, "trajectory: {{type: waypoints, file: {}}}\nduration_s: {:.3f}\n",
+       in_quotes(fs::absolute(file_.path()).lexically_proximate(folder).generic_string()),
+       std::floor(to_seconds(whole.end()) * 1e3) / 1e3);
 }
 
 /// Beside the way points, under a name of its own.

@@ -55,12 +55,12 @@ void walk_by_keys(Walk& walk, const std::vector<Key>& keys) {
     if (interrupted()) return;
     const Effect effect = walk.press(key);
     if (effect == Effect::leave) return;
-    if (effect == Effect::help) fmt::print(stderr, "{}", key_help());
+    if (effect == Effect::help) tell(stderr, "{}", key_help());
     if (effect == Effect::play) {
       const WaypointTrajectory motion = walk.motion();
       walk.say(fmt::format("the motion lasts {:.3f} s", to_seconds(motion.end())));
     }
-    if (!walk.message().empty()) fmt::print(stderr, "{}\n", walk.message());
+    if (!walk.message().empty()) tell(stderr, "{}\n", walk.message());
   }
 }
 

@@ -71,7 +71,7 @@ class play:
     fps : float
         Pictures per second of a video.
     slow_motion : float, optional
-        How many times slower than real time; so that the video lasts about 5 s or longer without.
+        How many times slower than real time; so that the video lasts about 4 s or longer without.
     start_s, duration_s : float, optional
         What is shown, in s since the start of the recording.
     window_s : float, optional

@@ -6,6 +6,7 @@
 
 #include "esim/core/error.h"
 #include "esim/record/fan_out.h"
+#include "esim/record/keep_on_failure.h"
 #include "esim/record/output_file.h"
 #include "esim/scenario/read.h"
 
@@ -97,6 +98,7 @@ bool Simulation::signal_came() {
 bool Simulation::advance() {
   const bool at_end = simulator_->advance_until(world_->info.end, [this](const Progress& progress) {
     packets_->know(progress.now);
+    recorded_ |= progress.now > progress.start;
     if (progress.wall_seconds - looked_at_ >= kSignalInterval_s) {
       looked_at_ = progress.wall_seconds;
       if (signal_came()) return false;
@@ -119,16 +121,34 @@ void Simulation::finish() {
   if (directory_ != nullptr) directory_->finish(report_);
 }
 
+/// Works without Python's lock. After a failure, from which there is no going on, the recording stays in
+/// DIR.incomplete if it holds anything.
+template <typename Work>
+void Simulation::or_keep_the_recording(const Work& work) {
+  const nb::gil_scoped_release released;
+  try {
+    work();
+  } catch (const OutputError& error) {
+    throw OutputError(keep_what_was_recorded(error.what()));
+  } catch (const std::exception& error) {
+    keep_what_was_recorded(error.what());
+    throw;
+  }
+}
+
+/// Returns the problem, and where the recording is kept.
+std::string Simulation::keep_what_was_recorded(const std::string& problem) {
+  over_ = true;
+  if (directory_ == nullptr || !recorded_) return problem;
+  end_incomplete(*recorder_);
+  directory_->keep(problem);
+  return problem + "; what was recorded before that is kept: " + directory_->path().string();
+}
+
 std::optional<Packet> Simulation::next() {
   if (!packets_->has_packet() && !over_) {
     bool undisturbed = true;
-    try {
-      const nb::gil_scoped_release released;
-      undisturbed = advance();
-    } catch (...) {
-      over_ = true;  // what is half done cannot be finished: the recording is left to its destructor, which removes it
-      throw;
-    }
+    or_keep_the_recording([&] { undisturbed = advance(); });
     if (!undisturbed) throw *std::exchange(signal_, std::nullopt);
   }
   if (!packets_->has_packet()) return std::nullopt;
@@ -136,9 +156,7 @@ std::optional<Packet> Simulation::next() {
 }
 
 void Simulation::close() {
-  if (over_) return;
-  const nb::gil_scoped_release released;
-  finish();
+  if (!over_) or_keep_the_recording([&] { finish(); });
 }
 
 }  // namespace esim::python

@@ -55,6 +55,9 @@ class Simulation {
   void build(const Substitutes& substitutes, const std::string& origin, const SimulationOptions& options);
   bool advance();
   void finish();
+  template <typename Work>
+  void or_keep_the_recording(const Work& work);
+  std::string keep_what_was_recorded(const std::string& problem);
   bool signal_came();
 
   Scenario scenario_;
@@ -69,6 +72,7 @@ class Simulation {
   double looked_at_ = 0;  // wall clock of the last look for signals, s
   std::string report_;
   bool over_ = false;
+  bool recorded_ = false;  // something, already
 };
 
 }  // namespace esim::python

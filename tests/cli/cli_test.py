@@ -313,7 +313,9 @@ class BadInput(Cli):
             resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 
         result = self.simulate("--set", "duration_s=1", preexec_fn=limit)
-        self.assert_refused(result, "out.incomplete")
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn("kept: " + str(self.out) + ".incomplete", result.stderr)
+        self.assertEqual([p.name for p in self.folder.iterdir() if p.name.startswith("out")], ["out.incomplete"])
 
 
 class Signals(Cli):

@@ -194,14 +194,33 @@ TEST_F(RecordingDirectoryTest, UnwritableParentIsNamed) {
   EXPECT_TRUE(contains(failure("/proc/a/out"), "cannot create the directory /proc/a: "));
 }
 
-TEST_F(RecordingDirectoryTest, FullDiskAtTheReport) {
+TEST_F(RecordingDirectoryTest, AFullDiskAtTheReportKeepsTheRecording) {
   {
     std::optional<test::FileSizeLimit> full;
     RecordingDirectory directory(out_, false);
+    std::ofstream(directory.path() / "file") << "content";
     full.emplace(10);
     EXPECT_THROW(directory.finish(std::string(1000, ' ')), OutputError);
   }
-  EXPECT_TRUE(fs::is_empty(base_.path()));
+  EXPECT_FALSE(fs::exists(out_));
+  EXPECT_EQ(test::content(incomplete_ / "file"), "content");
+  EXPECT_EQ(test::content(incomplete_ / "report.json"), "{\"status\": \"running\"}\n");
+}
+
+TEST_F(RecordingDirectoryTest, WhatIsToBeKeptStaysAndSaysWhy) {
+  { RecordingDirectory(out_, false).keep("the disk is \"full\""); }
+  EXPECT_TRUE(contains(test::content(incomplete_ / "report.json"), R"("reason": "the disk is \"full\"")"));
+  EXPECT_FALSE(is_being_written(incomplete_));
+  { RecordingDirectory(out_, true).finish("{}"); }
+  EXPECT_FALSE(fs::exists(incomplete_));
+}
+
+TEST_F(RecordingDirectoryTest, WhatAKilledRunLeftAtOnceIsReplaced) {
+  fs::create_directory(incomplete_);
+  base_.write("out.incomplete/report.json.tmp", "{\"st");
+  EXPECT_TRUE(contains(refusal(out_, false), "--force"));
+  { RecordingDirectory(out_, true).finish("{}"); }
+  EXPECT_FALSE(fs::exists(incomplete_));
 }
 
 }  // namespace

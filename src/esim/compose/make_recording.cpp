@@ -3,6 +3,7 @@
 
 #include "esim/compose/compose.h"
 #include "esim/record/fan_out.h"
+#include "esim/record/keep_on_failure.h"
 #include "esim/record/output_file.h"
 #include "esim/record/recording_directory.h"
 #include "esim/scenario/read.h"
@@ -35,11 +36,17 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
     sink = std::move(both);
   }
   if (!monitor({world.info.start, world.info.start, world.info.end, 0, 0, 0})) return std::nullopt;
-  Summary summary = simulate(world, *sink, monitor);
-  for (const std::string& loss : losses(scenario, summary)) given.push_back("warning: " + loss);
-  std::ranges::copy(hints(scenario, summary), std::back_inserter(given));
-  directory.finish(report_json(scenario, summary, world.workers->threads(), given));
-  return summary;
+  bool recorded = false;
+  return keep_on_failure(directory, recorded, [&]() -> std::optional<Summary> {
+    Summary summary = simulate(world, *sink, [&](const Progress& progress) {
+      recorded |= progress.now > progress.start;
+      return monitor(progress);
+    });
+    for (const std::string& loss : losses(scenario, summary)) given.push_back("warning: " + loss);
+    std::ranges::copy(hints(scenario, summary), std::back_inserter(given));
+    directory.finish(report_json(scenario, summary, world.workers->threads(), given));
+    return summary;
+  });
 }
 
 }  // namespace esim

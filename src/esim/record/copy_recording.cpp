@@ -9,6 +9,7 @@
 #include "esim/core/error.h"
 #include "esim/core/remedy.h"
 #include "esim/record/adapters.h"
+#include "esim/record/keep_on_failure.h"
 #include "esim/record/number_text.h"
 #include "esim/record/recording_directory.h"
 #include "esim/record/recording_file.h"
@@ -27,6 +28,8 @@ std::string names_of(const std::vector<CameraInfo>& cameras) {
 /// The camera to take out; nothing: all.
 std::optional<int> chosen_camera(const RecordingInfo& info, const Format& format, const std::string& name) {
   const auto& cameras = info.cameras;
+  if (cameras.empty() && !format.several_cameras)
+    throw UserError(fmt::format("{} holds what one camera recorded, and the input has no camera", format.name));
   if (name.empty()) {
     if (cameras.size() <= 1 || format.several_cameras) return std::nullopt;
     throw RemediableError(
@@ -35,6 +38,7 @@ std::optional<int> chosen_camera(const RecordingInfo& info, const Format& format
   }
   const auto found =
       std::find_if(cameras.begin(), cameras.end(), [&](const CameraInfo& camera) { return camera.name == name; });
+  if (cameras.empty()) throw UserError(fmt::format("there is no camera {}: the recording has none", name));
   if (found == cameras.end())
     throw UserError(fmt::format("there is no camera {}; the recording has {}", name, names_of(cameras)));
   return static_cast<int>(found - cameras.begin());
@@ -72,25 +76,32 @@ class Copy {
     }
   }
 
-  CopySummary run(const std::function<bool(double)>& go_on) {
+  /// `began` becomes true with the first record that is written, or refused.
+  CopySummary run(const std::function<bool(double)>& go_on, bool& began) {
     to_->begin(from_.info());
-    try {
-      while (const Record* record = from_.next()) {
-        take(*record);
-        if (!go_on(from_.progress())) {
-          summary_.complete = false;
-          break;
-        }
+    while (const Record* record = next()) {
+      began = true;
+      take(*record);
+      if (!go_on(from_.progress())) {
+        summary_.complete = false;
+        break;
       }
-    } catch (const UserError&) {
-      to_->end(false);
-      throw;
     }
     to_->end(summary_.complete);
     return summary_;
   }
 
  private:
+  /// What cannot be read ends the target, incomplete. (One that cannot be written is not ended: it stays as it is.)
+  const Record* next() {
+    try {
+      return from_.next();
+    } catch (const UserError&) {
+      to_->end(false);
+      throw;
+    }
+  }
+
   void take(const Record& record) {
     const Content content = content_of(record);
     const std::optional<int> camera = camera_of(record);
@@ -143,7 +154,8 @@ std::string written_formats() {
 
 CopySummary copy_recording(Source& from, const Format& format, const fs::path& to, const CopyOptions& options,
                            const std::function<bool(double)>& go_on) {
-  return Copy(from, format, to, options).run(go_on);
+  bool began = false;
+  return Copy(from, format, to, options).run(go_on, began);
 }
 
 CopySummary convert_recording(const fs::path& from, const Format& format, const fs::path& to,
@@ -158,21 +170,33 @@ CopySummary convert_recording(const fs::path& from, const Format& format, const 
     };
   }
   const std::unique_ptr<Source> source = open_source(from, reading);
+  bool copied = false;
   const auto copy_to = [&](const fs::path& path) {
-    CopySummary summary = copy_recording(*source, format, path, options.copy, go_on);
-    summary.complete &= !damaged;
-    return summary;
+    try {
+      CopySummary summary = Copy(*source, format, path, options.copy).run(go_on, copied);
+      summary.complete &= !damaged;
+      return summary;
+    } catch (const OutputError&) {
+      throw;
+    } catch (const UserError&) {
+      copied = false;  // the input is damaged or does not fit into the format: both have a remedy, and this is none
+      throw;
+    }
   };
   if (format.folder) {
     RecordingDirectory directory(to, options.replace);
-    const CopySummary summary = copy_to(directory.path());
-    directory.finish(conversion_report(source->info(), from.string(), summary.complete));
-    return summary;
+    return keep_on_failure(directory, copied, [&] {
+      const CopySummary summary = copy_to(directory.path());
+      directory.finish(conversion_report(source->info(), from.string(), summary.complete));
+      return summary;
+    });
   }
   RecordingFile file(to, options.replace);
-  const CopySummary summary = copy_to(file.path());
-  file.finish();
-  return summary;
+  return keep_on_failure(file, copied, [&] {
+    const CopySummary summary = copy_to(file.path());
+    file.finish();
+    return summary;
+  });
 }
 
 std::vector<Loss> losses(const CopySummary& summary, const Format& format) {

@@ -9,6 +9,7 @@
 
 #include "esim/core/error.h"
 #include "esim/core/remedy.h"
+#include "esim/record/recording_directory.h"
 
 namespace esim {
 namespace {
@@ -29,9 +30,7 @@ std::optional<fs::path> events_in(const fs::path& folder) {
 // The file that a path means.
 fs::path find_file(const fs::path& path) {
   std::error_code error;
-  if (!fs::exists(path, error)) {
-    throw UserError(path.string() + ": " + (error ? error.message() : "no such file or directory"));
-  }
+  require_existing(path);
   if (!fs::is_directory(path, error)) return path;
   if (const auto file = events_in(path)) return *file;
 
@@ -81,7 +80,8 @@ EventsFile::EventsFile(const fs::path& path, const ReadOptions& options) : path_
   // What the file itself says of the sensor counts for more than the report beside it.
   source_ = open_source(path_, told);
   const auto size_of = [](const Source& source) { return source.info().cameras.front().model; };
-  if (source_->info().cameras.size() != 1) {
+  if (source_->info().cameras.empty()) throw UserError(fmt::format("{} holds no events of a camera", path_.string()));
+  if (source_->info().cameras.size() > 1) {
     std::string names;
     for (const CameraInfo& camera : source_->info().cameras) names += (names.empty() ? "" : ", ") + camera.name;
     throw RemediableError(

@@ -1,6 +1,7 @@
 #include "esim/record/fan_out.h"
 
 #include <exception>
+#include <vector>
 
 namespace esim {
 
@@ -9,7 +10,24 @@ void FanOut::begin(const RecordingInfo& info) {
 }
 
 void FanOut::write(const Record& record) {
-  for (const auto& sink : sinks_) sink->write(record);
+  for (auto& sink : sinks_) {
+    try {
+      sink->write(record);
+    } catch (...) {
+      sink.reset();  // it cannot be ended in order: what it has written stays as it is
+      end_rest();
+      throw;
+    }
+  }
+}
+
+void FanOut::end_rest() noexcept {
+  std::erase(sinks_, nullptr);
+  try {
+    end(false);
+  } catch (...) {  // the first failure counts
+  }
+  sinks_.clear();
 }
 
 void FanOut::end(bool complete) {

@@ -8,7 +8,9 @@
 
 namespace esim {
 
-/// Passes everything on to several sinks, in their order.
+/// Passes everything on to several sinks, in their order. If one of them fails to write a record, the others are ended,
+/// incomplete, so that they keep what they have been given; then the failure is rethrown, and nothing more is passed
+/// on.
 class FanOut final : public Sink {
  public:
   FanOut() = default;
@@ -23,6 +25,8 @@ class FanOut final : public Sink {
   void end(bool complete) override;
 
  private:
+  void end_rest() noexcept;
+
   std::vector<std::unique_ptr<Sink>> sinks_;
 };
 

@@ -245,8 +245,7 @@ Inspection inspect(const fs::path& path) {
   fs::path found = path.has_filename() || !path.has_relative_path() ? path : path.parent_path();
   std::error_code error;
   if (!fs::exists(found, error) && fs::exists(incomplete_path(found), error)) found = incomplete_path(found);
-  if (!fs::exists(found, error))
-    throw UserError(path.string() + ": " + (error ? error.message() : "no such file or directory"));
+  require_existing(found);
   return fs::is_directory(found, error) ? inspect_directory(found) : inspect_file(found);
 }
 

@@ -36,8 +36,10 @@ void OutputFile::append(std::string_view text) {
   flush_if_full();
 }
 
-void OutputFile::flush_if_full() {
-  if (buffer_.size() >= kBufferBytes) flush();
+bool OutputFile::flush_if_full() {
+  if (buffer_.size() < kBufferBytes) return false;
+  flush();
+  return true;
 }
 
 void OutputFile::overwrite_start(std::string_view text) {
@@ -54,10 +56,22 @@ void OutputFile::flush() {
   while (!rest.empty()) {
     const ssize_t written = ::write(descriptor_, rest.data(), rest.size());
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) throw_cannot_write(path_, system_reason(errno));
+    if (written < 0) {
+      const int error = errno;
+      take_back(buffer_.size() - rest.size());
+      throw_cannot_write(path_, system_reason(error));
+    }
     rest.remove_prefix(static_cast<std::size_t>(written));
   }
+  flushed_ += buffer_.size();
   buffer_.clear();
+}
+
+void OutputFile::take_back(std::size_t written) {
+  const auto whole = static_cast<off_t>(flushed_);
+  if (::ftruncate(descriptor_, whole) == 0 && ::lseek(descriptor_, whole, SEEK_SET) == whole) return;
+  flushed_ += written;  // a pipe takes nothing back: it is not written twice
+  buffer_.erase(0, written);
 }
 
 void OutputFile::close() {
@@ -70,13 +84,20 @@ void OutputFile::close() {
 
 void write_file_atomically(const std::filesystem::path& path, std::string_view text) {
   std::filesystem::path temporary = path;
-  temporary += ".tmp";
-  OutputFile file(temporary);
-  file.append(text);
-  file.close();
-  std::error_code error;
+  temporary += kTemporaryExtension;
+  std::error_code error, ignored;
+  try {
+    OutputFile file(temporary);
+    file.append(text);
+    file.close();
+  } catch (const OutputError&) {
+    std::filesystem::remove(temporary, ignored);
+    throw;
+  }
   std::filesystem::rename(temporary, path, error);
-  if (error) throw_cannot_write(path, error.message());
+  if (!error) return;
+  std::filesystem::remove(temporary, ignored);
+  throw_cannot_write(path, error.message());
 }
 
 void create_folder(const std::filesystem::path& path) {

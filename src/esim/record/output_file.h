@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -20,12 +21,15 @@ class OutputFile {
   /// Room to append text to; call flush_if_full() after each portion.
   std::string& buffer() { return buffer_; }
   void append(std::string_view text);
-  void flush_if_full();
+
+  /// True where it has flushed.
+  bool flush_if_full();
 
   /// Replaces the first bytes of what has been flushed, as many as `text` has.
   void overwrite_start(std::string_view text);
 
-  /// Hands what is buffered to the system, so that it survives the end of this process.
+  /// Hands what is buffered to the system, so that it survives the end of this process: all of it or, where that fails,
+  /// none. Files that are flushed after whole lines so end with one, also on a full disk.
   void flush();
 
   /// Writes everything to the disk and closes.
@@ -34,10 +38,16 @@ class OutputFile {
   const std::filesystem::path& path() const { return path_; }
 
  private:
+  void take_back(std::size_t written);
+
   std::filesystem::path path_;
   std::string buffer_;
+  std::uint64_t flushed_ = 0;  // bytes
   int descriptor_ = -1;
 };
+
+/// What write_file_atomically() appends to the name of the file that it writes first.
+inline constexpr const char* kTemporaryExtension = ".tmp";
 
 /// Puts `text` into the file at once: readers see the old content or the new one, never a part.
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);

@@ -8,6 +8,7 @@
 
 #include <cerrno>
 #include <cstdlib>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -21,6 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kReport = "report.json";
+
 // "out/" and "./out" name the same directory as "out".
 fs::path normalised(const fs::path& out) {
   fs::path path = out.lexically_normal();
@@ -31,10 +34,20 @@ fs::path normalised(const fs::path& out) {
   return path;
 }
 
+// A run that was killed at once has left the beginning of its report.
 bool looks_like_a_recording(const fs::path& directory) {
   std::error_code error;
-  return fs::exists(directory / "report.json", error) || fs::exists(directory / "scenario.yaml", error) ||
-         fs::is_empty(directory, error);
+  return fs::exists(directory / kReport, error) || fs::exists(directory / "scenario.yaml", error) ||
+         fs::exists(directory / (std::string(kReport) + kTemporaryExtension), error) || fs::is_empty(directory, error);
+}
+
+// The report goes last: what a killed process leaves of the folder still looks like a recording.
+void remove_recording(const fs::path& directory, std::error_code& error) {
+  for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
+    std::error_code ignored;  // what stays keeps the folder from being removed
+    if (entry->path().filename() != kReport) fs::remove_all(entry->path(), ignored);
+  }
+  fs::remove_all(directory, error);
 }
 
 bool is_home(const fs::path& directory) {
@@ -80,7 +93,9 @@ void replace_directory(const fs::path& working, const fs::path& out) {
     fs::rename(out, old);
     fs::rename(working, out);
   }
-  fs::remove_all(old);
+  std::error_code error;
+  remove_recording(old, error);
+  if (error) throw std::system_error(error);
 }
 
 }  // namespace
@@ -89,6 +104,17 @@ fs::path incomplete_path(const fs::path& out) {
   fs::path path = out;
   path += ".incomplete";
   return path;
+}
+
+void require_existing(const fs::path& path) {
+  std::error_code error, ignored;
+  if (fs::exists(path, error)) return;
+  std::string problem = path.string() + ": " + (error ? error.message() : "no such file or directory");
+  const fs::path whole = path.has_filename() || !path.has_relative_path() ? path : path.parent_path();
+  const fs::path incomplete = incomplete_path(whole);
+  if (fs::exists(incomplete, ignored))
+    problem += "; there is " + incomplete.string() + ", which is being written or was left unfinished";
+  throw UserError(problem);
 }
 
 bool is_being_written(const fs::path& working_directory) {
@@ -118,7 +144,7 @@ RecordingDirectory::RecordingDirectory(const fs::path& out, bool force)
   try {
     create_parents();
     create_working_directory(force);
-    write_file_atomically(working_ / "report.json", "{\"status\": \"running\"}\n");
+    write_file_atomically(working_ / kReport, "{\"status\": \"running\"}\n");
   } catch (...) {
     discard();
     throw;
@@ -154,7 +180,7 @@ void RecordingDirectory::create_working_directory(bool force) {
           Remedy::replace_output);
     }
     require_replaceable(working_);
-    fs::remove_all(working_, error);
+    remove_recording(working_, error);
     if (error) throw OutputError("cannot remove " + working_.string() + ": " + error.message());
   }
   if (::mkdir(working_.c_str(), 0777) != 0) {
@@ -169,7 +195,7 @@ RecordingDirectory::~RecordingDirectory() { discard(); }
 void RecordingDirectory::discard() noexcept {
   if (!keep_) {
     std::error_code error;
-    if (owned_) fs::remove_all(working_, error);
+    if (owned_) remove_recording(working_, error);
     for (auto parent = created_parents_.rbegin(); parent != created_parents_.rend(); ++parent) {
       ::rmdir(parent->c_str());  // stays if somebody else uses it meanwhile
     }
@@ -179,9 +205,9 @@ void RecordingDirectory::discard() noexcept {
 }
 
 void RecordingDirectory::finish(std::string_view report_json) {
-  write_file_atomically(working_ / "report.json", report_json);
-  sync_directory(working_);
   keep_ = true;
+  write_file_atomically(working_ / kReport, report_json);
+  sync_directory(working_);
   try {
     if (replace_) {
       replace_directory(working_, out_);
@@ -193,6 +219,17 @@ void RecordingDirectory::finish(std::string_view report_json) {
                       "; the recording is kept in the former");
   }
   sync_directory(out_.parent_path().empty() ? fs::path(".") : out_.parent_path());
+}
+
+void RecordingDirectory::keep(std::string_view reason) noexcept {
+  keep_ = true;
+  if (reason.empty()) return;
+  try {
+    const nlohmann::ordered_json report = {{"status", "interrupted"}, {"reason", reason}};
+    write_file_atomically(working_ / kReport,
+                          report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  } catch (const std::exception&) {  // there is no room: it still says "running"
+  }
 }
 
 }  // namespace esim

@@ -10,7 +10,8 @@ namespace esim {
 ///
 ///   constructor    OUT.incomplete/ with a report.json that says "running"
 ///   finish()       the final report, then OUT.incomplete -> OUT, in one step also where an older OUT is replaced
-///   destructor     without finish(): OUT.incomplete is removed, an error leaves nothing behind
+///   destructor     without finish() and keep(): OUT.incomplete is removed, an error leaves nothing behind
+///   keep()         OUT.incomplete stays, whatever happens: it holds records
 ///   killed         OUT.incomplete stays
 class RecordingDirectory {
  public:
@@ -28,9 +29,13 @@ class RecordingDirectory {
   /// Where the recording will be: OUT.
   const std::filesystem::path& final_path() const { return out_; }
 
-  /// Writes report.json, makes the directory durable and puts it in its place. If only the last step fails, the
-  /// recording is kept in OUT.incomplete and the exception says so.
+  /// Writes report.json, makes the directory durable and puts it in its place. The recording is kept in OUT.incomplete
+  /// if that fails.
   void finish(std::string_view report_json);
+
+  /// From now on the destructor leaves OUT.incomplete where it is. If there is a `reason`, report.json says it, and
+  /// that the recording is interrupted; on a full disk, report.json stays as it was.
+  void keep(std::string_view reason = {}) noexcept;
 
  private:
   void create_parents();
@@ -47,6 +52,9 @@ class RecordingDirectory {
 
 /// OUT.incomplete.
 std::filesystem::path incomplete_path(const std::filesystem::path& out);
+
+/// Throws UserError where there is nothing at a path, naming OUT.incomplete if that is there.
+void require_existing(const std::filesystem::path& path);
 
 /// Whether a process is writing in this directory now.
 bool is_being_written(const std::filesystem::path& working_directory);

@@ -1,5 +1,6 @@
 #include "esim/record/recording_file.h"
 
+#include <string>
 #include <system_error>
 #include <utility>
 
@@ -29,14 +30,31 @@ RecordingFile::RecordingFile(fs::path out, bool force) : out_(std::move(out)), w
 }
 
 RecordingFile::~RecordingFile() {
+  if (kept_) return;
   std::error_code ignored;
-  if (!finished_) fs::remove(working_, ignored);
+  for (const fs::path& part : parts()) fs::remove(part, ignored);
+  fs::remove(working_, ignored);
+}
+
+/// OUT.incomplete.t.npy, OUT.incomplete.part0: what archives are made of.
+std::vector<fs::path> RecordingFile::parts() const {
+  const std::string prefix = working_.filename().string() + ".";
+  const fs::path folder = working_.has_parent_path() ? working_.parent_path() : fs::path(".");
+  std::vector<fs::path> found;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    const std::string extension = entry->path().extension().string();
+    const bool is_part = extension == ".npy" || extension.starts_with(".part");
+    if (is_part && name.starts_with(prefix)) found.push_back(entry->path());
+  }
+  return found;
 }
 
 void RecordingFile::finish() {
   std::error_code error;
   fs::rename(working_, out_, error);
-  finished_ = true;
+  kept_ = true;
   if (error) {
     throw OutputError("cannot rename " + working_.string() + " to " + out_.string() + ": " + error.message() +
                       "; the recording is kept in the former");

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "esim/core/error.h"
+#include "esim/record/keep_on_failure.h"
 #include "esim/sensors/bayer.h"
 #include "esim/sim/stopwatch.h"
 
@@ -172,9 +173,13 @@ ConversionSummary convert(const Conversion& conversion, Sink& out, const Monitor
       if (!run.cross_interval()) return run.finish(false, "");
     } while (run.take_frame());
   } catch (const OutputError&) {
+    end_incomplete(out);
     throw;
   } catch (const UserError& problem) {
     return run.finish(false, problem.what());
+  } catch (...) {
+    end_incomplete(out);
+    throw;
   }
   return run.finish(true, "");
 }

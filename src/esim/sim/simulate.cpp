@@ -5,6 +5,7 @@
 
 #include "esim/core/engine_error.h"
 #include "esim/motion/imu_kinematics.h"
+#include "esim/record/keep_on_failure.h"
 #include "esim/sim/stopwatch.h"
 
 namespace esim {
@@ -267,11 +268,18 @@ Summary Simulator::finish() { return run_->finish(camera_due(world_, world_.info
 
 Summary simulate(World& world, Sink& out, const Monitor& monitor) {
   Simulator simulator(world, out);
+  bool anything = false;
   std::string problem;
   try {
-    simulator.advance_until(world.info.end, monitor);
+    simulator.advance_until(world.info.end, [&](const Progress& progress) {
+      anything |= progress.now > progress.start;
+      return monitor(progress);
+    });
   } catch (const EngineError& error) {
     problem = error.what();
+  } catch (...) {
+    if (anything) end_incomplete(out);
+    throw;
   }
   Summary summary = simulator.finish();
   summary.problem = problem;

@@ -79,7 +79,8 @@ class Simulator {
 };
 
 /// Runs `world` from its start to its end and writes everything to `out`. The spine of the program: time moves only
-/// here. What comes before an EngineError is kept: the summary names the problem. Other errors are thrown.
+/// here. What comes before an EngineError is kept: the summary names the problem. Other errors are thrown; `out` has
+/// ended then, incomplete, if it had been given anything.
 Summary simulate(World& world, Sink& out, const Monitor& monitor);
 
 }  // namespace esim

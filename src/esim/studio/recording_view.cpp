@@ -85,11 +85,11 @@ RecordingView::RecordingView(const fs::path& path) {
   const RecordingInfo info = format_named("recording").open(path, recovering)->info();
   span_ = {info.start, info.end};
   const bool alone = is_camera_folder(path);
+  attempt([&] { read_report(path / "report.json"); });
   for (const CameraInfo& camera : info.cameras) open_camera(alone ? path : path / camera.name, camera);
   if (cameras_.empty()) throw UserError(path.string() + " holds nothing that can be shown");
   if (!alone && has_file(path / "imu.csv")) imu_file_ = path / "imu.csv";
   if (!alone && has_file(path / "states.csv")) states_file_ = path / "states.csv";
-  attempt([&] { read_report(path / "report.json"); });
   std::sort(notes_.begin(), notes_.end());
   notes_.erase(std::unique(notes_.begin(), notes_.end()), notes_.end());
 }
@@ -146,12 +146,12 @@ void RecordingView::open_events(const fs::path& file, CameraView& camera) {
 
 void RecordingView::open_images(const fs::path& folder, CameraView& camera) {
   if (has_file(folder / "frames.csv")) {
-    CsvReader list(folder / "frames.csv", 4, 1);
+    CsvReader list(folder / "frames.csv", 4, 1, incomplete_);
     while (list.next()) {
       camera.images.push_back({list.t(), folder / "frames" / fmt::format("{:06}.png", list.integer(0))});
     }
   } else if (has_file(folder / "images" / kTimedFilesList)) {
-    TimedFilesReader list(folder / "images");
+    TimedFilesReader list(folder / "images", false, incomplete_);
     while (list.next()) camera.images.push_back({list.span().start, list.file()});
   }
 }
@@ -236,13 +236,13 @@ std::optional<std::pair<Image<Rgb>, TimeNs>> RecordingView::truth_at(const Camer
 
 const std::vector<ImuRecord>& RecordingView::imu() const {
   const std::lock_guard lock(mutex_);
-  if (!imu_) imu_ = all_of<ImuRecord>(*imu_stream(imu_file_, imu_file_.parent_path() / "imu_truth.csv"));
+  if (!imu_) imu_ = all_of<ImuRecord>(*imu_stream(imu_file_, imu_file_.parent_path() / "imu_truth.csv", incomplete_));
   return *imu_;
 }
 
 const std::vector<PoseRecord>& RecordingView::poses() const {
   const std::lock_guard lock(mutex_);
-  if (!poses_) poses_ = all_of<PoseRecord>(*poses_stream(states_file_, {}));
+  if (!poses_) poses_ = all_of<PoseRecord>(*poses_stream(states_file_, {}, incomplete_));
   return *poses_;
 }
 

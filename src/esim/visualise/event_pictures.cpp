@@ -38,12 +38,13 @@ float TimeSurface::value(int column, int row, TimeNs t, double tau_ns) const {
 }
 
 Image<Rgb> TimeSurface::draw(TimeNs t, double tau_ns, Rgb ground) const {
+  constexpr float kFaded = 7;  // ages, in tau, at which less than a level of any colour is left
   Image<Rgb> out(grid_.width, grid_.height, ground);
-  for (int row = 0; row < grid_.height; ++row) {
-    for (int column = 0; column < grid_.width; ++column) {
-      const float now = value(column, row, t, tau_ns);
-      out(column, row) = mix(ground, now > 0 ? kOnColour : kOffColour, std::abs(now));
-    }
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const int polarity = polarity_.pixels()[i];
+    const float age = static_cast<float>(static_cast<double>(t - latest_.pixels()[i]) / tau_ns);
+    if (polarity == 0 || age > kFaded) continue;
+    out.pixels()[i] = mix(ground, polarity > 0 ? kOnColour : kOffColour, std::exp(-age));
   }
   return out;
 }

@@ -39,6 +39,7 @@ int Playable::camera(const std::string& name) const {
   std::string names;
   const auto source = open();
   const auto& cameras = source->info().cameras;
+  if (cameras.empty()) throw UserError(fmt::format("{} holds nothing that a camera saw", path_.string()));
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     if (name.empty() ? cameras.size() == 1 : cameras[i].name == name) return static_cast<int>(i);
     names += (names.empty() ? "" : ", ") + cameras[i].name;

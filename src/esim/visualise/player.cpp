@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "esim/core/error.h"
+#include "esim/core/parallel.h"
 #include "esim/core/remedy.h"
 #include "esim/record/number_text.h"
 #include "esim/visualise/event_pictures.h"
@@ -19,7 +20,7 @@ namespace esim {
 namespace {
 
 constexpr double kMostFrames = 1e6;
-constexpr double kLeastVideo_s = 4.9;
+constexpr double kLeastVideo_s = 3.9;
 constexpr double kLeastWindow_s = 1e-3, kMostWindow_s = 50e-3, kEventsPerPixel = 1.0 / 12;
 constexpr double kWindowsPerTau = 1.5, kWindowsPerSpan = 20;
 constexpr std::size_t kMostEventsCounted = std::size_t{1} << 23;
@@ -53,14 +54,21 @@ class PictureQueue {
     while (!waiting_.empty() && waiting_.front().t <= t) advance();
     return shown_;
   }
+  /// The same in another size, made once for all the frames of a video that show it.
+  const Image<Rgb>& enlarged_at(TimeNs t, int width, int height) {
+    const Image<Rgb>& picture = at(t);
+    if (enlarged_.empty() && !picture.empty()) enlarged_ = enlarge(picture, width, height);
+    return enlarged_;
+  }
 
  private:
   void advance() {
     shown_ = std::move(waiting_.front().pixels);
+    enlarged_ = {};
     waiting_.pop_front();
   }
   std::deque<Picture> waiting_;
-  Image<Rgb> shown_;
+  Image<Rgb> shown_, enlarged_;
 };
 
 Image<float> reduced(const Image<float>& image, const PictureGrid& grid) {
@@ -155,6 +163,7 @@ struct Player::Impl {
   void add(const TruthRecord& truth);
   void pass_events(TimeNs until);
   Panel draw(View view, TimeNs t);
+  std::vector<Panel> draw_all(TimeNs t);
   Panel draw_events(TimeNs t);
   Panel draw_cloud(TimeNs t);
 
@@ -166,6 +175,7 @@ struct Player::Impl {
   PageLayout layout;
   PictureGrid grid;
   std::optional<Content> image_from;
+  Workers workers{0};
 
   bool ended = false;
   std::size_t shown = 0;
@@ -275,6 +285,7 @@ Panel Player::Impl::draw_cloud(TimeNs t) {
 }
 
 Panel Player::Impl::draw(View view, TimeNs t) {
+  const auto large = [&](PictureQueue& queue) { return queue.enlarged_at(t, layout.panel_width, layout.panel_height); };
   switch (view) {
     case View::events:
       return draw_events(t);
@@ -285,13 +296,23 @@ Panel Player::Impl::draw(View view, TimeNs t) {
     case View::space_time:
       return draw_cloud(t);
     case View::image:
-      return {.picture = images.at(t)};
+      return {.picture = large(images)};
     case View::depth:
-      return {.picture = depths.at(t), .near_m = survey.depth.near_m(), .far_m = survey.depth.far_m()};
+      return {.picture = large(depths), .near_m = survey.depth.near_m(), .far_m = survey.depth.far_m()};
     case View::motion:
-      return {.picture = motions.at(t), .full_flow_px_per_s = survey.motion.full_px_per_s()};
+      return {.picture = large(motions), .full_flow_px_per_s = survey.motion.full_px_per_s()};
   }
   return {};
+}
+
+// Views share nothing that changes while they are drawn.
+std::vector<Panel> Player::Impl::draw_all(TimeNs t) {
+  std::vector<Panel> panels(options.views.size());
+  workers.for_each(static_cast<int>(panels.size()), [&](int i) {
+    const auto index = static_cast<std::size_t>(i);
+    panels[index] = draw(options.views[index], t);
+  });
+  return panels;
 }
 
 Player::Player(Source& source, int camera, const Survey& survey, const PlayOptions& options, const Instants& instants)
@@ -313,8 +334,7 @@ TimeNs Player::Impl::advance() {
 std::optional<Image<Rgb>> Player::next() {
   if (impl_->shown == impl_->instants.count) return std::nullopt;
   const TimeNs t = impl_->advance();
-  std::vector<Panel> panels;
-  for (const View view : impl_->options.views) panels.push_back(impl_->draw(view, t));
+  std::vector<Panel> panels = impl_->draw_all(t);
   ++impl_->shown;
   const SensorSize sensor = impl_->survey.sensor;
   std::string about = fmt::format("{}   {} x {} px", impl_->options.name, sensor.width, sensor.height);

@@ -25,7 +25,7 @@ struct PlayOptions {
 };
 
 /// The same with everything chosen: all views that there are; slow motion of 1, 2 or 5 times a power of ten, so that
-/// the video lasts about 5 s or longer; a window in which, on average, an event falls on every twelfth pixel, 1 to 50
+/// the video lasts about 4 s or longer; a window in which, on average, an event falls on every twelfth pixel, 1 to 50
 /// ms; tau of 1.5 windows; a span of 20. Throws UserError where there are no events, and for views of which there are
 /// no records.
 PlayOptions choose_missing(PlayOptions options, const Survey& survey);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "esim/stats/axes.h"
+#include "esim/visualise/dots.h"
 
 namespace esim {
 namespace {
@@ -37,13 +38,11 @@ struct Seen {
   double u = 0, v = 0, distance = 0;
 };
 
-Seen see(const Point& point, const SpaceTimeView& view) {
-  constexpr double kRadians = std::numbers::pi / 180;
-  const double sin_yaw = std::sin(view.yaw_deg * kRadians), cos_yaw = std::cos(view.yaw_deg * kRadians);
-  const double sin_pitch = std::sin(view.pitch_deg * kRadians), cos_pitch = std::cos(view.pitch_deg * kRadians);
-  const double right = point.x * cos_yaw + point.z * sin_yaw, away = point.z * cos_yaw - point.x * sin_yaw;
-  const double down = point.y * cos_pitch - away * sin_pitch;
-  const double distance = kViewerDistance + point.y * sin_pitch + away * cos_pitch;
+Seen see(const Point& point, const ViewTurn& turn) {
+  const double right = point.x * turn.cos_yaw + point.z * turn.sin_yaw;
+  const double away = point.z * turn.cos_yaw - point.x * turn.sin_yaw;
+  const double down = point.y * turn.cos_pitch - away * turn.sin_pitch;
+  const double distance = kViewerDistance + point.y * turn.sin_pitch + away * turn.cos_pitch;
   return {right * kViewerDistance / distance, down * kViewerDistance / distance, distance};
 }
 
@@ -52,6 +51,22 @@ Point corner(const Point& half, int index) {
   return {(index & 1) != 0 ? half.x : -half.x, (index & 2) != 0 ? half.y : -half.y,
           (index & 4) != 0 ? half.z : -half.z};
 }
+
+/// A colour that fades towards the ground with depth, 0 to 1.
+class FadedColours {
+ public:
+  FadedColours(Rgb colour, Rgb ground) {
+    for (std::size_t i = 0; i < colours_.size(); ++i)
+      colours_[i] = mix(colour, ground, kFade * static_cast<float>(i) / static_cast<float>(colours_.size() - 1));
+  }
+  Rgb at(float depth) const {
+    return colours_[static_cast<std::size_t>(std::clamp(depth, 0.0f, 1.0f) * static_cast<float>(colours_.size() - 1) +
+                                             0.5f)];
+  }
+
+ private:
+  std::array<Rgb, 256> colours_;
+};
 
 /// The box, its axes and what is in it.
 class Plot {
@@ -105,12 +120,8 @@ class Plot {
   }
 
   void draw_points(EventSpan events) {
-    struct Dot {
-      SpaceTimeProjection::Place place;
-      bool on = false;
-      float opacity = 1;
-    };
     std::vector<Dot> dots;
+    dots.reserve(events.size());
     double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
     for (int i = 0; i < 8; ++i) {
       const double distance =
@@ -120,20 +131,20 @@ class Plot {
       nearest = std::min(nearest, distance);
       farthest = std::max(farthest, distance);
     }
+    const FadedColours on(kOnColour, theme_.ground), off(kOffColour, theme_.ground);
+    const auto per_length = static_cast<float>(1 / (static_cast<double>(box_.end - box_.start) * kRecent));
     for (const Event& event : events) {
       if (event.t < box_.start || event.t > box_.end) continue;
-      const double age = static_cast<double>(box_.end - event.t) / static_cast<double>(box_.end - box_.start);
-      dots.push_back({projection_.place(event.x, event.y, static_cast<double>(event.t)), event.polarity > 0,
-                      kOldOpacity + (kNewOpacity - kOldOpacity) * static_cast<float>(std::exp(-age / kRecent))});
+      const SpaceTimeProjection::Place seen = projection_.place(event.x, event.y, static_cast<double>(event.t));
+      const auto depth = static_cast<float>((seen.distance - nearest) / (farthest - nearest));
+      const float recent = std::exp(-static_cast<float>(box_.end - event.t) * per_length);
+      const float opacity = kOldOpacity + (kNewOpacity - kOldOpacity) * recent;
+      dots.push_back({static_cast<float>(seen.spot.x), static_cast<float>(seen.spot.y),
+                      static_cast<float>(std::clamp(0.62 * seen.scale, 0.75, 8.0)), depth,
+                      (event.polarity > 0 ? on : off).at(depth), static_cast<std::uint16_t>(256 * opacity + 0.5f)});
     }
-    std::stable_sort(dots.begin(), dots.end(),
-                     [](const Dot& a, const Dot& b) { return a.place.distance > b.place.distance; });
     Image<Rgb> pixels = std::move(canvas_).take();
-    for (const Dot& dot : dots) {
-      const auto depth = static_cast<float>((dot.place.distance - nearest) / (farthest - nearest));
-      const Rgb colour = mix(dot.on ? kOnColour : kOffColour, theme_.ground, kFade * depth);
-      draw_dot(pixels, dot.place.spot, std::clamp(0.62 * dot.place.scale, 0.75, 8.0), colour, dot.opacity);
-    }
+    draw_dots(dots, pixels);
     canvas_ = Canvas(std::move(pixels));
   }
 
@@ -253,20 +264,6 @@ class Plot {
     }
   }
 
-  static void draw_dot(Image<Rgb>& pixels, Spot at, double radius, Rgb colour, float opacity) {
-    const double reach = radius + 0.5;
-    const int left = std::max(0, static_cast<int>(std::ceil(at.x - reach)));
-    const int right = std::min(pixels.width() - 1, static_cast<int>(std::floor(at.x + reach)));
-    const int top = std::max(0, static_cast<int>(std::ceil(at.y - reach)));
-    const int bottom = std::min(pixels.height() - 1, static_cast<int>(std::floor(at.y + reach)));
-    for (int y = top; y <= bottom; ++y) {
-      for (int x = left; x <= right; ++x) {
-        const double covered = std::clamp(reach - std::hypot(x - at.x, y - at.y), 0.0, 1.0);
-        pixels(x, y) = mix(pixels(x, y), colour, opacity * static_cast<float>(covered));
-      }
-    }
-  }
-
   SpaceTimeBox box_;
   Theme theme_;
   SpaceTimeProjection projection_;
@@ -277,17 +274,23 @@ class Plot {
 
 }  // namespace
 
+ViewTurn::ViewTurn(const SpaceTimeView& view) {
+  constexpr double kRadians = std::numbers::pi / 180;
+  sin_yaw = std::sin(view.yaw_deg * kRadians), cos_yaw = std::cos(view.yaw_deg * kRadians);
+  sin_pitch = std::sin(view.pitch_deg * kRadians), cos_pitch = std::cos(view.pitch_deg * kRadians);
+}
+
 SpaceTimeView turned_view(double share) {
   return {kMiddleYaw_deg - kSwing_deg * std::cos(2 * std::numbers::pi * share), kPitch_deg};
 }
 
 SpaceTimeProjection::SpaceTimeProjection(const SpaceTimeBox& box, const SpaceTimeView& view, const Tile& area)
-    : box_(box), view_(view) {
+    : box_(box), turn_(view) {
   constexpr int kTurns = 8;
   const Point half = half_extent(box.sensor);
   double left = 0, right = 0, top = 0, bottom = 0;
   for (int turn = 0; turn <= kTurns; ++turn) {
-    const SpaceTimeView other = turned_view(0.5 * turn / kTurns);
+    const ViewTurn other(turned_view(0.5 * turn / kTurns));
     for (int i = 0; i < 8; ++i) {
       const Seen seen = see(corner(half, i), other);
       left = std::min(left, seen.u);
@@ -308,7 +311,7 @@ SpaceTimeProjection::Place SpaceTimeProjection::place(double x, double y, double
   const double share = (t_ns - static_cast<double>(box_.start)) / static_cast<double>(box_.end - box_.start);
   const Seen seen = see({(x + 0.5 - 0.5 * box_.sensor.width) / longer, (y + 0.5 - 0.5 * box_.sensor.height) / longer,
                          kTimeLength * (0.5 - share)},
-                        view_);
+                        turn_);
   return {{centre_.x + scale_ * seen.u, centre_.y + scale_ * seen.v},
           seen.distance,
           scale_ / longer * kViewerDistance / seen.distance};

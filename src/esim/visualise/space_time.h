@@ -21,6 +21,12 @@ struct SpaceTimeView {
   double pitch_deg = 0;  ///< from above
 };
 
+/// The sines and cosines of a view's angles.
+struct ViewTurn {
+  explicit ViewTurn(const SpaceTimeView& view);
+  double sin_yaw, cos_yaw, sin_pitch, cos_pitch;
+};
+
 /// The view at a share (0 to 1) of a video: a slow turn to and fro.
 SpaceTimeView turned_view(double share);
 
@@ -39,7 +45,7 @@ class SpaceTimeProjection {
 
  private:
   SpaceTimeBox box_;
-  SpaceTimeView view_;
+  ViewTurn turn_;
   double scale_ = 1;  // px of the picture per longer side of the sensor
   Spot centre_{};     // of the picture, where the middle of the box is seen
 };

@@ -38,6 +38,7 @@ bool CsvReader::next() {
   while (file_.offset() < file_.size()) {
     line_start_ = file_.offset();
     std::string_view line = file_.read_line(kMaxLineBytes, "a line");
+    if (unfinished_ && line_start_ + line.size() == file_.size()) return false;
     if (line.empty() || (line[0] != '-' && std::isdigit(static_cast<unsigned char>(line[0])) == 0)) continue;
     fields_.clear();
     while (!line.empty()) {

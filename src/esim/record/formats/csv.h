@@ -33,9 +33,11 @@ class CsvFile {
 /// over. Failures are UserErrors with the file and the byte at which the line begins.
 class CsvReader {
  public:
-  /// Of at least so many columns, the time among them.
-  CsvReader(const std::filesystem::path& path, std::size_t columns, std::size_t time_column = 0)
-      : file_(path), columns_(columns), time_column_(time_column) {}
+  /// Of at least so many columns, the time among them. In files that are `unfinished`, because who wrote them was
+  /// killed or is still writing, a last line without its end is no line.
+  CsvReader(const std::filesystem::path& path, std::size_t columns, std::size_t time_column = 0,
+            bool unfinished = false)
+      : file_(path), columns_(columns), time_column_(time_column), unfinished_(unfinished) {}
 
   /// Goes to the next line; false where there is none left.
   bool next();
@@ -51,6 +53,7 @@ class CsvReader {
  private:
   InputFile file_;
   std::size_t columns_, time_column_;
+  bool unfinished_;
   std::uint64_t line_start_ = 0;
   std::optional<TimeNs> t_;
   std::vector<std::string_view> fields_;  // of the line, which the file holds

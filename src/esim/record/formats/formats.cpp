@@ -20,6 +20,7 @@
 #include "esim/record/formats/rosbag/rosbag_format.h"
 #include "esim/record/formats/v2e.h"
 #include "esim/record/input_file.h"
+#include "esim/record/recording_directory.h"
 
 namespace esim {
 namespace {
@@ -83,8 +84,7 @@ const Format& format_named(std::string_view name) {
 
 const Format& format_of(const fs::path& path) {
   std::error_code error;
-  if (!fs::exists(path, error))
-    throw UserError(path.string() + ": " + (error ? error.message() : "no such file or directory"));
+  require_existing(path);
   const bool folder = fs::is_directory(path, error);
   const std::string head = folder ? std::string() : read_head(path, kHeadBytes);
   for (const Format& format : formats()) {

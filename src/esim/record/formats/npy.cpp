@@ -39,17 +39,20 @@ class NpyWriter final : public EventsWriter {
       out += kItemBytes;
     }
     count_ += events.size();
-    file_->flush_if_full();
+    if (file_->flush_if_full()) write_count();
   }
 
   void end() override {
     file_->flush();
-    file_->overwrite_start(npy::header_text(descr_, std::array{count_}));
+    write_count();
     file_->close();
     file_.reset();
   }
 
  private:
+  /// With each flush, so that what a killed process leaves can be read.
+  void write_count() { file_->overwrite_start(npy::header_text(descr_, std::array{count_})); }
+
   static constexpr std::size_t kItemBytes = 13;
 
   TimeUnit unit_;

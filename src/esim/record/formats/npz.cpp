@@ -36,16 +36,13 @@ Archive open_archive(const fs::path& path, int flags, std::string& reason) {
   return archive;
 }
 
-/// One column of the events, as a file of its own until all is known.
+/// One column of the events, as a file of its own, ARCHIVE.t.npy, until all is known and packed. If that never comes,
+/// it is what has been recorded.
 class ColumnFile {
  public:
   ColumnFile(const fs::path& archive, std::string name, std::string descr)
-      : name_(std::move(name)), descr_(std::move(descr)), path_(archive.string() + "." + name_ + ".tmp"), file_(path_) {
+      : name_(std::move(name)), descr_(std::move(descr)), path_(archive.string() + "." + name_ + ".npy"), file_(path_) {
     file_.append(npy::header_text(descr_, std::array{std::uint64_t{0}}));
-  }
-  ~ColumnFile() {
-    std::error_code ignored;
-    fs::remove(path_, ignored);
   }
 
   /// Appends number(event) of each.
@@ -60,19 +57,28 @@ class ColumnFile {
       std::memcpy(out, &value, sizeof(Number));
       out += sizeof(Number);
     }
-    file_.flush_if_full();
+    count_ += events.size();
+    if (file_.flush_if_full()) write_count();
   }
 
-  void close(std::uint64_t count) {
+  void close() {
     file_.flush();
-    file_.overwrite_start(npy::header_text(descr_, std::array{count}));
+    write_count();
     file_.close();
+  }
+
+  void remove() const {
+    std::error_code ignored;
+    fs::remove(path_, ignored);
   }
 
   const std::string& name() const { return name_; }
   const fs::path& path() const { return path_; }
 
  private:
+  void write_count() { file_.overwrite_start(npy::header_text(descr_, std::array{count_})); }
+
+  std::uint64_t count_ = 0;
   std::string name_, descr_;
   fs::path path_;
   OutputFile file_;
@@ -102,7 +108,6 @@ class NpzWriter final : public EventsWriter {
     columns_[1]->write<std::uint16_t>(events, [](const Event& event) { return event.x; });
     columns_[2]->write<std::uint16_t>(events, [](const Event& event) { return event.y; });
     columns_[3]->write<std::uint8_t>(events, [](const Event& event) { return std::uint8_t{event.polarity > 0}; });
-    count_ += events.size();
   }
 
   void end() override {
@@ -110,7 +115,7 @@ class NpzWriter final : public EventsWriter {
     archive_ = open_archive(path_, ZIP_CREATE | ZIP_TRUNCATE, reason);
     if (!archive_) throw_cannot_write(path_, reason);
     for (const auto& column : columns_) {
-      column->close(count_);
+      column->close();
       add(column->name(), zip_source_file(archive_.get(), column->path().c_str(), 0, -1));
     }
     const std::string width = scalar(sensor_.width), height = scalar(sensor_.height);
@@ -120,8 +125,9 @@ class NpzWriter final : public EventsWriter {
     }
     if (zip_close(archive_.get()) != 0) fail();
     static_cast<void>(archive_.release());
-    columns_.clear();
     sync_file(path_);
+    for (const auto& column : columns_) column->remove();
+    columns_.clear();
   }
 
  private:
@@ -153,7 +159,6 @@ class NpzWriter final : public EventsWriter {
   SensorSize sensor_;
   std::vector<std::unique_ptr<ColumnFile>> columns_;
   Archive archive_;
-  std::uint64_t count_ = 0;
 };
 
 std::shared_ptr<npy::Array> open_array(const std::shared_ptr<zip_t>& archive, zip_uint64_t index, std::string name) {

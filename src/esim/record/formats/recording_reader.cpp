@@ -15,6 +15,7 @@
 #include "esim/record/formats/recording_streams.h"
 #include "esim/record/formats/timed_files.h"
 #include "esim/record/input_file.h"
+#include "esim/record/recording_directory.h"
 
 namespace esim {
 
@@ -107,6 +108,7 @@ class Folder {
       attempt([&] { open_events(i); });
       attempt([&] { open_truth(i); });
     }
+    require_something();
     std::vector<std::unique_ptr<RecordStream>> streams;
     for (auto* group : {&body_, &events_, &frames_, &truth_})
       std::move(group->begin(), group->end(), std::back_inserter(streams));
@@ -123,6 +125,23 @@ class Folder {
       if (!options_.recover) throw;
       options_.recover(error.what());
     }
+  }
+
+  /// A recording without events is one. But nothing at all, or the beginning of an unfinished one, is none.
+  void require_something() const {
+    const bool any = !body_.empty() || !events_.empty() || !frames_.empty() || !truth_.empty();
+    if (any || (!info_.cameras.empty() && !unfinished_)) return;
+    if (!unfinished_) throw UserError(fmt::format("{} holds no records", root_.string()));
+    if (is_being_written(root_))
+      throw UserError(fmt::format("{} is being written, and holds no records yet", root_.string()));
+    throw UserError(
+        fmt::format("{} holds no records: what wrote it was ended before the first; make it anew", root_.string()));
+  }
+
+  /// Of unfinished recordings, a file that has not got its first bytes is none yet.
+  bool is_there(const fs::path& path) const {
+    std::error_code error;
+    return is_file(path) && (!unfinished_ || fs::file_size(path, error) > 0);
   }
 
   void read_rig() {
@@ -148,6 +167,7 @@ class Folder {
     try {
       const auto report = nlohmann::json::parse(reinterpret_cast<const char*>(bytes.data()),
                                                 reinterpret_cast<const char*>(bytes.data()) + bytes.size());
+      unfinished_ = report.value("status", "complete") != "complete";
       if (report.contains("start_s")) {
         const double start_s = report.at("start_s"), length_s = report.value("simulated_s", 0.0);
         constexpr double kMax_s = 4e9;
@@ -190,15 +210,15 @@ class Folder {
   }
 
   void open_body() {
-    if (is_file(root_ / "states.csv")) {
+    if (is_there(root_ / "states.csv")) {
       attempt([&] {
         const std::vector<fs::path> objects = read_objects(root_ / "objects");
-        body_.push_back(poses_stream(root_ / "states.csv", objects));
+        body_.push_back(poses_stream(root_ / "states.csv", objects, unfinished_));
       });
     }
-    if (is_file(root_ / "imu.csv")) {
+    if (is_there(root_ / "imu.csv")) {
       if (!info_.imu) info_.imu.emplace();
-      attempt([&] { body_.push_back(imu_stream(root_ / "imu.csv", root_ / "imu_truth.csv")); });
+      attempt([&] { body_.push_back(imu_stream(root_ / "imu.csv", root_ / "imu_truth.csv", unfinished_)); });
     }
   }
 
@@ -230,7 +250,7 @@ class Folder {
   void open_events(std::size_t i) {
     const bool text = !is_file(folders_[i] / "events.h5");
     const fs::path file = folders_[i] / (text ? "events.txt" : "events.h5");
-    if (!is_file(file)) return;
+    if (!is_there(file)) return;
     const ReadOptions told{.sensor = options_.sensor};
     auto events =
         std::make_unique<CheckedSource>((text ? events_text_format() : dsec_format()).open(file, told), file, told);
@@ -242,16 +262,17 @@ class Folder {
 
   void open_truth(std::size_t i) {
     const int camera = static_cast<int>(i);
-    if (is_file(folders_[i] / "frames.csv")) attempt([&] { frames_.push_back(frames_stream(folders_[i], camera)); });
+    if (is_there(folders_[i] / "frames.csv"))
+      attempt([&] { frames_.push_back(frames_stream(folders_[i], camera, unfinished_)); });
     const ImagesStream* images = nullptr;
-    if (is_file(folders_[i] / "images" / kTimedFilesList)) {
+    if (is_there(folders_[i] / "images" / kTimedFilesList)) {
       attempt([&] {
-        auto stream = std::make_unique<ImagesStream>(folders_[i] / "images", camera);
+        auto stream = std::make_unique<ImagesStream>(folders_[i] / "images", camera, unfinished_);
         images = stream.get();
         truth_.push_back(std::move(stream));
       });
     }
-    if (!is_file(folders_[i] / "truth.h5")) return;
+    if (!is_there(folders_[i] / "truth.h5")) return;
     const auto truth = std::make_shared<TruthHdf5Reader>(folders_[i] / "truth.h5");
     learn_size(i, truth->sensor());
     if (truth->size() > 0) info_.end = std::max(info_.end, truth->t(truth->size() - 1));
@@ -279,6 +300,7 @@ class Folder {
   fs::path root_;
   std::vector<fs::path> folders_;  // of the cameras
   bool alone_ = false;             // one camera's, without what is the rig's
+  bool unfinished_ = false;        // by its report: killed, interrupted, or being written
   RecordingInfo info_;
   std::optional<TimeNs> start_;
   std::vector<std::unique_ptr<RecordStream>> body_, events_, frames_, truth_;

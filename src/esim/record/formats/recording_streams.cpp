@@ -18,11 +18,21 @@ namespace fs = std::filesystem;
 
 class PosesStream final : public RecordStream {
  public:
-  PosesStream(const fs::path& states, const std::vector<fs::path>& objects) : body_(states, kStateColumns) {
-    for (const fs::path& file : objects) objects_.emplace_back(file, kStateColumns);
+  PosesStream(const fs::path& states, const std::vector<fs::path>& objects, bool unfinished)
+      : body_(states, kStateColumns, 0, unfinished), unfinished_(unfinished) {
+    for (const fs::path& file : objects) objects_.emplace_back(file, kStateColumns, 0, unfinished);
   }
 
-  std::optional<TimeNs> due() override { return body_.next() ? std::optional(body_.t()) : std::nullopt; }
+  std::optional<TimeNs> due() override {
+    if (!body_.next()) return std::nullopt;
+    for (CsvReader& object : objects_) {
+      const bool there = object.next();
+      if (!there && unfinished_) return std::nullopt;
+      if (!there || object.t() != body_.t())
+        object.fail(fmt::format("expected the motion at {} ns, as in states.csv", body_.t()));
+    }
+    return body_.t();
+  }
 
   const Record* next(TimeNs) override {
     PoseRecord pose{body_.t(), motion(body_)};
@@ -30,11 +40,7 @@ class PosesStream final : public RecordStream {
       if (body_.columns() < kStateColumns + 6) body_.fail("the line ends within the biases");
       pose.imu_bias = InertialSignals{body_.vector(kStateColumns), body_.vector(kStateColumns + 3)};
     }
-    for (CsvReader& object : objects_) {
-      if (!object.next() || object.t() != pose.t)
-        object.fail(fmt::format("expected the motion at {} ns, as in states.csv", pose.t));
-      pose.objects.push_back(motion(object));
-    }
+    for (const CsvReader& object : objects_) pose.objects.push_back(motion(object));
     return &record_.emplace(std::move(pose));
   }
 
@@ -49,25 +55,30 @@ class PosesStream final : public RecordStream {
 
   CsvReader body_;
   std::vector<CsvReader> objects_;
+  bool unfinished_;
   std::optional<Record> record_;
 };
 
 class ImuStream final : public RecordStream {
  public:
-  ImuStream(const fs::path& measured, const fs::path& biases) : measured_(measured, kColumns) {
+  ImuStream(const fs::path& measured, const fs::path& biases, bool unfinished)
+      : measured_(measured, kColumns, 0, unfinished), unfinished_(unfinished) {
     std::error_code error;
-    if (fs::exists(biases, error)) biases_.emplace(biases, kColumns);
+    if (fs::exists(biases, error)) biases_.emplace(biases, kColumns, 0, unfinished);
   }
 
-  std::optional<TimeNs> due() override { return measured_.next() ? std::optional(measured_.t()) : std::nullopt; }
+  std::optional<TimeNs> due() override {
+    if (!measured_.next()) return std::nullopt;
+    const bool there = !biases_ || biases_->next();
+    if (!there && unfinished_) return std::nullopt;
+    if (!there || (biases_ && biases_->t() != measured_.t()))
+      biases_->fail(fmt::format("expected the biases at {} ns, as in imu.csv", measured_.t()));
+    return measured_.t();
+  }
 
   const Record* next(TimeNs) override {
     ImuRecord imu{measured_.t(), signals(measured_)};
-    if (biases_) {
-      if (!biases_->next() || biases_->t() != imu.t)
-        biases_->fail(fmt::format("expected the biases at {} ns, as in imu.csv", imu.t));
-      imu.bias = signals(*biases_);
-    }
+    if (biases_) imu.bias = signals(*biases_);
     return &record_.emplace(imu);
   }
 
@@ -78,6 +89,7 @@ class ImuStream final : public RecordStream {
 
   CsvReader measured_;
   std::optional<CsvReader> biases_;
+  bool unfinished_;
   std::optional<Record> record_;
 };
 
@@ -113,8 +125,8 @@ class EventsStream final : public RecordStream {
 
 class FramesStream final : public RecordStream {
  public:
-  FramesStream(const fs::path& folder, int camera)
-      : folder_(folder), camera_(camera), list_(folder / "frames.csv", 4, 1) {}
+  FramesStream(const fs::path& folder, int camera, bool unfinished)
+      : folder_(folder), camera_(camera), list_(folder / "frames.csv", 4, 1, unfinished) {}
 
   std::optional<TimeNs> due() override { return list_.next() ? std::optional(list_.t()) : std::nullopt; }
 
@@ -194,7 +206,8 @@ struct ImagesStream::Impl {
   std::optional<Record> record{};
 };
 
-ImagesStream::ImagesStream(const fs::path& folder, int camera) : impl_(new Impl{TimedFilesReader(folder), camera}) {}
+ImagesStream::ImagesStream(const fs::path& folder, int camera, bool unfinished)
+    : impl_(new Impl{TimedFilesReader(folder, false, unfinished), camera}) {}
 
 ImagesStream::~ImagesStream() = default;
 
@@ -214,20 +227,21 @@ const Record* ImagesStream::next(TimeNs) {
 
 const Image<float>& ImagesStream::at(TimeNs t) const { return impl_->t == t ? impl_->image : impl_->none; }
 
-std::unique_ptr<RecordStream> poses_stream(const fs::path& states, const std::vector<fs::path>& objects) {
-  return std::make_unique<PosesStream>(states, objects);
+std::unique_ptr<RecordStream> poses_stream(const fs::path& states, const std::vector<fs::path>& objects,
+                                           bool unfinished) {
+  return std::make_unique<PosesStream>(states, objects, unfinished);
 }
 
-std::unique_ptr<RecordStream> imu_stream(const fs::path& measured, const fs::path& biases) {
-  return std::make_unique<ImuStream>(measured, biases);
+std::unique_ptr<RecordStream> imu_stream(const fs::path& measured, const fs::path& biases, bool unfinished) {
+  return std::make_unique<ImuStream>(measured, biases, unfinished);
 }
 
 std::unique_ptr<RecordStream> events_stream(std::unique_ptr<Source> events, int camera) {
   return std::make_unique<EventsStream>(std::move(events), camera);
 }
 
-std::unique_ptr<RecordStream> frames_stream(const fs::path& folder, int camera) {
-  return std::make_unique<FramesStream>(folder, camera);
+std::unique_ptr<RecordStream> frames_stream(const fs::path& folder, int camera, bool unfinished) {
+  return std::make_unique<FramesStream>(folder, camera, unfinished);
 }
 
 std::unique_ptr<RecordStream> truth_stream(std::shared_ptr<const TruthHdf5Reader> truth, int camera,

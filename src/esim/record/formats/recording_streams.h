@@ -9,25 +9,28 @@
 
 namespace esim {
 
-/// The parts of a recording's folder as streams of records.
+/// The parts of a recording's folder as streams of records. Where the recording is `unfinished`, because who wrote it
+/// was killed or is still writing, a last line without its end is no line, and of files that belong together, the
+/// shortest tells where they end.
 
 /// states.csv and the objects' files.
 std::unique_ptr<RecordStream> poses_stream(const std::filesystem::path& states,
-                                           const std::vector<std::filesystem::path>& objects);
+                                           const std::vector<std::filesystem::path>& objects, bool unfinished = false);
 
 /// imu.csv, and the biases where there is a second file; else they are 0.
-std::unique_ptr<RecordStream> imu_stream(const std::filesystem::path& measured, const std::filesystem::path& biases);
+std::unique_ptr<RecordStream> imu_stream(const std::filesystem::path& measured, const std::filesystem::path& biases,
+                                         bool unfinished = false);
 
 /// A file of one camera's events, as its Source gives them.
 std::unique_ptr<RecordStream> events_stream(std::unique_ptr<Source> events, int camera);
 
 /// frames.csv and the images beside it. Demosaicked colour becomes the mosaic again that it was made of.
-std::unique_ptr<RecordStream> frames_stream(const std::filesystem::path& folder, int camera);
+std::unique_ptr<RecordStream> frames_stream(const std::filesystem::path& folder, int camera, bool unfinished = false);
 
 /// images/ with its list.
 class ImagesStream final : public RecordStream {
  public:
-  ImagesStream(const std::filesystem::path& folder, int camera);
+  ImagesStream(const std::filesystem::path& folder, int camera, bool unfinished = false);
   ~ImagesStream() override;
 
   std::optional<TimeNs> due() override;

@@ -43,6 +43,7 @@ bool TimedFilesReader::next() {
   while (list_.offset() < list_.size()) {
     const std::uint64_t offset = list_.offset();
     const std::string_view line = list_.read_line(kMaxLineBytes, "a line");
+    if (unfinished_ && offset + line.size() == list_.size()) return false;
     if (line.empty() || line.starts_with('#')) continue;
     parse(line, offset);
     return true;

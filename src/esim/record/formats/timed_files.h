@@ -43,8 +43,9 @@ class TimedFilesWriter {
 /// line begins.
 class TimedFilesReader {
  public:
-  explicit TimedFilesReader(const std::filesystem::path& folder, bool spans = false)
-      : folder_(folder), spans_(spans), list_(folder / kTimedFilesList) {}
+  /// `unfinished`: as in CsvReader.
+  explicit TimedFilesReader(const std::filesystem::path& folder, bool spans = false, bool unfinished = false)
+      : folder_(folder), spans_(spans), unfinished_(unfinished), list_(folder / kTimedFilesList) {}
 
   /// Goes to the next file; false where there is none left.
   bool next();
@@ -56,7 +57,7 @@ class TimedFilesReader {
   void parse(std::string_view line, std::uint64_t offset);
 
   std::filesystem::path folder_;
-  bool spans_;
+  bool spans_, unfinished_;
   InputFile list_;
   std::optional<TimeNs> last_;
   TimeSpan span_{};

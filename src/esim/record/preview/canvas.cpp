@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 #include <vector>
 
 namespace esim {
@@ -33,6 +35,69 @@ cv::Point fixed_point(const Spot& spot) {
   return {fixed(spot.x), fixed(spot.y)};
 }
 cv::Scalar scalar(Rgb colour) { return {double(colour.r), double(colour.g), double(colour.b)}; }
+
+constexpr int kTextBorder = 2;
+int above_baseline(int height) { return height + height / 2; }
+
+struct DrawnText {
+  cv::Mat coverage;  // of each pixel, with room for what hangs below the baseline and for the stroke
+  int width = 0;
+};
+
+DrawnText draw_text(const std::string& line, int height) {
+  int base = 0;
+  const cv::Size size = cv::getTextSize(line, kFont, font_scale(height), stroke(height), &base);
+  const int width = (size.width + kOversampling - 1) / kOversampling;
+  const int above = above_baseline(height), below = height / 2 + kTextBorder;
+  cv::Mat large = cv::Mat::zeros((above + below) * kOversampling, (width + 2 * kTextBorder) * kOversampling, CV_8UC1);
+  cv::putText(large, line, {kTextBorder * kOversampling, above * kOversampling}, kFont, font_scale(height),
+              cv::Scalar(255), stroke(height), cv::LINE_AA);
+  cv::Mat coverage;
+  cv::resize(large, coverage, {width + 2 * kTextBorder, above + below}, 0, 0, cv::INTER_AREA);
+  return {std::move(coverage), width};
+}
+
+/// Most lines stand in picture after picture of a video: what has been drawn lately is kept, for each thread.
+const DrawnText& drawn_text(std::string_view line, int height) {
+  constexpr std::size_t kMost = 512;
+  thread_local std::map<std::pair<std::string, int>, DrawnText> drawn;
+  const std::pair key(std::string(line), height);
+  const auto found = drawn.find(key);
+  if (found != drawn.end()) return found->second;
+  if (drawn.size() >= kMost) drawn.clear();
+  return drawn.emplace(key, draw_text(key.first, height)).first->second;
+}
+
+/// Where a pixel of an enlarged picture lies along one side of the original: within one pixel, or partly in the next.
+struct Source {
+  int first = 0, second = 0;
+  std::uint16_t of_second = 0;  // weight of the second, out of kWhole
+};
+constexpr std::uint16_t kWhole = 256;
+
+std::vector<Source> sources(int from, int to) {
+  std::vector<Source> all(static_cast<std::size_t>(to));
+  const double step = static_cast<double>(from) / to;
+  for (int i = 0; i < to; ++i) {
+    const int first = std::min(static_cast<int>(i * step), from - 1);
+    const double beyond = ((i + 1) * step - (first + 1)) / step;
+    const auto of_second = static_cast<std::uint16_t>(std::lround(kWhole * std::clamp(beyond, 0.0, 1.0)));
+    all[static_cast<std::size_t>(i)] = {first, std::min(first + 1, from - 1), of_second};
+  }
+  return all;
+}
+
+std::uint8_t blend(std::uint8_t a, std::uint8_t b, std::uint16_t of_b) {
+  return static_cast<std::uint8_t>(static_cast<std::uint16_t>(a * (kWhole - of_b) + b * of_b + kWhole / 2) >> 8);
+}
+
+void enlarge_row(const Rgb* row, const std::vector<Source>& columns, Rgb* out) {
+  for (const auto& [first, second, of_second] : columns) {
+    const Rgb a = row[first], b = row[second];
+    *out++ =
+        of_second == 0 ? a : Rgb{blend(a.r, b.r, of_second), blend(a.g, b.g, of_second), blend(a.b, b.b, of_second)};
+  }
+}
 
 Tile intersect(const Tile& a, const Tile& b) {
   const int x = std::max(a.x, b.x), y = std::max(a.y, b.y);
@@ -77,26 +142,13 @@ void Canvas::disc(Spot centre, double radius, Rgb colour) {
              cv::FILLED, cv::LINE_AA, kFractionBits);
 }
 
-int Canvas::text_width(std::string_view line, int height) {
-  int below = 0;
-  const cv::Size size = cv::getTextSize(std::string(line), kFont, font_scale(height), stroke(height), &below);
-  return (size.width + kOversampling - 1) / kOversampling;
-}
+int Canvas::text_width(std::string_view line, int height) { return drawn_text(line, height).width; }
 
 int Canvas::text(int x, int baseline, std::string_view line, int height, Rgb colour, Align align) {
-  const int width = text_width(line, height);
+  const auto& [coverage, width] = drawn_text(line, height);
   if (align == Align::centre) x -= width / 2;
   if (align == Align::right) x -= width;
-
-  // Coverage of each pixel, with room for what hangs below the baseline and for the stroke.
-  const int border = 2, above = height + height / 2, below = height / 2 + border;
-  cv::Mat large = cv::Mat::zeros((above + below) * kOversampling, (width + 2 * border) * kOversampling, CV_8UC1);
-  cv::putText(large, std::string(line), {border * kOversampling, above * kOversampling}, kFont, font_scale(height),
-              cv::Scalar(255), stroke(height), cv::LINE_AA);
-  cv::Mat coverage;
-  cv::resize(large, coverage, {width + 2 * border, above + below}, 0, 0, cv::INTER_AREA);
-
-  const Tile box = {x - border, baseline - above, coverage.cols, coverage.rows};
+  const Tile box = {x - kTextBorder, baseline - above_baseline(height), coverage.cols, coverage.rows};
   const Tile visible = intersect(box, pixels_.bounds());
   for (int row = visible.y; row < visible.y + visible.height; ++row) {
     for (int column = visible.x; column < visible.x + visible.width; ++column) {
@@ -135,13 +187,36 @@ std::string encode_png(const Image<Rgb>& image) {
 
 Image<Rgb> enlarge(const Image<Rgb>& image, int width, int height) {
   if (width == image.width() && height == image.height()) return image;
-  const int factor =
-      std::max((width + image.width() - 1) / image.width(), (height + image.height() - 1) / image.height());
-  cv::Mat repeated;
-  cv::resize(view(image), repeated, {image.width() * factor, image.height() * factor}, 0, 0, cv::INTER_NEAREST);
   Image<Rgb> out(width, height);
-  cv::Mat target = view(out);
-  cv::resize(repeated, target, target.size(), 0, 0, cv::INTER_AREA);
+  if (width < image.width() || height < image.height()) {
+    const int factor =
+        std::max((width + image.width() - 1) / image.width(), (height + image.height() - 1) / image.height());
+    cv::Mat repeated;
+    cv::resize(view(image), repeated, {image.width() * factor, image.height() * factor}, 0, 0, cv::INTER_NEAREST);
+    cv::Mat target = view(out);
+    cv::resize(repeated, target, target.size(), 0, 0, cv::INTER_AREA);
+    return out;
+  }
+  const std::vector<Source> columns = sources(image.width(), width), rows = sources(image.height(), height);
+  Image<Rgb> above(width, 1), below(width, 1);  // the two rows of the original, enlarged in one direction
+  int in_above = -1, in_below = -1;
+  for (int y = 0; y < height; ++y) {
+    const auto& [first, second, of_second] = rows[static_cast<std::size_t>(y)];
+    if (in_above != first && in_below == first) {
+      std::swap(above, below);
+      std::swap(in_above, in_below);
+    }
+    if (std::exchange(in_above, first) != first) enlarge_row(image.row(first), columns, above.data());
+    if (of_second == 0) {
+      std::copy_n(above.data(), width, out.row(y));
+      continue;
+    }
+    if (std::exchange(in_below, second) != second) enlarge_row(image.row(second), columns, below.data());
+    const auto* const a = reinterpret_cast<const std::uint8_t*>(above.data());
+    const auto* const b = reinterpret_cast<const std::uint8_t*>(below.data());
+    auto* const mixed = reinterpret_cast<std::uint8_t*>(out.row(y));
+    for (int i = 0; i < 3 * width; ++i) mixed[i] = blend(a[i], b[i], of_second);
+  }
   return out;
 }
 

@@ -161,13 +161,6 @@ Image<Rgb> coloured_levels(const Image<float>& irradiance, const Colour& colour)
 
 }  // namespace
 
-Rgb mix(Rgb from, Rgb to, float amount) {
-  const auto blend = [amount](std::uint8_t a, std::uint8_t b) {
-    return to_byte(static_cast<float>(a) + amount * static_cast<float>(b - a));
-  };
-  return {blend(from.r, to.r), blend(from.g, to.g), blend(from.b, to.b)};
-}
-
 Image<Rgb> dimmed(Image<Rgb> image) {
   for (Rgb& pixel : image.pixels()) pixel = mix({}, pixel, kBackgroundLevel);
   return image;

@@ -12,7 +12,13 @@ struct Rgb {
 };
 
 /// `amount` (0 to 1) of the way from one colour to another.
-Rgb mix(Rgb from, Rgb to, float amount);
+inline Rgb mix(Rgb from, Rgb to, float amount) {
+  const auto blend = [amount](std::uint8_t a, std::uint8_t b) {
+    const float value = static_cast<float>(a) + amount * static_cast<float>(b - a);
+    return static_cast<std::uint8_t>((value < 0.0f ? 0.0f : value > 255.0f ? 255.0f : value) + 0.5f);
+  };
+  return {blend(from.r, to.r), blend(from.g, to.g), blend(from.b, to.b)};
+}
 
 // Orange and blue are told apart with any kind of colour vision.
 inline constexpr Rgb kOnColour{255, 152, 20};

@@ -4,7 +4,6 @@ extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include <libavutil/opt.h>
-#include <libswscale/swscale.h>
 }
 
 #include <algorithm>
@@ -14,6 +13,7 @@ extern "C" {
 
 #include "esim/record/output_file.h"
 #include "esim/record/preview/palette.h"
+#include "esim/record/preview/yuv.h"
 
 namespace esim {
 namespace {
@@ -22,7 +22,6 @@ struct Deleter {
   void operator()(AVCodecContext* context) const { avcodec_free_context(&context); }
   void operator()(AVFrame* frame) const { av_frame_free(&frame); }
   void operator()(AVPacket* packet) const { av_packet_free(&packet); }
-  void operator()(SwsContext* context) const { sws_freeContext(context); }
   void operator()(AVFormatContext* context) const {
     if (context->pb != nullptr) avio_closep(&context->pb);
     avformat_free_context(context);
@@ -44,7 +43,6 @@ struct VideoFile::Impl {
   std::filesystem::path path;
   Owned<AVFormatContext> format;
   Owned<AVCodecContext> encoder;
-  Owned<SwsContext> converter;
   Owned<AVFrame> frame;
   Owned<AVPacket> packet;
   AVStream* stream = nullptr;  // belongs to format
@@ -77,7 +75,8 @@ void VideoFile::Impl::open_encoder(VideoKind kind, int width, int height, double
   encoder->thread_count = 1;  // the same file on every machine, and processors left for the simulation
   encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
   if (!gif) {
-    av_opt_set(encoder->priv_data, "preset", compact ? "veryfast" : "ultrafast", 0);
+    // Slower presets halve the file at best, and take three times as long for it: longer than everything else.
+    av_opt_set(encoder->priv_data, "preset", "ultrafast", 0);
     av_opt_set(encoder->priv_data, "crf", compact ? "23" : "20", 0);
   }
   check(avcodec_open2(encoder.get(), codec, nullptr));
@@ -88,9 +87,6 @@ void VideoFile::Impl::open_encoder(VideoKind kind, int width, int height, double
   frame->height = height;
   check(av_frame_get_buffer(frame.get(), 0));
   packet.reset(av_packet_alloc());
-  if (gif) return;
-  converter.reset(sws_getContext(width, height, AV_PIX_FMT_RGB24, width, height, encoder->pix_fmt, SWS_BILINEAR,
-                                 nullptr, nullptr, nullptr));
 }
 
 void VideoFile::Impl::open_file(VideoKind kind) {
@@ -107,10 +103,9 @@ void VideoFile::Impl::open_file(VideoKind kind) {
 }
 
 void VideoFile::Impl::fill(const Image<Rgb>& image) {
-  if (converter) {
-    const std::uint8_t* const source[] = {reinterpret_cast<const std::uint8_t*>(image.data())};
-    const int source_stride[] = {3 * image.width()};
-    sws_scale(converter.get(), source, source_stride, 0, image.height(), frame->data, frame->linesize);
+  if (frame->format == AV_PIX_FMT_YUV420P) {
+    const auto plane = [&](int index) { return BytePlane{frame->data[index], frame->linesize[index]}; };
+    to_yuv420(image, plane(0), plane(1), plane(2));
     return;
   }
   const PaletteImage reduced = reduce_colours(image);

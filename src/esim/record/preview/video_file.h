@@ -9,8 +9,8 @@
 
 namespace esim {
 
-/// MP4 with H.264 in yuv420p, which browsers play, made fast or of about a third of the bytes; or a GIF that repeats
-/// for ever, with 256 colours for each frame.
+/// MP4 with H.264 in yuv420p, which browsers play, or the same of about a quarter less bytes; or a GIF that repeats for
+/// ever, with 256 colours for each frame.
 enum class VideoKind { mp4, compact_mp4, gif };
 
 /// A video being written. Throws OutputError if it cannot be.

@@ -29,18 +29,15 @@ struct Entry {
   std::uint64_t packed_bytes = 0, bytes = 0, offset = 0;
 };
 
-/// A text that is packed into a file of its own.
+/// A text that is packed into a file of its own, until it is copied into the archive. If that never comes, it is what
+/// has been recorded.
 class PackedText {
  public:
   explicit PackedText(const fs::path& path) : file_(path) {
     // Without zlib's own head, and fast: digits shrink well with any effort.
     if (deflateInit2(&stream_, 1, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY) != Z_OK) throw std::bad_alloc();
   }
-  ~PackedText() {
-    deflateEnd(&stream_);
-    std::error_code ignored;
-    fs::remove(file_.path(), ignored);
-  }
+  ~PackedText() { deflateEnd(&stream_); }
   PackedText(const PackedText&) = delete;
   PackedText& operator=(const PackedText&) = delete;
 
@@ -102,9 +99,13 @@ class ZipOutput final : public FilesOutput {
       add_header(text.finish(name));
       copy(text.path());
     }
-    texts_.clear();
     write_directory();
     file_.close();
+    for (const auto& [name, text] : texts_) {
+      std::error_code ignored;
+      fs::remove(text.path(), ignored);
+    }
+    texts_.clear();
   }
 
  private:

@@ -109,6 +109,7 @@ std::string report_json(const ConversionOptions& options, const ConversionSummar
       {"events_on", summary.events_on},
       {"events_off", summary.events_off},
       {"events_per_second", converted_s > 0 ? static_cast<double>(events) / converted_s : 0.0},
+      {"modulation_between_frames_rms", summary.modulation ? Json(*summary.modulation) : Json(nullptr)},
       {"notices", notices},
   };
   if (!summary.problem.empty()) report["reason"] = summary.problem;

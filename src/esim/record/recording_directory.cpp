@@ -8,6 +8,7 @@
 
 #include <cerrno>
 #include <cstdlib>
+#include <fstream>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -192,6 +193,15 @@ void RecordingDirectory::finish(std::string_view report_json) {
                       "; the recording is kept in the former");
   }
   sync_directory(out_.parent_path().empty() ? fs::path(".") : out_.parent_path());
+}
+
+bool has_conversion_report(const fs::path& folder) {
+  constexpr std::streamsize kMostBytes = 1 << 16;
+  std::ifstream file(folder / "report.json", std::ios::binary);
+  std::string text(static_cast<std::size_t>(kMostBytes), '\0');
+  file.read(text.data(), kMostBytes);
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  return text.find("\"converted_from\"") != std::string::npos;
 }
 
 }  // namespace esim

@@ -5,9 +5,11 @@
 
 #include "commands.h"
 #include "esim/core/error.h"
+#include "esim/record/fan_out.h"
 #include "esim/record/keep_on_failure.h"
 #include "esim/record/recording_directory.h"
 #include "esim/record/recording_file.h"
+#include "esim/stats/between_frames.h"
 #include "progress_bar.h"
 #include "support.h"
 
@@ -88,6 +90,26 @@ void report_losses(const ConversionSummary& summary, const ConversionOptions& op
   std::ranges::for_each(losses(options, summary), notices.warning);
 }
 
+/// What would spread events that bunch at the frames: which of the options are left to try.
+std::string ways_to_spread(const ConversionOptions& options) {
+  if (!options.interpolation.interpolation) return "without --no-interpolation, edges move between the frames";
+  constexpr double kFineLambda_px = 0.25;
+  std::string ways;
+  if (options.event_camera.low_pass_hz == 0)
+    ways =
+        "pixels of a real camera (--set preset=davis346), or of limited bandwidth (--set low_pass_hz=50), spread them";
+  if (options.interpolation.lambda > kFineLambda_px)
+    ways += fmt::format("{}smaller steps (--lambda {}) help a little", ways.empty() ? "" : "; ", kFineLambda_px);
+  return ways.empty() ? "what is left comes from noise and aliasing of the frames" : ways;
+}
+
+void report_bunching(const ConversionSummary& summary, const ConversionOptions& options, const Notices& notices) {
+  constexpr double kMuch = 0.1;  // as of "strong" banding in `esim stats`
+  if (!summary.modulation || *summary.modulation < kMuch) return;
+  notices.note(fmt::format("events bunch at the frames: between two frames their rate varies by {:.0f} % rms; {}",
+                           100 * *summary.modulation, ways_to_spread(options)));
+}
+
 void print_summary(const ConversionSummary& summary) {
   const double converted_s = to_seconds(summary.end - summary.start);
   tell(stderr, "{}: {} frames, {:.3f} s, converted in {:.1f} s ({:.2f}x real time), {} steps, {} events\n",
@@ -103,18 +125,25 @@ class Converter {
         workers_(arguments.threads),
         frames_(arguments.input, arguments.options.video, arguments.options.bayer) {}
 
-  ConversionSummary run(Sink& out) {
+  ConversionSummary run(std::unique_ptr<Sink> out) {
     const ConversionOptions& options = arguments_.options;
     Interpolator interpolator(options.interpolation, options.event_camera.log_eps);
     EventCamera event_camera(options.event_camera, frames_.width(), frames_.height(), options.seed, 0);
+    auto watching = std::make_unique<BetweenFrames>();
+    const BetweenFrames& between_frames = *watching;
+    FanOut both;
+    both.add(std::move(out));
+    both.add(std::move(watching));
     ProgressBar bar(!arguments_.quiet);
     ConversionSummary summary =
-        convert({frames_, interpolator, event_camera, workers_}, out, [&](const Progress& progress) {
+        convert({frames_, interpolator, event_camera, workers_}, both, [&](const Progress& progress) {
           bar.show(progress);
           has_converted_ = true;
           return !interrupted();
         });
     bar.clear();
+    const PhaseTest test = between_frames.test();
+    if (test.banding != Banding::unknown) summary.modulation = test.modulation;
     return summary;
   }
 
@@ -142,13 +171,13 @@ int outcome(const ConversionSummary& summary, const fs::path& out) {
 int convert_to_file(const Arguments& arguments, const fs::path& out, const Format& format, const Notices& notices) {
   RecordingFile file(out, arguments.force);
   Converter converter(arguments);
-  const std::unique_ptr<Sink> sink = build_conversion_sink(file.path(), format);
   const ConversionSummary summary = keep_on_failure(file, converter.has_converted(), [&] {
-    ConversionSummary converted = converter.run(*sink);
+    ConversionSummary converted = converter.run(build_conversion_sink(file.path(), format));
     file.finish();
     return converted;
   });
   report_losses(summary, arguments.options, notices);
+  report_bunching(summary, arguments.options, notices);
   if (!arguments.quiet) {
     print_summary(summary);
     tell(stderr, "events: {}\n", out.string());
@@ -161,10 +190,10 @@ int convert_to_folder(const Arguments& arguments, const fs::path& out, const Not
   RecordingDirectory directory(out, arguments.force);
   Converter converter(arguments);
   write_text(directory.path() / "video.yaml", write_conversion(arguments.options));
-  const std::unique_ptr<Sink> sink = build_conversion_sink(directory.path());
   const ConversionSummary summary = keep_on_failure(directory, converter.has_converted(), [&] {
-    ConversionSummary converted = converter.run(*sink);
+    ConversionSummary converted = converter.run(build_conversion_sink(directory.path()));
     report_losses(converted, arguments.options, notices);
+    report_bunching(converted, arguments.options, notices);
     directory.finish(report_json(arguments.options, converted, converter.threads(), given));
     return converted;
   });

@@ -128,6 +128,7 @@ void save(const fs::path& path, const Bytes& bytes, int width, int height, const
   camera.model.height = height;
   info.cameras.push_back(camera);
   if (!events.empty()) info.start = events.front().t, info.end = events.back().t;
+  info.start_known = false;
   const std::unique_ptr<Sink> sink = format.create(path, {});
   sink->begin(info);
   for (std::size_t i = 0; i < events.size(); i += kPortion)

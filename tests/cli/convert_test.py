@@ -84,6 +84,22 @@ class Convert(ProgramTest):
         self.assertIn("outside the sensor", self.convert(self.text, self.folder / "a.h5", "--width", "32", "--height",
                                                          "48", code=2).stderr)
 
+    def test_files_of_unknown_topics(self):
+        for name in ("a.bag", "a.mcap"):
+            path = self.folder / name
+            self.convert(self.text, path, "--compression", "none")
+            if name == "a.bag":  # checksums tell of changes in the other
+                path.write_bytes(path.read_bytes().replace(b"dvs_msgs/EventArray", b"new_msgs/EventArray"))
+                for command in (["convert", path, self.folder / "out.txt"], ["stats", path]):
+                    result = run(*command)
+                    self.assertEqual(result.returncode, 2, result.stdout)
+                    self.assertIn("/cam0/events (new_msgs/EventArray)", result.stderr)
+                    self.assertIn(str(path), result.stderr)
+                self.assertFalse((self.folder / "out.txt").exists())
+                self.assertIn("/cam0/events (new_msgs/EventArray)", run("info", path).stdout)
+            else:
+                self.assertEqual(run("stats", path).returncode, 0)
+
     def test_the_list_names_every_format(self):
         listed = self.convert("--list").stdout
         for name in ("dsec", "text"):

@@ -58,6 +58,21 @@ class Video(ProgramTest):
         result = self.video("--no-interpolation", source=self.out / "cam0" / "preview.mp4", out=self.folder / "again")
         self.assertEqual(result.returncode, 0, result.stderr)
 
+    def test_says_that_events_bunch_at_the_frames(self):
+        for i in range(30):
+            write_frame(self.images / f"{i}.pgm", 2.5 * i)
+        result = self.video("--fps", "50", "--no-interpolation")
+        self.assertRegex(result.stderr, r"events bunch at the frames: .* \d+ % rms; without --no-interpolation")
+        report = json.loads((self.out / "report.json").read_text())
+        self.assertGreater(report["modulation_between_frames_rms"], 0.1)
+        self.assertTrue(any("bunch" in notice for notice in report["notices"]))
+        # `esim stats` says the same.
+        stats = json.loads(run("stats", self.out, "--fps", "50", "--json").stdout)
+        self.assertAlmostEqual(stats["time_stamps"]["modulation_rms"], report["modulation_between_frames_rms"], delta=0.05)
+        self.assertNotIn("bunch", self.video("--fps", "50", "--set", "contrast_threshold=0.1", "--set", "low_pass_hz=50", "--force").stderr)
+        self.video("--fps", "50", "--duration", "0.05", "--force")
+        self.assertIsNone(json.loads((self.out / "report.json").read_text())["modulation_between_frames_rms"], "too short to tell")
+
     def test_one_file_of_events(self):
         for name in ("out.h5", "out.txt"):
             out = self.folder / name

@@ -88,6 +88,32 @@ TEST(CopyRecording, TimesMayCountFromTheStart) {
   EXPECT_EQ(events_in(base.path() / "a"), expected);
 }
 
+// A conversion leaves a report.json in the folders that it makes: they are still of their format.
+TEST(ConvertRecording, FoldersOfEveryFormatReadBack) {
+  const test::TemporaryDirectory base;
+  const std::filesystem::path recording = base.path() / "source";
+  {
+    const auto sink = format_named("recording").create(recording, {});
+    sink->begin(test::recording_info(32, 24, 0, kNsPerSecond));
+    const std::vector<Event> events = test::random_events(100, 32, 24, 0, kNsPerSecond);
+    sink->write(EventsRecord{0, events});
+    for (int i = 0; i < 3; ++i) sink->write(test::TruthImages(32, 24, 0.1 * i).at(i * kNsPerMs));
+    sink->end(true);
+  }
+  for (const Format& format : formats()) {
+    if (!format.folder || !format.create) continue;
+    const auto to = base.path() / format.name;
+    const CopySummary there = convert_recording(recording, format, to, {}, kGoOn);
+    EXPECT_FALSE(there.copied.empty()) << format.name;
+    ASSERT_TRUE(std::filesystem::exists(to / "report.json")) << format.name;
+    EXPECT_EQ(format_of(to).name, format.name);
+    std::size_t records = 0;
+    const auto source = open_source(to);
+    while (source->next() != nullptr) ++records;
+    EXPECT_GT(records, 0U) << format.name;
+  }
+}
+
 TEST(CopyRecording, StoppedItEndsInOrder) {
   const test::TemporaryDirectory base;
   Given given;

@@ -98,7 +98,8 @@ TEST_P(EventsHdf5, MillisecondIndexIsTheFirstEventNotBefore) {
     const auto path = write(recording_info(64, 48, start, end), events);
     const auto t = read_raw(path, "events/t");
     const auto index = read_raw(path, "ms_to_idx");
-    EXPECT_EQ(index.size(), static_cast<std::size_t>((floored(end) - floored(start)) / kNsPerMs) + 1);
+    EXPECT_EQ(index.size(), static_cast<std::size_t>((floored(end) - floored(start) - 1) / kNsPerMs) + 2)
+        << "up to the end, rounded up";
     const std::uint64_t units_per_ms = static_cast<std::uint64_t>(kNsPerMs / unit_ns());
     for (std::size_t ms = 0; ms < index.size(); ++ms) {
       const auto expected = std::lower_bound(t.begin(), t.end(), ms * units_per_ms) - t.begin();
@@ -164,7 +165,27 @@ TEST_P(EventsHdf5, InterruptedRecordingEndsWhereItEnds) {
   writer.write(PoseRecord{4'200'000, {}});
   writer.end(false);
   EXPECT_EQ(EventsHdf5Reader(path).complete(), false);
-  EXPECT_EQ(read_raw(path, "ms_to_idx"), (std::vector<std::uint64_t>{0, 0, 1, 1, 1}));
+  EXPECT_EQ(read_raw(path, "ms_to_idx"), (std::vector<std::uint64_t>{0, 0, 1, 1, 1, 1}));
+}
+
+// DSEC's reader takes the events of [a, b) from those between the milliseconds floor(a) and ceil(b), counted from
+// t_offset, both of which must have an entry. It may be asked up to right behind the last event, and to the end.
+TEST_P(EventsHdf5, EveryWindowHasItsMilliseconds) {
+  for (const TimeNs last : {999'310'000, 999'999'999, 1'000'000'000, 1'000'000'001, 1'500'200'000}) {
+    for (const TimeNs end : {TimeNs{0}, kNsPerSecond, kNsPerSecond + 300'000}) {
+      const std::vector<Event> events{{310'000, 1, 2, 1}, {500'000'000, 3, 4, -1}, {last, 5, 6, 1}};
+      const auto path = write(recording_info(64, 48, 0, end), events);
+      const auto t = read_raw(path, "events/t");
+      const auto index = read_raw(path, "ms_to_idx");
+      const std::uint64_t units_per_ms = static_cast<std::uint64_t>(kNsPerMs / unit_ns());
+      const std::uint64_t b = std::max(t.back() + 1, static_cast<std::uint64_t>(end / unit_ns()));
+      ASSERT_LT((b + units_per_ms - 1) / units_per_ms, index.size()) << last << " " << end;
+      for (std::size_t ms = 0; ms < index.size(); ++ms) {
+        const auto expected = std::lower_bound(t.begin(), t.end(), ms * units_per_ms) - t.begin();
+        ASSERT_EQ(index[ms], static_cast<std::uint64_t>(expected)) << "ms " << ms;
+      }
+    }
+  }
 }
 
 std::string name_of(const testing::TestParamInfo<Case>& instance) {

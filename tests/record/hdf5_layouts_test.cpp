@@ -102,12 +102,13 @@ TEST_F(Hdf5Layouts, M3edTellsTheSensorAndFirstEventsOfMilliseconds) {
   const hid_t space = H5Dget_space(dataset);
   std::vector<std::uint64_t> index(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
   H5Sclose(space);
-  ASSERT_EQ(index.size(), 2001U);
+  ASSERT_EQ(index.size(), 2002U) << "one behind the last event, for the reader of its millisecond";
   ASSERT_EQ(H5Dread(dataset, H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, index.data()), 0);
   H5Dclose(dataset);
   H5Fclose(file);
   EXPECT_EQ(index[0], 0U);  // 1 us is after 0 ms
   for (std::size_t ms = 1; ms <= 2000; ++ms) ASSERT_EQ(index[ms], 2U) << ms;
+  EXPECT_EQ(index[2001], kEvents.size());
 }
 
 TEST_F(Hdf5Layouts, TimesThatDoNotFitAreRefused) {

@@ -212,7 +212,8 @@ TEST_F(ForeignHdf5, IndexAndOffsetMayBeAbsentAndTypesDiffer) {
 
 TEST_F(ForeignHdf5, WhatIsWrongIsSaid) {
   const std::string path = path_.string();
-  EXPECT_EQ(message([](Builder&) {}), "cannot read " + path + ": there is no dataset events/t");
+  EXPECT_EQ(message([](Builder&) {}),
+            "cannot read " + path + ": there is no dataset events/t, as DSEC has it; it holds events");
   EXPECT_TRUE(contains(
       message([](Builder& builder) { builder.column<double>("events/t", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, {1.0}); }),
       "events/t does not hold integers"));

@@ -62,6 +62,7 @@ RecordingInfo rig() {
   second.model.fx = second.model.fy = 7;
   second.model.distortion = Equidistant{0.1, 0.2, 0.3, 0.4};
   info.cameras.push_back(second);
+  for (CameraInfo& camera : info.cameras) camera.has_frames = true;
   info.imu.emplace().T_body_imu.translation = {0.01, 0.02, 0.03};
   info.objects = {"ball"};
   return info;

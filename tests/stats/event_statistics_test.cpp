@@ -150,8 +150,9 @@ TEST(Report, TwoFilesSideBySide) {
       {"second.h5", statistics_of(test::events_at(test::poisson_times(3e6, 0.1, 1), kWidth, kHeight, 2))}};
   const std::string text = describe(files);
   EXPECT_TRUE(contains(text, "first.h5"));
-  EXPECT_TRUE(contains(text, " kEv/s"));
-  EXPECT_TRUE(contains(text, " MEv/s"));
+  EXPECT_TRUE(contains(text, " kev/s"));
+  EXPECT_TRUE(contains(text, " Mev/s"));
+  EXPECT_TRUE(contains(text, ", corrected for ")) << "of how many frequencies a period is the strongest";
   for (const char* line : {"\n  events ", "\n  peak in 1 ms ", "\n  silent ", "\n  median ", "\n  verdict "}) {
     const std::size_t at = text.find(line);
     EXPECT_NE(at, std::string::npos) << line;
@@ -162,8 +163,8 @@ TEST(Report, TwoFilesSideBySide) {
 TEST(Report, Numbers) {
   EXPECT_EQ(format_rate(0), "0.00 ev/s");
   EXPECT_EQ(format_rate(999.4), "999 ev/s");
-  EXPECT_EQ(format_rate(999.6), "1.00 kEv/s");
-  EXPECT_EQ(format_rate(12'345'678), "12.3 MEv/s");
+  EXPECT_EQ(format_rate(999.6), "1.00 kev/s");
+  EXPECT_EQ(format_rate(12'345'678), "12.3 Mev/s");
   EXPECT_EQ(format_duration(0), "0 ns");
   EXPECT_EQ(format_duration(1e-6), "1.00 us");
   EXPECT_EQ(format_duration(0.0333333), "33.3 ms");

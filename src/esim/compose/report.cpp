@@ -114,6 +114,7 @@ std::string report_json(const ConversionOptions& options, const ConversionSummar
       {"events_delayed_by_readout", summary.sensor.delayed},
       {"longest_readout_delay_s", to_seconds(summary.sensor.longest_delay)},
       {"events_per_second", converted_s > 0 ? static_cast<double>(events) / converted_s : 0.0},
+      {"modulation_between_frames_rms", summary.modulation ? Json(*summary.modulation) : Json(nullptr)},
       {"notices", notices},
   };
   if (!summary.problem.empty()) report["reason"] = summary.problem;

@@ -256,7 +256,8 @@ CameraInfo camera_info(CameraOptions options, const SceneCamera* followed) {
   if (followed != nullptr && followed->horizontal_fov_rad && !options.horizontal_fov_deg)
     options.horizontal_fov_deg = *followed->horizontal_fov_rad * 180.0 / std::numbers::pi;
   return {options.name, camera_model(options),
-          pose_named(fmt::format("camera {}: T_body_camera", options.name), options.T_body_camera)};
+          pose_named(fmt::format("camera {}: T_body_camera", options.name), options.T_body_camera),
+          options.frame_camera.has_value()};
 }
 
 World build_world(const Scenario& scenario, int threads, const Notices& notices) {

@@ -19,6 +19,7 @@ class CheckedSource final : public Source {
 
   const RecordingInfo& info() const override { return inner_->info(); }
   const Record* next() override;
+  std::vector<std::string> not_read() const override { return inner_->not_read(); }
   double progress() const override { return inner_->progress(); }
 
  private:

@@ -88,6 +88,7 @@ class Copy {
       }
     }
     to_->end(summary_.complete);
+    summary_.not_read = from_.not_read();
     return summary_;
   }
 
@@ -135,10 +136,12 @@ std::string conversion_report(const RecordingInfo& info, const std::string& from
   for (const CameraInfo& camera : info.cameras) {
     cameras.push_back({{"name", camera.name}, {"width", camera.model.width}, {"height", camera.model.height}});
   }
-  const nlohmann::ordered_json report = {{"status", complete ? "complete" : "interrupted"},
-                                         {"converted_from", from},
-                                         {"start_s", to_seconds(info.start)},
-                                         {"cameras", cameras}};
+  nlohmann::ordered_json report = {{"status", complete ? "complete" : "interrupted"}, {"converted_from", from}};
+  if (info.start_known) {
+    report["start_s"] = to_seconds(info.start);
+    report["simulated_s"] = to_seconds(info.end - info.start);
+  }
+  report["cameras"] = cameras;
   return report.dump(2) + "\n";
 }
 
@@ -170,11 +173,16 @@ CopySummary convert_recording(const fs::path& from, const Format& format, const 
     };
   }
   const std::unique_ptr<Source> source = open_source(from, reading);
+  if (!format.can_hold(Content::imu) && !format.can_hold(Content::poses)) require_camera(*source, from);
   bool copied = false;
   const auto copy_to = [&](const fs::path& path) {
     try {
       CopySummary summary = Copy(*source, format, path, options.copy).run(go_on, copied);
       summary.complete &= !damaged;
+      if (summary.complete && summary.copied.empty() && summary.left_out.empty() && !summary.not_read.empty()) {
+        throw UserError(fmt::format("cannot convert {}: it holds nothing that can be read, only {}", from.string(),
+                                    list_of_some(summary.not_read)));
+      }
       return summary;
     } catch (const OutputError&) {
       throw;
@@ -204,6 +212,7 @@ std::vector<Loss> losses(const CopySummary& summary, const Format& format) {
   for (const auto& [content, count] : summary.left_out) {
     losses.push_back({fmt::format("{} does not hold {}: {} left out", format.name, describe(content), grouped(count))});
   }
+  if (!summary.not_read.empty()) losses.push_back({"not read: " + list_of_some(summary.not_read)});
   if (summary.rounded_to > 0) {
     losses.push_back({fmt::format("times of events are rounded down to {} us",
                                   static_cast<double>(summary.rounded_to) / static_cast<double>(kNsPerUs)),

@@ -9,6 +9,7 @@
 
 #include "esim/core/error.h"
 #include "esim/core/remedy.h"
+#include "esim/record/number_text.h"
 #include "esim/record/recording_directory.h"
 
 namespace esim {
@@ -80,7 +81,7 @@ EventsFile::EventsFile(const fs::path& path, const ReadOptions& options) : path_
   // What the file itself says of the sensor counts for more than the report beside it.
   source_ = open_source(path_, told);
   const auto size_of = [](const Source& source) { return source.info().cameras.front().model; };
-  if (source_->info().cameras.empty()) throw UserError(fmt::format("{} holds no events of a camera", path_.string()));
+  require_camera(*source_, path_);
   if (source_->info().cameras.size() > 1) {
     std::string names;
     for (const CameraInfo& camera : source_->info().cameras) names += (names.empty() ? "" : ", ") + camera.name;
@@ -106,6 +107,11 @@ bool EventsFile::read(std::vector<Event>& events, std::size_t count) {
     const Record* record = source_->next();
     if (record == nullptr) break;
     if (const auto* found = std::get_if<EventsRecord>(record)) portion_ = found->events;
+  }
+  found_any_ |= !events.empty();
+  if (!found_any_ && !source_->not_read().empty()) {
+    throw UserError(fmt::format("{} holds no events that can be read; not read: {}", path_.string(),
+                                list_of_some(source_->not_read())));
   }
   return !events.empty();
 }

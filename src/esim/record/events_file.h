@@ -19,7 +19,8 @@ class EventsFile {
   const std::filesystem::path& path() const { return path_; }  ///< of the file itself
   std::optional<SensorSize> sensor() const { return sensor_; }
 
-  /// Replaces `events` by the next ones, at most `count`; false if there are none left.
+  /// Replaces `events` by the next ones, at most `count`; false if there are none left. Throws UserError where there
+  /// are none at all in a file that holds things of unknown kinds.
   bool read(std::vector<Event>& events, std::size_t count);
 
  private:
@@ -27,6 +28,7 @@ class EventsFile {
   std::unique_ptr<Source> source_;
   std::optional<SensorSize> sensor_;
   EventSpan portion_;  // of the source's, what has not been read
+  bool found_any_ = false;
 };
 
 }  // namespace esim

@@ -1,5 +1,6 @@
 #include "esim/record/events_reader.h"
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -15,11 +16,14 @@ class EventsSource final : public Source {
     CameraInfo& camera = info_.cameras.emplace_back();
     camera.name = "cam0";
     camera.model.width = sensor.width, camera.model.height = sensor.height;
-    // The start is known with the first portion.
+    // Where the file does not tell the start, the first portion does.
     read();
     waiting_ = true;
-    if (!events_.empty()) info_.start = info_.end = events_.front().t;
-    if (const auto span = reader_->time_span(); span && !events_.empty()) info_.end = span->end;
+    const std::optional<TimeNs> start = reader_->start();
+    info_.start_known = start.has_value();
+    info_.start = start.value_or(0);
+    if (!events_.empty()) info_.start = std::min(start.value_or(events_.front().t), events_.front().t);
+    info_.end = std::max(info_.start, reader_->end().value_or(info_.start));
   }
 
   const RecordingInfo& info() const override { return info_; }

@@ -17,14 +17,16 @@ class EventsReader {
   /// 0 x 0 where the file does not say.
   virtual SensorSize sensor() const { return {}; }
 
-  /// Times of the first event and the last, where the file tells that beforehand.
-  virtual std::optional<TimeSpan> time_span() const { return std::nullopt; }
+  /// Start and end of the recording, which may be before the first event and after the last one; nothing where the
+  /// file does not tell. The end may also be merely that of the events.
+  virtual std::optional<TimeNs> start() const { return std::nullopt; }
+  virtual std::optional<TimeNs> end() const { return std::nullopt; }
 
   /// Appends the next events, some 10^4 to 10^5; false if there are none left. Where the file is damaged, appends what
   /// comes before and throws UserError.
   virtual bool read(std::vector<Event>& events) = 0;
 
-  /// The share of the file that has been read.
+  /// The fraction of the file that has been read.
   virtual double progress() const = 0;
 };
 

@@ -84,6 +84,9 @@ const Format& format_for(const std::filesystem::path& path);
 /// sensor, as far as its size is known, are a UserError with index and values.
 std::unique_ptr<Source> open_source(const std::filesystem::path& path, const ReadOptions& options = {});
 
+/// Throws UserError where a recording from `path` has no camera, with what of the file cannot be read.
+void require_camera(const Source& source, const std::filesystem::path& path);
+
 Content content_of(const Record& record);
 
 /// For people: "events", "measurements of the IMU".

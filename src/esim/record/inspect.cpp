@@ -61,6 +61,7 @@ void summarise(Source& source, Inspection& inspection) {
       ++inspection.others[content_of(*record)];
     }
   }
+  inspection.not_read = source.not_read();
 }
 
 // A file of events, without what else it holds.
@@ -259,6 +260,9 @@ std::string describe(const Inspection& inspection) {
   if (!inspection.others.empty()) text += "also\n";
   for (const auto& [content, count] : inspection.others)
     text += fmt::format("  {:<12}{}\n", grouped(count), describe(content));
+
+  if (!inspection.not_read.empty()) text += "not read\n";
+  for (const std::string& other : inspection.not_read) text += fmt::format("  {}\n", other);
 
   std::size_t width = 0;
   for (const FileSize& file : inspection.files) width = std::max(width, file.name.string().size());

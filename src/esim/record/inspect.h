@@ -47,6 +47,7 @@ struct Inspection {
   std::string format;  ///< of a file
   std::vector<EventsSummary> cameras;
   std::map<Content, std::uint64_t> others;  ///< what else a file holds: how many
+  std::vector<std::string> not_read;        ///< what of a file cannot be read, for people
   std::vector<FileSize> files;
 };
 

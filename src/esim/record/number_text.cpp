@@ -55,6 +55,14 @@ bool parse_seconds(std::string_view word, TimeNs& t) {
   return true;
 }
 
+std::string list_of_some(const std::vector<std::string>& items) {
+  constexpr std::size_t kListed = 8;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(items.size(), kListed); ++i) text += (i == 0 ? "" : ", ") + items[i];
+  if (items.size() > kListed) text += " and " + std::to_string(items.size() - kListed) + " more";
+  return text;
+}
+
 std::string_view problem_of_time(std::optional<TimeNs> last, TimeNs t) {
   constexpr TimeNs kMaxTime = std::numeric_limits<TimeNs>::max() / 2;  // differences of times stay representable
   if (t > kMaxTime || t < -kMaxTime) return "the time is none of a recording";

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <vector>
 
 #include "esim/core/time.h"
 
@@ -32,6 +33,9 @@ bool parse_number(std::string_view word, Number& value) {
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   return error == std::errc() && end == word.data() + word.size();
 }
+
+/// The first few of them, separated by commas, and how many more there are: "a, b and 7 more".
+std::string list_of_some(const std::vector<std::string>& items);
 
 /// What is wrong with a time that follows another one in a recording: "" where nothing is.
 std::string_view problem_of_time(std::optional<TimeNs> last, TimeNs t);

@@ -18,9 +18,10 @@ namespace esim {
 
 /// One camera of the recording.
 struct CameraInfo {
-  std::string name;   ///< unique within the rig: `cam0`, ...
-  Camera model;       ///< intrinsics and distortion; 0 where they are not known, as of files by others
-  SE3 T_body_camera;  ///< pose of the camera in the body frame
+  std::string name;         ///< unique within the rig: `cam0`, ...
+  Camera model;             ///< intrinsics and distortion; 0 where they are not known, as of files by others
+  SE3 T_body_camera;        ///< pose of the camera in the body frame
+  bool has_frames = false;  ///< a frame camera shares the lens: there may be FrameRecords
 };
 
 /// The inertial measurement unit of the recording. Densities are continuous-time.
@@ -37,6 +38,7 @@ struct ImuInfo {
 struct RecordingInfo {
   std::vector<CameraInfo> cameras;
   TimeNs start = 0;          ///< time of the first sample
+  bool start_known = true;   ///< otherwise `start` is merely the time of the first record
   TimeNs end = 0;            ///< time of the last sample, if the recording becomes complete; the start: not known yet
   double truth_rate_hz = 0;  ///< frames of ground truth, or of a video, per second; 0: none
   std::optional<ImuInfo> imu{};

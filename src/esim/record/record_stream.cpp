@@ -40,6 +40,10 @@ class MergedSource final : public Source {
         if (entry->damage) std::rethrow_exception(entry->damage);
         const Record* const record = entry->stream->next(turn_of(*entry));
         t_ = std::max(t_, *entry->due);
+        if (record == nullptr) {
+          look_ahead(*entry);
+          continue;
+        }
         taken_ = entry;
         return record;
       } catch (const UserError& error) {

@@ -16,8 +16,8 @@ class RecordStream {
   /// Looks for the next record and says its time; nothing where there are none left. Called once before each next().
   virtual std::optional<TimeNs> due() = 0;
 
-  /// That record, borrowed until the next call; of events, those up to `until`. Both throw UserError where the file is
-  /// damaged from there on.
+  /// That record, borrowed until the next call; of events, those up to `until`. Null where another stream hands it out
+  /// as a part of its own record. Both throw UserError where the file is damaged from there on.
   virtual const Record* next(TimeNs until) = 0;
 };
 

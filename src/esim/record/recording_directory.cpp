@@ -8,6 +8,7 @@
 
 #include <cerrno>
 #include <cstdlib>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <system_error>
@@ -230,6 +231,15 @@ void RecordingDirectory::keep(std::string_view reason) noexcept {
                           report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   } catch (const std::exception&) {  // there is no room: it still says "running"
   }
+}
+
+bool has_conversion_report(const fs::path& folder) {
+  constexpr std::streamsize kMostBytes = 1 << 16;
+  std::ifstream file(folder / "report.json", std::ios::binary);
+  std::string text(static_cast<std::size_t>(kMostBytes), '\0');
+  file.read(text.data(), kMostBytes);
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  return text.find("\"converted_from\"") != std::string::npos;
 }
 
 }  // namespace esim

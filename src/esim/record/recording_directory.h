@@ -59,4 +59,8 @@ void require_existing(const std::filesystem::path& path);
 /// Whether a process is writing in this directory now.
 bool is_being_written(const std::filesystem::path& working_directory);
 
+/// Whether the report.json in a folder is that of a conversion: such a one stands beside files of any format that is a
+/// folder, and does not make a recording of them.
+bool has_conversion_report(const std::filesystem::path& folder);
+
 }  // namespace esim

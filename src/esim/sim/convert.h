@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "esim/core/parallel.h"
@@ -27,6 +28,10 @@ struct ConversionSummary {
   double displacement_px = 0;  ///< greatest between two frames
   std::int64_t events_on = 0, events_off = 0;
   EventCameraStatistics sensor;
+
+  /// How much the events' rate varies between two frames, rms, relative to its mean; nothing where it is not known.
+  /// Measured by who reports it (stats/between_frames.h).
+  std::optional<double> modulation{};
 
   /// Wall-clock seconds by stage.
   struct Seconds {

@@ -31,8 +31,8 @@ struct Unit {
   const char* name;
 };
 Unit rate_unit(double largest) {
-  if (largest >= 1e6) return {1e-6, "MEv/s"};
-  return largest >= 1e3 ? Unit{1e-3, "kEv/s"} : Unit{1, "ev/s"};
+  if (largest >= 1e6) return {1e-6, "Mev/s"};
+  return largest >= 1e3 ? Unit{1e-3, "kev/s"} : Unit{1, "ev/s"};
 }
 
 Rgb viridis(double position) {

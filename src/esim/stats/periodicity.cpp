@@ -248,7 +248,8 @@ std::optional<Periodicity> find_periodicity(std::span<const TimeNs> times) {
   result.frequency_hz = harmonic_hz / static_cast<double>(line.harmonic);
   result.rayleigh = tapered.rayleigh(result.frequency_hz, 1);
   const double typical_z = level[(line.k + line.harmonic / 2) / line.harmonic];
-  result.p_value = std::min(1.0, static_cast<double>(end - first) * std::exp(-result.rayleigh / typical_z));
+  result.candidates = end - first;
+  result.p_value = std::min(1.0, static_cast<double>(result.candidates) * std::exp(-result.rayleigh / typical_z));
   return result;
 }
 

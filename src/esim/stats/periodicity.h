@@ -57,12 +57,14 @@ PhaseTest test_phase(std::span<const TimeNs> times, double frequency_hz);
 /// frequencies nearby: their median / ln 2, but at least 1. Bands have harmonics: of all frequencies with at least a
 /// quarter of the highest ratio, the lowest is taken, and from there the largest divisor up to 16 that leads to another
 /// significant one with at least 1/64. The maximum nearby is found with the time stamps themselves; of its ratio r,
-/// p = candidates exp(-r).
+/// p = min(1, candidates exp(-r)), which Bonferroni's correction makes 1 wherever the best of them is no better than
+/// chance.
 struct Periodicity {
   double frequency_hz = 0;
-  double rayleigh = 0;  ///< z
-  double p_value = 1;
-  bool found() const;  ///< p < 1e-6
+  double rayleigh = 0;         ///< z
+  std::size_t candidates = 0;  ///< frequencies that were looked at
+  double p_value = 1;          ///< that of one of them by chance: corrected for their number
+  bool found() const;          ///< p < 1e-6
 };
 
 /// `times` in order, ns; of more than 800 s, the first 800 s are searched. Nothing if there are fewer than 100 or if 20

@@ -28,6 +28,11 @@ double ratio(std::uint64_t part, std::uint64_t whole) {
 
 std::string p_text(double p) { return p < 1e-300 ? "p < 1e-300" : fmt::format("p = {:.2g}", p); }
 
+// Of the strongest of many frequencies: how likely it is that any of them would be so strong by chance.
+std::string corrected_p_text(const Periodicity& periodicity) {
+  return fmt::format("{}, corrected for {} frequencies", p_text(periodicity.p_value), grouped(periodicity.candidates));
+}
+
 double mean_count(const Statistics& s) {
   return s.counts.empty() ? 0.0 : static_cast<double>(s.events()) / static_cast<double>(s.counts.size());
 }
@@ -92,7 +97,7 @@ ReportSection stamp_section(const Statistics& s) {
                                    grouped(s.most_simultaneous)));
   line("period", period_text(s));
   line("Rayleigh",
-       s.periodicity ? fmt::format("z = {:.4g}, {}", s.periodicity->rayleigh, p_text(s.periodicity->p_value)) : "-");
+       s.periodicity ? fmt::format("z = {:.4g}, {}", s.periodicity->rayleigh, corrected_p_text(*s.periodicity)) : "-");
   const PhaseTest phase = s.phase.value_or(PhaseTest{});
   const bool tested = phase.banding != Banding::unknown && (!s.periodicity || s.periodicity->found());
   line("chi2 / dof", tested ? fmt::format("{:.4g} (nearby periods: {:.4g}), {}", phase.chi2_per_dof,
@@ -129,10 +134,12 @@ nlohmann::ordered_json stamps_json(const Statistics& s) {
                                    {"period_given", !s.periodicity},
                                    {"rayleigh_z", nullptr},
                                    {"rayleigh_p", nullptr},
+                                   {"rayleigh_candidates", nullptr},
                                    {"banding", banding_word(s.banding())}};
   if (s.periodicity) {
     stamps["rayleigh_z"] = s.periodicity->rayleigh;
     stamps["rayleigh_p"] = s.periodicity->p_value;
+    stamps["rayleigh_candidates"] = s.periodicity->candidates;
   }
   if (s.phase) {
     stamps["frequency_hz"] = s.phase->frequency_hz;
@@ -150,7 +157,7 @@ nlohmann::ordered_json stamps_json(const Statistics& s) {
 }  // namespace
 
 std::string format_rate(double per_second) {
-  constexpr std::array<const char*, 4> kUnits = {"ev/s", "kEv/s", "MEv/s", "GEv/s"};
+  constexpr std::array<const char*, 4> kUnits = {"ev/s", "kev/s", "Mev/s", "Gev/s"};
   std::size_t unit = 0;
   for (; per_second >= 999.5 && unit + 1 < kUnits.size(); ++unit) per_second /= 1000;
   return fmt::format("{} {}", three_digits(per_second), kUnits[unit]);
@@ -173,7 +180,7 @@ std::string verdict(const Statistics& s) {
       return fmt::format("time stamps follow the period weakly ({})", p_text(s.phase->p_value));
     case Banding::none:
       if (s.periodicity && !s.periodicity->found()) {
-        return fmt::format("no banding: no period found ({})", p_text(s.periodicity->p_value));
+        return fmt::format("no banding: no period found ({})", corrected_p_text(*s.periodicity));
       }
       return fmt::format("no banding ({})", p_text(s.phase->p_value));
     case Banding::unknown:

@@ -34,7 +34,7 @@ std::string describe(std::span<const NamedStatistics> files);
 /// The same as JSON, in SI units without prefixes; null where there is no value.
 std::string to_json(const NamedStatistics& file);
 
-/// Three significant digits with the unit's prefix: 1.23 MEv/s, 45.6 us, 0 ev/s.
+/// Three significant digits with the unit's prefix: 1.23 Mev/s, 45.6 us, 0 ev/s.
 std::string format_rate(double per_second);
 std::string format_duration(double seconds);
 

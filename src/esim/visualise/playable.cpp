@@ -38,6 +38,7 @@ Playable::Playable(const fs::path& path, std::optional<SensorSize> sensor) : pat
 int Playable::camera(const std::string& name) const {
   std::string names;
   const auto source = open();
+  require_camera(*source, path_);
   const auto& cameras = source->info().cameras;
   if (cameras.empty()) throw UserError(fmt::format("{} holds nothing that a camera saw", path_.string()));
   for (std::size_t i = 0; i < cameras.size(); ++i) {

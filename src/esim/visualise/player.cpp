@@ -156,6 +156,7 @@ struct Player::Impl {
   bool shows(View view) const {
     return std::find(options.views.begin(), options.views.end(), view) != options.views.end();
   }
+  bool shows_irradiance() const { return image_from == Content::images || image_from == Content::truth; }
   TimeNs known_until() const;
   bool read();
   TimeNs advance();
@@ -212,7 +213,7 @@ bool Player::Impl::read() {
     waiting.insert(waiting.end(), events->events.begin(), events->events.end());
   } else if (const auto* truth = std::get_if<TruthRecord>(record)) {
     add(*truth);
-  } else if (const auto* image = std::get_if<ImageRecord>(record); image != nullptr && image_from == Content::images) {
+  } else if (const auto* image = std::get_if<ImageRecord>(record); image != nullptr && shows_irradiance()) {
     add_image(image->t, esim::grey(reduced(image->irradiance, grid)));
   } else if (const auto* frame = std::get_if<FrameRecord>(record); frame != nullptr && image_from == Content::frames) {
     add_image(frame->t, grey(*frame, grid));
@@ -226,7 +227,7 @@ void Player::Impl::add_image(TimeNs t, Image<Rgb> picture) {
 }
 
 void Player::Impl::add(const TruthRecord& truth) {
-  if (image_from == Content::truth) {
+  if (shows_irradiance() && !truth.irradiance.empty()) {
     add_image(truth.t, esim::grey(reduced(truth.irradiance, grid)));
   }
   if (shows(View::depth))

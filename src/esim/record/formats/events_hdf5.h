@@ -22,8 +22,11 @@ struct EventsHdf5Options {
 ///   events/t   uint32 or uint64 [N]   time since t_offset, rounded down to the unit
 ///   events/x, events/y  uint16 [N]    px
 ///   events/p   uint8 [N]              1: ON, 0: OFF
-///   ms_to_idx  uint64 [M]             ms_to_idx[ms] = first i with t[i] >= ms milliseconds; M = duration in ms + 1
-///   t_offset   int64                  start of the recording, rounded down to the unit
+///   ms_to_idx  uint64 [M]             ms_to_idx[ms] = first i with t[i] >= ms milliseconds, N where there is none
+///   t_offset   int64                  start of the recording, rounded down to the unit; to a second if it is unknown
+///
+/// with M = 1 + the duration in ms, rounded up, but at least that up to right behind the last event: a reader such as
+/// DSEC's looks up the first millisecond at or after the end of a window,
 ///
 /// and, beyond DSEC, the attributes unit ("us" or "ns"), width, height and esim_complete of the file: 0 while it is
 /// being written or if the recording was interrupted, 1 if it ran to its end. t is uint32 where the planned duration
@@ -63,6 +66,9 @@ class EventsHdf5Reader {
   std::optional<bool> complete() const;  ///< esim_complete, if the file says
 
   std::optional<TimeSpan> time_span() const;  ///< of the events; nothing if there are none
+
+  /// End of the recording as far as the file tells: that of ms_to_idx, rounded up to a ms, or the last event.
+  TimeNs end() const;
 
   /// Up to `count` events from index `first` on; fewer at the end.
   std::vector<Event> read(std::uint64_t first, std::uint64_t count) const;

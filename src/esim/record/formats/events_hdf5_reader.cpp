@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <cstdlib>
+#include <limits>
 #include <utility>
 
 #include "esim/core/error.h"
@@ -34,6 +36,7 @@ struct EventsHdf5Reader::Impl {
   void open();
   TimeNs to_ns(std::int64_t t) const;
   std::int64_t stored_time(std::uint64_t index) const;
+  std::int64_t index_end() const;
   std::uint64_t first_at_or_after(TimeNs t) const;
   std::pair<std::uint64_t, std::uint64_t> index_hint(std::int64_t stored) const;
 
@@ -54,7 +57,10 @@ void EventsHdf5Reader::Impl::open() {
   unit = read_unit(file);
   ns_per_unit = unit == TimeUnit::us ? kNsPerUs : 1;
   t_offset = file.scalar("t_offset").value_or(0);
+  if (std::abs(t_offset / 2) > std::numeric_limits<TimeNs>::max() / ns_per_unit / 4)
+    file.fail("t_offset is " + std::to_string(t_offset) + ", too large for a time");
   if (const auto flag = file.integer_attribute("esim_complete")) complete = *flag != 0;
+  if (!file.has("events/t")) file.fail("there is no dataset events/t, as DSEC has it; it holds " + file.contents());
   t = file.open_column("events/t");
   x = file.open_column("events/x");
   y = file.open_column("events/y");
@@ -81,6 +87,14 @@ std::int64_t EventsHdf5Reader::Impl::stored_time(std::uint64_t index) const {
   return value;
 }
 
+// The last millisecond of ms_to_idx, in the unit.
+std::int64_t EventsHdf5Reader::Impl::index_end() const {
+  if (!ms_to_idx || ms_to_idx->size == 0) return 0;
+  std::int64_t end = 0;
+  if (__builtin_mul_overflow(ms_to_idx->size - 1, kNsPerMs / ns_per_unit, &end)) file.fail("ms_to_idx is too long");
+  return end;
+}
+
 // Where ms_to_idx says that the first event at or after a stored time is: somewhere in [first, second].
 std::pair<std::uint64_t, std::uint64_t> EventsHdf5Reader::Impl::index_hint(std::int64_t stored) const {
   const std::int64_t units_per_ms = kNsPerMs / ns_per_unit;
@@ -96,9 +110,8 @@ std::pair<std::uint64_t, std::uint64_t> EventsHdf5Reader::Impl::index_hint(std::
 
 std::uint64_t EventsHdf5Reader::Impl::first_at_or_after(TimeNs time) const {
   // In the file's unit since t_offset: stored times were rounded down, and stand for the start of their unit.
-  std::int64_t offset_ns = 0, since_ns = 0;
-  if (__builtin_mul_overflow(t_offset, ns_per_unit, &offset_ns)) file.fail("t_offset is too large");
-  if (__builtin_sub_overflow(time, offset_ns, &since_ns)) return time < 0 ? 0 : size;
+  std::int64_t since_ns = 0;
+  if (__builtin_sub_overflow(time, t_offset * ns_per_unit, &since_ns)) return time < 0 ? 0 : size;
   if (since_ns <= 0) return 0;
   const std::int64_t stored = (since_ns - 1) / ns_per_unit + 1;
 
@@ -140,6 +153,13 @@ std::optional<bool> EventsHdf5Reader::complete() const { return impl_->complete;
 std::optional<TimeSpan> EventsHdf5Reader::time_span() const {
   if (impl_->size == 0) return std::nullopt;
   return TimeSpan{impl_->to_ns(impl_->stored_time(0)), impl_->to_ns(impl_->stored_time(impl_->size - 1))};
+}
+
+TimeNs EventsHdf5Reader::end() const {
+  const Impl& impl = *impl_;
+  std::int64_t stored = impl.index_end();
+  if (impl.size > 0) stored = std::max(stored, impl.stored_time(impl.size - 1));
+  return impl.to_ns(stored);
 }
 
 std::vector<Event> EventsHdf5Reader::read(std::uint64_t first, std::uint64_t count) const {
@@ -211,7 +231,8 @@ class WholeFile final : public EventBlocksReader {
   explicit WholeFile(const std::filesystem::path& path) : reader_(path) {}
 
   SensorSize sensor() const override { return {reader_.width().value_or(0), reader_.height().value_or(0)}; }
-  std::optional<TimeSpan> time_span() const override { return reader_.time_span(); }
+  std::optional<TimeNs> start() const override { return reader_.t_offset(); }
+  std::optional<TimeNs> end() const override { return reader_.end(); }
 
  private:
   std::uint64_t event_count() const override { return reader_.size(); }

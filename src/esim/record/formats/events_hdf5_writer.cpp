@@ -4,17 +4,23 @@
 #include "esim/core/error.h"
 #include "esim/record/formats/events_hdf5.h"
 #include "esim/record/formats/hdf5_detail.h"
+#include "esim/record/formats/millisecond_index.h"
 
 namespace esim {
 namespace {
 
 constexpr std::size_t kChunkEvents = 1 << 16;
 constexpr std::size_t kChunkMs = 1 << 10;
-constexpr std::size_t kMsBuffer = 1 << 16;
 
 std::int64_t floor_divide(std::int64_t value, std::int64_t divisor) {
   const std::int64_t quotient = value / divisor;
   return quotient - (value % divisor < 0 ? 1 : 0);
+}
+
+// In units. Of a recording whose start is not known, times stay as they are up to whole seconds.
+std::int64_t offset_of(const RecordingInfo& info, std::int64_t ns_per_unit) {
+  if (info.start_known) return floor_divide(info.start, ns_per_unit);
+  return floor_divide(info.start, kNsPerSecond) * (kNsPerSecond / ns_per_unit);
 }
 
 }  // namespace
@@ -32,8 +38,6 @@ struct EventsHdf5Writer::Impl {
   void append(EventSpan events);
   void store(const Event& event);
   void write_chunk();
-  void write_ms_buffer();
-  void index_milliseconds_until(std::uint64_t since_origin);
   void close_series();
 
   std::filesystem::path path;
@@ -48,21 +52,18 @@ struct EventsHdf5Writer::Impl {
   bool narrow_t = false;  // uint32
   TimeNs last_t = std::numeric_limits<TimeNs>::min();
 
-  std::uint64_t events_seen = 0;
-  std::uint64_t next_ms_ns = 0;  // first millisecond without an entry in ms_to_idx, ns since origin
-
-  // Filled up to `fill` events; ms_to_idx as far as it is known and not written.
+  // Filled up to `fill` events.
   std::size_t fill = 0;
   std::vector<std::uint32_t> t32;
   std::vector<std::uint64_t> t64;
   std::vector<std::uint16_t> x, y;
   std::vector<std::uint8_t> p;
-  std::vector<std::uint64_t> ms;
 
   // The series close before the file.
   std::optional<hdf5::Output> file;
   hdf5::Handle esim_complete;
-  hdf5::Series t_series, x_series, y_series, p_series, ms_series;
+  hdf5::Series t_series, x_series, y_series, p_series;
+  hdf5::MillisecondIndex milliseconds;
 };
 
 void EventsHdf5Writer::Impl::create(const RecordingInfo& info) {
@@ -71,7 +72,7 @@ void EventsHdf5Writer::Impl::create(const RecordingInfo& info) {
   width = model.model.width;
   height = model.model.height;
   ns_per_unit = options.unit == TimeUnit::us ? kNsPerUs : 1;
-  const std::int64_t t_offset = floor_divide(info.start, ns_per_unit);
+  const std::int64_t t_offset = offset_of(info, ns_per_unit);
   origin = t_offset * ns_per_unit;
   planned_end = info.end;
   last_seen = info.start;
@@ -93,7 +94,7 @@ void EventsHdf5Writer::Impl::create(const RecordingInfo& info) {
   x_series = series("events/x", H5T_STD_U16LE);
   y_series = series("events/y", H5T_STD_U16LE);
   p_series = series("events/p", H5T_STD_U8LE);
-  ms_series = hdf5::Series(*file, "ms_to_idx", {H5T_STD_U64LE, {}, kChunkMs, Compression::none});
+  milliseconds.open(hdf5::Series(*file, "ms_to_idx", {H5T_STD_U64LE, {}, kChunkMs, Compression::none}));
   file->create_scalar("t_offset", t_offset);
   file->create_text_attribute(file->id(), "unit", options.unit == TimeUnit::us ? "us" : "ns");
   if (width > 0) file->create_attribute(file->id(), "width", static_cast<std::uint32_t>(width));
@@ -119,7 +120,7 @@ void EventsHdf5Writer::Impl::append(EventSpan events) {
 
 void EventsHdf5Writer::Impl::store(const Event& event) {
   const auto since_origin = static_cast<std::uint64_t>(event.t - origin);
-  index_milliseconds_until(since_origin);
+  milliseconds.add(since_origin);
   if (narrow_t) {
     const std::uint64_t t_us = since_origin / kNsPerUs;
     if (t_us > std::numeric_limits<std::uint32_t>::max()) {
@@ -133,7 +134,6 @@ void EventsHdf5Writer::Impl::store(const Event& event) {
   y[fill] = event.y;
   p[fill] = event.polarity > 0 ? 1 : 0;
   ++fill;
-  ++events_seen;
 }
 
 void EventsHdf5Writer::Impl::write_chunk() {
@@ -147,28 +147,14 @@ void EventsHdf5Writer::Impl::write_chunk() {
   y_series.append(std::span<const std::uint16_t>(y).first(fill));
   p_series.append(std::span<const std::uint8_t>(p).first(fill));
   fill = 0;
-  write_ms_buffer();
+  milliseconds.write();
   file->flush();
-}
-
-void EventsHdf5Writer::Impl::write_ms_buffer() {
-  const hdf5::Quiet quiet;
-  ms_series.append(std::span<const std::uint64_t>(ms));
-  ms.clear();
-}
-
-// Milliseconds at or before this time start at the next event.
-void EventsHdf5Writer::Impl::index_milliseconds_until(std::uint64_t since_origin) {
-  while (since_origin >= next_ms_ns) {
-    ms.push_back(events_seen);
-    next_ms_ns += kNsPerMs;
-    if (ms.size() == kMsBuffer) write_ms_buffer();
-  }
 }
 
 void EventsHdf5Writer::Impl::close_series() {
   esim_complete.reset();
-  for (hdf5::Series* series : {&t_series, &x_series, &y_series, &p_series, &ms_series}) *series = hdf5::Series();
+  for (hdf5::Series* series : {&t_series, &x_series, &y_series, &p_series}) *series = hdf5::Series();
+  milliseconds.close();
 }
 
 EventsHdf5Writer::EventsHdf5Writer(std::filesystem::path path, int camera, EventsHdf5Options options)
@@ -196,8 +182,9 @@ void EventsHdf5Writer::end(bool complete) {
   Impl& impl = *impl_;
   if (!impl.file) return;
   const hdf5::Quiet quiet;
-  const TimeNs end = complete ? impl.planned_end : impl.last_seen;
-  impl.index_milliseconds_until(static_cast<std::uint64_t>(std::max<TimeNs>(end - impl.origin, 0)));
+  const TimeNs end = complete ? std::max(impl.planned_end, impl.last_seen) : impl.last_seen;
+  const TimeNs duration = std::max<TimeNs>(end - impl.origin, 0);
+  impl.milliseconds.finish(static_cast<std::uint64_t>(duration / impl.ns_per_unit * impl.ns_per_unit));
   impl.write_chunk();
   if (complete) {
     constexpr std::uint8_t kOne = 1;

@@ -20,6 +20,7 @@
 #include "esim/record/formats/rosbag/rosbag_format.h"
 #include "esim/record/formats/v2e.h"
 #include "esim/record/input_file.h"
+#include "esim/record/number_text.h"
 #include "esim/record/recording_directory.h"
 
 namespace esim {
@@ -90,6 +91,16 @@ const Format& format_of(const fs::path& path) {
   for (const Format& format : formats()) {
     if (format.folder == folder && format.recognises(path, head)) return format;
   }
+  if (head.starts_with("SQLite format 3")) {
+    throw UserError(
+        fmt::format("cannot read {}: SQLite, as ROS 2 bags may use it, is not read; make an MCAP file of it "
+                    "with `ros2 bag convert`",
+                    path.string()));
+  }
+  if (folder && fs::is_regular_file(path / "metadata.yaml", error)) {
+    throw UserError(fmt::format("cannot read {}: it looks like the folder of a ROS 2 bag; name the .mcap file in it",
+                                path.string()));
+  }
   throw UserError(fmt::format("cannot read {}: it is of none of the formats {}", path.string(), names()));
 }
 
@@ -110,6 +121,13 @@ const Format& format_for(const fs::path& path) {
 std::unique_ptr<Source> open_source(const fs::path& path, const ReadOptions& options) {
   const Format& format = format_of(path);
   return std::make_unique<CheckedSource>(format.open(path, options), path, options);
+}
+
+void require_camera(const Source& source, const fs::path& path) {
+  if (!source.info().cameras.empty()) return;
+  const std::vector<std::string> others = source.not_read();
+  throw UserError(fmt::format("{} has no camera, and so no events{}", path.string(),
+                              others.empty() ? "" : "; not read: " + list_of_some(others)));
 }
 
 Content content_of(const Record& record) {
@@ -141,7 +159,7 @@ std::string_view describe(Content content) {
     case Content::poses:
       return "poses";
     case Content::truth:
-      return "depth and motion field";
+      return "frames of ground truth";
     case Content::displacement:
       return "displacement";
     case Content::event_points:

@@ -37,13 +37,19 @@ class ColumnsReader final : public EventBlocksReader {
       file_.fail(std::string(names.t) + " and the other datasets of the events differ in length");
     }
     if (names.resolution != nullptr && file_.has(names.resolution)) read_resolution(names.resolution);
+    if (names.ms_index != nullptr && file_.has(names.ms_index))
+      milliseconds_ = static_cast<std::int64_t>(file_.open_column(names.ms_index).size);
   }
 
   SensorSize sensor() const override { return sensor_; }
 
-  std::optional<TimeSpan> time_span() const override {
-    if (t_.size == 0) return std::nullopt;
-    return TimeSpan{times(0, 1).front(), times(t_.size - 1, 1).front()};
+  std::optional<TimeNs> start() const override { return milliseconds_ > 0 ? std::optional<TimeNs>(0) : std::nullopt; }
+  std::optional<TimeNs> end() const override {
+    constexpr std::int64_t kLatestMs = kLatestUs / 1000;
+    const TimeNs index_end = std::clamp<std::int64_t>(milliseconds_ - 1, 0, kLatestMs) * kNsPerMs;
+    if (t_.size == 0) return start() ? std::optional(index_end) : std::nullopt;
+    const TimeNs last = times(t_.size - 1, 1).front();
+    return start() ? std::max(last, index_end) : last;
   }
 
  private:
@@ -105,6 +111,7 @@ class ColumnsReader final : public EventBlocksReader {
   hdf5::Column t_, x_, y_, p_;
   bool in_seconds_;
   SensorSize sensor_;
+  std::int64_t milliseconds_ = 0;  // entries of the index; 0: there is none
   std::vector<std::int64_t> x_numbers_, y_numbers_, p_numbers_;
 };
 

@@ -13,6 +13,7 @@ namespace esim {
 struct EventColumns {
   const char *t, *x, *y, *p;
   const char* resolution = nullptr;  ///< width and height, px
+  const char* ms_index = nullptr;    ///< one entry for each ms since the start of the recording, at 0
 };
 
 /// Is it an HDF5 file with all four of them?

@@ -1,11 +1,13 @@
 #include "esim/record/formats/hdf5_input.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 
 #include "esim/core/error.h"
+#include "esim/record/number_text.h"
 #include "esim/record/output_file.h"
 
 namespace esim::hdf5 {
@@ -41,6 +43,20 @@ bool Input::has(const char* name) const {
     if (H5Lexists(file_, full.substr(0, slash).c_str(), H5P_DEFAULT) <= 0) return false;
   }
   return H5Lexists(file_, name, H5P_DEFAULT) > 0;
+}
+
+std::string Input::contents() const {
+  constexpr hsize_t kMost = 100;
+  const Quiet quiet;
+  H5G_info_t group{};
+  if (H5Gget_info(file_, &group) < 0) return "nothing that can be listed";
+  std::vector<std::string> names;
+  for (hsize_t i = 0; i < std::min(group.nlinks, kMost); ++i) {
+    std::array<char, 64> name{};
+    if (H5Lget_name_by_idx(file_, ".", H5_INDEX_NAME, H5_ITER_INC, i, name.data(), name.size(), H5P_DEFAULT) >= 0)
+      names.emplace_back(name.data());
+  }
+  return names.empty() ? "nothing" : list_of_some(names);
 }
 
 Column Input::open(const char* name, std::size_t item_rank, bool integers) const {

@@ -38,6 +38,9 @@ class Input {
 
   bool has(const char* name) const;
 
+  /// What is at the top, datasets and groups, for people: the first few of them.
+  std::string contents() const;
+
   /// Checks rank and type, and that the file is large enough for what the dataset claims: damaged files ask for no
   /// memory and no loops beyond their own size.
   Column open_column(const char* name) const { return open(name, 0, true); }

@@ -67,15 +67,16 @@ Image<float> decode_srgb(const Image<std::uint16_t>& encoded, int bits) {
 void ImagesPngWriter::begin(const RecordingInfo&) { files_.emplace(folder_, ".png"); }
 
 void ImagesPngWriter::write(const Record& record) {
-  if (const auto* image = std::get_if<ImageRecord>(&record); image != nullptr && image->camera == camera_) {
-    from_images_ = true;
-    write(image->t, image->irradiance);
+  if (const auto* image = std::get_if<ImageRecord>(&record)) {
+    if (image->camera == camera_) write(image->t, image->irradiance);
+  } else if (const auto* truth = std::get_if<TruthRecord>(&record)) {
+    if (truth->camera == camera_) write(truth->t, truth->irradiance);
   }
-  const auto* truth = std::get_if<TruthRecord>(&record);
-  if (truth != nullptr && truth->camera == camera_ && !from_images_) write(truth->t, truth->irradiance);
 }
 
 void ImagesPngWriter::write(TimeNs t, const Image<float>& irradiance) {
+  if (irradiance.empty() || last_ == t) return;
+  last_ = t;
   write_png(files_->next_path(), encode_srgb(irradiance));
   files_->add(t);
 }

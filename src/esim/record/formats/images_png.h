@@ -11,8 +11,8 @@
 
 namespace esim {
 
-/// Irradiance of one camera, of its images, or where there are none of its ground truth, as 8-bit grey PNG,
-/// sRGB-encoded: 000000.png and so on in a folder, beside timestamps.txt with lines `index t_s file`.
+/// Irradiance of one camera, of its images and its ground truth, as 8-bit grey PNG, sRGB-encoded: 000000.png and so on
+/// in a folder, beside timestamps.txt with lines `index t_s file`. Of two at the same time, the first is written.
 class ImagesPngWriter final : public Sink {
  public:
   ImagesPngWriter(std::filesystem::path folder, int camera) : folder_(std::move(folder)), camera_(camera) {}
@@ -26,7 +26,7 @@ class ImagesPngWriter final : public Sink {
 
   std::filesystem::path folder_;
   int camera_;
-  bool from_images_ = false;
+  std::optional<TimeNs> last_;  // time of the last image
   std::optional<TimedFilesWriter> files_;
 };
 

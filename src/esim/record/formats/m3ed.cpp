@@ -8,12 +8,17 @@
 #include "esim/core/remedy.h"
 #include "esim/record/formats/hdf5_columns.h"
 #include "esim/record/formats/hdf5_detail.h"
+#include "esim/record/formats/millisecond_index.h"
 
 namespace esim {
 namespace {
 
-constexpr EventColumns kColumns = {"prophesee/left/t", "prophesee/left/x", "prophesee/left/y", "prophesee/left/p",
-                                   "prophesee/left/calib/resolution"};
+constexpr EventColumns kColumns = {"prophesee/left/t",
+                                   "prophesee/left/x",
+                                   "prophesee/left/y",
+                                   "prophesee/left/p",
+                                   "prophesee/left/calib/resolution",
+                                   "prophesee/left/ms_map_idx"};
 constexpr std::size_t kChunk = 1 << 16;                 // events, and milliseconds
 constexpr TimeNs kLatest = 30 * 86'400 * kNsPerSecond;  // an index of its milliseconds fits anywhere
 
@@ -49,29 +54,27 @@ class M3edWriter final : public Sink {
 
  private:
   void write_calibration(const Camera& camera);
-  void index_milliseconds_until(std::int64_t us);
   void write_chunk();
-  void write_milliseconds();
   void close_series();
 
   std::filesystem::path path_;
   Compression compression_;
-  std::uint64_t events_seen_ = 0;
+  TimeNs end_ = 0;
 
   // What has not been written yet.
   std::vector<std::int64_t> t_;
   std::vector<std::uint16_t> x_, y_;
   std::vector<std::int8_t> p_;
-  std::vector<std::uint64_t> milliseconds_;
-  std::int64_t next_millisecond_ = 0;
 
   // The series close before the file.
   std::optional<hdf5::Output> file_;
-  hdf5::Series t_series_, x_series_, y_series_, p_series_, ms_series_;
+  hdf5::Series t_series_, x_series_, y_series_, p_series_;
+  hdf5::MillisecondIndex milliseconds_;
 };
 
 void M3edWriter::begin(const RecordingInfo& info) {
   const hdf5::Quiet quiet;
+  end_ = std::clamp<TimeNs>(info.end, 0, kLatest);
   file_.emplace(path_);
   for (const char* group : {"prophesee", "prophesee/left", "prophesee/left/calib"}) file_->create_group(group);
   const auto series = [&](const char* name, hid_t type) {
@@ -81,7 +84,7 @@ void M3edWriter::begin(const RecordingInfo& info) {
   x_series_ = series(kColumns.x, H5T_STD_U16LE);
   y_series_ = series(kColumns.y, H5T_STD_U16LE);
   p_series_ = series(kColumns.p, H5T_STD_I8LE);
-  ms_series_ = series("prophesee/left/ms_map_idx", H5T_STD_U64LE);
+  milliseconds_.open(series(kColumns.ms_index, H5T_STD_U64LE));
   if (!info.cameras.empty()) write_calibration(info.cameras.front().model);
   file_->flush();
 }
@@ -115,27 +118,12 @@ void M3edWriter::write(const Record& record) {
                             Remedy::times_from_zero);
     }
     const std::int64_t us = event.t / kNsPerUs;
-    index_milliseconds_until(us);
+    milliseconds_.add(static_cast<std::uint64_t>(event.t));
     t_.push_back(us);
     x_.push_back(event.x), y_.push_back(event.y);
     p_.push_back(event.polarity > 0 ? 1 : 0);
-    ++events_seen_;
     if (t_.size() == kChunk) write_chunk();
   }
-}
-
-/// Milliseconds at or before this time start at the next event.
-void M3edWriter::index_milliseconds_until(std::int64_t us) {
-  for (; next_millisecond_ * 1000 <= us; ++next_millisecond_) {
-    milliseconds_.push_back(events_seen_);
-    if (milliseconds_.size() == kChunk) write_milliseconds();
-  }
-}
-
-void M3edWriter::write_milliseconds() {
-  const hdf5::Quiet quiet;
-  ms_series_.append(std::span<const std::uint64_t>(milliseconds_));
-  milliseconds_.clear();
 }
 
 void M3edWriter::write_chunk() {
@@ -148,18 +136,20 @@ void M3edWriter::write_chunk() {
   file_->flush();
 }
 
-void M3edWriter::end(bool) {
+void M3edWriter::end(bool complete) {
   if (!file_) return;
   const hdf5::Quiet quiet;
   write_chunk();
-  write_milliseconds();
+  milliseconds_.finish(complete ? static_cast<std::uint64_t>(end_) : 0);
+  milliseconds_.write();
   close_series();
   file_->close();
   file_.reset();
 }
 
 void M3edWriter::close_series() {
-  for (hdf5::Series* series : {&t_series_, &x_series_, &y_series_, &p_series_, &ms_series_}) *series = hdf5::Series();
+  for (hdf5::Series* series : {&t_series_, &x_series_, &y_series_, &p_series_}) *series = hdf5::Series();
+  milliseconds_.close();
 }
 
 }  // namespace

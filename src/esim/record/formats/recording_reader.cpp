@@ -57,8 +57,9 @@ std::vector<CameraInfo> cameras_in_folders(const fs::path& root) {
 }
 
 bool is_recording(const fs::path& path) {
-  return is_file(path / "report.json") || is_file(path / "calibration" / "rig.yaml") || is_camera_folder(path) ||
-         !cameras_in_folders(path).empty();
+  const bool has_parts = is_file(path / "calibration" / "rig.yaml") || is_file(path / "states.csv") ||
+                         is_file(path / "imu.csv") || is_camera_folder(path) || !cameras_in_folders(path).empty();
+  return has_parts || (is_file(path / "report.json") && !has_conversion_report(path));
 }
 
 /// Frames per second: the shortest number that gives just these times, where there is one. 0: unknown.
@@ -112,6 +113,8 @@ class Folder {
     std::vector<std::unique_ptr<RecordStream>> streams;
     for (auto* group : {&body_, &events_, &frames_, &truth_})
       std::move(group->begin(), group->end(), std::back_inserter(streams));
+    if (!start_) start_ = events_start_;
+    info_.start_known = start_.has_value();
     return merge_streams(std::move(info_), std::move(streams), options_, start_);
   }
 
@@ -257,14 +260,17 @@ class Folder {
     const Camera& found = events->info().cameras.front().model;
     learn_size(i, {found.width, found.height});
     info_.end = std::max(info_.end, events->info().end);
+    if (const RecordingInfo& own = events->info(); own.start_known)
+      events_start_ = std::min(events_start_.value_or(own.start), own.start);
     events_.push_back(events_stream(std::move(events), static_cast<int>(i)));
   }
 
   void open_truth(std::size_t i) {
     const int camera = static_cast<int>(i);
-    if (is_there(folders_[i] / "frames.csv"))
+    info_.cameras[i].has_frames = is_there(folders_[i] / "frames.csv");
+    if (info_.cameras[i].has_frames)
       attempt([&] { frames_.push_back(frames_stream(folders_[i], camera, unfinished_)); });
-    const ImagesStream* images = nullptr;
+    ImagesStream* images = nullptr;
     if (is_there(folders_[i] / "images" / kTimedFilesList)) {
       attempt([&] {
         auto stream = std::make_unique<ImagesStream>(folders_[i] / "images", camera, unfinished_);
@@ -302,7 +308,8 @@ class Folder {
   bool alone_ = false;             // one camera's, without what is the rig's
   bool unfinished_ = false;        // by its report: killed, interrupted, or being written
   RecordingInfo info_;
-  std::optional<TimeNs> start_;
+  std::optional<TimeNs> start_;         // as the report has it
+  std::optional<TimeNs> events_start_;  // as the files of events have it
   std::vector<std::unique_ptr<RecordStream>> body_, events_, frames_, truth_;
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <utility>
 
 #include "esim/core/error.h"
@@ -160,8 +161,10 @@ class FramesStream final : public RecordStream {
 /// A displacement follows the frame that it leads to.
 class TruthStream final : public RecordStream {
  public:
-  TruthStream(std::shared_ptr<const TruthHdf5Reader> truth, int camera, const ImagesStream* images)
-      : truth_(std::move(truth)), camera_(camera), images_(images) {}
+  TruthStream(std::shared_ptr<const TruthHdf5Reader> truth, int camera, ImagesStream* images)
+      : truth_(std::move(truth)), camera_(camera), images_(images) {
+    if (images_ != nullptr) images_->leave_to_truth([this](TimeNs t) { return shows(t); });
+  }
 
   std::optional<TimeNs> due() override {
     if (displacement_due_) return truth_->t(frame_ - 1);
@@ -175,21 +178,34 @@ class TruthStream final : public RecordStream {
       return &record_.emplace(DisplacementRecord{camera_, truth_->t(frame_ - 2), truth_->t(frame_ - 1), displacement_.x,
                                                  displacement_.y, displacement_.visible});
     }
+    if (damage_) std::rethrow_exception(damage_);
     const TimeNs t = truth_->t(frame_);
-    truth_->read(frame_++, images_of_frame_);
+    const Image<float>& irradiance = images_ != nullptr ? images_->at(t) : kNoImage;
+    try {
+      truth_->read(frame_, images_of_frame_);
+    } catch (const UserError&) {
+      damage_ = std::current_exception();
+      if (irradiance.empty()) throw;
+      return &record_.emplace(ImageRecord{camera_, t, irradiance});
+    }
+    ++frame_;
     displacement_due_ = frame_ >= 2 && frame_ - 2 < truth_->displacements();
     const auto& [T_world_camera, depth, flow_x, flow_y, object, T_world_objects] = images_of_frame_;
-    return &record_.emplace(TruthRecord{camera_, t, T_world_camera, images_ != nullptr ? images_->at(t) : kNoImage,
-                                        depth, flow_x, flow_y, object.empty() ? nullptr : &object, T_world_objects});
+    return &record_.emplace(TruthRecord{camera_, t, T_world_camera, irradiance, depth, flow_x, flow_y,
+                                        object.empty() ? nullptr : &object, T_world_objects});
   }
 
  private:
+  /// Whether the next frame is of this time, and not known to be damaged.
+  bool shows(TimeNs t) const { return !damage_ && frame_ < truth_->size() && truth_->t(frame_) == t; }
+
   static inline const Image<float> kNoImage;
 
   std::shared_ptr<const TruthHdf5Reader> truth_;
   int camera_;
-  const ImagesStream* images_;
+  ImagesStream* images_;
   std::uint64_t frame_ = 0;        // that is read next
+  std::exception_ptr damage_;      // of that frame, whose image is still handed out
   bool displacement_due_ = false;  // to the frame before it
   TruthHdf5Reader::Frame images_of_frame_;
   TruthHdf5Reader::Displacement displacement_;
@@ -201,6 +217,7 @@ class TruthStream final : public RecordStream {
 struct ImagesStream::Impl {
   TimedFilesReader files;
   int camera;
+  std::function<bool(TimeNs)> truth_shows{};
   Image<float> image{}, none{};
   std::optional<TimeNs> t{};  // of the image
   std::optional<Record> record{};
@@ -222,10 +239,13 @@ const Record* ImagesStream::next(TimeNs) {
     throw UserError(fmt::format("cannot read {}: it is in colour, not grey", impl_->files.file().string()));
   impl_->image = decode_srgb(png.channels.front(), png.bits);
   impl_->t = impl_->files.span().start;
+  if (impl_->truth_shows && impl_->truth_shows(*impl_->t)) return nullptr;
   return &impl_->record.emplace(ImageRecord{impl_->camera, *impl_->t, impl_->image});
 }
 
 const Image<float>& ImagesStream::at(TimeNs t) const { return impl_->t == t ? impl_->image : impl_->none; }
+
+void ImagesStream::leave_to_truth(std::function<bool(TimeNs)> shows) { impl_->truth_shows = std::move(shows); }
 
 std::unique_ptr<RecordStream> poses_stream(const fs::path& states, const std::vector<fs::path>& objects,
                                            bool unfinished) {
@@ -245,7 +265,7 @@ std::unique_ptr<RecordStream> frames_stream(const fs::path& folder, int camera, 
 }
 
 std::unique_ptr<RecordStream> truth_stream(std::shared_ptr<const TruthHdf5Reader> truth, int camera,
-                                           const ImagesStream* images) {
+                                           ImagesStream* images) {
   return std::make_unique<TruthStream>(std::move(truth), camera, images);
 }
 

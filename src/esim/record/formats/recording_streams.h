@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -27,7 +28,8 @@ std::unique_ptr<RecordStream> events_stream(std::unique_ptr<Source> events, int 
 /// frames.csv and the images beside it. Demosaicked colour becomes the mosaic again that it was made of.
 std::unique_ptr<RecordStream> frames_stream(const std::filesystem::path& folder, int camera, bool unfinished = false);
 
-/// images/ with its list.
+/// images/ with its list. An image of the same time as a frame of ground truth is that frame's irradiance, and no
+/// record of its own.
 class ImagesStream final : public RecordStream {
  public:
   ImagesStream(const std::filesystem::path& folder, int camera, bool unfinished = false);
@@ -36,16 +38,19 @@ class ImagesStream final : public RecordStream {
   std::optional<TimeNs> due() override;
   const Record* next(TimeNs until) override;
 
-  /// The image that has been handed out last, if it is of this time; an empty one otherwise.
+  /// The image that was read last, if it is of this time; an empty one otherwise.
   const Image<float>& at(TimeNs t) const;
+
+  /// `shows` says whether the frame of ground truth that comes next is of this time.
+  void leave_to_truth(std::function<bool(TimeNs)> shows);
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
-/// truth.h5, with the irradiance of the images of the same times, which the stream before it hands out; null: none.
+/// truth.h5, with the irradiance of the images of the same times, which the stream before it reads; null: none.
 std::unique_ptr<RecordStream> truth_stream(std::shared_ptr<const TruthHdf5Reader> truth, int camera,
-                                           const ImagesStream* images);
+                                           ImagesStream* images);
 
 }  // namespace esim

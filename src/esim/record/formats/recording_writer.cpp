@@ -138,12 +138,12 @@ void RecordingWriter::end(bool complete) {
   nlohmann::ordered_json cameras = nlohmann::ordered_json::array();
   for (const CameraInfo& camera : info_.cameras)
     cameras.push_back({{"name", camera.name}, {"width", camera.model.width}, {"height", camera.model.height}});
-  const nlohmann::ordered_json report = {
-      {"status", complete ? "complete" : "interrupted"},
-      {"start_s", to_seconds(info_.start)},
-      {"simulated_s", to_seconds(std::max(end_, info_.start) - info_.start)},
-      {"cameras", cameras},
-  };
+  nlohmann::ordered_json report = {{"status", complete ? "complete" : "interrupted"}};
+  if (info_.start_known) {
+    report["start_s"] = to_seconds(info_.start);
+    report["simulated_s"] = to_seconds(std::max(end_, info_.start) - info_.start);
+  }
+  report["cameras"] = cameras;
   write_file_atomically(folder_ / "report.json", report.dump(2) + "\n");
 }
 

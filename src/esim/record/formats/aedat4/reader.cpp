@@ -11,6 +11,7 @@
 #include "esim/core/error.h"
 #include "esim/record/formats/aedat4/buffers.h"
 #include "esim/record/formats/aedat4/packets.h"
+#include "esim/record/number_text.h"
 
 namespace esim::aedat4 {
 namespace {
@@ -53,6 +54,7 @@ class Reader final : public Source {
   Reader(const std::filesystem::path& path, const ReadOptions& options);
 
   const RecordingInfo& info() const override { return info_; }
+  std::vector<std::string> not_read() const override;
   double progress() const override { return packets_.progress(); }
   const Record* next() override;
 
@@ -91,6 +93,12 @@ class Reader final : public Source {
 
 Reader::Reader(const std::filesystem::path& path, const ReadOptions& options) : packets_(path) {
   find_cameras(options.sensor);
+  if (wanted_.empty()) {
+    const std::vector<std::string> others = not_read();
+    throw UserError(fmt::format(
+        "cannot read {}: {}; types of streams that are read: EVTS, FRME, IMUS", path.string(),
+        others.empty() ? "it has no streams" : "none of its streams is one of a recording: " + list_of_some(others)));
+  }
   name_cameras();
   // The start is known with the first record.
   try {
@@ -98,6 +106,7 @@ Reader::Reader(const std::filesystem::path& path, const ReadOptions& options) : 
   } catch (const UserError&) {
     damage_ = std::current_exception();
   }
+  info_.start_known = false;
   if (!waiting_) return;
   const auto time_of = [](const auto& record) {
     if constexpr (std::is_same_v<std::decay_t<decltype(record)>, EventsRecord>) return record.events.front().t;
@@ -110,6 +119,15 @@ Reader::Reader(const std::filesystem::path& path, const ReadOptions& options) : 
     info_.start = std::min(info_.start, times->start_us * kNsPerUs);
     info_.end = std::max(info_.end, times->end_us * kNsPerUs);
   }
+}
+
+std::vector<std::string> Reader::not_read() const {
+  std::vector<std::string> others;
+  for (const Stream& stream : packets_.streams()) {
+    const bool known = stream.type == "EVTS" || stream.type == "FRME" || stream.type == "IMUS" || stream.type == "TRIG";
+    if (!known) others.push_back(fmt::format("{} of {}", stream.type, stream.source));
+  }
+  return others;
 }
 
 /// A camera is a source that has events or frames, once each: a second stream of a kind is another camera's.
@@ -132,7 +150,9 @@ void Reader::find_cameras(const std::optional<SensorSize>& sensor) {
     }
     (*camera).*member = stream.id;
     wanted_.push_back(stream.id);
-    Camera& model = info_.cameras[static_cast<std::size_t>(camera - cameras_.begin())].model;
+    CameraInfo& info = info_.cameras[static_cast<std::size_t>(camera - cameras_.begin())];
+    info.has_frames |= frames;
+    Camera& model = info.model;
     const SensorSize size = sensor.value_or(SensorSize{stream.width, stream.height});
     // Frames may be of another size than the events of the same camera.
     if (events || model.width == 0) model.width = size.width, model.height = size.height;

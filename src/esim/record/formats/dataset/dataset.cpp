@@ -4,6 +4,7 @@
 #include "esim/record/formats/dataset/dataset_files.h"
 #include "esim/record/formats/dataset/dataset_reader.h"
 #include "esim/record/formats/dataset/dataset_writer.h"
+#include "esim/record/recording_directory.h"
 
 namespace esim {
 namespace {
@@ -13,12 +14,10 @@ namespace fs = std::filesystem;
 const std::vector<Content> kContents = {Content::events, Content::frames, Content::imu, Content::poses};
 
 /// One with an events.txt that is not a recording's.
-bool is_dataset(const FilesInput& files) {
-  if (!files.has(kEventsTxt)) return false;
-  for (const char* name : {"report.json", "events.h5", "truth.h5"}) {
-    if (files.has(name)) return false;
-  }
-  return true;
+bool is_dataset(const fs::path& folder) {
+  const auto files = open_folder_input(folder);
+  if (!files->has(kEventsTxt) || files->has("events.h5") || files->has("truth.h5")) return false;
+  return !files->has("report.json") || has_conversion_report(folder);
 }
 
 /// A zip with an events.txt. One that is cut off is recognised by its beginning, so that its damage can be told.
@@ -55,7 +54,7 @@ Format dataset_folder_format() {
       .description = "a folder in the layout of the Event Camera Dataset",
       .holds = kContents,
       .folder = true,
-      .recognises = [](const fs::path& path, std::string_view) { return is_dataset(*open_folder_input(path)); },
+      .recognises = [](const fs::path& path, std::string_view) { return is_dataset(path); },
       .open = [](const fs::path& path,
                  const ReadOptions& options) { return open_dataset(open_folder_input(path), options); },
       .create = [](const fs::path& path,

@@ -250,6 +250,7 @@ Dataset::Dataset(std::unique_ptr<FilesInput> files, const ReadOptions& options) 
     throw UserError("cannot read " + files_->path_of(kEventsTxt).string() + ": it is missing");
   CameraInfo& camera = info_.cameras.emplace_back();
   camera.name = "cam0";
+  camera.has_frames = files_->has(kImagesTxt);
   if (files_->has(kCalibTxt)) read_calibration(*files_, camera.model);
   auto events = std::make_unique<EventsPart>(*files_);
   events_ = events.get();
@@ -269,6 +270,7 @@ Dataset::Dataset(std::unique_ptr<FilesInput> files, const ReadOptions& options) 
     }
   }
   info_.start = info_.end = start.value_or(0);
+  info_.start_known = false;
 }
 
 /// It tells the sensor's size.

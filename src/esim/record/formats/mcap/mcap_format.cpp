@@ -17,7 +17,8 @@ Format mcap_format() {
       .recognises = [](const auto&, std::string_view head) { return head.starts_with(mcap::kMagic); },
       .open =
           [](const auto& path, const ReadOptions& options) {
-            return ros::make_source([path] { return std::make_unique<mcap::McapInput>(path); }, options);
+            return ros::make_source(
+                path, [path] { return std::make_unique<mcap::McapInput>(path); }, options);
           },
       .create =
           [](const auto& path, const WriteOptions& options) {

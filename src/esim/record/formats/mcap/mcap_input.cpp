@@ -114,7 +114,12 @@ void McapInput::add_channel(ros::Bytes content) {
   channel.topic = topic;
   channel.encoding = encoding == "ros1" ? ros::Encoding::ros1 : ros::Encoding::cdr;
   const auto name = schemas_.find(schema);
-  if (name != schemas_.end() && (encoding == "ros1" || encoding == "cdr")) channel.type = ros::type_named(name->second);
+  if (name != schemas_.end()) channel.type_name = name->second;
+  if (encoding == "ros1" || encoding == "cdr") {
+    channel.type = ros::type_named(channel.type_name);
+  } else {
+    channel.type_name += (channel.type_name.empty() ? "in " : " in ") + std::string(encoding);
+  }
 }
 
 bool McapInput::next(ros::Message& message) {

@@ -27,6 +27,7 @@ struct Channel {
   std::string topic{};
   std::optional<MessageType> type{};  ///< nothing: one that is not read
   Encoding encoding = Encoding::ros1;
+  std::string type_name{};  ///< as the file has it
 };
 
 struct Message {

@@ -134,6 +134,12 @@ std::optional<MessageType> type_named(std::string_view name) {
   return std::nullopt;
 }
 
+std::string known_names() {
+  std::string names;
+  for (const Known& entry : kKnown) names += (names.empty() ? "" : ", ") + std::string(entry.name);
+  return names;
+}
+
 std::string definition_of(MessageType type, Encoding encoding) {
   const Definition& whole = definition_named(name_of(type));
   std::string text(text_of(whole, encoding));

@@ -20,6 +20,9 @@ std::string ros2_name_of(MessageType type);
 /// The type of that name, of ROS 1 or ROS 2, or of another name for the same fields; nothing for all others.
 std::optional<MessageType> type_named(std::string_view name);
 
+/// All names that type_named() knows, as in ROS 1, for people.
+std::string known_names();
+
 /// The type's definition, followed by those of all types in it, as bags and MCAP files hold it.
 std::string definition_of(MessageType type, Encoding encoding);
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/record/formats/images_png.h"
 #include "esim/record/formats/ros/event_array.h"
 #include "esim/record/formats/ros/sensor_messages.h"
 #include "esim/record/formats/ros/topics.h"
@@ -34,6 +35,7 @@ class RosSink final : public Sink {
   void put(const FrameRecord& record);
   void put(const ImageRecord& record);
   void put(const TruthRecord& record);
+  void put_irradiance(int camera, TimeNs t, const Image<float>& irradiance);
   void put(const PoseRecord& record);
   void put(const ImuRecord& record);
   void put(const DisplacementRecord&) {}
@@ -146,22 +148,38 @@ void RosSink::put(const FrameRecord& record) {
   send(topic_of(camera, topic::kFrame), MessageType::image, record.t, message);
 }
 
-void RosSink::put(const ImageRecord& record) {
-  ImageMessage message = to_message(record.irradiance);
-  message.header = header(record.t, camera_of(record.camera).name);
-  send(topic_of(record.camera, topic::kIrradiance), MessageType::image, record.t, message);
+void RosSink::put(const ImageRecord& record) { put_irradiance(record.camera, record.t, record.irradiance); }
+
+/// With a picture of it where there are no frames, since image_raw is what programs look for. Readers of ours know it
+/// for one by the frame_info that it lacks.
+void RosSink::put_irradiance(int camera, TimeNs t, const Image<float>& irradiance) {
+  if (irradiance.empty()) return;
+  const Header of_camera = header(t, camera_of(camera).name);
+  ImageMessage message = to_message(irradiance);
+  message.header = of_camera;
+  send(topic_of(camera, topic::kIrradiance), MessageType::image, t, message);
+  if (camera_of(camera).has_frames) return;
+  const Image<std::uint8_t> levels = encode_srgb(irradiance);
+  ImageMessage picture = to_message(levels);
+  picture.header = of_camera;
+  send_camera_info(camera, t);
+  send(topic_of(camera, topic::kFrame), MessageType::image, t, picture);
 }
 
 void RosSink::put(const TruthRecord& record) {
   const int camera = record.camera;
   const Header of_camera = header(record.t, camera_of(camera).name);
-  put(ImageRecord{camera, record.t, record.irradiance});
-  ImageMessage depth = to_message(record.depth);
-  depth.header = of_camera;
-  send(topic_of(camera, topic::kDepth), MessageType::image, record.t, depth);
-  FlowMessage flow = to_message(record.flow_x, record.flow_y);
-  flow.header = of_camera;
-  send(topic_of(camera, topic::kFlow), MessageType::flow, record.t, flow);
+  put_irradiance(camera, record.t, record.irradiance);
+  if (!record.depth.empty()) {
+    ImageMessage depth = to_message(record.depth);
+    depth.header = of_camera;
+    send(topic_of(camera, topic::kDepth), MessageType::image, record.t, depth);
+  }
+  if (!record.flow_x.empty()) {
+    FlowMessage flow = to_message(record.flow_x, record.flow_y);
+    flow.header = of_camera;
+    send(topic_of(camera, topic::kFlow), MessageType::flow, record.t, flow);
+  }
   send(topic_of(camera, topic::kTruthPose), MessageType::pose, record.t,
        PoseMessage{header(record.t, frame::kWorld), record.T_world_camera});
 }

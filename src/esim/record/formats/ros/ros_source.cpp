@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <exception>
+#include <set>
+#include <string>
 #include <utility>
 
 #include "esim/core/error.h"
@@ -9,6 +11,7 @@
 #include "esim/record/formats/ros/sensor_messages.h"
 #include "esim/record/formats/ros/survey.h"
 #include "esim/record/formats/ros/truth_assembler.h"
+#include "esim/record/number_text.h"
 
 namespace esim::ros {
 namespace {
@@ -16,6 +19,10 @@ namespace {
 using Part = TruthAssembler::Part;
 
 constexpr std::size_t kPortion = 1U << 16;  // events
+
+std::string described(const Channel& channel) {
+  return channel.topic + " (" + (channel.type_name.empty() ? "of no type" : channel.type_name) + ")";
+}
 
 /// What is said of one instant before the message that it belongs to.
 template <typename T>
@@ -28,6 +35,7 @@ struct Remembered {
 
 struct CameraState {
   TruthAssembler truth{};
+  bool has_frame_info = false;  // of every frame: what has none is a picture of the irradiance
   Remembered<FrameInfoMessage> frame_info{};
   Image<std::uint16_t> frame{};
 };
@@ -38,6 +46,7 @@ class RosSource final : public Source {
 
   const RecordingInfo& info() const override { return survey_.info; }
   const Record* next() override;
+  std::vector<std::string> not_read() const override;
   double progress() const override { return input_->progress(); }
 
  private:
@@ -48,9 +57,9 @@ class RosSource final : public Source {
   const Record* last_truth();
   Result read(const Message& message);
   Result read_events(const Assignment& to, MessageReader& reader);
-  Result read_frame(const Assignment& to, MessageReader& reader);
+  Result read_frame(const Assignment& to, const Channel& channel, MessageReader& reader);
   void read_frame_info(const Assignment& to, MessageReader& reader);
-  Result read_truth(const Assignment& to, MessageReader& reader);
+  Result read_truth(const Assignment& to, const Channel& channel, MessageReader& reader);
   Result read_imu(MessageReader& reader);
   Result read_transforms(MessageReader& reader);
   CameraState& camera(const Assignment& to) { return cameras_[static_cast<std::size_t>(to.camera)]; }
@@ -66,6 +75,7 @@ class RosSource final : public Source {
   Remembered<TwistMessage> twist_, accel_;
   PoseRecord pose_;
   Result record_;
+  std::set<std::string> passed_over_;  // images that cannot be read, by topics
   bool ended_ = false;
   std::exception_ptr damage_;
 };
@@ -74,11 +84,20 @@ RosSource::RosSource(std::unique_ptr<MessageInput> input, Survey survey)
     : input_(std::move(input)), survey_(std::move(survey)), cameras_(survey_.info.cameras.size()) {
   pose_.objects.resize(survey_.info.objects.size());
   for (const Assignment& to : survey_.channels) {
+    if (to.role == Role::frame_info) camera(to).has_frame_info = true;
     if (to.role == Role::irradiance) camera(to).truth.expect(Part::irradiance);
     if (to.role == Role::depth) camera(to).truth.expect(Part::depth);
     if (to.role == Role::flow) camera(to).truth.expect(Part::flow);
     if (to.role == Role::truth_pose) camera(to).truth.expect(Part::pose);
   }
+}
+
+std::vector<std::string> RosSource::not_read() const {
+  std::vector<std::string> all(passed_over_.begin(), passed_over_.end());
+  for (const Channel& channel : input_->channels()) {
+    if (!channel.type) all.push_back(described(channel));
+  }
+  return all;
 }
 
 const Record* RosSource::next() {
@@ -121,7 +140,8 @@ RosSource::Result RosSource::read(const Message& message) {
   if (message.channel >= survey_.channels.size()) return std::nullopt;
   const Assignment& to = survey_.channels[message.channel];
   if (to.role == Role::none || to.role == Role::camera_info) return std::nullopt;
-  MessageReader reader(input_->channels()[message.channel].encoding, message.payload);
+  const Channel& channel = input_->channels()[message.channel];
+  MessageReader reader(channel.encoding, message.payload);
   const auto remember = [&]<typename T>(Remembered<T>& memory) {
     reader(memory.value.emplace());
     memory.t = memory.value->header.stamp;
@@ -131,7 +151,7 @@ RosSource::Result RosSource::read(const Message& message) {
     case Role::events:
       return read_events(to, reader);
     case Role::frame:
-      return read_frame(to, reader);
+      return read_frame(to, channel, reader);
     case Role::frame_info:
       return remember(camera(to).frame_info);
     case Role::imu:
@@ -152,7 +172,7 @@ RosSource::Result RosSource::read(const Message& message) {
       return pose_;
     }
     default:
-      return read_truth(to, reader);
+      return read_truth(to, channel, reader);
   }
 }
 
@@ -170,15 +190,19 @@ bool RosSource::fits(int camera, std::uint32_t width, std::uint32_t height) cons
   return width == static_cast<std::uint32_t>(model.width) && height == static_cast<std::uint32_t>(model.height);
 }
 
-RosSource::Result RosSource::read_frame(const Assignment& to, MessageReader& reader) {
+RosSource::Result RosSource::read_frame(const Assignment& to, const Channel& channel, MessageReader& reader) {
   ImageMessage message;
   reader(message);
   if (!fits(to.camera, message.width, message.height)) return std::nullopt;
   CameraState& state = camera(to);
-  const int bits = to_frame(message, state.frame);
-  if (bits == 0) return std::nullopt;
   const TimeNs t = message.header.stamp;
   const FrameInfoMessage* info = state.frame_info.at(t);
+  if (info == nullptr && state.has_frame_info) return std::nullopt;
+  const int bits = to_frame(message, state.frame);
+  if (bits == 0) {
+    passed_over_.insert(channel.topic + " (images encoded as " + message.encoding + ")");
+    return std::nullopt;
+  }
   if (info == nullptr) return FrameRecord{to.camera, t, t, 0, 1, state.frame, bits};
   return FrameRecord{to.camera,
                      t,
@@ -189,7 +213,7 @@ RosSource::Result RosSource::read_frame(const Assignment& to, MessageReader& rea
                      std::min<int>(std::max<int>(info->bits, 1), bits)};
 }
 
-RosSource::Result RosSource::read_truth(const Assignment& to, MessageReader& reader) {
+RosSource::Result RosSource::read_truth(const Assignment& to, const Channel& channel, MessageReader& reader) {
   TruthAssembler& truth = camera(to).truth;
   if (to.role == Role::truth_pose) {
     PoseMessage message;
@@ -208,7 +232,10 @@ RosSource::Result RosSource::read_truth(const Assignment& to, MessageReader& rea
     if (!fits(to.camera, message.width, message.height)) return std::nullopt;
     const bool is_depth = to.role == Role::depth;
     Image<float> image;
-    if (!to_floats(message, image)) return std::nullopt;
+    if (!to_floats(message, image)) {
+      passed_over_.insert(channel.topic + " (images encoded as " + message.encoding + ")");
+      return std::nullopt;
+    }
     TruthAssembler::Frame& frame = truth.begin(is_depth ? Part::depth : Part::irradiance, message.header.stamp);
     (is_depth ? frame.depth : frame.irradiance) = std::move(image);
   }
@@ -256,12 +283,26 @@ RosSource::Result RosSource::read_transforms(MessageReader& reader) {
   return pose_;
 }
 
+bool has_no_role(const Assignment& to) { return to.role == Role::none; }
+
+[[noreturn]] void fail_for_want_of_topics(const std::filesystem::path& path, const std::vector<Channel>& channels) {
+  std::vector<std::string> found;
+  for (const Channel& channel : channels) found.push_back(described(channel));
+  throw UserError(
+      "cannot read " + path.string() + ": " +
+      (found.empty() ? "it holds no topics" : "none of its topics is one of a recording: " + list_of_some(found)) +
+      "; types that are read: " + known_names());
+}
+
 }  // namespace
 
-std::unique_ptr<Source> make_source(const std::function<std::unique_ptr<MessageInput>()>& open,
+std::unique_ptr<Source> make_source(const std::filesystem::path& path,
+                                    const std::function<std::unique_ptr<MessageInput>()>& open,
                                     const ReadOptions& options) {
   const std::unique_ptr<MessageInput> surveyed = open();
   Survey survey = ros::survey(*surveyed, options);
+  if (!survey.damaged && std::all_of(survey.channels.begin(), survey.channels.end(), has_no_role))
+    fail_for_want_of_topics(path, surveyed->channels());
   return std::make_unique<RosSource>(open(), std::move(survey));
 }
 

@@ -67,6 +67,15 @@ bool is_bayer(std::string_view encoding, std::string_view bits) {
   return encoding.starts_with("bayer_") && encoding.ends_with(bits);
 }
 
+template <typename T>
+ImageMessage borrowed(const Image<T>& image, const char* encoding) {
+  return {.height = static_cast<std::uint32_t>(image.height()),
+          .width = static_cast<std::uint32_t>(image.width()),
+          .encoding = encoding,
+          .step = static_cast<std::uint32_t>(static_cast<std::size_t>(image.width()) * sizeof(T)),
+          .data = std::as_bytes(image.pixels())};
+}
+
 struct DistortionMessage {
   std::string model;
   std::vector<double> d;
@@ -132,13 +141,9 @@ ImageMessage to_message(const Image<std::uint16_t>& numbers, int bits, std::vect
           .data = std::as_bytes(std::span(buffer))};
 }
 
-ImageMessage to_message(const Image<float>& image) {
-  return {.height = static_cast<std::uint32_t>(image.height()),
-          .width = static_cast<std::uint32_t>(image.width()),
-          .encoding = "32FC1",
-          .step = static_cast<std::uint32_t>(static_cast<std::size_t>(image.width()) * sizeof(float)),
-          .data = std::as_bytes(image.pixels())};
-}
+ImageMessage to_message(const Image<std::uint8_t>& image) { return borrowed(image, "mono8"); }
+
+ImageMessage to_message(const Image<float>& image) { return borrowed(image, "32FC1"); }
 
 FlowMessage to_message(const Image<float>& flow_x, const Image<float>& flow_y) {
   return {.height = static_cast<std::uint32_t>(flow_x.height()),

@@ -17,6 +17,9 @@ Camera to_camera(const CameraInfoMessage& message);
 /// Digital numbers as mono8, or mono16 where they have more than 8 bits; the bytes go to `buffer`.
 ImageMessage to_message(const Image<std::uint16_t>& numbers, int bits, std::vector<std::uint8_t>& buffer);
 
+/// mono8; borrows the image.
+ImageMessage to_message(const Image<std::uint8_t>& image);
+
 /// 32FC1; borrows the image.
 ImageMessage to_message(const Image<float>& image);
 

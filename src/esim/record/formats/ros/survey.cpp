@@ -139,15 +139,19 @@ Survey Surveyor::conclude(const MessageInput& input, const ReadOptions& options)
   for (const std::string& name : roles.cameras) {
     info.cameras.push_back(camera(name, static_cast<int>(info.cameras.size()), result.channels, options));
   }
-  std::optional<TimeNs> start;
+  std::optional<TimeNs> start, events_start;
   for (const auto& [channel, facts] : facts_) {
-    const bool is_used = result.channels[channel].role != Role::none;
-    if (is_used && facts.start) start = std::min(start.value_or(*facts.start), *facts.start);
+    const Role role = result.channels[channel].role;
+    if (role == Role::none || !facts.start) continue;
+    start = std::min(start.value_or(*facts.start), *facts.start);
+    if (role == Role::events) events_start = std::min(events_start.value_or(*facts.start), *facts.start);
   }
   for (const Assignment& channel : result.channels) {
+    if (channel.role == Role::frame) info.cameras[static_cast<std::size_t>(channel.camera)].has_frames = true;
     if (channel.role == Role::imu) info.imu.emplace().T_body_imu = pose_in_body(std::string(frame::kImu));
   }
   info.start = start.value_or(0);
+  info.start_known = start && start != events_start;  // by something that comes before the first event
   const TimeSpan written = input.times().value_or(TimeSpan{});
   info.end = info.start;
   if (written.start >= 0 && written.end >= written.start)
@@ -163,14 +167,19 @@ Survey Surveyor::conclude(const MessageInput& input, const ReadOptions& options)
 
 Survey survey(MessageInput& input, const ReadOptions& options) {
   Surveyor surveyor;
+  bool damaged = false;
   try {
     for (Message message; input.next(message);) {
       if (!surveyor.look(input, message)) break;
     }
   } catch (const UserError&) {
+    damaged = true;
   } catch (const Malformed&) {
+    damaged = true;
   }
-  return surveyor.conclude(input, options);
+  Survey result = surveyor.conclude(input, options);
+  result.damaged = damaged;
+  return result;
 }
 
 }  // namespace esim::ros

@@ -12,10 +12,11 @@ namespace esim::ros {
 struct Survey {
   RecordingInfo info{};
   std::vector<Assignment> channels{};
+  bool damaged = false;  ///< it ended early, where the file is damaged
 };
 
 /// Looks at messages until each channel has had one, or at some ten megabytes of them; at all where the file has no
-/// index. Stops at damage without a word.
+/// index. Stops at damage, which is left for the reader to tell.
 Survey survey(MessageInput& input, const ReadOptions& options);
 
 }  // namespace esim::ros

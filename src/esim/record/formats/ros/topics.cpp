@@ -43,6 +43,7 @@ class Assigner {
   template <typename Rank>
   void assign_best(Role role, int camera, const Rank& rank);
   int camera_of(const Path& path) const;
+  bool has(Role role, int camera) const;
 
   const std::vector<Channel>& channels_;
   std::vector<Path> paths_;
@@ -79,6 +80,12 @@ int Assigner::camera_of(const Path& path) const {
   return best;
 }
 
+bool Assigner::has(Role role, int camera) const {
+  return std::any_of(assignments_.begin(), assignments_.end(), [&](const Assignment& assignment) {
+    return assignment.role == role && assignment.camera == camera;
+  });
+}
+
 /// Gives the role to the channel of least rank, the first of these; below 0: not to this one.
 template <typename Rank>
 void Assigner::assign_best(Role role, int camera, const Rank& rank) {
@@ -108,12 +115,14 @@ void Assigner::assign_to_cameras() {
            [&](const Path& path) { return path.parent == cameras_[static_cast<std::size_t>(camera)] ? 0 : -1; });
     assign(Role::irradiance, MessageType::image, named(topic::kIrradiance));
     assign(Role::depth, MessageType::image, [&](const Path& path) { return is_depth(path) ? 0 : -1; });
+    assign(Role::frame_info, MessageType::frame_info, first);
+    const bool has_pictures = has(Role::irradiance, camera) && !has(Role::frame_info, camera);
     assign(Role::frame, MessageType::image, [&](const Path& path) {
       if (path.leaf == topic::kIrradiance || is_depth(path)) return -1;
+      if (has_pictures && path.leaf == topic::kFrame) return -1;
       if (path.leaf == "image_corrupted") return 0;
       return path.leaf == topic::kFrame ? 1 : 2;
     });
-    assign(Role::frame_info, MessageType::frame_info, first);
     assign(Role::flow, MessageType::flow, first);
     assign(Role::truth_pose, MessageType::pose, named(topic::kTruthPose));
   }

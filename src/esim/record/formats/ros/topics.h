@@ -73,9 +73,9 @@ struct Assignments {
 
 /// A camera is each path with a topic of events, and each path with images that is not below such a one: of
 /// /dvs/events and /dvs/left/image_raw the camera is dvs. Of several topics that could be the frames of a camera
-/// "image_corrupted" is taken, as the original ESIM has it, then "image_raw", then the first; of several IMUs /imu,
-/// then the first. Poses of the body are those of the transforms where these have a body, otherwise of "pose", then the
-/// first.
+/// "image_corrupted" is taken, as the original ESIM has it, then "image_raw", then the first; but image_raw beside
+/// irradiance, without frame_info, is a picture of that. Of several IMUs /imu is taken, then the first. Poses of the
+/// body are those of the transforms where these have a body, otherwise of "pose", then the first.
 Assignments assign_roles(const std::vector<Channel>& channels, bool transforms_have_body);
 
 }  // namespace esim::ros

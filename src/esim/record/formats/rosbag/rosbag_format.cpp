@@ -17,7 +17,8 @@ Format rosbag_format() {
       .recognises = [](const auto&, std::string_view head) { return head.starts_with("#ROSBAG V"); },
       .open =
           [](const auto& path, const ReadOptions& options) {
-            return ros::make_source([path] { return std::make_unique<rosbag::RosbagInput>(path); }, options);
+            return ros::make_source(
+                path, [path] { return std::make_unique<rosbag::RosbagInput>(path); }, options);
           },
       .create =
           [](const auto& path, const WriteOptions& options) {

@@ -96,8 +96,9 @@ void RosbagInput::open_chunk(const Record& record) {
 void RosbagInput::add_connection(const Record& record) {
   const auto id = field<std::uint32_t>(record.header, "conn");
   if (channel_of_connection_.contains(id)) return;
-  channels_.push_back({std::string(text_field(record.header, "topic")),
-                       ros::type_named(text_field(record.data, "type")), ros::Encoding::ros1});
+  const std::string_view type = text_field(record.data, "type");
+  channels_.push_back(
+      {std::string(text_field(record.header, "topic")), ros::type_named(type), ros::Encoding::ros1, std::string(type)});
   channel_of_connection_[id] = channels_.size() - 1;
 }
 

@@ -66,7 +66,7 @@ def frame_table(times):
              "|---|---|---|---|---|---|---|"]
     for (scene, size), ms in times.items():
         width, height = map(int, size.split("x"))
-        cells = [f"{1e3 / ms[engine]:.0f} | {1e6 * ms[engine] / (width * height):.2f}" for engine in ENGINES]
+        cells = [f"{1e3 / ms[engine]:.1f} | {1e6 * ms[engine] / (width * height):.2f}" for engine in ENGINES]
         lines.append(f"| {scene} | {width} x {height} | {cells[0]} | {cells[1]} | {ms['raycast'] / ms['gl']:.2f} |")
     return "\n".join(lines)
 
@@ -122,9 +122,9 @@ def main():
                  "give --software to measure that")
     print(f"OpenGL: {card or f'{device}, in software: not a graphics card'}")
     print(f"Ray caster: {os.cpu_count()} threads, {processor()}\n")
-    print(f"One frame with irradiance, depth and motion field, 16 samples per pixel; median of {options.runs} runs:\n")
+    print(f"One frame with irradiance, depth and motion field, 16 samples per pixel; medians, runs: {options.runs}\n")
     print(frame_table(frame_times(frames, options.seconds, options.runs)), flush=True)
-    print(f"\n`esim simulate` with all outputs, {options.duration_s:g} s of the scenario; median of {options.runs} runs in turns:\n")
+    print(f"\n`esim simulate` with all outputs, {options.duration_s:g} s of the scenario; engines in turns; medians, runs: {options.runs}\n")
     print(simulation_table(esim, options.duration_s, options.runs))
 
 

@@ -124,7 +124,8 @@ def main():
     print(f"Ray caster: {os.cpu_count()} threads, {processor()}\n")
     print(f"One frame with irradiance, depth and motion field, 16 samples per pixel; medians, runs: {options.runs}\n")
     print(frame_table(frame_times(frames, options.seconds, options.runs)), flush=True)
-    print(f"\n`esim simulate` with all outputs, {options.duration_s:g} s of the scenario; engines in turns; medians, runs: {options.runs}\n")
+    print(f"\n`esim simulate` with all outputs, {options.duration_s:g} s of the scenario; engines in turns; medians, "
+          f"runs: {options.runs}\n")
     print(simulation_table(esim, options.duration_s, options.runs))
 
 

@@ -7,48 +7,21 @@
 
 #include "generated_room.h"
 #include "render/scenes.h"
+#include "render_frames.h"
 
 namespace esim {
 namespace {
 
 const Camera kCamera = Camera::from_fov(346, 260, 75.0 * std::numbers::pi / 180.0);
 
-/// The whole image for n = 1; every n-th of its tiles of 32 x 20 pixels otherwise.
-std::vector<Tile> every_nth_tile(int n) {
-  if (n == 1) return {{0, 0, kCamera.width, kCamera.height}};
-  std::vector<Tile> tiles;
-  int i = 0;
-  for (int y = 0; y < kCamera.height; y += 20) {
-    for (int x = 0; x < kCamera.width; x += 32) {
-      if (i++ % n == n / 2) tiles.push_back({x, y, std::min(32, kCamera.width - x), std::min(20, kCamera.height - y)});
-    }
-  }
-  return tiles;
-}
-
-void render_frames(benchmark::State& state, Renderer& renderer, const Kinematics& start,
-                   const std::vector<Tile>& tiles = every_nth_tile(1), const std::vector<Kinematics>& objects = {}) {
-  Kinematics camera = start;
-  Sample sample;
-  for (auto _ : state) {
-    camera.T_world_body.translation.y() += 1e-4;
-    renderer.render({0, camera, tiles, objects}, sample);
-    benchmark::DoNotOptimize(sample.irradiance.data());
-  }
-  double pixels = 0;
-  for (const Tile& tile : tiles) pixels += static_cast<double>(tile.area() * state.iterations());
-  state.counters["ns/px"] =
-      benchmark::Counter(pixels * 1e-9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
-}
-
 void panorama(benchmark::State& state) {
   const Workers workers(static_cast<int>(state.range(0)));
-  render_frames(state, *test::make_renderer("panorama", kCamera, workers), test::moving_camera());
+  bench::render_frames(state, *test::make_renderer("panorama", kCamera, workers), kCamera, test::moving_camera());
 }
 
 void plane(benchmark::State& state) {
   const Workers workers(static_cast<int>(state.range(0)));
-  render_frames(state, *test::make_renderer("plane", kCamera, workers), test::moving_camera());
+  bench::render_frames(state, *test::make_renderer("plane", kCamera, workers), kCamera, test::moving_camera());
 }
 
 /// The layers of the tests, and ten translucent ones of 100 x 50 pixels in front of them.
@@ -62,7 +35,7 @@ void sprites(benchmark::State& state) {
                                                  LayerMotion({key}, KeyframeInterpolation::linear)});
   }
   const Workers workers(static_cast<int>(state.range(0)));
-  render_frames(state, *make_sprites_renderer(scene, kCamera, workers), test::moving_camera());
+  bench::render_frames(state, *make_sprites_renderer(scene, kCamera, workers), kCamera, test::moving_camera());
 }
 
 void mesh_file(benchmark::State& state, const std::filesystem::path& file, const Eigen::Vector3d& position) {
@@ -71,7 +44,7 @@ void mesh_file(benchmark::State& state, const std::filesystem::path& file, const
   const auto scene = build_raycast_scene(still_scene(load_mesh(file, [](const std::string&) {})));
   Kinematics camera = test::moving_camera();
   camera.T_world_body.translation = position;
-  render_frames(state, *make_raycast_renderer(scene, {}, kCamera, workers), camera);
+  bench::render_frames(state, *make_raycast_renderer(scene, {}, kCamera, workers), kCamera, camera);
 }
 
 void room(benchmark::State& state) {
@@ -94,7 +67,7 @@ void moving_objects(benchmark::State& state) {
   for (std::size_t i = 2; i < objects.size(); ++i)
     objects[i].T_world_body.translation.z() += 0.1 * static_cast<double>(i);
   const auto renderer = make_raycast_renderer(build_raycast_scene(scene), {}, kCamera, workers);
-  render_frames(state, *renderer, test::moving_camera(), every_nth_tile(1), objects);
+  bench::render_frames(state, *renderer, kCamera, test::moving_camera(), 1, objects);
 }
 
 /// Arguments: threads, triangles in thousands, tiles (every how manieth of 32 x 20 pixels).
@@ -105,7 +78,7 @@ void generated_room(benchmark::State& state) {
   if (scene == nullptr)
     scene = build_raycast_scene(still_scene(bench::generated_room(static_cast<int>(1000 * state.range(1)))));
   const auto renderer = make_raycast_renderer(scene, {}, kCamera, workers);
-  render_frames(state, *renderer, test::moving_camera(), every_nth_tile(static_cast<int>(state.range(2))));
+  bench::render_frames(state, *renderer, kCamera, test::moving_camera(), static_cast<int>(state.range(2)));
 }
 
 /// The same with OpenGL, whatever device there is. Arguments: triangles in thousands, tiles.
@@ -114,7 +87,7 @@ void generated_room_gl(benchmark::State& state) {
   const Scene scene = still_scene(bench::generated_room(static_cast<int>(1000 * state.range(0))));
   const auto renderer = make_gl_renderer(scene, {}, kCamera);
   state.SetLabel(renderer->traits().device);
-  render_frames(state, *renderer, test::moving_camera(), every_nth_tile(static_cast<int>(state.range(1))));
+  bench::render_frames(state, *renderer, kCamera, test::moving_camera(), static_cast<int>(state.range(1)));
 }
 
 /// With light and shadows; argument: what casts them, 0 nothing, 1 a sun, 2 a lamp, 3 a sun on things that move.
@@ -131,7 +104,7 @@ void shadows_gl(benchmark::State& state) {
   }
   const auto renderer = make_gl_renderer(scene, {}, kCamera);
   const auto objects = moves ? test::moving_objects(0) : std::vector<Kinematics>();
-  render_frames(state, *renderer, test::moving_camera(), every_nth_tile(1), objects);
+  bench::render_frames(state, *renderer, kCamera, test::moving_camera(), 1, objects);
 }
 
 BENCHMARK(panorama)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);

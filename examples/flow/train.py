@@ -64,20 +64,25 @@ class Training:
                                             **{"seed": settings["seed"], **settings["simulation"], **options})
 
     def loader(self, dataset, **options):
-        """Simulated samples come in batches that the data set makes; others in those of a batch_sampler."""
-        return DataLoader(dataset, num_workers=self.settings["workers"], pin_memory=self.device != "cpu",
-                          **(options or {"batch_size": self.settings["batch"]}))
+        return DataLoader(dataset, num_workers=self.settings["workers"], **options)
+
+    def simulated(self, **options):
+        """Batches of simulated samples, to be kept: copies, because each tensor that comes from a worker holds a file of
+        shared memory open."""
+        loader = self.loader(self.dataset(**options), batch_size=self.settings["batch"])
+        return ([part.clone() for part in batch] for batch in loader)
 
     def batches(self):
         """Batches of training samples, from the current iteration on: the same after a resumption."""
         first, size, count = self.iteration * self.settings["batch"], self.settings["batch"], self.settings["sequences"]
+        pinned = self.device != "cpu"
         if self.settings["dataset"] is not None:
             stored = esim.torch.EventTensorDataset(self.settings["dataset"])
         elif count:
-            stored = [sample for batch in self.loader(self.dataset(count=count)) for sample in zip(*batch)]
+            stored = [sample for batch in self.simulated(count=count) for sample in zip(*batch)]
         else:
-            return self.loader(self.dataset(first=first))
-        return self.loader(stored, batch_sampler=Passes(len(stored), first, size))
+            return self.loader(self.dataset(first=first), batch_size=size, pin_memory=pinned)
+        return self.loader(stored, batch_sampler=Passes(len(stored), first, size), pin_memory=pinned)
 
     def rate(self):
         """Learning rate of the current iteration."""
@@ -110,7 +115,7 @@ class Training:
         """End-point errors on pixels with events, px, of the network and of predicting no motion."""
         if self.validation_batches is None:
             seed = self.settings["seed"] + VALIDATION_SEED
-            self.validation_batches = list(self.loader(self.dataset(seed=seed, count=self.settings["validation"])))
+            self.validation_batches = list(self.simulated(seed=seed, count=self.settings["validation"]))
         self.network.eval()
         errors, zeros, pixels = 0.0, 0.0, 0.0
         with torch.no_grad():

@@ -12,6 +12,7 @@ import json
 import os
 import pathlib
 import re
+import resource
 import subprocess
 import sys
 import tarfile
@@ -385,6 +386,24 @@ class Learning(Temporary):
                 self.assertTrue(torch.equal(a, b), name)
             with open(folder / "parts/log.csv", newline="") as file:
                 self.assertEqual([row["iteration"] for row in csv.DictReader(file)], ["0", "2", "4"])
+
+    def test_kept_samples_hold_no_open_files(self):
+        """However many sequences a training keeps: processes hand over each tensor in a file of shared memory."""
+        training = Training(self.settings("simulation={width: 32, height: 24}", "workers=1", "batch=1", "sequences=60",
+                                          "validation=20"))
+        open_files = pathlib.Path("/proc/self/fd")
+        before = len(list(open_files.iterdir()))
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
+        resource.setrlimit(resource.RLIMIT_NOFILE, (before + 100, hard))
+        loader = training.batches()
+        self.assertEqual(len(loader.dataset), 60)
+        training.validate()
+        self.assertLess(len(list(open_files.iterdir())), before + 20)
+        expected = list(training.dataset(count=3))
+        for kept, sample in zip(loader.dataset, expected):
+            for a, b in zip(kept, sample):
+                self.assertTrue(torch.equal(a, b))
 
     def test_passes_go_through_all_samples(self):
         batches = list(itertools.islice(Passes(10, 0, 4), 10))

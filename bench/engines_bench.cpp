@@ -1,0 +1,107 @@
+// The ray caster on all processors, and OpenGL, on the same scenes from the same places: one full frame (E, Z and V),
+// 16 samples per pixel as in the shipped scenarios. Names: SCENE/WIDTHxHEIGHT/ENGINE. The label of gl is its device.
+// compare_engines.py makes tables of it.
+#include <benchmark/benchmark.h>
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "generated_room.h"
+#include "render/scenes.h"
+#include "render_frames.h"
+
+namespace esim {
+namespace {
+
+constexpr int kSamplesPerPixel = 16;
+
+struct View {
+  std::string name;
+  std::function<Mesh()> load;
+  SE3 T_world_camera;
+};
+
+SE3 pose(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation) {
+  SE3 pose;
+  pose.translation = position;
+  pose.rotation = rotation.normalized();
+  return pose;
+}
+
+Mesh shipped(const std::string& file) {
+  return load_mesh(std::filesystem::path(ESIM_SCENES) / file, [](const std::string&) {});
+}
+
+/// The shipped rooms from where their scenarios start, and generated ones of many triangles.
+std::vector<View> views() {
+  const SE3 middle = test::moving_camera().T_world_body;
+  return {
+      {"room", [] { return shipped("room/room.obj"); },
+       pose({2.016, -1.649, 1.511}, {0.61495, -0.68379, -0.28614, 0.26905})},
+      {"studio_room", [] { return shipped("studio_room/baked.glb"); },
+       pose({1.557, -1.991, 1.509}, {-0.63155, 0.73724, 0.17634, -0.16289})},
+      {"generated_127k", [] { return bench::generated_room(127000); }, middle},
+      {"generated_1000k", [] { return bench::generated_room(1000000); }, middle},
+  };
+}
+
+Kinematics motion_from(const SE3& T_world_camera) {
+  Kinematics camera = test::moving_camera();
+  camera.T_world_body = T_world_camera;
+  return camera;
+}
+
+/// The scene of the last benchmark, since Google Benchmark calls each of them several times; one of them, since some
+/// are large. No renderer: a driver may be gone already where static variables end.
+struct Prepared {
+  std::string name;
+  Scene scene;
+  std::shared_ptr<const RaycastScene> raycast;  // null until the ray caster asks for it
+};
+
+Prepared& prepared(const View& view) {
+  static Prepared last;
+  if (last.name != view.name) {
+    last = {};  // frees its memory first
+    last = {view.name, still_scene(view.load()), nullptr};
+  }
+  return last;
+}
+
+void raycast(benchmark::State& state, const View& view, const Camera& camera) {
+  const Workers workers(static_cast<int>(std::thread::hardware_concurrency()));
+  Prepared& room = prepared(view);
+  if (room.raycast == nullptr) room.raycast = build_raycast_scene(room.scene);
+  const auto renderer = make_raycast_renderer(room.raycast, {.samples_per_pixel = kSamplesPerPixel}, camera, workers);
+  bench::render_frames(state, *renderer, camera, motion_from(view.T_world_camera));
+}
+
+void gl(benchmark::State& state, const View& view, const Camera& camera) {
+  if (!test::has_gl()) return state.SkipWithError("there is no OpenGL");
+  const auto renderer = make_gl_renderer(prepared(view).scene, {.samples_per_pixel = kSamplesPerPixel}, camera);
+  state.SetLabel(renderer->traits().device);
+  bench::render_frames(state, *renderer, camera, motion_from(view.T_world_camera));
+}
+
+const bool kRegistered = [] {
+  constexpr double kFieldOfView = 75.0 * std::numbers::pi / 180.0;
+  for (const View& view : views()) {
+    for (const auto& [width, height] : {std::pair{346, 260}, std::pair{1280, 720}}) {
+      const Camera camera = Camera::from_fov(width, height, kFieldOfView);
+      for (const auto& [engine, function] : {std::pair{"raycast", &raycast}, std::pair{"gl", &gl}}) {
+        const std::string name = view.name + "/" + std::to_string(width) + "x" + std::to_string(height) + "/" + engine;
+        benchmark::RegisterBenchmark(name.c_str(),
+                                     [=, run = function](benchmark::State& state) { run(state, view, camera); })
+            ->UseRealTime()
+            ->Unit(benchmark::kMillisecond);
+      }
+    }
+  }
+  return true;
+}();
+
+}  // namespace
+}  // namespace esim

@@ -224,7 +224,7 @@ TEST_P(RosTopics, UnknownTypesBesideOthersAreToldOf) {
   const CopySummary summary = convert_recording(path(), bag, base_.path() / "out.bag", {}, [](double) { return true; });
   EXPECT_EQ(summary.copied.at(Content::imu), 1U);
   ASSERT_EQ(losses(summary, bag).size(), 1U);
-  EXPECT_TRUE(test::contains(losses(summary, bag)[0], "not read: /event_camera/events (vendors__msgs/"));
+  EXPECT_TRUE(test::contains(losses(summary, bag)[0].what, "not read: /event_camera/events (vendors__msgs/"));
   const std::string message = test::message_of<UserError>([&] { EventsFile{path()}; });
   EXPECT_TRUE(
       test::contains(message, "has no camera, and so no events; not read: /event_camera/events (vendors__msgs/"))

@@ -53,7 +53,7 @@ TEST(BetweenFrames, EvenOnesAndThoseThatBunch) {
       const auto frames = frames_every(intervals, 60, start);
       const PhaseTest even = test_of(frames, 0), bunched = test_of(frames, 0.2);
       EXPECT_EQ(even.banding, Banding::none) << start;
-      EXPECT_NEAR(even.events, 60'000, 1);
+      EXPECT_NEAR(static_cast<double>(even.events), 60'000, 1);
       EXPECT_EQ(bunched.banding, Banding::strong);
       // A fraction a in w = 2 % of the interval beside an even rest: the rms is a sqrt(1 / w - 1).
       EXPECT_NEAR(bunched.modulation, 0.2 * std::sqrt(1 / 0.02 - 1), 0.25);

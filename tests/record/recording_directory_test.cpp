@@ -218,7 +218,7 @@ TEST_F(RecordingDirectoryTest, WhatIsToBeKeptStaysAndSaysWhy) {
 TEST_F(RecordingDirectoryTest, WhatAKilledRunLeftAtOnceIsReplaced) {
   fs::create_directory(incomplete_);
   base_.write("out.incomplete/report.json.tmp", "{\"st");
-  EXPECT_TRUE(contains(refusal(out_, false), "--force"));
+  EXPECT_TRUE(contains(refusal(out_, false), "is left from a run that was killed"));
   { RecordingDirectory(out_, true).finish("{}"); }
   EXPECT_FALSE(fs::exists(incomplete_));
 }

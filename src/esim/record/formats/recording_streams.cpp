@@ -180,6 +180,11 @@ class TruthStream final : public RecordStream {
     }
     if (damage_) std::rethrow_exception(damage_);
     const TimeNs t = truth_->t(frame_);
+    if (frame_ > 0 && t <= truth_->t(frame_ - 1)) {
+      throw UserError(
+          fmt::format("ground truth of camera {}: the time of frame {}, {} ns, does not come after the one before",
+                      camera_, frame_, t));
+    }
     const Image<float>& irradiance = images_ != nullptr ? images_->at(t) : kNoImage;
     try {
       truth_->read(frame_, images_of_frame_);

@@ -17,7 +17,7 @@ import tempfile
 import time
 import unittest
 
-from program import ProgramTest, run
+from program import ESIM, ProgramTest, run
 from studio_server import Server
 
 SCENES = pathlib.Path(sys.argv[2]).absolute()

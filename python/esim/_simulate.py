@@ -250,7 +250,8 @@ def simulate(
     seed : int, optional
         Of all random numbers, in place of the scenario's.
     out : path, optional
-        Folder to write a recording to, as `esim simulate` does.
+        Folder to write a recording to, as `esim simulate` does. After an error on the way, what was recorded before it
+        stays in the folder `out`.incomplete.
     force : bool
         Replace an earlier recording there.
     packet_s : int or float, optional
@@ -271,7 +272,7 @@ def simulate(
     esim.Error
         Naming what is wrong in the scenario and what would be right.
     esim.OutputError
-        Where the recording cannot be written.
+        If the recording cannot be written; the message says where what was recorded before is kept.
     """
     if renderer is not None and not isinstance(renderer, Renderer):
         renderer = Renderer(renderer)

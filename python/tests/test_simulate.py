@@ -1,6 +1,8 @@
 import filecmp
 import gc
+import json
 import os
+import resource
 import signal
 import subprocess
 import time
@@ -97,21 +99,45 @@ def test_closing_early_finishes_an_interrupted_recording(poster, tmp_path):
     assert len(remaining) <= 1
 
 
-def test_a_failed_recording_leaves_nothing(poster, tmp_path):
+@pytest.mark.parametrize("fails_at_ns", [-1, 50_000_000])
+def test_a_failed_recording_keeps_what_it_has(poster, tmp_path, fails_at_ns):
     def render(t, T, objects):
-        if t > 50_000_000:
+        if t > fails_at_ns:
             raise KeyError("on the way")
         return {"irradiance": np.full((30, 40), 0.5), "depth": np.ones((30, 40))}
 
-    simulation = esim.simulate(poster, out=tmp_path / "out", renderer=render, overrides={"duration_s": 0.1})
+    simulation = None
     with pytest.raises(KeyError, match="on the way"):
+        simulation = esim.simulate(poster, out=tmp_path / "out", renderer=render, overrides={"duration_s": 0.1})
         simulation.run()
-    with pytest.raises(StopIteration):
-        while True:
-            next(simulation)
+    if simulation is not None:
+        with pytest.raises(StopIteration):
+            while True:
+                next(simulation)
     del simulation
     gc.collect()
-    assert list(tmp_path.iterdir()) == []
+    if fails_at_ns < 0:
+        assert list(tmp_path.iterdir()) == [], "there was nothing yet"
+        return
+    assert [path.name for path in tmp_path.iterdir()] == ["out.incomplete"]
+    assert "on the way" in json.loads((tmp_path / "out.incomplete" / "report.json").read_text())["reason"]
+    assert esim.info(tmp_path / "out.incomplete")["status"] == "interrupted"
+    assert len((tmp_path / "out.incomplete" / "states.csv").read_text().splitlines()) > 5
+
+
+def test_a_full_disk_says_what_is_kept(poster, tmp_path):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    simulation = esim.simulate(poster, out=tmp_path / "out", overrides={"duration_s": 20, "truth.rate_hz": 50})
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
+        with pytest.raises(esim.OutputError, match="kept: .*out.incomplete"):
+            simulation.run()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    del simulation
+    gc.collect()
+    assert [path.name for path in tmp_path.iterdir()] == ["out.incomplete"]
+    assert esim.info(tmp_path / "out.incomplete")["status"] in ("interrupted", "killed")
 
 
 def test_rigs_have_packets_by_name(poster):

@@ -151,14 +151,22 @@ int run(Arguments arguments) {
   ProgressBar bar(!arguments.quiet);
   const auto begun = std::chrono::steady_clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(); };
-  const Production production = produce(folder, *maker, share, workers, [&](const ProductionProgress& p) {
+  const auto show = [&](const ProductionProgress& p) {
     const std::uint32_t wanted = p.all - (p.done - p.made);
     bar.show(wanted > 0 ? static_cast<double>(p.made) / wanted : 1.0, [&] {
       return fmt::format("{}/{} sequences  {:.1f}/s  {} events", p.done, p.all, p.made / std::max(seconds(), 1e-9),
                          grouped(p.events));
     });
     return !interrupted();
-  });
+  };
+  const Production production = [&] {
+    try {
+      return produce(folder, *maker, share, workers, show);
+    } catch (const OutputError& error) {
+      throw OutputError(fmt::format("{}; the files that are whole stay in {}, and the same command goes on with them",
+                                    error.what(), arguments.out));
+    }
+  }();
   bar.clear();
   if (!arguments.quiet) {
     tell(stderr, "{}: made {} sequences in {:.1f} s, {:.1f} per second\n", arguments.out, production.progress.made,

@@ -104,6 +104,7 @@ class Dataset(ProgramTest):
             result = self.make(self.folder / name, "--format", name, preexec_fn=little_room)
             self.assertEqual(result.returncode, 2, result.stderr)
             self.assertIn("cannot write", result.stderr)
+            self.assertIn(f"stay in {self.folder / name}", result.stderr)
             self.assertEqual(self.make(self.folder / name, "--format", name).returncode, 0)
             self.assertEqual(run("dataset", "--check", self.folder / name).returncode, 0)
 

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <memory>
 
 namespace esim {
@@ -26,10 +28,15 @@ void sort(const std::vector<Dot>& dots, std::vector<Dot>& in_order) {
   for (const Dot& dot : dots) in_order[next[depth_of(dot)]++] = dot;
 }
 
-/// How much of the pixels around it a dot covers.
+constexpr int kTogether = 4;  // pixels that are blended at a time, of four bytes each
+using Bytes = std::uint8_t __attribute__((vector_size(4 * kTogether)));
+using Lanes = std::uint16_t __attribute__((vector_size(8 * kTogether)));
+
+/// How much of the pixels around it a dot covers, 0 to 255: rows of groups of pixels.
 struct Stamp {
-  Tile area{};                           ///< of the pixels, relative to the one that the dot is in
-  std::vector<std::uint16_t> covered{};  ///< 0 to 256, row by row
+  int left = 0, top = 0;  ///< of the first of them, relative to the pixel that the dot is in
+  int groups = 0, rows = 0;
+  std::vector<Lanes> covered{};
 };
 
 /// Of dots of one radius, for their places relative to the pixels in steps of 1/16.
@@ -51,11 +58,15 @@ class Stamps {
   static Stamp stamp(float reach, float x, float y) {
     const int left = static_cast<int>(std::ceil(x - reach)), right = static_cast<int>(std::floor(x + reach));
     const int top = static_cast<int>(std::ceil(y - reach)), bottom = static_cast<int>(std::floor(y + reach));
-    Stamp stamp{{left, top, right - left + 1, bottom - top + 1}};
+    Stamp stamp{left, top, (right - left) / kTogether + 1, bottom - top + 1};
     for (int row = top; row <= bottom; ++row) {
-      for (int column = left; column <= right; ++column) {
-        const float distance = std::hypot(static_cast<float>(column) - x, static_cast<float>(row) - y);
-        stamp.covered.push_back(static_cast<std::uint16_t>(256 * std::clamp(reach - distance, 0.0f, 1.0f) + 0.5f));
+      for (int column = left; column <= right; column += kTogether) {
+        Lanes covered{};
+        for (int i = 0; i < 4 * kTogether; ++i) {
+          const float distance = std::hypot(static_cast<float>(column + i / 4) - x, static_cast<float>(row) - y);
+          covered[i] = static_cast<std::uint16_t>(255 * std::clamp(reach - distance, 0.0f, 1.0f) + 0.5f);
+        }
+        stamp.covered.push_back(covered);
       }
     }
     return stamp;
@@ -64,67 +75,86 @@ class Stamps {
   std::vector<Stamp> all_;
 };
 
+constexpr float kMostRadius = 32;  // px
+
 /// Those of radii in steps of 1/8 px, each made when it is first asked for.
 const Stamps& stamps_of(float radius) {
   constexpr float kSteps = 8;
-  constexpr std::size_t kMost = 256;
-  thread_local std::array<std::unique_ptr<Stamps>, kMost> all;
-  const auto index = static_cast<std::size_t>(std::clamp(radius * kSteps + 0.5f, 1.0f, kMost - 1.0f));
+  thread_local std::array<std::unique_ptr<Stamps>, static_cast<std::size_t>(kSteps * kMostRadius) + 1> all;
+  const auto index = static_cast<std::size_t>(std::clamp(radius, 1 / kSteps, kMostRadius) * kSteps + 0.5f);
   if (all[index] == nullptr) all[index] = std::make_unique<Stamps>(static_cast<float>(index) / kSteps);
   return *all[index];
 }
 
-/// Pixels of four bytes, so that red and blue are blended by one multiplication.
-struct Wide {
-  static constexpr std::uint32_t kRedAndBlue = 0xff00ff, kGreen = 0xff00;
-
-  static std::uint32_t of(Rgb colour) {
-    return std::uint32_t{colour.r} | std::uint32_t{colour.g} << 8 | std::uint32_t{colour.b} << 16;
-  }
-  static Rgb narrow(std::uint32_t pixel) {
-    return {static_cast<std::uint8_t>(pixel), static_cast<std::uint8_t>(pixel >> 8),
-            static_cast<std::uint8_t>(pixel >> 16)};
-  }
-  /// `amount` of 256 parts of `to`.
-  static std::uint32_t blend(std::uint32_t from, std::uint32_t to, std::uint32_t amount) {
-    const std::uint32_t rest = 256 - amount;
-    const std::uint32_t red_and_blue = (from & kRedAndBlue) * rest + (to & kRedAndBlue) * amount + 0x800080;
-    const std::uint32_t green = (from & kGreen) * rest + (to & kGreen) * amount + 0x8000;
-    return (red_and_blue >> 8 & kRedAndBlue) | (green >> 8 & kGreen);
-  }
-};
-
-void draw_dot(const Dot& dot, Image<std::uint32_t>& picture) {
-  const int x = static_cast<int>(std::floor(dot.x * Stamps::kSteps + 0.5f));
-  const int y = static_cast<int>(std::floor(dot.y * Stamps::kSteps + 0.5f));
-  const Stamp& stamp = stamps_of(dot.radius).at(x & (Stamps::kSteps - 1), y & (Stamps::kSteps - 1));
-  const auto& [area_x, area_y, width, height] = stamp.area;
-  const int left = (x >> Stamps::kStepBits) + area_x, top = (y >> Stamps::kStepBits) + area_y;
-  const int first_column = std::max(0, -left), last_column = std::min(width, picture.width() - left);
-  const int first_row = std::max(0, -top), last_row = std::min(height, picture.height() - top);
-  const std::uint32_t colour = Wide::of(dot.colour), opacity = dot.opacity;
-  for (int row = first_row; row < last_row; ++row) {
-    std::uint32_t* const pixels = picture.row(top + row);
-    const std::uint16_t* const covered = stamp.covered.data() + row * width;
-    for (int column = first_column; column < last_column; ++column) {
-      const std::uint32_t amount = (opacity * covered[column] + 128) >> 8;
-      pixels[left + column] = Wide::blend(pixels[left + column], colour, amount);
+/// A picture of pixels of four bytes, with so much room around it that no dot reaches beyond.
+class Padded {
+ public:
+  explicit Padded(const Image<Rgb>& picture)
+      : width_(picture.width()), height_(picture.height()), pixels_(width_ + 2 * kPad, height_ + 2 * kPad) {
+    for (int y = 0; y < height_; ++y) {
+      std::uint32_t* const row = pixels_.row(y + kPad) + kPad;
+      for (int x = 0; x < width_; ++x) row[x] = wide(picture(x, y));
     }
   }
-}
+
+  void draw(const Dot& dot) {
+    const bool reaches = dot.x > -kMostReach && dot.x < static_cast<float>(width_) + kMostReach &&
+                         dot.y > -kMostReach && dot.y < static_cast<float>(height_) + kMostReach;
+    if (!reaches) return;
+    const int x = static_cast<int>(std::floor(dot.x * Stamps::kSteps + 0.5f));
+    const int y = static_cast<int>(std::floor(dot.y * Stamps::kSteps + 0.5f));
+    const Stamp& stamp = stamps_of(dot.radius).at(x & (Stamps::kSteps - 1), y & (Stamps::kSteps - 1));
+    const int left = (x >> Stamps::kStepBits) + stamp.left + kPad, top = (y >> Stamps::kStepBits) + stamp.top + kPad;
+    const std::uint32_t pixel = wide(dot.colour);
+    const Lanes colour = __builtin_convertvector(bytes_of({pixel, pixel, pixel, pixel}), Lanes);
+    const Lanes* covered = stamp.covered.data();
+    for (int row = top; row < top + stamp.rows; ++row) {
+      std::uint32_t* pixels = pixels_.row(row) + left;
+      for (int i = 0; i < stamp.groups; ++i, pixels += kTogether) blend(pixels, colour, *covered++, dot.opacity);
+    }
+  }
+
+  void take(Image<Rgb>& picture) const {
+    for (int y = 0; y < height_; ++y) {
+      const std::uint32_t* const row = pixels_.row(y + kPad) + kPad;
+      for (int x = 0; x < width_; ++x) {
+        picture(x, y) = {static_cast<std::uint8_t>(row[x]), static_cast<std::uint8_t>(row[x] >> 8),
+                         static_cast<std::uint8_t>(row[x] >> 16)};
+      }
+    }
+  }
+
+ private:
+  static constexpr float kMostReach = kMostRadius + 1;
+  static constexpr int kPad = 2 * static_cast<int>(kMostReach) + kTogether;
+
+  static std::uint32_t wide(Rgb colour) {
+    return std::uint32_t{colour.r} | std::uint32_t{colour.g} << 8 | std::uint32_t{colour.b} << 16;
+  }
+  static Bytes bytes_of(const std::array<std::uint32_t, kTogether>& pixels) { return std::bit_cast<Bytes>(pixels); }
+
+  static void blend(std::uint32_t* pixels, const Lanes& colour, const Lanes& covered, std::uint16_t opacity) {
+    Bytes bytes;
+    std::memcpy(&bytes, pixels, sizeof bytes);
+    const Lanes before = __builtin_convertvector(bytes, Lanes);
+    Lanes amount = (covered * opacity + 128) >> 8;
+    amount += amount >> 7;  // 256 is all of it
+    bytes = __builtin_convertvector((before * (256 - amount) + colour * amount + 128) >> 8, Bytes);
+    std::memcpy(pixels, &bytes, sizeof bytes);
+  }
+
+  int width_, height_;
+  Image<std::uint32_t> pixels_;
+};
 
 }  // namespace
 
 void draw_dots(const std::vector<Dot>& dots, Image<Rgb>& picture) {
   thread_local std::vector<Dot> in_order;
   sort(dots, in_order);
-  Image<std::uint32_t> wide(picture.width(), picture.height());
-  std::transform(picture.pixels().begin(), picture.pixels().end(), wide.pixels().begin(), Wide::of);
-  constexpr float kMostPlace = 1e6f;
-  for (const Dot& dot : in_order) {
-    if (std::abs(dot.x) < kMostPlace && std::abs(dot.y) < kMostPlace) draw_dot(dot, wide);
-  }
-  std::transform(wide.pixels().begin(), wide.pixels().end(), picture.pixels().begin(), Wide::narrow);
+  Padded padded(picture);
+  for (const Dot& dot : in_order) padded.draw(dot);
+  padded.take(picture);
 }
 
 }  // namespace esim

@@ -11,7 +11,7 @@ namespace esim {
 /// A round dot, smooth at its edge.
 struct Dot {
   float x = 0, y = 0;  ///< of its centre, px
-  float radius = 1;    ///< px
+  float radius = 1;    ///< px, up to 32
   float depth = 0;     ///< 0 (nearest) to 1 (farthest)
   Rgb colour{};
   std::uint16_t opacity = 0;  ///< 256: hides what is behind it

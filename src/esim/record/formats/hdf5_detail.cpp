@@ -122,7 +122,7 @@ void Output::close() {
   if (!file_.valid()) return;
   const Quiet quiet;
   state_.durable = true;
-  check(H5Fflush(file_, H5F_SCOPE_GLOBAL));
+  flush();
   file_.reset();
   check(0);
 }

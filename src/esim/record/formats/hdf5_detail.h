@@ -84,8 +84,9 @@ class Output {
     return result;
   }
 
-  /// Hands everything to the system: what is in the file now stays readable if this process is killed.
-  void flush() const { check(H5Fflush(file_, H5F_SCOPE_GLOBAL)); }
+  /// Hands everything to the system: what is in the file now stays readable if this process is killed, at any moment
+  /// from then on, or if the disk is full.
+  void flush() { check(flush_in_order(file_, state_)); }
 
   /// Waits for the disk and closes. Series of this file must be gone.
   void close();

@@ -11,12 +11,6 @@
 #include <new>
 
 namespace esim::hdf5 {
-namespace {
-
-/// What the access list carries, copied byte by byte.
-struct DriverInfo {
-  OutputState* state = nullptr;
-};
 
 struct DriverFile {
   H5FD_t base{};  // first: the library knows the file by this member
@@ -26,10 +20,45 @@ struct DriverFile {
   haddr_t end_of_file = 0;
   dev_t device = 0;
   ino_t inode = 0;
+  haddr_t flushed = 0;  // the file's end at the last flush: beyond it, nothing is referred to
 
   void note_failure() {
     if (state->error == 0) state->error = errno != 0 ? errno : EIO;
   }
+  void put(haddr_t address, const char* bytes, std::size_t size);
+  std::size_t get(haddr_t address, char* bytes, std::size_t size) const;
+};
+
+/// Once a write has failed, nothing more is written.
+void DriverFile::put(haddr_t address, const char* bytes, std::size_t size) {
+  while (size > 0 && state->error == 0) {
+    const ssize_t put = ::pwrite(descriptor, bytes, size, static_cast<off_t>(address));
+    if (put < 0 && errno == EINTR) continue;
+    if (put <= 0) return note_failure();
+    bytes += put;
+    address += static_cast<haddr_t>(put);
+    size -= static_cast<std::size_t>(put);
+  }
+}
+
+/// How much is there, up to `size`; more than that on errors.
+std::size_t DriverFile::get(haddr_t address, char* bytes, std::size_t size) const {
+  std::size_t done = 0;
+  while (done < size) {
+    const ssize_t got = ::pread(descriptor, bytes + done, size - done, static_cast<off_t>(address + done));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return size + 1;
+    if (got == 0) break;
+    done += static_cast<std::size_t>(got);
+  }
+  return done;
+}
+
+namespace {
+
+/// What the access list carries, copied byte by byte.
+struct DriverInfo {
+  OutputState* state = nullptr;
 };
 
 DriverFile* as_file(H5FD_t* file) { return reinterpret_cast<DriverFile*>(file); }
@@ -57,6 +86,7 @@ H5FD_t* open_file(const char* name, unsigned flags, hid_t access_list, haddr_t) 
   }
   file->descriptor = descriptor;
   file->state = info->state;
+  file->state->file = file;
   file->end_of_file = static_cast<haddr_t>(status.st_size);
   file->device = status.st_dev;
   file->inode = status.st_ino;
@@ -67,6 +97,7 @@ herr_t close_file(H5FD_t* base) {
   DriverFile* file = as_file(base);
   if (file->state->durable && ::fsync(file->descriptor) != 0) file->note_failure();
   if (::close(file->descriptor) != 0) file->note_failure();
+  file->state->file = nullptr;
   delete file;
   return 0;
 }
@@ -81,8 +112,9 @@ int compare_files(const H5FD_t* a, const H5FD_t* b) {
 
 herr_t query(const H5FD_t*, unsigned long* features) {
   if (features != nullptr) {
-    *features = H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_ACCUMULATE_METADATA | H5FD_FEAT_DATA_SIEVE |
-                H5FD_FEAT_AGGREGATE_SMALLDATA | H5FD_FEAT_DEFAULT_VFD_COMPATIBLE;
+    // Metadata is not accumulated: each piece comes with its type, by which flush_in_order() orders them.
+    *features = H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_DATA_SIEVE | H5FD_FEAT_AGGREGATE_SMALLDATA |
+                H5FD_FEAT_DEFAULT_VFD_COMPATIBLE;
   }
   return 0;
 }
@@ -99,35 +131,57 @@ haddr_t end_of_file(const H5FD_t* file, H5FD_mem_t) { return as_file(file)->end_
 herr_t read_bytes(H5FD_t* base, H5FD_mem_t, hid_t, haddr_t address, std::size_t size, void* buffer) {
   const DriverFile* file = as_file(base);
   auto* out = static_cast<char*>(buffer);
-  while (size > 0) {
-    const ssize_t got = ::pread(file->descriptor, out, size, static_cast<off_t>(address));
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return -1;
-    if (got == 0) break;
-    out += got;
-    address += static_cast<haddr_t>(got);
-    size -= static_cast<std::size_t>(got);
+  const std::size_t there = file->get(address, out, size);
+  if (there > size) return -1;
+  std::memset(out + there, 0, size - there);  // beyond the end of the file everything is zero
+  for (const HeldWrite& held : file->state->held) {
+    const haddr_t first = std::max(address, held.address);
+    const haddr_t last = std::min(address + size, held.address + held.bytes.size());
+    if (first < last) std::memcpy(out + (first - address), held.bytes.data() + (first - held.address), last - first);
   }
-  std::memset(out, 0, size);  // beyond the end of the file everything is zero
   return 0;
 }
 
-herr_t write_bytes(H5FD_t* base, H5FD_mem_t, hid_t, haddr_t address, std::size_t size, const void* buffer) {
+herr_t write_bytes(H5FD_t* base, H5FD_mem_t type, hid_t, haddr_t address, std::size_t size, const void* buffer) {
   DriverFile* file = as_file(base);
   const auto* in = static_cast<const char*>(buffer);
-  while (size > 0 && file->state->error == 0) {
-    const ssize_t put = ::pwrite(file->descriptor, in, size, static_cast<off_t>(address));
-    if (put < 0 && errno == EINTR) continue;
-    if (put <= 0) {
-      file->note_failure();
-      break;
-    }
-    in += put;
-    address += static_cast<haddr_t>(put);
-    size -= static_cast<std::size_t>(put);
-  }
   file->end_of_file = std::max(file->end_of_file, address + size);
+  if (!file->state->holding) {
+    file->put(address, in, size);
+    return 0;
+  }
+  try {
+    file->state->held.push_back({type, address, std::vector<char>(in, in + size)});
+  } catch (const std::bad_alloc&) {
+    if (file->state->error == 0) file->state->error = ENOMEM;
+  }
   return 0;
+}
+
+/// Of two pieces that are both referred to already: the superblock, which says how long the file is, before the
+/// indices, and those before the headers, which say how long the datasets are.
+int turn_of(H5FD_mem_t type) { return type == H5FD_MEM_SUPER ? 0 : type == H5FD_MEM_OHDR ? 2 : 1; }
+
+void write_in_order(DriverFile& file, std::vector<HeldWrite>& writes) {
+  const auto old = std::stable_partition(writes.begin(), writes.end(),
+                                         [&](const HeldWrite& write) { return write.address >= file.flushed; });
+  // A new file becomes one with its superblock.
+  std::stable_sort(writes.begin(), old, [](const HeldWrite& a, const HeldWrite& b) {
+    return (a.type != H5FD_MEM_SUPER) > (b.type != H5FD_MEM_SUPER);
+  });
+  for (auto write = writes.begin(); write != old; ++write)
+    file.put(write->address, write->bytes.data(), write->bytes.size());
+  // Also what has been left out of a file needs room: as it is now, it is written again.
+  for (auto write = old; write != writes.end(); ++write) {
+    std::vector<char> now(write->bytes.size());
+    if (file.get(write->address, now.data(), now.size()) <= now.size())
+      file.put(write->address, now.data(), now.size());
+  }
+  std::stable_sort(old, writes.end(),
+                   [](const HeldWrite& a, const HeldWrite& b) { return turn_of(a.type) < turn_of(b.type); });
+  for (auto write = old; write != writes.end(); ++write)
+    file.put(write->address, write->bytes.data(), write->bytes.size());
+  file.flushed = file.end_of_file;
 }
 
 herr_t truncate_file(H5FD_t* base, hid_t, hbool_t) {
@@ -166,6 +220,15 @@ H5FD_class_t driver_class() {
 }
 
 }  // namespace
+
+herr_t flush_in_order(hid_t file, OutputState& state) {
+  state.holding = true;
+  const herr_t result = H5Fflush(file, H5F_SCOPE_GLOBAL);
+  state.holding = false;
+  if (result >= 0 && state.file != nullptr) write_in_order(*state.file, state.held);
+  state.held.clear();
+  return result;
+}
 
 herr_t set_output_driver(hid_t access_list, OutputState& state) {
   static const H5FD_class_t kClass = driver_class();

@@ -1,5 +1,7 @@
 #include "esim/record/preview/yuv.h"
 
+#include <vector>
+
 namespace esim {
 namespace {
 
@@ -7,9 +9,8 @@ namespace {
 constexpr int kBits = 16;
 constexpr int kHalf = 1 << (kBits - 1);
 
-std::uint8_t luma(const std::uint8_t* rgb) {
-  const int sum = 16829 * rgb[0] + 33039 * rgb[1] + 6416 * rgb[2];
-  return static_cast<std::uint8_t>((sum + (16 << kBits) + kHalf) >> kBits);
+std::uint8_t luma(int red, int green, int blue) {
+  return static_cast<std::uint8_t>((16829 * red + 33039 * green + 6416 * blue + (16 << kBits) + kHalf) >> kBits);
 }
 
 /// `sum`: of four pixels.
@@ -17,26 +18,53 @@ std::uint8_t chroma(int sum) {
   return static_cast<std::uint8_t>((sum + (128 << (kBits + 2)) + 4 * kHalf) >> (kBits + 2));
 }
 
+/// A row of a picture, colour by colour: loops over these become SIMD code, unlike those over pixels of three bytes.
+class ColourRow {
+ public:
+  explicit ColourRow(int width) : width_(static_cast<std::size_t>(width)), bytes_(3 * width_) {}
+
+  void take(const Rgb* row) {
+    std::uint8_t *const r = bytes_.data(), *const g = r + width_, *const b = g + width_;
+    for (std::size_t x = 0; x < width_; ++x) r[x] = row[x].r, g[x] = row[x].g, b[x] = row[x].b;
+  }
+
+  const std::uint8_t* red() const { return bytes_.data(); }
+  const std::uint8_t* green() const { return bytes_.data() + width_; }
+  const std::uint8_t* blue() const { return bytes_.data() + 2 * width_; }
+
+ private:
+  std::size_t width_;
+  std::vector<std::uint8_t> bytes_;
+};
+
+void write_luma(const ColourRow& row, int width, std::uint8_t* out) {
+  const std::uint8_t *const r = row.red(), *const g = row.green(), *const b = row.blue();
+  for (int x = 0; x < width; ++x) out[x] = luma(r[x], g[x], b[x]);
+}
+
+void write_chroma(const ColourRow& above, const ColourRow& below, int width, std::uint8_t* u, std::uint8_t* v) {
+  const auto sum = [](const std::uint8_t* a, const std::uint8_t* b, int x) {
+    return a[2 * x] + a[2 * x + 1] + b[2 * x] + b[2 * x + 1];
+  };
+  for (int x = 0; x < width / 2; ++x) {
+    const int red = sum(above.red(), below.red(), x), green = sum(above.green(), below.green(), x);
+    const int blue = sum(above.blue(), below.blue(), x);
+    u[x] = chroma(-9714 * red - 19070 * green + 28784 * blue);
+    v[x] = chroma(28784 * red - 24103 * green - 4681 * blue);
+  }
+}
+
 }  // namespace
 
 void to_yuv420(const Image<Rgb>& image, BytePlane y, BytePlane u, BytePlane v) {
   const int width = image.width();
-  for (int row = 0; row < image.height(); ++row) {
-    const auto* const rgb = reinterpret_cast<const std::uint8_t*>(image.row(row));
-    std::uint8_t* const out = y.data + row * y.stride;
-    for (int x = 0; x < width; ++x) out[x] = luma(rgb + 3 * x);
-  }
-  for (int row = 0; row < image.height() / 2; ++row) {
-    const auto* const above = reinterpret_cast<const std::uint8_t*>(image.row(2 * row));
-    const auto* const below = reinterpret_cast<const std::uint8_t*>(image.row(2 * row + 1));
-    std::uint8_t* const u_out = u.data + row * u.stride;
-    std::uint8_t* const v_out = v.data + row * v.stride;
-    for (int x = 0; x < width / 2; ++x) {
-      const std::uint8_t *const a = above + 6 * x, *const b = below + 6 * x;
-      const int red = a[0] + a[3] + b[0] + b[3], green = a[1] + a[4] + b[1] + b[4], blue = a[2] + a[5] + b[2] + b[5];
-      u_out[x] = chroma(-9714 * red - 19070 * green + 28784 * blue);
-      v_out[x] = chroma(28784 * red - 24103 * green - 4681 * blue);
-    }
+  ColourRow above(width), below(width);
+  for (int row = 0; row + 1 < image.height(); row += 2) {
+    above.take(image.row(row));
+    below.take(image.row(row + 1));
+    write_luma(above, width, y.data + row * y.stride);
+    write_luma(below, width, y.data + (row + 1) * y.stride);
+    write_chroma(above, below, width, u.data + row / 2 * u.stride, v.data + row / 2 * v.stride);
   }
 }
 

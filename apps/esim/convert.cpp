@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <filesystem>
 #include <map>
 
 #include "commands.h"
@@ -42,7 +43,8 @@ int run(const Arguments& arguments) {
   if (arguments.list) return list_formats();
   if (arguments.out.empty()) throw UserError("give what to read and what to write: esim convert IN OUT");
   const auto start = std::chrono::steady_clock::now();
-  const Format& format = arguments.format.empty() ? format_for(arguments.out) : format_named(arguments.format);
+  const std::filesystem::path out = arguments.out;
+  const Format& format = arguments.format.empty() ? format_for(out) : format_named(arguments.format);
   ConvertOptions options{arguments.copy, {arguments.sensor, {}}, arguments.force};
   if (arguments.recover) {
     options.read.recover = [](const std::string& problem) {
@@ -51,7 +53,7 @@ int run(const Arguments& arguments) {
   }
   catch_interrupts();
   ProgressBar bar(!arguments.quiet);
-  const CopySummary summary = convert_recording(arguments.input, format, arguments.out, options, [&](double share) {
+  const CopySummary summary = convert_recording(arguments.input, format, out, options, [&](double share) {
     bar.show(share, [&] { return fmt::format("{:.0f} %", 100 * share); });
     return !interrupted();
   });

@@ -28,6 +28,16 @@ class SchemaWriter {
   }
 
  private:
+  /// Eigen leaves a new vector uninitialised.
+  template <typename T>
+  static T initial_value() {
+    if constexpr (requires { T::Zero(); }) {
+      return T::Zero();
+    } else {
+      return T{};
+    }
+  }
+
   static void leaf(Json& entry, const char* kind, Json value) {
     entry["kind"] = kind;
     entry["default"] = std::move(value);
@@ -48,7 +58,7 @@ class SchemaWriter {
 
   template <typename T>
   static void fill(std::optional<T>&, Json& entry) {
-    T value{};
+    T value = initial_value<T>();
     fill(value, entry);
     entry["optional"] = true;
     entry["default"] = nullptr;
@@ -57,7 +67,7 @@ class SchemaWriter {
   template <typename T>
   static void fill(std::vector<T>&, Json& entry) {
     entry["kind"] = "list";
-    T value{};
+    T value = initial_value<T>();
     fill(value, entry["element"]);
   }
 

@@ -131,6 +131,10 @@ TEST_F(UnfinishedRecording, EarlyStatesAreToldInOrder) {
     base_.write(std::string("out.incomplete/cam0/") + name, "");
   EXPECT_TRUE(contains(nothing(), "holds no records")) << "files that have just been created";
   expect_order();
+  for (const char* name : {"events.h5", "truth.h5"})
+    base_.write(std::string("out.incomplete/cam0/") + name, std::string(5000, '\0') + "later bytes come first");
+  EXPECT_TRUE(contains(nothing(), "holds no records")) << "files that have no signature yet";
+  expect_order();
   for (const char* name : {"events.h5", "truth.h5", "frames.csv"})
     base_.write(std::string("out.incomplete/cam0/") + name, "\x89HDF\r\n\x1a\n");
   expect_order();

@@ -141,10 +141,11 @@ class Folder {
         fmt::format("{} holds no records: what wrote it was ended before the first; make it anew", root_.string()));
   }
 
-  /// Of unfinished recordings, a file that has not got its first bytes is none yet.
+  /// Of unfinished recordings, a file that has not got its first bytes is none yet: HDF5's come after others.
   bool is_there(const fs::path& path) const {
-    std::error_code error;
-    return is_file(path) && (!unfinished_ || fs::file_size(path, error) > 0);
+    constexpr std::size_t kSignatureBytes = 8;
+    return is_file(path) &&
+           (!unfinished_ || read_head(path, kSignatureBytes).find_first_not_of('\0') != std::string::npos);
   }
 
   void read_rig() {

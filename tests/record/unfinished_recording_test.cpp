@@ -116,6 +116,7 @@ TEST_F(UnfinishedRecording, EarlyStatesAreToldInOrder) {
   expect_order();
   base_.write("out.incomplete/report.json", kRunning);
   const auto nothing = [&] { return message_of<UserError>([&] { open_source(folder_); }); };
+  const auto no_events = [&] { return message_of<UserError>([&] { EventsFile file(folder_); }); };
   EXPECT_TRUE(contains(nothing(), "holds no records")) << "nothing but the report";
   expect_order();
   base_.write("out.incomplete/scenario.yaml", "duration_s: 1\n");
@@ -130,10 +131,12 @@ TEST_F(UnfinishedRecording, EarlyStatesAreToldInOrder) {
   for (const char* name : {"events.h5", "truth.h5", "frames.csv"})
     base_.write(std::string("out.incomplete/cam0/") + name, "");
   EXPECT_TRUE(contains(nothing(), "holds no records")) << "files that have just been created";
+  EXPECT_TRUE(contains(no_events(), "holds no events")) << "an empty file is no recording of no events";
   expect_order();
   for (const char* name : {"events.h5", "truth.h5"})
     base_.write(std::string("out.incomplete/cam0/") + name, std::string(5000, '\0') + "later bytes come first");
   EXPECT_TRUE(contains(nothing(), "holds no records")) << "files that have no signature yet";
+  EXPECT_TRUE(contains(no_events(), "holds no events"));
   expect_order();
   for (const char* name : {"events.h5", "truth.h5", "frames.csv"})
     base_.write(std::string("out.incomplete/cam0/") + name, "\x89HDF\r\n\x1a\n");

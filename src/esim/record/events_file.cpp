@@ -20,32 +20,34 @@ namespace fs = std::filesystem;
 constexpr int kMaxExtent = 65536;  // px
 constexpr std::uintmax_t kMaxReportBytes = std::uintmax_t{1} << 24;
 
-std::optional<fs::path> events_in(const fs::path& folder) {
-  std::error_code error;
-  for (const char* name : {"events.h5", "events.txt"}) {
-    if (fs::is_regular_file(folder / name, error)) return folder / name;
-  }
-  return std::nullopt;
-}
-
 // The file that a path means.
-fs::path find_file(const fs::path& path) {
+fs::path find_any_file(const fs::path& path) {
   std::error_code error;
   require_existing(path);
   if (!fs::is_directory(path, error)) return path;
-  if (const auto file = events_in(path)) return *file;
+  if (const auto file = events_file_in(path)) return *file;
 
   std::vector<fs::path> cameras;
   for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error)) {
-    if (events_in(entry->path())) cameras.push_back(entry->path());
+    if (events_file_in(entry->path())) cameras.push_back(entry->path());
   }
   if (cameras.empty()) throw UserError(path.string() + ": there is no events.h5 or events.txt inside");
-  if (cameras.size() == 1) return *events_in(cameras.front());
+  if (cameras.size() == 1) return *events_file_in(cameras.front());
   std::sort(cameras.begin(), cameras.end());
   std::string names;
   for (const fs::path& camera : cameras) names += (names.empty() ? "" : ", ") + camera.filename().string();
   throw UserError(fmt::format("{} holds several cameras ({}): name one, for example {}", path.string(), names,
                               cameras.front().string()));
+}
+
+fs::path find_file(const fs::path& path) {
+  fs::path file = find_any_file(path);
+  if (file.extension() == ".h5" && !has_begun(file)) {
+    throw UserError(fmt::format(
+        "{} holds no events: the program that wrote {} was stopped before the first of them; make it again",
+        path.string(), file.filename().string()));
+  }
+  return file;
 }
 
 std::optional<SensorSize> sensor_in_report(const nlohmann::json& report, const std::string& name) {

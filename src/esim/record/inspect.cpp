@@ -74,20 +74,16 @@ EventsSummary summarise_events(const fs::path& path) {
 
 // One camera's folder; nothing if it holds no events.
 std::optional<EventsSummary> summarise_folder(const fs::path& folder, const std::string& camera) {
-  std::error_code error;
-  for (const char* name : {"events.h5", "events.txt"}) {
-    const fs::path path = folder / name;
-    if (!fs::is_regular_file(path, error)) continue;
-    EventsSummary summary;
-    try {
-      summary = summarise_events(path);
-    } catch (const UserError& problem) {
-      summary.problem = problem.what();
-    }
-    summary.camera = camera;
-    return summary;
+  const auto path = events_file_in(folder);
+  if (!path) return std::nullopt;
+  EventsSummary summary;
+  try {
+    if (has_begun(*path)) summary = summarise_events(*path);
+  } catch (const UserError& problem) {
+    summary.problem = problem.what();
   }
-  return std::nullopt;
+  summary.camera = camera;
+  return summary;
 }
 
 void read_report(const fs::path& directory, Inspection& inspection) {

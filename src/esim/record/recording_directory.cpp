@@ -16,6 +16,7 @@
 
 #include "esim/core/error.h"
 #include "esim/core/remedy.h"
+#include "esim/record/input_file.h"
 #include "esim/record/output_file.h"
 
 namespace esim {
@@ -231,6 +232,20 @@ void RecordingDirectory::keep(std::string_view reason) noexcept {
                           report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   } catch (const std::exception&) {  // there is no room: it still says "running"
   }
+}
+
+std::optional<fs::path> events_file_in(const fs::path& folder) {
+  std::error_code error;
+  for (const char* name : {"events.h5", "events.txt"}) {
+    if (fs::is_regular_file(folder / name, error)) return folder / name;
+  }
+  return std::nullopt;
+}
+
+bool has_begun(const fs::path& file) {
+  constexpr std::size_t kSignatureBytes = 8;
+  std::error_code error;
+  return fs::is_regular_file(file, error) && read_head(file, kSignatureBytes).find_first_not_of('\0') != std::string::npos;
 }
 
 bool has_conversion_report(const fs::path& folder) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -58,6 +59,13 @@ void require_existing(const std::filesystem::path& path);
 
 /// Whether a process is writing in this directory now.
 bool is_being_written(const std::filesystem::path& working_directory);
+
+/// The file of events in a camera's folder: events.h5, or else events.txt.
+std::optional<std::filesystem::path> events_file_in(const std::filesystem::path& folder);
+
+/// Whether a file is there and has its first bytes. A simulation creates its files before it writes to them, and writes
+/// the signature of an HDF5 file after what it refers to: where it was killed before that, there is nothing to read.
+bool has_begun(const std::filesystem::path& file);
 
 /// Whether the report.json in a folder is that of a conversion: such a one stands beside files of any format that is a
 /// folder, and does not make a recording of them.

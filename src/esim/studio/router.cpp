@@ -73,7 +73,7 @@ Response Router::answer(Request request) const {
   } catch (const OptionError& error) {
     return failure(400, error.what(), error.key());
   } catch (const OutputError& error) {
-    return refusal(is_about_room(error.what()) ? 507 : 500, error.what());
+    return refusal(is_about_room(error.what()) ? 507 : 400, error.what());
   } catch (const UserError& error) {
     return failure(400, error.what(), option_in(error.what()));
   } catch (const std::bad_alloc&) {

@@ -141,12 +141,7 @@ class Folder {
         fmt::format("{} holds no records: what wrote it was ended before the first; make it anew", root_.string()));
   }
 
-  /// Of unfinished recordings, a file that has not got its first bytes is none yet: HDF5's come after others.
-  bool is_there(const fs::path& path) const {
-    constexpr std::size_t kSignatureBytes = 8;
-    return is_file(path) &&
-           (!unfinished_ || read_head(path, kSignatureBytes).find_first_not_of('\0') != std::string::npos);
-  }
+  bool is_there(const fs::path& path) const { return unfinished_ ? has_begun(path) : is_file(path); }
 
   void read_rig() {
     if (is_file(root_ / "report.json")) attempt([&] { read_report(root_ / "report.json"); });
@@ -252,9 +247,10 @@ class Folder {
   }
 
   void open_events(std::size_t i) {
-    const bool text = !is_file(folders_[i] / "events.h5");
-    const fs::path file = folders_[i] / (text ? "events.txt" : "events.h5");
-    if (!is_there(file)) return;
+    const auto path = events_file_in(folders_[i]);
+    if (!path || !is_there(*path)) return;
+    const fs::path& file = *path;
+    const bool text = file.extension() == ".txt";
     const ReadOptions told{.sensor = options_.sensor};
     auto events =
         std::make_unique<CheckedSource>((text ? events_text_format() : dsec_format()).open(file, told), file, told);

@@ -167,23 +167,19 @@ void PixelPass<Signals>::fire(const PixelArray& pixels, const AwakePixels& awake
     double t = std::floor(compare_.tau[i] + 0.5);
     t = t > 1.0 ? t : 1.0;
     t = t < duration ? t : duration;
-    const bool fired = compare_.polarity[i] != 0, reports = fired && !(drops && t < until_[i]);
-    reports_[i] = reports ? 1.0 : 0.0;
+    reports_[i] = (compare_.polarity[i] != 0) & !(drops & (t < until_[i])) ? 1.0 : 0.0;
     stamp_[i] = t;
-    until_[i] = reports ? t + refractory : until_[i];
-    const double resumes = holds ? until_[i] : compare_.tau[i];
-    compare_.from[i] = fired ? resumes : compare_.from[i];
   }
-  if (!pixels.delays) return;
-  delay(pixels, awake, packing);
-  if (!pixels.acknowledged || !holds) return;
-    // The request is raised at the time of the stamp, and not acknowledged before.
+  // A request that is acknowledged is raised at the time of the stamp, with latency.
+  const bool delays_first = pixels.delays && pixels.acknowledged && holds;
+  if (delays_first) delay(pixels, awake, packing);
 #pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
-    const bool fired = compare_.polarity[i] != 0;
-    until_[i] = fired ? stamp_[i] + refractory : until_[i];
-    compare_.from[i] = fired ? until_[i] : compare_.from[i];
+    until_[i] = reports_[i] != 0 ? stamp_[i] + refractory : until_[i];
+    const double resumes = holds ? until_[i] : compare_.tau[i];
+    compare_.from[i] = compare_.polarity[i] != 0 ? resumes : compare_.from[i];
   }
+  if (pixels.delays && !delays_first) delay(pixels, awake, packing);
 }
 
 template <class Signals>

@@ -53,6 +53,17 @@ inline bool PixelReadout::raises(const Event& request) {
   return holds_ || request.t >= blind_until_[pixel];
 }
 
+/// Reads out the requests that are acknowledged at once: most, where the readout is fast enough. Their pixels have gone
+/// on already.
+inline void PixelReadout::read_prompt(TimeNs watermark) {
+  if (!holds_ || counted_ || !again_.empty() || !resuming_.empty()) return;
+  const std::size_t begin = read_.size();
+  const std::size_t count = readout_.serve_singly(arrived_.subspan(next_), watermark + 1, tolerance_, read_);
+  for (std::size_t i = 0; i < count; ++i)
+    longest_delay_ = std::max(longest_delay_, read_[begin + i].t - arrived_[next_ + i].t);
+  next_ += count;
+}
+
 /// Reads out a request at once where nothing waits, and nothing comes before the reader turns to it. False otherwise.
 inline bool PixelReadout::read_at_once(const Event& request, bool resumed, TimeNs before) {
   const TimeNs t = readout_.service_of_one(request.t);
@@ -169,12 +180,14 @@ void PixelReadout::advance(PixelArray& pixels, PixelUpdate& update, EventQueue& 
   arrived_ = found.release_until(watermark);
   next_ = 0;
   counted_ = false;
+  read_prompt(watermark);
   const Event* request = next_request(watermark);
   while (true) {
     const TimeNs t = request != nullptr ? request->t : watermark + 1;
     const TimeNs service = readout_.next_service();
     if (service < std::min(t, first_resumes_)) {
       read_row(service);
+      read_prompt(watermark);
       request = next_request(watermark);
     } else if (first_resumes_ <= t && !resuming_.empty()) {
       resume(update);

@@ -69,6 +69,7 @@ class PixelReadout {
   }
   const Event* next_request(TimeNs watermark);
   bool raises(const Event& request);
+  void read_prompt(TimeNs watermark);
   bool read_at_once(const Event& request, bool resumed, TimeNs before);
   void wait(const Event& request);
   void read_row(TimeNs t);

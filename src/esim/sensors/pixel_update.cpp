@@ -56,14 +56,18 @@ struct PixelUpdate::FilterRow {
   const float *band_low, *band_high;
   const std::int32_t* alarms;  // or null
   std::uint32_t pixel, place;  // of the first one
+  // Where the past segment keeps filtered1, filtered2, start and end, or null.
+  float *past1 = nullptr, *past2 = nullptr, *past_start = nullptr, *past_end = nullptr;
 
-  /// Copies some pixels to a row of the past segment.
-  void keep(PastSegment& past, int row, int begin, std::size_t count) const {
-    const auto copy = [&](const float* from, Image<float>& to) {
-      if (!to.empty()) std::copy_n(from + begin, count, to.row(row) + begin);
-    };
-    copy(filtered1, past.filtered1), copy(filtered2, past.filtered2);
-    copy(start, past.start), copy(end, past.end);
+  /// Keeps a row in the past segment.
+  void keep_in(PastSegment& past, int y) {
+    const auto row = [&](Image<float>& image) { return image.empty() ? nullptr : image.row(y); };
+    past1 = row(past.filtered1), past2 = row(past.filtered2), past_start = row(past.start), past_end = row(past.end);
+  }
+  void keep_ends(int begin, std::size_t count) const {
+    if (past_start == nullptr) return;
+    std::copy_n(start + begin, count, past_start + begin);
+    std::copy_n(end + begin, count, past_end + begin);
   }
 
   /// Asks memory for what is worked on next: processors that look ahead by themselves do so within a page only.
@@ -93,6 +97,7 @@ HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter
     // With m = 1 - exp(-phase): F moves by m of its distance, and lags behind the rise of L.
     const V one = hn::Set(d, 1.0F), rise = hn::Sub(end, start), m = moved_after(d, phase), followed = hn::Div(m, phase);
     const V f1 = hn::LoadU(d, row.filtered1 + x), distance = hn::Sub(start, f1);
+    if (row.past1 != nullptr) hn::StoreU(f1, d, row.past1 + x);
     const V f1_end = hn::Add(f1, hn::MulAdd(m, distance, hn::Mul(rise, hn::Sub(one, followed))));
     hn::StoreU(phase, d, moved_.phase.data() + at);
     hn::StoreU(m, d, moved_.moved.data() + at);
@@ -105,6 +110,7 @@ HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter
       highest = hn::Max(hn::Max(f1, f1_end), hn::Min(hn::Min(start, tangent0), tangent1));
     } else {
       const V f2 = hn::LoadU(d, row.filtered2 + x);
+      if (row.past2 != nullptr) hn::StoreU(f2, d, row.past2 + x);
       const V from_rise = hn::Mul(rise, hn::Add(hn::MulAdd(hn::Set(d, -2.0F), followed, one), hn::Sub(one, m)));
       // Never as a sum of two products, of which compilers fuse one or the other.
       const V from_both = hn::NegMulAdd(hn::Mul(phase, hn::Sub(one, m)), distance, from_rise);
@@ -201,17 +207,18 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
   const int left = segment.tile.x, width = segment.tile.width;
   const std::size_t first = index(pixels, left, y);
   const auto from = [&](auto& values) { return values.empty() ? nullptr : values.data() + first; };
-  const FilterRow row{.light0 = segment.irradiance0.row(y) + left,
-                      .light1 = segment.irradiance1.row(y) + left,
-                      .end = brightness,
-                      .start = from(pixels.brightness),
-                      .filtered1 = from(pixels.filtered1),
-                      .filtered2 = from(pixels.filtered2),
-                      .band_low = from(pixels.band_low),
-                      .band_high = from(pixels.band_high),
-                      .alarms = from(pixels.alarms),
-                      .pixel = static_cast<std::uint32_t>(first),
-                      .place = static_cast<std::uint32_t>(events.packing().place(left, y))};
+  FilterRow row{.light0 = segment.irradiance0.row(y) + left,
+                .light1 = segment.irradiance1.row(y) + left,
+                .end = brightness,
+                .start = from(pixels.brightness),
+                .filtered1 = from(pixels.filtered1),
+                .filtered2 = from(pixels.filtered2),
+                .band_low = from(pixels.band_low),
+                .band_high = from(pixels.band_high),
+                .alarms = from(pixels.alarms),
+                .pixel = static_cast<std::uint32_t>(first),
+                .place = static_cast<std::uint32_t>(events.packing().place(left, y))};
+  if (past != nullptr) row.keep_in(*past, y - segment.tile.y);
   const auto filter_to = [&](auto d, int begin, int end) {
     std::span<const std::uint32_t> columns = move<kOrder>(d, pixels, row, filter, begin, end);
     while (!columns.empty()) {
@@ -221,7 +228,7 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
       if (awake_.count == kBlock) run_awake<kOrder>(pixels, segment, false, events);
     }
     const auto count = static_cast<std::size_t>(end - begin);
-    if (past != nullptr) row.keep(*past, y - segment.tile.y, begin, count);
+    row.keep_ends(begin, count);
     std::copy_n(row.end + begin, count, row.start + begin);
     if constexpr (kOrder > 0) std::copy_n(moved_.filtered1.data(), count, row.filtered1 + begin);
     if constexpr (kOrder == 2) std::copy_n(moved_.filtered2.data(), count, row.filtered2 + begin);

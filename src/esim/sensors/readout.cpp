@@ -33,6 +33,25 @@ EventSpan Readout::serve() {
   return served_;
 }
 
+std::size_t Readout::serve_singly(EventSpan requests, TimeNs end, TimeNs delay, std::vector<Event>& served) {
+  if (waiting_ > 0 || capacity_ < requests.size()) return 0;
+  const FineTime busy = std::max(per_row_ + per_event_, kNs);
+  FineTime free_at = free_at_;
+  const Event* const last = requests.data() + requests.size();
+  const Event* request = requests.data();
+  for (; request != last; ++request) {
+    const TimeNs free_from = (free_at + kNs - 1) >> kFineBits, t = std::max(free_from, request->t);
+    if (t >= end || t - request->t > delay) break;
+    const Event* later = request + 1;
+    while (later != last && later->t <= t && later->y != request->y) ++later;
+    if (later != last && later->t <= t) break;
+    free_at = (t > free_from ? t << kFineBits : free_at) + busy;
+    served.push_back({t, request->x, request->y, request->polarity});
+  }
+  free_at_ = free_at;
+  return static_cast<std::size_t>(request - requests.data());
+}
+
 bool Readout::take(const Event& request) {
   if (waiting_ == capacity_) {
     ++dropped_;

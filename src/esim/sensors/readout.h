@@ -38,6 +38,11 @@ class Readout {
   /// The reader is busy from `start` on with one event of a row.
   void occupy_with_one(TimeNs start) { occupy(start, 1); }
 
+  /// Takes and serves the first ones of `requests`, as long as no two of a row are served together, and each is served
+  /// before `end` and at most `delay` after it was raised; none if others wait already. Appends them to `served`, with
+  /// the times of their service, and returns how many they are.
+  std::size_t serve_singly(EventSpan requests, TimeNs end, TimeNs delay, std::vector<Event>& served);
+
   std::int64_t dropped() const { return dropped_; }
   std::size_t waiting() const { return waiting_; }
 

@@ -79,6 +79,15 @@ class Recordings(Cli):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertNotIn("warning", result.stderr)
 
+    def test_rendering_slower_than_real_time_names_a_faster_sampling(self):
+        short = ["--set", "duration_s=0.03", "--set", "truth.rate_hz=0", "--threads", "1", "--force"]
+        room = SCENES / "room.yaml"
+        slow = self.simulate(*short, "--set", "sampling={type: adaptive}", scenario=room)
+        self.assertEqual(slow.returncode, 0, slow.stderr)
+        self.assertRegex(slow.stderr, r"hint: .*Flow sampling .*: esim simulate \S+room.yaml --set 'sampling=\{type: flow\}'")
+        for other in (["--set", "sampling={type: flow}"], ["--set", "sampling={type: adaptive}", "--quiet"]):
+            self.assertNotIn("hint:", self.simulate(*short, *other, scenario=room).stderr)
+
     def test_samples_held_to_the_maximum_rate_are_reported(self):
         result = self.simulate(*FAST, "--set", "sampling={type: flow, lambda: 0.1, max_rate_hz: 100}")
         self.assertEqual(result.returncode, 0, result.stderr)

@@ -89,8 +89,8 @@ std::vector<std::string> hints(const Scenario& scenario, const Summary& summary)
   if (!adaptive || !std::holds_alternative<MeshRendererOptions>(scenario.renderer)) return {};
   if (summary.wall_seconds < simulated_s || summary.seconds.render < 0.5 * summary.wall_seconds) return {};
   return {fmt::format(
-      "rendering took {:.3g} of {:.3g} s. Where edges of objects fill the image, flow sampling is often several times "
-      "faster than adaptive sampling (sampling={{type: flow}})",
+      "rendering took {:.3g} of {:.3g} s. Flow sampling (sampling={{type: flow}}) is often several times faster than "
+      "adaptive sampling where edges of objects fill the image",
       summary.seconds.render, summary.wall_seconds)};
 }
 

@@ -1,0 +1,54 @@
+"""Sources and documentation use the words of the field: none of those in words.txt.
+
+Run as: words_test.py PROJECT_FOLDER
+"""
+
+import pathlib
+import re
+import subprocess
+import sys
+
+ROOT = pathlib.Path(sys.argv[1])
+LIST = ROOT / "tests" / "words.txt"
+SUFFIXES = {".h", ".cpp", ".c", ".py", ".pyi", ".md", ".txt", ".cmake", ".yaml", ".yml", ".ts", ".mjs", ".css", ".html", ""}
+# Names of others' functions and formats, quotations, generated files.
+LEFT_OUT = {"tests/words.txt", "tests/words_test.py", "CHANGELOG.md", "studio/package-lock.json", "LICENSE"}
+
+
+def read_list():
+    entries = []
+    for number, line in enumerate(LIST.read_text().splitlines(), 1):
+        if line.startswith("#") or not line:
+            continue
+        words, tab, use = line.partition("\t")
+        if not tab or not use:
+            sys.exit(f"{LIST}:{number}: expected WORDS<tab>WHAT TO USE")
+        entries.append((re.compile(rf"\b(?:{words})\b", re.IGNORECASE), use))
+    return entries
+
+
+def main():
+    entries = read_list()
+    every = re.compile("|".join(pattern.pattern for pattern, _ in entries), re.IGNORECASE)
+    files = subprocess.run(["git", "-C", str(ROOT), "ls-files"], capture_output=True, text=True, check=True).stdout.splitlines()
+    problems = []
+    for name in files:
+        path = ROOT / name
+        if name in LEFT_OUT or path.suffix not in SUFFIXES or not path.is_file():
+            continue
+        try:
+            text = path.read_text()
+        except UnicodeDecodeError:
+            continue
+        if not every.search(text):
+            continue
+        for number, line in enumerate(text.splitlines(), 1):
+            for pattern, use in entries:
+                for found in pattern.finditer(line):
+                    problems.append(f"{name}:{number}: '{found.group()}': write: {use}")
+    if problems:
+        sys.exit("\n".join(problems) + f"\n{len(problems)} words that tests/words.txt lists")
+
+
+if __name__ == "__main__":
+    main()

@@ -8,9 +8,9 @@ set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 
 add_library(esim_build_flags INTERFACE)
-# g++ 12 reports restrict and maybe-uninitialized in the standard library's own strings and optionals.
+# g++ 12 reports restrict, maybe-uninitialized, stringop-overflow and array-bounds in the standard library's own strings and optionals.
 target_compile_options(esim_build_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
-                                                  -Wno-sign-conversion -Wno-restrict -Wno-maybe-uninitialized -fno-math-errno -fno-trapping-math -fopenmp-simd)
+                                                  -Wno-sign-conversion -Wno-restrict -Wno-maybe-uninitialized -Wno-stringop-overflow -Wno-array-bounds -fno-math-errno -fno-trapping-math -fopenmp-simd)
 if(ESIM_WERROR)
   target_compile_options(esim_build_flags INTERFACE -Werror)
 endif()

@@ -245,7 +245,8 @@ std::optional<fs::path> events_file_in(const fs::path& folder) {
 bool has_begun(const fs::path& file) {
   constexpr std::size_t kSignatureBytes = 8;
   std::error_code error;
-  return fs::is_regular_file(file, error) && read_head(file, kSignatureBytes).find_first_not_of('\0') != std::string::npos;
+  return fs::is_regular_file(file, error) &&
+         read_head(file, kSignatureBytes).find_first_not_of('\0') != std::string::npos;
 }
 
 bool has_conversion_report(const fs::path& folder) {

@@ -5,7 +5,7 @@
 
 RECORDING is a folder in the Event Camera Dataset's layout (`boxes_rotation`, unpacked): events.txt, imu.txt, calib.txt,
 and images.txt, which tells the sensor's size. The truth is the gyroscope's: `rotation_truth`. Without a checkpoint, the
-error of predicting no motion at all is what it says. See docs/learning.md.
+error of predicting no motion at all is what it says. See docs/methods/learning.md.
 """
 
 import argparse

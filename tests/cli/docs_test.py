@@ -79,6 +79,12 @@ class Pages(ProgramTest):
     def test_waypoints(self):
         self.run_page("docs/waypoints.md")
 
+    def test_sampling(self):
+        self.run_page("docs/sampling.md")
+
+    def test_sensors(self):
+        self.run_page("docs/pixel.md")
+
 
 class Options(unittest.TestCase):
     def test_every_option_that_migrating_names_exists(self):
@@ -104,14 +110,14 @@ class Options(unittest.TestCase):
 
 class Links(unittest.TestCase):
     def test_every_link_leads_somewhere(self):
-        for page in [*PROJECT.glob("*.md"), *(PROJECT / "docs").glob("*.md")]:
+        for page in [*PROJECT.glob("*.md"), *(PROJECT / "docs").rglob("*.md")]:
             for target in re.findall(r"\]\(([^)#\s]+)(?:#[\w-]*)?\)", page.read_text()):
                 if "://" not in target:
                     self.assertTrue((page.parent / target).exists(), f"{page.relative_to(PROJECT)} links to {target}")
 
     def test_the_readme_lists_every_page(self):
-        listed = set(re.findall(r"\]\(docs/([\w-]+\.md)\)", (PROJECT / "README.md").read_text()))
-        self.assertEqual({page.name for page in (PROJECT / "docs").glob("*.md")}, listed)
+        listed = set(re.findall(r"\]\((docs/[\w/-]+\.md)\)", (PROJECT / "README.md").read_text()))
+        self.assertEqual({str(page.relative_to(PROJECT)) for page in (PROJECT / "docs").rglob("*.md")}, listed)
 
 
 if __name__ == "__main__":

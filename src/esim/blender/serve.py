@@ -1,6 +1,6 @@
 # Shows the scene that is open in Blender to programs that speak the protocol of UnrealCV, on this machine alone:
 #   blender --background room.blend --python serve.py -- --port 9000
-# docs/engines.md lists the commands. What Blender renders for them: engine.py.
+# docs/methods/engines.md lists the commands. What Blender renders for them: engine.py.
 import argparse
 import contextlib
 import io

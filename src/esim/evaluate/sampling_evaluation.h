@@ -80,7 +80,7 @@ struct EvaluationMonitor {
 };
 
 /// Simulates camera 0 of a scenario with each way of sampling, the event camera being ideal but for the scenario's
-/// thresholds, and measures what each sees and what it costs. docs/sampling.md defines the measures. Nothing is
+/// thresholds, and measures what each sees and what it costs. docs/methods/sampling.md defines the measures. Nothing is
 /// returned where the monitor stopped it. Throws UserError for what the user can repair.
 std::optional<SamplingEvaluation> evaluate_sampling(const Scenario& scenario, const SamplingEvaluationOptions& options,
                                                     const Notices& notices, const EvaluationMonitor& monitor);

@@ -28,7 +28,7 @@ struct EventCameraStatistics {
 ///
 /// Every effect is a law in continuous time, so that none depends on how densely the signal was sampled: the
 /// photoreceptor's low-pass is solved exactly on each segment, thresholds and leaks are drawn once for each event, shot
-/// noise is a Poisson process of its own. EventCameraOptions lists them; docs/pixel.md gives the formulae.
+/// noise is a Poisson process of its own. EventCameraOptions lists them; docs/methods/pixel.md gives the equations.
 ///
 /// Each frame of a user's own, in order, goes through process(); samples of tiles go through integrate() and
 /// release_until(). Use one or the other.

@@ -6,7 +6,7 @@
 
 namespace esim {
 
-/// Sensors whose published figures are known (docs/pixel.md has the sources).
+/// Sensors whose published figures are known (docs/methods/pixel.md has the sources).
 enum class SensorPreset { ideal, dvs128, davis240c, davis346, dvxplorer, gen31_vga, imx636, v2e_clean, v2e_noisy };
 
 /// How irradiance becomes brightness.

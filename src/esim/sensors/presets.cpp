@@ -3,7 +3,7 @@
 namespace esim {
 namespace {
 
-/// The figures by which sensors differ. docs/pixel.md has the source of each.
+/// The values in which sensors differ. docs/methods/pixel.md has the source of each.
 struct SensorFigures {
   double threshold, mismatch;  // ln
   double leak_hz, shot_hz;     // per pixel; shot noise in the dark

@@ -17,7 +17,7 @@ std::shared_ptr<UnrealcvClient> make_unrealcv_client(UnrealcvOptions options);
 
 /// Lets the program render what a camera sees: E and Z are the program's, V follows from Z, from which object a pixel
 /// sees, and from the twists. Cameras that are no pinholes with square pixels and the principal point in the middle are
-/// looked up in a wider image (render/pinhole_lookup.h). Docs: docs/engines.md.
+/// looked up in a wider image (render/pinhole_lookup.h). Docs: docs/methods/engines.md.
 /// `samples` per pixel are asked for by a command that our server in Blender knows; 0: none are.
 /// Throws UserError where the camera's view is too wide for a pinhole; when rendering, EngineError naming host and
 /// port.

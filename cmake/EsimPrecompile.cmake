@@ -25,6 +25,9 @@ function(esim_precompile target from)
   endif()
 endfunction()
 
+if(CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
+  add_compile_options(-fpch-preprocess)  # with CCACHE_SLOPPINESS=pch_defines,time_macros
+endif()
 esim_add_precompiled(esim_precompiled HEADERS <Eigen/Geometry> <fmt/format.h> LIBRARIES Eigen3::Eigen fmt::fmt)
 if(TARGET esim_precompiled)
   set_target_properties(esim_precompiled PROPERTIES POSITION_INDEPENDENT_CODE ON)

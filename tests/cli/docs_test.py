@@ -17,6 +17,7 @@ from program import ESIM, ProgramTest, run
 
 PROJECT = pathlib.Path(sys.argv[2]).absolute()
 SMALL = "--set duration_s=0.1 --set camera.width=64 --set camera.height=48"
+MIGRATING = ["docs/migrating.md", "docs/migrating-rpg-esim.md", "docs/migrating-video.md"]
 WIDTH, HEIGHT, FRAMES, FPS = 64, 48, 31, 30
 
 
@@ -74,7 +75,8 @@ class Pages(ProgramTest):
             self.assertTrue((self.folder / path).exists(), f"docs/getting-started.md names {path}, which no command makes")
 
     def test_migrating(self):
-        self.run_page("docs/migrating.md")
+        for page in MIGRATING:
+            self.run_page(page)
 
     def test_waypoints(self):
         self.run_page("docs/waypoints.md")
@@ -93,7 +95,8 @@ class Options(unittest.TestCase):
         options = run("options").stdout
         names = set(re.findall(r"^ *(\w+):", options, re.MULTILINE))
         values = set(re.findall(r"[\w.-]+", options))
-        rows = [line.split(" | ") for line in (PROJECT / "docs/migrating.md").read_text().splitlines() if line.startswith("| ")]
+        lines = [line for page in MIGRATING for line in (PROJECT / page).read_text().splitlines()]
+        rows = [line.split(" | ") for line in lines if line.startswith("| ")]
         found = 0
         for row in rows:
             for token in re.findall(r"`([^`]+)`", row[1]):

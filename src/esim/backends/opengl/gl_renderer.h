@@ -28,7 +28,7 @@ std::vector<GlDevice> gl_devices();
 
 /// Renders triangles with OpenGL 4.5, headless, through EGL: on a graphics card, or in software. What lens distortion
 /// shows is looked up in a wider pinhole image of at least the camera's resolution. Surfaces closer than 1 mm are cut.
-/// Lights cast shadows by maps of depth; see docs/rendering.md.
+/// Lights cast shadows by maps of depth; see docs/methods/rendering.md.
 /// Each renderer has a context of its own; it may be used by any one thread at a time.
 /// Throws UserError naming what to install or to change where there is no such device, and where the camera's view is
 /// too wide for a pinhole.

@@ -137,7 +137,7 @@ TEST_F(Aedat4, FramesWhoseSizeIsALieAreRefused) {
   ASSERT_NE(at, std::string::npos);
   bytes[at + 1] = 0x7f;
   const fs::path path = base_.write("lie.aedat4", bytes);
-  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { test::read_all(path); }), "a frame of "));
+  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { test::read_all(path); }), "damaged frame: "));
 }
 
 TEST_F(Aedat4, SizesOfPacketsAreNotBelieved) {

@@ -213,7 +213,7 @@ TEST_F(ForeignHdf5, IndexAndOffsetMayBeAbsentAndTypesDiffer) {
 TEST_F(ForeignHdf5, WhatIsWrongIsSaid) {
   const std::string path = path_.string();
   EXPECT_EQ(message([](Builder&) {}),
-            "cannot read " + path + ": there is no dataset events/t, as DSEC has it; it holds events");
+            "cannot read " + path + ": there is no dataset events/t, as in DSEC's layout; the file holds events");
   EXPECT_TRUE(contains(
       message([](Builder& builder) { builder.column<double>("events/t", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, {1.0}); }),
       "events/t does not hold integers"));
@@ -250,7 +250,7 @@ TEST_F(ForeignHdf5, WhatIsWrongIsSaid) {
                          builder.dsec_columns();
                          builder.integers("t_offset", H5T_STD_I64LE, {1, 2});
                        }),
-                       "t_offset is not one integer"));
+                       "t_offset must be one integer"));
 }
 
 TEST_F(ForeignHdf5, LyingIndexIsNoticed) {

@@ -216,7 +216,7 @@ TEST_F(Prophesee, WhatDoesNotFitIsRefused) {
     };
     const Event good = at(0, 0, 0, 1);
     EXPECT_TRUE(contains(refusal({{-1, 0, 0, 1}}), "event 0 is at -0.000000001 s"));
-    EXPECT_TRUE(contains(refusal({{-1, 0, 0, 1}}), "write another format"));
+    EXPECT_TRUE(contains(refusal({{-1, 0, 0, 1}}), "choose another format"));
     const TimeNs latest = format_named(format).max_time;
     EXPECT_TRUE(contains(refusal({good, good, {latest + 1, 0, 0, 1}}), "event 2 is at ")) << format;
     EXPECT_NO_THROW(write(format, {good, {latest, 0, 0, 1}})) << format;

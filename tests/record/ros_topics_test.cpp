@@ -227,7 +227,7 @@ TEST_P(RosTopics, UnknownTypesBesideOthersAreToldOf) {
   EXPECT_TRUE(test::contains(losses(summary, bag)[0].what, "not read: /event_camera/events (vendors__msgs/"));
   const std::string message = test::message_of<UserError>([&] { EventsFile{path()}; });
   EXPECT_TRUE(
-      test::contains(message, "has no camera, and so no events; not read: /event_camera/events (vendors__msgs/"))
+      test::contains(message, "has no camera and therefore no events; not read: /event_camera/events (vendors__msgs/"))
       << message;
   EXPECT_EQ(test::message_of<UserError>([&] { convert(path(), "text", "events.txt"); }), message);
   EXPECT_EQ(test::message_of<UserError>([&] { convert(path(), "dsec", "events.h5"); }), message);
@@ -265,7 +265,8 @@ TEST_P(RosTopics, EncodingsThatAreNotReadAreToldOf) {
 TEST_P(RosTopics, NoTopicsAtAll) {
   output()->close();
   const std::string message = test::message_of<UserError>([&] { convert(path(), "text", "events.txt"); });
-  EXPECT_TRUE(test::contains(message, is_bag() ? "has no camera, and so no events" : "it holds no topics")) << message;
+  EXPECT_TRUE(test::contains(message, is_bag() ? "has no camera and therefore no events" : "it holds no topics"))
+      << message;
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, RosTopics, testing::Values("rosbag", "mcap"),

@@ -94,7 +94,7 @@ TEST_F(Rosbag, SizesThatAreNotTrueAreNamed) {
 
 TEST_F(Rosbag, OlderOnesAndEncryptedOnesAreRefused) {
   const auto old = base_.write("old.bag", "#ROSBAG V1.2\n" + std::string(100, '\0'));
-  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { open_source(old); }), "not of version 2.0"));
+  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { open_source(old); }), "must have version 2.0"));
   std::string bytes(rosbag::kMagic);
   RecordWriter(bytes, Op::bag_header)
       .field("index_pos", std::uint64_t{0})

@@ -131,7 +131,7 @@ TEST_F(UnfinishedRecording, EarlyStatesAreToldInOrder) {
   for (const char* name : {"events.h5", "truth.h5", "frames.csv"})
     base_.write(std::string("out.incomplete/cam0/") + name, "");
   EXPECT_TRUE(contains(nothing(), "holds no records")) << "files that have just been created";
-  EXPECT_TRUE(contains(no_events(), "holds no events")) << "an empty file is no recording of no events";
+  EXPECT_TRUE(contains(no_events(), "holds no events")) << "an empty file is not a recording without events";
   expect_order();
   for (const char* name : {"events.h5", "truth.h5"})
     base_.write(std::string("out.incomplete/cam0/") + name, std::string(5000, '\0') + "later bytes come first");
@@ -146,7 +146,7 @@ TEST_F(UnfinishedRecording, EarlyStatesAreToldInOrder) {
 TEST_F(UnfinishedRecording, IsBeingWrittenOrWasEnded) {
   fs::create_directory(folder_);
   base_.write("out.incomplete/report.json", kRunning);
-  EXPECT_TRUE(contains(message_of<UserError>([&] { open_source(folder_); }), "make it anew"));
+  EXPECT_TRUE(contains(message_of<UserError>([&] { open_source(folder_); }), "create it again"));
   base_.write("out.incomplete/report.json", R"({"status": "complete"})");
   EXPECT_TRUE(contains(message_of<UserError>([&] { open_source(folder_); }), "holds no records"));
 }
@@ -185,7 +185,7 @@ TEST_F(UnfinishedRecording, LinesAreReadAsFarAsAllFilesReach) {
   write_all();
   EXPECT_EQ(count(Content::imu), kSteps);
   EXPECT_EQ(count(Content::poses), kSteps);
-  cut("imu.csv", 3);  // a number that has lost its last digits is none
+  cut("imu.csv", 3);  // a number that has lost its last digits is invalid
   EXPECT_EQ(count(Content::imu), kSteps - 1);
   cut("imu_truth.csv", 100);
   EXPECT_LT(count(Content::imu), kSteps - 1);

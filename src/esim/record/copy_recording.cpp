@@ -29,18 +29,18 @@ std::string names_of(const std::vector<CameraInfo>& cameras) {
 std::optional<int> chosen_camera(const RecordingInfo& info, const Format& format, const std::string& name) {
   const auto& cameras = info.cameras;
   if (cameras.empty() && !format.several_cameras)
-    throw UserError(fmt::format("{} holds what one camera recorded, and the input has no camera", format.name));
+    throw UserError(fmt::format("{} holds the data of one camera, but the input has no camera", format.name));
   if (name.empty()) {
     if (cameras.size() <= 1 || format.several_cameras) return std::nullopt;
     throw RemediableError(
-        fmt::format("{} holds one camera, and there are {}: choose one", format.name, names_of(cameras)),
+        fmt::format("{} holds one camera, but the recording has {}: choose one", format.name, names_of(cameras)),
         Remedy::choose_camera);
   }
   const auto found =
       std::find_if(cameras.begin(), cameras.end(), [&](const CameraInfo& camera) { return camera.name == name; });
-  if (cameras.empty()) throw UserError(fmt::format("there is no camera {}: the recording has none", name));
+  if (cameras.empty()) throw UserError(fmt::format("camera {} does not exist: the recording has no camera", name));
   if (found == cameras.end())
-    throw UserError(fmt::format("there is no camera {}; the recording has {}", name, names_of(cameras)));
+    throw UserError(fmt::format("the recording has no camera {}; its cameras are {}", name, names_of(cameras)));
   return static_cast<int>(found - cameras.begin());
 }
 
@@ -163,7 +163,9 @@ CopySummary copy_recording(Source& from, const Format& format, const fs::path& t
 
 CopySummary convert_recording(const fs::path& from, const Format& format, const fs::path& to,
                               const ConvertOptions& options, const std::function<bool(double)>& go_on) {
-  if (!format.create) throw UserError(fmt::format("{} is only read; write one of {}", format.name, written_formats()));
+  if (!format.create)
+    throw UserError(
+        fmt::format("format {} can be read but not written; choose one of {}", format.name, written_formats()));
   bool damaged = false;
   ReadOptions reading = options.read;
   if (options.read.recover) {
@@ -180,7 +182,7 @@ CopySummary convert_recording(const fs::path& from, const Format& format, const 
       CopySummary summary = Copy(*source, format, path, options.copy).run(go_on, copied);
       summary.complete &= !damaged;
       if (summary.complete && summary.copied.empty() && summary.left_out.empty() && !summary.not_read.empty()) {
-        throw UserError(fmt::format("cannot convert {}: it holds nothing that can be read, only {}", from.string(),
+        throw UserError(fmt::format("cannot convert {}: it holds only data that cannot be read: {}", from.string(),
                                     list_of_some(summary.not_read)));
       }
       return summary;
@@ -210,11 +212,11 @@ CopySummary convert_recording(const fs::path& from, const Format& format, const 
 std::vector<Loss> losses(const CopySummary& summary, const Format& format) {
   std::vector<Loss> losses;
   for (const auto& [content, count] : summary.left_out) {
-    losses.push_back({fmt::format("{} does not hold {}: {} left out", format.name, describe(content), grouped(count))});
+    losses.push_back({fmt::format("{} cannot hold {}: {} left out", format.name, describe(content), grouped(count))});
   }
   if (!summary.not_read.empty()) losses.push_back({"not read: " + list_of_some(summary.not_read)});
   if (summary.rounded_to > 0) {
-    losses.push_back({fmt::format("times of events are rounded down to {} us",
+    losses.push_back({fmt::format("event times are rounded down to {} us",
                                   static_cast<double>(summary.rounded_to) / static_cast<double>(kNsPerUs)),
                       format.either_unit ? Remedy::nanoseconds : Remedy::none});
   }

@@ -43,9 +43,9 @@ fs::path find_any_file(const fs::path& path) {
 fs::path find_file(const fs::path& path) {
   fs::path file = find_any_file(path);
   if (file.extension() == ".h5" && !has_begun(file)) {
-    throw UserError(fmt::format(
-        "{} holds no events: the program that wrote {} was stopped before the first of them; make it again",
-        path.string(), file.filename().string()));
+    throw UserError(
+        fmt::format("{} holds no events: the program that wrote {} was stopped before the first event; create it again",
+                    path.string(), file.filename().string()));
   }
   return file;
 }

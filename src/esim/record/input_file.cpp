@@ -111,7 +111,7 @@ std::string_view InputFile::read_line(std::size_t most, std::string_view what) {
 }
 
 void InputFile::seek(std::uint64_t offset) {
-  if (offset > size_) fail(offset, "the file ends before");
+  if (offset > size_) fail(offset, "the file ends before this byte");
   if (::lseek(descriptor_, static_cast<off_t>(offset), SEEK_SET) < 0) fail(offset, system_reason(errno));
   offset_ = offset;
   begin_ = end_ = 0;

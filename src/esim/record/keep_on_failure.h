@@ -18,7 +18,7 @@ template <typename Output, typename Work>
 auto keep_on_failure(Output& output, const bool& worth_keeping, const Work& work) {
   const auto kept = [&](const std::string& problem) {
     output.keep(problem);
-    return problem + "; what was written before that is kept: " + output.path().string();
+    return problem + "; the output written so far is kept: " + output.path().string();
   };
   try {
     return work();

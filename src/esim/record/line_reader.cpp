@@ -57,7 +57,7 @@ bool LineReader::next(std::string_view& line) {
   if (begin_ == end_) return false;
   ++line_number_;
   line = std::string_view(block_.data() + begin_, static_cast<std::size_t>(newline - block_.begin()) - begin_);
-  if (line.size() > kMaxLineBytes) fail("the line is longer than any that belongs here");
+  if (line.size() > kMaxLineBytes) fail("the line is too long");
   begin_ += std::min(line.size() + 1, end_ - begin_);
   return true;
 }

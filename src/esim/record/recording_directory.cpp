@@ -61,7 +61,7 @@ bool is_home(const fs::path& directory) {
 // Replacing deletes: only what is surely a recording.
 void require_replaceable(const fs::path& directory) {
   const auto refuse = [&](const std::string& why) {
-    throw UserError(directory.string() + " " + why + ": not replaced, choose another name");
+    throw UserError(directory.string() + " " + why + " and is not replaced: choose another name");
   };
   std::error_code error;
   const fs::file_status status = fs::symlink_status(directory, error);
@@ -178,7 +178,7 @@ void RecordingDirectory::create_working_directory(bool force) {
     }
     if (!force) {
       throw RemediableError(
-          working_.string() + " is left from a run that was killed: look at what it holds, or choose another name",
+          working_.string() + " is left from a run that was killed: inspect it, or choose another name",
           Remedy::replace_output);
     }
     require_replaceable(working_);
@@ -245,7 +245,8 @@ std::optional<fs::path> events_file_in(const fs::path& folder) {
 bool has_begun(const fs::path& file) {
   constexpr std::size_t kSignatureBytes = 8;
   std::error_code error;
-  return fs::is_regular_file(file, error) && read_head(file, kSignatureBytes).find_first_not_of('\0') != std::string::npos;
+  return fs::is_regular_file(file, error) &&
+         read_head(file, kSignatureBytes).find_first_not_of('\0') != std::string::npos;
 }
 
 bool has_conversion_report(const fs::path& folder) {

@@ -7,7 +7,7 @@
 namespace esim {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "numbers are written as they stand in memory");
+static_assert(std::endian::native == std::endian::little, "numbers are written in the byte order of memory");
 
 template <typename T>
 void append_bytes(std::string& buffer, T number) {

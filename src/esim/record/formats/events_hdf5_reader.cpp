@@ -17,14 +17,15 @@ constexpr std::uint64_t kBlock = 1 << 16;
 std::optional<int> extent(const hdf5::Input& file, const char* name) {
   const auto value = file.integer_attribute(name);
   if (!value) return std::nullopt;
-  if (*value < 1 || *value > 65536) file.fail(std::string(name) + " is " + std::to_string(*value) + " px");
+  if (*value < 1 || *value > 65536)
+    file.fail(std::string(name) + " must be from 1 to 65536 px, not " + std::to_string(*value) + " px");
   return static_cast<int>(*value);
 }
 
 TimeUnit read_unit(const hdf5::Input& file) {
   const auto unit = file.text_attribute("unit");
   if (!unit || *unit == "us") return TimeUnit::us;
-  if (*unit != "ns") file.fail("the unit of time is \"" + *unit + "\", which is neither us nor ns");
+  if (*unit != "ns") file.fail("the unit of time is \"" + *unit + "\", but must be us or ns");
   return TimeUnit::ns;
 }
 
@@ -58,9 +59,10 @@ void EventsHdf5Reader::Impl::open() {
   ns_per_unit = unit == TimeUnit::us ? kNsPerUs : 1;
   t_offset = file.scalar("t_offset").value_or(0);
   if (std::abs(t_offset / 2) > std::numeric_limits<TimeNs>::max() / ns_per_unit / 4)
-    file.fail("t_offset is " + std::to_string(t_offset) + ", too large for a time");
+    file.fail("t_offset is " + std::to_string(t_offset) + ", which is too large for a time");
   if (const auto flag = file.integer_attribute("esim_complete")) complete = *flag != 0;
-  if (!file.has("events/t")) file.fail("there is no dataset events/t, as DSEC has it; it holds " + file.contents());
+  if (!file.has("events/t"))
+    file.fail("there is no dataset events/t, as in DSEC's layout; the file holds " + file.contents());
   t = file.open_column("events/t");
   x = file.open_column("events/x");
   y = file.open_column("events/y");
@@ -70,7 +72,7 @@ void EventsHdf5Reader::Impl::open() {
   // A killed writer may leave columns of different lengths: what all of them have is good.
   size = std::min({t.size, x.size, y.size, p.size});
   const bool equal = t.size == size && x.size == size && y.size == size && p.size == size;
-  if (!equal && complete.value_or(true)) file.fail("the datasets below events differ in length");
+  if (!equal && complete.value_or(true)) file.fail("the datasets in the group events differ in length");
 }
 
 TimeNs EventsHdf5Reader::Impl::to_ns(std::int64_t stored) const {
@@ -127,7 +129,7 @@ std::uint64_t EventsHdf5Reader::Impl::first_at_or_after(TimeNs time) const {
   }
   const bool too_early = first == hint_last && first < size && stored_time(first) < stored;
   const bool too_late = first == hint_first && first > 0 && stored_time(first - 1) >= stored;
-  if (too_early || too_late) file.fail("ms_to_idx does not fit the events' times");
+  if (too_early || too_late) file.fail("ms_to_idx does not match the event times");
   return first;
 }
 
@@ -219,7 +221,7 @@ std::vector<std::uint64_t> EventsHdf5Reader::ms_to_idx() const {
   if (!impl_->ms_to_idx) return {};
   std::vector<std::uint64_t> index(impl_->ms_to_idx->size);
   impl_->file.read(*impl_->ms_to_idx, 0, std::span(index));
-  if (!std::is_sorted(index.begin(), index.end())) impl_->file.fail("ms_to_idx decreases");
+  if (!std::is_sorted(index.begin(), index.end())) impl_->file.fail("ms_to_idx must not decrease");
   for (std::uint64_t& first : index) first = std::min(first, impl_->size);
   return index;
 }

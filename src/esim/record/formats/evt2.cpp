@@ -65,7 +65,7 @@ class Evt2Reader final : public EventsReader {
       if (words.empty()) return false;
       const bool sound = decode(words);
       portion_.move_to(events);
-      if (!sound) file_.fail(start, "the times up to here are beyond all reason");
+      if (!sound) file_.fail(start, "the times before this byte are out of range");
     }
     return true;
   }
@@ -131,7 +131,7 @@ std::unique_ptr<EventsReader> open_evt2(const std::filesystem::path& path) {
 Format evt2_format() {
   return {
       .name = "evt2",
-      .description = "Prophesee RAW, EVT 2.0; EVT 2.1 is read as well",
+      .description = "Prophesee RAW, EVT 2.0; reads EVT 2.1 as well",
       .extensions = {".raw"},
       .holds = {Content::events},
       .resolution = kNsPerUs,

@@ -132,7 +132,7 @@ class Evt3Reader final : public EventsReader {
       if (words.empty()) return false;
       const bool sound = header_.endianness == "big" ? decode<true>(words) : decode<false>(words);
       portion_.move_to(events);
-      if (!sound) file_.fail(start, "the times up to here are beyond all reason");
+      if (!sound) file_.fail(start, "the times before this byte are out of range");
     }
     return true;
   }

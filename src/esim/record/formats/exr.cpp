@@ -59,7 +59,7 @@ void decode(const InputFile& file, std::span<const std::byte> bytes, SequenceIma
   constexpr std::int64_t kMaxExtent = 65536, kSmall = 1 << 20, kMaxPixelsPerByte = 2000;
   if (width < 1 || height < 1 || width > kMaxExtent || height > kMaxExtent ||
       (width * height > kSmall && width * height / kMaxPixelsPerByte > static_cast<std::int64_t>(bytes.size())))
-    file.fail(0, fmt::format("{} x {} px in {} bytes: it is damaged", width, height, bytes.size()));
+    file.fail(0, fmt::format("the file is damaged: {} x {} px in {} bytes", width, height, bytes.size()));
   Imf::FrameBuffer buffer;
   const std::array planes = {&images.irradiance, &images.depth, &images.flow_x, &images.flow_y};
   for (std::size_t i = 0; i < kChannels.size(); ++i) {
@@ -69,7 +69,7 @@ void decode(const InputFile& file, std::span<const std::byte> bytes, SequenceIma
     buffer.insert(kChannels[i], Imf::Slice::Make(Imf::FLOAT, plane.data(), window, sizeof(float), row_bytes(plane)));
   }
   if (buffer.begin() == buffer.end()) file.fail(0, "it has none of the channels Y, Z, V.x and V.y");
-  if (images.flow_x.empty() != images.flow_y.empty()) file.fail(0, "it has one of the channels V.x and V.y only");
+  if (images.flow_x.empty() != images.flow_y.empty()) file.fail(0, "it has only one of the channels V.x and V.y");
   image.setFrameBuffer(buffer);
   image.readPixels(window.min.y, window.max.y);
 }

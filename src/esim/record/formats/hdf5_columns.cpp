@@ -65,7 +65,7 @@ class ColumnsReader final : public EventBlocksReader {
       const std::int64_t x = x_numbers_[i], y = y_numbers_[i];
       if (x < 0 || x >= kLargestExtent || y < 0 || y >= kLargestExtent) {
         file_.fail("event " + std::to_string(first + i) + " at (" + std::to_string(x) + ", " + std::to_string(y) +
-                   ") is outside any sensor");
+                   ") is out of range");
       }
       events.push_back({t[i], static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y),
                         static_cast<std::int8_t>(p_numbers_[i] > 0 ? 1 : -1)});
@@ -92,17 +92,17 @@ class ColumnsReader final : public EventBlocksReader {
   }
 
   [[noreturn]] void fail_time(std::uint64_t index) const {
-    file_.fail("the time of event " + std::to_string(index) + " is none of a recording");
+    file_.fail("the time of event " + std::to_string(index) + " is out of range");
   }
 
   void read_resolution(const char* name) {
     const hdf5::Column column = file_.open_column(name);
     std::int64_t size[2] = {};
-    if (column.size != 2) file_.fail(std::string(name) + " is not a width and a height");
+    if (column.size != 2) file_.fail(std::string(name) + " must hold two numbers, width and height");
     file_.read(column, 0, std::span<std::int64_t>(size));
     for (const std::int64_t extent : size) {
       if (extent < 1 || extent > kLargestExtent)
-        file_.fail(std::string(name) + " is " + std::to_string(extent) + " px");
+        file_.fail(std::string(name) + " must be from 1 to 65536 px, not " + std::to_string(extent) + " px");
     }
     sensor_ = {static_cast<int>(size[0]), static_cast<int>(size[1])};
   }
@@ -146,8 +146,8 @@ std::unique_ptr<Source> open_event_columns(const EventColumns& names, const std:
   return make_events_source(std::make_unique<ColumnsReader>(names, path), options);
 }
 
-Format e2calib_format() { return read_only("e2calib", "HDF5 with x, y, p and t, as e2calib takes it", kE2calib); }
+Format e2calib_format() { return read_only("e2calib", "HDF5 with x, y, p and t, the input of e2calib", kE2calib); }
 
-Format e2vid_format() { return read_only("e2vid", "HDF5 with events/xs, ys, ps and ts, as around E2VID", kE2vid); }
+Format e2vid_format() { return read_only("e2vid", "HDF5 with events/xs, ys, ps and ts, used with E2VID", kE2vid); }
 
 }  // namespace esim

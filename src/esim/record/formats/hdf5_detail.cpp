@@ -102,8 +102,8 @@ void require_available(Compression compression) {
   const Quiet quiet;
   if (compression != Compression::blosc || H5Zfilter_avail(kBloscFilter) > 0) return;
   throw UserError(
-      "the HDF5 library cannot find its Blosc filter: install the package hdf5-filter-plugin-blosc-serial (and let "
-      "HDF5_PLUGIN_PATH, if it is set, name the plugins' folder), or choose gzip compression");
+      "the HDF5 library cannot find its Blosc filter: install the package hdf5-filter-plugin-blosc-serial (if "
+      "HDF5_PLUGIN_PATH is set, it must name the folder of the plugins), or choose gzip compression");
 }
 
 Output::Output(std::filesystem::path path) : path_(std::move(path)) {

@@ -56,8 +56,8 @@ class SequenceStream final : public RecordStream {
     const Image<float>& image = image_in(images_);
     if (size_->width == 0) *size_ = {image.width(), image.height()};
     if (image.width() != size_->width || image.height() != size_->height) {
-      throw UserError(fmt::format("cannot read {}: its image is of {} x {} px, those before of {} x {}", file_.string(),
-                                  image.width(), image.height(), size_->width, size_->height));
+      throw UserError(fmt::format("cannot read {}: its image has {} x {} px, but the earlier images have {} x {} px",
+                                  file_.string(), image.width(), image.height(), size_->width, size_->height));
     }
     read_ = true;
   }

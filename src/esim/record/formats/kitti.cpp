@@ -39,7 +39,7 @@ void write_flow(const fs::path& path, const Image<float>& x, const Image<float>&
 PngImage read_numbers(const fs::path& path, std::size_t channels) {
   PngImage png = read_png(path);
   if (png.bits != 16 || png.channels.size() != channels) {
-    throw UserError(fmt::format("cannot read {}: it has {} channels of {} bits, and should have {} of 16",
+    throw UserError(fmt::format("cannot read {}: it has {} channels of {} bits, but must have {} of 16 bits",
                                 path.string(), png.channels.size(), png.bits, channels));
   }
   return png;
@@ -153,7 +153,7 @@ FileSequence dsec_files(const fs::path& folder) {
     if (!list.next()) return false;
     constexpr TimeNs kMax_us = std::numeric_limits<TimeNs>::max() / 2 / kNsPerUs;
     if (list.t() > kMax_us || list.integer(1) > kMax_us || list.integer(1) < list.t() || list.t() < 0)
-      list.fail("the times are none of a recording");
+      list.fail("the times are out of range or in the wrong order");
     span = {list.t() * kNsPerUs, list.integer(1) * kNsPerUs};
     if (index == names.size()) list.fail(fmt::format("there are only {} files in forward/", names.size()));
     file = names[index++];
@@ -167,7 +167,7 @@ FileSequence dsec_files(const fs::path& folder) {
 Format kitti_format() {
   return {
       .name = "kitti",
-      .description = "folders flow/ and depth/ of 16-bit PNG as KITTI has them",
+      .description = "folders flow/ and depth/ of 16-bit PNG files, as in KITTI",
       .holds = {Content::truth, Content::displacement},
       .folder = true,
       .recognises =
@@ -196,7 +196,7 @@ Format kitti_format() {
 Format dsec_flow_format() {
   return {
       .name = "dsec-flow",
-      .description = "DSEC's folder of optical flow: forward/ of 16-bit PNG, forward_timestamps.txt",
+      .description = "DSEC's folder of optical flow: 16-bit PNG files in forward/, forward_timestamps.txt",
       .holds = {Content::truth, Content::displacement},
       .folder = true,
       .recognises =

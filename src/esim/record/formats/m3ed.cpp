@@ -112,8 +112,7 @@ void M3edWriter::write(const Record& record) {
   if (events == nullptr || events->camera != 0) return;
   for (const Event& event : events->events) {
     if (event.t < 0 || event.t > kLatest) {
-      throw RemediableError(path_.string() +
-                                ": M3ED counts times from the start of the recording, so that an event at " +
+      throw RemediableError(path_.string() + ": M3ED counts times from the start of the recording, so an event at " +
                                 std::to_string(event.t / kNsPerSecond) + " s does not fit: choose another format",
                             Remedy::times_from_zero);
     }

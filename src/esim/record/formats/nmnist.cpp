@@ -111,7 +111,7 @@ bool is_nmnist(const std::filesystem::path& path, std::string_view head) {
 Format nmnist_format() {
   return {
       .name = "nmnist",
-      .description = "five bytes an event, as in N-MNIST",
+      .description = "five bytes per event, as in N-MNIST",
       .extensions = {".bin"},
       .holds = {Content::events},
       .resolution = kNsPerUs,

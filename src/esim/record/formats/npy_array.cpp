@@ -119,7 +119,7 @@ void Array::fail(const std::string& what) const { throw UserError(fmt::format("c
 void Array::take_fields(const Literal& descr) {
   const auto add = [&](const Literal& type, std::string name, std::uint64_t repeats) {
     auto field = type.sequence ? std::nullopt : field_of(type.text);
-    if (!field) fail(fmt::format("field \"{}\" is of a type that is not supported: {}", name, type.text));
+    if (!field) fail(fmt::format("field \"{}\" has a type that is not supported: {}", name, type.text));
     field->name = std::move(name);
     field->offset = item_bytes_;
     if (repeats != 1) field->kind = 'V';

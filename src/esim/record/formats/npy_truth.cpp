@@ -68,16 +68,17 @@ class NpyReader {
   NpyReader(const fs::path& path, std::size_t item_rank) : file_(path) {
     const npy::Header header = npy::read_header([&](std::span<std::byte> out) { return file_.read_into(out); },
                                                 [&](const std::string& problem) { file_.fail(0, problem); });
-    if (header.fortran_order) file_.fail(0, "it is not in C order");
+    if (header.fortran_order) file_.fail(0, "the array must be in C order");
     if (header.descr.text != kType<T>)
-      file_.fail(0, fmt::format("its type is {}, not {}", header.descr.text, kType<T>));
-    if (header.shape.size() != item_rank + 1) file_.fail(0, fmt::format("it has not {} dimensions", item_rank + 1));
+      file_.fail(0, fmt::format("its type is {}, but must be {}", header.descr.text, kType<T>));
+    if (header.shape.size() != item_rank + 1) file_.fail(0, fmt::format("it must have {} dimensions", item_rank + 1));
     items_ = header.shape[0];
     item_shape_.assign(header.shape.begin() + 1, header.shape.end());
     constexpr std::uint64_t kMaxExtent = 65536, kMaxNumbers = std::uint64_t{1} << 28;
     for (const std::uint64_t extent : item_shape_) {
       numbers_ *= extent;
-      if (extent < 1 || extent > kMaxExtent || numbers_ > kMaxNumbers) file_.fail(0, "its shape is that of no images");
+      if (extent < 1 || extent > kMaxExtent || numbers_ > kMaxNumbers)
+        file_.fail(0, "its shape is not valid for images");
     }
   }
 
@@ -86,7 +87,7 @@ class NpyReader {
 
   /// Fills the parts, which are all of the next item.
   void read(std::initializer_list<std::span<T>> parts) {
-    if (left() == 0) file_.fail(file_.size(), "it has fewer items than the times");
+    if (left() == 0) file_.fail(file_.size(), "it has fewer items than there are times");
     for (const std::span<T> part : parts) {
       // In pieces, so that a shape that is a lie takes no memory.
       constexpr std::size_t kPiece = 1 << 16;
@@ -203,16 +204,17 @@ class Folder {
     NpyReader<T> reader(path_ / name, vectors ? 3 : 2);
     const auto& shape = reader.item_shape();
     const SensorSize size{static_cast<int>(shape.back()), static_cast<int>(shape[shape.size() - 2])};
-    if (vectors && shape[0] != 2) reader.fail("its vectors have not two components");
+    if (vectors && shape[0] != 2) reader.fail("its vectors must have two components");
     if (size_.width == 0) size_ = size;
-    if (size.width != size_.width || size.height != size_.height) reader.fail("its images differ in size from others");
+    if (size.width != size_.width || size.height != size_.height)
+      reader.fail("its images differ in size from those of the other arrays");
     return reader;
   }
 
   template <typename T>
   NpyReader<T> numbers(const char* name, std::vector<std::uint64_t> item_shape) const {
     NpyReader<T> reader(path_ / name, item_shape.size());
-    if (reader.item_shape() != item_shape) reader.fail("its shape is another than expected");
+    if (reader.item_shape() != item_shape) reader.fail("its shape is wrong");
     return reader;
   }
 
@@ -269,7 +271,7 @@ class FramesStream final : public RecordStream {
       poses_->read({n});
       pose = {Eigen::Quaterniond(n[6], n[3], n[4], n[5]), Eigen::Vector3d(n.data())};
       if (!(std::abs(pose.rotation.norm() - 1) < 1e-3) || !pose.translation.allFinite())
-        poses_->fail("it holds a pose that is none");
+        poses_->fail("it holds an invalid pose");
     }
     folder_->read(irradiance_, images_.irradiance);
     folder_->read(depth_, images_.depth);
@@ -298,7 +300,8 @@ class DisplacementsStream final : public RecordStream {
         times_(folder->numbers<TimeNs>("displacement_t.npy", {2})),
         displacement_(folder->images<float>("displacement.npy", true)),
         valid_(folder->images<std::uint8_t>("displacement_valid.npy")) {
-    if (!displacement_ || !valid_) times_.fail("displacement.npy or displacement_valid.npy beside it is missing");
+    if (!displacement_ || !valid_)
+      times_.fail("displacement.npy or displacement_valid.npy is missing from the same folder");
   }
 
   std::optional<TimeNs> due() override {

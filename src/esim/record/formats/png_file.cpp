@@ -59,11 +59,11 @@ std::string problem_of(std::string_view bytes) {
   constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;
   constexpr std::uint64_t kMaxPixelsPerByte = 8'300;  // deflate's 1032 times, of eight pixels of one bit each
   if (!bytes.starts_with("\x89PNG\r\n\x1a\n")) return "it is not a PNG image";
-  if (bytes.size() < kHeadBytes || bytes.substr(12, 4) != "IHDR") return "the header is damaged or cut off";
+  if (bytes.size() < kHeadBytes || bytes.substr(12, 4) != "IHDR") return "the header is damaged or truncated";
   const std::uint64_t width = big_endian(bytes.substr(16, 4)), height = big_endian(bytes.substr(20, 4));
   const std::uint64_t most = std::min(kMaxPixels, bytes.size() * kMaxPixelsPerByte);
   if (width > 0 && height > 0 && width <= most && height <= most / width) return "";
-  return fmt::format("{} x {} px in {} bytes: it is damaged", width, height, bytes.size());
+  return fmt::format("the file is damaged: {} x {} px in {} bytes", width, height, bytes.size());
 }
 
 /// Empty where it is damaged.
@@ -126,12 +126,13 @@ void write_png(const std::filesystem::path& path, const PerColour<Image<std::uin
 
 PngImage read_png(const std::filesystem::path& path) {
   InputFile file(path);
-  if (file.size() > kMaxFileBytes) file.fail(0, fmt::format("{} bytes are no image", file.size()));
+  if (file.size() > kMaxFileBytes)
+    file.fail(0, fmt::format("the file is too large for an image: {} bytes", file.size()));
   const auto content = file.read(kMaxFileBytes);
   const std::string_view bytes(reinterpret_cast<const char*>(content.data()), content.size());
   if (const std::string problem = problem_of(bytes); !problem.empty()) file.fail(0, problem);
   const cv::Mat image = decode(bytes, cv::IMREAD_UNCHANGED);
-  if (image.empty()) file.fail(0, "it cannot be decoded: cut off, or damaged");
+  if (image.empty()) file.fail(0, "it cannot be decoded: it is truncated or damaged");
   if (image.channels() != 1 && image.channels() != 3)
     file.fail(0, fmt::format("it has {} channels, not 1 or 3", image.channels()));
   return to_png_image(image);

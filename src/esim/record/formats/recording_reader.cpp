@@ -137,8 +137,9 @@ class Folder {
     if (!unfinished_) throw UserError(fmt::format("{} holds no records", root_.string()));
     if (is_being_written(root_))
       throw UserError(fmt::format("{} is being written, and holds no records yet", root_.string()));
-    throw UserError(
-        fmt::format("{} holds no records: what wrote it was ended before the first; make it anew", root_.string()));
+    throw UserError(fmt::format(
+        "{} holds no records: the program that wrote it was stopped before the first record; create it again",
+        root_.string()));
   }
 
   bool is_there(const fs::path& path) const { return unfinished_ ? has_begun(path) : is_file(path); }
@@ -152,8 +153,8 @@ class Folder {
     for (CameraInfo& camera : info_.cameras) {
       if (camera.name.empty() || camera.name.find('/') != std::string::npos || camera.name == ".." ||
           !names.insert(camera.name).second)
-        throw UserError(fmt::format("cannot read {}: \"{}\" is no name of a camera's folder, or of two", root_.string(),
-                                    camera.name));
+        throw UserError(fmt::format("cannot read {}: the camera name \"{}\" must be unique and the name of a folder",
+                                    root_.string(), camera.name));
       if (!options_.sensor) continue;
       camera.model.width = options_.sensor->width, camera.model.height = options_.sensor->height;
     }
@@ -171,7 +172,7 @@ class Folder {
         const double start_s = report.at("start_s"), length_s = report.value("simulated_s", 0.0);
         constexpr double kMax_s = 4e9;
         if (!(std::abs(start_s) <= kMax_s) || !(length_s >= 0 && length_s <= kMax_s))
-          file.fail(0, "its times are none");
+          file.fail(0, "its times are invalid");
         start_ = to_ns(start_s);
         info_.end = *start_ + to_ns(length_s);
       }
@@ -182,12 +183,12 @@ class Folder {
         constexpr int kMaxExtent = 65536;
         if (std::min(camera.model.width, camera.model.height) < 0 ||
             std::max(camera.model.width, camera.model.height) > kMaxExtent)
-          file.fail(0, "the size of a camera is none");
+          file.fail(0, "the size of a camera is invalid");
         info_.cameras.push_back(std::move(camera));
       }
     } catch (const nlohmann::json::exception& error) {
       info_.cameras.clear();
-      file.fail(0, fmt::format("it is no report of a recording ({})", error.what()));
+      file.fail(0, fmt::format("it is not a report of a recording ({})", error.what()));
     }
   }
 

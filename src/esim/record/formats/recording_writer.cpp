@@ -77,8 +77,8 @@ void RecordingWriter::write(const Record& record) {
     if (truth_times_[displacement->camera] !=
         std::pair(std::optional(displacement->t0), std::optional(displacement->t1)))
       throw OutputError("cannot write " + folder_.string() +
-                        ": displacements stand in recordings beside the frames of ground truth that they are between, "
-                        "and there are none; write them in the format flo, or kitti");
+                        ": recordings store optical flow with the ground-truth frames that it connects, but the input "
+                        "has no such frames; write the format flo or kitti instead");
   }
   const Content content = content_of(record);
   sink_of(content == Content::displacement ? Content::truth : content, record).write(record);

@@ -26,7 +26,7 @@ hid_t file_type(NumberType type) {
     case NumberType::float32:
       return H5T_IEEE_F32LE;
   }
-  throw InternalError("a type of number that HDF5 files have not");
+  throw InternalError("this number type is not supported in HDF5 files");
 }
 
 /// Numbers of a growing series, written in whole chunks.
@@ -135,7 +135,7 @@ class Hdf5Shard final : public ShardWriter {
     };
     if (array.type == NumberType::float32) return append(float{});
     if (array.type == NumberType::uint8) return append(std::uint8_t{});
-    throw InternalError(array.name + ": entries of shards are float32 or uint8");
+    throw InternalError(array.name + ": entries of shards must be float32 or uint8");
   }
 
   void add_ragged(const ShardArray& array) {

@@ -14,7 +14,7 @@ constexpr std::size_t kPoseNumbers = 7;
 SE3 pose_of(const hdf5::Input& file, const double* numbers) {
   const SE3 pose{Eigen::Quaterniond(numbers[6], numbers[3], numbers[4], numbers[5]), Eigen::Vector3d(numbers)};
   if (!(std::abs(pose.rotation.norm() - 1) < 1e-3) || !pose.translation.allFinite())
-    file.fail("it holds a pose that is none");
+    file.fail("it holds an invalid pose");
   return pose;
 }
 
@@ -61,7 +61,7 @@ void TruthHdf5Reader::Impl::open() {
   const bool whole = file.integer_attribute("esim_complete").value_or(1) != 0;
   if (whole && size != t.size) file.fail("its datasets differ in length");
   if (displacement.has_value() != displacement_valid.has_value())
-    file.fail("displacement and displacement_valid belong together, and one is missing");
+    file.fail("it must hold both displacement and displacement_valid, or neither");
   if (displacement && size > 0)
     displacements = std::min<std::uint64_t>({displacement->size, displacement_valid->size, size - 1});
 }

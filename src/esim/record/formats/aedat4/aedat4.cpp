@@ -46,7 +46,7 @@ Format aedat4_format() {
 Format aedat4_zstd_format() {
   Format result = format(aedat4::Packing::zstd);
   result.name = "aedat4-zstd";
-  result.description = "AEDAT 4.0, packed with Zstd";
+  result.description = "AEDAT 4.0, compressed with Zstd";
   result.recognises = [](const std::filesystem::path& path, std::string_view head) {
     return aedat4::is_aedat4(head) && is_packed_with_zstd(path);
   };

@@ -96,8 +96,8 @@ Reader::Reader(const std::filesystem::path& path, const ReadOptions& options) : 
   if (wanted_.empty()) {
     const std::vector<std::string> others = not_read();
     throw UserError(fmt::format(
-        "cannot read {}: {}; types of streams that are read: EVTS, FRME, IMUS", path.string(),
-        others.empty() ? "it has no streams" : "none of its streams is one of a recording: " + list_of_some(others)));
+        "cannot read {}: {}; supported stream types: EVTS, FRME, IMUS", path.string(),
+        others.empty() ? "it has no streams" : "none of its streams has a supported type: " + list_of_some(others)));
   }
   name_cameras();
   // The start is known with the first record.
@@ -217,7 +217,7 @@ void Reader::open(const Packet& packet) {
     camera_ = static_cast<int>(i);
     if (cameras_[i].events == packet.stream) {
       const auto* events = verified<fb::EventPacket>(packet.plain, "EVTS");
-      if (events == nullptr) fail("the packet of events is damaged");
+      if (events == nullptr) fail("the event packet is damaged");
       elements_ = events->elements();
       return;
     }
@@ -229,18 +229,18 @@ void Reader::open(const Packet& packet) {
     }
     if (cameras_[i].triggers == packet.stream) {
       const auto* triggers = verified<fb::TriggerPacket>(packet.plain, "TRIG");
-      if (triggers == nullptr) fail("the packet of triggers is damaged");
+      if (triggers == nullptr) fail("the trigger packet is damaged");
       triggers_ = triggers->elements();
       return;
     }
   }
   const auto* imu = verified<fb::ImuPacket>(packet.plain, "IMUS");
-  if (imu == nullptr) fail("the packet of the IMU is damaged");
+  if (imu == nullptr) fail("the IMU packet is damaged");
   measurements_ = imu->elements();
 }
 
 TimeNs Reader::time(std::int64_t us) const {
-  if (us < -kLatestUs || us > kLatestUs) fail(fmt::format("{} us is no time of a recording", us));
+  if (us < -kLatestUs || us > kLatestUs) fail(fmt::format("the time {} us is out of range", us));
   return us * kNsPerUs;
 }
 
@@ -251,7 +251,7 @@ void Reader::take_events() {
     const fb::Event& event = *elements_->Get(taken_);
     const bool sound = event.x() >= 0 && event.y() >= 0 && std::abs(event.timestamp() / 2) <= kLatestUs / 2;
     if (!sound && events_.empty()) {
-      fail(fmt::format("an event at ({}, {}) and {} us", event.x(), event.y(), event.timestamp()));
+      fail(fmt::format("the event at ({}, {}) and {} us is out of range", event.x(), event.y(), event.timestamp()));
     }
     if (!sound) break;
     events_.push_back({event.timestamp() * kNsPerUs, static_cast<std::uint16_t>(event.x()),
@@ -283,7 +283,7 @@ void Reader::take_trigger() {
   }
   const fb::Trigger& trigger = *triggers_->Get(taken_++);
   const auto last = static_cast<std::int8_t>(TriggerKind::exposure_end);
-  if (trigger.kind() < 0 || trigger.kind() > last) fail(fmt::format("a trigger of kind {}", trigger.kind()));
+  if (trigger.kind() < 0 || trigger.kind() > last) fail(fmt::format("unknown trigger kind: {}", trigger.kind()));
   const auto kind = static_cast<TriggerKind>(trigger.kind());
   const bool of_frames = kind >= TriggerKind::frame_start;
   if (of_frames && cameras_[static_cast<std::size_t>(camera_)].frames >= 0) return;
@@ -295,14 +295,14 @@ void Reader::take_frame(const fb::Frame& frame, int camera) {
   const int depth = frame.format() & 7, channels = (frame.format() >> 3) + 1;
   const bool wide = depth == static_cast<int>(Depth::bits16);
   if ((!wide && depth != static_cast<int>(Depth::bits8)) || (channels != 1 && channels != 3 && channels != 4)) {
-    fail(fmt::format("a frame of OpenCV's type {}, which is not grey, BGR or BGRA of 8 or 16 bits", frame.format()));
+    fail(fmt::format("unsupported frame: OpenCV type {}, not grey, BGR or BGRA with 8 or 16 bits", frame.format()));
   }
   const std::size_t pixels =
       static_cast<std::size_t>(std::max(width, 0)) * static_cast<std::size_t>(std::max(height, 0));
   const int number_bytes = wide ? 2 : 1;
   const std::size_t bytes = frame.pixels() == nullptr ? 0 : frame.pixels()->size();
   if (pixels == 0 || bytes != pixels * static_cast<std::size_t>(channels * number_bytes)) {
-    fail(fmt::format("a frame of {} x {} px has {} bytes", width, height, bytes));
+    fail(fmt::format("damaged frame: {} x {} px in {} bytes", width, height, bytes));
   }
   if (image_.width() != width || image_.height() != height) image_ = Image<std::uint16_t>(width, height);
   decode_pixels(frame.pixels()->data(), number_bytes, channels, image_.pixels());

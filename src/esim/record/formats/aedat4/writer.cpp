@@ -82,8 +82,8 @@ void Writer::begin(const RecordingInfo& info) {
     const CameraInfo& camera = info.cameras[i];
     const int width = camera.model.width, height = camera.model.height;
     if (std::max(width, height) > kLargestExtent) {
-      throw UserError(fmt::format("{}: AEDAT 4 holds sensors of up to {} px, and {} has {} x {}", path_.string(),
-                                  kLargestExtent, camera.name, width, height));
+      throw UserError(fmt::format("{}: AEDAT 4 holds sensors of at most {} px per side, but {} has {} x {} px",
+                                  path_.string(), kLargestExtent, camera.name, width, height));
     }
     streams.push_back({events_stream(i), "EVTS", camera.name, width, height});
     streams.push_back({frames_stream(i), "FRME", camera.name, width, height});

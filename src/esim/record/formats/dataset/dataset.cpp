@@ -37,7 +37,7 @@ bool is_zipped_dataset(const fs::path& path, std::string_view head) {
 Format dataset_format() {
   return {
       .name = "dataset",
-      .description = "the Event Camera Dataset's zip",
+      .description = "a zip file in the layout of the Event Camera Dataset",
       .extensions = {".zip"},
       .holds = kContents,
       .recognises = is_zipped_dataset,

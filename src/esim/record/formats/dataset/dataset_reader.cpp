@@ -159,7 +159,7 @@ class FramesPart final : public LinesPart {
     const std::filesystem::path path(name);
     const bool leaves = std::find(path.begin(), path.end(), "..") != path.end();
     if (path.is_absolute() || leaves || !files_.has(name)) {
-      lines.fail(fmt::format("there is no image {} in the dataset", name));
+      lines.fail(fmt::format("the image {} is missing from the dataset", name));
     }
     const std::string shown = files_.path_of(name).string();
     if (files_.size(name) > kMostImageBytes) throw UserError(fmt::format("cannot read {}: it is too large", shown));
@@ -201,7 +201,7 @@ class PosesPart final : public LinesPart {
     pose.body.T_world_body.translation = lines.vector();
     const Eigen::Vector3d q = lines.vector();
     const Eigen::Quaterniond rotation(lines.number(), q.x(), q.y(), q.z());
-    if (std::abs(rotation.norm() - 1) > kLargestNormError) lines.fail("the quaternion is not of unit norm");
+    if (std::abs(rotation.norm() - 1) > kLargestNormError) lines.fail("the quaternion must have unit norm");
     pose.body.T_world_body.rotation = rotation.normalized();
     record.emplace(pose);
   }

@@ -37,12 +37,12 @@ class EntryBuffer final : public std::streambuf {
  public:
   EntryBuffer(const fs::path& path, Entry entry) : file_(path), entry_(entry), left_(entry.packed_bytes) {
     file_.seek(entry.offset);
-    const std::string_view header = text(file_.read_exactly(zip::kLocalHeaderBytes, "the head of a file in the zip"));
+    const std::string_view header = text(file_.read_exactly(zip::kLocalHeaderBytes, "the header of a file in the zip"));
     if (zip::get<std::uint32_t>(header, 0) != zip::kLocalHeader) file_.fail(entry.offset, "the zip is damaged");
     const std::uint64_t skipped = zip::get<std::uint16_t>(header, 26) + zip::get<std::uint16_t>(header, 28);
     file_.seek(file_.offset() + skipped);
     if (entry.method != zip::kStored && entry.method != zip::kDeflated) {
-      file_.fail(entry.offset, "a file in the zip is packed by something else than deflate");
+      file_.fail(entry.offset, "a file in the zip uses a compression method other than deflate");
     }
     if (inflateInit2(&stream_, -MAX_WBITS) != Z_OK) throw std::bad_alloc();
   }
@@ -107,7 +107,7 @@ class EntryBuffer final : public std::streambuf {
     if (result == Z_STREAM_END) {
       ended_ = true;
     } else if (result != Z_OK && count == 0) {
-      file_.fail(file_.offset(), "the file in the zip is damaged: it cannot be unpacked");
+      file_.fail(file_.offset(), "the file in the zip is damaged: it cannot be decompressed");
     }
     return count;
   }
@@ -115,7 +115,7 @@ class EntryBuffer final : public std::streambuf {
   /// At the end: none.
   std::span<const std::byte> next_packed(std::size_t most) {
     const auto bytes = file_.read(static_cast<std::size_t>(std::min<std::uint64_t>(most, left_)));
-    if (bytes.empty() && left_ > 0) file_.fail(file_.offset(), "the file ends before the file in the zip");
+    if (bytes.empty() && left_ > 0) file_.fail(file_.offset(), "the zip ends within a file that it contains");
     left_ -= bytes.size();
     ended_ = left_ == 0 && entry_.method == zip::kStored;
     return bytes;
@@ -188,7 +188,7 @@ ZipInput::Directory ZipInput::find_directory() {
   while (at != std::string::npos && zip::get<std::uint32_t>(end, at) != zip::kEnd)
     at = at > 0 ? at - 1 : std::string::npos;
   if (at == std::string::npos)
-    file_.fail(file_.size(), "the list of its files is missing from the end of the zip: it is cut off");
+    file_.fail(file_.size(), "the zip is truncated: the list of files at its end is missing");
 
   const Directory found{zip::get<std::uint32_t>(end, at + 16), zip::get<std::uint32_t>(end, at + 12),
                         zip::get<std::uint16_t>(end, at + 10)};
@@ -221,7 +221,7 @@ void ZipInput::read_directory() {
     const std::string rest(text(file_.read_exactly(name_bytes + extra_bytes + comment_bytes, "the list of files")));
     take_extra(std::string_view(rest).substr(name_bytes, extra_bytes), entry);
     if (file_.offset() - directory.offset > kMostDirectoryBytes) file_.fail(offset, "the list of files is too long");
-    if (entry.offset >= file_.size()) file_.fail(offset, "a file of the zip lies behind its end");
+    if (entry.offset >= file_.size()) file_.fail(offset, "a file in the zip starts after the end of the zip");
     entries_.emplace(rest.substr(0, name_bytes), entry);
   }
 }

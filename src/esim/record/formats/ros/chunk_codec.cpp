@@ -112,10 +112,10 @@ void compress(ChunkCodec codec, std::string_view raw, std::string& packed) {
 
 std::span<const std::byte> decompress(ChunkCodec codec, std::span<const std::byte> packed, std::uint64_t size,
                                       std::vector<std::byte>& buffer) {
-  if (size > kMaxChunkBytes) throw Malformed("it says that it is larger than any chunk");
+  if (size > kMaxChunkBytes) throw Malformed("its stated size is larger than any chunk");
   switch (codec) {
     case ChunkCodec::none:
-      if (packed.size() != size) throw Malformed("its size is not the one that it says");
+      if (packed.size() != size) throw Malformed("its size differs from its stated size");
       return packed;
     case ChunkCodec::lz4:
       decompress_lz4(packed, size, buffer);

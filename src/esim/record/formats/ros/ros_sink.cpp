@@ -70,8 +70,8 @@ TimeNs RosSink::checked(TimeNs t) const {
   const TimeNs most = encoding_ == Encoding::cdr ? std::numeric_limits<std::int32_t>::max()
                                                  : std::numeric_limits<std::uint32_t>::max();  // s
   if (t >= 0 && t / kNsPerSecond <= most) return t;
-  throw UserError(fmt::format("cannot write {}: the time {} s does not fit: ROS holds 0 to {} s", path_.string(),
-                              to_seconds(t), most));
+  throw UserError(fmt::format("cannot write {}: the time {} s does not fit: ROS holds times from 0 to {} s",
+                              path_.string(), to_seconds(t), most));
 }
 
 template <typename T>

@@ -21,7 +21,7 @@ using Part = TruthAssembler::Part;
 constexpr std::size_t kPortion = 1U << 16;  // events
 
 std::string described(const Channel& channel) {
-  return channel.topic + " (" + (channel.type_name.empty() ? "of no type" : channel.type_name) + ")";
+  return channel.topic + " (" + (channel.type_name.empty() ? "no type" : channel.type_name) + ")";
 }
 
 /// What is said of one instant before the message that it belongs to.
@@ -290,8 +290,8 @@ bool has_no_role(const Assignment& to) { return to.role == Role::none; }
   for (const Channel& channel : channels) found.push_back(described(channel));
   throw UserError(
       "cannot read " + path.string() + ": " +
-      (found.empty() ? "it holds no topics" : "none of its topics is one of a recording: " + list_of_some(found)) +
-      "; types that are read: " + known_names());
+      (found.empty() ? "it holds no topics" : "none of its topics has a supported type: " + list_of_some(found)) +
+      "; supported types: " + known_names());
 }
 
 }  // namespace

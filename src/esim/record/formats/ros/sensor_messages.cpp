@@ -24,8 +24,8 @@ class Rows {
     check_extent(message.width, message.height);
     if (pixel_bytes * message.width > message.step ||
         std::uint64_t{message.step} * message.height > message.data.size())
-      throw Malformed("an image has fewer bytes than its size says");
-    if (message.is_bigendian != 0 && pixel_bytes == 2) throw Malformed("an image is big-endian");
+      throw Malformed("an image has fewer bytes than its size requires");
+    if (message.is_bigendian != 0 && pixel_bytes == 2) throw Malformed("big-endian images are not supported");
   }
 
   const std::byte* row(std::uint32_t y) const { return message_.data.data() + std::size_t{y} * message_.step; }
@@ -186,7 +186,7 @@ void to_images(const FlowMessage& message, Image<float>& flow_x, Image<float>& f
   check_extent(message.width, message.height);
   const std::uint64_t bytes = std::uint64_t{message.width} * message.height * sizeof(float);
   if (message.flow_x.bytes.size() != bytes || message.flow_y.bytes.size() != bytes)
-    throw Malformed("a motion field has not as many numbers as its size says");
+    throw Malformed("the number of values of a motion field does not match its size");
   const auto fill = [&](Image<float>& image, Bytes from) {
     image = Image<float>(static_cast<int>(message.width), static_cast<int>(message.height));
     if (!from.empty()) std::memcpy(image.data(), from.data(), from.size());
@@ -197,7 +197,7 @@ void to_images(const FlowMessage& message, Image<float>& flow_x, Image<float>& f
 
 SE3 checked_pose(SE3 pose) {
   const double norm = pose.rotation.norm();
-  if (!(norm > 0.5 && norm < 2) || !pose.translation.allFinite()) throw Malformed("a pose is none");
+  if (!(norm > 0.5 && norm < 2) || !pose.translation.allFinite()) throw Malformed("a pose is invalid");
   if (std::abs(norm - 1) > kRoundingOfNorm) pose.rotation.normalize();
   return pose;
 }

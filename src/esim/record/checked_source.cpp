@@ -38,7 +38,7 @@ const Record* CheckedSource::next() {
   }
 }
 
-/// The events before the first one that is wrong.
+/// The events before the first invalid one.
 const Record* CheckedSource::checked(const EventsRecord& record) {
   const auto index = static_cast<std::size_t>(record.camera);
   const Camera& camera = info().cameras.at(index).model;

@@ -25,7 +25,7 @@ std::string names_of(const std::vector<CameraInfo>& cameras) {
   return names;
 }
 
-/// The camera to take out; nothing: all.
+/// The index of the camera to copy; nothing: all.
 std::optional<int> chosen_camera(const RecordingInfo& info, const Format& format, const std::string& name) {
   const auto& cameras = info.cameras;
   if (cameras.empty() && !format.several_cameras)
@@ -76,7 +76,7 @@ class Copy {
     }
   }
 
-  /// `began` becomes true with the first record that is written, or refused.
+  /// Sets `began` as soon as there is a record to write.
   CopySummary run(const std::function<bool(double)>& go_on, bool& began) {
     to_->begin(from_.info());
     while (const Record* record = next()) {
@@ -93,7 +93,7 @@ class Copy {
   }
 
  private:
-  /// What cannot be read ends the target, incomplete. (One that cannot be written is not ended: it stays as it is.)
+  /// If reading fails, the target is ended as incomplete. (If writing fails, it is left as it is.)
   const Record* next() {
     try {
       return from_.next();
@@ -130,7 +130,7 @@ class Copy {
   CopySummary summary_;
 };
 
-/// What a folder needs, besides the files of its format, to be known as a recording: a report.json.
+/// The report.json that makes a folder, with the files of its format, recognisable as a recording.
 std::string conversion_report(const RecordingInfo& info, const std::string& from, bool complete) {
   auto cameras = nlohmann::ordered_json::array();
   for (const CameraInfo& camera : info.cameras) {
@@ -189,7 +189,7 @@ CopySummary convert_recording(const fs::path& from, const Format& format, const 
     } catch (const OutputError&) {
       throw;
     } catch (const UserError&) {
-      copied = false;  // the input is damaged or does not fit into the format: both have a remedy, and this is none
+      copied = false;  // the input is damaged or does not fit into the format: both have a remedy, so nothing is kept
       throw;
     }
   };

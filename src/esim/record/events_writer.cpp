@@ -48,7 +48,7 @@ class EventsSink final : public Sink {
   }
 
  private:
-  /// They are in order of time: the first and the last tell.
+  /// Events are in order of time, so checking the first and the last is enough.
   void check(EventSpan events) const {
     int x = 0, y = 0;
     for (const Event& event : events) x = std::max<int>(x, event.x), y = std::max<int>(y, event.y);

@@ -15,7 +15,7 @@ constexpr std::int64_t kMaxUs = 0xFFFF'FFFF;
 constexpr std::uint64_t kTurnUs = kMaxUs + 1;
 
 constexpr char kEventSize = 8;
-constexpr char kEvent2d = 0x00, kEventCd = 0x0C;  // two names of one thing
+constexpr char kEvent2d = 0x00, kEventCd = 0x0C;  // two types with the same content
 
 bool is_dat(std::string_view head) {
   const prophesee::Header header = prophesee::parse_header(head);
@@ -76,7 +76,7 @@ class DatReader final : public EventsReader {
 
  private:
   static constexpr std::size_t kBlockWords = 1 << 15;
-  static constexpr std::uint64_t kMaxTurnsUs = std::uint64_t{1} << 52;  // and what a block may add
+  static constexpr std::uint64_t kMaxTurnsUs = std::uint64_t{1} << 52;  // plus what one block may add
 
   InputFile file_;
   prophesee::Header header_;

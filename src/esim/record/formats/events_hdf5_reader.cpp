@@ -69,7 +69,7 @@ void EventsHdf5Reader::Impl::open() {
   p = file.open_column("events/p");
   if (file.has("ms_to_idx")) ms_to_idx = file.open_column("ms_to_idx");
 
-  // A killed writer may leave columns of different lengths: what all of them have is good.
+  // A killed writer may leave columns of different lengths: their common part is valid.
   size = std::min({t.size, x.size, y.size, p.size});
   const bool equal = t.size == size && x.size == size && y.size == size && p.size == size;
   if (!equal && complete.value_or(true)) file.fail("the datasets in the group events differ in length");
@@ -89,7 +89,7 @@ std::int64_t EventsHdf5Reader::Impl::stored_time(std::uint64_t index) const {
   return value;
 }
 
-// The last millisecond of ms_to_idx, in the unit.
+// The time of the last entry of ms_to_idx, in units.
 std::int64_t EventsHdf5Reader::Impl::index_end() const {
   if (!ms_to_idx || ms_to_idx->size == 0) return 0;
   std::int64_t end = 0;
@@ -97,7 +97,7 @@ std::int64_t EventsHdf5Reader::Impl::index_end() const {
   return end;
 }
 
-// Where ms_to_idx says that the first event at or after a stored time is: somewhere in [first, second].
+// The range [first, second] in which, by ms_to_idx, the first event at or after a stored time is.
 std::pair<std::uint64_t, std::uint64_t> EventsHdf5Reader::Impl::index_hint(std::int64_t stored) const {
   const std::int64_t units_per_ms = kNsPerMs / ns_per_unit;
   if (!ms_to_idx || ms_to_idx->size == 0) return {0, size};
@@ -111,7 +111,7 @@ std::pair<std::uint64_t, std::uint64_t> EventsHdf5Reader::Impl::index_hint(std::
 }
 
 std::uint64_t EventsHdf5Reader::Impl::first_at_or_after(TimeNs time) const {
-  // In the file's unit since t_offset: stored times were rounded down, and stand for the start of their unit.
+  // Times in units since t_offset. Stored times were rounded down, so they stand for the start of their unit.
   std::int64_t since_ns = 0;
   if (__builtin_sub_overflow(time, t_offset * ns_per_unit, &since_ns)) return time < 0 ? 0 : size;
   if (since_ns <= 0) return 0;

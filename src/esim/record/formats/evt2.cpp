@@ -49,7 +49,7 @@ class Evt2Writer final : public EventsWriter {
   std::int64_t high_ = -1;
 };
 
-/// EVT 2.0 where words have 32 bits, EVT 2.1 where they have 64.
+/// EVT 2.0 for words of 32 bits, EVT 2.1 for words of 64 bits.
 template <typename Word>
 class Evt2Reader final : public EventsReader {
  public:
@@ -87,10 +87,10 @@ class Evt2Reader final : public EventsReader {
         if (!high_us) return false;
         high_us_ = *high_us;
         timed_ = true;
-      } else if (type <= kOn && timed_) {  // what comes before the first high bits has no time
+      } else if (type <= kOn && timed_) {  // events before the first high bits have no time
         const TimeNs t = (high_us_ + ((head >> 22) & ((1U << kLowBits) - 1))) * kNsPerUs;
         put(t, (head >> 11) & 0x7FF, head & 0x7FF, type == kOn, next);
-      }  // else triggers, their continuations, vendors' own
+      }  // otherwise triggers, their continuations, or vendors' own words
     }
     return true;
   }

@@ -22,7 +22,7 @@ constexpr std::array kChannels = {"Y", "Z", "V.x", "V.y"};  // irradiance, depth
 
 std::size_t row_bytes(const Image<float>& image) { return static_cast<std::size_t>(image.width()) * sizeof(float); }
 
-/// The channels that there are, as floats. False where there are none.
+/// Reads the channels that exist, as floats. Returns false if the file has none.
 bool write_exr(const fs::path& path, const TruthRecord& truth) {
   const std::array images = {&truth.irradiance, &truth.depth, &truth.flow_x, &truth.flow_y};
   std::optional<Imf::Header> header;
@@ -32,7 +32,7 @@ bool write_exr(const fs::path& path, const TruthRecord& truth) {
     if (image.empty()) continue;
     if (!header) header.emplace(image.width(), image.height());
     header->channels().insert(kChannels[i], Imf::Channel(Imf::FLOAT));
-    auto* const pixels = const_cast<char*>(reinterpret_cast<const char*>(image.data()));  // is only read
+    auto* const pixels = const_cast<char*>(reinterpret_cast<const char*>(image.data()));  // never written to
     buffer.insert(kChannels[i], Imf::Slice(Imf::FLOAT, pixels, sizeof(float), row_bytes(image)));
   }
   if (!header) return false;

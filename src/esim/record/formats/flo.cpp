@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 static_assert(std::endian::native == std::endian::little, "files are little-endian");
 
-// As in the benchmark's own code: above the threshold flow is unknown, and this is written for it.
+// As in the benchmark's own code: values above the threshold mean unknown flow, which is written as the second number.
 constexpr float kUnknownAbove = 1e9F, kUnknown = 1e10F;
 
 void write_flo(const fs::path& path, const Image<float>& x, const Image<float>& y) {

@@ -36,14 +36,14 @@ std::string names() {
   return text;
 }
 
-/// Of the path as it will be when it is whole.
+/// The extension of the path without a final .incomplete.
 std::string extension_of(const fs::path& path) {
   return (path.extension() == ".incomplete" ? path.stem() : path).extension().string();
 }
 
 }  // namespace
 
-// In order: of those that recognise a file the first reads it, of those with its extension the first writes it.
+// Order matters: the first format that recognises a file reads it; the first with its extension writes it.
 const std::vector<Format>& formats() {
   // clang-format off
   static const std::vector<Format> all = {
@@ -63,8 +63,8 @@ const std::vector<Format>& formats() {
       v2e_format(),
       e2vid_format(),
       e2calib_format(),
-      dsec_format(),  // takes every HDF5 that is left
-      events_text_format(),  // and every text
+      dsec_format(),  // recognises every other HDF5 file
+      events_text_format(),  // recognises every other text
       recording_format(),
       flo_format(),
       kitti_format(),

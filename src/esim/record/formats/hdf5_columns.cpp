@@ -111,7 +111,7 @@ class ColumnsReader final : public EventBlocksReader {
   hdf5::Column t_, x_, y_, p_;
   bool in_seconds_;
   SensorSize sensor_;
-  std::int64_t milliseconds_ = 0;  // entries of the index; 0: there is none
+  std::int64_t milliseconds_ = 0;  // number of entries of the index; 0: no index
   std::vector<std::int64_t> x_numbers_, y_numbers_, p_numbers_;
 };
 
@@ -136,7 +136,7 @@ bool has_event_columns(const EventColumns& names, const std::filesystem::path& p
     const hdf5::Input file(path);
     const char* all[] = {names.t, names.x, names.y, names.p};
     return std::all_of(std::begin(all), std::end(all), [&](const char* name) { return file.has(name); });
-  } catch (const UserError&) {  // for DSEC's reader, which takes all that are left, to tell
+  } catch (const UserError&) {  // DSEC's reader, which takes all other files, reports the problem
     return false;
   }
 }

@@ -9,8 +9,8 @@
 namespace esim::hdf5 {
 namespace {
 
-// Evictions would write parts of the index at any time; without them the file changes its structure only in flush(),
-// so that a killed process leaves what its last flush left. The index is small: about 40 bytes per chunk.
+// Evictions would write parts of the index at any time. Without them, the file changes its structure only in flush(),
+// so a killed process leaves the state of its last flush. The index is small: about 40 bytes per chunk.
 herr_t hold_index_until_flush(hid_t access_list) {
   H5AC_cache_config_t config{};
   config.version = H5AC__CURR_CACHE_CONFIG_VERSION;
@@ -22,7 +22,7 @@ herr_t hold_index_until_flush(hid_t access_list) {
   return H5Pset_mdc_config(access_list, &config);
 }
 
-// Byte shuffle before the codec: the high bytes of neighbours are alike.
+// Byte shuffle before the codec: the high bytes of neighbouring numbers are similar.
 herr_t add_filters(hid_t creation_list, Compression compression) {
   switch (compression) {
     case Compression::blosc: {
@@ -85,7 +85,7 @@ Quiet::Quiet() {
 
 Quiet::~Quiet() {
   H5Eset_auto2(H5E_DEFAULT, print_, data_);
-  // Errors that a thread leaves behind when it ends keep the library from closing.
+  // Errors that a thread leaves on the error stack when it ends would keep the library from closing.
   if (print_ != nullptr) H5Eclear2(H5E_DEFAULT);
 }
 
@@ -170,7 +170,7 @@ void Output::create_text_attribute(hid_t object, const char* name, const std::st
 void Output::create_text_attribute(hid_t object, const char* name, const std::vector<std::string>& values) const {
   std::size_t longest = 0;
   for (const std::string& value : values) longest = std::max(longest, value.size());
-  std::string cells;  // of one size each, filled up with zeros
+  std::string cells;  // of equal size, padded with zeros
   for (const std::string& value : values) cells += value + std::string(longest + 1 - value.size(), '\0');
   const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
   check(H5Tset_size(type, longest + 1));
@@ -205,7 +205,7 @@ Series::Series(const Output& file, const char* name, SeriesLayout layout)
   file.check(H5Pset_chunk(creation, rank, chunk.data()));
   file.check(add_filters(creation, layout.compression));
 
-  // Whole chunks pass the chunk cache by; a small one holds the growing chunk of an uncompressed series.
+  // Complete chunks bypass the chunk cache; a small cache holds the growing chunk of an uncompressed series.
   const Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
   const std::size_t cache_bytes = layout.compression == Compression::none ? 1 << 16 : 0;
   file.check(H5Pset_chunk_cache(access, 11, cache_bytes, 1.0));

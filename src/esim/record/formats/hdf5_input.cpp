@@ -37,7 +37,7 @@ void Input::fail(const std::string& what) const { throw UserError("cannot read "
 
 bool Input::has(const char* name) const {
   const Quiet quiet;
-  // Each part of the name by itself: the library refuses to look below what is not there.
+  // Checks each part of the name separately: the library fails below a group that does not exist.
   const std::string full = name;
   for (std::size_t slash = full.find('/'); slash != std::string::npos; slash = full.find('/', slash + 1)) {
     if (H5Lexists(file_, full.substr(0, slash).c_str(), H5P_DEFAULT) <= 0) return false;
@@ -114,7 +114,7 @@ void Input::open_chunks(hid_t creation, Column& column, const std::string& name)
   }
   if (!std::equal(column.item_shape.begin(), column.item_shape.end(), shape.begin() + 1))
     fail(name + " has chunks that hold only parts of items, which is not supported");
-  // Blosc's filter takes four values without looking whether there are so many.
+  // Blosc's filter reads four values without checking their number.
   const int filters = H5Pget_nfilters(creation);
   for (int i = 0; i < filters; ++i) {
     unsigned flags = 0;
@@ -134,8 +134,8 @@ void Input::fail_short(const Column& column, const std::string& name) const {
   fail(name + " should hold " + std::to_string(column.size) + " numbers, but the file has fewer");
 }
 
-// The filter trusts the sizes in the head of each packed chunk: how much it allocates and how much it leaves for the
-// library to read.
+// Blosc's filter trusts the sizes in the header of each compressed chunk: the size of its allocation and the number of
+// bytes for the library to read.
 void Input::require_sound_chunks(const Column& column, hsize_t first, hsize_t count) const {
   if (!column.only_blosc) return;
   std::vector<std::uint8_t> packed;
@@ -172,7 +172,7 @@ void Input::read(const Column& column, hsize_t first, hsize_t count, hid_t type,
   if (H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, shape.data(), nullptr) < 0 ||
       H5Dread(column.dataset, type, in_memory, in_file, H5P_DEFAULT, out) < 0) {
     const std::string reason = last_error();
-    require_available(Compression::blosc);  // the usual cause has a remedy
+    require_available(Compression::blosc);  // the usual cause, which has a remedy
     fail("it is damaged, or compressed by a filter that is not available (" + reason + ")");
   }
 }

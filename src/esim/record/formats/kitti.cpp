@@ -18,10 +18,10 @@ namespace fs = std::filesystem;
 
 constexpr float kMaxNumber = 65535;
 constexpr int kOffset = 32768;
-constexpr float kKittiPerPixel = 64, kDsecPerPixel = 128;  // numbers for a pixel of flow
-constexpr float kPerMetre = 256;                           // and for a metre of depth
+constexpr float kKittiPerPixel = 64, kDsecPerPixel = 128;  // numbers per pixel of flow
+constexpr float kPerMetre = 256;                           // numbers per metre of depth
 
-/// Flow in red and green, and in blue whether it is known: 1 or 0. What is too large for the numbers is not known.
+/// Flow in red and green; blue is 1 where the flow is known, otherwise 0. Flow that is out of range counts as unknown.
 void write_flow(const fs::path& path, const Image<float>& x, const Image<float>& y, float per_pixel) {
   PerColour<Image<std::uint16_t>> channels;
   channels.fill(Image<std::uint16_t>(x.width(), x.height()));
@@ -56,7 +56,7 @@ void read_flow(const fs::path& path, SequenceImages& images, float per_pixel) {
   }
 }
 
-/// 0 is no depth: nothing seen, or farther than the numbers go.
+/// 0 means no depth: no surface, or out of range.
 void write_depth(const fs::path& path, const Image<float>& depth) {
   Image<std::uint16_t> numbers(depth.width(), depth.height());
   std::transform(depth.pixels().begin(), depth.pixels().end(), numbers.pixels().begin(), [](float z) {
@@ -134,7 +134,7 @@ class DsecFlowWriter final : public Sink {
   }};
 };
 
-/// The files by name, and a line of times for each.
+/// The files in order of their names, with one line of times for each.
 FileSequence dsec_files(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;

@@ -61,12 +61,12 @@ class M3edWriter final : public Sink {
   Compression compression_;
   TimeNs end_ = 0;
 
-  // What has not been written yet.
+  // Buffers that have not been written yet.
   std::vector<std::int64_t> t_;
   std::vector<std::uint16_t> x_, y_;
   std::vector<std::int8_t> p_;
 
-  // The series close before the file.
+  // Declared last, so that the series close before the file.
   std::optional<hdf5::Output> file_;
   hdf5::Series t_series_, x_series_, y_series_, p_series_;
   hdf5::MillisecondIndex milliseconds_;

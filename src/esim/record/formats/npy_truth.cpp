@@ -45,7 +45,7 @@ class NpyWriter {
     file_.append(npy::header_text(quoted(kType<T>), shape_));
   }
 
-  /// One item, in parts. The file is whole after the last one.
+  /// Appends one item, in parts. Afterwards the file is valid.
   void append(std::initializer_list<std::span<const T>> parts) {
     for (const std::span<const T> part : parts) {
       file_.append({reinterpret_cast<const char*>(part.data()), part.size_bytes()});
@@ -61,7 +61,7 @@ class NpyWriter {
   std::vector<std::uint64_t> shape_;
 };
 
-/// The items of an array, one after the other.
+/// Reads the items of an array one after the other.
 template <typename T>
 class NpyReader {
  public:
@@ -85,11 +85,11 @@ class NpyReader {
   const std::vector<std::uint64_t>& item_shape() const { return item_shape_; }
   std::uint64_t left() const { return items_ - read_; }
 
-  /// Fills the parts, which are all of the next item.
+  /// Fills the parts, which together are the next item.
   void read(std::initializer_list<std::span<T>> parts) {
     if (left() == 0) file_.fail(file_.size(), "it has fewer items than there are times");
     for (const std::span<T> part : parts) {
-      // In pieces, so that a shape that is a lie takes no memory.
+      // In pieces, so that a wrong shape does not allocate memory.
       constexpr std::size_t kPiece = 1 << 16;
       for (std::size_t done = 0; done < part.size(); done += kPiece) {
         const std::span<T> piece = part.subspan(done, std::min(kPiece, part.size() - done));
@@ -99,7 +99,7 @@ class NpyReader {
     ++read_;
   }
 
-  /// Fails unless the file has the bytes of the next item.
+  /// Fails unless the file contains the bytes of the next item.
   void require_item() const {
     if ((file_.size() - file_.offset()) / sizeof(T) < numbers_)
       file_.fail(file_.size(), "the file ends within an item");
@@ -187,7 +187,7 @@ class NpyTruthWriter final : public Sink {
   std::optional<NpyWriter<std::uint8_t>> displacement_valid_;
 };
 
-/// Arrays of one folder, with images of one size.
+/// The arrays in one folder; all images have one size.
 class Folder {
  public:
   explicit Folder(fs::path path) : path_(std::move(path)) {}
@@ -197,7 +197,7 @@ class Folder {
     return fs::is_regular_file(path_ / name, error);
   }
 
-  /// Nothing where there is none; of `vectors`, x and then y.
+  /// Nothing if the file does not exist. `vectors`: images of x and y.
   template <typename T>
   std::optional<NpyReader<T>> images(const char* name, bool vectors = false) {
     if (!has(name)) return std::nullopt;
@@ -333,7 +333,7 @@ class DisplacementsStream final : public RecordStream {
   std::optional<Record> record_;
 };
 
-/// Displacements follow the frames that they lead to.
+/// Optical flow follows the frame at its end.
 std::unique_ptr<Source> open_folder(const fs::path& path, const ReadOptions& options) {
   const auto folder = std::make_shared<Folder>(path);
   std::vector<std::unique_ptr<RecordStream>> streams;

@@ -62,7 +62,7 @@ bool is_recording(const fs::path& path) {
   return has_parts || (is_file(path / "report.json") && !has_conversion_report(path));
 }
 
-/// Frames per second: the shortest number that gives just these times, where there is one. 0: unknown.
+/// Frames per second: the shortest number that gives exactly these times, if there is one. 0: unknown.
 double rate_of(const TruthHdf5Reader& truth) {
   const std::uint64_t frames = truth.size();
   if (frames < 2 || truth.t(frames - 1) <= truth.t(0)) return 0;
@@ -78,7 +78,7 @@ double rate_of(const TruthHdf5Reader& truth) {
   return rate_hz;
 }
 
-/// Reads one folder: first what is known of the recording, then its streams.
+/// Reads one folder: first the description of the recording, then its streams.
 class Folder {
  public:
   Folder(const fs::path& path, const ReadOptions& options) : options_(options) {
@@ -119,7 +119,7 @@ class Folder {
   }
 
  private:
-  /// With `recover`, goes on where a part cannot be read.
+  /// With `recover`, continues if a part cannot be read.
   template <typename Part>
   void attempt(const Part& read) {
     try {
@@ -130,7 +130,7 @@ class Folder {
     }
   }
 
-  /// A recording without events is one. But nothing at all, or the beginning of an unfinished one, is none.
+  /// A recording without events is valid. An empty one, or the beginning of an unfinished one, is not.
   void require_something() const {
     const bool any = !body_.empty() || !events_.empty() || !frames_.empty() || !truth_.empty();
     if (any || (!info_.cameras.empty() && !unfinished_)) return;
@@ -192,7 +192,7 @@ class Folder {
     }
   }
 
-  /// rig.yaml has the cameras in the body's frame; camchain.yaml, from the IMU's.
+  /// rig.yaml has the cameras in the body frame; camchain.yaml has them relative to the IMU.
   void read_calibrations(const fs::path& folder) {
     std::vector<CameraInfo> cameras;
     for (auto& [name, model, T_body_camera] : read_calibration(folder / "rig.yaml"))
@@ -222,7 +222,7 @@ class Folder {
     }
   }
 
-  /// The files of the moving objects, whose names become known; without names.txt, in the order of the files' names.
+  /// The files of the moving objects; sets their names. Without names.txt, they are in the order of the file names.
   std::vector<fs::path> read_objects(const fs::path& folder) {
     std::vector<fs::path> files;
     if (is_file(folder / "names.txt")) {
@@ -290,7 +290,7 @@ class Folder {
     if (model.width == 0) model.width = size.width, model.height = size.height;
   }
 
-  /// After "static" come the objects, then the layers.
+  /// The names are "static", then the objects, then the layers.
   void learn_names(const TruthHdf5Reader& truth) {
     const std::vector<std::string>& names = truth.names();
     const std::size_t objects = info_.objects.empty() ? truth.objects() : info_.objects.size();
@@ -303,10 +303,10 @@ class Folder {
   ReadOptions options_;
   fs::path root_;
   std::vector<fs::path> folders_;  // of the cameras
-  bool alone_ = false;             // one camera's, without what is the rig's
-  bool unfinished_ = false;        // by its report: killed, interrupted, or being written
+  bool alone_ = false;             // a camera's folder alone, without the rig's files
+  bool unfinished_ = false;        // by its report: killed, interrupted, or still being written
   RecordingInfo info_;
-  std::optional<TimeNs> start_;         // as the report has it
+  std::optional<TimeNs> start_;         // from the report
   std::optional<TimeNs> events_start_;  // as the files of events have it
   std::vector<std::unique_ptr<RecordStream>> body_, events_, frames_, truth_;
 };

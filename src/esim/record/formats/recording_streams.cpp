@@ -94,7 +94,7 @@ class ImuStream final : public RecordStream {
   std::optional<Record> record_;
 };
 
-/// Portions are cut where other streams have their turn.
+/// Portions end where other streams have earlier records.
 class EventsStream final : public RecordStream {
  public:
   EventsStream(std::unique_ptr<Source> events, int camera) : events_(std::move(events)), camera_(camera) {}
@@ -139,7 +139,7 @@ class FramesStream final : public RecordStream {
         for (int x = 0; x < image_.width(); ++x) image_(x, y) = png.channels[colour_at(x, y)](x, y);
       }
     }
-    // Lists of four columns do not say when the first row began: as if the shutter were global.
+    // Lists of four columns lack the start of the first row: assume a global shutter.
     const TimeNs exposure = list_.integer(2);
     const bool full = list_.columns() > 4;
     if (list_.columns() == 5) list_.fail("the line has 5 numbers, but needs 6");
@@ -158,7 +158,7 @@ class FramesStream final : public RecordStream {
   std::optional<Record> record_;
 };
 
-/// A displacement follows the frame that it leads to.
+/// Optical flow follows the frame at its end.
 class TruthStream final : public RecordStream {
  public:
   TruthStream(std::shared_ptr<const TruthHdf5Reader> truth, int camera, ImagesStream* images)
@@ -201,7 +201,7 @@ class TruthStream final : public RecordStream {
   }
 
  private:
-  /// Whether the next frame is of this time, and not known to be damaged.
+  /// Whether the next frame is at this time and not known to be damaged.
   bool shows(TimeNs t) const { return !damage_ && frame_ < truth_->size() && truth_->t(frame_) == t; }
 
   static inline const Image<float> kNoImage;
@@ -209,9 +209,9 @@ class TruthStream final : public RecordStream {
   std::shared_ptr<const TruthHdf5Reader> truth_;
   int camera_;
   ImagesStream* images_;
-  std::uint64_t frame_ = 0;        // that is read next
-  std::exception_ptr damage_;      // of that frame, whose image is still handed out
-  bool displacement_due_ = false;  // to the frame before it
+  std::uint64_t frame_ = 0;        // index of the next frame
+  std::exception_ptr damage_;      // damage of that frame, whose image is still handed out
+  bool displacement_due_ = false;  // optical flow to the previous frame is due
   TruthHdf5Reader::Frame images_of_frame_;
   TruthHdf5Reader::Displacement displacement_;
   std::optional<Record> record_;

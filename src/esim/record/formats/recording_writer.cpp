@@ -20,7 +20,7 @@
 namespace esim {
 namespace {
 
-/// The camera that a record is of; -1: of none.
+/// The camera of a record; -1: no camera.
 int camera_of(const Record& record) {
   const auto camera = [](const auto& kind) {
     if constexpr (requires { kind.camera; }) return kind.camera;
@@ -38,7 +38,7 @@ TimeNs time_of(const Record& record) {
   return std::visit(time, record);
 }
 
-/// Gives every camera a name that is fit for a folder and no other's.
+/// Gives every camera a unique name that is valid for a folder.
 void name_folders(std::vector<CameraInfo>& cameras) {
   std::set<std::string> taken = {"calibration", "objects"};
   for (std::size_t i = 0; i < cameras.size(); ++i) {

@@ -40,7 +40,7 @@ struct TruthHdf5Writer::Impl {
   int width = 0, height = 0;
   std::vector<float> vector_frame;
 
-  // The series close before the file.
+  // Declared last, so that the series close before the file.
   std::optional<hdf5::Output> file;
   hdf5::Handle esim_complete;
   hdf5::Series t, pose, depth, flow, objects, object_poses, displacement, displacement_valid;
@@ -152,7 +152,7 @@ void TruthHdf5Writer::Impl::append(hdf5::Series& series, std::span<const SE3> po
   series.append(std::span<const double>(numbers));
 }
 
-/// How many there are, the first frame says.
+/// The first frame determines the number of objects.
 void TruthHdf5Writer::Impl::append_object_poses(std::span<const SE3> poses) {
   if (poses.empty()) return;
   if (object_poses.id() < 0) {

@@ -100,7 +100,7 @@ class V2eWriter final : public Sink {
   Compression compression_;
   std::vector<std::uint32_t> rows_;  // not written yet
   std::optional<hdf5::Output> file_;
-  hdf5::Series series_;  // closes before the file
+  hdf5::Series series_;  // declared last, closes before the file
 };
 
 bool is_v2e(const std::filesystem::path& path, std::string_view head) {

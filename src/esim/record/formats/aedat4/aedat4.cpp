@@ -28,7 +28,7 @@ Format format(aedat4::Packing packing) {
 bool is_packed_with_zstd(const std::filesystem::path& path) {
   try {
     return aedat4::PacketReader(path).packing() >= aedat4::Packing::zstd;
-  } catch (const UserError&) {  // for the other format to tell
+  } catch (const UserError&) {  // the other format reports the problem
     return false;
   }
 }

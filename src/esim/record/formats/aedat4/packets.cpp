@@ -53,7 +53,7 @@ void PacketReader::read_header() {
   streams_ = *streams;
 }
 
-/// It is not needed: one that is damaged or cut off is as good as none.
+/// Reads the optional table; a damaged or truncated one is ignored.
 void PacketReader::read_data_table() {
   if (!data_table_ || *data_table_ >= file_.size() || file_.size() - *data_table_ > Unpacker::kMostBytes) return;
   file_.seek(*data_table_);

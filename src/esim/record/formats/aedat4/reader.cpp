@@ -26,13 +26,13 @@ bool is_plain(std::string_view name) {
   return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), plain);
 }
 
-/// The luma (ITU-R BT.601) of a pixel's numbers: grey, or BGR and what follows.
+/// The luma (ITU-R BT.601) of a grey, BGR or BGRA pixel.
 std::uint16_t luma(const std::uint16_t* numbers, int channels) {
   if (channels == 1) return numbers[0];
   return static_cast<std::uint16_t>((114U * numbers[0] + 587U * numbers[1] + 299U * numbers[2] + 500U) / 1000U);
 }
 
-/// Pixels of `channels` numbers of one byte or two.
+/// Converts pixels of `channels` numbers of one or two bytes.
 void decode_pixels(const std::uint8_t* bytes, int number_bytes, int channels, std::span<std::uint16_t> pixels) {
   for (std::uint16_t& pixel : pixels) {
     std::uint16_t numbers[4];
@@ -75,7 +75,7 @@ class Reader final : public Source {
   std::vector<CameraStreams> cameras_;
   std::vector<int> wanted_;  // streams
 
-  // What of the current packet is left.
+  // The rest of the current packet.
   Packet packet_;
   int camera_ = 0;
   const flatbuffers::Vector<const fb::Event*>* elements_ = nullptr;
@@ -86,7 +86,7 @@ class Reader final : public Source {
   std::vector<Event> events_;
   Image<std::uint16_t> image_;
   std::optional<Record> record_;
-  bool waiting_ = false;  // the first record has been read, but not handed out
+  bool waiting_ = false;  // the first record has been read but not handed out
   bool ended_ = false;
   std::exception_ptr damage_;
 };
@@ -100,7 +100,7 @@ Reader::Reader(const std::filesystem::path& path, const ReadOptions& options) : 
         others.empty() ? "it has no streams" : "none of its streams has a supported type: " + list_of_some(others)));
   }
   name_cameras();
-  // The start is known with the first record.
+  // The first record determines the start.
   try {
     waiting_ = read();
   } catch (const UserError&) {
@@ -130,11 +130,12 @@ std::vector<std::string> Reader::not_read() const {
   return others;
 }
 
-/// A camera is a source that has events or frames, once each: a second stream of a kind is another camera's.
+/// A camera is a source with at most one stream of events and one of frames: a second stream of a kind belongs to
+/// another camera.
 void Reader::find_cameras(const std::optional<SensorSize>& sensor) {
   for (const Stream& stream : packets_.streams()) {
     const bool events = stream.type == "EVTS", frames = stream.type == "FRME";
-    if (stream.type == "IMUS" && !info_.imu) {  // of several, the first
+    if (stream.type == "IMUS" && !info_.imu) {  // the first of several
       info_.imu.emplace();
       wanted_.push_back(stream.id);
     }
@@ -154,7 +155,7 @@ void Reader::find_cameras(const std::optional<SensorSize>& sensor) {
     info.has_frames |= frames;
     Camera& model = info.model;
     const SensorSize size = sensor.value_or(SensorSize{stream.width, stream.height});
-    // Frames may be of another size than the events of the same camera.
+    // Frames may differ in size from the events' sensor.
     if (events || model.width == 0) model.width = size.width, model.height = size.height;
   }
   for (const Stream& stream : packets_.streams()) {
@@ -167,7 +168,7 @@ void Reader::find_cameras(const std::optional<SensorSize>& sensor) {
   if (info_.cameras.empty()) info_.cameras.emplace_back();
 }
 
-/// As the file does, if that gives a plain name to each.
+/// Names cameras as in the file if this gives each a plain name.
 void Reader::name_cameras() {
   std::vector<std::string> names;
   for (const CameraStreams& camera : cameras_) names.push_back(camera.source);
@@ -186,12 +187,12 @@ const Record* Reader::next() {
     std::rethrow_exception(std::exchange(damage_, nullptr));
   }
   if (ended_) return nullptr;
-  ended_ = true;  // if it throws, too
+  ended_ = true;  // also if the following throws
   ended_ = !read();
   return ended_ ? nullptr : &*record_;
 }
 
-/// Makes record_ the next one; false if there are none left.
+/// Reads the next record into record_; returns false at the end.
 bool Reader::read() {
   record_.reset();
   while (!record_) {
@@ -275,7 +276,7 @@ void Reader::take_measurement() {
   record_.emplace(record);
 }
 
-/// Those of frames are left to the frames, where there are some.
+/// Skips exposure triggers if there are frames, which have their own exposures.
 void Reader::take_trigger() {
   if (taken_ == triggers_->size()) {
     triggers_ = nullptr;
@@ -307,7 +308,7 @@ void Reader::take_frame(const fb::Frame& frame, int camera) {
   if (image_.width() != width || image_.height() != height) image_ = Image<std::uint16_t>(width, height);
   decode_pixels(frame.pixels()->data(), number_bytes, channels, image_.pixels());
 
-  // Programs differ in what the frame's time is; the exposure's is plain where it is given.
+  // Programs define the frame's time differently, but the exposure clearly, where it is given.
   TimeNs start = time(frame.timestamp()), duration = std::max<TimeNs>(time(frame.exposure()), 0);
   const TimeNs opened = time(frame.timestamp_start_of_exposure()), closed = time(frame.timestamp_end_of_exposure());
   if (closed > opened) start = opened, duration = closed - opened;

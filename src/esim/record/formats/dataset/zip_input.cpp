@@ -32,7 +32,7 @@ struct Entry {
   std::uint64_t packed_bytes = 0, bytes = 0, offset = 0;
 };
 
-/// One file of a zip, from its start. What comes before damage is handed out first.
+/// One file in a zip, from its start. Data before damage are handed out first.
 class EntryBuffer final : public std::streambuf {
  public:
   EntryBuffer(const fs::path& path, Entry entry) : file_(path), entry_(entry), left_(entry.packed_bytes) {
@@ -76,7 +76,7 @@ class EntryBuffer final : public std::streambuf {
   }
 
  private:
-  /// The next bytes, at least one; false at the end.
+  /// Reads the next bytes, at least one; returns false at the end.
   bool refill() {
     std::size_t count = 0;
     while (count == 0 && !ended_) count = entry_.method == zip::kStored ? next_stored() : next_inflated();
@@ -96,7 +96,7 @@ class EntryBuffer final : public std::streambuf {
   std::size_t next_inflated() {
     if (stream_.avail_in == 0) {
       const auto bytes = next_packed(kBlockBytes);
-      // The file keeps what it lent until the next call.
+      // Data borrowed from the file stay valid until the next call.
       stream_.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes.data()));
       stream_.avail_in = static_cast<uInt>(bytes.size());
     }
@@ -112,7 +112,7 @@ class EntryBuffer final : public std::streambuf {
     return count;
   }
 
-  /// At the end: none.
+  /// Empty at the end.
   std::span<const std::byte> next_packed(std::size_t most) {
     const auto bytes = file_.read(static_cast<std::size_t>(std::min<std::uint64_t>(most, left_)));
     if (bytes.empty() && left_ > 0) file_.fail(file_.offset(), "the zip ends within a file that it contains");
@@ -123,7 +123,7 @@ class EntryBuffer final : public std::streambuf {
 
   InputFile file_;
   Entry entry_;
-  std::uint64_t left_;  // packed bytes
+  std::uint64_t left_;  // compressed bytes
   z_stream stream_{};
   bool ended_ = false;
   std::uint32_t crc_ = 0;
@@ -135,7 +135,7 @@ class EntryStream final : public std::istream {
  public:
   EntryStream(const fs::path& path, const Entry& entry) : std::istream(nullptr), buffer_(path, entry) {
     rdbuf(&buffer_);
-    exceptions(std::ios::badbit);  // the buffer's own exceptions pass
+    exceptions(std::ios::badbit);  // let exceptions of the buffer pass
   }
 
  private:
@@ -226,7 +226,7 @@ void ZipInput::read_directory() {
   }
 }
 
-/// Numbers that did not fit into 32 bits, in this order.
+/// Reads the extra field, which has the numbers that did not fit into 32 bits, in this order.
 void ZipInput::take_extra(std::string_view extra, Entry& entry) {
   while (extra.size() >= 4) {
     const auto tag = zip::get<std::uint16_t>(extra, 0);

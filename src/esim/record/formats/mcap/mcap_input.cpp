@@ -31,7 +31,7 @@ McapInput::McapInput(std::filesystem::path path) : file_(std::move(path)) {
   file_.seek(start);
 }
 
-/// Without success, the file is read as one that has no summary.
+/// If this fails, the file is read as one without a summary.
 void McapInput::read_summary() {
   if (file_.size() < 2 * kMagic.size() + kFooterBytes) return;
   try {
@@ -86,7 +86,7 @@ McapInput::Record McapInput::next_in_chunk() {
 
 void McapInput::open_chunk(const Record& record) {
   ros::ByteReader content(record.content);
-  content.take(2 * sizeof(std::uint64_t));  // times of the first message and the last
+  content.take(2 * sizeof(std::uint64_t));  // times of the first and last message
   const auto size = content.number<std::uint64_t>();
   const auto crc = content.number<std::uint32_t>();
   const ros::ChunkCodec codec = codec_named(ros::as_text(content.counted()));

@@ -18,7 +18,7 @@ constexpr std::size_t kFirstBytes = 1U << 20;
 
 [[noreturn]] void fail() { throw Malformed("its compressed data are damaged"); }
 
-/// One step of decompression: consumes from the front of both; true once the data are at their end.
+/// One step of decompression: consumes the start of both; returns true at the end of the data.
 template <typename Step>
 void decompress_in_steps(std::span<const std::byte> in, std::uint64_t size, std::vector<std::byte>& raw, Step step) {
   raw.resize(std::min<std::uint64_t>(size, kFirstBytes));

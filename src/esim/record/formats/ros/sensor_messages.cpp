@@ -8,7 +8,7 @@ namespace esim::ros {
 namespace {
 
 constexpr std::uint32_t kMaxExtent = 65536;  // px
-constexpr double kRoundingOfNorm = 1e-9;     // a rotation that is off by no more stays as it is
+constexpr double kRoundingOfNorm = 1e-9;     // rotations within this error of unit norm stay unchanged
 constexpr float kMetresPerMillimetre = 1e-3F;
 
 void check_extent(std::uint32_t width, std::uint32_t height) {
@@ -17,7 +17,7 @@ void check_extent(std::uint32_t width, std::uint32_t height) {
   }
 }
 
-/// The rows of an image whose pixels have so many bytes.
+/// Reads the rows of an image with so many bytes per pixel.
 class Rows {
  public:
   Rows(const ImageMessage& message, std::size_t pixel_bytes) : message_(message) {
@@ -46,7 +46,7 @@ void read_pixels(const ImageMessage& message, std::size_t pixel_bytes, Image<T>&
   }
 }
 
-/// Bytes of a pixel in red, green and blue, and where red and blue are in it; 0: it has no colours.
+/// Bytes per pixel of a colour image, and the positions of red and blue; 0: not a colour encoding.
 struct Colours {
   std::size_t bytes = 0, red = 0, blue = 0;
 };

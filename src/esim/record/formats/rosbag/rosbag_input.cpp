@@ -47,7 +47,7 @@ void RosbagInput::read_bag_header() {
   }
 }
 
-/// Without success, the bag is read as one that has no index.
+/// If this fails, the bag is read as one without an index.
 void RosbagInput::read_index() {
   try {
     file_.seek(index_position_);

@@ -88,7 +88,7 @@ TEST(CopyRecording, TimesMayCountFromTheStart) {
   EXPECT_EQ(events_in(base.path() / "a"), expected);
 }
 
-// A conversion leaves a report.json in the folders that it makes: they are still of their format.
+// A conversion leaves a report.json in its folders, which must keep their format.
 TEST(ConvertRecording, FoldersOfEveryFormatReadBack) {
   const test::TemporaryDirectory base;
   const std::filesystem::path recording = base.path() / "source";

@@ -1,4 +1,5 @@
-// The Event Camera Dataset's layout beyond events, which every_format_test.cpp looks at: as a zip and as a folder.
+// The layout of the Event Camera Dataset, as a zip and as a folder, except for events, which every_format_test.cpp
+// covers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -64,7 +65,7 @@ class DatasetFormat : public testing::TestWithParam<std::string> {
 TEST_P(DatasetFormat, EverythingReadsBack) {
   const fs::path path = write();
   EXPECT_EQ(format_of(path).name, GetParam());
-  EXPECT_EQ(std::distance(fs::directory_iterator(base_.path()), {}), 1) << "nothing is left beside it";
+  EXPECT_EQ(std::distance(fs::directory_iterator(base_.path()), {}), 1) << "no temporary files are left";
   const test::Recorded found = test::read_all(path);
 
   const Camera &camera = found.info.cameras.at(0).model, &was = info_.cameras[0].model;
@@ -117,7 +118,7 @@ TEST_P(DatasetFormat, WhatIsNotRecordedIsNotThere) {
 INSTANTIATE_TEST_SUITE_P(Layouts, DatasetFormat, testing::Values("dataset", "dataset-folder"),
                          [](const auto& test) { return test.param == "dataset" ? "zip" : "folder"; });
 
-/// A folder with the files given by name and content.
+/// Makes a folder with these files, given by name and content.
 fs::path make_folder(const test::TemporaryDirectory& base,
                      const std::vector<std::pair<std::string, std::string>>& files) {
   const fs::path folder = base.path() / "dataset";

@@ -1,4 +1,4 @@
-// NumPy's arrays as others write them. Round trips are those of every format (every_format_test.cpp).
+// NumPy arrays as other programs write them. every_format_test.cpp covers round trips.
 #include <gtest/gtest.h>
 
 #include <cstring>

@@ -16,7 +16,7 @@ class EventsFile {
   /// Throws UserError if there are no events to read, or several cameras.
   explicit EventsFile(const std::filesystem::path& path, const ReadOptions& options = {});
 
-  const std::filesystem::path& path() const { return path_; }  ///< of the file itself
+  const std::filesystem::path& path() const { return path_; }  ///< path of the events file
   std::optional<SensorSize> sensor() const { return sensor_; }
 
   /// Replaces `events` by the next ones, at most `count`; returns false at the end. Throws UserError if a file with

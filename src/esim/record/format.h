@@ -48,9 +48,9 @@ struct Format {
   bool folder = false;                                   ///< true: a recording is a folder; false: a file
   TimeNs resolution = 1;                                 ///< ns; event times are rounded down to multiples of it
   bool either_unit = false;                              ///< and to multiples of WriteOptions::unit
-  int max_width = 65536, max_height = 65536;             ///< px: larger sensors do not fit
-  TimeNs min_time = std::numeric_limits<TimeNs>::min();  ///< of events: earlier ones do not fit
-  TimeNs max_time = std::numeric_limits<TimeNs>::max();  ///< and neither do later ones
+  int max_width = 65536, max_height = 65536;             ///< px; maximum size of the sensor
+  TimeNs min_time = std::numeric_limits<TimeNs>::min();  ///< earliest and
+  TimeNs max_time = std::numeric_limits<TimeNs>::max();  ///< latest time of events, ns
 
   /// Whether a path is a file (or folder) of this format, by its content; `head` is its first 4096 bytes, or fewer.
   std::function<bool(const std::filesystem::path& path, std::string_view head)> recognises{};

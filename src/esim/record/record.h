@@ -102,7 +102,7 @@ struct FrameRecord {
   TimeNs t = 0;                       ///< middle of the exposure; with a rolling shutter, of the middle row
   TimeNs exposure_start = 0;          ///< of the first row
   TimeNs exposure_duration = 0;       ///< of each row
-  double gain = 1;                    ///< 1: a full pixel is full scale
+  double gain = 1;                    ///< 1: a full pixel gives the largest number
   const Image<std::uint16_t>& image;  ///< digital numbers
   int bits = 8;                       ///< bits per number
 };

@@ -59,11 +59,11 @@ class EventsHdf5Reader {
   EventsHdf5Reader& operator=(EventsHdf5Reader&&) noexcept;
 
   std::uint64_t size() const;            ///< number of events
-  std::optional<int> width() const;      ///< px, if the file says
-  std::optional<int> height() const;     ///< px, if the file says
-  TimeUnit unit() const;                 ///< µs if the file does not say
+  std::optional<int> width() const;      ///< px, if the file states it
+  std::optional<int> height() const;     ///< px, if the file states it
+  TimeUnit unit() const;                 ///< µs if the file does not state it
   TimeNs t_offset() const;               ///< ns, whatever the file's unit
-  std::optional<bool> complete() const;  ///< esim_complete, if the file says
+  std::optional<bool> complete() const;  ///< esim_complete, if the file states it
 
   std::optional<TimeSpan> time_span() const;  ///< span of the events; nothing if there are no events
 

@@ -5,7 +5,7 @@
 #include "esim/record/events_writer.h"
 #include "esim/record/formats/prophesee.h"
 
-// EVT 3.0: words of 16 bits, the upper four the type, each a change of the state that events are made of
+// EVT 3.0: words of 16 bits. The upper four bits are the type; each word changes the state that determines events
 // (https://docs.prophesee.ai/stable/data/encoding_formats/evt3.html).
 
 namespace esim {

@@ -13,7 +13,7 @@ namespace esim {
 struct EventColumns {
   const char *t, *x, *y, *p;
   const char* resolution = nullptr;  ///< width and height, px
-  const char* ms_index = nullptr;    ///< one entry for each ms since the start of the recording, at 0
+  const char* ms_index = nullptr;    ///< one entry per ms since the start of the recording, which is 0
 };
 
 /// Whether a file is HDF5 and has all four of them.

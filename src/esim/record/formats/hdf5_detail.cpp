@@ -26,7 +26,7 @@ herr_t hold_index_until_flush(hid_t access_list) {
 herr_t add_filters(hid_t creation_list, Compression compression) {
   switch (compression) {
     case Compression::blosc: {
-      // Blosc's own shuffle; four values reserved for the filter, then level, shuffle, codec (5: Zstd).
+      // Blosc's own shuffle. Four values are reserved for the filter, then level, shuffle, codec (5: Zstd).
       constexpr std::array<unsigned, 7> kOptions = {0, 0, 0, 0, 1, 1, 5};
       return H5Pset_filter(creation_list, kBloscFilter, H5Z_FLAG_OPTIONAL, kOptions.size(), kOptions.data());
     }

@@ -200,7 +200,7 @@ H5FD_class_t driver_class() {
   H5FD_class_t driver{};
 #ifdef H5FD_CLASS_VERSION  // HDF5 1.14 and later refuse a class that does not state its version
   driver.version = H5FD_CLASS_VERSION;
-  driver.value = H5_VFD_RESERVED;  // the first that is not HDF5's own; 256 to 511 are free for unregistered drivers
+  driver.value = H5_VFD_RESERVED;  // the first value not reserved by HDF5; 256 to 511 are free for unregistered drivers
 #endif
   driver.name = "esim_output";
   driver.maxaddr = (haddr_t{1} << 62) - 1;

@@ -19,8 +19,9 @@ constexpr EventColumns kColumns = {"prophesee/left/t",
                                    "prophesee/left/p",
                                    "prophesee/left/calib/resolution",
                                    "prophesee/left/ms_map_idx"};
-constexpr std::size_t kChunk = 1 << 16;                 // events, and milliseconds
-constexpr TimeNs kLatest = 30 * 86'400 * kNsPerSecond;  // an index of its milliseconds fits anywhere
+constexpr std::size_t kChunk = 1 << 16;  // events, and milliseconds
+constexpr TimeNs kLatest =
+    30 * 86'400 * kNsPerSecond;  // maximum time, for which the millisecond index still fits into memory
 
 void create_text(const hdf5::Output& file, const char* name, const std::string& text) {
   const hdf5::Handle type(H5Tcopy(H5T_C_S1), H5Tclose);

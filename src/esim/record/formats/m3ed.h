@@ -4,7 +4,7 @@
 
 namespace esim {
 
-/// Events in M3ED's HDF5 layout (Chaney et al., CVPRW 2023), those of the left event camera:
+/// Events in M3ED's HDF5 layout (Chaney et al., CVPRW 2023), as the left event camera:
 ///
 ///   prophesee/left/t            int64 [N]   us
 ///   prophesee/left/x, y         uint16 [N]  px

@@ -58,7 +58,8 @@ std::uint64_t big_endian(std::string_view bytes) {
 std::string problem_of(std::string_view bytes) {
   constexpr std::size_t kHeadBytes = 24;  // signature, then the IHDR chunk: length, name, width, height
   constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;
-  constexpr std::uint64_t kMaxPixelsPerByte = 8'300;  // deflate's 1032 times, of eight pixels of one bit each
+  constexpr std::uint64_t kMaxPixelsPerByte =
+      8'300;  // deflate's maximum ratio of 1032, with eight one-bit pixels per byte
   if (!bytes.starts_with("\x89PNG\r\n\x1a\n")) return "it is not a PNG image";
   if (bytes.size() < kHeadBytes || bytes.substr(12, 4) != "IHDR") return "the header is damaged or truncated";
   const std::uint64_t width = big_endian(bytes.substr(16, 4)), height = big_endian(bytes.substr(20, 4));

@@ -88,7 +88,7 @@ class Folder {
       for (CameraInfo& camera : info_.cameras) folders_.push_back(root_ / camera.name);
       return;
     }
-    // A camera's folder alone. "DIR/cam0/" and "DIR/cam0" are the same.
+    // A camera's folder by itself. "DIR/cam0/" and "DIR/cam0" are the same.
     const fs::path folder = fs::absolute(path / ".").lexically_normal().parent_path();
     root_ = folder.parent_path();
     attempt([&] { read_rig(); });
@@ -307,7 +307,7 @@ class Folder {
   bool unfinished_ = false;        // by its report: killed, interrupted, or still being written
   RecordingInfo info_;
   std::optional<TimeNs> start_;         // from the report
-  std::optional<TimeNs> events_start_;  // as the files of events have it
+  std::optional<TimeNs> events_start_;  // from the events files
   std::vector<std::unique_ptr<RecordStream>> body_, events_, frames_, truth_;
 };
 

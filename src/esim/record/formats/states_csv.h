@@ -27,7 +27,7 @@ class StatesCsvWriter final : public Sink {
  private:
   std::filesystem::path folder_;
   std::optional<CsvFile> body_;
-  std::deque<CsvFile> objects_;  // as in the recording's info
+  std::deque<CsvFile> objects_;  // in the order of RecordingInfo::objects
 };
 
 }  // namespace esim

@@ -24,7 +24,7 @@ struct TruthHdf5Options {
 ///
 ///   t                   int64 [N]              ns
 ///   T_world_camera      float64 [N, 7]         tx ty tz (m) qx qy qz qw
-///   depth               float32 [N, H, W]      m, planar; +inf where nothing is seen
+///   depth               float32 [N, H, W]      m, planar; +inf: no surface
 ///   flow                float32 [N, 2, H, W]   px/s, x to the right, then y downwards
 ///   objects             uint16 [N, H, W]       index into the attribute `names`; 0: static scene
 ///   T_world_objects     float64 [N, K, 7]      poses of the K moving objects in the world, without [0]

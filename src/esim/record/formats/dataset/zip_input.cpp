@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kBlockBytes = 1 << 16;
 constexpr std::uint64_t kMostDirectoryBytes = std::uint64_t{1} << 28;
-constexpr std::uint64_t kFarthestEnd = zip::kEndBytes + 65535;  // bytes before the file's end, with a comment between
+constexpr std::uint64_t kFarthestEnd = zip::kEndBytes + 65535;  // bytes; the end record with its longest comment
 
 std::string_view text(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};

@@ -6,8 +6,7 @@
 
 // EVT 2.0: words of 32 bits: type 4, low bits of the time 6, x 11, y 11; or type 4, high bits of the time 28
 // (https://docs.prophesee.ai/stable/data/encoding_formats/evt2.html).
-// EVT 2.1: words of 64 bits: the same, then a mask of the 32 pixels of the row from x on
-// (.../evt21.html).
+// EVT 2.1: words of 64 bits: the same, then a mask of the 32 pixels of the row from x on (.../evt21.html).
 
 namespace esim {
 namespace {

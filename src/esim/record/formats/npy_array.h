@@ -39,9 +39,7 @@ class Array {
   /// Throws UserError if it is not a valid array. `name` is the name of the file in messages.
   Array(std::string name, Read read);
 
-  const std::vector<Field>& fields() const {
-    return fields_;
-  }  ///< one field without a name if the items are not records
+  const std::vector<Field>& fields() const { return fields_; }  ///< a single nameless one if items are not records
   std::uint64_t count() const { return count_; }
   bool one_dimension() const { return one_dimension_; }  ///< or with one item only
   std::size_t item_bytes() const { return item_bytes_; }

@@ -168,7 +168,7 @@ void Reader::find_cameras(const std::optional<SensorSize>& sensor) {
   if (info_.cameras.empty()) info_.cameras.emplace_back();
 }
 
-/// Names cameras as in the file if this gives each a plain name.
+/// Names cameras as in the file if this gives each a unique, plain name.
 void Reader::name_cameras() {
   std::vector<std::string> names;
   for (const CameraStreams& camera : cameras_) names.push_back(camera.source);
@@ -276,7 +276,7 @@ void Reader::take_measurement() {
   record_.emplace(record);
 }
 
-/// Skips exposure triggers if there are frames, which have their own exposures.
+/// Skips triggers of frames and exposures if there are frames, which have their own exposures.
 void Reader::take_trigger() {
   if (taken_ == triggers_->size()) {
     triggers_ = nullptr;

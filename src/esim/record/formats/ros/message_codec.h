@@ -13,7 +13,7 @@ namespace esim::ros {
 /// The encoding of messages as bytes.
 enum class Encoding {
   ros1,  ///< ROS 1: packed
-  cdr,   ///< ROS 2, CDR: numbers aligned to their size, counted from behind the first four bytes, which name the
+  cdr,   ///< ROS 2, CDR: numbers aligned to their size, counted from after the first four bytes, which are the
          ///< encoding
 };
 

@@ -104,7 +104,7 @@ def test_what_is_refused(tmp_path):
         esim.save_events(tmp_path / "e.txt", zero, 10, 10)
     with pytest.raises(esim.Error, match="extension"):
         esim.save_events(tmp_path / "e.unknown", events, 10, 10)
-    with pytest.raises(esim.Error, match="no format"):
+    with pytest.raises(esim.Error, match="unknown format"):
         esim.save_events(tmp_path / "e.txt", events, 10, 10, format="unknown")
     assert list(tmp_path.iterdir()) == []
     for error in (esim.OutputError, esim.Error, OSError, ValueError):

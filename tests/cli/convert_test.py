@@ -78,7 +78,7 @@ class Convert(ProgramTest):
 
     def test_what_cannot_be(self):
         self.assertIn(".xyz", self.convert(self.text, self.folder / "a.xyz", code=2).stderr)
-        self.assertIn("no format \"xyz\"", self.convert(self.text, self.out, "--format", "xyz", code=2).stderr)
+        self.assertIn("unknown format \"xyz\"", self.convert(self.text, self.out, "--format", "xyz", code=2).stderr)
         self.assertIn("no such file", self.convert(self.folder / "none.h5", self.out, "-f", "text", code=2).stderr)
         self.assertIn("esim convert IN OUT", self.convert(self.text, code=2).stderr)
         self.assertIn("outside the sensor", self.convert(self.text, self.folder / "a.h5", "--width", "32", "--height",

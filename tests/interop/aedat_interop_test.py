@@ -33,7 +33,7 @@ def convert(*arguments):
 
 
 def write_theirs(path, compression):
-    """Events, two frames and the IMU, by dv-processing."""
+    """Events, two frames and the IMU, read with dv-processing."""
     config = dv.io.MonoCameraWriter.DAVISConfig("DAVIS346_test", SIZE)
     config.compression = compression
     writer = dv.io.MonoCameraWriter(str(path), config)

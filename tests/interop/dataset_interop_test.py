@@ -1,4 +1,4 @@
-"""The Event Camera Dataset's zip, written and read by Python's own libraries.
+"""Zip files of the Event Camera Dataset, written and read by Python's own libraries.
 
 Run as: dataset_interop_test.py PROGRAM
 
@@ -37,7 +37,7 @@ def png(image):
 
 
 def files():
-    """A recording in the words of the data set: its number of decimals, its names."""
+    """A recording in the style of the dataset: its number of decimals, its names."""
     random = np.random.default_rng(1)
     t = np.sort(random.uniform(0, 1, 20_000))
     events = "".join(f"{time:.9f} {random.integers(WIDTH)} {random.integers(HEIGHT)} {random.integers(2)}\n" for time in t)

@@ -1,4 +1,4 @@
-"""HDF5 layouts of others, written and read by h5py as their programs do.
+"""HDF5 layouts of other programs, written and read with h5py in the same way.
 
 Run as: hdf5_interop_test.py PROGRAM
 
@@ -31,7 +31,7 @@ def convert(*arguments):
 
 
 def write_v2e(path):
-    """As v2e: a dataset that grows, in chunks of h5py's choice."""
+    """Writes like v2e: a growing dataset, with h5py's default chunks."""
     with h5py.File(path, "w") as f:
         events = f.create_dataset("events", shape=(0, 4), maxshape=(None, 4), dtype="uint32", compression="gzip")
         for first in range(0, COUNT, 30_000):
@@ -41,7 +41,7 @@ def write_v2e(path):
 
 
 class Windows:
-    """Events between two times, as the reader of DSEC's authors finds them: by the milliseconds around the window."""
+    """Events between two times, found like in DSEC's own reader: by the milliseconds around the window."""
 
     def __init__(self, file):
         self.columns = {name: file[f"events/{name}"] for name in "txyp"}
@@ -50,7 +50,7 @@ class Windows:
         self.start_us, self.final_us = self.offset, self.offset + int(self.columns["t"][-1])
 
     def __call__(self, start_us, end_us):
-        """Of [start, end), or None where a millisecond is not in the index."""
+        """The events of [start, end), or None if a millisecond is not in the index."""
         start, end = start_us - self.offset, end_us - self.offset
         first_ms, end_ms = start // 1000, -(-end // 1000)
         assert 0 <= first_ms < end_ms
@@ -73,7 +73,7 @@ class Hdf5(unittest.TestCase):
             np.testing.assert_array_equal(found[:], expected)
 
     def assert_read(self, path):
-        """Read by esim, written as DSEC's."""
+        """Reads with esim and writes DSEC's layout."""
         out = self.folder / "dsec.h5"
         out.unlink(missing_ok=True)
         convert(path, out, "--compression", "gzip")
@@ -96,7 +96,7 @@ class Hdf5(unittest.TestCase):
                     np.testing.assert_array_equal(found[name], column[:len(t)][inside])
 
     def test_every_window_of_dsecs_reader(self):
-        """Of a recording that starts before its first event and ends after its last one, and what becomes of it."""
+        """A recording that starts before its first event and ends after its last one, converted."""
         for start_us in (0, 49_599_300_523):
             t = start_us + 310 + T[:-1]
             theirs = self.folder / f"{start_us}.h5"
@@ -120,7 +120,7 @@ class Hdf5(unittest.TestCase):
 
     def test_windows_of_a_file_whose_index_ends_with_its_events(self):
         theirs, ours = self.folder / "theirs.h5", self.folder / "ours.h5"
-        with h5py.File(theirs, "w") as f:  # as DSEC's own files, without the millisecond behind the last event
+        with h5py.File(theirs, "w") as f:  # as DSEC's own files, without the millisecond after the last event
             for name, column in (("t", T.astype("u4")), ("x", X.astype("u2")), ("y", Y.astype("u2")), ("p", P.astype("u1"))):
                 f[f"events/{name}"] = column
             f["t_offset"] = 5_000_000
@@ -148,7 +148,7 @@ class Hdf5(unittest.TestCase):
             self.assert_same(left["t"], left["x"], left["y"], left["p"])
             index = left["ms_map_idx"][:]
             np.testing.assert_array_equal(index, np.searchsorted(T, 1000 * np.arange(len(index))))
-            self.assertEqual(len(index), T[-1] // 1000 + 2, "one more, for the reader of the last millisecond")
+            self.assertEqual(len(index), T[-1] // 1000 + 2, "one more, for readers of the last millisecond")
         self.assert_read(ours)
 
     def test_e2vid_and_e2calib(self):

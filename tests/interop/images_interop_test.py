@@ -1,4 +1,4 @@
-"""Flow and depth as images, read by other programs' libraries.
+"""Optical flow and depth as images, read with the libraries of other programs.
 
 Run as: images_interop_test.py PROGRAM SCENES
 
@@ -33,7 +33,7 @@ def timestamps(folder):
 
 
 class Images(unittest.TestCase):
-    """A short recording as each format, against its truth.h5."""
+    """A short recording in each format, compared with its truth.h5."""
 
     @classmethod
     def setUpClass(cls):
@@ -67,7 +67,7 @@ class Images(unittest.TestCase):
     def check_png_flow(self, path, expected, scale):
         image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
         self.assertEqual((image.dtype, image.shape[2]), (np.uint16, 3))
-        known = image[..., 0] == 1  # OpenCV has blue first
+        known = image[..., 0] == 1  # OpenCV stores blue first
         self.assertGreater(known.mean(), 0.5)
         for component, channel in ((0, 2), (1, 1)):
             flow = (image[..., channel].astype(float) - 2**15) / scale

@@ -34,7 +34,7 @@ builtin_interfaces/Time stamp
 string frame_id
 """
 
-# Reads by the index and from front to back, checksums included. npm: @mcap/core, @mcap/nodejs, @mcap/support.
+# Reads through the index and from start to end, and checks the checksums. npm: @mcap/core, @mcap/nodejs, @mcap/support.
 CORE = """
 import { McapIndexedReader, McapStreamReader } from "@mcap/core";
 import { FileHandleReadable } from "@mcap/nodejs";

@@ -1,4 +1,4 @@
-"""What the tests of interoperation share. The program's path is the first argument of each; missing packages skip it."""
+"""Shared by the interoperation tests. Their first argument is the path of the program. Missing packages skip a test."""
 
 import importlib
 import os
@@ -15,7 +15,7 @@ SKIPPED = 77
 
 
 def need(*modules):
-    """Ends the test, as skipped, unless all of these can be imported."""
+    """Ends the test as skipped unless all of these modules can be imported."""
     for module in modules:
         try:
             importlib.import_module(module)
@@ -25,7 +25,7 @@ def need(*modules):
 
 
 class InteropTest(unittest.TestCase):
-    """A test with a folder of its own."""
+    """A test with a temporary folder."""
 
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="esim_interop_"))
@@ -43,7 +43,7 @@ class InteropTest(unittest.TestCase):
         return path
 
     def read_events(self, path):
-        """Of a text file: (ns, x, y, 1 or 0)."""
+        """The events of a text file: (ns, x, y, 1 or 0)."""
         events = []
         for line in path.read_text().splitlines():
             t, x, y, p = line.split()

@@ -1,4 +1,4 @@
-"""Events files against the programs that others read and write them with.
+"""Files of events, compared with the usual programs that read and write them.
 
 Run as: prophesee_interop_test.py PATH_TO_ESIM, with the packages of requirements.txt (where one is missing, its tests are
 skipped).
@@ -37,7 +37,7 @@ class InteropTest(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
 
     def random_events(self, duration_s, count=20_000):
-        """Columns t (us), x, y, p, by time: many at one instant and in one row, which are vectors in EVT 3.0."""
+        """Columns t (us), x, y, p, by time: many at one time and in one row, which become vectors in EVT 3.0."""
         random = self.np.random.default_rng(1)
         t = self.np.sort(random.integers(0, round(duration_s * 1e6), count // 20)).repeat(20)
         y = random.integers(0, HEIGHT, count // 20).repeat(20)
@@ -83,7 +83,7 @@ class Faery(InteropTest):
         return self.columns(self.np.concatenate(parts), "t", "x", "y", "on")
 
     def test_reads_what_esim_writes(self):
-        events = self.random_events(duration_s=40)  # two turns of EVT 3.0's clock
+        events = self.random_events(duration_s=40)  # two wraps of EVT 3.0's clock
         for name in ("evt3.raw", "evt2.raw", "dat.dat"):
             with self.subTest(name):
                 self.assert_same(self.read_by_faery(self.write(events, name)), events)
@@ -99,7 +99,7 @@ class Faery(InteropTest):
 
 
 class Expelliarmus(InteropTest):
-    # Seconds. It loses the high bits of EVT 3.0's time in what it writes, and in reading what it wrote: they are 0 here.
+    # Seconds. It loses the high bits of EVT 3.0's time when it writes, and when it reads its own files: here they are 0.
     DURATIONS = {"evt3.raw": 0.004, "evt2.raw": 10, "dat.dat": 10}
 
     def setUp(self):

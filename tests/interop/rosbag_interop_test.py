@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: E
 EVENT = "uint16 x\nuint16 y\ntime ts\nbool polarity\n"
 EVENT_ARRAY = "std_msgs/Header header\nuint32 height\nuint32 width\ndvs_msgs/Event[] events\n"
 
-# Debian's tools belong to Debian's Python. Prints what it has read as JSON.
+# Debian's tools need Debian's Python. Prints the messages that it reads as JSON.
 DEBIAN = r"""
 import json, sys
 import genpy.dynamic, rosbag
@@ -35,7 +35,7 @@ with rosbag.Bag(sys.argv[1]) as bag:
 print(json.dumps({"events": events, "topics": topics}))
 """
 
-# Plays a bag to a listener, with a master of its own. Prints how many messages came on each topic.
+# Plays a bag to a listener, with a separate master. Prints the number of messages on each topic.
 PLAY = r"""
 import json, os, socket, subprocess, sys, time
 with socket.socket() as free:
@@ -95,7 +95,7 @@ def events_of(messages):
 
 
 def write_bag(path, events, compression=None):
-    """As a driver of a DAVIS on a robot would record it."""
+    """Messages as the driver of a DAVIS on a robot would record them."""
     store = types()
     made = {name.split("/")[-1]: made for name, made in store.types.items() if not name.startswith("std_msgs/")}
     made["Header"] = store.types["std_msgs/msg/Header"]

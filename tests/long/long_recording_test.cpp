@@ -1,4 +1,4 @@
-// Ten minutes and fifty million events, as the studio shows them.
+// Recordings of ten minutes and fifty million events in the studio.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -57,7 +57,7 @@ TEST(LongRecording, OpensAtOnceAndStaysSmooth) {
   const EventStore& events = *recording->view()->camera("").events;
   EXPECT_EQ(events.size(), kEvents);
 
-  // The events of a picture at any time, of a plot of 4 s, and of the whole curve of rates.
+  // The events of an image at any time, of a 4 s plot, and of the complete curve of rates.
   std::mt19937 random(2);
   std::vector<double> looks;
   for (int i = 0; i < 50; ++i) {

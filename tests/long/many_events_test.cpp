@@ -1,4 +1,4 @@
-// Ten million events through every format, bit by bit.
+// Ten million events in every format, bit by bit.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kEvents = 10'000'000;
 
-/// In order, at times that the format holds, over at most an hour.
+/// Ordered events at times that the format can hold, within at most an hour.
 std::vector<Event> random_events(const Format& format, SensorSize sensor, TimeNs duration) {
   std::mt19937_64 random(5);
   std::vector<Event> events(kEvents);

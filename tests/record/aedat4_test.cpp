@@ -1,4 +1,4 @@
-// AEDAT 4 beyond the events of one camera, which every_format_test.cpp looks at.
+// AEDAT 4 features other than the events of one camera, which every_format_test.cpp covers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -91,7 +91,7 @@ TEST_F(Aedat4, TwoCamerasFramesAndTheImuReadBack) {
         EXPECT_EQ(found.frames[i].bits, frames_[i].bits > 8 ? 16 : 8);
         EXPECT_TRUE(std::ranges::equal(found.frames[i].image.pixels(), frames_[i].image.pixels())) << i;
       }
-      // Each camera's are in order; those of exposures are the frames' own.
+      // Triggers of each camera are in order; frames replace exposure triggers.
       const auto same = [](const TriggerRecord& a, const TriggerRecord& b) { return a.t == b.t && a.kind == b.kind; };
       for (const int camera : {0, 1}) {
         std::vector<TriggerRecord> expected = triggers_, triggers = found.triggers;
@@ -137,7 +137,7 @@ TEST_F(Aedat4, FramesWhoseSizeIsALieAreRefused) {
   ASSERT_NE(at, std::string::npos);
   bytes[at + 1] = 0x7f;
   const fs::path path = base_.write("lie.aedat4", bytes);
-  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { test::read_all(path); }), "a frame of "));
+  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { test::read_all(path); }), "damaged frame: "));
 }
 
 TEST_F(Aedat4, SizesOfPacketsAreNotBelieved) {

@@ -9,10 +9,10 @@
 namespace esim {
 namespace {
 
-/// What arrived, in order, as text.
+/// The records that arrived, in order, as text.
 struct Log {
   std::vector<std::string> lines;
-  int fail_at = -1;  // the line that fails
+  int fail_at = -1;  // index of the line that fails
 };
 
 class Recorder final : public Sink {
@@ -49,7 +49,7 @@ void write_everything(Sink& sink, int count) {
     image(1, 0) = static_cast<float>(i);
     sink.write(TruthRecord{0, i, {}, image, image, image, image});
     sink.write(PoseRecord{i, {}});
-    image.fill(-1);  // the sink has its own copy
+    image.fill(-1);  // must not change the copy in the sink
     events.clear();
   }
   sink.end(count % 2 == 0);
@@ -68,7 +68,7 @@ TEST(BackgroundSink, PassesEverythingOnInOrder) {
   }
 }
 
-/// Keeps the sums of what ground truth consists of.
+/// Sums the contents of ground truth.
 class Summer final : public Sink {
  public:
   explicit Summer(std::vector<double>& sums) : sums_(sums) {}

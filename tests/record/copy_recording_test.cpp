@@ -58,11 +58,11 @@ TEST(CopyRecording, TakesOneCameraAndSaysWhatIsLeftOut) {
                        "cam0, right: choose one"));
   EXPECT_TRUE(contains(
       message_of<UserError>([&] { copy_recording(given, text, base.path() / "a", {.camera = "left"}, kGoOn); }),
-      "no camera left; the recording has cam0, right"));
+      "no camera left; its cameras are cam0, right"));
   const CopySummary summary = copy_recording(given, text, base.path() / "a", {.camera = "right"}, kGoOn);
   EXPECT_EQ(summary.copied, (std::map<Content, std::uint64_t>{{Content::events, 3000}}));
   EXPECT_EQ(summary.left_out, (std::map<Content, std::uint64_t>{{Content::poses, 2}}));
-  EXPECT_EQ(losses(summary, text), std::vector<Loss>{{"text does not hold poses: 2 left out"}});
+  EXPECT_EQ(losses(summary, text), std::vector<Loss>{{"text cannot hold poses: 2 left out"}});
   EXPECT_EQ(events_in(base.path() / "a"), given.right_);
 }
 
@@ -88,7 +88,7 @@ TEST(CopyRecording, TimesMayCountFromTheStart) {
   EXPECT_EQ(events_in(base.path() / "a"), expected);
 }
 
-// A conversion leaves a report.json in the folders that it makes: they are still of their format.
+// A conversion leaves a report.json in its folders, which must keep their format.
 TEST(ConvertRecording, FoldersOfEveryFormatReadBack) {
   const test::TemporaryDirectory base;
   const std::filesystem::path recording = base.path() / "source";

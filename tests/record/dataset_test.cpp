@@ -1,4 +1,5 @@
-// The Event Camera Dataset's layout beyond events, which every_format_test.cpp looks at: as a zip and as a folder.
+// The layout of the Event Camera Dataset, as a zip and as a folder, except for events, which every_format_test.cpp
+// covers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -64,7 +65,7 @@ class DatasetFormat : public testing::TestWithParam<std::string> {
 TEST_P(DatasetFormat, EverythingReadsBack) {
   const fs::path path = write();
   EXPECT_EQ(format_of(path).name, GetParam());
-  EXPECT_EQ(std::distance(fs::directory_iterator(base_.path()), {}), 1) << "nothing is left beside it";
+  EXPECT_EQ(std::distance(fs::directory_iterator(base_.path()), {}), 1) << "no temporary files are left";
   const test::Recorded found = test::read_all(path);
 
   const Camera &camera = found.info.cameras.at(0).model, &was = info_.cameras[0].model;
@@ -117,7 +118,7 @@ TEST_P(DatasetFormat, WhatIsNotRecordedIsNotThere) {
 INSTANTIATE_TEST_SUITE_P(Layouts, DatasetFormat, testing::Values("dataset", "dataset-folder"),
                          [](const auto& test) { return test.param == "dataset" ? "zip" : "folder"; });
 
-/// A folder with the files given by name and content.
+/// Makes a folder with these files, given by name and content.
 fs::path make_folder(const test::TemporaryDirectory& base,
                      const std::vector<std::pair<std::string, std::string>>& files) {
   const fs::path folder = base.path() / "dataset";
@@ -143,10 +144,10 @@ TEST(DatasetLayout, WrongLinesAreNamed) {
   EXPECT_TRUE(test::contains(problem("imu.txt", "0 1 2 nan 4 5 6\n"), "\"nan\" is not a finite number"));
   EXPECT_TRUE(test::contains(problem("imu.txt", "1 1 2 3 4 5 6\n0.5 1 2 3 4 5 6\n"), "sort by time"));
   EXPECT_TRUE(test::contains(problem("groundtruth.txt", "0 1 2 3 0 0 0 2\n"), "unit norm"));
-  EXPECT_TRUE(test::contains(problem("images.txt", "0 images/frame_00000000.png\n"), "there is no image"));
+  EXPECT_TRUE(test::contains(problem("images.txt", "0 images/frame_00000000.png\n"), "is missing from the dataset"));
   EXPECT_TRUE(test::contains(problem("images.txt", "0 events.txt\n"), "not a PNG"));
   EXPECT_TRUE(test::contains(problem("calib.txt", "1 2 3\n"), "expected fx fy cx cy k1 k2 p1 p2 k3"));
-  EXPECT_TRUE(test::contains(problem("imu.txt", std::string(1 << 20, '1')), "longer than any"));
+  EXPECT_TRUE(test::contains(problem("imu.txt", std::string(1 << 20, '1')), "the line is too long"));
 }
 
 TEST(DatasetLayout, ImagesStayInsideTheDataset) {
@@ -156,7 +157,7 @@ TEST(DatasetLayout, ImagesStayInsideTheDataset) {
        {(base.path() / "secret.png").string(), std::string("../secret.png"), std::string("images/../../secret.png")}) {
     const fs::path folder =
         make_folder(base, {{"events.txt", ""}, {"images.txt", "0 " + name + "\n"}, {"images/a", ""}});
-    EXPECT_TRUE(test::contains(problem_of(folder), "there is no image")) << name;
+    EXPECT_TRUE(test::contains(problem_of(folder), "is missing from the dataset")) << name;
   }
 }
 
@@ -179,7 +180,7 @@ TEST(DatasetLayout, ACutZipIsToldAsThat) {
   const std::string bytes = test::content(path);
   const fs::path cut = base.write("cut.zip", bytes.substr(0, bytes.size() - 30));
   EXPECT_TRUE(test::contains(problem_of(cut), "cut.zip"));
-  EXPECT_TRUE(test::contains(problem_of(cut), "it is cut off"));
+  EXPECT_TRUE(test::contains(problem_of(cut), "the zip is truncated"));
 }
 
 std::string content_of(const FilesInput& files, const std::string& name) {

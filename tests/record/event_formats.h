@@ -10,7 +10,7 @@
 
 namespace esim::test {
 
-/// Names of all that hold events, and are written and read.
+/// Names of all formats that hold events and can be written and read.
 inline std::vector<std::string> event_formats(bool folders) {
   std::vector<std::string> names;
   for (const Format& format : formats()) {
@@ -20,7 +20,7 @@ inline std::vector<std::string> event_formats(bool folders) {
   return names;
 }
 
-/// A name without what names of tests cannot have.
+/// A name without the characters that test names cannot have.
 inline std::string name_of_test(const testing::TestParamInfo<std::string>& test) {
   std::string name = test.param;
   std::replace(name.begin(), name.end(), '-', '_');

@@ -14,7 +14,7 @@
 namespace esim {
 namespace {
 
-/// A vertex as the header lays it out.
+/// A vertex in the layout of the header.
 struct Vertex {
   float x, y, z;
   double t;
@@ -22,7 +22,7 @@ struct Vertex {
   std::int8_t polarity;
 };
 
-/// Reads by the header, as any reader of PLY does.
+/// Reads the file by its header, like any PLY reader.
 std::vector<Vertex> read_ply(const std::filesystem::path& path) {
   const std::string content = test::content(path);
   const std::string end = "end_header\n";
@@ -82,7 +82,7 @@ TEST(EventPointsPly, IsWholeWheneverItIsRead) {
   const std::vector<Vertex> found = read_ply(path);
   ASSERT_EQ(found.size(), 4000U);
   for (std::size_t i = 0, k = 0; i < events.size(); ++i) {
-    if (i % 5 == 0) continue;  // those without a point
+    if (i % 5 == 0) continue;  // events without a point
     const Vertex& vertex = found[k++];
     ASSERT_EQ(Eigen::Vector3f(vertex.x, vertex.y, vertex.z), points[i]);
     ASSERT_EQ(vertex.t, to_seconds(events[i].t));

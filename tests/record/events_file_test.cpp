@@ -78,7 +78,7 @@ TEST_F(EventsFileTest, FoldersAndTheirCameras) {
   EXPECT_TRUE(contains(error_of(out), (out / "left").string()));
   EXPECT_EQ(read_all(out / "right").size(), 1u);
 
-  // A text does not say how large the sensor is, but its recording does.
+  // A text file does not state the sensor size, but its recording does.
   EXPECT_FALSE(EventsFile(out / "right").sensor());
   base_.write("out/report.json", R"({"cameras": [{"name": "left", "width": 9, "height": 9},
                                                  {"name": "right", "width": 30, "height": 20}]})");
@@ -103,7 +103,7 @@ TEST_F(EventsFileTest, EventsOutOfOrder) {
   EXPECT_TRUE(contains(error_of(base_.write("t.txt", "0.1 1 2 1\n0.3 5 2 1\n0.2 9 2 1\n")),
                        "line 3: the time is before that of the line above, 0.300000000 s"));
 
-  // In DSEC's layout, as another program might write it.
+  // DSEC's layout, as another program might write it.
   const fs::path path = base_.path() / "unsorted.h5";
   const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   const hid_t group = H5Gcreate2(file, "events", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
@@ -125,9 +125,9 @@ TEST_F(EventsFileTest, EventsOutOfOrder) {
 
 TEST_F(EventsFileTest, FilesOfOtherKindsAndDamagedOnes) {
   EXPECT_TRUE(
-      contains(error_of(base_.write("a.png", std::string("\x89PNG\r\n\x1a\n\0\0", 10))), "none of the formats"));
+      contains(error_of(base_.write("a.png", std::string("\x89PNG\r\n\x1a\n\0\0", 10))), "not in any of the formats"));
   EXPECT_TRUE(contains(error_of(base_.write("junk.txt", "0.1 1 2 1\n0.2 1 2 1\n0.3 one 2 1\n")), "line 3: \"one\""));
-  EXPECT_TRUE(contains(error_of(base_.write("far.txt", "9000000000 1 2 1\n")), "no time of a recording"));
+  EXPECT_TRUE(contains(error_of(base_.write("far.txt", "9000000000 1 2 1\n")), "the time must be within"));
   write_hdf5(base_.path() / "whole.h5", events_);
   const std::string bytes = test::content(base_.path() / "whole.h5");
   EXPECT_TRUE(contains(error_of(base_.write("cut.h5", bytes.substr(0, bytes.size() / 2))), "cut.h5"));

@@ -47,7 +47,7 @@ class EventsHdf5 : public testing::TestWithParam<Case> {
   TemporaryDirectory directory_;
 };
 
-// Read through the library itself, not through the reader under test.
+// Reads through the HDF5 library, not through the reader under test.
 std::vector<std::uint64_t> read_raw(const std::filesystem::path& path, const char* name) {
   const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   const hid_t dataset = H5Dopen2(file, name, H5P_DEFAULT);
@@ -168,8 +168,8 @@ TEST_P(EventsHdf5, InterruptedRecordingEndsWhereItEnds) {
   EXPECT_EQ(read_raw(path, "ms_to_idx"), (std::vector<std::uint64_t>{0, 0, 1, 1, 1, 1}));
 }
 
-// DSEC's reader takes the events of [a, b) from those between the milliseconds floor(a) and ceil(b), counted from
-// t_offset, both of which must have an entry. It may be asked up to right behind the last event, and to the end.
+// DSEC's reader selects the events of [a, b) from those between the milliseconds floor(a) and ceil(b) since t_offset,
+// both of which must have an entry. Windows may reach to just after the last event and to the end of the recording.
 TEST_P(EventsHdf5, EveryWindowHasItsMilliseconds) {
   for (const TimeNs last : {999'310'000, 999'999'999, 1'000'000'000, 1'000'000'001, 1'500'200'000}) {
     for (const TimeNs end : {TimeNs{0}, kNsPerSecond, kNsPerSecond + 300'000}) {
@@ -288,7 +288,7 @@ TEST(EventsHdf5Writer, KilledAtOnceLeavesAnEmptyFile) {
   EXPECT_EQ(reader.complete(), false);
 }
 
-// At every stage of the file's life, from its creation to its last flush.
+// At every stage of the life of the file, from its creation to its last flush.
 TEST(EventsHdf5Writer, FullDiskIsAnOutputErrorAndNothingElse) {
   const TemporaryDirectory directory;
   const auto events = random_events(200'000, 64, 48, 0, 30 * kNsPerSecond);
@@ -310,7 +310,7 @@ TEST(EventsHdf5Writer, FullDiskIsAnOutputErrorAndNothingElse) {
   }
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 
-  // The library is as good as before.
+  // The library still works.
   EXPECT_EQ(EventsHdf5Reader(whole).read(0, 1'000'000).size(), events.size());
 }
 
@@ -344,7 +344,8 @@ TEST(EventsHdf5Writer, UnwritablePlacesAreNamed) {
 }
 
 TEST(EventsHdf5WriterDeathTest, MissingPluginIsExplained) {
-  testing::FLAGS_gtest_death_test_style = "threadsafe";  // a new process, in which HDF5 has not looked for plugins yet
+  testing::FLAGS_gtest_death_test_style =
+      "threadsafe";  // a new process, in which HDF5 has not searched for plugins yet
   EXPECT_EXIT(
       {
         setenv("HDF5_PLUGIN_PATH", "/nonexistent", 1);

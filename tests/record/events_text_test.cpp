@@ -74,7 +74,7 @@ TEST(EventsText, ErrorsNameTheLine) {
   }
   EXPECT_TRUE(contains(message("1.0 2 3"), "expected four numbers: t x y p"));
   EXPECT_TRUE(contains(message("0.4 1 2 1"), "before that of the line above"));
-  EXPECT_TRUE(contains(message(std::string(1'000'000, '1')), "longer than any"));
+  EXPECT_TRUE(contains(message(std::string(1'000'000, '1')), "the line is too long"));
   EXPECT_TRUE(contains(message(std::string("\0\0\0", 3)), "expected four numbers"));
   EXPECT_TRUE(contains(message_of<UserError>([] { EventsTextReader("/nonexistent"); }), "No such file"));
   EXPECT_TRUE(contains(message_of<UserError>([] { EventsTextReader("/tmp"); }), "directory"));

@@ -1,4 +1,4 @@
-// What every format of events promises. A new one is tested by being in the list of formats().
+// Requirements for every format of events. The tests cover every format in the list of formats().
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ class EveryFormat : public testing::TestWithParam<std::string> {
         test::recording_info(std::min(format_.max_width, 640), std::min(format_.max_height, 480), 0, 3 * kNsPerSecond);
   }
 
-  /// Of the camera's size, at times that the format holds.
+  /// Random events on the sensor, at times that the format can hold.
   std::vector<Event> random_events(std::size_t count) const {
     const Camera& camera = info_.cameras[0].model;
     std::vector<Event> events = test::random_events(count, camera.width, camera.height, info_.start, info_.end);
@@ -36,7 +36,7 @@ class EveryFormat : public testing::TestWithParam<std::string> {
     return path;
   }
 
-  /// The file that holds the events: that itself, or the largest in a folder.
+  /// The file with the events: the path itself, or the largest file in a folder.
   fs::path file_of(const fs::path& path) const {
     if (!format_.folder) return path;
     fs::path largest;
@@ -47,7 +47,7 @@ class EveryFormat : public testing::TestWithParam<std::string> {
     return largest;
   }
 
-  /// All events of a file, up to where it is damaged; what is wrong with it, if anything.
+  /// All events of a file up to its damage, and the error, if any.
   static std::vector<Event> read(const fs::path& path, std::string* problem = nullptr) {
     ReadOptions options;
     if (problem != nullptr) options.recover = [problem](const std::string& what) { *problem = what; };
@@ -62,8 +62,7 @@ class EveryFormat : public testing::TestWithParam<std::string> {
     return all;
   }
 
-  /// Reads what has been damaged, with and without recovery: it is a UserError that names the file, or it is not
-  /// noticed.
+  /// Reads a damaged file with and without recovery: the damage is a UserError that names the file, or goes unnoticed.
   static void expect_no_harm(const fs::path& path, const std::vector<Event>& events, bool is_prefix) {
     try {
       read(path);
@@ -112,7 +111,7 @@ TEST_P(EveryFormat, CornersOfTheSensorAndTheLargestOne) {
 }
 
 TEST_P(EveryFormat, LargerSensorsAreRefused) {
-  if (format_.max_width >= 65536) GTEST_SKIP() << "none is larger";
+  if (format_.max_width >= 65536) GTEST_SKIP() << "no larger sensor exists";
   info_ = test::recording_info(format_.max_width + 1, format_.max_height, 0, kNsPerSecond);
   const std::string message = test::message_of<UserError>([&] { write({}); });
   EXPECT_TRUE(test::contains(message, std::to_string(format_.max_width + 1))) << message;

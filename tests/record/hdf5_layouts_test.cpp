@@ -1,4 +1,5 @@
-// HDF5 layouts of others: every_format_test.cpp looks at those that are written, these at what others' files look like.
+// HDF5 layouts of other programs. every_format_test.cpp covers the formats that can be written; these tests read files
+// as other programs write them.
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
@@ -13,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// An HDF5 file by the library's own means.
+/// An HDF5 file written with the library directly.
 class File {
  public:
   explicit File(const fs::path& path) : id_(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT)) {}
@@ -102,7 +103,7 @@ TEST_F(Hdf5Layouts, M3edTellsTheSensorAndFirstEventsOfMilliseconds) {
   const hid_t space = H5Dget_space(dataset);
   std::vector<std::uint64_t> index(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
   H5Sclose(space);
-  ASSERT_EQ(index.size(), 2002U) << "one behind the last event, for the reader of its millisecond";
+  ASSERT_EQ(index.size(), 2002U) << "one entry after the last event, for readers of its millisecond";
   ASSERT_EQ(H5Dread(dataset, H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, index.data()), 0);
   H5Dclose(dataset);
   H5Fclose(file);
@@ -130,7 +131,7 @@ TEST_F(Hdf5Layouts, WrongNumbersAreNamed) {
     file.add<double>("t", H5T_NATIVE_DOUBLE, {0, std::numeric_limits<double>::quiet_NaN()});
     for (const char* name : {"x", "y", "p"}) file.add<std::int64_t>(name, H5T_NATIVE_INT64, {0, 0});
   }
-  EXPECT_TRUE(test::contains(problem(), "the time of event 1 is none of a recording"));
+  EXPECT_TRUE(test::contains(problem(), "the time of event 1 is out of range"));
   {
     const File file(path_);
     for (const char* name : {"t", "y", "p"}) file.add<std::int64_t>(name, H5T_NATIVE_INT64, {0, 0});

@@ -38,7 +38,7 @@ void read_truth(const std::filesystem::path& path) {
   for (std::uint64_t i = 0; i < reader.displacements(); ++i) reader.read(i, displacement);
 }
 
-// Either all is well or the file is at fault, by name.
+// Reading must succeed or fail with a UserError that names the file.
 void expect_no_worse_than_user_error(const std::filesystem::path& path, const std::string& what,
                                      void (*read)(const std::filesystem::path&) = read_everything) {
   try {
@@ -88,7 +88,7 @@ TEST(HostileHdf5, CutFiles) {
   }
 }
 
-// In a process of its own, which ends without the library's clean-up: after damaged files that complains.
+// Runs in a separate process, which ends without the clean-up of the library, since that complains after damaged files.
 TEST(HostileHdf5, FlippedBytes) {
   const TemporaryDirectory directory;
   const pid_t child = fork();
@@ -129,7 +129,7 @@ TEST(HostileHdf5, OtherFiles) {
   EXPECT_TRUE(contains(message_of<UserError>([] { EventsHdf5Reader("/tmp"); }), "/tmp"));
 }
 
-// Builds files through the library, as other programs would.
+// Builds files with the HDF5 library, as other programs would.
 class Builder {
  public:
   explicit Builder(const std::filesystem::path& path)
@@ -213,7 +213,7 @@ TEST_F(ForeignHdf5, IndexAndOffsetMayBeAbsentAndTypesDiffer) {
 TEST_F(ForeignHdf5, WhatIsWrongIsSaid) {
   const std::string path = path_.string();
   EXPECT_EQ(message([](Builder&) {}),
-            "cannot read " + path + ": there is no dataset events/t, as DSEC has it; it holds events");
+            "cannot read " + path + ": there is no dataset events/t, as in DSEC's layout; the file holds events");
   EXPECT_TRUE(contains(
       message([](Builder& builder) { builder.column<double>("events/t", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, {1.0}); }),
       "events/t does not hold integers"));
@@ -250,7 +250,7 @@ TEST_F(ForeignHdf5, WhatIsWrongIsSaid) {
                          builder.dsec_columns();
                          builder.integers("t_offset", H5T_STD_I64LE, {1, 2});
                        }),
-                       "t_offset is not one integer"));
+                       "t_offset must be one integer"));
 }
 
 TEST_F(ForeignHdf5, LyingIndexIsNoticed) {

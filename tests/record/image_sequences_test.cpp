@@ -1,4 +1,4 @@
-// Ground truth as files of images: what each format keeps, and damaged files.
+// Ground truth as image files: the precision of each format, and damaged files.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -32,7 +32,7 @@ struct Moved {
   Image<std::uint8_t> visible;
 };
 
-/// What a source gave, copied.
+/// Copies of the records of a source.
 struct Found {
   struct Frame {
     TimeNs t;
@@ -84,7 +84,7 @@ void expect_near(const Image<float>& found, const Image<float>& expected, double
 
 class ImageSequences : public testing::TestWithParam<std::string> {
  protected:
-  /// Frames, and between them displacements or none.
+  /// Frames, with or without optical flow between them.
   fs::path write(const std::string& format, bool displacements) const {
     const fs::path path = base_.path() / format;
     const auto sink = format_named(format).create(path, {});
@@ -110,13 +110,13 @@ class ImageSequences : public testing::TestWithParam<std::string> {
       expect_near(x, Moved(i).x, tolerance);
       expect_near(y, Moved(i).y, tolerance);
       EXPECT_EQ(visible(0, 0), 1);
-      EXPECT_EQ(visible(2, 1), 0) << "what is not known is not visible";
+      EXPECT_EQ(visible(2, 1), 0) << "unknown flow is not visible";
     }
     EXPECT_EQ(found.info.cameras[0].model.width, kWidth);
     EXPECT_EQ(found.info.cameras[0].model.height, kHeight);
   }
 
-  /// Where a recording has no displacement: the motion field times the interval.
+  /// Without optical flow in the recording: the motion field times the interval.
   static void expect_motion_field(const Found& found, double tolerance) {
     ASSERT_EQ(found.moved.size(), kFrames - 1U);
     for (int i = 0; i + 1 < kFrames; ++i) {
@@ -212,7 +212,7 @@ TEST_F(ImageSequences, NpyKeepsEverything) {
   const Found found = read(path);
   EXPECT_EQ(found.order, "ttdtdtd");
   expect_displacements(found, 0);
-  EXPECT_EQ(found.moved[0].visible(3, 1), 0) << "known, and hidden";
+  EXPECT_EQ(found.moved[0].visible(3, 1), 0) << "known, but occluded";
   for (int i = 0; i < kFrames; ++i) {
     const auto& frame = found.frames[static_cast<std::size_t>(i)];
     const test::TruthImages expected(kWidth, kHeight, i);
@@ -275,7 +275,7 @@ TEST_P(ImageSequences, CutAndDamagedFilesAreNamedOrHarmless) {
     options.recover = [](const std::string&) {};
     try {
       EXPECT_LE(read(path, options).order.size(), 2U * kFrames);
-    } catch (const UserError&) {  // nothing could be read
+    } catch (const UserError&) {  // the file could not be read
     }
   };
   for (const auto& entry : fs::recursive_directory_iterator(path)) {

@@ -1,4 +1,4 @@
-// HDF5 files of a process that is killed before each of its writes, one run for each.
+// HDF5 files of a process that is killed before each of its writes, in one run per write.
 #include <gtest/gtest.h>
 #include <sys/ptrace.h>
 #include <sys/syscall.h>
@@ -19,8 +19,8 @@ namespace fs = std::filesystem;
 
 constexpr int kWidth = 64, kHeight = 48;
 
-/// Runs work() in another process, which is killed as it is about to write into a file for the `number`-th time, from 1
-/// on. False where it ended before; nothing where processes cannot be traced.
+/// Runs work() in another process, which is killed just before its `number`-th write to a file, counted from 1. Returns
+/// false if it ended earlier; nothing if processes cannot be traced.
 template <typename Work>
 std::optional<bool> killed_at_write(int number, const Work& work) {
   const pid_t child = fork();
@@ -48,14 +48,14 @@ std::optional<bool> killed_at_write(int number, const Work& work) {
   return std::nullopt;
 }
 
-/// Holds what look() finds after each number of writes against what there must be: never less than before.
+/// Checks that look() never finds less data after more writes.
 template <typename Work, typename Look>
 void at_any_write(const Work& work, const Look& look) {
   std::uint64_t most = 0;
   bool readable = false;
   constexpr int kMost = 5000;
   for (int number = 1; number < kMost;
-       number += number < 80 ? 1 : 11) {  // of the many flushes later on, some writes of each
+       number += number < 80 ? 1 : 11) {  // later, only some writes of each of the many flushes
     const auto killed = killed_at_write(number, work);
     if (!killed) GTEST_SKIP() << "processes cannot be traced here";
     std::uint64_t found = 0;
@@ -69,12 +69,12 @@ void at_any_write(const Work& work, const Look& look) {
     most = found;
     if (!*killed) return;
   }
-  FAIL() << "no end";
+  FAIL() << "the writer did not end";
 }
 
 TEST(KilledWriter, EventsAreReadAsFarAsTheLastFlush) {
 #if !defined(__x86_64__)
-  GTEST_SKIP() << "knows the registers of one processor only";
+  GTEST_SKIP() << "supports one processor architecture only";
 #endif
   const test::TemporaryDirectory base;
   const fs::path file = base.path() / "events.h5";
@@ -96,11 +96,11 @@ TEST(KilledWriter, EventsAreReadAsFarAsTheLastFlush) {
 
 TEST(KilledWriter, GroundTruthIsReadAsFarAsTheLastFlush) {
 #if !defined(__x86_64__)
-  GTEST_SKIP() << "knows the registers of one processor only";
+  GTEST_SKIP() << "supports one processor architecture only";
 #endif
   const test::TemporaryDirectory base;
   const fs::path file = base.path() / "truth.h5";
-  constexpr int kFrames = 70;  // more than one node of an index holds
+  constexpr int kFrames = 70;  // more than one node of an index can hold
   at_any_write(
       [&] {
         TruthHdf5Writer writer(file, 0, {true, true, Compression::gzip, false});

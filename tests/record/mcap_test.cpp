@@ -16,7 +16,7 @@ using mcap::RecordWriter;
 
 class Mcap : public testing::Test {
  protected:
-  /// A file of these records, without summary.
+  /// A file of these records, without a summary.
   std::filesystem::path file(const std::string& records) const {
     std::string bytes(mcap::kMagic);
     RecordWriter(bytes, Op::header).text("ros2").text("test");
@@ -84,7 +84,8 @@ TEST_F(Mcap, SizesAndChecksumsThatAreNotTrueAreNamed) {
   std::string zstd;
   ros::compress(ros::ChunkCodec::zstd, raw, zstd);
   EXPECT_TRUE(test::contains(problem_of(chunk("zstd", zstd, raw.size() - 1)), "damaged"));
-  EXPECT_TRUE(test::contains(problem_of(chunk("zstd", zstd, ros::kMaxChunkBytes)), "damaged")) << "and costs no memory";
+  EXPECT_TRUE(test::contains(problem_of(chunk("zstd", zstd, ros::kMaxChunkBytes)), "damaged"))
+      << "and allocates no memory";
   EXPECT_TRUE(test::contains(problem_of(chunk("zstd", zstd, ~0ULL)), "larger than any chunk"));
   EXPECT_TRUE(test::contains(problem_of(chunk("brotli", zstd, raw.size())), "brotli"));
   EXPECT_TRUE(test::contains(problem_of(chunk("", raw, raw.size(), 12345)), "checksum"));

@@ -1,4 +1,4 @@
-// NumPy's arrays as others write them. Round trips are those of every format (every_format_test.cpp).
+// NumPy arrays as other programs write them. every_format_test.cpp covers round trips.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -110,10 +110,10 @@ TEST_F(Npy, WhatCannotBeReadIsSaid) {
   EXPECT_TRUE(contains(refusal(npy("[" + std::string(50, '('), "(1,)", "")), "damaged"));
   EXPECT_TRUE(contains(refusal(npy("[('t','<i8'),('x','|i1'),('y','|u1'),('p','|u1')]", "(1,)",
                                    bytes_of(I64{1}, U8{255}, U8{0}, U8{0}))),
-                       "event 0 has a time, place or polarity that cannot be one"));
+                       "event 0 has an invalid time, position or polarity"));
   EXPECT_TRUE(contains(refusal(npy("[('t','<f8'),('x','|u1'),('y','|u1'),('p','|u1')]", "(1,)",
                                    bytes_of(std::numeric_limits<double>::quiet_NaN(), U8{0}, U8{0}, U8{0}))),
-                       "event 0 has a time"));
+                       "event 0 has an invalid time"));
 }
 
 TEST_F(Npy, CountsAreNotTrusted) {

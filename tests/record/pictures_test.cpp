@@ -1,4 +1,4 @@
-// What previews and videos are drawn with, held against slow definitions.
+// The drawing functions of previews and videos, compared with slow definitions.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -20,7 +20,7 @@ Image<Rgb> noise(int width, int height) {
   return image;
 }
 
-/// The mean over the part of the original that a pixel of the larger picture covers, one colour of it.
+/// The mean, in one colour, over the part of the original that a pixel of the enlarged image covers.
 double covered_mean(const Image<Rgb>& image, int x, int y, int width, int height, int colour) {
   const double x0 = static_cast<double>(x) * image.width() / width,
                x1 = static_cast<double>(x + 1) * image.width() / width;
@@ -73,7 +73,7 @@ TEST(Text, IsTheSameEachTime) {
     EXPECT_TRUE(
         std::equal(first.pixels().pixels().begin(), first.pixels().pixels().end(), second.pixels().pixels().begin()));
   }
-  EXPECT_LT(Canvas::text_width("text", 10), Canvas::text_width("text", 20)) << "of another size, another drawing";
+  EXPECT_LT(Canvas::text_width("text", 10), Canvas::text_width("text", 20)) << "each size is drawn separately";
   for (int i = 0; i < 2000; ++i) EXPECT_GT(Canvas::text_width(std::to_string(i), 10), 0);
 }
 
@@ -100,7 +100,7 @@ TEST(Yuv, IsThatOfBt601) {
       ASSERT_NEAR(v[index], sum_v / 4, 0.51);
     }
   }
-  EXPECT_EQ(y[width], 1) << "what is beyond a row is not touched";
+  EXPECT_EQ(y[width], 1) << "pixels after the row are unchanged";
   EXPECT_EQ(u[width / 2], 1);
   for (const Rgb grey : {Rgb{0, 0, 0}, Rgb{255, 255, 255}, Rgb{77, 77, 77}}) {
     to_yuv420(Image<Rgb>(2, 2, grey), {y.data(), stride}, {u.data(), stride}, {v.data(), stride});

@@ -28,7 +28,7 @@ int brightness(Rgb colour) { return colour.r + colour.g + colour.b; }
 
 TEST(Colours, FlowWheel) {
   EXPECT_EQ(colour_flow(0, 0, 10), (Rgb{255, 255, 255}));
-  // Opposite directions and the axes all differ; on the rim no colour has white in it.
+  // Opposite directions and the axes have different colours; on the rim no colour contains white.
   std::set<std::tuple<int, int, int>> seen;
   for (int i = 0; i < 24; ++i) {
     const double angle = 2 * 3.14159265358979 * i / 24;
@@ -38,7 +38,7 @@ TEST(Colours, FlowWheel) {
     seen.insert({c.r, c.g, c.b});
   }
   EXPECT_EQ(seen.size(), 24u);
-  // To the right red, as in the reference implementation; beyond full scale darker.
+  // Motion to the right is red, as in the reference implementation; beyond full scale it is darker.
   const Rgb right = colour_flow(9.999f, 0, 10);
   EXPECT_GT(right.r, 250);
   EXPECT_LT(right.g + right.b, 60);

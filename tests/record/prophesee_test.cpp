@@ -1,4 +1,4 @@
-// Prophesee's files word by word. Round trips are those of every format (every_format_test.cpp).
+// Prophesee's files, word by word. every_format_test.cpp covers round trips.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -55,7 +55,7 @@ class Prophesee : public testing::Test {
     return test::content(path);
   }
 
-  /// Without the header.
+  /// The content without the header.
   std::vector<std::uint16_t> evt3_words(const std::vector<Event>& events, std::size_t portion = 1000) {
     const std::string bytes = write("evt3", events, portion);
     const std::size_t start = bytes.find("% end\n") + 6;
@@ -145,10 +145,10 @@ TEST_F(Prophesee, Evt3BytesDoNotDependOnPortions) {
 
 TEST_F(Prophesee, Evt3ReadsAllWords) {
   const std::string words = words16({
-      0x0005, 0x2801, 0x6003, 0x4FFF,          // without a time
+      0x0005, 0x2801, 0x6003, 0x4FFF,          // no time yet
       0x8001, 0x6002, 0x2810,                  // row 5, column 16
-      0x3820, 0x4801, 0x5081, 0x4001,          // a base; 0 and 11 from it on; 12 and 19; 20
-      0xA001, 0x7123, 0xF123, 0xE001, 0x7000,  // triggers, others and what belongs to them
+      0x3820, 0x4801, 0x5081, 0x4001,          // a base; pixels 0 and 11 from it; 12 and 19; 20
+      0xA001, 0x7123, 0xF123, 0xE001, 0x7000,  // triggers, other types and their continuations
       0x1FFF, 0x9FFF, 0xBFFF, 0xCFFF, 0xDFFF,  // reserved
       0x0FFF, 0x2002,                          // the second camera's row 2047
       0x8001, 0x2003, 0x6003, 0x2004,          // the time again
@@ -184,7 +184,7 @@ TEST_F(Prophesee, BigEndian) {
 TEST_F(Prophesee, Evt2) {
   EXPECT_EQ(read(kEvt2 + words32({0x10001002, 0x80000001, 0x10401802, 0xA0000000, 0xE0000000, 0xF0000000, 0x0FFFFFFF})),
             (std::vector<Event>{at(65, 3, 2, 1), at(127, 2047, 2047, -1)}))
-      << "the first has no time, the others are none";
+      << "the first has no time, the others are not events";
 }
 
 TEST_F(Prophesee, Evt21InBothOrdersOfItsHalves) {
@@ -216,7 +216,7 @@ TEST_F(Prophesee, WhatDoesNotFitIsRefused) {
     };
     const Event good = at(0, 0, 0, 1);
     EXPECT_TRUE(contains(refusal({{-1, 0, 0, 1}}), "event 0 is at -0.000000001 s"));
-    EXPECT_TRUE(contains(refusal({{-1, 0, 0, 1}}), "write another format"));
+    EXPECT_TRUE(contains(refusal({{-1, 0, 0, 1}}), "choose another format"));
     const TimeNs latest = format_named(format).max_time;
     EXPECT_TRUE(contains(refusal({good, good, {latest + 1, 0, 0, 1}}), "event 2 is at ")) << format;
     EXPECT_NO_THROW(write(format, {good, {latest, 0, 0, 1}})) << format;

@@ -8,7 +8,7 @@
 
 namespace esim::test {
 
-/// A frame with an image of its own.
+/// A frame that owns its image.
 struct OwnedFrame {
   int camera = 0;
   TimeNs t = 0, exposure_start = 0, exposure_duration = 0;
@@ -25,7 +25,7 @@ struct OwnedFrame {
   }
 };
 
-/// All that a file holds, by kind.
+/// All records of a file, by kind.
 struct Recorded {
   RecordingInfo info;
   std::vector<std::vector<Event>> events;  ///< of each camera
@@ -56,7 +56,7 @@ inline Recorded read_all(const std::filesystem::path& path, const ReadOptions& o
   return all;
 }
 
-/// A gradient, different for each `phase`, that reaches the largest number.
+/// A gradient up to the largest number, different for each `phase`.
 inline OwnedFrame gradient_frame(int camera, TimeNs t, int width, int height, int bits, int phase) {
   OwnedFrame frame{camera, t, t - 500 * kNsPerUs, kNsPerMs, bits, Image<std::uint16_t>(width, height)};
   std::uint32_t number = static_cast<std::uint32_t>(phase);

@@ -24,12 +24,12 @@ class RecordingDirectoryTest : public testing::Test {
   std::string refusal(const fs::path& path, bool force) {
     return message_of<UserError>([&] { RecordingDirectory directory(path, force); });
   }
-  /// That of a path that is refused because something is there.
+  /// The error of a path that is refused because something exists there.
   Remedy remedy() {
     try {
       RecordingDirectory directory(out_, false);
     } catch (const RemediableError& error) {
-      EXPECT_FALSE(contains(error.what(), "--")) << "the library names no flags";
+      EXPECT_FALSE(contains(error.what(), "--")) << "messages of the library must not name flags";
       return error.remedy();
     }
     return Remedy::none;

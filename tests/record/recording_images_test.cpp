@@ -1,4 +1,4 @@
-// The images of a recording's folder, beside its ground truth.
+// The images in a recording's folder, with its ground truth.
 #include <gtest/gtest.h>
 
 #include "esim/record/format.h"
@@ -22,7 +22,7 @@ class RecordingImages : public testing::Test {
   }
 
   struct Times {
-    std::vector<TimeNs> images{}, truth{}, irradiance{};  // the last: of ground truth that has one
+    std::vector<TimeNs> images{}, truth{}, irradiance{};  // `irradiance`: of ground-truth frames that have one
   };
   Times times() const {
     Times found;
@@ -43,7 +43,7 @@ class RecordingImages : public testing::Test {
 
 TEST_F(RecordingImages, AreTheIrradianceOfTheGroundTruth) {
   const Times found = times();
-  EXPECT_TRUE(found.images.empty()) << "none comes twice";
+  EXPECT_TRUE(found.images.empty()) << "no image comes twice";
   EXPECT_EQ(found.truth.size(), static_cast<std::size_t>(kFrames));
   EXPECT_EQ(found.irradiance, found.truth);
 }
@@ -79,7 +79,7 @@ TEST_F(RecordingImages, AreNotLostWithDamagedGroundTruth) {
     for (int i = 0; i < kFrames; ++i) EXPECT_EQ(all[static_cast<std::size_t>(i)], i * kStep);
     partly += !found.truth.empty() && found.truth.size() < kFrames;
   }
-  EXPECT_GT(partly, 0) << "the ground truth ended on the way";
+  EXPECT_GT(partly, 0) << "the ground truth ended early";
 }
 
 }  // namespace

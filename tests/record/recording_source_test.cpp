@@ -1,4 +1,4 @@
-// A recording's folder, written by way of RecordingWriter and read back as records.
+// A recording's folder, written with RecordingWriter and read back as records.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -53,7 +53,7 @@ void expect_same(const Image<T>& a, const Image<T>& b) {
   }
 }
 
-/// The rig of a simulation with everything: two cameras of different lenses, an IMU, an object and a layer.
+/// The rig of a simulation with everything: two cameras with different lenses, an IMU, an object and a layer.
 RecordingInfo rig() {
   RecordingInfo info;
   Camera left = Camera::from_fov(kWidth, kHeight, 1), right = left;
@@ -89,7 +89,7 @@ std::vector<Event> events_of(int camera) {
                              static_cast<unsigned>(camera) + 1);
 }
 
-/// Images that a recording keeps as they are: irradiance on levels of 8-bit sRGB.
+/// Images that a recording stores exactly: irradiance on levels of 8-bit sRGB.
 test::TruthImages truth_at(int i) {
   test::TruthImages images(kWidth, kHeight, 0.1 * i);
   const Image<std::uint8_t> levels = encode_srgb(images.irradiance);
@@ -116,7 +116,7 @@ Image<std::uint16_t> frame_at(int i, int bits) {
   return image;
 }
 
-/// Writes all of it as a simulation would: `left` has everything, `right` events and frames of 12 bits.
+/// Writes everything as a simulation would: `left` has all kinds of records, `right` events and 12-bit frames.
 void write_all(Sink& sink, TimeUnit unit) {
   const RecordingInfo info = rig();
   sink.begin(info);
@@ -149,13 +149,13 @@ void write_all(Sink& sink, TimeUnit unit) {
   sink.end(true);
 }
 
-/// Reads everything, checks each record against what was written, and counts them.
+/// Reads all records, compares each with what was written, and counts them.
 class Checker {
  public:
   void check(const Record& record) {
     std::visit([this](const auto& kind) { check_kind(kind); }, record);
     ++count[{content_of(record), camera_}];
-    EXPECT_GE(first_, last_) << "events are cut where other records have their turn";
+    EXPECT_GE(first_, last_) << "portions of events end where other records are due";
     last_ = first_;
   }
 
@@ -219,8 +219,8 @@ class Checker {
     expect_same(record.y, displacement_at(i, -3));
     EXPECT_EQ(record.visible(0, 0), i % 2);
   }
-  void check_kind(const TriggerRecord&) { ADD_FAILURE() << "points of events are not read"; }
-  void check_kind(const EventPointsRecord&) { ADD_FAILURE() << "points of events are not read"; }
+  void check_kind(const TriggerRecord&) { ADD_FAILURE() << "triggers are not read"; }
+  void check_kind(const EventPointsRecord&) { ADD_FAILURE() << "event points are not read"; }
 
   int camera_ = 0;
   TimeNs first_ = 0, last_ = 0;
@@ -232,7 +232,7 @@ class RecordingFolder : public testing::Test {
     write_all(*format_named("recording").create(path_, WriteOptions{unit, Compression::gzip}), unit);
   }
 
-  /// Damages one file, and reads the folder with and without recovery: what is wrong names the file.
+  /// Damages one file and reads the folder with and without recovery: the error names the file.
   void expect_named(const std::string& file, const std::string& bytes) {
     const std::string sound = test::content(path_ / file);
     base_.write("out/" + file, bytes);
@@ -275,8 +275,7 @@ TEST_F(RecordingFolder, EveryRecordReadsBackInOneOrderOfTime) {
   const auto count = [&](Content content, int camera) { return found.count.at({content, camera}); };
   for (const Content content : {Content::poses, Content::imu, Content::truth, Content::frames})
     EXPECT_EQ(count(content, 0), kSteps) << describe(content);
-  EXPECT_FALSE(found.count.contains({Content::images, 0}))
-      << "the irradiance of the ground truth, not to be seen twice";
+  EXPECT_FALSE(found.count.contains({Content::images, 0})) << "the irradiance of the ground truth must not come twice";
   EXPECT_EQ(count(Content::frames, 1), kSteps);
   EXPECT_EQ(count(Content::displacement, 0), kSteps - 1);
   EXPECT_FALSE(fs::exists(path_ / "right" / "truth.h5")) << "no file without a record";
@@ -335,7 +334,7 @@ TEST_F(RecordingFolder, ACameraAloneIsItsFolder) {
     const auto source = open_source(path_ / path);
     ASSERT_EQ(source->info().cameras.size(), 1U);
     EXPECT_EQ(source->info().cameras[0].name, "left");
-    EXPECT_EQ(source->info().cameras[0].model.fx, rig().cameras[0].model.fx) << "of the rig above it";
+    EXPECT_EQ(source->info().cameras[0].model.fx, rig().cameras[0].model.fx) << "from the rig in the parent folder";
     EXPECT_FALSE(source->info().imu);
   }
   const auto source = open_source(path_ / "right");
@@ -357,7 +356,7 @@ TEST_F(RecordingFolder, WhatAKilledSimulationLeavesIsRead) {
   fs::rename(path_, killed);
   EXPECT_EQ(read(killed).events[1], events_of(1));
   EXPECT_LE(open_source(killed)->info().start, time_of_step(0));
-  EXPECT_EQ(open_source(killed)->info().end, rig().end) << "as events.h5 has it";
+  EXPECT_EQ(open_source(killed)->info().end, rig().end) << "from events.h5";
   fs::remove_all(killed / "calibration");
   fs::remove(killed / "report.json");
   const RecordingInfo info = open_source(killed)->info();

@@ -31,8 +31,8 @@ inline RecordingInfo recording_info(int width, int height, TimeNs start, TimeNs 
   return info;
 }
 
-/// Events in their order, all after `start` and none after `end`: bursts at one instant, pauses of many milliseconds,
-/// and events exactly on milliseconds and one nanosecond before.
+/// Ordered events after `start` and up to `end`: bursts at one time, pauses of many milliseconds, and events exactly on
+/// milliseconds and one nanosecond before.
 inline std::vector<Event> random_events(std::size_t count, int width, int height, TimeNs start, TimeNs end,
                                         unsigned seed = 1) {
   std::mt19937_64 random(seed);
@@ -56,7 +56,7 @@ inline std::vector<Event> random_events(std::size_t count, int width, int height
         t = std::min(t + below(3000), end);
         break;
       default:
-        break;  // a burst goes on
+        break;  // the burst continues
     }
     event = {t, static_cast<std::uint16_t>(below(width)), static_cast<std::uint16_t>(below(height)),
              static_cast<std::int8_t>(below(2) == 0 ? 1 : -1)};
@@ -65,7 +65,7 @@ inline std::vector<Event> random_events(std::size_t count, int width, int height
   return events;
 }
 
-/// Passes events to a sink in batches of random size, empty ones included.
+/// Passes events to a sink in batches of random size, including empty ones.
 inline void write_in_batches(Sink& sink, const std::vector<Event>& events, std::size_t largest, unsigned seed = 1) {
   std::mt19937 random(seed);
   for (std::size_t done = 0; done < events.size();) {
@@ -114,7 +114,7 @@ struct TruthImages {
   Image<float> irradiance, depth, flow_x, flow_y;
 };
 
-/// While it lives, files of this process cannot grow beyond `bytes`: writing fails as on a full disk.
+/// While it exists, files of this process cannot grow beyond `bytes`: writing fails as on a full disk.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) {

@@ -1,4 +1,4 @@
-// What recordings become as ROS messages, in bags and in MCAP files alike.
+// Recordings as ROS messages, in both bags and MCAP files.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -125,7 +125,7 @@ TEST_P(RosFormats, EverythingReadsBackAsItWas) {
   EXPECT_EQ(all.info.start, info.start);
   EXPECT_GE(all.info.end, events.back().t);
   ASSERT_EQ(all.info.cameras.size(), 2U);
-  EXPECT_EQ(all.info.cameras[1].name, "right_eye") << "a name as ROS takes it";
+  EXPECT_EQ(all.info.cameras[1].name, "right_eye") << "a valid ROS name";
   for (std::size_t i = 0; i < 2; ++i) {
     const Camera &a = all.info.cameras[i].model, &b = info.cameras[i].model;
     EXPECT_EQ(std::tie(a.width, a.height, a.fx, a.fy, a.cx, a.cy), std::tie(b.width, b.height, b.fx, b.fy, b.cx, b.cy));
@@ -168,7 +168,7 @@ TEST_P(RosFormats, EverythingReadsBackAsItWas) {
     expect_equal(pose.body.T_world_body, expected.body.T_world_body, "T_world_body");
     EXPECT_EQ(pose.body.omega_body, expected.body.omega_body);
     EXPECT_EQ(pose.body.alpha_body, expected.body.alpha_body);
-    // These were turned to the body and back.
+    // These were transformed to the body and back.
     EXPECT_LT(test::largest_difference(pose.body.velocity_world, expected.body.velocity_world), 1e-14);
     EXPECT_LT(test::largest_difference(pose.body.acceleration_world, expected.body.acceleration_world), 1e-14);
     expect_equal(pose.objects.at(0).T_world_body, expected.objects[0].T_world_body, "ball");
@@ -251,12 +251,12 @@ TEST_P(RosFormats, TopicsOfOthers) {
   EXPECT_EQ(all.info.cameras[1].model.width, 3);
   EXPECT_EQ(all.info.start, 1);
   EXPECT_EQ(all.events[0], events);
-  ASSERT_EQ(all.frames.size(), 1U) << "of the sensor's size, and of one topic";
+  ASSERT_EQ(all.frames.size(), 1U) << "only frames of the sensor's size, from one topic";
   EXPECT_EQ(all.frames[0].t, 3);
   EXPECT_EQ(all.frames[0].image(2, 2), 7);
   ASSERT_EQ(all.poses.size(), 1U);
   EXPECT_EQ(all.poses[0].body.T_world_body.translation, Eigen::Vector3d(1, 2, 3));
-  EXPECT_EQ(all.poses[0].body.T_world_body.rotation.w(), 1) << "of unit norm";
+  EXPECT_EQ(all.poses[0].body.T_world_body.rotation.w(), 1) << "must have unit norm";
   EXPECT_EQ(all.imu.size(), 1U);
   ASSERT_EQ(all.truth.size(), 1U);
   EXPECT_EQ(all.truth[0].depth(0, 0), 1.0F) << "1000 mm";
@@ -298,7 +298,7 @@ TEST_P(RosFormats, CountsAndSizesThatAreNotThereCostNoMemory) {
   expect_problem("/cam0/events", MessageType::events, events + few);
   std::string transforms = encoding() == ros::Encoding::cdr ? std::string("\0\1\0\0", 4) : "";
   ros::append_number(transforms, 0xffffffffU);
-  // Transforms are read where they have a body, so one that has comes first.
+  // Transforms are used only if they have a body, so one with a body comes first.
   const auto file = output();
   const ros::TransformsMessage body{{{{1, "map"}, "body", SE3()}}};
   send(*file, "/tf", MessageType::transforms, 1, body);
@@ -313,7 +313,7 @@ INSTANTIATE_TEST_SUITE_P(Formats, RosFormats, testing::Values("rosbag", "mcap"),
                          [](const auto& test) { return std::string(test.param); });
 
 TEST(RosMessages, AlignmentInCdrIsThatOfTheStandard) {
-  // The header of four bytes, seconds, nanoseconds, a string of one character with its zero, height at a multiple of 4.
+  // Four bytes of header, seconds, nanoseconds, a string of one character with its zero, height at a multiple of 4.
   std::string bytes;
   ros::MessageWriter writer(ros::Encoding::cdr, bytes);
   writer(ros::EventArrayHead{{2 * kNsPerSecond + 5, "c"}, 3, 4});

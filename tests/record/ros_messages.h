@@ -19,7 +19,7 @@ std::string encoded(const T& message, ros::Encoding encoding) {
   return bytes;
 }
 
-/// What a file holds, as values.
+/// The messages of a file, as values.
 struct ReadBack {
   struct Frame {
     TimeNs t = 0, exposure_start = 0, exposure_duration = 0;
@@ -44,7 +44,7 @@ struct ReadBack {
   std::optional<std::string> problem{};
 };
 
-/// Everything in a file; up to its damage, if any.
+/// All messages of a file, up to its damage, if any.
 inline ReadBack read_back(const std::filesystem::path& path) {
   ReadBack all;
   const auto source = open_source(path, {.recover = [&](const std::string& problem) { all.problem = problem; }});

@@ -1,4 +1,4 @@
-// Images on the topics of bags and MCAP files, and files of topics that are not those of a recording.
+// Images on the topics of bags and MCAP files, and files whose topics are not those of a recording.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -40,7 +40,7 @@ class RosTopics : public testing::TestWithParam<const char*> {
     return std::make_unique<mcap::McapInput>(path());
   }
 
-  /// How many messages there are on each topic.
+  /// The number of messages on each topic.
   std::map<std::string, int> counts() const {
     std::map<std::string, int> result;
     const auto file = input();
@@ -63,7 +63,7 @@ class RosTopics : public testing::TestWithParam<const char*> {
     return result;
   }
 
-  /// Gives another name to a type of message in the file, of the same length.
+  /// Renames a message type in the file to a name of the same length.
   void rename_type(const std::string& from, const std::string& to) const {
     ASSERT_EQ(from.size(), to.size());
     std::string bytes = test::content(path());
@@ -73,7 +73,7 @@ class RosTopics : public testing::TestWithParam<const char*> {
     base_.write(path().filename().string(), bytes);
   }
 
-  /// Of an MCAP file's chunks, which are records of a byte, a length, two times, a size and the checksum.
+  /// The chunks of an MCAP file, which are records of a byte, a length, two times, a size and the checksum.
   static void without_checksums(std::string& bytes) {
     for (std::size_t at = mcap::kMagic.size(); at + 9 < bytes.size();) {
       std::uint64_t length = 0;
@@ -113,7 +113,7 @@ TEST_P(RosTopics, IrradianceHasAPictureWhereThereAreNoFrames) {
   std::map<std::string, int> found = counts();
   EXPECT_EQ(found["/cam0/irradiance"], kFrames + 1);
   EXPECT_EQ(found["/cam0/image_raw"], kFrames + 1);
-  EXPECT_EQ(found["/cam0/camera_info"], kFrames + 2) << "with every picture, for image_pipeline";
+  EXPECT_EQ(found["/cam0/camera_info"], kFrames + 2) << "with every image, for image_pipeline";
   EXPECT_EQ(found["/cam0/depthmap"], kFrames);
   const auto shown = pictures("/cam0/image_raw");
   ASSERT_EQ(shown.size(), kFrames + 1U);
@@ -122,7 +122,7 @@ TEST_P(RosTopics, IrradianceHasAPictureWhereThereAreNoFrames) {
 
   const test::ReadBack all = test::read_back(path());
   EXPECT_FALSE(all.problem) << *all.problem;
-  EXPECT_TRUE(all.frames.empty()) << "pictures are no frames of a frame camera";
+  EXPECT_TRUE(all.frames.empty()) << "images of irradiance are not frames of a frame camera";
   EXPECT_FALSE(all.info.cameras.at(0).has_frames);
   EXPECT_EQ(all.truth.size(), static_cast<std::size_t>(kFrames));
   EXPECT_EQ(all.images, std::vector<TimeNs>{kNsPerSecond});
@@ -164,7 +164,7 @@ TEST_P(RosTopics, ARecordingHasEveryImageOnce) {
   EXPECT_EQ(counts()["/cam0/irradiance"], kFrames);
   EXPECT_EQ(counts()["/cam0/image_raw"], kFrames);
 
-  // And so it stays, there and back.
+  // A second round trip changes nothing.
   const fs::path again = convert(path(), "recording", "again");
   EXPECT_EQ(std::distance(fs::directory_iterator(again / "cam0" / "images"), {}), kFrames + 1) << "and their list";
   convert(again, GetParam(), path("twice").filename().string());
@@ -227,7 +227,7 @@ TEST_P(RosTopics, UnknownTypesBesideOthersAreToldOf) {
   EXPECT_TRUE(test::contains(losses(summary, bag)[0].what, "not read: /event_camera/events (vendors__msgs/"));
   const std::string message = test::message_of<UserError>([&] { EventsFile{path()}; });
   EXPECT_TRUE(
-      test::contains(message, "has no camera, and so no events; not read: /event_camera/events (vendors__msgs/"))
+      test::contains(message, "has no camera and therefore no events; not read: /event_camera/events (vendors__msgs/"))
       << message;
   EXPECT_EQ(test::message_of<UserError>([&] { convert(path(), "text", "events.txt"); }), message);
   EXPECT_EQ(test::message_of<UserError>([&] { convert(path(), "dsec", "events.h5"); }), message);
@@ -265,7 +265,8 @@ TEST_P(RosTopics, EncodingsThatAreNotReadAreToldOf) {
 TEST_P(RosTopics, NoTopicsAtAll) {
   output()->close();
   const std::string message = test::message_of<UserError>([&] { convert(path(), "text", "events.txt"); });
-  EXPECT_TRUE(test::contains(message, is_bag() ? "has no camera, and so no events" : "it holds no topics")) << message;
+  EXPECT_TRUE(test::contains(message, is_bag() ? "has no camera and therefore no events" : "it holds no topics"))
+      << message;
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, RosTopics, testing::Values("rosbag", "mcap"),

@@ -18,7 +18,7 @@ using rosbag::RecordWriter;
 
 class Rosbag : public testing::Test {
  protected:
-  /// A bag of these records, which has no index.
+  /// A bag of these records, without an index.
   std::filesystem::path bag(const std::string& records) const {
     std::string bytes(rosbag::kMagic);
     RecordWriter(bytes, Op::bag_header)
@@ -42,7 +42,7 @@ class Rosbag : public testing::Test {
   test::TemporaryDirectory base_;
 };
 
-/// As it stands in a chunk: one measurement of an IMU at 7 ns.
+/// The content of a chunk: one IMU measurement at 7 ns.
 std::string imu_messages() {
   std::string records, connection;
   for (const auto& [name, value] : {std::pair{"topic", "/imu"}, {"type", "sensor_msgs/Imu"}, {"md5sum", "*"}}) {
@@ -70,7 +70,7 @@ TEST_F(Rosbag, EveryCompressionIsRead) {
     const test::ReadBack all = test::read_back(bag(records));
     ASSERT_EQ(all.imu.size(), 1U);
     EXPECT_EQ(all.imu[0].t, 7);
-    EXPECT_TRUE(all.problem && test::contains(*all.problem, "without an index")) << "as of a writer that was killed";
+    EXPECT_TRUE(all.problem && test::contains(*all.problem, "without an index")) << "as after a killed writer";
   }
 }
 
@@ -82,7 +82,8 @@ TEST_F(Rosbag, SizesThatAreNotTrueAreNamed) {
   EXPECT_TRUE(test::contains(problem_of(chunk("lz4", lz4, size - 1)), "damaged"));
   EXPECT_TRUE(test::contains(problem_of(chunk("lz4", lz4, size + 1)), "damaged"));
   EXPECT_TRUE(test::contains(problem_of(chunk("lz4", lz4, 0xffffffff)), "larger than any chunk"));
-  EXPECT_TRUE(test::contains(problem_of(chunk("lz4", lz4, ros::kMaxChunkBytes)), "damaged")) << "and costs no memory";
+  EXPECT_TRUE(test::contains(problem_of(chunk("lz4", lz4, ros::kMaxChunkBytes)), "damaged"))
+      << "and allocates no memory";
   EXPECT_TRUE(test::contains(problem_of(chunk("snappy", lz4, size)), "snappy"));
   EXPECT_TRUE(test::contains(problem_of("\xff\xff\xff\xff"), "4294967295 bytes"));
   EXPECT_TRUE(test::contains(problem_of(std::string("\0\0\0\0\xff\xff\xff\xff", 8)), "4294967295 bytes"));
@@ -94,7 +95,7 @@ TEST_F(Rosbag, SizesThatAreNotTrueAreNamed) {
 
 TEST_F(Rosbag, OlderOnesAndEncryptedOnesAreRefused) {
   const auto old = base_.write("old.bag", "#ROSBAG V1.2\n" + std::string(100, '\0'));
-  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { open_source(old); }), "not of version 2.0"));
+  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { open_source(old); }), "must have version 2.0"));
   std::string bytes(rosbag::kMagic);
   RecordWriter(bytes, Op::bag_header)
       .field("index_pos", std::uint64_t{0})

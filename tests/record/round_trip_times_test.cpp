@@ -1,4 +1,4 @@
-// Times of a recording on its way from DSEC's layout through another format and back.
+// Times of a recording that is converted from DSEC's layout to another format and back.
 #include <gtest/gtest.h>
 
 #include "esim/record/copy_recording.h"
@@ -32,7 +32,7 @@ std::vector<Event> events_between(TimeNs first, TimeNs last) {
   return events;
 }
 
-// The first event comes 310 us after the start, and the last 0.8 ms before the end.
+// The first event is 310 us after the start, and the last 0.8 ms before the end.
 TEST_P(RoundTripTimes, OfARecordingFromZeroStayAsTheyAre) {
   const auto events = events_between(310 * kNsPerUs, kNsPerSecond - 800 * kNsPerUs);
   const fs::path first = base_.path() / "first.h5";
@@ -42,7 +42,7 @@ TEST_P(RoundTripTimes, OfARecordingFromZeroStayAsTheyAre) {
   EXPECT_EQ(back.read(0, events.size() + 1), events);
   const auto index = EventsHdf5Reader(first).ms_to_idx(), found = back.ms_to_idx();
   ASSERT_EQ(index.size(), 1001U);
-  ASSERT_GE(found.size(), 1001U) << "up to right behind the last event";
+  ASSERT_GE(found.size(), 1001U) << "up to just after the last event";
   EXPECT_TRUE(std::equal(index.begin(), index.end(), found.begin()));
 }
 
@@ -58,7 +58,7 @@ TEST_P(RoundTripTimes, OfALaterRecordingStayAsTheyAre) {
             EventsHdf5Reader(first).read_window(start, start + 500 * kNsPerMs));
 }
 
-// Of a file that has no start.
+// For a file without a start.
 TEST_P(RoundTripTimes, OfATextStayAsTheyAre) {
   const auto events = events_between(310 * kNsPerUs, kNsPerSecond - 800 * kNsPerUs);
   const fs::path text = base_.path() / "events.txt";

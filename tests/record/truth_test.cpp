@@ -111,7 +111,7 @@ TEST(TruthHdf5, HoldsObjectsByNameAndDisplacementsBetweenFrames) {
     writer.write(complete);
     visible(0, 0) = static_cast<std::uint8_t>(k % 2);
     if (k > 0) writer.write(DisplacementRecord{0, k - 1, k, images.flow_x, images.flow_y, visible});
-    writer.write(DisplacementRecord{1, 0, 1, images.flow_x, images.flow_y, visible});  // another camera's
+    writer.write(DisplacementRecord{1, 0, 1, images.flow_x, images.flow_y, visible});  // of another camera
   }
   writer.end(true);
 
@@ -234,7 +234,7 @@ TEST(ImagesPng, FilesAndTimestamps) {
 
 // --- colour frames --------------------------------------------------------------------------------------------------
 
-/// Decodes what a mosaic of uniform light becomes.
+/// Decodes the mosaic of uniform irradiance.
 template <typename T>
 cv::Mat demosaicked(int width, int height, const std::array<T, 3>& light) {
   Image<T> mosaic(width, height);
@@ -254,7 +254,7 @@ TEST(DemosaickedPng, GivesEveryPixelTheColoursOfUniformLight) {
     ASSERT_EQ(wide.type(), CV_16UC3);
     ASSERT_EQ(narrow.size(), cv::Size(width, height));
     for (int y = 0; y < height; ++y) {
-      for (int x = 0; x < width; ++x) {  // blue first
+      for (int x = 0; x < width; ++x) {  // OpenCV stores blue first
         ASSERT_EQ(narrow.at<cv::Vec3b>(y, x), cv::Vec3b(30, 90, 200)) << x << ", " << y << " of " << width;
         ASSERT_EQ(wide.at<cv::Vec3w>(y, x), cv::Vec3w(300, 9'000, 50'000)) << x << ", " << y << " of " << width;
       }
@@ -274,7 +274,7 @@ TEST(DemosaickedPng, KeepsWhatEachPixelSaw) {
   }
 }
 
-// Notes what happens to it.
+// Logs its calls.
 class Probe final : public Sink {
  public:
   Probe(std::string& log, bool fails) : log_(log), fails_(fails) {}

@@ -1,4 +1,4 @@
-// What a simulation leaves that was killed, or found its disk full, and what reads it.
+// Recordings of simulations that were killed, or found the disk full, and everything that reads them.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -60,7 +60,7 @@ class UnfinishedRecording : public testing::Test {
     base_.write("out.incomplete/report.json", kRunning);
   }
 
-  /// What everything says of it: no more than a UserError of one line that names the place.
+  /// All readers accept it or throw a one-line UserError that names the file.
   void expect_order() {
     const auto in_order = [&](const std::string& what, const auto& work) {
       try {
@@ -131,7 +131,7 @@ TEST_F(UnfinishedRecording, EarlyStatesAreToldInOrder) {
   for (const char* name : {"events.h5", "truth.h5", "frames.csv"})
     base_.write(std::string("out.incomplete/cam0/") + name, "");
   EXPECT_TRUE(contains(nothing(), "holds no records")) << "files that have just been created";
-  EXPECT_TRUE(contains(no_events(), "holds no events")) << "an empty file is no recording of no events";
+  EXPECT_TRUE(contains(no_events(), "holds no events")) << "an empty file is not a recording without events";
   expect_order();
   for (const char* name : {"events.h5", "truth.h5"})
     base_.write(std::string("out.incomplete/cam0/") + name, std::string(5000, '\0') + "later bytes come first");
@@ -146,7 +146,7 @@ TEST_F(UnfinishedRecording, EarlyStatesAreToldInOrder) {
 TEST_F(UnfinishedRecording, IsBeingWrittenOrWasEnded) {
   fs::create_directory(folder_);
   base_.write("out.incomplete/report.json", kRunning);
-  EXPECT_TRUE(contains(message_of<UserError>([&] { open_source(folder_); }), "make it anew"));
+  EXPECT_TRUE(contains(message_of<UserError>([&] { open_source(folder_); }), "create it again"));
   base_.write("out.incomplete/report.json", R"({"status": "complete"})");
   EXPECT_TRUE(contains(message_of<UserError>([&] { open_source(folder_); }), "holds no records"));
 }
@@ -185,7 +185,7 @@ TEST_F(UnfinishedRecording, LinesAreReadAsFarAsAllFilesReach) {
   write_all();
   EXPECT_EQ(count(Content::imu), kSteps);
   EXPECT_EQ(count(Content::poses), kSteps);
-  cut("imu.csv", 3);  // a number that has lost its last digits is none
+  cut("imu.csv", 3);  // a number that has lost its last digits is invalid
   EXPECT_EQ(count(Content::imu), kSteps - 1);
   cut("imu_truth.csv", 100);
   EXPECT_LT(count(Content::imu), kSteps - 1);
@@ -196,7 +196,7 @@ TEST_F(UnfinishedRecording, LinesAreReadAsFarAsAllFilesReach) {
   cut("cam0/frames.csv", 2);
   EXPECT_EQ(count(Content::frames), kSteps - 1);
 
-  // Of a recording that says that it is whole, that is damage.
+  // In a recording that states to be complete, this is damage.
   base_.write("out.incomplete/report.json", R"({"status": "complete"})");
   EXPECT_THROW(count(Content::imu), UserError);
 }
@@ -284,7 +284,7 @@ TEST(OutputFile, AFullDiskLeavesNoTemporaryFile) {
   EXPECT_FALSE(fs::exists(base.path() / "report.json.tmp"));
 }
 
-/// Of a file that was cut by a full disk at each of many sizes: no more than what was written, and in order.
+/// Reads a file truncated by a full disk at each of many sizes: its records are the first ones written, in order.
 TEST(FullDisk, LeavesTheBeginningOfTheEvents) {
   const test::TemporaryDirectory base;
   const std::vector<Event> events = test::random_events(600'000, 640, 480, 0, 10 * kNsPerSecond);
@@ -319,7 +319,7 @@ TEST(FullDisk, LeavesTheBeginningOfTheEvents) {
   }
 }
 
-/// Every format that is a file: where the disk is full, what was converted until then stays and the message says where.
+/// Every format that is a file: on a full disk, the output converted so far stays, and the message says where.
 TEST(FullDisk, ConversionsKeepWhatTheyHave) {
   const test::TemporaryDirectory base;
   const std::vector<Event> events = test::random_events(1'500'000, 240, 180, 0, kNsPerSecond);
@@ -347,7 +347,7 @@ TEST(FullDisk, ConversionsKeepWhatTheyHave) {
     }
     EXPECT_GT(kept, 500'000U);
 
-    // As from a killed process: read whole or as far as it goes, or told what is wrong.
+    // Like the file of a killed process: it can be read, in part or completely, or the error says what is wrong.
     try {
       ReadOptions options;
       options.recover = [](const std::string&) {};

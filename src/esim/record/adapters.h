@@ -7,10 +7,10 @@
 
 #include "esim/record/record.h"
 
-/// Sinks that change what they pass on to another.
+/// Sinks that modify records and pass them on to another sink.
 namespace esim {
 
-/// Passes on one camera, as camera 0 and the only one, and what belongs to none.
+/// Passes on the records of one camera, as camera 0 and the only one, and those that belong to no camera.
 class OneCamera final : public Sink {
  public:
   OneCamera(std::unique_ptr<Sink> inner, int camera) : inner_(std::move(inner)), camera_(camera) {}
@@ -24,7 +24,7 @@ class OneCamera final : public Sink {
   int camera_;
 };
 
-/// Passes everything on at times that count from the start of the recording.
+/// Passes all records on, with times relative to the start of the recording.
 class FromZero final : public Sink {
  public:
   explicit FromZero(std::unique_ptr<Sink> inner) : inner_(std::move(inner)) {}

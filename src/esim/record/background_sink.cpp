@@ -10,10 +10,10 @@
 namespace esim {
 namespace {
 
-// To wake a thread takes longer than to copy a record: it is let sleep until there are some to write.
+// Waking a thread takes longer than copying a record, so the thread sleeps until this much is waiting.
 constexpr std::size_t kWorthWaking_bytes = std::size_t{64} << 10;
 
-/// A copy of a record that lives as long as it is needed, and what it weighs.
+/// An owned copy of a record, and its size.
 struct Copy {
   std::function<void(Sink&)> write;
   std::size_t bytes = 0;
@@ -102,8 +102,8 @@ Copy copy_of(const TriggerRecord& record) {
   return {[record](Sink& sink) { sink.write(record); }, sizeof record};
 }
 
-/// Lets other threads go first where processors are scarce: the simulation waits for each of its own, and for this one
-/// only at the end.
+/// Lowers the priority of this thread. The simulation waits for its other threads all the time, but for this one only
+/// at the end.
 void stand_back() {
 #ifdef __linux__
   constexpr int kNicer = 5;
@@ -120,7 +120,7 @@ BackgroundSink::BackgroundSink(std::unique_ptr<Sink> inner, std::size_t capacity
 BackgroundSink::~BackgroundSink() {
   {
     const std::lock_guard lock(mutex_);
-    jobs_.clear();  // ended without end(): what is waiting is not wanted
+    jobs_.clear();  // end() was not called: discard what is waiting
   }
   stop();
 }

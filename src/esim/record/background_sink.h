@@ -13,8 +13,8 @@
 
 namespace esim {
 
-/// Hands everything to another sink on a thread of its own, so that compressing and writing do not hold up the
-/// simulation. Records are copied; a few wait for others, at most `capacity_bytes` of them, and then write() does. A
+/// Passes everything to another sink on a separate thread, so that compressing and writing do not hold up the
+/// simulation. Records are copied. At most `capacity_bytes` of them wait; write() blocks while more are waiting. A
 /// failure of the inner sink is thrown by the next call.
 class BackgroundSink final : public Sink {
  public:

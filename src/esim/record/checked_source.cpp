@@ -38,7 +38,7 @@ const Record* CheckedSource::next() {
   }
 }
 
-/// The events before the first one that is wrong.
+/// The events before the first invalid one.
 const Record* CheckedSource::checked(const EventsRecord& record) {
   const auto index = static_cast<std::size_t>(record.camera);
   const Camera& camera = info().cameras.at(index).model;
@@ -64,7 +64,7 @@ void CheckedSource::fail(const Event& event, int camera) const {
   const Stream& stream = streams_[static_cast<std::size_t>(camera)];
   const Camera& model = info().cameras[static_cast<std::size_t>(camera)].model;
   if (event.t > kMaxTime || event.t < -kMaxTime) {
-    throw UserError(fmt::format("{}: event {} at {:.3g} s, which is no time of a recording", path_.string(),
+    throw UserError(fmt::format("{}: event {}: the time must be within 4.6e9 s of 0, not {:.3g} s", path_.string(),
                                 stream.count, to_seconds(event.t)));
   }
   if (stream.last && event.t < *stream.last) {

@@ -10,9 +10,9 @@
 
 namespace esim {
 
-/// Holds a Source to what it promises, so that nobody behind it needs to: every event is on the sensor, as far as its
-/// size is known, and not before the one above it; every time is one of a recording, within 146 years of 0. Anything
-/// else is a UserError with file, index and values. With `recover`, the recording ends there, and at damage, instead.
+/// Checks the events of a Source, so that its users need not: every event is on the sensor, as far as its size is
+/// known, and not earlier than the event before it; every time is within 146 years of 0. Anything else is a UserError
+/// with file, index and values. With `recover`, the recording ends there, and at damage, instead.
 class CheckedSource final : public Source {
  public:
   CheckedSource(std::unique_ptr<Source> inner, std::filesystem::path path, ReadOptions options);
@@ -35,8 +35,8 @@ class CheckedSource final : public Source {
   std::filesystem::path path_;
   ReadOptions options_;
   std::vector<Stream> streams_;       // events of each camera so far
-  std::optional<Record> part_;        // what is sound of a record,
-  std::optional<EventsRecord> rest_;  // and the rest, which begins with an event that is not
+  std::optional<Record> part_;        // the valid events at the start of a record,
+  std::optional<EventsRecord> rest_;  // and the rest, which starts with an invalid one
   bool ended_ = false;
 };
 

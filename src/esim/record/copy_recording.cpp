@@ -25,22 +25,22 @@ std::string names_of(const std::vector<CameraInfo>& cameras) {
   return names;
 }
 
-/// The camera to take out; nothing: all.
+/// The index of the camera to copy; nothing: all.
 std::optional<int> chosen_camera(const RecordingInfo& info, const Format& format, const std::string& name) {
   const auto& cameras = info.cameras;
   if (cameras.empty() && !format.several_cameras)
-    throw UserError(fmt::format("{} holds what one camera recorded, and the input has no camera", format.name));
+    throw UserError(fmt::format("{} holds the data of one camera, but the input has no camera", format.name));
   if (name.empty()) {
     if (cameras.size() <= 1 || format.several_cameras) return std::nullopt;
     throw RemediableError(
-        fmt::format("{} holds one camera, and there are {}: choose one", format.name, names_of(cameras)),
+        fmt::format("{} holds one camera, but the recording has {}: choose one", format.name, names_of(cameras)),
         Remedy::choose_camera);
   }
   const auto found =
       std::find_if(cameras.begin(), cameras.end(), [&](const CameraInfo& camera) { return camera.name == name; });
-  if (cameras.empty()) throw UserError(fmt::format("there is no camera {}: the recording has none", name));
+  if (cameras.empty()) throw UserError(fmt::format("camera {} does not exist: the recording has no camera", name));
   if (found == cameras.end())
-    throw UserError(fmt::format("there is no camera {}; the recording has {}", name, names_of(cameras)));
+    throw UserError(fmt::format("the recording has no camera {}; its cameras are {}", name, names_of(cameras)));
   return static_cast<int>(found - cameras.begin());
 }
 
@@ -76,7 +76,7 @@ class Copy {
     }
   }
 
-  /// `began` becomes true with the first record that is written, or refused.
+  /// Sets `began` as soon as there is a record to write.
   CopySummary run(const std::function<bool(double)>& go_on, bool& began) {
     to_->begin(from_.info());
     while (const Record* record = next()) {
@@ -93,7 +93,7 @@ class Copy {
   }
 
  private:
-  /// What cannot be read ends the target, incomplete. (One that cannot be written is not ended: it stays as it is.)
+  /// If reading fails, the target is ended as incomplete. (If writing fails, it is left as it is.)
   const Record* next() {
     try {
       return from_.next();
@@ -130,7 +130,7 @@ class Copy {
   CopySummary summary_;
 };
 
-/// What a folder needs, besides the files of its format, to be known as a recording: a report.json.
+/// The report.json that makes a folder, with the files of its format, recognisable as a recording.
 std::string conversion_report(const RecordingInfo& info, const std::string& from, bool complete) {
   auto cameras = nlohmann::ordered_json::array();
   for (const CameraInfo& camera : info.cameras) {
@@ -163,7 +163,9 @@ CopySummary copy_recording(Source& from, const Format& format, const fs::path& t
 
 CopySummary convert_recording(const fs::path& from, const Format& format, const fs::path& to,
                               const ConvertOptions& options, const std::function<bool(double)>& go_on) {
-  if (!format.create) throw UserError(fmt::format("{} is only read; write one of {}", format.name, written_formats()));
+  if (!format.create)
+    throw UserError(
+        fmt::format("format {} can be read but not written; choose one of {}", format.name, written_formats()));
   bool damaged = false;
   ReadOptions reading = options.read;
   if (options.read.recover) {
@@ -180,14 +182,14 @@ CopySummary convert_recording(const fs::path& from, const Format& format, const 
       CopySummary summary = Copy(*source, format, path, options.copy).run(go_on, copied);
       summary.complete &= !damaged;
       if (summary.complete && summary.copied.empty() && summary.left_out.empty() && !summary.not_read.empty()) {
-        throw UserError(fmt::format("cannot convert {}: it holds nothing that can be read, only {}", from.string(),
+        throw UserError(fmt::format("cannot convert {}: it holds only data that cannot be read: {}", from.string(),
                                     list_of_some(summary.not_read)));
       }
       return summary;
     } catch (const OutputError&) {
       throw;
     } catch (const UserError&) {
-      copied = false;  // the input is damaged or does not fit into the format: both have a remedy, and this is none
+      copied = false;  // the input is damaged or does not fit into the format: both have a remedy, so nothing is kept
       throw;
     }
   };
@@ -210,11 +212,11 @@ CopySummary convert_recording(const fs::path& from, const Format& format, const 
 std::vector<Loss> losses(const CopySummary& summary, const Format& format) {
   std::vector<Loss> losses;
   for (const auto& [content, count] : summary.left_out) {
-    losses.push_back({fmt::format("{} does not hold {}: {} left out", format.name, describe(content), grouped(count))});
+    losses.push_back({fmt::format("{} cannot hold {}: {} left out", format.name, describe(content), grouped(count))});
   }
   if (!summary.not_read.empty()) losses.push_back({"not read: " + list_of_some(summary.not_read)});
   if (summary.rounded_to > 0) {
-    losses.push_back({fmt::format("times of events are rounded down to {} us",
+    losses.push_back({fmt::format("event times are rounded down to {} us",
                                   static_cast<double>(summary.rounded_to) / static_cast<double>(kNsPerUs)),
                       format.either_unit ? Remedy::nanoseconds : Remedy::none});
   }

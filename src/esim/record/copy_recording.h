@@ -13,41 +13,40 @@
 namespace esim {
 
 struct CopyOptions {
-  std::string camera{};    ///< only this one, by its name; empty: all, or the only one
-  bool from_zero = false;  ///< times count from the start of the recording
+  std::string camera{};    ///< name of the camera to copy; empty: all, or the only one
+  bool from_zero = false;  ///< make times relative to the start of the recording
   WriteOptions write{};
 };
 
-/// What was copied, and what the target's format could not hold.
+/// What was copied, and what the target format could not hold.
 struct CopySummary {
-  std::map<Content, std::uint64_t> copied{}, left_out{};  ///< events, frames, ...: how many
-  std::vector<std::string> not_read{};                    ///< what of the input cannot be read, for people
-  TimeNs rounded_to = 0;  ///< ns; times of events were rounded down to multiples of it; 0: they were not
-  bool complete = true;   ///< else it was stopped
+  std::map<Content, std::uint64_t> copied{}, left_out{};  ///< number of events, frames, ...
+  std::vector<std::string> not_read{};                    ///< unsupported parts of the input, as text
+  TimeNs rounded_to = 0;  ///< ns; event times were rounded down to multiples of it; 0: they were not
+  bool complete = true;   ///< false: it was stopped
 };
 
-/// Copies a recording, record by record, to a path in a format that is written. `go_on` is asked after each, with the
-/// fraction that has been read. Throws UserError if the format holds one camera and none of several has been chosen, or
-/// if there is no camera of that name; what cannot be read or written throws too, when all that came before has been
-/// handed on; the target has ended incomplete then, but for one that cannot be written.
+/// Copies a recording, record by record, to `to` in a format that can be written. Calls `go_on` after each record with
+/// the fraction that has been read. Throws UserError if the format holds one camera and none of several has been
+/// chosen, or if no camera has that name. If reading or writing fails, throws after all earlier records have been
+/// passed on; the target has then been ended as incomplete, except after a failure to write.
 CopySummary copy_recording(Source& from, const Format& format, const std::filesystem::path& to,
                            const CopyOptions& options, const std::function<bool(double)>& go_on);
 
 struct ConvertOptions {
   CopyOptions copy{};
   ReadOptions read{};
-  bool replace = false;  ///< what is there already
+  bool replace = false;  ///< replace existing output
 };
 
-/// Opens what is at `from`, and makes the file or the folder `to` of it, which is there only when it is whole; see
-/// copy_recording(). What has been recovered from a damaged file is not `complete`. Throws UserError for a format that
-/// is only read, for a `to` that is there and not to be replaced, where `from` has no camera and the format holds
-/// nothing else, and where all that `from` holds is of unknown kinds. If something cannot be written, the OutputError
-/// says where what was written before it is kept: as `to`.incomplete.
+/// Converts `from` to the file or folder `to`, which appears only when it is complete; see copy_recording(). What is
+/// recovered from a damaged file is not `complete`. Throws UserError if the format cannot be written, if `to` exists
+/// and must not be replaced, if `from` has no camera but the format needs one, and if all contents of `from` are
+/// unsupported. If writing fails, the OutputError says where the data written so far are kept: in `to`.incomplete.
 CopySummary convert_recording(const std::filesystem::path& from, const Format& format, const std::filesystem::path& to,
                               const ConvertOptions& options, const std::function<bool(double)>& go_on);
 
-/// Something that was left out or changed: a line for people, and how to keep it.
+/// Something that was left out or changed, as a line of text, and how to keep it.
 struct Loss {
   std::string what{};
   Remedy remedy = Remedy::none;

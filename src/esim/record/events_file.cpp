@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 constexpr int kMaxExtent = 65536;  // px
 constexpr std::uintmax_t kMaxReportBytes = std::uintmax_t{1} << 24;
 
-// The file that a path means.
+// The events file that a path stands for.
 fs::path find_any_file(const fs::path& path) {
   std::error_code error;
   require_existing(path);
@@ -43,9 +43,9 @@ fs::path find_any_file(const fs::path& path) {
 fs::path find_file(const fs::path& path) {
   fs::path file = find_any_file(path);
   if (file.extension() == ".h5" && !has_begun(file)) {
-    throw UserError(fmt::format(
-        "{} holds no events: the program that wrote {} was stopped before the first of them; make it again",
-        path.string(), file.filename().string()));
+    throw UserError(
+        fmt::format("{} holds no events: the program that wrote {} was stopped before the first event; create it again",
+                    path.string(), file.filename().string()));
   }
   return file;
 }
@@ -61,7 +61,7 @@ std::optional<SensorSize> sensor_in_report(const nlohmann::json& report, const s
   return std::nullopt;
 }
 
-// What report.json of a recording says about the camera whose folder this is, or about its only one.
+// The sensor size in a recording's report.json: of the camera with this folder, or of the only camera.
 std::optional<SensorSize> reported_sensor(const fs::path& folder) {
   for (const fs::path& path : {folder / "report.json", folder.parent_path() / "report.json"}) {
     std::error_code error;
@@ -70,7 +70,7 @@ std::optional<SensorSize> reported_sensor(const fs::path& folder) {
     try {
       std::ifstream file(path);
       return sensor_in_report(nlohmann::json::parse(file), folder.filename().string());
-    } catch (const nlohmann::json::exception&) {  // somebody else's report
+    } catch (const nlohmann::json::exception&) {  // another program's report
     }
   }
   return std::nullopt;
@@ -80,7 +80,7 @@ std::optional<SensorSize> reported_sensor(const fs::path& folder) {
 
 EventsFile::EventsFile(const fs::path& path, const ReadOptions& options) : path_(find_file(path)) {
   ReadOptions told = options;
-  // What the file itself says of the sensor counts for more than the report beside it.
+  // The sensor size in the file itself takes precedence over the report's.
   source_ = open_source(path_, told);
   const auto size_of = [](const Source& source) { return source.info().cameras.front().model; };
   require_camera(*source_, path_);

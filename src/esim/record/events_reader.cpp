@@ -16,7 +16,7 @@ class EventsSource final : public Source {
     CameraInfo& camera = info_.cameras.emplace_back();
     camera.name = "cam0";
     camera.model.width = sensor.width, camera.model.height = sensor.height;
-    // Where the file does not tell the start, the first portion does.
+    // If the file does not state the start, the first portion determines it.
     read();
     waiting_ = true;
     const std::optional<TimeNs> start = reader_->start();
@@ -52,7 +52,7 @@ class EventsSource final : public Source {
   RecordingInfo info_;
   std::vector<Event> events_;
   std::optional<Record> record_;
-  bool waiting_ = false;  // the portion that has been read has not been handed out
+  bool waiting_ = false;  // a portion has been read but not handed out
   bool ended_ = false;
   std::exception_ptr damage_;
 };

@@ -9,21 +9,21 @@
 
 namespace esim {
 
-/// Reads the events of one camera: all that a format which holds nothing else needs to be a Source.
+/// Reads the events of one camera. A format that holds only events needs nothing else to be a Source.
 class EventsReader {
  public:
   virtual ~EventsReader() = default;
 
-  /// 0 x 0 where the file does not say.
+  /// 0 x 0 if the file does not state it.
   virtual SensorSize sensor() const { return {}; }
 
-  /// Start and end of the recording, which may be before the first event and after the last one; nothing where the
-  /// file does not tell. The end may also be merely that of the events.
+  /// Start and end of the recording, which may be before the first event and after the last one; nothing if the file
+  /// does not state them. The end may be that of the events only.
   virtual std::optional<TimeNs> start() const { return std::nullopt; }
   virtual std::optional<TimeNs> end() const { return std::nullopt; }
 
-  /// Appends the next events, some 10^4 to 10^5; false if there are none left. Where the file is damaged, appends what
-  /// comes before and throws UserError.
+  /// Appends the next events, some 10^4 to 10^5; returns false at the end. If the file is damaged, appends the events
+  /// before the damage and throws UserError.
   virtual bool read(std::vector<Event>& events) = 0;
 
   /// The fraction of the file that has been read.

@@ -25,7 +25,7 @@ class EventsSink final : public Sink {
   void begin(const RecordingInfo& info) override {
     const Camera& camera = info.cameras.at(0).model;
     if (camera.width > format_.max_width || camera.height > format_.max_height) {
-      fail_limits(fmt::format("the sensor has {} x {} px, and format {} has room for {} x {}", camera.width,
+      fail_limits(fmt::format("the sensor has {} x {} px, but format {} holds at most {} x {} px", camera.width,
                               camera.height, format_.name, format_.max_width, format_.max_height));
     }
     const bool known = camera.width > 0 && camera.height > 0;
@@ -48,7 +48,7 @@ class EventsSink final : public Sink {
   }
 
  private:
-  /// They are in order of time: the first and the last tell.
+  /// Events are in order of time, so checking the first and the last is enough.
   void check(EventSpan events) const {
     int x = 0, y = 0;
     for (const Event& event : events) x = std::max<int>(x, event.x), y = std::max<int>(y, event.y);
@@ -59,9 +59,8 @@ class EventsSink final : public Sink {
   [[noreturn]] void fail_time(EventSpan events) const {
     const auto fits = [&](const Event& event) { return event.t >= format_.min_time && event.t <= format_.max_time; };
     const auto wrong = std::find_if_not(events.begin(), events.end(), fits);
-    fail_limits(fmt::format("event {} is at {} s, and format {} has room for times from {} to {} s",
-                            index_of(wrong, events), seconds(wrong->t), format_.name, seconds(format_.min_time),
-                            seconds(format_.max_time)));
+    fail_limits(fmt::format("event {} is at {} s, but format {} holds times from {} to {} s", index_of(wrong, events),
+                            seconds(wrong->t), format_.name, seconds(format_.min_time), seconds(format_.max_time)));
   }
 
   [[noreturn]] void fail_place(EventSpan events) const {
@@ -70,10 +69,10 @@ class EventsSink final : public Sink {
     const std::string where =
         fmt::format("event {} is at ({}, {}), outside", index_of(wrong, events), wrong->x, wrong->y);
     if (wrong->x >= format_.max_width || wrong->y >= format_.max_height) {
-      fail_limits(fmt::format("{} the {} x {} px that format {} has room for", where, format_.max_width,
-                              format_.max_height, format_.name));
+      fail_limits(fmt::format("{} the {} x {} px that format {} can hold", where, format_.max_width, format_.max_height,
+                              format_.name));
     }
-    fail(fmt::format("{} the sensor of {} x {} px: say its true size", where, width_, height_));
+    fail(fmt::format("{} the sensor of {} x {} px: give the true size of the sensor", where, width_, height_));
   }
 
   std::uint64_t index_of(EventSpan::iterator event, EventSpan events) const {
@@ -81,7 +80,7 @@ class EventsSink final : public Sink {
   }
 
   [[noreturn]] void fail_limits(const std::string& what) const {
-    fail(what + "; write another format, such as dsec or text");
+    fail(what + "; choose another format, such as dsec or text");
   }
 
   [[noreturn]] void fail(const std::string& what) const {

@@ -14,7 +14,7 @@ void FanOut::write(const Record& record) {
     try {
       sink->write(record);
     } catch (...) {
-      sink.reset();  // it cannot be ended in order: what it has written stays as it is
+      sink.reset();  // end() would fail: leave its output as it is
       end_rest();
       throw;
     }
@@ -25,7 +25,7 @@ void FanOut::end_rest() noexcept {
   std::erase(sinks_, nullptr);
   try {
     end(false);
-  } catch (...) {  // the first failure counts
+  } catch (...) {  // rethrow only the first failure
   }
   sinks_.clear();
 }

@@ -8,8 +8,8 @@
 
 namespace esim {
 
-/// Passes everything on to several sinks, in their order. If one of them fails to write a record, the others are ended,
-/// incomplete, so that they keep what they have been given; then the failure is rethrown, and nothing more is passed
+/// Passes everything on to several sinks, in their order. If one of them fails to write a record, the others are ended
+/// as incomplete, so that they keep what they have received; then the failure is rethrown, and nothing more is passed
 /// on.
 class FanOut final : public Sink {
  public:
@@ -21,7 +21,7 @@ class FanOut final : public Sink {
   void begin(const RecordingInfo& info) override;
   void write(const Record& record) override;
 
-  /// Ends every sink, also when one of them fails; then rethrows the first failure.
+  /// Ends every sink, even if one of them fails; then rethrows the first failure.
   void end(bool complete) override;
 
  private:

@@ -21,75 +21,76 @@ struct SensorSize {
 };
 
 struct ReadOptions {
-  std::optional<SensorSize> sensor{};  ///< replaces what the file says of its cameras
+  std::optional<SensorSize> sensor{};  ///< replaces the sensor size in the file
 
-  /// Where set: what can be read of a file that is cut or damaged is read, and this is told what is wrong with it.
+  /// If set, damaged or truncated files are read as far as possible, and this is called with the problem.
   std::function<void(const std::string& problem)> recover{};
 };
 
 enum class TimeUnit { us, ns };
 
 struct WriteOptions {
-  TimeUnit unit = TimeUnit::us;  ///< of the times of events, where the format leaves the choice
+  TimeUnit unit = TimeUnit::us;  ///< unit of event times, if the format allows a choice
   Compression compression = Compression::blosc;
 };
 
 /// Kinds of record.
 enum class Content { events, frames, images, imu, poses, truth, displacement, event_points, triggers };
 
-/// What a format is, and what it can hold. One file in `formats/` describes each; `formats/formats.cpp` lists them.
+/// A format: its name, its functions and its limits. One file in `formats/` describes each; `formats/formats.cpp` lists
+/// them.
 struct Format {
   std::string name{};                     ///< as in `--format`: "evt3"
-  std::string description{};              ///< a line for people
+  std::string description{};              ///< one line of text
   std::vector<std::string> extensions{};  ///< ".raw"; the first format that has a path's extension writes it
   std::vector<Content> holds{};
-  bool several_cameras = false;                          ///< else records of camera 0 are all there is
-  bool folder = false;                                   ///< a recording is a folder of files, not a file
-  TimeNs resolution = 1;                                 ///< times of events are rounded down to multiples of it, ns
+  bool several_cameras = false;                          ///< false: only camera 0
+  bool folder = false;                                   ///< true: a recording is a folder; false: a file
+  TimeNs resolution = 1;                                 ///< ns; event times are rounded down to multiples of it
   bool either_unit = false;                              ///< and to multiples of WriteOptions::unit
-  int max_width = 65536, max_height = 65536;             ///< px: larger sensors do not fit
-  TimeNs min_time = std::numeric_limits<TimeNs>::min();  ///< of events: earlier ones do not fit
-  TimeNs max_time = std::numeric_limits<TimeNs>::max();  ///< and neither do later ones
+  int max_width = 65536, max_height = 65536;             ///< px; maximum size of the sensor
+  TimeNs min_time = std::numeric_limits<TimeNs>::min();  ///< earliest and
+  TimeNs max_time = std::numeric_limits<TimeNs>::max();  ///< latest time of events, ns
 
-  /// Is it a file (or folder) of this format? By its content, of which `head` is the first 4096 bytes, or less.
+  /// Whether a path is a file (or folder) of this format, by its content; `head` is its first 4096 bytes, or fewer.
   std::function<bool(const std::filesystem::path& path, std::string_view head)> recognises{};
 
-  /// Throws UserError where the file cannot be opened.
+  /// Throws UserError if the file cannot be opened.
   std::function<std::unique_ptr<Source>(const std::filesystem::path& path, const ReadOptions& options)> open{};
 
-  /// Nothing where the format is only read. `path` is where to write; a file there is replaced.
+  /// Empty if the format cannot be written. `path` is where to write; an existing file is replaced.
   std::function<std::unique_ptr<Sink>(const std::filesystem::path& path, const WriteOptions& options)> create{};
 
   bool can_hold(Content content) const { return std::find(holds.begin(), holds.end(), content) != holds.end(); }
 
-  /// The usual one: ".raw"; empty where there is none.
+  /// The default extension, such as ".raw"; empty for formats without extensions.
   std::string extension() const { return extensions.empty() ? std::string() : extensions.front(); }
 };
 
 /// All formats.
 const std::vector<Format>& formats();
 
-/// Throws UserError, with the names that there are, for others.
+/// The format of this name. Throws UserError, with the known names, for unknown names.
 const Format& format_named(std::string_view name);
 
-/// The format of what is there. Throws UserError for paths that are not there and for unknown content.
+/// The format of an existing file or folder. Throws UserError if the path does not exist or its content is unknown.
 const Format& format_of(const std::filesystem::path& path);
 
-/// The format that is written to a path, by its extension; null for unknown ones, of which format_for() throws
-/// UserError.
+/// The format for writing to a path, by its extension. For unknown extensions, this returns null and format_for()
+/// throws UserError.
 const Format* find_format_for(const std::filesystem::path& path);
 const Format& format_for(const std::filesystem::path& path);
 
-/// Opens a file of any format, and holds it to what a Source promises: events that are out of order or outside the
-/// sensor, as far as its size is known, are a UserError with index and values.
+/// Opens a file of any format, checked by CheckedSource: events that are out of order or outside the sensor, as far as
+/// its size is known, are a UserError with index and values.
 std::unique_ptr<Source> open_source(const std::filesystem::path& path, const ReadOptions& options = {});
 
-/// Throws UserError where a recording from `path` has no camera, with what of the file cannot be read.
+/// Throws UserError, with the unsupported contents of the file, if a recording from `path` has no camera.
 void require_camera(const Source& source, const std::filesystem::path& path);
 
 Content content_of(const Record& record);
 
-/// For people: "events", "measurements of the IMU".
+/// Plural names for messages: "events", "IMU measurements".
 std::string_view describe(Content content);
 
 }  // namespace esim

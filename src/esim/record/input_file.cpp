@@ -58,7 +58,7 @@ InputFile& InputFile::operator=(InputFile&& other) noexcept {
   return *this;
 }
 
-/// Makes sure that `count` bytes are in the buffer, or all that are left.
+/// Fills the buffer with at least `count` bytes, or all that are left.
 void InputFile::fill(std::size_t count) {
   if (end_ - begin_ >= count) return;
   if (buffer_.size() < count) buffer_.resize(std::max(count, kBlockBytes));
@@ -74,8 +74,8 @@ void InputFile::fill(std::size_t count) {
 }
 
 std::span<const std::byte> InputFile::read(std::size_t most) {
-  // What a damaged file says of its own sizes is not trusted with memory. Where the size is unknown, as of pipes, it is
-  // taken as it is.
+  // Damaged files do not cause allocations larger than their size. If the size is unknown, as of pipes, the stated size
+  // is used.
   if (size_ > 0) most = std::min<std::uint64_t>(most, std::max(size_, offset_) - offset_);
   fill(most);
   const std::size_t count = std::min(most, end_ - begin_);
@@ -111,7 +111,7 @@ std::string_view InputFile::read_line(std::size_t most, std::string_view what) {
 }
 
 void InputFile::seek(std::uint64_t offset) {
-  if (offset > size_) fail(offset, "the file ends before");
+  if (offset > size_) fail(offset, "the file ends before this byte");
   if (::lseek(descriptor_, static_cast<off_t>(offset), SEEK_SET) < 0) fail(offset, system_reason(errno));
   offset_ = offset;
   begin_ = end_ = 0;

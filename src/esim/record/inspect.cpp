@@ -46,7 +46,7 @@ void add(EventSpan events, EventsSummary& summary) {
       std::count_if(events.begin(), events.end(), [](const Event& event) { return event.polarity > 0; }));
 }
 
-// Of any format, by reading all of it.
+// Inspects a file of any format by reading all of it.
 void summarise(Source& source, Inspection& inspection) {
   const RecordingInfo& info = source.info();
   for (const CameraInfo& camera : info.cameras) {
@@ -64,7 +64,7 @@ void summarise(Source& source, Inspection& inspection) {
   inspection.not_read = source.not_read();
 }
 
-// A file of events, without what else it holds.
+// Inspects the events of a file, without its other contents.
 EventsSummary summarise_events(const fs::path& path) {
   if (format_of(path).name == "dsec") return summarise_hdf5(path);
   Inspection inspection;
@@ -72,7 +72,7 @@ EventsSummary summarise_events(const fs::path& path) {
   return inspection.cameras.front();
 }
 
-// One camera's folder; nothing if it holds no events.
+// Inspects one camera's folder; nothing if it has no events.
 std::optional<EventsSummary> summarise_folder(const fs::path& folder, const std::string& camera) {
   const auto path = events_file_in(folder);
   if (!path) return std::nullopt;
@@ -109,7 +109,7 @@ void read_report(const fs::path& directory, Inspection& inspection) {
   }
 }
 
-// Links are not followed, so that no loop of them can trap the walk.
+// Links are not followed, so that cycles cannot occur.
 FileSize folder_size(const fs::path& folder, const fs::path& name) {
   FileSize total{name / "", 0, 0};
   std::error_code error;
@@ -124,7 +124,7 @@ FileSize folder_size(const fs::path& folder, const fs::path& name) {
   return total;
 }
 
-// Files of a folder, by name; folders of images count as one, those of cameras are looked into.
+// The files of a folder, by name. Folders of images count as one; those of cameras are listed by file.
 void list_files(const fs::path& root, const fs::path& below, std::vector<FileSize>& files) {
   std::error_code error;
   std::vector<fs::path> names;

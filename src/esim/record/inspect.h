@@ -14,48 +14,48 @@ namespace esim {
 
 enum class RecordingStatus {
   complete,
-  interrupted,  ///< ended early, in order
-  killed,       ///< its process is gone, and what it wrote last may be missing
-  running,      ///< its process is writing now
-  unknown,      ///< the files do not say
+  interrupted,  ///< ended early by request
+  killed,       ///< its process has ended, and the last data may be missing
+  running,      ///< its process is still writing
+  unknown,      ///< the files do not state it
 };
 
-/// What one stream of events holds.
+/// Properties of one stream of events.
 struct EventsSummary {
-  std::string camera;                ///< the folder in the recording; empty for a file, or the folder itself
+  std::string camera;                ///< folder in the recording; empty for a file, or for the folder itself
   std::optional<int> width, height;  ///< px
   std::uint64_t events = 0, on = 0;
-  TimeNs first = 0, last = 0;  ///< of the events; meaningless if there are none
-  std::string problem;         ///< why the file cannot be read; empty: it can
+  TimeNs first = 0, last = 0;  ///< times of the first and last event; undefined if there are no events
+  std::string problem;         ///< why the file cannot be read; empty: no problem
 
   std::uint64_t off() const { return events - on; }
-  /// Events per second between the first and the last; 0 if that is no time at all.
+  /// Events per second between the first and the last; 0 if their times are equal.
   double mean_rate_hz() const;
 };
 
 struct FileSize {
   std::filesystem::path name;  ///< relative to the recording
   std::uint64_t bytes = 0;
-  std::uint64_t files = 1;  ///< more for a folder
+  std::uint64_t files = 1;  ///< larger for a folder
 };
 
-/// What `esim info PATH` tells about a recording, whole or not, or about one file of any format.
+/// The result of `esim info PATH` for a recording, complete or not, or for one file of any format.
 struct Inspection {
-  std::filesystem::path path;  ///< what was looked at: X.incomplete if there is no X
+  std::filesystem::path path;  ///< the inspected path: X.incomplete if X does not exist
   RecordingStatus status = RecordingStatus::unknown;
-  std::string reason;  ///< as the report has it
+  std::string reason;  ///< from the report
   std::string format;  ///< of a file
   std::vector<EventsSummary> cameras;
-  std::map<Content, std::uint64_t> others;  ///< what else a file holds: how many
-  std::vector<std::string> not_read;        ///< what of a file cannot be read, for people
+  std::map<Content, std::uint64_t> others;  ///< number of other records in a file
+  std::vector<std::string> not_read;        ///< unsupported contents of a file, as text
   std::vector<FileSize> files;
 };
 
-/// Reads through the events, in memory that does not depend on their number. Throws UserError if there is nothing to
-/// look at, or if PATH is one file that cannot be read.
+/// Reads all events, in memory that does not depend on their number. Throws UserError if PATH does not exist, is not a
+/// recording, or is a file that cannot be read.
 Inspection inspect(const std::filesystem::path& path);
 
-/// Several lines of plain text, columns aligned.
+/// Several lines of plain text, with aligned columns.
 std::string describe(const Inspection& inspection);
 
 }  // namespace esim

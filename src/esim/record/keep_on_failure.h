@@ -10,15 +10,15 @@
 
 namespace esim {
 
-/// The result of `work()`, which fills `output`, a RecordingDirectory or a RecordingFile, and finishes it. If that
-/// fails when `worth_keeping` is true, what has been written stays in output.path() (of archives, in the parts beside
-/// it), and the error says so. OutputError and UserError stay what they are, too little memory becomes a UserError,
+/// The result of `work()`, which fills and finishes `output`, a RecordingDirectory or a RecordingFile. If it fails
+/// while `worth_keeping` is true, the data written so far are kept in output.path() (for archives, in the parts next to
+/// it), and the error says so. OutputError and UserError keep their type; running out of memory becomes a UserError,
 /// anything else an InternalError.
 template <typename Output, typename Work>
 auto keep_on_failure(Output& output, const bool& worth_keeping, const Work& work) {
   const auto kept = [&](const std::string& problem) {
     output.keep(problem);
-    return problem + "; what was written before that is kept: " + output.path().string();
+    return problem + "; the output written so far is kept: " + output.path().string();
   };
   try {
     return work();
@@ -37,7 +37,7 @@ auto keep_on_failure(Output& output, const bool& worth_keeping, const Work& work
   }
 }
 
-/// Ends a sink after a failure, as far as it can be. Failures of its own are known already.
+/// Ends a sink after a failure, as far as possible. Ignores further failures.
 inline void end_incomplete(Sink& out) noexcept {
   try {
     out.end(false);

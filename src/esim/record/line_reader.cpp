@@ -46,7 +46,7 @@ bool LineReader::next(std::string_view& line) {
   const auto find_newline = [&] { return std::find(block_.begin() + begin_, block_.begin() + end_, '\n'); };
   auto newline = find_newline();
   if (newline == block_.begin() + end_ && *text_) {
-    // The rest of the block moves to its start, and more of the text follows it.
+    // Moves the rest of the block to its start and reads more text after it.
     std::memmove(block_.data(), block_.data() + begin_, end_ - begin_);
     end_ -= std::exchange(begin_, 0);
     text_->read(block_.data() + end_, static_cast<std::streamsize>(block_.size() - end_));
@@ -57,7 +57,7 @@ bool LineReader::next(std::string_view& line) {
   if (begin_ == end_) return false;
   ++line_number_;
   line = std::string_view(block_.data() + begin_, static_cast<std::size_t>(newline - block_.begin()) - begin_);
-  if (line.size() > kMaxLineBytes) fail("the line is longer than any that belongs here");
+  if (line.size() > kMaxLineBytes) fail("the line is too long");
   begin_ += std::min(line.size() + 1, end_ - begin_);
   return true;
 }

@@ -65,8 +65,8 @@ std::string list_of_some(const std::vector<std::string>& items) {
 
 std::string_view problem_of_time(std::optional<TimeNs> last, TimeNs t) {
   constexpr TimeNs kMaxTime = std::numeric_limits<TimeNs>::max() / 2;  // differences of times stay representable
-  if (t > kMaxTime || t < -kMaxTime) return "the time is none of a recording";
-  if (last && t < *last) return "the time is before that above: sort by time";
+  if (t > kMaxTime || t < -kMaxTime) return "the time is out of range";
+  if (last && t < *last) return "the time is earlier than the one before it: sort by time";
   return "";
 }
 

@@ -70,14 +70,14 @@ void OutputFile::flush() {
 void OutputFile::take_back(std::size_t written) {
   const auto whole = static_cast<off_t>(flushed_);
   if (::ftruncate(descriptor_, whole) == 0 && ::lseek(descriptor_, whole, SEEK_SET) == whole) return;
-  flushed_ += written;  // a pipe takes nothing back: it is not written twice
+  flushed_ += written;  // pipes cannot be rewound: avoid writing these bytes twice
   buffer_.erase(0, written);
 }
 
 void OutputFile::close() {
   if (descriptor_ < 0) return;
   flush();
-  // Pipes and devices cannot be synchronised: EINVAL is no failure.
+  // Pipes and devices cannot be synchronised: EINVAL is not a failure.
   if (::fsync(descriptor_) != 0 && errno != EINVAL) throw_cannot_write(path_, system_reason(errno));
   if (::close(std::exchange(descriptor_, -1)) != 0) throw_cannot_write(path_, system_reason(errno));
 }

@@ -7,29 +7,29 @@
 
 namespace esim {
 
-/// A file being written: buffered, and every failure is an OutputError with the file's name and the system's reason.
+/// Writes a file through a buffer. Every failure is an OutputError with the file name and the reason of the system.
 class OutputFile {
  public:
-  /// Creates the file, or empties the one that is there.
+  /// Creates the file, or empties an existing one.
   explicit OutputFile(std::filesystem::path path);
 
-  /// Closes without writing what is still buffered: after close() nothing is.
+  /// Closes without writing the buffer, which is empty after close().
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Room to append text to; call flush_if_full() after each portion.
+  /// The buffer, to append text to; call flush_if_full() after each portion.
   std::string& buffer() { return buffer_; }
   void append(std::string_view text);
 
-  /// True where it has flushed.
+  /// Returns true if it flushed.
   bool flush_if_full();
 
-  /// Replaces the first bytes of what has been flushed, as many as `text` has.
+  /// Replaces the first bytes of the flushed data by `text`.
   void overwrite_start(std::string_view text);
 
-  /// Hands what is buffered to the system, so that it survives the end of this process: all of it or, where that fails,
-  /// none. Files that are flushed after whole lines so end with one, also on a full disk.
+  /// Hands the buffer to the system, so that it survives the end of this process: all of it or, on failure, nothing.
+  /// Files that are flushed after whole lines therefore end with a whole line, even on a full disk.
   void flush();
 
   /// Writes everything to the disk and closes.
@@ -46,25 +46,25 @@ class OutputFile {
   int descriptor_ = -1;
 };
 
-/// What write_file_atomically() appends to the name of the file that it writes first.
+/// The suffix of the temporary file of write_file_atomically().
 inline constexpr const char* kTemporaryExtension = ".tmp";
 
-/// Puts `text` into the file at once: readers see the old content or the new one, never a part.
+/// Replaces the content of the file by `text` in one step: readers see the old or the new content, never a part.
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
 
-/// Creates a folder, and those that it is in, where they are missing. Throws OutputError.
+/// Creates a folder and its missing parents. Throws OutputError.
 void create_folder(const std::filesystem::path& path);
 
-/// Makes a file that is whole durable.
+/// Makes a complete file durable.
 void sync_file(const std::filesystem::path& path);
 
-/// Makes the names in a directory durable. Silent where the file system cannot do that.
+/// Makes the names in a directory durable. Does nothing if the file system does not support it.
 void sync_directory(const std::filesystem::path& directory);
 
-/// The system's words for an errno value: "No space left on device".
+/// The text of the system for an errno value: "No space left on device".
 std::string system_reason(int error_number);
 
-/// An OutputError: "cannot write FILE: REASON".
+/// Throws OutputError "cannot write FILE: REASON".
 [[noreturn]] void throw_cannot_write(const std::filesystem::path& path, std::string_view reason);
 
 }  // namespace esim

@@ -48,7 +48,7 @@ class MergedSource final : public Source {
         return record;
       } catch (const UserError& error) {
         if (!recover_) {
-          entries_.clear();  // no more will be handed out
+          entries_.clear();  // the stream has ended
           throw;
         }
         recover_(error.what());
@@ -66,7 +66,7 @@ class MergedSource final : public Source {
     std::exception_ptr damage{};
   };
 
-  /// A stream that turns out to be damaged comes due right after its last record.
+  /// A damaged stream is due right after its last record.
   static void look_ahead(Entry& entry) {
     const TimeNs last = entry.due.value_or(std::numeric_limits<TimeNs>::min() / 2);
     try {
@@ -85,7 +85,7 @@ class MergedSource final : public Source {
     return earliest;
   }
 
-  /// The last time at which no other stream has its turn before this one.
+  /// The last time until which no other stream is due before this one.
   TimeNs turn_of(const Entry& entry) const {
     TimeNs until = std::numeric_limits<TimeNs>::max();
     for (const Entry& other : entries_) {
@@ -97,7 +97,7 @@ class MergedSource final : public Source {
   RecordingInfo info_;
   std::vector<Entry> entries_;
   std::function<void(const std::string&)> recover_;
-  Entry* taken_ = nullptr;  // what it has given is in use
+  Entry* taken_ = nullptr;  // its last record is in use
   TimeNs t_ = 0;
   bool ended_ = false;
 };

@@ -8,22 +8,22 @@
 
 namespace esim {
 
-/// A part of a recording: records in order of time, from a file or folder of their own.
+/// A part of a recording: records in order of time, from a separate file or folder.
 class RecordStream {
  public:
   virtual ~RecordStream() = default;
 
-  /// Looks for the next record and says its time; nothing where there are none left. Called once before each next().
+  /// Prepares the next record and returns its time; nothing at the end. Called once before each next().
   virtual std::optional<TimeNs> due() = 0;
 
-  /// That record, borrowed until the next call; of events, those up to `until`. Null where another stream hands it out
-  /// as a part of its own record. Both throw UserError where the file is damaged from there on.
+  /// The prepared record, borrowed until the next call; of events, those up to `until`. Null if another stream hands it
+  /// out as a part of its own record. Both functions throw UserError if the file is damaged from here on.
   virtual const Record* next(TimeNs until) = 0;
 };
 
-/// All streams in one order of time; of records with the same time, those of the earlier streams first. The recording
-/// starts at `start`, where that is known and before the first record, and with the first record otherwise. With
-/// `recover`, a stream ends where it is damaged, and the others go on.
+/// Merges all streams in order of time; at equal times, earlier streams come first. The recording starts at `start` if
+/// that is known and before the first record, otherwise with the first record. With `recover`, a stream ends at its
+/// damage, and the others continue.
 std::unique_ptr<Source> merge_streams(RecordingInfo info, std::vector<std::unique_ptr<RecordStream>> streams,
                                       const ReadOptions& options, std::optional<TimeNs> start = std::nullopt);
 

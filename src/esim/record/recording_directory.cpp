@@ -36,17 +36,17 @@ fs::path normalised(const fs::path& out) {
   return path;
 }
 
-// A run that was killed at once has left the beginning of its report.
+// A run that was killed early left only the start of its report.
 bool looks_like_a_recording(const fs::path& directory) {
   std::error_code error;
   return fs::exists(directory / kReport, error) || fs::exists(directory / "scenario.yaml", error) ||
          fs::exists(directory / (std::string(kReport) + kTemporaryExtension), error) || fs::is_empty(directory, error);
 }
 
-// The report goes last: what a killed process leaves of the folder still looks like a recording.
+// Removes the report last: if this process is killed, the rest of the folder still looks like a recording.
 void remove_recording(const fs::path& directory, std::error_code& error) {
   for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
-    std::error_code ignored;  // what stays keeps the folder from being removed
+    std::error_code ignored;  // files that remain prevent the removal of the folder
     if (entry->path().filename() != kReport) fs::remove_all(entry->path(), ignored);
   }
   fs::remove_all(directory, error);
@@ -58,10 +58,10 @@ bool is_home(const fs::path& directory) {
   return home != nullptr && *home != '\0' && fs::equivalent(directory, home, error);
 }
 
-// Replacing deletes: only what is surely a recording.
+// Replacing deletes, so this requires a folder that certainly is a recording.
 void require_replaceable(const fs::path& directory) {
   const auto refuse = [&](const std::string& why) {
-    throw UserError(directory.string() + " " + why + ": not replaced, choose another name");
+    throw UserError(directory.string() + " " + why + " and is not replaced: choose another name");
   };
   std::error_code error;
   const fs::file_status status = fs::symlink_status(directory, error);
@@ -79,14 +79,14 @@ int lock_directory(const fs::path& directory) {
   return descriptor;
 }
 
-// Moves `from` to `to` where nothing may be, or exchanges the two. Some file systems cannot do either in one step.
+// Moves `from` to `to`, which must not exist, or exchanges the two. Some file systems cannot do either in one step.
 bool rename_in_one_step(const fs::path& from, const fs::path& to, unsigned flag) {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), flag) == 0) return true;
   if (errno == EINVAL || errno == ENOSYS) return false;
   throw std::system_error(errno, std::generic_category());
 }
 
-// An exchange leaves the old recording in `working`, where it is removed.
+// After an exchange, the old recording is in `working` and is removed there.
 void replace_directory(const fs::path& working, const fs::path& out) {
   fs::path old = working;
   if (!rename_in_one_step(working, out, RENAME_EXCHANGE)) {
@@ -129,7 +129,7 @@ bool is_being_written(const fs::path& working_directory) {
 
 RecordingDirectory::RecordingDirectory(const fs::path& out, bool force)
     : out_(normalised(out)), working_(incomplete_path(out_)) {
-  // What is there already?
+  // Check existing files.
   std::error_code error;
   const fs::file_status status = fs::symlink_status(out_, error);
   if (fs::exists(status)) {
@@ -154,7 +154,7 @@ RecordingDirectory::RecordingDirectory(const fs::path& out, bool force)
 }
 
 void RecordingDirectory::create_parents() {
-  // From the outermost missing one on, so that an error can take back what was made.
+  // Starts with the outermost missing folder, so that created folders can be removed after an error.
   std::vector<fs::path> missing;
   std::error_code error;
   for (fs::path parent = out_.parent_path(); !parent.empty() && !fs::exists(parent, error);
@@ -178,7 +178,7 @@ void RecordingDirectory::create_working_directory(bool force) {
     }
     if (!force) {
       throw RemediableError(
-          working_.string() + " is left from a run that was killed: look at what it holds, or choose another name",
+          working_.string() + " is left from a run that was killed: inspect it, or choose another name",
           Remedy::replace_output);
     }
     require_replaceable(working_);
@@ -199,7 +199,7 @@ void RecordingDirectory::discard() noexcept {
     std::error_code error;
     if (owned_) remove_recording(working_, error);
     for (auto parent = created_parents_.rbegin(); parent != created_parents_.rend(); ++parent) {
-      ::rmdir(parent->c_str());  // stays if somebody else uses it meanwhile
+      ::rmdir(parent->c_str());  // remains if another program uses it meanwhile
     }
     created_parents_.clear();
   }
@@ -230,7 +230,7 @@ void RecordingDirectory::keep(std::string_view reason) noexcept {
     const nlohmann::ordered_json report = {{"status", "interrupted"}, {"reason", reason}};
     write_file_atomically(working_ / kReport,
                           report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-  } catch (const std::exception&) {  // there is no room: it still says "running"
+  } catch (const std::exception&) {  // no room: the report still says "running"
   }
 }
 

@@ -7,35 +7,35 @@
 
 namespace esim {
 
-/// The life of a recording on disk. Everything is written in OUT.incomplete/, which becomes OUT only when it is whole:
+/// The life of a recording on disk. Everything is written in OUT.incomplete/, which becomes OUT when it is complete:
 ///
 ///   constructor    OUT.incomplete/ with a report.json that says "running"
-///   finish()       the final report, then OUT.incomplete -> OUT, in one step also where an older OUT is replaced
-///   destructor     without finish() and keep(): OUT.incomplete is removed, an error leaves nothing behind
+///   finish()       the final report, then OUT.incomplete -> OUT, in one step even if an older OUT is replaced
+///   destructor     without finish() and keep(): removes OUT.incomplete, so an error leaves nothing behind
 ///   keep()         OUT.incomplete stays, whatever happens: it holds records
 ///   killed         OUT.incomplete stays
 class RecordingDirectory {
  public:
-  /// Throws UserError if OUT exists or OUT.incomplete is left from a killed run, unless `force`; with it, still if what
-  /// would be replaced does not look like a recording, or is being written by a running process. Throws OutputError
-  /// where the folders cannot be made.
+  /// Throws UserError if OUT exists or OUT.incomplete is left from a killed run, unless `force`; even with `force`, if
+  /// the existing folder does not look like a recording or a running process is writing it. Throws OutputError if the
+  /// folders cannot be created.
   RecordingDirectory(const std::filesystem::path& out, bool force);
   ~RecordingDirectory();
   RecordingDirectory(const RecordingDirectory&) = delete;
   RecordingDirectory& operator=(const RecordingDirectory&) = delete;
 
-  /// Where to write: OUT.incomplete.
+  /// The folder to write to: OUT.incomplete.
   const std::filesystem::path& path() const { return working_; }
 
-  /// Where the recording will be: OUT.
+  /// The final folder of the recording: OUT.
   const std::filesystem::path& final_path() const { return out_; }
 
-  /// Writes report.json, makes the directory durable and puts it in its place. The recording is kept in OUT.incomplete
-  /// if that fails.
+  /// Writes report.json, makes the directory durable and renames it to OUT. If that fails, the recording stays in
+  /// OUT.incomplete.
   void finish(std::string_view report_json);
 
-  /// From now on the destructor leaves OUT.incomplete where it is. If there is a `reason`, report.json says it, and
-  /// that the recording is interrupted; on a full disk, report.json stays as it was.
+  /// From now on, the destructor leaves OUT.incomplete in place. With a `reason`, report.json states it and that the
+  /// recording was interrupted; on a full disk, report.json stays unchanged.
   void keep(std::string_view reason = {}) noexcept;
 
  private:
@@ -45,30 +45,30 @@ class RecordingDirectory {
 
   std::filesystem::path out_, working_;
   std::vector<std::filesystem::path> created_parents_;
-  bool replace_ = false;  // there is an OUT that may be replaced
-  bool owned_ = false;    // the working directory was made here
+  bool replace_ = false;  // OUT exists and may be replaced
+  bool owned_ = false;    // this object created the working directory
   bool keep_ = false;
-  int lock_ = -1;  // descriptor of the working directory, locked while this process writes there
+  int lock_ = -1;  // descriptor of the working directory, locked while this process writes to it
 };
 
 /// OUT.incomplete.
 std::filesystem::path incomplete_path(const std::filesystem::path& out);
 
-/// Throws UserError where there is nothing at a path, naming OUT.incomplete if that is there.
+/// Throws UserError if a path does not exist; names OUT.incomplete if that exists.
 void require_existing(const std::filesystem::path& path);
 
-/// Whether a process is writing in this directory now.
+/// Whether a process is currently writing to this directory.
 bool is_being_written(const std::filesystem::path& working_directory);
 
-/// The file of events in a camera's folder: events.h5, or else events.txt.
+/// The events file in a camera's folder: events.h5, or else events.txt.
 std::optional<std::filesystem::path> events_file_in(const std::filesystem::path& folder);
 
-/// Whether a file is there and has its first bytes. A simulation creates its files before it writes to them, and writes
-/// the signature of an HDF5 file after what it refers to: where it was killed before that, there is nothing to read.
+/// Whether a file exists and has its first bytes. A simulation creates its files before it writes to them, and writes
+/// the signature of an HDF5 file after the data that it refers to: if it is killed before that, nothing can be read.
 bool has_begun(const std::filesystem::path& file);
 
-/// Whether the report.json in a folder is that of a conversion: such a one stands beside files of any format that is a
-/// folder, and does not make a recording of them.
+/// Whether the report.json in a folder is that of a conversion. Conversions write one into folders of any format, so it
+/// does not make the folder a recording.
 bool has_conversion_report(const std::filesystem::path& folder);
 
 }  // namespace esim

@@ -36,7 +36,7 @@ RecordingFile::~RecordingFile() {
   fs::remove(working_, ignored);
 }
 
-/// OUT.incomplete.t.npy, OUT.incomplete.part0: what archives are made of.
+/// The temporary parts of archives, such as OUT.incomplete.t.npy and OUT.incomplete.part0.
 std::vector<fs::path> RecordingFile::parts() const {
   const std::string prefix = working_.filename().string() + ".";
   const fs::path folder = working_.has_parent_path() ? working_.parent_path() : fs::path(".");

@@ -6,25 +6,25 @@
 
 namespace esim {
 
-/// The life of a recording that is one file. It is written as OUT.incomplete, which becomes OUT only when it is whole;
-/// without finish() and keep() it is removed, with the parts, OUT.incomplete.*, that archives are made of. A killed
-/// process leaves them.
+/// The life of a recording that is one file. It is written as OUT.incomplete, which becomes OUT when it is complete.
+/// Without finish() and keep(), it is removed together with OUT.incomplete.*, the parts of archives. A killed process
+/// leaves these files.
 class RecordingFile {
  public:
-  /// Throws UserError if OUT or OUT.incomplete exists, unless `force`, or if OUT is a folder; OutputError if the folder
-  /// that it is to be in is missing.
+  /// Throws UserError if OUT or OUT.incomplete exists, unless `force`, or if OUT is a folder; OutputError if its parent
+  /// folder is missing.
   RecordingFile(std::filesystem::path out, bool force);
   ~RecordingFile();
   RecordingFile(const RecordingFile&) = delete;
   RecordingFile& operator=(const RecordingFile&) = delete;
 
-  /// Where to write: OUT.incomplete.
+  /// The file to write: OUT.incomplete.
   const std::filesystem::path& path() const { return working_; }
 
-  /// Puts what was written in its place.
+  /// Renames the written file to OUT.
   void finish();
 
-  /// From now on the destructor leaves what was written where it is.
+  /// From now on, the destructor leaves the written file in place.
   void keep(std::string_view = {}) { kept_ = true; }
 
  private:

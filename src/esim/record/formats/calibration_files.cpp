@@ -10,7 +10,7 @@
 namespace esim {
 namespace {
 
-/// Of the distortion: what Kalibr calls it, what the original ESIM does, and its coefficients for both.
+/// The names of a distortion model in Kalibr and in the original ESIM, and its coefficients for both.
 struct NamedDistortion {
   const char* kalibr;
   const char* rig;
@@ -32,7 +32,7 @@ NamedDistortion distortion_of(const Camera& camera) {
 
 Eigen::Matrix4d without_negative_zeros(const SE3& pose) { return pose.matrix().array() + 0.0; }
 
-/// A pose as Kalibr writes matrices.
+/// A pose as a matrix in the style of Kalibr.
 std::string rows(const char* key, const SE3& pose) {
   const Eigen::Matrix4d m = without_negative_zeros(pose);
   std::string text = fmt::format("  {}:\n", key);
@@ -41,7 +41,7 @@ std::string rows(const char* key, const SE3& pose) {
   return text;
 }
 
-/// A matrix as the original ESIM's rigs have them.
+/// A matrix in the style of the original ESIM's rig files.
 std::string matrix(int indent, const char* key, int rows, int columns, const std::vector<double>& values) {
   return fmt::format("{0:{1}}{2}:\n{0:{1}}  cols: {3}\n{0:{1}}  rows: {4}\n{0:{1}}  data: [{5}]\n", "", indent, key,
                      columns, rows, fmt::join(values, ", "));

@@ -2,10 +2,10 @@
 
 namespace esim {
 
-/// How the numbers in an HDF5 file are packed.
+/// Compression of the numbers in an HDF5 file.
 enum class Compression {
-  blosc,  ///< Blosc (filter 32001), bytes shuffled: fast; readers need the filter's plugin
-  gzip,   ///< deflate, bytes shuffled: every HDF5 reads it, but writing is slow
+  blosc,  ///< Blosc (filter 32001) with byte shuffle: fast, but readers need the plugin of the filter
+  gzip,   ///< deflate with byte shuffle: readable with every HDF5 library, but slow to write
   none,
 };
 

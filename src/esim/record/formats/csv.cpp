@@ -46,7 +46,7 @@ bool CsvReader::next() {
       line.remove_prefix(std::min(field.size() + 1, line.size()));
       fields_.push_back(take_word(field));
     }
-    if (fields_.size() < columns_) fail(fmt::format("the line has {} numbers, and needs {}", fields_.size(), columns_));
+    if (fields_.size() < columns_) fail(fmt::format("the line has {} numbers, but needs {}", fields_.size(), columns_));
     const TimeNs t = integer(time_column_);
     if (const auto problem = problem_of_time(t_, t); !problem.empty()) fail(problem);
     t_ = t;

@@ -13,8 +13,8 @@
 
 namespace esim {
 
-/// A file of numbers in the style of the EuRoC data set: a header `#timestamp [ns],name [unit],...`, then a line for
-/// each instant, nanoseconds and the shortest decimals that read back as the same doubles, separated by commas.
+/// A CSV file in the style of the EuRoC dataset: a header `#timestamp [ns],name [unit],...`, then one line for each
+/// time: nanoseconds, then the shortest decimals that give the same doubles when read, separated by commas.
 class CsvFile {
  public:
   CsvFile(std::filesystem::path path, std::string_view header);
@@ -29,21 +29,21 @@ class CsvFile {
   OutputFile file_;
 };
 
-/// Reads such files, in order of time: every line that does not begin with a digit or a minus is a header and passed
-/// over. Failures are UserErrors with the file and the byte at which the line begins.
+/// Reads such files, in order of time. Lines that do not start with a digit or a minus sign are headers and are
+/// skipped. Failures are UserErrors with the file and the byte at which the line starts.
 class CsvReader {
  public:
-  /// Of at least so many columns, the time among them. In files that are `unfinished`, because who wrote them was
-  /// killed or is still writing, a last line without its end is no line.
+  /// `columns` is the minimum number of columns, including the time. In an `unfinished` file, whose writer was killed
+  /// or is still writing, a last line without a line end is ignored.
   CsvReader(const std::filesystem::path& path, std::size_t columns, std::size_t time_column = 0,
             bool unfinished = false)
       : file_(path), columns_(columns), time_column_(time_column), unfinished_(unfinished) {}
 
-  /// Goes to the next line; false where there is none left.
+  /// Goes to the next line; returns false at the end.
   bool next();
 
   TimeNs t() const { return *t_; }
-  std::size_t columns() const { return fields_.size(); }  ///< that this line has
+  std::size_t columns() const { return fields_.size(); }  ///< of this line
   std::int64_t integer(std::size_t column) const;
   double value(std::size_t column) const;  ///< finite
   Eigen::Vector3d vector(std::size_t first_column) const;
@@ -56,7 +56,7 @@ class CsvReader {
   bool unfinished_;
   std::uint64_t line_start_ = 0;
   std::optional<TimeNs> t_;
-  std::vector<std::string_view> fields_;  // of the line, which the file holds
+  std::vector<std::string_view> fields_;  // of the current line, borrowed from the file
 };
 
 }  // namespace esim

@@ -15,7 +15,7 @@ constexpr std::int64_t kMaxUs = 0xFFFF'FFFF;
 constexpr std::uint64_t kTurnUs = kMaxUs + 1;
 
 constexpr char kEventSize = 8;
-constexpr char kEvent2d = 0x00, kEventCd = 0x0C;  // two names of one thing
+constexpr char kEvent2d = 0x00, kEventCd = 0x0C;  // two types with the same content
 
 bool is_dat(std::string_view head) {
   const prophesee::Header header = prophesee::parse_header(head);
@@ -52,7 +52,7 @@ class DatReader final : public EventsReader {
   explicit DatReader(const std::filesystem::path& path) : file_(path), header_(prophesee::read_header(file_)) {
     const auto type = static_cast<char>(file_.read_exactly(2, "the type of its events")[0]);
     if (type != kEvent2d && type != kEventCd) {
-      file_.fail(header_.bytes, fmt::format("it holds events of type {}, which are not a camera's (types {} and {})",
+      file_.fail(header_.bytes, fmt::format("events of type {} are not supported; those of cameras have type {} or {}",
                                             static_cast<int>(type), int{kEvent2d}, int{kEventCd}));
     }
   }
@@ -70,13 +70,13 @@ class DatReader final : public EventsReader {
                    place >> 28 != 0);
     }
     portion_.move_to(events);
-    if (turns_us_ > kMaxTurnsUs) file_.fail(file_.offset(), "the times up to here are beyond all reason");
+    if (turns_us_ > kMaxTurnsUs) file_.fail(file_.offset(), "the times before this byte are out of range");
     return !words.empty();
   }
 
  private:
   static constexpr std::size_t kBlockWords = 1 << 15;
-  static constexpr std::uint64_t kMaxTurnsUs = std::uint64_t{1} << 52;  // and what a block may add
+  static constexpr std::uint64_t kMaxTurnsUs = std::uint64_t{1} << 52;  // plus what one block may add
 
   InputFile file_;
   prophesee::Header header_;

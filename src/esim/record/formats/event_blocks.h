@@ -4,19 +4,19 @@
 
 namespace esim {
 
-/// Reads events that a file counts, block by block.
+/// Reads the events of a file with a known number of events, block by block.
 class EventBlocksReader : public EventsReader {
  public:
-  /// Of a block that cannot be read whole, half, and so on.
+  /// If a block cannot be read, tries half of it, and so on, down to the damage.
   bool read(std::vector<Event>& events) final;
 
   double progress() const final;
 
  protected:
-  /// Of the whole file.
+  /// Number of events in the file.
   virtual std::uint64_t event_count() const = 0;
 
-  /// Appends [first, first + count); throws UserError where one of them is damaged.
+  /// Appends [first, first + count); throws UserError if one of them is damaged.
   virtual void read_block(std::uint64_t first, std::uint64_t count, std::vector<Event>& events) = 0;
 
  private:

@@ -7,7 +7,7 @@
 namespace esim {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "numbers are written as they stand in memory");
+static_assert(std::endian::native == std::endian::little, "numbers are written in the byte order of memory");
 
 template <typename T>
 void append_bytes(std::string& buffer, T number) {
@@ -16,7 +16,7 @@ void append_bytes(std::string& buffer, T number) {
 
 }  // namespace
 
-/// Of the same length whatever the count, so that it can be replaced in place: a comment fills the line up.
+/// Has the same length for every count, so that it can be replaced in place: a comment line is padded.
 std::string EventPointsPlyWriter::header() const {
   constexpr std::size_t kDigits = 20;
   const std::string count = fmt::format("{}", count_);

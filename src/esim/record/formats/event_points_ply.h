@@ -11,14 +11,15 @@
 
 namespace esim {
 
-/// What one camera's events saw, as a point cloud in binary little-endian PLY, a vertex per event, in their order:
+/// The scene points of one camera's events, as a point cloud in binary little-endian PLY with one vertex per event, in
+/// their order:
 ///
-///   x y z     float   the point, world frame, m
-///   t         double  of the event, s
+///   x y z     float   scene point, world frame, m
+///   t         double  time of the event, s
 ///   u v       ushort  column and row of the event, px
-///   polarity  char    1: brightness rose, -1: it fell
+///   polarity  char    1: ON, -1: OFF
 ///
-/// Events without a point are left out. The header counts the vertices that are in the file whenever write() returns.
+/// Events without a point are omitted. After each write(), the header has the number of vertices in the file.
 class EventPointsPlyWriter final : public Sink {
  public:
   EventPointsPlyWriter(std::filesystem::path path, int camera) : path_(std::move(path)), camera_(camera) {}

@@ -17,14 +17,15 @@ constexpr std::uint64_t kBlock = 1 << 16;
 std::optional<int> extent(const hdf5::Input& file, const char* name) {
   const auto value = file.integer_attribute(name);
   if (!value) return std::nullopt;
-  if (*value < 1 || *value > 65536) file.fail(std::string(name) + " is " + std::to_string(*value) + " px");
+  if (*value < 1 || *value > 65536)
+    file.fail(std::string(name) + " must be from 1 to 65536 px, not " + std::to_string(*value) + " px");
   return static_cast<int>(*value);
 }
 
 TimeUnit read_unit(const hdf5::Input& file) {
   const auto unit = file.text_attribute("unit");
   if (!unit || *unit == "us") return TimeUnit::us;
-  if (*unit != "ns") file.fail("the unit of time is \"" + *unit + "\", which is neither us nor ns");
+  if (*unit != "ns") file.fail("the unit of time is \"" + *unit + "\", but must be us or ns");
   return TimeUnit::ns;
 }
 
@@ -58,19 +59,20 @@ void EventsHdf5Reader::Impl::open() {
   ns_per_unit = unit == TimeUnit::us ? kNsPerUs : 1;
   t_offset = file.scalar("t_offset").value_or(0);
   if (std::abs(t_offset / 2) > std::numeric_limits<TimeNs>::max() / ns_per_unit / 4)
-    file.fail("t_offset is " + std::to_string(t_offset) + ", too large for a time");
+    file.fail("t_offset is " + std::to_string(t_offset) + ", which is too large for a time");
   if (const auto flag = file.integer_attribute("esim_complete")) complete = *flag != 0;
-  if (!file.has("events/t")) file.fail("there is no dataset events/t, as DSEC has it; it holds " + file.contents());
+  if (!file.has("events/t"))
+    file.fail("there is no dataset events/t, as in DSEC's layout; the file holds " + file.contents());
   t = file.open_column("events/t");
   x = file.open_column("events/x");
   y = file.open_column("events/y");
   p = file.open_column("events/p");
   if (file.has("ms_to_idx")) ms_to_idx = file.open_column("ms_to_idx");
 
-  // A killed writer may leave columns of different lengths: what all of them have is good.
+  // A killed writer may leave columns of different lengths: their common part is valid.
   size = std::min({t.size, x.size, y.size, p.size});
   const bool equal = t.size == size && x.size == size && y.size == size && p.size == size;
-  if (!equal && complete.value_or(true)) file.fail("the datasets below events differ in length");
+  if (!equal && complete.value_or(true)) file.fail("the datasets in the group events differ in length");
 }
 
 TimeNs EventsHdf5Reader::Impl::to_ns(std::int64_t stored) const {
@@ -87,7 +89,7 @@ std::int64_t EventsHdf5Reader::Impl::stored_time(std::uint64_t index) const {
   return value;
 }
 
-// The last millisecond of ms_to_idx, in the unit.
+// The time of the last entry of ms_to_idx, in units.
 std::int64_t EventsHdf5Reader::Impl::index_end() const {
   if (!ms_to_idx || ms_to_idx->size == 0) return 0;
   std::int64_t end = 0;
@@ -95,7 +97,7 @@ std::int64_t EventsHdf5Reader::Impl::index_end() const {
   return end;
 }
 
-// Where ms_to_idx says that the first event at or after a stored time is: somewhere in [first, second].
+// The range [first, second] in which, by ms_to_idx, the first event at or after a stored time is.
 std::pair<std::uint64_t, std::uint64_t> EventsHdf5Reader::Impl::index_hint(std::int64_t stored) const {
   const std::int64_t units_per_ms = kNsPerMs / ns_per_unit;
   if (!ms_to_idx || ms_to_idx->size == 0) return {0, size};
@@ -109,7 +111,7 @@ std::pair<std::uint64_t, std::uint64_t> EventsHdf5Reader::Impl::index_hint(std::
 }
 
 std::uint64_t EventsHdf5Reader::Impl::first_at_or_after(TimeNs time) const {
-  // In the file's unit since t_offset: stored times were rounded down, and stand for the start of their unit.
+  // Times in units since t_offset. Stored times were rounded down, so they stand for the start of their unit.
   std::int64_t since_ns = 0;
   if (__builtin_sub_overflow(time, t_offset * ns_per_unit, &since_ns)) return time < 0 ? 0 : size;
   if (since_ns <= 0) return 0;
@@ -127,7 +129,7 @@ std::uint64_t EventsHdf5Reader::Impl::first_at_or_after(TimeNs time) const {
   }
   const bool too_early = first == hint_last && first < size && stored_time(first) < stored;
   const bool too_late = first == hint_first && first > 0 && stored_time(first - 1) >= stored;
-  if (too_early || too_late) file.fail("ms_to_idx does not fit the events' times");
+  if (too_early || too_late) file.fail("ms_to_idx does not match the event times");
   return first;
 }
 
@@ -219,7 +221,7 @@ std::vector<std::uint64_t> EventsHdf5Reader::ms_to_idx() const {
   if (!impl_->ms_to_idx) return {};
   std::vector<std::uint64_t> index(impl_->ms_to_idx->size);
   impl_->file.read(*impl_->ms_to_idx, 0, std::span(index));
-  if (!std::is_sorted(index.begin(), index.end())) impl_->file.fail("ms_to_idx decreases");
+  if (!std::is_sorted(index.begin(), index.end())) impl_->file.fail("ms_to_idx must not decrease");
   for (std::uint64_t& first : index) first = std::min(first, impl_->size);
   return index;
 }

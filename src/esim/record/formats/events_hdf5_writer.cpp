@@ -17,7 +17,7 @@ std::int64_t floor_divide(std::int64_t value, std::int64_t divisor) {
   return quotient - (value % divisor < 0 ? 1 : 0);
 }
 
-// In units. Of a recording whose start is not known, times stay as they are up to whole seconds.
+// t_offset in units. If the start is unknown, whole seconds are subtracted, so that the digits after them stay.
 std::int64_t offset_of(const RecordingInfo& info, std::int64_t ns_per_unit) {
   if (info.start_known) return floor_divide(info.start, ns_per_unit);
   return floor_divide(info.start, kNsPerSecond) * (kNsPerSecond / ns_per_unit);
@@ -52,14 +52,14 @@ struct EventsHdf5Writer::Impl {
   bool narrow_t = false;  // uint32
   TimeNs last_t = std::numeric_limits<TimeNs>::min();
 
-  // Filled up to `fill` events.
+  // Buffers with `fill` events.
   std::size_t fill = 0;
   std::vector<std::uint32_t> t32;
   std::vector<std::uint64_t> t64;
   std::vector<std::uint16_t> x, y;
   std::vector<std::uint8_t> p;
 
-  // The series close before the file.
+  // Declared last, so that the series close before the file.
   std::optional<hdf5::Output> file;
   hdf5::Handle esim_complete;
   hdf5::Series t_series, x_series, y_series, p_series;

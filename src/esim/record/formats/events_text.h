@@ -15,8 +15,8 @@
 
 namespace esim {
 
-/// Events of one camera as lines `t x y p`, as in the Event Camera Dataset: seconds with nine decimals, px, px, and
-/// 1 (ON) or 0 (OFF).
+/// Events of one camera as lines `t x y p`, as in the Event Camera Dataset: seconds with nine decimals, px, px, and 1
+/// (ON) or 0 (OFF).
 class EventsTextWriter final : public Sink {
  public:
   EventsTextWriter(std::filesystem::path path, int camera) : path_(std::move(path)), camera_(camera) {}
@@ -33,19 +33,19 @@ class EventsTextWriter final : public Sink {
 
 Format events_text_format();
 
-/// Reads such lines, also with fewer or more decimals, exponents aside; empty lines and those starting with # are
-/// passed over. Digits beyond the nanosecond are dropped. Throws UserError, with file and line, for anything else and
-/// for times that decrease.
+/// Reads such lines, with any number of decimals, but no exponents. Empty lines and lines that start with # are
+/// skipped. Digits beyond the nanosecond are dropped. Throws UserError, with file and line, for anything else and for
+/// times that decrease.
 class EventsTextReader {
  public:
   explicit EventsTextReader(std::filesystem::path path) : lines_(std::move(path)) {}
   explicit EventsTextReader(LineReader lines) : lines_(std::move(lines)) {}
 
-  /// Replaces `events` by the next ones, at most `count`; false if there are none left. Where it throws, they are those
-  /// above the line that is wrong.
+  /// Replaces `events` by the next ones, at most `count`; returns false at the end. If it throws, they are the events
+  /// before the invalid line.
   bool read(std::vector<Event>& events, std::size_t count);
 
-  /// The share of the file that has been read.
+  /// The fraction of the file that has been read.
   double progress() const { return lines_.progress(); }
 
  private:

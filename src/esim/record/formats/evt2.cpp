@@ -6,8 +6,7 @@
 
 // EVT 2.0: words of 32 bits: type 4, low bits of the time 6, x 11, y 11; or type 4, high bits of the time 28
 // (https://docs.prophesee.ai/stable/data/encoding_formats/evt2.html).
-// EVT 2.1: words of 64 bits: the same, and below it which of the 32 pixels of the row from x on are meant
-// (.../evt21.html).
+// EVT 2.1: words of 64 bits: the same, then a mask of the 32 pixels of the row from x on (.../evt21.html).
 
 namespace esim {
 namespace {
@@ -49,7 +48,7 @@ class Evt2Writer final : public EventsWriter {
   std::int64_t high_ = -1;
 };
 
-/// EVT 2.0 where words have 32 bits, EVT 2.1 where they have 64.
+/// EVT 2.0 for words of 32 bits, EVT 2.1 for words of 64 bits.
 template <typename Word>
 class Evt2Reader final : public EventsReader {
  public:
@@ -65,7 +64,7 @@ class Evt2Reader final : public EventsReader {
       if (words.empty()) return false;
       const bool sound = decode(words);
       portion_.move_to(events);
-      if (!sound) file_.fail(start, "the times up to here are beyond all reason");
+      if (!sound) file_.fail(start, "the times before this byte are out of range");
     }
     return true;
   }
@@ -87,10 +86,10 @@ class Evt2Reader final : public EventsReader {
         if (!high_us) return false;
         high_us_ = *high_us;
         timed_ = true;
-      } else if (type <= kOn && timed_) {  // what comes before the first high bits has no time
+      } else if (type <= kOn && timed_) {  // events before the first high bits have no time
         const TimeNs t = (high_us_ + ((head >> 22) & ((1U << kLowBits) - 1))) * kNsPerUs;
         put(t, (head >> 11) & 0x7FF, head & 0x7FF, type == kOn, next);
-      }  // else triggers, their continuations, vendors' own
+      }  // otherwise triggers, their continuations, or vendors' own words
     }
     return true;
   }
@@ -131,7 +130,7 @@ std::unique_ptr<EventsReader> open_evt2(const std::filesystem::path& path) {
 Format evt2_format() {
   return {
       .name = "evt2",
-      .description = "Prophesee RAW, EVT 2.0; EVT 2.1 is read as well",
+      .description = "Prophesee RAW, EVT 2.0; reads EVT 2.1 as well",
       .extensions = {".raw"},
       .holds = {Content::events},
       .resolution = kNsPerUs,

@@ -5,7 +5,7 @@
 #include "esim/record/events_writer.h"
 #include "esim/record/formats/prophesee.h"
 
-// EVT 3.0: words of 16 bits, the upper four the type, each a change of the state that events are made of
+// EVT 3.0: words of 16 bits. The upper four bits are the type; each word changes the state that determines events
 // (https://docs.prophesee.ai/stable/data/encoding_formats/evt3.html).
 
 namespace esim {
@@ -15,8 +15,8 @@ using prophesee::WordFile;
 
 constexpr int kMaxExtent = 2048;  // px
 
-// Of the 24 bits of the camera's clock, in us, two words hold twelve each: it is full after 16.8 s. Files are longer
-// than that, up to what EVT 2.0 can tell as well.
+// The camera's clock has 24 bits, in us: two words hold 12 bits each. It wraps after 16.8 s, but files may be longer,
+// up to the maximum time of EVT 2.0.
 constexpr int kTimeBits = 12;
 constexpr std::int64_t kMaxUs = (std::int64_t{1} << 34) - 1;
 constexpr std::int64_t kClockSlack = 16;  // x 4.1 ms
@@ -25,7 +25,7 @@ enum Type : std::uint16_t {
   kAddressY = 0x0,
   kAddressX = 0x2,  // an event
   kVectorBase = 0x3,
-  kVector12 = 0x4,  // events at twelve pixels of a row from the base on, which moves behind them
+  kVector12 = 0x4,  // events at twelve pixels of a row from the base on, which advances past them
   kVector8 = 0x5,
   kTimeLow = 0x6,
   kTimeHigh = 0x8,
@@ -35,8 +35,8 @@ constexpr std::uint16_t word(Type type, std::uint64_t value) {
   return static_cast<std::uint16_t>((type << 12) | (value & 0xFFF));
 }
 
-/// Events that follow each other in one row, at one time, of one polarity and from left to right are one run, and
-/// where they are dense, vectors.
+/// Consecutive events in one row, at one time, of one polarity and from left to right form a run. Dense runs are
+/// written as vectors.
 class Evt3Writer final : public EventsWriter {
  public:
   void begin(const std::filesystem::path& path, SensorSize sensor) override {
@@ -72,7 +72,7 @@ class Evt3Writer final : public EventsWriter {
     size_ = 0;
   }
 
-  /// Every value of the high bits, as cameras do, so that readers count the turns of the clock.
+  /// Writes every value of the high bits, as cameras do, so that readers can count the wraps of the clock.
   void put_time() {
     const std::int64_t high = us_ >> kTimeBits;
     while (known_high_ < high) file_->put(word(kTimeHigh, static_cast<std::uint64_t>(++known_high_)));
@@ -86,7 +86,7 @@ class Evt3Writer final : public EventsWriter {
     return end - first;
   }
 
-  /// Of the run from this index on; where what is left begins.
+  /// Writes the run from this index on; returns the index of the rest.
   std::size_t put_columns(std::size_t first) {
     const std::uint64_t polarity = on_ ? 0x800 : 0;
     int base = columns_[first];
@@ -113,7 +113,7 @@ class Evt3Writer final : public EventsWriter {
   std::uint16_t y_ = 0;
   bool on_ = false;
 
-  // What the words so far have told.
+  // The decoder state after the words read so far.
   std::int64_t known_us_ = -1, known_high_ = -1;
   int known_y_ = -1;
 };
@@ -132,7 +132,7 @@ class Evt3Reader final : public EventsReader {
       if (words.empty()) return false;
       const bool sound = header_.endianness == "big" ? decode<true>(words) : decode<false>(words);
       portion_.move_to(events);
-      if (!sound) file_.fail(start, "the times up to here are beyond all reason");
+      if (!sound) file_.fail(start, "the times before this byte are out of range");
     }
     return true;
   }
@@ -142,7 +142,7 @@ class Evt3Reader final : public EventsReader {
 
   template <bool kBigEndian>
   bool decode(std::span<const std::uint16_t> words) {
-    State state = state_;  // in registers
+    State state = state_;  // a local copy, kept in registers
     for (std::uint16_t next : words) {
       if constexpr (kBigEndian) next = __builtin_bswap16(next);
       const std::uint32_t value = next & 0xFFF;
@@ -176,7 +176,7 @@ class Evt3Reader final : public EventsReader {
           break;
         }
         default:
-          break;  // triggers, their continuations, vendors' own
+          break;  // triggers, their continuations, or vendors' own words
       }
     }
     state_ = state;
@@ -188,7 +188,7 @@ class Evt3Reader final : public EventsReader {
     std::int64_t high_us = 0;
     std::uint32_t low = 0, y = 0, base = 0;
     bool on = false;
-    bool timed = false;  // what comes before the first high bits has no time
+    bool timed = false;  // events before the first high bits have no time
   };
 
   void put_vector(State& state, std::uint32_t valid, std::uint32_t length) {

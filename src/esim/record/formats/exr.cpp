@@ -22,7 +22,7 @@ constexpr std::array kChannels = {"Y", "Z", "V.x", "V.y"};  // irradiance, depth
 
 std::size_t row_bytes(const Image<float>& image) { return static_cast<std::size_t>(image.width()) * sizeof(float); }
 
-/// The channels that there are, as floats. False where there are none.
+/// Reads the channels that exist, as floats. Returns false if the file has none.
 bool write_exr(const fs::path& path, const TruthRecord& truth) {
   const std::array images = {&truth.irradiance, &truth.depth, &truth.flow_x, &truth.flow_y};
   std::optional<Imf::Header> header;
@@ -32,7 +32,7 @@ bool write_exr(const fs::path& path, const TruthRecord& truth) {
     if (image.empty()) continue;
     if (!header) header.emplace(image.width(), image.height());
     header->channels().insert(kChannels[i], Imf::Channel(Imf::FLOAT));
-    auto* const pixels = const_cast<char*>(reinterpret_cast<const char*>(image.data()));  // is only read
+    auto* const pixels = const_cast<char*>(reinterpret_cast<const char*>(image.data()));  // never written to
     buffer.insert(kChannels[i], Imf::Slice(Imf::FLOAT, pixels, sizeof(float), row_bytes(image)));
   }
   if (!header) return false;
@@ -59,7 +59,7 @@ void decode(const InputFile& file, std::span<const std::byte> bytes, SequenceIma
   constexpr std::int64_t kMaxExtent = 65536, kSmall = 1 << 20, kMaxPixelsPerByte = 2000;
   if (width < 1 || height < 1 || width > kMaxExtent || height > kMaxExtent ||
       (width * height > kSmall && width * height / kMaxPixelsPerByte > static_cast<std::int64_t>(bytes.size())))
-    file.fail(0, fmt::format("{} x {} px in {} bytes: it is damaged", width, height, bytes.size()));
+    file.fail(0, fmt::format("the file is damaged: {} x {} px in {} bytes", width, height, bytes.size()));
   Imf::FrameBuffer buffer;
   const std::array planes = {&images.irradiance, &images.depth, &images.flow_x, &images.flow_y};
   for (std::size_t i = 0; i < kChannels.size(); ++i) {
@@ -69,7 +69,7 @@ void decode(const InputFile& file, std::span<const std::byte> bytes, SequenceIma
     buffer.insert(kChannels[i], Imf::Slice::Make(Imf::FLOAT, plane.data(), window, sizeof(float), row_bytes(plane)));
   }
   if (buffer.begin() == buffer.end()) file.fail(0, "it has none of the channels Y, Z, V.x and V.y");
-  if (images.flow_x.empty() != images.flow_y.empty()) file.fail(0, "it has one of the channels V.x and V.y only");
+  if (images.flow_x.empty() != images.flow_y.empty()) file.fail(0, "it has only one of the channels V.x and V.y");
   image.setFrameBuffer(buffer);
   image.readPixels(window.min.y, window.max.y);
 }

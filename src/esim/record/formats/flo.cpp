@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 static_assert(std::endian::native == std::endian::little, "files are little-endian");
 
-// As in the benchmark's own code: above the threshold flow is unknown, and this is written for it.
+// As in the benchmark's own code: values above the threshold mean unknown flow, which is written as the second number.
 constexpr float kUnknownAbove = 1e9F, kUnknown = 1e10F;
 
 void write_flo(const fs::path& path, const Image<float>& x, const Image<float>& y) {
@@ -42,10 +42,11 @@ void read_flo(const fs::path& path, SequenceImages& images) {
   const auto [width, height] = size;
   constexpr int kMaxExtent = 65536;
   if (width < 1 || height < 1 || width > kMaxExtent || height > kMaxExtent)
-    file.fail(4, fmt::format("images of {} x {} px are none", width, height));
+    file.fail(4, fmt::format("the image size is invalid: {} x {} px", width, height));
   const std::uint64_t bytes =
       kHeadBytes + std::uint64_t{8} * static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
-  if (file.size() < bytes) file.fail(file.size(), fmt::format("{} x {} px need {} bytes", width, height, bytes));
+  if (file.size() < bytes)
+    file.fail(file.size(), fmt::format("the file is too short: {} x {} px need {} bytes", width, height, bytes));
 
   images.flow_x = images.flow_y = Image<float>(width, height);
   for (int row = 0; row < height; ++row) {

@@ -36,14 +36,14 @@ std::string names() {
   return text;
 }
 
-/// Of the path as it will be when it is whole.
+/// The extension of the path without a final .incomplete.
 std::string extension_of(const fs::path& path) {
   return (path.extension() == ".incomplete" ? path.stem() : path).extension().string();
 }
 
 }  // namespace
 
-// In order: of those that recognise a file the first reads it, of those with its extension the first writes it.
+// Order matters: the first format that recognises a file reads it; the first with its extension writes it.
 const std::vector<Format>& formats() {
   // clang-format off
   static const std::vector<Format> all = {
@@ -63,8 +63,8 @@ const std::vector<Format>& formats() {
       v2e_format(),
       e2vid_format(),
       e2calib_format(),
-      dsec_format(),  // takes every HDF5 that is left
-      events_text_format(),  // and every text
+      dsec_format(),  // recognises every other HDF5 file
+      events_text_format(),  // recognises every other text
       recording_format(),
       flo_format(),
       kitti_format(),
@@ -80,7 +80,7 @@ const Format& format_named(std::string_view name) {
   for (const Format& format : formats()) {
     if (format.name == name) return format;
   }
-  throw UserError(fmt::format("there is no format \"{}\"; use one of {}", name, names()));
+  throw UserError(fmt::format("unknown format \"{}\"; use one of {}", name, names()));
 }
 
 const Format& format_of(const fs::path& path) {
@@ -93,7 +93,7 @@ const Format& format_of(const fs::path& path) {
   }
   if (head.starts_with("SQLite format 3")) {
     throw UserError(
-        fmt::format("cannot read {}: SQLite, as ROS 2 bags may use it, is not read; make an MCAP file of it "
+        fmt::format("cannot read {}: SQLite files of ROS 2 bags are not supported; convert the bag to MCAP "
                     "with `ros2 bag convert`",
                     path.string()));
   }
@@ -101,7 +101,7 @@ const Format& format_of(const fs::path& path) {
     throw UserError(fmt::format("cannot read {}: it looks like the folder of a ROS 2 bag; name the .mcap file in it",
                                 path.string()));
   }
-  throw UserError(fmt::format("cannot read {}: it is of none of the formats {}", path.string(), names()));
+  throw UserError(fmt::format("cannot read {}: it is not in any of the formats {}", path.string(), names()));
 }
 
 const Format* find_format_for(const fs::path& path) {
@@ -114,8 +114,8 @@ const Format* find_format_for(const fs::path& path) {
 
 const Format& format_for(const fs::path& path) {
   if (const Format* format = find_format_for(path)) return *format;
-  throw UserError(
-      fmt::format("{}: no format has the extension \"{}\"; name one: {}", path.string(), extension_of(path), names()));
+  throw UserError(fmt::format("{}: no format has the extension \"{}\"; choose one of {}", path.string(),
+                              extension_of(path), names()));
 }
 
 std::unique_ptr<Source> open_source(const fs::path& path, const ReadOptions& options) {
@@ -126,7 +126,7 @@ std::unique_ptr<Source> open_source(const fs::path& path, const ReadOptions& opt
 void require_camera(const Source& source, const fs::path& path) {
   if (!source.info().cameras.empty()) return;
   const std::vector<std::string> others = source.not_read();
-  throw UserError(fmt::format("{} has no camera, and so no events{}", path.string(),
+  throw UserError(fmt::format("{} has no camera and therefore no events{}", path.string(),
                               others.empty() ? "" : "; not read: " + list_of_some(others)));
 }
 
@@ -155,15 +155,15 @@ std::string_view describe(Content content) {
     case Content::images:
       return "images";
     case Content::imu:
-      return "measurements of the IMU";
+      return "IMU measurements";
     case Content::poses:
       return "poses";
     case Content::truth:
-      return "frames of ground truth";
+      return "ground-truth frames";
     case Content::displacement:
       return "displacement";
     case Content::event_points:
-      return "points of events";
+      return "event points";
     case Content::triggers:
       return "triggers";
   }

@@ -10,10 +10,10 @@
 
 namespace esim {
 
-/// Frames of one camera as grey PNG: frames/000000.png and so on in a folder, beside frames.csv with lines
-/// `index,t_ns,exposure_ns,gain,exposure_start_ns,bits`, t_ns in the middle of the exposure (of the middle row), the
-/// start that of the first row. Digital numbers are written as they are, of 8
-/// bits in files of 8 bits, of more in files of 16. Numbers of an RGGB mosaic become colour PNG if `in_colour`.
+/// Frames of one camera as grey PNG: frames/000000.png and so on in a folder, with frames.csv: lines
+/// `index,t_ns,exposure_ns,gain,exposure_start_ns,bits`, where t_ns is the middle of the exposure (of the middle row)
+/// and the start is that of the first row. Digital numbers of 8 bits are written to 8-bit files, larger ones to 16-bit
+/// files. With `in_colour`, numbers of an RGGB mosaic become colour PNG.
 class FramesPngWriter final : public Sink {
  public:
   FramesPngWriter(std::filesystem::path folder, int camera, bool in_colour = false)

@@ -65,7 +65,7 @@ class ColumnsReader final : public EventBlocksReader {
       const std::int64_t x = x_numbers_[i], y = y_numbers_[i];
       if (x < 0 || x >= kLargestExtent || y < 0 || y >= kLargestExtent) {
         file_.fail("event " + std::to_string(first + i) + " at (" + std::to_string(x) + ", " + std::to_string(y) +
-                   ") is outside any sensor");
+                   ") is out of range");
       }
       events.push_back({t[i], static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y),
                         static_cast<std::int8_t>(p_numbers_[i] > 0 ? 1 : -1)});
@@ -92,17 +92,17 @@ class ColumnsReader final : public EventBlocksReader {
   }
 
   [[noreturn]] void fail_time(std::uint64_t index) const {
-    file_.fail("the time of event " + std::to_string(index) + " is none of a recording");
+    file_.fail("the time of event " + std::to_string(index) + " is out of range");
   }
 
   void read_resolution(const char* name) {
     const hdf5::Column column = file_.open_column(name);
     std::int64_t size[2] = {};
-    if (column.size != 2) file_.fail(std::string(name) + " is not a width and a height");
+    if (column.size != 2) file_.fail(std::string(name) + " must hold two numbers, width and height");
     file_.read(column, 0, std::span<std::int64_t>(size));
     for (const std::int64_t extent : size) {
       if (extent < 1 || extent > kLargestExtent)
-        file_.fail(std::string(name) + " is " + std::to_string(extent) + " px");
+        file_.fail(std::string(name) + " must be from 1 to 65536 px, not " + std::to_string(extent) + " px");
     }
     sensor_ = {static_cast<int>(size[0]), static_cast<int>(size[1])};
   }
@@ -111,7 +111,7 @@ class ColumnsReader final : public EventBlocksReader {
   hdf5::Column t_, x_, y_, p_;
   bool in_seconds_;
   SensorSize sensor_;
-  std::int64_t milliseconds_ = 0;  // entries of the index; 0: there is none
+  std::int64_t milliseconds_ = 0;  // number of entries of the index; 0: no index
   std::vector<std::int64_t> x_numbers_, y_numbers_, p_numbers_;
 };
 
@@ -136,7 +136,7 @@ bool has_event_columns(const EventColumns& names, const std::filesystem::path& p
     const hdf5::Input file(path);
     const char* all[] = {names.t, names.x, names.y, names.p};
     return std::all_of(std::begin(all), std::end(all), [&](const char* name) { return file.has(name); });
-  } catch (const UserError&) {  // for DSEC's reader, which takes all that are left, to tell
+  } catch (const UserError&) {  // DSEC's reader, which takes all other files, reports the problem
     return false;
   }
 }
@@ -146,8 +146,8 @@ std::unique_ptr<Source> open_event_columns(const EventColumns& names, const std:
   return make_events_source(std::make_unique<ColumnsReader>(names, path), options);
 }
 
-Format e2calib_format() { return read_only("e2calib", "HDF5 with x, y, p and t, as e2calib takes it", kE2calib); }
+Format e2calib_format() { return read_only("e2calib", "HDF5 with x, y, p and t, the input of e2calib", kE2calib); }
 
-Format e2vid_format() { return read_only("e2vid", "HDF5 with events/xs, ys, ps and ts, as around E2VID", kE2vid); }
+Format e2vid_format() { return read_only("e2vid", "HDF5 with events/xs, ys, ps and ts, used with E2VID", kE2vid); }
 
 }  // namespace esim

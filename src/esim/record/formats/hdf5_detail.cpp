@@ -9,8 +9,8 @@
 namespace esim::hdf5 {
 namespace {
 
-// Evictions would write parts of the index at any time; without them the file changes its structure only in flush(),
-// so that a killed process leaves what its last flush left. The index is small: about 40 bytes per chunk.
+// Evictions would write parts of the index at any time. Without them, the file changes its structure only in flush(),
+// so a killed process leaves the state of its last flush. The index is small: about 40 bytes per chunk.
 herr_t hold_index_until_flush(hid_t access_list) {
   H5AC_cache_config_t config{};
   config.version = H5AC__CURR_CACHE_CONFIG_VERSION;
@@ -22,11 +22,11 @@ herr_t hold_index_until_flush(hid_t access_list) {
   return H5Pset_mdc_config(access_list, &config);
 }
 
-// Byte shuffle before the codec: the high bytes of neighbours are alike.
+// Byte shuffle before the codec: the high bytes of neighbouring numbers are similar.
 herr_t add_filters(hid_t creation_list, Compression compression) {
   switch (compression) {
     case Compression::blosc: {
-      // Blosc's own shuffle; four values reserved for the filter, then level, shuffle, codec (5: Zstd).
+      // Blosc's own shuffle. Four values are reserved for the filter, then level, shuffle, codec (5: Zstd).
       constexpr std::array<unsigned, 7> kOptions = {0, 0, 0, 0, 1, 1, 5};
       return H5Pset_filter(creation_list, kBloscFilter, H5Z_FLAG_OPTIONAL, kOptions.size(), kOptions.data());
     }
@@ -85,7 +85,7 @@ Quiet::Quiet() {
 
 Quiet::~Quiet() {
   H5Eset_auto2(H5E_DEFAULT, print_, data_);
-  // Errors that a thread leaves behind when it ends keep the library from closing.
+  // Errors that a thread leaves on the error stack when it ends would keep the library from closing.
   if (print_ != nullptr) H5Eclear2(H5E_DEFAULT);
 }
 
@@ -102,8 +102,8 @@ void require_available(Compression compression) {
   const Quiet quiet;
   if (compression != Compression::blosc || H5Zfilter_avail(kBloscFilter) > 0) return;
   throw UserError(
-      "the HDF5 library cannot find its Blosc filter: install the package hdf5-filter-plugin-blosc-serial (and let "
-      "HDF5_PLUGIN_PATH, if it is set, name the plugins' folder), or choose gzip compression");
+      "the HDF5 library cannot find its Blosc filter: install the package hdf5-filter-plugin-blosc-serial (if "
+      "HDF5_PLUGIN_PATH is set, it must name the folder of the plugins), or choose gzip compression");
 }
 
 Output::Output(std::filesystem::path path) : path_(std::move(path)) {
@@ -170,7 +170,7 @@ void Output::create_text_attribute(hid_t object, const char* name, const std::st
 void Output::create_text_attribute(hid_t object, const char* name, const std::vector<std::string>& values) const {
   std::size_t longest = 0;
   for (const std::string& value : values) longest = std::max(longest, value.size());
-  std::string cells;  // of one size each, filled up with zeros
+  std::string cells;  // of equal size, padded with zeros
   for (const std::string& value : values) cells += value + std::string(longest + 1 - value.size(), '\0');
   const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
   check(H5Tset_size(type, longest + 1));
@@ -205,7 +205,7 @@ Series::Series(const Output& file, const char* name, SeriesLayout layout)
   file.check(H5Pset_chunk(creation, rank, chunk.data()));
   file.check(add_filters(creation, layout.compression));
 
-  // Whole chunks pass the chunk cache by; a small one holds the growing chunk of an uncompressed series.
+  // Complete chunks bypass the chunk cache; a small cache holds the growing chunk of an uncompressed series.
   const Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
   const std::size_t cache_bytes = layout.compression == Compression::none ? 1 << 16 : 0;
   file.check(H5Pset_chunk_cache(access, 11, cache_bytes, 1.0));

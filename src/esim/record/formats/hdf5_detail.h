@@ -18,7 +18,7 @@ namespace esim::hdf5 {
 
 inline constexpr H5Z_filter_t kBloscFilter = 32001;
 
-/// While it lives, the library prints nothing from this thread.
+/// While it exists, the library prints nothing from this thread.
 class Quiet {
  public:
   Quiet();
@@ -60,13 +60,13 @@ class Handle {
   Close close_ = nullptr;
 };
 
-/// The innermost message that the library's last failing call left in this thread.
+/// The innermost message of the library's last failing call in this thread.
 std::string last_error();
 
 template <typename T>
 hid_t native_type();
 
-/// A new HDF5 file. No byte of it depends on when or where it is written.
+/// A new HDF5 file. Its bytes do not depend on when or where it is written.
 class Output {
  public:
   explicit Output(std::filesystem::path path);
@@ -77,21 +77,21 @@ class Output {
   hid_t id() const { return file_; }
   const std::filesystem::path& path() const { return path_; }
 
-  /// Passes a result of the library on, or throws OutputError if it is an error or if the system refused a write.
+  /// Returns a result of the library. Throws OutputError if it is an error or if the system refused a write.
   template <typename T>
   T check(T result) const {
     if (result < 0 || state_.error != 0) fail(result < 0);
     return result;
   }
 
-  /// Hands everything to the system: what is in the file now stays readable if this process is killed, at any moment
-  /// from then on, or if the disk is full.
+  /// Hands everything to the system. From then on, the contents stay readable if this process is killed at any moment
+  /// or the disk is full.
   void flush() { check(flush_in_order(file_, state_)); }
 
-  /// Waits for the disk and closes. Series of this file must be gone.
+  /// Waits for the disk and closes. All series of this file must have been destroyed.
   void close();
 
-  /// Closes whatever its state, silently.
+  /// Closes in any state, silently.
   void abandon() noexcept;
 
   Handle create_group(const char* name) const;
@@ -118,8 +118,8 @@ struct SeriesLayout {
   Compression compression = Compression::none;
 };
 
-/// A dataset that grows along its first dimension. Each append() should be of whole chunks, except for the last: then
-/// nothing is written twice. Without compression, any number of items is fine.
+/// A dataset that grows along its first dimension. Each append() except the last should consist of whole chunks, so
+/// that nothing is written twice. Without compression, any number of items is fine.
 class Series {
  public:
   Series() = default;
@@ -141,7 +141,7 @@ class Series {
   hsize_t items_ = 0;
 };
 
-/// Throws UserError, with what to install, if Blosc is asked for and its plugin cannot be found.
+/// Throws UserError, with what to install, if Blosc is requested and its plugin cannot be found.
 void require_available(Compression compression);
 
 }  // namespace esim::hdf5

@@ -37,7 +37,7 @@ void Input::fail(const std::string& what) const { throw UserError("cannot read "
 
 bool Input::has(const char* name) const {
   const Quiet quiet;
-  // Each part of the name by itself: the library refuses to look below what is not there.
+  // Checks each part of the name separately: the library fails below a group that does not exist.
   const std::string full = name;
   for (std::size_t slash = full.find('/'); slash != std::string::npos; slash = full.find('/', slash + 1)) {
     if (H5Lexists(file_, full.substr(0, slash).c_str(), H5P_DEFAULT) <= 0) return false;
@@ -80,7 +80,7 @@ Column Input::open(const char* name, std::size_t item_rank, bool integers) const
   hsize_t numbers = 1;
   for (const hsize_t extent : column.item_shape) {
     if (extent == 0 || __builtin_mul_overflow(numbers, extent, &numbers) || numbers > kMaxChunkNumbers)
-      fail(std::string(name) + " has items of a size that this reader does not take");
+      fail(std::string(name) + " has items of an unsupported size");
   }
   require_storage(column, name);
   const Handle creation(H5Dget_create_plist(column.dataset), H5Pclose);
@@ -91,11 +91,10 @@ Column Input::open(const char* name, std::size_t item_rank, bool integers) const
 void Input::require_storage(const Column& column, const std::string& name) const {
   const Handle creation(H5Dget_create_plist(column.dataset), H5Pclose);
   if (!creation.valid()) fail(name + ": " + last_error());
-  if (H5Pget_external_count(creation) != 0) fail(name + " keeps its data in another file");
+  if (H5Pget_external_count(creation) != 0) fail(name + " stores its data in another file, which is not supported");
   const H5D_layout_t layout = H5Pget_layout(creation);
   if (layout == H5D_CHUNKED) return;
-  if (layout != H5D_CONTIGUOUS && layout != H5D_COMPACT)
-    fail(name + " is stored in a way that this reader does not know");
+  if (layout != H5D_CONTIGUOUS && layout != H5D_COMPACT) fail(name + " has an unsupported storage layout");
   std::error_code error;
   const std::uintmax_t file_bytes = std::filesystem::file_size(path_, error);
   if (column.size > file_bytes / column.item_numbers() ||
@@ -111,18 +110,18 @@ void Input::open_chunks(hid_t creation, Column& column, const std::string& name)
   column.chunk = shape[0];
   if (column.chunk == 0 || column.chunk > kMaxChunkNumbers / column.item_numbers()) {
     fail(name + " has chunks of " + std::to_string(column.chunk) + (rank == 1 ? " numbers" : " items") +
-         ", which is more than this reader takes");
+         ", which is more than is supported");
   }
   if (!std::equal(column.item_shape.begin(), column.item_shape.end(), shape.begin() + 1))
-    fail(name + " has chunks that are parts of items, which this reader does not know");
-  // Blosc's filter takes four values without looking whether there are so many.
+    fail(name + " has chunks that hold only parts of items, which is not supported");
+  // Blosc's filter reads four values without checking their number.
   const int filters = H5Pget_nfilters(creation);
   for (int i = 0; i < filters; ++i) {
     unsigned flags = 0;
     std::size_t values = 0;
     const H5Z_filter_t filter =
         H5Pget_filter2(creation, static_cast<unsigned>(i), &flags, &values, nullptr, 0, nullptr, nullptr);
-    if (filter == kBloscFilter && values < 4) fail(name + " has a damaged description of its compression");
+    if (filter == kBloscFilter && values < 4) fail(name + " has a damaged description of its compression filter");
     column.only_blosc = filter == kBloscFilter && filters == 1;
   }
   hsize_t chunks = 0;
@@ -135,8 +134,8 @@ void Input::fail_short(const Column& column, const std::string& name) const {
   fail(name + " should hold " + std::to_string(column.size) + " numbers, but the file has fewer");
 }
 
-// The filter trusts the sizes in the head of each packed chunk: how much it allocates and how much it leaves for the
-// library to read.
+// Blosc's filter trusts the sizes in the header of each compressed chunk: the size of its allocation and the number of
+// bytes for the library to read.
 void Input::require_sound_chunks(const Column& column, hsize_t first, hsize_t count) const {
   if (!column.only_blosc) return;
   std::vector<std::uint8_t> packed;
@@ -157,7 +156,7 @@ void Input::require_sound_chunks(const Column& column, hsize_t first, hsize_t co
       std::memcpy(&packed_bytes, &packed[12], sizeof(packed_bytes));
       sound = skipped_filters != 0 ? bytes == chunk_bytes : unpacked_bytes == chunk_bytes && packed_bytes == bytes;
     }
-    if (!sound) fail("the packed numbers from number " + std::to_string(offset[0]) + " on are damaged");
+    if (!sound) fail("the compressed data from number " + std::to_string(offset[0]) + " on are damaged");
   }
 }
 
@@ -173,8 +172,8 @@ void Input::read(const Column& column, hsize_t first, hsize_t count, hid_t type,
   if (H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, shape.data(), nullptr) < 0 ||
       H5Dread(column.dataset, type, in_memory, in_file, H5P_DEFAULT, out) < 0) {
     const std::string reason = last_error();
-    require_available(Compression::blosc);  // the usual cause has a remedy
-    fail("it is damaged, or packed in a way that this machine cannot read (" + reason + ")");
+    require_available(Compression::blosc);  // the usual cause, which has a remedy
+    fail("it is damaged, or compressed by a filter that is not available (" + reason + ")");
   }
 }
 
@@ -188,7 +187,7 @@ std::optional<std::int64_t> Input::scalar(const char* name) const {
   std::int64_t value = 0;
   if (!is_integer(type) || H5Sget_simple_extent_npoints(space) != 1 ||
       H5Dread(dataset, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) {
-    fail(std::string(name) + " is not one integer");
+    fail(std::string(name) + " must be one integer");
   }
   return value;
 }
@@ -203,7 +202,7 @@ std::optional<std::int64_t> Input::integer_attribute(const char* name) const {
   std::int64_t value = 0;
   if (!is_integer(type) || H5Sget_simple_extent_npoints(space) != 1 ||
       H5Aread(attribute, H5T_NATIVE_INT64, &value) < 0) {
-    fail(std::string("attribute ") + name + " is not one integer");
+    fail(std::string("attribute ") + name + " must be one integer");
   }
   return value;
 }
@@ -218,7 +217,7 @@ std::optional<std::string> Input::text_attribute(const char* name) const {
   const std::size_t size = H5Tget_size(type);
   if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || size > kMaxTextBytes ||
       H5Sget_simple_extent_npoints(space) != 1) {
-    fail(std::string("attribute ") + name + " is not a short text");
+    fail(std::string("attribute ") + name + " must be a short text");
   }
   std::string text(size, '\0');
   if (H5Aread(attribute, type, text.data()) < 0) fail(std::string("attribute ") + name + ": " + last_error());
@@ -237,7 +236,7 @@ std::vector<std::string> Input::text_list_attribute(const Column& column, const 
   const hssize_t count = H5Sget_simple_extent_npoints(space);
   if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || size > kMaxTextBytes || count < 0 ||
       count > kMaxTexts) {
-    fail(std::string("attribute ") + name + " is not a list of short texts");
+    fail(std::string("attribute ") + name + " must be a list of short texts");
   }
   std::string cells(size * static_cast<std::size_t>(count), '\0');
   if (H5Aread(attribute, type, cells.data()) < 0) fail(std::string("attribute ") + name + ": " + last_error());

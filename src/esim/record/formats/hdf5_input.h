@@ -13,9 +13,9 @@
 
 namespace esim::hdf5 {
 
-/// A dataset of items, counted by its first dimension, whose storage is known to hold as many as it says.
+/// A dataset of items, counted by its first dimension. Its storage is known to hold the stated number of items.
 struct Column {
-  /// How many numbers one item has.
+  /// Numbers per item.
   hsize_t item_numbers() const {
     return std::accumulate(item_shape.begin(), item_shape.end(), hsize_t{1}, std::multiplies<>());
   }
@@ -23,12 +23,12 @@ struct Column {
   Handle dataset;
   hsize_t size = 0;                   ///< items
   std::vector<hsize_t> item_shape{};  ///< of one item; empty: a number
-  hsize_t chunk = 0;                  ///< items in a chunk; 0: not in chunks
+  hsize_t chunk = 0;                  ///< items per chunk; 0: not chunked
   std::size_t number_bytes = 0;       ///< of one number in the file
-  bool only_blosc = false;            ///< chunks are packed by Blosc and nothing else
+  bool only_blosc = false;            ///< chunks are compressed only by Blosc
 };
 
-/// An HDF5 file from anywhere: whatever is wrong with it is a UserError that names it.
+/// An HDF5 file from any source. Any problem is a UserError that names the file.
 class Input {
  public:
   explicit Input(std::filesystem::path path);
@@ -38,17 +38,17 @@ class Input {
 
   bool has(const char* name) const;
 
-  /// What is at the top, datasets and groups, for people: the first few of them.
+  /// The first few datasets and groups at the top, as text.
   std::string contents() const;
 
-  /// Checks rank and type, and that the file is large enough for what the dataset claims: damaged files ask for no
-  /// memory and no loops beyond their own size.
+  /// Checks rank, type, and that the file is large enough for the stated size of the dataset, so that damaged files
+  /// cannot cause allocations or loops larger than themselves.
   Column open_column(const char* name) const { return open(name, 0, true); }
 
-  /// The same of items with so many dimensions, of integers or floating-point numbers, each item whole in a chunk.
+  /// The same for items of so many dimensions, of integers or floating-point numbers; each item must lie in one chunk.
   Column open_items(const char* name, std::size_t item_rank) const { return open(name, item_rank, false); }
 
-  /// Fills `out` with whole items from the first-th on.
+  /// Fills `out` with complete items from index `first` on.
   template <typename T>
   void read(const Column& column, hsize_t first, std::span<T> out) const {
     read(column, first, out.size() / column.item_numbers(), native_type<T>(), out.data());
@@ -58,7 +58,7 @@ class Input {
   std::optional<std::int64_t> integer_attribute(const char* name) const;
   std::optional<std::string> text_attribute(const char* name) const;
 
-  /// Texts that belong to a dataset, as Output::create_text_attribute() writes them; none where there are none.
+  /// Text attributes of a dataset, as Output::create_text_attribute() writes them; may be empty.
   std::vector<std::string> text_list_attribute(const Column& column, const char* name) const;
 
   [[noreturn]] void fail(const std::string& what) const;

@@ -13,14 +13,14 @@
 namespace esim::hdf5 {
 
 struct DriverFile {
-  H5FD_t base{};  // first: the library knows the file by this member
+  H5FD_t base{};  // must be first: the library accesses the file by this member
   int descriptor = -1;
   OutputState* state = nullptr;
   haddr_t end_of_addresses = 0;
   haddr_t end_of_file = 0;
   dev_t device = 0;
   ino_t inode = 0;
-  haddr_t flushed = 0;  // the file's end at the last flush: beyond it, nothing is referred to
+  haddr_t flushed = 0;  // end of the file at the last flush; nothing refers to data beyond it
 
   void note_failure() {
     if (state->error == 0) state->error = errno != 0 ? errno : EIO;
@@ -29,7 +29,7 @@ struct DriverFile {
   std::size_t get(haddr_t address, char* bytes, std::size_t size) const;
 };
 
-/// Once a write has failed, nothing more is written.
+/// After a failed write, nothing more is written.
 void DriverFile::put(haddr_t address, const char* bytes, std::size_t size) {
   while (size > 0 && state->error == 0) {
     const ssize_t put = ::pwrite(descriptor, bytes, size, static_cast<off_t>(address));
@@ -41,7 +41,7 @@ void DriverFile::put(haddr_t address, const char* bytes, std::size_t size) {
   }
 }
 
-/// How much is there, up to `size`; more than that on errors.
+/// The number of existing bytes, up to `size`; more than `size` on errors.
 std::size_t DriverFile::get(haddr_t address, char* bytes, std::size_t size) const {
   std::size_t done = 0;
   while (done < size) {
@@ -56,7 +56,7 @@ std::size_t DriverFile::get(haddr_t address, char* bytes, std::size_t size) cons
 
 namespace {
 
-/// What the access list carries, copied byte by byte.
+/// The data in the access list, copied byte by byte.
 struct DriverInfo {
   OutputState* state = nullptr;
 };
@@ -78,7 +78,7 @@ H5FD_t* open_file(const char* name, unsigned flags, hid_t access_list, haddr_t) 
     if (descriptor >= 0) ::close(descriptor);
     return nullptr;
   }
-  info->state->error = 0;  // the library tries without O_CREAT first, which may have failed
+  info->state->error = 0;  // the library first tries without O_CREAT, which may have failed
   auto* file = new (std::nothrow) DriverFile;
   if (file == nullptr) {
     ::close(descriptor);
@@ -112,7 +112,8 @@ int compare_files(const H5FD_t* a, const H5FD_t* b) {
 
 herr_t query(const H5FD_t*, unsigned long* features) {
   if (features != nullptr) {
-    // Metadata is not accumulated: each piece comes with its type, by which flush_in_order() orders them.
+    // Metadata is not accumulated: each piece must arrive with its type, because flush_in_order() orders pieces by
+    // type.
     *features = H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_DATA_SIEVE | H5FD_FEAT_AGGREGATE_SMALLDATA |
                 H5FD_FEAT_DEFAULT_VFD_COMPATIBLE;
   }
@@ -133,7 +134,7 @@ herr_t read_bytes(H5FD_t* base, H5FD_mem_t, hid_t, haddr_t address, std::size_t 
   auto* out = static_cast<char*>(buffer);
   const std::size_t there = file->get(address, out, size);
   if (there > size) return -1;
-  std::memset(out + there, 0, size - there);  // beyond the end of the file everything is zero
+  std::memset(out + there, 0, size - there);  // beyond the end of the file, everything is zero
   for (const HeldWrite& held : file->state->held) {
     const haddr_t first = std::max(address, held.address);
     const haddr_t last = std::min(address + size, held.address + held.bytes.size());
@@ -158,20 +159,20 @@ herr_t write_bytes(H5FD_t* base, H5FD_mem_t type, hid_t, haddr_t address, std::s
   return 0;
 }
 
-/// Of two pieces that are both referred to already: the superblock, which says how long the file is, before the
-/// indices, and those before the headers, which say how long the datasets are.
+/// The order of pieces that are already referred to: the superblock, which has the length of the file, before the
+/// indices, and those before the headers, which have the lengths of the datasets.
 int turn_of(H5FD_mem_t type) { return type == H5FD_MEM_SUPER ? 0 : type == H5FD_MEM_OHDR ? 2 : 1; }
 
 void write_in_order(DriverFile& file, std::vector<HeldWrite>& writes) {
   const auto old = std::stable_partition(writes.begin(), writes.end(),
                                          [&](const HeldWrite& write) { return write.address >= file.flushed; });
-  // A new file becomes one with its superblock.
+  // A new file becomes valid with its superblock.
   std::stable_sort(writes.begin(), old, [](const HeldWrite& a, const HeldWrite& b) {
     return (a.type != H5FD_MEM_SUPER) > (b.type != H5FD_MEM_SUPER);
   });
   for (auto write = writes.begin(); write != old; ++write)
     file.put(write->address, write->bytes.data(), write->bytes.size());
-  // Also what has been left out of a file needs room: as it is now, it is written again.
+  // A hole in the file needs room as well: its present content is written again.
   for (auto write = old; write != writes.end(); ++write) {
     std::vector<char> now(write->bytes.size());
     if (file.get(write->address, now.data(), now.size()) <= now.size())
@@ -197,9 +198,9 @@ herr_t truncate_file(H5FD_t* base, hid_t, hbool_t) {
 H5FD_class_t driver_class() {
   constexpr H5FD_mem_t kOneFreeListForMetadata[H5FD_MEM_NTYPES] = H5FD_FLMAP_DICHOTOMY;
   H5FD_class_t driver{};
-#ifdef H5FD_CLASS_VERSION  // from HDF5 1.14 on, which refuses to register a class that does not state it
+#ifdef H5FD_CLASS_VERSION  // HDF5 1.14 and later refuse a class that does not state its version
   driver.version = H5FD_CLASS_VERSION;
-  driver.value = H5_VFD_RESERVED;  // the first that is not HDF5's own; 256 to 511 are free for unregistered drivers
+  driver.value = H5_VFD_RESERVED;  // the first value not reserved by HDF5; 256 to 511 are free for unregistered drivers
 #endif
   driver.name = "esim_output";
   driver.maxaddr = (haddr_t{1} << 62) - 1;

@@ -28,7 +28,7 @@ class SequenceStream final : public RecordStream {
     ahead_ = files_.next(span_, file_);
   }
 
-  /// Reads the first file, so that the size of its images is known.
+  /// Reads the first file to get the size of its images.
   void read_first() {
     if (ahead_ && !read_) read();
   }
@@ -56,8 +56,8 @@ class SequenceStream final : public RecordStream {
     const Image<float>& image = image_in(images_);
     if (size_->width == 0) *size_ = {image.width(), image.height()};
     if (image.width() != size_->width || image.height() != size_->height) {
-      throw UserError(fmt::format("cannot read {}: its image is of {} x {} px, those before of {} x {}", file_.string(),
-                                  image.width(), image.height(), size_->width, size_->height));
+      throw UserError(fmt::format("cannot read {}: its image has {} x {} px, but the earlier images have {} x {} px",
+                                  file_.string(), image.width(), image.height(), size_->width, size_->height));
     }
     read_ = true;
   }
@@ -66,8 +66,8 @@ class SequenceStream final : public RecordStream {
   std::shared_ptr<SensorSize> size_;  // of all sequences
   TimeSpan span_{};
   fs::path file_;
-  bool ahead_ = false;  // the file has not been asked for yet
-  bool read_ = false;   // its images have been read
+  bool ahead_ = false;  // the current file has not been handed out yet
+  bool read_ = false;   // its images have been read already
   SequenceImages images_;
   Image<std::uint8_t> known_;
   std::optional<Record> record_;
@@ -123,7 +123,7 @@ std::unique_ptr<Source> open_sequences(std::vector<FileSequence> sequences, cons
     auto stream = std::make_unique<SequenceStream>(std::move(files), size);
     try {
       if (size->width == 0) stream->read_first();
-    } catch (const UserError&) {  // comes again where the file has its turn
+    } catch (const UserError&) {  // it is thrown again when it is the turn of the file
     }
     streams.push_back(std::move(stream));
   }

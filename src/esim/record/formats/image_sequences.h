@@ -11,26 +11,26 @@
 
 namespace esim {
 
-// Formats of ground truth as files, one for each frame, in a folder: of one camera, without poses. Their readers give
-// motion from frame to frame as DisplacementRecord, visible where it is known, and all else as TruthRecord.
+// Formats of ground truth with one file per frame in a folder: one camera, without poses. Their readers give optical
+// flow as DisplacementRecord, visible where it is known, and everything else as TruthRecord.
 
-/// `flo`: the Middlebury benchmark's optical flow from frame to frame.
+/// `flo`: optical flow from frame to frame, in the format of the Middlebury benchmark.
 Format flo_format();
 
-/// `kitti`: KITTI's PNG of 16 bits, of optical flow from frame to frame in flow/ and of depth in depth/.
+/// `kitti`: 16-bit PNG of KITTI: optical flow from frame to frame in flow/ and depth in depth/.
 Format kitti_format();
 
-/// `dsec-flow`: DSEC's PNG of 16 bits in forward/, and forward_timestamps.txt.
+/// `dsec-flow`: 16-bit PNG of DSEC in forward/, with forward_timestamps.txt.
 Format dsec_flow_format();
 
 /// `exr`: OpenEXR files of irradiance, depth and motion field.
 Format exr_format();
 
-/// `npy-truth`: one NumPy array for everything of a kind, as in truth.h5.
+/// `npy-truth`: one NumPy array per quantity, as in truth.h5.
 Format npy_truth_format();
 
-/// Optical flow from each frame of the first camera to the next, px: its displacements, and where a recording has none
-/// between two frames of ground truth, the motion field of the first times the interval.
+/// Optical flow from each frame of the first camera to the next, px. If a recording has none between two ground-truth
+/// frames, the motion field of the first frame times the interval.
 class FrameFlow {
  public:
   using Write = std::function<void(TimeSpan span, const Image<float>& x, const Image<float>& y)>;
@@ -49,23 +49,23 @@ class FrameFlow {
   };
   Write write_;
   std::optional<Field> field_;    // motion field of the last frame, px/s
-  std::optional<Field> pending_;  // written unless a displacement comes instead
+  std::optional<Field> pending_;  // written unless optical flow arrives instead
 };
 
-/// What one file of a sequence holds; the rest is empty.
+/// The contents of one file of a sequence; what the file lacks is empty.
 struct SequenceImages {
   Image<float> irradiance, depth, flow_x, flow_y;
 };
 
 /// Files in order of time.
 struct FileSequence {
-  /// Goes to the next file; false where there is none left.
+  /// Goes to the next file; returns false at the end.
   std::function<bool(TimeSpan& span, std::filesystem::path& file)> next{};
 
-  /// Reads a file; UserError where it is damaged.
+  /// Reads a file; throws UserError if it is damaged.
   std::function<void(const std::filesystem::path& file, SequenceImages& images)> read{};
 
-  bool displacements = false;  ///< the flow is a displacement, px, from the span's start to its end; NaN: not known
+  bool displacements = false;  ///< the flow is optical flow, px, from the span's start to its end; NaN: unknown
 };
 
 /// The files that a folder's timestamps.txt lists.

@@ -13,7 +13,7 @@ namespace {
 
 double linear_from_srgb(double srgb) { return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4); }
 
-// Irradiance at which level i + 1 is nearer than level i.
+// Irradiance at which level i + 1 becomes nearer than level i.
 std::array<float, 255> level_bounds() {
   std::array<float, 255> bounds;
   for (std::size_t i = 0; i < bounds.size(); ++i) {
@@ -22,13 +22,13 @@ std::array<float, 255> level_bounds() {
   return bounds;
 }
 
-// A table's entry for each float on [2^-13, 1) that begins with the same kCodeBits of mantissa: so short a piece that
-// at most one bound lies in it. What is below has level 0.
+// A table with one entry for all floats on [2^-13, 1) with the same first kCodeBits of mantissa. These intervals are so
+// short that each contains at most one bound. Smaller numbers have level 0.
 constexpr int kCodeBits = 9, kOctaves = 13;
 constexpr std::uint32_t kFirstCode = (127U - kOctaves) << kCodeBits;
 std::uint32_t code_of(float e) { return std::bit_cast<std::uint32_t>(e) >> (23 - kCodeBits); }
 
-// Level at the start of each of those pieces.
+// Level at the start of each interval.
 std::array<std::uint8_t, std::size_t{kOctaves} << kCodeBits> level_starts(const std::array<float, 255>& bounds) {
   std::array<std::uint8_t, std::size_t{kOctaves} << kCodeBits> starts;
   for (std::uint32_t i = 0; i < starts.size(); ++i) {

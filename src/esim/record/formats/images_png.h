@@ -11,8 +11,8 @@
 
 namespace esim {
 
-/// Irradiance of one camera, of its images and its ground truth, as 8-bit grey PNG, sRGB-encoded: 000000.png and so on
-/// in a folder, beside timestamps.txt with lines `index t_s file`. Of two at the same time, the first is written.
+/// Irradiance images of one camera, from videos and ground truth, as 8-bit grey PNG, sRGB-encoded: 000000.png and so on
+/// in a folder, with timestamps.txt: lines `index t_s file`. Of two images at the same time, the first is written.
 class ImagesPngWriter final : public Sink {
  public:
   ImagesPngWriter(std::filesystem::path folder, int camera) : folder_(std::move(folder)), camera_(camera) {}
@@ -30,10 +30,10 @@ class ImagesPngWriter final : public Sink {
   std::optional<TimedFilesWriter> files_;
 };
 
-/// The irradiance, to the nearest level, that is encoded like this in so many bits.
+/// The irradiance that this level stands for, in an sRGB encoding with so many bits.
 Image<float> decode_srgb(const Image<std::uint16_t>& encoded, int bits);
 
-/// Linear irradiance in 8-bit sRGB (IEC 61966-2-1): 0 and below, and NaN, to 0; 1 and above to 255.
+/// Encodes linear irradiance as 8-bit sRGB (IEC 61966-2-1): 0 and below, and NaN, give 0; 1 and above give 255.
 Image<std::uint8_t> encode_srgb(const Image<float>& irradiance);
 
 }  // namespace esim

@@ -9,8 +9,8 @@
 
 namespace esim {
 
-/// The IMU's measurements in the EuRoC data set's layout in `folder`/imu.csv: time (ns), angular rate (rad/s), specific
-/// force (m/s²), in the IMU's frame; and the biases in them at the same times in `folder`/imu_truth.csv.
+/// The IMU's measurements in the layout of the EuRoC dataset, in `folder`/imu.csv: time (ns), angular rate (rad/s),
+/// specific force (m/s²), in the IMU's frame; and their biases at the same times in `folder`/imu_truth.csv.
 class ImuCsvWriter final : public Sink {
  public:
   explicit ImuCsvWriter(std::filesystem::path folder) : folder_(std::move(folder)) {}

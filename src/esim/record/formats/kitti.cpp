@@ -18,10 +18,10 @@ namespace fs = std::filesystem;
 
 constexpr float kMaxNumber = 65535;
 constexpr int kOffset = 32768;
-constexpr float kKittiPerPixel = 64, kDsecPerPixel = 128;  // numbers for a pixel of flow
-constexpr float kPerMetre = 256;                           // and for a metre of depth
+constexpr float kKittiPerPixel = 64, kDsecPerPixel = 128;  // numbers per pixel of flow
+constexpr float kPerMetre = 256;                           // numbers per metre of depth
 
-/// Flow in red and green, and in blue whether it is known: 1 or 0. What is too large for the numbers is not known.
+/// Flow in red and green; blue is 1 where the flow is known, otherwise 0. Flow that is out of range counts as unknown.
 void write_flow(const fs::path& path, const Image<float>& x, const Image<float>& y, float per_pixel) {
   PerColour<Image<std::uint16_t>> channels;
   channels.fill(Image<std::uint16_t>(x.width(), x.height()));
@@ -39,7 +39,7 @@ void write_flow(const fs::path& path, const Image<float>& x, const Image<float>&
 PngImage read_numbers(const fs::path& path, std::size_t channels) {
   PngImage png = read_png(path);
   if (png.bits != 16 || png.channels.size() != channels) {
-    throw UserError(fmt::format("cannot read {}: it has {} channels of {} bits, and should have {} of 16",
+    throw UserError(fmt::format("cannot read {}: it has {} channels of {} bits, but must have {} of 16 bits",
                                 path.string(), png.channels.size(), png.bits, channels));
   }
   return png;
@@ -56,7 +56,7 @@ void read_flow(const fs::path& path, SequenceImages& images, float per_pixel) {
   }
 }
 
-/// 0 is no depth: nothing seen, or farther than the numbers go.
+/// 0 means no depth: no surface, or out of range.
 void write_depth(const fs::path& path, const Image<float>& depth) {
   Image<std::uint16_t> numbers(depth.width(), depth.height());
   std::transform(depth.pixels().begin(), depth.pixels().end(), numbers.pixels().begin(), [](float z) {
@@ -134,7 +134,7 @@ class DsecFlowWriter final : public Sink {
   }};
 };
 
-/// The files by name, and a line of times for each.
+/// The files in order of their names, with one line of times for each.
 FileSequence dsec_files(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -153,7 +153,7 @@ FileSequence dsec_files(const fs::path& folder) {
     if (!list.next()) return false;
     constexpr TimeNs kMax_us = std::numeric_limits<TimeNs>::max() / 2 / kNsPerUs;
     if (list.t() > kMax_us || list.integer(1) > kMax_us || list.integer(1) < list.t() || list.t() < 0)
-      list.fail("the times are none of a recording");
+      list.fail("the times are out of range or in the wrong order");
     span = {list.t() * kNsPerUs, list.integer(1) * kNsPerUs};
     if (index == names.size()) list.fail(fmt::format("there are only {} files in forward/", names.size()));
     file = names[index++];
@@ -167,7 +167,7 @@ FileSequence dsec_files(const fs::path& folder) {
 Format kitti_format() {
   return {
       .name = "kitti",
-      .description = "folders flow/ and depth/ of 16-bit PNG as KITTI has them",
+      .description = "folders flow/ and depth/ of 16-bit PNG files, as in KITTI",
       .holds = {Content::truth, Content::displacement},
       .folder = true,
       .recognises =
@@ -196,7 +196,7 @@ Format kitti_format() {
 Format dsec_flow_format() {
   return {
       .name = "dsec-flow",
-      .description = "DSEC's folder of optical flow: forward/ of 16-bit PNG, forward_timestamps.txt",
+      .description = "DSEC's folder of optical flow: 16-bit PNG files in forward/, forward_timestamps.txt",
       .holds = {Content::truth, Content::displacement},
       .folder = true,
       .recognises =

@@ -19,8 +19,9 @@ constexpr EventColumns kColumns = {"prophesee/left/t",
                                    "prophesee/left/p",
                                    "prophesee/left/calib/resolution",
                                    "prophesee/left/ms_map_idx"};
-constexpr std::size_t kChunk = 1 << 16;                 // events, and milliseconds
-constexpr TimeNs kLatest = 30 * 86'400 * kNsPerSecond;  // an index of its milliseconds fits anywhere
+constexpr std::size_t kChunk = 1 << 16;  // events, and milliseconds
+constexpr TimeNs kLatest =
+    30 * 86'400 * kNsPerSecond;  // maximum time, for which the millisecond index still fits into memory
 
 void create_text(const hdf5::Output& file, const char* name, const std::string& text) {
   const hdf5::Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
@@ -61,12 +62,12 @@ class M3edWriter final : public Sink {
   Compression compression_;
   TimeNs end_ = 0;
 
-  // What has not been written yet.
+  // Buffers that have not been written yet.
   std::vector<std::int64_t> t_;
   std::vector<std::uint16_t> x_, y_;
   std::vector<std::int8_t> p_;
 
-  // The series close before the file.
+  // Declared last, so that the series close before the file.
   std::optional<hdf5::Output> file_;
   hdf5::Series t_series_, x_series_, y_series_, p_series_;
   hdf5::MillisecondIndex milliseconds_;
@@ -112,8 +113,7 @@ void M3edWriter::write(const Record& record) {
   if (events == nullptr || events->camera != 0) return;
   for (const Event& event : events->events) {
     if (event.t < 0 || event.t > kLatest) {
-      throw RemediableError(path_.string() +
-                                ": M3ED counts times from the start of the recording, so that an event at " +
+      throw RemediableError(path_.string() + ": M3ED counts times from the start of the recording, so an event at " +
                                 std::to_string(event.t / kNsPerSecond) + " s does not fit: choose another format",
                             Remedy::times_from_zero);
     }

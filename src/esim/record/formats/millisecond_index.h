@@ -9,29 +9,29 @@
 
 namespace esim::hdf5 {
 
-/// The index of the milliseconds in files as DSEC's and M3ED's: entry ms is the number of events before that many
-/// milliseconds, and so the index of the first event at or after them. Times count from the start of the index.
+/// The millisecond index of files in the layouts of DSEC and M3ED: entry ms is the number of events before that time,
+/// which is the index of the first event at or after it. Times count from the start of the index.
 ///
-/// Readers look up the first millisecond at or after the end of a window, so that the index has one entry more than
-/// milliseconds begin in the recording.
+/// Readers look up the first millisecond at or after the end of a window, so the index has one entry more than the
+/// number of milliseconds that begin in the recording.
 class MillisecondIndex {
  public:
-  /// The dataset to append to, which must be set before anything is written.
+  /// The dataset to append to; must be set before anything is written.
   void open(Series series) { series_ = std::move(series); }
 
-  /// Counts an event at or after 0, ns, in order of time.
+  /// Counts an event at time t >= 0, ns; events must be in order of time.
   void add(std::uint64_t t) {
     if (t >= next_) complete_until(t);
     ++events_;
   }
 
-  /// Adds the entries that windows up to `end` need, ns, and those up to right behind the last event.
+  /// Adds the entries for windows up to `end`, ns, and at least those up to just after the last event.
   void finish(std::uint64_t end) {
-    const std::uint64_t last = events_ > 0 ? next_ : 0;  // the first millisecond that begins after the last event
+    const std::uint64_t last = events_ > 0 ? next_ : 0;  // the first millisecond after the last event
     complete_until(std::max(last, (end + kMs - 1) / kMs * kMs));
   }
 
-  /// Appends what is known to the dataset.
+  /// Appends the completed entries to the dataset.
   void write() {
     series_.append(std::span<const std::uint64_t>(waiting_));
     waiting_.clear();
@@ -43,7 +43,7 @@ class MillisecondIndex {
   static constexpr std::uint64_t kMs = kNsPerMs;
   static constexpr std::size_t kBuffer = 1 << 16;
 
-  /// Milliseconds up to t, itself included, begin before the next event.
+  /// Milliseconds up to and including t begin before the next event.
   void complete_until(std::uint64_t t) {
     for (; next_ <= t; next_ += kMs) {
       waiting_.push_back(events_);
@@ -52,7 +52,7 @@ class MillisecondIndex {
   }
 
   Series series_;
-  std::vector<std::uint64_t> waiting_;  // entries that have not been written
+  std::vector<std::uint64_t> waiting_;  // entries not written yet
   std::uint64_t next_ = 0;              // ns; the first millisecond without an entry
   std::uint64_t events_ = 0;
 };

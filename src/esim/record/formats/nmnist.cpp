@@ -50,7 +50,7 @@ class NmnistWriter final : public EventsWriter {
 /// Turns bytes into events.
 class Decoder {
  public:
-  /// Nothing where it is a delay.
+  /// Nothing for a delay.
   std::optional<Event> decode(const std::uint8_t* bytes) {
     if (bytes[1] == kDelayRow) {
       delay_us_ += kDelayUs;
@@ -89,7 +89,7 @@ class NmnistReader final : public EventsReader {
   Decoder decoder_;
 };
 
-/// Nothing in the content marks it: the name, the size, and times that do not decrease.
+/// Files have no signature: recognised by name, size, and times that do not decrease.
 bool is_nmnist(const std::filesystem::path& path, std::string_view head) {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(path, error);
@@ -111,7 +111,7 @@ bool is_nmnist(const std::filesystem::path& path, std::string_view head) {
 Format nmnist_format() {
   return {
       .name = "nmnist",
-      .description = "five bytes an event, as in N-MNIST",
+      .description = "five bytes per event, as in N-MNIST",
       .extensions = {".bin"},
       .holds = {Content::events},
       .resolution = kNsPerUs,

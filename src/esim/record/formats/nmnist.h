@@ -4,9 +4,9 @@
 
 namespace esim {
 
-/// Five bytes an event, as in N-MNIST and N-Caltech101 (Orchard et al., Frontiers in Neuroscience 2015): x, y, then the
-/// polarity and 23 bits of the time in us, the highest first. An event in row 240 is none: from there on, times are
-/// 8192 us later than they say.
+/// Five bytes per event, as in N-MNIST and N-Caltech101 (Orchard et al., Frontiers in Neuroscience 2015): x, y, then
+/// the polarity and 23 bits of the time in us, the highest first. An event in row 240 is a delay, not an event: all
+/// following times increase by 8192 us.
 Format nmnist_format();
 
 }  // namespace esim

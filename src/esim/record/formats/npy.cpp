@@ -50,7 +50,7 @@ class NpyWriter final : public EventsWriter {
   }
 
  private:
-  /// With each flush, so that what a killed process leaves can be read.
+  /// Updated with each flush, so that the file of a killed process can be read.
   void write_count() { file_->overwrite_start(npy::header_text(descr_, std::array{count_})); }
 
   static constexpr std::size_t kItemBytes = 13;

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kMaxItemBytes = 1 << 16;
 
-/// Of "<i8", "|u1", "<m8[us]"; nothing for what has no such type.
+/// The field of "<i8", "|u1", "<m8[us]"; nothing for other types.
 std::optional<Field> field_of(std::string_view type) {
   if (type.size() < 3) return std::nullopt;
   Field field;
@@ -41,13 +41,13 @@ std::optional<Field> field_of(std::string_view type) {
   return field;
 }
 
-/// How many numbers an array has.
+/// The number of numbers in an array.
 struct Count {
   std::uint64_t numbers = 1;
-  bool one_dimension = true;  ///< that matters
+  bool one_dimension = true;  ///< or one item only
 };
 
-/// Nothing where the numbers cannot be counted.
+/// Nothing if the numbers cannot be counted.
 std::optional<Count> count_of(const std::vector<std::uint64_t>& shape) {
   Count count;
   for (const std::uint64_t extent : shape) {
@@ -67,13 +67,13 @@ Number load(const std::byte* from, bool big_endian) {
   return value;
 }
 
-/// Calls take(value) for the field in each item.
+/// Calls take(value) with the field of each item.
 template <typename Number, typename Take>
 void for_each(const Field& field, std::size_t stride, std::span<const std::byte> items, const Take& take) {
   for (std::size_t at = field.offset; at < items.size(); at += stride) take(load<Number>(&items[at], field.big_endian));
 }
 
-/// As above, of whichever type the field is.
+/// The same for a field of any type.
 template <typename Take>
 void for_each_number(const Field& field, std::size_t stride, std::span<const std::byte> items, const Take& take) {
   const auto visit = [&](auto zero) { for_each<decltype(zero)>(field, stride, items, take); };
@@ -119,7 +119,7 @@ void Array::fail(const std::string& what) const { throw UserError(fmt::format("c
 void Array::take_fields(const Literal& descr) {
   const auto add = [&](const Literal& type, std::string name, std::uint64_t repeats) {
     auto field = type.sequence ? std::nullopt : field_of(type.text);
-    if (!field) fail(fmt::format("field \"{}\" is of a type that is not supported: {}", name, type.text));
+    if (!field) fail(fmt::format("field \"{}\" has a type that is not supported: {}", name, type.text));
     field->name = std::move(name);
     field->offset = item_bytes_;
     if (repeats != 1) field->kind = 'V';
@@ -159,7 +159,7 @@ void Array::integers(const Field& field, std::vector<std::int64_t>& out) const {
 
 void Array::times(const Field& field, std::vector<std::int64_t>& out) const {
   if (field.kind == 'f') {
-    constexpr double kMost = 9e9;  // s; more is no int64 of ns
+    constexpr double kMost = 9e9;  // larger times do not fit into int64 ns
     out.clear();
     out.reserve(held_);
     for_each_number(field, item_bytes_, std::span(items_).first(held_ * item_bytes_), [&](auto value) {

@@ -20,7 +20,7 @@ class ColumnsReader final : public EventsReader {
       if (std::find(arrays_.begin(), arrays_.end(), column->array) == arrays_.end()) arrays_.push_back(column->array);
       portion_ = std::min(portion_, std::max<std::size_t>(1, kMaxBufferBytes / column->array->item_bytes()));
       if (!column->array->one_dimension()) column->array->fail("it has more than one dimension");
-      if (column->array->count() != count_) column->array->fail("its length is not that of the other arrays");
+      if (column->array->count() != count_) column->array->fail("its length differs from that of the other arrays");
     }
   }
 
@@ -38,7 +38,7 @@ class ColumnsReader final : public EventsReader {
     for (std::size_t i = 0; i < there; ++i, ++done_) {
       if (t_[i] == Array::kNoNumber || p_[i] == Array::kNoNumber || std::min(x_[i], y_[i]) < 0 ||
           std::max(x_[i], y_[i]) >= kMaxExtent) {
-        columns_.t.array->fail(fmt::format("event {} has a time, place or polarity that cannot be one", done_));
+        columns_.t.array->fail(fmt::format("event {} has an invalid time, position or polarity", done_));
       }
       events.push_back({t_[i], static_cast<std::uint16_t>(x_[i]), static_cast<std::uint16_t>(y_[i]),
                         static_cast<std::int8_t>(p_[i] > 0 ? 1 : -1)});
@@ -79,7 +79,7 @@ std::unique_ptr<EventsReader> make_columns_reader(const std::string& file, Event
   for (const auto& [name, column] : {std::pair{"t", columns.t}, {"x", columns.x}, {"y", columns.y}, {"p", columns.p}}) {
     if (!column.array || column.field.kind == 'V') {
       throw UserError(
-          fmt::format("cannot read {}: it has no numbers \"{}\": events need t, x, y and p, as fields of one "
+          fmt::format("cannot read {}: it has no numbers \"{}\": events need t, x, y and p as fields of one "
                       "array or as arrays of these names",
                       file, name));
     }

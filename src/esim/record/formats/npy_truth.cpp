@@ -45,7 +45,7 @@ class NpyWriter {
     file_.append(npy::header_text(quoted(kType<T>), shape_));
   }
 
-  /// One item, in parts. The file is whole after the last one.
+  /// Appends one item, in parts. Afterwards the file is valid.
   void append(std::initializer_list<std::span<const T>> parts) {
     for (const std::span<const T> part : parts) {
       file_.append({reinterpret_cast<const char*>(part.data()), part.size_bytes()});
@@ -61,34 +61,35 @@ class NpyWriter {
   std::vector<std::uint64_t> shape_;
 };
 
-/// The items of an array, one after the other.
+/// Reads the items of an array one after the other.
 template <typename T>
 class NpyReader {
  public:
   NpyReader(const fs::path& path, std::size_t item_rank) : file_(path) {
     const npy::Header header = npy::read_header([&](std::span<std::byte> out) { return file_.read_into(out); },
                                                 [&](const std::string& problem) { file_.fail(0, problem); });
-    if (header.fortran_order) file_.fail(0, "it is not in C order");
+    if (header.fortran_order) file_.fail(0, "the array must be in C order");
     if (header.descr.text != kType<T>)
-      file_.fail(0, fmt::format("its type is {}, not {}", header.descr.text, kType<T>));
-    if (header.shape.size() != item_rank + 1) file_.fail(0, fmt::format("it has not {} dimensions", item_rank + 1));
+      file_.fail(0, fmt::format("its type is {}, but must be {}", header.descr.text, kType<T>));
+    if (header.shape.size() != item_rank + 1) file_.fail(0, fmt::format("it must have {} dimensions", item_rank + 1));
     items_ = header.shape[0];
     item_shape_.assign(header.shape.begin() + 1, header.shape.end());
     constexpr std::uint64_t kMaxExtent = 65536, kMaxNumbers = std::uint64_t{1} << 28;
     for (const std::uint64_t extent : item_shape_) {
       numbers_ *= extent;
-      if (extent < 1 || extent > kMaxExtent || numbers_ > kMaxNumbers) file_.fail(0, "its shape is that of no images");
+      if (extent < 1 || extent > kMaxExtent || numbers_ > kMaxNumbers)
+        file_.fail(0, "its shape is not valid for images");
     }
   }
 
   const std::vector<std::uint64_t>& item_shape() const { return item_shape_; }
   std::uint64_t left() const { return items_ - read_; }
 
-  /// Fills the parts, which are all of the next item.
+  /// Fills the parts, which together are the next item.
   void read(std::initializer_list<std::span<T>> parts) {
-    if (left() == 0) file_.fail(file_.size(), "it has fewer items than the times");
+    if (left() == 0) file_.fail(file_.size(), "it has fewer items than there are times");
     for (const std::span<T> part : parts) {
-      // In pieces, so that a shape that is a lie takes no memory.
+      // In pieces, so that a wrong shape does not allocate memory.
       constexpr std::size_t kPiece = 1 << 16;
       for (std::size_t done = 0; done < part.size(); done += kPiece) {
         const std::span<T> piece = part.subspan(done, std::min(kPiece, part.size() - done));
@@ -98,7 +99,7 @@ class NpyReader {
     ++read_;
   }
 
-  /// Fails unless the file has the bytes of the next item.
+  /// Fails unless the file contains the bytes of the next item.
   void require_item() const {
     if ((file_.size() - file_.offset()) / sizeof(T) < numbers_)
       file_.fail(file_.size(), "the file ends within an item");
@@ -186,7 +187,7 @@ class NpyTruthWriter final : public Sink {
   std::optional<NpyWriter<std::uint8_t>> displacement_valid_;
 };
 
-/// Arrays of one folder, with images of one size.
+/// The arrays in one folder; all images have one size.
 class Folder {
  public:
   explicit Folder(fs::path path) : path_(std::move(path)) {}
@@ -196,23 +197,24 @@ class Folder {
     return fs::is_regular_file(path_ / name, error);
   }
 
-  /// Nothing where there is none; of `vectors`, x and then y.
+  /// Nothing if the file does not exist. `vectors`: images of x and y.
   template <typename T>
   std::optional<NpyReader<T>> images(const char* name, bool vectors = false) {
     if (!has(name)) return std::nullopt;
     NpyReader<T> reader(path_ / name, vectors ? 3 : 2);
     const auto& shape = reader.item_shape();
     const SensorSize size{static_cast<int>(shape.back()), static_cast<int>(shape[shape.size() - 2])};
-    if (vectors && shape[0] != 2) reader.fail("its vectors have not two components");
+    if (vectors && shape[0] != 2) reader.fail("its vectors must have two components");
     if (size_.width == 0) size_ = size;
-    if (size.width != size_.width || size.height != size_.height) reader.fail("its images differ in size from others");
+    if (size.width != size_.width || size.height != size_.height)
+      reader.fail("its images differ in size from those of the other arrays");
     return reader;
   }
 
   template <typename T>
   NpyReader<T> numbers(const char* name, std::vector<std::uint64_t> item_shape) const {
     NpyReader<T> reader(path_ / name, item_shape.size());
-    if (reader.item_shape() != item_shape) reader.fail("its shape is another than expected");
+    if (reader.item_shape() != item_shape) reader.fail("its shape is wrong");
     return reader;
   }
 
@@ -269,7 +271,7 @@ class FramesStream final : public RecordStream {
       poses_->read({n});
       pose = {Eigen::Quaterniond(n[6], n[3], n[4], n[5]), Eigen::Vector3d(n.data())};
       if (!(std::abs(pose.rotation.norm() - 1) < 1e-3) || !pose.translation.allFinite())
-        poses_->fail("it holds a pose that is none");
+        poses_->fail("it holds an invalid pose");
     }
     folder_->read(irradiance_, images_.irradiance);
     folder_->read(depth_, images_.depth);
@@ -298,7 +300,8 @@ class DisplacementsStream final : public RecordStream {
         times_(folder->numbers<TimeNs>("displacement_t.npy", {2})),
         displacement_(folder->images<float>("displacement.npy", true)),
         valid_(folder->images<std::uint8_t>("displacement_valid.npy")) {
-    if (!displacement_ || !valid_) times_.fail("displacement.npy or displacement_valid.npy beside it is missing");
+    if (!displacement_ || !valid_)
+      times_.fail("displacement.npy or displacement_valid.npy is missing from the same folder");
   }
 
   std::optional<TimeNs> due() override {
@@ -330,7 +333,7 @@ class DisplacementsStream final : public RecordStream {
   std::optional<Record> record_;
 };
 
-/// Displacements follow the frames that they lead to.
+/// Optical flow follows the frame at its end.
 std::unique_ptr<Source> open_folder(const fs::path& path, const ReadOptions& options) {
   const auto folder = std::make_shared<Folder>(path);
   std::vector<std::unique_ptr<RecordStream>> streams;

@@ -36,8 +36,8 @@ Archive open_archive(const fs::path& path, int flags, std::string& reason) {
   return archive;
 }
 
-/// One column of the events, as a file of its own, ARCHIVE.t.npy, until all is known and packed. If that never comes,
-/// it is what has been recorded.
+/// One column of the events, in a separate file, ARCHIVE.t.npy, until the archive is packed at the end. If the process
+/// ends before that, these files hold the data recorded so far.
 class ColumnFile {
  public:
   ColumnFile(const fs::path& archive, std::string name, std::string descr)
@@ -45,7 +45,7 @@ class ColumnFile {
     file_.append(npy::header_text(descr_, std::array{std::uint64_t{0}}));
   }
 
-  /// Appends number(event) of each.
+  /// Appends number(event) for each event.
   template <typename Number, typename Function>
   void write(EventSpan events, const Function& number) {
     std::string& bytes = file_.buffer();
@@ -89,7 +89,7 @@ class NpzWriter final : public EventsWriter {
   explicit NpzWriter(const WriteOptions& options) : options_(options) {}
 
   void begin(const fs::path& path, SensorSize sensor) override {
-    OutputFile(path).close();  // fails here, where it will
+    OutputFile(path).close();  // fails now rather than at the end
     path_ = path;
     sensor_ = sensor;
     const auto add = [&](std::string name, std::string_view type) {
@@ -152,7 +152,7 @@ class NpzWriter final : public EventsWriter {
 
   [[noreturn]] void fail() const { throw_cannot_write(path_, zip_strerror(archive_.get())); }
 
-  static constexpr zip_uint16_t kFirstOfJanuary1980 = (1 << 5) | 1;  // the same recording is the same bytes
+  static constexpr zip_uint16_t kFirstOfJanuary1980 = (1 << 5) | 1;  // makes the bytes independent of the date
 
   WriteOptions options_;
   fs::path path_;
@@ -205,7 +205,7 @@ std::unique_ptr<EventsReader> open_npz(const fs::path& path) {
   return npy::make_columns_reader(path.string(), std::move(columns));
 }
 
-/// Its first member is a NumPy array.
+/// Whether the first member of the zip is a NumPy array.
 bool is_npz(std::string_view head) {
   constexpr std::size_t kNameLength = 26, kName = 30;
   if (!head.starts_with(kLocalHead) || head.size() < kName) return false;

@@ -25,16 +25,17 @@ cv::Mat copy_of(const Image<T>& image, int type) {
 }
 
 cv::Mat demosaicked(const cv::Mat& mosaic) {
-  // At the border OpenCV takes what is one pixel further in. Mirroring keeps each pixel's colour.
+  // At the border, OpenCV copies the result one pixel further inside. Mirroring keeps the colour of each pixel.
   constexpr int kBorder = 2;
   cv::Mat wide, colours;
   cv::copyMakeBorder(mosaic, wide, kBorder, kBorder, kBorder, kBorder, cv::BORDER_REFLECT_101);
-  cv::cvtColor(wide, colours, cv::COLOR_BayerBG2BGR_EA);  // named after the second row, from its second column on
+  cv::cvtColor(wide, colours,
+               cv::COLOR_BayerBG2BGR_EA);  // OpenCV names the pattern by the second row, from its second column on
   return colours({kBorder, kBorder, mosaic.cols, mosaic.rows});
 }
 
-// OpenCV's own way of compressing, the fastest that it has: gradients and runs, which are what simulated images have.
-// Where it is told how hard to try, it tries everything, for twice the time and larger files.
+// OpenCV's default compression is its fastest: gradients and runs, which suit simulated images. With an explicit level,
+// OpenCV tries all filters, for twice the time and larger files.
 std::string encode(const cv::Mat& image) {
   std::vector<unsigned char> png;
   cv::imencode(".png", image, png);
@@ -53,20 +54,21 @@ std::uint64_t big_endian(std::string_view bytes) {
   return value;
 }
 
-/// Why the bytes are no PNG, or one that claims a size which they cannot have; empty: neither.
+/// Why the bytes are not a PNG, or why its stated size is impossible; empty: no problem.
 std::string problem_of(std::string_view bytes) {
   constexpr std::size_t kHeadBytes = 24;  // signature, then the IHDR chunk: length, name, width, height
   constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;
-  constexpr std::uint64_t kMaxPixelsPerByte = 8'300;  // deflate's 1032 times, of eight pixels of one bit each
+  constexpr std::uint64_t kMaxPixelsPerByte =
+      8'300;  // deflate's maximum ratio of 1032, with eight one-bit pixels per byte
   if (!bytes.starts_with("\x89PNG\r\n\x1a\n")) return "it is not a PNG image";
-  if (bytes.size() < kHeadBytes || bytes.substr(12, 4) != "IHDR") return "the header is damaged or cut off";
+  if (bytes.size() < kHeadBytes || bytes.substr(12, 4) != "IHDR") return "the header is damaged or truncated";
   const std::uint64_t width = big_endian(bytes.substr(16, 4)), height = big_endian(bytes.substr(20, 4));
   const std::uint64_t most = std::min(kMaxPixels, bytes.size() * kMaxPixelsPerByte);
   if (width > 0 && height > 0 && width <= most && height <= most / width) return "";
-  return fmt::format("{} x {} px in {} bytes: it is damaged", width, height, bytes.size());
+  return fmt::format("the file is damaged: {} x {} px in {} bytes", width, height, bytes.size());
 }
 
-/// Empty where it is damaged.
+/// Empty if it is damaged.
 cv::Mat decode(std::string_view bytes, int mode) {
   thread_local PngPixels png;
   const bool decoded = decode_png_pixels(std::as_bytes(std::span(bytes)), png);
@@ -91,7 +93,7 @@ PngImage to_png_image(cv::Mat image) {
   image.convertTo(image, CV_16U);
   std::vector<cv::Mat> channels;
   cv::split(image, channels);
-  std::reverse(channels.begin(), channels.end());  // blue is first
+  std::reverse(channels.begin(), channels.end());  // OpenCV stores blue first
   for (const cv::Mat& channel : channels) {
     result.channels.emplace_back(channel.cols, channel.rows);
     std::copy_n(channel.ptr<std::uint16_t>(), channel.total(), result.channels.back().data());
@@ -126,12 +128,13 @@ void write_png(const std::filesystem::path& path, const PerColour<Image<std::uin
 
 PngImage read_png(const std::filesystem::path& path) {
   InputFile file(path);
-  if (file.size() > kMaxFileBytes) file.fail(0, fmt::format("{} bytes are no image", file.size()));
+  if (file.size() > kMaxFileBytes)
+    file.fail(0, fmt::format("the file is too large for an image: {} bytes", file.size()));
   const auto content = file.read(kMaxFileBytes);
   const std::string_view bytes(reinterpret_cast<const char*>(content.data()), content.size());
   if (const std::string problem = problem_of(bytes); !problem.empty()) file.fail(0, problem);
   const cv::Mat image = decode(bytes, cv::IMREAD_UNCHANGED);
-  if (image.empty()) file.fail(0, "it cannot be decoded: cut off, or damaged");
+  if (image.empty()) file.fail(0, "it cannot be decoded: it is truncated or damaged");
   if (image.channels() != 1 && image.channels() != 3)
     file.fail(0, fmt::format("it has {} channels, not 1 or 3", image.channels()));
   return to_png_image(image);

@@ -9,8 +9,8 @@
 
 namespace esim {
 
-/// Poses of the body (T_world_body) in the TUM RGB-D benchmark's layout: one line `timestamp tx ty tz qx qy qz qw`
-/// each, seconds with nine decimals, m, Hamilton quaternion.
+/// Poses of the body (T_world_body) in the layout of the TUM RGB-D benchmark: one line `timestamp tx ty tz qx qy qz qw`
+/// per pose, seconds with nine decimals, m, Hamilton quaternion.
 class PosesTumWriter final : public Sink {
  public:
   explicit PosesTumWriter(std::filesystem::path path) : path_(std::move(path)) {}

@@ -18,7 +18,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-/// Up to the separator; the rest, without it, stays.
+/// Takes the text before the separator, and the separator, off the start of `text`.
 std::string_view take_until(std::string_view& text, char separator) {
   const std::size_t end = std::min(text.find(separator), text.size());
   const std::string_view part = text.substr(0, end);
@@ -94,7 +94,8 @@ Header read_header(InputFile& file) {
   return header;
 }
 
-// No date: the same recording is the same bytes. The plugin is the one that Prophesee's tools read such files with.
+// No date, so that the same recording gives the same bytes. The plugin is the one with which Prophesee's tools read
+// such files.
 std::string raw_header(std::string_view encoding, std::string_view version, SensorSize sensor) {
   const bool known = sensor.width > 0;
   return fmt::format("% camera_integrator_name esim\n% evt {}\n% format {}{}\n{}", version, encoding,

@@ -24,31 +24,30 @@ Format dat_format();
 
 }  // namespace esim
 
-/// What Prophesee's file formats have in common
-/// (https://docs.prophesee.ai/stable/data/file_formats/raw.html, .../dat.html).
+/// Common parts of Prophesee's file formats
 namespace esim::prophesee {
 
 static_assert(std::endian::native == std::endian::little, "words are copied between memory and files as they are");
 
-/// The text above the events: lines "% KEY VALUE". Read leniently: what is missing or senseless is empty or 0.
+/// The header: lines "% KEY VALUE". Missing or invalid values are empty or 0.
 struct Header {
-  std::string encoding{};    ///< in capitals, by the key "format" or "evt": EVT2, EVT21, EVT3
+  std::string encoding{};    ///< in capitals, from the key "format" or "evt": EVT2, EVT21, EVT3
   std::string endianness{};  ///< little, big or legacy
-  SensorSize sensor{};       ///< by the key "geometry", "format", or "width" and "height"
-  std::size_t bytes = 0;     ///< up to and with the end of its last line
-  bool ended = false;        ///< the last line says "end"; else it is the last one that begins with '%' and a space
+  SensorSize sensor{};       ///< from the key "geometry", "format", or "width" and "height"
+  std::size_t bytes = 0;     ///< up to and including the end of its last line
+  bool ended = false;  ///< the last line is "% end"; otherwise the header ends with the last line that starts with "% "
 };
 
-/// Of a file's first bytes.
+/// Parses the header in a file's first bytes.
 Header parse_header(std::string_view head);
 
-/// Reads it, and leaves the file where the events begin.
+/// Reads the header; the next byte is the first of the events.
 Header read_header(InputFile& file);
 
-/// As Prophesee's tools write it, with the version as in "3.0". Without lines for a sensor of unknown size.
+/// A header as in Prophesee's tools; version as in "3.0". Without lines for a sensor of unknown size.
 std::string raw_header(std::string_view encoding, std::string_view version, SensorSize sensor);
 
-/// The file's next words, at most so many; fails at what is left of one at the file's end, when there are no others.
+/// The next words of the file, at most so many; fails if only a part of a word is left.
 template <typename Word>
 std::span<const Word> read_words(InputFile& file, std::unique_ptr<Word[]>& words, std::size_t most) {
   const std::uint64_t start = file.offset();
@@ -61,7 +60,7 @@ std::span<const Word> read_words(InputFile& file, std::unique_ptr<Word[]>& words
   return {words.get(), count};
 }
 
-/// A file of words of one size.
+/// A reader of a file of equal-sized words.
 template <typename Word>
 class WordFile {
  public:
@@ -90,7 +89,7 @@ class WordFile {
   std::size_t count_ = 0;
 };
 
-/// Events as they are decoded, from which portions are made.
+/// A buffer of decoded events, from which portions are made.
 class Portion {
  public:
   explicit Portion(std::size_t capacity) : events_(std::make_unique<Event[]>(capacity)) {}
@@ -113,15 +112,15 @@ class Portion {
   std::size_t count_ = 0;
 };
 
-/// A clock of some bits, in us, whose high bits come in words of their own: it starts again from 0 when it is full.
+/// A clock of some bits, in us, which wraps to 0. Its high bits come in separate words.
 class WrappingClock {
  public:
-  /// A step back by more than `slack` is a new turn; a smaller one is none, and left to those who check the order.
+  /// A step back by more than `slack` is a wrap. Smaller steps back are not; the check of the order handles them.
   WrappingClock(int high_bits, int low_bits, std::int64_t slack)
       : turn_us_(std::int64_t{1} << (high_bits + low_bits)), low_bits_(low_bits), slack_(slack) {}
 
-  /// The time since the file's first turn began of a word with these high bits, us; nothing where that is beyond all
-  /// reason.
+  /// The time of a word with these high bits since the start of the file's first clock period, us; nothing if it is out
+  /// of range.
   std::optional<std::int64_t> advance(std::int64_t high) {
     if (high + slack_ < high_) turns_us_ += turn_us_;
     high_ = high;

@@ -10,14 +10,14 @@
 
 namespace esim {
 
-/// A recording's folder, as `esim simulate` writes it, or that of one of its cameras.
+/// The format of a recording's folder, as `esim simulate` writes it, or of the folder of one of its cameras.
 Format recording_format();
 
-/// Is it the folder of a camera, by the names of its files?
+/// Whether it is the folder of a camera, by the names of its files.
 bool is_camera_folder(const std::filesystem::path& folder);
 
-/// Writes any records as such a folder: the calibration where the intrinsics are known, then each file when the first
-/// record comes that belongs into it, and report.json at the end. Points of events come with the events themselves.
+/// Writes any records as such a folder: the calibration if the intrinsics are known, each file when its first record
+/// comes, and report.json at the end. Event points are written with the events.
 class RecordingWriter final : public Sink {
  public:
   RecordingWriter(std::filesystem::path folder, const WriteOptions& options)
@@ -28,7 +28,7 @@ class RecordingWriter final : public Sink {
   void end(bool complete) override;
 
  private:
-  /// The sink of that content, and of the record's camera.
+  /// The sink for the content and camera of a record.
   Sink& sink_of(Content content, const Record& record);
   std::unique_ptr<Sink> make_sink(Content content, const Record& record);
 
@@ -36,8 +36,9 @@ class RecordingWriter final : public Sink {
   WriteOptions options_;
   RecordingInfo info_;
   TimeNs end_ = 0;
-  std::map<std::pair<Content, int>, std::unique_ptr<Sink>> sinks_;                      // by camera; of none: -1
-  std::map<int, std::pair<std::optional<TimeNs>, std::optional<TimeNs>>> truth_times_;  // of each camera's last two
+  std::map<std::pair<Content, int>, std::unique_ptr<Sink>> sinks_;  // by camera; -1: no camera
+  std::map<int, std::pair<std::optional<TimeNs>, std::optional<TimeNs>>>
+      truth_times_;  // of the last two frames of each camera
 };
 
 }  // namespace esim

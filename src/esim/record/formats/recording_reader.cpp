@@ -62,7 +62,7 @@ bool is_recording(const fs::path& path) {
   return has_parts || (is_file(path / "report.json") && !has_conversion_report(path));
 }
 
-/// Frames per second: the shortest number that gives just these times, where there is one. 0: unknown.
+/// Frames per second: the shortest number that gives exactly these times, if there is one. 0: unknown.
 double rate_of(const TruthHdf5Reader& truth) {
   const std::uint64_t frames = truth.size();
   if (frames < 2 || truth.t(frames - 1) <= truth.t(0)) return 0;
@@ -78,7 +78,7 @@ double rate_of(const TruthHdf5Reader& truth) {
   return rate_hz;
 }
 
-/// Reads one folder: first what is known of the recording, then its streams.
+/// Reads one folder: first the description of the recording, then its streams.
 class Folder {
  public:
   Folder(const fs::path& path, const ReadOptions& options) : options_(options) {
@@ -88,7 +88,7 @@ class Folder {
       for (CameraInfo& camera : info_.cameras) folders_.push_back(root_ / camera.name);
       return;
     }
-    // A camera's folder alone. "DIR/cam0/" and "DIR/cam0" are the same.
+    // A camera's folder by itself. "DIR/cam0/" and "DIR/cam0" are the same.
     const fs::path folder = fs::absolute(path / ".").lexically_normal().parent_path();
     root_ = folder.parent_path();
     attempt([&] { read_rig(); });
@@ -119,7 +119,7 @@ class Folder {
   }
 
  private:
-  /// With `recover`, goes on where a part cannot be read.
+  /// With `recover`, continues if a part cannot be read.
   template <typename Part>
   void attempt(const Part& read) {
     try {
@@ -130,15 +130,16 @@ class Folder {
     }
   }
 
-  /// A recording without events is one. But nothing at all, or the beginning of an unfinished one, is none.
+  /// A recording without events is valid. An empty one, or the beginning of an unfinished one, is not.
   void require_something() const {
     const bool any = !body_.empty() || !events_.empty() || !frames_.empty() || !truth_.empty();
     if (any || (!info_.cameras.empty() && !unfinished_)) return;
     if (!unfinished_) throw UserError(fmt::format("{} holds no records", root_.string()));
     if (is_being_written(root_))
       throw UserError(fmt::format("{} is being written, and holds no records yet", root_.string()));
-    throw UserError(
-        fmt::format("{} holds no records: what wrote it was ended before the first; make it anew", root_.string()));
+    throw UserError(fmt::format(
+        "{} holds no records: the program that wrote it was stopped before the first record; create it again",
+        root_.string()));
   }
 
   bool is_there(const fs::path& path) const { return unfinished_ ? has_begun(path) : is_file(path); }
@@ -152,8 +153,8 @@ class Folder {
     for (CameraInfo& camera : info_.cameras) {
       if (camera.name.empty() || camera.name.find('/') != std::string::npos || camera.name == ".." ||
           !names.insert(camera.name).second)
-        throw UserError(fmt::format("cannot read {}: \"{}\" is no name of a camera's folder, or of two", root_.string(),
-                                    camera.name));
+        throw UserError(fmt::format("cannot read {}: the camera name \"{}\" must be unique and the name of a folder",
+                                    root_.string(), camera.name));
       if (!options_.sensor) continue;
       camera.model.width = options_.sensor->width, camera.model.height = options_.sensor->height;
     }
@@ -171,7 +172,7 @@ class Folder {
         const double start_s = report.at("start_s"), length_s = report.value("simulated_s", 0.0);
         constexpr double kMax_s = 4e9;
         if (!(std::abs(start_s) <= kMax_s) || !(length_s >= 0 && length_s <= kMax_s))
-          file.fail(0, "its times are none");
+          file.fail(0, "its times are invalid");
         start_ = to_ns(start_s);
         info_.end = *start_ + to_ns(length_s);
       }
@@ -182,16 +183,16 @@ class Folder {
         constexpr int kMaxExtent = 65536;
         if (std::min(camera.model.width, camera.model.height) < 0 ||
             std::max(camera.model.width, camera.model.height) > kMaxExtent)
-          file.fail(0, "the size of a camera is none");
+          file.fail(0, "the size of a camera is invalid");
         info_.cameras.push_back(std::move(camera));
       }
     } catch (const nlohmann::json::exception& error) {
       info_.cameras.clear();
-      file.fail(0, fmt::format("it is no report of a recording ({})", error.what()));
+      file.fail(0, fmt::format("it is not a report of a recording ({})", error.what()));
     }
   }
 
-  /// rig.yaml has the cameras in the body's frame; camchain.yaml, from the IMU's.
+  /// rig.yaml has the cameras in the body frame; camchain.yaml has them relative to the IMU.
   void read_calibrations(const fs::path& folder) {
     std::vector<CameraInfo> cameras;
     for (auto& [name, model, T_body_camera] : read_calibration(folder / "rig.yaml"))
@@ -221,7 +222,7 @@ class Folder {
     }
   }
 
-  /// The files of the moving objects, whose names become known; without names.txt, in the order of the files' names.
+  /// The files of the moving objects; sets their names. Without names.txt, they are in the order of the file names.
   std::vector<fs::path> read_objects(const fs::path& folder) {
     std::vector<fs::path> files;
     if (is_file(folder / "names.txt")) {
@@ -289,7 +290,7 @@ class Folder {
     if (model.width == 0) model.width = size.width, model.height = size.height;
   }
 
-  /// After "static" come the objects, then the layers.
+  /// The names are "static", then the objects, then the layers.
   void learn_names(const TruthHdf5Reader& truth) {
     const std::vector<std::string>& names = truth.names();
     const std::size_t objects = info_.objects.empty() ? truth.objects() : info_.objects.size();
@@ -302,11 +303,11 @@ class Folder {
   ReadOptions options_;
   fs::path root_;
   std::vector<fs::path> folders_;  // of the cameras
-  bool alone_ = false;             // one camera's, without what is the rig's
-  bool unfinished_ = false;        // by its report: killed, interrupted, or being written
+  bool alone_ = false;             // a camera's folder alone, without the rig's files
+  bool unfinished_ = false;        // by its report: killed, interrupted, or still being written
   RecordingInfo info_;
-  std::optional<TimeNs> start_;         // as the report has it
-  std::optional<TimeNs> events_start_;  // as the files of events have it
+  std::optional<TimeNs> start_;         // from the report
+  std::optional<TimeNs> events_start_;  // from the events files
   std::vector<std::unique_ptr<RecordStream>> body_, events_, frames_, truth_;
 };
 

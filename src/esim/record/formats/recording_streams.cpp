@@ -50,7 +50,7 @@ class PosesStream final : public RecordStream {
 
   static Kinematics motion(const CsvReader& line) {
     const Eigen::Quaterniond q(line.value(7), line.value(4), line.value(5), line.value(6));
-    if (!(std::abs(q.norm() - 1) < 1e-3)) line.fail("the quaternion is not of unit length");
+    if (!(std::abs(q.norm() - 1) < 1e-3)) line.fail("the quaternion must have unit norm");
     return {{q, line.vector(1)}, line.vector(8), line.vector(14), line.vector(11), line.vector(17)};
   }
 
@@ -94,7 +94,7 @@ class ImuStream final : public RecordStream {
   std::optional<Record> record_;
 };
 
-/// Portions are cut where other streams have their turn.
+/// Portions end where other streams have earlier records.
 class EventsStream final : public RecordStream {
  public:
   EventsStream(std::unique_ptr<Source> events, int camera) : events_(std::move(events)), camera_(camera) {}
@@ -139,13 +139,13 @@ class FramesStream final : public RecordStream {
         for (int x = 0; x < image_.width(); ++x) image_(x, y) = png.channels[colour_at(x, y)](x, y);
       }
     }
-    // Lists of four columns do not say when the first row began: as if the shutter were global.
+    // Lists of four columns lack the start of the first row: assume a global shutter.
     const TimeNs exposure = list_.integer(2);
     const bool full = list_.columns() > 4;
-    if (list_.columns() == 5) list_.fail("the line has 5 numbers, and needs 6");
+    if (list_.columns() == 5) list_.fail("the line has 5 numbers, but needs 6");
     const TimeNs start = full ? list_.integer(4) : list_.t() - exposure / 2;
     const std::int64_t bits = full ? list_.integer(5) : png.bits;
-    if (bits < 1 || bits > png.bits) list_.fail(fmt::format("{} bits are not those of the image", bits));
+    if (bits < 1 || bits > png.bits) list_.fail(fmt::format("{} bits do not match the image", bits));
     return &record_.emplace(
         FrameRecord{camera_, list_.t(), start, exposure, list_.value(3), image_, static_cast<int>(bits)});
   }
@@ -158,7 +158,7 @@ class FramesStream final : public RecordStream {
   std::optional<Record> record_;
 };
 
-/// A displacement follows the frame that it leads to.
+/// Optical flow follows the frame at its end.
 class TruthStream final : public RecordStream {
  public:
   TruthStream(std::shared_ptr<const TruthHdf5Reader> truth, int camera, ImagesStream* images)
@@ -181,9 +181,9 @@ class TruthStream final : public RecordStream {
     if (damage_) std::rethrow_exception(damage_);
     const TimeNs t = truth_->t(frame_);
     if (frame_ > 0 && t <= truth_->t(frame_ - 1)) {
-      throw UserError(
-          fmt::format("ground truth of camera {}: the time of frame {}, {} ns, does not come after the one before",
-                      camera_, frame_, t));
+      throw UserError(fmt::format(
+          "ground truth of camera {}: the time of frame {}, {} ns, must be later than that of the frame before it",
+          camera_, frame_, t));
     }
     const Image<float>& irradiance = images_ != nullptr ? images_->at(t) : kNoImage;
     try {
@@ -201,7 +201,7 @@ class TruthStream final : public RecordStream {
   }
 
  private:
-  /// Whether the next frame is of this time, and not known to be damaged.
+  /// Whether the next frame is at this time and not known to be damaged.
   bool shows(TimeNs t) const { return !damage_ && frame_ < truth_->size() && truth_->t(frame_) == t; }
 
   static inline const Image<float> kNoImage;
@@ -209,9 +209,9 @@ class TruthStream final : public RecordStream {
   std::shared_ptr<const TruthHdf5Reader> truth_;
   int camera_;
   ImagesStream* images_;
-  std::uint64_t frame_ = 0;        // that is read next
-  std::exception_ptr damage_;      // of that frame, whose image is still handed out
-  bool displacement_due_ = false;  // to the frame before it
+  std::uint64_t frame_ = 0;        // index of the next frame
+  std::exception_ptr damage_;      // damage of that frame, whose image is still handed out
+  bool displacement_due_ = false;  // optical flow to the previous frame is due
   TruthHdf5Reader::Frame images_of_frame_;
   TruthHdf5Reader::Displacement displacement_;
   std::optional<Record> record_;
@@ -241,7 +241,7 @@ const Record* ImagesStream::next(TimeNs) {
   impl_->t.reset();
   const PngImage png = read_png(impl_->files.file());
   if (png.channels.size() != 1)
-    throw UserError(fmt::format("cannot read {}: it is in colour, not grey", impl_->files.file().string()));
+    throw UserError(fmt::format("cannot read {}: it must be grey, not colour", impl_->files.file().string()));
   impl_->image = decode_srgb(png.channels.front(), png.bits);
   impl_->t = impl_->files.span().start;
   if (impl_->truth_shows && impl_->truth_shows(*impl_->t)) return nullptr;

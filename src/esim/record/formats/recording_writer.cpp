@@ -20,7 +20,7 @@
 namespace esim {
 namespace {
 
-/// The camera that a record is of; -1: of none.
+/// The camera of a record; -1: no camera.
 int camera_of(const Record& record) {
   const auto camera = [](const auto& kind) {
     if constexpr (requires { kind.camera; }) return kind.camera;
@@ -38,7 +38,7 @@ TimeNs time_of(const Record& record) {
   return std::visit(time, record);
 }
 
-/// Gives every camera a name that is fit for a folder and no other's.
+/// Gives every camera a unique name that is valid for a folder.
 void name_folders(std::vector<CameraInfo>& cameras) {
   std::set<std::string> taken = {"calibration", "objects"};
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -77,8 +77,8 @@ void RecordingWriter::write(const Record& record) {
     if (truth_times_[displacement->camera] !=
         std::pair(std::optional(displacement->t0), std::optional(displacement->t1)))
       throw OutputError("cannot write " + folder_.string() +
-                        ": displacements stand in recordings beside the frames of ground truth that they are between, "
-                        "and there are none; write them in the format flo, or kitti");
+                        ": recordings store optical flow with the ground-truth frames that it connects, but the input "
+                        "has no such frames; write the format flo or kitti instead");
   }
   const Content content = content_of(record);
   sink_of(content == Content::displacement ? Content::truth : content, record).write(record);

@@ -8,19 +8,19 @@
 #include <string>
 #include <vector>
 
-/// Files that hold many labelled sequences: the parts of a dataset.
+/// Files with many labelled sequences: the parts of a dataset.
 namespace esim {
 
 enum class NumberType { int8, uint8, uint16, uint32, int64, float32 };
 
-/// An array that belongs to a sequence, borrowed, rows one after the other.
+/// An array of a sequence, borrowed, in row-major order.
 struct ShardArray {
   std::string name{};  ///< "flow", or "events/t"
   NumberType type = NumberType::float32;
   std::vector<std::uint64_t> shape{};
   const void* numbers = nullptr;
-  bool ragged = false;  ///< of one dimension, in which sequences differ
-  std::string about{};  ///< unit and meaning, for people
+  bool ragged = false;  ///< one-dimensional, of a length that differs between sequences
+  std::string about{};  ///< unit and meaning, as text
 };
 
 template <typename T>
@@ -38,11 +38,11 @@ inline constexpr NumberType kNumberType<std::int64_t> = NumberType::int64;
 
 struct ShardSequence {
   std::uint32_t index = 0;
-  std::vector<ShardArray> arrays{};  ///< the same ones, in the same order and with the same shapes, in all of a file
+  std::vector<ShardArray> arrays{};  ///< the same names, order and shapes in all sequences of a file
   std::string info{};                ///< JSON
 };
 
-/// Writes one file. No byte of it depends on when or where it is written. Throws OutputError naming the file.
+/// Writes one file. Its bytes do not depend on when or where it is written. Throws OutputError that names the file.
 class ShardWriter {
  public:
   virtual ~ShardWriter() = default;
@@ -52,15 +52,15 @@ class ShardWriter {
   virtual void finish() = 0;
 };
 
-/// HDF5: `index` [S] and `info` (JSON, a line for each sequence), and for each array
-///   NAME         [S, ...]   one entry for each sequence; with Blosc's compression, one chunk
+/// HDF5: `index` [S] and `info` (JSON, one line per sequence), and for each array
+///   NAME         [S, ...]   one entry per sequence, which is one chunk with Blosc compression
 /// and for ragged ones
-///   NAME         [N]        of all sequences one after the other
-///   START        [S + 1]    those of sequence k are from START[k] to START[k + 1]; `events/start` for `events/t`
+///   NAME         [N]        all sequences concatenated
+///   START        [S + 1]    sequence k is [START[k], START[k + 1]); `events/start` for `events/t`
 std::unique_ptr<ShardWriter> make_hdf5_shard(const std::filesystem::path& file);
 
-/// A tar file for WebDataset and other readers of samples in sequence, without compression: for each sequence
-/// `00000042.NAME.npy` of each array, a slash in its name written as a dot, and `00000042.json`.
+/// An uncompressed tar file for WebDataset and other sequential readers: for each sequence, `00000042.NAME.npy` of each
+/// array, with dots for slashes in its name, and `00000042.json`.
 std::unique_ptr<ShardWriter> make_tar_shard(const std::filesystem::path& file);
 
 }  // namespace esim

@@ -26,10 +26,10 @@ hid_t file_type(NumberType type) {
     case NumberType::float32:
       return H5T_IEEE_F32LE;
   }
-  throw InternalError("a type of number that HDF5 files have not");
+  throw InternalError("this number type is not supported in HDF5 files");
 }
 
-/// Numbers of a growing series, written in whole chunks.
+/// A growing series of numbers, written in whole chunks.
 class Growing {
  public:
   Growing() = default;
@@ -135,7 +135,7 @@ class Hdf5Shard final : public ShardWriter {
     };
     if (array.type == NumberType::float32) return append(float{});
     if (array.type == NumberType::uint8) return append(std::uint8_t{});
-    throw InternalError(array.name + ": entries of shards are float32 or uint8");
+    throw InternalError(array.name + ": entries of shards must be float32 or uint8");
   }
 
   void add_ragged(const ShardArray& array) {
@@ -158,14 +158,14 @@ class Hdf5Shard final : public ShardWriter {
     of_group.series.append(std::span<const std::uint64_t>(&of_group.end, 1));
   }
 
-  /// Where the sequences of a group's arrays, which have the same length, begin.
+  /// The start indices of the sequences, for the arrays of a group, which have equal lengths.
   struct Start {
-    std::string counted{};  // the array whose length counts
+    std::string counted{};  // the array whose length is counted
     std::uint64_t end = 0;
     hdf5::Series series{};
   };
 
-  // The series close before the file.
+  // Declared last, so that the series close before the file.
   std::optional<hdf5::Output> file_;
   hdf5::Series index_;
   Growing info_;

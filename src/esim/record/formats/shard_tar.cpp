@@ -34,12 +34,12 @@ NumpyType numpy_type(NumberType type) {
     case NumberType::float32:
       return {"'<f4'", 4};
   }
-  throw InternalError("a type of number that NumPy's files have not");
+  throw InternalError("this number type is not supported in NumPy files");
 }
 
-/// The header of a file in an archive: ustar, of POSIX.1-1988, owned by nobody, of 1970.
+/// The header of a file in an archive: ustar, of POSIX.1-1988, without an owner, dated 1970.
 std::string tar_header(const std::string& name, std::size_t bytes) {
-  if (name.size() >= 100) throw InternalError(name + ": is too long a name for a tar file");
+  if (name.size() >= 100) throw InternalError(name + ": the name is too long for a tar file");
   std::string header(kBlock, '\0');
   const auto put = [&](std::size_t at, const std::string& text) { text.copy(header.data() + at, text.size()); };
   put(0, name);
@@ -48,7 +48,7 @@ std::string tar_header(const std::string& name, std::size_t bytes) {
   put(116, "0000000");
   put(124, fmt::format("{:011o}", bytes));
   put(136, "00000000000");
-  put(148, "        ");  // counts as blanks in the checksum
+  put(148, "        ");  // the checksum counts its own field as blanks
   put(156, "0");
   put(257, "ustar");
   put(263, "00");

@@ -24,7 +24,7 @@ void append(CsvFile& file, const Kinematics& motion) {
   file.append(motion.alpha_body);
 }
 
-/// A file name for an object that is none of `taken`, to which it is added.
+/// A file name for an object that is not in `taken`, to which it is added.
 std::string file_name(std::string name, std::set<std::string>& taken) {
   for (char& c : name) {
     const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');

@@ -69,7 +69,7 @@ bool lists_files(const std::filesystem::path& folder, std::string_view extension
   std::error_code error;
   if (!std::filesystem::is_regular_file(folder / kTimedFilesList, error)) return false;
   std::string head = read_head(folder / kTimedFilesList, 4096);
-  // Each whole line that is no comment names a file.
+  // Each complete line that is not a comment names a file.
   bool any = false;
   std::string_view rest = head;
   while (!rest.empty()) {

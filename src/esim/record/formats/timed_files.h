@@ -15,16 +15,16 @@ namespace esim {
 inline constexpr const char* kTimedFilesList = "timestamps.txt";
 
 /// Names the files of a folder, 000000.png and so on, and lists them in its timestamps.txt: lines `index t_s file`, or
-/// `index t_s until_s file` of what holds from one time to another; seconds with nine decimals.
+/// `index t_s until_s file` for data about a span of time; seconds with nine decimals.
 class TimedFilesWriter {
  public:
   /// Creates the folder. `extension`: ".png".
   TimedFilesWriter(const std::filesystem::path& folder, std::string extension, bool spans = false);
 
-  /// Where to write the next file; before its add().
+  /// The path of the next file; call before its add().
   std::filesystem::path next_path() const { return folder_ / next_name(); }
 
-  /// Lists the file that has been written.
+  /// Lists the file that was written.
   void add(TimeNs t) { add_line(t, std::nullopt); }
   void add(TimeSpan span) { add_line(span.start, span.end); }
   void close() { list_.close(); }
@@ -40,17 +40,17 @@ class TimedFilesWriter {
 };
 
 /// Reads such a list line by line, in order of time. Failures are UserErrors with the list and the byte at which the
-/// line begins.
+/// line starts.
 class TimedFilesReader {
  public:
   /// `unfinished`: as in CsvReader.
   explicit TimedFilesReader(const std::filesystem::path& folder, bool spans = false, bool unfinished = false)
       : folder_(folder), spans_(spans), unfinished_(unfinished), list_(folder / kTimedFilesList) {}
 
-  /// Goes to the next file; false where there is none left.
+  /// Goes to the next file; returns false at the end.
   bool next();
 
-  TimeSpan span() const { return span_; }  ///< without spans, both are its time
+  TimeSpan span() const { return span_; }  ///< without spans, start and end are its time
   const std::filesystem::path& file() const { return file_; }
 
  private:
@@ -64,7 +64,7 @@ class TimedFilesReader {
   std::filesystem::path file_;
 };
 
-/// Is there such a list, of files with this extension?
+/// Whether there is such a list, with files of this extension.
 bool lists_files(const std::filesystem::path& folder, std::string_view extension);
 
 }  // namespace esim

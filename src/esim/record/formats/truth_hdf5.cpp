@@ -40,7 +40,7 @@ struct TruthHdf5Writer::Impl {
   int width = 0, height = 0;
   std::vector<float> vector_frame;
 
-  // The series close before the file.
+  // Declared last, so that the series close before the file.
   std::optional<hdf5::Output> file;
   hdf5::Handle esim_complete;
   hdf5::Series t, pose, depth, flow, objects, object_poses, displacement, displacement_valid;
@@ -70,7 +70,7 @@ void TruthHdf5Writer::Impl::create(const RecordingInfo& recording) {
   }
   if (options.objects) {
     objects = hdf5::Series(*file, "objects", {H5T_STD_U16LE, {rows, columns}, 1, options.compression});
-    describe(objects, "index of names", "[frame, y, x]: which object is seen; 0: what stands still, or nothing");
+    describe(objects, "index of names", "[frame, y, x]: index of the object seen; 0: the static scene, or nothing");
     std::vector<std::string> names = {"static"};
     names.insert(names.end(), recording.objects.begin(), recording.objects.end());
     names.insert(names.end(), recording.layers.begin(), recording.layers.end());
@@ -86,13 +86,14 @@ void TruthHdf5Writer::Impl::create(const RecordingInfo& recording) {
 void TruthHdf5Writer::Impl::create_displacement() {
   const auto rows = static_cast<hsize_t>(height), columns = static_cast<hsize_t>(width);
   displacement = hdf5::Series(*file, "displacement", {H5T_IEEE_F32LE, {2, rows, columns}, 1, options.compression});
-  describe(displacement, "px",
-           "[frame k, component, y, x]: where the point seen in frame k is in frame k + 1, less where it is in frame "
-           "k; x to the right, then y downwards; NaN where there is no image of it");
+  describe(
+      displacement, "px",
+      "[frame k, component, y, x]: position in frame k + 1 of the point seen in frame k, minus its position in frame "
+      "k; x to the right, then y downwards; NaN where the point has no image in frame k + 1");
   displacement_valid =
       hdf5::Series(*file, "displacement_valid", {H5T_STD_U8LE, {rows, columns}, 1, options.compression});
   describe(displacement_valid, "1",
-           "[frame k, y, x]: 1 where frame k + 1 shows the point; 0 where something hides it, or outside the image");
+           "[frame k, y, x]: 1 where frame k + 1 shows the point; 0 where it is occluded or outside the image");
 }
 
 void TruthHdf5Writer::Impl::describe(const hdf5::Series& series, const char* unit, const char* convention) const {
@@ -116,7 +117,8 @@ void TruthHdf5Writer::Impl::append(const TruthRecord& truth) {
   }
   if (options.flow) append(flow, truth.flow_x, truth.flow_y);
   if (options.objects) {
-    if (truth.object == nullptr) throw InternalError(path.string() + ": a ground-truth frame does not say its objects");
+    if (truth.object == nullptr)
+      throw InternalError(path.string() + ": a ground-truth frame has no image of its objects");
     check_size(*truth.object);
     objects.append(truth.object->pixels());
     append_object_poses(truth.T_world_objects);
@@ -150,7 +152,7 @@ void TruthHdf5Writer::Impl::append(hdf5::Series& series, std::span<const SE3> po
   series.append(std::span<const double>(numbers));
 }
 
-/// How many there are, the first frame says.
+/// The first frame determines the number of objects.
 void TruthHdf5Writer::Impl::append_object_poses(std::span<const SE3> poses) {
   if (poses.empty()) return;
   if (object_poses.id() < 0) {

@@ -17,21 +17,21 @@ struct TruthHdf5Options {
   bool flow = true;
   Compression compression = Compression::blosc;
   bool objects = false;
-  bool displacement = false;  ///< else the dataset is there only if a displacement comes
+  bool displacement = false;  ///< false: the dataset is created with the first record of optical flow
 };
 
 /// Ground truth of one camera:
 ///
 ///   t                   int64 [N]              ns
 ///   T_world_camera      float64 [N, 7]         tx ty tz (m) qx qy qz qw
-///   depth               float32 [N, H, W]      m, planar; +inf where nothing is seen
+///   depth               float32 [N, H, W]      m, planar; +inf: no surface
 ///   flow                float32 [N, 2, H, W]   px/s, x to the right, then y downwards
-///   objects             uint16 [N, H, W]       index of its attribute `names`; 0: what stands still
-///   T_world_objects     float64 [N, K, 7]      of the K objects with a pose in the world, without [0]
-///   displacement        float32 [N-1, 2, H, W] px, from frame k to frame k + 1; NaN where there is no image
-///   displacement_valid  uint8 [N-1, H, W]      1: seen in frame k + 1 as well
+///   objects             uint16 [N, H, W]       index into the attribute `names`; 0: static scene
+///   T_world_objects     float64 [N, K, 7]      poses of the K moving objects in the world, without [0]
+///   displacement        float32 [N-1, 2, H, W] px, from frame k to frame k + 1; NaN: point has no image
+///   displacement_valid  uint8 [N-1, H, W]      1: visible in frame k + 1
 ///
-/// with units and conventions as attributes of each. One frame is one chunk, and is in the file as soon as write()
+/// Units and conventions are attributes of each dataset. One frame is one chunk, and is in the file when write()
 /// returns.
 class TruthHdf5Writer final : public Sink {
  public:
@@ -48,10 +48,10 @@ class TruthHdf5Writer final : public Sink {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Reads such files, frame by frame. Files that are something else, damaged or cut are a UserError that names the file.
+/// Reads such files, frame by frame. Other, damaged or truncated files are a UserError that names the file.
 class TruthHdf5Reader {
  public:
-  /// One frame; what the file does not hold is empty.
+  /// One frame; quantities that the file lacks are empty.
   struct Frame {
     SE3 T_world_camera;
     Image<float> depth, flow_x, flow_y;
@@ -67,12 +67,12 @@ class TruthHdf5Reader {
   ~TruthHdf5Reader();
 
   std::uint64_t size() const;           ///< number of frames
-  std::uint64_t displacements() const;  ///< from frame 0, 1, ... to the next one
-  SensorSize sensor() const;            ///< 0 x 0 where there are no images
+  std::uint64_t displacements() const;  ///< number of fields from a frame to the next
+  SensorSize sensor() const;            ///< 0 x 0 if there are no images
 
-  /// Of the numbers in Frame::object: "static", then those of objects, then those of layers.
+  /// Names for the numbers in Frame::object: "static", then objects, then layers.
   const std::vector<std::string>& names() const;
-  std::size_t objects() const;  ///< with a pose
+  std::size_t objects() const;  ///< number of objects with a pose
 
   TimeNs t(std::uint64_t frame) const;
   void read(std::uint64_t frame, Frame& out) const;

@@ -14,7 +14,7 @@ constexpr std::size_t kPoseNumbers = 7;
 SE3 pose_of(const hdf5::Input& file, const double* numbers) {
   const SE3 pose{Eigen::Quaterniond(numbers[6], numbers[3], numbers[4], numbers[5]), Eigen::Vector3d(numbers)};
   if (!(std::abs(pose.rotation.norm() - 1) < 1e-3) || !pose.translation.allFinite())
-    file.fail("it holds a pose that is none");
+    file.fail("it holds an invalid pose");
   return pose;
 }
 
@@ -25,7 +25,7 @@ struct TruthHdf5Reader::Impl {
 
   void open();
 
-  /// A dataset that need not be there, of images of the file's size, `planes` in each frame.
+  /// An optional dataset of images of the common size, `planes` per frame.
   std::optional<hdf5::Column> open_images(const char* name, std::size_t planes);
   std::optional<hdf5::Column> open_poses(const char* name, std::size_t item_rank) const;
 
@@ -53,7 +53,7 @@ void TruthHdf5Reader::Impl::open() {
   displacement_valid = open_images("displacement_valid", 1);
   if (objects) names = file.text_list_attribute(*objects, "names");
 
-  // A killed writer may leave datasets of different lengths: what all of them have is good.
+  // A killed writer may leave datasets of different lengths: their common part is valid.
   size = t.size;
   for (const auto* column : {&pose, &depth, &flow, &objects, &object_poses}) {
     if (*column) size = std::min<std::uint64_t>(size, (*column)->size);
@@ -61,7 +61,7 @@ void TruthHdf5Reader::Impl::open() {
   const bool whole = file.integer_attribute("esim_complete").value_or(1) != 0;
   if (whole && size != t.size) file.fail("its datasets differ in length");
   if (displacement.has_value() != displacement_valid.has_value())
-    file.fail("displacement and displacement_valid belong together, and one is missing");
+    file.fail("it must hold both displacement and displacement_valid, or neither");
   if (displacement && size > 0)
     displacements = std::min<std::uint64_t>({displacement->size, displacement_valid->size, size - 1});
 }
@@ -119,7 +119,7 @@ std::size_t TruthHdf5Reader::objects() const {
 }
 
 TimeNs TruthHdf5Reader::t(std::uint64_t frame) const {
-  std::array<TimeNs, 2> times{};  // of the frame before, and of it
+  std::array<TimeNs, 2> times{};  // times of the previous frame and of this one
   const std::uint64_t first = frame > 0 ? frame - 1 : 0, count = frame - first + 1;
   impl_->file.read(impl_->t, first, std::span(times).first(count));
   const std::optional<TimeNs> before = count == 2 ? std::optional(times[0]) : std::nullopt;

@@ -21,7 +21,7 @@ constexpr std::int64_t kLatestUs = std::numeric_limits<std::uint32_t>::max();
 class V2eReader final : public EventBlocksReader {
  public:
   explicit V2eReader(const std::filesystem::path& path) : file_(path), events_(file_.open_items(kEvents, 1)) {
-    if (events_.item_numbers() != 4) file_.fail("the rows of events are not t, x, y, p");
+    if (events_.item_numbers() != 4) file_.fail("the rows of events must be t, x, y, p");
   }
 
  private:
@@ -35,7 +35,7 @@ class V2eReader final : public EventBlocksReader {
       if (row[0] < 0 || row[0] > kLatestUs || row[1] < 0 || row[1] >= kLargestExtent || row[2] < 0 ||
           row[2] >= kLargestExtent) {
         file_.fail("event " + std::to_string(first + i) + " at " + std::to_string(row[0]) + " us and (" +
-                   std::to_string(row[1]) + ", " + std::to_string(row[2]) + ") is none");
+                   std::to_string(row[1]) + ", " + std::to_string(row[2]) + ") is out of range");
       }
       events.push_back({row[0] * kNsPerUs, static_cast<std::uint16_t>(row[1]), static_cast<std::uint16_t>(row[2]),
                         static_cast<std::int8_t>(row[3] == 1 ? 1 : -1)});
@@ -67,7 +67,7 @@ class V2eWriter final : public Sink {
     if (events == nullptr || events->camera != 0) return;
     for (const Event& event : events->events) {
       if (event.t < 0 || event.t / kNsPerUs > kLatestUs) {
-        throw RemediableError(path_.string() + ": v2e's times are from 0 to 71 minutes, so that an event at " +
+        throw RemediableError(path_.string() + ": v2e holds times from 0 to 71 minutes, so an event at " +
                                   std::to_string(event.t / kNsPerSecond) + " s does not fit: choose another format",
                               Remedy::times_from_zero);
       }
@@ -100,7 +100,7 @@ class V2eWriter final : public Sink {
   Compression compression_;
   std::vector<std::uint32_t> rows_;  // not written yet
   std::optional<hdf5::Output> file_;
-  hdf5::Series series_;  // closes before the file
+  hdf5::Series series_;  // declared last, closes before the file
 };
 
 bool is_v2e(const std::filesystem::path& path, std::string_view head) {
@@ -117,7 +117,7 @@ bool is_v2e(const std::filesystem::path& path, std::string_view head) {
 Format v2e_format() {
   return {
       .name = "v2e",
-      .description = "HDF5 as v2e writes it",
+      .description = "HDF5 in the layout of v2e",
       .holds = {Content::events},
       .resolution = kNsPerUs,
       .recognises = is_v2e,

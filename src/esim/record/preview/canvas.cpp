@@ -11,7 +11,7 @@
 namespace esim {
 namespace {
 
-// Text is drawn this much larger, then reduced: smooth at any size.
+// Text is drawn larger by this factor, then reduced, so that it is smooth at any size.
 constexpr int kOversampling = 4;
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
 constexpr double kCapitalHeight = 21.0;  // px, of the font at scale 1
@@ -26,7 +26,7 @@ cv::Mat view(const Image<Rgb>& image) {
   return {image.height(), image.width(), CV_8UC3, const_cast<Rgb*>(image.data())};
 }
 
-// OpenCV takes places in fractions of a pixel as whole numbers.
+// OpenCV takes subpixel positions as fixed-point integers.
 constexpr int kFractionBits = 4;
 cv::Point fixed_point(const Spot& spot) {
   const auto fixed = [](double v) {
@@ -40,7 +40,7 @@ constexpr int kTextBorder = 2;
 int above_baseline(int height) { return height + height / 2; }
 
 struct DrawnText {
-  cv::Mat coverage;  // of each pixel, with room for what hangs below the baseline and for the stroke
+  cv::Mat coverage;  // coverage of each pixel, with a margin for descenders and the stroke
   int width = 0;
 };
 
@@ -57,7 +57,7 @@ DrawnText draw_text(const std::string& line, int height) {
   return {std::move(coverage), width};
 }
 
-/// Most lines stand in picture after picture of a video: what has been drawn lately is kept, for each thread.
+/// Most lines of text are the same in many frames of a video, so each thread caches recent ones.
 const DrawnText& drawn_text(std::string_view line, int height) {
   constexpr std::size_t kMost = 512;
   thread_local std::map<std::pair<std::string, int>, DrawnText> drawn;
@@ -68,10 +68,11 @@ const DrawnText& drawn_text(std::string_view line, int height) {
   return drawn.emplace(key, draw_text(key.first, height)).first->second;
 }
 
-/// Where a pixel of an enlarged picture lies along one side of the original: within one pixel, or partly in the next.
+/// The position of a pixel of an enlarged image along one side of the original: within one pixel, or partly in the
+/// next.
 struct Source {
   int first = 0, second = 0;
-  std::uint16_t of_second = 0;  // weight of the second, out of kWhole
+  std::uint16_t of_second = 0;  // weight of the second pixel, out of kWhole
 };
 constexpr std::uint16_t kWhole = 256;
 
@@ -198,7 +199,7 @@ Image<Rgb> enlarge(const Image<Rgb>& image, int width, int height) {
     return out;
   }
   const std::vector<Source> columns = sources(image.width(), width), rows = sources(image.height(), height);
-  Image<Rgb> above(width, 1), below(width, 1);  // the two rows of the original, enlarged in one direction
+  Image<Rgb> above(width, 1), below(width, 1);  // two rows of the original, enlarged horizontally
   int in_above = -1, in_below = -1;
   for (int y = 0; y < height; ++y) {
     const auto& [first, second, of_second] = rows[static_cast<std::size_t>(y)];

@@ -12,12 +12,12 @@ namespace esim {
 
 enum class Align { left, centre, right };
 
-/// A place on a canvas, px.
+/// A position on a canvas, px.
 struct Spot {
   double x = 0, y = 0;
 };
 
-/// Colour pixels to draw figures on. What lies outside is cut off.
+/// A colour image to draw figures on, with clipping.
 class Canvas {
  public:
   Canvas(int width, int height, Rgb background) : pixels_(width, height, background) {}
@@ -30,30 +30,31 @@ class Canvas {
   void fill(const Tile& area, Rgb colour);
   void outline(const Tile& area, Rgb colour);
 
-  /// A line through points (columns and rows, pixel centres at whole numbers), smooth at its edges.
+  /// An antialiased line through points (columns and rows; pixel centres are integers).
   void polyline(std::span<const Spot> points, double width, Rgb colour);
   void disc(Spot centre, double radius, Rgb colour);
 
   /// One line of ASCII text; capitals are `height` px tall and stand on `baseline`. Returns its width.
   int text(int x, int baseline, std::string_view line, int height, Rgb colour, Align align = Align::left);
 
-  /// Width that text() would take.
+  /// The width of the same line drawn by text().
   static int text_width(std::string_view line, int height);
 
  private:
   Image<Rgb> pixels_;
 };
 
-/// Mean over the source pixels that each target pixel covers; for targets that are not larger.
+/// Mean over the source pixels that each target pixel covers; the target must not be larger than the source.
 Image<float> reduce_mean(const Image<float>& image, int width, int height);
 
-/// The source pixel nearest to each target pixel's centre; mixes nothing, so that edges and infinities stay.
+/// The source pixel nearest to the centre of each target pixel; without interpolation, so that edges and infinities
+/// remain.
 Image<float> reduce_nearest(const Image<float>& image, int width, int height);
 
-/// The bytes of an 8-bit colour PNG file.
+/// Encodes an 8-bit colour PNG file.
 std::string encode_png(const Image<Rgb>& image);
 
-/// Larger by repeating pixels; by factors that are not whole, with the borders between pixels blended.
+/// Enlarges by repeating pixels; with fractional factors, borders between pixels are blended.
 Image<Rgb> enlarge(const Image<Rgb>& image, int width, int height);
 
 }  // namespace esim

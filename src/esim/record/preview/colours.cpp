@@ -32,10 +32,11 @@ std::array<Rgb, 256> viridis() {
   return map;
 }
 
-// The hues of the flow wheel: six arcs of a linear change in one component, as long as the eye tells steps apart.
+// The hues of the flow colour wheel: six arcs, in each of which one component changes linearly, with as many steps as
+// are distinguishable.
 std::vector<std::array<float, 3>> flow_wheel() {
   struct Arc {
-    int steps, component;  // which changes
+    int steps, component;  // the component that changes
     bool rises;
     std::array<float, 3> start;
   };
@@ -68,7 +69,7 @@ class FlowColours {
     return colour;
   }
 
-  /// Of `count` pixels, a few at a time: all but the last step becomes SIMD code.
+  /// Colours `count` pixels, in groups that compile to SIMD code.
   void row(const float* x, const float* y, std::size_t count, Rgb* out) const {
     constexpr std::size_t kTogether = 64;
     std::array<float, kTogether> hue, strength, white;
@@ -79,7 +80,7 @@ class FlowColours {
       for (std::size_t i = 0; i < n; ++i) {
         const float vx = x[first + i], vy = y[first + i], radius = per_scale * std::sqrt(vx * vx + vy * vy);
         const bool known = radius <= std::numeric_limits<float>::max();
-        // Pure on the rim, white in the middle, darker beyond.
+        // Pure colour on the rim, white in the middle, darker outside.
         hue[i] = known ? turn(vx, vy) * (0.5f * kHues) + 0.5f * (kHues + 1) : 0.0f;
         strength[i] = radius <= 1.0f ? radius : (known ? 0.75f : 0.0f);
         white[i] = radius <= 1.0f ? 255.5f - 255.0f * radius : 0.5f;
@@ -108,7 +109,7 @@ class FlowColours {
     return y > 0 ? -half_turn : half_turn;
   }
 
-  /// The wheel's from one end to the other.
+  /// The colours of the wheel from one end to the other.
   static const Hues& hues() {
     static const Hues kTable = [] {
       const std::vector<std::array<float, 3>> wheel = flow_wheel();
@@ -144,7 +145,7 @@ class DepthColours {
   float log_near_, levels_per_log_;
 };
 
-/// What `colour` makes of the grey of each irradiance, sRGB-encoded.
+/// Applies `colour` to the sRGB-encoded grey of each irradiance.
 template <typename Colour>
 Image<Rgb> coloured_levels(const Image<float>& irradiance, const Colour& colour) {
   std::array<Rgb, 256> colours;
@@ -170,7 +171,7 @@ Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, Image<
   for (std::size_t i = 0; i < background.size(); ++i) {
     const float count = on.pixels()[i] + off.pixels()[i];
     if (!(count > 0.0f)) continue;
-    // One event is seen well; each doubling adds the same, up to the saturating number.
+    // One event is clearly visible; each doubling adds the same amount, up to the saturating number.
     const float strength = std::log2(1.0f + count) / std::log2(1.0f + kSaturatingEvents);
     const float opacity = std::min({1.0f, 0.35f + 0.65f * strength, 0.6f * count});
     const Rgb hue = mix(kOffColour, kOnColour, on.pixels()[i] / count);

@@ -11,7 +11,7 @@ struct Rgb {
   bool operator==(const Rgb&) const = default;
 };
 
-/// `amount` (0 to 1) of the way from one colour to another.
+/// Blends two colours: `amount` (0 to 1) of the second.
 inline Rgb mix(Rgb from, Rgb to, float amount) {
   const auto blend = [amount](std::uint8_t a, std::uint8_t b) {
     const float value = static_cast<float>(a) + amount * static_cast<float>(b - a);
@@ -20,33 +20,33 @@ inline Rgb mix(Rgb from, Rgb to, float amount) {
   return {blend(from.r, to.r), blend(from.g, to.g), blend(from.b, to.b)};
 }
 
-// Orange and blue are told apart with any kind of colour vision.
+// Orange and blue are distinguishable with any kind of colour vision.
 inline constexpr Rgb kOnColour{255, 152, 20};
 inline constexpr Rgb kOffColour{40, 140, 255};
 
-/// Where nothing is seen; not a colour of the depth map.
+/// The colour of pixels without depth; not a colour of the depth map.
 inline constexpr Rgb kNoDepthColour{196, 196, 196};
 
-/// Events counted per pixel over a picture: hue by the share of ON, opacity by the number, full from 8 events on.
-/// Counts may be fractions, as resampled ones are. All images have the same size.
+/// Event counts over an image: hue by the fraction of ON events, opacity by the number, full at 8 events. Counts may be
+/// fractions, for example after resampling. All images have the same size.
 Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, Image<Rgb> background);
 
-/// The same over the dimmed image; irradiance is linear.
+/// The same over the dimmed image of a linear irradiance.
 Image<Rgb> render_events(const Image<float>& on, const Image<float>& off, const Image<float>& irradiance);
 
-/// So dark that events are seen well above it.
+/// Dims an image, so that events stand out.
 Image<Rgb> dimmed(Image<Rgb> image);
 
-/// Irradiance in grey, sRGB-encoded.
+/// Irradiance as sRGB-encoded grey.
 Image<Rgb> grey(const Image<float>& irradiance);
 
-/// Image velocity in the colour code of Baker et al., "A Database and Evaluation Methodology for Optical Flow", IJCV
+/// The motion field in the colour code of Baker et al., "A Database and Evaluation Methodology for Optical Flow", IJCV
 /// 2011: hue by direction, white at rest, saturated at `full_scale_px_per_s`, darker beyond it.
 Image<Rgb> colour_flow(const Image<float>& flow_x, const Image<float>& flow_y, float full_scale_px_per_s);
 Rgb colour_flow(float x, float y, float full_scale);
 
-/// Depth in the map viridis, on a logarithmic scale from near_m (yellow) to far_m (violet), clamped; kNoDepthColour
-/// where there is none (infinite, NaN or not positive). 0 < near_m < far_m.
+/// Depth in the colour map viridis, on a logarithmic scale from near_m (yellow) to far_m (violet), clamped;
+/// kNoDepthColour for invalid depth (infinite, NaN or not positive). 0 < near_m < far_m.
 Image<Rgb> colour_depth(const Image<float>& depth_m, float near_m, float far_m);
 Rgb colour_depth(float depth_m, float near_m, float far_m);
 

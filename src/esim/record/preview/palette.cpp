@@ -13,7 +13,7 @@ std::size_t cell_of(Rgb colour) {
          static_cast<std::size_t>(colour.b) >> 3;
 }
 
-// The pixels of a cell: how many, and the sums of their components.
+// The pixels of a cell: their number, and the sums of their components.
 struct Cell {
   std::size_t index = 0;
   std::uint64_t count = 0;

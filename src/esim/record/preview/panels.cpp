@@ -43,7 +43,7 @@ std::string duration(TimeNs ns) {
   return ns < kNsPerSecond ? fmt::format("{:.3g} ms", 1e3 * to_seconds(ns)) : fmt::format("{:.3g} s", to_seconds(ns));
 }
 
-// Colours at the camera's resolution or, for large cameras, at that of the panel.
+// Colours at the resolution of the camera or, for large cameras, of the panel.
 class Panels {
  public:
   Panels(const PreviewLayout& layout, const PreviewFrame& frame) : layout_(layout), frame_(frame) {
@@ -122,7 +122,7 @@ void draw_depth_legend(Canvas& canvas, const PreviewLayout& layout, const Previe
   draw_swatch(canvas, x + bar + 24, y, kNoDepthColour, "no surface");
   if (frame.near_m <= 0) return;
 
-  // Logarithmic, as the colours are: the number in the middle is the geometric mean.
+  // Logarithmic, like the colours: the number in the middle is the geometric mean.
   const float ratio = frame.far_m / frame.near_m;
   const auto depth_at = [&](float position) { return frame.near_m * std::pow(ratio, position); };
   for (int i = 0; i < bar; ++i) {
@@ -161,7 +161,7 @@ void draw_flow_legend(Canvas& canvas, const PreviewLayout& layout, const Preview
   canvas.text(text_x, y + 50, "hue: direction of motion", kSmallTextHeight, kFaintInk);
 }
 
-/// What does not change from frame to frame.
+/// The parts that do not change from frame to frame.
 Image<Rgb> draw_backdrop(const PreviewLayout& layout, const PreviewFrame& frame) {
   Canvas canvas(layout.width, layout.height, kPaper);
   const int right = layout.panel_x(layout.panels - 1) + layout.column_width;

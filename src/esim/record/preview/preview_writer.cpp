@@ -21,7 +21,7 @@ constexpr double kMostFrames_hz = 60.0;
 constexpr double kLeastFrames_hz = 4.0;
 constexpr std::size_t kMostCandidates = 12;
 
-/// Frames that may become preview.png: every stride-th, the stride doubling so that there are never many.
+/// Candidates for preview.png: every stride-th frame; the stride doubles, so that their number stays small.
 class Candidates {
  public:
   bool wants_next() const { return seen_ % stride_ == 0; }
@@ -35,7 +35,7 @@ class Candidates {
     std::erase_if(kept_, [this](const Candidate& candidate) { return candidate.frame % stride_ != 0; });
   }
 
-  /// The one with the median number of events among the second half; nothing if there was no frame.
+  /// The candidate with the median number of events in the second half; nothing if there was no frame.
   const Image<Rgb>* best() const {
     std::vector<const Candidate*> later;
     for (const Candidate& candidate : kept_) {
@@ -93,7 +93,7 @@ struct PreviewWriter::Impl {
   std::optional<PreviewPage> page;
   std::optional<VideoFile> video;
 
-  // Since the previous frame.
+  // Events since the previous frame.
   Image<float> on, off;
   std::uint64_t events = 0;
   std::optional<TimeNs> previous;

@@ -7,10 +7,10 @@
 
 namespace esim {
 
-/// preview.mp4, a video of what one camera's events look like beside its ground truth or the video it saw, and
-/// preview.png, one frame of it: that with the median number of events among those of the second half. A frame for each
-/// frame of ground truth or of the video, played at real time or, if that were too short or too fast to watch, slower
-/// as its caption tells.
+/// Writes preview.mp4, a video of one camera's events next to its ground truth or its input video, and preview.png, one
+/// frame of it: the one with the median number of events in the second half. The video has one frame per frame of
+/// ground truth or input video and plays in real time or, if that were too short or too fast to watch, slower, as its
+/// caption states.
 class PreviewWriter final : public Sink {
  public:
   /// Both files go into `folder`, which must exist.
@@ -26,14 +26,14 @@ class PreviewWriter final : public Sink {
   std::unique_ptr<Impl> impl_;
 };
 
-/// How fast a recording is shown.
+/// The playback speed of a recording.
 struct Playback {
   double frames_per_s = 25;
   int slowdown = 1;  ///< 1, 2 or 5 times a power of ten
 };
 
-/// Real time, unless the recording is shorter than 2 s or has more than 60 frames/s; never fewer than 4 frames/s
-/// through slowing down.
+/// Real time, unless the recording is shorter than 2 s or has more than 60 frames/s; slowed down to no fewer than 4
+/// frames/s.
 Playback choose_playback(double duration_s, double truth_rate_hz);
 
 }  // namespace esim

@@ -9,7 +9,7 @@ namespace esim {
 namespace {
 
 constexpr std::size_t kSamples = 20'000;
-constexpr float kLeastRatio = 1.5f;  // of far to near
+constexpr float kLeastRatio = 1.5f;  // minimum ratio of far to near
 
 float quantile(std::vector<float>& values, double q) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
@@ -17,7 +17,7 @@ float quantile(std::vector<float>& values, double q) {
   return *at;
 }
 
-// Down or up to two significant digits, so that the legend's numbers are short.
+// Rounds down or up to two significant digits, so that the legend has short numbers.
 float two_digits(float value, bool up) {
   const double unit = std::pow(10.0, std::floor(std::log10(static_cast<double>(value))) - 1.0);
   const double steps = static_cast<double>(value) / unit;

@@ -4,8 +4,7 @@
 
 namespace esim {
 
-/// The range of depths that the preview's colours span. Stable over time: it only ever grows, in steps that make room
-/// for more.
+/// The depth range of the preview colours. It only grows, in steps with a margin, so that it is stable over time.
 class DepthScale {
  public:
   void include(const Image<float>& depth_m);
@@ -17,7 +16,7 @@ class DepthScale {
   float near_m_ = 0, far_m_ = 0;
 };
 
-/// The speed of the preview's most saturated colours: a round number, and never less than before.
+/// The speed with the most saturated colour in the preview: a round number that never decreases.
 class FlowScale {
  public:
   void include(const Image<float>& flow_x, const Image<float>& flow_y);

@@ -48,7 +48,7 @@ struct VideoFile::Impl {
   AVStream* stream = nullptr;  // belongs to format
   std::int64_t frames = 0;
 
-  /// Passes a result on unless it is an error.
+  /// Returns a result, or throws if it is an error.
   int check(int result) const {
     if (result < 0) throw_cannot_write(path, reason_of(result));
     return result;
@@ -72,10 +72,10 @@ void VideoFile::Impl::open_encoder(VideoKind kind, int width, int height, double
   encoder->height = height;
   encoder->pix_fmt = gif ? AV_PIX_FMT_PAL8 : AV_PIX_FMT_YUV420P;
   encoder->time_base = av_inv_q(av_d2q(frames_per_s, 100000));
-  encoder->thread_count = 1;  // the same file on every machine, and processors left for the simulation
+  encoder->thread_count = 1;  // gives the same file on every machine, and leaves processors for the simulation
   encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
   if (!gif) {
-    // Slower presets halve the file at best, and take three times as long for it: longer than everything else.
+    // Slower presets at best halve the file, but take three times as long, which would dominate the run time.
     av_opt_set(encoder->priv_data, "preset", "ultrafast", 0);
     av_opt_set(encoder->priv_data, "crf", compact ? "23" : "20", 0);
   }
@@ -133,9 +133,9 @@ void VideoFile::Impl::encode(const AVFrame* image) {
 
 VideoFile::VideoFile(std::filesystem::path path, int width, int height, double frames_per_s, VideoKind kind)
     : impl_(std::make_unique<Impl>()) {
-  av_log_set_level(AV_LOG_QUIET);  // what fails becomes an exception
+  av_log_set_level(AV_LOG_QUIET);  // failures become exceptions
   impl_->path = std::move(path);
-  OutputFile(impl_->path).close();  // says why, if the file cannot be created
+  OutputFile(impl_->path).close();  // throws with the reason if the file cannot be created
   impl_->open_encoder(kind, width, height, frames_per_s);
   impl_->open_file(kind);
 }

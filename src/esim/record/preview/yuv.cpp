@@ -5,7 +5,7 @@
 namespace esim {
 namespace {
 
-// Weights of red, green and blue in 1/65536, which sum up to 219/255 for luma and to nothing for chroma.
+// Weights of red, green and blue in 1/65536; their sum is 219/255 for luma and zero for chroma.
 constexpr int kBits = 16;
 constexpr int kHalf = 1 << (kBits - 1);
 
@@ -13,12 +13,13 @@ std::uint8_t luma(int red, int green, int blue) {
   return static_cast<std::uint8_t>((16829 * red + 33039 * green + 6416 * blue + (16 << kBits) + kHalf) >> kBits);
 }
 
-/// `sum`: of four pixels.
+/// `sum` is the sum of four pixels.
 std::uint8_t chroma(int sum) {
   return static_cast<std::uint8_t>((sum + (128 << (kBits + 2)) + 4 * kHalf) >> (kBits + 2));
 }
 
-/// A row of a picture, colour by colour: loops over these become SIMD code, unlike those over pixels of three bytes.
+/// A row of an image, stored by colour component: loops over these compile to SIMD code, unlike loops over pixels of
+/// three bytes.
 class ColourRow {
  public:
   explicit ColourRow(int width) : width_(static_cast<std::size_t>(width)), bytes_(3 * width_) {}

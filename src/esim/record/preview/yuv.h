@@ -8,14 +8,14 @@
 
 namespace esim {
 
-/// A plane of bytes that somebody else owns; `stride` is from one row to the next.
+/// A borrowed plane of bytes; `stride` is the distance between rows.
 struct BytePlane {
   std::uint8_t* data = nullptr;
   std::ptrdiff_t stride = 0;
 };
 
-/// What video encoders take: luma (16 to 235), and chroma (16 to 240, 128 is grey) as the mean of two by two pixels, by
-/// ITU-R BT.601. Width and height are even.
+/// Converts to the input of video encoders: luma (16 to 235), and chroma (16 to 240, 128 is grey) as the mean of 2 x 2
+/// pixels, by ITU-R BT.601. Width and height are even.
 void to_yuv420(const Image<Rgb>& image, BytePlane y, BytePlane u, BytePlane v);
 
 }  // namespace esim

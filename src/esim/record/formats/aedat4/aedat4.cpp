@@ -28,7 +28,7 @@ Format format(aedat4::Packing packing) {
 bool is_packed_with_zstd(const std::filesystem::path& path) {
   try {
     return aedat4::PacketReader(path).packing() >= aedat4::Packing::zstd;
-  } catch (const UserError&) {  // for the other format to tell
+  } catch (const UserError&) {  // the other format reports the problem
     return false;
   }
 }
@@ -46,7 +46,7 @@ Format aedat4_format() {
 Format aedat4_zstd_format() {
   Format result = format(aedat4::Packing::zstd);
   result.name = "aedat4-zstd";
-  result.description = "AEDAT 4.0, packed with Zstd";
+  result.description = "AEDAT 4.0, compressed with Zstd";
   result.recognises = [](const std::filesystem::path& path, std::string_view head) {
     return aedat4::is_aedat4(head) && is_packed_with_zstd(path);
   };

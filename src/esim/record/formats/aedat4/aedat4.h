@@ -4,15 +4,15 @@
 
 namespace esim {
 
-/// AEDAT 4.0, the format of iniVation's DV, dv-processing and their cameras: events, frames and the IMU. Any packing is
-/// read (LZ4, Zstd, none), also from files that end early or lack the table of packets; what else is in them
-/// (triggers, the results of trackers) is passed over. Written are, for each camera, a stream of events and one of
-/// frames, and one stream of the IMU. Times are in us.
+/// AEDAT 4.0, the format of iniVation's DV, dv-processing and their cameras: events, frames and the IMU. Reads any
+/// compression (LZ4, Zstd, none), also files that are truncated or lack the table of packets; other contents (triggers,
+/// results of trackers) are skipped. Writes a stream of events and one of frames for each camera, and one stream of the
+/// IMU. Times are in us.
 ///
-/// Frames are grey: colours are turned into grey when they are read, and numbers of more than 8 bits are stored as 16.
+/// Frames are grey: colour is converted to grey on reading, and numbers of more than 8 bits are stored with 16.
 Format aedat4_format();
 
-/// Likewise, but what it writes is packed with Zstd: smaller, slower.
+/// The same, but writes with Zstd compression: smaller, slower.
 Format aedat4_zstd_format();
 
 }  // namespace esim

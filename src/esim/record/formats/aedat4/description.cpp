@@ -41,7 +41,7 @@ std::string unescaped(std::string_view text) {
   return result;
 }
 
-/// The value of an attribute `name="value"` of a tag.
+/// The value of the attribute `name="value"` in a tag.
 std::string_view attribute(std::string_view tag, std::string_view name) {
   const std::string key = fmt::format(" {}=\"", name);
   const std::size_t found = tag.find(key);
@@ -62,7 +62,7 @@ int extent(std::string_view text) {
   return value > 0 && value <= kLargestExtent ? value : 0;
 }
 
-/// One `attr` of outInfo/ID, or of outInfo/ID/info below it.
+/// Applies one `attr` of outInfo/ID or outInfo/ID/info.
 void take(Stream& stream, bool of_info, std::string_view key, std::string_view value) {
   if (!of_info && key == "typeIdentifier") stream.type = value;
   if (of_info && key == "source") stream.source = unescaped(value);
@@ -103,7 +103,7 @@ std::string describe(const std::vector<Stream>& streams, std::string_view packin
 
 std::optional<std::vector<Stream>> parse_description(std::string_view xml) {
   std::vector<Stream> streams;
-  std::vector<std::string_view> nodes;  // those that are open
+  std::vector<std::string_view> nodes;  // open nodes
   for (std::size_t at = xml.find('<'); at != std::string_view::npos; at = xml.find('<', at)) {
     const std::size_t end = xml.find('>', at);
     if (end == std::string_view::npos) return std::nullopt;

@@ -16,11 +16,11 @@ namespace esim::aedat4 {
 
 struct Packet {
   int stream = 0;
-  std::uint64_t offset = 0;            ///< of its header, byte of the file
-  std::span<const std::byte> plain{};  ///< unpacked; borrowed until the next packet
+  std::uint64_t offset = 0;            ///< byte of the file at which its header starts
+  std::span<const std::byte> plain{};  ///< decompressed; borrowed until the next packet
 };
 
-/// The packets of a file in their order. The table at its end is not needed for that.
+/// Reads the packets of a file in their order, without the table at its end.
 class PacketReader {
  public:
   explicit PacketReader(const std::filesystem::path& path);
@@ -28,13 +28,13 @@ class PacketReader {
   Packing packing() const { return packing_; }
   const std::vector<Stream>& streams() const { return streams_; }
 
-  /// The earliest time and the latest in the table of packets, us, if there is a sound one.
+  /// The earliest and latest time in the table of packets, us, if the table is valid.
   struct Times {
     std::int64_t start_us = 0, end_us = 0;
   };
   std::optional<Times> times() const { return times_; }
 
-  /// Passes over the packets of other streams than those that are `wanted`.
+  /// Skips packets of streams that are not in `wanted`.
   std::optional<Packet> next(std::span<const int> wanted);
 
   double progress() const { return file_.progress(); }
@@ -48,7 +48,7 @@ class PacketReader {
   Packing packing_ = Packing::none;
   std::vector<Stream> streams_;
   std::optional<Unpacker> unpacker_;
-  std::optional<std::uint64_t> data_table_;  // where it begins
+  std::optional<std::uint64_t> data_table_;  // byte at which it starts
   std::optional<Times> times_;
 };
 

@@ -16,7 +16,7 @@ constexpr int kZstdLevel = 3;
 
 bool is_lz4(Packing packing) { return packing == Packing::lz4 || packing == Packing::lz4_high; }
 
-/// Damage that the codecs would not notice is, with a checksum.
+/// With a checksum, damage that the codecs would not notice is found.
 LZ4F_preferences_t lz4_preferences(std::size_t plain_bytes) {
   LZ4F_preferences_t preferences = LZ4F_INIT_PREFERENCES;
   preferences.frameInfo.contentChecksumFlag = LZ4F_contentChecksumEnabled;
@@ -79,7 +79,7 @@ struct Unpacker::Contexts {
     ZSTD_freeDCtx(zstd);
   }
 
-  /// Moves `in` and `out` on. Nothing: damaged. False: the end of the frame.
+  /// Advances `in` and `out`. Nothing: damaged. False: end of the frame.
   std::optional<bool> step_lz4(std::span<const std::byte>& in, std::span<std::byte>& out) const {
     std::size_t read = in.size(), written = out.size();
     const std::size_t more = LZ4F_decompress(lz4, out.data(), &written, in.data(), &read, nullptr);
@@ -138,7 +138,7 @@ std::optional<std::span<const std::byte>> Unpacker::unpack(std::span<const std::
     done += room - out.size();
     more = *step;
     const bool stuck = out.size() == room && packed.size() == rest;
-    if (more && stuck) return std::nullopt;  // the frame is cut off
+    if (more && stuck) return std::nullopt;  // the frame is truncated
   }
   return std::span<const std::byte>(plain_).first(done);
 }

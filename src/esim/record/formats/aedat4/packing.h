@@ -11,8 +11,8 @@
 
 namespace esim::aedat4 {
 
-/// How all packets of a file are packed: by LZ4's or Zstd's frame format. The numbers are those in the file; `high` is
-/// the same to readers.
+/// Compression of all packets of a file, in LZ4's or Zstd's frame format. The numbers are those in the file; readers
+/// treat `high` like its plain variant.
 enum class Packing : std::int32_t { none, lz4, lz4_high, zstd, zstd_high };
 
 /// The name in a file's description: "LZ4".
@@ -35,14 +35,14 @@ class Packer {
 
 class Unpacker {
  public:
-  /// Packets of more bytes than this are nobody's.
+  /// No program writes larger packets.
   static constexpr std::size_t kMostBytes = std::size_t{1} << 28;
 
   explicit Unpacker(Packing packing, std::size_t most_bytes = kMostBytes);
   ~Unpacker();
 
-  /// Borrowed until the next call, and aligned to 8 bytes. Nothing where the packet is damaged or larger than
-  /// `most_bytes`. Takes memory for what is there only, whatever the packet claims.
+  /// Borrowed until the next call, and aligned to 8 bytes. Nothing if the packet is damaged or larger than
+  /// `most_bytes`. Memory grows only with the data that exist, whatever size the packet claims.
   std::optional<std::span<const std::byte>> unpack(std::span<const std::byte> packed);
 
  private:

@@ -26,13 +26,13 @@ bool is_plain(std::string_view name) {
   return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), plain);
 }
 
-/// The luma (ITU-R BT.601) of a pixel's numbers: grey, or BGR and what follows.
+/// The luma (ITU-R BT.601) of a grey, BGR or BGRA pixel.
 std::uint16_t luma(const std::uint16_t* numbers, int channels) {
   if (channels == 1) return numbers[0];
   return static_cast<std::uint16_t>((114U * numbers[0] + 587U * numbers[1] + 299U * numbers[2] + 500U) / 1000U);
 }
 
-/// Pixels of `channels` numbers of one byte or two.
+/// Converts pixels of `channels` numbers of one or two bytes.
 void decode_pixels(const std::uint8_t* bytes, int number_bytes, int channels, std::span<std::uint16_t> pixels) {
   for (std::uint16_t& pixel : pixels) {
     std::uint16_t numbers[4];
@@ -75,7 +75,7 @@ class Reader final : public Source {
   std::vector<CameraStreams> cameras_;
   std::vector<int> wanted_;  // streams
 
-  // What of the current packet is left.
+  // The rest of the current packet.
   Packet packet_;
   int camera_ = 0;
   const flatbuffers::Vector<const fb::Event*>* elements_ = nullptr;
@@ -86,7 +86,7 @@ class Reader final : public Source {
   std::vector<Event> events_;
   Image<std::uint16_t> image_;
   std::optional<Record> record_;
-  bool waiting_ = false;  // the first record has been read, but not handed out
+  bool waiting_ = false;  // the first record has been read but not handed out
   bool ended_ = false;
   std::exception_ptr damage_;
 };
@@ -96,11 +96,11 @@ Reader::Reader(const std::filesystem::path& path, const ReadOptions& options) : 
   if (wanted_.empty()) {
     const std::vector<std::string> others = not_read();
     throw UserError(fmt::format(
-        "cannot read {}: {}; types of streams that are read: EVTS, FRME, IMUS", path.string(),
-        others.empty() ? "it has no streams" : "none of its streams is one of a recording: " + list_of_some(others)));
+        "cannot read {}: {}; supported stream types: EVTS, FRME, IMUS", path.string(),
+        others.empty() ? "it has no streams" : "none of its streams has a supported type: " + list_of_some(others)));
   }
   name_cameras();
-  // The start is known with the first record.
+  // The first record determines the start.
   try {
     waiting_ = read();
   } catch (const UserError&) {
@@ -130,11 +130,12 @@ std::vector<std::string> Reader::not_read() const {
   return others;
 }
 
-/// A camera is a source that has events or frames, once each: a second stream of a kind is another camera's.
+/// A camera is a source with at most one stream of events and one of frames: a second stream of a kind belongs to
+/// another camera.
 void Reader::find_cameras(const std::optional<SensorSize>& sensor) {
   for (const Stream& stream : packets_.streams()) {
     const bool events = stream.type == "EVTS", frames = stream.type == "FRME";
-    if (stream.type == "IMUS" && !info_.imu) {  // of several, the first
+    if (stream.type == "IMUS" && !info_.imu) {  // the first of several
       info_.imu.emplace();
       wanted_.push_back(stream.id);
     }
@@ -154,7 +155,7 @@ void Reader::find_cameras(const std::optional<SensorSize>& sensor) {
     info.has_frames |= frames;
     Camera& model = info.model;
     const SensorSize size = sensor.value_or(SensorSize{stream.width, stream.height});
-    // Frames may be of another size than the events of the same camera.
+    // Frames may differ in size from the events' sensor.
     if (events || model.width == 0) model.width = size.width, model.height = size.height;
   }
   for (const Stream& stream : packets_.streams()) {
@@ -167,7 +168,7 @@ void Reader::find_cameras(const std::optional<SensorSize>& sensor) {
   if (info_.cameras.empty()) info_.cameras.emplace_back();
 }
 
-/// As the file does, if that gives a plain name to each.
+/// Names cameras as in the file if this gives each a unique, plain name.
 void Reader::name_cameras() {
   std::vector<std::string> names;
   for (const CameraStreams& camera : cameras_) names.push_back(camera.source);
@@ -186,12 +187,12 @@ const Record* Reader::next() {
     std::rethrow_exception(std::exchange(damage_, nullptr));
   }
   if (ended_) return nullptr;
-  ended_ = true;  // if it throws, too
+  ended_ = true;  // also if the following throws
   ended_ = !read();
   return ended_ ? nullptr : &*record_;
 }
 
-/// Makes record_ the next one; false if there are none left.
+/// Reads the next record into record_; returns false at the end.
 bool Reader::read() {
   record_.reset();
   while (!record_) {
@@ -217,7 +218,7 @@ void Reader::open(const Packet& packet) {
     camera_ = static_cast<int>(i);
     if (cameras_[i].events == packet.stream) {
       const auto* events = verified<fb::EventPacket>(packet.plain, "EVTS");
-      if (events == nullptr) fail("the packet of events is damaged");
+      if (events == nullptr) fail("the event packet is damaged");
       elements_ = events->elements();
       return;
     }
@@ -229,18 +230,18 @@ void Reader::open(const Packet& packet) {
     }
     if (cameras_[i].triggers == packet.stream) {
       const auto* triggers = verified<fb::TriggerPacket>(packet.plain, "TRIG");
-      if (triggers == nullptr) fail("the packet of triggers is damaged");
+      if (triggers == nullptr) fail("the trigger packet is damaged");
       triggers_ = triggers->elements();
       return;
     }
   }
   const auto* imu = verified<fb::ImuPacket>(packet.plain, "IMUS");
-  if (imu == nullptr) fail("the packet of the IMU is damaged");
+  if (imu == nullptr) fail("the IMU packet is damaged");
   measurements_ = imu->elements();
 }
 
 TimeNs Reader::time(std::int64_t us) const {
-  if (us < -kLatestUs || us > kLatestUs) fail(fmt::format("{} us is no time of a recording", us));
+  if (us < -kLatestUs || us > kLatestUs) fail(fmt::format("the time {} us is out of range", us));
   return us * kNsPerUs;
 }
 
@@ -251,7 +252,7 @@ void Reader::take_events() {
     const fb::Event& event = *elements_->Get(taken_);
     const bool sound = event.x() >= 0 && event.y() >= 0 && std::abs(event.timestamp() / 2) <= kLatestUs / 2;
     if (!sound && events_.empty()) {
-      fail(fmt::format("an event at ({}, {}) and {} us", event.x(), event.y(), event.timestamp()));
+      fail(fmt::format("the event at ({}, {}) and {} us is out of range", event.x(), event.y(), event.timestamp()));
     }
     if (!sound) break;
     events_.push_back({event.timestamp() * kNsPerUs, static_cast<std::uint16_t>(event.x()),
@@ -275,7 +276,7 @@ void Reader::take_measurement() {
   record_.emplace(record);
 }
 
-/// Those of frames are left to the frames, where there are some.
+/// Skips triggers of frames and exposures if there are frames, which have their own exposures.
 void Reader::take_trigger() {
   if (taken_ == triggers_->size()) {
     triggers_ = nullptr;
@@ -283,7 +284,7 @@ void Reader::take_trigger() {
   }
   const fb::Trigger& trigger = *triggers_->Get(taken_++);
   const auto last = static_cast<std::int8_t>(TriggerKind::exposure_end);
-  if (trigger.kind() < 0 || trigger.kind() > last) fail(fmt::format("a trigger of kind {}", trigger.kind()));
+  if (trigger.kind() < 0 || trigger.kind() > last) fail(fmt::format("unknown trigger kind: {}", trigger.kind()));
   const auto kind = static_cast<TriggerKind>(trigger.kind());
   const bool of_frames = kind >= TriggerKind::frame_start;
   if (of_frames && cameras_[static_cast<std::size_t>(camera_)].frames >= 0) return;
@@ -295,19 +296,19 @@ void Reader::take_frame(const fb::Frame& frame, int camera) {
   const int depth = frame.format() & 7, channels = (frame.format() >> 3) + 1;
   const bool wide = depth == static_cast<int>(Depth::bits16);
   if ((!wide && depth != static_cast<int>(Depth::bits8)) || (channels != 1 && channels != 3 && channels != 4)) {
-    fail(fmt::format("a frame of OpenCV's type {}, which is not grey, BGR or BGRA of 8 or 16 bits", frame.format()));
+    fail(fmt::format("unsupported frame: OpenCV type {}, not grey, BGR or BGRA with 8 or 16 bits", frame.format()));
   }
   const std::size_t pixels =
       static_cast<std::size_t>(std::max(width, 0)) * static_cast<std::size_t>(std::max(height, 0));
   const int number_bytes = wide ? 2 : 1;
   const std::size_t bytes = frame.pixels() == nullptr ? 0 : frame.pixels()->size();
   if (pixels == 0 || bytes != pixels * static_cast<std::size_t>(channels * number_bytes)) {
-    fail(fmt::format("a frame of {} x {} px has {} bytes", width, height, bytes));
+    fail(fmt::format("damaged frame: {} x {} px in {} bytes", width, height, bytes));
   }
   if (image_.width() != width || image_.height() != height) image_ = Image<std::uint16_t>(width, height);
   decode_pixels(frame.pixels()->data(), number_bytes, channels, image_.pixels());
 
-  // Programs differ in what the frame's time is; the exposure's is plain where it is given.
+  // Programs define the frame's time differently, but the exposure clearly, where it is given.
   TimeNs start = time(frame.timestamp()), duration = std::max<TimeNs>(time(frame.exposure()), 0);
   const TimeNs opened = time(frame.timestamp_start_of_exposure()), closed = time(frame.timestamp_end_of_exposure());
   if (closed > opened) start = opened, duration = closed - opened;

@@ -27,7 +27,7 @@ std::string_view view(const Text& bytes) {
   return {reinterpret_cast<const char*>(bytes.GetBufferPointer()), bytes.GetSize()};
 }
 
-/// A line of the table of packets.
+/// A row of the table of packets.
 struct Entry {
   std::int64_t byte_offset = 0;
   fb::PacketHeader packet{};
@@ -82,8 +82,8 @@ void Writer::begin(const RecordingInfo& info) {
     const CameraInfo& camera = info.cameras[i];
     const int width = camera.model.width, height = camera.model.height;
     if (std::max(width, height) > kLargestExtent) {
-      throw UserError(fmt::format("{}: AEDAT 4 holds sensors of up to {} px, and {} has {} x {}", path_.string(),
-                                  kLargestExtent, camera.name, width, height));
+      throw UserError(fmt::format("{}: AEDAT 4 holds sensors of at most {} px per side, but {} has {} x {} px",
+                                  path_.string(), kLargestExtent, camera.name, width, height));
     }
     streams.push_back({events_stream(i), "EVTS", camera.name, width, height});
     streams.push_back({frames_stream(i), "FRME", camera.name, width, height});
@@ -97,7 +97,7 @@ void Writer::begin(const RecordingInfo& info) {
   append(header(-1));
 }
 
-/// Of the same length for every position.
+/// Has the same length for every position.
 std::string Writer::header(std::int64_t data_table_position) const {
   flatbuffers::FlatBufferBuilder builder;
   builder.ForceDefaults(true);
@@ -147,7 +147,7 @@ void Writer::take(const TriggerRecord& trigger) {
   if (triggers_[camera].size() == kPacketMeasurements) flush_triggers(camera);
 }
 
-/// In order of time: a frame is known when it ends, and what came meanwhile before it.
+/// Writes in order of time: a frame arrives when its exposure ends, so what came in the meantime is written before it.
 void Writer::flush_triggers(std::size_t camera) {
   std::vector<TriggerRecord>& pending = triggers_[camera];
   if (pending.empty()) return;
@@ -163,7 +163,7 @@ void Writer::flush_triggers(std::size_t camera) {
   pending.clear();
 }
 
-/// The middle of the exposure is half its duration after its start, also with a rolling shutter: it is that of the
+/// The middle of the exposure is the start plus half the duration. With a rolling shutter, this is the middle of the
 /// middle row.
 void Writer::take(const FrameRecord& frame) {
   const std::int64_t start = to_us(frame.t - frame.exposure_duration / 2);
@@ -217,7 +217,7 @@ void Writer::flush_imu() {
   imu_.clear();
 }
 
-/// What has been built in builder_.
+/// The buffer that was built in builder_.
 template <typename Table>
 void Writer::write_packet(int stream, flatbuffers::Offset<Table> root, const char* identifier, Entry entry) {
   builder_.FinishSizePrefixed(root, identifier);

@@ -13,14 +13,14 @@ namespace fs = std::filesystem;
 
 const std::vector<Content> kContents = {Content::events, Content::frames, Content::imu, Content::poses};
 
-/// One with an events.txt that is not a recording's.
+/// A folder with an events.txt that does not belong to a recording.
 bool is_dataset(const fs::path& folder) {
   const auto files = open_folder_input(folder);
   if (!files->has(kEventsTxt) || files->has("events.h5") || files->has("truth.h5")) return false;
   return !files->has("report.json") || has_conversion_report(folder);
 }
 
-/// A zip with an events.txt. One that is cut off is recognised by its beginning, so that its damage can be told.
+/// A zip with an events.txt. A truncated zip is recognised by its first bytes, so that the error can name the damage.
 bool is_zipped_dataset(const fs::path& path, std::string_view head) {
   if (!head.starts_with("PK\x03\x04")) return false;
   try {
@@ -37,7 +37,7 @@ bool is_zipped_dataset(const fs::path& path, std::string_view head) {
 Format dataset_format() {
   return {
       .name = "dataset",
-      .description = "the Event Camera Dataset's zip",
+      .description = "a zip file in the layout of the Event Camera Dataset",
       .extensions = {".zip"},
       .holds = kContents,
       .recognises = is_zipped_dataset,

@@ -2,7 +2,7 @@
 
 namespace esim {
 
-// Names of a dataset's files.
+// Names of the files of a dataset.
 inline constexpr char kEventsTxt[] = "events.txt", kImagesTxt[] = "images.txt", kImuTxt[] = "imu.txt",
                       kGroundTruthTxt[] = "groundtruth.txt", kCalibTxt[] = "calib.txt";
 

@@ -23,18 +23,18 @@ namespace {
 
 constexpr std::size_t kPortion = 1 << 16;  // events
 constexpr std::size_t kMostImageBytes = std::size_t{1} << 28;
-constexpr double kLargestNormError = 0.01;  // of a quaternion: some files have few digits
+constexpr double kLargestNormError = 0.01;  // of a quaternion; some files have few digits
 
 LineReader lines_of(const FilesInput& files, const std::string& name) {
   return LineReader(files.open(name), files.path_of(name), files.size(name));
 }
 
-/// Lines that begin with a time, in its order.
+/// Lines that start with a time, in order of time.
 class TimedLines {
  public:
   explicit TimedLines(LineReader lines) : lines_(std::move(lines)) {}
 
-  /// Goes to the next line; false if there are none left.
+  /// Goes to the next line; returns false at the end.
   bool next() {
     std::string_view line;
     while (lines_.next(line)) {
@@ -53,7 +53,7 @@ class TimedLines {
 
   TimeNs t() const { return *t_; }
 
-  /// The next word of the line, which is not its last one.
+  /// The next word of the line. Fails at its end.
   std::string_view word() {
     const std::string_view word = take_word(rest_);
     if (word.empty()) fail("the line has too few columns");
@@ -80,15 +80,15 @@ class TimedLines {
   std::string_view rest_;  // of the line
 };
 
-/// One kind of record, of which the next one is known.
+/// One kind of record. Keeps the next record ready.
 class Part {
  public:
   virtual ~Part() = default;
 
-  /// When the next record begins; nothing if there are none left. Where it throws, later calls do too.
+  /// Time of the next record; nothing at the end. If a call throws, later calls throw too.
   virtual std::optional<TimeNs> look_ahead() = 0;
 
-  /// The record that look_ahead() told of.
+  /// The record whose time look_ahead() returned.
   virtual void take(std::optional<Record>& record) = 0;
 };
 
@@ -126,7 +126,7 @@ class EventsPart final : public Part {
   std::exception_ptr damage_;
 };
 
-/// Of a text with one record a line.
+/// A text with one record per line.
 class LinesPart : public Part {
  public:
   LinesPart(const FilesInput& files, const char* name) : lines_(lines_of(files, name)) {}
@@ -159,7 +159,7 @@ class FramesPart final : public LinesPart {
     const std::filesystem::path path(name);
     const bool leaves = std::find(path.begin(), path.end(), "..") != path.end();
     if (path.is_absolute() || leaves || !files_.has(name)) {
-      lines.fail(fmt::format("there is no image {} in the dataset", name));
+      lines.fail(fmt::format("the image {} is missing from the dataset", name));
     }
     const std::string shown = files_.path_of(name).string();
     if (files_.size(name) > kMostImageBytes) throw UserError(fmt::format("cannot read {}: it is too large", shown));
@@ -201,7 +201,7 @@ class PosesPart final : public LinesPart {
     pose.body.T_world_body.translation = lines.vector();
     const Eigen::Vector3d q = lines.vector();
     const Eigen::Quaterniond rotation(lines.number(), q.x(), q.y(), q.z());
-    if (std::abs(rotation.norm() - 1) > kLargestNormError) lines.fail("the quaternion is not of unit norm");
+    if (std::abs(rotation.norm() - 1) > kLargestNormError) lines.fail("the quaternion must have unit norm");
     pose.body.T_world_body.rotation = rotation.normalized();
     record.emplace(pose);
   }
@@ -240,7 +240,7 @@ class Dataset final : public Source {
   std::unique_ptr<FilesInput> files_;
   RecordingInfo info_;
   std::vector<std::unique_ptr<Part>> parts_;
-  EventsPart* events_ = nullptr;  // one of them
+  EventsPart* events_ = nullptr;  // points to one of the parts
   std::optional<Record> record_;
   bool ended_ = false;
 };
@@ -266,14 +266,14 @@ Dataset::Dataset(std::unique_ptr<FilesInput> files, const ReadOptions& options) 
     try {
       const auto t = part->look_ahead();
       if (t) start = std::min(start.value_or(*t), *t);
-    } catch (const UserError&) {  // told by next()
+    } catch (const UserError&) {  // next() reports it
     }
   }
   info_.start = info_.end = start.value_or(0);
   info_.start_known = false;
 }
 
-/// It tells the sensor's size.
+/// The first image determines the size of the sensor.
 void Dataset::read_first_frame(const ReadOptions& options) {
   Camera& model = info_.cameras.front().model;
   if (options.sensor) {
@@ -285,14 +285,14 @@ void Dataset::read_first_frame(const ReadOptions& options) {
       frames.take(record_);
       const auto& image = std::get<FrameRecord>(*record_).image;
       model.width = image.width(), model.height = image.height();
-    } catch (const UserError&) {  // told by next()
+    } catch (const UserError&) {  // next() reports it
     }
     record_.reset();
   }
 }
 
 const Record* Dataset::next() {
-  if (std::exchange(ended_, true)) return nullptr;  // also after it throws
+  if (std::exchange(ended_, true)) return nullptr;  // also if the following throws
   Part* earliest = nullptr;
   TimeNs start = std::numeric_limits<TimeNs>::max();
   for (const auto& part : parts_) {

@@ -7,7 +7,7 @@
 
 namespace esim {
 
-/// Throws UserError where there is no events.txt. Records of all kinds come roughly in order of time.
+/// Throws UserError if there is no events.txt. Records of all kinds come roughly in order of time.
 std::unique_ptr<Source> open_dataset(std::unique_ptr<FilesInput> files, const ReadOptions& options);
 
 }  // namespace esim

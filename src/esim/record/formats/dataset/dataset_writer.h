@@ -8,8 +8,8 @@
 
 namespace esim {
 
-/// Writes what camera 0 sees. Of the calibration, what calib.txt cannot hold is left out with the file: other
-/// distortions than the radial-tangential one. `open` is called when the recording begins.
+/// Writes the records of camera 0. calib.txt is omitted if it cannot hold the distortion, which must be
+/// radial-tangential. Calls `open` when the recording begins.
 std::unique_ptr<Sink> make_dataset_writer(std::function<std::unique_ptr<FilesOutput>()> open);
 
 }  // namespace esim

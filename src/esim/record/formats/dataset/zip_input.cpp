@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kBlockBytes = 1 << 16;
 constexpr std::uint64_t kMostDirectoryBytes = std::uint64_t{1} << 28;
-constexpr std::uint64_t kFarthestEnd = zip::kEndBytes + 65535;  // bytes before the file's end, with a comment between
+constexpr std::uint64_t kFarthestEnd = zip::kEndBytes + 65535;  // bytes; the end record with its longest comment
 
 std::string_view text(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -32,17 +32,17 @@ struct Entry {
   std::uint64_t packed_bytes = 0, bytes = 0, offset = 0;
 };
 
-/// One file of a zip, from its start. What comes before damage is handed out first.
+/// One file in a zip, from its start. Data before damage are handed out first.
 class EntryBuffer final : public std::streambuf {
  public:
   EntryBuffer(const fs::path& path, Entry entry) : file_(path), entry_(entry), left_(entry.packed_bytes) {
     file_.seek(entry.offset);
-    const std::string_view header = text(file_.read_exactly(zip::kLocalHeaderBytes, "the head of a file in the zip"));
+    const std::string_view header = text(file_.read_exactly(zip::kLocalHeaderBytes, "the header of a file in the zip"));
     if (zip::get<std::uint32_t>(header, 0) != zip::kLocalHeader) file_.fail(entry.offset, "the zip is damaged");
     const std::uint64_t skipped = zip::get<std::uint16_t>(header, 26) + zip::get<std::uint16_t>(header, 28);
     file_.seek(file_.offset() + skipped);
     if (entry.method != zip::kStored && entry.method != zip::kDeflated) {
-      file_.fail(entry.offset, "a file in the zip is packed by something else than deflate");
+      file_.fail(entry.offset, "a file in the zip uses a compression method other than deflate");
     }
     if (inflateInit2(&stream_, -MAX_WBITS) != Z_OK) throw std::bad_alloc();
   }
@@ -76,7 +76,7 @@ class EntryBuffer final : public std::streambuf {
   }
 
  private:
-  /// The next bytes, at least one; false at the end.
+  /// Reads the next bytes, at least one; returns false at the end.
   bool refill() {
     std::size_t count = 0;
     while (count == 0 && !ended_) count = entry_.method == zip::kStored ? next_stored() : next_inflated();
@@ -96,7 +96,7 @@ class EntryBuffer final : public std::streambuf {
   std::size_t next_inflated() {
     if (stream_.avail_in == 0) {
       const auto bytes = next_packed(kBlockBytes);
-      // The file keeps what it lent until the next call.
+      // Data borrowed from the file stay valid until the next call.
       stream_.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes.data()));
       stream_.avail_in = static_cast<uInt>(bytes.size());
     }
@@ -107,15 +107,15 @@ class EntryBuffer final : public std::streambuf {
     if (result == Z_STREAM_END) {
       ended_ = true;
     } else if (result != Z_OK && count == 0) {
-      file_.fail(file_.offset(), "the file in the zip is damaged: it cannot be unpacked");
+      file_.fail(file_.offset(), "the file in the zip is damaged: it cannot be decompressed");
     }
     return count;
   }
 
-  /// At the end: none.
+  /// Empty at the end.
   std::span<const std::byte> next_packed(std::size_t most) {
     const auto bytes = file_.read(static_cast<std::size_t>(std::min<std::uint64_t>(most, left_)));
-    if (bytes.empty() && left_ > 0) file_.fail(file_.offset(), "the file ends before the file in the zip");
+    if (bytes.empty() && left_ > 0) file_.fail(file_.offset(), "the zip ends within a file that it contains");
     left_ -= bytes.size();
     ended_ = left_ == 0 && entry_.method == zip::kStored;
     return bytes;
@@ -123,7 +123,7 @@ class EntryBuffer final : public std::streambuf {
 
   InputFile file_;
   Entry entry_;
-  std::uint64_t left_;  // packed bytes
+  std::uint64_t left_;  // compressed bytes
   z_stream stream_{};
   bool ended_ = false;
   std::uint32_t crc_ = 0;
@@ -135,7 +135,7 @@ class EntryStream final : public std::istream {
  public:
   EntryStream(const fs::path& path, const Entry& entry) : std::istream(nullptr), buffer_(path, entry) {
     rdbuf(&buffer_);
-    exceptions(std::ios::badbit);  // the buffer's own exceptions pass
+    exceptions(std::ios::badbit);  // let exceptions of the buffer pass
   }
 
  private:
@@ -188,7 +188,7 @@ ZipInput::Directory ZipInput::find_directory() {
   while (at != std::string::npos && zip::get<std::uint32_t>(end, at) != zip::kEnd)
     at = at > 0 ? at - 1 : std::string::npos;
   if (at == std::string::npos)
-    file_.fail(file_.size(), "the list of its files is missing from the end of the zip: it is cut off");
+    file_.fail(file_.size(), "the zip is truncated: the list of files at its end is missing");
 
   const Directory found{zip::get<std::uint32_t>(end, at + 16), zip::get<std::uint32_t>(end, at + 12),
                         zip::get<std::uint16_t>(end, at + 10)};
@@ -221,12 +221,12 @@ void ZipInput::read_directory() {
     const std::string rest(text(file_.read_exactly(name_bytes + extra_bytes + comment_bytes, "the list of files")));
     take_extra(std::string_view(rest).substr(name_bytes, extra_bytes), entry);
     if (file_.offset() - directory.offset > kMostDirectoryBytes) file_.fail(offset, "the list of files is too long");
-    if (entry.offset >= file_.size()) file_.fail(offset, "a file of the zip lies behind its end");
+    if (entry.offset >= file_.size()) file_.fail(offset, "a file in the zip starts after the end of the zip");
     entries_.emplace(rest.substr(0, name_bytes), entry);
   }
 }
 
-/// Numbers that did not fit into 32 bits, in this order.
+/// Reads the extra field, which has the numbers that did not fit into 32 bits, in this order.
 void ZipInput::take_extra(std::string_view extra, Entry& entry) {
   while (extra.size() >= 4) {
     const auto tag = zip::get<std::uint16_t>(extra, 0);

@@ -14,8 +14,8 @@ inline constexpr std::uint32_t kLocalHeader = 0x04034b50, kDirectoryEntry = 0x02
 inline constexpr std::size_t kLocalHeaderBytes = 30, kDirectoryEntryBytes = 46, kEndBytes = 22, kEnd64Bytes = 56,
                              kEnd64LocatorBytes = 20;
 inline constexpr std::uint16_t kExtra64 = 1;           // tag of the extra field with sizes of 64 bits
-inline constexpr std::uint32_t kIn64 = 0xffffffff;     // instead of a number that is in the extra field
-inline constexpr std::uint16_t kManyEntries = 0xffff;  // likewise
+inline constexpr std::uint32_t kIn64 = 0xffffffff;     // placeholder for a number in the extra field
+inline constexpr std::uint16_t kManyEntries = 0xffff;  // the same for the number of entries
 inline constexpr std::uint16_t kStored = 0, kDeflated = 8;
 
 template <typename Integer>
@@ -23,7 +23,7 @@ void put(std::string& bytes, Integer value) {
   for (std::size_t i = 0; i < sizeof(Integer); ++i) bytes.push_back(static_cast<char>((value >> (8 * i)) & 0xff));
 }
 
-/// The number at a place that is known to be there.
+/// Reads a number from a position inside the bytes.
 template <typename Integer>
 Integer get(std::string_view bytes, std::size_t at) {
   Integer value = 0;

@@ -29,12 +29,12 @@ struct Entry {
   std::uint64_t packed_bytes = 0, bytes = 0, offset = 0;
 };
 
-/// A text that is packed into a file of its own, until it is copied into the archive. If that never comes, it is what
-/// has been recorded.
+/// A text that is compressed into a separate file until it is copied into the archive. If the process ends before that,
+/// the separate file holds the data recorded so far.
 class PackedText {
  public:
   explicit PackedText(const fs::path& path) : file_(path) {
-    // Without zlib's own head, and fast: digits shrink well with any effort.
+    // Raw deflate, without the zlib header, and fast: digits compress well at any level.
     if (deflateInit2(&stream_, 1, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY) != Z_OK) throw std::bad_alloc();
   }
   ~PackedText() { deflateEnd(&stream_); }
@@ -46,7 +46,7 @@ class PackedText {
     if (plain_.size() >= kBlockBytes) pack(Z_NO_FLUSH);
   }
 
-  /// After that, the file is whole.
+  /// Completes the file.
   Entry finish(const std::string& name) {
     pack(Z_FINISH);
     file_.close();
@@ -121,9 +121,10 @@ class ZipOutput final : public FilesOutput {
     }
   }
 
-  /// What local headers and the directory have in common, from the version on.
+  /// The fields that local headers and the directory have in common, from the version on.
   static void put_common(std::string& bytes, const Entry& entry, bool in_64) {
-    constexpr std::uint16_t kFirstDay = 0x0021;  // 1 January 1980, the first that there is: the same bytes every day
+    constexpr std::uint16_t kFirstDay =
+        0x0021;  // 1 January 1980, the earliest date of zip files: the bytes do not depend on the date
     zip::put<std::uint16_t>(bytes, in_64 ? 45 : 20);
     zip::put<std::uint16_t>(bytes, 0);
     zip::put(bytes, entry.method);
@@ -194,7 +195,7 @@ class ZipOutput final : public FilesOutput {
 
   OutputFile file_;
   std::uint64_t position_ = 0;
-  std::string directory_;  // some 70 bytes for each file
+  std::string directory_;  // about 70 bytes for each file
   std::uint64_t entries_ = 0;
   std::map<std::string, PackedText> texts_;
 };

@@ -4,7 +4,7 @@
 
 namespace esim {
 
-/// MCAP with messages of ROS 2.
+/// MCAP with ROS 2 messages.
 Format mcap_format();
 
 }  // namespace esim

@@ -31,7 +31,7 @@ McapInput::McapInput(std::filesystem::path path) : file_(std::move(path)) {
   file_.seek(start);
 }
 
-/// Without success, the file is read as one that has no summary.
+/// If this fails, the file is read as one without a summary.
 void McapInput::read_summary() {
   if (file_.size() < 2 * kMagic.size() + kFooterBytes) return;
   try {
@@ -60,18 +60,18 @@ void McapInput::read_summary() {
 
 McapInput::Record McapInput::next_in_file() {
   Record record{file_.offset()};
-  ros::ByteReader head(file_.read_exactly(kRecordHeadBytes, "the head of a record"));
+  ros::ByteReader head(file_.read_exactly(kRecordHeadBytes, "the header of a record"));
   record.op = head.number<Op>();
   const auto length = head.number<std::uint64_t>();
   if (length > file_.size() - file_.offset()) {
-    fail(record.offset, "the file ends within a record that says that it is " + std::to_string(length) + " bytes long");
+    fail(record.offset, "the file ends within a record whose stated length is " + std::to_string(length) + " bytes");
   }
   if (!is_read(record.op)) {
     file_.skip(length);
     return record;
   }
   if (length > ros::kMaxChunkBytes) {
-    fail(record.offset, "a record says that it is " + std::to_string(length) + " bytes long");
+    fail(record.offset, "a record is too long: " + std::to_string(length) + " bytes");
   }
   record.content = file_.read_exactly(static_cast<std::size_t>(length), "a record");
   return record;
@@ -86,7 +86,7 @@ McapInput::Record McapInput::next_in_chunk() {
 
 void McapInput::open_chunk(const Record& record) {
   ros::ByteReader content(record.content);
-  content.take(2 * sizeof(std::uint64_t));  // times of the first message and the last
+  content.take(2 * sizeof(std::uint64_t));  // times of the first and last message
   const auto size = content.number<std::uint64_t>();
   const auto crc = content.number<std::uint32_t>();
   const ros::ChunkCodec codec = codec_named(ros::as_text(content.counted()));
@@ -135,7 +135,7 @@ bool McapInput::next(ros::Message& message) {
       if (record.op != Op::message) continue;
       ros::ByteReader reader(record.content);
       const auto channel = channel_of_id_.find(reader.number<std::uint16_t>());
-      if (channel == channel_of_id_.end()) throw ros::Malformed("its channel is not known");
+      if (channel == channel_of_id_.end()) throw ros::Malformed("its channel is unknown");
       reader.take(sizeof(std::uint32_t) + 2 * sizeof(std::uint64_t));  // number, times of recording and sending
       message = {channel->second, reader.take(reader.left()), record.offset};
       return true;

@@ -12,8 +12,8 @@
 
 namespace esim::mcap {
 
-/// Reads MCAP files from front to back, chunk by chunk: the summary only tells beforehand which channels there are.
-/// Messages of ROS 1 and ROS 2 are read, those of other encodings are passed over.
+/// Reads MCAP files from start to end, chunk by chunk. The summary only lists the channels in advance. Reads messages
+/// of ROS 1 and ROS 2; those of other encodings are skipped.
 class McapInput final : public ros::MessageInput {
  public:
   explicit McapInput(std::filesystem::path path);
@@ -28,7 +28,7 @@ class McapInput final : public ros::MessageInput {
   struct Record {
     std::uint64_t offset = 0;
     Op op{};
-    ros::Bytes content{};  // borrowed; empty of records in the file that are not read
+    ros::Bytes content{};  // borrowed; empty for records that are not read
   };
 
   void read_summary();

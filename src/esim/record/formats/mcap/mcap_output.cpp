@@ -52,7 +52,7 @@ McapOutput::Channel& McapOutput::channel(const std::string& topic, ros::MessageT
         .text(ros::definition_of(type, ros::Encoding::cdr));
     chunk_.append(schema_records_, at);
   }
-  // ROS 2's player asks for the quality of service, and takes its default where it is empty.
+  // The ROS 2 player looks up the quality of service; an empty one means its default.
   std::string metadata;
   for (const std::string_view text : {"offered_qos_profiles", ""}) {
     ros::append_number(metadata, static_cast<std::uint32_t>(text.size()));
@@ -115,7 +115,7 @@ void McapOutput::flush_chunk() {
   chunk_.clear();
 }
 
-/// From its first record to the last but the footer, which is where it says where it begins.
+/// Writes the summary, from its first record to the footer, which has the position of the summary.
 std::string McapOutput::summary() const {
   std::string summary, offsets;
   const auto end_group = [&](Op op, std::size_t start) {
@@ -173,7 +173,7 @@ std::string McapOutput::summary() const {
   summary += offsets;
   std::string footer;
   RecordWriter(footer, Op::footer).number(position_).number(offsets_position).number(std::uint32_t{0});
-  // The checksum covers the footer up to itself.
+  // The checksum covers the footer before the checksum.
   footer.resize(footer.size() - sizeof(std::uint32_t));
   ros::append_number(footer, crc_of(footer, crc_of(summary)));
   return summary + footer;

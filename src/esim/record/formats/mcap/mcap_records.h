@@ -8,8 +8,8 @@
 
 namespace esim::mcap {
 
-// MCAP: a magic number, records (opcode, length as 64 bits, content), and the magic number again. Texts, and lists by
-// their bytes, have their length before them as 32 bits.
+// MCAP: a magic number, records (opcode, length as 64 bits, content), and the magic number again. Texts and lists are
+// preceded by their length in bytes as 32 bits.
 
 inline constexpr std::string_view kMagic = "\x89MCAP0\r\n";
 
@@ -30,7 +30,7 @@ enum class Op : std::uint8_t {
 inline constexpr std::size_t kRecordHeadBytes = 9;
 inline constexpr std::size_t kFooterBytes = kRecordHeadBytes + 20;
 
-/// Appends a record to `out`; its content ends with the scope.
+/// Appends a record to `out`; its content ends when this object is destroyed.
 class RecordWriter {
  public:
   RecordWriter(std::string& out, Op op) : out_(out) {

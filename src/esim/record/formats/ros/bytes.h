@@ -14,7 +14,8 @@ namespace esim::ros {
 
 static_assert(std::endian::native == std::endian::little, "numbers in these files are little-endian");
 
-/// Bytes that do not hold what they should. Who knows the file and the place makes a UserError of it.
+/// The bytes of a message or record are invalid. The caller, which knows the file and the position, turns this into a
+/// UserError.
 class Malformed : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -49,7 +50,7 @@ inline std::span<const std::byte> as_bytes(std::string_view text) {
   return {reinterpret_cast<const std::byte*>(text.data()), text.size()};
 }
 
-/// Reads numbers and texts one after the other. Throws Malformed where there are not enough bytes.
+/// Reads numbers and texts one after the other. Throws Malformed at the end of the bytes.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
@@ -69,7 +70,7 @@ class ByteReader {
     return load<T>(take(sizeof(T)).data());
   }
 
-  /// A text, or other bytes, after their number as 32 bits.
+  /// A text, or other bytes, preceded by their number as 32 bits.
   std::span<const std::byte> counted() { return take(number<std::uint32_t>()); }
 
  private:

@@ -18,7 +18,7 @@ constexpr std::size_t kFirstBytes = 1U << 20;
 
 [[noreturn]] void fail() { throw Malformed("its compressed data are damaged"); }
 
-/// One step of decompression: consumes from the front of both; true once the data are at their end.
+/// One step of decompression: consumes the start of both; returns true at the end of the data.
 template <typename Step>
 void decompress_in_steps(std::span<const std::byte> in, std::uint64_t size, std::vector<std::byte>& raw, Step step) {
   raw.resize(std::min<std::uint64_t>(size, kFirstBytes));
@@ -112,10 +112,10 @@ void compress(ChunkCodec codec, std::string_view raw, std::string& packed) {
 
 std::span<const std::byte> decompress(ChunkCodec codec, std::span<const std::byte> packed, std::uint64_t size,
                                       std::vector<std::byte>& buffer) {
-  if (size > kMaxChunkBytes) throw Malformed("it says that it is larger than any chunk");
+  if (size > kMaxChunkBytes) throw Malformed("its stated size is larger than any chunk");
   switch (codec) {
     case ChunkCodec::none:
-      if (packed.size() != size) throw Malformed("its size is not the one that it says");
+      if (packed.size() != size) throw Malformed("its size differs from its stated size");
       return packed;
     case ChunkCodec::lz4:
       decompress_lz4(packed, size, buffer);

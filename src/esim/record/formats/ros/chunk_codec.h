@@ -8,18 +8,18 @@
 
 namespace esim::ros {
 
-/// How chunks of messages are packed.
+/// Compression of chunks of messages.
 enum class ChunkCodec { none, lz4, zstd, bz2 };
 
-/// More than this, in bytes, is in no chunk and in no message: what a damaged file claims is not trusted with memory.
+/// The maximum size of chunks and messages, bytes. Damaged files that claim more do not allocate memory.
 inline constexpr std::uint64_t kMaxChunkBytes = 1U << 28;
 
-/// Replaces `packed`. LZ4 is in its frame format, of independent blocks with a checksum of the content: what ROS 1
-/// reads. Not for bz2, which is only read.
+/// Compresses into `packed`, which is replaced. LZ4 uses its frame format, with independent blocks and a checksum of
+/// the content, which ROS 1 can read. Not for bz2, which is read only.
 void compress(ChunkCodec codec, std::string_view raw, std::string& packed);
 
-/// What was packed: `packed` itself, or what it becomes in `buffer`. Throws Malformed unless it is exactly `size`
-/// bytes, and kMaxChunkBytes at most. Takes no more memory than twice what is really there.
+/// The uncompressed data: `packed` itself, or `buffer`. Throws Malformed unless they have exactly `size` bytes, at most
+/// kMaxChunkBytes. Allocates at most twice the size of the actual data.
 std::span<const std::byte> decompress(ChunkCodec codec, std::span<const std::byte> packed, std::uint64_t size,
                                       std::vector<std::byte>& buffer);
 

@@ -3,9 +3,9 @@
 namespace esim::ros {
 namespace {
 
-// An event is x, y: uint16; seconds, nanoseconds: 32 bits each; polarity: uint8. ROS 1 packs them. CDR begins the first
-// at a multiple of 4 and aligns each number: all that follows y has a period of 16 bytes, and x and y of all events but
-// the first lie 2 bytes before.
+// An event is x, y: uint16; seconds, nanoseconds: 32 bits each; polarity: uint8. ROS 1 packs them. CDR aligns the first
+// event to a multiple of 4 and each number to its size: events have a period of 16 bytes, and in all but the first, x
+// and y start 2 bytes earlier.
 template <Encoding encoding>
 struct Layout {
   static constexpr std::size_t kSize = 13;

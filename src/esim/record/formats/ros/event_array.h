@@ -7,7 +7,7 @@
 
 namespace esim::ros {
 
-/// dvs_msgs/EventArray, but for its events.
+/// The fields of dvs_msgs/EventArray without its events.
 struct EventArrayHead {
   Header header{};
   std::uint32_t height = 0, width = 0;  // px
@@ -18,10 +18,10 @@ struct EventArrayHead {
   }
 };
 
-/// The fields after the head.
+/// Appends the events, which follow the fields above.
 void write_events(MessageWriter& writer, EventSpan events);
 
-/// Replaces `events` by those after the head.
+/// Replaces `events` by those after the header.
 void read_events(MessageReader& reader, std::vector<Event>& events);
 
 }  // namespace esim::ros

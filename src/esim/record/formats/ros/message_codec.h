@@ -10,10 +10,10 @@
 
 namespace esim::ros {
 
-/// How messages become bytes.
+/// The encoding of messages as bytes.
 enum class Encoding {
   ros1,  ///< ROS 1: packed
-  cdr,   ///< ROS 2, CDR: numbers aligned to their size, counted from behind the first four bytes, which name the
+  cdr,   ///< ROS 2, CDR: numbers aligned to their size, counted from after the first four bytes, which are the
          ///< encoding
 };
 
@@ -27,10 +27,10 @@ struct Floats {
 
 inline constexpr std::size_t kCdrHeaderBytes = 4;
 
-/// Appends the values of a message. Messages tell their fields in `fields()`, as in messages.h.
+/// Appends the values of a message. Messages list their fields in `fields()`, see messages.h.
 class MessageWriter {
  public:
-  /// Replaces what `out` holds.
+  /// Replaces the content of `out`.
   MessageWriter(Encoding encoding, std::string& out) : encoding_(encoding), out_(out) {
     out_.clear();
     if (encoding == Encoding::cdr) out_.append("\0\1\0\0", kCdrHeaderBytes);
@@ -41,18 +41,18 @@ class MessageWriter {
     (put(values), ...);
   }
 
-  /// Between 0 and the greatest second that the encoding holds: 2^32 - 1, or 2^31 - 1 in ROS 2.
+  /// Must be from 0 to the largest second of the encoding: 2^32 - 1, or 2^31 - 1 in ROS 2.
   void time(TimeNs t) {
     number(static_cast<std::uint32_t>(t / kNsPerSecond));
     number(static_cast<std::uint32_t>(t % kNsPerSecond));
   }
 
-  /// Headers of ROS 1 begin with one.
+  /// Headers of ROS 1 start with a sequence number.
   void sequence_number() {
     if (encoding_ == Encoding::ros1) number(std::uint32_t{0});
   }
 
-  /// Room for so many bytes, to be written before the next call; zeros until then.
+  /// Room for so many bytes, zero until the caller writes them, before the next call.
   char* append(std::size_t count) {
     const std::size_t at = out_.size();
     out_.resize(at + count);
@@ -112,7 +112,7 @@ class MessageWriter {
   std::string& out_;
 };
 
-/// Reads what MessageWriter writes. Trusts nothing: throws Malformed where the bytes are not enough.
+/// Reads the messages of MessageWriter. Throws Malformed if there are too few bytes.
 class MessageReader {
  public:
   MessageReader(Encoding encoding, std::span<const std::byte> payload) : encoding_(encoding), bytes_(payload) {
@@ -173,7 +173,7 @@ class MessageReader {
     for (T& value : values) get(value);
   }
 
-  // Grows with what is there, not with what the count says.
+  // Grows with the data present, not with the stated count.
   template <typename T>
   void get(std::vector<T>& values) {
     values.clear();

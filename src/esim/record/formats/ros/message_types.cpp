@@ -10,8 +10,8 @@ namespace {
 struct Definition {
   std::string_view name;
   std::string_view text;
-  std::vector<std::string_view> parts{};  // the types in it, those in them included, in order of appearance
-  std::string_view ros2_text{};           // where it differs
+  std::vector<std::string_view> parts{};  // the types that it contains, recursively, in order of appearance
+  std::string_view ros2_text{};           // if it differs
 };
 
 struct Known {
@@ -31,7 +31,7 @@ constexpr std::array kKnown = {
     Known{MessageType::transforms, "tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec"},
     Known{MessageType::flow, "esim_msgs/OpticFlow", "1d447e443e01be233472e6f68c671fd7"},
     Known{MessageType::frame_info, "esim_msgs/FrameInfo", "ae9f8dcd7e0bf684080d955778c3ad6f"},
-    // The same fields under other names.
+    // Other names for the same fields.
     Known{MessageType::events, "prophesee_event_msgs/EventArray", ""},
     Known{MessageType::transforms, "tf/tfMessage", ""},
 };
@@ -106,7 +106,7 @@ const Definition& definition_named(std::string_view name) {
   for (const Definition& definition : definitions()) {
     if (definition.name == name) return definition;
   }
-  return definitions().front();  // not reached: all names stand in this file
+  return definitions().front();  // not reached: all names are in this file
 }
 
 const Known& known(MessageType type) { return kKnown[static_cast<std::size_t>(type)]; }
@@ -148,7 +148,7 @@ std::string definition_of(MessageType type, Encoding encoding) {
     text += text_of(definition_named(name), encoding);
   };
   for (const std::string_view part : whole.parts) add(part);
-  if (encoding == Encoding::cdr) add("builtin_interfaces/Time");  // in every header
+  if (encoding == Encoding::cdr) add("builtin_interfaces/Time");  // part of every header
   return text;
 }
 

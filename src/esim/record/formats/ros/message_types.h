@@ -8,25 +8,25 @@
 
 namespace esim::ros {
 
-/// The types of message that are written and read.
+/// The supported message types.
 enum class MessageType { events, image, camera_info, imu, pose, twist, accel, transforms, flow, frame_info };
 
-/// As in ROS 1: "sensor_msgs/Image".
+/// The name in ROS 1: "sensor_msgs/Image".
 std::string_view name_of(MessageType type);
 
-/// As in ROS 2: "sensor_msgs/msg/Image".
+/// The name in ROS 2: "sensor_msgs/msg/Image".
 std::string ros2_name_of(MessageType type);
 
-/// The type of that name, of ROS 1 or ROS 2, or of another name for the same fields; nothing for all others.
+/// The type of this name in ROS 1 or ROS 2, or of another name for the same fields; nothing for all others.
 std::optional<MessageType> type_named(std::string_view name);
 
-/// All names that type_named() knows, as in ROS 1, for people.
+/// All ROS 1 names that type_named() knows, for messages.
 std::string known_names();
 
-/// The type's definition, followed by those of all types in it, as bags and MCAP files hold it.
+/// The type's definition, followed by those of all types that it contains, as in bags and MCAP files.
 std::string definition_of(MessageType type, Encoding encoding);
 
-/// The MD5 sum by which ROS 1 tells versions of a type apart.
+/// The MD5 sum that identifies the version of a type in ROS 1.
 std::string_view md5_of(MessageType type);
 
 }  // namespace esim::ros

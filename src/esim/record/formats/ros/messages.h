@@ -10,8 +10,8 @@
 
 namespace esim::ros {
 
-/// The messages of ROS that recordings consist of, each with its fields in their order, told to a MessageWriter or a
-/// MessageReader. Their definitions stand in message_types.cpp; the events, which are many, in event_array.h.
+/// The ROS messages of recordings, each with its fields in their order, for a MessageWriter or MessageReader. Their
+/// definitions are in message_types.cpp; the events, which are many, are in event_array.h.
 
 struct Header {
   TimeNs stamp = 0;
@@ -64,7 +64,7 @@ struct CameraInfoMessage {
 struct ImuMessage {
   Header header{};
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
-  std::array<double, 9> orientation_covariance{-1};  ///< -1: there is no orientation
+  std::array<double, 9> orientation_covariance{-1};  ///< -1: no orientation
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
   std::array<double, 9> angular_velocity_covariance{};
   Eigen::Vector3d linear_acceleration = Eigen::Vector3d::Zero();
@@ -78,7 +78,7 @@ struct ImuMessage {
   }
 };
 
-/// geometry_msgs/PoseStamped: of the header's frame
+/// geometry_msgs/PoseStamped: in the header's frame
 struct PoseMessage {
   Header header{};
   SE3 pose{};

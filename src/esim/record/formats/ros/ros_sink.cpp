@@ -15,7 +15,7 @@
 namespace esim::ros {
 namespace {
 
-// A message of events ends with what comes first.
+// A message of events ends at whichever limit comes first.
 constexpr TimeNs kEventsDuration = 10 * kNsPerMs;
 constexpr std::size_t kEventsCount = 50'000;
 
@@ -70,8 +70,8 @@ TimeNs RosSink::checked(TimeNs t) const {
   const TimeNs most = encoding_ == Encoding::cdr ? std::numeric_limits<std::int32_t>::max()
                                                  : std::numeric_limits<std::uint32_t>::max();  // s
   if (t >= 0 && t / kNsPerSecond <= most) return t;
-  throw UserError(fmt::format("cannot write {}: the time {} s does not fit: ROS holds 0 to {} s", path_.string(),
-                              to_seconds(t), most));
+  throw UserError(fmt::format("cannot write {}: the time {} s does not fit: ROS holds times from 0 to {} s",
+                              path_.string(), to_seconds(t), most));
 }
 
 template <typename T>
@@ -150,8 +150,8 @@ void RosSink::put(const FrameRecord& record) {
 
 void RosSink::put(const ImageRecord& record) { put_irradiance(record.camera, record.t, record.irradiance); }
 
-/// With a picture of it where there are no frames, since image_raw is what programs look for. Readers of ours know it
-/// for one by the frame_info that it lacks.
+/// Also writes a grey image of the irradiance if there are no frames, since programs look for image_raw. Our reader
+/// recognises it by the missing frame_info.
 void RosSink::put_irradiance(int camera, TimeNs t, const Image<float>& irradiance) {
   if (irradiance.empty()) return;
   const Header of_camera = header(t, camera_of(camera).name);
@@ -200,7 +200,7 @@ void RosSink::put(const PoseRecord& record) {
   send(topic::kBodyAccel, MessageType::accel, t,
        TwistMessage{header(t, frame::kBody), R_body_world * record.body.acceleration_world, record.body.alpha_body});
 
-  // Last, because readers take the motion of a pose from what came before.
+  // Written last, because readers take the motion of a pose from the preceding messages.
   TransformsMessage transforms;
   transforms.transforms.push_back(transform(t, frame::kWorld, frame::kBody, record.body.T_world_body));
   for (std::size_t i = 0; i < std::min(record.objects.size(), info_.objects.size()); ++i) {

@@ -9,8 +9,8 @@
 
 namespace esim::ros {
 
-/// Writes a recording as ROS messages on the topics of topics.h. `create` makes the file, of messages in `encoding`;
-/// `path` is its name for people. Throws UserError for times that ROS cannot hold.
+/// Writes a recording as ROS messages on the topics of topics.h. `create` makes the file, with messages in `encoding`;
+/// `path` is its name in errors. Throws UserError for times that ROS cannot hold.
 std::unique_ptr<Sink> make_sink(std::filesystem::path path, Encoding encoding,
                                 std::function<std::unique_ptr<MessageOutput>()> create);
 

@@ -21,10 +21,10 @@ using Part = TruthAssembler::Part;
 constexpr std::size_t kPortion = 1U << 16;  // events
 
 std::string described(const Channel& channel) {
-  return channel.topic + " (" + (channel.type_name.empty() ? "of no type" : channel.type_name) + ")";
+  return channel.topic + " (" + (channel.type_name.empty() ? "no type" : channel.type_name) + ")";
 }
 
-/// What is said of one instant before the message that it belongs to.
+/// Data for one time that precede the message to which they belong.
 template <typename T>
 struct Remembered {
   TimeNs t = 0;
@@ -35,7 +35,7 @@ struct Remembered {
 
 struct CameraState {
   TruthAssembler truth{};
-  bool has_frame_info = false;  // of every frame: what has none is a picture of the irradiance
+  bool has_frame_info = false;  // every frame has it; an image without it is a picture of the irradiance
   Remembered<FrameInfoMessage> frame_info{};
   Image<std::uint16_t> frame{};
 };
@@ -69,13 +69,13 @@ class RosSource final : public Source {
   Survey survey_;
   std::vector<CameraState> cameras_;
   std::vector<Event> events_;
-  EventSpan rest_;  // of the events, what has not been handed out
+  EventSpan rest_;  // events that have not been handed out
   int events_camera_ = 0;
   Remembered<ImuMessage> imu_bias_;
   Remembered<TwistMessage> twist_, accel_;
   PoseRecord pose_;
   Result record_;
-  std::set<std::string> passed_over_;  // images that cannot be read, by topics
+  std::set<std::string> passed_over_;  // topics with images that cannot be read
   bool ended_ = false;
   std::exception_ptr damage_;
 };
@@ -127,7 +127,7 @@ const Record* RosSource::next_events() {
   return &record_.emplace(EventsRecord{events_camera_, portion});
 }
 
-/// Instants that the file ends in the middle of.
+/// Data of times at which the file ended early.
 const Record* RosSource::last_truth() {
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     cameras_[i].truth.end();
@@ -290,8 +290,8 @@ bool has_no_role(const Assignment& to) { return to.role == Role::none; }
   for (const Channel& channel : channels) found.push_back(described(channel));
   throw UserError(
       "cannot read " + path.string() + ": " +
-      (found.empty() ? "it holds no topics" : "none of its topics is one of a recording: " + list_of_some(found)) +
-      "; types that are read: " + known_names());
+      (found.empty() ? "it holds no topics" : "none of its topics has a supported type: " + list_of_some(found)) +
+      "; supported types: " + known_names());
 }
 
 }  // namespace

@@ -9,8 +9,8 @@
 
 namespace esim::ros {
 
-/// A recording from a file of ROS messages, on whatever topics they are (topics.h). `open` opens the file anew. Throws
-/// UserError, with the topics and their types, where none of them is one of a recording.
+/// A recording from a file of ROS messages, on any topics (topics.h). `open` opens the file from its start, more than
+/// once. Throws UserError, with the topics and their types, if none of them is supported.
 std::unique_ptr<Source> make_source(const std::filesystem::path& path,
                                     const std::function<std::unique_ptr<MessageInput>()>& open,
                                     const ReadOptions& options);

@@ -8,7 +8,7 @@ namespace esim::ros {
 namespace {
 
 constexpr std::uint32_t kMaxExtent = 65536;  // px
-constexpr double kRoundingOfNorm = 1e-9;     // a rotation that is off by no more stays as it is
+constexpr double kRoundingOfNorm = 1e-9;     // rotations within this error of unit norm stay unchanged
 constexpr float kMetresPerMillimetre = 1e-3F;
 
 void check_extent(std::uint32_t width, std::uint32_t height) {
@@ -17,15 +17,15 @@ void check_extent(std::uint32_t width, std::uint32_t height) {
   }
 }
 
-/// The rows of an image whose pixels have so many bytes.
+/// Reads the rows of an image with so many bytes per pixel.
 class Rows {
  public:
   Rows(const ImageMessage& message, std::size_t pixel_bytes) : message_(message) {
     check_extent(message.width, message.height);
     if (pixel_bytes * message.width > message.step ||
         std::uint64_t{message.step} * message.height > message.data.size())
-      throw Malformed("an image has fewer bytes than its size says");
-    if (message.is_bigendian != 0 && pixel_bytes == 2) throw Malformed("an image is big-endian");
+      throw Malformed("an image has fewer bytes than its size requires");
+    if (message.is_bigendian != 0 && pixel_bytes == 2) throw Malformed("big-endian images are not supported");
   }
 
   const std::byte* row(std::uint32_t y) const { return message_.data.data() + std::size_t{y} * message_.step; }
@@ -46,7 +46,7 @@ void read_pixels(const ImageMessage& message, std::size_t pixel_bytes, Image<T>&
   }
 }
 
-/// Bytes of a pixel in red, green and blue, and where red and blue are in it; 0: it has no colours.
+/// Bytes per pixel of a colour image, and the positions of red and blue; 0: not a colour encoding.
 struct Colours {
   std::size_t bytes = 0, red = 0, blue = 0;
 };
@@ -186,7 +186,7 @@ void to_images(const FlowMessage& message, Image<float>& flow_x, Image<float>& f
   check_extent(message.width, message.height);
   const std::uint64_t bytes = std::uint64_t{message.width} * message.height * sizeof(float);
   if (message.flow_x.bytes.size() != bytes || message.flow_y.bytes.size() != bytes)
-    throw Malformed("a motion field has not as many numbers as its size says");
+    throw Malformed("the number of values of a motion field does not match its size");
   const auto fill = [&](Image<float>& image, Bytes from) {
     image = Image<float>(static_cast<int>(message.width), static_cast<int>(message.height));
     if (!from.empty()) std::memcpy(image.data(), from.data(), from.size());
@@ -197,7 +197,7 @@ void to_images(const FlowMessage& message, Image<float>& flow_x, Image<float>& f
 
 SE3 checked_pose(SE3 pose) {
   const double norm = pose.rotation.norm();
-  if (!(norm > 0.5 && norm < 2) || !pose.translation.allFinite()) throw Malformed("a pose is none");
+  if (!(norm > 0.5 && norm < 2) || !pose.translation.allFinite()) throw Malformed("a pose is invalid");
   if (std::abs(norm - 1) > kRoundingOfNorm) pose.rotation.normalize();
   return pose;
 }

@@ -15,7 +15,7 @@ namespace {
 constexpr std::uint64_t kMaxBytes = 1U << 26;
 constexpr std::uint32_t kMaxExtent = 65536;  // px
 
-/// What the first message of a channel tells.
+/// Facts from the first message of a channel.
 struct Facts {
   std::optional<TimeNs> start{};
   std::uint32_t width = 0, height = 0;  // px
@@ -24,7 +24,7 @@ struct Facts {
 
 class Surveyor {
  public:
-  /// False once there is nothing more to be learned.
+  /// Returns false when nothing more can be learned.
   bool look(const MessageInput& input, const Message& message);
   Survey conclude(const MessageInput& input, const ReadOptions& options) const;
 
@@ -42,7 +42,7 @@ class Surveyor {
                     const ReadOptions& options) const;
   SE3 pose_in_body(const std::string& frame) const;
 
-  std::map<std::size_t, Facts> facts_;  // of channels that have been seen
+  std::map<std::size_t, Facts> facts_;  // channels seen so far
   std::map<std::string, SE3> T_body_frames_;
   bool has_body_ = false;
   std::vector<std::string> objects_;
@@ -151,7 +151,7 @@ Survey Surveyor::conclude(const MessageInput& input, const ReadOptions& options)
     if (channel.role == Role::imu) info.imu.emplace().T_body_imu = pose_in_body(std::string(frame::kImu));
   }
   info.start = start.value_or(0);
-  info.start_known = start && start != events_start;  // by something that comes before the first event
+  info.start_known = start && start != events_start;  // known if something comes before the first event
   const TimeSpan written = input.times().value_or(TimeSpan{});
   info.end = info.start;
   if (written.start >= 0 && written.end >= written.start)

@@ -8,15 +8,15 @@
 
 namespace esim::ros {
 
-/// What has to be known of a file of messages before its first record.
+/// The properties of a file of messages that are needed before its first record.
 struct Survey {
   RecordingInfo info{};
   std::vector<Assignment> channels{};
-  bool damaged = false;  ///< it ended early, where the file is damaged
+  bool damaged = false;  ///< the survey ended at damage
 };
 
-/// Looks at messages until each channel has had one, or at some ten megabytes of them; at all where the file has no
-/// index. Stops at damage, which is left for the reader to tell.
+/// Reads messages until each channel has had one, or up to 64 MiB; if the file has no index, reads all of it.
+/// Stops at damage, which the reader reports.
 Survey survey(MessageInput& input, const ReadOptions& options);
 
 }  // namespace esim::ros

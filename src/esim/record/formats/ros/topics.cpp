@@ -70,7 +70,7 @@ std::vector<std::string> Assigner::find_cameras() {
   return names;
 }
 
-/// The one with the longest path; -1: none.
+/// The camera with the longest path; -1: no camera.
 int Assigner::camera_of(const Path& path) const {
   int best = -1;
   for (int i = 0; i < static_cast<int>(cameras_.size()); ++i) {
@@ -86,7 +86,7 @@ bool Assigner::has(Role role, int camera) const {
   });
 }
 
-/// Gives the role to the channel of least rank, the first of these; below 0: not to this one.
+/// Gives the role to the channel of lowest rank, to the first one of several; ranks below 0 exclude a channel.
 template <typename Rank>
 void Assigner::assign_best(Role role, int camera, const Rank& rank) {
   std::size_t best = channels_.size();

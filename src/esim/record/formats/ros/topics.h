@@ -8,7 +8,7 @@
 
 namespace esim::ros {
 
-/// Topics of a camera named cam0 are /cam0/events and so on.
+/// The topics of a camera named cam0 are /cam0/events and so on.
 namespace topic {
 inline constexpr std::string_view kEvents = "events";
 inline constexpr std::string_view kCameraInfo = "camera_info";
@@ -29,20 +29,20 @@ inline constexpr std::string_view kTransforms = "/tf";
 inline constexpr std::string_view kStaticTransforms = "/tf_static";
 }  // namespace topic
 
-/// Frames of transforms; cameras and objects are frames of their names.
+/// Frame names of transforms; cameras and objects use their own names.
 namespace frame {
 inline constexpr std::string_view kWorld = "map";
 inline constexpr std::string_view kBody = "body";
 inline constexpr std::string_view kImu = "imu";
 }  // namespace frame
 
-/// A name as ROS takes it: letters, digits and underscores.
+/// A valid ROS name: letters, digits and underscores.
 std::string ros_name(std::string_view name);
 
 /// "/cam0/events"
 std::string camera_topic(std::string_view camera, std::string_view leaf);
 
-/// What the messages of a channel are to a recording.
+/// The role of the messages of a channel in a recording.
 enum class Role {
   none,
   events,
@@ -71,11 +71,11 @@ struct Assignments {
   std::vector<Assignment> of_channels{};
 };
 
-/// A camera is each path with a topic of events, and each path with images that is not below such a one: of
-/// /dvs/events and /dvs/left/image_raw the camera is dvs. Of several topics that could be the frames of a camera
-/// "image_corrupted" is taken, as the original ESIM has it, then "image_raw", then the first; but image_raw beside
-/// irradiance, without frame_info, is a picture of that. Of several IMUs /imu is taken, then the first. Poses of the
-/// body are those of the transforms where these have a body, otherwise of "pose", then the first.
+/// Each path with a topic of events is a camera, and so is each path with images that is not below such a path: with
+/// /dvs/events and /dvs/left/image_raw, the camera is dvs. If several topics could be the frames of a camera,
+/// "image_corrupted" is chosen, as in the original ESIM, then "image_raw", then the first. However, image_raw next to
+/// irradiance, without frame_info, is a picture of the irradiance. Of several IMUs, /imu is chosen, then the first.
+/// Poses of the body come from the transforms if these contain a body, otherwise from "pose", then the first.
 Assignments assign_roles(const std::vector<Channel>& channels, bool transforms_have_body);
 
 }  // namespace esim::ros

@@ -7,7 +7,7 @@
 
 namespace esim::ros {
 
-/// Puts together what one camera's messages say of one instant, each a part of the ground truth.
+/// Combines the messages of one camera at one time, each of which is a part of the ground truth.
 class TruthAssembler {
  public:
   enum class Part { irradiance, depth, flow, pose };
@@ -19,17 +19,17 @@ class TruthAssembler {
     SE3 T_world_camera{};
   };
 
-  /// There are messages of this part; a frame is complete with those of all parts that there are.
+  /// Announces messages of this part; a frame is complete when it has all announced parts.
   void expect(Part part) { expected_.set(index(part)); }
 
-  /// Where to put a part of this time. Ends the frame before, if it is of another time.
+  /// The frame for a part at this time. Ends the previous frame if it has another time.
   Frame& begin(Part part, TimeNs t);
 
-  /// Ends the frame, although parts of it may be missing.
+  /// Ends the frame even if parts are missing.
   void end() { end_frame(); }
 
-  /// The frame that is complete or ended, once: a TruthRecord, an ImageRecord where irradiance is all that is known, or
-  /// nothing. Missing images are NaN. Borrowed until the next call of begin().
+  /// The complete or ended frame, once: a TruthRecord, an ImageRecord if only irradiance is known, or nothing. Missing
+  /// images are NaN. Borrowed until the next call of begin().
   std::optional<Record> take(int camera);
 
   bool is_complete() const { return open_ && frame_.parts == expected_; }

@@ -11,13 +11,14 @@
 namespace esim::rosbag {
 
 // ROS bags, format 2.0. After the first line, everything is a record: the length of its header, the header, the length
-// of its data, the data. A header is a list of fields: length, then `name=value`; "op" says what the record is.
+// of its data, the data. A header is a list of fields: length, then `name=value`; the field "op" is the type of the
+// record.
 
 inline constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
 
 enum class Op : std::uint8_t { message = 2, bag_header = 3, index = 4, chunk = 5, chunk_info = 6, connection = 7 };
 
-/// A time as in ROS 1: seconds in the lower 32 bits, nanoseconds in the upper ones.
+/// A ROS 1 time: seconds in the lower 32 bits, nanoseconds in the upper ones.
 inline std::uint64_t to_ros(TimeNs t) {
   return static_cast<std::uint64_t>(t / kNsPerSecond) | static_cast<std::uint64_t>(t % kNsPerSecond) << 32U;
 }
@@ -37,7 +38,7 @@ class RecordWriter {
   }
   RecordWriter& text(std::string_view name, std::string_view value);
 
-  /// The data, of so many bytes, are appended by the caller.
+  /// Ends the header; the caller appends so many bytes of data.
   void end_header(std::size_t data_bytes);
   void end(std::string_view data) {
     end_header(data.size());
@@ -51,11 +52,11 @@ class RecordWriter {
   std::size_t start_;
 };
 
-/// The value of a field of a header, borrowed; nothing where it is not there. Throws Malformed where the header is no
-/// list of fields.
+/// The value of a field of a header, borrowed; nothing if it is missing. Throws Malformed if the header is not a list
+/// of fields.
 std::optional<std::span<const std::byte>> find_field(std::span<const std::byte> header, std::string_view name);
 
-/// A field that has to be there.
+/// A required field.
 std::string_view text_field(std::span<const std::byte> header, std::string_view name);
 
 template <typename T>

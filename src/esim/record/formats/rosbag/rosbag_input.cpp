@@ -26,7 +26,7 @@ ros::ChunkCodec codec_of(std::span<const std::byte> header) {
 
 RosbagInput::RosbagInput(std::filesystem::path path) : file_(std::move(path)) {
   if (ros::as_text(file_.read_exactly(kMagic.size(), "its first line")) != kMagic) {
-    fail(0, "it is a bag, but not of version 2.0: `rosbag fix` makes one of older bags");
+    fail(0, "the bag must have version 2.0; convert older bags with `rosbag fix`");
   }
   read_bag_header();
   const std::uint64_t start = file_.offset();
@@ -38,7 +38,7 @@ void RosbagInput::read_bag_header() {
   Record record;
   if (!next_in_file(record)) fail(file_.offset(), "the bag's header is missing");
   try {
-    if (op_of(record.header) != Op::bag_header) throw ros::Malformed("it is another record");
+    if (op_of(record.header) != Op::bag_header) throw ros::Malformed("it is a record of another type");
     const auto encryptor = find_field(record.header, "encryptor");
     if (encryptor && !encryptor->empty()) throw ros::Malformed("the bag is encrypted");
     index_position_ = field<std::uint64_t>(record.header, "index_pos");
@@ -47,7 +47,7 @@ void RosbagInput::read_bag_header() {
   }
 }
 
-/// Without success, the bag is read as one that has no index.
+/// If this fails, the bag is read as one without an index.
 void RosbagInput::read_index() {
   try {
     file_.seek(index_position_);
@@ -71,8 +71,7 @@ bool RosbagInput::next_in_file(Record& record) {
   if (record.offset == file_.size()) return false;
   const auto length = [&](std::uint64_t most, std::string_view what) {
     const auto bytes = ros::load<std::uint32_t>(file_.read_exactly(4, "the length of " + std::string(what)).data());
-    if (bytes > most)
-      fail(record.offset, std::string(what) + " says that it is " + std::to_string(bytes) + " bytes long");
+    if (bytes > most) fail(record.offset, std::string(what) + " is too long: " + std::to_string(bytes) + " bytes");
     return bytes;
   };
   header_ = ros::as_text(file_.read_exactly(length(kMaxHeaderBytes, "a record's header"), "a record's header"));
@@ -109,14 +108,14 @@ bool RosbagInput::next(ros::Message& message) {
       const bool chunked = next_in_chunk(record);
       if (!chunked && times_ && file_.offset() >= index_position_) return false;
       if (!chunked && !next_in_file(record)) {
-        fail(record.offset, "the bag ends without an index: it was cut, or not finished");
+        fail(record.offset, "the bag ends without an index: it is truncated or unfinished");
       }
       const Op op = op_of(record.header);
       if (op == Op::connection) add_connection(record);
       if (op == Op::chunk && !chunked) open_chunk(record);
       if (op != Op::message) continue;
       const auto channel = channel_of_connection_.find(field<std::uint32_t>(record.header, "conn"));
-      if (channel == channel_of_connection_.end()) throw ros::Malformed("its topic is not known");
+      if (channel == channel_of_connection_.end()) throw ros::Malformed("its topic is unknown");
       message = {channel->second, record.data, record.offset};
       return true;
     }

@@ -12,7 +12,7 @@
 
 namespace esim::rosbag {
 
-/// Reads bags from front to back, chunk by chunk: the index only tells beforehand which topics there are.
+/// Reads bags from start to end, chunk by chunk. The index only lists the topics in advance.
 class RosbagInput final : public ros::MessageInput {
  public:
   explicit RosbagInput(std::filesystem::path path);
@@ -37,11 +37,11 @@ class RosbagInput final : public ros::MessageInput {
   void add_connection(const Record& record);
 
   InputFile file_;
-  std::uint64_t index_position_ = 0;  // 0: there is none
+  std::uint64_t index_position_ = 0;  // 0: no index
   std::optional<TimeSpan> times_;
   std::vector<ros::Channel> channels_;
   std::map<std::uint32_t, std::size_t> channel_of_connection_;
-  std::string header_;  // of the record in the file
+  std::string header_;  // header of the current record
   std::vector<std::byte> unpacked_;
   ros::ByteReader chunk_{{}};
   std::uint64_t chunk_offset_ = 0;

@@ -8,8 +8,8 @@
 namespace esim::rosbag {
 namespace {
 
-constexpr std::size_t kChunkBytes = 768 * 1024;  // as ROS makes them
-constexpr std::size_t kBagHeaderBytes = 4096;    // with its padding, so that it can be replaced
+constexpr std::size_t kChunkBytes = 768 * 1024;  // as in ROS
+constexpr std::size_t kBagHeaderBytes = 4096;    // with padding, so that it can be replaced
 constexpr std::uint32_t kVersion = 1;            // of index records
 
 void append_connection(std::string& out, std::uint32_t id, const std::string& topic, ros::MessageType type) {

@@ -12,8 +12,8 @@
 
 namespace esim::rosbag {
 
-/// Writes a bag: chunks with their indices, and at the end the index of chunks. Until close() the bag's header says
-/// that there is none.
+/// Writes a bag: chunks with their indices, and at the end the index of chunks. Until close(), the header of the bag
+/// states that there is no index.
 class RosbagOutput final : public ros::MessageOutput {
  public:
   RosbagOutput(std::filesystem::path path, ros::ChunkCodec codec);
@@ -25,13 +25,13 @@ class RosbagOutput final : public ros::MessageOutput {
   struct Connection {
     std::uint32_t id = 0;
     ros::MessageType type{};
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> messages{};  // of the chunk: time, offset in it
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> messages{};  // messages of the chunk: time, offset in it
   };
 
   struct ChunkInfo {
     std::uint64_t position = 0;
     TimeNs start = 0, end = 0;
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> counts{};  // connection, messages of it
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> counts{};  // connection and its number of messages
   };
 
   std::string bag_header(std::uint64_t index_position) const;

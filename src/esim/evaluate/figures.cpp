@@ -110,7 +110,7 @@ Image<Rgb> draw_motion(const SamplingEvaluation& evaluation) {
   const double first = to_seconds(evaluation.span.start), last = to_seconds(evaluation.span.end);
   Axes axes(canvas, {80, 62, kWidth - 110, kHeight - 120}, "Motion over time",
             linear_scale(first, last,
-                         evaluation.event_spans.empty() ? "time, s" : "time, s (dark: where events are compared)"),
+                         evaluation.event_spans.empty() ? "time, s" : "time, s (dark: events are compared here)"),
             linear_scale(0, top, "mean motion field, px/s"));
   for (const Window& window : evaluation.windows) {
     if (window.name == "all") continue;
@@ -154,7 +154,7 @@ Image<Rgb> draw_error_boxes(const SamplingEvaluation& evaluation) {
   Canvas canvas(kWidth, height, kPaper);
   Axes axes(canvas, {kLeft, kTop, kWidth - kLeft - 30, height - kTop - kBottom},
             "Error of the brightness L = log(E + eps)",
-            decade_scale(range.low, range.high, "RMSE of L of a pixel: 5, 25, 50, 75, 95 % of the pixels; dot: mean"),
+            decade_scale(range.low, range.high, "RMSE of L of the pixels: percentiles 5, 25, 50, 75, 95; dot: mean"),
             std::move(rows));
   const double step = 0.84 / static_cast<double>(windows);
   for (std::size_t i = 0; i < schemes; ++i) {

@@ -53,7 +53,7 @@ Scenario bare(const Scenario& scenario) {
 /// The same scenario with other rays for pixels that edges cross.
 Scenario with_rays(Scenario scenario, int samples_per_pixel) {
   auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
-  if (mesh == nullptr) throw UserError("--truth-rays: the renderer casts no rays; leave it out");
+  if (mesh == nullptr) throw UserError("--truth-rays: the renderer casts no rays; omit this option");
   mesh->samples_per_pixel = samples_per_pixel;
   return scenario;
 }
@@ -143,7 +143,7 @@ class Evaluation {
   }
 
   void simulate_reference_events() {
-    share_.start("reference of events", 1.5);
+    share_.start("reference events", 1.5);
     for (std::size_t i = 0; i < result_.event_spans.size(); ++i) {
       const double all = static_cast<double>(result_.event_spans.size());
       const Summary summary =

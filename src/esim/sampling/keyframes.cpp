@@ -248,7 +248,7 @@ class KeyframeSampler final : public Sampler {
 
 KeyframeLayout lay_out_keyframes(const KeyframeSampling& options, const SamplingContext& context) {
   if (context.renderer.on_sensor) {
-    throw UserError("sampling: keyframes cannot be seen from elsewhere where " + context.renderer.name +
+    throw UserError("sampling: type keyframes is not supported where " + context.renderer.name +
                     " are drawn on the sensor itself; use type flow or brightness");
   }
   return lay_out_keyframes(context.camera, options.supersampling > 0 ? options.supersampling : kLeastSupersampling,

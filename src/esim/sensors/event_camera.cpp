@@ -93,7 +93,8 @@ EventCamera& EventCamera::operator=(EventCamera&&) noexcept = default;
 
 void EventCamera::State::subtract_surround(const Segment& segment, const Workers& workers) {
   if (segment.tile != size)
-    throw UserError("event camera: surround_px needs samples of whole images; choose a sampling that gives them");
+    throw UserError(
+        "event camera: surround_px requires samples of whole images; choose a sampling type that gives them");
   if (brightness.empty()) brightness = Image<float>(size.width, size.height);
   workers.for_each(size.height, [&](int y) {
     respond(pixels.options, static_cast<std::size_t>(size.width), segment.irradiance1.row(y), brightness.row(y));
@@ -110,7 +111,7 @@ void EventCamera::State::refuse_long_time(TimeNs duration) const {
   const TimeNs longest = packing.longest() / 2;
   if (duration < longest) return;
   throw UserError("event camera: two samples are " + std::to_string(to_seconds(duration)) +
-                  " s apart; give one at least every " + std::to_string(to_seconds(longest)) + " s");
+                  " s apart; the interval must be shorter than " + std::to_string(to_seconds(longest)) + " s");
 }
 
 /// Rows of the i-th segment.
@@ -171,7 +172,7 @@ bool EventCamera::State::integrate(const Workers& workers) {
 void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark, const Workers& workers) {
   State& state = *state_;
   if (state.spoiled)
-    throw UserError("event camera: it has seen an irradiance that is none, and cannot go on; begin with a new one");
+    throw UserError("event camera: an earlier irradiance was invalid, and the camera cannot go on; create a new one");
   const auto threads = static_cast<std::size_t>(workers.threads());
   if (state.updates.size() < threads) state.updates.resize(threads), state.events.resize(threads);
   TimeNs first = std::numeric_limits<TimeNs>::max(), last = std::numeric_limits<TimeNs>::min();
@@ -199,8 +200,8 @@ void EventCamera::process(const Image<float>& irradiance, TimeNs t, std::vector<
   const State& state = *state_;
   if (irradiance.bounds() != state.size) {
     throw UserError("frame " + std::to_string(state.frames) + ": its size is " + std::to_string(irradiance.width()) +
-                    " x " + std::to_string(irradiance.height()) + ", the camera's " + std::to_string(state.size.width) +
-                    " x " + std::to_string(state.size.height) + "; give frames of the camera's size");
+                    " x " + std::to_string(irradiance.height()) + " px; it must be the camera's, " +
+                    std::to_string(state.size.width) + " x " + std::to_string(state.size.height) + " px");
   }
   process(irradiance.pixels(), t, out, workers);
 }
@@ -210,13 +211,14 @@ void EventCamera::process(std::span<const float> irradiance, TimeNs t, std::vect
   State& state = *state_;
   const std::string frame = "frame " + std::to_string(state.frames);
   if (irradiance.size() != state.size.area()) {
-    throw UserError(frame + ": it has " + std::to_string(irradiance.size()) + " pixels, the camera " +
-                    std::to_string(state.size.area()) + "; give frames of the camera's size");
+    throw UserError(frame + ": it has " + std::to_string(irradiance.size()) + " pixels; it must have the camera's " +
+                    std::to_string(state.size.area()) + " pixels");
   }
   const bool first = state.frames == 0;
   if (!first && t <= state.last_time) {
-    throw UserError(frame + ": its time, " + std::to_string(t) + " ns, does not come after that of the frame before, " +
-                    std::to_string(state.last_time) + " ns; give frames in order");
+    throw UserError(frame + ": its time, " + std::to_string(t) +
+                    " ns, does not come after that of the previous frame, " + std::to_string(state.last_time) +
+                    " ns; pass the frames in order of time");
   }
   if (state.next_frame.empty()) state.next_frame = Image<float>(state.size.width, state.size.height);
   std::copy(irradiance.begin(), irradiance.end(), state.next_frame.data());
@@ -247,8 +249,8 @@ EventCameraStatistics EventCamera::statistics() const {
 std::vector<std::byte> EventCamera::state() const {
   if (state_->readout && !state_->readout->history.empty()) {
     throw UserError(
-        "event camera: its state cannot be saved while tiles are known until different times; save it where the "
-        "watermark is the end of every segment");
+        "event camera: its state cannot be saved while the segments of its tiles end at different times; save it when "
+        "every segment ends at the watermark");
   }
   std::vector<std::byte> bytes;
   StateWriter archive(bytes);

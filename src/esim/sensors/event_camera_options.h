@@ -90,17 +90,18 @@ inline constexpr std::array<const char*, 2> kEnumNames<RefractoryMode>{"hold", "
 
 template <class Visitor>
 void describe(Visitor& visit, ReadoutOptions& o) {
-  visit("rate_mev_per_s", o.rate_mev_per_s, About{"events read out at most; 0: no limit", "Mev/s", 0, 1e6});
-  visit("row_time_us", o.row_time_us, About{"time that reading a row takes beside its events", "us", 0, 1e6});
-  visit("queue_events", o.queue_events,
-        About{"events that can wait at the same time; more are dropped and counted; 0: one per pixel", "", 0, 1e9});
+  visit("rate_mev_per_s", o.rate_mev_per_s, About{"maximum readout rate; 0: no limit", "Mev/s", 0, 1e6});
+  visit("row_time_us", o.row_time_us, About{"time to read out a row, in addition to its events", "us", 0, 1e6});
+  visit(
+      "queue_events", o.queue_events,
+      About{"maximum number of waiting events; further events are dropped and counted; 0: one per pixel", "", 0, 1e9});
 }
 
 template <class Visitor>
 void describe(Visitor& visit, EventCameraOptions& o) {
   // A preset stands for all values that are not given beside it.
   const SensorPreset before = o.preset;
-  visit("preset", o.preset, About{"sensor whose values stand where none are given"});
+  visit("preset", o.preset, About{"sensor that sets the defaults of all other options"});
   if (o.preset != before) o = preset_options(o.preset);
 
   visit("contrast_threshold", o.contrast_threshold,
@@ -117,32 +118,38 @@ void describe(Visitor& visit, EventCameraOptions& o) {
   visit("response", o.response, About{"brightness: ln(E + log_eps), or v2e's with a linear toe"});
   visit("log_eps", o.log_eps, About{"added to the irradiance before the logarithm", "", 0, 1, true});
   visit("lin_log_knee", o.lin_log_knee, About{"irradiance below which lin_log is linear", "", 0.005, 10});
-  visit("dark_irradiance", o.dark_irradiance,
-        About{"irradiance worth of the dark current: what goes with the light goes with E plus this", "", 0, 10, true});
-  visit("low_pass_hz", o.low_pass_hz, About{"cut-off (-3 dB) of the photoreceptor at white; 0: none", "Hz", 0, 1e9});
+  visit(
+      "dark_irradiance", o.dark_irradiance,
+      About{"irradiance equivalent to the dark current; effects that depend on the irradiance E use E plus this value",
+            "", 0, 10, true});
+  visit("low_pass_hz", o.low_pass_hz,
+        About{"cut-off (-3 dB) of the photoreceptor at white; 0: no low-pass", "Hz", 0, 1e9});
   visit("low_pass_order", o.low_pass_order, About{"poles of the photoreceptor's low-pass", "", 1, 2});
   visit("surround_px", o.surround_px,
-        About{"reach of the surround that is subtracted from each pixel; 0: none", "px", 0, 1000});
+        About{"length constant of the surround that is subtracted from each pixel; 0: no surround", "px", 0, 1000});
   visit("surround_ms", o.surround_ms, About{"time constant of the surround", "ms", 0, 1e6});
 
   visit("refractory_period_us", o.refractory_period_us,
-        About{"time after an event during which a pixel fires none", "us", 0, 1e9});
-  visit("refractory_mode", o.refractory_mode, About{"the pixel is held in reset, or its events are dropped"});
-  visit("leak_rate_hz", o.leak_rate_hz, About{"ON events of a pixel without change of light", "Hz", 0, 1e6});
+        About{"time after an event during which a pixel fires no events", "us", 0, 1e9});
+  visit("refractory_mode", o.refractory_mode, About{"hold: the pixel is held in reset; drop: its events are dropped"});
+  visit("leak_rate_hz", o.leak_rate_hz, About{"rate of ON events of a pixel at constant irradiance", "Hz", 0, 1e6});
   visit("leak_mismatch_decades", o.leak_mismatch_decades,
         About{"standard deviation of log10 of the leak rate from pixel to pixel", "", 0, 2});
   visit("leak_jitter", o.leak_jitter, About{"relative standard deviation of the time between leak events", "", 0, 0.3});
-  visit("shot_noise_hz", o.shot_noise_hz, About{"random events of a pixel in the dark, ON and OFF", "Hz", 0, 1e5});
-  visit("shot_noise_at_white", o.shot_noise_at_white, About{"share of the shot noise that is left at white", "", 0, 1});
-  visit("hot_pixels", o.hot_pixels, About{"share of pixels that leak at hot_pixel_rate_hz", "", 0, 1});
-  visit("hot_pixel_rate_hz", o.hot_pixel_rate_hz, About{"ON events of a hot pixel", "Hz", 0, 1e6});
-  visit("dead_pixels", o.dead_pixels, About{"share of pixels that never fire", "", 0, 1});
+  visit("shot_noise_hz", o.shot_noise_hz,
+        About{"rate of random events of a pixel in the dark, ON and OFF", "Hz", 0, 1e5});
+  visit("shot_noise_at_white", o.shot_noise_at_white,
+        About{"fraction of the shot noise that remains at white", "", 0, 1});
+  visit("hot_pixels", o.hot_pixels, About{"fraction of pixels that leak at hot_pixel_rate_hz", "", 0, 1});
+  visit("hot_pixel_rate_hz", o.hot_pixel_rate_hz, About{"rate of ON events of a hot pixel", "Hz", 0, 1e6});
+  visit("dead_pixels", o.dead_pixels, About{"fraction of pixels that never fire", "", 0, 1});
 
-  visit("latency_us", o.latency_us, About{"from the crossing to the time stamp, at white", "us", 0, 1e6});
+  visit("latency_us", o.latency_us,
+        About{"time from the threshold crossing to the time stamp, at white", "us", 0, 1e6});
   visit("latency_jitter_us", o.latency_jitter_us, About{"standard deviation of the latency, at white", "us", 0, 1e6});
   visit("latency_light_share", o.latency_light_share,
-        About{"share of latency and jitter that goes with 1 / intensity", "", 0, 1});
-  visit("readout", o.readout, About{"from the pixels to the outside"});
+        About{"fraction of latency and jitter that is proportional to 1 / intensity", "", 0, 1});
+  visit("readout", o.readout, About{"readout of the events from the pixels"});
 }
 
 }  // namespace esim

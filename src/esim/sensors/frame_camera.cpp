@@ -41,7 +41,7 @@ const FrameCameraOptions& checked(const FrameCameraOptions& o, int height) {
                                      height, o.line_delay_s * height, interval_s, o.rate_hz));
   }
   if (o.black_level >= o.largest_number())
-    fail("black_level", fmt::format("{} leaves nothing of the {} bits", o.black_level, o.bits));
+    fail("black_level", fmt::format("{} leaves no range within {} bits", o.black_level, o.bits));
   if (!o.auto_exposure) return o;
   const double least = o.auto_exposure->min_exposure_s, most = o.auto_exposure->max_exposure_s.value_or(interval_s);
   check_exposure("auto_exposure.max_exposure_s", most);
@@ -49,7 +49,7 @@ const FrameCameraOptions& checked(const FrameCameraOptions& o, int height) {
     fail("auto_exposure.min_exposure_s", fmt::format("{} s is above max_exposure_s, {:.6g} s; swap them", least, most));
   if (o.exposure_s < least || o.exposure_s > most * slack) {
     fail("exposure_s",
-         fmt::format("{} s, the first exposure, is not between min_exposure_s = {} s and max_exposure_s = "
+         fmt::format("{} s, the first exposure, must be between min_exposure_s = {} s and max_exposure_s = "
                      "{:.6g} s of auto_exposure",
                      o.exposure_s, least, most));
   }
@@ -257,7 +257,7 @@ FrameCamera& FrameCamera::operator=(FrameCamera&&) noexcept = default;
 void FrameCamera::integrate(std::span<const Segment> segments, TimeNs watermark, const Workers& workers) {
   State& state = *state_;
   if (state.spoiled)
-    throw UserError("frame camera: it has seen an irradiance that is none, and cannot go on; begin with a new one");
+    throw UserError("frame camera: an earlier irradiance was invalid, and the camera cannot go on; create a new one");
   state.spoiled = true;  // unless all goes well
   state.expose(segments, workers);
   for (const Segment& segment : segments) {

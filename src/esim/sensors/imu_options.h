@@ -51,13 +51,12 @@ struct InertialUnits {
 template <class Visitor>
 void describe_axes(Visitor& visit, InertialAxesOptions& o, const InertialUnits& units) {
   visit("noise_density", o.noise_density, About{"white noise, continuous-time", units.noise_density, 0, 1e6});
-  visit("random_walk", o.random_walk, About{"of the bias, continuous-time", units.random_walk, 0, 1e6});
-  visit("initial_bias", o.initial_bias, About{"at the start", units.signal, -1e6, 1e6});
-  visit("scale", o.scale, About{"factor of each axis", "", -1e3, 1e3});
+  visit("random_walk", o.random_walk, About{"random walk of the bias, continuous-time", units.random_walk, 0, 1e6});
+  visit("initial_bias", o.initial_bias, About{"bias at the start", units.signal, -1e6, 1e6});
+  visit("scale", o.scale, About{"scale factor of each axis", "", -1e3, 1e3});
   visit("misalignment", o.misalignment,
-        About{"what axes take from others, as factors: x from y, x from z, y from x, y from z, z from x, z from y", "",
-              -1e3, 1e3});
-  visit("range", o.range, About{"greatest magnitude of an axis; 0: unlimited", units.signal, 0, 1e9});
+        About{"cross-axis factors: x from y, x from z, y from x, y from z, z from x, z from y", "", -1e3, 1e3});
+  visit("range", o.range, About{"maximum magnitude of an axis; 0: unlimited", units.signal, 0, 1e9});
 }
 
 template <class Visitor>
@@ -75,7 +74,7 @@ void describe(Visitor& visit, ImuOptions& o) {
   visit("rate_hz", o.rate_hz, About{"measurements per second", "Hz", 0, kMaxImuRate_hz, true});
   visit("gyroscope", o.gyroscope, About{"angular rate"});
   visit("accelerometer", o.accelerometer, About{"specific force"});
-  visit("gravity", o.gravity, About{"acceleration of free fall, world frame", "m/s^2", -1e6, 1e6});
+  visit("gravity", o.gravity, About{"gravitational acceleration, world frame", "m/s^2", -1e6, 1e6});
 }
 
 }  // namespace esim

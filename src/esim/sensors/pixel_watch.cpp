@@ -98,7 +98,7 @@ void check_irradiance(const Segment& segment) {
       if (is_irradiance(row[x])) continue;
       throw UserError("irradiance " + std::to_string(row[x]) + " of pixel (" + std::to_string(x) + ", " +
                       std::to_string(y) + ") at t = " + std::to_string(to_seconds(segment.t1)) +
-                      " s is not a finite number >= 0; check where the images come from");
+                      " s must be a finite number >= 0; check the source of the images");
     }
   }
 }

@@ -81,7 +81,8 @@ class StateReader {
 
   [[noreturn]] static void fail() {
     throw UserError(
-        "the state of an event camera is damaged, or of another camera: restore it in one that is made alike");
+        "the state of an event camera is damaged, or belongs to another camera; restore it into a camera that was "
+        "created with the same arguments");
   }
 
  private:

@@ -104,7 +104,7 @@ ReportSection stamp_section(const Statistics& s) {
                                           phase.neighbours_chi2_per_dof, p_text(phase.p_value))
                             : "-");
   line("modulation", tested ? percent(phase.modulation) + " rms" : "-");
-  line("within 1 % of peak", tested ? percent(phase.share_at_peak) + " of the events (even: 2 %)" : "-");
+  line("within 1 % of peak", tested ? percent(phase.share_at_peak) + " of the events (uniform: 2 %)" : "-");
   line("verdict", verdict(s));
   return section;
 }

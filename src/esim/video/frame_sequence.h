@@ -24,12 +24,12 @@ struct VideoOptions {
 template <class Visitor>
 void describe(Visitor& visit, VideoOptions& o) {
   visit("encoding", o.encoding,
-        About{"how codes stand for light; auto: integers are sRGB, floating point (EXR, HDR) is linear"});
+        About{"encoding of the pixel values; auto: integers are sRGB, floating point (EXR, HDR) is linear"});
   visit("fps", o.fps, About{"frames per second, instead of the input's time stamps", "Hz", 0, 1e9, true});
   visit("slow_motion", o.slow_motion,
-        About{"the scene was this many times faster than the time stamps say", "", 0, 1e9, true});
-  visit("start", o.start, About{"where to begin, after the first frame, by the time stamps", "s", 0, 1e9});
-  visit("duration", o.duration, About{"how much to convert, by the time stamps (default: all)", "s", 0, 1e9, true});
+        About{"factor by which the scene was faster than the time stamps say", "", 0, 1e9, true});
+  visit("start", o.start, About{"start of the conversion, after the first frame, by the time stamps", "s", 0, 1e9});
+  visit("duration", o.duration, About{"duration to convert, by the time stamps (default: all)", "s", 0, 1e9, true});
 }
 
 struct Frame {

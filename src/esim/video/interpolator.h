@@ -15,9 +15,9 @@ struct InterpolationOptions {
 
 template <class Visitor>
 void describe(Visitor& visit, InterpolationOptions& o) {
-  visit("interpolation", o.interpolation, About{"follow the motion between frames"});
-  visit("lambda", o.lambda, About{"greatest displacement in a step between frames", "px", 0, 1000, true});
-  visit("max_steps", o.max_steps, About{"most steps between two frames, whatever the displacement", "", 1, 1e6});
+  visit("interpolation", o.interpolation, About{"interpolate along the motion between frames"});
+  visit("lambda", o.lambda, About{"maximum motion in a step between frames", "px", 0, 1000, true});
+  visit("max_steps", o.max_steps, About{"maximum number of steps between two frames, whatever the motion", "", 1, 1e6});
 }
 
 /// The brightness between frames of a video. With displacements u forward from frame 0 and v backward from frame 1, the

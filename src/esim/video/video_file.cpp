@@ -40,7 +40,7 @@ struct Demuxer {
     };
     AVFormatContext* context = nullptr;
     check(avformat_open_input(&context, ("file:" + path.string()).c_str(), nullptr, nullptr),
-          "is no video that can be read, or it is cut off");
+          "is not a readable video, or is cut off");
     format.reset(context);
     check(avformat_find_stream_info(context, nullptr), "cannot be read as a video");
     const int best = av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
@@ -190,7 +190,7 @@ class VideoFileSource final : public FrameSource {
         converter_.release(), frame_->width, frame_->height, format, frame_->width, frame_->height, wanted,
         SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP | SWS_BITEXACT, nullptr, nullptr,
         nullptr));
-    if (!converter_) fail("has pixels of a kind that cannot be converted to RGB; convert the video to H.264 or FFV1");
+    if (!converter_) fail("has a pixel format that cannot be converted to RGB; convert the video to H.264 or FFV1");
     const int matrix = frame_->colorspace != AVCOL_SPC_UNSPECIFIED ? frame_->colorspace
                        : frame_->height >= 720                     ? SWS_CS_ITU709
                                                                    : SWS_CS_ITU601;
@@ -212,8 +212,8 @@ class VideoFileSource final : public FrameSource {
     if (frame_->color_trc == AVCOL_TRC_LINEAR) return Encoding::linear;
     if (frame_->color_trc == AVCOL_TRC_SMPTE2084 || frame_->color_trc == AVCOL_TRC_ARIB_STD_B67) {
       fail(
-          "is encoded for high dynamic range (PQ or HLG), which is not known here; convert the video to SDR, or pass "
-          "--encoding srgb to take it as that");
+          "is encoded for high dynamic range (PQ or HLG), which is not supported; convert the video to SDR, or pass "
+          "--encoding srgb to read it as sRGB");
     }
     return Encoding::srgb;
   }

@@ -105,7 +105,7 @@ std::optional<Content> image_content(const Survey& survey) {
 
 PlayOptions choose_missing(PlayOptions options, const Survey& survey) {
   if (survey.events == 0) {
-    throw UserError(fmt::format("{}: there are no events from {} to {} s", options.name,
+    throw UserError(fmt::format("{}: there are no events between {} and {} s", options.name,
                                 to_seconds(survey.start - survey.origin), to_seconds(survey.end - survey.origin)));
   }
   const std::vector<View> all = views_of(survey);
@@ -132,7 +132,7 @@ Instants video_instants(const Survey& survey, const PlayOptions& options) {
   const double step_ns = 1e9 / (options.frames_per_s * options.slow_motion);
   const double steps = static_cast<double>(survey.end - survey.start) / step_ns;
   if (!(steps < kMostFrames)) {
-    throw RemediableError(fmt::format("{} lasts {:.4g} s, too long for a video: choose a part of it, or show it faster",
+    throw RemediableError(fmt::format("{} lasts {:.4g} s, too long for a video; choose a part of it, or show it faster",
                                       options.name, to_seconds(survey.end - survey.start)),
                           Remedy::shorter_video);
   }

@@ -32,7 +32,7 @@ struct FlowSampling {
   RateBounds bounds{};
 };
 
-/// Tiles have times of their own, so that the brightness between two samples is off by no more than the tolerance.
+/// Samples each tile at its own times, so that the error of brightness between two samples stays below the tolerance.
 struct AdaptiveSampling {
   static constexpr const char* kType = "adaptive";
   double tolerance = 0.25;
@@ -41,7 +41,7 @@ struct AdaptiveSampling {
   RateBounds bounds{20, 50000};
 };
 
-/// Few images of a denser camera, and between them what their pixels show from elsewhere.
+/// Renders a few images with a denser camera, and reprojects them to the times in between.
 struct KeyframeSampling {
   static constexpr const char* kType = "keyframes";
   double tolerance = 0.5;

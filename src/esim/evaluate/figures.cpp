@@ -34,7 +34,7 @@ std::size_t family_index(const SamplingEvaluation& evaluation, const SchemeResul
 
 Rgb family_colour(std::size_t index) { return kFamilyColours[index % std::size(kFamilyColours)]; }
 
-/// A scheme's colour: its family's, the paler the cheaper it is among them.
+/// A scheme's colour: that of its family, paler for cheaper schemes.
 Rgb scheme_colour(const SamplingEvaluation& evaluation, const SchemeResult& scheme) {
   const auto cost = [](const SchemeResult& s) { return s.windows.back().frame_equivalents_per_s; };
   int cheaper = 0, members = 0;
@@ -47,7 +47,7 @@ Rgb scheme_colour(const SamplingEvaluation& evaluation, const SchemeResult& sche
   return mix(family_colour(family_index(evaluation, scheme)), kPaper, pale);
 }
 
-/// The smallest and largest of the values above 0, with room on both sides on a logarithmic axis.
+/// The smallest and the largest of the values above 0.
 struct Range {
   double low = std::numeric_limits<double>::infinity(), high = 0;
   void add(double value) {
@@ -72,7 +72,7 @@ void draw_key(Canvas& canvas, int x, int baseline, Rgb colour, const std::string
   canvas.text(x + 30, baseline, label, kTextHeight, kInk);
 }
 
-/// Five quantiles and the mean, at the height `y` of the diagram.
+/// Draws five quantiles and the mean at the height `y` of the diagram.
 void draw_box(Axes& axes, const std::vector<double>& values, double y, double half_height, Rgb colour) {
   const double low = quantile(values, 0.05), lower = quantile(values, 0.25), middle = quantile(values, 0.5),
                upper = quantile(values, 0.75), high = quantile(values, 0.95);

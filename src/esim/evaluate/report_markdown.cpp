@@ -62,7 +62,7 @@ std::string brightness_table(const SamplingEvaluation& e, std::size_t w) {
   return text;
 }
 
-/// Where the squared errors are; empty unless all pixels were compared.
+/// The squared errors by place; empty unless all pixels were compared.
 std::string places_table(const SamplingEvaluation& e, std::size_t w) {
   const auto& first = e.schemes.front().windows[w].brightness;
   if (first.places[0].values == 0) return {};

@@ -68,7 +68,7 @@ void EventStatistics::add(EventSpan events) {
   for (const Event& event : events) {
     if (event.x >= s.sensor.width || event.y >= s.sensor.height) make_room(event);
     count_stamp(event.t);
-    const bool on = event.polarity > 0;  // added rather than branched upon: it cannot be predicted
+    const bool on = event.polarity > 0;  // no branch: the polarity cannot be predicted
     s.on += on;
     s.off += !on;
     s.rate.add(event.t - s.first, on);

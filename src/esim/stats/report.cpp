@@ -28,7 +28,7 @@ double ratio(std::uint64_t part, std::uint64_t whole) {
 
 std::string p_text(double p) { return p < 1e-300 ? "p < 1e-300" : fmt::format("p = {:.2g}", p); }
 
-// Of the strongest of many frequencies: how likely it is that any of them would be so strong by chance.
+// Probability that any of the searched frequencies is this strong by chance.
 std::string corrected_p_text(const Periodicity& periodicity) {
   return fmt::format("{}, corrected for {} frequencies", p_text(periodicity.p_value), grouped(periodicity.candidates));
 }

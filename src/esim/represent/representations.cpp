@@ -34,7 +34,7 @@ ImageStack<T> make_stack(int count, int width, int height, T value = T{}) {
                   std::to_string(height) + " px");
 }
 
-/// Calls visit(event, pixel) for each.
+/// Calls visit(event, pixel) for each event.
 template <typename Visit>
 void for_each_pixel(EventSpan events, int width, int height, Visit visit) {
   for (const Event& event : events) {
@@ -46,7 +46,7 @@ void for_each_pixel(EventSpan events, int width, int height, Visit visit) {
 
 bool covers(const TimeSpan& span, TimeNs t) { return t >= span.start && t <= span.end; }
 
-/// What takes the time since the start of a span to a number from 0 to `full`.
+/// Factor that scales the time since the start of a span to [0, full].
 double scale_of(const TimeSpan& span, double full) {
   if (span.end < span.start) {
     throw UserError("the time span from " + std::to_string(span.start) + " to " + std::to_string(span.end) +
@@ -70,7 +70,7 @@ ImageStack<float> count_and_stamp(EventSpan events, int width, int height, const
   auto stack = make_stack<float>(4, width, height);
   const std::size_t plane = stack.values.size() / 4;
   const double scale = scale_of(span, 1);
-  std::vector<double> stamps(2 * plane, 0.0);  // the last, or the sum
+  std::vector<double> stamps(2 * plane, 0.0);  // last time stamp, or their sum
   for_each_pixel(events, width, height, [&](const Event& event, std::size_t pixel) {
     if (!covers(span, event.t)) return;
     const std::size_t place = pixel + (event.polarity > 0 ? 0 : plane);

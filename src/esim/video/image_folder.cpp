@@ -127,7 +127,7 @@ class ImageFolder final : public FrameSource {
   bool colour_;
   Listing listing_;
   std::vector<std::string> names_;
-  std::size_t next_ = 0;  // frames that advance() has come to
+  std::size_t next_ = 0;  // frames that advance() has reached
 };
 
 }  // namespace

@@ -31,7 +31,7 @@ Playable::Playable(const fs::path& path, std::optional<SensorSize> sensor) : pat
     path_ = events.path();
     reading_.sensor = events.sensor();
   } else if (!folder && !reading_.sensor && open()->info().cameras.size() == 1) {
-    reading_.sensor = EventsFile(path_, reading_).sensor();  // as a report beside it may say
+    reading_.sensor = EventsFile(path_, reading_).sensor();  // from a report next to the file, if there is one
   }
 }
 

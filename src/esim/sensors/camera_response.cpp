@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kMostPoints = 1 << 20;
 
-/// Takes a number, and the blanks and comma behind it, from the front of `text`.
+/// Takes a number, and the blanks, comma or semicolon after it, from the front of `text`.
 std::optional<double> take_number(std::string_view& text) {
   double value = 0;
   const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -48,7 +48,7 @@ CameraResponse::CameraResponse(const ResponseOptions& options) : options_(option
     if (text.empty() || text.front() == '#') continue;
     const auto signal = take_number(text), level = signal ? take_number(text) : std::nullopt;
     if (!level || !text.empty()) {
-      if (points.empty() && number == 1) continue;  // names of columns
+      if (points.empty() && number == 1) continue;  // column names
       fail("a line of a measured response must hold two numbers, signal and level");
     }
     if (*signal < 0 || *level < 0) fail("signal and level must not be below 0");

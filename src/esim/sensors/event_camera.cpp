@@ -20,9 +20,9 @@
 namespace esim {
 namespace {
 
-constexpr int kPixelsPerPiece = 4096;  // of a parallel loop
+constexpr int kPixelsPerPiece = 4096;  // per task of a parallel loop
 
-/// The rows of a tile in pieces for a parallel loop.
+/// Divides the rows of a tile into tasks of a parallel loop.
 struct RowPieces {
   int first, last, rows, count;
 
@@ -52,7 +52,7 @@ struct EventCamera::State {
   void refuse_long_time(TimeNs duration) const;
   void subtract_surround(const Segment& segment, const Workers& workers);
 
-  /// All but memory to work in, and the queue.
+  /// Everything except working memory and the queue.
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     PixelArray::transfer(archive, self.pixels);
@@ -67,17 +67,17 @@ struct EventCamera::State {
   PixelArray pixels;
   EventPacking packing;
   Tile size;
-  bool spoiled = false;  // by a segment that was only partly integrated
+  bool spoiled = false;  // a segment was integrated only partly
   std::optional<CenterSurround> surround;
-  Image<float> brightness;               // less the surround
-  std::vector<PixelUpdate> updates;      // by worker
-  std::vector<PackedEvents> events;      // by worker
-  std::span<const Segment> segments;     // that are being integrated
-  std::vector<std::size_t> tile_begins;  // where the segments of some tiles begin, and the end
+  Image<float> brightness;               // minus the surround
+  std::vector<PixelUpdate> updates;      // per worker
+  std::vector<PackedEvents> events;      // per worker
+  std::span<const Segment> segments;     // being integrated
+  std::vector<std::size_t> tile_begins;  // first segment of each group of tiles, and the end
   EventQueue queue;
   std::optional<PixelReadout> readout;
 
-  // Of process().
+  // For process().
   Image<float> last_frame, next_frame;
   TimeNs last_time = 0;
   std::int64_t frames = 0;
@@ -106,7 +106,7 @@ void EventCamera::State::subtract_surround(const Segment& segment, const Workers
   }
 }
 
-/// What packed events have no room for, latencies included.
+/// Refuses durations that packed events, including latencies, cannot represent.
 void EventCamera::State::refuse_long_time(TimeNs duration) const {
   const TimeNs longest = packing.longest() / 2;
   if (duration < longest) return;
@@ -114,7 +114,7 @@ void EventCamera::State::refuse_long_time(TimeNs duration) const {
                   " s apart; the interval must be shorter than " + std::to_string(to_seconds(longest)) + " s");
 }
 
-/// Rows of the i-th segment.
+/// Integrates rows of the i-th segment.
 bool EventCamera::State::advance(std::size_t i, const Image<float>* given, Rows rows, int worker) {
   const Segment& segment = segments[i];
   PixelUpdate& update = updates[static_cast<std::size_t>(worker)];
@@ -123,7 +123,7 @@ bool EventCamera::State::advance(std::size_t i, const Image<float>* given, Rows 
   return update.advance(pixels, segment, given, rows, past, events[static_cast<std::size_t>(worker)]);
 }
 
-/// The rows of the i-th segment in parallel.
+/// Integrates the rows of the i-th segment in parallel.
 bool EventCamera::State::integrate_one(std::size_t i, const Workers& workers) {
   const Segment& segment = segments[i];
   const Image<float>* given = nullptr;
@@ -139,7 +139,7 @@ bool EventCamera::State::integrate_one(std::size_t i, const Workers& workers) {
   return good;
 }
 
-/// Several tiles in parallel.
+/// Integrates several tiles in parallel.
 bool EventCamera::State::integrate_tiles(const Workers& workers) {
   std::atomic<bool> good = true;
   workers.for_each_with_worker(static_cast<int>(tile_begins.size()) - 1, [&](int i, int worker) {
@@ -154,7 +154,7 @@ bool EventCamera::State::integrate_tiles(const Workers& workers) {
 
 bool EventCamera::State::integrate(const Workers& workers) {
   tile_begins.clear();
-  int pixels_seen = 0;  // since the last of them
+  int pixels_seen = 0;  // since the last tile_begins
   for (std::size_t i = 0; i < segments.size(); ++i) {
     if (segments[i].t0 == segments[i].t1) pixels.set_epoch(segments[i].t0);
     if (i == 0 || (segments[i].tile != segments[i - 1].tile && pixels_seen >= kPixelsPerPiece))

@@ -6,24 +6,24 @@
 
 namespace esim {
 
-/// Sensors whose published figures are known (docs/pixel.md has the sources).
+/// Sensors with published parameters (docs/pixel.md has the sources).
 enum class SensorPreset { ideal, dvs128, davis240c, davis346, dvxplorer, gen31_vga, imx636, v2e_clean, v2e_noisy };
 
 /// How irradiance becomes brightness.
 enum class PixelResponse {
-  log,      ///< L = ln(E + log_eps), the paper's
-  lin_log,  ///< L = ln(255 E), but a straight line through the origin below lin_log_knee, v2e's
+  log,      ///< L = ln(E + log_eps), as in the paper
+  lin_log,  ///< L = ln(255 E), linear through the origin below lin_log_knee, as in v2e
 };
 
-/// What a refractory period does to the events that fall into it.
+/// What happens to events within a refractory period.
 enum class RefractoryMode {
-  hold,  ///< the pixel is held in reset, and its reference is the brightness at the period's end, as in silicon
-  drop,  ///< the events are lost, but the reference steps on through them, as in the original ESIM
+  hold,  ///< the pixel is held in reset; its reference is the brightness at the period's end, as in real sensors
+  drop,  ///< the events are lost, but they update the reference, as in the original ESIM
 };
 
-/// The way from the pixels to the outside: rows with events wait, first come first served, for one reader that takes
-/// all of a row's events at once and stamps them with the time at which it does. A pixel waits until its event has been
-/// read; its refractory period begins then.
+/// The readout of the pixels. Rows with events wait, first come first served, for one reader, which reads all events of
+/// a row together and stamps them with the time of reading. A pixel waits until its event has been read; then its
+/// refractory period begins.
 struct ReadoutOptions {
   double rate_mev_per_s = 0.0;
   double row_time_us = 0.0;
@@ -32,15 +32,14 @@ struct ReadoutOptions {
   bool limited() const { return rate_mev_per_s > 0 || row_time_us > 0; }
 };
 
-/// Parameters of an event camera. Thresholds are changes of brightness, in natural logarithms. Where an effect goes
-/// with the light, its measure is the relative intensity i = (E + dark_irradiance) / (1 + dark_irradiance), which is 1
-/// at white.
+/// Parameters of an event camera. Thresholds are changes of brightness, in natural logarithms. Effects that depend on
+/// the irradiance use the relative intensity i = (E + dark_irradiance) / (1 + dark_irradiance), which is 1 at white.
 struct EventCameraOptions {
   SensorPreset preset = SensorPreset::ideal;
 
   double contrast_threshold = 0.5;
-  std::optional<double> contrast_threshold_on{};   ///< C+; contrast_threshold where not set
-  std::optional<double> contrast_threshold_off{};  ///< C-; contrast_threshold where not set
+  std::optional<double> contrast_threshold_on{};   ///< C+; default: contrast_threshold
+  std::optional<double> contrast_threshold_off{};  ///< C-; default: contrast_threshold
   double threshold_mismatch = 0.0;
   double threshold_noise = 0.0;
 
@@ -74,10 +73,10 @@ struct EventCameraOptions {
   double threshold_off() const { return contrast_threshold_off.value_or(contrast_threshold); }
 };
 
-/// Smallest threshold of any pixel, whatever the noise: keeps the number of events of a step finite.
+/// Minimum threshold of any pixel, whatever the noise: keeps the number of events per step finite.
 inline constexpr double kMinContrastThreshold = 0.01;
 
-/// The values of a sensor.
+/// The parameters of a sensor.
 EventCameraOptions preset_options(SensorPreset preset);
 
 template <>
@@ -99,7 +98,7 @@ void describe(Visitor& visit, ReadoutOptions& o) {
 
 template <class Visitor>
 void describe(Visitor& visit, EventCameraOptions& o) {
-  // A preset stands for all values that are not given beside it.
+  // A preset sets all values that are not given explicitly.
   const SensorPreset before = o.preset;
   visit("preset", o.preset, About{"sensor that sets the defaults of all other options"});
   if (o.preset != before) o = preset_options(o.preset);

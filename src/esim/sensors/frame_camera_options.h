@@ -9,7 +9,7 @@
 
 namespace esim {
 
-/// How the signal, 0 in the dark and 1 at full scale, becomes a level between the same.
+/// Conversion of the signal to a level: both 0 in the dark and 1 at full scale.
 struct LinearResponse {
   static constexpr const char* kType = "linear";
 };
@@ -18,18 +18,19 @@ struct GammaResponse {
   static constexpr const char* kType = "gamma";
   double gamma = 2.2;
 };
-/// As measured: straight lines between the points of a file.
+/// Measured: linear interpolation between the points of a file.
 struct MeasuredResponse {
   static constexpr const char* kType = "measured";
   std::filesystem::path path;
 };
 using ResponseOptions = std::variant<LinearResponse, GammaResponse, MeasuredResponse>;
 
-/// Each exposure is that of the frame two before, times what would have brought its mean level to the target.
+/// Each exposure is that of two frames earlier, times the factor that would have given that frame the target mean
+/// level.
 struct AutoExposureOptions {
   double target = 0.4;
   double min_exposure_s = 1e-4;
-  std::optional<double> max_exposure_s{};  ///< the frame interval where not set
+  std::optional<double> max_exposure_s{};  ///< default: the frame interval
 };
 
 /// Parameters of a frame camera; docs/frames.md gives the formulae.

@@ -6,11 +6,11 @@
 
 namespace esim {
 
-/// The three axes of a gyroscope or of an accelerometer. Of the true signal x, sampled at `rate_hz`, they measure
-///   y = M x + b + n,   cut to ± range,
-/// with M's diagonal in `scale` and what each axis takes from the others in `misalignment`, n white noise of standard
-/// deviation noise_density sqrt(rate_hz), and b a bias that begins at `initial_bias` and walks at random: its variance
-/// grows by random_walk² per second. A random walk is drawn at 200 Hz and interpolated by a cubic spline.
+/// The three axes of a gyroscope or of an accelerometer. From the true signal x, sampled at `rate_hz`, they measure
+///   y = M x + b + n,   clipped to ± range.
+/// M has the diagonal `scale` and the off-diagonal elements `misalignment`. n is white noise of standard deviation
+/// noise_density sqrt(rate_hz). b is a bias that starts at `initial_bias` and follows a random walk, whose variance
+/// grows by random_walk² per second. The random walk is drawn at 200 Hz and interpolated by a cubic spline.
 struct InertialAxesOptions {
   double noise_density = 0.0;
   double random_walk = 0.0;
@@ -20,12 +20,12 @@ struct InertialAxesOptions {
   double range = 0.0;                                                              ///< 0: unlimited
 };
 
-/// rad/s. The original ESIM's noise.
+/// In rad/s. The defaults are the noise of the original ESIM.
 struct GyroscopeOptions : InertialAxesOptions {
   GyroscopeOptions() : InertialAxesOptions{.noise_density = 1.86e-4, .random_walk = 2.66e-5} {}
 };
 
-/// m/s². The original ESIM's noise.
+/// In m/s². The defaults are the noise of the original ESIM.
 struct AccelerometerOptions : InertialAxesOptions {
   AccelerometerOptions() : InertialAxesOptions{.noise_density = 1.86e-3, .random_walk = 4.33e-4} {}
 };
@@ -38,10 +38,10 @@ struct ImuOptions {
   Eigen::Vector3d gravity = {0.0, 0.0, -9.81};
 };
 
-/// Times are whole nanoseconds: no more measurements than that.
+/// Maximum rate, because times are whole nanoseconds.
 inline constexpr double kMaxImuRate_hz = 1e9;
 
-/// Throws UserError naming the option, as in a scenario, that is out of range.
+/// Throws UserError naming the option that is out of range, as in a scenario.
 void validate(const ImuOptions& options);
 
 struct InertialUnits {

@@ -29,8 +29,8 @@ struct BrightnessError {
   std::int64_t large_steps = 0;  ///< segments over which brightness changes by more than the contrast threshold
 };
 
-/// Compares segments with the reference at each instant in (t0, t1]: in a segment L is linear in time between
-/// ln(E0 + log_eps) and ln(E1 + log_eps). Segments of different tiles may come in any order.
+/// Compares segments with the reference at each instant in (t0, t1]: in a segment L is linear in time between ln(E0 +
+/// log_eps) and ln(E1 + log_eps). Segments of different tiles may come in any order.
 class BrightnessErrors {
  public:
   /// A window holds the instants in (start, end]. The reference must outlive this object.

@@ -241,9 +241,8 @@ class Evaluation {
   std::optional<World> truth_world_;  // if options().truth_rays is set
   SamplingEvaluation result_;
   std::unique_ptr<ReferenceBrightness> reference_;
-  std::vector<EventsByPixel> reference_events_;  // of each of event_spans
-  const Notices silent_{[](const std::string&) {},
-                        [](const std::string&) {}};  // the first world has reported everything
+  std::vector<EventsByPixel> reference_events_;                                 // of each of event_spans
+  const Notices silent_{[](const std::string&) {}, [](const std::string&) {}};  // the first world reported all
 };
 
 }  // namespace

@@ -15,8 +15,7 @@ namespace esim {
 namespace {
 
 constexpr double kMostPerSecond = 50000;  // maximum rate of reconstructions, whatever the motion
-constexpr double kMostUnseen =
-    0.01;  // maximum fraction of hidden pixels, beyond those that keyframes miss at their own times
+constexpr double kMostUnseen = 0.01;      // maximum fraction of pixels hidden from both keyframes, except at edges
 
 // The first of every kAuditOneIn intervals between keyframes is compared with the truth.
 constexpr std::int64_t kAuditOneIn = 6;

@@ -16,8 +16,8 @@ namespace esim {
 /// Between two samples at distance h, irradiance is a straight line minus a curvature term,
 ///   E(f) = E0 + (E1 - E0) f - c h^2 f (1 - f) / 2,
 /// where c is the mean of the second derivatives on both sides: the divided differences of three samples each. In the
-/// middle of equally spaced samples this equals the cubic through all four. Errors are of brightness,
-/// L = ln(E + log_eps).
+/// middle of equally spaced samples this equals the cubic through all four. Errors are of brightness, L = ln(E +
+/// log_eps).
 class TileTimeline {
  public:
   TileTimeline(const Tile& tile, float log_eps) : tile_(tile), log_eps_(log_eps) {}

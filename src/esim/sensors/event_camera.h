@@ -44,8 +44,7 @@ class EventCamera {
   /// Takes the irradiance of all pixels at time t (linear, >= 0, 1 = white), and appends to `out`, in order, the events
   /// since the previous frame. The first frame sets the references and fires no events. Throws UserError naming the
   /// frame if its size differs, if its time is not after that of the previous frame, or if a pixel is not a finite
-  /// number
-  /// >= 0; the camera is then unchanged.
+  /// number >= 0; the camera is then unchanged.
   void process(const Image<float>& irradiance, TimeNs t, std::vector<Event>& out, const Workers& workers);
 
   /// The same from external memory: consecutive rows without padding.

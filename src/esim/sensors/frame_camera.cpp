@@ -144,7 +144,7 @@ TimeNs FrameCamera::State::centre(std::int64_t frame) const {
   return span.start + to_ns(static_cast<double>(frame) / options.rate_hz);
 }
 
-/// Starts the next frame; false if there is none.
+/// Starts the next frame; false after the last one.
 bool FrameCamera::State::plan() {
   const Exposure next(number, centre(number) - next_exposure / 2 + to_first_row, next_exposure, row_delays);
   if (horizon == kNever || next.end() > span.end) {

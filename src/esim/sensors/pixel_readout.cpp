@@ -27,7 +27,7 @@ PixelReadout::PixelReadout(const EventCameraOptions& options, int width, int hei
   if (!holds_) blind_until_.assign(pixels, kLongAgo);
 }
 
-/// The next request up to `watermark`; null if there is none. Skips events in `found` that do not occur.
+/// The next request up to `watermark`, or null. Skips events in `found` that do not occur.
 inline const Event* PixelReadout::next_request(TimeNs watermark) {
   if (!superseded_.empty()) {
     for (; next_ < arrived_.size(); ++next_) {

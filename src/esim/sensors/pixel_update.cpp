@@ -26,16 +26,14 @@ void prefetch_row(const Segment& segment, int y) {
 
 /// Values that all pixels of a segment share.
 struct PixelUpdate::Filter {
-  float phase_per_light = 0,
-        phase_in_dark = 0;                // time constants in the segment: per 6 units of irradiance, and constant part
-  double duration = 0, per_duration = 0;  // ns
-  std::int32_t later = 0;                 // timers below this value expire, in ticks
+  float phase_per_light = 0, phase_in_dark = 0;  // time constants: per 6 units of irradiance, and constant
+  double duration = 0, per_duration = 0;         // ns
+  std::int32_t later = 0;                        // timers below this value expire, in ticks
 
   Filter(const PixelArray& pixels, const Segment& segment)
       : duration(static_cast<double>(segment.t1 - segment.t0)), per_duration(1 / duration) {
     const EventCameraOptions& o = pixels.options;
-    const double per_pole =
-        o.low_pass_order == 2 ? 1 / std::sqrt(std::numbers::sqrt2 - 1) : 1;  // -3 dB of both poles together
+    const double per_pole = o.low_pass_order == 2 ? 1 / std::sqrt(std::numbers::sqrt2 - 1) : 1;  // -3 dB together
     const double at_white = 2 * std::numbers::pi * o.low_pass_hz * per_pole * duration * 1e-9;
     const double per_light = at_white / (1 + o.dark_irradiance);
     phase_per_light = static_cast<float>(per_light / 6);

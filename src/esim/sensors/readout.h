@@ -72,9 +72,7 @@ class Readout {
     // Fractions of a nanosecond are kept while the reader is continuously busy.
     free_at_ = (start > free_from() ? start << kFineBits : free_at_) + busy;
   }
-  TimeNs free_from() const {
-    return (free_at_ + kNs - 1) >> kFineBits;
-  }  ///< first whole ns at which the reader is free
+  TimeNs free_from() const { return (free_at_ + kNs - 1) >> kFineBits; }  ///< first whole ns without work
 
   FineTime per_event_, per_row_;
   std::size_t capacity_;

@@ -82,10 +82,9 @@ void RelaxingSignals::copy(std::size_t i, std::size_t to) {
 /// Some neighbouring signals after one pole relative to their references, plus the leak, between `from` and the
 /// segment's end. Their slope is monotone.
 struct RelaxingSignals::Span {
-  V filtered, distance, rise,
-      leak;          // F at u = 0, and its distance from the input; slopes of the input and of the leak, per u
-  V first, last;     // u at `from` and at the end;
-  V v0, v1, g0, g1;  // the signal at both, and its slopes
+  V filtered, distance, rise, leak;  // F at u = 0, its distance from the input; slopes of input and leak per u
+  V first, last;                     // u at `from` and at the end
+  V v0, v1, g0, g1;                  // the signal at both, and its slopes
   V upper, lower;
 
   Span(const RelaxingSignals& s, const Comparators& c, std::size_t i) {

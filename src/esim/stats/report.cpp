@@ -174,7 +174,7 @@ std::string format_duration(double seconds) {
 std::string verdict(const Statistics& s) {
   switch (s.banding()) {
     case Banding::strong:
-      return fmt::format("time stamps band at {} ({})", s.periodicity ? "this period" : "the frame times",
+      return fmt::format("time stamps show banding at {} ({})", s.periodicity ? "this period" : "the frame times",
                          p_text(s.phase->p_value));
     case Banding::weak:
       return fmt::format("time stamps follow the period weakly ({})", p_text(s.phase->p_value));

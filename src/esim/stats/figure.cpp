@@ -198,7 +198,7 @@ void draw_pixel_rates(Canvas& canvas, const Cell& cell, const Statistics& s) {
   const auto edge_hz = [&](std::size_t i) { return (static_cast<double>(edges[i]) - 0.5) * rate_of_one; };
   const auto lowest = std::find_if(pixels.begin(), pixels.end(), [](double number) { return number > 0; });
   const double low_hz = edge_hz(lowest == pixels.end() ? 0 : static_cast<std::size_t>(lowest - pixels.begin()));
-  Axes axes(canvas, cell.diagram(), "How many pixels have which rate",
+  Axes axes(canvas, cell.diagram(), "Histogram of the pixels' rates",
             decade_scale(0.8 * low_hz, std::max(8 * low_hz, 1.25 * edge_hz(edges.size() - 1)), "ev/s of a pixel"),
             decade_scale(0.7, 1.6 * most, "pixels"));
   for (std::size_t i = 0; i + 1 < edges.size(); ++i) {

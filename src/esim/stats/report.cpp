@@ -93,8 +93,8 @@ ReportSection stamp_section(const Statistics& s) {
   const auto line = [&](const char* label, const std::string& value) { section.lines.push_back({label, value}); };
   line("distinct",
        fmt::format("{} ({} of the events)", grouped(s.distinct_times), percent(ratio(s.distinct_times, s.events()))));
-  line("simultaneous", fmt::format("{} of the events, at most {} at once", percent(ratio(s.simultaneous, s.events())),
-                                   grouped(s.most_simultaneous)));
+  line("simultaneous", fmt::format("{} of the events, at most {} at the same time",
+                                   percent(ratio(s.simultaneous, s.events())), grouped(s.most_simultaneous)));
   line("period", period_text(s));
   line("Rayleigh",
        s.periodicity ? fmt::format("z = {:.4g}, {}", s.periodicity->rayleigh, corrected_p_text(*s.periodicity)) : "-");

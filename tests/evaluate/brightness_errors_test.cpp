@@ -56,7 +56,7 @@ World plaid_world(TimeNs end) {
   return world;
 }
 
-/// What BrightnessErrors finds in all segments of a uniform sampling.
+/// The errors of all segments of a uniform sampling.
 std::vector<BrightnessError> errors_of_uniform(World& world, double rate_hz, double truth_hz,
                                                const std::vector<Window>& windows, std::size_t memory_bytes,
                                                bool in_tiles = false) {
@@ -82,8 +82,8 @@ std::vector<BrightnessError> errors_of_uniform(World& world, double rate_hz, dou
   return errors.finish();
 }
 
-/// Mean square of the error of a sinusoid of unit amplitude that is interpolated linearly, over phases and time; theta:
-/// its phase from one sample to the next.
+/// Mean square error, over phases and time, of a linearly interpolated sinusoid of unit amplitude. theta: phase between
+/// two samples.
 double mean_square(double theta) {
   return 0.5 * (5.0 / 3 + std::cos(theta) / 3 - 4 * (1 - std::cos(theta)) / (theta * theta));
 }

@@ -8,7 +8,7 @@
 namespace esim {
 namespace {
 
-/// Events at milliseconds, negative ones OFF: {1, -3} is ON at 1 ms and OFF at 3 ms.
+/// Events at times in milliseconds, OFF if negative: {1, -3} is ON at 1 ms and OFF at 3 ms.
 std::vector<PixelEvent> events(const std::vector<double>& signed_ms) {
   std::vector<PixelEvent> all;
   for (const double t : signed_ms) all.push_back({to_ns(std::abs(t) * 1e-3), static_cast<std::int8_t>(t > 0 ? 1 : -1)});

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kFocal = 100;  // px
 
-/// Places where 1/Z is a function of the pixel.
+/// The places of an image whose 1/Z is a function of the pixel.
 Image<Place> places_where(const std::function<double(int x, int y)>& nearness) {
   Image<float> depth(24, 16);
   for (int y = 0; y < depth.height(); ++y) {

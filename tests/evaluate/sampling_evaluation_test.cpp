@@ -88,12 +88,12 @@ TEST(SamplingEvaluation, TakesEveryWayOfSampling) {
     const WindowResult& all = scheme.windows.back();
     EXPECT_GT(all.frame_equivalents_per_s, 0) << scheme.text;
     EXPECT_LT(all.brightness.mean_rmse, 0.1) << scheme.text;
-    EXPECT_EQ(all.brightness.values, 30 * 800) << scheme.text << " leaves pixels or times out";
+    EXPECT_EQ(all.brightness.values, 30 * 800) << scheme.text << " misses pixels or times";
     EXPECT_FALSE(all.events);
   }
 }
 
-/// A card that crosses the view before a wall, both of one grey.
+/// A card that crosses the view in front of a wall, each of uniform grey.
 class PlacesOfErrors : public test::CardScene {
  protected:
   PlacesOfErrors() {
@@ -105,7 +105,7 @@ class PlacesOfErrors : public test::CardScene {
     options_.event_span_s = 0;
   }
 
-  /// In the window "all".
+  /// The errors in the window "all".
   BrightnessError errors_of(const SamplingOptions& scheme) {
     options_.schemes = {scheme};
     return evaluate(scenario_, options_).schemes[0].windows.back().brightness;
@@ -127,8 +127,8 @@ TEST_F(PlacesOfErrors, AddUp) {
   EXPECT_NEAR(squares, of_pixels * static_cast<double>(error.values) / static_cast<double>(error.rmse.size()),
               1e-6 * squares);
   EXPECT_EQ(squares_at(error, Place::crease), 0);
-  EXPECT_GT(squares_at(error, Place::depth_edge), 0) << "where the card's edge is";
-  EXPECT_GT(squares_at(error, Place::surface), 0) << "where it was or will be, at the next sample";
+  EXPECT_GT(squares_at(error, Place::depth_edge), 0) << "at the card's edge";
+  EXPECT_GT(squares_at(error, Place::surface), 0) << "where the edge was or will be at the next sample";
 }
 
 TEST_F(PlacesOfErrors, AreOnEdgesWhereTheTruthAloneHasMoreRays) {
@@ -137,8 +137,9 @@ TEST_F(PlacesOfErrors, AreOnEdgesWhereTheTruthAloneHasMoreRays) {
   const BrightnessError error = errors_of(UniformSampling{500});
   const double on_edges = squares_at(error, Place::depth_edge) + squares_at(error, Place::near_edge);
   EXPECT_GT(on_edges, 0);
-  EXPECT_LT(squares_at(error, Place::surface), 0.2 * on_edges) << "of the card as it enters, at the image's border";
-  EXPECT_LT(error.max_abs, 0.25) << "16 rays against 64 of an edge";
+  EXPECT_LT(squares_at(error, Place::surface), 0.2 * on_edges)
+      << "only from the card as it enters at the image's border";
+  EXPECT_LT(error.max_abs, 0.25) << "16 rays compared with 64 at an edge";
 }
 
 TEST(SamplingEvaluation, KnowsNoPlacesOfSomePixels) {

@@ -52,7 +52,7 @@ TEST(Pixels, AreDifferentAndSpread) {
     cells.insert({p.x * 10 / 346, p.y * 8 / 260});
   }
   EXPECT_EQ(different.size(), 400U);
-  EXPECT_EQ(cells.size(), 80U) << "a part of the image has none";
+  EXPECT_EQ(cells.size(), 80U) << "a part of the image has no pixel";
   EXPECT_EQ(spread_pixels(4, 3, 0).size(), 12U);
   EXPECT_EQ(spread_pixels(4, 3, 100).size(), 12U);
   EXPECT_EQ(spread_pixels(4, 3, 11).size(), 11U);

@@ -16,7 +16,7 @@ namespace {
 constexpr int kWidth = 7, kHeight = 5;
 constexpr TimeSpan kSpan{1'000'000, 11'000'000};
 
-/// Events at random places and times, in order.
+/// Events at random pixels and times, in order.
 std::vector<Event> random_events(std::size_t count) {
   const AddressedRandom random(3, Purpose::test);
   std::vector<Event> events(count);

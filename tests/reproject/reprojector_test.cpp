@@ -27,7 +27,7 @@ Difference difference(const Image<float>& a, const Image<float>& b) {
   return result;
 }
 
-/// What a camera in one of the test scenes sees `dt` seconds later.
+/// The request of a camera in one of the test scenes, `dt` seconds later.
 RenderRequest view_of(const std::string& scene, const Camera& camera, double dt) {
   return {test::kTime + to_ns(dt),
           test::moving_camera(dt),
@@ -35,7 +35,7 @@ RenderRequest view_of(const std::string& scene, const Camera& camera, double dt)
           test::objects_of(scene, dt)};
 }
 
-/// One of the test scenes, its keyframes, and what lies between them.
+/// One of the test scenes with two keyframes and the views between them.
 class Between {
  public:
   Between(const std::string& name, int distortion, const Workers& workers = test::two_threads(), bool wide = true)
@@ -87,8 +87,8 @@ class Between {
 
 class EveryLens : public testing::TestWithParam<std::tuple<const char*, int>> {};
 
-// Rotation, parallax and lenses: the texture is smooth, so that all that is left is what interpolation does; but where
-// walls meet, a ray per pixel sees the one or the other.
+// Rotation, parallax and lenses: the texture is smooth, so that only interpolation errors remain, except where walls
+// meet: there one ray per pixel sees one wall or the other.
 TEST_P(EveryLens, ReprojectionIsDirectRendering) {
   const auto [name, distortion] = GetParam();
   Between scene(name, distortion);
@@ -117,7 +117,7 @@ TEST(Reprojector, FollowsMovingObjectsAndWhatTheyHide) {
     const Sample direct = scene.direct(0.05);
     const Reconstruction found = scene.reconstruct(before, after, 0.05, Detail::whole);
 
-    // On the objects, on the walls, and all but at their edges.
+    // On the objects and on the walls, except at their edges.
     std::vector<float> on_objects, on_walls;
     for (int y = 0; y < direct.irradiance.height(); ++y) {
       for (int x = 0; x < direct.irradiance.width(); ++x) {
@@ -131,7 +131,7 @@ TEST(Reprojector, FollowsMovingObjectsAndWhatTheyHide) {
       std::nth_element(errors->begin(), rank, errors->end());
       EXPECT_LT(*rank, 0.02);
     }
-    // Without the objects' motion they would be elsewhere.
+    // Without the objects' motion the images would differ.
     const Difference stayed = difference(scene.direct(0).irradiance, direct.irradiance);
     EXPECT_LT(difference(found.irradiance, direct.irradiance).rms, 0.35 * stayed.rms);
   }
@@ -173,7 +173,7 @@ TEST(Reprojector, BearsDepthThatIsNoNumber) {
   }
 }
 
-/// Dark bars at 1 m before the camera, and the test scenes' wall behind them: each begins at `place(i)` and is
+/// Dark bars 1 m in front of the camera, with the test scenes' wall behind them: each begins at `place(i)` and is
 /// `width(i)` wide, px.
 template <typename Place, typename Width>
 Scene bars(const Camera& camera, int count, const Place& place, const Width& width) {
@@ -196,7 +196,7 @@ Scene bars(const Camera& camera, int count, const Place& place, const Width& wid
   return scene;
 }
 
-/// Mean square errors of reconstructions of a scene, with 64 rays where edges are.
+/// Mean square errors of reconstructions of a scene, with 64 rays per pixel at edges.
 struct SquaredErrors {
   double whole = 0, apart = 0;
 };
@@ -241,7 +241,7 @@ TEST(Reprojector, SeesEdgesAsFinelyAsItsKeyframes) {
 }
 
 TEST(Reprojector, SeesThroughNarrowGaps) {
-  // Gaps of 1.6 px: some pixels see the wall alone, but none of a keyframe's wide ones is sure to.
+  // Gaps of 1.6 px: some pixels see only the wall, but a keyframe's wide pixels may not.
   const Camera sensor = test::distorted_camera(0);
   const auto place = [](int i) { return 5.6 * i - 70; };
   const auto width = [](int) { return 4.0; };

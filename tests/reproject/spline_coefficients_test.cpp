@@ -53,7 +53,7 @@ TEST(SplineCoefficients, ReproducePolynomialsOfTheThirdDegree) {
     for (double x = 20; x < 60; x += 2.19) EXPECT_NEAR(at(coefficients, x, y), f(x, y), 3e-6);
 }
 
-// What spline_coefficients.h says of sharpness.
+// The sharpness stated in spline_coefficients.h.
 TEST(SplineCoefficients, KeepAFourthOfThePixelsFrequency) {
   const auto f = [](double x, double) { return std::cos(M_PI / 2 * (x - 40.5)); };
   Image<float> coefficients = image_of(80, 8, f);

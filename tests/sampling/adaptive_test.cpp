@@ -15,7 +15,7 @@ namespace {
 constexpr int kWidth = 96, kHeight = 64;
 constexpr double kEps = 0.001, kThreshold = 0.3;
 
-/// Brightness and motion of a pixel at a time, in seconds.
+/// Brightness and motion of a pixel as functions of time in seconds.
 struct Movie {
   std::function<double(double x, double y, double t)> brightness;
   std::function<double(double x, double y, double t)> speed;  // to the right, px/s
@@ -30,7 +30,7 @@ Movie passing_wall(double px_per_s) {
           [=](double, double, double) { return px_per_s; }};
 }
 
-/// A smooth bar that flies through the middle of a dark, motionless image.
+/// A smooth bar that moves through the middle of a dark, motionless image.
 Movie flying_bar(double px_per_s) {
   const auto offset = [=](double x, double t) { return (x + 20 - px_per_s * t) / 3; };
   return {[=](double x, double y, double t) {
@@ -41,10 +41,10 @@ Movie flying_bar(double px_per_s) {
           }};
 }
 
-/// Bright lines, a pixel wide and without any blur but the pixels' own, pass over a dark and flat image: few pixels at
-/// a time change at all, and those abruptly.
+/// Bright lines, one pixel wide and blurred only by the pixels' area, that move over a dark, uniform image: at any time
+/// only a few pixels change, but abruptly.
 Movie passing_lines(double px_per_s, double distance_px) {
-  // How much of [0, x] is covered by lines.
+  // Length of the lines within [0, x].
   const auto covered = [=](double x) {
     const double lines = std::floor(x / distance_px);
     return lines + std::min(x - lines * distance_px, 1.0);
@@ -57,7 +57,7 @@ Movie passing_lines(double px_per_s, double distance_px) {
 }
 
 struct Outcome {
-  std::vector<double> errors;  // |L - truth| at random pixels and times, of what the sensor is given
+  std::vector<double> errors;  // |L - truth| of the segments, at random pixels and times
   SamplingStatistics statistics;
   double digest = 0;
 
@@ -71,7 +71,7 @@ struct Outcome {
   }
 };
 
-/// Evaluates tiles of one time.
+/// Evaluates the tiles of one time.
 void evaluate(const TilesAt& wanted, const Movie& movie, Sample& sample) {
   const double t = to_seconds(wanted.t);
   for (const Tile& tile : wanted.tiles) {
@@ -102,7 +102,7 @@ Outcome sample(const AdaptiveSampling& options, const Movie& movie, TimeNs end, 
   while (const auto request = sampler->next()) {
     answer(*request, movie, sample);
     for (const Segment& segment : sampler->accept(sample)) {
-      // A pixel of each segment, somewhere in it, so that each time counts alike.
+      // One pixel per segment, at a varying position, so that all times have equal weight.
       const int x = segment.tile.x + static_cast<int>(segment.t1 / 7 % segment.tile.width);
       const int y = segment.tile.y + static_cast<int>(segment.t1 / 13 % segment.tile.height);
       const double l0 = std::log(double{segment.irradiance0(x, y)} + kEps);
@@ -128,7 +128,7 @@ TEST(AdaptiveSampling, WhatDoesNotChangeCostsTheMinimumRate) {
   EXPECT_LE(outcome.quantile(1), 1e-5);
 }
 
-// 99 % of the true error stay below the tolerance, and a tolerance of a half makes half the error.
+// 99 % of the true errors stay below the tolerance, and half the tolerance halves the error.
 TEST(AdaptiveSampling, KeepsTheTolerance) {
   const Movie wall = passing_wall(400);
   double error_before = 0, evaluations_before = 0;
@@ -145,7 +145,7 @@ TEST(AdaptiveSampling, KeepsTheTolerance) {
   }
 }
 
-// The same where few pixels have most of the error, as in a room with edges: the errors of a tile are far from normal.
+// The same if few pixels have most of the error, as in a room with edges: the errors of a tile are far from normal.
 TEST(AdaptiveSampling, KeepsTheToleranceWhereOnlyEdgesChange) {
   for (const double tolerance : {0.4, 0.2, 0.1}) {
     const Outcome outcome = sample({.tolerance = tolerance}, passing_lines(400, 24), kNsPerSecond / 4);
@@ -153,7 +153,7 @@ TEST(AdaptiveSampling, KeepsTheToleranceWhereOnlyEdgesChange) {
   }
 }
 
-// Before any audit has said how errors are spread.
+// Before any audit has measured the distribution of the errors.
 TEST(AdaptiveSampling, KeepsTheToleranceFromTheStart) {
   for (const double tolerance : {0.4, 0.2, 0.1}) {
     for (const double distance_px : {6, 12, 24}) {
@@ -165,23 +165,23 @@ TEST(AdaptiveSampling, KeepsTheToleranceFromTheStart) {
 
 TEST(AdaptiveSampling, MeasuresItsErrorHonestly) {
   const Outcome outcome = sample({.tolerance = 0.2}, passing_wall(400), kNsPerSecond);
-  // Audits look into the middle of intervals, where errors are largest.
+  // Audits measure in the middle of intervals, where errors are largest.
   EXPECT_GT(outcome.statistics.measured_error->p99, 0.8 * outcome.quantile(0.99));
   EXPECT_LT(outcome.statistics.measured_error->p99, 4 * outcome.quantile(0.99));
   EXPECT_GT(outcome.statistics.audits, 20);
 }
 
-// Where one thing flies through a still image, only its surroundings are sampled, and it is missed nowhere.
+// If one object moves through a static image, only its surroundings are sampled, and its motion is never missed.
 TEST(AdaptiveSampling, FollowsWhatMoves) {
   const Movie bar = flying_bar(600);
   const Outcome outcome = sample({.tolerance = 0.2}, bar, kNsPerSecond / 5);
   EXPECT_LE(outcome.quantile(0.99), 0.2 * kThreshold);
-  EXPECT_LE(outcome.quantile(0.9995), kThreshold) << "the bar came into a tile unnoticed";
+  EXPECT_LE(outcome.quantile(0.9995), kThreshold) << "the bar entered a tile without being noticed";
   const double flow_half_px = 600 / 0.5 / 5;
   EXPECT_LE(outcome.evaluations_per_pixel(), 0.4 * flow_half_px);
 }
 
-// The motion field says nothing of a light that flickers.
+// The motion field does not show a light that flickers.
 TEST(AdaptiveSampling, NoticesFlicker) {
   const Movie flicker{[](double, double, double t) { return -1 + 0.5 * std::sin(2 * std::numbers::pi * 23 * t); },
                       [](double, double, double) { return 0.0; }};
@@ -205,7 +205,7 @@ TEST(AdaptiveSampling, EndsWhereMotionIsNotFinite) {
   EXPECT_LE(sample({.tolerance = 0.2}, wall, kNsPerSecond / 10).quantile(0.99), 0.2 * kThreshold);
 }
 
-// No budget makes the brightness of noise known in between: the highest rate is the end of it, and is reported.
+// Noise cannot be interpolated at any rate: sampling stops at the maximum rate, which is reported.
 TEST(AdaptiveSampling, StopsAtTheHighestRate) {
   const Movie noise{[](double x, double y, double t) {
                       const double v = std::sin(x * 12.9898 + y * 78.233 + t * 1e7) * 43758.5453;

@@ -31,7 +31,7 @@ Sample moving_ramp(TimeNs t, float gradient, float vx, float vy, double log_eps,
   return sample;
 }
 
-/// A camera at rest before something infinitely far away.
+/// A camera at rest; the scene is infinitely far away.
 SamplingContext context(const TimeSpan& span, const SensorTraits& sensor = {}) {
   return {sensor,
           kWidth,
@@ -49,8 +49,8 @@ SamplingContext context(const TimeSpan& span, const SensorTraits& sensor = {}) {
 
 class EverySampler : public testing::TestWithParam<SamplingOptions> {};
 
-// The contract of Sampler: each pixel from an instant at the start to the end exactly, in contiguous segments, and a
-// watermark that keeps up.
+// The contract of Sampler: each pixel has contiguous segments from an instant at the start exactly to the end, and the
+// watermark advances with them.
 TEST_P(EverySampler, KeepsItsContract) {
   const TimeSpan span{-3 * kNsPerMs, 17 * kNsPerMs + 123};
   const Camera camera = sampled_camera(GetParam(), context(span));
@@ -71,8 +71,7 @@ TEST_P(EverySampler, KeepsItsContract) {
   TimeNs watermark = span.start;
   while (const auto request = sampler->next()) {
     EXPECT_EQ(request->t, sampler->next()->t) << "next() is not idempotent";
-    ASSERT_TRUE(samples == 0 ? request->t == span.start : request->t > sampler->watermark())
-        << "asks for what is known";
+    ASSERT_TRUE(samples == 0 ? request->t == span.start : request->t > sampler->watermark()) << "requests a known time";
     ASSERT_LE(request->t, span.end);
     const int width = request->of_sensor ? kWidth : camera.width, height = request->of_sensor ? kHeight : camera.height;
     Sample sample = moving_ramp(request->t, 0.05F, 100.0F, 200.0F, 0.001, width, height);
@@ -131,7 +130,7 @@ TEST(FlowSampling, IgnoresMotionThatIsNotFinite) {
 }
 
 TEST(BrightnessSampling, BoundsTheChangeBetweenSamples) {
-  // dL/dt = gradient * v; the interval is lambda C / |dL/dt|: the C that the original forgot is in it.
+  // dL/dt = gradient * v; the interval is lambda C / |dL/dt|, including the C that the original omitted.
   const Sample sample = moving_ramp(0, 0.07F, -90.0F, 12.0F, 0.01);
   EXPECT_NEAR(fastest_brightness_change_per_s(sample, 0.01, kWorkers), 0.07 * 90, 1e-3);
   const SensorTraits sensor{.contrast_threshold = 0.3, .log_eps = 0.01};
@@ -141,12 +140,12 @@ TEST(BrightnessSampling, BoundsTheChangeBetweenSamples) {
 
 TEST(BrightnessSampling, SeesTheImagesBorder) {
   Sample sample = moving_ramp(0, 0.0F, 10.0F, 0.0F, 0.001);
-  sample.irradiance(0, 3) *= std::exp(1.0F);  // one-sided difference: 1 per pixel; its neighbour's is half of that
+  sample.irradiance(0, 3) *= std::exp(1.0F);  // one-sided difference: 1 per pixel; half of that at its neighbour
   EXPECT_NEAR(fastest_brightness_change_per_s(sample, 0.001, kWorkers), 10.0, 0.05);
 }
 
 TEST(BrightnessSampling, ComparesPixelsOfTheSameColourInAMosaic) {
-  // Uniform red light: what differs between neighbours is no edge, at the border either.
+  // Uniform red light: differences between neighbours are not edges, also at the border.
   Sample sample = moving_ramp(0, 0.0F, 10.0F, 12.0F, 0.001);
   for (int y = 0; y < sample.irradiance.height(); ++y) {
     for (int x = 0; x < sample.irradiance.width(); ++x) sample.irradiance(x, y) = x % 2 + y % 2 == 0 ? 0.9F : 0.1F;
@@ -171,9 +170,9 @@ std::vector<TimeNs> sample_times(const SamplingOptions& options, float speed, Ti
 TEST(FrameSampler, KeepsToItsRates) {
   EXPECT_EQ(sample_times(UniformSampling{100}, 0, kNsPerSecond).size(), 101U);
   EXPECT_EQ(sample_times(FlowSampling{0.5, {200, 1000}}, 0, kNsPerSecond).size(), 201U)
-      << "nothing moves: the least rate";
+      << "nothing moves: the minimum rate";
   EXPECT_EQ(sample_times(FlowSampling{0.5, {200, 1000}}, 1e9F, kNsPerSecond).size(), 1001U)
-      << "too fast: the greatest rate";
+      << "too fast: the maximum rate";
   EXPECT_EQ(sample_times(FlowSampling{0.5, {10, 10000}}, 250, kNsPerSecond).size(), 501U);
 }
 

@@ -16,13 +16,13 @@ namespace {
 
 const Workers kWorkers(2);
 
-/// A pattern infinitely far away whose light changes over time, and a camera that turns before it.
+/// A pattern at infinity whose irradiance changes over time, and a camera that rotates in front of it.
 struct Turning {
   double omega = 0;                                                  ///< rad/s about y
-  std::function<double(double)> light = [](double) { return 1.0; };  ///< by t, s
+  std::function<double(double)> light = [](double) { return 1.0; };  ///< as a function of t, s
   Camera sensor = Camera::from_fov(60, 40, 1.0);
   RendererTraits traits{.name = "test", .at_infinity = true, .wide_pixels = true};
-  float flow = 0;  ///< px/s of the sensor; in place of what omega gives, if not 0
+  float flow = 0;  ///< px/s of the sensor; if not 0, replaces the speed from omega
 
   RenderRequest view(TimeNs t) const {
     RenderRequest request;
@@ -98,7 +98,7 @@ TEST(Keyframes, AreAsFarApartAsTheImageMoves) {
   scene.omega = 2;  // 110 px/s
   const Outcome outcome = run(scene, {.max_displacement_px = 10}, 1.0);
   EXPECT_NEAR(static_cast<double>(outcome.statistics.samples - outcome.statistics.audits), 12, 1);
-  EXPECT_EQ(outcome.statistics.audits, 2) << "of 11 intervals the first and the seventh";
+  EXPECT_EQ(outcome.statistics.audits, 2) << "the first and the seventh of 11 intervals";
   EXPECT_NEAR(static_cast<double>(outcome.statistics.reconstructions), 220, 20) << "half a pixel each";
   EXPECT_EQ(outcome.statistics.bisections, 0);
   EXPECT_LT(outcome.rmse, 1e-3);

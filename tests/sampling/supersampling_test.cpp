@@ -13,7 +13,7 @@ namespace {
 const Workers kWorkers(2);
 constexpr RendererTraits kTraits{.name = "test", .at_infinity = true, .wide_pixels = true};
 
-/// Stripes infinitely far away, `period` of the sensor's pixels wide, of pixels that see one direction only.
+/// Stripes at infinity, `period` sensor pixels wide; each pixel sees only one direction.
 class Stripes final : public ProcessorRenderer {
  public:
   Stripes(const Camera& camera, double period) : camera_(camera), period_(period) {}

@@ -34,7 +34,7 @@ TEST_P(CameraState, ARestoredCameraGoesOnWhereTheOtherWas) {
     EventCamera camera = made(), restored = made();
     process(camera, 0, frames);
     const std::vector<std::byte> state = camera.state();
-    process(restored, 20, 3);  // whatever it had seen before
+    process(restored, 20, 3);  // whatever its earlier input
     restored.restore(state);
     EXPECT_EQ(restored.statistics().dropped, camera.statistics().dropped);
     EXPECT_EQ(restored.statistics().in_flight, camera.statistics().in_flight);
@@ -89,7 +89,7 @@ INSTANTIATE_TEST_SUITE_P(
                                        .latency_us = 2500,
                                        .latency_jitter_us = 900,
                                        .latency_light_share = 0.7},
-                    // A queue that overflows, of rows that wait with several events each.
+                    // A queue that overflows, with waiting rows of several events each.
                     EventCameraOptions{.contrast_threshold = 0.2,
                                        .readout = {.rate_mev_per_s = 0.7, .row_time_us = 5, .queue_events = 500}}));
 

@@ -22,7 +22,7 @@ Image<float> uniform_image(double brightness, double log_eps) {
   return Image<float>(1, 1, static_cast<float>(std::exp(brightness) - log_eps));
 }
 
-/// A random walk of the log-irradiance in every pixel, with steps of very different sizes.
+/// A random walk of the log-irradiance of each pixel, with steps of very different sizes.
 std::vector<Image<float>> random_frames(int width, int height, int count, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<float> normal;
@@ -41,7 +41,7 @@ std::vector<Image<float>> random_frames(int width, int height, int count, unsign
 
 class EventCameraAgainstLiteral : public testing::TestWithParam<EventCameraOptions> {};
 
-/// Pixel by pixel the same events, at most so far apart in time.
+/// Expects the same events of each pixel, with times equal within the tolerance.
 void expect_same(std::vector<Event> events, std::vector<Event> expected, TimeNs tolerance_ns) {
   const auto by_pixel = [](const Event& a, const Event& b) {
     return std::tie(a.y, a.x, a.t, a.polarity) < std::tie(b.y, b.x, b.t, b.polarity);
@@ -74,7 +74,7 @@ TEST_P(EventCameraAgainstLiteral, FiresTheSameEvents) {
   const std::vector<Event> events = fast.events();
   EXPECT_TRUE(std::is_sorted(events.begin(), events.end()));
   EXPECT_GT(events.size(), 1000U);
-  // With a front end of floats, times are as exact as these.
+  // The front end uses floats, which limits the accuracy of times.
   expect_same(events, expected, GetParam().response == PixelResponse::log ? 1 : 2000);
 }
 
@@ -126,7 +126,7 @@ TEST(EventCamera, TheFirstFrameFiresNothing) {
 }
 
 TEST(EventCamera, ARampFiresAtItsLevels) {
-  // L rises by 100 per second and then falls: events every C / 100 s, to the rounding of a float irradiance.
+  // L rises by 100 per second and then falls: events every C / 100 s, up to the rounding of float irradiance.
   const EventCameraOptions options{.contrast_threshold_on = 0.3, .contrast_threshold_off = 0.2};
   Feed feed(options, 1, 1);
   constexpr double kSlope = 100;
@@ -144,7 +144,7 @@ TEST(EventCamera, ARampFiresAtItsLevels) {
 }
 
 TEST(EventCamera, FiresWithinANanosecondOfItsLevels) {
-  // One slow segment of a second, for several thresholds; the irradiances are what the floats are.
+  // One slow segment of one second, for several thresholds, with the irradiance of the floats.
   for (const double threshold : {0.013, 0.1, 0.3}) {
     for (const bool rises : {true, false}) {
       const EventCameraOptions options{.contrast_threshold = threshold};
@@ -216,7 +216,7 @@ TEST(EventCamera, DoesNotDependOnTheNumberOfThreads) {
 TEST(EventCamera, HoldsThePixelForTheRefractoryPeriod) {
   const EventCameraOptions options{.contrast_threshold = 0.1, .refractory_period_us = 1000};
   Feed feed(options, 1, 1);
-  // 1 per second: a level every 100 ms, far apart. Then 1000 per second: one event, reset for 1 ms, a new reference.
+  // 1 per second: one level every 100 ms. Then 1000 per second: one event, reset for 1 ms, and a new reference.
   feed.frame(uniform_image(0, options.log_eps), 0);
   feed.frame(uniform_image(1000 * 0.010, options.log_eps), 10 * kNsPerMs);
   const std::vector<Event> events = feed.events();
@@ -227,7 +227,7 @@ TEST(EventCamera, HoldsThePixelForTheRefractoryPeriod) {
 }
 
 TEST(EventCamera, ThresholdsHaveTheGivenMeanAndSpread) {
-  // On a ramp of 1 per second the time between a pixel's events is its threshold.
+  // On a ramp of 1 per second the time in s between a pixel's events is its threshold.
   constexpr int kWidth = 100, kHeight = 40;
   constexpr double kMean = 0.2, kMismatch = 0.02, kNoise = 0.015;
   const EventCameraOptions options{
@@ -322,7 +322,7 @@ TEST(EventCamera, TimeStampsDoNotBandAtTheFrames) {
   for (int k = 0; k < kFrames; ++k) feed.frame(moving_waves(kWidth, kHeight, k), k * kNsPerMs);
   std::vector<double> bins(kBins, 0.0);
   double count = 0;
-  // Neighbours see the same edge: far fewer events than there are tell something new.
+  // Neighbours see the same edge: the number of independent events is much smaller.
   std::mt19937 random(1);
   for (const Event& event : feed.events()) {
     if (random() % 5 != 0 || event.t < 20 * kNsPerMs) continue;
@@ -396,7 +396,7 @@ TEST(EventCamera, KeepsWhatCameBeforeABadSegment) {
 }
 
 TEST(EventCamera, TimesFarFromZeroAreAsExactAsAnyOthers) {
-  // Nanoseconds since 1970 and a large image's narrow packing.
+  // Nanoseconds since 1970, and the short packing range of a large image.
   for (const TimeNs start : {TimeNs{1'700'000'000} * kNsPerSecond, -TimeNs{5'000'000'000} * kNsPerSecond}) {
     const EventCameraOptions options{.contrast_threshold = 0.3, .leak_rate_hz = 3, .shot_noise_hz = 20};
     Feed here(options, 20, 10, 1), there(options, 20, 10, 1);

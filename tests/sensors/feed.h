@@ -29,7 +29,7 @@ class Feed {
     last_t_ = t;
   }
 
-  /// The events up to `until` that were not asked for before.
+  /// The events up to `until` that have not been returned yet.
   std::vector<Event> events(TimeNs until = std::numeric_limits<TimeNs>::max()) {
     std::vector<Event> events;
     camera_.release_until(until, events);

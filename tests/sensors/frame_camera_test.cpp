@@ -24,7 +24,7 @@ using Light = std::function<double(int x, int y, double t_s)>;
 
 const Workers kOneThread(1);
 
-/// Sixteen bits and no noise: numbers tell irradiance up to 1 to 8e-6.
+/// 16 bits and no noise: digital numbers represent irradiance up to 1 within 8e-6.
 FrameCameraOptions precise(double rate_hz, double exposure_s) {
   FrameCameraOptions options;
   options.rate_hz = rate_hz;
@@ -35,7 +35,7 @@ FrameCameraOptions precise(double rate_hz, double exposure_s) {
 
 double irradiance(std::uint16_t number) { return number / 65535.0; }
 
-constexpr double kQuantum = 0.55 / 65535;  // half a number, and the rounding of floats
+constexpr double kQuantum = 0.55 / 65535;  // half a digital number, and the rounding of floats
 
 Image<float> sampled(const Light& light, int width, int height, TimeNs t) {
   Image<float> image(width, height);
@@ -45,7 +45,7 @@ Image<float> sampled(const Light& light, int width, int height, TimeNs t) {
   return image;
 }
 
-/// Shows a camera whole images at these times, and takes the frames.
+/// Passes whole images at these times to a camera, and takes the frames.
 std::vector<CameraFrame> show(FrameCamera& camera, const Light& light, int width, int height,
                               const std::vector<TimeNs>& times, const Workers& workers = kOneThread) {
   Image<float> before = sampled(light, width, height, times[0]);
@@ -87,7 +87,7 @@ TEST(FrameCamera, CentresFramesOnItsClockAndLeavesOutThoseThatDoNotFit) {
 }
 
 TEST(FrameCamera, IntegratesARampExactlyHoweverItIsCut) {
-  // E = a + b t: the mean over an exposure is E at its middle, wherever the samples are.
+  // E = a + b t: the mean over an exposure is E in its middle, for any sampling.
   const Light ramp = [](int x, int, double t) { return 0.1 + 0.05 * x + 6 * t; };
   std::mt19937 random(1);
   for (int run = 0; run < 20; ++run) {
@@ -116,14 +116,14 @@ TEST(FrameCamera, IntegratesTheStraightLinesBetweenSamples) {
   ASSERT_EQ(frames.size(), 1U);
   EXPECT_NEAR(irradiance(frames[0].numbers(0, 0)), 0.5 * 0.8 * 2.5 / 4, kQuantum);
 
-  // A step of a microsecond at 9 ms, seen by samples whose times are not the exposure's.
+  // A step of 1 us at 9 ms, with sample times that differ from the exposure's limits.
   FrameCamera other(precise(100, 0.004), 1, 1, {0, 20 * kNsPerMs});
   const Light step = [](int, int, double t) { return t < 0.0090005 ? 0.1 : 0.9; };
   const auto seen = show(other, step, 1, 1, {0, 5 * kNsPerMs, 9 * kNsPerMs, 9'001'000, 14 * kNsPerMs, 20 * kNsPerMs});
   EXPECT_NEAR(irradiance(seen.at(0).numbers(0, 0)), 0.1 + 0.8 * (3 - 0.0005) / 4, kQuantum);
 }
 
-/// A light that changes from pixel to pixel and in time.
+/// Irradiance that varies over pixels and time.
 double waves(int x, int y, double t) { return 0.5 + 0.45 * std::sin(0.9 * x + 1.3 * y + 400 * t * (1 + 0.1 * x)); }
 
 TEST(FrameCamera, SeesTheSameThroughTilesOfTheirOwnTimesInAnyOrder) {
@@ -133,7 +133,7 @@ TEST(FrameCamera, SeesTheSameThroughTilesOfTheirOwnTimesInAnyOrder) {
     FrameCameraOptions options = precise(90, 0.006);
     options.line_delay_s = 1e-4;
     if (automatic) options.auto_exposure = AutoExposureOptions{.target = 0.35};
-    // The knots of the light: everything samples it there, and maybe anywhere between.
+    // The knots of the irradiance: every sampling includes them, and possibly times in between.
     const auto knots = every(kNsPerMs, kEnd);
     const Light light = [&](int x, int y, double t) {
       const double knot = std::floor(t * 1e3 + 1e-9), share = t * 1e3 - knot;
@@ -159,7 +159,7 @@ TEST(FrameCamera, SeesTheSameThroughTilesOfTheirOwnTimesInAnyOrder) {
         lines.push_back(line);
       }
     }
-    // Tiles in any order, each as far ahead of the others as it likes; a few segments of a few tiles at once.
+    // Tiles in random order, any of them ahead of the others; a few segments of a few tiles at a time.
     FrameCamera tiled(options, kWidth, kHeight, {0, kEnd});
     std::vector<CameraFrame> frames;
     const Workers two(2);
@@ -213,7 +213,7 @@ TEST(FrameCamera, TakesOneSegmentOfManyFrames) {
 }
 
 TEST(FrameCamera, ExposesRowsOneAfterTheOther) {
-  // In a ramp, each row's value is its time.
+  // On a ramp, each row's value is its time.
   FrameCameraOptions options = precise(20, 0.01);
   options.line_delay_s = 0.0005;
   constexpr int kHeight = 48;
@@ -232,8 +232,8 @@ TEST(FrameCamera, ExposesRowsOneAfterTheOther) {
 }
 
 TEST(FrameCamera, KeepsExposuresApartThatOverlapInTime) {
-  // Reading takes the whole interval, and so does the exposure: a frame's first rows begin long before the last rows of
-  // the frame before end.
+  // Reading and exposure each take the whole interval: the first rows of a frame begin long before the last rows of the
+  // previous frame end.
   FrameCameraOptions options = precise(100, 0.01);
   options.line_delay_s = 0.01 / 40;
   FrameCamera camera(options, 2, 40, {0, 100 * kNsPerMs});
@@ -247,7 +247,7 @@ TEST(FrameCamera, KeepsExposuresApartThatOverlapInTime) {
   }
 }
 
-/// All numbers of a frame of even light.
+/// All digital numbers of a frame with uniform irradiance.
 std::vector<std::uint16_t> numbers_of(const FrameCameraOptions& options, double light, int width = 64, int height = 64,
                                       std::uint64_t seed = 0, std::uint16_t stream = 0, std::size_t frame = 0,
                                       const Workers& workers = kOneThread) {
@@ -292,14 +292,14 @@ TEST(FrameCamera, AddsTheBlackLevel) {
   EXPECT_EQ(numbers_of(options, 0)[0], 95);
   EXPECT_EQ(numbers_of(options, 0.5)[0], 2095);
   EXPECT_EQ(numbers_of(options, 1)[0], 4095);
-  options.read_noise_e = 40;  // 16 numbers
+  options.read_noise_e = 40;  // 16 DN
   const Moments dark = moments(numbers_of(options, 0));
-  EXPECT_NEAR(dark.mean, 95, 1.5) << "noise below the black level is not cut off";
+  EXPECT_NEAR(dark.mean, 95, 1.5) << "noise below the black level is not clipped";
   EXPECT_NEAR(std::sqrt(dark.variance), 16, 0.8);
 }
 
 TEST(FrameCamera, FollowsThePhotonTransferCurve) {
-  // variance = K (mean - black) + (K read)^2 + 1/12, with K numbers per electron.
+  // variance = K (mean - black) + (K read)^2 + 1/12, with K DN per electron.
   FrameCameraOptions options;
   options.bits = 12;
   options.black_level = 95;
@@ -318,7 +318,7 @@ TEST(FrameCamera, FollowsThePhotonTransferCurve) {
 }
 
 TEST(FrameCamera, CountsElectronsAsPoissonDid) {
-  // One number per electron: mean, variance and third moment are all the same, also where the light is faint.
+  // One DN per electron: mean, variance and third moment are equal, also at low irradiance.
   FrameCameraOptions options;
   options.bits = 16;
   options.full_well_e = 65535;
@@ -362,7 +362,7 @@ TEST(FrameCamera, SharesNothingWithAnotherCamera) {
   const auto times = every(kNsPerMs, 200 * kNsPerMs);
   FrameCamera alone(options, 8, 8, {0, 200 * kNsPerMs}, 1, 0);
   const auto expected = show(alone, waves, 8, 8, times);
-  // The same beside another one, in turns.
+  // The same if it alternates with another camera.
   FrameCamera first(options, 8, 8, {0, 200 * kNsPerMs}, 1, 0), second(options, 8, 8, {0, 200 * kNsPerMs}, 1, 1);
   std::vector<CameraFrame> frames;
   for (std::size_t i = 0; i + 1 < times.size(); ++i) {
@@ -395,13 +395,13 @@ TEST(FrameCamera, AdaptsItsExposureToTheLight) {
     options.black_level = 1000;
     options.auto_exposure = AutoExposureOptions{.target = 0.3, .min_exposure_s = 2e-5, .max_exposure_s = 0.015};
     FrameCamera camera(options, 16, 16, {0, 2 * kNsPerSecond});
-    // Even light that is too dark at first, then too bright: 25 frames each.
+    // Uniform irradiance, first too dark, then too bright: 25 frames each.
     const Light light = [](int, int, double t) { return t < 0.51 ? 0.1 : (t < 1.01 ? 2 : (t < 1.51 ? 1e4 : 1e-4)); };
     const auto frames = show(camera, light, 16, 16, every(kNsPerMs, 2 * kNsPerSecond));
     ASSERT_EQ(frames.size(), 99U);
     const auto level = [&](std::size_t k) { return (frames[k].numbers(3, 3) - 1000.0) / 64535; };
     EXPECT_EQ(frames[0].exposure, 2 * kNsPerMs);
-    EXPECT_EQ(frames[1].exposure, 2 * kNsPerMs) << "an exposure follows from that of two frames before";
+    EXPECT_EQ(frames[1].exposure, 2 * kNsPerMs) << "an exposure depends on that of two frames earlier";
     EXPECT_NE(frames[2].exposure, 2 * kNsPerMs);
     for (const std::size_t k : {10U, 20U, 40U, 48U}) EXPECT_NEAR(level(k), 0.3, 0.001) << k;
     EXPECT_EQ(frames[70].exposure, 20'000) << "the shortest";
@@ -424,7 +424,7 @@ TEST(FrameCamera, RefusesAnIrradianceThatIsNone) {
 }
 
 TEST(FrameCamera, RefusesAnIrradianceThatIsNoneAheadOfItsTime) {
-  // A tile has come so far that the exposures are not known yet.
+  // A tile is so far ahead that the exposures are not known yet.
   FrameCameraOptions options = precise(100, 0.004);
   options.auto_exposure = AutoExposureOptions{};
   FrameCamera camera(options, 4, 4, {0, kNsPerSecond});

@@ -57,7 +57,7 @@ TEST(Imu, AnHourAtRestHasTheAllanDeviationsOfItsNoise) {
     for (const auto& samples : axes) variance += allan_variance(samples, 0.008, 125 * tau_s) / 3;
     return std::sqrt(variance);
   };
-  // White noise N and a random walk K: N²/tau + K² tau/3, of which the first rules at 1 s and the second at 60 s.
+  // White noise N and a random walk K: N²/tau + K² tau/3; the first term dominates at 1 s, the second at 60 s.
   const auto expected = [](const InertialAxesOptions& axes, double tau_s) {
     return std::sqrt(axes.noise_density * axes.noise_density / tau_s + axes.random_walk * axes.random_walk * tau_s / 3);
   };
@@ -138,7 +138,7 @@ TEST(Imu, BiasesWalkWithoutJumpsOrCorners) {
     const TimeNs t = step * BiasWalk::kStep;
     constexpr TimeNs h = 1000;
     const double before = (bias(t) - bias(t - h)) / 1e-6, after = (bias(t + h) - bias(t)) / 1e-6;
-    EXPECT_NEAR(before, after, 0.3) << "a corner at step " << step;  // slopes are of the order of 14
+    EXPECT_NEAR(before, after, 0.3) << "discontinuous slope at step " << step;  // slopes are of the order of 14
     largest_step = std::max(largest_step, std::abs(bias(t) - bias(t - BiasWalk::kStep)));
   }
   EXPECT_GT(largest_step, std::sqrt(0.005));

@@ -17,9 +17,9 @@
 
 namespace esim::test {
 
-/// The event camera as its options word it, without low-pass and surround: pixel by pixel and event by event, in double
-/// precision and without a shortcut. Slow, and simple enough to be believed. It draws the same random numbers. Frames
-/// are whole images at increasing times.
+/// A literal implementation of the event camera's options, without low-pass and surround: pixel by pixel and event by
+/// event, in double precision and without optimisations. Slow, but simple enough to verify by reading. It draws the
+/// same random numbers. Frames are whole images at increasing times.
 class LiteralEventCamera {
  public:
   LiteralEventCamera(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream)
@@ -61,7 +61,7 @@ class LiteralEventCamera {
     std::uint64_t shots = 0;
     TimeNs shot_at = std::numeric_limits<TimeNs>::max();
     std::optional<TimeNs> busy_until;  // refractory, or waiting for the readout
-    double from = 0;                   // s after the frame before: what lies before is done
+    double from = 0;                   // s after the previous frame: start of the search
   };
 
   static constexpr double kNever = std::numeric_limits<double>::infinity();
@@ -93,12 +93,12 @@ class LiteralEventCamera {
     ++pixel.shots;
   }
 
-  /// What holds from one event to the next.
+  /// Draws the parameters that hold until the next event.
   void draw(std::size_t i) {
     Pixel& pixel = pixels_[i];
     const auto item = static_cast<std::uint32_t>(i);
     const auto fixed = mismatch_.normals(item);
-    // What is random of the thresholds is kept in floats.
+    // The random parts of the thresholds are stored as floats.
     const auto above = [](double nominal, double deviation) {
       return static_cast<float>(std::max(deviation, kMinContrastThreshold - nominal));
     };
@@ -125,7 +125,7 @@ class LiteralEventCamera {
     if (dead < options_.dead_pixels) pixel.on = pixel.off = kNever, pixel.leak = 0;
   }
 
-  /// The next event of a pixel on the way from the frame at t0 to that at t1.
+  /// The next event of a pixel between the frames at t0 and t1.
   std::optional<Event> next_event(std::size_t i, TimeNs t0, TimeNs t1, double light1) {
     Pixel& pixel = pixels_[i];
     const double start = brightness(pixel.light), end = brightness(light1), duration = to_seconds(t1 - t0);
@@ -183,7 +183,7 @@ class LiteralEventCamera {
 
   TimeNs refractory() const { return to_ns(options_.refractory_period_us * 1e-6); }
 
-  /// One request, one row and one acknowledgement after the other.
+  /// Processes one request, row and acknowledgement at a time.
   void read_out(const Image<float>& frame, TimeNs t0, TimeNs t1, std::vector<Event>& events) {
     constexpr TimeNs kNoTime = std::numeric_limits<TimeNs>::max();
     const ReadoutOptions& o = options_.readout;
@@ -204,7 +204,7 @@ class LiteralEventCamera {
       const TimeNs arrival = requests_.empty() ? kNoTime : requests_.begin()->t;
       const TimeNs service = waiting_.empty() ? kNoTime : std::max(free_at_, waiting_[0].t);
       if (std::min(arrival, service) > t1) return;
-      if (arrival <= service) {  // what arrives at the time of a service is still taken
+      if (arrival <= service) {  // requests that arrive at the time of a service are included
         const Event request = *requests_.begin();
         requests_.erase(requests_.begin());
         const auto same = [&](const Event& e) { return e.x == request.x && e.y == request.y; };
@@ -248,7 +248,7 @@ class LiteralEventCamera {
   AddressedRandom mismatch_, per_event_, leak_, shot_, defects_;
   std::optional<TimeNs> last_t_;
 
-  // The readout: requests that are still to come, requests that wait, and when the reader is free.
+  // The readout: future requests, waiting requests, and the time at which the reader is free.
   std::set<Event> requests_;
   std::vector<Event> waiting_;
   std::vector<TimeNs> blind_until_;

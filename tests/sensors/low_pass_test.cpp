@@ -1,4 +1,4 @@
-// The photoreceptor's low-pass, measured by the events behind it.
+// The photoreceptor's low-pass, measured from the events after it.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -31,7 +31,7 @@ double time_constant_s(const EventCameraOptions& o, double light) {
 TEST(LowPass, AnswersAStepAsItsFormulaSays) {
   for (const int order : {1, 2}) {
     for (const double light : {1.0, 0.2, 0.01}) {
-      for (const int samples : {1, 3, 1000}) {  // of the constant light behind the step
+      for (const int samples : {1, 3, 1000}) {  // of the constant irradiance after the step
         const EventCameraOptions options = low_pass(200, order);
         Feed feed(options, 1, 1);
         const float before = static_cast<float>((light + options.log_eps) * std::exp(-1.0) - options.log_eps);
@@ -54,7 +54,7 @@ TEST(LowPass, AnswersAStepAsItsFormulaSays) {
   }
 }
 
-/// Amplitude of the brightness behind the low-pass at a frequency, from the number of events in ten periods.
+/// Amplitude of the brightness after the low-pass at a frequency, from the number of events in ten periods.
 double measured_amplitude(const EventCameraOptions& options, double frequency_hz, double amplitude) {
   constexpr int kSamplesPerPeriod = 400, kPeriods = 20;
   Feed feed(options, 1, 1);
@@ -67,7 +67,7 @@ double measured_amplitude(const EventCameraOptions& options, double frequency_hz
     const std::size_t fired = feed.events(to_ns(period_s * k / kSamplesPerPeriod)).size();
     if (k > kPeriods / 2 * kSamplesPerPeriod) count += fired;
   }
-  // Each period passes the peak-to-peak swing twice; a turn costs less than a threshold.
+  // Each period covers the peak-to-peak swing twice; each extremum loses less than a threshold.
   return (static_cast<double>(count) / (kPeriods / 2) + 1) * options.contrast_threshold / 4;
 }
 
@@ -77,7 +77,7 @@ TEST(LowPass, LosesThreeDecibelsAtItsCutOff) {
     EventCameraOptions options = low_pass(100, order);
     options.contrast_threshold = 0.01;
     options.log_eps = 1e-9;
-    options.dark_irradiance = 10;  // the light hardly matters: 10 of it are dark
+    options.dark_irradiance = 10;  // the irradiance hardly matters relative to the dark irradiance
     const double intensity = (10 + std::exp(-3)) / 11;
     for (const double relative : {0.1, 1.0, 3.0}) {
       const double f = relative * 100 * intensity;
@@ -99,7 +99,7 @@ std::vector<Event> by_small_steps(const EventCameraOptions& o, const std::vector
   double f1 = brightness(light[0]), f2 = f1, reference = f1;
   double busy_until = -1, t = 0;
   for (std::size_t k = 1; k < light.size(); ++k) {
-    // The time constant is that of the segment's mean light.
+    // The time constant is that of the segment's mean irradiance.
     const double e0 = light[k - 1], e1 = light[k], mean = (e0 + 4 * std::sqrt(e0 * e1) + e1) / 6;
     const double tau = time_constant_s(o, mean), l0 = brightness(e0), l1 = brightness(e1);
     const int steps = static_cast<int>(std::llround(to_seconds(interval) / step_s));

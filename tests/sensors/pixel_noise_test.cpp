@@ -1,4 +1,4 @@
-// Rates and distributions of what is random, against their formulae.
+// Rates and distributions of the random effects, compared with their formulae.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ using test::Feed;
 constexpr int kWidth = 100, kHeight = 60;
 constexpr double kPixels = kWidth * kHeight;
 
-/// The events of constant light, sampled `samples` times.
+/// The events at constant irradiance, sampled `samples` times.
 std::vector<Event> in_constant_light(const EventCameraOptions& options, double light, double duration_s,
                                      int samples = 50) {
   Feed feed(options, kWidth, kHeight, 21);
@@ -50,7 +50,7 @@ TEST(PixelNoise, LeakEventsHaveTheGivenRateAndJitter) {
       options.leak_rate_hz = 5;
       options.leak_jitter = 0.1;
       const std::vector<Event> events = in_constant_light(options, 0.3, 4, samples);
-      // Pixels begin anywhere between two events, so that the number per pixel is rate * time on average.
+      // Pixels start at a random time between two events, so that the mean number per pixel is rate * time.
       const double expected = 5 * 4 * kPixels;
       EXPECT_NEAR(static_cast<double>(events.size()), expected, 5 * 0.5 * std::sqrt(kPixels));
       EXPECT_TRUE(std::all_of(events.begin(), events.end(), [](const Event& e) { return e.polarity == 1; }));
@@ -120,7 +120,7 @@ TEST(PixelNoise, IntervalsOfShotNoiseAreExponential) {
     for (std::size_t i = 1; i < std::min<std::size_t>(times.size(), 60); ++i)
       intervals.push_back(times[i] - times[i - 1]);
   }
-  // Kolmogorov-Smirnov at the level of 1e-3.
+  // Kolmogorov-Smirnov test at the level of 1e-3.
   std::sort(intervals.begin(), intervals.end());
   const auto n = static_cast<double>(intervals.size());
   double distance = 0;
@@ -200,14 +200,14 @@ TEST(PixelNoise, LatencyHasTheGivenMeanAndSpreadAndGoesWithTheLight) {
       const double factor = 1 - share + share * (1 + kDark) / (light + kDark);
       std::vector<double> delays;
       for (const Event& event : events) delays.push_back((to_seconds(event.t) - crossing_s) * 1e6);
-      // The light at the crossing is within 0.6 % of that at the end.
+      // The irradiance at the crossing is within 0.6 % of that at the end.
       EXPECT_NEAR(Moments(delays).mean, 100 * factor, 5 * 10 * factor / std::sqrt(kPixels) + 0.6 * factor);
       EXPECT_NEAR(std::sqrt(Moments(delays).variance), 10 * factor, 0.6 * factor);
     }
   }
 }
 
-/// Sinusoids of different frequency, phase, amplitude and mean in every pixel.
+/// Sinusoids with different frequency, phase, amplitude and mean in each pixel.
 Image<float> flicker(double t_s, int width, int height) {
   Image<float> image(width, height);
   for (int y = 0; y < height; ++y) {

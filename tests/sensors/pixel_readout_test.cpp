@@ -9,13 +9,13 @@
 #include "sensors/feed.h"
 #include "sensors/literal_event_camera.h"
 
-// What the readout does to the pixels.
+// The effect of the readout on the pixels.
 namespace esim {
 namespace {
 
 constexpr int kWidth = 24, kHeight = 10;
 
-/// Frames of a scene that flickers at random: much to read out in some, little in others.
+/// Frames of a scene that flickers randomly, with many events in some frames and few in others.
 std::vector<Image<float>> frames_of(int count, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<float> normal;
@@ -128,7 +128,7 @@ TEST_P(PixelReadoutTest, DoesNotDependOnThreads) {
   EXPECT_EQ(feed_whole(GetParam().options, frames), feed_whole(GetParam().options, frames, Workers(2)));
 }
 
-/// Tiles of different sizes, each sampled at times of its own and given when another tile's turn would come.
+/// Tiles of different sizes, each sampled at its own times and passed on out of order.
 std::vector<Event> feed_tiles(const EventCameraOptions& options, const std::vector<Image<float>>& frames) {
   EventCamera camera(options, kWidth, kHeight, 7);
   const std::vector<Tile> tiles = {{0, 0, 7, 10}, {7, 0, 17, 4}, {7, 4, 17, 6}};
@@ -141,7 +141,7 @@ std::vector<Event> feed_tiles(const EventCameraOptions& options, const std::vect
   std::mt19937 random(1);
   while (*std::ranges::min_element(known) + 1 < frames.size()) {
     segments.clear();
-    std::vector<Image<float>> copies;  // which are gone when the camera returns
+    std::vector<Image<float>> copies;  // destroyed when the camera returns
     copies.reserve(100);
     for (std::size_t i = 0; i < tiles.size(); ++i) {
       for (std::size_t more = random() % 4; more > 0 && known[i] + 1 < frames.size(); --more, ++known[i]) {
@@ -181,7 +181,7 @@ TEST_P(PixelReadoutTest, HoldsOneRequestPerPixelAndThenTheRefractoryPeriod) {
   for (const auto& [pixel, own] : by_pixel(events)) {
     for (std::size_t i = 1; i < own.size(); ++i) {
       ASSERT_GT(own[i].t, own[i - 1].t) << pixel.first << ", " << pixel.second;
-      // A request that waits for less than 1 % of the refractory period counts as read out at once.
+      // A request that waits for less than 1 % of the refractory period counts as read out immediately.
       ASSERT_GE(static_cast<double>(own[i].t - own[i - 1].t), 0.99 * options.refractory_period_us * 1e3);
     }
   }
@@ -198,7 +198,7 @@ TEST_P(PixelReadoutTest, AccountsForEveryRequest) {
   EXPECT_EQ(before.in_flight, released + feed.camera().statistics().in_flight);
 }
 
-/// With a readout that nothing waits for, the sensor fires as without one.
+/// If no request waits, the readout does not change the events.
 TEST(PixelReadout, ChangesNothingWhereNothingWaits) {
   std::vector<Image<float>> frames(1, Image<float>(kWidth, kHeight, 0.1F));
   for (int k = 1; k < 40; ++k) {  // one pixel after another
@@ -212,8 +212,8 @@ TEST(PixelReadout, ChangesNothingWhereNothingWaits) {
   EXPECT_GT(free.size(), 100U);
 }
 
-/// All pixels of a column brighten together, and the reader needs 100 us for each row: the k-th row is read k rows
-/// later, and sees its brightness only from then on.
+/// All pixels of a column brighten together, and the reader needs 100 us per row: the k-th row is read k rows later,
+/// and sees its brightness only from then on.
 TEST(PixelReadout, PixelsSeeTheirBrightnessFromTheirAcknowledgementOn) {
   constexpr int kRows = 10;
   constexpr double kRise = 2.0, kThreshold = 0.5;  // in 4 ms; ln
@@ -225,7 +225,7 @@ TEST(PixelReadout, PixelsSeeTheirBrightnessFromTheirAcknowledgementOn) {
   const auto pixels = by_pixel(feed.events(4 * kNsPerMs));
   ASSERT_EQ(pixels.size(), static_cast<std::size_t>(kRows));
   for (const auto& [pixel, events] : pixels) {
-    // The first request of all comes after 1 ms. A later one comes 1 ms after the refractory period.
+    // The first request of every pixel is after 1 ms. Later requests are 1 ms after the refractory period.
     const double first = 1000 + 100 * pixel.second;
     ASSERT_GE(events.size(), 2U);
     EXPECT_NEAR(static_cast<double>(events[0].t), first * 1e3, 2);
@@ -242,11 +242,11 @@ TEST(PixelReadout, DropsAndCountsRequestsBeyondItsQueue) {
   for (std::size_t k = 0; k < frames.size(); ++k) feed.frame(frames[k], static_cast<TimeNs>(k) * kNsPerMs);
   EXPECT_GT(feed.camera().statistics().dropped, 100);
   EXPECT_GT(feed.camera().statistics().longest_delay, 20 * kNsPerUs);
-  // At most 20 before it and 20 of rows that grew meanwhile, at 2 us each.
+  // At most 20 requests before it, and 20 in rows that have grown meanwhile, at 2 us each.
   EXPECT_LT(feed.camera().statistics().longest_delay, 2 * 2 * 21 * kNsPerUs + kNsPerUs);
 }
 
-/// A readout that cannot follow reports fewer events, and later ones, and never a pixel twice at once.
+/// A readout at its limit reports fewer and later events, and never two events of a pixel at the same time.
 TEST(PixelReadout, ASaturatedSensorReportsEachPixelInTurn) {
   const EventCameraOptions options{.contrast_threshold = 0.05, .refractory_period_us = 10};
   const std::vector<Image<float>> frames = frames_of(60, 8);
@@ -258,7 +258,7 @@ TEST(PixelReadout, ASaturatedSensorReportsEachPixelInTurn) {
   for (const Event& event : read) EXPECT_TRUE(seen.insert({event.t / kNsPerUs, event.x, event.y}).second);
 }
 
-/// As everything else, what becomes of a saturated sensor is a law in continuous time.
+/// Like all other effects, saturation is defined in continuous time.
 TEST(PixelReadout, DoesNotDependOnSampling) {
   EventCameraOptions options = with(kNoisy, {.rate_mev_per_s = 1});
   options.low_pass_hz = 500;
@@ -278,7 +278,7 @@ TEST(PixelReadout, DoesNotDependOnSampling) {
     }
     counts.push_back(static_cast<double>(count));
   }
-  EXPECT_NEAR(counts[0], counts[2], 0.01 * counts[2]);  // straight pieces of 1 ms are not quite the wave
+  EXPECT_NEAR(counts[0], counts[2], 0.01 * counts[2]);  // linear segments of 1 ms only approximate the wave
   EXPECT_NEAR(counts[1], counts[2], 0.005 * counts[2]);
 }
 

@@ -24,7 +24,7 @@ std::vector<Event> random_events(std::size_t count, TimeNs span, unsigned seed) 
   return events;
 }
 
-/// The rules of ReadoutOptions, in whole nanoseconds, with a list that is searched.
+/// A literal implementation of the rules of ReadoutOptions, in whole nanoseconds, with a linear search.
 std::vector<Event> by_the_rules(const std::vector<Event>& events, TimeNs per_event, TimeNs per_row,
                                 std::size_t capacity, std::int64_t& dropped) {
   std::vector<Event> waiting, out;
@@ -33,7 +33,7 @@ std::vector<Event> by_the_rules(const std::vector<Event>& events, TimeNs per_eve
   while (next < events.size() || !waiting.empty()) {
     const TimeNs arrival = next < events.size() ? events[next].t : std::numeric_limits<TimeNs>::max();
     const TimeNs service = waiting.empty() ? std::numeric_limits<TimeNs>::max() : std::max(free_at, waiting[0].t);
-    if (arrival <= service) {  // what arrives at the time of a service is still taken
+    if (arrival <= service) {  // requests that arrive at the time of a service are included
       if (waiting.size() < capacity) {
         waiting.push_back(events[next]);
       } else {
@@ -59,7 +59,7 @@ std::vector<Event> by_the_rules(const std::vector<Event>& events, TimeNs per_eve
   return out;
 }
 
-/// Gives requests to the readout, and serves its rows when they are due, until a time.
+/// Passes requests to the readout, and serves its rows when they are due, until a time.
 void run(Readout& readout, EventSpan events, TimeNs until, std::vector<Event>& out) {
   const auto serve_before = [&](TimeNs t) {
     for (TimeNs service = readout.next_service(); service < t; service = readout.next_service()) {
@@ -83,7 +83,7 @@ TEST(Readout, FollowsItsRules) {
             {.rate_mev_per_s = 100, .row_time_us = static_cast<double>(per_row) * 1e-3, .queue_events = capacity},
             kHeight);
         std::vector<Event> out;
-        // In pieces, as watermarks come.
+        // In portions, like watermarks.
         std::mt19937 random(seed);
         std::size_t begin = 0;
         for (TimeNs until = 0; begin < events.size() || readout.waiting() > 0; until += 1 + random() % 30'000) {

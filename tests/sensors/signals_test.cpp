@@ -51,7 +51,7 @@ TEST(RelaxingSignal, SolvesTheDifferentialEquation) {
   }
 }
 
-/// The first time on a fine grid at which the signal is outside of the band.
+/// The first time on a fine grid at which the signal is outside the bounds.
 Crossing search(const RelaxingSignal& signal, double low, double high, double from) {
   constexpr int kSteps = 20000;
   for (int i = 0; i <= kSteps; ++i) {
@@ -80,7 +80,7 @@ TEST(RelaxingSignal, FindsTheFirstCrossingThatAFineSearchFinds) {
     const double end = signal.value(Case::kDuration);
     turned += expected.tau != kNever && end > low && end < high ? 1 : 0;
     if (expected.tau == kNever) {
-      // The search may miss a level that is only just touched.
+      // The search may miss a level that is barely touched.
       if (crossing.tau == kNever) continue;
       EXPECT_NEAR(signal.value(crossing.tau), crossing.on ? high : low, 1e-6);
       continue;
@@ -94,10 +94,10 @@ TEST(RelaxingSignal, FindsTheFirstCrossingThatAFineSearchFinds) {
     EXPECT_NEAR(signal.value(crossing.tau), crossing.on ? high : low, 1e-9 * (1 + std::fabs(now)) + 0.1 * per_ns) << i;
   }
   EXPECT_GT(found, 500);
-  EXPECT_GT(turned, 20);  // crossings that the segment's ends do not show
+  EXPECT_GT(turned, 20);  // crossings that are not visible at the segment's ends
 }
 
-/// A block of signals whose state is in floats, as the camera's is.
+/// A block of signals whose state is in floats, as in the camera.
 template <int kPoles>
 struct Block {
   AwakePixels awake;
@@ -158,7 +158,7 @@ void expect_the_same_as_one_by_one(double duration) {
     }
   }
   EXPECT_GT(crossed, 1000);
-  EXPECT_GT(quiet, kPoles == 1 ? 500 : -1);  // looking ahead is worth it
+  EXPECT_GT(quiet, kPoles == 1 ? 500 : -1);  // looking ahead is useful
 }
 
 TEST(RelaxingSignals, AreTheSameAsOneByOne) {
@@ -215,9 +215,9 @@ TEST(LinearSignals, FindTheirCrossings) {
   EXPECT_EQ(compare.polarity[2], -1);
   EXPECT_NEAR(compare.tau[2], 2.5e5, 1e-6);
   EXPECT_EQ(compare.polarity[3], -1);
-  EXPECT_NEAR(compare.tau[3], 4e5, 1e-6);  // it has already left
+  EXPECT_NEAR(compare.tau[3], 4e5, 1e-6);  // it is already outside
   EXPECT_NEAR(signals.value(3), 0.2, 1e-12);
-  EXPECT_EQ(compare.polarity[4], 1);  // of the leak alone
+  EXPECT_EQ(compare.polarity[4], 1);  // only by the leak
   EXPECT_NEAR(compare.tau[4], 5e5, 1e-6);
 }
 

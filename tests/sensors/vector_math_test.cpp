@@ -1,4 +1,4 @@
-// The elementary functions that are the camera's own, against the library's in doubles.
+// The camera's own elementary functions, compared with the library's in doubles.
 #include "esim/sensors/vector_math.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 namespace esim {
 namespace {
 
-/// Calls check(x, f(x)) for many x, f being a function of vectors.
+/// Calls check(x, f(x)) for many x, where f is a function of vectors.
 template <typename T, typename Function, typename Check>
 void for_many(const Function& f, const Check& check, T first, T factor, T step) {
   const hn::CappedTag<T, 8> d;

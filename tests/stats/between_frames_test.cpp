@@ -9,7 +9,7 @@
 namespace esim {
 namespace {
 
-/// Frames at some times, and events between them, of which part come within the last 2 % before the next frame.
+/// Frames at given times, and events between them; the fraction `bunched` lies in the last 2 % before the next frame.
 PhaseTest test_of(const std::vector<TimeNs>& frames, double bunched, bool all_at_once = false) {
   constexpr int kPerInterval = 1000;
   std::mt19937 random(3);
@@ -55,9 +55,9 @@ TEST(BetweenFrames, EvenOnesAndThoseThatBunch) {
       EXPECT_EQ(even.banding, Banding::none) << start;
       EXPECT_NEAR(static_cast<double>(even.events), 60'000, 1);
       EXPECT_EQ(bunched.banding, Banding::strong);
-      // A fraction a in w = 2 % of the interval beside an even rest: the rms is a sqrt(1 / w - 1).
+      // A fraction a in w = 2 % of the interval, the others uniform: the rms is a sqrt(1 / w - 1).
       EXPECT_NEAR(bunched.modulation, 0.2 * std::sqrt(1 / 0.02 - 1), 0.25);
-      EXPECT_EQ(test_of(frames, 0.2, true).modulation, bunched.modulation) << "in whatever portions they come";
+      EXPECT_EQ(test_of(frames, 0.2, true).modulation, bunched.modulation) << "independent of the portions";
     }
   }
 }
@@ -65,7 +65,7 @@ TEST(BetweenFrames, EvenOnesAndThoseThatBunch) {
 TEST(BetweenFrames, TooLittleToTell) {
   EXPECT_EQ(BetweenFrames().test().banding, Banding::unknown);
   EXPECT_EQ(test_of({0}, 0).banding, Banding::unknown);
-  EXPECT_EQ(test_of(frames_every({1'000'000}, 10, 0), 0.5).banding, Banding::unknown) << "of ten periods";
+  EXPECT_EQ(test_of(frames_every({1'000'000}, 10, 0), 0.5).banding, Banding::unknown) << "only ten periods";
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ TEST(IntervalHistogram, EveryIntervalIsBetweenTheEdgesOfItsBin) {
 }
 
 TEST(IntervalHistogram, WholeMicrosecondsShowNoComb) {
-  // As many intervals of each number of us: as many per us in every bar, however few us it holds.
+  // Equal numbers of intervals for each whole us: every bar has the same density, even if it spans few us.
   IntervalHistogram whole, finer;
   constexpr int kLongest_us = 3000;
   for (int us = 1; us < kLongest_us; ++us) whole.add(us * kNsPerUs);
@@ -49,7 +49,7 @@ TEST(IntervalHistogram, WholeMicrosecondsShowNoComb) {
     all += bars[static_cast<std::size_t>(bar)];
   }
   EXPECT_NEAR(all, IntervalHistogram::edge_s(2 * 69) / (1e-6 * kLongest_us), 1e-3);
-  // What is finer stands where it is.
+  // Intervals finer than a us are not spread.
   EXPECT_NEAR(finer.bars(2)[6], 1.0 / static_cast<double>(finer.total()), 1e-12);  // 1.995 to 2.24 us: 2 us alone
 }
 
@@ -74,7 +74,7 @@ TEST(IntervalHistogram, QuantilesAreThoseOfTheSortedIntervals) {
   EXPECT_TRUE(std::isnan(IntervalHistogram().quantile_s(0.5)));
 }
 
-// Windows of 1 ms by brute force; with pauses of all lengths, so that the curve's bins grow.
+// Compares with windows of 1 ms by brute force, with pauses of all lengths, so that the curve's bins grow.
 TEST(RateCurve, CountsWindows) {
   std::mt19937_64 random(3);
   for (const double pause_s : {1e-4, 1e-3, 0.01, 1.0}) {

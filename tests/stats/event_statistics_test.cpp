@@ -101,7 +101,7 @@ TEST(EventStatistics, BandsOfAGivenAndOfAnUnknownPeriod) {
   StatisticsOptions options;
   options.frame_rate_hz = 50;
   EXPECT_EQ(statistics_of(events, options).banding(), Banding::strong);
-  EXPECT_TRUE(contains(verdict(statistics_of(events, options)), "band at the frame times"));
+  EXPECT_TRUE(contains(verdict(statistics_of(events, options)), "banding at the frame times"));
   const Statistics searched = statistics_of(events);
   EXPECT_EQ(searched.banding(), Banding::strong);
   EXPECT_NEAR(searched.periodicity->frequency_hz, 200, 0.01);
@@ -126,7 +126,7 @@ TEST(EventStatistics, BrokenContracts) {
   EXPECT_NE(message_of<InternalError>([] { statistics_of({{5, kWidth, 0, 1}}); }), "nothing was thrown");
 }
 
-// Nothing, one event, all at once, and negative times: text, JSON and figure all the same.
+// No events, one event, simultaneous events and negative times: text, JSON and figure must all work.
 TEST(EventStatistics, DegenerateStreams) {
   const std::vector<std::vector<Event>> streams = {{},
                                                    {{7, 1, 2, 1}},
@@ -152,7 +152,7 @@ TEST(Report, TwoFilesSideBySide) {
   EXPECT_TRUE(contains(text, "first.h5"));
   EXPECT_TRUE(contains(text, " kev/s"));
   EXPECT_TRUE(contains(text, " Mev/s"));
-  EXPECT_TRUE(contains(text, ", corrected for ")) << "of how many frequencies a period is the strongest";
+  EXPECT_TRUE(contains(text, ", corrected for ")) << "number of searched frequencies";
   for (const char* line : {"\n  events ", "\n  peak in 1 ms ", "\n  silent ", "\n  median ", "\n  verdict "}) {
     const std::size_t at = text.find(line);
     EXPECT_NE(at, std::string::npos) << line;

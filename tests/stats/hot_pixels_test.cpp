@@ -25,7 +25,7 @@ TEST(HotPixels, PlantedOnesAreFoundAndNoOthers) {
     const auto hot = static_cast<std::uint32_t>(4 * mean + 40);
     counts(0, 0) = hot;
     counts(60, 30) = hot + 3;
-    counts(61, 30) = hot + 2;  // beside another
+    counts(61, 30) = hot + 2;  // next to another one
     counts(119, 89) = hot + 1;
     const std::vector<HotPixel> found = find_hot_pixels(counts, 5);
     ASSERT_EQ(found.size(), 4u) << mean;
@@ -38,7 +38,7 @@ TEST(HotPixels, PlantedOnesAreFoundAndNoOthers) {
   }
 }
 
-// A line of texture, one pixel wide, heats all that it passes along.
+// A line of texture, one pixel wide, raises the counts of all pixels along its path.
 TEST(HotPixels, TextureIsNotHot) {
   auto counts = poisson_counts(120, 90, 5, 6);
   for (int x = 0; x < 120; ++x) counts(x, 40) += 400;
@@ -50,7 +50,7 @@ TEST(HotPixels, TextureIsNotHot) {
 
 constexpr double kPi = std::numbers::pi;
 
-/// Irradiance at a point (u, v) from the middle of a wheel of 20.3 px, px: spokes, and a tyre with knobs.
+/// Irradiance at (u, v), px from the centre of a wheel with a radius of 20.3 px: spokes, and a tyre with knobs.
 double wheel(double u, double v, double angle) {
   constexpr double kRadius = 20.3;
   const double r = std::hypot(u, v), a = std::atan2(v, u) - angle;
@@ -60,7 +60,7 @@ double wheel(double u, double v, double angle) {
   return tyre ? 0.12 : 0.55;
 }
 
-/// Events of pixels of contrast threshold C that watch it turn once, in the middle of a sensor of 140 x 140 px.
+/// Event counts for one turn of the wheel in the middle of a sensor of 140 x 140 px.
 Image<std::uint32_t> counts_of_a_wheel(double threshold) {
   constexpr int kSize = 140, kFirst = 46, kEnd = 94, kSteps = 480, kSamples = 4;
   Image<std::uint32_t> counts(kSize, kSize);
@@ -89,14 +89,14 @@ TEST(HotPixels, TheRimOfAWheelIsNotHot) {
   for (const double threshold : {0.15, 0.5}) {
     auto counts = counts_of_a_wheel(threshold);
     EXPECT_TRUE(find_hot_pixels(counts, 5).empty()) << threshold;
-    // Hot ones are: beside the wheel, at its rim, on a spoke's way.
+    // Hot pixels outside the wheel, at its rim and on a spoke's path are found.
     const std::uint32_t busiest = *std::max_element(counts.pixels().begin(), counts.pixels().end());
     for (const auto& [x, y] : {std::pair{10, 120}, {70, 49}, {91, 70}, {60, 70}}) counts(x, y) += 6 * busiest;
     EXPECT_EQ(find_hot_pixels(counts, 5).size(), 4u) << threshold;
   }
 }
 
-// Around a pixel at the rim of a wheel that was filmed: what passes there makes one pixel cross two levels more.
+// Around a pixel at the rim of a recorded wheel: one pixel crosses two levels more than its neighbours.
 TEST(HotPixels, NeighboursAsUnevenAsARimAreNotHot) {
   constexpr std::uint32_t kRim[7][7] = {{48, 48, 48, 48, 48, 48, 46}, {48, 48, 48, 48, 48, 24, 46},
                                         {48, 48, 48, 48, 48, 47, 46}, {0, 0, 24, 130, 48, 23, 46},

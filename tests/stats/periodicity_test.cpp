@@ -51,7 +51,7 @@ TEST(PhaseTest, StatisticsByBruteForce) {
   EXPECT_NEAR(test.share_at_peak, 0.02, 0.003);
 }
 
-// p is even on [0, 1] where there is nothing to find.
+// Without periodicity, p is uniform on [0, 1].
 TEST(PhaseTest, PoissonStreamsAreNotFlagged) {
   constexpr int kSeeds = 200;
   int below_1_percent = 0, below_half = 0;
@@ -80,7 +80,7 @@ TEST(PhaseTest, EvenStreamsAreNotFlagged) {
   std::vector<TimeNs> every_10_us;
   for (TimeNs t = 0; t < kNsPerSecond; t += 10'007) every_10_us.push_back(t);
   EXPECT_EQ(test_phase(every_10_us, 30).banding, Banding::none);
-  // 1 kHz is 15.6 us per bin: bins of 15 and of 16 stamps.
+  // At 1 kHz a bin is 15.6 us wide: bins hold 15 or 16 different stamps.
   EXPECT_EQ(test_phase(in_whole_microseconds(poisson_times(1e6, 1, 7)), 1000).banding, Banding::none);
 }
 
@@ -94,7 +94,7 @@ TEST(PhaseTest, BandsAreFlagged) {
     EXPECT_NEAR(test.share_at_peak, 1.0 / stamps, 0.02) << stamps;
     EXPECT_NEAR(test.modulation, std::sqrt(64.0 / stamps - 1), 0.1) << stamps;
   }
-  // One event in two hundred at the frames: rms of sqrt(64) / 200 = 4 % at most.
+  // One in 200 events at the frames: rms of at most sqrt(64) / 200 = 4 %.
   std::vector<TimeNs> weak = poisson_times(1e5, 4, 1);
   const std::vector<TimeNs> moved = banded(weak, 25, 1);
   for (std::size_t i = 0; i < weak.size(); i += 200) weak[i] = moved[i];
@@ -129,7 +129,7 @@ TEST(FindPeriodicity, TheFrameRate) {
   }
 }
 
-// Stamps at 1/5, 2/5, 3/5 of the frame, say: the strongest line is not the frame rate.
+// For stamps at 1/5, 2/5, 3/5 of the frame, the strongest frequency is not the frame rate.
 TEST(FindPeriodicity, UnevenStampsInAFrame) {
   std::mt19937 random(1);
   std::vector<TimeNs> times = banded(poisson_times(2e4, 4, 1), 30, 1);

@@ -18,14 +18,14 @@ inline std::vector<TimeNs> poisson_times(double rate_hz, double duration_s, unsi
   return times;
 }
 
-/// Each time moved to one of a few stamps in its frame, as simulators do that work frame by frame.
+/// Moves each time to one of a few stamps in its frame, as in simulators that work frame by frame.
 inline std::vector<TimeNs> banded(std::vector<TimeNs> times, double frame_rate_hz, int stamps_per_frame) {
   const double step_ns = 1e9 / frame_rate_hz / stamps_per_frame;
   for (TimeNs& t : times) t = static_cast<TimeNs>(std::ceil(static_cast<double>(t) / step_ns) * step_ns);
   return times;
 }
 
-/// Events at these times, on pixels and with polarities drawn evenly.
+/// Events at these times, with uniformly drawn pixels and polarities.
 inline std::vector<Event> events_at(const std::vector<TimeNs>& times, int width, int height, unsigned seed) {
   std::mt19937 random(seed);
   std::vector<Event> events;

@@ -10,7 +10,7 @@
 namespace esim {
 namespace {
 
-/// Value between the pixels; NaN outside their centres.
+/// Value between the pixels; NaN outside the area of their centres.
 float bilinear(const Image<float>& image, double u, double v) {
   const int x = static_cast<int>(std::floor(u)), y = static_cast<int>(std::floor(v));
   if (x < 0 || y < 0 || x + 1 >= image.width() || y + 1 >= image.height())
@@ -20,7 +20,7 @@ float bilinear(const Image<float>& image, double u, double v) {
          g * ((1 - f) * image(x, y + 1) + f * image(x + 1, y + 1));
 }
 
-/// Whether all of the 4 x 4 pixels around a place see the same object, and depth that changes smoothly.
+/// Whether the 4 x 4 pixels around a point see the same object with smooth depth.
 bool is_smooth_around(const Sample& sample, double u, double v) {
   const int left = static_cast<int>(std::floor(u)) - 1, top = static_cast<int>(std::floor(v)) - 1;
   if (left < 0 || top < 0 || left + 4 > sample.depth.width() || top + 4 > sample.depth.height()) return false;
@@ -69,7 +69,7 @@ TEST_P(EveryRendererOfSpace, DisplacementIsTheIntegralOfTheMotionFieldAlongThePa
   double longest = 0, worst = 0;
   for (int y = 0; y < model_.height; ++y) {
     for (int x = 0; x < model_.width; ++x) {
-      // Runge and Kutta's method of fourth order; given up where the path leaves what is smooth.
+      // Fourth-order Runge-Kutta method; stops if the path leaves the smooth area.
       Eigen::Vector2d at(x, y);
       const auto velocity = [&](int half_steps, const Eigen::Vector2d& p) -> Eigen::Vector2d {
         const Sample& sample = samples[static_cast<std::size_t>(half_steps)];
@@ -104,7 +104,7 @@ TEST_P(EveryRendererOfSpace, DepthPosesAndCalibrationMapOneImageOntoAnother) {
   int count = 0;
   for (int y = 0; y < model_.height; ++y) {
     for (int x = 0; x < model_.width; ++x) {
-      // Between the pixels beside an edge or a crease there is no light of either side.
+      // Next to an edge or a crease, values between pixels do not belong to either side.
       const double u = x + double{found.x(x, y)}, v = y + double{found.y(x, y)};
       if (found.visible(x, y) == 0 || !is_smooth_around(there, u, v)) continue;
       const float expected = bilinear(there.irradiance, u, v);
@@ -126,7 +126,7 @@ INSTANTIATE_TEST_SUITE_P(Renderers, EveryRendererOfSpace,
 
 // --- two planes: everything in closed form --------------------------------------------------------------------------
 
-constexpr double kWall = 4, kCard = 2;  // m before the camera, along its z axis
+constexpr double kWall = 4, kCard = 2;  // m in front of the camera, along its z axis
 
 /// A square in the plane z = 0 of its own frame.
 Mesh square(float side) {
@@ -140,7 +140,7 @@ Mesh square(float side) {
   return mesh;
 }
 
-/// A wall, and a card of half its distance before it, which may move.
+/// A wall, and a card at half its distance, which may move.
 class WallAndCard : public testing::TestWithParam<int> {
  protected:
   WallAndCard() {
@@ -166,7 +166,7 @@ class WallAndCard : public testing::TestWithParam<int> {
     return *field.advance(to, sample);
   }
 
-  /// The point of the world that a place of the image sees, and whether it is on the card.
+  /// The world point that a point of the image sees, and whether it is on the card.
   std::pair<Eigen::Vector3d, bool> seen(const RenderRequest& view, const Eigen::Vector2d& pixel) const {
     const Eigen::Vector3d from = view.camera.T_world_body.translation;
     const Eigen::Vector3d bearing = model_.back_project(pixel)->bearing;
@@ -176,7 +176,7 @@ class WallAndCard : public testing::TestWithParam<int> {
     return {from + (kWall - from.z()) * bearing, false};
   }
 
-  /// Holds all pixels against rays, and returns how many are hidden.
+  /// Compares all pixels with rays, and returns the number of hidden pixels.
   int check(const RenderRequest& from, const RenderRequest& to) const {
     const Displacement found = displacement(from, to);
     const Eigen::Vector3d card_moves =
@@ -195,7 +195,7 @@ class WallAndCard : public testing::TestWithParam<int> {
           EXPECT_EQ(found.visible(x, y), 0);
           continue;
         }
-        // Of a pixel that an edge crosses, either may be said.
+        // For a pixel at an edge, both results are valid.
         bool hit = false, missed = false;
         for (const double dx : {-0.5, 0.0, 0.5}) {
           for (const double dy : {-0.5, 0.0, 0.5})
@@ -216,7 +216,7 @@ class WallAndCard : public testing::TestWithParam<int> {
 
 TEST_P(WallAndCard, TheCardHidesTheWallWhereTheCameraMoves) {
   const Eigen::Vector3d card(0, 0, kCard);
-  // It crosses the wall by about 100 px/m (1/2 - 1/4 1/m) 0.6 m = 15 px.
+  // It moves relative to the wall by about 100 px/m (1/2 - 1/4 1/m) 0.6 m = 15 px.
   EXPECT_GT(check(view(0, {-0.3, 0, 0}, card), view(1, {0.3, 0, 0}, card)), 200);
   EXPECT_GT(check(view(0, {0, 0, 0}, card), view(1, {0.1, -0.2, 1.2}, card)), 200);
 }
@@ -227,7 +227,7 @@ TEST_P(WallAndCard, TheCardMovesAndHidesTheWall) {
   EXPECT_GT(check(from, to), 200);
 
   const Displacement found = displacement(from, to);
-  EXPECT_NEAR(found.x(5, 5), 0, 1e-4) << "the wall stands still";
+  EXPECT_NEAR(found.x(5, 5), 0, 1e-4) << "the wall does not move";
   if (GetParam() == 0) {
     const double bearing = (60 - model_.cx) / model_.fx;  // on the card
     EXPECT_NEAR(found.x(60, 44), model_.fx * ((2 * bearing + 0.4) / 1.7 - bearing), 1e-3);

@@ -19,7 +19,7 @@ constexpr TimeNs kPeriod = 40 * kNsPerMs;
 
 const test::Pattern kPattern(4);
 
-/// Keeps what it is given.
+/// Keeps all records.
 struct Memory final : Sink {
   void begin(const RecordingInfo& given) override { info = given; }
   void write(const Record& record) override {
@@ -77,8 +77,8 @@ class ConvertTest : public testing::Test {
   test::TemporaryDirectory directory_;
 };
 
-/// χ² of the events' times modulo the frame period against a flat histogram of 20 bins. Neighbouring events depend on
-/// each other: one of every `stride` is counted, which leaves about 4000 of those of a test.
+/// χ² of the events' times modulo the frame period relative to a uniform histogram of 20 bins. Because neighbouring
+/// events are correlated, only every `stride`-th event is counted, about 4000 per test.
 double banding(const std::vector<Event>& events) {
   constexpr std::size_t kBins = 20, kCounted = 4000;
   const std::size_t stride = std::max<std::size_t>(1, events.size() / kCounted);
@@ -100,9 +100,9 @@ TEST_F(ConvertTest, EventsOfAMovingPatternShowNoFrames) {
   Memory followed, blended;
   convert_folder(path(), followed, {.threads = 2});
   convert_folder(path(), blended, {.interpolation = {.interpolation = false}, .threads = 2});
-  // 43.8 is exceeded by one flat histogram of 19 degrees of freedom in a thousand.
+  // With 19 degrees of freedom, one in a thousand uniform histograms exceeds 43.8.
   EXPECT_LT(banding(followed.events), 43.8);
-  EXPECT_GT(banding(blended.events), 200) << "the test would not notice";
+  EXPECT_GT(banding(blended.events), 200) << "the test is not sensitive enough";
 }
 
 TEST_F(ConvertTest, AStillSceneFiresNothingAndABrightnessRampOnTime) {
@@ -115,7 +115,7 @@ TEST_F(ConvertTest, AStillSceneFiresNothingAndABrightnessRampOnTime) {
   std::filesystem::remove(path() / "2.png");
   Memory ramp;
   convert_folder(path(), ramp, {.interpolation = {.interpolation = false}});
-  // Each pixel fires where the line between its two brightnesses passes multiples of the threshold.
+  // Each pixel fires when the line between its two values of brightness crosses multiples of the threshold.
   std::vector<int> fired(std::size_t{kWidth} * kHeight);
   for (const Event& event : ramp.events) {
     const double light = 0.25 * kPattern(event.x, event.y), log_eps = EventCameraOptions().log_eps;
@@ -203,7 +203,7 @@ TEST(Bayer, RedAtEvenColumnsAndRows) {
 }
 
 TEST_F(ConvertTest, BayerPixelsSeeTheirColour) {
-  // From black to red: red pixels fire, the others stay.
+  // From black to red: only red pixels fire.
   test::write_png(path() / "0.png", kWidth, kHeight, 0);
   cv::imwrite((path() / "1.png").string(), cv::Mat(kHeight, kWidth, CV_8UC3, cv::Scalar(0, 0, 255)));
   Memory out;

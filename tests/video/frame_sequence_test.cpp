@@ -44,7 +44,7 @@ std::string refusal(const std::filesystem::path& input, const VideoOptions& opti
 
 class FrameSequenceTest : public testing::Test {
  protected:
-  /// Folders with three images, codes 50, 60, 70, not in the order of their names as text.
+  /// A folder of three images with values 50, 60, 70, whose order differs from that of their names as text.
   std::filesystem::path images(const std::string& name = "images") const {
     const auto folder = directory_.path() / name;
     std::filesystem::create_directory(folder);

@@ -31,7 +31,7 @@ Scene rotation(double degrees) {
   };
 }
 
-/// A disc moving before a background that moves the other way: things appear and disappear at its rim.
+/// A disc in front of a background that moves in the opposite direction: content appears and disappears at its rim.
 double occlusion(double x, double y, double t) {
   const double u = x - 60 - 6 * t, v = y - 60, inside = std::clamp(30.5 - std::hypot(u, v), 0.0, 1.0);
   return inside * kOther(u, v) + (1 - inside) * kPattern(x + 2 * t, y);
@@ -125,7 +125,7 @@ TEST(Interpolator, BrightnessThatChangesInPlaceIsBlended) {
 }
 
 TEST(Interpolator, AnyContentStaysWithinWhatTheFramesHold) {
-  // Frames that have nothing to do with each other, extremes of light, and sizes down to a pixel.
+  // Unrelated frames, extreme irradiance, and sizes down to one pixel.
   const Workers workers(2);
   std::mt19937 random(3);
   for (const auto& [width, height] : {std::pair{90, 70}, {1, 1}, {5, 40}, {40, 5}, {17, 16}}) {

@@ -22,8 +22,8 @@ extern "C" {
 
 namespace esim::test {
 
-/// Writes a video without loss (FFV1 in Matroska) whose frames have the given stamps. `code` is the value of every
-/// component of a pixel, of 8 or 16 bits as the format has.
+/// Writes a lossless video (FFV1 in Matroska) whose frames have the given time stamps. `code` is the value of every
+/// component of a pixel, with 8 or 16 bits depending on the format.
 using Code = std::function<int(int x, int y, int frame)>;
 inline void write_video(const std::filesystem::path& path, AVPixelFormat format, int width, int height,
                         const std::vector<std::int64_t>& stamps_ms, const Code& code) {
@@ -90,12 +90,12 @@ inline void write_exr(const std::filesystem::path& path, int width, int height,
   file.writePixels(height);
 }
 
-/// A grey image of one code.
+/// Writes a uniform grey image.
 inline void write_png(const std::filesystem::path& path, int width, int height, int code, int type = CV_8UC1) {
   cv::imwrite(path.string(), cv::Mat(height, width, type, cv::Scalar::all(code)));
 }
 
-/// A pattern of light without detail finer than 5 px, at any point.
+/// A continuous pattern of irradiance without detail finer than 5 px.
 class Pattern {
  public:
   explicit Pattern(unsigned seed) {
@@ -120,7 +120,7 @@ class Pattern {
   std::array<Wave, 40> waves_;
 };
 
-/// A scene: light at a point and a time, in frames.
+/// A scene: irradiance at a point and a time, in frames.
 using Scene = std::function<double(double x, double y, double t)>;
 
 inline Image<float> view(const Scene& scene, int width, int height, double t = 0) {

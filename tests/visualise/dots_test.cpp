@@ -12,7 +12,7 @@ namespace {
 
 constexpr Rgb kGround{24, 27, 34};
 
-/// The definition: each pixel takes opacity times the covered fraction of the dot's colour, the farthest dot first.
+/// Draws by definition: the weight of a dot's colour is opacity times the covered fraction, the farthest dot first.
 Image<Rgb> drawn_slowly(std::vector<Dot> dots, Image<Rgb> picture) {
   std::stable_sort(dots.begin(), dots.end(), [](const Dot& a, const Dot& b) { return a.depth > b.depth; });
   for (const Dot& dot : dots) {
@@ -44,7 +44,7 @@ TEST(Dots, AreDrawnAsDefined) {
     const Image<Rgb> ground(40, 30, kGround);
     Image<Rgb> picture = ground;
     draw_dots({dot}, picture);
-    // A 32nd of a pixel of place and a 16th of radius, over the steepest edge.
+    // Errors of 1/32 px in position and 1/16 px in radius, at the steepest edge.
     EXPECT_LE(largest_difference(picture, drawn_slowly({dot}, ground)), 22)
         << dot.x << " " << dot.y << " " << dot.radius;
   }

@@ -12,7 +12,7 @@
 namespace esim {
 namespace {
 
-// Some events anywhere, in order.
+// Events at random pixels, in order.
 std::vector<Event> scattered(std::size_t count, SensorSize sensor) {
   std::vector<Event> events;
   std::uint64_t state = 12345;

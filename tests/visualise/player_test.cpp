@@ -35,7 +35,7 @@ class Memory final : public Source {
 
 constexpr SensorSize kSensor{16, 12};
 
-// `count` events, one every ms from 1 ms after `start`, each on another pixel.
+// `count` events, one per ms from 1 ms after `start`, each at a different pixel.
 std::vector<Event> regular(int count, TimeNs start = 0) {
   std::vector<Event> events;
   for (int i = 0; i < count; ++i) {
@@ -55,7 +55,7 @@ Survey surveyed(Memory& source, const Extent& extent = {}) {
 
 PlayOptions events_only() { return {.views = {View::events}, .slow_motion = 1, .window_s = 0.01}; }
 
-// Pixels of the panel's colours, which are exact where it is enlarged by a whole factor.
+// Number of pixels of a colour; exact if the panel is enlarged by an integer factor.
 std::size_t pixels_with(const Image<Rgb>& picture, Rgb colour) {
   return static_cast<std::size_t>(std::count(picture.pixels().begin(), picture.pixels().end(), colour));
 }
@@ -175,7 +175,7 @@ TEST(Player, ShowsAllThatGroundTruthTells) {
     const Tile panel = layout.panel(static_cast<std::size_t>(index));
     return (*page)(panel.x + panel.width / 2, panel.y + panel.height / 2);
   };
-  EXPECT_EQ(middle_of(View::image), (Rgb{255, 255, 255}));  // the frame rather than the ground truth
+  EXPECT_EQ(middle_of(View::image), (Rgb{255, 255, 255}));  // the frame, not the ground truth
   EXPECT_EQ(middle_of(View::depth), colour_depth(3, found.depth.near_m(), found.depth.far_m()));
   EXPECT_EQ(middle_of(View::motion), colour_flow(50, 0, found.motion.full_px_per_s()));
 }

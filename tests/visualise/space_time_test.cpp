@@ -17,7 +17,7 @@ SpaceTimeProjection::Place at(const SpaceTimeView& view, double x, double y, dou
 }
 
 TEST(SpaceTime, StraightAheadItIsAnImage) {
-  // The middle of the sensor stays where it is at all times; axes are those of the image; the newest is nearest.
+  // The middle of the sensor does not move over time; the axes are those of the image; newest events are nearest.
   const auto middle = at({}, 31.5, 23.5, 3e6);
   for (const double t : {1e6, 2e6, 3e6}) {
     EXPECT_NEAR(at({}, 31.5, 23.5, t).spot.x, middle.spot.x, 1e-9);
@@ -43,7 +43,7 @@ TEST(SpaceTime, LinesStayStraight) {
 }
 
 TEST(SpaceTime, SizeIsThatOfAStepAcrossTheLineOfSight) {
-  // Seen along the time axis, nearer images are larger, in the inverse ratio of the distances.
+  // Along the time axis, sizes are inversely proportional to the distances.
   const auto near = at({}, 10, 10, 3e6), far = at({}, 10, 10, 1e6);
   EXPECT_NEAR(near.scale / far.scale, far.distance / near.distance, 1e-12);
   EXPECT_NEAR(at({}, 11, 10, 1e6).spot.x - far.spot.x, far.scale, 1e-9);

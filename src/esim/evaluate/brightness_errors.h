@@ -10,36 +10,36 @@
 
 namespace esim {
 
-/// The errors at pixels that lie alike.
+/// The errors at the pixels of one kind of place.
 struct PlaceError {
   double squares = 0;  ///< sum of the squared errors
   std::int64_t values = 0;
 };
 
-/// How far the brightness that a sampler's segments say is from the truth, in one window.
+/// Error of the brightness of a sampler's segments relative to the truth, in one window.
 struct BrightnessError {
   std::vector<double> rmse;  ///< of each pixel, over the reference's instants in the window
-  double mean_rmse = 0;      ///< over the pixels
-  double mean_abs = 0;       ///< of |error|, over pixels and instants
-  double p99_abs = 0;        ///< within 2.3 %
+  double mean_rmse = 0;      ///< mean over the pixels
+  double mean_abs = 0;       ///< mean |error| over pixels and instants
+  double p99_abs = 0;        ///< 99th percentile of |error|, within 2.3 %
   double max_abs = 0;
   std::int64_t values = 0;                              ///< pixels times instants
-  std::array<PlaceError, kPlaceNames.size()> places{};  ///< by Place; all 0 unless all pixels are compared
+  std::array<PlaceError, kPlaceNames.size()> places{};  ///< indexed by Place; all 0 unless all pixels are compared
   std::int64_t steps = 0;                               ///< segments of a pixel that end in the window
-  std::int64_t large_steps = 0;  ///< those over which its brightness changes by more than the contrast threshold
+  std::int64_t large_steps = 0;  ///< segments over which brightness changes by more than the contrast threshold
 };
 
-/// Compares segments with the reference at each instant in (t0, t1]: there they say that L is linear in time between
-/// ln(E0 + log_eps) and ln(E1 + log_eps). Segments of different tiles may come in any order.
+/// Compares segments with the reference at each instant in (t0, t1]: in a segment L is linear in time between ln(E0 +
+/// log_eps) and ln(E1 + log_eps). Segments of different tiles may come in any order.
 class BrightnessErrors {
  public:
-  /// A window holds the instants in (start, end]. The reference outlives this.
+  /// A window holds the instants in (start, end]. The reference must outlive this object.
   BrightnessErrors(ReferenceBrightness& reference, int width, int height, const std::vector<Window>& windows,
                    double contrast_threshold);
 
   void add(std::span<const Segment> segments);
 
-  /// Per window.
+  /// The errors of each window.
   std::vector<BrightnessError> finish() const;
 
  private:
@@ -68,7 +68,7 @@ class BrightnessErrors {
     int pixel = 0;
     double before = 0, after = 0;  // L at the segment's ends
   };
-  std::vector<Line> lines_;  // of the segment in progress
+  std::vector<Line> lines_;  // of the current segment
 };
 
 }  // namespace esim

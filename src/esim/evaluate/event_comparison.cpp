@@ -35,7 +35,7 @@ EventMatch match_events(std::span<const PixelEvent> reference, std::span<const P
     for (std::size_t i = 0; i < reference.size(); ++i) pair(i, i);
     return match;
   }
-  // cost[i][j]: least of the first i and j events; step[i][j]: the last step on the way to it.
+  // cost[i][j]: minimum cost of the first i and j events; step[i][j]: the last step of that solution.
   const std::size_t rows = reference.size() + 1, columns = events.size() + 1;
   std::vector<TimeNs> cost(rows * columns);
   std::vector<Step> step(rows * columns);

@@ -34,7 +34,7 @@ std::size_t family_index(const SamplingEvaluation& evaluation, const SchemeResul
 
 Rgb family_colour(std::size_t index) { return kFamilyColours[index % std::size(kFamilyColours)]; }
 
-/// A scheme's colour: its family's, the paler the cheaper it is among them.
+/// A scheme's colour: that of its family, paler for cheaper schemes.
 Rgb scheme_colour(const SamplingEvaluation& evaluation, const SchemeResult& scheme) {
   const auto cost = [](const SchemeResult& s) { return s.windows.back().frame_equivalents_per_s; };
   int cheaper = 0, members = 0;
@@ -47,7 +47,7 @@ Rgb scheme_colour(const SamplingEvaluation& evaluation, const SchemeResult& sche
   return mix(family_colour(family_index(evaluation, scheme)), kPaper, pale);
 }
 
-/// The smallest and largest of the values above 0, with room on both sides on a logarithmic axis.
+/// The smallest and the largest of the values above 0.
 struct Range {
   double low = std::numeric_limits<double>::infinity(), high = 0;
   void add(double value) {
@@ -72,7 +72,7 @@ void draw_key(Canvas& canvas, int x, int baseline, Rgb colour, const std::string
   canvas.text(x + 30, baseline, label, kTextHeight, kInk);
 }
 
-/// Five quantiles and the mean, at the height `y` of the diagram.
+/// Draws five quantiles and the mean at the height `y` of the diagram.
 void draw_box(Axes& axes, const std::vector<double>& values, double y, double half_height, Rgb colour) {
   const double low = quantile(values, 0.05), lower = quantile(values, 0.25), middle = quantile(values, 0.5),
                upper = quantile(values, 0.75), high = quantile(values, 0.95);
@@ -110,7 +110,7 @@ Image<Rgb> draw_motion(const SamplingEvaluation& evaluation) {
   const double first = to_seconds(evaluation.span.start), last = to_seconds(evaluation.span.end);
   Axes axes(canvas, {80, 62, kWidth - 110, kHeight - 120}, "Motion over time",
             linear_scale(first, last,
-                         evaluation.event_spans.empty() ? "time, s" : "time, s (dark: where events are compared)"),
+                         evaluation.event_spans.empty() ? "time, s" : "time, s (dark: events are compared here)"),
             linear_scale(0, top, "mean motion field, px/s"));
   for (const Window& window : evaluation.windows) {
     if (window.name == "all") continue;
@@ -154,7 +154,7 @@ Image<Rgb> draw_error_boxes(const SamplingEvaluation& evaluation) {
   Canvas canvas(kWidth, height, kPaper);
   Axes axes(canvas, {kLeft, kTop, kWidth - kLeft - 30, height - kTop - kBottom},
             "Error of the brightness L = log(E + eps)",
-            decade_scale(range.low, range.high, "RMSE of L of a pixel: 5, 25, 50, 75, 95 % of the pixels; dot: mean"),
+            decade_scale(range.low, range.high, "RMSE of L of the pixels: percentiles 5, 25, 50, 75, 95; dot: mean"),
             std::move(rows));
   const double step = 0.84 / static_cast<double>(windows);
   for (std::size_t i = 0; i < schemes; ++i) {

@@ -12,17 +12,16 @@ namespace {
 
 constexpr double kDuration_s = 5, kPoses_hz = 250;
 
-// As in the configuration for panoramas that the original ESIM is released with. The paper does not say.
+// From the panorama configuration of the original ESIM's release; the paper does not state it.
 constexpr int kMedian_px = 5;
 
-// Found by search among the first seeds: with these, the motion has the paper's statistics.
+// Found by searching the first seeds: with these values, the motion has the paper's statistics.
 constexpr std::uint64_t kSeed = 204;
 constexpr double kKnotInterval_s = 0.5;
 const Eigen::Vector3d kAmplitude_deg{20, 90, 90};
 constexpr double kSpeed = 1.3649, kPeakSpeed = 1.4492, kPeak_s = 1.5, kPeakWidth_s = 0.06;
 
-/// Where on the random motion the camera is at time t: the integral of kSpeed (1 + kPeakSpeed e^-((t - kPeak) /
-/// width)^2).
+/// Time on the random motion at time t: the integral of kSpeed (1 + kPeakSpeed e^-((t - kPeak) / width)^2).
 double progress_s(double t) {
   const double area = kPeakSpeed * kPeakWidth_s * std::sqrt(std::numbers::pi) / 2;
   return kSpeed * (t + area * (std::erf((t - kPeak_s) / kPeakWidth_s) + std::erf(kPeak_s / kPeakWidth_s)));

@@ -13,11 +13,11 @@ struct PixelPosition {
 };
 
 /// `count` different pixels, spread evenly over the image by the R2 sequence (Roberts 2018): the k-th lies at the
-/// fractional parts of k / g and k / g^2, with g^3 = g + 1, and those that come twice are left out. All pixels, row by
-/// row, where count is 0 or exceeds their number.
+/// fractional parts of k / g and k / g^2, with g^3 = g + 1; repeated pixels are skipped. If count is 0 or exceeds the
+/// number of pixels, all pixels, row by row.
 std::vector<PixelPosition> spread_pixels(int width, int height, int count);
 
-/// Some pixels of an image, found by tile.
+/// Finds the pixels of a set that lie in a tile.
 class PixelIndex {
  public:
   PixelIndex(int width, int height, const std::vector<PixelPosition>& pixels);

@@ -10,7 +10,7 @@ constexpr float kBent = 0.35F;    // change of the slope of 1/Z, in 1/Z per foca
 constexpr float kJump = 0.01F;    // of 1/Z
 constexpr float kSteeper = 3.0F;  // than the slopes on both sides
 
-/// Whether something else begins between b and c, in a row a, b, c, d of 1/Z.
+/// Whether there is a depth discontinuity between b and c, in a row a, b, c, d of 1/Z.
 bool is_jump(float a, float b, float c, float d) {
   const float step = std::fabs(c - b);
   return step > kJump * std::max(b, c) && step > kSteeper * std::max(std::fabs(b - a), std::fabs(d - c));

@@ -11,13 +11,13 @@
 namespace esim {
 
 /// The true brightness L = ln(E + log_eps) of some pixels of camera 0, rendered at start + k / rate and kept in blocks
-/// of kBlock instants. Where all blocks exceed the memory that is granted, those used longest ago are forgotten, and
-/// rendered again when they are asked for.
+/// of kBlock instants. If the blocks exceed the memory limit, the least recently used ones are dropped, and rendered
+/// again when needed.
 class ReferenceBrightness {
  public:
   static constexpr std::int64_t kBlock = 256;
 
-  /// The world outlives this.
+  /// The world must outlive this object.
   ReferenceBrightness(const World& world, std::vector<PixelPosition> pixels, double rate_hz, double log_eps,
                       std::size_t memory_bytes);
 
@@ -29,14 +29,14 @@ class ReferenceBrightness {
   /// The first instant after t.
   std::int64_t first_after(TimeNs t) const;
 
-  /// L at the instants block * kBlock + j, a row per pixel; valid until the next call.
+  /// L at the instants block * kBlock + j, one row per pixel; valid until the next call.
   const Image<float>& block(std::int64_t block);
 
-  /// Where those pixels lie at these instants, likewise; without size unless all pixels are there.
+  /// The places of the pixels at the same instants, in the same layout; empty unless all pixels are compared.
   const Image<Place>& places(std::int64_t block);
   std::int64_t blocks() const { return (instants_ + kBlock - 1) / kBlock; }
 
-  /// Whether all blocks can be kept at once.
+  /// Whether all blocks fit into memory.
   bool fits() const { return static_cast<std::size_t>(blocks()) <= capacity_; }
 
  private:

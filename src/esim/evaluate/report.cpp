@@ -148,11 +148,11 @@ std::string text_line(const SchemeResult& scheme) {
 std::string goal_text(const SamplingEvaluation& evaluation) {
   std::string text;
   for (const GoalCost& goal : evaluation.goals) {
-    text +=
-        goal.samples_per_s
-            ? fmt::format("RMSE <= {:g}: {} needs {:.0f} frame-equivalents/s in {:.0f} renders/s\n",
-                          evaluation.options.rmse_goal, goal.family, *goal.frame_equivalents_per_s, *goal.samples_per_s)
-            : fmt::format("RMSE <= {:g}: {} does not cross it\n", evaluation.options.rmse_goal, goal.family);
+    text += goal.samples_per_s ? fmt::format("RMSE <= {:g}: {} needs {:.0f} frame-equivalents/s in {:.0f} renders/s\n",
+                                             evaluation.options.rmse_goal, goal.family, *goal.frame_equivalents_per_s,
+                                             *goal.samples_per_s)
+                               : fmt::format("RMSE <= {:g}: the curve of {} does not cross it\n",
+                                             evaluation.options.rmse_goal, goal.family);
   }
   return text;
 }

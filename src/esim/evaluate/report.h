@@ -6,14 +6,14 @@
 
 namespace esim {
 
-/// Everything that was measured, but the values of single pixels.
+/// All measurements except the values of single pixels.
 std::string to_json(const SamplingEvaluation& evaluation);
 
-/// A table for a terminal, whose lines come as the schemes do: cost and events in the last window, RMSE in all.
+/// A table for a terminal, one line per finished scheme: cost and events in the last window, RMSE in each.
 std::string text_header(const SamplingEvaluation& evaluation);
 std::string text_line(const SchemeResult& scheme);
 
-/// What each family costs at the goal, a line each.
+/// The cost of each family at the goal, one line each.
 std::string goal_text(const SamplingEvaluation& evaluation);
 
 }  // namespace esim

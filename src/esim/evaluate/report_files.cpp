@@ -10,7 +10,7 @@
 namespace esim {
 namespace {
 
-/// A line per scheme and window.
+/// One line per scheme and window.
 std::string summary_csv(const SamplingEvaluation& evaluation) {
   std::string text =
       "scheme,window,frame_equivalents_per_s,samples_per_s,rmse_mean,error_mean_abs,error_p99_abs,error_max_abs,"
@@ -32,7 +32,7 @@ std::string summary_csv(const SamplingEvaluation& evaluation) {
   return text;
 }
 
-/// A line per pixel of each scheme and window.
+/// One line per pixel of each scheme and window.
 std::string samples_csv(const SamplingEvaluation& evaluation) {
   std::string text = "scheme,window,x,y,rmse\n";
   for (const SchemeResult& scheme : evaluation.schemes) {

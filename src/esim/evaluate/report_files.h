@@ -6,7 +6,7 @@
 
 namespace esim {
 
-/// Writes into a folder what people read of an evaluation: report.md, summary.csv, samples.csv and figures.
+/// Writes report.md, summary.csv, samples.csv and the figures of an evaluation into a folder.
 void write_report_files(const SamplingEvaluation& evaluation, const std::filesystem::path& folder);
 
 }  // namespace esim

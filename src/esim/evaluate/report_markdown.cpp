@@ -15,16 +15,16 @@ std::string span_text(const TimeSpan& span) {
 std::string setup(const SamplingEvaluation& e) {
   const SamplingEvaluationOptions& options = e.options;
   std::string text = fmt::format(
-      "- Scene: renderer {}, {} x {} px, {:.3f} s. Motion field: {:.0f} px/s on average, at most {:.0f} px/s; the "
-      "camera "
+      "- Scene: renderer {}, {} x {} px, {:.3f} s. Motion field: mean {:.0f} px/s, maximum {:.0f} px/s; the camera "
       "turns at up to {:.0f} deg/s.\n"
-      "- Brightness: L = ln(E + {:g}) of {} pixels, against renderings at {:g} Hz{}.\n",
+      "- Brightness: L = ln(E + {:g}) of {} pixels, compared with renderings at {:g} Hz{}.\n",
       e.renderer, e.width, e.height, to_seconds(e.span.end - e.span.start), e.motion.mean(e.span),
       e.motion.greatest_px_per_s, e.motion.fastest_turn_deg_per_s, e.log_eps, e.pixels.size(), options.truth_rate_hz,
-      options.truth_rays > 0 ? fmt::format(", with {} rays where edges are", options.truth_rays) : "");
+      options.truth_rays > 0 ? fmt::format(", with {} rays per pixel at edges", options.truth_rays) : "");
   if (!e.event_spans.empty()) {
-    text += fmt::format("- Events: all pixels, C = {:g}, otherwise ideal, against uniform sampling at {:g} Hz.\n",
-                        e.contrast_threshold, options.event_rate_hz);
+    text += fmt::format(
+        "- Events: all pixels of an ideal sensor with C = {:g}, compared with uniform sampling at {:g} Hz.\n",
+        e.contrast_threshold, options.event_rate_hz);
   }
   return text + fmt::format("- {} threads; the evaluation took {:.0f} s.\n", e.threads, e.wall_seconds);
 }
@@ -32,8 +32,8 @@ std::string setup(const SamplingEvaluation& e) {
 std::string windows_table(const SamplingEvaluation& e) {
   const bool events = !e.event_spans.empty();
   std::string text =
-      events ? "| window | time, s | motion field, px/s | events compared in, s | their motion field, px/s | "
-               "events of the reference |\n|---|---|---|---|---|---|\n"
+      events ? "| window | time, s | motion field, px/s | time of the compared events, s | motion field in it, px/s | "
+               "reference events |\n|---|---|---|---|---|---|\n"
              : "| window | time, s | motion field, px/s |\n|---|---|---|\n";
   for (std::size_t i = 0; i < e.windows.size(); ++i) {
     const Window& window = e.windows[i];
@@ -49,7 +49,7 @@ std::string windows_table(const SamplingEvaluation& e) {
 
 std::string brightness_table(const SamplingEvaluation& e, std::size_t w) {
   std::string text =
-      "| scheme | frame-equivalents/s | renders/s | mean RMSE | mean error | 99 % | largest | steps above C, % |\n"
+      "| scheme | frame-equivalents/s | renders/s | mean RMSE | mean error | 99 % | maximum | steps above C, % |\n"
       "|---|---|---|---|---|---|---|---|\n";
   for (const SchemeResult& scheme : e.schemes) {
     const WindowResult& result = scheme.windows[w];
@@ -62,11 +62,11 @@ std::string brightness_table(const SamplingEvaluation& e, std::size_t w) {
   return text;
 }
 
-/// Where the squared errors are; empty unless all pixels were compared.
+/// The squared errors by place; empty unless all pixels were compared.
 std::string places_table(const SamplingEvaluation& e, std::size_t w) {
   const auto& first = e.schemes.front().windows[w].brightness;
   if (first.places[0].values == 0) return {};
-  std::string text = "\n| share of the squared error, % (root mean square) |", line = "\n|---|",
+  std::string text = "\n| percentage of the squared error (root mean square) |", line = "\n|---|",
               pixels = "\n| pixels, % |";
   const auto percent = [](double part, double all) { return all > 0 ? 100 * part / all : 0.0; };
   for (std::size_t i = 0; i < kPlaceNames.size(); ++i) {
@@ -107,7 +107,7 @@ std::string events_table(const SamplingEvaluation& e, std::size_t w) {
 
 std::string speed_table(const SamplingEvaluation& e) {
   std::string text =
-      "| scheme | rendering, s | sampling, s | events, s | all, s | real-time factor | events simulated |\n"
+      "| scheme | rendering, s | sampling, s | events, s | total, s | real-time factor | events simulated |\n"
       "|---|---|---|---|---|---|---|\n";
   for (const SchemeResult& scheme : e.schemes) {
     const StageSeconds& s = scheme.seconds;
@@ -132,17 +132,18 @@ std::string goals_table(const SamplingEvaluation& e) {
 
 std::string to_markdown(const SamplingEvaluation& e) {
   const bool events = !e.event_spans.empty();
-  std::string text = "# Evaluation of ways of sampling\n\n" + setup(e) + "\n" + windows_table(e) +
+  std::string text = "# Evaluation of sampling schemes\n\n" + setup(e) + "\n" + windows_table(e) +
                      "\n![Motion over time](motion.png)\n\n## Cost at equal error\n\n" + goals_table(e) +
-                     "\nWhere the curve of a family, in the window all and straight between its schemes in logarithms, "
-                     "first falls below it. The paper: 1260 (flow), 2060 (uniform) for .01, in its own motion.\n\n"
-                     "![RMSE over cost](rmse_over_cost.png)\n\n![RMSE of the pixels](rmse.png)\n";
+                     "\nThe cost at which the curve of a family first falls below this RMSE in the window \"all\". The "
+                     "curve is linear in logarithms between the schemes. The paper reports 1260 (flow) and 2060 "
+                     "(uniform) for an RMSE of 0.01 in its own motion.\n\n"
+                     "![RMSE against cost](rmse_over_cost.png)\n\n![RMSE of the pixels](rmse.png)\n";
   for (std::size_t w = e.windows.size(); w-- > 0;) {
     text += fmt::format("\n## Window {}\n\n{}", e.windows[w].name, brightness_table(e, w) + places_table(e, w));
     if (events) text += "\n" + events_table(e, w);
   }
   if (events) text += "\n![Timing of events](timing.png)\n";
-  text += "\n## Speed\n\nWall-clock time of the whole simulation, without that of measuring.\n\n" + speed_table(e);
+  text += "\n## Speed\n\nWall-clock time of the complete simulation, without the measurements.\n\n" + speed_table(e);
   return text;
 }
 

@@ -6,7 +6,7 @@
 
 namespace esim {
 
-/// The evaluation as a page with its tables, and the figures that lie beside it.
+/// The evaluation as a Markdown page with its tables and links to its figures.
 std::string to_markdown(const SamplingEvaluation& evaluation);
 
 }  // namespace esim

@@ -12,10 +12,10 @@
 namespace esim {
 namespace {
 
-/// Thrown where the monitor wants no more.
+/// Thrown if the monitor stops the evaluation.
 struct Stopped {};
 
-/// Keeps events alone.
+/// Keeps only events.
 class EventStore final : public Sink {
  public:
   explicit EventStore(bool keep) : keep_(keep) {}
@@ -33,7 +33,7 @@ class EventStore final : public Sink {
   std::vector<Event> events_;
 };
 
-/// Camera 0 alone, ideal but for its thresholds, without frames and ground truth.
+/// Only camera 0, ideal except for its thresholds, without frames and ground truth.
 Scenario bare(const Scenario& scenario) {
   Scenario bare = scenario;
   bare.cameras.resize(1);
@@ -50,15 +50,15 @@ Scenario bare(const Scenario& scenario) {
   return bare;
 }
 
-/// The same scenario with other rays for pixels that edges cross.
+/// The same scenario with another number of rays for pixels at edges.
 Scenario with_rays(Scenario scenario, int samples_per_pixel) {
   auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
-  if (mesh == nullptr) throw UserError("--truth-rays: the renderer casts no rays; leave it out");
+  if (mesh == nullptr) throw UserError("--truth-rays: the renderer casts no rays; omit this option");
   mesh->samples_per_pixel = samples_per_pixel;
   return scenario;
 }
 
-/// How the work is shared among its parts, for the progress.
+/// Computes the progress from the parts of the work.
 class Share {
  public:
   Share(const EvaluationMonitor& monitor, std::size_t schemes)
@@ -69,7 +69,7 @@ class Share {
     what_ = std::move(what);
     length_ = parts / parts_;
   }
-  /// How much of the part is done.
+  /// Reports the completed fraction of the current part.
   void show(double fraction) const {
     if (!monitor_.progress(done_ + fraction * length_, what_)) throw Stopped();
   }
@@ -134,7 +134,7 @@ class Evaluation {
         std::make_unique<ReferenceBrightness>(truth_world_ ? *truth_world_ : world_, result_.pixels,
                                               options().truth_rate_hz, result_.log_eps, options().memory_bytes);
     share_.start("true brightness", 0.5);
-    if (!reference_->fits()) return;  // it will be rendered piece by piece, for each scheme
+    if (!reference_->fits()) return;  // rendered block by block for each scheme
     Stopwatch stopwatch(result_.truth_seconds);
     for (std::int64_t i = 0; i < reference_->blocks(); ++i) {
       share_.show(static_cast<double>(i) / static_cast<double>(reference_->blocks()));
@@ -143,7 +143,7 @@ class Evaluation {
   }
 
   void simulate_reference_events() {
-    share_.start("reference of events", 1.5);
+    share_.start("reference events", 1.5);
     for (std::size_t i = 0; i < result_.event_spans.size(); ++i) {
       const double all = static_cast<double>(result_.event_spans.size());
       const Summary summary =
@@ -154,7 +154,7 @@ class Evaluation {
     }
   }
 
-  /// Simulates a part of the time with fresh pixels, and appends the events to reference_events_.
+  /// Simulates a part of the time from an initial state, and appends the events to reference_events_.
   Summary simulate_span(const SamplingOptions& scheme, const TimeSpan& span,
                         const std::function<void(double fraction)>& show) {
     EventStore events(true);
@@ -192,7 +192,7 @@ class Evaluation {
     monitor_.scheme_done(result_);
   }
 
-  /// The whole time, with an ear on what the event camera is told.
+  /// Simulates the whole time, and measures the segments that the event camera receives.
   void simulate_whole(SchemeResult& result) {
     for (const Window& window : result_.windows)
       result.windows.push_back({to_seconds(window.span.end - window.span.start), 0, 0, {}, {}});
@@ -238,11 +238,11 @@ class Evaluation {
   const EvaluationMonitor& monitor_;
   Share share_;
   World world_;
-  std::optional<World> truth_world_;  // where the truth has rays of its own
+  std::optional<World> truth_world_;  // if options().truth_rays is set
   SamplingEvaluation result_;
   std::unique_ptr<ReferenceBrightness> reference_;
   std::vector<EventsByPixel> reference_events_;                                 // of each of event_spans
-  const Notices silent_{[](const std::string&) {}, [](const std::string&) {}};  // all was said with the first world
+  const Notices silent_{[](const std::string&) {}, [](const std::string&) {}};  // the first world reported all
 };
 
 }  // namespace

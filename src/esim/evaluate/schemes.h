@@ -6,14 +6,13 @@
 
 namespace esim {
 
-/// The paper's three schemes over the range of their one option, and every other way of sampling that there is with its
-/// defaults.
+/// The paper's three schemes over the range of their one option, and every other sampling type with its defaults.
 std::vector<SamplingOptions> default_schemes();
 
-/// Two of each of the paper's, at low cost.
+/// A few of the paper's schemes, at low cost.
 std::vector<SamplingOptions> quick_schemes();
 
-/// Makes an evaluation short: less time, fewer pixels, a coarser reference of events. Suits a test.
+/// Makes an evaluation short, for tests: less time, fewer pixels, a coarser reference of events.
 void make_quick(Scenario& scenario, SamplingEvaluationOptions& options);
 
 }  // namespace esim

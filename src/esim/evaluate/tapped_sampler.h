@@ -7,15 +7,15 @@
 
 namespace esim {
 
-/// What passes between a sampler and the event camera, as somebody who listens in hears it.
+/// One step of a sampler: a sample and the segments that it completes.
 struct Tapped {
-  TimeNs t = 0;                        ///< of the sample that was accepted
-  std::int64_t samples = 0;            ///< 1, or 0 where more segments follow from the one before
-  std::int64_t pixel_evaluations = 0;  ///< that it cost
-  std::span<const Segment> segments;   ///< that followed from it
+  TimeNs t = 0;                        ///< time of the accepted sample
+  std::int64_t samples = 0;            ///< 1; 0 for further segments of the previous sample
+  std::int64_t pixel_evaluations = 0;  ///< cost of the sample
+  std::span<const Segment> segments;   ///< completed by the sample
 };
 
-/// A sampler that does what another one does, and shows every step to a listener.
+/// Forwards to another sampler, and reports every step to a listener.
 class TappedSampler final : public Sampler {
  public:
   using Listener = std::function<void(const Tapped&)>;
@@ -45,7 +45,7 @@ class TappedSampler final : public Sampler {
  private:
   std::unique_ptr<Sampler> sampler_;
   Listener listener_;
-  TimeNs t_ = 0;  // of the sample that was accepted last
+  TimeNs t_ = 0;  // of the last accepted sample
 };
 
 }  // namespace esim

@@ -7,7 +7,7 @@
 namespace esim {
 namespace {
 
-/// Spans of one length that begin at the curve's instants, inside `within`.
+/// All spans of a length within `within` that begin at an instant of the curve.
 std::vector<TimeSpan> candidates(const MotionCurve& motion, const TimeSpan& within, TimeNs length) {
   std::vector<TimeSpan> spans;
   for (std::size_t k = 0; k < motion.mean_px_per_s.size(); ++k) {

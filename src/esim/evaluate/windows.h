@@ -8,15 +8,15 @@
 
 namespace esim {
 
-/// How fast the image moves over time: the motion field of some pixels at the instants start + k / rate.
+/// The speed of the image over time: the motion field of some pixels at the instants start + k / rate.
 struct MotionCurve {
   TimeNs start = 0;
   double rate_hz = 0;
-  std::vector<double> mean_px_per_s;  ///< of |V| over the pixels, at each instant
-  double greatest_px_per_s = 0;       ///< |V| of any pixel at any instant
-  double fastest_turn_deg_per_s = 0;  ///< of the camera
+  std::vector<double> mean_px_per_s;  ///< mean |V| over the pixels, at each instant
+  double greatest_px_per_s = 0;       ///< maximum |V| of all pixels and instants
+  double fastest_turn_deg_per_s = 0;  ///< maximum angular speed of the camera
 
-  /// Mean over the instants in a span; of the nearest one where it holds none.
+  /// Mean over the instants in a span; if it holds none, the value at the nearest one.
   double mean(const TimeSpan& span) const;
 };
 
@@ -30,11 +30,12 @@ struct Window {
   double mean_px_per_s = 0;  ///< motion in it
 };
 
-/// "slow" and "fast": the spans of the given length in which the mean motion is least and greatest; "all": the whole
-/// time. Only "all" where the length exceeds half of it.
+/// "slow" and "fast": the spans of the given length with the smallest and the largest mean motion; "all": the whole
+/// time. Only "all" if the length exceeds half of the time.
 std::vector<Window> choose_windows(const MotionCurve& motion, const TimeSpan& all, double length_s);
 
-/// The part of a window, of the given length or shorter if the window is, whose mean motion is nearest to the window's.
+/// The part of a window whose mean motion is nearest to the window's. It has the given length, or the window's if
+/// shorter.
 TimeSpan typical_part(const MotionCurve& motion, const Window& window, double length_s);
 
 }  // namespace esim

@@ -15,7 +15,7 @@ struct Event {
   std::uint16_t y = 0;       ///< row, px
   std::int8_t polarity = 0;  ///< +1: brightness rose, -1: it fell
 
-  /// The one order of events: by (t, y, x, polarity).
+  /// The canonical order of events: by (t, y, x, polarity).
   friend constexpr std::strong_ordering operator<=>(const Event& a, const Event& b) {
     if (const auto order = a.t <=> b.t; order != 0) return order;
     if (const auto order = a.y <=> b.y; order != 0) return order;
@@ -25,7 +25,7 @@ struct Event {
   friend constexpr bool operator==(const Event&, const Event&) = default;
 };
 
-/// Consecutive events in their order.
+/// Consecutive events in canonical order.
 using EventSpan = std::span<const Event>;
 
 }  // namespace esim

@@ -10,7 +10,7 @@
 
 namespace esim {
 
-/// Memory for events that are about to be written: a vector would fill it with zeros first.
+/// Memory for events that is not initialised: a vector would fill it with zeros first.
 class EventBuffer {
  public:
   EventBuffer() = default;
@@ -21,7 +21,7 @@ class EventBuffer {
     return *this;
   }
 
-  /// Has `count` events from now on, each of which must be written before it is read.
+  /// Resizes to `count` events, each of which must be written before it is read.
   Event* make_room(std::size_t count) {
     static_assert(std::is_trivially_copyable_v<Event>);
     if (count > capacity_) {
@@ -34,7 +34,7 @@ class EventBuffer {
     return events_;
   }
 
-  /// Removes those from the first-th on for which predicate(event).
+  /// Removes the events from index `first` on for which predicate(event) is true.
   template <typename Predicate>
   void remove_if(std::size_t first, const Predicate& predicate) {
     size_ = static_cast<std::size_t>(std::remove_if(events_ + first, events_ + size_, predicate) - events_);

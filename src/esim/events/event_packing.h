@@ -9,20 +9,20 @@
 
 namespace esim {
 
-/// Events of a limited time as numbers whose order is the one order of events: half the memory, and faster to sort.
+/// Packs events of a limited time span into integers in the canonical order of events: half the memory, faster to sort.
 class EventPacking {
  public:
   EventPacking(int width, int height)
       : x_bits_(std::bit_width(static_cast<unsigned>(width - 1))),
         time_shift_(1 + x_bits_ + std::bit_width(static_cast<unsigned>(height - 1))) {}
 
-  /// Time that packed events count from: none is earlier. They must be unpacked with the same origin.
+  /// Time origin of packed events; no event may be earlier. Unpack them with the same origin.
   TimeNs origin = 0;
 
-  /// Events must be earlier than the origin and this: 17 s for the largest images, hours for common ones.
+  /// Events must be earlier than origin + longest(): 17 s for the largest images, hours for common ones.
   TimeNs longest() const { return TimeNs{1} << (63 - time_shift_); }
 
-  /// The part of the number that says where; the least bit is left for the polarity.
+  /// The bits of the integer for the pixel; the lowest bit is left for the polarity.
   std::uint64_t place(int x, int y) const {
     return (static_cast<std::uint64_t>(y) << (x_bits_ + 1)) | (static_cast<std::uint64_t>(x) << 1);
   }
@@ -36,7 +36,7 @@ class EventPacking {
     const auto t = static_cast<std::uint64_t>(origin) + (packed >> time_shift_);
     const std::int64_t polarity = static_cast<std::int64_t>(packed & 1) * 2 - 1;
     if constexpr (std::endian::native == std::endian::little && sizeof(Event) == 16) {
-      // As two words: member by member, or through an event that is copied, takes several times as long.
+      // As two words: several times as fast as member by member or through a copied event.
       const std::array<std::uint64_t, 2> words{t, x | y << 16 | (static_cast<std::uint64_t>(polarity) & 0xff) << 32};
       std::memcpy(static_cast<void*>(&out), words.data(), sizeof(Event));
       return;

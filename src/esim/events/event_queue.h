@@ -11,19 +11,20 @@
 
 namespace esim {
 
-/// Events that a sensor has made but not yet delivered. Tiles may be sampled at different times, so events
-/// arrive in any order; they leave in the one order of events, as far as the watermark allows.
+/// Events that a sensor has generated but not delivered. Because tiles may be sampled at different times, events arrive
+/// in any order; they are released in canonical order up to the watermark.
 class EventQueue {
  public:
-  /// Takes the packed events of all parts, in any order but later than the last watermark, and empties the parts.
+  /// Takes the packed events of all parts and empties the parts. Events may be in any order, but must be later than the
+  /// last watermark.
   void add(std::span<PackedEvents> parts, const Workers& workers);
 
-  /// Forgets every event with t <= watermark, and returns them in order: they are there until the next add().
+  /// Removes and returns the events with t <= watermark, in order. They are valid until the next add().
   EventSpan release_until(TimeNs watermark);
 
   std::size_t size() const;
 
-  /// All events that wait, in order, and a queue's beginning with such events.
+  /// All waiting events in order, and the start of a queue with such events.
   std::vector<Event> waiting() const;
   void restore(EventSpan waiting);
 
@@ -32,7 +33,7 @@ class EventQueue {
   void for_each(const Body& body) const {
     for (const Run& run : runs_) std::ranges::for_each(run.rest(), body);
   }
-  /// Forgets the events that have not been released and for which predicate(event).
+  /// Removes the events that have not been released and for which predicate(event) is true.
   template <typename Predicate>
   void remove_if(const Predicate& predicate) {
     for (Run& run : runs_) run.events.remove_if(run.released, predicate);
@@ -50,9 +51,9 @@ class EventQueue {
   EventBuffer take_buffer();
   void merge_last_two();
 
-  std::vector<Run> runs_;            // each more than twice as long as the next, so that an event is seldom moved
-  EventBuffer together_, scratch_;   // what is released from several runs
-  std::vector<EventBuffer> unused_;  // memory
+  std::vector<Run> runs_;            // each more than twice as long as the next, so that events are rarely moved
+  EventBuffer together_, scratch_;   // events released from several runs
+  std::vector<EventBuffer> unused_;  // memory to reuse
   EventSorter sorter_;
 };
 

@@ -14,13 +14,14 @@ constexpr std::size_t kTooFewForRadix = 64;
 
 using Counts = std::array<std::uint32_t, std::size_t{1} << kMaxDigitBits>;
 
-/// Positions of the buckets from the numbers in them.
+/// Converts the counts of the buckets to their positions.
 void add_up(Counts& counts, std::size_t buckets) {
   std::uint32_t sum = 0;
   for (std::size_t i = 0; i < buckets; ++i) sum += std::exchange(counts[i], sum);
 }
 
-/// Two stable passes of a radix sort, by `bits` bits from `shift` on and as many above: from `keys` and back.
+/// Two stable passes of a radix sort, by `bits` bits from `shift` on and by the next `bits` above; the result is in
+/// `keys`.
 void two_passes(std::span<std::uint64_t> keys, std::span<std::uint64_t> scratch, int shift, int bits) {
   const std::size_t buckets = std::size_t{1} << bits, mask = buckets - 1;
   Counts low, high;
@@ -33,8 +34,8 @@ void two_passes(std::span<std::uint64_t> keys, std::span<std::uint64_t> scratch,
   for (const std::uint64_t key : scratch.first(keys.size())) keys[high[(key >> (shift + bits)) & mask]++] = key;
 }
 
-/// Orders keys whose bits from `shift` on, `bits` of them, are ordered: those that are equal there, few of which are
-/// expected.
+/// Completes the order of keys that are sorted by their bits from `shift` on: sorts the keys that are equal in these
+/// bits, of which few are expected.
 void order_ties(std::span<std::uint64_t> keys, int shift) {
   for (std::size_t i = 1; i < keys.size(); ++i) {
     if (keys[i] >= keys[i - 1]) continue;
@@ -47,13 +48,13 @@ void order_ties(std::span<std::uint64_t> keys, int shift) {
   }
 }
 
-/// Sorts keys that agree in all bits from shift + bits on. The result is in `keys`.
+/// Sorts keys that are equal in all bits from shift + bits on. The result is in `keys`.
 void sort_keys(std::span<std::uint64_t> keys, std::span<std::uint64_t> scratch, int shift, int bits) {
   if (keys.size() < kTooFewForRadix) {
     std::sort(keys.begin(), keys.end());
     return;
   }
-  // An even number of passes ends where it began.
+  // After an even number of passes the result is in the first array.
   const int passes = (bits + 2 * kMaxDigitBits - 1) / (2 * kMaxDigitBits) * 2;
   const int digit = passes > 0 ? (bits + passes - 1) / passes : 0;
   for (int i = 0; i < passes; i += 2) two_passes(keys, scratch, shift + i * digit, digit);
@@ -62,13 +63,13 @@ void sort_keys(std::span<std::uint64_t> keys, std::span<std::uint64_t> scratch, 
 
 }  // namespace
 
-/// Brings the keys of a range together in `keys`, sorted.
+/// Collects the keys of a range in `keys`, sorted.
 void EventSorter::sort_range(std::span<PackedEvents> parts, std::size_t range, std::span<std::uint64_t> keys,
                              std::span<std::uint64_t> scratch, int time_shift) {
   if (keys.empty()) return;
   std::uint64_t* next = keys.data();
   for (const PackedEvents& part : parts) next = std::ranges::copy(part.range(range), next).out;
-  // How many bits of the time do they differ in?
+  // The bits of the time in which the keys differ.
   std::uint64_t differing = 0;
   for (const std::uint64_t key : keys) differing |= key ^ keys[0];
   sort_keys(keys, scratch, time_shift, std::max(0, static_cast<int>(std::bit_width(differing)) - time_shift));

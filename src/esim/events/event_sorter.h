@@ -10,11 +10,11 @@
 
 namespace esim {
 
-/// Brings packed events into their order: a radix sort of each range of time, over as many digits as its times differ
-/// in. Keeps memory to work in.
+/// Sorts packed events: a radix sort of each time range, over the digits in which its times differ. Keeps its working
+/// memory.
 class EventSorter {
  public:
-  /// Moves the events of all parts, of one packing, to `sorted`, whose content is replaced.
+  /// Moves the events of all parts, which must have the same packing, to `sorted`, whose content is replaced.
   void sort(std::span<PackedEvents> parts, const Workers& workers, EventBuffer& sorted);
 
  private:

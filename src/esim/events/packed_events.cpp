@@ -20,7 +20,7 @@ void PackedEvents::add(std::size_t count, TimeNs start, const double* time, cons
     if (ranges_[r].size() < sizes_[r] + count) ranges_[r].resize(2 * (sizes_[r] + count));
     ends[r] = ranges_[r].data() + sizes_[r];
   }
-  // Without branches: which pixels fire is hard to foresee.
+  // Without branches: the pixels that fire are hard to predict.
   const EventPacking packing = packing_;
   const TimeNs begin = start - packing.origin;
   for (std::size_t i = 0; i < count; ++i) {

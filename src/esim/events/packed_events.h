@@ -10,18 +10,18 @@
 
 namespace esim {
 
-/// Events that one thread has found, packed, in any order but apart by range of their time, so that each range can be
-/// sorted by itself.
+/// The packed events that one thread has generated, in any order but separated into time ranges, so that each range can
+/// be sorted independently.
 class PackedEvents {
  public:
   static constexpr std::size_t kRanges = 8;
 
-  /// Expects events between packing.origin and `duration` later. Later ones are possible, but all in the last range.
+  /// Expects events within `duration` after packing.origin. Later events are possible, but all go to the last range.
   void expect(const EventPacking& packing, TimeNs duration);
 
   const EventPacking& packing() const { return packing_; }
 
-  /// Adds `count` events, except those where `reported` is 0: `time` is whole ns after `start`.
+  /// Adds `count` events, except those with `reported` = 0. `time` is in whole ns after `start`.
   void add(std::size_t count, TimeNs start, const double* time, const std::uint32_t* place, const double* polarity,
            const double* reported);
 

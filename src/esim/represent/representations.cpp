@@ -17,11 +17,11 @@ template <typename T>
 ImageStack<T> make_stack(int count, int width, int height, T value = T{}) {
   constexpr int kMaxExtent = 65536, kMaxCount = 65536;
   if (std::min(width, height) < 1 || std::max(width, height) > kMaxExtent) {
-    throw UserError("a sensor of " + std::to_string(width) + " x " + std::to_string(height) +
-                    " px is none; width and height are between 1 and " + std::to_string(kMaxExtent));
+    throw UserError("the size of the sensor is invalid, " + std::to_string(width) + " x " + std::to_string(height) +
+                    " px; width and height must be between 1 and " + std::to_string(kMaxExtent));
   }
   if (count < 1 || count > kMaxCount)
-    throw UserError(std::to_string(count) + " bins: give between 1 and " + std::to_string(kMaxCount));
+    throw UserError(std::to_string(count) + " bins: the number must be between 1 and " + std::to_string(kMaxCount));
   ImageStack<T> stack{count, height, width, {}};
   stack.values.assign(
       static_cast<std::size_t>(count) * static_cast<std::size_t>(height) * static_cast<std::size_t>(width), value);
@@ -34,7 +34,7 @@ ImageStack<T> make_stack(int count, int width, int height, T value = T{}) {
                   std::to_string(height) + " px");
 }
 
-/// Calls visit(event, pixel) for each.
+/// Calls visit(event, pixel) for each event.
 template <typename Visit>
 void for_each_pixel(EventSpan events, int width, int height, Visit visit) {
   for (const Event& event : events) {
@@ -46,10 +46,10 @@ void for_each_pixel(EventSpan events, int width, int height, Visit visit) {
 
 bool covers(const TimeSpan& span, TimeNs t) { return t >= span.start && t <= span.end; }
 
-/// What takes the time since the start of a span to a number from 0 to `full`.
+/// Factor that scales the time since the start of a span to [0, full].
 double scale_of(const TimeSpan& span, double full) {
   if (span.end < span.start) {
-    throw UserError("a span from " + std::to_string(span.start) + " to " + std::to_string(span.end) +
+    throw UserError("the time span from " + std::to_string(span.start) + " to " + std::to_string(span.end) +
                     " ns ends before it starts");
   }
   return span.end > span.start ? full / (static_cast<double>(span.end) - static_cast<double>(span.start)) : 0.0;
@@ -70,7 +70,7 @@ ImageStack<float> count_and_stamp(EventSpan events, int width, int height, const
   auto stack = make_stack<float>(4, width, height);
   const std::size_t plane = stack.values.size() / 4;
   const double scale = scale_of(span, 1);
-  std::vector<double> stamps(2 * plane, 0.0);  // the last, or the sum
+  std::vector<double> stamps(2 * plane, 0.0);  // last time stamp, or their sum
   for_each_pixel(events, width, height, [&](const Event& event, std::size_t pixel) {
     if (!covers(span, event.t)) return;
     const std::size_t place = pixel + (event.polarity > 0 ? 0 : plane);
@@ -115,7 +115,8 @@ void standardise(std::span<float> values) {
 }
 
 ImageStack<float> time_surface(EventSpan events, int width, int height, TimeNs t, double tau_s) {
-  if (!(tau_s > 0 && std::isfinite(tau_s))) throw UserError("tau is " + std::to_string(tau_s) + " s; give one above 0");
+  if (!(tau_s > 0 && std::isfinite(tau_s)))
+    throw UserError("tau must be above 0 s and finite, not " + std::to_string(tau_s) + " s");
   auto stack = make_stack<float>(2, width, height);
   const std::size_t plane = stack.values.size() / 2;
   std::vector<TimeNs> last(2 * plane, kNever);

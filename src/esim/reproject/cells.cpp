@@ -5,7 +5,7 @@
 namespace esim {
 namespace {
 
-// Cells around a pixel's centre see one surface where their nearness differs by no more than this share.
+// Cells around a pixel's centre see the same surface if their nearness differs by at most this fraction.
 constexpr float kOneSurface = 0.05F;
 
 }  // namespace
@@ -30,10 +30,10 @@ void Cells::look(const std::vector<SeenPoints>& keyframes, const RenderRequest& 
   });
 }
 
-/// What the pixel (x, y) sees at its centre, or, where no point falls there, the nearest of what it sees.
+/// The surface at the centre of pixel (x, y), or the nearest surface in the pixel if no point falls on the centre.
 Cells::Seen Cells::at_centre(int x, int y) const {
   const int left = s_ * x, top = s_ * y;
-  const int around = 2 - s_ % 2;  // cells meet at the centre where there is none
+  const int around = 2 - s_ % 2;  // without a central cell, cells meet at the centre
   const int i = left + (s_ - around) / 2, j = top + (s_ - around) / 2;
   Seen seen = nearest_of(i, j, around);
   if (seen.nearness < 0) return nearest_of(left, top, s_);
@@ -44,7 +44,7 @@ Cells::Seen Cells::at_centre(int x, int y) const {
   return seen;
 }
 
-/// The nearest thing that a square of cells sees.
+/// The nearest surface in a square of cells.
 Cells::Seen Cells::nearest_of(int left, int top, int width) const {
   Seen nearest;
   for (int j = top; j < top + width; ++j) {
@@ -55,7 +55,7 @@ Cells::Seen Cells::nearest_of(int left, int top, int width) const {
   return nearest;
 }
 
-/// An edge in one of the pixel's cells.
+/// The first edge found in the pixel's cells.
 Edge Cells::edge_in(int x, int y) const {
   for (int j = y * s_; j < (y + 1) * s_; ++j)
     for (int i = x * s_; i < (x + 1) * s_; ++i)

@@ -9,24 +9,24 @@
 
 namespace esim {
 
-/// What a view sees at supersampling x supersampling places within each of its pixels: a cell is as large as one of the
-/// keyframes' pixels.
+/// The surfaces that a view sees at supersampling x supersampling places within each of its pixels. A cell has the size
+/// of a keyframe pixel.
 class Cells {
  public:
-  /// `greatest_radius`: of bearings that the lens takes.
+  /// `greatest_radius`: limit of the bearings that the lens maps.
   Cells(const KeyframeLayout& layout, double greatest_radius, const Workers& workers);
 
-  /// Finds what the cells see of the keyframes' dense points, and what the pixels do at their centres: kNothing where
-  /// no point falls into any of their cells. An edge crosses a pixel where it crosses one of its cells.
+  /// Projects the keyframes' dense points into the cells, and finds the surfaces at the pixels' centres: kNothing if no
+  /// point falls into any of a pixel's cells. An edge crosses a pixel if it crosses one of its cells.
   void look(const std::vector<SeenPoints>& keyframes, const RenderRequest& view, VisibleSurface& pixels);
 
-  /// A surface's nearness, and the object that it is on.
+  /// The nearness and the object of a surface.
   struct Seen {
     float nearness = VisibleSurface::kNothing;
     std::uint16_t object = 0;
   };
 
-  /// What the cell in column i and row j sees: kNothing where no point falls.
+  /// The surface in the cell at column i and row j: kNothing if no point falls into it.
   Seen at(int i, int j) const {
     return {cells_.nearness(i, j), cells_.object.empty() ? std::uint16_t{0} : cells_.object(i, j)};
   }
@@ -36,7 +36,7 @@ class Cells {
   Seen nearest_of(int left, int top, int width) const;
   Edge edge_in(int x, int y) const;
 
-  int s_;  // cells along a pixel's side
+  int s_;  // cells per side of a pixel
   const Workers& workers_;
   DepthSplat splat_;
   VisibleSurface cells_;

@@ -42,7 +42,7 @@ void DepthSplat::resize(int points) {
     values->resize(static_cast<std::size_t>((points + kChunk - 1) / kChunk));
 }
 
-/// Finds where the points [begin, end) fall; begin is a chunk's first.
+/// Projects the points [begin, end); `begin` must be the first of a chunk.
 void DepthSplat::throw_run(const SurfacePoints& points, const std::vector<ViewChange>& changes, int begin, int end) {
   const std::uint16_t* const object = points.object.empty() ? nullptr : points.object.data();
   const float *const bx = points.x.data(), *const by = points.y.data(), *const w = points.nearness.data();
@@ -52,7 +52,7 @@ void DepthSplat::throw_run(const SurfacePoints& points, const std::vector<ViewCh
       [&](const auto& model) {
         const Projector project(camera_, model, greatest_radius_);
         for (int first = begin; first < end;) {
-          // Points in a row that belong to the same object.
+          // Consecutive points of the same object.
           int last = object == nullptr ? end : first + 1;
           while (last < end && object[last] == object[first]) ++last;
           const ViewChange c = changes[object == nullptr ? 0 : object[first]];
@@ -105,7 +105,7 @@ void DepthSplat::collect(const SurfacePoints& points, int begin, int end, Visibl
         if (!(nearness > there)) return;
         there = nearness;
         if (objects) surface.object(column, line) = object;
-        // An outline covers all that its surface does. A crease is where it is.
+        // An outline marks all pixels that its point covers, a crease only the pixel of its point.
         const auto apart = [](int a, float b) { return std::fabs(static_cast<float>(a) - b) > 0.5F; };
         const bool beside = points.edge[i] == Edge::crease && (apart(column, u) || apart(line, v));
         surface.edge(column, line) = beside ? Edge::none : points.edge[i];

@@ -30,7 +30,7 @@ void box_mean(const Image<float>& in, int s, const Workers& workers, Image<float
   });
 }
 
-/// Makes the spline through the roots of an image of E.
+/// Computes the spline through the square roots of an image of E.
 void to_root(Image<float>& light, const Workers& workers) {
   workers.for_each(light.height(), [&](int y) {
     float* const row = light.row(y);
@@ -42,7 +42,7 @@ void to_root(Image<float>& light, const Workers& workers) {
   to_spline_coefficients(light, workers);
 }
 
-/// Fills in everything that follows from depth.
+/// Computes everything that follows from depth.
 void find_surfaces(const KeyframeLayout& layout, const PixelRays& rays, const Sample& sample, const Workers& workers,
                    Keyframe& keyframe) {
   const Surfaces surfaces(sample.depth, layout.camera.fx, workers);
@@ -51,7 +51,7 @@ void find_surfaces(const KeyframeLayout& layout, const PixelRays& rays, const Sa
   for (int y = layout.first(); y < height; y += s)
     for (int x = layout.first(); x < width; x += s)
       surfaces.add_point(rays, sample.object, Edge::none, x, y, keyframe.sparse);
-  // At that many pixels from an edge the mean over a pixel of the sensor holds both of its sides.
+  // Within this distance of an edge, the mean over a sensor pixel contains both sides of the edge.
   keyframe.wide.front = surfaces.front(s / 2 + 1);
   if (keyframe.narrow.root.empty()) return;
   keyframe.narrow.front = surfaces.front(1);
@@ -81,7 +81,7 @@ KeyframeLayout lay_out_keyframes(const Camera& sensor, int supersampling, int ma
     try {
       layout.camera.validate();
       break;
-    } catch (const UserError&) {  // the lens ends within this margin
+    } catch (const UserError&) {  // the lens cannot be inverted within this margin
       layout.camera = denser(sensor, supersampling, --layout.margin_px);
     }
   }

@@ -9,48 +9,49 @@
 
 namespace esim {
 
-/// How a keyframe's image lies around the sensor's: `supersampling` pixels to one of the sensor's in each direction,
-/// and `margin_px` of the sensor's pixels more on each side. The sensor's pixel (u, v) has its centre at
+/// Layout of a keyframe's image relative to the sensor's: `supersampling` keyframe pixels per sensor pixel along each
+/// side, and a margin of `margin_px` sensor pixels on each side. The centre of the sensor's pixel (u, v) is at
 ///     s (u + margin + 1/2) - 1/2
-/// of the keyframe, likewise for v: focal lengths and principal point follow, the lens's distortion stays as it is.
+/// in the keyframe, likewise for v. Focal lengths and principal point are adapted; the distortion is the same.
 struct KeyframeLayout {
   Camera sensor;
   int supersampling = 2;
   int margin_px = 0;
   Camera camera;            ///< of the keyframes
-  bool wide_pixels = true;  ///< the renderer averages over the camera's footprint: over a pixel of the sensor
+  bool wide_pixels = true;  ///< the renderer averages over the footprint of a sensor pixel
 
-  /// The first row and column of those that are thrown into views.
+  /// The first row and column of the points that are projected into views.
   int first() const { return supersampling / 2; }
 
-  /// Where the mean over a pixel of the sensor lies from the keyframe's pixel that holds it, px.
+  /// Offset of the mean over a sensor pixel from the keyframe pixel that stores it, px.
   float offset() const { return wide_pixels ? 0.0F : 0.5F * static_cast<float>(supersampling - 1); }
 };
 
-/// A camera with `s` pixels to one of the sensor's in each direction, and `margin` of the sensor's more on each side.
+/// A camera with `s` pixels per sensor pixel along each side, and a margin of `margin` sensor pixels on each side.
 Camera denser(const Camera& sensor, int s, int margin);
 
-/// Lays out keyframes. Where the lens cannot be inverted as far outside the sensor, the margin becomes smaller.
+/// Lays out keyframes. The margin is reduced if the lens cannot be inverted that far outside the sensor.
 KeyframeLayout lay_out_keyframes(const Camera& sensor, int supersampling, int margin_px, bool wide_pixels);
 
-/// A rendered keyframe, prepared for being looked up from other views.
+/// A rendered keyframe, prepared for lookups from other views.
 struct Keyframe {
-  RenderRequest view;  ///< its time, where the camera and the moving objects were
+  RenderRequest view;  ///< time, and poses of the camera and of the moving objects
 
   /// An image of the keyframe's size.
   struct Light {
-    Image<float> root;   ///< spline coefficients of the root of E
-    Image<float> front;  ///< nearness; beside a nearer surface, whose light E holds too, that one's
+    Image<float> root;   ///< spline coefficients of the square root of E
+    Image<float> front;  ///< nearness; next to a nearer surface, which E then contains, that of the nearer one
   };
-  Light wide;    ///< each pixel the mean over the area of one of the sensor's
-  Light narrow;  ///< each pixel the mean over its own area; without size where the renderer does not tell
+  Light wide;    ///< each pixel is the mean over the area of a sensor pixel
+  Light narrow;  ///< each pixel is the mean over its own area; empty if the renderer cannot compute it
 
-  SurfacePoints sparse;  ///< of every s-th pixel of every s-th row, from KeyframeLayout::first() on
-  SurfacePoints dense;   ///< of all pixels that edges cross and of every second pixel of every second row: each covers
-                         ///< the four around it; none without `narrow`
+  SurfacePoints sparse;  ///< every s-th pixel of every s-th row, from KeyframeLayout::first() on
+  SurfacePoints dense;  ///< all pixels at edges, and every second pixel of every second row: each point covers the four
+                        ///< pixels around it; empty without `narrow`
 };
 
-/// Prepares a sample of the whole keyframe, whose buffers are taken. `rays`: of the layout's camera.
+/// Prepares a keyframe from a sample of the whole image, and takes the sample's buffers. `rays`: of the layout's
+/// camera.
 void prepare_keyframe(const KeyframeLayout& layout, const PixelRays& rays, bool at_infinity, RenderRequest view,
                       Sample& sample, const Workers& workers, Keyframe& keyframe);
 

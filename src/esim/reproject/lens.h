@@ -7,8 +7,8 @@
 
 namespace esim {
 
-/// From a bearing (x, y, 1) to the distorted image point, in single precision, as loops that compile to SIMD code need
-/// it: the formulae of camera.h. Valid where |bearing| is at most that of a pixel of the camera.
+/// Maps a bearing (x, y, 1) to the distorted image point in single precision, for loops that compile to SIMD code: the
+/// formulae of camera.h. Valid if |bearing| is at most that of a pixel of the camera.
 template <typename Model>
 class Lens;
 
@@ -96,7 +96,7 @@ struct Projector {
         cy(static_cast<float>(camera.cy)),
         greatest_r2(static_cast<float>(greatest_radius * greatest_radius)) {}
 
-  /// The pixel's coordinates; far outside the image where nothing is projected.
+  /// The pixel coordinates; far outside the image if the direction is not projected.
   void operator()(float y0, float y1, float y2, float& u, float& v) const {
     const float inverse = 1.0F / y2;
     float x = y0 * inverse, y = y1 * inverse;

@@ -22,14 +22,14 @@ double greatest_radius(const PixelRays& rays) {
   return greatest * (1 + 1e-5);
 }
 
-/// The later keyframe's share in between; never quite none, for what the other does not see.
+/// Weight of the later keyframe; strictly between 0 and 1, because the other keyframe may not see a pixel.
 float share_of_later(const Keyframe& before, const Keyframe& after, TimeNs t) {
   const TimeNs interval = after.view.t - before.view.t;
   const double share = interval > 0 ? static_cast<double>(t - before.view.t) / static_cast<double>(interval) : 0.0;
   return static_cast<float>(std::clamp(share, 1e-4, 1 - 1e-4));
 }
 
-/// Where no keyframe's pixel fell, the farther one of the surfaces beside.
+/// Fills pixels without a keyframe point with the farther of the adjacent surfaces.
 void fill_gaps(float* nearness, int width) {
   for (int x = 0; x < width;) {
     if (nearness[x] >= 0) {
@@ -45,7 +45,7 @@ void fill_gaps(float* nearness, int width) {
   }
 }
 
-/// Of several points in a row of the view: bearings (x, y, 1), nearness and, where objects move, which one each is on.
+/// Several points in a row of the view: bearings (x, y, 1), nearness and, if objects move, the object of each.
 struct RowPoints {
   const float *x, *y, *nearness;
   const std::uint16_t* object;
@@ -78,7 +78,7 @@ struct Reprojector::Between {
   const Keyframe &before, &after;
   const RenderRequest& view;
   std::vector<ViewChange> to_before, to_after;
-  float share;  // of `after`
+  float share;  // weight of `after`
 
   template <typename Model>
   void project(const Projector<Model>& project, const RowPoints& points, RowLookup& in_before,
@@ -89,7 +89,7 @@ struct Reprojector::Between {
     });
   }
 
-  /// E of point i; from both where neither sees it.
+  /// E of point i; from both keyframes if neither sees it.
   float blend(const RowLookup& in_before, const RowLookup& in_after, std::size_t i) const {
     const bool neither = in_before.seen[i] + in_after.seen[i] == 0;
     const float w0 = (1 - share) * (neither ? 1.0F : in_before.seen[i]);
@@ -107,7 +107,7 @@ Reprojector::Reprojector(const KeyframeLayout& layout, bool at_infinity, const W
       workers_(workers),
       splat_(layout.sensor, layout.supersampling, greatest_radius_, workers),
       cells_(layout, greatest_radius_, workers) {
-  surface_.resize(layout.sensor.width, layout.sensor.height, false);  // all of it infinitely far, until one looks
+  surface_.resize(layout.sensor.width, layout.sensor.height, false);  // initially everything is at infinity
 }
 
 void Reprojector::prepare(RenderRequest view, Sample& sample, Keyframe& keyframe) const {
@@ -137,7 +137,7 @@ void Reprojector::reconstruct(const Keyframe& before, const Keyframe& after, con
       layout_.camera.distortion);
 }
 
-/// Every pixel, at its centre.
+/// Looks up every pixel at its centre.
 template <typename Model>
 void Reprojector::look_up(const Between& between, const Model& model, Detail detail, Reconstruction& result) {
   const int width = layout_.sensor.width, height = layout_.sensor.height;
@@ -162,7 +162,7 @@ void Reprojector::look_up(const Between& between, const Model& model, Detail det
       const auto i = static_cast<std::size_t>(x);
       const bool hidden = row0.seen[i] + row1.seen[i] == 0;
       nowhere += hidden;
-      if (hidden) surface_.edge(x, y) = Edge::outline;  // it is beside one, for both
+      if (hidden) surface_.edge(x, y) = Edge::outline;  // it is next to an outline, for both keyframes
       out[x] = between.blend(row0, row1, i);
     }
     if (detail != Detail::apart) return;
@@ -175,8 +175,8 @@ void Reprojector::look_up(const Between& between, const Model& model, Detail det
   result.unseen = std::accumulate(unseen.begin(), unseen.end(), std::int64_t{0});
 }
 
-/// Pixels that edges cross, or that are hidden behind the blur of edges from both keyframes, at supersampling^2 places
-/// each. Places that neither keyframe sees do not count beside others that one does.
+/// Looks up the pixels at edges, and those hidden from both keyframes by the blur of edges, at supersampling^2 places
+/// each. Places that neither keyframe sees count only if the pixel has no others.
 template <typename Model>
 void Reprojector::refine(const Between& between, const Model& model, Reconstruction& result) {
   const int s = layout_.supersampling, margin = s * layout_.margin_px, places = s * s;
@@ -194,7 +194,7 @@ void Reprojector::refine(const Between& between, const Model& model, Reconstruct
           bx.push_back(keyframe_rays_.x(i + margin, j + margin)),
               by.push_back(keyframe_rays_.y(i + margin, j + margin));
           const Cells::Seen seen = cells_.at(i, j);
-          const bool nothing = seen.nearness < 0;  // no point falls there
+          const bool nothing = seen.nearness < 0;  // no point falls into the cell
           w.push_back(nothing ? surface_.nearness(x, y) : seen.nearness);
           if (objects) object.push_back(nothing ? surface_.object(x, y) : seen.object);
         }

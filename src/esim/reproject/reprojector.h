@@ -6,28 +6,28 @@
 
 namespace esim {
 
-/// What a reconstruction saw of its keyframes.
+/// Result of a reconstruction.
 struct Reconstruction {
   Image<float> irradiance;  ///< E of the sensor's pixels
 
-  // Only where asked for: E from either keyframe alone; below 0 where that keyframe does not see the pixel.
+  // Only with Detail::apart: E from each keyframe alone; below 0 if that keyframe does not see the pixel.
   Image<float> from_before, from_after;
   std::int64_t unseen = 0;  ///< pixels that neither keyframe sees
 };
 
-/// How much a reconstruction looks at.
+/// Level of detail of a reconstruction.
 enum class Detail {
-  whole,  ///< pixels near depth edges at many places, each with its own surface, where keyframes have narrow pixels
-  apart,  ///< every pixel at one place, and each keyframe's prediction on its own: for comparing them
+  whole,  ///< pixels near depth edges at many places, each with its own surface, if keyframes have narrow pixels
+  apart,  ///< every pixel at one place, and each keyframe's prediction separately, for comparison
 };
 
-/// Reconstructs E between two keyframes: the surface that a view sees is found by throwing the keyframes' pixels into
-/// it; its points are then looked up in either keyframe, and blended by the distance in time where both see them. Exact
-/// where poses, depth and lens are: what it costs is the keyframes' resolution. A pure function of its arguments, with
-/// any number of threads.
+/// Reconstructs E between two keyframes. First it finds the surface that a view sees by projecting the keyframes'
+/// pixels into the view. Then it looks up the surface's points in each keyframe, and blends them by the distance in
+/// time if both keyframes see them. The geometry is exact if poses, depth and lens are; the resolution is limited by
+/// that of the keyframes. A pure function of its arguments for any number of threads.
 class Reprojector {
  public:
-  /// `at_infinity`: everything is infinitely far; depth is not looked at.
+  /// `at_infinity`: everything is infinitely far, and depth is ignored.
   Reprojector(const KeyframeLayout& layout, bool at_infinity, const Workers& workers);
 
   Reprojector(const Reprojector&) = delete;
@@ -35,10 +35,10 @@ class Reprojector {
 
   const KeyframeLayout& layout() const { return layout_; }
 
-  /// Prepares a sample of the whole keyframe, whose buffers are taken.
+  /// Prepares a keyframe from a sample of the whole image, and takes the sample's buffers.
   void prepare(RenderRequest view, Sample& sample, Keyframe& keyframe) const;
 
-  /// E as seen by the sensor where `view` has it; view.t between those of the keyframes.
+  /// Reconstructs E of the sensor at `view`; view.t must lie between the times of the keyframes.
   void reconstruct(const Keyframe& before, const Keyframe& after, const RenderRequest& view, Detail detail,
                    Reconstruction& result);
 
@@ -53,7 +53,7 @@ class Reprojector {
   KeyframeLayout layout_;
   bool at_infinity_;
   PixelRays rays_, keyframe_rays_;
-  double greatest_radius_;  // of the keyframe's bearings
+  double greatest_radius_;  // maximum radius of the keyframe's bearings
   const Workers& workers_;
   DepthSplat splat_;
   Cells cells_;

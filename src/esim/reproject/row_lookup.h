@@ -9,17 +9,17 @@
 
 namespace esim {
 
-/// A surface is the one that a keyframe sees where their nearness agrees to this share.
+/// A keyframe sees a surface if their nearness agrees within this fraction.
 inline constexpr float kSameSurface = 0.02F;
 
-/// Where points of a row of the view appear in a keyframe, and what is found there.
+/// Positions of the points of a row of the view in a keyframe, and the values there.
 struct RowLookup {
   explicit RowLookup(std::size_t points)
       : u(points), v(u.size()), nearness(u.size()), value(u.size()), seen(u.size()) {}
   std::vector<float> u, v, nearness, value, seen;
 };
 
-/// Takes points from the view to the keyframe: [begin, end) of bearings (x, y, 1) and nearness w.
+/// Projects the points [begin, end), with bearings (x, y, 1) and nearness w, from the view to the keyframe.
 template <typename Model>
 void project_row(const Projector<Model>& project, const ViewChange& c, const float* bx, const float* by, const float* w,
                  int begin, int end, RowLookup& row) {
@@ -37,8 +37,8 @@ void project_row(const Projector<Model>& project, const ViewChange& c, const flo
   }
 }
 
-/// Looks the points up by the spline, of which pixels hold what lies `offset` pixels right of and below them. `seen` is
-/// 1 where they lie in the image and, with `depth`, on the surface there.
+/// Looks up the points with the spline; a pixel stores the value at `offset` pixels to its right and below. `seen` is 1
+/// if a point lies in the image and, with `depth`, on the surface there.
 template <bool depth>
 void look_up_row(const Keyframe::Light& light, float offset, RowLookup& row) {
   const int stride = light.root.width(), count = static_cast<int>(row.u.size());

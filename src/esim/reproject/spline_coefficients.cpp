@@ -5,10 +5,10 @@
 namespace esim {
 namespace {
 
-constexpr float kPole = -0.26794919243F;  // sqrt(3) - 2: of the recursive filter in both directions
-constexpr int kMemory = 14;               // its powers beyond are below the precision of numbers
+constexpr float kPole = -0.26794919243F;  // sqrt(3) - 2: pole of the recursive filter in both directions
+constexpr int kMemory = 14;               // higher powers of the pole are below float precision
 
-/// Filters `count` values that lie `stride` apart, `lanes` such lines side by side.
+/// Filters `lanes` adjacent lines of `count` values, `stride` apart.
 void filter(float* values, int count, std::ptrdiff_t stride, int lanes) {
   const auto line = [&](int i) { return values + stride * i; };
   float* const first = line(0);

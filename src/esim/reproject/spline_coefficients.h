@@ -5,7 +5,7 @@
 
 namespace esim {
 
-/// Weights of the cubic B-spline at a place f between the second and the third of four coefficients.
+/// Weights of the cubic B-spline at the fraction f between the second and the third of four coefficients.
 struct CubicSpline {
   float w0, w1, w2, w3;
 
@@ -19,10 +19,10 @@ struct CubicSpline {
   float operator()(float a, float b, float c, float d) const { return w0 * a + w1 * b + w2 * c + w3 * d; }
 };
 
-/// Replaces an image by the coefficients of the cubic B-spline that passes through its pixels (Unser, "Splines: a
-/// perfect fit for signal and image processing", 1999), which is about as sharp as interpolation over four pixels can
-/// be: a fourth of the pixels' frequency passes with 0.97 halfway between them, with Catmull and Rom's cubic with 0.88.
-/// The image goes on as a mirror image beyond its borders. At least 2 x 2 pixels.
+/// Replaces an image by the coefficients of the cubic B-spline through its pixels (Unser, "Splines: a perfect fit for
+/// signal and image processing", 1999). It is nearly as sharp as interpolation over four pixels can be: halfway between
+/// pixels, a quarter of the sampling frequency passes with a gain of 0.97 (Catmull-Rom: 0.88). The image continues
+/// mirrored beyond its borders. At least 2 x 2 pixels.
 void to_spline_coefficients(Image<float>& image, const Workers& workers);
 
 }  // namespace esim

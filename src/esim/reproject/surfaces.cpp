@@ -7,15 +7,15 @@
 namespace esim {
 namespace {
 
-/// Neighbouring pixels belong to different surfaces where 1/Z differs by more than this share of it from the straight
-/// line through their neighbours.
+/// Neighbouring pixels belong to different surfaces if 1/Z deviates by more than this fraction from the straight line
+/// through their neighbours.
 constexpr float kDiscontinuity = 0.01F;
 
-/// A surface has a crease where the slope of 1/Z changes by more than this between neighbouring pixels, in 1/Z per
-/// focal length: a corner of a room seen along its bisector by 2.
+/// A surface has a crease if the slope of 1/Z changes by more than this between neighbouring pixels, in 1/Z per focal
+/// length: by 2 at a corner of a room seen along its bisector.
 constexpr double kCrease = 1.5;
 
-/// The smaller of the differences to both sides, if that is no discontinuity.
+/// The smaller of the differences to both sides, unless it is a discontinuity.
 float slope(float before, float here, float after) {
   const float a = here - before, b = after - here;
   const float smaller = std::fabs(a) < std::fabs(b) ? a : b;
@@ -28,14 +28,14 @@ Image<float> inverse(const Image<float>& depth, const Workers& workers) {
   Image<float> nearness(depth.width(), depth.height());
   workers.for_each(depth.height(), [&](int y) {
     for (int x = 0; x < depth.width(); ++x) {
-      const float z = depth(x, y), w = z > 0 ? 1.0F / z : 0.0F;  // no number: as good as nothing
+      const float z = depth(x, y), w = z > 0 ? 1.0F / z : 0.0F;  // not a number: as if at infinity
       nearness(x, y) = w <= std::numeric_limits<float>::max() ? w : 0.0F;
     }
   });
   return nearness;
 }
 
-/// The value that comes first by `before`, of the square of pixels around each, `reach` pixels to all sides.
+/// For each pixel, the value that `before` sorts first among the pixels within `reach` in x and y.
 template <typename Before>
 Image<float> first_around(const Image<float>& in, int reach, const Before& before, const Workers& workers) {
   const int width = in.width(), height = in.height();
@@ -91,7 +91,7 @@ void Surfaces::for_each_pixel(const Body& body) const {
   });
 }
 
-/// By how much nearness changes within `reach` pixels, at least, where there is another surface.
+/// Minimum change of nearness within `reach` pixels that indicates another surface.
 float Surfaces::unlike(int x, int y, int reach) const {
   return (static_cast<float>(reach) + 0.5F) * (std::fabs(slope_x_(x, y)) + std::fabs(slope_y_(x, y))) +
          kDiscontinuity * nearness_(x, y);

@@ -9,38 +9,38 @@
 
 namespace esim {
 
-/// What depth shows of an edge in a pixel.
+/// Kind of the edge in a pixel, judged by depth.
 enum class Edge : std::uint8_t {
   none,
-  outline,  ///< of a surface, of which the pixel sees the nearer side
-  crease,   ///< of a surface
+  outline,  ///< boundary of a surface; the pixel sees the nearer side
+  crease,   ///< bend of a surface
 };
 
-/// Points on the surfaces that an image sees, an array per quantity.
+/// Points on the surfaces that an image sees, one array per quantity.
 struct SurfacePoints {
   std::vector<float> x, y;              ///< bearing (x, y, 1)
-  std::vector<float> nearness;          ///< 1 / Z, 1/m; 0 for what is infinitely far, and where Z is none
-  std::vector<float> slope_x, slope_y;  ///< of nearness per pixel, on the smooth surface; 0 where there is none
-  std::vector<std::uint16_t> object;    ///< 0: what stands still, i + 1: object i; empty where nothing moves
-  std::vector<Edge> edge;               ///< that crosses the pixel
+  std::vector<float> nearness;          ///< 1 / Z, 1/m; 0 at infinity and if Z is invalid
+  std::vector<float> slope_x, slope_y;  ///< change of nearness per pixel on a smooth surface; otherwise 0
+  std::vector<std::uint16_t> object;    ///< 0: static scene, i + 1: object i; empty if nothing moves
+  std::vector<Edge> edge;               ///< edge that crosses the pixel
 
   int size() const { return static_cast<int>(x.size()); }
 };
 
-/// What an image's depth says about the surfaces in it.
+/// Finds the surfaces in an image from its depth.
 class Surfaces {
  public:
-  /// `focal_px`: the image's, horizontally.
+  /// `focal_px`: horizontal focal length of the image.
   Surfaces(const Image<float>& depth, double focal_px, const Workers& workers);
 
-  /// Nearness; beside a surface that is nearer and at most `reach` pixels away, that one's.
+  /// Nearness; within `reach` pixels of a nearer surface, that of the nearer one.
   Image<float> front(int reach) const;
 
-  /// The edges that cross the pixels. Of an outline the nearer surface's pixels have it: those of the farther one see
-  /// no edge once the nearer one has moved away.
+  /// The edges that cross the pixels. Only the nearer surface's pixels have an outline: the farther surface has no edge
+  /// there once the nearer one has moved away.
   Image<Edge> edges() const;
 
-  /// Adds what the pixel (x, y) sees, by the image's rays; `object` as in Sample.
+  /// Adds the point that pixel (x, y) sees along its ray; `object` as in Sample.
   void add_point(const PixelRays& rays, const Image<std::uint16_t>& object, Edge edge, int x, int y,
                  SurfacePoints& to) const;
 

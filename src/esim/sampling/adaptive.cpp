@@ -18,20 +18,20 @@ using Reason = TileCourse::Reason;
 
 constexpr double kNsPerS = 1e9;
 
-// A round takes the tiles that are due within this share of the typical interval.
+// A round takes the tiles that are due within this fraction of the typical interval.
 constexpr double kRound = 0.5;
 
-// In a round, tiles are sampled at one time if none comes earlier than it should by more than this share of its
-// interval: a time has a price, too.
+// In a round, tiles are sampled at the same time if none is sampled earlier than it is due by more than this fraction
+// of its interval: each different time has a cost.
 constexpr double kSlack = 0.06;
 
-// An interval's bow that is less than this share of the tolerance is left out.
+// The curvature term of an interval is omitted if it is below this fraction of the tolerance.
 constexpr double kStraight = 0.07;
 
-// Tiles of a parallel loop that go to one thread together: a round has a few tens.
+// Tiles per task of a parallel loop: a round has a few tens of tiles.
 constexpr int kTogether = 4;
 
-/// Memory for the pixels of tiles, handed out to several threads and taken back all at once.
+/// Memory for the pixels of tiles: several threads take blocks, which are all returned together.
 class TileMemory {
  public:
   explicit TileMemory(std::size_t pixels) : pixels_(pixels) {}
@@ -110,7 +110,7 @@ class AdaptiveSampler final : public Sampler {
       const int end = std::min(count, (piece + 1) * kTogether);
       for (int i = piece * kTogether; i < end; ++i) {
         const std::uint32_t* const index = indices.data() + i;
-        if (i + 1 < end) tiles_[index[1]].timeline.prefetch();  // not of others: they may be changing
+        if (i + 1 < end) tiles_[index[1]].timeline.prefetch();  // only of this task: others may be changing
         body(tiles_[*index], *index);
       }
     });
@@ -138,11 +138,11 @@ class AdaptiveSampler final : public Sampler {
   std::vector<Segment> segments_;
 
   ErrorBudget budget_;
-  double straight_ = 0;  // a bow that does not matter, ln units
+  double straight_ = 0;  // curvature that is omitted, ln units
   SamplingStatistics statistics_;
 };
 
-/// Makes a tile's segments of the intervals that are known well enough.
+/// Makes a tile's segments from the intervals that are known accurately enough.
 void AdaptiveSampler::give(TileCourse& tile) {
   TileTimeline& timeline = tile.timeline;
   tile.segments.clear();
@@ -177,7 +177,7 @@ void AdaptiveSampler::give(TileCourse& tile) {
   tile.done = timeline.forget_before(tile.until);
 }
 
-/// Into how many straight pieces the interval behind sample i is cut for the pixels.
+/// Number of straight pieces into which the interval after sample i is divided.
 int AdaptiveSampler::pieces(const TileTimeline& timeline, std::size_t i) const {
   constexpr TimeNs kMost = 4;
   if (timeline.time(i + 1) - timeline.time(i) < kMost) return 1;
@@ -185,13 +185,13 @@ int AdaptiveSampler::pieces(const TileTimeline& timeline, std::size_t i) const {
   return bow <= straight_ ? 1 : (bow <= 4 * straight_ ? 2 : kMost);
 }
 
-/// Adds up what the tiles found.
+/// Adds the results of the tiles to the statistics.
 void AdaptiveSampler::account() {
   for (const std::uint32_t index : asked_) {
     TileCourse& tile = tiles_[index];
     statistics_.held_to_max_rate += std::exchange(tile.held, 0);
     budget_.remember(std::exchange(tile.log_intervals, 0), std::exchange(tile.intervals, 0));
-    // First steps are shorter than what is wanted.
+    // First steps are a quarter of the expected interval.
     if (tile.timeline.size() == 1) budget_.remember(std::log(4 * tile.step), 1);
     if (tile.audit.empty()) continue;
     budget_.audit(tile.audit, tile.most_change, static_cast<double>(tile.audit_duration));
@@ -200,7 +200,7 @@ void AdaptiveSampler::account() {
   }
 }
 
-/// Puts the segments of the tiles together.
+/// Joins the segments of the tiles.
 void AdaptiveSampler::collect() {
   segments_.clear();
   for (const std::uint32_t index : asked_) {
@@ -209,9 +209,9 @@ void AdaptiveSampler::collect() {
   }
 }
 
-/// Brings forward the tiles that content of others may come into.
+/// Makes tiles due earlier if content of other tiles may enter them.
 void AdaptiveSampler::watch() {
-  // By how many px a tile that is so many away is apart.
+  // Gap in px to a tile at this distance in tiles.
   const auto gap = [&](int distance) { return static_cast<double>(options_.tile_px * std::max(distance - 1, 0)); };
   const auto bring_forward = [&](TileCourse& tile, TimeNs t) {
     if (tile.reason != Reason::next || t >= tile.due) return;
@@ -241,7 +241,7 @@ void AdaptiveSampler::watch() {
   }
 }
 
-/// Chooses the tiles of the next round: of the next samples the earliest, and all that look back.
+/// Chooses the tiles of the next round: those with the earliest next samples, and all bisections and audits.
 void AdaptiveSampler::choose_round() {
   TimeNs first = kNever;
   for (const TileCourse& tile : tiles_) {
@@ -257,7 +257,7 @@ void AdaptiveSampler::choose_round() {
   std::sort(asked_.begin(), asked_.end(), [&](std::uint32_t a, std::uint32_t b) { return order(a) < order(b); });
 }
 
-/// Lets tiles of the round that are due at nearly the same time be due at the same.
+/// Makes tiles of the round that are due at nearly the same time due at the same time.
 void AdaptiveSampler::meet() {
   TimeNs t = kNever;
   for (const std::uint32_t index : asked_) {
@@ -270,7 +270,7 @@ void AdaptiveSampler::meet() {
   }
 }
 
-/// Asks for the tiles of the next round.
+/// Requests the tiles of the next round.
 void AdaptiveSampler::request() {
   choose_round();
   meet();
@@ -289,7 +289,7 @@ void AdaptiveSampler::request() {
   times.erase(times.begin());
   request_.motion_rows = planner_.motion_rows();
   request_.later = std::move(times);
-  std::sort(asked_.begin(), asked_.end());  // as they lie in memory
+  std::sort(asked_.begin(), asked_.end());  // in the order of memory
 }
 
 }  // namespace

@@ -13,8 +13,8 @@ double fastest_brightness_change_per_s(const Sample& sample, double log_eps, con
   const float eps = static_cast<float>(log_eps);
   const int reach = mosaic ? 2 : 1;  // at the border
   return row_maximum(height, workers, [&](int y) {
-    // Central differences of L = ln(E + eps), as logarithms of ratios; one-sided at the image's border, in a mosaic
-    // between pixels of the same colour there too.
+    // Central differences of L = ln(E + eps), as logarithms of ratios; one-sided at the image's border, where a mosaic
+    // also uses pixels of the same colour.
     const int above = std::max(y == height - 1 ? y - reach : y - 1, 0);
     const int below = std::min(y == 0 ? y + reach : y + 1, height - 1);
     const float *const row = irradiance.row(y), *const row_above = irradiance.row(above),

@@ -7,11 +7,11 @@
 
 namespace esim {
 
-/// Time until the next sample, s; +inf where the criterion sees no change.
+/// Time until the next sample, s; +inf if the criterion sees no change.
 double wanted_interval_s(const BrightnessSampling& options, const SensorTraits&, const Sample&, const Workers&);
 double wanted_interval_s(const FlowSampling& options, const SensorTraits&, const Sample&, const Workers&);
 
-/// Fastest motion in the image, max |V| over the pixels, px/s. Pixels whose motion is not finite do not count.
+/// Fastest motion in the image, max |V| over the pixels with finite motion, px/s.
 double fastest_motion_px_per_s(const Sample& sample, const Workers& workers);
 
 /// Fastest expected change of brightness, max |dL/dt| = max |<grad L, V>| over the pixels (Eq. 1), 1/s. In a

@@ -10,7 +10,7 @@ namespace esim {
 namespace {
 
 constexpr int kBlock = 8;         // px
-constexpr double kShare = 0.998;  // of the blocks, that disagree by less
+constexpr double kShare = 0.998;  // percentile of the blocks
 
 }  // namespace
 

@@ -4,9 +4,10 @@
 
 namespace esim {
 
-/// By how much two keyframes disagree on an image between them: |mean of L_before - L_after| over blocks of 8 x 8
-/// pixels of which both see at least a quarter, and of those the one that 0.2 % exceed. The mean leaves out what
-/// resampling and edges do to single pixels, and keeps what changes over an area: light, shadows, reflections.
+/// Difference between the predictions of an image by the two keyframes around it: the 99.8th percentile, over blocks of
+/// 8 x 8 pixels, of |mean of L_before - L_after|. Both keyframes must see at least a quarter of a block. The mean
+/// removes the effects of resampling and edges on single pixels, and keeps changes over an area: lighting, shadows,
+/// reflections.
 double disagreement(const Reconstruction& apart, double log_eps);
 
 }  // namespace esim

@@ -6,17 +6,17 @@
 namespace esim {
 namespace {
 
-// Of the errors, this share is to be above the tolerance.
+// Target fraction of the errors above the tolerance.
 constexpr double kShareAbove = 0.01;
 
-// e_0 over what it would be for normal errors.
+// Bounds of e_0 relative to its value for normally distributed errors.
 constexpr double kLeastGain = 0.25, kMostGain = 2;
 
-// An audit of a typical interval all of whose errors are above the tolerance changes ln(e_0) by the first step, later
-// by the last; so many audits halve it. One of a longer interval counts at most as so many.
+// An audit of a typical interval with all errors above the tolerance changes ln(e_0) by kFirstStep. The step decreases
+// to kLastStep; it is halved after kHalvedAfter audits. The weight of a longer interval is at most kMostWeight.
 constexpr double kFirstStep = 1, kLastStep = 0.25, kHalvedAfter = 64, kMostWeight = 4;
 
-// Tiles in which no pixel changes by more than this share of the tolerance say nothing of errors.
+// Tiles in which no pixel changes by more than this fraction of the tolerance do not count.
 constexpr double kActive = 0.25;
 
 }  // namespace

@@ -7,44 +7,44 @@
 
 namespace esim {
 
-/// What an interval may have: ln units, and those squared times ns.
+/// Limits of an interval, in ln units and in ln units squared times ns.
 struct ErrorLimits {
-  double error = 0;   ///< e_0 times the 99th percentile of a normal deviate: the tolerance, or less
+  double error = 0;   ///< e_0 times the 99th percentile of a normal deviate; at most the tolerance
   double energy = 0;  ///< e_0^2 h_0
 };
 
-/// How much error a tile's interval between two samples may have, and what audits say of what came of it.
+/// The permitted error of a tile's interval between two samples, corrected by audits.
 ///
-/// The energy of an interval is its mean square error e^2, of brightness, times its duration h. A sample more takes
-/// much of an interval's energy away, and costs the same wherever it is: a mean square error is had with the fewest
-/// samples if all intervals have the same energy, e_0^2 h_0. Here h_0 is the typical interval of late. Each audit
-/// moves e_0 towards where 1 % of the audited errors, in tiles in which something changes, are above the tolerance: how
-/// e^2 is spread over pixels and time, no mean square tells.
+/// The energy of an interval is its mean square error of brightness, e^2, times its duration h. One more sample removes
+/// most of an interval's energy and costs the same in every interval. Therefore a given mean square error needs the
+/// fewest samples if all intervals have the same energy, e_0^2 h_0, where h_0 is the typical recent interval. The mean
+/// square does not determine how e^2 is distributed over pixels and time: each audit moves e_0 towards the value at
+/// which 1 % of the audited errors, in tiles whose brightness changes, are above the tolerance.
 class ErrorBudget {
  public:
-  /// 99 % of the errors are to stay below `tolerance`, ln units.
+  /// 99 % of the errors must stay below `tolerance`, ln units.
   explicit ErrorBudget(double tolerance) : tolerance_(tolerance) {}
 
   ErrorLimits limits() const;
 
-  /// h_0, ns; 0 before any interval was remembered.
+  /// h_0, ns; 0 before the first remember().
   double typical_interval() const;
 
-  /// Takes note of the lengths of some intervals: ln ns, added up.
+  /// Adds `count` intervals; `log_intervals` is the sum of the logarithms of their lengths in ns.
   void remember(double log_intervals, int count);
 
-  /// Takes an audit of a tile: the error of each pixel in the middle of an interval that lasts `duration`, and by how
-  /// much the brightness of the one that changes most does in it.
+  /// Adds an audit of a tile: the error of each pixel in the middle of an interval of this duration, and the largest
+  /// change of any pixel's brightness in the interval.
   void audit(std::span<const float> errors, float most_change, double duration);
 
   MeasuredError measured() const { return measured_error(audited_); }
 
  private:
   double tolerance_;
-  double gain_ = 0.5;                         // e_0 over what it would be for normal errors; careful at first
-  double log_intervals_ = 0, intervals_ = 0;  // of late: ln ns added up, and how many
+  double gain_ = 0.5;                         // e_0 relative to its value for normally distributed errors; starts low
+  double log_intervals_ = 0, intervals_ = 0;  // recent intervals: sum of ln ns, and their number
   LogHistogram audited_;
-  double steering_audits_ = 0;  // of tiles in which something changes
+  double steering_audits_ = 0;  // of tiles whose brightness changes
 };
 
 }  // namespace esim

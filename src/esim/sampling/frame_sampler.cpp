@@ -59,7 +59,7 @@ class FrameSampler final : public Sampler {
     const TimeNs shortest = std::max<TimeNs>(1, to_ns(1.0 / criterion.bounds.max_rate_hz));
     const TimeNs longest = std::max(shortest, to_ns(1.0 / criterion.bounds.min_rate_hz));
     const double wanted_s = wanted_interval_s(criterion, context_.sensor, current_, context_.workers);
-    // Rounded down, so that the criterion's bound holds to the nanosecond.
+    // Rounded down, so that the criterion's bound holds exactly.
     const auto wanted = static_cast<TimeNs>(std::min(wanted_s * 1e9, static_cast<double>(longest)));
     if (wanted < shortest) ++statistics_.held_to_max_rate;
     return current_.t + std::max(wanted, shortest);

@@ -12,8 +12,8 @@ namespace esim {
 /// The schemes that sample the whole image at once, as the paper does.
 using FrameScheme = std::variant<FlowSampling, BrightnessSampling, UniformSampling>;
 
-/// The first sample at the span's start, the last one exactly at its end, and between them as the scheme says from each
-/// sample, within its bounds on the rate.
+/// Places the first sample at the span's start and the last exactly at its end. The scheme determines each interval in
+/// between from the sample at its start, within the bounds on the rate.
 std::unique_ptr<Sampler> make_frame_sampler(const FrameScheme& scheme, const SamplingContext& context);
 
 }  // namespace esim

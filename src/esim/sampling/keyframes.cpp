@@ -14,23 +14,23 @@
 namespace esim {
 namespace {
 
-constexpr double kMostPerSecond = 50000;  // reconstructions, also where something moves faster
-constexpr double kMostUnseen = 0.01;      // share of an image that no keyframe sees, but would from its own place
+constexpr double kMostPerSecond = 50000;  // maximum rate of reconstructions, whatever the motion
+constexpr double kMostUnseen = 0.01;      // maximum fraction of pixels hidden from both keyframes, except at edges
 
-// One interval between keyframes in so many is held against the truth, from the first on.
+// The first of every kAuditOneIn intervals between keyframes is compared with the truth.
 constexpr std::int64_t kAuditOneIn = 6;
 
-/// A keyframe, and how fast its image moves.
+/// A keyframe, and the speed of its image.
 struct MovingKeyframe {
   Keyframe keyframe;
   double typical_px_per_s = 0;  ///< 99 % of the pixels are slower
   double fastest_px_per_s = 0;  ///< 99.9 %
-  std::int64_t unseen = 0;      ///< of the sensor's pixels, even from where it was taken: on edges
+  std::int64_t unseen = 0;      ///< sensor pixels hidden even in the keyframe's own view, at edges
 
   TimeNs t() const { return keyframe.view.t; }
 };
 
-/// The speeds below which these shares of the pixels stay, px/s. Those that are no numbers do not count.
+/// Two quantiles of the pixels' speed, px/s. Speeds that are not finite do not count.
 std::pair<double, double> speeds(const Sample& sample, double lower_share, double upper_share) {
   std::vector<float> squared;
   squared.reserve(sample.flow_x.size());
@@ -111,7 +111,7 @@ class KeyframeSampler final : public Sampler {
 
   void request(TimeNs t) { request_ = SampleRequest{t, {{0, 0, layout_.camera.width, layout_.camera.height}}}; }
 
-  /// Puts a rendered keyframe in front of those that are ahead.
+  /// Adds a rendered keyframe as the next of those ahead.
   void take(Sample& sample) {
     MovingKeyframe& taken = ahead_.emplace_back();
     std::tie(taken.typical_px_per_s, taken.fastest_px_per_s) = speeds(sample, 0.99, 0.999);
@@ -125,7 +125,7 @@ class KeyframeSampler final : public Sampler {
 
   TimeNs shortest() const { return std::max<TimeNs>(1, to_ns(1.0 / options_.bounds.max_rate_hz)); }
 
-  /// When the keyframe after `before_` is due.
+  /// Time of the keyframe after `before_`.
   TimeNs predicted() {
     const TimeNs longest = std::max(shortest(), to_ns(1.0 / options_.bounds.min_rate_hz));
     const double wanted_ns = 1e9 * options_.max_displacement_px / before_.typical_px_per_s;
@@ -134,7 +134,7 @@ class KeyframeSampler final : public Sampler {
     return std::min(before_.t() + std::max(wanted, shortest()), context_.span.end);
   }
 
-  /// Begins with the interval up to the next keyframe, or asks for another one in its middle.
+  /// Starts the interval up to the next keyframe, or requests another keyframe in its middle.
   std::span<const Segment> settle() {
     const TimeNs interval = ahead_.back().t() - before_.t();
     if (!agree()) {
@@ -158,7 +158,7 @@ class KeyframeSampler final : public Sampler {
     return reconstruct();
   }
 
-  /// Whether the keyframes around an interval will do.
+  /// Whether the keyframes around an interval are close enough.
   bool agree() {
     const MovingKeyframe& after = ahead_.back();
     const TimeNs interval = after.t() - before_.t();
@@ -196,7 +196,7 @@ class KeyframeSampler final : public Sampler {
     return {&segment_, 1};
   }
 
-  /// Holds the segment against the truth, all of its interval's length counting.
+  /// Compares the segment with the truth, weighted by the length of its interval.
   void audit() {
     const auto eps = static_cast<float>(context_.sensor.log_eps);
     const auto share = static_cast<float>(to_seconds(truth_.t - segment_.t0) / to_seconds(segment_.t1 - segment_.t0));
@@ -228,10 +228,10 @@ class KeyframeSampler final : public Sampler {
   Reprojector reprojector_;
 
   std::optional<SampleRequest> request_;
-  MovingKeyframe before_;              // the keyframe up to which everything is known
-  std::vector<MovingKeyframe> ahead_;  // later ones, the last one the next
-  TimeNs step_ = 0, steps_ = 0;        // of the interval that is being reconstructed: done, and in all; else 0
-  std::int64_t intervals_ = 0;         // settled so far
+  MovingKeyframe before_;              // segments are complete up to this keyframe
+  std::vector<MovingKeyframe> ahead_;  // later keyframes, the last one is the next
+  TimeNs step_ = 0, steps_ = 0;        // of the current interval: done and total; otherwise 0
+  std::int64_t intervals_ = 0;         // started so far
   Sample truth_;                       // of the latest audit
   AddressedRandom random_;
   Reconstruction earlier_, later_, apart_;
@@ -248,7 +248,7 @@ class KeyframeSampler final : public Sampler {
 
 KeyframeLayout lay_out_keyframes(const KeyframeSampling& options, const SamplingContext& context) {
   if (context.renderer.on_sensor) {
-    throw UserError("sampling: keyframes cannot be seen from elsewhere where " + context.renderer.name +
+    throw UserError("sampling: type keyframes is not supported where " + context.renderer.name +
                     " are drawn on the sensor itself; use type flow or brightness");
   }
   return lay_out_keyframes(context.camera, options.supersampling > 0 ? options.supersampling : kLeastSupersampling,

@@ -9,19 +9,20 @@
 
 namespace esim {
 
-/// Whole images of a denser, slightly wider camera at few times, and between them reconstructions by reprojection so
-/// often that hardly a pixel moves by more than lambda from one to the next, at most 50000 times per second. A keyframe
-/// follows when the image is expected to have moved by max_displacement_px. Two keyframes that do not agree on what
-/// lies between them, that leave more than a hundredth of it unseen, or between which the image has moved by more than
-/// twice that, get a third one in the middle, again and again, down to 1 / max_rate_hz.
+/// Renders a few images (keyframes) with a denser, slightly wider camera and reconstructs the images between them by
+/// reprojection: often enough that hardly any pixel moves by more than lambda between two images, but at most 50000
+/// times per second. The next keyframe follows when the image is expected to have moved by max_displacement_px. A third
+/// keyframe is rendered in the middle between two keyframes if their predictions differ by more than the tolerance, if
+/// more than 1 % of the image is hidden from both, or if the image has moved by more than twice max_displacement_px.
+/// This repeats down to intervals of 1 / max_rate_hz.
 ///
-/// One interval between keyframes in six, from the first on, is audited: the sensor's own image at a random time in it
-/// is compared with what the segments say of that time.
+/// The first of every six intervals between keyframes is audited: the sensor's own image at a random time in the
+/// interval is compared with the segments.
 ///
-/// Needs the context's camera, renderer and view_at. Throws UserError for renderers that draw on the sensor.
+/// Requires the context's camera, renderer and view_at. Throws UserError for renderers that draw on the sensor.
 std::unique_ptr<Sampler> make_keyframe_sampler(const KeyframeSampling& options, const SamplingContext& context);
 
-/// What is chosen from where the options leave the supersampling open.
+/// Range of the automatic choice of the supersampling.
 constexpr int kLeastSupersampling = 2, kMostSupersampling = 4;
 
 /// The keyframes' camera. Throws UserError for renderers that draw on the sensor.

@@ -8,10 +8,10 @@
 
 namespace esim {
 
-/// Makes the sampler that the options describe. Throws UserError where the renderer does not suit it.
+/// Makes the sampler that the options describe. Throws UserError if it does not support the renderer.
 std::unique_ptr<Sampler> make_sampler(const SamplingOptions& options, const SamplingContext& context);
 
-/// The camera whose whole images or tiles that sampler asks for: the context's own, or a keyframe's.
+/// The camera whose images or tiles the sampler requests: the context's own, or the keyframes' camera.
 Camera sampled_camera(const SamplingOptions& options, const SamplingContext& context);
 
 }  // namespace esim

@@ -4,7 +4,7 @@
 
 namespace esim {
 
-/// Of the brightness between samples, as far as a scheme measures it; in ln(E + eps).
+/// Error of the brightness between samples, as measured by the scheme; in ln(E + eps).
 struct MeasuredError {
   double mean = 0, p99 = 0, max = 0;
 };

@@ -32,7 +32,7 @@ struct FlowSampling {
   RateBounds bounds{};
 };
 
-/// Tiles have times of their own, so that the brightness between two samples is off by no more than the tolerance.
+/// Samples each tile at its own times, so that the error of brightness between two samples stays below the tolerance.
 struct AdaptiveSampling {
   static constexpr const char* kType = "adaptive";
   double tolerance = 0.25;
@@ -41,7 +41,7 @@ struct AdaptiveSampling {
   RateBounds bounds{20, 50000};
 };
 
-/// Few images of a denser camera, and between them what their pixels show from elsewhere.
+/// Renders a few images with a denser camera, and reprojects them to the times in between.
 struct KeyframeSampling {
   static constexpr const char* kType = "keyframes";
   double tolerance = 0.5;
@@ -62,9 +62,10 @@ void describe(Visitor& visit, UniformSampling& o) {
 
 template <class Visitor>
 void describe(Visitor& visit, RateBounds& o) {
-  visit("min_rate_hz", o.min_rate_hz, About{"least samples per second, also where nothing moves", "Hz", 0, 1e9, true});
+  visit("min_rate_hz", o.min_rate_hz,
+        About{"minimum number of samples per second, also where nothing moves", "Hz", 0, 1e9, true});
   visit("max_rate_hz", o.max_rate_hz,
-        About{"most samples per second, also where the criterion asks for more", "Hz", 0, 1e9, true});
+        About{"maximum number of samples per second, also where the criterion asks for more", "Hz", 0, 1e9, true});
 }
 
 template <class Visitor>
@@ -83,11 +84,12 @@ void describe(Visitor& visit, FlowSampling& o) {
 template <class Visitor>
 void describe(Visitor& visit, AdaptiveSampling& o) {
   visit("tolerance", o.tolerance,
-        About{"that 99 % of the errors of brightness between samples stay below, in contrast thresholds, where "
-              "something changes",
+        About{"bound that 99 % of the brightness errors between samples stay below, in contrast thresholds, where the "
+              "brightness changes",
               "", 0, 1e6, true});
-  visit("max_motion_px", o.max_motion_px,
-        About{"most expected motion between two samples, however little brightness changes", "px", 0, 1e6, true});
+  visit(
+      "max_motion_px", o.max_motion_px,
+      About{"maximum expected motion between two samples, however little the brightness changes", "px", 0, 1e6, true});
   visit("tile_px", o.tile_px, About{"side of the tiles that are sampled independently", "px", 4, 1024});
   describe(visit, o.bounds);
 }
@@ -96,15 +98,17 @@ template <class Visitor>
 void describe(Visitor& visit, KeyframeSampling& o) {
   visit(
       "tolerance", o.tolerance,
-      About{"two keyframes may disagree on what lies between them by so many contrast thresholds, over blocks of 8 x 8 "
-            "pixels; a third one is rendered where they disagree more",
-            "", 0, 1e6, true});
+      About{
+          "maximum difference between the images that two keyframes predict between them, in contrast thresholds, over "
+          "blocks of 8 x 8 pixels; a third keyframe is rendered where the difference is larger",
+          "", 0, 1e6, true});
   visit("supersampling", o.supersampling,
-        About{"pixels of a keyframe to one of the sensor's, along each side; 0: as many, from 2 to 4, as the tolerance "
-              "needs",
+        About{"keyframe pixels per sensor pixel, along each side; 0: as many, from 2 to 4, as the tolerance "
+              "requires",
               "", 0, 4});
-  visit("margin_px", o.margin_px, About{"that a keyframe shows around the sensor's image", "px", 0, 1024});
-  visit("max_displacement_px", o.max_displacement_px, About{"expected motion between two keyframes", "px", 1, 1024});
+  visit("margin_px", o.margin_px, About{"margin of a keyframe around the sensor's image", "px", 0, 1024});
+  visit("max_displacement_px", o.max_displacement_px,
+        About{"maximum expected motion between two keyframes", "px", 1, 1024});
   visit("lambda", o.lambda, About{"expected motion between two reconstructed images", "px", 0, 1e6, true});
   describe(visit, o.bounds);
 }

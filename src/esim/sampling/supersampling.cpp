@@ -18,9 +18,10 @@ MeasuredError measure_resampling_floor(const KeyframeLayout& layout, RenderReque
   Reprojector reprojector(layout, context.renderer.at_infinity, context.workers);
   reprojector.prepare(request, sample, keyframe);
 
-  // The view turns away such that its pixels are far from the keyframe's. Where s is odd, the sensor's pixels and the
-  // places within them have their centres on pixels of the keyframe: by half of one. Where s is even, the sensor's
-  // pixels have theirs between two already, and the places, if they are looked at, have not: by a quarter.
+  // Turn the view so that its samples lie as far as possible from the keyframe's pixels. If s is odd, the centres of
+  // the sensor's pixels and of the places within them lie on keyframe pixels: turn by half a keyframe pixel. If s is
+  // even, the centres of the sensor's pixels already lie between two keyframe pixels, but the places within them, if
+  // used, do not: turn by a quarter.
   const double even = keyframe.narrow.root.empty() ? 0 : 0.25;
   const double turn = (layout.supersampling % 2 == 1 ? 0.5 : even) / layout.supersampling;
   SE3& pose = request.camera.T_world_body;

@@ -9,16 +9,16 @@ namespace {
 
 constexpr double kNsPerS = 1e9;
 
-// One interval in so many is looked into.
+// One in kAuditOneIn intervals is audited.
 constexpr std::uint32_t kAuditOneIn = 128;
 
-// The next sample is meant to make this share of the error that is let pass.
+// Planned error of the next interval, as a fraction of the permitted error.
 constexpr double kAim = 0.65;
 
-// Of the motion field, which is smooth, one row in so many is looked at, the first of each tile among them.
+// Every kMotionRows-th row of the motion field, which is smooth, is used, including the first row of each tile.
 constexpr int kMotionRows = 4;
 
-// Times are multiples of a power of two, at most this share of the interval that they end: so tiles meet.
+// Times are multiples of a power of two, at most this fraction of the interval: so tiles share times.
 constexpr double kGrid = 0.03125;
 
 /// Fastest finite motion in some rows of a tile, px/s.
@@ -35,8 +35,9 @@ double fastest_in(const Sample& sample, const Tile& tile, int every) {
   return std::sqrt(static_cast<double>(most));
 }
 
-/// The mean square error between samples i and i + 1 times its duration, as far as their own surprises tell, which
-/// belong to longer intervals: errors go with the second power of the length.
+/// Predicted energy of the interval between samples i and i + 1: mean square error times duration. It follows from the
+/// prediction errors of both samples, which belong to longer intervals: errors are proportional to the square of the
+/// length.
 double error_energy(const TileTimeline& timeline, std::size_t i) {
   const auto h = static_cast<double>(timeline.time(i + 1) - timeline.time(i));
   double most = 0;
@@ -66,7 +67,7 @@ void TilePlanner::take(TileCourse& tile, std::uint32_t index, const Sample& samp
   settle(tile, index, limits);
 }
 
-/// Looks what the error of the audited interval was: the sample that was due was taken for that.
+/// Measures the error of the audited interval with the sample that was taken for the audit.
 void TilePlanner::audit(TileCourse& tile) const {
   const TileTimeline& timeline = tile.timeline;
   std::size_t i = tile.done;
@@ -81,13 +82,13 @@ void TilePlanner::audit(TileCourse& tile) const {
   }
 }
 
-/// Finds how far the tile is known well enough, and its next sample.
+/// Finds up to which sample the tile is known accurately enough, and its next sample.
 void TilePlanner::settle(TileCourse& tile, std::uint32_t index, const ErrorLimits& limits) const {
   const TileTimeline& timeline = tile.timeline;
   const bool complete = tile.complete(span_.end);
   tile.until = tile.done;
   for (std::size_t i = tile.done; i + 1 < timeline.size(); ++i) {
-    if (i + 2 >= timeline.size() && !complete) break;  // what comes behind is needed to judge it
+    if (i + 2 >= timeline.size() && !complete) break;  // the sample after it is needed to judge it
     const TimeNs t0 = timeline.time(i), h = timeline.time(i + 1) - t0;
     const bool too_much = error_energy(timeline, i) > limits.energy;
     if (too_much && h >= 2 * shortest_) {
@@ -116,16 +117,16 @@ void TilePlanner::plan(TileCourse& tile, const ErrorLimits& limits) const {
   const TileTimeline& timeline = tile.timeline;
   const std::size_t last = timeline.size() - 1;
   const double way = max_motion_px_ / tile.speed * kNsPerS;  // ns
-  // At first nothing is known: short steps tell something soon.
+  // Initially nothing is known: start with short steps.
   double step = 0.25 * std::min({way, static_cast<double>(longest_), static_cast<double>(span_.end - span_.start)});
   if (last >= 2) {
     const auto left = static_cast<double>(timeline.time(last - 1) - timeline.time(last - 2));
     const auto right = static_cast<double>(timeline.time(last) - timeline.time(last - 1));
-    // The energy goes with the fifth power of the length.
+    // The energy is proportional to the fifth power of the length.
     const double square =
         timeline.surprise(last - 1) * timeline.surprise(last - 1) / (16 * left * left * right * right);
     step = std::pow(kAim * kAim * limits.energy / std::max(square, 1e-300), 0.2);
-    // Bisections say nothing of what comes: steps change with the steps before.
+    // Bisections do not predict the future: limit the change relative to the previous step.
     step = std::clamp(step, 0.5 * tile.step, 2 * tile.step);
   }
   tile.step = std::clamp(step, static_cast<double>(shortest_), static_cast<double>(longest_));
@@ -137,10 +138,10 @@ TimeNs TilePlanner::after(const TileCourse& tile, double step) const {
   return std::min(std::max(on_grid(tile.last() + h, h), tile.last() + shortest_), span_.end);
 }
 
-/// A time in the middle of the h from t on, or a little before.
+/// A time in the middle of [t, t + h], or slightly earlier.
 TimeNs TilePlanner::middle(TimeNs t, TimeNs h) const { return std::max(on_grid(t + h / 2, h), t + h / 4); }
 
-/// The last time not after t that is a multiple of the largest power of two within kGrid of h.
+/// The last time <= t that is a multiple of the largest power of two within kGrid h.
 TimeNs TilePlanner::on_grid(TimeNs t, TimeNs h) const {
   const auto grid = std::bit_floor(static_cast<std::uint64_t>(std::max(1.0, kGrid * static_cast<double>(h))));
   const TimeNs since = t - span_.start;

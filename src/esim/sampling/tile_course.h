@@ -15,12 +15,12 @@ namespace esim {
 
 inline constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
 
-/// Tiles whose motion is watched: those up to so many away.
+/// Content is expected from tiles up to this distance, in tiles.
 inline constexpr int kReach = 3;
 
-/// A tile on its way through time.
+/// The sampling state of a tile.
 struct TileCourse {
-  /// Why it asks for its next sample.
+  /// Reason of the next sample.
   enum class Reason { next, bisection, audit };
 
   TileCourse(const Tile& tile, float log_eps, TimeNs start) : timeline(tile, log_eps), due(start) {}
@@ -29,41 +29,41 @@ struct TileCourse {
   bool complete(TimeNs end) const { return timeline.size() > 0 && last() >= end; }
 
   TileTimeline timeline;
-  std::size_t done = 0;  // index of the sample up to which segments have been given
+  std::size_t done = 0;  // index of the sample up to which segments have been passed on
   TimeNs due = 0;        // the next sample; kNever after the last
   Reason reason = Reason::next;
-  TimeNs audited = std::numeric_limits<TimeNs>::min();  // intervals that begin up to then are not audited any more
-  double step = 0;                                      // that was planned last, ns
+  TimeNs audited = std::numeric_limits<TimeNs>::min();  // intervals that begin until then are no longer audited
+  double step = 0;                                      // the last planned step, ns
   double speed = 0;                                     // fastest motion at the last sample, px/s
-  // When what the tile showed last may come into a tile so many away; kNever where nothing moves.
+  // Time at which the tile's content may enter a tile at each distance; kNever if nothing moves.
   std::array<TimeNs, kReach + 1> arrival = {kNever, kNever, kNever, kNever};
-  bool begun = false;  // the first segment, an instant, has been given
+  bool begun = false;  // the first segment, an instant, has been passed on
 
-  // What the last sample brought.
-  std::size_t until = 0;          // segments up to this sample are to be given
-  std::vector<Segment> segments;  // that are given now
-  double log_intervals = 0;       // lengths of the intervals that were given, ln ns added up
+  // Result of the last sample.
+  std::size_t until = 0;          // pass on the segments up to this sample
+  std::vector<Segment> segments;  // to pass on now
+  double log_intervals = 0;       // of the intervals passed on: sum of ln ns
   int intervals = 0;
   std::int64_t held = 0;
-  std::vector<float> audit;  // errors of the audited interval; empty for none
+  std::vector<float> audit;  // errors of the audited interval; empty without an audit
   float most_change = 0;     // of a pixel's brightness in it
   TimeNs audit_duration = 0;
 };
 
-/// Decides of each tile how far it is known well enough, and when it needs its next sample.
+/// Decides up to which time a tile is known accurately enough, and when it needs its next sample.
 class TilePlanner {
  public:
   TilePlanner(const AdaptiveSampling& options, TimeSpan span);
 
   TimeNs shortest() const { return shortest_; }
 
-  /// One row in so many of the motion field is looked at, from the image's first on.
+  /// Every motion_rows()-th row of the motion field is used, from the image's first on.
   int motion_rows() const { return motion_rows_; }
 
-  /// Takes the sample of a tile that was due; `index` is the tile's number among all.
+  /// Takes the tile's sample that was due; `index` is the number of the tile.
   void take(TileCourse& tile, std::uint32_t index, const Sample& sample, const ErrorLimits& limits) const;
 
-  /// The time `step` ns after the tile's last sample, or a little less, within the bounds.
+  /// The time `step` ns after the tile's last sample, or slightly earlier, within the bounds.
   TimeNs after(const TileCourse& tile, double step) const;
 
  private:

@@ -10,11 +10,11 @@
 namespace esim {
 namespace {
 
-// Before a jump, the second difference on one side says nothing of the interval: the bow is never more than so many
-// times the smaller one.
+// Near a jump, the second difference on one side does not describe the interval: the curvature term is at most this
+// multiple of the smaller one.
 constexpr float kMostBend = 2;
 
-// Every third row is watched, the left half of one and the right half of the next: errors of neighbours are alike.
+// Every third row is watched, alternating its left and its right half: errors of neighbours are similar.
 constexpr int kRowsPerRun = 3;
 
 std::size_t run_length(const Tile& tile) { return static_cast<std::size_t>((tile.width + 1) / 2); }
@@ -23,8 +23,8 @@ std::size_t watched_pixels(const Tile& tile) {
   return static_cast<std::size_t>((tile.height + kRowsPerRun - 1) / kRowsPerRun) * run_length(tile);
 }
 
-/// Calls run(k, watched) for each run of pixels of a tile that are watched: its first pixel is number k among all,
-/// number `watched` among those.
+/// Calls run(k, watched) for each run of watched pixels of a tile. k is the index of its first pixel among all pixels,
+/// `watched` its index among the watched ones.
 template <typename Run>
 void for_watched(const Tile& tile, const Run& run) {
   const auto width = static_cast<std::size_t>(tile.width);
@@ -32,7 +32,7 @@ void for_watched(const Tile& tile, const Run& run) {
   for (std::size_t i = 0; i < count; ++i) run(i * kRowsPerRun * width + (i % 2 == 0 ? 0 : width - length), i * length);
 }
 
-/// Of a few pixels, in place: a call would take longer than the copy.
+/// Copies a few pixels inline: a call would take longer than the copy.
 void copy(const float* from, std::size_t count, float* to) {
 #pragma omp simd
   for (std::size_t x = 0; x < count; ++x) to[x] = from[x];
@@ -44,15 +44,15 @@ double root_mean(float sum, std::size_t count) {
 
 }  // namespace
 
-/// The bow between two samples: c h^2 from the second differences before and after, each a weighted sum of the
+/// The curvature c h^2 between two samples, from the second differences before and after, each a weighted sum of the
 /// irradiance at three samples.
 struct TileTimeline::Bow {
   const float *before, *first, *last, *after;
   float before_outer = 0, before_near = 0, before_far = 0;
   float after_outer = 0, after_near = 0, after_far = 0;
-  bool straight = true;  // nothing is known on one side
+  bool straight = true;  // no sample on one side
 
-  /// Of pixel k.
+  /// c h^2 of pixel k.
   float operator()(std::size_t k) const {
     const float a = before_outer * before[k] + before_near * first[k] + before_far * last[k];
     const float b = after_outer * after[k] + after_near * last[k] + after_far * first[k];
@@ -62,10 +62,10 @@ struct TileTimeline::Bow {
     return a * b > 0 ? limited : 0.0F;
   }
 
-  /// Irradiance of pixel k at f of the way. Never less than a quarter of the lower end.
+  /// Irradiance of pixel k at the fraction f of the interval; at least a quarter of the smaller end.
   float irradiance(std::size_t k, float f) const { return irradiance(k, (*this)(k), f); }
 
-  /// The same, its bow being `c`.
+  /// The same with the curvature `c`.
   float irradiance(std::size_t k, float c, float f) const {
     const float e0 = first[k], e1 = last[k];
     const float e = e0 + (e1 - e0) * f - c * (0.5F * f * (1 - f)), least = 0.25F * (e0 < e1 ? e0 : e1);
@@ -80,7 +80,7 @@ TileTimeline::Bow TileTimeline::bow_between(std::size_t first, std::size_t last)
   if (!has_before || !has_after) return bow;
   bow.straight = false;
   const auto h = static_cast<double>(samples_[last].t - samples_[first].t);
-  // h^2 times the second divided difference of three samples, one of them `gap` away from the interval.
+  // h^2 times the second divided difference of three samples, one of them at a distance `gap` from the interval.
   const auto weigh = [&](double gap, float& outer, float& near, float& far) {
     const double scale = 2 * h * h / (h + gap);
     outer = static_cast<float>(scale / gap), far = static_cast<float>(scale / h);
@@ -155,7 +155,7 @@ void TileTimeline::errors(std::size_t i, std::vector<float>& out) const {
   }
 }
 
-/// Computes the surprise of a sample, and its bend.
+/// Computes a sample's prediction error and its bend.
 void TileTimeline::measure(std::size_t i) {
   if (i == 0 || i + 1 >= samples_.size()) return;
   errors(i, errors_);
@@ -175,7 +175,8 @@ void TileTimeline::measure(std::size_t i) {
 
 double TileTimeline::bow(std::size_t i) const {
   const auto h = static_cast<double>(time(i + 1) - time(i));
-  // What a sample's bend, over the intervals on both sides, makes of this one: it goes with the square of the length.
+  // Scales a sample's bend, which spans the intervals on both sides, to this interval: it is proportional to the square
+  // of the length.
   const auto of = [&](std::size_t k) {
     const auto left = static_cast<double>(time(k) - time(k - 1)), right = static_cast<double>(time(k + 1) - time(k));
     return samples_[k].bend * h * h / (4 * left * right);

@@ -4,7 +4,7 @@
 
 namespace esim {
 
-/// What the pixels of a sensor with RGGB filters (see colour_at) see of an image, all planes of one size and linear.
+/// The mosaic that a sensor with RGGB filters (see colour_at) sees of an image. All planes are linear and of one size.
 void mosaic(const Image<float>& red, const Image<float>& green, const Image<float>& blue, Image<float>& out);
 
 }  // namespace esim

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kMostPoints = 1 << 20;
 
-/// Takes a number, and the blanks and comma behind it, from the front of `text`.
+/// Takes a number, and the blanks, comma or semicolon after it, from the front of `text`.
 std::optional<double> take_number(std::string_view& text) {
   double value = 0;
   const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -35,7 +35,7 @@ CameraResponse::CameraResponse(const ResponseOptions& options) : options_(option
   const auto* const measured = std::get_if<MeasuredResponse>(&options);
   if (measured == nullptr) return;
   const std::string name = measured->path.string();
-  if (name.empty()) throw UserError("frame_camera.response.path: is missing; name the file of the measured response");
+  if (name.empty()) throw UserError("frame_camera.response.path: is missing; give the file of the measured response");
   std::ifstream file(measured->path);
   if (!file) throw UserError(fmt::format("frame_camera.response.path: {}: cannot be read", name));
 
@@ -48,21 +48,22 @@ CameraResponse::CameraResponse(const ResponseOptions& options) : options_(option
     if (text.empty() || text.front() == '#') continue;
     const auto signal = take_number(text), level = signal ? take_number(text) : std::nullopt;
     if (!level || !text.empty()) {
-      if (points.empty() && number == 1) continue;  // names of columns
-      fail("a line of a measured response holds two numbers, signal and level");
+      if (points.empty() && number == 1) continue;  // column names
+      fail("a line of a measured response must hold two numbers, signal and level");
     }
     if (*signal < 0 || *level < 0) fail("signal and level must not be below 0");
     if (!points.empty() && *signal <= points.back().first)
-      fail(fmt::format("the signal must rise from line to line, but {} does not come after {}", *signal,
+      fail(fmt::format("the signal must rise from line to line, but {} is not greater than the previous {}", *signal,
                        points.back().first));
     if (!points.empty() && *level < points.back().second)
-      fail(fmt::format("the level must not fall, but {} comes after {}; give a monotonic response", *level,
+      fail(fmt::format("the level must not fall, but {} is below the previous {}; give a monotonic response", *level,
                        points.back().second));
-    if (points.size() == kMostPoints) fail("a measured response has at most 2^20 lines");
+    if (points.size() == kMostPoints) fail("a measured response must have at most 2^20 lines");
     points.emplace_back(*signal, *level);
   }
   if (points.size() < 2 || points.back().second <= points.front().second)
-    throw UserError(fmt::format("{}: a measured response has at least two lines, of rising signal and level", name));
+    throw UserError(
+        fmt::format("{}: a measured response must have at least two lines, with rising signal and level", name));
   const auto [full_signal, full_level] = points.back();
   for (const auto& [signal, level] : points)
     points_.push_back({static_cast<float>(signal / full_signal), static_cast<float>(level / full_level)});

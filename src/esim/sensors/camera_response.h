@@ -7,17 +7,17 @@
 
 namespace esim {
 
-/// The response f of a frame camera: from the signal, 1 at full scale, to the level, 1 likewise (paper, Section 7.4).
+/// The response f of a frame camera: from the signal to the level, both 1 at full scale (paper, Section 7.4).
 class CameraResponse {
  public:
-  /// Reads the file of a measured response. Throws UserError with file and line where it is none.
+  /// Reads the file of a measured response. Throws UserError naming file and line if it is invalid.
   explicit CameraResponse(const ResponseOptions& options);
 
-  /// level = f(signal) of each value. What is below 0 stays there if the response is linear, and becomes 0 otherwise;
-  /// what is above 1 may stay above.
+  /// level = f(signal) for each value. Values below 0 stay negative if the response is linear, and become 0 otherwise;
+  /// values above 1 may stay above 1.
   void apply(std::span<float> signal) const;
 
-  /// The signal at which the level is reached, for a level on [0, 1].
+  /// The signal for a level in [0, 1].
   double inverse(double level) const;
 
  private:

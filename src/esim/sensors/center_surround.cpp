@@ -16,8 +16,8 @@ cv::Mat view(Image<float>& image) { return {image.height(), image.width(), CV_32
 CenterSurround::CenterSurround(double reach_px, double tau_s, int width, int height)
     : tau_s_(tau_s), wave_(width, height), surround_(width, height), next_(width, height) {
   if (width % 2 != 0 || height % 2 != 0)
-    throw UserError("event camera: surround_px needs an even number of columns and rows, not " + std::to_string(width) +
-                    " x " + std::to_string(height));
+    throw UserError("event camera: surround_px: the image must have an even number of columns and rows, not " +
+                    std::to_string(width) + " x " + std::to_string(height));
   const auto eigenvalue = [](int i, int n) { return 2.0 - 2.0 * std::cos(std::numbers::pi * i / n); };
   gain_.reserve(wave_.size());
   for (int y = 0; y < height; ++y) {

@@ -14,21 +14,21 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Pixels on their way through a segment. Brightness is at the segment's ends; times are ns after its start.
+/// Pixels that advance through a segment. Brightness is at the segment's ends; times are in ns after its start.
 struct Lanes {
   PerPixel<double> before, after, on, off, reference;
-  PerPixel<double> polarity;  // of the last round: 1, -1, or 0 where nothing fired
-  PerPixel<double> crossing;  // when it fired
-  PerPixel<double> resumes;   // end of the refractory period behind
-  PerPixel<double> again;     // 1 where it fires in the next round, too
+  PerPixel<double> polarity;  // of the last round: 1, -1, or 0 without an event
+  PerPixel<double> crossing;  // time of the event
+  PerPixel<double> resumes;   // end of the refractory period after it
+  PerPixel<double> again;     // 1 if it also fires in the next round
   PerPixel<std::uint32_t> place;
   std::size_t count = 0;
 
   Lanes() { before.fill(1), after.fill(1); }
 
-  /// One round: each pixel passes its next level, if it does, and takes its reference behind that: the level, or where
-  /// it is held in reset (refractory >= 0) the brightness at the end of the refractory period. Returns when the last of
-  /// these ends.
+  /// One round: each pixel that crosses its next level fires once. Its new reference is the level, or, if it is held in
+  /// reset (refractory >= 0), the brightness at the end of the refractory period. Returns when the last refractory
+  /// period ends.
   double fire(double duration, double refractory) {
     const double per_duration = 1 / duration;
     double last = 0;
@@ -55,7 +55,7 @@ struct Lanes {
     return last;
   }
 
-  /// A pixel that fires nothing more in this segment.
+  /// Makes a pixel fire no more events in this segment.
   void silence(std::size_t i) {
     on[i] = off[i] = kInfinity;
     again[i] = 0;
@@ -73,13 +73,13 @@ struct Lanes {
 struct CleanPass::Block {
   Lanes all;
   PerPixel<std::uint32_t> pixel;
-  bool some_held = false;  // among those that were gathered
+  bool some_held = false;  // among the gathered pixels
 
-  // The few pixels that fire more than once, and which they are.
+  // The few pixels that fire more than once, and their indices.
   Lanes rest;
   PerPixel<std::uint32_t> origin;
 
-  PerPixel<float> low, high;  // levels to sleep between
+  PerPixel<float> low, high;  // bounds while inactive
 
   Block() { low.fill(0), high.fill(0); }
 
@@ -121,7 +121,7 @@ void CleanPass::Block::gather(const PixelArray& pixels, const Segment& segment, 
   some_held = held;
 }
 
-/// Ends the refractory periods that end in this segment, and silences the pixels that stay in reset.
+/// Ends the refractory periods that end in this segment, and excludes the pixels that stay in reset.
 void CleanPass::Block::resume(const PixelArray& pixels, const Segment& segment) {
   const double per_ns = 1.0 / static_cast<double>(segment.t1 - segment.t0);
   for (std::size_t i = 0; i < all.count; ++i) {
@@ -136,8 +136,8 @@ void CleanPass::Block::resume(const PixelArray& pixels, const Segment& segment) 
   }
 }
 
-/// Holds those in reset that fired and whose refractory period ends after the segment. `which` are their indices among
-/// all; null: these are all.
+/// Holds in reset the pixels that fired and whose refractory period ends after the segment. `which` are the indices of
+/// `lanes` among all pixels; null: `lanes` are all pixels.
 void CleanPass::Block::hold(PixelArray& pixels, Lanes& lanes, const std::uint32_t* which, TimeNs t0, double duration) {
   for (std::size_t i = 0; i < lanes.count; ++i) {
     if (!(lanes.resumes[i] > duration && lanes.polarity[i] != 0)) continue;
@@ -149,7 +149,7 @@ void CleanPass::Block::hold(PixelArray& pixels, Lanes& lanes, const std::uint32_
   }
 }
 
-/// Leaves those in reset that fired, for as long as nothing else is said.
+/// Holds the pixels that fired in reset until they are released.
 void CleanPass::Block::wait(PixelArray& pixels) {
   for (std::size_t i = 0; i < all.count; ++i) {
     if (all.polarity[i] == 0) continue;
@@ -158,7 +158,7 @@ void CleanPass::Block::wait(PixelArray& pixels) {
   }
 }
 
-/// Copies those pixels to `rest` that fire again.
+/// Copies the pixels that fire again to `rest`.
 std::size_t CleanPass::Block::take_rest() {
   std::size_t count = 0;
   for (std::size_t i = 0; i < all.count; ++i) {
@@ -170,7 +170,7 @@ std::size_t CleanPass::Block::take_rest() {
   return count;
 }
 
-/// Gives all pixels their references and bands.
+/// Sets the references and bounds of all pixels.
 void CleanPass::Block::settle(PixelArray& pixels) {
   for (std::size_t i = 0; i < all.count; ++i) {
     low[i] = static_cast<float>(all.reference[i] - all.off[i]);
@@ -204,7 +204,7 @@ void CleanPass::run_block(PixelArray& pixels, const Segment& segment, PackedEven
     events.add(lanes.count, segment.t0, lanes.crossing.data(), lanes.place.data(), polarity, polarity);
     if (pixels.holds && !wait && last_reset > duration) block.hold(pixels, lanes, which, segment.t0, duration);
   };
-  // Most pixels that wake up fire once; the others go on among themselves.
+  // Most active pixels fire once; the others continue in a smaller group.
   round(block.all, nullptr);
   if (wait) {
     block.wait(pixels);

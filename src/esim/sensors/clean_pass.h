@@ -12,9 +12,9 @@
 
 namespace esim {
 
-/// Takes the pixels that woke up in a segment through it, where nothing but the light makes them fire and their bands
-/// are of irradiance: what PixelPass does, in whole vectors and without branches. Private to the event camera; holds
-/// memory to work in.
+/// Advances the active pixels through a segment if only changes of irradiance make pixels fire and their bounds are of
+/// irradiance: as PixelPass, but in whole vectors and without branches. Private to the event camera; keeps its working
+/// memory.
 class CleanPass {
  public:
   CleanPass();
@@ -22,14 +22,14 @@ class CleanPass {
   CleanPass(CleanPass&&) noexcept;
   CleanPass& operator=(CleanPass&&) noexcept;
 
-  /// Sets the references of neighbouring pixels, from `first` on, that are seen for the first time.
+  /// Sets the references of neighbouring pixels, from `first` on, at their first sample.
   void open(PixelArray& pixels, std::uint32_t first, std::span<const double> brightness);
 
-  /// What `watch` found in rows of the segment.
+  /// Advances the active pixels that `watch` found in rows of the segment.
   void run(PixelArray& pixels, const Segment& segment, const PixelWatch& watch, Rows rows, PackedEvents& events);
 
-  /// Lets pixels that are held in reset resume in the segment, and take their next event at most. Those that fire wait
-  /// in reset.
+  /// Lets pixels that are held in reset resume in the segment, up to their next event. Pixels that fire then wait in
+  /// reset.
   void resume(PixelArray& pixels, const Segment& segment, std::span<const std::uint32_t> which, PackedEvents& events);
 
  private:

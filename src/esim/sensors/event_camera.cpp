@@ -20,9 +20,9 @@
 namespace esim {
 namespace {
 
-constexpr int kPixelsPerPiece = 4096;  // of a parallel loop
+constexpr int kPixelsPerPiece = 4096;  // per task of a parallel loop
 
-/// The rows of a tile in pieces for a parallel loop.
+/// Divides the rows of a tile into tasks of a parallel loop.
 struct RowPieces {
   int first, last, rows, count;
 
@@ -52,7 +52,7 @@ struct EventCamera::State {
   void refuse_long_time(TimeNs duration) const;
   void subtract_surround(const Segment& segment, const Workers& workers);
 
-  /// All but memory to work in, and the queue.
+  /// Everything except working memory and the queue.
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     PixelArray::transfer(archive, self.pixels);
@@ -67,17 +67,17 @@ struct EventCamera::State {
   PixelArray pixels;
   EventPacking packing;
   Tile size;
-  bool spoiled = false;  // by a segment that was only partly integrated
+  bool spoiled = false;  // a segment was integrated only partly
   std::optional<CenterSurround> surround;
-  Image<float> brightness;               // less the surround
-  std::vector<PixelUpdate> updates;      // by worker
-  std::vector<PackedEvents> events;      // by worker
-  std::span<const Segment> segments;     // that are being integrated
-  std::vector<std::size_t> tile_begins;  // where the segments of some tiles begin, and the end
+  Image<float> brightness;               // minus the surround
+  std::vector<PixelUpdate> updates;      // per worker
+  std::vector<PackedEvents> events;      // per worker
+  std::span<const Segment> segments;     // being integrated
+  std::vector<std::size_t> tile_begins;  // first segment of each group of tiles, and the end
   EventQueue queue;
   std::optional<PixelReadout> readout;
 
-  // Of process().
+  // For process().
   Image<float> last_frame, next_frame;
   TimeNs last_time = 0;
   std::int64_t frames = 0;
@@ -93,7 +93,8 @@ EventCamera& EventCamera::operator=(EventCamera&&) noexcept = default;
 
 void EventCamera::State::subtract_surround(const Segment& segment, const Workers& workers) {
   if (segment.tile != size)
-    throw UserError("event camera: surround_px needs samples of whole images; choose a sampling that gives them");
+    throw UserError(
+        "event camera: surround_px requires samples of whole images; choose a sampling type that gives them");
   if (brightness.empty()) brightness = Image<float>(size.width, size.height);
   workers.for_each(size.height, [&](int y) {
     respond(pixels.options, static_cast<std::size_t>(size.width), segment.irradiance1.row(y), brightness.row(y));
@@ -105,15 +106,15 @@ void EventCamera::State::subtract_surround(const Segment& segment, const Workers
   }
 }
 
-/// What packed events have no room for, latencies included.
+/// Refuses durations that packed events, including latencies, cannot represent.
 void EventCamera::State::refuse_long_time(TimeNs duration) const {
   const TimeNs longest = packing.longest() / 2;
   if (duration < longest) return;
   throw UserError("event camera: two samples are " + std::to_string(to_seconds(duration)) +
-                  " s apart; give one at least every " + std::to_string(to_seconds(longest)) + " s");
+                  " s apart; the interval must be shorter than " + std::to_string(to_seconds(longest)) + " s");
 }
 
-/// Rows of the i-th segment.
+/// Integrates rows of the i-th segment.
 bool EventCamera::State::advance(std::size_t i, const Image<float>* given, Rows rows, int worker) {
   const Segment& segment = segments[i];
   PixelUpdate& update = updates[static_cast<std::size_t>(worker)];
@@ -122,7 +123,7 @@ bool EventCamera::State::advance(std::size_t i, const Image<float>* given, Rows 
   return update.advance(pixels, segment, given, rows, past, events[static_cast<std::size_t>(worker)]);
 }
 
-/// The rows of the i-th segment in parallel.
+/// Integrates the rows of the i-th segment in parallel.
 bool EventCamera::State::integrate_one(std::size_t i, const Workers& workers) {
   const Segment& segment = segments[i];
   const Image<float>* given = nullptr;
@@ -138,7 +139,7 @@ bool EventCamera::State::integrate_one(std::size_t i, const Workers& workers) {
   return good;
 }
 
-/// Several tiles in parallel.
+/// Integrates several tiles in parallel.
 bool EventCamera::State::integrate_tiles(const Workers& workers) {
   std::atomic<bool> good = true;
   workers.for_each_with_worker(static_cast<int>(tile_begins.size()) - 1, [&](int i, int worker) {
@@ -153,7 +154,7 @@ bool EventCamera::State::integrate_tiles(const Workers& workers) {
 
 bool EventCamera::State::integrate(const Workers& workers) {
   tile_begins.clear();
-  int pixels_seen = 0;  // since the last of them
+  int pixels_seen = 0;  // since the last tile_begins
   for (std::size_t i = 0; i < segments.size(); ++i) {
     if (segments[i].t0 == segments[i].t1) pixels.set_epoch(segments[i].t0);
     if (i == 0 || (segments[i].tile != segments[i - 1].tile && pixels_seen >= kPixelsPerPiece))
@@ -171,7 +172,7 @@ bool EventCamera::State::integrate(const Workers& workers) {
 void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark, const Workers& workers) {
   State& state = *state_;
   if (state.spoiled)
-    throw UserError("event camera: it has seen an irradiance that is none, and cannot go on; begin with a new one");
+    throw UserError("event camera: an earlier irradiance was invalid, and the camera cannot go on; create a new one");
   const auto threads = static_cast<std::size_t>(workers.threads());
   if (state.updates.size() < threads) state.updates.resize(threads), state.events.resize(threads);
   TimeNs first = std::numeric_limits<TimeNs>::max(), last = std::numeric_limits<TimeNs>::min();
@@ -199,8 +200,8 @@ void EventCamera::process(const Image<float>& irradiance, TimeNs t, std::vector<
   const State& state = *state_;
   if (irradiance.bounds() != state.size) {
     throw UserError("frame " + std::to_string(state.frames) + ": its size is " + std::to_string(irradiance.width()) +
-                    " x " + std::to_string(irradiance.height()) + ", the camera's " + std::to_string(state.size.width) +
-                    " x " + std::to_string(state.size.height) + "; give frames of the camera's size");
+                    " x " + std::to_string(irradiance.height()) + " px; it must be the camera's, " +
+                    std::to_string(state.size.width) + " x " + std::to_string(state.size.height) + " px");
   }
   process(irradiance.pixels(), t, out, workers);
 }
@@ -210,13 +211,14 @@ void EventCamera::process(std::span<const float> irradiance, TimeNs t, std::vect
   State& state = *state_;
   const std::string frame = "frame " + std::to_string(state.frames);
   if (irradiance.size() != state.size.area()) {
-    throw UserError(frame + ": it has " + std::to_string(irradiance.size()) + " pixels, the camera " +
-                    std::to_string(state.size.area()) + "; give frames of the camera's size");
+    throw UserError(frame + ": it has " + std::to_string(irradiance.size()) + " pixels; it must have the camera's " +
+                    std::to_string(state.size.area()) + " pixels");
   }
   const bool first = state.frames == 0;
   if (!first && t <= state.last_time) {
-    throw UserError(frame + ": its time, " + std::to_string(t) + " ns, does not come after that of the frame before, " +
-                    std::to_string(state.last_time) + " ns; give frames in order");
+    throw UserError(frame + ": its time, " + std::to_string(t) +
+                    " ns, does not come after that of the previous frame, " + std::to_string(state.last_time) +
+                    " ns; pass the frames in order of time");
   }
   if (state.next_frame.empty()) state.next_frame = Image<float>(state.size.width, state.size.height);
   std::copy(irradiance.begin(), irradiance.end(), state.next_frame.data());
@@ -247,8 +249,8 @@ EventCameraStatistics EventCamera::statistics() const {
 std::vector<std::byte> EventCamera::state() const {
   if (state_->readout && !state_->readout->history.empty()) {
     throw UserError(
-        "event camera: its state cannot be saved while tiles are known until different times; save it where the "
-        "watermark is the end of every segment");
+        "event camera: its state cannot be saved while the segments of its tiles end at different times; save it when "
+        "every segment ends at the watermark");
   }
   std::vector<std::byte> bytes;
   StateWriter archive(bytes);

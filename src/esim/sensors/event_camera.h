@@ -14,28 +14,27 @@
 
 namespace esim {
 
-/// What became of a camera's events.
+/// Statistics of a camera's readout.
 struct EventCameraStatistics {
-  std::int64_t dropped = 0;  ///< by the readout, whose queue was full
+  std::int64_t dropped = 0;  ///< dropped by the readout because its queue was full
   std::int64_t delayed = 0;  ///< read out more than 1 us after the request, or 1 % of the refractory period if shorter
   TimeNs longest_delay = 0;  ///< from a pixel's request to its readout
-  std::int64_t in_flight = 0;  ///< fired, but not read out by the last watermark
+  std::int64_t in_flight = 0;  ///< generated, but not read out by the last watermark
 };
 
-/// The event sensor: a field of independent pixels (paper, Section 3). Each watches its brightness L(t), taken as
-/// linear in time between two samples, and fires at the time at which it has risen by C+ or fallen by C- from its
-/// reference; the level reached becomes the new reference.
+/// The event sensor: an array of independent pixels (paper, Section 3). The brightness L(t) of a pixel is linear in
+/// time between two samples. The pixel fires when L has risen by C+ or fallen by C- from its reference; this level
+/// becomes the new reference.
 ///
-/// Every effect is a law in continuous time, so that none depends on how densely the signal was sampled: the
-/// photoreceptor's low-pass is solved exactly on each segment, thresholds and leaks are drawn once for each event, shot
-/// noise is a Poisson process of its own. EventCameraOptions lists them; docs/methods/pixel.md gives the equations.
+/// Every effect is defined in continuous time, so that none depends on the sampling density: the photoreceptor's
+/// low-pass is solved exactly on each segment, thresholds and leaks are drawn once per event, and shot noise is a
+/// separate Poisson process. EventCameraOptions lists the effects; docs/methods/pixel.md gives the formulae.
 ///
-/// Each frame of a user's own, in order, goes through process(); samples of tiles go through integrate() and
-/// release_until(). Use one or the other.
+/// Use either process() for whole frames in order, or integrate() and release_until() for samples of tiles.
 class EventCamera {
  public:
-  /// `stream` separates the random numbers of cameras that share a seed. Throws UserError where the options do not fit
-  /// the size.
+  /// `stream` separates the random numbers of cameras with the same seed. Throws UserError if the size does not support
+  /// the options.
   EventCamera(const EventCameraOptions& options, int width, int height, std::uint64_t seed = 0,
               std::uint16_t stream = 0);
   ~EventCamera();
@@ -43,18 +42,18 @@ class EventCamera {
   EventCamera& operator=(EventCamera&&) noexcept;
 
   /// Takes the irradiance of all pixels at time t (linear, >= 0, 1 = white), and appends to `out`, in order, the events
-  /// since the frame before. The first frame sets the references and fires nothing. Throws UserError naming the frame
-  /// where its size differs, its time does not come after the one before, or a pixel is not a finite number >= 0; the
-  /// camera is then as it was before.
+  /// since the previous frame. The first frame sets the references and fires no events. Throws UserError naming the
+  /// frame if its size differs, if its time is not after that of the previous frame, or if a pixel is not a finite
+  /// number >= 0; the camera is then unchanged.
   void process(const Image<float>& irradiance, TimeNs t, std::vector<Event>& out, const Workers& workers);
 
-  /// The same from the memory of somebody else: rows one after the other, without padding.
+  /// The same from external memory: consecutive rows without padding.
   void process(std::span<const float> irradiance, TimeNs t, std::vector<Event>& out, const Workers& workers);
 
-  /// Takes what is newly known of the pixels' irradiance: those of a tile one after the other, contiguous in time. Each
-  /// pixel's first segment is an instant, sets its reference, and fires nothing before. Throws UserError naming the
-  /// pixel and the time where an irradiance is not a finite number >= 0; nothing of that segment has then been seen.
-  /// `watermark`: no segment that is still to come begins before it. It must not decrease.
+  /// Takes new segments of the pixels' irradiance; the segments of a tile must be contiguous in time. The first segment
+  /// of a pixel is an instant, which sets its reference. Throws UserError naming the pixel and the time if an
+  /// irradiance is not a finite number >= 0; that segment has then no effect. `watermark`: no future segment begins
+  /// before it. It must not decrease.
   void integrate(std::span<const Segment> segments, TimeNs watermark, const Workers& workers);
 
   /// Appends to `out`, in order, the events with t <= until that were not released before. `until` must not be later
@@ -63,12 +62,12 @@ class EventCamera {
 
   EventCameraStatistics statistics() const;
 
-  /// All that the camera remembers, as bytes for restore(), by the same build of esim. They do not say how the camera
-  /// was made: neither options, size, seed nor stream.
+  /// The state of the camera as bytes for restore() of the same build of esim. The bytes do not contain the arguments
+  /// of the constructor: options, size, seed and stream.
   std::vector<std::byte> state() const;
 
-  /// Makes a camera go on where one that was made alike was: it will give the same events. Throws UserError for bytes
-  /// of another length; the camera is then of no use.
+  /// Restores the state of a camera that was created with the same arguments: it continues with the same events. Throws
+  /// UserError for bytes of another length; the camera can then no longer be used.
   void restore(std::span<const std::byte> state);
 
  private:

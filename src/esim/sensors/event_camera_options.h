@@ -6,24 +6,24 @@
 
 namespace esim {
 
-/// Sensors whose published figures are known (docs/methods/pixel.md has the sources).
+/// Sensors with published parameters (docs/methods/pixel.md has the sources).
 enum class SensorPreset { ideal, dvs128, davis240c, davis346, dvxplorer, gen31_vga, imx636, v2e_clean, v2e_noisy };
 
 /// How irradiance becomes brightness.
 enum class PixelResponse {
-  log,      ///< L = ln(E + log_eps), the paper's
-  lin_log,  ///< L = ln(255 E), but a straight line through the origin below lin_log_knee, v2e's
+  log,      ///< L = ln(E + log_eps), as in the paper
+  lin_log,  ///< L = ln(255 E), linear through the origin below lin_log_knee, as in v2e
 };
 
-/// What a refractory period does to the events that fall into it.
+/// What happens to events within a refractory period.
 enum class RefractoryMode {
-  hold,  ///< the pixel is held in reset, and its reference is the brightness at the period's end, as in silicon
-  drop,  ///< the events are lost, but the reference steps on through them, as in the original ESIM
+  hold,  ///< the pixel is held in reset; its reference is the brightness at the period's end, as in real sensors
+  drop,  ///< the events are lost, but they update the reference, as in the original ESIM
 };
 
-/// The way from the pixels to the outside: rows with events wait, first come first served, for one reader that takes
-/// all of a row's events at once and stamps them with the time at which it does. A pixel waits until its event has been
-/// read; its refractory period begins then.
+/// The readout of the pixels. Rows with events wait, first come first served, for one reader, which reads all events of
+/// a row together and stamps them with the time of reading. A pixel waits until its event has been read; then its
+/// refractory period begins.
 struct ReadoutOptions {
   double rate_mev_per_s = 0.0;
   double row_time_us = 0.0;
@@ -32,15 +32,14 @@ struct ReadoutOptions {
   bool limited() const { return rate_mev_per_s > 0 || row_time_us > 0; }
 };
 
-/// Parameters of an event camera. Thresholds are changes of brightness, in natural logarithms. Where an effect goes
-/// with the light, its measure is the relative intensity i = (E + dark_irradiance) / (1 + dark_irradiance), which is 1
-/// at white.
+/// Parameters of an event camera. Thresholds are changes of brightness, in natural logarithms. Effects that depend on
+/// the irradiance use the relative intensity i = (E + dark_irradiance) / (1 + dark_irradiance), which is 1 at white.
 struct EventCameraOptions {
   SensorPreset preset = SensorPreset::ideal;
 
   double contrast_threshold = 0.5;
-  std::optional<double> contrast_threshold_on{};   ///< C+; contrast_threshold where not set
-  std::optional<double> contrast_threshold_off{};  ///< C-; contrast_threshold where not set
+  std::optional<double> contrast_threshold_on{};   ///< C+; default: contrast_threshold
+  std::optional<double> contrast_threshold_off{};  ///< C-; default: contrast_threshold
   double threshold_mismatch = 0.0;
   double threshold_noise = 0.0;
 
@@ -74,10 +73,10 @@ struct EventCameraOptions {
   double threshold_off() const { return contrast_threshold_off.value_or(contrast_threshold); }
 };
 
-/// Smallest threshold of any pixel, whatever the noise: keeps the number of events of a step finite.
+/// Minimum threshold of any pixel, whatever the noise: keeps the number of events per step finite.
 inline constexpr double kMinContrastThreshold = 0.01;
 
-/// The values of a sensor.
+/// The parameters of a sensor.
 EventCameraOptions preset_options(SensorPreset preset);
 
 template <>
@@ -90,17 +89,18 @@ inline constexpr std::array<const char*, 2> kEnumNames<RefractoryMode>{"hold", "
 
 template <class Visitor>
 void describe(Visitor& visit, ReadoutOptions& o) {
-  visit("rate_mev_per_s", o.rate_mev_per_s, About{"events read out at most; 0: no limit", "Mev/s", 0, 1e6});
-  visit("row_time_us", o.row_time_us, About{"time that reading a row takes beside its events", "us", 0, 1e6});
-  visit("queue_events", o.queue_events,
-        About{"events that can wait at the same time; more are dropped and counted; 0: one per pixel", "", 0, 1e9});
+  visit("rate_mev_per_s", o.rate_mev_per_s, About{"maximum readout rate; 0: no limit", "Mev/s", 0, 1e6});
+  visit("row_time_us", o.row_time_us, About{"time to read out a row, in addition to its events", "us", 0, 1e6});
+  visit(
+      "queue_events", o.queue_events,
+      About{"maximum number of waiting events; further events are dropped and counted; 0: one per pixel", "", 0, 1e9});
 }
 
 template <class Visitor>
 void describe(Visitor& visit, EventCameraOptions& o) {
-  // A preset stands for all values that are not given beside it.
+  // A preset sets all values that are not given explicitly.
   const SensorPreset before = o.preset;
-  visit("preset", o.preset, About{"sensor whose values stand where none are given"});
+  visit("preset", o.preset, About{"sensor that sets the defaults of all other options"});
   if (o.preset != before) o = preset_options(o.preset);
 
   visit("contrast_threshold", o.contrast_threshold,
@@ -117,32 +117,38 @@ void describe(Visitor& visit, EventCameraOptions& o) {
   visit("response", o.response, About{"brightness: ln(E + log_eps), or v2e's with a linear toe"});
   visit("log_eps", o.log_eps, About{"added to the irradiance before the logarithm", "", 0, 1, true});
   visit("lin_log_knee", o.lin_log_knee, About{"irradiance below which lin_log is linear", "", 0.005, 10});
-  visit("dark_irradiance", o.dark_irradiance,
-        About{"irradiance worth of the dark current: what goes with the light goes with E plus this", "", 0, 10, true});
-  visit("low_pass_hz", o.low_pass_hz, About{"cut-off (-3 dB) of the photoreceptor at white; 0: none", "Hz", 0, 1e9});
+  visit(
+      "dark_irradiance", o.dark_irradiance,
+      About{"irradiance equivalent to the dark current; effects that depend on the irradiance E use E plus this value",
+            "", 0, 10, true});
+  visit("low_pass_hz", o.low_pass_hz,
+        About{"cut-off (-3 dB) of the photoreceptor at white; 0: no low-pass", "Hz", 0, 1e9});
   visit("low_pass_order", o.low_pass_order, About{"poles of the photoreceptor's low-pass", "", 1, 2});
   visit("surround_px", o.surround_px,
-        About{"reach of the surround that is subtracted from each pixel; 0: none", "px", 0, 1000});
+        About{"length constant of the surround that is subtracted from each pixel; 0: no surround", "px", 0, 1000});
   visit("surround_ms", o.surround_ms, About{"time constant of the surround", "ms", 0, 1e6});
 
   visit("refractory_period_us", o.refractory_period_us,
-        About{"time after an event during which a pixel fires none", "us", 0, 1e9});
-  visit("refractory_mode", o.refractory_mode, About{"the pixel is held in reset, or its events are dropped"});
-  visit("leak_rate_hz", o.leak_rate_hz, About{"ON events of a pixel without change of light", "Hz", 0, 1e6});
+        About{"time after an event during which a pixel fires no events", "us", 0, 1e9});
+  visit("refractory_mode", o.refractory_mode, About{"hold: the pixel is held in reset; drop: its events are dropped"});
+  visit("leak_rate_hz", o.leak_rate_hz, About{"rate of ON events of a pixel at constant irradiance", "Hz", 0, 1e6});
   visit("leak_mismatch_decades", o.leak_mismatch_decades,
         About{"standard deviation of log10 of the leak rate from pixel to pixel", "", 0, 2});
   visit("leak_jitter", o.leak_jitter, About{"relative standard deviation of the time between leak events", "", 0, 0.3});
-  visit("shot_noise_hz", o.shot_noise_hz, About{"random events of a pixel in the dark, ON and OFF", "Hz", 0, 1e5});
-  visit("shot_noise_at_white", o.shot_noise_at_white, About{"share of the shot noise that is left at white", "", 0, 1});
-  visit("hot_pixels", o.hot_pixels, About{"share of pixels that leak at hot_pixel_rate_hz", "", 0, 1});
-  visit("hot_pixel_rate_hz", o.hot_pixel_rate_hz, About{"ON events of a hot pixel", "Hz", 0, 1e6});
-  visit("dead_pixels", o.dead_pixels, About{"share of pixels that never fire", "", 0, 1});
+  visit("shot_noise_hz", o.shot_noise_hz,
+        About{"rate of random events of a pixel in the dark, ON and OFF", "Hz", 0, 1e5});
+  visit("shot_noise_at_white", o.shot_noise_at_white,
+        About{"fraction of the shot noise that remains at white", "", 0, 1});
+  visit("hot_pixels", o.hot_pixels, About{"fraction of pixels that leak at hot_pixel_rate_hz", "", 0, 1});
+  visit("hot_pixel_rate_hz", o.hot_pixel_rate_hz, About{"rate of ON events of a hot pixel", "Hz", 0, 1e6});
+  visit("dead_pixels", o.dead_pixels, About{"fraction of pixels that never fire", "", 0, 1});
 
-  visit("latency_us", o.latency_us, About{"from the crossing to the time stamp, at white", "us", 0, 1e6});
+  visit("latency_us", o.latency_us,
+        About{"time from the threshold crossing to the time stamp, at white", "us", 0, 1e6});
   visit("latency_jitter_us", o.latency_jitter_us, About{"standard deviation of the latency, at white", "us", 0, 1e6});
   visit("latency_light_share", o.latency_light_share,
-        About{"share of latency and jitter that goes with 1 / intensity", "", 0, 1});
-  visit("readout", o.readout, About{"from the pixels to the outside"});
+        About{"fraction of latency and jitter that is proportional to 1 / intensity", "", 0, 1});
+  visit("readout", o.readout, About{"readout of the events from the pixels"});
 }
 
 }  // namespace esim

@@ -8,7 +8,7 @@
 namespace esim {
 namespace {
 
-/// sum += w0 E0 + w1 E1. False where an irradiance is not a finite number >= 0.
+/// sum += w0 E0 + w1 E1. False if an irradiance is not a finite number >= 0.
 bool add_row(std::size_t count, float w0, const float* e0, float w1, const float* e1, float* sum) {
   bool good = true;
   const auto run = [&](auto d, std::size_t from, std::size_t to) {
@@ -35,11 +35,11 @@ void Exposure::open(Image<float> memory) {
   mean_.fill(0);
 }
 
-/// What a segment's ends weigh in the mean of a row whose exposure begins at `begin`.
+/// Weights of a segment's ends in the mean of a row whose exposure begins at `begin`.
 Exposure::Weights Exposure::weigh(const Segment& segment, TimeNs begin) const {
   const TimeNs from = std::max(segment.t0, begin), to = std::min(segment.t1, begin + duration_);
   if (from >= to) return {begin, 0, 0};
-  // The mean over the overlap is E at its middle.
+  // The mean over the overlap is E in its middle.
   const double share = static_cast<double>(to - from) / static_cast<double>(duration_);
   const double twice_middle = static_cast<double>(from - segment.t0) + static_cast<double>(to - segment.t0);
   const double middle = twice_middle / (2 * static_cast<double>(segment.t1 - segment.t0));

@@ -17,16 +17,16 @@
 namespace esim {
 namespace {
 
-constexpr int kPixelsPerPiece = 16384;  // of a parallel loop
+constexpr int kPixelsPerPiece = 16384;  // per task of a parallel loop
 
-// Exposures that are summed at the same time. An automatic one follows from that of two frames before.
+// Exposures that are accumulated at the same time. An automatic exposure depends on the one two frames earlier.
 constexpr std::size_t kExposures = 4, kAutoExposures = 2;
 
 [[noreturn]] void fail(const char* option, const std::string& what) {
   throw UserError(fmt::format("frame_camera.{}: {}", option, what));
 }
 
-/// Refuses options that contradict each other, and returns them.
+/// Checks the options for contradictions, and returns them.
 const FrameCameraOptions& checked(const FrameCameraOptions& o, int height) {
   const double interval_s = 1 / o.rate_hz, slack = 1 + 1e-9;
   const auto check_exposure = [&](const char* option, double exposure_s) {
@@ -41,7 +41,7 @@ const FrameCameraOptions& checked(const FrameCameraOptions& o, int height) {
                                      height, o.line_delay_s * height, interval_s, o.rate_hz));
   }
   if (o.black_level >= o.largest_number())
-    fail("black_level", fmt::format("{} leaves nothing of the {} bits", o.black_level, o.bits));
+    fail("black_level", fmt::format("{} leaves no range within {} bits", o.black_level, o.bits));
   if (!o.auto_exposure) return o;
   const double least = o.auto_exposure->min_exposure_s, most = o.auto_exposure->max_exposure_s.value_or(interval_s);
   check_exposure("auto_exposure.max_exposure_s", most);
@@ -49,7 +49,7 @@ const FrameCameraOptions& checked(const FrameCameraOptions& o, int height) {
     fail("auto_exposure.min_exposure_s", fmt::format("{} s is above max_exposure_s, {:.6g} s; swap them", least, most));
   if (o.exposure_s < least || o.exposure_s > most * slack) {
     fail("exposure_s",
-         fmt::format("{} s, the first exposure, is not between min_exposure_s = {} s and max_exposure_s = "
+         fmt::format("{} s, the first exposure, must be between min_exposure_s = {} s and max_exposure_s = "
                      "{:.6g} s of auto_exposure",
                      o.exposure_s, least, most));
   }
@@ -74,14 +74,14 @@ Image<float> part(const ImageView<float>& image, const Tile& tile) {
 
 }  // namespace
 
-/// The exposures: those under way, and what is kept for later ones.
+/// The current exposures, and the segments that later ones need.
 struct FrameCamera::State {
-  /// Rows of a tile, with the segments that it has among those given.
+  /// Rows of a tile, with the tile's segments among the given ones.
   struct Piece {
     std::size_t first, last;
     Rows rows;
   };
-  /// What a tile has seen of times whose exposures are not planned yet.
+  /// A copy of a tile's segment in a time whose exposures are not planned yet.
   struct Held {
     Tile tile;
     TimeNs t0, t1;
@@ -107,15 +107,15 @@ struct FrameCamera::State {
   FrameReadout readout;
   TimeNs to_first_row;             // from a frame's middle row
   std::vector<TimeNs> row_delays;  // from the first row on
-  TimeNs shortest, longest;        // exposures that there may be
+  TimeNs shortest, longest;        // possible exposures
 
-  std::int64_t number = 0;  // of the frame that is planned next
-  TimeNs next_exposure;     // its exposure, as far as is known
-  TimeNs horizon = 0;       // before which it cannot begin; kNever after the last frame
+  std::int64_t number = 0;  // of the next planned frame
+  TimeNs next_exposure;     // its exposure, as far as known
+  TimeNs horizon = 0;       // earliest possible start of it; kNever after the last frame
   std::deque<Exposure> exposing;
   std::deque<CameraFrame> finished;
   std::vector<Held> held;
-  std::vector<Image<float>> memory;  // of exposures that are over
+  std::vector<Image<float>> memory;  // of finished exposures, to reuse
   std::vector<Piece> pieces;
   bool spoiled = false;
 };
@@ -144,7 +144,7 @@ TimeNs FrameCamera::State::centre(std::int64_t frame) const {
   return span.start + to_ns(static_cast<double>(frame) / options.rate_hz);
 }
 
-/// Begins with the next frame; false where there is none.
+/// Starts the next frame; false after the last one.
 bool FrameCamera::State::plan() {
   const Exposure next(number, centre(number) - next_exposure / 2 + to_first_row, next_exposure, row_delays);
   if (horizon == kNever || next.end() > span.end) {
@@ -157,7 +157,7 @@ bool FrameCamera::State::plan() {
   return true;
 }
 
-/// Cuts what is given into pieces of work that do not touch each other's pixels.
+/// Divides the segments into tasks with disjoint pixels.
 void FrameCamera::State::cut(std::span<const Segment> segments) {
   pieces.clear();
   for (std::size_t first = 0, last = 0; first < segments.size(); first = last) {
@@ -168,7 +168,7 @@ void FrameCamera::State::cut(std::span<const Segment> segments) {
   }
 }
 
-/// Gives an exposure memory, if it has none.
+/// Allocates the memory of an exposure.
 void FrameCamera::State::open(Exposure& exposure) {
   if (exposure.is_open()) return;
   if (memory.empty()) memory.emplace_back(image.width, image.height);
@@ -176,7 +176,7 @@ void FrameCamera::State::open(Exposure& exposure) {
   memory.pop_back();
 }
 
-/// Adds segments to the exposures that are under way.
+/// Adds segments to the current exposures.
 void FrameCamera::State::expose(std::span<const Segment> segments, const Workers& workers) {
   TimeNs first = kNever, last = std::numeric_limits<TimeNs>::min();
   for (const Segment& segment : segments) first = std::min(first, segment.t0), last = std::max(last, segment.t1);
@@ -201,14 +201,14 @@ void FrameCamera::State::expose(std::span<const Segment> segments, const Workers
   for (const Segment& segment : segments) check_both_ends(segment);
 }
 
-/// Keeps a copy of what a tile has seen of the time behind the horizon.
+/// Keeps a copy of a segment that ends after the horizon.
 void FrameCamera::State::hold(const Segment& segment) {
   check_both_ends(segment);
   held.push_back({segment.tile, segment.t0, segment.t1, part(segment.irradiance0, segment.tile),
                   part(segment.irradiance1, segment.tile)});
 }
 
-/// Reads out the exposure that ends first, and begins with another one.
+/// Reads out the exposure that ends first, and starts another one.
 void FrameCamera::State::finish_first(const Workers& workers) {
   Exposure& over = exposing.front();
   open(over);
@@ -227,7 +227,7 @@ void FrameCamera::State::finish_first(const Workers& workers) {
   std::erase_if(held, [&](const Held& part) { return part.t1 <= horizon; });
 }
 
-/// Adds what is held to a new exposure.
+/// Adds the held segments to a new exposure.
 void FrameCamera::State::expose_held(Exposure& exposure) {
   for (const auto& [tile, t0, t1, irradiance0, irradiance1] : held) {
     if (!exposure.overlaps(t0, t1)) continue;
@@ -237,9 +237,9 @@ void FrameCamera::State::expose_held(Exposure& exposure) {
   }
 }
 
-/// Sets the exposure of the next frame from this one's.
+/// Sets the exposure of the next frame from that of this frame.
 void FrameCamera::State::adapt(const CameraFrame& frame) {
-  constexpr double kLongest = 1e18;  // as far as numbers go
+  constexpr double kLongest = 1e18;  // limit of the representable times
   const double signal = readout.signal_of(readout.mean_level(frame.numbers));
   const double wanted = readout.signal_of(options.auto_exposure->target);
   const double exposure = signal > 0 ? static_cast<double>(frame.exposure) * (wanted / signal) : kLongest;
@@ -257,8 +257,8 @@ FrameCamera& FrameCamera::operator=(FrameCamera&&) noexcept = default;
 void FrameCamera::integrate(std::span<const Segment> segments, TimeNs watermark, const Workers& workers) {
   State& state = *state_;
   if (state.spoiled)
-    throw UserError("frame camera: it has seen an irradiance that is none, and cannot go on; begin with a new one");
-  state.spoiled = true;  // unless all goes well
+    throw UserError("frame camera: an earlier irradiance was invalid, and the camera cannot go on; create a new one");
+  state.spoiled = true;  // reset on success
   state.expose(segments, workers);
   for (const Segment& segment : segments) {
     if (segment.t1 > state.horizon) state.hold(segment);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr float kManyElectrons = 64;
 
-/// By the sum of the probabilities: the smallest k whose distribution function reaches the normal's.
+/// Sums the probabilities: the smallest k whose distribution function reaches that of the normal deviate.
 float few_electrons(double mean, double normal) {
   const double reached = 0.5 * std::erfc(-normal / std::numbers::sqrt2);
   double probability = std::exp(-mean), sum = probability, k = 0;
@@ -27,13 +27,13 @@ float few_electrons(double mean, double normal) {
 float poisson(float mean, float normal) {
   if (!(mean > 0)) return 0;
   if (mean < kManyElectrons) return few_electrons(static_cast<double>(mean), static_cast<double>(normal));
-  // The quantile by Cornish and Fisher's expansion: its error is far below an electron.
+  // Cornish-Fisher expansion of the quantile: its error is far below one electron.
   const float root = std::sqrt(mean), square = normal * normal;
   const float quantile = mean + root * normal + (square - 1) / 6 + (normal - normal * square) / (72 * root);
   return std::max(0.0F, std::floor(quantile + 0.5F));
 }
 
-/// Pixels that are read together.
+/// A block of pixels that are read together.
 struct FrameReadout::Block {
   std::size_t count = 0;
   PerPixel<float> signal{};
@@ -44,7 +44,7 @@ struct FrameReadout::Block {
 FrameReadout::FrameReadout(const FrameCameraOptions& options, std::uint64_t seed, std::uint16_t stream)
     : options_(options), response_(options.response), random_(seed, Purpose::frame_noise, stream) {}
 
-/// Pixels from index `first` on.
+/// Reads the pixels from index `first` on.
 void FrameReadout::read_block(Block& block, std::size_t first, std::uint32_t number, double electrons_per_irradiance,
                               const float* irradiance, std::uint16_t* numbers) const {
   const auto scale = static_cast<float>(electrons_per_irradiance), well = static_cast<float>(options_.full_well_e);
@@ -57,8 +57,8 @@ void FrameReadout::read_block(Block& block, std::size_t first, std::uint32_t num
     block.normals.draw(random_, count, block.pixel, block.draw);
   }
 
-  // Electrons: collected, held, read.
-  const float most = 2 * well + 1000;  // beyond, the well is full in any case
+  // Electrons: collected, limited by the full well, read.
+  const float most = 2 * well + 1000;  // above this the well is always full
   for (std::size_t i = 0; i < count; ++i) signal[i] = std::min(irradiance[i] * scale, most);
   if (options_.shot_noise) {
     for (std::size_t i = 0; i < count; ++i) signal[i] = poisson(signal[i], block.normals[0][i]);
@@ -68,7 +68,7 @@ void FrameReadout::read_block(Block& block, std::size_t first, std::uint32_t num
     for (std::size_t i = 0; i < count; ++i) signal[i] += read_noise * block.normals[1][i];
   }
 
-  // Levels and numbers.
+  // Levels and digital numbers.
   const auto per_electron = static_cast<float>(options_.gain / options_.full_well_e);
   for (std::size_t i = 0; i < count; ++i) signal[i] = std::min(signal[i] * per_electron, 1.0F);
   response_.apply({signal, count});

@@ -11,21 +11,21 @@
 
 namespace esim {
 
-/// From light to digital numbers: electrons, the full well, noise, gain, response and quantisation. Private to the
+/// Converts irradiance to digital numbers: electrons, full well, noise, gain, response and quantisation. Private to the
 /// frame camera.
 class FrameReadout {
  public:
   FrameReadout(const FrameCameraOptions& options, std::uint64_t seed, std::uint16_t stream);
 
-  /// Reads frame `number`: mean irradiance over an exposure that is `exposure` times exposure_s. `numbers` has the
-  /// image's size.
+  /// Reads frame `number` from the mean irradiance over an exposure of `exposure` times exposure_s. `numbers` must have
+  /// the image's size.
   void read(const Image<float>& irradiance, double exposure, std::int64_t number, const Workers& workers,
             Image<std::uint16_t>& numbers) const;
 
   /// Mean level of an image, 0 at the black level and 1 at full scale; not below 0.
   double mean_level(const Image<std::uint16_t>& numbers) const;
 
-  /// The signal that the response takes to a level.
+  /// The signal that the response maps to a level.
   double signal_of(double level) const { return response_.inverse(level); }
 
  private:
@@ -38,7 +38,7 @@ class FrameReadout {
   AddressedRandom random_;
 };
 
-/// A Poisson-distributed number with this mean, as a monotone function of a standard normal deviate.
+/// Maps a standard normal deviate monotonically to a Poisson-distributed number with this mean.
 float poisson(float mean, float normal);
 
 }  // namespace esim

@@ -8,9 +8,9 @@
 namespace esim {
 namespace {
 
-constexpr float kWhite = 255.0F;  // v2e counts in the steps of an 8-bit image
+constexpr float kWhite = 255.0F;  // v2e uses the values of an 8-bit image
 
-/// L = ln(255 E) from the knee on; below, the straight line to L(0) = 0.
+/// L = ln(255 E) above the knee; below, the straight line to L(0) = 0.
 template <class D, class V>
 V lin_log(D d, V irradiance, float knee) {
   const auto logarithmic = logarithm(d, hn::Mul(hn::Set(d, kWhite), hn::Max(irradiance, hn::Set(d, knee))));

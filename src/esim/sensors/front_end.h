@@ -6,8 +6,8 @@
 
 namespace esim {
 
-/// Brightness of `count` pixels from their irradiance, as the sensor's front end responds. False where an irradiance is
-/// not a finite number >= 0.
+/// Converts the irradiance of `count` pixels to brightness with the response of the sensor's front end. False if an
+/// irradiance is not a finite number >= 0.
 bool respond(const EventCameraOptions& options, std::size_t count, const float* irradiance, float* brightness);
 
 }  // namespace esim

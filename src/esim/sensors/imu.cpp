@@ -48,7 +48,7 @@ void require(bool valid, const std::string& field, const char* rule) {
 
 void validate(const InertialAxesOptions& axes, const std::string& name) {
   const auto not_negative = [](double value) { return std::isfinite(value) && value >= 0; };
-  constexpr const char* kRule = "must be a finite number, not negative";
+  constexpr const char* kRule = "must be a finite number >= 0";
   require(not_negative(axes.noise_density), name + ".noise_density", kRule);
   require(not_negative(axes.random_walk), name + ".random_walk", kRule);
   require(not_negative(axes.range), name + ".range", kRule);
@@ -61,7 +61,7 @@ void validate(const InertialAxesOptions& axes, const std::string& name) {
 
 void validate(const ImuOptions& options) {
   require(options.rate_hz > 0 && options.rate_hz <= kMaxImuRate_hz, "rate_hz",
-          "must be above 0 and at most 1e9 Hz, since times are whole nanoseconds");
+          "must be above 0 and at most 1e9 Hz, because times are whole nanoseconds");
   require(options.gravity.allFinite(), "gravity", "must be finite numbers");
   validate(options.gyroscope, "gyroscope");
   validate(options.accelerometer, "accelerometer");

@@ -10,16 +10,15 @@
 
 namespace esim {
 
-/// The random walks of an IMU's biases, as functions of time: at any time after the start, in any order. The steps
-/// drawn are kept.
+/// The random walks of an IMU's biases as functions of time, evaluated at any times after the start and in any order.
+/// Keeps the steps that it has drawn.
 class BiasWalk {
  public:
   static constexpr TimeNs kStep = 5 * kNsPerMs;
 
   BiasWalk(const ImuOptions& options, TimeNs start, std::uint64_t seed);
 
-  /// Between two steps, the cubic through them with the slopes of their neighbours' chords (Catmull-Rom): continuous
-  /// with its derivative.
+  /// Between two steps: cubic interpolation with Catmull-Rom slopes, continuous with its derivative.
   InertialSignals at(TimeNs t);
 
  private:
@@ -31,8 +30,8 @@ class BiasWalk {
   std::vector<InertialSignals> steps_;
 };
 
-/// An inertial measurement unit: what becomes of a true motion in its sensors. A measurement is a pure function of
-/// (options, seed, time since the start, truth), with noise of its own for each of the times k / rate_hz.
+/// An inertial measurement unit: converts the true motion to measurements. A measurement is a pure function of
+/// (options, seed, time since the start, truth), with independent noise at each of the times k / rate_hz.
 class Imu {
  public:
   /// Throws UserError naming an option that is out of range.

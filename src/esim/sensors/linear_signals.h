@@ -4,21 +4,22 @@
 
 namespace esim {
 
-/// What comparators see where there is no low-pass: straight lines in brightness.
+/// The signals of comparators without a low-pass: straight lines in brightness.
 class LinearSignals {
  public:
-  /// Of the brightness of `awake`, from the `first` one on.
+  /// Takes the brightness of the active pixels from index `first` on.
   void take(const AwakePixels& awake, std::size_t first, double duration);
-  /// Of the logarithm of their irradiance plus eps.
+  /// Takes the logarithm of their irradiance plus eps.
   void take_light(const AwakePixels& awake, std::size_t first, double eps, double duration);
   void set(std::size_t i, double start, double end) { start_[i] = start, end_[i] = end; }
 
-  /// Finds when each of the first `count` signals first leaves its levels, between `from` and the segment's end.
+  /// Finds the first time at which each of the first `count` signals leaves its levels, from `from` to the segment's
+  /// end.
   void find(Comparators& c) const;
-  /// Moves on to `from`.
+  /// Advances to `from`.
   void advance(const Comparators& c);
   void advance(const Comparators& c, std::size_t i) { value_[i] = start_[i] + slope(i) * c.from[i]; }
-  /// again[i] = 1 where the signal, between its levels at `from`, may leave them until the segment's end; otherwise 0.
+  /// again[i] = 1 if the signal, between its levels at `from`, may leave them before the segment's end; otherwise 0.
   void look_ahead(const Comparators& c, double* again) const;
 
   double value(std::size_t i) const { return value_[i]; }  ///< F at `from`

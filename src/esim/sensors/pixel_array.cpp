@@ -8,7 +8,7 @@
 namespace esim {
 namespace {
 
-/// What thresholds are above the nominal one, not too small.
+/// Threshold relative to the nominal one, limited to the minimum.
 float above(double nominal, double deviation) {
   return static_cast<float>(std::max(deviation, kMinContrastThreshold - nominal));
 }
@@ -54,7 +54,7 @@ PixelArray::PixelArray(const EventCameraOptions& o, int width_px, int height_px,
   make_pixels(seed, stream);
 }
 
-/// Draws what stays with each pixel.
+/// Draws the fixed parameters of each pixel.
 void PixelArray::make_pixels(std::uint64_t seed, std::uint16_t stream) {
   const EventCameraOptions& o = options;
   const AddressedRandom mismatch(seed, Purpose::threshold_mismatch, stream);
@@ -125,7 +125,7 @@ void PixelArray::take_back(std::uint32_t pixel, std::uint32_t events, TimeNs end
   NoisyPixel& own = noisy_pixels[pixel];
   if (renews) own.draws -= events;
   if (!shoots) return;
-  // Back to the first candidate that does not fall into the refractory period.
+  // Back to the first candidate that is not in the refractory period.
   constexpr double kToUnit = 0x1.0p-32;
   while (own.shots > 1) {
     const auto bits = per_shot.bits(pixel, own.shots - 1);

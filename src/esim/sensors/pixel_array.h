@@ -12,42 +12,41 @@
 
 namespace esim {
 
-/// Before every time, but so that differences do not overflow.
+/// Earlier than every time, but such that differences do not overflow.
 inline constexpr TimeNs kLongAgo = std::numeric_limits<TimeNs>::min() / 2;
 
-/// After every time, likewise.
+/// Later than every time, likewise.
 inline constexpr TimeNs kFarAhead = std::numeric_limits<TimeNs>::max() / 2;
 
-/// As good as never, in ns: three years.
+/// Effectively never, ns: three years.
 inline constexpr double kAges = 1e17;
 
-/// In place of the reference of a pixel that is held in reset.
+/// Replaces the reference of a pixel that is held in reset.
 inline constexpr double kHeld = std::numeric_limits<double>::infinity();
 
-/// What the pixels of a camera remember, and what makes them differ. Private to the event camera.
+/// The state and the individual parameters of a camera's pixels. Private to the event camera.
 ///
-/// A pixel compares G, its brightness behind the low-pass plus what has leaked since the epoch, with its reference. It
-/// sleeps as long as its signal stays in a band around the reference that it cannot leave without an event, and its
-/// alarm has not gone off: most pixels of most segments are settled by these comparisons.
+/// A pixel compares G, its brightness after the low-pass plus the leak since the epoch, with its reference. It is
+/// inactive while its signal stays within bounds around the reference, inside which no event is possible, and until its
+/// timer expires. In most segments these comparisons suffice for most pixels.
 class PixelArray {
  public:
   PixelArray(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream);
 
-  /// Sets where leaks and alarms count from, if it is not set.
+  /// Sets the time origin of leaks and timers, unless it is set.
   void set_epoch(TimeNs t) {
     if (epoch == kLongAgo) epoch = t;
   }
 
-  /// Gives pixels the bands between these levels. The arrays have kVectorPadding elements more, and are overwritten.
+  /// Sets the bounds of pixels. The arrays need kVectorPadding more elements, and are overwritten.
   void set_bands(std::size_t count, const std::uint32_t* which, float* low, float* high);
 
-  /// Holds a pixel in reset until then, whatever it did before.
+  /// Holds a pixel in reset until a time, whatever its state.
   void hold(std::uint32_t pixel, TimeNs until);
-  /// Takes a pixel back to where it was when it had fired `events` events less. It must be held afterwards, until
-  /// `until`: its reference is lost.
+  /// Reverts the last `events` events of a pixel. It must then be held until `until`, because its reference is lost.
   void take_back(std::uint32_t pixel, std::uint32_t events, TimeNs until);
 
-  /// Asks memory for what is needed of a pixel that wakes up.
+  /// Prefetches the state of a pixel that becomes active.
   void prefetch(std::size_t pixel) const {
     if (clean) {
       __builtin_prefetch(&clean_pixels[pixel], 1);
@@ -78,49 +77,49 @@ class PixelArray {
   int width, height;
   double threshold_on, threshold_off;
   TimeNs refractory;
-  bool acknowledged;        // by a readout: refractory periods begin when an event has been read out
+  bool acknowledged;        // a readout acknowledges events: refractory periods begin when an event has been read out
   bool holds;               // pixels are held in reset from their event to the end of the refractory period
   bool drops;               // events that fall into a refractory period are lost
-  TimeNs epoch = kLongAgo;  // of leaks and alarms: the first sample
+  TimeNs epoch = kLongAgo;  // time origin of leaks and timers: the first sample
 
   // Which parts of the model are in use.
-  bool in_brightness;  // the band is one of brightness, not of irradiance
-  bool leaks, shoots;  // pixels fire without a change of light
-  bool alarmed;        // either
+  bool in_brightness;  // bounds are of brightness, not of irradiance
+  bool leaks, shoots;  // pixels fire without a change of irradiance
+  bool alarmed;        // leaks or shoots: pixels have timers
   bool renews;         // thresholds, leaks or latencies differ from event to event
-  bool delays;         // time stamps come later than crossings
-  bool clean;          // nothing but the light makes pixels fire, and bands are of irradiance
+  bool delays;         // time stamps are later than crossings
+  bool clean;          // only changes of irradiance make pixels fire, and bounds are of irradiance
 
-  // What is needed of a pixel that wakes up, in one place each. Thresholds count from the camera's.
+  // The state of active pixels, stored per pixel. Thresholds are relative to the camera's.
 
   struct CleanPixel {
     double reference = 0;   // G at the last event; kHeld while the pixel is held in reset
-    float on = 0, off = 0;  // what the pixel's thresholds are above threshold_on and threshold_off
+    float on = 0, off = 0;  // the pixel's thresholds relative to threshold_on and threshold_off
   };
   LargeVector<CleanPixel> clean_pixels;
-  LargeVector<TimeNs> until;  // of clean pixels that are held in reset
+  LargeVector<TimeNs> until;  // end of the reset of clean pixels
 
   struct alignas(64) NoisyPixel {
     double reference = 0;
     float on = 0, off = 0, mean_on = 0, mean_off = 0;
     float leak = 0, mean_leak = 0;  // 1/s, in brightness
-    std::uint32_t draws = 0;        // for its events, so far
-    std::uint32_t shots = 0;        // candidates of shot noise, so far
-    double shot_at = 0;             // the next of them, ns after the epoch
+    std::uint32_t draws = 0;        // number of draws for its events
+    std::uint32_t shots = 0;        // number of candidates of shot noise
+    double shot_at = 0;             // next candidate, ns after the epoch
     double until = -kAges;          // end of the last refractory period, likewise
   };
   LargeVector<NoisyPixel> noisy_pixels;
 
-  // Band of the irradiance, or of the filtered brightness, strictly within which nothing fires.
+  // Bounds of the irradiance, or of the filtered brightness; strictly within them no event is possible.
   LargeVector<float> band_low, band_high;
-  LargeVector<std::int32_t> alarms;  // in ticks
+  LargeVector<std::int32_t> alarms;  // timers, in ticks
 
-  // With in_brightness: the brightness at the last sample, and behind each pole.
+  // With in_brightness: the brightness at the last sample, and after each pole.
   LargeVector<float> brightness, filtered1, filtered2;
 
   AddressedRandom per_event, per_shot, per_leak;
 
-  /// What changes while the pixels watch, for state_archive.h.
+  /// The variable state, for state_archive.h.
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     archive.value(self.epoch);
@@ -142,8 +141,8 @@ class PixelArray {
   void make_pixels(std::uint64_t seed, std::uint16_t stream);
 };
 
-/// Relative room between a band and the levels, more than the rounding of the floats that lead to it: the band may wake
-/// a pixel for nothing, but never lets it sleep over a crossing.
+/// Relative margin between bounds and levels, larger than the rounding errors of floats: a pixel may become active
+/// unnecessarily, but never misses a crossing.
 inline constexpr double kBandGuard = 4e-6;
 
 }  // namespace esim

@@ -4,25 +4,25 @@
 #include <cstddef>
 #include <cstdint>
 
-// Pixels on their way through a segment, many at once. Private to the event camera.
+// Blocks of pixels that advance through a segment. Private to the event camera.
 namespace esim {
 
-/// Arrays that are worked on in whole vectors have room for one more.
+/// Arrays that are processed in whole vectors have room for one more vector.
 inline constexpr std::size_t kVectorPadding = 16;
 
-/// Pixels that go through a segment together: enough for vectors, few enough for the first level of cache.
+/// Pixels that are processed together: enough for vectors, few enough for the first-level cache.
 inline constexpr std::size_t kBlock = 256;
 
 template <typename T>
 using PerPixel = std::array<T, kBlock + kVectorPadding>;
 
-/// The pixels of a segment that woke up. What is not in use of the low-pass holds any number.
+/// The active pixels of a segment. Unused values of the low-pass are arbitrary.
 struct AwakePixels {
   PerPixel<std::uint32_t> pixel, place;  ///< index; EventPacking::place()
   PerPixel<float> light0, light1;        ///< irradiance at the segment's ends
   PerPixel<float> start, end;            ///< brightness there
-  PerPixel<float> filtered1, filtered2;  ///< behind each pole, at the segment's start
-  PerPixel<float> phase, moved;          ///< time constants that the segment lasts, and 1 - exp(-phase)
+  PerPixel<float> filtered1, filtered2;  ///< after each pole, at the segment's start
+  PerPixel<float> phase, moved;          ///< duration of the segment in time constants, and 1 - exp(-phase)
   std::size_t count = 0;
 
   void copy(std::size_t i, std::size_t to) {
@@ -32,16 +32,16 @@ struct AwakePixels {
   }
 };
 
-/// What the pixels of a block compare their signals with, and what comes of it. Times are ns after the segment's start.
-/// The signal is G less what had leaked until then: F(tau) + leak tau, F being the brightness behind the low-pass.
+/// The comparators of a block: levels and results. Times are in ns after the segment's start. The signal is G minus the
+/// leak until the segment's start: F(tau) + leak tau, where F is the brightness after the low-pass.
 struct Comparators {
   double threshold_on = 0, threshold_off = 0;
-  PerPixel<float> on, off;  ///< what the pixel's thresholds are above these two
+  PerPixel<float> on, off;  ///< the pixel's thresholds relative to these two
   PerPixel<double> reference;
   PerPixel<double> leak;      ///< 1/ns
-  PerPixel<double> from;      ///< what lies before is done
-  PerPixel<double> tau;       ///< when the signal first leaves the levels,
-  PerPixel<double> polarity;  ///< through which: 1, -1, or 0 where it does not
+  PerPixel<double> from;      ///< start of the search
+  PerPixel<double> tau;       ///< first time at which the signal leaves the levels
+  PerPixel<double> polarity;  ///< crossed level: 1 upper, -1 lower, 0 none
   std::size_t count = 0;
 
   double upper(std::size_t i) const { return reference[i] + (threshold_on + static_cast<double>(on[i])); }

@@ -7,10 +7,10 @@
 namespace esim {
 namespace {
 
-// Share of a threshold that may leak before the band is renewed.
+// Fraction of a threshold that may leak before the bounds are renewed.
 constexpr double kLeakPerBand = 0.05;
 
-// A pixel's time between leak events is never shorter than this share of the mean.
+// Minimum time between leak events of a pixel, as a fraction of the mean.
 constexpr double kMinLeakInterval = 0.05;
 
 constexpr double kPerNs = 1e-9, kNsPerS = 1e9;
@@ -100,7 +100,7 @@ void PixelPass<Signals>::resume_held() {
   held_count_ = 0;
 }
 
-/// Shot noise is a Poisson process at its highest rate, thinned by the light of the moment.
+/// Shot noise is a Poisson process at its maximum rate, thinned according to the current irradiance.
 template <class Signals>
 void PixelPass<Signals>::find_shots(const PixelArray& pixels, const AwakePixels& awake) {
   for (std::size_t i = 0; i < compare_.count; ++i) {
@@ -109,7 +109,7 @@ void PixelPass<Signals>::find_shots(const PixelArray& pixels, const AwakePixels&
   }
 }
 
-/// The first candidate before the crossing that passes becomes the pixel's event.
+/// The first accepted candidate before the crossing becomes the pixel's event.
 template <class Signals>
 void PixelPass<Signals>::find_shot(const PixelArray& pixels, const AwakePixels& awake, std::size_t i) {
   constexpr double kToUnit = 0x1.0p-32;
@@ -117,7 +117,7 @@ void PixelPass<Signals>::find_shot(const PixelArray& pixels, const AwakePixels& 
     const double tau = shot_[i];
     const auto bits = pixels.per_shot.bits(awake.pixel[i], shots_[i]++);
     shot_[i] += pixels.shot_interval((bits[0] + 0.5) * kToUnit);
-    if (tau <= 0 || tau < compare_.from[i]) continue;  // it fell into a refractory period
+    if (tau <= 0 || tau < compare_.from[i]) continue;  // within a refractory period
     const double light = awake.light0[i] + (awake.light1[i] - awake.light0[i]) * tau / duration_;
     const double intensity = std::min(pixels.relative_intensity(light), 1.0);
     const double passes = 1.0 - (1.0 - pixels.options.shot_noise_at_white) * intensity;
@@ -129,7 +129,7 @@ void PixelPass<Signals>::find_shot(const PixelArray& pixels, const AwakePixels& 
   }
 }
 
-/// Draws the thresholds and leaks after the events that were found.
+/// Draws the thresholds and leaks after the new events.
 template <class Signals>
 void PixelPass<Signals>::renew(const PixelArray& pixels, const AwakePixels& awake) {
   normals_.draw(pixels.per_event, compare_.count, awake.pixel, draws_);
@@ -151,13 +151,13 @@ void PixelPass<Signals>::renew(const PixelArray& pixels, const AwakePixels& awak
     const double interval = 1.0 + jitter * normal_leak[i];
     const auto rate = static_cast<float>(mean_leak_[i] / (interval > kMinLeakInterval ? interval : kMinLeakInterval));
     const double leak = compare_.polarity[i] != 0 ? rate * kPerNs : compare_.leak[i];
-    // From this event on, so that the signal stands where it stood.
+    // The new leak starts at this event, so that the signal is continuous.
     passed_[i] += (leak - compare_.leak[i]) * compare_.tau[i];
     compare_.leak[i] = leak;
   }
 }
 
-/// Times of the events and of the refractory periods behind them.
+/// Computes the times of the events and of the refractory periods after them.
 template <class Signals>
 void PixelPass<Signals>::fire(const PixelArray& pixels, const AwakePixels& awake, const EventPacking& packing) {
   const double duration = duration_, refractory = static_cast<double>(pixels.refractory);
@@ -170,7 +170,7 @@ void PixelPass<Signals>::fire(const PixelArray& pixels, const AwakePixels& awake
     reports_[i] = (compare_.polarity[i] != 0) & !(drops & (t < until_[i])) ? 1.0 : 0.0;
     stamp_[i] = t;
   }
-  // A request that is acknowledged is raised at the time of the stamp, with latency.
+  // An acknowledged request is raised at the time stamp, which includes the latency.
   const bool delays_first = pixels.delays && pixels.acknowledged && holds;
   if (delays_first) delay(pixels, awake, packing);
 #pragma omp simd
@@ -201,7 +201,7 @@ void PixelPass<Signals>::delay(const PixelArray& pixels, const AwakePixels& awak
   }
 }
 
-/// Sets the references behind the events, and finds the pixels that may fire again.
+/// Sets the references after the events, and finds the pixels that may fire again.
 template <class Signals>
 void PixelPass<Signals>::reset(const PixelArray& pixels, bool wait) {
   signals.advance(compare_);
@@ -227,7 +227,7 @@ void PixelPass<Signals>::reset(const PixelArray& pixels, bool wait) {
   }
 }
 
-/// Puts the pixels that are done to sleep, and keeps the others.
+/// Makes the finished pixels inactive, and keeps the others.
 template <class Signals>
 void PixelPass<Signals>::sleep(PixelArray& pixels, AwakePixels& awake) {
   constexpr double kForever = kAges;
@@ -238,7 +238,7 @@ void PixelPass<Signals>::sleep(PixelArray& pixels, AwakePixels& awake) {
   for (std::size_t i = 0; i < compare_.count; ++i) {
     const double reference = compare_.reference[i], leak = compare_.leak[i];
     const double upper = compare_.upper(i), lower = compare_.lower(i), now = signals.end(i) + leak * duration;
-    // Both levels fall by what leaks: the upper one until the alarm; the lower one is surely not above where it is now.
+    // The leak lowers both levels: use the upper level at the timer's end and the current lower level, an upper bound.
     const double most = kLeakPerBand * (upper - reference), room = 0.5 * (upper - now);
     double valid = (most < room ? most : room) / leak;
     valid = leak > 0 && valid < kForever ? valid : kForever;
@@ -249,7 +249,7 @@ void PixelPass<Signals>::sleep(PixelArray& pixels, AwakePixels& awake) {
     const double shot = shot_[i] - duration + no_shot, alarm = shot < valid ? shot : valid;
     alarm_[i] = PixelArray::ticks_after_epoch(since_epoch + alarm);
   }
-  // Those that go on are put to sleep, too: they will be again.
+  // Pixels that continue are also written back here: they become inactive later.
   for (std::size_t i = 0; i < compare_.count; ++i) write_back(pixels.noisy_pixels[awake.pixel[i]], i);
   if (pixels.alarmed) {
     for (std::size_t i = 0; i < compare_.count; ++i) pixels.alarms[awake.pixel[i]] = alarm_[i];
@@ -305,7 +305,7 @@ void PixelPass<Signals>::open(PixelArray& pixels, AwakePixels& awake) {
   if (pixels.renews) renew(pixels, awake);
   for (std::size_t i = 0; i < count; ++i) compare_.reference[i] = signals.end(i);
   if (pixels.leaks) {
-    // A sensor that leaks has been running before: it is anywhere between two leak events.
+    // A sensor that leaks is already running at the start: it is at a random time between two leak events.
     draw_uniforms(pixels.per_leak, awake, 1);
     for (std::size_t i = 0; i < count; ++i) {
       const double threshold = pixels.threshold_on + compare_.on[i];

@@ -12,32 +12,32 @@
 
 namespace esim {
 
-/// Takes the pixels that woke up through a segment, with all that is random about them. All of a block take one event
-/// at a time, in vectors. Private to the event camera; memory to work in, to be kept.
+/// Advances active pixels through a segment, with all random effects. In each round, every pixel of a block fires at
+/// most one event, in vectors. Private to the event camera; keep the object for its working memory.
 template <class Signals>
 class PixelPass {
  public:
-  /// What the comparators see of the pixels: to be set for those that take() has taken.
+  /// The signals of the comparators; set them for the pixels that take() added.
   Signals signals;
 
-  /// Takes pixels that woke up between t0 and t1: those of `awake` behind the ones that the last round() left, in the
-  /// same segment. Removes from `awake` those that stay in reset. Returns the index of the first.
+  /// Takes the new active pixels between t0 and t1: those in `awake` after the ones that the last round() left, in the
+  /// same segment. Removes from `awake` those that stay in reset. Returns the index of the first new pixel.
   std::size_t take(const PixelArray& pixels, AwakePixels& awake, TimeNs t0, TimeNs t1);
 
-  /// Adds to `events`, in any order, the next event of each that fires. In `awake` are left those that may fire again:
-  /// none where pixels wait after their event, in reset, until they are told that it has been read out.
+  /// Adds the next event of each pixel that fires to `events`, in any order. `awake` keeps the pixels that may fire
+  /// again; with `wait`, none: pixels then stay in reset after their event until it has been read out.
   void round(PixelArray& pixels, AwakePixels& awake, PackedEvents& events, bool wait = false);
 
-  /// Gives pixels what was drawn after the last of the events that they have drawn for.
+  /// Restores the values that pixels drew after the last of their events.
   void draw_again(PixelArray& pixels, const AwakePixels& awake);
 
-  /// Instead of rounds where the pixels are first seen, at t0 = t1: sets their references.
+  /// Instead of rounds at the pixels' first sample, t0 = t1: sets their references.
   void open(PixelArray& pixels, AwakePixels& awake);
 
  private:
   void resume_held();
 
-  // The steps of a round, for all pixels that are left.
+  // The steps of a round, for all remaining pixels.
   void find_shots(const PixelArray& pixels, const AwakePixels& awake);
   void find_shot(const PixelArray& pixels, const AwakePixels& awake, std::size_t i);
   void renew(const PixelArray& pixels, const AwakePixels& awake);
@@ -54,25 +54,25 @@ class PixelPass {
   double duration_ = 0;  // ns
   double epoch_ns_ = 0;  // from the epoch to t0
 
-  // Pixels whose refractory period ends in the segment, and that have not resumed yet.
+  // Pixels that have not resumed yet, and whose refractory period ends in the segment.
   PerPixel<std::uint32_t> held_{};
   std::size_t held_count_ = 0;
 
-  // By pixel that is left. Times are ns after t0.
+  // Per remaining pixel. Times are in ns after t0.
   Comparators compare_{};
   PerPixel<std::uint32_t> draws_{}, shots_{};
   PerPixel<float> mean_on_{}, mean_off_{}, mean_leak_{};
-  PerPixel<double> shot_{};     // the next candidate of shot noise
+  PerPixel<double> shot_{};     // next candidate of shot noise
   PerPixel<double> until_{};    // end of the last refractory period
-  PerPixel<double> passed_{};   // the level that the event passed
-  PerPixel<double> anew_{};     // 1 where the event is none of the light: the reference is the signal of the moment
-  PerPixel<double> stamp_{};    // of the event
-  PerPixel<double> reports_{};  // 0 where the event is lost
-  PerPixel<double> again_{};    // 1 where another event may follow
+  PerPixel<double> passed_{};   // the level that the event crossed
+  PerPixel<double> anew_{};     // 1: the new reference is the current signal, not the level
+  PerPixel<double> stamp_{};    // time stamp of the event
+  PerPixel<double> reports_{};  // 0 if the event is lost
+  PerPixel<double> again_{};    // 1 if another event may follow
   PixelNormals normals_{};
   PerPixel<double> uniform_{};
 
-  // The levels that pixels sleep between.
+  // The bounds of inactive pixels.
   PerPixel<float> low_{}, high_{};
   PerPixel<std::int32_t> alarm_{};
 };

@@ -7,8 +7,8 @@
 namespace esim {
 namespace {
 
-// An acknowledgement that comes sooner after its request counts as immediate: the resolution of the stamps of real
-// sensors, and a hundredth of the refractory period.
+// An acknowledgement within this time after its request counts as immediate: the time resolution of real sensors, and a
+// hundredth of the refractory period.
 constexpr TimeNs kPrompt = kNsPerUs;
 constexpr TimeNs kPromptPerRefractory = 100;
 
@@ -27,7 +27,7 @@ PixelReadout::PixelReadout(const EventCameraOptions& options, int width, int hei
   if (!holds_) blind_until_.assign(pixels, kLongAgo);
 }
 
-/// The next request until `watermark`; null where there is none. Drops those of `found` that do not happen.
+/// The next request up to `watermark`, or null. Skips events in `found` that do not occur.
 inline const Event* PixelReadout::next_request(TimeNs watermark) {
   if (!superseded_.empty()) {
     for (; next_ < arrived_.size(); ++next_) {
@@ -41,8 +41,8 @@ inline const Event* PixelReadout::next_request(TimeNs watermark) {
   return found != nullptr && *found < again_.front() ? found : &again_.front();
 }
 
-/// Whether a pixel whose requests are all acknowledged at once would have raised this one: not while another one waits,
-/// or in a refractory period in which events are dropped.
+/// Whether the pixel raises this request, which assumes immediate acknowledgements: not while another request of it
+/// waits, or in a refractory period in which events are dropped.
 inline bool PixelReadout::raises(const Event& request) {
   const std::uint32_t pixel = index(request);
   if (counted_) --to_come_[pixel];
@@ -53,8 +53,8 @@ inline bool PixelReadout::raises(const Event& request) {
   return holds_ || request.t >= blind_until_[pixel];
 }
 
-/// Reads out the requests that are acknowledged at once: most, where the readout is fast enough. Their pixels have gone
-/// on already.
+/// Reads out the requests that are acknowledged immediately: most of them, if the readout is fast enough. Their pixels
+/// have already continued.
 inline void PixelReadout::read_prompt(TimeNs watermark) {
   if (!holds_ || counted_ || !again_.empty() || !resuming_.empty()) return;
   const std::size_t begin = read_.size();
@@ -64,13 +64,13 @@ inline void PixelReadout::read_prompt(TimeNs watermark) {
   next_ += count;
 }
 
-/// Reads out a request at once where nothing waits, and nothing comes before the reader turns to it. False otherwise.
+/// Reads out a request immediately if no other waits, and none arrives before the reader serves it; otherwise false.
 inline bool PixelReadout::read_at_once(const Event& request, bool resumed, TimeNs before) {
   const TimeNs t = readout_.service_of_one(request.t);
   if (readout_.waiting() > 0 || t >= before) return false;
   readout_.occupy_with_one(t);
   stamp(request, t);
-  // A pixel that was acknowledged at once has gone on already.
+  // A pixel that was acknowledged immediately has already continued.
   if (resumed || !holds_ || t - request.t > tolerance_) acknowledge(request, t);
   return true;
 }
@@ -96,7 +96,7 @@ inline void PixelReadout::stamp(const Event& request, TimeNs t) {
   longest_delay_ = std::max(longest_delay_, t - request.t);
 }
 
-/// Lets the pixel go on: behind its refractory period, if it has not done so already.
+/// Lets the pixel continue after its refractory period, if it has not already.
 inline void PixelReadout::acknowledge(const Event& request, TimeNs t) {
   const std::uint32_t pixel = index(request);
   const std::uint8_t state = states_[pixel];
@@ -106,7 +106,7 @@ inline void PixelReadout::acknowledge(const Event& request, TimeNs t) {
   if (late || waits) release(pixel, (late ? t : request.t) + refractory_, waits, late);
 }
 
-/// Lets a pixel resume at a time that was not known when its segments were integrated.
+/// Makes a pixel resume at a time that was unknown when its segments were integrated.
 void PixelReadout::release(std::uint32_t pixel, TimeNs until, bool waits, bool late) {
   if (late) ++delayed_;
   const std::uint32_t ignored = std::exchange(ignored_[pixel], 0U);
@@ -125,7 +125,7 @@ void PixelReadout::release(std::uint32_t pixel, TimeNs until, bool waits, bool l
   first_resumes_ = std::min(first_resumes_, until);
 }
 
-/// Counts what was found for each pixel and has not been looked at.
+/// Counts the unprocessed events in `found` of each pixel.
 void PixelReadout::count_found() {
   if (std::exchange(counted_, true)) return;
   to_come_.assign(states_.size(), 0);
@@ -134,13 +134,13 @@ void PixelReadout::count_found() {
   found_->for_each(count);
 }
 
-/// Lets pixels go on in the segments that they have been through, up to their next request or the end of what is known.
+/// Lets pixels resume in past segments, up to their next request or to the last known segment.
 void PixelReadout::resume(PixelUpdate& update) {
   update.draw_again(*pixels_, to_draw_);
   to_draw_.clear();
   first_resumes_ = kNoTime;
   while (!resuming_.empty()) {
-    std::ranges::sort(resuming_);  // the same order, whatever the threads
+    std::ranges::sort(resuming_);  // the same order for any number of threads
     for (std::size_t begin = 0, end = 0; begin < resuming_.size(); begin = end) {
       const std::uint32_t segment = resuming_[begin].segment;
       together_.clear();
@@ -162,7 +162,7 @@ void PixelReadout::resume(PixelUpdate& update) {
   }
 }
 
-/// Takes the requests of pixels that have resumed.
+/// Collects the requests of resumed pixels.
 void PixelReadout::collect() {
   for (std::size_t range = 0; range < PackedEvents::kRanges; ++range) {
     for (const std::uint64_t packed : packed_.range(range)) {

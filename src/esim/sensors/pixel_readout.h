@@ -12,24 +12,24 @@
 
 namespace esim {
 
-/// The readout, and what it does to the pixels. A pixel that fires holds its request until that has been read out. Only
-/// then does its refractory period begin, and its reference is its brightness at the end of that period. It sees
-/// nothing meanwhile, so that a readout that cannot follow reports fewer events, and later ones.
+/// The readout and its effect on the pixels. A pixel that fires holds its request until it has been read out. Only then
+/// its refractory period begins, and its new reference is its brightness at the end of that period. Until then the
+/// pixel is blind, so that a readout at its limit reports fewer and later events.
 ///
-/// Pixels are advanced as if each request were acknowledged at once, which is true of most. Where one was not, the
-/// pixel is taken back to its event, and resumes in the segments that it has gone through since. A request never comes
-/// before its pixel resumes, so that all pixels that resume before the next service do so together.
+/// Pixels are advanced as if each request were acknowledged immediately, which is true for most requests. Otherwise the
+/// pixel is reverted to its event, and resumes in the segments after it. A request is never earlier than the time at
+/// which its pixel resumes, so that all pixels that resume before the next service are processed together.
 ///
 /// Private to the event camera.
 class PixelReadout {
  public:
   PixelReadout(const EventCameraOptions& options, int width, int height);
 
-  /// What the pixels see: to be told of segments before the pixels are advanced through them.
+  /// The recent segments: add segments before the pixels are advanced through them.
   SegmentHistory history;
 
-  /// Reads out what has been requested until the watermark, until when all segments must be known. `found` are the
-  /// events of pixels whose requests are all acknowledged at once; those that do not happen are removed.
+  /// Reads out the requests up to the watermark; all segments must be known up to it. `found` are the events under the
+  /// assumption that all requests are acknowledged immediately; events that do not occur are removed.
   void advance(PixelArray& pixels, PixelUpdate& update, EventQueue& found, TimeNs watermark);
 
   /// Appends the events with t <= until that were not released before, in order.
@@ -40,7 +40,7 @@ class PixelReadout {
   TimeNs longest_delay() const { return longest_delay_; }  ///< of any event
   std::size_t waiting() const { return readout_.waiting() + again_.size() + read_.size() - released_; }
 
-  /// What it remembers besides the history, for state_archive.h.
+  /// Its state without the history, for state_archive.h.
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     Readout::transfer(archive, self.readout_);
@@ -57,11 +57,11 @@ class PixelReadout {
  private:
   static constexpr TimeNs kNoTime = std::numeric_limits<TimeNs>::max();
 
-  /// Of a pixel's state.
+  /// Flags of a pixel's state.
   enum : std::uint8_t {
     kRequests = 1,    // a request waits to be read out
-    kWaits = 2,       // held in reset since the last request: nothing was found for later
-    kSuperseded = 4,  // what is left of `found` does not happen
+    kWaits = 2,       // held in reset since the last request: `found` has no later events of it
+    kSuperseded = 4,  // the remaining events of the pixel in `found` do not occur
   };
 
   std::uint32_t index(const Event& event) const {
@@ -84,19 +84,19 @@ class PixelReadout {
   int width_;
   TimeNs refractory_;
   bool holds_;        // pixels are held in reset; otherwise their events are dropped
-  TimeNs tolerance_;  // an acknowledgement that comes sooner after the request counts as immediate
+  TimeNs tolerance_;  // an acknowledgement within this time after the request counts as immediate
 
-  // By pixel.
+  // Per pixel.
   std::vector<std::uint8_t> states_;
-  std::vector<std::uint32_t> ignored_;  // of `found`, since the request that waits
-  std::vector<TimeNs> blind_until_;     // where pixels are not held
-  std::vector<std::uint32_t> to_come_;  // of `found`, not looked at yet; in use where counted_
+  std::vector<std::uint32_t> ignored_;  // events in `found` since the waiting request
+  std::vector<TimeNs> blind_until_;     // if pixels are not held
+  std::vector<std::uint32_t> to_come_;  // events in `found` not processed yet; valid if counted_
 
-  // Of one advance().
+  // For one advance().
   PixelArray* pixels_ = nullptr;
   EventQueue* found_ = nullptr;
-  EventSpan arrived_;     // of `found`, until the watermark
-  std::size_t next_ = 0;  // of these
+  EventSpan arrived_;     // events in `found` up to the watermark
+  std::size_t next_ = 0;  // index into arrived_
   bool counted_ = false;
   std::vector<std::uint32_t> superseded_, to_draw_;  // pixels
 
@@ -105,14 +105,14 @@ class PixelReadout {
     friend auto operator<=>(const Resuming&, const Resuming&) = default;
   };
   std::vector<Resuming> resuming_, still_resuming_;
-  TimeNs first_resumes_ = kNoTime;  // the earliest of them
+  TimeNs first_resumes_ = kNoTime;  // the earliest time at which one resumes
   std::vector<std::uint32_t> together_;
 
-  std::vector<Event> again_;  // requests of pixels that have resumed: a heap, the first on top
+  std::vector<Event> again_;  // requests of resumed pixels: a heap with the earliest on top
   EventPacking packing_;
   PackedEvents packed_;
 
-  std::vector<Event> read_;  // in order; the first released_ are gone
+  std::vector<Event> read_;  // in order; the first released_ have been released
   std::size_t released_ = 0;
   std::int64_t delayed_ = 0;
   TimeNs longest_delay_ = 0;

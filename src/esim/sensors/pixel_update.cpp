@@ -15,7 +15,7 @@ std::size_t index(const PixelArray& pixels, int x, int y) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width) + static_cast<std::size_t>(x);
 }
 
-/// Asks memory for a row of the new irradiance while the row before is worked on.
+/// Prefetches a row of the new irradiance while the previous row is processed.
 void prefetch_row(const Segment& segment, int y) {
   constexpr int kPerLine = 64 / sizeof(float);
   const float* const row = segment.irradiance1.row(y) + segment.tile.x;
@@ -24,16 +24,16 @@ void prefetch_row(const Segment& segment, int y) {
 
 }  // namespace
 
-/// What all pixels of a segment have in common.
+/// Values that all pixels of a segment share.
 struct PixelUpdate::Filter {
-  float phase_per_light = 0, phase_in_dark = 0;  // time constants that the segment lasts: per 6 of light, and besides
+  float phase_per_light = 0, phase_in_dark = 0;  // time constants: per 6 units of irradiance, and constant
   double duration = 0, per_duration = 0;         // ns
-  std::int32_t later = 0;                        // than the alarms that go off, in ticks
+  std::int32_t later = 0;                        // timers below this value expire, in ticks
 
   Filter(const PixelArray& pixels, const Segment& segment)
       : duration(static_cast<double>(segment.t1 - segment.t0)), per_duration(1 / duration) {
     const EventCameraOptions& o = pixels.options;
-    const double per_pole = o.low_pass_order == 2 ? 1 / std::sqrt(std::numbers::sqrt2 - 1) : 1;  // -3 dB of both
+    const double per_pole = o.low_pass_order == 2 ? 1 / std::sqrt(std::numbers::sqrt2 - 1) : 1;  // -3 dB together
     const double at_white = 2 * std::numbers::pi * o.low_pass_hz * per_pole * duration * 1e-9;
     const double per_light = at_white / (1 + o.dark_irradiance);
     phase_per_light = static_cast<float>(per_light / 6);
@@ -41,7 +41,7 @@ struct PixelUpdate::Filter {
     if (pixels.alarmed) later = pixels.ticks(segment.t1) + 1;
   }
 
-  /// How many time constants the segment lasts: of the mean light, by Simpson's rule for an exponential.
+  /// Duration of the segment in time constants, at the mean irradiance: Simpson's rule for an exponential.
   template <class D>
   hn::Vec<D> phase(D d, hn::Vec<D> light0, hn::Vec<D> light1) const {
     const auto sum = hn::MulAdd(hn::Set(d, 4.0F), hn::Sqrt(hn::Mul(light0, light1)), hn::Add(light0, light1));
@@ -49,17 +49,17 @@ struct PixelUpdate::Filter {
   }
 };
 
-/// Where a row's pixels are in memory, from the tile's first on.
+/// Pointers to a row's pixels, from the tile's first on.
 struct PixelUpdate::FilterRow {
-  const float *light0, *light1, *end;    // irradiance at the segment's ends, brightness at its end
-  float *start, *filtered1, *filtered2;  // brightness at its start, and behind each pole: to be moved on
+  const float *light0, *light1, *end;    // irradiance at both ends of the segment, brightness at its end
+  float *start, *filtered1, *filtered2;  // brightness at its start, and after each pole: to be advanced
   const float *band_low, *band_high;
-  const std::int32_t* alarms;  // or null
-  std::uint32_t pixel, place;  // of the first one
-  // Where the past segment keeps filtered1, filtered2, start and end, or null.
+  const std::int32_t* alarms;  // timers, or null
+  std::uint32_t pixel, place;  // of the first pixel
+  // Storage of the past segment for filtered1, filtered2, start and end, or null.
   float *past1 = nullptr, *past2 = nullptr, *past_start = nullptr, *past_end = nullptr;
 
-  /// Keeps a row in the past segment.
+  /// Stores a row in the past segment.
   void keep_in(PastSegment& past, int y) {
     const auto row = [&](Image<float>& image) { return image.empty() ? nullptr : image.row(y); };
     past1 = row(past.filtered1), past2 = row(past.filtered2), past_start = row(past.start), past_end = row(past.end);
@@ -70,7 +70,7 @@ struct PixelUpdate::FilterRow {
     std::copy_n(end + begin, count, past_end + begin);
   }
 
-  /// Asks memory for what is worked on next: processors that look ahead by themselves do so within a page only.
+  /// Prefetches the next data: hardware prefetchers stop at page boundaries.
   template <int kOrder>
   void prefetch(int x) const {
     constexpr int kAhead = 512;
@@ -83,8 +83,8 @@ struct PixelUpdate::FilterRow {
   }
 };
 
-/// Moves the low-passes of some neighbouring pixels to the segment's end, exactly for brightness that is linear in time
-/// and for the segment's mean intensity, and looks which pixels may have left their band on the way.
+/// Advances the low-passes of some neighbouring pixels to the segment's end, exactly for brightness that is linear in
+/// time and for the segment's mean intensity, and finds the pixels that may have left their bounds.
 template <int kOrder, class D>
 HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter& filter, int x, int at) {
   using V = hn::Vec<D>;
@@ -94,7 +94,7 @@ HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter
   if constexpr (kOrder > 0) {
     const V phase = filter.phase(d, hn::LoadU(d, row.light0 + x), hn::LoadU(d, row.light1 + x));
 
-    // With m = 1 - exp(-phase): F moves by m of its distance, and lags behind the rise of L.
+    // With m = 1 - exp(-phase): F covers the fraction m of its distance, and lags the rise of L.
     const V one = hn::Set(d, 1.0F), rise = hn::Sub(end, start), m = moved_after(d, phase), followed = hn::Div(m, phase);
     const V f1 = hn::LoadU(d, row.filtered1 + x), distance = hn::Sub(start, f1);
     if (row.past1 != nullptr) hn::StoreU(f1, d, row.past1 + x);
@@ -103,8 +103,8 @@ HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter
     hn::StoreU(m, d, moved_.moved.data() + at);
     hn::StoreU(f1_end, d, moved_.filtered1.data() + at);
     if constexpr (kOrder == 1) {
-      // F stays between its ends, or turns back where it meets L: before L's start, and before the tangents at its ends
-      // reach the other end.
+      // F stays between its ends, or has an extremum where it meets L, which is limited by L's start and by the
+      // tangents at F's ends.
       const V tangent0 = hn::MulAdd(distance, phase, f1), tangent1 = hn::NegMulAdd(hn::Sub(end, f1_end), phase, f1_end);
       lowest = hn::Min(hn::Min(f1, f1_end), hn::Max(hn::Max(start, tangent0), tangent1));
       highest = hn::Max(hn::Max(f1, f1_end), hn::Min(hn::Min(start, tangent0), tangent1));
@@ -112,7 +112,7 @@ HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter
       const V f2 = hn::LoadU(d, row.filtered2 + x);
       if (row.past2 != nullptr) hn::StoreU(f2, d, row.past2 + x);
       const V from_rise = hn::Mul(rise, hn::Add(hn::MulAdd(hn::Set(d, -2.0F), followed, one), hn::Sub(one, m)));
-      // Never as a sum of two products, of which compilers fuse one or the other.
+      // Not as a sum of two products: compilers may fuse either of them.
       const V from_both = hn::NegMulAdd(hn::Mul(phase, hn::Sub(one, m)), distance, from_rise);
       const V f2_end = hn::Add(hn::MulAdd(m, hn::Sub(start, f2), f2), from_both);
       hn::StoreU(f2_end, d, moved_.filtered2.data() + at);
@@ -129,7 +129,7 @@ HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter
   moved_.restless[static_cast<std::size_t>(at) / hn::Lanes(d)] = ChosenLanes<D>::bits_of(d, restless);
 }
 
-/// Moves the low-passes of pixels from x = begin on, and tells which columns wake up.
+/// Advances the low-passes of pixels from x = begin on, and returns the columns that become active.
 template <int kOrder, class D>
 std::span<const std::uint32_t> PixelUpdate::move(D d, const PixelArray& pixels, const FilterRow& row,
                                                  const Filter& filter, int begin, int end) {
@@ -137,11 +137,11 @@ std::span<const std::uint32_t> PixelUpdate::move(D d, const PixelArray& pixels, 
   for (int x = begin; x < end; x += lanes) {
     move_vector<kOrder>(d, row, filter, x, x - begin);
     row.prefetch<kOrder>(x);
-    // Memory is asked a little at a time for what is needed of those that woke up before.
+    // Prefetch the previous active pixels, a few at a time.
     pixels.prefetch(awake_.pixel[asked_]), pixels.prefetch(awake_.pixel[asked_ + 1]);
     asked_ = std::min(asked_ + 2, awake_.count);
   }
-  // Without a branch: that a pixel wakes is as hard to foresee as an event.
+  // Without a branch: active pixels are as hard to predict as events.
   std::size_t count = 0, vector = 0;
   for (int x = begin; x < end; x += lanes) {
     const ChosenLanes<D> chosen(moved_.restless[vector++]);
@@ -151,7 +151,7 @@ std::span<const std::uint32_t> PixelUpdate::move(D d, const PixelArray& pixels, 
   return {moved_.columns.data(), count};
 }
 
-/// Adds pixels of these columns to those that are awake.
+/// Adds the pixels of these columns to the active pixels.
 template <int kOrder>
 void PixelUpdate::wake(const FilterRow& row, int begin, std::span<const std::uint32_t> columns) {
   AwakePixels& a = awake_;
@@ -172,7 +172,7 @@ void PixelUpdate::wake(const FilterRow& row, int begin, std::span<const std::uin
   a.count = to;
 }
 
-/// Takes the pixels that woke up through the segment: all of them, or only so far that there is room for more.
+/// Advances the active pixels through the segment: all of them, or only until there is room for more.
 template <int kOrder>
 void PixelUpdate::run_awake(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events) {
   const auto duration = static_cast<double>(segment.t1 - segment.t0);
@@ -191,7 +191,7 @@ void PixelUpdate::run_awake(PixelArray& pixels, const Segment& segment, bool all
   }
 }
 
-/// Brightness of a row's pixels at the segment's end: `given`, or from their irradiance. Null where that is none.
+/// Brightness of a row's pixels at the segment's end: `given`, or from the irradiance. Null if that is invalid.
 const float* PixelUpdate::brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* given,
                                          int y) {
   if (given != nullptr) return all_irradiance(segment, {y, y + 1}) ? given->row(y) + segment.tile.x : nullptr;
@@ -241,8 +241,8 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
   if (middle < width) filter_to(hn::CappedTag<float, 1>(), middle, width);
 }
 
-/// Where bands are of brightness: moves all low-passes on, and takes those pixels through the segment whose filtered
-/// brightness may leave its band.
+/// If bounds are of brightness: advances all low-passes, and then through the segment the pixels whose filtered
+/// brightness may leave its bounds.
 bool PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
                          PastSegment* past, PackedEvents& events) {
   const Filter common(pixels, segment);
@@ -261,7 +261,7 @@ bool PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image
   return true;
 }
 
-/// Where bands are of irradiance: takes the pixels through the segment that wake up in it.
+/// If bounds are of irradiance: advances the pixels that become active in the segment.
 bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, PackedEvents& events) {
   if (!watch_.look(pixels, segment, rows)) return false;
   if (pixels.clean) {
@@ -297,7 +297,7 @@ bool PixelUpdate::advance(PixelArray& pixels, const Segment& segment, const Imag
                               : cross(pixels, segment, rows, events);
 }
 
-/// Makes those pixels the awake ones, as they were at the segment's start.
+/// Makes these pixels the active ones, with their state at the segment's start.
 void PixelUpdate::gather(const PixelArray& pixels, const PastSegment& past, std::span<const std::uint32_t> which,
                          const EventPacking& packing) {
   const Segment& segment = past.segment;
@@ -319,7 +319,7 @@ void PixelUpdate::gather(const PixelArray& pixels, const PastSegment& past, std:
   respond(pixels.options, a.count, a.light1.data(), a.end.data());
 }
 
-/// How far the low-passes of the awake pixels move in the segment.
+/// Computes how far the low-passes of the active pixels move in the segment.
 void PixelUpdate::find_phases(const Filter& filter) {
   const hn::CappedTag<float, 8> d;
   for (std::size_t i = 0; i < awake_.count; i += hn::Lanes(d)) {

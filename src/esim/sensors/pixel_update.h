@@ -16,25 +16,25 @@
 
 namespace esim {
 
-/// Brings rows of pixels from the beginning of a segment to its end. One for each thread, as memory to work in. Private
-/// to the event camera.
+/// Advances rows of pixels from the start of a segment to its end. Use one object per thread, for its working memory.
+/// Private to the event camera.
 ///
-/// In each, `brightness` is null or replaces what follows from the irradiance. False, and nothing is done, where an
-/// irradiance is not a finite number >= 0.
+/// `brightness`, if not null, replaces the brightness from the irradiance. The functions return false, and change
+/// nothing, if an irradiance is not a finite number >= 0.
 class PixelUpdate {
  public:
-  /// Of a segment that is an instant: sets the references.
+  /// For a segment that is an instant: sets the references.
   bool open(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows);
 
-  /// Of any other: adds what the pixels fire to `events`. `past`, where not null, gets the state at its start.
+  /// For any other segment: adds the pixels' events to `events`. `past`, if not null, receives the state at its start.
   bool advance(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows, PastSegment* past,
                PackedEvents& events);
 
-  /// Lets pixels that are held in reset resume in a segment through which their tile has been advanced before. Each
-  /// fires once at most, and then waits in reset; the others are where they are at the segment's end.
+  /// Lets pixels that are held in reset resume in a past segment. Each pixel fires at most once, and then waits in
+  /// reset; the others are advanced to the segment's end.
   void resume(PixelArray& pixels, const PastSegment& past, std::span<const std::uint32_t> which, PackedEvents& events);
 
-  /// Gives pixels what they drew after the last of the events that they have drawn for.
+  /// Restores the values that pixels drew after the last of their events.
   void draw_again(PixelArray& pixels, std::span<const std::uint32_t> which);
 
  private:
@@ -61,11 +61,11 @@ class PixelUpdate {
   void run_awake(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events);
   const float* brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* given, int y);
 
-  /// Where the low-passes of neighbouring pixels are at the segment's end, and which pixels wake up.
+  /// The low-passes of neighbouring pixels at the segment's end, and the pixels that become active.
   static constexpr int kMovedTogether = 128;
   struct MovedPixels {
     std::array<float, kMovedTogether> filtered1, filtered2, phase, moved;
-    std::array<std::uint8_t, kMovedTogether> restless;  // a bit for each lane of a vector
+    std::array<std::uint8_t, kMovedTogether> restless;  // one bit per lane of a vector
     std::array<std::uint32_t, kMovedTogether + kVectorPadding> columns;
   };
 
@@ -73,7 +73,7 @@ class PixelUpdate {
   CleanPass clean_;
   MovedPixels moved_;
   AwakePixels awake_;
-  std::size_t asked_ = 0;  // of the awake pixels, those that memory has been asked for
+  std::size_t asked_ = 0;  // number of active pixels that have been prefetched
   PixelPass<LinearSignals> linear_;
   PixelPass<RelaxingSignals> relaxing_;
   std::vector<double> row_;       // brightness at the first sample

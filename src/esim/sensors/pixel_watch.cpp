@@ -26,7 +26,7 @@ bool PixelWatch::look(const PixelArray& pixels, const Segment& segment, Rows row
     const std::size_t before = count;
     if (!look_at_row(pixels, segment, y, count)) return false;
     ends_.push_back(count);
-    // What is needed next of the pixels comes from memory while the rows behind are looked at.
+    // Prefetch the pixels of later rows while this row is processed.
     const std::size_t row = static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width);
     const float* const light0 = segment.irradiance0.row(y);
     for (std::size_t i = before; i < count; ++i) {
@@ -47,7 +47,7 @@ bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, i
   std::size_t found = count;
   bool good = true;
 
-  // Without branches: that a pixel wakes is as hard to foresee as an event.
+  // Without branches: active pixels are as hard to predict as events.
   const auto look_at = [&](auto d, int from, int to) {
     const hn::RebindToSigned<decltype(d)> di;
     const int lanes = static_cast<int>(hn::Lanes(d));
@@ -98,7 +98,7 @@ void check_irradiance(const Segment& segment) {
       if (is_irradiance(row[x])) continue;
       throw UserError("irradiance " + std::to_string(row[x]) + " of pixel (" + std::to_string(x) + ", " +
                       std::to_string(y) + ") at t = " + std::to_string(to_seconds(segment.t1)) +
-                      " s is not a finite number >= 0; check where the images come from");
+                      " s must be a finite number >= 0; check the source of the images");
     }
   }
 }

@@ -16,21 +16,20 @@ struct Rows {
   int count() const { return last - first; }
 };
 
-/// Finds the pixels of some rows that wake up: whose irradiance leaves the band, or whose alarm goes off. Private to
-/// the event camera; holds memory to work in.
+/// Finds the pixels of some rows that become active: whose irradiance leaves its bounds, or whose timer expires.
+/// Private to the event camera; keeps its working memory.
 class PixelWatch {
  public:
-  /// Looks at rows of the segment, without changing anything. False where an irradiance is not a finite
-  /// number >= 0.
+  /// Checks rows of the segment without changing the pixels. False if an irradiance is not a finite number >= 0.
   bool look(const PixelArray& pixels, const Segment& segment, Rows rows);
 
-  /// The columns in which a pixel of the row woke up.
+  /// The columns of the row's active pixels.
   std::span<const std::uint32_t> columns(int y) const {
     const std::size_t row = static_cast<std::size_t>(y - first_);
     return std::span(columns_).subspan(ends_[row], ends_[row + 1] - ends_[row]);
   }
 
-  /// Of all rows.
+  /// The number of active pixels in all rows.
   std::size_t count() const { return ends_.back(); }
 
  private:
@@ -38,7 +37,7 @@ class PixelWatch {
 
   int first_ = 0;
   std::vector<std::uint32_t> columns_;
-  std::vector<std::size_t> ends_ = {0};  // of each row before
+  std::vector<std::size_t> ends_ = {0};  // end of each previous row
 };
 
 /// Whether all irradiances of the segment's rows are finite numbers >= 0.

@@ -3,7 +3,7 @@
 namespace esim {
 namespace {
 
-/// The values in which sensors differ. docs/methods/pixel.md has the source of each.
+/// The parameters by which sensors differ; docs/methods/pixel.md has their sources.
 struct SensorFigures {
   double threshold, mismatch;  // ln
   double leak_hz, shot_hz;     // per pixel; shot noise in the dark
@@ -29,7 +29,7 @@ EventCameraOptions options_of(const SensorFigures& figures) {
   return o;
 }
 
-/// v2e's models, without its time slots: its brightness has a linear toe.
+/// The models of v2e, without its time slots; its brightness is linear near zero.
 EventCameraOptions v2e_options(const SensorFigures& figures) {
   EventCameraOptions o = options_of(figures);
   o.response = PixelResponse::lin_log;

@@ -6,7 +6,7 @@
 namespace esim {
 namespace {
 
-/// 1 - exp(-u), for u >= 0, to a dozen digits: std::expm1 takes several times as long.
+/// 1 - exp(-u) for u >= 0, to a dozen digits: several times as fast as std::expm1.
 double moved_after(double u) {
   constexpr double kSmall = 0.01;
   if (u > kSmall) return 1 - std::exp(-u);
@@ -38,8 +38,8 @@ void RelaxingSignal::add(double offset, double drift) {
   at_from_.slope += drift / rate_;
 }
 
-/// Where the signal passes `level` between a and b, between which it is monotone and does pass it: Halley's method from
-/// the inverse cubic through the ends, with bisection where that leaves the bracket.
+/// Time at which the signal crosses `level` between a and b. It must be monotone there and cross the level. Halley's
+/// method, started from the inverse cubic through the ends, with bisection if it leaves the bracket.
 double RelaxingSignal::solve(double level, const Point& a, const Point& b) const {
   constexpr double kToleranceNs = 0.05;
   double low = a.u, high = b.u;
@@ -65,13 +65,14 @@ double RelaxingSignal::solve(double level, const Point& a, const Point& b) const
     if (!inside) next = 0.5 * (low + high);
     const double step = std::fabs(next - u);
     u = next;
-    // The next step of Halley's would be about this one cubed, times what the bend makes of it.
+    // The next step of Halley's method would be about the cube of this one, times a factor that depends on the
+    // curvature.
     if (step <= tolerance || (inside && step * step * step * (1 + bend * bend) <= tolerance)) break;
   }
   return u;
 }
 
-/// Where the slope changes its sign between a and b, between which it is monotone.
+/// Time at which the slope changes its sign between a and b, where it is monotone.
 double RelaxingSignal::turn_between(const Point& a, const Point& b) const {
   if (!two_poles_) {
     const double distance = start_ - filtered1_;
@@ -86,14 +87,14 @@ double RelaxingSignal::turn_between(const Point& a, const Point& b) const {
   return 0.5 * (low + high);
 }
 
-/// Where the signal turns back between a and b, at most twice, in order; behind them, b.
+/// The extrema of the signal between a and b, at most two, in order, followed by b.
 std::size_t RelaxingSignal::turns(const Point& a, const Point& b, std::array<Point, 3>& points) const {
   std::size_t count = 0;
   const auto add_turn = [&](const Point& from, const Point& to) {
     if ((from.slope < 0) == (to.slope < 0) || from.slope == 0 || to.slope == 0) return;
     points[count++] = at(std::clamp(turn_between(from, to), from.u, to.u));
   };
-  // Behind two poles the slope is monotone on either side of where it is steepest.
+  // After two poles the slope is monotone on both sides of its extremum.
   const double resonance = filtered1_ - start_ + rise_;
   const double steepest = two_poles_ && resonance != 0 ? 2.0 - (filtered2_ - start_ + 2 * rise_) / resonance : a.u;
   if (steepest > a.u && steepest < b.u) {

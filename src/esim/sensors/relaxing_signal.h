@@ -9,22 +9,22 @@ namespace esim {
 /// No crossing within a segment.
 inline constexpr double kNever = std::numeric_limits<double>::infinity();
 
-/// Where a signal first leaves the open interval between two levels.
+/// The first time at which a signal leaves the open interval between two levels.
 struct Crossing {
   double tau = kNever;  ///< ns after the segment's start
   bool on = false;      ///< through the upper level
 };
 
-/// What a comparator sees on a segment behind a low-pass of one pole, or of two equal ones, plus what leaks. tau is in
-/// ns after the segment's start; what lies before from() is done. With u = rate tau, m = 1 - exp(-u) and an input
-/// L(u) = start + rise u, the poles answer
+/// The signal of a comparator on a segment after a low-pass with one pole, or with two equal poles, plus the leak. tau
+/// is in ns after the segment's start; the search starts at from(). With u = rate tau, m = 1 - exp(-u) and the input
+/// L(u) = start + rise u, the poles respond with
 ///     F1 = F1(0) + (start - F1(0)) m + rise (u - m)
 ///     F2 = F2(0) + (start - F2(0)) m + (F1(0) - start) u (1 - m) + rise (2 u - 2 m - u m),
-/// which lose no digits where u is small.
+/// which lose no precision for small u.
 class RelaxingSignal {
  public:
-  /// One pole, at `filtered` when its input, `start`, begins to rise with `slope` per ns. `moved` is m at the segment's
-  /// end.
+  /// One pole with output `filtered` when its input, `start`, begins to rise with `slope` per ns. `moved` is m at the
+  /// segment's end.
   static RelaxingSignal first_order(double rate, double moved, double filtered, double start, double slope) {
     RelaxingSignal signal(false, rate, moved, filtered, filtered, start, slope / rate);
     const double distance = start - filtered;
@@ -32,7 +32,7 @@ class RelaxingSignal {
     return signal;
   }
 
-  /// Two poles, one behind the other, at `filtered1` and `filtered2`.
+  /// Two poles in series, with outputs `filtered1` and `filtered2`.
   static RelaxingSignal second_order(double rate, double moved, double filtered1, double filtered2, double start,
                                      double slope) {
     RelaxingSignal signal(true, rate, moved, filtered1, filtered2, start, slope / rate);
@@ -74,9 +74,9 @@ class RelaxingSignal {
 
   bool two_poles_ = false;
   double rate_ = 0;                       // 1/ns
-  double start_ = 0, rise_ = 0;           // of the input; per u
+  double start_ = 0, rise_ = 0;           // of the input; rise per u
   double filtered1_ = 0, filtered2_ = 0;  // at the segment's start
-  double offset_ = 0, drift_ = 0;         // what leaks; per u
+  double offset_ = 0, drift_ = 0;         // of the leak; drift per u
   double moved_ = 0;                      // m at the segment's end
   Point at_from_;
 };

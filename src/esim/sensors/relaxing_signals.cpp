@@ -19,7 +19,7 @@ constexpr D kD;
 constexpr double kToleranceNs = 0.05;
 constexpr int kMostSteps = 3;
 
-// How close to its levels a signal may turn back for floats to say that it does not reach them.
+// Minimum distance of an extremum from the levels for floats to decide that it does not reach them.
 constexpr float kTooClose = 1e-5F;
 
 V set(float value) { return hn::Set(kF, value); }
@@ -27,7 +27,7 @@ V load(const PerPixel<float>& values, std::size_t i) { return hn::LoadU(kF, valu
 hn::Vec<D> set_double(double value) { return hn::Set(kD, value); }
 hn::Vec<D> load_double(const PerPixel<double>& values, std::size_t i) { return hn::LoadU(kD, values.data() + i); }
 
-/// As doubles.
+/// Conversion to doubles.
 template <class To>
 hn::Vec<To> promoted(To d, const PerPixel<float>& values, std::size_t i) {
   return hn::PromoteTo(d, hn::LoadU(hn::Rebind<float, To>(), values.data() + i));
@@ -79,12 +79,12 @@ void RelaxingSignals::copy(std::size_t i, std::size_t to) {
   value_[to] = value_[i];
 }
 
-/// Some neighbouring signals of one pole above their references, plus what leaks, between `from` and the segment's end.
-/// Their slope moves one way only.
+/// Some neighbouring signals after one pole relative to their references, plus the leak, between `from` and the
+/// segment's end. Their slope is monotone.
 struct RelaxingSignals::Span {
-  V filtered, distance, rise, leak;  // F at u = 0, and how far from its input; of the input, and of the leak, per u
-  V first, last;                     // u at `from` and at the end;
-  V v0, v1, g0, g1;                  // the signal there, and its slope
+  V filtered, distance, rise, leak;  // F at u = 0, its distance from the input; slopes of input and leak per u
+  V first, last;                     // u at `from` and at the end
+  V v0, v1, g0, g1;                  // the signal at both, and its slopes
   V upper, lower;
 
   Span(const RelaxingSignals& s, const Comparators& c, std::size_t i) {
@@ -111,20 +111,20 @@ struct RelaxingSignals::Span {
 
   Mask between_levels(V value) const { return hn::And(hn::Lt(value, upper), hn::Gt(value, lower)); }
 
-  /// Where the tangents at both ends meet: the signal does not go beyond.
+  /// The intersection of the tangents at both ends, which limits the signal.
   V farthest() const {
     const V u = hn::Div(hn::NegMulAdd(g1, hn::Sub(last, first), hn::Sub(v1, v0)), hn::Sub(g0, g1));
     return hn::MulAdd(g0, u, v0);
   }
 
-  /// Where signals of different slopes at their ends turn back, is that surely between the levels?
+  /// Whether the extremum, of signals whose slopes at the ends have different signs, is certainly between the levels.
   Mask turns_inside() const {
     const V m = hn::Div(hn::Add(distance, leak), hn::Sub(distance, rise));
     const V q = hn::Max(hn::Sub(set(1), m), set(1e-30F)), there = value(hn::Neg(logarithm(kF, q)), m);
     return hn::And(hn::Lt(there, hn::Sub(upper, set(kTooClose))), hn::Gt(there, hn::Add(lower, set(kTooClose))));
   }
 
-  /// Near to where it passes `level`, for signals that do not turn back: the inverse cubic through the ends.
+  /// Approximate u at the crossing of `level`, for monotone signals: the inverse cubic through the ends.
   V guess_straight(V level) const {
     const V rises = hn::Sub(v1, v0), part = hn::Div(hn::Sub(level, v0), rises), left = hn::Sub(set(1), part);
     const V ends = hn::MulAdd(hn::Mul(hn::Mul(left, left), hn::MulAdd(set(2), part, set(1))), first,
@@ -133,7 +133,7 @@ struct RelaxingSignals::Span {
     return hn::MulAdd(hn::Mul(hn::Mul(part, left), rises), bow, ends);
   }
 
-  /// For those that do: from the end on whose side it passes the level, along the tangent, which does not go too far.
+  /// The same for other signals: along the tangent at the end on that side of the extremum; does not overshoot.
   V guess_bent(V level, Mask on) const {
     const auto at_last = hn::Xor(on, hn::Lt(g1, set(0)));
     const V u = hn::IfThenElse(at_last, last, first), v = hn::IfThenElse(at_last, v1, v0);
@@ -148,14 +148,15 @@ struct RelaxingSignals::Span {
   }
 };
 
-/// Decides which signals leave their levels, and nearly when, or that it is unclear.
+/// Decides which signals leave their levels, and approximately when, or that it is unclear.
 void RelaxingSignals::guess(Comparators& c) {
   std::size_t unclear_count = 0;
   for (std::size_t i = 0; i < c.count; i += hn::Lanes(kF)) {
     const Span s(*this, c, i);
     const auto on = hn::Ge(s.v1, s.upper), off = hn::Le(s.v1, s.lower), crosses = hn::Or(on, off);
     const auto straight = hn::Gt(hn::Mul(s.g0, s.g1), set(0));
-    // What turns back may leave through the one level before the other. Then, or if outside already, it is unclear.
+    // With an extremum, a signal may leave through one level before the other. Then, or if it is outside, it is
+    // unclear.
     const V farthest = s.farthest();
     const auto early_on = hn::AndNot(on, hn::Ge(farthest, s.upper)),
                early_off = hn::AndNot(off, hn::Le(farthest, s.lower));
@@ -178,7 +179,7 @@ void RelaxingSignals::guess(Comparators& c) {
   unclear_count_ = unclear_count;
 }
 
-/// When signals reach their levels, from the guesses, by a step or a few of Halley's method in doubles.
+/// Computes the crossings from the approximations, by one or a few steps of Halley's method in doubles.
 void RelaxingSignals::solve(Comparators& c) {
   const AwakePixels& a = *awake_;
   for (std::size_t i = 0; i < c.count; i += hn::Lanes(kD)) {
@@ -204,10 +205,10 @@ void RelaxingSignals::solve(Comparators& c) {
       const auto slope2 = hn::Mul(slope, slope), curved = hn::Mul(hn::Mul(miss, set_double(0.5)), bend);
       auto next = hn::Sub(u, hn::Div(hn::Mul(miss, slope), hn::Sub(slope2, curved)));
       next = hn::Min(hn::Max(next, first), last);
-      // The next step would be about this one cubed, times what the bend makes of it.
+      // The next step would be about the cube of this one, times a factor that depends on the curvature.
       const auto moved = hn::Abs(hn::Sub(next, u)), cube = hn::Mul(moved, hn::Mul(moved, moved));
       const auto precise = hn::Le(hn::Mul(cube, hn::MulAdd(bend, bend, slope2)), hn::Mul(tolerance, slope2));
-      u = hn::IfThenElse(found, u, next);  // no lane depends on its neighbours
+      u = hn::IfThenElse(found, u, next);  // no lane depends on the others
       found = hn::Or(found, precise);
       if (hn::AllTrue(kD, found)) [[likely]]
         break;
@@ -241,7 +242,7 @@ void RelaxingSignals::find(Comparators& c) {
   }
 }
 
-/// As many as a vector has lanes.
+/// Processes one vector of signals.
 template <class D>
 void RelaxingSignals::advance(D d, const Comparators& c, std::size_t i) {
   const AwakePixels& a = *awake_;
@@ -272,7 +273,7 @@ void RelaxingSignals::advance(const Comparators& c) {
 }
 
 void RelaxingSignals::look_ahead(const Comparators& c, double* again) const {
-  if (poles_ == 2) {  // they may turn back twice
+  if (poles_ == 2) {  // they may have two extrema
     std::fill_n(again, c.count, 1.0);
     return;
   }

@@ -5,26 +5,26 @@
 
 namespace esim {
 
-/// RelaxingSignal for the pixels of a block, in vectors as far as there is one pole: which of them leave their levels
-/// is decided in floats, relative to the reference; when they do, and what they are then, in doubles.
+/// RelaxingSignal for the pixels of a block, in vectors if there is one pole. Floats, relative to the reference, decide
+/// which signals leave their levels; doubles determine when, and the values.
 class RelaxingSignals {
  public:
-  /// Takes those of `awake` from the `first` one on, which must stay there, to the segment's start.
+  /// Takes the active pixels from index `first` on, at the segment's start; `awake` must outlive their use.
   void take(const AwakePixels& awake, std::size_t first, int poles, double duration);
 
-  /// Finds when each signal first leaves its levels, between `from` and the segment's end.
+  /// Finds the first time at which each signal leaves its levels, from `from` to the segment's end.
   void find(Comparators& c);
-  /// Moves on to `from`.
+  /// Advances to `from`.
   void advance(const Comparators& c);
   void advance(const Comparators& c, std::size_t i);
-  /// again[i] = 1 where the signal, between its levels at `from`, may leave them until the segment's end; otherwise 0.
+  /// again[i] = 1 if the signal, between its levels at `from`, may leave them before the segment's end; otherwise 0.
   void look_ahead(const Comparators& c, double* again) const;
 
   double value(std::size_t i) const { return value_[i]; }                   ///< F at `from`
   double end(std::size_t i) const { return static_cast<double>(end_[i]); }  ///< F at the segment's end
   void copy(std::size_t i, std::size_t to);
 
-  /// One of them, plus what leaks.
+  /// One of the signals, plus its leak.
   RelaxingSignal signal(const Comparators& c, std::size_t i) const;
 
  private:
@@ -45,8 +45,8 @@ class RelaxingSignals {
   PerPixel<double> value_{};       // F there
   PerPixel<float> end_{};          // F at the segment's end
 
-  PerPixel<float> guess_{};            // u at the crossing, nearly
-  PerPixel<std::uint32_t> unclear_{};  // those to be looked at one by one
+  PerPixel<float> guess_{};            // approximate u at the crossing
+  PerPixel<std::uint32_t> unclear_{};  // signals to process one by one
   std::size_t unclear_count_ = 0;
 };
 

@@ -10,7 +10,7 @@ void make_size(Image<float>& image, const Tile& tile) {
   if (image.width() != tile.width || image.height() != tile.height) image = Image<float>(tile.width, tile.height);
 }
 
-/// Copies a view's pixels of the tile, and lets the view show the copy.
+/// Copies a view's pixels of the tile, and redirects the view to the copy.
 void keep(ImageView<float>& view, Image<float>& copy, const Tile& tile) {
   make_size(copy, tile);
   for (int y = 0; y < tile.height; ++y) std::copy_n(view.row(tile.y + y) + tile.x, tile.width, copy.row(y));
@@ -40,7 +40,7 @@ void SegmentHistory::keep_after(TimeNs watermark) {
     PastSegment& past = segments_[i];
     const Segment& segment = past.segment;
     if (segment.t0 == segment.t1 || segment.t1 <= watermark) continue;
-    if (i >= added_) {  // the others have been copied before
+    if (i >= added_) {  // the others have already been copied
       keep(past.segment.irradiance0, past.light0, segment.tile);
       keep(past.segment.irradiance1, past.light1, segment.tile);
     }

@@ -12,8 +12,8 @@
 
 namespace esim {
 
-/// Turns what an object remembers into bytes. An object lists its members once, in a template
-/// `transfer(archive, self)`, for the writer and the reader. Private to the sensors.
+/// Serialises the state of an object. An object lists its members once, in a template `transfer(archive, self)`, for
+/// the writer and the reader. Private to the sensors.
 class StateWriter {
  public:
   explicit StateWriter(std::vector<std::byte>& out) : out_(out) {}
@@ -31,14 +31,14 @@ class StateWriter {
     fixed(values);
   }
 
-  /// A list whose length follows from how the object was made.
+  /// A list whose length is determined by the constructor's arguments.
   template <class T, class Allocator>
   void fixed(const std::vector<T, Allocator>& values) {
     static_assert(std::is_trivially_copyable_v<T>);
     append(values.data(), values.size() * sizeof(T));
   }
 
-  /// An image whose size follows from how the object was made.
+  /// An image whose size is determined by the constructor's arguments.
   void image(const Image<float>& image) { append(image.data(), image.size() * sizeof(float)); }
 
  private:
@@ -52,7 +52,7 @@ class StateWriter {
   std::vector<std::byte>& out_;
 };
 
-/// Its counterpart. Throws UserError where the bytes end too early.
+/// The counterpart of StateWriter. Throws UserError if the bytes end too early.
 class StateReader {
  public:
   explicit StateReader(std::span<const std::byte> in) : in_(in) {}
@@ -81,7 +81,8 @@ class StateReader {
 
   [[noreturn]] static void fail() {
     throw UserError(
-        "the state of an event camera is damaged, or of another camera: restore it in one that is made alike");
+        "the state of an event camera is damaged, or belongs to another camera; restore it into a camera that was "
+        "created with the same arguments");
   }
 
  private:

@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <limits>
 
-// What is done with many values at once. Private: only .cpp files include it.
+// Functions on vectors of values. Private: only .cpp files include it.
 namespace esim {
 
 namespace hn = hwy::HWY_NAMESPACE;
@@ -30,8 +30,8 @@ inline void exponentials(std::size_t count, float* values) {
   for_vectors(count, values, [](auto d, auto x) { return hn::Exp(d, x); });
 }
 
-/// Whether all of many values are irradiances: finite numbers >= 0. Their bits, as unsigned numbers, are at most those
-/// of the largest float; adding zero makes minus zero one of them.
+/// Whether all values are valid irradiances: finite numbers >= 0. Their bits, as unsigned integers, are at most those
+/// of the largest float; adding zero converts minus zero.
 template <class D>
 class IrradianceCheck {
  public:
@@ -49,7 +49,7 @@ class IrradianceCheck {
   hn::Vec<hn::RebindToUnsigned<D>> largest_;
 };
 
-/// ln(x) for x > 0, finite and not denormal, to a unit or two in the last place of a float.
+/// ln(x) for x > 0, finite and not denormal, to one or two units in the last place of a float.
 template <class D>
 HWY_INLINE hn::Vec<D> logarithm(D d, hn::Vec<D> x) {
   // x = 2^n (1 + f) with 1 + f between sqrt(1/2) and sqrt(2); ln(1 + f) = f - f^2 / 2 + f^3 times a minimax polynomial.
@@ -69,11 +69,11 @@ HWY_INLINE hn::Vec<D> logarithm(D d, hn::Vec<D> x) {
 /// 1 - exp(-u) for u >= 0, to a few units in the last place of a float.
 template <class D>
 HWY_INLINE hn::Vec<D> moved_after(D d, hn::Vec<D> u) {
-  // u = n ln 2 - r with |r| <= ln 2 / 2; then 1 - exp(-u) = (1 - 2^-n) - 2^-n (exp(r) - 1). Added to 1.5 * 2^23, n
-  // stands in the lowest bits of a float.
+  // u = n ln 2 - r with |r| <= ln 2 / 2; then 1 - exp(-u) = (1 - 2^-n) - 2^-n (exp(r) - 1). After adding 1.5 * 2^23,
+  // the lowest bits of the float hold n.
   const hn::RebindToSigned<D> di;
   const auto rounder = hn::Set(d, 12582912.0F), one = hn::Set(d, 1.0F);
-  u = hn::Min(u, hn::Set(d, 60.0F));  // where it has long been 1
+  u = hn::Min(u, hn::Set(d, 60.0F));  // beyond this the result is 1
   const auto rounded = hn::MulAdd(u, hn::Set(d, 1.44269504F), rounder), n = hn::Sub(rounded, rounder);
   const auto r = hn::MulSub(n, hn::Set(d, 0.693359375F), hn::MulAdd(n, hn::Set(d, 2.12194440e-4F), u));
   const auto r2 = hn::Mul(r, r);
@@ -106,7 +106,7 @@ HWY_INLINE hn::Vec<D> precisely_moved_after(D d, hn::Vec<D> u) {
 /// Cosine and sine of 2 pi `turns`, for turns between 0 and 1, to a few units in the last place of 1.
 template <class D>
 HWY_INLINE void cosine_and_sine(D d, hn::Vec<D> turns, hn::Vec<D>& cosine, hn::Vec<D>& sine) {
-  // Minimax polynomials within an eighth of a turn around a multiple of a quarter, n; n stands in the lowest bits.
+  // Minimax polynomials within an eighth of a turn of n quarters of a turn; the lowest bits hold n.
   const hn::RebindToSigned<D> di;
   const auto rounder = hn::Set(d, 12582912.0F), rounded = hn::MulAdd(turns, hn::Set(d, 4.0F), rounder);
   const auto x = hn::NegMulAdd(hn::Sub(rounded, rounder), hn::Set(d, 0.25F), turns), x2 = hn::Mul(x, x);
@@ -115,7 +115,7 @@ HWY_INLINE void cosine_and_sine(D d, hn::Vec<D> turns, hn::Vec<D>& cosine, hn::V
   const auto s = hn::Mul(x, hn::MulAdd(pair(81.5923536F, -75.3935628F), x4, pair(6.28318529F, -41.3416615F)));
   const auto c67 = hn::MulAdd(hn::Set(d, 59.2027961F), x4, pair(64.9393107F, -85.442298F));
   const auto c = hn::MulAdd(c67, x4, pair(1.0F, -19.7392086F));
-  // Odd quarters swap the two; the second and third turn the cosine's sign, the third and fourth the sine's.
+  // Odd quarters swap the two; the second and third change the cosine's sign, the third and fourth the sine's.
   const auto n = hn::BitCast(di, rounded);
   const auto odd = hn::RebindMask(d, hn::Ne(hn::And(n, hn::Set(di, 1)), hn::Zero(di)));
   const auto sign_of = [&](auto quarter) {
@@ -125,7 +125,7 @@ HWY_INLINE void cosine_and_sine(D d, hn::Vec<D> turns, hn::Vec<D>& cosine, hn::V
   sine = hn::Xor(hn::IfThenElse(odd, c, s), sign_of(n));
 }
 
-/// For each set of eight lanes, as bits, the lanes in it, in order, then others.
+/// For each set of eight lanes, given as bits: the lanes in the set, in order, then the others.
 inline constexpr auto kLanesOf = [] {
   std::array<std::array<std::uint8_t, 8>, 256> lanes{};
   for (std::size_t bits = 0; bits < 256; ++bits) {
@@ -137,8 +137,8 @@ inline constexpr auto kLanesOf = [] {
   return lanes;
 }();
 
-/// Up to eight lanes of 32 bits, those of a mask chosen without a branch. (Highway's CompressStore copies its table
-/// to the stack for each call with g++ 12.)
+/// Up to eight lanes of 32 bits; selects the lanes of a mask without a branch. (With g++ 12, Highway's CompressStore
+/// copies its table to the stack for each call.)
 template <class D>
 class ChosenLanes {
  public:
@@ -159,7 +159,7 @@ class ChosenLanes {
 
   std::size_t count() const { return count_; }
 
-  /// Writes first + lane for each chosen lane, in order, and maybe more behind.
+  /// Writes first + lane for each chosen lane, in order, possibly followed by other values.
   void store_positions(std::uint32_t first, std::uint32_t* out) const {
     const hn::RebindToUnsigned<D> du;
     hn::StoreU(hn::Add(lanes_, hn::Set(du, first)), du, out);

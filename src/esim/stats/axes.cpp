@@ -14,7 +14,7 @@ constexpr int kTitleHeight = 13, kTextHeight = 10;
 // mantissa times 10^exponent with a prefix.
 std::string decade_label(int mantissa, int exponent, bool seconds) {
   constexpr std::array<const char*, 7> kPrefixes = {"n", "u", "m", "", "k", "M", "G"};
-  const int lowest = seconds ? -3 : 0, highest = seconds ? 0 : 3;  // no ks, and 0.1 rather than 100m
+  const int lowest = seconds ? -3 : 0, highest = seconds ? 0 : 3;  // not ks, and 0.1 instead of 100m
   const int group = std::clamp(static_cast<int>(std::floor(exponent / 3.0)), lowest, highest);
   const double factor = mantissa * std::pow(10.0, exponent - 3 * group);
   return fmt::format("{:g}{}{}{}", factor, seconds ? " " : "", kPrefixes[static_cast<std::size_t>(group + 3)],

@@ -7,7 +7,7 @@ namespace {
 
 constexpr TimeNs kEvenInterval = 10 * kNsPerMs;
 
-/// Time stamps in whole microseconds, spread over theirs, as test_phase() does.
+/// A time stamp in whole microseconds, spread over its microsecond as in test_phase().
 TimeNs stored(TimeNs t, std::size_t index) {
   const TimeNs remainder = t % kNsPerUs;
   const TimeNs floored = t - (remainder < 0 ? remainder + kNsPerUs : remainder);

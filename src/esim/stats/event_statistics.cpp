@@ -16,7 +16,8 @@ constexpr std::int64_t kMaxPixels = std::int64_t{1} << 26;
 void require_bearable(std::int64_t width, std::int64_t height) {
   if (width * height <= kMaxPixels) return;
   throw UserError(fmt::format(
-      "a sensor of {} x {} px is too large for statistics: are the coordinates right? (at most {} million pixels)",
+      "a sensor of {} x {} px is too large for statistics, which support at most {} million pixels; check the "
+      "coordinates of the events",
       width, height, kMaxPixels >> 20));
 }
 
@@ -35,7 +36,7 @@ EventStatistics::EventStatistics(std::optional<SensorSize> sensor) : grows_(!sen
 }
 
 void EventStatistics::make_room(const Event& event) {
-  if (!grows_) throw InternalError("an event outside the sensor");
+  if (!grows_) throw InternalError("an event is outside the sensor");
   SensorSize& sensor = statistics_.sensor;
   sensor.width = std::max(sensor.width, event.x + 1);
   sensor.height = std::max(sensor.height, event.y + 1);
@@ -54,7 +55,7 @@ void EventStatistics::count_stamp(TimeNs t) {
     s.simultaneous += same_time_ == 2 ? 2 : 1;
   } else {
     if (s.events() == 0) s.first = t;
-    if (t < s.last && s.events() > 0) throw InternalError("an event before the one above it");
+    if (t < s.last && s.events() > 0) throw InternalError("an event is earlier than the previous one");
     ++s.distinct_times;
     same_time_ = 1;
   }
@@ -67,7 +68,7 @@ void EventStatistics::add(EventSpan events) {
   for (const Event& event : events) {
     if (event.x >= s.sensor.width || event.y >= s.sensor.height) make_room(event);
     count_stamp(event.t);
-    const bool on = event.polarity > 0;  // added rather than branched upon: it cannot be predicted
+    const bool on = event.polarity > 0;  // no branch: the polarity cannot be predicted
     s.on += on;
     s.off += !on;
     s.rate.add(event.t - s.first, on);

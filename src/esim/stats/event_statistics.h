@@ -15,17 +15,17 @@
 
 namespace esim {
 
-/// What is true of a stream of events. Rates are per second of the time between its first event and its last.
+/// Statistics of a stream of events. Rates are relative to the time between its first event and its last.
 struct Statistics {
   SensorSize sensor;  ///< as given, or just large enough for the events
   std::uint64_t on = 0, off = 0;
-  TimeNs first = 0, last = 0;  ///< of the events; meaningless if there are none
+  TimeNs first = 0, last = 0;  ///< of the events; undefined without events
   RateCurve rate;
 
-  Image<std::uint32_t> on_counts, off_counts, counts;  ///< events of each pixel; the last: of both polarities
-  double median_count = 0;                             ///< events of a pixel
+  Image<std::uint32_t> on_counts, off_counts, counts;  ///< events of each pixel: ON, OFF, both
+  double median_count = 0;                             ///< median number of events of a pixel
   std::uint32_t largest_count = 0;
-  std::uint64_t silent_pixels = 0;  ///< without any event
+  std::uint64_t silent_pixels = 0;  ///< pixels without events
   std::vector<HotPixel> hot_pixels;
   IntervalHistogram intervals;  ///< between consecutive events of the same pixel
 
@@ -33,8 +33,8 @@ struct Statistics {
   std::uint64_t simultaneous = 0;       ///< events that share their time stamp with another
   std::uint64_t most_simultaneous = 0;  ///< events with the same time stamp
 
-  std::optional<Periodicity> periodicity;  ///< nothing if the period was given or cannot be searched for
-  std::optional<PhaseTest> phase;          ///< at the given frequency, or at that of `periodicity`
+  std::optional<Periodicity> periodicity;  ///< not set if the period was given or cannot be searched for
+  std::optional<PhaseTest> phase;          ///< at the given frequency, or that of `periodicity`
 
   std::uint64_t events() const { return on + off; }
   double duration_s() const { return to_seconds(last - first); }
@@ -42,27 +42,27 @@ struct Statistics {
   double per_second(std::uint64_t number) const {
     return last > first ? static_cast<double>(number) / duration_s() : 0.0;
   }
-  /// Do the time stamps prefer phases of the period? A period that was searched for must have been found, too.
+  /// Whether the time stamps prefer phases of the period. A period that was searched for must also have been found.
   Banding banding() const;
 };
 
 struct StatisticsOptions {
   double hot_pixel_sigmas = 5;
-  std::optional<double> frame_rate_hz;  ///< to test for banding; searched for without it
+  std::optional<double> frame_rate_hz;  ///< frequency to test for banding; if not set, it is searched for
 };
 
-/// Computes Statistics in one pass, in memory that does not depend on the number of events: 16 bytes per pixel and at
-/// most 10 MB. How the events are divided into portions does not matter.
+/// Computes Statistics in one pass, with memory that does not depend on the number of events: 16 bytes per pixel and at
+/// most 10 MB. The result does not depend on how the events are divided into portions.
 class EventStatistics {
  public:
   /// Without a size, the sensor grows with the events. Throws UserError if it has more than 2^26 pixels.
   explicit EventStatistics(std::optional<SensorSize> sensor = std::nullopt);
 
-  /// Events in order of time, within 146 years, and on the sensor, as EventsFile hands them out. Throws InternalError
-  /// for others, and UserError where a sensor of unknown size would become too large.
+  /// Adds events in order of time, within 146 years and on the sensor, as EventsFile delivers them. Throws
+  /// InternalError for other events, and UserError if a sensor of unknown size becomes too large.
   void add(EventSpan events);
 
-  /// Of all events so far; ends the computation.
+  /// The statistics of all events; ends the computation.
   Statistics finish(const StatisticsOptions& options = {}) &&;
 
  private:

@@ -25,7 +25,7 @@ struct Cell {
   Tile diagram() const { return {x() + kLeft, y() + kTop, kCellWidth - kLeft - kRight, kCellHeight - kTop - kBottom}; }
 };
 
-// A unit with a prefix that suits values up to `largest`.
+// A unit and its factor.
 struct Unit {
   double factor;
   const char* name;
@@ -67,7 +67,7 @@ void draw_rate(Canvas& canvas, const Cell& cell, const Statistics& s) {
       sum.on += s.rate.bins()[i].on;
       sum.off += s.rate.bins()[i].off;
     }
-    // The last bar may be cut short by the end of the recording: too short, it says nothing.
+    // The end of the recording may cut the last bar; a bar that is too short is omitted.
     const double start_s = static_cast<double>(first) * bin_s, full_s = static_cast<double>(group) * bin_s;
     const double covered_s = std::min(full_s, s.duration_s() - start_s);
     if (covered_s < 0.5 * full_s && first > 0) break;
@@ -121,7 +121,7 @@ void draw_intervals(Canvas& canvas, const Cell& cell, const Statistics& s) {
   axes.finish();
 }
 
-// The count that 99.5 % of the pixels that fired do not exceed.
+// The 99.5th percentile of the counts of active pixels.
 std::uint32_t bright_count(const Statistics& s) {
   std::vector<std::uint32_t> counts;
   std::copy_if(s.counts.pixels().begin(), s.counts.pixels().end(), std::back_inserter(counts),
@@ -179,7 +179,7 @@ void draw_map(Canvas& canvas, const Cell& cell, const Statistics& s) {
   }
 }
 
-// Bins of whole counts, 20 per decade where there are enough numbers.
+// Bins of whole counts, up to 20 per decade.
 void draw_pixel_rates(Canvas& canvas, const Cell& cell, const Statistics& s) {
   std::vector<std::uint64_t> edges = {1};
   while (edges.back() <= s.largest_count) {
@@ -198,7 +198,7 @@ void draw_pixel_rates(Canvas& canvas, const Cell& cell, const Statistics& s) {
   const auto edge_hz = [&](std::size_t i) { return (static_cast<double>(edges[i]) - 0.5) * rate_of_one; };
   const auto lowest = std::find_if(pixels.begin(), pixels.end(), [](double number) { return number > 0; });
   const double low_hz = edge_hz(lowest == pixels.end() ? 0 : static_cast<std::size_t>(lowest - pixels.begin()));
-  Axes axes(canvas, cell.diagram(), "How many pixels have which rate",
+  Axes axes(canvas, cell.diagram(), "Histogram of the pixels' rates",
             decade_scale(0.8 * low_hz, std::max(8 * low_hz, 1.25 * edge_hz(edges.size() - 1)), "ev/s of a pixel"),
             decade_scale(0.7, 1.6 * most, "pixels"));
   for (std::size_t i = 0; i + 1 < edges.size(); ++i) {

@@ -11,8 +11,8 @@
 namespace esim {
 namespace {
 
-// A hot pixel is so many times farther above its neighbours than these are apart. Pixels at the rims of wheels, filmed
-// and simulated, reach 2.9 times.
+// A hot pixel exceeds its neighbours by this multiple of their difference. Pixels at the rims of wheels, recorded and
+// simulated, reach 2.9.
 constexpr double kUneven = 4;
 
 double median(std::vector<double> values) {
@@ -23,7 +23,7 @@ double median(std::vector<double> values) {
 }
 
 struct Neighbours {
-  double busy = 0;   // the second largest count of them
+  double busy = 0;   // the second largest count of the neighbours
   double quiet = 0;  // the smallest
 };
 

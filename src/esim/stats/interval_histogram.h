@@ -12,8 +12,8 @@
 
 namespace esim {
 
-/// Number of time intervals in bins of equal logarithmic width: 40 per decade from 1 us to 100 s, one bin for what is
-/// shorter and one for what is longer. A bin holds its lower edge.
+/// Number of time intervals in bins of equal logarithmic width: 40 per decade from 1 us to 100 s, one bin for shorter
+/// intervals and one for longer ones. A bin includes its lower edge.
 class IntervalHistogram {
  public:
   static constexpr int kBinsPerDecade = 40, kDecades = 8;
@@ -30,7 +30,7 @@ class IntervalHistogram {
   }
 
   std::uint64_t total() const;
-  TimeNs shortest() const { return shortest_; }  ///< exact, ns; meaningless if there are none
+  TimeNs shortest() const { return shortest_; }  ///< exact, ns; undefined without intervals
   TimeNs longest() const { return longest_; }
 
   std::uint64_t below() const { return counts_.front(); }
@@ -40,17 +40,17 @@ class IntervalHistogram {
   /// Lower edge of a bin, s; edge_s(kBins) = 100 s.
   static double edge_s(int bin);
 
-  /// The fraction of all intervals in bars of `bins_per_bar` bins each, which divides kBins. Where all are whole us, as
-  /// in most files, each is spread over the us that it begins: otherwise bars of a few us, which hold one or none of
-  /// these, would show a comb.
+  /// The fraction of all intervals in bars of `bins_per_bar` bins each, which must divide kBins. If all intervals are
+  /// whole us, as in most files, each is spread over the us that it begins: otherwise bars that are narrower than a few
+  /// us would show a comb.
   std::vector<double> bars(int bins_per_bar) const;
 
-  /// The interval that `fraction` of all are shorter than, s, taking the intervals of a bin as spread evenly in the
-  /// logarithm: wrong by at most a bin's width, 6 %. Below 1 us it is no more than that; NaN if there are none.
+  /// Quantile of the intervals, s, assuming that the intervals of a bin are spread evenly in the logarithm: the error
+  /// is at most a bin's width, 6 %. Below 1 us the result is only a bound. NaN without intervals.
   double quantile_s(double fraction) const;
 
  private:
-  // A lookup by octave and 1/32 of it, each of which holds at most one edge: then one comparison.
+  // A lookup by octave and 1/32 of it, which holds at most one edge, followed by one comparison.
   static constexpr int kSubBits = 5;
   struct Lookup {
     std::array<TimeNs, kBins + 2> upper_edge{};  // ns, of each counter; the last has none

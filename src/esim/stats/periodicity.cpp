@@ -33,7 +33,7 @@ std::vector<TimeNs> spread_over_microseconds(std::span<const TimeNs> times) {
   return spread;
 }
 
-// Phases as fractions of 2^64, so that overflow is the modulo.
+// Phases in units of 2^-64, so that integer overflow is the modulo operation.
 class Phase {
  public:
   explicit Phase(double frequency_hz)
@@ -91,7 +91,7 @@ class Tapered {
   std::span<const TimeNs> times() const { return times_; }
   const std::vector<double>& weights() const { return weights_; }
 
-  // z(f), from every stride-th time stamp.
+  // z(f) from every stride-th time stamp.
   double rayleigh(double frequency_hz, std::size_t stride) const {
     const Phase phase(frequency_hz);
     double real = 0, imaginary = 0, weights2 = 0;
@@ -150,7 +150,7 @@ std::vector<double> typical(const std::vector<double>& z, std::size_t first, std
   return level;
 }
 
-// A frequency of the bands that is seen well, and which harmonic of their own it is.
+// A strong frequency of the bands, and the harmonic that it is.
 struct Line {
   std::size_t k = 0;
   std::size_t harmonic = 1;
@@ -173,7 +173,7 @@ Line find_line(const std::vector<double>& z, const std::vector<double>& level, s
   return {line, 1};
 }
 
-// Where z is largest within `reach` of a frequency, by looking closer and closer.
+// Maximum of z within `reach_hz` of a frequency, by successive refinement.
 double refine(const Tapered& tapered, std::size_t stride, double frequency_hz, double reach_hz) {
   constexpr int kSteps = 8;
   for (int zoom = 0; zoom < 4; ++zoom, reach_hz /= kSteps / 2) {

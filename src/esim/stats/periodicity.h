@@ -16,25 +16,26 @@ enum class Banding {
   unknown  ///< fewer than 100 events or 20 periods
 };
 
-/// How time stamps lie in a period of 1 / frequency_hz, as simulators that work frame by frame leave their mark there.
+/// Distribution of time stamps in a period of 1 / frequency_hz, which reveals simulators that work frame by frame.
 ///
-/// N time stamps t in bins n_b of their phase, the fraction of t f, with E = N / 64:
+/// N time stamps t are counted in 64 bins n_b of their phase, the fractional part of t f, with E = N / 64:
 ///
 ///   chi2 = sum over b of (n_b - E)^2 / E,   63 degrees of freedom
 ///
-/// Events come in bursts and rates change, so that chi2 is large at any frequency. It is therefore held against c, the
+/// Events come in bursts and rates change, so that chi2 is large at any frequency. It is therefore compared with c, the
 /// median of chi2 / 63 at 32 frequencies f (1 +- 0.1 ... 0.3), but at least 1, the value of a Poisson process:
 ///
 ///   p_value    = Q(63 / 2, chi2 / (2 c))            (quasi-likelihood)
 ///   modulation = sqrt(max(0, chi2 - 63 c) / N)      rms of the rate over the period, relative to its mean
 ///
-/// They band if p_value < 1e-4: strongly from a modulation of 10 % on. Stamps in whole microseconds are spread over
-/// theirs first, lest the bins hold different numbers of microseconds.
+/// The time stamps show banding if p_value < 1e-4; it is strong if the modulation is at least 10 %. Time stamps in
+/// whole microseconds are first spread over their microsecond, so that the bins do not hold different numbers of
+/// microseconds.
 struct PhaseTest {
   static constexpr int kBins = 64;
 
   double frequency_hz = 0;
-  std::uint64_t events = 0;  ///< that were tested: all, or a random part
+  std::uint64_t events = 0;  ///< number of tested events: all, or a random part
   double periods = 0;        ///< between the first event and the last
   std::array<std::uint64_t, kBins> histogram{};
   double chi2_per_dof = 0;
@@ -45,30 +46,30 @@ struct PhaseTest {
   Banding banding = Banding::unknown;
 };
 
-/// `times` in order, ns; 0 < frequency_hz < 1e8.
+/// `times` must be in order, ns; 0 < frequency_hz < 1e8.
 PhaseTest test_phase(std::span<const TimeNs> times, double frequency_hz);
 
 /// The frequency that the time stamps prefer, from 10 Hz (or 20 periods in the recording) to 2 kHz:
 ///
 ///   z(f) = |sum over i of w_i exp(2 pi j f t_i)|^2 / sum of w_i^2,    w_i = sin^2(pi (t_i - t_0) / T)
 ///
-/// Rayleigh's statistic with a Hann taper, exponentially distributed with mean 1 for a Poisson process. It is computed
-/// at all multiples of 1 / T by a Fourier transform of bins of 0.1 ms, and judged by its ratio to the typical z of
-/// frequencies nearby: their median / ln 2, but at least 1. Bands have harmonics: of all frequencies with at least a
-/// quarter of the highest ratio, the lowest is taken, and from there the largest divisor up to 16 that leads to another
-/// significant one with at least 1/64. The maximum nearby is found with the time stamps themselves; of its ratio r,
-/// p = min(1, candidates exp(-r)), which Bonferroni's correction makes 1 wherever the best of them is no better than
-/// chance.
+/// This is Rayleigh's statistic with a Hann taper, exponentially distributed with mean 1 for a Poisson process. It is
+/// computed at all multiples of 1 / T by a Fourier transform of bins of 0.1 ms, and divided by the typical z of nearby
+/// frequencies: their median / ln 2, but at least 1. Bands have harmonics: of all frequencies with at least a quarter
+/// of the highest ratio, the lowest is taken, and then divided by the largest integer up to 16 that yields another
+/// significant frequency with at least 1/64 of the highest ratio. The maximum near it is found from the time stamps
+/// themselves. With its ratio r, p = min(1, candidates exp(-r)): with Bonferroni's correction, p is 1 if the strongest
+/// frequency is no stronger than expected by chance.
 struct Periodicity {
   double frequency_hz = 0;
   double rayleigh = 0;         ///< z
-  std::size_t candidates = 0;  ///< frequencies that were looked at
-  double p_value = 1;          ///< that of one of them by chance: corrected for their number
+  std::size_t candidates = 0;  ///< number of frequencies that were searched
+  double p_value = 1;          ///< corrected for the number of candidates
   bool found() const;          ///< p < 1e-6
 };
 
-/// `times` in order, ns; of more than 800 s, the first 800 s are searched. Nothing if there are fewer than 100 or if 20
-/// periods of 2 kHz do not fit in.
+/// `times` must be in order, ns; only the first 800 s are searched. Nothing if there are fewer than 100 time stamps or
+/// fewer than 20 periods of 2 kHz.
 std::optional<Periodicity> find_periodicity(std::span<const TimeNs> times);
 
 }  // namespace esim

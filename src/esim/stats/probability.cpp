@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kEpsilon = 1e-15;
 
-// x^a e^-x / Gamma(a); lgamma_r, for std::lgamma writes to a global.
+// x^a e^-x / Gamma(a); uses lgamma_r, because std::lgamma writes to a global variable.
 double leading_factor(double a, double x) {
   int sign = 0;
   return std::exp(a * std::log(x) - x - ::lgamma_r(a, &sign));

@@ -7,7 +7,7 @@ namespace esim {
 
 void RateCurve::start_window(std::int64_t ms) {
   close_window();
-  // Windows without events, as far as they push others out of the last ten.
+  // Windows without events replace older ones among the last ten.
   for (std::int64_t passed = std::max(ms_ + 1, ms - 9); passed <= ms; ++passed) {
     recent_sum_ -= std::exchange(recent_[static_cast<std::size_t>(passed % 10)], 0);
   }

@@ -8,8 +8,8 @@
 
 namespace esim {
 
-/// Events per time, counted in windows of 1 ms that start with the first event. The curve's bins grow by doubling, so
-/// that there are never more than kMaxBins of them.
+/// Events over time, counted in windows of 1 ms from the first event on. The width of the curve's bins doubles as
+/// needed, so that there are at most kMaxBins bins.
 class RateCurve {
  public:
   static constexpr std::size_t kMaxBins = 2048;
@@ -26,13 +26,13 @@ class RateCurve {
     window_.off += !on;
   }
 
-  /// Takes the window that is still open into account: call once, after the last event.
+  /// Adds the window that is still open: call once, after the last event.
   void finish() { close_window(); }
 
   const std::vector<Bin>& bins() const { return bins_; }
   TimeNs bin_width() const { return kNsPerMs << doublings_; }
 
-  /// Most events in one of the windows of 1 ms, and in ten consecutive ones.
+  /// Maximum number of events in one window of 1 ms, and in ten consecutive windows.
   std::uint64_t most_in_1_ms() const { return most_in_1_; }
   std::uint64_t most_in_10_ms() const { return most_in_10_; }
 

@@ -28,7 +28,7 @@ double ratio(std::uint64_t part, std::uint64_t whole) {
 
 std::string p_text(double p) { return p < 1e-300 ? "p < 1e-300" : fmt::format("p = {:.2g}", p); }
 
-// Of the strongest of many frequencies: how likely it is that any of them would be so strong by chance.
+// Probability that any of the searched frequencies is this strong by chance.
 std::string corrected_p_text(const Periodicity& periodicity) {
   return fmt::format("{}, corrected for {} frequencies", p_text(periodicity.p_value), grouped(periodicity.candidates));
 }
@@ -93,8 +93,8 @@ ReportSection stamp_section(const Statistics& s) {
   const auto line = [&](const char* label, const std::string& value) { section.lines.push_back({label, value}); };
   line("distinct",
        fmt::format("{} ({} of the events)", grouped(s.distinct_times), percent(ratio(s.distinct_times, s.events()))));
-  line("simultaneous", fmt::format("{} of the events, at most {} at once", percent(ratio(s.simultaneous, s.events())),
-                                   grouped(s.most_simultaneous)));
+  line("simultaneous", fmt::format("{} of the events, at most {} at the same time",
+                                   percent(ratio(s.simultaneous, s.events())), grouped(s.most_simultaneous)));
   line("period", period_text(s));
   line("Rayleigh",
        s.periodicity ? fmt::format("z = {:.4g}, {}", s.periodicity->rayleigh, corrected_p_text(*s.periodicity)) : "-");
@@ -104,7 +104,7 @@ ReportSection stamp_section(const Statistics& s) {
                                           phase.neighbours_chi2_per_dof, p_text(phase.p_value))
                             : "-");
   line("modulation", tested ? percent(phase.modulation) + " rms" : "-");
-  line("within 1 % of peak", tested ? percent(phase.share_at_peak) + " of the events (even: 2 %)" : "-");
+  line("within 1 % of peak", tested ? percent(phase.share_at_peak) + " of the events (uniform: 2 %)" : "-");
   line("verdict", verdict(s));
   return section;
 }
@@ -174,7 +174,7 @@ std::string format_duration(double seconds) {
 std::string verdict(const Statistics& s) {
   switch (s.banding()) {
     case Banding::strong:
-      return fmt::format("time stamps band at {} ({})", s.periodicity ? "this period" : "the frame times",
+      return fmt::format("time stamps show banding at {} ({})", s.periodicity ? "this period" : "the frame times",
                          p_text(s.phase->p_value));
     case Banding::weak:
       return fmt::format("time stamps follow the period weakly ({})", p_text(s.phase->p_value));

@@ -16,8 +16,9 @@ constexpr std::uint64_t hash_index(std::uint64_t index) {
   return z ^ (z >> 31);
 }
 
-/// Time stamps of all events or, of more than a million, of a part that every event is in with the same probability
-/// 2^-k: those whose index has a hash with at least k trailing zeros. Which ones depends on nothing else.
+/// Time stamps of all events or, for more than a million events, of a random sample that contains each event with
+/// probability 2^-k: the events whose index has a hash with at least k trailing zeros. The sample depends only on the
+/// indices.
 class TimeSample {
  public:
   static constexpr std::size_t kCapacity = 1 << 20;
@@ -40,7 +41,7 @@ class TimeSample {
   std::uint64_t index_ = 0;
   int least_zeros_ = 0;
   std::vector<TimeNs> times_;
-  std::vector<std::uint8_t> zeros_;  // of each one's hash
+  std::vector<std::uint8_t> zeros_;  // trailing zeros of each hash
 };
 
 }  // namespace esim

@@ -7,8 +7,8 @@
 
 namespace esim {
 
-/// Of each pixel's centre the bearing (x, y, 1) in the camera frame, without the 1. The camera is one that renderers
-/// accept: its lens shows something at every pixel.
+/// The bearing (x, y, 1) of each pixel's centre in the camera frame, without the 1. Renderers must accept the camera:
+/// its lens must map every pixel to a bearing.
 Image<Eigen::Vector2d> bearings_of(const Camera& camera);
 
 }  // namespace esim

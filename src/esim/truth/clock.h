@@ -7,8 +7,8 @@
 
 namespace esim {
 
-/// Instants start + k / rate, k = 0, 1, ..., up to and including the end. Each is computed from k, so that rounding
-/// does not accumulate. A rate of 0 gives none.
+/// The instants start + k / rate, k = 0, 1, ..., up to and including the end; none for a rate of 0. Each is computed
+/// from k, so that rounding does not accumulate.
 class PeriodicClock {
  public:
   static constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
@@ -16,7 +16,7 @@ class PeriodicClock {
   PeriodicClock() = default;
   PeriodicClock(TimeNs start, TimeNs end, double rate_hz) : start_(start), end_(end), rate_hz_(rate_hz) { settle(); }
 
-  /// The next instant, kNever after the last one.
+  /// The next instant; kNever after the last one.
   TimeNs due() const { return due_; }
 
   void advance() {

@@ -11,7 +11,7 @@ namespace {
 constexpr double kTolerance = 0.005;  // of 1 / depth
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
-/// From the camera at `from` to the camera at `to`: of what stands still, then of each moving object.
+/// Transforms from the camera at `from` to the camera at `to`: for the static scene, then for each moving object.
 std::vector<SE3> motions(const RenderRequest& from, const RenderRequest& to) {
   const SE3 T_world_camera0 = from.camera.T_world_body, T_camera1_world = to.camera.T_world_body.inverse();
   std::vector<SE3> result = {T_camera1_world * T_world_camera0};
@@ -22,7 +22,7 @@ std::vector<SE3> motions(const RenderRequest& from, const RenderRequest& to) {
   return result;
 }
 
-/// Whether a camera that sees `depth` sees a point of inverse depth `nearness` whose image is at (u, v), in the image.
+/// Whether a camera with this depth image sees a point of inverse depth `nearness` at (u, v), within the image.
 bool is_seen(const Image<float>& depth, double u, double v, double nearness) {
   const auto near = [&](int x, int y) {
     return 1.0 / double{depth(std::clamp(x, 0, depth.width() - 1), std::clamp(y, 0, depth.height() - 1))};
@@ -57,9 +57,9 @@ void DisplacementField::compute(const Frame& from, const RenderRequest& to, cons
     for (int x = 0; x < camera_.width; ++x) {
       const SE3& motion = T_there_here[from.view.objects.empty() ? 0 : from.object(x, y)];
       const Eigen::Vector2d& bearing = bearings_(x, y);
-      const double nearness = 1.0 / double{from.depth(x, y)};  // 0 where it is infinitely far
+      const double nearness = 1.0 / double{from.depth(x, y)};  // 0 at infinity
 
-      // The point over its depth: any length is as good for projecting.
+      // The point divided by its depth: the scale does not affect the projection.
       const Eigen::Vector3d there = motion.rotation * bearing.homogeneous() + nearness * motion.translation;
       const auto image = camera_.project(there);
       displacement_.x(x, y) = image ? static_cast<float>(image->pixel.x() - x) : kNone;

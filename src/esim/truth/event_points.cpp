@@ -7,7 +7,7 @@
 namespace esim {
 namespace {
 
-constexpr std::size_t kPortion = 256;  // events that a thread takes at a time
+constexpr std::size_t kPortion = 256;  // events per task of a parallel loop
 
 }  // namespace
 

@@ -11,26 +11,26 @@
 
 namespace esim {
 
-/// Where in the world the surfaces are that events see: for each event, its pixel alone is rendered at its own time.
-/// Exact to the renderer's rounding for the pixel's centre at the event's time stamp; an event of noise has the point
-/// that its pixel happens to see, and where the sensor delays events, the points are those of their stamps.
+/// Finds the scene points that events see: for each event, only its pixel is rendered, at the time of the event. The
+/// points are exact, up to the renderer's rounding, for the pixel's centre at the event's time stamp. A noise event has
+/// the point that its pixel sees; if the sensor delays events, the points belong to the delayed time stamps.
 class EventPoints {
  public:
   using MakeRenderer = std::function<std::unique_ptr<Renderer>(const Camera& camera, const Workers& workers)>;
 
-  /// The renderer is one on the processor: many threads ask it for single pixels at once. `view_at` says where camera
-  /// and objects are, for times of `covered`; events after it see what is seen at its end.
+  /// The renderer must run on the CPU: many threads request single pixels at the same time. `view_at` gives the poses
+  /// of camera and objects for times within `covered`; later events see the scene at its end.
   EventPoints(const Camera& camera, const MakeRenderer& make_renderer, std::function<RenderRequest(TimeNs)> view_at,
               const TimeSpan& covered, const Workers& workers);
 
-  /// The point that each event sees, world frame, m; NaN where that is infinitely far, or nothing.
+  /// The point that each event sees, world frame, m; NaN if it is at infinity or there is no surface.
   void locate(EventSpan events, std::vector<Eigen::Vector3f>& points);
 
  private:
   Eigen::Vector3f locate(const Event& event, Sample& sample) const;
 
   Image<Eigen::Vector2d> bearings_;
-  Workers alone_{1};  // a pixel is not divided
+  Workers alone_{1};  // a single pixel is not parallel
   std::unique_ptr<Renderer> renderer_;
   std::function<RenderRequest(TimeNs)> view_at_;
   TimeSpan covered_;

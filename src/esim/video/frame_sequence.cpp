@@ -23,7 +23,7 @@ std::unique_ptr<FrameSource> open(const fs::path& input, const VideoOptions& opt
 
 std::string out_of_order(TimeNs t, TimeNs before) {
   return fmt::format(
-      "its time, {:.9f} s, is not after that of the frame before, {:.9f} s; correct the time stamps, or replace them "
+      "its time, {:.9f} s, is not after that of the previous frame, {:.9f} s; correct the time stamps, or replace them "
       "with --fps",
       to_seconds(t), to_seconds(before));
 }
@@ -39,18 +39,18 @@ FrameSequence::FrameSequence(const fs::path& input, const VideoOptions& options,
   const FrameSource::Listing& listing = source_->listing();
   if (listing.frames == 0) throw UserError(fmt::format("{}: holds no frames", input.string()));
   if (!fps_ && listing.stamps.empty()) {
-    throw UserError(fmt::format("{}: the frames have no time stamps; say how many there are per second with --fps",
+    throw UserError(fmt::format("{}: the frames have no time stamps; pass the number of frames per second with --fps",
                                 input.string()));
   }
   choose_window(options);
   first_.emplace();
-  if (!read(*first_)) throw UserError(fmt::format("{}: no frame of it can be read", input.string()));
+  if (!read(*first_)) throw UserError(fmt::format("{}: none of its frames can be read", input.string()));
   start_ = first_->t;
   width_ = first_->planes.front().width();
   height_ = first_->planes.front().height();
   if (std::max(width_, height_) > kMaxSide) {
-    throw UserError(fmt::format("{}: the frames are {} x {} px; make them {} px at most", input.string(), width_,
-                                height_, kMaxSide));
+    throw UserError(fmt::format("{}: the frames are {} x {} px; they must be at most {} px wide and high",
+                                input.string(), width_, height_, kMaxSide));
   }
 }
 
@@ -79,7 +79,7 @@ void FrameSequence::choose_window(const VideoOptions& options) {
   }
   const TimeNs input_end = stamp_of(count - 1);
   if (first_stamp_ > input_end) {
-    throw UserError(fmt::format("{}: --start {} s is beyond its last frame, {:.3f} s after the first", input_.string(),
+    throw UserError(fmt::format("{}: --start {} s is beyond the last frame, {:.3f} s after the first", input_.string(),
                                 options.start, to_seconds(input_end - origin_)));
   }
 }
@@ -101,7 +101,7 @@ bool FrameSequence::read(Frame& frame) {
   while (source_->advance()) {
     const std::size_t index = index_++;
     const std::optional<TimeNs> stamp = fps_ ? stamp_of(index) : source_->stamp();
-    if (!stamp) fail("it has no time stamp; say how many frames there are per second with --fps");
+    if (!stamp) fail("has no time stamp; pass the number of frames per second with --fps");
     if (*stamp > last_stamp_) return false;
     if (*stamp < first_stamp_) continue;
     source_->read(frame.planes);
@@ -115,7 +115,7 @@ bool FrameSequence::read(Frame& frame) {
 void FrameSequence::check(const Frame& frame) const {
   const Image<float>& plane = frame.planes.front();
   if (width_ > 0 && (plane.width() != width_ || plane.height() != height_)) {
-    fail(fmt::format("is {} x {} px, but the first one {} x {}; make all frames the same size", plane.width(),
+    fail(fmt::format("is {} x {} px, but the first one {} x {}; all frames must have the same size", plane.width(),
                      plane.height(), width_, height_));
   }
   for (const Image<float>& values : frame.planes) {
@@ -123,7 +123,7 @@ void FrameSequence::check(const Frame& frame) const {
     const auto bad = std::find_if_not(pixels.begin(), pixels.end(), is_irradiance);
     if (bad == pixels.end()) continue;
     const int at = static_cast<int>(bad - pixels.begin());
-    fail(fmt::format("pixel ({}, {}) is {}, which is no light; make every value finite and >= 0", at % values.width(),
+    fail(fmt::format("pixel ({}, {}) is {}; irradiance must be finite and >= 0", at % values.width(),
                      at / values.width(), *bad));
   }
 }

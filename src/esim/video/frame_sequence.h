@@ -12,7 +12,7 @@
 
 namespace esim {
 
-/// Which frames of a video are taken, and as what.
+/// Which frames of a video are read, and how they are interpreted.
 struct VideoOptions {
   Encoding encoding = Encoding::automatic;
   std::optional<double> fps{};
@@ -24,12 +24,12 @@ struct VideoOptions {
 template <class Visitor>
 void describe(Visitor& visit, VideoOptions& o) {
   visit("encoding", o.encoding,
-        About{"how codes stand for light; auto: integers are sRGB, floating point (EXR, HDR) is linear"});
+        About{"encoding of the pixel values; auto: integers are sRGB, floating point (EXR, HDR) is linear"});
   visit("fps", o.fps, About{"frames per second, instead of the input's time stamps", "Hz", 0, 1e9, true});
   visit("slow_motion", o.slow_motion,
-        About{"the scene was this many times faster than the time stamps say", "", 0, 1e9, true});
-  visit("start", o.start, About{"where to begin, after the first frame, by the time stamps", "s", 0, 1e9});
-  visit("duration", o.duration, About{"how much to convert, by the time stamps (default: all)", "s", 0, 1e9, true});
+        About{"factor by which the scene was faster than the time stamps say", "", 0, 1e9, true});
+  visit("start", o.start, About{"start of the conversion, after the first frame, by the time stamps", "s", 0, 1e9});
+  visit("duration", o.duration, About{"duration to convert, by the time stamps (default: all)", "s", 0, 1e9, true});
 }
 
 struct Frame {
@@ -37,23 +37,23 @@ struct Frame {
   Planes planes;
 };
 
-/// The chosen frames of a video or a folder of images, checked: times increase, sizes are all the same, and every value
-/// is an irradiance (finite, >= 0). Holds one frame at most.
+/// Reads the chosen frames of a video or of a folder of images and checks that times increase, all sizes are equal, and
+/// every irradiance is finite and >= 0. Holds at most one frame.
 class FrameSequence {
  public:
-  /// Opens the input and reads its first frame; three planes if `colour`, else luminance. Throws UserError if there are
-  /// no frames or no times.
+  /// Opens the input and reads its first frame: three planes if `colour`, otherwise luminance. Throws UserError if
+  /// there are no frames or no time stamps.
   FrameSequence(const std::filesystem::path& input, const VideoOptions& options, bool colour);
 
-  /// Takes the next frame, in the memory of `frame`; false at the end. Throws UserError naming the frame that cannot be
-  /// used, and what to do.
+  /// Reads the next frame into `frame`, reusing its memory; false at the end. Throws UserError naming the invalid frame
+  /// and a remedy.
   bool next(Frame& frame);
 
   const std::filesystem::path& input() const { return input_; }
   int width() const { return width_; }
   int height() const { return height_; }
 
-  /// As the input announces; a damaged one may hold less.
+  /// Number of frames that the input declares; a damaged one may hold fewer.
   std::int64_t frames() const { return frames_; }
   TimeNs start() const { return start_; }
   TimeNs end() const { return end_; }
@@ -70,13 +70,13 @@ class FrameSequence {
   std::unique_ptr<FrameSource> source_;
   std::optional<double> fps_;
   double slow_motion_;
-  std::size_t index_ = 0;                                 // of the frame that advance() comes to next
-  TimeNs origin_ = 0, first_stamp_ = 0, last_stamp_ = 0;  // of the input; of what is taken of it
+  std::size_t index_ = 0;                                 // of the next frame
+  TimeNs origin_ = 0, first_stamp_ = 0, last_stamp_ = 0;  // of the input; of the chosen part
   std::int64_t frames_ = 0;
   TimeNs start_ = 0, end_ = 0;
   int width_ = 0, height_ = 0;
-  std::optional<Frame> first_;  // until it is taken
-  TimeNs previous_ = 0;         // time of the frame taken last
+  std::optional<Frame> first_;  // until next() returns it
+  TimeNs previous_ = 0;         // time of the last frame
 };
 
 }  // namespace esim

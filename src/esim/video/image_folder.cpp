@@ -100,15 +100,15 @@ class ImageFolder final : public FrameSource {
 
   void take(const std::vector<StampedName>& entries, const char* file) {
     if (entries.empty()) {
-      throw UserError(
-          fmt::format("{}: names no frames; fill it, or remove it and pass --fps", (folder_ / file).string()));
+      throw UserError(fmt::format("{}: names no frames; list the frames, or remove the file and pass --fps",
+                                  (folder_ / file).string()));
     }
     const bool named = !entries.front().name.empty();
     if (!named) names_ = images_of(folder_);
     if (!named && names_.size() != entries.size()) {
       throw UserError(
-          fmt::format("{}: there are {} images but {} time stamps; make them match, or name the images in "
-                      "each line",
+          fmt::format("{}: there are {} images but {} time stamps; the numbers must match, or each line must name its "
+                      "image",
                       (folder_ / file).string(), names_.size(), entries.size()));
     }
     for (const StampedName& entry : entries) {
@@ -127,7 +127,7 @@ class ImageFolder final : public FrameSource {
   bool colour_;
   Listing listing_;
   std::vector<std::string> names_;
-  std::size_t next_ = 0;  // frames that advance() has come to
+  std::size_t next_ = 0;  // frames that advance() has reached
 };
 
 }  // namespace

@@ -16,10 +16,10 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::ScalableTag<float>;
 using V = hn::Vec<D>;
 
-constexpr int kBorderBefore = 1, kBorderAfter = 2;  // of repeated pixels, for the 4 x 4 neighbourhood
+constexpr int kBorderBefore = 1, kBorderAfter = 2;  // repeated pixels for the 4 x 4 neighbourhood
 constexpr int kRowsPerPiece = 16;
 
-/// Change of brightness along the motion that says nothing against it: noise, and aliased texture.
+/// Change of brightness along the motion that is attributed to noise and aliased texture.
 constexpr float kUnexplained = 0.5F;
 
 template <typename Body>
@@ -40,13 +40,13 @@ std::array<V, 4> cubic_weights(D d, V u) {
   return {w0, w1, w2, w3};
 }
 
-/// An image with a border, to be sampled.
+/// An image with a border, for sampling.
 struct View {
   const float* origin;  // its pixel (0, 0)
   int stride, width, height;
 };
 
-/// The image at points (x, y); those outside of it are moved to its edge.
+/// The image at points (x, y); points outside are moved to its edge.
 V sample(D d, const View& image, V x, V y) {
   const hn::RebindToSigned<D> di;
   x = hn::Min(hn::Max(x, hn::Zero(d)), hn::Set(d, static_cast<float>(image.width - 1)));
@@ -66,7 +66,7 @@ V sample(D d, const View& image, V x, V y) {
   return sum;
 }
 
-/// Shares of the displacements u and v that lead to frame 0 and to frame 1, at the fraction s between them.
+/// Weights of the displacements u and v towards frame 0 and frame 1, at the fraction s between them.
 struct Shares {
   explicit Shares(float s)
       : u0(0.5F * (s * s - s)),
@@ -76,7 +76,8 @@ struct Shares {
   float u0, v0, u1, v1;
 };
 
-/// ln(E + log_eps) of the pixels from (x, y) on, at the fraction s: motion compensated where that explains the frames.
+/// ln(E + log_eps) of the pixels from (x, y) on at the fraction s, motion compensated if the motion explains the
+/// frames.
 V blend(D d, const View& frame0, const View& frame1, int x, int y, float s, V ux, V uy, V vx, V vy) {
   const std::ptrdiff_t at = std::ptrdiff_t{y} * frame0.stride + x;
   const V fraction = hn::Set(d, s);
@@ -96,7 +97,7 @@ V blend(D d, const View& frame0, const View& frame1, int x, int y, float s, V ux
   const V moved0 = moved(frame0, shares.u0, shares.v0), moved1 = moved(frame1, shares.u1, shares.v1);
   const V change = hn::Sub(moved1, moved0);
 
-  // The more the frames differ along the motion, compared with how they differ in place, the less is it believed.
+  // The weight of the motion decreases with the difference along it, relative to the difference in place.
   const V room = hn::MulAdd(still_change, still_change, hn::Set(d, kUnexplained * kUnexplained));
   const V doubt = hn::Div(hn::Mul(change, change), room), one = hn::Set(d, 1.0F);
   const V belief = hn::Div(one, hn::MulAdd(doubt, doubt, one));
@@ -150,7 +151,7 @@ void Interpolator::measure_motion(const Planes& frame, const Workers& workers) {
   }
   optical_flow_->estimate(luminance_before_, luminance_after_, workers, forward_, backward_);
 
-  // The speed along the parabola changes linearly: it is greatest at one of the ends.
+  // The speed along the parabola changes linearly: its maximum is at one of the ends.
   std::vector<float> greatest(static_cast<std::size_t>(height), 0.0F);  // squared, per row
   for_rows(height, workers, [&](int y) {
     for (int x = 0; x < width; ++x) {
@@ -187,13 +188,13 @@ void Interpolator::interpolate_row(int y, float s, std::size_t plane, float* lig
   const View frame0{before_[plane].row(0), padded.width(), width, height};
   const View frame1{after_[plane].row(0), padded.width(), width, height};
   const float log_eps = static_cast<float>(log_eps_);
-  if (width < lanes || forward_.x.empty()) {  // no motion is known
+  if (width < lanes || forward_.x.empty()) {  // without motion
     const float *log0 = before_[plane].row(y), *log1 = after_[plane].row(y);
     for (int x = 0; x < width; ++x) light[x] = std::max(std::exp(log0[x] + s * (log1[x] - log0[x])) - log_eps, 0.0F);
     return;
   }
   for (int begin = 0; begin < width; begin += lanes) {
-    const int x = std::min(begin, width - lanes);  // the last vector overlaps the one before
+    const int x = std::min(begin, width - lanes);  // the last vector overlaps the previous one
     const auto load = [&](const Image<float>& field) { return hn::LoadU(d, field.row(y) + x); };
     const V log =
         blend(d, frame0, frame1, x, y, s, load(forward_.x), load(forward_.y), load(backward_.x), load(backward_.y));

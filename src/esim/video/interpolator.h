@@ -15,41 +15,41 @@ struct InterpolationOptions {
 
 template <class Visitor>
 void describe(Visitor& visit, InterpolationOptions& o) {
-  visit("interpolation", o.interpolation, About{"follow the motion between frames"});
-  visit("lambda", o.lambda, About{"greatest displacement in a step between frames", "px", 0, 1000, true});
-  visit("max_steps", o.max_steps, About{"most steps between two frames, whatever the displacement", "", 1, 1e6});
+  visit("interpolation", o.interpolation, About{"interpolate along the motion between frames"});
+  visit("lambda", o.lambda, About{"maximum motion in a step between frames", "px", 0, 1000, true});
+  visit("max_steps", o.max_steps, About{"maximum number of steps between two frames, whatever the motion", "", 1, 1e6});
 }
 
-/// The brightness between frames of a video. With displacements u forward from frame 0 and v backward from frame 1, the
-/// content of a pixel at the fraction s between them is at
+/// Interpolates the brightness between two frames of a video. With the displacements u forward from frame 0 and v
+/// backward from frame 1, the content of a pixel at the fraction s between the frames is at
 ///   d0 = (s² - s)/2 u + (s² + s)/2 v   from it in frame 0, and at
 ///   d1 = (r² + r)/2 u + (r² - r)/2 v   from it in frame 1,  r = 1 - s:
-/// the parabola through v, 0 and u, exact for steady motion along curves of constant acceleration. What both frames
-/// show there is blended, linearly in ln(E + log_eps). Where they disagree, more than what the pixel itself shows in
-/// the two frames does, motion does not explain what happens, and the pixel is blended without it. At s = 0 and 1 this
-/// gives the frames.
+/// the parabola through v, 0 and u, exact for steady motion along curves of constant acceleration. The values of both
+/// frames at these points are blended linearly in ln(E + log_eps). If they differ by more than the pixel's own values
+/// in the two frames, the motion does not explain the change, and the pixel's own values are blended instead. s = 0 and
+/// s = 1 give the frames.
 class Interpolator {
  public:
   Interpolator(const InterpolationOptions& options, double log_eps) : options_(options), log_eps_(log_eps) {}
 
-  /// Takes the next frame, linear light; all have one size and number of planes. Afterwards frames 0 and 1 are the one
-  /// taken before and this one.
+  /// Takes the next frame, in linear irradiance; all frames must have the same size and number of planes. Afterwards
+  /// frames 0 and 1 are the previous frame and this one.
   void advance(const Planes& frame, const Workers& workers);
 
-  /// Steps into which to divide the time between the frames so that no pixel moves farther than lambda in any.
+  /// Number of steps between the frames such that no pixel moves by more than lambda in any step.
   int steps() const { return steps_; }
 
-  /// Greatest speed of any pixel, px per frame.
+  /// Maximum speed of any pixel, px per frame.
   double displacement() const { return displacement_; }
 
-  /// Whether steps() is held to max_steps.
+  /// Whether max_steps limits steps().
   bool is_held() const { return held_; }
 
-  /// Light at the fraction between frames 0 and 1, in [0, 1].
+  /// Irradiance at the fraction in [0, 1] between frames 0 and 1.
   void at(double fraction, const Workers& workers, Planes& light) const;
 
  private:
-  /// ln(E + log_eps) with a border of repeated pixels, so that every neighbourhood lies within.
+  /// ln(E + log_eps) with a border of repeated pixels that contains every neighbourhood.
   struct PaddedLog {
     void assign(const Image<float>& light, float log_eps, const Workers& workers);
     const float* row(int y) const { return pixels.row(y + 1) + 1; }

@@ -11,12 +11,12 @@
 namespace esim {
 namespace {
 
-constexpr int kLeastSide = 16;        // px; smaller images have no pyramid to search in
-constexpr float kNoise = 0.1F;        // px; slower motion is taken as none
-constexpr std::size_t kLooks = 4096;  // pixels that the scale is measured at
+constexpr int kLeastSide = 16;        // px; smaller images have no search pyramid
+constexpr float kNoise = 0.1F;        // px; slower motion counts as 0
+constexpr std::size_t kLooks = 4096;  // pixels that determine the scale
 constexpr int kRowsPerPiece = 16;
 
-/// Nearly the most light in an image: a quantile, so that single hot pixels do not darken the rest.
+/// Nearly the maximum irradiance of an image: a quantile, so that single hot pixels do not darken the others.
 float white_level(const Image<float>& light) {
   const std::size_t stride = std::max<std::size_t>(1, light.size() / kLooks);
   std::vector<float> values;
@@ -37,8 +37,8 @@ cv::Vec2f bilinear(const cv::Mat2f& field, float x, float y) {
   return (1 - v) * ((1 - u) * field(y0, x0) + u * field(y0, x1)) + v * ((1 - u) * field(y1, x0) + u * field(y1, x1));
 }
 
-/// Whether going along `there` and back along `back` leads near to the start (Sundaram et al., ECCV 2010, eq. 5), all
-/// within the image.
+/// Forward-backward consistency (Sundaram et al., ECCV 2010, eq. 5): whether `there` followed by `back` leads close to
+/// the start, within the image.
 bool is_consistent(const cv::Mat2f& there, const cv::Mat2f& back, int x, int y) {
   const cv::Vec2f go = there(y, x);
   const float to_x = static_cast<float>(x) + go[0], to_y = static_cast<float>(y) + go[1];
@@ -86,7 +86,7 @@ struct OpticalFlow::Impl {
     }
   }
 
-  // One for each direction, so that both can search at once.
+  // One per direction, so that both can run in parallel.
   std::array<cv::Ptr<cv::DISOpticalFlow>, 2> searches;
   std::array<cv::Mat1b, 2> images;
   std::array<cv::Mat2f, 2> fields;
@@ -107,7 +107,7 @@ void OpticalFlow::estimate(const Image<float>& before, const Image<float>& after
   if (std::min(width, height) >= kLeastSide) {
     const float white = std::max(white_level(before), white_level(after));
     workers.for_each(2, [&](int i) { impl.encode(i == 0 ? before : after, white, impl.images[i]); });
-    cv::setNumThreads(1);  // the search divides its work by the number of threads, and that shows in the result
+    cv::setNumThreads(1);  // the result of the search depends on the number of threads
     workers.for_each(2, [&](int i) { impl.searches[i]->calc(impl.images[i], impl.images[1 - i], impl.fields[i]); });
   }
   workers.for_each((height + kRowsPerPiece - 1) / kRowsPerPiece, [&](int piece) {

@@ -7,12 +7,12 @@
 
 namespace esim {
 
-/// A displacement per pixel, px: x to the right, y downwards.
+/// Optical flow: a displacement per pixel, px; x to the right, y downwards.
 struct FlowField {
   Image<float> x, y;
 };
 
-/// How image content moves between two frames.
+/// Estimates the optical flow between two frames.
 class OpticalFlow {
  public:
   OpticalFlow(int width, int height);
@@ -20,10 +20,10 @@ class OpticalFlow {
   OpticalFlow(OpticalFlow&&) noexcept;
   OpticalFlow& operator=(OpticalFlow&&) noexcept;
 
-  /// Estimates where the pixels of `before` are in `after` and the other way round, in linear luminance. Dense inverse
-  /// search (Kroeger et al., ECCV 2016) on the square root of the light, which evens out noise as sRGB does, scaled so
-  /// that 8 bits span the brighter of the frames. Displacements of two fields that contradict each other, as at
-  /// occlusions and in what enters the image, are replaced: by the one of the field that is consistent, else by none.
+  /// Estimates the optical flow from `before` to `after` and back; both in linear luminance. Uses dense inverse search
+  /// (Kroeger et al., ECCV 2016) on the square root of the irradiance, which equalises noise as sRGB does, scaled so
+  /// that 8 bits cover the brighter of the frames. Where the two fields contradict each other, as at occlusions and in
+  /// content that enters the image, a displacement is replaced by that of the consistent field, or otherwise by 0.
   void estimate(const Image<float>& before, const Image<float>& after, const Workers& workers, FlowField& forward,
                 FlowField& backward);
 

@@ -18,7 +18,7 @@ using Words = std::vector<std::string>;
 
 bool is_separator(char c) { return c == ' ' || c == '\t' || c == '\r' || c == ',' || c == ';'; }
 
-/// The first `count` words of a line, the last of them to the line's end: names may hold spaces.
+/// Splits a line into `count` words; the last one extends to the end of the line, because names may contain spaces.
 Words split(const std::string& line, std::size_t count) {
   Words words;
   std::size_t end = line.size();
@@ -43,7 +43,7 @@ std::optional<Integer> parse_integer(const std::string& text) {
   return value;
 }
 
-/// Reads the lines that are no comments; the first one may be a heading that `parse` refuses.
+/// Parses the lines that are not comments; the first one may be a heading that `parse` rejects.
 using ParseLine = std::function<std::optional<StampedName>(const std::string& line)>;
 std::vector<StampedName> read_lines(const std::filesystem::path& path, const ParseLine& parse, const char* expected) {
   std::ifstream file(path);
@@ -95,10 +95,10 @@ std::vector<StampedName> read_images_csv(const std::filesystem::path& path) {
 }
 
 std::vector<StampedName> read_timestamps_txt(const std::filesystem::path& path) {
-  std::size_t columns = 0;  // of the first line; those of the others must be the same
+  std::size_t columns = 0;  // of the first line; all lines must have the same number
   const auto parse = [&](const std::string& line) -> std::optional<StampedName> {
     Words words = split(line, 3);
-    // `index seconds file`, or a name with a space in it?
+    // `index seconds file`, or a name that contains a space?
     const bool indexed = words.size() == 3 && parse_integer<TimeNs>(words[0]) && parse_seconds(words[1]);
     if (indexed) words.erase(words.begin());
     if (words.size() == 3) words = split(line, 2);

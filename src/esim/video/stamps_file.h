@@ -15,15 +15,14 @@ struct StampedName {
   std::string name;  ///< of the image; empty if the file gives none
 };
 
-/// images.csv: lines `timestamp in ns, file`. Here as below, comments (#), empty lines and a heading are passed over,
-/// and anything else that is not such a line is a UserError naming file and line. The order of the times is not looked
-/// at.
+/// Reads images.csv: lines `timestamp in ns, file`. Both functions skip comments (#), empty lines and a heading, and
+/// throw UserError naming file and line for any other line. They do not check the order of the times.
 std::vector<StampedName> read_images_csv(const std::filesystem::path& path);
 
-/// timestamps.txt: lines `seconds`, `seconds file` or `index seconds file`, all of one kind.
+/// Reads timestamps.txt: lines `seconds`, `seconds file` or `index seconds file`, all of the same kind.
 std::vector<StampedName> read_timestamps_txt(const std::filesystem::path& path);
 
-/// "12.5" or "1.25e1" as nanoseconds, exact unless there is an exponent; nothing if it is no such number.
+/// Parses seconds such as "12.5" or "1.25e1" to nanoseconds, exact without an exponent; nothing if it is not a number.
 std::optional<TimeNs> parse_seconds(const std::string& text);
 
 }  // namespace esim

@@ -32,7 +32,7 @@ std::string reason_of(int error) {
   return text;
 }
 
-/// A file, and the video stream in it; the packets of other streams are passed over.
+/// A file and its video stream; the packets of other streams are skipped.
 struct Demuxer {
   explicit Demuxer(const std::filesystem::path& path) {
     const auto check = [&](int result, const char* what) {
@@ -40,7 +40,7 @@ struct Demuxer {
     };
     AVFormatContext* context = nullptr;
     check(avformat_open_input(&context, ("file:" + path.string()).c_str(), nullptr, nullptr),
-          "is no video that can be read, or it is cut off");
+          "is not a readable video, or is cut off");
     format.reset(context);
     check(avformat_find_stream_info(context, nullptr), "cannot be read as a video");
     const int best = av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
@@ -51,7 +51,7 @@ struct Demuxer {
     }
   }
 
-  /// The next packet of the stream; libav's error code otherwise.
+  /// Reads the next packet of the stream; returns libav's error code on failure.
   int read(AVPacket* packet) const {
     while (true) {
       av_packet_unref(packet);
@@ -65,10 +65,10 @@ struct Demuxer {
 
   Owned<AVFormatContext> format;
   const AVCodec* codec = nullptr;
-  AVStream* stream = nullptr;  // belongs to format
+  AVStream* stream = nullptr;  // owned by format
 };
 
-/// The stamps of all packets: the file is read through once, but nothing decoded.
+/// The time stamps of all packets: reads the whole file once without decoding it.
 FrameSource::Listing list_frames(const Demuxer& demuxer) {
   FrameSource::Listing listing;
   const Owned<AVPacket> packet(av_packet_alloc());
@@ -84,14 +84,14 @@ FrameSource::Listing list_frames(const Demuxer& demuxer) {
     listing.stamps.clear();
     return listing;
   }
-  // Packets come in the order of decoding.
+  // Packets are in the order of decoding.
   std::sort(listing.stamps.begin(), listing.stamps.end());
   listing.stamps.erase(std::unique(listing.stamps.begin(), listing.stamps.end()), listing.stamps.end());
   listing.frames = listing.stamps.size();
   return listing;
 }
 
-/// Whether the codes span all numbers, as in photographs, or the range that television uses.
+/// Whether the pixel values use the full range, as in photographs, or the limited range of television.
 bool is_full_range(const AVFrame& frame) {
   if (frame.color_range != AVCOL_RANGE_UNSPECIFIED) return frame.color_range == AVCOL_RANGE_JPEG;
   return av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame.format))->nb_components < 3;
@@ -153,7 +153,7 @@ class VideoFileSource final : public FrameSource {
   std::string name() const override { return fmt::format("frame {}", count_ - 1); }
 
  private:
-  /// Hands the decoder the next packet. After an error it gets no more, but gives what it still holds.
+  /// Passes the next packet to the decoder. After an error no more packets follow, and the decoder is flushed.
   void feed() {
     int result = demuxer_.read(packet_.get());
     if (result == AVERROR_EOF && is_cut_off()) {
@@ -172,7 +172,7 @@ class VideoFileSource final : public FrameSource {
     if (result < 0 || !failure_.empty()) avcodec_send_packet(decoder_.get(), nullptr);
   }
 
-  /// Whether the file ends before its index or its heading says.
+  /// Whether the file ends earlier than its index or header states.
   bool is_cut_off() const {
     if (packets_ < avformat_index_get_entries_count(demuxer_.stream)) return true;
     const AVFormatContext& format = *demuxer_.format;
@@ -181,7 +181,7 @@ class VideoFileSource final : public FrameSource {
     return format.duration > 0 && read_until_ < promised - kNsPerSecond / 2;
   }
 
-  /// Makes RGB of the frame, with 16 bits per channel where it has more than 8; returns whether it has.
+  /// Converts the frame to RGB, with 16 bits per channel if it has more than 8; returns whether it has.
   bool convert() {
     const auto format = static_cast<AVPixelFormat>(frame_->format);
     const bool deep = av_pix_fmt_desc_get(format)->comp[0].depth > 8;
@@ -190,7 +190,7 @@ class VideoFileSource final : public FrameSource {
         converter_.release(), frame_->width, frame_->height, format, frame_->width, frame_->height, wanted,
         SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP | SWS_BITEXACT, nullptr, nullptr,
         nullptr));
-    if (!converter_) fail("has pixels of a kind that cannot be converted to RGB; convert the video to H.264 or FFV1");
+    if (!converter_) fail("has a pixel format that cannot be converted to RGB; convert the video to H.264 or FFV1");
     const int matrix = frame_->colorspace != AVCOL_SPC_UNSPECIFIED ? frame_->colorspace
                        : frame_->height >= 720                     ? SWS_CS_ITU709
                                                                    : SWS_CS_ITU601;
@@ -212,8 +212,8 @@ class VideoFileSource final : public FrameSource {
     if (frame_->color_trc == AVCOL_TRC_LINEAR) return Encoding::linear;
     if (frame_->color_trc == AVCOL_TRC_SMPTE2084 || frame_->color_trc == AVCOL_TRC_ARIB_STD_B67) {
       fail(
-          "is encoded for high dynamic range (PQ or HLG), which is not known here; convert the video to SDR, or pass "
-          "--encoding srgb to take it as that");
+          "is encoded for high dynamic range (PQ or HLG), which is not supported; convert the video to SDR, or pass "
+          "--encoding srgb to read it as sRGB");
     }
     return Encoding::srgb;
   }
@@ -232,16 +232,16 @@ class VideoFileSource final : public FrameSource {
   Owned<AVPacket> packet_;
   Owned<AVFrame> frame_, converted_;
   Owned<SwsContext> converter_;
-  std::int64_t packets_ = 0;  // that the decoder got
-  TimeNs read_until_ = 0;     // end of the last of them
-  std::int64_t count_ = 0;    // frames that advance() has come to
+  std::int64_t packets_ = 0;  // passed to the decoder
+  TimeNs read_until_ = 0;     // end of the last packet
+  std::int64_t count_ = 0;    // frames that advance() has reached
   std::string failure_;       // why there are no more packets
 };
 
 }  // namespace
 
 std::unique_ptr<FrameSource> open_video_file(const std::filesystem::path& path, Encoding encoding, bool colour) {
-  av_log_set_level(AV_LOG_QUIET);  // what fails becomes an exception
+  av_log_set_level(AV_LOG_QUIET);  // failures become exceptions
   return std::make_unique<VideoFileSource>(path, encoding, colour);
 }
 

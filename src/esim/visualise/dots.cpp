@@ -11,15 +11,15 @@
 namespace esim {
 namespace {
 
-/// So many depths are told apart: neighbouring ones differ by less than can be seen.
+/// Number of distinct depths: neighbouring ones look the same.
 constexpr std::size_t kDepths = 4096;
 
 std::size_t depth_of(const Dot& dot) {
-  const float nearness = dot.depth < 1.0f ? 1.0f - std::max(dot.depth, 0.0f) : 0.0f;  // the farthest first
+  const float nearness = dot.depth < 1.0f ? 1.0f - std::max(dot.depth, 0.0f) : 0.0f;  // farthest first
   return static_cast<std::size_t>(nearness * static_cast<float>(kDepths - 1));
 }
 
-/// By counting, stable.
+/// Stable counting sort by depth.
 void sort(const std::vector<Dot>& dots, std::vector<Dot>& in_order) {
   std::vector<std::uint32_t> next(kDepths + 1);
   for (const Dot& dot : dots) ++next[depth_of(dot) + 1];
@@ -28,18 +28,18 @@ void sort(const std::vector<Dot>& dots, std::vector<Dot>& in_order) {
   for (const Dot& dot : dots) in_order[next[depth_of(dot)]++] = dot;
 }
 
-constexpr int kTogether = 4;  // pixels that are blended at a time, of four bytes each
+constexpr int kTogether = 4;  // pixels of four bytes each that are blended together
 using Bytes = std::uint8_t __attribute__((vector_size(4 * kTogether)));
 using Lanes = std::uint16_t __attribute__((vector_size(8 * kTogether)));
 
-/// How much of the pixels around it a dot covers, 0 to 255: rows of groups of pixels.
+/// Coverage of the pixels around a dot, 0 to 255: rows of groups of pixels.
 struct Stamp {
-  int left = 0, top = 0;  ///< of the first of them, relative to the pixel that the dot is in
+  int left = 0, top = 0;  ///< of the first group, relative to the dot's pixel
   int groups = 0, rows = 0;
   std::vector<Lanes> covered{};
 };
 
-/// Of dots of one radius, for their places relative to the pixels in steps of 1/16.
+/// Stamps of dots of one radius, for positions within a pixel in steps of 1/16.
 class Stamps {
  public:
   static constexpr int kStepBits = 4, kSteps = 1 << kStepBits;
@@ -51,7 +51,7 @@ class Stamps {
     }
   }
 
-  /// Of a dot that is so many steps to the right of a pixel's centre, and below it.
+  /// The stamp of a dot at x_steps to the right of a pixel's centre and y_steps below it.
   const Stamp& at(int x_steps, int y_steps) const { return all_[static_cast<std::size_t>(y_steps * kSteps + x_steps)]; }
 
  private:
@@ -77,7 +77,7 @@ class Stamps {
 
 constexpr float kMostRadius = 32;  // px
 
-/// Those of radii in steps of 1/8 px, each made when it is first asked for.
+/// The stamps of a radius, in steps of 1/8 px, created on first use.
 const Stamps& stamps_of(float radius) {
   constexpr float kSteps = 8;
   thread_local std::array<std::unique_ptr<Stamps>, static_cast<std::size_t>(kSteps * kMostRadius) + 1> all;
@@ -86,7 +86,7 @@ const Stamps& stamps_of(float radius) {
   return *all[index];
 }
 
-/// A picture of pixels of four bytes, with so much room around it that no dot reaches beyond.
+/// An image with four bytes per pixel and a border that contains all dots.
 class Padded {
  public:
   explicit Padded(const Image<Rgb>& picture)
@@ -138,7 +138,7 @@ class Padded {
     std::memcpy(&bytes, pixels, sizeof bytes);
     const Lanes before = __builtin_convertvector(bytes, Lanes);
     Lanes amount = (covered * opacity + 128) >> 8;
-    amount += amount >> 7;  // 256 is all of it
+    amount += amount >> 7;  // 256 is full coverage
     bytes = __builtin_convertvector((before * (256 - amount) + colour * amount + 128) >> 8, Bytes);
     std::memcpy(pixels, &bytes, sizeof bytes);
   }

@@ -10,15 +10,15 @@ namespace esim {
 
 /// A round dot, smooth at its edge.
 struct Dot {
-  float x = 0, y = 0;  ///< of its centre, px
+  float x = 0, y = 0;  ///< centre, px
   float radius = 1;    ///< px, up to 32
   float depth = 0;     ///< 0 (nearest) to 1 (farthest)
   Rgb colour{};
-  std::uint16_t opacity = 0;  ///< 256: hides what is behind it
+  std::uint16_t opacity = 0;  ///< 256: opaque
 };
 
-/// Draws dots over a picture from the farthest to the nearest, those of (almost) the same depth in their order. What
-/// lies outside is cut off.
+/// Draws dots onto an image from the farthest to the nearest, those of (almost) the same depth in their order. Dots are
+/// clipped to the image.
 void draw_dots(const std::vector<Dot>& dots, Image<Rgb>& picture);
 
 }  // namespace esim

@@ -38,7 +38,7 @@ float TimeSurface::value(int column, int row, TimeNs t, double tau_ns) const {
 }
 
 Image<Rgb> TimeSurface::draw(TimeNs t, double tau_ns, Rgb ground) const {
-  constexpr float kFaded = 7;  // ages, in tau, at which less than a level of any colour is left
+  constexpr float kFaded = 7;  // age in tau at which less than one level of any colour remains
   Image<Rgb> out(grid_.width, grid_.height, ground);
   for (std::size_t i = 0; i < out.size(); ++i) {
     const int polarity = polarity_.pixels()[i];

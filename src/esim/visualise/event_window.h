@@ -10,18 +10,18 @@ namespace esim {
 /// The latest events of a stream, in order, in bounded memory.
 class EventWindow {
  public:
-  /// Holds at most `most` events at a time. Where more come, `thin` leaves out all but every 2nd, 4th, 8th ... of the
-  /// stream, evenly over the window; otherwise the oldest are forgotten.
+  /// Holds at most `most` events. With `thin`, further events reduce the window to every 2nd, 4th, 8th ... event of the
+  /// stream; otherwise they replace the oldest ones.
   explicit EventWindow(std::size_t most, bool thin = false) : most_(most), thin_(thin) {}
 
   void add(EventSpan events);
 
-  /// Forgets those at or before `t`.
+  /// Removes the events at or before `t`.
   void forget_until(TimeNs t);
 
   EventSpan events() const { return EventSpan(events_).subspan(head_); }
 
-  /// Every how many-th event of the stream is kept.
+  /// Every stride()-th event of the stream is kept.
   std::size_t stride() const { return stride_; }
 
  private:
@@ -30,8 +30,8 @@ class EventWindow {
   std::size_t most_;
   bool thin_;
   std::vector<Event> events_;
-  std::vector<std::uint64_t> numbers_;  // of the events in the stream; only with thin_
-  std::size_t head_ = 0;                // the events before it are forgotten
+  std::vector<std::uint64_t> numbers_;  // index of each event in the stream; only with thin_
+  std::size_t head_ = 0;                // the events before it are removed
   std::size_t stride_ = 1;
   std::uint64_t seen_ = 0;
 };

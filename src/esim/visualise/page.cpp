@@ -18,7 +18,7 @@ int draw_polarity(Canvas& canvas, int x, int baseline, Rgb colour, const char* n
   return 16 + canvas.text(x + 16, baseline, name, kSmallTextHeight, theme.faint_ink) + 18;
 }
 
-// A bar of colours between two labels.
+// A colour bar between two labels.
 void draw_depth_legend(Canvas& canvas, int x, int baseline, const Panel& panel, const Theme& theme) {
   constexpr int kBar = 140;
   x += canvas.text(x, baseline, fmt::format("{:.3g} m", panel.near_m), kSmallTextHeight, theme.faint_ink) + 10;

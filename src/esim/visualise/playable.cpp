@@ -31,7 +31,7 @@ Playable::Playable(const fs::path& path, std::optional<SensorSize> sensor) : pat
     path_ = events.path();
     reading_.sensor = events.sensor();
   } else if (!folder && !reading_.sensor && open()->info().cameras.size() == 1) {
-    reading_.sensor = EventsFile(path_, reading_).sensor();  // as a report beside it may say
+    reading_.sensor = EventsFile(path_, reading_).sensor();  // from a report next to the file, if there is one
   }
 }
 
@@ -40,13 +40,13 @@ int Playable::camera(const std::string& name) const {
   const auto source = open();
   require_camera(*source, path_);
   const auto& cameras = source->info().cameras;
-  if (cameras.empty()) throw UserError(fmt::format("{} holds nothing that a camera saw", path_.string()));
+  if (cameras.empty()) throw UserError(fmt::format("{} holds no data of a camera", path_.string()));
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     if (name.empty() ? cameras.size() == 1 : cameras[i].name == name) return static_cast<int>(i);
     names += (names.empty() ? "" : ", ") + cameras[i].name;
   }
-  if (name.empty()) throw UserError(fmt::format("{} holds several cameras: name one of {}", path_.string(), names));
-  throw UserError(fmt::format("{} has no camera {}; there is {}", path_.string(), name, names));
+  if (name.empty()) throw UserError(fmt::format("{} holds several cameras; choose one of {}", path_.string(), names));
+  throw UserError(fmt::format("{} has no camera {}; choose one of {}", path_.string(), name, names));
 }
 
 std::vector<View> views_named(const std::vector<std::string>& names) {
@@ -60,7 +60,7 @@ std::vector<View> views_named(const std::vector<std::string>& names) {
       if (name == name_of(view)) found = view;
       known += fmt::format(", {}", name_of(view));
     }
-    if (!found) throw UserError(fmt::format("there is no view {}: it is one of {}", name, known));
+    if (!found) throw UserError(fmt::format("there is no view {}; choose one of {}", name, known));
     if (std::find(views.begin(), views.end(), *found) == views.end()) views.push_back(*found);
   }
   return views;

@@ -11,19 +11,19 @@
 
 namespace esim {
 
-/// A recording or file of events that can be opened again and again: to survey it, and to show it. Of a folder that is
-/// of no format, the events in it.
+/// A recording or event file that can be opened repeatedly: to survey it, and to show it. For a folder that has no
+/// known format, the event file in it.
 class Playable {
  public:
-  /// `sensor` replaces what the file says. Throws UserError where there is nothing that is read.
+  /// `sensor` replaces the size in the file. Throws UserError if there is nothing to read.
   Playable(const std::filesystem::path& path, std::optional<SensorSize> sensor);
 
   std::unique_ptr<Source> open() const { return open_source(path_, reading_); }
 
-  /// The index of the camera of that name, or of the only one. Throws UserError where there is none.
+  /// The index of the camera with this name, or of the only camera. Throws UserError if there is no such camera.
   int camera(const std::string& name) const;
 
-  /// Of the file or folder, for headlines.
+  /// Name of the file or folder, for headlines.
   const std::string& name() const { return name_; }
 
  private:
@@ -32,7 +32,7 @@ class Playable {
   ReadOptions reading_;
 };
 
-/// The views of these names, once each; of "all", none. Throws UserError for others.
+/// The views with these names, without duplicates; empty for "all". Throws UserError for unknown names.
 std::vector<View> views_named(const std::vector<std::string>& names);
 
 }  // namespace esim

@@ -27,7 +27,7 @@ constexpr std::size_t kMostEventsCounted = std::size_t{1} << 23;
 constexpr std::size_t kMostPoints = 160'000;
 constexpr std::size_t kMostEventsWaiting = std::size_t{1} << 22, kMostPicturesWaiting = 64;
 
-// The least of 1, 2, 5, 10, ... that is not below `value`, to rounding; a power of ten times that for others.
+// Rounds up to 1, 2 or 5 times a power of ten, within rounding errors.
 double round_up(double value) {
   const double decade = std::pow(10.0, std::floor(std::log10(value)));
   for (const double step : {1.0, 2.0, 5.0}) {
@@ -43,7 +43,7 @@ struct Picture {
   Image<Rgb> pixels;
 };
 
-/// Pictures of one kind that wait for their time to come.
+/// Images of one kind that wait for their time.
 class PictureQueue {
  public:
   void add(TimeNs t, Image<Rgb> pixels) {
@@ -54,7 +54,7 @@ class PictureQueue {
     while (!waiting_.empty() && waiting_.front().t <= t) advance();
     return shown_;
   }
-  /// The same in another size, made once for all the frames of a video that show it.
+  /// The same in another size, scaled once for all frames of the video that show it.
   const Image<Rgb>& enlarged_at(TimeNs t, int width, int height) {
     const Image<Rgb>& picture = at(t);
     if (enlarged_.empty() && !picture.empty()) enlarged_ = enlarge(picture, width, height);
@@ -80,7 +80,7 @@ Image<float> picked(const Image<float>& image, const PictureGrid& grid) {
   return reduce_nearest(image, grid.width, grid.height);
 }
 
-// Digital numbers as they are: cameras encode for the eye.
+// Digital numbers without conversion: cameras encode for display.
 Image<Rgb> grey(const FrameRecord& frame, const PictureGrid& grid) {
   const float full = static_cast<float>((1u << std::clamp(frame.bits, 1, 16)) - 1);
   Image<float> levels(frame.image.width(), frame.image.height());
@@ -93,7 +93,7 @@ Image<Rgb> grey(const FrameRecord& frame, const PictureGrid& grid) {
   return out;
 }
 
-// Frames of a camera rather than a video's, and those rather than ground truth.
+// Frames of a camera are preferred to images of a video, and these to ground truth.
 std::optional<Content> image_content(const Survey& survey) {
   for (const Content content : {Content::frames, Content::images, Content::truth}) {
     if (survey.last.contains(content)) return content;
@@ -105,7 +105,7 @@ std::optional<Content> image_content(const Survey& survey) {
 
 PlayOptions choose_missing(PlayOptions options, const Survey& survey) {
   if (survey.events == 0) {
-    throw UserError(fmt::format("{}: there are no events from {} to {} s", options.name,
+    throw UserError(fmt::format("{}: there are no events between {} and {} s", options.name,
                                 to_seconds(survey.start - survey.origin), to_seconds(survey.end - survey.origin)));
   }
   const std::vector<View> all = views_of(survey);
@@ -132,7 +132,7 @@ Instants video_instants(const Survey& survey, const PlayOptions& options) {
   const double step_ns = 1e9 / (options.frames_per_s * options.slow_motion);
   const double steps = static_cast<double>(survey.end - survey.start) / step_ns;
   if (!(steps < kMostFrames)) {
-    throw RemediableError(fmt::format("{} lasts {:.4g} s, too long for a video: choose a part of it, or show it faster",
+    throw RemediableError(fmt::format("{} lasts {:.4g} s, too long for a video; choose a part of it, or show it faster",
                                       options.name, to_seconds(survey.end - survey.start)),
                           Remedy::shorter_video);
   }
@@ -187,14 +187,14 @@ struct Player::Impl {
   PictureQueue images, backgrounds, depths, motions;
 };
 
-// Kinds that have ended hold up nothing.
+// Time until which all records are known; kinds of records that have ended do not count.
 TimeNs Player::Impl::known_until() const {
   TimeNs until = std::numeric_limits<TimeNs>::max();
   if (ended || waiting.size() > kMostEventsWaiting) return until;
   for (const auto& [content, last] : survey.last) {
     const auto now = seen.find(content);
     if (now == seen.end()) return std::numeric_limits<TimeNs>::min();
-    // Of records at the same time, more may come.
+    // Further records with the same time may follow.
     if (now->second < last) until = std::min(until, now->second - 1);
   }
   return until;
@@ -238,7 +238,7 @@ void Player::Impl::add(const TruthRecord& truth) {
   }
 }
 
-// The events up to this time go where they are shown.
+// Adds the events up to this time to the views.
 void Player::Impl::pass_events(TimeNs until) {
   constexpr std::size_t kPortion = 4096;
   std::vector<Event> portion;
@@ -306,7 +306,7 @@ Panel Player::Impl::draw(View view, TimeNs t) {
   return {};
 }
 
-// Views share nothing that changes while they are drawn.
+// The views share no mutable data while they are drawn.
 std::vector<Panel> Player::Impl::draw_all(TimeNs t) {
   std::vector<Panel> panels(options.views.size());
   workers.for_each(static_cast<int>(panels.size()), [&](int i) {
@@ -323,7 +323,7 @@ Player::~Player() = default;
 
 const PageLayout& Player::layout() const { return impl_->layout; }
 
-// To the next instant.
+// Advances to the next instant.
 TimeNs Player::Impl::advance() {
   const TimeNs t = instants.at(shown);
   while (known_until() < t && read()) {

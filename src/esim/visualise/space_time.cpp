@@ -14,16 +14,16 @@
 namespace esim {
 namespace {
 
-constexpr double kTimeLength = 1.5;    // of the box, in longer sides of the sensor, as all lengths here
+constexpr double kTimeLength = 1.5;    // of the box; all lengths are in units of the sensor's longer side
 constexpr double kViewerDistance = 5;  // from the middle of the box
 constexpr double kMiddleYaw_deg = -40, kSwing_deg = 18, kPitch_deg = 19;
 constexpr double kLabelSpace = 50;  // px around the box
 constexpr int kTextHeight = 10;
 constexpr float kNewOpacity = 0.95f, kOldOpacity = 0.45f;
-constexpr float kFade = 0.45f;   // of the most distant points towards the ground
-constexpr double kRecent = 0.1;  // share of the time in which points lose most of their opacity
+constexpr float kFade = 0.45f;   // of the most distant points towards the background
+constexpr double kRecent = 0.1;  // fraction of the time in which points lose most of their opacity
 
-// A point relative to the middle of the box: to the right, down, and away from who looks along the time axis.
+// A point relative to the middle of the box: right, down, and away from a viewer along the time axis.
 struct Point {
   double x = 0, y = 0, z = 0;
 };
@@ -33,7 +33,7 @@ Point half_extent(SensorSize sensor) {
   return {0.5 * sensor.width / longer, 0.5 * sensor.height / longer, 0.5 * kTimeLength};
 }
 
-// As the viewer sees it at scale 1.
+// Its projection at scale 1.
 struct Seen {
   double u = 0, v = 0, distance = 0;
 };
@@ -46,13 +46,13 @@ Seen see(const Point& point, const ViewTurn& turn) {
   return {right * kViewerDistance / distance, down * kViewerDistance / distance, distance};
 }
 
-// The eight corners: bit 0, 1, 2 for the greater x, y, z.
+// One of the eight corners: bits 0, 1, 2 select the larger x, y, z.
 Point corner(const Point& half, int index) {
   return {(index & 1) != 0 ? half.x : -half.x, (index & 2) != 0 ? half.y : -half.y,
           (index & 4) != 0 ? half.z : -half.z};
 }
 
-/// A colour that fades towards the ground with depth, 0 to 1.
+/// A colour that fades to the background with depth, 0 to 1.
 class FadedColours {
  public:
   FadedColours(Rgb colour, Rgb ground) {
@@ -68,7 +68,7 @@ class FadedColours {
   std::array<Rgb, 256> colours_;
 };
 
-/// The box, its axes and what is in it.
+/// The box, its axes and its content.
 class Plot {
  public:
   Plot(const SpaceTimeBox& box, const SpaceTimeView& view, int width, int height, const Theme& theme)
@@ -80,7 +80,7 @@ class Plot {
                {linear_scale(0, box.sensor.height, "y, px"), -0.5, box.sensor.height - 0.5},
                {time_scale(box), double(box.start), double(box.end)}}} {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      // Of two opposite sides, the one whose middle is farther away is behind everything.
+      // Of two opposite sides, the one whose middle is farther away is behind the content.
       std::array<double, 3> low = middle(), high = middle();
       low[axis] = axes_[axis].low;
       high[axis] = axes_[axis].high;
@@ -95,7 +95,7 @@ class Plot {
       for (const Tick& tick : axes_[axis].scale.ticks) {
         const double at = value_of(axis, tick);
         if (at < axes_[axis].low || at > axes_[axis].high) continue;
-        // On the two sides behind that this axis runs along.
+        // On the two back sides that are parallel to this axis.
         for (const std::size_t other : {(axis + 1) % 3, (axis + 2) % 3}) {
           std::array<double, 3> from = back_, to = back_;
           from[axis] = to[axis] = at;
@@ -149,7 +149,7 @@ class Plot {
   }
 
   void draw_labels() {
-    // Those of x and time stand at the lower edges in front, those of y at the edge that is leftmost.
+    // The labels of x and time are at the lower front edges, those of y at the leftmost edge.
     const double bottom = axes_[1].high;
     label_axis(0, {0, bottom, front_[2]}, std::array{0.0, 0.0, front_[2] - back_[2]});
     label_axis(2, {front_[0], bottom, 0}, std::array{front_[0] - back_[0], 0.0, 0.0});
@@ -175,11 +175,11 @@ class Plot {
 
   static Scale time_scale(const SpaceTimeBox& box) {
     const double low = to_seconds(box.start - box.origin), high = to_seconds(box.end - box.origin);
-    const bool too_fine = high - low < 1e-9 * std::max(std::abs(low), std::abs(high));  // for numbers on ticks
+    const bool too_fine = high - low < 1e-9 * std::max(std::abs(low), std::abs(high));  // for tick labels
     return too_fine ? Scale{low, high, false, {}, "t, s"} : linear_scale(low, high, "t, s");
   }
 
-  // Ticks of time are labelled in seconds, and stand at ns.
+  // Ticks of the time axis are labelled in seconds, but placed in ns.
   double value_of(std::size_t axis, const Tick& tick) const {
     return axis == 2 ? static_cast<double>(box_.origin) + 1e9 * tick.value : tick.value;
   }
@@ -207,7 +207,7 @@ class Plot {
     return widest;
   }
 
-  // Every how many-th tick of an edge has room for its label; the same ones while time goes on.
+  // Distance of the ticks with labels, so that labels fit; the same ticks keep labels as time advances.
   long labelled_ticks(std::size_t axis, const std::array<double, 3>& from, const std::array<double, 3>& to) const {
     const Spot first = place(from).spot, last = place(to).spot;
     const double across = std::abs(last.x - first.x), down = std::abs(last.y - first.y);
@@ -220,7 +220,7 @@ class Plot {
     return 10;
   }
 
-  // Ticks and title of an axis along an edge, on the side to which `outward` points; without, to the left.
+  // Draws ticks and title of an axis along an edge, in the direction `outward`, or to the left without it.
   void label_axis(std::size_t axis, std::array<double, 3> edge, std::optional<std::array<double, 3>> outward) {
     const auto direction = [&](const std::array<double, 3>& at) {
       if (!outward) return Spot{-1, 0};
@@ -251,7 +251,7 @@ class Plot {
       const std::array<Spot, 2> ends = {spot, Spot{spot.x + 4 * out.x, spot.y + 4 * out.y}};
       canvas_.polyline(ends, 1, theme_.faint_ink);
       const bool at_corner = axis == 2 && at - axes_[axis].low < 0.04 * (axes_[axis].high - axes_[axis].low);
-      if (at_corner) continue;  // where those of y end
+      if (at_corner) continue;  // the labels of y end here
       if (every > 1 && std::lround(tick.value / tick_step(axis)) % every != 0) continue;
       write(at, 11, tick.label, theme_.ink);
     }
@@ -269,7 +269,7 @@ class Plot {
   SpaceTimeProjection projection_;
   Canvas canvas_;
   std::array<Axis, 3> axes_;                // x, y, time
-  std::array<double, 3> back_{}, front_{};  // where each axis ends on the far and on the near side
+  std::array<double, 3> back_{}, front_{};  // ends of each axis on the far and on the near side
 };
 
 }  // namespace

@@ -7,7 +7,7 @@
 namespace esim {
 namespace {
 
-constexpr double kMostSeconds = 1e9;  // of times given, so that sums stay in range
+constexpr double kMostSeconds = 1e9;  // limit of given times, so that sums stay in range
 
 TimeNs bounded_ns(double seconds) { return to_ns(std::clamp(seconds, 0.0, kMostSeconds)); }
 

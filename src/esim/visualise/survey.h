@@ -11,32 +11,32 @@
 
 namespace esim {
 
-/// What of a recording is shown.
+/// The part of a recording to show.
 struct Extent {
   int camera = 0;
   double start_s = 0;                  ///< since the start of the recording
-  std::optional<double> duration_s{};  ///< all that follows, without
+  std::optional<double> duration_s{};  ///< if not set, up to the end
 };
 
-/// What is known of a recording, and of one camera's part in it, once it has been read.
+/// Properties of a recording and of one of its cameras, found by reading it.
 struct Survey {
-  SensorSize sensor{};               ///< where it is not known: as far as the events reach
+  SensorSize sensor{};               ///< if unknown: large enough for the events
   TimeNs origin = 0;                 ///< start of the recording
-  TimeNs start = 0, end = 0;         ///< of what is shown; within the recording
+  TimeNs start = 0, end = 0;         ///< of the part to show, within the recording
   std::uint64_t events = 0;          ///< from start to end
-  std::map<Content, TimeNs> last{};  ///< kinds of record that can be shown, and the time of the last one read
-  DepthScale depth{};                ///< suits all depths that are shown
+  std::map<Content, TimeNs> last{};  ///< kinds of records that can be shown, with the time of the last one
+  DepthScale depth{};                ///< scale for all depths that are shown
   FlowScale motion{};
 };
 
-/// What the records can fill, in the order of View: depth and motion need ground truth, the image a frame of any kind.
+/// The views that the records support, in the order of View: depth and motion need ground truth, image any frame.
 std::vector<View> views_of(const Survey& survey);
 
-/// Reads a recording up to the end of what is to be shown. `proceed` is told the share (0 to 1) that is done, and says
-/// whether to go on; where it does not, nothing comes of it.
+/// Reads a recording up to the end of the part to show. `proceed` receives the completed fraction (0 to 1) and returns
+/// whether to continue; if it returns false, the result is empty.
 std::optional<Survey> survey(Source& source, const Extent& extent, const std::function<bool(double)>& proceed);
 
-/// Of which camera a record is, and when; nothing for those that are not of a camera or not shown.
+/// Camera and time of a record; nothing for records without a camera and for those that are not shown.
 struct RecordStamp {
   int camera = 0;
   TimeNs first = 0, last = 0;

@@ -7,7 +7,7 @@ namespace esim {
 /// Colours around and behind the events.
 struct Theme {
   Rgb page{13, 15, 20};          ///< around the panels
-  Rgb ground{24, 27, 34};        ///< where nothing has happened
+  Rgb ground{24, 27, 34};        ///< background, without events
   Rgb ink{226, 229, 235};        ///< text
   Rgb faint_ink{142, 150, 163};  ///< less important text, and axes
   Rgb grid{52, 58, 70};

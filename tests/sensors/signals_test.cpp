@@ -100,26 +100,26 @@ TEST(RelaxingSignal, FindsTheFirstCrossingThatAFineSearchFinds) {
 /// A block of signals whose state is in floats, as in the camera.
 template <int kPoles>
 struct Block {
-  AwakePixels awake;
+  ActivePixels active;
   RelaxingSignals signals;
   Comparators compare;
 
   explicit Block(std::mt19937& random, double duration = Case::kDuration) {
     std::uniform_real_distribution<double> uniform;
-    awake.count = compare.count = kBlock;
+    active.count = compare.count = kBlock;
     compare.threshold_on = compare.threshold_off = 0.01;
     for (std::size_t i = 0; i < kBlock; ++i) {
       const Case c(random);
-      awake.start[i] = static_cast<float>(c.start);
-      awake.end[i] = static_cast<float>(c.start + c.slope * Case::kDuration);
-      awake.filtered1[i] = static_cast<float>(c.filtered1);
-      awake.filtered2[i] = static_cast<float>(c.filtered2);
-      awake.phase[i] = static_cast<float>(c.rate * Case::kDuration);
-      awake.moved[i] = static_cast<float>(-std::expm1(-awake.phase[i]));
+      active.start[i] = static_cast<float>(c.start);
+      active.end[i] = static_cast<float>(c.start + c.slope * Case::kDuration);
+      active.filtered1[i] = static_cast<float>(c.filtered1);
+      active.filtered2[i] = static_cast<float>(c.filtered2);
+      active.phase[i] = static_cast<float>(c.rate * Case::kDuration);
+      active.moved[i] = static_cast<float>(-std::expm1(-active.phase[i]));
       compare.leak[i] = 0.3 / duration * uniform(random);
       compare.from[i] = i % 2 == 0 ? duration * uniform(random) : 0;
     }
-    signals.take(awake, 0, kPoles, duration);
+    signals.take(active, 0, kPoles, duration);
     signals.advance(compare);
     for (std::size_t i = 0; i < kBlock; ++i) {
       compare.reference[i] = signals.value(i) + compare.leak[i] * compare.from[i];
@@ -176,16 +176,16 @@ TEST(RelaxingSignals, DoNotDependOnTheirNeighbours) {
   Block<1> block(random), single(random);
   block.signals.find(block.compare);
   for (std::size_t i = 0; i < kBlock; ++i) {
-    single.awake.copy(0, 0);
-    for (auto values :
-         {&AwakePixels::start, &AwakePixels::end, &AwakePixels::filtered1, &AwakePixels::phase, &AwakePixels::moved}) {
-      (single.awake.*values)[0] = (block.awake.*values)[i];
+    single.active.copy(0, 0);
+    for (auto values : {&ActivePixels::start, &ActivePixels::end, &ActivePixels::filtered1, &ActivePixels::phase,
+                        &ActivePixels::moved}) {
+      (single.active.*values)[0] = (block.active.*values)[i];
     }
     single.compare.on[0] = block.compare.on[i], single.compare.off[0] = block.compare.off[i];
     single.compare.reference[0] = block.compare.reference[i], single.compare.leak[0] = block.compare.leak[i];
     single.compare.from[0] = block.compare.from[i];
-    single.awake.count = single.compare.count = 1;
-    single.signals.take(single.awake, 0, 1, Case::kDuration);
+    single.active.count = single.compare.count = 1;
+    single.signals.take(single.active, 0, 1, Case::kDuration);
     single.signals.advance(single.compare);
     single.signals.find(single.compare);
     EXPECT_EQ(single.compare.polarity[0], block.compare.polarity[i]);
@@ -197,16 +197,16 @@ TEST(RelaxingSignals, DoNotDependOnTheirNeighbours) {
 TEST(LinearSignals, FindTheirCrossings) {
   LinearSignals signals;
   Comparators compare{};
-  AwakePixels awake{};
+  ActivePixels active{};
   const double ends[] = {3.0, 3.0, -1.0, -1.0, 1.0}, on[] = {3.1, 1.0, 1.0, 1.0, 1.0}, from[] = {0, 0, 0, 4e5, 0};
-  awake.count = compare.count = 5;
+  active.count = compare.count = 5;
   for (std::size_t i = 0; i < 5; ++i) {
-    awake.start[i] = 1, awake.end[i] = static_cast<float>(ends[i]);
+    active.start[i] = 1, active.end[i] = static_cast<float>(ends[i]);
     compare.reference[i] = 1, compare.on[i] = static_cast<float>(on[i]), compare.off[i] = 0.5F;
     compare.from[i] = from[i];
   }
   compare.leak[4] = 2e-6;
-  signals.take(awake, 0, 1e6);
+  signals.take(active, 0, 1e6);
   signals.advance(compare);
   signals.find(compare);
   EXPECT_EQ(compare.polarity[0], 0);

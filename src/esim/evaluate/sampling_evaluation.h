@@ -79,9 +79,9 @@ struct EvaluationMonitor {
   std::function<void(const SamplingEvaluation& so_far)> scheme_done;
 };
 
-/// Simulates camera 0 of a scenario with each sampling scheme and measures errors and cost; docs/methods/sampling.md defines
-/// the measures. The event camera is ideal except for the scenario's thresholds. Returns nothing if the monitor stopped
-/// the evaluation. Throws UserError for problems that the user can repair.
+/// Simulates camera 0 of a scenario with each sampling scheme and measures errors and cost; docs/methods/sampling.md
+/// defines the measures. The event camera is ideal except for the scenario's thresholds. Returns nothing if the monitor
+/// stopped the evaluation. Throws UserError for problems that the user can repair.
 std::optional<SamplingEvaluation> evaluate_sampling(const Scenario& scenario, const SamplingEvaluationOptions& options,
                                                     const Notices& notices, const EvaluationMonitor& monitor);
 

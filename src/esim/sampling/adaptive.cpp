@@ -181,8 +181,8 @@ void AdaptiveSampler::give(TileCourse& tile) {
 int AdaptiveSampler::pieces(const TileTimeline& timeline, std::size_t i) const {
   constexpr TimeNs kMost = 4;
   if (timeline.time(i + 1) - timeline.time(i) < kMost) return 1;
-  const double bow = timeline.bow(i);
-  return bow <= straight_ ? 1 : (bow <= 4 * straight_ ? 2 : kMost);
+  const double curvature = timeline.curvature(i);
+  return curvature <= straight_ ? 1 : (curvature <= 4 * straight_ ? 2 : kMost);
 }
 
 /// Adds the results of the tiles to the statistics.

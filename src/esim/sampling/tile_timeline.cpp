@@ -46,7 +46,7 @@ double root_mean(float sum, std::size_t count) {
 
 /// The curvature c h^2 between two samples, from the second differences before and after, each a weighted sum of the
 /// irradiance at three samples.
-struct TileTimeline::Bow {
+struct TileTimeline::Curvature {
   const float *before, *first, *last, *after;
   float before_outer = 0, before_near = 0, before_far = 0;
   float after_outer = 0, after_near = 0, after_far = 0;
@@ -73,12 +73,13 @@ struct TileTimeline::Bow {
   }
 };
 
-TileTimeline::Bow TileTimeline::bow_between(std::size_t first, std::size_t last) const {
+TileTimeline::Curvature TileTimeline::curvature_between(std::size_t first, std::size_t last) const {
   const bool has_before = first > 0, has_after = last + 1 < samples_.size();
   const auto values = [&](std::size_t i) { return samples_[i].irradiance.data(); };
-  Bow bow{values(has_before ? first - 1 : first), values(first), values(last), values(has_after ? last + 1 : last)};
-  if (!has_before || !has_after) return bow;
-  bow.straight = false;
+  Curvature curvature{values(has_before ? first - 1 : first), values(first), values(last),
+                      values(has_after ? last + 1 : last)};
+  if (!has_before || !has_after) return curvature;
+  curvature.straight = false;
   const auto h = static_cast<double>(samples_[last].t - samples_[first].t);
   // h^2 times the second divided difference of three samples, one of them at a distance `gap` from the interval.
   const auto weigh = [&](double gap, float& outer, float& near, float& far) {
@@ -86,10 +87,11 @@ TileTimeline::Bow TileTimeline::bow_between(std::size_t first, std::size_t last)
     outer = static_cast<float>(scale / gap), far = static_cast<float>(scale / h);
     near = -static_cast<float>(scale / gap + scale / h);
   };
-  weigh(static_cast<double>(samples_[first].t - samples_[first - 1].t), bow.before_outer, bow.before_near,
-        bow.before_far);
-  weigh(static_cast<double>(samples_[last + 1].t - samples_[last].t), bow.after_outer, bow.after_near, bow.after_far);
-  return bow;
+  weigh(static_cast<double>(samples_[first].t - samples_[first - 1].t), curvature.before_outer, curvature.before_near,
+        curvature.before_far);
+  weigh(static_cast<double>(samples_[last + 1].t - samples_[last].t), curvature.after_outer, curvature.after_near,
+        curvature.after_far);
+  return curvature;
 }
 
 void TileTimeline::insert(TimeNs t, const Image<float>& irradiance) {
@@ -133,7 +135,7 @@ std::size_t TileTimeline::forget_before(std::size_t i) {
 }
 
 void TileTimeline::errors(std::size_t i, std::vector<float>& out) const {
-  const Bow bow = bow_between(i - 1, i + 1);
+  const Curvature curvature = curvature_between(i - 1, i + 1);
   const TimeNs t0 = samples_[i - 1].t, t1 = samples_[i + 1].t;
   const auto f = static_cast<float>(static_cast<double>(samples_[i].t - t0) / static_cast<double>(t1 - t0));
   const float* const seen = samples_[i].brightness.data();
@@ -148,10 +150,10 @@ void TileTimeline::errors(std::size_t i, std::vector<float>& out) const {
       }
     });
   };
-  if (bow.straight) {
-    compare([&](std::size_t k) { return bow.first[k] + (bow.last[k] - bow.first[k]) * f; });
+  if (curvature.straight) {
+    compare([&](std::size_t k) { return curvature.first[k] + (curvature.last[k] - curvature.first[k]) * f; });
   } else {
-    compare([&](std::size_t k) { return bow.irradiance(k, f); });
+    compare([&](std::size_t k) { return curvature.irradiance(k, f); });
   }
 }
 
@@ -173,7 +175,7 @@ void TileTimeline::measure(std::size_t i) {
   sample.surprise = root_mean(error, errors_.size()), sample.bend = root_mean(bend, errors_.size());
 }
 
-double TileTimeline::bow(std::size_t i) const {
+double TileTimeline::curvature(std::size_t i) const {
   const auto h = static_cast<double>(time(i + 1) - time(i));
   // Scales a sample's bend, which spans the intervals on both sides, to this interval: it is proportional to the square
   // of the length.
@@ -188,22 +190,22 @@ double TileTimeline::bow(std::size_t i) const {
 }
 
 void TileTimeline::write_half(std::size_t i, float* half) const {
-  const Bow bow = bow_between(i, i + 1);
+  const Curvature curvature = curvature_between(i, i + 1);
   const std::size_t count = samples_[i].irradiance.size();
 #pragma omp simd
-  for (std::size_t k = 0; k < count; ++k) half[k] = bow.irradiance(k, 0.5F);
+  for (std::size_t k = 0; k < count; ++k) half[k] = curvature.irradiance(k, 0.5F);
 }
 
 void TileTimeline::write_quarters(std::size_t i, const std::array<float*, 3>& quarters) const {
-  const Bow bow = bow_between(i, i + 1);
+  const Curvature curvature = curvature_between(i, i + 1);
   const std::size_t count = samples_[i].irradiance.size();
   float *const first = quarters[0], *const half = quarters[1], *const last = quarters[2];
 #pragma omp simd
   for (std::size_t k = 0; k < count; ++k) {
-    const float c = bow(k);
-    first[k] = bow.irradiance(k, c, 0.25F);
-    half[k] = bow.irradiance(k, c, 0.5F);
-    last[k] = bow.irradiance(k, c, 0.75F);
+    const float c = curvature(k);
+    first[k] = curvature.irradiance(k, c, 0.25F);
+    half[k] = curvature.irradiance(k, c, 0.5F);
+    last[k] = curvature.irradiance(k, c, 0.75F);
   }
 }
 

@@ -49,7 +49,7 @@ class TileTimeline {
 
   /// Deviation of brightness from a straight line in the middle between samples i and i + 1, root mean square as above:
   /// the smaller of the estimates from the second differences of brightness at both samples.
-  double bow(std::size_t i) const;
+  double curvature(std::size_t i) const;
 
   /// Irradiance of the tile's pixels at sample i, row by row. Valid until the next insert(), even if the sample is
   /// removed.
@@ -67,9 +67,9 @@ class TileTimeline {
     LargeVector<float> irradiance;
     LargeVector<float> brightness;  // of the watched pixels
   };
-  struct Bow;
+  struct Curvature;
 
-  Bow bow_between(std::size_t first, std::size_t last) const;
+  Curvature curvature_between(std::size_t first, std::size_t last) const;
   void measure(std::size_t i);
 
   Tile tile_;

@@ -4,16 +4,17 @@
 
 namespace esim {
 
-void LinearSignals::take(const AwakePixels& awake, std::size_t first, double duration) {
+void LinearSignals::take(const ActivePixels& active, std::size_t first, double duration) {
   duration_ = duration, per_duration_ = 1 / duration;
-  for (std::size_t i = first; i < awake.count; ++i) start_[i] = awake.start[i], end_[i] = awake.end[i];
+  for (std::size_t i = first; i < active.count; ++i) start_[i] = active.start[i], end_[i] = active.end[i];
 }
 
-void LinearSignals::take_light(const AwakePixels& awake, std::size_t first, double eps, double duration) {
+void LinearSignals::take_light(const ActivePixels& active, std::size_t first, double eps, double duration) {
   duration_ = duration, per_duration_ = 1 / duration;
-  for (std::size_t i = first; i < awake.count; ++i) start_[i] = awake.light0[i] + eps, end_[i] = awake.light1[i] + eps;
-  logarithms(awake.count - first, start_.data() + first);
-  logarithms(awake.count - first, end_.data() + first);
+  for (std::size_t i = first; i < active.count; ++i)
+    start_[i] = active.light0[i] + eps, end_[i] = active.light1[i] + eps;
+  logarithms(active.count - first, start_.data() + first);
+  logarithms(active.count - first, end_.data() + first);
 }
 
 void LinearSignals::find(Comparators& c) const {

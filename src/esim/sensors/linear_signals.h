@@ -8,9 +8,9 @@ namespace esim {
 class LinearSignals {
  public:
   /// Takes the brightness of the active pixels from index `first` on.
-  void take(const AwakePixels& awake, std::size_t first, double duration);
+  void take(const ActivePixels& active, std::size_t first, double duration);
   /// Takes the logarithm of their irradiance plus eps.
-  void take_light(const AwakePixels& awake, std::size_t first, double eps, double duration);
+  void take_light(const ActivePixels& active, std::size_t first, double eps, double duration);
   void set(std::size_t i, double start, double end) { start_[i] = start, end_[i] = end; }
 
   /// Finds the first time at which each of the first `count` signals leaves its levels, from `from` to the segment's

@@ -29,10 +29,10 @@ PixelArray::PixelArray(const EventCameraOptions& o, int width_px, int height_px,
       in_brightness(o.low_pass_hz > 0 || o.response != PixelResponse::log || o.surround_px > 0),
       leaks(o.leak_rate_hz > 0 || (o.hot_pixels > 0 && o.hot_pixel_rate_hz > 0)),
       shoots(o.shot_noise_hz > 0),
-      alarmed(leaks || shoots),
+      has_timers(leaks || shoots),
       renews(o.threshold_noise > 0 || (leaks && o.leak_jitter > 0) || o.latency_jitter_us > 0),
       delays(o.latency_us > 0 || o.latency_jitter_us > 0),
-      clean(!in_brightness && !alarmed && !renews && !delays && !drops),
+      clean(!in_brightness && !has_timers && !renews && !delays && !drops),
       per_event(seed, Purpose::threshold_noise, stream),
       per_shot(seed, Purpose::shot_noise, stream),
       per_leak(seed, Purpose::leak_mismatch, stream) {
@@ -45,7 +45,7 @@ PixelArray::PixelArray(const EventCameraOptions& o, int width_px, int height_px,
   }
   band_low.assign(pixels, std::numeric_limits<float>::infinity());
   band_high.assign(pixels, -std::numeric_limits<float>::infinity());
-  if (alarmed) alarms.assign(pixels, std::numeric_limits<std::int32_t>::max());
+  if (has_timers) timers.assign(pixels, std::numeric_limits<std::int32_t>::max());
   if (in_brightness) {
     brightness.resize(pixels);
     if (o.low_pass_hz > 0) filtered1.resize(pixels);
@@ -117,7 +117,7 @@ void PixelArray::hold(std::uint32_t pixel, TimeNs end) {
     noisy_pixels[pixel].until = static_cast<double>(end - epoch);
   }
   empty_band(pixel);
-  if (alarmed) alarms[pixel] = std::numeric_limits<std::int32_t>::max();
+  if (has_timers) timers[pixel] = std::numeric_limits<std::int32_t>::max();
 }
 
 void PixelArray::take_back(std::uint32_t pixel, std::uint32_t events, TimeNs end) {

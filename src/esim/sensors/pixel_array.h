@@ -85,7 +85,7 @@ class PixelArray {
   // Which parts of the model are in use.
   bool in_brightness;  // bounds are of brightness, not of irradiance
   bool leaks, shoots;  // pixels fire without a change of irradiance
-  bool alarmed;        // leaks or shoots: pixels have timers
+  bool has_timers;     // of leaks or shot noise
   bool renews;         // thresholds, leaks or latencies differ from event to event
   bool delays;         // time stamps are later than crossings
   bool clean;          // only changes of irradiance make pixels fire, and bounds are of irradiance
@@ -112,7 +112,7 @@ class PixelArray {
 
   // Bounds of the irradiance, or of the filtered brightness; strictly within them no event is possible.
   LargeVector<float> band_low, band_high;
-  LargeVector<std::int32_t> alarms;  // timers, in ticks
+  LargeVector<std::int32_t> timers;  // timers, in ticks
 
   // With in_brightness: the brightness at the last sample, and after each pole.
   LargeVector<float> brightness, filtered1, filtered2;
@@ -128,7 +128,7 @@ class PixelArray {
     archive.fixed(self.noisy_pixels);
     archive.fixed(self.band_low);
     archive.fixed(self.band_high);
-    archive.fixed(self.alarms);
+    archive.fixed(self.timers);
     archive.fixed(self.brightness);
     archive.fixed(self.filtered1);
     archive.fixed(self.filtered2);

@@ -17,7 +17,7 @@ template <typename T>
 using PerPixel = std::array<T, kBlock + kVectorPadding>;
 
 /// The active pixels of a segment. Unused values of the low-pass are arbitrary.
-struct AwakePixels {
+struct ActivePixels {
   PerPixel<std::uint32_t> pixel, place;  ///< index; EventPacking::place()
   PerPixel<float> light0, light1;        ///< irradiance at the segment's ends
   PerPixel<float> start, end;            ///< brightness there

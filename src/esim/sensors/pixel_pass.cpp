@@ -18,7 +18,7 @@ constexpr double kPerNs = 1e-9, kNsPerS = 1e9;
 }  // namespace
 
 template <class Signals>
-std::size_t PixelPass<Signals>::take(const PixelArray& pixels, AwakePixels& awake, TimeNs t0, TimeNs t1) {
+std::size_t PixelPass<Signals>::take(const PixelArray& pixels, ActivePixels& active, TimeNs t0, TimeNs t1) {
   t0_ = t0;
   duration_ = static_cast<double>(t1 - t0);
   epoch_ns_ = static_cast<double>(t0 - pixels.epoch);
@@ -26,14 +26,14 @@ std::size_t PixelPass<Signals>::take(const PixelArray& pixels, AwakePixels& awak
   const double duration = duration_, epoch_ns = epoch_ns_, epoch_s = epoch_ns * kPerNs;
   const std::size_t first = compare_.count;
   std::size_t count = first, held_count = 0;
-  for (std::size_t from = first; from < awake.count; ++from) {
-    const PixelArray::NoisyPixel& own = pixels.noisy_pixels[awake.pixel[from]];
+  for (std::size_t from = first; from < active.count; ++from) {
+    const PixelArray::NoisyPixel& own = pixels.noisy_pixels[active.pixel[from]];
     const double until = own.until - epoch_ns;
     const bool held = own.reference == kHeld;
     if (held & (until > duration)) [[unlikely]]
       continue;
     const std::size_t i = count++;
-    if (i != from) awake.copy(from, i);
+    if (i != from) active.copy(from, i);
     held_[held_count] = static_cast<std::uint32_t>(i);
     held_count += held ? 1 : 0;
     compare_.reference[i] = own.reference - own.leak * epoch_s;
@@ -45,33 +45,33 @@ std::size_t PixelPass<Signals>::take(const PixelArray& pixels, AwakePixels& awak
     shot_[i] = own.shot_at - epoch_ns;
     until_[i] = until;
   }
-  awake.count = compare_.count = count;
+  active.count = compare_.count = count;
   held_count_ = held_count;
   return first;
 }
 
 template <class Signals>
-void PixelPass<Signals>::round(PixelArray& pixels, AwakePixels& awake, PackedEvents& events, bool wait) {
+void PixelPass<Signals>::round(PixelArray& pixels, ActivePixels& active, PackedEvents& events, bool wait) {
   resume_held();
   signals.find(compare_);
   std::fill_n(anew_.begin(), compare_.count, pixels.holds ? 1.0 : 0.0);
-  if (pixels.shoots) find_shots(pixels, awake);
+  if (pixels.shoots) find_shots(pixels, active);
   for (std::size_t i = 0; i < compare_.count; ++i) {
     passed_[i] = compare_.polarity[i] > 0 ? compare_.upper(i) : compare_.lower(i);
   }
-  if (pixels.renews) renew(pixels, awake);
-  fire(pixels, awake, events.packing());
-  events.add(compare_.count, t0_, stamp_.data(), awake.place.data(), compare_.polarity.data(), reports_.data());
+  if (pixels.renews) renew(pixels, active);
+  fire(pixels, active, events.packing());
+  events.add(compare_.count, t0_, stamp_.data(), active.place.data(), compare_.polarity.data(), reports_.data());
   reset(pixels, wait);
-  sleep(pixels, awake);
+  deactivate(pixels, active);
 }
 
 template <class Signals>
-void PixelPass<Signals>::draw_again(PixelArray& pixels, const AwakePixels& awake) {
+void PixelPass<Signals>::draw_again(PixelArray& pixels, const ActivePixels& active) {
   if (!pixels.renews) return;
-  const std::size_t count = awake.count;
+  const std::size_t count = active.count;
   for (std::size_t i = 0; i < count; ++i) {
-    const PixelArray::NoisyPixel& own = pixels.noisy_pixels[awake.pixel[i]];
+    const PixelArray::NoisyPixel& own = pixels.noisy_pixels[active.pixel[i]];
     mean_on_[i] = own.mean_on, mean_off_[i] = own.mean_off, mean_leak_[i] = own.mean_leak;
     draws_[i] = own.draws - 1;
   }
@@ -79,9 +79,9 @@ void PixelPass<Signals>::draw_again(PixelArray& pixels, const AwakePixels& awake
   std::fill_n(compare_.tau.begin(), count, 0.0);
   compare_.threshold_on = pixels.threshold_on, compare_.threshold_off = pixels.threshold_off;
   compare_.count = count;
-  renew(pixels, awake);
+  renew(pixels, active);
   for (std::size_t i = 0; i < count; ++i) {
-    PixelArray::NoisyPixel& own = pixels.noisy_pixels[awake.pixel[i]];
+    PixelArray::NoisyPixel& own = pixels.noisy_pixels[active.pixel[i]];
     own.on = compare_.on[i], own.off = compare_.off[i];
     if (pixels.leaks) own.leak = static_cast<float>(compare_.leak[i] * kNsPerS);
   }
@@ -102,23 +102,23 @@ void PixelPass<Signals>::resume_held() {
 
 /// Shot noise is a Poisson process at its maximum rate, thinned according to the current irradiance.
 template <class Signals>
-void PixelPass<Signals>::find_shots(const PixelArray& pixels, const AwakePixels& awake) {
+void PixelPass<Signals>::find_shots(const PixelArray& pixels, const ActivePixels& active) {
   for (std::size_t i = 0; i < compare_.count; ++i) {
     if (shot_[i] <= duration_) [[unlikely]]
-      find_shot(pixels, awake, i);
+      find_shot(pixels, active, i);
   }
 }
 
 /// The first accepted candidate before the crossing becomes the pixel's event.
 template <class Signals>
-void PixelPass<Signals>::find_shot(const PixelArray& pixels, const AwakePixels& awake, std::size_t i) {
+void PixelPass<Signals>::find_shot(const PixelArray& pixels, const ActivePixels& active, std::size_t i) {
   constexpr double kToUnit = 0x1.0p-32;
   while (shot_[i] <= duration_ && !(compare_.polarity[i] != 0 && shot_[i] >= compare_.tau[i])) {
     const double tau = shot_[i];
-    const auto bits = pixels.per_shot.bits(awake.pixel[i], shots_[i]++);
+    const auto bits = pixels.per_shot.bits(active.pixel[i], shots_[i]++);
     shot_[i] += pixels.shot_interval((bits[0] + 0.5) * kToUnit);
     if (tau <= 0 || tau < compare_.from[i]) continue;  // within a refractory period
-    const double light = awake.light0[i] + (awake.light1[i] - awake.light0[i]) * tau / duration_;
+    const double light = active.light0[i] + (active.light1[i] - active.light0[i]) * tau / duration_;
     const double intensity = std::min(pixels.relative_intensity(light), 1.0);
     const double passes = 1.0 - (1.0 - pixels.options.shot_noise_at_white) * intensity;
     if (bits[1] * kToUnit >= passes) continue;
@@ -131,8 +131,8 @@ void PixelPass<Signals>::find_shot(const PixelArray& pixels, const AwakePixels& 
 
 /// Draws the thresholds and leaks after the new events.
 template <class Signals>
-void PixelPass<Signals>::renew(const PixelArray& pixels, const AwakePixels& awake) {
-  normals_.draw(pixels.per_event, compare_.count, awake.pixel, draws_);
+void PixelPass<Signals>::renew(const PixelArray& pixels, const ActivePixels& active) {
+  normals_.draw(pixels.per_event, compare_.count, active.pixel, draws_);
   const double sigma = pixels.options.threshold_noise, jitter = pixels.options.leak_jitter;
   const double least_on = kMinContrastThreshold - pixels.threshold_on;
   const double least_off = kMinContrastThreshold - pixels.threshold_off;
@@ -159,7 +159,7 @@ void PixelPass<Signals>::renew(const PixelArray& pixels, const AwakePixels& awak
 
 /// Computes the times of the events and of the refractory periods after them.
 template <class Signals>
-void PixelPass<Signals>::fire(const PixelArray& pixels, const AwakePixels& awake, const EventPacking& packing) {
+void PixelPass<Signals>::fire(const PixelArray& pixels, const ActivePixels& active, const EventPacking& packing) {
   const double duration = duration_, refractory = static_cast<double>(pixels.refractory);
   const bool drops = pixels.drops, holds = pixels.holds;
 #pragma omp simd
@@ -172,18 +172,18 @@ void PixelPass<Signals>::fire(const PixelArray& pixels, const AwakePixels& awake
   }
   // An acknowledged request is raised at the time stamp, which includes the latency.
   const bool delays_first = pixels.delays && pixels.acknowledged && holds;
-  if (delays_first) delay(pixels, awake, packing);
+  if (delays_first) delay(pixels, active, packing);
 #pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
     until_[i] = reports_[i] != 0 ? stamp_[i] + refractory : until_[i];
     const double resumes = holds ? until_[i] : compare_.tau[i];
     compare_.from[i] = compare_.polarity[i] != 0 ? resumes : compare_.from[i];
   }
-  if (pixels.delays && !delays_first) delay(pixels, awake, packing);
+  if (pixels.delays && !delays_first) delay(pixels, active, packing);
 }
 
 template <class Signals>
-void PixelPass<Signals>::delay(const PixelArray& pixels, const AwakePixels& awake, const EventPacking& packing) {
+void PixelPass<Signals>::delay(const PixelArray& pixels, const ActivePixels& active, const EventPacking& packing) {
   constexpr double kLongestNs = 1e17;
   const EventCameraOptions& o = pixels.options;
   const double mean = o.latency_us * 1e3, jitter = o.latency_jitter_us * 1e3, share = o.latency_light_share;
@@ -192,7 +192,7 @@ void PixelPass<Signals>::delay(const PixelArray& pixels, const AwakePixels& awak
   const PerPixel<float>& normal = normals_[3];
 #pragma omp simd
   for (std::size_t i = 0; i < compare_.count; ++i) {
-    const double light = awake.light0[i] + (awake.light1[i] - awake.light0[i]) * compare_.tau[i] * per_duration;
+    const double light = active.light0[i] + (active.light1[i] - active.light0[i]) * compare_.tau[i] * per_duration;
     const double slower = 1.0 - share + share * (1.0 + dark) / (light + dark);
     double ns = (mean + (jitter > 0 ? jitter * normal[i] : 0.0)) * (share > 0 ? slower : 1.0);
     ns = ns > 0 ? ns : 0.0;
@@ -229,7 +229,7 @@ void PixelPass<Signals>::reset(const PixelArray& pixels, bool wait) {
 
 /// Makes the finished pixels inactive, and keeps the others.
 template <class Signals>
-void PixelPass<Signals>::sleep(PixelArray& pixels, AwakePixels& awake) {
+void PixelPass<Signals>::deactivate(PixelArray& pixels, ActivePixels& active) {
   constexpr double kForever = kAges;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const double duration = duration_, since_epoch = epoch_ns_ + duration_;
@@ -246,27 +246,27 @@ void PixelPass<Signals>::sleep(PixelArray& pixels, AwakePixels& awake) {
     const double sinks = leak > 0 ? leak * (duration + valid) : 0.0;
     low_[i] = held ? kInfinity : static_cast<float>(lower - leak * duration);
     high_[i] = held ? -kInfinity : static_cast<float>(upper - sinks);
-    const double shot = shot_[i] - duration + no_shot, alarm = shot < valid ? shot : valid;
-    alarm_[i] = PixelArray::ticks_after_epoch(since_epoch + alarm);
+    const double shot = shot_[i] - duration + no_shot, timer = shot < valid ? shot : valid;
+    timer_[i] = PixelArray::ticks_after_epoch(since_epoch + timer);
   }
   // Pixels that continue are also written back here: they become inactive later.
-  for (std::size_t i = 0; i < compare_.count; ++i) write_back(pixels.noisy_pixels[awake.pixel[i]], i);
-  if (pixels.alarmed) {
-    for (std::size_t i = 0; i < compare_.count; ++i) pixels.alarms[awake.pixel[i]] = alarm_[i];
+  for (std::size_t i = 0; i < compare_.count; ++i) write_back(pixels.noisy_pixels[active.pixel[i]], i);
+  if (pixels.has_timers) {
+    for (std::size_t i = 0; i < compare_.count; ++i) pixels.timers[active.pixel[i]] = timer_[i];
   }
-  pixels.set_bands(compare_.count, awake.pixel.data(), low_.data(), high_.data());
+  pixels.set_bands(compare_.count, active.pixel.data(), low_.data(), high_.data());
   std::size_t kept = 0;
   for (std::size_t i = 0; i < compare_.count; ++i) {
     if (again_[i] != 0) [[unlikely]]
-      keep(awake, i, kept++);
+      keep(active, i, kept++);
   }
-  compare_.count = awake.count = kept;
+  compare_.count = active.count = kept;
 }
 
 template <class Signals>
-void PixelPass<Signals>::keep(AwakePixels& awake, std::size_t i, std::size_t to) {
+void PixelPass<Signals>::keep(ActivePixels& active, std::size_t i, std::size_t to) {
   if (i == to) return;
-  awake.copy(i, to);
+  active.copy(i, to);
   compare_.copy(i, to);
   signals.copy(i, to);
   draws_[to] = draws_[i], shots_[to] = shots_[i];
@@ -287,40 +287,40 @@ void PixelPass<Signals>::write_back(PixelArray::NoisyPixel& own, std::size_t i) 
 
 /// The first of random.uniforms(pixel, draw) for each pixel.
 template <class Signals>
-void PixelPass<Signals>::draw_uniforms(const AddressedRandom& random, const AwakePixels& awake, std::uint32_t draw) {
+void PixelPass<Signals>::draw_uniforms(const AddressedRandom& random, const ActivePixels& active, std::uint32_t draw) {
   std::array<PerPixel<std::uint32_t>, 4> words;
   PerPixel<std::uint32_t> draws;
   draws.fill(draw);
-  random.bits(awake.count, awake.pixel.data(), draws.data(),
+  random.bits(active.count, active.pixel.data(), draws.data(),
               {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
-  for (std::size_t i = 0; i < awake.count; ++i) uniform_[i] = AddressedRandom::open_unit(words[0][i], words[1][i]);
+  for (std::size_t i = 0; i < active.count; ++i) uniform_[i] = AddressedRandom::open_unit(words[0][i], words[1][i]);
 }
 
 template <class Signals>
-void PixelPass<Signals>::open(PixelArray& pixels, AwakePixels& awake) {
+void PixelPass<Signals>::open(PixelArray& pixels, ActivePixels& active) {
   const std::size_t count = compare_.count;
   std::fill_n(compare_.polarity.begin(), count, 1.0);
   std::fill_n(compare_.tau.begin(), count, 0.0);
   std::fill_n(again_.begin(), count, 0.0);
-  if (pixels.renews) renew(pixels, awake);
+  if (pixels.renews) renew(pixels, active);
   for (std::size_t i = 0; i < count; ++i) compare_.reference[i] = signals.end(i);
   if (pixels.leaks) {
     // A sensor that leaks is already running at the start: it is at a random time between two leak events.
-    draw_uniforms(pixels.per_leak, awake, 1);
+    draw_uniforms(pixels.per_leak, active, 1);
     for (std::size_t i = 0; i < count; ++i) {
       const double threshold = pixels.threshold_on + compare_.on[i];
       if (compare_.leak[i] > 0) compare_.reference[i] -= threshold * uniform_[i];
     }
   }
   if (pixels.shoots) {
-    draw_uniforms(pixels.per_shot, awake, 0);
+    draw_uniforms(pixels.per_shot, active, 0);
     for (std::size_t i = 0; i < count; ++i) {
       const bool dead = std::isinf(compare_.on[i]);
       shot_[i] = dead ? kAges : pixels.shot_interval(uniform_[i]);
       shots_[i] = 1;
     }
   }
-  sleep(pixels, awake);
+  deactivate(pixels, active);
 }
 
 template class PixelPass<LinearSignals>;

@@ -20,34 +20,34 @@ class PixelPass {
   /// The signals of the comparators; set them for the pixels that take() added.
   Signals signals;
 
-  /// Takes the new active pixels between t0 and t1: those in `awake` after the ones that the last round() left, in the
-  /// same segment. Removes from `awake` those that stay in reset. Returns the index of the first new pixel.
-  std::size_t take(const PixelArray& pixels, AwakePixels& awake, TimeNs t0, TimeNs t1);
+  /// Takes the new active pixels between t0 and t1: those in `active` after the ones that the last round() left, in the
+  /// same segment. Removes from `active` those that stay in reset. Returns the index of the first new pixel.
+  std::size_t take(const PixelArray& pixels, ActivePixels& active, TimeNs t0, TimeNs t1);
 
-  /// Adds the next event of each pixel that fires to `events`, in any order. `awake` keeps the pixels that may fire
+  /// Adds the next event of each pixel that fires to `events`, in any order. `active` keeps the pixels that may fire
   /// again; with `wait`, none: pixels then stay in reset after their event until it has been read out.
-  void round(PixelArray& pixels, AwakePixels& awake, PackedEvents& events, bool wait = false);
+  void round(PixelArray& pixels, ActivePixels& active, PackedEvents& events, bool wait = false);
 
   /// Restores the values that pixels drew after the last of their events.
-  void draw_again(PixelArray& pixels, const AwakePixels& awake);
+  void draw_again(PixelArray& pixels, const ActivePixels& active);
 
   /// Instead of rounds at the pixels' first sample, t0 = t1: sets their references.
-  void open(PixelArray& pixels, AwakePixels& awake);
+  void open(PixelArray& pixels, ActivePixels& active);
 
  private:
   void resume_held();
 
   // The steps of a round, for all remaining pixels.
-  void find_shots(const PixelArray& pixels, const AwakePixels& awake);
-  void find_shot(const PixelArray& pixels, const AwakePixels& awake, std::size_t i);
-  void renew(const PixelArray& pixels, const AwakePixels& awake);
-  void fire(const PixelArray& pixels, const AwakePixels& awake, const EventPacking& packing);
-  void delay(const PixelArray& pixels, const AwakePixels& awake, const EventPacking& packing);
+  void find_shots(const PixelArray& pixels, const ActivePixels& active);
+  void find_shot(const PixelArray& pixels, const ActivePixels& active, std::size_t i);
+  void renew(const PixelArray& pixels, const ActivePixels& active);
+  void fire(const PixelArray& pixels, const ActivePixels& active, const EventPacking& packing);
+  void delay(const PixelArray& pixels, const ActivePixels& active, const EventPacking& packing);
   void reset(const PixelArray& pixels, bool wait);
-  void sleep(PixelArray& pixels, AwakePixels& awake);
+  void deactivate(PixelArray& pixels, ActivePixels& active);
 
-  void draw_uniforms(const AddressedRandom& random, const AwakePixels& awake, std::uint32_t draw);
-  void keep(AwakePixels& awake, std::size_t i, std::size_t to);
+  void draw_uniforms(const AddressedRandom& random, const ActivePixels& active, std::uint32_t draw);
+  void keep(ActivePixels& active, std::size_t i, std::size_t to);
   void write_back(PixelArray::NoisyPixel& own, std::size_t i) const;
 
   TimeNs t0_ = 0;
@@ -74,7 +74,7 @@ class PixelPass {
 
   // The bounds of inactive pixels.
   PerPixel<float> low_{}, high_{};
-  PerPixel<std::int32_t> alarm_{};
+  PerPixel<std::int32_t> timer_{};
 };
 
 extern template class PixelPass<LinearSignals>;

@@ -38,7 +38,7 @@ struct PixelUpdate::Filter {
     const double per_light = at_white / (1 + o.dark_irradiance);
     phase_per_light = static_cast<float>(per_light / 6);
     phase_in_dark = static_cast<float>(per_light * o.dark_irradiance);
-    if (pixels.alarmed) later = pixels.ticks(segment.t1) + 1;
+    if (pixels.has_timers) later = pixels.ticks(segment.t1) + 1;
   }
 
   /// Duration of the segment in time constants, at the mean irradiance: Simpson's rule for an exponential.
@@ -54,7 +54,7 @@ struct PixelUpdate::FilterRow {
   const float *light0, *light1, *end;    // irradiance at both ends of the segment, brightness at its end
   float *start, *filtered1, *filtered2;  // brightness at its start, and after each pole: to be advanced
   const float *band_low, *band_high;
-  const std::int32_t* alarms;  // timers, or null
+  const std::int32_t* timers;  // timers, or null
   std::uint32_t pixel, place;  // of the first pixel
   // Storage of the past segment for filtered1, filtered2, start and end, or null.
   float *past1 = nullptr, *past2 = nullptr, *past_start = nullptr, *past_end = nullptr;
@@ -79,7 +79,7 @@ struct PixelUpdate::FilterRow {
     }
     if constexpr (kOrder > 0) __builtin_prefetch(filtered1 + x + kAhead);
     if constexpr (kOrder > 1) __builtin_prefetch(filtered2 + x + kAhead);
-    if (alarms != nullptr) __builtin_prefetch(alarms + x + kAhead);
+    if (timers != nullptr) __builtin_prefetch(timers + x + kAhead);
   }
 };
 
@@ -120,13 +120,13 @@ HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter
       highest = hn::Max(hn::Max(f2, f2_end), hn::Max(f1, highest));
     }
   }
-  auto restless =
+  auto leaving =
       hn::Or(hn::Le(lowest, hn::LoadU(d, row.band_low + x)), hn::Ge(highest, hn::LoadU(d, row.band_high + x)));
-  if (row.alarms != nullptr) {
-    const auto alarmed = hn::Lt(hn::LoadU(di, row.alarms + x), hn::Set(di, filter.later));
-    restless = hn::Or(restless, hn::RebindMask(d, alarmed));
+  if (row.timers != nullptr) {
+    const auto expired = hn::Lt(hn::LoadU(di, row.timers + x), hn::Set(di, filter.later));
+    leaving = hn::Or(leaving, hn::RebindMask(d, expired));
   }
-  moved_.restless[static_cast<std::size_t>(at) / hn::Lanes(d)] = ChosenLanes<D>::bits_of(d, restless);
+  moved_.leaving[static_cast<std::size_t>(at) / hn::Lanes(d)] = ChosenLanes<D>::bits_of(d, leaving);
 }
 
 /// Advances the low-passes of pixels from x = begin on, and returns the columns that become active.
@@ -138,13 +138,13 @@ std::span<const std::uint32_t> PixelUpdate::move(D d, const PixelArray& pixels, 
     move_vector<kOrder>(d, row, filter, x, x - begin);
     row.prefetch<kOrder>(x);
     // Prefetch the previous active pixels, a few at a time.
-    pixels.prefetch(awake_.pixel[asked_]), pixels.prefetch(awake_.pixel[asked_ + 1]);
-    asked_ = std::min(asked_ + 2, awake_.count);
+    pixels.prefetch(active_.pixel[asked_]), pixels.prefetch(active_.pixel[asked_ + 1]);
+    asked_ = std::min(asked_ + 2, active_.count);
   }
   // Without a branch: active pixels are as hard to predict as events.
   std::size_t count = 0, vector = 0;
   for (int x = begin; x < end; x += lanes) {
-    const ChosenLanes<D> chosen(moved_.restless[vector++]);
+    const ChosenLanes<D> chosen(moved_.leaving[vector++]);
     chosen.store_positions(static_cast<std::uint32_t>(x), moved_.columns.data() + count);
     count += chosen.count();
   }
@@ -153,8 +153,8 @@ std::span<const std::uint32_t> PixelUpdate::move(D d, const PixelArray& pixels, 
 
 /// Adds the pixels of these columns to the active pixels.
 template <int kOrder>
-void PixelUpdate::wake(const FilterRow& row, int begin, std::span<const std::uint32_t> columns) {
-  AwakePixels& a = awake_;
+void PixelUpdate::activate(const FilterRow& row, int begin, std::span<const std::uint32_t> columns) {
+  ActivePixels& a = active_;
   std::size_t to = a.count;
   for (const std::uint32_t x : columns) {
     const std::size_t at = x - static_cast<std::uint32_t>(begin);
@@ -174,20 +174,21 @@ void PixelUpdate::wake(const FilterRow& row, int begin, std::span<const std::uin
 
 /// Advances the active pixels through the segment: all of them, or only until there is room for more.
 template <int kOrder>
-void PixelUpdate::run_awake(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events) {
+void PixelUpdate::run_active(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events) {
   const auto duration = static_cast<double>(segment.t1 - segment.t0);
   const auto run = [&](auto& pass, const auto& take) {
-    for (; asked_ < awake_.count; ++asked_) pixels.prefetch(awake_.pixel[asked_]);
-    take(pass.signals, pass.take(pixels, awake_, segment.t0, segment.t1));
+    for (; asked_ < active_.count; ++asked_) pixels.prefetch(active_.pixel[asked_]);
+    take(pass.signals, pass.take(pixels, active_, segment.t0, segment.t1));
     do {
-      pass.round(pixels, awake_, events);
-    } while (all ? awake_.count > 0 : awake_.count == kBlock);
-    asked_ = awake_.count;
+      pass.round(pixels, active_, events);
+    } while (all ? active_.count > 0 : active_.count == kBlock);
+    asked_ = active_.count;
   };
   if constexpr (kOrder == 0) {
-    run(linear_, [&](LinearSignals& signals, std::size_t first) { signals.take(awake_, first, duration); });
+    run(linear_, [&](LinearSignals& signals, std::size_t first) { signals.take(active_, first, duration); });
   } else {
-    run(relaxing_, [&](RelaxingSignals& signals, std::size_t first) { signals.take(awake_, first, kOrder, duration); });
+    run(relaxing_,
+        [&](RelaxingSignals& signals, std::size_t first) { signals.take(active_, first, kOrder, duration); });
   }
 }
 
@@ -215,17 +216,17 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
                 .filtered2 = from(pixels.filtered2),
                 .band_low = from(pixels.band_low),
                 .band_high = from(pixels.band_high),
-                .alarms = from(pixels.alarms),
+                .timers = from(pixels.timers),
                 .pixel = static_cast<std::uint32_t>(first),
                 .place = static_cast<std::uint32_t>(events.packing().place(left, y))};
   if (past != nullptr) row.keep_in(*past, y - segment.tile.y);
   const auto filter_to = [&](auto d, int begin, int end) {
     std::span<const std::uint32_t> columns = move<kOrder>(d, pixels, row, filter, begin, end);
     while (!columns.empty()) {
-      const std::size_t room = std::min(kBlock - awake_.count, columns.size());
-      wake<kOrder>(row, begin, columns.first(room));
+      const std::size_t room = std::min(kBlock - active_.count, columns.size());
+      activate<kOrder>(row, begin, columns.first(room));
       columns = columns.subspan(room);
-      if (awake_.count == kBlock) run_awake<kOrder>(pixels, segment, false, events);
+      if (active_.count == kBlock) run_active<kOrder>(pixels, segment, false, events);
     }
     const auto count = static_cast<std::size_t>(end - begin);
     row.keep_ends(begin, count);
@@ -255,9 +256,9 @@ bool PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image
     if (order == 1) filter_row<1>(pixels, segment, common, row, y, past, events);
     if (order == 2) filter_row<2>(pixels, segment, common, row, y, past, events);
   }
-  if (order == 0) run_awake<0>(pixels, segment, true, events);
-  if (order == 1) run_awake<1>(pixels, segment, true, events);
-  if (order == 2) run_awake<2>(pixels, segment, true, events);
+  if (order == 0) run_active<0>(pixels, segment, true, events);
+  if (order == 1) run_active<1>(pixels, segment, true, events);
+  if (order == 2) run_active<2>(pixels, segment, true, events);
   return true;
 }
 
@@ -270,21 +271,21 @@ bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, P
   }
   const auto duration = static_cast<double>(segment.t1 - segment.t0);
   const auto run = [&](bool all) {
-    const std::size_t first = linear_.take(pixels, awake_, segment.t0, segment.t1);
-    linear_.signals.take_light(awake_, first, pixels.options.log_eps, duration);
+    const std::size_t first = linear_.take(pixels, active_, segment.t0, segment.t1);
+    linear_.signals.take_light(active_, first, pixels.options.log_eps, duration);
     do {
-      linear_.round(pixels, awake_, events);
-    } while (all ? awake_.count > 0 : awake_.count == kBlock);
+      linear_.round(pixels, active_, events);
+    } while (all ? active_.count > 0 : active_.count == kBlock);
   };
   for (int y = rows.first; y < rows.last; ++y) {
     for (const std::uint32_t x : watch_.columns(y)) {
-      const std::size_t i = awake_.count++;
+      const std::size_t i = active_.count++;
       const int column = static_cast<int>(x);
-      awake_.pixel[i] = static_cast<std::uint32_t>(index(pixels, column, y));
-      awake_.place[i] = static_cast<std::uint32_t>(events.packing().place(column, y));
-      awake_.light0[i] = segment.irradiance0.row(y)[x];
-      awake_.light1[i] = segment.irradiance1.row(y)[x];
-      if (awake_.count == kBlock) run(false);
+      active_.pixel[i] = static_cast<std::uint32_t>(index(pixels, column, y));
+      active_.place[i] = static_cast<std::uint32_t>(events.packing().place(column, y));
+      active_.light0[i] = segment.irradiance0.row(y)[x];
+      active_.light1[i] = segment.irradiance1.row(y)[x];
+      if (active_.count == kBlock) run(false);
     }
   }
   run(true);
@@ -301,7 +302,7 @@ bool PixelUpdate::advance(PixelArray& pixels, const Segment& segment, const Imag
 void PixelUpdate::gather(const PixelArray& pixels, const PastSegment& past, std::span<const std::uint32_t> which,
                          const EventPacking& packing) {
   const Segment& segment = past.segment;
-  AwakePixels& a = awake_;
+  ActivePixels& a = active_;
   for (std::size_t i = 0; i < which.size(); ++i) {
     const int x = static_cast<int>(which[i]) % pixels.width, y = static_cast<int>(which[i]) / pixels.width;
     const auto at = [&](const Image<float>& image) {
@@ -322,11 +323,11 @@ void PixelUpdate::gather(const PixelArray& pixels, const PastSegment& past, std:
 /// Computes how far the low-passes of the active pixels move in the segment.
 void PixelUpdate::find_phases(const Filter& filter) {
   const hn::CappedTag<float, 8> d;
-  for (std::size_t i = 0; i < awake_.count; i += hn::Lanes(d)) {
-    const auto light0 = hn::LoadU(d, awake_.light0.data() + i), light1 = hn::LoadU(d, awake_.light1.data() + i);
+  for (std::size_t i = 0; i < active_.count; i += hn::Lanes(d)) {
+    const auto light0 = hn::LoadU(d, active_.light0.data() + i), light1 = hn::LoadU(d, active_.light1.data() + i);
     const auto phase = filter.phase(d, light0, light1);
-    hn::StoreU(phase, d, awake_.phase.data() + i);
-    hn::StoreU(moved_after(d, phase), d, awake_.moved.data() + i);
+    hn::StoreU(phase, d, active_.phase.data() + i);
+    hn::StoreU(moved_after(d, phase), d, active_.moved.data() + i);
   }
 }
 
@@ -340,18 +341,18 @@ void PixelUpdate::resume(PixelArray& pixels, const PastSegment& past, std::span<
   for (; !which.empty(); which = which.subspan(std::min(kBlock, which.size()))) {
     gather(pixels, past, which.first(std::min(kBlock, which.size())), events.packing());
     const auto run = [&](auto& pass, const auto& take) {
-      take(pass.signals, pass.take(pixels, awake_, segment.t0, segment.t1));
-      pass.round(pixels, awake_, events, true);
-      awake_.count = asked_ = 0;
+      take(pass.signals, pass.take(pixels, active_, segment.t0, segment.t1));
+      pass.round(pixels, active_, events, true);
+      active_.count = asked_ = 0;
     };
     if (order > 0) {
       find_phases(filter);
-      run(relaxing_, [&](RelaxingSignals& signals, std::size_t i) { signals.take(awake_, i, order, duration); });
+      run(relaxing_, [&](RelaxingSignals& signals, std::size_t i) { signals.take(active_, i, order, duration); });
     } else if (pixels.in_brightness) {
-      run(linear_, [&](LinearSignals& signals, std::size_t i) { signals.take(awake_, i, duration); });
+      run(linear_, [&](LinearSignals& signals, std::size_t i) { signals.take(active_, i, duration); });
     } else {
       const double eps = pixels.options.log_eps;
-      run(linear_, [&](LinearSignals& signals, std::size_t i) { signals.take_light(awake_, i, eps, duration); });
+      run(linear_, [&](LinearSignals& signals, std::size_t i) { signals.take_light(active_, i, eps, duration); });
     }
   }
 }
@@ -359,10 +360,10 @@ void PixelUpdate::resume(PixelArray& pixels, const PastSegment& past, std::span<
 void PixelUpdate::draw_again(PixelArray& pixels, std::span<const std::uint32_t> which) {
   if (pixels.clean) return;
   for (; !which.empty(); which = which.subspan(std::min(kBlock, which.size()))) {
-    awake_.count = std::min(kBlock, which.size());
-    std::copy_n(which.begin(), awake_.count, awake_.pixel.begin());
-    linear_.draw_again(pixels, awake_);
-    awake_.count = 0;
+    active_.count = std::min(kBlock, which.size());
+    std::copy_n(which.begin(), active_.count, active_.pixel.begin());
+    linear_.draw_again(pixels, active_);
+    active_.count = 0;
   }
 }
 
@@ -389,11 +390,11 @@ bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<f
     }
     for (std::size_t begin = 0; begin < width; begin += kBlock) {
       const std::size_t count = std::min(kBlock, width - begin);
-      for (std::size_t i = 0; i < count; ++i) awake_.pixel[i] = static_cast<std::uint32_t>(first + begin + i);
-      awake_.count = count;
-      linear_.take(pixels, awake_, segment.t0, segment.t1);
+      for (std::size_t i = 0; i < count; ++i) active_.pixel[i] = static_cast<std::uint32_t>(first + begin + i);
+      active_.count = count;
+      linear_.take(pixels, active_, segment.t0, segment.t1);
       for (std::size_t i = 0; i < count; ++i) linear_.signals.set(i, row_[begin + i], row_[begin + i]);
-      linear_.open(pixels, awake_);
+      linear_.open(pixels, active_);
     }
   }
   return true;

@@ -53,26 +53,26 @@ class PixelUpdate {
   std::span<const std::uint32_t> move(D d, const PixelArray& pixels, const FilterRow& row, const Filter& filter,
                                       int begin, int end);
   template <int kOrder>
-  void wake(const FilterRow& row, int begin, std::span<const std::uint32_t> columns);
+  void activate(const FilterRow& row, int begin, std::span<const std::uint32_t> columns);
   void gather(const PixelArray& pixels, const PastSegment& past, std::span<const std::uint32_t> which,
               const EventPacking& packing);
   void find_phases(const Filter& filter);
   template <int kOrder>
-  void run_awake(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events);
+  void run_active(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events);
   const float* brightness_row(const PixelArray& pixels, const Segment& segment, const Image<float>* given, int y);
 
   /// The low-passes of neighbouring pixels at the segment's end, and the pixels that become active.
   static constexpr int kMovedTogether = 128;
   struct MovedPixels {
     std::array<float, kMovedTogether> filtered1, filtered2, phase, moved;
-    std::array<std::uint8_t, kMovedTogether> restless;  // one bit per lane of a vector
+    std::array<std::uint8_t, kMovedTogether> leaving;  // one bit per lane of a vector
     std::array<std::uint32_t, kMovedTogether + kVectorPadding> columns;
   };
 
   PixelWatch watch_;
   CleanPass clean_;
   MovedPixels moved_;
-  AwakePixels awake_;
+  ActivePixels active_;
   std::size_t asked_ = 0;  // number of active pixels that have been prefetched
   PixelPass<LinearSignals> linear_;
   PixelPass<RelaxingSignals> relaxing_;

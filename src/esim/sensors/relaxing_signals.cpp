@@ -43,20 +43,21 @@ V relative(const PerPixel<float>& filtered, const PerPixel<double>& reference, s
 
 }  // namespace
 
-void RelaxingSignals::take(const AwakePixels& awake, std::size_t first, int poles, double duration) {
-  awake_ = &awake;
+void RelaxingSignals::take(const ActivePixels& active, std::size_t first, int poles, double duration) {
+  active_ = &active;
   poles_ = poles;
   duration_ = duration;
-  for (std::size_t i = first; i < awake.count; ++i) {
-    const float rise = (awake.end[i] - awake.start[i]) / awake.phase[i], distance = awake.start[i] - awake.filtered1[i];
+  for (std::size_t i = first; i < active.count; ++i) {
+    const float rise = (active.end[i] - active.start[i]) / active.phase[i],
+                distance = active.start[i] - active.filtered1[i];
     rise_[i] = rise;
     u_[i] = moved_[i] = 0;
-    value_[i] = static_cast<double>(awake.filtered1[i]);
-    end_[i] = awake.filtered1[i] + (distance * awake.moved[i] + rise * (awake.phase[i] - awake.moved[i]));
+    value_[i] = static_cast<double>(active.filtered1[i]);
+    end_[i] = active.filtered1[i] + (distance * active.moved[i] + rise * (active.phase[i] - active.moved[i]));
   }
   if (poles == 1) return;
   const Comparators none{};
-  for (std::size_t i = first; i < awake.count; ++i) {
+  for (std::size_t i = first; i < active.count; ++i) {
     const RelaxingSignal one = signal(none, i);
     value_[i] = one.value();
     end_[i] = static_cast<float>(one.value(duration));
@@ -64,7 +65,7 @@ void RelaxingSignals::take(const AwakePixels& awake, std::size_t first, int pole
 }
 
 RelaxingSignal RelaxingSignals::signal(const Comparators& c, std::size_t i) const {
-  const AwakePixels& a = *awake_;
+  const ActivePixels& a = *active_;
   const double rate = a.phase[i] / duration_, slope = rise_[i] * rate;
   RelaxingSignal one =
       poles_ == 2 ? RelaxingSignal::second_order(rate, a.moved[i], a.filtered1[i], a.filtered2[i], a.start[i], slope)
@@ -88,7 +89,7 @@ struct RelaxingSignals::Span {
   V upper, lower;
 
   Span(const RelaxingSignals& s, const Comparators& c, std::size_t i) {
-    const AwakePixels& a = *s.awake_;
+    const ActivePixels& a = *s.active_;
     const V m0 = load(s.moved_, i), m1 = load(a.moved, i), start = load(a.start, i), f1 = load(a.filtered1, i);
     first = load(s.u_, i), last = load(a.phase, i);
     filtered = relative(a.filtered1, c.reference, i);
@@ -129,8 +130,8 @@ struct RelaxingSignals::Span {
     const V rises = hn::Sub(v1, v0), part = hn::Div(hn::Sub(level, v0), rises), left = hn::Sub(set(1), part);
     const V ends = hn::MulAdd(hn::Mul(hn::Mul(left, left), hn::MulAdd(set(2), part, set(1))), first,
                               hn::Mul(hn::Mul(hn::Mul(part, part), hn::NegMulAdd(set(2), part, set(3))), last));
-    const V bow = hn::Div(hn::NegMulAdd(part, g0, hn::Mul(left, g1)), hn::Mul(g0, g1));
-    return hn::MulAdd(hn::Mul(hn::Mul(part, left), rises), bow, ends);
+    const V curvature = hn::Div(hn::NegMulAdd(part, g0, hn::Mul(left, g1)), hn::Mul(g0, g1));
+    return hn::MulAdd(hn::Mul(hn::Mul(part, left), rises), curvature, ends);
   }
 
   /// The same for other signals: along the tangent at the end on that side of the extremum; does not overshoot.
@@ -181,7 +182,7 @@ void RelaxingSignals::guess(Comparators& c) {
 
 /// Computes the crossings from the approximations, by one or a few steps of Halley's method in doubles.
 void RelaxingSignals::solve(Comparators& c) {
-  const AwakePixels& a = *awake_;
+  const ActivePixels& a = *active_;
   for (std::size_t i = 0; i < c.count; i += hn::Lanes(kD)) {
     const auto polarity = load_double(c.polarity, i), zero = set_double(0);
     const auto last = promoted(kD, a.phase, i), per_u = hn::Div(set_double(duration_), last);
@@ -245,7 +246,7 @@ void RelaxingSignals::find(Comparators& c) {
 /// Processes one vector of signals.
 template <class D>
 void RelaxingSignals::advance(D d, const Comparators& c, std::size_t i) {
-  const AwakePixels& a = *awake_;
+  const ActivePixels& a = *active_;
   const hn::Rebind<float, D> narrow;
   const auto start = promoted(d, a.start, i), f1 = promoted(d, a.filtered1, i), rise = promoted(d, rise_, i);
   const auto part = hn::Mul(hn::LoadU(d, c.from.data() + i), hn::Set(d, 1 / duration_));

@@ -9,8 +9,8 @@ namespace esim {
 /// which signals leave their levels; doubles determine when, and the values.
 class RelaxingSignals {
  public:
-  /// Takes the active pixels from index `first` on, at the segment's start; `awake` must outlive their use.
-  void take(const AwakePixels& awake, std::size_t first, int poles, double duration);
+  /// Takes the active pixels from index `first` on, at the segment's start; `active` must outlive their use.
+  void take(const ActivePixels& active, std::size_t first, int poles, double duration);
 
   /// Finds the first time at which each signal leaves its levels, from `from` to the segment's end.
   void find(Comparators& c);
@@ -37,7 +37,7 @@ class RelaxingSignals {
   void solve(Comparators& c);
   void find_one(Comparators& c, std::size_t i) const;
 
-  const AwakePixels* awake_ = nullptr;
+  const ActivePixels* active_ = nullptr;
   int poles_ = 1;
   double duration_ = 0;
   PerPixel<float> rise_{};         // of the input, per u

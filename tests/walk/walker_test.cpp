@@ -145,8 +145,8 @@ TEST(KeyReader, TellsEscapeFromTheBeginningOfAnotherKey) {
 TEST(Keys, OfATextAreThoseThatAreTyped) {
   EXPECT_EQ(keys_of("wd p<left><esc>"),
             (std::vector<Key>{Key::forward, Key::right, Key::drop, Key::preview, Key::turn_left, Key::leave}));
-  EXPECT_TRUE(test::contains(test::message_of<UserError>([] { keys_of("wz"); }), "'z' is no key"));
-  EXPECT_TRUE(test::contains(test::message_of<UserError>([] { keys_of("<home>"); }), "'<' is no key"));
+  EXPECT_TRUE(test::contains(test::message_of<UserError>([] { keys_of("wz"); }), "'z' is not a key"));
+  EXPECT_TRUE(test::contains(test::message_of<UserError>([] { keys_of("<home>"); }), "'<' is not a key"));
 }
 
 }  // namespace

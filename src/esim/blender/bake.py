@@ -41,7 +41,7 @@ def unwrap(thing):
         pin_coordinates(material, thing.data)
     layer = thing.data.uv_layers.new(name="esim_bake", do_init=False)
     if layer is None:
-        raise RuntimeError(f"Error: {thing.name} has too many layers of texture coordinates; remove some")
+        raise RuntimeError(f"Error: object {thing.name}: has too many UV maps; remove some")
     thing.data.uv_layers.active = layer
     layer.active_render = True
     bpy.ops.object.mode_set(mode="EDIT")
@@ -173,7 +173,7 @@ if not things:
 lights = any(thing.type == "LIGHT" for thing in scene.objects)
 world = scene.world is not None
 if not lights and not world:
-    esim_warn("the scene has no light: only what emits light itself will be seen")
+    esim_warn("the scene has no light: only surfaces that emit light will be visible")
 
 for thing in things:
     make_real(thing)

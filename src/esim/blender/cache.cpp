@@ -34,7 +34,7 @@ class ContentHash {
 
 std::string hash_of(const fs::path& blend) {
   std::ifstream file(blend, std::ios::binary);
-  if (!file) throw UserError(fmt::format("scene {}: no such file, or not to be read", blend.string()));
+  if (!file) throw UserError(fmt::format("scene {}: no such file, or no permission to read it", blend.string()));
   ContentHash hash;
   std::string buffer(1 << 20, '\0');
   while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || file.gcount() > 0)
@@ -51,11 +51,14 @@ fs::path cache_folder() {
   };
   fs::path base = variable("XDG_CACHE_HOME");
   if (!base.is_absolute()) base = variable("HOME").empty() ? fs::path() : variable("HOME") / ".cache";
-  if (base.empty()) throw UserError("no place for a cache; set XDG_CACHE_HOME to a folder");
+  if (base.empty())
+    throw UserError(
+        "there is no folder for the cache, since neither HOME nor XDG_CACHE_HOME is set; set XDG_CACHE_HOME");
   std::error_code error;
   fs::create_directories(base / "esim", error);
   if (error)
-    throw OutputError(fmt::format("cannot make {}: {}; set XDG_CACHE_HOME", (base / "esim").string(), error.message()));
+    throw OutputError(fmt::format("cannot create the folder {}: {}; set XDG_CACHE_HOME to another one",
+                                  (base / "esim").string(), error.message()));
   return base / "esim";
 }
 

@@ -47,7 +47,7 @@ def esim_find_images(folder):
                 image.filepath = path = beside
                 image.reload()
             else:
-                esim_warn(f"image {image.name}: there is no {image.filepath}")
+                esim_warn(f"image {image.name}: the file {image.filepath} does not exist")
         print("esim warning file " + path, flush=True)
     for library in bpy.data.libraries:
         print("esim warning file " + os.path.abspath(bpy.path.abspath(library.filepath)), flush=True)
@@ -73,7 +73,7 @@ def esim_open(path):
     elif extension == ".dae":
         bpy.ops.wm.collada_import(filepath=path)
     else:
-        raise RuntimeError("Error: Blender does not know the format " + extension)
+        raise RuntimeError("Error: Blender does not support the format " + extension)
 
 
 def esim_export(path):

@@ -90,7 +90,7 @@ class ExrLayout:
                     channel, inner = text(inner)
                     kind, = struct.unpack_from("<i", head, inner)
                     if kind != 2:
-                        raise RuntimeError("a channel of the rendering is not of 32-bit floats")
+                        raise RuntimeError("a channel of the rendered image does not have 32-bit floats")
                     self.channels.append(channel.split(".", 1)[1])  # without the layer's name
                     inner += 16
             elif name == "dataWindow":
@@ -218,7 +218,8 @@ class Engine:
     def object(self, name):
         thing = self.objects.get(name)
         if thing is None:
-            raise CommandError(f"there is no object {name} that hangs on no other, among {' '.join(self.objects)}")
+            raise CommandError(f"object {name} does not exist or has a parent; objects without a parent are: "
+                               f"{' '.join(self.objects)}")
         return thing
 
     def move(self, name, location=None, rotation=None):
@@ -264,7 +265,7 @@ class Engine:
             self.layout_key, self.layout = key, ExrLayout(data)
         layout = self.layout
         if (layout.width, layout.height) != self.size:
-            raise RuntimeError("Blender rendered an image of another size than it was asked for")
+            raise RuntimeError("Blender rendered an image of a different size than requested")
         rows, at = layout.read(data), layout.channels.index
         first = at("Combined.B")  # channels stand in the order of their names
         passes = {"light": rows[:, first:first + 3], "depth": rows[:, at("Depth.Z")]}

@@ -15,7 +15,7 @@ class BlendFile:
         if data[:2] == b"\x1f\x8b":
             data = gzip.decompress(data)
         if data[:7] != b"BLENDER":
-            raise ValueError("no .blend file, or of a compression that is not known")
+            raise ValueError("this is not a .blend file, or its compression is not supported")
         self.pointer = 8 if data[7:8] == b"-" else 4
         self.order = "<" if data[8:9] == b"v" else ">"
         self.blocks = {}

@@ -87,7 +87,7 @@ struct Started {
 
 Started start(const std::vector<std::string>& command) {
   int pipe[2];
-  if (::pipe2(pipe, O_CLOEXEC) != 0) throw InternalError(std::string("cannot make a pipe: ") + std::strerror(errno));
+  if (::pipe2(pipe, O_CLOEXEC) != 0) throw InternalError(std::string("cannot create a pipe: ") + std::strerror(errno));
   std::vector<char*> arguments;
   for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
   arguments.push_back(nullptr);

@@ -40,7 +40,7 @@ def numbers(text, count):
     parts = text.split()
     values = tuple(float(part) for part in parts) if len(parts) == count else ()
     if len(values) != count or not all(math.isfinite(value) for value in values):
-        raise CommandError(f"wants {count} numbers")
+        raise CommandError(f"this command requires {count} finite numbers")
     return values
 
 
@@ -97,7 +97,7 @@ class Commands:
                     return "ok" if result is None else result
                 except (CommandError, ValueError, RuntimeError, MemoryError) as error:
                     return f"error {error}"
-        return f"error there is no command '{command[:200]}'"
+        return f"error unknown command '{command[:200]}'"
 
     def status(self):
         engine = self.engine
@@ -122,13 +122,14 @@ class Commands:
     def set_field_of_view(self, camera, text):
         degrees, = numbers(text, 1)
         if not 0.5 <= degrees <= 172:
-            raise CommandError("Blender's cameras see from 0.5 to 172 degrees")
+            raise CommandError("the field of view must be from 0.5 to 172 degrees")
         self.view(camera).field_of_view = degrees
 
     def resize(self, width, height):
         width, height = int(width), int(height)
         if not (4 <= width <= LARGEST_SIDE and 4 <= height <= LARGEST_SIDE and width * height <= MOST_PIXELS):
-            raise CommandError(f"images have from 4x4 to {MOST_PIXELS} pixels, {LARGEST_SIDE} along a side at most")
+            raise CommandError(f"images must have at least 4x4 pixels, at most {LARGEST_SIDE} per side and "
+                               f"{MOST_PIXELS} in total")
         self.engine.size = width, height
 
     def set_samples(self, count):
@@ -193,7 +194,7 @@ class Commands:
 
     def ids(self, camera):
         if "ids" not in self.render(camera):
-            raise CommandError("Eevee does not say which object a pixel sees; use the engine cycles")
+            raise CommandError("Eevee renders no object masks; use --engine cycles")
         return self.render(camera)["ids"].astype(np.uint16)
 
     def mask_png(self, camera):
@@ -265,26 +266,26 @@ def parse(arguments):
     def size(text):
         match = re.match(r"(\d{1,5})x(\d{1,5})\Z", text)
         if not match:
-            raise argparse.ArgumentTypeError("is WIDTHxHEIGHT, such as 640x480")
+            raise argparse.ArgumentTypeError("must be WIDTHxHEIGHT, such as 640x480")
         return int(match[1]), int(match[2])
 
     def count(text):
         if not 1 <= int(text) <= 65536:
-            raise argparse.ArgumentTypeError("is from 1 to 65536")
+            raise argparse.ArgumentTypeError("must be from 1 to 65536")
         return int(text)
 
-    parser = argparse.ArgumentParser(prog="serve.py", description="Shows a scene to clients of UnrealCV's protocol.")
-    parser.add_argument("--scene", help="a scene file, if Blender has not opened one already")
-    parser.add_argument("--port", type=int, default=9000, help="0: any that is free")
+    parser = argparse.ArgumentParser(prog="serve.py", description="Renders a scene for clients of UnrealCV's protocol.")
+    parser.add_argument("--scene", help="scene file, unless Blender has already opened one")
+    parser.add_argument("--port", type=int, default=9000, help="TCP port; 0: any free port")
     parser.add_argument("--engine", choices=("cycles", "eevee"), default="cycles")
-    parser.add_argument("--samples", type=count, default=16, help="per pixel")
-    parser.add_argument("--size", type=size, default=(640, 480), help="WIDTHxHEIGHT until a client sets it")
-    parser.add_argument("--seed", type=int, default=0, help="of the path tracer's noise")
-    parser.add_argument("--threads", type=int, default=0, help="0: as many as there are processors")
+    parser.add_argument("--samples", type=count, default=16, help="samples per pixel")
+    parser.add_argument("--size", type=size, default=(640, 480), help="initial image size, WIDTHxHEIGHT")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the path tracer's noise")
+    parser.add_argument("--threads", type=int, default=0, help="number of threads; 0: one per processor")
     parser.add_argument("--persistent", action=argparse.BooleanOptionalAction, default=True,
-                        help="keep the scene's data from one rendering to the next: faster, more memory")
+                        help="keep the scene's data between renderings: faster, but needs more memory")
     parser.add_argument("--once", action="store_true",
-                        help="end when the first client goes, or the program that started this")
+                        help="exit when the first client disconnects, or when the parent process ends")
     return parser.parse_args(arguments)
 
 

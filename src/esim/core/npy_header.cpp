@@ -78,7 +78,7 @@ Header read_header(const Read& read, const Fail& fail) {
     if (read(std::as_writable_bytes(std::span(text))) < bytes) fail("it ends within its header");
     return text;
   };
-  if (take(kMagic.size()) != kMagic) fail("it does not begin as NumPy's files do");
+  if (take(kMagic.size()) != kMagic) fail("it does not begin with NumPy's magic bytes");
   const bool first_version = take(2)[0] == 1;  // the version decides on the length of the length
   const std::string digits = take(first_version ? 2 : 4);
   std::size_t length = 0;
@@ -100,7 +100,7 @@ Header read_header(const Read& read, const Fail& fail) {
     if (key == "descr") header.descr = std::move(value), typed = true;
   }
   if (!typed || !ordered) fail("its header is damaged");
-  if (!shape) fail("its shape is none");
+  if (!shape) fail("its shape is invalid");
   header.shape = std::move(*shape);
   return header;
 }

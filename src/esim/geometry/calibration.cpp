@@ -54,9 +54,9 @@ struct Section {
         }
       }
     } catch (const YAML::Exception&) {
-      fail(fmt::format("{} holds something that is not a number", key));
+      fail(fmt::format("{} contains a value that is not a number", key));
     }
-    if (values.size() != count) fail(fmt::format("{} needs {} numbers and has {}", key, count, values.size()));
+    if (values.size() != count) fail(fmt::format("{} must have {} numbers, not {}", key, count, values.size()));
     return values;
   }
 
@@ -95,8 +95,8 @@ Camera camera_of(const Section& camera, const std::string& projection, double wi
   const auto side = [&](double pixels) {
     constexpr double kMaxSide = 16384;
     if (!(pixels >= 1 && pixels <= kMaxSide) || pixels != std::floor(pixels))
-      camera.fail(
-          fmt::format("the image's size is {} x {} px; it must be whole numbers up to {}", width, height, kMaxSide));
+      camera.fail(fmt::format("the image size is {} x {} px; width and height must be positive integers up to {}",
+                              width, height, kMaxSide));
     return static_cast<int>(pixels);
   };
   if (projection != "pinhole") camera.fail(fmt::format("camera model '{}' is not supported; use pinhole", projection));
@@ -175,11 +175,11 @@ std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file
     if (root.IsMap() && root["cameras"].IsDefined() && root["cameras"].IsSequence()) cameras = read_rig(root, file);
     if (root.IsMap() && root["cam0"].IsDefined()) cameras = read_camchain(root, file);
   } catch (const YAML::Exception& exception) {
-    throw UserError(fmt::format("calibration {}: is not laid out as expected: {}", file.string(), exception.msg));
+    throw UserError(fmt::format("calibration {}: the layout is not as expected: {}", file.string(), exception.msg));
   }
   if (cameras.empty()) {
     throw UserError(fmt::format(
-        "calibration {}: holds no cameras; expected a Kalibr camchain (cam0: ...) or a rig (cameras: - camera: ...)",
+        "calibration {}: contains no cameras; expected a Kalibr camchain (cam0: ...) or a rig (cameras: - camera: ...)",
         file.string()));
   }
   return cameras;
@@ -187,11 +187,13 @@ std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file
 
 CalibratedImu read_imu_calibration(const std::filesystem::path& file) {
   const YAML::Node root = load(file);
-  if (!root.IsMap()) throw UserError(fmt::format("calibration {}: is no imu.yaml of Kalibr's", file.string()));
+  if (!root.IsMap())
+    throw UserError(fmt::format("calibration {}: is not an imu.yaml of Kalibr; it must be a map of keys and values",
+                                file.string()));
   const bool nested = root["imu0"].IsDefined();
   const Section imu{file, "imu0", nested ? root["imu0"] : root};
   if (!imu.node.IsMap()) imu.fail("must be a map of keys and values");
-  if (root["imu1"].IsDefined()) imu.fail("there is an imu1 as well; a rig has one IMU: remove the others");
+  if (root["imu1"].IsDefined()) imu.fail("imu1 is also defined, but only one IMU is supported; remove the others");
   if (imu.node["model"].IsDefined() && imu.as<std::string>("model") != "calibrated") {
     imu.fail(fmt::format("model '{}' is not supported; use calibrated, and give scale and misalignment in the scenario",
                          imu.as<std::string>("model")));

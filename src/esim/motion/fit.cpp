@@ -45,14 +45,16 @@ void validate(std::span<const TimedPose> poses, const FitOptions& options) {
   for (const auto& [name, value] : {std::pair{"knot_interval_s", options.knot_interval_s},
                                     std::pair{"smoothing_time_s", options.smoothing_time_s}}) {
     if (!(value >= 0.0) || !std::isfinite(value)) {
-      throw UserError(fmt::format("trajectory fit: {} is {}; it must be positive, or 0 to choose it", name, value));
+      throw UserError(
+          fmt::format("trajectory fit: {} is {}; it must be positive, or 0 for an automatic choice", name, value));
     }
   }
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const SE3& pose = poses[i].T_world_body;
     const double norm = pose.rotation.norm();
     if (!pose.translation.allFinite() || !(std::abs(norm - 1.0) < 1e-3)) {
-      throw UserError(fmt::format("trajectory fit: pose {} is not finite, or its quaternion has not unit norm", i));
+      throw UserError(
+          fmt::format("trajectory fit: pose {} is not finite, or its quaternion does not have unit norm", i));
     }
   }
   if (const auto fault = find_stamp_fault(poses)) {

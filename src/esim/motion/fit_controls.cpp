@@ -138,8 +138,8 @@ std::vector<Eigen::Quaterniond> fit_control_rotations(const UniformBasis& basis,
     }
   }
   throw UserError(
-      "trajectory fit: the rotations have no smooth fit; check the poses for jumps and noise, or choose a shorter knot "
-      "interval or a longer smoothing time");
+      "trajectory fit: no smooth curve fits the rotations; check the poses for jumps and noise, or choose a shorter "
+      "knot interval or a longer smoothing time");
 }
 
 }  // namespace esim

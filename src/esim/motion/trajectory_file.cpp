@@ -31,7 +31,7 @@ struct Format {
   bool commas;
   int stamp_decimals;  // one unit of the stamps is 10^stamp_decimals ns
 };
-constexpr Format kTum{"TUM", "t x y z qx qy qz qw, t in seconds, separated by blanks", false, 9};
+constexpr Format kTum{"TUM", "t x y z qx qy qz qw, t in seconds, separated by spaces", false, 9};
 constexpr Format kEsimCsv{"ESIM CSV", "t, x, y, z, qx, qy, qz, qw, t in nanoseconds, separated by commas", true, 0};
 
 std::string_view trim(std::string_view text) {

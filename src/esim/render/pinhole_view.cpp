@@ -61,7 +61,7 @@ PinholeView pinhole_view(const Camera& camera, const PixelRays& rays, Pinhole wh
   const double width = focal * (right - left) + 2 * kMargin + 1, height = focal * (bottom - top) + 2 * kMargin + 1;
   constexpr double kLargest = 32768;
   if (!(width < kLargest && height < kLargest)) {
-    throw UserError("the camera sees too wide for a pinhole image (" + std::to_string(std::lround(width)) + " x " +
+    throw UserError("the field of view is too wide for a pinhole image (" + std::to_string(std::lround(width)) + " x " +
                     std::to_string(std::lround(height)) + " pixels would be needed)");
   }
   view.width = static_cast<int>(std::ceil(width)), view.height = static_cast<int>(std::ceil(height));

@@ -41,8 +41,8 @@ void check_claim(const std::filesystem::path& path, std::int64_t width, std::int
   check_size(path, width, height);
   const double pixels = static_cast<double>(width) * static_cast<double>(height);
   if (pixels > kSmall && pixels > kMaxPixelsPerByte * static_cast<double>(bytes))
-    fail(path,
-         fmt::format("claims {}x{} pixels, but has {} bytes only; it is cut off or damaged", width, height, bytes));
+    fail(path, fmt::format("its header states {}x{} pixels, but it has only {} bytes; it is cut off or damaged", width,
+                           height, bytes));
 }
 
 std::uintmax_t size_of(const std::filesystem::path& path) {
@@ -56,7 +56,7 @@ std::vector<const char*> colour_channels(const std::filesystem::path& path, cons
   const auto has = [&](const char* name) { return channels.findChannel(name) != nullptr; };
   if (has("R") && has("G") && has("B")) return {"R", "G", "B"};
   if (has("Y")) return {"Y"};
-  fail(path, "has neither the channels R, G, B nor Y; save it with one of these");
+  fail(path, "must have the channels R, G and B, or the channel Y; save it with them");
 }
 
 void read_exr(const std::filesystem::path& path, Encoding encoding, bool colour, Planes& planes) {
@@ -140,7 +140,7 @@ cv::Mat read_pixels(const std::filesystem::path& path, const Read& read) {
   } catch (const cv::Exception& exception) {
     fail(path, "cannot be decoded: " + exception.err);
   }
-  if (image.empty()) fail(path, "cannot be decoded; is it a PNG, JPEG, TIFF, EXR or HDR image, and complete?");
+  if (image.empty()) fail(path, "cannot be decoded; it must be a complete PNG, JPEG, TIFF, EXR or HDR image");
   check_size(path, image.cols, image.rows);
   return image;
 }
@@ -179,7 +179,7 @@ std::string lower_case_extension(const std::filesystem::path& path) {
 cv::Mat read_pixels(const std::filesystem::path& path) {
   const std::string extension = lower_case_extension(path);
   if ((extension == ".jpg" || extension == ".jpeg") && !is_whole_jpeg(path)) {
-    fail(path, "is no JPEG image, or is cut off");
+    fail(path, "is not a JPEG image, or is cut off");
   }
   check_header(path);
   return read_pixels(path, [&] { return cv::imread(path.string(), cv::IMREAD_UNCHANGED); });
@@ -190,7 +190,8 @@ void require_file(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path, error)) fail(path, "no such file");
 }
 
-constexpr const char* kMedianNeedsBytes = "is not of 8 bits, which a median needs; leave the median out";
+constexpr const char* kMedianNeedsBytes =
+    "does not have 8 bits per channel, which the median filter requires; remove the median";
 
 /// Applies a filter that reaches so many pixels far; `around`: across the left and right edge.
 template <typename Filter>
@@ -205,7 +206,7 @@ void apply(cv::Mat& image, int reach, bool around, const Filter& filter) {
 void take_median(const std::filesystem::path& path, const Softening& softening, cv::Mat& image) {
   const int side = softening.median_px;
   if (side <= 1) return;
-  if (side % 2 == 0) fail(path, fmt::format("a median over {} px has no middle; use an odd number", side));
+  if (side % 2 == 0) fail(path, fmt::format("the width of the median must be an odd number of pixels, not {}", side));
   if (image.depth() != CV_8U) fail(path, kMedianNeedsBytes);
   apply(image, side / 2, softening.around, [&](cv::Mat& pixels) { cv::medianBlur(pixels, pixels, side); });
 }

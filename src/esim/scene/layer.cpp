@@ -35,11 +35,12 @@ std::vector<Parameters> natural_spline(const std::vector<double>& t, const std::
 }  // namespace
 
 LayerMotion::LayerMotion(const std::vector<LayerKeyframe>& keyframes, KeyframeInterpolation interpolation) {
-  if (keyframes.empty()) throw UserError("has no keyframes; give it one at least, or leave them out");
+  if (keyframes.empty()) throw UserError("has no keyframes; add at least one, or remove the list");
   for (const LayerKeyframe& key : keyframes) {
     if (!t_s_.empty() && !(key.t_s > t_s_.back())) {
-      throw UserError(fmt::format("the keyframe at t_s = {} follows one at {}; put them in order, each time once",
-                                  key.t_s, t_s_.back()));
+      throw UserError(fmt::format(
+          "the times of keyframes must increase, but t_s = {} follows {}; sort them, and use each time once", key.t_s,
+          t_s_.back()));
     }
     t_s_.push_back(key.t_s);
     Parameters value;

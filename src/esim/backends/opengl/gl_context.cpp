@@ -130,17 +130,17 @@ std::unique_ptr<GlContext::Handles> GlContext::open(void* display) {
 
 GlContext::GlContext(std::optional<int> device) {
   const std::vector<EGLDisplay> all = displays();
-  if (all.empty()) throw UserError(std::string("gl: no device for OpenGL without a window; ") + kInstall);
+  if (all.empty()) throw UserError(std::string("gl: no device supports OpenGL without a window; ") + kInstall);
   const int count = static_cast<int>(all.size());
   if (device && (*device < 0 || *device >= count)) {
-    throw UserError("gl_device: " + std::to_string(*device) + " is not there; the devices are 0 to " +
+    throw UserError("gl_device: device " + std::to_string(*device) + " does not exist; the devices are 0 to " +
                     std::to_string(count - 1));
   }
   for (int i = device.value_or(0); i < (device ? *device + 1 : count); ++i) {
     std::unique_ptr<Handles> found = open(all[static_cast<std::size_t>(i)]);
     if (found && (!handles_ || (handles_->software && !found->software))) handles_ = std::move(found);
   }
-  if (!handles_) throw UserError(std::string("gl: the devices offer no OpenGL 4.5; ") + kInstall);
+  if (!handles_) throw UserError(std::string("gl: no device supports OpenGL 4.5; ") + kInstall);
 }
 
 const std::string& GlContext::name() const { return handles_->name; }
@@ -166,7 +166,7 @@ void throw_on_gl_error(const char* doing) {
   const GLenum error = glGetError();
   if (error == GL_NO_ERROR) return;
   if (error == GL_OUT_OF_MEMORY) {
-    throw UserError(std::string("gl: the device has not enough memory for ") + doing +
+    throw UserError(std::string("gl: the device does not have enough memory for ") + doing +
                     "; use smaller textures or a smaller image");
   }
   throw InternalError(std::string("gl: error ") + std::to_string(error) + " while " + doing);

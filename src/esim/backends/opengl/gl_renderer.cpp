@@ -81,7 +81,7 @@ class GlRenderer final : public Renderer {
 
   std::unique_ptr<Rendering> start(RenderRequest request) override {
     if (request.objects.size() != moving_count())
-      throw InternalError("a request does not name as many objects as move in the scene");
+      throw InternalError("the number of objects in a request must be the number of moving objects in the scene");
     const GlContext::Use use(context_);
     set_up(request);
     if (shadows_) shadows_->draw(request);
@@ -129,8 +129,8 @@ class GlRenderer final : public Renderer {
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
     if (std::max(view_.width, view_.height) <= largest) return;
     throw UserError("gl: this camera's view needs a pinhole image of " + std::to_string(view_.width) + " x " +
-                    std::to_string(view_.height) + " pixels, the device has " + std::to_string(largest) +
-                    "; use engine: raycast");
+                    std::to_string(view_.height) + " pixels, but the device supports at most " +
+                    std::to_string(largest) + "; use engine: raycast");
   }
 
   void make_passes() {

@@ -79,8 +79,9 @@ GlShadows::GlShadows(const Scene& scene, const GlScene& drawn) : drawn_(drawn), 
   glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &most_layers);
   layers_ = static_cast<int>(lighting_.suns.size() + kFaces * lighting_.points.size());
   if (layers_ > most_layers) {
-    throw UserError("gl: too many lights cast shadows for the device's " + std::to_string(most_layers) +
-                    " layers (six for each point light); use fewer, or engine: raycast");
+    throw UserError("gl: too many lights cast shadows: their shadow maps need more than the device's " +
+                    std::to_string(most_layers) +
+                    " layers (six for each point light); use fewer lights, or engine: raycast");
   }
   for (const SceneObject& object : scene.objects) {
     if (!object.moves) continue;
@@ -124,7 +125,7 @@ GlShadows::Maps GlShadows::make_maps(double most_texels) const {
     glTextureParameteri(maps.texture, direction, GL_CLAMP_TO_EDGE);
   for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
     glTextureParameteri(maps.texture, filter, GL_NEAREST);
-  throw_on_gl_error("making room for shadows");
+  throw_on_gl_error("allocating shadow maps");
   return maps;
 }
 

@@ -53,7 +53,7 @@ void attach(RTCDevice device, RTCScene scene, const Mesh& mesh) {
                                            sizeof(Eigen::Vector3f), mesh.vertices.size());
   void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                             sizeof(mesh.triangles[0]), mesh.triangles.size());
-  throw_on_error(device, "hold the mesh");
+  throw_on_error(device, "store the mesh");
   std::memcpy(vertices, mesh.vertices.data(), mesh.vertices.size() * sizeof(Eigen::Vector3f));
   std::memcpy(triangles, mesh.triangles.data(), mesh.triangles.size() * sizeof(mesh.triangles[0]));
   rtcCommitGeometry(geometry);
@@ -163,7 +163,7 @@ void RaycastScene::append(const Mesh& mesh) {
 std::vector<PlacedGroup> RaycastScene::place(const RenderRequest& request) const {
   if (request.objects.size() + 1 != groups_.size()) {
     throw InternalError("a request names " + std::to_string(request.objects.size()) +
-                        " moving objects of a scene that has " + std::to_string(groups_.size() - 1));
+                        " moving objects, but the scene has " + std::to_string(groups_.size() - 1));
   }
   std::vector<PlacedGroup> placed;
   for (const Group& group : groups_) {

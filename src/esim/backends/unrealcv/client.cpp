@@ -87,7 +87,7 @@ void UnrealcvClient::wait_for(const Asked& asked, Until until) {
     } catch (const ConnectionLost& lost) {
       session_.reset();
       if (const auto why = options_.why_ended())
-        fail(options_, *why, "see what it says of the scene, and whether memory sufficed");
+        fail(options_, *why, "check its messages about the scene, and whether the memory was sufficient");
       if (was_connected) give_up = seconds_from_now(options_.timeout_s);
       const bool is_absent = !dialect_ && dynamic_cast<const ConnectionRefused*>(&lost) != nullptr;
       if (is_absent || Clock::now() >= give_up) fail_to_connect(lost.what());
@@ -102,10 +102,11 @@ void UnrealcvClient::wait_for(const Asked& asked, Until until) {
 
 void UnrealcvClient::fail_to_connect(const std::string& reason) const {
   if (!dialect_) {
-    fail(options_, "cannot be connected to: " + reason, "start the program, or change renderer.host and renderer.port");
+    fail(options_, "cannot connect: " + reason, "start the program, or change renderer.host and renderer.port");
   }
-  fail(options_, fmt::format("is gone ({}), and did not come back within {:g} s", reason, options_.timeout_s),
-       "see why it ended");
+  fail(options_,
+       fmt::format("the connection was lost ({}) and could not be restored within {:g} s", reason, options_.timeout_s),
+       "check why the program ended");
 }
 
 /// Waits for a view once. Throws OtherSize; whatever is wrong with the light, what is wrong with the connection or the
@@ -143,9 +144,9 @@ void UnrealcvClient::finish(const std::shared_ptr<Asked>& asked, const Workers& 
       // The window may take some frames to change.
       if (!first && Clock::now() >= give_up) {
         fail(options_,
-             fmt::format("was set to {} x {} pixels, but sends images of {} x {} for {:g} s", asked->view.width,
-                         asked->view.height, other.width, other.height, options_.timeout_s),
-             "let its window have any size, or change the camera's");
+             fmt::format("its image size was set to {} x {} pixels, but it sent images of {} x {} pixels for {:g} s",
+                         asked->view.width, asked->view.height, other.width, other.height, options_.timeout_s),
+             "allow its window to have any size, or change the size of the camera");
       }
       state_ = {};
       submit_or_lose(*asked);

@@ -161,7 +161,7 @@ class Converter {
       std::array<Eigen::Vector2f, 3> uv;
       for (unsigned c = 0; c < 3; ++c) {
         const unsigned index = face.mIndices[c];
-        if (index >= part.mNumVertices) fail_scene(file_, "is damaged: a face names a vertex that is not there");
+        if (index >= part.mNumVertices) fail_scene(file_, "is damaged: a face refers to a missing vertex");
         corners[c] = index;
         const aiVector3D coordinate = part.HasTextureCoords(0) ? part.mTextureCoords[0][index] : aiVector3D();
         uv[c] = is_finite(coordinate) ? Eigen::Vector2f(coordinate.x, 1.0F - coordinate.y) : Eigen::Vector2f(0, 0);
@@ -170,8 +170,8 @@ class Converter {
       mesh.texture_uv.push_back(uv);
       mesh.material.push_back(has_material ? part.mMaterialIndex : 0);
     }
-    if (part.HasVertexColors(0)) warn(fmt::format("mesh {}: its vertex colours are not shown", name));
-    if (part.HasBones()) warn(fmt::format("mesh {}: is deformed by a skeleton, and shown in its rest pose", name));
+    if (part.HasVertexColors(0)) warn(fmt::format("mesh {}: vertex colours are not supported, and are ignored", name));
+    if (part.HasBones()) warn(fmt::format("mesh {}: skeletons are not supported; it is shown in its rest pose", name));
     return mesh;
   }
 
@@ -205,7 +205,7 @@ class Converter {
       if (!node.matrix->allFinite()) fail_scene(file_, fmt::format("the pose of {} is not finite", node.name));
       for (unsigned i = 0; i < source->mNumMeshes; ++i) {
         if (source->mMeshes[i] >= graph_.meshes.size())
-          fail_scene(file_, "is damaged: a node names a mesh that is not there");
+          fail_scene(file_, "is damaged: a node refers to a missing mesh");
         node.meshes.push_back(source->mMeshes[i]);
       }
       const auto index = static_cast<int>(graph_.nodes.size());
@@ -229,7 +229,7 @@ class Converter {
         value = {v.x, v.y, v.z, 0};
       }
       if (!value.allFinite() || !(std::abs(t_s) < 1e6))
-        fail_scene(file_, "an animation holds a number that is not finite");
+        fail_scene(file_, "an animation contains a number that is not finite");
       if (!track.times_s.empty() && !(t_s > track.times_s.back())) continue;  // twice the same instant
       track.times_s.push_back(t_s);
       track.values.push_back(value);
@@ -265,7 +265,8 @@ class Converter {
         return a.rank(node.name) < b.rank(node.name);
       });
       if (of_node.size() > 1 && !best.action.starts_with(node.name) && best.action != "Scene")
-        warn(fmt::format("object {}: of its {} animations, {} is shown", node.name, of_node.size(), best.action));
+        warn(fmt::format("object {}: has {} animations, of which only {} is shown", node.name, of_node.size(),
+                         best.action));
       animate(node, *best.channel, best.animation->mTicksPerSecond > 0 ? best.animation->mTicksPerSecond : 1.0);
     }
   }
@@ -299,7 +300,7 @@ class Converter {
       const Eigen::Vector3d forward = to_eigen(source.mLookAt), up = to_eigen(source.mUp);
       const Eigen::Vector3d right = forward.cross(up);
       if (found == node_of_.end() || !(right.norm() > 1e-9) || !right.allFinite() || !is_finite(source.mPosition)) {
-        warn(fmt::format("camera {}: has no orientation, and is left out", name_of(source.mName)));
+        warn(fmt::format("camera {}: has no orientation; it is ignored", name_of(source.mName)));
         continue;
       }
       GraphCamera camera{name_of(source.mName), static_cast<std::uint32_t>(found->second), 0,
@@ -356,7 +357,7 @@ SceneGraph read_with_assimp(const std::filesystem::path& file) {
     case IsolatedResult::End::refused:
       throw UserError(result.bytes);
     default:
-      fail_scene(file, "cannot be read: its reader failed or asked for too much memory; export the scene anew");
+      fail_scene(file, "cannot be read: the parser failed or needed too much memory; export the scene again");
   }
 }
 

@@ -106,10 +106,10 @@ void check_size(const SceneGraph& graph, const std::filesystem::path& file) {
     for (const std::uint32_t mesh : node.meshes) {
       triangles += graph.meshes[mesh].triangles.size(), vertices += graph.meshes[mesh].vertices.size();
       if (triangles > kMaxSceneTriangles || vertices > kMaxSceneVertices)
-        fail_scene(file, fmt::format("shows more than {} triangles; simplify it", kMaxSceneTriangles));
+        fail_scene(file, fmt::format("has more than {} triangles; simplify it", kMaxSceneTriangles));
     }
   }
-  if (triangles == 0) fail_scene(file, "holds no triangles; export meshes, not only curves, points or instances");
+  if (triangles == 0) fail_scene(file, "contains no triangles; export meshes, not only curves, points or instances");
 }
 
 /// For each node, the animated one that it moves with (itself, or its nearest animated ancestor), or the world.
@@ -139,9 +139,10 @@ void give_warnings(const SceneGraph& graph, const std::filesystem::path& file, c
   constexpr std::size_t kMost = 10;  // a line each; scenes from elsewhere can have thousands of flaws
   for (std::size_t i = 0; i < std::min(graph.warnings.size(), kMost); ++i) warn(graph.warnings[i]);
   if (graph.warnings.size() > kMost)
-    warn(fmt::format("scene {}: and {} more of the kind", file.filename().string(), graph.warnings.size() - kMost));
+    warn(fmt::format("scene {}: {} more warnings of this kind", file.filename().string(),
+                     graph.warnings.size() - kMost));
   if (graph.normal_maps > 0)
-    warn(fmt::format("scene {}: {} of its materials have a normal or bump map, which is not shown",
+    warn(fmt::format("scene {}: {} of its materials have a normal or bump map, which is ignored",
                      file.filename().string(), graph.normal_maps));
 }
 

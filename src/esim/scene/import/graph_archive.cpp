@@ -148,7 +148,7 @@ class Reader {
     bytes_.remove_prefix(size);
   }
   void require(std::size_t size) const {
-    if (size > bytes_.size()) throw InternalError("a scene graph's bytes end early");
+    if (size > bytes_.size()) throw InternalError("the bytes of a scene graph are cut off");
   }
 
   std::string_view bytes_;

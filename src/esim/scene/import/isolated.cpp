@@ -74,7 +74,7 @@ std::string content_of(int descriptor) {
 
 IsolatedResult run_isolated(const std::function<std::string()>& work, std::size_t memory_bytes, unsigned cpu_s) {
   const int result = ::memfd_create("esim", MFD_CLOEXEC);
-  if (result < 0) throw InternalError(std::string("cannot make a memory file: ") + std::strerror(errno));
+  if (result < 0) throw InternalError(std::string("cannot create a memory file: ") + std::strerror(errno));
   const std::size_t addresses = address_bytes() + memory_bytes;
   const pid_t copy = ::fork();
   if (copy < 0) {

@@ -141,7 +141,7 @@ SceneMotion sample_motion(const NodeTransforms& transforms, std::size_t node, co
     if (!motion.empty() && motion.back().T_world_object.rotation.dot(q) < 0) q.coeffs() *= -1.0;
     motion.push_back(pose);
   }
-  if (!rigid) warn(fmt::format("object {}: its scale is animated, and kept at its first value", name));
+  if (!rigid) warn(fmt::format("object {}: animated scale is not supported; it keeps its first value", name));
   return motion;
 }
 

@@ -10,7 +10,7 @@
 namespace esim {
 namespace {
 
-/// One sensor's part of a file, for reading and for messages.
+/// The section of one sensor in a file.
 struct Section {
   const std::filesystem::path& file;
   std::string name;
@@ -35,14 +35,14 @@ struct Section {
     }
   }
 
-  /// A time difference that must be nothing, or absent.
+  /// Fails unless a time shift is 0 or absent.
   void require_no_shift(const char* key) const {
     if (node[key].IsDefined() && as<double>(key) != 0) {
       fail(fmt::format("{} is {} s, but all simulated sensors share one clock; set it to 0", key, as<double>(key)));
     }
   }
 
-  /// Numbers of a flat list or of a list of rows.
+  /// The numbers of a flat list or of a list of rows.
   std::vector<double> numbers(const YAML::Node& list, const char* key, std::size_t count) const {
     std::vector<double> values;
     try {
@@ -110,7 +110,7 @@ Camera camera_of(const Section& camera, const std::string& projection, double wi
   return model;
 }
 
-/// The original ESIM's layout.
+/// The layout of the original ESIM.
 std::vector<CalibratedCamera> read_rig(const YAML::Node& root, const std::filesystem::path& file) {
   std::vector<CalibratedCamera> cameras;
   for (std::size_t i = 0; i < root["cameras"].size(); ++i) {
@@ -131,7 +131,7 @@ std::vector<CalibratedCamera> read_rig(const YAML::Node& root, const std::filesy
   return cameras;
 }
 
-/// Kalibr's layout. T_cam_imu maps from the IMU to the camera; T_cn_cnm1 from the camera before.
+/// Kalibr's layout. T_cam_imu maps from the IMU to the camera, T_cn_cnm1 from the previous camera.
 std::vector<CalibratedCamera> read_camchain(const YAML::Node& root, const std::filesystem::path& file) {
   std::vector<CalibratedCamera> cameras;
   for (int i = 0; root[fmt::format("cam{}", i)].IsDefined(); ++i) {

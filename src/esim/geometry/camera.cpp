@@ -101,7 +101,7 @@ void Camera::validate() const {
     throw UserError(
         fmt::format("camera: w is {} rad; it must be between 0 and pi (instead of 0, use no distortion)", model->w));
   }
-  // The domains surround the optical axis without holes: where the border can be inverted, the inside can too.
+  // The domains contain the optical axis and have no holes: if the border can be inverted, so can the inside.
   for (int x = 0; x < width; ++x) {
     require_visible(*this, x, 0);
     require_visible(*this, x, height - 1);

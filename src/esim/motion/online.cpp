@@ -57,7 +57,7 @@ TimeNs OnlineTrajectory::newest() const {
 
 Kinematics OnlineTrajectory::at(TimeNs t) const {
   require_covered(t);
-  // The segment (k, k + 1] · interval: the end of what is known belongs to the same one after later pushes, too.
+  // The segment (k, k + 1] · interval: the end of the known motion stays in the same segment after later pushes.
   const TimeNs since_start = t - options_.start;
   const TimeNs segment = since_start == 0 ? 0 : (since_start - 1) / options_.interval;
   std::vector<Eigen::Quaterniond> rotations;

@@ -111,8 +111,7 @@ Extent extent_of(const QuinticBezier& curve) {
   return extent;
 }
 
-/// How long each leg takes without standing still at its ends: first along its chord, then along the curve that this
-/// makes.
+/// Sets the duration of each leg without its ramps: first along its chord, then along the resulting curve.
 void set_leg_times_by_speed(std::span<const Waypoint> points, const WaypointOptions& options, WaypointCourse& course) {
   constexpr int kRounds = 6;
   const auto time_of = [&](std::size_t leg, const Extent& extent) {
@@ -192,7 +191,7 @@ WaypointTrajectory::WaypointTrajectory(std::span<const Waypoint> points, const W
     schedule.push_back(leg);
     arrived = leg.arrive;
   }
-  // A closed motion has stood at its first point already.
+  // A closed motion has already paused at its first point.
   end_ = arrived + (options.closed ? 0 : to_ns(points.back().pause_s));
 
   const std::vector<QuinticBezier> path = smooth_path(course);
@@ -203,7 +202,7 @@ WaypointTrajectory::WaypointTrajectory(std::span<const Waypoint> points, const W
 
 Kinematics WaypointTrajectory::at(TimeNs t) const {
   require_covered(t);
-  // The first leg that has not ended: before it begins, the body stands at its start.
+  // The first leg that has not ended; before it begins, the body rests at its start.
   auto leg = std::lower_bound(legs_.begin(), legs_.end(), t, [](const Leg& l, TimeNs time) { return l.arrive < time; });
   if (leg == legs_.end()) leg = legs_.end() - 1;  // a pause at the last point
   const double leg_s = to_seconds(leg->arrive - leg->leave);

@@ -59,7 +59,7 @@ LayerMotion::State LayerMotion::at(TimeNs t) const {
   if (now_s < t_s_.front() || t_s_.size() == 1) return {values_.front(), Parameters::Zero()};
   if (now_s > t_s_.back()) return {values_.back(), Parameters::Zero()};
 
-  // Between keyframes i and i + 1; at the last one the motion still goes on.
+  // Between keyframes i and i + 1; at the last keyframe the velocity is still that of the motion.
   const auto next = std::upper_bound(t_s_.begin(), t_s_.end() - 1, now_s);
   const auto i = static_cast<std::size_t>(next - t_s_.begin()) - 1;
   const double h = t_s_[i + 1] - t_s_[i], p = (t_s_[i + 1] - now_s) / h, q = (now_s - t_s_[i]) / h;

@@ -12,9 +12,9 @@
 
 namespace esim {
 
-/// Corners are not shared: texture coordinates belong to a triangle's corner.
+/// Vertices are not shared, since texture coordinates belong to a triangle's corner.
 struct GlScene::Vertex {
-  Eigen::Vector3f position, normal;  // a normal of zero: a flat triangle
+  Eigen::Vector3f position, normal;  // a normal of zero means a flat triangle
   Eigen::Vector2f texture_uv;
 };
 

@@ -20,7 +20,7 @@
 namespace esim {
 namespace {
 
-/// Files of the scene's own folder, for reading.
+/// Gives assimp read access to the files of the scene's own folder.
 class FolderFiles final : public Assimp::DefaultIOSystem {
  public:
   explicit FolderFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
@@ -59,7 +59,7 @@ bool is_finite(const aiVector3D& v) { return std::isfinite(v.x) && std::isfinite
 
 Eigen::Vector3d to_eigen(const aiVector3D& v) { return {v.x, v.y, v.z}; }
 
-/// Turns what assimp made of a file into a graph.
+/// Converts assimp's result to a graph.
 class Converter {
  public:
   Converter(const std::filesystem::path& file, std::string format, const aiScene& scene)
@@ -77,7 +77,7 @@ class Converter {
  private:
   void warn(const std::string& text) { graph_.warnings.push_back(text); }
 
-  /// The image that a material names: one of the file's own, or a file beside it.
+  /// The image of a material: embedded in the file, or a separate file.
   std::int32_t image(const std::string& name) {
     const auto [entry, is_new] = image_of_.try_emplace(name, static_cast<std::int32_t>(graph_.images.size()));
     if (!is_new) return entry->second;
@@ -113,7 +113,7 @@ class Converter {
       material.name = name_of(source.GetName());
       aiColor3D colour;
       if (source.Get(AI_MATKEY_COLOR_DIFFUSE, colour) == AI_SUCCESS) material.base = {colour.r, colour.g, colour.b};
-      // Where there is a texture, it alone is the base colour: exporters leave the factor at whatever it was.
+      // If there is a texture, it alone is the base colour: exporters write an arbitrary factor.
       material.base_texture = texture(source, aiTextureType_DIFFUSE);
       if (material.base_texture.image >= 0) material.base.setOnes();
       if (source.Get(AI_MATKEY_COLOR_EMISSIVE, colour) == AI_SUCCESS)
@@ -156,7 +156,7 @@ class Converter {
     const bool has_material = part.mMaterialIndex < graph_.materials.size();
     for (unsigned f = 0; f < part.mNumFaces; ++f) {
       const aiFace& face = part.mFaces[f];
-      if (face.mNumIndices != 3) continue;  // points and lines
+      if (face.mNumIndices != 3) continue;  // a point or a line
       std::array<std::uint32_t, 3> corners{};
       std::array<Eigen::Vector2f, 3> uv;
       for (unsigned c = 0; c < 3; ++c) {
@@ -175,7 +175,7 @@ class Converter {
     return mesh;
   }
 
-  /// From the file's world, as assimp gives it, to metres with z upwards.
+  /// The transform from the file's world, as assimp returns it, to metres with z up.
   Eigen::Matrix4d world() const {
     const Eigen::Matrix3d from_y_up =
         Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
@@ -230,7 +230,7 @@ class Converter {
       }
       if (!value.allFinite() || !(std::abs(t_s) < 1e6))
         fail_scene(file_, "an animation contains a number that is not finite");
-      if (!track.times_s.empty() && !(t_s > track.times_s.back())) continue;  // twice the same instant
+      if (!track.times_s.empty() && !(t_s > track.times_s.back())) continue;  // the same instant twice
       track.times_s.push_back(t_s);
       track.values.push_back(value);
     }
@@ -243,7 +243,7 @@ class Converter {
     const aiNodeAnim* channel;
     std::string action;  // "Thing|ThingAction" without its first part
 
-    /// Blender's FBX plays every action on every object: a thing's own is called like it.
+    /// Blender's FBX applies every action to every object; an object's own action has its name.
     auto rank(const std::string& node) const {
       return std::tuple(action.starts_with(node), action == "Scene", animation->mNumChannels);
     }

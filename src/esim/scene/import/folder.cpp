@@ -16,7 +16,7 @@ constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{1} << 31;
 
 bool has_scheme(const std::string& name) {
   const std::size_t colon = name.find(':');
-  return colon != std::string::npos && colon > 1;  // one letter is a drive
+  return colon != std::string::npos && colon > 1;  // a single letter is a drive
 }
 
 bool is_absolute(const std::string& name) { return name.starts_with('/') || (name.size() > 1 && name[1] == ':'); }

@@ -67,12 +67,12 @@ float as_float(const std::byte* from, int type) {
   }
 }
 
-/// Also in single precision.
+/// Whether a number is finite, also in single precision.
 bool is_finite_number(const Json& value) {
   return value.is_number() && std::abs(value.get<double>()) <= double{std::numeric_limits<float>::max()};
 }
 
-/// Nothing for text that is no base64.
+/// Empty for text that is not base64.
 std::vector<std::byte> base64_decoded(std::string_view text) {
   static constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::array<std::int8_t, 256> value;

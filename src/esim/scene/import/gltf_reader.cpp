@@ -19,7 +19,7 @@ Eigen::Vector3f colour_of(const std::vector<double>& factor) {
   return {static_cast<float>(factor[0]), static_cast<float>(factor[1]), static_cast<float>(factor[2])};
 }
 
-/// Where a material's texture lies on a surface.
+/// A material's texture and its texture coordinates.
 struct TextureSlot {
   GraphTexture texture;
   std::string coordinates = "TEXCOORD_0";
@@ -120,7 +120,7 @@ class GltfReader {
         material.base_texture = base.texture;
       }
       material.unlit = extension("KHR_materials_unlit") != nullptr;
-      // Light baked into a texture may be brighter than the format's largest factor, 1.
+      // Baked light can exceed 1, the largest factor of the format.
       if (const Json* const extras = GltfDocument::find(json, "extras"))
         material.base *= static_cast<float>(document_.number(*extras, "esim_radiance_scale", 1));
 
@@ -142,7 +142,7 @@ class GltfReader {
     }
   }
 
-  /// The index of a plain grey material, for surfaces that have none.
+  /// The index of a grey material for surfaces without one.
   std::uint32_t plain_material() {
     if (plain_material_ == kNoMaterial) {
       plain_material_ = static_cast<std::int32_t>(graph_.materials.size());
@@ -155,7 +155,7 @@ class GltfReader {
     return document_.index(attributes, name, "accessors");
   }
 
-  /// The corners of a primitive's triangles as indices of its vertices.
+  /// The corners of a primitive's triangles, as indices of its vertices.
   std::vector<std::uint32_t> corners(const Json& primitive, std::size_t vertices) {
     constexpr double kTriangles = 4, kStrip = 5, kFan = 6;
     const double mode = document_.number(primitive, "mode", kTriangles);
@@ -196,7 +196,7 @@ class GltfReader {
     const std::size_t material = has_material ? document_.index(primitive, "material", "materials") : plain_material();
     const TextureSlot slot = has_material ? slots_[material] : TextureSlot{};
 
-    // What is per vertex.
+    // Data per vertex.
     for (std::size_t i = 0; i < vertices; ++i)
       mesh.vertices.emplace_back(positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]);
     if (GltfDocument::find(*attributes, "NORMAL") != nullptr) {
@@ -221,7 +221,7 @@ class GltfReader {
     if (GltfDocument::find(primitive, "targets") != nullptr)
       warn(fmt::format("mesh {}: shape keys are not supported, and are ignored", name));
 
-    // What is per triangle.
+    // Data per triangle.
     for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
       const auto corner = [&](std::size_t c) { return static_cast<std::uint32_t>(first + indices[i + c]); };
       mesh.triangles.push_back({corner(0), corner(1), corner(2)});
@@ -242,7 +242,7 @@ class GltfReader {
     }
   }
 
-  /// The nodes of the scene that is shown, from its roots on, so that parents come before their children.
+  /// Reads the nodes of the default scene from its roots, so that parents come before their children.
   void read_nodes() {
     GraphNode world{.name = "world"};
     world.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX()));  // y is up
@@ -297,7 +297,7 @@ class GltfReader {
     return node;
   }
 
-  /// Cameras look along -z, with y upwards. They belong to the node that is about to be added.
+  /// Cameras look along -z, with y up. They belong to the node that is added next.
   void read_camera(const Json& node, const std::string& name) {
     const Json& json = document_.list("cameras")[document_.index(node, "camera", "cameras")];
     GraphCamera camera{name, static_cast<std::uint32_t>(graph_.nodes.size()), 0, Eigen::Matrix4d::Identity()};
@@ -338,7 +338,7 @@ class GltfReader {
     return track;
   }
 
-  /// All animations play at once, as Blender exports one per object.
+  /// All animations play at the same time, since Blender exports one per object.
   void read_animations() {
     for (const Json& animation : document_.list("animations")) {
       const Json* const channels = GltfDocument::find(animation, "channels");

@@ -6,7 +6,7 @@
 namespace esim {
 namespace {
 
-// Every struct names its members once, for both directions.
+// Every struct lists its members once, for reading and writing.
 
 template <class Archive>
 void archive(Archive& a, Track& o) {
@@ -50,7 +50,7 @@ void archive(Archive& a, SceneGraph& o) {
       a(o.warnings);
 }
 
-/// Whether a value is the bytes it consists of.
+/// Whether a type is stored as its bytes.
 template <typename T>
 inline constexpr bool kIsFlat = std::is_arithmetic_v<T> || std::is_enum_v<T>;
 template <typename Scalar, int Rows, int Columns>

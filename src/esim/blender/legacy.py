@@ -1,5 +1,5 @@
-# Blender forgets the textures of materials made for its internal renderer (before 2.80) when it opens them. They still
-# stand in the file, whose layout it describes itself: this reads them there.
+# When Blender opens materials of its former internal renderer (before 2.80), it drops their textures. The file still
+# contains them and describes its own layout; this module reads them from the file.
 import gzip
 import struct
 
@@ -88,7 +88,7 @@ class BlendFile:
 
 
 def esim_legacy_textures(path):
-    """Image names by material name, from the texture slots of the file's materials."""
+    """Returns image names by material name, from the texture slots of the file's materials."""
     file = BlendFile(path)
     images = {}
     for kind, data in file.of_type("Material"):

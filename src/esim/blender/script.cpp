@@ -56,7 +56,7 @@ std::string ScriptInMemory::path() const { return fmt::format("/proc/self/fd/{}"
 
 std::vector<std::string> blender_command(const std::string& program, const ScriptInMemory& script,
                                          const std::vector<std::string>& arguments) {
-  // Debian's Blender uses the first Python on PATH, which may be one that lacks the system's modules.
+  // Debian's Blender uses the first Python on PATH, which may lack the system's modules.
   const char* const path = std::getenv("PATH");
   std::vector<std::string> command = {
       "/usr/bin/env", "-u",         "PYTHONHOME",

@@ -23,7 +23,7 @@ bool is_answered(const EngineBatch& batch) {
 
 }  // namespace
 
-/// Tells the program of a view and asks for its images. Throws ConnectionLost.
+/// Sets a view and requests its images. Throws ConnectionLost.
 void UnrealcvClient::submit(Asked& asked) {
   // Four channels of eight bytes for each pixel.
   constexpr std::size_t kPixel = 32;
@@ -42,7 +42,7 @@ std::shared_ptr<UnrealcvClient::Asked> UnrealcvClient::start(EngineView view) {
   return asked;
 }
 
-/// What is lost is submitted after connecting again.
+/// Lost requests are submitted again after the next connection.
 void UnrealcvClient::submit_or_lose(Asked& asked) {
   try {
     submit(asked);
@@ -58,12 +58,12 @@ void UnrealcvClient::abandon(const std::shared_ptr<Asked>& asked) {
   forget_answered();
 }
 
-/// Others are kept: the session writes answers into them.
+/// Requests without an answer are kept, since the session writes their answers.
 void UnrealcvClient::forget_answered() {
   asked_.remove_if([](const auto& asked) { return !asked->is_wanted && is_answered(asked->batch); });
 }
 
-/// Connects, and asks again for what has no answer yet.
+/// Connects, and repeats requests without an answer.
 void UnrealcvClient::connect(const EngineView& view, SteadyTime give_up) {
   session_.emplace(options_, give_up);
   state_ = {};
@@ -74,7 +74,7 @@ void UnrealcvClient::connect(const EngineView& view, SteadyTime give_up) {
   }
 }
 
-/// The answers to what is asked, whatever connections that takes.
+/// Waits for the answers, and connects as often as necessary.
 void UnrealcvClient::wait_for(const Asked& asked, Until until) {
   SteadyTime give_up = seconds_from_now(options_.timeout_s);
   while (true) {
@@ -109,12 +109,12 @@ void UnrealcvClient::fail_to_connect(const std::string& reason) const {
        "check why the program ended");
 }
 
-/// Waits for a view once. Throws OtherSize; whatever is wrong with the light, what is wrong with the connection or the
-/// depth comes first.
+/// Waits for a view once. Throws OtherSize. Errors of the connection or the depth take precedence over errors of the
+/// light.
 void UnrealcvClient::receive(Asked& asked, const Workers& workers, PinholeImage& image,
                              const std::function<void()>& take_geometry) {
   wait_for(asked, Until::light);
-  // Taken out, for the batch is another if the connection is lost now.
+  // Moved out, since the batch is replaced if the connection is lost now.
   const EngineRequest light = dialect_->take_light(asked.batch);
   std::exception_ptr failed[2];
   workers.for_each(2, [&](int part) {
@@ -141,7 +141,7 @@ void UnrealcvClient::finish(const std::shared_ptr<Asked>& asked, const Workers& 
       receive(*asked, workers, image, take_geometry);
       break;
     } catch (const OtherSize& other) {
-      // The window may take some frames to change.
+      // The window may change its size only after some frames.
       if (!first && Clock::now() >= give_up) {
         fail(options_,
              fmt::format("its image size was set to {} x {} pixels, but it sent images of {} x {} pixels for {:g} s",

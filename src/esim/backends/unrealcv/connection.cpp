@@ -18,7 +18,7 @@ namespace esim {
 namespace {
 
 constexpr std::uint32_t kMagic = 0x9E2B83C1;
-constexpr std::size_t kPortion = std::size_t{1} << 20;  // of memory, as a message grows
+constexpr std::size_t kPortion = std::size_t{1} << 20;  // step of allocation while a message is received
 
 std::uint32_t number_at(const char* bytes) {
   std::uint32_t number = 0;
@@ -53,7 +53,7 @@ struct FreeAddresses {
   void operator()(addrinfo* list) const { ::freeaddrinfo(list); }
 };
 
-/// Connects to one of a host's addresses; the reason where that fails.
+/// Connects to one of a host's addresses; returns the reason if it fails.
 std::string connect_to(const addrinfo& address, SteadyTime deadline, int& socket) {
   socket = ::socket(address.ai_family, address.ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, address.ai_protocol);
   if (socket < 0) return std::strerror(errno);
@@ -116,7 +116,7 @@ void MessageConnection::write_some() {
   }
 }
 
-/// Reads until `have` is `size`; false at the deadline. Sends what is waiting meanwhile.
+/// Reads until `have` is `size`; false at the deadline. Meanwhile sends waiting data.
 bool MessageConnection::read_into(char* to, std::size_t size, std::size_t& have, SteadyTime deadline) {
   while (have < size) {
     const ssize_t count = ::recv(socket_, to + have, size - have, 0);

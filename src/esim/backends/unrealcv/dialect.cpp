@@ -14,10 +14,10 @@
 namespace esim {
 namespace {
 
-/// Where 16-bit floating-point numbers end: the depth of a sky.
+/// The largest 16-bit floating-point number, which is the depth of the sky.
 constexpr float kNoDepth = 65504;
 
-// Servers read no exponents.
+// Without exponents, which servers do not parse.
 std::string location_text(const UnrealPose& pose) {
   const Eigen::Vector3d& p = pose.location_cm;
   return fmt::format("{:.6f} {:.6f} {:.6f}", p.x(), p.y(), p.z());
@@ -142,7 +142,7 @@ EngineBatch Dialect::setting_commands(const EngineView& view, EngineState& state
   return batch;
 }
 
-/// Light, depth and, where they are wanted, masks.
+/// The commands for light, depth and, if they are needed, masks.
 std::vector<std::string> Dialect::image_commands() const {
   std::vector<std::string> commands = {
       camera("vget", options_.light_image + (light_ == EngineLight::npy ? " npy" : " png")),
@@ -173,7 +173,7 @@ EngineRequest Dialect::take_light(EngineBatch& batch) const {
   return std::exchange(batch[light], {batch[light].command, ""});
 }
 
-/// Names the command in what goes wrong.
+/// Adds the command to errors.
 template <typename Decode>
 void Dialect::decode(const EngineRequest& answered, const Decode& decode) const {
   try {

@@ -16,7 +16,7 @@
 namespace esim {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "numbers are taken as they come");
+static_assert(std::endian::native == std::endian::little, "numbers are read in the byte order of the machine");
 
 /// An array of H x W x channels numbers, borrowed.
 struct NpyImage {
@@ -111,7 +111,7 @@ void light_of_bytes(const NpyImage& image, Image<float>& irradiance) {
   std::swap(planes[0], irradiance);
 }
 
-/// Decodes a PNG image of the size that is expected.
+/// Decodes a PNG image of the expected size.
 void decode_png(std::string_view body, const ImageExtent& expected, Encoding encoding, bool colour, Planes& planes) {
   const std::span<const std::byte> bytes(reinterpret_cast<const std::byte*>(body.data()), body.size());
   const auto size = size_in_header(bytes);

@@ -14,7 +14,7 @@ namespace {
 constexpr const char* kOneAtATime = "an UnrealCV server serves one client at a time";
 constexpr std::uint32_t kMostIds = 100'000'000;  // eight digits
 
-/// The id at the beginning of an answer, and where its body begins. A notification has none.
+/// The id at the beginning of an answer, and the position of its body. Notifications have no id.
 std::optional<std::pair<std::uint32_t, std::size_t>> id_of(std::string_view message) {
   constexpr std::size_t kMostDigits = 8;
   const std::size_t digits = std::min(message.find_first_not_of("0123456789"), message.size());
@@ -67,7 +67,7 @@ void EngineSession::send_waiting() {
   }
 }
 
-/// Whether it was an answer that somebody waits for, who then has it.
+/// Assigns an answer to its request; false if the message is not an answer.
 bool EngineSession::take(std::string& message) {
   const auto id = id_of(message);
   if (!id) return false;

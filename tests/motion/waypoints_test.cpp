@@ -111,7 +111,7 @@ TEST(Waypoints, DerivativesAreThoseOfThePose) {
   for (const auto& [points, options] : motions()) {
     const WaypointTrajectory trajectory(points, options);
     const double start_s = to_seconds(trajectory.start()), duration_s = to_seconds(trajectory.end()) - start_s;
-    // Differences do not reach over joints, where third derivatives jump: they would be off by a little there.
+    // Differences do not cross joints, where third derivatives jump and would cause small errors.
     const double step = 2e-3;
     double worst = 0;
     std::vector<double> errors;
@@ -193,7 +193,7 @@ TEST(Waypoints, SpeedIsReachedOnStraightLegs) {
   options.ramp_s = 0.4;
   const WaypointTrajectory trajectory(points, options);
   const std::vector<TimeNs> arrivals = trajectory.arrivals();
-  // Each ramp costs half of its time.
+  // Each ramp adds half of its duration.
   EXPECT_NEAR(to_seconds(arrivals[1]), 3 / 1.5 + 0.2, 0.05);
   EXPECT_NEAR(to_seconds(trajectory.end()), 5 / 1.5 + 6 / 2.0 + 2 * 0.2, 0.05);
   EXPECT_NEAR(trajectory.at(to_ns(1.0)).velocity_world.norm(), 1.5, 0.075);

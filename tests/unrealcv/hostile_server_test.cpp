@@ -1,4 +1,4 @@
-// Servers that are slow, broken or not there: one clear error each, in time.
+// Servers that are slow, broken or missing: each gives one clear error, in time.
 #include <chrono>
 
 #include "unrealcv/shown.h"
@@ -14,8 +14,8 @@ class HostileServer : public testing::Test {
  protected:
   static constexpr double kTimeout_s = 0.4;
 
-  /// What is said of a server that has been set up, and that it is said in time: the connection, the first answers and
-  /// the image may each take as long as is allowed.
+  /// The error for the current server; checks that it comes in time: the connection, the first answers and the image
+  /// may each take the complete timeout.
   std::string problem(const Camera& camera = test::small_camera()) {
     UnrealcvOptions options = test::options_for(*server_, kTimeout_s);
     options.objects = objects_;
@@ -30,7 +30,7 @@ class HostileServer : public testing::Test {
     return message;
   }
 
-  /// The same where an answer is tampered with.
+  /// The same with a manipulated answer.
   std::string problem_of(const std::string& part, const UnrealcvServer::Tamper& tamper) {
     server_.emplace(test::show_ramp, objects_);
     server_->tamper = [=](const std::string& command, std::string& bytes, bool& hang_up) {
@@ -39,7 +39,7 @@ class HostileServer : public testing::Test {
     return problem();
   }
 
-  /// Where the body of an answer is another.
+  /// The same with another body of an answer.
   std::string problem_of_body(const std::string& part, const std::string& body) {
     return problem_of(part, [=](const std::string&, std::string& bytes, bool&) {
       const std::string payload = bytes.substr(8);
@@ -100,7 +100,7 @@ TEST_F(HostileServer, AnotherClientIsThere) {
   const auto first = test::renderer_for(test::options_for(*server_), camera);
   test::render(*first, camera, {});
   EXPECT_TRUE(test::contains(problem(), "one client at a time"));
-  test::render(*first, camera, {});  // goes on
+  test::render(*first, camera, {});  // continues
 }
 
 TEST_F(HostileServer, NoAnswer) {
@@ -114,7 +114,7 @@ TEST_F(HostileServer, NoAnswer) {
 }
 
 TEST_F(HostileServer, NotificationsAreNoAnswers) {
-  // They come without end instead of one. Before answers they do no harm: see the next test.
+  // An endless sequence of them instead of an answer. Before answers they are harmless: see the next test.
   const std::string message = problem_of("lit npy", [](const std::string&, std::string& bytes, bool&) {
     bytes.clear();
     for (int i = 0; i < 20000; ++i) bytes += UnrealcvServer::framed("something has happened: 7");
@@ -138,7 +138,7 @@ TEST_F(HostileServer, CutOffMessages) {
     const std::string message = problem_of(
         "lit npy", [=](const std::string&, std::string& bytes, bool&) { bytes.resize(std::min(bytes.size(), keep)); });
     const bool silent = test::contains(message, "did not answer");
-    EXPECT_TRUE(silent || test::contains(message, "wrong magic number")) << "of what comes next: " << message;
+    EXPECT_TRUE(silent || test::contains(message, "wrong magic number")) << "of the next message: " << message;
   }
 }
 
@@ -215,7 +215,7 @@ TEST_F(HostileServer, DamagedImages) {
       {UnrealcvServer::npy("<f4", "24, x", npy.data(), 3072), "its shape is invalid"}};
   for (const auto& [body, part] : headers) EXPECT_TRUE(test::contains(problem_of_body("depth npy", body), part));
 
-  // PNG, where it is asked for.
+  // PNG, if it is requested.
   server_.emplace(test::show_ramp, objects_, UnrealcvServer::Version{.npy_light = false});
   server_->tamper = [](const std::string& command, std::string& bytes, bool&) {
     if (command.find("lit png") != std::string::npos)
@@ -225,7 +225,7 @@ TEST_F(HostileServer, DamagedImages) {
 }
 
 TEST_F(HostileServer, RandomDamageIsNeverMoreThanAnError) {
-  // Of every byte of the image's header, and of what frames it. The image may survive, or the server seem silent.
+  // In every byte of the image's header and of its frame. The image may survive, or the server may seem silent.
   const Camera camera = test::small_camera();
   int errors = 0;
   for (std::size_t at = 12; at < 140; at += 9) {

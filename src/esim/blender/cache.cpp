@@ -52,8 +52,7 @@ fs::path cache_folder() {
   fs::path base = variable("XDG_CACHE_HOME");
   if (!base.is_absolute()) base = variable("HOME").empty() ? fs::path() : variable("HOME") / ".cache";
   if (base.empty())
-    throw UserError(
-        "there is no folder for the cache, since neither HOME nor XDG_CACHE_HOME is set; set XDG_CACHE_HOME");
+    throw UserError("the cache has no folder, since neither HOME nor XDG_CACHE_HOME is set; set XDG_CACHE_HOME");
   std::error_code error;
   fs::create_directories(base / "esim", error);
   if (error)

@@ -32,7 +32,7 @@ FARTHEST = 1e9  # m; Blender writes 1e10 where no surface is visible
 # --- commands ---------------------------------------------------------------------------------------------------------
 
 def colour_of(number):
-    """Returns the colour of an object in masks: its number, in red and green. Pixels without an object are black."""
+    """Returns the colour of an object in masks: its number, in red and green. Other pixels are black."""
     return number & 255, number >> 8, 0
 
 

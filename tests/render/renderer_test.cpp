@@ -280,7 +280,7 @@ TEST(SpritesRenderer, SaysWhoseMotionEachPixelHas) {
       uncovered = uncovered || alone[0].object(x, y) == 0;
     }
   }
-  EXPECT_TRUE(uncovered) << "0 beside the only layer";
+  EXPECT_TRUE(uncovered) << "0 outside the only layer";
 }
 
 TEST(PlaneRenderer, ShowsEachPointWhereItIs) {

@@ -73,7 +73,7 @@ TEST(UnrealcvReconnection, GivesUpInTime) {
   const std::string message = test::message_of<EngineError>([&] { test::render(*renderer, camera, {}); });
   EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), 2.5);
   EXPECT_TRUE(test::contains(message, "127.0.0.1:" + std::to_string(server.port()) + ": the connection was lost"));
-  EXPECT_TRUE(test::contains(message, "did not come back within 0.3 s"));
+  EXPECT_TRUE(test::contains(message, "could not be restored within 0.3 s"));
 }
 
 TEST(UnrealcvReconnection, GivesUpOnOneThatFallsOverEachTime) {

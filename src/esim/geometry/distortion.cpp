@@ -67,8 +67,8 @@ bool positive_up_to(const std::array<double, N>& c, double end) {
   return bernstein_positive(bernstein, 40);
 }
 
-/// A point moved along its direction from the centre to the radius `ratio` r, where that radius has the given
-/// slope with respect to r: the Jacobian is the slope radially and the ratio across.
+/// Moves a point along its direction from the centre to the radius `ratio` r, which has the given slope with respect to
+/// r: the Jacobian is the slope in radial direction and the ratio in tangential direction.
 Distorted radially(const Eigen::Vector2d& ideal, double r, double ratio, double slope) {
   if (r == 0.0) return {ideal * ratio, Eigen::Matrix2d::Identity() * ratio};
   const Eigen::Vector2d direction = ideal / r;

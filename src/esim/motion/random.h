@@ -16,7 +16,7 @@ struct RandomMotionOptions {
   int order = 5;                                                     // of the spline, 2 … 6
 };
 
-/// A smooth random motion: a uniform B-spline whose control points are drawn independently, control point j being
+/// A smooth random motion: a uniform B-spline with independent random control points; control point j is
 ///   center · (Exp(a_x e_x) Exp(a_y e_y) Exp(a_z e_z), p),   a and p uniform in ± amplitude per axis,
 /// with AddressedRandom(seed, trajectory_position or trajectory_rotation), item = axis, draw = j, and `stream` for the
 /// moving body. A longer duration therefore only appends control points, and the amplitude of one axis does not affect

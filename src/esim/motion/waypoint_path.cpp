@@ -16,7 +16,7 @@ using Rate = Eigen::Matrix<double, 6, 1>;  // velocity and angular velocity in t
 
 constexpr double kLargestRateInMeans = 2.0;
 
-/// Of positions and of rotations.
+/// The mean rates of position and rotation on a leg.
 Rate mean_rate(const WaypointCourse& course, std::size_t leg) {
   Rate rate;
   rate.head<3>() = course.displacement(leg) / course.leg_s[leg];

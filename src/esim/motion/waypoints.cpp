@@ -150,7 +150,7 @@ Clock ramp(double t_s, double ramp_s) {
   return {ramp_s * x * x * x * (1.0 - 0.5 * x), x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / ramp_s};
 }
 
-/// On a leg that lasts `leg_s`, its ramps included.
+/// The clock on a leg that takes `leg_s`, including its ramps.
 Clock clock(double t_s, double leg_s, double ramp_in_s, double ramp_out_s) {
   if (t_s < ramp_in_s) return ramp(t_s, ramp_in_s);
   if (const double left_s = leg_s - t_s; left_s < ramp_out_s) {

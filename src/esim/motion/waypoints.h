@@ -22,7 +22,7 @@ struct WaypointOptions {
   double turn_rad_per_s = 0.8;  ///< maximum mean turn rate, if points have no times
   double ramp_s = 0.5;          ///< duration of acceleration after a rest, and of deceleration before one
   bool rest = true;             ///< the body rests at the start and at the end
-  bool closed = false;          ///< returns to the first point
+  bool closed = false;          ///< the motion returns to the first point
 };
 
 /// A smooth motion through poses, with twist and acceleration continuous throughout.

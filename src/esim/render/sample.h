@@ -11,13 +11,13 @@ namespace esim {
 /// One evaluation of the scene by one camera: a field per quantity, all of the image's size. Only the pixels in `tiles`
 /// are valid.
 struct Sample {
-  TimeNs t = 0;             // of the evaluation            set by the renderer from the request
-  std::vector<Tile> tiles;  // that were evaluated          set by the renderer from the request
+  TimeNs t = 0;             // of the evaluation               set by the renderer from the request
+  std::vector<Tile> tiles;  // that were evaluated             set by the renderer from the request
 
-  Image<float> irradiance;  // E, linear, 1.0 = white       computed by the renderer
+  Image<float> irradiance;  // E, linear, 1.0 = white          computed by the renderer
   Image<float> depth;       // Z, planar, m; +inf: no surface  computed by the renderer
-  Image<float> flow_x;      // V, px/s, to the right        by motion_field() from Z, object and the twists, or by the
-  Image<float> flow_y;      // V, px/s, downwards           renderer where there is no space
+  Image<float> flow_x;      // V, px/s, to the right           by motion_field() from Z, object and the twists, or by
+  Image<float> flow_y;      // V, px/s, downwards              the renderer if its scene is not three-dimensional
 
   // E over the area of one pixel if the camera's footprint is wider; E is its mean over the footprint. Empty otherwise,
   // and for panorama and plane, which have no edges.

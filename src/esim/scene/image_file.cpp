@@ -156,7 +156,7 @@ void decode_pixels(const std::filesystem::path& path, const cv::Mat& image, Enco
          encoding, colour, planes);
 }
 
-/// As opaque, whatever its alpha.
+/// The pixels as an opaque image, whatever their alpha.
 CodedImage coded_image(const PngPixels& png) {
   return {.data = png.bytes.data(),
           .row_bytes = static_cast<std::ptrdiff_t>(png.row_bytes),

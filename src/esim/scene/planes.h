@@ -35,7 +35,7 @@ struct CodedImage {
 /// over white. Planes of the right size are reused.
 void decode(const CodedImage& image, Encoding encoding, bool colour, Planes& planes);
 
-/// Luminance of R, G and B; exactly their value where they are equal.
+/// Luminance of R, G and B; if they are equal, exactly their value.
 constexpr float luminance(float red, float green, float blue) {
   return green + 0.2126F * (red - green) + 0.0722F * (blue - green);
 }

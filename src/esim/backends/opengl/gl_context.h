@@ -9,7 +9,7 @@ namespace esim {
 /// An OpenGL 4.5 context without a window. Private to the renderer.
 class GlContext {
  public:
-  /// On the device with this index, by default on the first one that is not software. Throws UserError.
+  /// Opens the device with this index, by default the first one that is not software. Throws UserError.
   explicit GlContext(std::optional<int> device);
   ~GlContext();
   GlContext(const GlContext&) = delete;

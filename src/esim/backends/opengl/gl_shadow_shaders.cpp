@@ -78,8 +78,8 @@ float share_of_box(sampler2DArray depths, int layer, vec2 place, Mapped seen) {
   return sum / 9;
 }
 
-// The lit fraction of the footprint, by as many boxes as necessary, up to 4 x 4. If its corners and its centre agree, no
-// straight edge crosses it.
+// The lit fraction of the footprint, by as many boxes as necessary, up to 4 x 4. If its corners and its centre agree,
+// no straight edge crosses it.
 float share_of_footprint(sampler2DArray depths, int layer, Mapped seen) {
   const float most_boxes = 4;
   vec2 low = vec2(1), high = vec2(textureSize(depths, 0).xy) - 3;

@@ -124,7 +124,7 @@ class LightOnSurfaces {
     for (unsigned i = 0; i < K; ++i) light[i] += (hits >> i & 1U) != 0 ? received[i] : 0.0F;
   }
 
-  /// Those of `lanes` whose points see the light, that is, nothing blocks the vector to it, up to `reach` times it.
+  /// Those of `lanes` whose points see the light: no triangle crosses the vector to it, up to `reach` times its length.
   std::uint32_t visible(const SurfacePoints<K>& surface, const VectorLanes<K>& to_light, float reach,
                         std::uint32_t lanes) const {
     // Slightly above the surface, by more than the rounding error of the point.

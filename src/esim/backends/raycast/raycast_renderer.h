@@ -16,7 +16,7 @@ std::shared_ptr<const RaycastScene> build_raycast_scene(const Scene& scene);
 
 struct RaycastOptions {
   float background = 0.2F;    ///< irradiance where no surface is hit
-  int samples_per_pixel = 1;  ///< 1, or 16 or 64 where an edge crosses the pixel; depth is that of its centre
+  int samples_per_pixel = 1;  ///< 1, or 16 or 64 if an edge crosses the pixel; depth is that of its centre
 };
 
 /// Renders triangles by ray casting with Embree: the cost is proportional to the tiles, lens distortion is exact, and

@@ -24,7 +24,7 @@ struct Sprite {
 /// Layers drawn directly on the sensor, without a 3D camera.
 struct SpriteScene {
   std::vector<Sprite> sprites;  ///< front to back
-  float background = 0.2F;      ///< irradiance where no layer is
+  float background = 0.2F;      ///< irradiance outside all layers
 };
 
 /// Shows the scene on a sensor of the camera's size; pose, twist and lens have no effect. With c_i the fraction of the

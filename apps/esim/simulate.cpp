@@ -55,8 +55,7 @@ int run(const Arguments& arguments) {
   if (!arguments.quiet) {
     print_summary(summary, out, scenario.output.preview && scenario.truth.rate_hz > 0);
     for (const std::string& hint : hints(scenario, summary)) {
-      tell(stderr, "hint:      {}: esim simulate {} --set 'sampling={{type: flow}}'\n", hint,
-           arguments.scenario);
+      tell(stderr, "hint:      {}: esim simulate {} --set 'sampling={{type: flow}}'\n", hint, arguments.scenario);
     }
   }
   if (!summary.problem.empty()) {

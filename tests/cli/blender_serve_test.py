@@ -196,7 +196,7 @@ class Serve(unittest.TestCase):
         client.ask("vset /camera/0/pose 0 0 0 0 0 0")
         self.assertAlmostEqual(client.array("vget /camera/0/luminance npy")[12][16], 0.1, 3)
         self.assertAlmostEqual(client.array("vget /camera/0/plane_depth npy")[12][16], 4.0, 3)
-        self.assertIn("use the engine cycles", client.text("vget /camera/0/object_mask npy"))
+        self.assertIn("use --engine cycles", client.text("vget /camera/0/object_mask npy"))
 
     def test_a_scene_without_a_camera_is_shown_from_the_origin(self):
         server = Serving(SCRIPTS, self.folder / "bright.blend", *SMALL)

@@ -100,7 +100,7 @@ class Waypoints(ProgramTest):
         session.press(b"u")
         session.wait_for(rb"3 way points")
         session.press(b"?")
-        session.wait_for(rb"drop a way point")
+        session.wait_for(rb"drop a waypoint")
         session.press(b"w")
         session.wait_for(rb"3 way points")
         session.press(b"p")
@@ -172,7 +172,7 @@ class Waypoints(ProgramTest):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(self.points(), 3)
         self.assertRegex(result.stderr, r"the motion lasts \d")
-        self.assertIn("drop a way point", result.stderr)
+        self.assertIn("drop a waypoint", result.stderr)
         self.assertRegex(result.stdout, r"\Atrajectory: {type: waypoints, file: walk.yaml}\nduration_s: \d+\.\d{3}\n\Z")
         self.assertTrue((self.folder / "walk.1.png").exists())
         # Again, going on from there; the picture gets a name of its own.
@@ -212,7 +212,7 @@ class Waypoints(ProgramTest):
 
     def test_bad_input(self):
         self.assert_refused(run("waypoints", self.scenario, "--out", self.walk, stdin=subprocess.DEVNULL), "terminal", "--keys")
-        self.assert_refused(run("waypoints", self.scenario, "--out", self.walk, "--keys", "wz"), "'z' is no key")
+        self.assert_refused(run("waypoints", self.scenario, "--out", self.walk, "--keys", "wz"), "'z' is not a key")
         self.assert_refused(run("waypoints", self.scenario, "--out", self.folder / "none" / "walk.yaml", "--keys", "x"), "no folder")
         self.assert_refused(run("waypoints", self.folder / "none.yaml", "--out", self.walk, "--keys", "x"), "none.yaml")
         self.assert_refused(run("waypoints", self.folder / "none.glb", "--out", self.walk, "--keys", "x"), "none.glb")
@@ -224,7 +224,7 @@ class Waypoints(ProgramTest):
     def test_help(self):
         help_text = run("waypoints", "--help").stdout
         self.assertIn("Examples", help_text)
-        self.assertIn("drop a way point", help_text)
+        self.assertIn("drop a waypoint", help_text)
         self.assertIn("esim waypoints", run("--help").stdout)
 
 

@@ -1,4 +1,4 @@
-// Against an encoder of its own, which filters as the standard says and does not compress.
+// Compares with a separate encoder, which filters as in the standard and does not compress.
 #include "esim/core/png_pixels.h"
 
 #include <gtest/gtest.h>
@@ -68,13 +68,13 @@ int predictor(int filter, int left, int above, int corner) {
 
 struct Picture {
   int width = 0, height = 0, channels = 0, bits = 0;
-  Bytes bytes{};  ///< as in the file: the higher byte of 16 bits first
+  Bytes bytes{};  ///< as in the file: 16-bit numbers have the higher byte first
 
   std::size_t pixel_bytes() const { return static_cast<std::size_t>(channels * bits / 8); }
   std::size_t row_bytes() const { return static_cast<std::size_t>(width) * pixel_bytes(); }
 };
 
-/// Smooth with jumps, so that every filter's carries and ties occur.
+/// Smooth with jumps, so that carries and ties of every filter occur.
 Picture picture_of(int width, int height, int channels, int bits) {
   Picture picture{width, height, channels, bits};
   std::uint32_t noise = 7;
@@ -96,7 +96,7 @@ Bytes head_of(const Picture& picture, std::uint32_t width, std::uint32_t height,
   return head;
 }
 
-/// With one filter for all rows, or -1: each in turn; the data in so many chunks.
+/// Encodes with one filter for all rows, or with each in turn (-1), and the data in several chunks.
 Bytes encode(const Picture& picture, int filter, std::size_t chunks = 1) {
   Bytes rows;
   const std::size_t row = picture.row_bytes(), step = picture.pixel_bytes();
@@ -131,7 +131,7 @@ bool decode(const Bytes& file, PngPixels& pixels) {
 }
 
 TEST(PngPixels, EveryKindAndFilter) {
-  PngPixels pixels;  // used again for all of them
+  PngPixels pixels;  // reused for all images
   for (const int channels : {1, 2, 3, 4}) {
     for (const int bits : {8, 16}) {
       for (const int filter : {0, 1, 2, 3, 4, -1}) {
@@ -195,7 +195,7 @@ TEST(PngPixels, OtherKindsAreLeftToOthers) {
   palette[9] = 3;
   EXPECT_FALSE(decode(with_head(palette), pixels));
 
-  // Of other sizes than there is data for: too little, too much, and more than memory.
+  // Sizes that do not match the data: too small, too large, and larger than memory.
   EXPECT_FALSE(decode(with_head(head_of(picture, 5, 3)), pixels));
   EXPECT_FALSE(decode(with_head(head_of(picture, 5, 5)), pixels));
   EXPECT_FALSE(decode(with_head(head_of(picture, 1 << 20, 1 << 20)), pixels));

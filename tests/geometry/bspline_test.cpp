@@ -49,7 +49,7 @@ Se3Spline spline_through(const Controls& controls, int order) {
   return Se3Spline(order, kStart_s, kInterval_s, controls.rotations, controls.positions);
 }
 
-/// Instants inside the segments, away from the knots by more than the numeric differences reach.
+/// Instants inside the segments, so far from the knots that numeric differences do not cross them.
 std::vector<double> inner_times() {
   std::vector<double> times;
   for (int segment = 0; segment < kSegments; ++segment) {

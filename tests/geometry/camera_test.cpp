@@ -25,7 +25,7 @@ struct NamedCamera {
   Camera camera;
 };
 
-// Calibrations of real event cameras (the Event Camera Dataset's, a quadrotor's, a wide lens), and made-up strong ones.
+// Calibrations of real event cameras (Event Camera Dataset, a quadrotor, a wide lens), and strong invented ones.
 const std::vector<NamedCamera> kCameras{
     {"pinhole", {640, 480, 400.0, 410.0, 321.5, 236.25, NoDistortion{}}},
     {"radial_tangential",
@@ -201,7 +201,7 @@ TEST(Camera, EquidistantAndFovEndAtARightAngle) {
 }
 
 TEST(Camera, NoTwoPointsOfARandomDomainShareAPixel) {
-  // Whatever is projected must come back to where it came from, even for absurd coefficients.
+  // Back-projection must invert projection, even for absurd coefficients.
   std::mt19937 engine(11);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   int projected = 0, refused = 0;
@@ -218,7 +218,7 @@ TEST(Camera, NoTwoPointsOfARandomDomainShareAPixel) {
     ++projected;
     const auto back = camera.back_project(projection->pixel);
     ASSERT_TRUE(back) << i;
-    // Close to a fold many points lie within rounding of one pixel.
+    // Close to a fold, many points differ by rounding only from one pixel.
     const double tolerance = 1e-12 * (1.0 + back->jacobian.norm() * 200.0);
     ASSERT_LT((back->bearing - point).norm(), tolerance) << i << ": " << point.transpose();
   }
@@ -268,7 +268,7 @@ TEST(Camera, ValidationNamesWhatIsWrong) {
 }
 
 TEST(Camera, ValidationNamesThePixelThatTheDistortionCannotReach) {
-  // Everything is visible but the lower right: the principal point lies in the upper left.
+  // Only the lower right corner is invalid: the principal point is in the upper left.
   const Camera corner{240, 180, 200.0, 200.0, 0.0, 0.0, RadialTangential{-0.066, 0.0, 0.0, 0.0}};
   EXPECT_EQ(error_of(corner), "nothing was thrown");
   const Camera folded{240, 180, 200.0, 200.0, 0.0, 0.0, RadialTangential{-0.0665, 0.0, 0.0, 0.0}};

@@ -42,7 +42,7 @@ TEST(BandedLeastSquares, FindsTheDenseSolution) {
 }
 
 TEST(BandedLeastSquares, RefusesUnknownsThatDependOnEachOther) {
-  // Two unknowns of which only one sum is known, whatever the rounding of its coefficients does.
+  // Two unknowns of which only one sum is known, for any rounding of its coefficients.
   for (const double a : {0.1, 0.3, 0.7, 1.1}) {
     for (const double b : {0.1, 0.2, 0.6, 1.3}) {
       using LeastSquares = BandedLeastSquares<1, 1>;

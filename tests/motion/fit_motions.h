@@ -27,7 +27,7 @@ inline std::vector<TimedPose> sample(const Motion& motion, int count, double dur
   return poses;
 }
 
-/// What a hand-held camera does: a few sinusoids of up to 2 Hz.
+/// A motion like that of a hand-held camera: a few sinusoids of up to 2 Hz.
 inline SE3 smooth_motion(double t) {
   const Eigen::Vector3d turn(0.5 * std::sin(3.0 * t), 0.3 * std::cos(7.0 * t), 0.4 * std::sin(11.0 * t + 1.0));
   return {so3_exp(turn), {std::sin(4.0 * t), 0.5 * std::cos(9.0 * t), 2.0 + 0.2 * std::sin(12.0 * t)}};

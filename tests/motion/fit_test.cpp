@@ -45,7 +45,7 @@ TEST_P(FitOrder, FindsTheSplineThatThePosesWereTakenFrom) {
   FitOptions options;
   options.order = GetParam();
   options.knot_interval_s = 0.1;
-  options.smoothing_time_s = 1e-5;  // none to speak of
+  options.smoothing_time_s = 1e-5;  // negligible
   const FittedTrajectory fit = fit_trajectory(poses, options);
   EXPECT_EQ(fit.report.control_points, 30 + GetParam() - 1);
   EXPECT_EQ(fit.trajectory.start(), kEpoch);
@@ -101,7 +101,7 @@ TEST(Fit, FollowsTurnsOfMoreThanAQuarterFromPoseToPose) {
 }
 
 TEST(Fit, FollowsFastTumblingInDensePoses) {
-  const Vector3d rate(60.0, 80.0, 0.0);  // a radian from pose to pose, two within the usual 20 ms
+  const Vector3d rate(60.0, 80.0, 0.0);  // 1 rad from pose to pose, two poses within the usual 20 ms
   const auto poses = sample([&](double t) { return SE3{so3_exp(rate * t), {0.0, 0.0, 0.0}}; }, 201, 2.0);
   const FittedTrajectory fit = fit_trajectory(poses, {});
   EXPECT_LT(fit.report.knot_interval_s, 0.004);
@@ -177,7 +177,7 @@ TEST(Fit, DoesNotMindTheSignsOfQuaternions) {
 
 // What it minimises.
 
-/// The rotations' cost as documented, from the spline alone.
+/// The documented cost of the rotations, computed from the spline alone.
 double rotation_cost(const Se3Spline& spline, const std::vector<TimedPose>& poses, double weight) {
   double cost = 0.0;
   for (const TimedPose& pose : poses) {
@@ -281,7 +281,7 @@ TEST(Fit, AveragesNoise) {
 }
 
 TEST(Fit, AttenuatesBySmoothingTimeAndFrequencyAlone) {
-  // A sinusoid with τω = 1 is halved, whatever the knot interval and the rate.
+  // A sinusoid with τω = 1 is halved, for any knot interval and rate.
   constexpr double kOmega = 10.0;
   const auto swing = [](double t) {
     const double s = std::sin(kOmega * t);

@@ -59,8 +59,8 @@ struct InertialState {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
 };
 
-/// Integrates what an IMU at `T_body_imu` measures at `rate_hz` on a trajectory from its start, for `duration_s`, by
-/// the fourth-order scheme of Runge and Kutta, each step using the measurements at its ends and in its middle.
+/// Integrates the measurements of an IMU at `T_body_imu` at `rate_hz` on a trajectory from its start, for `duration_s`,
+/// by the fourth-order Runge-Kutta method; each step uses the measurements at its ends and in its middle.
 InertialState integrate(const Trajectory& trajectory, const SE3& T_body_imu, double duration_s, double rate_hz) {
   const auto felt = [&](int measurement) {
     const TimeNs t = trajectory.start() + to_ns(measurement / rate_hz);

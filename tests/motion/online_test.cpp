@@ -87,7 +87,7 @@ TEST_P(Online, IntegratesAccelerationsAndRates) {
   OnlineTrajectory motion = trajectory(SE3{});
   const Eigen::Vector3d acceleration(0.5, 0, -1), omega(0, 0, 0.7);
   for (int k = 0; k < 400; ++k) motion.push_motion(acceleration, omega);
-  // Well away from the start, the motion is the parabola and the turn that it would be from newest() at the first push.
+  // Well after the start, the motion is the parabola and the rotation that begin at newest() at the first push.
   const TimeNs t = motion.start() + kNsPerSecond;
   const double moved_s = 1.0 - to_seconds(motion.latency());
   const Kinematics now = motion.at(t);

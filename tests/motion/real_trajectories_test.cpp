@@ -15,7 +15,7 @@ struct RealTrajectory {
   std::string file;
   std::size_t poses;
   TimeNs end;
-  // What the measured poses deviate from smooth motion (motion-capture noise and glitches).
+  // The deviation of the measured poses from a smooth motion (motion-capture noise and glitches).
   double rms_position_m, rms_rotation_rad;
 
   friend std::ostream& operator<<(std::ostream& out, const RealTrajectory& trajectory) {

@@ -19,9 +19,10 @@ using test::contains;
 using test::largest_difference;
 using test::numeric_derivative;
 
-constexpr TimeNs kStart = 1'403'715'273'262'142'976;  // a stamp of today, where `double` seconds resolve 240 ns only
+constexpr TimeNs kStart =
+    1'403'715'273'262'142'976;  // a present-day stamp, which `double` seconds resolve to 240 ns only
 
-/// A lively motion of 1.5 s.
+/// A fast motion of 1.5 s.
 SplineTrajectory tumbling() {
   std::mt19937 engine(3);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);

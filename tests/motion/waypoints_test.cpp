@@ -111,7 +111,7 @@ TEST(Waypoints, DerivativesAreThoseOfThePose) {
   for (const auto& [points, options] : motions()) {
     const WaypointTrajectory trajectory(points, options);
     const double start_s = to_seconds(trajectory.start()), duration_s = to_seconds(trajectory.end()) - start_s;
-    // Differences do not reach over joints, where third derivatives jump: they would be off by a little there.
+    // Differences do not cross joints, where third derivatives jump and would cause small errors.
     const double step = 2e-3;
     double worst = 0;
     std::vector<double> errors;
@@ -193,7 +193,7 @@ TEST(Waypoints, SpeedIsReachedOnStraightLegs) {
   options.ramp_s = 0.4;
   const WaypointTrajectory trajectory(points, options);
   const std::vector<TimeNs> arrivals = trajectory.arrivals();
-  // Each ramp costs half of its time.
+  // Each ramp adds half of its duration.
   EXPECT_NEAR(to_seconds(arrivals[1]), 3 / 1.5 + 0.2, 0.05);
   EXPECT_NEAR(to_seconds(trajectory.end()), 5 / 1.5 + 6 / 2.0 + 2 * 0.2, 0.05);
   EXPECT_NEAR(trajectory.at(to_ns(1.0)).velocity_world.norm(), 1.5, 0.075);
@@ -284,9 +284,9 @@ TEST(Waypoints, SayWhatIsWrongWithThem) {
   EXPECT_TRUE(contains(error({}), "at least two"));
   EXPECT_TRUE(contains(error({at_place(1)}), "1 point, but a motion needs at least two"));
   EXPECT_TRUE(contains(error({timed(at_place(0), 1), timed(at_place(1), 1)}),
-                       "points.1: t: 1 s is the time of the point before"));
+                       "points.1: t: 1 s is also the time of the previous point"));
   EXPECT_TRUE(
-      contains(error({timed(at_place(0), 1), timed(at_place(1), 0.5)}), "points.1: t: 0.5 s comes before the 1 s"));
+      contains(error({timed(at_place(0), 1), timed(at_place(1), 0.5)}), "points.1: t: 0.5 s is before the 1 s"));
   EXPECT_TRUE(contains(error({timed(at_place(0), 1), at_place(1)}), "points.1: has no t"));
   EXPECT_TRUE(contains(error({at_place(0), timed(at_place(1), 1)}), "points.1: has t"));
   Waypoint both = timed(at_place(0), 1);
@@ -294,7 +294,8 @@ TEST(Waypoints, SayWhatIsWrongWithThem) {
   EXPECT_TRUE(contains(error({both, timed(at_place(1), 2)}), "points.0: has both t and speed"));
   EXPECT_TRUE(contains(error({at_place(0), at_place(kNan)}), "points.1: is not finite"));
   EXPECT_TRUE(contains(error({timed(at_place(0), 0), timed(at_place(1), kNan)}), "points.1: t: nan"));
-  EXPECT_TRUE(contains(error({at_place(0), at_place(1), at_place(1)}), "points.2: is the pose of the point before"));
+  EXPECT_TRUE(
+      contains(error({at_place(0), at_place(1), at_place(1)}), "points.2: has the same pose as the previous point"));
   EXPECT_TRUE(contains(error({timed(paused(at_place(0), 2), 0), timed(at_place(1), 2)}), "points.0: pause_s"));
   EXPECT_TRUE(contains(error({paused(at_place(0), -1), at_place(1)}), "points.0: pause_s"));
   Waypoint backwards = at_place(0);
@@ -305,7 +306,7 @@ TEST(Waypoints, SayWhatIsWrongWithThem) {
   EXPECT_TRUE(contains(error({timed(at_place(0), 1), timed(at_place(1), 2)}, closed), "closed"));
   EXPECT_TRUE(contains(error({at_place(0), at_place(1), at_place(0)}, closed), "remove the last point"));
   slow.speed_m_per_s = 1e-12;
-  EXPECT_TRUE(contains(error({at_place(0), at_place(1)}, slow), "raise speed"));
+  EXPECT_TRUE(contains(error({at_place(0), at_place(1)}, slow), "increase speed"));
   sudden.ramp_s = 0;
   EXPECT_TRUE(contains(error({at_place(0), at_place(1)}, sudden), "ramp_s"));
 }

@@ -1,4 +1,4 @@
-// Cameras with colour filters, in every renderer that knows colours.
+// Cameras with colour filters, in every renderer that supports colours.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace {
 
 const char* const kColourful[] = {"panorama", "plane", "mesh", "moving mesh", "smooth mesh", "lit mesh"};
 
-/// Patterns of a few texels' size, which differ: red, green, blue, and one that is none of them.
+/// Different patterns with a size of a few texels: red, green, blue, and a fourth one.
 std::shared_ptr<const Texture> pattern(int which) {
   Image<float> image(256, 128);
   for (int y = 0; y < image.height(); ++y) {
@@ -23,7 +23,7 @@ std::shared_ptr<const Texture> pattern(int which) {
 const std::array<std::shared_ptr<const Texture>, 4> kPatterns = {pattern(0), pattern(1), pattern(2), pattern(3)};
 const ColourTextures kColours = {kPatterns[0], kPatterns[1], kPatterns[2]};
 
-/// As luminance shows `luminance`, and as colours `colours`, if there are any.
+/// A texture with this luminance and, if they are given, these colours.
 std::unique_ptr<Renderer> make(const std::string& name, const std::shared_ptr<const Texture>& luminance,
                                const ColourTextures& colours, const Camera& model, ColourFilters filters,
                                const Workers& workers = test::two_threads()) {
@@ -111,7 +111,7 @@ INSTANTIATE_TEST_SUITE_P(Renderers, EveryColourfulRenderer, testing::ValuesIn(kC
 });
 
 TEST(ColourFilters, PureColoursAreSeenByTheirPixelsAlone) {
-  // A poster of three columns, red, green and blue, seen straight from before its middle.
+  // A plane with three columns, red, green and blue, seen frontally from in front of its centre.
   ColourTextures colours;
   for (std::size_t colour = 0; colour < 3; ++colour) {
     Image<float> image(3, 1, 0.0F);
@@ -125,7 +125,7 @@ TEST(ColourFilters, PureColoursAreSeenByTheirPixelsAlone) {
   const Sample sample = test::render(*renderer, model, Kinematics{});
   for (int y = 0; y < model.height; ++y) {
     for (const auto& [x, column] : {std::pair(15, 0), {14, 0}, {45, 1}, {46, 1}, {75, 2}, {76, 2}}) {
-      // The texels' centres are at x = 14.7, 45 and 75.3; between them light goes over linearly.
+      // The texels' centres are at x = 14.7, 45 and 75.3; between them light is interpolated linearly.
       EXPECT_NEAR(sample.irradiance(x, y), x % 2 + y % 2 == column ? 0.8 : 0.0, 0.04) << x << ", " << y;
     }
   }

@@ -10,7 +10,7 @@
 
 namespace esim::test {
 
-/// A renderer of `unrealcv`, with the server that it asks: one that shows what the ray caster does.
+/// An `unrealcv` renderer with its server, which shows the images of the ray caster.
 class ServedRenderer final : public Renderer {
  public:
   ServedRenderer(const std::string& scene, const Camera& camera, const Workers& workers)
@@ -30,7 +30,7 @@ class ServedRenderer final : public Renderer {
   std::unique_ptr<Renderer> renderer_;
 };
 
-/// make_renderer, of engines as well.
+/// make_renderer, also for engines.
 inline std::unique_ptr<Renderer> make_any_renderer(const std::string& name, const Camera& camera,
                                                    const Workers& workers = two_threads()) {
   if (name == "unrealcv") return std::make_unique<ServedRenderer>("mesh", camera, workers);

@@ -22,7 +22,7 @@ class EveryRenderer : public testing::TestWithParam<std::tuple<const char*, int>
  protected:
   virtual std::unique_ptr<Renderer> make(const Workers& workers) const { return make_renderer(name_, model_, workers); }
 
-  /// What moving_camera() and moving_objects() see `dt` seconds later.
+  /// The sample of moving_camera() and moving_objects() `dt` seconds later.
   RenderRequest view(double dt) const {
     return {kTime + to_ns(dt), moving_camera(dt), {{0, 0, model_.width, model_.height}}, objects_of(name_, dt)};
   }

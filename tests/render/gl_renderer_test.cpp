@@ -1,4 +1,4 @@
-// OpenGL against the ray caster: the same scene, seen in two ways that share nothing but the scene.
+// OpenGL against the ray caster: two independent renderings of the same scene.
 #include "esim/backends/opengl/gl_renderer.h"
 
 #include <gtest/gtest.h>
@@ -27,10 +27,10 @@ RenderRequest request_with_objects(const Camera& model) {
   return {123, test::moving_camera(), {{0, 0, model.width, model.height}}, test::moving_objects(0)};
 }
 
-/// How two samples differ, leaving out pixels next to an edge of depth.
+/// Differences between two samples, without pixels next to a depth edge.
 struct Difference {
   double mean_irradiance = 0;                      // over all pixels
-  double depth = 0, flow = 0, flow_tolerance = 0;  // the largest, away from edges; V relative to what is allowed
+  double depth = 0, flow = 0, flow_tolerance = 0;  // maximum, away from edges; V relative to its tolerance
   int edges = 0, other_objects = 0;
 };
 
@@ -42,7 +42,7 @@ Difference compare(const Sample& a, const Sample& b) {
       for (int dx = -1; dx <= 1; ++dx) {
         const int u = std::clamp(x + dx, 0, width - 1), v = std::clamp(y + dy, 0, height - 1);
         if (!a.object.empty() && a.object(u, v) != a.object(x, y)) return true;
-        // Nor are creases: 1 / Z is linear on planes only (and nearly so through a lens).
+        // Creases are left out too: 1 / Z is linear on planes only (and nearly so through a lens).
         const int u2 = std::clamp(x - dx, 0, width - 1), v2 = std::clamp(y - dy, 0, height - 1);
         const double bend = 1.0 / a.depth(u, v) + 1.0 / a.depth(u2, v2) - 2.0 / a.depth(x, y);
         if (std::fabs(bend) * a.depth(x, y) > 2e-3) return true;
@@ -112,7 +112,7 @@ TEST_F(GlRendererTest, AgreesWithTheRayCasterOnTheOriginalsRoom) {
   const char* const data = std::getenv("ESIM_TEST_DATA");
   const std::filesystem::path room =
       std::filesystem::path(data != nullptr ? data : "") / "mesh/flying_room/flying_room.obj";
-  if (!std::filesystem::exists(room)) GTEST_SKIP() << room << " is not there";
+  if (!std::filesystem::exists(room)) GTEST_SKIP() << room << " is missing";
   const Scene scene = still_scene(load_mesh(room, [](const std::string&) {}));
   const Camera model = Camera::from_fov(346, 260, 1.3);
   for (const double turn : {0.0, 1.5, 3.0, 4.5}) {
@@ -187,7 +187,7 @@ TEST_F(GlRendererTest, RenderersInManyThreadsDoNotShareAContext) {
     EXPECT_TRUE(std::ranges::equal(sample.object.pixels(), expected.object.pixels()));
   }
 
-  // A renderer may also go from one thread to another.
+  // A renderer may also change threads.
   Sample moved;
   std::thread([&] { alone->render(request, moved); }).join();
   EXPECT_TRUE(std::ranges::equal(moved.depth.pixels(), expected.depth.pixels()));

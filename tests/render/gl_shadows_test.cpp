@@ -1,4 +1,4 @@
-// Shadows by maps of depth against those by rays.
+// Shadows by shadow maps against shadows by rays.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -58,7 +58,7 @@ Scene furnished_room(Lighting lighting) {
   return scene;
 }
 
-/// The same without the walls and the ceiling, in the open.
+/// The same scene outdoors, without walls and ceiling.
 Scene furnished_floor(const Lighting& lighting) {
   Scene scene = furnished_room(lighting);
   scene.objects[0].mesh = moved(white_box({4, 3, 0.1F}), {0, 0, -2.1F});
@@ -96,12 +96,12 @@ bool is_smooth(const Image<float>& image, int x, int y, float most) {
   return high - low < most;
 }
 
-/// How E of a sample differs from what is expected; `without` has no shadows.
+/// Differences of E from the expected sample; `without` has no shadows.
 struct Difference {
   double mean = 0;
-  double largest = 0;   ///< away from edges, of shadows and other ones
-  double compared = 0;  ///< the share of pixels that are
-  double shadows = 0;   ///< the share of pixels in shadow
+  double largest = 0;   ///< away from all edges, including those of shadows
+  double compared = 0;  ///< fraction of pixels that are compared
+  double shadows = 0;   ///< fraction of pixels in shadow
 };
 
 Difference compare(const Sample& expected, const Sample& without, const Sample& sample) {
@@ -175,11 +175,11 @@ TEST_F(GlShadowsTest, MoveWithWhatCastsThem) {
 }
 
 TEST_F(GlShadowsTest, HaveSmoothEdges) {
-  // The mean over a pixel's area is what many rays see; one ray has steps.
+  // Many rays approximate the mean over a pixel's area; a single ray has steps.
   Lighting lighting = sun({-0.9F, 0.3F, -0.25F});
   Scene scene = furnished_floor(lighting);
   const auto built = build_raycast_scene(scene);
-  for (const double distance : {0.5, 2.0}) {  // of pixels that are finer and coarser than texels
+  for (const double distance : {0.5, 2.0}) {  // pixels that are finer and coarser than texels
     SCOPED_TRACE(distance);
     const Eigen::Vector3d edge(-0.1, 0.5, -2);
     const RenderRequest request =
@@ -198,7 +198,7 @@ TEST_F(GlShadowsTest, HaveSmoothEdges) {
 }
 
 TEST_F(GlShadowsTest, NoPlaneShadowsItselfHoweverGrazingTheLight) {
-  // Whether or not shadows are asked for must not matter.
+  // The result must not depend on whether shadows are enabled.
   Kinematics camera = looking({-3, -0.4, -1.2}, {1, 0.2, -2});
   for (const double elevation : {0.5, 0.1, 0.03, 0.01}) {
     SCOPED_TRACE(elevation);
@@ -225,7 +225,7 @@ TEST_F(GlShadowsTest, NoPlaneShadowsItselfHoweverGrazingTheLight) {
 }
 
 TEST_F(GlShadowsTest, NoRoundBodyShadowsItsLitSide) {
-  // A ball's facets: ray caster and map agree wherever the light does not graze.
+  // A ball's facets: ray caster and map agree except at grazing light.
   for (const float radius : {0.02F, 1.0F, 30.0F}) {
     SCOPED_TRACE(radius);
     Scene scene = still_scene(test::ball_mesh(radius, 40));
@@ -238,14 +238,14 @@ TEST_F(GlShadowsTest, NoRoundBodyShadowsItsLitSide) {
                  sample = rendered(*gl, request_of(kCamera, camera));
     for (std::size_t i = 0; i < sample.irradiance.size(); ++i) {
       const float lit = expected.irradiance.pixels()[i];
-      if (lit < 0.2F + 0.2F * 0.9F) continue;  // ambient, and what grazes
+      if (lit < 0.2F + 0.2F * 0.9F) continue;  // ambient light only, or grazing light
       ASSERT_NEAR(sample.irradiance.pixels()[i], lit, 1e-4);
     }
   }
 }
 
 TEST_F(GlShadowsTest, BeginWhereThingsTouch) {
-  // A box on the floor, light from behind it: the floor is dark from the first pixel or two before the box on.
+  // A box on the floor, lit from behind: the floor is dark from one or two pixels in front of the box.
   Lighting lighting = sun({-1, 0, -0.8F});
   Scene scene = furnished_floor(lighting);
   const Kinematics camera = looking({-1.5, 0.3, -0.8}, {1.1, 0.3, -2});

@@ -1,4 +1,4 @@
-// The closed form of the motion field against where points really go, for what stands still and for moving objects.
+// The closed form of the motion field against the true motion of points, for the static scene and moving objects.
 #include "esim/render/motion_field.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 namespace esim {
 namespace {
 
-/// Where something is `dt` seconds later if its twist stays as it is.
+/// The pose `dt` seconds later under a constant twist.
 SE3 later(const Kinematics& body, double dt) {
   return {body.T_world_body.rotation * so3_exp(body.omega_body * dt),
           body.T_world_body.translation + body.velocity_world * dt};
@@ -75,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(Distortions, MotionField, testing::Range(0, 4));
 TEST(MotionField, VanishesOnWhatMovesWithTheCamera) {
   const Camera model = test::distorted_camera(1);
   const Kinematics camera = test::moving_camera();
-  // Rigidly in front of the camera, whatever it does.
+  // Rigidly attached in front of the camera.
   const Kinematics companion = rigidly_attached(camera, {so3_exp(Eigen::Vector3d(0.3, 2, -1)), {0.2, -0.1, 1.5}});
   RenderRequest request{0, camera, {{0, 0, model.width, model.height}}, {companion}};
   Sample sample;

@@ -1,4 +1,4 @@
-// The ray caster in closed form: depth, edges, moving objects, light and shadow.
+// The ray caster against closed forms: depth, edges, moving objects, light and shadow.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +13,7 @@ namespace esim {
 namespace {
 
 TEST(RaycastRenderer, MeasuresPlanarDepth) {
-  // The wall at x = 4, seen straight from x = 1: 3 m in every pixel that sees it, however far from the axis.
+  // The wall at x = 4, seen frontally from x = 1: depth 3 m in every pixel that sees it, at any distance from the axis.
   Kinematics camera;
   Eigen::Matrix3d R;
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -49,7 +49,7 @@ Sample half_plane_seen(double angle, double offset, int rays) {
   return test::render(*renderer, model, Kinematics{});
 }
 
-/// The share of a pixel that the half-plane leaves white, by a fine grid.
+/// The fraction of a pixel that the half-plane leaves white, by a fine grid.
 double white_share(double x, double y, double angle, double offset) {
   constexpr int kGrid = 40;
   int white = 0;
@@ -101,7 +101,7 @@ TEST(RaycastRenderer, AnEdgeThatMovesComesInSmallSteps) {
 }
 
 TEST(RaycastRenderer, SeamsBetweenTrianglesOfOneSurfaceAreNoEdges) {
-  // A finely cut ball with a texture: where no outline is near, more rays change nothing at all.
+  // A finely tessellated ball with a texture: away from the outline, more rays must not change anything.
   Scene scene = still_scene(test::ball_mesh(3, 60));
   const Camera model = test::distorted_camera(1);
   const auto shared = build_raycast_scene(scene);
@@ -115,7 +115,7 @@ TEST(RaycastRenderer, SeamsBetweenTrianglesOfOneSurfaceAreNoEdges) {
 }
 
 TEST(RaycastRenderer, SurfacesAreNoSharperWhereAnEdgeIs) {
-  // A wall of noise, cut into stripes of two materials that look the same: their seams are edges, but show nothing.
+  // A wall of noise, cut into stripes of two materials that look the same: their seams are edges, but invisible.
   constexpr int kTexels = 256, kStripes = 40;
   Image<float> noise(kTexels, kTexels);
   std::mt19937 random(1);
@@ -320,7 +320,7 @@ TEST(Light, OfAPointFallsWithTheSquaredDistance) {
   for (int y = 0; y < sample.depth.height(); y += 5) {
     for (int x = 0; x < sample.depth.width(); x += 5) {
       const Eigen::Vector3d to_light = lighting.points[0].position.cast<double>() - point_seen(sample, x, y);
-      const double expected = 0.5 * 5.0 * 1.1 / std::pow(to_light.norm(), 3);  // 1.1 m before the wall
+      const double expected = 0.5 * 5.0 * 1.1 / std::pow(to_light.norm(), 3);  // 1.1 m in front of the wall
       ASSERT_NEAR(sample.irradiance(x, y), expected, 1e-4 * expected) << x << ", " << y;
     }
   }
@@ -341,7 +341,7 @@ TEST(Light, AddsEmissionAndSparesUnlitMaterials) {
 }
 
 TEST(Light, StopsAtAnObjectWhereGeometrySays) {
-  // A square hangs between a lamp and the wall, aside of the view: its shadow is the square seen from the lamp.
+  // A square between a lamp and the wall, outside the view: its shadow is the square as seen from the lamp.
   for (const bool moves : {false, true}) {
     Lighting lighting;
     lighting.shadows = true;
@@ -373,7 +373,7 @@ TEST(Light, StopsAtAnObjectWhereGeometrySays) {
 }
 
 TEST(Light, ShadowsOfStraightEdgesAreSmooth) {
-  // A shadow in a wall of one surface: 16 rays give its pixels' means, one gives light or none.
+  // A shadow on a wall of one surface: 16 rays give the mean of a pixel, one ray gives full light or none.
   Lighting lighting;
   lighting.suns = {{{0.5F, 0.3F, 1}, 1.0F}};
   lighting.shadows = true;
@@ -417,7 +417,7 @@ TEST(Light, MakesNoEdgesOnWhatItDoesNotFallOn) {
 }
 
 TEST(Light, LeavesNoShadowOfASurfaceOnItself) {
-  // Inside of a ball with a lamp in the middle, at many scales: no triangle shadows itself or its neighbours.
+  // Inside a ball with a lamp in the middle, at many scales: no triangle shadows itself or its neighbours.
   for (const float radius : {0.1F, 3.0F, 1000.0F}) {
     Scene scene = still_scene(test::ball_mesh(radius, 20));
     scene.lighting = Lighting{0, {}, {{Eigen::Vector3f::Zero(), radius * radius}}, true};
@@ -429,7 +429,7 @@ TEST(Light, LeavesNoShadowOfASurfaceOnItself) {
 }
 
 TEST(Light, FollowsTheNormalsOfAMesh) {
-  // A coarse ball seen from outside with the normals of a true one: the error of Lambert's cosine is small everywhere.
+  // A coarse ball from outside, with the normals of a true sphere: the error of Lambert's cosine is small everywhere.
   const float radius = 0.5F;
   Scene scene;
   scene.objects = {{"ball", test::ball_mesh(radius, 10), true}};

@@ -1,4 +1,4 @@
-// What every renderer promises. A new one is tested by adding its name to the list at the end.
+// The contract of every renderer. To test a new one, add its name to the list at the end.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ class EveryRenderer : public test::EveryRenderer {
   const std::vector<Kinematics> objects_ = test::objects_of(name_);
 };
 
-/// Those whose scene is one of space.
+/// Renderers with a 3D scene.
 class EveryRendererOfSpace : public EveryRenderer {};
 
 TEST_P(EveryRendererOfSpace, MotionFieldIsTheVelocityOfTheImageOfWhatIsSeen) {
@@ -57,7 +57,7 @@ TEST_P(EveryRendererOfSpace, MotionFieldIsTheVelocityOfTheImageOfWhatIsSeen) {
 }
 
 TEST_P(EveryRenderer, SeveralRenderingsMayBeUnderWay) {
-  // Of one renderer and of two, finished in another order than started; one is never finished.
+  // With one renderer and with two, finished in a different order than started; one is never finished.
   const auto other = make(test::two_threads());
   const auto expect_that_of = [&](double dt, Rendering& rendering) {
     Sample sample, expected;
@@ -128,7 +128,7 @@ TEST_P(EveryRenderer, BrightnessMovesWithTheMotionField) {
       squared += expected * expected;
     }
   }
-  // The 90th percentile: the corners of a room are no smooth texture; nor are the edges of boxes, seen from outside.
+  // The 90th percentile, since corners of a room and edges of boxes are not smooth.
   const std::size_t tenths = objects_.empty() ? 9 : 8;
   const auto rank = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() * tenths / 10);
   std::nth_element(errors.begin(), rank, errors.end());
@@ -166,7 +166,7 @@ TEST_P(EveryRenderer, SaysWhichObjectEachPixelSeesWhereAsked) {
   request.tiles = {{17, 3, 35, 21}};
   renderer_->render(request, tile);
 
-  // Where a pinhole's image is looked up, edges are missed by half a pixel, and now and then the slope of the surface.
+  // If a pinhole image is looked up, edges are off by half a pixel, and sometimes the slope of the surface is wrong.
   const bool of_engine = name_ == "moving_unrealcv";
   const double tolerance = of_engine || (name_ == "moving_gl" && std::get<1>(GetParam()) > 0) ? 0.2 : 0.01;
   int astray = 0;
@@ -178,7 +178,7 @@ TEST_P(EveryRenderer, SaysWhichObjectEachPixelSeesWhereAsked) {
       ++count[static_cast<std::size_t>(object)];
       ASSERT_TRUE(x < 17 || x >= 52 || y < 3 || y >= 24 || tile.object(x, y) == object);
       if (objects_.empty()) continue;
-      // On the surface of that one of the test's boxes: 1 in the largest coordinate, relative to the box's half.
+      // On the surface of that box of the test: the largest coordinate is 1, relative to half the box.
       const Eigen::Vector3d point =
           camera_.T_world_body * (double{whole.depth(x, y)} * model_.back_project(Eigen::Vector2d(x, y))->bearing);
       const auto in_box = [&](const Eigen::Vector3d& p, double scale) {
@@ -280,7 +280,7 @@ TEST(SpritesRenderer, SaysWhoseMotionEachPixelHas) {
       uncovered = uncovered || alone[0].object(x, y) == 0;
     }
   }
-  EXPECT_TRUE(uncovered) << "0 beside the only layer";
+  EXPECT_TRUE(uncovered) << "0 outside the only layer";
 }
 
 TEST(PlaneRenderer, ShowsEachPointWhereItIs) {

@@ -65,7 +65,7 @@ inline Mesh box_mesh() {
   return mesh;
 }
 
-/// The poster of make_renderer("plane"): 5 m wide, 2 m in front of the world's origin along x, a little askew.
+/// The plane of make_renderer("plane"): 5 m wide, 2 m in front of the world's origin along x, slightly tilted.
 inline Poster test_poster() {
   SE3 pose;
   pose.translation = {2.0, 0.1, -0.05};
@@ -76,7 +76,8 @@ inline Poster test_poster() {
   return {smooth_texture(Wrap::repeat, Wrap::repeat), pose, 5.0, true, 0.2F};
 }
 
-/// The layers of make_renderer("sprites"): a rectangle that turns and grows before a picture that fills the sensor.
+/// The layers of make_renderer("sprites"): a rectangle that rotates and grows in front of an image that fills the
+/// sensor.
 inline SpriteScene test_sprites() {
   const auto texture = smooth_texture(Wrap::clamp, Wrap::clamp);
   const auto spline = [](std::vector<LayerKeyframe> keyframes) {
@@ -116,7 +117,7 @@ inline Mesh ball_mesh(float radius, int n) {
   return mesh;
 }
 
-/// Small copies of the box, seen from outside, for a scene in which two things move.
+/// Small copies of the box, seen from outside, for a scene with two moving objects.
 inline Scene moving_scene() {
   Scene scene = still_scene(box_mesh());
   for (const float scale : {0.15F, 0.2F}) {
@@ -127,7 +128,7 @@ inline Scene moving_scene() {
   return scene;
 }
 
-/// The same, one black and one white: nothing to be seen on them but their outlines.
+/// The same, one black and one white, so that only their outlines are visible.
 inline Scene plain_moving_scene() {
   Scene scene = moving_scene();
   float base = 0;
@@ -136,7 +137,7 @@ inline Scene plain_moving_scene() {
   return scene;
 }
 
-/// Their motion, of constant twists, before the moving camera.
+/// Their motion, with constant twists, in front of the moving camera.
 inline std::vector<Kinematics> moving_objects(double t_s) {
   Kinematics left, right;
   left.T_world_body = {so3_exp(Eigen::Vector3d(0.3, 0.5, -0.2)), {1.7, 0.4, 0.1}};
@@ -152,7 +153,7 @@ inline std::vector<Kinematics> moving_objects(double t_s) {
   return {left, right};
 }
 
-/// False where this machine has no OpenGL.
+/// False if OpenGL is not available.
 inline bool has_gl() { return !gl_devices().empty(); }
 
 /// Every renderer on a scene that fills the view from near the origin.
@@ -166,7 +167,7 @@ inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Ca
   return make_raycast_renderer(build_raycast_scene(scene), {}, camera, workers);
 }
 
-/// What moves in that scene.
+/// The moving objects of that scene.
 inline std::vector<Kinematics> objects_of(const std::string& name, double t_s = 0) {
   return name.starts_with("moving") ? moving_objects(t_s) : std::vector<Kinematics>();
 }
@@ -196,7 +197,7 @@ inline Kinematics moving_camera(double dt_s = 0) {
   return camera;
 }
 
-/// When the test's camera is where it is.
+/// The time of the test.
 inline constexpr TimeNs kTime = 123;
 inline constexpr double kTime_s = 123e-9;
 

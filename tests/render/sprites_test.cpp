@@ -17,7 +17,7 @@ std::shared_ptr<const Texture> constant(float value, int width = 8, int height =
   return std::make_shared<const Texture>(Image<float>(width, height, value), Wrap::clamp, Wrap::clamp);
 }
 
-/// How exactly a texture keeps light of up to 1.
+/// Precision of a texture for light of up to 1.
 constexpr double kTexel = 1.0 / 4096;
 
 template <typename Function>
@@ -69,7 +69,7 @@ TEST(SpritesRenderer, ATranslatingLayerMovesByVelocityTimesTime) {
   });
   for (const double rotation_deg : {0.0, 31.0}) {
     for (const double scale : {1.0, 0.6, 1.7}) {
-      const double tolerance_px = scale < 1 ? 0.01 : 2e-3;  // mip levels of an odd size are not quite centred
+      const double tolerance_px = scale < 1 ? 0.01 : 2e-3;  // mip levels of an odd size are not exactly centred
       const LayerMotion motion =
           linear({{0, start, rotation_deg, {scale, scale}}, {1, start + velocity, rotation_deg, {scale, scale}}});
       for (const auto& [light, alpha] : {std::pair(blob, blob), std::pair(constant(0.8F, 33, 27), constant(1, 1, 1))}) {
@@ -130,7 +130,7 @@ TEST(SpritesRenderer, TheFirstLayerIsTheNearest) {
   EXPECT_NEAR(dark_first.irradiance(60, 45), 0.1F, kTexel);
   EXPECT_FLOAT_EQ(dark_first.flow_x(60, 45), -20.0F);
   EXPECT_NEAR(bright_first.irradiance(60, 72), 0.1F, kTexel) << "beyond the bright one";
-  EXPECT_NEAR(bright_first.irradiance(3, 3), 0.4F, kTexel) << "beside both";
+  EXPECT_NEAR(bright_first.irradiance(3, 3), 0.4F, kTexel) << "outside of both";
   EXPECT_EQ(bright_first.flow_x(3, 3), 0.0F);
 }
 
@@ -173,7 +173,7 @@ TEST(SpritesRenderer, EdgesCoverTheirShareOfEveryPixel) {
 }
 
 TEST(SpritesRenderer, CompositesLikeASlowReference) {
-  // Three layers of smooth light and alpha, of which the reference knows the formulae: 8 x 8 points per pixel.
+  // Three layers with smooth light and alpha; the reference evaluates their formulas at 8 x 8 points per pixel.
   const auto light = [](int i, double u, double v) { return 0.5 + 0.3 * std::sin(7 * u + i) * std::cos(5 * v - i); };
   const auto alpha = [](int i, double u, double v) {
     return 0.5 + 0.45 * std::cos(6 * u - 2 * i) * std::sin(4 * v + i);
@@ -216,7 +216,7 @@ TEST(SpritesRenderer, CompositesLikeASlowReference) {
 }
 
 TEST(SpritesRenderer, TransparentTexelsDarkenNoEdge) {
-  // A white disc cut out by alpha, on black that must never be seen, before a white background.
+  // A white disc cut out by alpha, on black that must not be visible, in front of a white background.
   const auto disc = textured(64, 64, [](double u, double v) { return std::hypot(u - 0.5, v - 0.5) < 0.4 ? 1.0 : 0.0; });
   for (const double scale : {0.13, 0.5, 1.0, 1.6}) {
     const Sprite sprite{disc, disc, LayerUnits::pixel, LayerBeyond::nothing,

@@ -1,4 +1,4 @@
-// Rays held against the few triangles that a cell of the image may see: the same as found by Embree, and no holes.
+// Testing rays against the few triangles that a cell of the image may see: the same hits as by Embree, and no holes.
 #include "esim/backends/raycast/triangle_tree.h"
 
 #include <gtest/gtest.h>
@@ -13,10 +13,10 @@
 namespace esim {
 namespace {
 
-// More triangles than this are left to Embree.
+// With more triangles than this, Embree is used.
 constexpr std::size_t kMostInTree = 20'000;
 
-/// A box with things in it, in sight of the moving camera.
+/// A box with objects in it, in view of the moving camera.
 Mesh furnished_box() {
   Mesh mesh = test::box_mesh();
   for (const auto& [scale, x, y] : {std::tuple{0.15F, 1.9F, 0.3F}, {0.1F, 1.5F, -0.5F}, {0.2F, 3.0F, -1.0F}}) {
@@ -32,7 +32,7 @@ Mesh furnished_box() {
   return mesh;
 }
 
-/// The same with so many triangles outside of the box that no tree is made.
+/// The same with so many triangles outside the box that no tree is built.
 Mesh with_crowd_outside(Mesh mesh) {
   const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
   for (const float x : {20.0F, 20.1F, 20.2F}) mesh.vertices.emplace_back(x, x * x / 20, 1);
@@ -117,7 +117,7 @@ TEST(TriangleTree, FindsEveryTriangleThatIsSeenOrSaysThatTheyAreTooMany) {
     std::set<std::uint32_t> indices;
     for (const SeenTriangle& triangle : found.from(0)) EXPECT_TRUE(indices.insert(triangle.index).second);
     for (std::uint32_t i = 0; i < triangles.size(); ++i) {
-      // A triangle whose middle lies within the bounds is seen.
+      // A triangle whose centre is within the bounds must be found.
       Eigen::Vector3f p = Eigen::Vector3f::Zero();
       for (const std::uint32_t corner : triangles[i]) p += R.transpose() * (vertices[corner] - camera) / 3;
       const float u = p.x() / p.z(), v = p.y() / p.z();

@@ -309,12 +309,12 @@ TEST(Calibration, RefusesWhatItCannotHold) {
   EXPECT_TRUE(
       contains(message("camera_model: pinhole", "camera_model: omni"), "cam0: camera model 'omni' is not supported"));
   EXPECT_TRUE(contains(message("[235.9, 235.8, 170.4, 130.1]", "[235.9, 235.8, 170.4]"),
-                       "intrinsics needs 4 numbers and has 3"));
+                       "intrinsics must have 4 numbers, not 3"));
   EXPECT_TRUE(contains(message("235.9", "-235.9"), "cam0"));
   EXPECT_TRUE(contains(message("equidistant", "equisolid"), "'equisolid' is not supported"));
   EXPECT_TRUE(contains(message("[0, 1, 0, 0.1]", "[0, 2, 0, 0.1]"), "T_cam_imu"));
   EXPECT_TRUE(contains(message("resolution: [346, 260]", "x: 1"), "resolution is missing"));
-  EXPECT_TRUE(contains(message("cam0:", "camera0:"), "holds no cameras"));
+  EXPECT_TRUE(contains(message("cam0:", "camera0:"), "contains no cameras"));
   EXPECT_TRUE(contains(test::message_of<UserError>([] { read_calibration("/no/such.yaml"); }), "no such file"));
 }
 
@@ -333,10 +333,10 @@ TEST(Calibration, RefusesHostileNumbersNamingTheCameraAndTheKey) {
   EXPECT_PRED3(names, message("130.1", ".inf"), "cam0", "cy");
   EXPECT_PRED3(names, message("231", ".nan"), "cam1", "fy");
   EXPECT_PRED3(names, message("-0.3, 0.1", ".nan, 0.1"), "cam1", "k1");
-  EXPECT_PRED3(names, message("-0.3, 0.1, 0.001, 0.002", "-0.3, 0.1"), "cam1", "distortion_coeffs needs 4 numbers");
+  EXPECT_PRED3(names, message("-0.3, 0.1, 0.001, 0.002", "-0.3, 0.1"), "cam1", "distortion_coeffs must have 4 numbers");
   EXPECT_PRED3(names, message("distortion_coeffs: [-0.1, 0.01, 0.0, 0.0]", "x: 1"), "cam0", "distortion_coeffs");
   for (const char* size : {"[-346, 260]", "[346.5, 260]", "[1e9, 260]", "[.nan, 260]", "[0, 260]"})
-    EXPECT_PRED3(names, message("[346, 260]", size), "cam0", "the image's size");
+    EXPECT_PRED3(names, message("[346, 260]", size), "cam0", "the image size");
   EXPECT_PRED3(names, message("[1, 0, 0, -0.11]", "[-1, 0, 0, -0.11]"), "cam1", "T_cn_cnm1: pose matrix");
   EXPECT_PRED3(names, message("[1, 0, 0, -0.11]", "[.nan, 0, 0, -0.11]"), "cam1", "T_cn_cnm1: pose matrix");
   EXPECT_PRED3(names, message("[0, 1, 0, 0.1]", "[0, 1, 0, .inf]"), "cam0", "T_cam_imu: pose matrix");
@@ -372,12 +372,12 @@ TEST(Calibration, ReadsKalibrsImu) {
     return test::message_of<UserError>([&] { read_imu_calibration(folder.write("imu.yaml", text)); });
   };
   const std::string yaml = kImuYaml;
-  EXPECT_TRUE(contains(message(""), "imu.yaml: is no imu.yaml"));
+  EXPECT_TRUE(contains(message(""), "imu.yaml: is not an imu.yaml"));
   EXPECT_TRUE(contains(message("update_rate: 200\n"), "imu.yaml: imu0: gyroscope_noise_density is missing"));
   EXPECT_TRUE(contains(message(yaml + "time_offset: 0.01\n"), "imu0: time_offset is 0.01 s"));
   EXPECT_TRUE(contains(message(yaml + "model: scale-misalignment\n"), "'scale-misalignment' is not supported"));
-  EXPECT_TRUE(contains(message(yaml + "imu1: {}\n"), "there is an imu1 as well"));
-  EXPECT_TRUE(contains(message(yaml + "T_i_b: [1, 0, 0, 0]\n"), "T_i_b needs 16 numbers and has 4"));
+  EXPECT_TRUE(contains(message(yaml + "imu1: {}\n"), "imu1 is also defined"));
+  EXPECT_TRUE(contains(message(yaml + "T_i_b: [1, 0, 0, 0]\n"), "T_i_b must have 16 numbers, not 4"));
   const auto changed = [&](const std::string& from, const std::string& to) {
     std::string text = yaml;
     text.replace(text.find(from), from.size(), to);

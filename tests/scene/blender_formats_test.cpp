@@ -11,7 +11,7 @@
 namespace esim {
 namespace {
 
-/// A cube that stands, a cube that moves and turns, and a camera that moves, in every format.
+/// A static cube, a cube that translates and rotates, and a moving camera, in every format.
 constexpr const char* kScript = R"python(
 import math, os, sys
 import bpy
@@ -67,7 +67,7 @@ class BlenderFormats : public testing::Test {
   static void TearDownTestSuite() { delete std::exchange(folder_, nullptr); }
 
   void SetUp() override {
-    if (folder_ == nullptr) GTEST_SKIP() << "there is no blender; apt install blender";
+    if (folder_ == nullptr) GTEST_SKIP() << "Blender is missing; apt install blender";
     ASSERT_TRUE(exported_) << "Blender could not export";
   }
 
@@ -79,7 +79,7 @@ class BlenderFormats : public testing::Test {
   inline static bool exported_ = false;
 };
 
-/// Corners of a cube of side `size`, scaled, turned about z and moved.
+/// Corners of a cube of side `size`, scaled, rotated about z and translated.
 std::vector<Eigen::Vector3d> cube(double size, const Eigen::Vector3d& scale, double yaw, const Eigen::Vector3d& at) {
   std::vector<Eigen::Vector3d> corners;
   for (int i = 0; i < 8; ++i) {

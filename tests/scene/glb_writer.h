@@ -8,7 +8,7 @@
 
 namespace esim::test {
 
-/// Writes GLB files from their JSON: the test adds numbers, and gets the accessors' indices.
+/// Writes GLB files from their JSON: tests add arrays and get the indices of their accessors.
 class GlbWriter {
  public:
   nlohmann::json json = {{"asset", {{"version", "2.0"}}},
@@ -36,7 +36,7 @@ class GlbWriter {
     return json["bufferViews"].size() - 1;
   }
 
-  /// A node of the scene's top.
+  /// A node at the top level of the scene.
   std::size_t add_node(nlohmann::json node) {
     json["nodes"].push_back(std::move(node));
     json["scenes"][0]["nodes"].push_back(json["nodes"].size() - 1);

@@ -22,7 +22,7 @@ namespace {
 using test::GlbWriter;
 using test::TemporaryDirectory;
 
-/// The one line with which a scene is refused.
+/// The one-line error for a scene.
 std::string refusal(const std::filesystem::path& path) {
   const std::string message = test::message_of<UserError>([&] { load_scene_file(path, [](const std::string&) {}); });
   EXPECT_EQ(message.find('\n'), std::string::npos) << message;
@@ -44,7 +44,7 @@ GlbWriter plain() {
 TEST(HostileScene, GltfThatLiesIsRefused) {
   GlbWriter out_of_range = plain();
   out_of_range.json["meshes"][0]["primitives"][0]["indices"] = out_of_range.indices({0, 1, 9});
-  EXPECT_TRUE(test::contains(refusal(out_of_range), "a vertex that is not there"));
+  EXPECT_TRUE(test::contains(refusal(out_of_range), "a missing vertex"));
 
   GlbWriter absurd = plain();
   absurd.json["accessors"][0]["count"] = 4'000'000'000U;
@@ -93,7 +93,7 @@ TEST(HostileScene, ObjThatLiesIsRefused) {
   EXPECT_TRUE(test::contains(refusal(folder.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 900\n")), "a.obj"));
   EXPECT_TRUE(test::contains(refusal(folder.write("b.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n")), "not finite"));
   EXPECT_TRUE(test::contains(refusal(folder.write("c.obj", "")), "c.obj"));
-  EXPECT_TRUE(test::contains(refusal(folder.write("d.xyz", "")), "format is not known"));
+  EXPECT_TRUE(test::contains(refusal(folder.write("d.xyz", "")), "format is not supported"));
   EXPECT_TRUE(test::contains(refusal(folder.path() / "none.glb"), "no such file"));
 }
 
@@ -173,7 +173,7 @@ TEST(HostileImage, AbsurdSizesAreRefusedBeforeDecoding) {
                              "100000x100000 pixels"));
 }
 
-/// Reads damaged copies of a file in another process, which may take 2 GiB; each is read, or refused with one line.
+/// Reads damaged copies of a file in another process with at most 2 GiB; each is read, or gives a one-line error.
 void survives_damage(const std::string& name, const std::string& content,
                      const std::function<void(const std::filesystem::path&)>& read, int cases = 300) {
   const TemporaryDirectory folder;
@@ -184,7 +184,7 @@ void survives_damage(const std::string& name, const std::string& content,
     const rlimit limit{rlim_t{1} << 31, rlim_t{1} << 31};
     setrlimit(RLIMIT_AS, &limit);
 #endif
-    if (std::freopen("/dev/null", "w", stderr) == nullptr) _exit(4);  // decoders complain there
+    if (std::freopen("/dev/null", "w", stderr) == nullptr) _exit(4);  // decoders print errors there
     std::uint64_t state = 1;
     const auto random = [&](std::size_t below) {
       state = state * 6364136223846793005U + 1442695040888963407U;
@@ -246,7 +246,7 @@ TEST(HostileScene, DamagedObjIsReadOrRefused) {
     };
     obj += "f" + corner(0) + corner(1) + corner(2) + "\n";
   }
-  survives_damage("scene.obj", obj, read_scene, 150);  // a process each
+  survives_damage("scene.obj", obj, read_scene, 150);  // one process per copy
 }
 
 TEST(HostileImage, DamagedPngIsReadOrRefused) {

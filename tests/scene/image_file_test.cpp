@@ -49,7 +49,7 @@ TEST_F(LuminanceFile, IsBlurredAsLight) {
 
 TEST_F(LuminanceFile, IsFilteredAcrossTheEdgesWhereItGoesAround) {
   cv::Mat image(32, 64, CV_8U, cv::Scalar(0));
-  image.colRange(0, 32).setTo(255);  // edges in the middle and where the image ends
+  image.colRange(0, 32).setTo(255);  // edges in the middle and at the border of the image
   const auto file = write("around.png", image);
   for (const Softening& softening : {Softening{0, 2, true}, Softening{0, 20, true}}) {
     const Image<float> soft = load_luminance(file, softening);

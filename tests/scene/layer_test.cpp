@@ -72,7 +72,7 @@ TEST(LayerMotion, RefusesKeyframesWithoutOrder) {
   };
   EXPECT_TRUE(test::contains(message({}), "no keyframes"));
   EXPECT_TRUE(test::contains(message({{0.5, {}, 0, {}}, {0.5, {}, 0, {}}}), "t_s = 0.5"));
-  EXPECT_TRUE(test::contains(message({{0.5, {}, 0, {}}, {0.2, {}, 0, {}}}), "in order"));
+  EXPECT_TRUE(test::contains(message({{0.5, {}, 0, {}}, {0.2, {}, 0, {}}}), "must increase"));
 }
 
 TEST(LayerPlacement, PutsTheImageWhereTheKeyframeSays) {

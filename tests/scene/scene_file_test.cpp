@@ -39,7 +39,7 @@ SceneFile load(const GlbWriter& glb) {
   return load(folder.write("scene.glb", glb.bytes()));
 }
 
-/// glTF's y axis points up, ours is z.
+/// In glTF y points up, in esim z.
 Eigen::Vector3d from_gltf(double x, double y, double z) { return {x, -z, y}; }
 
 /// The image as PNG or the like, from the top left, blue first.
@@ -67,11 +67,11 @@ TEST(SceneFile, NodesPutMeshesIntoTheWorld) {
   const std::size_t mesh = glb.add_triangle();
   const double half = std::sqrt(0.5);
   const std::size_t child = glb.add("nodes", {{"mesh", mesh}, {"translation", {0, 0, 3}}});
-  // A quarter turn about y takes x to -z and z to x; then twice as large along x; then off by (1, 2, 0).
+  // A quarter turn about y maps x to -z and z to x, after a scale of 2 along x and before a translation by (1, 2, 0).
   glb.add_node(
       {{"children", {child}}, {"rotation", {0, half, 0, half}}, {"scale", {2, 1, 1}}, {"translation", {1, 2, 0}}});
   const Mesh mesh_read = load(glb).scene.objects.at(0).mesh;
-  // Vertex (1, 0, 0): (1, 0, 3) in the parent, (2, 0, 3) scaled, (3, 0, -2) turned, (4, 2, -2) moved.
+  // Vertex (1, 0, 0): (1, 0, 3) in the parent, (2, 0, 3) scaled, (3, 0, -2) rotated, (4, 2, -2) translated.
   ASSERT_EQ(mesh_read.vertices.size(), 3U);
   EXPECT_LT(test::largest_difference(mesh_read.vertices[0], from_gltf(4, 2, 0).cast<float>()), 1e-6);
   EXPECT_LT(test::largest_difference(mesh_read.vertices[1], from_gltf(4, 2, -2).cast<float>()), 1e-6);
@@ -95,7 +95,7 @@ TEST(SceneFile, AnAnimatedSubtreeIsAMovingObjectAndTheRestStands) {
   EXPECT_EQ(file.scene.objects[1].mesh.triangles.size(), 2U);
   ASSERT_EQ(file.motions.size(), 1U);
 
-  // At every time the vertices are where the node has them: twice as large, shifted by 4 t along x.
+  // At every time the vertices follow the node: scaled by 2, translated by 4 t along x.
   for (const ScenePose& pose : file.motions[0]) {
     const double t = to_seconds(pose.t);
     const Eigen::Vector3d vertex = pose.T_world_object * file.scene.objects[1].mesh.vertices[1].cast<double>();
@@ -105,7 +105,7 @@ TEST(SceneFile, AnAnimatedSubtreeIsAMovingObjectAndTheRestStands) {
   EXPECT_EQ(file.animation.end, kNsPerSecond);
 }
 
-/// Where the node of a scene that is animated by these keys is at t = 0.25 s.
+/// The position at t = 0.25 s of a node that these keys animate.
 Eigen::Vector3d place_at_a_quarter(const std::vector<float>& values, const char* interpolation) {
   GlbWriter glb;
   const std::size_t mover = glb.add_node({{"mesh", glb.add_triangle()}});
@@ -206,7 +206,7 @@ TEST(SceneFile, KeepsColoursWhereTheyAreWanted) {
     EXPECT_FLOAT_EQ(plain.base, 0.1F * static_cast<float>(colour + 1));
     EXPECT_FLOAT_EQ(plain.emission, 0.4F * static_cast<float>(colour));
   }
-  // Luminance is what it is without colours.
+  // Luminance is the same as without colours.
   EXPECT_EQ(mesh.materials[0].texture->texels()(0, 0), grey.materials[0].texture->texels()(0, 0));
   EXPECT_EQ(mesh.materials[1].base, grey.materials[1].base);
 }
@@ -244,7 +244,7 @@ TEST(SceneFile, ObjAndPlyAreTakenAsTheyAre) {
 TEST(SceneFile, ReadsTheOriginalsRoomAndFootball) {
   const auto room = test::test_data("mesh/flying_room/flying_room.obj");
   const auto ball = test::test_data("mesh/football/americanfootball.obj");
-  if (!room || !ball) GTEST_SKIP() << "ESIM_TEST_DATA names no folder with mesh/";
+  if (!room || !ball) GTEST_SKIP() << "the folder ESIM_TEST_DATA does not contain mesh/";
   const SceneFile file = load(*room);
   EXPECT_EQ(file.scene.objects.at(0).mesh.triangles.size(), 1006U);
   EXPECT_EQ(file.image_count, 5U);

@@ -59,7 +59,7 @@ TEST(Texture, EveryLevelKeepsTheMeanAlsoOfOddSizes) {
 }
 
 TEST(Texture, DoesNotAliasAlongALongFootprint) {
-  // Stripes across u, seen at a grazing angle: a footprint of 4 x 1 texels along u averages them, one along v does not.
+  // Stripes across u at a grazing angle: a footprint of 4 x 1 texels along u averages them, one along v does not.
   Image<float> stripes(256, 256);
   for (int y = 0; y < 256; ++y) {
     for (int x = 0; x < 256; ++x) stripes(x, y) = x % 2 == 0 ? 0.0F : 1.0F;

@@ -25,7 +25,7 @@ class TranslucentImageFile : public testing::Test {
     return message;
   }
 
-  /// A PNG file that claims a size and holds nothing.
+  /// A PNG file with a size in its header, but without pixels.
   std::filesystem::path claim(std::uint32_t width, std::uint32_t height) {
     std::string head = "\x89PNG\r\n\x1a\n";
     head += std::string("\0\0\0\rIHDR", 8);
@@ -59,7 +59,7 @@ TEST_F(TranslucentImageFile, HasNoAlphaWhereTheFileHasNone) {
 }
 
 TEST_F(TranslucentImageFile, BlursLightAndAlphaAlike) {
-  // White with an edge of alpha; the transparent half is black in the file, and must not darken the edge.
+  // White with an edge in alpha; the transparent half is black in the file, and must not darken the edge.
   cv::Mat image(32, 32, CV_8UC4, cv::Scalar(255, 255, 255, 255));
   image.colRange(16, 32).setTo(cv::Scalar(0, 0, 0, 0));
   const TranslucentImage soft = load_translucent(write(image), {0, 2.0});

@@ -201,7 +201,7 @@ TEST_F(Simulation, RefusesWhatCannotBeSimulated) {
   }
   scenario_.cameras[0].sampling = FlowSampling{};
   std::get<PanoramaRendererOptions>(scenario_.renderer).median_px = 2;
-  EXPECT_TRUE(test::contains(error(), "use an odd number"));
+  EXPECT_TRUE(test::contains(error(), "must be an odd number"));
   PlaneRendererOptions behind;
   behind.image = folder_.path() / "p.png";
   behind.pose.position = {-5, 0, 0};
@@ -210,7 +210,7 @@ TEST_F(Simulation, RefusesWhatCannotBeSimulated) {
   EXPECT_TRUE(test::contains(error(), "sees nothing"));
   behind.median_px = 2;
   scenario_.renderer = behind;
-  EXPECT_TRUE(test::contains(error(), "use an odd number"));
+  EXPECT_TRUE(test::contains(error(), "must be an odd number"));
   behind.image = folder_.path() / "q.png";
   scenario_.renderer = behind;
   EXPECT_TRUE(test::contains(error(), "no such file"));

@@ -83,7 +83,7 @@ TEST_F(SpritesScenario, NamesTheLayerThatIsWrong) {
   EXPECT_TRUE(test::contains(error(of_layers("{image: b.png}")), "no such file"));
   EXPECT_TRUE(test::contains(error(of_layers("{image: a.png, keyframes: []}")), "renderer.layers.1: has no keyframes"));
   EXPECT_TRUE(test::contains(error(of_layers("{image: a.png, median_px: 4}")), "renderer.layers.1: image"));
-  EXPECT_TRUE(test::contains(error(of_layers("{image: a.png, keyframes: [{t_s: 1}, {t_s: 1}]}")), "put them in order"));
+  EXPECT_TRUE(test::contains(error(of_layers("{image: a.png, keyframes: [{t_s: 1}, {t_s: 1}]}")), "must increase"));
 }
 
 TEST_F(SpritesScenario, TheOriginalsExampleRuns) {

@@ -142,8 +142,8 @@ TEST_F(WaypointScenario, SaysWhatIsWrongAndWhere) {
                        "s.yaml:3: trajectory.points.0.lookat: unknown key; did you mean look_at?"));
   EXPECT_TRUE(
       contains(refused("{type: waypoints, points: [{position: [0, .nan, 0]}]}"), "trajectory.points.0.position"));
-  EXPECT_TRUE(
-      contains(refused("{type: waypoints, points: [" + a + ", " + a + "]}"), "trajectory: points.1: is the pose"));
+  EXPECT_TRUE(contains(refused("{type: waypoints, points: [" + a + ", " + a + "]}"),
+                       "trajectory: points.1: has the same pose"));
   EXPECT_TRUE(contains(refused("{type: waypoints, file: none.yaml}"), "none.yaml: no such file of way points"));
   folder_.write("one.yaml", "points:\n  - " + a + "\n");
   EXPECT_TRUE(contains(refused("{type: waypoints, file: one.yaml}"), "one.yaml: points: 1 point, but"));

@@ -6,7 +6,7 @@ namespace esim {
 namespace {
 
 TEST(UnrealcvOverhead, AFrameCostsLittleBesideTheEnginesOwnTime) {
-  // bench_unrealcv measures. On a busy machine, one frame that is fast enough shows that nothing sleeps, and that no
+  // bench_unrealcv measures the time. On a busy machine, a single fast frame shows that nothing sleeps, and that no
   // answer waits for a timer.
   constexpr double kEnough_s = 0.015;
   const Camera camera = Camera::from_fov(346, 260, 1.3);

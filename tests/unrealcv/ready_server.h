@@ -4,8 +4,8 @@
 
 namespace esim::test {
 
-/// A server that has the images ready that a camera's renderer asks for: whatever time a frame takes is the protocol's.
-/// Light is a picture with detail and noise, as one that was rendered.
+/// A server with prepared images for a camera's renderer, so that all time of a frame is spent in the protocol.
+/// Light has detail and noise, like a rendered image.
 inline std::unique_ptr<UnrealcvServer> ready_server(const Camera& camera, bool png) {
   const PixelRays rays(camera);
   const PinholeView view = pinhole_view(camera, rays, Pinhole::centred);

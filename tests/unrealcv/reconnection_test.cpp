@@ -1,4 +1,4 @@
-// Servers that go away and come back.
+// Servers that disconnect and come back.
 #include <algorithm>
 #include <thread>
 
@@ -9,7 +9,7 @@ namespace {
 
 using test::UnrealcvServer;
 
-/// Whether everything in a sample is the same.
+/// Whether two samples are identical.
 bool same(const Sample& a, const Sample& b) {
   return std::ranges::equal(a.irradiance.pixels(), b.irradiance.pixels()) &&
          std::ranges::equal(a.depth.pixels(), b.depth.pixels()) &&
@@ -17,7 +17,7 @@ bool same(const Sample& a, const Sample& b) {
 }
 
 TEST(UnrealcvReconnection, AsksAgainForWhatIsUnderWay) {
-  // It hangs up in the middle of an answer; with three renderings under way.
+  // It disconnects in the middle of an answer, with three renderings in progress.
   const Camera camera = test::small_camera();
   UnrealcvServer server(test::show_with([](const Camera& model) { return test::make_renderer("mesh", model); }));
   int asked = 0;
@@ -42,7 +42,7 @@ TEST(UnrealcvReconnection, AsksAgainForWhatIsUnderWay) {
     EXPECT_TRUE(same(samples[i], expected)) << i;
   }
   const std::vector<std::string> commands = server.commands();
-  EXPECT_EQ(std::count(commands.begin(), commands.end(), "vrun r.setres 32x24"), 2) << "told again";
+  EXPECT_EQ(std::count(commands.begin(), commands.end(), "vrun r.setres 32x24"), 2) << "settings are sent again";
 }
 
 TEST(UnrealcvReconnection, WaitsForAServerThatIsStartedAgain) {
@@ -72,8 +72,8 @@ TEST(UnrealcvReconnection, GivesUpInTime) {
   const auto start = std::chrono::steady_clock::now();
   const std::string message = test::message_of<EngineError>([&] { test::render(*renderer, camera, {}); });
   EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), 2.5);
-  EXPECT_TRUE(test::contains(message, "127.0.0.1:" + std::to_string(server.port()) + ": is gone"));
-  EXPECT_TRUE(test::contains(message, "did not come back within 0.3 s"));
+  EXPECT_TRUE(test::contains(message, "127.0.0.1:" + std::to_string(server.port()) + ": the connection was lost"));
+  EXPECT_TRUE(test::contains(message, "could not be restored within 0.3 s"));
 }
 
 TEST(UnrealcvReconnection, GivesUpOnOneThatFallsOverEachTime) {
@@ -85,12 +85,13 @@ TEST(UnrealcvReconnection, GivesUpOnOneThatFallsOverEachTime) {
     if (command.find("lit") != std::string::npos) bytes.clear(), hang_up = true;
   };
   const auto renderer = test::renderer_for(options, camera);
-  EXPECT_TRUE(test::contains(test::message_of<EngineError>([&] { test::render(*renderer, camera, {}); }), "is gone"));
+  EXPECT_TRUE(test::contains(test::message_of<EngineError>([&] { test::render(*renderer, camera, {}); }),
+                             "the connection was lost"));
   EXPECT_GE(server.connections(), 2);
 }
 
 TEST(UnrealcvReconnection, GivesUpOnOneThatFallsOverBehindLightThatCannotBeUsed) {
-  // Light is decoded while depth is waited for: whatever is wrong with it must not hide that nobody is there.
+  // Light is decoded while depth is received: an error of the light must not hide the lost connection.
   const Camera camera = test::small_camera();
   UnrealcvServer server(test::show_ramp);
   UnrealcvOptions options = test::options_for(server, 0.3);
@@ -103,7 +104,8 @@ TEST(UnrealcvReconnection, GivesUpOnOneThatFallsOverBehindLightThatCannotBeUsed)
     bytes = UnrealcvServer::framed(payload.substr(0, payload.find(':') + 1) + UnrealcvServer::npy("<f4", old));
   };
   const auto renderer = test::renderer_for(options, camera);
-  EXPECT_TRUE(test::contains(test::message_of<EngineError>([&] { test::render(*renderer, camera, {}); }), "is gone"));
+  EXPECT_TRUE(test::contains(test::message_of<EngineError>([&] { test::render(*renderer, camera, {}); }),
+                             "the connection was lost"));
   EXPECT_GE(server.connections(), 2);
 }
 
@@ -117,7 +119,7 @@ TEST(UnrealcvReconnection, WhatIsNotWantedIsForgotten) {
 }
 
 TEST(UnrealcvReconnection, WaitsForTheWindowToChange) {
-  // The images of the first moments have the window's old size.
+  // The first images have the window's old size.
   const Camera camera = test::small_camera();
   UnrealcvServer server(test::show_ramp);
   int asked = 0;
@@ -130,7 +132,7 @@ TEST(UnrealcvReconnection, WaitsForTheWindowToChange) {
   const auto renderer = test::renderer_for(test::options_for(server), camera);
   const Sample sample = test::render(*renderer, camera, {});
   EXPECT_EQ(sample.irradiance.width(), 32);
-  EXPECT_EQ(asked, 5) << "once to find out whether there are such images";
+  EXPECT_EQ(asked, 5) << "once to determine whether such images exist";
 }
 
 }  // namespace

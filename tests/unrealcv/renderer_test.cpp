@@ -1,4 +1,4 @@
-// What a lens sees of a pinhole's image; the server shows the tests' scenes. The contract: render/renderer_test.cpp.
+// Lens distortion from a pinhole image; the server shows the tests' scenes. The contract: render/renderer_test.cpp.
 #include "unrealcv/shown.h"
 
 namespace esim {
@@ -6,7 +6,7 @@ namespace {
 
 using test::UnrealcvServer;
 
-/// (is there something that moves, kind of camera: 0 to 3 distortions, 4 off-centre, 5 a pinhole of the server's kind)
+/// (whether there are moving objects, type of camera: 0 to 3 distortions, 4 off-centre, 5 a pinhole like the server's)
 class UnrealcvRenderer : public testing::TestWithParam<std::tuple<bool, int>> {
  protected:
   static Camera camera_of(int kind) {

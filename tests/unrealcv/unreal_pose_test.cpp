@@ -15,7 +15,7 @@ double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
   return so3_log(a.conjugate() * b).norm();
 }
 
-/// Unreal's own definition of a rotator: what it makes of the axes, components of its left-handed world.
+/// Unreal's definition of a rotator: the rotated axes, in components of its left-handed world.
 Eigen::Matrix3d unreal_axes(const UnrealPose& pose) {
   constexpr double kDegree = std::numbers::pi / 180;
   const double p = pose.pitch_deg * kDegree, y = pose.yaw_deg * kDegree, r = pose.roll_deg * kDegree;
@@ -75,14 +75,14 @@ TEST(UnrealPose, EveryPoseComesBack) {
 }
 
 TEST(UnrealPose, KnownOnes) {
-  // Our camera that looks along world x with its x axis to the right: Unreal's zero rotation.
+  // A camera that looks along esim's world x with its x axis to the right has Unreal's zero rotation.
   Eigen::Matrix3d R;
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   const UnrealPose zero = unreal_camera_pose_of({Eigen::Quaterniond(R), {1, 2, 3}});
   EXPECT_LT((zero.location_cm - Eigen::Vector3d(100, -200, 300)).norm(), 1e-9);
   EXPECT_NEAR(std::fabs(zero.pitch_deg) + std::fabs(zero.yaw_deg) + std::fabs(zero.roll_deg), 0, 1e-9);
 
-  // To the left, which is our y: yaw -90. Upwards: pitch 45.
+  // To the left, which is esim's y: yaw -90. Upwards: pitch 45.
   EXPECT_NEAR(unreal_pose_of({so3_exp({0, 0, std::numbers::pi / 2}), {}}).yaw_deg, -90, 1e-9);
   EXPECT_NEAR(unreal_pose_of({so3_exp({0, -std::numbers::pi / 4, 0}), {}}).pitch_deg, 45, 1e-9);
   EXPECT_NEAR(unreal_pose_of({so3_exp({0.3, 0, 0}), {}}).roll_deg, 0.3 * 180 / std::numbers::pi, 1e-9)

@@ -1,4 +1,4 @@
-// What a client makes of what servers of several versions offer.
+// Clients with servers of several versions.
 #include "unrealcv/shown.h"
 
 namespace esim {
@@ -80,7 +80,7 @@ TEST(UnrealcvVersions, WhatIsForcedIsAskedForAsItIs) {
   const std::vector<std::string> commands = server.commands();
   EXPECT_FALSE(test::has_command(commands, "vget /camera/0/lit npy"));
   EXPECT_FALSE(test::has_command(commands, "vget /camera/0/plane_depth npy"));
-  EXPECT_EQ(std::count(commands.begin(), commands.end(), "vget /camera/0/lit png"), 3) << "two are thrown away";
+  EXPECT_EQ(std::count(commands.begin(), commands.end(), "vget /camera/0/lit png"), 3) << "two are discarded";
   EXPECT_NEAR(sample.irradiance(0, 0), 0.2, 5e-3);
   EXPECT_NEAR(sample.depth(0, 0), 2, 1e-5);
 }
@@ -99,7 +99,7 @@ TEST(UnrealcvVersions, ColourBecomesLuminance) {
     return test::render(*test::renderer_for(test::options_for(server), camera), camera, {}).irradiance(5, 5);
   };
   server.ready["lit npy"] = UnrealcvServer::npy("<f4", "24, 32, 4", colours.data(), 4 * colours.size());
-  EXPECT_NEAR(light(), 0.2126 * 1.5 + 0.7152 * 0.5 + 0.0722 * 0.25, 1e-6) << "linear, above 1, whatever alpha is";
+  EXPECT_NEAR(light(), 0.2126 * 1.5 + 0.7152 * 0.5 + 0.0722 * 0.25, 1e-6) << "linear, above 1, for any alpha";
 }
 
 TEST(UnrealcvVersions, BytesAreSrgb) {

@@ -201,8 +201,8 @@ TEST_F(FrameSequenceTest, NamesTheFrameThatCannotBeUsed) {
   cv::imwrite(cut.string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(9)));
   EXPECT_EQ(take_all(folder, {.fps = 10}).values.size(), 4u);
   std::filesystem::resize_file(cut, std::filesystem::file_size(cut) - 10);
-  EXPECT_TRUE(
-      test::contains(refusal(folder, {.fps = 10}), "frame 3: image " + cut.string() + ": is no JPEG image, or is cut"));
+  EXPECT_TRUE(test::contains(refusal(folder, {.fps = 10}),
+                             "frame 3: image " + cut.string() + ": is not a JPEG image, or is cut"));
   std::filesystem::remove(cut);
   for (const float value : {-0.5F, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
     test::write_exr(folder / "f12.exr", kWidth, kHeight, [&](int x, int y) { return x == 7 && y == 5 ? value : 0.5F; });

@@ -27,7 +27,7 @@ TEST(HalfBlocks, EveryLineStandsForItself) {
 }
 
 TEST(HalfBlocks, IndexedColoursAreTheNearest) {
-  // The palette as terminals have it.
+  // The palette of terminals.
   const auto palette = [](int index) -> Rgb {
     const auto level = [](int i) { return static_cast<std::uint8_t>(i == 0 ? 0 : 55 + 40 * i); };
     if (index >= 232)
@@ -44,7 +44,7 @@ TEST(HalfBlocks, IndexedColoursAreTheNearest) {
         const Rgb colour{static_cast<std::uint8_t>(r), static_cast<std::uint8_t>(g), static_cast<std::uint8_t>(b)};
         int best = 1 << 30;
         for (int i = 16; i < 256; ++i) best = std::min(best, distance(colour, palette(i)));
-        // Greys are chosen by the mean, which may be off by a step of rounding.
+        // Greys are chosen by the mean, which may differ by one step due to rounding.
         EXPECT_LE(distance(colour, palette(indexed_colour(colour))), best + 100) << r << ' ' << g << ' ' << b;
       }
     }

@@ -135,7 +135,7 @@ TEST(KeyReader, TellsEscapeFromTheBeginningOfAnotherKey) {
   EXPECT_TRUE(reader.waits());
   EXPECT_EQ(reader.finish(), std::vector<Key>{Key::leave});
   EXPECT_TRUE(reader.read("\033[").empty());
-  EXPECT_TRUE(reader.finish().empty()) << "half a key is none";
+  EXPECT_TRUE(reader.finish().empty()) << "a part of a key is not a key";
   EXPECT_EQ(reader.read("\033w"), std::vector<Key>{Key::forward}) << "with Alt";
   EXPECT_EQ(reader.read("\033\033[A"), (std::vector<Key>{Key::leave, Key::look_up}));
   EXPECT_TRUE(reader.read("\033[" + std::string(5000, '1')).size() < 5000);
@@ -145,8 +145,8 @@ TEST(KeyReader, TellsEscapeFromTheBeginningOfAnotherKey) {
 TEST(Keys, OfATextAreThoseThatAreTyped) {
   EXPECT_EQ(keys_of("wd p<left><esc>"),
             (std::vector<Key>{Key::forward, Key::right, Key::drop, Key::preview, Key::turn_left, Key::leave}));
-  EXPECT_TRUE(test::contains(test::message_of<UserError>([] { keys_of("wz"); }), "'z' is no key"));
-  EXPECT_TRUE(test::contains(test::message_of<UserError>([] { keys_of("<home>"); }), "'<' is no key"));
+  EXPECT_TRUE(test::contains(test::message_of<UserError>([] { keys_of("wz"); }), "'z' is not a key"));
+  EXPECT_TRUE(test::contains(test::message_of<UserError>([] { keys_of("<home>"); }), "'<' is not a key"));
 }
 
 }  // namespace

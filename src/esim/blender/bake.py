@@ -1,11 +1,11 @@
-# Bakes the light on a scene's surfaces into textures, and writes it as GLB with unlit materials.
+# Bakes the radiance of a scene's surfaces into textures, and writes the scene as GLB with unlit materials.
 # Arguments: the scene, the GLB, light paths per texel, largest side of a texture.
 import sys
 import tempfile
 
 import numpy as np
 
-LARGEST_AREA = 64.0  # m²; a surface of this size, or the largest of a smaller scene, gets a texture of the full size
+LARGEST_AREA = 64.0  # m²; a surface of this area, or the largest of a smaller scene, gets a texture of the maximum size
 
 
 def area_of(thing):
@@ -14,7 +14,7 @@ def area_of(thing):
 
 
 def make_real(thing):
-    """A mesh of its own with modifiers applied, and one material slot at least."""
+    """Gives an object its own mesh with modifiers applied, and at least one material slot."""
     graph = bpy.context.evaluated_depsgraph_get()
     mesh = bpy.data.meshes.new_from_object(thing.evaluated_get(graph), preserve_all_data_layers=True, depsgraph=graph)
     thing.modifiers.clear()
@@ -24,7 +24,7 @@ def make_real(thing):
     for slot in range(len(mesh.materials)):
         if mesh.materials[slot] is None:
             mesh.materials[slot] = bpy.data.materials.new("grey")
-        # A copy of its own, so that baking can add a node to it.
+        # A separate copy, so that baking can add a node to it.
         mesh.materials[slot] = mesh.materials[slot].copy()
         mesh.materials[slot].use_nodes = True
 
@@ -36,12 +36,12 @@ def select(thing):
 
 
 def unwrap(thing):
-    """Texture coordinates of which no two triangles share a texel; the materials go on using the old ones."""
+    """Adds texture coordinates with which no two triangles share a texel; the materials keep using the old ones."""
     for material in thing.data.materials:
         pin_coordinates(material, thing.data)
     layer = thing.data.uv_layers.new(name="esim_bake", do_init=False)
     if layer is None:
-        raise RuntimeError(f"Error: {thing.name} has too many layers of texture coordinates; remove some")
+        raise RuntimeError(f"Error: object {thing.name}: has too many UV maps; remove some")
     thing.data.uv_layers.active = layer
     layer.active_render = True
     bpy.ops.object.mode_set(mode="EDIT")
@@ -51,7 +51,7 @@ def unwrap(thing):
 
 
 def pin_coordinates(material, mesh):
-    """Textures without explicit coordinates follow the layer that is active for rendering, which is about to change."""
+    """Textures without explicit coordinates use the layer that is active for rendering; this keeps the current one."""
     before = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
     if before is None:
         return
@@ -69,7 +69,7 @@ def pin_coordinates(material, mesh):
 
 
 def bake(thing, size, samples):
-    """The radiance of the surface's front as size x size texels, rows from the top."""
+    """Returns the radiance of the surface's front as size x size texels, rows from the top."""
     image = bpy.data.images.new("bake_" + thing.name, size, size, alpha=False, float_buffer=True)
     nodes = []
     for material in thing.data.materials:
@@ -89,7 +89,7 @@ def bake(thing, size, samples):
 
 
 def radiance_of_faces(thing, radiance):
-    """At the middle of each face."""
+    """Returns the radiance at the centre of each face."""
     uv = thing.data.uv_layers["esim_bake"].data
     size = radiance.shape[0]
     result = []
@@ -101,7 +101,7 @@ def radiance_of_faces(thing, radiance):
 
 
 def turn_to_light(thing):
-    """Baking sees fronts alone, but many a room shows us its backs: turns the faces whose back is far brighter."""
+    """Flips faces whose back is much brighter: only fronts are baked, but rooms often show the backs of their faces."""
     size, samples = 128, 4
     front = radiance_of_faces(thing, bake(thing, size, samples))
     thing.data.flip_normals()
@@ -123,13 +123,13 @@ def turn_to_light(thing):
 
 
 def radiance_scale(radiance):
-    """What the texture's white stands for: 1, or as much as the scene needs but for a few sparks."""
+    """Returns the radiance of the texture's white: 1, or more if the surface is brighter (except for a few sparks)."""
     bright = float(np.quantile(radiance.max(axis=2), 0.9995))
     return max(1.0, bright)
 
 
 def show_baked(thing, radiance, folder, number):
-    """Replaces the materials by one that shows its texture in whatever light: a colour without a shader is unlit."""
+    """Replaces the materials by an unlit one, which is a texture's colour without a shader."""
     scale = radiance_scale(radiance)
     path = f"{folder}/{number}.png"
     with open(path, "wb") as file:
@@ -173,7 +173,7 @@ if not things:
 lights = any(thing.type == "LIGHT" for thing in scene.objects)
 world = scene.world is not None
 if not lights and not world:
-    esim_warn("the scene has no light: only what emits light itself will be seen")
+    esim_warn("the scene has no light: only surfaces that emit light will be visible")
 
 for thing in things:
     make_real(thing)
@@ -184,7 +184,7 @@ areas = [area_of(thing) for thing in things]
 reference = min(LARGEST_AREA, max(areas)) or 1.0
 baked = []
 for number, thing in enumerate(things):
-    # Texels of about the same size everywhere; powers of two from 64 up.
+    # Texels of about the same size everywhere; sizes are powers of two, at least 64.
     wanted = largest * min(1.0, areas[number] / reference) ** 0.5
     size = max(min(64, largest), 2 ** int(np.ceil(np.log2(max(wanted, 1)))))
     esim_progress(0.02 + 0.93 * sum(areas[:number]) / (sum(areas) or 1), f"baking {thing.name} ({size} px)")

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Lets Blender run a script that writes `glb`. What it prints is "esim progress FRACTION WHAT" or "esim warning TEXT".
+/// Runs a script in Blender that writes `glb`. It prints "esim progress FRACTION WHAT" or "esim warning TEXT".
 bool run_script(const fs::path& scene, const std::string& script, const std::vector<std::string>& arguments,
                 const fs::path& glb, const BlenderWatch& watch) {
   const std::string program = blender_program(scene);

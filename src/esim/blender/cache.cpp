@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// FNV-1a over 128 bits: names files by content. Nobody gains by making two scenes collide in his own cache.
+/// FNV-1a with 128 bits, for file names by content. Users cannot gain from collisions in their own cache.
 class ContentHash {
  public:
   void add(const char* data, std::size_t size) {
@@ -34,7 +34,7 @@ class ContentHash {
 
 std::string hash_of(const fs::path& blend) {
   std::ifstream file(blend, std::ios::binary);
-  if (!file) throw UserError(fmt::format("scene {}: no such file, or not to be read", blend.string()));
+  if (!file) throw UserError(fmt::format("scene {}: no such file, or no permission to read it", blend.string()));
   ContentHash hash;
   std::string buffer(1 << 20, '\0');
   while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || file.gcount() > 0)
@@ -51,22 +51,24 @@ fs::path cache_folder() {
   };
   fs::path base = variable("XDG_CACHE_HOME");
   if (!base.is_absolute()) base = variable("HOME").empty() ? fs::path() : variable("HOME") / ".cache";
-  if (base.empty()) throw UserError("no place for a cache; set XDG_CACHE_HOME to a folder");
+  if (base.empty())
+    throw UserError("the cache has no folder, since neither HOME nor XDG_CACHE_HOME is set; set XDG_CACHE_HOME");
   std::error_code error;
   fs::create_directories(base / "esim", error);
   if (error)
-    throw OutputError(fmt::format("cannot make {}: {}; set XDG_CACHE_HOME", (base / "esim").string(), error.message()));
+    throw OutputError(fmt::format("cannot create the folder {}: {}; set XDG_CACHE_HOME to another one",
+                                  (base / "esim").string(), error.message()));
   return base / "esim";
 }
 
-/// What a file that a scene refers to is known by: size and time of its last change; "absent" where there is none.
+/// The state of a file to which a scene refers: size and time of the last change; "absent" if it does not exist.
 std::string state_of(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return "absent";
   return fmt::format("{} {}", fs::file_size(file, error), fs::last_write_time(file, error).time_since_epoch().count());
 }
 
-/// Whether the files listed beside a cached scene are what they were: lines of "STATE<tab>PATH".
+/// Whether the files in the list of a cached scene are unchanged. The list has lines "STATE<tab>PATH".
 bool is_current(const fs::path& list) {
   std::ifstream file(list);
   if (!file) return false;
@@ -86,7 +88,7 @@ fs::path cached_glb(const fs::path& blend, const BlenderWatch& watch) {
   std::error_code error;
   if (fs::is_regular_file(glb, error) && is_current(list)) return glb;
 
-  // The exporter says which files the scene refers to. Without their list, the cached scene does not count.
+  // The exporter reports the files to which the scene refers. Without their list, the cached scene is not used.
   std::vector<std::string> files;
   BlenderWatch listening = watch;
   listening.warning = [&](const std::string& text) {

@@ -1,4 +1,4 @@
-# What all scripts share; legacy.py stands before it.
+# Shared by all scripts; legacy.py precedes it.
 import os
 import struct
 import zlib
@@ -16,10 +16,10 @@ def esim_progress(fraction, what):
 
 
 def esim_png(pixels):
-    """The bytes of a PNG of an array, rows from the top: height x width x 3 (RGB) or 4 (RGBA), of uint8 or uint16."""
+    """Encodes an array as PNG, rows from the top: height x width x 3 (RGB) or 4 (RGBA), of uint8 or uint16."""
     height, width, channels = pixels.shape
     bits = 8 * pixels.dtype.itemsize
-    rows = np.zeros((height, 1 + width * channels * bits // 8), np.uint8)  # each row begins with its filter: none
+    rows = np.zeros((height, 1 + width * channels * bits // 8), np.uint8)  # each row begins with its filter, 0
     rows[:, 1:] = np.ascontiguousarray(pixels.astype(pixels.dtype.newbyteorder(">"))).reshape(height, -1).view(np.uint8)
 
     def chunk(kind, data):
@@ -35,7 +35,7 @@ def esim_srgb(linear):
 
 
 def esim_find_images(folder):
-    """Images whose file is missing are looked for in the scene's own folder. Names the files that the scene uses."""
+    """Looks for missing image files in the scene's own folder. Prints the files that the scene uses."""
     for image in bpy.data.images:
         if image.source != "FILE" or image.packed_file is not None:
             continue
@@ -47,14 +47,14 @@ def esim_find_images(folder):
                 image.filepath = path = beside
                 image.reload()
             else:
-                esim_warn(f"image {image.name}: there is no {image.filepath}")
+                esim_warn(f"image {image.name}: the file {image.filepath} does not exist")
         print("esim warning file " + path, flush=True)
     for library in bpy.data.libraries:
         print("esim warning file " + os.path.abspath(bpy.path.abspath(library.filepath)), flush=True)
 
 
 def esim_open(path):
-    """Shows the scene of a file, whatever its format."""
+    """Opens the scene of a file in any supported format."""
     extension = os.path.splitext(path)[1].lower()
     if extension == ".blend":
         bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
@@ -73,7 +73,7 @@ def esim_open(path):
     elif extension == ".dae":
         bpy.ops.wm.collada_import(filepath=path)
     else:
-        raise RuntimeError("Error: Blender does not know the format " + extension)
+        raise RuntimeError("Error: Blender does not support the format " + extension)
 
 
 def esim_export(path):

@@ -1,4 +1,4 @@
-# Renders the scene that is open in Blender, from poses in Unreal's units and frames; common.py stands before it.
+# Renders the open scene of Blender, from poses in Unreal's units and frames; common.py precedes it.
 import math
 import mmap
 import os
@@ -12,16 +12,16 @@ from mathutils import Matrix, Vector
 
 
 class CommandError(Exception):
-    """What a client asked for cannot be done."""
+    """A client's command cannot be executed."""
 
 
 # --- frames -----------------------------------------------------------------------------------------------------------
-# Unreal's world is left-handed, in centimetres: x forward, y right, z up. Blender's is that with y reversed, in metres.
-# Angles in degrees: pitch lifts the nose, yaw turns it to the right, roll lowers the right wing, in the order roll,
-# pitch, yaw about the world's axes.
+# Unreal's world is left-handed, in centimetres: x forward, y right, z up. Blender's world has y reversed, in metres.
+# Angles are in degrees: positive pitch is nose up, positive yaw is nose right, positive roll is right wing down, applied
+# in the order roll, pitch, yaw about the world's axes.
 
 def unreal_axes(pitch, yaw, roll):
-    """The rotated x, y and z axis as columns, in Unreal's world."""
+    """Returns the rotated x, y and z axes as columns, in Unreal's world."""
     p, y, r = (math.radians(angle) for angle in (pitch, yaw, roll))
     cp, sp, cy, sy, cr, sr = math.cos(p), math.sin(p), math.cos(y), math.sin(y), math.cos(r), math.sin(r)
     return Matrix(((cp * cy, sr * sp * cy - cr * sy, -(cr * sp * cy + sr * sy)),
@@ -30,7 +30,7 @@ def unreal_axes(pitch, yaw, roll):
 
 
 def unreal_angles(axes):
-    """Pitch, yaw, roll of such axes; roll 0 where only its sum with the yaw is known."""
+    """Returns pitch, yaw and roll of such axes; roll is 0 if only its sum with the yaw is known."""
     pitch = math.atan2(axes[2][0], math.hypot(axes[0][0], axes[1][0]))
     if math.hypot(axes[0][0], axes[1][0]) < 1e-7:
         return math.degrees(pitch), math.degrees(math.atan2(-axes[0][1], axes[1][1])), 0.0
@@ -61,7 +61,7 @@ def object_matrix(location, rotation, scale):
 
 
 def pose_of(thing):
-    """Location and rotation of an object, for Unreal."""
+    """Returns location and rotation of an object, for Unreal."""
     position, turn, _ = thing.matrix_world.decompose()
     return position_to_unreal(position), unreal_angles(MIRROR @ turn.to_matrix() @ MIRROR)
 
@@ -69,7 +69,7 @@ def pose_of(thing):
 # --- OpenEXR ----------------------------------------------------------------------------------------------------------
 
 class ExrLayout:
-    """Where the numbers are in an OpenEXR file without compression."""
+    """The layout of an OpenEXR file without compression."""
 
     def __init__(self, data):
         self.channels, at = [], 8
@@ -90,17 +90,17 @@ class ExrLayout:
                     channel, inner = text(inner)
                     kind, = struct.unpack_from("<i", head, inner)
                     if kind != 2:
-                        raise RuntimeError("a channel of the rendering is not of 32-bit floats")
+                        raise RuntimeError("a channel of the rendered image does not have 32-bit floats")
                     self.channels.append(channel.split(".", 1)[1])  # without the layer's name
                     inner += 16
             elif name == "dataWindow":
                 left, top, right, bottom = struct.unpack_from("<4i", head, at)
             at += size
         self.width, self.height = right - left + 1, bottom - top + 1
-        self.start, = struct.unpack_from("<Q", head, at + 1)  # of the first row, of all alike
+        self.start, = struct.unpack_from("<Q", head, at + 1)  # offset of the first row; all rows have the same layout
 
     def read(self, data):
-        """height x channels x width, not copied."""
+        """Returns a view of height x channels x width."""
         count, stride = len(self.channels), 2 + self.width * len(self.channels)
         rows = np.frombuffer(data, "<f4", stride * self.height, self.start).reshape(self.height, stride)
         return rows[:, 2:].reshape(self.height, count, self.width)
@@ -127,12 +127,12 @@ def has_light(scene):
 
 
 def spoken_name(name):
-    """The protocol separates names by spaces."""
+    """Replaces spaces, with which the protocol separates names."""
     return name.replace(" ", "_")
 
 
 class View:
-    """What one camera of the protocol sees."""
+    """One camera of the protocol."""
 
     def __init__(self):
         self.location, self.rotation, self.field_of_view = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 90.0
@@ -142,15 +142,15 @@ class View:
 
 
 class Engine:
-    """Renders the open scene. What was rendered last is kept until something in it changes."""
+    """Renders the open scene. The last result is kept until something changes."""
 
     def __init__(self, options):
         self.scene = scene = bpy.context.scene
         self.size, self.samples, self.seed = options.size, options.samples, options.seed
         self.cached_key, self.cached = None, None
-        self.seconds_rendering = 0.0  # by Blender, with writing its file
+        self.seconds_rendering = 0.0  # by Blender, including writing its file
         self.renders = 0
-        # Blender gives its floats away in files alone. This one has no name, and is gone with the process.
+        # Blender writes floats to files only. This file has no name, and vanishes with the process.
         self.file = os.memfd_create("esim frame")
         self.settings = self.layout_key = self.layout = None
         self._own_camera()
@@ -158,7 +158,7 @@ class Engine:
         self._name_objects()
 
     def _own_camera(self):
-        """The scene's camera gives the first pose and field of view; what renders is a plain one beside it."""
+        """Adds a plain camera for rendering; the scene's camera gives its first pose and field of view."""
         self.first = View()
         if self.scene.camera is not None and self.scene.camera.type == "CAMERA":
             matrix = self.scene.camera.matrix_world
@@ -181,8 +181,8 @@ class Engine:
         layer.use_pass_combined = layer.use_pass_z = True
         layer.use_pass_object_index = options.engine == "cycles"
         render.engine = {"cycles": "CYCLES", "eevee": "BLENDER_EEVEE"}[options.engine]
-        # Every sample is drawn within its own pixel, whose value is their mean; always the same, so that the same
-        # requests give the same bytes. Blender's denoiser, where there is one, would smear what is to be seen.
+        # A pixel is the mean of samples within it, with a fixed seed, so that the same requests give the same bytes.
+        # Blender's denoiser, if it has one, would blur details.
         scene.cycles.device, scene.cycles.pixel_filter_type = "CPU", "BOX"
         scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = scene.cycles.use_auto_tile = False
         scene.cycles.use_animated_seed = False
@@ -203,7 +203,7 @@ class Engine:
         render.use_overwrite, render.use_placeholder = True, False
 
     def _name_objects(self):
-        """What can be moved: the objects that hang on no other, each with all that hangs on it. Ids from 1 on."""
+        """Lists the objects that can be moved: those without a parent, each with its children. Ids start at 1."""
         def root_of(thing):
             return root_of(thing.parent) if thing.parent is not None else thing
 
@@ -218,14 +218,15 @@ class Engine:
     def object(self, name):
         thing = self.objects.get(name)
         if thing is None:
-            raise CommandError(f"there is no object {name} that hangs on no other, among {' '.join(self.objects)}")
+            raise CommandError(f"object {name} does not exist or has a parent; objects without a parent are: "
+                               f"{' '.join(self.objects)}")
         return thing
 
     def move(self, name, location=None, rotation=None):
         thing = self.object(name)
         if name not in self.moved:
             self.moved[name] = (*pose_of(thing), thing.matrix_world.to_scale())
-            thing.animation_data_clear()  # what else would move it
+            thing.animation_data_clear()  # nothing else may move it
             thing.constraints.clear()
         old_location, old_rotation, scale = self.moved[name]
         location, rotation = location or old_location, rotation or old_rotation
@@ -233,8 +234,8 @@ class Engine:
         thing.matrix_world = object_matrix(location, rotation, scale)
 
     def render(self, view):
-        """The passes of the current state, 32-bit floats: light (height x B, G, R x width), depth (planar, m), and with Cycles
-        ids. Valid until the next call."""
+        """Returns the passes of the current state, as 32-bit floats: light (height x B, G, R x width), depth (planar, m),
+        and with Cycles ids. They are valid until the next call."""
         moved = tuple((name, *pose[:2]) for name, pose in sorted(self.moved.items()))
         key = view.key(), self.size, self.samples, self.seed, moved
         if key == self.cached_key:
@@ -257,16 +258,16 @@ class Engine:
         return self.cached
 
     def _passes(self):
-        """Of the file that Blender has written, as views of it, which it overwrites at the next rendering."""
+        """Returns views of the file that Blender has written, which the next rendering overwrites."""
         data = mmap.mmap(self.file, 0, flags=mmap.MAP_SHARED | mmap.MAP_POPULATE, prot=mmap.PROT_READ)
-        key = len(data), self.size  # the header says when it was rendered: its length may change
+        key = len(data), self.size  # the header contains the date, so its length may change
         if key != self.layout_key:
             self.layout_key, self.layout = key, ExrLayout(data)
         layout = self.layout
         if (layout.width, layout.height) != self.size:
-            raise RuntimeError("Blender rendered an image of another size than it was asked for")
+            raise RuntimeError("Blender rendered an image of a different size than requested")
         rows, at = layout.read(data), layout.channels.index
-        first = at("Combined.B")  # channels stand in the order of their names
+        first = at("Combined.B")  # channels are sorted by name
         passes = {"light": rows[:, first:first + 3], "depth": rows[:, at("Depth.Z")]}
         if "IndexOB.X" in layout.channels:
             passes["ids"] = rows[:, at("IndexOB.X")]

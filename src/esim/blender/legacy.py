@@ -1,5 +1,5 @@
-# Blender forgets the textures of materials made for its internal renderer (before 2.80) when it opens them. They still
-# stand in the file, whose layout it describes itself: this reads them there.
+# When Blender opens materials of its former internal renderer (before 2.80), it drops their textures. The file still
+# contains them and describes its own layout; this module reads them from the file.
 import gzip
 import struct
 
@@ -15,7 +15,7 @@ class BlendFile:
         if data[:2] == b"\x1f\x8b":
             data = gzip.decompress(data)
         if data[:7] != b"BLENDER":
-            raise ValueError("no .blend file, or of a compression that is not known")
+            raise ValueError("this is not a .blend file, or its compression is not supported")
         self.pointer = 8 if data[7:8] == b"-" else 4
         self.order = "<" if data[8:9] == b"v" else ">"
         self.blocks = {}
@@ -88,7 +88,7 @@ class BlendFile:
 
 
 def esim_legacy_textures(path):
-    """Image names by material name, from the texture slots of the file's materials."""
+    """Returns image names by material name, from the texture slots of the file's materials."""
     file = BlendFile(path)
     images = {}
     for kind, data in file.of_type("Material"):

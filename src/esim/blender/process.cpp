@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::size_t kTailLines = 40, kLongestLine = 2000;
 
-/// In the new process: becomes the program. Only calls that are allowed after a fork.
+/// Runs the program in the new process. Makes only calls that are allowed after a fork.
 [[noreturn]] void become(char* const* arguments, int output) {
   ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -76,7 +76,7 @@ class Lines {
  private:
   LineHandler on_line_;
   std::string line_;
-  mutable std::mutex mutex_;  // of what is below
+  mutable std::mutex mutex_;  // of tail_
   std::deque<std::string> tail_;
 };
 
@@ -87,7 +87,7 @@ struct Started {
 
 Started start(const std::vector<std::string>& command) {
   int pipe[2];
-  if (::pipe2(pipe, O_CLOEXEC) != 0) throw InternalError(std::string("cannot make a pipe: ") + std::strerror(errno));
+  if (::pipe2(pipe, O_CLOEXEC) != 0) throw InternalError(std::string("cannot create a pipe: ") + std::strerror(errno));
   std::vector<char*> arguments;
   for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
   arguments.push_back(nullptr);
@@ -101,7 +101,7 @@ Started start(const std::vector<std::string>& command) {
 
 enum class Came { nothing, something, end };
 
-/// Waits for output of a program, for a tenth of a second; what `lines` says of it is and-ed to `go_on`.
+/// Waits up to a tenth of a second for output of a program; clears `go_on` if a handler of `lines` returns false.
 Came read_some(int output, Lines& lines, bool& go_on) {
   constexpr int kPatience_ms = 100;
   char buffer[1 << 14];
@@ -123,7 +123,7 @@ int wait_for_end(pid_t child) {
   return exit_status_of(status);
 }
 
-/// Ends a process and those that it started: politely first.
+/// Ends a process and its child processes, first with SIGTERM.
 void end_group(pid_t leader) {
   ::kill(-leader, SIGTERM);
   for (int i = 0; i < 50; ++i) {
@@ -151,7 +151,7 @@ ProcessResult run_process(const std::vector<std::string>& command, const LineHan
   const Started program = start(command);
   Lines lines(on_line);
   ProcessResult result;
-  // Until the program has closed its output, which it does when it ends.
+  // Until the program closes its output, at the latest when it ends.
   while (true) {
     bool go_on = on_line("");
     if (read_some(program.output, lines, go_on) == Came::end) break;

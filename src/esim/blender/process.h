@@ -8,35 +8,35 @@
 
 namespace esim {
 
-/// How another program ended, and what it said.
+/// How a program ended, and its output.
 struct ProcessResult {
-  int exit_status = 0;      ///< 128 + the signal's number where a signal ended it
-  bool cancelled = false;   ///< `on_line` wished so
+  int exit_status = 0;      ///< 128 + the signal's number if a signal ended it
+  bool cancelled = false;   ///< `on_line` ended it
   std::string output_tail;  ///< the last lines of both its output streams
 };
 
-/// Receives each line of output as it comes, and empty ones now and then; false ends the program.
+/// Receives each line of output immediately, and empty lines regularly; false ends the program.
 using LineHandler = std::function<bool(const std::string&)>;
 
-/// Runs a program to its end, with no input. Ends it, and whatever it has started, when `on_line` says so or this
-/// process dies. Throws UserError where it cannot be started.
+/// Runs a program to its end, without input. Ends it and its child processes if `on_line` returns false or this process
+/// ends. Throws UserError if it cannot be started.
 ProcessResult run_process(const std::vector<std::string>& command, const LineHandler& on_line);
 
-/// A program that runs beside this one, with no input. It ends, with whatever it has started, with this object or with
-/// the thread that made it.
+/// A program that runs in the background, without input. It and its child processes end with this object, or with the
+/// thread that created it.
 class RunningProcess {
  public:
-  /// Throws UserError where it cannot be started.
+  /// Throws UserError if it cannot be started.
   explicit RunningProcess(const std::vector<std::string>& command);
   ~RunningProcess();
   RunningProcess(const RunningProcess&) = delete;
   RunningProcess& operator=(const RunningProcess&) = delete;
 
-  /// Reads its output until `on_line` returns false: then true, and the rest of it is followed in the background. False
-  /// where the program ends, or the time is over, before. To be called once.
+  /// Reads its output until `on_line` returns false; then returns true and reads the remaining output in the
+  /// background. False if the program ends or the time is over first. Call it once.
   bool read_until(const LineHandler& on_line, double timeout_s);
 
-  /// How it ended, once it has; as in ProcessResult.
+  /// The exit status, as in ProcessResult; empty while it runs.
   std::optional<int> exit_status();
 
   /// The last lines that it wrote.
@@ -47,7 +47,7 @@ class RunningProcess {
   std::unique_ptr<State> state_;
 };
 
-/// Where a program is: `name` itself if it has a slash, or else the first match on PATH; empty where there is none.
+/// The path of a program: `name` itself if it has a slash, otherwise the first match on PATH; empty if not found.
 std::string find_program(const std::string& name);
 
 }  // namespace esim

@@ -20,8 +20,9 @@ namespace fs = std::filesystem;
 ScratchFolder::ScratchFolder(const fs::path& beside) {
   std::string name = (beside / ".esim_XXXXXX").string();
   if (::mkdtemp(name.data()) == nullptr) {
-    throw OutputError(
-        fmt::format("{}: cannot be written to; check that it exists, its permissions, and the disk", beside.string()));
+    throw OutputError(fmt::format(
+        "{}: cannot be written to; check that it exists, that you may write to it, and that the disk has space",
+        beside.string()));
   }
   path_ = name;
 }
@@ -36,15 +37,15 @@ std::string blender_program(const fs::path& scene) {
   const std::string name = chosen != nullptr && *chosen != '\0' ? chosen : "blender";
   std::string program = find_program(name);
   if (!program.empty()) return program;
-  throw UserError(
-      fmt::format("scene {}: needs Blender, but there is no program {}; install it with 'sudo apt install blender', or "
-                  "export the scene as GLB on a machine that has it",
-                  scene.string(), name));
+  throw UserError(fmt::format(
+      "scene {}: requires Blender, but the program {} was not found; install it with 'sudo apt install blender', or "
+      "export the scene as GLB on a computer that has it",
+      scene.string(), name));
 }
 
 ScriptInMemory::ScriptInMemory(const std::string& script) : file_(::memfd_create("script.py", 0)) {
   if (file_ < 0 || ::write(file_, script.data(), script.size()) != static_cast<ssize_t>(script.size()))
-    throw OutputError(std::string("cannot keep a script in memory: ") + std::strerror(errno));
+    throw OutputError(std::string("cannot store a script in memory: ") + std::strerror(errno));
 }
 
 ScriptInMemory::~ScriptInMemory() {
@@ -55,7 +56,7 @@ std::string ScriptInMemory::path() const { return fmt::format("/proc/self/fd/{}"
 
 std::vector<std::string> blender_command(const std::string& program, const ScriptInMemory& script,
                                          const std::vector<std::string>& arguments) {
-  // Debian's Blender uses the first Python on PATH, which may be one that lacks the system's modules.
+  // Debian's Blender uses the first Python on PATH, which may lack the system's modules.
   const char* const path = std::getenv("PATH");
   std::vector<std::string> command = {
       "/usr/bin/env", "-u",         "PYTHONHOME",

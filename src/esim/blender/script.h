@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-/// How Blender is made to run a script; shared by what does so.
+/// Runs scripts in Blender.
 namespace esim {
 
-/// A folder of its own for one run, gone with the object.
+/// A temporary folder for one run, which is removed with the object.
 class ScratchFolder {
  public:
   explicit ScratchFolder(const std::filesystem::path& beside);
@@ -21,11 +21,11 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-/// Where Blender is. Throws UserError, which names the scene and says how to install it, where there is none.
+/// The path of Blender. If it is missing, throws UserError, which names the scene and says how to install Blender.
 std::string blender_program(const std::filesystem::path& scene);
 
-/// A script in memory, which the programs that this one starts can read as a file while the object lives. No disk has
-/// it, so that none keeps it, however the programs end.
+/// A script in memory, which child processes can read as a file while the object exists. It is never on a disk, so that
+/// nothing remains, however the processes end.
 class ScriptInMemory {
  public:
   explicit ScriptInMemory(const std::string& script);
@@ -39,12 +39,12 @@ class ScriptInMemory {
   int file_ = -1;
 };
 
-/// What to run so that Blender runs a script with arguments. Blender then has no display, none of the user's settings,
-/// and runs no scripts of scenes; it ends with status 3 where the script fails.
+/// The command with which Blender runs a script with arguments. Blender then has no display and none of the user's
+/// settings, does not run scripts of scenes, and exits with status 3 if the script fails.
 std::vector<std::string> blender_command(const std::string& program, const ScriptInMemory& script,
                                          const std::vector<std::string>& arguments);
 
-/// The last of what Blender said that sounds like a reason, on one line.
+/// The last line of Blender's output that looks like an error message, or else the last line.
 std::string reason_in(const std::string& output);
 
 }  // namespace esim

@@ -1,6 +1,6 @@
-# Shows the scene that is open in Blender to programs that speak the protocol of UnrealCV, on this machine alone:
+# Renders the open scene of Blender for clients with UnrealCV's protocol, on the loopback interface only:
 #   blender --background room.blend --python serve.py -- --port 9000
-# docs/methods/engines.md lists the commands. What Blender renders for them: engine.py.
+# docs/methods/engines.md lists the commands. engine.py renders.
 import argparse
 import contextlib
 import io
@@ -14,7 +14,7 @@ import struct
 import sys
 import time
 
-if "esim_open" not in globals():  # run by hand: esim itself puts the files one behind the other
+if "esim_open" not in globals():  # run directly; esim concatenates the files
     for _part in ("legacy.py", "common.py", "engine.py"):
         with open(os.path.join(os.path.dirname(os.path.realpath(__file__)), _part)) as _file:
             exec(_file.read())
@@ -25,14 +25,14 @@ import numpy as np
 MAGIC = 0x9E2B83C1
 LONGEST_REQUEST = 1 << 16  # bytes
 LARGEST_SIDE, MOST_PIXELS = 16384, 1 << 26
-MOST_HEADS = 64  # of arrays, that are remembered
-FARTHEST = 1e9  # m; Blender writes 1e10 where nothing is seen
+MOST_HEADS = 64  # of arrays, in the cache
+FARTHEST = 1e9  # m; Blender writes 1e10 where no surface is visible
 
 
 # --- commands ---------------------------------------------------------------------------------------------------------
 
 def colour_of(number):
-    """The colour of an object in masks: its number, in red and green. What is no object is black."""
+    """Returns the colour of an object in masks: its number, in red and green. Other pixels are black."""
     return number & 255, number >> 8, 0
 
 
@@ -40,7 +40,7 @@ def numbers(text, count):
     parts = text.split()
     values = tuple(float(part) for part in parts) if len(parts) == count else ()
     if len(values) != count or not all(math.isfinite(value) for value in values):
-        raise CommandError(f"wants {count} numbers")
+        raise CommandError(f"this command requires {count} finite numbers")
     return values
 
 
@@ -49,13 +49,13 @@ def spell(*values):
 
 
 class Commands:
-    """Answers requests with text, bytes, or bytes in parts."""
+    """Answers requests with text, bytes, or a sequence of bytes."""
 
     def __init__(self, engine):
         self.engine = engine
         self.views = {"0": engine.first}
         self.buffers, self.heads = {}, {}
-        self.seconds_answering = 0.0  # from when a request has come to when the socket has taken its answer
+        self.seconds_answering = 0.0  # from receiving a request to sending its answer
         number = r"/camera/(\d{1,2})"
         self.table = [(re.compile(pattern + r"\Z", re.IGNORECASE), answer) for pattern, answer in (
             (r"vget /unrealcv/status", self.status),
@@ -97,7 +97,7 @@ class Commands:
                     return "ok" if result is None else result
                 except (CommandError, ValueError, RuntimeError, MemoryError) as error:
                     return f"error {error}"
-        return f"error there is no command '{command[:200]}'"
+        return f"error unknown command '{command[:200]}'"
 
     def status(self):
         engine = self.engine
@@ -122,13 +122,14 @@ class Commands:
     def set_field_of_view(self, camera, text):
         degrees, = numbers(text, 1)
         if not 0.5 <= degrees <= 172:
-            raise CommandError("Blender's cameras see from 0.5 to 172 degrees")
+            raise CommandError("the field of view must be from 0.5 to 172 degrees")
         self.view(camera).field_of_view = degrees
 
     def resize(self, width, height):
         width, height = int(width), int(height)
         if not (4 <= width <= LARGEST_SIDE and 4 <= height <= LARGEST_SIDE and width * height <= MOST_PIXELS):
-            raise CommandError(f"images have from 4x4 to {MOST_PIXELS} pixels, {LARGEST_SIDE} along a side at most")
+            raise CommandError(f"images must have at least 4x4 pixels, at most {LARGEST_SIDE} per side and "
+                               f"{MOST_PIXELS} in total")
         self.engine.size = width, height
 
     def set_samples(self, count):
@@ -149,7 +150,7 @@ class Commands:
         return f"(R={red},G={green},B={blue},A=255)"
 
     def npy(self, array):
-        """A NumPy file in two parts, of which the pixels are copied only where they do not lie together."""
+        """Returns a NumPy file in two parts; the pixels are copied only if they are not contiguous."""
         array, kind = np.ascontiguousarray(array), (array.dtype, array.shape)
         if kind not in self.heads:
             head = io.BytesIO()
@@ -163,14 +164,14 @@ class Commands:
         return self.render(camera)["light"][:, ::-1].swapaxes(1, 2)
 
     def buffer(self, name):
-        """A float for each pixel, in memory that is used again and again: fresh memory costs time."""
+        """Returns an array with a float per pixel in reused memory, since new memory takes time."""
         shape = self.engine.size[::-1]
         if name not in self.buffers or self.buffers[name].shape != shape:
             self.buffers[name] = np.empty(shape, np.float32)
         return self.buffers[name]
 
     def luminance(self, camera):
-        """Of Rec. 709, in one channel: a third to send."""
+        """Returns the luminance of Rec. 709: one channel, a third of the data."""
         shares = np.array([0.0722, 0.7152, 0.2126], np.float32)
         return self.npy(np.matmul(shares, self.render(camera)["light"], out=self.buffer("luminance")))
 
@@ -193,7 +194,7 @@ class Commands:
 
     def ids(self, camera):
         if "ids" not in self.render(camera):
-            raise CommandError("Eevee does not say which object a pixel sees; use the engine cycles")
+            raise CommandError("Eevee renders no object masks; use --engine cycles")
         return self.render(camera)["ids"].astype(np.uint16)
 
     def mask_png(self, camera):
@@ -215,7 +216,7 @@ class Client:
         self.connection.sendall(parts[-1])
 
     def serve(self):
-        """Answers what has come. False when the client has gone, or sends what is not the protocol."""
+        """Answers received requests. False if the client has disconnected, or violates the protocol."""
         data = self.connection.recv(1 << 16)
         begin = time.perf_counter()
         self.received += data
@@ -238,7 +239,7 @@ class Client:
 
 
 def serve(listener, commands, once, parent):
-    """One client at a time; another's connection is closed."""
+    """Serves one client at a time, and closes other connections."""
     client = None
     while os.getppid() == parent or not once:
         ready = select.select([listener] + ([client.connection] if client else []), [], [], 1.0)[0]
@@ -265,33 +266,33 @@ def parse(arguments):
     def size(text):
         match = re.match(r"(\d{1,5})x(\d{1,5})\Z", text)
         if not match:
-            raise argparse.ArgumentTypeError("is WIDTHxHEIGHT, such as 640x480")
+            raise argparse.ArgumentTypeError("must be WIDTHxHEIGHT, such as 640x480")
         return int(match[1]), int(match[2])
 
     def count(text):
         if not 1 <= int(text) <= 65536:
-            raise argparse.ArgumentTypeError("is from 1 to 65536")
+            raise argparse.ArgumentTypeError("must be from 1 to 65536")
         return int(text)
 
-    parser = argparse.ArgumentParser(prog="serve.py", description="Shows a scene to clients of UnrealCV's protocol.")
-    parser.add_argument("--scene", help="a scene file, if Blender has not opened one already")
-    parser.add_argument("--port", type=int, default=9000, help="0: any that is free")
+    parser = argparse.ArgumentParser(prog="serve.py", description="Renders a scene for clients of UnrealCV's protocol.")
+    parser.add_argument("--scene", help="scene file, unless Blender has already opened one")
+    parser.add_argument("--port", type=int, default=9000, help="TCP port; 0: any free port")
     parser.add_argument("--engine", choices=("cycles", "eevee"), default="cycles")
-    parser.add_argument("--samples", type=count, default=16, help="per pixel")
-    parser.add_argument("--size", type=size, default=(640, 480), help="WIDTHxHEIGHT until a client sets it")
-    parser.add_argument("--seed", type=int, default=0, help="of the path tracer's noise")
-    parser.add_argument("--threads", type=int, default=0, help="0: as many as there are processors")
+    parser.add_argument("--samples", type=count, default=16, help="samples per pixel")
+    parser.add_argument("--size", type=size, default=(640, 480), help="initial image size, WIDTHxHEIGHT")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the path tracer's noise")
+    parser.add_argument("--threads", type=int, default=0, help="number of threads; 0: one per processor")
     parser.add_argument("--persistent", action=argparse.BooleanOptionalAction, default=True,
-                        help="keep the scene's data from one rendering to the next: faster, more memory")
+                        help="keep the scene's data between renderings: faster, but needs more memory")
     parser.add_argument("--once", action="store_true",
-                        help="end when the first client goes, or the program that started this")
+                        help="exit when the first client disconnects, or when the parent process ends")
     return parser.parse_args(arguments)
 
 
 def main():
     parent = os.getppid()
     with contextlib.suppress(OSError):
-        os.rmdir(bpy.app.tempdir)  # empty; Blender leaves it if it is killed
+        os.rmdir(bpy.app.tempdir)  # empty; it would remain if Blender is killed
     options = parse(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
     if options.scene:
         if not os.path.isfile(options.scene):
@@ -310,7 +311,7 @@ def main():
         raise RuntimeError(f"Error: port {options.port} of 127.0.0.1: {error}; choose another with --port") from None
     listener.listen(8)
     print(f"esim serving 127.0.0.1:{listener.getsockname()[1]}", flush=True)
-    # From here on, what Blender says of every rendering would fill a pipe that nobody reads.
+    # From here on, Blender's messages about every rendering would fill a pipe that is no longer read.
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:

@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kHowToGetOpenGl =
-    " (Eevee needs OpenGL, if in software: install libegl1 and libgl1-mesa-dri, or use engine: cycles)";
+    " (Eevee requires OpenGL, which may run in software: install libegl1 and libgl1-mesa-dri, or use engine: cycles)";
 
 }  // namespace
 
@@ -53,7 +53,7 @@ BlenderServer::BlenderServer(const BlenderServerOptions& options, const BlenderN
   if (serves) return;
   if (const auto why = why_ended()) throw UserError(fmt::format("scene {}: {}", options.scene.string(), *why));
   throw UserError(
-      fmt::format("scene {}: Blender does not show it within {:g} s; raise renderer.timeout_s, or look at it "
+      fmt::format("scene {}: Blender did not open it within {:g} s; increase renderer.timeout_s, or check it "
                   "in Blender: {}",
                   options.scene.string(), options.timeout_s, reason_in(parts_->process.output_tail())));
 }

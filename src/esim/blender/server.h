@@ -12,26 +12,26 @@ namespace esim {
 struct BlenderServerOptions {
   std::filesystem::path scene;
   bool eevee = false;      ///< Blender's rasteriser instead of its path tracer, Cycles
-  int samples = 16;        ///< per pixel, until a client says otherwise
-  int seed = 0;            ///< of the path tracer's noise
-  int threads = 0;         ///< 0: as many as there are processors
-  double timeout_s = 120;  ///< longest wait for Blender to open the scene
+  int samples = 16;        ///< per pixel, until a client sets it
+  int seed = 0;            ///< seed of the path tracer's noise
+  int threads = 0;         ///< 0: one per processor
+  double timeout_s = 120;  ///< for Blender to open the scene
 };
 
-/// Blender, without a display, showing a scene to a client that speaks UnrealCV's protocol. It ends with this object.
+/// A background Blender that renders a scene for a client with UnrealCV's protocol. It ends with this object.
 class BlenderServer {
  public:
-  /// Starts Blender and waits until it serves. Throws UserError where there is no Blender, saying how to install it, no
-  /// such file, or what Blender said where it fails.
+  /// Starts Blender and waits until it serves. Throws UserError if Blender is missing, with how to install it, if the
+  /// file does not exist, or if Blender fails, with its message.
   BlenderServer(const BlenderServerOptions& options, const BlenderNotice& warning);
   ~BlenderServer();
   BlenderServer(const BlenderServer&) = delete;
   BlenderServer& operator=(const BlenderServer&) = delete;
 
-  /// On which it listens, on this machine alone.
+  /// The TCP port, on the loopback interface only.
   int port() const { return port_; }
 
-  /// Why it ended, on one line; nothing while it runs.
+  /// Why it ended, on one line; empty while it runs.
   std::optional<std::string> why_ended();
 
  private:

@@ -5,13 +5,13 @@
 
 namespace esim {
 
-/// What is in front of a sensor's pixels.
+/// The colour filters of a sensor's pixels.
 enum class ColourFilters {
   none,  ///< every pixel sees luminance
-  rggb,  ///< Bayer's mosaic: every pixel sees the colour_at() its place
+  rggb,  ///< Bayer mosaic: every pixel sees the colour_at() its position
 };
 
-/// Something of red, green and blue, in this order.
+/// A value each for red, green and blue, in this order.
 template <typename T>
 using PerColour = std::array<T, 3>;
 

@@ -4,7 +4,7 @@
 
 namespace esim {
 
-/// Another program that shows the scene does not answer as it should. What was simulated until then is worth keeping.
+/// An external program that renders the scene failed or answered incorrectly. What was simulated before is kept.
 class EngineError : public UserError {
  public:
   using UserError::UserError;

@@ -5,13 +5,13 @@
 
 namespace esim {
 
-/// Base of everything the library throws. The message is one line: what is wrong, where, what to do.
+/// Base of all exceptions of the library. The message is one line: what is wrong, where, and what to do.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// The input or the environment is at fault (bad file, bad value, full disk): the user can repair it.
+/// An error of the input or the environment (bad file, bad value, full disk), which the user can correct.
 class UserError : public Error {
  public:
   using Error::Error;
@@ -23,7 +23,7 @@ class OutputError : public UserError {
   using UserError::UserError;
 };
 
-/// The program is at fault: a contract between two modules was broken.
+/// An error of the program: a contract between two modules was broken.
 class InternalError : public Error {
  public:
   using Error::Error;

@@ -2,7 +2,7 @@
 
 namespace esim {
 
-/// Arc tangent of t on [0, 1], within 3e-7: the polynomial of Abramowitz and Stegun, 4.4.49, made of operations that
+/// Arc tangent of t on [0, 1], within 3e-7: the polynomial of Abramowitz and Stegun, 4.4.49, from operations that
 /// compile to SIMD code.
 inline float fast_arc_tangent(float t) {
   const float s = t * t;

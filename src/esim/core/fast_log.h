@@ -5,9 +5,9 @@
 
 namespace esim {
 
-/// Binary logarithm within 3e-6 and the rounding of a float, for x > 0, normal and finite. Monotone, continuous, exact
-/// at powers of two, and made of operations that compile to SIMD code: for decisions (a level of detail, a sampling
-/// interval), not for signals.
+/// Binary logarithm within 3e-6 plus the rounding of a float, for x > 0, normal and finite. Monotone, continuous, exact
+/// at powers of two, and built from operations that compile to SIMD code. Use it for decisions (a level of detail, a
+/// sampling interval), not for signals.
 inline float fast_log2(float x) {
   const std::uint32_t bits = std::bit_cast<std::uint32_t>(x);
   const float exponent = static_cast<float>(static_cast<int>(bits >> 23) - 127);

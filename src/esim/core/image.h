@@ -7,7 +7,7 @@
 
 namespace esim {
 
-/// Axis-aligned block of pixels: columns [x, x+width), rows [y, y+height).
+/// A rectangle of pixels: columns [x, x+width), rows [y, y+height).
 struct Tile {
   int x = 0, y = 0, width = 0, height = 0;
 
@@ -56,7 +56,7 @@ class Image {
   std::vector<T> data_;
 };
 
-/// Borrowed pixels of an image, all of them or those of a tile that is stored apart. Coordinates are the image's.
+/// A view of an image, or of a tile that is stored separately. Coordinates are those of the image.
 template <typename T>
 class ImageView {
  public:

@@ -10,8 +10,7 @@
 
 namespace esim {
 
-/// Allocates large arrays on huge pages where the system has some: scattered access to them then seldom waits for page
-/// tables.
+/// Allocates large arrays on huge pages if the system has some, so that scattered access rarely waits for page tables.
 template <typename T>
 struct LargeAllocator {
   using value_type = T;
@@ -27,7 +26,7 @@ struct LargeAllocator {
     void* const memory = std::aligned_alloc(alignment(count), bytes);
     if (memory == nullptr) throw std::bad_alloc();
 #ifdef MADV_HUGEPAGE
-    // Only advice: where it is not taken, nothing but speed is lost.
+    // Only advice: if the system does not follow it, only speed is lost.
     if (is_large(count)) static_cast<void>(madvise(memory, bytes, MADV_HUGEPAGE));
 #endif
     return static_cast<T*>(memory);

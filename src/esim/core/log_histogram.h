@@ -6,8 +6,8 @@
 
 namespace esim {
 
-/// Mean, greatest and quantiles of values >= 0. Their weights are in bins a hundredth of a decade wide, 2.3 %, from
-/// 1e-9 to 1e3; those beyond belong to the outermost bins.
+/// Mean, maximum and quantiles of values >= 0. Weights are collected in bins a hundredth of a decade wide (2.3 %), from
+/// 1e-9 to 1e3; values outside belong to the outermost bins.
 class LogHistogram {
  public:
   void add(double value, double weight = 1) {
@@ -20,7 +20,7 @@ class LogHistogram {
   double mean() const { return total_ > 0 ? sum_ / total_ : 0; }
   double max() const { return max_; }
 
-  /// The value that a share of all, by weight, does not exceed: the upper edge of its bin. 0 where there are none.
+  /// The value that a fraction of the weight does not exceed: the upper edge of its bin. 0 without values.
   double quantile(double share) const {
     if (total_ == 0) return 0;
     double below = 0;

@@ -11,7 +11,7 @@ constexpr std::size_t kHeaderBytes = 192;
 constexpr std::size_t kMaxHeaderBytes = 1 << 16;
 constexpr int kMaxDepth = 8;
 
-/// Leaves what follows the literal; nothing where there is none.
+/// Removes a literal from the start of `source`; nothing if there is no literal.
 std::optional<Literal> take_literal(std::string_view& source, int depth = 0) {
   const auto skip = [&](std::string_view these) {
     source.remove_prefix(std::min(source.find_first_not_of(these), source.size()));
@@ -78,8 +78,8 @@ Header read_header(const Read& read, const Fail& fail) {
     if (read(std::as_writable_bytes(std::span(text))) < bytes) fail("it ends within its header");
     return text;
   };
-  if (take(kMagic.size()) != kMagic) fail("it does not begin as NumPy's files do");
-  const bool first_version = take(2)[0] == 1;  // the version decides on the length of the length
+  if (take(kMagic.size()) != kMagic) fail("it does not begin with NumPy's magic bytes");
+  const bool first_version = take(2)[0] == 1;  // the length field has two bytes in version 1, four in later ones
   const std::string digits = take(first_version ? 2 : 4);
   std::size_t length = 0;
   for (std::size_t i = 0; i < digits.size(); ++i) length |= std::size_t{static_cast<unsigned char>(digits[i])} << 8 * i;
@@ -100,7 +100,7 @@ Header read_header(const Read& read, const Fail& fail) {
     if (key == "descr") header.descr = std::move(value), typed = true;
   }
   if (!typed || !ordered) fail("its header is damaged");
-  if (!shape) fail("its shape is none");
+  if (!shape) fail("its shape is invalid");
   header.shape = std::move(*shape);
   return header;
 }

@@ -9,23 +9,23 @@
 #include <string_view>
 #include <vector>
 
-/// The head of NumPy's files (https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html).
+/// The header of NumPy's files (https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html).
 namespace esim::npy {
 
 inline constexpr std::string_view kMagic = "\x93NUMPY";
 
-/// What stands before the numbers, in C order. As long for any extents, so that it can be replaced when the array has
-/// grown. `descr` is Python: "'<f4'".
+/// The header of an array in C order. Its length does not depend on the shape, so that it can be overwritten when the
+/// array has grown. `descr` is Python: "'<f4'".
 std::string header_text(std::string_view descr, std::span<const std::uint64_t> shape);
 
-/// A Python literal: a text, a word, or a sequence of literals. Of dictionaries, keys and values in turn.
+/// A Python literal: a text, a word, or a sequence of literals. Dictionaries are sequences of keys and values in turn.
 struct Literal {
   std::string text{};
   bool sequence = false;
   std::vector<Literal> items{};
 };
 
-/// Extents; nothing where it is no sequence of natural numbers.
+/// The shape; nothing if the literal is not a sequence of natural numbers.
 std::optional<std::vector<std::uint64_t>> shape_of(const Literal& literal);
 
 struct Header {
@@ -34,13 +34,13 @@ struct Header {
   std::vector<std::uint64_t> shape{};
 };
 
-/// Fills as much as there is; returns how many bytes, fewer only at the end.
+/// Reads bytes into a buffer; returns their number, which is less than requested only at the end of the file.
 using Read = std::function<std::size_t(std::span<std::byte>)>;
 
-/// Throws what the caller throws: it is told what is wrong with the file, "it ends within its header".
+/// Throws the caller's exception; `problem` says what is wrong with the file: "it ends within its header".
 using Fail = std::function<void(const std::string& problem)>;
 
-/// Reads the header, of versions 1 to 3, up to the first number.
+/// Reads a header of version 1 to 3, up to the first number.
 Header read_header(const Read& read, const Fail& fail);
 
 }  // namespace esim::npy

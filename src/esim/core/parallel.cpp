@@ -35,7 +35,7 @@ void Workers::for_each_with_worker(int count, const std::function<void(int, int)
     return;
   }
 #ifdef __SANITIZE_THREAD__
-  // TBB's own synchronisation is invisible to the thread sanitizer: say what it does.
+  // The thread sanitizer does not see TBB's synchronisation; this atomic shows it.
   std::atomic<int> order = 0;
   order.fetch_add(1);
   const auto run = [&](int i, int worker) {

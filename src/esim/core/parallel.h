@@ -6,11 +6,11 @@
 namespace esim {
 
 /// A fixed number of threads for data-parallel loops. Results must not depend on how work is divided:
-/// callers split work into pieces of their own choosing, and each piece writes only what belongs to it.
+/// callers split work into pieces, and each piece writes only its own data.
 class Workers {
  public:
-  /// `threads` ≥ 1, the calling thread included; 0 takes every processor. No more run at
-  /// once than there are processors.
+  /// `threads` ≥ 1, including the calling thread; 0: one per processor. At most as many threads as processors run at
+  /// the same time.
   explicit Workers(int threads);
   ~Workers();
   Workers(const Workers&) = delete;
@@ -22,8 +22,8 @@ class Workers {
   /// done. The first exception thrown by a body is rethrown here.
   void for_each(int count, const std::function<void(int)>& body) const;
 
-  /// The same with body(i, worker): `worker` in [0, threads()) is that of no other body at the same time, as the index
-  /// of memory to work in.
+  /// As above, with body(i, worker): no two bodies that run at the same time have the same `worker` in [0, threads()),
+  /// so that it can be the index of working memory.
   void for_each_with_worker(int count, const std::function<void(int, int)>& body) const;
 
  private:

@@ -27,7 +27,7 @@ struct Chunk {
   std::span<const std::uint8_t> data;
 };
 
-/// Takes the next chunk off `rest`; false where it is cut off, or its checksum is wrong.
+/// Removes the next chunk from `rest`; false if it is cut off or its checksum is wrong.
 bool take_chunk(std::span<const std::uint8_t>& rest, Chunk& chunk) {
   constexpr std::size_t kHead = 8, kChecksum = 4;
   if (rest.size() < kHead + kChecksum) return false;
@@ -40,7 +40,7 @@ bool take_chunk(std::span<const std::uint8_t>& rest, Chunk& chunk) {
   return true;
 }
 
-/// The size and the kind of pixels that IHDR announces; false where that is another kind than ours.
+/// Reads the size and the type of pixels from IHDR; false if the type is not supported.
 bool read_header(const Chunk& chunk, PngPixels& pixels) {
   if (chunk.name != "IHDR" || chunk.data.size() != 13) return false;
   const std::uint8_t* const head = chunk.data.data();
@@ -49,15 +49,15 @@ bool read_header(const Chunk& chunk, PngPixels& pixels) {
   if (width < 1 || height < 1 || width > kLargest || height > kLargest) return false;
   pixels.width = static_cast<int>(width), pixels.height = static_cast<int>(height);
   pixels.bits = head[8];
-  constexpr int kChannels[] = {1, 0, 3, 0, 2, 0, 4};  // by the type of colour
+  constexpr int kChannels[] = {1, 0, 3, 0, 2, 0, 4};  // by colour type
   pixels.channels = head[9] < std::size(kChannels) ? kChannels[head[9]] : 0;
   pixels.row_bytes = width * static_cast<std::size_t>(pixels.channels * pixels.bits / 8);
   const bool known_methods = head[10] == 0 && head[11] == 0 && head[12] == 0;
   return (pixels.bits == 8 || pixels.bits == 16) && pixels.channels > 0 && known_methods;
 }
 
-/// The compressed bytes: those of the only IDAT chunk, or of all in `joined`. Empty where anything is wrong, or the
-/// image has a transparent colour.
+/// The compressed bytes: those of the only IDAT chunk, or those of all, in `joined`. Empty if anything is invalid, or
+/// if the image has a transparent colour.
 std::span<const std::uint8_t> compressed_bytes(std::span<const std::uint8_t> rest, std::vector<std::uint8_t>& joined) {
   std::span<const std::uint8_t> all;
   Chunk chunk;
@@ -105,7 +105,7 @@ Pixel paeth(Pixel left, Pixel above, Pixel corner) {
   return hn::IfThenElse(hn::Eq(nearest, to_left), left, hn::IfThenElse(hn::Eq(nearest, to_above), above, corner));
 }
 
-/// A pixel's bytes are the sums of all to the left: those of a vector, in the logarithm of their number of steps.
+/// Each byte of a pixel is the sum of those to the left: a prefix sum of a vector, in logarithmically many steps.
 template <std::size_t kBytes>
 void undo_sub(const std::uint8_t* coded, std::uint8_t* out, std::size_t size) {
   const hn::FixedTag<std::uint8_t, 16> d;
@@ -130,7 +130,7 @@ void undo_sub(const std::uint8_t* coded, std::uint8_t* out, std::size_t size) {
 
 enum Filter : std::uint8_t { kNone, kSub, kUp, kAverage, kPaeth, kFilters };
 
-/// Undoes the filter of a row of pixels that have so many bytes each; `above` is the finished row before, or zeros.
+/// Undoes the filter of a row of pixels with kBytes bytes each; `above` is the previous decoded row, or zeros.
 template <std::size_t kBytes>
 void unfilter(std::uint8_t filter, const std::uint8_t* coded, const std::uint8_t* above, std::uint8_t* out,
               std::size_t size) {
@@ -183,7 +183,7 @@ void swap_bytes(std::vector<std::uint8_t>& bytes) {
   for (std::size_t i = 0; i + 1 < bytes.size(); i += 2) std::swap(bytes[i], bytes[i + 1]);
 }
 
-/// False where the stream is damaged or is not of as many bytes as there is room for.
+/// False if the stream is damaged or does not fill `out` exactly.
 bool inflate(std::span<const std::uint8_t> compressed, std::span<std::uint8_t> out) {
   constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
   if (compressed.size() > kMost || out.size() > kMost) return false;
@@ -212,8 +212,8 @@ bool decode_png_pixels(std::span<const std::byte> file, PngPixels& pixels) {
   std::vector<std::uint8_t> joined;
   const std::span<const std::uint8_t> compressed = compressed_bytes(rest, joined);
 
-  // Each row stands behind the number of its filter.
-  constexpr std::size_t kMostPerByte = 1040;  // deflate's limit, and a little
+  // Each row follows the number of its filter.
+  constexpr std::size_t kMostPerByte = 1040;  // deflate's limit, with a margin
   const std::size_t stride = pixels.row_bytes + 1, height = static_cast<std::size_t>(pixels.height);
   if (stride > kMostPerByte * compressed.size() / height) return false;
   thread_local std::vector<std::uint8_t> filtered;

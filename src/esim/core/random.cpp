@@ -44,7 +44,7 @@ std::array<std::uint32_t, 4> AddressedRandom::bits(std::uint32_t item, std::uint
 
 void AddressedRandom::bits(std::size_t count, const std::uint32_t* items, const std::uint32_t* draws,
                            const std::array<std::uint32_t*, 4>& words) const {
-  // Philox4x32-10 as the paper gives it: two products, and a key that moves on by a Weyl sequence.
+  // Philox4x32-10 as in the paper: two products per round, and a key that follows a Weyl sequence.
   constexpr int kRounds = 10;
   constexpr std::uint32_t kFactor0 = 0xD2511F53, kFactor1 = 0xCD9E8D57, kWeyl0 = 0x9E3779B9, kWeyl1 = 0xBB67AE85;
   static_assert(hn::MaxLanes(Words()) <= 16);

@@ -6,7 +6,7 @@
 
 namespace esim {
 
-/// What a random number is for. Values are part of the reproducibility promise: never renumber.
+/// What a random number is used for. Results depend on the values: never renumber them.
 enum class Purpose : std::uint16_t {
   threshold_mismatch = 1,
   threshold_noise = 2,
@@ -27,11 +27,11 @@ enum class Purpose : std::uint16_t {
   test = 1000,
 };
 
-/// Addressed randomness: every draw is a pure function of (seed, purpose, stream, item, draw), computed
-/// with the counter-based generator Philox4x32-10 (Salmon et al., SC 2011). No state, no order of calls, so
-/// results do not depend on threads or on what else was drawn.
+/// Addressed random numbers: every draw is a pure function of (seed, purpose, stream, item, draw), computed with the
+/// counter-based generator Philox4x32-10 (Salmon et al., SC 2011). There is no state, so that results depend neither on
+/// the order of calls nor on threads or other draws.
 ///
-/// `stream` separates cameras (or things that move), `item` pixels (or axes), `draw` successive draws of one item.
+/// `stream` separates cameras (or moving bodies), `item` pixels (or axes), `draw` successive draws of one item.
 class AddressedRandom {
  public:
   AddressedRandom(std::uint64_t seed, Purpose purpose, std::uint16_t stream = 0);
@@ -39,18 +39,18 @@ class AddressedRandom {
   /// Four independent uniform 32-bit words.
   std::array<std::uint32_t, 4> bits(std::uint32_t item, std::uint64_t draw = 0) const;
 
-  /// bits(items[i], draws[i]) for many at once: word k of the i-th in words[k][i]. All arrays have room for `count`
-  /// rounded up to a multiple of 16, and are read and written that far.
+  /// bits(items[i], draws[i]) for many items: word k of the i-th in words[k][i]. All arrays are read and written up to
+  /// `count` rounded up to a multiple of 16, and must have that size.
   void bits(std::size_t count, const std::uint32_t* items, const std::uint32_t* draws,
             const std::array<std::uint32_t*, 4>& words) const;
 
-  /// A uniform on the open interval (0, 1) from 53 bits of two words.
+  /// A uniform deviate on the open interval (0, 1) from 53 bits of two words.
   static double open_unit(std::uint32_t high, std::uint32_t low) {
     const std::uint64_t word = (static_cast<std::uint64_t>(high) << 32) | low;
     return (static_cast<double>(static_cast<std::int64_t>(word >> 11)) + 0.5) * 0x1.0p-53;
   }
 
-  /// Two independent uniforms on the open interval (0, 1), 53 bits each: from the first two of bits(), and the last.
+  /// Two independent uniform deviates on (0, 1), 53 bits each, from the first two and the last two words of bits().
   std::array<double, 2> uniforms(std::uint32_t item, std::uint64_t draw = 0) const;
 
   /// Two independent standard normal deviates (Box-Muller).

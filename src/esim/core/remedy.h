@@ -6,19 +6,19 @@
 
 namespace esim {
 
-/// What a caller can ask for so that an error or a loss does not come again. How to ask for it depends on the
-/// interface: the command line adds the flag to the message, the Python package the argument.
+/// An option with which the caller can avoid an error or a loss. The interfaces name it differently: the command line
+/// adds its flag to the message, the Python package its argument.
 enum class Remedy {
   none,
-  replace_output,   ///< let what is at the output's path be replaced
+  replace_output,   ///< replace what is at the output's path
   choose_camera,    ///< choose one of several cameras
-  extract_camera,   ///< copy one of several cameras into a file of its own first
-  times_from_zero,  ///< let times count from the start of the recording
-  nanoseconds,      ///< write times of events in nanoseconds
-  shorter_video,    ///< show a part of the recording, or show it faster
+  extract_camera,   ///< first copy one of several cameras into a separate file
+  times_from_zero,  ///< count times from the start of the recording
+  nanoseconds,      ///< write event times in nanoseconds
+  shorter_video,    ///< show a part of the recording, or play it faster
 };
 
-/// A UserError with a remedy. The message names no flag and no argument.
+/// A UserError with a remedy. The message itself names neither a flag nor an argument.
 class RemediableError : public UserError {
  public:
   RemediableError(const std::string& message, Remedy remedy) : UserError(message), remedy_(remedy) {}

@@ -5,15 +5,15 @@
 
 namespace esim {
 
-/// Instants and durations, in nanoseconds. Everything that is stored or compared uses this type;
-/// seconds as `double` appear only inside spline mathematics and at the user's side of the schema.
+/// Instants and durations, in nanoseconds. All times that are stored or compared have this type; seconds as `double`
+/// appear only in spline mathematics and in the user's options.
 using TimeNs = std::int64_t;
 
 inline constexpr TimeNs kNsPerUs = 1'000;
 inline constexpr TimeNs kNsPerMs = 1'000'000;
 inline constexpr TimeNs kNsPerSecond = 1'000'000'000;
 
-/// From start to end, both included.
+/// From start to end, inclusive.
 struct TimeSpan {
   TimeNs start = 0, end = 0;
 };

@@ -30,8 +30,8 @@ struct MagnitudeHistogram {
 ///
 /// Its benchmark publishes end-point errors of all pixels, and of those below 10, from 10 to 40 and from 40 px per
 /// frame on. The first is the mean of the others, weighted by their shares of the pixels; these follow from the results
-/// of any three methods. Those of ten methods (docs/methods/dataset.md lists them) agree to 0.002 px on 59.3 %, 28.8 % and
-/// 11.9 %. The histogram is that of a log-normal distribution, cut off at 160 px, with these shares.
+/// of any three methods. Those of ten methods (docs/methods/dataset.md lists them) agree to 0.002 px on 59.3 %, 28.8 %
+/// and 11.9 %. The histogram is that of a log-normal distribution, cut off at 160 px, with these shares.
 MagnitudeHistogram sintel_magnitudes();
 
 /// Reads lines "LOW HIGH WEIGHT", px and any unit, in order and without gaps from 0 on; # begins a comment. Throws

@@ -47,7 +47,7 @@ QuinticBezier::QuinticBezier(const SplineValue& start, const SplineValue& end, d
   c[3] = c[4] - per_acceleration * end.acceleration;
   c[2] = end.pose.translation - start.pose.translation - (c[0] + c[1] + c[3] + c[4]);
 
-  // The same in the body frame, where the last factor turns what comes before it.
+  // The same in the body frame, where the last factor rotates the earlier ones.
   auto& d = rotation_increments_;
   d[0] = per_velocity * start.angular_velocity;
   d[1] = d[0] + per_acceleration * start.angular_acceleration;

@@ -11,12 +11,12 @@ namespace esim {
 /// A quintic Bézier curve on SO(3)×R³, over [0, duration_s]: with λ_j the cumulative Bernstein polynomials of degree 5,
 ///   p(t) = p_0 + Σ_{j=1}^5 λ_j(t) c_j,   R(t) = R_0 ∏_{j=1}^5 Exp(λ_j(t) d_j)
 /// (Kim, Kim and Shin, "A General Construction Scheme for Unit Quaternion Curves with Simple High Order Derivatives",
-/// SIGGRAPH 1995). Curves that share pose, velocities and accelerations at a joint make a motion with two continuous
+/// SIGGRAPH 1995). Curves with the same pose, velocities and accelerations at a joint form a motion with two continuous
 /// derivatives.
 class QuinticBezier {
  public:
-  /// The curve with these poses, velocities and accelerations at its ends. Needs a positive duration. Where the ends'
-  /// velocities are moderate, the body turns the shorter way.
+  /// The curve with these poses, velocities and accelerations at its ends. The duration must be positive. If the
+  /// velocities at the ends are moderate, the body makes the shorter rotation.
   QuinticBezier(const SplineValue& start, const SplineValue& end, double duration_s);
 
   /// For t in [0, duration_s].

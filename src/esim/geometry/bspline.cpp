@@ -62,7 +62,7 @@ UniformBasis::UniformBasis(int order, double start_s, double knot_interval_s, in
   if (!(knot_interval_s > 0.0) || !std::isfinite(knot_interval_s)) {
     throw InternalError(fmt::format("knot interval {} s is not positive and finite", knot_interval_s));
   }
-  // A cumulative weight is the sum of the weights from its own on.
+  // A cumulative weight is the sum of its own weight and all later ones.
   for (int s = order - 1; s >= 0; --s) {
     for (int n = 0; n < order; ++n) {
       polynomials_[s][n] = blending_coefficient(order, s, n);
@@ -132,8 +132,8 @@ RotationSensitivity So3Spline::sensitivity(double t_s) const {
   result.first = lambda.first;
   result.jacobian.fill(Eigen::Matrix3d::Zero());
 
-  // From the last factor to the first, with `tail` the product of the factors after the current one. A change x of
-  // increment j turns its factor by Jr(λ_j d_j) λ_j x, and the change of the increment is
+  // From the last factor to the first, where `tail` is the product of the factors after the current one. A change x of
+  // increment j rotates its factor by Jr(λ_j d_j) λ_j x, and the change of the increment is
   // Jr⁻¹(d_j) ε_j − Jl⁻¹(d_j) ε_{j−1}.
   Eigen::Quaterniond tail = Eigen::Quaterniond::Identity();
   for (int j = basis_.order() - 1; j >= 1; --j) {

@@ -13,8 +13,8 @@ namespace esim {
 inline constexpr int kMinSplineOrder = 2;
 inline constexpr int kMaxSplineOrder = 6;
 
-/// Weights with which consecutive control points act at one instant: the entries 0 … order−1 belong to the
-/// control points first … first+order−1, the others are zero.
+/// Weights of consecutive control points at one instant: entries 0 … order−1 belong to the control points
+/// first … first+order−1; the others are zero.
 struct BasisWeights {
   using Array = std::array<double, kMaxSplineOrder>;
   int first = 0;
@@ -40,14 +40,14 @@ class UniformBasis {
   int segments() const { return control_points_ - order_ + 1; }
 
   /// Weights of the control points themselves: p(t) = Σ value[j] p[first + j]; the values sum to 1.
-  /// Throws InternalError where t lies outside [start_s, end_s] by more than 1e-9 of the duration.
+  /// Throws InternalError if t is outside [start_s, end_s] by more than 1e-9 of the duration.
   BasisWeights weights(double t_s) const { return evaluate(t_s, polynomials_); }
 
   /// Weights of the differences: p(t) = p[first] + Σ_{j≥1} value[j] (p[first + j] − p[first + j − 1]).
   BasisWeights cumulative_weights(double t_s) const { return evaluate(t_s, cumulative_polynomials_); }
 
-  /// The middle of the support of a control point, where it weighs most. The first and the last few lie outside
-  /// [start_s, end_s].
+  /// The middle of the support of a control point, where its weight is largest. For the first and last few control
+  /// points it is outside [start_s, end_s].
   double centre_s(int control_point) const;
 
  private:
@@ -76,7 +76,7 @@ struct RotationValue {
 RotationValue cumulative_rotation(const Eigen::Quaterniond& first, std::span<const Eigen::Vector3d> increments,
                                   const BasisWeights& lambda);
 
-/// How an orientation reacts to its control rotations: with R[first + j] replaced by R[first + j] Exp(ε_j),
+/// Sensitivity of an orientation to its control rotations: with R[first + j] replaced by R[first + j] Exp(ε_j),
 /// R(t) becomes R(t) Exp(Σ jacobian[j] ε_j + O(ε²)).
 struct RotationSensitivity {
   Eigen::Quaterniond rotation;
@@ -86,10 +86,10 @@ struct RotationSensitivity {
 
 /// Cumulative B-spline on SO(3), Sommer et al., section 3.3: with d_j = Log(R[i+j−1]⁻¹ R[i+j]),
 ///   R(t) = R[i] ∏_{j=1}^{order−1} Exp(λ_j(t) d_j).
-/// The increments d_j take the shorter way, |d_j| ≤ π.
+/// The increments d_j are the shorter rotations, |d_j| ≤ π.
 class So3Spline {
  public:
-  /// Throws InternalError where the number of rotations is not the basis's, or one is zero or not finite.
+  /// Throws InternalError if the number of rotations differs from that of the basis, or if one is zero or not finite.
   So3Spline(const UniformBasis& basis, std::vector<Eigen::Quaterniond> rotations);
 
   const UniformBasis& basis() const { return basis_; }
@@ -123,7 +123,7 @@ class Se3Spline {
   Se3Spline(int order, double start_s, double knot_interval_s, std::vector<Eigen::Quaterniond> rotations,
             std::vector<Eigen::Vector3d> positions);
 
-  /// Throws InternalError where t lies outside [start_s, end_s] by more than 1e-9 of the duration.
+  /// Throws InternalError if t is outside [start_s, end_s] by more than 1e-9 of the duration.
   SplineValue at(double t_s) const;
 
   const UniformBasis& basis() const { return rotation_.basis(); }

@@ -10,7 +10,7 @@
 namespace esim {
 namespace {
 
-/// One sensor's part of a file, for reading and for messages.
+/// The section of one sensor in a file.
 struct Section {
   const std::filesystem::path& file;
   std::string name;
@@ -35,14 +35,14 @@ struct Section {
     }
   }
 
-  /// A time difference that must be nothing, or absent.
+  /// Fails unless a time shift is 0 or absent.
   void require_no_shift(const char* key) const {
     if (node[key].IsDefined() && as<double>(key) != 0) {
       fail(fmt::format("{} is {} s, but all simulated sensors share one clock; set it to 0", key, as<double>(key)));
     }
   }
 
-  /// Numbers of a flat list or of a list of rows.
+  /// The numbers of a flat list or of a list of rows.
   std::vector<double> numbers(const YAML::Node& list, const char* key, std::size_t count) const {
     std::vector<double> values;
     try {
@@ -54,9 +54,9 @@ struct Section {
         }
       }
     } catch (const YAML::Exception&) {
-      fail(fmt::format("{} holds something that is not a number", key));
+      fail(fmt::format("{} contains a value that is not a number", key));
     }
-    if (values.size() != count) fail(fmt::format("{} needs {} numbers and has {}", key, count, values.size()));
+    if (values.size() != count) fail(fmt::format("{} must have {} numbers, not {}", key, count, values.size()));
     return values;
   }
 
@@ -95,8 +95,8 @@ Camera camera_of(const Section& camera, const std::string& projection, double wi
   const auto side = [&](double pixels) {
     constexpr double kMaxSide = 16384;
     if (!(pixels >= 1 && pixels <= kMaxSide) || pixels != std::floor(pixels))
-      camera.fail(
-          fmt::format("the image's size is {} x {} px; it must be whole numbers up to {}", width, height, kMaxSide));
+      camera.fail(fmt::format("the image size is {} x {} px; width and height must be positive integers up to {}",
+                              width, height, kMaxSide));
     return static_cast<int>(pixels);
   };
   if (projection != "pinhole") camera.fail(fmt::format("camera model '{}' is not supported; use pinhole", projection));
@@ -110,7 +110,7 @@ Camera camera_of(const Section& camera, const std::string& projection, double wi
   return model;
 }
 
-/// The original ESIM's layout.
+/// The layout of the original ESIM.
 std::vector<CalibratedCamera> read_rig(const YAML::Node& root, const std::filesystem::path& file) {
   std::vector<CalibratedCamera> cameras;
   for (std::size_t i = 0; i < root["cameras"].size(); ++i) {
@@ -131,7 +131,7 @@ std::vector<CalibratedCamera> read_rig(const YAML::Node& root, const std::filesy
   return cameras;
 }
 
-/// Kalibr's layout. T_cam_imu maps from the IMU to the camera; T_cn_cnm1 from the camera before.
+/// Kalibr's layout. T_cam_imu maps from the IMU to the camera, T_cn_cnm1 from the previous camera.
 std::vector<CalibratedCamera> read_camchain(const YAML::Node& root, const std::filesystem::path& file) {
   std::vector<CalibratedCamera> cameras;
   for (int i = 0; root[fmt::format("cam{}", i)].IsDefined(); ++i) {
@@ -175,11 +175,11 @@ std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file
     if (root.IsMap() && root["cameras"].IsDefined() && root["cameras"].IsSequence()) cameras = read_rig(root, file);
     if (root.IsMap() && root["cam0"].IsDefined()) cameras = read_camchain(root, file);
   } catch (const YAML::Exception& exception) {
-    throw UserError(fmt::format("calibration {}: is not laid out as expected: {}", file.string(), exception.msg));
+    throw UserError(fmt::format("calibration {}: the layout is not as expected: {}", file.string(), exception.msg));
   }
   if (cameras.empty()) {
     throw UserError(fmt::format(
-        "calibration {}: holds no cameras; expected a Kalibr camchain (cam0: ...) or a rig (cameras: - camera: ...)",
+        "calibration {}: contains no cameras; expected a Kalibr camchain (cam0: ...) or a rig (cameras: - camera: ...)",
         file.string()));
   }
   return cameras;
@@ -187,11 +187,13 @@ std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file
 
 CalibratedImu read_imu_calibration(const std::filesystem::path& file) {
   const YAML::Node root = load(file);
-  if (!root.IsMap()) throw UserError(fmt::format("calibration {}: is no imu.yaml of Kalibr's", file.string()));
+  if (!root.IsMap())
+    throw UserError(fmt::format("calibration {}: is not an imu.yaml of Kalibr; it must be a map of keys and values",
+                                file.string()));
   const bool nested = root["imu0"].IsDefined();
   const Section imu{file, "imu0", nested ? root["imu0"] : root};
   if (!imu.node.IsMap()) imu.fail("must be a map of keys and values");
-  if (root["imu1"].IsDefined()) imu.fail("there is an imu1 as well; a rig has one IMU: remove the others");
+  if (root["imu1"].IsDefined()) imu.fail("imu1 is also defined, but only one IMU is supported; remove the others");
   if (imu.node["model"].IsDefined() && imu.as<std::string>("model") != "calibrated") {
     imu.fail(fmt::format("model '{}' is not supported; use calibrated, and give scale and misalignment in the scenario",
                          imu.as<std::string>("model")));

@@ -20,10 +20,10 @@ struct CalibratedCamera {
 ///  - a Kalibr camchain (`cam0: {camera_model: pinhole, intrinsics, distortion_model, ...}`): the body is the IMU where
 ///    the file has T_cam_imu, and cam0 otherwise. All sensors share one clock: a timeshift_cam_imu must be 0;
 ///  - the original ESIM's rig file (`cameras: - camera: {...}  T_B_C: {...}`).
-/// Throws UserError naming the file, the camera and the key for anything missing, inconsistent or not supported.
+/// Throws UserError, naming the file, the camera and the key, if a value is missing, inconsistent or not supported.
 std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file);
 
-/// The noise of an inertial measurement unit. Densities are continuous-time.
+/// The noise of an inertial measurement unit. Densities are for continuous time.
 struct CalibratedImu {
   double rate_hz = 0;
   double gyroscope_noise_density = 0;      ///< rad/s/sqrt(Hz)

@@ -99,9 +99,9 @@ void Camera::validate() const {
   require_finite(std::visit([](const auto& model) { return parameters(model); }, distortion));
   if (const Fov* model = std::get_if<Fov>(&distortion); model && !(model->w > 0.0 && model->w < std::numbers::pi)) {
     throw UserError(
-        fmt::format("camera: w is {} rad; it must be between 0 and pi (no distortion instead of 0)", model->w));
+        fmt::format("camera: w is {} rad; it must be between 0 and pi (instead of 0, use no distortion)", model->w));
   }
-  // The domains surround the optical axis without holes: where the border can be inverted, the inside can too.
+  // The domains contain the optical axis and have no holes: if the border can be inverted, so can the inside.
   for (int x = 0; x < width; ++x) {
     require_visible(*this, x, 0);
     require_visible(*this, x, height - 1);

@@ -7,17 +7,17 @@
 namespace esim {
 
 /// The distortion models map the ideal image point x = (X/Z, Y/Z) to the distorted one. r = |x|, θ = atan r.
-/// Each is invertible on its domain only: outside of it nothing is projected.
+/// Each is invertible on its domain only; points outside the domain are not projected.
 
 /// The ideal pinhole.
 struct NoDistortion {};
 
 /// Brown-Conrady with five coefficients, as in OpenCV ("plumb bob") and Kalibr ("radtan"):
 ///   x (1 + k1 r² + k2 r⁴ + k3 r⁶) + (2 p1 x y + p2 (r² + 2 x²), p1 (r² + 2 y²) + 2 p2 x y).
-/// Domain: the largest disc r < r_max on which 1 + 3 k1 r² + 5 k2 r⁴ + 7 k3 r⁶ > 6.4 r sqrt(p1² + p2²). Its left side
-/// is the slope of the radial part; with barrel distortion r_max is where the image folds back onto itself. The right
-/// side keeps the tangential part from undoing it: the distortion is the gradient of a potential whose Hessian is then
-/// positive definite on a convex set, so that no two points of the domain share a pixel.
+/// Domain: the largest disc r < r_max on which 1 + 3 k1 r² + 5 k2 r⁴ + 7 k3 r⁶ > 6.4 r sqrt(p1² + p2²). The left side
+/// is the slope of the radial part; with barrel distortion, the image folds back onto itself at r_max. The right side
+/// bounds the tangential part: the distortion is the gradient of a potential whose Hessian is then positive definite on
+/// a convex set, so that no two points of the domain project to the same pixel.
 struct RadialTangential {
   double k1 = 0.0, k2 = 0.0, p1 = 0.0, p2 = 0.0, k3 = 0.0;
 };
@@ -37,15 +37,15 @@ struct Fov {
 
 using Distortion = std::variant<NoDistortion, RadialTangential, Equidistant, Fov>;
 
-/// Where a point appears, and how that changes with the point.
+/// The pixel of a point, and its derivative with respect to the point.
 struct Projection {
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, 3> jacobian;  // px/m: ∂pixel/∂point_C
 };
 
-/// The direction that a pixel looks in, and how that changes with the pixel.
+/// The viewing direction of a pixel, and its derivative with respect to the pixel.
 struct BackProjection {
-  Eigen::Vector3d bearing;               // z = 1: times the (planar) depth it is the point in the camera frame
+  Eigen::Vector3d bearing;               // z = 1; bearing times planar depth is the point in the camera frame
   Eigen::Matrix<double, 3, 2> jacobian;  // 1/px: ∂bearing/∂pixel
 };
 
@@ -58,16 +58,16 @@ struct Camera {
   Distortion distortion;
   double footprint = 1.0;  // px: side of the square that a pixel averages over
 
-  /// An ideal camera with square pixels, its optical axis through the middle of the image, that sees
+  /// An ideal camera with square pixels, the principal point in the middle of the image, and a field of view of
   /// horizontal_fov_rad between its left and right borders. Throws UserError unless 0 < horizontal_fov_rad < π and
   /// the size is positive.
   static Camera from_fov(int width, int height, double horizontal_fov_rad);
 
-  /// pixel = (fx x' + cx, fy y' + cy), where x' is the distorted image point. Nothing for points that are not in
-  /// front of the camera (Z ≤ 0) or outside the distortion's domain; the image's borders do not matter.
+  /// pixel = (fx x' + cx, fy y' + cy), where x' is the distorted image point. Empty for points that are not in front of
+  /// the camera (Z ≤ 0) or outside the distortion's domain; the pixel may be outside the image.
   std::optional<Projection> project(const Eigen::Vector3d& point_C) const;
 
-  /// The inverse of project(), to rounding. Nothing for pixels that no point in the domain projects to.
+  /// The inverse of project(), up to rounding. Empty for pixels to which no point in the domain projects.
   std::optional<BackProjection> back_project(const Eigen::Vector2d& pixel) const;
 
   /// Throws UserError for a size that is not positive, focal lengths that are not positive and finite, other

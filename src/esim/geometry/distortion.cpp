@@ -28,8 +28,8 @@ std::array<double, N> slope_of_odd(std::array<double, N> c) {
   return c;
 }
 
-/// Whether a polynomial in Bernstein form on [0, 1] is positive everywhere there: surely if all coefficients are,
-/// surely not if one at an end is not; otherwise both halves are looked at (de Casteljau's subdivision).
+/// Whether a polynomial in Bernstein form is positive on [0, 1]: it is if all coefficients are positive, and is not if
+/// one at an end is not positive; otherwise both halves are tested (de Casteljau's subdivision).
 template <std::size_t N>
 bool bernstein_positive(std::array<double, N> c, int depth) {
   bool all_positive = true;
@@ -45,7 +45,7 @@ bool bernstein_positive(std::array<double, N> c, int depth) {
   return bernstein_positive(left, depth - 1) && bernstein_positive(c, depth - 1);
 }
 
-/// Whether the polynomial is positive on all of [0, end]. A minimum that touches zero counts as not positive.
+/// Whether the polynomial is positive on [0, end]. A minimum of zero counts as not positive.
 template <std::size_t N>
 bool positive_up_to(const std::array<double, N>& c, double end) {
   // Bernstein coefficient i is Σ_{j≤i} C(i,j)/C(n,j) c_j end^j, of degree n = N − 1.
@@ -67,8 +67,8 @@ bool positive_up_to(const std::array<double, N>& c, double end) {
   return bernstein_positive(bernstein, 40);
 }
 
-/// A point moved along its direction from the centre to the radius `ratio` r, where that radius has the given
-/// slope with respect to r: the Jacobian is the slope radially and the ratio across.
+/// Moves a point along its direction from the centre to the radius `ratio` r, which has the given slope with respect to
+/// r: the Jacobian is the slope in radial direction and the ratio in tangential direction.
 Distorted radially(const Eigen::Vector2d& ideal, double r, double ratio, double slope) {
   if (r == 0.0) return {ideal * ratio, Eigen::Matrix2d::Identity() * ratio};
   const Eigen::Vector2d direction = ideal / r;
@@ -81,7 +81,7 @@ std::array<double, 4> radial_polynomial(const RadialTangential& m) { return {1.0
 /// In polar coordinates about the axis, φ from the direction (p2, p1) and q = r |(p1, p2)|, the Jacobian is
 ///   [slope + 6 q cos φ, −2 q sin φ; −2 q sin φ, ratio + 2 q cos φ],
 /// where the slope belongs to r · ratio. It is positive definite for every φ if slope > 6.4 q at all radii up to r,
-/// since then ratio > 3.2 q and the determinant is least at φ = π.
+/// since then ratio > 3.2 q and the determinant has its minimum at φ = π.
 bool radius_in_domain(const RadialTangential& model, double r) {
   const auto slope = slope_of_odd(radial_polynomial(model));
   const double tangential = 6.4 * std::hypot(model.p1, model.p2);
@@ -141,7 +141,7 @@ std::optional<Distorted> distort(const Fov& model, const Eigen::Vector2d& ideal)
 
 std::optional<Eigen::Vector2d> undistort(const NoDistortion&, const Eigen::Vector2d& distorted) { return distorted; }
 
-// Newton's method from the centre, each step halved until it stays in the domain and comes closer.
+// Newton's method from the centre; each step is halved until it stays in the domain and reduces the error.
 std::optional<Eigen::Vector2d> undistort(const RadialTangential& model, const Eigen::Vector2d& distorted) {
   const double scale = distorted.norm();
   Eigen::Vector2d ideal = Eigen::Vector2d::Zero();

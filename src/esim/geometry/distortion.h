@@ -13,13 +13,13 @@ struct Distorted {
   Eigen::Matrix2d jacobian;
 };
 
-/// The formula of each model, stated with it in camera.h. Nothing outside the model's domain.
+/// The formula of each model, as in camera.h. Empty outside the model's domain.
 std::optional<Distorted> distort(const NoDistortion&, const Eigen::Vector2d& ideal);
 std::optional<Distorted> distort(const RadialTangential& model, const Eigen::Vector2d& ideal);
 std::optional<Distorted> distort(const Equidistant& model, const Eigen::Vector2d& ideal);
 std::optional<Distorted> distort(const Fov& model, const Eigen::Vector2d& ideal);
 
-/// The ideal image point that distort() takes to `distorted`, or nothing where there is none.
+/// The ideal image point that distort() maps to `distorted`; empty if it does not exist.
 std::optional<Eigen::Vector2d> undistort(const NoDistortion&, const Eigen::Vector2d& distorted);
 std::optional<Eigen::Vector2d> undistort(const RadialTangential& model, const Eigen::Vector2d& distorted);
 std::optional<Eigen::Vector2d> undistort(const Equidistant& model, const Eigen::Vector2d& distorted);

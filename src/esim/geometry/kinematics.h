@@ -15,10 +15,10 @@ struct Kinematics {
   Eigen::Vector3d alpha_body = Eigen::Vector3d::Zero();          // angular acceleration in the body frame, rad/s²
 };
 
-/// The signals of an inertial measurement unit in its own frame: what it feels, what it measures, or its biases.
+/// Signals of an inertial measurement unit in its own frame: true values, measurements, or biases.
 struct InertialSignals {
   Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();    // rad/s
-  Eigen::Vector3d specific_force = Eigen::Vector3d::Zero();  // acceleration less gravity, m/s²
+  Eigen::Vector3d specific_force = Eigen::Vector3d::Zero();  // acceleration minus gravity, m/s²
 };
 
 /// The motion of a frame C (a camera, an IMU) rigidly attached to the body B, with p = T_B_C's translation:

@@ -35,10 +35,10 @@ SE3 SE3::from_matrix(const Eigen::Matrix4d& matrix) {
   const Eigen::Matrix3d linear = matrix.topLeftCorner<3, 3>();
   const double deviation = (linear.transpose() * linear - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (deviation > kTolerance) {
-    throw UserError(
-        fmt::format("pose matrix: the upper left 3x3 block is no rotation, R^T R differs from the identity by {:.3g} "
-                    "(tolerance {:g}); give orthonormal columns without scale or shear",
-                    deviation, kTolerance));
+    throw UserError(fmt::format(
+        "pose matrix: the upper left 3x3 block is not a rotation: R^T R differs from the identity by {:.3g} "
+        "(tolerance {:g}); give orthonormal columns without scale or shear",
+        deviation, kTolerance));
   }
   if (linear.determinant() < 0.0) {
     throw UserError("pose matrix: the upper left 3x3 block is a reflection (determinant -1); flip one axis");

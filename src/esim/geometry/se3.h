@@ -5,8 +5,8 @@
 
 namespace esim {
 
-/// Rigid motion. An SE3 named T_A_B maps points from frame B to frame A: p_A = rotation p_B + translation,
-/// so that chains cancel by eye: T_A_C = T_A_B * T_B_C.
+/// A rigid transform. An SE3 named T_A_B maps points from frame B to frame A: p_A = rotation p_B + translation,
+/// so that T_A_C = T_A_B * T_B_C.
 struct SE3 {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // unit norm
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();         // m
@@ -18,8 +18,8 @@ struct SE3 {
   /// The homogeneous 4×4 matrix [R t; 0 0 0 1].
   Eigen::Matrix4d matrix() const;
 
-  /// Reads a homogeneous matrix. The rotation may be off by rounding (RᵀR within 1e-3 of the identity) and is
-  /// replaced by the nearest one; throws UserError beyond that, for reflections and for a wrong last row.
+  /// Converts a homogeneous matrix. The rotation may have rounding errors (RᵀR within 1e-3 of the identity) and is
+  /// replaced by the nearest rotation. Throws UserError for larger errors, reflections, and a wrong last row.
   static SE3 from_matrix(const Eigen::Matrix4d& matrix);
 };
 

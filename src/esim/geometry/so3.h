@@ -9,7 +9,7 @@ namespace esim {
 Eigen::Matrix3d hat(const Eigen::Vector3d& v);
 
 /// Exp: rotation vector (axis times angle, rad) to unit quaternion, (v sin(θ/2)/θ, cos(θ/2)) with θ = |v|.
-/// Defined for every finite v, angles beyond 2π included.
+/// Defined for every finite v, including angles above 2π.
 Eigen::Quaterniond so3_exp(const Eigen::Vector3d& v);
 
 /// Log: the rotation vector of the shorter of the two rotations that ±q describe, so |Log(q)| ≤ π.

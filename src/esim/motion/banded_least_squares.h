@@ -13,8 +13,8 @@
 namespace esim {
 
 /// Least squares min_x Σ_k weight_k |residual_k + Σ_j jacobian_kj x_(first_k + j)|² over unknowns that come in blocks
-/// of `BlockSize`, where each residual sees only `reach` neighbouring blocks: the normal equations are banded. The
-/// problem may have several right sides (`Columns`), and so as many solutions.
+/// of `BlockSize`, where each residual depends on `reach` neighbouring blocks only, so that the normal equations are
+/// banded. The problem may have several right sides (`Columns`), with one solution each.
 template <int BlockSize, int Columns>
 class BandedLeastSquares {
  public:
@@ -39,7 +39,7 @@ class BandedLeastSquares {
     }
   }
 
-  /// The minimiser. Throws UserError where it is not unique to numerical precision.
+  /// The minimiser. Throws UserError if it is not unique to numerical precision.
   Solution solve() const {
     using Matrix = Eigen::SparseMatrix<double>;
     const int unknowns = blocks_ * BlockSize;
@@ -51,7 +51,7 @@ class BandedLeastSquares {
     Matrix normal(unknowns, unknowns);
     normal.setFromTriplets(entries.begin(), entries.end());
 
-    // A band keeps its width in its factor, so the unknowns stay in their natural order.
+    // The factor of a banded matrix has the same band, so the unknowns keep their natural order.
     const Eigen::SimplicialLDLT<Matrix, Eigen::Lower, Eigen::NaturalOrdering<int>> factor(normal);
     if (factor.info() != Eigen::Success || !well_determined(factor.vectorD(), normal.diagonal())) {
       throw UserError(
@@ -61,7 +61,7 @@ class BandedLeastSquares {
     return factor.solve(right_);
   }
 
-  /// By how much the minimiser x lowers the sum of squares from that at zero: |Jx|² for its Jacobian J.
+  /// The decrease of the sum of squares from zero to the minimiser x: |Jx|² for the Jacobian J.
   double predicted_decrease(const Solution& x) const { return right_.cwiseProduct(x).sum(); }
 
  private:
@@ -78,7 +78,7 @@ class BandedLeastSquares {
     }
   }
 
-  /// A pivot that elimination has reduced to rounding errors says that its unknown depends on the others.
+  /// If elimination has reduced a pivot to rounding errors, its unknown depends on the others.
   static bool well_determined(const Eigen::VectorXd& pivots, const Eigen::VectorXd& diagonal) {
     return (pivots.array() > 1e-14 * diagonal.array()).all();
   }

@@ -21,7 +21,7 @@ constexpr TimeNs kShortestSpan = kNsPerMs;
 constexpr double kDenseSmoothingPerKnot = 0.2;
 constexpr double kSparseSmoothingPerKnot = 0.05;
 
-// Poses at least this dense are averaged over knots that are further apart; sparser ones are passed through.
+// Poses with at most this interval are averaged by wider knot intervals; the spline passes through sparser poses.
 constexpr double kLongestDenseInterval_s = 0.015;
 constexpr double kDenseKnotInterval_s = 0.02;
 constexpr double kMostDenseTurn_rad = std::numbers::pi / 3.0;
@@ -33,7 +33,7 @@ struct PoseColumns {
   std::vector<double> times_s;
   std::vector<Eigen::Vector3d> positions;
   std::vector<Eigen::Quaterniond> rotations;
-  std::vector<double> turned_rad;  // sum of the angles from pose to pose up to each
+  std::vector<double> turned_rad;  // per pose: sum of the angles from pose to pose so far
 };
 
 void validate(std::span<const TimedPose> poses, const FitOptions& options) {
@@ -45,14 +45,16 @@ void validate(std::span<const TimedPose> poses, const FitOptions& options) {
   for (const auto& [name, value] : {std::pair{"knot_interval_s", options.knot_interval_s},
                                     std::pair{"smoothing_time_s", options.smoothing_time_s}}) {
     if (!(value >= 0.0) || !std::isfinite(value)) {
-      throw UserError(fmt::format("trajectory fit: {} is {}; it must be positive, or 0 to choose it", name, value));
+      throw UserError(
+          fmt::format("trajectory fit: {} is {}; it must be positive, or 0 for an automatic choice", name, value));
     }
   }
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const SE3& pose = poses[i].T_world_body;
     const double norm = pose.rotation.norm();
     if (!pose.translation.allFinite() || !(std::abs(norm - 1.0) < 1e-3)) {
-      throw UserError(fmt::format("trajectory fit: pose {} is not finite, or its quaternion has not unit norm", i));
+      throw UserError(
+          fmt::format("trajectory fit: pose {} is not finite, or its quaternion does not have unit norm", i));
     }
   }
   if (const auto fault = find_stamp_fault(poses)) {
@@ -82,7 +84,7 @@ struct Interpolated {
   double turned_rad;
 };
 
-/// Between two poses the body turns at a constant rate; before the first and after the last it rests.
+/// Between two poses the body rotates at a constant rate; before the first and after the last pose it rests.
 Interpolated interpolate(const PoseColumns& poses, double t_s) {
   const double t = std::clamp(t_s, poses.times_s.front(), poses.times_s.back());
   const auto after = std::upper_bound(poses.times_s.begin() + 1, poses.times_s.end() - 1, t);
@@ -97,8 +99,8 @@ UniformBasis basis_of(const PoseColumns& poses, int order, int segments) {
   return UniformBasis(order, 0.0, poses.times_s.back() / segments, segments + order - 1);
 }
 
-/// The most that the body turns from the centre of one control point to that of the next, on its way through the
-/// poses, and when.
+/// The largest rotation of the body from the centre of one control point to that of the next, along the poses, and its
+/// time.
 struct FastestTurn {
   double angle_rad = 0.0;
   double t_s = 0.0;
@@ -145,8 +147,8 @@ UniformBasis chosen_basis(const PoseColumns& poses, int order, double median_int
     const UniformBasis basis = basis_of(poses, order, static_cast<int>(whole_segments(poses, interval_s)));
     if (fastest_turn(poses, basis).angle_rad <= kMostDenseTurn_rad) return basis;
   }
-  // Knots at twice the rate of the poses: at the same rate, splines of odd order would hardly see an oscillation from
-  // knot to knot.
+  // Knots at twice the rate of the poses: at the same rate, poses hardly constrain an oscillation of a spline of odd
+  // order from knot to knot.
   FastestTurn turn;
   for (double segments = whole_segments(poses, 0.5 * median_interval_s); segments <= most_segments(poses);
        segments *= 2.0) {
@@ -189,7 +191,7 @@ FittedTrajectory fit_trajectory(std::span<const TimedPose> poses, const FitOptio
   const double chosen_smoothing_time_s =
       knot_interval_s * (knot_interval_s > median_interval_s ? kDenseSmoothingPerKnot : kSparseSmoothingPerKnot);
   const double smoothing_time_s = options.smoothing_time_s > 0.0 ? options.smoothing_time_s : chosen_smoothing_time_s;
-  SmoothnessPenalty penalty;  // of an order that leaves no more polynomials unpenalised than the poses determine
+  SmoothnessPenalty penalty;  // its order leaves only polynomials unpenalised that the poses determine
   penalty.difference_order = poses.size() < 3 ? 2 : 3;
   penalty.weight =
       std::pow(smoothing_time_s / knot_interval_s, 2 * penalty.difference_order) * knot_interval_s / median_interval_s;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kMaxDifferenceOrder = 3;
 
-/// Coefficients of the backward difference of order 1, 2 or 3, from the oldest value on: (−1)^(order−j) C(order, j).
+/// Coefficients of the backward difference of order 1, 2 or 3, oldest value first: (−1)^(order−j) C(order, j).
 std::span<const double> difference_coefficients(int order) {
   static constexpr std::array<double, 2> kFirst{-1.0, 1.0};
   static constexpr std::array<double, 3> kSecond{1.0, -2.0, 1.0};
@@ -98,7 +98,7 @@ std::vector<Eigen::Vector3d> fit_control_positions(const UniformBasis& basis, st
                                                    const SmoothnessPenalty& penalty) {
   using LeastSquares = BandedLeastSquares<1, 3>;
   LeastSquares problem(basis.control_points(), reach(basis, penalty));
-  // Relative to the first position, so that coordinates far from the origin lose no digits.
+  // Relative to the first position, to keep precision for coordinates far from the origin.
   const Eigen::Vector3d origin = positions.front();
   for (std::size_t i = 0; i < times_s.size(); ++i) {
     const BasisWeights weights = basis.weights(times_s[i]);
@@ -124,7 +124,7 @@ std::vector<Eigen::Quaterniond> fit_control_rotations(const UniformBasis& basis,
                                                       const SmoothnessPenalty& penalty,
                                                       std::vector<Eigen::Quaterniond> initial) {
   constexpr int kMaxSteps = 100;
-  constexpr double kTolerance_rad = 1e-13;  // rms change of the residuals by a step; rounding makes some 1e-15
+  constexpr double kTolerance_rad = 1e-13;  // RMS change of the residuals by a step; rounding causes about 1e-15
 
   const RotationProblem problem(times_s, rotations, penalty);
   So3Spline spline(basis, std::move(initial));
@@ -138,8 +138,8 @@ std::vector<Eigen::Quaterniond> fit_control_rotations(const UniformBasis& basis,
     }
   }
   throw UserError(
-      "trajectory fit: the rotations have no smooth fit; check the poses for jumps and noise, or choose a shorter knot "
-      "interval or a longer smoothing time");
+      "trajectory fit: no smooth curve fits the rotations; check the poses for jumps and noise, or choose a shorter "
+      "knot interval or a longer smoothing time");
 }
 
 }  // namespace esim

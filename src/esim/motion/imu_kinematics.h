@@ -6,9 +6,9 @@
 
 namespace esim {
 
-/// What a perfect inertial measurement unit feels whose frame I is rigidly attached to the body B at T_B_I = (R_BI, p):
+/// The signals of an ideal inertial measurement unit, with frame I rigidly attached to the body B at T_B_I = (R_BI, p):
 ///   ω_I = R_BIᵀ ω,   f_I = R_WIᵀ (a_B + R_WB (α × p + ω × (ω × p)) − g),
-/// with g = `gravity_world` the acceleration of free fall in the world frame, m/s². At rest f is −g, upwards.
+/// where g = `gravity_world` is the acceleration of free fall in the world frame, m/s². At rest f is −g, upwards.
 InertialSignals inertial_signals(const Kinematics& body, const SE3& T_body_imu, const Eigen::Vector3d& gravity_world);
 
 }  // namespace esim

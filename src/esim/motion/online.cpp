@@ -23,7 +23,7 @@ OnlineMotionOptions checked(const OnlineMotionOptions& options) {
 
 const SE3& checked(const SE3& pose) {
   if (!pose.translation.allFinite() || !(std::abs(pose.rotation.norm() - 1) < 1e-6))
-    throw UserError("online motion: a pose is not finite, or its quaternion has not unit norm");
+    throw UserError("online motion: a pose is not finite, or its quaternion does not have unit norm");
   return pose;
 }
 
@@ -36,7 +36,7 @@ void OnlineTrajectory::push(const SE3& T_world_body) {
   constexpr double kLargestTurn_rad = 0.999 * std::numbers::pi;
   const SE3& last = controls_.back();
   if (so3_log((last.rotation.conjugate() * checked(T_world_body).rotation).normalized()).norm() > kLargestTurn_rad)
-    throw UserError("online motion: the body turns by 180 deg from one pushed pose to the next; push more often");
+    throw UserError("online motion: the body turns by 180 deg from one pushed pose to the next; push poses more often");
   velocity_ = (T_world_body.translation - last.translation) / to_seconds(options_.interval);
   controls_.push_back(T_world_body);
 }
@@ -57,7 +57,7 @@ TimeNs OnlineTrajectory::newest() const {
 
 Kinematics OnlineTrajectory::at(TimeNs t) const {
   require_covered(t);
-  // The segment (k, k + 1] · interval: the end of what is known belongs to the same one after later pushes, too.
+  // The segment (k, k + 1] · interval: the end of the known motion stays in the same segment after later pushes.
   const TimeNs since_start = t - options_.start;
   const TimeNs segment = since_start == 0 ? 0 : (since_start - 1) / options_.interval;
   std::vector<Eigen::Quaterniond> rotations;

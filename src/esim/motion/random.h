@@ -16,16 +16,16 @@ struct RandomMotionOptions {
   int order = 5;                                                     // of the spline, 2 … 6
 };
 
-/// A smooth random motion: a uniform B-spline whose control points are drawn independently, control point j being
+/// A smooth random motion: a uniform B-spline with independent random control points; control point j is
 ///   center · (Exp(a_x e_x) Exp(a_y e_y) Exp(a_z e_z), p),   a and p uniform in ± amplitude per axis,
 /// with AddressedRandom(seed, trajectory_position or trajectory_rotation), item = axis, draw = j, and `stream` for the
-/// thing that moves. So a longer duration only appends, and the amplitude of one axis does not change the others. The
-/// position stays within the amplitudes. Between successive control rotations the body turns the shorter way: with
-/// amplitudes beyond 90°, whole turns happen, but never more than 180° in one knot interval.
+/// moving body. A longer duration therefore only appends control points, and the amplitude of one axis does not affect
+/// the others. The position stays within the amplitudes. Between successive control rotations the body makes the
+/// shorter rotation: with amplitudes above 90° full turns can occur, but never more than 180° in one knot interval.
 ///
 /// Throws UserError, naming the field, for amplitudes that are negative or not finite, an order outside 2 … 6, a knot
 /// interval or a duration that is not positive, more than ten million control points, and a center whose rotation
-/// has not unit norm.
+/// does not have unit norm.
 SplineTrajectory random_trajectory(const RandomMotionOptions& options, TimeNs start, TimeNs duration,
                                    std::uint64_t seed, std::uint16_t stream = 0);
 

@@ -6,10 +6,10 @@
 
 namespace esim {
 
-/// A motion that stops at its end, and rests there until `end`.
+/// A motion that rests at its last pose until `end`.
 class RestingTrajectory final : public Trajectory {
  public:
-  /// Throws InternalError where `end` comes before the motion's.
+  /// Throws InternalError if `end` is before the end of the motion.
   RestingTrajectory(std::shared_ptr<const Trajectory> motion, TimeNs end);
 
   Kinematics at(TimeNs t) const override;

@@ -11,7 +11,7 @@ namespace esim {
 
 SplineTrajectory::SplineTrajectory(Se3Spline spline, TimeNs start, TimeNs end)
     : spline_(std::move(spline)), start_(start), end_(end) {
-  // Half a nanosecond and the rounding of seconds are no lack of spline.
+  // The spline may be shorter by half a nanosecond and the rounding of seconds.
   const double spline_duration_s = spline_.end_s() - spline_.start_s();
   const double slack_s = 0.5e-9 + 1e-12 * spline_duration_s;
   if (end < start || to_seconds(end - start) > spline_duration_s + slack_s) {

@@ -8,8 +8,8 @@ namespace esim {
 /// The motion along a B-spline.
 class SplineTrajectory final : public Trajectory {
  public:
-  /// The beginning of the spline is at the instant `start`; what the spline holds after `end` is not used.
-  /// Throws InternalError where end < start or the spline ends before `end`.
+  /// The spline begins at the instant `start`; its part after `end` is not used. Throws InternalError if end < start or
+  /// the spline ends before `end`.
   SplineTrajectory(Se3Spline spline, TimeNs start, TimeNs end);
 
   Kinematics at(TimeNs t) const override;

@@ -5,8 +5,8 @@
 
 namespace esim {
 
-/// A motion over the closed interval [start, end]. What at() has said never changes, and it may be called from
-/// several threads.
+/// A motion over the closed interval [start, end]. The result of at() for a time never changes; several threads may
+/// call it.
 class Trajectory {
  public:
   virtual ~Trajectory() = default;

@@ -31,7 +31,7 @@ struct Format {
   bool commas;
   int stamp_decimals;  // one unit of the stamps is 10^stamp_decimals ns
 };
-constexpr Format kTum{"TUM", "t x y z qx qy qz qw, t in seconds, separated by blanks", false, 9};
+constexpr Format kTum{"TUM", "t x y z qx qy qz qw, t in seconds, separated by spaces", false, 9};
 constexpr Format kEsimCsv{"ESIM CSV", "t, x, y, z, qx, qy, qz, qw, t in nanoseconds, separated by commas", true, 0};
 
 std::string_view trim(std::string_view text) {
@@ -57,7 +57,7 @@ std::vector<std::string_view> split(std::string_view line, const Format& format)
   return fields;
 }
 
-/// A whole field as a number; `from_chars` knows no leading plus.
+/// A complete field as a number; `from_chars` does not accept a leading plus.
 template <typename T>
 std::optional<T> parse_number(std::string_view text) {
   if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
@@ -67,8 +67,8 @@ std::optional<T> parse_number(std::string_view text) {
   return value;
 }
 
-/// The integer nearest to text · 10^decimals (halves away from zero), exactly. Nothing for text that is no decimal
-/// number, and for values beyond ±146 years of nanoseconds, so that differences do not overflow.
+/// The integer nearest to text · 10^decimals (halves away from zero), exactly. Empty for text that is not a decimal
+/// number, and for values beyond ±146 years in nanoseconds, so that differences do not overflow.
 std::optional<TimeNs> parse_stamp(std::string_view text, int decimals) {
   const bool negative = text.starts_with('-');
   if (negative || text.starts_with('+')) text.remove_prefix(1);

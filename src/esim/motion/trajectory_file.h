@@ -7,7 +7,7 @@
 
 namespace esim {
 
-/// Reads a list of poses T_world_body, in one of two formats that are told apart by their commas:
+/// Reads a list of poses T_world_body, in one of two formats, which are distinguished by their commas:
 ///
 ///   TUM        t x y z qx qy qz qw           seconds and metres, separated by white space
 ///   ESIM CSV   t, x, y, z, qx, qy, qz, qw    nanoseconds and metres, separated by commas
@@ -16,7 +16,7 @@ namespace esim {
 /// decimal numbers, never through `double`, and rounded to the nanosecond. They may be non-uniform within the limit
 /// of find_stamp_fault(). Quaternions are normalised, and their signs chosen so that neighbours are close.
 ///
-/// Throws UserError, with file, line and remedy, for a file that cannot be read, lines of another form, numbers that
+/// Throws UserError, with file, line and remedy, for a file that cannot be read, malformed lines, numbers that
 /// are not finite, zero quaternions, faulty stamps (find_stamp_fault), and fewer than two poses.
 std::vector<TimedPose> read_trajectory(const std::filesystem::path& path);
 

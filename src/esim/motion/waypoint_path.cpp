@@ -16,7 +16,7 @@ using Rate = Eigen::Matrix<double, 6, 1>;  // velocity and angular velocity in t
 
 constexpr double kLargestRateInMeans = 2.0;
 
-/// Of positions and of rotations.
+/// The mean rates of position and rotation on a leg.
 Rate mean_rate(const WaypointCourse& course, std::size_t leg) {
   Rate rate;
   rate.head<3>() = course.displacement(leg) / course.leg_s[leg];
@@ -24,7 +24,7 @@ Rate mean_rate(const WaypointCourse& course, std::size_t leg) {
   return rate;
 }
 
-/// The legs that one goes on from and to smoothly, if any.
+/// The previous and the next leg, if the path is smooth at the joint.
 std::optional<std::size_t> joined_before(const WaypointCourse& course, std::size_t leg) {
   if (course.stops[leg] || (leg == 0 && !course.periodic)) return std::nullopt;
   return leg == 0 ? course.legs() - 1 : leg - 1;
@@ -39,7 +39,7 @@ struct LegEnds {
   Rate rate[2], acceleration[2];
 };
 
-/// Rate and acceleration at the end of a leg that is not joined there, by those of its other end.
+/// Rate and acceleration at an end of a leg without a joint there, from those at its other end.
 void free_end(const Rate& mean, LegEnds& leg, int end, int part) {
   leg.rate[end].segment<3>(part) = 1.5 * mean.segment<3>(part) - 0.5 * leg.rate[1 - end].segment<3>(part);
   leg.acceleration[end].segment<3>(part).setZero();
@@ -93,8 +93,8 @@ std::vector<LegEnds> spline_ends(const WaypointCourse& course) {
     ends[i].acceleration[1] = (-6.0 * mean[i] + 2.0 * v + 4.0 * w) / h;
   }
 
-  // Where two legs are joined: no more than the slower one stands, of positions and of rotations. Both get the very
-  // same values. What a leg has that is joined at one end only follows from there.
+  // At a joint of two legs, the rates of positions and of rotations are limited by the slower leg. Both legs get the
+  // same values. If a leg is joined at one end only, the values at its other end follow from these.
   for (std::size_t i = 0; i < ends.size(); ++i) {
     const auto before = joined_before(course, i);
     if (!before) continue;

@@ -8,11 +8,11 @@
 
 namespace esim {
 
-/// Poses that a path joins, and how: leg i leads from node i to node i + 1.
+/// The poses of a path and the legs between them: leg i leads from node i to node i + 1.
 struct WaypointCourse {
   std::vector<SE3> nodes;
   std::vector<bool> stops;    ///< per node: the path may have a corner there
-  bool periodic = false;      ///< it goes on smoothly from the last node to the first, which is the same pose
+  bool periodic = false;      ///< smooth from the last node to the first, which is the same pose
   std::vector<double> leg_s;  ///< how long each leg takes
 
   std::size_t legs() const { return nodes.size() - 1; }
@@ -20,10 +20,10 @@ struct WaypointCourse {
   Eigen::Vector3d turn(std::size_t leg) const;  ///< rotation vector in the world frame, at most a half turn
 };
 
-/// A curve for each leg. Between stops, velocities and accelerations are continuous: those of the C² cubic spline, of
-/// positions and, by the same equations for world-frame rates, of rotations. Where a leg is so much slower than its
-/// neighbour that the rate at their joint is above twice its mean, the rate is lowered to that and its derivative set
-/// to zero: the spline would lead past the point and back.
+/// A curve for each leg. Between stops, velocities and accelerations are continuous: those of the C² cubic spline of
+/// positions and, by the same equations for world-frame rates, of rotations. If a leg is so much slower than its
+/// neighbour that the rate at their joint exceeds twice its mean, the rate is reduced to that and its derivative set
+/// to zero; otherwise the spline would overshoot the point and return.
 std::vector<QuinticBezier> smooth_path(const WaypointCourse& course);
 
 }  // namespace esim

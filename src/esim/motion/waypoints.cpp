@@ -29,7 +29,7 @@ void validate(const WaypointOptions& options) {
       throw UserError(fmt::format("{} is {}; it must be positive and finite", name, value));
   };
   require_positive("speed", options.speed_m_per_s);
-  require_positive("the rate of turning", options.turn_rad_per_s);
+  require_positive("the turn rate", options.turn_rad_per_s);
   require_positive("ramp_s", options.ramp_s);
 }
 
@@ -40,12 +40,14 @@ void validate(std::span<const Waypoint> points, const WaypointOptions& options) 
   }
   const bool timed = points[0].t_s.has_value();
   if (timed && options.closed)
-    throw UserError("closed: the way back has no time; use speeds, or repeat the first point with a time at the end");
+    throw UserError(
+        "closed: the segment back to the first point has no time; use speeds, or repeat the first point with a time at "
+        "the end");
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Waypoint& point = points[i];
     const SE3& pose = point.T_world_body;
     if (!pose.translation.allFinite() || !(std::abs(pose.rotation.norm() - 1.0) < 1e-3))
-      fail(i, "is not finite, or its quaternion has not unit norm; correct it");
+      fail(i, "is not finite, or its quaternion does not have unit norm; correct it");
     if (!(point.pause_s >= 0.0 && point.pause_s <= kMostTime_s))
       fail(i, fmt::format("pause_s: {} is out of range; it must be 0 to {:g} s", point.pause_s, kMostTime_s));
     if (point.t_s.has_value() != timed) {
@@ -53,7 +55,7 @@ void validate(std::span<const Waypoint> points, const WaypointOptions& options) 
                     : "has t, but points.0 has none; give a time to every point or to none");
     }
     if (timed && point.speed_m_per_s)
-      fail(i, "has both t and speed; the times say how fast the motion is: remove one of the two");
+      fail(i, "has both t and speed, but times already define the speed; remove one of the two");
     if (point.speed_m_per_s && (!(*point.speed_m_per_s > 0.0) || !std::isfinite(*point.speed_m_per_s)))
       fail(i, fmt::format("speed: {} must be positive and finite", *point.speed_m_per_s));
     if (timed && !(std::abs(*point.t_s) <= kMostTime_s))
@@ -61,13 +63,12 @@ void validate(std::span<const Waypoint> points, const WaypointOptions& options) 
     if (!timed || i == 0) continue;
     const double before = *points[i - 1].t_s;
     if (to_ns(*point.t_s) == to_ns(before))
-      fail(i,
-           fmt::format("t: {} s is the time of the point before as well; give each point a time of its own", before));
+      fail(i, fmt::format("t: {} s is also the time of the previous point; give each point a different time", before));
     if (*point.t_s < before)
-      fail(i, fmt::format("t: {} s comes before the {} s of the point before; sort the points by time", *point.t_s,
+      fail(i, fmt::format("t: {} s is before the {} s of the previous point; sort the points by time", *point.t_s,
                           before));
     if (to_ns(before + points[i - 1].pause_s) >= to_ns(*point.t_s)) {
-      fail(i - 1, fmt::format("pause_s: {} s last until after the next point's time; make the pause shorter than {} s",
+      fail(i - 1, fmt::format("pause_s: a pause of {} s ends after the next point's time; make it shorter than {} s",
                               points[i - 1].pause_s, *point.t_s - before));
     }
   }
@@ -110,8 +111,7 @@ Extent extent_of(const QuinticBezier& curve) {
   return extent;
 }
 
-/// How long each leg takes without standing still at its ends: first along its chord, then along the curve that this
-/// makes.
+/// Sets the duration of each leg without its ramps: first along its chord, then along the resulting curve.
 void set_leg_times_by_speed(std::span<const Waypoint> points, const WaypointOptions& options, WaypointCourse& course) {
   constexpr int kRounds = 6;
   const auto time_of = [&](std::size_t leg, const Extent& extent) {
@@ -123,15 +123,15 @@ void set_leg_times_by_speed(std::span<const Waypoint> points, const WaypointOpti
     const Extent chord{course.displacement(i).norm(), course.turn(i).norm()};
     if (chord.length_m < kSamePlace_m && chord.angle_rad < kSameRotation_rad) {
       if (i + 1 == points.size())
-        throw UserError("closed: the last point is the first one again; remove the last point");
-      fail(i + 1, "is the pose of the point before; remove it, or wait there with pause_s");
+        throw UserError("closed: the last point repeats the first one; remove the last point");
+      fail(i + 1, "has the same pose as the previous point; remove it, or wait there with pause_s");
     }
     course.leg_s.push_back(time_of(i, chord));
     if (course.leg_s.back() < kShortestLeg_s)
-      fail(i + 1, "follows within less than a microsecond; remove it, or lower the speed");
+      fail(i + 1, "is less than a microsecond after the previous point; remove it, or reduce the speed");
     whole_s += course.leg_s.back() + points[i].pause_s;
     if (!(whole_s <= kMostTime_s))
-      fail(i, fmt::format("is left so slowly that the motion takes more than {:g} s; raise speed", kMostTime_s));
+      fail(i, fmt::format("has so low a speed that the motion takes more than {:g} s; increase speed", kMostTime_s));
   }
   for (int round = 0; round < kRounds; ++round) {
     const std::vector<QuinticBezier> path = smooth_path(course);
@@ -150,7 +150,7 @@ Clock ramp(double t_s, double ramp_s) {
   return {ramp_s * x * x * x * (1.0 - 0.5 * x), x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / ramp_s};
 }
 
-/// On a leg that lasts `leg_s`, its ramps included.
+/// The clock on a leg that takes `leg_s`, including its ramps.
 Clock clock(double t_s, double leg_s, double ramp_in_s, double ramp_out_s) {
   if (t_s < ramp_in_s) return ramp(t_s, ramp_in_s);
   if (const double left_s = leg_s - t_s; left_s < ramp_out_s) {
@@ -191,7 +191,7 @@ WaypointTrajectory::WaypointTrajectory(std::span<const Waypoint> points, const W
     schedule.push_back(leg);
     arrived = leg.arrive;
   }
-  // A closed motion has stood at its first point already.
+  // A closed motion has already paused at its first point.
   end_ = arrived + (options.closed ? 0 : to_ns(points.back().pause_s));
 
   const std::vector<QuinticBezier> path = smooth_path(course);
@@ -202,7 +202,7 @@ WaypointTrajectory::WaypointTrajectory(std::span<const Waypoint> points, const W
 
 Kinematics WaypointTrajectory::at(TimeNs t) const {
   require_covered(t);
-  // The first leg that has not ended: before it begins, the body stands at its start.
+  // The first leg that has not ended; before it begins, the body rests at its start.
   auto leg = std::lower_bound(legs_.begin(), legs_.end(), t, [](const Leg& l, TimeNs time) { return l.arrive < time; });
   if (leg == legs_.end()) leg = legs_.end() - 1;  // a pause at the last point
   const double leg_s = to_seconds(leg->arrive - leg->leave);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kBandRows = 8;
 
-// Of a parallel loop: bands of small tiles are too little work to hand over one by one.
+// Size of a piece of a parallel loop: a single band of a small tile is too little work for a task.
 constexpr std::size_t kPixelsPerPiece = 1024;
 
 struct Band {
@@ -18,7 +18,7 @@ struct Band {
   Tile tile;
 };
 
-/// Bands end at multiples of kBandRows, wherever the tile begins: renderers may work in small blocks.
+/// Bands end at multiples of kBandRows, wherever the tile begins, so that renderers can work in small blocks.
 std::vector<Band> cut_into_bands(std::span<const RenderRequest> requests) {
   std::vector<Band> bands;
   for (std::size_t which = 0; which < requests.size(); ++which) {

@@ -9,16 +9,16 @@
 
 namespace esim {
 
-/// What every renderer begins with: makes room in `sample`, and says in it what it answers.
+/// First step of every renderer: resizes `sample` and stores the request's time and tiles in it.
 void prepare(std::span<const RenderRequest> requests, int width, int height, Sample& sample);
 
-/// What renderers on the CPU share: prepares `sample`, cuts the requests' tiles into bands of a few rows, calls `shade`
-/// for each of them in parallel to fill E, Z and, where the requests name objects, which of them is seen, and derives V
-/// from that and the twists. A band is of the request with the index `which`.
+/// Shared by renderers on the CPU: prepares `sample`, cuts the requests' tiles into bands of a few rows, and calls
+/// `shade` for each band in parallel. `shade` fills E, Z and, if the requests name objects, the visible object; V is
+/// derived from these and the twists. `which` is the index of the band's request.
 void render_in_bands(std::span<const RenderRequest> requests, const PixelRays& rays, const Workers& workers,
                      Sample& sample, const std::function<void(std::size_t which, const Tile& band)>& shade);
 
-/// The same for a `shade` that fills V as well.
+/// As above, for a `shade` that also fills V.
 void render_in_bands(std::span<const RenderRequest> requests, int width, int height, const Workers& workers,
                      Sample& sample, const std::function<void(std::size_t which, const Tile& band)>& shade);
 

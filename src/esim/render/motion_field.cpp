@@ -10,7 +10,7 @@ Twist relative_to_world(const Kinematics& camera) {
           camera.omega_body.cast<float>()};
 }
 
-/// The object moves the point at X of the camera frame by v_O + omega_O x (X - p), p being the object's origin there.
+/// In the camera frame, the object's point at X moves at v_O + omega_O x (X - p), where p is the object's origin.
 Twist relative_to_object(const Kinematics& camera, const Kinematics& object) {
   const Eigen::Quaterniond R_camera_world = camera.T_world_body.rotation.conjugate();
   const Eigen::Vector3d omega_camera = R_camera_world * (object.T_world_body.rotation * object.omega_body);
@@ -19,7 +19,7 @@ Twist relative_to_object(const Kinematics& camera, const Kinematics& object) {
   return {v.cast<float>(), (camera.omega_body - omega_camera).cast<float>()};
 }
 
-/// Fills V of a row from column `begin` to `end`; `twist_at(column)` is the motion relative to what is seen there.
+/// Fills V of a row from column `begin` to `end`; `twist_at(column)` is the motion relative to what that pixel sees.
 template <typename TwistAt>
 inline void fill_row(const PixelRays& rays, int row, int begin, int end, Sample& sample, const TwistAt& twist_at) {
   const float *const x = rays.x.row(row), *const y = rays.y.row(row);
@@ -32,7 +32,7 @@ inline void fill_row(const PixelRays& rays, int row, int begin, int end, Sample&
   for (int i = begin; i < end; ++i) {
     const auto& [v, omega] = twist_at(i);
 
-    // Velocity of the point over its depth: -v/Z - omega x b.
+    // Velocity of the point divided by its depth: -v/Z - omega x b.
     const float inverse_depth = 1.0F / depth[i];
     const float wx = -v.x() * inverse_depth - (omega.y() - omega.z() * y[i]);
     const float wy = -v.y() * inverse_depth - (omega.z() * x[i] - omega.x());

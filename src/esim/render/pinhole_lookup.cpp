@@ -22,7 +22,7 @@ using IntVector = hn::Vec<Ints>;
 
 constexpr std::size_t kMostLanes = hn::MaxLanes(Floats());
 
-/// Of an image: where the pixel left of and above a place is, within it and `margin` pixels from its far ends.
+/// The pixel to the left of and above an image position, clamped to at least `margin` pixels from the far borders.
 struct Place {
   IntVector x, y, index;
 
@@ -38,7 +38,7 @@ struct Place {
   }
 };
 
-/// Between the four pixels around a place.
+/// Bilinear interpolation between the four pixels around a position.
 Vector interpolate(const Image<float>& image, Vector x, Vector y) {
   const Place place(image, hn::ConvertTo(Ints(), x), hn::ConvertTo(Ints(), y), 0, 2);
   const Vector fx = hn::Sub(x, hn::ConvertTo(Floats(), place.x)), fy = hn::Sub(y, hn::ConvertTo(Floats(), place.y));
@@ -52,17 +52,17 @@ Vector interpolate(const Image<float>& image, Vector x, Vector y) {
 
 Vector inverse(Vector v) { return hn::Div(hn::Set(Floats(), 1.0F), v); }
 
-/// Of nearness, along a direction; of the two sides the one that is more likely on the same surface.
+/// Slope of 1 / Z along a direction, from the neighbour that more likely lies on the same surface.
 Vector slope(const Image<float>& depth, const Place& place, Vector here, int dx, int dy) {
   const Vector before = hn::Sub(here, inverse(place.value(depth, -dx, -dy)));
   const Vector after = hn::Sub(inverse(place.value(depth, dx, dy)), here);
   return hn::IfThenElse(hn::Lt(hn::Abs(before), hn::Abs(after)), before, after);
 }
 
-constexpr float kHalf = 0.5F;  // added, lets cutting off round
+constexpr float kHalf = 0.5F;  // added before truncation, so that it rounds
 
-// Of as many pixels as a vector has. Not inlined: all pixels go through the same instructions, whether they stand at
-// the end of a row or not, so that tiles equal whole images.
+// For as many pixels as a vector has lanes. Not inlined, so that all pixels go through the same instructions, also at
+// the end of a row, and tiles are identical to full images.
 
 /// E.
 HWY_NOINLINE void light_of_vector(const Image<float>& image, const float* centres, const float* footprints,
@@ -97,8 +97,8 @@ HWY_NOINLINE void depth_of_vector(const Image<float>& image, const float* centre
   hn::StoreU(hn::IfThenElse(hn::Gt(nearest, hn::Zero(d)), inverse(nearest), nothing), d, depth);
 }
 
-/// Calls look_up(centres, footprints, out) for the vectors of pixels of a tile. Where fewer pixels are left in a row,
-/// what they need is copied, and back.
+/// Calls look_up(centres, footprints, out) for each vector of pixels of a tile. The last pixels of a row are copied to
+/// and from full vectors.
 template <typename LookUp>
 void for_each_vector(const PinholeView& view, const Tile& tile, Image<float>& out, const LookUp& look_up) {
   const std::size_t lanes = hn::Lanes(Floats()), width = static_cast<std::size_t>(tile.width);

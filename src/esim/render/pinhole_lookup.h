@@ -8,21 +8,21 @@
 
 namespace esim {
 
-/// What a pinhole camera sees, from a renderer that knows no other.
+/// What a pinhole camera sees, from a renderer that supports no other camera.
 struct PinholeImage {
   Image<float> irradiance;      ///< E, linear
-  Image<float> depth;           ///< Z, planar, m; +inf: nothing
-  Image<std::uint16_t> object;  ///< as in Sample; without size where nobody asked
+  Image<float> depth;           ///< Z, planar, m; +inf where no surface is seen
+  Image<std::uint16_t> object;  ///< as in Sample; empty if not requested
 };
 
-// For a tile of the camera's pixels, from the image that `view` describes. Where that is not the camera's own, it is
-// looked up in.
+// These fill a tile of the camera's pixels from the image that `view` describes. If that is not the camera's own image,
+// they look up each pixel in it.
 
-/// Fills E: the mean of four places in the pixel's footprint, each between four pixels: blurred by less than a pixel.
+/// Fills E: the mean of four bilinear samples in the pixel's footprint, which blurs by less than a pixel.
 void look_up_light(const PinholeView& view, const PinholeImage& image, const Tile& tile, Sample& sample);
 
-/// Fills Z and, where the sample has room for it, the object. Z follows from the plane that the nearest pixel sees, on
-/// which 1 / Z is linear: exact away from edges. The object is that of the nearest pixel.
+/// Fills Z and, if the sample has space for it, the object. Z follows from the plane that the nearest pixel sees, on
+/// which 1 / Z is linear; it is exact away from edges. The object is that of the nearest pixel.
 void look_up_geometry(const PinholeView& view, const PinholeImage& image, const Tile& tile, Sample& sample);
 
 }  // namespace esim

@@ -10,16 +10,16 @@
 namespace esim {
 namespace {
 
-constexpr int kMargin = 2;  // pixels around what is looked up
+constexpr int kMargin = 2;  // pixels around the positions that are looked up
 
-/// How much a pixel's footprint stretches the least, of the bearing: its smaller singular value.
+/// The smaller singular value of a pixel's footprint.
 double smaller_stretch(double a, double b, double c, double d) {
   const double sum = a * a + b * b + c * c + d * d, determinant = a * d - b * c;
   const double root = std::sqrt(std::max(0.0, sum * sum - 4 * determinant * determinant));
   return std::sqrt(std::max(0.0, 0.5 * (sum - root)));
 }
 
-/// Whether such a renderer draws the camera's own image.
+/// Whether a renderer with this limitation can draw the camera's own image.
 bool is_drawn(const Camera& camera, Pinhole which) {
   if (!std::holds_alternative<NoDistortion>(camera.distortion)) return false;
   constexpr double kNothing_px = 1e-6;
@@ -61,7 +61,7 @@ PinholeView pinhole_view(const Camera& camera, const PixelRays& rays, Pinhole wh
   const double width = focal * (right - left) + 2 * kMargin + 1, height = focal * (bottom - top) + 2 * kMargin + 1;
   constexpr double kLargest = 32768;
   if (!(width < kLargest && height < kLargest)) {
-    throw UserError("the camera sees too wide for a pinhole image (" + std::to_string(std::lround(width)) + " x " +
+    throw UserError("the field of view is too wide for a pinhole image (" + std::to_string(std::lround(width)) + " x " +
                     std::to_string(std::lround(height)) + " pixels would be needed)");
   }
   view.width = static_cast<int>(std::ceil(width)), view.height = static_cast<int>(std::ceil(height));

@@ -9,7 +9,8 @@
 
 namespace esim {
 
-/// A value per pixel. Where all rows are the same, as without distortion, one is kept: rendering waits for memory.
+/// A value per pixel. If all rows are equal, as without distortion, only one is stored, since rendering is limited by
+/// memory bandwidth.
 class PixelTable {
  public:
   PixelTable() = default;
@@ -26,21 +27,21 @@ class PixelTable {
   Image<float> values_;
 };
 
-/// A camera's geometry, tabulated once per pixel, lens distortion included.
+/// A camera's geometry, including lens distortion, as tables with a value per pixel.
 struct PixelRays {
   explicit PixelRays(const Camera& camera);
 
   // Bearing of the pixel's centre in the camera frame: (x, y, 1).
   PixelTable x, y;
 
-  // d(pixel) / d(bearing), px: how the image of a point moves when its bearing does.
+  // d(pixel) / d(bearing), px.
   PixelTable du_dx, du_dy, dv_dx, dv_dy;
 
   // d(bearing) / d(pixel) times the camera's footprint: the area that the pixel averages over.
   PixelTable dx_du, dx_dv, dy_du, dy_dv;
 };
 
-/// The rays of K neighbouring pixels of a row, one array per quantity, for loops that compile to SIMD code. Where a row
+/// The rays of K neighbouring pixels of a row, one array per quantity, for loops that compile to SIMD code. If a row
 /// has fewer, the last one is repeated.
 template <int K>
 class RayLanes {

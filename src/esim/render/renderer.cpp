@@ -3,7 +3,7 @@
 namespace esim {
 namespace {
 
-/// Evaluations of disjoint tiles, one after the other.
+/// Evaluations of disjoint tiles, in sequence.
 class InTurn final : public Rendering {
  public:
   InTurn(Renderer& renderer, std::vector<RenderRequest> requests) : t_(requests[0].t) {

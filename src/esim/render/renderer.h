@@ -13,65 +13,67 @@
 
 namespace esim {
 
-/// What to evaluate: some pixels of one camera at one time.
+/// The pixels of one camera that are evaluated at one time.
 struct RenderRequest {
   TimeNs t = 0;
   Kinematics camera;        ///< pose and twist of the camera frame (x right, y down, z forward) at t
   std::vector<Tile> tiles;  ///< disjoint, inside the image, at least one
   std::vector<Kinematics>
       objects{};               ///< pose T_world_object and twist of each moving object at t, in the scene's order
-  bool which_objects = false;  ///< say which object each pixel sees also where that is not needed for V
-  int motion_rows = 1;         ///< V is wanted of one row in so many, from the image's first on
+  bool which_objects = false;  ///< store which object each pixel sees even if V does not need it
+  int motion_rows = 1;         ///< V is needed in every motion_rows-th row of the image only, from the first
 
   bool wants_objects() const { return which_objects || !objects.empty(); }
 };
 
-/// The smallest thing that a renderer can evaluate at its proper cost.
+/// The smallest unit that a renderer can evaluate without extra cost.
 enum class Granularity { tile, frame };
 
 struct RendererTraits {
-  std::string name;                             ///< as in the scenario, for reports
-  Granularity granularity = Granularity::tile;  ///< frame: asking for a tile costs as much as the whole image
-  bool at_infinity = false;                     ///< everything that it shows is infinitely far away
-  bool on_sensor = false;    ///< drawn on the sensor: the camera's pose, twist and lens change nothing
-  bool wide_pixels = false;  ///< averages over the camera's footprint also where that is more than a pixel
-  std::string device{};      ///< that it runs on, where that is not simply the processor
+  std::string name;                             ///< as in the scenario; used in reports
+  Granularity granularity = Granularity::tile;  ///< frame: a tile costs as much as the full image
+  bool at_infinity = false;                     ///< all surfaces are infinitely far away
+  bool on_sensor = false;    ///< drawn on the sensor: the camera's pose, twist and lens have no effect
+  bool wide_pixels = false;  ///< averages over the camera's footprint even if that is wider than a pixel
+  std::string device{};      ///< that it runs on; empty for the processor
 
-  /// For people.
+  /// A name to display.
   std::string label() const { return device.empty() ? name : name + " on " + device; }
 };
 
-/// An evaluation under way. It ends before its renderer does; one that is no longer wanted need not be finished.
+/// An evaluation in progress. It must be destroyed before its renderer; finish() may be omitted if the result is not
+/// needed.
 class Rendering {
  public:
   virtual ~Rendering() = default;
 
-  /// Waits until it is done, and fills E, Z and V of the request's tiles in `sample`, which is resized to the camera's
-  /// image. To be called once at most.
+  /// Waits for the result and fills E, Z and V of the request's tiles in `sample`, which is resized to the camera's
+  /// image. Call it at most once.
   virtual void finish(Sample& sample) = 0;
 };
 
-/// Evaluates a scene as one camera sees it. A renderer is made for one camera and one scene, keeps no history, and
-/// never chooses a time: the same request gives the same sample, whatever was asked before, whatever else is under way,
-/// and with any number of threads, and a tile's pixels are the same as in the whole frame.
+/// Evaluates a scene as one camera sees it. A renderer belongs to one camera and one scene, and has no history: the
+/// same request gives the same sample, whatever was requested before or at the same time, and with any number of
+/// threads. The pixels of a tile are the same as in the full frame.
 class Renderer {
  public:
   virtual ~Renderer() = default;
 
   virtual RendererTraits traits() const = 0;
 
-  /// Begins an evaluation, which a graphics card goes on with while the processor does other things. Any number may be
-  /// under way, and be finished in any order. The request names as many objects as move in the scene.
+  /// Begins an evaluation, which a graphics card continues while the processor does other work. Any number of
+  /// evaluations may be in progress, and be finished in any order. The request must name as many objects as move in the
+  /// scene.
   virtual std::unique_ptr<Rendering> start(RenderRequest request) = 0;
 
-  /// Begins to evaluate disjoint tiles of several times, into one sample.
+  /// Begins to evaluate disjoint tiles at several times into one sample.
   virtual std::unique_ptr<Rendering> start_together(std::vector<RenderRequest> requests);
 
-  /// Starts and finishes at once.
+  /// Starts an evaluation and waits for it.
   void render(RenderRequest request, Sample& sample) { start(std::move(request))->finish(sample); }
 };
 
-/// What renderers on the processor derive from: they compute when the sample is wanted.
+/// Base of renderers on the processor, which compute when finish() is called.
 class ProcessorRenderer : public Renderer {
  public:
   std::unique_ptr<Rendering> start(RenderRequest request) final;

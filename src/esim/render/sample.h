@@ -8,26 +8,26 @@
 
 namespace esim {
 
-/// One evaluation of the scene by one camera: a field per quantity, all of the image's size, of which only the
-/// pixels of `tiles` are current.
+/// One evaluation of the scene by one camera: a field per quantity, all of the image's size. Only the pixels in `tiles`
+/// are valid.
 struct Sample {
-  TimeNs t = 0;             // of the evaluation            set by the renderer from the request
-  std::vector<Tile> tiles;  // that were evaluated          set by the renderer from the request
+  TimeNs t = 0;             // of the evaluation               set by the renderer from the request
+  std::vector<Tile> tiles;  // that were evaluated             set by the renderer from the request
 
-  Image<float> irradiance;  // E, linear, 1.0 = white       computed by the renderer
-  Image<float> depth;       // Z, planar, m; +inf: nothing  computed by the renderer
-  Image<float> flow_x;      // V, px/s, to the right        by motion_field() from Z, object and the twists, or by the
-  Image<float> flow_y;      // V, px/s, downwards           renderer where there is no space
+  Image<float> irradiance;  // E, linear, 1.0 = white          computed by the renderer
+  Image<float> depth;       // Z, planar, m; +inf: no surface  computed by the renderer
+  Image<float> flow_x;      // V, px/s, to the right           by motion_field() from Z, object and the twists, or by
+  Image<float> flow_y;      // V, px/s, downwards              the renderer if its scene is not three-dimensional
 
-  // E over the area of one pixel where the camera's footprint is wider, whose mean over the footprint is E. Has no size
-  // elsewhere, and where edges do not matter: of panorama and plane.
+  // E over the area of one pixel if the camera's footprint is wider; E is its mean over the footprint. Empty otherwise,
+  // and for panorama and plane, which have no edges.
   Image<float> narrow;
 
-  // Which moving object is seen: 0 none, i + 1 the i-th of the request, or of the layers that are drawn on the sensor.
-  // Computed by the renderer; has no size unless the request wants_objects().
+  // The visible moving object: 0 for none, i + 1 for the i-th of the request, or of the layers drawn on the sensor.
+  // Computed by the renderer; empty unless the request wants_objects().
   Image<std::uint16_t> object;
 
-  /// Makes room for width x height pixels; keeps the content if the size is right already.
+  /// Resizes to width x height pixels; keeps the content if that is already the size.
   void resize(int width, int height, bool with_objects = false) {
     if (irradiance.width() != width || irradiance.height() != height) {
       for (Image<float>* field : {&irradiance, &depth, &flow_x, &flow_y}) *field = Image<float>(width, height);
@@ -38,13 +38,13 @@ struct Sample {
   }
 };
 
-/// The irradiance of a tile's pixels between two of their samples, linear in log-irradiance unless a sensor says
-/// otherwise. Contiguous segments of a tile follow each other: t0 of one is t1 of the one before. The first one of
-/// a tile is an instant (t0 == t1): it sets the pixels' reference.
+/// The irradiance of a tile's pixels between two of their samples, linear in log-irradiance unless a sensor states
+/// otherwise. Segments of a tile are contiguous: t0 of each is t1 of the previous one. The first segment of a tile is
+/// an instant (t0 == t1), which sets the reference of the pixels.
 struct Segment {
   Tile tile;
   TimeNs t0 = 0, t1 = 0;
-  ImageView<float> irradiance0;  ///< E at t0; borrowed, of the tile's pixels at least
+  ImageView<float> irradiance0;  ///< E at t0; borrowed, at least the tile's pixels
   ImageView<float> irradiance1;  ///< E at t1
 };
 

@@ -8,10 +8,10 @@
 
 namespace esim {
 
-/// The red, green and blue light of an image; all null where it is not known.
+/// The red, green and blue planes of an image; all null if they are unknown.
 using ColourTextures = PerColour<std::shared_ptr<const Texture>>;
 
-/// Of three planes.
+/// Makes textures of three planes.
 inline ColourTextures colour_textures(const Planes& planes, Wrap wrap_u, Wrap wrap_v) {
   ColourTextures textures;
   for (std::size_t i = 0; i < textures.size(); ++i)
@@ -19,8 +19,8 @@ inline ColourTextures colour_textures(const Planes& planes, Wrap wrap_u, Wrap wr
   return textures;
 }
 
-/// What K pixels of a row see of an image behind RGGB filters: those from (x, y) to the right, each its own colour's
-/// mean over its footprint.
+/// Samples an image behind RGGB filters for K pixels of a row, from (x, y) to the right: for each pixel the mean of its
+/// own colour over its footprint.
 template <int K>
 std::array<float, K> sample_mosaic(const ColourTextures& textures, int x, int y, const TextureLookup<K>& at) {
   std::array<float, K> seen;

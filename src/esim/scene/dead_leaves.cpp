@@ -11,7 +11,7 @@
 namespace esim {
 namespace {
 
-/// One leaf: its shape in coordinates (p, q) that are 1 at its border, and its light.
+/// One leaf: its shape in coordinates (p, q) that are 1 at its border, and its brightness.
 struct Leaf {
   float x, y;                    // centre, px
   std::array<float, 4> to_unit;  // (p, q) = to_unit (pixel - centre)
@@ -27,7 +27,7 @@ struct Leaf {
   }
 };
 
-/// The radius r with a share u of the leaves below, for the density 1 / r^3.
+/// The radius that a fraction u of the leaves does not exceed, for the density 1 / r^3.
 double radius(const DeadLeavesOptions& options, double u) {
   const double low = 1 / (options.least_radius_px * options.least_radius_px),
                high = 1 / (options.greatest_radius_px * options.greatest_radius_px);
@@ -59,11 +59,11 @@ Leaf draw_leaf(const DeadLeavesOptions& options, const AddressedRandom& random, 
           static_cast<float>(dark + level * (light - dark)),
           static_cast<float>(0.6 * (slope - 0.5)),
           pattern < 0.25 ? static_cast<float>(0.3 * strength) : 0.0F,
-          static_cast<float>(2 + frequency * 0.8 * a),  // at most a stripe in about eight pixels
+          static_cast<float>(2 + frequency * 0.8 * a),  // at most one stripe in about eight pixels
           static_cast<float>(2 * std::numbers::pi * phase)};
 }
 
-/// Lays a leaf below those that are there already. Returns the number of pixels that it is seen in.
+/// Draws a leaf below all previous ones. Returns the number of pixels in which it is visible.
 int lay_under(const Leaf& leaf, Image<float>& log_light, Image<std::uint8_t>& taken) {
   const int top = std::max(0, static_cast<int>(leaf.y - leaf.reach)),
             bottom = std::min(taken.height() - 1, static_cast<int>(leaf.y + leaf.reach) + 1);
@@ -89,7 +89,7 @@ int lay_under(const Leaf& leaf, Image<float>& log_light, Image<std::uint8_t>& ta
 
 Image<float> dead_leaves(const DeadLeavesOptions& options, std::uint64_t seed, std::uint32_t number) {
   constexpr std::uint64_t kMostLeaves = 100'000;
-  constexpr std::int64_t kCovered = 200;  // but for one pixel in so many, which show the ground
+  constexpr std::int64_t kCovered = 200;  // one pixel in this number may show the background
   constexpr double kLens_px = 0.6;
   const AddressedRandom random(seed, Purpose::dead_leaves);
   const auto ground = static_cast<float>(0.5 * (std::log(options.darkest) + std::log(options.lightest)));

@@ -2,31 +2,31 @@
 
 namespace esim {
 
-/// How the images of another program are asked for, where that is not found out by asking.
+/// Which commands request the images of an external renderer, if this is not determined automatically.
 
-/// Light.
+/// Irradiance.
 enum class EngineLight {
-  automatic,  ///< NPY where it is offered, PNG otherwise
+  automatic,  ///< NPY if it is offered, otherwise PNG
   png,        ///< 8 or 16 bits, sRGB
-  npy,        ///< floats are linear, bytes sRGB
+  npy,        ///< floats are linear, bytes are sRGB
 };
 
 /// Depth, as NumPy arrays.
 enum class EngineDepth {
-  automatic,    ///< plane_depth where it is offered; otherwise as the program's version suggests
-  plane_depth,  ///< of the image plane, m, by the command of this name
-  ray_metres,   ///< the ray's length, m, by the command depth
+  automatic,    ///< plane_depth if it is offered; otherwise as implied by the program's version
+  plane_depth,  ///< planar depth in m, from the command of this name
+  ray_metres,   ///< length of the ray in m, from the command depth
   ray_centimetres,
-  planar_metres,  ///< of the image plane, by the command depth
+  planar_metres,  ///< planar depth in m, from the command depth
   planar_centimetres,
 };
 
 /// Which object each pixel sees.
 enum class EngineMask {
-  automatic,  ///< NPY where it is offered, PNG otherwise
+  automatic,  ///< NPY if it is offered, otherwise PNG
   png,        ///< colours
-  npy,        ///< colours, or numbers
-  none,       ///< not asked: all is taken for standing still
+  npy,        ///< colours or numbers
+  none,       ///< not requested: everything counts as static
 };
 
 }  // namespace esim

@@ -35,14 +35,14 @@ void check_size(const std::filesystem::path& path, std::int64_t width, std::int6
   }
 }
 
-/// The same of a size that a file claims, which it must have the bytes for: no compression saves more than this.
+/// Checks the size in a file's header, also against the number of bytes: no compression saves more than this.
 void check_claim(const std::filesystem::path& path, std::int64_t width, std::int64_t height, std::uintmax_t bytes) {
   constexpr double kMaxPixelsPerByte = 10'000, kSmall = 1 << 20;
   check_size(path, width, height);
   const double pixels = static_cast<double>(width) * static_cast<double>(height);
   if (pixels > kSmall && pixels > kMaxPixelsPerByte * static_cast<double>(bytes))
-    fail(path,
-         fmt::format("claims {}x{} pixels, but has {} bytes only; it is cut off or damaged", width, height, bytes));
+    fail(path, fmt::format("its header states {}x{} pixels, but it has only {} bytes; it is cut off or damaged", width,
+                           height, bytes));
 }
 
 std::uintmax_t size_of(const std::filesystem::path& path) {
@@ -51,12 +51,12 @@ std::uintmax_t size_of(const std::filesystem::path& path) {
   return error ? 0 : bytes;
 }
 
-/// The channels that hold the colour: R, G, B, or the luminance Y.
+/// The channels with the colour: R, G, B, or the luminance Y.
 std::vector<const char*> colour_channels(const std::filesystem::path& path, const Imf::ChannelList& channels) {
   const auto has = [&](const char* name) { return channels.findChannel(name) != nullptr; };
   if (has("R") && has("G") && has("B")) return {"R", "G", "B"};
   if (has("Y")) return {"Y"};
-  fail(path, "has neither the channels R, G, B nor Y; save it with one of these");
+  fail(path, "must have the channels R, G and B, or the channel Y; save it with them");
 }
 
 void read_exr(const std::filesystem::path& path, Encoding encoding, bool colour, Planes& planes) {
@@ -95,10 +95,9 @@ void load_exr(const std::filesystem::path& path, Encoding encoding, bool colour,
   }
 }
 
-/// Whether a JPEG file has an end-of-image mark near its end. The decoder makes grey of what is cut off, and says
-/// nothing.
+/// Whether a JPEG file has an end-of-image marker near its end. The decoder silently fills missing parts with grey.
 bool is_whole_jpeg(const std::filesystem::path& path) {
-  constexpr std::streamoff kTailBytes = 1 << 16;  // cameras append data of their own
+  constexpr std::streamoff kTailBytes = 1 << 16;  // cameras append their own data
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   const std::streamoff size = file.tellg();
   file.seekg(std::max<std::streamoff>(0, size - kTailBytes));
@@ -106,7 +105,7 @@ bool is_whole_jpeg(const std::filesystem::path& path) {
   return tail.find("\xff\xd9") != std::string::npos;
 }
 
-/// Refuses an image by the size that it says it has, before a decoder takes memory for it.
+/// Rejects an image by the size in its header, before a decoder allocates memory for it.
 void check_header(const std::filesystem::path& path, std::span<const std::byte> head, std::uintmax_t bytes) {
   if (const auto size = size_in_header(head)) check_claim(path, size->width, size->height, bytes);
 }
@@ -131,7 +130,7 @@ PixelType pixel_type(const std::filesystem::path& path, const cv::Mat& image) {
   }
 }
 
-/// The pixels of a file that is not OpenEXR, as they are coded. `read` lets OpenCV decode it.
+/// The encoded pixel values of a file that is not OpenEXR. `read` decodes it with OpenCV.
 template <typename Read>
 cv::Mat read_pixels(const std::filesystem::path& path, const Read& read) {
   cv::Mat image;
@@ -140,7 +139,7 @@ cv::Mat read_pixels(const std::filesystem::path& path, const Read& read) {
   } catch (const cv::Exception& exception) {
     fail(path, "cannot be decoded: " + exception.err);
   }
-  if (image.empty()) fail(path, "cannot be decoded; is it a PNG, JPEG, TIFF, EXR or HDR image, and complete?");
+  if (image.empty()) fail(path, "cannot be decoded; it must be a complete PNG, JPEG, TIFF, EXR or HDR image");
   check_size(path, image.cols, image.rows);
   return image;
 }
@@ -157,7 +156,7 @@ void decode_pixels(const std::filesystem::path& path, const cv::Mat& image, Enco
          encoding, colour, planes);
 }
 
-/// Whatever alpha it has.
+/// The pixels as an opaque image, whatever their alpha.
 CodedImage coded_image(const PngPixels& png) {
   return {.data = png.bytes.data(),
           .row_bytes = static_cast<std::ptrdiff_t>(png.row_bytes),
@@ -175,11 +174,11 @@ std::string lower_case_extension(const std::filesystem::path& path) {
   return extension;
 }
 
-/// The pixels of such a file on disk.
+/// As above, for a file on disk.
 cv::Mat read_pixels(const std::filesystem::path& path) {
   const std::string extension = lower_case_extension(path);
   if ((extension == ".jpg" || extension == ".jpeg") && !is_whole_jpeg(path)) {
-    fail(path, "is no JPEG image, or is cut off");
+    fail(path, "is not a JPEG image, or is cut off");
   }
   check_header(path);
   return read_pixels(path, [&] { return cv::imread(path.string(), cv::IMREAD_UNCHANGED); });
@@ -190,9 +189,10 @@ void require_file(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path, error)) fail(path, "no such file");
 }
 
-constexpr const char* kMedianNeedsBytes = "is not of 8 bits, which a median needs; leave the median out";
+constexpr const char* kMedianNeedsBytes =
+    "does not have 8 bits per channel, which the median filter requires; remove the median";
 
-/// Applies a filter that reaches so many pixels far; `around`: across the left and right edge.
+/// Applies a filter with a radius of `reach` pixels; `around`: across the left and right edge.
 template <typename Filter>
 void apply(cv::Mat& image, int reach, bool around, const Filter& filter) {
   if (!around) return filter(image);
@@ -205,12 +205,12 @@ void apply(cv::Mat& image, int reach, bool around, const Filter& filter) {
 void take_median(const std::filesystem::path& path, const Softening& softening, cv::Mat& image) {
   const int side = softening.median_px;
   if (side <= 1) return;
-  if (side % 2 == 0) fail(path, fmt::format("a median over {} px has no middle; use an odd number", side));
+  if (side % 2 == 0) fail(path, fmt::format("the width of the median must be an odd number of pixels, not {}", side));
   if (image.depth() != CV_8U) fail(path, kMedianNeedsBytes);
   apply(image, side / 2, softening.around, [&](cv::Mat& pixels) { cv::medianBlur(pixels, pixels, side); });
 }
 
-/// Decoding laid `coded` over white, light + (1 - alpha): takes the white away.
+/// Decoding composites `coded` over white, light + (1 - alpha); this subtracts the white.
 void separate_alpha(const cv::Mat& coded, TranslucentImage& image) {
   image.alpha = Image<float>(coded.cols, coded.rows);
   cv::Mat channel, alpha(coded.rows, coded.cols, CV_32F, image.alpha.data());
@@ -224,14 +224,14 @@ void separate_alpha(const cv::Mat& coded, TranslucentImage& image) {
 void blur(const Softening& softening, Image<float>& image) {
   const double sigma = softening.gaussian_px;
   if (image.empty() || !(sigma > 0)) return;
-  constexpr double kReach = 5;  // standard deviations: OpenCV's kernel ends before
+  constexpr double kReach = 5;  // standard deviations; OpenCV's kernel is smaller
   cv::Mat matrix(image.height(), image.width(), CV_32F, image.data());
   apply(matrix, static_cast<int>(std::ceil(kReach * sigma)), softening.around, [&](cv::Mat& pixels) {
     cv::GaussianBlur(pixels, pixels, {0, 0}, sigma);
   });
 }
 
-/// An image after its median, and the pixels that it was decoded from: none of OpenEXR.
+/// An image after its median filter, and the pixels from which it was decoded (empty for OpenEXR).
 struct Decoded {
   Planes planes;
   cv::Mat pixels;

@@ -7,7 +7,7 @@
 namespace esim {
 namespace {
 
-/// Reads whole numbers of either byte order; 0 beyond the end.
+/// Reads integers of either byte order; 0 beyond the end.
 class Bytes {
  public:
   explicit Bytes(std::span<const std::byte> bytes, bool big_endian = true) : bytes_(bytes), big_endian_(big_endian) {}

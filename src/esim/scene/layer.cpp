@@ -35,11 +35,12 @@ std::vector<Parameters> natural_spline(const std::vector<double>& t, const std::
 }  // namespace
 
 LayerMotion::LayerMotion(const std::vector<LayerKeyframe>& keyframes, KeyframeInterpolation interpolation) {
-  if (keyframes.empty()) throw UserError("has no keyframes; give it one at least, or leave them out");
+  if (keyframes.empty()) throw UserError("has no keyframes; add at least one, or remove the list");
   for (const LayerKeyframe& key : keyframes) {
     if (!t_s_.empty() && !(key.t_s > t_s_.back())) {
-      throw UserError(fmt::format("the keyframe at t_s = {} follows one at {}; put them in order, each time once",
-                                  key.t_s, t_s_.back()));
+      throw UserError(fmt::format(
+          "the times of keyframes must increase, but t_s = {} follows {}; sort them, and use each time once", key.t_s,
+          t_s_.back()));
     }
     t_s_.push_back(key.t_s);
     Parameters value;
@@ -58,7 +59,7 @@ LayerMotion::State LayerMotion::at(TimeNs t) const {
   if (now_s < t_s_.front() || t_s_.size() == 1) return {values_.front(), Parameters::Zero()};
   if (now_s > t_s_.back()) return {values_.back(), Parameters::Zero()};
 
-  // Between keyframes i and i + 1; at the last one the motion still goes on.
+  // Between keyframes i and i + 1; at the last keyframe the velocity is still that of the motion.
   const auto next = std::upper_bound(t_s_.begin(), t_s_.end() - 1, now_s);
   const auto i = static_cast<std::size_t>(next - t_s_.begin()) - 1;
   const double h = t_s_[i + 1] - t_s_[i], p = (t_s_[i + 1] - now_s) / h, q = (now_s - t_s_[i]) / h;

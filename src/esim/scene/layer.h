@@ -7,13 +7,13 @@
 
 namespace esim {
 
-/// What positions and scales of a layer are measured in.
+/// The units of a layer's positions and scales.
 enum class LayerUnits {
   pixel,   ///< pixels; at scale 1 a texel is as large as a pixel
   sensor,  ///< fractions of the sensor's width and height; at scale 1 the image fills the sensor
 };
 
-/// What is seen of a layer beyond its image's edges.
+/// What a layer shows outside its image.
 enum class LayerBeyond { nothing, clamp, mirror, repeat };
 
 /// How a layer moves from one keyframe to the next.
@@ -22,7 +22,7 @@ enum class KeyframeInterpolation {
   linear,  ///< constant rates of position, rotation and scale
 };
 
-/// How a layer lies on the sensor at one time.
+/// The placement of a layer on the sensor at one time.
 struct LayerKeyframe {
   double t_s = 0;
   Eigen::Vector2d position = Eigen::Vector2d::Zero();  ///< of the layer's pivot from the sensor's centre, right, down
@@ -31,7 +31,7 @@ struct LayerKeyframe {
   double shear = 0;  ///< shift to the right over distance downwards, after the scale and before the rotation
 };
 
-/// Motion through keyframes. Before the first and after the last one the layer rests.
+/// Motion through keyframes. Before the first and after the last keyframe the layer rests.
 class LayerMotion {
  public:
   /// Position (2), rotation in radians, scale (2), shear.
@@ -52,7 +52,7 @@ class LayerMotion {
   std::vector<Parameters> accelerations_;  // second derivatives at the keyframes, per s^2
 };
 
-/// An affine map from an image to the sensor, and how it changes:
+/// An affine map from an image to the sensor, and its rate of change:
 ///     pixel = centre + A (uv - 1/2),   with (u, v) on [0, 1] x [0, 1] in the image.
 struct LayerPlacement {
   Eigen::Matrix2d A, A_rate;
@@ -63,8 +63,8 @@ struct PixelSize {
   int width = 0, height = 0;
 };
 
-/// Where a layer is whose point `pivot`, in (u, v), is at the position. With U = 1 and I = diag(image's size) in units
-/// of pixels, U = diag(sensor's size) and I = 1 in units of the sensor, and K = (1 shear; 0 1):
+/// The placement of a layer whose point `pivot`, in (u, v), is at the position. With U = 1 and I = diag(image's size)
+/// in units of pixels, U = diag(sensor's size) and I = 1 in units of the sensor, and K = (1 shear; 0 1):
 ///     A = U R(rotation) K diag(scale) I,   centre = the sensor's centre + U position + A (1/2 - pivot).
 LayerPlacement place(const LayerMotion::State& state, LayerUnits units, PixelSize image, PixelSize sensor,
                      const Eigen::Vector2d& pivot = {0.5, 0.5});

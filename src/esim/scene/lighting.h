@@ -5,28 +5,28 @@
 
 namespace esim {
 
-/// Parallel light. A white surface that it falls on squarely gets the radiance `strength`.
+/// Parallel light. A white surface perpendicular to it gets the radiance `strength`.
 struct SunLight {
-  Eigen::Vector3f direction = -Eigen::Vector3f::UnitZ();  ///< in which it shines, world frame; of any length but zero
+  Eigen::Vector3f direction = -Eigen::Vector3f::UnitZ();  ///< of the light, world frame; any length except zero
   float strength = 1;
 };
 
-/// Light from a point, the same in all directions. A white surface that it falls on squarely from r metres away gets
+/// Light from a point, the same in all directions. A white surface perpendicular to it at a distance of r metres gets
 /// the radiance strength / r².
 struct PointLight {
   Eigen::Vector3f position = Eigen::Vector3f::Zero();  ///< world frame, m
   float strength = 1;
 };
 
-/// The light that falls on a scene's diffuse (Lambertian) surfaces. One of base colour a, with the unit normal n on the
-/// side that is seen, shows the radiance
+/// The lights of a scene with diffuse (Lambertian) surfaces. A surface with base colour a and the unit normal n on the
+/// visible side has the radiance
 ///     a (ambient + sum over lights of strength_i max(0, <n, l_i>) visible_i) + emission,
-/// l_i being the direction to the light. Everything is linear: 1.0 = diffuse white, with no upper end.
+/// where l_i is the direction to the light. All values are linear: 1.0 = diffuse white, with no upper limit.
 struct Lighting {
   float ambient = 0;
   std::vector<SunLight> suns;
   std::vector<PointLight> points;
-  bool shadows = false;  ///< visible_i is 0 where a surface stands between; 1 everywhere otherwise
+  bool shadows = false;  ///< visible_i is 0 where a surface blocks the light; otherwise it is 1 everywhere
 };
 
 }  // namespace esim

@@ -7,7 +7,7 @@
 namespace esim {
 namespace {
 
-/// Light of every code of an integer image.
+/// Linear light for every code of an integer image.
 template <typename Code>
 class CodeTable {
  public:
@@ -35,7 +35,7 @@ struct Light {
   float red, green, blue;
 };
 
-/// Of a pixel with so many channels.
+/// Decodes pixels with kChannels channels.
 template <int kChannels, typename T, typename Linear>
 Light light_of(const T* channel, bool opaque, float full_scale, const Linear& linear) {
   constexpr bool kGrey = kChannels < 3;

@@ -9,20 +9,20 @@
 
 namespace esim {
 
-/// A rigid part of a scene: what stands still, or a thing with a motion of its own.
+/// A rigid part of a scene: all that is static, or an object with its own motion.
 struct SceneObject {
   std::string name;
-  Mesh mesh;           ///< in the object's frame, which is the world's if it does not move
-  bool moves = false;  ///< its pose at the time of rendering comes with the request (see RenderRequest::objects)
+  Mesh mesh;           ///< in the object's frame, which is the world frame if it does not move
+  bool moves = false;  ///< each request contains its pose (see RenderRequest::objects)
 };
 
-/// Everything that a renderer of triangles shows.
+/// A scene for renderers of triangles.
 struct Scene {
   std::vector<SceneObject> objects;
-  std::optional<Lighting> lighting;  ///< where there is none, surfaces show their base colour ("unlit")
+  std::optional<Lighting> lighting;  ///< if it is empty, surfaces show their base colour ("unlit")
 };
 
-/// A scene of one mesh that stands still, unlit.
+/// An unlit scene of one static mesh.
 Scene still_scene(Mesh mesh);
 
 }  // namespace esim

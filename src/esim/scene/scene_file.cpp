@@ -21,7 +21,8 @@ SceneGraph read_graph(const std::filesystem::path& path) {
   for (const char* const known : {".obj", ".ply", ".stl", ".fbx", ".dae"}) {
     if (extension == known) return read_with_assimp(path);
   }
-  fail_scene(path, "its format is not known; use GLB, glTF, OBJ, PLY, STL, FBX, Collada (.dae) or Blender's (.blend)");
+  fail_scene(path,
+             "its format is not supported; use GLB, glTF, OBJ, PLY, STL, FBX, Collada (.dae) or Blender's (.blend)");
 }
 
 std::string counted(std::size_t count, const char* singular, const char* plural) {

@@ -8,7 +8,7 @@
 namespace esim {
 namespace {
 
-/// Light that can be kept: neither negative nor infinite, and a number.
+/// Clamps light to finite numbers >= 0; NaN becomes 0.
 float valid_light(float light) { return light > 0 ? std::min(light, std::numeric_limits<float>::max()) : 0.0F; }
 
 /// The power of two that no texel exceeds.
@@ -45,7 +45,7 @@ Texture::Texture(const Image<float>& texels, Wrap wrap_u, Wrap wrap_v) : wrap_u_
     }
     if ((width == 1 && height == 1) || levels_ == kMaxLevels) break;
 
-    // Each coarser texel is the exact mean over its area, also where the size is odd.
+    // Each coarser texel is the exact mean over its area, also if the size is odd.
     cv::Mat coarser;
     cv::resize(level, coarser, {std::max(1, width / 2), std::max(1, height / 2)}, 0, 0, cv::INTER_AREA);
     level = coarser;

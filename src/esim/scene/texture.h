@@ -12,11 +12,11 @@
 
 namespace esim {
 
-/// What lies beyond the edge of a texture.
+/// How a texture continues beyond its edges.
 enum class Wrap { repeat, clamp };
 
-/// Where K pixels look at a texture, and how large their footprints are there. Texture coordinates: u to the right,
-/// v downwards, the image spans [0, 1] x [0, 1]. One array per quantity, for SIMD code; K is 4 or a multiple of 8.
+/// Texture coordinates of K pixels, and their footprints. u points to the right, v downwards; the image spans
+/// [0, 1] x [0, 1]. One array per quantity, for SIMD code; K is 4 or a multiple of 8.
 template <int K>
 struct TextureLookup {
   alignas(64) std::array<float, K> u, v;
@@ -25,16 +25,18 @@ struct TextureLookup {
 };
 
 /// A linear-light image that can be averaged over a pixel's footprint: a mip pyramid, sampled trilinearly at up to
-/// kMaxProbes places along the footprint's longer side, so that neither distance nor a grazing view aliases.
+/// kMaxProbes positions along the longer side of the footprint, so that there is no aliasing at large distances or
+/// grazing angles.
 ///
-/// Rendering waits for memory, so a texel is kept in 16 bits: a floating-point number without sign, of 11 bits of
-/// mantissa, relative to the brightest texel. Its relative error is at most 2^-12, far below that of 8-bit images, down
-/// to 2^-31 of the brightest; what is darker counts as that. Light that is negative or no number counts as none.
+/// Since rendering is limited by memory bandwidth, a texel is stored in 16 bits: an unsigned floating-point number with
+/// 11 bits of mantissa, relative to the brightest texel. The relative error is at most 2^-12, far below that of 8-bit
+/// images, down to 2^-31 of the brightest texel; darker texels are raised to that. Values that are negative or not a
+/// number become 0.
 class Texture {
  public:
   Texture(const Image<float>& texels, Wrap wrap_u, Wrap wrap_v);
 
-  /// Mean of the texture over each of the K footprints. Lanes whose bit in `lanes` is not set need no value.
+  /// Mean of the texture over each of the K footprints. Lanes whose bit in `lanes` is not set are undefined.
   template <int K>
   std::array<float, K> sample(const TextureLookup<K>& at, std::uint32_t lanes = ~0U) const;
 
@@ -44,25 +46,25 @@ class Texture {
   Wrap wrap_u() const { return wrap_u_; }
   Wrap wrap_v() const { return wrap_v_; }
 
-  /// The texels as they are kept, at full resolution.
+  /// The stored texels at full resolution.
   Image<float> texels() const;
 
  private:
   static constexpr int kMaxLevels = 18;
   static constexpr int kMaxProbes = 4;
 
-  // A code is the upper 16 bits of value / scale_ as a float, less those that are the same in all: see encode().
+  // A code is the upper 16 bits of value / scale_ as a float, without those that are the same in all: see encode().
   static constexpr int kCodeShift = 12;
   static constexpr std::uint32_t kCodeBias = 96U << 23;
 
-  /// The levels that the lanes of a vector look at.
+  /// The mip levels that the lanes of a vector sample.
   template <class V, class I>
   struct Grid {
     V width, height;       // texels
     I offset, row_stride;  // bytes
   };
 
-  /// How pixels' footprints lie on the texture.
+  /// The footprints of pixels on the texture.
   template <class V>
   struct Footprint {
     V step_u, step_v;     // the longer side
@@ -93,7 +95,7 @@ class Texture {
   float scale_ = 1;
   std::array<float, kMaxLevels> level_width_{}, level_height_{};
   std::array<std::int32_t, kMaxLevels> level_offset_{}, level_stride_{};  // bytes
-  std::vector<std::uint16_t> codes_;  // all levels, row-major; each row and column ends with what lies beyond it
+  std::vector<std::uint16_t> codes_;  // all levels, row-major; each row and column is followed by its continuation
 };
 
 template <int K>
@@ -111,7 +113,7 @@ std::array<float, K> Texture::sample(const TextureLookup<K>& at, std::uint32_t l
   V largest2 = zero;
   for (std::size_t i = 0; i < K; i += kVector) largest2 = hn::Max(largest2, largest_side2(d, at, i));
   if (hn::AllTrue(d, hn::Le(largest2, one))) {
-    // Seen from close by: footprints within a texel, where the rest comes to the same.
+    // Close view: footprints within a texel, where the general code gives the same result.
     const auto finest = grid(d, hn::Zero(di));
     for (std::size_t i = 0; i < K; i += kVector) {
       if (skips(i)) continue;
@@ -121,7 +123,7 @@ std::array<float, K> Texture::sample(const TextureLookup<K>& at, std::uint32_t l
     return result;
   }
 
-  // Of all vectors first, so that none waits for the other.
+  // First for all vectors, so that none waits for another.
   std::array<Footprint<V>, K / kVector> footprints;
   for (std::size_t i = 0; i < K; i += kVector) footprints[i / kVector] = footprint(d, at, i);
   for (std::size_t i = 0; i < K; i += kVector) {
@@ -167,7 +169,7 @@ auto Texture::largest_side2(D d, const Lookup& at, std::size_t i) const {
   return hwy::HWY_NAMESPACE::Max(x2, y2);
 }
 
-/// Of the lanes from i on: probes go along the longer side, the shorter one sets the blur.
+/// For the lanes from i on: probes lie along the longer side, the shorter side sets the blur.
 template <class D, class Lookup>
 auto Texture::footprint(D d, const Lookup& at, std::size_t i) const {
   namespace hn = hwy::HWY_NAMESPACE;
@@ -180,8 +182,8 @@ auto Texture::footprint(D d, const Lookup& at, std::size_t i) const {
   Footprint<V> f;
   f.step_u = hn::IfThenElse(along_x, du_dx, du_dy), f.step_v = hn::IfThenElse(along_x, dv_dx, dv_dy);
 
-  // One texel is the finest that is resolved: a probe more when the longer side is 1.25, 2.25 and 3.25 times that or
-  // the shorter one. Squared, which spares roots. The upper bound keeps a degenerate footprint (a pole, a horizon)
+  // One texel is the finest resolution: there is one more probe if the longer side exceeds 1.25, 2.25 and 3.25 times
+  // a texel and the shorter side. Squares avoid roots. The upper bound keeps a degenerate footprint (a pole, a horizon)
   // finite.
   static_assert(kMaxProbes == 4);
   const V major2 = hn::Min(hn::Max(x2, y2), hn::Set(d, 1e12F)), minor2 = hn::Max(hn::Min(x2, y2), one);
@@ -198,8 +200,8 @@ auto Texture::footprint(D d, const Lookup& at, std::size_t i) const {
   return f;
 }
 
-/// Of whole numbers from 0 to 2^22: those are the last bits of what is 2^23 larger. A general conversion takes thrice
-/// as long.
+/// Converts integers from 0 to 2^22, which are the last bits of the number plus 2^23. A general conversion takes three
+/// times as long.
 template <class D, class V>
 auto Texture::to_integer(D d, V x) {
   namespace hn = hwy::HWY_NAMESPACE;
@@ -228,7 +230,7 @@ auto Texture::grid(D d, I level) const {
   namespace hn = hwy::HWY_NAMESPACE;
   const hn::RebindToSigned<D> di;
   using AnyGrid = Grid<hn::Vec<D>, I>;
-  // Neighbouring pixels mostly look at the same level, and broadcasts are far cheaper than gathers.
+  // Neighbouring pixels usually sample the same level, and broadcasts are much cheaper than gathers.
   const std::int32_t first = hn::GetLane(level);
   if (hn::AllTrue(di, hn::Eq(level, hn::Set(di, first)))) {
     const auto i = static_cast<std::size_t>(first);
@@ -239,7 +241,7 @@ auto Texture::grid(D d, I level) const {
                  hn::GatherIndex(di, level_offset_.data(), level), hn::GatherIndex(di, level_stride_.data(), level)};
 }
 
-/// The coordinate within the image, on [0, 1] whatever it was: what is no number becomes 0.
+/// Maps any coordinate into the image, on [0, 1]; NaN becomes 0.
 template <class D, class V>
 V Texture::wrapped(D d, V coordinate, Wrap wrap) {
   namespace hn = hwy::HWY_NAMESPACE;
@@ -253,7 +255,7 @@ V Texture::bilinear(D d, V u, V v, const Grid<V, I>& on) const {
   const hn::RebindToUnsigned<D> du;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0F), half = hn::Set(d, 0.5F);
 
-  // Texel centres are at half-integers of the level's grid. `first` is the one before the coordinate; the one after it
+  // Texel centres are at half-integers of the level's grid. `first` is the one before the coordinate; the next one
   // follows in memory, also at the end.
   const auto locate = [&](V unit, V size, Wrap wrap, V& first, V& fraction) {
     const V last = hn::Sub(size, one);
@@ -270,7 +272,7 @@ V Texture::bilinear(D d, V u, V v, const Grid<V, I>& on) const {
   const I upper_row = hn::Add(hn::Add(on.offset, column), hn::Mul(to_integer(d, y), on.row_stride));
   const I lower_row = hn::Add(upper_row, on.row_stride);
 
-  // Two neighbouring texels come in one word.
+  // One word contains two neighbouring texels.
   const auto bias = hn::Set(du, kCodeBias);
   const auto row = [&](I position) {
     const auto pair = hn::GatherOffset(du, reinterpret_cast<const std::uint32_t*>(codes_.data()), position);

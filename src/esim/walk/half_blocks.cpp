@@ -26,7 +26,7 @@ int distance(Rgb a, int r, int g, int b) {
   return dr * dr + dg * dg + db * db;
 }
 
-/// The sequence that sets a colour: of what stands before (38) or behind (48).
+/// The escape sequence that sets the foreground (38) or background (48) colour.
 std::string set_colour(int which, Rgb colour, TerminalColours colours) {
   if (colours == TerminalColours::indexed) return fmt::format("\033[{};5;{}m", which, indexed_colour(colour));
   return fmt::format("\033[{};2;{};{};{}m", which, colour.r, colour.g, colour.b);

@@ -81,9 +81,9 @@ constexpr std::array<std::pair<std::string_view, Key>, 6> kNames{{{"<left>", Key
 }  // namespace
 
 std::string key_help() {
-  return "w s  forward, back        arrows  turn, look up and down    space  drop a way point\n"
+  return "w s  forward, back        arrows  turn, look up and down    space  drop a waypoint\n"
          "a d  left, right          + -     faster, slower            u      remove the last one\n"
-         "q e  up, down (or r f)    p       picture of the view       g      go to the next one\n"
+         "q e  up, down (or r f)    p       image of the view         g      go to the next one\n"
          "?    this help            t       play the motion so far    x      end (or Esc)\n";
 }
 
@@ -131,10 +131,10 @@ std::vector<Key> keys_of(std::string_view text) {
       if (text.substr(i).starts_with(name)) key = named, length = name.size();
     }
     if (!key) {
-      throw UserError(fmt::format(
-          "keys: '{}' is no key; there are w s a d q e r f + - u p g t ? x, the space, and <left> <right> <up> <down> "
-          "<space> <esc>",
-          text.substr(i, 1)));
+      throw UserError(
+          fmt::format("keys: '{}' is not a key; the keys are w s a d q e r f + - u p g t ? x, the space, and <left> "
+                      "<right> <up> <down> <space> <esc>",
+                      text.substr(i, 1)));
     }
     keys.push_back(*key);
     i += length;

@@ -6,7 +6,7 @@
 
 namespace esim {
 
-/// What one may ask for while walking through a scene.
+/// Commands for walking through a scene.
 enum class Key {
   forward,
   back,
@@ -20,36 +20,36 @@ enum class Key {
   look_down,
   faster,
   slower,
-  drop,     ///< a way point here
-  undo,     ///< the last way point
-  preview,  ///< a picture of the view
-  next,     ///< to the next way point
-  play,     ///< the motion through the way points
+  drop,     ///< add a waypoint here
+  undo,     ///< remove the last waypoint
+  preview,  ///< save an image of the view
+  next,     ///< go to the next waypoint
+  play,     ///< play the motion through the waypoints
   help,
   leave,
 };
 
-/// Lines that say which key does what.
+/// The help text of the keys.
 std::string key_help();
 
-/// Makes keys of the bytes that a terminal sends. Bytes that are no key of ours are passed over.
+/// Converts the bytes that a terminal sends to keys. Bytes of other keys are ignored.
 class KeyReader {
  public:
-  /// The keys that are whole; what may be the beginning of another one waits for the next bytes.
+  /// The complete keys; the possible beginning of another key waits for the next bytes.
   std::vector<Key> read(std::string_view bytes);
 
-  /// Whether there is such a beginning.
+  /// Whether such a beginning is waiting.
   bool waits() const { return !waiting_.empty(); }
 
-  /// No more bytes have come: an escape character that still waits was the key Esc.
+  /// Call it if no more bytes arrive: a waiting escape character is the key Esc.
   std::vector<Key> finish();
 
  private:
   std::string waiting_;
 };
 
-/// The keys of a text: characters as they are typed, a space among them, and <left>, <right>, <up>, <down>, <space>,
-/// <esc>. Throws UserError for what is no key.
+/// The keys of a text: characters as they are typed, including a space, and <left>, <right>, <up>, <down>, <space>,
+/// <esc>. Throws UserError for other text.
 std::vector<Key> keys_of(std::string_view text);
 
 }  // namespace esim

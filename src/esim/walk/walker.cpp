@@ -8,7 +8,7 @@ namespace esim {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kStep_s = 0.1;  // a key is a step of so long
+constexpr double kStep_s = 0.1;  // each key press moves for this time
 constexpr double kTurn_rad = 5.0 * kDegree;
 constexpr double kLargestPitch_rad = 89.0 * kDegree;
 constexpr double kFaster = 1.25;
@@ -24,7 +24,7 @@ void Walker::stand_at(const SE3& T_world_camera) {
   position_ = T_world_camera.translation;
   const Eigen::Vector3d direction = T_world_camera.rotation * Eigen::Vector3d::UnitZ();
   const double level = std::hypot(direction.x(), direction.y());
-  // One that looks straight up or down has its heading in what is up in the image.
+  // If it looks straight up or down, the upward direction of the image gives the heading.
   const Eigen::Vector3d heading =
       level > 1e-6 ? direction : -direction.z() * (T_world_camera.rotation * -Eigen::Vector3d::UnitY());
   yaw_rad_ = std::atan2(heading.y(), heading.x());

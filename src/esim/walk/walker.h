@@ -8,30 +8,30 @@
 
 namespace esim {
 
-/// A camera that keys move through a scene, and the way points that it drops. It keeps level: its x axis is horizontal
-/// (world z is up), and it looks up and down by at most 89°.
+/// A camera that moves through a scene by keys, and its waypoints. The camera stays level: its x axis is horizontal
+/// (world z is up), and its pitch is at most ±89°.
 class Walker {
  public:
-  /// What a key has led to, and what is to be done by whoever shows the scene.
+  /// The effect of a key, or an action that the caller must perform.
   enum class Effect {
     nothing,
-    moved,          ///< also by going to a way point
+    moved,          ///< also to a waypoint
     speed_changed,  ///< of the steps
     dropped,        ///< points() has one more
-    stands_there,   ///< nothing was dropped: the last way point is here
-    removed,        ///< points() has one less
+    stands_there,   ///< nothing was added: the last waypoint is here
+    removed,        ///< points() has one fewer
     preview,
     play,
     help,
     leave,
   };
 
-  /// At a camera's pose, of which the roll is left out.
+  /// Starts at a camera's pose without its roll.
   explicit Walker(const SE3& T_world_camera, double speed_m_per_s = 1.0);
 
   Effect press(Key key);
 
-  /// A way point that is there already.
+  /// Adds an existing waypoint.
   void add_point(const SE3& T_world_camera) { points_.push_back(T_world_camera); }
 
   SE3 T_world_camera() const;

@@ -18,7 +18,7 @@ namespace {
 constexpr const char* kInstall =
     "install the graphics driver's EGL, or Mesa's (Debian: libegl1 libgl1-mesa-dri), or use engine: raycast";
 
-/// libepoxy ends the process where a library is missing: look before it does.
+/// libepoxy terminates the process if a library is missing, so this checks for the libraries first.
 bool is_installed() {
   for (const char* library : {"libEGL.so.1", "libOpenGL.so.0"}) {
     void* const handle = dlopen(library, RTLD_LAZY | RTLD_LOCAL);
@@ -30,7 +30,7 @@ bool is_installed() {
   return true;
 }
 
-/// A display for each device that EGL knows, or Mesa's own where it cannot tell.
+/// A display for each device that EGL lists, or Mesa's surfaceless display if it cannot list devices.
 std::vector<EGLDisplay> displays() {
   std::vector<EGLDisplay> found;
   if (!is_installed()) return found;
@@ -47,7 +47,7 @@ std::vector<EGLDisplay> displays() {
   return found;
 }
 
-/// Null where the device offers no OpenGL 4.5.
+/// Null if the device does not support OpenGL 4.5.
 EGLContext create_context(EGLDisplay display) {
   if (display == EGL_NO_DISPLAY || eglInitialize(display, nullptr, nullptr) == EGL_FALSE) return EGL_NO_CONTEXT;
   if (!epoxy_has_egl_extension(display, "EGL_KHR_no_config_context") ||
@@ -66,7 +66,7 @@ bool is_software(std::string_view renderer) {
                      [&](std::string_view name) { return renderer.find(name) != std::string_view::npos; });
 }
 
-/// What the current context runs on.
+/// The device of the current context.
 std::string current_device() {
   const GLubyte* const name = glGetString(GL_RENDERER);
   return name != nullptr ? reinterpret_cast<const char*>(name) : "unknown";
@@ -74,9 +74,9 @@ std::string current_device() {
 
 }  // namespace
 
-/// A context, and what it runs on.
+/// A context and its device.
 struct GlContext::Handles {
-  EGLDisplay display;  // the process's, and never closed: others may use it
+  EGLDisplay display;  // shared by the process, and never closed, since others may use it
   EGLContext context;
   std::string name;
   bool software = false;
@@ -89,7 +89,7 @@ struct GlContext::Handles {
 
 namespace {
 
-/// The thread's context, to be put back.
+/// The thread's previous context, to be restored.
 struct CurrentContext {
   EGLDisplay display = eglGetCurrentDisplay();
   EGLContext context = eglGetCurrentContext();
@@ -116,7 +116,7 @@ GlContext::Use::Use(const GlContext& context) : display_(context.handles_->displ
 
 GlContext::Use::~Use() { before_->put_back(display_); }
 
-/// Null where the device offers no OpenGL 4.5.
+/// Null if the device does not support OpenGL 4.5.
 std::unique_ptr<GlContext::Handles> GlContext::open(void* display) {
   auto handles = std::make_unique<Handles>(display);
   if (handles->context == EGL_NO_CONTEXT) return nullptr;
@@ -130,17 +130,17 @@ std::unique_ptr<GlContext::Handles> GlContext::open(void* display) {
 
 GlContext::GlContext(std::optional<int> device) {
   const std::vector<EGLDisplay> all = displays();
-  if (all.empty()) throw UserError(std::string("gl: no device for OpenGL without a window; ") + kInstall);
+  if (all.empty()) throw UserError(std::string("gl: no device supports OpenGL without a window; ") + kInstall);
   const int count = static_cast<int>(all.size());
   if (device && (*device < 0 || *device >= count)) {
-    throw UserError("gl_device: " + std::to_string(*device) + " is not there; the devices are 0 to " +
+    throw UserError("gl_device: device " + std::to_string(*device) + " does not exist; the devices are 0 to " +
                     std::to_string(count - 1));
   }
   for (int i = device.value_or(0); i < (device ? *device + 1 : count); ++i) {
     std::unique_ptr<Handles> found = open(all[static_cast<std::size_t>(i)]);
     if (found && (!handles_ || (handles_->software && !found->software))) handles_ = std::move(found);
   }
-  if (!handles_) throw UserError(std::string("gl: the devices offer no OpenGL 4.5; ") + kInstall);
+  if (!handles_) throw UserError(std::string("gl: no device supports OpenGL 4.5; ") + kInstall);
 }
 
 const std::string& GlContext::name() const { return handles_->name; }
@@ -166,7 +166,7 @@ void throw_on_gl_error(const char* doing) {
   const GLenum error = glGetError();
   if (error == GL_NO_ERROR) return;
   if (error == GL_OUT_OF_MEMORY) {
-    throw UserError(std::string("gl: the device has not enough memory for ") + doing +
+    throw UserError(std::string("gl: the device does not have enough memory for ") + doing +
                     "; use smaller textures or a smaller image");
   }
   throw InternalError(std::string("gl: error ") + std::to_string(error) + " while " + doing);

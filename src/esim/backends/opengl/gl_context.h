@@ -9,13 +9,13 @@ namespace esim {
 /// An OpenGL 4.5 context without a window. Private to the renderer.
 class GlContext {
  public:
-  /// On the device of this index; where none is given, on the first that is no software. Throws UserError.
+  /// Opens the device with this index, by default the first one that is not software. Throws UserError.
   explicit GlContext(std::optional<int> device);
   ~GlContext();
   GlContext(const GlContext&) = delete;
   GlContext& operator=(const GlContext&) = delete;
 
-  /// Makes the context that of the calling thread for as long as it lives.
+  /// Makes the context current in the calling thread during its lifetime.
   class Use {
    public:
     explicit Use(const GlContext& context);
@@ -29,7 +29,7 @@ class GlContext {
     std::unique_ptr<Before> before_;
   };
 
-  /// The driver's name of the device.
+  /// The driver's name for the device.
   const std::string& name() const;
   bool software() const;
 

@@ -8,7 +8,7 @@
 namespace esim {
 namespace {
 
-/// Throws unless `status` of a shader or program is good; `get` and `get_log` are OpenGL's functions for its kind.
+/// Throws unless `status` of a shader or program is true; `get` and `get_log` are OpenGL's functions for its type.
 template <typename Get, typename GetLog>
 void require(GLuint name, GLenum status, const Get& get, const GetLog& get_log, const char* problem) {
   GLint good = GL_FALSE, length = 0;

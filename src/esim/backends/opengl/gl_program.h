@@ -6,11 +6,10 @@
 
 namespace esim {
 
-/// The parts of a shader's source, in order, without the line that names the version.
+/// The parts of a shader's source, in order, without the #version line.
 using ShaderSource = std::vector<const char*>;
 
-/// A shader program; belongs to the current context and ends with it. Throws InternalError with the driver's log where
-/// the source does not compile.
+/// A shader program of the current context. Throws InternalError with the driver's log if the source does not compile.
 GLuint make_program(const ShaderSource& vertex, const ShaderSource& fragment);
 
 // A program's uniforms, by name.

@@ -52,7 +52,7 @@ void GlReadBack::start(const GlTarget& target, const std::vector<Tile>& tiles, b
   glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
   if (done_ != nullptr) glDeleteSync(done_);
   done_ = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
-  glFlush();  // or nothing would begin before finish()
+  glFlush();  // otherwise nothing would begin before finish()
 }
 
 void GlReadBack::finish(Sample& sample) {

@@ -9,19 +9,19 @@
 
 namespace esim {
 
-/// Pixels on their way from the device into memory. Used with its context current, and ends with that. Private to the
-/// renderer.
+/// An asynchronous copy of pixels from the device to memory. Use and destroy it with its context current. Private to
+/// the renderer.
 class GlReadBack {
  public:
-  /// Begins to copy the tiles' E, Z and V, and with `with_objects` which object is seen, as soon as all that has been
-  /// drawn is there. What was under way before is forgotten.
+  /// Begins to copy E, Z and V of the tiles, and with `with_objects` the visible objects, after all previous draw
+  /// calls. Discards an earlier copy that is not finished.
   void start(const GlTarget& target, const std::vector<Tile>& tiles, bool with_objects);
 
-  /// Waits for them, and puts them into `sample`, which has room and names the tiles.
+  /// Waits for the pixels and writes them to `sample`, which must have the right size and the list of tiles.
   void finish(Sample& sample);
 
  private:
-  /// A buffer that the device writes pixels to and the processor reads them from.
+  /// A buffer to which the device writes pixels and from which the processor reads them.
   struct Buffer {
     GLuint name = 0;
     std::size_t size = 0;  // bytes

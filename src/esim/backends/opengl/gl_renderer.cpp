@@ -26,7 +26,7 @@ namespace {
 
 constexpr float kNear = 1e-3F;  // m
 
-// For the shaders: see their structs of these names.
+// Data of the shaders, which have structs of the same names.
 struct ShaderTwist {
   float v[4];
   float omega[4];
@@ -52,8 +52,8 @@ std::array<float, 4> clip_of(const PinholeView& view) {
           static_cast<float>((2 * view.cy + 1) / view.height - 1)};
 }
 
-/// Passes one after the other: surfaces into a pinhole image; its samples into pixels; these into the distorted image,
-/// where the lens distorts. The last of them writes E, Z and V, once per pixel however many triangles were drawn there.
+/// The passes are: draw the surfaces into a pinhole image; resolve its samples into pixels; if the lens distorts, look
+/// these up in the distorted image. The last pass writes E, Z and V once per pixel, for any number of triangles.
 class GlRenderer final : public Renderer {
  public:
   GlRenderer(const Scene& scene, const GlOptions& options, const Camera& camera)
@@ -81,7 +81,7 @@ class GlRenderer final : public Renderer {
 
   std::unique_ptr<Rendering> start(RenderRequest request) override {
     if (request.objects.size() != moving_count())
-      throw InternalError("a request does not name as many objects as move in the scene");
+      throw InternalError("the number of objects in a request must be the number of moving objects in the scene");
     const GlContext::Use use(context_);
     set_up(request);
     if (shadows_) shadows_->draw(request);
@@ -95,7 +95,7 @@ class GlRenderer final : public Renderer {
   }
 
  private:
-  /// A frame that has been handed to the device. Borrows buffers from the renderer.
+  /// A frame that the device renders. Borrows buffers from the renderer.
   struct UnderWay final : Rendering {
     UnderWay(GlRenderer& from, RenderRequest asked) : renderer(from), request(std::move(asked)) {
       if (renderer.idle_.empty()) renderer.idle_.push_back(std::make_unique<GlReadBack>());
@@ -129,12 +129,12 @@ class GlRenderer final : public Renderer {
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
     if (std::max(view_.width, view_.height) <= largest) return;
     throw UserError("gl: this camera's view needs a pinhole image of " + std::to_string(view_.width) + " x " +
-                    std::to_string(view_.height) + " pixels, the device has " + std::to_string(largest) +
-                    "; use engine: raycast");
+                    std::to_string(view_.height) + " pixels, but the device supports at most " +
+                    std::to_string(largest) + "; use engine: raycast");
   }
 
   void make_passes() {
-    const GLenum floats = view_.looked_up ? GL_RGBA32F : GL_RG32F;  // a lens needs to know how 1 / Z changes
+    const GLenum floats = view_.looked_up ? GL_RGBA32F : GL_RG32F;  // a lens needs the slope of 1 / Z
     ShaderSource surfaces = {kSurfaceFragmentShader}, resolve = {kResolveFragmentShader};
     if (shadows_) surfaces.insert(surfaces.begin(), kShadowShader);
     surface_program_ = make_program({kSurfaceVertexShader}, surfaces);
@@ -173,7 +173,7 @@ class GlRenderer final : public Renderer {
     jacobians_ = upload(GL_RGBA32F, GL_RGBA, jacobians);
   }
 
-  /// What is the same for all tiles: state, poses, twists, lights.
+  /// Sets what is the same for all tiles: state, poses, twists, lights.
   void set_up(const RenderRequest& request) {
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     glDepthFunc(GL_GREATER);
@@ -240,7 +240,7 @@ class GlRenderer final : public Renderer {
     draw_whole();
   }
 
-  /// Draws the scene once, wherever the request's tiles are: a stencil keeps pixels between them from being shaded.
+  /// Draws the scene once; a stencil prevents shading of pixels outside the request's tiles.
   void draw_surfaces(const RenderRequest& request) const {
     clear_surfaces(request.tiles);
     const GLuint program = surface_program_;
@@ -264,7 +264,7 @@ class GlRenderer final : public Renderer {
     glDisable(GL_STENCIL_TEST);
   }
 
-  /// Clears the tiles, and lets only these be drawn.
+  /// Clears the tiles, and restricts drawing to them.
   void clear_surfaces(const std::vector<Tile>& tiles) const {
     const GLuint target = surfaces_.framebuffer;
     const GLfloat background[] = {options_.background, 0, 0, 0};
@@ -324,7 +324,7 @@ class GlRenderer final : public Renderer {
   GLuint no_vertices_ = 0, lights_ = 0, twists_ = 0;
   std::vector<std::unique_ptr<GlReadBack>> idle_;
 
-  // Of the request that is being drawn.
+  // State of the current request.
   SE3 T_camera_world_;
   int light_count_ = 0;
 };

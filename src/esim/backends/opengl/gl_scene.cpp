@@ -12,9 +12,9 @@
 
 namespace esim {
 
-/// Corners are not shared: texture coordinates belong to a triangle's corner.
+/// Vertices are not shared, since texture coordinates belong to a triangle's corner.
 struct GlScene::Vertex {
-  Eigen::Vector3f position, normal;  // a normal of zero: a flat triangle
+  Eigen::Vector3f position, normal;  // a normal of zero means a flat triangle
   Eigen::Vector2f texture_uv;
 };
 
@@ -77,7 +77,7 @@ GLuint GlScene::texture(const Texture* texture) {
   glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
   if (texture->width() > largest || texture->height() > largest) {
     throw UserError("gl: a texture of " + std::to_string(texture->width()) + " x " + std::to_string(texture->height()) +
-                    " texels is larger than the device's " + std::to_string(largest) +
+                    " texels is larger than the device's maximum of " + std::to_string(largest) +
                     "; scale it down, or use engine: raycast");
   }
   const Image<float> texels = texture->texels();

@@ -9,7 +9,7 @@
 
 namespace esim {
 
-/// A scene in the memory of the current context's device; ends with the context. Private to the renderer.
+/// A scene in the device memory of the current context. Private to the renderer.
 class GlScene {
  public:
   explicit GlScene(const Scene& scene);

@@ -8,11 +8,11 @@ const char* const kSeveralSamples = "#define SEVERAL_SAMPLES\n";
 const char* const kLastPassShader = R"(
 #define LAST_PASS
 struct Twist {
-  vec4 v, omega;  // of the camera relative to what is seen, in the camera frame; m/s, rad/s
+  vec4 v, omega;  // of the camera relative to the surface, in the camera frame; m/s, rad/s
 };
-layout(std430, binding = 1) readonly buffer Twists { Twist twists[]; };  // by object; first what stands still
+layout(std430, binding = 1) readonly buffer Twists { Twist twists[]; };  // by object; first the static scene
 
-// E, Z and V. `jacobian` is that of the pixel's place with respect to its bearing.
+// E, Z and V. `jacobian` is the derivative of the pixel's position by its bearing.
 vec4 last_pass(float irradiance, float inverse_depth, uint which, vec2 bearing, mat2 jacobian) {
   float depth = inverse_depth > 0 ? 1 / inverse_depth : uintBitsToFloat(0x7F800000u);
   vec3 w = -twists[which].v.xyz * inverse_depth - cross(twists[which].omega.xyz, vec3(bearing, 1));
@@ -20,8 +20,8 @@ vec4 last_pass(float irradiance, float inverse_depth, uint which, vec2 bearing, 
 }
 )";
 
-// Row y of a target is row y of the image: nothing is turned over. Depth is reversed (1 at the near plane, 0 at
-// infinity), which keeps floats precise far away; 1 / gl_FragCoord.w is Z.
+// Row y of a target is row y of the image: images are not flipped. Depth is reversed (1 at the near plane, 0 at
+// infinity), so that floats stay precise at large distances; 1 / gl_FragCoord.w is Z.
 const char* const kSurfaceVertexShader = R"(
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
@@ -42,7 +42,7 @@ void main() {
 
 const char* const kSurfaceFragmentShader = R"(
 struct Light {
-  vec4 place;     // xyz: towards a sun, or the place of a point light (w = 1), in the camera frame
+  vec4 place;     // xyz: direction to a sun, or position of a point light (w = 1), in the camera frame
   vec4 strength;  // x
 };
 layout(std430, binding = 0) readonly buffer Lights { Light lights[]; };
@@ -62,8 +62,8 @@ uniform uint object;
 layout(location = 0) out vec4 seen;
 layout(location = 1) out uint which;
 
-// Mean over the pixel's footprint, as Texture::sample() computes it: up to four probes along the footprint's longer side,
-// each between two levels of the mip pyramid. Drivers' own anisotropic filters take liberties.
+// Mean over the pixel's footprint, as in Texture::sample(): up to four probes along the footprint's longer side, each
+// between two levels of the mip pyramid. The anisotropic filters of drivers differ.
 float mean_colour(sampler2D image) {
   const float most_probes = 4;
   vec2 size = vec2(textureSize(image, 0)), dx = dFdx(uv), dy = dFdy(uv);
@@ -81,7 +81,7 @@ float mean_colour(sampler2D image) {
 }
 
 float light_on_surface() {
-  // On the side that is seen. A vertex normal of zero stands for a flat triangle.
+  // On the visible side. A vertex normal of zero means a flat triangle.
   vec3 right = dFdx(point), down = dFdy(point), flat_normal = normalize(cross(right, down));
   vec3 n = dot(surface_normal, surface_normal) > 0 ? normalize(surface_normal) : flat_normal;
   if (dot(flat_normal, point) > 0) flat_normal = -flat_normal;
@@ -116,7 +116,7 @@ void main() {
 }
 )";
 
-// E is the mean of the samples; Z and the object are those of one.
+// E is the mean of the samples; Z and the object are those of one sample.
 const char* const kResolveFragmentShader = R"(
 #ifdef SEVERAL_SAMPLES
 layout(binding = 0) uniform sampler2DMS seen_samples;
@@ -144,8 +144,8 @@ void main() {
 }
 )";
 
-// Where each pixel's centre and footprint lie in the pinhole image is tabulated, and so are its bearing and the lens'
-// Jacobian. 1 / Z is linear on planes, so that Z is exact there.
+// Tables hold each pixel's centre and footprint in the pinhole image, its bearing and the Jacobian of the lens. 1 / Z
+// is linear on planes, so that Z is exact there.
 const char* const kDistortFragmentShader = R"(
 layout(binding = 0) uniform sampler2D pinhole_seen;
 layout(binding = 1) uniform usampler2D pinhole_which;

@@ -5,20 +5,20 @@
 /// The shaders, as parts of sources for make_program().
 namespace esim {
 
-// What they share with their users: attributes of vertices, bindings of buffers and of textures.
+// Vertex attributes, and bindings of buffers and textures.
 inline constexpr GLuint kPosition = 0, kNormal = 1, kTextureUv = 2;
 inline constexpr GLuint kLightsBinding = 0, kTwistsBinding = 1, kShadowViewsBinding = 2;
 inline constexpr GLuint kBaseTexture = 0, kEmissionTexture = 1, kStillShadows = 2, kMovingShadows = 3;
 inline constexpr GLuint kSeen = 0, kWhich = 1, kCentres = 2, kFootprints = 3, kBearings = 4, kJacobians = 5;
 
-/// Goes before the shader of the last pass, which writes E, Z and V. The others write E, 1 / Z and how that changes to
-/// the right and downwards.
+/// Precedes the shader of the last pass, which writes E, Z and V. The other passes write E, 1 / Z and its slopes to the
+/// right and downwards.
 extern const char* const kLastPassShader;
 
-/// Goes before kResolveFragmentShader where pixels have more than one sample.
+/// Precedes kResolveFragmentShader if pixels have more than one sample.
 extern const char* const kSeveralSamples;
 
-/// Goes before the surfaces' shader of fragments where lights cast shadows.
+/// Precedes the fragment shader of surfaces if lights cast shadows.
 extern const char* const kShadowShader;
 
 extern const char* const kSurfaceVertexShader;

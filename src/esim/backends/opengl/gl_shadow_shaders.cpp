@@ -2,7 +2,7 @@
 
 namespace esim {
 
-// What a light sees: depth in clip space, reversed like the camera's. Both sides of a triangle cast shadows.
+// A light's view: depth in clip space, reversed like the camera's. Both sides of a triangle cast shadows.
 const char* const kShadowMapVertexShader = R"(
 layout(location = 0) in vec3 position;
 uniform mat4 clip_from_object;
@@ -13,49 +13,49 @@ const char* const kShadowMapFragmentShader = R"(
 void main() {}
 )";
 
-// How much of a light reaches what a pixel sees: percentage-closer filtering over the pixel's footprint in the map, and
-// over three texels at least. Each texel's depth is compared with that of the surface's own plane under the texel's
-// centre, so that no plane shadows itself however grazing the light; or with the surface's depth in the middle where
-// that is nearer to the light, so that the other side of a concave corner does not either. (What casts shadows is drawn
-// with an offset of its own slope; see GlShadows.)
+// The fraction of a light that reaches a pixel's surface: percentage-closer filtering over the pixel's footprint in the
+// map, and over at least three texels. Each texel's depth is compared with that of the surface's own plane under the
+// texel's centre, so that no plane shadows itself at any angle; or with the surface's depth at the pixel's centre if
+// that is nearer to the light, so that the other side of a concave corner casts no false shadow either. (Shadow casters
+// are drawn with an offset by their own slope; see GlShadows.)
 const char* const kShadowShader = R"(
 #define SHADOWS
 struct ShadowView {
   mat4 clip_from_camera, camera_from_clip;
-  vec4 texel;  // x: its width in m, where w of clip space is 1; y: 0 where nothing has been drawn
+  vec4 texel;  // x: its width in m at w = 1 of clip space; y: 0 if nothing has been drawn
 };
 layout(std430, binding = 2) readonly buffer ShadowViews {
-  ShadowView views[];  // a layer each: of what stands still, then of what moves
+  ShadowView views[];  // one per layer: of static objects, then of moving ones
 };
 layout(binding = 2) uniform sampler2DArray still_shadows;
 layout(binding = 3) uniform sampler2DArray moving_shadows;
 uniform int shadow_layers;
-uniform int shadow_suns;          // they come first, with one layer each; point lights have six
+uniform int shadow_suns;          // suns come first, with one layer each; point lights have six
 uniform mat3 world_from_camera;
 uniform float camera_to_origin;   // of the world: |x| + |y| + |z|
 
-// Which of the six views of a point light a direction in the world frame lies in.
+// The view of a point light, out of six, that contains a direction in the world frame.
 int face_of(vec3 direction) {
   vec3 size = abs(direction);
   int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
   return 2 * axis + (direction[axis] < 0 ? 1 : 0);
 }
 
-// What a pixel sees: a point, how it moves as the pixel does to the right and downwards, and the triangle's normal on
-// the side that is seen.
+// What a pixel sees: a point, its derivatives by the pixel to the right and downwards, and the triangle's normal on the
+// visible side.
 struct Seen {
   vec3 point, right, down, normal;
 };
 
-// A surface as a map sees it. Places are in texels.
+// A surface in a shadow map. Positions are in texels.
 struct Mapped {
-  vec2 place, along, across;  // of the pixel's centre, and how it moves as the pixel does to the right and downwards
+  vec2 place, along, across;  // of the pixel's centre, and its derivatives by the pixel to the right and downwards
   float depth;                // there
   vec2 slope;                 // how the depth changes per texel
 };
 
-// Which of the four texels around `corner` + 1/2 light reaches: (0, 1), (1, 1), (1, 0) and (0, 0) from `corner`. `depth`
-// is that of the surface nearby.
+// Whether light reaches each of the four texels around `corner` + 1/2: (0, 1), (1, 1), (1, 0) and (0, 0) from `corner`.
+// `depth` is that of the surface nearby.
 vec4 lit_texels(sampler2DArray depths, int layer, vec2 corner, Mapped seen, float depth) {
   vec4 stored = textureGather(depths, vec3((corner + 1) / vec2(textureSize(depths, 0).xy), layer));
   vec2 away = corner - seen.place;
@@ -63,7 +63,7 @@ vec4 lit_texels(sampler2DArray depths, int layer, vec2 corner, Mapped seen, floa
   return vec4(lessThanEqual(stored, max(max(on_plane, depth), 0)));
 }
 
-// Over 4 x 4 texels, a box of 3 x 3 that moves continuously with `place`.
+// The lit fraction of a box of 3 x 3 texels, out of 4 x 4, that moves continuously with `place`.
 float share_of_box(sampler2DArray depths, int layer, vec2 place, Mapped seen) {
   float depth = seen.depth + dot(seen.slope, place - seen.place);
   vec2 corner = floor(place) - 1, f = fract(place);
@@ -78,8 +78,8 @@ float share_of_box(sampler2DArray depths, int layer, vec2 place, Mapped seen) {
   return sum / 9;
 }
 
-// Over the footprint, by as many boxes as it takes, up to 4 x 4. Where its corners and its centre are alike, no straight
-// edge crosses it.
+// The lit fraction of the footprint, by as many boxes as necessary, up to 4 x 4. If its corners and its centre agree,
+// no straight edge crosses it.
 float share_of_footprint(sampler2DArray depths, int layer, Mapped seen) {
   const float most_boxes = 4;
   vec2 low = vec2(1), high = vec2(textureSize(depths, 0).xy) - 3;
@@ -107,7 +107,7 @@ float share_of_footprint(sampler2DArray depths, int layer, Mapped seen) {
 
 float share_in_view(sampler2DArray depths, int layer, int view, Seen seen) {
   if (views[view].texel.y == 0) return 1;
-  // A little above the surface: a quarter of a texel, and what rounding may have put the point below it.
+  // Slightly above the surface: by a quarter of a texel plus the rounding error of the point.
   mat4 clip_from_camera = views[view].clip_from_camera;
   float texel = views[view].texel.x * (clip_from_camera * vec4(seen.point, 1)).w;
   vec3 a = abs(seen.point), n = seen.normal;
@@ -116,7 +116,7 @@ float share_in_view(sampler2DArray depths, int layer, int view, Seen seen) {
   if (clip.w <= 0) return 1;
   vec3 at = clip.xyz / clip.w;
 
-  // Where that is in the map, and what of it the pixel covers, in texels.
+  // Its position in the map, and the pixel's footprint there, in texels.
   vec2 size = vec2(textureSize(depths, 0).xy), half_size = 0.5 * size / clip.w;
   vec2 place = (0.5 * at.xy + 0.5) * size - 0.5;
   vec4 right = clip_from_camera * vec4(seen.right, 0), down = clip_from_camera * vec4(seen.down, 0);

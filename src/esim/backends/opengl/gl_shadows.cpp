@@ -16,17 +16,17 @@ namespace {
 
 constexpr int kLargestMap = 4096;                                          // texels
 constexpr double kMostStillTexels = 1 << 26, kMostMovingTexels = 1 << 23;  // of all layers, 4 bytes each
-constexpr int kMargin = 4;          // texels around what is seen: more than the filter reaches
+constexpr int kMargin = 4;          // texels around a view: more than the radius of the filter
 constexpr double kNearLamp = 1e-3;  // m
 constexpr int kFaces = 6;
 
-/// One view of the shader: see its struct of this name.
+/// One view, as in the shader's struct of this name.
 struct ShadowView {
   Eigen::Matrix4f clip_from_camera, camera_from_clip;
   float texel[4];
 };
 
-/// Rows: two axes across the light, and the direction in which it shines.
+/// Rows: two axes perpendicular to the light, and its direction.
 Eigen::Matrix3d across(const SunLight& sun) {
   const Eigen::Vector3d along = sun.direction.cast<double>().normalized();
   Eigen::Matrix3d axes;
@@ -36,7 +36,7 @@ Eigen::Matrix3d across(const SunLight& sun) {
   return axes;
 }
 
-/// What a sun sees of a box in its frame. Depth is 1 where the light comes in, 0 at the end.
+/// A sun's view of a box in its frame. Depth is 1 where the light enters, 0 at the opposite side.
 Eigen::Matrix4d sun_clip(const Eigen::Matrix3d& axes, const Eigen::AlignedBox3d& box) {
   const Eigen::Vector3d size = box.sizes(), centre = box.center();
   Eigen::Matrix4d clip = Eigen::Matrix4d::Identity();
@@ -46,7 +46,7 @@ Eigen::Matrix4d sun_clip(const Eigen::Matrix3d& axes, const Eigen::AlignedBox3d&
   return clip;
 }
 
-/// What a point light sees along one axis of the world: a square of 90 degrees, and a little more.
+/// A point light's view along one axis of the world: a square of slightly more than 90 degrees.
 Eigen::Matrix4d face_clip(const Eigen::Vector3d& light, int face, double tangent) {
   const int axis = face / 2;
   Eigen::Matrix4d clip = Eigen::Matrix4d::Zero();
@@ -58,7 +58,7 @@ Eigen::Matrix4d face_clip(const Eigen::Vector3d& light, int face, double tangent
   return clip;
 }
 
-/// Whether a ball may reach into a view: in clip space -w <= x <= w and -w <= y <= w there.
+/// Whether a ball may intersect a view, which is -w <= x <= w and -w <= y <= w in clip space.
 bool sees(const Eigen::Matrix4d& clip_from_world, const Eigen::Vector3d& centre, double radius) {
   const Eigen::Vector4d at = clip_from_world * centre.homogeneous();
   const auto change_per_m = [&](int row) { return clip_from_world.row(row).head<3>().norm(); };
@@ -66,7 +66,7 @@ bool sees(const Eigen::Matrix4d& clip_from_world, const Eigen::Vector3d& centre,
   return w > 0 && std::fabs(at.x()) - radius * change_per_m(0) < w && std::fabs(at.y()) - radius * change_per_m(1) < w;
 }
 
-/// For boxes of no size in a direction.
+/// Enlarges boxes that have no extent in a direction.
 Eigen::AlignedBox3d with_some_size(Eigen::AlignedBox3d box) {
   const Eigen::Vector3d least = Eigen::Vector3d::Constant(1e-6 * (1 + box.center().lpNorm<1>()));
   return {box.min() - least, box.max() + least};
@@ -79,8 +79,9 @@ GlShadows::GlShadows(const Scene& scene, const GlScene& drawn) : drawn_(drawn), 
   glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &most_layers);
   layers_ = static_cast<int>(lighting_.suns.size() + kFaces * lighting_.points.size());
   if (layers_ > most_layers) {
-    throw UserError("gl: too many lights cast shadows for the device's " + std::to_string(most_layers) +
-                    " layers (six for each point light); use fewer, or engine: raycast");
+    throw UserError("gl: too many lights cast shadows: their shadow maps need more than the device's " +
+                    std::to_string(most_layers) +
+                    " layers (six for each point light); use fewer lights, or engine: raycast");
   }
   for (const SceneObject& object : scene.objects) {
     if (!object.moves) continue;
@@ -110,7 +111,7 @@ GlShadows::GlShadows(const Scene& scene, const GlScene& drawn) : drawn_(drawn), 
   draw_views(still_, objects);
 }
 
-/// The largest layers of a power of two that stay within `most_texels` in all.
+/// Layers of the largest power of two that have at most `most_texels` in total.
 GlShadows::Maps GlShadows::make_maps(double most_texels) const {
   GLint largest = 0;
   glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
@@ -124,11 +125,11 @@ GlShadows::Maps GlShadows::make_maps(double most_texels) const {
     glTextureParameteri(maps.texture, direction, GL_CLAMP_TO_EDGE);
   for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
     glTextureParameteri(maps.texture, filter, GL_NEAREST);
-  throw_on_gl_error("making room for shadows");
+  throw_on_gl_error("allocating shadow maps");
   return maps;
 }
 
-/// A sun's view of all that stands still.
+/// A sun's view of all static objects.
 GlShadows::View GlShadows::still_sun(const Scene& scene, const SunLight& sun) const {
   const Eigen::Matrix3d axes = across(sun);
   Eigen::AlignedBox3d box;
@@ -143,8 +144,8 @@ GlShadows::View GlShadows::still_sun(const Scene& scene, const SunLight& sun) co
   return {sun_clip(axes, {box.min() - margin, box.max() + margin}), std::max(texel.x(), texel.y()), true};
 }
 
-/// A sun's view of all that moves, `balls` being in the world frame. Its texels are of few sizes, and lie at whole
-/// multiples of them: what has come to rest keeps its shadow while other things move.
+/// A sun's view of all moving objects, with `balls` in the world frame. Its texels have few different sizes, and lie at
+/// integer multiples of these, so that the shadow of an object at rest does not change while other objects move.
 GlShadows::View GlShadows::moving_sun(const std::vector<Ball>& balls, const SunLight& sun) const {
   const Eigen::Matrix3d axes = across(sun);
   Eigen::AlignedBox3d box;
@@ -162,7 +163,7 @@ GlShadows::View GlShadows::moving_sun(const std::vector<Ball>& balls, const SunL
   return {sun_clip(axes, box), texel, true};
 }
 
-/// Adds the views of the point lights: squares a little wider than 90 degrees, so that the filter stays within one.
+/// Adds the views of the point lights: squares slightly wider than 90 degrees, so that the filter stays within one.
 void GlShadows::view_points(Maps& maps) const {
   const double tangent = maps.size / (maps.size - 2.0 * kMargin);
   for (const PointLight& light : lighting_.points) {

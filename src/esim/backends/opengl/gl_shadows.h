@@ -11,26 +11,26 @@
 
 namespace esim {
 
-/// Depth as a scene's lights see it: a layer for each sun, six for each point light. What stands still is drawn once,
-/// and for good: its texels lie still in the world, so that its shadows' edges do not shimmer as the camera moves. What
-/// moves has maps of its own, drawn anew for every request. Ends with the current context. Private to the renderer.
+/// Shadow maps: a layer for each sun, six for each point light. Static objects are drawn once: their texels are fixed
+/// in the world, so that the edges of their shadows do not shimmer when the camera moves. Moving objects have separate
+/// maps, which are drawn again for every request. Belongs to the current context. Private to the renderer.
 class GlShadows {
  public:
-  /// Both outlive it. Throws UserError where there are more lights than the device has layers for.
+  /// Both must outlive it. Throws UserError if the device does not have enough layers for the lights.
   GlShadows(const Scene& scene, const GlScene& drawn);
 
-  /// Draws what moves, and gives all that shaders need to those that follow. Changes the framebuffer, the viewport, the
+  /// Draws the moving objects, and uploads the data for the shaders. Changes the framebuffer, the viewport, the
   /// scissor, the program and the vertices.
   void draw(const RenderRequest& request);
 
-  /// Sets the uniforms of a program in use that has the shader of shadows.
+  /// Sets the uniforms of the current program, which must contain the shadow shader.
   void bind_to(GLuint program) const;
 
  private:
-  /// What a light sees of a part of the scene.
+  /// A light's view of a part of the scene.
   struct View {
     Eigen::Matrix4d clip_from_world;
-    double texel = 0;  ///< width in m where w of clip space is 1
+    double texel = 0;  ///< width in m at w = 1 of clip space
     bool used = false;
   };
   /// Layers of depth, one per view.

@@ -39,9 +39,9 @@ GlTarget GlTarget::make(int width, int height, int samples, bool with_depth, GLe
   }
   constexpr GLenum kBuffers[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
   glNamedFramebufferDrawBuffers(target.framebuffer, 2, kBuffers);
-  throw_on_gl_error("making room for images");
+  throw_on_gl_error("allocating images");
   if (glCheckNamedFramebufferStatus(target.framebuffer, GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
-    throw UserError("gl: the driver cannot draw into images of floats; use engine: raycast");
+    throw UserError("gl: the driver cannot render to floating-point images; use engine: raycast");
   return target;
 }
 

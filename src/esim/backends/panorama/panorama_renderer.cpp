@@ -64,7 +64,7 @@ class PanoramaRenderer final : public ProcessorRenderer {
       at.u[i] = 0.5F + kPerLongitude * arc_tangent(dy, dx);
       at.v[i] = 0.5F + kPerLatitude * arc_tangent(dz, rho);
 
-      // Derivatives of u and v with respect to d, then as the pixel moves by one to the right and by one downwards.
+      // Derivatives of u and v with respect to d, then with respect to the pixel to the right and downwards.
       const float u_x = -kPerLongitude * dy / rho2, u_y = kPerLongitude * dx / rho2;
       const float scale = kPerLatitude / (rho2 + dz * dz);
       const float v_x = -dz * dx / rho * scale, v_y = -dz * dy / rho * scale, v_z = rho * scale;

@@ -39,7 +39,7 @@ class PlaneRenderer final : public ProcessorRenderer {
 
   struct View {
     Eigen::Matrix3f R_poster_camera;
-    Eigen::Vector3f origin;  // of the camera, in the poster's frame
+    Eigen::Vector3f origin;  // of the camera, in the plane's frame
   };
 
   void shade(const View& view, int first, int row, int count, Sample& sample) const {
@@ -54,7 +54,7 @@ class PlaneRenderer final : public ProcessorRenderer {
     const float per_width = 1.0F / static_cast<float>(poster_.width_m);
     const float per_height =
         per_width * static_cast<float>(poster_.radiance->width()) / static_cast<float>(poster_.radiance->height());
-    // Where the poster ends, in texture coordinates around its centre.
+    // The edge of the plane, in texture coordinates around its centre.
     const float reach = poster_.endless ? 1e6F : 0.5F;
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
 #pragma omp simd
@@ -63,10 +63,10 @@ class PlaneRenderer final : public ProcessorRenderer {
       const float dx = r00 * bx + r01 * by + r02, dy = r10 * bx + r11 * by + r12, dz = r20 * bx + r21 * by + r22;
       const float slope = std::fabs(dz) > 1e-12F ? 1.0F / dz : 1e12F;
 
-      // The bearing has z = 1 in the camera, so the ray's parameter is the planar depth.
+      // The bearing has z = 1 in the camera frame, so the ray's parameter is the planar depth.
       const float distance = -oz * slope;
       const float u = (ox + distance * dx) * per_width, v = (oy + distance * dy) * per_height;
-      const float seen = std::max(std::fabs(u), std::fabs(v)) <= reach ? distance : -1.0F;  // the distance, where hit
+      const float seen = std::max(std::fabs(u), std::fabs(v)) <= reach ? distance : -1.0F;  // -1: no hit
       depth[i] = seen > 0 ? seen : kInfinity;
       at.u[i] = seen > 0 ? u + 0.5F : 0.0F;
       at.v[i] = seen > 0 ? v + 0.5F : 0.0F;

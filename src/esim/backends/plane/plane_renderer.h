@@ -10,16 +10,16 @@
 
 namespace esim {
 
-/// A textured rectangle at a pose, seen from both sides. In its own frame the poster lies in z = 0 with its centre at
-/// the origin, x to the right and y down the image, so that z points into the wall: a camera of the same orientation
-/// in front of it (at negative z) sees it upright.
+/// A textured rectangle at a pose, visible from both sides. In its own frame it lies in z = 0 with its centre at the
+/// origin, x to the right and y downwards in the image, so that z points into the wall: a camera with the same
+/// orientation in front of it (at negative z) sees it upright.
 struct Poster {
   std::shared_ptr<const Texture> radiance;
   SE3 T_world_poster;
-  double width_m = 1.0;      ///< the height follows from the image's aspect
-  bool endless = false;      ///< the image repeats over the whole plane
-  float background = 0.2F;   ///< irradiance where the poster is not hit
-  ColourTextures colours{};  ///< for cameras with colour filters, which otherwise see luminance
+  double width_m = 1.0;      ///< the height follows from the image's aspect ratio
+  bool endless = false;      ///< the image repeats over an infinite plane
+  float background = 0.2F;   ///< irradiance where the rectangle is not hit
+  ColourTextures colours{};  ///< for cameras with colour filters; without them these see luminance
 };
 
 std::unique_ptr<Renderer> make_plane_renderer(Poster poster, const Camera& camera, const Workers& workers,

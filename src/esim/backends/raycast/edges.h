@@ -6,20 +6,21 @@
 #include "esim/backends/raycast/packet.h"
 #include "esim/backends/raycast/raycast_scene.h"
 
-/// Where edges cross pixels: of surfaces, and of the light on them.
+/// Finds pixels that are crossed by edges of surfaces or of the light on them.
 namespace esim {
 
-/// What a ray sees of the scene, in each of K lanes.
+/// The scene as seen by a ray in each of K lanes.
 template <int K>
 struct SeenSurfaces {
   const Packet<K>& packet;
   const std::array<std::uint32_t, K>& triangles;
-  const std::array<float, K>& light;  ///< that the surface receives; of no meaning where nothing is hit
+  const std::array<float, K>& light;  ///< that the surface receives; undefined if nothing is hit
 };
 
-/// A bit for each pixel whose centre and one of its corners see different surfaces: of another object or material,
-/// turned away by more than 25 degrees, before or behind the centre's plane by an eighth of a pixel's width, or in
-/// another light. A straight edge cannot enter a convex pixel but over a corner.
+/// A bit for each pixel whose centre and one of whose corners see different surfaces: another object or material, a
+/// normal that differs by more than 25 degrees, a distance of more than an eighth of a pixel's width from the centre's
+/// plane, or different light. These corners suffice: a straight edge that cuts off a part of a convex pixel separates a
+/// corner.
 template <int K>
 std::uint32_t pixels_on_edges(const RaycastScene& scene, const RayBlock& block, int first,
                               const SeenSurfaces<K>& centre, const SeenSurfaces<K>& corner) {
@@ -32,7 +33,7 @@ std::uint32_t pixels_on_edges(const RaycastScene& scene, const RayBlock& block, 
     const float n00 = hit0.Ng_x[i] * hit0.Ng_x[i] + hit0.Ng_y[i] * hit0.Ng_y[i] + hit0.Ng_z[i] * hit0.Ng_z[i];
     const float n11 = hit1.Ng_x[i] * hit1.Ng_x[i] + hit1.Ng_y[i] * hit1.Ng_y[i] + hit1.Ng_z[i] * hit1.Ng_z[i];
     const float n01 = hit0.Ng_x[i] * hit1.Ng_x[i] + hit0.Ng_y[i] * hit1.Ng_y[i] + hit0.Ng_z[i] * hit1.Ng_z[i];
-    // From the centre's point to the corner's, both seen from the same place, in the frame of what is hit.
+    // From the centre's point to the corner's, both from the same viewpoint, in the frame of the surface.
     const float dx = ray1.tfar[i] * ray1.dir_x[i] - ray0.tfar[i] * ray0.dir_x[i];
     const float dy = ray1.tfar[i] * ray1.dir_y[i] - ray0.tfar[i] * ray0.dir_y[i];
     const float dz = ray1.tfar[i] * ray1.dir_z[i] - ray0.tfar[i] * ray0.dir_z[i];

@@ -1,6 +1,6 @@
 #pragma once
 
-// Embree 3 and 4, which differ in how a query receives its arguments. CMakeLists.txt defines ESIM_EMBREE_MAJOR as the
+// Embree 3 and 4 pass the arguments of a query in different ways. CMakeLists.txt defines ESIM_EMBREE_MAJOR as the
 // version that was found.
 #if ESIM_EMBREE_MAJOR >= 4
 #include <embree4/rtcore.h>
@@ -16,11 +16,11 @@ namespace esim::embree {
 template <int K>
 using Rays = std::conditional_t<K == 16, RTCRay16, std::conditional_t<K == 8, RTCRay8, RTCRay4>>;
 
-/// K rays and what each of them hits.
+/// K rays and their hits.
 template <int K>
 using RayHits = std::conditional_t<K == 16, RTCRayHit16, std::conditional_t<K == 8, RTCRayHit8, RTCRayHit4>>;
 
-/// Finds the nearest triangle that each ray hits. `valid` has K numbers: -1 where the lane holds a ray, 0 elsewhere.
+/// Finds the nearest triangle that each ray hits. `valid` has K numbers: -1 if the lane has a ray, otherwise 0.
 /// Embree writes `instance` into instID[0] of the hits. The rays should be coherent, like those of neighbouring pixels.
 template <int K>
 void intersect(const int* valid, RTCScene scene, unsigned instance, RayHits<K>& rays) {
@@ -44,10 +44,10 @@ void intersect(const int* valid, RTCScene scene, unsigned instance, RayHits<K>& 
   if constexpr (K == 4) query(rtcIntersect4);
 }
 
-/// Sets tfar to minus infinity where a ray hits any triangle. `valid` as above.
+/// Sets tfar to minus infinity if a ray hits any triangle. `valid` as above.
 template <int K>
 void occlude(const int* valid, RTCScene scene, Rays<K>& rays) {
-  // Not as coherent rays: with those Embree 3.13 has been seen not to end.
+  // Not as coherent rays: with these, Embree 3.13 sometimes does not terminate.
 #if ESIM_EMBREE_MAJOR >= 4
   RTCOccludedArguments arguments;
   rtcInitOccludedArguments(&arguments);

@@ -4,10 +4,10 @@
 
 #include "esim/backends/raycast/surface.h"
 
-/// Light on the surfaces that a packet of rays has hit. All vectors are in the camera frame unless they say otherwise.
+/// Light on the surfaces that a packet of rays has hit. Vectors are in the camera frame unless stated otherwise.
 namespace esim {
 
-/// A scene's lighting as one camera sees it; `world` is the group of what stands still.
+/// A scene's lighting in a camera's frame; `world` is the group of all static triangles.
 inline Lighting in_camera_frame(Lighting lighting, const PlacedGroup& world) {
   for (SunLight& sun : lighting.suns) sun.direction = world.R_camera_group * sun.direction.normalized();
   for (PointLight& point : lighting.points) point.position = world.R_camera_group * (point.position - world.camera);
@@ -20,13 +20,13 @@ struct VectorLanes {
   alignas(64) std::array<float, K> x, y, z;
 };
 
-/// Places on surfaces: the points, and the unit normals on the side that is seen: the triangle's own, and the one for
-/// shading, interpolated where the mesh has normals.
+/// Points on surfaces, with the unit normals on the visible side: the triangle's normal, and the normal for shading,
+/// which is interpolated if the mesh has normals.
 template <int K>
 struct SurfacePoints {
   VectorLanes<K> point, triangle_normal, normal;
 
-  /// Those that the packet has hit; of no meaning in lanes that have hit nothing.
+  /// Takes the points that the packet has hit; undefined in lanes without a hit.
   void take(const RaycastScene& scene, const Packet<K>& packet, const std::array<std::uint32_t, K>& triangles,
             const GroupRotations<K>& rotations) {
     normal = normals_of(scene, packet, triangles);
@@ -37,7 +37,7 @@ struct SurfacePoints {
       const float bx = packet.bearing_x[i], by = packet.bearing_y[i], depth = packet.ray.ray.tfar[i];
       point.x[i] = depth * bx, point.y[i] = depth * by, point.z[i] = depth;
 
-      // Turned into the camera frame, to unit length, and to the side that is seen.
+      // Rotated into the camera frame, normalised, and turned to the visible side.
       const float gx = R[0][i] * hit.Ng_x[i] + R[1][i] * hit.Ng_y[i] + R[2][i] * hit.Ng_z[i];
       const float gy = R[3][i] * hit.Ng_x[i] + R[4][i] * hit.Ng_y[i] + R[5][i] * hit.Ng_z[i];
       const float gz = R[6][i] * hit.Ng_x[i] + R[7][i] * hit.Ng_y[i] + R[8][i] * hit.Ng_z[i];
@@ -55,7 +55,7 @@ struct SurfacePoints {
   }
 
  private:
-  /// Of any length and on either side, in the frames of what is hit.
+  /// Normals of any length and on either side, in the frames of the hit groups.
   static VectorLanes<K> normals_of(const RaycastScene& scene, const Packet<K>& packet,
                                    const std::array<std::uint32_t, K>& triangles) {
     const auto& hit = packet.ray.hit;
@@ -73,7 +73,7 @@ struct SurfacePoints {
   }
 };
 
-/// How much light falls on surfaces: the bracket of the formula in Lighting.
+/// The light on surfaces: the bracket of the formula in Lighting.
 template <int K>
 class LightOnSurfaces {
  public:
@@ -107,7 +107,7 @@ class LightOnSurfaces {
 
  private:
   static constexpr float kNearestLamp = 1e-3F;  // m
-  static constexpr float kToLamp = 0.9999F;     // of the way to it: the lamp itself casts no shadow
+  static constexpr float kToLamp = 0.9999F;     // fraction of the distance: the lamp itself casts no shadow
 
   static float cosine(const VectorLanes<K>& n, const VectorLanes<K>& l, unsigned i) {
     return n.x[i] * l.x[i] + n.y[i] * l.y[i] + n.z[i] * l.z[i];
@@ -124,10 +124,10 @@ class LightOnSurfaces {
     for (unsigned i = 0; i < K; ++i) light[i] += (hits >> i & 1U) != 0 ? received[i] : 0.0F;
   }
 
-  /// Those of `lanes` from whose points nothing stands before the light, up to `reach` times the vector to it.
+  /// Those of `lanes` whose points see the light: no triangle crosses the vector to it, up to `reach` times its length.
   std::uint32_t visible(const SurfacePoints<K>& surface, const VectorLanes<K>& to_light, float reach,
                         std::uint32_t lanes) const {
-    // A little above the surface, by more than what rounding may have put the point below it.
+    // Slightly above the surface, by more than the rounding error of the point.
     VectorLanes<K> start;
     const float to_origin = groups_[0].camera.template lpNorm<1>();
     for (unsigned i = 0; i < K; ++i) {
@@ -152,7 +152,7 @@ class LightOnSurfaces {
     for (unsigned i = 0; i < K; ++i) {
       wanted[i] = (lanes >> i & 1U) != 0 ? -1 : 0;
       Eigen::Vector3f origin = Eigen::Vector3f::Zero(), direction = Eigen::Vector3f::UnitZ();
-      if (wanted[i] != 0) {  // other lanes may hold what is no number
+      if (wanted[i] != 0) {  // other lanes may contain NaN
         origin = group.camera + R * Eigen::Vector3f(start.x[i], start.y[i], start.z[i]);
         direction = R * Eigen::Vector3f(to_light.x[i], to_light.y[i], to_light.z[i]);
       }
@@ -163,7 +163,7 @@ class LightOnSurfaces {
     }
     embree::occlude<K>(wanted.data(), group.triangles, ray);
     std::uint32_t found = 0;
-    for (unsigned i = 0; i < K; ++i) found |= (ray.tfar[i] < 0 ? 1U : 0U) << i;  // so Embree marks them
+    for (unsigned i = 0; i < K; ++i) found |= (ray.tfar[i] < 0 ? 1U : 0U) << i;  // Embree's mark of a hit
     return found;
   }
 

@@ -18,7 +18,7 @@ inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 template <int K>
 inline constexpr std::uint32_t kEveryLane = (1U << K) - 1;
 
-/// A bit per lane in which the value is there.
+/// A bit per lane that has the value.
 template <int K>
 std::uint32_t lanes_equal(const std::uint32_t* values, std::uint32_t value) {
   namespace hn = hwy::HWY_NAMESPACE;
@@ -38,31 +38,31 @@ struct Packet {
   alignas(64) std::array<float, K> bearing_x, bearing_y;  // in the camera frame; z = 1
   embree::RayHits<K> ray;
 
-  /// One ray per pixel of the block from its lane `first` on, through the point at `offset` from the pixel's centre.
-  /// Nothing is hit yet.
+  /// Sets one ray per pixel of the block from its lane `first` on, through the point at `offset` from the pixel's
+  /// centre, without hits.
   void aim(const RayBlock& block, int first, const Eigen::Vector2f& offset);
 
-  /// Finds the nearest triangle of the group that each ray hits, where it is nearer than what has been hit already. As
-  /// bearings have z = 1 in the camera, the ray's parameter is the planar depth.
+  /// Finds the nearest triangle of the group that each ray hits, if it is nearer than previous hits. As bearings have
+  /// z = 1 in the camera frame, the ray's parameter is the planar depth.
   void intersect(const PlacedGroup& placed, unsigned group);
 
-  /// The same where it is one of these, by holding every ray against all of them.
+  /// As above, with these triangles as the only candidates, by testing every ray against all of them.
   void intersect(const PlacedGroup& placed, unsigned group, std::span<const SeenTriangle> triangles);
 
-  /// Which group of a RaycastScene a lane has hit; 0 if nothing.
+  /// The group of a RaycastScene that a lane has hit; 0 without a hit.
   unsigned group(unsigned lane) const { return ray.hit.instID[0][lane]; }
 
-  /// A bit per lane that has hit something.
+  /// A bit per lane with a hit.
   std::uint32_t hits() const { return ~lanes_equal<K>(ray.hit.geomID, RTC_INVALID_GEOMETRY_ID) & kEveryLane<K>; }
 
  private:
-  static constexpr float kNearest = 1e-3F;  // m; what touches the lens is not seen
+  static constexpr float kNearest = 1e-3F;  // m; closer surfaces are invisible
 
-  /// Turns the rays into the frame of a group.
+  /// Transforms the rays to the frame of a group.
   void turn(const PlacedGroup& placed);
 };
 
-/// For Embree, every lane holds a ray.
+/// For Embree: every lane has a ray.
 template <int K>
 inline constexpr auto kAllLanes = [] {
   struct {

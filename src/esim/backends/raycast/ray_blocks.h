@@ -7,25 +7,25 @@
 
 namespace esim {
 
-/// A block of 4 x 4 pixels, row-major. What lies outside of the image repeats its last row or column.
+/// A block of 4 x 4 pixels, row-major. Pixels outside the image repeat its last row or column.
 struct RayBlock {
   static constexpr int kSide = 4, kPixels = kSide * kSide;
 
-  // Bearing of the pixel's centre (x, y, 1) in the camera frame, and its change as the pixel (u, v) does.
+  // Bearing of the pixel's centre (x, y, 1) in the camera frame, and its derivatives by the pixel (u, v).
   alignas(64) float x[kPixels], y[kPixels];
   alignas(64) float dx_du[kPixels], dx_dv[kPixels], dy_du[kPixels], dy_dv[kPixels];
 
-  /// Asks memory for it: there are more blocks than fit into the caches.
+  /// Prefetches it, since there are more blocks than fit into the caches.
   void prefetch() const {
     for (const float* values : {x, y, dx_du, dx_dv, dy_du, dy_dv}) __builtin_prefetch(values);
   }
 };
 
-/// A rectangle of bearings: x from left to right, y from top to bottom.
+/// A rectangle of bearings: x to the right, y downwards.
 struct BearingBounds {
   float left, right, top, bottom;
 
-  /// The smallest rectangle that holds this one and another.
+  /// The smallest rectangle that contains this one and another.
   BearingBounds with(const BearingBounds& other) const {
     return {std::min(left, other.left), std::max(right, other.right), std::min(top, other.top),
             std::max(bottom, other.bottom)};
@@ -36,11 +36,11 @@ struct BearingBounds {
   }
 };
 
-/// A camera's rays in blocks aligned with the image's corner: what is traced together lies together in memory, and it
-/// is the same pixels whatever tile is asked for.
+/// A camera's rays in blocks aligned with the image's corner: rays that are traced together are adjacent in memory, and
+/// the blocks do not depend on the requested tile.
 class RayBlocks {
  public:
-  /// Blocks that lie in the same cell of the image, so many pixels wide and high, see nearly the same.
+  /// Size in pixels of a cell of the image; blocks in the same cell see nearly the same triangles.
   static constexpr int kCellWidth = 16, kCellHeight = 8;
 
   explicit RayBlocks(const PixelRays& rays);
@@ -48,7 +48,7 @@ class RayBlocks {
   /// The block that begins at column x and row y, multiples of kSide.
   const RayBlock& at(int x, int y) const { return blocks_[index(x, y)]; }
 
-  /// What holds all the rays of the cell that begins there, wherever in their pixels they lie.
+  /// Bounds of all rays of the cell that begins there, for all positions within the pixels.
   const BearingBounds& cell(int x, int y) const {
     return cells_[static_cast<std::size_t>(y / kCellHeight * cell_columns_ + x / kCellWidth)];
   }

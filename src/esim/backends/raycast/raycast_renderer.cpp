@@ -15,20 +15,20 @@
 namespace esim {
 namespace {
 
-/// The square that pixels average over, and what rays see of textures. Alone, a ray sees its surface through the
-/// triangle that bilinear interpolation between texels of a pixel's size makes, whose variance is 1/6 of a pixel's
-/// square. That of rays spread over the pixel is 1/12, and half the area in each makes up for the rest: where an edge
-/// comes into a pixel, the surfaces that it shows do not become sharper at once. Of pixels that are narrower than the
-/// camera's footprint, the mean over the footprint is as sharp.
+/// The square over which pixels average, and the footprint of rays on textures. A single ray filters its surface with
+/// the triangle of bilinear interpolation between texels of a pixel's size, whose variance is 1/6 of a squared pixel.
+/// Rays spread over the pixel have the variance 1/12, and each covers half the area to supply the rest, so that
+/// surfaces do not suddenly become sharper when an edge enters a pixel. For pixels narrower than the camera's
+/// footprint, the mean over the footprint is equally sharp.
 struct Area {
   float side;  // of the square, in footprints
 
-  /// In footprints: what a ray sees of a texture, alone and where it is one of many.
+  /// In footprints: the footprint of a ray on a texture, for a single ray and for one of many.
   float alone() const { return std::sqrt(0.5F * (1 + side * side)); }
   static float together() { return 0.70710678F; }
 };
 
-/// Places of rays in a pixel, from its centre: a rank-1 lattice, in which no two are in a line with the pixel's sides.
+/// Positions of rays in a pixel, from its centre: a rank-1 lattice, with no two rays in the same row or column.
 std::vector<Eigen::Vector2f> lattice(int count) {
   const int generator = count == 64 ? 19 : 5;
   std::vector<Eigen::Vector2f> places;
@@ -47,23 +47,23 @@ struct Moment {
   std::optional<Lighting> lighting;  // in the camera frame
 };
 
-/// K rays on their way through the stages of rendering.
+/// K rays in the stages of rendering.
 template <int K>
 struct Rays {
   const RayBlock* block;
   int first;                            // of the block's lanes
-  const std::uint32_t* first_material;  // per lane, of its pixel's colour; null: of luminance
+  const std::uint32_t* first_material;  // per lane, for its pixel's colour; null: luminance
   Packet<K> packet;
   std::uint32_t hits;                                 // a bit per lane, like `lit`
-  std::uint32_t lit;                                  // those that light of the scene falls on
-  alignas(64) std::array<std::uint32_t, K> triangle;  // among all of the scene; 0 where nothing is hit
+  std::uint32_t lit;                                  // lanes whose surfaces are lit
+  alignas(64) std::array<std::uint32_t, K> triangle;  // index in the scene; 0 without a hit
   TextureLookup<K> at;
   alignas(64) std::array<std::uint32_t, K> material;
   alignas(64) std::array<float, K> light;  // that the surface receives
   alignas(64) std::array<float, K> irradiance;
 };
 
-/// Which triangles of a group a cell of the image may see.
+/// The triangles of a group that a cell of the image may see.
 struct CellView {
   bool any = false;  // otherwise none
   bool few = false;  // `triangles` are all of them
@@ -77,7 +77,7 @@ struct Work {
   Rays<K> rays;
 };
 
-/// A pixel that an edge crosses, and the rays that look closer.
+/// A pixel that an edge crosses, and its additional rays.
 template <int K>
 struct EdgeWork {
   Work<K>* pixel;
@@ -148,7 +148,8 @@ class RaycastRenderer final : public ProcessorRenderer {
     });
   }
 
-  /// Blocks are traced in whole even if the band takes only a part of them, so that pixels do not depend on the tile.
+  /// Blocks are always traced completely, even if the band contains only a part, so that pixels do not depend on the
+  /// tile.
   template <int K>
   void render_band(const Moment& moment, const Tile& band, Sample& sample) const {
     constexpr int kSide = RayBlock::kSide, kWidth = RayBlocks::kCellWidth, kHeight = RayBlocks::kCellHeight;
@@ -175,10 +176,10 @@ class RaycastRenderer final : public ProcessorRenderer {
     }
   }
 
-  /// Where the first block of a cell begins that has pixels in a band.
+  /// The beginning of the first block of a cell with pixels in a band.
   static int first_block(int cell, int band) { return std::max(cell, band / RayBlock::kSide * RayBlock::kSide); }
 
-  /// Finds what a cell may see of each group.
+  /// Finds the triangles of each group that a cell may see.
   static void look(const Moment& moment, const BearingBounds& cell, SeenTriangles& seen, std::span<CellView> views) {
     seen.shrink(0);
     for (std::size_t i = 0; i < views.size(); ++i) {
@@ -207,7 +208,7 @@ class RaycastRenderer final : public ProcessorRenderer {
     if (!sample.narrow.empty()) average({1 / footprint_}, sample.narrow);
   }
 
-  /// Looks closer at the pixels that edges cross.
+  /// Traces additional rays in the pixels that edges cross.
   template <int K>
   void smooth_edges(const Moment& moment, std::span<const CellView> views, const Area& area,
                     std::span<Work<K>> batch) const {
@@ -233,7 +234,7 @@ class RaycastRenderer final : public ProcessorRenderer {
     look_closer<K>(moment, views, std::span(closer).first(count));
   }
 
-  /// Pixels of the work that edges cross, a bit per lane.
+  /// The pixels that edges cross, a bit per lane.
   template <int K>
   std::uint32_t edges_of(const Moment& moment, std::span<const CellView> views, const Area& area,
                          const Work<K>& work) const {
@@ -254,7 +255,7 @@ class RaycastRenderer final : public ProcessorRenderer {
     return edges;
   }
 
-  /// Makes a block of the pixel in lane `lane` of `from`: K times, seen from the lattice's places `first` and on.
+  /// Makes a block of K rays in the pixel of lane `lane` of `from`, at the lattice's positions from `first` on.
   template <int K>
   void spread(const RayBlock& from, int lane, const Area& area, std::size_t first, RayBlock& to) const {
     for (std::size_t i = 0; i < K; ++i) {
@@ -308,8 +309,8 @@ class RaycastRenderer final : public ProcessorRenderer {
     store(work, objects.data(), band, sample.object);
   }
 
-  /// Stage by stage, so that what a stage waits for in memory comes while others are in the one before. Each ray sees
-  /// `footprint` pixels along each side.
+  /// Processes the rays in stages, so that memory for a stage arrives while other rays are in the previous one. Each
+  /// ray covers `footprint` pixels along each side.
   template <int K, typename W>
   void shade(const Moment& moment, std::span<W> batch, float footprint) const {
     GroupRotations<K> rotations;
@@ -344,7 +345,7 @@ class RaycastRenderer final : public ProcessorRenderer {
     }
   }
 
-  /// For rays that all lie in the pixel `lane` of a block.
+  /// For rays that are all in the pixel `lane` of a block.
   const std::uint32_t* first_material_of_edge(int lane) const {
     return first_material_of_edges_[colour_at(lane % RayBlock::kSide, lane / RayBlock::kSide)].data();
   }
@@ -372,7 +373,7 @@ class RaycastRenderer final : public ProcessorRenderer {
   RayBlocks blocks_;
   const Workers& workers_;
 
-  // Behind colour filters: where the materials of their colours begin, for the pixels of a block and for each colour.
+  // With colour filters: the first material of each colour, for the pixels of a block and for each colour.
   bool mosaic_;
   std::array<std::uint32_t, RayBlock::kPixels> first_material_;
   PerColour<std::array<std::uint32_t, RayBlock::kPixels>> first_material_of_edges_;

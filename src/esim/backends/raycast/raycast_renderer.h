@@ -16,12 +16,12 @@ std::shared_ptr<const RaycastScene> build_raycast_scene(const Scene& scene);
 
 struct RaycastOptions {
   float background = 0.2F;    ///< irradiance where no surface is hit
-  int samples_per_pixel = 1;  ///< 1, or 16 or 64 where an edge crosses the pixel; depth is that of its centre
+  int samples_per_pixel = 1;  ///< 1, or 16 or 64 if an edge crosses the pixel; depth is that of its centre
 };
 
-/// Renders triangles by ray casting with Embree: any tile at its own cost, lens distortion exact, textures averaged
-/// over the pixel's footprint. Behind colour filters a pixel sees its colour of the materials, with all of its rays,
-/// and luminance where the scene has no colours.
+/// Renders triangles by ray casting with Embree: the cost is proportional to the tiles, lens distortion is exact, and
+/// textures are averaged over the pixel's footprint. With colour filters, all rays of a pixel see the materials in its
+/// colour, or luminance if the scene has no colours.
 std::unique_ptr<Renderer> make_raycast_renderer(std::shared_ptr<const RaycastScene> scene,
                                                 const RaycastOptions& options, const Camera& camera,
                                                 const Workers& workers, ColourFilters filters = ColourFilters::none);

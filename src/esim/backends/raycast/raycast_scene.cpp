@@ -35,7 +35,7 @@ TriangleShading shading_of(const Mesh& mesh, std::size_t index, std::uint32_t fi
   return shading;
 }
 
-// Of more triangles, too many lie in most parts of an image.
+// With more triangles, most parts of an image see too many of them.
 constexpr std::size_t kMostInTree = 20'000;
 
 void throw_on_error(RTCDevice device, const char* what) {
@@ -47,13 +47,13 @@ void throw_on_error(RTCDevice device, const char* what) {
 }
 
 void attach(RTCDevice device, RTCScene scene, const Mesh& mesh) {
-  // Embree wants its buffers padded: it allocates them, and we copy.
+  // Embree requires padded buffers: it allocates them, and the data are copied.
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                            sizeof(Eigen::Vector3f), mesh.vertices.size());
   void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                             sizeof(mesh.triangles[0]), mesh.triangles.size());
-  throw_on_error(device, "hold the mesh");
+  throw_on_error(device, "store the mesh");
   std::memcpy(vertices, mesh.vertices.data(), mesh.vertices.size() * sizeof(Eigen::Vector3f));
   std::memcpy(triangles, mesh.triangles.data(), mesh.triangles.size() * sizeof(mesh.triangles[0]));
   rtcCommitGeometry(geometry);
@@ -61,7 +61,7 @@ void attach(RTCDevice device, RTCScene scene, const Mesh& mesh) {
   rtcReleaseGeometry(geometry);
 }
 
-/// All of them as one, so that a triangle's index is enough to find it. Materials stay each mesh's own.
+/// All meshes as one, so that an index identifies a triangle. Materials remain separate per mesh.
 Mesh joined(const std::vector<const Mesh*>& meshes) {
   Mesh all;
   for (const Mesh* mesh : meshes) {
@@ -72,7 +72,7 @@ Mesh joined(const std::vector<const Mesh*>& meshes) {
   return all;
 }
 
-/// The bearings under which a box may be seen: all of them, unless it is before the camera in whole.
+/// The bearings under which a box may be visible: all of them, unless it is completely in front of the camera.
 BearingBounds bounds_in_view(const Eigen::AlignedBox3f& box, const SE3& T_group_camera) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   constexpr float kRounding = 1e-4F;
@@ -113,7 +113,7 @@ RaycastScene::RaycastScene(const Scene& scene) : lighting_(scene.lighting) {
   append_colours(all);
 }
 
-/// Of all meshes, in the order in which they were appended; those without colours are grey.
+/// Appends the colours of all meshes, in the order of the meshes; those without colours are grey.
 void RaycastScene::append_colours(const std::vector<const Mesh*>& meshes) {
   const auto is_coloured = [](const Mesh* mesh) { return !mesh->coloured[0].empty(); };
   if (std::none_of(meshes.begin(), meshes.end(), is_coloured)) return;
@@ -135,13 +135,13 @@ void RaycastScene::add_group(const std::vector<const Mesh*>& meshes) {
   if (triangles_.size() == group.first_triangle) return;
   group.accelerator.reset(rtcNewScene(device_.get()));
   rtcSetSceneFlags(group.accelerator.get(), RTC_SCENE_FLAG_ROBUST);
-  rtcSetSceneBuildQuality(group.accelerator.get(), RTC_BUILD_QUALITY_HIGH);  // slower to build, faster to look at
+  rtcSetSceneBuildQuality(group.accelerator.get(), RTC_BUILD_QUALITY_HIGH);  // slower to build, faster to query
   const Mesh all = meshes.size() == 1 ? Mesh() : joined(meshes);
   const Mesh& mesh = meshes.size() == 1 ? *meshes[0] : all;
   attach(device_.get(), group.accelerator.get(), mesh);
   if (mesh.triangles.size() <= kMostInTree) group.tree = TriangleTree(mesh.vertices, mesh.triangles);
-  // One thread builds the tree, so that it is the same in every run. (The device's own limit on threads would hold for
-  // the whole process.)
+  // One thread builds the tree, so that it is the same in every run. (The device's own limit on threads would affect
+  // the complete process.)
   tbb::task_arena(1).execute([&group] { rtcJoinCommitScene(group.accelerator.get()); });
   throw_on_error(device_.get(), "build the scene");
 }
@@ -155,7 +155,7 @@ void RaycastScene::append(const Mesh& mesh) {
 
   if (!lighting_ || mesh.normals.empty()) return;
   const Eigen::Vector3f none = Eigen::Vector3f::Zero();
-  corner_normals_.resize(first_triangle, {none, none, none});  // of the flat ones before
+  corner_normals_.resize(first_triangle, {none, none, none});  // of the previous flat triangles
   for (const auto& [a, b, c] : mesh.triangles)
     corner_normals_.push_back({mesh.normals[a], mesh.normals[b], mesh.normals[c]});
 }
@@ -163,7 +163,7 @@ void RaycastScene::append(const Mesh& mesh) {
 std::vector<PlacedGroup> RaycastScene::place(const RenderRequest& request) const {
   if (request.objects.size() + 1 != groups_.size()) {
     throw InternalError("a request names " + std::to_string(request.objects.size()) +
-                        " moving objects of a scene that has " + std::to_string(groups_.size() - 1));
+                        " moving objects, but the scene has " + std::to_string(groups_.size() - 1));
   }
   std::vector<PlacedGroup> placed;
   for (const Group& group : groups_) {

@@ -12,8 +12,8 @@
 
 namespace esim {
 
-/// What shading needs to know of a triangle, in one line of the cache. Texture coordinates are uv0 + b1 uv1 + b2 uv2
-/// (barycentric b), and change by (gradient_u, gradient_v) per metre in its plane.
+/// A triangle's data for shading, in one cache line. Texture coordinates are uv0 + b1 uv1 + b2 uv2 (barycentric b), and
+/// have the gradients (gradient_u, gradient_v) per metre in its plane.
 struct alignas(64) TriangleShading {
   float u0, v0, u1, v1, u2, v2;
   float gradient_u[3], gradient_v[3];
@@ -31,31 +31,31 @@ using ScenePointer = std::unique_ptr<RTCSceneTy, ReleaseScene>;
 
 /// A rigid group of triangles, as a camera sees it at one time.
 struct PlacedGroup {
-  RTCScene triangles;        // in the group's frame; null if there are none
-  const TriangleTree* tree;  // of the same
+  RTCScene triangles;        // in the group's frame; null if it is empty
+  const TriangleTree* tree;  // of the same triangles
   Eigen::Matrix3f R_group_camera, R_camera_group;
-  Eigen::Vector3f camera;  // where the camera is, in the group's frame
-  BearingBounds bounds;    // what is seen of the group lies in there
+  Eigen::Vector3f camera;  // position of the camera in the group's frame
+  BearingBounds bounds;    // contain the visible part of the group
 };
 
-/// The triangles of a scene in groups that are rigid: all that stands still is group 0, the i-th moving object group
-/// i + 1. Immutable, so that any number of threads may use it at any times of the scene.
+/// The triangles of a scene in rigid groups: group 0 is static, group i + 1 is the i-th moving object. Immutable, so
+/// that any number of threads can use it for any times of the scene.
 class RaycastScene {
  public:
   explicit RaycastScene(const Scene& scene);
 
   int packet_size() const { return packet_size_; }
 
-  /// The groups as a camera sees them. Throws InternalError if the request does not name as many objects as move.
+  /// The groups as a camera sees them. Throws InternalError if the request has another number of moving objects.
   std::vector<PlacedGroup> place(const RenderRequest& request) const;
 
-  /// Where the triangles of a group begin among all.
+  /// Index of the first triangle of a group.
   std::uint32_t first_triangle(unsigned group) const { return groups_[group].first_triangle; }
   const TriangleShading& triangle(std::uint32_t index) const { return triangles_[index]; }
   const Material& material(unsigned index) const { return materials_[index]; }
 
-  /// Whether materials are known in each colour: then index + first_material(colour) is the one of a colour for that of
-  /// luminance.
+  /// Whether there are materials in each colour: then index + first_material(colour) is the material of a colour that
+  /// corresponds to index.
   bool has_colours() const { return material_count_ < materials_.size(); }
   std::uint32_t first_material(std::size_t colour) const {
     return static_cast<std::uint32_t>((1 + colour) * material_count_);
@@ -63,7 +63,7 @@ class RaycastScene {
 
   const std::optional<Lighting>& lighting() const { return lighting_; }
 
-  /// The normals at a triangle's corners; null, or of no length, where it is flat.
+  /// The normals at a triangle's corners; null or of length 0 if it is flat.
   const std::array<Eigen::Vector3f, 3>* corner_normals(std::uint32_t index) const {
     return index < corner_normals_.size() ? &corner_normals_[index] : nullptr;
   }
@@ -71,8 +71,8 @@ class RaycastScene {
  private:
   struct Group {
     std::uint32_t first_triangle;
-    ScenePointer accelerator;    // null for no triangles
-    TriangleTree tree;           // empty for many
+    ScenePointer accelerator;    // null without triangles
+    TriangleTree tree;           // empty if there are many triangles
     Eigen::AlignedBox3f bounds;  // of its vertices
   };
 
@@ -87,7 +87,7 @@ class RaycastScene {
   std::size_t material_count_ = 0;   // of luminance
   std::vector<Group> groups_;
   std::vector<TriangleShading> triangles_;                      // of all groups
-  std::vector<std::array<Eigen::Vector3f, 3>> corner_normals_;  // likewise, as far as there are any that light needs
+  std::vector<std::array<Eigen::Vector3f, 3>> corner_normals_;  // likewise, up to the last one that light needs
 };
 
 }  // namespace esim

@@ -6,10 +6,10 @@
 #include "esim/backends/raycast/packet.h"
 #include "esim/backends/raycast/raycast_scene.h"
 
-/// From what a packet of rays has hit to the colours there. All vectors are in the camera frame.
+/// Colours of the surfaces that a packet of rays has hit. All vectors are in the camera frame.
 namespace esim {
 
-/// The rotations into the camera frame from the groups of triangles that the lanes have hit, element by element.
+/// The rotations to the camera frame from the groups that the lanes have hit, element by element.
 template <int K>
 class GroupRotations {
  public:
@@ -81,13 +81,13 @@ void locate_on_textures(const Packet<K>& packet, const RayBlock& block, int firs
   const auto& hit = packet.ray.hit;
 #pragma omp simd
   for (int i = 0; i < K; ++i) {
-    // Lanes that have hit nothing hold numbers of no meaning.
+    // Lanes without a hit have undefined values.
     const float depth = ray.tfar[i] < kInfinity ? ray.tfar[i] : 0.0F;
     const float b1 = depth > 0 ? hit.u[i] : 0.0F, b2 = depth > 0 ? hit.v[i] : 0.0F;
     at.u[i] = on.u0[i] + b1 * on.u1[i] + b2 * on.u2[i];
     at.v[i] = on.v0[i] + b1 * on.v1[i] + b2 * on.v2[i];
 
-    // The normal and the gradients of the texture coordinates, turned into the camera frame.
+    // The normal and the gradients of the texture coordinates, rotated to the camera frame.
     const float hx = depth > 0 ? hit.Ng_x[i] : 0.0F, hy = depth > 0 ? hit.Ng_y[i] : 0.0F,
                 hz = depth > 0 ? hit.Ng_z[i] : 0.0F;
     const float nx = R[0][i] * hx + R[1][i] * hy + R[2][i] * hz;
@@ -100,7 +100,7 @@ void locate_on_textures(const Packet<K>& packet, const RayBlock& block, int firs
     const float vy = R[3][i] * on.vx[i] + R[4][i] * on.vy[i] + R[5][i] * on.vz[i];
     const float vz = R[6][i] * on.vx[i] + R[7][i] * on.vy[i] + R[8][i] * on.vz[i];
 
-    // As the bearing moves by (1, 0) and by (0, 1), then as the pixel moves by one to the right and by one downwards.
+    // Derivatives by the bearing (1, 0) and (0, 1), then by the pixel to the right and downwards.
     const float bx = packet.bearing_x[i], by = packet.bearing_y[i];
     const float facing = nx * bx + ny * by + nz;
     const float per_facing = std::fabs(facing) > 1e-20F ? 1.0F / facing : 0.0F;
@@ -115,13 +115,13 @@ void locate_on_textures(const Packet<K>& packet, const RayBlock& block, int firs
   }
 }
 
-/// The base colour and the emission of the surfaces, and whether light changes them.
+/// The base colour and the emission of the surfaces, and whether they are lit.
 template <int K>
 struct SurfaceColours {
   alignas(64) std::array<float, K> base, emission;
   std::uint32_t unlit = 0;  // a bit per lane
 
-  /// Takes them at `hits`, material by material.
+  /// Looks them up for the lanes in `hits`, material by material.
   void look_up(const RaycastScene& scene, const std::array<std::uint32_t, K>& materials, const TextureLookup<K>& at,
                std::uint32_t hits) {
     unlit = 0;

@@ -22,8 +22,8 @@ float half_area(const Eigen::AlignedBox3f& box) {
   return side.x() * side.y() + side.y() * side.z() + side.z() * side.x();
 }
 
-/// Divides pieces in two so that a ray meets few of the boxes around them: by the sum of area times number, of 15 cuts
-/// along each axis. Returns the second part's beginning, never an end.
+/// Divides pieces in two so that a ray meets few of their boxes: the cut with the smallest sum of area times number,
+/// out of 15 along each axis. Returns the beginning of the second part; neither part is empty.
 std::span<Piece>::iterator cut(std::span<Piece> pieces) {
   constexpr int kBins = 16;
   struct Bin {
@@ -34,7 +34,7 @@ std::span<Piece>::iterator cut(std::span<Piece> pieces) {
   for (const Piece& piece : pieces) middles.extend(piece.box.center());
   const auto bin_of = [&](const Piece& piece, int axis) {
     const float along = (piece.box.center()[axis] - middles.min()[axis]) / middles.sizes()[axis];
-    if (!(along > 0)) return 0;  // where it is no number, too
+    if (!(along > 0)) return 0;  // also for NaN
     return along < 1 ? static_cast<int>(along * kBins) : kBins - 1;
   };
 
@@ -47,7 +47,7 @@ std::span<Piece>::iterator cut(std::span<Piece> pieces) {
       Bin& bin = bins[static_cast<std::size_t>(bin_of(piece, axis))];
       bin.box.extend(piece.box), ++bin.count;
     }
-    std::array<float, kBins> before{};  // cost of what lies in the bins before
+    std::array<float, kBins> before{};  // cost of the previous bins
     Bin sum;
     for (std::size_t i = 1; i < kBins; ++i) {
       sum.box.extend(bins[i - 1].box), sum.count += bins[i - 1].count;
@@ -74,7 +74,7 @@ class TriangleTree::Builder {
   Builder(TriangleTree& tree, std::span<const Vector> vertices, std::span<const std::array<std::uint32_t, 3>> triangles)
       : tree_(tree), vertices_(vertices), triangles_(triangles) {}
 
-  /// Adds the node of these triangles; the first is the root.
+  /// Adds the node of these triangles; the first node is the root.
   std::uint32_t add_node(std::span<Piece> pieces) {
     const auto index = static_cast<std::uint32_t>(tree_.nodes_.size());
     tree_.nodes_.emplace_back();
@@ -135,7 +135,7 @@ TriangleTree::TriangleTree(std::span<const Vector> vertices, std::span<const std
   if (!pieces.empty()) Builder(*this, vertices, triangles).add_node(pieces);
 }
 
-/// What a camera sees within bounds lies on the inner side of four planes through it, in the tree's frame.
+/// The camera's view within bounds: the inner side of four planes through the camera, in the tree's frame.
 struct TriangleTree::Pyramid {
   std::array<std::array<float, 3>, 4> normal;
   std::array<float, 4> offset;
@@ -154,7 +154,7 @@ struct TriangleTree::Pyramid {
     }
   }
 
-  /// A bit for each of the boxes that may reach into it.
+  /// A bit for each of the boxes that may intersect it.
   unsigned meets(const Node& node) const {
     alignas(32) std::array<float, kWide> inside;
     inside.fill(1);
@@ -171,7 +171,7 @@ struct TriangleTree::Pyramid {
     return not_negative(inside) & ((1U << node.count) - 1);
   }
 
-  /// A bit for each of the triangles that may.
+  /// A bit for each of the triangles that may intersect it.
   unsigned meets(const Leaf& leaf) const {
     alignas(32) std::array<float, kWide> inside;
     inside.fill(1);
@@ -197,11 +197,11 @@ struct TriangleTree::Pyramid {
 
 namespace {
 
-/// p x q, to the last bit opposite to q x p.
+/// p x q, which is bitwise the opposite of q x p.
 Vector edge_normal(const Vector& p, const Vector& q) {
   const bool in_order = std::tie(p.x(), p.y(), p.z()) < std::tie(q.x(), q.y(), q.z());
   const Vector &from = in_order ? p : q, edge = (in_order ? q : p) - from;
-  // In double precision products are exact, so that nothing depends on how the compiler puts them together.
+  // Products are exact in double precision, so that the result does not depend on the compiler's contractions.
   const Vector normal = from.cast<double>().cross(edge.cast<double>()).cast<float>();
   return in_order ? normal : -normal;
 }

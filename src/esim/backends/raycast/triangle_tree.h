@@ -10,20 +10,20 @@
 
 namespace esim {
 
-/// A triangle as a camera sees it. Of the ray r = (x, y, 1) and the triangle with the corners p0, p1, p2, all in the
-/// camera frame, weight k is the triple product of r with the two other corners: where none is negative r goes through
-/// the triangle, at the barycentric coordinates weight k / (facing . r), at the depth distance / (facing . r). The
-/// weights of two triangles at their common edge are opposite to the last bit: no ray passes between them.
+/// A triangle as a camera sees it. For the ray r = (x, y, 1) and the triangle with the corners p0, p1, p2, all in the
+/// camera frame, weight k is the triple product of r with the two other corners. If no weight is negative, r hits the
+/// triangle at the barycentric coordinates weight k / (facing . r) and the depth distance / (facing . r). The weights
+/// of two triangles at their common edge are bitwise opposite, so that no ray passes between them.
 struct SeenTriangle {
   std::array<std::array<float, 3>, 3> weight;
   std::array<float, 3> facing;  ///< normal to the plane, away from the camera
   float distance;
-  float least_facing;           ///< facing . r is at least that unless the triangle is seen edge-on
+  float least_facing;           ///< lower bound of facing . r unless the triangle is seen edge-on
   std::array<float, 3> normal;  ///< (p1 - p0) x (p2 - p0) in the triangles' own frame
   std::uint32_t index;
 };
 
-/// Room for a few triangles.
+/// A container for a few triangles.
 class SeenTriangles {
  public:
   static constexpr std::size_t kMost = 48;
@@ -32,10 +32,10 @@ class SeenTriangles {
   bool full() const { return count_ == kMost; }
   void add(const SeenTriangle& triangle) { triangles_[count_++] = triangle; }
 
-  /// Forgets all but the first ones.
+  /// Keeps only the first `count`.
   void shrink(std::size_t count) { count_ = count; }
 
-  /// Those from one on.
+  /// The triangles from `first` on.
   std::span<const SeenTriangle> from(std::size_t first) const {
     return std::span(triangles_).first(count_).subspan(first);
   }
@@ -45,15 +45,15 @@ class SeenTriangles {
   std::size_t count_ = 0;
 };
 
-/// Triangles in a hierarchy of boxes, eight to a node, to find those that a small part of an image may see. Where these
-/// are few it is faster to hold each ray against all of them than to find each ray's.
+/// Triangles in a hierarchy of boxes, eight per node, to find those that a small part of an image may see. If these are
+/// few, it is faster to test each ray against all of them than to traverse the hierarchy for each ray.
 class TriangleTree {
  public:
   TriangleTree() = default;
   TriangleTree(std::span<const Eigen::Vector3f> vertices, std::span<const std::array<std::uint32_t, 3>> triangles);
 
-  /// Adds the triangles that a camera may see in these bounds, in an order that depends on nothing else. False if there
-  /// is no room for all of them, or if there is no tree.
+  /// Adds the triangles that a camera may see in these bounds, in an order that depends on nothing else. False if they
+  /// do not all fit, or if there is no tree.
   bool find(const BearingBounds& bounds, const Eigen::Matrix3f& R_tree_camera, const Eigen::Vector3f& camera,
             SeenTriangles& found) const;
 
@@ -61,7 +61,7 @@ class TriangleTree {
   static constexpr int kWide = 8;
   using Lanes = std::array<float, kWide>;
 
-  /// The boxes of eight nodes or leaves: middles, and half of their sides.
+  /// The boxes of eight nodes or leaves: centres and half sides.
   struct alignas(64) Node {
     std::array<Lanes, 3> middle, half;
     std::array<std::uint32_t, kWide> child;  // kLeaf: of leaves_
@@ -80,7 +80,7 @@ class TriangleTree {
 
   std::vector<Node> nodes_;  // the root first
   std::vector<Leaf> leaves_;
-  float extent_ = 0;  // largest coordinate
+  float extent_ = 0;  // maximum coordinate
 };
 
 }  // namespace esim

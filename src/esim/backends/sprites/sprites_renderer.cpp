@@ -15,8 +15,8 @@ namespace {
 constexpr int kLanes = 16;
 using Lanes = std::array<float, kLanes>;
 
-/// How much of a pixel's footprint lies between 0 and 1 of one texture coordinate. The coordinate is the sum of two
-/// uniform variables over the pixel, of widths |d/dx| and |d/dy|: its density is a trapezoid.
+/// The fraction of a pixel's footprint with one texture coordinate between 0 and 1. Over the pixel, the coordinate is
+/// the sum of two uniform variables of widths |d/dx| and |d/dy|: its density is a trapezoid.
 class EdgeCoverage {
  public:
   EdgeCoverage(double along_x, double along_y)
@@ -30,7 +30,7 @@ class EdgeCoverage {
   }
 
  private:
-  /// Of an edge that the pixel's centre is `distance` inside of.
+  /// The fraction inside an edge, for a pixel's centre at `distance` inside of it.
   float share_inside(float distance) const {
     const float depth = std::fabs(distance);
     const float tail = std::max(0.0F, 0.5F * (wide_ + narrow_) - depth);
@@ -41,13 +41,13 @@ class EdgeCoverage {
   float wide_, narrow_, per_wide_, per_area_;
 };
 
-/// A coordinate that runs back at each edge of the image.
+/// A coordinate that is reflected at each edge of the image.
 inline float mirrored(float coordinate) {
   const float turn = coordinate - 2.0F * std::floor(0.5F * coordinate);
   return turn > 1.0F ? 2.0F - turn : turn;
 }
 
-/// A layer as it lies on the sensor at one time.
+/// A layer on the sensor at one time.
 struct PlacedSprite {
   const Sprite* sprite;
   std::uint16_t number;           // in the scene, from 1
@@ -55,7 +55,7 @@ struct PlacedSprite {
   Eigen::Matrix2d flow_gradient;  // V = velocity + flow_gradient (pixel - centre)
   Eigen::Vector2d centre, velocity;
   EdgeCoverage coverage_u, coverage_v;
-  Eigen::Vector2d reach;  // pixels further from the centre see nothing of it
+  Eigen::Vector2d reach;  // pixels further from the centre do not see it
 
   bool reaches(int first, int row) const {
     return std::fabs(row - centre.y()) <= reach.y() && first + kLanes - 1 >= centre.x() - reach.x() &&
@@ -63,7 +63,7 @@ struct PlacedSprite {
   }
 };
 
-/// Nothing where the layer is degenerate: seen from its edge, or too small to be seen.
+/// Empty if the layer is degenerate: seen edge-on, or too small to be visible.
 std::optional<PlacedSprite> place_on_sensor(const Sprite& sprite, std::uint16_t number, TimeNs t, PixelSize sensor) {
   constexpr double kLeastArea_px2 = 1e-6;
   const LayerPlacement at =
@@ -71,7 +71,7 @@ std::optional<PlacedSprite> place_on_sensor(const Sprite& sprite, std::uint16_t 
   if (!(std::fabs(at.A.determinant()) > kLeastArea_px2)) return std::nullopt;
   const Eigen::Matrix2d inverse = at.A.inverse();
 
-  // Half of the image's extent on the sensor, half a pixel, and a little for rounding.
+  // Half of the image's extent on the sensor, half a pixel, and a margin for rounding.
   Eigen::Vector2d reach = 0.5 * at.A.cwiseAbs().rowwise().sum() + Eigen::Vector2d::Constant(1.0);
   if (sprite.beyond != LayerBeyond::nothing) reach.setConstant(std::numeric_limits<double>::infinity());
   return PlacedSprite{&sprite,
@@ -85,10 +85,10 @@ std::optional<PlacedSprite> place_on_sensor(const Sprite& sprite, std::uint16_t 
                       reach};
 }
 
-/// Some pixels of a row while layers are laid on them, from front to back.
+/// Some pixels of a row, onto which layers are composited from front to back.
 class Span {
  public:
-  /// `which`: find out which layer each pixel sees.
+  /// `which`: determine which layer each pixel sees.
   Span(int first, int row, bool which) : first_(first), row_(row), which_(which) { transmittance_.fill(1.0F); }
 
   void lay_under(const PlacedSprite& placed);
@@ -121,9 +121,9 @@ class Span {
   bool which_;
   alignas(64) Lanes transmittance_{};  // of all layers so far
   alignas(64) Lanes irradiance_{};
-  alignas(64) Lanes weight_{};  // the largest share of a layer in its pixel
+  alignas(64) Lanes weight_{};  // the largest contribution of a layer to its pixel
   alignas(64) Lanes flow_x_{}, flow_y_{};
-  std::array<std::uint16_t, kLanes> number_{};  // of the layer with that share
+  std::array<std::uint16_t, kLanes> number_{};  // of the layer with that contribution
 };
 
 TextureLookup<kLanes> Span::lookup(const PlacedSprite& placed) const {

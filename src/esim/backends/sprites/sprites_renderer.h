@@ -18,22 +18,22 @@ struct Sprite {
   LayerUnits units = LayerUnits::pixel;
   LayerBeyond beyond = LayerBeyond::nothing;
   LayerMotion motion;
-  Eigen::Vector2d pivot{0.5, 0.5};  ///< the point of the image that `motion` tells the place of, in (u, v)
+  Eigen::Vector2d pivot{0.5, 0.5};  ///< the point of the image whose position `motion` gives, in (u, v)
 };
 
-/// Layers drawn straight onto the sensor, without a camera in three dimensions.
+/// Layers drawn directly on the sensor, without a 3D camera.
 struct SpriteScene {
-  std::vector<Sprite> sprites;  ///< the nearest first
-  float background = 0.2F;      ///< irradiance where no layer is
+  std::vector<Sprite> sprites;  ///< front to back
+  float background = 0.2F;      ///< irradiance outside all layers
 };
 
-/// Shows the scene on a sensor of the camera's size; pose, twist and lens do not matter. With c_i the share of the
-/// pixel that layer i covers, P_i and a_i its light and its alpha, averaged over the pixel's footprint:
+/// Shows the scene on a sensor of the camera's size; pose, twist and lens have no effect. With c_i the fraction of the
+/// pixel that layer i covers, and P_i and a_i its light and alpha, averaged over the pixel's footprint:
 ///     E = sum_i T_i c_i P_i + T_end background,   T_i = product of (1 - c_j a_j) over the layers j in front of i.
-/// c_i is the area of the pixel on the inner side of the image's edges: exact where one of them crosses the pixel, the
-/// product of two such areas at a corner.
-/// V is the velocity of that point of a layer which lies under the pixel's centre, of the layer with the largest
-/// T_i c_i a_i; zero where the background has more than any. Z is +inf: layers have an order, but no distance.
+/// c_i is the area of the pixel inside the image's edges: exact if one edge crosses the pixel, and the product of two
+/// such areas at a corner.
+/// V is the velocity, at the pixel's centre, of the layer with the largest T_i c_i a_i; it is zero if the weight of the
+/// background is larger. Z is +inf: layers have an order, but no distance.
 std::unique_ptr<Renderer> make_sprites_renderer(SpriteScene scene, const Camera& camera, const Workers& workers);
 
 }  // namespace esim

@@ -23,7 +23,7 @@ bool is_answered(const EngineBatch& batch) {
 
 }  // namespace
 
-/// Tells the program of a view and asks for its images. Throws ConnectionLost.
+/// Sets a view and requests its images. Throws ConnectionLost.
 void UnrealcvClient::submit(Asked& asked) {
   // Four channels of eight bytes for each pixel.
   constexpr std::size_t kPixel = 32;
@@ -42,7 +42,7 @@ std::shared_ptr<UnrealcvClient::Asked> UnrealcvClient::start(EngineView view) {
   return asked;
 }
 
-/// What is lost is submitted after connecting again.
+/// Lost requests are submitted again after the next connection.
 void UnrealcvClient::submit_or_lose(Asked& asked) {
   try {
     submit(asked);
@@ -58,12 +58,12 @@ void UnrealcvClient::abandon(const std::shared_ptr<Asked>& asked) {
   forget_answered();
 }
 
-/// Others are kept: the session writes answers into them.
+/// Requests without an answer are kept, since the session writes their answers.
 void UnrealcvClient::forget_answered() {
   asked_.remove_if([](const auto& asked) { return !asked->is_wanted && is_answered(asked->batch); });
 }
 
-/// Connects, and asks again for what has no answer yet.
+/// Connects, and repeats requests without an answer.
 void UnrealcvClient::connect(const EngineView& view, SteadyTime give_up) {
   session_.emplace(options_, give_up);
   state_ = {};
@@ -74,7 +74,7 @@ void UnrealcvClient::connect(const EngineView& view, SteadyTime give_up) {
   }
 }
 
-/// The answers to what is asked, whatever connections that takes.
+/// Waits for the answers, and connects as often as necessary.
 void UnrealcvClient::wait_for(const Asked& asked, Until until) {
   SteadyTime give_up = seconds_from_now(options_.timeout_s);
   while (true) {
@@ -87,7 +87,7 @@ void UnrealcvClient::wait_for(const Asked& asked, Until until) {
     } catch (const ConnectionLost& lost) {
       session_.reset();
       if (const auto why = options_.why_ended())
-        fail(options_, *why, "see what it says of the scene, and whether memory sufficed");
+        fail(options_, *why, "check its messages about the scene, and whether the memory was sufficient");
       if (was_connected) give_up = seconds_from_now(options_.timeout_s);
       const bool is_absent = !dialect_ && dynamic_cast<const ConnectionRefused*>(&lost) != nullptr;
       if (is_absent || Clock::now() >= give_up) fail_to_connect(lost.what());
@@ -102,18 +102,19 @@ void UnrealcvClient::wait_for(const Asked& asked, Until until) {
 
 void UnrealcvClient::fail_to_connect(const std::string& reason) const {
   if (!dialect_) {
-    fail(options_, "cannot be connected to: " + reason, "start the program, or change renderer.host and renderer.port");
+    fail(options_, "cannot connect: " + reason, "start the program, or change renderer.host and renderer.port");
   }
-  fail(options_, fmt::format("is gone ({}), and did not come back within {:g} s", reason, options_.timeout_s),
-       "see why it ended");
+  fail(options_,
+       fmt::format("the connection was lost ({}) and could not be restored within {:g} s", reason, options_.timeout_s),
+       "check why the program ended");
 }
 
-/// Waits for a view once. Throws OtherSize; whatever is wrong with the light, what is wrong with the connection or the
-/// depth comes first.
+/// Waits for a view once. Throws OtherSize. Errors of the connection or the depth take precedence over errors of the
+/// light.
 void UnrealcvClient::receive(Asked& asked, const Workers& workers, PinholeImage& image,
                              const std::function<void()>& take_geometry) {
   wait_for(asked, Until::light);
-  // Taken out, for the batch is another if the connection is lost now.
+  // Moved out, since the batch is replaced if the connection is lost now.
   const EngineRequest light = dialect_->take_light(asked.batch);
   std::exception_ptr failed[2];
   workers.for_each(2, [&](int part) {
@@ -140,12 +141,12 @@ void UnrealcvClient::finish(const std::shared_ptr<Asked>& asked, const Workers& 
       receive(*asked, workers, image, take_geometry);
       break;
     } catch (const OtherSize& other) {
-      // The window may take some frames to change.
+      // The window may change its size only after some frames.
       if (!first && Clock::now() >= give_up) {
         fail(options_,
-             fmt::format("was set to {} x {} pixels, but sends images of {} x {} for {:g} s", asked->view.width,
-                         asked->view.height, other.width, other.height, options_.timeout_s),
-             "let its window have any size, or change the camera's");
+             fmt::format("its image size was set to {} x {} pixels, but it sent images of {} x {} pixels for {:g} s",
+                         asked->view.width, asked->view.height, other.width, other.height, options_.timeout_s),
+             "allow its window to have any size, or change the size of the camera");
       }
       state_ = {};
       submit_or_lose(*asked);

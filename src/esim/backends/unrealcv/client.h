@@ -14,32 +14,31 @@
 
 namespace esim {
 
-/// A program that speaks UnrealCV's protocol, of which one camera is sent about. It is connected to when it is first
-/// waited for, and again when the connection is lost: then it is told and asked anew what is under way. May be used by
-/// several threads.
+/// A program with UnrealCV's protocol, of which one camera is moved. The client connects when a view is first waited
+/// for, and again if the connection is lost; it then repeats all requests in progress. Several threads may use it.
 class UnrealcvClient {
  public:
   explicit UnrealcvClient(UnrealcvOptions options) : options_(std::move(options)) {}
 
   const UnrealcvOptions& options() const { return options_; }
 
-  /// A view that is under way.
+  /// A view in progress.
   struct Asked {
     EngineView view;
     EngineBatch batch{};
     bool is_wanted = true;
   };
 
-  /// Asks for a view; neither waits nor fails.
+  /// Requests a view; neither waits nor fails.
   std::shared_ptr<Asked> start(EngineView view);
 
-  /// Waits for it. Light is decoded while depth and objects are on their way; meanwhile `take_geometry` is called, once
-  /// these are in the image, and again where the program had to be asked again. Throws EngineError naming the host, the
-  /// port, what was asked, and what to do.
+  /// Waits for a view. Light is decoded while depth and objects are being received; `take_geometry` is called in
+  /// parallel when these are in the image, and again if the request had to be repeated. Throws EngineError, which names
+  /// the host, the port, the request, and what to do.
   void finish(const std::shared_ptr<Asked>& asked, const Workers& workers, PinholeImage& image,
               const std::function<void()>& take_geometry);
 
-  /// It need not be finished.
+  /// Declares that a view is no longer needed.
   void abandon(const std::shared_ptr<Asked>& asked);
 
  private:
@@ -54,7 +53,7 @@ class UnrealcvClient {
 
   UnrealcvOptions options_;
   std::mutex mutex_;
-  std::list<std::shared_ptr<Asked>> asked_;  // in the order in which the program is told of them; outlive the session
+  std::list<std::shared_ptr<Asked>> asked_;  // in the order of the requests; outlive the session
   std::optional<EngineSession> session_;
   std::optional<Dialect> dialect_;
   EngineState state_;

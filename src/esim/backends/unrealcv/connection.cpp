@@ -18,7 +18,7 @@ namespace esim {
 namespace {
 
 constexpr std::uint32_t kMagic = 0x9E2B83C1;
-constexpr std::size_t kPortion = std::size_t{1} << 20;  // of memory, as a message grows
+constexpr std::size_t kPortion = std::size_t{1} << 20;  // step of allocation while a message is received
 
 std::uint32_t number_at(const char* bytes) {
   std::uint32_t number = 0;
@@ -53,7 +53,7 @@ struct FreeAddresses {
   void operator()(addrinfo* list) const { ::freeaddrinfo(list); }
 };
 
-/// Connects to one of a host's addresses; the reason where that fails.
+/// Connects to one of a host's addresses; returns the reason if it fails.
 std::string connect_to(const addrinfo& address, SteadyTime deadline, int& socket) {
   socket = ::socket(address.ai_family, address.ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, address.ai_protocol);
   if (socket < 0) return std::strerror(errno);
@@ -116,7 +116,7 @@ void MessageConnection::write_some() {
   }
 }
 
-/// Reads until `have` is `size`; false at the deadline. Sends what is waiting meanwhile.
+/// Reads until `have` is `size`; false at the deadline. Meanwhile sends waiting data.
 bool MessageConnection::read_into(char* to, std::size_t size, std::size_t& have, SteadyTime deadline) {
   while (have < size) {
     const ssize_t count = ::recv(socket_, to + have, size - have, 0);
@@ -138,11 +138,10 @@ bool MessageConnection::read_into(char* to, std::size_t size, std::size_t& have,
 bool MessageConnection::receive(std::string& payload, std::size_t most_bytes, SteadyTime deadline) {
   if (!read_into(header_, sizeof header_, have_header_, deadline)) return false;
   if (number_at(header_) != kMagic)
-    throw ProtocolError("sends what is no message of UnrealCV (its magic number is wrong)");
+    throw ProtocolError("sent a message with a wrong magic number, which is not UnrealCV's protocol");
   const std::size_t size = number_at(header_ + 4);
   if (size > most_bytes)
-    throw ProtocolError("announces a message of " + std::to_string(size) +
-                        " bytes, more than anything it was asked for");
+    throw ProtocolError("announced a message of " + std::to_string(size) + " bytes, more than any answer can have");
   while (have_ < size) {
     incoming_.resize(std::min(size, have_ + kPortion));
     if (!read_into(incoming_.data(), incoming_.size(), have_, deadline)) return false;

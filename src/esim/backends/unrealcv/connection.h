@@ -12,40 +12,40 @@ using SteadyTime = std::chrono::steady_clock::time_point;
 
 SteadyTime seconds_from_now(double seconds);
 
-/// The other side has gone away; it may come back.
+/// The connection was closed; the server may come back.
 class ConnectionLost : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// The other side does not want us; it may later.
+/// The server refused the connection; it may accept later.
 class ConnectionRefused : public ConnectionLost {
  public:
   using ConnectionLost::ConnectionLost;
 };
 
-/// What comes is not what the protocol says; the message is the end of a sentence about the server.
+/// The server violated the protocol; the message is the end of a sentence about the server.
 class ProtocolError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
 /// Messages over TCP, as UnrealCV frames them: a magic number and the payload's size, 32 bits each, little-endian, then
-/// the payload. Nothing here blocks beyond the deadline that it is given.
+/// the payload. No function blocks beyond its deadline.
 class MessageConnection {
  public:
-  /// Throws ConnectionRefused where nobody listens there, or there is no such host.
+  /// Throws ConnectionRefused if no server listens there, or if the host does not exist.
   MessageConnection(const std::string& host, int port, SteadyTime deadline);
   ~MessageConnection();
   MessageConnection(const MessageConnection&) = delete;
   MessageConnection& operator=(const MessageConnection&) = delete;
 
-  /// Hands over a message; what the socket does not take at once is sent while waiting for answers. Throws
+  /// Sends a message; the part that the socket does not accept immediately is sent while waiting for answers. Throws
   /// ConnectionLost.
   void send(std::string_view payload);
 
-  /// The next message, of at most `most_bytes`; false where none has come by the deadline. Throws ConnectionLost, and
-  /// ProtocolError for what is no such message.
+  /// Receives the next message, of at most `most_bytes`; false if it is not complete by the deadline. Throws
+  /// ConnectionLost, and ProtocolError for an invalid message.
   bool receive(std::string& payload, std::size_t most_bytes, SteadyTime deadline);
 
  private:
@@ -55,7 +55,7 @@ class MessageConnection {
   int socket_ = -1;
   std::string unsent_;
 
-  // Of the message that is coming in.
+  // The message that is being received.
   std::string incoming_;
   std::size_t have_ = 0;
   char header_[8] = {};

@@ -14,10 +14,10 @@
 namespace esim {
 namespace {
 
-/// Where 16-bit floating-point numbers end: the depth of a sky.
+/// The largest 16-bit floating-point number, which is the depth of the sky.
 constexpr float kNoDepth = 65504;
 
-// Servers read no exponents.
+// Without exponents, which servers do not parse.
 std::string location_text(const UnrealPose& pose) {
   const Eigen::Vector3d& p = pose.location_cm;
   return fmt::format("{:.6f} {:.6f} {:.6f}", p.x(), p.y(), p.z());
@@ -58,12 +58,12 @@ void Dialect::learn_commands(EngineSession& session) {
       session.ask({camera("vget", "location"), camera("vget", "pose"), camera("vget", "horizontal_fieldofview"),
                    camera("vget", "fov"), camera("vget", "size")});
   if (answers[0].is_refused()) {
-    fail(options_, fmt::format("asked for '{}', it answers '{}'", answers[0].command, shortened(*answers[0].answer)),
+    fail(options_, fmt::format("the answer to '{}' is '{}'", answers[0].command, shortened(*answers[0].answer)),
          "change renderer.camera");
   }
   has_pose_ = !answers[1].is_refused();
   if (answers[2].is_refused() && answers[3].is_refused())
-    fail(options_, "cannot change its field of view", "use UnrealCV 0.3.10 or later");
+    fail(options_, "it has no command that changes the field of view", "use UnrealCV 0.3.10 or later");
   fov_command_ = answers[2].is_refused() ? "fov" : "horizontal_fieldofview";
   has_size_ = !answers[4].is_refused();
 }
@@ -90,21 +90,22 @@ void Dialect::learn_objects(EngineSession& session) {
   const EngineBatch answers = session.ask(std::move(commands));
   for (std::size_t i = 0; i < options_.objects.size(); ++i) {
     if (answers[i].is_refused()) {
-      fail(options_, fmt::format("asked for '{}', it answers '{}'", answers[i].command, shortened(*answers[i].answer)),
-           fmt::format("name an object that it has: {}", shortened(answers.back().answer.value_or(""))));
+      fail(options_, fmt::format("the answer to '{}' is '{}'", answers[i].command, shortened(*answers[i].answer)),
+           fmt::format("use the name of an object that exists: {}", shortened(answers.back().answer.value_or(""))));
     }
     if (!masks()) continue;
     try {
       mask_codes_.push_back(colour_code(*answers[i].answer));
     } catch (const EngineError&) {
       fail(options_,
-           fmt::format("asked for '{}', it answers '{}', no colour", answers[i].command, shortened(*answers[i].answer)),
-           "with renderer.object_mask: none, what moves is taken for standing still in the motion field");
+           fmt::format("the answer to '{}' is '{}', which is not a colour", answers[i].command,
+                       shortened(*answers[i].answer)),
+           "set renderer.object_mask: none (moving objects are then static in the motion field)");
     }
     for (std::size_t j = 0; j < i; ++j) {
       if (mask_codes_[j] != mask_codes_[i]) continue;
       fail(options_, fmt::format("objects {} and {} have the same colour", options_.objects[j], options_.objects[i]),
-           "give them colours apart");
+           "give them different colours");
     }
   }
 }
@@ -141,7 +142,7 @@ EngineBatch Dialect::setting_commands(const EngineView& view, EngineState& state
   return batch;
 }
 
-/// Light, depth and, where they are wanted, masks.
+/// The commands for light, depth and, if they are needed, masks.
 std::vector<std::string> Dialect::image_commands() const {
   std::vector<std::string> commands = {
       camera("vget", options_.light_image + (light_ == EngineLight::npy ? " npy" : " png")),
@@ -161,8 +162,8 @@ EngineBatch Dialect::commands_for(const EngineView& view, EngineState& state) co
 void Dialect::require_done(std::span<const EngineRequest> batch) const {
   for (const EngineRequest& request : batch) {
     if (!request.is_refused()) continue;
-    fail(options_, fmt::format("told '{}', it answers '{}'", request.command, shortened(*request.answer)),
-         "see what the server's own log says");
+    fail(options_, fmt::format("the answer to '{}' is '{}'", request.command, shortened(*request.answer)),
+         "see the log of the server");
   }
 }
 
@@ -172,14 +173,14 @@ EngineRequest Dialect::take_light(EngineBatch& batch) const {
   return std::exchange(batch[light], {batch[light].command, ""});
 }
 
-/// Names the command in what goes wrong.
+/// Adds the command to errors.
 template <typename Decode>
 void Dialect::decode(const EngineRequest& answered, const Decode& decode) const {
   try {
     decode(*answered.answer);
   } catch (const EngineError& error) {
-    fail(options_, fmt::format("what it answers to '{}' {}", answered.command, error.what()),
-         "renderer.light, renderer.depth and renderer.object_mask say how images are asked for");
+    fail(options_, fmt::format("the answer to '{}' {}", answered.command, error.what()),
+         "change renderer.light, renderer.depth or renderer.object_mask, which choose the commands for images");
   }
 }
 

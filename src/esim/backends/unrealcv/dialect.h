@@ -12,44 +12,44 @@
 
 namespace esim {
 
-/// What a program is asked to show: a pinhole image.
+/// A pinhole image that is requested from a program.
 struct EngineView {
   int width = 0, height = 0;
   double focal_px = 0;  ///< the principal point is in the middle
   SE3 T_world_camera;
   std::vector<SE3> objects{};  ///< T_world_object
-  int samples = 0;             ///< per pixel; 0: as many as the program likes
+  int samples = 0;             ///< per pixel; 0: the program's default
 };
 
-/// What a program was last told of its camera; nothing after connecting.
+/// The last settings of a program's camera; unset after connecting.
 struct EngineState {
   int width = 0, height = 0;
   double horizontal_fov_deg = 0;
   int samples = 0;
 };
 
-/// The commands that one server understands, among those that versions of UnrealCV differ in.
+/// The commands of one server, where versions of UnrealCV differ.
 class Dialect {
  public:
-  /// Finds out by asking, images included, for which it sets the state that a view wants; `state` is that, then. Throws
-  /// ConnectionLost and EngineError.
+  /// Determines the commands by queries, including images, for which it sets the camera as a view requires and updates
+  /// `state`. Throws ConnectionLost and EngineError.
   Dialect(const UnrealcvOptions& options, EngineSession& session, const EngineView& view, EngineState& state);
 
-  /// What to send so that it shows a view. Then `state` is what it was told.
+  /// The commands that request a view. Updates `state` accordingly.
   EngineBatch commands_for(const EngineView& view, EngineState& state) const;
 
-  /// How many of the last answers to these commands are images. The first of them is light.
+  /// Number of images, which are the last answers to these commands. The first image is light.
   std::size_t images() const { return masks() ? 3 : 2; }
 
-  /// Takes the answer that is light out of a batch in which no more need be answered. Throws EngineError naming a
-  /// command that failed.
+  /// Moves the answer with light out of a batch; later answers may still be missing. Throws EngineError, which names
+  /// the command, if one failed.
   EngineRequest take_light(EngineBatch& batch) const;
 
-  /// E in that answer. Throws OtherSize, and EngineError naming the command.
+  /// Decodes E from that answer. Throws OtherSize, and EngineError, which names the command.
   void decode_light(const EngineRequest& answered, const EngineView& view, PinholeImage& image) const;
 
-  /// Z in metres, and the object where any are known, in the answers to all commands. Throws OtherSize, and EngineError
-  /// naming the command that failed.
+  /// Decodes Z in metres, and the objects if there are any, from the answers to all commands. Throws OtherSize, and
+  /// EngineError, which names the command that failed.
   void decode_geometry(const EngineBatch& answered, const EngineView& view, PinholeImage& image) const;
 
  private:

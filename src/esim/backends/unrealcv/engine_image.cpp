@@ -16,7 +16,7 @@
 namespace esim {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "numbers are taken as they come");
+static_assert(std::endian::native == std::endian::little, "numbers are read in the byte order of the machine");
 
 /// An array of H x W x channels numbers, borrowed.
 struct NpyImage {
@@ -50,16 +50,16 @@ NpyImage parse_npy(std::string_view body, const ImageExtent& expected) {
     return next.size();
   };
   const npy::Header header = npy::read_header(
-      read, [](const std::string& problem) { throw EngineError("is no array that can be used: " + problem); });
-  if (header.fortran_order) throw EngineError("is an array in Fortran's order, which is not supported");
+      read, [](const std::string& problem) { throw EngineError("is not a usable array: " + problem); });
+  if (header.fortran_order) throw EngineError("is an array in Fortran order, which is not supported");
   NpyImage image;
   const std::string& type = header.descr.text;
   const std::vector<std::uint64_t>& shape = header.shape;
   const bool readable = type.size() == 3 && (type[0] == '<' || type[0] == '|' || type[0] == '=') &&
                         std::strchr("uif", type[1]) != nullptr && std::strchr("1248", type[2]) != nullptr;
-  if (!readable) throw EngineError("holds numbers of type " + type + "; these are not supported");
+  if (!readable) throw EngineError("contains numbers of type " + type + ", which are not supported");
   if (shape.size() < 2 || shape.size() > 3 || (shape.size() == 3 && (shape[2] < 1 || shape[2] > 4)))
-    throw EngineError("is no array of height x width, or of height x width x channels");
+    throw EngineError("is not an array of height x width, or of height x width x channels");
   require(expected, shape[1], shape[0]);
   image.width = expected.width, image.height = expected.height;
   image.channels = shape.size() == 3 ? static_cast<std::size_t>(shape[2]) : 1;
@@ -86,7 +86,8 @@ void light_of_floats(const NpyImage& image, Image<float>& irradiance) {
   const auto take = [&](auto light_at) {
     for (std::size_t i = 0; i < image.pixels(); ++i) {
       const float light = light_at(i * image.channels);
-      if (!(std::fabs(light) <= std::numeric_limits<float>::max())) fail_at(image, i, "has light that is no number");
+      if (!(std::fabs(light) <= std::numeric_limits<float>::max()))
+        fail_at(image, i, "has light values that are not finite");
       out[i] = std::max(0.0F, light);
     }
   };
@@ -110,7 +111,7 @@ void light_of_bytes(const NpyImage& image, Image<float>& irradiance) {
   std::swap(planes[0], irradiance);
 }
 
-/// Decodes a PNG image of the size that is expected.
+/// Decodes a PNG image of the expected size.
 void decode_png(std::string_view body, const ImageExtent& expected, Encoding encoding, bool colour, Planes& planes) {
   const std::span<const std::byte> bytes(reinterpret_cast<const std::byte*>(body.data()), body.size());
   const auto size = size_in_header(bytes);
@@ -126,7 +127,7 @@ void decode_png(std::string_view body, const ImageExtent& expected, Encoding enc
 [[noreturn]] void refuse(std::string_view body) {
   std::string beginning;
   for (const char c : body.substr(0, 60)) beginning += c >= ' ' && c < 127 ? c : '?';
-  throw EngineError("is no image, but '" + beginning + "'");
+  throw EngineError("is not an image, but '" + beginning + "'");
 }
 
 std::uint32_t code_at(const NpyImage& image, std::size_t pixel) {
@@ -165,7 +166,7 @@ void decode_light(std::string_view body, ImageExtent expected, Image<float>& irr
   make_room(expected, irradiance);
   if (image.kind == 'f' && image.bytes >= 4) return light_of_floats(image, irradiance);
   if (image.kind != 'u' || image.bytes != 1)
-    throw EngineError("holds light neither as bytes nor as 32- or 64-bit floating-point numbers");
+    throw EngineError("must contain light as 8-bit integers, or as 32- or 64-bit floating-point numbers");
   light_of_bytes(image, irradiance);
 }
 
@@ -173,13 +174,13 @@ void decode_depth(std::string_view body, ImageExtent expected, Image<float>& dep
   if (!is_npy(body)) refuse(body);
   const NpyImage image = parse_npy(body, expected);
   if (image.kind != 'f' || image.bytes < 4)
-    throw EngineError("holds depth, but not as 32- or 64-bit floating-point numbers");
+    throw EngineError("must contain depth as 32- or 64-bit floating-point numbers");
   make_room(expected, depth);
   float* const out = depth.data();
   for (std::size_t i = 0; i < image.pixels(); ++i) {
     const std::size_t index = i * image.channels;
     const float z = image.bytes == 4 ? image.at<float>(index) : static_cast<float>(image.at<double>(index));
-    if (!(z >= 0)) fail_at(image, i, "has depths that are negative or no numbers");
+    if (!(z >= 0)) fail_at(image, i, "has depths that are negative or not numbers");
     out[i] = z;
   }
 }
@@ -210,7 +211,7 @@ void decode_mask(std::string_view body, ImageExtent expected, const std::vector<
   if (!is_npy(body)) refuse(body);
   const NpyImage image = parse_npy(body, expected);
   if (image.kind == 'f' || (image.channels >= 3 && image.bytes != 1))
-    throw EngineError("holds neither whole numbers nor colours of bytes");
+    throw EngineError("must contain integers, or colours with 8 bits per channel");
   for (std::size_t i = 0; i < object.size(); ++i) object.data()[i] = number_of(code_at(image, i));
 }
 
@@ -219,11 +220,11 @@ std::uint32_t colour_code(std::string_view text) {
   std::size_t at = 0;
   for (int channel = 0; channel < 3; ++channel) {
     at = text.find_first_of("0123456789", at);
-    if (at == std::string_view::npos) throw EngineError("is no colour");
+    if (at == std::string_view::npos) throw EngineError("is not a colour");
     std::uint32_t value = 0;
     while (at < text.size() && text[at] >= '0' && text[at] <= '9' && value < 256)
       value = 10 * value + static_cast<std::uint32_t>(text[at++] - '0');
-    if (value > 255) throw EngineError("is no colour");
+    if (value > 255) throw EngineError("is not a colour");
     code |= value << 8 * channel;
   }
   return code;

@@ -11,10 +11,10 @@
 namespace esim {
 namespace {
 
-constexpr const char* kOneAtATime = "a server of UnrealCV serves one client at a time";
+constexpr const char* kOneAtATime = "an UnrealCV server serves one client at a time";
 constexpr std::uint32_t kMostIds = 100'000'000;  // eight digits
 
-/// The id at the beginning of an answer, and where its body begins. A notification has none.
+/// The id at the beginning of an answer, and the position of its body. Notifications have no id.
 std::optional<std::pair<std::uint32_t, std::size_t>> id_of(std::string_view message) {
   constexpr std::size_t kMostDigits = 8;
   const std::size_t digits = std::min(message.find_first_not_of("0123456789"), message.size());
@@ -45,10 +45,11 @@ void EngineSession::require_greeting(SteadyTime deadline) {
   try {
     came = connection_.receive(message_, kMostGreeting, deadline);
   } catch (const ConnectionLost&) {
-    throw ConnectionLost(std::string("it hangs up at once; ") + kOneAtATime);
+    throw ConnectionLost(std::string("it closed the connection at once; ") + kOneAtATime);
   }
-  if (!came) throw ConnectionLost(fmt::format("it does not greet within {:g} s; {}", options_.timeout_s, kOneAtATime));
-  if (!message_.starts_with("connected")) throw ProtocolError("does not greet as UnrealCV does");
+  if (!came)
+    throw ConnectionLost(fmt::format("it sent no greeting within {:g} s; {}", options_.timeout_s, kOneAtATime));
+  if (!message_.starts_with("connected")) throw ProtocolError("did not send UnrealCV's greeting");
 }
 
 void EngineSession::send(EngineBatch& batch) {
@@ -66,12 +67,12 @@ void EngineSession::send_waiting() {
   }
 }
 
-/// Whether it was an answer that somebody waits for, who then has it.
+/// Assigns an answer to its request; false if the message is not an answer.
 bool EngineSession::take(std::string& message) {
   const auto id = id_of(message);
   if (!id) return false;
   const auto found = pending_.find(id->first);
-  if (found == pending_.end()) throw ProtocolError(fmt::format("answers request {}, which was not made", id->first));
+  if (found == pending_.end()) throw ProtocolError(fmt::format("answered request {}, which was not sent", id->first));
   message.erase(0, id->second);
   found->second->answer = std::move(message);
   pending_.erase(found);
@@ -88,14 +89,13 @@ void EngineSession::wait_for(std::span<const EngineRequest> batch) {
         came = connection_.receive(message_, most_bytes_, patience);
         is_answer = came && take(message_);
       } catch (const ProtocolError& error) {
-        fail(options_, fmt::format("asked for '{}', it {}", request.command, error.what()),
-             "restart it; is it a server of UnrealCV?");
+        fail(options_, fmt::format("after the request '{}', it {}", request.command, error.what()),
+             "restart it, and check that it is an UnrealCV server");
       }
       if (is_answer) patience = seconds_from_now(options_.timeout_s);
       if (!came || std::chrono::steady_clock::now() >= patience) {
-        fail(options_,
-             fmt::format("asked for '{}', it does not answer within {:g} s", request.command, options_.timeout_s),
-             "restart it, or raise renderer.timeout_s if it is slow");
+        fail(options_, fmt::format("it did not answer '{}' within {:g} s", request.command, options_.timeout_s),
+             "restart it, or increase renderer.timeout_s if it is slow");
       }
     }
   }

@@ -19,7 +19,7 @@ namespace esim {
 /// Throws EngineError: "unrealcv 127.0.0.1:9000: PROBLEM; REMEDY".
 [[noreturn]] void fail(const UnrealcvOptions& options, const std::string& problem, const std::string& remedy);
 
-/// A command of UnrealCV, and what came back.
+/// A command of UnrealCV, and its answer.
 struct EngineRequest {
   std::string command;
   std::optional<std::string> answer{};
@@ -29,22 +29,22 @@ struct EngineRequest {
 
 using EngineBatch = std::vector<EngineRequest>;
 
-/// One connection with a server of UnrealCV's protocol: requests go out with ids, answers find them by these. After an
-/// exception it is of no further use.
+/// One connection to an UnrealCV server: requests are sent with ids, by which answers are assigned to them. It cannot
+/// be used after an exception.
 class EngineSession {
  public:
-  /// Connects, and waits for the greeting. Throws ConnectionRefused where nobody listens, ConnectionLost where the
-  /// server hangs up, as it does while it has another client.
+  /// Connects, and waits for the greeting. Throws ConnectionRefused if no server listens, and ConnectionLost if the
+  /// server closes the connection, as it does while it has another client.
   EngineSession(const UnrealcvOptions& options, SteadyTime deadline);
 
-  /// Answers may have as many bytes as that.
+  /// Allows answers of up to this number of bytes.
   void expect_up_to(std::size_t bytes) { most_bytes_ = std::max(most_bytes_, bytes); }
 
-  /// Sends a batch, or puts it in the queue; it must live until it is answered, or the session ends.
+  /// Sends a batch, or queues it; it must exist until it is answered or the session ends.
   void send(EngineBatch& batch);
 
-  /// Waits until all of a batch, or of a part of it, is answered. Throws ConnectionLost, and EngineError where no
-  /// answer has come for too long.
+  /// Waits until a batch, or a part of it, is answered. Throws ConnectionLost, and EngineError if no answer arrives in
+  /// time.
   void wait_for(std::span<const EngineRequest> batch);
 
   /// Sends commands and waits for their answers.
@@ -57,7 +57,7 @@ class EngineSession {
 
   const UnrealcvOptions& options_;
   MessageConnection connection_;
-  std::size_t most_bytes_ = std::size_t{1} << 27;  // of a message; more is refused
+  std::size_t most_bytes_ = std::size_t{1} << 27;  // maximum of a message
   std::string message_;
   std::uint32_t last_id_ = 0;
   std::deque<EngineRequest*> waiting_;               // to be sent

@@ -8,17 +8,17 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0, kCentimetre = 0.01;
 
-/// Between the two worlds, both ways.
+/// Converts between the two worlds, in both directions.
 Eigen::Vector3d mirrored(const Eigen::Vector3d& v) { return {v.x(), -v.y(), v.z()}; }
 
-/// Rotates a camera's axes into those of an actor that looks the same way.
+/// Rotates a camera's axes to those of an actor that looks in the same direction.
 Eigen::Quaterniond R_actor_camera() {
   Eigen::Matrix3d R;
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // right is -y, down is -z, forward is x
   return Eigen::Quaterniond(R);
 }
 
-/// Unreal's axes, seen from its world, after yaw and pitch.
+/// Unreal's axes in its world, after yaw and pitch.
 struct Unrolled {
   Eigen::Vector3d forward, right, up;
 
@@ -36,7 +36,7 @@ UnrealPose unreal_pose_of(const SE3& T_world_actor) {
   const double yaw = std::atan2(forward.y(), forward.x());
   const double pitch = std::atan2(forward.z(), std::hypot(forward.x(), forward.y()));
 
-  // Of what is left: whatever yaw came of looking straight up or down, the roll makes up for it.
+  // The remaining rotation: if the actor looks straight up or down, the roll compensates for an arbitrary yaw.
   const Unrolled unrolled(pitch, yaw);
   const double roll = std::atan2(-right.dot(unrolled.up), right.dot(unrolled.right));
   return {mirrored(T_world_actor.translation) / kCentimetre, pitch / kDegree, yaw / kDegree, roll / kDegree};

@@ -13,7 +13,7 @@ PinholeView require_pinhole(const Camera& camera, const PixelRays& rays, const s
   try {
     return pinhole_view(camera, rays, Pinhole::centred);
   } catch (const UserError& error) {
-    throw UserError(name + ": " + error.what() + "; use a camera with a narrower view");
+    throw UserError(name + ": " + error.what() + "; use a camera with a narrower field of view");
   }
 }
 
@@ -35,7 +35,7 @@ class UnrealcvRenderer final : public Renderer {
 
   std::unique_ptr<Rendering> start(RenderRequest request) override {
     if (request.objects.size() != client_->options().objects.size())
-      throw InternalError("a request does not name as many objects as move in the scene");
+      throw InternalError("the number of objects in a request must be the number of moving objects in the scene");
     EngineView view{view_.width, view_.height, view_.fx, request.camera.T_world_body};
     view.samples = samples_;
     for (const Kinematics& object : request.objects) view.objects.push_back(object.T_world_body);

@@ -11,16 +11,15 @@ namespace esim {
 
 class UnrealcvClient;
 
-/// A connection with a program that speaks UnrealCV's protocol, to be shared by the renderers of all cameras. Nothing
-/// is sent before the first image is waited for.
+/// A connection to a program with UnrealCV's protocol, shared by the renderers of all cameras. It is opened when the
+/// first image is waited for.
 std::shared_ptr<UnrealcvClient> make_unrealcv_client(UnrealcvOptions options);
 
-/// Lets the program render what a camera sees: E and Z are the program's, V follows from Z, from which object a pixel
-/// sees, and from the twists. Cameras that are no pinholes with square pixels and the principal point in the middle are
-/// looked up in a wider image (render/pinhole_lookup.h). Docs: docs/methods/engines.md.
-/// `samples` per pixel are asked for by a command that our server in Blender knows; 0: none are.
-/// Throws UserError where the camera's view is too wide for a pinhole; when rendering, EngineError naming host and
-/// port.
+/// Renders a camera's images with the program: E and Z come from the program; V follows from Z, the visible objects and
+/// the twists. For cameras other than pinholes with square pixels and a central principal point, pixels are looked up
+/// in a wider image (render/pinhole_lookup.h). See docs/methods/engines.md. `samples` per pixel are requested by a
+/// command of esim's Blender server; 0: no such request. Throws UserError if the camera's field of view is too wide for
+/// a pinhole; when rendering, EngineError, which names host and port.
 std::unique_ptr<Renderer> make_unrealcv_renderer(std::shared_ptr<UnrealcvClient> client, const Camera& camera,
                                                  const Workers& workers, int samples = 0);
 

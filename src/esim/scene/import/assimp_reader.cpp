@@ -20,7 +20,7 @@
 namespace esim {
 namespace {
 
-/// Files of the scene's own folder, for reading.
+/// Gives assimp read access to the files of the scene's own folder.
 class FolderFiles final : public Assimp::DefaultIOSystem {
  public:
   explicit FolderFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
@@ -59,7 +59,7 @@ bool is_finite(const aiVector3D& v) { return std::isfinite(v.x) && std::isfinite
 
 Eigen::Vector3d to_eigen(const aiVector3D& v) { return {v.x, v.y, v.z}; }
 
-/// Turns what assimp made of a file into a graph.
+/// Converts assimp's result to a graph.
 class Converter {
  public:
   Converter(const std::filesystem::path& file, std::string format, const aiScene& scene)
@@ -77,7 +77,7 @@ class Converter {
  private:
   void warn(const std::string& text) { graph_.warnings.push_back(text); }
 
-  /// The image that a material names: one of the file's own, or a file beside it.
+  /// The image of a material: embedded in the file, or a separate file.
   std::int32_t image(const std::string& name) {
     const auto [entry, is_new] = image_of_.try_emplace(name, static_cast<std::int32_t>(graph_.images.size()));
     if (!is_new) return entry->second;
@@ -113,7 +113,7 @@ class Converter {
       material.name = name_of(source.GetName());
       aiColor3D colour;
       if (source.Get(AI_MATKEY_COLOR_DIFFUSE, colour) == AI_SUCCESS) material.base = {colour.r, colour.g, colour.b};
-      // Where there is a texture, it alone is the base colour: exporters leave the factor at whatever it was.
+      // If there is a texture, it alone is the base colour: exporters write an arbitrary factor.
       material.base_texture = texture(source, aiTextureType_DIFFUSE);
       if (material.base_texture.image >= 0) material.base.setOnes();
       if (source.Get(AI_MATKEY_COLOR_EMISSIVE, colour) == AI_SUCCESS)
@@ -156,12 +156,12 @@ class Converter {
     const bool has_material = part.mMaterialIndex < graph_.materials.size();
     for (unsigned f = 0; f < part.mNumFaces; ++f) {
       const aiFace& face = part.mFaces[f];
-      if (face.mNumIndices != 3) continue;  // points and lines
+      if (face.mNumIndices != 3) continue;  // a point or a line
       std::array<std::uint32_t, 3> corners{};
       std::array<Eigen::Vector2f, 3> uv;
       for (unsigned c = 0; c < 3; ++c) {
         const unsigned index = face.mIndices[c];
-        if (index >= part.mNumVertices) fail_scene(file_, "is damaged: a face names a vertex that is not there");
+        if (index >= part.mNumVertices) fail_scene(file_, "is damaged: a face refers to a missing vertex");
         corners[c] = index;
         const aiVector3D coordinate = part.HasTextureCoords(0) ? part.mTextureCoords[0][index] : aiVector3D();
         uv[c] = is_finite(coordinate) ? Eigen::Vector2f(coordinate.x, 1.0F - coordinate.y) : Eigen::Vector2f(0, 0);
@@ -170,12 +170,12 @@ class Converter {
       mesh.texture_uv.push_back(uv);
       mesh.material.push_back(has_material ? part.mMaterialIndex : 0);
     }
-    if (part.HasVertexColors(0)) warn(fmt::format("mesh {}: its vertex colours are not shown", name));
-    if (part.HasBones()) warn(fmt::format("mesh {}: is deformed by a skeleton, and shown in its rest pose", name));
+    if (part.HasVertexColors(0)) warn(fmt::format("mesh {}: vertex colours are not supported, and are ignored", name));
+    if (part.HasBones()) warn(fmt::format("mesh {}: skeletons are not supported; it is shown in its rest pose", name));
     return mesh;
   }
 
-  /// From the file's world, as assimp gives it, to metres with z upwards.
+  /// The transform from the file's world, as assimp returns it, to metres with z up.
   Eigen::Matrix4d world() const {
     const Eigen::Matrix3d from_y_up =
         Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
@@ -205,7 +205,7 @@ class Converter {
       if (!node.matrix->allFinite()) fail_scene(file_, fmt::format("the pose of {} is not finite", node.name));
       for (unsigned i = 0; i < source->mNumMeshes; ++i) {
         if (source->mMeshes[i] >= graph_.meshes.size())
-          fail_scene(file_, "is damaged: a node names a mesh that is not there");
+          fail_scene(file_, "is damaged: a node refers to a missing mesh");
         node.meshes.push_back(source->mMeshes[i]);
       }
       const auto index = static_cast<int>(graph_.nodes.size());
@@ -229,8 +229,8 @@ class Converter {
         value = {v.x, v.y, v.z, 0};
       }
       if (!value.allFinite() || !(std::abs(t_s) < 1e6))
-        fail_scene(file_, "an animation holds a number that is not finite");
-      if (!track.times_s.empty() && !(t_s > track.times_s.back())) continue;  // twice the same instant
+        fail_scene(file_, "an animation contains a number that is not finite");
+      if (!track.times_s.empty() && !(t_s > track.times_s.back())) continue;  // the same instant twice
       track.times_s.push_back(t_s);
       track.values.push_back(value);
     }
@@ -243,7 +243,7 @@ class Converter {
     const aiNodeAnim* channel;
     std::string action;  // "Thing|ThingAction" without its first part
 
-    /// Blender's FBX plays every action on every object: a thing's own is called like it.
+    /// Blender's FBX applies every action to every object; an object's own action has its name.
     auto rank(const std::string& node) const {
       return std::tuple(action.starts_with(node), action == "Scene", animation->mNumChannels);
     }
@@ -265,7 +265,8 @@ class Converter {
         return a.rank(node.name) < b.rank(node.name);
       });
       if (of_node.size() > 1 && !best.action.starts_with(node.name) && best.action != "Scene")
-        warn(fmt::format("object {}: of its {} animations, {} is shown", node.name, of_node.size(), best.action));
+        warn(fmt::format("object {}: has {} animations, of which only {} is shown", node.name, of_node.size(),
+                         best.action));
       animate(node, *best.channel, best.animation->mTicksPerSecond > 0 ? best.animation->mTicksPerSecond : 1.0);
     }
   }
@@ -299,7 +300,7 @@ class Converter {
       const Eigen::Vector3d forward = to_eigen(source.mLookAt), up = to_eigen(source.mUp);
       const Eigen::Vector3d right = forward.cross(up);
       if (found == node_of_.end() || !(right.norm() > 1e-9) || !right.allFinite() || !is_finite(source.mPosition)) {
-        warn(fmt::format("camera {}: has no orientation, and is left out", name_of(source.mName)));
+        warn(fmt::format("camera {}: has no orientation; it is ignored", name_of(source.mName)));
         continue;
       }
       GraphCamera camera{name_of(source.mName), static_cast<std::uint32_t>(found->second), 0,
@@ -356,7 +357,7 @@ SceneGraph read_with_assimp(const std::filesystem::path& file) {
     case IsolatedResult::End::refused:
       throw UserError(result.bytes);
     default:
-      fail_scene(file, "cannot be read: its reader failed or asked for too much memory; export the scene anew");
+      fail_scene(file, "cannot be read: the parser failed or needed too much memory; export the scene again");
   }
 }
 

@@ -48,7 +48,7 @@ struct Materials {
   PerColour<std::vector<Material>> coloured;
 };
 
-/// Turns a node's mesh into the frame of the object that it belongs to, and appends it.
+/// Transforms the mesh of a node to the frame of its object, and appends it.
 class MeshJoiner {
  public:
   explicit MeshJoiner(const std::filesystem::path& file) : file_(file) {}
@@ -87,7 +87,7 @@ class MeshJoiner {
   bool empty() const { return mesh_.triangles.empty(); }
 
  private:
-  /// det(A) A⁻ᵀ, which turns normals as A turns surfaces, also where A is singular.
+  /// det(A) A⁻ᵀ, which transforms normals as A transforms surfaces, also if A is singular.
   static Eigen::Matrix3d cofactors(const Eigen::Matrix3d& A) {
     Eigen::Matrix3d C;
     for (int i = 0; i < 3; ++i) C.col(i) = A.col((i + 1) % 3).cross(A.col((i + 2) % 3));
@@ -99,20 +99,20 @@ class MeshJoiner {
   bool any_normals_ = false;
 };
 
-/// Throws UserError where the nodes show nothing, or so much that it would not fit into memory.
+/// Throws UserError if the nodes have no triangles, or too many.
 void check_size(const SceneGraph& graph, const std::filesystem::path& file) {
   std::size_t triangles = 0, vertices = 0;
   for (const GraphNode& node : graph.nodes) {
     for (const std::uint32_t mesh : node.meshes) {
       triangles += graph.meshes[mesh].triangles.size(), vertices += graph.meshes[mesh].vertices.size();
       if (triangles > kMaxSceneTriangles || vertices > kMaxSceneVertices)
-        fail_scene(file, fmt::format("shows more than {} triangles; simplify it", kMaxSceneTriangles));
+        fail_scene(file, fmt::format("has more than {} triangles; simplify it", kMaxSceneTriangles));
     }
   }
-  if (triangles == 0) fail_scene(file, "holds no triangles; export meshes, not only curves, points or instances");
+  if (triangles == 0) fail_scene(file, "contains no triangles; export meshes, not only curves, points or instances");
 }
 
-/// For each node, the animated one that it moves with (itself, or its nearest animated ancestor), or the world.
+/// For each node, the animated node that moves it (itself, or its nearest animated ancestor), or the world.
 std::vector<int> movers(const SceneGraph& graph, const NodeTransforms& transforms) {
   std::vector<int> result;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
@@ -136,12 +136,13 @@ Materials convert_materials(const SceneGraph& graph, TextureStore& textures) {
 }
 
 void give_warnings(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn) {
-  constexpr std::size_t kMost = 10;  // a line each; scenes from elsewhere can have thousands of flaws
+  constexpr std::size_t kMost = 10;  // one line each; a scene can have thousands of faults
   for (std::size_t i = 0; i < std::min(graph.warnings.size(), kMost); ++i) warn(graph.warnings[i]);
   if (graph.warnings.size() > kMost)
-    warn(fmt::format("scene {}: and {} more of the kind", file.filename().string(), graph.warnings.size() - kMost));
+    warn(fmt::format("scene {}: {} more warnings of this kind", file.filename().string(),
+                     graph.warnings.size() - kMost));
   if (graph.normal_maps > 0)
-    warn(fmt::format("scene {}: {} of its materials have a normal or bump map, which is not shown",
+    warn(fmt::format("scene {}: {} of its materials have a normal or bump map, which is ignored",
                      file.filename().string(), graph.normal_maps));
 }
 

@@ -16,7 +16,7 @@ constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{1} << 31;
 
 bool has_scheme(const std::string& name) {
   const std::size_t colon = name.find(':');
-  return colon != std::string::npos && colon > 1;  // one letter is a drive
+  return colon != std::string::npos && colon > 1;  // a single letter is a drive
 }
 
 bool is_absolute(const std::string& name) { return name.starts_with('/') || (name.size() > 1 && name[1] == ':'); }
@@ -27,18 +27,18 @@ FolderPath path_inside(const std::filesystem::path& folder, std::string name) {
   namespace fs = std::filesystem;
   std::replace(name.begin(), name.end(), '\\', '/');
   if (name.empty() || name.find('\0') != std::string::npos) return {{}, "has no name"};
-  if (has_scheme(name)) return {{}, "is a URI, which is not followed"};
+  if (has_scheme(name)) return {{}, "is a URI; only files are read"};
 
   std::error_code error;
   const fs::path root = fs::weakly_canonical(folder.empty() ? fs::path(".") : folder, error);
-  if (error) return {{}, "cannot be looked for: " + error.message()};
+  if (error) return {{}, "cannot be resolved: " + error.message()};
   const fs::path resolved = fs::weakly_canonical(is_absolute(name) ? fs::path(name) : root / name, error);
   const bool inside =
       !error && std::mismatch(root.begin(), root.end(), resolved.begin(), resolved.end()).first == root.end();
   if (inside && !is_absolute(name)) return {resolved, {}};
   const fs::path beside = root / fs::path(name).filename();
   if (fs::is_regular_file(beside, error) && !fs::is_symlink(beside, error)) return {beside, {}};
-  return {{}, "lies outside the scene's folder, where scenes may not read"};
+  return {{}, "is outside the scene's folder; scenes may only read files inside it"};
 }
 
 std::string percent_decoded(const std::string& uri) {
@@ -60,7 +60,7 @@ std::vector<std::byte> read_bytes(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) throw UserError(fmt::format("{}: no such file", file.string()));
   const std::uintmax_t size = std::filesystem::file_size(file, error);
-  if (error || size > kMaxFileBytes) throw UserError(fmt::format("{}: is larger than 2 GiB; divide it", file.string()));
+  if (error || size > kMaxFileBytes) throw UserError(fmt::format("{}: is larger than 2 GiB; split it", file.string()));
   std::vector<std::byte> bytes(size);
   std::ifstream in(file, std::ios::binary);
   if (!in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size)))

@@ -8,22 +8,22 @@
 
 namespace esim {
 
-/// A file that a scene names, if the scene may have it.
+/// A file that a scene refers to, if the scene may read it.
 struct FolderPath {
   std::optional<std::filesystem::path> path;
-  std::string reason;  ///< why not, to go on with "its texture 'NAME' ..."
+  std::string reason;  ///< why it may not, as the end of a sentence: "its texture 'NAME' ..."
 };
 
-/// What `name` stands for in `folder`: a path relative to it that stays inside it, links resolved too. A scene that
-/// comes from somewhere else may not read the rest of the machine: of absolute paths, and of those that lead out of the
-/// folder, only the last part counts, and only if a file of that name lies in the folder itself (exporters like to
-/// write the paths of the machine they ran on). Other URIs are refused.
+/// Resolves `name`, including links, to a path inside `folder`. Scenes from untrusted sources must not read other files
+/// of the computer: for absolute paths, and for paths that lead out of the folder, only the last component is used, and
+/// only if the folder itself contains a file of that name (exporters often write paths of their own computer). Other
+/// URIs are rejected.
 FolderPath path_inside(const std::filesystem::path& folder, std::string name);
 
-/// Undoes %20 and the like.
+/// Decodes %20 and the like.
 std::string percent_decoded(const std::string& uri);
 
-/// The whole of a file. Throws UserError naming it when it is no regular file, larger than 2 GiB, or unreadable.
+/// Reads a file. Throws UserError, naming it, if it is not a regular file, larger than 2 GiB, or unreadable.
 std::vector<std::byte> read_bytes(const std::filesystem::path& file);
 
 }  // namespace esim

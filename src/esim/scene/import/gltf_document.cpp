@@ -67,12 +67,12 @@ float as_float(const std::byte* from, int type) {
   }
 }
 
-/// Also in single precision.
+/// Whether a number is finite, also in single precision.
 bool is_finite_number(const Json& value) {
   return value.is_number() && std::abs(value.get<double>()) <= double{std::numeric_limits<float>::max()};
 }
 
-/// Nothing for text that is no base64.
+/// Empty for text that is not base64.
 std::vector<std::byte> base64_decoded(std::string_view text) {
   static constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::array<std::int8_t, 256> value;
@@ -102,7 +102,7 @@ GltfDocument::GltfDocument(const std::filesystem::path& file) : file_(file) {
   if (content.size() >= 4 && load<std::uint32_t>(content.data()) == kGlbMagic) {
     constexpr std::size_t kHeader = 12, kChunkHeader = 8;
     if (content.size() < kHeader + kChunkHeader || load<std::uint32_t>(&content[4]) != 2)
-      fail("is no GLB file of version 2, or is cut off");
+      fail("is not a GLB file of version 2, or is cut off");
     if (load<std::uint32_t>(&content[8]) > content.size()) fail("is cut off: copy or export it again");
     std::size_t at = kHeader;
     for (int chunk = 0; at + kChunkHeader <= content.size(); ++chunk) {
@@ -132,7 +132,7 @@ void GltfDocument::parse(std::span<const std::byte> text) {
   }
   const Json* const asset = find(root_, "asset");
   if (asset == nullptr || text.empty() || !this->text(*asset, "version").starts_with("2"))
-    fail("is not glTF 2.0; export it anew as glTF 2.0");
+    fail("is not glTF 2.0; export it again as glTF 2.0");
 }
 
 void GltfDocument::load_buffers(std::vector<std::byte> binary) {
@@ -145,7 +145,7 @@ void GltfDocument::load_buffers(std::vector<std::byte> binary) {
       buffers_.push_back(data_uri(uri));
     } else {
       const FolderPath inside = path_inside(file_.parent_path(), percent_decoded(uri));
-      if (!inside.path) fail(fmt::format("its buffer '{}' {}; put it beside the file", uri, inside.reason));
+      if (!inside.path) fail(fmt::format("its buffer '{}' {}; put it next to the file", uri, inside.reason));
       buffers_.push_back(read_bytes(*inside.path));
     }
     if (buffers_.back().size() < whole(buffers[i], "byteLength", 0))
@@ -159,7 +159,7 @@ const Json& GltfDocument::list(const char* name) const {
   static const Json kNone = Json::array();
   const Json* const found = find(root_, name);
   if (found == nullptr) return kNone;
-  if (!found->is_array()) fail(fmt::format("is damaged: {} is no list", name));
+  if (!found->is_array()) fail(fmt::format("is damaged: {} is not a list", name));
   return *found;
 }
 
@@ -176,7 +176,7 @@ const Json* GltfDocument::find(const Json& object, const char* name) {
 std::size_t GltfDocument::whole(const Json& object, const char* name, std::size_t otherwise) const {
   const Json* const found = find(object, name);
   if (found == nullptr) return otherwise;
-  if (!found->is_number_unsigned()) fail(fmt::format("is damaged: {} is no whole number", name));
+  if (!found->is_number_unsigned()) fail(fmt::format("is damaged: {} is not an integer", name));
   const auto value = found->get<std::uint64_t>();
   if (value > std::numeric_limits<std::uint32_t>::max()) fail(fmt::format("is damaged: {} is {}", name, value));
   return value;
@@ -192,7 +192,7 @@ std::size_t GltfDocument::index(const Json& object, const char* name, const char
 double GltfDocument::number(const Json& object, const char* name, double otherwise) const {
   const Json* const found = find(object, name);
   if (found == nullptr) return otherwise;
-  if (!is_finite_number(*found)) fail(fmt::format("is damaged: {} is no finite number", name));
+  if (!is_finite_number(*found)) fail(fmt::format("is damaged: {} is not a finite number", name));
   return found->get<double>();
 }
 
@@ -220,7 +220,7 @@ std::vector<double> GltfDocument::numbers(const Json& object, const char* name, 
 
 std::span<const std::byte> GltfDocument::buffer_view(std::size_t index_of_view) const {
   const Json& views = list("bufferViews");
-  if (index_of_view >= views.size()) fail("is damaged: it names a bufferView that is not there");
+  if (index_of_view >= views.size()) fail("is damaged: it refers to a missing bufferView");
   const Json& view = views[index_of_view];
   const std::vector<std::byte>& buffer = buffers_[index(view, "buffer", "buffers")];
   const std::size_t offset = whole(view, "byteOffset", 0), length = whole(view, "byteLength", 0);
@@ -238,7 +238,7 @@ GltfDocument::Accessor GltfDocument::accessor(std::size_t index_of_accessor, std
   result.normalised = flag(json, "normalized");
   const std::size_t element = component_bytes(result.component_type) * components;
   if (element == 0 || component_count(text(json, "type")) != components)
-    fail(fmt::format("is damaged: accessor {} has not the type that its use needs", index_of_accessor));
+    fail(fmt::format("is damaged: accessor {} has the wrong type for its use", index_of_accessor));
 
   const std::size_t view = index(json, "bufferView", "bufferViews");
   const std::size_t stride = whole(list("bufferViews")[view], "byteStride", 0);
@@ -257,14 +257,15 @@ GltfDocument::Accessor GltfDocument::accessor(std::size_t index_of_accessor, std
 std::vector<float> GltfDocument::floats(std::size_t index_of_accessor, std::size_t components) const {
   const Accessor from = accessor(index_of_accessor, components);
   if (from.component_type != kFloat && !from.normalised)
-    fail(fmt::format("is damaged: accessor {} holds whole numbers", index_of_accessor));
+    fail(fmt::format("is damaged: accessor {} contains integers instead of floats", index_of_accessor));
   const std::size_t step = component_bytes(from.component_type);
   std::vector<float> values;
   values.reserve(from.count * components);
   for (std::size_t i = 0; i < from.count; ++i) {
     for (std::size_t c = 0; c < components; ++c) {
       const float value = as_float(&from.bytes[i * from.stride + c * step], from.component_type);
-      if (!std::isfinite(value)) fail(fmt::format("accessor {} holds a number that is not finite", index_of_accessor));
+      if (!std::isfinite(value))
+        fail(fmt::format("accessor {} contains a number that is not finite", index_of_accessor));
       values.push_back(value);
     }
   }
@@ -288,7 +289,7 @@ std::vector<std::uint32_t> GltfDocument::integers(std::size_t index_of_accessor)
         values.push_back(load<std::uint32_t>(at));
         break;
       default:
-        fail(fmt::format("is damaged: accessor {} holds no indices", index_of_accessor));
+        fail(fmt::format("is damaged: accessor {} does not contain indices", index_of_accessor));
     }
   }
   return values;

@@ -10,37 +10,37 @@
 
 namespace esim {
 
-/// A glTF 2.0 file as text and bytes. Nothing in it is trusted: whatever is missing, of the wrong type or out of range
-/// throws UserError with the file's name.
+/// A glTF 2.0 file as text and bytes. The content is not trusted: a value that is missing, of the wrong type or out of
+/// range throws UserError with the file's name.
 class GltfDocument {
  public:
   using Json = nlohmann::json;
 
   explicit GltfDocument(const std::filesystem::path& file);
 
-  /// A list at the top of the document; empty where there is none.
+  /// A list at the top level of the document; empty if it is missing.
   const Json& list(const char* name) const;
 
-  /// The scene that the file wants to be shown first, among its at least one.
+  /// The default scene of the file, which has at least one.
   std::size_t first_scene() const;
 
   /// A member of an object, or null.
   static const Json* find(const Json& object, const char* name);
 
-  /// The index that a member holds into a list at the top.
+  /// A member that is an index into a list at the top level.
   std::size_t index(const Json& object, const char* name, const char* into) const;
   bool has_index(const Json& object, const char* name) const { return find(object, name) != nullptr; }
 
   double number(const Json& object, const char* name, double otherwise) const;
   bool flag(const Json& object, const char* name) const;
 
-  /// A member of text, without control characters.
+  /// A member that is text, without control characters.
   std::string text(const Json& object, const char* name, const std::string& otherwise = {}) const;
 
-  /// A member of `count` numbers, or `otherwise`.
+  /// A member that is a list of numbers, as many as `otherwise` has; `otherwise` if it is missing.
   std::vector<double> numbers(const Json& object, const char* name, std::vector<double> otherwise) const;
 
-  /// The elements of an accessor of floating-point (or normalised integer) vectors, one after the other, all finite.
+  /// The elements of an accessor of floating-point (or normalised integer) vectors, concatenated, all finite.
   std::vector<float> floats(std::size_t accessor, std::size_t components) const;
 
   /// The elements of an accessor of unsigned integers.
@@ -55,7 +55,7 @@ class GltfDocument {
 
  private:
   struct Accessor {
-    std::span<const std::byte> bytes;  // from the first element on
+    std::span<const std::byte> bytes;  // starting at the first element
     std::size_t count = 0, stride = 0;
     int component_type = 0;
     bool normalised = false;

@@ -19,7 +19,7 @@ Eigen::Vector3f colour_of(const std::vector<double>& factor) {
   return {static_cast<float>(factor[0]), static_cast<float>(factor[1]), static_cast<float>(factor[2])};
 }
 
-/// Where a material's texture lies on a surface.
+/// A material's texture and its texture coordinates.
 struct TextureSlot {
   GraphTexture texture;
   std::string coordinates = "TEXCOORD_0";
@@ -50,7 +50,8 @@ class GltfReader {
     for (const Json& extension : document_.list("extensionsRequired")) {
       const std::string name = extension.is_string() ? extension.get<std::string>() : "?";
       if (!kKnown.contains(name) && !name.starts_with("KHR_materials_"))
-        document_.fail(fmt::format("needs the extension {}, which is not supported; export it without", name));
+        document_.fail(
+            fmt::format("requires the extension {}, which is not supported; export the scene without it", name));
     }
   }
 
@@ -119,7 +120,7 @@ class GltfReader {
         material.base_texture = base.texture;
       }
       material.unlit = extension("KHR_materials_unlit") != nullptr;
-      // Light baked into a texture may be brighter than the format's largest factor, 1.
+      // Baked light can exceed 1, the largest factor of the format.
       if (const Json* const extras = GltfDocument::find(json, "extras"))
         material.base *= static_cast<float>(document_.number(*extras, "esim_radiance_scale", 1));
 
@@ -131,16 +132,17 @@ class GltfReader {
       if (base.texture.image < 0 && emission.texture.image >= 0) base = emission;
       if (emission.texture.image >= 0 &&
           (emission.coordinates != base.coordinates || emission.transform != base.transform))
-        warn(fmt::format("material {}: its emission is laid like its base colour", material.name));
+        warn(fmt::format("material {}: its emission texture is shown with the texture coordinates of its base colour",
+                         material.name));
       if (GltfDocument::find(json, "normalTexture") != nullptr) ++graph_.normal_maps;
       if (document_.text(json, "alphaMode", "OPAQUE") != "OPAQUE")
-        warn(fmt::format("material {}: is transparent, and shown opaque", material.name));
+        warn(fmt::format("material {}: transparency is not supported; it is shown opaque", material.name));
       graph_.materials.push_back(std::move(material));
       slots_.push_back(std::move(base));
     }
   }
 
-  /// The index of a plain grey material, for surfaces that have none.
+  /// The index of a grey material for surfaces without one.
   std::uint32_t plain_material() {
     if (plain_material_ == kNoMaterial) {
       plain_material_ = static_cast<std::int32_t>(graph_.materials.size());
@@ -153,7 +155,7 @@ class GltfReader {
     return document_.index(attributes, name, "accessors");
   }
 
-  /// The corners of a primitive's triangles as indices of its vertices.
+  /// The corners of a primitive's triangles, as indices of its vertices.
   std::vector<std::uint32_t> corners(const Json& primitive, std::size_t vertices) {
     constexpr double kTriangles = 4, kStrip = 5, kFan = 6;
     const double mode = document_.number(primitive, "mode", kTriangles);
@@ -165,7 +167,7 @@ class GltfReader {
       for (std::uint32_t i = 0; i < vertices; ++i) indices.push_back(i);
     }
     for (const std::uint32_t index : indices) {
-      if (index >= vertices) document_.fail("is damaged: a triangle names a vertex that is not there");
+      if (index >= vertices) document_.fail("is damaged: a triangle refers to a missing vertex");
     }
     if (mode == kTriangles) {
       indices.resize(indices.size() - indices.size() % 3);
@@ -194,12 +196,12 @@ class GltfReader {
     const std::size_t material = has_material ? document_.index(primitive, "material", "materials") : plain_material();
     const TextureSlot slot = has_material ? slots_[material] : TextureSlot{};
 
-    // What is per vertex.
+    // Data per vertex.
     for (std::size_t i = 0; i < vertices; ++i)
       mesh.vertices.emplace_back(positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]);
     if (GltfDocument::find(*attributes, "NORMAL") != nullptr) {
       const auto normals = document_.floats(accessor_of(*attributes, "NORMAL"), 3);
-      if (normals.size() != positions.size()) document_.fail("is damaged: a mesh has not a normal per vertex");
+      if (normals.size() != positions.size()) document_.fail("is damaged: a mesh must have one normal per vertex");
       mesh.normals.resize(first, Eigen::Vector3f::Zero());
       for (std::size_t i = 0; i < vertices; ++i)
         mesh.normals.emplace_back(normals[3 * i], normals[3 * i + 1], normals[3 * i + 2]);
@@ -210,16 +212,16 @@ class GltfReader {
     if (GltfDocument::find(*attributes, slot.coordinates.c_str()) != nullptr) {
       const auto coordinates = document_.floats(accessor_of(*attributes, slot.coordinates.c_str()), 2);
       if (coordinates.size() != 2 * vertices)
-        document_.fail("is damaged: a mesh has not texture coordinates per vertex");
+        document_.fail("is damaged: a mesh must have one pair of texture coordinates per vertex");
       for (std::size_t i = 0; i < vertices; ++i)
         uv[i] = slot.transform * Eigen::Vector3f(coordinates[2 * i], coordinates[2 * i + 1], 1);
     } else if (slot.texture.image >= 0) {
-      warn(fmt::format("mesh {}: has a texture, but no {} to lay it by", name, slot.coordinates));
+      warn(fmt::format("mesh {}: has a texture, but its texture coordinates {} are missing", name, slot.coordinates));
     }
     if (GltfDocument::find(primitive, "targets") != nullptr)
-      warn(fmt::format("mesh {}: its shape keys are not animated", name));
+      warn(fmt::format("mesh {}: shape keys are not supported, and are ignored", name));
 
-    // What is per triangle.
+    // Data per triangle.
     for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
       const auto corner = [&](std::size_t c) { return static_cast<std::uint32_t>(first + indices[i + c]); };
       mesh.triangles.push_back({corner(0), corner(1), corner(2)});
@@ -240,7 +242,7 @@ class GltfReader {
     }
   }
 
-  /// The nodes of the scene that is shown, from its roots on, so that parents come before their children.
+  /// Reads the nodes of the default scene from its roots, so that parents come before their children.
   void read_nodes() {
     GraphNode world{.name = "world"};
     world.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX()));  // y is up
@@ -253,7 +255,7 @@ class GltfReader {
       if (indices == nullptr || !indices->is_array()) return;
       for (auto child = indices->rbegin(); child != indices->rend(); ++child) {
         if (!child->is_number_unsigned() || child->get<std::uint64_t>() >= nodes.size())
-          document_.fail("is damaged: it names a node that is not there");
+          document_.fail("is damaged: it refers to a missing node");
         to_visit.emplace_back(child->get<std::size_t>(), parent);
       }
     };
@@ -276,7 +278,8 @@ class GltfReader {
     if (GltfDocument::find(json, "matrix") != nullptr) {
       const auto columns = document_.numbers(json, "matrix", std::vector<double>(16));
       node.matrix = Eigen::Map<const Eigen::Matrix4d>(columns.data());
-      if (node.matrix->row(3) != Eigen::RowVector4d::UnitW()) document_.fail("is damaged: a node is not affine");
+      if (node.matrix->row(3) != Eigen::RowVector4d::UnitW())
+        document_.fail("is damaged: the matrix of a node is not affine");
     } else {
       const auto t = document_.numbers(json, "translation", {0, 0, 0});
       const auto r = document_.numbers(json, "rotation", {0, 0, 0, 1}), s = document_.numbers(json, "scale", {1, 1, 1});
@@ -289,12 +292,12 @@ class GltfReader {
     if (document_.has_index(json, "mesh"))
       node.meshes.push_back(static_cast<std::uint32_t>(document_.index(json, "mesh", "meshes")));
     if (GltfDocument::find(json, "skin") != nullptr)
-      warn(fmt::format("object {}: is deformed by a skeleton, and shown in its rest pose", node.name));
+      warn(fmt::format("object {}: skeletons are not supported; it is shown in its rest pose", node.name));
     if (document_.has_index(json, "camera")) read_camera(json, node.name);
     return node;
   }
 
-  /// Cameras look along -z, with y upwards. They belong to the node that is about to be added.
+  /// Cameras look along -z, with y up. They belong to the node that is added next.
   void read_camera(const Json& node, const std::string& name) {
     const Json& json = document_.list("cameras")[document_.index(node, "camera", "cameras")];
     GraphCamera camera{name, static_cast<std::uint32_t>(graph_.nodes.size()), 0, Eigen::Matrix4d::Identity()};
@@ -305,7 +308,7 @@ class GltfReader {
       if (vertical_rad > 0 && vertical_rad < std::numbers::pi && aspect > 0)
         camera.horizontal_fov_rad = 2 * std::atan(aspect * std::tan(vertical_rad / 2));
     } else {
-      warn(fmt::format("camera {}: is orthographic; its images will be perspective", name));
+      warn(fmt::format("camera {}: is orthographic, which is not supported; its images will be perspective", name));
     }
     graph_.cameras.push_back(std::move(camera));
   }
@@ -321,11 +324,11 @@ class GltfReader {
     key_count_ += times.size();
     if (key_count_ > kMaxSceneKeys) document_.fail(fmt::format("has more than {} animation keys", kMaxSceneKeys));
     if (times.empty() || values.size() != times.size() * per_time * components)
-      document_.fail("is damaged: an animation has not a value per time");
+      document_.fail("is damaged: an animation must have one value per time");
     track.times_s.assign(times.begin(), times.end());
     if (std::adjacent_find(times.begin(), times.end(), std::greater_equal<>()) != times.end() || times.front() < 0 ||
         times.back() > 1e6F)
-      document_.fail("is damaged: an animation's times do not increase from 0 on");
+      document_.fail("is damaged: the times of an animation must increase, from 0 or later");
     for (std::size_t i = 0; i < values.size(); i += components) {
       Eigen::Vector4d value = Eigen::Vector4d::UnitW();
       for (std::size_t c = 0; c < components; ++c) value[static_cast<Eigen::Index>(c)] = values[i + c];
@@ -335,7 +338,7 @@ class GltfReader {
     return track;
   }
 
-  /// All animations play at once, as Blender exports one per object.
+  /// All animations play at the same time, since Blender exports one per object.
   void read_animations() {
     for (const Json& animation : document_.list("animations")) {
       const Json* const channels = GltfDocument::find(animation, "channels");
@@ -347,7 +350,7 @@ class GltfReader {
         const int index = node_of_[document_.index(*target, "node", "nodes")];
         const double sampler = document_.number(channel, "sampler", -1);
         if (!(sampler >= 0 && sampler < static_cast<double>(samplers->size())))
-          document_.fail("is damaged: an animation names a sampler that is not there");
+          document_.fail("is damaged: an animation refers to a missing sampler");
         if (index >= 0)
           animate(graph_.nodes[static_cast<std::size_t>(index)], document_.text(*target, "path"),
                   (*samplers)[static_cast<std::size_t>(sampler)]);
@@ -357,12 +360,12 @@ class GltfReader {
 
   void animate(GraphNode& node, const std::string& path, const Json& sampler) {
     if (path != "translation" && path != "rotation" && path != "scale") return;
-    if (node.matrix) document_.fail(fmt::format("is damaged: node {} has a matrix and is animated", node.name));
+    if (node.matrix) document_.fail(fmt::format("is damaged: node {} has a matrix, but is animated", node.name));
     Track& slot = path == "translation" ? node.translation_track
                   : path == "rotation"  ? node.rotation_track
                                         : node.scale_track;
     if (!slot.times_s.empty()) {
-      warn(fmt::format("object {}: has several animations, of which the first is shown", node.name));
+      warn(fmt::format("object {}: has several animations, of which only the first is shown", node.name));
       return;
     }
     slot = track(sampler, path == "rotation" ? 4 : 3);

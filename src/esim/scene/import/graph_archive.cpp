@@ -6,7 +6,7 @@
 namespace esim {
 namespace {
 
-// Every struct names its members once, for both directions.
+// Every struct lists its members once, for reading and writing.
 
 template <class Archive>
 void archive(Archive& a, Track& o) {
@@ -50,7 +50,7 @@ void archive(Archive& a, SceneGraph& o) {
       a(o.warnings);
 }
 
-/// Whether a value is the bytes it consists of.
+/// Whether a type is stored as its bytes.
 template <typename T>
 inline constexpr bool kIsFlat = std::is_arithmetic_v<T> || std::is_enum_v<T>;
 template <typename Scalar, int Rows, int Columns>
@@ -148,7 +148,7 @@ class Reader {
     bytes_.remove_prefix(size);
   }
   void require(std::size_t size) const {
-    if (size > bytes_.size()) throw InternalError("a scene graph's bytes end early");
+    if (size > bytes_.size()) throw InternalError("the bytes of a scene graph are cut off");
   }
 
   std::string_view bytes_;

@@ -7,10 +7,10 @@
 
 namespace esim {
 
-/// A graph as bytes, to hand it from one process to another of the same program.
+/// A graph as bytes, for transfer to another process of the same program.
 std::string to_bytes(const SceneGraph& graph);
 
-/// Throws InternalError for bytes that are no graph.
+/// Throws InternalError for bytes that are not a graph.
 SceneGraph graph_from_bytes(std::string_view bytes);
 
 }  // namespace esim

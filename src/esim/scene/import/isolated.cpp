@@ -18,7 +18,7 @@ namespace esim {
 namespace {
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;  // sanitizers reserve terabytes of addresses
+constexpr bool kSanitized = true;  // sanitizers reserve terabytes of address space
 #else
 constexpr bool kSanitized = false;
 #endif
@@ -28,7 +28,7 @@ void limit(int resource, std::size_t value) {
   ::setrlimit(resource, &limits);
 }
 
-/// Addresses that this process uses.
+/// Size of the address space that this process uses.
 std::size_t address_bytes() {
   std::size_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
@@ -45,7 +45,7 @@ bool write_all(int descriptor, const std::string& bytes) {
   return true;
 }
 
-/// What the copy does; its exit status is a kind of end.
+/// The work of the copy; its exit status tells how it ended.
 int work_in_copy(const std::function<std::string()>& work, int result) {
   try {
     return write_all(result, work()) ? 0 : 2;
@@ -74,7 +74,7 @@ std::string content_of(int descriptor) {
 
 IsolatedResult run_isolated(const std::function<std::string()>& work, std::size_t memory_bytes, unsigned cpu_s) {
   const int result = ::memfd_create("esim", MFD_CLOEXEC);
-  if (result < 0) throw InternalError(std::string("cannot make a memory file: ") + std::strerror(errno));
+  if (result < 0) throw InternalError(std::string("cannot create a memory file: ") + std::strerror(errno));
   const std::size_t addresses = address_bytes() + memory_bytes;
   const pid_t copy = ::fork();
   if (copy < 0) {

@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kMaxDepth = 200;
 constexpr double kShortestAnimation_s = 1e-3;
 
-// Keys up to this far apart (15 per second, and some rounding) are samples of a smooth motion.
+// Keys with at most this interval (15 per second, plus rounding) are samples of a smooth motion.
 constexpr double kBakedInterval_s = 0.07;
 constexpr double kDenseInterval_s = 0.005;
 constexpr double kMaxSamples = 20000;
@@ -30,7 +30,7 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& A) {
   return svd.matrixU() * sign * svd.matrixV().transpose();
 }
 
-/// The times at which the nodes' tracks have keys, or none where these are no dense samples of a smooth motion.
+/// The times of the keys of the nodes' tracks; empty if these are not dense samples of a smooth motion.
 std::vector<double> baked_times(const NodeTransforms& transforms, const std::vector<std::size_t>& nodes) {
   constexpr double kSame_s = 1e-4;
   std::vector<double> keys;
@@ -53,7 +53,7 @@ std::vector<double> baked_times(const NodeTransforms& transforms, const std::vec
     longest = std::max(longest, times[i] - times[i - 1]);
   }
   if (longest > kBakedInterval_s || longest > 3 * shortest) return {};
-  // Before its first and after its last key the thing rests.
+  // Before its first and after its last key the object rests.
   const auto add = [&](double from, double to) {
     const int count = static_cast<int>(std::ceil((to - from) / longest - 1e-3));
     for (int i = 0; i < count; ++i) times.push_back(from + (to - from) * i / count);
@@ -122,7 +122,7 @@ SceneMotion sample_motion(const NodeTransforms& transforms, std::size_t node, co
   if (moves) times = baked_times(transforms, chain);
   if (times.empty()) times = dense_times(transforms.start_s(), transforms.end_s());
 
-  // Rotations are taken relative to the first, so that they stay continuous whatever the scale.
+  // Rotations are relative to the first one, so that they are continuous for any scale.
   const Eigen::Matrix3d first = (transforms.world(node, times.front()) * T_node_frame).topLeftCorner<3, 3>();
   const Eigen::Matrix3d first_rotation = nearest_rotation(first);
   const bool invertible = std::abs(first.determinant()) > 1e-12;
@@ -141,7 +141,7 @@ SceneMotion sample_motion(const NodeTransforms& transforms, std::size_t node, co
     if (!motion.empty() && motion.back().T_world_object.rotation.dot(q) < 0) q.coeffs() *= -1.0;
     motion.push_back(pose);
   }
-  if (!rigid) warn(fmt::format("object {}: its scale is animated, and kept at its first value", name));
+  if (!rigid) warn(fmt::format("object {}: animated scale is not supported; it keeps its first value", name));
   return motion;
 }
 

@@ -12,7 +12,7 @@ Eigen::Vector4d normalised(const Eigen::Vector4d& rotation) {
   return norm > 1e-9 ? Eigen::Vector4d(rotation / norm) : Eigen::Vector4d::UnitW();
 }
 
-/// Between two rotations at a constant rate, the shorter way.
+/// Interpolates between two rotations at a constant rate, along the shorter rotation.
 Eigen::Vector4d turned(const Eigen::Vector4d& from, const Eigen::Vector4d& to, double fraction) {
   return Eigen::Quaterniond(normalised(from)).slerp(fraction, Eigen::Quaterniond(normalised(to))).coeffs();
 }
@@ -53,7 +53,7 @@ Eigen::Vector4d value_at(const Track& track, double t_s, bool is_rotation) {
 }
 
 bool varies(const Track& track) {
-  constexpr double kNegligible = 1e-7;  // of the values, which come in single precision
+  constexpr double kNegligible = 1e-7;  // relative to the values, which have single precision
   const bool cubic = track.interpolation == Interpolation::cubic;
   for (std::size_t i = 0; i < track.values.size(); ++i) {
     const bool is_slope = cubic && i % 3 != 1;

@@ -11,8 +11,8 @@
 #include "esim/core/error.h"
 #include "esim/scene/mesh.h"
 
-/// What every reader of scene files makes of its file: a tree of nodes, before it becomes a Scene. The world's z axis
-/// points up, lengths are metres.
+/// The result of every reader of scene files: a tree of nodes, from which a Scene is made. The world's z axis points
+/// up; lengths are in metres.
 namespace esim {
 
 enum class Interpolation { step, linear, cubic };
@@ -20,12 +20,12 @@ enum class Interpolation { step, linear, cubic };
 /// A property of a node over time: translation or scale (x y z and an unused number), or rotation (x y z w).
 struct Track {
   Interpolation interpolation = Interpolation::linear;
-  std::vector<double> times_s;          ///< increasing; none: the property does not change
-  std::vector<Eigen::Vector4d> values;  ///< one per time; if cubic three: slope before, value, slope after
+  std::vector<double> times_s;          ///< increasing; empty: the property does not change
+  std::vector<Eigen::Vector4d> values;  ///< one per time; if cubic, three: slope before, value, slope after
 };
 
-/// The track's value; before its first and after its last time it rests. Rotations come with unit norm, and turn the
-/// shorter way. The track must not be empty.
+/// The track's value, which is constant before its first and after its last time. Rotations have unit norm, and follow
+/// the shorter path. The track must not be empty.
 Eigen::Vector4d value_at(const Track& track, double t_s, bool is_rotation);
 
 /// Whether any of the track's values differ.
@@ -33,8 +33,8 @@ bool varies(const Track& track);
 
 struct GraphNode {
   std::string name;
-  int parent = -1;                          ///< comes before its children
-  std::optional<Eigen::Matrix4d> matrix{};  ///< instead of the following three, where nothing is animated
+  int parent = -1;                          ///< index; parents precede their children
+  std::optional<Eigen::Matrix4d> matrix{};  ///< instead of the following three, if none is animated
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();
@@ -42,17 +42,17 @@ struct GraphNode {
   std::vector<std::uint32_t> meshes{};
 };
 
-/// From the node's frame to its parent's.
+/// The transform from the node's frame to its parent's.
 Eigen::Matrix4d local_transform(const GraphNode& node, double t_s);
 
-/// An image that materials show: a file that the scene names, or bytes of its own.
+/// An image of materials: a file that the scene refers to, or embedded bytes.
 struct GraphImage {
-  std::string name;  ///< of the file, relative to the scene's folder; for messages only where there are bytes
+  std::string name;  ///< of the file, relative to the scene's folder; only for messages if there are bytes
   std::vector<std::byte> bytes;
 };
 
 struct GraphTexture {
-  std::int32_t image = -1;  ///< none
+  std::int32_t image = -1;  ///< -1: no image
   Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
 };
 
@@ -69,7 +69,7 @@ struct GraphMaterial {
 struct GraphCamera {
   std::string name;
   std::uint32_t node = 0;
-  double horizontal_fov_rad = 0;                                ///< 0: not known
+  double horizontal_fov_rad = 0;                                ///< 0: unknown
   Eigen::Matrix4d T_node_camera = Eigen::Matrix4d::Identity();  ///< of the camera frame: x right, y down, z forward
 };
 
@@ -79,12 +79,12 @@ struct SceneGraph {
   std::vector<GraphMaterial> materials;
   std::vector<GraphImage> images;
   std::vector<GraphCamera> cameras;
-  bool ignores_alpha = false;  ///< whether the format counts surfaces as opaque unless it says otherwise
-  int normal_maps = 0;         ///< materials that have one, which is not shown
+  bool ignores_alpha = false;  ///< whether surfaces of the format are opaque by default
+  int normal_maps = 0;         ///< number of materials with a normal map, which is ignored
   std::vector<std::string> warnings;
 };
 
-/// The most of anything that a scene may hold, so that a small file cannot ask for gigabytes.
+/// Limits of a scene, so that a small file cannot request gigabytes.
 inline constexpr std::size_t kMaxSceneTriangles = std::size_t{1} << 24;
 inline constexpr std::size_t kMaxSceneVertices = std::size_t{1} << 25;
 inline constexpr std::size_t kMaxSceneTexels = std::size_t{1} << 28;
@@ -93,13 +93,13 @@ inline constexpr std::size_t kMaxSceneKeys = std::size_t{1} << 22;
 /// Throws the UserError "scene FILE: REASON".
 [[noreturn]] void fail_scene(const std::filesystem::path& file, const std::string& reason);
 
-// The readers, one per file of this folder. Each throws UserError for what cannot be read, and warns for what can be
-// lived with. They check all indices and refuse numbers that are not finite.
+// The readers, one per file of this folder. They throw UserError for files that cannot be read, and warn of features
+// that are ignored. They check all indices and reject numbers that are not finite.
 
 /// glTF 2.0: .gltf and .glb.
 SceneGraph read_gltf(const std::filesystem::path& file);
 
-/// What assimp reads: OBJ, PLY, STL, FBX, Collada.
+/// The formats that assimp reads: OBJ, PLY, STL, FBX, Collada.
 SceneGraph read_with_assimp(const std::filesystem::path& file);
 
 }  // namespace esim

@@ -69,7 +69,7 @@ TextureStore::Views TextureStore::views_of(const GraphTexture& slot, const Eigen
   Planes planes = decoded(read(slot), colour || !is_grey(factor));
   texel_count_ += planes[0].size();
   if (texel_count_ > kMaxSceneTexels)
-    throw UserError(fmt::format("its textures have more than {} texels in all; make them smaller", kMaxSceneTexels));
+    throw UserError(fmt::format("the textures have more than {} texels in total; make them smaller", kMaxSceneTexels));
   Views views;
   const auto keep = [&](View view, const Image<float>& image) {
     views[static_cast<std::size_t>(view)] = std::make_shared<const Texture>(image, slot.wrap_u, slot.wrap_v);

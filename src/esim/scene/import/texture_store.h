@@ -13,27 +13,27 @@
 
 namespace esim {
 
-/// What of an image or a material is wanted.
+/// The part of an image or a material that is used.
 enum class View { red, green, blue, luminance };
 
-/// Reads the images of a scene, each once per way in which it is used.
+/// Reads the images of a scene, once for each way in which they are used.
 class TextureStore {
  public:
-  /// Views other than luminance are had if `look` has colours.
+  /// Views other than luminance require that `look` has colours.
   TextureStore(const SceneGraph& graph, std::filesystem::path folder, const WarningHandler& warn, SceneLook look)
       : graph_(graph), folder_(std::move(folder)), warn_(warn), look_(look) {}
 
   SceneLook look() const { return look_; }
 
-  /// A view of an image whose colours are multiplied by `factor`. Null where the slot holds no texture, and, after a
-  /// warning that names the material, where its image is missing, forbidden or unreadable.
+  /// A view of an image whose colours are multiplied by `factor`. Null if the slot has no texture, and, after a warning
+  /// that names the material, if its image is missing, not allowed or unreadable.
   std::shared_ptr<const Texture> get(const GraphTexture& slot, const Eigen::Vector3f& factor,
                                      const std::string& material, View view);
 
-  /// The image itself, not decoded. Null as above; that its bytes are no image is not noticed.
+  /// The encoded image. Null as above; the bytes are not checked.
   std::shared_ptr<const CodedTexture> coded(const GraphTexture& slot, const std::string& material);
 
-  /// Images that were read.
+  /// Number of images that were read.
   std::size_t image_count() const { return image_count_; }
 
  private:

@@ -91,7 +91,7 @@ class Recordings(Cli):
     def test_samples_held_to_the_maximum_rate_are_reported(self):
         result = self.simulate(*FAST, "--set", "sampling={type: flow, lambda: 0.1, max_rate_hz: 100}")
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertRegex(result.stderr, r"warning: cam0: \d+ intervals between samples were held to sampling.max_rate_hz "
+        self.assertRegex(result.stderr, r"warning: cam0: \d+ intervals between samples were limited by sampling.max_rate_hz "
                                         r"\(100 Hz\)")
 
     def test_a_recording_holds_what_the_manual_says(self):
@@ -253,7 +253,7 @@ class BadInput(Cli):
             "camera.width=0": "at least 1",
             "duration_s=-1": "above 0",
             "truth.rate_hz=-1": "at least 0",
-            "truth={rate_hz: 0, displacement: true}": "joins two frames",
+            "truth={rate_hz: 0, displacement: true}": "needs two frames",
             "renderer.image=none.jpg": "no such file",
             "trajectory={type: file, path: none.txt}": "none.txt",
             "renderer.pose.look_at=[-5, 0, 0]": "sees nothing",

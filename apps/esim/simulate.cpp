@@ -55,12 +55,11 @@ int run(const Arguments& arguments) {
   if (!arguments.quiet) {
     print_summary(summary, out, scenario.output.preview && scenario.truth.rate_hz > 0);
     for (const std::string& hint : hints(scenario, summary)) {
-      tell(stderr, "hint:      {}: esim simulate {} --set 'sampling={{type: flow}}'\n", hint,
-           arguments.scenario);
+      tell(stderr, "hint:      {}: esim simulate {} --set 'sampling={{type: flow}}'\n", hint, arguments.scenario);
     }
   }
   if (!summary.problem.empty()) {
-    throw UserError(fmt::format("{}; the {:.3f} s before it are simulated: {}, marked incomplete", summary.problem,
+    throw UserError(fmt::format("{}; the {:.3f} s before this error are kept in {}, marked incomplete", summary.problem,
                                 to_seconds(summary.end - summary.start), out.string()));
   }
   return summary.complete ? kOk : kInterrupted;

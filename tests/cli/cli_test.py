@@ -256,7 +256,7 @@ class BadInput(Cli):
             "truth={rate_hz: 0, displacement: true}": "needs two frames",
             "renderer.image=none.jpg": "no such file",
             "trajectory={type: file, path: none.txt}": "none.txt",
-            "renderer.pose.look_at=[-5, 0, 0]": "sees nothing",
+            "renderer.pose.look_at=[-5, 0, 0]": "never sees",
             "renderer={type: mesh, scene: none.obj}": "no such file",
             "camera={calibration: none.yaml}": "no such file",
             "output.compression=zip": "is not one of",
@@ -264,7 +264,7 @@ class BadInput(Cli):
         for setting, message in cases.items():
             with self.subTest(setting):
                 arguments = ["--set", setting]
-                if message == "sees nothing":
+                if message == "never sees":
                     arguments += ["--set", "renderer.pose.position=[-6, 0, 0]"]
                 self.assert_refused(self.simulate(*arguments), message)
 

@@ -51,7 +51,7 @@ class Dataset(ProgramTest):
             self.assertTrue((self.out / picture).read_bytes().startswith(b"\x89PNG"))
         check = run("dataset", "--check", self.out)
         self.assertEqual(check.returncode, 0, check.stderr)
-        self.assertIn("24 sequences, each once", check.stdout)
+        self.assertIn("complete: 24 sequences", check.stdout)
 
     def test_workers_and_ends_change_nothing(self):
         straight, other = self.folder / "straight", self.folder / "other"
@@ -156,7 +156,7 @@ class Dataset(ProgramTest):
         self.assert_refused(self.make(self.out, "--set", "contrast_treshold=1"), "contrast_treshold")
         self.assert_refused(self.make(self.out, "--threshold", 0.5, 0.2), "from 0.5 to 0.2")
         self.assert_refused(run("dataset", "affine"), "--out")
-        self.assert_refused(run("dataset", "--out", self.out), "say what to make")
+        self.assert_refused(run("dataset", "--out", self.out), "give affine, or a scenario file")
         self.assert_refused(run("dataset", self.folder / "none.yaml", "--out", self.out), "none.yaml: cannot be read")
         self.assert_refused(run("dataset", "--check", self.folder), "is no dataset")
         other = self.folder / "thesis"
@@ -206,7 +206,7 @@ class Dataset(ProgramTest):
         self.assertEqual(run("dataset", "--check", self.out).returncode, 0)
         missing = self.make(self.folder / "other", *options, env={"PATH": "/nowhere"})
         self.assertEqual(missing.returncode, 2)
-        self.assertIn("sbatch did not take", missing.stderr)
+        self.assertIn("sbatch failed", missing.stderr)
 
     def test_help_has_examples(self):
         result = run("dataset", "--help")

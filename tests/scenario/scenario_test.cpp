@@ -176,7 +176,7 @@ TEST_F(ScenarioFile, RefusesUnknownKeysAndNamesTheNearest) {
   EXPECT_TRUE(
       contains(error(std::string(kMinimal) + "samplin: {}\n"), ":5: samplin: unknown key; did you mean sampling?"));
   EXPECT_TRUE(contains(error(kMinimal, {"truth.rate=3"}), "--set truth.rate: unknown key; did you mean rate_hz?"));
-  EXPECT_TRUE(contains(error(std::string(kMinimal) + "xyzzy: 1\n"), "known are"));
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "xyzzy: 1\n"), "valid keys are"));
 }
 
 TEST_F(ScenarioFile, RefusesWrongTypesAndRanges) {
@@ -207,7 +207,7 @@ TEST_F(ScenarioFile, RefusesWrongTypesAndRanges) {
 
 TEST_F(ScenarioFile, RefusesFilesThatAreNoScenario) {
   EXPECT_TRUE(contains(error("renderer: [1, 2"), "not valid YAML"));
-  EXPECT_TRUE(contains(error("just text"), "a scenario is a map"));
+  EXPECT_TRUE(contains(error("just text"), "a scenario must be a map"));
   EXPECT_TRUE(contains(error("duration_s: 1\ntrajectory: {type: static}\n"), "renderer: is missing"));
   EXPECT_TRUE(contains(test::message_of<UserError>([&] { read_scenario(folder_.path() / "none.yaml"); }),
                        "no such scenario file"));

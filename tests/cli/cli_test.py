@@ -84,7 +84,7 @@ class Recordings(Cli):
         room = SCENES / "room.yaml"
         slow = self.simulate(*short, "--set", "sampling={type: adaptive}", scenario=room)
         self.assertEqual(slow.returncode, 0, slow.stderr)
-        self.assertRegex(slow.stderr, r"hint: .*Flow sampling .*: esim simulate \S+room.yaml --set 'sampling=\{type: flow\}'")
+        self.assertRegex(slow.stderr, r"hint: .*flow sampling .*: esim simulate \S+room.yaml --set 'sampling=\{type: flow\}'")
         for other in (["--set", "sampling={type: flow}"], ["--set", "sampling={type: adaptive}", "--quiet"]):
             self.assertNotIn("hint:", self.simulate(*short, *other, scenario=room).stderr)
 

@@ -41,7 +41,7 @@ class SceneWords {
 
   const std::string& word(const char* what) {
     if (at_end()) {
-      throw UserError(fmt::format("scene {}:{}: the file ends, but {} must follow; a layer is an image and 12 numbers",
+      throw UserError(fmt::format("scene {}:{}: ends where {} should follow; a layer is an image and 12 numbers",
                                   file_.string(), line_count_, what));
     }
     return words_[next_++].text;
@@ -52,14 +52,14 @@ class SceneWords {
     double value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc{} || end != text.data() + text.size() || !(value >= range.min && value <= range.max)) {
-      fail(fmt::format("{} '{}' is invalid: must be a number from {} to {}", what, text, range.min, range.max));
+      fail(fmt::format("{} is '{}', but must be a number from {} to {}", what, text, range.min, range.max));
     }
     return value;
   }
 
   int whole_number(const char* what, Range range) {
     const double value = number(what, range);
-    if (value != std::floor(value)) fail(fmt::format("{} {} is invalid: must be a whole number", what, value));
+    if (value != std::floor(value)) fail(fmt::format("{} is {}, but must be a whole number", what, value));
     return static_cast<int>(value);
   }
 
@@ -94,7 +94,7 @@ fs::path find_image(const fs::path& name, const fs::path& scene, const std::vect
     tried += (tried.empty() ? "" : ", ") + place.string();
   }
   words.fail(
-      fmt::format("image {} not found (tried {}); put it into the scene file's folder, or add its folder to "
+      fmt::format("image {} is not found (tried {}); put it into the scene file's folder, or add its folder to "
                   "renderer.search_path",
                   name.filename().string(), tried));
 }

@@ -36,8 +36,8 @@ class Hdf5Shard:
             start = self._file.get(f"{name.split('/')[0]}/start") if "/" in name else None
             return self._file[name][k] if start is None else self._file[name][start[k] : start[k + 1]]
         except OSError as problem:
-            raise Error(f"cannot read {name} of sequence {k} of {self._path}: {problem}; check that the Blosc filter for HDF5 is available "
-                        "(`import hdf5plugin`)") from None
+            raise Error(f"cannot read {name} of sequence {k} of {self._path}: {problem}; check that the Blosc "
+                        "filter for HDF5 is available (`import hdf5plugin`)") from None
 
 
 class TarShard:

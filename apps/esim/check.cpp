@@ -32,7 +32,8 @@ void add_check(CLI::App& app, int& exit_code) {
     std::vector<std::string> overrides;
   };
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("check", "Check a scenario and everything it names; nothing is written");
+  CLI::App* command =
+      app.add_subcommand("check", "Check a scenario and the files that it names, without writing anything");
   command->add_option("scenario", arguments->scenario, "Scenario file (YAML)")->required()->type_name("SCENARIO.yaml");
   command->add_option("--set", arguments->overrides, "Change one option")
       ->type_name("KEY=VALUE")
@@ -43,7 +44,8 @@ void add_check(CLI::App& app, int& exit_code) {
 }
 
 void add_options(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("options", "Print every option of a scenario: default, unit, range, meaning");
+  CLI::App* command =
+      app.add_subcommand("options", "Print every option of a scenario with default, unit, range and meaning");
   command->callback([&exit_code] {
     fmt::print("{}", scenario_reference());
     exit_code = kOk;

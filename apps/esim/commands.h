@@ -4,10 +4,10 @@
 
 namespace esim::app {
 
-/// What a subcommand returns to the shell.
+/// The exit codes of subcommands.
 enum ExitCode : int { kOk = 0, kOurFault = 1, kUsersFault = 2, kInterrupted = 130 };
 
-// Each adds its subcommand to `app`; the exit code of the one that was chosen ends up in `exit_code`.
+// Each function adds its subcommand to `app`. The subcommand that runs sets `exit_code`.
 void add_simulate(CLI::App& app, int& exit_code);
 void add_video(CLI::App& app, int& exit_code);
 void add_check(CLI::App& app, int& exit_code);

@@ -27,7 +27,7 @@ int list_formats() {
     std::string extensions = format.folder ? "folder" : "";
     for (const std::string& extension : format.extensions) extensions += format.folder ? "" : extension + " ";
     fmt::print("{:<14} {:<10} {}{}\n", format.name, extensions, format.description,
-               format.create ? "" : " (is only read)");
+               format.create ? "" : " (read only)");
   }
   return kOk;
 }
@@ -42,14 +42,14 @@ void print_summary(const CopySummary& summary, const Arguments& arguments, doubl
 
 int run(const Arguments& arguments, const CLI::App& command) {
   if (arguments.list) return list_formats();
-  if (arguments.out.empty()) throw UserError("give what to read and what to write: esim convert IN OUT");
+  if (arguments.out.empty()) throw UserError("IN or OUT is missing; write: esim convert IN OUT");
   const auto start = std::chrono::steady_clock::now();
   const std::filesystem::path out = arguments.out;
   const Format& format = arguments.format.empty() ? format_for(out) : format_named(arguments.format);
   ConvertOptions options{arguments.copy, {arguments.sensor, {}}, arguments.force};
   if (arguments.recover) {
     options.read.recover = [](const std::string& problem) {
-      tell(stderr, "warning: {}; what comes before is converted\n", problem);
+      tell(stderr, "warning: {}; everything before it is converted\n", problem);
     };
   }
   catch_interrupts();
@@ -72,16 +72,16 @@ void add_convert(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("convert", "Convert recordings and event files between formats");
   command->add_flag("--list", arguments->list, "List the formats");
-  command->add_option("in", arguments->input, "What to read, of any format: recognised by its content")
+  command
+      ->add_option("in", arguments->input,
+                   "Recording or event file of any format; esim detects the format from the content")
       ->type_name("IN");
-  command->add_option("out", arguments->out, "What to write")->type_name("OUT");
+  command->add_option("out", arguments->out, "File or folder to write")->type_name("OUT");
   command->add_option("-f,--format", arguments->format, "Format to write (default: by the extension of OUT)")
       ->type_name("NAME");
-  command->add_option("--camera", arguments->copy.camera, "Convert this one only")->type_name("NAME");
-  command->add_flag("--from-zero", arguments->copy.from_zero, "Let times count from the start of the recording");
-  command
-      ->add_option("--time-unit", arguments->copy.write.unit,
-                   "Of the times of events, where the format leaves the choice")
+  command->add_option("--camera", arguments->copy.camera, "Convert this camera only")->type_name("NAME");
+  command->add_flag("--from-zero", arguments->copy.from_zero, "Write times relative to the start of the recording");
+  command->add_option("--time-unit", arguments->copy.write.unit, "Unit of event times, if the format allows a choice")
       ->transform(CLI::CheckedTransformer(std::map<std::string, TimeUnit>{{"us", TimeUnit::us}, {"ns", TimeUnit::ns}})
                       .description(""))
       ->type_name("us|ns");
@@ -92,16 +92,16 @@ void add_convert(CLI::App& app, int& exit_code) {
                       .description(""))
       ->type_name("blosc|gzip|none");
   add_sensor_options(*command, arguments->sensor);
-  command->add_flag("--recover", arguments->recover, "Convert what can be read of a damaged file");
+  command->add_flag("--recover", arguments->recover, "Convert the readable part of a damaged file");
   command->add_flag("-q,--quiet", arguments->quiet, "Print warnings and errors only");
-  command->add_flag("--force", arguments->force, "Replace an earlier OUT");
+  command->add_flag("--force", arguments->force, "Replace an existing OUT");
   command->footer(
       "Examples:\n"
-      "  esim convert out/room room.bag                                  all of a recording, for ROS\n"
+      "  esim convert out/room room.bag                                  a complete recording, for ROS\n"
       "  esim convert out/room/cam0/events.h5 events.raw                 Prophesee's EVT 3.0\n"
       "  esim convert out/room flow --format kitti                       optical flow and depth as images\n"
       "  esim convert events.txt events.h5 --width 640 --height 480 --time-unit ns\n"
-      "  esim convert cut.h5 whole.h5 --recover                          as far as it can be read\n"
+      "  esim convert cut.h5 whole.h5 --recover                          the readable part of a damaged file\n"
       "  esim convert --list");
   command->callback([arguments, command, &exit_code] { exit_code = run(*arguments, *command); });
 }

@@ -64,7 +64,7 @@ std::unique_ptr<SequenceMaker> make_affine(const Arguments& arguments) {
   return std::make_unique<AffineSequences>(std::move(options));
 }
 
-/// The words that this program was started with, without those about Slurm.
+/// The command line of this process without the options for Slurm.
 std::vector<std::string> own_command() {
   std::ifstream file("/proc/self/cmdline", std::ios::binary);
   std::vector<std::string> words;
@@ -91,8 +91,9 @@ int submit(const Arguments& arguments, const DatasetFolder& folder) {
   write_file_atomically(script, slurm_script(job));
   const int status = std::system(("sbatch " + shell_quoted(script.string())).c_str());
   if (status == -1 || !WIFEXITED(status) || WEXITSTATUS(status) != 0) {
-    throw UserError(fmt::format("sbatch did not take {}; submit it where Slurm is, or change it with --slurm-options",
-                                script.string()));
+    throw UserError(fmt::format(
+        "sbatch failed for {}; submit it on a machine with Slurm, or change its options with --slurm-options",
+        script.string()));
   }
   return kOk;
 }
@@ -106,7 +107,7 @@ int check(const Arguments& arguments) {
     return kUsersFault;
   }
   const DatasetState state = survey_dataset(folder);
-  fmt::print("{}: whole: {} sequences, each once, {} events, {:.1f} GB in {} files\n", arguments.check,
+  fmt::print("{}: complete: {} sequences, {} events, {:.1f} GB in {} files\n", arguments.check,
              grouped(state.sequences), grouped(state.events), static_cast<double>(state.bytes) * 1e-9,
              state.shards.size());
   return kOk;
@@ -117,15 +118,15 @@ void report(const DatasetState& state, const fs::path& out) {
   for (const ShardRecord& record : state.shards)
     passed_over.insert(record.passed_over.begin(), record.passed_over.end());
   if (!passed_over.empty()) {
-    tell(stderr, "warning: {} image{} could not be used; for one, {}\n", passed_over.size(),
+    tell(stderr, "warning: {} image{} could not be used, for example: {}\n", passed_over.size(),
          passed_over.size() == 1 ? "" : "s", passed_over.begin()->second);
   }
-  tell(stderr, "{}: whole; look at {}\n", out.string(), (out / "preview.png").string());
+  tell(stderr, "{}: complete; look at {}\n", out.string(), (out / "preview.png").string());
 }
 
 int run(Arguments arguments) {
   if (!arguments.check.empty()) return check(arguments);
-  if (arguments.what.empty()) throw UserError("say what to make: affine, or a scenario's file");
+  if (arguments.what.empty()) throw UserError("the kind of dataset is missing; give affine, or a scenario file");
   if (arguments.out.empty()) throw UserError("--out: is missing; name a folder");
   const bool affine = arguments.what == kAffine;
   std::vector<std::string> names = arguments.contents;
@@ -163,7 +164,7 @@ int run(Arguments arguments) {
     try {
       return produce(folder, *maker, share, workers, show);
     } catch (const OutputError& error) {
-      throw OutputError(fmt::format("{}; the files that are whole stay in {}, and the same command goes on with them",
+      throw OutputError(fmt::format("{}; complete files stay in {}, and the same command continues from them",
                                     error.what(), arguments.out));
     }
   }();
@@ -183,26 +184,27 @@ int run(Arguments arguments) {
 }
 
 void add_affine_options(CLI::App& command, Arguments& arguments) {
-  const char* const kGroup = "Of affine motion";
+  const char* const kGroup = "Affine motion";
   AffineOptions& affine = arguments.affine;
   const auto add = [&](const char* name, auto& value, const char* help, const char* type) {
     return command.add_option(name, value, help)->type_name(type)->group(kGroup);
   };
-  add("--images", arguments.images, "Folder of images to move; without, collages of dead leaves are made", "DIR");
-  add("--duration", affine.duration_s, "Of a sequence (default: 0.04)", "S");
-  add("--width", affine.width, "Sensor (default: 240)", "PX");
-  add("--height", affine.height, "Sensor (default: 180)", "PX");
+  add("--images", arguments.images, "Folder of images to move (default: generated dead-leaves images)", "DIR");
+  add("--duration", affine.duration_s, "Duration of a sequence, s (default: 0.04)", "S");
+  add("--width", affine.width, "Width of the sensor, px (default: 240)", "PX");
+  add("--height", affine.height, "Height of the sensor, px (default: 180)", "PX");
   add("--flow-histogram", arguments.histogram,
-      "What displacements over the duration follow: lines LOW HIGH WEIGHT, px (default: MPI Sintel's)", "FILE");
-  add("--flow-scale", affine.flow_scale, "Times the histogram's magnitudes", "F");
+      "Histogram of the optical flow over the duration: lines LOW HIGH WEIGHT, px (default: MPI Sintel's)", "FILE");
+  add("--flow-scale", affine.flow_scale, "Factor on the histogram's magnitudes", "F");
   add("--flow-at", arguments.flow_at, "Time of the motion field: start, middle (default) or end", "TIME")
       ->check(CLI::IsMember({"start", "middle", "end"}));
-  add("--threshold", arguments.thresholds, "Contrast threshold of each sequence, drawn between two (default: 0.2 0.5)",
+  add("--threshold", arguments.thresholds, "Range of the random contrast threshold of each sequence (default: 0.2 0.5)",
       "LOW [HIGH]")
       ->expected(1, 2);
-  add("--mix", arguments.mix, "Shares of translation, rotation, scale and shear (default: 1 0.5 0.3 0.2)", "T R S H")
+  add("--mix", arguments.mix, "Relative strengths of translation, rotation, scale and shear (default: 1 0.5 0.3 0.2)",
+      "T R S H")
       ->expected(4);
-  add("--sampling", arguments.sampling, "As of a scenario (default: 'flow lambda=0.5')", "SAMPLING");
+  add("--sampling", arguments.sampling, "Sampling method, as in a scenario (default: 'flow lambda=0.5')", "SAMPLING");
 }
 
 }  // namespace
@@ -210,63 +212,69 @@ void add_affine_options(CLI::App& command, Arguments& arguments) {
 void add_dataset(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("dataset", "Make many labelled sequences for learning");
-  command->add_option("what", arguments->what, "affine: random affine motion of images. Or a scenario with randomise")
+  command
+      ->add_option("what", arguments->what,
+                   "affine (random affine motion of images), or a scenario with the key randomise")
       ->type_name("affine|SCENARIO.yaml");
-  command->add_option("-o,--out", arguments->out, "Folder to write, or to go on with")->type_name("DIR");
-  command->add_option("-n,--count", arguments->count, "Sequences (default: 10000)")
+  command->add_option("-o,--out", arguments->out, "Folder to write; an incomplete dataset is continued")
+      ->type_name("DIR");
+  command->add_option("-n,--count", arguments->count, "Number of sequences (default: 10000)")
       ->type_name("N")
       ->check(CLI::Range(1U, 4'000'000'000U));
   command
-      ->add_option("--contents", arguments->contents,
-                   "Beside events: flow, displacement (both the default), images, tensor, voxels=BINS, depth")
+      ->add_option(
+          "--contents", arguments->contents,
+          "Contents in addition to events: flow, displacement (default: both), images, tensor, voxels=BINS, depth")
       ->type_name("NAME,...")
       ->delimiter(',');
-  command->add_option("--format", arguments->format, "Of the files: hdf5 (default) or webdataset")
+  command->add_option("--format", arguments->format, "Format of the files: hdf5 (default) or webdataset")
       ->type_name("FORMAT")
       ->check(CLI::IsMember({"hdf5", "webdataset"}));
-  command->add_option("--shard-size", arguments->shard_size, "Sequences in a file (default: up to 100)")
+  command->add_option("--shard-size", arguments->shard_size, "Sequences per file (default: up to 100)")
       ->type_name("N")
       ->check(CLI::Range(1U, 1'000'000U));
-  command->add_option("--seed", arguments->seed, "Of everything that is drawn (default: 1)")->type_name("N");
+  command->add_option("--seed", arguments->seed, "Seed of all random numbers (default: 1)")->type_name("N");
   command
       ->add_option("--set", arguments->overrides,
-                   "Changes an option of the scenario; of affine motion, one of its event_camera")
+                   "Change one option of the scenario; for affine motion, one option of event_camera")
       ->type_name("KEY=VALUE")
       ->expected(1)
       ->take_all();
   command
       ->add_option("-j,--workers", arguments->workers,
-                   "Sequences made at a time; 0 takes every processor. The result does not depend on it")
+                   "Number of worker threads; 0 uses every processor. The result does not depend on it")
       ->type_name("N")
       ->check(CLI::Range(0, 1024));
   command->add_flag("-q,--quiet", arguments->quiet, "Print warnings and errors only");
-  command->add_option("--check", arguments->check, "Instead: is the dataset in DIR whole? Reads all of it")
+  command
+      ->add_option("--check", arguments->check,
+                   "Instead: check that the dataset in DIR is complete; this reads all its files")
       ->type_name("DIR");
   add_affine_options(*command, *arguments);
   const char* const kCluster = "On a cluster";
   command
       ->add_option("--shard", arguments->share,
-                   "Make part I of N of the files, I from 0 on; auto/N: I is SLURM_ARRAY_TASK_ID or "
-                   "JOB_COMPLETION_INDEX. In a Slurm array, that is the default")
+                   "Make part I of N of the files, with I from 0 to N - 1; auto/N takes I from SLURM_ARRAY_TASK_ID or "
+                   "JOB_COMPLETION_INDEX. In a Slurm array, auto/N is the default")
       ->type_name("I/N")
       ->group(kCluster);
-  command->add_flag("--slurm", arguments->slurm, "Submit the work to Slurm as an array of tasks, and return")
+  command->add_flag("--slurm", arguments->slurm, "Submit the work to Slurm as an array of tasks, and exit")
       ->group(kCluster);
-  command->add_option("--slurm-tasks", arguments->slurm_tasks, "Tasks of the array (default: 8)")
+  command->add_option("--slurm-tasks", arguments->slurm_tasks, "Number of tasks of the array (default: 8)")
       ->type_name("N")
       ->check(CLI::Range(1U, 100'000U))
       ->group(kCluster);
-  command->add_option("--slurm-options", arguments->slurm_options, "Further options of sbatch")
+  command->add_option("--slurm-options", arguments->slurm_options, "Additional options of sbatch")
       ->type_name("\"--time=1:00:00 ...\"")
       ->group(kCluster);
   command->footer(
       "Examples:\n"
       "  esim dataset affine --out flow                              10,000 sequences of 0.04 s, as in the paper\n"
       "  esim dataset affine --out flow --images photographs --contents flow,tensor --format webdataset\n"
-      "  esim dataset room.yaml --count 500 --out rooms              of a scenario with randomise\n"
+      "  esim dataset room.yaml --count 500 --out rooms              from a scenario with the key randomise\n"
       "  esim dataset affine --out flow --slurm --slurm-tasks 50 --slurm-options \"--cpus-per-task=8\"\n"
-      "  esim dataset --check flow                                   is every sequence there, once?\n"
-      "The same command again makes what is missing. Look at preview.png and magnitudes.png in the folder.");
+      "  esim dataset --check flow                                   check that the dataset is complete\n"
+      "The same command again makes missing files. Look at preview.png and magnitudes.png in the folder.");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

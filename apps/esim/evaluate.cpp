@@ -30,16 +30,16 @@ struct Arguments : RunOptions {
   bool quick = false;
 };
 
-/// The scenario to evaluate. What the built-in one needs is written into `folder`.
+/// The scenario to evaluate. Writes the files of the built-in scenario into `folder`.
 Scenario base_scenario(const Arguments& arguments, const fs::path& folder) {
   if (arguments.panorama.empty()) return read_scenario(arguments.scenario, arguments.overrides);
   if (!arguments.overrides.empty())
-    throw UserError("--set: changes SCENARIO.yaml, but --panorama brings its own; leave one of them out");
+    throw UserError("--set: changes SCENARIO.yaml, which --panorama replaces; remove one of them");
   write_text(folder / kRotation, paper_rotation());
   return paper_scenario(fs::absolute(arguments.panorama), folder / kRotation);
 }
 
-/// As the scenario is once the folder has its final name.
+/// The scenario with paths for the folder's final name.
 Scenario to_keep(Scenario scenario, const Arguments& arguments, const fs::path& folder) {
   if (!arguments.panorama.empty())
     std::get<FileTrajectoryOptions>(scenario.trajectory).path = fs::absolute(folder / kRotation);
@@ -50,11 +50,11 @@ int number_of_pixels(const std::string& text) {
   if (text == "all") return 0;
   int count = 0;
   if (!CLI::detail::lexical_cast(text, count) || count < 1)
-    throw UserError(fmt::format("--pixels {}: must be a number from 1 on, or all", text));
+    throw UserError(fmt::format("--pixels {}: must be a number of at least 1, or all", text));
   return count;
 }
 
-/// What is being done and the time left: one line on a terminal, nothing elsewhere.
+/// Current step and remaining time: one line on a terminal, otherwise nothing.
 class StatusLine {
  public:
   explicit StatusLine(bool wanted) : on_terminal_(wanted && isatty(STDERR_FILENO) == 1) {}
@@ -78,7 +78,7 @@ class StatusLine {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), shown_;
 };
 
-/// The table's lines on the terminal as the schemes are done.
+/// Prints a line of the table when a scheme is done.
 class Table {
  public:
   explicit Table(bool wanted) : wanted_(wanted) {}
@@ -138,45 +138,45 @@ void add_sampling(CLI::App& evaluate, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   SamplingEvaluationOptions& options = arguments->options;
   CLI::App* command = evaluate.add_subcommand(
-      "sampling", "Measure the accuracy and cost of ways of sampling, as in the ESIM paper's Section 4.1");
-  auto* file =
-      command
-          ->add_option("scenario", arguments->scenario,
-                       "Scenario file, whose sampling is replaced by each scheme (default: scenes/panorama.yaml)")
-          ->type_name("SCENARIO.yaml");
+      "sampling", "Measure the accuracy and cost of sampling methods, as in Section 4.1 of the ESIM paper");
+  auto* file = command
+                   ->add_option("scenario", arguments->scenario,
+                                "Scenario file; each scheme replaces its sampling (default: scenes/panorama.yaml)")
+                   ->type_name("SCENARIO.yaml");
   command
       ->add_option("--panorama", arguments->panorama,
-                   "Instead: the paper's random rotations in this equirectangular image of 8 bits")
+                   "Instead: the paper's random rotations in this equirectangular 8-bit image")
       ->type_name("IMAGE")
       ->excludes(file);
   command->add_option("-o,--out", arguments->out, "Folder to write")->required()->type_name("DIR");
   command
       ->add_option("--scheme", arguments->schemes,
-                   "A way of sampling, for example 'flow lambda=0.5'; give it several times (default: a list)")
+                   "Sampling method, for example 'flow lambda=0.5'; may be given several times (default: a list)")
       ->type_name("SCHEME")
       ->expected(1)
       ->take_all();
-  command->add_option("--pixels", arguments->pixels, "Pixels at which brightness is compared, or all")
+  command->add_option("--pixels", arguments->pixels, "Number of pixels at which brightness is compared, or all")
       ->type_name("N")
       ->capture_default_str();
   command
       ->add_option("--truth-rays", options.truth_rays,
-                   "samples_per_pixel of the brightness to compare with (default: the scenario's)")
+                   "samples_per_pixel of the reference brightness (default: the scenario's)")
       ->check(CLI::IsMember({1, 16, 64}));
-  command->add_option("--truth-rate", options.truth_rate_hz, "Of the brightness to compare with, Hz")
+  command->add_option("--truth-rate", options.truth_rate_hz, "Sampling rate of the reference brightness, Hz")
       ->check(CLI::Range(100.0, 1e7))
       ->capture_default_str();
   command->add_option("--window", options.window_s, "Length of the windows of slowest and fastest motion, s")
       ->check(CLI::Range(1e-3, 1e6))
       ->capture_default_str();
   command
-      ->add_option("--event-span", options.event_span_s, "Time of which events are compared in each window, s; 0: none")
+      ->add_option("--event-span", options.event_span_s,
+                   "Duration in each window over which events are compared, s; 0: no comparison")
       ->check(CLI::Range(0.0, 1e3))
       ->capture_default_str();
-  command->add_option("--event-rate", options.event_rate_hz, "Uniform sampling that makes the reference of events, Hz")
+  command->add_option("--event-rate", options.event_rate_hz, "Uniform sampling rate of the reference events, Hz")
       ->check(CLI::Range(1e3, 1e7))
       ->capture_default_str();
-  command->add_option("--goal", options.rmse_goal, "RMSE for which the cost is interpolated")
+  command->add_option("--goal", options.rmse_goal, "RMSE at which the cost is interpolated")
       ->check(CLI::Range(1e-6, 10.0))
       ->capture_default_str();
   command->add_flag("--quick", arguments->quick, "A short run with few schemes and pixels");
@@ -194,7 +194,7 @@ void add_sampling(CLI::App& evaluate, int& exit_code) {
 }  // namespace
 
 void add_evaluate(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("evaluate", "Measure how good a simulation is");
+  CLI::App* command = app.add_subcommand("evaluate", "Measure the accuracy of a simulation");
   command->require_subcommand(1);
   add_sampling(*command, exit_code);
 }

@@ -21,7 +21,7 @@ struct Arguments {
   bool force = false;
 };
 
-/// What Blender is at: one line on a terminal, a line per step elsewhere.
+/// Blender's current step: one line on a terminal, otherwise a line per step.
 class Steps {
  public:
   explicit Steps(bool wanted) : wanted_(wanted), on_terminal_(isatty(STDERR_FILENO) == 1) {}
@@ -47,11 +47,10 @@ std::filesystem::path output_of(const Arguments& arguments) {
   const std::filesystem::path scene = arguments.scene;
   std::filesystem::path out = arguments.out;
   if (out.empty()) out = scene.parent_path() / (scene.stem().string() + (arguments.bake ? "_baked.glb" : ".glb"));
-  if (out.extension() != ".glb")
-    throw UserError(fmt::format("--out {}: is written as GLB; end it in .glb", out.string()));
+  if (out.extension() != ".glb") throw UserError(fmt::format("--out {}: must end in .glb", out.string()));
   std::error_code error;
   if (std::filesystem::equivalent(scene, out, error))
-    throw UserError(fmt::format("--out {}: is the scene itself; name another file", out.string()));
+    throw UserError(fmt::format("--out {}: must not be the scene itself; name another file", out.string()));
   if (std::filesystem::exists(out, error) && !arguments.force)
     throw UserError(fmt::format("--out {}: exists; name another file, or replace it with --force", out.string()));
   return out;
@@ -84,21 +83,22 @@ int run(const Arguments& arguments) {
 
 void add_import(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command =
-      app.add_subcommand("import", "Turn a scene (.blend and others) into GLB with Blender, its light baked if wanted");
+  CLI::App* command = app.add_subcommand(
+      "import", "Convert a scene (.blend and others) to GLB with Blender, optionally with baked lighting");
   command->add_option("scene", arguments->scene, "Scene file")->required()->type_name("SCENE");
   command
-      ->add_option("-o,--out", arguments->out, "File to write (default: NAME.glb or NAME_baked.glb beside the scene)")
+      ->add_option("-o,--out", arguments->out, "File to write (default: NAME.glb or NAME_baked.glb next to the scene)")
       ->type_name("FILE.glb");
-  command->add_flag("--bake", arguments->bake, "Compute the light with Cycles and bake it into one texture per object");
-  command->add_option("--samples", arguments->options.samples, "Light paths per texel: more is less grainy")
+  command->add_flag("--bake", arguments->bake,
+                    "Path-trace the lighting with Cycles and bake it into one texture per object");
+  command->add_option("--samples", arguments->options.samples, "Light paths per texel; more paths reduce noise")
       ->capture_default_str()
       ->check(CLI::Range(1, 65536));
-  command->add_option("--size", arguments->options.size_px, "Largest side of an object's texture, px")
+  command->add_option("--size", arguments->options.size_px, "Maximum side length of an object's texture, px")
       ->capture_default_str()
       ->check(CLI::Range(16, 8192));
   command->add_flag("-q,--quiet", arguments->quiet, "Print warnings and errors only");
-  command->add_flag("--force", arguments->force, "Replace an earlier file");
+  command->add_flag("--force", arguments->force, "Replace an existing file");
   command->footer(
       "Examples:\n  esim import room.blend\n  esim import room.blend --bake --out room_baked.glb --samples 256");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });

@@ -7,8 +7,8 @@ namespace esim::app {
 
 void add_info(CLI::App& app, int& exit_code) {
   auto path = std::make_shared<std::string>();
-  CLI::App* command = app.add_subcommand("info", "Say what a recording or a file of events holds");
-  command->add_option("file", *path, "Recording folder, or file of any format that esim convert --list names")
+  CLI::App* command = app.add_subcommand("info", "Describe the contents of a recording or of an event file");
+  command->add_option("file", *path, "Recording folder, or file of any format in esim convert --list")
       ->required()
       ->type_name("FILE");
   command->footer("Examples:\n  esim info out/room\n  esim info out/room/cam0/events.h5");

@@ -14,20 +14,20 @@ int main(int argc, char** argv) {
       "Examples:\n"
       "  esim simulate scenes/room.yaml --out out/room     simulate; then look at out/room/cam0/preview.png\n"
       "  esim simulate scenes/room.yaml --out out/low --set event_camera.contrast_threshold=0.2\n"
-      "  esim check scenes/room.yaml                       is the scenario right? nothing is written\n"
+      "  esim check scenes/room.yaml                       check a scenario without writing anything\n"
       "  esim video clip.mp4 --out out/clip                events of a video, or of a folder of images\n"
       "  esim convert out/room room.bag                    other formats: esim convert --list\n"
-      "  esim import room.blend --bake                     photorealistic light for fast rendering, by Blender\n"
-      "  esim info out/room                                what a recording holds\n"
-      "  esim play out/room                                a video of a recording or of a file of events\n"
+      "  esim import room.blend --bake                     path-traced lighting for fast rendering, by Blender\n"
+      "  esim info out/room                                the contents of a recording\n"
+      "  esim play out/room                                a video of a recording or of an event file\n"
       "  esim stats out/room --plot                        rates, intervals, hot pixels, banding of its events\n"
-      "  esim waypoints scenes/room.yaml --out walk.yaml   walk through a scene, drop way points for a trajectory\n"
+      "  esim waypoints scenes/room.yaml --out walk.yaml   walk through a scene and set waypoints of a trajectory\n"
       "  esim dataset affine --out out/flow                10,000 sequences with optical flow, for learning\n"
-      "  esim studio scenes/room.yaml                      design, make and look at recordings in a browser\n"
-      "  esim evaluate sampling --out out/sampling         accuracy and cost of ways of sampling\n"
+      "  esim studio scenes/room.yaml                      design, make and view recordings in a browser\n"
+      "  esim evaluate sampling --out out/sampling         accuracy and cost of sampling methods\n"
       "  esim options                                      every option of a scenario\n"
       "\n"
-      "Exit status: 0 done, 1 a defect of esim, 2 something for you to repair, 130 interrupted.");
+      "Exit status: 0 success, 1 internal error, 2 error in the input or on this machine, 130 interrupted.");
 
   int exit_code = kOk;
   add_simulate(app, exit_code);

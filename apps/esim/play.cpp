@@ -21,8 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kSheetColumns = 3, kSheetRows = 3;
-constexpr int kWidthOfGif = 960;            // px: they are large files
-constexpr double kMostFramesOfGif_hz = 50;  // faster ones are shown slowly by browsers
+constexpr int kWidthOfGif = 960;            // px; limits the file size
+constexpr double kMostFramesOfGif_hz = 50;  // browsers slow down faster ones
 
 struct Arguments {
   std::string input, out, camera;
@@ -35,7 +35,7 @@ struct Arguments {
   bool light = false, quiet = false, force = false;
 };
 
-// Beside what is shown, as other figures are: FILE.h5 has FILE.play.mp4, and a folder FOLDER.play.mp4.
+// The default path: FILE.play.mp4 next to FILE.h5, FOLDER.play.mp4 next to a folder.
 fs::path out_path(const Arguments& arguments) {
   if (!arguments.out.empty()) return arguments.out;
   const fs::path file = fs::path(arguments.input + "/").parent_path();  // without a slash at its end
@@ -43,7 +43,7 @@ fs::path out_path(const Arguments& arguments) {
   return fs::path(file).replace_extension(".play.mp4");
 }
 
-/// One showing, from the survey to the finished file.
+/// One output, from the survey to the finished file.
 class Showing {
  public:
   Showing(const Arguments& arguments, const Playable& input, const Survey& found, const fs::path& out)
@@ -55,7 +55,7 @@ class Showing {
     if (!arguments_.at_s) return contact_sheet();
     const TimeNs t = survey_.origin + to_ns(*arguments_.at_s);
     if (t < survey_.start || t > survey_.end) {
-      throw UserError(fmt::format("--at {} is outside what is shown, from {} to {} s", *arguments_.at_s,
+      throw UserError(fmt::format("--at {}: must be within the shown time, from {} to {} s", *arguments_.at_s,
                                   to_seconds(survey_.start - survey_.origin),
                                   to_seconds(survey_.end - survey_.origin)));
     }
@@ -71,7 +71,7 @@ class Showing {
     RecordingFile file(out_, arguments_.force);
     VideoFile video(file.path(), player.layout().width, player.layout().height, options_.frames_per_s, kind);
     std::size_t frames = 0;
-    std::future<void> encoding;  // of one picture, while the next is drawn
+    std::future<void> encoding;  // of one image, while the next is drawn
     while (!interrupted()) {
       auto image = player.next();
       if (encoding.valid()) encoding.get();
@@ -95,10 +95,11 @@ class Showing {
  private:
   int contact_sheet() {
     if (arguments_.play.views.empty()) options_.views = {View::events};
-    if (options_.views.size() != 1) throw UserError("a contact sheet shows one view: name one, or a moment with --at");
+    if (options_.views.size() != 1)
+      throw UserError("a contact sheet shows one view only; give one --view, or a time with --at");
     options_.width = options_.width > 0 ? options_.width : 620;
     constexpr std::size_t kCount = kSheetColumns * kSheetRows;
-    // The middles of equal parts.
+    // The centres of equal intervals.
     const double step_ns = static_cast<double>(survey_.end - survey_.start) / kCount;
     const Instants instants{survey_.start + static_cast<TimeNs>(0.5 * step_ns), step_ns, kCount};
     Player player(*source_, arguments_.extent.camera, survey_, options_, instants);
@@ -111,7 +112,7 @@ class Showing {
     bar_.clear();
     if (pictures.empty()) return kInterrupted;
     write_png(draw_contact_sheet(pictures, kSheetColumns, options_.theme));
-    say(fmt::format("{} moments", pictures.size()));
+    say(fmt::format("{} times", pictures.size()));
     return interrupted() ? kInterrupted : kOk;
   }
 
@@ -139,10 +140,10 @@ int run(Arguments& arguments) {
   const fs::path out = out_path(arguments);
   const std::string extension = out.extension().string();
   if (extension != ".mp4" && extension != ".gif" && extension != ".png")
-    throw UserError(fmt::format("{}: give --out a name that ends in .mp4, .gif or .png", out.string()));
+    throw UserError(fmt::format("--out {}: must end in .mp4, .gif or .png", out.string()));
   if (fs::exists(out) && (!arguments.force || fs::is_directory(out)))
-    throw UserError(out.string() + " exists: choose another --out, or replace a file with --force");
-  if (arguments.at_s && extension != ".png") throw UserError("--at gives a still: name it with --out FILE.png");
+    throw UserError(out.string() + " exists; choose another --out, or replace a file with --force");
+  if (arguments.at_s && extension != ".png") throw UserError("--at gives a single image; add --out FILE.png");
 
   PlayOptions& play = arguments.play;
   play.views = views_named(arguments.views);
@@ -151,7 +152,7 @@ int run(Arguments& arguments) {
   play.span_s = 1e-3 * arguments.span_ms;
   play.frames_per_s = arguments.fps.value_or(extension == ".gif" ? 20 : 30);
   if (extension == ".gif" && play.frames_per_s > kMostFramesOfGif_hz)
-    throw UserError(fmt::format("GIFs have at most {} frames per second: lower --fps", kMostFramesOfGif_hz));
+    throw UserError(fmt::format("--fps: must be at most {} for a GIF; lower it", kMostFramesOfGif_hz));
   if (extension == ".gif" && play.width == 0) play.width = kWidthOfGif;
   play.theme = arguments.light ? kLightTheme : kDarkTheme;
 
@@ -175,7 +176,7 @@ int run(Arguments& arguments) {
 
 void add_play(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("play", "Make a video or a picture of events, to look at");
+  CLI::App* command = app.add_subcommand("play", "Make a video or an image of events");
   const auto positive = [&](const char* name, auto& value, const char* help, const char* unit, double least,
                             double most) {
     return command->add_option(name, value, help)->type_name(unit)->check(CLI::Range(least, most));
@@ -184,45 +185,44 @@ void add_play(CLI::App& app, int& exit_code) {
       ->required()
       ->type_name("IN");
   command
-      ->add_option("-o,--out", arguments->out,
-                   "What to write (default: NAME.play.mp4 beside IN). A picture (.png) is a contact sheet, or one "
-                   "moment with --at")
+      ->add_option(
+          "-o,--out", arguments->out,
+          "File to write (default: NAME.play.mp4 next to IN). A .png file shows a contact sheet, or with --at a "
+          "single time")
       ->type_name("FILE.mp4|.gif|.png");
   command
       ->add_option(
           "--view", arguments->views,
-          "What to show side by side: events, time-surface, space-time, image, depth, motion; all there is without")
+          "Views to show side by side: events, time-surface, space-time, image, depth, motion (default: all available)")
       ->type_name("VIEW,...")
       ->delimiter(',');
-  positive("--fps", arguments->fps, "Frames per second of the video (default: 30, of GIFs 20)", "F", 1, 240);
-  positive(
-      "--slow-motion", arguments->play.slow_motion,
-      "How many times slower than real time; below 1 faster (default: so that the video lasts about 4 s or longer)",
-      "F", 1e-3, 1e6);
+  positive("--fps", arguments->fps, "Frames per second of the video (default: 30, for GIFs 20)", "F", 1, 240);
+  positive("--slow-motion", arguments->play.slow_motion,
+           "Slow-motion factor; below 1 is faster than real time (default: so that the video lasts at least about 4 s)",
+           "F", 1e-3, 1e6);
   auto* window =
       positive("--window-ms", arguments->window_ms,
-               "Time whose events a picture of events shows (default: by their rate, 1 to 50 ms)", "MS", 1e-3, 1e6);
-  positive("--window-events", arguments->play.window_events, "Shows the latest N events instead", "N", 1, 8e6)
+               "Time window of the shown events (default: depends on their rate, 1 to 50 ms)", "MS", 1e-3, 1e6);
+  positive("--window-events", arguments->play.window_events, "Show the latest N events instead of a time window", "N",
+           1, 8e6)
       ->excludes(window);
-  positive("--tau-ms", arguments->tau_ms, "Decay of the time surface (default: 1.5 windows)", "MS", 1e-3, 1e6);
-  positive("--span-ms", arguments->span_ms, "Time that the plot of space and time spans (default: 20 windows)", "MS",
-           1e-3, 1e6);
-  positive("--start", arguments->extent.start_s, "Begins there, since the start of the recording", "S", 0, 1e9);
-  positive("--duration", arguments->extent.duration_s, "Ends so much later", "S", 1e-6, 1e9);
-  positive("--at", arguments->at_s, "The moment of a still, since the start of the recording", "S", 0, 1e9);
-  positive("--size", arguments->play.width, "Width of the picture (default: 960 to 1920, of GIFs 960)", "PX", 128,
-           7680);
-  command->add_option("--camera", arguments->camera, "Of several cameras, the one to show")->type_name("NAME");
+  positive("--tau-ms", arguments->tau_ms, "Decay time of the time surface (default: 1.5 windows)", "MS", 1e-3, 1e6);
+  positive("--span-ms", arguments->span_ms, "Time span of the space-time plot (default: 20 windows)", "MS", 1e-3, 1e6);
+  positive("--start", arguments->extent.start_s, "Start time, relative to the start of the recording", "S", 0, 1e9);
+  positive("--duration", arguments->extent.duration_s, "Duration after the start time", "S", 1e-6, 1e9);
+  positive("--at", arguments->at_s, "Time of a single image, relative to the start of the recording", "S", 0, 1e9);
+  positive("--size", arguments->play.width, "Width of the image (default: 960 to 1920, for GIFs 960)", "PX", 128, 7680);
+  command->add_option("--camera", arguments->camera, "Camera to show, if there are several")->type_name("NAME");
   add_sensor_options(*command, arguments->sensor);
-  command->add_flag("--light", arguments->light, "On white, for paper");
+  command->add_flag("--light", arguments->light, "White background, for print");
   command->add_flag("-q,--quiet", arguments->quiet, "Print warnings and errors only");
-  command->add_flag("--force", arguments->force, "Replace an earlier file");
+  command->add_flag("--force", arguments->force, "Replace an existing file");
   command->footer(
       "Examples:\n"
       "  esim play out/room                                      then look at out/room.play.mp4\n"
       "  esim play events.h5 --view space-time --out cube.gif --duration 0.5\n"
-      "  esim play events.txt --out sheet.png                    nine moments\n"
-      "  esim play out/room --out moment.png --at 0.25 --light   one, for paper");
+      "  esim play events.txt --out sheet.png                    nine times in one image\n"
+      "  esim play out/room --out moment.png --at 0.25 --light   one time, for print");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -8,13 +8,13 @@
 
 namespace esim::app {
 
-/// One line on a terminal that says how far something is; on anything else, nothing.
+/// A progress bar of one line on a terminal; otherwise nothing.
 class ProgressBar {
  public:
   explicit ProgressBar(bool wanted);
   void show(const Progress& progress);
 
-  /// `fraction` of it is done; `what` says how far that is, and is asked only when the line is drawn.
+  /// Shows `fraction` and the text of `what`, which is called only when the line is drawn.
   void show(double fraction, const std::function<std::string()>& what);
 
   void clear();

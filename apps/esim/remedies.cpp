@@ -4,7 +4,7 @@ namespace esim::app {
 namespace {
 
 struct Advice {
-  const char* flag;  // of the command, or empty: of any
+  const char* flag;  // of the command; empty: of any command
   const char* text;
 };
 

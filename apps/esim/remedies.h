@@ -7,8 +7,7 @@
 
 namespace esim::app {
 
-/// A message with the flag that brings the remedy, where the command has it: `command`, or the one that was given to
-/// it.
+/// A message followed by the flag that solves the problem, if `command` or its subcommand has this flag.
 std::string with_remedy(const std::string& message, Remedy remedy, const CLI::App& command);
 
 }  // namespace esim::app

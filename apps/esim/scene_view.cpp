@@ -12,11 +12,11 @@
 namespace esim::app {
 namespace {
 
-// The side of the square of pixels whose mean a pixel of a picture is; even, so that it sees every colour behind
-// Bayer's filters. These lie side by side, which shows at edges the less, the finer they are.
+// Each pixel of an image is the mean of a square of this side; it must be even, to cover all filters of the Bayer
+// pattern. Larger squares reduce colour fringes at edges.
 constexpr int kFinerLook = 4, kFinerPicture = 2;
 
-/// Whether there is a motion to begin with.
+/// Whether the scenario has a motion that gives the initial pose.
 bool has_trajectory(const Scenario& scenario) {
   if (const auto* const file = std::get_if<FileTrajectoryOptions>(&scenario.trajectory)) return !file->path.empty();
   if (const auto* const points = std::get_if<WaypointTrajectoryOptions>(&scenario.trajectory))
@@ -32,8 +32,10 @@ SceneView::SceneView(const Scenario& scenario, int threads, const Notices& notic
   camera_ = camera_model(options);
   T_body_camera_ = pose_named("T_body_camera", options.T_body_camera);
   if (pictures_.traits().on_sensor) {
-    throw UserError(fmt::format("renderer: {} are drawn on the sensor itself; there is no space to walk through",
-                                pictures_.traits().name));
+    throw UserError(
+        fmt::format("renderer: {} are drawn on the sensor, so that there is no 3D scene to walk through; use a mesh, a "
+                    "plane or a panorama",
+                    pictures_.traits().name));
   }
   find_start(scenario, notices);
 
@@ -46,7 +48,7 @@ void SceneView::find_start(const Scenario& scenario, const Notices& notices) {
   const SceneFile& scene = pictures_.scene();
   if (has_trajectory(scenario)) {
     Scenario with_end = scenario;
-    if (!with_end.duration_s) with_end.duration_s = 1;  // of those without an end of their own
+    if (!with_end.duration_s) with_end.duration_s = 1;  // for trajectories that do not define one
     const auto trajectory = build_trajectory(with_end, scene, notices);
     t_ = std::min(trajectory->start() + to_ns(scenario.start_s), trajectory->end());
     start_ = trajectory->at(t_).T_world_body * T_body_camera_;

@@ -6,22 +6,22 @@
 
 namespace esim::app {
 
-/// What a scenario's renderer shows of its scene at the beginning, as pictures from wherever one likes, through the
-/// scenario's first camera. In colour where the renderer has colours.
+/// Images of a scenario's scene at its start time, from any pose, through the scenario's first camera. In colour if the
+/// renderer supports it.
 class SceneView {
  public:
   SceneView(const Scenario& scenario, int threads, const Notices& notices);
 
-  /// Where the scenario's trajectory, which may be missing, or else the first camera of its scene file begins; without
-  /// both, in front of the mesh, or at the origin. A camera's pose.
+  /// The initial pose of the camera: the start of the scenario's trajectory; without one, of the first camera of the
+  /// scene file; otherwise in front of the mesh, or at the origin.
   const SE3& start() const { return start_; }
 
   const SE3& T_body_camera() const { return T_body_camera_; }
 
-  /// As large as fits into so many pixels.
+  /// An image as large as fits into width x height pixels.
   Image<Rgb> look(const SE3& T_world_camera, int width, int height);
 
-  /// As large as the camera's image.
+  /// An image of the camera's size.
   Image<Rgb> picture(const SE3& T_world_camera);
 
  private:

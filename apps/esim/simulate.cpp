@@ -59,7 +59,7 @@ int run(const Arguments& arguments) {
     }
   }
   if (!summary.problem.empty()) {
-    throw UserError(fmt::format("{}; the {:.3f} s before it are simulated: {}, marked incomplete", summary.problem,
+    throw UserError(fmt::format("{}; the {:.3f} s before this error are kept in {}, marked incomplete", summary.problem,
                                 to_seconds(summary.end - summary.start), out.string()));
   }
   return summary.complete ? kOk : kInterrupted;

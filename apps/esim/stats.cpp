@@ -38,7 +38,7 @@ NamedStatistics compute(const std::string& path, const Arguments& arguments) {
   return {file.path().string(), std::move(statistics).finish(options)};
 }
 
-// Where the figure goes: nowhere if it was not asked for. FILE.h5 has FILE.stats.png beside it, and so has a folder.
+// The path of the figure, if requested: FILE.stats.png next to FILE.h5, FOLDER.stats.png next to a folder.
 std::optional<fs::path> figure_path(const Arguments& arguments) {
   if (!arguments.out.empty()) return arguments.out;
   if (!arguments.plot) return std::nullopt;
@@ -50,16 +50,16 @@ std::optional<fs::path> figure_path(const Arguments& arguments) {
 int run(const Arguments& arguments) {
   const std::optional<fs::path> figure = figure_path(arguments);
   if (figure && arguments.files.size() > 1)
-    throw UserError("a figure shows one file: give one, or no --plot and --out");
+    throw UserError("a figure shows one file only; give one file, or remove --plot and --out");
   if (figure && fs::exists(*figure) && !arguments.force) {
-    throw UserError(figure->string() + " exists: choose another --out, or replace it with --force");
+    throw UserError(figure->string() + " exists; choose another --out, or replace it with --force");
   }
   std::vector<NamedStatistics> all;
   for (const std::string& file : arguments.files) all.push_back(compute(file, arguments));
   if (figure) write_file_atomically(*figure, encode_png(draw_figure(all.front())));
   if (!arguments.json) {
     fmt::print("{}", describe(all));
-    fmt::print(stderr, "{}\n", figure ? "figure: " + figure->string() : "for a figure: --plot, or --out FILE.png");
+    fmt::print(stderr, "{}\n", figure ? "figure: " + figure->string() : "for a figure, add --plot or --out FILE.png");
   } else if (all.size() == 1) {
     fmt::print("{}", to_json(all.front()));
   } else {
@@ -73,7 +73,7 @@ int run(const Arguments& arguments) {
 void add_stats(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
-      app.add_subcommand("stats", "Statistics of events, as text and figure; of two files side by side");
+      app.add_subcommand("stats", "Print and draw statistics of events; compare two files side by side");
   command
       ->add_option("file", arguments->files, "events.h5 (also DSEC's), lines of text `t x y p`, or a recording folder")
       ->required()
@@ -82,23 +82,25 @@ void add_stats(CLI::App& app, int& exit_code) {
   auto* fps = command->add_option("--fps", arguments->fps, "Frame rate to look for in the time stamps, Hz")
                   ->type_name("F")
                   ->check(CLI::Range(1e-3, 1e6));
-  command->add_option("--frame-period", arguments->frame_period_s, "Likewise, the time between frames, s")
+  command->add_option("--frame-period", arguments->frame_period_s, "Time between frames, s, instead of --fps")
       ->type_name("S")
       ->check(CLI::Range(1e-6, 1e3))
       ->excludes(fps);
   add_sensor_options(*command, arguments->sensor);
-  command->add_option("--hot-sigmas", arguments->hot_sigmas, "How far above the median a hot pixel is, robust sigmas")
+  command
+      ->add_option("--hot-sigmas", arguments->hot_sigmas,
+                   "Minimum rate of a hot pixel above the median, in robust standard deviations")
       ->type_name("K")
       ->check(CLI::Range(1.0, 1e6))
       ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print JSON, in SI units");
-  command->add_option("-o,--out", arguments->out, "Draw a figure into this file")->type_name("FILE.png");
-  command->add_flag("--plot", arguments->plot, "Draw a figure beside FILE: NAME.stats.png");
-  command->add_flag("--force", arguments->force, "Replace an earlier figure");
+  command->add_option("-o,--out", arguments->out, "Write a figure to this file")->type_name("FILE.png");
+  command->add_flag("--plot", arguments->plot, "Write a figure to NAME.stats.png next to FILE");
+  command->add_flag("--force", arguments->force, "Replace an existing figure");
   command->footer(
       "Examples:\n"
       "  esim stats out/room --plot                              then look at out/room.stats.png\n"
-      "  esim stats events.txt --fps 30                          do the time stamps band at the frames?\n"
+      "  esim stats events.txt --fps 30                          check whether time stamps cluster at the frames\n"
       "  esim stats simulated/events.h5 real/events.h5           side by side\n"
       "  esim stats out/rig/left --json > left.json");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });

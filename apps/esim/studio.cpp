@@ -19,8 +19,7 @@ struct Arguments : studio::StudioOptions {
   std::vector<std::string> folders;
 };
 
-/// Where the page lies as seen from this program, wherever it was moved: as it is installed, beside it in an unpacked
-/// archive, or in the tree that it was built in.
+/// The folder of the page relative to this program: installed, next to it in an unpacked archive, or in the build tree.
 fs::path page_folder() {
   std::error_code error;
   const fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
@@ -36,7 +35,7 @@ int run(Arguments& arguments) {
   arguments.roots.assign(arguments.folders.begin(), arguments.folders.end());
   arguments.pages = arguments.page.empty() ? page_folder() : fs::path(arguments.page);
 
-  // All threads leave these signals to this one, which waits for them.
+  // Blocked in all threads; this one waits for them.
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
@@ -49,7 +48,7 @@ int run(Arguments& arguments) {
   std::fflush(stdout);
   int signal = 0;
   sigwait(&signals, &signal);
-  pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);  // a second one ends the program at once
+  pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);  // a second signal ends the program at once
   return kOk;
 }
 
@@ -57,38 +56,43 @@ int run(Arguments& arguments) {
 
 void add_studio(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("studio", "Design a recording in a browser, make it, and look at it");
-  command->add_option("in", arguments->input, "Scenario, scene file, recording, or folder to open (default: this one)")
+  CLI::App* command = app.add_subcommand("studio", "Design, make and view recordings in a browser");
+  command
+      ->add_option("in", arguments->input,
+                   "Scenario, scene file, recording or folder to open (default: the current folder)")
       ->type_name("IN");
-  command->add_option("--root", arguments->folders, "Folder of files that may be read and written, beside that of IN")
+  command
+      ->add_option("--root", arguments->folders,
+                   "Additional folder whose files the studio may read and write, besides that of IN")
       ->type_name("DIR")
       ->expected(1)
       ->take_all();
-  command->add_option("--port", arguments->port, "Where to listen (default: 8391, or the next that is free)")
+  command->add_option("--port", arguments->port, "Port to listen on (default: 8391, or the next free port)")
       ->type_name("N")
       ->check(CLI::Range(1, 65535));
-  command
-      ->add_option("--host", arguments->host,
-                   "Address to listen on; for another than this machine's own, --token is needed")
+  command->add_option("--host", arguments->host, "Address to listen on; any other than 127.0.0.1 needs --token")
       ->capture_default_str()
       ->type_name("ADDRESS");
-  command->add_option("--token", arguments->token, "Whoever knows it may use the studio (default: new, random)")
+  command
+      ->add_option("--token", arguments->token,
+                   "Access token: anyone who knows it may use the studio (default: random)")
       ->type_name("TEXT");
   command
-      ->add_option("--page", arguments->page,
-                   "Folder of the page (default: share/esim/studio beside the program, or as scripts/studio builds it)")
+      ->add_option(
+          "--page", arguments->page,
+          "Folder of the page (default: share/esim/studio next to the program, or the output of scripts/studio)")
       ->type_name("DIR");
-  command->add_option("-j,--threads", arguments->threads, "Threads; 0 takes every processor")
+  command->add_option("-j,--threads", arguments->threads, "Number of threads; 0 uses every processor")
       ->type_name("N")
       ->check(CLI::Range(0, 1024));
   command->footer(
-      "Prints an address to be opened in a browser on this machine; Ctrl-C ends it.\n\n"
+      "Prints an address to open in a browser on this machine; Ctrl-C ends the studio.\n\n"
       "Examples:\n"
-      "  esim studio scenes/room.yaml            change it, and see what it does\n"
-      "  esim studio room.glb                    begin a scenario with a scene\n"
-      "  esim studio out/room                    look at a recording, of any format that esim convert --list names\n"
+      "  esim studio scenes/room.yaml            edit a scenario and see the effect\n"
+      "  esim studio room.glb                    begin a new scenario with this scene\n"
+      "  esim studio out/room                    view a recording, of any format in esim convert --list\n"
       "  esim studio scenes/room.yaml --root ~/data --port 9000\n"
-      "From another machine: ssh -L 8391:127.0.0.1:8391 HOST, and open the address there.");
+      "To use it from another machine, run ssh -L 8391:127.0.0.1:8391 HOST there, and open the address.");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -44,11 +44,12 @@ Notices print_and_keep(std::vector<std::string>& given, bool quiet) { return kee
 void add_run_options(CLI::App& command, RunOptions& options, const std::string& set_help) {
   command.add_option("--set", options.overrides, set_help)->type_name("KEY=VALUE")->expected(1)->take_all();
   command
-      .add_option("-j,--threads", options.threads, "Threads; 0 takes every processor. The result does not depend on it")
+      .add_option("-j,--threads", options.threads,
+                  "Number of threads; 0 uses every processor. The result does not depend on it")
       ->type_name("N")
       ->check(CLI::Range(0, 1024));
   command.add_flag("-q,--quiet", options.quiet, "Print warnings and errors only");
-  command.add_flag("--force", options.force, "Replace an earlier recording in --out");
+  command.add_flag("--force", options.force, "Replace an existing recording in --out");
 }
 
 void add_sensor_options(CLI::App& command, std::optional<SensorSize>& sensor) {
@@ -59,8 +60,8 @@ void add_sensor_options(CLI::App& command, std::optional<SensorSize>& sensor) {
     };
     return command.add_option_function<int>(name, set, help)->type_name("PX")->check(CLI::Range(1, 65536));
   };
-  CLI::Option* width = add("--width", &SensorSize::width, "Sensor (default: as the file says)");
-  CLI::Option* height = add("--height", &SensorSize::height, "Sensor");
+  CLI::Option* width = add("--width", &SensorSize::width, "Width of the sensor (default: from the file)");
+  CLI::Option* height = add("--height", &SensorSize::height, "Height of the sensor (default: from the file)");
   width->needs(height);
   height->needs(width);
 }

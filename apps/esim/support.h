@@ -15,8 +15,8 @@
 
 namespace esim::app {
 
-/// From now on, Ctrl-C, SIGTERM and, unless nohup has let it be ignored, SIGHUP (a lost connection) are only
-/// remembered; that nobody reads what is printed any more ends nothing.
+/// From now on, Ctrl-C, SIGTERM and SIGHUP (a lost connection; unless nohup ignores it) only set interrupted(), and
+/// SIGPIPE is ignored.
 void catch_interrupts();
 bool interrupted();
 
@@ -25,8 +25,8 @@ bool is_ignored(int signal);
 
 void write_or_not(std::FILE* file, const std::string& text) noexcept;
 
-/// Prints for people. Unlike fmt::print, does not throw where the terminal is gone or the pipe closed: what is being
-/// written to files matters more.
+/// Prints text for users. Unlike fmt::print, does not throw if the terminal is gone or the pipe is closed, so that
+/// files are still completed.
 template <typename... Arguments>
 void tell(std::FILE* file, fmt::format_string<Arguments...> format, Arguments&&... arguments) {
   write_or_not(file, fmt::format(format, std::forward<Arguments>(arguments)...));
@@ -35,10 +35,10 @@ void tell(std::FILE* file, fmt::format_string<Arguments...> format, Arguments&&.
 /// Prints warnings and, unless `quiet`, notes.
 Notices printing(bool quiet);
 
-/// The same; keeps both in `given` for the report.
+/// The same; also appends both to `given` for the report.
 Notices print_and_keep(std::vector<std::string>& given, bool quiet);
 
-/// What the commands that make recordings have in common.
+/// The common options of commands that make recordings.
 struct RunOptions {
   std::vector<std::string> overrides;
   int threads = 0;
@@ -46,10 +46,10 @@ struct RunOptions {
   bool force = false;
 };
 
-/// Adds them to a command; `set_help` says what --set changes.
+/// Adds them to a command; `set_help` is the help of --set.
 void add_run_options(CLI::App& command, RunOptions& options, const std::string& set_help);
 
-/// Adds --width and --height of the sensor, for files that do not tell.
+/// Adds --width and --height of the sensor, for files that do not contain it.
 void add_sensor_options(CLI::App& command, std::optional<SensorSize>& sensor);
 
 void write_text(const std::filesystem::path& path, const std::string& text);

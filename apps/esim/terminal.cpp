@@ -32,7 +32,7 @@ void restore() {
 
 void restore_and_die(int signal) {
   restore();
-  raise(signal);  // whose handler has been reset
+  raise(signal);  // its handler has been reset
 }
 
 }  // namespace
@@ -41,7 +41,7 @@ bool Terminal::is_there() { return isatty(STDIN_FILENO) == 1 && isatty(STDOUT_FI
 
 Terminal::Terminal() {
   if (!is_there() || tcgetattr(STDIN_FILENO, &before) != 0)
-    throw UserError("standard input and output are no terminal; run this in one, without redirecting them");
+    throw UserError("standard input and output must be a terminal; run this in a terminal, without redirection");
   struct sigaction dying {};
   dying.sa_handler = restore_and_die;
   dying.sa_flags = SA_RESETHAND | SA_NODEFER;

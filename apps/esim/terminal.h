@@ -7,14 +7,14 @@
 
 namespace esim::app {
 
-/// The terminal that standard input and output are, without echo and lines, on its alternate screen. It is as before
-/// when this ends, and when the process is ended by a signal that can be caught.
+/// The terminal of standard input and output in raw mode without echo, on its alternate screen. The destructor, and any
+/// signal that can be caught, restore its state.
 class Terminal {
  public:
   /// Whether standard input and output are a terminal.
   static bool is_there();
 
-  /// Throws UserError where they are not. One at a time.
+  /// Throws UserError if they are not. At most one Terminal may exist.
   Terminal();
   ~Terminal();
   Terminal(const Terminal&) = delete;
@@ -26,13 +26,13 @@ class Terminal {
   };
   Size size() const;
 
-  /// As COLORTERM says.
+  /// According to COLORTERM.
   TerminalColours colours() const;
 
-  /// What has been typed; waits so long for it, and returns nothing where a signal comes or nothing is typed.
+  /// The typed characters. Waits up to the given time; returns an empty text on a signal or a timeout.
   std::string read(int wait_ms);
 
-  /// Whether nothing more can be typed: the terminal has gone.
+  /// Whether the terminal is gone, so that no more input can come.
   bool closed() const { return closed_; }
 
   void write(std::string_view text);

@@ -23,7 +23,7 @@ struct Arguments : RunOptions {
   std::string input, out;
 };
 
-/// A visitor of describe() that gives every member an option of the command line: --max-steps for max_steps.
+/// A visitor of describe() that adds a command-line option for every member: --max-steps for max_steps.
 class CommandLine {
  public:
   explicit CommandLine(CLI::App& command) : command_(command) {}
@@ -68,7 +68,7 @@ class CommandLine {
     return text;
   }
 
-  /// CLI11's convention: the error, or nothing.
+  /// Returns the error, or an empty text, as CLI11 expects.
   static std::string out_of_range(const std::string& text, const About& about) {
     double value = 0;
     if (!CLI::detail::lexical_cast(text, value)) return fmt::format("'{}' is not a number", text);
@@ -83,28 +83,29 @@ class CommandLine {
 void report_losses(const ConversionSummary& summary, const ConversionOptions& options, const Notices& notices) {
   if (summary.held > 0) {
     notices.warning(
-        fmt::format("between {} of {} pairs of frames, something moves too far for {} steps (up to {:.0f} px); "
-                    "raise --lambda or --max-steps, or give a video with more frames per second",
+        fmt::format("between {} of {} pairs of frames, the motion is too large for {} steps (up to {:.0f} px); "
+                    "raise --lambda or --max-steps, or use a video with more frames per second",
                     summary.held, summary.frames - 1, options.interpolation.max_steps, summary.displacement_px));
   }
   std::ranges::for_each(losses(options, summary), notices.warning);
 }
 
-/// What would spread events that bunch at the frames: which of the options are left to try.
+/// Options that the user has not tried and that would spread events that bunch at the frames.
 std::string ways_to_spread(const ConversionOptions& options) {
-  if (!options.interpolation.interpolation) return "without --no-interpolation, edges move between the frames";
+  if (!options.interpolation.interpolation) return "without --no-interpolation, edges would move between the frames";
   constexpr double kFineLambda_px = 0.25;
   std::string ways;
   if (options.event_camera.low_pass_hz == 0)
     ways =
-        "pixels of a real camera (--set preset=davis346), or of limited bandwidth (--set low_pass_hz=50), spread them";
+        "the pixels of a real camera (--set preset=davis346), or a limited bandwidth (--set low_pass_hz=50), spread "
+        "them";
   if (options.interpolation.lambda > kFineLambda_px)
     ways += fmt::format("{}smaller steps (--lambda {}) help a little", ways.empty() ? "" : "; ", kFineLambda_px);
-  return ways.empty() ? "what is left comes from noise and aliasing of the frames" : ways;
+  return ways.empty() ? "the rest comes from noise and aliasing of the frames" : ways;
 }
 
 void report_bunching(const ConversionSummary& summary, const ConversionOptions& options, const Notices& notices) {
-  constexpr double kMuch = 0.1;  // as of "strong" banding in `esim stats`
+  constexpr double kMuch = 0.1;  // as for "strong" banding in `esim stats`
   if (!summary.modulation || *summary.modulation < kMuch) return;
   notices.note(fmt::format("events bunch at the frames: between two frames their rate varies by {:.0f} % rms; {}",
                            100 * *summary.modulation, ways_to_spread(options)));
@@ -117,7 +118,7 @@ void print_summary(const ConversionSummary& summary) {
        converted_s / summary.wall_seconds, summary.steps, summary.events_on + summary.events_off);
 }
 
-/// A conversion from the opened input to the summary of what was written.
+/// A conversion from the opened input to the summary.
 class Converter {
  public:
   explicit Converter(const Arguments& arguments)
@@ -149,7 +150,7 @@ class Converter {
 
   int threads() const { return workers_.threads(); }
 
-  /// Anything yet.
+  /// Whether anything has been converted.
   const bool& has_converted() const { return has_converted_; }
 
  private:
@@ -159,11 +160,11 @@ class Converter {
   bool has_converted_ = false;
 };
 
-/// What the shell gets; throws what ended the conversion early.
+/// The exit code. Throws UserError if a problem ended the conversion early.
 int outcome(const ConversionSummary& summary, const fs::path& out) {
   if (!summary.problem.empty()) {
-    throw UserError(fmt::format("{}; the {} frames before it are converted: {}, marked incomplete", summary.problem,
-                                summary.frames, out.string()));
+    throw UserError(fmt::format("{}; the {} frames before this error are kept in {}, marked incomplete",
+                                summary.problem, summary.frames, out.string()));
   }
   return summary.complete ? kOk : kInterrupted;
 }
@@ -224,7 +225,7 @@ int run(Arguments& arguments) {
 
 void add_video(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("video", "Turn a video, or a folder of images, into events");
+  CLI::App* command = app.add_subcommand("video", "Convert a video, or a folder of images, to events");
   command
       ->add_option("input", arguments->input,
                    "Video file, or folder of images with images.csv (ns, file), timestamps.txt (s) or --fps")
@@ -232,7 +233,7 @@ void add_video(CLI::App& app, int& exit_code) {
       ->type_name("INPUT");
   command
       ->add_option("-o,--out", arguments->out,
-                   "Folder to write, or file of events: .h5, .txt, ... (default: out/NAME of the input)")
+                   "Recording folder or event file (.h5, .txt, ...) to write (default: out/NAME of the input)")
       ->type_name("FILE_OR_DIR");
   CommandLine options(*command);
   describe_command_line(options, arguments->options);

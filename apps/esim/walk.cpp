@@ -22,7 +22,7 @@ using Effect = Walker::Effect;
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// A text as YAML, in quotes where it might be read as anything else.
+/// A text as YAML, in quotes if necessary.
 std::string in_quotes(const std::string& text) {
   const bool plain = std::all_of(text.begin(), text.end(), [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.' || c == '/';
@@ -39,18 +39,18 @@ WalkFile::WalkFile(const fs::path& path, bool append, bool force) : path_(path) 
   std::error_code error;
   const fs::path folder = fs::absolute(path).parent_path();
   if (!fs::is_directory(folder, error))
-    throw UserError(fmt::format("--out {}: there is no folder {}; make it", path.string(), folder.string()));
+    throw UserError(fmt::format("--out {}: the folder {} does not exist; create it", path.string(), folder.string()));
   if (!fs::exists(path, error) || (force && !append)) return;
   if (!append) {
     throw UserError(
-        fmt::format("--out {}: exists; go on where it ends with --append, replace it with --force, or "
+        fmt::format("--out {}: exists; continue it with --append, replace it with --force, or "
                     "name another file",
                     path.string()));
   }
   points_ = read_waypoints(path);
   for (const WaypointPointOptions& point : points_) {
     if (!point.t) continue;
-    throw UserError(fmt::format("--out {}: its points have times, which those of a walk have not; name another file",
+    throw UserError(fmt::format("--out {}: its points have times, so that it cannot be continued; name another file",
                                 path.string()));
   }
 }
@@ -87,17 +87,17 @@ Effect Walk::press(Key key) {
   switch (effect) {
     case Effect::dropped:
       file_.add(walker_.points().back() * view_.T_body_camera().inverse());
-      message_ = fmt::format("way point {} is in {}", file_.points().size(), file_.path().string());
+      message_ = fmt::format("waypoint {} saved to {}", file_.points().size(), file_.path().string());
       break;
     case Effect::removed:
       file_.remove_last();
       message_ = fmt::format("removed; {} left", file_.points().size());
       break;
     case Effect::stands_there:
-      message_ = "the last way point is here; move on first";
+      message_ = "the last waypoint is already here; move first";
       break;
     case Effect::nothing:
-      message_ = "there is no way point yet";
+      message_ = "there is no waypoint yet";
       break;
     case Effect::preview:
       write_picture();
@@ -110,7 +110,7 @@ Effect Walk::press(Key key) {
 
 std::string Walk::status() const {
   const Eigen::Vector3d p = T_world_camera().translation;
-  return fmt::format("{:.2f} {:.2f} {:.2f} m  heading {:.0f}, up {:.0f} deg  {:.3g} m/s  {} way point{}", p.x(), p.y(),
+  return fmt::format("{:.2f} {:.2f} {:.2f} m  heading {:.0f}, up {:.0f} deg  {:.3g} m/s  {} waypoint{}", p.x(), p.y(),
                      p.z(), walker_.yaw_rad() / kDegree, walker_.pitch_rad() / kDegree, walker_.speed_m_per_s(),
                      file_.points().size(), file_.points().size() == 1 ? "" : "s");
 }
@@ -129,9 +129,9 @@ SE3 Walk::T_world_camera(const WaypointTrajectory& motion, TimeNs t) const {
 void Walk::print_summary(const fs::path& scenario) const {
   const std::size_t count = file_.points().size();
   if (count == 0) return;
-  tell(stderr, "{}: {} way point{}\n", file_.path().string(), count, count == 1 ? "" : "s");
+  tell(stderr, "{}: {} waypoint{}\n", file_.path().string(), count, count == 1 ? "" : "s");
   if (count < 2) {
-    tell(stderr, "a motion needs two; go on with --append\n");
+    tell(stderr, "a motion needs two waypoints; continue with --append\n");
     return;
   }
   const WaypointTrajectory whole = motion();
@@ -142,7 +142,7 @@ void Walk::print_summary(const fs::path& scenario) const {
        std::floor(to_seconds(whole.end()) * 1e3) / 1e3);
 }
 
-/// Beside the way points, under a name of its own.
+/// Writes the current view to a new .png file next to the file of waypoints.
 void Walk::write_picture() {
   fs::path path;
   std::error_code error;

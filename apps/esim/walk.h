@@ -11,11 +11,10 @@
 
 namespace esim::app {
 
-/// The points of a walk and the file that holds them, which is written with every change.
+/// The points of a walk and their file, which is written after every change.
 class WalkFile {
  public:
-  /// Throws UserError where the file is there already, unless it is to be continued or replaced, and where it cannot
-  /// be continued.
+  /// Throws UserError if the file exists and neither `append` nor `force` is set, or if it cannot be continued.
   WalkFile(const std::filesystem::path& path, bool append, bool force);
 
   void add(const SE3& T_world_body);
@@ -31,13 +30,13 @@ class WalkFile {
   std::vector<WaypointPointOptions> points_;
 };
 
-/// The walk from its first key to its last.
+/// A walk from the first key to the last.
 class Walk {
  public:
-  /// Begins at `start`, the camera's position; or else where the file ends, or where the view begins.
+  /// Begins at `start`, a position of the camera; if not given, at the last point of the file or at the view's start.
   Walk(WalkFile file, SceneView& view, const std::optional<Eigen::Vector3d>& start, double speed_m_per_s);
 
-  /// Does what the key asks for, but playing, helping and leaving.
+  /// Executes a key, except playing, help and leaving, which the caller does.
   Walker::Effect press(Key key);
 
   SE3 T_world_camera() const { return walker_.T_world_camera(); }
@@ -45,18 +44,18 @@ class Walk {
     return view_.look(T_world_camera, width, height);
   }
 
-  /// What the last key has led to, for a person.
+  /// The result of the last key as text.
   const std::string& message() const { return message_; }
   void say(const std::string& message) { message_ = message; }
 
-  /// Where one is, in a line.
+  /// The current pose, in one line.
   std::string status() const;
 
-  /// The motion through the points so far. Throws UserError where there is none.
+  /// The motion through the points so far. Throws UserError if it is undefined.
   WaypointTrajectory motion() const;
   SE3 T_world_camera(const WaypointTrajectory& motion, TimeNs t) const;
 
-  /// Prints what to do with the file; to standard output what belongs into the scenario.
+  /// Prints how to use the file; the lines for the scenario go to standard output.
   void print_summary(const std::filesystem::path& scenario) const;
 
  private:

@@ -18,9 +18,9 @@ namespace fs = std::filesystem;
 using Effect = Walker::Effect;
 
 constexpr int kLinesBelow = 2;
-constexpr int kWait_ms = 200;   // after which the terminal's size is looked at
-constexpr int kEscape_ms = 40;  // after which an escape character is no part of a longer key
-constexpr int kFrame_ms = 66;   // of the motion that is played
+constexpr int kWait_ms = 200;   // after which the terminal's size is checked
+constexpr int kEscape_ms = 40;  // after which an escape character is a key of its own
+constexpr int kFrame_ms = 66;   // frame interval while a motion is played
 
 struct Arguments {
   std::string input, out;
@@ -32,7 +32,7 @@ struct Arguments {
   bool append = false, force = false;
 };
 
-/// A scenario, of which neither the trajectory nor its file of way points need exist, or a scene file.
+/// A scenario, whose trajectory or file of waypoints may be missing, or a scene file.
 Scenario read_input(const Arguments& arguments) {
   ScenarioText text;
   text.needs_trajectory = text.needs_waypoints = false;
@@ -41,7 +41,7 @@ Scenario read_input(const Arguments& arguments) {
   if (extension == ".yaml" || extension == ".yml") return read_scenario(arguments.input, text);
   std::error_code error;
   if (!fs::is_regular_file(arguments.input, error))
-    throw UserError(fmt::format("{}: no such scenario (.yaml) or scene file", arguments.input));
+    throw UserError(fmt::format("{}: must be an existing scenario (.yaml) or scene file", arguments.input));
   text.yaml = "renderer: {type: mesh, scene: \"\"}";
   text.file = arguments.input;
   Scenario scenario = read_scenario(text);
@@ -49,7 +49,7 @@ Scenario read_input(const Arguments& arguments) {
   return scenario;
 }
 
-/// Keys from a text, without a terminal.
+/// Executes keys from a text, without a terminal.
 void walk_by_keys(Walk& walk, const std::vector<Key>& keys) {
   for (const Key key : keys) {
     if (interrupted()) return;
@@ -64,14 +64,14 @@ void walk_by_keys(Walk& walk, const std::vector<Key>& keys) {
   }
 }
 
-/// The view and two lines below it, drawn anew where anything has changed.
+/// The view and two lines below it, redrawn if anything has changed.
 class Screen {
  public:
   explicit Screen(Walk& walk) : walk_(walk), size_(terminal_.size()) {}
 
   Terminal& terminal() { return terminal_; }
 
-  /// Whether the terminal has become another size.
+  /// Whether the terminal's size has changed.
   bool resized() {
     const Terminal::Size now = terminal_.size();
     if (now == size_) return false;
@@ -88,12 +88,12 @@ class Screen {
   }
 
   void help() {
-    terminal_.write("\033[2J\033[H" + with_returns(key_help()) + "\r\nany key goes back");
+    terminal_.write("\033[2J\033[H" + with_returns(key_help()) + "\r\npress any key to return");
     clear_ = true;
   }
 
  private:
-  /// As wide as the terminal, over what was there before.
+  /// A line padded to the width of the terminal.
   std::string line(const std::string& text) const {
     const auto width = static_cast<std::size_t>(std::max(1, size_.columns - 1));
     return fmt::format("{:<{}}", text.substr(0, width), width);
@@ -108,7 +108,7 @@ class Screen {
   Walk& walk_;
   Terminal terminal_;
   Terminal::Size size_;
-  bool clear_ = true;  // what stands beside the picture
+  bool clear_ = true;  // the area outside the image
 };
 
 /// Plays the motion at its own speed until a key is pressed.
@@ -126,7 +126,7 @@ void play(Walk& walk, Screen& screen) {
     if (t > motion->end()) break;
     screen.resized();
     screen.draw(walk.T_world_camera(*motion, t),
-                fmt::format("{:.1f} of {:.1f} s", to_seconds(t), to_seconds(motion->end())), "any key stops");
+                fmt::format("{:.1f} of {:.1f} s", to_seconds(t), to_seconds(motion->end())), "press any key to stop");
     if (!screen.terminal().read(kFrame_ms).empty()) break;
   }
   walk.say(fmt::format("the motion lasts {:.1f} s", to_seconds(motion->end())));
@@ -136,7 +136,7 @@ void walk_in_terminal(Walk& walk) {
   Screen screen(walk);
   Terminal& terminal = screen.terminal();
   KeyReader reader;
-  walk.say("? shows the keys");
+  walk.say("press ? for the keys");
   bool changed = true, helping = false;
   while (!interrupted() && !terminal.closed()) {
     if (changed && !helping) screen.draw(walk.T_world_camera(), walk.status(), walk.message());
@@ -167,7 +167,8 @@ int run(const Arguments& arguments) {
   if (arguments.keys) keys = keys_of(*arguments.keys);
   if (!keys && !Terminal::is_there()) {
     throw UserError(
-        "waypoints: standard input and output are no terminal; run it in one, or give the keys with --keys \"wwd x\"");
+        "waypoints: standard input and output must be a terminal; run it in one, or give the keys with --keys \"wwd "
+        "x\"");
   }
   WalkFile file(arguments.out, arguments.append, arguments.force);
   const Scenario scenario = read_input(arguments);
@@ -190,33 +191,35 @@ int run(const Arguments& arguments) {
 
 void add_waypoints(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("waypoints", "Walk through a scene in the terminal, and drop way points");
-  command->add_option("in", arguments->input, "Scenario, whose first camera looks, or scene file")
+  CLI::App* command = app.add_subcommand("waypoints", "Walk through a scene in the terminal and set waypoints");
+  command->add_option("in", arguments->input, "Scenario, seen through its first camera, or scene file")
       ->required()
       ->type_name("SCENARIO.yaml|SCENE");
-  command->add_option("-o,--out", arguments->out, "File of way points, written with each of them")
+  command->add_option("-o,--out", arguments->out, "File of waypoints, saved after each waypoint")
       ->required()
       ->type_name("WALK.yaml");
-  command->add_flag("--append", arguments->append, "Go on where an earlier file ends");
-  command->add_flag("--force", arguments->force, "Replace an earlier file");
-  command->add_option("--start", arguments->start, "Where the camera begins, m (default: as the trajectory does)")
+  command->add_flag("--append", arguments->append, "Continue an existing file");
+  command->add_flag("--force", arguments->force, "Replace an existing file");
+  command
+      ->add_option("--start", arguments->start,
+                   "Initial position of the camera, m (default: the start of the trajectory)")
       ->type_name("X Y Z")
       ->expected(3)
       ->check(CLI::Range(-1e6, 1e6));
-  command->add_option("--speed", arguments->speed_m_per_s, "Of walking, m/s: a key is a step of 0.1 s")
+  command->add_option("--speed", arguments->speed_m_per_s, "Walking speed, m/s; each key press is a step of 0.1 s")
       ->capture_default_str()
       ->type_name("V")
       ->check(CLI::Range(0.01, 100.0));
   command
       ->add_option("--keys", arguments->keys,
-                   "Press these keys instead, without a terminal: as they are typed, a space drops a way point; "
+                   "Keys to press instead of a terminal, as one would type them; a space sets a waypoint; "
                    "<left>, <right>, <up>, <down>, <space>, <esc>")
       ->type_name("KEYS");
   command->add_option("--set", arguments->overrides, "Change one option of the scenario")
       ->type_name("KEY=VALUE")
       ->expected(1)
       ->take_all();
-  command->add_option("-j,--threads", arguments->threads, "Threads; 0 takes every processor")
+  command->add_option("-j,--threads", arguments->threads, "Number of threads; 0 uses every processor")
       ->type_name("N")
       ->check(CLI::Range(0, 1024));
   command->footer("Keys:\n" + key_help() +

@@ -1,4 +1,4 @@
-// The loop over frames of overhead.py, in C++.
+// The loop of overhead.py in C++.
 #include <chrono>
 #include <cmath>
 #include <cstdio>

@@ -1,7 +1,7 @@
-"""What Python adds to EventCamera.process(): python/bench/overhead.py [PROGRAM]
+"""Measures the overhead of Python in EventCamera.process(): python/bench/overhead.py [PROGRAM]
 
-Compares a loop over frames in Python with the same loop in C++ (PROGRAM, built from overhead.cpp beside this file), in
-turns, so that both see the same machine. Prints the ratio of the medians for each sensor.
+Compares a loop over frames in Python with the same loop in C++ (PROGRAM, built from overhead.cpp), alternately, so that
+both run under the same conditions. Prints the ratio of the medians for each sensor.
 """
 
 import statistics
@@ -17,7 +17,7 @@ WIDTH, HEIGHT, FRAMES, ROUNDS = 346, 260, 100, 9
 
 
 def frames():
-    """A texture that moves by a pixel from frame to frame, as overhead.cpp has it."""
+    """A texture that moves by one pixel per frame, as in overhead.cpp."""
     y, x = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
     return [np.ascontiguousarray(0.5 + 0.4 * np.sin(0.1 * (x - k)) * np.sin(0.13 * y)) for k in range(FRAMES)]
 

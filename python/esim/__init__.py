@@ -1,9 +1,9 @@
 """esim: an open event-camera simulator.
 
-Times that esim gives are ints in nanoseconds. Where it asks for a time, give a float in seconds, or nanoseconds as
-`esim.ns(...)`; a bare int is refused, since it does not say its unit. Irradiance is linear light with 1 = white; pixel
-centres are at integer coordinates; T_A_B maps points from frame B to frame A; quaternions are Hamilton, x y z w. The
-guide is `docs/python.md`, the options of scenarios are in `docs/scenario.md`.
+Returned times are ints in nanoseconds. Time arguments are floats in seconds, or nanoseconds as `esim.ns(...)`; a bare
+int is refused, since it has no unit. Irradiance is linear with 1 = white; pixel centres are at integer coordinates;
+T_A_B maps points from frame B to frame A; quaternions are Hamilton, x y z w. `docs/python.md` is the guide, and
+`docs/scenario.md` lists the options of scenarios.
 """
 
 from . import dataset

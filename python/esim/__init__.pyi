@@ -1,4 +1,5 @@
-# The public surface, kept by hand; tests/test_stubs.py holds it against the package. Docstrings have shapes and units.
+# The public interface, written by hand; tests/test_stubs.py compares it with the package. Docstrings give shapes and
+# units.
 import datetime
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from os import PathLike
@@ -14,8 +15,8 @@ Path: TypeAlias = str | PathLike[str]
 Int: TypeAlias = int | np.integer[Any]
 Number: TypeAlias = float | np.floating[Any] | np.integer[Any]
 Duration: TypeAlias = np.timedelta64 | datetime.timedelta
-Time: TypeAlias = float | np.floating[Any] | Duration  # float s; esim.ns() for ints
-EventsLike: TypeAlias = NDArray[np.void]  # of EVENT_DTYPE, or with the fields t, x, y and p
+Time: TypeAlias = float | np.floating[Any] | Duration  # float: s; esim.ns() for int ns
+EventsLike: TypeAlias = NDArray[np.void]  # EVENT_DTYPE, or with the fields t, x, y and p
 
 __version__: str
 
@@ -97,7 +98,7 @@ class CameraPacket:
     trigger_t: NDArray[np.int64]
     trigger_kind: NDArray[np.uint8]
 
-class Packet(CameraPacket):  # of the only camera, where there is one
+class Packet(CameraPacket):  # the attributes of the only camera
     t0: int
     t1: int
     cameras: dict[str, CameraPacket]

@@ -1,6 +1,6 @@
-"""The checks of what users hand in: numbers, sizes, times, images. Every entry of the package uses these.
+"""Checks of arguments: numbers, sizes, times, images. All functions of the package use them.
 
-What is of the wrong kind is a TypeError, and a value that is out of range an esim.Error. Both name the argument.
+A wrong type raises TypeError, a value out of range esim.Error. Both messages name the argument.
 """
 
 import datetime
@@ -13,7 +13,7 @@ import numpy as np
 from ._errors import Error
 
 MAX_EXTENT = 65536  # px
-MAX_TIME_S = 9.2e9  # within what 64 bits of nanoseconds hold
+MAX_TIME_S = 9.2e9  # fits into 64 bits of nanoseconds
 
 
 def _kind(value):
@@ -23,7 +23,7 @@ def _kind(value):
 
 
 def whole(value, name, low, high):
-    """An int from low to high; numpy's too."""
+    """An int from low to high; also NumPy integers."""
     try:
         if isinstance(value, (bool, np.bool_)):
             raise TypeError
@@ -36,7 +36,7 @@ def whole(value, name, low, high):
 
 
 def number(value, name, *, above=None, low=-math.inf, high=math.inf):
-    """A finite float, of an int or a float; numpy's too."""
+    """A finite float from an int or a float; also NumPy scalars."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):
@@ -69,12 +69,12 @@ def one_of(value, name, choices):
 
 
 def seed(value):
-    """What random numbers begin with."""
+    """The seed of random numbers."""
     return whole(value, "seed", 0, 2**64 - 1)
 
 
 def threads(value):
-    """A number of threads; 0: one for every processor."""
+    """A number of threads; 0: one per processor."""
     return whole(value, "threads", 0, 1024)
 
 
@@ -86,28 +86,27 @@ def sensor_size(width, height):
 def optional_sensor_size(width, height):
     """The same, or None for both."""
     if (width is None) != (height is None):
-        raise Error("give width and height of the sensor, or neither")
+        raise Error("width and height must be given both or not at all")
     return (None, None) if width is None else sensor_size(width, height)
 
 
-# Times. What an argument takes does not depend on whether a number is written as an int or as a float by accident: where
-# the name does not say the unit, a bare int is refused.
+# Times. Arguments whose names have no unit refuse bare ints, since an int could mean seconds or nanoseconds.
 
 
 def seconds(value, name, *, above=None, low=-MAX_TIME_S):
-    """What the name says is in seconds, as a float: any number."""
+    """A float from any number, for arguments whose name says seconds."""
     return number(value, name, above=above, low=low, high=MAX_TIME_S)
 
 
 def packet_length(packet_s):
-    """Length of packets as int ns; 0 where it is not given."""
+    """Length of packets as int ns; 0 if not given."""
     if packet_s is None:
         return 0
     return max(1, round(seconds(packet_s, "packet_s", above=0) * 1e9))
 
 
 def ns(t):
-    """Nanoseconds, as esim gives times, for where it asks for a time.
+    """Converts nanoseconds, the unit of returned times, to a time argument.
 
     Parameters
     ----------
@@ -131,7 +130,7 @@ def ns(t):
 
 
 def time(t, name="t"):
-    """A time as int ns: of a float, s, or of what has a unit, such as esim.ns()."""
+    """A time as int ns, from a float (s) or a value with a unit, such as esim.ns()."""
     if isinstance(t, float) and abs(t) < MAX_TIME_S:  # the usual case, faster
         return round(t * 1e9)
     value = times(t, name)
@@ -141,7 +140,7 @@ def time(t, name="t"):
 
 
 def times(t, name="t"):
-    """Times as an array of int64 ns, contiguous, likewise."""
+    """Times as a contiguous array of int64 ns, from the same types."""
     array = np.asarray(np.timedelta64(t) if isinstance(t, datetime.timedelta) else t)
     kind = array.dtype.kind
     if kind == "f":
@@ -155,7 +154,7 @@ def times(t, name="t"):
     if kind in "iu" or (array.ndim == 0 and isinstance(t, numbers.Integral) and not isinstance(t, bool)):
         example = array[array != 0].flat[0] if array.dtype.kind != "O" else t
         raise TypeError(
-            f"{name} must be a float (s), or esim.ns(...) for an int (ns): the int {example} does not say which it is; "
+            f"{name} must be a float (s), or esim.ns(...) for an int (ns): the int {example} has no unit; "
             f"write {example}.0 for seconds, or esim.ns({example}) for nanoseconds"
         )
     raise TypeError(f"{name} must be a float (s), or esim.ns(...) for an int (ns), not {_kind(t)}")
@@ -169,7 +168,7 @@ def _require_range(array_s, name):
 def _of_timedelta(array, name):
     unit = np.datetime_data(array.dtype)[0]
     if unit in ("generic", "Y", "M"):
-        raise TypeError(f"{name}: a timedelta64 of unit {unit!r} is not a number of nanoseconds")
+        raise TypeError(f"{name}: a timedelta64 with unit {unit!r} has no fixed length; use a unit from weeks to nanoseconds")
     if np.isnat(array).any():
         raise Error(f"{name} must be finite, not NaT")
     _require_range(array / np.timedelta64(1, "s"), name)
@@ -191,17 +190,17 @@ def _require_shape(image, name, shape):
 
 
 def _to_float32(image):
-    with np.errstate(over="ignore"):  # infinite then, which is told
+    with np.errstate(over="ignore"):  # becomes infinite, which is reported
         return np.ascontiguousarray(image, np.float32)
 
 
 def irradiance(image, name, shape):
-    """Linear light as contiguous float32. EventCamera sees for itself whether its values are finite and 0 or above."""
+    """Linear intensity as contiguous float32. EventCamera itself checks that values are finite and at least 0."""
     image = np.asarray(image)
     if image.dtype.kind != "f":
         raise TypeError(
-            f"{name} must be floats, linear light with 1 = white, not {image.dtype}; esim.linear_light() makes it of the "
-            "codes of a picture"
+            f"{name} must be floats, linear intensity with 1 = white, not {image.dtype}; esim.linear_light() converts "
+            "sRGB images"
         )
     _require_shape(image, name, shape)
     return _to_float32(image)
@@ -213,19 +212,19 @@ def rendered_irradiance(image, name, shape):
     wrong = ~((image >= 0) & (image < np.inf))
     if wrong.any():
         y, x = np.argwhere(wrong)[0]
-        raise Error(f"{name} must be finite and 0 or above, not {image[y, x]} at pixel ({x}, {y})")
+        raise Error(f"{name} must be finite and at least 0, not {image[y, x]} at pixel ({x}, {y})")
     return image
 
 
 def depth(image, name, shape):
-    """Depth, m, as contiguous float32; inf where there is nothing."""
+    """Depth, m, as contiguous float32; inf without a surface."""
     image = np.asarray(image)
     if image.dtype.kind != "f":
         raise TypeError(f"{name} must be floats, m along the optical axis, not {image.dtype}")
     _require_shape(image, name, shape)
     image = _to_float32(image)
     if not (image > 0).all():
-        raise Error(f"{name} must be above 0 everywhere: depth is above 0, and inf where nothing is seen")
+        raise Error(f"{name} must be above 0 everywhere, and inf where there is no surface")
     return image
 
 
@@ -239,22 +238,22 @@ def motion_field(image, name, shape):
 
 
 def labels(image, name, shape, count):
-    """Numbers from 0 to count as contiguous uint16."""
+    """Integers from 0 to count as contiguous uint16."""
     image = np.asarray(image)
     if image.dtype.kind not in "iuf":
         raise TypeError(f"{name} must be ints, not {image.dtype}")
     _require_shape(image, name, shape)
     wrong = image[~((image >= 0) & (image <= count) & (image == np.floor(image)))]
     if wrong.size:
-        raise Error(f"{name} {wrong.flat[0]:g} of {count}: must be ints from 0, which stands for none, to {count}")
+        raise Error(f"{name} {wrong.flat[0]:g} of {count}: must be ints from 0 (no object) to {count}")
     return np.ascontiguousarray(image, np.uint16)
 
 
 def picture(image):
-    """The codes of a picture, uint8 or uint16, grey or with three colours."""
+    """An sRGB image, uint8 or uint16, grey or with three colours."""
     image = np.asarray(image)
     if image.dtype not in (np.uint8, np.uint16):
-        raise TypeError(f"a picture must be uint8 or uint16, not {image.dtype}")
+        raise TypeError(f"image must be uint8 or uint16, not {image.dtype}")
     if not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)):
-        raise Error(f"a picture must have the shape (height, width) or (height, width, 3), not {image.shape}")
+        raise Error(f"image must have the shape (height, width) or (height, width, 3), not {image.shape}")
     return image

@@ -1,8 +1,8 @@
-"""What esim raises; the module in C++ finds the classes here."""
+"""The exceptions of esim; the C++ module uses these classes."""
 
 
 class Error(ValueError):
-    """Something that the caller can repair. The message is one line: what is wrong, where, what to do."""
+    """An error that the caller can repair. The message is one line: what is wrong, where, what to do."""
 
 
 class OutputError(Error, OSError):
@@ -10,8 +10,9 @@ class OutputError(Error, OSError):
 
 
 class LossWarning(UserWarning):
-    """Something was dropped, delayed, held to a maximum rate or off its tolerance. The message names the options that govern it."""
+    """Events were dropped or delayed, or samples were limited by a maximum rate or missed the tolerance. The message names
+    the options that control this."""
 
 
 class InternalError(RuntimeError):
-    """A defect of esim."""
+    """A bug in esim."""

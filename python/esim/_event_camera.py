@@ -1,4 +1,4 @@
-"""The event sensor, for frames of one's own."""
+"""The event sensor for given frames."""
 
 import numpy as np
 
@@ -11,23 +11,23 @@ _FLOAT32 = np.dtype(np.float32)
 
 
 class EventCamera:
-    """An event camera that is given frames: between two of them, brightness goes straight.
+    """An event camera that converts frames to events. Between two frames, brightness is interpolated linearly.
 
-    A copy, of `copy.copy` or of a pickle, goes on where the camera is: given the same frames, both give the same events.
-    A pickle is for the version of esim that made it.
+    A copy, made by `copy.copy` or pickle, has the same state: given the same frames, both give the same events. A pickle
+    can only be loaded by the version of esim that made it.
 
     Parameters
     ----------
     width, height : int
-        Of the sensor, px.
+        Size of the sensor, px.
     preset : str, optional
-        Sensor whose values stand where none are given: "ideal", "davis346", ... (`docs/pixel.md`).
+        Sensor model that gives the default values: "ideal", "davis346", ... (`docs/pixel.md`).
     seed : int
-        Of all random numbers.
+        Seed of all random numbers.
     threads : int
-        0 takes every processor. The result does not depend on it.
+        Number of threads; 0 uses every processor. The result does not depend on it.
     **options
-        By their names in a scenario's `event_camera`: `contrast_threshold=0.2, readout={"row_time_us": 1}`.
+        Options of `event_camera` in a scenario: `contrast_threshold=0.2, readout={"row_time_us": 1}`.
 
     Raises
     ------
@@ -52,25 +52,26 @@ class EventCamera:
         self._core = _core.EventCamera(*size, overrides, seed, threads)
 
     def process(self, frame, t):
-        """The events since the frame before; none for the first one.
+        """Returns the events since the previous frame; none for the first frame.
 
         Parameters
         ----------
         frame : numpy.ndarray, float32, shape (height, width)
-            Irradiance: linear light, 0 and above, 1 = white. Read in place where it is C-contiguous float32; other
-            floats are converted. Pictures of 8 bits are not linear light: `esim.linear_light` makes it of them.
+            Irradiance: linear intensity, at least 0, 1 = white. C-contiguous float32 is read without a copy; other
+            floats are converted. 8-bit images are not linear: convert them with `esim.linear_light`.
         t : float, or numpy.timedelta64 such as esim.ns()
-            Time of the frame, s, after the one before.
+            Time of the frame, s; later than the previous frame.
 
         Returns
         -------
         esim.Events, shape (N,)
-            In order of time; a view of memory that belongs to the array.
+            In order of time. The array owns its memory.
 
         Raises
         ------
         esim.Error
-            For frames of another size, values that are no irradiance, times out of order. The camera is then as before.
+            For frames of another size, negative or infinite values, and times out of order. The state of the camera does
+            not change.
         """
         if not (
             isinstance(frame, np.ndarray)
@@ -83,12 +84,12 @@ class EventCamera:
 
     @property
     def dropped(self):
-        """int: events that the readout has dropped, because its queue was full."""
+        """int: number of events that the readout dropped because its queue was full."""
         return self._core.statistics()[0]
 
     @property
     def delayed(self):
-        """int: events whose pixels had to wait for the readout, by more than 1 us."""
+        """int: number of events that waited for the readout by more than 1 us."""
         return self._core.statistics()[1]
 
     def __getstate__(self):
@@ -97,7 +98,7 @@ class EventCamera:
     def __setstate__(self, state):
         if state["version"] != _core.__version__:
             raise Error(
-                f"an event camera that esim {state['version']} pickled cannot go on in esim {_core.__version__}; "
+                f"an EventCamera pickled by esim {state['version']} cannot be loaded by esim {_core.__version__}; "
                 "make a new one"
             )
         self._options = state["options"]
@@ -111,7 +112,7 @@ class EventCamera:
 
 
 def linear_light(image):
-    """The irradiance that a picture shows: decodes sRGB, and weighs colours to luminance (Rec. 709).
+    """Converts an sRGB image to irradiance: decodes sRGB and converts colours to luminance (Rec. 709).
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ def linear_light(image):
     Returns
     -------
     numpy.ndarray, float32, shape (height, width)
-        Linear light, 1 = white.
+        Linear intensity, 1 = white.
     """
     image = _checks.picture(image)
     code = np.arange(np.iinfo(image.dtype).max + 1) / np.iinfo(image.dtype).max

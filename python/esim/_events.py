@@ -8,15 +8,15 @@ from ._types import EVENT_DTYPE
 
 
 class Events(np.ndarray):
-    """An array of esim.EVENT_DTYPE, shape (N,), that knows the sensor which its events are of.
+    """An array of esim.EVENT_DTYPE, shape (N,), with the size of the sensor.
 
-    A slice, a copy, a pickle and a concatenation of arrays of one sensor know it too. All else is as with any array of
-    NumPy's; fields are plain arrays.
+    Slices, copies, pickles and concatenations of arrays with the same size keep it. Otherwise it behaves like any NumPy
+    array; fields are plain arrays.
 
     Attributes
     ----------
     width, height : int or None
-        Of the sensor, px; None where it is not known.
+        Size of the sensor, px; None if unknown.
     """
 
     width = None
@@ -32,12 +32,12 @@ class Events(np.ndarray):
             self.width, self.height = of.width, of.height
 
     def __array_wrap__(self, array, context=None, return_scalar=False):
-        return array[()] if return_scalar else array  # what NumPy computes are no events
+        return array[()] if return_scalar else array  # results of computations are not events
 
     def __array_function__(self, function, types, arguments, options):
         result = super().__array_function__(function, types, arguments, options)
         if function is np.concatenate and all(getattr(part, "dtype", None) == EVENT_DTYPE for part in arguments[0]):
-            result = to_layout(np.asarray(result)).view(Events)  # NumPy's has no padding
+            result = to_layout(np.asarray(result)).view(Events)  # NumPy's result has no padding
             sizes = {(getattr(part, "width", None), getattr(part, "height", None)) for part in arguments[0]}
             result.width, result.height = sizes.pop() if len(sizes) == 1 else (None, None)
         return _plain_unless_events(result)
@@ -59,7 +59,7 @@ def _plain_unless_events(array):
 
 
 def to_layout(events):
-    """Events in the one layout: the array itself where it has it, and a copy otherwise.
+    """Events with EVENT_DTYPE: the array itself if it has this layout, otherwise a copy.
 
     Fields may have other types; `p` may be bool, or 0 for -1.
     """
@@ -88,12 +88,12 @@ def to_layout(events):
 
 
 def as_bytes(events):
-    """Events as the module in C++ takes them, without a copy where they have the one layout."""
+    """Events as bytes for the C++ module, without a copy if they have EVENT_DTYPE."""
     return to_layout(events).view(np.uint8, np.ndarray)
 
 
 def of_bytes(raw, width=None, height=None):
-    """Events from the module in C++, as a view of their memory; a size of 0 is not known."""
+    """Events from the C++ module, as a view of their memory; a size of 0 means unknown."""
     events = raw.view(EVENT_DTYPE).view(Events)
     if width and height:
         events.width, events.height = width, height
@@ -101,11 +101,11 @@ def of_bytes(raw, width=None, height=None):
 
 
 def size_of(events, width, height):
-    """Width and height of the events' sensor, px: as given, or as the events know."""
+    """Width and height of the sensor, px: the arguments, or else the size stored with the events."""
     if width is None and height is None:
         width, height = getattr(events, "width", None), getattr(events, "height", None)
         if width is None:
-            raise Error("give width and height of the sensor: these events do not say how large it is")
+            raise Error("width and height are missing: these events do not contain the size of the sensor")
     elif width is None or height is None:
-        raise Error("give width and height of the sensor, or neither")
+        raise Error("width and height must be given both or not at all")
     return sensor_size(width, height)

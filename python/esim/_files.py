@@ -1,4 +1,4 @@
-"""Files of events, of every format that esim knows."""
+"""Event files in all formats of esim."""
 
 import os
 
@@ -10,20 +10,20 @@ _ALL = (1 << 63) - 1
 
 
 class EventsIterator:
-    """The events of a file, portion by portion, in memory that does not depend on its length.
+    """Iterates over the events of a file in portions. The memory use does not depend on the length of the file.
 
     Parameters
     ----------
     path : path
-        A file of any format in `esim.formats()` that is read, a recording of one camera, or a camera's folder in it.
+        A file of any readable format in `esim.formats()`, a recording of one camera, or a camera's folder.
     delta_t : float, or numpy.timedelta64 such as esim.ns(), optional
-        Portions are [start + k delta_t, start + (k + 1) delta_t), also where nothing happened; s.
+        Duration of portions, s: [start + k delta_t, start + (k + 1) delta_t), including empty ones.
     n_events : int, optional
-        Portions are of so many events, the last one of fewer. Without either, portions are as they come.
+        Number of events per portion; the last may have fewer. Without delta_t and n_events, portions have any size.
     start : float, or numpy.timedelta64 such as esim.ns(), optional
-        Where portions of delta_t begin, s; events before are passed over. The first event's time otherwise.
+        Start of the first portion, s; earlier events are skipped. Default: the time of the first event.
     width, height : int, optional
-        Of the sensor, in place of what the file says.
+        Size of the sensor, px; overrides the file.
 
     Yields
     ------
@@ -32,14 +32,14 @@ class EventsIterator:
     Raises
     ------
     esim.Error
-        Naming file and place, for damaged ones.
+        For damaged files, with file and position.
     """
 
     def __init__(self, path, delta_t=None, n_events=None, *, start=None, width=None, height=None):
         if delta_t is not None and n_events is not None:
-            raise Error("give delta_t or n_events, not both")
+            raise Error("delta_t and n_events must not both be given")
         if start is not None and delta_t is None:
-            raise Error("start goes with delta_t")
+            raise Error("start needs delta_t")
         self._delta_t = None if delta_t is None else _checks.time(delta_t, "delta_t")
         if self._delta_t is not None and self._delta_t <= 0:
             raise Error("delta_t must be above 0")
@@ -50,7 +50,7 @@ class EventsIterator:
 
     @property
     def size(self):
-        """(int, int) or None: width and height of the sensor, px, where they are known."""
+        """(int, int) or None: width and height of the sensor, px, if known."""
         return self._core.sensor()
 
     def __iter__(self):
@@ -75,7 +75,7 @@ class EventsIterator:
 
 
 def load_events(path, *, width=None, height=None):
-    """All events of a file.
+    """Loads all events of a file.
 
     Parameters
     ----------
@@ -85,37 +85,37 @@ def load_events(path, *, width=None, height=None):
     Returns
     -------
     esim.Events, shape (N,)
-        With the size of the sensor, where it is known.
+        With the size of the sensor, if known.
     """
     reader = _core.EventReader(os.fspath(path), *_checks.optional_sensor_size(width, height))
     return of_bytes(reader.take(_ALL), *(reader.sensor() or (None, None)))
 
 
 def save_events(path, events, width=None, height=None, *, format=None):
-    """Writes events to a file; one that is there is replaced.
+    """Writes events to a file; replaces an existing one.
 
     Parameters
     ----------
     path : path
     events : numpy.ndarray, shape (N,)
-        Structured, with the fields t (int, ns), x, y and p, in order of time.
+        Structured array with the fields t (int, ns), x, y and p, in order of time.
     width, height : int, optional
-        Of the sensor, px; of `esim.Events`, what they know otherwise.
+        Size of the sensor, px. Default: the size stored in `esim.Events`.
     format : str, optional
-        A name from `esim.formats()`; by the path's extension otherwise.
+        A name from `esim.formats()`. Default: by the path's extension.
 
     Raises
     ------
     esim.Error
         For events that are out of order or outside the sensor, and for unknown formats.
     esim.OutputError
-        Where the file cannot be written.
+        If the file cannot be written.
     """
     _core.save_events(os.fspath(path), as_bytes(events), *size_of(events, width, height), format)
 
 
 def info(path):
-    """What a recording or a file of events holds.
+    """Describes the contents of a recording or an event file.
 
     Parameters
     ----------
@@ -125,17 +125,17 @@ def info(path):
     -------
     dict
         `path`, `status` and `cameras`: a list of dicts with the number of events, their first and last time (ns), mean
-        rate (Hz), and the sensor's size (px) where it is known.
+        rate (Hz), and the sensor's size (px) if known.
     """
     return _core.info(os.fspath(path))
 
 
 def formats():
-    """All formats of files of events.
+    """Lists all file formats.
 
     Returns
     -------
     list of dict
-        Name, description, extensions, what it holds, whether it is read and written, resolution of times (ns).
+        Name, description, extensions, contents, whether it can be read and written, resolution of times (ns).
     """
     return _core.formats()

@@ -1,4 +1,4 @@
-"""Pictures of events and recordings, for people: arrays of red, green and blue."""
+"""Images of events and recordings for display: RGB arrays."""
 
 import os
 
@@ -8,7 +8,7 @@ from ._represent import moment
 
 
 def time_surface_picture(events, width=None, height=None, *, t=None, tau_s=0.03):
-    """A time surface for people: each pixel in the colour of its last event until t, ON orange and OFF blue, faded.
+    """Draws a time surface: each pixel has the colour of its last event until t (ON orange, OFF blue), which fades.
 
     Parameters
     ----------
@@ -20,7 +20,7 @@ def time_surface_picture(events, width=None, height=None, *, t=None, tau_s=0.03)
     Returns
     -------
     numpy.ndarray, uint8, shape (height, width, 3)
-        Red, green, blue.
+        RGB image.
     """
     size, tau = size_of(events, width, height), _checks.seconds(tau_s, "tau_s", above=0)
     events = to_layout(events)
@@ -28,21 +28,22 @@ def time_surface_picture(events, width=None, height=None, *, t=None, tau_s=0.03)
 
 
 def space_time_plot(events, width=None, height=None, *, size=(960, 720), yaw_deg=35.0, pitch_deg=20.0):
-    """Events as points in x, y and time, between axes, as `esim play` shows them.
+    """Draws events as points in x, y and time with axes, as `esim play` does.
 
     Parameters
     ----------
     events, width, height
         As in `event_count`, in order of time.
     size : (int, int)
-        Width and height of the picture, px.
+        Width and height of the image, px.
     yaw_deg, pitch_deg : float
-        From where it is seen: at yaw 0 along the time axis, and from above. Best from -60 to 60, and from 0 to 40.
+        Direction of view: yaw 0 is along the time axis; a positive pitch is from above. Useful ranges are -60 to 60 and
+        0 to 40.
 
     Returns
     -------
     numpy.ndarray, uint8, shape (size[1], size[0], 3)
-        Red, green, blue.
+        RGB image.
     """
     columns, rows = size
     return _core.space_time_plot(
@@ -56,39 +57,39 @@ def space_time_plot(events, width=None, height=None, *, size=(960, 720), yaw_deg
 
 
 class play:
-    """The pictures that the command `esim play` makes a video of, one by one: views of a recording side by side.
+    """Iterates over the images of `esim play`: views of a recording side by side.
 
     Parameters
     ----------
     path : path
-        A recording's folder or a file of events, of any format in `esim.formats()`.
+        A recording's folder or an event file, of any format in `esim.formats()`.
     views : str or list of str, optional
-        Of "events", "time-surface", "space-time", "image", "depth" and "motion"; all there is without.
+        From "events", "time-surface", "space-time", "image", "depth" and "motion". Default: all available views.
     camera : str, optional
-        Of several cameras, the one to show.
+        Name of the camera to show, if there are several.
     at_s : float, optional
-        One picture, of this moment, in s since the start of the recording.
+        Time of a single image, s since the start of the recording.
     fps : float
-        Pictures per second of a video.
+        Images per second.
     slow_motion : float, optional
-        How many times slower than real time; so that the video lasts about 4 s or longer without.
+        Slow-motion factor. Default: so that the video lasts at least about 4 s.
     start_s, duration_s : float, optional
-        What is shown, in s since the start of the recording.
+        The part to show, s; the start is relative to the start of the recording.
     window_s : float, optional
-        Time whose events a picture of events shows; `window_events` shows the latest so many instead.
+        Time window of the shown events, s; `window_events` shows a number of the latest events instead.
     tau_s, span_s : float, optional
-        Decay of the time surface; time that the plot of space and time spans.
+        Decay time of the time surface, s; time span of the space-time plot, s.
     size : int, optional
-        Width of the pictures, about, px.
+        Approximate width of the images, px.
     light : bool
-        On white, for paper.
+        White background, for print.
     width, height : int, optional
-        Of the sensor, in place of what the file says.
+        Size of the sensor, px; overrides the file.
 
     Yields
     ------
     numpy.ndarray, uint8, shape (height, width, 3)
-        `len` says how many, and the attribute `times` when: int64, ns.
+        RGB images. `len` gives their number, and the attribute `times` their times: int64, ns.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Recordings from files, of every format that esim knows."""
+"""Recordings from files in all formats of esim."""
 
 import os
 import warnings
@@ -8,19 +8,20 @@ from ._simulate import Packet
 
 
 class Recording:
-    """A recording from a file or folder, packet by packet, as `simulate` gives them; memory does not grow with it.
+    """Iterates over the packets of a recording in a file or folder, as `simulate` does. The memory use does not depend
+    on the length of the recording.
 
     Parameters
     ----------
     path : path
-        Of any format in `esim.formats()` that is read.
+        Of any readable format in `esim.formats()`.
     packet_s : float, optional
-        Length of packets, s. Otherwise as of a simulation: each lasts until the next frame of ground truth where the
-        recording is a folder that has some, and 1/30 s elsewhere.
+        Length of packets, s. Default: until the next frame of ground truth if the recording is a folder with ground
+        truth, otherwise 1/30 s.
     width, height : int, optional
-        Of the sensor, in place of what the file says.
+        Size of the sensor, px; overrides the file.
     recover : bool
-        Read what can be read of a damaged file, and warn.
+        Read the readable part of a damaged file, with a warning.
 
     Yields
     ------
@@ -29,7 +30,7 @@ class Recording:
     Raises
     ------
     esim.Error
-        Naming file and place, for damaged ones.
+        For damaged files, with file and position.
     """
 
     def __init__(self, path, packet_s=None, *, width=None, height=None, recover=False):
@@ -44,8 +45,8 @@ class Recording:
 
     @property
     def info(self):
-        """dict: `start` and `end` (ns; the end is the start where it is not known beforehand), `cameras`: a dict by
-        name with width, height, K and T_body_camera, and names of moving `objects`."""
+        """dict: `start` and `end` (ns; equal if the end is not known in advance), `cameras`: a dict by name with width,
+        height, K and T_body_camera, and `objects`: the names of moving objects."""
         return self._core.info()
 
     def __iter__(self):
@@ -64,28 +65,28 @@ class Recording:
 def convert(
     source, target, *, format=None, camera=None, from_zero=False, time_unit="us", recover=False, force=False
 ):
-    """Copies a recording or a file of events into another format.
+    """Converts a recording or an event file to another format.
 
     Parameters
     ----------
     source, target : path
     format : str, optional
-        A name from `esim.formats()`; by the extension of the target otherwise, where none is a folder.
+        A name from `esim.formats()`. Default: by the extension of the target; without extension, a recording folder.
     camera : str, optional
-        This one only.
+        Convert this camera only.
     from_zero : bool
-        Times count from the start of the recording.
+        Write times relative to the start of the recording.
     time_unit : str
-        "us" or "ns": of the times of events, where the format leaves the choice.
+        "us" or "ns": unit of event times, if the format allows a choice.
     recover : bool
-        Convert what can be read of a damaged file, and warn.
+        Convert the readable part of a damaged file, with a warning.
     force : bool
-        Replace what is there.
+        Replace an existing target.
 
     Returns
     -------
     dict of str to int
-        What was copied: events, frames, ...: how many. What the format does not hold is a warning.
+        Number of copied events, frames, .... Contents that the format does not support are reported as warnings.
 
     Raises
     ------

@@ -1,11 +1,11 @@
-"""Events as arrays, for networks and for people. All of them release Python's lock."""
+"""Event representations as arrays, for networks and for display. All functions release the GIL."""
 
 from . import _checks, _core
 from ._events import as_bytes, size_of, to_layout
 
 
 def span(events, t0, t1):
-    """From t0 to t1, and from the first event to the last where they are not given; int ns."""
+    """(t0, t1) as int ns; by default the times of the first and the last event."""
     start = None if t0 is None else _checks.time(t0, "t0")
     end = None if t1 is None else _checks.time(t1, "t1")
     if len(events) == 0:
@@ -15,21 +15,21 @@ def span(events, t0, t1):
 
 
 def moment(events, t):
-    """t, or the time of the last event where it is not given; int ns."""
+    """t as int ns; by default the time of the last event."""
     if t is not None:
         return _checks.time(t)
     return int(events["t"].max()) if len(events) else 0
 
 
 def event_count(events, width=None, height=None):
-    """The number of events of each pixel.
+    """Counts the events of each pixel.
 
     Parameters
     ----------
     events : numpy.ndarray, shape (N,)
-        Structured, with the fields t, x, y and p; read in place where they are of esim.EVENT_DTYPE.
+        Structured array with the fields t, x, y and p; esim.EVENT_DTYPE is read without a copy.
     width, height : int, optional
-        Of the sensor, px; of `esim.Events`, what they know otherwise.
+        Size of the sensor, px. Default: the size stored in `esim.Events`.
 
     Returns
     -------
@@ -40,22 +40,22 @@ def event_count(events, width=None, height=None):
 
 
 def event_tensor(events, width=None, height=None, *, t0=None, t1=None, stamp="last"):
-    """The four channels of EV-FlowNet (Zhu et al., RSS 2018), which the ESIM paper uses for learning optical flow.
+    """Computes the four channels of EV-FlowNet (Zhu et al., RSS 2018), which the ESIM paper uses for optical flow.
 
     Parameters
     ----------
     events, width, height
         As in `event_count`.
     t0, t1 : float, or numpy.timedelta64 such as esim.ns(), optional
-        Events before and after are passed over; s. The first and the last event's time otherwise.
+        Time span, s; other events are ignored. Default: the times of the first and the last event.
     stamp : {"last", "mean"}
-        Which time stamp stands for a pixel's events of a polarity.
+        Which time stamp represents the events of a pixel and a polarity.
 
     Returns
     -------
     numpy.ndarray, float32, shape (4, height, width)
-        Numbers of ON and OFF events, and the time stamps of ON and OFF events, from 0 at t0 to 1 at t1; 0 where there
-        are none.
+        Counts of ON and OFF events, and the time stamps of ON and OFF events, from 0 at t0 to 1 at t1; 0 for pixels
+        without events.
     """
     mean = _checks.one_of(stamp, "stamp", ("last", "mean")) == "mean"
     size, events = size_of(events, width, height), to_layout(events)
@@ -63,7 +63,7 @@ def event_tensor(events, width=None, height=None, *, t0=None, t1=None, stamp="la
 
 
 def voxel_grid(events, width=None, height=None, bins=5, *, t0=None, t1=None, normalise=False):
-    """Polarities spread over bins of time, linearly between the two nearest (Zhu et al., CVPR 2019, Eqs. 1 and 2).
+    """Distributes polarities linearly between the two nearest time bins (Zhu et al., CVPR 2019, Eqs. 1 and 2).
 
     With p = +1 or -1 and t* = (bins - 1) (t - t0) / (t1 - t0), voxel (b, y, x) is the sum of p max(0, 1 - abs(b - t*))
     over the events of pixel (x, y).
@@ -76,7 +76,7 @@ def voxel_grid(events, width=None, height=None, bins=5, *, t0=None, t1=None, nor
     t0, t1
         As in `event_tensor`.
     normalise : bool
-        Bring the voxels that are not 0 to a mean of 0 and a standard deviation of 1.
+        Normalise the nonzero voxels to mean 0 and standard deviation 1.
 
     Returns
     -------
@@ -88,21 +88,21 @@ def voxel_grid(events, width=None, height=None, bins=5, *, t0=None, t1=None, nor
 
 
 def time_surface(events, width=None, height=None, *, t=None, tau_s=0.03):
-    """exp(-(t - t_last) / tau) of each pixel's last event until t.
+    """Computes exp(-(t - t_last) / tau) of each pixel's last event until t.
 
     Parameters
     ----------
     events, width, height
         As in `event_count`.
     t : float, or numpy.timedelta64 such as esim.ns(), optional
-        When it is looked at, s; later events are passed over. The last event's time otherwise.
+        Time of the surface, s; later events are ignored. Default: the time of the last event.
     tau_s : float
         Time constant, s.
 
     Returns
     -------
     numpy.ndarray, float32, shape (2, height, width)
-        ON, OFF; 0 where there was no event.
+        ON, OFF; 0 for pixels without events.
     """
     tau = _checks.seconds(tau_s, "tau_s", above=0)
     size, events = size_of(events, width, height), to_layout(events)
@@ -110,7 +110,7 @@ def time_surface(events, width=None, height=None, *, t=None, tau_s=0.03):
 
 
 def event_frame(events, width=None, height=None):
-    """A picture for people: on white, each pixel in the colour of the last of its events, ON orange and OFF blue.
+    """Draws events on white: each pixel has the colour of its last event, ON orange and OFF blue.
 
     Parameters
     ----------
@@ -120,6 +120,6 @@ def event_frame(events, width=None, height=None):
     Returns
     -------
     numpy.ndarray, uint8, shape (height, width, 3)
-        Red, green, blue.
+        RGB image.
     """
     return _core.event_frame(as_bytes(events), *size_of(events, width, height))

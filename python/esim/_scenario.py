@@ -1,4 +1,4 @@
-"""Scenarios: from YAML, from dicts, option by option. The reader in C++ knows and checks every option."""
+"""Scenarios from YAML, dicts and single options. The C++ reader checks every option."""
 
 import json
 import os
@@ -10,52 +10,52 @@ from ._errors import Error
 
 
 def _plain(value):
-    """What JSON has no words for."""
+    """Converts types that JSON does not support."""
     if isinstance(value, os.PathLike):
         return os.fspath(value)
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
-    raise TypeError(f"a scenario holds numbers, text, lists and dicts, not a {type(value).__name__}")
+    raise TypeError(f"options of a scenario must be numbers, text, lists and dicts, not a {type(value).__name__}")
 
 
 def to_yaml(value):
-    """A value as YAML, of which JSON is a part."""
+    """A value as YAML, in the JSON subset."""
     return json.dumps(value, default=_plain, ensure_ascii=False)
 
 
 def to_overrides(options):
-    """`{"a.b": value}`, or `["a.b=value"]`, as the reader takes them."""
+    """Converts `{"a.b": value}` or `["a.b=value"]` to the reader's form."""
     if options is None:
         return []
     if isinstance(options, dict):
         return [f"{key}={to_yaml(value)}" for key, value in options.items()]
     if isinstance(options, str):
-        raise TypeError('overrides are a dict, {"key.path": value}, or a list of "key.path=value"')
+        raise TypeError('overrides must be a dict, {"key.path": value}, or a list of "key.path=value"')
     return list(options)
 
 
 class Scenario:
-    """Everything that determines a simulation; `docs/scenario.md` lists the options.
+    """All options of a simulation; `docs/scenario.md` lists them.
 
-    A copy is independent. A pickle holds what was given, text and changes, and reads it again: relative paths are those
-    of the process that does so.
+    A copy is independent. A pickle contains the text and the changes and is read again when it is loaded: relative paths
+    then refer to the loading process.
 
     Parameters
     ----------
     options : dict
-        Nested as in YAML. Values may be numpy's, and paths.
+        Nested as in YAML. Values may also be NumPy types and paths.
     folder : path, optional
-        Where relative paths begin; the working directory otherwise.
+        Base of relative paths. Default: the working directory.
 
     Raises
     ------
     esim.Error
-        For unknown keys, values out of range and whatever else the reader finds, naming the key and what would be right.
+        For unknown keys, values out of range and other problems, with the key and the valid values.
     """
 
     def __init__(self, options, *, folder=None):
         if not isinstance(options, dict):
-            raise TypeError("options of a scenario are a dict; Scenario.load() reads files")
+            raise TypeError("options of a scenario must be a dict; use Scenario.load() for files")
         name = "scenario" if folder is None else os.path.join(os.fspath(folder), "scenario")
         self._begin(to_yaml(options), name, False)
 
@@ -65,12 +65,12 @@ class Scenario:
         self._values = self._read([])
 
     def _read(self, overrides, renderer=False, trajectory=False):
-        """Values in C++. A renderer or a trajectory may be missing where one is brought, or nothing is simulated yet."""
+        """The values in C++. If `renderer` or `trajectory` is false, the scenario need not have one."""
         return _core.Scenario(*self._text, self._overrides + overrides, renderer, trajectory)
 
     @classmethod
     def load(cls, path):
-        """Reads a YAML file. Relative paths in it are taken from its folder.
+        """Reads a YAML file. Relative paths in it start at its folder.
 
         Parameters
         ----------
@@ -85,7 +85,7 @@ class Scenario:
             with open(path, encoding="utf-8") as file:
                 text = file.read()
         except OSError as error:
-            raise Error(f"{path}: no scenario can be read there: {error.strerror}") from None
+            raise Error(f"{path}: cannot read the scenario: {error.strerror}") from None
         except UnicodeDecodeError as error:
             raise Error(f"{path}: not valid YAML: {error}") from None
         self = cls.__new__(cls)
@@ -98,14 +98,14 @@ class Scenario:
         Parameters
         ----------
         key : str
-            Dotted, as in `"event_camera.contrast_threshold"`; entries of lists by their number.
+            Dotted key, as in `"event_camera.contrast_threshold"`; entries of lists by number.
         value : object
-            As in a dict of options.
+            Value as in a dict of options.
 
         Returns
         -------
         Scenario
-            Itself, so that calls chain. Where the value is refused, it is as it was before.
+            Itself, for chained calls. It does not change if the value is invalid.
         """
         override = to_overrides({key: value})
         self._values = self._read(override)
@@ -113,7 +113,7 @@ class Scenario:
         return self
 
     def to_yaml(self):
-        """The scenario in full, every option explicit, as YAML.
+        """Returns the complete scenario, with every option, as YAML.
 
         Returns
         -------
@@ -134,7 +134,7 @@ class Scenario:
 
 
 def to_scenario(scenario):
-    """What simulate() takes, as a Scenario."""
+    """Converts the argument of simulate() to a Scenario."""
     if isinstance(scenario, Scenario):
         return scenario
     if isinstance(scenario, dict):

@@ -1,4 +1,4 @@
-"""Datasets as `esim dataset` writes them, read sequence by sequence. HDF5 needs h5py, and Blosc's filter for it."""
+"""Reads datasets of `esim dataset` sequence by sequence. HDF5 needs h5py and the Blosc filter for HDF5."""
 
 import json
 import os
@@ -13,7 +13,7 @@ MOST_OPEN = 64  # files
 
 
 class Hdf5Shard:
-    """A shard of HDF5."""
+    """A shard in HDF5."""
 
     def __init__(self, path):
         import h5py
@@ -22,26 +22,26 @@ class Hdf5Shard:
             self._file = h5py.File(path, "r")
             self._count = len(self._file["index"])
         except (OSError, KeyError) as problem:
-            raise Error(f"{path} is no shard of a dataset, or it is damaged: {problem}") from None
+            raise Error(f"{path} is not a shard of a dataset, or is damaged: {problem}") from None
         self._path = path
 
     def __len__(self):
         return self._count
 
     def array(self, k, name):
-        """An array of sequence k of the shard; None where there is none of that name."""
+        """An array of sequence k of the shard; None if it does not exist."""
         if name not in self._file:
             return None
         try:
             start = self._file.get(f"{name.split('/')[0]}/start") if "/" in name else None
             return self._file[name][k] if start is None else self._file[name][start[k] : start[k + 1]]
         except OSError as problem:
-            raise Error(f"cannot read {name} of sequence {k} of {self._path}: {problem}; is Blosc's filter for HDF5 there "
-                        "(`import hdf5plugin`)?") from None
+            raise Error(f"cannot read {name} of sequence {k} of {self._path}: {problem}; check that the Blosc "
+                        "filter for HDF5 is available (`import hdf5plugin`)") from None
 
 
 class TarShard:
-    """A shard of WebDataset's layout: files KEY.NAME.npy."""
+    """A shard in the layout of WebDataset: files KEY.NAME.npy."""
 
     def __init__(self, path):
         self._path, self._places = path, {}
@@ -51,7 +51,7 @@ class TarShard:
                     key, _, name = member.name.partition(".")
                     self._places.setdefault(key, {})[name] = member.offset_data
         except (OSError, tarfile.TarError) as problem:
-            raise Error(f"{path} is no shard of a dataset, or it is damaged: {problem}") from None
+            raise Error(f"{path} is not a shard of a dataset, or is damaged: {problem}") from None
         self._keys = sorted(self._places)
         self._file = open(path, "rb")
 
@@ -59,7 +59,7 @@ class TarShard:
         return len(self._keys)
 
     def array(self, k, name):
-        """As Hdf5Shard's."""
+        """As in Hdf5Shard."""
         place = self._places[self._keys[k]].get(name.replace("/", ".") + ".npy")
         if place is None:
             return None
@@ -71,7 +71,7 @@ class TarShard:
 
 
 class Shards:
-    """All sequences of a dataset's folder, in the order of their files. May be pickled, and copied into other processes.
+    """All sequences of a dataset folder, in the order of their files. Can be pickled and copied to other processes.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class Shards:
     Raises
     ------
     esim.Error
-        Where there is no dataset, or it is not whole.
+        If the folder is not a dataset, or the dataset is incomplete.
     """
 
     def __init__(self, folder):
@@ -90,7 +90,7 @@ class Shards:
             size, count, kind = int(plan["shard_size"]), int(plan["sequences"]), plan["format"]
             self.duration_s = float(plan["made_by"]["duration_s"])
         except FileNotFoundError:
-            raise Error(f"there is no dataset in {self.folder}: dataset.json is missing") from None
+            raise Error(f"{self.folder} is not a dataset: dataset.json is missing") from None
         except (ValueError, KeyError, TypeError) as problem:
             raise Error(f"{self.folder / 'dataset.json'} is damaged: {problem!r}") from None
         self._size, self._count = size, count
@@ -99,7 +99,7 @@ class Shards:
         missing = [path.name for path in self._paths if not path.exists()]
         if missing:
             raise Error(f"{self.folder}: {missing[0]} is missing ({len(missing)} of {len(self._paths)} files are); "
-                        "`esim dataset` goes on where it was interrupted")
+                        "continue it with the same `esim dataset` command")
         self._open, self._process = {}, None
 
     def __getstate__(self):
@@ -109,15 +109,15 @@ class Shards:
         return self._count
 
     def array(self, i, name):
-        """An array of sequence i: "flow", "events/t", ...; None where the dataset does not hold it."""
+        """An array of sequence i: "flow", "events/t", ...; None if the dataset does not contain it."""
         if not 0 <= i < self._count:
-            raise IndexError(f"sequences have numbers from 0 to {self._count - 1}, not {i}")
-        if self._process != os.getpid() or len(self._open) >= MOST_OPEN:  # open files are not shared with other processes
+            raise IndexError(f"index must be between 0 and {self._count - 1}, not {i}")
+        if self._process != os.getpid() or len(self._open) >= MOST_OPEN:  # do not share open files with other processes
             self._open, self._process = {}, os.getpid()
         number, k = divmod(i, self._size)
         if number not in self._open:
             self._open[number] = self._kind(self._paths[number])
         shard = self._open[number]
         if k >= len(shard):
-            raise Error(f"{self._paths[number]} holds {len(shard)} sequences, and not number {k}: it is damaged")
+            raise Error(f"{self._paths[number]} has {len(shard)} sequences, but number {k} is missing: it is damaged")
         return shard.array(k, name)

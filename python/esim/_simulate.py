@@ -12,7 +12,7 @@ from ._types import IMU_DTYPE, STATE_DTYPE
 
 
 class CameraPacket:
-    """What one camera recorded in a packet's time. N frames of ground truth, M frames of the frame camera.
+    """The records of one camera in a packet: N frames of ground truth, M frames of the frame camera.
 
     Attributes
     ----------
@@ -22,31 +22,31 @@ class CameraPacket:
     pose : float64, shape (N, 4, 4)
         T_world_camera at these times; the camera looks along z, x to the right, y downwards.
     irradiance : float32, shape (N, height, width)
-        Linear light, 1 = white.
+        Linear intensity, 1 = white.
     depth : float32, shape (N, height, width)
-        Along the optical axis, m; inf where nothing is seen.
+        Along the optical axis, m; inf without a surface.
     flow : float32, shape (N, 2, height, width)
         Motion field, px/s: to the right, and downwards.
     object : uint16, shape (N, height, width)
-        0, or i + 1 where moving object i is seen; N = 0 unless the scenario has `truth.objects`.
+        i + 1 for moving object i, 0 for the static scene. N = 0 unless the scenario has `truth.objects`.
     displacement : float32, shape (K, 2, height, width)
-        From a frame to the next, px; NaN where there is no image of it. K = 0 unless the scenario has
+        Optical flow from a frame to the next, px; NaN if the point has no image there. K = 0 unless the scenario has
         `truth.displacement`.
     displacement_t : int64, shape (K, 2)
         Times of the two frames, ns.
     visible : uint8, shape (K, height, width)
-        1 where what is seen is seen in the later frame as well.
+        1 if the point is also visible in the later frame.
     event_points : float32, shape (number of events, 3)
-        Point of the scene that each event saw, world frame, m; NaN: none. Empty unless the scenario has
+        Scene point of each event, world frame, m; NaN without a surface. Empty unless the scenario has
         `truth.event_points`.
     images : uint8, or uint16 above 8 bits, shape (M, height, width)
-        Of the frame camera: digital numbers, a Bayer mosaic where it sees colour. A frame belongs to the packet in which
-        its exposure ends.
+        Frames of the frame camera: digital numbers; a Bayer mosaic for colour cameras. A frame belongs to the packet in
+        which its exposure ends.
     image_t, exposure_start, exposure : int64, shape (M,)
         Middle of the exposure, its start, and its duration, ns.
     trigger_t, trigger_kind : int64, uint8, shape (number of triggers,)
-        Of files that hold triggers: when, ns, and what, numbered as in AEDAT 4 (1, 2: rising, falling edge of the
-        external signal).
+        Triggers of files: time, ns, and kind, numbered as in AEDAT 4 (1, 2: rising, falling edge of the external
+        signal).
     """
 
     __slots__ = (
@@ -64,12 +64,13 @@ class CameraPacket:
 
 
 class Packet:
-    """What happened after `t0`, until `t1`; the first packet includes t0. Arrays own their memory.
+    """The records of the time t0 < t <= t1; the first packet includes t0. Arrays own their memory.
 
-    The first packet begins at the start, each other one where the one before ends, and the last one ends at the end.
+    The first packet begins at the start, every other packet where the previous one ends, and the last one ends at the
+    end.
 
-    What a camera recorded is an attribute of the packet itself where there is one camera: `packet.events`; with several
-    it is that of `packet["name"].events`.
+    With one camera, its records are attributes of the packet: `packet.events`. With several cameras, write
+    `packet["name"].events`.
 
     Attributes
     ----------
@@ -81,7 +82,7 @@ class Packet:
     objects : float64, shape (len(body), number of moving objects, 4, 4)
         T_world_object at the times of body.
     imu : numpy.ndarray of esim.IMU_DTYPE
-        Empty where there is no IMU.
+        Empty without an IMU.
     """
 
     def __init__(self, parts, cameras):
@@ -99,9 +100,9 @@ class Packet:
 
     def __getattr__(self, name):
         if name not in CameraPacket.__slots__:
-            raise AttributeError(f"a packet has no {name}")
+            raise AttributeError(f"a packet has no attribute {name}")
         if len(self.cameras) > 1:
-            raise Error(f"there are several cameras: take packet[name].{name}, with name one of {list(self.cameras)}")
+            raise Error(f"the packet has several cameras: use packet[name].{name}, with name one of {list(self.cameras)}")
         (camera,) = self.cameras.values()
         return getattr(camera, name)
 
@@ -114,42 +115,42 @@ class Packet:
 
 
 class Renderer:
-    """What simulate() renders with instead of the scenario's renderer.
+    """A custom renderer that replaces the scenario's renderer in simulate().
 
     Parameters
     ----------
     render : callable
-        `render(t, T_world_camera, T_world_objects)` with t in ns, a matrix (4, 4), and a list of one for each object.
-        Returns a dict of arrays of the camera's size:
+        `render(t, T_world_camera, T_world_objects)` with t in ns, a (4, 4) matrix, and a list with a (4, 4) matrix for
+        each object. Returns a dict of arrays of the camera's size:
 
-        - `irradiance`, (height, width) floats: linear light, 1 = white; `esim.linear_light` makes it of 8-bit pictures;
-        - `depth`, (height, width) floats: along the optical axis, m; inf where nothing is seen;
-        - `flow`, (2, height, width), optional: the motion field, px/s. Without, it is computed from depth and motion;
-        - `object`, (height, width) ints, where objects move and flow is not given: 0, or i + 1 where object i is seen.
+        - `irradiance`, (height, width) floats: linear intensity, 1 = white; `esim.linear_light` converts 8-bit images;
+        - `depth`, (height, width) floats: along the optical axis, m; inf without a surface;
+        - `flow`, (2, height, width), optional: the motion field, px/s. By default computed from depth and motion;
+        - `object`, (height, width) ints, needed if objects move and flow is not given: i + 1 for object i, otherwise 0.
 
         The same arguments must give the same images.
     objects : dict of str to Trajectory, optional
-        What moves, by name: T_world_object.
+        Moving objects by name: T_world_object.
     """
 
     def __init__(self, render, *, objects=None):
         if not callable(render):
-            raise TypeError("render is a function of t, T_world_camera and T_world_objects")
+            raise TypeError("render must be a function of t, T_world_camera and T_world_objects")
         self.render = render
         self.objects = dict(objects or {})
 
     def _checked(self, t, T_world_camera, T_world_objects, shape):
         images = self.render(t, T_world_camera, T_world_objects)
         if not isinstance(images, dict):
-            raise TypeError(f"render() gives a dict of images, not a {type(images).__name__}")
+            raise TypeError(f"render() must return a dict of images, not a {type(images).__name__}")
         unknown = set(images) - {"irradiance", "depth", "flow", "object"}
         if unknown:
-            raise Error(f"render() gives irradiance, depth, flow and object, not {', '.join(sorted(unknown))}")
+            raise Error(f"render() must return irradiance, depth, flow and object only, not {', '.join(sorted(unknown))}")
         missing = {"irradiance", "depth"} - set(images)
         if missing:
-            raise Error(f"render() gives no {' and no '.join(sorted(missing))}")
+            raise Error(f"render() must also return {' and '.join(sorted(missing))}")
         if self.objects and not {"flow", "object"} & set(images):
-            raise Error("render() gives neither flow nor object: which pixels see what moves?")
+            raise Error("render() must return flow or object, since objects move")
 
         def checked(name, check, *arguments):
             return check(images[name], f"render() at {t} ns: {name}", *arguments) if name in images else None
@@ -163,48 +164,48 @@ class Renderer:
 
 
 class Report(dict):
-    """What a simulation did, and at which cost: the content of a recording's `report.json`.
+    """The results and the cost of a simulation: the content of a recording's `report.json`.
 
     Attributes
     ----------
     dropped : dict of str to int
-        Of each camera, by its name, the events that its readout has dropped, because its queue was full.
+        By camera name, the number of events that the readout dropped because its queue was full.
     delayed : dict of str to int
-        Of each camera, the events whose pixels had to wait for the readout.
+        By camera name, the number of events that waited for the readout.
     notices : list of str
-        What was warned of or noted.
+        Warnings and notes.
     """
 
     @property
     def dropped(self):
-        """dict of str to int: events that the readout of each camera has dropped."""
+        """dict of str to int: by camera name, the number of events that the readout dropped."""
         return {camera["name"]: camera["events_dropped_by_readout"] for camera in self["cameras"]}
 
     @property
     def delayed(self):
-        """dict of str to int: events of each camera whose pixels had to wait for the readout."""
+        """dict of str to int: by camera name, the number of events that waited for the readout."""
         return {camera["name"]: camera["events_delayed_by_readout"] for camera in self["cameras"]}
 
     @property
     def notices(self):
-        """list of str: what was warned of or noted."""
+        """list of str: warnings and notes."""
         return self["notices"]
 
 
 class Simulation:
-    """A simulation under way: an iterator over its packets. Made by `simulate`.
+    """A running simulation: an iterator over its packets. Made by `simulate`.
 
-    Also a context manager, which ends it: a recording that is being written is then finished as an interrupted one.
-    Where events were lost, the end is a `LossWarning`.
+    Also a context manager, which ends it: a recording is then finished and marked as interrupted. If events were lost,
+    the end raises a `LossWarning`.
 
     Attributes
     ----------
     start, end : int
-        Of the time that is simulated, ns.
+        The simulated time, ns.
     cameras : dict of str to dict
-        Of each camera `width` and `height` (px), `K` (3, 3, px, without distortion) and `T_body_camera` (4, 4).
+        By camera name, `width` and `height` (px), `K` (3, 3, px, without distortion) and `T_body_camera` (4, 4).
     objects : list of str
-        Names of what moves, in the order of its numbers.
+        Names of the moving objects, in the order of their numbers.
     """
 
     def __init__(self, core):
@@ -228,7 +229,7 @@ class Simulation:
         return Packet(parts, self.cameras)
 
     def run(self):
-        """Simulates to the end, keeping nothing but the recording that is being written.
+        """Simulates to the end without returning packets; a recording is written if `out` is given.
 
         Returns
         -------
@@ -240,12 +241,12 @@ class Simulation:
         return self.report
 
     def close(self):
-        """Ends the simulation where it is."""
+        """Ends the simulation at the current time."""
         self._core.close()
         self._warn_of_losses()
 
     def _warn_of_losses(self):
-        """Once; called by what users call."""
+        """Warns of each loss once. Must be called directly from a public method, for `stacklevel`."""
         losses = self._core.losses()[self._told :]
         self._told += len(losses)
         for loss in losses:
@@ -253,7 +254,7 @@ class Simulation:
 
     @property
     def report(self):
-        """Report or None: what was done, and at which cost (`report.json` of recordings); None before the end."""
+        """Report or None: results and cost (`report.json` of recordings); None before the end."""
         text = self._core.report()
         return Report(json.loads(text)) if text else None
 
@@ -282,37 +283,36 @@ def simulate(
     Parameters
     ----------
     scenario : path, dict or Scenario
-        A YAML file, or the same as a dict.
+        A YAML file, or its contents as a dict.
     overrides : dict or list of str, optional
         Options to change: `{"event_camera.contrast_threshold": 0.2}`, or `["event_camera.contrast_threshold=0.2"]`.
     threads : int
-        0 takes every processor. The result does not depend on it.
+        Number of threads; 0 uses every processor. The result does not depend on it.
     seed : int, optional
-        Of all random numbers, in place of the scenario's.
+        Seed of all random numbers; overrides the scenario.
     out : path, optional
-        Folder to write a recording to, as `esim simulate` does. After an error on the way, what was recorded before it
-        stays in the folder `out`.incomplete.
+        Folder to write a recording to, as `esim simulate` does. After an error, the part recorded before it stays in the
+        folder `out`.incomplete.
     force : bool
-        Replace an earlier recording there.
+        Replace an existing recording.
     packet_s : float, optional
-        Length of packets, s. Otherwise each lasts until the next frame of ground truth, or 1/30 s where the scenario has
-        none.
+        Length of packets, s. Default: until the next frame of ground truth, or 1/30 s without ground truth.
     trajectory : Trajectory, optional
-        Of the body, in place of the scenario's, which need not have one.
+        Motion of the body; replaces the scenario's trajectory, which may be missing.
     renderer : Renderer or callable, optional
-        In place of the scenario's, which need not have one.
+        Replaces the scenario's renderer, which may be missing.
 
     Returns
     -------
     Simulation
-        An iterator over packets. Nothing is simulated before they are asked for.
+        An iterator over packets, which are simulated on demand.
 
     Raises
     ------
     esim.Error
-        Naming what is wrong in the scenario and what would be right.
+        For problems of the scenario, with the key and the valid values.
     esim.OutputError
-        If the recording cannot be written; the message says where what was recorded before is kept.
+        If the recording cannot be written; the message names the folder with the part recorded before.
     """
     if renderer is not None and not isinstance(renderer, Renderer):
         renderer = Renderer(renderer)
@@ -320,7 +320,7 @@ def simulate(
     if seed is not None:
         values.seed = _checks.seed(seed)
     given = [name for name, part in (("renderer", renderer), ("trajectory", trajectory)) if part is not None]
-    origin = "".join(f"# The {name} was given by a program: what stands under {name} was not used.\n" for name in given)
+    origin = "".join(f"# A program replaced the {name}: the entry {name} was not used.\n" for name in given)
     return Simulation(
         _core.Simulation(
             values,

@@ -24,7 +24,7 @@ def matrices(position, orientation):
 class Trajectory:
     """A smooth motion, T_world_body over time. Made by `from_poses` and `load`.
 
-    It never changes. A pickle holds the poses that it was made of, and fits them again.
+    It is immutable. A pickle contains the original poses, which are fitted again.
     """
 
     def __init__(self):
@@ -38,21 +38,21 @@ class Trajectory:
 
     @classmethod
     def from_poses(cls, t, poses, *, order=5, knot_interval_s=0.0, smoothing_time_s=0.0):
-        """A spline through, or near, poses.
+        """Fits a spline to poses.
 
         Parameters
         ----------
         t : array_like, shape (N,)
             Times, increasing: floats, s, or numpy.timedelta64 such as esim.ns().
         poses : array_like, shape (N, 4, 4), or a pair of shapes (N, 3) and (N, 4)
-            T_world_body: homogeneous matrices, or positions (m) and quaternions (Hamilton, x y z w; any length but 0).
+            T_world_body: homogeneous matrices, or positions (m) and quaternions (Hamilton, x y z w; any nonzero norm).
             A camera looks along its z axis, x to the right.
         order : int
-            Of the spline, 4 (cubic) to 6.
+            Order of the spline, 4 (cubic) to 6.
         knot_interval_s : float
-            Between the spline's control points, s; 0: from the data.
+            Time between the spline's control points, s; 0: derived from the data.
         smoothing_time_s : float
-            Faster motion is smoothed away, s; 0: none but what determines the spline.
+            Time constant of the smoothing, which removes faster motion, s; 0: only as much as the spline needs.
 
         Returns
         -------
@@ -61,7 +61,7 @@ class Trajectory:
         Raises
         ------
         esim.Error
-            For fewer than two poses, times that do not increase, matrices that are no poses.
+            For fewer than two poses, times that do not increase, and matrices that are not poses.
         """
         t = _checks.times(t)
         if isinstance(poses, tuple):
@@ -72,12 +72,12 @@ class Trajectory:
         else:
             T = np.ascontiguousarray(poses, np.float64)
         if t.ndim != 1 or T.shape != (len(t), 4, 4):
-            raise Error(f"{t.shape} times do not fit poses of shape {T.shape}; give (N,) and (N, 4, 4)")
+            raise Error(f"t must have shape (N,) and poses (N, 4, 4), not {t.shape} and {T.shape}")
         return cls._of(_core.Trajectory.from_matrices(t, T, *_fit(order, knot_interval_s, smoothing_time_s)))
 
     @classmethod
     def load(cls, path, *, order=5, knot_interval_s=0.0, smoothing_time_s=0.0):
-        """A spline through the poses of a file, TUM's text or the original ESIM's CSV.
+        """Fits a spline to the poses of a file, TUM text or CSV of the original ESIM.
 
         Parameters
         ----------
@@ -103,11 +103,11 @@ class Trajectory:
 
     @property
     def fit(self):
-        """dict: how far the spline stays from the poses, and what was chosen."""
+        """dict: residuals of the spline fit, and the chosen options."""
         return self._core.fit_report()
 
     def at(self, t):
-        """The motion at times.
+        """Evaluates the motion at times.
 
         Parameters
         ----------
@@ -128,7 +128,7 @@ class Trajectory:
         return states.reshape(times.shape)
 
     def pose(self, t):
-        """T_world_body at times, as homogeneous matrices.
+        """Evaluates T_world_body at times, as homogeneous matrices.
 
         Parameters
         ----------
@@ -155,7 +155,7 @@ class Trajectory:
 
 
 def _fit(order, knot_interval_s, smoothing_time_s):
-    """The options of a fit, whose range it checks itself."""
+    """The options of a fit; the fit itself checks their range."""
     return (
         _checks.whole(order, "order", 2, 6),
         _checks.seconds(knot_interval_s, "knot_interval_s", low=0),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-#: Events: `t` ns, `x` and `y` px, `p` +1 where brightness rose and -1 where it fell.
+#: Events: `t` ns, `x` and `y` px, `p` +1 for rising and -1 for falling brightness.
 EVENT_DTYPE = np.dtype(
     {"names": ["t", "x", "y", "p"], "formats": ["<i8", "<u2", "<u2", "i1"], "offsets": [0, 8, 10, 12], "itemsize": 16}
 )

@@ -1,4 +1,4 @@
-"""Labelled sequences for learning, made on the fly. `esim dataset` on the command line writes them to disk."""
+"""Labelled sequences for learning, simulated on demand. The command `esim dataset` writes them to disk."""
 
 import json
 import operator
@@ -13,7 +13,7 @@ __all__ = ["AffineSequence", "AffineSequences"]
 
 
 class AffineSequence:
-    """A sequence with its labels. All but the tensors is exact.
+    """A sequence with its labels. All values except the tensors are exact.
 
     Attributes
     ----------
@@ -24,12 +24,12 @@ class AffineSequence:
     flow : numpy.ndarray, float32, shape (2, height, width)
         Motion field, px/s, to the right and downwards, at the time `flow_t` (ns).
     displacement : numpy.ndarray, float32, shape (2, height, width)
-        Where the points that the pixels see at the start are at the end, less where they were: px, also outside the image.
+        Optical flow of each pixel from the start to the end, px, also to points outside the image.
     images : numpy.ndarray, float32, shape (2, height, width)
-        Irradiance at the start and at the end: linear light, 1 = white.
+        Irradiance at the start and at the end: linear intensity, 1 = white.
     info : dict
-        What was drawn: image, contrast_threshold, displacement_rms_px, and the motion as the pivot and keyframes of a layer
-        (`docs/sprites.md`).
+        The random values: image, contrast_threshold, displacement_rms_px, and the motion as the pivot and keyframes of a
+        sprite (`docs/sprites.md`).
     """
 
     __slots__ = ("index", "duration", "events", "flow", "flow_t", "displacement", "images", "info")
@@ -41,7 +41,7 @@ class AffineSequence:
         self.info = json.loads(info)
 
     def tensor(self, stamp="last"):
-        """The four channels of EV-FlowNet of all events: `esim.event_tensor`.
+        """Computes the four channels of EV-FlowNet from all events: `esim.event_tensor`.
 
         Parameters
         ----------
@@ -54,7 +54,7 @@ class AffineSequence:
         return event_tensor(self.events, t0=0, t1=_checks.ns(self.duration), stamp=stamp)
 
     def voxels(self, bins=5, normalise=False):
-        """All events as `esim.voxel_grid`.
+        """Computes `esim.voxel_grid` from all events.
 
         Parameters
         ----------
@@ -71,32 +71,32 @@ class AffineSequence:
 class AffineSequences:
     """Random affine motions of images over the sensor: `sequences[i]` is the i-th, for any i from 0 to 2**32 - 1.
 
-    A sequence depends on nothing but these options and its index. Threads may make sequences at the same time.
+    A sequence depends only on these options and its index. Several threads may make sequences at the same time.
 
     Parameters
     ----------
     images : path, optional
-        Folder of images, with the folders in it. Otherwise textures are made on the fly: collages of dead leaves.
+        Folder of images, including subfolders. Default: generated dead-leaves textures.
     width, height : int
-        Of the sensor, px.
+        Size of the sensor, px.
     duration : float, or numpy.timedelta64
-        Of a sequence, s.
+        Duration of a sequence, s.
     seed : int
     contrast_threshold : float or (float, float)
-        Each sequence draws its own between the two.
+        Range of the random threshold of each sequence.
     flow_histogram : path, optional
-        What magnitudes of displacement over the duration follow: lines "LOW HIGH WEIGHT", px. MPI Sintel's otherwise.
+        Histogram of optical flow over the duration: lines "LOW HIGH WEIGHT", px. Default: MPI Sintel's.
     flow_scale : float
-        Times the magnitudes of the histogram.
+        Factor on the magnitudes of the histogram.
     flow_at : {"start", "middle", "end"}
-        The time that `flow` is of.
+        Time of `flow`.
     event_camera : dict, optional
-        Further options by their names in a scenario's `event_camera`: {"threshold_mismatch": 0.03}.
+        Additional options of `event_camera` in a scenario: {"threshold_mismatch": 0.03}.
 
     Raises
     ------
     esim.Error
-        For options that are impossible, and where there is no usable image.
+        For invalid options, and if there is no usable image.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class AffineSequences:
         )
 
     def __getitem__(self, index):
-        """The sequence with this index.
+        """Makes the sequence with this index.
 
         Parameters
         ----------
@@ -141,5 +141,5 @@ class AffineSequences:
         """
         index = operator.index(index)
         if not 0 <= index < 2**32:
-            raise IndexError(f"sequences have numbers from 0 to 2**32 - 1, not {index}")
+            raise IndexError(f"index must be between 0 and 2**32 - 1, not {index}")
         return AffineSequence(index, self._core.make(index))

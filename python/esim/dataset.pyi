@@ -1,4 +1,4 @@
-# The surface of dataset.py. Docstrings there have shapes and units.
+# The interface of dataset.py. Docstrings there give shapes and units.
 from collections.abc import Mapping
 from os import PathLike
 from typing import Any, Literal

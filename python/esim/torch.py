@@ -1,12 +1,12 @@
-"""Data sets for PyTorch: `import esim.torch`. The rest of the package does not need PyTorch.
+"""Datasets for PyTorch: `import esim.torch`. The rest of the package does not need PyTorch.
 
 Samples are tuples of float32 tensors:
 
-- input, (4, height, width): `esim.event_tensor`, numbers of ON and OFF events and their latest times from 0 to 1;
-- target, (2, height, width): to the right, and downwards; px from the start of the window to its end (displacement), or
-  px/s (motion field);
-- fired, (1, height, width): 1 where at least one event fired and the target is known, 0 elsewhere; targets that are not
-  known are 0.
+- input, (4, height, width): `esim.event_tensor`, counts of ON and OFF events and their latest times from 0 to 1;
+- target, (2, height, width): to the right, and downwards; optical flow in px over the window (displacement), or motion
+  field in px/s (flow);
+- fired, (1, height, width): 1 for pixels with at least one event and a known target, otherwise 0; unknown targets are
+  0.
 """
 
 import itertools
@@ -26,7 +26,7 @@ TARGETS = ("displacement", "flow")
 
 
 def to_sample(tensor, target):
-    """The tuple of a sample from arrays: (4, height, width) and (2, height, width)."""
+    """Converts arrays (4, height, width) and (2, height, width) to a sample."""
     tensor, target = np.array(tensor, np.float32), np.array(target, np.float32)
     known = np.isfinite(target).all(axis=0)
     target[:, ~known] = 0
@@ -35,47 +35,46 @@ def to_sample(tensor, target):
 
 
 class AffineFlowDataset(torch.utils.data.IterableDataset):
-    """Events of random affine motions with their flow, simulated while they are asked for; nothing is read from or
-    written to disk but the images.
+    """Events of random affine motions with optical flow, simulated on demand. Only the images are read from disk.
 
-    Sample number i is a function of i and of the options, the seed among them, alone. They come in order, in blocks of
-    `block` consecutive ones: of the processes of a distributed training, process r of R takes the blocks r, r + R, ...,
-    and of those worker w of W of its DataLoader takes w, w + W, .... With `block` the DataLoader's batch size, batches
-    are therefore the same, and in the same order, with any number of workers.
+    Sample i depends only on i and on the options, including the seed. Samples come in order, in blocks of `block`
+    consecutive samples. In a distributed training, process r of R takes the blocks r, r + R, ..., and of these, worker w
+    of W of its DataLoader takes w, w + W, .... If `block` is the batch size, batches and their order do not depend on
+    the number of workers.
 
     Parameters
     ----------
     images : path, optional
-        A folder; textures of random shapes otherwise.
+        A folder. Default: generated dead-leaves textures.
     seed : int
     first, count : int
-        Samples are first, ..., first + count - 1, in all processes together; without count there is no end. To go on
-        where a training was interrupted, give the number of samples it has seen as first.
+        Samples are first, ..., first + count - 1, in all processes together; without count they are endless. To continue
+        an interrupted training, set first to the number of samples that it has used.
     block : int
         The batch size.
     target : {"displacement", "flow"}
     rank, world : int, optional
-        Which of how many processes this is; torch.distributed's where it is initialised, otherwise 0 of 1.
+        Rank of this process and number of processes. Default: from torch.distributed if initialised, otherwise 0 of 1.
     **options
-        Of `esim.dataset.AffineSequences`: width, height, duration, contrast_threshold, ....
+        Options of `esim.dataset.AffineSequences`: width, height, duration, contrast_threshold, ....
     """
 
     def __init__(self, images=None, *, seed=1, first=0, count=None, block=1, target="displacement", rank=None, world=None,
                  **options):
         if target not in TARGETS:
-            raise ValueError(f"target is one of {TARGETS}, not {target!r}")
+            raise ValueError(f"target must be one of {TARGETS}, not {target!r}")
         if block < 1 or first < 0 or (count is not None and count < 0):
-            raise ValueError("block is 1 or more, first and count are 0 or more")
+            raise ValueError("block must be at least 1, first and count at least 0")
         distributed = torch.distributed.is_available() and torch.distributed.is_initialized()
         self.rank = (torch.distributed.get_rank() if distributed else 0) if rank is None else rank
         self.world = (torch.distributed.get_world_size() if distributed else 1) if world is None else world
         if not 0 <= self.rank < self.world:
-            raise ValueError(f"rank {self.rank} is not between 0 and {self.world - 1}")
+            raise ValueError(f"rank must be between 0 and {self.world - 1}, not {self.rank}")
         self.first, self.count, self.block, self.target = first, count, block, target
         self.options = {"images": images, "seed": seed, **options}
 
     def indices(self, worker=0, workers=1):
-        """Numbers of the samples that a worker makes, in order."""
+        """The indices of the samples of a worker, in order."""
         share, shares = self.rank + self.world * worker, self.world * workers
         for start in itertools.count(share * self.block, shares * self.block):
             for i in range(start, start + self.block):
@@ -92,7 +91,7 @@ class AffineFlowDataset(torch.utils.data.IterableDataset):
 
 
 class EventTensorDataset(torch.utils.data.Dataset):
-    """A dataset that `esim dataset` has written, HDF5 or WebDataset's tar files, as samples by number.
+    """Samples of a dataset that `esim dataset` has written, in HDF5 or WebDataset tar files, by index.
 
     Parameters
     ----------
@@ -102,22 +101,22 @@ class EventTensorDataset(torch.utils.data.Dataset):
     Raises
     ------
     esim.Error
-        For what is no dataset, is not whole, or is damaged, and where it does not hold the target.
+        If the folder is not a dataset, or if the dataset is incomplete, damaged, or lacks the target.
     """
 
     def __init__(self, folder, *, target="displacement"):
         if target not in TARGETS:
-            raise ValueError(f"target is one of {TARGETS}, not {target!r}")
+            raise ValueError(f"target must be one of {TARGETS}, not {target!r}")
         self.shards, self.target = Shards(folder), target
 
     def __len__(self):
         return len(self.shards)
 
     def __getitem__(self, i):
-        """Sample i; its event tensor is made of the events where the dataset does not hold it."""
+        """Returns sample i; computes its event tensor from the events if the dataset does not contain it."""
         target = self.shards.array(i, self.target)
         if target is None:
-            raise Error(f"{self.shards.folder} holds no {self.target}; make it with `esim dataset --contents {self.target}`")
+            raise Error(f"{self.shards.folder} has no {self.target}; make it with `esim dataset --contents {self.target}`")
         tensor = self.shards.array(i, "tensor")
         if tensor is None:
             columns = {name: self.shards.array(i, f"events/{name}") for name in "txyp"}

@@ -6,7 +6,7 @@
 namespace esim::python {
 namespace {
 
-// The layouts that _types.py repeats.
+// The layouts, which _types.py repeats.
 static_assert(sizeof(Event) == 16 && offsetof(Event, t) == 0 && offsetof(Event, x) == 8 && offsetof(Event, y) == 10 &&
               offsetof(Event, polarity) == 12);
 static_assert(sizeof(State) == 8 * 20 && sizeof(ImuSample) == 8 * 13);

@@ -17,7 +17,7 @@ namespace esim::python {
 
 namespace nb = nanobind;
 
-/// An array of numpy's that lives in the vector's own memory.
+/// A NumPy array that owns the vector's memory.
 template <typename T>
 nb::object to_numpy(std::vector<T> values, std::initializer_list<std::size_t> shape) {
   auto* const kept = new std::vector<T>(std::move(values));
@@ -31,7 +31,7 @@ nb::object to_numpy(std::vector<T> values) {
   return to_numpy(std::move(values), {count});
 }
 
-/// The bytes of records, in their own memory; Python views them as what they are (_types.py has the layouts).
+/// The bytes of records, without a copy; Python views them with the layouts of _types.py.
 template <typename Record>
 nb::object bytes_to_numpy(std::vector<Record> records) {
   auto* const kept = new std::vector<Record>(std::move(records));
@@ -42,7 +42,7 @@ nb::object bytes_to_numpy(std::vector<Record> records) {
 
 using Bytes = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-/// Events in the memory of an array, aligned as they are.
+/// Events in the memory of an array, which is aligned.
 inline EventSpan events_in(const Bytes& bytes) {
   return {reinterpret_cast<const Event*>(bytes.data()), bytes.size() / sizeof(Event)};
 }

@@ -30,7 +30,7 @@ void make_simulation(Simulation* self, const CheckedScenario& scenario, const st
   new (self) Simulation(scenario.value, substitutes, function, origin, {threads, packet, out, force});
 }
 
-// A renderer often belongs to who holds the simulation: the garbage collector has to see through it.
+// A renderer often refers to the owner of the simulation: the garbage collector must be able to traverse this cycle.
 
 int traverse(PyObject* self, visitproc visit, void* arg) {
   Py_VISIT(Py_TYPE(self));

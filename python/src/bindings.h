@@ -2,7 +2,7 @@
 
 #include <nanobind/nanobind.h>
 
-/// Each file adds its part to the module. What Python's users see is written in Python, on top of this.
+/// Each file adds its part to the module. The public interface is written in Python on top of it.
 namespace esim::python {
 
 void bind_errors(nanobind::module_& module);

@@ -14,7 +14,7 @@
 namespace esim::python {
 namespace {
 
-/// Two images as an array of shape (2, height, width).
+/// Two images as one array of shape (2, height, width).
 nb::object pair_to_numpy(const Image<float>& first, const Image<float>& second) {
   std::vector<float> values(first.pixels().begin(), first.pixels().end());
   values.insert(values.end(), second.pixels().begin(), second.pixels().end());

@@ -13,7 +13,7 @@ namespace {
 
 using Frame = nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
-/// An event camera and the threads that it works on. Frames have its size: _checks.py sees to that.
+/// An event camera and its threads. _checks.py ensures that frames have its size.
 struct OwnedEventCamera {
   OwnedEventCamera(int columns, int rows, const std::vector<std::string>& options, std::uint64_t seed, int threads)
       : workers(threads), camera(read_event_camera(options, ""), columns, rows, seed) {}

@@ -20,13 +20,13 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kPortion = 1 << 17;
 
-/// A file's events, by number or by time.
+/// Reads the events of a file, by number or by time.
 class EventReader {
  public:
   EventReader(const fs::path& path, std::optional<int> width, std::optional<int> height)
       : file_(path, {sensor_size(width, height), {}}) {}
 
-  /// The next `count` events, or as many as are left.
+  /// The next events, at most `count`.
   nb::object take(std::size_t count) {
     std::vector<Event> events;
     {
@@ -46,13 +46,13 @@ class EventReader {
     return bytes_to_numpy(std::move(events));
   }
 
-  /// Passes over the events before t.
+  /// Skips the events before t.
   void skip_before(TimeNs t) {
     const nb::gil_scoped_release released;
     while (fill() && portion_[next_].t < t) next_ += count_before(t);
   }
 
-  /// The time of the next event; none after the last.
+  /// The time of the next event; empty after the last.
   std::optional<TimeNs> next_time() {
     const nb::gil_scoped_release released;
     if (!fill()) return std::nullopt;
@@ -73,7 +73,7 @@ class EventReader {
     return file_.read(portion_, kPortion);
   }
 
-  /// Of what is left of the portion.
+  /// The rest of the portion.
   std::size_t count_before(TimeNs t) const {
     const auto first = portion_.begin() + static_cast<std::ptrdiff_t>(next_);
     const auto end = std::partition_point(first, portion_.end(), [t](const Event& event) { return event.t < t; });
@@ -96,14 +96,15 @@ void check(EventSpan events, int width, int height) {
     const Event& event = events[i];
     if (event.x >= width || event.y >= height) {
       throw UserError("event " + std::to_string(i) + ": x = " + std::to_string(event.x) +
-                      ", y = " + std::to_string(event.y) + " is outside the sensor, " + std::to_string(width) + " x " +
-                      std::to_string(height) + " px");
+                      ", y = " + std::to_string(event.y) + " is outside the sensor of " + std::to_string(width) +
+                      " x " + std::to_string(height) + " px");
     }
     if (event.polarity != 1 && event.polarity != -1)
-      throw UserError("event " + std::to_string(i) + ": p = " + std::to_string(event.polarity) + "; give 1 or -1");
+      throw UserError("event " + std::to_string(i) + ": p = " + std::to_string(event.polarity) +
+                      ", but must be 1 or -1");
     if (i > 0 && event.t < events[i - 1].t) {
-      throw UserError("event " + std::to_string(i) + ": its time, " + std::to_string(event.t) +
-                      " ns, is before that of the event before, " + std::to_string(events[i - 1].t) +
+      throw UserError("event " + std::to_string(i) + ": its t, " + std::to_string(event.t) +
+                      " ns, is before that of the previous event, " + std::to_string(events[i - 1].t) +
                       " ns; sort the events by time");
     }
   }
@@ -114,12 +115,12 @@ void save(const fs::path& path, const Bytes& bytes, int width, int height, const
   const nb::gil_scoped_release released;
   check(events, width, height);
   const Format& format = name ? format_named(*name) : format_for(path);
-  if (!format.create) throw UserError("format " + format.name + " can only be read; see esim.formats()");
+  if (!format.create) throw UserError("format " + format.name + " cannot be written; see esim.formats()");
   if (!format.can_hold(Content::events))
-    throw UserError("format " + format.name + " holds no events; see esim.formats()");
+    throw UserError("format " + format.name + " does not contain events; see esim.formats()");
   if (width > format.max_width || height > format.max_height) {
-    throw UserError("format " + format.name + " holds sensors of " + std::to_string(format.max_width) + " x " +
-                    std::to_string(format.max_height) + " px at most");
+    throw UserError("format " + format.name + " supports sensors of at most " + std::to_string(format.max_width) +
+                    " x " + std::to_string(format.max_height) + " px");
   }
   RecordingInfo info;
   CameraInfo camera;

@@ -43,7 +43,7 @@ Packet& PacketSink::at(TimeNs t) {
   cover(t);
   filled_ = std::max(filled_, t);
   written_ = true;
-  // Almost always the last one, or one of the last.
+  // It is almost always one of the last.
   auto packet = packets_.rbegin();
   while (t <= packet->t0 && packet + 1 != packets_.rend()) ++packet;
   return *packet;
@@ -97,7 +97,7 @@ void PacketSink::write(const EventsRecord& record) {
 }
 
 void PacketSink::write(const EventPointsRecord& record) {
-  // They follow their events, which may have gone into several packets.
+  // They follow their events, which may be in several packets.
   std::size_t done = 0;
   const auto take = [&](Packet& packet) {
     CameraPart& camera = packet.cameras[static_cast<std::size_t>(record.camera)];
@@ -113,9 +113,9 @@ template <typename T>
 void PacketSink::require_size(const Image<T>& image, int camera, TimeNs t) const {
   const CameraInfo& info = cameras_[static_cast<std::size_t>(camera)];
   if (image.width() == info.model.width && image.height() == info.model.height) return;
-  throw UserError(fmt::format("the image of {} at {} s has {} x {} px, and the camera {} x {}: give width and height",
-                              info.name, to_seconds(t), image.width(), image.height(), info.model.width,
-                              info.model.height));
+  throw UserError(
+      fmt::format("the image of {} at {} s has {} x {} px, but the camera {} x {} px; give width and height", info.name,
+                  to_seconds(t), image.width(), image.height(), info.model.width, info.model.height));
 }
 
 void PacketSink::write(const TruthRecord& record) {
@@ -145,7 +145,8 @@ void PacketSink::write(const DisplacementRecord& record) {
 void PacketSink::write(const FrameRecord& record) {
   require_size(record.image, record.camera, record.t);
   reached_ = std::max(reached_, record.t);
-  // It belongs where its exposure ends. The middle of that is rounded: a nanosecond is no reason to leave a packet.
+  // A frame belongs to the packet in which its exposure ends. The middle of the exposure is rounded, so that the end
+  // may be off by 1 ns.
   CameraPart& camera = part(record.camera, std::max(record.t, 2 * record.t - record.exposure_start - 1));
   camera.image_t.push_back(record.t);
   camera.exposure_start.push_back(record.exposure_start);
@@ -173,6 +174,6 @@ void PacketSink::write(const TriggerRecord& record) {
   camera.trigger_kind.push_back(static_cast<std::uint8_t>(record.kind));
 }
 
-void PacketSink::write(const ImageRecord&) {}  // of videos only
+void PacketSink::write(const ImageRecord&) {}  // only from videos
 
 }  // namespace esim::python

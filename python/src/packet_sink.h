@@ -10,7 +10,7 @@
 
 namespace esim::python {
 
-/// What one camera recorded in a step of time. Images lie one after the other.
+/// The records of one camera in a packet. Images are stored one after the other.
 struct CameraPart {
   std::vector<Event> events;
   std::vector<float> event_points;
@@ -33,10 +33,10 @@ struct CameraPart {
   std::vector<std::uint8_t> trigger_kind;
 };
 
-/// Of packets that neither their user nor ground truth determines.
+/// The length of packets if neither the user nor ground truth determines it.
 inline constexpr double kUsualPacketRate_hz = 30;
 
-/// Everything that was recorded after t0, until t1; the first packet of a recording includes t0.
+/// The records of t0 < t <= t1; the first packet of a recording includes t0.
 struct Packet {
   TimeNs t0 = 0, t1 = 0;
   std::vector<CameraPart> cameras;
@@ -45,28 +45,27 @@ struct Packet {
   std::vector<ImuSample> imu;
 };
 
-/// Cuts a recording into packets, each of which begins where the one before ends: from the recording's start to its
-/// end. No packet is without length, unless the whole recording is one instant. Records of different kinds and cameras
-/// may come in any order, as long as know() is right: each goes into the packet of its time.
+/// Cuts a recording into consecutive packets from its start to its end. Packets have a positive length, unless the
+/// recording is one instant. Records of different kinds and cameras may come in any order, as long as know() is
+/// correct: each goes into the packet of its time.
 class PacketSink final : public Sink {
  public:
-  /// Packets end where the clock ticks, its tick at the recording's start aside.
+  /// Packets end at the ticks of the clock, except the tick at the recording's start.
   explicit PacketSink(const PeriodicClock& clock);
 
   void begin(const RecordingInfo& info) override;
   void write(const Record& record) override;
   void end(bool complete) override;
 
-  /// Nothing at or before `t` will be written any more. What is nevertheless goes into the first packet that is left.
+  /// Promises that no record at or before `t` will follow. Late records go into the first remaining packet.
   void know(TimeNs t);
 
-  /// Replaces the end that begin() was told, where that was not known: at `t`, or at the last record where that is
-  /// later.
+  /// Sets the end if begin() did not know it: `t`, or the last record if that is later.
   void set_end(TimeNs t);
 
   TimeNs end() const { return end_; }
   TimeNs reached() const { return reached_; }            ///< the time of the latest record
-  TimeNs covered() const { return packets_.back().t1; }  ///< the end of the last packet that there is yet
+  TimeNs covered() const { return packets_.back().t1; }  ///< the end of the last packet so far
 
   bool has_packet() const { return !packets_.empty() && (ended_ || packets_.front().t1 <= known_) && !is_last(); }
   Packet take();
@@ -82,27 +81,27 @@ class PacketSink final : public Sink {
   void write(const ImuRecord& record);
   void write(const TriggerRecord& record);
 
-  /// Throws UserError unless the image is as large as the camera's, since a packet's images make one array.
+  /// Throws UserError unless the image has the camera's size, since a packet's images form one array.
   template <typename T>
   void require_size(const Image<T>& image, int camera, TimeNs t) const;
 
-  /// The packet that `t` belongs to.
+  /// The packet of time `t`.
   Packet& at(TimeNs t);
   CameraPart& part(int camera, TimeNs t) { return at(t).cameras[static_cast<std::size_t>(camera)]; }
 
   void begin_packet(TimeNs t0);
   void cover(TimeNs t);
 
-  /// The first packet may yet be the recording's last one, which end() hands out.
+  /// Whether the first packet may still be the recording's last one, which end() returns.
   bool is_last() const { return !ended_ && packets_.size() == 1; }
 
   PeriodicClock clock_;
   std::vector<CameraInfo> cameras_;
   TimeNs end_ = 0, known_ = 0, reached_ = 0;
-  TimeNs filled_ = 0;     // the latest time for which anything was put into a packet
-  bool written_ = false;  // anything at all
+  TimeNs filled_ = 0;     // the latest time of a record in a packet
+  bool written_ = false;  // whether any record was written
   bool ended_ = false;
-  std::deque<Packet> packets_;  // not yet taken, without gaps
+  std::deque<Packet> packets_;  // not taken yet, without gaps
 };
 
 }  // namespace esim::python

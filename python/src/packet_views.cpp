@@ -16,7 +16,7 @@ nb::object images(std::vector<T> values, const Camera& model) {
   return to_numpy(std::move(values), {count, height, width});
 }
 
-/// The same of pairs of images.
+/// The same for pairs of images.
 nb::object image_pairs(std::vector<float> values, const Camera& model) {
   const auto height = static_cast<std::size_t>(model.height), width = static_cast<std::size_t>(model.width);
   const std::size_t count = values.size() / std::max<std::size_t>(2 * height * width, 1);

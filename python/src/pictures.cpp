@@ -30,10 +30,10 @@ nb::object picture_to_numpy(const Image<Rgb>& picture) {
 
 void require_on_sensor(EventSpan events, int width, int height) {
   if (width < 1 || height < 1 || width > 65536 || height > 65536)
-    throw UserError("width and height of a sensor are from 1 to 65536 px");
+    throw UserError("width and height must be from 1 to 65536 px");
   for (const Event& event : events) {
     if (event.x < width && event.y < height) continue;
-    throw UserError("an event at (" + std::to_string(event.x) + ", " + std::to_string(event.y) +
+    throw UserError("the event at (" + std::to_string(event.x) + ", " + std::to_string(event.y) +
                     ") is outside the sensor of " + std::to_string(width) + " x " + std::to_string(height) + " px");
   }
 }
@@ -45,7 +45,7 @@ nb::object space_time_plot(const Bytes& bytes, int width, int height, int pictur
     const nb::gil_scoped_release released;
     require_on_sensor(events, width, height);
     if (std::min(picture_width, picture_height) < 64 || std::max(picture_width, picture_height) > 16384)
-      throw UserError("size: width and height of a picture are from 64 to 16384 px");
+      throw UserError("size: width and height must be from 64 to 16384 px");
     SpaceTimeBox box{{width, height}, 0, 1, 0};
     if (!events.empty()) box.start = events.front().t - 1, box.end = events.back().t + 1;
     return draw_space_time(events, box, {yaw_deg, pitch_deg}, picture_width, picture_height, Theme{});
@@ -67,7 +67,7 @@ nb::object time_surface_picture(const Bytes& bytes, int width, int height, TimeN
   return picture_to_numpy(picture);
 }
 
-/// The pages of a recording, as `esim play` shows it.
+/// The images of a recording, as `esim play` shows them.
 class Pages {
  public:
   Pages(const fs::path& path, std::optional<SensorSize> sensor, const std::string& camera, PlayOptions options,
@@ -79,7 +79,7 @@ class Pages {
     options = choose_missing(std::move(options), *found);
     instants_ = at_s ? Instants{.first = found->origin + to_ns(*at_s)} : video_instants(*found, options);
     if (instants_.first < found->start || instants_.first > found->end)
-      throw UserError("at_s: " + path.string() + " lasts from 0 to " +
+      throw UserError("at_s: must be within " + path.string() + ", from 0 to " +
                       std::to_string(to_seconds(found->end - found->origin)) + " s");
     source_ = input.open();
     player_ = std::make_unique<Player>(*source_, extent.camera, *found, options, instants_);

@@ -22,7 +22,7 @@ nb::object matrix(const SE3& pose) {
   return to_numpy(std::move(values), {4, 4});
 }
 
-/// Copies the tiles of an image of the same size.
+/// Copies tiles from an image of the same size.
 template <typename T>
 void copy(const T* from, const std::vector<Tile>& tiles, Image<T>& to) {
   for (const Tile& tile : tiles) {
@@ -54,7 +54,7 @@ class PythonRenderer final : public ProcessorRenderer {
     }
   }
 
-  /// Fills E, Z, and which object is seen; V as well where it returns true.
+  /// Sets irradiance, depth and object; returns true if it also sets the motion field.
   bool ask(const RenderRequest& request, Sample& sample) const {
     const nb::gil_scoped_acquire acquired;
     nb::list objects;

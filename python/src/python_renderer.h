@@ -9,12 +9,12 @@
 
 namespace esim::python {
 
-/// A function of Python's that is called, and let go, by threads that need not hold Python's lock.
+/// A Python function that threads may call and release without holding the GIL.
 class PythonFunction {
  public:
   explicit PythonFunction(nanobind::object function);
 
-  // For those who hold the lock.
+  // Needs the GIL.
   const nanobind::object& get() const { return *function_; }
   void clear() { function_->reset(); }
 
@@ -22,8 +22,8 @@ class PythonFunction {
   std::shared_ptr<nanobind::object> function_;
 };
 
-/// A renderer that asks Python for whole images: `render(t, T_world_camera, T_world_objects, shape)` gives irradiance
-/// and depth, and flow and object where it knows them, as _simulate.py promises.
+/// A renderer that calls Python for complete images: `render(t, T_world_camera, T_world_objects, shape)` returns
+/// irradiance and depth, and optionally flow and object. _simulate.py checks them.
 std::unique_ptr<Renderer> make_python_renderer(const PythonFunction& render, const Camera& camera);
 
 }  // namespace esim::python

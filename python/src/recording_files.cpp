@@ -22,14 +22,14 @@ namespace fs = std::filesystem;
 
 constexpr TimeNs kEndless = std::numeric_limits<TimeNs>::max() / 2;
 
-/// Sources give records of a camera and kind in order. Those of others are mixed with them, and come this much later at
-/// most: as long as the messages of drivers last, or half an exposure.
+/// Sources give records of one camera and kind in order. Records of other cameras and kinds may be late by at most this
+/// time: the duration of drivers' messages, or half an exposure.
 constexpr TimeNs kMostDisorder = 500 * kNsPerMs;
 
-/// A file's recording, packet by packet.
+/// Reads the recording of a file packet by packet.
 class RecordingReader {
  public:
-  /// `packet`: length of packets; 0: from one frame of ground truth to the next, where the file says their rate.
+  /// `packet`: length of packets; 0: from one frame of ground truth to the next, if the file contains their rate.
   RecordingReader(const fs::path& path, TimeNs packet, std::optional<int> width, std::optional<int> height,
                   bool recover) {
     ReadOptions options;
@@ -38,7 +38,7 @@ class RecordingReader {
     source_ = open_source(path, options);
     info_ = source_->info();
     RecordingInfo endless = info_;
-    endless.end = kEndless;  // the end is known when it is there
+    endless.end = kEndless;  // the end becomes known when it is reached
     const double usual_hz = info_.truth_rate_hz > 0 ? info_.truth_rate_hz : kUsualPacketRate_hz;
     packets_.emplace(PeriodicClock(info_.start, kEndless, packet > 0 ? 1 / to_seconds(packet) : usual_hz));
     packets_->begin(endless);
@@ -70,7 +70,7 @@ class RecordingReader {
     }
   }
 
-  /// False after the last record. What comes before a damaged place is handed out before it is told of.
+  /// False after the last record. Records before a damaged position are returned before the error.
   bool take() {
     try {
       const Record* const record = source_->next();
@@ -89,11 +89,11 @@ class RecordingReader {
   std::optional<PacketSink> packets_;
   std::vector<std::string> problems_;
   std::exception_ptr damage_;
-  bool read_ = false;   // all of the source
-  bool ended_ = false;  // and all packets are made
+  bool read_ = false;   // whether the source is read completely
+  bool ended_ = false;  // whether all packets are made
 };
 
-/// Copies a recording into another format; returns how many of what, and what was lost.
+/// Converts a recording to another format; returns the numbers of copied records, and the losses.
 nb::tuple convert(const fs::path& from, const fs::path& to, const std::optional<std::string>& name,
                   const std::string& camera, bool from_zero, bool nanoseconds, bool recover, bool force) {
   std::map<std::string, std::uint64_t> copied;

@@ -6,7 +6,7 @@
 
 namespace esim::python {
 
-/// A message with the argument in Python that brings the remedy.
+/// A message followed by the Python argument that solves the problem.
 std::string with_remedy(const std::string& message, Remedy remedy);
 
 }  // namespace esim::python

@@ -9,7 +9,7 @@
 namespace esim::python {
 namespace {
 
-/// What `make` makes, without Python's lock, as an array of images.
+/// The result of `make`, computed without the GIL, as an array of images.
 template <typename Make>
 nb::object stack_to_numpy(Make make) {
   auto stack = [&] {

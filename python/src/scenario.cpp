@@ -14,7 +14,7 @@ namespace nb = nanobind;
 
 namespace {
 
-/// A few words for people: "cam0 240 x 180 px, 2 s".
+/// A short description: "cam0 240 x 180 px, 2 s".
 std::string describe(const Scenario& scenario) {
   std::string text;
   for (const CameraOptions& camera : scenario.cameras) {

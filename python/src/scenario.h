@@ -4,7 +4,7 @@
 
 namespace esim::python {
 
-/// A scenario that has been read and checked.
+/// A valid scenario.
 struct CheckedScenario {
   Scenario value;
 };

@@ -6,7 +6,7 @@
 
 namespace esim::python {
 
-/// Of both, or of neither: _checks.py sees to that.
+/// Width and height; _checks.py ensures that both or neither are given.
 inline std::optional<SensorSize> sensor_size(std::optional<int> width, std::optional<int> height) {
   if (!width || !height) return std::nullopt;
   return SensorSize{*width, *height};

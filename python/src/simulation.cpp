@@ -17,7 +17,7 @@ namespace nb = nanobind;
 
 constexpr double kSignalInterval_s = 0.02;
 
-/// Passes everything on to sinks that others own.
+/// Forwards everything to sinks that it does not own.
 class Both final : public Sink {
  public:
   Both(Sink& first, Sink* second) : first_(first), second_(second) {}
@@ -58,9 +58,9 @@ Simulation::Simulation(Scenario scenario, const Substitutes& substitutes, std::o
 Simulation::~Simulation() {
   try {
     close();
-  } catch (const std::exception&) {  // nobody is left to be told
+  } catch (const std::exception&) {  // a destructor cannot report it
   }
-  const nb::gil_scoped_release released;  // a recorder's thread may be waited for
+  const nb::gil_scoped_release released;  // this may wait for a recorder's thread
   simulator_.reset();
   sink_.reset();
   recorder_.reset();
@@ -86,7 +86,7 @@ void Simulation::build(const Substitutes& substitutes, const std::string& origin
   simulator_ = std::make_unique<Simulator>(*world_, *sink_);
 }
 
-/// Whether a signal's handler, as Ctrl-C's, raised an exception. Looking costs Python's lock.
+/// Whether a signal handler, such as that of Ctrl-C, raised an exception. Takes the GIL.
 bool Simulation::signal_came() {
   const nb::gil_scoped_acquire acquired;
   if (PyErr_CheckSignals() == 0) return false;
@@ -94,7 +94,7 @@ bool Simulation::signal_came() {
   return true;
 }
 
-/// Until there is a packet or an end; false where a signal came before.
+/// Simulates until there is a packet or the end; false if a signal came first.
 bool Simulation::advance() {
   const bool at_end = simulator_->advance_until(world_->info.end, [this](const Progress& progress) {
     packets_->know(progress.now);
@@ -109,7 +109,7 @@ bool Simulation::advance() {
   return !signal_;
 }
 
-/// Ends the recording where it is.
+/// Ends the recording at the current time.
 void Simulation::finish() {
   over_ = true;
   const Summary summary = simulator_->finish();
@@ -121,8 +121,7 @@ void Simulation::finish() {
   if (directory_ != nullptr) directory_->finish(report_);
 }
 
-/// Works without Python's lock. After a failure, from which there is no going on, the recording stays in
-/// DIR.incomplete if it holds anything.
+/// Works without the GIL. After a fatal error, the recording stays in DIR.incomplete if it contains any records.
 template <typename Work>
 void Simulation::or_keep_the_recording(const Work& work) {
   const nb::gil_scoped_release released;
@@ -136,13 +135,13 @@ void Simulation::or_keep_the_recording(const Work& work) {
   }
 }
 
-/// Returns the problem, and where the recording is kept.
+/// Returns the problem and the folder of the kept recording.
 std::string Simulation::keep_what_was_recorded(const std::string& problem) {
   over_ = true;
   if (directory_ == nullptr || !recorded_) return problem;
   end_incomplete(*recorder_);
   directory_->keep(problem);
-  return problem + "; what was recorded before that is kept: " + directory_->path().string();
+  return problem + "; the recording until then is kept: " + directory_->path().string();
 }
 
 std::optional<Packet> Simulation::next() {

@@ -15,37 +15,37 @@
 
 namespace esim::python {
 
-/// What a simulation is made of, beside its scenario.
+/// Parameters of a simulation in addition to its scenario.
 struct SimulationOptions {
   int threads = 0;
   TimeNs packet = 0;          ///< length of packets; 0: from one frame of ground truth to the next
-  std::filesystem::path out;  ///< where to write a recording; empty: nowhere
-  bool force = false;         ///< replace an earlier recording there
+  std::filesystem::path out;  ///< folder of the recording; empty: none is written
+  bool force = false;         ///< replace an existing recording
 };
 
-/// A simulation that goes on packet by packet. Used by those who hold Python's lock, which is let go of while it works.
+/// A simulation packet by packet. Callers hold the GIL, which is released during the simulation.
 class Simulation {
  public:
-  /// `origin` are lines above the written scenario, if any; `render` is what the substitutes render with.
+  /// `origin` is text above the written scenario; `render` is the Python function of the substitutes' renderer.
   Simulation(Scenario scenario, const Substitutes& substitutes, std::optional<PythonFunction> render,
              const std::string& origin, const SimulationOptions& options);
   ~Simulation();
 
-  /// The next packet; none after the last. Throws Python's exception where a signal handler or a renderer raised one;
-  /// after the former it can go on.
+  /// The next packet; empty after the last. Throws the Python exception of a signal handler or a renderer; after a
+  /// signal, the simulation can continue.
   std::optional<Packet> next();
 
-  /// Ends the simulation, and the recording, wherever they are.
+  /// Ends the simulation and the recording at the current time.
   void close();
 
   const RecordingInfo& info() const { return world_->info; }
   bool colour(std::size_t camera) const { return scenario_.cameras[camera].colour != ColourFilters::none; }
   const std::vector<std::string>& warnings() const { return warnings_; }
 
-  /// What of Python's is held here, for its garbage collector.
+  /// The Python objects held here, for the garbage collector.
   std::optional<PythonFunction>& render() { return render_; }
 
-  /// A line on each thing that was lost; none before the end.
+  /// One line per loss; empty before the end.
   const std::vector<std::string>& losses() const { return losses_; }
 
   /// The report as JSON; empty before the end.
@@ -69,10 +69,10 @@ class Simulation {
   std::unique_ptr<Sink> recorder_, sink_;
   std::unique_ptr<Simulator> simulator_;
   std::optional<nanobind::python_error> signal_;
-  double looked_at_ = 0;  // wall clock of the last look for signals, s
+  double looked_at_ = 0;  // wall-clock time of the last check for signals, s
   std::string report_;
   bool over_ = false;
-  bool recorded_ = false;  // something, already
+  bool recorded_ = false;  // whether any record was written
 };
 
 }  // namespace esim::python

@@ -18,7 +18,7 @@ namespace {
 using Times = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Matrices = nb::ndarray<const double, nb::shape<-1, 4, 4>, nb::c_contig, nb::device::cpu>;
 
-/// A pose as it is pickled.
+/// A pose in a pickle.
 struct FlatPose {
   TimeNs t = 0;
   double orientation[4]{}, position[3]{};  // x y z w; m
@@ -56,7 +56,7 @@ SharedTrajectory from_file(const std::filesystem::path& path, int order, double 
   }
 }
 
-/// Every bit of the poses, so that from_state() fits the same motion.
+/// The exact poses, so that from_state() fits the same motion.
 nb::tuple state(const SharedTrajectory& self) {
   std::vector<FlatPose> poses(self.poses->size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -87,7 +87,7 @@ nb::object states(const SharedTrajectory& self, const Times& times) {
   for (std::size_t i = 0; i < times.size(); ++i) {
     const TimeNs t = times.data()[i];
     if (t < self.motion->start() || t > self.motion->end()) {
-      throw UserError("t = " + std::to_string(t) + " ns is outside the trajectory, which lasts from " +
+      throw UserError("t = " + std::to_string(t) + " ns is outside the trajectory, from " +
                       std::to_string(self.motion->start()) + " to " + std::to_string(self.motion->end()) + " ns");
     }
     states.push_back(to_state(t, self.motion->at(t)));

@@ -8,7 +8,7 @@
 
 namespace esim::python {
 
-/// A motion that Python holds, and what it was made of: the same poses and options make the same motion again.
+/// A motion and its original poses and options, which reproduce the same motion.
 struct SharedTrajectory {
   std::shared_ptr<const Trajectory> motion;
   FitReport fit;

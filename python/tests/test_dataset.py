@@ -49,7 +49,7 @@ def test_options_reach_the_camera():
 def test_mistakes_are_named(tmp_path):
     with pytest.raises(esim.Error, match="thresh"):
         esim.dataset.AffineSequences(event_camera={"thresh": 1})
-    with pytest.raises(esim.Error, match="holds no image"):
+    with pytest.raises(esim.Error, match="has no images"):
         esim.dataset.AffineSequences(tmp_path)
     with pytest.raises(esim.Error, match="flow_at"):
         esim.dataset.AffineSequences(flow_at="never")

@@ -158,9 +158,9 @@ CODES = [np.uint8, np.uint16, np.int64, bool, complex]
 def test_light_that_is_none(poster, dtype):
     frame = np.ones((30, 40), dtype)
     depth = np.ones((30, 40))
-    refused(TypeError, "linear light.*linear_light", lambda: esim.EventCamera(40, 30).process(frame, 0))
+    refused(TypeError, "linear intensity.*linear_light", lambda: esim.EventCamera(40, 30).process(frame, 0))
     render = lambda t, T, objects: {"irradiance": frame, "depth": depth}
-    refused(TypeError, "linear light.*linear_light", lambda: esim.simulate(poster, renderer=render).run())
+    refused(TypeError, "linear intensity.*linear_light", lambda: esim.simulate(poster, renderer=render).run())
     swapped = lambda t, T, objects: {"irradiance": depth, "depth": frame}
     refused(TypeError, "depth must be floats", lambda: esim.simulate(poster, renderer=swapped).run())
 

@@ -96,7 +96,7 @@ def test_what_is_refused(tmp_path):
     events = random_events(50, 10, 10)
     with pytest.raises(esim.Error, match="outside the sensor"):
         esim.save_events(tmp_path / "e.txt", events, 9, 10)
-    with pytest.raises(esim.Error, match="before that of the event before"):
+    with pytest.raises(esim.Error, match="before that of the previous event"):
         esim.save_events(tmp_path / "e.txt", events[::-1], 10, 10)
     zero = events.copy()
     zero["p"][7] = 0
@@ -162,9 +162,9 @@ def test_events_whose_sensor_is_not_known(tmp_path):
     plain = np.array(events, subok=False)
     for them in (events, plain):
         for use in (esim.event_count, esim.voxel_grid, esim.space_time_plot, lambda e: esim.save_events(tmp_path / "f.txt", e)):
-            with pytest.raises(esim.Error, match="give width and height of the sensor"):
+            with pytest.raises(esim.Error, match="width and height are missing"):
                 use(them)
-        with pytest.raises(esim.Error, match="or neither"):
+        with pytest.raises(esim.Error, match="both or not at all"):
             esim.event_count(them, width=10)
     known = esim.Events(plain, 10, 9)
     assert esim.event_count(known).shape == (2, 9, 10)

@@ -69,7 +69,7 @@ def test_damaged_files_with_and_without_recovery(tmp_path):
 
 def test_images_of_another_size_than_the_sensor_are_refused(recorded):
     out, _ = recorded
-    with pytest.raises(esim.Error, match="has 64 x 48 px, and the camera 80 x 60"):
+    with pytest.raises(esim.Error, match="has 64 x 48 px, but the camera 80 x 60"):
         list(esim.Recording(out, width=80, height=60))
 
 

@@ -42,7 +42,7 @@ def test_messages_name_the_place(tmp_path):
         esim.Scenario.load(file)
     with pytest.raises(esim.Error, match="^scenario: rendere: unknown key"):
         esim.Scenario({"rendere": {}})
-    with pytest.raises(esim.Error, match="no scenario can be read there"):
+    with pytest.raises(esim.Error, match="cannot read the scenario"):
         esim.Scenario.load(tmp_path / "none.yaml")
     file.write_text("seed: [")
     with pytest.raises(esim.Error, match="not valid YAML"):

@@ -254,11 +254,11 @@ def test_objects_of_ones_own(poster):
     "images, message",
     [
         ([1], "dict"),
-        ({"depth": np.ones((30, 40))}, "gives no irradiance"),
+        ({"depth": np.ones((30, 40))}, "must also return irradiance"),
         ({"irradiance": np.ones((40, 30)), "depth": np.ones((30, 40))}, r"irradiance of shape \(40, 30\)"),
-        ({"irradiance": np.ones((30, 40)), "depth": np.zeros((30, 40))}, "depth is above 0"),
+        ({"irradiance": np.ones((30, 40)), "depth": np.zeros((30, 40))}, "depth must be above 0"),
         ({"irradiance": np.ones((30, 40)), "depth": np.ones((30, 40)), "flows": 1}, "not flows"),
-        ({"irradiance": np.ones((30, 40)), "depth": np.full((30, 40), np.inf)}, "sees nothing"),
+        ({"irradiance": np.ones((30, 40)), "depth": np.full((30, 40), np.inf)}, "never sees"),
         ({"irradiance": np.ones((30, 40)), "depth": np.ones((30, 40)), "object": np.ones((30, 40))}, "object 1 of 0"),
     ],
 )

@@ -11,7 +11,7 @@ import { readAddress } from "./ui/address.ts";
 import { h } from "./ui/dom.ts";
 import { Shell } from "./shell.ts";
 
-/** The server reads the scene while the page is still being built. */
+/** Lets the server read the scene while the page is being built. */
 async function askForScene({ opened }: Session): Promise<void> {
   const { place, scenario } = readAddress(location.hash);
   const path = scenario ?? (opened.kind === "scenario" ? opened.path : null);
@@ -22,17 +22,17 @@ async function askForScene({ opened }: Session): Promise<void> {
   askAhead(() => server.trajectory(source)).catch(() => undefined);
 }
 
-/** Waits for the server, so that a page that is loaded while it starts finds its way. */
+/** Waits for the server, so that a page that is loaded while the server starts works. */
 async function begin(): Promise<void> {
   const app = document.getElementById("app")!;
   try {
     const session = await server.session();
-    await askForScene(session).catch(() => undefined); // the design place says what is wrong
+    await askForScene(session).catch(() => undefined); // the design place reports errors
     await new Shell(app, session).begin();
   } catch (error) {
     const text =
       connection.value === "denied"
-        ? "This page needs the address that esim studio printed when it was started: open that one."
+        ? "Open the address that esim studio printed when it started; it contains the token that this page needs."
         : error instanceof Error
           ? error.message
           : String(error);

@@ -19,7 +19,7 @@ import { toggleTheme } from "./ui/theme.ts";
 type PlaceName = "design" | "configure" | "run" | "look";
 const placeNames: Record<PlaceName, string> = { design: "Design", configure: "Configure", run: "Run", look: "Look" };
 
-/** The page's frame: bar, places, status line; opening and saving. */
+/** The frame of the page: bar, places, status line; opening and saving. */
 export class Shell {
   private document = new ScenarioDocument();
   private file: ScenarioFile;
@@ -65,11 +65,11 @@ export class Shell {
     this.app.replaceChildren(this.bar(), stack, this.status());
     this.shortcuts();
     this.document.changed.watch(() => this.showDocument());
-    // The page itself replaces the address without this event: somebody has typed another one.
+    // The page replaces the address without this event, so that the user has entered another address.
     addEventListener("hashchange", () => location.reload());
   }
 
-  /** Opens what the address or the command line names. */
+  /** Opens the file of the address or of the command line. */
   async begin(): Promise<void> {
     const address = readAddress(location.hash);
     const { opened } = this.session;
@@ -144,12 +144,12 @@ export class Shell {
           ? "connected"
           : state === "gone"
             ? "the server does not answer; trying again"
-            : "the server was started anew: open the address that it printed",
+            : "the server was restarted; open the address that it printed",
       );
     });
     let before = connection.value;
     connection.listen((state) => {
-      if (before === "gone" && state === "there") say("The server is there again");
+      if (before === "gone" && state === "there") say("The server answers again");
       before = state;
     });
     return h(
@@ -268,7 +268,7 @@ export class Shell {
     return this.file.saveAs();
   }
 
-  /** The path of the scenario once it is saved, or null. */
+  /** Saves the scenario; returns its path, or null if it was not saved. */
   private async saved(): Promise<string | null> {
     await this.document.revision.settled.catch(() => undefined);
     if ((this.document.dirty || this.document.path === null) && !(await this.save())) return null;
@@ -281,7 +281,7 @@ export class Shell {
     void this.configure.reveal(where);
   }
 
-  /** Runs what the page shows, or says why that cannot be. */
+  /** Runs the scenario, or reports why it cannot run. */
   private async startRun(): Promise<void> {
     commitTyping();
     await this.document.revision.checked;

@@ -84,14 +84,14 @@ class Recordings(Cli):
         room = SCENES / "room.yaml"
         slow = self.simulate(*short, "--set", "sampling={type: adaptive}", scenario=room)
         self.assertEqual(slow.returncode, 0, slow.stderr)
-        self.assertRegex(slow.stderr, r"hint: .*Flow sampling .*: esim simulate \S+room.yaml --set 'sampling=\{type: flow\}'")
+        self.assertRegex(slow.stderr, r"hint: .*flow sampling .*: esim simulate \S+room.yaml --set 'sampling=\{type: flow\}'")
         for other in (["--set", "sampling={type: flow}"], ["--set", "sampling={type: adaptive}", "--quiet"]):
             self.assertNotIn("hint:", self.simulate(*short, *other, scenario=room).stderr)
 
     def test_samples_held_to_the_maximum_rate_are_reported(self):
         result = self.simulate(*FAST, "--set", "sampling={type: flow, lambda: 0.1, max_rate_hz: 100}")
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertRegex(result.stderr, r"warning: cam0: \d+ intervals between samples were held to sampling.max_rate_hz "
+        self.assertRegex(result.stderr, r"warning: cam0: \d+ intervals between samples were limited by sampling.max_rate_hz "
                                         r"\(100 Hz\)")
 
     def test_a_recording_holds_what_the_manual_says(self):
@@ -253,10 +253,10 @@ class BadInput(Cli):
             "camera.width=0": "at least 1",
             "duration_s=-1": "above 0",
             "truth.rate_hz=-1": "at least 0",
-            "truth={rate_hz: 0, displacement: true}": "joins two frames",
+            "truth={rate_hz: 0, displacement: true}": "needs two frames",
             "renderer.image=none.jpg": "no such file",
             "trajectory={type: file, path: none.txt}": "none.txt",
-            "renderer.pose.look_at=[-5, 0, 0]": "sees nothing",
+            "renderer.pose.look_at=[-5, 0, 0]": "never sees",
             "renderer={type: mesh, scene: none.obj}": "no such file",
             "camera={calibration: none.yaml}": "no such file",
             "output.compression=zip": "is not one of",
@@ -264,7 +264,7 @@ class BadInput(Cli):
         for setting, message in cases.items():
             with self.subTest(setting):
                 arguments = ["--set", setting]
-                if message == "sees nothing":
+                if message == "never sees":
                     arguments += ["--set", "renderer.pose.position=[-6, 0, 0]"]
                 self.assert_refused(self.simulate(*arguments), message)
 

@@ -141,7 +141,7 @@ frame_camera: {rate_hz: 20, bits: 16}
 
     def test_colour_is_refused_where_it_cannot_be(self):
         colour = ["--set", "camera.colour=rggb"]
-        self.assert_refused(run("check", SCENES / "sprites.yaml", *FAST, *colour), "camera cam0: colour", "grey only")
+        self.assert_refused(run("check", SCENES / "sprites.yaml", *FAST, *colour), "camera cam0: colour", "luminance only")
         self.assert_refused(run("check", SCENES / "poster.yaml", *FAST, *colour, "--set", "sampling={type: keyframes}"),
                             "camera cam0: sampling: keyframes", "colour: none")
         self.assert_refused(run("check", SCENES / "poster.yaml", *FAST, "--set", "camera.colour=bayer"), "rggb")
@@ -174,7 +174,7 @@ frame_camera: {rate_hz: 20, bits: 16}
 
     def test_says_so_where_no_frame_fits(self):
         result = run("check", SCENES / "poster.yaml", "--set", "duration_s=0.02", "--set", "frame_camera={rate_hz: 30}")
-        self.assertIn("no exposure lies wholly within the simulated time, 0.02 s", result.stderr)
+        self.assertIn("no exposure fits into the simulated time, 0.02 s", result.stderr)
 
 
 if __name__ == "__main__":

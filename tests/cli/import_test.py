@@ -80,7 +80,7 @@ class Import(ProgramTest):
         target = self.folder / "a.glb"
         target.write_text("mine")
         self.assert_refused(self.esim("import", scene), "exists", "--force")
-        self.assert_refused(self.esim("import", scene, "--out", self.folder / "b.obj"), "end it in .glb")
+        self.assert_refused(self.esim("import", scene, "--out", self.folder / "b.obj"), "must end in .glb")
         self.assertEqual(target.read_text(), "mine")
 
     @unittest.skipUnless(BLENDER, "there is no blender; apt install blender")

@@ -404,7 +404,7 @@ class Refusals(StudioTest):
             problems = {p["where"]: p["what"] for p in self.server.json("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]}
             if "up/" in yaml and not (self.work / "up").exists():
                 continue
-            self.assertIn("outside the folders", problems.get(where, ""), (yaml, problems))
+            self.assertIn("must be in one of the folders", problems.get(where, ""), (yaml, problems))
 
     def test_nonsense(self):
         for data in (b"", b"\r\n\r\n", b"\0" * 5000, b"GET", b"GET / HTTP/9.9\r\n\r\n", b"GET /%zz HTTP/1.1\r\n\r\n", bytes(range(256)) * 100,
@@ -492,7 +492,7 @@ class Lives(ProgramTest):
             taken.bind(("127.0.0.1", 0))
             taken.listen()
             port = taken.getsockname()[1]
-            self.assert_refused(run("studio", self.work, "--port", port, "--page", self.page()), str(port), "another program has it")
+            self.assert_refused(run("studio", self.work, "--port", port, "--page", self.page()), str(port), "in use by another program")
         first, second = self.server(self.work), self.server(self.work)
         self.assertNotEqual(first.port, second.port)
 

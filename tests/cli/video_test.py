@@ -110,7 +110,7 @@ class Video(ProgramTest):
             result = self.video("--fps", "50", out=out)
             self.assertEqual(result.returncode, 2)
             self.assertIn("frame 4 (4.pgm): is 63 x 48 px", result.stderr)
-            self.assertIn("the 4 frames before it are converted", result.stderr)
+            self.assertIn("the 4 frames before this error are kept", result.stderr)
             self.assertIn("interrupted", run("info", out).stdout)
         report = json.loads((self.out / "report.json").read_text())
         self.assertEqual(report["frames"], 4)

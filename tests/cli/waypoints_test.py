@@ -85,24 +85,24 @@ class Waypoints(ProgramTest):
     def test_in_a_terminal(self):
         self.write_scenario("{type: mesh, scene: scenes/room/room.obj}", "{position: [1, -1, 1.4], look_at: [-1, 1, 1]}")
         session = Session(self.scenario, "--out", self.walk)
-        first = session.wait_for(rb"1\.00 -1\.00 1\.40 m .* 0 way points")
+        first = session.wait_for(rb"1\.00 -1\.00 1\.40 m .* 0 waypoints")
         self.assertIn("\u2580".encode(), first)
         self.assertRegex(first, rb"\033\[38;2;\d+;\d+;\d+m")
         session.press(b" ")
-        session.wait_for(rb"1 way point\b")
+        session.wait_for(rb"1 waypoint\b")
         self.assertEqual(self.points(), 1, "written at once")
         session.press(b"wwww\033[C\033[C ")
-        session.wait_for(rb"2 way points")
+        session.wait_for(rb"2 waypoints")
         session.press(b"dddd\033[C ")
-        session.wait_for(rb"3 way points")
+        session.wait_for(rb"3 waypoints")
         session.press(b"ww ")
-        session.wait_for(rb"4 way points")
+        session.wait_for(rb"4 waypoints")
         session.press(b"u")
-        session.wait_for(rb"3 way points")
+        session.wait_for(rb"3 waypoints")
         session.press(b"?")
         session.wait_for(rb"drop a waypoint")
         session.press(b"w")
-        session.wait_for(rb"3 way points")
+        session.wait_for(rb"3 waypoints")
         session.press(b"p")
         session.wait_for(rb"walk\.1\.png")
         session.press(b"t")
@@ -114,7 +114,7 @@ class Waypoints(ProgramTest):
         self.assertEqual(status, 0, message)
         self.assertEqual(self.points(), 3)
         self.assertEqual((self.folder / "walk.1.png").read_bytes()[16:24], struct.pack(">II", 64, 48))
-        self.assertIn("3 way points", message)
+        self.assertIn("3 waypoints", message)
 
         # What it prints takes the place of the scenario's own lines.
         lines = printed.replace("\r", "").strip().splitlines()
@@ -132,12 +132,12 @@ class Waypoints(ProgramTest):
 
     def test_the_screen_follows_its_size_and_colours(self):
         session = Session(self.scenario, "--out", self.walk, environment={"COLORTERM": ""})
-        first = session.wait_for(rb"0 way points")
+        first = session.wait_for(rb"0 waypoints")
         self.assertRegex(first, rb"\033\[38;5;\d+m")
         self.assertNotRegex(first, rb"\033\[38;2;")
         self.assertEqual(first.count("\u2580".encode()), 22 * 59, "as large as fits, in the camera's proportions")
         fcntl.ioctl(session.terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 12, 80, 0, 0))
-        second = session.wait_for(rb"0 way points")
+        second = session.wait_for(rb"0 waypoints")
         self.assertEqual(second.count("\u2580".encode()), 10 * 27)
         session.press(b"\033")
         self.assertEqual(session.end()[0], 0)
@@ -146,7 +146,7 @@ class Waypoints(ProgramTest):
     def test_the_terminal_is_restored_whatever_happens(self):
         for number, expected in ((signal.SIGINT, 130), (signal.SIGTERM, 130), (signal.SIGHUP, 130), (signal.SIGSEGV, -signal.SIGSEGV)):
             session = Session(self.scenario, "--out", self.walk, "--append")
-            session.wait_for(rb"\d way point")
+            session.wait_for(rb"\d waypoint")
             session.press(b"w ")
             session.wait_for(rb"walk\.yaml")
             session.process.send_signal(number)
@@ -160,7 +160,7 @@ class Waypoints(ProgramTest):
         folder = self.folder / "later"
         folder.mkdir()
         session = Session(self.scenario, "--out", folder / "walk.yaml")
-        session.wait_for(rb"0 way points")
+        session.wait_for(rb"0 waypoints")
         folder.rmdir()
         session.press(b" ")  # cannot be written
         status, _, message = session.end()
@@ -213,7 +213,7 @@ class Waypoints(ProgramTest):
     def test_bad_input(self):
         self.assert_refused(run("waypoints", self.scenario, "--out", self.walk, stdin=subprocess.DEVNULL), "terminal", "--keys")
         self.assert_refused(run("waypoints", self.scenario, "--out", self.walk, "--keys", "wz"), "'z' is not a key")
-        self.assert_refused(run("waypoints", self.scenario, "--out", self.folder / "none" / "walk.yaml", "--keys", "x"), "no folder")
+        self.assert_refused(run("waypoints", self.scenario, "--out", self.folder / "none" / "walk.yaml", "--keys", "x"), "does not exist")
         self.assert_refused(run("waypoints", self.folder / "none.yaml", "--out", self.walk, "--keys", "x"), "none.yaml")
         self.assert_refused(run("waypoints", self.folder / "none.glb", "--out", self.walk, "--keys", "x"), "none.glb")
         self.assert_refused(run("waypoints", SCENES / "sprites.yaml", "--out", self.walk, "--keys", "x"), "drawn on the sensor")

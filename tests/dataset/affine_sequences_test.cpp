@@ -138,8 +138,8 @@ TEST(AffineSequences, RefuseWhatIsImpossible) {
   EXPECT_TRUE(test::contains(problem([](auto& o) { o.duration_s = NAN; }), "duration"));
   EXPECT_TRUE(test::contains(problem([](auto& o) { o.contrast_threshold = {0.5, 0.2}; }), "from 0.5 to 0.2"));
   EXPECT_TRUE(test::contains(problem([](auto& o) { o.mix.translation = 0; }), "translation"));
-  EXPECT_TRUE(test::contains(problem([](auto& o) { o.flow_scale = -1; }), "times -1"));
-  EXPECT_TRUE(test::contains(problem([](auto& o) { o.images = "/nowhere"; }), "/nowhere: is no folder"));
+  EXPECT_TRUE(test::contains(problem([](auto& o) { o.flow_scale = -1; }), "scale of -1"));
+  EXPECT_TRUE(test::contains(problem([](auto& o) { o.images = "/nowhere"; }), "/nowhere: must be a folder"));
 }
 
 class Images : public testing::Test {
@@ -153,7 +153,7 @@ class Images : public testing::Test {
 
 TEST_F(Images, AreTakenInTurnAndTheUnusablePassedOver) {
   write("a.png", 100, 80, 10);
-  folder_.write("b.png", "this is no image");
+  folder_.write("b.png", "this is not an image");
   write("c.png", 20, 200);
   write("deep/d.jpg", 64, 64, 200);
   folder_.write("notes.txt", "not looked at");
@@ -177,9 +177,9 @@ TEST_F(Images, AreTakenInTurnAndTheUnusablePassedOver) {
 
 TEST_F(Images, AreRefusedWhereNoneIsLeft) {
   const auto problem = [&] { return test::message_of<UserError>([&] { ImageFolder(folder_.path()).pick(0); }); };
-  EXPECT_TRUE(test::contains(problem(), "holds no image"));
-  folder_.write("b.png", "this is no image");
-  EXPECT_TRUE(test::contains(problem(), "none of its 1 images can be used; for one, image"));
+  EXPECT_TRUE(test::contains(problem(), "has no images"));
+  folder_.write("b.png", "this is not an image");
+  EXPECT_TRUE(test::contains(problem(), "none of its 1 images can be used, for example: image"));
 }
 
 TEST_F(Images, ChangeTheFingerprint) {

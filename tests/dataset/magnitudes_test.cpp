@@ -59,16 +59,16 @@ TEST_F(MagnitudeFile, IsReadAndNormalised) {
 }
 
 TEST_F(MagnitudeFile, SaysWhatIsWrongAndWhere) {
-  EXPECT_TRUE(test::contains(problem("0 1 3\n2 3 1\n"), "histogram.txt:2: begins at 2 px, but must go on at 1"));
-  EXPECT_TRUE(test::contains(problem("1 2 3\n"), "must go on at 0"));
+  EXPECT_TRUE(test::contains(problem("0 1 3\n2 3 1\n"), "histogram.txt:2: LOW is 2 px, but must continue at 1"));
+  EXPECT_TRUE(test::contains(problem("1 2 3\n"), "must continue at 0"));
   EXPECT_TRUE(test::contains(problem("0 1\n"), "three numbers"));
   EXPECT_TRUE(test::contains(problem("0 1 2 3\n"), "three numbers"));
   EXPECT_TRUE(test::contains(problem("0 x 2\n"), "three numbers"));
-  EXPECT_TRUE(test::contains(problem("0 0 2\n"), "ends at 0 px"));
+  EXPECT_TRUE(test::contains(problem("0 0 2\n"), "HIGH is 0 px"));
   EXPECT_TRUE(test::contains(problem("0 nan 2\n"), "three numbers"));
-  EXPECT_TRUE(test::contains(problem("0 1 -2\n"), "no share"));
-  EXPECT_TRUE(test::contains(problem("0 1 0\n"), "no weight"));
-  EXPECT_TRUE(test::contains(problem(""), "no weight"));
+  EXPECT_TRUE(test::contains(problem("0 1 -2\n"), "WEIGHT is -2"));
+  EXPECT_TRUE(test::contains(problem("0 1 0\n"), "a weight above 0"));
+  EXPECT_TRUE(test::contains(problem(""), "a weight above 0"));
   EXPECT_TRUE(test::contains(test::message_of<UserError>([] { read_magnitudes("/nowhere"); }), "cannot be read"));
 }
 

@@ -251,7 +251,7 @@ TEST(DatasetFolder, RefusesWhatIsAnotherDataset) {
   };
   DatasetFolder(out, plan, "1.0");
   EXPECT_EQ(problem(plan, "1.0"), "nothing was thrown");
-  EXPECT_TRUE(test::contains(problem(plan, "1.1"), "was begun by esim 1.0, this is 1.1"));
+  EXPECT_TRUE(test::contains(problem(plan, "1.1"), "begun by esim 1.0, but this is esim 1.1"));
   DatasetPlan more = plan;
   more.count = 24;
   EXPECT_TRUE(test::contains(problem(more, "1.0"), "sequences is 23 there, but 24 here"));
@@ -265,9 +265,9 @@ TEST(DatasetFolder, RefusesWhatIsAnotherDataset) {
   fs::create_directories(folder.path() / "other");
   std::ofstream(folder.path() / "other" / "thesis.tex") << "x";
   const auto other = test::message_of<UserError>([&] { DatasetFolder(folder.path() / "other", plan, "1.0"); });
-  EXPECT_TRUE(test::contains(other, "is no dataset"));
+  EXPECT_TRUE(test::contains(other, "must be a dataset"));
   EXPECT_TRUE(
-      test::contains(test::message_of<UserError>([&] { DatasetFolder(folder.path() / "none"); }), "no dataset"));
+      test::contains(test::message_of<UserError>([&] { DatasetFolder(folder.path() / "none"); }), "is not a dataset"));
 }
 
 }  // namespace

@@ -33,17 +33,17 @@ TEST(Randomise, SaysWhatIsWrongAndWhere) {
   const auto problem = [](const std::string& distribution) {
     return test::message_of<UserError>([&] { read_template("randomise:\n  a.b: " + distribution, "t.yaml"); });
   };
-  EXPECT_TRUE(test::contains(problem("{uniform: [2, 1]}"), "t.yaml:2: randomise.a.b: 2 is above 1"));
+  EXPECT_TRUE(test::contains(problem("{uniform: [2, 1]}"), "t.yaml:2: randomise.a.b: LOW is 2"));
   EXPECT_TRUE(test::contains(problem("{uniform: [1]}"), "two numbers, [LOW, HIGH]"));
   EXPECT_TRUE(test::contains(problem("{uniform: [a, b]}"), "two numbers"));
   EXPECT_TRUE(test::contains(problem("{uniform: [0, .inf]}"), "two numbers"));
-  EXPECT_TRUE(test::contains(problem("{log_uniform: [0, 1]}"), "0 is below"));
-  EXPECT_TRUE(test::contains(problem("{normal: [0, -1]}"), "standard deviation of -1"));
+  EXPECT_TRUE(test::contains(problem("{log_uniform: [0, 1]}"), "LOW is 0"));
+  EXPECT_TRUE(test::contains(problem("{normal: [0, -1]}"), "DEVIATION is -1"));
   EXPECT_TRUE(test::contains(problem("{integer: [0.5, 1]}"), "two numbers"));
   EXPECT_TRUE(test::contains(problem("{choice: []}"), "at least one"));
-  EXPECT_TRUE(test::contains(problem("{gaussian: [0, 1]}"), "gaussian is no distribution; use uniform"));
-  EXPECT_TRUE(test::contains(problem("0.5"), "must be one of uniform"));
-  EXPECT_TRUE(test::contains(problem("{uniform: [0, 1], normal: [0, 1]}"), "must be one of"));
+  EXPECT_TRUE(test::contains(problem("{gaussian: [0, 1]}"), "unknown distribution 'gaussian'; use uniform"));
+  EXPECT_TRUE(test::contains(problem("0.5"), "must be a map with one key of uniform"));
+  EXPECT_TRUE(test::contains(problem("{uniform: [0, 1], normal: [0, 1]}"), "one key of"));
   EXPECT_TRUE(test::contains(test::message_of<UserError>([] { read_template("a: [", "t.yaml"); }), "t.yaml:"));
   EXPECT_TRUE(test::contains(test::message_of<UserError>([] { read_template("randomise: 3", "t.yaml"); }), "a map"));
 }

@@ -306,7 +306,7 @@ class Stored(Temporary):
             if "flow" in contents:
                 np.testing.assert_array_equal(esim.torch.EventTensorDataset(folder, target="flow")[4][1], sequences[4]["flow"])
             else:
-                with self.assertRaisesRegex(esim.Error, "holds no flow"):
+                with self.assertRaisesRegex(esim.Error, "has no flow"):
                     esim.torch.EventTensorDataset(folder, target="flow")[0]
 
     @unittest.skipUnless("ESIM_PROGRAM" in os.environ, "needs the program, as ESIM_PROGRAM")
@@ -339,7 +339,7 @@ class Stored(Temporary):
             (folder / "dataset.json").write_text('{"sequences": 3}')
             with self.assertRaisesRegex(esim.Error, "dataset.json is damaged"):
                 esim.torch.EventTensorDataset(folder)
-        with self.assertRaisesRegex(esim.Error, "there is no dataset"):
+        with self.assertRaisesRegex(esim.Error, "is not a dataset"):
             esim.torch.EventTensorDataset(self.folder)
         with self.assertRaises(ValueError):
             esim.torch.EventTensorDataset(self.folder, target="depth")

@@ -79,7 +79,7 @@ TEST_F(SceneFile, RefusesWhatIsCutOffOrAbsurd) {
   const std::string layer = "ball.png 0 0 0 0 0 0 0 0 1 1 1 1\n";
   EXPECT_TRUE(contains(error(""), "s.scene:0: ends where the width should follow"));
   EXPECT_TRUE(contains(error("346 260"), "s.scene:1: ends where the duration should follow"));
-  EXPECT_TRUE(contains(error("346 260 1\n"), "no layers follow"));
+  EXPECT_TRUE(contains(error("346 260 1\n"), "layers are missing"));
   EXPECT_TRUE(contains(error("346 260 1\nball.png 0 0 0 0 0 0 0 0 1 1 1\n"), "s.scene:2: ends where a scale"));
   EXPECT_TRUE(contains(error("100000 100000 1\n" + layer), "s.scene:1: the width is '100000'"));
   EXPECT_TRUE(contains(error("346 0 1\n" + layer), "the height is '0'"));
@@ -93,8 +93,8 @@ TEST_F(SceneFile, RefusesWhatIsCutOffOrAbsurd) {
   EXPECT_TRUE(contains(error("346 260 1\nball.png 0 -1 0 0 0 0 0 0 1 1 1 1\n"), "the blur is '-1'"));
   EXPECT_TRUE(contains(error("346 260 1\nball.png 1e9 0 0 0 0 0 0 0 1 1 1 1\n"), "median"));
   EXPECT_TRUE(contains(error("346 260 1\nball.png 0 0 0 ball.png 0 0 0 0 1 1 1 1\n"), "a rotation is 'ball.png'"));
-  EXPECT_TRUE(contains(error(std::string("\x89PNG\0\0", 6)), "is not a .scene file"));
-  EXPECT_TRUE(contains(error(std::string(2'000'000, '1')), "is not a .scene file"));
+  EXPECT_TRUE(contains(error(std::string("\x89PNG\0\0", 6)), "must be a .scene file"));
+  EXPECT_TRUE(contains(error(std::string(2'000'000, '1')), "must be a .scene file"));
   EXPECT_TRUE(contains(test::message_of<UserError>([&] { read_sprite_scene(folder_.path() / "no.scene", {}); }),
                        "no such file"));
   EXPECT_TRUE(contains(test::message_of<UserError>([&] { read_sprite_scene(folder_.path(), {}); }), "no such file"));

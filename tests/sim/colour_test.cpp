@@ -152,12 +152,12 @@ TEST_F(ColourCamera, IsRefusedByWhatShowsGreyOnly) {
   SpritesRendererOptions sprites;
   sprites.layers.emplace_back().image = folder_.path() / "paint.png";
   scenario_.renderer = sprites;
-  EXPECT_TRUE(test::contains(refusal(), "camera cam0: colour: the renderer sprites shows grey only"));
+  EXPECT_TRUE(test::contains(refusal(), "camera cam0: colour: the renderer sprites renders luminance only"));
 
   MeshRendererOptions mesh = wall();
   mesh.engine = MeshEngine::gl;
   scenario_.renderer = mesh;
-  EXPECT_TRUE(test::contains(refusal(), "camera cam0: colour: engine: gl shows grey only; use engine: raycast"));
+  EXPECT_TRUE(test::contains(refusal(), "camera cam0: colour: engine: gl renders luminance only; use engine: raycast"));
   mesh.engine = MeshEngine::automatic;
   scenario_.renderer = mesh;
   EXPECT_EQ(refusal(), "nothing was thrown");

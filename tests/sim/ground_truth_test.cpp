@@ -183,7 +183,8 @@ TEST_F(GroundTruth, OfAStereoPairObeysTheEpipolarConstraint) {
 TEST_F(GroundTruth, SaysWhyItCannotBeHad) {
   scenario_.truth.displacement = true;
   scenario_.truth.rate_hz = 0;
-  EXPECT_TRUE(test::contains(error(), "truth.displacement: joins two frames of ground truth, but rate_hz = 0 gives 0"));
+  EXPECT_TRUE(
+      test::contains(error(), "truth.displacement: needs two frames of ground truth, but truth.rate_hz = 0 gives 0"));
   scenario_.truth.rate_hz = 4;
   EXPECT_TRUE(test::contains(error(), "rate_hz = 4 gives 1 in 0.2 s; raise truth.rate_hz"));
   scenario_.truth.rate_hz = 5;
@@ -199,7 +200,7 @@ TEST_F(GroundTruth, SaysWhyItCannotBeHad) {
   PanoramaRendererOptions panorama;
   panorama.image = folder_.path() / "sky.pgm";
   scenario_.renderer = panorama;
-  EXPECT_TRUE(test::contains(error(), "truth.event_points: all that panorama shows is infinitely far"));
+  EXPECT_TRUE(test::contains(error(), "truth.event_points: needs finite depth, but everything in panorama"));
 
   scenario_.truth = {};
   scenario_.truth.displacement = true;

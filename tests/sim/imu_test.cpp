@@ -225,7 +225,7 @@ TEST_F(ImuSimulation, WithoutAnImuTheFirstCameraIsTheReference) {
 TEST_F(ImuSimulation, NamesThePoseThatIsNone) {
   scenario_.imu->T_body_imu.quaternion = Eigen::Vector4d::Zero();
   const auto message = [&] { return test::message_of<UserError>([&] { build_world(scenario_, 1, kQuiet); }); };
-  EXPECT_TRUE(test::contains(message(), "imu.T_body_imu: quaternion [0, 0, 0, 0]"));
+  EXPECT_TRUE(test::contains(message(), "imu.T_body_imu: quaternion must not be [0, 0, 0, 0]"));
   scenario_.imu.reset();
   scenario_.cameras[1].T_body_camera.quaternion = Eigen::Vector4d::Zero();
   EXPECT_TRUE(test::contains(message(), "camera right: T_body_camera: quaternion"));

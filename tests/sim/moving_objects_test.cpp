@@ -99,14 +99,15 @@ TEST_F(MovingObjects, AreRefusedWhereTheirMotionIsNot) {
   std::get<FileTrajectoryOptions>(mesh().objects[0].trajectory).path.clear();
   EXPECT_TRUE(test::contains(error(), "renderer.objects.0.trajectory.path: is missing"));
   mesh().objects.push_back(mesh().objects[0]);
-  EXPECT_TRUE(test::contains(error(), "renderer.objects.1.name: another object is named card too"));
+  EXPECT_TRUE(
+      test::contains(error(), "renderer.objects.1.name: must be unique, but another object is also named card"));
   mesh().objects.clear();
   mesh().objects.resize(1);
   mesh().objects[0].trajectory = StaticTrajectoryOptions{};
   EXPECT_TRUE(test::contains(error(), "renderer.objects.0.scene: is missing"));
   mesh().objects.clear();
   mesh().lighting = LambertOptions{0.2, {{{0, 0, 0}, 1.0}}, {}, false};
-  EXPECT_TRUE(test::contains(error(), "renderer.lighting.suns: [0, 0, 0] is no direction"));
+  EXPECT_TRUE(test::contains(error(), "renderer.lighting.suns: direction must not be [0, 0, 0]"));
 }
 
 }  // namespace

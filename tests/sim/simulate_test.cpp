@@ -207,7 +207,7 @@ TEST_F(Simulation, RefusesWhatCannotBeSimulated) {
   behind.pose.position = {-5, 0, 0};
   behind.pose.look_at = Eigen::Vector3d(0, 0, 0);
   scenario_.renderer = behind;
-  EXPECT_TRUE(test::contains(error(), "sees nothing"));
+  EXPECT_TRUE(test::contains(error(), "never sees"));
   behind.median_px = 2;
   scenario_.renderer = behind;
   EXPECT_TRUE(test::contains(error(), "must be an odd number"));

@@ -68,15 +68,16 @@ TEST_F(SpritesScenario, NeedsNoTrajectoryAndEndsWithItsKeyframes) {
 TEST_F(SpritesScenario, SaysWhatHasNoEffect) {
   build(std::string(kMoving) +
         "trajectory: {type: random}\ncamera: {distortion: {type: radial-tangential, k1: -0.1}}\n");
-  EXPECT_TRUE(test::contains(warnings_, "trajectory: sprites are drawn on the sensor"));
-  EXPECT_TRUE(test::contains(warnings_, "camera cam0: the lens's distortion has no effect"));
+  EXPECT_TRUE(
+      test::contains(warnings_, "trajectory: has no effect on the images, since sprites are drawn on the sensor"));
+  EXPECT_TRUE(test::contains(warnings_, "camera cam0: distortion has no effect"));
 }
 
 TEST_F(SpritesScenario, NamesTheLayerThatIsWrong) {
   const auto of_layers = [](const std::string& layers) {
     return "duration_s: 1\nrenderer: {type: sprites, layers: [{image: a.png}, " + layers + "]}\n";
   };
-  EXPECT_TRUE(test::contains(error("duration_s: 1\nrenderer: {type: sprites}\n"), "list layers"));
+  EXPECT_TRUE(test::contains(error("duration_s: 1\nrenderer: {type: sprites}\n"), "list sprites"));
   EXPECT_TRUE(test::contains(error("renderer: {type: sprites, layers: [{image: a.png}]}\n"), "duration_s: is missing"));
   EXPECT_TRUE(test::contains(error(of_layers("{}")), "renderer.layers.1.image: is missing"));
   EXPECT_TRUE(test::contains(error(of_layers("{image: b.png}")), "renderer.layers.1: image"));

@@ -53,18 +53,18 @@ TEST(WaypointAim, SaysWhatCannotBeAimed) {
     return test::message_of<UserError>([&] { waypoints_of({looking({0, 0, 0}, {1, 0, 0}), point}, T_body_camera); });
   };
   EXPECT_TRUE(contains(error({}), "points.1: has no orientation"));
-  EXPECT_TRUE(contains(error(looking({1, 1, 1}, {1, 1, 1})), "points.1: look_at is the position itself"));
-  EXPECT_TRUE(contains(error(looking({1, 1, 1}, {1, 1, 5})), "points.1: look_at lies along up"));
+  EXPECT_TRUE(contains(error(looking({1, 1, 1}, {1, 1, 1})), "points.1: look_at must differ from position"));
+  EXPECT_TRUE(contains(error(looking({1, 1, 1}, {1, 1, 5})), "points.1: up must not point along the optical axis"));
   EXPECT_TRUE(contains(error(looking({0, 0, 0}, {0, 0.1, 0.1}), {{}, {0.5, 0, 0}}), "points.1: look_at is 0.141 m"));
   WaypointPointOptions both = looking({0, 0, 0}, {1, 0, 0});
   both.quaternion = Eigen::Vector4d(0, 0, 0, 1);
-  EXPECT_TRUE(contains(error(both), "points.1: a pose has both"));
+  EXPECT_TRUE(contains(error(both), "points.1: quaternion and look_at must not both"));
   WaypointPointOptions no_up = looking({0, 0, 0}, {1, 0, 0}), idle;
   no_up.up = Vector3d::Zero();
-  EXPECT_TRUE(contains(error(no_up), "up is no direction"));
+  EXPECT_TRUE(contains(error(no_up), "up must not be [0, 0, 0]"));
   idle.quaternion = Eigen::Vector4d(0, 0, 0, 1);
   idle.up = Vector3d::UnitZ();
-  EXPECT_TRUE(contains(error(idle), "points.1: up goes with look_at"));
+  EXPECT_TRUE(contains(error(idle), "points.1: up has no effect without look_at"));
 }
 
 class WaypointScenario : public test::CardScene {
@@ -144,13 +144,13 @@ TEST_F(WaypointScenario, SaysWhatIsWrongAndWhere) {
       contains(refused("{type: waypoints, points: [{position: [0, .nan, 0]}]}"), "trajectory.points.0.position"));
   EXPECT_TRUE(contains(refused("{type: waypoints, points: [" + a + ", " + a + "]}"),
                        "trajectory: points.1: has the same pose"));
-  EXPECT_TRUE(contains(refused("{type: waypoints, file: none.yaml}"), "none.yaml: no such file of way points"));
+  EXPECT_TRUE(contains(refused("{type: waypoints, file: none.yaml}"), "none.yaml: no such file of waypoints"));
   folder_.write("one.yaml", "points:\n  - " + a + "\n");
   EXPECT_TRUE(contains(refused("{type: waypoints, file: one.yaml}"), "one.yaml: points: 1 point, but"));
-  EXPECT_TRUE(
-      contains(refused("{type: waypoints, file: one.yaml, points: [" + a + ", " + b + "]}"), "as well; remove one"));
+  EXPECT_TRUE(contains(refused("{type: waypoints, file: one.yaml, points: [" + a + ", " + b + "]}"),
+                       "together with file; remove one"));
   folder_.write("list.yaml", "- " + a + "\n");
-  EXPECT_TRUE(contains(refused("{type: waypoints, file: list.yaml}"), "list.yaml: holds no way points"));
+  EXPECT_TRUE(contains(refused("{type: waypoints, file: list.yaml}"), "list.yaml: has no waypoints"));
   folder_.write("more.yaml", "points:\n  - " + a + "\n  - " + b + "\nspeeed: 1\n");
   EXPECT_TRUE(contains(refused("{type: waypoints, file: more.yaml}"), "more.yaml:4: speeed: unknown key"));
 }

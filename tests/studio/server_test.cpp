@@ -171,7 +171,7 @@ TEST_F(ServerTest, TakesTheNextPortWhereOneIsTaken) {
     const HttpServer same({"127.0.0.1", taken, 1});
     FAIL();
   } catch (const UserError& error) {
-    EXPECT_NE(std::string(error.what()).find("another program has it"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("in use by another program"), std::string::npos) << error.what();
   }
   EXPECT_THROW(HttpServer({"no such host", 0, 1}), UserError);
 }

@@ -150,7 +150,7 @@ TEST_F(UnrealcvSimulation, RefusesWhatItCannotDo) {
     return test::message_of<UserError>([&] { build(wanted); });
   };
   EXPECT_TRUE(test::contains(refusal("camera: {width: 32, height: 24, colour: rggb}\nsampling: {type: flow}\n"),
-                             "unrealcv shows grey only"));
+                             "unrealcv renders luminance only"));
   EXPECT_TRUE(
       test::contains(refusal("camera: {width: 32, height: 24}\nsampling: {type: flow}\ntruth: {event_points: true}\n"),
                      "truth.event_points"));

@@ -12,7 +12,7 @@
 namespace esim {
 namespace {
 
-/// A Blender that was started, and the connection with it, which ends first.
+/// A started Blender and the connection to it, which is destroyed first.
 struct StartedBlender {
   std::unique_ptr<BlenderServer> server;
   std::shared_ptr<UnrealcvClient> client;
@@ -26,12 +26,12 @@ void set_address(const std::string& address, UnrealcvOptions& engine) {
   const auto [rest, error] = std::from_chars(port, end, engine.port);
   if (colon == std::string::npos || colon == 0 || error != std::errc() || rest != end || engine.port < 1 ||
       engine.port > 65535)
-    throw UserError(fmt::format("renderer.address: {} is no HOST:PORT, such as 127.0.0.1:9000", address));
+    throw UserError(fmt::format("renderer.address: must be HOST:PORT, such as 127.0.0.1:9000, not '{}'", address));
   engine.host = address.substr(0, colon);
 }
 
-/// Light paths per pixel. Keyframes are whole times as dense as a sensor, and so many of their pixels are averaged
-/// later: together they have what one of the sensor's has.
+/// Light paths per pixel. A keyframe has k x k pixels per pixel of the sensor, which are averaged later: together they
+/// have as many paths as one pixel of the sensor.
 int samples_for(const Camera& camera, const std::vector<CameraInfo>& sensors, int samples) {
   constexpr int kDensest = 4;
   for (int density = 1; density <= kDensest; ++density) {
@@ -47,7 +47,8 @@ int samples_for(const Camera& camera, const std::vector<CameraInfo>& sensors, in
 RendererFactory start_blender(const BlenderRendererOptions& options, const std::vector<CameraInfo>& sensors,
                               const Notices& notices) {
   if (options.address.empty() && options.scene.empty())
-    throw UserError("renderer.scene: is missing; name a file, or a Blender that serves already in address");
+    throw UserError(
+        "renderer.scene: is missing; name a file, or set renderer.address to a Blender that already serves");
   UnrealcvOptions engine;
   engine.name = "blender";
   engine.timeout_s = options.timeout_s;
@@ -73,7 +74,7 @@ RendererFactory start_blender(const BlenderRendererOptions& options, const std::
                                                       const Workers& workers) {
     if (filters != ColourFilters::none)
       throw UserError(
-          "colour: the renderer blender shows grey only; use a mesh, a plane or a panorama, or colour: none");
+          "colour: the renderer blender renders luminance only; use a mesh, a plane or a panorama, or colour: none");
     return make_unrealcv_renderer(client, camera, workers, samples_for(camera, sensors, samples));
   };
 }

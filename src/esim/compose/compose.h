@@ -17,36 +17,37 @@
 
 namespace esim {
 
-/// Receives one line about something that the user should know but that stops nothing.
+/// Receives one line that the user should know about; the program continues.
 using NoticeHandler = std::function<void(const std::string&)>;
 
-/// Who is told what while a world is built.
+/// The receivers of warnings and notes while a world is built.
 struct Notices {
-  NoticeHandler warning;  ///< something is probably not as meant
+  NoticeHandler warning;  ///< something is probably not as intended
   NoticeHandler note;     ///< something was chosen or measured
 };
 
-/// Passes notices on, and keeps them in `given`, for reports.
+/// Forwards notices, and appends them to `given` for reports.
 Notices keeping(Notices notify, std::vector<std::string>& given);
 
 /// Builds everything that a scenario describes, ready to simulate on `threads` threads (0: every processor). Loads
-/// scenes and trajectories, and checks what can be checked beforehand. Throws UserError for whatever the user can
-/// repair.
+/// scenes and trajectories, and checks everything that can be checked before the simulation. Throws UserError for
+/// problems that the user can repair.
 World build_world(const Scenario& scenario, int threads, const Notices& notices);
 
-/// The same for a body that moves as `body`, of which only the beginning may be known yet, whatever the scenario's
-/// trajectory. The scenario needs a duration_s.
+/// The same for a body that moves along `body` instead of the scenario's trajectory. Only the beginning of `body` may
+/// be known yet. The scenario needs a duration_s.
 World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> body, int threads,
                   const Notices& notices);
 
-/// What stands in place of what a scenario says, where it is set.
+/// Parts that replace those of a scenario, if set.
 struct Substitutes {
-  std::shared_ptr<const Trajectory> body;  ///< known from its start to its end
+  std::shared_ptr<const Trajectory> body;  ///< completely known
 
-  /// Beside it, the scenario's renderer counts for nothing: neither its scenes nor its objects.
+  /// Replaces the scenario's renderer, with its scenes and objects.
   std::function<std::unique_ptr<Renderer>(const Camera& camera)> make_renderer;
 
-  /// Of make_renderer's: what moves, in the order of RenderRequest::objects. Trajectories cover the simulated time.
+  /// A moving object of make_renderer's renderers, in the order of RenderRequest::objects. Trajectories cover the
+  /// simulated time.
   struct Object {
     std::string name;
     std::shared_ptr<const Trajectory> trajectory;
@@ -54,99 +55,95 @@ struct Substitutes {
   std::vector<Object> objects;
 };
 
-/// The same with substitutes. Throws UserError where the scenario asks for what a renderer of somebody else cannot do.
+/// The same with substitutes. Throws UserError if the scenario has an option that custom renderers do not support.
 World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices);
 
-/// What the scene files of a scenario's renderer hold: a mesh renderer's scene with all its objects, those that the
-/// scenario lists after the scene file's own; of what Blender renders, the cameras, where the trajectory follows one.
-/// Empty for renderers without scene files. Notes say what was found.
+/// The contents of the scene files of a scenario's renderer: for a mesh renderer, the objects of the scene file
+/// followed by those that the scenario lists; for Blender, only the cameras, and only if the trajectory follows one.
+/// Empty for renderers without scene files. Notes describe the contents.
 SceneFile load_scenes(const Scenario& scenario, SceneLook look, const Notices& notices);
 
 /// The motion of the body that a scenario describes.
 std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const SceneFile& scene,
                                                    const Notices& notices);
 
-/// The part of the body's trajectory that a scenario simulates. Throws UserError where it is not within it.
+/// The part of the body's trajectory that a scenario simulates. Throws UserError if the trajectory does not cover it.
 TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory);
 
-/// The camera of the scene file that the scenario's trajectory follows; null for trajectories from elsewhere. Throws
-/// UserError naming those that there are.
+/// The camera of the scene file that the scenario's trajectory follows; null for trajectories of other types. Throws
+/// UserError with the names of the cameras in the file.
 const SceneCamera* followed_camera(const Scenario& scenario, const SceneFile& scene);
 
-/// A camera as it is recorded: its field of view is that of the scene's camera, where it follows one (null: none) and
-/// says nothing itself.
+/// A camera as it is recorded. If its options give no field of view, it has that of the followed camera (may be null).
 CameraInfo camera_info(CameraOptions options, const SceneCamera* followed);
 
-/// The motions of the moving objects that a scenario's renderer shows, in the order in which the renderer wants them.
-/// All cover `simulated`; what has no duration of its own, and the scene file's animation, begin with the body's
-/// trajectory. What is animated in the scene file rests after its animation's end.
+/// The motions of the moving objects that a scenario's renderer shows, in the renderer's order. All cover `simulated`.
+/// Trajectories that do not define a duration, and the scene file's animation, begin with the body's trajectory. After
+/// the end of its animation, an object of the scene file rests.
 std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const Scenario& scenario,
                                                                          const SceneFile& scene, const Trajectory& body,
                                                                          const TimeSpan& simulated,
                                                                          const Notices& notices);
 
-/// Makes the renderers of a scenario's cameras; what they show is loaded once and shared. Throws UserError for filters
-/// that the renderer cannot look through.
+/// Makes the renderers of a scenario's cameras, which share one loaded scene. Throws UserError for colour filters that
+/// the renderer does not support.
 using RendererFactory =
     std::function<std::unique_ptr<Renderer>(const Camera& camera, ColourFilters filters, const Workers& workers)>;
 
-/// Cameras may have colour filters if `colour`. Renderers are made for the sensors, and for cameras that are denser.
+/// Cameras may have colour filters if `colour`. Renderers are made for the sensors and for supersampled keyframes.
 RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene, bool colour,
                                        const std::vector<CameraInfo>& sensors, const Notices& notices);
 
-/// Starts Blender, which runs as long as any renderer of the factory's, or finds the one that runs already.
+/// Starts Blender, which runs as long as any renderer of the factory, or connects to a running one.
 RendererFactory start_blender(const BlenderRendererOptions& options, const std::vector<CameraInfo>& sensors,
                               const Notices& notices);
 
-/// Gives a world with cameras the ground truth that its scenario asks for. Throws UserError where that cannot be had.
+/// Sets up the ground truth of a world with cameras. Throws UserError if the renderer cannot provide it.
 void prepare_truth(const Scenario& scenario, const SceneFile& scene, const RendererFactory& make_renderer,
                    const Notices& notices, World& world);
 
-/// Throws UserError for formats that a scenario asks for and that there are not.
+/// Throws UserError for unknown names in output.formats.
 void check_output(const Scenario& scenario);
 
-/// The files of a recording, to be written into `folder`: those of the rig at its top, those of a camera in a folder of
-/// its name.
+/// The files of a recording in `folder`: the files of the rig at its top, those of each camera in a folder of its name.
 std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem::path& folder);
 
-/// The files of a converted video, to be written into `folder`, likewise.
+/// The files of a converted video in `folder`.
 std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& folder);
 
 /// One file of a format.
 std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& file, const Format& format);
 
-/// report.json: what was done, at which cost, where the time went, and the notices given on the way.
+/// The text of report.json: results, cost, time by stage, and notices.
 std::string report_json(const Scenario& scenario, const Summary& summary, int threads,
                         const std::vector<std::string>& notices);
 
-/// What a simulation, or a conversion, left out or missed: events that the readout dropped or that waited for it,
-/// samples held to the maximum rate, a tolerance that was not met. One line each, with the option that governs it; none
-/// where everything is as asked for.
+/// Losses of a simulation or a conversion: events that the readout dropped or delayed, samples limited by the maximum
+/// rate, a tolerance that was not met. One line each, with the option that controls it.
 std::vector<std::string> losses(const Scenario& scenario, const Summary& summary);
 std::vector<std::string> losses(const ConversionOptions& options, const ConversionSummary& summary);
 
-/// What would have been faster, one line each: flow sampling, where adaptive sampling of a mesh was slower than real
-/// time because of rendering.
+/// Faster alternatives, one line each: flow sampling, if adaptive sampling of a mesh was slower than real time because
+/// of rendering.
 std::vector<std::string> hints(const Scenario& scenario, const Summary& summary);
 
-/// How a recording is made.
+/// Options of make_recording().
 struct RecordingOptions {
   std::filesystem::path out{};  ///< the recording's folder
-  bool replace = false;         ///< what is there already
+  bool replace = false;         ///< an existing recording
   int threads = 0;              ///< 0: every processor
 
-  std::unique_ptr<Sink> beside{};  ///< sees all that is recorded, where set
+  std::unique_ptr<Sink> beside{};  ///< if set, receives every record too
 };
 
-/// Simulates a scenario into a recording's folder, with its scenario.yaml and its report.json: what `esim simulate`
-/// does. The monitor, which ends it early, is asked once more when everything has been loaded, with a progress of
-/// nothing: nothing is kept then, and nothing is returned. The folder is there only when the recording is; see
-/// RecordingDirectory. What is notified stands in the report too, and losses and hints beside it, which are not
-/// notified.
+/// Simulates a scenario into a recording's folder with scenario.yaml and report.json, as `esim simulate` does. The
+/// monitor can end it early. It is called once before the first sample, when everything has been loaded; if it returns
+/// false then, nothing is kept and the result is empty. The folder appears only with the finished recording; see
+/// RecordingDirectory. The report contains the notices, and also losses and hints, which `notify` does not receive.
 std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions options, const Notices& notify,
                                       const Monitor& monitor);
 
-/// The same of a conversion.
+/// The text of report.json of a conversion.
 std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,
                         const std::vector<std::string>& notices);
 

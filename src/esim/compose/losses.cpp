@@ -9,7 +9,7 @@
 namespace esim {
 namespace {
 
-// A readout is called saturated where more than this fraction of the events waited for it.
+// A readout counts as saturated if more than this fraction of the events waited for it.
 constexpr double kSaturated = 0.01;
 
 double percent(std::int64_t part, std::int64_t whole) {
@@ -22,15 +22,15 @@ void add_readout(const std::string& name, const ReadoutOptions& readout, const E
                  std::int64_t events, std::vector<std::string>& lines) {
   if (sensor.dropped > 0) {
     lines.push_back(
-        fmt::format("{}the readout dropped {} of {} events ({:.3g} %), because {} were waiting already: raise "
-                    "event_camera.readout.queue_events, or set it to 0 for one per pixel",
+        fmt::format("{}the readout dropped {} of {} events ({:.3g} %), because its queue of {} events was full: raise "
+                    "event_camera.readout.queue_events, or set it to 0 for one event per pixel",
                     name, grouped(sensor.dropped), grouped(events + sensor.dropped),
                     percent(sensor.dropped, events + sensor.dropped), readout.queue_events));
   }
   if (static_cast<double>(sensor.delayed) > kSaturated * static_cast<double>(events)) {
     lines.push_back(fmt::format(
-        "{}the readout was saturated: {:.3g} % of the events waited for it, for up to {:.3g} ms, and their pixels saw "
-        "nothing meanwhile. It is limited by event_camera.readout.rate_mev_per_s ({:g} Mev/s) and "
+        "{}the readout was saturated: {:.3g} % of the events waited for it, for up to {:.3g} ms, and their pixels were "
+        "blind while they waited. Its limits are event_camera.readout.rate_mev_per_s ({:g} Mev/s) and "
         "event_camera.readout.row_time_us ({:g} us)",
         name, percent(sensor.delayed, events), to_seconds(sensor.longest_delay) * 1e3, readout.rate_mev_per_s,
         readout.row_time_us));
@@ -51,8 +51,8 @@ void add_sampling(const std::string& name, const CameraOptions& camera, const Sa
   if (sampling.held_to_max_rate > 0) {
     const double rate = std::visit([](const auto& scheme) { return max_rate_hz(scheme); }, camera.sampling);
     lines.push_back(fmt::format(
-        "{}{} intervals between samples were held to sampling.max_rate_hz ({:g} Hz): the error there is larger than "
-        "sampling asks for. Raise it, or move more slowly",
+        "{}{} intervals between samples were limited by sampling.max_rate_hz ({:g} Hz): the error there is larger than "
+        "the sampling method allows. Raise max_rate_hz, or move more slowly",
         name, grouped(sampling.held_to_max_rate), rate));
   }
   const double budget =
@@ -88,10 +88,11 @@ std::vector<std::string> hints(const Scenario& scenario, const Summary& summary)
   });
   if (!adaptive || !std::holds_alternative<MeshRendererOptions>(scenario.renderer)) return {};
   if (summary.wall_seconds < simulated_s || summary.seconds.render < 0.5 * summary.wall_seconds) return {};
-  return {fmt::format(
-      "rendering took {:.3g} of {:.3g} s. Flow sampling (sampling={{type: flow}}) is often several times faster than "
-      "adaptive sampling where edges of objects fill the image",
-      summary.seconds.render, summary.wall_seconds)};
+  return {
+      fmt::format("rendering took {:.3g} of {:.3g} s. If edges of objects fill the image, flow sampling "
+                  "(sampling={{type: flow}}) is "
+                  "often several times faster than adaptive sampling",
+                  summary.seconds.render, summary.wall_seconds)};
 }
 
 std::vector<std::string> losses(const ConversionOptions& options, const ConversionSummary& summary) {

@@ -24,7 +24,7 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
                                       const Monitor& monitor) {
   std::vector<std::string> given;
   const Notices notices = keeping(notify, given);
-  // The directory comes first: finding out that it exists should not take loading a scene.
+  // The directory comes first, so that an existing one is reported before a scene is loaded.
   RecordingDirectory directory(options.out, options.replace);
   World world = build_world(scenario, options.threads, notices);
   write_file_atomically(directory.path() / "scenario.yaml", write_scenario(scenario));

@@ -23,12 +23,12 @@ void require_path(const std::filesystem::path& path, const std::string& key) {
 
 void refuse(ColourFilters filters, const char* renderer, const char* instead) {
   if (filters != ColourFilters::none)
-    throw UserError(fmt::format("colour: {} shows grey only; use {}, or colour: none", renderer, instead));
+    throw UserError(fmt::format("colour: {} renders luminance only; use {}, or colour: none", renderer, instead));
 }
 
-// One overload per type of renderer: a new one is a line in RendererOptions and a function here.
+// One overload per type of renderer. A new type is a line in RendererOptions and a function here.
 
-/// OpenGL where there is a graphics card for it, and no need of colour.
+/// OpenGL if there is a graphics card and no camera sees colour.
 MeshEngine choose_engine(const MeshRendererOptions& options, bool colour) {
   if (options.engine != MeshEngine::automatic) return options.engine;
   if (colour) return MeshEngine::raycast;
@@ -56,7 +56,7 @@ RendererFactory factory(const MeshRendererOptions& options, const SceneFile& fil
 RendererFactory factory(const PanoramaRendererOptions& options, const SceneFile&, bool colour) {
   require_path(options.image, "image");
   if (!(options.orientation.norm() > 1e-6))
-    throw UserError("renderer.orientation: [0, 0, 0, 0] is no orientation; use [0, 0, 0, 1]");
+    throw UserError("renderer.orientation: must not be [0, 0, 0, 0]; use [0, 0, 0, 1]");
   const Softening softening{options.median_px, options.gaussian_px, true};
   Panorama panorama{
       std::make_shared<const Texture>(load_luminance(options.image, softening), Wrap::repeat, Wrap::clamp),
@@ -79,7 +79,7 @@ RendererFactory factory(const PlaneRendererOptions& options, const SceneFile&, b
   };
 }
 
-/// The textures of layers. Layers of the same image share them.
+/// The textures of sprites. Sprites with the same image and filters share them.
 class LayerTextures {
  public:
   struct Textures {
@@ -103,7 +103,7 @@ class LayerTextures {
 
 RendererFactory factory(const SpritesRendererOptions& options, const SceneFile&, bool) {
   if (options.layers.empty())
-    throw UserError("renderer: sprites without layers show nothing; list layers, or name a scene file in scene");
+    throw UserError("renderer.layers: is missing; list sprites, or name a .scene file in renderer.scene");
   SpriteScene scene{{}, static_cast<float>(options.background)};
   LayerTextures textures;
   for (std::size_t i = 0; i < options.layers.size(); ++i) {

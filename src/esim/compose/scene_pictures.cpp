@@ -82,7 +82,7 @@ Image<Rgb> ScenePictures::render(const Camera& camera, int finer, RenderRequest 
   Sample sample;
   renderer_->render(std::move(view), sample);
 
-  // The mean of what each colour's pixels see, or of all.
+  // The mean of the pixels of each colour, or of all pixels.
   PerColour<Image<float>> light;
   for (auto& channel : light) channel = Image<float>(camera.width, camera.height);
   const auto pixels = static_cast<float>(finer * finer);

@@ -7,8 +7,8 @@
 
 namespace esim {
 
-/// What a scenario's renderer shows, loaded once, as pictures for people: from wherever one likes, through any camera,
-/// at any time. In colour where the renderer has colours.
+/// Images of a scenario's scene for display: from any pose, through any camera, at any time. The scene is loaded once.
+/// Images are in colour if the renderer supports it.
 class ScenePictures {
  public:
   /// Renders on `threads` threads (0: every processor).
@@ -17,9 +17,9 @@ class ScenePictures {
   const SceneFile& scene() const { return scene_; }
   const RendererTraits& traits() const { return traits_; }
 
-  /// What `view` sees (of its poses and its time; its tiles do not matter) through a camera, each pixel the mean of
-  /// finer x finer smaller ones. `finer` is even where there are colours, so that each sees them all. The renderer is
-  /// kept for the next picture of the same size. From one thread at a time.
+  /// Renders the image of a camera at the poses and the time of `view`, whose tiles are ignored. Each pixel is the mean
+  /// of finer x finer smaller ones; `finer` must be even in colour, so that each pixel covers all colour filters. Keeps
+  /// the renderer for the next image of the same size. Call from one thread at a time.
   Image<Rgb> render(const Camera& camera, int finer, RenderRequest view);
 
  private:
@@ -30,14 +30,15 @@ class ScenePictures {
   bool colour_ = true;
   RendererFactory factory_;
   RendererTraits traits_;
-  std::unique_ptr<Renderer> renderer_;  // of the latest picture
-  Camera camera_;                       // of it
+  std::unique_ptr<Renderer> renderer_;  // of the latest image
+  Camera camera_;                       // of the latest image
 };
 
-/// The same view in so many pixels.
+/// The same view with width x height pixels.
 Camera scaled(const Camera& camera, int width, int height);
 
-/// Before the meshes, so far that all of them are in view, looking along world x; at the origin where there are none.
+/// A pose in front of the meshes, looking along world x, so far away that all of them are in view; at the origin if
+/// there are none.
 SE3 before_the_meshes(const Scene& scene, const Camera& camera);
 
 }  // namespace esim

@@ -12,7 +12,7 @@ Lighting lighting_of(const LambertOptions& options) {
   lighting.ambient = static_cast<float>(options.ambient);
   for (const SunOptions& sun : options.suns) {
     if (!(sun.direction.norm() > 1e-6))
-      throw UserError("renderer.lighting.suns: [0, 0, 0] is no direction; [0, 0, -1] shines straight down");
+      throw UserError("renderer.lighting.suns: direction must not be [0, 0, 0]; [0, 0, -1] shines straight down");
     lighting.suns.push_back({sun.direction.cast<float>(), static_cast<float>(sun.strength)});
   }
   for (const PointLightOptions& point : options.points)
@@ -25,13 +25,14 @@ void require_path(const std::filesystem::path& path, const std::string& key) {
   if (path.empty()) throw UserError(fmt::format("renderer.{}: is missing; name a file", key));
 }
 
-/// The file that can be read for one that a scenario names.
+/// The file to read for the scene file that a scenario names: itself, or Blender's export of a .blend.
 std::filesystem::path readable(const std::filesystem::path& scene, const Notices& notices) {
   if (!is_blend(scene)) return scene;
   BlenderWatch watch;
   watch.warning = notices.warning;
   std::filesystem::path glb = cached_glb(scene, watch);
-  notices.note(fmt::format("scene {}: read from Blender's export of it, {}", scene.filename().string(), glb.string()));
+  notices.note(fmt::format("scene {}: reading the GLB that Blender exported from it, {}", scene.filename().string(),
+                           glb.string()));
   return glb;
 }
 
@@ -46,8 +47,8 @@ SceneFile load(const MeshRendererOptions& options, SceneLook look, const Notices
                        load_mesh(readable(object.scene, notices), notices.warning, look), true};
     for (const SceneObject& other : file.scene.objects) {
       if (!other.moves || other.name != loaded.name) continue;
-      throw UserError(
-          fmt::format("renderer.objects.{}.name: another object is named {} too; name them apart", i, loaded.name));
+      throw UserError(fmt::format(
+          "renderer.objects.{}.name: must be unique, but another object is also named {}; rename one", i, loaded.name));
     }
     for (Eigen::Vector3f& vertex : loaded.mesh.vertices) vertex *= static_cast<float>(object.scale);
     file.scene.objects.push_back(std::move(loaded));
@@ -61,12 +62,12 @@ SceneFile load(const Renderer&, SceneLook, const Notices&) {
   return {};
 }
 
-/// The cameras alone of what Blender renders, and when its animation is.
+/// Only the cameras and the animation's time span of the scene that Blender renders.
 SceneFile load_cameras(const BlenderRendererOptions& options, const Notices& notices) {
   if (options.scene.empty()) {
     throw UserError(
-        "trajectory: follows a camera of the scene, but renderer.scene names none; name the file that the Blender at "
-        "renderer.address has opened");
+        "renderer.scene: is missing, but the trajectory follows a camera of the scene; name the file that the Blender "
+        "at renderer.address has opened");
   }
   SceneFile file = load_scene_file(readable(options.scene, notices), [](const std::string&) {});
   if (file.cameras.empty())

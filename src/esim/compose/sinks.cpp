@@ -40,10 +40,10 @@ const Format& written(const std::string& name) {
   } catch (const UserError& error) {
     throw UserError(fmt::format("output.formats: {}", error.what()));
   }
-  throw UserError(fmt::format("output.formats: {} is not written beside a recording; remove it", name));
+  throw UserError(fmt::format("output.formats: {} cannot be written in addition to a recording; remove it", name));
 }
 
-/// Where a format goes: `stem` with its extension, or with its name before that if the extension is taken already.
+/// The path of a format's file: `stem` plus the extension, with the format's name in between if that path is taken.
 std::filesystem::path place_for(const Format& format, const std::filesystem::path& stem,
                                 std::set<std::filesystem::path>& taken) {
   if (format.folder) return stem.parent_path() / format.name;
@@ -52,7 +52,7 @@ std::filesystem::path place_for(const Format& format, const std::filesystem::pat
   return path;
 }
 
-/// The formats that a scenario asks for: those of several cameras at the top, others in the cameras' folders.
+/// The formats of output.formats: formats for several cameras at the top, others in the cameras' folders.
 void add_formats(const Scenario& scenario, const std::filesystem::path& folder, const WriteOptions& options,
                  FanOut& sinks) {
   std::set<std::filesystem::path> taken;

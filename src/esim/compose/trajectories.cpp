@@ -16,17 +16,17 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// Whose motion is built, and what it has to cover where its options do not say.
+/// The body or object whose motion is built, and what applies if its options leave it open.
 struct Mover {
   std::string key;                                                  ///< of its options, for messages
-  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< where its options give none
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< if its options give none
   std::uint64_t seed = 0;
   std::uint16_t stream = 0;  ///< of random numbers
   std::function<TimeSpan()> span;
-  const SceneFile* scene = nullptr;  ///< whose cameras it may follow
+  const SceneFile* scene = nullptr;  ///< with the cameras that it may follow
   double time_scale = 1;             ///< of that file's animation
   bool has_duration = false;         ///< whether the scenario gives one
-  SE3 T_body_camera;                 ///< of the camera that way points aim
+  SE3 T_body_camera;                 ///< of the camera that waypoints aim
 };
 
 std::shared_ptr<const Trajectory> fit(const std::vector<TimedPose>& poses, const FitOptions& options,
@@ -34,14 +34,14 @@ std::shared_ptr<const Trajectory> fit(const std::vector<TimedPose>& poses, const
   const FittedTrajectory fitted = fit_trajectory(poses, options);
   const FitReport& fit = fitted.report;
   notices.note(
-      fmt::format("{}: {} poses fitted by a spline with a knot every {:.1f} ms; residual {:.3f} mm rms "
+      fmt::format("{}: fitted {} poses by a spline with a knot every {:.1f} ms; residual {:.3f} mm rms "
                   "({:.3f} max), {:.4f} deg rms ({:.4f} max)",
                   name, poses.size(), fit.knot_interval_s * 1e3, fit.rms_position_m * 1e3, fit.max_position_m * 1e3,
                   fit.rms_rotation_rad / kDegree, fit.max_rotation_rad / kDegree));
   return std::make_shared<const SplineTrajectory>(fitted.trajectory);
 }
 
-/// A motion of the scene file, which begins at `start`.
+/// A motion of the scene file, shifted so that it begins at `start`.
 std::shared_ptr<const Trajectory> fit_animation(const SceneMotion& motion, TimeNs start, double time_scale,
                                                 const std::string& name, const Notices& notices) {
   std::vector<TimedPose> poses;
@@ -52,7 +52,7 @@ std::shared_ptr<const Trajectory> fit_animation(const SceneMotion& motion, TimeN
   try {
     return fit(poses, {}, name, notices);
   } catch (const UserError& error) {
-    throw UserError(fmt::format("{}: its animation cannot be followed: {}", name, error.what()));
+    throw UserError(fmt::format("{}: cannot fit its animation: {}", name, error.what()));
   }
 }
 
@@ -88,10 +88,10 @@ std::shared_ptr<const Trajectory> build(const StaticTrajectoryOptions& options, 
 
 const SceneCamera& find_camera(const SceneTrajectoryOptions& options, const Mover& mover) {
   if (mover.scene == nullptr || (mover.scene->scene.objects.empty() && mover.scene->cameras.empty())) {
-    throw UserError(
-        fmt::format("{}: type scene is for the body and a renderer of type mesh or blender, whose scene file has the "
-                    "camera; use file, random or static",
-                    mover.key));
+    throw UserError(fmt::format(
+        "{}: type scene needs a renderer of type mesh or blender, whose scene file has a camera, and is for the "
+        "body only; use file, random or static",
+        mover.key));
   }
   const std::vector<SceneCamera>& cameras = mover.scene->cameras;
   std::string names;
@@ -102,8 +102,10 @@ const SceneCamera& find_camera(const SceneTrajectoryOptions& options, const Move
   if (cameras.empty())
     throw UserError(fmt::format("{}: the scene file has no camera; use file, random or static", mover.key));
   if (options.camera.empty())
-    throw UserError(fmt::format("{}.camera: is missing; the scene file has several: {}", mover.key, names));
-  throw UserError(fmt::format("{}.camera: the scene file has no {}; it has {}", mover.key, options.camera, names));
+    throw UserError(
+        fmt::format("{}.camera: is missing, but the scene file has several cameras; name one of {}", mover.key, names));
+  throw UserError(
+      fmt::format("{}.camera: the scene file has no camera '{}'; name one of {}", mover.key, options.camera, names));
 }
 
 std::shared_ptr<const Trajectory> build(const SceneTrajectoryOptions& options, const Mover& mover,
@@ -113,7 +115,7 @@ std::shared_ptr<const Trajectory> build(const SceneTrajectoryOptions& options, c
     const TimeNs start = std::llround(static_cast<double>(camera.motion.front().t) * mover.time_scale);
     return fit_animation(camera.motion, start, mover.time_scale, "camera " + camera.name, notices);
   }
-  // A camera that stands still watches the whole animation.
+  // A static camera sees the complete animation.
   const TimeSpan& animation = mover.scene->animation;
   const auto scaled = [&](TimeNs t) { return std::llround(static_cast<double>(t) * mover.time_scale); };
   const TimeSpan span = animation.end > animation.start && !mover.has_duration
@@ -127,7 +129,7 @@ std::shared_ptr<const Trajectory> build(const WaypointTrajectoryOptions& options
                                         const Notices& notices) {
   auto trajectory =
       std::make_shared<const WaypointTrajectory>(waypoint_trajectory(options, mover.T_body_camera, mover.key));
-  notices.note(fmt::format("{}: {} way points in {:.3f} s", mover.key, options.points.size(),
+  notices.note(fmt::format("{}: {} waypoints in {:.3f} s", mover.key, options.points.size(),
                            to_seconds(trajectory->end() - trajectory->start())));
   return trajectory;
 }
@@ -136,7 +138,7 @@ std::shared_ptr<const Trajectory> build(const TrajectoryOptions& options, const 
   return std::visit([&](const auto& alternative) { return build(alternative, mover, notices); }, options);
 }
 
-/// The motion of the renderer's object of this index, over `span` where it has no duration of its own.
+/// The motion of the renderer's object with this index; over `span` if its trajectory does not define a duration.
 std::shared_ptr<const Trajectory> build_for_object(const TrajectoryOptions& options, std::size_t index,
                                                    const Scenario& scenario, const TimeSpan& span,
                                                    const TimeSpan& simulated, const Notices& notices) {
@@ -148,7 +150,7 @@ std::shared_ptr<const Trajectory> build_for_object(const TrajectoryOptions& opti
   auto trajectory = build(options, mover, notices);
   if (trajectory->start() > simulated.start || trajectory->end() < simulated.end) {
     throw UserError(
-        fmt::format("{}: lasts from {:.9g} to {:.9g} s, but the simulation from {:.9g} to {:.9g} s; shorten "
+        fmt::format("{}: lasts from {:.9g} to {:.9g} s, but must cover the simulation from {:.9g} to {:.9g} s; shorten "
                     "the simulation with start_s and duration_s, or stretch the trajectory with its time_scale",
                     mover.key, to_seconds(trajectory->start()), to_seconds(trajectory->end()),
                     to_seconds(simulated.start), to_seconds(simulated.end)));
@@ -175,7 +177,7 @@ std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, con
   mover.seed = scenario.seed;
   mover.span = [&]() -> TimeSpan {
     if (!scenario.duration_s)
-      throw UserError("duration_s: is missing; a random or static trajectory has no end of its own");
+      throw UserError("duration_s: is missing; a random or static trajectory does not define one");
     return {0, to_ns(scenario.start_s + *scenario.duration_s)};
   };
   mover.scene = &scene;

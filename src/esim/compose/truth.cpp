@@ -12,30 +12,31 @@ void check_displacement(const TruthOptions& truth, PeriodicClock clock, double d
                         const RendererTraits& renderer) {
   if (!truth.displacement) return;
   if (renderer.on_sensor) {
-    throw UserError(fmt::format("truth.displacement: {} are drawn on the sensor, where nothing has depth; remove it",
-                                renderer.name));
+    throw UserError(fmt::format(
+        "truth.displacement: needs depth, but {} are drawn on the sensor and have none; remove it", renderer.name));
   }
   const bool has_frames = clock.due() != PeriodicClock::kNever;
   if (has_frames) clock.advance();
   if (clock.due() != PeriodicClock::kNever) return;
-  throw UserError(
-      fmt::format("truth.displacement: joins two frames of ground truth, but rate_hz = {} gives {} in {:.6g} s; raise "
-                  "truth.rate_hz",
-                  truth.rate_hz, has_frames ? 1 : 0, duration_s));
+  throw UserError(fmt::format(
+      "truth.displacement: needs two frames of ground truth, but truth.rate_hz = {} gives {} in {:.6g} s; raise "
+      "truth.rate_hz",
+      truth.rate_hz, has_frames ? 1 : 0, duration_s));
 }
 
 void check_event_points(const TruthOptions& truth, const RendererTraits& renderer) {
   if (truth.event_points && renderer.granularity == Granularity::frame) {
     throw UserError(fmt::format(
-        "truth.event_points: asks for single pixels at the time of each event, which {} cannot give; remove it",
+        "truth.event_points: needs single pixels at the time of each event, which {} cannot render; remove it",
         renderer.name));
   }
   if (truth.event_points && renderer.at_infinity) {
-    throw UserError(fmt::format("truth.event_points: all that {} shows is infinitely far; remove it", renderer.name));
+    throw UserError(fmt::format(
+        "truth.event_points: needs finite depth, but everything in {} is infinitely far; remove it", renderer.name));
   }
 }
 
-/// A rate in the wrong unit fills the disk.
+/// Warns of very large ground truth: a rate in the wrong unit would fill the disk.
 void warn_of_much(const Scenario& scenario, double duration_s, const Notices& notices) {
   constexpr double kMuch = 1e11;
   const TruthOptions& truth = scenario.truth;
@@ -48,12 +49,12 @@ void warn_of_much(const Scenario& scenario, double duration_s, const Notices& no
   if (bytes <= kMuch) return;
   notices.warning(
       fmt::format("truth.rate_hz = {} makes {:.0f} frames for each camera, {:.0f} GB before compression; "
-                  "is it meant?",
+                  "check that it is in Hz",
                   truth.rate_hz, frames, bytes * 1e-9));
 }
 
-/// Renderers of the same scene on the processor, as fast as they are for single pixels where depth is all that counts:
-/// a graphics card would draw everything for each.
+/// Renderers of the same scene for single pixels and their depth. They use the processor, since a graphics card would
+/// draw the complete image for each pixel.
 EventPoints::MakeRenderer for_single_pixels(RendererFactory make_renderer, RendererOptions options, SceneFile scene,
                                             const World& world, const Notices& notices) {
   if (auto* const mesh = std::get_if<MeshRendererOptions>(&options)) {

@@ -11,35 +11,36 @@
 namespace esim {
 namespace {
 
-/// The orientation of a body at `position` whose camera, at T_body_camera, sees `target` on its optical axis, with its
-/// x axis at right angles to `up` and its y axis away from it.
+/// The orientation of a body at `position` so that its camera, at T_body_camera, has `target` on its optical axis, its
+/// x axis perpendicular to `up`, and its y axis pointing away from `up`.
 Eigen::Quaterniond aim(const Eigen::Vector3d& position, const Eigen::Vector3d& target, const Eigen::Vector3d& up,
                        const SE3& T_body_camera) {
   const Eigen::Vector3d to_target = target - position;
   const double distance = to_target.norm();
-  if (!(distance > 1e-9)) throw UserError("look_at is the position itself; name another point");
-  if (!(up.norm() > 1e-9)) throw UserError("up is no direction; use [0, 0, 1]");
+  if (!(distance > 1e-9)) throw UserError("look_at must differ from position; choose another point");
+  if (!(up.norm() > 1e-9)) throw UserError("up must not be [0, 0, 0]; use [0, 0, 1]");
 
-  // From the body's origin to the target, in camera axes: the target is somewhere on the camera's z axis.
+  // The vector from the body's origin to the target in camera axes: the target lies on the camera's z axis.
   const Eigen::Vector3d camera_in_camera_axes = T_body_camera.rotation.conjugate() * T_body_camera.translation;
   const double lateral = camera_in_camera_axes.head<2>().norm();
   if (!(lateral < distance)) {
-    throw UserError(
-        fmt::format("look_at is {:.3g} m from the body, whose camera is {:.3g} m beside it; name a point "
-                    "further away",
-                    distance, lateral));
+    throw UserError(fmt::format(
+        "look_at is {:.3g} m from the body, but must be further away than the camera's lateral offset, {:.3g} m; "
+        "choose a point further away",
+        distance, lateral));
   }
   const Eigen::Vector3d seen(camera_in_camera_axes.x(), camera_in_camera_axes.y(),
                              std::sqrt(distance * distance - lateral * lateral));
 
-  // Any rotation that takes `seen` to the target, and then about the line to it by the angle at which the camera's x
-  // axis is level: a cos θ + b sin θ + c = 0.
+  // First any rotation of `seen` to the target, then a rotation about the line to it by the angle θ at which the
+  // camera's x axis is level: a cos θ + b sin θ + c = 0.
   const Eigen::Quaterniond some = Eigen::Quaterniond::FromTwoVectors(seen, to_target);
   const Eigen::Vector3d axis = to_target / distance, vertical = up.normalized(), x = some * Eigen::Vector3d::UnitX();
   const double c = axis.dot(x) * axis.dot(vertical), a = x.dot(vertical) - c, b = axis.cross(x).dot(vertical);
   const double amplitude = std::hypot(a, b);
   if (!(amplitude > 1e-6 && std::abs(c) < amplitude))
-    throw UserError("look_at lies along up: which way the image is turned is open; choose another up");
+    throw UserError(
+        "up must not point along the optical axis, since the image's rotation would be undefined; choose another up");
   const double middle = std::atan2(b, a), half = std::acos(-c / amplitude);
   const auto turned_by = [&](double angle) { return Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis)) * some; };
   const Eigen::Quaterniond one = turned_by(middle + half), other = turned_by(middle - half);
@@ -50,7 +51,7 @@ Eigen::Quaterniond aim(const Eigen::Vector3d& position, const Eigen::Vector3d& t
 
 SE3 pose_at(const WaypointPointOptions& point, const SE3& T_body_camera) {
   if (!point.quaternion && !point.look_at) throw UserError("has no orientation; give a quaternion or look_at");
-  if (point.up && !point.look_at) throw UserError("up goes with look_at; remove it");
+  if (point.up && !point.look_at) throw UserError("up has no effect without look_at; remove it");
   SE3 pose = pose_of(point);
   if (point.look_at) {
     pose.rotation = aim(point.position, *point.look_at, point.up.value_or(Eigen::Vector3d::UnitZ()), T_body_camera);

@@ -34,7 +34,7 @@ void check_sampling(const CameraOptions& camera, const Notices& notices) {
 
 bool sees_colour(const CameraOptions& camera) { return camera.colour != ColourFilters::none; }
 
-/// Whether any camera does.
+/// Whether any camera sees colour.
 bool sees_colour(const Scenario& scenario) {
   return std::any_of(scenario.cameras.begin(), scenario.cameras.end(),
                      [](const CameraOptions& camera) { return sees_colour(camera); });
@@ -46,10 +46,10 @@ std::unique_ptr<Renderer> build_renderer(const RendererFactory& make_renderer, c
                                          const Camera& model, const Workers& workers) {
   if (!sees_colour(options)) return make_renderer(model, ColourFilters::none, workers);
   if (std::holds_alternative<KeyframeSampling>(options.sampling)) {
-    throw UserError(
-        fmt::format("camera {}: sampling: keyframes joins what neighbouring pixels see, which is not the same colour; "
-                    "use adaptive or flow, or colour: none",
-                    options.name));
+    throw UserError(fmt::format(
+        "camera {}: sampling: keyframes interpolates between neighbouring pixels, which see different colours; "
+        "use adaptive or flow, or colour: none",
+        options.name));
   }
   try {
     return make_renderer(model, options.colour, workers);
@@ -58,15 +58,14 @@ std::unique_ptr<Renderer> build_renderer(const RendererFactory& make_renderer, c
   }
 }
 
-/// The frame camera that a camera has.
+/// The frame camera of a camera.
 FrameCamera build_frame_camera(const CameraOptions& options, const Camera& model, const TimeSpan& span,
                                std::uint64_t seed, std::size_t index, const Notices& notices) {
   try {
     FrameCamera camera(*options.frame_camera, model.width, model.height, span, seed, static_cast<std::uint16_t>(index));
     if (camera.due() == FrameCamera::kNever) {
-      notices.warning(
-          fmt::format("camera {}: frame_camera: no exposure lies wholly within the simulated time, {:.6g} s",
-                      options.name, to_seconds(span.end - span.start)));
+      notices.warning(fmt::format("camera {}: frame_camera: no exposure fits into the simulated time, {:.6g} s",
+                                  options.name, to_seconds(span.end - span.start)));
     }
     return camera;
   } catch (const UserError& error) {
@@ -91,22 +90,22 @@ bool sees_something(const Sample& sample) {
   return std::any_of(depth.begin(), depth.end(), [](float z) { return std::isfinite(z); });
 }
 
-/// Says what a scenario asks for in vain of a renderer that draws on the sensor.
+/// Warns of options that have no effect with a renderer that draws on the sensor.
 void name_what_has_no_effect(const Scenario& scenario, const World& world, std::size_t index, const Notices& notices) {
   if (!world.cameras[index].renderer->traits().on_sensor) return;
   const CameraInfo& info = world.info.cameras[index];
   if (!std::holds_alternative<NoDistortion>(info.model.distortion)) {
-    notices.warning(fmt::format("camera {}: the lens's distortion has no effect: {} are drawn on the sensor itself",
-                                info.name, world.cameras[index].renderer->traits().name));
+    notices.warning(fmt::format("camera {}: distortion has no effect: {} are drawn on the sensor", info.name,
+                                world.cameras[index].renderer->traits().name));
   }
   if (index == 0 && !std::holds_alternative<StaticTrajectoryOptions>(scenario.trajectory)) {
-    notices.warning(fmt::format("trajectory: {} are drawn on the sensor itself; its motion is recorded, but not seen",
-                                world.cameras[index].renderer->traits().name));
+    notices.warning(
+        fmt::format("trajectory: has no effect on the images, since {} are drawn on the sensor; it is only recorded",
+                    world.cameras[index].renderer->traits().name));
   }
 }
 
-/// Where a camera and the moving objects are at a time of the simulation; the body where it is last known to be, if its
-/// motion becomes known on the way.
+/// The poses of a camera and of the moving objects at `t`; for an online motion, the last known pose of the body.
 RenderRequest known_view(const World& world, std::size_t index, TimeNs t) {
   RenderRequest request;
   request.t = t;
@@ -116,7 +115,7 @@ RenderRequest known_view(const World& world, std::size_t index, TimeNs t) {
   return request;
 }
 
-/// Looks through a camera at a few times: one that never sees anything is a mistake of poses or frames.
+/// Renders a few images: if a camera never sees anything, its poses or frames are wrong.
 void require_a_view(const World& world, std::size_t index) {
   constexpr int kLooks = 9;
   if (world.cameras[index].renderer->traits().at_infinity) return;
@@ -131,12 +130,12 @@ void require_a_view(const World& world, std::size_t index) {
   }
   const Eigen::Vector3d position = known_view(world, index, world.info.start).camera.T_world_body.translation;
   throw UserError(
-      fmt::format("camera {} sees nothing of the scene on its whole way (it starts at {:.3g} {:.3g} {:.3g} m); check "
+      fmt::format("camera {} never sees the scene (it starts at {:.3g} {:.3g} {:.3g} m); check "
                   "the trajectory's frame and T_body_camera",
                   info.name, position.x(), position.y(), position.z()));
 }
 
-/// In the order in which renderers number it.
+/// Names the moving objects and sprites, in the order in which renderers number them.
 void name_what_moves(const RendererOptions& renderer, const SceneFile& scene, RecordingInfo& info) {
   for (const SceneObject& object : scene.scene.objects) {
     if (object.moves) info.objects.push_back(object.name);
@@ -149,20 +148,20 @@ void name_what_moves(const RendererOptions& renderer, const SceneFile& scene, Re
   }
 }
 
-/// What a renderer that is not ours cannot do.
+/// Throws UserError for options that custom renderers do not support.
 void check_substitutes(const Scenario& scenario, const Substitutes& substitutes, const TimeSpan& span) {
   if (!substitutes.make_renderer) return;
-  if (sees_colour(scenario)) throw UserError("colour: a renderer of your own shows grey only; use colour: none");
+  if (sees_colour(scenario)) throw UserError("colour: a custom renderer gives luminance only; use colour: none");
   if (scenario.truth.event_points) {
     throw UserError(
-        "truth.event_points: asks for single pixels at the time of each event, which a renderer of your own cannot "
-        "give; remove it");
+        "truth.event_points: needs single pixels at the time of each event, which a custom renderer cannot render; "
+        "remove it");
   }
   for (const Substitutes::Object& object : substitutes.objects) {
     if (object.trajectory->start() <= span.start && object.trajectory->end() >= span.end) continue;
     throw UserError(
-        fmt::format("object {}: its trajectory lasts from {:.9g} to {:.9g} s, but the simulation from "
-                    "{:.9g} to {:.9g} s; shorten the simulation, or give it a longer trajectory",
+        fmt::format("object {}: its trajectory lasts from {:.9g} to {:.9g} s, but must cover the simulation from "
+                    "{:.9g} to {:.9g} s; shorten the simulation, or give the object a longer trajectory",
                     object.name, to_seconds(object.trajectory->start()), to_seconds(object.trajectory->end()),
                     to_seconds(span.start), to_seconds(span.end)));
   }
@@ -245,8 +244,8 @@ TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory) 
   const TimeNs end = start + to_ns(*scenario.duration_s);
   if (end > trajectory.end()) {
     throw UserError(
-        fmt::format("duration_s: {} s is longer than the trajectory, which has {:.9g} s left; shorten it, or make the "
-                    "trajectory longer (that of a file with trajectory.time_scale)",
+        fmt::format("duration_s: {} s is longer than the rest of the trajectory, {:.9g} s; shorten it, or make the "
+                    "trajectory longer (for a trajectory file, with trajectory.time_scale)",
                     *scenario.duration_s, available_s));
   }
   return {start, end};
@@ -274,7 +273,7 @@ World build_world(const Scenario& scenario, const Substitutes& substitutes, int 
 
 World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> body, int threads,
                   const Notices& notices) {
-  if (!scenario.duration_s) throw UserError("duration_s: is missing; a motion that goes on has no end of its own");
+  if (!scenario.duration_s) throw UserError("duration_s: is missing; an online motion does not define one");
   const TimeNs start = body->start() + to_ns(scenario.start_s);
   const TimeSpan span{start, start + to_ns(*scenario.duration_s)};
   const SceneFile scene = load_scenes(scenario, look_of(scenario), notices);

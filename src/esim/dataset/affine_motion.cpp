@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
 
-/// Rates of change with strength 1, and how far each has come half-way.
+/// Changes at strength 1, and the fraction of each that is reached half-way.
 struct Direction {
   Eigen::Vector2d translation = Eigen::Vector2d::Zero();  // px
   double rotation = 0;                                    // rad
@@ -23,7 +23,7 @@ struct Direction {
   std::array<double, 6> half_way{};
 };
 
-/// Root mean square distance of the sensor's pixels from its middle.
+/// Root mean square distance of the sensor's pixels from its centre.
 double spread_px(PixelSize sensor) {
   const double w = sensor.width, h = sensor.height;
   return std::sqrt((w * w + h * h) / 12);
@@ -49,7 +49,7 @@ Direction draw_direction(const MotionMix& mix, PixelSize sensor, std::uint64_t s
   return direction;
 }
 
-/// Where a layer is that has gone `strength` into a direction, or of that for each kind of motion a share.
+/// The placement of a sprite after a motion of `strength`, or after a fraction of it for each kind of motion.
 LayerKeyframe go(const AffineStart& start, const Direction& direction, double strength,
                  const std::array<double, 6>& share = {1, 1, 1, 1, 1, 1}) {
   LayerKeyframe key;
@@ -112,12 +112,12 @@ AffineMotion draw_motion(const MotionMix& mix, PixelSize sensor, const AffineSta
 }
 
 MagnitudeHistogram strengths_for(const MagnitudeHistogram& target, const MotionMix& mix, PixelSize sensor) {
-  constexpr std::uint64_t kSeed = 0;  // of the draws here: a constant of the method
+  constexpr std::uint64_t kSeed = 0;  // of the random numbers here: a constant of the method
   constexpr std::uint32_t kMotions = 200, kPixels = 16;
   constexpr int kIterations = 300;
   const std::size_t bins = target.bins();
 
-  // K[a][b], its last b for magnitudes beyond the target's last.
+  // K[a][b]; the last b is for magnitudes beyond the target's bins.
   std::vector<std::vector<double>> K(bins, std::vector<double>(bins + 1));
   const AddressedRandom random(kSeed, Purpose::dataset_choice);
   for (std::size_t a = 0; a < bins; ++a) {

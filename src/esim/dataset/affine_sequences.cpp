@@ -25,13 +25,13 @@
 namespace esim {
 namespace {
 
-/// How an image lies under the sensor at the start.
+/// The initial placement of an image under the sensor.
 struct Framing {
   AffineStart start;
-  Eigen::Vector2d pivot{0.5, 0.5};  ///< what of the image is in the sensor's middle
+  Eigen::Vector2d pivot{0.5, 0.5};  ///< point of the image at the sensor's centre
 };
 
-/// Turned a little and with all of the sensor on the image, unless the image is so small that it would be blurred.
+/// A slightly rotated placement in which the image covers the sensor, unless a small image would be blurred.
 Framing draw_framing(PixelSize sensor, const Texture& image, const AddressedRandom& random, std::uint32_t index) {
   constexpr double kMostTurn_deg = 30, kMostEnlarged = 1.5;
   const auto [turn, size] = random.uniforms(index, 1);
@@ -76,19 +76,19 @@ void check(const AffineOptions& o) {
     if (!good) throw UserError(problem);
   };
   require(o.width >= 8 && o.height >= 8 && o.width <= 8192 && o.height <= 8192,
-          fmt::format("{}x{} px: a sensor has from 8x8 to 8192x8192", o.width, o.height));
+          fmt::format("sensor of {}x{} px: must be from 8x8 to 8192x8192 px", o.width, o.height));
   require(o.duration_s >= 1e-4 && o.duration_s <= 100,
-          fmt::format("a duration of {} s: must be from 0.0001 to 100", o.duration_s));
+          fmt::format("duration of {} s: must be from 0.0001 to 100 s", o.duration_s));
   require(o.contrast_threshold.low >= kMinContrastThreshold && o.contrast_threshold.high <= 100 &&
               o.contrast_threshold.low <= o.contrast_threshold.high,
           fmt::format("contrast thresholds from {} to {}: must increase, between {} and 100", o.contrast_threshold.low,
                       o.contrast_threshold.high, kMinContrastThreshold));
   require(o.flow_scale >= 1e-3 && o.flow_scale <= 1e3,
-          fmt::format("magnitudes times {}: must be from 0.001 to 1000", o.flow_scale));
+          fmt::format("flow scale of {}: must be from 0.001 to 1000", o.flow_scale));
   const MotionMix& mix = o.mix;
   require(std::min({mix.translation, mix.rotation, mix.scale, mix.shear}) >= 0 &&
               std::isfinite(mix.translation + mix.rotation + mix.scale + mix.shear) && mix.translation > 0,
-          "the shares of the kinds of motion: must be 0 or more, that of translation more than 0");
+          "motion mix: the strengths must be at least 0, and that of translation above 0");
 }
 
 }  // namespace
@@ -137,9 +137,9 @@ Sequence AffineSequences::make(std::uint32_t index) const {
   const AffineOptions& o = options_;
   const PixelSize sensor{o.width, o.height};
 
-  // What is seen, and how it moves. Strengths go through their distribution evenly.
+  // The image and its motion. Strengths cover their distribution evenly.
   const AddressedRandom random(o.seed, Purpose::dataset_image);
-  const auto all = random.bits(0xffffffffU);  // the same for all sequences
+  const auto all = random.bits(0xffffffffU);  // common to all sequences
   const ImageFolder::Picture picture = impl_->picture(o.seed, index, all[0]);
   const Framing framing = draw_framing(sensor, *picture.light, random, index);
   double turn = 0;
@@ -181,7 +181,7 @@ Sequence AffineSequences::make(std::uint32_t index) const {
   Collector collector(sequence);
   simulate(world, collector, [](const Progress&) { return true; });
 
-  // The truth, from where the image lies.
+  // Ground truth, from the placements of the image.
   const auto lies = [&](TimeNs t) {
     return place(layer.at(t), LayerUnits::pixel, {picture.light->width(), picture.light->height()}, sensor,
                  framing.pivot);

@@ -15,7 +15,7 @@
 
 namespace esim {
 
-/// The time that the motion field is of.
+/// The time of the motion field.
 enum class FlowTime { start, middle, end };
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<FlowTime>{"start", "middle", "end"};
@@ -29,12 +29,12 @@ struct AffineOptions {
   int width = 240, height = 180;   ///< px
   double duration_s = 0.04;
   std::uint64_t seed = 1;
-  MagnitudeHistogram magnitudes = sintel_magnitudes();  ///< of displacements over the duration
-  double flow_scale = 1;                                ///< times their magnitudes
+  MagnitudeHistogram magnitudes = sintel_magnitudes();  ///< of the optical flow over the duration
+  double flow_scale = 1;                                ///< factor on the magnitudes
   MotionMix mix{};
   FlowTime flow_at = FlowTime::middle;
-  Range contrast_threshold{0.2, 0.5};  ///< C+ = C-, drawn for each sequence
-  EventCameraOptions event_camera{};   ///< the rest of it
+  Range contrast_threshold{0.2, 0.5};  ///< C+ = C-, random for each sequence
+  EventCameraOptions event_camera{};   ///< all other options
   SamplingOptions sampling = FlowSampling{};
 };
 
@@ -42,7 +42,7 @@ struct AffineOptions {
 /// Section 5. A sequence is a function of the options and its index. Any number of threads may make sequences.
 class AffineSequences final : public SequenceMaker {
  public:
-  /// Throws UserError for options that are impossible, and for a folder without images.
+  /// Throws UserError for invalid options, and for a folder without images.
   explicit AffineSequences(AffineOptions options);
   ~AffineSequences() override;
 
@@ -50,7 +50,7 @@ class AffineSequences final : public SequenceMaker {
   const MagnitudeHistogram& magnitudes() const override { return options_.magnitudes; }
   bool is_target() const override { return true; }
 
-  /// The sequence from 0 to the duration. Throws UserError where no image is left.
+  /// The sequence from 0 to the duration. Throws UserError if no image is usable.
   Sequence make(std::uint32_t index) const override;
 
  private:

@@ -7,7 +7,7 @@
 
 namespace esim {
 
-/// The CRC-32 of `bytes` that follow those of `before`: as zlib's, gzip's and Python's zlib.crc32.
+/// The CRC-32 of `bytes`, continued from `before`, as in zlib, gzip and Python's zlib.crc32.
 std::uint32_t crc32(std::string_view bytes, std::uint32_t before = 0);
 
 struct FileChecksum {
@@ -15,7 +15,7 @@ struct FileChecksum {
   std::uint32_t crc32 = 0;
 };
 
-/// Of a file's content. Throws UserError where it cannot be read.
+/// The CRC-32 of a file's content. Throws UserError if the file cannot be read.
 FileChecksum checksum_of(const std::filesystem::path& path);
 
 /// Eight hexadecimal digits.

@@ -24,7 +24,7 @@ std::optional<std::uint32_t> from_environment(const char* name) {
   return text != nullptr ? number(text) : std::nullopt;
 }
 
-/// Of a Slurm array or an indexed job, from 0 on.
+/// The index of this task of a Slurm array or an indexed job, from 0.
 std::optional<std::uint32_t> index_of_task() {
   if (const auto task = from_environment("SLURM_ARRAY_TASK_ID"))
     return *task - from_environment("SLURM_ARRAY_TASK_MIN").value_or(0);
@@ -45,7 +45,7 @@ Share share_named(const std::string& text) {
   const auto parts = slash == std::string::npos ? std::nullopt : number(std::string_view(text).substr(slash + 1));
   if (first == "auto" && !part) {
     throw UserError(
-        fmt::format("--shard {}: neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set; name the "
+        fmt::format("--shard {}: neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set; give the "
                     "part, as in 0/8",
                     text));
   }
@@ -70,8 +70,7 @@ std::string slurm_script(const SlurmJob& job) {
   script += fmt::format("#SBATCH --output={}/slurm-%a.log\n", job.folder.string());
   script += "#SBATCH --open-mode=append\n#SBATCH --requeue\n";
   for (const std::string& option : job.options) script += fmt::format("#SBATCH {}\n", option);
-  script +=
-      "\n# A task that is killed and requeued goes on where it was; the one that is ready last writes the manifest.\n";
+  script += "\n# A task that is killed and requeued continues its work; the last task to finish writes the manifest.\n";
   script += "exec";
   for (const std::string& word : job.command) script += " " + shell_quoted(word);
   return script + fmt::format(" --shard auto/{}\n", job.tasks);

@@ -7,7 +7,7 @@
 
 namespace esim {
 
-/// Takes the events of a recording's first camera into a sequence.
+/// Collects the events of a recording's first camera in a sequence.
 class Collector final : public Sink {
  public:
   explicit Collector(Sequence& sequence) : sequence_(sequence) {}

@@ -41,8 +41,7 @@ DatasetContents contents_named(const std::vector<std::string>& names) {
       contents.voxel_bins = name == "voxels" ? kUsualBins : bins_named(std::string_view(name).substr(7));
     } else if (name != "events") {
       throw UserError(fmt::format(
-          "contents: there are flow, displacement, depth, images, tensor and voxels=BINS beside the events, but no {}",
-          name));
+          "contents: must be of events, flow, displacement, depth, images, tensor and voxels=BINS, not '{}'", name));
     }
   }
   return contents;
@@ -90,21 +89,21 @@ SequenceArrays::SequenceArrays(const Sequence& sequence, const DatasetContents& 
     add_pair("flow", sequence.flow.x, sequence.flow.y, "motion field at flow_t, px/s: to the right, downwards");
   if (contents.displacement) {
     add_pair("displacement", sequence.displacement.x, sequence.displacement.y,
-             "from the start to the end, px: to the right, downwards; NaN where there is no image");
+             "from the start to the end, px: to the right, downwards; NaN outside the image");
   }
   const auto width = static_cast<std::uint64_t>(sequence.width), height = static_cast<std::uint64_t>(sequence.height);
   if (contents.depth) {
-    if (sequence.depth.empty()) throw UserError("contents: there is no depth; leave it out");
+    if (sequence.depth.empty()) throw UserError("contents: these sequences have no depth; remove it");
     arrays.push_back({"depth",
                       NumberType::float32,
                       {height, width},
                       sequence.depth.data(),
                       false,
-                      "m along the optical axis, at the start; inf where nothing is seen"});
+                      "m along the optical axis, at the start; inf without a surface"});
   }
   if (contents.images) {
     for (const Image<float>* image : {&sequence.first, &sequence.last}) {
-      if (image->empty()) throw UserError("contents: there are no images; leave them out");
+      if (image->empty()) throw UserError("contents: these sequences have no images; remove them");
       const Image<std::uint8_t> coded = encode_srgb(*image);
       made_->images.insert(made_->images.end(), coded.pixels().begin(), coded.pixels().end());
     }
@@ -126,11 +125,11 @@ SequenceArrays::SequenceArrays(const Sequence& sequence, const DatasetContents& 
   };
   if (contents.tensor) {
     stack("tensor", count_and_stamp(sequence.events, sequence.width, sequence.height, sequence.span, StampChoice::last),
-          "numbers of ON and OFF events, and the last one's time from 0 to 1 (EV-FlowNet)");
+          "counts of ON and OFF events, and the time of the latest, from 0 to 1 (EV-FlowNet)");
   }
   if (contents.voxel_bins > 0) {
     stack("voxels", voxel_grid(sequence.events, sequence.width, sequence.height, contents.voxel_bins, sequence.span),
-          "polarities in bins of time (Zhu et al., CVPR 2019)");
+          "polarities in time bins (Zhu et al., CVPR 2019)");
   }
 }
 
@@ -138,7 +137,7 @@ SequenceArrays::~SequenceArrays() = default;
 
 void SequenceArrays::add_pair(const std::string& name, const Image<float>& first, const Image<float>& second,
                               const char* about) {
-  if (first.empty()) throw UserError(fmt::format("contents: there is no {}; leave it out", name));
+  if (first.empty()) throw UserError(fmt::format("contents: these sequences have no {}; remove it", name));
   std::vector<float>& both = made_->floats.emplace_back(first.pixels().begin(), first.pixels().end());
   both.insert(both.end(), second.pixels().begin(), second.pixels().end());
   shard_sequence_.arrays.push_back(

@@ -10,27 +10,27 @@
 
 namespace esim {
 
-/// What is written of a sequence beside its events.
+/// The contents of a sequence in addition to its events.
 struct DatasetContents {
   bool flow = true;
   bool displacement = true;
   bool depth = false;
-  bool images = false;  ///< at the start and at the end, 8 bits, sRGB
+  bool images = false;  ///< at the start and at the end, 8-bit sRGB
   bool tensor = false;  ///< EV-FlowNet's four channels
   int voxel_bins = 0;   ///< 0: no voxel grid
 };
 
-/// "flow", "displacement", "depth", "images", "tensor", "voxels" or "voxels=BINS", which has 5 otherwise. Throws
-/// UserError naming what is none of them.
+/// Parses "flow", "displacement", "depth", "images", "tensor", "voxels" (5 bins) or "voxels=BINS". Throws UserError
+/// for any other name.
 DatasetContents contents_named(const std::vector<std::string>& names);
 
-/// The same names of contents.
+/// The inverse of contents_named().
 std::vector<std::string> names_of(const DatasetContents& contents);
 
-/// A sequence as it is written. Borrows from `sequence`, and owns what is made of it.
+/// The arrays of a sequence as they are written. Borrows from `sequence` and owns derived arrays.
 class SequenceArrays {
  public:
-  /// Throws UserError where the sequence has not what is wanted.
+  /// Throws UserError if the sequence lacks one of the contents.
   SequenceArrays(const Sequence& sequence, const DatasetContents& contents);
   ~SequenceArrays();
 

@@ -26,14 +26,14 @@ constexpr int kFormatVersion = 1;
 constexpr std::array<const char*, 2> kFormats{"hdf5", "webdataset"};
 constexpr const char* kPlanName = "dataset.json";
 constexpr const char* kLockName = ".lock";
-constexpr std::uint64_t kPlanByte = std::uint64_t{1} << 40;  // beyond those of shards
+constexpr std::uint64_t kPlanByte = std::uint64_t{1} << 40;  // beyond the bytes of shards
 
 std::string host_name() {
   std::array<char, 256> name{};
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "host";
 }
 
-/// The content of a small file; nothing where there is none.
+/// The content of a small file; empty optional if it does not exist.
 std::optional<std::string> read_text(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) return std::nullopt;
@@ -66,11 +66,11 @@ DatasetPlan plan_in(const Json& json) {
   plan.format = json.at("format").get<std::string>() == kFormats[0] ? ShardFormat::hdf5 : ShardFormat::webdataset;
   plan.contents = contents_named(json.at("contents").get<std::vector<std::string>>());
   plan.maker = json.at("made_by").dump();
-  if (plan.count < 1 || plan.shard_size < 1) throw UserError("no sequences");
+  if (plan.count < 1 || plan.shard_size < 1) throw UserError("it must have at least one sequence");
   return plan;
 }
 
-/// Where two plans differ first: "seed is 1 there, but 2 here".
+/// The first difference of two plans: "seed is 1 there, but 2 here".
 std::string difference(const Json& there, const Json& here, const std::string& within = "") {
   for (const auto& [key, value] : here.items()) {
     const auto found = there.find(key);
@@ -81,13 +81,13 @@ std::string difference(const Json& there, const Json& here, const std::string& w
     for (std::string* text : {&before, &now}) {
       if (text->size() > kMost) *text = "different";
     }
-    return before == now ? fmt::format("{}{} is another one", within, key)
+    return before == now ? fmt::format("{}{} differs", within, key)
                          : fmt::format("{}{} is {} there, but {} here", within, key, before, now);
   }
-  return "there is more in it";
+  return "it has additional options";
 }
 
-/// Whether nothing is there but what somebody leaves who has just begun a dataset.
+/// Whether the folder is empty except for files of a dataset that has just been begun.
 bool holds_nothing(const fs::path& folder) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
@@ -97,8 +97,8 @@ bool holds_nothing(const fs::path& folder) {
   return !error;
 }
 
-/// Locks a byte of the folder's lock file for as long as the descriptor that it returns is open; -1 where somebody else
-/// has it, unless it is to `wait`.
+/// Locks a byte of the folder's lock file while the returned descriptor is open. If another process has locked it,
+/// waits if `wait`, otherwise returns -1.
 int lock_byte(const fs::path& folder, std::uint64_t byte, bool wait) {
   const fs::path file = folder / kLockName;
   const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
@@ -112,7 +112,7 @@ int lock_byte(const fs::path& folder, std::uint64_t byte, bool wait) {
   const int error = errno;
   ::close(descriptor);
   if (error == EAGAIN || error == EACCES) return -1;
-  throw_cannot_write(file, "it cannot be locked: " + system_reason(error));
+  throw_cannot_write(file, "cannot lock it: " + system_reason(error));
 }
 
 }  // namespace
@@ -128,7 +128,7 @@ DatasetFolder::DatasetFolder(fs::path folder, const DatasetPlan& plan, const std
   std::error_code error;
   if (!fs::exists(file, error)) {
     if (fs::exists(folder_, error) && (!fs::is_directory(folder_, error) || !holds_nothing(folder_))) {
-      throw UserError(folder_.string() + ": is there, but is no dataset; choose another --out, or empty it");
+      throw UserError(folder_.string() + ": must be a dataset or an empty folder; choose another --out, or empty it");
     }
     create_folder(folder_);
     const int lock = lock_byte(folder_, kPlanByte, true);
@@ -140,12 +140,12 @@ DatasetFolder::DatasetFolder(fs::path folder, const DatasetPlan& plan, const std
   if (there == here) return;
   if (there.value("esim", "") != version) {
     throw UserError(
-        fmt::format("{}: was begun by esim {}, this is {}; finish it with that version, or choose another "
+        fmt::format("{}: begun by esim {}, but this is esim {}; finish it with that version, or choose another "
                     "--out",
                     folder_.string(), there.value("esim", "of an unknown version"), version));
   }
   throw UserError(
-      fmt::format("{}: is another dataset: {}; give the same options to go on with it, or choose another "
+      fmt::format("{}: contains a different dataset: {}; give the same options to continue it, or choose another "
                   "--out",
                   folder_.string(), difference(there, here)));
 }
@@ -153,13 +153,13 @@ DatasetFolder::DatasetFolder(fs::path folder, const DatasetPlan& plan, const std
 DatasetFolder::DatasetFolder(fs::path folder) : folder_(std::move(folder)) {
   const fs::path file = folder_ / kPlanName;
   const auto text = read_text(file);
-  if (!text) throw UserError(fmt::format("{}: is no dataset: it has no {}", folder_.string(), kPlanName));
+  if (!text) throw UserError(fmt::format("{}: is not a dataset: {} is missing", folder_.string(), kPlanName));
   const Json json = parse(file, *text);
   try {
     plan_ = plan_in(json);
     version_ = json.at("esim").get<std::string>();
   } catch (const std::exception&) {
-    throw UserError(file.string() + ": is damaged, or of another version of esim");
+    throw UserError(file.string() + ": is damaged, or from another version of esim");
   }
 }
 

@@ -35,19 +35,19 @@ bool is_image(const fs::path& file) {
   return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
 }
 
-/// Throws UserError for a size that is no use.
+/// Throws UserError for an unsupported size.
 void check_size(const fs::path& file, std::int64_t width, std::int64_t height) {
   if (std::min(width, height) < kLeastSide_px) {
-    throw UserError(fmt::format("image {}: {}x{} px is too small; {} on each side are needed", file.string(), width,
-                                height, kLeastSide_px));
+    throw UserError(fmt::format("image {}: {}x{} px is too small; each side must have at least {} px", file.string(),
+                                width, height, kLeastSide_px));
   }
   if (width > kMostPixels / height) {
     throw UserError(
-        fmt::format("image {}: {}x{} px is too large; 2^26 px are the limit", file.string(), width, height));
+        fmt::format("image {}: {}x{} px is too large; it must have at most 2^26 px", file.string(), width, height));
   }
 }
 
-/// The same before a decoder takes memory for it, where the file says its size.
+/// The same for the size in the file's header, if any, before a decoder allocates memory for it.
 void check_header(const fs::path& file) {
   std::vector<std::byte> head(kImageHeadBytes);
   std::ifstream stream(file, std::ios::binary);
@@ -56,7 +56,7 @@ void check_header(const fs::path& file) {
   if (const auto size = size_in_header(bytes)) check_size(file, size->width, size->height);
 }
 
-/// Smaller, as means over areas, where an image is larger than anything is seen of it.
+/// Reduces large images to means over areas.
 Image<float> reduced(Image<float> image) {
   const int side = std::max(image.width(), image.height());
   if (side <= kLargestSide_px) return image;
@@ -74,7 +74,7 @@ Image<float> reduced(Image<float> image) {
 ImageFolder::ImageFolder(fs::path folder) : folder_(std::move(folder)) {
   std::error_code error;
   if (!fs::is_directory(folder_, error))
-    throw UserError(fmt::format("{}: is no folder; name one with images in it", folder_.string()));
+    throw UserError(fmt::format("{}: must be a folder of images", folder_.string()));
   for (auto entry = fs::recursive_directory_iterator(folder_, fs::directory_options::skip_permission_denied, error);
        !error && entry != fs::recursive_directory_iterator(); entry.increment(error)) {
     std::error_code unreadable;
@@ -82,7 +82,8 @@ ImageFolder::ImageFolder(fs::path folder) : folder_(std::move(folder)) {
     files_.push_back({entry->path().lexically_relative(folder_).generic_string(), entry->file_size(unreadable)});
   }
   if (error) throw UserError(fmt::format("{}: cannot be listed: {}", folder_.string(), error.message()));
-  if (files_.empty()) throw UserError(fmt::format("{}: holds no image; PNG, JPEG, TIFF, EXR, ...", folder_.string()));
+  if (files_.empty())
+    throw UserError(fmt::format("{}: has no images; supported are PNG, JPEG, TIFF, EXR, ...", folder_.string()));
   std::sort(files_.begin(), files_.end(), [](const File& a, const File& b) { return a.name < b.name; });
 
   for (const File& file : files_) fingerprint_ = crc32(fmt::format("{}\n{}\n", file.name, file.bytes), fingerprint_);
@@ -96,7 +97,7 @@ ImageFolder::Picture ImageFolder::pick(std::uint64_t number) const {
     const std::lock_guard locked(mutex_);
     passed_over.emplace(files_[index].name, unusable_.at(index));
   }
-  throw UserError(fmt::format("{}: none of its {} images can be used; for one, {}", folder_.string(), files_.size(),
+  throw UserError(fmt::format("{}: none of its {} images can be used, for example: {}", folder_.string(), files_.size(),
                               passed_over.begin()->second));
 }
 

@@ -14,27 +14,27 @@
 
 namespace esim {
 
-/// The images in a folder and the folders in it, as luminance. They are read when they are first wanted; the latest
-/// ones are kept. Any number of threads may ask.
+/// The images in a folder and its subfolders, as luminance. Images are read on first use; the latest ones are kept.
+/// Safe to use from several threads.
 class ImageFolder {
  public:
   struct Picture {
-    std::string name;  ///< its path in the folder
+    std::string name;  ///< path relative to the folder
     std::shared_ptr<const Texture> light;
-    std::map<std::string, std::string> passed_over{};  ///< images before it that cannot be used, and why
+    std::map<std::string, std::string> passed_over{};  ///< unusable images before it and the reasons
   };
 
-  /// Lists them. Throws UserError where there is no such folder or no image in it.
+  /// Lists the images. Throws UserError if the folder does not exist or has no images.
   explicit ImageFolder(std::filesystem::path folder);
 
   std::size_t size() const { return files_.size(); }
 
-  /// The image with this number, round and round; where it is unusable, the next one that is usable. Unusable are those
-  /// that cannot be decoded, with a side of less than 32 px, or of more than 2^26 px. Throws UserError if none is left,
-  /// saying what is wrong with one of them.
+  /// Image `number` modulo size(); if it is unusable, the next usable one. Images are unusable if they cannot be
+  /// decoded, have a side of less than 32 px, or more than 2^26 px. Throws UserError if none is usable, with the reason
+  /// for one of them.
   Picture pick(std::uint64_t number) const;
 
-  /// A number that other names or sizes of the files change.
+  /// A checksum of the names and sizes of the files.
   std::uint32_t fingerprint() const { return fingerprint_; }
 
  private:
@@ -44,7 +44,7 @@ class ImageFolder {
   };
   using Kept = std::list<std::pair<std::size_t, std::shared_ptr<const Texture>>>;
 
-  /// Null where it is unusable.
+  /// Null if it is unusable.
   std::shared_ptr<const Texture> texture(std::size_t index) const;
   std::shared_ptr<const Texture> load(std::size_t index) const;
 
@@ -56,7 +56,7 @@ class ImageFolder {
   mutable Kept kept_;  // the latest first
   mutable std::map<std::size_t, Kept::iterator> where_;
   mutable std::size_t kept_texels_ = 0;
-  mutable std::map<std::size_t, std::string> unusable_;  // and why
+  mutable std::map<std::size_t, std::string> unusable_;  // with the reasons
 };
 
 }  // namespace esim

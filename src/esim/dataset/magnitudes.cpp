@@ -21,7 +21,7 @@ void normalise(std::vector<double>& shares) {
   for (double& share : shares) share /= sum;
 }
 
-/// One line of a file; false for a blank one.
+/// Reads one line of a file; false for a blank line.
 bool read_bin(const std::string& place, std::string line, MagnitudeHistogram& into) {
   line.erase(std::find(line.begin(), line.end(), '#'), line.end());
   std::istringstream words(line);
@@ -32,13 +32,13 @@ bool read_bin(const std::string& place, std::string line, MagnitudeHistogram& in
   if (!(words >> low >> high >> weight) || (words >> rest))
     throw UserError(place + ": must be three numbers, LOW HIGH WEIGHT");
   const double before = into.edges.empty() ? 0 : into.edges.back();
-  if (low != before) throw UserError(fmt::format("{}: begins at {} px, but must go on at {}", place, low, before));
+  if (low != before) throw UserError(fmt::format("{}: LOW is {} px, but must continue at {} px", place, low, before));
   if (!(high > low) || !(high <= kMostMagnitude_px))
     throw UserError(
-        fmt::format("{}: ends at {} px; must be above {} and at most {}", place, high, low, kMostMagnitude_px));
+        fmt::format("{}: HIGH is {} px, but must be above {} and at most {} px", place, high, low, kMostMagnitude_px));
   if (!(weight >= 0) || !std::isfinite(weight))
-    throw UserError(fmt::format("{}: the weight {} is no share; use 0 or more", place, weight));
-  if (into.bins() == kMostBins) throw UserError(fmt::format("{}: more than {} bins; merge some", place, kMostBins));
+    throw UserError(fmt::format("{}: WEIGHT is {}, but must be at least 0", place, weight));
+  if (into.bins() == kMostBins) throw UserError(fmt::format("{}: has more than {} bins; merge some", place, kMostBins));
   if (into.edges.empty()) into.edges.push_back(0);
   into.edges.push_back(high);
   into.shares.push_back(weight);
@@ -67,14 +67,14 @@ MagnitudeHistogram MagnitudeHistogram::scaled(double factor) const {
 }
 
 MagnitudeHistogram sintel_magnitudes() {
-  constexpr double kMedian_px = 7.334, kSigma = 1.5844;  // of the distribution before it is cut off
+  constexpr double kMedian_px = 7.334, kSigma = 1.5844;  // of the distribution before truncation
   constexpr double kLast_px = 160;
   constexpr int kBins = 21;
   const auto below = [](double px) { return 0.5 * std::erfc(-std::log(px / kMedian_px) / (kSigma * std::sqrt(2.0))); };
   MagnitudeHistogram result;
   result.source = "MPI Sintel";
   result.edges = {0};
-  for (int i = 0; i < kBins; ++i) {  // two bins to each doubling
+  for (int i = 0; i < kBins; ++i) {  // two bins per doubling
     result.edges.push_back(kLast_px * std::exp2(-0.5 * (kBins - 1 - i)));
     const double before = result.edges.end()[-2];
     result.shares.push_back(below(result.edges.back()) - (before > 0 ? below(before) : 0.0));
@@ -85,14 +85,14 @@ MagnitudeHistogram sintel_magnitudes() {
 
 MagnitudeHistogram read_magnitudes(const std::filesystem::path& file) {
   std::ifstream stream(file);
-  if (!stream) throw UserError(file.string() + ": cannot be read; name a file of lines LOW HIGH WEIGHT");
+  if (!stream) throw UserError(file.string() + ": cannot be read; must be a file of lines LOW HIGH WEIGHT");
   MagnitudeHistogram result;
   result.source = file.filename().string();
   std::string line;
   for (int number = 1; std::getline(stream, line); ++number)
     read_bin(fmt::format("{}:{}", file.string(), number), line, result);
   if (!(std::accumulate(result.shares.begin(), result.shares.end(), 0.0) > 0))
-    throw UserError(file.string() + ": holds no weight above 0; give lines LOW HIGH WEIGHT");
+    throw UserError(file.string() + ": needs at least one line LOW HIGH WEIGHT with a weight above 0");
   normalise(result.shares);
   return result;
 }

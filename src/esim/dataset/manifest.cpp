@@ -40,7 +40,7 @@ std::string manifest_text(const DatasetFolder& folder, const DatasetState& state
   return manifest.dump(1) + "\n";
 }
 
-/// The numbers of all shards' pixels by magnitude.
+/// The pixel counts of all shards by magnitude.
 std::vector<std::uint64_t> magnitudes_of(const DatasetState& state) {
   std::vector<std::uint64_t> sum;
   for (const ShardRecord& record : state.shards) {
@@ -79,7 +79,7 @@ std::string text_of_file(const fs::path& path) {
   return std::move(text).str();
 }
 
-/// What is wrong with a shard's content; empty: nothing.
+/// The problem of a shard's content; empty if it is correct.
 std::string problem_of(const fs::path& path, const ShardRecord& record) {
   const std::uint32_t checksum = checksum_of(path).crc32;
   if (checksum == record.crc32) return {};
@@ -107,7 +107,7 @@ DatasetState survey_dataset(const DatasetFolder& folder) {
 
 void write_manifest(const DatasetFolder& folder, const DatasetState& state, const MagnitudeHistogram& magnitudes,
                     bool is_target) {
-  // Several processes may get here at the same time: one of them is enough.
+  // Several processes may arrive here at the same time; only one of them writes.
   const std::uint32_t beyond = folder.plan().shards();
   const ShardLock lock(folder, beyond);
   if (!lock.owned()) return;
@@ -143,7 +143,7 @@ std::vector<std::string> check_dataset(const DatasetFolder& folder) {
   const fs::path manifest = folder.path() / kManifestName;
   if (state.complete() && text_of_file(manifest) != manifest_text(folder, state)) {
     problems.push_back(manifest.string() +
-                       ": is missing, or does not fit the files; run the command that makes the dataset again");
+                       ": is missing or does not match the files; run the command that makes the dataset again");
   }
   return problems;
 }

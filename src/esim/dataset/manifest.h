@@ -9,23 +9,23 @@
 
 namespace esim {
 
-/// What there is of a dataset.
+/// The existing part of a dataset.
 struct DatasetState {
-  std::vector<ShardRecord> shards{};     ///< that are whole, in order
-  std::vector<std::uint32_t> missing{};  ///< numbers of the others
+  std::vector<ShardRecord> shards{};     ///< complete ones, in order
+  std::vector<std::uint32_t> missing{};  ///< numbers of the other shards
   std::uint64_t sequences = 0, events = 0, bytes = 0;
   bool complete() const { return missing.empty(); }
 };
 
-/// Reads the records; what is in the files is not looked at.
+/// Reads the records without reading the files.
 DatasetState survey_dataset(const DatasetFolder& folder);
 
-/// Writes manifest.json, report.json and magnitudes.png of a dataset that is whole, unless another process is doing it.
+/// Writes manifest.json, report.json and magnitudes.png of a complete dataset, unless another process is doing so.
 void write_manifest(const DatasetFolder& folder, const DatasetState& state, const MagnitudeHistogram& magnitudes,
                     bool is_target);
 
-/// Reads every file, and holds it against its record, the records against the plan, and the manifest against both.
-/// Returns what is wrong, a line for each; none: every sequence is there once.
+/// Reads every file and compares it with its record, the records with the plan, and the manifest with both. Returns one
+/// line per problem; empty if every sequence exists exactly once.
 std::vector<std::string> check_dataset(const DatasetFolder& folder);
 
 }  // namespace esim

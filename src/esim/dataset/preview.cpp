@@ -14,7 +14,7 @@ namespace {
 
 constexpr Rgb kTargetColour{222, 120, 24};
 
-/// Events over the dimmed image, as in recordings' previews.
+/// Events over the dimmed image, as in previews of recordings.
 Image<Rgb> draw_events(const Sequence& sequence) {
   Image<float> on(sequence.width, sequence.height), off(sequence.width, sequence.height);
   for (const Event& event : sequence.events) ++(event.polarity > 0 ? on : off)(event.x, event.y);
@@ -39,7 +39,7 @@ double mean_magnitude(const VectorField& field) {
   return sum / static_cast<double>(field.x.size());
 }
 
-/// The histogram's outline: shares per doubling, over the magnitude.
+/// The histogram's outline: fractions per doubling over the magnitude.
 std::vector<DataPoint> outline(const MagnitudeHistogram& bins, const std::vector<double>& shares, double least) {
   std::vector<DataPoint> points;
   for (std::size_t i = 0; i < shares.size(); ++i) {
@@ -64,7 +64,7 @@ Image<Rgb> draw_sequences(std::span<const Sequence> sequences) {
     canvas.draw(draw_events(sequence), width + kGap_px, 0);
     canvas.draw(draw_flow(sequence), 2 * (width + kGap_px), 0);
     pictures.push_back(
-        {std::move(canvas).take(), fmt::format("{}:  {} events,  mean displacement {:.3g} px", sequence.index,
+        {std::move(canvas).take(), fmt::format("{}:  {} events,  mean optical flow {:.3g} px", sequence.index,
                                                sequence.events.size(), mean_magnitude(sequence.displacement))});
   }
   return draw_contact_sheet(pictures, kColumns, kDarkTheme);
@@ -88,8 +88,8 @@ Image<Rgb> draw_magnitudes(const MagnitudeHistogram& bins, bool is_target, std::
     for (const DataPoint& point : *points) top = std::max(top, 1.15 * point.y);
   }
   Canvas canvas(kWidth, kHeight, kPaper);
-  Axes axes(canvas, {80, 62, kWidth - 110, kHeight - 122}, "Displacement of the pixels over a sequence",
-            decade_scale(least, most, "magnitude, px"), linear_scale(0, top, "% of the pixels per doubling"));
+  Axes axes(canvas, {80, 62, kWidth - 110, kHeight - 122}, "Optical flow of the pixels over a sequence",
+            decade_scale(least, most, "magnitude, px"), linear_scale(0, top, "% of pixels per doubling"));
   for (std::size_t i = 0; i + 1 < made.size(); i += 2)
     axes.fill(made[i].x, made[i + 1].x, 0, made[i].y, mix(kBarColour, kPaper, 0.5F));
   axes.line(target, kTargetColour, 3);

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Counts pixels by the magnitude of their displacement.
+/// Counts pixels by the magnitude of their optical flow.
 void count_magnitudes(const VectorField& displacement, const MagnitudeHistogram& bins,
                       std::vector<std::uint64_t>& counts) {
   for (std::size_t i = 0; i < displacement.x.size(); ++i) {
@@ -33,7 +33,7 @@ std::unique_ptr<ShardWriter> make_writer(ShardFormat format, const fs::path& fil
   return format == ShardFormat::hdf5 ? make_hdf5_shard(file) : make_tar_shard(file);
 }
 
-/// A file that is being written, and is removed unless it is kept.
+/// A temporary file, which is removed unless it is kept.
 struct WorkingFile {
   fs::path path;
   bool kept = false;
@@ -83,7 +83,7 @@ class Run {
     }
   }
 
-  /// Makes a shard unless another process does.
+  /// Makes a shard unless another process makes it.
   void take(std::uint32_t shard) {
     const ShardLock lock(folder_, shard);
     if (!lock.owned()) {
@@ -128,7 +128,7 @@ class Run {
     folder_.write_record(record);
   }
 
-  /// False where the production is to end.
+  /// False if the production must end.
   bool count_made(std::uint64_t events) {
     const std::lock_guard locked(mutex_);
     ++result_.progress.done;
@@ -151,7 +151,7 @@ class Run {
   std::atomic<std::size_t> next_ = 0;
   std::atomic<bool> stop_ = false;
 
-  std::mutex mutex_;  // of what follows
+  std::mutex mutex_;  // of the members below
   Production result_;
   std::exception_ptr problem_;
 };

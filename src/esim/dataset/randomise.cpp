@@ -14,7 +14,7 @@ namespace {
 
 constexpr const char* kKey = "randomise";
 
-/// What a distribution is read from, and who is told what is wrong with it.
+/// The place of a distribution in the file, for messages.
 struct Place {
   std::string name;
   std::string key;
@@ -39,19 +39,19 @@ std::pair<Number, Number> two_numbers(const Place& place, const YAML::Node& valu
   place.fail(fmt::format("must be a list of two numbers, {}", names));
 }
 
-/// LOW and HIGH in order.
+/// Reads LOW and HIGH, LOW first.
 template <typename Number>
 std::pair<Number, Number> range(const Place& place, const YAML::Node& value, Number least) {
   const auto [low, high] = two_numbers<Number>(place, value, "[LOW, HIGH]");
-  if (low > high) place.fail(fmt::format("{} is above {}; swap them", low, high));
-  if (low < least) place.fail(fmt::format("{} is below {}", low, least));
+  if (low > high) place.fail(fmt::format("LOW is {}, but must be at most HIGH, {}; swap them", low, high));
+  if (low < least) place.fail(fmt::format("LOW is {}, but must be at least {}", low, least));
   return {low, high};
 }
 
 Distribution read_distribution(const Place& place) {
   constexpr const char* kKinds = "uniform, log_uniform, normal, integer or choice";
   if (!place.node.IsMap() || place.node.size() != 1)
-    place.fail(fmt::format("must be one of {}, as in {{uniform: [0.1, 0.5]}}", kKinds));
+    place.fail(fmt::format("must be a map with one key of {}, as in {{uniform: [0.1, 0.5]}}", kKinds));
   const std::string kind = place.node.begin()->first.Scalar();
   const YAML::Node value = place.node.begin()->second;
   constexpr double kLowest = std::numeric_limits<double>::lowest();
@@ -65,12 +65,12 @@ Distribution read_distribution(const Place& place) {
   }
   if (kind == "normal") {
     const auto [mean, deviation] = two_numbers<double>(place, value, "[MEAN, DEVIATION]");
-    if (deviation < 0) place.fail(fmt::format("a standard deviation of {}; must be 0 or more", deviation));
+    if (deviation < 0) place.fail(fmt::format("DEVIATION is {}, but must be at least 0", deviation));
     return Normal{mean, deviation};
   }
   if (kind == "integer") {
     const auto [low, high] = range<std::int64_t>(place, value, -(std::int64_t{1} << 53));
-    if (high - low >= std::int64_t{1} << 53) place.fail("is too wide a range; 2^53 is the limit");
+    if (high - low >= std::int64_t{1} << 53) place.fail("the range must be smaller than 2^53");
     return WholeNumber{low, high};
   }
   if (kind == "choice") {
@@ -83,7 +83,7 @@ Distribution read_distribution(const Place& place) {
     }
     return choice;
   }
-  place.fail(fmt::format("{} is no distribution; use {}", kind, kKinds));
+  place.fail(fmt::format("unknown distribution '{}'; use {}", kind, kKinds));
 }
 
 }  // namespace
@@ -119,7 +119,7 @@ ScenarioTemplate read_template(const std::string& text, const std::string& name)
   } catch (const YAML::Exception& error) {
     throw UserError(fmt::format("{}:{}: {}", name, error.mark.line + 1, error.msg));
   }
-  if (!root.IsMap()) throw UserError(name + ": is no scenario: it has no keys");
+  if (!root.IsMap()) throw UserError(name + ": must be a scenario, which is a map of keys and values");
   ScenarioTemplate result;
   const YAML::Node random = std::as_const(root)[kKey];
   if (random.IsDefined()) {

@@ -8,7 +8,7 @@
 
 namespace esim {
 
-// How a value is drawn.
+// Distributions of values.
 struct Uniform {
   double low = 0, high = 0;
 };
@@ -26,16 +26,16 @@ struct Choice {
 };
 using Distribution = std::variant<Uniform, LogUniform, Normal, WholeNumber, Choice>;
 
-/// An option of a scenario by its dotted key, and what it is drawn from.
+/// An option of a scenario, by its dotted key, and its distribution.
 struct RandomOption {
   std::string key{};
   Distribution distribution{};
 };
 
-/// A value as YAML: a function of the seed, the number of the sequence, and which option it is for.
+/// A random value as YAML. Depends on the seed, the number of the sequence and the option only.
 std::string draw(const Distribution& distribution, std::uint64_t seed, std::uint32_t sequence, std::uint16_t option);
 
-/// A scenario of which some options are drawn.
+/// A scenario with random options.
 struct ScenarioTemplate {
   std::string yaml{};                   ///< without `randomise`
   std::vector<RandomOption> options{};  ///< in the order of the file
@@ -46,8 +46,8 @@ struct ScenarioTemplate {
 ///       event_camera.contrast_threshold: {uniform: [0.1, 0.5]}
 ///       camera.width: {integer: [100, 300]}
 ///       renderer.image: {choice: [a.png, b.png]}
-/// and log_uniform: [LOW, HIGH] and normal: [MEAN, DEVIATION] likewise. Throws UserError naming `name`, the key and
-/// what would be right; whether the keys are options of a scenario shows when one is read.
+/// and likewise log_uniform: [LOW, HIGH] and normal: [MEAN, DEVIATION]. Throws UserError with `name`, the key and the
+/// valid values. Unknown keys are reported later, when a scenario is read.
 ScenarioTemplate read_template(const std::string& text, const std::string& name);
 
 }  // namespace esim

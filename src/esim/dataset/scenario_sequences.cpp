@@ -21,13 +21,13 @@ constexpr const char* kSetterOfDrawn = "randomise: ";
 
 std::string text_of(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw UserError(file.string() + ": cannot be read; name a scenario, or affine");
+  if (!stream) throw UserError(file.string() + ": cannot be read; must be a scenario file, or affine");
   std::ostringstream text;
   text << stream.rdbuf();
   return std::move(text).str();
 }
 
-/// The values at which a distribution may leave an option's range.
+/// The extreme values of a distribution, which may be outside an option's range.
 std::vector<std::string> extremes(const Distribution& distribution) {
   struct Extremes {
     std::vector<std::string> operator()(const Uniform& d) const {
@@ -64,8 +64,8 @@ ScenarioSequences::ScenarioSequences(const std::filesystem::path& file, std::vec
     for (const std::string& value : extremes(option.distribution)) read({option.key + "=" + value}, kSetterOfDrawn);
   }
   if (scenario.cameras.size() != 1) {
-    throw UserError(
-        fmt::format("{}: has {} cameras, but a sequence has one; keep one", file_.string(), scenario.cameras.size()));
+    throw UserError(fmt::format("{}: has {} cameras, but must have one; remove the others", file_.string(),
+                                scenario.cameras.size()));
   }
 }
 
@@ -104,7 +104,7 @@ Sequence ScenarioSequences::make(std::uint32_t index) const {
                                      .overrides = std::move(set),
                                      .setter = kSetterOfDrawn});
 
-  // Nothing but the events and the two instants counts.
+  // Only the events and the ground truth at the two instants are needed.
   scenario.truth = TruthOptions{};
   scenario.truth.rate_hz = 0;
   scenario.imu.reset();

@@ -10,14 +10,14 @@
 
 namespace esim {
 
-/// Sequences of a scenario, with options that are drawn for each of them (docs/dataset.md). The scenario's one camera
-/// is simulated from start to end. Ground truth is that of the first and of the last instant: the motion field at the
-/// end, the displacement from the one to the other, depth at the start, images of both. A sequence is a function of the
-/// scenario, the seed and its index; `seed` of the scenario is drawn, unless `randomise` names it.
+/// Sequences of a scenario, with random options for each of them (docs/dataset.md). The scenario has one camera and is
+/// simulated from start to end. Ground truth is given for the first and the last instant: the motion field at the end,
+/// the optical flow from start to end, depth at the start, images of both. A sequence depends on the scenario, the seed
+/// and its index only. The scenario's `seed` is random unless `randomise` contains it.
 class ScenarioSequences final : public SequenceMaker {
  public:
-  /// `overrides` are "key=value" as of `--set`. Throws UserError for a scenario that cannot be read, of which the first
-  /// sequence serves as a sample, for several cameras, and for ground truth that the renderer does not have.
+  /// `overrides` are "key=value" as for `--set`. Throws UserError if the scenario cannot be read (tested with the first
+  /// sequence), if it has several cameras, and for ground truth that the renderer does not support.
   ScenarioSequences(const std::filesystem::path& file, std::vector<std::string> overrides, std::uint64_t seed,
                     bool displacement);
 
@@ -27,7 +27,7 @@ class ScenarioSequences final : public SequenceMaker {
   Sequence make(std::uint32_t index) const override;
 
  private:
-  /// What is set for a sequence, as "key=value".
+  /// The overrides of a sequence, as "key=value".
   std::vector<std::string> drawn(std::uint32_t index) const;
 
   std::filesystem::path file_;

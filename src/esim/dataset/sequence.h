@@ -18,7 +18,7 @@ struct VectorField {
   bool empty() const { return x.empty(); }
 };
 
-/// One labelled sequence of a dataset. What it does not have is empty.
+/// One labelled sequence of a dataset. Missing contents are empty.
 struct Sequence {
   std::uint32_t index = 0;
   int width = 0, height = 0;
@@ -27,12 +27,12 @@ struct Sequence {
 
   TimeNs flow_t = 0;
   VectorField flow{};            ///< motion field at flow_t, px/s
-  VectorField displacement{};    ///< of the points that the pixels see at the start, until the end, px
+  VectorField displacement{};    ///< optical flow from the start to the end, at the pixels of the start, px
   Image<float> first{}, last{};  ///< irradiance at the start and at the end
-  Image<float> depth{};          ///< at the start, m; +inf where nothing is seen
+  Image<float> depth{};          ///< at the start, m; +inf without a surface
 
-  std::string info{};                                ///< what was drawn for it, as JSON
-  std::map<std::string, std::string> passed_over{};  ///< what was drawn, but could not be used, and why
+  std::string info{};                                ///< its random values, as JSON
+  std::map<std::string, std::string> passed_over{};  ///< unusable images and the reasons
 };
 
 }  // namespace esim

@@ -8,19 +8,19 @@
 
 namespace esim {
 
-/// What makes the sequences of a dataset.
+/// The source of the sequences of a dataset.
 class SequenceMaker {
  public:
   virtual ~SequenceMaker() = default;
 
-  /// Everything that its sequences depend on, as JSON.
+  /// All options on which the sequences depend, as JSON.
   virtual std::string options() const = 0;
 
-  /// In whose bins magnitudes of displacement are counted, and with which they are compared if it `is_target()`.
+  /// The bins in which magnitudes of optical flow are counted; if `is_target()`, also the distribution to compare with.
   virtual const MagnitudeHistogram& magnitudes() const = 0;
   virtual bool is_target() const = 0;
 
-  /// A function of the options and the index alone. Any number of threads may call it.
+  /// A function of the options and the index only. Safe to call from several threads.
   virtual Sequence make(std::uint32_t index) const = 0;
 };
 

@@ -14,7 +14,7 @@
 
 namespace esim {
 
-/// Everything that determines the conversion of a video to events, as values.
+/// All options of a conversion of a video to events.
 struct ConversionOptions {
   std::filesystem::path input;
   std::uint64_t seed = 0;
@@ -24,13 +24,13 @@ struct ConversionOptions {
   EventCameraOptions event_camera;
 };
 
-/// What `esim video` has an option of its own for.
+/// Options that `esim video` has on its command line.
 template <class Visitor>
 void describe_command_line(Visitor& visit, ConversionOptions& o) {
   visit("seed", o.seed, About{"seed of all random numbers"});
   describe(visit, o.video);
   describe(visit, o.interpolation);
-  visit("bayer", o.bayer, About{"events of a colour sensor: RGGB filters, red at even columns and rows"});
+  visit("bayer", o.bayer, About{"simulate a colour sensor: RGGB filters, red at even columns and rows"});
 }
 
 template <class Visitor>
@@ -43,8 +43,8 @@ void describe(Visitor& visit, ConversionOptions& o) {
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<Encoding>{"auto", "srgb", "linear"};
 
-/// The event camera that "event_camera.key=value", or "key=value" for short, make of the default one. Throws UserError
-/// with key and what would be right, beginning with `setter`.
+/// The default event camera with overrides "event_camera.key=value", or "key=value" for short. Throws UserError, which
+/// begins with `setter`, with the key and the valid values.
 EventCameraOptions read_event_camera(const std::vector<std::string>& overrides, const std::string& setter = kSetter);
 
 /// A camera's options in full as YAML.

@@ -11,7 +11,7 @@ namespace esim {
 Eigen::Quaterniond looking_along(const Eigen::Vector3d& direction) {
   const Eigen::Vector3d z = direction.normalized();
   Eigen::Vector3d x = z.cross(Eigen::Vector3d::UnitZ());
-  if (x.norm() < 1e-6) x = Eigen::Vector3d::UnitX();  // straight up or down: any level x will do
+  if (x.norm() < 1e-6) x = Eigen::Vector3d::UnitX();  // straight up or down: any level x is valid
   x.normalize();
   Eigen::Matrix3d R;
   R << x, z.cross(x), z;
@@ -21,16 +21,15 @@ Eigen::Quaterniond looking_along(const Eigen::Vector3d& direction) {
 SE3 pose_of(const PoseOptions& options, const Eigen::Quaterniond& otherwise) {
   SE3 pose{otherwise, options.position};
   if (options.quaternion && options.look_at) {
-    throw UserError("a pose has both quaternion and look_at; remove one of them");
+    throw UserError("quaternion and look_at must not both be given; remove one of them");
   }
   if (options.quaternion) {
-    if (!(options.quaternion->norm() > 1e-6))
-      throw UserError("quaternion [0, 0, 0, 0] is no orientation; use [0, 0, 0, 1]");
+    if (!(options.quaternion->norm() > 1e-6)) throw UserError("quaternion must not be [0, 0, 0, 0]; use [0, 0, 0, 1]");
     pose.rotation = Eigen::Quaterniond(options.quaternion->normalized());
   }
   if (options.look_at) {
     const Eigen::Vector3d direction = *options.look_at - options.position;
-    if (!(direction.norm() > 1e-9)) throw UserError("look_at is the position itself; name another point");
+    if (!(direction.norm() > 1e-9)) throw UserError("look_at must differ from position; choose another point");
     pose.rotation = looking_along(direction);
   }
   return pose;

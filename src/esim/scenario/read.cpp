@@ -14,8 +14,8 @@
 namespace esim {
 namespace {
 
-/// What a camera inherits for `key`: the shared map, overridden entry by entry by its own. A map of another type
-/// replaces the shared one.
+/// The map that applies to a camera: the shared map, overridden entry by entry by the camera's own. A map with another
+/// `type` replaces the shared one.
 YAML::Node inherit(const YAML::Node& shared, const YAML::Node& own) {
   if (!shared.IsDefined() || !own.IsDefined()) return own.IsDefined() ? own : shared;
   if (!shared.IsMap() || !own.IsMap()) return own;
@@ -26,7 +26,7 @@ YAML::Node inherit(const YAML::Node& shared, const YAML::Node& own) {
   return merged;
 }
 
-/// One camera for each of its calibration file's, or itself.
+/// One camera for each camera of the calibration file; the camera itself if it names none.
 std::vector<CameraOptions> with_calibration(const CameraOptions& options) {
   if (options.calibration.empty()) return {options};
   std::vector<CameraOptions> cameras;
@@ -49,20 +49,20 @@ std::vector<CameraOptions> with_calibration(const CameraOptions& options) {
   return cameras;
 }
 
-/// Keys of a camera that its calibration file would override.
+/// Throws OptionError for keys of a camera that its calibration file would override.
 void refuse_geometry_beside_calibration(const YAML::Node& entry, const std::string& key, const YamlSource& source) {
   if (!entry["calibration"].IsDefined()) return;
   for (const char* name :
        {"width", "height", "horizontal_fov_deg", "fx", "fy", "cx", "cy", "distortion", "T_body_camera"}) {
     if (entry[name].IsDefined()) {
       YamlReader::fail(source, entry[name], key + "." + name,
-                       "is given by the calibration file as well; remove one of them");
+                       "must not be given together with a calibration file, which sets it; remove one of them");
     }
   }
 }
 
-/// Where a scenario does not say. Whole images are sampled by flow, and so is what is not `described`: a renderer of
-/// the user's own, and motion that becomes known on the way.
+/// The default sampling method: flow for renderers of complete images and for parts that the scenario does not
+/// describe (custom renderers and online motion), keyframes if another program renders, otherwise adaptive.
 SamplingOptions usual_sampling(const RendererOptions& renderer, bool described) {
   if (engine_objects(renderer) != nullptr) return KeyframeSampling{};
   const auto* const mesh = std::get_if<MeshRendererOptions>(&renderer);
@@ -71,12 +71,12 @@ SamplingOptions usual_sampling(const RendererOptions& renderer, bool described) 
   return FlowSampling{};
 }
 
-/// `otherwise` holds what a camera is where it does not say.
+/// `otherwise` holds the default values of a camera.
 std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource& source,
                                         const CameraOptions& otherwise) {
   const YAML::Node one = root["camera"], several = root["cameras"];
   if (one.IsDefined() && several.IsDefined())
-    YamlReader::fail(source, several, "cameras", "camera is given as well; remove one of them");
+    YamlReader::fail(source, several, "cameras", "must not be given together with camera; remove one of them");
   if (several.IsDefined() && (!several.IsSequence() || several.size() == 0))
     YamlReader::fail(source, several, "cameras", "must be a list of at least one camera");
 
@@ -102,12 +102,13 @@ std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource
   return cameras;
 }
 
-/// Puts what an IMU's calibration file says in its place.
+/// Replaces the calibration file of an IMU by its contents.
 void read_imu(RigImuOptions& imu, const YAML::Node& node, const YamlSource& source) {
   if (imu.calibration.empty()) return;
   const auto refuse = [&](const YAML::Node& given, const std::string& key) {
     if (given.IsDefined())
-      YamlReader::fail(source, given, "imu." + key, "is given by the calibration file as well; remove one of them");
+      YamlReader::fail(source, given, "imu." + key,
+                       "must not be given together with a calibration file, which sets it; remove one of them");
   };
   refuse(node["rate_hz"], "rate_hz");
   for (const std::string sensor : {"gyroscope", "accelerometer"}) {
@@ -123,7 +124,7 @@ void read_imu(RigImuOptions& imu, const YAML::Node& node, const YamlSource& sour
   imu.accelerometer.random_walk = calibrated.accelerometer_random_walk;
 }
 
-/// Gives every camera a name of its own, fit for a folder.
+/// Gives every camera a unique name that is also valid for a folder.
 void name_cameras(std::vector<CameraOptions>& cameras, const YamlSource& source) {
   std::set<std::string> names;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -133,18 +134,19 @@ void name_cameras(std::vector<CameraOptions>& cameras, const YamlSource& source)
         name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == std::string::npos;
     if (!plain)
       throw UserError(
-          fmt::format("{}: camera name '{}': use letters, digits, _ and - only", source.file.string(), name));
+          fmt::format("{}: camera name '{}': must consist of letters, digits, _ and -", source.file.string(), name));
     if (!names.insert(name).second)
-      throw UserError(fmt::format("{}: two cameras are named {}; name them apart", source.file.string(), name));
+      throw UserError(fmt::format("{}: two cameras are named {}; rename one", source.file.string(), name));
   }
 }
 
-/// Puts the layers of a scene file, where one is named, in its place; the camera becomes as large as the file says.
+/// Replaces the scene file, if given, by its sprites; the camera gets the size given in the file.
 void read_layers(SpritesRendererOptions& renderer, const YAML::Node& node, const YamlSource& source,
                  CameraOptions& camera) {
   if (renderer.scene.empty()) return;
   if (!renderer.layers.empty()) {
-    YamlReader::fail(source, node["layers"], "renderer.layers", "are given by the scene file as well; remove one");
+    YamlReader::fail(source, node["layers"], "renderer.layers",
+                     "must not be given together with a scene file, which sets them; remove one");
   }
   SpriteSceneFile scene = read_sprite_scene(renderer.scene, renderer.search_path);
   renderer.layers = std::move(scene.layers);
@@ -153,15 +155,16 @@ void read_layers(SpritesRendererOptions& renderer, const YAML::Node& node, const
   camera.width = scene.width, camera.height = scene.height;
 }
 
-/// Puts the points of a file, where one is named, in its place.
+/// Replaces the file of waypoints, if given, by its points.
 void read_points(TrajectoryOptions& trajectory, const YAML::Node& node, const std::string& key,
                  const YamlSource& source, bool may_be_missing) {
   auto* const options = std::get_if<WaypointTrajectoryOptions>(&trajectory);
   if (options == nullptr) return;
   if (!options->file.empty() && !options->points.empty())
-    YamlReader::fail(source, node["points"], key + ".points", "are given by the file as well; remove one of them");
+    YamlReader::fail(source, node["points"], key + ".points",
+                     "must not be given together with file; remove one of them");
   if (options->file.empty() && options->points.empty())
-    YamlReader::fail(source, node, key, "has no points; list them, or name a file of them in file");
+    YamlReader::fail(source, node, key, "has no points; list them in points, or name a file of waypoints in file");
   std::error_code error;
   if (options->file.empty() || (may_be_missing && !std::filesystem::exists(options->file, error))) return;
   options->points = read_waypoints(options->file);
@@ -169,7 +172,7 @@ void read_points(TrajectoryOptions& trajectory, const YAML::Node& node, const st
   options->file.clear();
 }
 
-/// The last keyframe of any layer; 0 where there is none.
+/// The time of the last keyframe of all sprites; 0 without keyframes.
 double last_keyframe_s(const SpritesRendererOptions& renderer) {
   double last = 0;
   for (const LayerOptions& layer : renderer.layers) {
@@ -178,8 +181,8 @@ double last_keyframe_s(const SpritesRendererOptions& renderer) {
   return last;
 }
 
-/// Layers lie on the sensor: a scenario of them needs no trajectory, and where it has none that ends by itself, it ends
-/// with the layers' motion.
+/// Sprites lie on the sensor, so that their scenario needs no trajectory. Unless its trajectory defines a duration, it
+/// ends with the last keyframe.
 void complete_for_layers(Scenario& scenario, const SpritesRendererOptions& renderer, bool has_trajectory) {
   if (!has_trajectory) scenario.trajectory = StaticTrajectoryOptions{};
   const double end_s = last_keyframe_s(renderer);
@@ -188,7 +191,7 @@ void complete_for_layers(Scenario& scenario, const SpritesRendererOptions& rende
   if (scenario.duration_s || end_s <= 0 || has_end) return;
   if (scenario.start_s >= end_s) {
     throw UserError(
-        fmt::format("start_s: {} s is beyond the last keyframe of the layers, at {} s; start earlier, or set "
+        fmt::format("start_s: {} s is beyond the last keyframe of the sprites, at {} s; start earlier, or set "
                     "duration_s",
                     scenario.start_s, end_s));
   }
@@ -224,7 +227,7 @@ Scenario read_scenario(const ScenarioText& text) {
   auto* const sprites = std::get_if<SpritesRendererOptions>(&scenario.renderer);
   const auto require = [&](const char* key, bool needed) {
     if (needed && !std::as_const(root)[key].IsDefined() && sprites == nullptr)
-      YamlReader::fail(source, YAML::Node(YAML::NodeType::Undefined), key, "is missing; every scenario needs one");
+      YamlReader::fail(source, YAML::Node(YAML::NodeType::Undefined), key, "is missing; every scenario needs it");
   };
   require("renderer", text.needs_renderer);
   require("trajectory", text.needs_trajectory);

@@ -10,18 +10,18 @@
 
 namespace esim {
 
-/// Reads a scenario from a YAML file. Relative paths in it are taken from the file's folder, and ${NAME} stands for an
+/// Reads a scenario from a YAML file. Relative paths in it start at the file's folder, and ${NAME} stands for an
 /// environment variable.
 ///
-/// Cameras are a list under `cameras`, or a single one under `camera` (default: one camera of default values); the keys
-/// `sampling`, `event_camera` and `frame_camera` at the top hold for every camera that does not set them itself. A
-/// camera's calibration file is read here: the result holds explicit geometry only.
+/// Cameras are a list under `cameras`, or a single one under `camera` (default: one camera with default values). The
+/// keys `sampling`, `event_camera` and `frame_camera` at the top apply to every camera that does not set them itself.
+/// Calibration files are read here: the result has explicit geometry only.
 ///
-/// `overrides` are "dotted.key=value" and come last. Throws UserError, most often an OptionError, with file, line, key,
-/// and what would be right.
+/// `overrides` ("dotted.key=value") are applied last. Throws UserError, usually an OptionError, with file, line, key
+/// and the valid values.
 Scenario read_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides = {});
 
-/// What is wrong with one option of a scenario. The message has the file and the line too.
+/// An invalid option of a scenario. The message also has the file and the line.
 class OptionError : public UserError {
  public:
   OptionError(const std::string& message, std::string key, std::string problem)
@@ -34,41 +34,41 @@ class OptionError : public UserError {
   std::string key_, problem_;
 };
 
-/// What messages about overrides begin with, unless told otherwise: they are options of a command.
+/// The default beginning of messages about overrides, which are options of a command.
 inline constexpr const char* kSetter = "--set ";
 
-/// A scenario that a program has put together.
+/// A scenario as text, with options for reading it.
 struct ScenarioText {
   std::string yaml;
-  std::filesystem::path file;  ///< names it in messages; relative paths are taken from its folder; it need not exist
+  std::filesystem::path file;  ///< for messages, and its folder for relative paths; it need not exist
   bool has_lines = true;       ///< messages name the lines of `yaml`
   std::vector<std::string> overrides;
-  std::string setter = kSetter;  ///< what messages about overrides begin with
-  bool needs_renderer = true;    ///< false: whoever simulates it brings its own, and the key may be missing
-  bool needs_trajectory = true;  ///< likewise
-  bool needs_waypoints = true;   ///< false: a file of way points may be missing, since it is yet to be written
+  std::string setter = kSetter;  ///< beginning of messages about overrides
+  bool needs_renderer = true;    ///< false: the key may be missing, since the caller brings its own renderer
+  bool needs_trajectory = true;  ///< false: the key may be missing, since the caller brings its own trajectory
+  bool needs_waypoints = true;   ///< false: the file of waypoints may not exist yet
 
-  /// Where set: told of every file that the text names, before it is read; what it returns, if anything, is what is
-  /// wrong with naming it.
+  /// If set, called for every file that the text names, before it is read. Returns why the file may not be used, or an
+  /// empty text.
   std::function<std::string(const std::filesystem::path& file)> refuses{};
 };
 
-/// The same from text.
+/// Reads a scenario from text.
 Scenario read_scenario(const ScenarioText& text);
 
-/// The same from a file, whose text and name replace those of `otherwise`.
+/// Reads a scenario from a file, whose text and name replace those of `otherwise`.
 Scenario read_scenario(const std::filesystem::path& file, ScenarioText otherwise);
 
 /// The scenario in full, every option explicit, as YAML: reading it back gives the same scenario.
 std::string write_scenario(const Scenario& scenario);
 
-/// A way of sampling in full, as YAML.
+/// A sampling method with all its options, as YAML.
 std::string write_sampling(const SamplingOptions& options);
 
-/// Every option with type, default, unit, range and help, as text for a person.
+/// Every option with type, default, unit, range and help, as text for users.
 std::string scenario_reference();
 
-/// The geometry that `options` describe. Throws UserError where it is impossible.
+/// The geometry that `options` describe. Throws UserError if it is impossible.
 Camera camera_model(const CameraOptions& options);
 
 }  // namespace esim

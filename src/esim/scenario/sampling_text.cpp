@@ -21,8 +21,7 @@ YAML::Node map_of_words(const std::string& text) {
   while (words >> word) {
     const std::size_t equals = word.find('=');
     if (equals == std::string::npos || equals == 0)
-      throw UserError(
-          fmt::format("scheme '{}': '{}' is no option; write key=value, as in 'flow lambda=0.5'", text, word));
+      throw UserError(fmt::format("scheme '{}': expected key=value, as in 'flow lambda=0.5', not '{}'", text, word));
     map[word.substr(0, equals)] = word.substr(equals + 1);
   }
   return map;
@@ -32,7 +31,7 @@ YAML::Node map_of(const std::string& text) {
   if (text.find('{') == std::string::npos) return map_of_words(text);
   try {
     YAML::Node map(YAML::NodeType::Map);
-    // Copied as plain text, which has no line numbers for messages to name.
+    // A copy without line numbers, which would appear in messages.
     for (const auto& entry : YAML::Load(text)) map[entry.first.Scalar()] = entry.second.Scalar();
     return map;
   } catch (const YAML::Exception& exception) {
@@ -45,7 +44,7 @@ struct Entry {
   bool operator==(const Entry&) const = default;
 };
 
-/// The options in their order, the type first.
+/// The options in order, the type first.
 std::vector<Entry> entries(const SamplingOptions& options) {
   std::vector<Entry> all;
   for (const auto& entry : YAML::Load(write_sampling(options))) {

@@ -56,7 +56,7 @@ struct WaypointPointOptions : PoseOptions {
   std::optional<double> t, speed, pause_s;
 };
 
-/// Where `file` names a file, the points come from there.
+/// If `file` is given, the points come from there.
 struct WaypointTrajectoryOptions {
   static constexpr const char* kType = "waypoints";
   std::filesystem::path file;
@@ -67,7 +67,7 @@ struct WaypointTrajectoryOptions {
   bool rest = true;
   bool closed = false;
 
-  /// The file that the points were read from, for messages; empty where they stand in the scenario.
+  /// The file that the points were read from, for messages; empty if the scenario lists them.
   std::filesystem::path points_file;
 };
 
@@ -76,7 +76,7 @@ using TrajectoryOptions = std::variant<FileTrajectoryOptions, RandomTrajectoryOp
 
 // --- renderers ---------------------------------------------------------------------------------------------------
 
-/// A thing in the scene that moves.
+/// A moving object of the scene.
 struct ObjectOptions {
   std::string name;
   std::filesystem::path scene;
@@ -94,7 +94,7 @@ struct PointLightOptions {
   double strength = 1.0;
 };
 
-/// Surfaces show their base colour, in whatever light.
+/// Surfaces show their base colour, independent of lights.
 struct UnlitOptions {
   static constexpr const char* kType = "unlit";
 };
@@ -110,7 +110,7 @@ struct LambertOptions {
 
 using LightingOptions = std::variant<UnlitOptions, LambertOptions>;
 
-/// What draws triangles.
+/// The renderer of triangles.
 enum class MeshEngine { raycast, gl, automatic };
 
 /// Triangles.
@@ -147,7 +147,7 @@ struct PlaneRendererOptions {
   double background = 0.2;
 };
 
-/// An image that moves over the sensor.
+/// A sprite: an image that moves over the sensor.
 struct LayerOptions {
   std::filesystem::path image;
   LayerUnits units = LayerUnits::pixel;
@@ -159,7 +159,7 @@ struct LayerOptions {
   std::vector<LayerKeyframe> keyframes{LayerKeyframe{}};  // at rest in the middle
 };
 
-/// Layers on the sensor itself. Where `scene` names a file, they come from there.
+/// Sprites on the sensor. If `scene` is given, they come from that file.
 struct SpritesRendererOptions {
   static constexpr const char* kType = "sprites";
   std::filesystem::path scene;
@@ -168,7 +168,7 @@ struct SpritesRendererOptions {
   double background = 0.2;
 };
 
-/// A thing in another program's scene that is moved.
+/// An object in another program's scene that esim moves.
 struct EngineObjectOptions {
   std::string name;
   TrajectoryOptions trajectory;
@@ -192,7 +192,7 @@ struct UnrealcvRendererOptions {
 
 enum class BlenderEngine { cycles, eevee };
 
-/// Blender, which is started to render a scene, or runs already.
+/// Blender, which esim starts or which runs already.
 struct BlenderRendererOptions {
   static constexpr const char* kType = "blender";
   std::filesystem::path scene;
@@ -209,7 +209,7 @@ struct BlenderRendererOptions {
 using RendererOptions = std::variant<MeshRendererOptions, PanoramaRendererOptions, PlaneRendererOptions,
                                      SpritesRendererOptions, UnrealcvRendererOptions, BlenderRendererOptions>;
 
-/// What moves in the scene of another program that renders; null where none does.
+/// The moving objects in the scene of another program that renders; null if esim renders.
 inline const std::vector<EngineObjectOptions>* engine_objects(const RendererOptions& renderer) {
   if (const auto* const unrealcv = std::get_if<UnrealcvRendererOptions>(&renderer)) return &unrealcv->objects;
   if (const auto* const blender = std::get_if<BlenderRendererOptions>(&renderer)) return &blender->objects;
@@ -218,7 +218,7 @@ inline const std::vector<EngineObjectOptions>* engine_objects(const RendererOpti
 
 // --- cameras -----------------------------------------------------------------------------------------------------
 
-/// Distortions as written in a scenario. An empty struct stands for none.
+/// Distortions as written in a scenario. An empty struct stands for no distortion.
 struct NoDistortionOptions {
   static constexpr const char* kType = "none";
 };
@@ -233,7 +233,7 @@ struct FovOptions : Fov {
 };
 using DistortionOptions = std::variant<NoDistortionOptions, RadialTangentialOptions, EquidistantOptions, FovOptions>;
 
-/// One camera of the rig. Where `calibration` names a file, the geometry comes from there.
+/// One camera of the rig. If `calibration` is given, the geometry comes from that file.
 struct CameraOptions {
   std::string name;
   std::filesystem::path calibration;
@@ -246,12 +246,12 @@ struct CameraOptions {
   SamplingOptions sampling;
   bool events = true;
   EventCameraOptions event_camera;
-  std::optional<FrameCameraOptions> frame_camera;  ///< none where not set
+  std::optional<FrameCameraOptions> frame_camera;  ///< unset: no frame camera
 };
 
 // --- the inertial measurement unit --------------------------------------------------------------------------------
 
-/// The IMU of the rig. Where `calibration` names a file, its rate and noise come from there.
+/// The IMU of the rig. If `calibration` is given, its rate and noise come from that file.
 struct RigImuOptions : ImuOptions {
   std::filesystem::path calibration;
   PoseOptions T_body_imu;
@@ -280,14 +280,13 @@ struct OutputOptions {
   bool preview = true;
 };
 
-// --- the whole -----------------------------------------------------------------------------------------------------
+// --- the scenario --------------------------------------------------------------------------------------------------
 
-/// Everything that determines a simulation, as values: what to show, how the rig moves, which cameras it has, what to
-/// keep.
+/// All options of a simulation: the scene, the motion of the rig, its cameras, and the files to write.
 struct Scenario {
   std::uint64_t seed = 0;
   double start_s = 0.0;              ///< after the trajectory's start
-  std::optional<double> duration_s;  ///< to the trajectory's end where not set
+  std::optional<double> duration_s;  ///< unset: until the trajectory's end
   RendererOptions renderer;
   TrajectoryOptions trajectory;
   std::vector<CameraOptions> cameras;

@@ -30,7 +30,7 @@ class SceneWords {
       ++line_count_;
       bytes += line.size();
       if (bytes > kMostBytes || line.find('\0') != std::string::npos) {
-        throw UserError(fmt::format("scene {}: is not a .scene file, which is a few lines of text", file.string()));
+        throw UserError(fmt::format("scene {}: must be a .scene file, which is a few lines of text", file.string()));
       }
       std::istringstream words(line);
       for (std::string word; words >> word;) words_.push_back({word, line_count_});
@@ -52,18 +52,18 @@ class SceneWords {
     double value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc{} || end != text.data() + text.size() || !(value >= range.min && value <= range.max)) {
-      fail(fmt::format("{} is '{}'; it must be a number from {} to {}", what, text, range.min, range.max));
+      fail(fmt::format("{} is '{}', but must be a number from {} to {}", what, text, range.min, range.max));
     }
     return value;
   }
 
   int whole_number(const char* what, Range range) {
     const double value = number(what, range);
-    if (value != std::floor(value)) fail(fmt::format("{} is {}; it must be a whole number", what, value));
+    if (value != std::floor(value)) fail(fmt::format("{} is {}, but must be a whole number", what, value));
     return static_cast<int>(value);
   }
 
-  /// Blames the word read last.
+  /// Throws UserError with the line of the latest word.
   [[noreturn]] void fail(const std::string& message) const {
     throw UserError(fmt::format("scene {}:{}: {}", file_.string(), words_[next_ - 1].line, message));
   }
@@ -81,7 +81,7 @@ class SceneWords {
   int line_count_ = 0;
 };
 
-/// The first of the places where an image may be that holds a file.
+/// The first existing file of the places where an image may be.
 fs::path find_image(const fs::path& name, const fs::path& scene, const std::vector<fs::path>& search_path,
                     const SceneWords& words) {
   const fs::path beside = scene.parent_path();
@@ -94,7 +94,7 @@ fs::path find_image(const fs::path& name, const fs::path& scene, const std::vect
     tried += (tried.empty() ? "" : ", ") + place.string();
   }
   words.fail(
-      fmt::format("image {} is not found (tried {}); put it beside the scene file, or name its folder in "
+      fmt::format("image {} is not found (tried {}); put it into the scene file's folder, or add its folder to "
                   "renderer.search_path",
                   name.filename().string(), tried));
 }
@@ -131,7 +131,7 @@ SpriteSceneFile read_sprite_scene(const fs::path& file, const std::vector<fs::pa
   scene.height = words.whole_number("the height", {1, 16384});
   const double duration_s = words.number("the duration", {1e-6, 1e8});
   while (!words.at_end()) scene.layers.push_back(read_layer(words, duration_s, file, search_path));
-  if (scene.layers.empty()) words.fail("no layers follow; a layer is an image and 12 numbers");
+  if (scene.layers.empty()) words.fail("layers are missing; a layer is an image and 12 numbers");
   scene.layers.front().beyond = LayerBeyond::mirror;
   std::reverse(scene.layers.begin(), scene.layers.end());
   return scene;

@@ -28,7 +28,7 @@ std::string nearest(const std::string& word, const std::vector<std::string>& can
   std::string best;
   std::size_t best_distance = std::max<std::size_t>(2, word.size() / 2) + 1;
   for (const std::string& candidate : candidates) {
-    // A word that the candidate contains is as good as one wrong letter.
+    // If the candidate contains the word, the distance counts as one wrong letter.
     const bool contained = word.size() >= 4 && candidate.find(word) != std::string::npos;
     const std::size_t distance = contained ? 1 : edit_distance(word, candidate);
     const bool shorter = distance == best_distance && candidate.size() < best.size();

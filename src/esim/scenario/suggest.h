@@ -5,7 +5,7 @@
 
 namespace esim {
 
-/// The candidate that a person most likely meant by `word` (least edit distance); empty where none is near.
+/// The candidate with the smallest edit distance to `word`; empty if none is similar.
 std::string nearest(const std::string& word, const std::vector<std::string>& candidates);
 
 /// "a, b, c".

@@ -7,10 +7,10 @@
 namespace esim {
 
 std::vector<WaypointPointOptions> read_waypoints(const std::filesystem::path& file) {
-  const YAML::Node root = parse_yaml(text_of(file, "file of way points"), file);
+  const YAML::Node root = parse_yaml(text_of(file, "file of waypoints"), file);
   if (!root.IsMap() || !root["points"].IsDefined()) {
     throw UserError(
-        fmt::format("{}: holds no way points; it begins with points: and lists maps like "
+        fmt::format("{}: has no waypoints; it must begin with points: and list maps like "
                     "{{position: [0, 0, 1], look_at: [2, 0, 1]}}",
                     file.string()));
   }

@@ -101,7 +101,7 @@ class YamlWriter {
   YAML::Emitter& out_;
 };
 
-/// A visitor of describe() that documents every member, one line each, nested ones indented.
+/// A visitor of describe() that documents every member on one line, nested members indented.
 class ReferenceWriter {
  public:
   explicit ReferenceWriter(std::string& out, int depth = 0) : out_(out), depth_(depth) {}
@@ -216,7 +216,7 @@ std::string write_scenario(const Scenario& scenario) {
 
 namespace {
 
-/// One option of a scenario, in full.
+/// One option of a scenario with all its members.
 template <typename Options>
 std::string write_option(const Options& options) {
   YAML::Emitter out;

@@ -78,7 +78,7 @@ std::string apply_override(YAML::Node root, const std::string& text, const std::
   } catch (const YAML::Exception& exception) {
     throw UserError(fmt::format("{}{}: cannot be set: {}", setter, text, exception.msg));
   } catch (const std::logic_error&) {
-    throw UserError(fmt::format("{}{}: entries of a list are named by their number", setter, text));
+    throw UserError(fmt::format("{}{}: an entry of a list must be given by its number", setter, text));
   }
 }
 
@@ -86,7 +86,7 @@ YamlReader::YamlReader(const YAML::Node& map, std::string where, const YamlSourc
     : map_(map), where_(std::move(where)), source_(source) {
   if (!map.IsMap()) {
     if (where_.empty())
-      throw UserError(fmt::format("{}: a scenario is a map of keys and values; see scenes/*.yaml for examples",
+      throw UserError(fmt::format("{}: a scenario must be a map of keys and values; see scenes/*.yaml for examples",
                                   source.file.string()));
     fail(source, map, where_, "must be a map of keys and values");
   }
@@ -118,7 +118,7 @@ void YamlReader::finish() const {
     const std::vector<std::string> known(known_.begin(), known_.end());
     const std::string suggestion = nearest(key, known);
     fail(source_, entry.first, child(key),
-         suggestion.empty() ? fmt::format("unknown key; known are {}", list(known))
+         suggestion.empty() ? fmt::format("unknown key; valid keys are {}", list(known))
                             : fmt::format("unknown key; did you mean {}?", suggestion));
   }
 }

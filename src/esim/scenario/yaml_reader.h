@@ -17,24 +17,24 @@
 
 namespace esim {
 
-/// Where a scenario's text comes from, for messages and for resolving paths.
+/// The origin of a scenario's text, for messages and for resolving paths.
 struct YamlSource {
   std::filesystem::path file;        ///< of the scenario
   std::vector<std::string> changed;  ///< dotted keys that were set on the command line
-  std::string setter = kSetter;      ///< what messages about those begin with
-  bool has_lines = true;             ///< a person has written the lines, and finds them by their numbers
+  std::string setter = kSetter;      ///< beginning of messages about those
+  bool has_lines = true;             ///< messages give line numbers
 
   /// As in ScenarioText.
   std::function<std::string(const std::filesystem::path& file)> refuses{};
 };
 
-/// What a file holds. Throws UserError where it cannot be read; `kind` says what it should be.
+/// The contents of a file of this kind. Throws UserError if it cannot be read.
 std::string text_of(const std::filesystem::path& file, const char* kind);
 
 /// Throws UserError with file and line for text that is not YAML.
 YAML::Node parse_yaml(const std::string& yaml, const std::filesystem::path& file);
 
-/// Sets root[a][b][c] for "a.b.c=value" and returns the key; list entries are named by their index. Messages begin with
+/// Sets root[a][b][c] for "a.b.c=value" and returns the key; list entries are given by their index. Messages begin with
 /// `setter`.
 std::string apply_override(YAML::Node root, const std::string& text, const std::string& setter = kSetter);
 
@@ -43,14 +43,14 @@ inline constexpr bool kIsVariant = false;
 template <typename... T>
 inline constexpr bool kIsVariant<std::variant<T...>> = true;
 
-/// The values that a visitor of describe() finds in one YAML map. Every key of the map must be visited: unknown keys
-/// are errors, reported with the nearest known one.
+/// A visitor of describe() that reads values from one YAML map. Every key of the map must be visited: unknown keys are
+/// errors, reported with the most similar valid key.
 class YamlReader {
  public:
   /// `where` is the dotted key of the map; empty for the whole file.
   YamlReader(const YAML::Node& map, std::string where, const YamlSource& source);
 
-  /// Visits one member: reads it if the map has its key, checks its range, and leaves it as it is otherwise.
+  /// Visits one member. If the map has its key, reads the value and checks its range.
   template <typename T>
   void operator()(const char* name, T& value, const About& about) {
     known_.insert(name);
@@ -58,13 +58,13 @@ class YamlReader {
     if (node.IsDefined() && !node.IsNull()) read(node, child(name), value, about);
   }
 
-  /// A key that somebody else reads.
+  /// Marks a key as valid that is read elsewhere.
   void know(const char* name) { known_.insert(name); }
 
   /// Throws UserError if the map has a key that was not visited.
   void finish() const;
 
-  /// Throws OptionError: what is wrong with the value of a key.
+  /// Throws OptionError for the value of a key.
   [[noreturn]] static void fail(const YamlSource& source, const YAML::Node& node, const std::string& key,
                                 const std::string& message);
 
@@ -125,7 +125,7 @@ class YamlReader {
   template <typename... T, std::size_t... I>
   void read_alternative(const YAML::Node& node, const std::string& key, std::variant<T...>& value, std::size_t index,
                         std::index_sequence<I...>) {
-    // An alternative that is there already keeps the values that the map does not name.
+    // An alternative of the same type keeps the values of keys that the map lacks.
     const auto read_as = [&]<std::size_t Index>() {
       if (value.index() != Index) value.template emplace<Index>();
       YamlReader reader(node, key, source_);

@@ -11,7 +11,7 @@
 namespace esim::studio {
 namespace {
 
-/// Takes as long for any two texts of the same length.
+/// Compares in constant time for texts of the same length.
 bool equal_in_constant_time(std::string_view a, std::string_view b) {
   if (a.size() != b.size()) return false;
   unsigned difference = 0;
@@ -38,7 +38,7 @@ std::string random_token() {
   std::array<unsigned char, 24> bytes{};
   for (std::size_t done = 0; done < bytes.size();) {
     const ssize_t got = ::getrandom(bytes.data() + done, bytes.size() - done, 0);
-    if (got < 0 && errno != EINTR) throw InternalError("the system gives no random numbers");
+    if (got < 0 && errno != EINTR) throw InternalError("the system provides no random numbers");
     if (got > 0) done += static_cast<std::size_t>(got);
   }
   std::string text;
@@ -63,7 +63,8 @@ bool Access::is_own_host(const std::string& host) const {
   if (!host.ends_with(suffix)) return false;
   const std::string name = host.substr(0, host.size() - suffix.size());
   if (name == "127.0.0.1" || name == "localhost" || name == "[::1]") return true;
-  if (listens_everywhere(host_)) return is_address(name);  // a name may be anybody's, an address may not
+  if (listens_everywhere(host_))
+    return is_address(name);  // a name may point here without permission, an address cannot
   return name == host_ || name == "[" + host_ + "]";
 }
 
@@ -90,13 +91,13 @@ bool Access::knows_token(const RequestHead& head) const {
 }
 
 std::optional<Response> Access::answer(const RequestHead& head) const {
-  if (!head.host || !is_own_host(*head.host)) return refusal(403, "this server does not go by that name");
-  if (head.origin && !is_own_origin(*head.origin)) return refusal(403, "requests of other sites are refused");
+  if (!head.host || !is_own_host(*head.host)) return refusal(403, "the Host header must be this server's address");
+  if (head.origin && !is_own_origin(*head.origin)) return refusal(403, "requests from other sites are not allowed");
 
   const bool reads = head.method == "GET";
   const bool enters = reads && (head.target == "/" || head.target.starts_with("/?"));
   const bool foreign = head.fetch_site && *head.fetch_site != "same-origin" && *head.fetch_site != "none";
-  if (foreign && !enters) return refusal(403, "requests of other sites are refused");
+  if (foreign && !enters) return refusal(403, "requests from other sites are not allowed");
 
   constexpr std::string_view kEntry = "/?token=";
   if (enters && head.target.starts_with(kEntry) &&
@@ -107,7 +108,7 @@ std::optional<Response> Access::answer(const RequestHead& head) const {
                         {"Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/", cookie_name(), token_)}};
     return response;
   }
-  if (!knows_token(head)) return refusal(401, "open the address that esim studio has printed: it has the token");
+  if (!knows_token(head)) return refusal(401, "the token is missing; open the address that esim studio has printed");
   if (reads) return std::nullopt;
   if (head.method != "POST" && head.method != "PUT" && head.method != "DELETE")
     return refusal(405, "the method must be GET, POST, PUT or DELETE");

@@ -7,18 +7,18 @@
 
 namespace esim::studio {
 
-/// Who may ask. A server on a person's own machine can be reached by every page in their browser and every program of
-/// theirs; only who knows the token that this start has made is answered:
-///   - the Host must be the server's own, so that no name that is made to point here (DNS rebinding) gets in;
-///   - an Origin, where there is one, too, and what a browser sends on behalf of another site is refused;
-///   - the token stands in a cookie, which GET /?token=... sets, or in "Authorization: Bearer ...";
-///   - what changes something must be application/json, which a foreign page's form cannot send.
+/// Access control. Every page in the user's browser and every program on the machine can reach the server, so that a
+/// request needs the token of this start:
+///   - the Host must be the server's own, which prevents DNS rebinding;
+///   - so must the Origin, if given; requests that a browser sends for another site are refused;
+///   - the token is in a cookie, which GET /?token=... sets, or in "Authorization: Bearer ...";
+///   - requests that change something must be application/json, which a form of another site cannot send.
 class Access {
  public:
-  /// `host` is what the server listens on: an address, or a name.
+  /// `host` is the address or name on which the server listens.
   Access(std::string token, std::string host, int port);
 
-  /// The refusal, or the redirection that sets the cookie; nothing where the request may go on.
+  /// The refusal, or the redirection that sets the cookie; empty if the request is allowed.
   std::optional<Response> answer(const RequestHead& head) const;
 
   std::string cookie_name() const;
@@ -32,13 +32,13 @@ class Access {
   int port_;
 };
 
-/// Whether only programs of this machine can reach an address.
+/// Whether only programs on this machine can reach an address.
 bool is_loopback(const std::string& host);
 
-/// 192 random bits from the system, as text that fits into a URL.
+/// 192 random bits from the system, as URL-safe text.
 std::string random_token();
 
-/// {"error": ...}, as every refusal is.
+/// An error response: {"error": ...}.
 Response refusal(int status, const std::string& what);
 
 }  // namespace esim::studio

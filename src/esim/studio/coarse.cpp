@@ -8,13 +8,14 @@
 namespace esim::studio {
 namespace {
 
-constexpr int kAcrossTexture = 32;  // vertices further apart in the texture are not merged: they may be of other parts
+constexpr int kAcrossTexture =
+    32;  // vertices further apart in the texture are not merged, since they may belong to different parts
 
 Eigen::Vector3f position(const Surface& surface, std::size_t vertex) {
   return Eigen::Map<const Eigen::Vector3f>(&surface.positions[3 * vertex]);
 }
 
-/// Vertices with the same key are merged. 16 bits for each coordinate, 8 for each of the texture's.
+/// Vertices with the same key are merged. 16 bits per coordinate, 8 per texture coordinate.
 std::uint64_t key_of(const Surface& surface, std::size_t vertex, const Eigen::Vector3f& origin, float cells_per_m) {
   const Eigen::Vector3f cell = (position(surface, vertex) - origin) * cells_per_m;
   std::uint64_t key = 0;
@@ -27,7 +28,7 @@ std::uint64_t key_of(const Surface& surface, std::size_t vertex, const Eigen::Ve
   return key;
 }
 
-/// The vertex that stands for each one.
+/// The vertex that replaces each vertex.
 std::vector<std::uint32_t> representatives(const Surface& surface, const Eigen::AlignedBox3f& box, float cells) {
   struct Cell {
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
@@ -76,7 +77,7 @@ std::vector<std::uint32_t> coarse_indices(const Surface& surface, std::size_t wa
   Eigen::AlignedBox3f box;
   for (std::size_t i = 0; i < surface.positions.size() / 3; ++i) box.extend(position(surface, i));
 
-  // A square of n x n cells has 2 n^2 triangles; other surfaces are approached from there.
+  // A square of n x n cells has 2 n^2 triangles: the initial value of the search for other surfaces.
   constexpr int kTries = 4;
   constexpr float kMostCells = 32'000;
   float cells = std::sqrt(static_cast<float>(wanted) / 2);

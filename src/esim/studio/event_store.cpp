@@ -74,7 +74,7 @@ class FileStore final : public EventStore {
     std::uint64_t all = 0, on = 0;
   };
 
-  /// What there is before a time: by the index up to the ms in which it lies, and counted from there.
+  /// The counts before a time: from the index up to its millisecond, then by counting events.
   Counts until(TimeNs t) const {
     if (!span_ || t <= span_->start) return {};
     if (t > span_->end) return until_ms_.back();
@@ -93,8 +93,8 @@ class FileStore final : public EventStore {
     return counts;
   }
 
-  /// What there has been before each ms, and at last all, by reading the polarities once; the times too where the file
-  /// has no index of its own.
+  /// The counts before each ms and, as the last entry, of all events. Reads all polarities once, and all times if the
+  /// file has no index.
   void make_index() const {
     std::vector<std::uint64_t> first = reader_.ms_to_idx();
     if (first.empty()) first = index_by_reading();
@@ -115,7 +115,7 @@ class FileStore final : public EventStore {
   }
 
   std::vector<std::uint64_t> index_by_reading() const {
-    constexpr std::size_t kMostMs = std::size_t{1} << 25;  // nine hours: what a damaged time asks for has an end
+    constexpr std::size_t kMostMs = std::size_t{1} << 25;  // nine hours; limits memory if a time is damaged
     std::vector<std::uint64_t> first;
     for (std::uint64_t at = 0; at < reader_.size(); at += kBlock) {
       const std::vector<Event> block = reader_.read(at, kBlock);
@@ -130,7 +130,7 @@ class FileStore final : public EventStore {
   EventsHdf5Reader reader_;
   std::optional<TimeSpan> span_;  // of the events
   mutable std::mutex mutex_;
-  mutable std::vector<Counts> until_ms_;  // made when it is first wanted
+  mutable std::vector<Counts> until_ms_;  // made on first use
 };
 
 }  // namespace
@@ -139,7 +139,7 @@ std::vector<TimeNs> bin_edges(TimeNs from, TimeNs to, std::size_t most, TimeNs u
   const auto up = [](TimeNs value, TimeNs step) { return value / step * step + (value % step > 0 ? step : 0); };
   TimeNs width = std::max(unit, up((to - from + static_cast<TimeNs>(most) - 1) / static_cast<TimeNs>(most), unit));
   std::vector<TimeNs> edges;
-  do {  // again where the parts of a bin at both ends are one too many
+  do {  // repeat if the partial bins at both ends are one too many
     edges.assign(1, from);
     for (TimeNs edge = origin + up(from + width / 2 - origin, width); edge + width / 2 <= to; edge += width)
       edges.push_back(edge);
@@ -175,7 +175,7 @@ std::vector<Event> EventStore::thinned(Range range, std::uint64_t most) const {
   if (all <= most) return read(range.first, all);
   std::vector<Event> kept;
   kept.reserve(most);
-  // Few enough to read are read; of more, runs of neighbours are taken.
+  // Reads a small range completely; takes runs of consecutive events from a larger one.
   constexpr std::uint64_t kReadAll = std::uint64_t{1} << 22, kRun = 64;
   const std::uint64_t run = all <= kReadAll ? 1 : kRun;
   const std::uint64_t runs = std::max<std::uint64_t>(1, most / run);

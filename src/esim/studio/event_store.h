@@ -12,16 +12,16 @@ namespace esim::studio {
 
 /// Events in bins of time.
 struct EventRate {
-  std::vector<TimeNs> edges;           ///< ns, of the bins one after the other: one more than there are bins
+  std::vector<TimeNs> edges;           ///< ns; one more than there are bins
   std::vector<std::uint64_t> on, off;  ///< events with edges[i] <= t < edges[i + 1]
 };
 
-/// Edges of at most `most` bins (at least 1) of the times from <= t < to. The edges between are multiples of one width,
-/// counted from `origin`, and the width is one of `unit`: time stamps that are multiples of the unit fall into all bins
-/// alike. The first bin and the last are between half and one and a half times as wide. All in ns.
+/// Edges of at most `most` bins (at least 1) that cover from <= t < to, in ns. Inner edges are multiples of one width,
+/// counted from `origin`, and the width is a multiple of `unit`, so that time stamps in this unit fall evenly into all
+/// bins. The first and the last bin are between half and one and a half times as wide.
 std::vector<TimeNs> bin_edges(TimeNs from, TimeNs to, std::size_t most, TimeNs unit, TimeNs origin);
 
-/// The events of one camera of a recording, any part of them at once. From any thread.
+/// The events of one camera of a recording, with random access. Thread-safe.
 class EventStore {
  public:
   using Range = EventsHdf5Reader::IndexRange;
@@ -32,28 +32,28 @@ class EventStore {
   /// Indices of the events with t0 <= t < t1.
   virtual Range find(TimeNs t0, TimeNs t1) const = 0;
 
-  /// Up to `count` events from index `first` on.
+  /// Up to `count` events, starting at index `first`.
   virtual std::vector<Event> read(std::uint64_t first, std::uint64_t count) const = 0;
 
-  /// In at most `most` bins of the times from <= t < to: their widths are whole ms, of which the files have an index,
-  /// or whole us where they are shorter than a few ms.
+  /// Counts in at most `most` bins that cover from <= t < to. Widths are multiples of 1 ms, for which files have an
+  /// index, or of 1 us for bins shorter than a few ms.
   EventRate rate(TimeNs from, TimeNs to, std::size_t most) const;
 
-  /// At most `most` of the events of a range, evenly spread over it.
+  /// At most `most` events of a range, evenly spread over it.
   std::vector<Event> thinned(Range range, std::uint64_t most) const;
 
  protected:
-  /// Where the first ms begins.
+  /// The start of the first ms.
   virtual TimeNs origin() const { return 0; }
 
   /// Counts the events between the edges.
   virtual void count(EventRate& rate) const;
 };
 
-/// Those of an HDF5 file, which stays on the disk.
+/// The events of an HDF5 file, read on demand.
 std::unique_ptr<EventStore> store_of(EventsHdf5Reader reader);
 
-/// Some in memory, in order.
+/// Events in memory, in order of time.
 std::unique_ptr<EventStore> store_of(std::vector<Event> events);
 
 }  // namespace esim::studio

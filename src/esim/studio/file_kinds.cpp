@@ -23,7 +23,7 @@ bool is_recording_folder(const fs::path& place) {
   });
 }
 
-/// Those of formats that hold events, but for what others have as well.
+/// The extensions of formats with events, except those that other files use too.
 bool is_recording_file(const std::string& extension) {
   static constexpr std::array<const char*, 4> kOthers{".txt", ".csv", ".zip", ".npz"};
   const auto& all = formats();

@@ -7,7 +7,7 @@ namespace esim::studio {
 
 enum class FileKind { folder, scenario, scene, recording, image, trajectory, other };
 
-/// What a file or folder is, by its name, and of folders by what they have in them.
+/// The kind of a file by its name, or of a folder by its name and contents.
 FileKind kind_of(const std::filesystem::path& place);
 
 /// "scenario", ...

@@ -15,19 +15,19 @@ namespace {
 using Eigen::Vector2f;
 
 constexpr float kEyes_m = 1.6F;           // above the floor
-constexpr float kEyesOfLowRooms = 0.65F;  // of the height of what is lower than a room
+constexpr float kEyesOfLowRooms = 0.65F;  // fraction of the height of scenes that are lower than a room
 constexpr float kClearance_m = 0.45F;     // from walls and furniture
-constexpr float kLevel = 0.95F;           // of floors: the upward part of their normal
-constexpr float kStorey_m = 0.3F;         // what is level to so much is one floor
-constexpr float kWide = 0.25F;            // of the area of the widest
+constexpr float kLevel = 0.95F;           // minimum upward component of a floor's normal
+constexpr float kStorey_m = 0.3F;         // maximum height difference within one floor
+constexpr float kWide = 0.25F;            // minimum area of a wide floor, relative to the widest
 constexpr std::size_t kMostFloors = 6;
 constexpr float kHighest_m = 1e5F;
-constexpr double kDown = 0.12;                // slope of the look, so that the floor is seen
+constexpr double kDown = 0.12;                // downward slope of the view, so that the floor is visible
 constexpr int kDirections = 48, kPlaces = 5;  // even; odd
 constexpr float kMostlyEnclosed = 0.75F;
 constexpr double kHalfAngle_rad = 32.5 * std::numbers::pi / 180;
 
-/// A surface where a horizontal plane cuts it; `front` is horizontal, out of the side that is seen.
+/// The intersection of a surface with a horizontal plane; `front` is its horizontal normal on the visible side.
 struct Wall {
   Vector2f a, b, front;
 };
@@ -64,7 +64,7 @@ std::vector<Wall> walls_at(const Scene& scene, float z) {
 
 struct Sight {
   float distance = std::numeric_limits<float>::infinity();
-  bool front = false;  ///< the nearest surface is seen from its front
+  bool front = false;  ///< whether the nearest surface is seen from its front
 };
 
 Sight sight(const std::vector<Wall>& walls, const Vector2f& from, const Vector2f& along) {
@@ -92,14 +92,14 @@ float clearance(const std::vector<Wall>& walls, const Vector2f& at) {
   return least;
 }
 
-/// What one can stand on at one level.
+/// The floor area at one level.
 struct Floor {
   float z = std::numeric_limits<float>::infinity();
   Eigen::AlignedBox2f extent{};
   float area = 0;
 };
 
-/// The wide ones, from below.
+/// The wide floors, from the lowest up.
 std::vector<Floor> floors_of(const Scene& scene) {
   std::map<int, Floor> levels;
   each_object(scene, [&](const Mesh& mesh) {
@@ -128,7 +128,7 @@ SE3 looking(const Eigen::Vector3d& from, const Eigen::Vector3d& along) {
   return {looking_along(along.normalized()), from};
 }
 
-/// The place furthest back from `middle` where one has room to stand on a floor.
+/// The point of a floor furthest back from `middle` with enough clearance.
 Vector2f standing(const std::vector<Wall>& walls, const Eigen::AlignedBox2f& floor, const Vector2f& middle,
                   const Vector2f& along, float behind) {
   constexpr int kSteps = 20;
@@ -139,7 +139,7 @@ Vector2f standing(const std::vector<Wall>& walls, const Eigen::AlignedBox2f& flo
   return middle;
 }
 
-/// A view across the middle of the room that a floor is in; nothing where no walls are around.
+/// A view across the middle of a floor's room; empty without surrounding walls.
 std::optional<SE3> view_inside(const Scene& scene, const Floor& floor, float ceiling) {
   const float z = floor.z + std::min(kEyes_m, kEyesOfLowRooms * (ceiling - floor.z));
   const std::vector<Wall> walls = walls_at(scene, z);

@@ -5,10 +5,10 @@
 
 namespace esim::studio {
 
-/// T_world_camera of a view that shows what stands still in a scene, or all where nothing does. Where walls are around
-/// the middle of a wide floor: from the height of a person's eyes above it, along the longest free line through its
-/// middle. Otherwise from outside, obliquely from above, so far that a camera of 65 degrees sees all of it. World z is
-/// up. At the origin, along x, where there are no meshes.
+/// T_world_camera of a view of the static objects of a scene, or of all objects if none is static. If walls surround
+/// the middle of a wide floor: at eye height above it, along the longest free line through its middle. Otherwise from
+/// outside, obliquely from above, so far away that a camera with a field of view of 65 degrees sees everything. World z
+/// is up. Without meshes: at the origin, along x.
 SE3 first_view(const Scene& scene);
 
 }  // namespace esim::studio

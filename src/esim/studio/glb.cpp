@@ -17,21 +17,21 @@ namespace esim::studio {
 namespace {
 
 constexpr int kThumbnail = 128;  // px
-// Of glTF: types of numbers, what a buffer is for, how a texture goes on.
+// Constants of glTF: number types, buffer targets, texture wrapping.
 constexpr int kUint32 = 5125, kFloat = 5126, kVertices = 34962, kIndices = 34963, kClamp = 33071, kRepeat = 10497;
-// What a browser without a graphics card draws ten times a second, twice over: in the view and in the camera's.
+// Number of triangles that a browser without a graphics card draws ten times a second, in the view and in the camera's.
 constexpr std::size_t kFewTriangles = 100'000, kCoarseTriangles = 24'000;
 constexpr std::uint32_t kNone = ~0U;
 constexpr double kMissingTexture = 0.2;  // as esim shows it
 
-/// A material in the three colours.
+/// A material in three colour channels.
 PerColour<const Material*> in_colour(const Mesh& mesh, std::size_t index) {
   PerColour<const Material*> channels{};
   for (std::size_t c = 0; c < channels.size(); ++c) channels[c] = &mesh.coloured[c][index];
   return channels;
 }
 
-/// What a colour or an emission is: a factor, and a texture, null where there is none.
+/// A base colour or an emission: a factor and a texture, which may be null.
 struct Look {
   PerColour<double> factor{};
   const CodedTexture* texture = nullptr;
@@ -72,7 +72,8 @@ class Writer {
     binary_.resize((binary_.size() + 3) / 4 * 4, '\0');
     constexpr std::size_t kHeads = 12 + 8 + 8;
     const std::size_t size = kHeads + json.size() + binary_.size();
-    if (size > std::numeric_limits<std::uint32_t>::max()) throw UserError("the scene is too large for a browser");
+    if (size > std::numeric_limits<std::uint32_t>::max())
+      throw UserError("the scene is too large for a browser; GLB is limited to 4 GiB");
     std::string bytes = "glTF";
     const auto put = [&](std::size_t value) {
       for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(value >> shift & 0xff);
@@ -84,7 +85,7 @@ class Writer {
   }
 
  private:
-  /// Of all textures, and at once: that is what takes time.
+  /// Makes all thumbnails in parallel, since this takes the most time.
   void make_thumbnails(const Scene& scene, const Workers& workers) {
     std::vector<std::shared_ptr<const CodedTexture>> all;
     for (const SceneObject& object : scene.objects) {
@@ -99,7 +100,7 @@ class Writer {
       const auto i = static_cast<std::size_t>(index);
       try {
         made[i] = thumbnail(*all[i], kThumbnail);
-      } catch (const UserError&) {  // the renderer will say so
+      } catch (const UserError&) {  // the renderer will report it
       }
     });
     for (std::size_t i = 0; i < all.size(); ++i) {
@@ -120,7 +121,7 @@ class Writer {
     gltf_["nodes"].push_back(std::move(node));
   }
 
-  /// One per material.
+  /// One primitive per material.
   Json primitives_of(const Mesh& mesh) {
     std::map<std::uint32_t, std::vector<std::uint32_t>> triangles;
     for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) triangles[mesh.material[i]].push_back(i);
@@ -137,8 +138,8 @@ class Writer {
     return primitives;
   }
 
-  /// Corners of triangles are vertices of their own only where their texture coordinates are. `first_of`: none yet of
-  /// each of the mesh's vertices.
+  /// Corners of triangles share a vertex unless their texture coordinates differ. `first_of` must be empty for each of
+  /// the mesh's vertices.
   Json geometry(const Mesh& mesh, const std::vector<std::uint32_t>& triangles, std::vector<std::uint32_t>& first_of) {
     struct Corner {
       std::uint32_t vertex;
@@ -274,7 +275,7 @@ class Writer {
   Json roots_ = Json::array();
   std::vector<std::string> names_;
   std::map<PerColour<const Material*>, std::size_t> materials_;
-  std::map<const CodedTexture*, std::optional<std::size_t>> textures_;  // nothing where it cannot be decoded
+  std::map<const CodedTexture*, std::optional<std::size_t>> textures_;  // empty if it cannot be decoded
   std::vector<std::shared_ptr<const CodedTexture>> images_;
 };
 

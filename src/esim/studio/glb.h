@@ -9,22 +9,22 @@
 
 namespace esim::studio {
 
-/// A scene for a browser to draw.
+/// A scene in a format for browsers.
 struct Glb {
-  std::string bytes;               ///< glTF 2.0, binary; in the scene's own axes, z up
+  std::string bytes;               ///< binary glTF 2.0, in the scene's axes, z up
   std::vector<std::string> nodes;  ///< of the objects, in their order
 
-  /// What its textures show, in their order: the images in `bytes` are small, for the first picture. Where the file is
-  /// larger, the image's `extras` have `image`, its index here.
+  /// Its textures, in order. The images in `bytes` are thumbnails; if the texture is larger, the `extras` of the image
+  /// have `image`, the texture's index here.
   std::vector<std::shared_ptr<const CodedTexture>> images;
 };
 
-/// One node per object, in its own frame; unlit where the scene has no light. Of scenes of more than 100 000 triangles
-/// each primitive's `extras` have `coarse`, an accessor of the indices of far fewer triangles between the same
-/// vertices. For scenes of SceneLook::coded.
+/// One node per object, in the object's frame; unlit if the scene has no lights. In scenes with more than 100 000
+/// triangles, the `extras` of each primitive have `coarse`, an accessor of the indices of far fewer triangles with the
+/// same vertices. The scene must be loaded with SceneLook::coded.
 Glb make_glb(const Scene& scene, const Workers& workers);
 
-/// The most triangles that a browser is asked to draw.
+/// The maximum number of triangles for a browser.
 inline constexpr std::size_t kMostTriangles = std::size_t{4} << 20;
 
 }  // namespace esim::studio

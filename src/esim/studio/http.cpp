@@ -20,11 +20,12 @@ std::string decoded(std::string_view text, bool plus_is_space) {
     if (c == '%') {
       const int high = i + 2 < text.size() ? hex_digit(text[i + 1]) : -1;
       const int low = i + 2 < text.size() ? hex_digit(text[i + 2]) : -1;
-      if (high < 0 || low < 0) throw HttpError(400, "the address has a % without two hexadecimal digits");
+      if (high < 0 || low < 0) throw HttpError(400, "in the address, % must be followed by two hexadecimal digits");
       c = static_cast<char>(16 * high + low);
       i += 2;
     }
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) throw HttpError(400, "the address has a control character");
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+      throw HttpError(400, "the address must not have control characters");
     out += c;
   }
   return out;
@@ -33,7 +34,7 @@ std::string decoded(std::string_view text, bool plus_is_space) {
 }  // namespace
 
 std::pair<std::string, std::map<std::string, std::string>> parse_target(std::string_view target) {
-  if (target.empty() || target.front() != '/') throw HttpError(400, "the address is no path");
+  if (target.empty() || target.front() != '/') throw HttpError(400, "the address must begin with /");
   const std::size_t question = target.find('?');
   std::pair<std::string, std::map<std::string, std::string>> parsed{decoded(target.substr(0, question), false), {}};
   if (question == std::string_view::npos) return parsed;

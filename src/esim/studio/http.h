@@ -12,8 +12,7 @@
 
 namespace esim::studio {
 
-/// What is known of a request before its body: the method, the target as it was sent, and the headers that matter.
-/// Headers that are not there are nothing.
+/// The head of a request: the method, the raw target, and the relevant headers. Missing headers are empty.
 struct RequestHead {
   std::string method{}, target{};
   std::optional<std::string> host{}, origin{}, cookie{}, authorization{}, content_type{}, fetch_site{};
@@ -24,7 +23,7 @@ struct Request {
   std::string path{};                          ///< decoded, without the query
   std::map<std::string, std::string> query{};  ///< decoded
   std::string body{};
-  std::vector<std::string> captured{};  ///< the parts of the path that a route leaves open, in their order
+  std::vector<std::string> captured{};  ///< the parts of the path that match * of the route, in order
 };
 
 struct Response {
@@ -33,12 +32,12 @@ struct Response {
   std::string body{};
   std::vector<std::pair<std::string, std::string>> headers{};
 
-  /// Instead of a body: what has come since the last call, often nothing; without a value it is over. Called now and
-  /// then, must not wait.
+  /// Replaces the body: returns the text since the last call, which may be empty, or nullopt at the end. Called
+  /// periodically; must not block.
   std::function<std::optional<std::string>()> stream{};
 };
 
-/// An answer other than success: a status of HTTP, and what a person can do about it.
+/// An error response: an HTTP status and a message for users.
 class HttpError : public Error {
  public:
   HttpError(int status, const std::string& what) : Error(what), status_(status) {}
@@ -48,11 +47,11 @@ class HttpError : public Error {
   int status_;
 };
 
-/// The path and the query of a request's target, decoded. Throws HttpError 400 for what is no target, and for bytes
-/// that no path has.
+/// The path and the query of a request's target, decoded. Throws HttpError 400 for invalid targets and for bytes that
+/// are invalid in paths.
 std::pair<std::string, std::map<std::string, std::string>> parse_target(std::string_view target);
 
-/// "application/json" and the like, by a file name's extension; "application/octet-stream" where it says nothing.
+/// The media type for a file name's extension; "application/octet-stream" for unknown ones.
 std::string content_type_of(const std::string& file_name);
 
 }  // namespace esim::studio

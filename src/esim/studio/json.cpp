@@ -16,7 +16,7 @@ Json parse_object(const std::string& body) {
     return !too_deep;
   };
   const Json json = Json::parse(body, watch, false);
-  if (too_deep || !json.is_object()) throw HttpError(400, "the request is no JSON object");
+  if (too_deep || !json.is_object()) throw HttpError(400, "the request must be a JSON object");
   return json;
 }
 
@@ -32,8 +32,7 @@ Json json_of(const Eigen::Vector3d& vector) { return {vector.x(), vector.y(), ve
 
 std::string text_member(const Json& object, const char* name) {
   const auto found = object.find(name);
-  if (found == object.end() || !found->is_string())
-    throw HttpError(400, fmt::format("the request lacks the text {}", name));
+  if (found == object.end() || !found->is_string()) throw HttpError(400, fmt::format("{}: must be a text", name));
   return found->get<std::string>();
 }
 

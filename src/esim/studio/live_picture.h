@@ -10,8 +10,8 @@
 
 namespace esim::studio {
 
-/// What the first camera of a recording has seen last, while it is made: the events of the last moments over the latest
-/// image. Others may look at any time.
+/// The current view of a recording's first camera while it is made: the latest events over the latest image.
+/// Thread-safe.
 class LivePicture {
  public:
   void begin(const RecordingInfo& info);
@@ -28,7 +28,7 @@ class LivePicture {
   Image<float> image_;
 };
 
-/// Hands what is recorded to a picture, which outlives it.
+/// Forwards records to a picture, which must outlive it.
 class LiveSink final : public Sink {
  public:
   explicit LiveSink(LivePicture& picture) : picture_(picture) {}

@@ -8,12 +8,12 @@
 namespace esim::studio {
 namespace {
 
-// A person's hand shakes and turns less than that.
+// A hand-held camera stays below these limits.
 constexpr double kFastTurn_rad_per_s = 720 * std::numbers::pi / 180, kFast_m_per_s2 = 50;
-constexpr double kMostTests = 4e8;    // of a triangle's box with another: about a second
-constexpr std::size_t kStretch = 16;  // intervals of the course that are tested together first
+constexpr double kMostTests = 4e8;    // of two triangles' boxes: about a second
+constexpr std::size_t kStretch = 16;  // intervals of the path that are first tested together
 
-/// Whether the segment from a to b meets a triangle (Möller and Trumbore 1997).
+/// Whether the segment from a to b intersects a triangle (Möller and Trumbore 1997).
 bool meets(const Eigen::Vector3f& a, const Eigen::Vector3f& along, const Eigen::Vector3f& p, const Eigen::Vector3f& q,
            const Eigen::Vector3f& r) {
   const Eigen::Vector3f e1 = q - p, e2 = r - p, h = along.cross(e2);
@@ -30,7 +30,7 @@ bool meets(const Eigen::Vector3f& a, const Eigen::Vector3f& along, const Eigen::
   return t >= 0 && t <= 1;
 }
 
-/// One warning for each stretch of consecutive intervals.
+/// One warning for each run of consecutive intervals.
 void add_stretches(const std::vector<MotionSample>& course, const std::function<bool(std::size_t)>& is_so,
                    const std::string& what, std::vector<MotionWarning>& warnings) {
   bool within = false;
@@ -42,8 +42,8 @@ void add_stretches(const std::vector<MotionSample>& course, const std::function<
   }
 }
 
-/// For each of the ways between consecutive eyes whether it goes through a triangle that stands still; none where
-/// finding out would take too long.
+/// For each segment between consecutive camera positions, whether it intersects a static triangle; empty if the test
+/// would take too long.
 std::vector<bool> ways_through(const std::vector<Eigen::Vector3f>& eyes, const Scene& scene) {
   const std::size_t count = eyes.empty() ? 0 : eyes.size() - 1;
   std::vector<bool> through(count);

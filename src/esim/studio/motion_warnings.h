@@ -14,14 +14,14 @@ struct MotionSample {
   Kinematics body{};
 };
 
-/// Something about a motion that is probably not as meant.
+/// A part of a motion that is probably unintended.
 struct MotionWarning {
   TimeNs from = 0, to = 0;
   std::string what{};
 };
 
-/// Where the camera passes through a surface that stands still, leaves the scene's bounds, or turns or accelerates as
-/// nothing does that is held in a hand. Samples are in order of time; between two of them the camera goes straight.
+/// Warns where the camera passes through a static surface, leaves the scene's bounds, or turns or accelerates faster
+/// than a hand-held camera. Samples are in order of time; between two samples the camera moves along a straight line.
 std::vector<MotionWarning> motion_warnings(const std::vector<MotionSample>& course, const SE3& T_body_camera,
                                            const Scene& scene);
 

@@ -42,7 +42,7 @@ std::size_t big_endian(std::string_view bytes, std::size_t at, std::size_t count
 
 bool is_jpeg(std::string_view bytes) { return bytes.starts_with("\xff\xd8\xff"); }
 
-/// Of grey or three colours, whole, and not to be turned when it is shown, which esim does not.
+/// Whether a JPEG is complete, grey or of three colours, and without an EXIF rotation, which esim ignores.
 bool is_plain_jpeg(std::string_view bytes) {
   if (!is_jpeg(bytes) || bytes.find("\xff\xd9") == std::string_view::npos) return false;
   for (std::size_t at = 2; at + 10 < bytes.size() && bytes[at] == '\xff';) {
@@ -59,7 +59,7 @@ bool is_plain_jpeg(std::string_view bytes) {
   return false;
 }
 
-/// Without transparency.
+/// The image without transparency.
 bool is_plain_png(std::string_view bytes) {
   constexpr std::size_t kHead = 8, kColourType = 25, kAlpha = 4;
   if (!bytes.starts_with("\x89PNG\r\n\x1a\n") || (big_endian(bytes, kColourType, 1) & kAlpha) != 0) return false;
@@ -78,7 +78,7 @@ std::optional<int> longest_side(const CodedTexture& texture) {
               : std::nullopt;
 }
 
-/// A JPEG decoded at an eighth of its size or so, which is quick; nothing where that is not to be.
+/// A JPEG decoded at reduced size (down to one eighth), which is fast; empty if this is not possible.
 std::optional<cv::Mat> reduced(const CodedTexture& texture, int longest) {
   constexpr int kMostSide = 8192, kFinest = 2;
   const std::optional<int> side = longest_side(texture);

@@ -8,26 +8,26 @@
 
 namespace esim::studio {
 
-/// An image file that every browser shows as esim does.
+/// An image file that all browsers show in the same way as esim.
 struct PageImage {
   std::string type;  ///< "image/jpeg" or "image/png"
   std::string bytes;
 };
 
-/// The file itself where it is such a one, at most 2048 px wide and high; else made from it. Throws UserError where it
-/// cannot be decoded.
+/// The file itself if it is of such a type and at most 2048 px wide and high; otherwise a converted image. Throws
+/// UserError if it cannot be decoded.
 PageImage page_image(const CodedTexture& texture);
 
 /// A small version of an image.
 struct Thumbnail {
   std::string jpeg;
-  bool whole = false;  ///< it is as large as the image
+  bool whole = false;  ///< whether it has the full size of the image
 };
 
-/// About `longest` px wide or high. Throws UserError where the image cannot be decoded.
+/// An image whose longer side has about `longest` px. Throws UserError if the image cannot be decoded.
 Thumbnail thumbnail(const CodedTexture& texture, int longest);
 
-/// sRGB, at most `longest` px wide and high; what is brighter than white is white. Of one plane or three.
+/// Converts one plane or three to sRGB of at most `longest` px; values above white are clipped.
 std::string make_jpeg(const Planes& linear, int longest);
 
 }  // namespace esim::studio

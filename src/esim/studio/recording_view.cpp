@@ -28,7 +28,7 @@ bool is_file(const fs::path& path) {
   return fs::is_regular_file(path, error);
 }
 
-/// Where the file does not say: as far as the events reach.
+/// The sensor's size if the file does not give it: the extent of the events.
 void learn_size(CameraView& camera) {
   constexpr std::uint64_t kBlock = std::uint64_t{1} << 20;
   Camera& model = camera.info.model;
@@ -87,7 +87,7 @@ RecordingView::RecordingView(const fs::path& path) {
   const bool alone = is_camera_folder(path);
   attempt([&] { read_report(path / "report.json"); });
   for (const CameraInfo& camera : info.cameras) open_camera(alone ? path : path / camera.name, camera);
-  if (cameras_.empty()) throw UserError(path.string() + " holds nothing that can be shown");
+  if (cameras_.empty()) throw UserError(path.string() + ": has no data that can be shown");
   if (!alone && has_file(path / "imu.csv")) imu_file_ = path / "imu.csv";
   if (!alone && has_file(path / "states.csv")) states_file_ = path / "states.csv";
   std::sort(notes_.begin(), notes_.end());
@@ -160,7 +160,7 @@ void RecordingView::open_truth(const fs::path& file, CameraView& camera) {
   camera.truth = std::make_unique<TruthHdf5Reader>(file);
   for (std::uint64_t i = 0; i < camera.truth->size(); ++i) camera.truth_times.push_back(camera.truth->t(i));
   if (camera.truth_times.empty()) return;
-  // The colours span what a few frames hold.
+  // The colour scale covers the values of a few frames.
   constexpr std::uint64_t kLooks = 5;
   TruthHdf5Reader::Frame frame;
   for (std::uint64_t look = 0; look < kLooks; ++look) {

@@ -15,17 +15,17 @@
 
 namespace esim::studio {
 
-/// A file with an image, and when it was seen.
+/// A file with an image, and the time of the image.
 struct TimedFile {
   TimeNs t = 0;
   std::filesystem::path file{};
 };
 
-/// What one camera of a recording has.
+/// The data of one camera of a recording.
 struct CameraView {
   CameraInfo info{};
   std::unique_ptr<EventStore> events{};      ///< null: none
-  std::vector<TimedFile> images{};           ///< PNG; frames of a frame camera rather than other images
+  std::vector<TimedFile> images{};           ///< PNG; frames of a frame camera if there are any, otherwise other images
   std::unique_ptr<TruthHdf5Reader> truth{};  ///< null: none
   std::vector<TimeNs> truth_times{};
   bool depth = false, flow = false;
@@ -33,19 +33,19 @@ struct CameraView {
   FlowScale flow_scale{};
 };
 
-/// A recording, of which any part can be had at once: only indices are in memory.
+/// A recording with random access: only indices are in memory.
 class RecordingView {
  public:
   enum class Kind { depth, flow };
 
-  /// The folder of a recording or of one of its cameras, or a file of events in DSEC's layout. Parts that cannot be
-  /// read are left out, and noted. Throws UserError where nothing can be read, and for other formats.
+  /// Opens the folder of a recording or of one of its cameras, or an event file in DSEC's layout. Unreadable parts are
+  /// left out with a note. Throws UserError if nothing can be read, and for other formats.
   explicit RecordingView(const std::filesystem::path& path);
 
-  /// The beginning of a recording of any format, which is read until there are many events or a while has passed.
+  /// The beginning of a recording of any format: reads up to a number of events or a time limit.
   static std::unique_ptr<RecordingView> beginning_of(const std::filesystem::path& path);
 
-  /// Whether a path is of a kind that the constructor takes.
+  /// Whether the constructor supports a path.
   static bool takes(const std::filesystem::path& path);
 
   const std::vector<CameraView>& cameras() const { return cameras_; }
@@ -55,16 +55,16 @@ class RecordingView {
   bool has_imu() const { return !imu_file_.empty(); }
   bool has_poses() const { return !states_file_.empty(); }
 
-  /// Throws HttpError 404 where there is none of that name; empty: the first.
+  /// The camera with this name; the first if empty. Throws HttpError 404 if there is none.
   const CameraView& camera(const std::string& name) const;
 
-  /// Ground truth in colours, as it was last at or before `t`, and when that was; nothing where there is none.
+  /// The last ground truth at or before `t` as a colour image, with its time; empty without ground truth.
   std::optional<std::pair<Image<Rgb>, TimeNs>> truth_at(const CameraView& camera, Kind kind, TimeNs t) const;
 
-  /// A file with an image; nothing where it cannot be read, or is a link that leads out of the recording.
+  /// The bytes of an image file; empty if it cannot be read, or is a link that leads out of the recording.
   std::optional<std::string> bytes_of(const TimedFile& image) const;
 
-  /// All of them, read when they are first wanted.
+  /// All records, read on first use.
   const std::vector<ImuRecord>& imu() const;
   const std::vector<PoseRecord>& poses() const;
 
@@ -80,14 +80,14 @@ class RecordingView {
   template <typename Part>
   void attempt(const Part& part);
 
-  std::filesystem::path folder_;  // without links
+  std::filesystem::path folder_;  // with links resolved
   std::vector<CameraView> cameras_;
   TimeSpan span_{};
   bool incomplete_ = false;
   std::vector<std::string> notes_;
   std::filesystem::path imu_file_, states_file_;
 
-  mutable std::mutex mutex_;  // of all below, and of the readers of ground truth
+  mutable std::mutex mutex_;  // of all members below, and of the readers of ground truth
   mutable std::optional<std::vector<ImuRecord>> imu_;
   mutable std::optional<std::vector<PoseRecord>> poses_;
 };

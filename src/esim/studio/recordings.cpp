@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What tells that a recording is no longer the one it was.
+/// A fingerprint that changes when a recording is replaced.
 std::string key_of(const fs::path& path) {
   std::error_code error;
   const fs::path report = path / "report.json";
@@ -52,7 +52,7 @@ void OpenRecording::copy(const fs::path& path) {
   try {
     const fs::path copy = folder_ / "recording";
     ConvertOptions options;
-    options.copy.write = {TimeUnit::ns, Compression::none};  // for speed, and so that no time is rounded
+    options.copy.write = {TimeUnit::ns, Compression::none};  // fast, and without rounding of times
     options.read.recover = [&](const std::string& what) { problem = what; };
     convert_recording(path, format_named("recording"), copy, options, [&](double share) {
       indexed_ = 0.99 * share;
@@ -64,7 +64,7 @@ void OpenRecording::copy(const fs::path& path) {
       view_ = std::move(view);
     }
   } catch (const std::exception& error) {
-    problem = fmt::format("only the beginning can be shown: {}", error.what());
+    problem = fmt::format("only the beginning is available: {}", error.what());
   }
   const std::lock_guard lock(mutex_);
   problem_ = problem;
@@ -91,7 +91,7 @@ std::string Recordings::open(const fs::path& path) {
     }
   }
   auto recording = std::make_shared<OpenRecording>(path);
-  std::shared_ptr<OpenRecording> forgotten;  // ends after the lock does
+  std::shared_ptr<OpenRecording> forgotten;  // destroyed after the lock is released
   const std::lock_guard lock(mutex_);
   entries_[++last_] = {key, std::move(recording)};
   if (entries_.size() > kMost) {
@@ -106,7 +106,7 @@ std::shared_ptr<OpenRecording> Recordings::find(const std::string& id) const {
   for (const auto& [number, entry] : entries_) {
     if (std::to_string(number) == id) return entry.recording;
   }
-  throw HttpError(404, "this recording has been closed; open it anew");
+  throw HttpError(404, "this recording has been closed; open it again");
 }
 
 }  // namespace esim::studio

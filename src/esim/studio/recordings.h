@@ -12,34 +12,34 @@
 
 namespace esim::studio {
 
-/// A recording that has been opened. Of formats without an index its beginning is seen at once, and the rest when all
-/// of it has been copied, in the background, into a recording's folder among the system's temporary files.
+/// An open recording. For formats without an index, the beginning is available at once; the rest follows when a
+/// background thread has converted all of it to a temporary recording folder.
 class OpenRecording {
  public:
-  /// Throws UserError where there is nothing to read.
+  /// Throws UserError if nothing can be read.
   explicit OpenRecording(const std::filesystem::path& path);
 
-  /// Stops the copying, and removes the copy.
+  /// Stops the conversion and removes the copy.
   ~OpenRecording();
   OpenRecording(const OpenRecording&) = delete;
   OpenRecording& operator=(const OpenRecording&) = delete;
 
-  /// What is seen of it now.
+  /// The part that is available now.
   std::shared_ptr<const RecordingView> view() const;
 
   const std::string& format() const { return format_; }
 
-  /// The share that has been copied; 1 where nothing is to be, or all is.
+  /// The converted fraction; 1 if complete or if no conversion is needed.
   double indexed() const { return indexed_; }
 
-  /// Why it cannot be seen beyond its beginning; empty: it can.
+  /// Why only the beginning is available; empty if there is no problem.
   std::string problem() const;
 
  private:
   void copy(const std::filesystem::path& path);
 
   std::string format_;
-  std::filesystem::path folder_;  // of the copy; empty: none
+  std::filesystem::path folder_;  // of the copy; empty without a copy
   std::atomic<double> indexed_{1};
   std::atomic<bool> stop_{false};
   mutable std::mutex mutex_;
@@ -48,13 +48,13 @@ class OpenRecording {
   std::thread thread_;
 };
 
-/// The recordings that were opened last.
+/// The recently opened recordings.
 class Recordings {
  public:
-  /// The id of the recording that is there now: the same as before if it is still the same.
+  /// The id of the recording at a path; it changes when the recording is replaced.
   std::string open(const std::filesystem::path& path);
 
-  /// Throws HttpError 404 where it has been forgotten.
+  /// Throws HttpError 404 if it has been closed.
   std::shared_ptr<OpenRecording> find(const std::string& id) const;
 
  private:

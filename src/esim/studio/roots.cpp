@@ -16,11 +16,11 @@ bool is_below(const fs::path& place, const fs::path& folder) {
   return std::mismatch(folder.begin(), folder.end(), place.begin(), place.end()).first == folder.end();
 }
 
-/// Of what may not exist; links of what does are resolved.
+/// The canonical form of a path that may not exist; links of existing parts are resolved.
 fs::path without_links(const fs::path& place) {
   std::error_code error;
   fs::path canonical = fs::weakly_canonical(fs::absolute(place), error);
-  if (error) throw HttpError(403, place.filename().string() + ": cannot be reached: " + error.message());
+  if (error) throw HttpError(403, place.filename().string() + ": is not accessible: " + error.message());
   return canonical.has_filename() ? canonical : canonical.parent_path();
 }
 
@@ -49,23 +49,25 @@ fs::path Roots::resolve(const std::string& path) const {
   const std::string name = path.substr(0, slash);
   const auto root = std::find_if(roots_.begin(), roots_.end(), [&](const Root& r) { return r.name == name; });
   if (root == roots_.end())
-    throw HttpError(403, fmt::format("{}: is in none of the folders that are open; see --root", path));
+    throw HttpError(403,
+                    fmt::format("{}: must be in one of the folders that are open; add a folder with --root", path));
   fs::path place = root->folder;
   std::size_t begin = slash;
   while (begin < path.size()) {
     const std::size_t end = std::min(path.find('/', begin + 1), path.size());
     const std::string part = path.substr(begin + 1, end - begin - 1);
     if (part == ".." || part == "." || part.find('\0') != std::string::npos || part.find('\\') != std::string::npos)
-      throw HttpError(400, fmt::format("{}: a path has no such part as '{}'", path, part));
+      throw HttpError(400, fmt::format("{}: a path must not have the part '{}'", path, part));
     if (!part.empty()) place /= part;
     begin = end;
   }
   place = without_links(place);
-  if (!is_below(place, root->folder)) throw HttpError(403, path + ": leads out of its folder");
-  // A link that is left leads to what is not there yet, wherever that is.
+  if (!is_below(place, root->folder)) throw HttpError(403, path + ": must not lead out of its folder");
+  // A remaining link points to a file that does not exist yet, possibly outside.
   std::error_code error;
   for (fs::path part = place; part != root->folder; part = part.parent_path()) {
-    if (fs::is_symlink(fs::symlink_status(part, error))) throw HttpError(403, path + ": leads out of its folder");
+    if (fs::is_symlink(fs::symlink_status(part, error)))
+      throw HttpError(403, path + ": must not lead out of its folder");
   }
   return place;
 }

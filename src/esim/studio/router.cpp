@@ -22,7 +22,7 @@ std::vector<std::string> parts_of(const std::string& path) {
   return parts;
 }
 
-/// What a disk that has no room says, in one way or another.
+/// Whether an error means that the disk is full.
 bool is_about_room(const std::string& message) {
   for (const int error : {ENOSPC, EDQUOT, EFBIG}) {
     if (message.find(system_reason(error)) != std::string::npos) return true;
@@ -60,9 +60,9 @@ Response Router::find(Request& request) const {
     known = true;
     if (route.method == request.method) return route.answer(request);
   }
-  if (known) throw HttpError(405, fmt::format("{} is not for {}", request.method, request.path));
+  if (known) throw HttpError(405, fmt::format("method {} is not supported for {}", request.method, request.path));
   if (request.method == "GET" && rest_ && !request.path.starts_with("/api/")) return rest_(request);
-  throw HttpError(404, request.path + ": there is no such address");
+  throw HttpError(404, request.path + ": no such address");
 }
 
 Response Router::answer(Request request) const {
@@ -79,7 +79,7 @@ Response Router::answer(Request request) const {
   } catch (const std::bad_alloc&) {
     return refusal(507, "out of memory; use smaller images, a smaller scene, or a machine with more memory");
   } catch (const std::exception& error) {
-    return refusal(500, std::string("a defect of esim: ") + error.what());
+    return refusal(500, std::string("internal error of esim: ") + error.what());
   }
 }
 

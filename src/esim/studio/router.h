@@ -9,18 +9,18 @@
 
 namespace esim::studio {
 
-/// Which function answers which request.
+/// Maps requests to handlers.
 class Router {
  public:
   using Answer = std::function<Response(const Request&)>;
 
-  /// `path` is that of requests, with * for a part that is left open.
+  /// `path` is the path of requests; * matches any one part.
   void add(const std::string& method, const std::string& path, Answer answer);
 
-  /// What no other route answers, with GET.
+  /// The handler of GET requests that match no route.
   void add_rest(Answer answer) { rest_ = std::move(answer); }
 
-  /// Answers anything: what is thrown becomes {"error": ..., "where": ...}.
+  /// Answers any request; exceptions become {"error": ..., "where": ...}.
   Response answer(Request request) const;
 
  private:

@@ -25,7 +25,7 @@ std::string_view name_of(RunState state) {
 }
 
 struct Runs::Run {
-  RunStatus status;  // guarded by the mutex of all
+  RunStatus status;  // guarded by Runs::mutex_
   Scenario scenario;
   bool replace = false;
   std::atomic<bool> cancelled{false};

@@ -20,41 +20,41 @@ namespace esim::studio {
 enum class RunState { waiting, running, done, failed, cancelled };
 std::string_view name_of(RunState state);
 
-/// What is known of a run.
+/// The status of a run.
 struct RunStatus {
   int id = 0;
   std::filesystem::path scenario{}, out{};
   RunState state = RunState::waiting;
   Progress progress{};
   bool loading = false;  ///< running, but not simulating yet
-  std::string error{};   ///< of one that failed
+  std::string error{};   ///< of a failed run
   std::vector<std::string> notices{};
-  int pictures = 0;  ///< how many there have been so far
+  int pictures = 0;  ///< number so far
 
   bool over() const { return state != RunState::waiting && state != RunState::running; }
 };
 
-/// Recordings that are made one after the other, whether or not anybody looks on.
+/// Makes recordings one after the other, independent of open pages.
 class Runs {
  public:
   explicit Runs(int threads);
 
-  /// Cancels all.
+  /// Cancels all runs.
   ~Runs();
 
-  /// Returns its number. The scenario has been read, `file` names it.
+  /// Adds a run and returns its number. The scenario has been read from `file`.
   int start(Scenario scenario, const std::filesystem::path& file, const std::filesystem::path& out, bool replace);
 
   std::vector<RunStatus> list() const;
   std::optional<RunStatus> find(int id) const;
 
-  /// Whether a run that is not over writes there.
+  /// Whether an unfinished run writes to a folder.
   bool writes_to(const std::filesystem::path& out) const;
 
-  /// A PNG of what has come last; empty where there is nothing yet.
+  /// A PNG of the current view; empty before the first.
   std::string picture(int id) const;
 
-  /// False where there is none of that number, or it is over.
+  /// False if there is no such run or it has ended.
   bool cancel(int id);
 
  private:
@@ -66,7 +66,7 @@ class Runs {
   int threads_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::vector<std::shared_ptr<Run>> runs_;  // by number, from 1 on
+  std::vector<std::shared_ptr<Run>> runs_;  // by number, from 1
   bool ending_ = false;
   std::thread thread_;
 };

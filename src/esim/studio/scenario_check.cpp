@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A visitor of describe() that calls a function with every file that options name.
+/// A visitor of describe() that calls a function for every file in the options.
 class FileVisitor {
  public:
   using See = std::function<void(const fs::path&)>;
@@ -52,11 +52,11 @@ class FileVisitor {
 };
 
 std::string outside(const fs::path& file) {
-  return fmt::format("{} is outside the folders that are open; start esim studio with --root {}", file.string(),
+  return fmt::format("{} must be in one of the folders that are open; start esim studio with --root {}", file.string(),
                      file.parent_path().string());
 }
 
-/// Files that became known by reading those that the text names.
+/// Files that are named in other files of the scenario.
 void refuse_foreign_files(Scenario& scenario, const Roots& roots) {
   FileVisitor visitor([&](const fs::path& file) {
     if (!roots.contains(file)) throw UserError(outside(file));
@@ -83,7 +83,7 @@ bool has(const Json& values, const std::string& key) {
   return true;
 }
 
-/// Where an option stands that all cameras share: the reader names it as each camera's own.
+/// The key in the text of an option that all cameras share; the reader reports it with a camera's key.
 std::string place_in(const Json& values, const std::string& key) {
   if (has(values, key)) return key;
   for (const char* shared : {"event_camera", "frame_camera", "sampling"}) {
@@ -115,7 +115,7 @@ CheckedScenario check_scenario(const std::string& yaml, const fs::path& file, co
   text.refuses = [&](const fs::path& named) { return roots.contains(named) ? "" : outside(named); };
   const auto note = [&](const std::string& where, const std::string& what) {
     for (const Json& problem : checked.problems) {
-      if (problem["where"] == where) return;  // that it is missing now is of our own making
+      if (problem["where"] == where) return;  // it is missing because of the removal below
     }
     checked.problems.push_back({{"where", where}, {"what", what}});
   };
@@ -126,7 +126,7 @@ CheckedScenario check_scenario(const std::string& yaml, const fs::path& file, co
       checked.scenario = std::move(scenario);
       return checked;
     } catch (const OptionError& error) {
-      // Without it, the next one shows.
+      // Remove the invalid option to find the next problem.
       const std::string place = place_in(values_of(text.yaml, ""), error.key());
       note(place.empty() ? error.key() : place, error.problem());
       if (!place.empty()) {

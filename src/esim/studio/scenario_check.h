@@ -10,28 +10,28 @@
 
 namespace esim::studio {
 
-/// What a text says, and what is wrong with it.
+/// The contents of a scenario's text, and its problems.
 struct CheckedScenario {
-  Json values;                       ///< the options that it gives
-  Json problems = Json::array();     ///< [{where, what}]: as many as can be told at once
-  std::optional<Scenario> scenario;  ///< without the options that are problems; nothing where even that cannot be had
+  Json values;                       ///< the given options
+  Json problems = Json::array();     ///< [{where, what}]: all problems that can be found at once
+  std::optional<Scenario> scenario;  ///< without the invalid options; empty if it still cannot be read
 };
 
-/// Checks a scenario; `file` names it, and its folder is where relative paths begin. Files outside the roots are
-/// problems, and not read. Throws UserError for what is no YAML.
+/// Checks a scenario; `file` is its name, and relative paths start at its folder. Files outside the roots are problems
+/// and are not read. Throws UserError for invalid YAML.
 CheckedScenario check_scenario(const std::string& yaml, const std::filesystem::path& file, const Roots& roots);
 
-/// What has to be right: the renderer and the cameras, or the motion as well.
+/// The parts that must be valid: the renderer and the cameras, or also the motion.
 enum class ScenarioNeeds { scene, motion };
 
-/// The scenario of a request, {yaml, dir}, which may have problems elsewhere. Throws UserError: the first problem of
-/// what is needed.
+/// The scenario of a request, {yaml, dir}. Throws UserError with the first problem of the needed parts; other parts may
+/// have problems.
 Scenario scenario_of(const Json& request, const Roots& roots, ScenarioNeeds needs);
 
-/// The place that a request's text stands for: a file in its `dir`, which need not exist.
+/// The place of a request's text: a file in its `dir`, which need not exist.
 std::filesystem::path place_of(const Json& request, const Roots& roots);
 
-/// The option that a message begins with, as in "duration_s: is missing"; empty where it begins with none.
+/// The option at the beginning of a message, as in "duration_s: is missing"; empty without one.
 std::string option_in(const std::string& message);
 
 }  // namespace esim::studio

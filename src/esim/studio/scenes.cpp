@@ -24,7 +24,7 @@ std::string stamp_of(const std::filesystem::path& file) {
   return fmt::format("{}:{}:{};", file.string(), time.time_since_epoch().count(), error ? 0 : bytes);
 }
 
-/// What is loaded, as text: the renderer without the motions of its objects, and the state of the files.
+/// A text that identifies a loaded scene: the renderer without the motions of its objects, and the state of the files.
 std::string key_of(const RendererOptions& renderer) {
   Scenario bare;
   bare.renderer = renderer;
@@ -50,7 +50,7 @@ std::string key_of(const RendererOptions& renderer) {
   return files + write_scenario(bare);
 }
 
-/// Whether making the renderer may fail for another reason than that its scene cannot be read.
+/// Whether making the renderer may fail for a reason other than an unreadable scene.
 bool fails_when_made(const RendererOptions& renderer) {
   const auto* const mesh = std::get_if<MeshRendererOptions>(&renderer);
   return mesh == nullptr || mesh->engine == MeshEngine::gl;
@@ -58,7 +58,8 @@ bool fails_when_made(const RendererOptions& renderer) {
 
 void refuse_engines(const Scenario& scenario) {
   if (engine_objects(scenario.renderer) != nullptr)
-    throw UserError("renderer: another program renders this scene; it is seen in recordings only");
+    throw UserError(
+        "renderer: another program renders this scene, so that it cannot be shown here; look at a recording of it");
 }
 
 }  // namespace
@@ -116,7 +117,7 @@ Image<Rgb> StudioScene::render(const Camera& camera, const RenderRequest& view) 
 std::shared_ptr<StudioScene> SceneStore::of(const Scenario& scenario) {
   refuse_engines(scenario);
   const std::string id = fmt::format("{:016x}", std::hash<std::string>()(key_of(scenario.renderer)));
-  const std::lock_guard lock(mutex_);  // who asks for the same scene meanwhile waits for it
+  const std::lock_guard lock(mutex_);  // other requests for the same scene wait
   const auto known = scenes_.find(id);
   if (known != scenes_.end()) return known->second;
   auto scene = std::make_shared<StudioScene>(scenario, id, threads_);
@@ -153,7 +154,7 @@ std::vector<CameraInfo> cameras_of(const Scenario& scenario, const SceneFile& sc
   const SceneCamera* followed = nullptr;
   try {
     followed = followed_camera(scenario, scene);
-  } catch (const UserError&) {  // the motion will say what is wrong with it
+  } catch (const UserError&) {  // reported with the motion
   }
   std::vector<CameraInfo> cameras;
   for (const CameraOptions& options : scenario.cameras) cameras.push_back(camera_info(options, followed));

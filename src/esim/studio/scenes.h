@@ -12,30 +12,30 @@
 
 namespace esim::studio {
 
-/// What a renderer shows, as a browser draws it; the renderer itself is made when its first picture is asked for.
+/// A scene in a format for browsers. Its renderer is made for the first rendered image.
 class StudioScene {
  public:
   StudioScene(const Scenario& scenario, std::string id, int threads);
 
   const std::string& id() const { return id_; }
 
-  /// Its textures are coded (see SceneLook).
+  /// The scene with coded textures (see SceneLook).
   const SceneFile& file() const { return file_; }
 
-  /// Of meshes; nothing of others, and where there are more triangles than a browser is asked to draw.
+  /// For meshes; empty for other scenes and for too many triangles.
   const std::optional<Glb>& glb() const { return glb_; }
 
-  /// Of panoramas and planes: a JPEG.
+  /// A JPEG for panoramas and planes.
   const std::optional<std::string>& texture() const { return texture_; }
   double texture_aspect() const { return texture_aspect_; }  ///< height / width
 
   std::size_t triangles() const;
 
-  /// One of the GLB's textures, whole; null where there is none of that number. Throws UserError where it cannot be
-  /// decoded. From any thread.
+  /// A texture of the GLB in full resolution; null if the index is invalid. Throws UserError if it cannot be decoded.
+  /// Thread-safe.
   std::shared_ptr<const PageImage> image(std::size_t index);
 
-  /// From here on from any thread. Both throw UserError where the renderer cannot be made.
+  // The functions below are thread-safe. They throw UserError if the renderer cannot be made.
   bool on_sensor() { return pictures().traits().on_sensor; }
   Image<Rgb> render(const Camera& camera, const RenderRequest& view);  ///< ScenePictures::render
 
@@ -46,7 +46,7 @@ class StudioScene {
   Scenario scenario_;
   int threads_;
   SceneFile file_;
-  std::mutex mutex_;  // of what follows
+  std::mutex mutex_;  // of the members below
   std::optional<ScenePictures> pictures_;
   std::map<std::size_t, std::shared_ptr<const PageImage>> images_;
   std::optional<Glb> glb_;
@@ -54,16 +54,16 @@ class StudioScene {
   double texture_aspect_ = 1;
 };
 
-/// The scenes that were looked at last.
+/// The recently used scenes.
 class SceneStore {
  public:
   explicit SceneStore(int threads) : threads_(threads) {}
 
-  /// Loads what a scenario shows, unless that has been done and its files have not changed since. Throws UserError
-  /// where it cannot be loaded, and for engines, which render in recordings only.
+  /// Loads the scene of a scenario, unless it is loaded and its files are unchanged. Throws UserError if it cannot be
+  /// loaded, and for renderers in other programs.
   std::shared_ptr<StudioScene> of(const Scenario& scenario);
 
-  /// Null where it has been forgotten.
+  /// Null if it is no longer loaded.
   std::shared_ptr<StudioScene> find(const std::string& id);
 
  private:
@@ -73,7 +73,7 @@ class SceneStore {
   std::vector<std::string> order_;                              // the latest last
 };
 
-/// Where the body and what moves are, as the simulator has them.
+/// The motions of the body and of moving objects, as in the simulator.
 struct StudioMotion {
   std::shared_ptr<const Trajectory> body;
   TimeSpan simulated;
@@ -83,7 +83,7 @@ struct StudioMotion {
 
 StudioMotion motion_of(const Scenario& scenario, const SceneFile& scene);
 
-/// The rig's cameras, as they are simulated; the first is the one by which way points are aimed.
+/// The rig's cameras, as they are simulated; look_at of waypoints refers to the first.
 std::vector<CameraInfo> cameras_of(const Scenario& scenario, const SceneFile& scene);
 
 }  // namespace esim::studio

@@ -10,7 +10,7 @@
 namespace esim::studio {
 namespace {
 
-/// A visitor of describe() that makes a list of what it sees.
+/// A visitor of describe() that lists the members.
 class SchemaWriter {
  public:
   explicit SchemaWriter(Json& members) : members_(members) {}
@@ -107,7 +107,7 @@ class SchemaWriter {
   Json& members_;
 };
 
-/// A visitor of describe() that keeps the values.
+/// A visitor of describe() that collects the values.
 class ValueWriter {
  public:
   explicit ValueWriter(Json& values) : values_(values) {}
@@ -131,12 +131,12 @@ class ValueWriter {
 }  // namespace
 
 Json schema_json() {
-  Json schema{{"kind", "group"}, {"name", "scenario"}, {"help", "everything that determines a simulation"}};
+  Json schema{{"kind", "group"}, {"name", "scenario"}, {"help", "all options of a simulation"}};
   SchemaWriter writer(schema["members"] = Json::array());
   Scenario scenario;
   describe(writer, scenario);
-  // A scenario has one `camera` or a list of `cameras`; sampling, event_camera and frame_camera at its top hold for
-  // all.
+  // A scenario has one `camera` or a list of `cameras`; sampling, event_camera and frame_camera at its top apply to all
+  // cameras.
   Json camera = Json::array();
   SchemaWriter inner(camera);
   CameraOptions options;
@@ -161,7 +161,7 @@ Json presets_json() {
     Json values = Json::object();
     ValueWriter writer(values);
     describe(writer, options);
-    const std::string help = i == 0 ? "no noise, no latency, no bandwidth: the paper's pixel"
+    const std::string help = i == 0 ? "the paper's ideal pixel: no noise, no latency, unlimited bandwidth"
                                     : fmt::format("contrast threshold {}, bandwidth {} Hz, latency {} us",
                                                   options.contrast_threshold, options.low_pass_hz, options.latency_us);
     presets.push_back({{"name", kEnumNames<SensorPreset>[i]}, {"help", help}, {"values", values}});

@@ -26,12 +26,12 @@ namespace http = beast::http;
 using Tcp = asio::ip::tcp;
 using Failure = beast::error_code;
 
-constexpr int kHandlers = 6;  // threads: one that loads a scene must not hold up pictures
+constexpr int kHandlers = 6;  // threads, so that loading a scene does not delay images
 constexpr auto kStreamPace = std::chrono::milliseconds(50);
 constexpr auto kHeartbeat = std::chrono::seconds(15);
 
-/// What every answer says of itself. Scripts, styles and data come from this server alone; three.js hands pictures of
-/// scenes on as blobs.
+/// The content security policy of every answer: scripts, styles and data come from this server only; three.js passes
+/// images of scenes as blobs.
 constexpr const char* kPolicy =
     "default-src 'self'; img-src 'self' blob: data:; connect-src 'self' blob: data:; worker-src 'self' blob:; "
     "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -46,17 +46,18 @@ struct HttpServer::Impl {
   void forget(Session& session) { sessions.erase(&session); }
 
   ServerLimits limits;
-  std::unordered_set<Session*> sessions;  // of the thread of `io` alone; outlives it, as do the connections it ends
+  std::unordered_set<Session*>
+      sessions;  // used only by the thread of `io`; outlives it, as do the connections that it ends
   asio::io_context io;
   Tcp::acceptor acceptor{io};
-  asio::steady_timer pause{io};  // after an accept that failed, as where no descriptors are left
+  asio::steady_timer pause{io};  // after a failed accept, for example without free descriptors
   asio::thread_pool handlers{kHandlers};
   Admit admit;
   Handle handle;
   std::thread thread;
 };
 
-/// One connection. Everything but the handlers' work happens on the thread of `io`.
+/// One connection. Everything except the handlers runs on the thread of `io`.
 class HttpServer::Impl::Session : public std::enable_shared_from_this<Session> {
  public:
   Session(Tcp::socket socket, Impl& server) : stream_(std::move(socket)), server_(server), timer_(server.io) {
@@ -120,14 +121,14 @@ class HttpServer::Impl::Session : public std::enable_shared_from_this<Session> {
     });
   }
 
-  /// Of what could not be read: an answer where a client can understand it.
+  /// Answers an unreadable request if the client can still understand it.
   void refuse(Failure failure) {
     if (failure == http::error::body_limit) return respond(refusal(413, "the request is too large"), false);
     if (failure == http::error::header_limit || failure == http::error::buffer_overflow)
       return respond(refusal(431, "the request's headers are too large"), false);
     const bool cut = failure == http::error::end_of_stream || failure == http::error::partial_message;
     if (!cut && failure.category() == http::make_error_code(http::error::bad_method).category())
-      return respond(refusal(400, "this is no request of HTTP: " + failure.message()), false);
+      return respond(refusal(400, "invalid HTTP request: " + failure.message()), false);
     close();
   }
 
@@ -159,8 +160,7 @@ class HttpServer::Impl::Session : public std::enable_shared_from_this<Session> {
     });
   }
 
-  /// Says that nothing more comes, and lets the client read it: closing at once with something unread would take the
-  /// answer back.
+  /// Ends sending and lets the client read the answer: closing at once with unread input would discard it.
   void finish() {
     Failure ignored;
     stream_.socket().shutdown(Tcp::socket::shutdown_send, ignored);
@@ -178,7 +178,7 @@ class HttpServer::Impl::Session : public std::enable_shared_from_this<Session> {
     });
   }
 
-  // --- answers without end ---
+  // --- streams ---
 
   void stream(Response response) {
     source_ = std::move(response.stream);
@@ -236,7 +236,7 @@ class HttpServer::Impl::Session : public std::enable_shared_from_this<Session> {
 HttpServer::Impl::Impl(const Place& place, const ServerLimits& bounds) : limits(bounds) {
   Failure failure;
   const Tcp::resolver::results_type found = Tcp::resolver(io).resolve(place.host, "", failure);
-  if (failure || found.empty()) throw UserError(fmt::format("--host {}: no such address", place.host));
+  if (failure || found.empty()) throw UserError(fmt::format("--host {}: cannot resolve this address", place.host));
   const asio::ip::address address = found.begin()->endpoint().address();
   for (int i = 0; i < place.ports; ++i) {
     const Tcp::endpoint endpoint(address, static_cast<std::uint16_t>(place.port + i));
@@ -250,9 +250,9 @@ HttpServer::Impl::Impl(const Place& place, const ServerLimits& bounds) : limits(
   }
   if (failure == asio::error::address_in_use) {
     throw UserError(place.ports == 1
-                        ? fmt::format("--port {}: another program has it; name another, or none", place.port)
-                        : fmt::format("ports {} to {}: other programs have them; name one with --port", place.port,
-                                      place.port + place.ports - 1));
+                        ? fmt::format("--port {}: in use by another program; give another port, or none", place.port)
+                        : fmt::format("ports {} to {}: in use by other programs; give a free port with --port",
+                                      place.port, place.port + place.ports - 1));
   }
   throw UserError(fmt::format("cannot listen on {} port {}: {}", place.host, place.port, failure.message()));
 }

@@ -10,12 +10,12 @@
 
 namespace esim::studio {
 
-/// What a connection may take.
+/// Limits of connections.
 struct ServerLimits {
   std::size_t head_bytes = std::size_t{16} << 10;
   std::size_t body_bytes = std::size_t{8} << 20;
-  int connections = 64;                         ///< more are closed at once
-  std::chrono::milliseconds head_time{15'000};  ///< from the connection, or the last answer, to the end of the headers
+  int connections = 64;                         ///< further ones are closed at once
+  std::chrono::milliseconds head_time{15'000};  ///< from the connection or the last answer to the end of the headers
   std::chrono::milliseconds body_time{30'000};
   std::chrono::milliseconds write_time{60'000};
 };
@@ -23,16 +23,16 @@ struct ServerLimits {
 /// An HTTP/1.1 server.
 class HttpServer {
  public:
-  /// Sees what a request begins with, before its body is read: an answer ends it there. Must not wait.
+  /// Sees the head of a request before its body is read; a returned answer ends the request. Must not block.
   using Admit = std::function<std::optional<Response>(const RequestHead&)>;
 
-  /// Answers a request, on one of a few threads. Throws nothing.
+  /// Answers a request, on one of a few threads. Must not throw.
   using Handle = std::function<Response(const Request&)>;
 
-  /// Where to listen; of `ports` the first that is free. Throws UserError where none is.
+  /// The address to listen on, at the first free one of `ports`. Throws UserError if none is free.
   struct Place {
     std::string host = "127.0.0.1";
-    int port = 0;  ///< 0: any
+    int port = 0;  ///< 0: any free port
     int ports = 1;
   };
 
@@ -43,10 +43,10 @@ class HttpServer {
 
   int port() const;
 
-  /// Begins to answer. Once.
+  /// Starts answering. Call once.
   void start(Admit admit, Handle handle);
 
-  /// Ends all connections, and returns when nothing is being answered any more.
+  /// Ends all connections, and returns when all handlers have finished.
   void stop();
 
  private:

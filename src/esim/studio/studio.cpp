@@ -36,12 +36,13 @@ std::string token_of(const StudioOptions& options) {
   constexpr std::size_t kLeast = 16;
   if (options.token.empty()) {
     if (is_loopback(options.host)) return random_token();
-    throw UserError(fmt::format("--host {}: other machines can reach it; choose who may with --token", options.host));
+    throw UserError(
+        fmt::format("--host {}: other machines can reach this address; restrict access with --token", options.host));
   }
   const bool plain = options.token.find_first_not_of(
                          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == std::string::npos;
   if (!plain || options.token.size() < kLeast)
-    throw UserError(fmt::format("--token: use at least {} letters, digits, _ and -", kLeast));
+    throw UserError(fmt::format("--token: must have at least {} characters: letters, digits, _ and -", kLeast));
   return options.token;
 }
 
@@ -49,8 +50,8 @@ void require_pages(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_regular_file(folder / "index.html", error))
     throw UserError(
-        fmt::format("the studio's page is not there ({} is missing): build it with scripts/studio, which needs npm, or "
-                    "name its folder with --page",
+        fmt::format("the studio's page is missing ({}): build it with scripts/studio, which needs npm, or "
+                    "give its folder with --page",
                     (folder / "index.html").string()));
 }
 
@@ -83,12 +84,12 @@ struct Studio::Impl {
     load_ahead.join();
   }
 
-  /// The page will ask for it in a moment.
+  /// Loads the scene in advance, since the page will request it.
   void load() {
     try {
       if (!options.opened.empty() && kind_of(options.opened) == FileKind::scenario)
         scenes.of(read_scenario(options.opened));
-    } catch (const std::exception&) {  // the page will be told when it asks
+    } catch (const std::exception&) {  // reported when the page requests it
     }
   }
 

@@ -7,31 +7,32 @@
 
 namespace esim::studio {
 
-/// What is opened, and to whom.
+/// Options of the studio.
 struct StudioOptions {
-  std::filesystem::path opened{};              ///< a scenario, a scene or a recording; empty: nothing
-  std::vector<std::filesystem::path> roots{};  ///< beside the folder of what is opened; without both, the current one
-  std::filesystem::path pages{};               ///< folder of the page
+  std::filesystem::path opened{};  ///< a scenario, a scene or a recording; may be empty
+  std::vector<std::filesystem::path>
+      roots{};                    ///< in addition to the folder of `opened`; without both, the current folder
+  std::filesystem::path pages{};  ///< folder of the page
   std::string host = "127.0.0.1";
-  int port = 0;         ///< 0: the usual one, or one of those that follow
-  std::string token{};  ///< empty: a new one
-  int threads = 0;      ///< of rendering and simulating; 0: every processor
+  int port = 0;         ///< 0: the default port or one of the next
+  std::string token{};  ///< empty: a new random one
+  int threads = 0;      ///< for rendering and simulating; 0: every processor
 };
 
-/// The usual port.
+/// The default port.
 inline constexpr int kStudioPort = 8391;
 
-/// A server of pages by which one designs recordings, makes them and looks at them.
+/// A web server with pages to design, make and view recordings.
 class Studio {
  public:
-  /// Begins to answer. Throws UserError where what is opened is not there, the page is not built, the port is taken, or
-  /// other machines could reach the server without a token of the user's own.
+  /// Starts answering. Throws UserError if `opened` does not exist, the page is not built, the port is in use, or other
+  /// machines could reach the server without a token chosen by the user.
   explicit Studio(const StudioOptions& options);
 
-  /// Ends a recording that is being made, in order, and all connections.
+  /// Ends a running recording in order, and all connections.
   ~Studio();
 
-  /// To be opened in a browser; it holds the token.
+  /// The address to open in a browser; it contains the token.
   std::string url() const;
 
  private:

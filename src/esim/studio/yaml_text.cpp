@@ -17,7 +17,7 @@ using Path = std::vector<std::string>;
 
 // --- text to values ---
 
-/// Aliases of anchors share nodes: what is small as text may be endless as a tree.
+/// Aliases of anchors share nodes, so that a small text may be an endless tree.
 constexpr int kMostNodes = 1 << 20, kMostDeep = 64;
 
 Json scalar_json(const YAML::Node& node) {
@@ -36,11 +36,11 @@ Json scalar_json(const YAML::Node& node) {
 
 Json json_of(const YAML::Node& node, int depth, int& nodes) {
   if (++nodes > kMostNodes || depth > kMostDeep)
-    throw UserError("the scenario is too deep or too large, or an alias in it leads back to itself");
+    throw UserError("the scenario is nested too deeply, is too large, or has an alias that contains itself");
   if (node.IsMap()) {
     Json object = Json::object();
     for (const auto& entry : node) {
-      if (!entry.first.IsScalar()) throw UserError("the keys of a scenario are plain words");
+      if (!entry.first.IsScalar()) throw UserError("the keys of a scenario must be plain words");
       object[entry.first.Scalar()] = json_of(entry.second, depth + 1, nodes);
     }
     return object;
@@ -57,7 +57,7 @@ YAML::Node parse(const std::string& yaml, const std::string& name) {
   try {
     YAML::Node root = YAML::Load(yaml);
     if (root.IsNull()) return YAML::Node(YAML::NodeType::Map);
-    if (!root.IsMap()) throw UserError(name + ": a scenario is a map of keys and values");
+    if (!root.IsMap()) throw UserError(name + ": a scenario must be a map of keys and values");
     return root;
   } catch (const YAML::Exception& exception) {
     throw UserError(fmt::format("{}:{}: not valid YAML: {}", name, exception.mark.line + 1, exception.msg));
@@ -79,7 +79,7 @@ std::string quoted(const std::string& text) {
   return out + "\"";
 }
 
-/// Without quotes where it then is the same text.
+/// Without quotes if they are not needed.
 std::string text_scalar(const std::string& text) {
   const bool plain = !text.empty() &&
                      text.find_first_not_of(
@@ -99,7 +99,7 @@ bool is_list_of_maps(const Json& value) {
          std::all_of(value.begin(), value.end(), [](const Json& entry) { return entry.is_object(); });
 }
 
-/// Below a key that stands `indent` columns in, to be put after its colon.
+/// The text of a value after the colon of a key at column `indent`.
 std::string block_text(const Json& value, std::size_t indent) {
   constexpr std::size_t kLineWidth = 100;
   const std::string line = yaml_of(value);
@@ -176,7 +176,7 @@ std::size_t end_of_value(const std::string& text, std::size_t from, std::size_t 
     return e;
   };
   if (flow) return trimmed(end);
-  // A collection goes on over the lines that stand further in.
+  // A collection continues over the lines with a larger indent.
   std::size_t last = trimmed(end);
   for (std::size_t line = end_of_line(text, from) + 1; line < text.size(); line = end_of_line(text, line) + 1) {
     const std::size_t stop = end_of_line(text, line);
@@ -200,14 +200,14 @@ std::optional<std::size_t> index_of(const std::string& part) {
   return std::stoul(part);
 }
 
-/// The tree as it shall be.
+/// The tree after the change.
 void set_in(Json& tree, const Path& path, const Json& value, std::size_t depth = 0) {
   const std::string& part = path[depth];
   const bool last = depth + 1 == path.size();
   if (tree.is_array()) {
     const auto index = index_of(part);
     if (!index || *index > tree.size())
-      throw UserError(fmt::format("{}: entries of a list are named by their number", part));
+      throw UserError(fmt::format("{}: an entry of a list must be given by its number", part));
     if (last && value.is_null()) {
       if (*index < tree.size()) tree.erase(*index);
       return;
@@ -232,16 +232,16 @@ void set_in(Json& tree, const Path& path, const Json& value, std::size_t depth =
   }
 }
 
-/// An entry of a map, or of a list, in the text.
+/// An entry of a map or of a list in the text.
 struct Place {
-  std::size_t key = 0;    // where the key, or the dash, begins
-  std::size_t value = 0;  // where the value begins
+  std::size_t key = 0;    // start of the key or of the dash
+  std::size_t value = 0;  // start of the value
   std::size_t end = 0;
   bool flow = false;
   bool in_list = false;
 };
 
-/// Edits the text itself. Gives nothing where it does not know how.
+/// Edits the text itself. Returns nothing for unsupported cases.
 class TextEdit {
  public:
   TextEdit(const std::string& text, const Json& wanted, bool removes)
@@ -253,11 +253,11 @@ class TextEdit {
     std::optional<Place> place;
     for (std::size_t depth = 0; depth < path.size(); ++depth) {
       const std::string& part = path[depth];
-      // Entries of a list move up where one goes.
+      // Later entries of a list move up.
       if (removes_ && want->is_array() && depth + 1 == path.size()) return replace(place, *want);
       const bool wants = want->is_array() ? index_of(part).value_or(want->size()) < want->size() : want->contains(part);
       const auto found = find(node, part);
-      if (!wants) {  // it goes
+      if (!wants) {  // it is removed
         if (!found || !node.IsMap() || node.size() < 2 || found->second.flow) return replace(place, *want);
         return without(found->second);
       }
@@ -323,7 +323,7 @@ class TextEdit {
     return text_.substr(0, begin) + text_.substr(std::min(end_of_line(text_, place.end) + 1, text_.size()));
   }
 
-  /// A new entry at the end of a map; of a list, the whole is written.
+  /// A new entry at the end of a map; a list is written completely.
   std::optional<std::string> add(const YAML::Node& node, const std::optional<Place>& place, const Json& all,
                                  const std::string& part, const Json& value) const {
     if (node.IsMap() && node.size() == 0 && !place) return append(text_.size(), 0, part, value);
@@ -354,7 +354,7 @@ class TextEdit {
 
 bool same(const Json& a, const Json& b) { return nlohmann::json(a) == nlohmann::json(b); }
 
-/// A text that means `wanted`, by whichever way keeps more of the old one.
+/// A text with the values `wanted` that keeps as much of the old text as possible.
 std::string rewritten(const Json& wanted) {
   std::string out;
   for (const auto& [key, value] : wanted.items()) out += text_scalar(key) + ":" + block_text(value, 0) + "\n";
@@ -388,10 +388,10 @@ std::string with_option(const std::string& yaml, const std::string& key, const J
   for (std::size_t begin = 0; begin <= key.size();) {
     const std::size_t end = std::min(key.find('.', begin), key.size());
     path.push_back(key.substr(begin, end - begin));
-    if (path.back().empty()) throw UserError(fmt::format("'{}' names no option", key));
+    if (path.back().empty()) throw UserError(fmt::format("'{}' is not an option", key));
     begin = end + 1;
   }
-  if (path.size() > static_cast<std::size_t>(kMostDeep)) throw UserError(fmt::format("'{}' names no option", key));
+  if (path.size() > static_cast<std::size_t>(kMostDeep)) throw UserError(fmt::format("'{}' is not an option", key));
   const Json before = values_of(yaml, "the scenario");
   Json wanted = before;
   set_in(wanted, path, value);
@@ -399,7 +399,7 @@ std::string with_option(const std::string& yaml, const std::string& key, const J
   const auto edited = TextEdit(yaml, wanted, value.is_null()).set(parse(yaml, "the scenario"), path);
   try {
     if (edited && same(values_of(*edited, ""), wanted)) return *edited;
-  } catch (const UserError&) {  // it would have broken the text
+  } catch (const UserError&) {  // the edit would have made the text invalid
   }
   return rewritten(wanted);
 }

@@ -1,8 +1,8 @@
-/** Events of one camera in a span of time, in order of time. */
+/** Events of one camera in a time span, in order of time. */
 export interface EventCloud {
   from_ns: number;
   to_ns: number;
-  /** How many there were before they were thinned. */
+  /** Their number before thinning. */
   total: number;
   /** Since from_ns. */
   dt_ns: Uint32Array;
@@ -17,7 +17,7 @@ const event_bytes = 8;
 
 /**
  * Reads the server's events.bin, little-endian: u64 from, u64 to, u32 n, u32 total, then n times u32 dt, u16 x,
- * u16 y | polarity << 15. Throws where the length is not that of n events.
+ * u16 y | polarity << 15. Throws if the length does not match n events.
  */
 export function parseEvents(buffer: ArrayBuffer): EventCloud {
   if (buffer.byteLength < header_bytes)

@@ -1,12 +1,12 @@
 import { Signal } from "../ui/signal.ts";
 
-/** An answer of the server that is not a success; `where` is the option that it is about. */
+/** An error answer of the server; `where` is the option that it concerns. */
 export class ApiError extends Error {
   constructor(
     message: string,
     readonly status: number,
     readonly where: string | undefined,
-    /** The whole answer: a conflict carries the file's present text. */
+    /** The complete answer; a conflict contains the file's current text. */
     readonly body: Record<string, unknown>,
   ) {
     super(message);
@@ -16,7 +16,7 @@ export class ApiError extends Error {
 /** The server did not answer at all. */
 export class ServerGone extends Error {
   constructor() {
-    super("The server does not answer. The page goes on trying; what you design stays here.");
+    super("The server does not answer. The page keeps trying, and your changes stay here.");
   }
 }
 
@@ -42,7 +42,7 @@ async function waitForServer(): Promise<void> {
   retrying = false;
 }
 
-/** Tells that the server went away, also where this was not seen by a request of this file. */
+/** Reports that the server is gone, for requests that other files send. */
 export function serverIsGone(): void {
   if (connection.value !== "gone") connection.set("gone");
   void waitForServer();
@@ -53,7 +53,7 @@ async function failure(answer: Response): Promise<ApiError> {
   try {
     body = (await answer.json()) as Record<string, unknown>;
   } catch {
-    // no JSON: the status must do
+    // not JSON: use the status
   }
   const text =
     typeof body["error"] === "string" ? body["error"] : `the server answered ${answer.status} ${answer.statusText}`;
@@ -76,11 +76,11 @@ async function request(path: string, init: RequestInit): Promise<Response> {
 }
 
 const kept_ms = 10_000;
-/** Answers that were asked for ahead, by their question. */
+/** Answers that were requested in advance, by their question. */
 const answers = new Map<string, Promise<unknown>>();
 let isAhead = false;
 
-/** Asks now for what another part of the page will ask for in a moment, and then gets this answer. */
+/** Sends a request in advance that another part of the page will soon make. */
 export function askAhead<T>(question: () => Promise<T>): Promise<T> {
   isAhead = true;
   try {
@@ -135,7 +135,7 @@ export async function getBytes(path: string, query: Query, signal?: AbortSignal)
   return (await request(url(path, query), { signal: signal ?? null })).arrayBuffer();
 }
 
-/** A picture and the time that it was taken at (X-Time-Ns), where the server says so. */
+/** An image and its time (X-Time-Ns), if the server gives it. */
 export async function getPicture(
   path: string,
   query: Query,

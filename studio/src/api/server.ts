@@ -16,7 +16,7 @@ import type {
   Trajectory,
 } from "./types.ts";
 
-/** A scenario as text, and the folder in which its paths begin. */
+/** A scenario as text, and the base folder of its relative paths. */
 export interface Source {
   yaml: string;
   dir: string;

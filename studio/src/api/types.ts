@@ -1,4 +1,4 @@
-/** What the server speaks: docs/studio-api.md. Times in nanoseconds, lengths in metres, poses x y z qx qy qz qw. */
+/** The server's messages (docs/studio-api.md). Times in nanoseconds, lengths in metres, poses x y z qx qy qz qw. */
 
 export type Pose = [number, number, number, number, number, number, number];
 export type Json = null | boolean | number | string | Json[] | { [key: string]: Json };
@@ -70,9 +70,9 @@ export interface SceneInfo {
   glb: string | null;
   texture: string | null;
   triangles: number;
-  /** Of what stands still; null where there is none. */
+  /** Of the static objects; null without static objects. */
   bounds: [[number, number, number], [number, number, number]] | null;
-  /** The rig's; way points are aimed by the first. */
+  /** Of the rig; look_at of waypoints refers to the first. */
   cameras: [CameraModel, ...CameraModel[]];
   objects: { name: string; glb_node: string; moving: boolean }[];
   world?: {
@@ -102,14 +102,14 @@ export interface RunState {
   out: string;
   state: "waiting" | "running" | "done" | "failed" | "cancelled";
   error?: string;
-  /** The option that the error is about. */
+  /** The option that the error concerns. */
   where?: string;
-  /** Null where nothing was kept. */
+  /** Null if nothing was kept. */
   recording?: string | null;
   t?: number;
   start?: number;
   end?: number;
-  /** The scene is still being read. */
+  /** Whether the scene is still being read. */
   loading?: boolean;
   samples?: number;
   events?: number;
@@ -131,9 +131,9 @@ export interface RecordingInfo {
     height: number;
     events: number;
     has: { events: boolean; images: boolean; depth: boolean; flow: boolean };
-    /** What the colours of depth go from and to [m]. */
+    /** The range of the depth colours [m]. */
     depth_m?: [number, number];
-    /** The speed whose colour is saturated. */
+    /** The speed at which the colour saturates. */
     flow_px_per_s?: number;
   }[];
   imu: boolean;
@@ -141,7 +141,7 @@ export interface RecordingInfo {
   indexing?: number;
 }
 
-/** Events per second between the edges of bins, of which there is one more. */
+/** Events per second in bins; there is one more edge than bins. */
 export interface Rate {
   edges: number[];
   on: number[];

@@ -12,11 +12,11 @@ import { makeField } from "./fields.ts";
 import { findOptions, type Hit } from "./search.ts";
 import { YamlEditor } from "./yaml_editor.ts";
 
-/** Options that stand at the scenario's top, without a group. */
+/** Options at the top of the scenario, without a group. */
 const general = "general";
 const most_hits = 40;
 
-/** Every option of the scenario as a form, beside its text. */
+/** Every option of the scenario as a form, next to its text. */
 export class ConfigurePlace implements Place {
   readonly element: HTMLElement;
   private nav = h("nav", { class: "groups", attrs: { "aria-label": "Groups of options" } });
@@ -71,7 +71,7 @@ export class ConfigurePlace implements Place {
     addShortcuts({
       group: "Configure",
       keys: "/",
-      help: "search the options (Escape: all of them again)",
+      help: "search the options (Escape: show all)",
       act: () => {
         if (this.element.hidden) return false;
         this.search.focus();
@@ -128,7 +128,7 @@ export class ConfigurePlace implements Place {
     if (!entry) return;
     this.search.value = this.hits = this.found.textContent = "";
     this.group = entry.name;
-    // The group's own frame would only repeat its name: its members stand alone.
+    // Without the group's frame, which would only repeat its name.
     this.fields =
       name === general
         ? (entry.node.members ?? []).map((member) => makeField(member, member.name!, this.context))
@@ -138,7 +138,7 @@ export class ConfigurePlace implements Place {
     this.update();
   }
 
-  /** Shows what is searched for, or the group again where that is nothing. */
+  /** Shows the results of the search, or the group if the search is empty. */
   private showHits(): void {
     const text = this.search.value.trim();
     if (text === "") {
@@ -169,7 +169,7 @@ export class ConfigurePlace implements Place {
     for (const field of this.fields) field.update();
   }
 
-  /** An option that the scenario has only when another one is chosen. */
+  /** An option that exists only if another option is chosen. */
   private elsewhere({ where, node, needs }: Hit): HTMLElement {
     return h(
       "div",
@@ -208,7 +208,7 @@ export class ConfigurePlace implements Place {
     this.problems.replaceChildren(...problemEntries(problems, (where) => void this.reveal(where)));
   }
 
-  /** Opens the group of an option and puts the focus there; into the text where the form has no such option. */
+  /** Opens the group of an option and focuses its field, or the text if the form lacks the option. */
   async reveal(where: string): Promise<void> {
     await this.loading;
     this.open(

@@ -1,18 +1,18 @@
 import type { Json, SchemaNode } from "../api/types.ts";
 import type { ScenarioDocument } from "../document/document.ts";
 
-/** What fields need to know of the page. */
+/** The context of fields. */
 export interface FormContext {
   document: ScenarioDocument;
-  /** The value that holds where none is given: the schema's, or that of the chosen preset. */
+  /** The default value: from the schema or the chosen preset. */
   defaultOf: (where: string, node: SchemaNode) => Json | undefined;
   chooseFile: () => Promise<string | null>;
 }
 
-/** A part of the form that shows one option, or several. */
+/** A part of the form with one or several options. */
 export interface FieldView {
   readonly element: HTMLElement;
-  /** Shows the document's present values and problems. */
+  /** Shows the document's current values and problems. */
   update(): void;
 }
 

@@ -5,7 +5,7 @@ import { shortNumber } from "../ui/format.ts";
 export function rangeText(node: SchemaNode): string {
   const { low, high } = node;
   const unit = node.unit ? ` ${node.unit}` : "";
-  const huge = 1e6; // bounds that only keep nonsense out are not worth reading
+  const huge = 1e6; // larger bounds only exclude nonsense and are not shown
   const from = low !== undefined && low > -huge ? low : undefined;
   const to = high !== undefined && high < huge ? high : undefined;
   if (from !== undefined && to !== undefined)
@@ -23,16 +23,16 @@ export function valueText(value: Json | undefined): string {
   return String(value);
 }
 
-/** What was typed as the kind of value that the option wants, or a sentence about what is wrong with it. */
+/** The typed text as a value of the option's type, or a problem. */
 export function readValue(node: SchemaNode, text: string): { value: Json } | { problem: string } {
   const trimmed = text.trim();
   if (node.kind !== "number" && node.kind !== "integer") return { value: trimmed };
   const value = Number(trimmed.replace(",", "."));
-  if (trimmed === "") return { problem: "needs a number in every field" };
+  if (trimmed === "") return { problem: "every field must have a number" };
   if (!Number.isFinite(value)) return { problem: `must be a number, not '${trimmed}'` };
   if (node.kind === "integer" && !Number.isInteger(value)) return { problem: `must be a whole number, not ${trimmed}` };
   if (node.kind === "integer" && !Number.isSafeInteger(value))
-    return { problem: "is too large for the form: write it into the text" };
+    return { problem: "is too large for the form; edit the text instead" };
   const { low, high } = node;
   if (
     (low !== undefined && (value < low || (node.positive && value === low))) ||
@@ -43,7 +43,7 @@ export function readValue(node: SchemaNode, text: string): { value: Json } | { p
   return { value };
 }
 
-/** The path of a file as seen from a folder, both with the root's name in front. */
+/** The path of a file relative to a folder; both begin with the root's name. */
 export function relativePath(folder: string, file: string): string {
   const [from, to] = [folder.split("/").filter(Boolean), file.split("/")];
   let shared = 0;

@@ -19,7 +19,7 @@ export function makeField(node: SchemaNode, where: string, context: FormContext)
 
 const join = (where: string, name: string | number) => (where ? `${where}.${name}` : String(name));
 
-/** What a group of options is called, and what for. */
+/** The name and the help of a group of options. */
 function groupTitle(node: SchemaNode, where: string): HTMLElement {
   return h(
     "span",
@@ -29,7 +29,7 @@ function groupTitle(node: SchemaNode, where: string): HTMLElement {
   );
 }
 
-/** Options that belong together; an optional group is there or not. */
+/** A group of options, which may be optional. */
 class GroupField implements FieldView {
   readonly element: HTMLElement;
   private members: FieldView[] | null = null;
@@ -79,7 +79,7 @@ class GroupField implements FieldView {
   }
 }
 
-/** One of several kinds, each with options of its own. */
+/** A choice of types, each with its own options. */
 class VariantField implements FieldView {
   readonly element: HTMLElement;
   private select: HTMLSelectElement;
@@ -146,7 +146,7 @@ class VariantField implements FieldView {
   }
 }
 
-/** Entries of one kind, one after the other. */
+/** A list of entries of one type. */
 class ListField implements FieldView {
   readonly element: HTMLElement;
   private body = h("div", { class: "members" });

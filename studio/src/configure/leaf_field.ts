@@ -4,13 +4,13 @@ import { shortNumber } from "../ui/format.ts";
 import { type FieldView, type FormContext, idOf } from "./field.ts";
 import { rangeText, readValue, relativePath, valueText } from "./field_text.ts";
 
-/** One value: typed, ticked or chosen. */
+/** One value: text, a check box or a choice. */
 export class LeafField implements FieldView {
   readonly element: HTMLElement;
   private inputs: (HTMLInputElement | HTMLSelectElement)[] = [];
   private reset: HTMLButtonElement;
   private problem = h("span", { class: "problem", attrs: { role: "alert" } });
-  /** Typed since the fields were last read: what the document says must wait. */
+  /** Whether the user has typed since the fields were last read; the document's value then waits. */
   private typing = false;
 
   constructor(
@@ -91,14 +91,14 @@ export class LeafField implements FieldView {
     else this.forget();
   }
 
-  /** Back to what the document says. */
+  /** Restores the document's value. */
   private forget(): void {
     this.typing = false;
     this.context.document.refuse(this.where, null);
     this.update();
   }
 
-  /** What was typed is taken by now, or is what stood there before. */
+  /** Whether the typed text has been applied or is unchanged. */
   private left(): void {
     if (!this.typing) return;
     this.typing = false;

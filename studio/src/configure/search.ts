@@ -1,18 +1,18 @@
 import type { Json, JsonMap, SchemaNode } from "../api/types.ts";
 import { getIn } from "../document/values.ts";
 
-/** An option that was searched for. */
+/** An option found by a search. */
 export interface Hit {
   where: string;
   node: SchemaNode;
-  /** Set where the scenario as it is has no such option: the option on which that depends, and how. */
+  /** Set if the current scenario lacks the option: the option on which it depends, and how. */
   needs?: { where: string; how: string };
 }
 
 type Needs = Hit["needs"];
 const join = (where: string, name: string | number) => (where ? `${where}.${name}` : String(name));
 
-/** Options whose name, path or description holds all words of a text; those whose path holds them first. */
+/** Options whose name, path or description contains all words; those whose path contains them come first. */
 export function findOptions(members: SchemaNode[], values: JsonMap, text: string): Hit[] {
   const words = text.toLowerCase().split(/\s+/).filter(Boolean);
   if (words.length === 0) return [];

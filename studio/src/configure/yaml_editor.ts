@@ -39,7 +39,7 @@ export class YamlEditor {
     });
   }
 
-  /** Selects the key of an option, or what is nearest to it, and takes the focus. */
+  /** Selects the key of an option, or the nearest one, and takes the focus. */
   reveal(where: string): void {
     this.area.focus();
     for (const key of where.split(".").reverse()) {
@@ -56,7 +56,7 @@ export class YamlEditor {
     this.document.type(this.area.value);
   }
 
-  /** Undo and redo are the page's own; Tab leaves, as keyboards expect, and indents nothing. */
+  /** Undo and redo are those of the page; Tab leaves the editor and does not indent. */
   private key(event: KeyboardEvent): void {
     if ((event.ctrlKey || event.metaKey) && ["z", "y"].includes(event.key.toLowerCase())) this.take();
     if (event.key !== "Enter" || event.ctrlKey || event.metaKey) return;
@@ -83,7 +83,7 @@ export class YamlEditor {
   }
 }
 
-/** A line of YAML in pieces: keys, comments, the rest. */
+/** A line of YAML split into keys, comments and the rest. */
 function coloured(line: string): (Node | string)[] {
   const comment = /(^|\s)#.*$/.exec(line);
   const body = comment ? line.slice(0, comment.index) : line;

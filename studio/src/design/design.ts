@@ -11,7 +11,7 @@ import { Timeline } from "./timeline.ts";
 import { Viewport } from "./viewport.ts";
 import { WaypointPanel } from "./waypoint_panel.ts";
 
-/** Where the motion is designed: the scene, its way points, and the time line. */
+/** The place to design the motion: the scene, waypoints, and the time line. */
 export class DesignPlace implements Place {
   readonly element: HTMLElement;
   readonly state: DesignState;
@@ -28,7 +28,7 @@ export class DesignPlace implements Place {
       "main",
       { class: "place design", attrs: { "aria-label": "Design" } },
       h("div", { class: "view" }, this.toolbar(), this.viewport.stage.element),
-      h("aside", { class: "panel", attrs: { "aria-label": "Way points" } }, waypoints.element, inspector.element),
+      h("aside", { class: "panel", attrs: { "aria-label": "Waypoints" } }, waypoints.element, inspector.element),
       this.timeline.element,
     );
     this.shortcuts(waypoints);
@@ -47,7 +47,7 @@ export class DesignPlace implements Place {
   private toolbar(): HTMLElement {
     const { viewport, state } = this;
     const above = new NumberField({
-      label: "Height of the way point above the clicked surface",
+      label: "Height of the waypoint above the clicked surface",
       unit: "m",
       step: 0.1,
       change: (value) => (viewport.dropper.height_above_m = value!),
@@ -55,14 +55,14 @@ export class DesignPlace implements Place {
     above.set(viewport.dropper.height_above_m);
     above.element.classList.add("hidden");
     const click = new Segmented<ClickMode>(
-      "A click drops a way point",
+      "A click drops a waypoint",
       [
-        { value: "aim", label: "Aimed at click", title: "Where you are, aimed at the point that is clicked" },
-        { value: "along", label: "Along view", title: "Where you are, looking as you look" },
+        { value: "aim", label: "Aimed at click", title: "At your position, aimed at the clicked point" },
+        { value: "along", label: "Along view", title: "At your position, along your view" },
         {
           value: "above",
           label: "Above click",
-          title: "Above the surface that is clicked, looking as you look",
+          title: "Above the clicked surface, along your view",
         },
       ],
       "aim",
@@ -74,8 +74,8 @@ export class DesignPlace implements Place {
     const gizmo = new Segmented<"translate" | "rotate">(
       "Handles",
       [
-        { value: "translate", label: "Move", title: "Drag the selected way point (T)" },
-        { value: "rotate", label: "Rotate", title: "Turn the selected way point (R)" },
+        { value: "translate", label: "Move", title: "Drag the selected waypoint (T)" },
+        { value: "rotate", label: "Rotate", title: "Turn the selected waypoint (R)" },
       ],
       "translate",
       (mode) => (viewport.gizmoMode = mode),
@@ -95,7 +95,7 @@ export class DesignPlace implements Place {
         {
           value: "orbit",
           label: "Orbit",
-          title: "Dragging turns about what is under the pointer; right button looks around",
+          title: "Dragging orbits the point under the pointer; right button looks around",
         },
       ],
       "look",
@@ -169,34 +169,34 @@ export class DesignPlace implements Place {
         act: here(() => this.viewport.eye.setLarge(!this.viewport.eye.large)),
       },
       {
-        group: "Design: way points",
+        group: "Design: waypoints",
         keys: "Space",
         help: "drop one that looks along the view",
         act: inView(() => this.viewport.dropper.drop(false)),
       },
       {
-        group: "Design: way points",
+        group: "Design: waypoints",
         keys: "Shift+Space or Enter",
         help: "drop one aimed at the middle of the view",
         act: inView(() => this.viewport.dropper.drop(true)),
       },
-      { group: "Design: way points", keys: "N", help: "select the next one", act: here(() => select(1)) },
-      { group: "Design: way points", keys: "B", help: "select the one before", act: here(() => select(-1)) },
+      { group: "Design: waypoints", keys: "N", help: "select the next one", act: here(() => select(1)) },
+      { group: "Design: waypoints", keys: "B", help: "select the previous one", act: here(() => select(-1)) },
       {
-        group: "Design: way points",
+        group: "Design: waypoints",
         keys: "G",
         help: "go to the selected one",
         act: here(() => this.viewport.goTo(this.state.selected.value)),
       },
-      { group: "Design: way points", keys: "T", help: "handles move", act: here(() => this.setGizmo("translate")) },
-      { group: "Design: way points", keys: "R", help: "handles rotate", act: here(() => this.setGizmo("rotate")) },
+      { group: "Design: waypoints", keys: "T", help: "handles move", act: here(() => this.setGizmo("translate")) },
+      { group: "Design: waypoints", keys: "R", help: "handles rotate", act: here(() => this.setGizmo("rotate")) },
       {
-        group: "Design: way points",
+        group: "Design: waypoints",
         keys: "Delete",
         help: "remove the selected one",
         act: inView(() => waypoints.remove()),
       },
-      { group: "Design: way points", keys: "Alt+↑ or Alt+↓", help: "reorder, in the list" },
+      { group: "Design: waypoints", keys: "Alt+↑ or Alt+↓", help: "reorder, in the list" },
       { group: "Design: time", keys: "P", help: "play the flight, pause", act: here(() => this.timeline.togglePlay()) },
       { group: "Design: time", keys: "← or →", help: "step, on the time line (Shift: further)" },
     );

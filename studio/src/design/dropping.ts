@@ -5,10 +5,10 @@ import { complain } from "../ui/status.ts";
 import type { DesignState } from "./state.ts";
 import { insert, roundPosition, roundQuaternion, type Waypoint } from "./waypoints.ts";
 
-/** What a click on a surface makes, for the camera: here and aimed at it, here along the view, or above it along the view. */
+/** The waypoint that a click on a surface makes: at the eye and aimed at it, at the eye along the view, or above it along the view. */
 export type ClickMode = "aim" | "along" | "above";
 
-/** Makes way points where the view is, or where it was clicked. */
+/** Makes waypoints at the view's pose or at clicked points. */
 export class Dropper {
   mode: ClickMode = "aim";
   height_above_m = 1.4;
@@ -19,17 +19,17 @@ export class Dropper {
     private camera: PerspectiveCamera,
   ) {}
 
-  /** From the view alone: along it, or aimed at what is in its middle. An object goes to what is in the middle. */
+  /** Without a click: along the view, or aimed at the point in its middle. An object goes to that point. */
   drop(aimed: boolean): void {
     const object = this.state.mover.value !== null;
     const at = aimed || object ? this.content.pick(0, 0, this.camera) : null;
     if (at && object) return this.add(this.objectAt(at));
     if (at) return this.add({ position: this.here(), look_at: roundPosition(at.toArray()) });
-    if (aimed || object) return complain(new Error("Nothing lies in the middle of the view to aim at"));
+    if (aimed || object) return complain(new Error("There is no surface in the middle of the view to aim at"));
     this.add(this.alongView());
   }
 
-  /** A click on the picture, -1 to 1 to the right and up. */
+  /** A click on the image, -1 to 1 to the right and up. */
   click(x: number, y: number): void {
     if (this.panorama) return this.add(this.alongView(this.content.direction(x, y, this.camera)));
     const at = this.content.pick(x, y, this.camera);
@@ -48,7 +48,7 @@ export class Dropper {
     return this.panorama ? [0, 0, 0] : roundPosition(this.camera.position.toArray());
   }
 
-  /** At the eye; the body is turned so that the scenario's camera looks where the view does, or in a direction. */
+  /** At the eye; the body is oriented so that the scenario's camera looks along the view or in a direction. */
   private alongView(direction?: Vector3): Waypoint {
     let view = poseOfCamera(this.camera);
     if (direction) {
@@ -64,7 +64,7 @@ export class Dropper {
     };
   }
 
-  /** An object's origin on a surface, turned as at the way point before. */
+  /** An object's origin on a surface, with the orientation of the previous waypoint. */
   private objectAt(at: Vector3): Waypoint {
     const before = this.state.poseOfPoint(this.after);
     return {
@@ -73,7 +73,7 @@ export class Dropper {
     };
   }
 
-  /** The way point that a new one follows. */
+  /** The waypoint that a new one follows. */
   private get after(): number {
     const { selected, points } = this.state;
     return selected.value >= 0 ? selected.value : (points?.length ?? 0) - 1;
@@ -83,6 +83,6 @@ export class Dropper {
     const points = this.state.points ?? [];
     const speed = this.state.document.get("trajectory.speed");
     const added = insert(points, this.after, point, typeof speed === "number" ? speed : 1);
-    this.state.change("Drop way point", added, this.after + 1);
+    this.state.change("Drop waypoint", added, this.after + 1);
   }
 }

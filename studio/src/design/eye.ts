@@ -7,11 +7,11 @@ import { complain } from "../ui/status.ts";
 
 type Source = "preview" | "simulator";
 const inset_width_px = 294;
-/** Of the stage's width at most. */
+/** Maximum fraction of the stage's width. */
 const inset_share = 0.5;
 const tallest_inset_px = 222;
 
-/** What a camera of the rig sees: drawn by the browser, or by the simulator's own renderer; small in a corner or large. */
+/** The view of a camera of the rig: drawn by the browser or by the simulator's renderer; small in a corner or large. */
 export class Eye {
   readonly element: HTMLElement;
   large = false;
@@ -70,7 +70,7 @@ export class Eye {
     this.changed();
   }
 
-  /** Shows the simulator's picture, whatever the browser can draw. */
+  /** Always shows the simulator's image. */
   onlySimulator(only: boolean): void {
     this.source.enable(!only);
     if (only) this.source.set("simulator");
@@ -104,7 +104,7 @@ export class Eye {
     this.view.style.height = `${Math.round(height)}px`;
   }
 
-  /** The camera's pose (null: nothing is drawn), and the time on the flight, where it is on it. */
+  /** The camera's pose (null: nothing is drawn), and its time if it is on the flight. */
   place(T_world_camera: Matrix4 | null, caption: string, time: number | null = null): void {
     this.caption.textContent = caption;
     this.placed = T_world_camera !== null;
@@ -122,7 +122,7 @@ export class Eye {
     this.changed();
   }
 
-  /** One question at a time; what has changed meanwhile is asked next. */
+  /** One request at a time; changes in the meantime cause the next one. */
   private async ask(): Promise<void> {
     const at = this.time !== null ? { t: Math.round(this.time) } : this.placed ? { pose: poseOf(this.pose) } : null;
     if (this.busy || !at || !this.model) return;
@@ -147,7 +147,7 @@ export class Eye {
     if (this.source.value === "simulator" && (this.version !== version || this.model.name !== name)) void this.ask();
   }
 
-  /** Asks again although the camera did not move: the scenario has changed. */
+  /** Requests a new image because the scenario has changed. */
   renew(): void {
     if (this.source.value === "simulator") void this.ask();
   }

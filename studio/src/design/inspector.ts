@@ -8,10 +8,10 @@ import { motionOf, roundPosition, roundQuaternion, type Waypoint } from "./waypo
 
 const axes = ["x", "y", "z"] as const;
 
-/** Numbers of the selected way point, and what holds for the whole motion. */
+/** Numbers of the selected waypoint, and options of the complete motion. */
 export class Inspector {
   readonly element: HTMLElement;
-  private title = h("h2", { text: "Way point" });
+  private title = h("h2", { text: "Waypoint" });
   private position: NumberField[];
   private target: NumberField[];
   private angles: NumberField[];
@@ -50,7 +50,7 @@ export class Inspector {
       "Aim",
       [
         { value: "point", label: "At a point", title: "The optical axis goes through a point of the world" },
-        { value: "free", label: "Free", title: "An orientation of its own" },
+        { value: "free", label: "Free", title: "A fixed orientation" },
       ],
       "free",
       (value) => this.setAim(value),
@@ -113,7 +113,7 @@ export class Inspector {
     );
     this.element = h(
       "section",
-      { class: "inspector", attrs: { "aria-label": "Selected way point" } },
+      { class: "inspector", attrs: { "aria-label": "Selected waypoint" } },
       h("header", {}, this.title),
       this.pointPart,
       h("header", { class: "second" }, h("h2", { text: "Whole motion" })),
@@ -131,7 +131,7 @@ export class Inspector {
   private show(): void {
     const { point, state } = this;
     const index = state.selected.value;
-    this.title.textContent = point ? `Way point ${index + 1}` : "No way point selected";
+    this.title.textContent = point ? `Waypoint ${index + 1}` : "No waypoint selected";
     this.pointPart.disabled = !point;
     const pose = state.poseOfPoint(index);
     this.position.forEach((field, i) => field.set(point ? (state.dragged.value?.pose ?? point.position)[i]! : null));
@@ -156,7 +156,7 @@ export class Inspector {
     }
   }
 
-  /** Of the scenario's camera, for the camera's motion; of the object itself otherwise. */
+  /** Of the scenario's camera for the camera's motion, otherwise of the object. */
   private axisRotation(body: Quaternion): Quaternion {
     const mount = this.state.mover.value === null ? this.state.aim?.T_body_camera : undefined;
     return mount ? body.clone().multiply(new Quaternion(mount[3], mount[4], mount[5], mount[6])) : body;
@@ -175,14 +175,14 @@ export class Inspector {
   }
 
   private setPosition(axis: number, value: number): void {
-    this.change("Move way point", "position", (point) => ({
+    this.change("Move waypoint", "position", (point) => ({
       ...point,
       position: roundPosition(point.position.map((old, i) => (i === axis ? value : old))),
     }));
   }
 
   private setTarget(axis: number, value: number): void {
-    this.change("Aim way point", "aim", (point) => ({
+    this.change("Aim waypoint", "aim", (point) => ({
       ...point,
       look_at: roundPosition((point.look_at ?? point.position).map((old, i) => (i === axis ? value : old))),
     }));
@@ -197,7 +197,7 @@ export class Inspector {
     const angles = anglesOf(camera);
     angles[which] = value;
     const turned = rotationOf(angles).multiply(mount);
-    this.change("Turn way point", "angle", ({ look_at: _at, up: _up, ...point }) => ({
+    this.change("Turn waypoint", "angle", ({ look_at: _at, up: _up, ...point }) => ({
       ...point,
       quaternion: roundQuaternion(turned.toArray()),
     }));
@@ -208,7 +208,7 @@ export class Inspector {
     if (!pose) return;
     const rotation = new Quaternion(pose[3], pose[4], pose[5], pose[6]);
     if (value === "free") {
-      this.change("Free way point", "free", ({ look_at: _at, up: _up, ...point }) => ({
+      this.change("Free waypoint", "free", ({ look_at: _at, up: _up, ...point }) => ({
         ...point,
         quaternion: roundQuaternion(rotation.toArray()),
       }));
@@ -217,7 +217,7 @@ export class Inspector {
         .applyQuaternion(this.axisRotation(rotation))
         .multiplyScalar(2)
         .add(new Vector3(pose[0], pose[1], pose[2]));
-      this.change("Aim way point", "aim", ({ quaternion: _q, ...point }) => ({
+      this.change("Aim waypoint", "aim", ({ quaternion: _q, ...point }) => ({
         ...point,
         look_at: roundPosition(target.toArray()),
       }));
@@ -234,11 +234,11 @@ export class Inspector {
 }
 
 const helpOf: Record<string, string> = {
-  speed: "Along the path, where way points have no times",
-  turn_deg_per_s: "Rate of turning on the spot, and the highest mean rate between two points",
-  ramp_s: "Time to gather speed after standing still, and to lose it before",
-  rest: "The body stands still at the start and at the end",
-  closed: "It returns to the first way point; without times only",
+  speed: "Speed along the path, if waypoints have no times",
+  turn_deg_per_s: "Turning rate on the spot, and maximum mean turning rate between two points",
+  ramp_s: "Time to accelerate after standing still, and to brake before it",
+  rest: "Whether the body stands still at the start and at the end",
+  closed: "Whether the path returns to the first waypoint; only if waypoints have no times",
 };
 
 /** A camera looks along z with y down. With all angles 0 it looks along world x, level. */

@@ -12,7 +12,7 @@ import { changeTo, type Mover, motionOf, timed, type Waypoint, waypointAt, waypo
 const debounce_ms = 80;
 const noScale = new Vector3(1, 1, 1);
 
-/** What the parts of the design place share: the scene, the flight, what is selected, and the clock of the preview. */
+/** The shared state of the design place: the scene, the flight, the selection, and the clock of the preview. */
 export class DesignState {
   readonly scene = new Signal<SceneInfo | null>(null);
   readonly sceneProblem = new Signal("");
@@ -21,15 +21,15 @@ export class DesignState {
   readonly trajectoryProblem = new Signal("");
   readonly mover = new Signal<Mover>(null);
   readonly selected = new Signal(-1);
-  /** Name of the camera that is looked through; where the rig has none of it, that is the first. */
+  /** Name of the current camera; if the rig has no such camera, the first one is used. */
   readonly lookedThrough = new Signal("");
-  /** Where the preview stands, on the trajectory's clock. */
+  /** The time of the preview, on the trajectory's clock. */
   readonly playhead = new Signal(0);
   readonly playing = new Signal(false);
-  /** A way point while it is dragged, before the document knows. */
+  /** A waypoint while it is dragged, before the document changes. */
   readonly dragged = new Signal<{ index: number; pose: Pose } | null>(null);
   active = true;
-  /** The preview goes to the selected way point as soon as its time is known. */
+  /** The preview goes to the selected waypoint as soon as its time is known. */
   private follow = false;
   private cameraTrack: PoseTrack | null = null;
   private objectTracks: (PoseTrack | undefined)[] = [];
@@ -37,7 +37,7 @@ export class DesignState {
   private trajectoryRequest: AbortController | null = null;
   private position = new Vector3();
   private rotation = new Quaternion();
-  /** T_body_camera of the camera that is looked through. */
+  /** T_body_camera of the current camera. */
   private mount = new Matrix4();
   private seen = "";
   private sceneSeen = "";
@@ -55,18 +55,18 @@ export class DesignState {
     this.lookedThrough.listen(mount);
   }
 
-  /** The camera that is looked through. */
+  /** The current camera. */
   get eye(): CameraModel | null {
     const cameras = this.scene.value?.cameras;
     return cameras?.find(({ name }) => name === this.lookedThrough.value) ?? cameras?.[0] ?? null;
   }
 
-  /** The camera by which way points are aimed. */
+  /** The camera to which look_at of waypoints refers. */
   get aim(): CameraModel | null {
     return this.scene.value?.cameras[0] ?? null;
   }
 
-  /** Names of the objects that the scenario moves, in its order. */
+  /** Names of the moving objects, in the scenario's order. */
   get moverNames(): string[] {
     const objects = this.document.get("renderer.objects");
     if (!Array.isArray(objects)) return [];
@@ -87,12 +87,12 @@ export class DesignState {
     return waypointsIn(this.document.values, this.mover.value);
   }
 
-  /** Asks the server for what the present text means. */
+  /** Requests the scene and the motion of the current text. */
   async refresh(): Promise<void> {
     if (!this.active) return;
     const { revision } = this.document;
     const source = await this.document.source().catch(() => null);
-    // What came meanwhile asks for itself.
+    // Later changes send their own requests.
     if (!source || source.yaml === this.seen || revision !== this.document.revision) return;
     this.seen = source.yaml;
     await Promise.all([this.refreshScene(source), this.refreshTrajectory(source)]);
@@ -104,7 +104,7 @@ export class DesignState {
     if (key === this.sceneSeen) return;
     this.sceneRequest?.abort();
     const known = this.problemIn(["renderer", "camera", "cameras"]);
-    // A motion that is yet to be finished is no fault of the scene's.
+    // An unfinished motion is not a problem of the scene.
     if (known) return this.sceneProblem.set(/^renderer\.objects\.\d+\.trajectory/.test(known.where) ? "" : known.what);
     this.sceneRequest = new AbortController();
     try {
@@ -155,12 +155,12 @@ export class DesignState {
     this.trajectoryProblem.set(why);
   }
 
-  /** What is known to be wrong with one of these groups, or with the text itself: the server need not be asked. */
+  /** A known problem of one of these groups or of the text itself, which makes a request unnecessary. */
   private problemIn(groups: string[]): Problem | undefined {
     return this.document.problems.find(({ where }) => where === "" || groups.includes(where.split(".")[0]!));
   }
 
-  /** T_world_camera of the camera that is looked through at a time; false where there is no flight. */
+  /** T_world_camera of the current camera at a time; false without a flight. */
   eyeAt(time: number, into: Matrix4): boolean {
     if (!this.cameraTrack || !this.scene.value) return false;
     this.cameraTrack.at(time, this.position, this.rotation);
@@ -172,7 +172,7 @@ export class DesignState {
     return this.objectTracks;
   }
 
-  /** T_world_body of a way point: from the server where it is known, else as well as the page can tell. */
+  /** T_world_body of a waypoint: from the server if known, otherwise estimated by the page. */
   poseOfPoint(index: number): Pose | null {
     const dragged = this.dragged.value;
     if (dragged && dragged.index === index) return dragged.pose;
@@ -189,7 +189,7 @@ export class DesignState {
     return [...point.position, body.x, body.y, body.z, body.w];
   }
 
-  /** Changes the way points; a motion of another kind is replaced by them. */
+  /** Changes the waypoints; they replace a motion of another type. */
   change(label: string, points: Waypoint[], select?: number, merge: string | null = null): void {
     const { values } = this.document;
     const replaced = waypointsIn(values, this.mover.value) === null;
@@ -198,17 +198,17 @@ export class DesignState {
       this.selected.set(select);
       this.follow = true;
     }
-    if (replaced) say("Way points replace the motion that was there; Ctrl+Z brings it back");
+    if (replaced) say("Waypoints have replaced the previous motion; Ctrl+Z restores it");
   }
 
-  /** Makes the points that the server reports, of a file of way points or of the flight as it is, the scenario's own. */
+  /** Writes the server's points, of a file of waypoints or of the current flight, into the scenario. */
   adoptFlight(): void {
     const trajectory = this.trajectory.value;
     if (!trajectory) return;
     const given = this.mover.value === null ? trajectory.waypoints : null;
     const track =
       this.mover.value === null ? new PoseTrack(trajectory.t, trajectory.poses) : this.trackOf(this.moverName);
-    if (!track) return complain(new Error("There is no motion to take way points from"));
+    if (!track) return complain(new Error("There is no motion to take waypoints from"));
     const wanted = Math.max(2, Math.min(40, Math.round((trajectory.end - trajectory.start) / 0.5e9) + 1));
     const times =
       given?.map((point) => point.t) ??
@@ -220,10 +220,10 @@ export class DesignState {
       ...waypointAt(given?.[i]?.pose ?? track.poseAt(t)),
       t: Number((t / 1e9).toFixed(3)),
     }));
-    this.change("Way points from the motion", points, 0);
+    this.change("Waypoints from the motion", points, 0);
   }
 
-  /** When the points are passed [s]: their own times, or those that the server reports. */
+  /** Times of the points [s]: their own, or those that the server reports. */
   times_s(): (number | null)[] {
     const points = this.points ?? [];
     if (timed(points)) return points.map((point) => point.t!);

@@ -7,7 +7,7 @@ import { timed, waypointsIn, withTime } from "./waypoints.ts";
 
 const mark_reach_px = 8;
 
-/** The flight over time: speed and turning rate as the simulator flies it, way points, doubts, and the preview's clock. */
+/** The flight over time: speed and turning rate in the simulation, waypoints, warnings, and the preview's clock. */
 export class Timeline {
   readonly element: HTMLElement;
   private plot = new TimePlot("Time of the preview; arrow keys step, Home and End jump");
@@ -86,12 +86,12 @@ export class Timeline {
       : [];
     const problem = this.state.trajectoryProblem.value;
     const doubts = flight?.warnings ?? [];
-    // A motion that is yet to be designed is no fault.
+    // An unfinished motion is not a problem.
     const begun = problem !== "" && (waypointsIn(this.state.document.values, null)?.length ?? 2) < 2;
     this.warnings.className = `warnings grow ${begun ? "quiet" : problem ? "problem" : ""}`;
     this.warnings.replaceChildren(
       ...(problem
-        ? [begun ? "a motion needs two way points" : problem]
+        ? [begun ? "a motion needs two waypoints" : problem]
         : doubts.slice(0, 3).map((doubt) => {
             const element = button(`${seconds(doubt.from, 1)}: ${doubt.what}`, () => this.jump(doubt.from), {
               icon: "warning",
@@ -176,9 +176,9 @@ export class Timeline {
     if (this.dragging === null) return;
     const points = state.points;
     if (!points) return;
-    // The last point may be dragged past the end: the axis is stretched on, as a ruler would be.
+    // The last point may be dragged past the end: the axis continues there at the same scale.
     const t = (plot.from + ((event.offsetX - plot.left) / (plot.right - plot.left)) * (plot.to - plot.from)) / 1e9;
-    state.change("Time of way point", withTime(points, this.dragging, t), this.dragging, `time ${this.dragging}`);
+    state.change("Time of waypoint", withTime(points, this.dragging, t), this.dragging, `time ${this.dragging}`);
   }
 
   private release(): void {

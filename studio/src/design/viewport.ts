@@ -29,11 +29,11 @@ import { Eye } from "./eye.ts";
 import type { DesignState } from "./state.ts";
 import { roundPosition, roundQuaternion, type Waypoint } from "./waypoints.ts";
 
-const sky_m = 10; // where panoramas show their marks
+const sky_m = 10; // distance of markers in panoramas
 
-/** The scene in 3D: fly through it, drop way points, move them. */
+/** The scene in 3D: fly through it, drop waypoints, move them. */
 export class Viewport {
-  readonly stage = new Stage("Scene in 3D. W A S D and Q E move, arrow keys turn, Space drops a way point.");
+  readonly stage = new Stage("Scene in 3D. W A S D and Q E move, arrow keys turn, Space drops a waypoint.");
   readonly navigation = new Navigation(this.stage);
   readonly eye: Eye;
   readonly dropper: Dropper;
@@ -42,7 +42,7 @@ export class Viewport {
   private path = new PathLine();
   private ground = new Ground();
   private axes = new AxesGizmo();
-  /** The width of the ground's cells, as it is shown; "" where there is no ground. */
+  /** The displayed width of the ground's cells; "" without a ground. */
   readonly cell = new Signal("");
   private now = new LineSegments(new BufferGeometry(), new LineBasicMaterial());
   private gizmo: TransformControls | null = null;
@@ -132,7 +132,7 @@ export class Viewport {
     const { bounds } = this.content;
     const [size, middle] = [bounds.getSize(new Vector3()), bounds.getCenter(new Vector3())];
     const known = !bounds.isEmpty() && Number.isFinite(size.length());
-    const room = info.kind === "plane" ? 3 : 1; // a camera stands before a poster, not in it
+    const room = info.kind === "plane" ? 3 : 1; // a camera stands in front of a plane
     this.ground.fit(known ? room * Math.max(size.x, size.y) : 10, known ? [middle.x, middle.y] : [0, 0]);
     this.cell.set(flat ? `${shortNumber(this.ground.cell_m)} m` : "");
     this.grid = this.gridWanted;
@@ -179,7 +179,7 @@ export class Viewport {
     }
     this.state.dragged.set(null);
     this.state.change(
-      this.gizmoMode === "rotate" ? "Turn way point" : "Move way point",
+      this.gizmoMode === "rotate" ? "Turn waypoint" : "Move waypoint",
       points.map((point, i) => (i === dragged.index ? moved : point)),
       dragged.index,
     );
@@ -204,7 +204,7 @@ export class Viewport {
     else this.dropper.click(x, y);
   }
 
-  /** Flies to a way point and looks as it does. */
+  /** Flies to a waypoint and takes its orientation. */
   goTo(index: number): void {
     const pose = this.state.poseOfPoint(index);
     const { aim } = this.state;
@@ -253,7 +253,7 @@ export class Viewport {
     this.note.classList.toggle("problem", problem !== "");
   }
 
-  /** A first view: near the flight's beginning, looking where it looks. */
+  /** The first view: near the start of the flight, along its view. */
   private findView(info: SceneInfo, first: boolean): void {
     const size = this.content.bounds.getSize(new Vector3()).length();
     if (info.kind === "mesh" && Number.isFinite(size) && size > 0) {
@@ -282,7 +282,7 @@ export class Viewport {
     }
   }
 
-  /** By so much, or less where a surface is in the way. */
+  /** Moves by a vector, or less if a surface is in the way. */
   private stepBack(from: Vector3, by: Vector3): void {
     const free = this.content.distance(from, by) / by.length();
     from.addScaledVector(by, Math.min(1, 0.7 * free));
@@ -299,7 +299,7 @@ export class Viewport {
     this.placed = true;
   }
 
-  /** The path, the way points and the camera of this moment. */
+  /** The path, the waypoints and the current camera. */
   showMotion(): void {
     const { state, info } = this;
     const flight = state.trajectory.value;
@@ -321,7 +321,7 @@ export class Viewport {
     this.showNow();
   }
 
-  /** The pose moved along its optical axis to where a panorama's marks stand. */
+  /** The pose moved along its optical axis to the distance of markers in panoramas. */
   private ahead(pose: Pose): Pose {
     const axis = new Vector3(0, 0, sky_m).applyQuaternion(new Quaternion(pose[3], pose[4], pose[5], pose[6]));
     return [pose[0] + axis.x, pose[1] + axis.y, pose[2] + axis.z, pose[3], pose[4], pose[5], pose[6]];
@@ -382,13 +382,13 @@ export class Viewport {
     const { eye } = state;
     const dragged = state.dragged.value;
     if (dragged && state.mover.value === null && eye)
-      return this.eye.place(matrixOf(product(dragged.pose, eye.T_body_camera)), `Way point ${dragged.index + 1}`);
+      return this.eye.place(matrixOf(product(dragged.pose, eye.T_body_camera)), `Waypoint ${dragged.index + 1}`);
     if (state.eyeAt(state.playhead.value, this.eyePose))
       return this.eye.place(this.eyePose, `At ${seconds(state.playhead.value)}`, state.playhead.value);
     const pose = state.mover.value === null ? state.poseOfPoint(state.selected.value) : null;
     this.eye.place(
       pose && eye ? matrixOf(product(pose, eye.T_body_camera)) : null,
-      pose ? `Way point ${state.selected.value + 1}` : "Camera",
+      pose ? `Waypoint ${state.selected.value + 1}` : "Camera",
     );
   }
 }

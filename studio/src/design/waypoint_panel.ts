@@ -13,14 +13,14 @@ interface Row {
   aim: HTMLElement;
 }
 
-/** The list of way points: their order, times or speeds, and whose motion it is. */
+/** The list of waypoints: order, times or speeds, and the body or object that they move. */
 export class WaypointPanel {
   readonly element: HTMLElement;
   private movers = h("select", { class: "grow", attrs: { "aria-label": "Whose motion" } });
   private list = h("div", {
     class: "waypoint-list scroll",
     tabIndex: 0,
-    attrs: { role: "listbox", "aria-label": "Way points. Enter goes there, Delete removes, Alt with arrows reorders" },
+    attrs: { role: "listbox", "aria-label": "Waypoints. Enter goes there, Delete removes, Alt with arrows reorders" },
   });
   private rows: Row[] = [];
   private clock: Segmented<"speeds" | "times">;
@@ -32,7 +32,7 @@ export class WaypointPanel {
     private goTo: (index: number) => void,
   ) {
     this.clock = new Segmented<"speeds" | "times">(
-      "Way points have",
+      "Waypoints have",
       [
         { value: "speeds", label: "Speeds", title: "Motion at given speeds; times follow" },
         { value: "times", label: "Times", title: "Each point is passed at a given time" },
@@ -48,7 +48,7 @@ export class WaypointPanel {
     ];
     this.element = h(
       "section",
-      { class: "waypoint-panel", attrs: { "aria-label": "Way points" } },
+      { class: "waypoint-panel", attrs: { "aria-label": "Waypoints" } },
       h("header", {}, h("h2", { text: "Motion of" }), this.movers),
       h("header", {}, this.clock.element, h("span", { class: "grow" }), ...this.tools),
       h(
@@ -87,7 +87,7 @@ export class WaypointPanel {
     const known = this.state.times_s();
     const times = known.map((t, i) => t ?? (i > 0 ? (known[i - 1] ?? i - 1) + 1 : 0));
     this.state.change(
-      value === "times" ? "Give way points times" : "Give way points speeds",
+      value === "times" ? "Give waypoints times" : "Give waypoints speeds",
       value === "times" ? withTimes(points, times) : withSpeeds(points),
     );
   }
@@ -96,7 +96,7 @@ export class WaypointPanel {
     const { points } = this.state;
     const from = this.state.selected.value;
     if (!points || from < 0 || from + by < 0 || from + by >= points.length) return;
-    this.state.change("Reorder way points", reorder(points, from, from + by), from + by);
+    this.state.change("Reorder waypoints", reorder(points, from, from + by), from + by);
   }
 
   remove(): void {
@@ -104,7 +104,7 @@ export class WaypointPanel {
     const at = this.state.selected.value;
     if (!points || at < 0) return;
     this.state.change(
-      "Remove way point",
+      "Remove waypoint",
       points.filter((_, i) => i !== at),
       Math.min(at, points.length - 2),
     );
@@ -191,7 +191,7 @@ export class WaypointPanel {
     row.speed.input.disabled = byTime || last;
     row.pause.set(point.pause_s, "0");
     row.aim.textContent = point.look_at ? "point" : "free";
-    row.aim.title = point.look_at ? `Looks at ${point.look_at.join(", ")} m` : "Has an orientation of its own";
+    row.aim.title = point.look_at ? `Looks at ${point.look_at.join(", ")} m` : "Has a fixed orientation";
     if (selected) row.element.scrollIntoView({ block: "nearest" });
   }
 
@@ -207,33 +207,33 @@ export class WaypointPanel {
           `${merge} ${index}`,
         );
       };
-    const named = `of way point ${index + 1}`;
+    const named = `of waypoint ${index + 1}`;
     const time = new NumberField({
       label: `Time ${named}, seconds`,
       step: 0.1,
       parse: parseSeconds,
       change: (value) =>
-        this.state.change("Time of way point", withTime(this.state.points!, index, value!), index, `time ${index}`),
+        this.state.change("Time of waypoint", withTime(this.state.points!, index, value!), index, `time ${index}`),
     });
     const speed = new NumberField({
       label: `Speed ${named}, metres per second`,
       step: 0.1,
       optional: true,
-      change: set("Speed of way point", "speed", (point, value) => without(point, "speed", value)),
+      change: set("Speed of waypoint", "speed", (point, value) => without(point, "speed", value)),
     });
     const pause = new NumberField({
       label: `Pause ${named}, seconds`,
       step: 0.1,
       parse: parseSeconds,
       optional: true,
-      change: set("Pause of way point", "pause", (point, value) => without(point, "pause_s", value)),
+      change: set("Pause of waypoint", "pause", (point, value) => without(point, "pause_s", value)),
     });
     const aim = h("span", { class: "quiet" });
     const element = h(
       "div",
       {
         class: "waypoint",
-        attrs: { role: "option", "aria-selected": "false", "aria-label": `Way point ${index + 1}` },
+        attrs: { role: "option", "aria-selected": "false", "aria-label": `Waypoint ${index + 1}` },
         on: {
           click: (event) => {
             if (!(event.target instanceof HTMLInputElement)) this.list.focus();
@@ -257,12 +257,12 @@ export class WaypointPanel {
     this.empty.replaceChildren(
       ...(otherKind && kind !== "none" && kind !== "static"
         ? [
-            h("p", { text: `The motion is of the kind “${kind}”, set in the scenario.` }),
-            button("Make way points of it", () => this.state.adoptFlight()),
-            h("p", { text: "A way point dropped in the view replaces it by a new motion." }),
+            h("p", { text: `The scenario has a motion of type “${kind}”.` }),
+            button("Convert it to waypoints", () => this.state.adoptFlight()),
+            h("p", { text: "A waypoint dropped in the view replaces it by a new motion." }),
           ]
         : [
-            h("p", { text: "No way points yet." }),
+            h("p", { text: "No waypoints yet." }),
             h("p", {
               text: "Fly with W A S D and the mouse; click a surface, or press Space, to drop one. A motion needs two.",
             }),

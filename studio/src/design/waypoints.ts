@@ -2,7 +2,7 @@ import type { Json, JsonMap, Pose } from "../api/types.ts";
 import type { Change } from "../document/document.ts";
 import { getIn } from "../document/values.ts";
 
-/** A way point as it stands in a scenario (docs/waypoints.md). */
+/** A waypoint as in a scenario (docs/waypoints.md). */
 export interface Waypoint {
   position: [number, number, number];
   quaternion?: [number, number, number, number];
@@ -13,14 +13,14 @@ export interface Waypoint {
   pause_s?: number;
 }
 
-/** Whose motion is designed: the camera's rig (null), or the object at this place in `renderer.objects`. */
+/** What moves: the camera rig (null), or the object with this index in `renderer.objects`. */
 export type Mover = number | null;
 
 export function motionOf(mover: Mover): string {
   return mover === null ? "trajectory" : `renderer.objects.${mover}.trajectory`;
 }
 
-/** The way points, or null where the motion is of another kind or they stand in another file. */
+/** The waypoints; null if the motion has another type or the waypoints are in another file. */
 export function waypointsIn(values: JsonMap, mover: Mover): Waypoint[] | null {
   const motion = getIn(values, motionOf(mover));
   if (getIn(motion, "type") !== "waypoints" || getIn(motion, "file") !== undefined) return null;
@@ -37,7 +37,7 @@ export function timed(points: Waypoint[]): boolean {
 }
 
 const round = (value: number, decimals: number) => Number(value.toFixed(decimals)) + 0;
-/** To a tenth of a millimetre, and quaternions to a microradian or so: what is written stays readable. */
+/** Rounds to 0.1 mm, and quaternions to about 1 microradian, so that the text stays readable. */
 export const roundPosition = (p: readonly number[]) => p.map((value) => round(value, 4)) as [number, number, number];
 export const roundQuaternion = (q: readonly number[]) =>
   q.map((value) => round(value, 6)) as [number, number, number, number];
@@ -46,7 +46,7 @@ export function waypointAt(pose: Pose): Waypoint {
   return { position: roundPosition(pose.slice(0, 3)), quaternion: roundQuaternion(pose.slice(3)) };
 }
 
-/** What to set so that the motion goes through these points; a motion of another kind is replaced. */
+/** The options to set so that the motion goes through these points; replaces a motion of another type. */
 export function changeTo(values: JsonMap, mover: Mover, points: Waypoint[]): Change[] {
   const where = motionOf(mover);
   const list = points as unknown as Json;
@@ -60,7 +60,7 @@ export function changeTo(values: JsonMap, mover: Mover, points: Waypoint[]): Cha
   return [{ where, value: { type: "waypoints", ...kept, points: list } }];
 }
 
-/** A point after the one at `after`, with a time where the others have some: as far as its distance asks at `speed`. */
+/** Adds a point after the one at `after`. If the points have times, its time follows from its distance and `speed`. */
 export function insert(points: Waypoint[], after: number, point: Waypoint, speed_m_per_s: number): Waypoint[] {
   const result = [...points];
   const added = { ...point };
@@ -75,7 +75,7 @@ export function insert(points: Waypoint[], after: number, point: Waypoint, speed
   return result;
 }
 
-/** Moves a point to another place in the order; times stay with the places, so that they go on rising. */
+/** Moves a point to another place in the order; times stay in place, so that they remain increasing. */
 export function reorder(points: Waypoint[], from: number, to: number): Waypoint[] {
   const times = timed(points) ? points.map((point) => point.t!) : null;
   const result = [...points];
@@ -85,7 +85,7 @@ export function reorder(points: Waypoint[], from: number, to: number): Waypoint[
   return times ? result.map((point, i) => ({ ...point, t: times[i]! })) : result;
 }
 
-/** With the times at which the points are passed now, instead of speeds. */
+/** Replaces speeds by the current times of the points. */
 export function withTimes(points: Waypoint[], times_s: number[]): Waypoint[] {
   return points.map((point, i) => {
     const { speed: _speed, ...rest } = point;
@@ -97,7 +97,7 @@ export function withSpeeds(points: Waypoint[]): Waypoint[] {
   return points.map(({ t: _t, ...rest }) => rest);
 }
 
-/** The time of one point changed, kept between its neighbours' by a hair where it would pass them. */
+/** Changes the time of one point, limited to between those of its neighbours. */
 export function withTime(points: Waypoint[], index: number, t: number): Waypoint[] {
   const least = 0.01;
   const low = index > 0 ? points[index - 1]!.t! + least : -Infinity;

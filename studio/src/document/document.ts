@@ -6,23 +6,23 @@ import { complain } from "../ui/status.ts";
 import { History } from "./history.ts";
 import { getIn, samePlace, setIn } from "./values.ts";
 
-/** What was typed into the fields of an option and is not a value of it. */
+/** Invalid text in the fields of an option. */
 export interface Refused {
   /** As typed, one per field. */
   texts: string[];
   what: string;
 }
 
-/** One state of the design. Its text comes from the server, a moment after its values. */
+/** One state of the design. The server writes its text shortly after its values change. */
 export interface Revision {
   values: JsonMap;
-  /** What the server finds wrong with the text. */
+  /** The problems that the server finds in the text. */
   problems: Problem[];
-  /** Entries of the form that are not in the text, by option: what the fields show is not what would run. */
+  /** Invalid entries of the form, by option. They are not in the text, so that the form differs from the scenario. */
   refused: ReadonlyMap<string, Refused>;
-  /** Null while the server has not written it. */
+  /** Null until the server has written it. */
   yaml: string | null;
-  /** The text, as soon as it is there. */
+  /** The text, as soon as it exists. */
   settled: Promise<string>;
   /** Resolves when `problems` are those of the text. */
   checked: Promise<void>;
@@ -37,7 +37,7 @@ function revisionOf(state: ScenarioState): Revision {
   return { ...state, refused: new Map(), settled: Promise.resolve(state.yaml), checked: Promise.resolve() };
 }
 
-/** Whether one option stands within the other, or is it. */
+/** Whether one option contains the other or equals it. */
 function related(a: string, b: string): boolean {
   return a === b || a.startsWith(`${b}.`) || b.startsWith(`${a}.`);
 }
@@ -53,7 +53,7 @@ async function untilConnected(): Promise<void> {
   });
 }
 
-/** Asks until there is an answer, however long the server is away. */
+/** Repeats a request until the server answers. */
 async function persistently<T>(question: () => Promise<T>): Promise<T> {
   for (;;) {
     try {
@@ -65,11 +65,11 @@ async function persistently<T>(question: () => Promise<T>): Promise<T> {
   }
 }
 
-/** The scenario that is designed: its text, its values, its past. Every part of the page edits it through here. */
+/** The edited scenario: text, values and history. All parts of the page edit it through this class. */
 export class ScenarioDocument {
-  /** Notified at every change of the current revision or of what is known of it. */
+  /** Notified at every change of the current revision or of its text and problems. */
   readonly changed: Signal<Revision>;
-  /** Where it is saved, and what stood there when it was read; null for one that has never been saved. */
+  /** The file and its content when it was read; null if never saved. */
   path: string | null = null;
   onDisk: string | null = null;
   private savedYaml: string | null = null;
@@ -88,7 +88,7 @@ export class ScenarioDocument {
   get values(): JsonMap {
     return this.revision.values;
   }
-  /** What is wrong with entries of the form and with the text, by option. */
+  /** Problems of form entries and of the text, by option. */
   get problems(): Problem[] {
     const { refused, problems } = this.revision;
     const entries = [...refused].map(([where, { what }]) => ({ where, what }));
@@ -104,7 +104,7 @@ export class ScenarioDocument {
     return this.history.redoLabel;
   }
 
-  /** In which relative paths begin. */
+  /** The base folder of relative paths. */
   get dir(): string {
     return this.path === null ? this.untitledFolder : this.path.split("/").slice(0, -1).join("/");
   }
@@ -118,12 +118,12 @@ export class ScenarioDocument {
     return getIn(this.values, where);
   }
 
-  /** What the server works on: the present text. */
+  /** The current text for requests. */
   async source(): Promise<server.Source> {
     return { yaml: await this.revision.settled, dir: this.dir };
   }
 
-  /** Begins with another scenario: the past is forgotten. */
+  /** Begins with another scenario and an empty history. */
   begin(state: ScenarioState, path: string | null, onDisk: string | null, folder: string): void {
     this.path = path;
     this.onDisk = onDisk;
@@ -140,7 +140,7 @@ export class ScenarioDocument {
     this.show();
   }
 
-  /** Sets options, seen at once; the server then writes the text. Edits with the same `merge` in a row are one step of undo. */
+  /** Sets options at once; the server then writes the text. Consecutive edits with the same `merge` are one undo step. */
   edit(label: string, changes: Change[], merge: string | null = null): void {
     const base = this.revision;
     let values = base.values;
@@ -152,7 +152,7 @@ export class ScenarioDocument {
     this.push({ ...base, values, refused, yaml: null }, settled, label, merge);
   }
 
-  /** Keeps what was typed into an option's fields and is not a value of it; without `entry`, forgets it. */
+  /** Stores invalid text of an option's fields; without `entry`, removes it. */
   refuse(where: string, entry: Refused | null): void {
     const base = this.revision;
     const refused = new Map(base.refused);
@@ -165,7 +165,7 @@ export class ScenarioDocument {
     this.push({ ...base, refused }, settled, `Type into ${where}`, `entry ${where}`);
   }
 
-  /** Takes a text as it was typed. */
+  /** Takes typed text. */
   type(yaml: string): void {
     const base = this.revision;
     if (base.yaml === yaml) return;
@@ -185,12 +185,12 @@ export class ScenarioDocument {
     if (this.history.redo()) this.show();
   }
 
-  /** The next edit is a step of its own. */
+  /** Makes the next edit a separate undo step. */
   seal(): void {
     this.history.seal();
   }
 
-  /** A new state, of which the server's answer tells the rest; text that is there already need not wait for it. */
+  /** Adds a new state, which the server's answer completes; existing text is available at once. */
   private push(known: Revision, answer: Promise<ScenarioState>, label: string, merge: string | null): void {
     const settled = known.yaml === null ? answer.then((state) => state.yaml) : Promise.resolve(known.yaml);
     const checked = answer.then(

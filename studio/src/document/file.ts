@@ -11,7 +11,7 @@ import { refuseFor } from "./problems.ts";
 
 const draftKey = "esim-studio-draft";
 
-/** Opening, saving, and what to do when somebody else has saved meanwhile. */
+/** Opening and saving, including conflicts with other programs. */
 export class ScenarioFile {
   constructor(
     private document: ScenarioDocument,
@@ -19,7 +19,7 @@ export class ScenarioFile {
     /** Shows an option in the form. */
     private reveal: (where: string) => void,
   ) {
-    // What is not saved survives a reload of the page.
+    // Unsaved changes survive a reload of the page.
     document.changed.listen((revision) => {
       if (revision.yaml === null) return;
       if (document.dirty)
@@ -40,7 +40,7 @@ export class ScenarioFile {
     this.document.begin(read, path, read.revision, "");
     if (draft !== null && draft !== read.yaml) {
       this.document.type(draft);
-      say(`${path}: what was not saved is here again; Ctrl+Z returns to the file`);
+      say(`${path}: unsaved changes restored; Ctrl+Z returns to the file`);
     } else {
       say(`Opened ${path}`);
     }
@@ -65,7 +65,7 @@ export class ScenarioFile {
     );
   }
 
-  /** Whether it was saved: not while a field of the form shows what the text does not say. */
+  /** Returns whether it was saved; refuses to save while the form has invalid entries. */
   async save(): Promise<boolean> {
     if (await this.refused()) return false;
     return this.document.path === null ? this.saveAs() : this.write(this.document.path, this.document.onDisk, false);
@@ -74,7 +74,7 @@ export class ScenarioFile {
   private async refused(): Promise<boolean> {
     const entries = this.document.problems.filter(({ where }) => this.document.refused.has(where));
     if (entries.length === 0) return false;
-    const why = "What was typed is not in the scenario; saved, it would hold other values than the form shows.";
+    const why = "Some entries of the form are invalid, so that the saved scenario would differ from the form.";
     const where = await refuseFor("Not saved", why, entries);
     if (where !== null) this.reveal(where);
     return true;
@@ -112,7 +112,7 @@ export class ScenarioFile {
     }
   }
 
-  /** The file is not what it was: keep ours, take theirs, or look at both. */
+  /** The file has changed: asks to keep ours, take theirs, or compare both. */
   private async resolve(path: string, mine: string, conflict: ApiError): Promise<boolean> {
     const theirs = String(conflict.body["yaml"] ?? "");
     const revision = String(conflict.body["revision"] ?? "");
@@ -123,7 +123,7 @@ export class ScenarioFile {
       { label: "Look at both", value: "both", kind: "primary" },
     ];
     const why = h("p", {
-      text: `${path} was changed by somebody else since it was opened here, or is there already. Which of the two shall stand in the file?`,
+      text: `${path} has been changed by another program since it was opened here, or already exists. Which version should be kept?`,
     });
     let answer = await ask("Two versions of one file", [why], answers);
     if (answer === "both") {
@@ -135,7 +135,7 @@ export class ScenarioFile {
       this.document.saved(path, revision, theirs);
       this.document.seal();
       this.document.type(theirs);
-      say(`${path}: theirs is here; Ctrl+Z brings yours back`);
+      say(`${path}: their version is open; Ctrl+Z restores yours`);
       return true;
     }
     return false;

@@ -1,4 +1,4 @@
-/** States one after the other, of which one is current: undo and redo. */
+/** A sequence of states with a current one, for undo and redo. */
 export class History<T> {
   private past: { state: T; label: string }[] = [];
   private future: { state: T; label: string }[] = [];
@@ -13,7 +13,7 @@ export class History<T> {
     return this.state;
   }
 
-  /** What undo would take back, and redo bring again. */
+  /** The labels of the next undo and redo steps. */
   get undoLabel(): string | null {
     return this.past.at(-1)?.label ?? null;
   }
@@ -21,7 +21,7 @@ export class History<T> {
     return this.future.at(-1)?.label ?? null;
   }
 
-  /** A new state; one after another with the same `merge` counts as one step. */
+  /** Adds a state; consecutive states with the same `merge` are one step. */
   push(state: T, label: string, merge: string | null = null): void {
     if (merge === null || merge !== this.merging || this.past.length === 0) {
       this.past.push({ state: this.state, label });
@@ -32,12 +32,12 @@ export class History<T> {
     this.future = [];
   }
 
-  /** What comes next is a step of its own, whatever its `merge`. */
+  /** Makes the next state a separate step, whatever its `merge`. */
   seal(): void {
     this.merging = null;
   }
 
-  /** Takes `state` out as if it had never been. */
+  /** Removes `state` from the history. */
   drop(state: T): void {
     if (this.state === state) {
       const before = this.past.pop();

@@ -2,7 +2,7 @@ import type { Problem } from "../api/types.ts";
 import { ask } from "../ui/dialog.ts";
 import { h } from "../ui/dom.ts";
 
-/** Problems as entries of a list; each leads to its option. */
+/** A list of problems with links to their options. */
 export function problemEntries(problems: Problem[], go: (where: string) => void): HTMLElement[] {
   return problems.map(({ where, what }) =>
     h(
@@ -18,7 +18,7 @@ export function problemEntries(problems: Problem[], go: (where: string) => void)
   );
 }
 
-/** Says that something was not done because of these problems; the option that the user wants to go to, or null. */
+/** Reports that problems prevented an action; returns the option that the user wants to see, or null. */
 export async function refuseFor(title: string, why: string, problems: Problem[]): Promise<string | null> {
   let chosen: string | null = null;
   const list = h("ul", { class: "problems" });

@@ -11,7 +11,7 @@ export function getIn(values: Json | undefined, where: string): Json | undefined
   return at;
 }
 
-/** The values with one option set, or removed by null; what leads there is made where it is missing. Changes nothing in place. */
+/** A copy of the values with one option set, or removed by null; creates missing parents. */
 export function setIn(values: JsonMap, where: string, value: Json): JsonMap {
   return set(values, where.split("."), value) as JsonMap;
 }
@@ -33,7 +33,7 @@ function set(at: Json | undefined, keys: string[], value: Json): Json {
   return copy;
 }
 
-/** Whether an option has the same value in both, and stands among the same kinds and in lists of the same length. */
+/** Whether an option has the same value in both, and all its parents have the same type and length. */
 export function samePlace(before: JsonMap, after: JsonMap, where: string): boolean {
   let [a, b]: (Json | undefined)[] = [before, after];
   for (const key of where.split(".")) {

@@ -1,9 +1,9 @@
 import { Signal } from "../ui/signal.ts";
 
-/** Speeds of playing, as shares of real time. */
+/** Playback speeds relative to real time. */
 export const speeds = [1, 1 / 2, 1 / 5, 1 / 10, 1 / 20, 1 / 50, 1 / 100, 1 / 200, 1 / 500, 1 / 1000] as const;
 
-/** The one clock of all that is looked at: nanoseconds since the start of each recording. */
+/** The common clock of all open recordings: nanoseconds since the start of each. */
 export class Clock {
   readonly time = new Signal(0);
   readonly playing = new Signal(false);

@@ -4,14 +4,14 @@ import type { Slot } from "./slot.ts";
 
 export interface FactsOptions {
   title: string;
-  /** What the button says that asks for another recording. */
+  /** Label of the button that opens another recording. */
   open: string;
   enabled: boolean;
   ask: () => void;
   close?: () => void;
 }
 
-/** What is known of a recording, and the choice of its camera. */
+/** Information about a recording, and the choice of its camera. */
 export function factsOf(slot: Slot, options: FactsOptions): HTMLElement[] {
   const { info, camera } = slot;
   const open = button(options.open, options.ask, { class: "small" });
@@ -42,7 +42,7 @@ export function factsOf(slot: Slot, options: FactsOptions): HTMLElement[] {
     head,
     h("p", { class: "recording-path", text: info.path, title: info.path }),
     h("dl", {}, ...rows.flatMap(([name, value]) => [h("dt", { text: name }), h("dd", {}, value)])),
-    ...(info.incomplete ? [h("p", { class: "badge warn", text: "incomplete: it was cancelled or cut short" })] : []),
+    ...(info.incomplete ? [h("p", { class: "badge warn", text: "incomplete: it was cancelled or interrupted" })] : []),
     ...(info.note ? [h("p", { class: "quiet", text: info.note })] : []),
   ];
 }

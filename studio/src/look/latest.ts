@@ -1,4 +1,4 @@
-/** Runs one asynchronous job at a time; of those asked for meanwhile only the latest comes next. */
+/** Runs one asynchronous job at a time; of the jobs requested in the meantime, only the latest runs next. */
 export class Latest<T> {
   private busy = false;
   private next: { wanted: T } | null = null;
@@ -18,7 +18,7 @@ export class Latest<T> {
       try {
         await this.job(wanted);
       } catch {
-        // the job tells by itself
+        // the job reports errors itself
       }
     }
     this.busy = false;

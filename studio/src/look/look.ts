@@ -13,10 +13,10 @@ import { Slot } from "./slot.ts";
 import { imuStrips, rateStrip } from "./strips.ts";
 import { type Display, has, type TileKind, tileNames } from "./tiles.ts";
 
-/** Looking at recordings of any format: one, or two side by side on one clock. */
+/** The viewer of recordings of any format: one, or two side by side with a common clock. */
 export class LookPlace implements Place {
   readonly element: HTMLElement;
-  /** Called when other recordings are shown: the page's address names them. */
+  /** Called when the shown recordings change, to update the page's address. */
   opened: (paths: string[]) => void = () => undefined;
   private display: Display = { view: "onoff", over: "image", window: 20e6, span: 200e6 };
   private clock = new Clock();
@@ -63,14 +63,14 @@ export class LookPlace implements Place {
     else this.showTime(this.clock.time.value);
   }
 
-  /** Opens a recording in the first place, or beside the first. */
+  /** Opens a recording in the first or the second place. */
   async open(path: string, which = 0): Promise<void> {
     try {
       const slot = this.slots[which]!;
       await slot.open(path);
       const all = Object.keys(tileNames) as TileKind[];
       const fits = (kind: TileKind) => has(slot.info!, slot.camera, kind);
-      // What there is, where nothing of what is chosen is left of a recording.
+      // Show all available views if none of the chosen ones is available.
       if (![...this.kinds].some(fits)) for (const kind of all.filter(fits)) this.kinds.add(kind);
       if (which === 0) this.clock.set(Math.min(this.slots[0]!.length * 0.5, this.clock.time.value || Infinity));
       this.refresh();
@@ -87,7 +87,7 @@ export class LookPlace implements Place {
       [
         { value: "onoff", label: "On/off", title: "Each pixel in the colour of its latest event" },
         { value: "counts", label: "Counts", title: "Events of each pixel in the window" },
-        { value: "time_surface", label: "Time surface", title: "How long ago each pixel's latest event was" },
+        { value: "time_surface", label: "Time surface", title: "Time since each pixel's latest event" },
       ],
       display.view,
       (value) => {
@@ -128,7 +128,7 @@ export class LookPlace implements Place {
     });
     return h(
       "div",
-      { class: "toolbar row", attrs: { role: "toolbar", "aria-label": "What is shown" } },
+      { class: "toolbar row", attrs: { role: "toolbar", "aria-label": "Views" } },
       h("span", { class: "row" }, ...buttons),
       h("span", { class: "grow" }),
       view.element,
@@ -149,8 +149,8 @@ export class LookPlace implements Place {
       { class: "transport row" },
       button("", () => this.clock.set(0), { icon: "first", title: "To the start (Home)" }),
       this.play,
-      button("−", () => this.step(-1), { class: "small", title: "Back by a window (,)" }),
-      button("+", () => this.step(1), { class: "small", title: "On by a window (.)" }),
+      button("−", () => this.step(-1), { class: "small", title: "Back by one window (,)" }),
+      button("+", () => this.step(1), { class: "small", title: "Forward by one window (.)" }),
       h("label", {}, h("span", { class: "quiet", text: "Speed" }), this.speed),
       h("label", {}, loop, "Loop"),
       this.time,
@@ -288,7 +288,7 @@ export class LookPlace implements Place {
     this.plot.invalidate();
   }
 
-  /** The window of events, before the playhead. */
+  /** The window of events before the playhead. */
   private drawWindow(pen: CanvasRenderingContext2D): void {
     if (this.plot.playhead === null) return;
     const [from, to] = [this.plot.x(this.plot.playhead - this.display.window), this.plot.x(this.plot.playhead)];
@@ -335,8 +335,8 @@ export class LookPlace implements Place {
     };
     addShortcuts(
       { group: "Look", keys: "P", help: "play, pause", act: here(() => this.clock.toggle()) },
-      { group: "Look", keys: ",", help: "back by a window of events", act: here(() => this.step(-1)) },
-      { group: "Look", keys: ".", help: "on by a window of events", act: here(() => this.step(1)) },
+      { group: "Look", keys: ",", help: "back by one window of events", act: here(() => this.step(-1)) },
+      { group: "Look", keys: ".", help: "forward by one window of events", act: here(() => this.step(1)) },
       { group: "Look", keys: "[", help: "play slower, down to 1/1000", act: here(() => faster(-1)) },
       { group: "Look", keys: "]", help: "play faster", act: here(() => faster(1)) },
       { group: "Look", keys: "← or →", help: "step, on the plot (Shift: further)" },

@@ -14,10 +14,10 @@ import type { Tile, TileSource } from "./tiles.ts";
 
 const most_poses = 4000;
 
-/** The body's path through the world, and where it is now. */
+/** The path of the body in the world, and its current pose. */
 export class PathTile implements Tile {
   readonly element: HTMLElement;
-  private stage = new Stage("Path of the camera. Drag to turn, wheel to come nearer; W A S D and arrow keys move.");
+  private stage = new Stage("Path of the camera. Drag to turn, wheel to zoom; W A S D and arrow keys move.");
   private navigation = new Navigation(this.stage);
   private path = new PathLine();
   private now = new LineSegments(new BufferGeometry(), new LineBasicMaterial());

@@ -7,7 +7,7 @@ import { theme } from "../ui/theme.ts";
 import { Latest } from "./latest.ts";
 import { type Display, type Tile, type TileKind, tileNames, type TileSource } from "./tiles.ts";
 
-/** A picture of the recording at a time, made by the server: events over the image, depth, flow. */
+/** An image of the recording at a time, made by the server: events over the image, depth, motion field. */
 export class PictureTile implements Tile {
   readonly element: HTMLElement;
   private canvas = h("canvas", { attrs: { role: "img" } });
@@ -67,7 +67,7 @@ export class PictureTile implements Tile {
     }
   }
 
-  /** What the colours mean. */
+  /** The meaning of the colours. */
   private scale(): string {
     const { depth_m, flow_px_per_s } = this.source.camera;
     if (this.kind === "depth" && depth_m)

@@ -11,7 +11,7 @@ const rate_bins = 800;
 const imu_values = 1500;
 const indexing_poll_ms = 500;
 
-/** One of the recordings that are looked at: its tiles and what its plots show. */
+/** One of the open recordings: its tiles and plots. */
 export class Slot {
   readonly element = h("div", { class: "slot" });
   info: RecordingInfo | null = null;
@@ -21,7 +21,7 @@ export class Slot {
   private tiles = new Map<TileKind, Tile>();
   private time = 0;
 
-  /** `changed` is called when something new is known of the recording. */
+  /** `changed` is called when information about the recording changes. */
   constructor(
     private display: Display,
     private changed: () => void,
@@ -63,7 +63,7 @@ export class Slot {
     void this.measure(info);
   }
 
-  /** What the plots show; asked again while the server still counts. */
+  /** The data of the plots; requested again while the server still counts. */
   private async measure(info: RecordingInfo): Promise<void> {
     try {
       let now = info;
@@ -84,7 +84,7 @@ export class Slot {
     }
   }
 
-  /** Has these tiles, as far as the recording can fill them; answers their number. */
+  /** Shows these tiles if the recording has their data; returns their number. */
   arrange(kinds: TileKind[]): number {
     const { info, camera } = this;
     const wanted = info ? kinds.filter((kind) => has(info, camera, kind)) : [];

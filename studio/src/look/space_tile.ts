@@ -27,14 +27,14 @@ import type { Display, Tile, TileSource } from "./tiles.ts";
 
 const most_points = 200_000;
 const label_px = 15;
-/** Length of the axis of time, in image widths. */
+/** Length of the time axis, in image widths. */
 const depth = 1.6;
 
-/** Events of a span of time as points in space and time: x to the right, time to the back, y downwards; the image is at the front, now. */
+/** Events of a time span as points: x to the right, time to the back, y downwards; the image is at the front, at the current time. */
 export class SpaceTile implements Tile {
   readonly element: HTMLElement;
   private stage = new Stage(
-    "Events in space and time. Drag to turn, wheel to come nearer; W A S D and arrow keys move.",
+    "Events in space and time. Drag to turn, wheel to zoom; W A S D and arrow keys move.",
   );
   private navigation = new Navigation(this.stage);
   private geometry = new BufferGeometry();
@@ -93,7 +93,7 @@ export class SpaceTile implements Tile {
     });
   }
 
-  /** The box of the cloud, with its edges. */
+  /** The box of the point cloud. */
   private frame(): BufferGeometry {
     const [x, z] = [0.5, this.aspect / 2];
     const corners = [
@@ -125,7 +125,7 @@ export class SpaceTile implements Tile {
     this.stage.invalidate();
   }
 
-  /** Keeps the labels as large as other small text, however large the tile is. */
+  /** Keeps the size of labels independent of the tile's size. */
   private scaleLabels(): void {
     const { height, camera } = this.stage;
     const size = (label_px / height) * 2 * Math.tan((camera.fov * Math.PI) / 360);
@@ -212,7 +212,7 @@ export class SpaceTile implements Tile {
   }
 }
 
-/** `anchor` is where in the text its place is: 0 to the left, 1 to the right. */
+/** `anchor` is the position of the anchor in the text: 0 left, 1 right. */
 function text(words: string, at: Vector3, anchor = 0.5): Sprite {
   const canvas = document.createElement("canvas");
   const pen = canvas.getContext("2d")!;

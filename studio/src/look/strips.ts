@@ -9,7 +9,7 @@ export function rateStrip(slot: Slot, suffix: string): Strip[] {
   const [scale, unit] = highest >= 1e6 ? [1e6, "Mev/s"] : highest >= 1e3 ? [1e3, "kev/s"] : [1, "ev/s"];
   const t = rate.on.map((_, i) => (rate.edges[i]! + rate.edges[i + 1]!) / 2 - info.start);
   const scaled = (values: number[], sign: 1 | -1) => values.map((value) => (sign * value) / scale);
-  // ON upwards and OFF downwards, on one scale.
+  // ON upwards and OFF downwards, on the same scale.
   const curves = [
     { colour: "on", t, values: scaled(rate.on, 1), filled: true },
     { colour: "off", t, values: scaled(rate.off, -1), filled: true },
@@ -17,7 +17,7 @@ export function rateStrip(slot: Slot, suffix: string): Strip[] {
   return [{ label: `Rate${suffix} ±`, unit, low: -highest / scale, high: highest / scale, curves }];
 }
 
-/** What the IMU of a recording measured. */
+/** Measurements of a recording's IMU. */
 export function imuStrips(slot: Slot): Strip[] {
   const { imu, info } = slot;
   if (!imu || !info || imu.t.length === 0) return [];

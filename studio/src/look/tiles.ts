@@ -11,13 +11,13 @@ export const tileNames: Record<TileKind, string> = {
   path: "Path",
 };
 
-/** What is chosen for all tiles. */
+/** The common display options of all tiles. */
 export interface Display {
   view: "onoff" | "counts" | "time_surface";
   over: "image" | "none";
-  /** Span of time whose events are shown [ns]. */
+  /** Duration of the shown events [ns]. */
   window: number;
-  /** Span of time of the cloud [ns]. */
+  /** Duration of the point cloud [ns]. */
   span: number;
 }
 

@@ -9,16 +9,16 @@ import { complain, say } from "../ui/status.ts";
 
 const ended = (state: string) => state === "done" || state === "failed" || state === "cancelled";
 const stateNames = {
-  waiting: "waiting for the run before it",
+  waiting: "waiting for the previous run",
   running: "running",
   done: "done",
   failed: "failed",
   cancelled: "cancelled",
 };
 
-/** What the place of runs needs of the page. */
+/** The interface of the run place to the page. */
 export interface RunContext {
-  /** Saves; the path of the scenario, or null where it is not saved. */
+  /** Saves the scenario; returns its path, or null if it was not saved. */
   saved: () => Promise<string | null>;
   look: (path: string) => void;
   /** Shows an option in the form. */
@@ -26,10 +26,10 @@ export interface RunContext {
   isOpen: (scenario: string) => boolean;
 }
 
-/** The server's runs: how far they are, and what their cameras see. */
+/** The server's runs: their progress and their cameras' views. */
 export class RunPlace implements Place {
   readonly element: HTMLElement;
-  /** Called when the run that is watched changes: the page's address names it. */
+  /** Called when the watched run changes, to update the page's address. */
   watched: (id: string | null) => void = () => undefined;
   private list = h("div", { class: "run-list scroll", attrs: { role: "list", "aria-label": "Runs" } });
   private picture = h("canvas", {
@@ -43,7 +43,7 @@ export class RunPlace implements Place {
   private figures = h("dl", { class: "figures" });
   private error = h("p", { class: "problem", attrs: { role: "alert" } });
   private refusal: ApiError | null = null;
-  /** The option for which a run was refused or failed. */
+  /** The option that made a run fail. */
   private wrong = "";
   private toOption = button("", () => this.context.reveal(this.wrong), { class: "small" });
   private cancel = button("Cancel the run", () => void this.cancelRun(), { class: "danger" });
@@ -92,7 +92,7 @@ export class RunPlace implements Place {
     if (visible) void this.refresh();
   }
 
-  /** Saves, and starts a run; asks where a recording is in the way. */
+  /** Saves and starts a run; asks if a recording already exists. */
   async start(): Promise<void> {
     const path = await this.context.saved();
     if (!path) return;
@@ -113,12 +113,12 @@ export class RunPlace implements Place {
     }
   }
 
-  /** Something is in the way: a recording, or a run that still writes one. Only the first can be replaced. */
+  /** The folder has a recording, which can be replaced, or a run is writing to it. */
   private async askWhere(path: string, out: string | undefined, { message, body }: ApiError): Promise<void> {
     const running = body["running"] === true;
     const replace: Answer<"over" | "other">[] = running ? [] : [{ label: "Replace it", value: "over", kind: "danger" }];
     const answer = await ask<"over" | "other">(
-      running ? "A run is writing there" : "There is a recording already",
+      running ? "A run is writing there" : "The recording already exists",
       [h("p", { text: message })],
       [
         { label: "Cancel", value: null as never },
@@ -129,11 +129,11 @@ export class RunPlace implements Place {
     if (answer === "over") return this.launch(path, out, true);
     if (answer !== "other") return;
     const proposal = `${out ?? path.replace(/([^/]*)\.ya?ml$/, "out/$1")}-2`;
-    const other = await askText("Where shall the recording go?", "A folder below the server's roots", proposal, "Run");
+    const other = await askText("Where should the recording be saved?", "A folder below the server's roots", proposal, "Run");
     if (other) return this.launch(path, other, false);
   }
 
-  /** Why the last run was not begun, or failed, and the way to the option where it is about one. */
+  /** Why the last run could not start or failed, with a link to the option if any. */
   private showError(run: RunState | null): void {
     const { refusal } = this;
     this.error.textContent = this.error.title = refusal?.message ?? run?.error ?? "";
@@ -143,7 +143,7 @@ export class RunPlace implements Place {
     this.toOption.textContent = `Go to ${where}`;
   }
 
-  /** Rejoins a run, also after the page was loaded again. */
+  /** Reconnects to a run, also after a reload of the page. */
   async rejoin(id: string): Promise<void> {
     await this.refresh();
     if (this.runs.some((run) => run.id === id)) this.watch(id);
@@ -167,7 +167,7 @@ export class RunPlace implements Place {
     if (!id || !run) return;
     if (this.current?.id !== id) {
       this.pictureShown = this.pictureWanted = -1;
-      this.picture.width = this.picture.height = 1; // that of another run
+      this.picture.width = this.picture.height = 1; // clears the image of another run
     }
     this.current = run;
     this.watched(id);
@@ -203,8 +203,8 @@ export class RunPlace implements Place {
     if (run?.state === "cancelled")
       say(
         run.recording
-          ? `Cancelled; what was simulated is kept: ${run.recording}`
-          : "Cancelled before anything was kept",
+          ? `Cancelled; the simulated part is kept: ${run.recording}`
+          : "Cancelled before anything was recorded",
       );
   }
 
@@ -224,7 +224,7 @@ export class RunPlace implements Place {
         picture.close();
       }
     } catch {
-      // the next picture will do
+      // wait for the next image
     }
     this.pictureBusy = false;
   }
@@ -234,7 +234,7 @@ export class RunPlace implements Place {
     if (!run) return;
     try {
       await server.cancelRun(run.id);
-      if (!ended(run.state)) say("The run is being cancelled; what was simulated until now is kept");
+      if (!ended(run.state)) say("Cancelling the run; the simulated part is kept");
     } catch (error) {
       complain(error);
     }
@@ -271,7 +271,7 @@ export class RunPlace implements Place {
   private showList(): void {
     if (this.runs.length === 0)
       return this.list.replaceChildren(
-        h("p", { class: "quiet", text: "None yet. Runs go on when the page is closed, and are found here again." }),
+        h("p", { class: "quiet", text: "None yet. Runs continue when the page is closed, and appear here again." }),
       );
     this.list.replaceChildren(
       ...[...this.runs].reverse().map((run) => {

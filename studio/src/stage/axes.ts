@@ -5,7 +5,7 @@ const reach_px = 22;
 const names = ["x", "y", "z"] as const;
 const svg = "http://www.w3.org/2000/svg";
 
-/** A small picture in the corner of a stage: where the world's axes point, as the camera sees them. */
+/** A small image in the corner of a stage with the directions of the world's axes. */
 export class AxesGizmo {
   readonly element = document.createElementNS(svg, "svg");
   private arms = names.map((name) => {

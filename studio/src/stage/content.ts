@@ -26,12 +26,12 @@ import { anisotropy, drawnBySoftware } from "./gpu.ts";
 import { matrixOf, PoseTrack } from "./frames.ts";
 import { loadMesh, loadWhole, type Made } from "./mesh.ts";
 
-/** So many frames later. */
+/** Waits for a number of frames. */
 async function frames(count: number): Promise<void> {
   for (let i = 0; i < count; ++i) await new Promise(requestAnimationFrame);
 }
 
-/** What stands in the scene, as the server describes it. */
+/** The content of the scene, as the server describes it. */
 export class SceneContent {
   readonly group = new Group();
   readonly bounds = new Box3();
@@ -41,10 +41,10 @@ export class SceneContent {
   private made: Made = { group: new Group(), details: [], small: [] };
   private raycaster = new Raycaster();
 
-  /** `changed` is called when something of it looks different. */
+  /** `changed` is called when its appearance changes. */
   constructor(private changed: () => void) {}
 
-  /** Loads what is not there yet; answers whether anything changed. Textures come small at first, whole by and by. */
+  /** Loads missing parts; returns whether anything changed. Textures are thumbnails first; full sizes follow. */
   async show(info: SceneInfo, lighting: Json | undefined): Promise<boolean> {
     const key = JSON.stringify([info.kind, info.glb, info.texture, info.world, info.kind === "mesh" ? lighting : null]);
     if (key === this.key) return false;
@@ -61,18 +61,18 @@ export class SceneContent {
     return true;
   }
 
-  /** Whether drawing it takes so long that its first picture should be a coarse one. */
+  /** Whether drawing is so slow that the first image should be coarse. */
   get slow(): boolean {
     return drawnBySoftware() && this.made.details.length > 0;
   }
 
-  /** Shows few triangles in place of many, or all of them again. */
+  /** Shows the reduced mesh, or all triangles. */
   coarsen(coarse: boolean): void {
     this.coarse = coarse;
     for (const detail of this.made.details) detail.mesh.geometry = coarse ? detail.coarse : detail.whole;
   }
 
-  /** Puts the whole textures in the place of the small ones, as they come; one a frame, since each takes a while. */
+  /** Replaces thumbnails by full textures as they arrive, one per frame, since each takes a while. */
   private async sharpen(made: Made): Promise<void> {
     await frames(2);
     for (const { texture, url, materials } of made.small) {
@@ -104,7 +104,7 @@ export class SceneContent {
     this.made = { group: new Group(), details: [], small: [] };
   }
 
-  /** Moves the objects to where they are at a time. */
+  /** Moves the objects to their poses at a time. */
   place(tracks: (PoseTrack | undefined)[], time: number): void {
     for (let i = 0; i < this.nodes.length; ++i) {
       const node = this.nodes[i];
@@ -116,13 +116,13 @@ export class SceneContent {
     }
   }
 
-  /** The first surface under a point of the picture, -1 to 1 to the right and up: of the scene as it is, never coarse. */
+  /** The first surface under a point of the image, -1 to 1 to the right and up; uses all triangles. */
   pick(x: number, y: number, camera: Camera): Vector3 | null {
     this.raycaster.setFromCamera(new Vector2(x, y), camera);
     return this.firstHit()?.point ?? null;
   }
 
-  /** How far a surface lies from a point in a direction, m; infinite where there is none. */
+  /** The distance of the first surface from a point in a direction, m; infinite without a surface. */
   distance(from: Vector3, direction: Vector3): number {
     this.raycaster.set(from, direction.clone().normalize());
     return this.firstHit()?.distance ?? Infinity;
@@ -136,7 +136,7 @@ export class SceneContent {
     return hit;
   }
 
-  /** The direction under a point of the picture. */
+  /** The direction of a point of the image. */
   direction(x: number, y: number, camera: Camera): Vector3 {
     this.raycaster.setFromCamera(new Vector2(x, y), camera);
     return this.raycaster.ray.direction.clone();
@@ -159,7 +159,7 @@ async function make(info: SceneInfo, lighting: Json | undefined): Promise<Made> 
 
 const panorama_radius_m = 200;
 
-/** The image's centre is seen along x, its upper edge at the zenith, its right half to the right (towards -y). */
+/** The image's centre is along x, its upper edge at the zenith, its right half to the right (towards -y). */
 function makePanorama(texture: Texture, info: SceneInfo): Mesh {
   const [columns, rows] = [96, 48];
   const [positions, uvs, indices] = [[] as number[], [] as number[], [] as number[]];
@@ -182,14 +182,14 @@ function makePanorama(texture: Texture, info: SceneInfo): Mesh {
   geometry.setAttribute("position", new Float32BufferAttribute(positions, 3));
   geometry.setAttribute("uv", new Float32BufferAttribute(uvs, 2));
   geometry.setIndex(indices);
-  texture.minFilter = LinearFilter; // mip maps would show the seam
+  texture.minFilter = LinearFilter; // mipmaps would show the seam
   const mesh = new Mesh(geometry, new MeshBasicMaterial({ map: texture, side: 2, depthWrite: false }));
   const orientation = info.world?.panorama?.orientation;
   if (orientation) mesh.quaternion.copy(new Quaternion(...orientation).normalize());
   return mesh;
 }
 
-/** The poster's frame has its origin at the centre, x right and y down the image. */
+/** The plane's frame has its origin at the image's centre, x right and y down. */
 function makePlane(texture: Texture, info: SceneInfo): Mesh {
   const { pose, width_m, height_m, endless } = info.world!.plane!;
   const repeat = endless ? 41 : 1;

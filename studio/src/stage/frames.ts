@@ -29,14 +29,14 @@ export function inverse(pose: Pose): Pose {
 
 const unused = new Vector3();
 
-/** Puts a camera of three.js where a camera with this pose is, looking the same way. */
+/** Gives a three.js camera this camera pose. */
 export function placeCamera(camera: PerspectiveCamera, T_world_camera: Matrix4): void {
   T_world_camera.decompose(camera.position, camera.quaternion, unused);
   camera.quaternion.multiply(flip);
   camera.updateMatrixWorld();
 }
 
-/** T_world_camera of what a camera of three.js sees. */
+/** T_world_camera of a three.js camera. */
 export function poseOfCamera(camera: PerspectiveCamera): Pose {
   const rotation = camera.quaternion.clone().multiply(flip);
   return [camera.position.x, camera.position.y, camera.position.z, rotation.x, rotation.y, rotation.z, rotation.w];
@@ -65,7 +65,7 @@ export function imageCorners(model: CameraModel): Vector3[] {
   ];
 }
 
-/** Orientation of a frame whose z axis points from `from` to `to`, with y as far downwards as it can (world z, or `up`, is up). */
+/** Orientation of a frame whose z axis points from `from` to `to`, with y as far downwards as possible (world z, or `up`, is up). */
 export function lookRotation(from: Vector3, to: Vector3, up = new Vector3(0, 0, 1)): Quaternion {
   const z = to.clone().sub(from).normalize();
   let x = z.clone().cross(up);
@@ -75,7 +75,7 @@ export function lookRotation(from: Vector3, to: Vector3, up = new Vector3(0, 0, 
   return new Quaternion().setFromRotationMatrix(new Matrix4().makeBasis(x, y, z));
 }
 
-/** The pose at a time, between the neighbours in a list of them; held at the ends. `into` is overwritten. */
+/** The pose at a time, interpolated in a list and constant beyond its ends. Overwrites `into`. */
 export class PoseTrack {
   private a = new Quaternion();
   private b = new Quaternion();

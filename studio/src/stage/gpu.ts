@@ -1,13 +1,13 @@
 import { WebGLRenderer } from "three";
 
-/** Whether WebGL is drawn by the processor: then smooth edges and slanted textures cost more than they are worth. */
+/** Whether the processor draws WebGL, which makes antialiasing and anisotropic filtering too slow. */
 let software: boolean | null = null;
 
-/** Null where the browser gives no WebGL. */
+/** Null if the browser does not support WebGL. */
 export function makeRenderer(): WebGLRenderer | null {
   try {
     if (software !== null) return rendererWith(!software);
-    // The first tells who draws; a context costs a graphics card little, and a processor much.
+    // The first context tells whether the processor draws, for which a context is expensive.
     const first = rendererWith(false);
     software = isSoftware(first.getContext());
     if (software) return first;
@@ -29,5 +29,5 @@ function isSoftware(gl: WebGLRenderingContext | WebGL2RenderingContext): boolean
 
 export const drawnBySoftware = () => software === true;
 
-/** Samples of a texture along a slanted surface. */
+/** Anisotropy of textures. */
 export const anisotropy = () => (software ? 1 : 8);

@@ -2,10 +2,10 @@ import { BufferAttribute, BufferGeometry, Color, LineBasicMaterial, LineSegments
 import { colour } from "../ui/theme.ts";
 import { cellWidth } from "./sizes.ts";
 
-const cells = 20; // to each side of the middle
+const cells = 20; // on each side of the middle
 const opacity = 0.6;
 
-/** A level grid, with the world's x and y axes in their colours; it fades away from its middle. */
+/** A level grid with coloured x and y axes; it fades with the distance from its middle. */
 export class Ground {
   readonly lines = new LineSegments(
     new BufferGeometry(),
@@ -19,11 +19,11 @@ export class Ground {
     this.lines.renderOrder = 1;
   }
 
-  /** Goes with a scene of this size and with this middle, in m. */
+  /** Fits a scene with this size and middle, in m. */
   fit(size_m: number, middle: [number, number], height_m = 0): void {
     this.cell_m = cellWidth(size_m);
     this.middle = [0, 1].map((i) => Math.round(middle[i]! / this.cell_m) * this.cell_m) as [number, number];
-    this.lines.position.z = height_m + 0.002 * this.cell_m; // a floor there does not swallow it
+    this.lines.position.z = height_m + 0.002 * this.cell_m; // above a floor at this height
     this.draw();
   }
 

@@ -1,33 +1,33 @@
 const slow_ms = 45;
-/** So slow that the next movement need not find it out again. */
+/** Frames this slow make the next movements coarse from the start. */
 const very_slow_ms = 180;
 const movements_remembered = 10;
 /** Longer than any frame: the page was hidden. */
 const absence_ms = 10_000;
 
-/** Decides from how long frames take whether those of a movement are to be drawn coarsely. */
+/** Decides from the duration of frames whether to draw a movement coarsely. */
 export class Haste {
   private mean_ms = 0;
   private frames = 0;
   private hurried = false;
   private remembered = 0;
 
-  /** A frame of a movement has come, so long after it was asked for; whether it is to be drawn coarsely. */
+  /** Reports the latency of a frame of a movement; returns whether to draw it coarsely. */
   frame(waited_ms: number): boolean {
     if (this.hurried) return true;
     const begins = this.frames++ === 0;
     if (begins)
-      this.hurried = this.remembered-- > 0; // what it waited for came before the movement
+      this.hurried = this.remembered-- > 0; // this latency is from before the movement
     else if (waited_ms < absence_ms) this.take(waited_ms);
     return this.hurried;
   }
 
-  /** It is known that frames are slow. */
+  /** Reports that frames are slow. */
   hurry(): void {
     this.hurried = true;
   }
 
-  /** Everything rests again. */
+  /** Reports that the movement has ended. */
   rest(): void {
     this.mean_ms = this.frames = 0;
     this.hurried = false;

@@ -17,7 +17,7 @@ import { colour } from "../ui/theme.ts";
 import { imageCorners } from "./frames.ts";
 import { frustumOpacity } from "./sizes.ts";
 
-/** Lines of a camera's frustum of depth 1 in its own frame: its edges, the image, and a tick for what is up. */
+/** Lines of a camera's frustum of depth 1 in the camera's frame: edges, image, and a tick for the upward direction. */
 export function frustumLines(model: CameraModel | null): Float32Array {
   const origin = new Vector3();
   if (!model) {
@@ -61,11 +61,11 @@ export interface Marker {
   matrix: Matrix4;
   label: string;
   selected: boolean;
-  /** Where the label stands (default: at the frustum's tip). */
+  /** Position of the label (default: the frustum's tip). */
   anchor?: Vector3;
 }
 
-/** Frusta and numbered dots: way points of a motion. */
+/** Frusta and numbered dots: waypoints of a motion. */
 export class Markers {
   readonly group = new Group();
   private lines = new LineSegments(
@@ -86,7 +86,7 @@ export class Markers {
     this.group.add(this.lines);
   }
 
-  /** `depth` is how far the frusta reach [m]. */
+  /** `depth` is the length of the frusta [m]. */
   show(markers: Marker[], model: CameraModel | null, depth: number): void {
     const shape = frustumLines(model);
     const positions = new Float32Array(markers.length * shape.length);
@@ -132,7 +132,7 @@ export class Markers {
     });
   }
 
-  /** Before a frame: keeps the dots' size on the screen, whatever its height [px], and lets far frusta fade. */
+  /** Call before a frame: keeps the dots' size in px and fades distant frusta. */
   face(camera: PerspectiveCamera, height_px: number): void {
     const size = (22 / height_px) * 2 * Math.tan((camera.fov * Math.PI) / 360);
     for (const sprite of this.sprites) sprite.scale.setScalar(size);
@@ -149,7 +149,7 @@ export class Markers {
     });
   }
 
-  /** The marker within a few pixels of a point of the picture (-1 to 1), the nearest to it; -1: none. */
+  /** The nearest marker within a few pixels of a point of the image (-1 to 1); -1: none. */
   at(x: number, y: number, camera: PerspectiveCamera, width: number, height: number): number {
     let [best, nearest] = [-1, 14];
     const point = new Vector3();

@@ -19,28 +19,28 @@ import type { Json } from "../api/types.ts";
 import { getIn } from "../document/values.ts";
 import { anisotropy } from "./gpu.ts";
 
-/** A surface in many triangles and, between some of the same vertices, in few. */
+/** A surface with all triangles and with few, which share vertices. */
 interface Detail {
   mesh: Mesh;
   whole: BufferGeometry;
   coarse: BufferGeometry;
 }
 
-/** A texture that is a small version of the image at `url`. */
+/** A thumbnail texture of the image at `url`. */
 interface SmallTexture {
   texture: Texture;
   url: string;
   materials: (MeshBasicMaterial | MeshLambertMaterial)[];
 }
 
-/** What was made of a scene. */
+/** The objects made from a scene. */
 export interface Made {
   group: Group;
   details: Detail[];
   small: SmallTexture[];
 }
 
-/** A scene file of the server's. */
+/** A scene file of the server. */
 export async function loadMesh(url: string, lighting: Json | undefined): Promise<Made> {
   const gltf = await new GLTFLoader().loadAsync(url);
   const made: Made = { group: new Group(), details: [], small: [] };
@@ -83,7 +83,7 @@ function materialOf(
   return material;
 }
 
-/** The same texture in its full size. */
+/** The texture in full size. */
 export async function loadWhole(small: Texture, url: string): Promise<Texture> {
   const loader = new ImageBitmapLoader().setOptions({ premultiplyAlpha: "none", colorSpaceConversion: "none" });
   const whole = small.clone();

@@ -6,7 +6,7 @@ import type { Stage } from "./stage.ts";
 export type DragMode = "look" | "orbit";
 
 const click_px = 4;
-/** A slow frame is no leap, and a key that is tapped does something, also in the first frame after a rest. */
+/** Limits of the time step: a slow frame causes no jump, and a short key press always has an effect. */
 const longest_step_s = 0.1;
 const shortest_step_s = 1 / 60;
 const look_rad_per_px = 0.0035;
@@ -31,13 +31,13 @@ const turns: Record<string, [number, number]> = {
 /** Moves a stage's camera by mouse and keys: flying, orbiting, panning. World z is up. */
 export class Navigation {
   dragMode: DragMode = "look";
-  /** A click on the picture (-1 to 1, right and up) that was no drag; true in `aside` with Alt held. */
+  /** A click (not a drag) on the image (-1 to 1, right and up); `aside` is true with Alt. */
   clicked: (x: number, y: number) => void = () => undefined;
-  /** Whether something else, such as a handle under the pointer, takes the drag. */
+  /** Whether another control, such as a handle under the pointer, takes the drag. */
   taken: () => boolean = () => false;
-  /** What lies under a point of the picture: orbiting turns about it. */
+  /** The scene point under a point of the image, about which orbiting turns. */
   pick: (x: number, y: number) => Vector3 | null = () => null;
-  /** Called whenever the camera was moved. */
+  /** Called when the camera has moved. */
   moved: () => void = () => undefined;
   canMove = true;
   readonly speed_m_per_s = new Signal(1.5);
@@ -45,7 +45,7 @@ export class Navigation {
   private yaw = 0;
   private pitch = 0;
   private pressed = new Set<string>();
-  /** Pressed since the last frame: they count for one, also where they were let go before it. */
+  /** Keys pressed since the last frame; each counts for one frame, even if already released. */
   private tapped = new Set<string>();
   private released = new Set<string>();
   private fast = false;
@@ -83,7 +83,7 @@ export class Navigation {
     element.addEventListener("blur", () => this.pressed.clear());
   }
 
-  /** Takes over where the camera is and looks. */
+  /** Takes the current pose of the camera. */
   adopt(): void {
     const angles = new Euler().setFromQuaternion(this.camera.quaternion.clone().multiply(level), "ZXY");
     this.yaw = angles.z;
@@ -91,7 +91,7 @@ export class Navigation {
     this.apply();
   }
 
-  /** Puts the camera somewhere, looking at a point. */
+  /** Places the camera, looking at a point. */
   look(from: Vector3, to: Vector3): void {
     this.camera.position.copy(from);
     const direction = to.clone().sub(from);
@@ -101,7 +101,7 @@ export class Navigation {
     this.apply();
   }
 
-  /** Moves by what is held down; whether anything is. */
+  /** Moves according to the held keys; returns whether any is held. */
   frame(elapsed_s: number): boolean {
     for (const key of this.tapped) this.pressed.add(key);
     if (this.pressed.size === 0) return false;
@@ -236,6 +236,6 @@ export class Navigation {
   }
 }
 
-/** A camera of three.js looks down; this makes it look along y with z up. */
+/** Makes a three.js camera, which looks down, look along y with z up. */
 const upright = new Quaternion().setFromEuler(new Euler(Math.PI / 2, 0, 0));
 const level = upright.clone().invert();

@@ -5,7 +5,7 @@ import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import type { Pose } from "../api/types.ts";
 import { colour } from "../ui/theme.ts";
 
-/** A motion as a line through space: bright where it is in sight, faint where something hides it. */
+/** A motion as a line in space: bright where visible, faint where hidden. */
 export class PathLine {
   readonly group = new Group();
   private near = new Line2(new LineGeometry(), new LineMaterial({ linewidth: 2.5, vertexColors: true }));
@@ -23,7 +23,7 @@ export class PathLine {
     this.group.visible = false;
   }
 
-  /** `doubtful` answers for which of the poses the motion is implausible: those parts are drawn in the colour of warnings. */
+  /** `doubtful` returns whether a pose is implausible; those parts have the colour of warnings. */
   show(poses: Pose[], doubtful: (index: number) => boolean = () => false, quiet = false): void {
     this.group.visible = poses.length > 1;
     if (poses.length < 2) return;

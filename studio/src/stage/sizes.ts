@@ -8,8 +8,8 @@ export function cellWidth(size_m: number): number {
 }
 
 /**
- * How much of a way point's frustum is seen, 0 to 1: all of the selected one; of the others the less the farther they
- * are, in terms of how far a frustum reaches.
+ * The opacity of a waypoint's frustum, 0 to 1: 1 for the selected one; for others it decreases with the distance
+ * relative to the frustum's length.
  */
 export function frustumOpacity(selected: boolean, distance: number, depth: number): number {
   if (selected) return 1;

@@ -4,23 +4,23 @@ import { makeRenderer } from "./gpu.ts";
 import { Haste } from "./haste.ts";
 import { colour, theme } from "../ui/theme.ts";
 
-/** Of the pixels along each side, where frames are slow. */
+/** Fraction of the resolution if frames are slow. */
 const coarsest = 0.5;
 const rest_ms = 250;
 
-/** A picture of a three.js scene that is drawn when something has changed, and at no other time. */
+/** A view of a three.js scene that is drawn only after changes. */
 export class Stage {
   readonly element: HTMLElement;
   readonly renderer: WebGLRenderer | null;
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(65, 1, 0.02, 500);
-  /** Called for every frame while it answers true: moves what moves. */
+  /** Called for every frame while it returns true, to animate the scene. */
   animate: (dt_s: number) => boolean = () => false;
-  /** Draws the picture; the default draws the scene through the camera. */
+  /** Draws the image; by default the scene through the camera. */
   draw: (renderer: WebGLRenderer) => void = (renderer) => renderer.render(this.scene, this.camera);
   /** Called when the size has changed. */
   resized: () => void = () => undefined;
-  /** Called with true when frames become slow while something moves, and with false when all of it rests again. */
+  /** Called with true when frames become slow during a movement, and with false at its end. */
   hurried: (hurried: boolean) => void = () => undefined;
   width = 1;
   height = 1;
@@ -40,7 +40,7 @@ export class Stage {
       this.element.append(
         h("p", {
           class: "stage-note",
-          text: "This browser gives no WebGL, which the view in 3D needs. Everything else works.",
+          text: "This browser does not support WebGL, which the 3D view needs. Everything else works.",
         }),
       );
       return;
@@ -55,7 +55,7 @@ export class Stage {
     });
   }
 
-  /** Asks for a frame. */
+  /** Requests a frame. */
   invalidate(): void {
     if (this.scheduled || !this.renderer) return;
     this.scheduled = true;
@@ -63,19 +63,19 @@ export class Stage {
     requestAnimationFrame((now) => this.frame(now));
   }
 
-  /** Asks for a frame because something moves: where frames are slow it is drawn coarsely until all rests. */
+  /** Requests a frame of a movement; if frames are slow, it is drawn coarsely until the movement ends. */
   moved(): void {
     this.moving = true;
     this.invalidate();
   }
 
-  /** Draws coarsely now, and all of it in a moment: for what is known to be slow. */
+  /** Draws coarsely now and completely a moment later, for slow scenes. */
   hurry(): void {
     this.haste.hurry();
     this.setHurried(true);
   }
 
-  /** What is shown is another thing: how slow it is remains to be seen. */
+  /** The content has changed: forgets how slow it was. */
   forgetPace(): void {
     this.haste = new Haste();
   }

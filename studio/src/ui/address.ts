@@ -1,4 +1,4 @@
-/** What the page's address remembers, so that a reload comes back to the same place. */
+/** The state in the page's address, which a reload restores. */
 export interface Address {
   place: string;
   scenario?: string;

@@ -4,13 +4,13 @@ import { allShortcuts } from "./shortcuts.ts";
 export interface Answer<T> {
   label: string;
   value: T;
-  /** Primary: Enter gives this answer. What destroys something is in danger, and never that answer. */
+  /** primary: Enter gives this answer. danger: destroys data; never the answer of Enter. */
   kind?: "primary" | "danger";
 }
 
 /**
- * A question in a dialog: resolves to the answer's value, or null when the dialog was left by Escape. The focus is on
- * the first field, on the primary answer, or on the first answer that destroys nothing.
+ * A dialog with a question: resolves to the answer's value, or null after Escape. The focus is on the first field, the
+ * primary answer, or the first answer that destroys nothing.
  */
 export function ask<T>(
   title: string,
@@ -64,7 +64,7 @@ export function ask<T>(
   });
 }
 
-/** One line of text, or null. `check` answers what is wrong with it, or nothing. */
+/** Asks for one line of text; null if cancelled. `check` returns a problem or an empty text. */
 export async function askText(title: string, label: string, value: string, accept: string): Promise<string | null> {
   const input = h("input", { value, attrs: { "aria-label": label, spellcheck: "false" } });
   const answer = await ask<true>(

@@ -4,7 +4,7 @@ export interface DiffRow {
   same: boolean;
 }
 
-/** Two texts line by line, equal lines side by side (longest common subsequence); lines without a counterpart beside null. */
+/** Two texts line by line, equal lines side by side (longest common subsequence); null for missing counterparts. */
 export function diffLines(mine: string, theirs: string): DiffRow[] {
   const [a, b] = [mine.split("\n"), theirs.split("\n")];
   const width = b.length + 1;

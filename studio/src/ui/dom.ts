@@ -11,7 +11,7 @@ export interface Properties {
   disabled?: boolean;
   checked?: boolean;
   tabIndex?: number;
-  /** Attributes, `aria-...` among them; undefined ones are left out. */
+  /** Attributes, including `aria-...`; undefined ones are left out. */
   attrs?: Record<string, string | number | boolean | undefined>;
   on?: Handlers;
 }
@@ -37,7 +37,7 @@ export function h<K extends keyof HTMLElementTagNameMap>(
   return element;
 }
 
-/** A button; `key` is the shortcut that its tooltip names. */
+/** A button; its tooltip shows the shortcut `key`. */
 export function button(
   label: string,
   action: () => void,
@@ -58,7 +58,7 @@ export function button(
   return element;
 }
 
-/** Buttons of which one is pressed. */
+/** A group of buttons, one of which is pressed. */
 export class Segmented<T extends string> {
   readonly element: HTMLElement;
   private buttons = new Map<T, HTMLButtonElement>();
@@ -88,7 +88,7 @@ export class Segmented<T extends string> {
     return this.selected;
   }
 
-  /** Selects without telling. */
+  /** Selects without calling the handler. */
   set(value: T): void {
     this.selected = value;
     this.show();
@@ -155,14 +155,14 @@ export function icon(name: IconName): SVGSVGElement {
   return svg;
 }
 
-/** Takes what is being typed into a field, as leaving the field would. */
+/** Applies the text typed into a field, as if the field lost the focus. */
 export function commitTyping(): void {
   const at = document.activeElement;
   if (at instanceof HTMLTextAreaElement || (at instanceof HTMLInputElement && typing(at)))
     at.dispatchEvent(new Event("change"));
 }
 
-/** Whether keys typed now belong to a field. */
+/** Whether keyboard input goes to a field. */
 export function typing(target: EventTarget | null): boolean {
   return (
     target instanceof HTMLTextAreaElement ||

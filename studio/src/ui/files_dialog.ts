@@ -6,16 +6,16 @@ import { complain } from "./status.ts";
 
 export interface FilesQuestion {
   title: string;
-  /** Which entries can be chosen, beside folders that can be entered. */
+  /** Kinds of entries that can be chosen, in addition to folders, which can be entered. */
   kinds: FileEntry["kind"][];
-  /** Where to begin. */
+  /** The initial folder. */
   folder: string;
-  /** Asks for a new file's name, with this proposal. */
+  /** Asks for the name of a new file, with this proposal. */
   saveAs?: string;
   accept: string;
 }
 
-/** Lets the user choose a file below the server's roots: its path, or null. */
+/** Lets the user choose a file below the server's roots; returns its path or null. */
 export function chooseFile(question: FilesQuestion, roots: string[]): Promise<FileEntry | null> {
   return new Promise((resolve) => {
     let folder = question.folder;

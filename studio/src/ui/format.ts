@@ -1,8 +1,8 @@
-/** Numbers and times as people read them: always with their unit, never wider than they were made for. */
+/** Numbers and times as text for users, with units and limited width. */
 
 const grouping = "\u202f"; // narrow space between groups of three digits
 
-/** At most `digits` significant digits, without needless zeros: 0.25, 1200, 3.1e-7. */
+/** At most `digits` significant digits, without trailing zeros: 0.25, 1200, 3.1e-7. */
 export function shortNumber(value: number, digits = 4): string {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? "–" : value > 0 ? "∞" : "-∞";
   if (value === 0) return "0";
@@ -43,7 +43,7 @@ export function seconds(time_ns: number, decimals = 3): string {
   return `${whole}.${fraction.match(/.{1,3}/g)!.join(grouping)}${grouping}s`;
 }
 
-/** A span of time in the unit that suits it: 250 µs, 33.3 ms, 5 s, 2 min 5 s. */
+/** A duration in a suitable unit: 250 µs, 33.3 ms, 5 s, 2 min 5 s. */
 export function duration(span_ns: number): string {
   const size = Math.abs(span_ns);
   if (size < 1e3) return `${shortNumber(span_ns, 3)}${grouping}ns`;
@@ -56,7 +56,7 @@ export function duration(span_ns: number): string {
   return `${Math.floor(minutes / 60)}${grouping}h ${minutes % 60}${grouping}min`;
 }
 
-/** Seconds typed by a person: "1.5", "1.5 s", "1500 ms", "2:05", "250us"; NaN for anything else. */
+/** Parses typed seconds: "1.5", "1.5 s", "1500 ms", "2:05", "250us"; NaN for anything else. */
 export function parseSeconds(text: string): number {
   const trimmed = text.trim().replace(",", ".");
   const clock = /^(\d+):([0-5]?\d(?:\.\d*)?)$/.exec(trimmed);
@@ -74,7 +74,7 @@ export function bytes(size: number): string {
   return `${shortNumber(size / 1e9, 3)}${grouping}GB`;
 }
 
-/** Ticks of a round step that suit a range: about `wanted` of them, both ends included where they fall on one. */
+/** About `wanted` ticks with a round step in a range; includes the ends if they are ticks. */
 export function ticks(low: number, high: number, wanted: number): number[] {
   if (!(high > low)) return [low];
   const rough = (high - low) / Math.max(1, wanted);

@@ -7,21 +7,21 @@ export interface NumberFieldOptions {
   unit?: string;
   /** Digits shown. */
   digits?: number;
-  /** What arrow up and down change it by; with Shift tenfold. */
+  /** The step of the arrow keys; ten times larger with Shift. */
   step?: number;
-  /** Reads what was typed; NaN: it is not valid. */
+  /** Parses the typed text; NaN if invalid. */
   parse?: (text: string) => number;
   low?: number;
   high?: number;
-  /** An emptied field means that there is no number; otherwise it must hold one. */
+  /** Whether an empty field is valid and means no number. */
   optional?: boolean;
   /** Called with a valid number, or null for an emptied field. */
   change: (value: number | null) => void;
 }
 
 /**
- * A number with its unit: typed, or stepped by the arrow keys. It shows the number in use: what is typed and cannot be
- * used is said to be so, and the number in use comes back.
+ * A number with its unit, typed or stepped with the arrow keys. It shows the current number: for an invalid entry, it
+ * reports the problem and restores the current number.
  */
 export class NumberField {
   readonly element: HTMLElement;
@@ -45,7 +45,7 @@ export class NumberField {
     this.input.addEventListener("focus", () => this.input.select());
   }
 
-  /** Shows a value, unless another one is being typed. */
+  /** Shows a value unless the user is typing. */
   set(value: number | null | undefined, placeholder = ""): void {
     this.value = value ?? null;
     this.input.placeholder = placeholder;
@@ -73,7 +73,7 @@ export class NumberField {
     this.options.change(value);
   }
 
-  /** What is wrong with a number that was typed. */
+  /** The problem of a typed number. */
   private wrong(text: string, value: number | null): string {
     const { low = -Infinity, high = Infinity, optional } = this.options;
     if (value === null) return optional ? "" : "must be a number";

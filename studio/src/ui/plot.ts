@@ -22,16 +22,16 @@ export interface Strip {
 
 const margin = { left: 62, right: 10, top: 4, bottom: 18 };
 
-/** Curves over one axis of time, in strips one below the other; drawn when something changes, at no other time. */
+/** Curves over a common time axis, in strips one below the other; drawn only after changes. */
 export class TimePlot {
   readonly canvas: HTMLCanvasElement;
   strips: Strip[] = [];
   from = 0;
   to = 1e9;
-  /** Spans that are marked behind the curves. */
+  /** Time spans marked in the background. */
   shaded: { from: number; to: number }[] = [];
   playhead: number | null = null;
-  /** Draws more on top: marks, windows. */
+  /** Draws marks and windows on top. */
   decorate: (pen: CanvasRenderingContext2D) => void = () => undefined;
   private scheduled = false;
   private background: HTMLCanvasElement = document.createElement("canvas");
@@ -72,7 +72,7 @@ export class TimePlot {
     this.invalidate();
   }
 
-  /** Only the playhead or what decorates has changed. */
+  /** Only the playhead or the decoration has changed. */
   invalidate(): void {
     if (this.scheduled) return;
     this.scheduled = true;

@@ -1,14 +1,14 @@
 import { typing } from "./dom.ts";
 
 export interface Shortcut {
-  /** As it is shown: "Ctrl+Z", "W A S D". */
+  /** Displayed text: "Ctrl+Z", "W A S D". */
   keys: string;
   help: string;
-  /** Where it works; shown as heading. */
+  /** The place where it works; shown as heading. */
   group: string;
-  /** Answers whether it took the event; shortcuts that a part of the page handles itself have none. */
+  /** Returns whether it handled the event; missing for shortcuts that a part of the page handles itself. */
   act?: (event: KeyboardEvent) => boolean | void;
-  /** Works in fields too. */
+  /** Whether it also works in fields. */
   always?: boolean;
 }
 

@@ -1,4 +1,4 @@
-/** A value that tells who listens when it changes. */
+/** A value that notifies listeners of changes. */
 export class Signal<T> {
   private listeners = new Set<(value: T) => void>();
   constructor(private current: T) {}
@@ -13,12 +13,12 @@ export class Signal<T> {
     this.notify();
   }
 
-  /** For values that were changed in place. */
+  /** Notifies after a change in place. */
   notify(): void {
     for (const listener of [...this.listeners]) listener(this.current);
   }
 
-  /** Calls the listener now and at every change, until what is returned is called. */
+  /** Calls the listener now and at every change, until the returned function is called. */
   watch(listener: (value: T) => void): () => void {
     const stop = this.listen(listener);
     listener(this.current);

@@ -5,7 +5,7 @@ export interface Message {
   bad: boolean;
 }
 
-/** The last thing worth saying, in the status line. */
+/** The latest message in the status line. */
 export const message = new Signal<Message>({ text: "", bad: false });
 
 export function say(text: string): void {

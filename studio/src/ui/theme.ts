@@ -5,7 +5,7 @@ const preference = matchMedia("(prefers-color-scheme: light)");
 const stored = () => localStorage.getItem("esim-studio-theme") as Theme | null;
 const current = (): Theme => stored() ?? (preference.matches ? "light" : "dark");
 
-/** The theme in use: the system's until the user chooses. */
+/** The current theme: the system's until the user chooses one. */
 export const theme = new Signal<Theme>(current());
 
 theme.watch((name) => (document.documentElement.dataset["theme"] = name));

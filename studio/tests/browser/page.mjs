@@ -88,6 +88,6 @@ export const differing = (page, picture, other) =>
     [picture.toString("base64"), Array.isArray(other) ? other : other.toString("base64")],
   );
 
-/** Loads the page anew at a place. */
+/** Reloads the page at a place. */
 let visits = 0;
 export const visit = (page, server, hash) => page.goto(`http://127.0.0.1:${server.port}/?visit=${++visits}${hash}`);

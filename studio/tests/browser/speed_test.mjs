@@ -137,7 +137,7 @@ test("half a million triangles: flown through in few, rested on in all, picked e
   await page.mouse.click(box.x + 0.4 * box.width, box.y + 0.95 * box.height);
   await page.keyboard.up("w");
   expectQuick(context, rate > 5, `${rate.toFixed(1)} frames/s while flying, of ${drawn / 3} triangles`);
-  await until(async () => (await rows(page).count()) === 3, "a way point");
+  await until(async () => (await rows(page).count()) === 3, "a waypoint");
   const yaml = await until(async () => {
     const text = await page.locator(".yaml-editor textarea").inputValue();
     return text.split("look_at").length === 4 ? text : null;

@@ -71,7 +71,7 @@ test("times and speeds exclude each other", () => {
   );
 });
 
-test("a motion of another kind is replaced as a whole, one of way points only in its points", () => {
+test("a motion of another kind is replaced as a whole, one of waypoints only in its points", () => {
   const other = { trajectory: { type: "file", path: "a.txt" } };
   assert.equal(waypointsIn(other, null), null);
   let values = other as Parameters<typeof waypointsIn>[0];

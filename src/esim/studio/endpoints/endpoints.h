@@ -9,7 +9,7 @@
 
 namespace esim::studio {
 
-/// What the requests work on.
+/// The state on which requests work.
 struct Workshop {
   const Roots& roots;
   SceneStore& scenes;
@@ -17,7 +17,7 @@ struct Workshop {
   Recordings& recordings;
 };
 
-// Each adds the routes of its topic; docs/studio.md has the table.
+// Each function adds the routes of its topic; docs/studio-api.md lists them.
 void add_files(Router& router, const Roots& roots, const StudioOptions& options);
 void add_pages(Router& router, const std::filesystem::path& folder);
 void add_scenarios(Router& router, const Roots& roots);

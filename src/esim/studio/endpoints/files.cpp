@@ -61,7 +61,7 @@ void add_files(Router& router, const Roots& roots, const StudioOptions& options)
     while (name.ends_with('/')) name.pop_back();
     const fs::path folder = roots.existing(name);
     std::error_code error;
-    if (!fs::is_directory(folder, error)) throw HttpError(400, name + ": is no folder");
+    if (!fs::is_directory(folder, error)) throw HttpError(400, name + ": must be a folder");
     return json_response(list(roots, folder, name));
   });
 }

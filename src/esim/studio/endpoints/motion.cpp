@@ -20,7 +20,7 @@ std::vector<TimeNs> even_times(const TimeSpan& span, int count) {
   return times;
 }
 
-/// The way points with the poses and the times that the motion gives them; null where it has none.
+/// The waypoints with their poses and times in the motion; null if the motion has none.
 Json waypoints_json(const Scenario& scenario, const CameraInfo& camera) {
   const auto* const options = std::get_if<WaypointTrajectoryOptions>(&scenario.trajectory);
   if (options == nullptr) return nullptr;

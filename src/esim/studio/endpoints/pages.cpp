@@ -10,8 +10,7 @@ void add_pages(Router& router, const std::filesystem::path& folder) {
     const std::string& root = page.list().front().name;
     const std::filesystem::path file = page.existing(root + (request.path == "/" ? "/index.html" : request.path));
     std::error_code error;
-    if (!std::filesystem::is_regular_file(file, error))
-      throw HttpError(404, request.path + ": there is no such address");
+    if (!std::filesystem::is_regular_file(file, error)) throw HttpError(404, request.path + ": no such address");
     std::ifstream stream(file, std::ios::binary);
     Response response;
     response.content_type = content_type_of(file.filename().string());

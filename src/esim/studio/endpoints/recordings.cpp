@@ -20,7 +20,7 @@ std::string text_in(const Request& request, const char* name, const std::string&
   return found == request.query.end() ? otherwise : found->second;
 }
 
-/// A whole number of the query; what a page makes of a fraction is cut off.
+/// A whole number of the query; fractions are truncated.
 std::int64_t number_in(const Request& request, const char* name, std::int64_t otherwise, std::int64_t low,
                        std::int64_t high) {
   const auto found = request.query.find(name);
@@ -28,7 +28,7 @@ std::int64_t number_in(const Request& request, const char* name, std::int64_t ot
   char* end = nullptr;
   const double value = std::strtod(found->second.c_str(), &end);
   if (end != found->second.c_str() + found->second.size() || !(std::abs(value) < 9e18))
-    throw HttpError(400, fmt::format("{}: '{}' is no number", name, found->second));
+    throw HttpError(400, fmt::format("{}: must be a number, not '{}'", name, found->second));
   return std::clamp(static_cast<std::int64_t>(value), low, high);
 }
 
@@ -84,7 +84,7 @@ Json recording_json(const std::string& id, const std::string& path, const OpenRe
   return json;
 }
 
-/// The file of the last image at or before `t`, or of the first; null where there is none.
+/// The file of the last image at or before `t`, or of the first; null without images.
 const TimedFile* image_at(const CameraView& camera, TimeNs t) {
   if (camera.images.empty()) return nullptr;
   const auto later = std::upper_bound(camera.images.begin(), camera.images.end(), t,
@@ -92,15 +92,15 @@ const TimedFile* image_at(const CameraView& camera, TimeNs t) {
   return later == camera.images.begin() ? &camera.images.front() : &*std::prev(later);
 }
 
-/// What is behind the events where there is no image.
+/// The background of the events without an image.
 Rgb ground_in(const Request& request) {
   const std::string theme = text_in(request, "theme", "dark");
   if (theme != "dark" && theme != "light")
-    throw HttpError(400, fmt::format("theme: '{}' is none of dark, light", theme));
+    throw HttpError(400, fmt::format("theme: must be dark or light, not '{}'", theme));
   return (theme == "light" ? kLightTheme : kDarkTheme).ground;
 }
 
-/// What is behind the events: the image, or the ground.
+/// The background of the events: the image, or a plain colour.
 Image<Rgb> background_of(const Request& request, const Asked& asked, const CameraView& camera, TimeNs t) {
   const Camera& model = camera.info.model;
   const TimedFile* const file = text_in(request, "over", "none") == "image" ? image_at(camera, t) : nullptr;
@@ -143,7 +143,7 @@ Response picture(const Request& request, const Asked& asked) {
     const EventCounts counts = count_events(events, grid);
     image = render_events(counts.on, counts.off, background_of(request, asked, camera, t));
   } else {
-    throw HttpError(400, fmt::format("view: '{}' is none of onoff, counts, time_surface", view));
+    throw HttpError(400, fmt::format("view: must be one of onoff, counts, time_surface, not '{}'", view));
   }
   Response response = png_response(encode_png(image));
   response.headers = {{"X-Events", std::to_string(events.size())}};
@@ -170,7 +170,7 @@ Response image(const Request& request, const Asked& asked) {
     response = png_response(encode_png(truth->first));
     seen = truth->second;
   } else {
-    throw HttpError(400, fmt::format("kind: '{}' is none of image, depth, flow", kind));
+    throw HttpError(400, fmt::format("kind: must be one of image, depth, flow, not '{}'", kind));
   }
   response.headers = {{"X-Time-Ns", std::to_string(seen)}};
   return response;
@@ -182,7 +182,7 @@ void put(std::string& bytes, std::uint64_t value, int count) {
 
 Response events(const Request& request, const Asked& asked) {
   constexpr std::int64_t kMostEvents = 500'000;
-  constexpr TimeNs kLongest = 0xffff'ffff;  // ns from the beginning, in 32 bits
+  constexpr TimeNs kLongest = 0xffff'ffff;  // ns from the start, in 32 bits
   const CameraView& camera = camera_in(request, asked);
   const EventStore& store = events_of(camera);
   const TimeNs from = number_in(request, "from", asked.view->span().start, -kMostTime, kMostTime);
@@ -221,7 +221,7 @@ Response rate(const Request& request, const Asked& asked) {
   return json_response({{"edges", counted.edges}, {"on", on}, {"off", off}});
 }
 
-/// The records from one time to another.
+/// The records between two times.
 template <typename T>
 std::span<const T> part_of(const std::vector<T>& records, const Request& request, const TimeSpan& span) {
   const TimeNs from = number_in(request, "from", span.start, -kMostTime, kMostTime);
@@ -235,8 +235,8 @@ std::size_t most_in(const Request& request) {
   return static_cast<std::size_t>(number_in(request, "max", 2000, 1, 100'000));
 }
 
-/// What is drawn in place of more than `most` measurements: of each stretch of them the least of every axis, at its
-/// beginning, and the greatest, at its end. Some picked out of them would show vibrations slower than they are.
+/// Reduces more than `most` measurements for drawing: from each interval, the minimum of every axis, at its start, and
+/// the maximum, at its end. Mere subsampling would alias vibrations.
 std::vector<ImuRecord> envelope(std::span<const ImuRecord> records, std::size_t most) {
   if (records.size() <= most) return {records.begin(), records.end()};
   const std::size_t stretches = std::max<std::size_t>(1, most / 2);

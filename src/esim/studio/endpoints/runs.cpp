@@ -25,7 +25,7 @@ Json progress_json(const RunStatus& run) {
           {"left_s", share > 0 ? Json(p.wall_seconds * (1 - share) / share) : Json()}};
 }
 
-/// What went wrong, and the option that it is about; nothing where nothing went wrong.
+/// The error and its option; empty without an error.
 Json error_json(const RunStatus& run) {
   Json json = Json::object();
   if (!run.error.empty()) json["error"] = run.error;
@@ -80,7 +80,7 @@ int id_of(const Request& request) {
 
 RunStatus run_of(const Request& request, const Runs& runs) {
   const auto run = runs.find(id_of(request));
-  if (!run) throw HttpError(404, request.path + ": there is no such run");
+  if (!run) throw HttpError(404, request.path + ": no such run");
   return *run;
 }
 
@@ -88,7 +88,7 @@ std::string message(const char* event, const Json& data) {
   return fmt::format("event: {}\ndata: {}\n\n", event, text_of(data));
 }
 
-/// The state at first, then what changes, until the run is over.
+/// First the state, then changes, until the run ends.
 Response stream(const Request& request, const Workshop& workshop) {
   const int id = run_of(request, workshop.runs).id;
   struct Sent {
@@ -136,12 +136,12 @@ void add_runs(Router& router, const Workshop& workshop) {
   router.add("GET", "/api/runs/*/stream", [workshop](const Request& request) { return stream(request, workshop); });
   router.add("GET", "/api/runs/*/picture.png", [workshop](const Request& request) {
     std::string png = workshop.runs.picture(run_of(request, workshop.runs).id);
-    if (png.empty()) throw HttpError(404, "there is no picture yet");
+    if (png.empty()) throw HttpError(404, "there is no image yet");
     return png_response(std::move(png));
   });
   router.add("DELETE", "/api/runs/*", [workshop](const Request& request) {
     const RunStatus run = run_of(request, workshop.runs);
-    if (!workshop.runs.cancel(run.id)) throw HttpError(409, fmt::format("run {} is over already", run.id));
+    if (!workshop.runs.cancel(run.id)) throw HttpError(409, fmt::format("run {} has already ended", run.id));
     return json_response(run_json(*workshop.runs.find(run.id), workshop.roots));
   });
 }

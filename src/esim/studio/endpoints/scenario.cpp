@@ -20,21 +20,22 @@ constexpr std::uintmax_t kMostBytes = std::uintmax_t{8} << 20;
 std::string read(const fs::path& file, const std::string& name) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) throw HttpError(404, name + ": no such file");
-  if (fs::file_size(file, error) > kMostBytes) throw HttpError(413, name + ": is too large for a scenario");
+  if (fs::file_size(file, error) > kMostBytes)
+    throw HttpError(413, name + ": is too large; a scenario must have at most 8 MiB");
   std::ifstream stream(file, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(stream), {}};
   if (!stream) throw UserError(name + ": cannot be read; check its permissions");
   return text;
 }
 
-/// FNV-1a: the same for the same bytes, and for others practically never.
+/// The FNV-1a hash of a text.
 std::string revision_of(const std::string& text) {
   std::uint64_t hash = 0xcbf29ce484222325U;
   for (const unsigned char byte : text) hash = (hash ^ byte) * 0x100000001b3U;
   return fmt::format("{:016x}-{}", hash, text.size());
 }
 
-/// {yaml, values, problems}, also of what is no YAML.
+/// {yaml, values, problems}, also for invalid YAML.
 Json checked(const std::string& yaml, const fs::path& file, const Roots& roots) {
   Json answer{{"yaml", yaml}, {"values", Json::object()}, {"problems", Json::array()}};
   try {
@@ -57,13 +58,13 @@ std::string new_scenario(const std::string& scene) {
 }
 
 Response save(const Json& request, const Roots& roots) {
-  static std::mutex one_at_a_time;  // between looking and writing
+  static std::mutex one_at_a_time;  // from the check to the end of writing
   const std::string path = text_member(request, "path"), yaml = text_member(request, "yaml");
   const std::string extension = fs::path(path).extension().string();
-  if (extension != ".yaml" && extension != ".yml") throw HttpError(400, path + ": give it a name that ends in .yaml");
+  if (extension != ".yaml" && extension != ".yml") throw HttpError(400, path + ": must end in .yaml");
   const fs::path file = roots.resolve(path);
   std::error_code error;
-  if (!fs::is_directory(file.parent_path(), error)) throw HttpError(404, path + ": there is no such folder");
+  if (!fs::is_directory(file.parent_path(), error)) throw HttpError(404, path + ": its folder does not exist");
   const auto known = request.find("revision");
   const bool is_new = known == request.end() || known->is_null();
 
@@ -74,8 +75,8 @@ Response save(const Json& request, const Roots& roots) {
     const std::string revision = exists ? revision_of(there) : "";
     if (is_new || text_member(request, "revision") != revision) {
       Json conflict{{"error", is_new   ? path + ": exists already; replace it, or choose another name"
-                              : exists ? path + ": was changed meanwhile, by another window or program"
-                                       : path + ": was removed meanwhile"},
+                              : exists ? path + ": has been changed by another window or program"
+                                       : path + ": has been removed"},
                     {"yaml", there},
                     {"revision", revision}};
       Response response = json_response(conflict);
@@ -83,7 +84,7 @@ Response save(const Json& request, const Roots& roots) {
       return response;
     }
   }
-  // What is written first has a name of its own, which may be a link to elsewhere.
+  // The temporary file has another name, which may be a link to elsewhere.
   const fs::path temporary = fs::path(file) += ".tmp";
   fs::remove(temporary, error);
   try {
@@ -107,7 +108,7 @@ void add_scenarios(Router& router, const Roots& roots) {
   router.add("GET", "/api/presets", [](const Request&) { return json_response(presets_json()); });
   router.add("GET", "/api/scenario", [&roots](const Request& request) {
     const auto path = request.query.find("path");
-    if (path == request.query.end()) throw HttpError(400, "the request lacks path");
+    if (path == request.query.end()) throw HttpError(400, "path: is missing");
     const fs::path file = roots.existing(path->second);
     const std::string yaml = read(file, path->second);
     Json answer{{"path", path->second}};
@@ -132,9 +133,9 @@ void add_scenarios(Router& router, const Roots& roots) {
     const Json body = parse_object(request.body);
     std::string yaml = text_member(body, "yaml");
     const auto changes = body.find("set");
-    if (changes == body.end() || !changes->is_array()) throw HttpError(400, "the request lacks the list set");
+    if (changes == body.end() || !changes->is_array()) throw HttpError(400, "set: must be a list");
     for (const Json& change : *changes) {
-      if (!change.is_object() || !change.contains("value")) throw HttpError(400, "set: wants {where, value}");
+      if (!change.is_object() || !change.contains("value")) throw HttpError(400, "set: entries must be {where, value}");
       yaml = with_option(yaml, text_member(change, "where"), change["value"]);
     }
     return json_response(checked(yaml, place_of(body, roots), roots));

@@ -11,7 +11,7 @@
 namespace esim::studio {
 namespace {
 
-constexpr const char* kForgotten = "this scene has been forgotten; ask for it anew";
+constexpr const char* kForgotten = "this scene is no longer loaded; reload the page";
 constexpr const char* kKept = "private, max-age=3600";
 
 Json bounds_of(const Scene& scene) {
@@ -27,7 +27,7 @@ Json bounds_of(const Scene& scene) {
   return {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
 }
 
-/// What kind of scene it is, and how a panorama or a plane lies in the world.
+/// The kind of scene, and the pose of a panorama or a plane in the world.
 void describe_kind(const RendererOptions& renderer, const StudioScene& scene, Json& answer) {
   struct Visit {
     const StudioScene& scene;
@@ -72,7 +72,7 @@ Json cameras_json(const std::vector<CameraInfo>& cameras) {
   return all;
 }
 
-/// Of another program that renders, nothing is known before it does.
+/// The answer for a scene in another program, about which nothing is known before rendering.
 Json engine_json(const Scenario& scenario) {
   return {{"kind", "engine"},        {"glb", nullptr},    {"texture", nullptr},
           {"triangles", 0},          {"bounds", nullptr}, {"cameras", cameras_json(cameras_of(scenario, {}))},
@@ -115,12 +115,12 @@ Response scene_file(const Request& request, SceneStore& scenes) {
   } else if (name.ends_with(".jpg") && scene->texture()) {
     response.body = *scene->texture();
   } else {
-    throw HttpError(404, request.path + ": there is no such file");
+    throw HttpError(404, request.path + ": no such file");
   }
   return response;
 }
 
-/// A texture of a mesh, whole.
+/// A texture of a mesh in full resolution.
 Response scene_image(const Request& request, SceneStore& scenes) {
   const auto scene = scenes.find(request.captured[0]);
   if (scene == nullptr) throw HttpError(404, kForgotten);
@@ -129,7 +129,7 @@ Response scene_image(const Request& request, SceneStore& scenes) {
   const auto [end, failure] = std::from_chars(number.data(), number.data() + number.size(), index);
   const bool is_number = failure == std::errc() && end == number.data() + number.size();
   const auto image = is_number ? scene->image(index) : nullptr;
-  if (image == nullptr) throw HttpError(404, request.path + ": there is no such texture");
+  if (image == nullptr) throw HttpError(404, request.path + ": no such texture");
   Response response;
   response.content_type = image->type;
   response.headers = {{"Cache-Control", kKept}};
@@ -151,16 +151,16 @@ SE3 pose_in(const Json& numbers) {
   return {q.normalized(), {p[0], p[1], p[2]}};
 }
 
-/// The camera that a request names, or the first.
+/// The camera of a request; by default the first.
 CameraInfo camera_in(const Json& request, const std::vector<CameraInfo>& cameras) {
   const std::string name = text_member(request, "camera", cameras.front().name);
   for (const CameraInfo& camera : cameras) {
     if (camera.name == name) return camera;
   }
-  throw HttpError(400, name + ": the rig has no camera of that name");
+  throw HttpError(400, name + ": the rig has no camera with this name");
 }
 
-/// What a camera sees at a time of the motion, or from a pose of its own.
+/// The image of a camera at a time of the motion, or from a given pose.
 Response view(const Json& request, const Workshop& workshop) {
   constexpr double kMostPixels = 4096, kMostTime_ns = 9e15;
   const bool free = request.contains("pose") && !request["pose"].is_null();

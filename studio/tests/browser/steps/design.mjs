@@ -5,12 +5,12 @@ import { until } from "../harness.mjs";
 import { clock, cramped, differing, place, press, rows, shot, stage, yaml } from "../page.mjs";
 import { main, read } from "../session.mjs";
 
-test("fly, and drop four way points by clicking", async () => {
+test("fly, and drop four waypoints by clicking", async () => {
   const { page } = main;
   const box = await stage(page).boundingBox();
   for (let i = 0; i < 4; ++i) {
     await page.mouse.click(box.x + (0.35 + 0.05 * i) * box.width, box.y + 0.45 * box.height);
-    await until(async () => (await rows(page).count()) === i + 1, `way point ${i + 1}`);
+    await until(async () => (await rows(page).count()) === i + 1, `waypoint ${i + 1}`);
     await press(page, i % 2 ? "a" : "w", 250);
   }
   await until(async () => / of /.test(await clock(page).textContent()), "a flight");
@@ -38,9 +38,9 @@ test("drag to look, wheel, orbit and pan move the view without dropping anything
 test("times are edited, undone and redone", async () => {
   const { page } = main;
   await page.getByRole("radio", { name: "Times" }).click();
-  const third = page.getByLabel("Time of way point 3, seconds");
+  const third = page.getByLabel("Time of waypoint 3, seconds");
   await until(async () => Number(await third.inputValue()) > 0 && (await third.isEnabled()), "times");
-  const timeOf = async (i) => Number(await page.getByLabel(`Time of way point ${i}, seconds`).inputValue());
+  const timeOf = async (i) => Number(await page.getByLabel(`Time of waypoint ${i}, seconds`).inputValue());
   const original = await third.inputValue();
   const wanted = String(Number((0.3 * (await timeOf(2)) + 0.7 * (await timeOf(4))).toFixed(3)));
   await third.fill(wanted);
@@ -55,7 +55,7 @@ test("times are edited, undone and redone", async () => {
   await until(async () => (await third.inputValue()) === original, "undo again");
 });
 
-test("a way point is moved by its handles, reordered and removed", async () => {
+test("a waypoint is moved by its handles, reordered and removed", async () => {
   const { page } = main;
   await rows(page).nth(1).click();
   const x = page.getByLabel("Position x, metres");

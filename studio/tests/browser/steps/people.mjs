@@ -26,11 +26,11 @@ test("by keyboard alone: fly, drop, save, run", async () => {
   await page.keyboard.press("v");
   assert.equal(await stage(page).evaluate((element) => element === document.activeElement), true);
   await page.keyboard.press("Space");
-  await until(async () => (await rows(page).count()) === 1, "the first way point");
+  await until(async () => (await rows(page).count()) === 1, "the first waypoint");
   await press(page, "w", 500);
   await press(page, "ArrowRight", 200);
   await page.keyboard.press("Space");
-  await until(async () => (await rows(page).count()) === 2, "the second way point");
+  await until(async () => (await rows(page).count()) === 2, "the second waypoint");
   await until(async () => / of /.test(await clock(page).textContent()), "a flight");
 
   // Every stop of the Tab key is seen and has a name.
@@ -53,7 +53,7 @@ test("by keyboard alone: fly, drop, save, run", async () => {
     assert.ok(stop.outline, `focus is not seen: ${stop.what}`);
     stops.add(stop.name);
   }
-  assert.ok([...stops].some((name) => /Way points\. Enter/.test(name)) && stops.size > 12, [...stops].join(" | "));
+  assert.ok([...stops].some((name) => /Waypoints\. Enter/.test(name)) && stops.size > 12, [...stops].join(" | "));
 
   await page.keyboard.press("Control+s");
   await until(async () => !(await page.title()).startsWith("•"), "saving");

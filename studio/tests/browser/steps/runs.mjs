@@ -59,7 +59,7 @@ test("a run is cancelled: what there is of it is kept, shown as cut short, and c
   const out = join(files.folder, "out/long");
   await page.getByRole("button", { name: "Cancel the run" }).click();
   await until(async () => /cancelled/.test(await figures(page)), "the end of the run");
-  const kept = /what was simulated is kept: project\/out\/long/;
+  const kept = /the simulated part is kept: project\/out\/long/;
   await until(async () => kept.test(await page.locator(".status .message").textContent()), "what is said of it");
   assert.ok(await page.getByRole("button", { name: "Cancel the run" }).isDisabled());
   assert.match(read("out/long/report.json"), /"interrupted"/);

@@ -39,17 +39,17 @@ async function design(name) {
   return state.page;
 }
 
-/** Where the view is: a way point is dropped there, and taken back. */
+/** Where the view is: a waypoint is dropped there, and taken back. */
 async function standpoint(page) {
   await stage(page).focus();
   await page.keyboard.press("Space");
-  const there = await until(async () => position(/points:[\s\S]*/.exec(await yaml(page))?.[0] ?? ""), "a way point");
+  const there = await until(async () => position(/points:[\s\S]*/.exec(await yaml(page))?.[0] ?? ""), "a waypoint");
   await page.keyboard.press("Control+z");
   await until(async () => (await rows(page).count()) === 0, "undo");
   return there;
 }
 
-test("an object moves by way points of its own: dropped, drawn, flown and saved", async () => {
+test("an object moves by waypoints of its own: dropped, drawn, flown and saved", async () => {
   write(
     "moving.yaml",
     `${room}  objects:\n  - {name: ball, scene: ball.glb, trajectory: {type: static, pose: {position: [0, 0, 0.2]}}}\ntrajectory: {type: static, pose: {position: [-1.5, 0, 1.5], look_at: [1, 0, 0]}}\nduration_s: 2\n${camera}`,
@@ -61,12 +61,12 @@ test("an object moves by way points of its own: dropped, drawn, flown and saved"
   const box = await stage(page).boundingBox();
   for (const [i, x] of [0.3, 0.5].entries()) {
     await page.mouse.click(box.x + x * box.width, box.y + 0.8 * box.height);
-    await until(async () => (await rows(page).count()) === i + 1, `way point ${i + 1} of the ball`);
+    await until(async () => (await rows(page).count()) === i + 1, `waypoint ${i + 1} of the ball`);
   }
   const text = await until(async () => {
     const now = await yaml(page);
     return /name: ball[\s\S]*type: waypoints[\s\S]*position:[\s\S]*position:/.test(now) && now;
-  }, "the ball's way points in the text");
+  }, "the ball's waypoints in the text");
   assert.match(text, /^trajectory: *\{type: static/m, "the camera's own motion stays");
   // It is to fly for as long as is simulated.
   await until(
@@ -74,14 +74,14 @@ test("an object moves by way points of its own: dropped, drawn, flown and saved"
     "what is missing",
   );
   await page.getByRole("radio", { name: "Times" }).click();
-  const arrival = page.getByLabel("Time of way point 2, seconds");
+  const arrival = page.getByLabel("Time of waypoint 2, seconds");
   await until(async () => await arrival.isEnabled(), "times");
   await arrival.fill("2");
   await arrival.press("Enter");
   await until(async () => / of /.test(await clock(page).textContent()), "the flight again");
   await page.locator(".timeline .plot").press("Home");
   const start = await pictureOf(page);
-  assert.ok((await differing(page, bare, start)) > 0.001, "way points and path are drawn");
+  assert.ok((await differing(page, bare, start)) > 0.001, "waypoints and path are drawn");
   await shot(page, "moving-dark");
   await page.emulateMedia({ colorScheme: "light" });
   await page.waitForTimeout(400);
@@ -105,7 +105,7 @@ test("an object moves by way points of its own: dropped, drawn, flown and saved"
 test("the flight of a file becomes waypoints, the selected one with its handles", async () => {
   const page = await design("room.yaml");
   await until(async () => / of /.test(await clock(page).textContent()), "the flight");
-  await page.getByRole("button", { name: "Make way points of it" }).click();
+  await page.getByRole("button", { name: "Convert it to waypoints" }).click();
   await until(async () => (await rows(page).count()) === 11, "a waypoint every half second");
   await rows(page).nth(4).click();
   await until(async () => /^2\.000/.test(await clock(page).textContent()), "the time of the fifth");

@@ -60,10 +60,10 @@ Response start(const Json& request, const Workshop& workshop) {
   std::error_code error;
   const bool running = workshop.runs.writes_to(out);
   if (running || (fs::exists(out, error) && !replace)) {
-    Response response = json_response(
-        {{"error", out_name + (running ? ": a run is writing there; cancel it, or choose another name"
-                                       : ": exists already; replace it, or choose another name")},
-         {"running", running}});
+    Response response =
+        json_response({{"error", out_name + (running ? ": a run is writing there; cancel it, or choose another name"
+                                                     : ": exists already; replace it, or choose another name")},
+                       {"running", running}});
     response.status = 409;
     return response;
   }
@@ -136,7 +136,7 @@ void add_runs(Router& router, const Workshop& workshop) {
   router.add("GET", "/api/runs/*/stream", [workshop](const Request& request) { return stream(request, workshop); });
   router.add("GET", "/api/runs/*/picture.png", [workshop](const Request& request) {
     std::string png = workshop.runs.picture(run_of(request, workshop.runs).id);
-    if (png.empty()) throw HttpError(404, "there is no image yet");
+    if (png.empty()) throw HttpError(404, "no image yet");
     return png_response(std::move(png));
   });
   router.add("DELETE", "/api/runs/*", [workshop](const Request& request) {

@@ -24,7 +24,7 @@ SIZES = ((346, 260), (1280, 720))
 
 
 def run(*command):
-    """Its standard output. Exits with its errors where it fails."""
+    """The standard output of a command. Exits with its errors if it fails."""
     result = subprocess.run([str(part) for part in command], capture_output=True, text=True)
     if result.returncode != 0:
         sys.exit(f"compare_engines.py: {command[0]} failed:\n{result.stderr or result.stdout}")
@@ -32,14 +32,14 @@ def run(*command):
 
 
 def opengl_device(esim, engine):
-    """What `engine` renders with OpenGL on; None where it chooses the ray caster."""
+    """The OpenGL device of `engine`; None if it chooses the ray caster."""
     found = re.search(r"renderer mesh on OpenGL, (.*), \w+ sampling$",
                       run(esim, "check", SCENES / "room.yaml", "--set", f"renderer.engine={engine}"), re.MULTILINE)
     return found and found[1]
 
 
 def processor():
-    """Its name, where the system tells."""
+    """The name of the processor, if known."""
     try:
         found = re.search(r"^model name\s*: (.*)$", pathlib.Path("/proc/cpuinfo").read_text(), re.MULTILINE)
     except OSError:
@@ -91,7 +91,7 @@ def simulation_table(esim, duration_s, runs):
     for scenario in SCENARIOS:
         for size in SIZES:
             results = {engine: [] for engine in ENGINES}
-            for _ in range(runs):  # in turns, so that what else the machine does meets both
+            for _ in range(runs):  # alternately, so that other load affects both
                 for engine in ENGINES:
                     results[engine].append(simulate(esim, scenario, size, engine, duration_s))
             median = {engine: [statistics.median(column) for column in zip(*results[engine])] for engine in ENGINES}
@@ -104,10 +104,10 @@ def simulation_table(esim, duration_s, runs):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("build", type=pathlib.Path, help="folder of a build with ESIM_BENCHMARKS=ON")
-    parser.add_argument("--runs", type=int, default=3, help="of everything; medians are printed (default: 3)")
-    parser.add_argument("--seconds", type=float, default=1.0, help="of each run of a single frame (default: 1)")
-    parser.add_argument("--duration-s", type=float, default=1.0, help="simulated by each whole simulation (default: 1)")
-    parser.add_argument("--software", action="store_true", help="measure OpenGL in software, too, where there is no card")
+    parser.add_argument("--runs", type=int, default=3, help="number of runs of each measurement; medians are printed (default: 3)")
+    parser.add_argument("--seconds", type=float, default=1.0, help="duration of each run of single frames (default: 1)")
+    parser.add_argument("--duration-s", type=float, default=1.0, help="simulated time of each simulation (default: 1)")
+    parser.add_argument("--software", action="store_true", help="measure OpenGL in software if there is no graphics card")
     options = parser.parse_args()
     if options.runs < 1 or not options.seconds > 0 or not options.duration_s > 0:
         parser.error("--runs must be at least 1; --seconds and --duration-s must be above 0")

@@ -80,7 +80,7 @@ void raycast(benchmark::State& state, const View& view, const Camera& camera) {
 }
 
 void gl(benchmark::State& state, const View& view, const Camera& camera) {
-  if (!test::has_gl()) return state.SkipWithError("there is no OpenGL");
+  if (!test::has_gl()) return state.SkipWithError("OpenGL is not available");
   const auto renderer = make_gl_renderer(prepared(view).scene, {.samples_per_pixel = kSamplesPerPixel}, camera);
   state.SetLabel(renderer->traits().device);
   bench::render_frames(state, *renderer, camera, motion_from(view.T_world_camera));

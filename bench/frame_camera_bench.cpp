@@ -1,4 +1,4 @@
-// Frames beside events, from the same samples on one thread: 4,000 samples per second, 25 frames per second of 20 ms
+// Frames and events from the same samples on one thread: 4,000 samples per second, 25 frames per second of 20 ms
 // each. Arguments: width, height, noise or none. "ns/px" is of the frame camera, per pixel and sample; "share" is its
 // time over that of the event camera.
 #include <benchmark/benchmark.h>

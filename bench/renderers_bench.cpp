@@ -39,7 +39,7 @@ void sprites(benchmark::State& state) {
 }
 
 void mesh_file(benchmark::State& state, const std::filesystem::path& file, const Eigen::Vector3d& position) {
-  if (!std::filesystem::exists(file)) return state.SkipWithError("the scene is not there");
+  if (!std::filesystem::exists(file)) return state.SkipWithError("the scene file is missing");
   const Workers workers(static_cast<int>(state.range(0)));
   const auto scene = build_raycast_scene(still_scene(load_mesh(file, [](const std::string&) {})));
   Kinematics camera = test::moving_camera();
@@ -83,7 +83,7 @@ void generated_room(benchmark::State& state) {
 
 /// The same with OpenGL, whatever device there is. Arguments: triangles in thousands, tiles.
 void generated_room_gl(benchmark::State& state) {
-  if (!test::has_gl()) return state.SkipWithError("there is no OpenGL");
+  if (!test::has_gl()) return state.SkipWithError("OpenGL is not available");
   const Scene scene = still_scene(bench::generated_room(static_cast<int>(1000 * state.range(0))));
   const auto renderer = make_gl_renderer(scene, {}, kCamera);
   state.SetLabel(renderer->traits().device);
@@ -92,7 +92,7 @@ void generated_room_gl(benchmark::State& state) {
 
 /// With light and shadows; argument: what casts them, 0 nothing, 1 a sun, 2 a lamp, 3 a sun on things that move.
 void shadows_gl(benchmark::State& state) {
-  if (!test::has_gl()) return state.SkipWithError("there is no OpenGL");
+  if (!test::has_gl()) return state.SkipWithError("OpenGL is not available");
   const bool moves = state.range(0) == 3;
   Scene scene = moves ? test::moving_scene() : still_scene(bench::generated_room(10000));
   scene.lighting = Lighting{};

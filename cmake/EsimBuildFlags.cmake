@@ -1,4 +1,4 @@
-# Flags that every target of the project is compiled with, as the interface library esim_build_flags.
+# Compiler flags of all targets, as the interface library esim_build_flags.
 if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Type of build" FORCE)
 endif()
@@ -15,7 +15,7 @@ if(ESIM_WERROR)
   target_compile_options(esim_build_flags INTERFACE -Werror)
 endif()
 
-# AVX2 and FMA, where the machine that builds has them.
+# AVX2 and FMA, if the build machine supports them.
 if(ESIM_MARCH AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   include(CheckCXXSourceRuns)
   set(CMAKE_REQUIRED_QUIET ON)

@@ -1,5 +1,5 @@
-# What the libraries are made of; also read by find_package(esim). Everything comes from the packages of
-# Debian 12 and 13: scripts/setup lists them.
+# Dependencies of the libraries; also read by find_package(esim). All are packages of Debian 12 and 13, which
+# scripts/setup lists.
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(fmt 9 REQUIRED)
 find_package(Threads REQUIRED)

@@ -1,4 +1,4 @@
-# Installs the program, the libraries with their headers, and what find_package(esim) needs.
+# Installs the program, the libraries with their headers, and the files for find_package(esim).
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 

@@ -1,8 +1,8 @@
 # esim_module(NAME SOURCES a.cpp ... [DEPENDS other modules] [PUBLIC libraries] [PRIVATE libraries])
 #
-# One folder of src/esim is one static library, esim::NAME. A module sees the headers of the modules it
-# depends on and links only to them, so an include against the arrows of ARCHITECTURE.md fails to link
-# (and tests/architecture_test.py names it).
+# Each folder of src/esim is a static library, esim::NAME. A module links only to the modules that it depends
+# on, so that an include against the arrows of ARCHITECTURE.md fails to link
+# (and tests/architecture_test.py reports it).
 function(esim_module name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PUBLIC;PRIVATE" ${ARGN})
   string(REPLACE "/" "_" target ${name})

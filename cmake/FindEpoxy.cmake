@@ -1,4 +1,4 @@
-# libepoxy, which finds OpenGL and EGL while the program runs, as the imported target Epoxy::epoxy.
+# libepoxy, which loads OpenGL and EGL at run time, as the imported target Epoxy::epoxy.
 find_path(Epoxy_INCLUDE_DIR epoxy/egl.h)
 find_library(Epoxy_LIBRARY epoxy)
 include(FindPackageHandleStandardArgs)

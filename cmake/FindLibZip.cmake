@@ -1,4 +1,4 @@
-# libzip as the imported target LibZip::zip. Its own libzip-config.cmake asks for command-line tools as well.
+# libzip as the imported target LibZip::zip. Its own libzip-config.cmake also requires command-line tools.
 find_path(LibZip_INCLUDE_DIR zip.h)
 find_library(LibZip_LIBRARY zip)
 include(FindPackageHandleStandardArgs)

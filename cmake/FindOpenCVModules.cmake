@@ -1,5 +1,5 @@
-# Single modules of OpenCV as imported targets opencv_NAME. Debian's OpenCVConfig.cmake comes with the whole of OpenCV
-# only, which is an order of magnitude larger than the few modules that esim uses.
+# Single modules of OpenCV as imported targets opencv_NAME. Debian's OpenCVConfig.cmake is only in the package of
+# all of OpenCV, which is an order of magnitude larger than the few modules that esim uses.
 #
 #   find_package(OpenCVModules REQUIRED COMPONENTS core imgproc ...)
 find_path(OpenCVModules_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4)

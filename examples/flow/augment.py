@@ -1,4 +1,4 @@
-"""Turning and scaling samples about the middle of the image, flow included."""
+"""Rotates and scales samples about the image's centre, including the flow."""
 
 import math
 

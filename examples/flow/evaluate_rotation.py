@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""How well a network trained on simulated events predicts the flow of a real recording of pure rotation.
+"""Evaluates a network trained on simulated events on the optical flow of a real recording of pure rotation.
 
     evaluate_rotation.py RECORDING [--checkpoint FILE] [--out FOLDER]
 
 RECORDING is a folder in the Event Camera Dataset's layout (`boxes_rotation`, unpacked): events.txt, imu.txt, calib.txt,
-and images.txt, which tells the sensor's size. The truth is the gyroscope's: `rotation_truth`. Without a checkpoint, the
-error of predicting no motion at all is what it says. See docs/methods/learning.md.
+and images.txt, which gives the sensor's size. The truth comes from the gyroscope: `rotation_truth`. Without a
+checkpoint, it reports the error of predicting no motion. See docs/methods/learning.md.
 """
 
 import argparse
@@ -20,18 +20,18 @@ import numpy as np
 import esim
 from rotation_truth import Calibration, Gyroscope, parse_axes, sharpness
 
-SHARP_RAD = 0.15  # events of so long a turn at the start of a window tell whether the axes of the IMU are right
-SHARP_WINDOWS = 4  # for each axis: the fastest
+SHARP_RAD = 0.15  # events of a rotation by this angle at the start of a window test the axes of the IMU
+SHARP_WINDOWS = 4  # the fastest for each axis
 
 
 def end_point_errors(predicted, truth, fired):
-    """|predicted - truth| of the pixels where events fired and the truth is known, px: (N,)."""
+    """|predicted - truth| of the pixels with events and known truth, px: (N,)."""
     known = fired & np.isfinite(truth).all(axis=0)
     return np.linalg.norm(predicted[:, known] - truth[:, known], axis=0)
 
 
 class AxesCheck:
-    """Whether events agree with the gyroscope's axes, from the fastest turns about each."""
+    """Tests whether events agree with the gyroscope's axes, from the fastest rotations about each axis."""
 
     def __init__(self, calibration, gyroscope):
         self.calibration, self.gyroscope = calibration, gyroscope
@@ -47,8 +47,8 @@ class AxesCheck:
             self.fastest[axis] = sorted(kept, key=lambda entry: entry[:2])[-SHARP_WINDOWS:]
 
     def best(self):
-        """Of all 48 ways to name and turn around axes, the one that fits the events best, (3, 3), and how much sharper
-        the image of events is with it than with the axes as they are."""
+        """Of all 48 permutations and signs of axes, the one that fits the events best, (3, 3), and the ratio of the
+        sharpness of the image of events with it to that with the given axes."""
         windows = [window for axis in self.fastest for window in axis]
         if not windows:
             return np.eye(3), 1.0
@@ -90,7 +90,7 @@ def evaluate(events_path, calibration, gyroscope, predict=None, *, window_s=0.04
     end = int(gyroscope.t[-1]) if duration_s is None else min(int(gyroscope.t[-1]), start + round(duration_s * 1e9))
     count = (end - start) // window
     if start < gyroscope.t[0] or count < 1:
-        raise esim.Error(f"no window of {window_s:g} s lies between the start and the gyroscope's last measurement "
+        raise esim.Error(f"no window of {window_s:g} s fits between the start and the gyroscope's last measurement "
                          f"at {gyroscope.t[-1] * 1e-9:.3f} s, or it starts before its first at {gyroscope.t[0] * 1e-9:.3f} s")
     shape = calibration.width, calibration.height
     check, rows, kept = AxesCheck(calibration, gyroscope), [], []
@@ -131,7 +131,7 @@ def sensor_size(folder, given):
         return tuple(given)
     (camera,) = esim.Recording(folder).info["cameras"].values()
     if not camera["width"]:
-        raise esim.Error(f"{folder}: the sensor's size is not known, there are no images; give --size WIDTH HEIGHT")
+        raise esim.Error(f"{folder}: the sensor's size is unknown, since there are no images; give --size WIDTH HEIGHT")
     return camera["width"], camera["height"]
 
 
@@ -150,21 +150,21 @@ def three_numbers(text):
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("recording", type=pathlib.Path)
-    parser.add_argument("--checkpoint", type=pathlib.Path, help="of a trained network (train.py)")
+    parser.add_argument("--checkpoint", type=pathlib.Path, help="checkpoint of a trained network (train.py)")
     parser.add_argument("--out", type=pathlib.Path, help="folder for windows.csv, summary.json and figure.png")
-    parser.add_argument("--window-s", type=float, help="length of a window (default: the checkpoint's, or 0.04)")
-    parser.add_argument("--start-s", type=float, help="by the recording's clock (default: the first rate)")
-    parser.add_argument("--duration-s", type=float, help="default: to the last rate")
-    parser.add_argument("--size", type=int, nargs=2, metavar=("WIDTH", "HEIGHT"), help="of the sensor (default: of its images)")
+    parser.add_argument("--window-s", type=float, help="length of a window (default: from the checkpoint, or 0.04)")
+    parser.add_argument("--start-s", type=float, help="start on the recording's clock (default: the first rate)")
+    parser.add_argument("--duration-s", type=float, help="duration (default: until the last rate)")
+    parser.add_argument("--size", type=int, nargs=2, metavar=("WIDTH", "HEIGHT"), help="size of the sensor (default: that of the images)")
     parser.add_argument("--imu-axes", default="x,y,z", metavar="AXES",
-                        help="the camera's x, y and z in terms of the IMU's, like x,-y,-z, or a quaternion x,y,z,w of "
+                        help="the camera's x, y and z in IMU axes, such as x,-y,-z, or a quaternion x,y,z,w of "
                              "R_camera_imu (default: x,y,z, as for the DAVIS240C of the Event Camera Dataset)")
-    parser.add_argument("--imu-delay-s", type=float, default=0.0, help="by which the IMU's stamps are late (default: 0)")
-    parser.add_argument("--max-gap-s", type=float, default=0.02, help="longest time without a rate (default: 0.02)")
+    parser.add_argument("--imu-delay-s", type=float, default=0.0, help="delay of the IMU's time stamps (default: 0)")
+    parser.add_argument("--max-gap-s", type=float, default=0.02, help="maximum time without a rate (default: 0.02)")
     bias = parser.add_mutually_exclusive_group()
-    bias.add_argument("--bias", type=three_numbers, metavar="X,Y,Z", help="of the gyroscope, rad/s in its axes (default: none)")
+    bias.add_argument("--bias", type=three_numbers, metavar="X,Y,Z", help="bias of the gyroscope, rad/s in its axes (default: 0)")
     bias.add_argument("--still", type=float, nargs=2, metavar=("START_S", "END_S"),
-                      help="when the camera stood still: the bias is the mean rate of then")
+                      help="time in which the camera stood still, to estimate the bias")
     return parser.parse_args()
 
 
@@ -200,7 +200,7 @@ def main():
 
 
 def name_of(axes):
-    """Text for `--imu-axes`: that of the nearest axes."""
+    """The text of the nearest axes for `--imu-axes`."""
     return ",".join(("-" if row[i] < 0 else "") + "xyz"[i] for row in axes for i in [np.abs(row).argmax()])
 
 

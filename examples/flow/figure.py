@@ -1,4 +1,4 @@
-"""Pictures as in the ESIM paper's Fig. 7: what the network sees, what it predicts, and the truth."""
+"""Figures as in the ESIM paper's Fig. 7: the input of the network, its prediction, and the truth."""
 
 import csv
 
@@ -17,7 +17,7 @@ def flow_colours(flow, longest):
 
 
 def event_colours(tensor):
-    """Numbers of events of an event tensor: orange where more are ON, blue where OFF, on white."""
+    """Counts of an event tensor on white: orange for mostly ON, blue for mostly OFF."""
     on, off = (np.minimum(count / max(1.0, np.percentile(tensor[:2], 99)), 1) for count in tensor[:2])
     return np.clip(np.stack([1 - off, 1 - 0.5 * on - 0.4 * off, 1 - on], -1), 0, 1)
 

@@ -13,13 +13,13 @@ from torch.nn import functional as F
 
 import esim
 
-# Of the paper: kernel, and channels; "+": of those with a second convolution, 3 x 3 with stride 1.
+# Layers of the paper: kernel and channels; "+": with a second convolution, 3 x 3 with stride 1.
 LAYERS = ((7, 64, ""), (5, 128, ""), (5, 256, "+"), (3, 512, "+"), (3, 512, "+"), (3, 1024, ""))
 CHANNELS = 4  # of an event tensor
 SLOPE = 0.1  # of the leaky ReLU
 
-# Weights of end-point errors, from 1/4 of the resolution to coarser ones. The authors weigh errors summed over pixels by
-# 0.005, 0.01, 0.02, 0.08, 0.32; of means over pixels, as here, these are the ratios.
+# Weights of end-point errors, from 1/4 of the resolution to coarser ones. The authors weight errors summed over pixels
+# by 0.005, 0.01, 0.02, 0.08, 0.32; for means over pixels, as here, these are the ratios.
 LEVEL_WEIGHTS = (1.0, 0.5, 0.25, 0.25, 0.25)
 
 
@@ -51,7 +51,7 @@ class FlowNetS(nn.Module):
     def __init__(self, width=1.0, levels=6, normalise=False, unit_px=20.0):
         super().__init__()
         if not 3 <= levels <= len(LAYERS) or width <= 0 or unit_px <= 0:
-            raise esim.Error("the network has 3 to 6 levels, and its width and unit_px are above 0")
+            raise esim.Error("levels of the network must be 3 to 6, and its width and unit_px above 0")
         self.levels, self.unit_px = levels, unit_px
         channels = [max(1, round(outputs * width)) for _, outputs, _ in LAYERS[:levels]]
         self.contracting = nn.ModuleList()
@@ -74,7 +74,7 @@ class FlowNetS(nn.Module):
                 nn.init.kaiming_normal_(module.weight, SLOPE)
                 if module.bias is not None:
                     nn.init.zeros_(module.bias)
-        for module in self.predict:  # at first, it predicts little
+        for module in self.predict:  # initially, it predicts little motion
             nn.init.normal_(module.weight, std=1e-2 / math.sqrt(module.in_channels))
 
     def forward(self, tensors):
@@ -96,12 +96,12 @@ class FlowNetS(nn.Module):
         return [flow * self.unit_px for flow in flows]
 
     def full_flow(self, tensors):
-        """Flow of the full size, (N, 2, height, width), px."""
+        """Flow in full resolution, (N, 2, height, width), px."""
         return enlarged(self(tensors)[0], *tensors.shape[-2:])
 
 
 def enlarged(flow, height, width):
-    """Flow of a quarter of the resolution on all pixels, without the borders that forward() added."""
+    """Upsamples flow from a quarter of the resolution, without the borders that forward() added."""
     return F.interpolate(flow, scale_factor=4, mode="bilinear", align_corners=False)[..., :height, :width]
 
 
@@ -128,21 +128,21 @@ def training_loss(flows, truth, valid):
 
 
 def load_checkpoint(path):
-    """What train.py saved. Raises esim.Error for files that are none of its."""
+    """Loads a checkpoint of train.py. Raises esim.Error for other files."""
     try:
         checkpoint = torch.load(path, map_location="cpu")
     except FileNotFoundError:
-        raise esim.Error(f"there is no checkpoint {path}") from None
-    except Exception as problem:  # zip, pickle and PyTorch have many
-        raise esim.Error(f"{path} is no checkpoint of train.py, or it is damaged: {str(problem).splitlines()[0]}") from None
+        raise esim.Error(f"the checkpoint {path} does not exist") from None
+    except Exception as problem:  # zip, pickle and PyTorch raise many types
+        raise esim.Error(f"{path} is not a checkpoint of train.py, or is damaged: {str(problem).splitlines()[0]}") from None
     if not isinstance(checkpoint, dict) or not {"settings", "network"} <= set(checkpoint):
-        raise esim.Error(f"{path} is no checkpoint of train.py")
+        raise esim.Error(f"{path} is not a checkpoint of train.py")
     return checkpoint
 
 
 def load_predictor(path):
-    """A function from an event tensor (4, height, width) to the displacement (2, height, width) in px, both NumPy, and
-    the settings that the network was trained with (a dict)."""
+    """A function from an event tensor (4, height, width) to optical flow (2, height, width) in px, both NumPy arrays,
+    and the settings of the training (a dict)."""
     checkpoint = load_checkpoint(path)
     network = FlowNetS(**checkpoint["settings"]["network"])
     network.load_state_dict(checkpoint["network"])

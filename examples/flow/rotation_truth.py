@@ -1,7 +1,7 @@
-"""Optical flow of a camera that only turns, from its gyroscope: for the rotation sequences of the Event Camera Dataset.
+"""Optical flow of a rotating camera from its gyroscope, for the rotation sequences of the Event Camera Dataset.
 
-Everything in a scene at rest moves over the image alike, near or far, when the camera turns about its optical centre: a
-point on the bearing b = (x, y, 1) of camera frame C at t0 is at t1 on R_C1_C0 b, and at every instant
+If the camera rotates about its optical centre, the image motion of a static scene does not depend on depth: a point on
+the bearing b = (x, y, 1) of camera frame C at t0 is on R_C1_C0 b at t1, and at every instant
 
     db/dt = -omega x b + (omega x b)_z b,       pixel velocity = (d pixel / d b) db/dt
 
@@ -21,7 +21,7 @@ AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 
 
 def rows_of(path, columns, meaning):
-    """The numbers of a text file, float64 (N, columns), and their lines (N,); empty lines and comments are passed over."""
+    """The numbers of a text file, float64 (N, columns), and their lines (N,); skips empty lines and comments."""
     try:
         text = pathlib.Path(path).read_text(encoding="ascii", errors="replace")
     except OSError as problem:
@@ -42,7 +42,7 @@ def rows_of(path, columns, meaning):
         rows.append(row)
         lines.append(number)
     if not rows:
-        raise esim.Error(f"{path}: there is nothing in it; expected {meaning}")
+        raise esim.Error(f"{path}: is empty; expected {meaning}")
     return np.array(rows), np.array(lines)
 
 
@@ -77,11 +77,11 @@ class Calibration:
             raise esim.Error(f"{path}: {len(rows)} lines of numbers instead of one: fx fy cx cy k1 k2 p1 p2 k3")
         calibration = Calibration(width, height, *rows[0].tolist())
         if min(calibration.fx, calibration.fy) <= 0:
-            raise esim.Error(f"{path}:1: focal lengths are above 0")
-        # Principal points of real lenses lie near the middle.
+            raise esim.Error(f"{path}:1: focal lengths must be above 0")
+        # Principal points of real lenses are near the middle.
         for name, centre, size in (("cx", calibration.cx, width), ("cy", calibration.cy, height)):
             if not 0.2 * size < centre < 0.8 * size:
-                raise esim.Error(f"{path}:1: {name} = {centre:g} px cannot be of a sensor of {width} x {height} px; "
+                raise esim.Error(f"{path}:1: {name} = {centre:g} px cannot belong to a sensor of {width} x {height} px; "
                                  "is the calibration of another size?")
         try:
             calibration.bearings  # may not exist
@@ -103,7 +103,7 @@ class Calibration:
 
     @functools.cached_property
     def bearings(self):
-        """Where each pixel looks: x and y of (x, y, 1) in C, float64 (2, height, width), by Newton's method.
+        """The bearing of each pixel: x and y of (x, y, 1) in C, float64 (2, height, width), by Newton's method.
 
         Raises esim.Error where the distortion folds the image back onto itself within the sensor.
         """
@@ -139,7 +139,7 @@ class Calibration:
         return np.stack([self.fx * (a * moved_x + b * moved_y), self.fy * (b * moved_x + d * moved_y)])
 
     def displacement(self, R_C0_C1):
-        """Where what a pixel sees at t0 is at t1, less where it was: float64 (2, height, width), px.
+        """Optical flow from t0 to t1: float64 (2, height, width), px.
 
         R_C0_C1 maps from the camera's frame at t1 to its frame at t0.
         """
@@ -159,7 +159,7 @@ def rotation_of(vector):
 
 
 def parse_axes(text):
-    """What brings angular rates of the IMU into the camera's frame, float64 (3, 3), from text.
+    """The rotation from the IMU's frame to the camera's frame, float64 (3, 3), from text.
 
     `x,-y,-z`: the camera's x, y and z axes are the IMU's x, -y and -z (left-handed gyroscopes too); or a quaternion of
     R_C_I, `x,y,z,w`. Raises esim.Error.
@@ -205,14 +205,14 @@ class Gyroscope:
         """
         rows, lines = rows_of(path, 7, "t ax ay az gx gy gz")
         if not (np.abs(rows[:, 0]) < 9e9).all():
-            raise esim.Error(f"{path}:{lines[np.abs(rows[:, 0]) >= 9e9][0]}: this is no time in seconds")
+            raise esim.Error(f"{path}:{lines[np.abs(rows[:, 0]) >= 9e9][0]}: the time must be in seconds")
         t = np.rint((rows[:, 0] - delay_s) * 1e9).astype(np.int64)
         step = np.diff(t)
         for at in np.flatnonzero(step <= 0)[:1]:
-            raise esim.Error(f"{path}:{lines[at + 1]}: the time {rows[at + 1, 0]:.9f} s does not come after the one before; "
+            raise esim.Error(f"{path}:{lines[at + 1]}: the time {rows[at + 1, 0]:.9f} s does not come after the previous one; "
                              "sort the file")
         for at in np.flatnonzero(step > max_gap_s * 1e9)[:1]:
-            raise esim.Error(f"{path}:{lines[at + 1]}: nothing was measured for {step[at] * 1e-9:.3f} s before this line; "
+            raise esim.Error(f"{path}:{lines[at + 1]}: no measurement for {step[at] * 1e-9:.3f} s before this line; "
                              f"allow gaps longer than {max_gap_s:g} s (--max-gap-s) or cut the recording")
         return Gyroscope(t, rows[:, 4:] @ np.asarray(axes).T)
 
@@ -257,7 +257,7 @@ class Gyroscope:
 
 
 def sharpness(events, calibration, omega_C, t0):
-    """How well events fit a rotation: variance of the image of events, each moved back along the motion field to t0, over
+    """The fit of events to a rotation: variance of the image of events, each moved back along the motion field to t0, over
     that of the image of events as they are (contrast maximisation, Gallego and Scaramuzza, RA-L 2017). Images are
     smoothed by a pixel, so that events between pixels blur them no more than others."""
     width, height = calibration.width, calibration.height

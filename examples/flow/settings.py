@@ -1,4 +1,4 @@
-"""Settings of a training, from YAML: see full.yaml, which has and explains all of them."""
+"""Settings of a training from YAML; full.yaml has and explains all of them."""
 
 import pathlib
 
@@ -34,11 +34,11 @@ def read(path):
     except OSError as problem:
         raise esim.Error(f"cannot read {path}: {problem.strerror}") from None
     except yaml.YAMLError as problem:
-        raise esim.Error(f"{path} is not YAML: {' '.join(str(problem).split())}") from None
+        raise esim.Error(f"{path} is not valid YAML: {' '.join(str(problem).split())}") from None
     if not isinstance(settings, dict):
-        raise esim.Error(f"{path} holds no settings")
+        raise esim.Error(f"{path} has no settings")
     simulation = settings.get("simulation")
-    if isinstance(simulation, dict) and simulation.get("flow_histogram"):  # beside the file
+    if isinstance(simulation, dict) and simulation.get("flow_histogram"):  # relative to the file
         simulation["flow_histogram"] = str(pathlib.Path(path).resolve().parent / simulation["flow_histogram"])
     return settings
 
@@ -46,20 +46,20 @@ def read(path):
 def change(settings, changes, where):
     for name, value in changes.items():
         if name not in settings:
-            raise esim.Error(f"{where}: there is no setting {name}; there are {', '.join(settings)}")
+            raise esim.Error(f"{where}: unknown setting {name}; valid settings are {', '.join(settings)}")
         known = settings[name]
         if name == "simulation" and isinstance(value, dict):  # esim checks these
             settings[name] = {**known, **value}
         elif isinstance(known, dict):
             if not isinstance(value, dict):
-                raise esim.Error(f"{where}: {name} has settings of its own: {', '.join(known)}")
+                raise esim.Error(f"{where}: {name} must be a map of these settings: {', '.join(known)}")
             change(known, value, where)
         else:
             settings[name] = like(known, value, f"{where}: {name}")
 
 
 def like(known, value, where):
-    """The value, where it is of the kind of the known one."""
+    """The value, if it has the type of the known one."""
     kind = type(known)
     try:
         if kind is float and not isinstance(value, bool):
@@ -67,5 +67,5 @@ def like(known, value, where):
         if kind in (int, bool) and type(value) is not kind:
             raise ValueError
     except (TypeError, ValueError):
-        raise esim.Error(f"{where} is {KINDS[kind]}, not {value!r}") from None
+        raise esim.Error(f"{where} must be {KINDS[kind]}, not {value!r}") from None
     return value

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Trains FlowNet Simple to predict optical flow from events that are simulated meanwhile (the ESIM paper's Section 5).
+"""Trains FlowNet Simple to predict optical flow from events, which are simulated during the training (the ESIM paper's Section 5).
 
     train.py small.yaml --out out/flow [--resume] [--set network.width=0.5] [--device cuda]
 
@@ -29,8 +29,8 @@ VALIDATION_SEED = 1 << 32  # added to the training's
 
 
 class Passes:
-    """Numbers of the samples of each batch, from sample number `first` of all passes on: each pass goes through all
-    `count` samples in an order of its own."""
+    """Indices of the samples of each batch, starting at sample number `first` of all passes: each pass goes through all
+    `count` samples in another order."""
 
     def __init__(self, count, first, size):
         self.count, self.first, self.size = count, first, size
@@ -47,7 +47,7 @@ class Passes:
 
 
 class Training:
-    """A network, what trains it, and how far it is."""
+    """A network, its optimiser, and the progress of the training."""
 
     def __init__(self, settings, device="cpu"):
         self.settings, self.device = settings, device
@@ -67,13 +67,13 @@ class Training:
         return DataLoader(dataset, num_workers=self.settings["workers"], **options)
 
     def simulated(self, **options):
-        """Batches of simulated samples, to be kept: copies, because each tensor that comes from a worker holds a file of
-        shared memory open."""
+        """Batches of simulated samples that can be kept: copies, because each tensor from a worker keeps a file of shared
+        memory open."""
         loader = self.loader(self.dataset(**options), batch_size=self.settings["batch"])
         return ([part.clone() for part in batch] for batch in loader)
 
     def batches(self):
-        """Batches of training samples, from the current iteration on: the same after a resumption."""
+        """Batches of training samples, starting at the current iteration; the same after resuming."""
         first, size, count = self.iteration * self.settings["batch"], self.settings["batch"], self.settings["sequences"]
         pinned = self.device != "cpu"
         if self.settings["dataset"] is not None:
@@ -128,7 +128,7 @@ class Training:
         return errors / max(pixels, 1), zeros / max(pixels, 1)
 
     def save(self, path):
-        """Replaces the checkpoint as a whole."""
+        """Replaces the checkpoint atomically."""
         part = path.with_suffix(".part")
         torch.save({"settings": self.settings, "network": self.network.state_dict(), "iteration": self.iteration,
                     "optimiser": self.optimiser.state_dict(), "seconds": self.seconds}, part)
@@ -136,18 +136,18 @@ class Training:
 
     def restore(self, path):
         checkpoint = load_checkpoint(path)
-        free = {"iterations", "workers", "report_every", "validation"}  # what may change on the way
+        free = {"iterations", "workers", "report_every", "validation"}  # what may change when resuming
         changed = [name for name, value in self.settings.items()
                    if name not in free and checkpoint["settings"].get(name) != value]
         if changed:
-            raise esim.Error(f"{path} was trained with other settings: {', '.join(changed)}; give those, or another --out")
+            raise esim.Error(f"{path} was trained with other settings: {', '.join(changed)}; use the same settings, or another --out")
         self.network.load_state_dict(checkpoint["network"])
         self.optimiser.load_state_dict(checkpoint["optimiser"])
         self.iteration, self.seconds = checkpoint["iteration"], checkpoint["seconds"]
 
 
 class Log:
-    """log.csv, and TensorBoard where it is there."""
+    """Writes log.csv, and TensorBoard logs if it is installed."""
 
     def __init__(self, folder, until):
         self.path = folder / "log.csv"
@@ -175,7 +175,7 @@ class Log:
 
 
 def train(training, folder):
-    """To the last iteration, with a report of each part of the way: rows of the log."""
+    """Trains until the last iteration; yields a row of the log for each report."""
     settings = training.settings
     log = Log(folder, training.iteration)
 
@@ -204,7 +204,7 @@ def train(training, folder):
 
 
 def draw_validation(training, path, count=4):
-    """The first validation sequences, the prediction and the truth, as the paper's Fig. 7."""
+    """Draws the first validation sequences, the prediction and the truth, as in the paper's Fig. 7."""
     tensors, flow, _ = training.validation_batches[0]
     with torch.no_grad():
         predicted = training.network.full_flow(tensors.to(training.device)).cpu()
@@ -214,11 +214,11 @@ def draw_validation(training, path, count=4):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("settings", type=pathlib.Path, help="small.yaml, full.yaml, or your own")
-    parser.add_argument("--out", type=pathlib.Path, required=True, help="folder")
+    parser.add_argument("--out", type=pathlib.Path, required=True, help="folder to write")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="change a setting")
-    parser.add_argument("--resume", action="store_true", help="go on from the folder's checkpoint")
+    parser.add_argument("--resume", action="store_true", help="continue from the checkpoint in the folder")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
-    parser.add_argument("--threads", type=int, help="of PyTorch on the processor")
+    parser.add_argument("--threads", type=int, help="number of PyTorch's processor threads")
     options = parser.parse_args()
     if options.threads:
         torch.set_num_threads(options.threads)
@@ -227,7 +227,7 @@ def main():
     if options.resume:
         training.restore(checkpoint)
     elif checkpoint.exists():
-        raise esim.Error(f"there is a training in {options.out} already; --resume goes on with it")
+        raise esim.Error(f"{options.out} already has a training; continue it with --resume")
     options.out.mkdir(parents=True, exist_ok=True)
     train(training, options.out)
     if training.validation_batches is None:

@@ -7,7 +7,7 @@
 
 namespace {
 
-// Where each error begins.
+// Index of the first component of each error.
 constexpr int kPosition = 0, kVelocity = 3, kRotation = 6, kGyroscope = 9, kAccelerometer = 12;
 
 }  // namespace

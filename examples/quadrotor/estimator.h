@@ -3,12 +3,12 @@
 #include <esim/record/record.h>
 #include <esim/sensors/imu_options.h>
 
-/// An error-state Kalman filter of pose, velocity and the IMU's biases: predicts with every measurement of the IMU, and
-/// corrects with positions. Its errors are, in this order: position and velocity (world frame), rotation (body frame,
+/// An error-state Kalman filter of pose, velocity and the IMU's biases: predicts with every measurement of the IMU and
+/// corrects with positions. Its errors, in order: position and velocity (world frame), rotation (body frame,
 /// R_true = R Exp(error)), bias of the gyroscope, bias of the accelerometer.
 class Estimator {
  public:
-  /// Knows the pose at first well, the biases hardly. The IMU's frame is the body's.
+  /// The initial pose is well known, the biases are not. The IMU's frame is the body's.
   Estimator(const esim::SE3& T_world_body, const esim::ImuOptions& imu);
 
   void predict(const esim::ImuRecord& measurement);

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-/// Where the vehicle was told to be, was, and believed to be, at successive times.
+/// The commanded, true and estimated positions of the vehicle at successive times.
 struct Flight {
   std::vector<Eigen::Vector3d> commanded, flown, estimated;
 };

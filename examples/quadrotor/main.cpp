@@ -1,5 +1,5 @@
-// Closes the loop: a quadrotor flies a figure eight by what its simulated IMU measures, with a noisy fix of its
-// position five times a second, while an event camera looks down. Writes the recording, and the paths as path.png.
+// Closed-loop simulation: a quadrotor flies a figure eight with its simulated IMU and a noisy position fix five times a
+// second, while an event camera looks down. Writes the recording, and the paths as path.png.
 #include <esim/compose/compose.h>
 #include <esim/core/error.h>
 #include <esim/motion/online.h>
@@ -16,7 +16,7 @@
 
 namespace {
 
-/// Passes the IMU's measurements on.
+/// Forwards the IMU's measurements.
 class ImuTap final : public esim::Sink {
  public:
   explicit ImuTap(Estimator& estimator) : estimator_(estimator) {}
@@ -43,7 +43,7 @@ int fly(const std::string& scenario_file, const std::string& out, const std::vec
   const esim::Scenario scenario = esim::read_scenario(scenario_file, overrides);
   const auto* take_off = std::get_if<esim::StaticTrajectoryOptions>(&scenario.trajectory);
   if (take_off == nullptr || !scenario.imu)
-    throw esim::UserError(scenario_file + ": this flight needs a static trajectory, to take off from, and an imu");
+    throw esim::UserError(scenario_file + ": must have a static trajectory, which is the take-off pose, and an imu");
   const esim::SE3 initial = esim::pose_of(take_off->pose);
 
   const auto motion = std::make_shared<esim::OnlineTrajectory>(esim::OnlineMotionOptions{.interval = kStep}, initial);
@@ -62,7 +62,7 @@ int fly(const std::string& scenario_file, const std::string& out, const std::vec
   std::normal_distribution<double> fix_error(0, kFixSigma_m);
   Flight flight;
   for (esim::TimeNs next_fix = 0; motion->final_until() <= world.info.end;) {
-    // What the sensors have seen of the motion so far.
+    // The sensors' measurements so far.
     simulator.advance_until(motion->final_until(), go_on);
     const esim::TimeNs now = estimator.time();
     const Eigen::Vector3d position = motion->at(now).T_world_body.translation;
@@ -71,7 +71,7 @@ int fly(const std::string& scenario_file, const std::string& out, const std::vec
                         kFixSigma_m);
       next_fix += kFixInterval;
     }
-    // What the pilot makes of it, and where that brings the vehicle.
+    // The pilot's command and the resulting motion of the vehicle.
     const Waypoint goal = figure_eight(initial.translation, esim::to_seconds(now));
     vehicle.step(steer(goal, estimator), esim::to_seconds(kStep));
     motion->push(vehicle.pose());

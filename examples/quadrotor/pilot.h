@@ -8,8 +8,8 @@ struct Waypoint {
   Eigen::Vector3d position, velocity, acceleration;
 };
 
-/// A lying figure eight around `centre`, 4 m by 2 m, begun from rest; `t_s` after the start.
+/// A horizontal figure eight around `centre`, 4 m by 2 m, from rest, at `t_s` after the start.
 Waypoint figure_eight(const Eigen::Vector3d& centre, double t_s);
 
-/// What steers the vehicle onto the path, looking along x, by what is estimated.
+/// The command that steers the estimated vehicle onto the path, facing along x.
 Command steer(const Waypoint& goal, const Estimator& estimate);

@@ -2,7 +2,7 @@
 
 #include <esim/geometry/se3.h>
 
-/// What the pilot asks of the vehicle.
+/// A command of the pilot.
 struct Command {
   double thrust = 9.81;                             ///< along the body's z axis, per mass, m/s²
   Eigen::Vector3d omega = Eigen::Vector3d::Zero();  ///< angular rate in the body frame, rad/s
@@ -21,5 +21,5 @@ class Vehicle {
  private:
   esim::SE3 T_world_body_;
   Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();  // world frame, m/s
-  Command state_;                                       // what the motors give now
+  Command state_;                                       // the current output of the motors
 };

@@ -16,7 +16,7 @@ import numpy as np
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 HALF_X, HALF_Y, HEIGHT = 2.6, 2.2, 2.7  # as in make_room.py
-BEHIND = 0.02  # m: faces of the walls so far behind the inner ones are seen by nobody
+BEHIND = 0.02  # m: outer faces of the walls, this far behind the inner ones, are invisible
 
 # Names of things begin like this; the last is all that is left. Texels of colour along a side, colour's per light's,
 # light paths per texel.

@@ -152,7 +152,7 @@ class Serve(unittest.TestCase):
 
     def test_what_cannot_be_done_is_an_error_and_the_rest_goes_on(self):
         for command in ("nonsense", "", "vset /camera/0/pose 1 2 3", "vset /camera/0/pose nan 0 0 0 0 0", "vset /camera/0/fov 180",
-                        "vrun r.setres 99999x99999", "vrun r.setres 0x5", "vset /object/Nobody/location 0 0 0", "vget /camera/0/lit tiff",
+                        "vrun r.setres 99999x99999", "vrun r.setres 0x5", "vset /object/Absent/location 0 0 0", "vget /camera/0/lit tiff",
                         "vset /object/Box/location inf 0 0", "vrun esim.samples 0x"):
             self.assertTrue(self.client.text(command).startswith("error"), command)
         self.assertEqual(self.client.text("vrun r.setres 40x30"), "ok")

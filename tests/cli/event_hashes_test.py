@@ -3,7 +3,7 @@
 Run as: event_hashes_test.py ESIM_PROGRAM PROJECT_FOLDER TOOLCHAIN
 
 Simulates the beginning of each scenario, and some variants with other samplings and sensors, and compares SHA-256 sums of
-the events with tests/event_hashes.json. `scripts/renew-event-hashes` writes that file anew after a deliberate change, which
+the events with tests/event_hashes.json. `scripts/renew-event-hashes` rewrites that file after a deliberate change, which
 needs a reason in CHANGELOG.md. The sums hold for the toolchain that the file names, because compilers and libraries round
 differently; elsewhere the test is skipped.
 """

@@ -1,4 +1,4 @@
-"""A lost connection: SIGHUP, a terminal that is gone, a pipe that nobody reads. Everything ends in order, as with SIGTERM.
+"""A lost connection: SIGHUP, a terminal that is gone, a pipe without a reader. Everything ends in order, as with SIGTERM.
 
 Run as: hangup_test.py ESIM_PROGRAM SCENES_FOLDER, with the standard library of Python alone.
 """

@@ -24,7 +24,7 @@ from studio_server import Server
 SCENES = pathlib.Path(sys.argv[2]).absolute()
 SMALL = """renderer: {type: plane, image: poster/poster.png, width_m: 2, pose: {position: [1, 0, 0], look_at: [3, 0, 0]}}
 trajectory:
-  type: waypoints   # to and fro
+  type: waypoints   # back and forth
   points:
     - {position: [0, -0.1, 0], look_at: [1, 0, 0]}
     - {position: [0, 0.1, 0], look_at: [1, 0, 0]}
@@ -457,7 +457,7 @@ class Lives(ProgramTest):
                 return
             self.assertIn(status["state"], ("waiting", "running"))
             time.sleep(0.02)
-        self.fail(f"waited in vain: {status}")
+        self.fail(f"timed out: {status}")
 
     def test_an_interrupt_ends_a_run_in_order(self):
         long = (self.work / "small.yaml").read_text().replace("type: waypoints", "type: waypoints\n  speed: 0.0005")

@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Sequences that cost nothing, and can be told apart.
+/// Sequences that are cheap to make and distinguishable.
 class Numbers final : public SequenceMaker {
  public:
   std::string options() const override { return R"({"kind": "numbers", "seed": 1})"; }

@@ -429,12 +429,12 @@ class Learning(Temporary):
         damaged = self.folder / "damaged.pt"
         for content in (b"", whole[: len(whole) // 2], b"nonsense" * 100):
             damaged.write_bytes(content)
-            with self.assertRaisesRegex(esim.Error, "damaged.pt is no checkpoint"):
+            with self.assertRaisesRegex(esim.Error, "damaged.pt is not a checkpoint"):
                 load_checkpoint(damaged)
         torch.save([1, 2], damaged)
-        with self.assertRaisesRegex(esim.Error, "is no checkpoint of train.py"):
+        with self.assertRaisesRegex(esim.Error, "is not a checkpoint of train.py"):
             load_checkpoint(damaged)
-        with self.assertRaisesRegex(esim.Error, "there is no checkpoint"):
+        with self.assertRaisesRegex(esim.Error, "checkpoint .*none.pt does not exist"):
             load_checkpoint(self.folder / "none.pt")
 
     def test_settings(self):
@@ -442,14 +442,14 @@ class Learning(Temporary):
         self.assertEqual(self.settings("rate=1e-5")["rate"], 1e-5)
         self.assertEqual(self.settings("simulation={seed: 3}")["simulation"]["width"], 64)
         self.assertEqual(read_settings(EXAMPLE / "full.yaml")["network"]["levels"], 6)
-        for change, message in (("batches=3", "there is no setting batches"), ("network.depth=3", "there is no setting depth"),
-                                ("batch", "expected NAME=VALUE"), ("batch=2.5", "batch is a whole number, not 2.5"), ("rate=fast", "rate is a number"), ("network=3", "settings of its own"),
-                                ("simulation=3", "settings of its own"),
-                                ("network.normalise=1", "normalise is true or false")):
+        for change, message in (("batches=3", "unknown setting batches"), ("network.depth=3", "unknown setting depth"),
+                                ("batch", "expected NAME=VALUE"), ("batch=2.5", "batch must be a whole number, not 2.5"), ("rate=fast", "rate must be a number"), ("network=3", "must be a map of these settings"),
+                                ("simulation=3", "must be a map of these settings"),
+                                ("network.normalise=1", "normalise must be true or false")):
             with self.assertRaisesRegex(esim.Error, message):
                 self.settings(change)
         (self.folder / "bad.yaml").write_text("batch: [")
-        with self.assertRaisesRegex(esim.Error, "bad.yaml is not YAML"):
+        with self.assertRaisesRegex(esim.Error, "bad.yaml is not valid YAML"):
             read_settings(self.folder / "bad.yaml")
         with self.assertRaisesRegex(esim.Error, "none.yaml: No such file"):
             read_settings(self.folder / "none.yaml")
@@ -464,12 +464,12 @@ class Learning(Temporary):
                  *(word for change in (*TINY, "report_every=1") for word in ("--set", change))]
         first = run("train.py", *short, "--set", "iterations=1")
         self.assertEqual(first.returncode, 0, first.stderr)
-        self.assertIn("there is a training", run("train.py", *short).stderr)
+        self.assertIn("already has a training", run("train.py", *short).stderr)
         second = run("train.py", *short, "--set", "iterations=2", "--resume")
         self.assertEqual(second.returncode, 0, second.stderr)
         self.assertEqual(load_checkpoint(out / "last.pt")["iteration"], 2)
         self.assertEqual({path.name for path in out.iterdir()} - {"tensorboard"}, {"last.pt", "log.csv", "figure.png", "curve.png"})
-        self.assertIn("no setting", run("train.py", *short, "--set", "nothing=1").stderr)
+        self.assertIn("unknown setting", run("train.py", *short, "--set", "nothing=1").stderr)
 
         dataset = self.folder / "recording"
         dataset.mkdir()

@@ -7,7 +7,7 @@ namespace {
 
 const SE3 kIdentity{Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero()};
 
-/// A wall of 2 n x n triangles across x = 0, from -1 to 1 m, and a triangle at x = -2 that nobody comes near.
+/// A wall of 2 n x n triangles across x = 0, from -1 to 1 m, and a triangle at x = -2, far from the motion.
 Scene wall(int n) {
   Mesh mesh;
   for (int z = 0; z <= n; ++z) {

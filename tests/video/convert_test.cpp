@@ -175,7 +175,7 @@ TEST_F(ConvertTest, FewerThanTwoFramesWriteNothing) {
   Memory none, one, bad;
   EXPECT_TRUE(test::contains(message(none), "holds no images"));
   write_frames(1, 0);
-  EXPECT_TRUE(test::contains(message(one), "holds one frame; events need at least two"));
+  EXPECT_TRUE(test::contains(message(one), "has only one frame; events need at least two"));
   std::ofstream(path() / "1.png") << "broken";
   EXPECT_TRUE(test::contains(message(bad), "frame 1"));
   for (const Memory* memory : {&none, &one, &bad}) EXPECT_FALSE(memory->info.has_value());

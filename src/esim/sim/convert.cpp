@@ -13,7 +13,7 @@
 namespace esim {
 namespace {
 
-/// One conversion: what it does with each frame, and the account of it.
+/// One conversion: processes each frame and collects the summary.
 class Run {
  public:
   Run(const Conversion& conversion, Sink& out, const Monitor& monitor)
@@ -45,7 +45,7 @@ class Run {
     write_image();
   }
 
-  /// Goes from the frame before to this one; false if the monitor wants to end.
+  /// Processes the interval from the previous frame to this one; false if the monitor stops the conversion.
   bool cross_interval() {
     const Interpolator& interpolator = conversion_.interpolator;
     const TimeNs t0 = summary_.end, duration = frame_.t - t0;
@@ -106,7 +106,7 @@ class Run {
     }
   }
 
-  /// Lets the pixels see the light change to that of `after_` at time t.
+  /// Changes the irradiance of the pixels linearly to `after_` at time t.
   void see(TimeNs t) {
     Stopwatch stopwatch(summary_.seconds.events);
     const bool first = before_.empty();
@@ -155,7 +155,7 @@ class Run {
   ConversionSummary summary_;
   Frame frame_;
   Planes between_;
-  Image<float> before_, after_;  // what the pixels saw last, and what they see next
+  Image<float> before_, after_;  // the previous and the next irradiance
   std::vector<Event> events_;
   std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
 };
@@ -166,7 +166,7 @@ ConversionSummary convert(const Conversion& conversion, Sink& out, const Monitor
   Run run(conversion, out, monitor);
   if (run.take_frame()) run.open_pixels();
   if (!run.take_frame())
-    throw UserError(conversion.frames.input().string() + ": holds one frame; events need at least two");
+    throw UserError(conversion.frames.input().string() + ": has only one frame; events need at least two");
   run.begin_output();
   try {
     do {

@@ -16,21 +16,21 @@ namespace esim {
 /// Name of the camera that sees the video.
 inline constexpr const char* kConversionCamera = "cam0";
 
-/// What a conversion did, for the report.
+/// Results of a conversion, for the report.
 struct ConversionSummary {
   bool complete = false;
-  std::string problem;         ///< why it ended before the end of the input; empty: it did not, or was interrupted
-  TimeNs start = 0, end = 0;   ///< of the time that was converted
+  std::string problem;         ///< why it failed before the end of the input; empty if complete or interrupted
+  TimeNs start = 0, end = 0;   ///< of the converted time
   int width = 0, height = 0;   ///< px
   std::int64_t frames = 0;     ///< of the input
   std::int64_t steps = 0;      ///< of the interpolation
   std::int64_t held = 0;       ///< intervals that needed more than max_steps
-  double displacement_px = 0;  ///< greatest between two frames
+  double displacement_px = 0;  ///< maximum between two frames
   std::int64_t events_on = 0, events_off = 0;
   EventCameraStatistics sensor;
 
-  /// How much the events' rate varies between two frames, rms, relative to its mean; nothing where it is not known.
-  /// Measured by who reports it (stats/between_frames.h).
+  /// Variation of the event rate between two frames, rms, relative to its mean; empty if unknown. The caller measures
+  /// it (stats/between_frames.h).
   std::optional<double> modulation{};
 
   /// Wall-clock seconds by stage.
@@ -40,7 +40,7 @@ struct ConversionSummary {
   double wall_seconds = 0;
 };
 
-/// Everything that a conversion works on.
+/// The parts of a conversion.
 struct Conversion {
   FrameSequence& frames;
   Interpolator& interpolator;
@@ -48,12 +48,12 @@ struct Conversion {
   const Workers& workers;
 };
 
-/// Turns a video into events: between each two frames as many steps as the motion asks for, from each to the next a
-/// segment for the event camera. Writes the events of camera 0 and an ImageRecord for each frame. The sibling of
-/// simulate() for given frames: time moves only here. The monitor is called after every step.
+/// Converts a video to events: divides the time between two frames into steps according to the motion; each step is a
+/// segment for the event camera. Writes the events of camera 0 and an ImageRecord for each frame. This is the main loop
+/// for given frames, as simulate() is for scenes. The monitor is called after every step.
 ///
-/// Throws UserError, with nothing written, if there are not two frames. A later frame that cannot be used ends the
-/// conversion in order, incomplete, and the summary names the problem.
+/// Throws UserError, with nothing written, if there are fewer than two frames. An unusable later frame ends the
+/// conversion as incomplete, and the summary contains the problem.
 ConversionSummary convert(const Conversion& conversion, Sink& out, const Monitor& monitor);
 
 }  // namespace esim

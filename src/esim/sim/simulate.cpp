@@ -11,7 +11,7 @@
 namespace esim {
 namespace {
 
-/// The camera whose next sample comes first; null where none comes by `until`.
+/// The camera whose next sample comes first; null if none is due until `until`.
 CameraChannel* camera_due(World& world, TimeNs until) {
   CameraChannel* due = nullptr;
   TimeNs earliest = 0;
@@ -33,7 +33,7 @@ TimeNs watermark(const World& world) {
 
 }  // namespace
 
-/// One run of a world: what it does with each piece of time, and the account of it.
+/// One run of a world: processes each piece of time and collects the summary.
 class Simulator::Run {
  public:
   Run(World& world, Sink& out)
@@ -47,10 +47,10 @@ class Simulator::Run {
     }
   }
 
-  /// The body's motion is known until then: samples until then may be started.
+  /// The body's motion is known until `until`, so that samples until then may be started.
   void know(TimeNs until) { known_until_ = until; }
 
-  /// Lets a camera's pixels see its next sample. A graphics card has had the time since its last one to render it.
+  /// Processes the next sample of a camera. A graphics card has rendered it since the previous sample.
   void advance(CameraChannel& camera) {
     if (camera.rendering == nullptr) start_next(camera);  // its motion was not yet known
     {
@@ -72,11 +72,11 @@ class Simulator::Run {
       Stopwatch stopwatch(summary_.seconds.sampling);
       segments = camera.sampler->more();
     }
-    expose(camera, {});                                   // what is complete after the last segment
-    if (camera.rendering == nullptr) start_next(camera);  // what comes next may have depended on more()
+    expose(camera, {});                                   // exposures that are complete after the last segment
+    if (camera.rendering == nullptr) start_next(camera);  // the next request may depend on more()
   }
 
-  /// Writes everything up to `until`, all kinds of record together in order of time.
+  /// Writes all records up to `until`, all kinds together in order of time.
   void deliver(TimeNs until) {
     while (true) {
       const TimeNs t = std::min(until, due());
@@ -90,7 +90,7 @@ class Simulator::Run {
     summary_.end = until;
   }
 
-  /// Writes the IMU's measurements up to `until`, ahead of what has to wait for cameras.
+  /// Writes the IMU's measurements up to `until`, before records that must wait for cameras.
   void deliver_imu_until(TimeNs until) {
     while (imu_due() <= until) deliver_imu(imu_due());
   }
@@ -123,7 +123,7 @@ class Simulator::Run {
     return static_cast<std::size_t>(&camera - world_.cameras.data());
   }
 
-  /// Begins to evaluate the scene as the camera's sampler asks for next.
+  /// Starts the next rendering that the camera's sampler requests.
   void start_next(CameraChannel& camera) {
     Stopwatch stopwatch(summary_.seconds.render);
     const SampleRequest* const next = camera.sampler->next();
@@ -134,7 +134,7 @@ class Simulator::Run {
     camera.rendering = camera.asked_for(*next).start_together(std::move(views));
   }
 
-  /// Lets the frame camera see what the event camera has seen.
+  /// Gives the frame camera the segments of the event camera.
   void expose(CameraChannel& camera, std::span<const Segment> segments) {
     if (!camera.frame_camera) return;
     Stopwatch stopwatch(summary_.seconds.frames);
@@ -143,7 +143,7 @@ class Simulator::Run {
 
   TimeNs imu_due() const { return world_.imu ? world_.imu->clock.due() : PeriodicClock::kNever; }
 
-  /// When the next record is due that is none of events. A frame is due when its exposure ends.
+  /// The time of the next due record except events. A frame is due when its exposure ends.
   TimeNs due() const {
     TimeNs due = std::min({world_.truth_clock.due(), world_.pose_clock.due(), imu_due()});
     for (const CameraChannel& camera : world_.cameras) {

@@ -17,11 +17,11 @@ struct StageSeconds {
   double sampling = 0;  ///< choosing times, reconstructing between keyframes
   double events = 0;    ///< pixels, and ordering of events
   double frames = 0;    ///< exposing and reading out frame cameras
-  double truth = 0;     ///< making of ground truth
-  double write = 0;     ///< handing over to sinks; what they do on threads of their own does not count
+  double truth = 0;     ///< computing ground truth
+  double write = 0;     ///< calls of sinks; their background threads do not count
 };
 
-/// What one camera did.
+/// Results of one camera.
 struct CameraSummary {
   std::string name;
   std::string renderer;
@@ -32,11 +32,11 @@ struct CameraSummary {
   std::int64_t frames = 0;  ///< of the frame camera
 };
 
-/// What a simulation did, for the report.
+/// Results of a simulation, for the report.
 struct Summary {
   bool complete = false;
-  std::string problem;        ///< why it ended before its end; empty: it did not, or was interrupted
-  TimeNs start = 0, end = 0;  ///< of the time that was simulated
+  std::string problem;        ///< why it failed before its end; empty if complete or interrupted
+  TimeNs start = 0, end = 0;  ///< of the simulated time
   std::vector<CameraSummary> cameras;
   std::int64_t truth_frames = 0;
   std::int64_t imu_samples = 0;
@@ -44,7 +44,7 @@ struct Summary {
   double wall_seconds = 0;
 };
 
-/// How far a simulation has come.
+/// Progress of a simulation.
 struct Progress {
   TimeNs start = 0, now = 0, end = 0;
   std::int64_t samples = 0, events = 0;
@@ -54,7 +54,7 @@ struct Progress {
 /// Called after every sample; returns false to end the simulation early.
 using Monitor = std::function<bool(const Progress&)>;
 
-/// A simulation that goes on as far as it is told, for bodies whose motion becomes known on the way (motion/online.h).
+/// A simulation that advances on request, for bodies whose motion becomes known during it (motion/online.h).
 class Simulator {
  public:
   /// Begins the recording.
@@ -63,10 +63,10 @@ class Simulator {
   Simulator(const Simulator&) = delete;
   Simulator& operator=(const Simulator&) = delete;
 
-  /// Takes every sample that is due until `t`, or until the end of the body's trajectory where that comes earlier, and
-  /// writes what is then certain: of the IMU, everything until then; of all else, everything until the time before
-  /// which every camera's events are known. That is behind by less than a sampler's longest interval (min_rate_hz). The
-  /// monitor is called after every sample; false where it stopped there, and another call goes on from there.
+  /// Takes every sample that is due until `t`, or until the end of the body's trajectory if that is earlier. Writes the
+  /// IMU's measurements until then, and all other records until the time up to which every camera's events are known,
+  /// which lags by less than a sampler's longest interval (min_rate_hz). The monitor is called after every sample;
+  /// returns false if it stopped the simulation, which another call continues.
   bool advance_until(TimeNs t, const Monitor& monitor);
 
   /// Ends the recording, complete if it has reached the world's end.
@@ -78,9 +78,9 @@ class Simulator {
   std::unique_ptr<Run> run_;
 };
 
-/// Runs `world` from its start to its end and writes everything to `out`. The spine of the program: time moves only
-/// here. What comes before an EngineError is kept: the summary names the problem. Other errors are thrown; `out` has
-/// ended then, incomplete, if it had been given anything.
+/// Runs `world` from its start to its end and writes everything to `out`. This is the main loop: time advances only
+/// here. After an EngineError, the records before it are kept and the summary contains the problem. Other errors are
+/// thrown after `out` has been ended as incomplete if it has received any records.
 Summary simulate(World& world, Sink& out, const Monitor& monitor);
 
 }  // namespace esim

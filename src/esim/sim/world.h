@@ -20,17 +20,17 @@
 
 namespace esim {
 
-/// One camera of the rig, with everything of its own: its view of the scene, its clock, its pixels.
+/// One camera of the rig with its renderer, sampler and sensors.
 struct CameraChannel {
   std::unique_ptr<Renderer> renderer;
   std::unique_ptr<Sampler> sampler;
   std::optional<EventCamera> event_camera;
-  Sample sample;                           // the latest evaluation; its buffers go round between renderer and sampler
-  std::unique_ptr<Rendering> rendering{};  // the one that the sampler wants next, under way
-  std::unique_ptr<Renderer> keyframes{};   // what the sampler asks, where its camera is denser than the sensor's
+  Sample sample;                           // the latest sample; renderer and sampler exchange its buffers
+  std::unique_ptr<Rendering> rendering{};  // the running rendering of the sampler's next request
+  std::unique_ptr<Renderer> keyframes{};   // the renderer of supersampled keyframes
   std::optional<FrameCamera> frame_camera{};
 
-  // Ground truth, where it is wanted.
+  // Ground truth, if requested.
   std::unique_ptr<DisplacementField> displacement{};
   std::unique_ptr<EventPoints> event_points{};
 
@@ -55,20 +55,20 @@ struct World {
   std::vector<CameraChannel> cameras;                      // as in info.cameras
   PeriodicClock truth_clock, pose_clock;
   std::optional<ImuChannel> imu{};
-  bool truth_objects = false;  // ground truth says which object each pixel sees
+  bool truth_objects = false;  // whether ground truth has the object of each pixel
 };
 
-/// Where a camera and the moving objects are at `t`; no tiles.
+/// The poses of a camera and of the moving objects at `t`, without tiles.
 RenderRequest view(const Trajectory& body, const SE3& T_body_camera,
                    std::span<const std::shared_ptr<const Trajectory>> objects, TimeNs t);
 
-/// The same for a camera of the world, as a function that may outlive it.
+/// The same for a camera of the world, as a function that may outlive the world.
 std::function<RenderRequest(TimeNs)> view_at(const World& world, std::size_t camera);
 
-/// What a camera of the world is asked to show of `tiles` at `t`: here the motions are evaluated.
+/// The request to render `tiles` of a camera of the world at `t`; evaluates the motions.
 RenderRequest view(const World& world, std::size_t camera, TimeNs t, std::vector<Tile> tiles);
 
-/// The same for its whole image.
+/// The same for the complete image.
 RenderRequest view(const World& world, std::size_t camera, TimeNs t);
 
 }  // namespace esim

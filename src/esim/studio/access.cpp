@@ -108,7 +108,8 @@ std::optional<Response> Access::answer(const RequestHead& head) const {
                         {"Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/", cookie_name(), token_)}};
     return response;
   }
-  if (!knows_token(head)) return refusal(401, "the token is missing; open the address that esim studio has printed");
+  if (!knows_token(head))
+    return refusal(401, "the token is missing or wrong; open the address that esim studio has printed");
   if (reads) return std::nullopt;
   if (head.method != "POST" && head.method != "PUT" && head.method != "DELETE")
     return refusal(405, "the method must be GET, POST, PUT or DELETE");

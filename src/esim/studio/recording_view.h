@@ -55,7 +55,7 @@ class RecordingView {
   bool has_imu() const { return !imu_file_.empty(); }
   bool has_poses() const { return !states_file_.empty(); }
 
-  /// The camera with this name; the first if empty. Throws HttpError 404 if there is none.
+  /// The camera with this name; the first if empty. Throws HttpError 404 if it does not exist.
   const CameraView& camera(const std::string& name) const;
 
   /// The last ground truth at or before `t` as a colour image, with its time; empty without ground truth.

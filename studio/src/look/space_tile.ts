@@ -33,9 +33,7 @@ const depth = 1.6;
 /** Events of a time span as points: x to the right, time to the back, y downwards; the image is at the front, at the current time. */
 export class SpaceTile implements Tile {
   readonly element: HTMLElement;
-  private stage = new Stage(
-    "Events in space and time. Drag to turn, wheel to zoom; W A S D and arrow keys move.",
-  );
+  private stage = new Stage("Events in space and time. Drag to turn, wheel to zoom; W A S D and arrow keys move.");
   private navigation = new Navigation(this.stage);
   private geometry = new BufferGeometry();
   private positions = new Float32Array(0);

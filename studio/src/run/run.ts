@@ -129,7 +129,12 @@ export class RunPlace implements Place {
     if (answer === "over") return this.launch(path, out, true);
     if (answer !== "other") return;
     const proposal = `${out ?? path.replace(/([^/]*)\.ya?ml$/, "out/$1")}-2`;
-    const other = await askText("Where should the recording be saved?", "A folder below the server's roots", proposal, "Run");
+    const other = await askText(
+      "Where should the recording be saved?",
+      "A folder below the server's roots",
+      proposal,
+      "Run",
+    );
     if (other) return this.launch(path, other, false);
   }
 

@@ -156,5 +156,5 @@ export async function until(question, what, timeout_ms = 60_000) {
     if (last) return last;
     await new Promise((resolve) => setTimeout(resolve, 100));
   }
-  throw new Error(`waited in vain for ${what}; last: ${last}`);
+  throw new Error(`timed out waiting for ${what}; last: ${last}`);
 }

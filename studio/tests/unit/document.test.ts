@@ -110,7 +110,7 @@ const threshold = "event_camera.contrast_threshold";
 const entry = { texts: ["abc"], what: "must be a number, not 'abc'" };
 const settled = () => new Promise((resolve) => setTimeout(resolve, 60));
 
-test("an entry that is no value is a problem and not saved, until it is replaced or undone", async () => {
+test("an invalid entry is a problem and not saved, until it is replaced or undone", async () => {
   const [document] = begin();
   const text = document.revision.yaml;
   document.refuse(threshold, entry);

@@ -136,7 +136,7 @@ void add_runs(Router& router, const Workshop& workshop) {
   router.add("GET", "/api/runs/*/stream", [workshop](const Request& request) { return stream(request, workshop); });
   router.add("GET", "/api/runs/*/picture.png", [workshop](const Request& request) {
     std::string png = workshop.runs.picture(run_of(request, workshop.runs).id);
-    if (png.empty()) throw HttpError(404, "there is no image yet");
+    if (png.empty()) throw HttpError(404, "no image yet");
     return png_response(std::move(png));
   });
   router.add("DELETE", "/api/runs/*", [workshop](const Request& request) {

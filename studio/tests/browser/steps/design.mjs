@@ -185,7 +185,7 @@ const focused = (page) => page.evaluate(() => document.activeElement?.textConten
 const isFocused = (field) => field.evaluate((element) => element === document.activeElement).catch(() => false);
 const dialog = (page) => page.locator("dialog");
 
-test("an entry that is no value is a problem, and is neither saved nor run as another", async () => {
+test("an invalid entry is a problem, and is neither saved nor run", async () => {
   const { page } = main;
   const threshold = page.locator("#option-event_camera-contrast_threshold");
   const problems = page.locator(".problem-section li");

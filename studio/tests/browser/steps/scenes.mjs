@@ -179,7 +179,7 @@ test("a scene that cannot be read is said to be so, and can be replaced", async 
   const page = await design("ball.yaml");
   await visit(page, server, "#/design?scenario=project/broken.yaml");
   const note = page.locator(".stage-note.problem");
-  await until(async () => /broken\.obj/.test(await note.textContent()), "why there is no scene");
+  await until(async () => /broken\.obj/.test(await note.textContent()), "the reason why the scene is missing");
   await shot(page, "scene-broken-dark");
   await place(page, "Configure");
   const text = page.locator(".yaml-editor textarea");

@@ -57,7 +57,7 @@ def test_one_of_several_cameras(rig, tmp_path):
     esim.convert(rig, tmp_path / "x.bag")
     for read in (esim.load_events, esim.EventsIterator):
         refused(esim.Error, r"esim\.convert\(\.\.\., camera=", lambda: read(tmp_path / "x.bag"))
-    refused(esim.Error, "name one of left, right", lambda: esim.play(rig))
+    refused(esim.Error, "choose one of left, right", lambda: esim.play(rig))
 
 
 def test_times_that_a_format_has_no_room_for(tmp_path):

@@ -73,7 +73,7 @@ TEST(Se3, FromMatrixFindsTheNearestRotation) {
 TEST(Se3, FromMatrixRefusesWhatIsNoRigidMotion) {
   Matrix4d scaled = kA.matrix();
   scaled.topLeftCorner<3, 3>() *= 1.001;
-  EXPECT_TRUE(contains(error_of(scaled), "no rotation"));
+  EXPECT_TRUE(contains(error_of(scaled), "is not a rotation"));
 
   Matrix4d mirrored = kA.matrix();
   mirrored.col(0) *= -1.0;

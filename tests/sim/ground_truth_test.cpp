@@ -209,7 +209,7 @@ TEST_F(GroundTruth, SaysWhyItCannotBeHad) {
   sprites.layers.resize(1);
   sprites.layers[0].image = folder_.path() / "sky.pgm";
   scenario_.renderer = sprites;
-  EXPECT_TRUE(test::contains(error(), "truth.displacement: sprites are drawn on the sensor"));
+  EXPECT_TRUE(test::contains(error(), "truth.displacement: needs depth, but sprites are drawn on the sensor"));
 }
 
 }  // namespace

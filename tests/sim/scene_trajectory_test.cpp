@@ -96,8 +96,9 @@ TEST(SceneTrajectory, SaysWhichCamerasThereAre) {
   const auto message = [&](const std::string& trajectory) {
     return test::message_of<UserError>([&] { scene.build(trajectory); });
   };
-  EXPECT_TRUE(test::contains(message("{type: scene, camera: Camera.001}"), "no Camera.001; it has Drone, Tripod"));
-  EXPECT_TRUE(test::contains(message("{type: scene}"), "several: Drone, Tripod"));
+  EXPECT_TRUE(test::contains(message("{type: scene, camera: Camera.001}"),
+                             "no camera 'Camera.001'; name one of Drone, Tripod"));
+  EXPECT_TRUE(test::contains(message("{type: scene}"), "several cameras; name one of Drone, Tripod"));
 }
 
 }  // namespace

@@ -5,8 +5,8 @@
 
 #include <filesystem>
 
-#include "esim/dataset/affine_sequences.h"
-#include "esim/dataset/contents.h"
+#include "esim/dataset/files/contents.h"
+#include "esim/dataset/generators/affine_sequences.h"
 #include "support/temporary_directory.h"
 
 namespace esim {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <map>
 
-#include "esim/sensors/event_camera.h"
+#include "esim/event_camera/event_camera.h"
 #include "moving_texture.h"
 
 namespace esim {

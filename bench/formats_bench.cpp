@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <random>
 
-#include "esim/record/format.h"
+#include "esim/formats/formats.h"
 #include "support/temporary_directory.h"
 
 namespace esim {
@@ -113,7 +113,7 @@ int main(int argc, char** argv) {
   using esim::Compression;
   esim::use_memory();
   const esim::test::TemporaryDirectory folder;
-  for (const esim::Format& format : esim::formats()) {
+  for (const esim::Format& format : esim::all_formats()) {
     if (!esim::is_tried(format)) continue;
     if (format.name == "dsec")
       esim::add("dsec, uncompressed", format, {.compression = Compression::none}, folder.path());

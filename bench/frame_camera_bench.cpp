@@ -5,8 +5,8 @@
 
 #include <chrono>
 
-#include "esim/sensors/event_camera.h"
-#include "esim/sensors/frame_camera.h"
+#include "esim/event_camera/event_camera.h"
+#include "esim/frame_camera/frame_camera.h"
 #include "moving_texture.h"
 
 namespace esim {

@@ -1,12 +1,13 @@
-# esim_module(NAME SOURCES a.cpp ... [DEPENDS other modules] [PUBLIC libraries] [PRIVATE libraries])
+# esim_module(NAME [DEPENDS other modules] [PUBLIC libraries] [PRIVATE libraries])
 #
-# Each folder of src/esim is a static library, esim::NAME. A module links only to the modules that it depends
-# on, so that an include against the arrows of ARCHITECTURE.md fails to link
-# (and tests/architecture_test.py reports it).
+# A folder of src/esim as a static library, esim::NAME, of all .cpp files in it. A module links only to the modules that
+# it depends on, so an include that ARCHITECTURE.md does not allow fails to link (and tests/architecture_test.py reports
+# it).
 function(esim_module name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "DEPENDS;PUBLIC;PRIVATE" ${ARGN})
   string(REPLACE "/" "_" target ${name})
-  add_library(esim_${target} STATIC ${ARG_SOURCES})
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cpp)
+  add_library(esim_${target} STATIC ${sources})
   add_library(esim::${target} ALIAS esim_${target})
   list(TRANSFORM ARG_DEPENDS PREPEND esim_)
   target_include_directories(esim_${target} PUBLIC

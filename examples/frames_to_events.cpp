@@ -1,5 +1,5 @@
 // Events from frames in memory: a bright bar that crosses the image.
-#include <esim/sensors/event_camera.h>
+#include <esim/event_camera/event_camera.h>
 
 #include <cstdio>
 

@@ -48,7 +48,7 @@ PRIVATE_HEADERS = {"backends/opengl/gl_program.h", "backends/opengl/gl_read_back
                    "backends/raycast/surface.h", "backends/unrealcv/client.h", "backends/unrealcv/connection.h", "backends/unrealcv/dialect.h",
                    "backends/unrealcv/engine_image.h", "backends/unrealcv/session.h", "scenario/yaml_reader.h", "scene/import/gltf_document.h",
                    "record/formats/aedat4/buffers.h", "record/formats/hdf5_detail.h",
-                   "record/formats/hdf5_input.h", "record/formats/hdf5_output_driver.h", "record/formats/millisecond_index.h", "sensors/vector_math.h",
+                   "record/formats/hdf5_input.h", "record/formats/hdf5_output_driver.h", "record/formats/millisecond_index.h", "event_camera/vector_math.h",
                    "studio/endpoints/endpoints.h", "studio/json.h", "studio/router.h", "studio/scenario_check.h", "studio/schema_json.h",
                    "studio/yaml_text.h"}
 

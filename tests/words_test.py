@@ -3,15 +3,16 @@
 Run as: words_test.py PROJECT_FOLDER
 """
 
+import os
 import pathlib
 import re
-import subprocess
 import sys
 
 ROOT = pathlib.Path(sys.argv[1])
 LIST = ROOT / "tests" / "words.txt"
 SUFFIXES = {".h", ".cpp", ".c", ".py", ".pyi", ".md", ".txt", ".cmake", ".yaml", ".yml", ".ts", ".mjs", ".css", ".html", ""}
 LEFT_OUT = {"tests/words.txt", "tests/words_test.py", "CHANGELOG.md", "studio/package-lock.json", "LICENSE"}
+GENERATED = {"build", "dist", "node_modules", "out", "__pycache__"}
 LEFT_OUT_FOLDERS = ("tests/fuzz/corpus/",)  # of damaged files
 
 
@@ -27,13 +28,18 @@ def read_list():
     return entries
 
 
+def sources():
+    for folder, folders, files in os.walk(ROOT):
+        folders[:] = sorted(name for name in folders if name not in GENERATED and not name.startswith(".git"))
+        yield from (pathlib.Path(folder) / name for name in sorted(files))
+
+
 def main():
     entries = read_list()
     every = re.compile("|".join(pattern.pattern for pattern, _ in entries), re.IGNORECASE)
-    files = subprocess.run(["git", "-C", str(ROOT), "ls-files"], capture_output=True, text=True, check=True).stdout.splitlines()
     problems = []
-    for name in files:
-        path = ROOT / name
+    for path in sources():
+        name = str(path.relative_to(ROOT))
         if name in LEFT_OUT or name.startswith(LEFT_OUT_FOLDERS) or path.suffix not in SUFFIXES or not path.is_file():
             continue
         try:

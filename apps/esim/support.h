@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "esim/compose/compose.h"
-#include "esim/record/format.h"
+#include "esim/recording/format.h"
 
 namespace esim::app {
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <esim/record/record.h>
-#include <esim/sensors/imu_options.h>
+#include <esim/imu/options.h>
+#include <esim/recording/record.h>
 
 /// An error-state Kalman filter of pose, velocity and the IMU's biases: predicts with every measurement of the IMU and
 /// corrects with positions. Its errors, in order: position and velocity (world frame), rotation (body frame,

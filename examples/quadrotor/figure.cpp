@@ -1,6 +1,6 @@
 #include "figure.h"
 
-#include <esim/record/output_file.h>
+#include <esim/files/output_file.h>
 #include <esim/stats/axes.h>
 
 #include <algorithm>

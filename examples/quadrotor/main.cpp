@@ -3,8 +3,8 @@
 #include <esim/compose/compose.h>
 #include <esim/core/error.h>
 #include <esim/motion/online.h>
-#include <esim/record/fan_out.h>
-#include <esim/record/recording_directory.h>
+#include <esim/recording/fan_out.h>
+#include <esim/recording/recording_directory.h>
 #include <esim/scenario/read.h>
 
 #include <cmath>

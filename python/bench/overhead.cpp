@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "esim/core/parallel.h"
-#include "esim/sensors/event_camera.h"
+#include "esim/event_camera/event_camera.h"
 
 int main(int, char** arguments) {
   constexpr int kWidth = 346, kHeight = 260, kFrames = 100;

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "esim/record/format.h"
+#include "esim/recording/format.h"
 
 namespace esim::python {
 

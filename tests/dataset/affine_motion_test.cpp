@@ -1,4 +1,4 @@
-#include "esim/dataset/affine_motion.h"
+#include "esim/dataset/generators/affine_motion.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "esim/core/random.h"
-#include "esim/dataset/magnitudes.h"
+#include "esim/dataset/generators/magnitudes.h"
 #include "support/numeric.h"
 
 namespace esim {

@@ -1,4 +1,4 @@
-#include "esim/dataset/affine_sequences.h"
+#include "esim/dataset/generators/affine_sequences.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "esim/core/error.h"
-#include "esim/dataset/image_folder.h"
-#include "esim/scene/dead_leaves.h"
+#include "esim/dataset/generators/image_folder.h"
+#include "esim/scene/images/dead_leaves.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
 

@@ -1,4 +1,4 @@
-#include "esim/dataset/magnitudes.h"
+#include "esim/dataset/generators/magnitudes.h"
 
 #include <gtest/gtest.h>
 

@@ -14,7 +14,7 @@
 
 #include "esim/core/error.h"
 #include "esim/core/random.h"
-#include "esim/dataset/manifest.h"
+#include "esim/dataset/files/manifest.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
 

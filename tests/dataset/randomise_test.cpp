@@ -1,4 +1,4 @@
-#include "esim/dataset/randomise.h"
+#include "esim/dataset/generators/randomise.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "esim/core/error.h"
 #include "esim/dataset/cluster.h"
-#include "esim/dataset/scenario_sequences.h"
+#include "esim/dataset/generators/scenario_sequences.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
 

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "esim/core/error.h"
-#include "esim/record/checked_source.h"
-#include "esim/record/format.h"
+#include "esim/formats/formats.h"
+#include "esim/recording/checked_source.h"
 
 namespace {
 

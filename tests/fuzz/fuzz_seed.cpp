@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "esim/core/error.h"
-#include "esim/record/format.h"
+#include "esim/formats/formats.h"
 
 namespace esim {
 namespace {
@@ -48,7 +48,7 @@ void write(const Format& format, const std::filesystem::path& folder) {
 
 int main(int argc, char** argv) {
   if (argc != 2) return std::fprintf(stderr, "usage: fuzz_seed FOLDER\n"), 2;
-  for (const esim::Format& format : esim::formats()) {
+  for (const esim::Format& format : esim::all_formats()) {
     if (format.create && !format.folder) esim::write(format, std::filesystem::path(argv[1]) / format.name);
   }
 }

@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <random>
 
-#include "esim/record/formats/events_hdf5.h"
-#include "esim/studio/recording_view.h"
-#include "esim/studio/recordings.h"
+#include "esim/formats/hdf5/dsec.h"
+#include "esim/studio/recordings/recording_view.h"
+#include "esim/studio/recordings/recordings.h"
 #include "support/temporary_directory.h"
 
 namespace esim::studio {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <random>
 
-#include "esim/record/format.h"
-#include "record/event_formats.h"
-#include "record/recordings.h"
+#include "esim/formats/formats.h"
+#include "formats/event_formats.h"
+#include "formats/recordings.h"
 #include "support/temporary_directory.h"
 
 namespace esim {

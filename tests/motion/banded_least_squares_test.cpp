@@ -1,4 +1,4 @@
-#include "esim/motion/banded_least_squares.h"
+#include "esim/motion/fit/banded_least_squares.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "esim/core/error.h"
-#include "esim/motion/fit.h"
+#include "esim/motion/fit/fit.h"
 #include "motion/fit_motions.h"
 #include "support/errors.h"
 

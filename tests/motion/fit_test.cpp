@@ -1,4 +1,4 @@
-#include "esim/motion/fit.h"
+#include "esim/motion/fit/fit.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "esim/geometry/so3.h"
-#include "esim/motion/fit.h"
+#include "esim/motion/fit/fit.h"
 #include "esim/motion/random.h"
 #include "esim/motion/static.h"
 #include "esim/motion/trajectory_file.h"

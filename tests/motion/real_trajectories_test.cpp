@@ -3,7 +3,7 @@
 #include <ostream>
 #include <string>
 
-#include "esim/motion/fit.h"
+#include "esim/motion/fit/fit.h"
 #include "esim/motion/trajectory_file.h"
 #include "support/test_data.h"
 

@@ -1,4 +1,4 @@
-#include "esim/motion/waypoints.h"
+#include "esim/motion/waypoints/waypoints.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Events from a user's own frames, with the installed library.
 #include <esim/compose/compose.h>
-#include <esim/sensors/event_camera.h>
+#include <esim/event_camera/event_camera.h>
 
 #include <cstdio>
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "esim/geometry/so3.h"
-#include "esim/scene/texture.h"
+#include "esim/scene/images/texture.h"
 #include "render/engines.h"
 #include "render/every_renderer.h"
 

@@ -1,4 +1,4 @@
-#include "esim/sampling/adaptive.h"
+#include "esim/sampling/adaptive/adaptive.h"
 
 #include <gtest/gtest.h>
 

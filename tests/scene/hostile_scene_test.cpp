@@ -10,7 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "esim/core/error.h"
-#include "esim/scene/image_file.h"
+#include "esim/scene/images/image_file.h"
 #include "esim/scene/scene_file.h"
 #include "glb_writer.h"
 #include "support/errors.h"

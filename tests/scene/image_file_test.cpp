@@ -1,5 +1,5 @@
 // Luminance of image files, with filters. Transparency: translucent_image_test.cpp.
-#include "esim/scene/image_file.h"
+#include "esim/scene/images/image_file.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "esim/scene/texture.h"
+#include "esim/scene/images/texture.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "esim/core/error.h"
-#include "esim/scene/image_file.h"
+#include "esim/scene/images/image_file.h"
 #include "esim/scene/planes.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"

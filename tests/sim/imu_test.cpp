@@ -4,9 +4,9 @@
 
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
+#include "esim/formats/recording_folder/calibration_files.h"
 #include "esim/geometry/calibration.h"
 #include "esim/motion/imu_kinematics.h"
-#include "esim/record/formats/calibration_files.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
 

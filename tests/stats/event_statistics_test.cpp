@@ -8,7 +8,7 @@
 
 #include "esim/core/error.h"
 #include "esim/stats/figure.h"
-#include "esim/stats/report.h"
+#include "esim/stats/statistics_text.h"
 #include "stats/streams.h"
 #include "support/errors.h"
 

@@ -1,4 +1,4 @@
-#include "esim/studio/access.h"
+#include "esim/studio/server/access.h"
 
 #include <gtest/gtest.h>
 

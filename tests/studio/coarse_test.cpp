@@ -1,4 +1,4 @@
-#include "esim/studio/coarse.h"
+#include "esim/studio/scene_view/coarse.h"
 
 #include <gtest/gtest.h>
 

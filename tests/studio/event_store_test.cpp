@@ -1,4 +1,4 @@
-#include "esim/studio/event_store.h"
+#include "esim/studio/recordings/event_store.h"
 
 #include <gtest/gtest.h>
 

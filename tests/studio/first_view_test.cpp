@@ -1,4 +1,4 @@
-#include "esim/studio/first_view.h"
+#include "esim/studio/scene_view/first_view.h"
 
 #include <gtest/gtest.h>
 

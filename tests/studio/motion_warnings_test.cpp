@@ -1,4 +1,4 @@
-#include "esim/studio/motion_warnings.h"
+#include "esim/studio/editor/motion_warnings.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "esim/studio/page_images.h"
+#include "esim/studio/scene_view/page_images.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <fstream>
 
 #include "esim/core/error.h"
-#include "esim/studio/http.h"
+#include "esim/studio/server/http.h"
 #include "support/temporary_directory.h"
 
 namespace esim::studio {

@@ -1,4 +1,4 @@
-#include "esim/studio/server.h"
+#include "esim/studio/server/server.h"
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "esim/studio/yaml_text.h"
+#include "esim/studio/editor/yaml_text.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // From a scenario to a recording.
 #include "esim/compose/compose.h"
-#include "esim/record/inspect.h"
-#include "esim/record/recording_directory.h"
+#include "esim/formats/inspect.h"
+#include "esim/recording/recording_directory.h"
 #include "esim/scenario/read.h"
 #include "support/temporary_directory.h"
 #include "unrealcv/shown.h"

@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "esim/core/error.h"
-#include "esim/sensors/bayer.h"
+#include "esim/frame_camera/bayer.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
 #include "video/videos.h"

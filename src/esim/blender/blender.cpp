@@ -10,7 +10,7 @@
 #include "esim/blender/scripts.h"
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline blender {
 namespace {
 
 namespace fs = std::filesystem;
@@ -65,4 +65,4 @@ bool bake_scene(const fs::path& scene, const fs::path& glb, const BakeOptions& o
                     {std::to_string(options.samples), std::to_string(options.size_px)}, glb, watch);
 }
 
-}  // namespace esim
+}  // namespace esim::inline blender

@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-namespace esim {
+namespace esim::inline blender {
 
 /// Receives Blender's progress, from 0 to 1, and its current step. Returning false ends Blender.
 using BlenderProgress = std::function<bool(double fraction, const std::string& what)>;
@@ -43,4 +43,4 @@ bool bake_scene(const std::filesystem::path& scene, const std::filesystem::path&
 /// has changed. The cache is $XDG_CACHE_HOME/esim, or ~/.cache/esim.
 std::filesystem::path cached_glb(const std::filesystem::path& blend, const BlenderWatch& watch);
 
-}  // namespace esim
+}  // namespace esim::inline blender

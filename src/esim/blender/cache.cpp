@@ -10,7 +10,7 @@
 #include "esim/blender/scripts.h"
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline blender {
 namespace {
 
 namespace fs = std::filesystem;
@@ -107,4 +107,4 @@ fs::path cached_glb(const fs::path& blend, const BlenderWatch& watch) {
   return glb;
 }
 
-}  // namespace esim
+}  // namespace esim::inline blender

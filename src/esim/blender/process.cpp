@@ -20,7 +20,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline blender {
 namespace {
 
 constexpr std::size_t kTailLines = 40, kLongestLine = 2000;
@@ -217,4 +217,4 @@ std::optional<int> RunningProcess::exit_status() {
 
 std::string RunningProcess::output_tail() const { return state_->lines.tail(); }
 
-}  // namespace esim
+}  // namespace esim::inline blender

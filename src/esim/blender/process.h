@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace esim {
+namespace esim::inline blender {
 
 /// How a program ended, and its output.
 struct ProcessResult {
@@ -50,4 +50,4 @@ class RunningProcess {
 /// The path of a program: `name` itself if it has a slash, otherwise the first match on PATH; empty if not found.
 std::string find_program(const std::string& name);
 
-}  // namespace esim
+}  // namespace esim::inline blender

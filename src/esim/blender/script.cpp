@@ -13,7 +13,7 @@
 #include "esim/blender/process.h"
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline blender {
 
 namespace fs = std::filesystem;
 
@@ -83,4 +83,4 @@ std::string reason_in(const std::string& output) {
   return reason.empty() ? last : reason;
 }
 
-}  // namespace esim
+}  // namespace esim::inline blender

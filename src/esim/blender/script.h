@@ -5,7 +5,7 @@
 #include <vector>
 
 /// Runs scripts in Blender.
-namespace esim {
+namespace esim::inline blender {
 
 /// A temporary folder for one run, which is removed with the object.
 class ScratchFolder {
@@ -47,4 +47,4 @@ std::vector<std::string> blender_command(const std::string& program, const Scrip
 /// The last line of Blender's output that looks like an error message, or else the last line.
 std::string reason_in(const std::string& output);
 
-}  // namespace esim
+}  // namespace esim::inline blender

@@ -1,6 +1,6 @@
 #pragma once
 
-namespace esim {
+namespace esim::inline blender {
 
 // The Python scripts for Blender; see the .py files of this folder.
 extern const char* const kCommonScript;  // precedes each of the others
@@ -8,4 +8,4 @@ extern const char* const kExportScript;
 extern const char* const kBakeScript;
 extern const char* const kServeScript;
 
-}  // namespace esim
+}  // namespace esim::inline blender

@@ -9,7 +9,7 @@
 #include "esim/blender/scripts.h"
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline blender {
 
 namespace fs = std::filesystem;
 
@@ -68,4 +68,4 @@ std::optional<std::string> BlenderServer::why_ended() {
                      parts_->needs_opengl && reason.find("GL") != std::string::npos ? kHowToGetOpenGl : "");
 }
 
-}  // namespace esim
+}  // namespace esim::inline blender

@@ -7,7 +7,7 @@
 
 #include "esim/blender/blender.h"
 
-namespace esim {
+namespace esim::inline blender {
 
 struct BlenderServerOptions {
   std::filesystem::path scene;
@@ -40,4 +40,4 @@ class BlenderServer {
   int port_ = 0;
 };
 
-}  // namespace esim
+}  // namespace esim::inline blender

@@ -9,7 +9,7 @@
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline compose {
 namespace {
 
 /// A started Blender and the connection to it, which is destroyed first.
@@ -79,4 +79,4 @@ RendererFactory start_blender(const BlenderRendererOptions& options, const std::
   };
 }
 
-}  // namespace esim
+}  // namespace esim::inline compose

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "esim/record/format.h"
+#include "esim/recording/format.h"
 #include "esim/scenario/conversion.h"
 #include "esim/scenario/scenario.h"
 #include "esim/scene/scene_file.h"
@@ -15,7 +15,7 @@
 #include "esim/sim/simulate.h"
 #include "esim/sim/world.h"
 
-namespace esim {
+namespace esim::inline compose {
 
 /// Receives one line that the user should know about; the program continues.
 using NoticeHandler = std::function<void(const std::string&)>;
@@ -147,4 +147,4 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
 std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,
                         const std::vector<std::string>& notices);
 
-}  // namespace esim
+}  // namespace esim::inline compose

@@ -4,9 +4,9 @@
 #include <type_traits>
 
 #include "esim/compose/compose.h"
-#include "esim/record/number_text.h"
+#include "esim/files/number_text.h"
 
-namespace esim {
+namespace esim::inline compose {
 namespace {
 
 // A readout counts as saturated if more than this fraction of the events waited for it.
@@ -101,4 +101,4 @@ std::vector<std::string> losses(const ConversionOptions& options, const Conversi
   return lines;
 }
 
-}  // namespace esim
+}  // namespace esim::inline compose

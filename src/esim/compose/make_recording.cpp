@@ -2,13 +2,13 @@
 #include <iterator>
 
 #include "esim/compose/compose.h"
-#include "esim/record/fan_out.h"
-#include "esim/record/keep_on_failure.h"
-#include "esim/record/output_file.h"
-#include "esim/record/recording_directory.h"
+#include "esim/files/output_file.h"
+#include "esim/recording/fan_out.h"
+#include "esim/recording/keep_on_failure.h"
+#include "esim/recording/recording_directory.h"
 #include "esim/scenario/read.h"
 
-namespace esim {
+namespace esim::inline compose {
 Notices keeping(Notices notify, std::vector<std::string>& given) {
   return {[warning = std::move(notify.warning), &given](const std::string& text) {
             given.push_back("warning: " + text);
@@ -49,4 +49,4 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
   });
 }
 
-}  // namespace esim
+}  // namespace esim::inline compose

@@ -12,9 +12,9 @@
 #include "esim/backends/unrealcv/unrealcv_renderer.h"
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
-#include "esim/scene/image_file.h"
+#include "esim/scene/images/image_file.h"
 
-namespace esim {
+namespace esim::inline compose {
 namespace {
 
 void require_path(const std::filesystem::path& path, const std::string& key) {
@@ -157,4 +157,4 @@ RendererFactory build_renderer_factory(const RendererOptions& options, const Sce
       options);
 }
 
-}  // namespace esim
+}  // namespace esim::inline compose

@@ -8,7 +8,7 @@
 #include "esim/core/error.h"
 #include "esim/scenario/read.h"
 
-namespace esim {
+namespace esim::inline compose {
 namespace {
 
 bool same_rays(const Camera& a, const Camera& b) {
@@ -105,4 +105,4 @@ Image<Rgb> ScenePictures::render(const Camera& camera, int finer, RenderRequest 
   return picture;
 }
 
-}  // namespace esim
+}  // namespace esim::inline compose

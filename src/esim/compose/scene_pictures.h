@@ -3,9 +3,9 @@
 #include <memory>
 
 #include "esim/compose/compose.h"
-#include "esim/record/preview/colours.h"
+#include "esim/preview/colours.h"
 
-namespace esim {
+namespace esim::inline compose {
 
 /// Images of a scenario's scene for display: from any pose, through any camera, at any time. The scene is loaded once.
 /// Images are in colour if the renderer supports it.
@@ -41,4 +41,4 @@ Camera scaled(const Camera& camera, int width, int height);
 /// without meshes.
 SE3 before_the_meshes(const Scene& scene, const Camera& camera);
 
-}  // namespace esim
+}  // namespace esim::inline compose

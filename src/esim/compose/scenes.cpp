@@ -4,7 +4,7 @@
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline compose {
 namespace {
 
 Lighting lighting_of(const LambertOptions& options) {
@@ -87,4 +87,4 @@ SceneFile load_scenes(const Scenario& scenario, SceneLook look, const Notices& n
   return std::visit([&](const auto& renderer) { return load(renderer, look, notices); }, scenario.renderer);
 }
 
-}  // namespace esim
+}  // namespace esim::inline compose

@@ -4,22 +4,23 @@
 
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
-#include "esim/record/adapters.h"
-#include "esim/record/background_sink.h"
-#include "esim/record/fan_out.h"
-#include "esim/record/formats/calibration_files.h"
-#include "esim/record/formats/event_points_ply.h"
-#include "esim/record/formats/events_hdf5.h"
-#include "esim/record/formats/frames_png.h"
-#include "esim/record/formats/images_png.h"
-#include "esim/record/formats/imu_csv.h"
-#include "esim/record/formats/poses_tum.h"
-#include "esim/record/formats/states_csv.h"
-#include "esim/record/formats/truth_hdf5.h"
-#include "esim/record/output_file.h"
-#include "esim/record/preview/preview_writer.h"
+#include "esim/files/output_file.h"
+#include "esim/formats/formats.h"
+#include "esim/formats/hdf5/dsec.h"
+#include "esim/formats/hdf5/truth.h"
+#include "esim/formats/images/frames_png.h"
+#include "esim/formats/images/images_png.h"
+#include "esim/formats/recording_folder/calibration_files.h"
+#include "esim/formats/recording_folder/event_points_ply.h"
+#include "esim/formats/text/imu_csv.h"
+#include "esim/formats/text/poses_tum.h"
+#include "esim/formats/text/states_csv.h"
+#include "esim/preview/preview_writer.h"
+#include "esim/recording/adapters.h"
+#include "esim/recording/background_sink.h"
+#include "esim/recording/fan_out.h"
 
-namespace esim {
+namespace esim::inline compose {
 namespace {
 
 Compression compression_of(EventCompression compression) {
@@ -128,4 +129,4 @@ std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& file, c
   return std::make_unique<BackgroundSink>(format.create(file, {}));
 }
 
-}  // namespace esim
+}  // namespace esim::inline compose

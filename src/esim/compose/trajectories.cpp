@@ -5,13 +5,13 @@
 #include "esim/compose/compose.h"
 #include "esim/compose/waypoints.h"
 #include "esim/core/error.h"
-#include "esim/motion/fit.h"
+#include "esim/motion/fit/fit.h"
 #include "esim/motion/random.h"
 #include "esim/motion/resting.h"
 #include "esim/motion/static.h"
 #include "esim/motion/trajectory_file.h"
 
-namespace esim {
+namespace esim::inline compose {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -217,4 +217,4 @@ std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const S
   return trajectories;
 }
 
-}  // namespace esim
+}  // namespace esim::inline compose

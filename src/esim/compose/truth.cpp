@@ -5,7 +5,7 @@
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline compose {
 namespace {
 
 void check_displacement(const TruthOptions& truth, PeriodicClock clock, double duration_s,
@@ -94,4 +94,4 @@ void prepare_truth(const Scenario& scenario, const SceneFile& scene, const Rende
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline compose

@@ -8,7 +8,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline compose {
 namespace {
 
 /// The orientation of a body at `position` so that its camera, at T_body_camera, has `target` on its optical axis, its
@@ -89,4 +89,4 @@ WaypointTrajectory waypoint_trajectory(const WaypointTrajectoryOptions& options,
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline compose

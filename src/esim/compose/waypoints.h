@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
-#include "esim/motion/waypoints.h"
+#include "esim/motion/waypoints/waypoints.h"
 #include "esim/scenario/scenario.h"
 
-namespace esim {
+namespace esim::inline compose {
 
 /// The poses of the body at a list of points; look_at aims the optical axis of the camera at T_body_camera. Throws
 /// UserError with the point's index if an orientation is missing, given twice or zero, or if the camera cannot look at
@@ -17,4 +17,4 @@ std::vector<Waypoint> waypoints_of(const std::vector<WaypointPointOptions>& poin
 WaypointTrajectory waypoint_trajectory(const WaypointTrajectoryOptions& options, const SE3& T_body_camera,
                                        const std::string& key);
 
-}  // namespace esim
+}  // namespace esim::inline compose

@@ -10,7 +10,7 @@
 #include "esim/sampling/supersampling.h"
 #include "esim/scenario/read.h"
 
-namespace esim {
+namespace esim::inline compose {
 namespace {
 
 void check_sampling(const CameraOptions& camera, const Notices& notices) {
@@ -280,4 +280,4 @@ World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> bo
   return build(scenario, scene, std::move(body), span, Substitutes{}, threads, notices);
 }
 
-}  // namespace esim
+}  // namespace esim::inline compose

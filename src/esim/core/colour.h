@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 
-namespace esim {
+namespace esim::inline core {
 
 /// The colour filters of a sensor's pixels.
 enum class ColourFilters {
@@ -19,4 +19,4 @@ using PerColour = std::array<T, 3>;
 /// green (1) elsewhere.
 constexpr std::size_t colour_at(int x, int y) { return static_cast<std::size_t>((x & 1) + (y & 1)); }
 
-}  // namespace esim
+}  // namespace esim::inline core

@@ -3,7 +3,7 @@
 #include <array>
 #include <limits>
 
-namespace esim {
+namespace esim::inline core {
 
 /// The description of an option. Every struct of options has a function template
 /// `template <class Visitor> void describe(Visitor& visit, Options& options)`
@@ -22,4 +22,4 @@ struct About {
 template <typename Enum>
 inline constexpr std::array<const char*, 0> kEnumNames{};
 
-}  // namespace esim
+}  // namespace esim::inline core

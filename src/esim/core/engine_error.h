@@ -2,7 +2,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline core {
 
 /// An external program that renders the scene failed or answered incorrectly. What was simulated before is kept.
 class EngineError : public UserError {
@@ -10,4 +10,4 @@ class EngineError : public UserError {
   using UserError::UserError;
 };
 
-}  // namespace esim
+}  // namespace esim::inline core

@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace esim {
+namespace esim::inline core {
 
 /// Base of all exceptions of the library. The message is one line: what is wrong, where, and what to do.
 class Error : public std::runtime_error {
@@ -29,4 +29,4 @@ class InternalError : public Error {
   using Error::Error;
 };
 
-}  // namespace esim
+}  // namespace esim::inline core

@@ -1,6 +1,6 @@
 #pragma once
 
-namespace esim {
+namespace esim::inline core {
 
 /// Arc tangent of t on [0, 1], within 3e-7: the polynomial of Abramowitz and Stegun, 4.4.49, from operations that
 /// compile to SIMD code.
@@ -17,4 +17,4 @@ inline float fast_arc_tangent(float t) {
   return (angle * s + 1.0F) * t;
 }
 
-}  // namespace esim
+}  // namespace esim::inline core

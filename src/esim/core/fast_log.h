@@ -3,7 +3,7 @@
 #include <bit>
 #include <cstdint>
 
-namespace esim {
+namespace esim::inline core {
 
 /// Binary logarithm within 3e-6 plus the rounding of a float, for x > 0, normal and finite. Monotone, continuous, exact
 /// at powers of two, and built from operations that compile to SIMD code. Use it for decisions (a level of detail, a
@@ -21,4 +21,4 @@ inline float fast_log2(float x) {
 /// Natural logarithm, likewise.
 inline float fast_log(float x) { return 0.6931471806F * fast_log2(x); }
 
-}  // namespace esim
+}  // namespace esim::inline core

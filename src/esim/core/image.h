@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-namespace esim {
+namespace esim::inline core {
 
 /// A rectangle of pixels: columns [x, x+width), rows [y, y+height).
 struct Tile {
@@ -75,4 +75,4 @@ class ImageView {
   std::ptrdiff_t stride_ = 0, first_ = 0;
 };
 
-}  // namespace esim
+}  // namespace esim::inline core

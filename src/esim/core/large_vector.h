@@ -8,7 +8,7 @@
 #include <sys/mman.h>
 #endif
 
-namespace esim {
+namespace esim::inline core {
 
 /// Allocates large arrays on huge pages if the system has some, so that scattered access rarely waits for page tables.
 template <typename T>
@@ -46,4 +46,4 @@ struct LargeAllocator {
 template <typename T>
 using LargeVector = std::vector<T, LargeAllocator<T>>;
 
-}  // namespace esim
+}  // namespace esim::inline core

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace esim {
+namespace esim::inline core {
 
 /// Mean, maximum and quantiles of values >= 0. Weights are collected in bins a hundredth of a decade wide (2.3 %), from
 /// 1e-9 to 1e3; values outside belong to the outermost bins.
@@ -37,4 +37,4 @@ class LogHistogram {
   double total_ = 0, sum_ = 0, max_ = 0;
 };
 
-}  // namespace esim
+}  // namespace esim::inline core

@@ -7,7 +7,7 @@
 #include <atomic>
 #include <thread>
 
-namespace esim {
+namespace esim::inline core {
 
 struct Workers::Arena {
   explicit Arena(int threads, int processors) : threads_count(threads), arena(std::min(threads, processors)) {}
@@ -55,4 +55,4 @@ void Workers::for_each_with_worker(int count, const std::function<void(int, int)
 #endif
 }
 
-}  // namespace esim
+}  // namespace esim::inline core

@@ -3,7 +3,7 @@
 #include <functional>
 #include <memory>
 
-namespace esim {
+namespace esim::inline core {
 
 /// A fixed number of threads for data-parallel loops. Results must not depend on how work is divided:
 /// callers split work into pieces, and each piece writes only its own data.
@@ -31,4 +31,4 @@ class Workers {
   std::unique_ptr<Arena> arena_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline core

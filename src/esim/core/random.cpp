@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace esim {
+namespace esim::inline core {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
@@ -78,4 +78,4 @@ std::array<double, 2> AddressedRandom::normals(std::uint32_t item, std::uint64_t
   return {radius * std::cos(angle), radius * std::sin(angle)};
 }
 
-}  // namespace esim
+}  // namespace esim::inline core

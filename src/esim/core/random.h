@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace esim {
+namespace esim::inline core {
 
 /// What a random number is used for. Results depend on the values: never renumber them.
 enum class Purpose : std::uint16_t {
@@ -61,4 +61,4 @@ class AddressedRandom {
   std::uint32_t address_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline core

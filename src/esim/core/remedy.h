@@ -4,7 +4,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline core {
 
 /// An option with which the caller can avoid an error or a loss. The interfaces name it differently: the command line
 /// adds its flag to the message, the Python package its argument.
@@ -29,4 +29,4 @@ class RemediableError : public UserError {
   Remedy remedy_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline core

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
-namespace esim {
+namespace esim::inline core {
 
 /// Instants and durations, in nanoseconds. All times that are stored or compared have this type; seconds as `double`
 /// appear only in spline mathematics and in the user's options.
@@ -23,4 +23,4 @@ constexpr double to_seconds(TimeNs t) { return static_cast<double>(t) * 1e-9; }
 /// Nearest nanosecond. `seconds` must be finite and within ±292 years.
 inline TimeNs to_ns(double seconds) { return static_cast<TimeNs>(std::llround(seconds * 1e9)); }
 
-}  // namespace esim
+}  // namespace esim::inline core

@@ -8,7 +8,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline dataset {
 namespace {
 
 std::optional<std::uint32_t> number(std::string_view text) {
@@ -76,4 +76,4 @@ std::string slurm_script(const SlurmJob& job) {
   return script + fmt::format(" --shard auto/{}\n", job.tasks);
 }
 
-}  // namespace esim
+}  // namespace esim::inline dataset

@@ -7,7 +7,7 @@
 
 #include "esim/dataset/produce.h"
 
-namespace esim {
+namespace esim::inline dataset {
 
 /// The part of a dataset that this process makes. `text` is "I/N" with I from 0; "auto/N" with I from the task of a
 /// Slurm array or the pod of an indexed Kubernetes job (JOB_COMPLETION_INDEX); or empty: the task of a Slurm array if
@@ -32,4 +32,4 @@ std::string slurm_script(const SlurmJob& job);
 /// A text quoted as one word of a shell.
 std::string shell_quoted(const std::string& word);
 
-}  // namespace esim
+}  // namespace esim::inline dataset

@@ -3,9 +3,9 @@
 #include <stdexcept>
 
 #include "esim/dataset/sequence.h"
-#include "esim/record/record.h"
+#include "esim/recording/record.h"
 
-namespace esim {
+namespace esim::inline dataset {
 
 /// Collects the events of a recording's first camera in a sequence.
 class Collector final : public Sink {
@@ -31,4 +31,4 @@ class Collector final : public Sink {
   Sequence& sequence_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline dataset

@@ -11,11 +11,11 @@
 #include <vector>
 
 #include "esim/core/error.h"
-#include "esim/dataset/checksum.h"
-#include "esim/dataset/preview.h"
-#include "esim/record/output_file.h"
+#include "esim/dataset/files/checksum.h"
+#include "esim/dataset/files/preview.h"
+#include "esim/files/output_file.h"
 
-namespace esim {
+namespace esim::inline dataset {
 namespace {
 
 namespace fs = std::filesystem;
@@ -163,4 +163,4 @@ Production produce(const DatasetFolder& folder, const SequenceMaker& maker, cons
   return Run(folder, maker, share, monitor).finish(threads);
 }
 
-}  // namespace esim
+}  // namespace esim::inline dataset

@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <functional>
 
-#include "esim/dataset/dataset_folder.h"
+#include "esim/dataset/files/dataset_folder.h"
 #include "esim/dataset/sequence_maker.h"
 
-namespace esim {
+namespace esim::inline dataset {
 
 /// The part of this process: it makes the shards whose numbers are `part` modulo `parts`.
 struct Share {
@@ -34,4 +34,4 @@ struct Production {
 Production produce(const DatasetFolder& folder, const SequenceMaker& maker, const Share& share, int threads,
                    const ProductionMonitor& monitor);
 
-}  // namespace esim
+}  // namespace esim::inline dataset

@@ -9,7 +9,7 @@
 #include "esim/core/time.h"
 #include "esim/events/event.h"
 
-namespace esim {
+namespace esim::inline dataset {
 
 /// A vector for each pixel: x to the right, y downwards.
 struct VectorField {
@@ -35,4 +35,4 @@ struct Sequence {
   std::map<std::string, std::string> passed_over{};  ///< unusable images and the reasons
 };
 
-}  // namespace esim
+}  // namespace esim::inline dataset

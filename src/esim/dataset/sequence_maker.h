@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <string>
 
-#include "esim/dataset/magnitudes.h"
+#include "esim/dataset/generators/magnitudes.h"
 #include "esim/dataset/sequence.h"
 
-namespace esim {
+namespace esim::inline dataset {
 
 /// The source of the sequences of a dataset.
 class SequenceMaker {
@@ -24,4 +24,4 @@ class SequenceMaker {
   virtual Sequence make(std::uint32_t index) const = 0;
 };
 
-}  // namespace esim
+}  // namespace esim::inline dataset

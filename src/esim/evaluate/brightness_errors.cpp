@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace esim {
+namespace esim::inline evaluate {
 
 BrightnessErrors::BrightnessErrors(ReferenceBrightness& reference, int width, int height,
                                    const std::vector<Window>& windows, double contrast_threshold)
@@ -90,4 +90,4 @@ std::vector<BrightnessError> BrightnessErrors::finish() const {
   return errors;
 }
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

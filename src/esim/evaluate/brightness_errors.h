@@ -8,7 +8,7 @@
 #include "esim/evaluate/reference_brightness.h"
 #include "esim/evaluate/windows.h"
 
-namespace esim {
+namespace esim::inline evaluate {
 
 /// The errors at the pixels of one kind of place.
 struct PlaceError {
@@ -71,4 +71,4 @@ class BrightnessErrors {
   std::vector<Line> lines_;  // of the current segment
 };
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace esim {
+namespace esim::inline evaluate {
 namespace {
 
 enum class Step : std::uint8_t { pair, missing, spurious };
@@ -95,4 +95,4 @@ EventComparison compare_events(const EventsByPixel& reference, const EventsByPix
   return all;
 }
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

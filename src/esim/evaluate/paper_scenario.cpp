@@ -7,7 +7,7 @@
 
 #include "esim/motion/random.h"
 
-namespace esim {
+namespace esim::inline evaluate {
 namespace {
 
 constexpr double kDuration_s = 5, kPoses_hz = 250;
@@ -64,4 +64,4 @@ Scenario paper_scenario(const std::filesystem::path& panorama, const std::filesy
   return scenario;
 }
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

@@ -5,7 +5,7 @@
 
 #include "esim/scenario/scenario.h"
 
-namespace esim {
+namespace esim::inline evaluate {
 
 /// The setup of the paper's Section 4.1: camera rotations of varying speed in an 8-bit equirectangular image at
 /// infinity, smoothed with a median filter of 5 px; 346 x 260 px, horizontal field of view 75 degrees, thresholds 0.3.
@@ -17,4 +17,4 @@ Scenario paper_scenario(const std::filesystem::path& panorama, const std::filesy
 /// fastest), its maximum is 4500 px/s, and the camera turns at up to 1000 degrees per second.
 std::string paper_rotation();
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-namespace esim {
+namespace esim::inline evaluate {
 
 std::vector<PixelPosition> spread_pixels(int width, int height, int count) {
   const std::size_t all = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -35,4 +35,4 @@ PixelIndex::PixelIndex(int width, int height, const std::vector<PixelPosition>& 
     cells_(pixels_[i].x / kCell, pixels_[i].y / kCell).push_back(static_cast<int>(i));
 }
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

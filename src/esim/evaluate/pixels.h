@@ -4,7 +4,7 @@
 
 #include "esim/core/image.h"
 
-namespace esim {
+namespace esim::inline evaluate {
 
 /// A pixel's column and row.
 struct PixelPosition {
@@ -43,4 +43,4 @@ class PixelIndex {
   Image<std::vector<int>> cells_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

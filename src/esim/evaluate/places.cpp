@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace esim {
+namespace esim::inline evaluate {
 namespace {
 
 constexpr float kBent = 0.35F;    // change of the slope of 1/Z, in 1/Z per focal length
@@ -50,4 +50,4 @@ Image<Place> places_of(const Image<float>& depth, double focal_px) {
   return places;
 }
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

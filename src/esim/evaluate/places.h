@@ -5,7 +5,7 @@
 
 #include "esim/core/image.h"
 
-namespace esim {
+namespace esim::inline evaluate {
 
 /// What an image shows at a pixel, judged by depth.
 enum class Place : std::uint8_t {
@@ -23,4 +23,4 @@ inline constexpr std::array<const char*, 4> kPlaceNames = {"surface", "crease", 
 /// both sides.
 Image<Place> places_of(const Image<float>& depth, double focal_px);
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

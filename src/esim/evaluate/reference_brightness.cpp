@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace esim {
+namespace esim::inline evaluate {
 
 ReferenceBrightness::ReferenceBrightness(const World& world, std::vector<PixelPosition> pixels, double rate_hz,
                                          double log_eps, std::size_t memory_bytes)
@@ -67,4 +67,4 @@ void ReferenceBrightness::render(std::int64_t block, Entry& entry) {
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

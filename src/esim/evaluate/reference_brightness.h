@@ -8,7 +8,7 @@
 #include "esim/evaluate/places.h"
 #include "esim/sim/world.h"
 
-namespace esim {
+namespace esim::inline evaluate {
 
 /// The true brightness L = ln(E + log_eps) of some pixels of camera 0, rendered at start + k / rate and kept in blocks
 /// of kBlock instants. If the blocks exceed the memory limit, the least recently used ones are dropped, and rendered
@@ -60,4 +60,4 @@ class ReferenceBrightness {
   Sample sample_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

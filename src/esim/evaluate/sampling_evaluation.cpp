@@ -9,7 +9,7 @@
 #include "esim/scenario/sampling_text.h"
 #include "esim/sim/stopwatch.h"
 
-namespace esim {
+namespace esim::inline evaluate {
 namespace {
 
 /// Thrown if the monitor stops the evaluation.
@@ -286,4 +286,4 @@ std::optional<SamplingEvaluation> evaluate_sampling(const Scenario& scenario, co
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

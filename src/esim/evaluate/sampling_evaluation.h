@@ -10,7 +10,7 @@
 #include "esim/evaluate/event_comparison.h"
 #include "esim/evaluate/windows.h"
 
-namespace esim {
+namespace esim::inline evaluate {
 
 struct SamplingEvaluationOptions {
   std::vector<SamplingOptions> schemes;
@@ -88,4 +88,4 @@ std::optional<SamplingEvaluation> evaluate_sampling(const Scenario& scenario, co
 /// Computes the GoalCost of each family from the last window.
 std::vector<GoalCost> interpolate_goals(const std::vector<SchemeResult>& schemes, double rmse_goal);
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

@@ -4,7 +4,7 @@
 
 #include "esim/scenario/sampling_text.h"
 
-namespace esim {
+namespace esim::inline evaluate {
 namespace {
 
 std::vector<SamplingOptions> read_all(const std::vector<std::string>& texts) {
@@ -46,4 +46,4 @@ void make_quick(Scenario& scenario, SamplingEvaluationOptions& options) {
   options.event_span_s = std::min(options.event_span_s, 0.02);
 }
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

@@ -4,7 +4,7 @@
 
 #include "esim/evaluate/sampling_evaluation.h"
 
-namespace esim {
+namespace esim::inline evaluate {
 
 /// The paper's three schemes over the range of their one option, and every other sampling type with its defaults.
 std::vector<SamplingOptions> default_schemes();
@@ -15,4 +15,4 @@ std::vector<SamplingOptions> quick_schemes();
 /// Makes an evaluation short, for tests: less time, fewer pixels, a coarser reference of events.
 void make_quick(Scenario& scenario, SamplingEvaluationOptions& options);
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

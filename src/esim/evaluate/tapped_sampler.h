@@ -5,7 +5,7 @@
 
 #include "esim/sampling/sampler.h"
 
-namespace esim {
+namespace esim::inline evaluate {
 
 /// One step of a sampler: a sample and the segments that it completes.
 struct Tapped {
@@ -48,4 +48,4 @@ class TappedSampler final : public Sampler {
   TimeNs t_ = 0;  // of the last accepted sample
 };
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace esim {
+namespace esim::inline evaluate {
 namespace {
 
 /// All spans of a length within `within` that begin at an instant of the curve.
@@ -80,4 +80,4 @@ TimeSpan typical_part(const MotionCurve& motion, const Window& window, double le
                            [&](const TimeSpan& a, const TimeSpan& b) { return distance(a) < distance(b); });
 }
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

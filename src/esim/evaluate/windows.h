@@ -6,7 +6,7 @@
 #include "esim/evaluate/pixels.h"
 #include "esim/sim/world.h"
 
-namespace esim {
+namespace esim::inline evaluate {
 
 /// The speed of the image over time: the motion field of some pixels at the instants start + k / rate.
 struct MotionCurve {
@@ -38,4 +38,4 @@ std::vector<Window> choose_windows(const MotionCurve& motion, const TimeSpan& al
 /// shorter.
 TimeSpan typical_part(const MotionCurve& motion, const Window& window, double length_s);
 
-}  // namespace esim
+}  // namespace esim::inline evaluate

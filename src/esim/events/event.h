@@ -6,7 +6,7 @@
 
 #include "esim/core/time.h"
 
-namespace esim {
+namespace esim::inline events {
 
 /// One change of log-brightness reported by one pixel.
 struct Event {
@@ -28,4 +28,4 @@ struct Event {
 /// Consecutive events in canonical order.
 using EventSpan = std::span<const Event>;
 
-}  // namespace esim
+}  // namespace esim::inline events

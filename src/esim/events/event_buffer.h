@@ -8,7 +8,7 @@
 #include "esim/core/large_vector.h"
 #include "esim/events/event.h"
 
-namespace esim {
+namespace esim::inline events {
 
 /// Memory for events that is not initialised: a vector would fill it with zeros first.
 class EventBuffer {
@@ -53,4 +53,4 @@ class EventBuffer {
   std::size_t size_ = 0, capacity_ = 0;
 };
 
-}  // namespace esim
+}  // namespace esim::inline events

@@ -7,7 +7,7 @@
 
 #include "esim/events/event.h"
 
-namespace esim {
+namespace esim::inline events {
 
 /// Packs events of a limited time span into integers in the canonical order of events: half the memory, faster to sort.
 class EventPacking {
@@ -52,4 +52,4 @@ class EventPacking {
   int x_bits_, time_shift_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline events

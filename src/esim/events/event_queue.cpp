@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <utility>
 
-namespace esim {
+namespace esim::inline events {
 namespace {
 
 void merge(EventSpan a, EventSpan b, EventBuffer& out) {
@@ -83,4 +83,4 @@ std::size_t EventQueue::size() const {
   return count;
 }
 
-}  // namespace esim
+}  // namespace esim::inline events

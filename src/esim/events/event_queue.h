@@ -9,7 +9,7 @@
 #include "esim/events/event_buffer.h"
 #include "esim/events/event_sorter.h"
 
-namespace esim {
+namespace esim::inline events {
 
 /// Events that a sensor has generated but not delivered. Because tiles may be sampled at different times, events arrive
 /// in any order; they are released in canonical order up to the watermark.
@@ -57,4 +57,4 @@ class EventQueue {
   EventSorter sorter_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline events

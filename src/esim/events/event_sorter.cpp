@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <utility>
 
-namespace esim {
+namespace esim::inline events {
 namespace {
 
 constexpr int kMaxDigitBits = 11;
@@ -104,4 +104,4 @@ void EventSorter::sort(std::span<PackedEvents> parts, const Workers& workers, Ev
   for (PackedEvents& part : parts) part.clear();
 }
 
-}  // namespace esim
+}  // namespace esim::inline events

@@ -8,7 +8,7 @@
 #include "esim/events/event_buffer.h"
 #include "esim/events/packed_events.h"
 
-namespace esim {
+namespace esim::inline events {
 
 /// Sorts packed events: a radix sort of each time range, over the digits in which its times differ. Keeps its working
 /// memory.
@@ -24,4 +24,4 @@ class EventSorter {
   std::vector<std::uint64_t> keys_, scratch_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline events

@@ -4,7 +4,7 @@
 #include <bit>
 #include <numeric>
 
-namespace esim {
+namespace esim::inline events {
 
 void PackedEvents::expect(const EventPacking& packing, TimeNs duration) {
   packing_ = packing;
@@ -34,4 +34,4 @@ void PackedEvents::add(std::size_t count, TimeNs start, const double* time, cons
 
 std::size_t PackedEvents::size() const { return std::accumulate(sizes_.begin(), sizes_.end(), std::size_t{0}); }
 
-}  // namespace esim
+}  // namespace esim::inline events

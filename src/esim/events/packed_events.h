@@ -8,7 +8,7 @@
 
 #include "esim/events/event_packing.h"
 
-namespace esim {
+namespace esim::inline events {
 
 /// The packed events that one thread has generated, in any order but separated into time ranges, so that each range can
 /// be sorted independently.
@@ -36,4 +36,4 @@ class PackedEvents {
   std::array<std::size_t, kRanges> sizes_{};
 };
 
-}  // namespace esim
+}  // namespace esim::inline events

@@ -2,7 +2,7 @@
 
 #include "esim/geometry/so3.h"
 
-namespace esim {
+namespace esim::inline geometry {
 
 namespace {
 
@@ -75,4 +75,4 @@ SplineValue QuinticBezier::at(double t_s) const {
   return result;
 }
 
-}  // namespace esim
+}  // namespace esim::inline geometry

@@ -6,7 +6,7 @@
 
 #include "esim/geometry/bspline.h"
 
-namespace esim {
+namespace esim::inline geometry {
 
 /// A quintic Bézier curve on SO(3)×R³, over [0, duration_s]: with λ_j the cumulative Bernstein polynomials of degree 5,
 ///   p(t) = p_0 + Σ_{j=1}^5 λ_j(t) c_j,   R(t) = R_0 ∏_{j=1}^5 Exp(λ_j(t) d_j)
@@ -31,4 +31,4 @@ class QuinticBezier {
   std::array<Eigen::Vector3d, 5> rotation_increments_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline geometry

@@ -9,7 +9,7 @@
 #include "esim/core/error.h"
 #include "esim/geometry/so3.h"
 
-namespace esim {
+namespace esim::inline geometry {
 
 namespace {
 
@@ -176,4 +176,4 @@ SplineValue Se3Spline::at(double t_s) const {
   return result;
 }
 
-}  // namespace esim
+}  // namespace esim::inline geometry

@@ -8,7 +8,7 @@
 
 #include "esim/geometry/se3.h"
 
-namespace esim {
+namespace esim::inline geometry {
 
 inline constexpr int kMinSplineOrder = 2;
 inline constexpr int kMaxSplineOrder = 6;
@@ -137,4 +137,4 @@ class Se3Spline {
   std::vector<Eigen::Vector3d> positions_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline geometry

@@ -7,7 +7,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline geometry {
 namespace {
 
 /// The section of one sensor in a file.
@@ -218,4 +218,4 @@ CalibratedImu read_imu_calibration(const std::filesystem::path& file) {
   return calibrated;
 }
 
-}  // namespace esim
+}  // namespace esim::inline geometry

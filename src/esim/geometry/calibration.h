@@ -7,7 +7,7 @@
 #include "esim/geometry/camera.h"
 #include "esim/geometry/se3.h"
 
-namespace esim {
+namespace esim::inline geometry {
 
 /// One camera of a calibrated rig.
 struct CalibratedCamera {
@@ -37,4 +37,4 @@ struct CalibratedImu {
 /// offsets.
 CalibratedImu read_imu_calibration(const std::filesystem::path& file);
 
-}  // namespace esim
+}  // namespace esim::inline geometry

@@ -12,7 +12,7 @@
 #include "esim/core/error.h"
 #include "esim/geometry/distortion.h"
 
-namespace esim {
+namespace esim::inline geometry {
 
 namespace {
 
@@ -112,4 +112,4 @@ void Camera::validate() const {
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline geometry

@@ -4,7 +4,7 @@
 #include <optional>
 #include <variant>
 
-namespace esim {
+namespace esim::inline geometry {
 
 /// The distortion models map the ideal image point x = (X/Z, Y/Z) to the distorted one. r = |x|, θ = atan r.
 /// Each is invertible on its domain only; points outside the domain are not projected.
@@ -75,4 +75,4 @@ struct Camera {
   void validate() const;
 };
 
-}  // namespace esim
+}  // namespace esim::inline geometry

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-namespace esim {
+namespace esim::inline geometry {
 
 namespace {
 
@@ -197,4 +197,4 @@ std::optional<Eigen::Vector2d> undistort(const Fov& model, const Eigen::Vector2d
   return distorted * (std::tan(angle) / (2.0 * std::tan(0.5 * model.w) * radius));
 }
 
-}  // namespace esim
+}  // namespace esim::inline geometry

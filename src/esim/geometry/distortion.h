@@ -5,7 +5,7 @@
 
 #include "esim/geometry/camera.h"
 
-namespace esim {
+namespace esim::inline geometry {
 
 /// A distorted image point and its derivative with respect to the ideal one.
 struct Distorted {
@@ -25,4 +25,4 @@ std::optional<Eigen::Vector2d> undistort(const RadialTangential& model, const Ei
 std::optional<Eigen::Vector2d> undistort(const Equidistant& model, const Eigen::Vector2d& distorted);
 std::optional<Eigen::Vector2d> undistort(const Fov& model, const Eigen::Vector2d& distorted);
 
-}  // namespace esim
+}  // namespace esim::inline geometry

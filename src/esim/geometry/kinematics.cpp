@@ -1,6 +1,6 @@
 #include "esim/geometry/kinematics.h"
 
-namespace esim {
+namespace esim::inline geometry {
 
 Kinematics rigidly_attached(const Kinematics& body, const SE3& T_body_camera) {
   const Eigen::Quaterniond& R_world_body = body.T_world_body.rotation;
@@ -18,4 +18,4 @@ Kinematics rigidly_attached(const Kinematics& body, const SE3& T_body_camera) {
   return camera;
 }
 
-}  // namespace esim
+}  // namespace esim::inline geometry

@@ -4,7 +4,7 @@
 
 #include "esim/geometry/se3.h"
 
-namespace esim {
+namespace esim::inline geometry {
 
 /// The motion of a body at one instant. Gravity is not part of the acceleration.
 struct Kinematics {
@@ -26,4 +26,4 @@ struct InertialSignals {
 /// The result's "body" is C.
 Kinematics rigidly_attached(const Kinematics& body, const SE3& T_body_camera);
 
-}  // namespace esim
+}  // namespace esim::inline geometry

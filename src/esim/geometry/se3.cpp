@@ -6,7 +6,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline geometry {
 
 SE3 SE3::inverse() const {
   const Eigen::Quaterniond back = rotation.conjugate();
@@ -49,4 +49,4 @@ SE3 SE3::from_matrix(const Eigen::Matrix4d& matrix) {
   return {Eigen::Quaterniond(rotation).normalized(), matrix.topRightCorner<3, 1>()};
 }
 
-}  // namespace esim
+}  // namespace esim::inline geometry

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-namespace esim {
+namespace esim::inline geometry {
 
 /// A rigid transform. An SE3 named T_A_B maps points from frame B to frame A: p_A = rotation p_B + translation,
 /// so that T_A_C = T_A_B * T_B_C.
@@ -23,4 +23,4 @@ struct SE3 {
   static SE3 from_matrix(const Eigen::Matrix4d& matrix);
 };
 
-}  // namespace esim
+}  // namespace esim::inline geometry

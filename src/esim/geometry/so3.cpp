@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace esim {
+namespace esim::inline geometry {
 
 namespace {
 
@@ -64,4 +64,4 @@ Eigen::Matrix3d so3_left_jacobian(const Eigen::Vector3d& v) { return so3_right_j
 
 Eigen::Matrix3d so3_left_jacobian_inverse(const Eigen::Vector3d& v) { return so3_right_jacobian_inverse(-v); }
 
-}  // namespace esim
+}  // namespace esim::inline geometry

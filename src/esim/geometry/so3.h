@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-namespace esim {
+namespace esim::inline geometry {
 
 /// The skew-symmetric matrix of the cross product: hat(v) w = v × w.
 Eigen::Matrix3d hat(const Eigen::Vector3d& v);
@@ -32,4 +32,4 @@ Eigen::Matrix3d so3_left_jacobian(const Eigen::Vector3d& v);
 /// Inverse of the left Jacobian, for θ < 2π:   Log(Exp(δ) Exp(v)) = v + Jl⁻¹(v) δ + O(δ²)   (ibid., eq. 146).
 Eigen::Matrix3d so3_left_jacobian_inverse(const Eigen::Vector3d& v);
 
-}  // namespace esim
+}  // namespace esim::inline geometry

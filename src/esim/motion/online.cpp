@@ -10,7 +10,7 @@
 #include "esim/geometry/bspline.h"
 #include "esim/geometry/so3.h"
 
-namespace esim {
+namespace esim::inline motion {
 namespace {
 
 OnlineMotionOptions checked(const OnlineMotionOptions& options) {
@@ -73,4 +73,4 @@ Kinematics OnlineTrajectory::at(TimeNs t) const {
   return {value.pose, value.velocity, value.acceleration, value.angular_velocity, value.angular_acceleration};
 }
 
-}  // namespace esim
+}  // namespace esim::inline motion

@@ -5,7 +5,7 @@
 
 #include "esim/motion/trajectory.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 struct OnlineMotionOptions {
   TimeNs start = 0;
@@ -54,4 +54,4 @@ class OnlineTrajectory final : public Trajectory {
   Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();
 };
 
-}  // namespace esim
+}  // namespace esim::inline motion

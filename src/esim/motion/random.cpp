@@ -11,7 +11,7 @@
 #include "esim/core/random.h"
 #include "esim/geometry/so3.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 namespace {
 
@@ -73,4 +73,4 @@ SplineTrajectory random_trajectory(const RandomMotionOptions& options, TimeNs st
           start + duration};
 }
 
-}  // namespace esim
+}  // namespace esim::inline motion

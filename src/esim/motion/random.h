@@ -6,7 +6,7 @@
 #include "esim/core/time.h"
 #include "esim/motion/spline.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 struct RandomMotionOptions {
   Eigen::Vector3d position_amplitude_m = Eigen::Vector3d::Zero();    // along the axes of `center`, ≥ 0
@@ -29,4 +29,4 @@ struct RandomMotionOptions {
 SplineTrajectory random_trajectory(const RandomMotionOptions& options, TimeNs start, TimeNs duration,
                                    std::uint64_t seed, std::uint16_t stream = 0);
 
-}  // namespace esim
+}  // namespace esim::inline motion

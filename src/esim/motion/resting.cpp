@@ -6,7 +6,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 RestingTrajectory::RestingTrajectory(std::shared_ptr<const Trajectory> motion, TimeNs end)
     : motion_(std::move(motion)), end_(end) {
@@ -22,4 +22,4 @@ Kinematics RestingTrajectory::at(TimeNs t) const {
   return at_rest;
 }
 
-}  // namespace esim
+}  // namespace esim::inline motion

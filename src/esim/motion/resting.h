@@ -4,7 +4,7 @@
 
 #include "esim/motion/trajectory.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 /// A motion that rests at its last pose until `end`.
 class RestingTrajectory final : public Trajectory {
@@ -21,4 +21,4 @@ class RestingTrajectory final : public Trajectory {
   TimeNs end_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline motion

@@ -7,7 +7,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 SplineTrajectory::SplineTrajectory(Se3Spline spline, TimeNs start, TimeNs end)
     : spline_(std::move(spline)), start_(start), end_(end) {
@@ -26,4 +26,4 @@ Kinematics SplineTrajectory::at(TimeNs t) const {
   return {value.pose, value.velocity, value.acceleration, value.angular_velocity, value.angular_acceleration};
 }
 
-}  // namespace esim
+}  // namespace esim::inline motion

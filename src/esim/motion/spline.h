@@ -3,7 +3,7 @@
 #include "esim/geometry/bspline.h"
 #include "esim/motion/trajectory.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 /// The motion along a B-spline.
 class SplineTrajectory final : public Trajectory {
@@ -24,4 +24,4 @@ class SplineTrajectory final : public Trajectory {
   TimeNs end_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline motion

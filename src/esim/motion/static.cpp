@@ -4,7 +4,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 StaticTrajectory::StaticTrajectory(const SE3& T_world_body, TimeNs start, TimeNs duration)
     : start_(start), end_(start + duration) {
@@ -17,4 +17,4 @@ Kinematics StaticTrajectory::at(TimeNs t) const {
   return kinematics_;
 }
 
-}  // namespace esim
+}  // namespace esim::inline motion

@@ -2,7 +2,7 @@
 
 #include "esim/motion/trajectory.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 /// A body at rest for a given time.
 class StaticTrajectory final : public Trajectory {
@@ -20,4 +20,4 @@ class StaticTrajectory final : public Trajectory {
   TimeNs end_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline motion

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace esim {
+namespace esim::inline motion {
 
 std::optional<StampFault> find_stamp_fault(std::span<const TimedPose> poses) {
   for (std::size_t i = 1; i < poses.size(); ++i) {
@@ -39,4 +39,4 @@ TimeNs median_interval(std::span<const TimedPose> poses) {
   return *middle;
 }
 
-}  // namespace esim
+}  // namespace esim::inline motion

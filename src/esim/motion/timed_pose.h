@@ -9,7 +9,7 @@
 #include "esim/core/time.h"
 #include "esim/geometry/se3.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 struct TimedPose {
   TimeNs t = 0;
@@ -32,4 +32,4 @@ std::optional<StampFault> find_stamp_fault(std::span<const TimedPose> poses);
 /// The median of the intervals between successive stamps (the upper one of an even number). Needs two poses.
 TimeNs median_interval(std::span<const TimedPose> poses);
 
-}  // namespace esim
+}  // namespace esim::inline motion

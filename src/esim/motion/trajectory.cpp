@@ -4,7 +4,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 void Trajectory::require_covered(TimeNs t) const {
   if (t < start() || t > end()) {
@@ -12,4 +12,4 @@ void Trajectory::require_covered(TimeNs t) const {
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline motion

@@ -3,7 +3,7 @@
 #include "esim/core/time.h"
 #include "esim/geometry/kinematics.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 /// A motion over the closed interval [start, end]. The result of at() for a time never changes; several threads may
 /// call it.
@@ -22,4 +22,4 @@ class Trajectory {
   void require_covered(TimeNs t) const;
 };
 
-}  // namespace esim
+}  // namespace esim::inline motion

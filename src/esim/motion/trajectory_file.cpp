@@ -17,7 +17,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 namespace {
 
@@ -172,4 +172,4 @@ std::vector<TimedPose> read_trajectory(const std::filesystem::path& path) {
   return poses;
 }
 
-}  // namespace esim
+}  // namespace esim::inline motion

@@ -5,7 +5,7 @@
 
 #include "esim/motion/timed_pose.h"
 
-namespace esim {
+namespace esim::inline motion {
 
 /// Reads a list of poses T_world_body, in one of two formats, which are distinguished by their commas:
 ///
@@ -20,4 +20,4 @@ namespace esim {
 /// are not finite, zero quaternions, faulty stamps (find_stamp_fault), and fewer than two poses.
 std::vector<TimedPose> read_trajectory(const std::filesystem::path& path);
 
-}  // namespace esim
+}  // namespace esim::inline motion

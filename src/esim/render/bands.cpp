@@ -5,7 +5,7 @@
 
 #include "esim/render/motion_field.h"
 
-namespace esim {
+namespace esim::inline render {
 namespace {
 
 constexpr int kBandRows = 8;
@@ -76,4 +76,4 @@ void render_in_bands(std::span<const RenderRequest> requests, int width, int hei
   });
 }
 
-}  // namespace esim
+}  // namespace esim::inline render

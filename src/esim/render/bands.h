@@ -7,7 +7,7 @@
 #include "esim/render/pixel_rays.h"
 #include "esim/render/renderer.h"
 
-namespace esim {
+namespace esim::inline render {
 
 /// First step of every renderer: resizes `sample` and stores the request's time and tiles in it.
 void prepare(std::span<const RenderRequest> requests, int width, int height, Sample& sample);
@@ -22,4 +22,4 @@ void render_in_bands(std::span<const RenderRequest> requests, const PixelRays& r
 void render_in_bands(std::span<const RenderRequest> requests, int width, int height, const Workers& workers,
                      Sample& sample, const std::function<void(std::size_t which, const Tile& band)>& shade);
 
-}  // namespace esim
+}  // namespace esim::inline render

@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 
-namespace esim {
+namespace esim::inline render {
 namespace {
 
 Twist relative_to_world(const Kinematics& camera) {
@@ -71,4 +71,4 @@ void motion_field(const PixelRays& rays, const std::vector<Twist>& twists, const
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline render

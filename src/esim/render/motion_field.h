@@ -6,7 +6,7 @@
 #include "esim/render/pixel_rays.h"
 #include "esim/render/renderer.h"
 
-namespace esim {
+namespace esim::inline render {
 
 /// Motion of the camera relative to a rigid body, in the camera frame; m/s and rad/s.
 struct Twist {
@@ -33,4 +33,4 @@ std::vector<Twist> relative_twists(const RenderRequest& request);
 void motion_field(const PixelRays& rays, const std::vector<Twist>& twists, const Tile& tile, Sample& sample,
                   int every = 1);
 
-}  // namespace esim
+}  // namespace esim::inline render

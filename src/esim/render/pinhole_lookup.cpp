@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace esim {
+namespace esim::inline render {
 namespace {
 
 template <typename T>
@@ -157,4 +157,4 @@ void look_up_geometry(const PinholeView& view, const PinholeImage& image, const 
   if (with_objects) look_up_objects(view, image, tile, sample.object);
 }
 
-}  // namespace esim
+}  // namespace esim::inline render

@@ -6,7 +6,7 @@
 #include "esim/render/pinhole_view.h"
 #include "esim/render/sample.h"
 
-namespace esim {
+namespace esim::inline render {
 
 /// What a pinhole camera sees, from a renderer that supports no other camera.
 struct PinholeImage {
@@ -25,4 +25,4 @@ void look_up_light(const PinholeView& view, const PinholeImage& image, const Til
 /// which 1 / Z is linear; it is exact away from edges. The object is that of the nearest pixel.
 void look_up_geometry(const PinholeView& view, const PinholeImage& image, const Tile& tile, Sample& sample);
 
-}  // namespace esim
+}  // namespace esim::inline render

@@ -7,7 +7,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline render {
 namespace {
 
 constexpr int kMargin = 2;  // pixels around the positions that are looked up
@@ -99,4 +99,4 @@ Tile PinholeView::part_for(const Tile& tile) const {
   return {x0, y0, x1 - x0, y1 - y0};
 }
 
-}  // namespace esim
+}  // namespace esim::inline render

@@ -6,7 +6,7 @@
 #include "esim/geometry/camera.h"
 #include "esim/render/pixel_rays.h"
 
-namespace esim {
+namespace esim::inline render {
 
 /// Which pinhole images a renderer can draw.
 enum class Pinhole {
@@ -37,4 +37,4 @@ struct PinholeView {
 /// Throws UserError if the field of view is too wide for a pinhole image.
 PinholeView pinhole_view(const Camera& camera, const PixelRays& rays, Pinhole which);
 
-}  // namespace esim
+}  // namespace esim::inline render

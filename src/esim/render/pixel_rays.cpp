@@ -8,7 +8,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline render {
 
 PixelTable::PixelTable(Image<float> values) : width_(values.width()), height_(values.height()) {
   const auto width = static_cast<std::size_t>(width_);
@@ -47,4 +47,4 @@ PixelRays::PixelRays(const Camera& camera) {
   for (std::size_t i = 0; i < values.size(); ++i) *tables[i] = PixelTable(std::move(values[i]));
 }
 
-}  // namespace esim
+}  // namespace esim::inline render

@@ -7,7 +7,7 @@
 #include "esim/core/image.h"
 #include "esim/geometry/camera.h"
 
-namespace esim {
+namespace esim::inline render {
 
 /// A value per pixel. If all rows are equal, as without distortion, only one is stored, since rendering is limited by
 /// memory bandwidth.
@@ -71,4 +71,4 @@ class RayLanes {
   }
 };
 
-}  // namespace esim
+}  // namespace esim::inline render

@@ -1,6 +1,6 @@
 #include "esim/render/renderer.h"
 
-namespace esim {
+namespace esim::inline render {
 namespace {
 
 /// Evaluations of disjoint tiles, in sequence.
@@ -54,4 +54,4 @@ std::unique_ptr<Rendering> ProcessorRenderer::start_together(std::vector<RenderR
   return std::make_unique<Postponed>(*this, std::move(requests));
 }
 
-}  // namespace esim
+}  // namespace esim::inline render

@@ -11,7 +11,7 @@
 #include "esim/motion/trajectory.h"
 #include "esim/render/sample.h"
 
-namespace esim {
+namespace esim::inline render {
 
 /// The pixels of one camera that are evaluated at one time.
 struct RenderRequest {
@@ -86,4 +86,4 @@ class ProcessorRenderer : public Renderer {
   virtual void compute(std::span<const RenderRequest> requests, Sample& sample) const = 0;
 };
 
-}  // namespace esim
+}  // namespace esim::inline render

@@ -6,7 +6,7 @@
 #include "esim/core/image.h"
 #include "esim/core/time.h"
 
-namespace esim {
+namespace esim::inline render {
 
 /// One evaluation of the scene by one camera: a field per quantity, all of the image's size. Only the pixels in `tiles`
 /// are valid.
@@ -48,4 +48,10 @@ struct Segment {
   ImageView<float> irradiance1;  ///< E at t1
 };
 
-}  // namespace esim
+/// Rows [first, last) of an image.
+struct Rows {
+  int first, last;
+  int count() const { return last - first; }
+};
+
+}  // namespace esim::inline render

@@ -8,7 +8,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline represent {
 namespace {
 
 constexpr TimeNs kNever = std::numeric_limits<TimeNs>::min();
@@ -142,4 +142,4 @@ std::vector<std::uint8_t> event_frame(EventSpan events, int width, int height, c
   return std::move(frame.values);
 }
 
-}  // namespace esim
+}  // namespace esim::inline represent

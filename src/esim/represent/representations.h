@@ -11,7 +11,7 @@
 
 /// Events as arrays, for networks and for display. Events may be in any order unless stated otherwise. All functions
 /// throw UserError for invalid sizes, and for events outside the sensor, naming the first.
-namespace esim {
+namespace esim::inline represent {
 
 /// Images of one size, stored one after the other, row by row.
 template <typename T>
@@ -55,4 +55,4 @@ struct FramePalette {
 /// An image for display, height x width x 3: each pixel has the colour of its last event in the list.
 std::vector<std::uint8_t> event_frame(EventSpan events, int width, int height, const FramePalette& palette);
 
-}  // namespace esim
+}  // namespace esim::inline represent

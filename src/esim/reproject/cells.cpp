@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace esim {
+namespace esim::inline reproject {
 namespace {
 
 // Cells around a pixel's centre see the same surface if their nearness differs by at most this fraction.
@@ -63,4 +63,4 @@ Edge Cells::edge_in(int x, int y) const {
   return Edge::none;
 }
 
-}  // namespace esim
+}  // namespace esim::inline reproject

@@ -7,7 +7,7 @@
 #include "esim/reproject/depth_splat.h"
 #include "esim/reproject/keyframe.h"
 
-namespace esim {
+namespace esim::inline reproject {
 
 /// The surfaces that a view sees at supersampling x supersampling places within each of its pixels. A cell has the size
 /// of a keyframe pixel.
@@ -42,4 +42,4 @@ class Cells {
   VisibleSurface cells_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline reproject

@@ -6,7 +6,7 @@
 
 #include "esim/reproject/lens.h"
 
-namespace esim {
+namespace esim::inline reproject {
 
 std::vector<ViewChange> view_changes(const RenderRequest& from, const RenderRequest& to) {
   const SE3 T_to_world = to.camera.T_world_body.inverse();
@@ -138,4 +138,4 @@ void DepthSplat::splat(const std::vector<SeenPoints>& keyframes, const RenderReq
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline reproject

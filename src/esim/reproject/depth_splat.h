@@ -7,7 +7,7 @@
 #include "esim/core/parallel.h"
 #include "esim/reproject/keyframe.h"
 
-namespace esim {
+namespace esim::inline reproject {
 
 /// Transforms points from one view to another: for a bearing b and a nearness w = 1/Z in the first view, y = R b + w t
 /// is the point in the second view divided by Z; it appears at y / y_z with the nearness w / y_z. w = 0 is infinity.
@@ -63,4 +63,4 @@ class DepthSplat {
   std::vector<float> first_row_, last_row_;      // of the points in each chunk
 };
 
-}  // namespace esim
+}  // namespace esim::inline reproject

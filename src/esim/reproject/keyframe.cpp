@@ -8,7 +8,7 @@
 #include "esim/core/error.h"
 #include "esim/reproject/spline_coefficients.h"
 
-namespace esim {
+namespace esim::inline reproject {
 namespace {
 
 /// Mean over the s x s pixels that begin at each pixel.
@@ -105,4 +105,4 @@ void prepare_keyframe(const KeyframeLayout& layout, const PixelRays& rays, bool 
   find_surfaces(layout, rays, sample, workers, keyframe);
 }
 
-}  // namespace esim
+}  // namespace esim::inline reproject

@@ -7,7 +7,7 @@
 #include "esim/render/renderer.h"
 #include "esim/reproject/surfaces.h"
 
-namespace esim {
+namespace esim::inline reproject {
 
 /// Layout of a keyframe's image relative to the sensor's: `supersampling` keyframe pixels per sensor pixel along each
 /// side, and a margin of `margin_px` sensor pixels on each side. The centre of the sensor's pixel (u, v) is at
@@ -55,4 +55,4 @@ struct Keyframe {
 void prepare_keyframe(const KeyframeLayout& layout, const PixelRays& rays, bool at_infinity, RenderRequest view,
                       Sample& sample, const Workers& workers, Keyframe& keyframe);
 
-}  // namespace esim
+}  // namespace esim::inline reproject

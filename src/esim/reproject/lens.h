@@ -5,7 +5,7 @@
 #include "esim/core/fast_arc_tangent.h"
 #include "esim/geometry/camera.h"
 
-namespace esim {
+namespace esim::inline reproject {
 
 /// Maps a bearing (x, y, 1) to the distorted image point in single precision, for loops that compile to SIMD code: the
 /// formulae of camera.h. Valid if |bearing| is at most that of a pixel of the camera.
@@ -109,4 +109,4 @@ struct Projector {
   }
 };
 
-}  // namespace esim
+}  // namespace esim::inline reproject

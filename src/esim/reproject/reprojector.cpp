@@ -11,7 +11,7 @@
 #include "esim/reproject/lens.h"
 #include "esim/reproject/row_lookup.h"
 
-namespace esim {
+namespace esim::inline reproject {
 namespace {
 
 double greatest_radius(const PixelRays& rays) {
@@ -219,4 +219,4 @@ void Reprojector::refine(const Between& between, const Model& model, Reconstruct
   });
 }
 
-}  // namespace esim
+}  // namespace esim::inline reproject

@@ -4,7 +4,7 @@
 #include "esim/reproject/depth_splat.h"
 #include "esim/reproject/keyframe.h"
 
-namespace esim {
+namespace esim::inline reproject {
 
 /// Result of a reconstruction.
 struct Reconstruction {
@@ -60,4 +60,4 @@ class Reprojector {
   VisibleSurface surface_;  // of the sensor's pixels
 };
 
-}  // namespace esim
+}  // namespace esim::inline reproject

@@ -7,7 +7,7 @@
 #include "esim/reproject/lens.h"
 #include "esim/reproject/spline_coefficients.h"
 
-namespace esim {
+namespace esim::inline reproject {
 
 /// A keyframe sees a surface if their nearness agrees within this fraction.
 inline constexpr float kSameSurface = 0.02F;
@@ -74,4 +74,4 @@ void look_up_row(const Keyframe::Light& light, float offset, RowLookup& row) {
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline reproject

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace esim {
+namespace esim::inline reproject {
 namespace {
 
 constexpr float kPole = -0.26794919243F;  // sqrt(3) - 2: pole of the recursive filter in both directions
@@ -45,4 +45,4 @@ void to_spline_coefficients(Image<float>& image, const Workers& workers) {
   });
 }
 
-}  // namespace esim
+}  // namespace esim::inline reproject

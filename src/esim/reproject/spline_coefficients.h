@@ -3,7 +3,7 @@
 #include "esim/core/image.h"
 #include "esim/core/parallel.h"
 
-namespace esim {
+namespace esim::inline reproject {
 
 /// Weights of the cubic B-spline at the fraction f between the second and the third of four coefficients.
 struct CubicSpline {
@@ -25,4 +25,4 @@ struct CubicSpline {
 /// mirrored beyond its borders. At least 2 x 2 pixels.
 void to_spline_coefficients(Image<float>& image, const Workers& workers);
 
-}  // namespace esim
+}  // namespace esim::inline reproject

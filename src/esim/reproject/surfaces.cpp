@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace esim {
+namespace esim::inline reproject {
 namespace {
 
 /// Neighbouring pixels belong to different surfaces if 1/Z deviates by more than this fraction from the straight line
@@ -134,4 +134,4 @@ void Surfaces::add_point(const PixelRays& rays, const Image<std::uint16_t>& obje
   to.edge.push_back(edge);
 }
 
-}  // namespace esim
+}  // namespace esim::inline reproject

@@ -7,7 +7,7 @@
 #include "esim/core/parallel.h"
 #include "esim/render/pixel_rays.h"
 
-namespace esim {
+namespace esim::inline reproject {
 
 /// Kind of the edge in a pixel, judged by depth.
 enum class Edge : std::uint8_t {
@@ -55,4 +55,4 @@ class Surfaces {
   Image<float> nearness_, slope_x_, slope_y_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline reproject

@@ -5,7 +5,7 @@
 #include "esim/sampling/criterion.h"
 #include "esim/sampling/row_maximum.h"
 
-namespace esim {
+namespace esim::inline sampling {
 
 double fastest_brightness_change_per_s(const Sample& sample, double log_eps, const Workers& workers, bool mosaic) {
   const Image<float>& irradiance = sample.irradiance;
@@ -48,4 +48,4 @@ double wanted_interval_s(const BrightnessSampling& options, const SensorTraits& 
          fastest_brightness_change_per_s(sample, sensor.log_eps, workers, sensor.mosaic);
 }
 
-}  // namespace esim
+}  // namespace esim::inline sampling

@@ -9,7 +9,7 @@
 #include "esim/render/renderer.h"
 #include "esim/sampling/measured_error.h"
 
-namespace esim {
+namespace esim::inline sampling {
 
 /// Properties of the event camera that a criterion may need.
 struct SensorTraits {
@@ -32,4 +32,4 @@ struct SamplingContext {
   std::optional<MeasuredError> resampling_floor{};  ///< of keyframes, if it was measured
 };
 
-}  // namespace esim
+}  // namespace esim::inline sampling

@@ -5,7 +5,7 @@
 #include "esim/sampling/context.h"
 #include "esim/sampling/options.h"
 
-namespace esim {
+namespace esim::inline sampling {
 
 /// Time until the next sample, s; +inf if the criterion sees no change.
 double wanted_interval_s(const BrightnessSampling& options, const SensorTraits&, const Sample&, const Workers&);
@@ -19,4 +19,4 @@ double fastest_motion_px_per_s(const Sample& sample, const Workers& workers);
 double fastest_brightness_change_per_s(const Sample& sample, double log_eps, const Workers& workers,
                                        bool mosaic = false);
 
-}  // namespace esim
+}  // namespace esim::inline sampling

@@ -4,7 +4,7 @@
 #include "esim/sampling/criterion.h"
 #include "esim/sampling/row_maximum.h"
 
-namespace esim {
+namespace esim::inline sampling {
 
 double fastest_motion_px_per_s(const Sample& sample, const Workers& workers) {
   const int width = sample.flow_x.width();
@@ -26,4 +26,4 @@ double wanted_interval_s(const FlowSampling& options, const SensorTraits&, const
   return options.lambda / fastest_motion_px_per_s(sample, workers);
 }
 
-}  // namespace esim
+}  // namespace esim::inline sampling

@@ -5,7 +5,7 @@
 
 #include "esim/sampling/criterion.h"
 
-namespace esim {
+namespace esim::inline sampling {
 namespace {
 
 class FrameSampler final : public Sampler {
@@ -82,4 +82,4 @@ std::unique_ptr<Sampler> make_frame_sampler(const FrameScheme& scheme, const Sam
   return std::make_unique<FrameSampler>(scheme, context);
 }
 
-}  // namespace esim
+}  // namespace esim::inline sampling

@@ -7,7 +7,7 @@
 #include "esim/sampling/options.h"
 #include "esim/sampling/sampler.h"
 
-namespace esim {
+namespace esim::inline sampling {
 
 /// The schemes that sample the whole image at once, as the paper does.
 using FrameScheme = std::variant<FlowSampling, BrightnessSampling, UniformSampling>;
@@ -16,4 +16,4 @@ using FrameScheme = std::variant<FlowSampling, BrightnessSampling, UniformSampli
 /// between from the sample at its start, within the bounds on the rate.
 std::unique_ptr<Sampler> make_frame_sampler(const FrameScheme& scheme, const SamplingContext& context);
 
-}  // namespace esim
+}  // namespace esim::inline sampling

@@ -11,7 +11,7 @@
 #include "esim/core/random.h"
 #include "esim/sampling/disagreement.h"
 
-namespace esim {
+namespace esim::inline sampling {
 namespace {
 
 constexpr double kMostPerSecond = 50000;  // maximum rate of reconstructions, whatever the motion
@@ -259,4 +259,4 @@ std::unique_ptr<Sampler> make_keyframe_sampler(const KeyframeSampling& options, 
   return std::make_unique<KeyframeSampler>(options, context);
 }
 
-}  // namespace esim
+}  // namespace esim::inline sampling

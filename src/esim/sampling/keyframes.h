@@ -7,7 +7,7 @@
 #include "esim/sampling/options.h"
 #include "esim/sampling/sampler.h"
 
-namespace esim {
+namespace esim::inline sampling {
 
 /// Renders a few images (keyframes) with a denser, slightly wider camera and reconstructs the images between them by
 /// reprojection: often enough that hardly any pixel moves by more than lambda between two images, but at most 50000
@@ -28,4 +28,4 @@ constexpr int kLeastSupersampling = 2, kMostSupersampling = 4;
 /// The keyframes' camera. Throws UserError for renderers that draw on the sensor.
 KeyframeLayout lay_out_keyframes(const KeyframeSampling& options, const SamplingContext& context);
 
-}  // namespace esim
+}  // namespace esim::inline sampling

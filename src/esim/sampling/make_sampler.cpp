@@ -1,10 +1,10 @@
 #include "esim/sampling/make_sampler.h"
 
-#include "esim/sampling/adaptive.h"
+#include "esim/sampling/adaptive/adaptive.h"
 #include "esim/sampling/frame_sampler.h"
 #include "esim/sampling/keyframes.h"
 
-namespace esim {
+namespace esim::inline sampling {
 namespace {
 
 // One overload per scheme.
@@ -31,4 +31,4 @@ Camera sampled_camera(const SamplingOptions& options, const SamplingContext& con
   return keyframes != nullptr ? lay_out_keyframes(*keyframes, context).camera : context.camera;
 }
 
-}  // namespace esim
+}  // namespace esim::inline sampling

@@ -6,7 +6,7 @@
 #include "esim/sampling/options.h"
 #include "esim/sampling/sampler.h"
 
-namespace esim {
+namespace esim::inline sampling {
 
 /// Makes the sampler that the options describe. Throws UserError if it does not support the renderer.
 std::unique_ptr<Sampler> make_sampler(const SamplingOptions& options, const SamplingContext& context);
@@ -14,4 +14,4 @@ std::unique_ptr<Sampler> make_sampler(const SamplingOptions& options, const Samp
 /// The camera whose images or tiles the sampler requests: the context's own, or the keyframes' camera.
 Camera sampled_camera(const SamplingOptions& options, const SamplingContext& context);
 
-}  // namespace esim
+}  // namespace esim::inline sampling

@@ -2,7 +2,7 @@
 
 #include "esim/core/log_histogram.h"
 
-namespace esim {
+namespace esim::inline sampling {
 
 /// Error of the brightness between samples, as measured by the scheme; in ln(E + eps).
 struct MeasuredError {
@@ -13,4 +13,4 @@ inline MeasuredError measured_error(const LogHistogram& errors) {
   return {errors.mean(), errors.quantile(0.99), errors.max()};
 }
 
-}  // namespace esim
+}  // namespace esim::inline sampling

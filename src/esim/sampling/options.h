@@ -4,7 +4,7 @@
 
 #include "esim/core/describe.h"
 
-namespace esim {
+namespace esim::inline sampling {
 
 /// Bounds on the interval between two samples, common to the criteria that adapt it.
 struct RateBounds {
@@ -113,4 +113,4 @@ void describe(Visitor& visit, KeyframeSampling& o) {
   describe(visit, o.bounds);
 }
 
-}  // namespace esim
+}  // namespace esim::inline sampling

@@ -5,7 +5,7 @@
 
 #include "esim/core/parallel.h"
 
-namespace esim {
+namespace esim::inline sampling {
 
 /// Maximum of row_value(y) over all rows, computed in parallel; independent of the number of threads.
 template <typename RowValue>
@@ -22,4 +22,4 @@ float row_maximum(int rows, const Workers& workers, const RowValue& row_value) {
   return pieces > 0 ? *std::max_element(maxima.begin(), maxima.end()) : 0.0F;
 }
 
-}  // namespace esim
+}  // namespace esim::inline sampling

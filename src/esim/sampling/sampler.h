@@ -10,7 +10,7 @@
 #include "esim/render/sample.h"
 #include "esim/sampling/measured_error.h"
 
-namespace esim {
+namespace esim::inline sampling {
 
 /// Pixels to evaluate at one time.
 struct TilesAt {
@@ -72,4 +72,4 @@ class Sampler {
   virtual SamplingStatistics statistics() const = 0;
 };
 
-}  // namespace esim
+}  // namespace esim::inline sampling

@@ -7,7 +7,7 @@
 #include "esim/reproject/reprojector.h"
 #include "esim/sampling/keyframes.h"
 
-namespace esim {
+namespace esim::inline sampling {
 
 MeasuredError measure_resampling_floor(const KeyframeLayout& layout, RenderRequest request,
                                        const SamplingContext& context, Renderer& sensor, Renderer& keyframes) {
@@ -51,4 +51,4 @@ KeyframeSampling decide_supersampling(const KeyframeSampling& options, const Ren
   return decided;
 }
 
-}  // namespace esim
+}  // namespace esim::inline sampling

@@ -7,7 +7,7 @@
 #include "esim/sampling/context.h"
 #include "esim/sampling/options.h"
 
-namespace esim {
+namespace esim::inline sampling {
 
 /// Makes a renderer of the scene for a camera.
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const Camera&)>;
@@ -24,4 +24,4 @@ MeasuredError measure_resampling_floor(const KeyframeLayout& layout, RenderReque
 KeyframeSampling decide_supersampling(const KeyframeSampling& options, const RenderRequest& view,
                                       SamplingContext& context, Renderer& sensor, const MakeRenderer& make_renderer);
 
-}  // namespace esim
+}  // namespace esim::inline sampling

@@ -2,7 +2,7 @@
 
 #include "esim/scenario/yaml_reader.h"
 
-namespace esim {
+namespace esim::inline scenario {
 
 EventCameraOptions read_event_camera(const std::vector<std::string>& overrides, const std::string& setter) {
   const std::string prefix = "event_camera.";
@@ -19,4 +19,4 @@ EventCameraOptions read_event_camera(const std::vector<std::string>& overrides, 
   return options;
 }
 
-}  // namespace esim
+}  // namespace esim::inline scenario

@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "esim/event_camera/event_camera.h"
 #include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
-#include "esim/sensors/event_camera.h"
 #include "esim/video/frame_sequence.h"
 #include "esim/video/interpolator.h"
 
-namespace esim {
+namespace esim::inline scenario {
 
 /// All options of a conversion of a video to events.
 struct ConversionOptions {
@@ -40,8 +40,16 @@ void describe(Visitor& visit, ConversionOptions& o) {
   visit("event_camera", o.event_camera, About{"the event sensor"});
 }
 
+}  // namespace esim::inline scenario
+
+namespace esim {
+
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<Encoding>{"auto", "srgb", "linear"};
+
+}  // namespace esim
+
+namespace esim::inline scenario {
 
 /// The default event camera with overrides "event_camera.key=value", or "key=value" for short. Throws UserError, which
 /// begins with `setter`, with the key and the valid values.
@@ -53,4 +61,4 @@ std::string write_event_camera(const EventCameraOptions& options);
 /// The options in full as YAML.
 std::string write_conversion(const ConversionOptions& options);
 
-}  // namespace esim
+}  // namespace esim::inline scenario

@@ -6,7 +6,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline scenario {
 
 Eigen::Quaterniond looking_along(const Eigen::Vector3d& direction) {
   const Eigen::Vector3d z = direction.normalized();
@@ -50,4 +50,4 @@ PoseOptions options_of(const SE3& pose) {
   return options;
 }
 
-}  // namespace esim
+}  // namespace esim::inline scenario

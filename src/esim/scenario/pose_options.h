@@ -7,7 +7,7 @@
 #include "esim/core/describe.h"
 #include "esim/geometry/se3.h"
 
-namespace esim {
+namespace esim::inline scenario {
 
 /// A pose as a user writes it: a position, and either a quaternion or a point to look at.
 struct PoseOptions {
@@ -39,4 +39,4 @@ PoseOptions options_of(const SE3& pose);
 /// The orientation whose z axis points along `direction`, with x level and y downwards; world z is up.
 Eigen::Quaterniond looking_along(const Eigen::Vector3d& direction);
 
-}  // namespace esim
+}  // namespace esim::inline scenario

@@ -11,7 +11,7 @@
 #include "esim/scenario/waypoint_file.h"
 #include "esim/scenario/yaml_reader.h"
 
-namespace esim {
+namespace esim::inline scenario {
 namespace {
 
 /// The map that applies to a camera: the shared map, overridden entry by entry by the camera's own. A map with another
@@ -273,4 +273,4 @@ Camera camera_model(const CameraOptions& options) {
   return camera;
 }
 
-}  // namespace esim
+}  // namespace esim::inline scenario

@@ -8,7 +8,7 @@
 #include "esim/core/error.h"
 #include "esim/scenario/scenario.h"
 
-namespace esim {
+namespace esim::inline scenario {
 
 /// Reads a scenario from a YAML file. Relative paths in it start at the file's folder, and ${NAME} stands for an
 /// environment variable.
@@ -71,4 +71,4 @@ std::string scenario_reference();
 /// The geometry that `options` describe. Throws UserError if it is impossible.
 Camera camera_model(const CameraOptions& options);
 
-}  // namespace esim
+}  // namespace esim::inline scenario

@@ -8,7 +8,7 @@
 #include "esim/scenario/read.h"
 #include "esim/scenario/yaml_reader.h"
 
-namespace esim {
+namespace esim::inline scenario {
 namespace {
 
 /// {type: flow, lambda: 0.5} for "flow lambda=0.5".
@@ -86,4 +86,4 @@ std::string sampling_text(const SamplingOptions& options) { return text_of(optio
 std::string sampling_family(const SamplingOptions& options) { return text_of(options, false); }
 std::vector<std::string> sampling_types() { return types_of(SamplingOptions{}); }
 
-}  // namespace esim
+}  // namespace esim::inline scenario

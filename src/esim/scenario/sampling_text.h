@@ -5,7 +5,7 @@
 
 #include "esim/sampling/options.h"
 
-namespace esim {
+namespace esim::inline scenario {
 
 /// The sampling method that a line describes: "flow lambda=0.5", or as in a scenario, "{type: flow, lambda: 0.5}".
 /// Missing options have their defaults. Throws UserError with the key and the valid values.
@@ -20,4 +20,4 @@ std::string sampling_family(const SamplingOptions& options);
 /// All types of sampling.
 std::vector<std::string> sampling_types();
 
-}  // namespace esim
+}  // namespace esim::inline scenario

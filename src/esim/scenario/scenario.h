@@ -8,16 +8,16 @@
 #include <vector>
 
 #include "esim/core/colour.h"
+#include "esim/event_camera/event_camera.h"
+#include "esim/frame_camera/options.h"
 #include "esim/geometry/camera.h"
+#include "esim/imu/options.h"
 #include "esim/sampling/options.h"
 #include "esim/scenario/pose_options.h"
 #include "esim/scene/engine_images.h"
 #include "esim/scene/layer.h"
-#include "esim/sensors/event_camera.h"
-#include "esim/sensors/frame_camera_options.h"
-#include "esim/sensors/imu_options.h"
 
-namespace esim {
+namespace esim::inline scenario {
 
 // --- trajectories of the body and of objects -----------------------------------------------------------------------
 
@@ -295,4 +295,4 @@ struct Scenario {
   OutputOptions output;
 };
 
-}  // namespace esim
+}  // namespace esim::inline scenario

@@ -4,7 +4,7 @@
 
 /// The schema: every option of a scenario once, with unit, range and help (see core/describe.h). Options of separate
 /// modules, such as the event camera, are described there.
-namespace esim {
+namespace esim::inline scenario {
 
 template <class Visitor>
 void describe(Visitor& visit, FileTrajectoryOptions& o) {
@@ -336,6 +336,10 @@ void describe(Visitor& visit, Scenario& o) {
   visit("truth", o.truth, About{"ground truth"});
   visit("output", o.output, About{"files that esim writes"});
 }
+
+}  // namespace esim::inline scenario
+
+namespace esim {
 
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<LayerUnits>{"pixel", "sensor"};

@@ -10,7 +10,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline scenario {
 namespace {
 
 namespace fs = std::filesystem;
@@ -137,4 +137,4 @@ SpriteSceneFile read_sprite_scene(const fs::path& file, const std::vector<fs::pa
   return scene;
 }
 
-}  // namespace esim
+}  // namespace esim::inline scenario

@@ -5,7 +5,7 @@
 
 #include "esim/scenario/scenario.h"
 
-namespace esim {
+namespace esim::inline scenario {
 
 /// The contents of a .scene file.
 struct SpriteSceneFile {
@@ -27,4 +27,4 @@ struct SpriteSceneFile {
 SpriteSceneFile read_sprite_scene(const std::filesystem::path& file,
                                   const std::vector<std::filesystem::path>& search_path);
 
-}  // namespace esim
+}  // namespace esim::inline scenario

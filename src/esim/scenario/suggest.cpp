@@ -4,7 +4,7 @@
 #include <numeric>
 #include <utility>
 
-namespace esim {
+namespace esim::inline scenario {
 namespace {
 
 /// Levenshtein distance.
@@ -43,4 +43,4 @@ std::string list(const std::vector<std::string>& words) {
   return out;
 }
 
-}  // namespace esim
+}  // namespace esim::inline scenario

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace esim {
+namespace esim::inline scenario {
 
 /// The candidate with the smallest edit distance to `word`; empty if none is similar.
 std::string nearest(const std::string& word, const std::vector<std::string>& candidates);
@@ -11,4 +11,4 @@ std::string nearest(const std::string& word, const std::vector<std::string>& can
 /// "a, b, c".
 std::string list(const std::vector<std::string>& words);
 
-}  // namespace esim
+}  // namespace esim::inline scenario

@@ -4,7 +4,7 @@
 
 #include "esim/scenario/yaml_reader.h"
 
-namespace esim {
+namespace esim::inline scenario {
 
 std::vector<WaypointPointOptions> read_waypoints(const std::filesystem::path& file) {
   const YAML::Node root = parse_yaml(text_of(file, "file of waypoints"), file);
@@ -22,4 +22,4 @@ std::vector<WaypointPointOptions> read_waypoints(const std::filesystem::path& fi
   return points;
 }
 
-}  // namespace esim
+}  // namespace esim::inline scenario

@@ -7,7 +7,7 @@
 
 #include "esim/scenario/scenario.h"
 
-namespace esim {
+namespace esim::inline scenario {
 
 /// Reads a YAML file of waypoints: a map whose only key, `points`, is a list as in a scenario. It may be empty.
 /// Throws UserError with file, line, key and the valid values.
@@ -16,4 +16,4 @@ std::vector<WaypointPointOptions> read_waypoints(const std::filesystem::path& fi
 /// The text of such a file, one line per point. Reading it back gives the same points.
 std::string write_waypoints(std::span<const WaypointPointOptions> points);
 
-}  // namespace esim
+}  // namespace esim::inline scenario

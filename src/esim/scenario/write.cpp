@@ -11,7 +11,7 @@
 #include "esim/scenario/schema.h"
 #include "esim/scenario/waypoint_file.h"
 
-namespace esim {
+namespace esim::inline scenario {
 namespace {
 
 /// A visitor of describe() that writes every member into an open YAML map.
@@ -268,4 +268,4 @@ std::string scenario_reference() {
   return out;
 }
 
-}  // namespace esim
+}  // namespace esim::inline scenario

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <iterator>
 
-namespace esim {
+namespace esim::inline scenario {
 namespace {
 
 /// Replaces every ${NAME} by the environment variable NAME.
@@ -191,4 +191,4 @@ std::size_t YamlReader::index_of_name(const YAML::Node& node, const std::string&
                    suggestion.empty() ? "" : "; did you mean " + suggestion + "?"));
 }
 
-}  // namespace esim
+}  // namespace esim::inline scenario

@@ -15,7 +15,7 @@
 #include "esim/scenario/schema.h"
 #include "esim/scenario/suggest.h"
 
-namespace esim {
+namespace esim::inline scenario {
 
 /// The origin of a scenario's text, for messages and for resolving paths.
 struct YamlSource {
@@ -145,4 +145,4 @@ class YamlReader {
   std::set<std::string> known_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline scenario

@@ -1,6 +1,6 @@
 #pragma once
 
-namespace esim {
+namespace esim::inline scene {
 
 /// Which commands request the images of an external renderer, if this is not determined automatically.
 
@@ -29,4 +29,4 @@ enum class EngineMask {
   none,       ///< not requested: everything counts as static
 };
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -8,7 +8,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline scene {
 namespace {
 
 using Parameters = LayerMotion::Parameters;
@@ -98,4 +98,4 @@ LayerPlacement place(const LayerMotion::State& state, LayerUnits units, PixelSiz
   return placement;
 }
 
-}  // namespace esim
+}  // namespace esim::inline scene

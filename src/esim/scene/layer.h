@@ -5,7 +5,7 @@
 
 #include "esim/core/time.h"
 
-namespace esim {
+namespace esim::inline scene {
 
 /// The units of a layer's positions and scales.
 enum class LayerUnits {
@@ -69,4 +69,4 @@ struct PixelSize {
 LayerPlacement place(const LayerMotion::State& state, LayerUnits units, PixelSize image, PixelSize sensor,
                      const Eigen::Vector2d& pivot = {0.5, 0.5});
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-namespace esim {
+namespace esim::inline scene {
 
 /// Parallel light. A white surface perpendicular to it gets the radiance `strength`.
 struct SunLight {
@@ -29,4 +29,4 @@ struct Lighting {
   bool shadows = false;  ///< visible_i is 0 where a surface blocks the light; otherwise it is 1 everywhere
 };
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "esim/core/colour.h"
+#include "esim/scene/images/texture.h"
 #include "esim/scene/planes.h"
-#include "esim/scene/texture.h"
 
-namespace esim {
+namespace esim::inline scene {
 
 /// The form in which a scene is loaded.
 enum class SceneLook {
@@ -65,4 +65,4 @@ using WarningHandler = std::function<void(const std::string&)>;
 /// naming the file, if it cannot be read, is damaged, or has no triangles.
 Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look = SceneLook::luminance);
 
-}  // namespace esim
+}  // namespace esim::inline scene

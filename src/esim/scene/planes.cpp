@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <utility>
 
-namespace esim {
+namespace esim::inline scene {
 namespace {
 
 /// Linear light for every code of an integer image.
@@ -111,4 +111,4 @@ void decode(const CodedImage& image, Encoding encoding, bool colour, Planes& pla
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -5,7 +5,7 @@
 
 #include "esim/core/image.h"
 
-namespace esim {
+namespace esim::inline scene {
 
 /// An image in linear light, 1.0 = white: one plane of luminance (Rec. 709: 0.2126 R + 0.7152 G + 0.0722 B), or three
 /// of R, G and B.
@@ -46,4 +46,4 @@ void resize(Planes& planes, int width, int height, bool colour);
 /// Inverse of the sRGB transfer function (IEC 61966-2-1), for values on [0, 1].
 float linear_from_srgb(float encoded);
 
-}  // namespace esim
+}  // namespace esim::inline scene

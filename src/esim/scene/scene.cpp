@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace esim {
+namespace esim::inline scene {
 
 Scene still_scene(Mesh mesh) {
   Scene scene;
@@ -10,4 +10,4 @@ Scene still_scene(Mesh mesh) {
   return scene;
 }
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -7,7 +7,7 @@
 #include "esim/scene/lighting.h"
 #include "esim/scene/mesh.h"
 
-namespace esim {
+namespace esim::inline scene {
 
 /// A rigid part of a scene: all that is static, or an object with its own motion.
 struct SceneObject {
@@ -25,4 +25,4 @@ struct Scene {
 /// An unlit scene of one static mesh.
 Scene still_scene(Mesh mesh);
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -8,7 +8,7 @@
 
 #include "esim/scene/import/flatten.h"
 
-namespace esim {
+namespace esim::inline scene {
 namespace {
 
 SceneGraph read_graph(const std::filesystem::path& path) {
@@ -70,4 +70,4 @@ std::string summary(const SceneFile& file) {
                                  : fmt::format("; {}: {}", file.cameras.size() == 1 ? "camera" : "cameras", cameras));
 }
 
-}  // namespace esim
+}  // namespace esim::inline scene

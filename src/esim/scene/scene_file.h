@@ -9,7 +9,7 @@
 #include "esim/geometry/se3.h"
 #include "esim/scene/scene.h"
 
-namespace esim {
+namespace esim::inline scene {
 
 /// A pose in a scene file at a time of the file's animation.
 struct ScenePose {
@@ -45,4 +45,4 @@ SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandle
 /// A summary in one line: objects, triangles, materials, textures, cameras, animation.
 std::string summary(const SceneFile& file);
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "esim/core/error.h"
-#include "esim/record/keep_on_failure.h"
-#include "esim/sensors/bayer.h"
+#include "esim/frame_camera/bayer.h"
+#include "esim/recording/keep_on_failure.h"
 #include "esim/sim/stopwatch.h"
 
-namespace esim {
+namespace esim::inline sim {
 namespace {
 
 /// One conversion: processes each frame and collects the summary.
@@ -184,4 +184,4 @@ ConversionSummary convert(const Conversion& conversion, Sink& out, const Monitor
   return run.finish(true, "");
 }
 
-}  // namespace esim
+}  // namespace esim::inline sim

@@ -5,13 +5,13 @@
 #include <string>
 
 #include "esim/core/parallel.h"
-#include "esim/record/record.h"
-#include "esim/sensors/event_camera.h"
+#include "esim/event_camera/event_camera.h"
+#include "esim/recording/record.h"
 #include "esim/sim/simulate.h"
 #include "esim/video/frame_sequence.h"
 #include "esim/video/interpolator.h"
 
-namespace esim {
+namespace esim::inline sim {
 
 /// Name of the camera that sees the video.
 inline constexpr const char* kConversionCamera = "cam0";
@@ -56,4 +56,4 @@ struct Conversion {
 /// conversion as incomplete, and the summary contains the problem.
 ConversionSummary convert(const Conversion& conversion, Sink& out, const Monitor& monitor);
 
-}  // namespace esim
+}  // namespace esim::inline sim

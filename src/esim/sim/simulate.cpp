@@ -5,10 +5,10 @@
 
 #include "esim/core/engine_error.h"
 #include "esim/motion/imu_kinematics.h"
-#include "esim/record/keep_on_failure.h"
+#include "esim/recording/keep_on_failure.h"
 #include "esim/sim/stopwatch.h"
 
-namespace esim {
+namespace esim::inline sim {
 namespace {
 
 /// The camera whose next sample comes first; null if none is due until `until`.
@@ -286,4 +286,4 @@ Summary simulate(World& world, Sink& out, const Monitor& monitor) {
   return summary;
 }
 
-}  // namespace esim
+}  // namespace esim::inline sim

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "esim/record/record.h"
+#include "esim/recording/record.h"
 #include "esim/sim/world.h"
 
-namespace esim {
+namespace esim::inline sim {
 
 /// Wall-clock seconds by stage.
 struct StageSeconds {
@@ -83,4 +83,4 @@ class Simulator {
 /// thrown after `out` has been ended as incomplete if it has received any records.
 Summary simulate(World& world, Sink& out, const Monitor& monitor);
 
-}  // namespace esim
+}  // namespace esim::inline sim

@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-namespace esim {
+namespace esim::inline sim {
 
 /// Adds the wall-clock time of a scope to a total.
 class Stopwatch {
@@ -17,4 +17,4 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-}  // namespace esim
+}  // namespace esim::inline sim

@@ -1,6 +1,6 @@
 #include "esim/sim/world.h"
 
-namespace esim {
+namespace esim::inline sim {
 
 RenderRequest view(const Trajectory& body, const SE3& T_body_camera,
                    std::span<const std::shared_ptr<const Trajectory>> objects, TimeNs t) {
@@ -29,4 +29,4 @@ RenderRequest view(const World& world, std::size_t camera, TimeNs t) {
   return view(world, camera, t, {{0, 0, model.width, model.height}});
 }
 
-}  // namespace esim
+}  // namespace esim::inline sim

@@ -7,18 +7,18 @@
 #include <vector>
 
 #include "esim/core/parallel.h"
+#include "esim/event_camera/event_camera.h"
+#include "esim/frame_camera/frame_camera.h"
+#include "esim/imu/imu.h"
 #include "esim/motion/trajectory.h"
-#include "esim/record/record.h"
+#include "esim/recording/record.h"
 #include "esim/render/renderer.h"
 #include "esim/sampling/sampler.h"
-#include "esim/sensors/event_camera.h"
-#include "esim/sensors/frame_camera.h"
-#include "esim/sensors/imu.h"
 #include "esim/truth/clock.h"
 #include "esim/truth/displacement.h"
 #include "esim/truth/event_points.h"
 
-namespace esim {
+namespace esim::inline sim {
 
 /// One camera of the rig with its renderer, sampler and sensors.
 struct CameraChannel {
@@ -71,4 +71,4 @@ RenderRequest view(const World& world, std::size_t camera, TimeNs t, std::vector
 /// The same for the complete image.
 RenderRequest view(const World& world, std::size_t camera, TimeNs t);
 
-}  // namespace esim
+}  // namespace esim::inline sim

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-namespace esim {
+namespace esim::inline stats {
 namespace {
 
 constexpr int kTitleHeight = 13, kTextHeight = 10;
@@ -118,4 +118,4 @@ void Axes::finish() {
   canvas_.text(area_.x + area_.width / 2, bottom + 40, x_.title, kTextHeight, kFaintInk, Align::centre);
 }
 
-}  // namespace esim
+}  // namespace esim::inline stats

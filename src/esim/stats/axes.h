@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "esim/record/preview/canvas.h"
+#include "esim/preview/canvas.h"
 
-namespace esim {
+namespace esim::inline stats {
 
 // Colours of figures.
 inline constexpr Rgb kPaper{255, 255, 255};
@@ -73,4 +73,4 @@ class Axes {
   Scale x_, y_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline stats

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace esim {
+namespace esim::inline stats {
 namespace {
 
 constexpr TimeNs kEvenInterval = 10 * kNsPerMs;
@@ -41,4 +41,4 @@ PhaseTest BetweenFrames::test() const {
   return test_phase(places, static_cast<double>(kNsPerSecond) / kEvenInterval);
 }
 
-}  // namespace esim
+}  // namespace esim::inline stats

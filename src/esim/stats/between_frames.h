@@ -2,11 +2,11 @@
 
 #include <vector>
 
-#include "esim/record/record.h"
+#include "esim/recording/record.h"
 #include "esim/stats/periodicity.h"
 #include "esim/stats/time_sample.h"
 
-namespace esim {
+namespace esim::inline stats {
 
 /// Measures how the events of a converted video are distributed between its frames: a Sink of the events and the images
 /// of camera 0, whose images have the times of the frames.
@@ -26,4 +26,4 @@ class BetweenFrames final : public Sink {
   std::vector<TimeNs> frames_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline stats

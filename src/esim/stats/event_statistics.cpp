@@ -8,7 +8,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline stats {
 namespace {
 
 constexpr std::int64_t kMaxPixels = std::int64_t{1} << 26;
@@ -108,4 +108,4 @@ Statistics EventStatistics::finish(const StatisticsOptions& options) && {
   return s;
 }
 
-}  // namespace esim
+}  // namespace esim::inline stats

@@ -6,14 +6,14 @@
 
 #include "esim/core/image.h"
 #include "esim/events/event.h"
-#include "esim/record/events_file.h"
+#include "esim/formats/events_file.h"
 #include "esim/stats/hot_pixels.h"
 #include "esim/stats/interval_histogram.h"
 #include "esim/stats/periodicity.h"
 #include "esim/stats/rate_curve.h"
 #include "esim/stats/time_sample.h"
 
-namespace esim {
+namespace esim::inline stats {
 
 /// Statistics of a stream of events. Rates are relative to the time between its first event and its last.
 struct Statistics {
@@ -80,4 +80,4 @@ class EventStatistics {
   std::uint64_t same_time_ = 0;  // events at the last time
 };
 
-}  // namespace esim
+}  // namespace esim::inline stats

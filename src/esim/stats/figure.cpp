@@ -9,7 +9,7 @@
 
 #include "esim/stats/axes.h"
 
-namespace esim {
+namespace esim::inline stats {
 namespace {
 
 constexpr int kWidth = 1920, kHeight = 1104;
@@ -266,4 +266,4 @@ Image<Rgb> draw_figure(const NamedStatistics& file) {
   return std::move(canvas).take();
 }
 
-}  // namespace esim
+}  // namespace esim::inline stats

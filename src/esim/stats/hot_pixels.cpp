@@ -8,7 +8,7 @@
 
 #include "esim/stats/probability.h"
 
-namespace esim {
+namespace esim::inline stats {
 namespace {
 
 // A hot pixel exceeds its neighbours by this multiple of their difference. Pixels at the rims of wheels, recorded and
@@ -74,4 +74,4 @@ std::vector<HotPixel> find_hot_pixels(const Image<std::uint32_t>& counts, double
   return hot;
 }
 
-}  // namespace esim
+}  // namespace esim::inline stats

@@ -5,7 +5,7 @@
 
 #include "esim/core/image.h"
 
-namespace esim {
+namespace esim::inline stats {
 
 /// A pixel with far more events than its neighbours.
 struct HotPixel {
@@ -30,4 +30,4 @@ std::vector<HotPixel> find_hot_pixels(const Image<std::uint32_t>& counts, double
 /// Median of the counts: the mean of the two in the middle for an even number, 0 for an empty image.
 double median_count(const Image<std::uint32_t>& counts);
 
-}  // namespace esim
+}  // namespace esim::inline stats

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numeric>
 
-namespace esim {
+namespace esim::inline stats {
 
 IntervalHistogram::Lookup IntervalHistogram::make_lookup() {
   Lookup lookup;
@@ -69,4 +69,4 @@ double IntervalHistogram::quantile_s(double fraction) const {
   return low * std::pow(high / low, std::clamp(part, 0.0, 1.0));
 }
 
-}  // namespace esim
+}  // namespace esim::inline stats

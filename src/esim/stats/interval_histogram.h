@@ -10,7 +10,7 @@
 
 #include "esim/core/time.h"
 
-namespace esim {
+namespace esim::inline stats {
 
 /// Number of time intervals in bins of equal logarithmic width: 40 per decade from 1 us to 100 s, one bin for shorter
 /// intervals and one for longer ones. A bin includes its lower edge.
@@ -73,4 +73,4 @@ class IntervalHistogram {
   TimeNs part_of_us_ = 0;  // 0: all are whole us
 };
 
-}  // namespace esim
+}  // namespace esim::inline stats

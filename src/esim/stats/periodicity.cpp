@@ -9,7 +9,7 @@
 #include "esim/stats/probability.h"
 #include "esim/stats/time_sample.h"
 
-namespace esim {
+namespace esim::inline stats {
 namespace {
 
 constexpr std::size_t kLeastEvents = 100;
@@ -253,4 +253,4 @@ std::optional<Periodicity> find_periodicity(std::span<const TimeNs> times) {
   return result;
 }
 
-}  // namespace esim
+}  // namespace esim::inline stats

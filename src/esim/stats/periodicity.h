@@ -7,7 +7,7 @@
 
 #include "esim/core/time.h"
 
-namespace esim {
+namespace esim::inline stats {
 
 enum class Banding {
   none,
@@ -72,4 +72,4 @@ struct Periodicity {
 /// fewer than 20 periods of 2 kHz.
 std::optional<Periodicity> find_periodicity(std::span<const TimeNs> times);
 
-}  // namespace esim
+}  // namespace esim::inline stats

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-namespace esim {
+namespace esim::inline stats {
 namespace {
 
 constexpr double kEpsilon = 1e-15;
@@ -58,4 +58,4 @@ double chi2_tail(double chi2, double dof) { return gamma_q(0.5 * dof, 0.5 * chi2
 
 double poisson_tail(double count, double lambda) { return count <= 0.0 ? 1.0 : gamma_p(count, lambda); }
 
-}  // namespace esim
+}  // namespace esim::inline stats

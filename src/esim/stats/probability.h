@@ -1,6 +1,6 @@
 #pragma once
 
-namespace esim {
+namespace esim::inline stats {
 
 /// Regularised incomplete gamma functions P(a, x) and Q(a, x) = 1 - P(a, x), each without cancellation; a > 0, x >= 0.
 /// Series below x = a + 1, Lentz's continued fraction above. Relative error below 1e-9 for a up to 1e5.
@@ -13,4 +13,4 @@ double chi2_tail(double chi2, double dof);
 /// Probability of a Poisson variable with mean `lambda` to be at least `count`: P(count, lambda); 1 for count 0.
 double poisson_tail(double count, double lambda);
 
-}  // namespace esim
+}  // namespace esim::inline stats

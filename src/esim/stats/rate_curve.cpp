@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace esim {
+namespace esim::inline stats {
 
 void RateCurve::start_window(std::int64_t ms) {
   close_window();
@@ -39,4 +39,4 @@ void RateCurve::close_window() {
   window_ = {};
 }
 
-}  // namespace esim
+}  // namespace esim::inline stats

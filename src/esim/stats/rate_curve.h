@@ -6,7 +6,7 @@
 
 #include "esim/core/time.h"
 
-namespace esim {
+namespace esim::inline stats {
 
 /// Events over time, counted in windows of 1 ms from the first event on. The width of the curve's bins doubles as
 /// needed, so that there are at most kMaxBins bins.
@@ -48,4 +48,4 @@ class RateCurve {
   int doublings_ = 0;
 };
 
-}  // namespace esim
+}  // namespace esim::inline stats

@@ -1,6 +1,6 @@
 #include "esim/stats/time_sample.h"
 
-namespace esim {
+namespace esim::inline stats {
 
 void TimeSample::thin() {
   ++least_zeros_;
@@ -14,4 +14,4 @@ void TimeSample::thin() {
   zeros_.resize(kept);
 }
 
-}  // namespace esim
+}  // namespace esim::inline stats

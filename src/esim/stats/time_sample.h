@@ -6,7 +6,7 @@
 
 #include "esim/core/time.h"
 
-namespace esim {
+namespace esim::inline stats {
 
 /// A hash that spreads consecutive numbers over all 64 bits: SplitMix64 (Steele et al., OOPSLA 2014).
 constexpr std::uint64_t hash_index(std::uint64_t index) {
@@ -44,4 +44,4 @@ class TimeSample {
   std::vector<std::uint8_t> zeros_;  // trailing zeros of each hash
 };
 
-}  // namespace esim
+}  // namespace esim::inline stats

@@ -4,7 +4,7 @@
 #include <array>
 #include <string>
 
-#include "esim/record/format.h"
+#include "esim/formats/formats.h"
 
 namespace esim::studio {
 namespace {
@@ -17,7 +17,7 @@ bool is_one_of(const std::string& text, const std::array<const char*, N>& all) {
 }
 
 bool is_recording_folder(const fs::path& place) {
-  const auto& all = formats();
+  const auto& all = all_formats();
   return std::any_of(all.begin(), all.end(), [&](const Format& format) {
     return format.folder && format.name == "recording" && format.recognises(place, "");
   });
@@ -26,7 +26,7 @@ bool is_recording_folder(const fs::path& place) {
 /// The extensions of formats with events, except those that other files use too.
 bool is_recording_file(const std::string& extension) {
   static constexpr std::array<const char*, 4> kOthers{".txt", ".csv", ".zip", ".npz"};
-  const auto& all = formats();
+  const auto& all = all_formats();
   return !is_one_of(extension, kOthers) && std::any_of(all.begin(), all.end(), [&](const Format& format) {
     return !format.folder && format.can_hold(Content::events) &&
            std::count(format.extensions.begin(), format.extensions.end(), extension) > 0;

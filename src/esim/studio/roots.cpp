@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "esim/core/error.h"
-#include "esim/studio/http.h"
+#include "esim/studio/server/http.h"
 
 namespace esim::studio {
 namespace {

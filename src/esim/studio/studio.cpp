@@ -6,10 +6,10 @@
 
 #include "esim/core/error.h"
 #include "esim/scenario/read.h"
-#include "esim/studio/access.h"
 #include "esim/studio/endpoints/endpoints.h"
 #include "esim/studio/file_kinds.h"
-#include "esim/studio/server.h"
+#include "esim/studio/server/access.h"
+#include "esim/studio/server/server.h"
 
 namespace esim::studio {
 namespace {

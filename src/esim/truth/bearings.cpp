@@ -1,6 +1,6 @@
 #include "esim/truth/bearings.h"
 
-namespace esim {
+namespace esim::inline truth {
 
 Image<Eigen::Vector2d> bearings_of(const Camera& camera) {
   Image<Eigen::Vector2d> bearings(camera.width, camera.height);
@@ -9,4 +9,4 @@ Image<Eigen::Vector2d> bearings_of(const Camera& camera) {
   return bearings;
 }
 
-}  // namespace esim
+}  // namespace esim::inline truth

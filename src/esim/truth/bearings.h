@@ -5,10 +5,10 @@
 #include "esim/core/image.h"
 #include "esim/geometry/camera.h"
 
-namespace esim {
+namespace esim::inline truth {
 
 /// The bearing (x, y, 1) of each pixel's centre in the camera frame, without the 1. Renderers must accept the camera:
 /// its lens must map every pixel to a bearing.
 Image<Eigen::Vector2d> bearings_of(const Camera& camera);
 
-}  // namespace esim
+}  // namespace esim::inline truth

@@ -1,6 +1,6 @@
 #include "esim/truth/clock.h"
 
-namespace esim {
+namespace esim::inline truth {
 
 void PeriodicClock::settle() {
   due_ = kNever;
@@ -11,4 +11,4 @@ void PeriodicClock::settle() {
   if (t <= end_) due_ = t;
 }
 
-}  // namespace esim
+}  // namespace esim::inline truth

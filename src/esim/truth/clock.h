@@ -5,7 +5,7 @@
 
 #include "esim/core/time.h"
 
-namespace esim {
+namespace esim::inline truth {
 
 /// The instants start + k / rate, k = 0, 1, ..., up to and including the end; none for a rate of 0. Each is computed
 /// from k, so that rounding does not accumulate.
@@ -33,4 +33,4 @@ class PeriodicClock {
   TimeNs due_ = kNever;
 };
 
-}  // namespace esim
+}  // namespace esim::inline truth

@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-namespace esim {
+namespace esim::inline truth {
 namespace {
 
 constexpr double kTolerance = 0.005;  // of 1 / depth
@@ -72,4 +72,4 @@ void DisplacementField::compute(const Frame& from, const RenderRequest& to, cons
   });
 }
 
-}  // namespace esim
+}  // namespace esim::inline truth

@@ -7,7 +7,7 @@
 #include "esim/render/renderer.h"
 #include "esim/truth/bearings.h"
 
-namespace esim {
+namespace esim::inline truth {
 
 /// Optical flow of a camera from time t0 to t1.
 struct Displacement {
@@ -51,4 +51,4 @@ class DisplacementField {
   Displacement displacement_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline truth

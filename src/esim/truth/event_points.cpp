@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace esim {
+namespace esim::inline truth {
 namespace {
 
 constexpr std::size_t kPortion = 256;  // events per task of a parallel loop
@@ -40,4 +40,4 @@ Eigen::Vector3f EventPoints::locate(const Event& event, Sample& sample) const {
   return (T_world_camera * (depth * bearings_(event.x, event.y).homogeneous())).cast<float>();
 }
 
-}  // namespace esim
+}  // namespace esim::inline truth

@@ -9,7 +9,7 @@
 #include "esim/render/renderer.h"
 #include "esim/truth/bearings.h"
 
-namespace esim {
+namespace esim::inline truth {
 
 /// Finds the scene points that events see: for each event, only its pixel is rendered, at the time of the event. The
 /// points are exact, up to the renderer's rounding, for the pixel's centre at the event's time stamp. A noise event has
@@ -38,4 +38,4 @@ class EventPoints {
   std::vector<Sample> samples_;  // of each thread
 };
 
-}  // namespace esim
+}  // namespace esim::inline truth

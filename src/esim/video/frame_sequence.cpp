@@ -9,7 +9,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline video {
 namespace {
 
 namespace fs = std::filesystem;
@@ -132,4 +132,4 @@ void FrameSequence::fail(const std::string& what) const {
   throw UserError(fmt::format("{}: {}: {}", input_.string(), source_->name(), what));
 }
 
-}  // namespace esim
+}  // namespace esim::inline video

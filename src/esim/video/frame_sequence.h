@@ -10,7 +10,7 @@
 #include "esim/scene/planes.h"
 #include "esim/video/frame_source.h"
 
-namespace esim {
+namespace esim::inline video {
 
 /// Which frames of a video are read, and how they are interpreted.
 struct VideoOptions {
@@ -79,4 +79,4 @@ class FrameSequence {
   TimeNs previous_ = 0;         // time of the last frame
 };
 
-}  // namespace esim
+}  // namespace esim::inline video

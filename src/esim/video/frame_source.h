@@ -10,7 +10,7 @@
 #include "esim/core/time.h"
 #include "esim/scene/planes.h"
 
-namespace esim {
+namespace esim::inline video {
 
 /// A sequence of frames from a video file or a folder of images. Frames are counted from 0.
 class FrameSource {
@@ -47,4 +47,4 @@ std::unique_ptr<FrameSource> open_video_file(const std::filesystem::path& path, 
 /// timestamps.txt (lines `seconds`) or none. Throws UserError for missing or inconsistent files.
 std::unique_ptr<FrameSource> open_image_folder(const std::filesystem::path& folder, Encoding encoding, bool colour);
 
-}  // namespace esim
+}  // namespace esim::inline video

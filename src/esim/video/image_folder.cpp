@@ -6,11 +6,11 @@
 #include <string_view>
 
 #include "esim/core/error.h"
-#include "esim/scene/image_file.h"
+#include "esim/scene/images/image_file.h"
 #include "esim/video/frame_source.h"
 #include "esim/video/stamps_file.h"
 
-namespace esim {
+namespace esim::inline video {
 namespace {
 
 namespace fs = std::filesystem;
@@ -136,4 +136,4 @@ std::unique_ptr<FrameSource> open_image_folder(const fs::path& folder, Encoding 
   return std::make_unique<ImageFolder>(folder, encoding, colour);
 }
 
-}  // namespace esim
+}  // namespace esim::inline video

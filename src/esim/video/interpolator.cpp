@@ -9,7 +9,7 @@
 #include <cmath>
 #include <utility>
 
-namespace esim {
+namespace esim::inline video {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
@@ -202,4 +202,4 @@ void Interpolator::interpolate_row(int y, float s, std::size_t plane, float* lig
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline video

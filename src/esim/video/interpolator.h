@@ -5,7 +5,7 @@
 #include "esim/scene/planes.h"
 #include "esim/video/optical_flow.h"
 
-namespace esim {
+namespace esim::inline video {
 
 struct InterpolationOptions {
   bool interpolation = true;
@@ -70,4 +70,4 @@ class Interpolator {
   bool held_ = false;
 };
 
-}  // namespace esim
+}  // namespace esim::inline video

@@ -8,7 +8,7 @@
 #include <opencv2/video/tracking.hpp>
 #include <vector>
 
-namespace esim {
+namespace esim::inline video {
 namespace {
 
 constexpr int kLeastSide = 16;        // px; smaller images have no search pyramid
@@ -116,4 +116,4 @@ void OpticalFlow::estimate(const Image<float>& before, const Image<float>& after
   });
 }
 
-}  // namespace esim
+}  // namespace esim::inline video

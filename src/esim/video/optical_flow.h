@@ -5,7 +5,7 @@
 #include "esim/core/image.h"
 #include "esim/core/parallel.h"
 
-namespace esim {
+namespace esim::inline video {
 
 /// Optical flow: a displacement per pixel, px; x to the right, y downwards.
 struct FlowField {
@@ -32,4 +32,4 @@ class OpticalFlow {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline video

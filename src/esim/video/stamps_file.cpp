@@ -9,7 +9,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline video {
 namespace {
 
 constexpr double kMostSeconds = 9e9;
@@ -111,4 +111,4 @@ std::vector<StampedName> read_timestamps_txt(const std::filesystem::path& path) 
   return read_lines(path, parse, "`seconds`, `seconds file` or `index seconds file`, the same on every line");
 }
 
-}  // namespace esim
+}  // namespace esim::inline video

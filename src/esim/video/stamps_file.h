@@ -7,7 +7,7 @@
 
 #include "esim/core/time.h"
 
-namespace esim {
+namespace esim::inline video {
 
 /// One line of a file of time stamps.
 struct StampedName {
@@ -25,4 +25,4 @@ std::vector<StampedName> read_timestamps_txt(const std::filesystem::path& path);
 /// Parses seconds such as "12.5" or "1.25e1" to nanoseconds, exact without an exponent; nothing if it is not a number.
 std::optional<TimeNs> parse_seconds(const std::string& text);
 
-}  // namespace esim
+}  // namespace esim::inline video

@@ -12,7 +12,7 @@ extern "C" {
 #include "esim/core/error.h"
 #include "esim/video/frame_source.h"
 
-namespace esim {
+namespace esim::inline video {
 namespace {
 
 struct Deleter {
@@ -245,4 +245,4 @@ std::unique_ptr<FrameSource> open_video_file(const std::filesystem::path& path, 
   return std::make_unique<VideoFileSource>(path, encoding, colour);
 }
 
-}  // namespace esim
+}  // namespace esim::inline video

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <memory>
 
-namespace esim {
+namespace esim::inline visualise {
 namespace {
 
 /// Number of distinct depths: neighbouring ones look the same.
@@ -157,4 +157,4 @@ void draw_dots(const std::vector<Dot>& dots, Image<Rgb>& picture) {
   padded.take(picture);
 }
 
-}  // namespace esim
+}  // namespace esim::inline visualise

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "esim/core/image.h"
-#include "esim/record/preview/colours.h"
+#include "esim/preview/colours.h"
 
-namespace esim {
+namespace esim::inline visualise {
 
 /// A round dot, smooth at its edge.
 struct Dot {
@@ -21,4 +21,4 @@ struct Dot {
 /// clipped to the image.
 void draw_dots(const std::vector<Dot>& dots, Image<Rgb>& picture);
 
-}  // namespace esim
+}  // namespace esim::inline visualise

@@ -4,7 +4,7 @@
 #include <cassert>
 #include <cmath>
 
-namespace esim {
+namespace esim::inline visualise {
 
 PictureGrid picture_grid(SensorSize sensor, int width, int height) {
   return {sensor, std::clamp(width, 1, sensor.width), std::clamp(height, 1, sensor.height)};
@@ -49,4 +49,4 @@ Image<Rgb> TimeSurface::draw(TimeNs t, double tau_ns, Rgb ground) const {
   return out;
 }
 
-}  // namespace esim
+}  // namespace esim::inline visualise

@@ -2,10 +2,10 @@
 
 #include "esim/core/image.h"
 #include "esim/events/event.h"
-#include "esim/record/format.h"
-#include "esim/record/preview/colours.h"
+#include "esim/preview/colours.h"
+#include "esim/recording/format.h"
 
-namespace esim {
+namespace esim::inline visualise {
 
 /// The cells of an image of events: the sensor's pixels or, for large sensors, blocks of pixels.
 struct PictureGrid {
@@ -48,4 +48,4 @@ class TimeSurface {
   Image<std::int8_t> polarity_;  // 0: no event
 };
 
-}  // namespace esim
+}  // namespace esim::inline visualise

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace esim {
+namespace esim::inline visualise {
 
 void EventWindow::add(EventSpan events) {
   for (const Event& event : events) {
@@ -43,4 +43,4 @@ void EventWindow::forget_until(TimeNs t) {
   head_ = static_cast<std::size_t>(later - events_.begin());
 }
 
-}  // namespace esim
+}  // namespace esim::inline visualise

@@ -5,7 +5,7 @@
 
 #include "esim/events/event.h"
 
-namespace esim {
+namespace esim::inline visualise {
 
 /// The latest events of a stream, in order, in bounded memory.
 class EventWindow {
@@ -36,4 +36,4 @@ class EventWindow {
   std::uint64_t seen_ = 0;
 };
 
-}  // namespace esim
+}  // namespace esim::inline visualise

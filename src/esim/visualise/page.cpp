@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-namespace esim {
+namespace esim::inline visualise {
 namespace {
 
 constexpr int kMargin = 20, kGap = 18, kHeader = 42, kTitle = 28, kLegend = 30;
@@ -131,4 +131,4 @@ Image<Rgb> draw_contact_sheet(const std::vector<CaptionedPicture>& pictures, int
   return std::move(canvas).take();
 }
 
-}  // namespace esim
+}  // namespace esim::inline visualise

@@ -4,11 +4,11 @@
 #include <string_view>
 #include <vector>
 
-#include "esim/record/format.h"
-#include "esim/record/preview/canvas.h"
+#include "esim/preview/canvas.h"
+#include "esim/recording/format.h"
 #include "esim/visualise/theme.h"
 
-namespace esim {
+namespace esim::inline visualise {
 
 /// What a panel shows.
 enum class View { events, time_surface, space_time, image, depth, motion };
@@ -57,4 +57,4 @@ struct CaptionedPicture {
 /// Arranges images of equal size in rows of `columns`; an empty image without any.
 Image<Rgb> draw_contact_sheet(const std::vector<CaptionedPicture>& pictures, int columns, const Theme& theme);
 
-}  // namespace esim
+}  // namespace esim::inline visualise

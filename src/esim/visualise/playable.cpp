@@ -5,15 +5,16 @@
 #include <algorithm>
 
 #include "esim/core/error.h"
-#include "esim/record/events_file.h"
+#include "esim/formats/events_file.h"
+#include "esim/formats/formats.h"
 
-namespace esim {
+namespace esim::inline visualise {
 namespace {
 
 namespace fs = std::filesystem;
 
 bool is_format(const fs::path& folder) {
-  for (const Format& format : formats()) {
+  for (const Format& format : all_formats()) {
     if (format.folder && format.recognises(folder, "")) return true;
   }
   return false;
@@ -66,4 +67,4 @@ std::vector<View> views_named(const std::vector<std::string>& names) {
   return views;
 }
 
-}  // namespace esim
+}  // namespace esim::inline visualise

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "esim/record/format.h"
+#include "esim/formats/formats.h"
 #include "esim/visualise/page.h"
 
-namespace esim {
+namespace esim::inline visualise {
 
 /// A recording or event file that can be opened repeatedly: to survey it, and to show it. For a folder that has no
 /// known format, the event file in it.
@@ -35,4 +35,4 @@ class Playable {
 /// The views with these names, without duplicates; empty for "all". Throws UserError for unknown names.
 std::vector<View> views_named(const std::vector<std::string>& names);
 
-}  // namespace esim
+}  // namespace esim::inline visualise

@@ -11,12 +11,12 @@
 #include "esim/core/error.h"
 #include "esim/core/parallel.h"
 #include "esim/core/remedy.h"
-#include "esim/record/number_text.h"
+#include "esim/files/number_text.h"
 #include "esim/visualise/event_pictures.h"
 #include "esim/visualise/event_window.h"
 #include "esim/visualise/space_time.h"
 
-namespace esim {
+namespace esim::inline visualise {
 namespace {
 
 constexpr double kMostFrames = 1e6;
@@ -355,4 +355,4 @@ std::optional<Image<Rgb>> Player::next_picture() {
                                : enlarge(panel.picture, width, height);
 }
 
-}  // namespace esim
+}  // namespace esim::inline visualise

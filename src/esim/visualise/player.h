@@ -8,7 +8,7 @@
 #include "esim/visualise/survey.h"
 #include "esim/visualise/theme.h"
 
-namespace esim {
+namespace esim::inline visualise {
 
 /// How a recording is shown. choose_missing() replaces 0 and empty values.
 struct PlayOptions {
@@ -63,4 +63,4 @@ class Player {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline visualise

@@ -11,7 +11,7 @@
 #include "esim/stats/axes.h"
 #include "esim/visualise/dots.h"
 
-namespace esim {
+namespace esim::inline visualise {
 namespace {
 
 constexpr double kTimeLength = 1.5;    // of the box; all lengths are in units of the sensor's longer side
@@ -326,4 +326,4 @@ Image<Rgb> draw_space_time(EventSpan events, const SpaceTimeBox& box, const Spac
   return std::move(plot).take();
 }
 
-}  // namespace esim
+}  // namespace esim::inline visualise

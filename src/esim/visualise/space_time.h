@@ -2,11 +2,11 @@
 
 #include "esim/core/image.h"
 #include "esim/events/event.h"
-#include "esim/record/format.h"
-#include "esim/record/preview/canvas.h"
+#include "esim/preview/canvas.h"
+#include "esim/recording/format.h"
 #include "esim/visualise/theme.h"
 
-namespace esim {
+namespace esim::inline visualise {
 
 /// The extent of a space-time plot: the sensor's pixels, and the times from start to end (start < end).
 struct SpaceTimeBox {
@@ -55,4 +55,4 @@ class SpaceTimeProjection {
 Image<Rgb> draw_space_time(EventSpan events, const SpaceTimeBox& box, const SpaceTimeView& view, int width, int height,
                            const Theme& theme);
 
-}  // namespace esim
+}  // namespace esim::inline visualise

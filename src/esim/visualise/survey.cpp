@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace esim {
+namespace esim::inline visualise {
 namespace {
 
 constexpr double kMostSeconds = 1e9;  // limit of given times, so that sums stay in range
@@ -70,4 +70,4 @@ std::optional<Survey> survey(Source& source, const Extent& extent, const std::fu
   return found;
 }
 
-}  // namespace esim
+}  // namespace esim::inline visualise

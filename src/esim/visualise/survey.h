@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
-#include "esim/record/format.h"
-#include "esim/record/preview/scales.h"
+#include "esim/preview/scales.h"
+#include "esim/recording/format.h"
 #include "esim/visualise/page.h"
 
-namespace esim {
+namespace esim::inline visualise {
 
 /// The part of a recording to show.
 struct Extent {
@@ -43,4 +43,4 @@ struct RecordStamp {
 };
 std::optional<RecordStamp> stamp_of(const Record& record);
 
-}  // namespace esim
+}  // namespace esim::inline visualise

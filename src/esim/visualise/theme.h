@@ -1,8 +1,8 @@
 #pragma once
 
-#include "esim/record/preview/colours.h"
+#include "esim/preview/colours.h"
 
-namespace esim {
+namespace esim::inline visualise {
 
 /// Colours around and behind the events.
 struct Theme {
@@ -16,4 +16,4 @@ struct Theme {
 inline constexpr Theme kDarkTheme{};
 inline constexpr Theme kLightTheme{{255, 255, 255}, {246, 247, 249}, {30, 30, 30}, {110, 110, 110}, {214, 217, 222}};
 
-}  // namespace esim
+}  // namespace esim::inline visualise

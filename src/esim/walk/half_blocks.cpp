@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <optional>
 
-namespace esim {
+namespace esim::inline walk {
 namespace {
 
 constexpr std::array<int, 6> kCubeLevels{0, 95, 135, 175, 215, 255};
@@ -60,4 +60,4 @@ std::string half_blocks(const Image<Rgb>& image, TerminalColours colours) {
   return text;
 }
 
-}  // namespace esim
+}  // namespace esim::inline walk

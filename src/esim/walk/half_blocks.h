@@ -3,9 +3,9 @@
 #include <string>
 
 #include "esim/core/image.h"
-#include "esim/record/preview/colours.h"
+#include "esim/preview/colours.h"
 
-namespace esim {
+namespace esim::inline walk {
 
 /// How colours are sent to a terminal.
 enum class TerminalColours {
@@ -21,4 +21,4 @@ std::string half_blocks(const Image<Rgb>& image, TerminalColours colours);
 /// The nearest of the colours 16 to 255 of a terminal with 256 colours.
 int indexed_colour(Rgb colour);
 
-}  // namespace esim
+}  // namespace esim::inline walk

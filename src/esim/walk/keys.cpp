@@ -8,7 +8,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline walk {
 namespace {
 
 constexpr char kEscape = '\033';
@@ -142,4 +142,4 @@ std::vector<Key> keys_of(std::string_view text) {
   return keys;
 }
 
-}  // namespace esim
+}  // namespace esim::inline walk

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-namespace esim {
+namespace esim::inline walk {
 
 /// Commands for walking through a scene.
 enum class Key {
@@ -52,4 +52,4 @@ class KeyReader {
 /// <esc>. Throws UserError for other text.
 std::vector<Key> keys_of(std::string_view text);
 
-}  // namespace esim
+}  // namespace esim::inline walk

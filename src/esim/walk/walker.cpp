@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace esim {
+namespace esim::inline walk {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -113,4 +113,4 @@ Walker::Effect Walker::press(Key key) {
   return Effect::nothing;
 }
 
-}  // namespace esim
+}  // namespace esim::inline walk

@@ -6,7 +6,7 @@
 #include "esim/geometry/se3.h"
 #include "esim/walk/keys.h"
 
-namespace esim {
+namespace esim::inline walk {
 
 /// A camera that moves through a scene by keys, and its waypoints. The camera stays level: its x axis is horizontal
 /// (world z is up), and its pitch is at most ±89°.
@@ -53,4 +53,4 @@ class Walker {
   std::size_t next_ = 0;
 };
 
-}  // namespace esim
+}  // namespace esim::inline walk

@@ -12,7 +12,7 @@
 #include "esim/backends/opengl/gl_renderer.h"
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 namespace {
 
 constexpr const char* kInstall =
@@ -172,4 +172,4 @@ void throw_on_gl_error(const char* doing) {
   throw InternalError(std::string("gl: error ") + std::to_string(error) + " while " + doing);
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 
 /// An OpenGL 4.5 context without a window. Private to the renderer.
 class GlContext {
@@ -43,4 +43,4 @@ class GlContext {
 /// Throws if OpenGL has reported an error since the last call.
 void throw_on_gl_error(const char* doing);
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

@@ -5,7 +5,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 namespace {
 
 /// Throws unless `status` of a shader or program is true; `get` and `get_log` are OpenGL's functions for its type.
@@ -43,4 +43,4 @@ GLuint make_program(const ShaderSource& vertex, const ShaderSource& fragment) {
   return program;
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

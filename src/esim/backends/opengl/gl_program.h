@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 
 /// The parts of a shader's source, in order, without the #version line.
 using ShaderSource = std::vector<const char*>;
@@ -17,4 +17,4 @@ inline GLint location(GLuint program, const char* name) { return glGetUniformLoc
 inline void set(GLuint program, const char* name, float value) { glUniform1f(location(program, name), value); }
 inline void set(GLuint program, const char* name, int value) { glUniform1i(location(program, name), value); }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

@@ -6,7 +6,7 @@
 #include "esim/backends/opengl/gl_context.h"
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 namespace {
 
 constexpr std::size_t kSeenBytes = 4 * sizeof(float), kWhichBytes = sizeof(std::uint16_t);
@@ -87,4 +87,4 @@ void GlReadBack::finish(Sample& sample) {
   glUnmapNamedBuffer(which_.name);
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

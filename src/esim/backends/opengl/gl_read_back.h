@@ -7,7 +7,7 @@
 #include "esim/backends/opengl/gl_targets.h"
 #include "esim/render/sample.h"
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 
 /// An asynchronous copy of pixels from the device to memory. Use and destroy it with its context current. Private to
 /// the renderer.
@@ -34,4 +34,4 @@ class GlReadBack {
   GLsync done_ = nullptr;
 };
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

@@ -21,7 +21,7 @@
 #include "esim/render/motion_field.h"
 #include "esim/render/pinhole_view.h"
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 namespace {
 
 constexpr float kNear = 1e-3F;  // m
@@ -335,4 +335,4 @@ std::unique_ptr<Renderer> make_gl_renderer(const Scene& scene, const GlOptions& 
   return std::make_unique<GlRenderer>(scene, options, camera);
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

@@ -9,7 +9,7 @@
 #include "esim/render/renderer.h"
 #include "esim/scene/scene.h"
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 
 struct GlOptions {
   float background = 0.2F;      ///< irradiance where no surface is visible
@@ -34,4 +34,4 @@ std::vector<GlDevice> gl_devices();
 /// view is too wide for a pinhole.
 std::unique_ptr<Renderer> make_gl_renderer(const Scene& scene, const GlOptions& options, const Camera& camera);
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

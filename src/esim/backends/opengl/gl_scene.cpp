@@ -10,7 +10,7 @@
 #include "esim/backends/opengl/gl_shaders.h"
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 
 /// Vertices are not shared, since texture coordinates belong to a triangle's corner.
 struct GlScene::Vertex {
@@ -96,4 +96,4 @@ GLuint GlScene::texture(const Texture* texture) {
   return name;
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

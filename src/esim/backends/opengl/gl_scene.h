@@ -7,7 +7,7 @@
 
 #include "esim/scene/scene.h"
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 
 /// A scene in the device memory of the current context. Private to the renderer.
 class GlScene {
@@ -41,4 +41,4 @@ class GlScene {
   GLuint vertex_array_ = 0;
 };
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

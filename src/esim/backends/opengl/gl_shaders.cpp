@@ -1,6 +1,6 @@
 #include "esim/backends/opengl/gl_shaders.h"
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 
 const char* const kSeveralSamples = "#define SEVERAL_SAMPLES\n";
 
@@ -182,4 +182,4 @@ void main() {
 }
 )";
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

@@ -3,7 +3,7 @@
 #include <epoxy/gl.h>
 
 /// The shaders, as parts of sources for make_program().
-namespace esim {
+namespace esim::inline backends::inline opengl {
 
 // Vertex attributes, and bindings of buffers and textures.
 inline constexpr GLuint kPosition = 0, kNormal = 1, kTextureUv = 2;
@@ -29,4 +29,4 @@ extern const char* const kWholeImageVertexShader;
 extern const char* const kResolveFragmentShader;
 extern const char* const kDistortFragmentShader;
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

@@ -1,6 +1,6 @@
 #include "esim/backends/opengl/gl_shaders.h"
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 
 // A light's view: depth in clip space, reversed like the camera's. Both sides of a triangle cast shadows.
 const char* const kShadowMapVertexShader = R"(
@@ -140,4 +140,4 @@ float visible_share(int light, bool is_point, vec3 to_light, Seen seen) {
 }
 )";
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

@@ -11,7 +11,7 @@
 #include "esim/backends/opengl/gl_shaders.h"
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 namespace {
 
 constexpr int kLargestMap = 4096;                                          // texels
@@ -256,4 +256,4 @@ void GlShadows::bind_to(GLuint program) const {
   set(program, "camera_to_origin", static_cast<float>(T_world_camera_.translation.lpNorm<1>()));
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

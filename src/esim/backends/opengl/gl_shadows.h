@@ -9,7 +9,7 @@
 #include "esim/render/renderer.h"
 #include "esim/scene/scene.h"
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 
 /// Shadow maps: a layer for each sun, six for each point light. Static objects are drawn once: their texels are fixed
 /// in the world, so that the edges of their shadows do not shimmer when the camera moves. Moving objects have separate
@@ -65,4 +65,4 @@ class GlShadows {
   SE3 T_world_camera_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

@@ -6,7 +6,7 @@
 #include "esim/backends/opengl/gl_context.h"
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 namespace {
 
 GLuint make_texture(GLenum format, int width, int height, int samples) {
@@ -61,4 +61,4 @@ int offered_samples(int wanted) {
   return best;
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

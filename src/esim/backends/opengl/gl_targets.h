@@ -2,7 +2,7 @@
 
 #include <epoxy/gl.h>
 
-namespace esim {
+namespace esim::inline backends::inline opengl {
 
 /// A framebuffer with floats and the object (16 bits) per pixel, in textures. The floats depend on the pass: E, Z and V
 /// after the last one; E, 1 / Z and its slopes before. Belongs to its context. Private to the renderer.
@@ -18,4 +18,4 @@ struct GlTarget {
 /// The largest number of samples per pixel that the driver supports for a target, at most `wanted`.
 int offered_samples(int wanted);
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline opengl

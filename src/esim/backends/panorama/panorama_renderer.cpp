@@ -8,7 +8,7 @@
 #include "esim/core/fast_arc_tangent.h"
 #include "esim/render/bands.h"
 
-namespace esim {
+namespace esim::inline backends::inline panorama {
 namespace {
 
 constexpr int kLanes = 16;
@@ -98,4 +98,4 @@ std::unique_ptr<Renderer> make_panorama_renderer(Panorama panorama, const Camera
   return std::make_unique<PanoramaRenderer>(std::move(panorama), camera, workers, mosaic);
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline panorama

@@ -6,9 +6,9 @@
 #include "esim/geometry/camera.h"
 #include "esim/geometry/se3.h"
 #include "esim/render/renderer.h"
-#include "esim/scene/colour_textures.h"
+#include "esim/scene/images/colour_textures.h"
 
-namespace esim {
+namespace esim::inline backends::inline panorama {
 
 /// An equirectangular image at infinity, for which only the camera's rotation matters.
 ///
@@ -24,4 +24,4 @@ struct Panorama {
 std::unique_ptr<Renderer> make_panorama_renderer(Panorama panorama, const Camera& camera, const Workers& workers,
                                                  ColourFilters filters = ColourFilters::none);
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline panorama

@@ -6,7 +6,7 @@
 
 #include "esim/render/bands.h"
 
-namespace esim {
+namespace esim::inline backends::inline plane {
 namespace {
 
 constexpr int kLanes = 16;
@@ -108,4 +108,4 @@ std::unique_ptr<Renderer> make_plane_renderer(Poster poster, const Camera& camer
   return std::make_unique<PlaneRenderer>(std::move(poster), camera, workers, mosaic);
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline plane

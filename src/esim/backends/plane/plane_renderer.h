@@ -6,9 +6,9 @@
 #include "esim/geometry/camera.h"
 #include "esim/geometry/se3.h"
 #include "esim/render/renderer.h"
-#include "esim/scene/colour_textures.h"
+#include "esim/scene/images/colour_textures.h"
 
-namespace esim {
+namespace esim::inline backends::inline plane {
 
 /// A textured rectangle at a pose, visible from both sides. In its own frame it lies in z = 0 with its centre at the
 /// origin, x to the right and y downwards in the image, so that z points into the wall: a camera with the same
@@ -25,4 +25,4 @@ struct Poster {
 std::unique_ptr<Renderer> make_plane_renderer(Poster poster, const Camera& camera, const Workers& workers,
                                               ColourFilters filters = ColourFilters::none);
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline plane

@@ -7,7 +7,7 @@
 #include "esim/backends/raycast/raycast_scene.h"
 
 /// Finds pixels that are crossed by edges of surfaces or of the light on them.
-namespace esim {
+namespace esim::inline backends::inline raycast {
 
 /// The scene as seen by a ray in each of K lanes.
 template <int K>
@@ -59,4 +59,4 @@ std::uint32_t pixels_on_edges(const RaycastScene& scene, const RayBlock& block, 
   return edges;
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline raycast

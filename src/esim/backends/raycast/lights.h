@@ -5,7 +5,7 @@
 #include "esim/backends/raycast/surface.h"
 
 /// Light on the surfaces that a packet of rays has hit. Vectors are in the camera frame unless stated otherwise.
-namespace esim {
+namespace esim::inline backends::inline raycast {
 
 /// A scene's lighting in a camera's frame; `world` is the group of all static triangles.
 inline Lighting in_camera_frame(Lighting lighting, const PlacedGroup& world) {
@@ -171,4 +171,4 @@ class LightOnSurfaces {
   const std::vector<PlacedGroup>& groups_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline raycast

@@ -10,7 +10,7 @@
 #include "esim/backends/raycast/embree.h"
 #include "esim/backends/raycast/raycast_scene.h"
 
-namespace esim {
+namespace esim::inline backends::inline raycast {
 
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -162,4 +162,4 @@ void Packet<K>::intersect(const PlacedGroup& placed, unsigned group, std::span<c
   turn(placed);
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline raycast

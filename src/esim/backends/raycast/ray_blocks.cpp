@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace esim {
+namespace esim::inline backends::inline raycast {
 
 namespace {
 
@@ -50,4 +50,4 @@ RayBlocks::RayBlocks(const PixelRays& rays) {
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline raycast

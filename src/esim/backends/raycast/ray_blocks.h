@@ -5,7 +5,7 @@
 
 #include "esim/render/pixel_rays.h"
 
-namespace esim {
+namespace esim::inline backends::inline raycast {
 
 /// A block of 4 x 4 pixels, row-major. Pixels outside the image repeat its last row or column.
 struct RayBlock {
@@ -63,4 +63,4 @@ class RayBlocks {
   std::vector<BearingBounds> cells_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline raycast

@@ -12,7 +12,7 @@
 #include "esim/core/error.h"
 #include "esim/render/bands.h"
 
-namespace esim {
+namespace esim::inline backends::inline raycast {
 namespace {
 
 /// The square over which pixels average, and the footprint of rays on textures. A single ray filters its surface with
@@ -391,4 +391,4 @@ std::unique_ptr<Renderer> make_raycast_renderer(std::shared_ptr<const RaycastSce
   return std::make_unique<RaycastRenderer>(std::move(scene), options, camera, workers, filters);
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline raycast

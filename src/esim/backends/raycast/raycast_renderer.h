@@ -8,7 +8,7 @@
 #include "esim/render/renderer.h"
 #include "esim/scene/scene.h"
 
-namespace esim {
+namespace esim::inline backends::inline raycast {
 
 /// A scene with its ray-casting accelerator; may be shared by the renderers of several cameras.
 class RaycastScene;
@@ -26,4 +26,4 @@ std::unique_ptr<Renderer> make_raycast_renderer(std::shared_ptr<const RaycastSce
                                                 const RaycastOptions& options, const Camera& camera,
                                                 const Workers& workers, ColourFilters filters = ColourFilters::none);
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline raycast

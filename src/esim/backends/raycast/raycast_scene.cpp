@@ -10,7 +10,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline backends::inline raycast {
 namespace {
 
 TriangleShading shading_of(const Mesh& mesh, std::size_t index, std::uint32_t first_material) {
@@ -180,4 +180,4 @@ std::shared_ptr<const RaycastScene> build_raycast_scene(const Scene& scene) {
   return std::make_shared<const RaycastScene>(scene);
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline raycast

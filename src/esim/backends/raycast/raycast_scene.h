@@ -10,7 +10,7 @@
 #include "esim/backends/raycast/raycast_renderer.h"
 #include "esim/backends/raycast/triangle_tree.h"
 
-namespace esim {
+namespace esim::inline backends::inline raycast {
 
 /// A triangle's data for shading, in one cache line. Texture coordinates are uv0 + b1 uv1 + b2 uv2 (barycentric b), and
 /// have the gradients (gradient_u, gradient_v) per metre in its plane.
@@ -90,4 +90,4 @@ class RaycastScene {
   std::vector<std::array<Eigen::Vector3f, 3>> corner_normals_;  // likewise, up to the last one that light needs
 };
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline raycast

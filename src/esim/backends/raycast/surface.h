@@ -7,7 +7,7 @@
 #include "esim/backends/raycast/raycast_scene.h"
 
 /// Colours of the surfaces that a packet of rays has hit. All vectors are in the camera frame.
-namespace esim {
+namespace esim::inline backends::inline raycast {
 
 /// The rotations to the camera frame from the groups that the lanes have hit, element by element.
 template <int K>
@@ -151,4 +151,4 @@ struct SurfaceColours {
   }
 };
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline raycast

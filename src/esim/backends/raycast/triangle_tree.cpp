@@ -6,7 +6,7 @@
 #include <limits>
 #include <tuple>
 
-namespace esim {
+namespace esim::inline backends::inline raycast {
 namespace {
 
 using Vector = Eigen::Vector3f;
@@ -261,4 +261,4 @@ bool TriangleTree::find(const BearingBounds& bounds, const Eigen::Matrix3f& R_tr
   return true;
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline raycast

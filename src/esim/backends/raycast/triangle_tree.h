@@ -8,7 +8,7 @@
 
 #include "esim/backends/raycast/ray_blocks.h"
 
-namespace esim {
+namespace esim::inline backends::inline raycast {
 
 /// A triangle as a camera sees it. For the ray r = (x, y, 1) and the triangle with the corners p0, p1, p2, all in the
 /// camera frame, weight k is the triple product of r with the two other corners. If no weight is negative, r hits the
@@ -83,4 +83,4 @@ class TriangleTree {
   float extent_ = 0;  // maximum coordinate
 };
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline raycast

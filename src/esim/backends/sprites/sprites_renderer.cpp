@@ -9,7 +9,7 @@
 
 #include "esim/render/bands.h"
 
-namespace esim {
+namespace esim::inline backends::inline sprites {
 namespace {
 
 constexpr int kLanes = 16;
@@ -229,4 +229,4 @@ std::unique_ptr<Renderer> make_sprites_renderer(SpriteScene scene, const Camera&
   return std::make_unique<SpritesRenderer>(std::move(scene), PixelSize{camera.width, camera.height}, workers);
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline sprites

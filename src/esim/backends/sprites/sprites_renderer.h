@@ -6,10 +6,10 @@
 #include "esim/core/parallel.h"
 #include "esim/geometry/camera.h"
 #include "esim/render/renderer.h"
+#include "esim/scene/images/texture.h"
 #include "esim/scene/layer.h"
-#include "esim/scene/texture.h"
 
-namespace esim {
+namespace esim::inline backends::inline sprites {
 
 /// An image that moves over the sensor.
 struct Sprite {
@@ -36,4 +36,4 @@ struct SpriteScene {
 /// background is larger. Z is +inf: layers have an order, but no distance.
 std::unique_ptr<Renderer> make_sprites_renderer(SpriteScene scene, const Camera& camera, const Workers& workers);
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline sprites

@@ -11,7 +11,7 @@
 #include "esim/backends/unrealcv/engine_image.h"
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -155,4 +155,4 @@ void UnrealcvClient::finish(const std::shared_ptr<Asked>& asked, const Workers& 
   asked_.remove(asked);
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

@@ -12,7 +12,7 @@
 #include "esim/backends/unrealcv/session.h"
 #include "esim/core/parallel.h"
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 
 /// A program with UnrealCV's protocol, of which one camera is moved. The client connects when a view is first waited
 /// for, and again if the connection is lost; it then repeats all requests in progress. Several threads may use it.
@@ -59,4 +59,4 @@ class UnrealcvClient {
   EngineState state_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

@@ -14,7 +14,7 @@
 #include <memory>
 #include <utility>
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 namespace {
 
 constexpr std::uint32_t kMagic = 0x9E2B83C1;
@@ -152,4 +152,4 @@ bool MessageConnection::receive(std::string& payload, std::size_t most_bytes, St
   return true;
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

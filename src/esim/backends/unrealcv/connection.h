@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
 
@@ -62,4 +62,4 @@ class MessageConnection {
   std::size_t have_header_ = 0;
 };
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

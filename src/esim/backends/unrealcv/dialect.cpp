@@ -11,7 +11,7 @@
 #include "esim/backends/unrealcv/unreal_pose.h"
 #include "esim/core/engine_error.h"
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 namespace {
 
 /// The largest 16-bit floating-point number, which is the depth of the sky.
@@ -221,4 +221,4 @@ void Dialect::convert_depth(const EngineView& view, Image<float>& depth) const {
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

@@ -10,7 +10,7 @@
 #include "esim/geometry/se3.h"
 #include "esim/render/pinhole_lookup.h"
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 
 /// A pinhole image that is requested from a program.
 struct EngineView {
@@ -74,4 +74,4 @@ class Dialect {
   std::vector<std::uint32_t> mask_codes_;  // of the objects
 };
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

@@ -9,11 +9,11 @@
 #include <string>
 
 #include "esim/core/engine_error.h"
-#include "esim/core/npy_header.h"
-#include "esim/scene/image_file.h"
-#include "esim/scene/image_header.h"
+#include "esim/files/npy_header.h"
+#include "esim/scene/images/image_file.h"
+#include "esim/scene/images/image_header.h"
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "numbers are read in the byte order of the machine");
@@ -230,4 +230,4 @@ std::uint32_t colour_code(std::string_view text) {
   return code;
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

@@ -9,7 +9,7 @@
 
 /// Images in answers of UnrealCV, as PNG or NPY files. Errors are EngineErrors whose message is the end of a sentence
 /// about the image, without the address and the command.
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 
 /// A complete image with another size than was set.
 struct OtherSize {
@@ -39,4 +39,4 @@ void decode_mask(std::string_view body, ImageExtent expected, const std::vector<
 /// The code in "(R=255,G=0,B=127,A=255)", or in "255 0 127"; throws EngineError for other text.
 std::uint32_t colour_code(std::string_view text);
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

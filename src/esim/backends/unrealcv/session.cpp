@@ -8,7 +8,7 @@
 
 #include "esim/core/engine_error.h"
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 namespace {
 
 constexpr const char* kOneAtATime = "an UnrealCV server serves one client at a time";
@@ -109,4 +109,4 @@ EngineBatch EngineSession::ask(std::vector<std::string> commands) {
   return batch;
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

@@ -14,7 +14,7 @@
 #include "esim/backends/unrealcv/connection.h"
 #include "esim/backends/unrealcv/unrealcv_options.h"
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 
 /// Throws EngineError: "unrealcv 127.0.0.1:9000: PROBLEM; REMEDY".
 [[noreturn]] void fail(const UnrealcvOptions& options, const std::string& problem, const std::string& remedy);
@@ -64,4 +64,4 @@ class EngineSession {
   std::map<std::uint32_t, EngineRequest*> pending_;  // sent, without answer
 };
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0, kCentimetre = 0.01;
@@ -61,4 +61,4 @@ SE3 camera_pose_of(const UnrealPose& pose) {
   return {T_world_actor.rotation * R_actor_camera(), T_world_actor.translation};
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

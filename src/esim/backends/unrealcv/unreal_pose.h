@@ -4,7 +4,7 @@
 
 #include "esim/geometry/se3.h"
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 
 /// A pose in Unreal's world: left-handed, x forward, y right, z up. Rotations are about z (yaw, from x towards y), then
 /// about the new y (pitch, upwards), then about the new x (roll, clockwise seen from behind).
@@ -28,4 +28,4 @@ UnrealPose unreal_camera_pose_of(const SE3& T_world_camera);
 SE3 actor_pose_of(const UnrealPose& pose);
 SE3 camera_pose_of(const UnrealPose& pose);
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

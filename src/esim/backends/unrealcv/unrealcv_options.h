@@ -7,7 +7,7 @@
 
 #include "esim/scene/engine_images.h"
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 
 /// The address of a program with UnrealCV's protocol, and how to communicate with it.
 struct UnrealcvOptions {
@@ -29,4 +29,4 @@ struct UnrealcvOptions {
   std::function<std::optional<std::string>()> why_ended = [] { return std::nullopt; };
 };
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

@@ -6,7 +6,7 @@
 #include "esim/core/error.h"
 #include "esim/render/bands.h"
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 namespace {
 
 PinholeView require_pinhole(const Camera& camera, const PixelRays& rays, const std::string& name) {
@@ -87,4 +87,4 @@ std::unique_ptr<Renderer> make_unrealcv_renderer(std::shared_ptr<UnrealcvClient>
   return std::make_unique<UnrealcvRenderer>(std::move(client), camera, workers, samples);
 }
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

@@ -7,7 +7,7 @@
 #include "esim/geometry/camera.h"
 #include "esim/render/renderer.h"
 
-namespace esim {
+namespace esim::inline backends::inline unrealcv {
 
 class UnrealcvClient;
 
@@ -23,4 +23,4 @@ std::shared_ptr<UnrealcvClient> make_unrealcv_client(UnrealcvOptions options);
 std::unique_ptr<Renderer> make_unrealcv_renderer(std::shared_ptr<UnrealcvClient> client, const Camera& camera,
                                                  const Workers& workers, int samples = 0);
 
-}  // namespace esim
+}  // namespace esim::inline backends::inline unrealcv

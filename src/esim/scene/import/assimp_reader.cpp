@@ -17,7 +17,7 @@
 #include "esim/scene/import/isolated.h"
 #include "esim/scene/import/scene_graph.h"
 
-namespace esim {
+namespace esim::inline scene {
 namespace {
 
 /// Gives assimp read access to the files of the scene's own folder.
@@ -361,4 +361,4 @@ SceneGraph read_with_assimp(const std::filesystem::path& file) {
   }
 }
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -8,7 +8,7 @@
 #include "esim/scene/import/motion_samples.h"
 #include "esim/scene/import/texture_store.h"
 
-namespace esim {
+namespace esim::inline scene {
 namespace {
 
 constexpr float kMissingTextureBase = 0.2F;  // a mid-grey surface: 18-20 % reflectance
@@ -211,4 +211,4 @@ Mesh flatten_still(const SceneGraph& graph, const std::filesystem::path& file, c
   return joiner.take(convert_materials(graph, textures));
 }
 
-}  // namespace esim
+}  // namespace esim::inline scene

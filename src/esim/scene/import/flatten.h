@@ -3,7 +3,7 @@
 #include "esim/scene/import/scene_graph.h"
 #include "esim/scene/scene_file.h"
 
-namespace esim {
+namespace esim::inline scene {
 
 /// Geometry, materials and motions of a graph. All static nodes become one object in the world's frame; every subtree
 /// with an animated root becomes a separate object, without those of its subtrees that are animated themselves.
@@ -17,4 +17,4 @@ SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, co
 Mesh flatten_still(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
                    SceneLook look);
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -9,7 +9,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline scene {
 namespace {
 
 constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{1} << 31;
@@ -68,4 +68,4 @@ std::vector<std::byte> read_bytes(const std::filesystem::path& file) {
   return bytes;
 }
 
-}  // namespace esim
+}  // namespace esim::inline scene

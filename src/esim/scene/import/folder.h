@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace esim {
+namespace esim::inline scene {
 
 /// A file that a scene refers to, if the scene may read it.
 struct FolderPath {
@@ -26,4 +26,4 @@ std::string percent_decoded(const std::string& uri);
 /// Reads a file. Throws UserError, naming it, if it is not a regular file, larger than 2 GiB, or unreadable.
 std::vector<std::byte> read_bytes(const std::filesystem::path& file);
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -11,7 +11,7 @@
 #include "esim/scene/import/folder.h"
 #include "esim/scene/import/scene_graph.h"
 
-namespace esim {
+namespace esim::inline scene {
 namespace {
 
 using Json = GltfDocument::Json;
@@ -302,4 +302,4 @@ std::vector<std::byte> GltfDocument::data_uri(const std::string& uri) const {
   return base64_decoded(std::string_view(uri).substr(comma + 1));
 }
 
-}  // namespace esim
+}  // namespace esim::inline scene

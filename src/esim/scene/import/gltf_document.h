@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace esim {
+namespace esim::inline scene {
 
 /// A glTF 2.0 file as text and bytes. The content is not trusted: a value that is missing, of the wrong type or out of
 /// range throws UserError with the file's name.
@@ -71,4 +71,4 @@ class GltfDocument {
   std::vector<std::vector<std::byte>> buffers_;
 };
 
-}  // namespace esim
+}  // namespace esim::inline scene

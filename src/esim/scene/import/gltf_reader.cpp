@@ -8,7 +8,7 @@
 #include "esim/scene/import/gltf_document.h"
 #include "esim/scene/import/scene_graph.h"
 
-namespace esim {
+namespace esim::inline scene {
 namespace {
 
 using Json = GltfDocument::Json;
@@ -384,4 +384,4 @@ class GltfReader {
 
 SceneGraph read_gltf(const std::filesystem::path& file) { return GltfReader(file).read(); }
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -3,7 +3,7 @@
 #include <cstring>
 #include <type_traits>
 
-namespace esim {
+namespace esim::inline scene {
 namespace {
 
 // Every struct lists its members once, for reading and writing.
@@ -170,4 +170,4 @@ SceneGraph graph_from_bytes(std::string_view bytes) {
   return graph;
 }
 
-}  // namespace esim
+}  // namespace esim::inline scene

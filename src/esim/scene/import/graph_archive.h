@@ -5,7 +5,7 @@
 
 #include "esim/scene/import/scene_graph.h"
 
-namespace esim {
+namespace esim::inline scene {
 
 /// A graph as bytes, for transfer to another process of the same program.
 std::string to_bytes(const SceneGraph& graph);
@@ -13,4 +13,4 @@ std::string to_bytes(const SceneGraph& graph);
 /// Throws InternalError for bytes that are not a graph.
 SceneGraph graph_from_bytes(std::string_view bytes);
 
-}  // namespace esim
+}  // namespace esim::inline scene

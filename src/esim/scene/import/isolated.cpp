@@ -14,7 +14,7 @@
 
 #include "esim/core/error.h"
 
-namespace esim {
+namespace esim::inline scene {
 namespace {
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -104,4 +104,4 @@ IsolatedResult run_isolated(const std::function<std::string()>& work, std::size_
   return ended;
 }
 
-}  // namespace esim
+}  // namespace esim::inline scene

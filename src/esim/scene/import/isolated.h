@@ -3,7 +3,7 @@
 #include <functional>
 #include <string>
 
-namespace esim {
+namespace esim::inline scene {
 
 /// How work in a separate process ended.
 struct IsolatedResult {
@@ -17,4 +17,4 @@ struct IsolatedResult {
 /// threads, since the copy has none.
 IsolatedResult run_isolated(const std::function<std::string()>& work, std::size_t memory_bytes, unsigned cpu_s);
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -8,7 +8,7 @@
 #include <array>
 #include <cmath>
 
-namespace esim {
+namespace esim::inline scene {
 namespace {
 
 constexpr std::size_t kMaxDepth = 200;
@@ -145,4 +145,4 @@ SceneMotion sample_motion(const NodeTransforms& transforms, std::size_t node, co
   return motion;
 }
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -5,7 +5,7 @@
 #include "esim/scene/import/scene_graph.h"
 #include "esim/scene/scene_file.h"
 
-namespace esim {
+namespace esim::inline scene {
 
 /// The poses of a graph's nodes over time.
 class NodeTransforms {
@@ -41,4 +41,4 @@ class NodeTransforms {
 SceneMotion sample_motion(const NodeTransforms& transforms, std::size_t node, const Eigen::Matrix4d& T_node_frame,
                           const std::string& name, const WarningHandler& warn);
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace esim {
+namespace esim::inline scene {
 namespace {
 
 Eigen::Vector4d normalised(const Eigen::Vector4d& rotation) {
@@ -81,4 +81,4 @@ void fail_scene(const std::filesystem::path& file, const std::string& reason) {
   throw UserError(fmt::format("scene {}: {}", file.string(), reason));
 }
 
-}  // namespace esim
+}  // namespace esim::inline scene

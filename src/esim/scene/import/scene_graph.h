@@ -13,7 +13,7 @@
 
 /// The result of every reader of scene files: a tree of nodes, from which a Scene is made. The world's z axis points
 /// up; lengths are in metres.
-namespace esim {
+namespace esim::inline scene {
 
 enum class Interpolation { step, linear, cubic };
 
@@ -102,4 +102,4 @@ SceneGraph read_gltf(const std::filesystem::path& file);
 /// The formats that assimp reads: OBJ, PLY, STL, FBX, Collada.
 SceneGraph read_with_assimp(const std::filesystem::path& file);
 
-}  // namespace esim
+}  // namespace esim::inline scene

@@ -4,11 +4,11 @@
 
 #include <span>
 
-#include "esim/scene/image_file.h"
-#include "esim/scene/image_header.h"
+#include "esim/scene/images/image_file.h"
+#include "esim/scene/images/image_header.h"
 #include "esim/scene/import/folder.h"
 
-namespace esim {
+namespace esim::inline scene {
 namespace {
 
 constexpr double kMaxTexels = 8192.0 * 8192.0;
@@ -115,4 +115,4 @@ void TextureStore::warn_failed(const std::string& material, const UserError& err
   warn_(fmt::format("material {}: {}; its surfaces are grey", material, error.what()));
 }
 
-}  // namespace esim
+}  // namespace esim::inline scene

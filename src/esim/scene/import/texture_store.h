@@ -11,7 +11,7 @@
 #include "esim/scene/import/scene_graph.h"
 #include "esim/scene/planes.h"
 
-namespace esim {
+namespace esim::inline scene {
 
 /// The part of an image or a material that is used.
 enum class View { red, green, blue, luminance };
@@ -52,4 +52,4 @@ class TextureStore {
   std::size_t image_count_ = 0, texel_count_ = 0;
 };
 
-}  // namespace esim
+}  // namespace esim::inline scene

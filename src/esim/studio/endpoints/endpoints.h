@@ -1,10 +1,10 @@
 #pragma once
 
-#include "esim/studio/recordings.h"
+#include "esim/studio/recordings/recordings.h"
+#include "esim/studio/recordings/runs.h"
 #include "esim/studio/roots.h"
-#include "esim/studio/router.h"
-#include "esim/studio/runs.h"
-#include "esim/studio/scenes.h"
+#include "esim/studio/scene_view/scenes.h"
+#include "esim/studio/server/router.h"
 #include "esim/studio/studio.h"
 
 namespace esim::studio {

@@ -2,7 +2,7 @@
 #include <array>
 #include <thread>
 
-#include "esim/record/format.h"
+#include "esim/recording/format.h"
 #include "esim/studio/endpoints/endpoints.h"
 #include "esim/studio/file_kinds.h"
 

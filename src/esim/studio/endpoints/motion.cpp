@@ -5,9 +5,9 @@
 
 #include "esim/compose/waypoints.h"
 #include "esim/scenario/read.h"
+#include "esim/studio/editor/motion_warnings.h"
+#include "esim/studio/editor/scenario_check.h"
 #include "esim/studio/endpoints/endpoints.h"
-#include "esim/studio/motion_warnings.h"
-#include "esim/studio/scenario_check.h"
 
 namespace esim::studio {
 namespace {

@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <span>
 
-#include "esim/record/preview/canvas.h"
-#include "esim/scene/image_file.h"
+#include "esim/preview/canvas.h"
+#include "esim/scene/images/image_file.h"
 #include "esim/studio/endpoints/endpoints.h"
 #include "esim/visualise/event_pictures.h"
 #include "esim/visualise/theme.h"

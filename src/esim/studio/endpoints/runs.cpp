@@ -3,8 +3,8 @@
 #include <fstream>
 
 #include "esim/scenario/read.h"
+#include "esim/studio/editor/scenario_check.h"
 #include "esim/studio/endpoints/endpoints.h"
-#include "esim/studio/scenario_check.h"
 
 namespace esim::studio {
 namespace {

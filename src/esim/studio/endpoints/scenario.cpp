@@ -4,11 +4,11 @@
 #include <iterator>
 #include <mutex>
 
-#include "esim/record/output_file.h"
+#include "esim/files/output_file.h"
+#include "esim/studio/editor/scenario_check.h"
+#include "esim/studio/editor/schema_json.h"
+#include "esim/studio/editor/yaml_text.h"
 #include "esim/studio/endpoints/endpoints.h"
-#include "esim/studio/scenario_check.h"
-#include "esim/studio/schema_json.h"
-#include "esim/studio/yaml_text.h"
 
 namespace esim::studio {
 namespace {

@@ -2,11 +2,11 @@
 #include <charconv>
 #include <cmath>
 
-#include "esim/record/preview/canvas.h"
+#include "esim/preview/canvas.h"
 #include "esim/scenario/read.h"
+#include "esim/studio/editor/scenario_check.h"
 #include "esim/studio/endpoints/endpoints.h"
-#include "esim/studio/first_view.h"
-#include "esim/studio/scenario_check.h"
+#include "esim/studio/scene_view/first_view.h"
 
 namespace esim::studio {
 namespace {

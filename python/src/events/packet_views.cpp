@@ -1,0 +1,94 @@
+#include "events/packet_views.h"
+
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+
+namespace esim::python {
+namespace {
+
+/// `values` as `leading` x ... arrays of height x width.
+template <typename T>
+nb::object images(std::vector<T> values, const Camera& model) {
+  const auto height = static_cast<std::size_t>(model.height), width = static_cast<std::size_t>(model.width);
+  const std::size_t count = values.size() / std::max<std::size_t>(height * width, 1);
+  return to_numpy(std::move(values), {count, height, width});
+}
+
+/// The same for pairs of images.
+nb::object image_pairs(std::vector<float> values, const Camera& model) {
+  const auto height = static_cast<std::size_t>(model.height), width = static_cast<std::size_t>(model.width);
+  const std::size_t count = values.size() / std::max<std::size_t>(2 * height * width, 1);
+  return to_numpy(std::move(values), {count, 2, height, width});
+}
+
+nb::dict to_dict(CameraPart part, const Camera& model) {
+  nb::dict view;
+  const std::size_t frames = part.t.size(), points = part.event_points.size() / 3;
+  view["events"] = bytes_to_numpy(std::move(part.events));
+  view["event_points"] = to_numpy(std::move(part.event_points), {points, 3});
+  view["t"] = to_numpy(std::move(part.t));
+  view["pose"] = to_numpy(std::move(part.poses), {frames, 4, 4});
+  view["irradiance"] = images(std::move(part.irradiance), model);
+  view["depth"] = images(std::move(part.depth), model);
+  view["flow"] = image_pairs(std::move(part.flow), model);
+  view["object"] = images(std::move(part.object), model);
+  const std::size_t displacements = part.displacement_span.size() / 2;
+  view["displacement_span"] = to_numpy(std::move(part.displacement_span), {displacements, 2});
+  view["displacement"] = image_pairs(std::move(part.displacement), model);
+  view["visible"] = images(std::move(part.visible), model);
+  view["image_t"] = to_numpy(std::move(part.image_t));
+  view["exposure_start"] = to_numpy(std::move(part.exposure_start));
+  view["exposure"] = to_numpy(std::move(part.exposure));
+  view["trigger_t"] = to_numpy(std::move(part.trigger_t));
+  view["trigger_kind"] = to_numpy(std::move(part.trigger_kind));
+  if (part.image_bits > 8) {
+    view["images"] = images(std::move(part.images), model);
+  } else {
+    view["images"] = images(std::vector<std::uint8_t>(part.images.begin(), part.images.end()), model);
+  }
+  return view;
+}
+
+nb::object matrix(const SE3& pose) {
+  std::vector<double> values;
+  append_matrix(pose, values);
+  return to_numpy(std::move(values), {4, 4});
+}
+
+}  // namespace
+
+nb::dict to_dict(Packet packet, const RecordingInfo& info) {
+  nb::dict view, cameras;
+  view["t0"] = packet.t0;
+  view["t1"] = packet.t1;
+  for (std::size_t i = 0; i < packet.cameras.size(); ++i)
+    cameras[info.cameras[i].name.c_str()] = to_dict(std::move(packet.cameras[i]), info.cameras[i].model);
+  view["cameras"] = cameras;
+  const std::size_t states = packet.body.size();
+  view["body"] = bytes_to_numpy(std::move(packet.body));
+  view["objects"] = to_numpy(std::move(packet.objects), {states, info.objects.size(), 4, 4});
+  view["imu"] = bytes_to_numpy(std::move(packet.imu));
+  return view;
+}
+
+nb::dict to_dict(const RecordingInfo& info) {
+  nb::dict view, cameras;
+  for (const CameraInfo& camera : info.cameras) {
+    nb::dict one;
+    const Camera& model = camera.model;
+    one["width"] = model.width;
+    one["height"] = model.height;
+    one["K"] = to_numpy(std::vector<double>{model.fx, 0, model.cx, 0, model.fy, model.cy, 0, 0, 1}, {3, 3});
+    one["T_body_camera"] = matrix(camera.T_body_camera);
+    cameras[camera.name.c_str()] = one;
+  }
+  view["start"] = info.start;
+  view["end"] = info.end;
+  view["cameras"] = cameras;
+  view["objects"] = nb::cast(info.objects);
+  return view;
+}
+
+}  // namespace esim::python

@@ -1,0 +1,73 @@
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings.h"
+#include "events/packet_views.h"
+#include "simulation/python_renderer.h"
+#include "simulation/scenario.h"
+#include "simulation/simulation.h"
+#include "simulation/trajectory.h"
+
+namespace esim::python {
+namespace {
+
+using NamedTrajectories = std::vector<std::pair<std::string, SharedTrajectory>>;
+
+void make_simulation(Simulation* self, const CheckedScenario& scenario, const std::optional<SharedTrajectory>& body,
+                     const nb::object& render, const NamedTrajectories& objects, const std::string& origin, int threads,
+                     TimeNs packet, const std::filesystem::path& out, bool force) {
+  Substitutes substitutes;
+  if (body) substitutes.body = body->motion;
+  std::optional<PythonFunction> function;
+  if (!render.is_none()) {
+    function.emplace(render);
+    substitutes.make_renderer = [function](const Camera& camera) { return make_python_renderer(*function, camera); };
+  }
+  for (const auto& [name, trajectory] : objects) substitutes.objects.push_back({name, trajectory.motion});
+  new (self) Simulation(scenario.value, substitutes, function, origin, {threads, packet, out, force});
+}
+
+// A renderer often refers to the owner of the simulation: the garbage collector must be able to traverse this cycle.
+
+int traverse(PyObject* self, visitproc visit, void* arg) {
+  Py_VISIT(Py_TYPE(self));
+  if (!nb::inst_ready(self)) return 0;
+  std::optional<PythonFunction>& render = nb::inst_ptr<Simulation>(self)->render();
+  if (render) Py_VISIT(render->get().ptr());
+  return 0;
+}
+
+int clear(PyObject* self) {
+  if (!nb::inst_ready(self)) return 0;
+  std::optional<PythonFunction>& render = nb::inst_ptr<Simulation>(self)->render();
+  if (render) render->clear();
+  return 0;
+}
+
+PyType_Slot slots[] = {
+    {Py_tp_traverse, reinterpret_cast<void*>(traverse)}, {Py_tp_clear, reinterpret_cast<void*>(clear)}, {0, nullptr}};
+
+}  // namespace
+
+void bind_simulation(nb::module_& module) {
+  nb::class_<Simulation>(module, "Simulation", nb::type_slots(slots))
+      .def("__init__", &make_simulation, nb::arg("scenario"), nb::arg("trajectory").none(), nb::arg("render").none(),
+           nb::arg("objects"), nb::arg("origin"), nb::arg("threads"), nb::arg("packet"), nb::arg("out"),
+           nb::arg("force"))
+      .def("next",
+           [](Simulation& self) -> std::optional<nb::dict> {
+             std::optional<Packet> packet = self.next();
+             if (!packet) return std::nullopt;
+             return to_dict(std::move(*packet), self.info());
+           })
+      .def("close", &Simulation::close)
+      .def("info", [](const Simulation& self) { return to_dict(self.info()); })
+      .def("warnings", &Simulation::warnings)
+      .def("losses", &Simulation::losses)
+      .def("report", &Simulation::report);
+}
+
+}  // namespace esim::python

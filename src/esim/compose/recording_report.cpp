@@ -1,0 +1,124 @@
+#include <nlohmann/json.hpp>
+
+#include "esim/compose/compose.h"
+
+namespace esim::inline compose {
+
+std::string report_json(const Scenario& scenario, const Summary& summary, int threads,
+                        const std::vector<std::string>& notices) {
+  using Json = nlohmann::ordered_json;
+  const double simulated_s = to_seconds(summary.end - summary.start);
+
+  Json cameras = Json::array();
+  for (std::size_t i = 0; i < summary.cameras.size(); ++i) {
+    const CameraSummary& camera = summary.cameras[i];
+    const SamplingStatistics& sampling = camera.sampling;
+    const std::int64_t events = camera.events_on + camera.events_off;
+    const double pixels = static_cast<double>(camera.width * camera.height);
+    cameras.push_back({
+        {"name", camera.name},
+        {"renderer", camera.renderer},
+        {"width", camera.width},
+        {"height", camera.height},
+        {"sampling", std::visit([](const auto& criterion) { return criterion.kType; }, scenario.cameras[i].sampling)},
+        {"frames", sampling.samples},
+        {"pixel_evaluations", sampling.pixel_evaluations},
+        {"frame_equivalents", static_cast<double>(sampling.pixel_evaluations) / pixels},
+        {"samples_held_to_max_rate", sampling.held_to_max_rate},
+        {"events", events},
+        {"events_on", camera.events_on},
+        {"events_off", camera.events_off},
+        {"events_dropped_by_readout", camera.sensor.dropped},
+        {"events_delayed_by_readout", camera.sensor.delayed},
+        {"longest_readout_delay_s", to_seconds(camera.sensor.longest_delay)},
+        {"events_per_second", simulated_s > 0 ? static_cast<double>(events) / simulated_s : 0.0},
+    });
+    if (scenario.cameras[i].frame_camera) cameras.back()["frames_written"] = camera.frames;
+    if (sampling.resampling_floor) {
+      const auto& [mean, p99, max] = *sampling.resampling_floor;
+      cameras.back()["supersampling"] = sampling.supersampling;
+      cameras.back()["resampling_floor"] = {{"mean", mean}, {"p99", p99}, {"max", max}};
+    }
+    if (!sampling.measured_error) continue;
+    const auto& [mean, p99, max] = *sampling.measured_error;
+    cameras.back()["tolerance"] = sampling.tolerance;
+    cameras.back()["measured_error"] = {{"mean", mean}, {"p99", p99}, {"max", max}};
+    cameras.back()["bisections"] = sampling.bisections;
+    cameras.back()["audits"] = sampling.audits;
+    cameras.back()["reconstructions"] = sampling.reconstructions;
+    cameras.back()["unseen_share"] = sampling.unseen_share;
+  }
+
+  const StageSeconds& s = summary.seconds;
+  const double other = summary.wall_seconds - (s.render + s.sampling + s.events + s.frames + s.truth + s.write);
+  Json report = {
+      {"status", summary.complete ? "complete" : "interrupted"},
+      {"esim_version", ESIM_VERSION},
+      {"seed", scenario.seed},
+      {"start_s", to_seconds(summary.start)},
+      {"simulated_s", simulated_s},
+      {"wall_s", summary.wall_seconds},
+      {"real_time_factor", summary.wall_seconds > 0 ? simulated_s / summary.wall_seconds : 0.0},
+      {"threads", threads},
+      {"wall_s_by_stage",
+       {{"render", s.render},
+        {"sampling", s.sampling},
+        {"events", s.events},
+        {"frames", s.frames},
+        {"truth", s.truth},
+        {"write", s.write},
+        {"other", other}}},
+      {"truth_frames", summary.truth_frames},
+      {"imu_samples", summary.imu_samples},
+      {"cameras", cameras},
+      {"notices", notices},
+  };
+  if (!summary.problem.empty()) report["reason"] = summary.problem;
+  return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,
+                        const std::vector<std::string>& notices) {
+  using Json = nlohmann::ordered_json;
+  const double converted_s = to_seconds(summary.end - summary.start);
+  const std::int64_t events = summary.events_on + summary.events_off;
+  const ConversionSummary::Seconds& s = summary.seconds;
+  const double other = summary.wall_seconds - (s.decode + s.motion + s.interpolation + s.events + s.write);
+  Json report = {
+      {"status", summary.complete ? "complete" : "interrupted"},
+      {"esim_version", ESIM_VERSION},
+      {"input", options.input.string()},
+      {"seed", options.seed},
+      {"start_s", to_seconds(summary.start)},
+      {"simulated_s", converted_s},
+      {"wall_s", summary.wall_seconds},
+      {"real_time_factor", summary.wall_seconds > 0 ? converted_s / summary.wall_seconds : 0.0},
+      {"threads", threads},
+      {"wall_s_by_stage",
+       {{"decode", s.decode},
+        {"motion", s.motion},
+        {"interpolation", s.interpolation},
+        {"events", s.events},
+        {"write", s.write},
+        {"other", other}}},
+      {"width", summary.width},
+      {"height", summary.height},
+      {"frames", summary.frames},
+      {"steps", summary.steps},
+      {"intervals_held_to_max_steps", summary.held},
+      {"greatest_displacement_px", summary.displacement_px},
+      {"events", events},
+      {"events_on", summary.events_on},
+      {"events_off", summary.events_off},
+      {"events_dropped_by_readout", summary.sensor.dropped},
+      {"events_delayed_by_readout", summary.sensor.delayed},
+      {"longest_readout_delay_s", to_seconds(summary.sensor.longest_delay)},
+      {"events_per_second", converted_s > 0 ? static_cast<double>(events) / converted_s : 0.0},
+      {"modulation_between_frames_rms", summary.modulation ? Json(*summary.modulation) : Json(nullptr)},
+      {"notices", notices},
+  };
+  if (!summary.problem.empty()) report["reason"] = summary.problem;
+  return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace esim::inline compose

@@ -1,0 +1,217 @@
+#include "esim/dataset/generators/affine_sequences.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "esim/backends/sprites/sprites_renderer.h"
+#include "esim/core/error.h"
+#include "esim/core/random.h"
+#include "esim/dataset/collector.h"
+#include "esim/dataset/files/checksum.h"
+#include "esim/dataset/generators/image_folder.h"
+#include "esim/motion/static.h"
+#include "esim/sampling/make_sampler.h"
+#include "esim/scenario/conversion.h"
+#include "esim/scene/images/dead_leaves.h"
+#include "esim/sim/simulate.h"
+
+namespace esim::inline dataset {
+namespace {
+
+/// The initial placement of an image under the sensor.
+struct Framing {
+  AffineStart start;
+  Eigen::Vector2d pivot{0.5, 0.5};  ///< point of the image at the sensor's centre
+};
+
+/// A slightly rotated placement in which the image covers the sensor, unless a small image would be blurred.
+Framing draw_framing(PixelSize sensor, const Texture& image, const AddressedRandom& random, std::uint32_t index) {
+  constexpr double kMostTurn_deg = 30, kMostEnlarged = 1.5;
+  const auto [turn, size] = random.uniforms(index, 1);
+  const auto [u, v] = random.uniforms(index, 2);
+  Framing framing;
+  framing.start.rotation_deg = kMostTurn_deg * (2 * turn - 1);
+  const double angle = framing.start.rotation_deg * std::numbers::pi / 180;
+  const double c = std::fabs(std::cos(angle)), s = std::fabs(std::sin(angle));
+
+  // Width and height of the sensor in the image, at scale 1, and the scale at which they just fit.
+  const Eigen::Vector2d seen(sensor.width * c + sensor.height * s, sensor.width * s + sensor.height * c);
+  const Eigen::Vector2d extent(image.width(), image.height());
+  const double least = seen.cwiseQuotient(extent).maxCoeff(), most = std::max(1.0, kMostEnlarged * least);
+  framing.start.scale = least * std::pow(most / least, size);
+  const Eigen::Vector2d margin = 0.5 * seen.cwiseQuotient(extent) / framing.start.scale;
+  framing.pivot = margin + (Eigen::Vector2d::Ones() - 2 * margin).cwiseProduct(Eigen::Vector2d(u, v));
+  return framing;
+}
+
+VectorField affine_field(PixelSize size, const AffineDisplacement& map) {
+  VectorField field{Image<float>(size.width, size.height), Image<float>(size.width, size.height)};
+  const Eigen::Vector2d middle((size.width - 1) / 2.0, (size.height - 1) / 2.0);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const Eigen::Vector2d v = map.at(Eigen::Vector2d(x, y) - middle);
+      field.x(x, y) = static_cast<float>(v.x());
+      field.y(x, y) = static_cast<float>(v.y());
+    }
+  }
+  return field;
+}
+
+/// The motion field, V = c' + A' A^-1 (pixel - c).
+AffineDisplacement velocity(const LayerPlacement& at, PixelSize sensor) {
+  const Eigen::Matrix2d gradient = at.A_rate * at.A.inverse();
+  const Eigen::Vector2d middle((sensor.width - 1) / 2.0, (sensor.height - 1) / 2.0);
+  return {gradient, at.centre_velocity + gradient * (middle - at.centre)};
+}
+
+void check(const AffineOptions& o) {
+  const auto require = [](bool good, const std::string& problem) {
+    if (!good) throw UserError(problem);
+  };
+  require(o.width >= 8 && o.height >= 8 && o.width <= 8192 && o.height <= 8192,
+          fmt::format("sensor of {}x{} px: must be from 8x8 to 8192x8192 px", o.width, o.height));
+  require(o.duration_s >= 1e-4 && o.duration_s <= 100,
+          fmt::format("duration of {} s: must be from 0.0001 to 100 s", o.duration_s));
+  require(o.contrast_threshold.low >= kMinContrastThreshold && o.contrast_threshold.high <= 100 &&
+              o.contrast_threshold.low <= o.contrast_threshold.high,
+          fmt::format("contrast thresholds from {} to {}: must increase, between {} and 100", o.contrast_threshold.low,
+                      o.contrast_threshold.high, kMinContrastThreshold));
+  require(o.flow_scale >= 1e-3 && o.flow_scale <= 1e3,
+          fmt::format("flow scale of {}: must be from 0.001 to 1000", o.flow_scale));
+  const MotionMix& mix = o.mix;
+  require(std::min({mix.translation, mix.rotation, mix.scale, mix.shear}) >= 0 &&
+              std::isfinite(mix.translation + mix.rotation + mix.scale + mix.shear) && mix.translation > 0,
+          "motion mix: the strengths must be at least 0, and that of translation above 0");
+}
+
+}  // namespace
+
+struct AffineSequences::Impl {
+  std::optional<ImageFolder> images;
+  MagnitudeHistogram strengths;
+
+  ImageFolder::Picture picture(std::uint64_t seed, std::uint32_t index, std::uint32_t offset) const {
+    if (images) return images->pick(std::uint64_t{index} + offset);
+    auto light = std::make_shared<const Texture>(dead_leaves({}, seed, index), Wrap::clamp, Wrap::clamp);
+    return {"dead leaves", std::move(light), {}};
+  }
+};
+
+AffineSequences::AffineSequences(AffineOptions options) : options_(std::move(options)) {
+  check(options_);
+  auto impl = std::make_unique<Impl>();
+  if (!options_.images.empty()) impl->images.emplace(options_.images);
+  options_.magnitudes = options_.magnitudes.scaled(options_.flow_scale);
+  impl->strengths = strengths_for(options_.magnitudes, options_.mix, {options_.width, options_.height});
+  impl_ = std::move(impl);
+}
+
+AffineSequences::~AffineSequences() = default;
+
+std::string AffineSequences::options() const {
+  const AffineOptions& o = options_;
+  nlohmann::ordered_json json{
+      {"kind", "affine"},
+      {"images", o.images.empty() ? "dead leaves" : checksum_text(impl_->images->fingerprint())},
+      {"width", o.width},
+      {"height", o.height},
+      {"duration_s", o.duration_s},
+      {"seed", o.seed},
+      {"flow_at", kEnumNames<FlowTime>[static_cast<std::size_t>(o.flow_at)]},
+      {"contrast_threshold", {o.contrast_threshold.low, o.contrast_threshold.high}},
+      {"mix", {o.mix.translation, o.mix.rotation, o.mix.scale, o.mix.shear}},
+      {"sampling", write_sampling(o.sampling)},
+      {"event_camera", write_event_camera(o.event_camera)},
+      {"magnitudes", {{"edges_px", o.magnitudes.edges}, {"shares", o.magnitudes.shares}}}};
+  return json.dump();
+}
+
+Sequence AffineSequences::make(std::uint32_t index) const {
+  const AffineOptions& o = options_;
+  const PixelSize sensor{o.width, o.height};
+
+  // The image and its motion. Strengths cover their distribution evenly.
+  const AddressedRandom random(o.seed, Purpose::dataset_image);
+  const auto all = random.bits(0xffffffffU);  // common to all sequences
+  const ImageFolder::Picture picture = impl_->picture(o.seed, index, all[0]);
+  const Framing framing = draw_framing(sensor, *picture.light, random, index);
+  double turn = 0;
+  const double u = std::modf(AddressedRandom::open_unit(all[1], all[2]) + std::numbers::phi * index, &turn);
+  const AffineMotion motion =
+      draw_motion(o.mix, sensor, framing.start, o.duration_s, impl_->strengths.quantile(u), o.seed, index);
+  const LayerMotion layer({motion.keyframes.begin(), motion.keyframes.end()}, KeyframeInterpolation::spline);
+
+  // The pixels.
+  EventCameraOptions camera = o.event_camera;
+  const AddressedRandom sensor_random(o.seed, Purpose::dataset_sensor);
+  const auto words = sensor_random.bits(index);
+  const double share = sensor_random.uniforms(index, 1)[0];
+  camera.contrast_threshold = o.contrast_threshold.low + share * (o.contrast_threshold.high - o.contrast_threshold.low);
+  camera.contrast_threshold_on.reset();
+  camera.contrast_threshold_off.reset();
+  const std::uint64_t sensor_seed = (std::uint64_t{words[0]} << 32) | words[1];
+
+  World world;
+  world.workers = std::make_unique<const Workers>(1);
+  world.info.end = to_ns(o.duration_s);
+  world.trajectory = std::make_shared<const StaticTrajectory>(SE3{}, 0, world.info.end);
+  const Camera model = Camera::from_fov(o.width, o.height, 1.0);
+  world.info.cameras.push_back({"cam0", model, {}});
+  SpriteScene scene;
+  scene.sprites.push_back({picture.light, nullptr, LayerUnits::pixel, LayerBeyond::mirror, layer, framing.pivot});
+  auto renderer = make_sprites_renderer(std::move(scene), model, *world.workers);
+  const SensorTraits traits{camera.contrast_threshold, camera.log_eps, false};
+  auto sampler = make_sampler(
+      o.sampling,
+      {traits, o.width, o.height, {0, world.info.end}, *world.workers, model, renderer->traits(), [](TimeNs t) {
+         return RenderRequest{.t = t, .camera = {}, .tiles = {}};
+       }});
+  world.cameras.push_back(
+      {std::move(renderer), std::move(sampler), EventCamera(camera, o.width, o.height, sensor_seed), {}});
+
+  Sequence sequence;
+  sequence.index = index;
+  Collector collector(sequence);
+  simulate(world, collector, [](const Progress&) { return true; });
+
+  // Ground truth, from the placements of the image.
+  const auto lies = [&](TimeNs t) {
+    return place(layer.at(t), LayerUnits::pixel, {picture.light->width(), picture.light->height()}, sensor,
+                 framing.pivot);
+  };
+  const TimeNs start = 0, end = world.info.end;
+  sequence.flow_t = o.flow_at == FlowTime::start ? start : o.flow_at == FlowTime::end ? end : end / 2;
+  sequence.flow = affine_field(sensor, velocity(lies(sequence.flow_t), sensor));
+  sequence.displacement = affine_field(sensor, displacement_between(lies(start), lies(end), sensor));
+  Sample sample;
+  for (const auto& [t, image] : {std::pair{start, &sequence.first}, std::pair{end, &sequence.last}}) {
+    world.cameras[0].renderer->render(view(world, 0, t), sample);
+    *image = sample.irradiance;
+  }
+  const auto keyframe = [](const LayerKeyframe& k) {
+    return nlohmann::ordered_json{{"t_s", k.t_s},
+                                  {"position", {k.position.x(), k.position.y()}},
+                                  {"rotation_deg", k.rotation_deg},
+                                  {"scale", {k.scale.x(), k.scale.y()}},
+                                  {"shear", k.shear}};
+  };
+  sequence.passed_over = picture.passed_over;
+  const nlohmann::ordered_json info{
+      {"image", picture.name},
+      {"flow_t", sequence.flow_t},
+      {"contrast_threshold", camera.contrast_threshold},
+      {"displacement_rms_px", motion.displacement_rms_px},
+      {"pivot", {framing.pivot.x(), framing.pivot.y()}},
+      {"keyframes", {keyframe(motion.keyframes[0]), keyframe(motion.keyframes[1]), keyframe(motion.keyframes[2])}}};
+  sequence.info = info.dump();
+  return sequence;
+}
+
+}  // namespace esim::inline dataset

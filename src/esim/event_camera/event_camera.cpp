@@ -1,0 +1,273 @@
+#include "esim/event_camera/event_camera.h"
+
+#include <algorithm>
+#include <atomic>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "esim/core/error.h"
+#include "esim/event_camera/center_surround.h"
+#include "esim/event_camera/front_end.h"
+#include "esim/event_camera/pixel/pixel_array.h"
+#include "esim/event_camera/pixel/pixel_update.h"
+#include "esim/event_camera/pixel/pixel_watch.h"
+#include "esim/event_camera/readout/pixel_readout.h"
+#include "esim/event_camera/state_archive.h"
+#include "esim/events/event_queue.h"
+#include "esim/render/irradiance_check.h"
+
+namespace esim::inline event_camera {
+namespace {
+
+constexpr int kPixelsPerPiece = 4096;  // per task of a parallel loop
+
+/// Divides the rows of a tile into tasks of a parallel loop.
+struct RowPieces {
+  int first, last, rows, count;
+
+  explicit RowPieces(const Tile& tile)
+      : first(tile.y),
+        last(tile.y + tile.height),
+        rows(std::max(1, kPixelsPerPiece / std::max(1, tile.width))),
+        count((tile.height + rows - 1) / rows) {}
+  int begin(int piece) const { return first + piece * rows; }
+  int end(int piece) const { return std::min(begin(piece) + rows, last); }
+};
+
+}  // namespace
+
+/// From irradiance to events: surround, pixels, queue, readout.
+struct EventCamera::State {
+  State(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream)
+      : pixels(options, width, height, seed, stream), packing(width, height), size{0, 0, width, height} {
+    if (options.surround_px > 0) surround.emplace(options.surround_px, options.surround_ms * 1e-3, width, height);
+    if (options.readout.limited()) readout.emplace(options, width, height);
+  }
+
+  bool integrate(const Workers& workers);
+  bool integrate_one(std::size_t i, const Workers& workers);
+  bool integrate_tiles(const Workers& workers);
+  bool advance(std::size_t i, const Image<float>* given, Rows rows, int worker);
+  void refuse_long_time(TimeNs duration) const;
+  void subtract_surround(const Segment& segment, const Workers& workers);
+
+  /// Everything except working memory and the queue.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    PixelArray::transfer(archive, self.pixels);
+    if (self.surround) CenterSurround::transfer(archive, *self.surround);
+    if (self.readout) PixelReadout::transfer(archive, *self.readout);
+    archive.value(self.spoiled);
+    archive.value(self.last_time);
+    archive.value(self.frames);
+    if (self.frames > 0) archive.image(self.last_frame);
+  }
+
+  PixelArray pixels;
+  EventPacking packing;
+  Tile size;
+  bool spoiled = false;  // a segment was integrated only partly
+  std::optional<CenterSurround> surround;
+  Image<float> brightness;               // minus the surround
+  std::vector<PixelUpdate> updates;      // per worker
+  std::vector<PackedEvents> events;      // per worker
+  std::span<const Segment> segments;     // being integrated
+  std::vector<std::size_t> tile_begins;  // first segment of each group of tiles, and the end
+  EventQueue queue;
+  std::optional<PixelReadout> readout;
+
+  // For process().
+  Image<float> last_frame, next_frame;
+  TimeNs last_time = 0;
+  std::int64_t frames = 0;
+};
+
+EventCamera::EventCamera(const EventCameraOptions& options, int width, int height, std::uint64_t seed,
+                         std::uint16_t stream)
+    : state_(std::make_unique<State>(options, width, height, seed, stream)) {}
+
+EventCamera::~EventCamera() = default;
+EventCamera::EventCamera(EventCamera&&) noexcept = default;
+EventCamera& EventCamera::operator=(EventCamera&&) noexcept = default;
+
+void EventCamera::State::subtract_surround(const Segment& segment, const Workers& workers) {
+  if (segment.tile != size)
+    throw UserError(
+        "event camera: surround_px requires samples of whole images; choose a sampling type that gives them");
+  if (brightness.empty()) brightness = Image<float>(size.width, size.height);
+  workers.for_each(size.height, [&](int y) {
+    respond(pixels.options, static_cast<std::size_t>(size.width), segment.irradiance1.row(y), brightness.row(y));
+  });
+  if (segment.t0 == segment.t1) {
+    surround->open(brightness);
+  } else {
+    surround->advance(brightness, to_seconds(segment.t1 - segment.t0));
+  }
+}
+
+/// Refuses durations that packed events, including latencies, cannot represent.
+void EventCamera::State::refuse_long_time(TimeNs duration) const {
+  const TimeNs longest = packing.longest() / 2;
+  if (duration < longest) return;
+  throw UserError("event camera: two samples are " + std::to_string(to_seconds(duration)) +
+                  " s apart; the interval must be shorter than " + std::to_string(to_seconds(longest)) + " s");
+}
+
+/// Integrates rows of the i-th segment.
+bool EventCamera::State::advance(std::size_t i, const Image<float>* given, Rows rows, int worker) {
+  const Segment& segment = segments[i];
+  PixelUpdate& update = updates[static_cast<std::size_t>(worker)];
+  if (segment.t0 == segment.t1) return update.open(pixels, segment, given, rows);
+  PastSegment* const past = readout ? &readout->history.added(i) : nullptr;
+  return update.advance(pixels, segment, given, rows, past, events[static_cast<std::size_t>(worker)]);
+}
+
+/// Integrates the rows of the i-th segment in parallel.
+bool EventCamera::State::integrate_one(std::size_t i, const Workers& workers) {
+  const Segment& segment = segments[i];
+  const Image<float>* given = nullptr;
+  if (surround) {
+    subtract_surround(segment, workers);
+    given = &brightness;
+  }
+  const RowPieces pieces(segment.tile);
+  std::atomic<bool> good = true;
+  workers.for_each_with_worker(pieces.count, [&](int piece, int worker) {
+    if (!advance(i, given, {pieces.begin(piece), pieces.end(piece)}, worker)) good = false;
+  });
+  return good;
+}
+
+/// Integrates several tiles in parallel.
+bool EventCamera::State::integrate_tiles(const Workers& workers) {
+  std::atomic<bool> good = true;
+  workers.for_each_with_worker(static_cast<int>(tile_begins.size()) - 1, [&](int i, int worker) {
+    const auto tile = static_cast<std::size_t>(i);
+    for (std::size_t k = tile_begins[tile]; k < tile_begins[tile + 1]; ++k) {
+      const Tile& where = segments[k].tile;
+      if (!advance(k, nullptr, {where.y, where.y + where.height}, worker)) good = false;
+    }
+  });
+  return good;
+}
+
+bool EventCamera::State::integrate(const Workers& workers) {
+  tile_begins.clear();
+  int pixels_seen = 0;  // since the last tile_begins
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    if (segments[i].t0 == segments[i].t1) pixels.set_epoch(segments[i].t0);
+    if (i == 0 || (segments[i].tile != segments[i - 1].tile && pixels_seen >= kPixelsPerPiece))
+      tile_begins.push_back(i), pixels_seen = 0;
+    pixels_seen += static_cast<int>(segments[i].tile.area());
+  }
+  tile_begins.push_back(segments.size());
+  if (tile_begins.size() > 2 && !surround) return integrate_tiles(workers);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    if (!integrate_one(i, workers)) return false;
+  }
+  return true;
+}
+
+void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark, const Workers& workers) {
+  State& state = *state_;
+  if (state.spoiled)
+    throw UserError("event camera: an earlier irradiance was invalid, and the camera cannot go on; create a new one");
+  const auto threads = static_cast<std::size_t>(workers.threads());
+  if (state.updates.size() < threads) state.updates.resize(threads), state.events.resize(threads);
+  TimeNs first = std::numeric_limits<TimeNs>::max(), last = std::numeric_limits<TimeNs>::min();
+  for (const Segment& segment : segments) first = std::min(first, segment.t0), last = std::max(last, segment.t1);
+  state.packing.origin = first;
+  state.refuse_long_time(last - first);
+  for (PackedEvents& events : state.events) events.expect(state.packing, last - first);
+  state.segments = segments;
+  if (state.readout) state.readout->history.add(segments, state.pixels);
+  if (!state.integrate(workers)) {
+    state.spoiled = true;
+    for (const Segment& segment : segments) check_irradiance(segment);
+  }
+  state.queue.add(state.events, workers);
+  if (state.readout) state.readout->advance(state.pixels, state.updates[0], state.queue, watermark);
+}
+
+void EventCamera::release_until(TimeNs until, std::vector<Event>& out) {
+  if (state_->readout) return state_->readout->release_until(until, out);
+  const EventSpan released = state_->queue.release_until(until);
+  out.insert(out.end(), released.begin(), released.end());
+}
+
+void EventCamera::process(const Image<float>& irradiance, TimeNs t, std::vector<Event>& out, const Workers& workers) {
+  const State& state = *state_;
+  if (irradiance.bounds() != state.size) {
+    throw UserError("frame " + std::to_string(state.frames) + ": its size is " + std::to_string(irradiance.width()) +
+                    " x " + std::to_string(irradiance.height()) + " px; it must be the camera's, " +
+                    std::to_string(state.size.width) + " x " + std::to_string(state.size.height) + " px");
+  }
+  process(irradiance.pixels(), t, out, workers);
+}
+
+void EventCamera::process(std::span<const float> irradiance, TimeNs t, std::vector<Event>& out,
+                          const Workers& workers) {
+  State& state = *state_;
+  const std::string frame = "frame " + std::to_string(state.frames);
+  if (irradiance.size() != state.size.area()) {
+    throw UserError(frame + ": it has " + std::to_string(irradiance.size()) + " pixels; it must have the camera's " +
+                    std::to_string(state.size.area()) + " pixels");
+  }
+  const bool first = state.frames == 0;
+  if (!first && t <= state.last_time) {
+    throw UserError(frame + ": its time, " + std::to_string(t) +
+                    " ns, does not come after that of the previous frame, " + std::to_string(state.last_time) +
+                    " ns; pass the frames in order of time");
+  }
+  if (state.next_frame.empty()) state.next_frame = Image<float>(state.size.width, state.size.height);
+  std::copy(irradiance.begin(), irradiance.end(), state.next_frame.data());
+  const Image<float>& before = first ? state.next_frame : state.last_frame;
+  const Segment segment{state.size, first ? t : state.last_time, t, &before, &state.next_frame};
+  try {
+    check_irradiance(segment);
+    integrate(std::span(&segment, 1), t, workers);
+  } catch (const UserError& error) {
+    throw UserError(frame + ": " + error.what());
+  }
+  release_until(t, out);
+  std::swap(state.last_frame, state.next_frame);
+  state.last_time = t;
+  ++state.frames;
+}
+
+EventCameraStatistics EventCamera::statistics() const {
+  const auto found = static_cast<std::int64_t>(state_->queue.size());
+  if (!state_->readout) return {.in_flight = found};
+  const PixelReadout& readout = *state_->readout;
+  return {.dropped = readout.dropped(),
+          .delayed = readout.delayed(),
+          .longest_delay = readout.longest_delay(),
+          .in_flight = found + static_cast<std::int64_t>(readout.waiting())};
+}
+
+std::vector<std::byte> EventCamera::state() const {
+  if (state_->readout && !state_->readout->history.empty()) {
+    throw UserError(
+        "event camera: its state cannot be saved while the segments of its tiles end at different times; save it when "
+        "every segment ends at the watermark");
+  }
+  std::vector<std::byte> bytes;
+  StateWriter archive(bytes);
+  State::transfer(archive, *state_);
+  archive.list(state_->queue.waiting());
+  return bytes;
+}
+
+void EventCamera::restore(std::span<const std::byte> state) {
+  StateReader archive(state);
+  state_->last_frame = Image<float>(state_->size.width, state_->size.height);
+  State::transfer(archive, *state_);
+  std::vector<Event> waiting;
+  archive.list(waiting);
+  if (!archive.at_end()) StateReader::fail();
+  state_->queue.restore(waiting);
+}
+
+}  // namespace esim::inline event_camera

@@ -1,0 +1,162 @@
+#pragma once
+
+#include <optional>
+
+#include "esim/core/describe.h"
+
+namespace esim::inline event_camera {
+
+/// Sensors with published parameters (docs/methods/pixel.md has the sources).
+enum class SensorPreset { ideal, dvs128, davis240c, davis346, dvxplorer, gen31_vga, imx636, v2e_clean, v2e_noisy };
+
+/// How irradiance becomes brightness.
+enum class PixelResponse {
+  log,      ///< L = ln(E + log_eps), as in the paper
+  lin_log,  ///< L = ln(255 E), linear through the origin below lin_log_knee, as in v2e
+};
+
+/// What happens to events within a refractory period.
+enum class RefractoryMode {
+  hold,  ///< the pixel is held in reset; its reference is the brightness at the period's end, as in real sensors
+  drop,  ///< the events are lost, but they update the reference, as in the original ESIM
+};
+
+/// The readout of the pixels. Rows with events wait, first come first served, for one reader, which reads all events of
+/// a row together and stamps them with the time of reading. A pixel waits until its event has been read; then its
+/// refractory period begins.
+struct ReadoutOptions {
+  double rate_mev_per_s = 0.0;
+  double row_time_us = 0.0;
+  int queue_events = 0;
+
+  bool limited() const { return rate_mev_per_s > 0 || row_time_us > 0; }
+};
+
+/// Parameters of an event camera. Thresholds are changes of brightness, in natural logarithms. Effects that depend on
+/// the irradiance use the relative intensity i = (E + dark_irradiance) / (1 + dark_irradiance), which is 1 at white.
+struct EventCameraOptions {
+  SensorPreset preset = SensorPreset::ideal;
+
+  double contrast_threshold = 0.5;
+  std::optional<double> contrast_threshold_on{};   ///< C+; default: contrast_threshold
+  std::optional<double> contrast_threshold_off{};  ///< C-; default: contrast_threshold
+  double threshold_mismatch = 0.0;
+  double threshold_noise = 0.0;
+
+  PixelResponse response = PixelResponse::log;
+  double log_eps = 0.001;
+  double lin_log_knee = 20.0 / 255.0;
+  double dark_irradiance = 20.0 / 255.0;
+  double low_pass_hz = 0.0;
+  int low_pass_order = 1;
+  double surround_px = 0.0;
+  double surround_ms = 0.0;
+
+  double refractory_period_us = 0.0;
+  RefractoryMode refractory_mode = RefractoryMode::hold;
+
+  double leak_rate_hz = 0.0;
+  double leak_mismatch_decades = 0.0;
+  double leak_jitter = 0.0;
+  double shot_noise_hz = 0.0;
+  double shot_noise_at_white = 0.25;
+  double hot_pixels = 0.0;
+  double hot_pixel_rate_hz = 100.0;
+  double dead_pixels = 0.0;
+
+  double latency_us = 0.0;
+  double latency_jitter_us = 0.0;
+  double latency_light_share = 0.0;
+  ReadoutOptions readout{};
+
+  double threshold_on() const { return contrast_threshold_on.value_or(contrast_threshold); }
+  double threshold_off() const { return contrast_threshold_off.value_or(contrast_threshold); }
+};
+
+/// Minimum threshold of any pixel, whatever the noise: keeps the number of events per step finite.
+inline constexpr double kMinContrastThreshold = 0.01;
+
+/// The parameters of a sensor.
+EventCameraOptions preset_options(SensorPreset preset);
+
+}  // namespace esim::inline event_camera
+
+namespace esim {
+
+template <>
+inline constexpr std::array<const char*, 9> kEnumNames<SensorPreset>{
+    "ideal", "dvs128", "davis240c", "davis346", "dvxplorer", "gen3.1-vga", "imx636", "v2e-clean", "v2e-noisy"};
+template <>
+inline constexpr std::array<const char*, 2> kEnumNames<PixelResponse>{"log", "lin_log"};
+template <>
+inline constexpr std::array<const char*, 2> kEnumNames<RefractoryMode>{"hold", "drop"};
+
+}  // namespace esim
+
+namespace esim::inline event_camera {
+
+template <class Visitor>
+void describe(Visitor& visit, ReadoutOptions& o) {
+  visit("rate_mev_per_s", o.rate_mev_per_s, About{"maximum readout rate; 0: no limit", "Mev/s", 0, 1e6});
+  visit("row_time_us", o.row_time_us, About{"time to read out a row, in addition to its events", "us", 0, 1e6});
+  visit(
+      "queue_events", o.queue_events,
+      About{"maximum number of waiting events; further events are dropped and counted; 0: one per pixel", "", 0, 1e9});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, EventCameraOptions& o) {
+  // A preset sets all values that are not given explicitly.
+  const SensorPreset before = o.preset;
+  visit("preset", o.preset, About{"sensor that sets the defaults of all other options"});
+  if (o.preset != before) o = preset_options(o.preset);
+
+  visit("contrast_threshold", o.contrast_threshold,
+        About{"change of log-brightness that fires an event", "", 0.01, 100});
+  visit("contrast_threshold_on", o.contrast_threshold_on,
+        About{"the same for ON events, C+ (default: contrast_threshold)", "", 0.01, 100});
+  visit("contrast_threshold_off", o.contrast_threshold_off,
+        About{"the same for OFF events, C- (default: contrast_threshold)", "", 0.01, 100});
+  visit("threshold_mismatch", o.threshold_mismatch,
+        About{"standard deviation of the thresholds from pixel to pixel, fixed in time", "", 0, 10});
+  visit("threshold_noise", o.threshold_noise,
+        About{"standard deviation of a pixel's thresholds from event to event (sigma_C)", "", 0, 10});
+
+  visit("response", o.response, About{"brightness: ln(E + log_eps), or v2e's with a linear toe"});
+  visit("log_eps", o.log_eps, About{"added to the irradiance before the logarithm", "", 0, 1, true});
+  visit("lin_log_knee", o.lin_log_knee, About{"irradiance below which lin_log is linear", "", 0.005, 10});
+  visit(
+      "dark_irradiance", o.dark_irradiance,
+      About{"irradiance equivalent to the dark current; effects that depend on the irradiance E use E plus this value",
+            "", 0, 10, true});
+  visit("low_pass_hz", o.low_pass_hz,
+        About{"cut-off (-3 dB) of the photoreceptor at white; 0: no low-pass", "Hz", 0, 1e9});
+  visit("low_pass_order", o.low_pass_order, About{"poles of the photoreceptor's low-pass", "", 1, 2});
+  visit("surround_px", o.surround_px,
+        About{"length constant of the surround that is subtracted from each pixel; 0: no surround", "px", 0, 1000});
+  visit("surround_ms", o.surround_ms, About{"time constant of the surround", "ms", 0, 1e6});
+
+  visit("refractory_period_us", o.refractory_period_us,
+        About{"time after an event during which a pixel fires no events", "us", 0, 1e9});
+  visit("refractory_mode", o.refractory_mode, About{"hold: the pixel is held in reset; drop: its events are dropped"});
+  visit("leak_rate_hz", o.leak_rate_hz, About{"rate of ON events of a pixel at constant irradiance", "Hz", 0, 1e6});
+  visit("leak_mismatch_decades", o.leak_mismatch_decades,
+        About{"standard deviation of log10 of the leak rate from pixel to pixel", "", 0, 2});
+  visit("leak_jitter", o.leak_jitter, About{"relative standard deviation of the time between leak events", "", 0, 0.3});
+  visit("shot_noise_hz", o.shot_noise_hz,
+        About{"rate of random events of a pixel in the dark, ON and OFF", "Hz", 0, 1e5});
+  visit("shot_noise_at_white", o.shot_noise_at_white,
+        About{"fraction of the shot noise that remains at white", "", 0, 1});
+  visit("hot_pixels", o.hot_pixels, About{"fraction of pixels that leak at hot_pixel_rate_hz", "", 0, 1});
+  visit("hot_pixel_rate_hz", o.hot_pixel_rate_hz, About{"rate of ON events of a hot pixel", "Hz", 0, 1e6});
+  visit("dead_pixels", o.dead_pixels, About{"fraction of pixels that never fire", "", 0, 1});
+
+  visit("latency_us", o.latency_us,
+        About{"time from the threshold crossing to the time stamp, at white", "us", 0, 1e6});
+  visit("latency_jitter_us", o.latency_jitter_us, About{"standard deviation of the latency, at white", "us", 0, 1e6});
+  visit("latency_light_share", o.latency_light_share,
+        About{"fraction of latency and jitter that is proportional to 1 / intensity", "", 0, 1});
+  visit("readout", o.readout, About{"readout of the events from the pixels"});
+}
+
+}  // namespace esim::inline event_camera

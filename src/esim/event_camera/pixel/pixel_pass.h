@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "esim/core/pixel_normals.h"
+#include "esim/event_camera/pixel/linear_signals.h"
+#include "esim/event_camera/pixel/pixel_array.h"
+#include "esim/event_camera/pixel/pixel_block.h"
+#include "esim/event_camera/pixel/relaxing_signals.h"
+#include "esim/events/packed_events.h"
+
+namespace esim::inline event_camera {
+
+/// Advances active pixels through a segment, with all random effects. In each round, every pixel of a block fires at
+/// most one event, in vectors. Private to the event camera; keep the object for its working memory.
+template <class Signals>
+class PixelPass {
+ public:
+  /// The signals of the comparators; set them for the pixels that take() added.
+  Signals signals;
+
+  /// Takes the new active pixels between t0 and t1: those in `active` after the ones that the last round() left, in the
+  /// same segment. Removes from `active` those that stay in reset. Returns the index of the first new pixel.
+  std::size_t take(const PixelArray& pixels, ActivePixels& active, TimeNs t0, TimeNs t1);
+
+  /// Adds the next event of each pixel that fires to `events`, in any order. `active` keeps the pixels that may fire
+  /// again; with `wait`, none: pixels then stay in reset after their event until it has been read out.
+  void round(PixelArray& pixels, ActivePixels& active, PackedEvents& events, bool wait = false);
+
+  /// Restores the values that pixels drew after the last of their events.
+  void draw_again(PixelArray& pixels, const ActivePixels& active);
+
+  /// Instead of rounds at the pixels' first sample, t0 = t1: sets their references.
+  void open(PixelArray& pixels, ActivePixels& active);
+
+ private:
+  void resume_held();
+
+  // The steps of a round, for all remaining pixels.
+  void find_shots(const PixelArray& pixels, const ActivePixels& active);
+  void find_shot(const PixelArray& pixels, const ActivePixels& active, std::size_t i);
+  void renew(const PixelArray& pixels, const ActivePixels& active);
+  void fire(const PixelArray& pixels, const ActivePixels& active, const EventPacking& packing);
+  void delay(const PixelArray& pixels, const ActivePixels& active, const EventPacking& packing);
+  void reset(const PixelArray& pixels, bool wait);
+  void deactivate(PixelArray& pixels, ActivePixels& active);
+
+  void draw_uniforms(const AddressedRandom& random, const ActivePixels& active, std::uint32_t draw);
+  void keep(ActivePixels& active, std::size_t i, std::size_t to);
+  void write_back(PixelArray::NoisyPixel& own, std::size_t i) const;
+
+  TimeNs t0_ = 0;
+  double duration_ = 0;  // ns
+  double epoch_ns_ = 0;  // from the epoch to t0
+
+  // Pixels that have not resumed yet, and whose refractory period ends in the segment.
+  PerPixel<std::uint32_t> held_{};
+  std::size_t held_count_ = 0;
+
+  // Per remaining pixel. Times are in ns after t0.
+  Comparators compare_{};
+  PerPixel<std::uint32_t> draws_{}, shots_{};
+  PerPixel<float> mean_on_{}, mean_off_{}, mean_leak_{};
+  PerPixel<double> shot_{};     // next candidate of shot noise
+  PerPixel<double> until_{};    // end of the last refractory period
+  PerPixel<double> passed_{};   // the level that the event crossed
+  PerPixel<double> anew_{};     // 1: the new reference is the current signal, not the level
+  PerPixel<double> stamp_{};    // time stamp of the event
+  PerPixel<double> reports_{};  // 0 if the event is lost
+  PerPixel<double> again_{};    // 1 if another event may follow
+  PixelNormals normals_{};
+  PerPixel<double> uniform_{};
+
+  // The bounds of inactive pixels.
+  PerPixel<float> low_{}, high_{};
+  PerPixel<std::int32_t> timer_{};
+};
+
+extern template class PixelPass<LinearSignals>;
+extern template class PixelPass<RelaxingSignals>;
+
+}  // namespace esim::inline event_camera

@@ -1,0 +1,71 @@
+#include "esim/event_camera/options.h"
+
+namespace esim::inline event_camera {
+namespace {
+
+/// The parameters by which sensors differ; docs/methods/pixel.md has their sources.
+struct SensorFigures {
+  double threshold, mismatch;  // ln
+  double leak_hz, shot_hz;     // per pixel; shot noise in the dark
+  double low_pass_hz, refractory_us;
+  double latency_us, jitter_us;
+  double readout_mev_per_s, row_us;
+};
+
+EventCameraOptions options_of(const SensorFigures& figures) {
+  EventCameraOptions o;
+  o.contrast_threshold = figures.threshold;
+  o.threshold_mismatch = figures.mismatch;
+  o.leak_rate_hz = figures.leak_hz;
+  o.leak_mismatch_decades = 0.1;
+  o.leak_jitter = 0.1;
+  o.shot_noise_hz = figures.shot_hz;
+  o.low_pass_hz = figures.low_pass_hz;
+  o.refractory_period_us = figures.refractory_us;
+  o.latency_us = figures.latency_us;
+  o.latency_jitter_us = figures.jitter_us;
+  o.readout.rate_mev_per_s = figures.readout_mev_per_s;
+  o.readout.row_time_us = figures.row_us;
+  return o;
+}
+
+/// The models of v2e, without its time slots; its brightness is linear near zero.
+EventCameraOptions v2e_options(const SensorFigures& figures) {
+  EventCameraOptions o = options_of(figures);
+  o.response = PixelResponse::lin_log;
+  return o;
+}
+
+EventCameraOptions values_of(SensorPreset preset) {
+  switch (preset) {
+    case SensorPreset::ideal:
+      return {};
+    case SensorPreset::dvs128:
+      return options_of({0.20, 0.021, 0.1, 5, 3000, 500, 15, 2, 1, 0});
+    case SensorPreset::davis240c:
+      return options_of({0.20, 0.034, 0.1, 10, 300, 500, 3, 2, 10, 0.1});
+    case SensorPreset::davis346:
+      return options_of({0.20, 0.034, 0.2, 10, 300, 500, 20, 2, 12, 0.08});
+    case SensorPreset::dvxplorer:
+      return options_of({0.243, 0.040, 0.03, 5, 300, 200, 150, 58, 165, 0.31});
+    case SensorPreset::gen31_vga:
+      return options_of({0.182, 0.03, 0.07, 5, 800, 100, 40, 20, 50, 0});
+    case SensorPreset::imx636:
+      return options_of({0.223, 0.03, 0.1, 5, 1600, 100, 20, 10, 1066, 0.1});
+    case SensorPreset::v2e_clean:
+      return v2e_options({0.2, 0.02, 0, 0, 0, 0, 0, 0, 0, 0});
+    case SensorPreset::v2e_noisy:
+      return v2e_options({0.2, 0.05, 0.1, 5, 30, 0, 0, 0, 0, 0});
+  }
+  return {};
+}
+
+}  // namespace
+
+EventCameraOptions preset_options(SensorPreset preset) {
+  EventCameraOptions options = values_of(preset);
+  options.preset = preset;
+  return options;
+}
+
+}  // namespace esim::inline event_camera

@@ -1,0 +1,77 @@
+#include "esim/event_camera/segment_history.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace esim::inline event_camera {
+namespace {
+
+void make_size(Image<float>& image, const Tile& tile) {
+  if (image.width() != tile.width || image.height() != tile.height) image = Image<float>(tile.width, tile.height);
+}
+
+/// Copies a view's pixels of the tile, and redirects the view to the copy.
+void keep(ImageView<float>& view, Image<float>& copy, const Tile& tile) {
+  make_size(copy, tile);
+  for (int y = 0; y < tile.height; ++y) std::copy_n(view.row(tile.y + y) + tile.x, tile.width, copy.row(y));
+  view = ImageView<float>(copy.data(), tile);
+}
+
+}  // namespace
+
+void SegmentHistory::add(std::span<const Segment> segments, const PixelArray& pixels) {
+  width_ = pixels.width, height_ = pixels.height;
+  added_ = count_;
+  count_ += segments.size();
+  if (segments_.size() < count_) segments_.resize(count_);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    PastSegment& past = segments_[added_ + i];
+    past.segment = segments[i];
+    if (!pixels.filtered1.empty()) make_size(past.filtered1, segments[i].tile);
+    if (!pixels.filtered2.empty()) make_size(past.filtered2, segments[i].tile);
+    if (pixels.options.surround_px > 0) make_size(past.start, segments[i].tile), make_size(past.end, segments[i].tile);
+  }
+  indexed_ = false;
+}
+
+void SegmentHistory::keep_after(TimeNs watermark) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    PastSegment& past = segments_[i];
+    const Segment& segment = past.segment;
+    if (segment.t0 == segment.t1 || segment.t1 <= watermark) continue;
+    if (i >= added_) {  // the others have already been copied
+      keep(past.segment.irradiance0, past.light0, segment.tile);
+      keep(past.segment.irradiance1, past.light1, segment.tile);
+    }
+    if (kept != i) std::swap(segments_[kept], past);
+    ++kept;
+  }
+  count_ = added_ = kept;
+  indexed_ = false;
+}
+
+void SegmentHistory::index() {
+  first_seen_.assign(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), kNone);
+  next_.assign(count_, kNone);
+  for (std::size_t i = count_; i-- > 0;) {
+    const Segment& segment = segments_[i].segment;
+    if (segment.t0 == segment.t1) continue;
+    const Tile& tile = segment.tile;
+    for (int y = tile.y; y < tile.y + tile.height; ++y) {
+      std::uint32_t* const row = first_seen_.data() + static_cast<std::ptrdiff_t>(y) * width_;
+      if (y == tile.y) next_[i] = row[tile.x];
+      std::fill_n(row + tile.x, tile.width, static_cast<std::uint32_t>(i));
+    }
+  }
+  indexed_ = true;
+}
+
+std::uint32_t SegmentHistory::find(std::uint32_t pixel, TimeNs t) {
+  if (!indexed_) index();
+  std::uint32_t i = first_seen_[pixel];
+  while (i != kNone && segments_[i].segment.t1 < t) i = next_[i];
+  return i;
+}
+
+}  // namespace esim::inline event_camera

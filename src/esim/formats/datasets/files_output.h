@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace esim::inline formats {
+
+/// Writes the files of a dataset to a folder or a zip. Failures are OutputErrors.
+class FilesOutput {
+ public:
+  virtual ~FilesOutput() = default;
+
+  /// Adds a complete file. Names may contain folders: "images/a.png".
+  virtual void add(const std::string& name, std::string_view content) = 0;
+
+  /// Appends to a text file, which is created empty. A few may grow at the same time.
+  virtual void append(const std::string& name, std::string_view text) = 0;
+
+  /// Makes everything durable.
+  virtual void close() = 0;
+};
+
+std::unique_ptr<FilesOutput> make_folder_output(const std::filesystem::path& folder);
+
+/// Added files are stored uncompressed. Growing texts are compressed into separate files next to the zip and copied
+/// into it at the end, so that memory does not grow with them. The same content gives the same bytes.
+std::unique_ptr<FilesOutput> make_zip_output(const std::filesystem::path& path);
+
+}  // namespace esim::inline formats

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "esim/events/event.h"
+#include "esim/recording/format.h"
+
+namespace esim::inline formats {
+
+/// Reads the events of one camera. A format that holds only events needs nothing else to be a Source.
+class EventsReader {
+ public:
+  virtual ~EventsReader() = default;
+
+  /// 0 x 0 if the file does not state it.
+  virtual SensorSize sensor() const { return {}; }
+
+  /// Start and end of the recording, which may be before the first event and after the last one; nothing if the file
+  /// does not state them. The end may be that of the events only.
+  virtual std::optional<TimeNs> start() const { return std::nullopt; }
+  virtual std::optional<TimeNs> end() const { return std::nullopt; }
+
+  /// Appends the next events, some 10^4 to 10^5; returns false at the end. If the file is damaged, appends the events
+  /// before the damage and throws UserError.
+  virtual bool read(std::vector<Event>& events) = 0;
+
+  /// The fraction of the file that has been read.
+  virtual double progress() const = 0;
+};
+
+std::unique_ptr<Source> make_events_source(std::unique_ptr<EventsReader> reader, const ReadOptions& options);
+
+}  // namespace esim::inline formats

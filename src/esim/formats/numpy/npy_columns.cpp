@@ -1,0 +1,90 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <utility>
+
+#include "esim/core/error.h"
+#include "esim/formats/numpy/npy_array.h"
+
+namespace esim::inline formats::npy {
+namespace {
+
+constexpr std::int64_t kMaxExtent = 65536;  // px
+
+class ColumnsReader final : public EventsReader {
+ public:
+  explicit ColumnsReader(EventColumns columns) : columns_(std::move(columns)), count_(columns_.t.array->count()) {
+    for (const auto* column : all()) {
+      if (std::find(arrays_.begin(), arrays_.end(), column->array) == arrays_.end()) arrays_.push_back(column->array);
+      portion_ = std::min(portion_, std::max<std::size_t>(1, kMaxBufferBytes / column->array->item_bytes()));
+      if (!column->array->one_dimension()) column->array->fail("it has more than one dimension");
+      if (column->array->count() != count_) column->array->fail("its length differs from that of the other arrays");
+    }
+  }
+
+  SensorSize sensor() const override { return columns_.sensor; }
+  double progress() const override { return count_ > 0 ? static_cast<double>(done_) / static_cast<double>(count_) : 1; }
+
+  bool read(std::vector<Event>& events) override {
+    const std::size_t wanted = std::min<std::uint64_t>(portion_, count_ - done_);
+    std::size_t there = wanted;
+    for (const auto& array : arrays_) there = std::min(there, array->advance(wanted));
+    columns_.t.array->times(columns_.t.field, t_);
+    columns_.x.array->integers(columns_.x.field, x_);
+    columns_.y.array->integers(columns_.y.field, y_);
+    columns_.p.array->integers(columns_.p.field, p_);
+    for (std::size_t i = 0; i < there; ++i, ++done_) {
+      if (t_[i] == Array::kNoNumber || p_[i] == Array::kNoNumber || std::min(x_[i], y_[i]) < 0 ||
+          std::max(x_[i], y_[i]) >= kMaxExtent) {
+        columns_.t.array->fail(fmt::format("event {} has an invalid time, position or polarity", done_));
+      }
+      events.push_back({t_[i], static_cast<std::uint16_t>(x_[i]), static_cast<std::uint16_t>(y_[i]),
+                        static_cast<std::int8_t>(p_[i] > 0 ? 1 : -1)});
+    }
+    if (there < wanted) columns_.t.array->fail(fmt::format("it ends after {} of {} events", done_, count_));
+    return there > 0;
+  }
+
+ private:
+  static constexpr std::size_t kMaxBufferBytes = 1 << 22;
+
+  std::array<const EventColumns::Column*, 4> all() const {
+    return {&columns_.t, &columns_.x, &columns_.y, &columns_.p};
+  }
+
+  EventColumns columns_;
+  std::vector<std::shared_ptr<Array>> arrays_;
+  std::vector<std::int64_t> t_, x_, y_, p_;
+  std::uint64_t count_ = 0, done_ = 0;
+  std::size_t portion_ = 1 << 15;
+};
+
+}  // namespace
+
+void take_column(std::string_view name, EventColumns::Column column, EventColumns& columns) {
+  std::string key(name);
+  for (char& c : key) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const auto is_one_of = [&](std::initializer_list<std::string_view> names) {
+    return std::find(names.begin(), names.end(), key) != names.end();
+  };
+  if (is_one_of({"t", "ts", "time", "timestamp", "timestamps"})) columns.t = std::move(column);
+  if (is_one_of({"x"})) columns.x = std::move(column);
+  if (is_one_of({"y"})) columns.y = std::move(column);
+  if (is_one_of({"p", "pol", "polarity", "polarities"})) columns.p = std::move(column);
+}
+
+std::unique_ptr<EventsReader> make_columns_reader(const std::string& file, EventColumns columns) {
+  for (const auto& [name, column] : {std::pair{"t", columns.t}, {"x", columns.x}, {"y", columns.y}, {"p", columns.p}}) {
+    if (!column.array || column.field.kind == 'V') {
+      throw UserError(
+          fmt::format("cannot read {}: it has no numbers \"{}\": events need t, x, y and p as fields of one "
+                      "array or as arrays of these names",
+                      file, name));
+    }
+  }
+  return std::make_unique<ColumnsReader>(std::move(columns));
+}
+
+}  // namespace esim::inline formats::npy

@@ -1,0 +1,32 @@
+#include "esim/formats/ros/rosbag/rosbag_format.h"
+
+#include "esim/formats/ros/ros_sink.h"
+#include "esim/formats/ros/ros_source.h"
+#include "esim/formats/ros/rosbag/rosbag_input.h"
+#include "esim/formats/ros/rosbag/rosbag_output.h"
+
+namespace esim::inline formats {
+
+Format rosbag_format() {
+  return {
+      .name = "rosbag",
+      .description = "ROS 1 bag: dvs_msgs, sensor_msgs, geometry_msgs, tf2_msgs",
+      .extensions = {".bag"},
+      .holds = {Content::events, Content::frames, Content::images, Content::imu, Content::poses, Content::truth},
+      .several_cameras = true,
+      .recognises = [](const auto&, std::string_view head) { return head.starts_with("#ROSBAG V"); },
+      .open =
+          [](const auto& path, const ReadOptions& options) {
+            return ros::make_source(
+                path, [path] { return std::make_unique<rosbag::RosbagInput>(path); }, options);
+          },
+      .create =
+          [](const auto& path, const WriteOptions& options) {
+            const auto codec = options.compression == Compression::none ? ros::ChunkCodec::none : ros::ChunkCodec::lz4;
+            return ros::make_sink(path, ros::Encoding::ros1,
+                                  [=] { return std::make_unique<rosbag::RosbagOutput>(path, codec); });
+          },
+  };
+}
+
+}  // namespace esim::inline formats

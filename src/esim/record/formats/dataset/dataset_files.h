@@ -1,9 +1,0 @@
-#pragma once
-
-namespace esim {
-
-// Names of the files of a dataset.
-inline constexpr char kEventsTxt[] = "events.txt", kImagesTxt[] = "images.txt", kImuTxt[] = "imu.txt",
-                      kGroundTruthTxt[] = "groundtruth.txt", kCalibTxt[] = "calib.txt";
-
-}  // namespace esim

@@ -1,0 +1,129 @@
+#include "esim/studio/scene_view/page_images.h"
+
+#include <algorithm>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+#include <span>
+#include <string_view>
+
+#include "esim/core/srgb.h"
+#include "esim/preview/canvas.h"
+#include "esim/scene/images/image_header.h"
+
+namespace esim::studio {
+namespace {
+
+constexpr int kLongest = 2048;  // px
+
+Image<float> at_most(const Image<float>& image, int longest) {
+  const int side = std::max(image.width(), image.height());
+  if (side <= longest) return image;
+  const auto scaled = [&](int px) { return std::max(1, static_cast<int>(std::int64_t{px} * longest / side)); };
+  return reduce_mean(image, scaled(image.width()), scaled(image.height()));
+}
+
+std::string jpeg_of(const cv::Mat& bgr) {
+  constexpr int kQuality = 90;
+  std::vector<unsigned char> jpeg;
+  cv::imencode(".jpg", bgr, jpeg, {cv::IMWRITE_JPEG_QUALITY, kQuality});
+  return {jpeg.begin(), jpeg.end()};
+}
+
+std::string_view text_of(const CodedTexture& texture) {
+  return {reinterpret_cast<const char*>(texture.bytes.data()), texture.bytes.size()};
+}
+
+std::size_t big_endian(std::string_view bytes, std::size_t at, std::size_t count) {
+  std::size_t value = 0;
+  for (std::size_t i = at; i < at + count && i < bytes.size(); ++i)
+    value = value << 8 | static_cast<unsigned char>(bytes[i]);
+  return value;
+}
+
+bool is_jpeg(std::string_view bytes) { return bytes.starts_with("\xff\xd8\xff"); }
+
+/// Whether a JPEG is complete, grey or of three colours, and without an EXIF rotation, which esim ignores.
+bool is_plain_jpeg(std::string_view bytes) {
+  if (!is_jpeg(bytes) || bytes.find("\xff\xd9") == std::string_view::npos) return false;
+  for (std::size_t at = 2; at + 10 < bytes.size() && bytes[at] == '\xff';) {
+    const auto marker = static_cast<unsigned char>(bytes[at + 1]);
+    constexpr unsigned kApp1 = 0xe1, kHuffman = 0xc4, kScan = 0xda;
+    if (marker == kApp1 && bytes.substr(at + 4, 4) == "Exif") return false;
+    if (marker == kScan) return false;
+    if ((marker & 0xf0U) == 0xc0 && marker != kHuffman) {
+      const std::size_t channels = big_endian(bytes, at + 9, 1);
+      return channels == 1 || channels == 3;
+    }
+    at += 2 + big_endian(bytes, at + 2, 2);
+  }
+  return false;
+}
+
+/// The image without transparency.
+bool is_plain_png(std::string_view bytes) {
+  constexpr std::size_t kHead = 8, kColourType = 25, kAlpha = 4;
+  if (!bytes.starts_with("\x89PNG\r\n\x1a\n") || (big_endian(bytes, kColourType, 1) & kAlpha) != 0) return false;
+  for (std::size_t at = kHead; at + kHead < bytes.size();) {
+    const std::string_view kind = bytes.substr(at + 4, 4);
+    if (kind == "tRNS") return false;
+    if (kind == "IDAT") return true;
+    at += 12 + big_endian(bytes, at, 4);
+  }
+  return false;
+}
+
+std::optional<int> longest_side(const CodedTexture& texture) {
+  const auto size = size_in_header(texture.bytes);
+  return size ? std::optional(static_cast<int>(std::min<std::int64_t>(std::max(size->width, size->height), 1 << 20)))
+              : std::nullopt;
+}
+
+/// A JPEG decoded at reduced size (down to one eighth), which is fast; empty if this is not possible.
+std::optional<cv::Mat> reduced(const CodedTexture& texture, int longest) {
+  constexpr int kMostSide = 8192, kFinest = 2;
+  const std::optional<int> side = longest_side(texture);
+  if (!is_plain_jpeg(text_of(texture)) || !side || *side > kMostSide || *side < kFinest * longest) return std::nullopt;
+  const int times = *side / longest;
+  const int flags = times >= 8   ? cv::IMREAD_REDUCED_COLOR_8
+                    : times >= 4 ? cv::IMREAD_REDUCED_COLOR_4
+                                 : cv::IMREAD_REDUCED_COLOR_2;
+  const cv::Mat coded(1, static_cast<int>(texture.bytes.size()), CV_8U, const_cast<std::byte*>(texture.bytes.data()));
+  try {
+    const cv::Mat bgr = cv::imdecode(coded, flags);
+    return bgr.empty() ? std::nullopt : std::optional(bgr);
+  } catch (const cv::Exception&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+PageImage page_image(const CodedTexture& texture) {
+  const std::string_view bytes = text_of(texture);
+  const std::optional<int> side = longest_side(texture);
+  if (side && *side <= kLongest) {
+    if (is_plain_jpeg(bytes)) return {"image/jpeg", std::string(bytes)};
+    if (is_plain_png(bytes)) return {"image/png", std::string(bytes)};
+  }
+  return {"image/jpeg", make_jpeg(decoded(texture, true), kLongest)};
+}
+
+Thumbnail thumbnail(const CodedTexture& texture, int longest) {
+  if (const auto bgr = reduced(texture, longest)) return {jpeg_of(*bgr), false};
+  const Planes planes = decoded(texture, true);
+  return {make_jpeg(planes, longest), std::max(planes.front().width(), planes.front().height()) <= longest};
+}
+
+std::string make_jpeg(const Planes& linear, int longest) {
+  std::vector<Image<std::uint8_t>> channels;
+  for (const Image<float>& plane : linear) channels.push_back(encode_srgb(at_most(plane, longest)));
+  const Image<std::uint8_t>&red = channels.front(), &green = channels[channels.size() / 2], &blue = channels.back();
+  cv::Mat bgr(red.height(), red.width(), CV_8UC3);
+  for (int y = 0; y < red.height(); ++y) {
+    auto* out = bgr.ptr<cv::Vec3b>(y);
+    for (int x = 0; x < red.width(); ++x) out[x] = {blue(x, y), green(x, y), red(x, y)};
+  }
+  return jpeg_of(bgr);
+}
+
+}  // namespace esim::studio

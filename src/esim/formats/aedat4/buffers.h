@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-// Private to record/formats/aedat4: includes flatbuffers.
+// Private to formats/aedat4: includes flatbuffers.
 
 namespace esim::inline formats::aedat4 {
 

@@ -9,7 +9,7 @@
 
 #include "esim/formats/hdf5/library.h"
 
-// Private to record/formats: includes hdf5.h.
+// Private to formats: includes hdf5.h.
 
 namespace esim::inline formats::hdf5 {
 

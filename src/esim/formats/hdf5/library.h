@@ -12,7 +12,7 @@
 #include "esim/formats/hdf5/output_driver.h"
 #include "esim/recording/compression.h"
 
-// Private to record/formats: includes hdf5.h.
+// Private to formats: includes hdf5.h.
 
 namespace esim::inline formats::hdf5 {
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-// Private to record/formats: includes hdf5.h.
+// Private to formats: includes hdf5.h.
 
 namespace esim::inline formats::hdf5 {
 

@@ -28,7 +28,6 @@ ALLOWED = {
     "represent": "core events",
     "stats": "core events record",
     "visualise": "core events record stats",
-    "walk": "core geometry record",
     "truth": "core events geometry motion render",
     "video": "core scene",
     "sim": "core events geometry motion render reproject sampling sensors record truth video",

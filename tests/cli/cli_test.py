@@ -40,6 +40,14 @@ class Cli(ProgramTest):
         return process
 
 
+class RemovedCommands(Cli):
+    def test_waypoints_names_the_studio(self):
+        for arguments in ([], [SCENES / "room.yaml", "--out", "walk.yaml"], ["room.glb", "--out", "walk.yaml", "--keys", " w x"], ["--help"]):
+            self.assert_refused(run("waypoints", *arguments), "removed", "esim studio")
+        self.assertNotIn("esim waypoints", run("--help").stdout)
+        self.assertNotIn("\n  waypoints", run("--help").stdout)
+
+
 class Recordings(Cli):
     def test_formats_beside_the_recordings_own(self):
         for name in ("xyz", "recording"):

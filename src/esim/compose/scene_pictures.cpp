@@ -1,7 +1,5 @@
 #include "esim/compose/scene_pictures.h"
 
-#include <algorithm>
-#include <cmath>
 #include <tuple>
 #include <utility>
 
@@ -35,19 +33,6 @@ Camera scaled(const Camera& camera, int width, int height) {
   result.cx = (camera.cx + 0.5) * x - 0.5;
   result.cy = (camera.cy + 0.5) * y - 0.5;
   return result;
-}
-
-SE3 before_the_meshes(const Scene& scene, const Camera& camera) {
-  Eigen::AlignedBox3d box;
-  for (const SceneObject& object : scene.objects) {
-    for (const Eigen::Vector3f& vertex : object.mesh.vertices) box.extend(vertex.cast<double>());
-  }
-  SE3 pose{looking_along(Eigen::Vector3d::UnitX()), Eigen::Vector3d::Zero()};
-  if (box.isEmpty()) return pose;
-  const double fov_rad = 2 * std::atan(0.5 * camera.width / camera.fx);
-  const double radius = 0.5 * box.diagonal().norm();
-  pose.translation = box.center() - radius / std::sin(0.5 * std::min(fov_rad, 1.5)) * Eigen::Vector3d::UnitX();
-  return pose;
 }
 
 ScenePictures::ScenePictures(const Scenario& scenario, int threads, const Notices& notices) : workers_(threads) {

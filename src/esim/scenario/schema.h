@@ -59,7 +59,7 @@ void describe(Visitor& visit, WaypointPointOptions& o) {
 
 template <class Visitor>
 void describe(Visitor& visit, WaypointTrajectoryOptions& o) {
-  visit("file", o.file, About{"instead of points: a YAML file of waypoints, as esim waypoints writes it"});
+  visit("file", o.file, About{"instead of points: a YAML file with such a list under points:"});
   visit("points", o.points, About{"two or more waypoints, visited in this order: a list of maps of"});
   visit("speed", o.speed, About{"speed along the path, if the points have no times", "m/s", 0, 1e6, true});
   visit("turn_deg_per_s", o.turn_deg_per_s,

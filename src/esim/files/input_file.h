@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -54,6 +55,9 @@ class InputFile {
   std::vector<std::byte> buffer_;
   std::size_t begin_ = 0, end_ = 0;  // unread part of the buffer
 };
+
+/// Reads the next bytes into a buffer and returns their number; fewer than requested only at the end. Throws UserError.
+using Read = std::function<std::size_t(std::span<std::byte>)>;
 
 /// The first bytes of a file, at most so many; empty if it cannot be read.
 std::string read_head(const std::filesystem::path& path, std::size_t most);

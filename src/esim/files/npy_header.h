@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "esim/files/input_file.h"
+
 /// The header of NumPy's files (https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html).
 namespace esim::inline formats::npy {
 
@@ -33,9 +35,6 @@ struct Header {
   bool fortran_order = false;
   std::vector<std::uint64_t> shape{};
 };
-
-/// Reads bytes into a buffer; returns their number, which is less than requested only at the end of the file.
-using Read = std::function<std::size_t(std::span<std::byte>)>;
 
 /// Throws the caller's exception; `problem` says what is wrong with the file: "it ends within its header".
 using Fail = std::function<void(const std::string& problem)>;

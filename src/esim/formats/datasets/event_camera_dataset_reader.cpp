@@ -163,10 +163,8 @@ class FramesPart final : public LinesPart {
     }
     const std::string shown = files_.path_of(name).string();
     if (files_.size(name) > kMostImageBytes) throw UserError(fmt::format("cannot read {}: it is too large", shown));
-    const auto file = files_.open(name);
     std::string bytes(static_cast<std::size_t>(files_.size(name)), '\0');
-    file->read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    bytes.resize(static_cast<std::size_t>(file->gcount()));
+    bytes.resize(files_.open(name)(std::as_writable_bytes(std::span(bytes))));
     auto png = decode_grey_png(bytes);
     if (!png) throw UserError(fmt::format("cannot read {}: it is not a PNG, or it is damaged", shown));
     image_ = std::move(*png);

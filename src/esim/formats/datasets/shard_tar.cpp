@@ -37,7 +37,8 @@ NumpyType numpy_type(NumberType type) {
   throw InternalError("this number type is not supported in NumPy files");
 }
 
-/// The header of a file in an archive: ustar, of POSIX.1-1988, without an owner, dated 1970.
+/// The header of a file in an archive: ustar, of POSIX.1-1988, without an owner, dated 1970. Written here, since calls
+/// of libarchive would be as long.
 std::string tar_header(const std::string& name, std::size_t bytes) {
   if (name.size() >= 100) throw InternalError(name + ": the name is too long for a tar file");
   std::string header(kBlock, '\0');

@@ -1,15 +1,14 @@
 #include <fmt/format.h>
-#include <zip.h>
 
 #include <array>
 #include <cstring>
-#include <optional>
 
 #include "esim/core/error.h"
 #include "esim/files/output_file.h"
 #include "esim/formats/events_writer.h"
 #include "esim/formats/numpy/npy.h"
 #include "esim/formats/numpy/npy_array.h"
+#include "esim/formats/zip_archive.h"
 
 namespace esim::inline formats {
 namespace {
@@ -18,23 +17,6 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kLocalHead = "PK\x03\x04";
 constexpr int kMaxExtent = 65536;  // px
-
-struct DiscardArchive {
-  void operator()(zip_t* archive) const { zip_discard(archive); }
-};
-using Archive = std::unique_ptr<zip_t, DiscardArchive>;
-
-Archive open_archive(const fs::path& path, int flags, std::string& reason) {
-  int code = 0;
-  Archive archive(zip_open(path.c_str(), flags, &code));
-  if (!archive) {
-    zip_error_t error;
-    zip_error_init_with_code(&error, code);
-    reason = zip_error_strerror(&error);
-    zip_error_fini(&error);
-  }
-  return archive;
-}
 
 /// One column of the events, in a separate file, ARCHIVE.t.npy, until the archive is packed at the end. If the process
 /// ends before that, these files hold the data recorded so far.
@@ -111,21 +93,18 @@ class NpzWriter final : public EventsWriter {
   }
 
   void end() override {
-    std::string reason;
-    archive_ = open_archive(path_, ZIP_CREATE | ZIP_TRUNCATE, reason);
-    if (!archive_) throw_cannot_write(path_, reason);
+    const bool deflated = options_.compression != Compression::none;
+    const auto packing = deflated ? ZipWriter::Packing::deflated : ZipWriter::Packing::stored;
+    ZipWriter zip(path_);
     for (const auto& column : columns_) {
       column->close();
-      add(column->name(), zip_source_file(archive_.get(), column->path().c_str(), 0, -1));
+      zip.add_file(column->name() + ".npy", column->path(), packing);
     }
-    const std::string width = scalar(sensor_.width), height = scalar(sensor_.height);
     if (sensor_.width > 0) {
-      add("width", zip_source_buffer(archive_.get(), width.data(), width.size(), 0));
-      add("height", zip_source_buffer(archive_.get(), height.data(), height.size(), 0));
+      zip.add("width.npy", scalar(sensor_.width), packing);
+      zip.add("height.npy", scalar(sensor_.height), packing);
     }
-    if (zip_close(archive_.get()) != 0) fail();
-    static_cast<void>(archive_.release());
-    sync_file(path_);
+    zip.close();
     for (const auto& column : columns_) column->remove();
     columns_.clear();
   }
@@ -135,42 +114,11 @@ class NpzWriter final : public EventsWriter {
     return npy::header_text("'<i4'", {}) + std::string(reinterpret_cast<const char*>(&value), sizeof(value));
   }
 
-  void add(const std::string& name, zip_source_t* source) {
-    if (source == nullptr) fail();
-    const zip_int64_t index = zip_file_add(archive_.get(), (name + ".npy").c_str(), source, ZIP_FL_ENC_UTF_8);
-    if (index < 0) {
-      zip_source_free(source);
-      fail();
-    }
-    const auto entry = static_cast<zip_uint64_t>(index);
-    const bool packed = options_.compression != Compression::none;
-    if (zip_set_file_compression(archive_.get(), entry, packed ? ZIP_CM_DEFLATE : ZIP_CM_STORE, packed ? 1 : 0) != 0 ||
-        zip_file_set_dostime(archive_.get(), entry, 0, kFirstOfJanuary1980, 0) != 0) {
-      fail();
-    }
-  }
-
-  [[noreturn]] void fail() const { throw_cannot_write(path_, zip_strerror(archive_.get())); }
-
-  static constexpr zip_uint16_t kFirstOfJanuary1980 = (1 << 5) | 1;  // makes the bytes independent of the date
-
   WriteOptions options_;
   fs::path path_;
   SensorSize sensor_;
   std::vector<std::unique_ptr<ColumnFile>> columns_;
-  Archive archive_;
 };
-
-std::shared_ptr<npy::Array> open_array(const std::shared_ptr<zip_t>& archive, zip_uint64_t index, std::string name) {
-  zip_file_t* const opened = zip_fopen_index(archive.get(), index, 0);
-  if (opened == nullptr) throw UserError(fmt::format("cannot read {}: {}", name, zip_strerror(archive.get())));
-  const std::shared_ptr<zip_file_t> member(opened, [archive](zip_file_t* file) { zip_fclose(file); });
-  return std::make_shared<npy::Array>(name, [member, name](std::span<std::byte> out) {
-    const zip_int64_t got = zip_fread(member.get(), out.data(), out.size());
-    if (got < 0) throw UserError(fmt::format("cannot read {}: {}", name, zip_file_strerror(member.get())));
-    return static_cast<std::size_t>(got);
-  });
-}
 
 int extent(npy::Array& array) {
   std::vector<std::int64_t> value;
@@ -180,17 +128,12 @@ int extent(npy::Array& array) {
 }
 
 std::unique_ptr<EventsReader> open_npz(const fs::path& path) {
-  std::string reason;
-  const std::shared_ptr<zip_t> archive = open_archive(path, ZIP_RDONLY, reason);
-  if (!archive) throw UserError(fmt::format("cannot read {}: {}", path.string(), reason));
+  const ZipReader zip(path);
   npy::EventColumns columns;
-  const zip_int64_t members = zip_get_num_entries(archive.get(), 0);
-  for (zip_int64_t i = 0; i < members; ++i) {
-    const auto index = static_cast<zip_uint64_t>(i);
-    const char* const member = zip_get_name(archive.get(), index, 0);
-    const fs::path name = member != nullptr ? member : "";
+  for (std::size_t i = 0; i < zip.members().size(); ++i) {
+    const fs::path name = zip.members()[i].name;
     if (name.extension() != ".npy") continue;
-    const auto array = open_array(archive, index, path.string() + ": " + name.string());
+    const auto array = std::make_shared<npy::Array>(path.string() + ": " + name.string(), zip.open(i));
     if (name == "width.npy") {
       columns.sensor.width = extent(*array);
     } else if (name == "height.npy") {

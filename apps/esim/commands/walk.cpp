@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "esim/compose/waypoints.h"
+#include "esim/compose/waypoint_trajectory.h"
 #include "esim/core/error.h"
 #include "esim/files/output_file.h"
 #include "esim/preview/canvas.h"

@@ -3,7 +3,7 @@
 #include <numbers>
 
 #include "esim/compose/compose.h"
-#include "esim/compose/waypoints.h"
+#include "esim/compose/waypoint_trajectory.h"
 #include "esim/core/error.h"
 #include "esim/motion/fit/fit.h"
 #include "esim/motion/random.h"

@@ -51,6 +51,15 @@ TEST(AffineSequences, DisplacementCarriesTheFirstImageToTheLast) {
   }
 }
 
+TEST(AffineSequences, ChecksSamplingLikeAScenario) {
+  AffineOptions options = small();
+  const auto refused = [&] { return test::message_of<UserError>([&] { AffineSequences(options).make(0); }); };
+  options.sampling = FlowSampling{0.5, {1000, 10}};
+  EXPECT_TRUE(test::contains(refused(), "min_rate_hz = 1000 is above max_rate_hz = 10"));
+  options.sampling = KeyframeSampling{};
+  EXPECT_TRUE(test::contains(refused(), "keyframes"));
+}
+
 TEST(AffineSequences, FlowIsTheRateOfDisplacement) {
   AffineOptions options = small();
   VectorField start, middle, end;

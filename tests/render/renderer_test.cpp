@@ -1,4 +1,4 @@
-// The contract of every renderer. To test a new one, add its name to the list at the end.
+// The contract of every renderer. To test a new one, add it to render/scenes.h.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -207,15 +207,17 @@ TEST_P(EveryRenderer, DoesNotDependOnThreadsOrHistory) {
   EXPECT_TRUE(std::equal(a.flow_x.pixels().begin(), a.flow_x.pixels().end(), b.flow_x.pixels().begin()));
 }
 
-INSTANTIATE_TEST_SUITE_P(Renderers, EveryRenderer,
-                         testing::Combine(testing::Values("panorama", "plane", "mesh", "moving_mesh", "gl", "moving_gl",
-                                                          "sprites", "unrealcv", "moving_unrealcv"),
-                                          testing::Values(0, 1, 2, 3)),
+const auto kLenses = testing::Range(0, 4);
+
+INSTANTIATE_TEST_SUITE_P(OfSpace, EveryRenderer, testing::Combine(testing::ValuesIn(test::kRenderersOfSpace), kLenses),
                          EveryRenderer::name);
-INSTANTIATE_TEST_SUITE_P(Renderers, EveryRendererOfSpace,
-                         testing::Combine(testing::Values("panorama", "plane", "mesh", "moving_mesh", "gl", "moving_gl",
-                                                          "unrealcv", "moving_unrealcv"),
-                                          testing::Values(0, 1, 2, 3)),
+INSTANTIATE_TEST_SUITE_P(OnSensor, EveryRenderer,
+                         testing::Combine(testing::ValuesIn(test::kRenderersOnSensor), kLenses), EveryRenderer::name);
+INSTANTIATE_TEST_SUITE_P(Engines, EveryRenderer, testing::Combine(testing::ValuesIn(test::kEngines), kLenses),
+                         EveryRenderer::name);
+INSTANTIATE_TEST_SUITE_P(OfSpace, EveryRendererOfSpace,
+                         testing::Combine(testing::ValuesIn(test::kRenderersOfSpace), kLenses), EveryRenderer::name);
+INSTANTIATE_TEST_SUITE_P(Engines, EveryRendererOfSpace, testing::Combine(testing::ValuesIn(test::kEngines), kLenses),
                          EveryRenderer::name);
 
 // --- closed forms ---------------------------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -155,6 +156,11 @@ inline std::vector<Kinematics> moving_objects(double t_s) {
 
 /// False if OpenGL is not available.
 inline bool has_gl() { return !gl_devices().empty(); }
+
+/// The renderers that make_renderer() makes: those of a 3D scene, and those that draw on the sensor. "moving": two
+/// objects move.
+inline constexpr std::array kRenderersOfSpace = {"panorama", "plane", "mesh", "moving_mesh", "gl", "moving_gl"};
+inline constexpr std::array kRenderersOnSensor = {"sprites"};
 
 /// Every renderer on a scene that fills the view from near the origin.
 inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Camera& camera,

@@ -156,6 +156,26 @@ renderer:
   EXPECT_TRUE(contains(error(yaml, {"renderer.lighting.type=phong"}), "is not one of unlit, lambert"));
 }
 
+TEST_F(ScenarioFile, ReadsTheWaypointsOfObjectsInEveryRenderer) {
+  std::ofstream(folder_.path() / "walk.yaml") << "points: [{position: [0, 0, 1]}, {position: [2, 0, 1]}]\n";
+  for (const std::string renderer : {"mesh, scene: room.obj", "unrealcv", "blender, scene: room.blend"}) {
+    const Scenario scenario = read("trajectory: {type: static}\nrenderer: {type: " + renderer +
+                                   ", objects: [{name: a, trajectory: {type: waypoints, file: walk.yaml}}]}\n");
+    std::visit(
+        [&](const auto& options) {
+          if constexpr (requires { options.objects; }) {
+            ASSERT_EQ(options.objects.size(), 1U) << renderer;
+            const auto& path = std::get<WaypointTrajectoryOptions>(options.objects[0].trajectory);
+            EXPECT_EQ(path.points.size(), 2U) << renderer;
+            EXPECT_EQ(path.points_file, folder_.path() / "walk.yaml") << renderer;
+          } else {
+            ADD_FAILURE() << renderer;
+          }
+        },
+        scenario.renderer);
+  }
+}
+
 TEST_F(ScenarioFile, TakesOverrides) {
   const Scenario scenario =
       read(kMinimal, {"event_camera.contrast_threshold=0.2", "sampling.type=flow", "sampling.lambda=0.25",

@@ -119,9 +119,7 @@ TEST_P(EveryRendererOfSpace, DepthPosesAndCalibrationMapOneImageOntoAnother) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Renderers, EveryRendererOfSpace,
-                         testing::Combine(testing::Values("panorama", "plane", "mesh", "moving_mesh", "gl",
-                                                          "moving_gl"),
-                                          testing::Values(0, 1, 2, 3)),
+                         testing::Combine(testing::ValuesIn(test::kRenderersOfSpace), testing::Values(0, 1, 2, 3)),
                          EveryRendererOfSpace::name);
 
 // --- two planes: everything in closed form --------------------------------------------------------------------------

@@ -43,31 +43,31 @@ fs::path out_path(const Arguments& arguments) {
   return fs::path(file).replace_extension(".play.mp4");
 }
 
-/// One output, from the survey to the finished file.
+/// One output, from the overview to the finished file.
 class Showing {
  public:
-  Showing(const Arguments& arguments, const Playable& input, const Survey& found, const fs::path& out)
-      : arguments_(arguments), survey_(found), source_(input.open()), bar_(!arguments.quiet), out_(out) {
+  Showing(const Arguments& arguments, const Playable& input, const RecordingOverview& found, const fs::path& out)
+      : arguments_(arguments), overview_(found), source_(input.open()), bar_(!arguments.quiet), out_(out) {
     options_ = choose_missing(arguments.play, found);
   }
 
   int still() {
     if (!arguments_.at_s) return contact_sheet();
-    const TimeNs t = survey_.origin + to_ns(*arguments_.at_s);
-    if (t < survey_.start || t > survey_.end) {
+    const TimeNs t = overview_.origin + to_ns(*arguments_.at_s);
+    if (t < overview_.start || t > overview_.end) {
       throw UserError(fmt::format("--at {}: must be within the shown time, from {} to {} s", *arguments_.at_s,
-                                  to_seconds(survey_.start - survey_.origin),
-                                  to_seconds(survey_.end - survey_.origin)));
+                                  to_seconds(overview_.start - overview_.origin),
+                                  to_seconds(overview_.end - overview_.origin)));
     }
-    Player player(*source_, arguments_.extent.camera, survey_, options_, {.first = t});
+    Player player(*source_, arguments_.extent.camera, overview_, options_, {.first = t});
     write_png(*player.next());
     say(fmt::format("t = {:g} s", *arguments_.at_s));
     return kOk;
   }
 
   int video(VideoKind kind) {
-    const Instants instants = video_instants(survey_, options_);
-    Player player(*source_, arguments_.extent.camera, survey_, options_, instants);
+    const Instants instants = video_instants(overview_, options_);
+    Player player(*source_, arguments_.extent.camera, overview_, options_, instants);
     RecordingFile file(out_, arguments_.force);
     VideoFile video(file.path(), player.layout().width, player.layout().height, options_.frames_per_s, kind);
     std::size_t frames = 0;
@@ -100,13 +100,13 @@ class Showing {
     options_.width = options_.width > 0 ? options_.width : 620;
     constexpr std::size_t kCount = kSheetColumns * kSheetRows;
     // The centres of equal intervals.
-    const double step_ns = static_cast<double>(survey_.end - survey_.start) / kCount;
-    const Instants instants{survey_.start + static_cast<TimeNs>(0.5 * step_ns), step_ns, kCount};
-    Player player(*source_, arguments_.extent.camera, survey_, options_, instants);
+    const double step_ns = static_cast<double>(overview_.end - overview_.start) / kCount;
+    const Instants instants{overview_.start + static_cast<TimeNs>(0.5 * step_ns), step_ns, kCount};
+    Player player(*source_, arguments_.extent.camera, overview_, options_, instants);
     std::vector<CaptionedPicture> pictures;
     for (std::size_t i = 0; i < kCount && !interrupted(); ++i) {
       pictures.push_back(
-          {*player.next_picture(), fmt::format("t = {:.4f} s", to_seconds(instants.at(i) - survey_.origin))});
+          {*player.next_picture(), fmt::format("t = {:.4f} s", to_seconds(instants.at(i) - overview_.origin))});
       show(i + 1, kCount);
     }
     bar_.clear();
@@ -125,11 +125,11 @@ class Showing {
 
   void say(const std::string& what) {
     if (arguments_.quiet) return;
-    tell(stderr, "{}: {}; {} events\n", out_.string(), what, grouped(survey_.events));
+    tell(stderr, "{}: {}; {} events\n", out_.string(), what, grouped(overview_.events));
   }
 
   const Arguments& arguments_;
-  const Survey& survey_;
+  const RecordingOverview& overview_;
   PlayOptions options_;
   std::unique_ptr<Source> source_;
   ProgressBar bar_;
@@ -161,7 +161,7 @@ int run(Arguments& arguments) {
   play.name = input.name();
   arguments.extent.camera = input.camera(arguments.camera);
   ProgressBar bar(!arguments.quiet);
-  const auto found = survey(*input.open(), arguments.extent, [&](double share) {
+  const auto found = read_overview(*input.open(), arguments.extent, [&](double share) {
     bar.show(share, [&] { return fmt::format("reading, {:.0f} %", 100 * share); });
     return !interrupted();
   });

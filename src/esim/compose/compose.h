@@ -15,6 +15,7 @@
 #include "esim/sim/simulate.h"
 #include "esim/sim/world.h"
 
+/// From a scenario to a recording. simulate() (sim/simulate.h) runs the world that build_world() builds.
 namespace esim::inline compose {
 
 /// Receives one line that the user should know about; the program continues.
@@ -28,6 +29,8 @@ struct Notices {
 
 /// Forwards notices, and appends them to `given` for reports.
 Notices keeping(Notices notify, std::vector<std::string>& given);
+
+// --- the world (build_world.cpp) -------------------------------------------------------------------------------------
 
 /// Builds everything that a scenario describes, ready to simulate on `threads` threads (0: every processor). Loads
 /// scenes and trajectories, and checks everything that can be checked before the simulation. Throws UserError for
@@ -43,8 +46,9 @@ World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> bo
 struct Substitutes {
   std::shared_ptr<const Trajectory> body;  ///< completely known
 
-  /// Replaces the scenario's renderer, with its scenes and objects.
-  std::function<std::unique_ptr<Renderer>(const Camera& camera)> make_renderer;
+  /// Replaces the scenario's renderer, with its scenes and objects. The workers are those of the world, which outlives
+  /// its renderers.
+  std::function<std::unique_ptr<Renderer>(const Camera& camera, const Workers& workers)> make_renderer;
 
   /// A moving object of make_renderer's renderers, in the order of RenderRequest::objects. Trajectories cover the
   /// simulated time.
@@ -58,6 +62,14 @@ struct Substitutes {
 /// The same with substitutes. Throws UserError if the scenario has an option that custom renderers do not support.
 World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices);
 
+/// The part of the body's trajectory that a scenario simulates. Throws UserError if the trajectory does not cover it.
+TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory);
+
+/// A camera as it is recorded. If its options give no field of view, it has that of the followed camera (may be null).
+CameraInfo camera_info(CameraOptions options, const SceneCamera* followed);
+
+// --- scenes and motions (load_scenes.cpp, build_trajectories.cpp) ----------------------------------------------------
+
 /// The contents of the scene files of a scenario's renderer: for a mesh renderer, the objects of the scene file
 /// followed by those that the scenario lists; for Blender, only the cameras, and only if the trajectory follows one.
 /// Empty for renderers without scene files. Notes describe the contents.
@@ -67,15 +79,9 @@ SceneFile load_scenes(const Scenario& scenario, SceneLook look, const Notices& n
 std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const SceneFile& scene,
                                                    const Notices& notices);
 
-/// The part of the body's trajectory that a scenario simulates. Throws UserError if the trajectory does not cover it.
-TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory);
-
 /// The camera of the scene file that the scenario's trajectory follows; null for trajectories of other types. Throws
 /// UserError with the names of the cameras in the file.
 const SceneCamera* followed_camera(const Scenario& scenario, const SceneFile& scene);
-
-/// A camera as it is recorded. If its options give no field of view, it has that of the followed camera (may be null).
-CameraInfo camera_info(CameraOptions options, const SceneCamera* followed);
 
 /// The motions of the moving objects that a scenario's renderer shows, in the renderer's order. All cover `simulated`.
 /// Trajectories that do not define a duration, and the scene file's animation, begin with the body's trajectory. After
@@ -84,6 +90,8 @@ std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const S
                                                                          const SceneFile& scene, const Trajectory& body,
                                                                          const TimeSpan& simulated,
                                                                          const Notices& notices);
+
+// --- renderers (renderer_factory.cpp, start_blender.cpp) -------------------------------------------------------------
 
 /// Makes the renderers of a scenario's cameras, which share one loaded scene. Throws UserError for colour filters that
 /// the renderer does not support.
@@ -98,9 +106,13 @@ RendererFactory build_renderer_factory(const RendererOptions& options, const Sce
 RendererFactory start_blender(const BlenderRendererOptions& options, const std::vector<CameraInfo>& sensors,
                               const Notices& notices);
 
+// --- ground truth (prepare_truth.cpp) --------------------------------------------------------------------------------
+
 /// Sets up the ground truth of a world with cameras. Throws UserError if the renderer cannot provide it.
 void prepare_truth(const Scenario& scenario, const SceneFile& scene, const RendererFactory& make_renderer,
                    const Notices& notices, World& world);
+
+// --- files (build_sinks.cpp) -----------------------------------------------------------------------------------------
 
 /// Throws UserError for unknown names in output.formats.
 void check_output(const Scenario& scenario);
@@ -114,8 +126,14 @@ std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& folder)
 /// One file of a format.
 std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& file, const Format& format);
 
+// --- reports (recording_report.cpp, losses_and_hints.cpp) ------------------------------------------------------------
+
 /// The text of report.json: results, cost, time by stage, and notices.
 std::string report_json(const Scenario& scenario, const Summary& summary, int threads,
+                        const std::vector<std::string>& notices);
+
+/// The text of report.json of a conversion.
+std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,
                         const std::vector<std::string>& notices);
 
 /// Losses of a simulation or a conversion: events that the readout dropped or delayed, samples limited by the maximum
@@ -126,6 +144,8 @@ std::vector<std::string> losses(const ConversionOptions& options, const Conversi
 /// Faster alternatives, one line each: flow sampling, if adaptive sampling of a mesh was slower than real time because
 /// of rendering.
 std::vector<std::string> hints(const Scenario& scenario, const Summary& summary);
+
+// --- all together (make_recording.cpp) -------------------------------------------------------------------------------
 
 /// Options of make_recording().
 struct RecordingOptions {
@@ -142,9 +162,5 @@ struct RecordingOptions {
 /// RecordingDirectory. The report contains the notices, and also losses and hints, which `notify` does not receive.
 std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions options, const Notices& notify,
                                       const Monitor& monitor);
-
-/// The text of report.json of a conversion.
-std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,
-                        const std::vector<std::string>& notices);
 
 }  // namespace esim::inline compose

@@ -186,8 +186,7 @@ double last_keyframe_s(const SpritesRendererOptions& renderer) {
 void complete_for_layers(Scenario& scenario, const SpritesRendererOptions& renderer, bool has_trajectory) {
   if (!has_trajectory) scenario.trajectory = StaticTrajectoryOptions{};
   const double end_s = last_keyframe_s(renderer);
-  const bool has_end = std::holds_alternative<FileTrajectoryOptions>(scenario.trajectory) ||
-                       std::holds_alternative<WaypointTrajectoryOptions>(scenario.trajectory);
+  const bool has_end = std::visit([](const auto& trajectory) { return trajectory.kHasDuration; }, scenario.trajectory);
   if (scenario.duration_s || end_s <= 0 || has_end) return;
   if (scenario.start_s >= end_s) {
     throw UserError(
@@ -233,12 +232,16 @@ Scenario read_scenario(const ScenarioText& text) {
   require("trajectory", text.needs_trajectory);
   if (scenario.imu) read_imu(*scenario.imu, std::as_const(root)["imu"], source);
   read_points(scenario.trajectory, trajectory, "trajectory", source, !text.needs_waypoints);
-  if (auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer)) {
-    for (std::size_t i = 0; i < mesh->objects.size(); ++i) {
-      read_points(mesh->objects[i].trajectory, renderer["objects"][i]["trajectory"],
-                  fmt::format("renderer.objects.{}.trajectory", i), source, false);
-    }
-  }
+  std::visit(
+      [&](auto& options) {
+        if constexpr (requires { options.objects; }) {
+          for (std::size_t i = 0; i < options.objects.size(); ++i) {
+            read_points(options.objects[i].trajectory, renderer["objects"][i]["trajectory"],
+                        fmt::format("renderer.objects.{}.trajectory", i), source, false);
+          }
+        }
+      },
+      scenario.renderer);
   CameraOptions camera;
   camera.sampling = usual_sampling(scenario.renderer, text.needs_renderer && text.needs_trajectory);
   if (sprites != nullptr) {

@@ -237,10 +237,10 @@ void draw_phases(Canvas& canvas, const Cell& cell, const Statistics& s) {
 void draw_report(Canvas& canvas, const Cell& cell, const Statistics& s) {
   constexpr int kLine = 15, kValueColumn = 168;
   int y = cell.y() + kTop - 32;
-  for (const ReportSection& section : report_sections(s)) {
+  for (const StatisticsSection& section : statistics_sections(s)) {
     canvas.text(cell.x() + 10, y, section.title, 11, kInk);
     y += kLine + 2;
-    for (const ReportLine& line : section.lines) {
+    for (const StatisticsLine& line : section.lines) {
       if (line.label.empty()) continue;  // hot pixels, which the map shows
       canvas.text(cell.x() + 10, y, line.label, 10, kFaintInk);
       canvas.text(cell.x() + kValueColumn, y, line.value, 10, kInk);

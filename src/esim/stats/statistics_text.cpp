@@ -37,8 +37,8 @@ double mean_count(const Statistics& s) {
   return s.counts.empty() ? 0.0 : static_cast<double>(s.events()) / static_cast<double>(s.counts.size());
 }
 
-ReportSection stream_section(const Statistics& s) {
-  ReportSection section{"stream", {}};
+StatisticsSection stream_section(const Statistics& s) {
+  StatisticsSection section{"stream", {}};
   section.lines.push_back({"events", grouped(s.events())});
   section.lines.push_back(
       {"ON, OFF", fmt::format("{:.1f} %, {:.1f} %", 100 * ratio(s.on, s.events()), 100 * ratio(s.off, s.events()))});
@@ -51,8 +51,8 @@ ReportSection stream_section(const Statistics& s) {
   return section;
 }
 
-ReportSection pixel_section(const Statistics& s) {
-  ReportSection section{"pixels", {}};
+StatisticsSection pixel_section(const Statistics& s) {
+  StatisticsSection section{"pixels", {}};
   section.lines.push_back({"sensor", fmt::format("{} x {} px", s.sensor.width, s.sensor.height)});
   section.lines.push_back({"counts", fmt::format("mean {}, median {:g}, max {} events", three_digits(mean_count(s)),
                                                  s.median_count, grouped(s.largest_count))});
@@ -67,7 +67,7 @@ ReportSection pixel_section(const Statistics& s) {
   return section;
 }
 
-ReportSection interval_section(const Statistics& s) {
+StatisticsSection interval_section(const Statistics& s) {
   const IntervalHistogram& intervals = s.intervals;
   const bool any = intervals.total() > 0;
   const auto quantile = [&](double fraction) -> std::string {
@@ -88,8 +88,8 @@ std::string period_text(const Statistics& s) {
   return fmt::format("{} ({:.6g} Hz), {}", format_duration(1 / f), f, s.periodicity ? "strongest found" : "given");
 }
 
-ReportSection stamp_section(const Statistics& s) {
-  ReportSection section{"time stamps", {}};
+StatisticsSection stamp_section(const Statistics& s) {
+  StatisticsSection section{"time stamps", {}};
   const auto line = [&](const char* label, const std::string& value) { section.lines.push_back({label, value}); };
   line("distinct",
        fmt::format("{} ({} of the events)", grouped(s.distinct_times), percent(ratio(s.distinct_times, s.events()))));
@@ -189,21 +189,21 @@ std::string verdict(const Statistics& s) {
   return "too few events or periods to tell";
 }
 
-std::vector<ReportSection> report_sections(const Statistics& statistics) {
+std::vector<StatisticsSection> statistics_sections(const Statistics& statistics) {
   return {stream_section(statistics), pixel_section(statistics), interval_section(statistics),
           stamp_section(statistics)};
 }
 
 std::string describe(std::span<const NamedStatistics> files) {
-  std::vector<std::vector<ReportSection>> reports;
+  std::vector<std::vector<StatisticsSection>> reports;
   std::vector<std::string> names;
   std::vector<std::size_t> widths;
   for (const NamedStatistics& file : files) {
-    reports.push_back(report_sections(file.statistics));
+    reports.push_back(statistics_sections(file.statistics));
     names.push_back(file.name);
     widths.push_back(file.name.size());
-    for (const ReportSection& section : reports.back()) {
-      for (const ReportLine& line : section.lines) widths.back() = std::max(widths.back(), line.value.size());
+    for (const StatisticsSection& section : reports.back()) {
+      for (const StatisticsLine& line : section.lines) widths.back() = std::max(widths.back(), line.value.size());
     }
   }
   std::string text;

@@ -11,13 +11,13 @@
 #include <utility>
 
 #include "esim/backends/sprites/sprites_renderer.h"
+#include "esim/compose/compose.h"
 #include "esim/core/error.h"
 #include "esim/core/random.h"
 #include "esim/dataset/collector.h"
 #include "esim/dataset/files/checksum.h"
 #include "esim/dataset/generators/image_folder.h"
 #include "esim/motion/static.h"
-#include "esim/sampling/make_sampler.h"
 #include "esim/scenario/conversion.h"
 #include "esim/scene/images/dead_leaves.h"
 #include "esim/sim/simulate.h"
@@ -69,6 +69,28 @@ AffineDisplacement velocity(const LayerPlacement& at, PixelSize sensor) {
   const Eigen::Matrix2d gradient = at.A_rate * at.A.inverse();
   const Eigen::Vector2d middle((sensor.width - 1) / 2.0, (sensor.height - 1) / 2.0);
   return {gradient, at.centre_velocity + gradient * (middle - at.centre)};
+}
+
+/// A camera at rest that sees the sprites, without ground truth, on one thread.
+World world_of(const AffineOptions& o, const EventCameraOptions& event_camera, std::uint64_t seed,
+               const SpriteScene& scene) {
+  CameraOptions camera;
+  camera.name = "cam0";
+  camera.width = o.width;
+  camera.height = o.height;
+  camera.sampling = o.sampling;
+  camera.event_camera = event_camera;
+  Scenario scenario;
+  scenario.seed = seed;
+  scenario.cameras = {camera};
+  scenario.truth.rate_hz = scenario.truth.pose_rate_hz = 0;
+  Substitutes substitutes;
+  substitutes.body = std::make_shared<const StaticTrajectory>(SE3{}, 0, to_ns(o.duration_s));
+  substitutes.make_renderer = [&](const Camera& model, const Workers& workers) {
+    return make_sprites_renderer(scene, model, workers);
+  };
+  const auto ignore = [](const std::string&) {};
+  return build_world(scenario, substitutes, 1, {ignore, ignore});
 }
 
 void check(const AffineOptions& o) {
@@ -147,6 +169,7 @@ Sequence AffineSequences::make(std::uint32_t index) const {
   const AffineMotion motion =
       draw_motion(o.mix, sensor, framing.start, o.duration_s, impl_->strengths.quantile(u), o.seed, index);
   const LayerMotion layer({motion.keyframes.begin(), motion.keyframes.end()}, KeyframeInterpolation::spline);
+  const Sprite sprite{picture.light, nullptr, LayerUnits::pixel, LayerBeyond::mirror, layer, framing.pivot};
 
   // The pixels.
   EventCameraOptions camera = o.event_camera;
@@ -158,23 +181,7 @@ Sequence AffineSequences::make(std::uint32_t index) const {
   camera.contrast_threshold_off.reset();
   const std::uint64_t sensor_seed = (std::uint64_t{words[0]} << 32) | words[1];
 
-  World world;
-  world.workers = std::make_unique<const Workers>(1);
-  world.info.end = to_ns(o.duration_s);
-  world.trajectory = std::make_shared<const StaticTrajectory>(SE3{}, 0, world.info.end);
-  const Camera model = Camera::from_fov(o.width, o.height, 1.0);
-  world.info.cameras.push_back({"cam0", model, {}});
-  SpriteScene scene;
-  scene.sprites.push_back({picture.light, nullptr, LayerUnits::pixel, LayerBeyond::mirror, layer, framing.pivot});
-  auto renderer = make_sprites_renderer(std::move(scene), model, *world.workers);
-  const SensorTraits traits{camera.contrast_threshold, camera.log_eps, false};
-  auto sampler = make_sampler(
-      o.sampling,
-      {traits, o.width, o.height, {0, world.info.end}, *world.workers, model, renderer->traits(), [](TimeNs t) {
-         return RenderRequest{.t = t, .camera = {}, .tiles = {}};
-       }});
-  world.cameras.push_back(
-      {std::move(renderer), std::move(sampler), EventCamera(camera, o.width, o.height, sensor_seed), {}});
+  World world = world_of(o, camera, sensor_seed, SpriteScene{{sprite}});
 
   Sequence sequence;
   sequence.index = index;

@@ -26,7 +26,7 @@ class Surveyor {
  public:
   /// Returns false when nothing more can be learned.
   bool look(const MessageInput& input, const Message& message);
-  Survey conclude(const MessageInput& input, const ReadOptions& options) const;
+  TopicSurvey conclude(const MessageInput& input, const ReadOptions& options) const;
 
  private:
   template <typename T>
@@ -131,8 +131,8 @@ SE3 Surveyor::pose_in_body(const std::string& frame) const {
   return found != T_body_frames_.end() ? found->second : SE3();
 }
 
-Survey Surveyor::conclude(const MessageInput& input, const ReadOptions& options) const {
-  Survey result;
+TopicSurvey Surveyor::conclude(const MessageInput& input, const ReadOptions& options) const {
+  TopicSurvey result;
   Assignments roles = assign_roles(input.channels(), has_body_);
   result.channels = std::move(roles.of_channels);
   RecordingInfo& info = result.info;
@@ -165,7 +165,7 @@ Survey Surveyor::conclude(const MessageInput& input, const ReadOptions& options)
 
 }  // namespace
 
-Survey survey(MessageInput& input, const ReadOptions& options) {
+TopicSurvey survey_topics(MessageInput& input, const ReadOptions& options) {
   Surveyor surveyor;
   bool damaged = false;
   try {
@@ -177,7 +177,7 @@ Survey survey(MessageInput& input, const ReadOptions& options) {
   } catch (const Malformed&) {
     damaged = true;
   }
-  Survey result = surveyor.conclude(input, options);
+  TopicSurvey result = surveyor.conclude(input, options);
   result.damaged = damaged;
   return result;
 }

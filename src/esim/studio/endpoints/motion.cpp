@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "esim/compose/waypoints.h"
+#include "esim/compose/waypoint_trajectory.h"
 #include "esim/scenario/read.h"
 #include "esim/studio/editor/motion_warnings.h"
 #include "esim/studio/editor/scenario_check.h"

@@ -27,35 +27,30 @@ Json bounds_of(const Scene& scene) {
   return {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
 }
 
-/// The kind of scene, and the pose of a panorama or a plane in the world.
-void describe_kind(const RendererOptions& renderer, const StudioScene& scene, Json& answer) {
-  struct Visit {
-    const StudioScene& scene;
-    Json& answer;
-    void operator()(const MeshRendererOptions&) const { answer["kind"] = "mesh"; }
-    void operator()(const PanoramaRendererOptions& panorama) const {
-      const Eigen::Vector4d q = panorama.orientation.normalized();
-      answer["kind"] = "panorama";
-      answer["world"]["panorama"] = {{"orientation", {q.x(), q.y(), q.z(), q.w()}}};
+/// Sets the kind of scene, and the pose of a panorama or a plane in the world.
+struct DescribeKind {
+  const StudioScene& scene;
+  Json& answer;
+  void operator()(const MeshRendererOptions&) const { answer["kind"] = "mesh"; }
+  void operator()(const PanoramaRendererOptions& panorama) const {
+    const Eigen::Vector4d q = panorama.orientation.normalized();
+    answer["kind"] = "panorama";
+    answer["world"]["panorama"] = {{"orientation", {q.x(), q.y(), q.z(), q.w()}}};
+  }
+  void operator()(const PlaneRendererOptions& plane) const {
+    const SE3 pose = pose_named("renderer.pose", plane.pose);
+    const double height_m = plane.width_m * scene.texture_aspect();
+    answer["kind"] = "plane";
+    answer["world"]["plane"] = {
+        {"pose", json_of(pose)}, {"width_m", plane.width_m}, {"height_m", height_m}, {"endless", plane.endless}};
+    Eigen::AlignedBox3d box;
+    for (const double x : {-0.5, 0.5}) {
+      for (const double y : {-0.5, 0.5}) box.extend(pose * Eigen::Vector3d(x * plane.width_m, y * height_m, 0));
     }
-    void operator()(const PlaneRendererOptions& plane) const {
-      const SE3 pose = pose_named("renderer.pose", plane.pose);
-      const double height_m = plane.width_m * scene.texture_aspect();
-      answer["kind"] = "plane";
-      answer["world"]["plane"] = {
-          {"pose", json_of(pose)}, {"width_m", plane.width_m}, {"height_m", height_m}, {"endless", plane.endless}};
-      Eigen::AlignedBox3d box;
-      for (const double x : {-0.5, 0.5}) {
-        for (const double y : {-0.5, 0.5}) box.extend(pose * Eigen::Vector3d(x * plane.width_m, y * height_m, 0));
-      }
-      answer["bounds"] = {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
-    }
-    void operator()(const SpritesRendererOptions&) const { answer["kind"] = "layers"; }
-    void operator()(const UnrealcvRendererOptions&) const {}
-    void operator()(const BlenderRendererOptions&) const {}
-  };
-  std::visit(Visit{scene, answer}, renderer);
-}
+    answer["bounds"] = {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
+  }
+  void operator()(const auto&) const { answer["kind"] = "layers"; }  // the page shows only the simulator's images
+};
 
 Json cameras_json(const std::vector<CameraInfo>& cameras) {
   Json all = Json::array();
@@ -88,7 +83,7 @@ Json scene_json(const Scenario& scenario, SceneStore& scenes) {
               {"texture", scene->texture() ? Json(base + ".jpg") : Json()},
               {"triangles", scene->triangles()},
               {"bounds", bounds_of(scene->file().scene)}};
-  describe_kind(scenario.renderer, *scene, answer);
+  std::visit(DescribeKind{*scene, answer}, scenario.renderer);
   answer["cameras"] = cameras_json(cameras_of(scenario, scene->file()));
   answer["start"] =
       json_of(scene->file().cameras.empty() ? first_view(scene->file().scene)

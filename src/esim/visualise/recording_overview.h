@@ -19,7 +19,7 @@ struct Extent {
 };
 
 /// Properties of a recording and of one of its cameras, found by reading it.
-struct Survey {
+struct RecordingOverview {
   SensorSize sensor{};               ///< if unknown: large enough for the events
   TimeNs origin = 0;                 ///< start of the recording
   TimeNs start = 0, end = 0;         ///< of the part to show, within the recording
@@ -30,11 +30,12 @@ struct Survey {
 };
 
 /// The views that the records support, in the order of View: depth and motion need ground truth, image any frame.
-std::vector<View> views_of(const Survey& survey);
+std::vector<View> views_of(const RecordingOverview& overview);
 
 /// Reads a recording up to the end of the part to show. `proceed` receives the completed fraction (0 to 1) and returns
 /// whether to continue; if it returns false, the result is empty.
-std::optional<Survey> survey(Source& source, const Extent& extent, const std::function<bool(double)>& proceed);
+std::optional<RecordingOverview> read_overview(Source& source, const Extent& extent,
+                                               const std::function<bool(double)>& proceed);
 
 /// Camera and time of a record; nothing for records without a camera and for those that are not shown.
 struct RecordStamp {

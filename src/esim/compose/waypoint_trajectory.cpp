@@ -1,4 +1,4 @@
-#include "esim/compose/waypoints.h"
+#include "esim/compose/waypoint_trajectory.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "esim/evaluate/report/report_json.h"
+#include "esim/evaluate/report/evaluation_text.h"
 
 #include <fmt/format.h>
 

@@ -3,7 +3,7 @@
 #include <numbers>
 
 #include "esim/compose/compose.h"
-#include "esim/compose/waypoints.h"
+#include "esim/compose/waypoint_trajectory.h"
 #include "esim/core/error.h"
 #include "esim/motion/fit/fit.h"
 #include "esim/motion/random.h"
@@ -55,6 +55,8 @@ std::shared_ptr<const Trajectory> fit_animation(const SceneMotion& motion, TimeN
     throw UserError(fmt::format("{}: cannot fit its animation: {}", name, error.what()));
   }
 }
+
+// One overload per type of trajectory.
 
 std::shared_ptr<const Trajectory> build(const FileTrajectoryOptions& options, const Mover& mover,
                                         const Notices& notices) {
@@ -134,7 +136,10 @@ std::shared_ptr<const Trajectory> build(const WaypointTrajectoryOptions& options
   return trajectory;
 }
 
-std::shared_ptr<const Trajectory> build(const TrajectoryOptions& options, const Mover& mover, const Notices& notices) {
+/// The motion of any type. Its name differs from the overloads above: otherwise, a type without an overload would
+/// convert to TrajectoryOptions and call this function forever.
+std::shared_ptr<const Trajectory> build_any(const TrajectoryOptions& options, const Mover& mover,
+                                            const Notices& notices) {
   return std::visit([&](const auto& alternative) { return build(alternative, mover, notices); }, options);
 }
 
@@ -147,7 +152,7 @@ std::shared_ptr<const Trajectory> build_for_object(const TrajectoryOptions& opti
   mover.seed = scenario.seed;
   mover.stream = static_cast<std::uint16_t>(index + 1);
   mover.span = [&] { return span; };
-  auto trajectory = build(options, mover, notices);
+  auto trajectory = build_any(options, mover, notices);
   if (trajectory->start() > simulated.start || trajectory->end() < simulated.end) {
     throw UserError(
         fmt::format("{}: lasts from {:.9g} to {:.9g} s, but must cover the simulation from {:.9g} to {:.9g} s; shorten "
@@ -188,7 +193,7 @@ std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, con
     const CameraOptions& camera = scenario.cameras.front();
     mover.T_body_camera = pose_named(fmt::format("camera {}: T_body_camera", camera.name), camera.T_body_camera);
   }
-  return build(scenario.trajectory, mover, notices);
+  return build_any(scenario.trajectory, mover, notices);
 }
 
 std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const Scenario& scenario,

@@ -13,6 +13,7 @@
 namespace esim::inline compose {
 namespace {
 
+/// Throws UserError for options that contradict each other, and warns of those that are probably not intended.
 void check_sampling(const CameraOptions& camera, const Notices& notices) {
   const auto check = [&]<typename Criterion>(const Criterion& criterion) {
     if constexpr (requires { criterion.lambda; }) {
@@ -32,6 +33,7 @@ void check_sampling(const CameraOptions& camera, const Notices& notices) {
   std::visit(check, camera.sampling);
 }
 
+/// Whether the pixels have colour filters.
 bool sees_colour(const CameraOptions& camera) { return camera.colour != ColourFilters::none; }
 
 /// Whether any camera sees colour.
@@ -40,8 +42,11 @@ bool sees_colour(const Scenario& scenario) {
                      [](const CameraOptions& camera) { return sees_colour(camera); });
 }
 
+/// What cameras need of the scene's textures.
 SceneLook look_of(const Scenario& scenario) { return sees_colour(scenario) ? SceneLook::colour : SceneLook::luminance; }
 
+/// The renderer of a sensor. Throws UserError if the renderer or the sampling method does not support its colour
+/// filters.
 std::unique_ptr<Renderer> build_renderer(const RendererFactory& make_renderer, const CameraOptions& options,
                                          const Camera& model, const Workers& workers) {
   if (!sees_colour(options)) return make_renderer(model, ColourFilters::none, workers);
@@ -73,6 +78,7 @@ FrameCamera build_frame_camera(const CameraOptions& options, const Camera& model
   }
 }
 
+/// Sets the IMU of a world, and its description.
 void add_imu(const RigImuOptions& options, std::uint64_t seed, World& world) {
   const SE3 T_body_imu = pose_named("imu.T_body_imu", options.T_body_imu);
   const TimeSpan span{world.info.start, world.info.end};
@@ -85,6 +91,7 @@ void add_imu(const RigImuOptions& options, std::uint64_t seed, World& world) {
                     options.accelerometer.random_walk};
 }
 
+/// Whether any pixel of a sample sees a surface.
 bool sees_something(const Sample& sample) {
   const auto depth = sample.depth.pixels();
   return std::any_of(depth.begin(), depth.end(), [](float z) { return std::isfinite(z); });
@@ -167,9 +174,9 @@ void check_substitutes(const Scenario& scenario, const Substitutes& substitutes,
   }
 }
 
-World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<const Trajectory> body,
-            const TimeSpan& span, const Substitutes& substitutes, int threads, const Notices& notices) {
-  check_substitutes(scenario, substitutes, span);
+/// A world without cameras: its time, the motions of the body and of the objects, and the IMU.
+World build_motions(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<const Trajectory> body,
+                    const TimeSpan& span, const Substitutes& substitutes, int threads, const Notices& notices) {
   World world;
   world.workers = std::make_unique<const Workers>(threads);
   world.trajectory = std::move(body);
@@ -178,7 +185,6 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
   world.info.truth_rate_hz = scenario.truth.rate_hz;
   world.truth_clock = PeriodicClock(span.start, span.end, scenario.truth.rate_hz);
   world.pose_clock = PeriodicClock(span.start, span.end, scenario.truth.pose_rate_hz);
-
   if (scenario.imu) add_imu(*scenario.imu, scenario.seed, world);
   if (substitutes.make_renderer) {
     for (const Substitutes::Object& object : substitutes.objects) {
@@ -189,7 +195,14 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
     world.objects = build_object_trajectories(scenario, scene, *world.trajectory, span, notices);
     name_what_moves(scenario.renderer, scene, world.info);
   }
+  return world;
+}
 
+/// Everything. All other functions that build a world end here.
+World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<const Trajectory> body,
+            const TimeSpan& span, const Substitutes& substitutes, int threads, const Notices& notices) {
+  check_substitutes(scenario, substitutes, span);
+  World world = build_motions(scenario, scene, std::move(body), span, substitutes, threads, notices);
   const SceneCamera* const followed = substitutes.body != nullptr ? nullptr : followed_camera(scenario, scene);
   check_output(scenario);
   for (const CameraOptions& options : scenario.cameras) {
@@ -198,14 +211,14 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
   }
   const RendererFactory make_renderer =
       substitutes.make_renderer
-          ? [&](const Camera& camera, ColourFilters, const Workers&) { return substitutes.make_renderer(camera); }
+          ? [&](const Camera& camera, ColourFilters,
+                const Workers& workers) { return substitutes.make_renderer(camera, workers); }
           : build_renderer_factory(scenario.renderer, scene, sees_colour(scenario), world.info.cameras, notices);
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
     const CameraOptions& options = scenario.cameras[i];
     const Camera& model = world.info.cameras[i].model;
     const EventCameraOptions& sensor = options.event_camera;
-    const SensorTraits traits{std::min(sensor.threshold_on(), sensor.threshold_off()), sensor.log_eps,
-                              sees_colour(options)};
+    const SensorTraits traits{sensor.min_threshold(), sensor.log_eps, sees_colour(options)};
     std::unique_ptr<Renderer> renderer = build_renderer(make_renderer, options, model, *world.workers);
     SamplingContext context{traits,         model.width, model.height,       span,
                             *world.workers, model,       renderer->traits(), view_at(world, i)};

@@ -1,4 +1,4 @@
-#include "esim/visualise/survey.h"
+#include "esim/visualise/recording_overview.h"
 
 #include <algorithm>
 #include <cmath>
@@ -24,19 +24,20 @@ std::optional<RecordStamp> stamp_of(const Record& record) {
   return std::nullopt;
 }
 
-std::vector<View> views_of(const Survey& survey) {
+std::vector<View> views_of(const RecordingOverview& overview) {
   std::vector<View> views = {View::events, View::time_surface, View::space_time};
-  const bool truth = survey.last.contains(Content::truth);
-  if (truth || survey.last.contains(Content::images) || survey.last.contains(Content::frames))
+  const bool truth = overview.last.contains(Content::truth);
+  if (truth || overview.last.contains(Content::images) || overview.last.contains(Content::frames))
     views.push_back(View::image);
-  if (truth && survey.depth.near_m() > 0) views.push_back(View::depth);
+  if (truth && overview.depth.near_m() > 0) views.push_back(View::depth);
   if (truth) views.push_back(View::motion);
   return views;
 }
 
-std::optional<Survey> survey(Source& source, const Extent& extent, const std::function<bool(double)>& proceed) {
+std::optional<RecordingOverview> read_overview(Source& source, const Extent& extent,
+                                               const std::function<bool(double)>& proceed) {
   const auto& cameras = source.info().cameras;
-  Survey found;
+  RecordingOverview found;
   if (extent.camera < static_cast<int>(cameras.size())) {
     const Camera& model = cameras[static_cast<std::size_t>(extent.camera)].model;
     found.sensor = {model.width, model.height};

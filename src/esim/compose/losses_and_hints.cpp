@@ -55,8 +55,7 @@ void add_sampling(const std::string& name, const CameraOptions& camera, const Sa
         "the sampling method allows. Raise max_rate_hz, or move more slowly",
         name, grouped(sampling.held_to_max_rate), rate));
   }
-  const double budget =
-      sampling.tolerance * std::min(camera.event_camera.threshold_on(), camera.event_camera.threshold_off());
+  const double budget = sampling.tolerance * camera.event_camera.min_threshold();
   if (sampling.measured_error && sampling.measured_error->p99 > budget) {
     lines.push_back(fmt::format(
         "{}sampling missed its tolerance: the 99th percentile of the measured error is {:.3g} in brightness, "

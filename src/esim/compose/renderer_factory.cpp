@@ -26,7 +26,7 @@ void refuse(ColourFilters filters, const char* renderer, const char* instead) {
     throw UserError(fmt::format("colour: {} renders luminance only; use {}, or colour: none", renderer, instead));
 }
 
-// One overload per type of renderer. A new type is a line in RendererOptions and a function here.
+// One overload per type of renderer (scenario/renderer_options.h).
 
 /// OpenGL if there is a graphics card and no camera sees colour.
 MeshEngine choose_engine(const MeshRendererOptions& options, bool colour) {

@@ -22,7 +22,7 @@ void frames(benchmark::State& state, const Camera& camera) {
   for (auto _ : state) {
     at.T_world_body.translation.y() += 1e-4;
     renderer->render({0, at, whole}, sample);
-    benchmark::DoNotOptimize(sample.flow_x.data());
+    benchmark::DoNotOptimize(sample.motion_x.data());
   }
 }
 

@@ -38,8 +38,8 @@ class PlaidRenderer final : public ProcessorRenderer {
       for (int y = tile.y; y < tile.y + tile.height; ++y) {
         for (int x = tile.x; x < tile.x + tile.width; ++x) {
           sample.irradiance(x, y) = static_cast<float>(std::exp(Plaid{}.brightness(x, y, request.t)) - kLogEps);
-          sample.flow_x(x, y) = static_cast<float>(30 + 10 * std::sin(20 * to_seconds(request.t)));
-          sample.flow_y(x, y) = 40;
+          sample.motion_x(x, y) = static_cast<float>(30 + 10 * std::sin(20 * to_seconds(request.t)));
+          sample.motion_y(x, y) = 40;
         }
       }
     }

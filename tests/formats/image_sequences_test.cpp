@@ -37,7 +37,7 @@ struct Found {
   struct Frame {
     TimeNs t;
     SE3 pose;
-    Image<float> irradiance, depth, flow_x, flow_y;
+    Image<float> irradiance, depth, motion_x, motion_y;
     Image<std::uint16_t> object;
   };
   struct Displacement {
@@ -58,8 +58,8 @@ Found read(const fs::path& path, const ReadOptions& options = {}) {
   while (const Record* record = source->next()) {
     if (const auto* truth = std::get_if<TruthRecord>(record)) {
       found.order += 't';
-      found.frames.push_back({truth->t, truth->T_world_camera, truth->irradiance, truth->depth, truth->flow_x,
-                              truth->flow_y, truth->object != nullptr ? *truth->object : Image<std::uint16_t>()});
+      found.frames.push_back({truth->t, truth->T_world_camera, truth->irradiance, truth->depth, truth->motion_x,
+                              truth->motion_y, truth->object != nullptr ? *truth->object : Image<std::uint16_t>()});
     } else {
       const auto& moved = std::get<DisplacementRecord>(*record);
       found.order += 'd';
@@ -121,8 +121,8 @@ class ImageSequences : public testing::TestWithParam<std::string> {
     ASSERT_EQ(found.moved.size(), kFrames - 1U);
     for (int i = 0; i + 1 < kFrames; ++i) {
       test::TruthImages images(kWidth, kHeight, i);
-      for (float& value : images.flow_x.pixels()) value *= static_cast<float>(to_seconds(kStep));
-      expect_near(found.moved[static_cast<std::size_t>(i)].x, images.flow_x, tolerance);
+      for (float& value : images.motion_x.pixels()) value *= static_cast<float>(to_seconds(kStep));
+      expect_near(found.moved[static_cast<std::size_t>(i)].x, images.motion_x, tolerance);
     }
   }
 
@@ -169,7 +169,8 @@ TEST_F(ImageSequences, KittiDoesNotKnowWhatIsTooLarge) {
   sink->begin(test::recording_info(4, 1, 0, kNsPerSecond));
   test::TruthImages images(4, 1, 0);
   const float depths[] = {255.99F, 256.1F, 0.001F, 10.0F}, flows[] = {511.9F, 512.5F, -512.0F, -512.1F};
-  for (int x = 0; x < 4; ++x) images.depth(x, 0) = depths[x], images.flow_x(x, 0) = flows[x], images.flow_y(x, 0) = 0;
+  for (int x = 0; x < 4; ++x)
+    images.depth(x, 0) = depths[x], images.motion_x(x, 0) = flows[x], images.motion_y(x, 0) = 0;
   for (int i = 0; i < 2; ++i) sink->write(images.at(i * kNsPerSecond));
   sink->end(true);
   const Found found = read(path);
@@ -202,8 +203,8 @@ TEST_F(ImageSequences, ExrKeepsIrradianceDepthAndMotionFieldExactly) {
     EXPECT_EQ(frame.t, i * kStep);
     expect_near(frame.irradiance, expected.irradiance, 0);
     expect_near(frame.depth, expected.depth, 0);
-    expect_near(frame.flow_x, expected.flow_x, 0);
-    expect_near(frame.flow_y, expected.flow_y, 0);
+    expect_near(frame.motion_x, expected.motion_x, 0);
+    expect_near(frame.motion_y, expected.motion_y, 0);
   }
 }
 
@@ -219,7 +220,7 @@ TEST_F(ImageSequences, NpyKeepsEverything) {
     EXPECT_EQ(frame.pose.translation.z(), i);
     expect_near(frame.irradiance, expected.irradiance, 0);
     expect_near(frame.depth, expected.depth, 0);
-    expect_near(frame.flow_y, expected.flow_y, 0);
+    expect_near(frame.motion_y, expected.motion_y, 0);
   }
   const std::string head = test::content(path / "flow.npy").substr(0, 192);
   EXPECT_TRUE(test::contains(head, "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 2, 11, 18), }"));

@@ -117,7 +117,7 @@ TEST(KilledWriter, GroundTruthIsReadAsFarAsTheLastFlush) {
         for (std::uint64_t i = 0; i < reader.size(); ++i) {
           EXPECT_EQ(reader.t(i), static_cast<TimeNs>(i) * kNsPerMs);
           reader.read(i, frame);
-          EXPECT_EQ(frame.flow_x(3, 5), test::TruthImages(kWidth, kHeight, static_cast<double>(i)).flow_x(3, 5));
+          EXPECT_EQ(frame.motion_x(3, 5), test::TruthImages(kWidth, kHeight, static_cast<double>(i)).motion_x(3, 5));
         }
         return reader.size();
       });

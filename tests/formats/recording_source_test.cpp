@@ -139,7 +139,7 @@ void write_all(Sink& sink, TimeUnit unit) {
     const test::TruthImages images = truth_at(i);
     const Image<std::uint16_t> objects = objects_at(i);
     const SE3 poses[] = {some_pose(i), some_pose(i + 0.5)};
-    sink.write(TruthRecord{0, t, some_pose(0.3 * i), images.irradiance, images.depth, images.flow_x, images.flow_y,
+    sink.write(TruthRecord{0, t, some_pose(0.3 * i), images.irradiance, images.depth, images.motion_x, images.motion_y,
                            &objects, poses});
     if (i == 0) continue;
     const Image<float> x = displacement_at(i, 0.5), y = displacement_at(i, -3);
@@ -205,8 +205,8 @@ class Checker {
     expect_same(record.T_world_camera, some_pose(0.3 * i));
     expect_same(record.irradiance, expected.irradiance);
     expect_same(record.depth, expected.depth);
-    expect_same(record.flow_x, expected.flow_x);
-    expect_same(record.flow_y, expected.flow_y);
+    expect_same(record.motion_x, expected.motion_x);
+    expect_same(record.motion_y, expected.motion_y);
     ASSERT_NE(record.object, nullptr);
     expect_same(*record.object, objects_at(i));
     ASSERT_EQ(record.T_world_objects.size(), 2U);

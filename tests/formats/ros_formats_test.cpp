@@ -157,7 +157,7 @@ TEST_P(RosFormats, EverythingReadsBackAsItWas) {
     EXPECT_EQ(truth.t, t + 3);
     expect_equal(truth.T_world_camera, T_world_camera, "T_world_camera");
     EXPECT_TRUE(same_pixels(truth.irradiance, images.irradiance) && same_pixels(truth.depth, images.depth));
-    EXPECT_TRUE(same_pixels(truth.flow_x, images.flow_x) && same_pixels(truth.flow_y, images.flow_y));
+    EXPECT_TRUE(same_pixels(truth.motion_x, images.motion_x) && same_pixels(truth.motion_y, images.motion_y));
 
     EXPECT_EQ(all.imu[i].t, t + 2);
     EXPECT_EQ(all.imu[i].measured.angular_rate, vector_at(to_seconds(t), 7));
@@ -261,7 +261,7 @@ TEST_P(RosFormats, TopicsOfOthers) {
   EXPECT_EQ(all.imu.size(), 1U);
   ASSERT_EQ(all.truth.size(), 1U);
   EXPECT_EQ(all.truth[0].depth(0, 0), 1.0F) << "1000 mm";
-  EXPECT_TRUE(std::isnan(all.truth[0].flow_x(0, 0)));
+  EXPECT_TRUE(std::isnan(all.truth[0].motion_x(0, 0)));
 }
 
 TEST_P(RosFormats, MessagesThatAreTooShortAreNamed) {

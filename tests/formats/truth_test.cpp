@@ -72,8 +72,8 @@ TEST(TruthHdf5, HoldsWhatWasWritten) {
       EXPECT_EQ(poses[7 * i + 6], some_pose(t_s).rotation.w());
       const std::size_t n = kRows * kColumns;
       EXPECT_TRUE(std::equal(images.depth.data(), images.depth.data() + n, &depth[i * n]));
-      EXPECT_TRUE(std::equal(images.flow_x.data(), images.flow_x.data() + n, &flow[2 * i * n]));
-      EXPECT_TRUE(std::equal(images.flow_y.data(), images.flow_y.data() + n, &flow[(2 * i + 1) * n]));
+      EXPECT_TRUE(std::equal(images.motion_x.data(), images.motion_x.data() + n, &flow[2 * i * n]));
+      EXPECT_TRUE(std::equal(images.motion_y.data(), images.motion_y.data() + n, &flow[(2 * i + 1) * n]));
     }
   }
 }
@@ -108,11 +108,12 @@ TEST(TruthHdf5, HoldsObjectsByNameAndDisplacementsBetweenFrames) {
     TruthRecord truth = images.at(k);
     EXPECT_THROW(writer.write(truth), InternalError) << "objects are missing";
     const SE3 poses[] = {some_pose(k), some_pose(k + 0.5)};
-    const TruthRecord complete{0, k, {}, images.irradiance, images.depth, images.flow_x, images.flow_y, &object, poses};
+    const TruthRecord complete{0,       k,    {}, images.irradiance, images.depth, images.motion_x, images.motion_y,
+                               &object, poses};
     writer.write(complete);
     visible(0, 0) = static_cast<std::uint8_t>(k % 2);
-    if (k > 0) writer.write(DisplacementRecord{0, k - 1, k, images.flow_x, images.flow_y, visible});
-    writer.write(DisplacementRecord{1, 0, 1, images.flow_x, images.flow_y, visible});  // of another camera
+    if (k > 0) writer.write(DisplacementRecord{0, k - 1, k, images.motion_x, images.motion_y, visible});
+    writer.write(DisplacementRecord{1, 0, 1, images.motion_x, images.motion_y, visible});  // of another camera
   }
   writer.end(true);
 
@@ -124,8 +125,8 @@ TEST(TruthHdf5, HoldsObjectsByNameAndDisplacementsBetweenFrames) {
   EXPECT_EQ(poses[14 + 7], some_pose(1.5).translation.x());
   EXPECT_EQ(poses[28 + 6], some_pose(2).rotation.w());
   const auto displacement = read_dataset<float>(path, "displacement", H5T_NATIVE_FLOAT, {2, 2, 3, 4});
-  EXPECT_EQ(displacement[12], images.flow_y(0, 0));
-  EXPECT_EQ(displacement[24 + 5], images.flow_x(1, 1));
+  EXPECT_EQ(displacement[12], images.motion_y(0, 0));
+  EXPECT_EQ(displacement[24 + 5], images.motion_x(1, 1));
   const auto valid = read_dataset<std::uint8_t>(path, "displacement_valid", H5T_NATIVE_UINT8, {2, 3, 4});
   EXPECT_EQ(valid[0], 1);
   EXPECT_EQ(valid[12], 0);

@@ -122,7 +122,7 @@ TEST(PreviewLayoutTest, FitsAnyCamera) {
     const TruthImages images(width, height, 0);
     const Image<float> none(width, height);
     const auto image = PreviewPage(layout).compose(
-        {0, 0, none, none, images.irradiance, &images.depth, &images.flow_x, &images.flow_y, 1, 3, 100, "caption"});
+        {0, 0, none, none, images.irradiance, &images.depth, &images.motion_x, &images.motion_y, 1, 3, 100, "caption"});
     EXPECT_EQ(image.width(), layout.width);
     EXPECT_EQ(image.height(), layout.height);
   }
@@ -133,7 +133,7 @@ TEST(PreviewPageTest, KeepsNothingOfThePreviousFrame) {
   const TruthImages images(64, 48, 0);
   Image<float> none(64, 48), many(64, 48, 3);
   const auto frame = [&](TimeNs t, const Image<float>& on, float far_m, float full_flow) {
-    return PreviewFrame{t, 0,     on,       none, images.irradiance, &images.depth, &images.flow_x, &images.flow_y,
+    return PreviewFrame{t, 0,     on,       none, images.irradiance, &images.depth, &images.motion_x, &images.motion_y,
                         1, far_m, full_flow};
   };
   PreviewPage page(layout);

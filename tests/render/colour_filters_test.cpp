@@ -66,7 +66,7 @@ TEST_P(EveryColourfulRenderer, APixelSeesItsColourAsAGreyCameraSeesAWorldOfThatC
   for (std::size_t colour = 0; colour < 3; ++colour) {
     const Sample grey = seen(kPatterns[colour], {}, ColourFilters::none);
     EXPECT_TRUE(std::ranges::equal(mosaic.depth.pixels(), grey.depth.pixels()));
-    EXPECT_TRUE(std::ranges::equal(mosaic.flow_x.pixels(), grey.flow_x.pixels()));
+    EXPECT_TRUE(std::ranges::equal(mosaic.motion_x.pixels(), grey.motion_x.pixels()));
     for (int y = 0; y < model_.height; ++y) {
       for (int x = 0; x < model_.width; ++x) {
         if (static_cast<std::size_t>(x % 2 + y % 2) != colour) continue;

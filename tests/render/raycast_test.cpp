@@ -259,7 +259,7 @@ TEST(RaycastRenderer, ShowsAMovingMeshAsTheSameMeshAtRestThere) {
   for (std::size_t i = 0; i < sample.depth.size(); ++i) {
     ASSERT_NEAR(sample.depth.pixels()[i], expected.depth.pixels()[i], 1e-4);
     differ += std::fabs(sample.irradiance.pixels()[i] - expected.irradiance.pixels()[i]) > 2e-3F ? 1 : 0;
-    ASSERT_NEAR(sample.flow_x.pixels()[i], expected.flow_x.pixels()[i], 0.05);
+    ASSERT_NEAR(sample.motion_x.pixels()[i], expected.motion_x.pixels()[i], 0.05);
   }
   EXPECT_LT(differ, 20) << "but at the box's edges";
 }
@@ -271,7 +271,7 @@ TEST(RaycastRenderer, StaysFiniteWhenAnObjectPassesThroughTheCamera) {
     Kinematics square = at_distance(distance);
     square.velocity_world = {0.1, 0, -1};
     const Sample sample = render_scene(scene, {square});
-    for (const float v : sample.flow_x.pixels()) ASSERT_TRUE(std::isfinite(v));
+    for (const float v : sample.motion_x.pixels()) ASSERT_TRUE(std::isfinite(v));
     for (const float z : sample.depth.pixels()) ASSERT_GT(z, 0.0F);
     EXPECT_EQ(sample.object(60, 45), distance > 5e-3 ? 1 : 0) << "in front of the lens or not";
   }

@@ -84,8 +84,8 @@ TEST(SpritesRenderer, ATranslatingLayerMovesByVelocityTimesTime) {
           EXPECT_NEAR(now.mass / at_start.mass, 1.0, 2e-3);
           const auto x = static_cast<int>(std::lround(now.centre.x())),
                      y = static_cast<int>(std::lround(now.centre.y()));
-          EXPECT_FLOAT_EQ(sample.flow_x(x, y), 17.7F);
-          EXPECT_FLOAT_EQ(sample.flow_y(x, y), -9.1F);
+          EXPECT_FLOAT_EQ(sample.motion_x(x, y), 17.7F);
+          EXPECT_FLOAT_EQ(sample.motion_y(x, y), -9.1F);
           EXPECT_TRUE(std::isinf(sample.depth(x, y)));
         }
       }
@@ -114,8 +114,8 @@ TEST(SpritesRenderer, TheMotionFieldIsTheVelocityOfThePointThatIsSeen) {
         for (int x = 0; x < 120; x += 13) {
           const Eigen::Vector2d uv = Eigen::Vector2d(0.5, 0.5) + now.A.inverse() * (Eigen::Vector2d(x, y) - now.centre);
           const Eigen::Vector2d expected = (where(t_s + 1e-5, uv) - where(t_s - 1e-5, uv)) / 2e-5;
-          EXPECT_NEAR(sample.flow_x(x, y), expected.x(), 2e-5 * (1 + expected.norm()));
-          EXPECT_NEAR(sample.flow_y(x, y), expected.y(), 2e-5 * (1 + expected.norm()));
+          EXPECT_NEAR(sample.motion_x(x, y), expected.x(), 2e-5 * (1 + expected.norm()));
+          EXPECT_NEAR(sample.motion_y(x, y), expected.y(), 2e-5 * (1 + expected.norm()));
         }
       }
     }
@@ -126,12 +126,12 @@ TEST(SpritesRenderer, TheFirstLayerIsTheNearest) {
   const Sprite bright = plain(0.9F, {5, 5}, 10), dark = plain(0.1F, {3, 8}, -20);
   const Sample bright_first = render({{bright, dark}, 0.4F}, 0), dark_first = render({{dark, bright}, 0.4F}, 0);
   EXPECT_NEAR(bright_first.irradiance(60, 45), 0.9F, kTexel);
-  EXPECT_FLOAT_EQ(bright_first.flow_x(60, 45), 10.0F);
+  EXPECT_FLOAT_EQ(bright_first.motion_x(60, 45), 10.0F);
   EXPECT_NEAR(dark_first.irradiance(60, 45), 0.1F, kTexel);
-  EXPECT_FLOAT_EQ(dark_first.flow_x(60, 45), -20.0F);
+  EXPECT_FLOAT_EQ(dark_first.motion_x(60, 45), -20.0F);
   EXPECT_NEAR(bright_first.irradiance(60, 72), 0.1F, kTexel) << "beyond the bright one";
   EXPECT_NEAR(bright_first.irradiance(3, 3), 0.4F, kTexel) << "outside of both";
-  EXPECT_EQ(bright_first.flow_x(3, 3), 0.0F);
+  EXPECT_EQ(bright_first.motion_x(3, 3), 0.0F);
 }
 
 TEST(SpritesRenderer, TheMotionFieldIsOfTheLayerWithTheLargestShare) {
@@ -139,10 +139,10 @@ TEST(SpritesRenderer, TheMotionFieldIsOfTheLayerWithTheLargestShare) {
     Sprite glass = plain(0.9F * alpha, {5, 5}, 10);
     glass.alpha = constant(alpha);
     const Sample over_layer = render({{glass, plain(0.1F, {9, 9}, -20)}, 0.0F}, 0);
-    EXPECT_FLOAT_EQ(over_layer.flow_x(60, 45), alpha > 0.5F ? 10.0F : -20.0F) << alpha;
+    EXPECT_FLOAT_EQ(over_layer.motion_x(60, 45), alpha > 0.5F ? 10.0F : -20.0F) << alpha;
     EXPECT_NEAR(over_layer.irradiance(60, 45), 0.9F * alpha + 0.1F * (1 - alpha), kTexel);
     const Sample over_background = render({{glass}, 0.5F}, 0);
-    EXPECT_FLOAT_EQ(over_background.flow_x(60, 45), alpha > 0.5F ? 10.0F : 0.0F) << alpha;
+    EXPECT_FLOAT_EQ(over_background.motion_x(60, 45), alpha > 0.5F ? 10.0F : 0.0F) << alpha;
     EXPECT_NEAR(over_background.irradiance(60, 45), 0.9F * alpha + 0.5F * (1 - alpha), kTexel);
   }
 }
@@ -247,7 +247,7 @@ TEST(SpritesRenderer, GoesOnBeyondTheEdgesAsAsked) {
 TEST(SpritesRenderer, DoesNotSeeTheCameraMove) {
   const Sample a = render(test::test_sprites(), 0.2), b = render(test::test_sprites(), 0.2, test::moving_camera());
   EXPECT_TRUE(std::ranges::equal(a.irradiance.pixels(), b.irradiance.pixels()));
-  EXPECT_TRUE(std::ranges::equal(a.flow_x.pixels(), b.flow_x.pixels()));
+  EXPECT_TRUE(std::ranges::equal(a.motion_x.pixels(), b.motion_x.pixels()));
   EXPECT_TRUE(make_sprites_renderer(test::test_sprites(), kCamera, test::two_threads())->traits().on_sensor);
 }
 
@@ -259,7 +259,7 @@ TEST(SpritesRenderer, DegenerateLayersAreNotSeenAndLeaveNumbersFinite) {
         const Sprite sprite{constant(0.5F), constant(0.5F), LayerUnits::pixel, beyond,
                             linear({{0, {away, -away}, 33, scale}, {1, {0, 0}, -1e9, {1, 1}}})};
         const Sample sample = render({{sprite}, 0.25F}, 0);
-        for (const auto* field : {&sample.irradiance, &sample.flow_x, &sample.flow_y}) {
+        for (const auto* field : {&sample.irradiance, &sample.motion_x, &sample.motion_y}) {
           EXPECT_TRUE(std::ranges::all_of(field->pixels(), [](float value) { return std::isfinite(value); }));
         }
         EXPECT_TRUE(std::ranges::all_of(sample.irradiance.pixels(), [](float e) { return e > 0.24F && e < 0.64F; }));

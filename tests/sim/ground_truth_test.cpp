@@ -16,7 +16,7 @@ class Collector final : public Sink {
     int camera;
     TimeNs t;
     SE3 T_world_camera;
-    Image<float> depth, flow_x;
+    Image<float> depth, motion_x;
     Image<std::uint16_t> object;
     std::vector<SE3> T_world_objects;
   };
@@ -29,7 +29,7 @@ class Collector final : public Sink {
   void begin(const RecordingInfo& recording) override { info = recording; }
   void write(const Record& record) override {
     if (const auto* truth = std::get_if<TruthRecord>(&record)) {
-      frames.push_back({truth->camera, truth->t, truth->T_world_camera, truth->depth, truth->flow_x, {}, {}});
+      frames.push_back({truth->camera, truth->t, truth->T_world_camera, truth->depth, truth->motion_x, {}, {}});
       frames.back().T_world_objects.assign(truth->T_world_objects.begin(), truth->T_world_objects.end());
       if (truth->object != nullptr) frames.back().object = *truth->object;
     }
@@ -101,7 +101,7 @@ TEST_F(GroundTruth, KnowsTheCardWhereverItIs) {
         if (k + 1 == out.frames.size()) continue;
         // The card moves along world y, to the left of the image, by 2 m/s at 2 m for 10 ms; the wall does not.
         ASSERT_NEAR(out.intervals[k].x(x, y), card ? -fx * 0.01 : 0.0, 0.01) << x << ", " << y << ", frame " << k;
-        ASSERT_NEAR(out.intervals[k].x(x, y), frame.flow_x(x, y) * 0.01, 0.01);
+        ASSERT_NEAR(out.intervals[k].x(x, y), frame.motion_x(x, y) * 0.01, 0.01);
       }
     }
     EXPECT_GT(on_card, 100);

@@ -21,7 +21,7 @@ class LastFrame final : public Sink {
     if (const auto* part = std::get_if<EventsRecord>(&record)) events += part->events.size();
     if (const auto* truth = std::get_if<TruthRecord>(&record)) {
       brightest = *std::max_element(truth->irradiance.pixels().begin(), truth->irradiance.pixels().end());
-      fastest = *std::max_element(truth->flow_x.pixels().begin(), truth->flow_x.pixels().end());
+      fastest = *std::max_element(truth->motion_x.pixels().begin(), truth->motion_x.pixels().end());
     }
   }
   void end(bool) override {}

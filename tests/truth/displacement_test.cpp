@@ -77,7 +77,7 @@ TEST_P(EveryRendererOfSpace, DisplacementIsTheIntegralOfTheMotionFieldAlongThePa
                             (sample.object.empty() || sample.object(static_cast<int>(p.x()), static_cast<int>(p.y())) ==
                                                           samples[0].object(x, y));
         if (!smooth) return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
-        return {bilinear(sample.flow_x, p.x(), p.y()), bilinear(sample.flow_y, p.x(), p.y())};
+        return {bilinear(sample.motion_x, p.x(), p.y()), bilinear(sample.motion_y, p.x(), p.y())};
       };
       for (int i = 0; i < 2 * kSteps && at.allFinite(); i += 2) {
         const Eigen::Vector2d k1 = velocity(i, at), k2 = velocity(i + 1, at + 0.5 * kStep * k1),

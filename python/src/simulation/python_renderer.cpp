@@ -68,8 +68,8 @@ class PythonRenderer final : public ProcessorRenderer {
       copy(nb::cast<Plane<std::uint16_t>>(object).data(), request.tiles, sample.object);
     if (flow.is_none()) return false;
     const auto planes = nb::cast<TwoPlanes>(flow);
-    copy(planes.data(), request.tiles, sample.flow_x);
-    copy(planes.data() + sample.flow_x.size(), request.tiles, sample.flow_y);
+    copy(planes.data(), request.tiles, sample.motion_x);
+    copy(planes.data() + sample.motion_x.size(), request.tiles, sample.motion_y);
     return true;
   }
 

@@ -45,7 +45,7 @@ MotionCurve measure_motion(const World& world, const std::vector<PixelPosition>&
     double sum = 0;
     int counted = 0;
     for (const PixelPosition& p : pixels) {
-      const double speed = std::hypot(sample.flow_x(p.x, p.y), sample.flow_y(p.x, p.y));
+      const double speed = std::hypot(sample.motion_x(p.x, p.y), sample.motion_y(p.x, p.y));
       if (!std::isfinite(speed)) continue;
       sum += speed;
       ++counted;

@@ -113,14 +113,14 @@ void PreviewWriter::Impl::count(EventSpan span) {
 
 void PreviewWriter::Impl::add_frame(const TruthRecord& truth) {
   depth_scale.include(truth.depth);
-  flow_scale.include(truth.flow_x, truth.flow_y);
+  flow_scale.include(truth.motion_x, truth.motion_y);
   show({.t = truth.t,
         .on_events = on,
         .off_events = off,
         .irradiance = truth.irradiance,
         .depth_m = &truth.depth,
-        .flow_x_px_per_s = &truth.flow_x,
-        .flow_y_px_per_s = &truth.flow_y,
+        .flow_x_px_per_s = &truth.motion_x,
+        .flow_y_px_per_s = &truth.motion_y,
         .near_m = depth_scale.near_m(),
         .far_m = depth_scale.far_m(),
         .full_flow_px_per_s = flow_scale.full_px_per_s()});

@@ -54,10 +54,10 @@ void DepthScale::include(const Image<float>& depth_m) {
   }
 }
 
-void FlowScale::include(const Image<float>& flow_x, const Image<float>& flow_y) {
+void FlowScale::include(const Image<float>& motion_x, const Image<float>& motion_y) {
   std::vector<float> speeds;
-  for (std::size_t i = 0; i < flow_x.size(); i += stride_of(flow_x)) {
-    const float speed = std::hypot(flow_x.pixels()[i], flow_y.pixels()[i]);
+  for (std::size_t i = 0; i < motion_x.size(); i += stride_of(motion_x)) {
+    const float speed = std::hypot(motion_x.pixels()[i], motion_y.pixels()[i]);
     if (std::isfinite(speed)) speeds.push_back(speed);
   }
   if (speeds.empty()) return;

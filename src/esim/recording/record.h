@@ -62,8 +62,8 @@ struct TruthRecord {
   SE3 T_world_camera;
   const Image<float>& irradiance;  ///< E, 1.0 = diffuse white
   const Image<float>& depth;       ///< Z, planar, m; +inf: no surface
-  const Image<float>& flow_x;      ///< motion field, px/s, positive to the right
-  const Image<float>& flow_y;      ///< motion field, px/s, positive downwards
+  const Image<float>& motion_x;    ///< motion field, px/s, positive to the right
+  const Image<float>& motion_y;    ///< motion field, px/s, positive downwards
 
   /// If requested: i + 1 for pixels that see moving object i, otherwise 0.
   const Image<std::uint16_t>* object = nullptr;

@@ -209,7 +209,8 @@ class Simulator::Run {
         if (world_.cameras[i].displacement) displacement = world_.cameras[i].displacement->advance(request, truth_);
       }
       write(TruthRecord{static_cast<int>(i), t, request.camera.T_world_body, truth_.irradiance, truth_.depth,
-                        truth_.flow_x, truth_.flow_y, world_.truth_objects ? &truth_.object : nullptr, object_poses_});
+                        truth_.motion_x, truth_.motion_y, world_.truth_objects ? &truth_.object : nullptr,
+                        object_poses_});
       if (displacement != nullptr) {
         write(DisplacementRecord{static_cast<int>(i), displacement->t0, displacement->t1, displacement->x,
                                  displacement->y, displacement->visible});

@@ -234,7 +234,7 @@ void Player::Impl::add(const TruthRecord& truth) {
     depths.add(truth.t, colour_depth(picked(truth.depth, grid), survey.depth.near_m(), survey.depth.far_m()));
   if (shows(View::motion)) {
     motions.add(truth.t,
-                colour_flow(picked(truth.flow_x, grid), picked(truth.flow_y, grid), survey.motion.full_px_per_s()));
+                colour_flow(picked(truth.motion_x, grid), picked(truth.motion_y, grid), survey.motion.full_px_per_s()));
   }
 }
 

@@ -62,7 +62,7 @@ std::optional<Survey> survey(Source& source, const Extent& extent, const std::fu
       }
     } else if (const auto* truth = std::get_if<TruthRecord>(record)) {
       found.depth.include(truth->depth);
-      found.motion.include(truth->flow_x, truth->flow_y);
+      found.motion.include(truth->motion_x, truth->motion_y);
     }
     found.end = std::clamp(stamp->last, found.end, end);
     if (stamp->first > end && std::holds_alternative<EventsRecord>(*record)) break;

@@ -108,8 +108,8 @@ class Span {
 
   void store(int count, Sample& sample) const {
     std::copy_n(irradiance_.begin(), count, sample.irradiance.row(row_) + first_);
-    std::copy_n(flow_x_.begin(), count, sample.flow_x.row(row_) + first_);
-    std::copy_n(flow_y_.begin(), count, sample.flow_y.row(row_) + first_);
+    std::copy_n(flow_x_.begin(), count, sample.motion_x.row(row_) + first_);
+    std::copy_n(flow_y_.begin(), count, sample.motion_y.row(row_) + first_);
     std::fill_n(sample.depth.row(row_) + first_, count, std::numeric_limits<float>::infinity());
     if (which_) std::copy_n(number_.begin(), count, sample.object.row(row_) + first_);
   }

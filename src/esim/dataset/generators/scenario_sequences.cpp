@@ -129,7 +129,7 @@ Sequence ScenarioSequences::make(std::uint32_t index) const {
   if (has_displacement) field.advance(first, sample);
   renderer.render(last, sample);
   sequence.last = sample.irradiance;
-  sequence.flow = {sample.flow_x, sample.flow_y};
+  sequence.flow = {sample.motion_x, sample.motion_y};
   sequence.flow_t = end - start;
   if (has_displacement) {
     const Displacement* const displacement = field.advance(last, sample);

@@ -54,7 +54,7 @@ class TruthHdf5Reader {
   /// One frame; quantities that the file lacks are empty.
   struct Frame {
     SE3 T_world_camera;
-    Image<float> depth, flow_x, flow_y;
+    Image<float> depth, motion_x, motion_y;
     Image<std::uint16_t> object;
     std::vector<SE3> T_world_objects;
   };

@@ -136,7 +136,7 @@ void TruthHdf5Reader::read(std::uint64_t frame, Frame& out) const {
     out.T_world_camera = pose_of(impl.file, numbers.data());
   }
   if (impl.depth) impl.read(*impl.depth, frame, out.depth);
-  if (impl.flow) impl.read(*impl.flow, frame, out.flow_x, out.flow_y);
+  if (impl.flow) impl.read(*impl.flow, frame, out.motion_x, out.motion_y);
   if (impl.objects) impl.read(*impl.objects, frame, out.object);
   if (!impl.object_poses) return;
   std::vector<double> numbers(impl.object_poses->item_numbers());

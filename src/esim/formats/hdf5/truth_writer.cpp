@@ -115,7 +115,7 @@ void TruthHdf5Writer::Impl::append(const TruthRecord& truth) {
     check_size(truth.depth);
     depth.append(truth.depth.pixels());
   }
-  if (options.flow) append(flow, truth.flow_x, truth.flow_y);
+  if (options.flow) append(flow, truth.motion_x, truth.motion_y);
   if (options.objects) {
     if (truth.object == nullptr)
       throw InternalError(path.string() + ": a ground-truth frame has no image of its objects");

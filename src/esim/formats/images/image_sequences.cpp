@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 const Image<float>& image_in(const SequenceImages& images) {
-  for (const Image<float>* image : {&images.depth, &images.flow_x}) {
+  for (const Image<float>* image : {&images.depth, &images.field_x}) {
     if (!image->empty()) return *image;
   }
   return images.irradiance;
@@ -41,13 +41,13 @@ class SequenceStream final : public RecordStream {
   const Record* next(TimeNs) override {
     if (!std::exchange(read_, false)) read();
     read_ = false;
-    const auto& [irradiance, depth, flow_x, flow_y] = images_;
+    const auto& [irradiance, depth, field_x, field_y] = images_;
     if (!files_.displacements)
-      return &record_.emplace(TruthRecord{0, span_.start, {}, irradiance, depth, flow_x, flow_y});
-    known_ = Image<std::uint8_t>(flow_x.width(), flow_x.height());
-    std::transform(flow_x.pixels().begin(), flow_x.pixels().end(), known_.pixels().begin(),
+      return &record_.emplace(TruthRecord{0, span_.start, {}, irradiance, depth, field_x, field_y});
+    known_ = Image<std::uint8_t>(field_x.width(), field_x.height());
+    std::transform(field_x.pixels().begin(), field_x.pixels().end(), known_.pixels().begin(),
                    [](float x) { return static_cast<std::uint8_t>(std::isnan(x) ? 0 : 1); });
-    return &record_.emplace(DisplacementRecord{0, span_.start, span_.end, flow_x, flow_y, known_});
+    return &record_.emplace(DisplacementRecord{0, span_.start, span_.end, field_x, field_y, known_});
   }
 
  private:
@@ -92,7 +92,7 @@ void FrameFlow::add(const Record& record) {
     }
   }
   field_.reset();
-  if (!truth->flow_x.empty()) field_ = Field{{truth->t, truth->t}, truth->flow_x, truth->flow_y};
+  if (!truth->motion_x.empty()) field_ = Field{{truth->t, truth->t}, truth->motion_x, truth->motion_y};
 }
 
 void FrameFlow::finish() { flush(); }

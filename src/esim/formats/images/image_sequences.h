@@ -54,7 +54,8 @@ class FrameFlow {
 
 /// The contents of one file of a sequence; what the file lacks is empty.
 struct SequenceImages {
-  Image<float> irradiance, depth, flow_x, flow_y;
+  Image<float> irradiance, depth;
+  Image<float> field_x, field_y;  ///< motion field, px/s, or optical flow, px
 };
 
 /// Files in order of time.

@@ -48,11 +48,12 @@ PngImage read_numbers(const fs::path& path, std::size_t channels) {
 void read_flow(const fs::path& path, SequenceImages& images, float per_pixel) {
   const PngImage png = read_numbers(path, 3);
   const Image<std::uint16_t>& known = png.channels[2];
-  images.flow_x = images.flow_y = Image<float>(known.width(), known.height(), std::numeric_limits<float>::quiet_NaN());
+  images.field_x = images.field_y =
+      Image<float>(known.width(), known.height(), std::numeric_limits<float>::quiet_NaN());
   for (std::size_t i = 0; i < known.size(); ++i) {
     if (known.data()[i] == 0) continue;
-    images.flow_x.data()[i] = static_cast<float>(png.channels[0].data()[i] - kOffset) / per_pixel;
-    images.flow_y.data()[i] = static_cast<float>(png.channels[1].data()[i] - kOffset) / per_pixel;
+    images.field_x.data()[i] = static_cast<float>(png.channels[0].data()[i] - kOffset) / per_pixel;
+    images.field_y.data()[i] = static_cast<float>(png.channels[1].data()[i] - kOffset) / per_pixel;
   }
 }
 

@@ -165,8 +165,9 @@ class NpyTruthWriter final : public Sink {
     if (has_irradiance_)
       array(irradiance_, "irradiance.npy", shape_of(truth.irradiance)).append({truth.irradiance.pixels()});
     if (!truth.depth.empty()) array(depth_, "depth.npy", shape_of(truth.depth)).append({truth.depth.pixels()});
-    if (!truth.flow_x.empty())
-      array(flow_, "flow.npy", shape_of_vectors(truth.flow_x)).append({truth.flow_x.pixels(), truth.flow_y.pixels()});
+    if (!truth.motion_x.empty())
+      array(flow_, "flow.npy", shape_of_vectors(truth.motion_x))
+          .append({truth.motion_x.pixels(), truth.motion_y.pixels()});
     if (truth.object != nullptr)
       array(objects_, "objects.npy", shape_of(*truth.object)).append({truth.object->pixels()});
   }
@@ -275,10 +276,10 @@ class FramesStream final : public RecordStream {
     }
     folder_->read(irradiance_, images_.irradiance);
     folder_->read(depth_, images_.depth);
-    folder_->read(flow_, images_.flow_x, images_.flow_y);
+    folder_->read(flow_, images_.field_x, images_.field_y);
     folder_->read(objects_, object_);
-    return &record_.emplace(TruthRecord{0, *t_, pose, images_.irradiance, images_.depth, images_.flow_x, images_.flow_y,
-                                        object_.empty() ? nullptr : &object_});
+    return &record_.emplace(TruthRecord{0, *t_, pose, images_.irradiance, images_.depth, images_.field_x,
+                                        images_.field_y, object_.empty() ? nullptr : &object_});
   }
 
  private:

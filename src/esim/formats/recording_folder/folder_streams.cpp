@@ -196,8 +196,8 @@ class TruthStream final : public RecordStream {
     }
     ++frame_;
     displacement_due_ = frame_ >= 2 && frame_ - 2 < truth_->displacements();
-    const auto& [T_world_camera, depth, flow_x, flow_y, object, T_world_objects] = images_of_frame_;
-    return &record_.emplace(TruthRecord{camera_, t, T_world_camera, irradiance, depth, flow_x, flow_y,
+    const auto& [T_world_camera, depth, motion_x, motion_y, object, T_world_objects] = images_of_frame_;
+    return &record_.emplace(TruthRecord{camera_, t, T_world_camera, irradiance, depth, motion_x, motion_y,
                                         object.empty() ? nullptr : &object, T_world_objects});
   }
 

@@ -124,12 +124,12 @@ std::unique_ptr<Sink> RecordingWriter::make_sink(Content content, const Record& 
   const auto& truth = std::get<TruthRecord>(record);
   Camera& model = info_.cameras[static_cast<std::size_t>(camera)].model;
   if (model.width == 0) {
-    const Image<float>& image = truth.depth.empty() ? truth.flow_x : truth.depth;
+    const Image<float>& image = truth.depth.empty() ? truth.motion_x : truth.depth;
     model.width = image.width(), model.height = image.height();
   }
   return std::make_unique<TruthHdf5Writer>(
       place / "truth.h5", camera,
-      TruthHdf5Options{!truth.depth.empty(), !truth.flow_x.empty(), options_.compression, truth.object != nullptr});
+      TruthHdf5Options{!truth.depth.empty(), !truth.motion_x.empty(), options_.compression, truth.object != nullptr});
 }
 
 void RecordingWriter::end(bool complete) {

@@ -175,8 +175,8 @@ void RosSink::put(const TruthRecord& record) {
     depth.header = of_camera;
     send(topic_of(camera, topic::kDepth), MessageType::image, record.t, depth);
   }
-  if (!record.flow_x.empty()) {
-    FlowMessage flow = to_message(record.flow_x, record.flow_y);
+  if (!record.motion_x.empty()) {
+    FlowMessage flow = to_message(record.motion_x, record.motion_y);
     flow.header = of_camera;
     send(topic_of(camera, topic::kFlow), MessageType::flow, record.t, flow);
   }

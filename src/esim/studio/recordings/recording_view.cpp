@@ -166,10 +166,10 @@ void RecordingView::open_truth(const fs::path& file, CameraView& camera) {
   for (std::uint64_t look = 0; look < kLooks; ++look) {
     camera.truth->read(look * (camera.truth->size() - 1) / (kLooks - 1), frame);
     if (!frame.depth.empty()) camera.depth_scale.include(frame.depth);
-    if (!frame.flow_x.empty()) camera.flow_scale.include(frame.flow_x, frame.flow_y);
+    if (!frame.motion_x.empty()) camera.flow_scale.include(frame.motion_x, frame.motion_y);
   }
   camera.depth = camera.depth_scale.near_m() > 0;
-  camera.flow = !frame.flow_x.empty();
+  camera.flow = !frame.motion_x.empty();
 }
 
 std::unique_ptr<RecordingView> RecordingView::beginning_of(const fs::path& path) {
@@ -230,7 +230,7 @@ std::optional<std::pair<Image<Rgb>, TimeNs>> RecordingView::truth_at(const Camer
   }
   return std::pair(kind == Kind::depth
                        ? colour_depth(frame.depth, camera.depth_scale.near_m(), camera.depth_scale.far_m())
-                       : colour_flow(frame.flow_x, frame.flow_y, camera.flow_scale.full_px_per_s()),
+                       : colour_flow(frame.motion_x, frame.motion_y, camera.flow_scale.full_px_per_s()),
                    times[index]);
 }
 

@@ -175,7 +175,7 @@ class Waypoints(ProgramTest):
         self.assertIn("drop a waypoint", result.stderr)
         self.assertRegex(result.stdout, r"\Atrajectory: {type: waypoints, file: walk.yaml}\nduration_s: \d+\.\d{3}\n\Z")
         self.assertTrue((self.folder / "walk.1.png").exists())
-        # Again, going on from there; the picture gets a name of its own.
+        # Continues from there; the image gets another name.
         self.assertEqual(run("waypoints", self.scenario, "--out", self.walk, "--append", "--keys", "w pu ").returncode, 0)
         self.assertEqual(self.points(), 4)
         self.assertTrue((self.folder / "walk.2.png").exists())

@@ -141,7 +141,7 @@ TEST(Motion, IsMeasuredOverTime) {
   const MotionCurve motion = measure_motion(world, spread_pixels(kWidth, kHeight, 20), 100);
   ASSERT_EQ(motion.mean_px_per_s.size(), 101U);
   EXPECT_NEAR(motion.mean_px_per_s[0], 50, 1e-4);
-  EXPECT_NEAR(motion.greatest_px_per_s, std::hypot(40, 40), 0.01);
+  EXPECT_NEAR(motion.max_px_per_s, std::hypot(40, 40), 0.01);
   EXPECT_EQ(motion.fastest_turn_deg_per_s, 0);
 }
 

@@ -187,12 +187,12 @@ TEST_P(RosFormats, FramesOfVideosAreIrradiance) {
 }
 
 TEST_P(RosFormats, TimesThatRosCannotHoldAreRefused) {
-  const TimeNs most = (is_bag() ? std::numeric_limits<std::uint32_t>::max()
-                                : static_cast<TimeNs>(std::numeric_limits<std::int32_t>::max())) *
-                          kNsPerSecond +
-                      999'999'999;
+  const TimeNs max = (is_bag() ? std::numeric_limits<std::uint32_t>::max()
+                               : static_cast<TimeNs>(std::numeric_limits<std::int32_t>::max())) *
+                         kNsPerSecond +
+                     999'999'999;
   const RecordingInfo info = test::recording_info(4, 4, 0, 1);
-  for (const TimeNs t : {TimeNs{-1}, most + 1}) {
+  for (const TimeNs t : {TimeNs{-1}, max + 1}) {
     const auto sink = format_.create(path(), {});
     sink->begin(info);
     const std::vector<Event> events{{t, 1, 1, 1}};
@@ -200,7 +200,7 @@ TEST_P(RosFormats, TimesThatRosCannotHoldAreRefused) {
     EXPECT_TRUE(test::contains(message, path().string()) && test::contains(message, "does not fit")) << message;
     EXPECT_THROW(sink->write(pose_at(t)), UserError);
   }
-  const std::vector<Event> last{{most, 1, 1, 1}};
+  const std::vector<Event> last{{max, 1, 1, 1}};
   test::record(*format_.create(path(), {}), info, last);
   EXPECT_EQ(test::read_back(path()).events[0], last);
 }

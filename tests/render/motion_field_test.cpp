@@ -49,7 +49,7 @@ TEST_P(MotionField, IsTheVelocityOfTheImageOfAPointOfWhateverIsSeen) {
   motion_field(rays, relative_twists(request), request.tiles[0], sample);
 
   constexpr double kStep = 1e-4;
-  double greatest_dynamic = 0;
+  double max_dynamic = 0;
   for (int y = 0; y < model.height; y += 3) {
     for (int x = 0; x < model.width; ++x) {
       const Eigen::Vector3d bearing = model.back_project(Eigen::Vector2d(x, y))->bearing;
@@ -64,10 +64,10 @@ TEST_P(MotionField, IsTheVelocityOfTheImageOfAPointOfWhateverIsSeen) {
       const Eigen::Vector2d expected = (image_of_it(kStep) - image_of_it(-kStep)) / (2 * kStep);
       const Eigen::Vector2d actual(sample.motion_x(x, y), sample.motion_y(x, y));
       ASSERT_LT((actual - expected).norm(), 0.02 + 2e-4 * expected.norm()) << x << ", " << y << ", object " << seen;
-      if (seen != 0) greatest_dynamic = std::max(greatest_dynamic, expected.norm());
+      if (seen != 0) max_dynamic = std::max(max_dynamic, expected.norm());
     }
   }
-  EXPECT_GT(greatest_dynamic, 300) << "the test's objects should move";
+  EXPECT_GT(max_dynamic, 300) << "the test's objects should move";
 }
 
 INSTANTIATE_TEST_SUITE_P(Distortions, MotionField, testing::Range(0, 4));

@@ -50,7 +50,7 @@ Sample half_plane_seen(double angle, double offset, int rays) {
 }
 
 /// The fraction of a pixel that the half-plane leaves white, by a fine grid.
-double white_share(double x, double y, double angle, double offset) {
+double white_fraction(double x, double y, double angle, double offset) {
   constexpr int kGrid = 40;
   int white = 0;
   for (int i = 0; i < kGrid * kGrid; ++i) {
@@ -70,7 +70,7 @@ TEST(RaycastRenderer, APixelOnAnEdgeIsTheMeanOverItsArea) {
       int between = 0;
       for (int y = 0; y < model.height; ++y) {
         for (int x = 0; x < model.width; ++x) {
-          const double expected = white_share(x - model.cx, y - model.cy, angle, offset);
+          const double expected = white_fraction(x - model.cx, y - model.cy, angle, offset);
           const double error = sample.irradiance(x, y) - expected;
           EXPECT_NEAR(error, 0, worst) << x << ", " << y << " at " << angle;
           if (expected > 0.01 && expected < 0.99) squares += error * error, ++between;

@@ -275,16 +275,16 @@ TEST(SpritesRenderer, SaysWhoseMotionEachPixelHas) {
   bool uncovered = false;
   for (int y = 0; y < model.height; ++y) {
     for (int x = 0; x < model.width; ++x) {
-      const Sample& layer = alone[found.object(x, y) - 1];
-      ASSERT_EQ(found.motion_x(x, y), layer.motion_x(x, y)) << x << ", " << y;
+      const Sample& sprite = alone[found.object(x, y) - 1];
+      ASSERT_EQ(found.motion_x(x, y), sprite.motion_x(x, y)) << x << ", " << y;
       uncovered = uncovered || alone[0].object(x, y) == 0;
     }
   }
-  EXPECT_TRUE(uncovered) << "0 outside the only layer";
+  EXPECT_TRUE(uncovered) << "0 outside the only sprite";
 }
 
 TEST(PlaneRenderer, ShowsEachPointWhereItIs) {
-  const Poster poster = test::test_poster();
+  const TexturedPlane plane = test::test_plane();
   for (int kind = 0; kind < 4; ++kind) {
     const Camera model = test::distorted_camera(kind);
     const Kinematics camera = test::moving_camera();
@@ -292,8 +292,8 @@ TEST(PlaneRenderer, ShowsEachPointWhereItIs) {
     for (int y = 0; y < model.height; y += 7) {
       for (int x = 0; x < model.width; x += 7) {
         const Eigen::Vector3d bearing = model.back_project(Eigen::Vector2d(x, y))->bearing;
-        const SE3 T_poster_camera = poster.T_world_poster.inverse() * camera.T_world_body;
-        const Eigen::Vector3d o = T_poster_camera.translation, d = T_poster_camera.rotation * bearing;
+        const SE3 T_plane_camera = plane.T_world_plane.inverse() * camera.T_world_body;
+        const Eigen::Vector3d o = T_plane_camera.translation, d = T_plane_camera.rotation * bearing;
         const double depth = -o.z() / d.z();
         const Eigen::Vector3d point = o + depth * d;
         EXPECT_NEAR(sample.depth(x, y), depth, 1e-5 * depth);
@@ -303,12 +303,12 @@ TEST(PlaneRenderer, ShowsEachPointWhereItIs) {
   }
 }
 
-TEST(PlaneRenderer, ShowsTheBackgroundBesideThePosterAndBehindTheCamera) {
-  Poster poster = test::test_poster();
-  poster.endless = false;
-  poster.width_m = 0.1;
+TEST(PlaneRenderer, ShowsTheBackgroundBesideThePlaneAndBehindTheCamera) {
+  TexturedPlane plane = test::test_plane();
+  plane.endless = false;
+  plane.width_m = 0.1;
   const Camera model = test::distorted_camera(0);
-  const auto renderer = make_plane_renderer(poster, model, test::two_threads());
+  const auto renderer = make_plane_renderer(plane, model, test::two_threads());
   Sample sample = test::render(*renderer, model, test::moving_camera());
   EXPECT_EQ(sample.irradiance(0, 0), 0.2F);
   EXPECT_TRUE(std::isinf(sample.depth(0, 0)));

@@ -178,7 +178,7 @@ TEST(Player, ShowsAllThatGroundTruthTells) {
   };
   EXPECT_EQ(middle_of(View::image), (Rgb{255, 255, 255}));  // the frame, not the ground truth
   EXPECT_EQ(middle_of(View::depth), colour_depth(3, found.depth.near_m(), found.depth.far_m()));
-  EXPECT_EQ(middle_of(View::motion), colour_flow(50, 0, found.motion.full_px_per_s()));
+  EXPECT_EQ(middle_of(View::motion), colour_motion(50, 0, found.motion.full_px_per_s()));
 }
 
 TEST(Player, OneEventAndExtremeSensors) {

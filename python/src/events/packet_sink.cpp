@@ -128,17 +128,17 @@ void PacketSink::write(const TruthRecord& record) {
   append_matrix(record.T_world_camera, camera.poses);
   append(record.irradiance, camera.irradiance);
   append(record.depth, camera.depth);
-  append(record.motion_x, camera.flow);
-  append(record.motion_y, camera.flow);
+  append(record.motion_x, camera.motion_field);
+  append(record.motion_y, camera.motion_field);
   if (record.object != nullptr) append(*record.object, camera.object);
 }
 
-void PacketSink::write(const DisplacementRecord& record) {
+void PacketSink::write(const OpticalFlowRecord& record) {
   require_size(record.x, record.camera, record.t1);
   CameraPart& camera = part(record.camera, record.t1);
-  camera.displacement_span.insert(camera.displacement_span.end(), {record.t0, record.t1});
-  append(record.x, camera.displacement);
-  append(record.y, camera.displacement);
+  camera.optical_flow_span.insert(camera.optical_flow_span.end(), {record.t0, record.t1});
+  append(record.x, camera.optical_flow);
+  append(record.y, camera.optical_flow);
   append(record.visible, camera.visible);
 }
 

@@ -49,7 +49,7 @@ MotionCurve measure_motion(const World& world, const std::vector<PixelPosition>&
       if (!std::isfinite(speed)) continue;
       sum += speed;
       ++counted;
-      motion.greatest_px_per_s = std::max(motion.greatest_px_per_s, speed);
+      motion.max_px_per_s = std::max(motion.max_px_per_s, speed);
     }
     motion.mean_px_per_s.push_back(counted > 0 ? sum / counted : 0.0);
     motion.fastest_turn_deg_per_s =

@@ -17,7 +17,7 @@ class DepthScale {
 };
 
 /// The speed with the most saturated colour in the preview: a round number that never decreases.
-class FlowScale {
+class MotionScale {
  public:
   void include(const Image<float>& motion_x, const Image<float>& motion_y);
 

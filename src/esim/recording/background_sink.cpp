@@ -49,14 +49,14 @@ Copy copy_of(const TruthRecord& record) {
       4 * record.irradiance.size() * sizeof(float)};
 }
 
-Copy copy_of(const DisplacementRecord& record) {
+Copy copy_of(const OpticalFlowRecord& record) {
   struct Images {
     Image<float> x, y;
     Image<std::uint8_t> visible;
   };
   auto images = std::make_shared<const Images>(Images{record.x, record.y, record.visible});
   return {[camera = record.camera, t0 = record.t0, t1 = record.t1, images](Sink& sink) {
-            sink.write(DisplacementRecord{camera, t0, t1, images->x, images->y, images->visible});
+            sink.write(OpticalFlowRecord{camera, t0, t1, images->x, images->y, images->visible});
           },
           2 * record.x.size() * sizeof(float)};
 }

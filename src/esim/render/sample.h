@@ -23,7 +23,7 @@ struct Sample {
   // and for panorama and plane, which have no edges.
   Image<float> narrow;
 
-  // The visible moving object: 0 for none, i + 1 for the i-th of the request, or of the layers drawn on the sensor.
+  // The visible moving object: 0 for none, i + 1 for the i-th of the request, or of the sprites drawn on the sensor.
   // Computed by the renderer; empty unless the request wants_objects().
   Image<std::uint16_t> object;
 

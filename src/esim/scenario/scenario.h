@@ -15,7 +15,7 @@
 #include "esim/sampling/options.h"
 #include "esim/scenario/pose_options.h"
 #include "esim/scene/engine_images.h"
-#include "esim/scene/layer.h"
+#include "esim/scene/sprite.h"
 
 namespace esim::inline scenario {
 
@@ -148,15 +148,15 @@ struct PlaneRendererOptions {
 };
 
 /// A sprite: an image that moves over the sensor.
-struct LayerOptions {
+struct SpriteOptions {
   std::filesystem::path image;
-  LayerUnits units = LayerUnits::pixel;
-  LayerBeyond beyond = LayerBeyond::nothing;
+  SpriteUnits units = SpriteUnits::pixel;
+  SpriteBeyond beyond = SpriteBeyond::nothing;
   int median_px = 0;
   double gaussian_px = 0;
   Eigen::Vector2d pivot{0.5, 0.5};
-  KeyframeInterpolation interpolation = KeyframeInterpolation::spline;
-  std::vector<LayerKeyframe> keyframes{LayerKeyframe{}};  // at rest in the middle
+  SpriteInterpolation interpolation = SpriteInterpolation::spline;
+  std::vector<SpritePose> poses{SpritePose{}};  // at rest in the middle
 };
 
 /// Sprites on the sensor. If `scene` is given, they come from that file.
@@ -164,7 +164,7 @@ struct SpritesRendererOptions {
   static constexpr const char* kType = "sprites";
   std::filesystem::path scene;
   std::vector<std::filesystem::path> search_path;
-  std::vector<LayerOptions> layers;
+  std::vector<SpriteOptions> sprites;
   double background = 0.2;
 };
 
@@ -263,8 +263,8 @@ struct TruthOptions {
   double rate_hz = 30;
   bool images = true;
   bool depth = true;
-  bool flow = true;
-  bool displacement = false;
+  bool motion_field = true;
+  bool optical_flow = false;
   bool objects = false;
   bool event_points = false;
   double pose_rate_hz = 200;
@@ -293,6 +293,9 @@ struct Scenario {
   std::optional<RigImuOptions> imu;
   TruthOptions truth;
   OutputOptions output;
+
+  /// What users should know about the text from which the scenario was read: options that have other names now.
+  std::vector<std::string> notices{};
 };
 
 }  // namespace esim::inline scenario

@@ -147,7 +147,7 @@ void describe(Visitor& visit, PlaneRendererOptions& o) {
 }
 
 template <class Visitor>
-void describe(Visitor& visit, LayerKeyframe& o) {
+void describe(Visitor& visit, SpritePose& o) {
   visit("t_s", o.t_s,
         About{"time on the trajectory's clock, which starts at 0 unless the trajectory is a file", "s", -1e8, 1e8});
   visit("position", o.position,
@@ -161,32 +161,31 @@ void describe(Visitor& visit, LayerKeyframe& o) {
 }
 
 template <class Visitor>
-void describe(Visitor& visit, LayerOptions& o) {
+void describe(Visitor& visit, SpriteOptions& o) {
   visit("image", o.image, About{"image file, with or without alpha"});
   visit("units", o.units,
         About{"unit of positions. pixel: at scale 1, a texel is a pixel; sensor: at scale 1, the image fills the "
               "sensor, whose width and height are 1"});
   visit("beyond", o.beyond, About{"what lies beyond the image's edges"});
   describe_softening(visit, o);
+  visit("pivot", o.pivot,
+        About{"point of the image that the poses place: [0, 0] is its upper left corner, [1, 1] its lower right corner",
+              "", -1e3, 1e3});
+  visit("interpolation", o.interpolation, About{"motion between poses: natural cubic splines, or linear"});
   visit(
-      "pivot", o.pivot,
-      About{
-          "point of the image that the keyframes place: [0, 0] is its upper left corner, [1, 1] its lower right corner",
-          "", -1e3, 1e3});
-  visit("interpolation", o.interpolation, About{"motion between keyframes: natural cubic splines, or linear"});
-  visit(
-      "keyframes", o.keyframes,
+      "poses", o.poses,
       About{
           "in order of time; before the first and after the last, the sprite rests (default: it rests in the middle)"});
 }
 
 template <class Visitor>
 void describe(Visitor& visit, SpritesRendererOptions& o) {
-  visit("scene", o.scene,
-        About{"instead of layers: a .scene file of the original ESIM; it also gives the duration and the camera's size "
-              "if the scenario does not"});
+  visit(
+      "scene", o.scene,
+      About{"instead of sprites: a .scene file of the original ESIM; it also gives the duration and the camera's size "
+            "if the scenario does not"});
   visit("search_path", o.search_path, About{"folders in which esim looks for the scene file's images"});
-  visit("layers", o.layers, About{"sprites on the sensor, the nearest first"});
+  visit("sprites", o.sprites, About{"sprites on the sensor, the nearest first"});
   visit("background", o.background, About{"irradiance where no sprite lies", "", 0, 1e6});
 }
 
@@ -303,8 +302,8 @@ void describe(Visitor& visit, TruthOptions& o) {
   visit("rate_hz", o.rate_hz, About{"ground-truth frames per second; 0: no frames", "Hz", 0, 1e6});
   visit("images", o.images, About{"write images/, 8-bit sRGB"});
   visit("depth", o.depth, About{"write depth to truth.h5"});
-  visit("flow", o.flow, About{"write the motion field to truth.h5"});
-  visit("displacement", o.displacement,
+  visit("motion_field", o.motion_field, About{"write the motion field to truth.h5"});
+  visit("optical_flow", o.optical_flow,
         About{"write optical flow (px) from each frame to the next to truth.h5, with occlusions"});
   visit("objects", o.objects,
         About{"write the index of the moving object, or of the sprite, that each pixel sees to truth.h5"});
@@ -328,7 +327,7 @@ void describe(Visitor& visit, Scenario& o) {
   visit("seed", o.seed, About{"seed of all random numbers"});
   visit("start_s", o.start_s, About{"start of the simulation, after the trajectory's start", "s", 0, 1e9});
   visit("duration_s", o.duration_s,
-        About{"duration of the simulation (default: until the trajectory, or the sprites' keyframes, end)", "s", 0, 1e9,
+        About{"duration of the simulation (default: until the trajectory, or the sprites' poses, end)", "s", 0, 1e9,
               true});
   visit("renderer", o.renderer, About{"what the cameras see"});
   visit("trajectory", o.trajectory, About{"how the body moves"});
@@ -342,11 +341,11 @@ void describe(Visitor& visit, Scenario& o) {
 namespace esim {
 
 template <>
-inline constexpr std::array<const char*, 2> kEnumNames<LayerUnits>{"pixel", "sensor"};
+inline constexpr std::array<const char*, 2> kEnumNames<SpriteUnits>{"pixel", "sensor"};
 template <>
-inline constexpr std::array<const char*, 4> kEnumNames<LayerBeyond>{"nothing", "clamp", "mirror", "repeat"};
+inline constexpr std::array<const char*, 4> kEnumNames<SpriteBeyond>{"nothing", "clamp", "mirror", "repeat"};
 template <>
-inline constexpr std::array<const char*, 2> kEnumNames<KeyframeInterpolation>{"spline", "linear"};
+inline constexpr std::array<const char*, 2> kEnumNames<SpriteInterpolation>{"spline", "linear"};
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<MeshEngine>{"raycast", "gl", "auto"};
 template <>

@@ -202,18 +202,18 @@ class Simulator::Run {
       request.which_objects = world_.truth_objects;
       object_poses_.clear();
       for (const Kinematics& object : request.objects) object_poses_.push_back(object.T_world_body);
-      const Displacement* displacement = nullptr;
+      const OpticalFlowImages* optical_flow = nullptr;
       {
         Stopwatch stopwatch(summary_.seconds.truth);
         world_.cameras[i].renderer->render(request, truth_);
-        if (world_.cameras[i].displacement) displacement = world_.cameras[i].displacement->advance(request, truth_);
+        if (world_.cameras[i].optical_flow) optical_flow = world_.cameras[i].optical_flow->advance(request, truth_);
       }
       write(TruthRecord{static_cast<int>(i), t, request.camera.T_world_body, truth_.irradiance, truth_.depth,
                         truth_.motion_x, truth_.motion_y, world_.truth_objects ? &truth_.object : nullptr,
                         object_poses_});
-      if (displacement != nullptr) {
-        write(DisplacementRecord{static_cast<int>(i), displacement->t0, displacement->t1, displacement->x,
-                                 displacement->y, displacement->visible});
+      if (optical_flow != nullptr) {
+        write(OpticalFlowRecord{static_cast<int>(i), optical_flow->t0, optical_flow->t1, optical_flow->x,
+                                optical_flow->y, optical_flow->visible});
       }
       ++summary_.truth_frames;
     }

@@ -7,9 +7,9 @@
 namespace esim::inline visualise {
 namespace {
 
-constexpr double kMostSeconds = 1e9;  // limit of given times, so that sums stay in range
+constexpr double kMaxSeconds = 1e9;  // limit of given times, so that sums stay in range
 
-TimeNs bounded_ns(double seconds) { return to_ns(std::clamp(seconds, 0.0, kMostSeconds)); }
+TimeNs bounded_ns(double seconds) { return to_ns(std::clamp(seconds, 0.0, kMaxSeconds)); }
 
 }  // namespace
 

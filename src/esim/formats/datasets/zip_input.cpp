@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kBlockBytes = 1 << 16;
-constexpr std::uint64_t kMostDirectoryBytes = std::uint64_t{1} << 28;
+constexpr std::uint64_t kMaxDirectoryBytes = std::uint64_t{1} << 28;
 constexpr std::uint64_t kFarthestEnd = zip::kEndBytes + 65535;  // bytes; the end record with its longest comment
 
 std::string_view text(std::span<const std::byte> bytes) {
@@ -113,8 +113,8 @@ class EntryBuffer final : public std::streambuf {
   }
 
   /// Empty at the end.
-  std::span<const std::byte> next_packed(std::size_t most) {
-    const auto bytes = file_.read(static_cast<std::size_t>(std::min<std::uint64_t>(most, left_)));
+  std::span<const std::byte> next_packed(std::size_t max) {
+    const auto bytes = file_.read(static_cast<std::size_t>(std::min<std::uint64_t>(max, left_)));
     if (bytes.empty() && left_ > 0) file_.fail(file_.offset(), "the zip ends within a file that it contains");
     left_ -= bytes.size();
     ended_ = left_ == 0 && entry_.method == zip::kStored;
@@ -206,7 +206,7 @@ ZipInput::Directory ZipInput::find_directory() {
 
 void ZipInput::read_directory() {
   const Directory directory = find_directory();
-  if (directory.bytes > kMostDirectoryBytes || directory.offset > file_.size()) {
+  if (directory.bytes > kMaxDirectoryBytes || directory.offset > file_.size()) {
     file_.fail(file_.size(), "the list of files in the zip is damaged");
   }
   file_.seek(directory.offset);
@@ -220,7 +220,7 @@ void ZipInput::read_directory() {
                       comment_bytes = zip::get<std::uint16_t>(head, 32);
     const std::string rest(text(file_.read_exactly(name_bytes + extra_bytes + comment_bytes, "the list of files")));
     take_extra(std::string_view(rest).substr(name_bytes, extra_bytes), entry);
-    if (file_.offset() - directory.offset > kMostDirectoryBytes) file_.fail(offset, "the list of files is too long");
+    if (file_.offset() - directory.offset > kMaxDirectoryBytes) file_.fail(offset, "the list of files is too long");
     if (entry.offset >= file_.size()) file_.fail(offset, "a file in the zip starts after the end of the zip");
     entries_.emplace(rest.substr(0, name_bytes), entry);
   }

@@ -88,7 +88,7 @@ Format flo_format() {
   return {
       .name = "flo",
       .description = "a folder of Middlebury .flo files: optical flow from frame to frame",
-      .holds = {Content::truth, Content::displacement},
+      .holds = {Content::truth, Content::optical_flow},
       .folder = true,
       .recognises = [](const auto& path, std::string_view) { return lists_files(path, ".flo"); },
       .open =

@@ -12,7 +12,7 @@
 namespace esim::inline formats {
 
 // Formats of ground truth with one file per frame in a folder: one camera, without poses. Their readers give optical
-// flow as DisplacementRecord, visible where it is known, and everything else as TruthRecord.
+// flow as OpticalFlowRecord, visible where it is known, and everything else as TruthRecord.
 
 /// `flo`: optical flow from frame to frame, in the format of the Middlebury benchmark.
 Format flo_format();
@@ -66,11 +66,11 @@ struct FileSequence {
   /// Reads a file; throws UserError if it is damaged.
   std::function<void(const std::filesystem::path& file, SequenceImages& images)> read{};
 
-  bool displacements = false;  ///< the flow is optical flow, px, from the span's start to its end; NaN: unknown
+  bool optical_flows = false;  ///< the flow is optical flow, px, from the span's start to its end; NaN: unknown
 };
 
 /// The files that a folder's timestamps.txt lists.
-FileSequence listed_files(const std::filesystem::path& folder, bool displacements);
+FileSequence listed_files(const std::filesystem::path& folder, bool optical_flows);
 
 /// Sequences of one camera as a recording. All images have the first one's size.
 std::unique_ptr<Source> open_sequences(std::vector<FileSequence> sequences, const ReadOptions& options);

@@ -169,7 +169,7 @@ Format kitti_format() {
   return {
       .name = "kitti",
       .description = "folders flow/ and depth/ of 16-bit PNG files, as in KITTI",
-      .holds = {Content::truth, Content::displacement},
+      .holds = {Content::truth, Content::optical_flow},
       .folder = true,
       .recognises =
           [](const auto& path, std::string_view) {
@@ -198,7 +198,7 @@ Format dsec_flow_format() {
   return {
       .name = "dsec-flow",
       .description = "DSEC's folder of optical flow: 16-bit PNG files in forward/, forward_timestamps.txt",
-      .holds = {Content::truth, Content::displacement},
+      .holds = {Content::truth, Content::optical_flow},
       .folder = true,
       .recognises =
           [](const auto& path, std::string_view) {

@@ -38,7 +38,7 @@ class RosSink final : public Sink {
   void put_irradiance(int camera, TimeNs t, const Image<float>& irradiance);
   void put(const PoseRecord& record);
   void put(const ImuRecord& record);
-  void put(const DisplacementRecord&) {}
+  void put(const OpticalFlowRecord&) {}
   void put(const EventPointsRecord&) {}
   void put(const TriggerRecord&) {}
 
@@ -67,11 +67,11 @@ class RosSink final : public Sink {
 };
 
 TimeNs RosSink::checked(TimeNs t) const {
-  const TimeNs most = encoding_ == Encoding::cdr ? std::numeric_limits<std::int32_t>::max()
-                                                 : std::numeric_limits<std::uint32_t>::max();  // s
-  if (t >= 0 && t / kNsPerSecond <= most) return t;
+  const TimeNs max = encoding_ == Encoding::cdr ? std::numeric_limits<std::int32_t>::max()
+                                                : std::numeric_limits<std::uint32_t>::max();  // s
+  if (t >= 0 && t / kNsPerSecond <= max) return t;
   throw UserError(fmt::format("cannot write {}: the time {} s does not fit: ROS holds times from 0 to {} s",
-                              path_.string(), to_seconds(t), most));
+                              path_.string(), to_seconds(t), max));
 }
 
 template <typename T>

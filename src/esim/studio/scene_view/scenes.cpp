@@ -13,7 +13,7 @@ namespace {
 
 const Notices kSilent{[](const std::string&) {}, [](const std::string&) {}};
 
-constexpr std::size_t kMostScenes = 3;
+constexpr std::size_t kMaxScenes = 3;
 constexpr int kLongestPicture = 4096;
 constexpr int kFiner = 2;  // even: see ScenePictures::render()
 
@@ -41,7 +41,7 @@ std::string key_of(const RendererOptions& renderer) {
     void operator()(PanoramaRendererOptions& panorama) const { files += stamp_of(panorama.image); }
     void operator()(PlaneRendererOptions& plane) const { files += stamp_of(plane.image); }
     void operator()(SpritesRendererOptions& sprites) const {
-      for (const LayerOptions& layer : sprites.layers) files += stamp_of(layer.image);
+      for (const SpriteOptions& sprite : sprites.sprites) files += stamp_of(sprite.image);
     }
     void operator()(UnrealcvRendererOptions&) const {}
     void operator()(BlenderRendererOptions&) const {}
@@ -71,7 +71,7 @@ StudioScene::StudioScene(const Scenario& scenario, std::string id, int threads)
       file_(load_scenes(scenario, SceneLook::coded, kSilent)) {
   if (fails_when_made(scenario.renderer)) pictures();
   if (std::holds_alternative<MeshRendererOptions>(scenario.renderer)) {
-    if (triangles() <= kMostTriangles) glb_ = make_glb(file_.scene, Workers(threads));
+    if (triangles() <= kMaxTriangles) glb_ = make_glb(file_.scene, Workers(threads));
     return;
   }
   const auto show = [&](const std::filesystem::path& image, const Softening& softening) {
@@ -123,7 +123,7 @@ std::shared_ptr<StudioScene> SceneStore::of(const Scenario& scenario) {
   auto scene = std::make_shared<StudioScene>(scenario, id, threads_);
   scenes_[id] = scene;
   order_.push_back(id);
-  if (order_.size() > kMostScenes) {
+  if (order_.size() > kMaxScenes) {
     scenes_.erase(order_.front());
     order_.erase(order_.begin());
   }

@@ -42,7 +42,7 @@ class Session:
         self.client.receive()
 
     def seconds(self):
-        """(renderings, seconds in Blender with writing its file, seconds of the server beside)."""
+        """(renderings, seconds in Blender including writing its file, other seconds of the server)."""
         found = re.search(r"(\d+) renderings in ([\d.]+) s, ([\d.]+) s beside", self.client.text("vget /unrealcv/status"))
         return int(found[1]), float(found[2]), float(found[3])
 

@@ -138,7 +138,7 @@ class Calibration:
         _, (a, b, d) = self._distort(x, y)
         return np.stack([self.fx * (a * moved_x + b * moved_y), self.fy * (b * moved_x + d * moved_y)])
 
-    def displacement(self, R_C0_C1):
+    def optical_flow(self, R_C0_C1):
         """Optical flow from t0 to t1: float64 (2, height, width), px.
 
         R_C0_C1 maps from the camera's frame at t1 to its frame at t0.

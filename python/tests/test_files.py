@@ -117,7 +117,7 @@ def test_what_is_refused(tmp_path):
             esim.EventsIterator(tmp_path, **arguments)
 
 
-def test_a_damaged_file_names_the_place_after_what_is_whole(file):
+def test_a_damaged_file_names_the_place_of_the_damage(file):
     path, events = file
     text = path.read_text().splitlines()
     text[4000] = "rubbish"

@@ -385,7 +385,7 @@ TEST(EventCamera, RefusesAFrameAndGoesOnAsIfItHadNotBeen) {
   }
 }
 
-TEST(EventCamera, KeepsWhatCameBeforeABadSegment) {
+TEST(EventCamera, KeepsEventsBeforeABadSegment) {
   Feed feed({}, 40, 3);
   feed.frame(Image<float>(40, 3, 0.1F), 0);
   feed.frame(Image<float>(40, 3, 0.9F), kNsPerMs);

@@ -170,7 +170,7 @@ TEST(DatasetLayout, AnImageThatClaimsToBeHugeTakesNoMemory) {
   EXPECT_TRUE(test::contains(problem_of(folder), "not a PNG, or it is damaged"));
 }
 
-TEST(DatasetLayout, ACutZipIsToldAsThat) {
+TEST(DatasetLayout, ReportsATruncatedZip) {
   const test::TemporaryDirectory base;
   const fs::path path = base.path() / "a.zip";
   const auto frame = test::gradient_frame(0, 0, 64, 48, 8, 1);

@@ -50,7 +50,7 @@ Sample half_plane_seen(double angle, double offset, int rays) {
 }
 
 /// The fraction of a pixel that the half-plane leaves white, by a fine grid.
-double white_share(double x, double y, double angle, double offset) {
+double white_fraction(double x, double y, double angle, double offset) {
   constexpr int kGrid = 40;
   int white = 0;
   for (int i = 0; i < kGrid * kGrid; ++i) {
@@ -70,7 +70,7 @@ TEST(RaycastRenderer, APixelOnAnEdgeIsTheMeanOverItsArea) {
       int between = 0;
       for (int y = 0; y < model.height; ++y) {
         for (int x = 0; x < model.width; ++x) {
-          const double expected = white_share(x - model.cx, y - model.cy, angle, offset);
+          const double expected = white_fraction(x - model.cx, y - model.cy, angle, offset);
           const double error = sample.irradiance(x, y) - expected;
           EXPECT_NEAR(error, 0, worst) << x << ", " << y << " at " << angle;
           if (expected > 0.01 && expected < 0.99) squares += error * error, ++between;
@@ -259,7 +259,7 @@ TEST(RaycastRenderer, ShowsAMovingMeshAsTheSameMeshAtRestThere) {
   for (std::size_t i = 0; i < sample.depth.size(); ++i) {
     ASSERT_NEAR(sample.depth.pixels()[i], expected.depth.pixels()[i], 1e-4);
     differ += std::fabs(sample.irradiance.pixels()[i] - expected.irradiance.pixels()[i]) > 2e-3F ? 1 : 0;
-    ASSERT_NEAR(sample.flow_x.pixels()[i], expected.flow_x.pixels()[i], 0.05);
+    ASSERT_NEAR(sample.motion_x.pixels()[i], expected.motion_x.pixels()[i], 0.05);
   }
   EXPECT_LT(differ, 20) << "but at the box's edges";
 }
@@ -271,7 +271,7 @@ TEST(RaycastRenderer, StaysFiniteWhenAnObjectPassesThroughTheCamera) {
     Kinematics square = at_distance(distance);
     square.velocity_world = {0.1, 0, -1};
     const Sample sample = render_scene(scene, {square});
-    for (const float v : sample.flow_x.pixels()) ASSERT_TRUE(std::isfinite(v));
+    for (const float v : sample.motion_x.pixels()) ASSERT_TRUE(std::isfinite(v));
     for (const float z : sample.depth.pixels()) ASSERT_GT(z, 0.0F);
     EXPECT_EQ(sample.object(60, 45), distance > 5e-3 ? 1 : 0) << "in front of the lens or not";
   }

@@ -67,7 +67,7 @@ inline Mesh box_mesh() {
 }
 
 /// The plane of make_renderer("plane"): 5 m wide, 2 m in front of the world's origin along x, slightly tilted.
-inline Poster test_poster() {
+inline TexturedPlane test_plane() {
   SE3 pose;
   pose.translation = {2.0, 0.1, -0.05};
   Eigen::Matrix3d R;
@@ -77,18 +77,16 @@ inline Poster test_poster() {
   return {smooth_texture(Wrap::repeat, Wrap::repeat), pose, 5.0, true, 0.2F};
 }
 
-/// The layers of make_renderer("sprites"): a rectangle that rotates and grows in front of an image that fills the
+/// The sprites of make_renderer("sprites"): a rectangle that rotates and grows in front of an image that fills the
 /// sensor.
 inline SpriteScene test_sprites() {
   const auto texture = smooth_texture(Wrap::clamp, Wrap::clamp);
-  const auto spline = [](std::vector<LayerKeyframe> keyframes) {
-    return LayerMotion(keyframes, KeyframeInterpolation::spline);
-  };
+  const auto spline = [](std::vector<SpritePose> poses) { return SpriteMotion(poses, SpriteInterpolation::spline); };
   Sprite near{
-      texture, nullptr, LayerUnits::pixel, LayerBeyond::nothing,
+      texture, nullptr, SpriteUnits::pixel, SpriteBeyond::nothing,
       spline({{-1, {-60, -20}, -70, {0.04, 0.08}}, {0.1, {5, 3}, 12, {0.06, 0.1}}, {1, {70, 10}, 80, {0.1, 0.1}}})};
   Sprite far{
-      texture, nullptr, LayerUnits::sensor, LayerBeyond::mirror,
+      texture, nullptr, SpriteUnits::sensor, SpriteBeyond::mirror,
       spline({{-1, {-0.3, 0.2}, 20, {1.5, 2.1}}, {0, {0.05, 0.1}, 5, {1.6, 2}}, {1, {0.4, 0.1}, -20, {1.9, 2}}})};
   return {{near, far}, 0.2F};
 }
@@ -166,7 +164,7 @@ inline constexpr std::array kRenderersOnSensor = {"sprites"};
 inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Camera& camera,
                                                const Workers& workers = two_threads()) {
   if (name == "panorama") return make_panorama_renderer({smooth_texture(Wrap::repeat, Wrap::clamp)}, camera, workers);
-  if (name == "plane") return make_plane_renderer(test_poster(), camera, workers);
+  if (name == "plane") return make_plane_renderer(test_plane(), camera, workers);
   if (name == "sprites") return make_sprites_renderer(test_sprites(), camera, workers);
   const Scene scene = name.starts_with("moving") ? moving_scene() : still_scene(box_mesh());
   if (name.ends_with("gl")) return make_gl_renderer(scene, {}, camera);

@@ -79,7 +79,7 @@ void evaluate(const TilesAt& wanted, const Movie& movie, Sample& sample) {
     for (int y = tile.y; y < tile.y + tile.height; ++y) {
       for (int x = tile.x; x < tile.x + tile.width; ++x) {
         sample.irradiance(x, y) = static_cast<float>(std::exp(movie.brightness(x, y, t)) - kEps);
-        sample.flow_x(x, y) = static_cast<float>(movie.speed(x, y, t)), sample.flow_y(x, y) = 0;
+        sample.motion_x(x, y) = static_cast<float>(movie.speed(x, y, t)), sample.motion_y(x, y) = 0;
       }
     }
   }

@@ -24,8 +24,8 @@ Sample moving_ramp(TimeNs t, float gradient, float vx, float vy, double log_eps,
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       sample.irradiance(x, y) = static_cast<float>(std::exp(gradient * static_cast<float>(x - kWidth)) - log_eps);
-      sample.flow_x(x, y) = vx;
-      sample.flow_y(x, y) = vy;
+      sample.motion_x(x, y) = vx;
+      sample.motion_y(x, y) = vy;
     }
   }
   return sample;
@@ -117,15 +117,15 @@ TEST(FrameSampler, HandsOutWhatWasRendered) {
 TEST(FlowSampling, BoundsTheMotionBetweenSamples) {
   Sample sample = moving_ramp(0, 0.1F, 30.0F, -40.0F, 0.001);
   EXPECT_NEAR(fastest_motion_px_per_s(sample, kWorkers), 50.0, 1e-4);
-  sample.flow_x(kWidth - 1, kHeight - 1) = 300.0F;
-  sample.flow_y(kWidth - 1, kHeight - 1) = 400.0F;
+  sample.motion_x(kWidth - 1, kHeight - 1) = 300.0F;
+  sample.motion_y(kWidth - 1, kHeight - 1) = 400.0F;
   EXPECT_NEAR(wanted_interval_s(FlowSampling{.lambda = 0.25, .bounds = {}}, {}, sample, kWorkers), 0.25 / 500, 1e-8);
 }
 
 TEST(FlowSampling, IgnoresMotionThatIsNotFinite) {
   Sample sample = moving_ramp(0, 0.1F, 3.0F, 4.0F, 0.001);
-  sample.flow_x(1, 1) = std::numeric_limits<float>::quiet_NaN();
-  sample.flow_y(2, 1) = std::numeric_limits<float>::infinity();
+  sample.motion_x(1, 1) = std::numeric_limits<float>::quiet_NaN();
+  sample.motion_y(2, 1) = std::numeric_limits<float>::infinity();
   EXPECT_NEAR(fastest_motion_px_per_s(sample, kWorkers), 5.0, 1e-5);
 }
 

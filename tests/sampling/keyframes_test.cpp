@@ -37,7 +37,7 @@ struct Turning {
     sample.t = t;
     sample.depth.fill(std::numeric_limits<float>::infinity());
     const float speed = flow > 0 ? flow : static_cast<float>(std::fabs(omega) * sensor.fx);
-    sample.flow_x.fill(speed * static_cast<float>(camera.fx / sensor.fx));
+    sample.motion_x.fill(speed * static_cast<float>(camera.fx / sensor.fx));
     const Eigen::Quaterniond R = view(t).camera.T_world_body.rotation;
     for (int y = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x) {

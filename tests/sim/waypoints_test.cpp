@@ -20,7 +20,7 @@ WaypointPointOptions looking(const Vector3d& position, const Vector3d& at) {
   return point;
 }
 
-/// A camera beside its body and turned against it.
+/// A camera next to its body, with another orientation.
 SE3 odd_mount() { return {so3_exp({0.7, -1.1, 0.4}), {0.3, -0.2, 0.5}}; }
 
 TEST(WaypointAim, PutsTheTargetOnTheOpticalAxis) {

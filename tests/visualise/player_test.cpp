@@ -159,7 +159,8 @@ TEST(Player, ShowsAllThatGroundTruthTells) {
   const auto events = regular(30);
   const Image<float> grey(16, 12, 0.2f), depth(16, 12, 3.0f), x(16, 12, 50.0f), y(16, 12, 0.0f);
   Image<std::uint16_t> frame(16, 12, 1023);
-  source.add(TruthRecord{.t = 0, .T_world_camera = {}, .irradiance = grey, .depth = depth, .flow_x = x, .flow_y = y});
+  source.add(
+      TruthRecord{.t = 0, .T_world_camera = {}, .irradiance = grey, .depth = depth, .motion_x = x, .motion_y = y});
   source.add(EventsRecord{0, events});
   source.add(FrameRecord{.t = 3 * kNsPerMs, .image = frame, .bits = 10});
   const RecordingOverview found = overview_of(source);
@@ -177,7 +178,7 @@ TEST(Player, ShowsAllThatGroundTruthTells) {
   };
   EXPECT_EQ(middle_of(View::image), (Rgb{255, 255, 255}));  // the frame, not the ground truth
   EXPECT_EQ(middle_of(View::depth), colour_depth(3, found.depth.near_m(), found.depth.far_m()));
-  EXPECT_EQ(middle_of(View::motion), colour_flow(50, 0, found.motion.full_px_per_s()));
+  EXPECT_EQ(middle_of(View::motion), colour_motion(50, 0, found.motion.full_px_per_s()));
 }
 
 TEST(Player, OneEventAndExtremeSensors) {

@@ -55,8 +55,8 @@ int run(const Arguments& arguments, const CLI::App& command) {
   }
   catch_interrupts();
   ProgressBar bar(!arguments.quiet);
-  const CopySummary summary = convert_recording(arguments.input, format, out, options, [&](double share) {
-    bar.show(share, [&] { return fmt::format("{:.0f} %", 100 * share); });
+  const CopySummary summary = convert_recording(arguments.input, format, out, options, [&](double fraction) {
+    bar.show(fraction, [&] { return fmt::format("{:.0f} %", 100 * fraction); });
     return !interrupted();
   });
   bar.clear();

@@ -39,7 +39,7 @@ struct Arguments {
 
   // Of affine motion.
   AffineOptions affine;
-  std::string images, histogram, flow_at = "middle", sampling;
+  std::string images, histogram, motion_field_at = "middle", sampling;
   std::vector<double> thresholds, mix;
 
   // Of Slurm.
@@ -57,8 +57,9 @@ std::unique_ptr<SequenceMaker> make_affine(const Arguments& arguments) {
   if (!arguments.thresholds.empty())
     options.contrast_threshold = {arguments.thresholds.front(), arguments.thresholds.back()};
   if (!arguments.mix.empty()) options.mix = {arguments.mix[0], arguments.mix[1], arguments.mix[2], arguments.mix[3]};
-  for (std::size_t i = 0; i < kEnumNames<FlowTime>.size(); ++i) {
-    if (arguments.flow_at == kEnumNames<FlowTime>[i]) options.flow_at = static_cast<FlowTime>(i);
+  for (std::size_t i = 0; i < kEnumNames<MotionFieldTime>.size(); ++i) {
+    if (arguments.motion_field_at == kEnumNames<MotionFieldTime>[i])
+      options.motion_field_at = static_cast<MotionFieldTime>(i);
   }
   options.event_camera = read_event_camera(arguments.overrides);
   return std::make_unique<AffineSequences>(std::move(options));
@@ -130,7 +131,11 @@ int run(Arguments arguments) {
   if (arguments.out.empty()) throw UserError("--out: is missing; name a folder");
   const bool affine = arguments.what == kAffine;
   std::vector<std::string> names = arguments.contents;
-  if (names.empty()) names = {"flow", "displacement"};
+  if (names.empty()) names = {"motion_field", "optical_flow"};
+  for (const std::string& name : names) {
+    if (const std::string present = present_content_name(name); present != name)
+      tell(stderr, "warning: --contents: {} is now {}\n", name, present);
+  }
   DatasetPlan plan{.count = arguments.count,
                    .shard_size = arguments.shard_size > 0 ? arguments.shard_size : usual_shard_size(arguments.count),
                    .format = arguments.format == "hdf5" ? ShardFormat::hdf5 : ShardFormat::webdataset,
@@ -139,7 +144,7 @@ int run(Arguments arguments) {
   const std::unique_ptr<SequenceMaker> maker =
       affine ? make_affine(arguments)
              : std::make_unique<ScenarioSequences>(arguments.what, arguments.overrides, arguments.seed,
-                                                   plan.contents.displacement);
+                                                   plan.contents.optical_flow);
   plan.maker = maker->options();
   if (share.part == 0) SequenceArrays(maker->make(0), plan.contents);  // a sample, before anything is written
   const DatasetFolder folder(arguments.out, plan, ESIM_VERSION);
@@ -196,8 +201,13 @@ void add_affine_options(CLI::App& command, Arguments& arguments) {
   add("--flow-histogram", arguments.histogram,
       "Histogram of the optical flow over the duration: lines LOW HIGH WEIGHT, px (default: MPI Sintel's)", "FILE");
   add("--flow-scale", affine.flow_scale, "Factor on the histogram's magnitudes", "F");
-  add("--flow-at", arguments.flow_at, "Time of the motion field: start, middle (default) or end", "TIME")
+  add("--motion-field-at", arguments.motion_field_at, "Time of the motion field: start, middle (default) or end",
+      "TIME")
       ->check(CLI::IsMember({"start", "middle", "end"}));
+  add("--flow-at", arguments.motion_field_at, "Old name of --motion-field-at", "TIME")
+      ->check(CLI::IsMember({"start", "middle", "end"}))
+      ->each([](const std::string&) { tell(stderr, "warning: --flow-at is now --motion-field-at\n"); })
+      ->group("");
   add("--threshold", arguments.thresholds, "Range of the random contrast threshold of each sequence (default: 0.2 0.5)",
       "LOW [HIGH]")
       ->expected(1, 2);
@@ -222,9 +232,9 @@ void add_dataset(CLI::App& app, int& exit_code) {
       ->type_name("N")
       ->check(CLI::Range(1U, 4'000'000'000U));
   command
-      ->add_option(
-          "--contents", arguments->contents,
-          "Contents in addition to events: flow, displacement (default: both), images, tensor, voxels=BINS, depth")
+      ->add_option("--contents", arguments->contents,
+                   "Contents in addition to events: motion_field, optical_flow (default: both), images, tensor, "
+                   "voxels=BINS, depth")
       ->type_name("NAME,...")
       ->delimiter(',');
   command->add_option("--format", arguments->format, "Format of the files: hdf5 (default) or webdataset")
@@ -270,7 +280,7 @@ void add_dataset(CLI::App& app, int& exit_code) {
   command->footer(
       "Examples:\n"
       "  esim dataset affine --out flow                              10,000 sequences of 0.04 s, as in the paper\n"
-      "  esim dataset affine --out flow --images photographs --contents flow,tensor --format webdataset\n"
+      "  esim dataset affine --out flow --images photographs --contents motion_field,tensor --format webdataset\n"
       "  esim dataset room.yaml --count 500 --out rooms              from a scenario with the key randomise\n"
       "  esim dataset affine --out flow --slurm --slurm-tasks 50 --slurm-options \"--cpus-per-task=8\"\n"
       "  esim dataset --check flow                                   check that the dataset is complete\n"

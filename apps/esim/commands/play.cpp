@@ -21,8 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kSheetColumns = 3, kSheetRows = 3;
-constexpr int kWidthOfGif = 960;            // px; limits the file size
-constexpr double kMostFramesOfGif_hz = 50;  // browsers slow down faster ones
+constexpr int kWidthOfGif = 960;           // px; limits the file size
+constexpr double kMaxFramesOfGif_hz = 50;  // browsers slow down faster ones
 
 struct Arguments {
   std::string input, out, camera;
@@ -151,8 +151,8 @@ int run(Arguments& arguments) {
   play.tau_s = 1e-3 * arguments.tau_ms;
   play.span_s = 1e-3 * arguments.span_ms;
   play.frames_per_s = arguments.fps.value_or(extension == ".gif" ? 20 : 30);
-  if (extension == ".gif" && play.frames_per_s > kMostFramesOfGif_hz)
-    throw UserError(fmt::format("--fps: must be at most {} for a GIF; lower it", kMostFramesOfGif_hz));
+  if (extension == ".gif" && play.frames_per_s > kMaxFramesOfGif_hz)
+    throw UserError(fmt::format("--fps: must be at most {} for a GIF; lower it", kMaxFramesOfGif_hz));
   if (extension == ".gif" && play.width == 0) play.width = kWidthOfGif;
   play.theme = arguments.light ? kLightTheme : kDarkTheme;
 
@@ -161,8 +161,8 @@ int run(Arguments& arguments) {
   play.name = input.name();
   arguments.extent.camera = input.camera(arguments.camera);
   ProgressBar bar(!arguments.quiet);
-  const auto found = read_overview(*input.open(), arguments.extent, [&](double share) {
-    bar.show(share, [&] { return fmt::format("reading, {:.0f} %", 100 * share); });
+  const auto found = read_overview(*input.open(), arguments.extent, [&](double fraction) {
+    bar.show(fraction, [&] { return fmt::format("reading, {:.0f} %", 100 * fraction); });
     return !interrupted();
   });
   bar.clear();
@@ -177,9 +177,8 @@ int run(Arguments& arguments) {
 void add_play(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("play", "Make a video or an image of events");
-  const auto positive = [&](const char* name, auto& value, const char* help, const char* unit, double least,
-                            double most) {
-    return command->add_option(name, value, help)->type_name(unit)->check(CLI::Range(least, most));
+  const auto positive = [&](const char* name, auto& value, const char* help, const char* unit, double min, double max) {
+    return command->add_option(name, value, help)->type_name(unit)->check(CLI::Range(min, max));
   };
   command->add_option("in", arguments->input, "Recording folder, or file of events of any format")
       ->required()

@@ -86,7 +86,7 @@ void report_losses(const ConversionSummary& summary, const ConversionOptions& op
     notices.warning(
         fmt::format("between {} of {} pairs of frames, the motion is too large for {} steps (up to {:.0f} px); "
                     "raise --lambda or --max-steps, or use a video with more frames per second",
-                    summary.held, summary.frames - 1, options.interpolation.max_steps, summary.displacement_px));
+                    summary.held, summary.frames - 1, options.interpolation.max_steps, summary.max_optical_flow_px));
   }
   std::ranges::for_each(losses(options, summary), notices.warning);
 }

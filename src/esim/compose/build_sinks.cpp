@@ -107,8 +107,8 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
       sinks->add(std::make_unique<EventPointsPlyWriter>(place / "event_points.ply", camera));
     if (truth.rate_hz <= 0) continue;
     if (truth.images) sinks->add(std::make_unique<ImagesPngWriter>(place / "images", camera));
-    const TruthHdf5Options datasets{truth.depth, truth.flow, compression, truth.objects, truth.displacement};
-    if (datasets.depth || datasets.flow || datasets.objects || datasets.displacement)
+    const TruthHdf5Options datasets{truth.depth, truth.motion_field, compression, truth.objects, truth.optical_flow};
+    if (datasets.depth || datasets.motion_field || datasets.objects || datasets.optical_flow)
       sinks->add(std::make_unique<TruthHdf5Writer>(place / "truth.h5", camera, datasets));
     if (output.preview) sinks->add(std::make_unique<PreviewWriter>(place, camera));
   }

@@ -148,7 +148,7 @@ void name_what_moves(const RendererOptions& renderer, const SceneFile& scene, Re
     if (object.moves) info.objects.push_back(object.name);
   }
   if (const auto* const sprites = std::get_if<SpritesRendererOptions>(&renderer)) {
-    for (std::size_t i = 0; i < sprites->layers.size(); ++i) info.layers.push_back(fmt::format("layer{}", i));
+    for (std::size_t i = 0; i < sprites->sprites.size(); ++i) info.sprites.push_back(fmt::format("sprite{}", i));
   }
   if (const auto* const objects = engine_objects(renderer)) {
     for (const EngineObjectOptions& object : *objects) info.objects.push_back(object.name);
@@ -201,6 +201,7 @@ World build_motions(const Scenario& scenario, const SceneFile& scene, std::share
 /// Everything. All other functions that build a world end here.
 World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<const Trajectory> body,
             const TimeSpan& span, const Substitutes& substitutes, int threads, const Notices& notices) {
+  std::ranges::for_each(scenario.notices, notices.warning);
   check_substitutes(scenario, substitutes, span);
   World world = build_motions(scenario, scene, std::move(body), span, substitutes, threads, notices);
   const SceneCamera* const followed = substitutes.body != nullptr ? nullptr : followed_camera(scenario, scene);

@@ -8,18 +8,18 @@
 namespace esim::inline compose {
 namespace {
 
-void check_displacement(const TruthOptions& truth, PeriodicClock clock, double duration_s,
+void check_optical_flow(const TruthOptions& truth, PeriodicClock clock, double duration_s,
                         const RendererTraits& renderer) {
-  if (!truth.displacement) return;
+  if (!truth.optical_flow) return;
   if (renderer.on_sensor) {
     throw UserError(fmt::format(
-        "truth.displacement: needs depth, but {} are drawn on the sensor and have none; remove it", renderer.name));
+        "truth.optical_flow: needs depth, but {} are drawn on the sensor and have none; remove it", renderer.name));
   }
   const bool has_frames = clock.due() != PeriodicClock::kNever;
   if (has_frames) clock.advance();
   if (clock.due() != PeriodicClock::kNever) return;
   throw UserError(fmt::format(
-      "truth.displacement: needs two frames of ground truth, but truth.rate_hz = {} gives {} in {:.6g} s; raise "
+      "truth.optical_flow: needs two frames of ground truth, but truth.rate_hz = {} gives {} in {:.6g} s; raise "
       "truth.rate_hz",
       truth.rate_hz, has_frames ? 1 : 0, duration_s));
 }
@@ -43,8 +43,8 @@ void warn_of_much(const Scenario& scenario, double duration_s, const Notices& no
   if (truth.rate_hz <= 0) return;
   double pixels = 0;
   for (const CameraOptions& camera : scenario.cameras) pixels += static_cast<double>(camera.width) * camera.height;
-  const int bytes_per_pixel = (truth.images ? 1 : 0) + (truth.depth ? 4 : 0) + (truth.flow ? 8 : 0) +
-                              (truth.displacement ? 9 : 0) + (truth.objects ? 2 : 0);
+  const int bytes_per_pixel = (truth.images ? 1 : 0) + (truth.depth ? 4 : 0) + (truth.motion_field ? 8 : 0) +
+                              (truth.optical_flow ? 9 : 0) + (truth.objects ? 2 : 0);
   const double frames = std::floor(duration_s * truth.rate_hz) + 1, bytes = frames * pixels * bytes_per_pixel;
   if (bytes <= kMuch) return;
   notices.warning(
@@ -75,7 +75,7 @@ void prepare_truth(const Scenario& scenario, const SceneFile& scene, const Rende
   const TruthOptions& truth = scenario.truth;
   const double duration_s = to_seconds(world.info.end - world.info.start);
   const RendererTraits traits = world.cameras.front().renderer->traits();
-  check_displacement(truth, world.truth_clock, duration_s, traits);
+  check_optical_flow(truth, world.truth_clock, duration_s, traits);
   check_event_points(truth, traits);
   warn_of_much(scenario, duration_s, notices);
 
@@ -86,7 +86,7 @@ void prepare_truth(const Scenario& scenario, const SceneFile& scene, const Rende
   for (std::size_t i = 0; i < world.cameras.size(); ++i) {
     CameraChannel& camera = world.cameras[i];
     const Camera& model = world.info.cameras[i].model;
-    if (truth.displacement) camera.displacement = std::make_unique<DisplacementField>(model, *world.workers);
+    if (truth.optical_flow) camera.optical_flow = std::make_unique<OpticalFlowFromDepth>(model, *world.workers);
     if (truth.event_points && camera.event_camera) {
       camera.event_points = std::make_unique<EventPoints>(model, make_pixel_renderer, view_at(world, i),
                                                           TimeSpan{world.info.start, world.info.end}, *world.workers);

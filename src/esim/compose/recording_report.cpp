@@ -37,7 +37,7 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
     if (sampling.resampling_floor) {
       const auto& [mean, p99, max] = *sampling.resampling_floor;
       cameras.back()["supersampling"] = sampling.supersampling;
-      cameras.back()["resampling_floor"] = {{"mean", mean}, {"p99", p99}, {"max", max}};
+      cameras.back()["resampling_error"] = {{"mean", mean}, {"p99", p99}, {"max", max}};
     }
     if (!sampling.measured_error) continue;
     const auto& [mean, p99, max] = *sampling.measured_error;
@@ -46,7 +46,7 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
     cameras.back()["bisections"] = sampling.bisections;
     cameras.back()["audits"] = sampling.audits;
     cameras.back()["reconstructions"] = sampling.reconstructions;
-    cameras.back()["unseen_share"] = sampling.unseen_share;
+    cameras.back()["unseen_fraction"] = sampling.unseen_share;
   }
 
   const StageSeconds& s = summary.seconds;
@@ -106,7 +106,7 @@ std::string report_json(const ConversionOptions& options, const ConversionSummar
       {"frames", summary.frames},
       {"steps", summary.steps},
       {"intervals_held_to_max_steps", summary.held},
-      {"greatest_displacement_px", summary.displacement_px},
+      {"max_optical_flow_px", summary.max_optical_flow_px},
       {"events", events},
       {"events_on", summary.events_on},
       {"events_off", summary.events_off},

@@ -71,26 +71,26 @@ RendererFactory factory(const PlaneRendererOptions& options, const SceneFile&, b
   require_path(options.image, "image");
   const Wrap wrap = options.endless ? Wrap::repeat : Wrap::clamp;
   const Softening softening{options.median_px, options.gaussian_px};
-  Poster poster{std::make_shared<const Texture>(load_luminance(options.image, softening), wrap, wrap),
-                pose_of(options.pose), options.width_m, options.endless, static_cast<float>(options.background)};
-  if (colour) poster.colours = colour_textures(load_colours(options.image, softening), wrap, wrap);
+  TexturedPlane plane{std::make_shared<const Texture>(load_luminance(options.image, softening), wrap, wrap),
+                      pose_of(options.pose), options.width_m, options.endless, static_cast<float>(options.background)};
+  if (colour) plane.colours = colour_textures(load_colours(options.image, softening), wrap, wrap);
   return [=](const Camera& camera, ColourFilters filters, const Workers& workers) {
-    return make_plane_renderer(poster, camera, workers, filters);
+    return make_plane_renderer(plane, camera, workers, filters);
   };
 }
 
 /// The textures of sprites. Sprites with the same image and filters share them.
-class LayerTextures {
+class SpriteTextures {
  public:
   struct Textures {
     std::shared_ptr<const Texture> light, alpha;
   };
 
-  const Textures& of(const LayerOptions& layer) {
-    const Wrap wrap = layer.beyond == LayerBeyond::repeat ? Wrap::repeat : Wrap::clamp;
-    const auto [entry, is_new] = loaded_.try_emplace({layer.image, layer.median_px, layer.gaussian_px, wrap});
+  const Textures& of(const SpriteOptions& sprite) {
+    const Wrap wrap = sprite.beyond == SpriteBeyond::repeat ? Wrap::repeat : Wrap::clamp;
+    const auto [entry, is_new] = loaded_.try_emplace({sprite.image, sprite.median_px, sprite.gaussian_px, wrap});
     if (is_new) {
-      const TranslucentImage image = load_translucent(layer.image, {layer.median_px, layer.gaussian_px});
+      const TranslucentImage image = load_translucent(sprite.image, {sprite.median_px, sprite.gaussian_px});
       entry->second.light = std::make_shared<const Texture>(image.light, wrap, wrap);
       if (!image.alpha.empty()) entry->second.alpha = std::make_shared<const Texture>(image.alpha, wrap, wrap);
     }
@@ -102,19 +102,19 @@ class LayerTextures {
 };
 
 RendererFactory factory(const SpritesRendererOptions& options, const SceneFile&, bool) {
-  if (options.layers.empty())
-    throw UserError("renderer.layers: is missing; list sprites, or name a .scene file in renderer.scene");
+  if (options.sprites.empty())
+    throw UserError("renderer.sprites: is missing; list sprites, or name a .scene file in renderer.scene");
   SpriteScene scene{{}, static_cast<float>(options.background)};
-  LayerTextures textures;
-  for (std::size_t i = 0; i < options.layers.size(); ++i) {
-    const LayerOptions& layer = options.layers[i];
-    require_path(layer.image, fmt::format("layers.{}.image", i));
+  SpriteTextures textures;
+  for (std::size_t i = 0; i < options.sprites.size(); ++i) {
+    const SpriteOptions& sprite = options.sprites[i];
+    require_path(sprite.image, fmt::format("sprites.{}.image", i));
     try {
-      const auto& [light, alpha] = textures.of(layer);
+      const auto& [light, alpha] = textures.of(sprite);
       scene.sprites.push_back(
-          {light, alpha, layer.units, layer.beyond, LayerMotion(layer.keyframes, layer.interpolation), layer.pivot});
+          {light, alpha, sprite.units, sprite.beyond, SpriteMotion(sprite.poses, sprite.interpolation), sprite.pivot});
     } catch (const UserError& error) {
-      throw UserError(fmt::format("renderer.layers.{}: {}", i, error.what()));
+      throw UserError(fmt::format("renderer.sprites.{}: {}", i, error.what()));
     }
   }
   return [=](const Camera& camera, ColourFilters filters, const Workers& workers) {

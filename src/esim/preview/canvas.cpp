@@ -59,12 +59,12 @@ DrawnText draw_text(const std::string& line, int height) {
 
 /// Most lines of text are the same in many frames of a video, so each thread caches recent ones.
 const DrawnText& drawn_text(std::string_view line, int height) {
-  constexpr std::size_t kMost = 512;
+  constexpr std::size_t kMax = 512;
   thread_local std::map<std::pair<std::string, int>, DrawnText> drawn;
   const std::pair key(std::string(line), height);
   const auto found = drawn.find(key);
   if (found != drawn.end()) return found->second;
-  if (drawn.size() >= kMost) drawn.clear();
+  if (drawn.size() >= kMax) drawn.clear();
   return drawn.emplace(key, draw_text(key.first, height)).first->second;
 }
 

@@ -188,12 +188,12 @@ Image<Rgb> grey(const Image<float>& irradiance) {
   return coloured_levels(irradiance, [](Rgb grey) { return grey; });
 }
 
-Rgb colour_flow(float x, float y, float full_scale) { return FlowColours(full_scale).of(x, y); }
+Rgb colour_motion(float x, float y, float full_scale) { return FlowColours(full_scale).of(x, y); }
 
-Image<Rgb> colour_flow(const Image<float>& flow_x, const Image<float>& flow_y, float full_scale_px_per_s) {
+Image<Rgb> colour_motion(const Image<float>& motion_x, const Image<float>& motion_y, float full_scale_px_per_s) {
   const FlowColours colours(full_scale_px_per_s);
-  Image<Rgb> out(flow_x.width(), flow_x.height());
-  colours.row(flow_x.data(), flow_y.data(), out.size(), out.data());
+  Image<Rgb> out(motion_x.width(), motion_x.height());
+  colours.row(motion_x.data(), motion_y.data(), out.size(), out.data());
   return out;
 }
 

@@ -42,8 +42,8 @@ Image<Rgb> grey(const Image<float>& irradiance);
 
 /// The motion field in the colour code of Baker et al., "A Database and Evaluation Methodology for Optical Flow", IJCV
 /// 2011: hue by direction, white at rest, saturated at `full_scale_px_per_s`, darker beyond it.
-Image<Rgb> colour_flow(const Image<float>& flow_x, const Image<float>& flow_y, float full_scale_px_per_s);
-Rgb colour_flow(float x, float y, float full_scale);
+Image<Rgb> colour_motion(const Image<float>& motion_x, const Image<float>& motion_y, float full_scale_px_per_s);
+Rgb colour_motion(float x, float y, float full_scale);
 
 /// Depth in the colour map viridis, on a logarithmic scale from near_m (yellow) to far_m (violet), clamped;
 /// kNoDepthColour for invalid depth (infinite, NaN or not positive). 0 < near_m < far_m.

@@ -12,9 +12,9 @@ namespace esim::inline preview {
 namespace {
 
 constexpr int kMaxWidth = 1920;
-constexpr int kLeastPanelWidth = 320;
+constexpr int kMinPanelWidth = 320;
 constexpr int kMaxPanelHeight = 960;
-constexpr int kLeastColumnWidth = 320;  // for the legends of narrow panels
+constexpr int kMinColumnWidth = 320;  // for the legends of narrow panels
 constexpr int kMargin = 18, kGap = 14;
 constexpr int kHeader = 44, kTitle = 30, kLegend = 84;
 constexpr int kTextHeight = 11, kSmallTextHeight = 10;
@@ -65,10 +65,10 @@ class Panels {
     return colour_depth(nearest(*frame_.depth_m), near_m, far_m);
   }
 
-  Image<Rgb> flow() const {
-    const Image<float>&x = *frame_.flow_x_px_per_s, &y = *frame_.flow_y_px_per_s;
-    if (!large_) return fit(colour_flow(x, y, frame_.full_flow_px_per_s));
-    return colour_flow(nearest(x), nearest(y), frame_.full_flow_px_per_s);
+  Image<Rgb> motion_field() const {
+    const Image<float>&x = *frame_.motion_x_px_per_s, &y = *frame_.motion_y_px_per_s;
+    if (!large_) return fit(colour_motion(x, y, frame_.full_speed_px_per_s));
+    return colour_motion(nearest(x), nearest(y), frame_.full_speed_px_per_s);
   }
 
  private:
@@ -150,13 +150,13 @@ void draw_flow_legend(Canvas& canvas, const PreviewLayout& layout, const Preview
       const float radius = std::hypot(static_cast<float>(u), static_cast<float>(v));
       const float coverage = std::clamp(kRadius + 0.5f - radius, 0.0f, 1.0f);
       const float inside = std::min(1.0f, static_cast<float>(kRadius) / std::max(radius, 1.0f));
-      const Rgb colour = colour_flow(static_cast<float>(u) * inside, static_cast<float>(v) * inside, kRadius);
+      const Rgb colour = colour_motion(static_cast<float>(u) * inside, static_cast<float>(v) * inside, kRadius);
       wheel(u + kRadius, v + kRadius) = mix(kPaper, colour, coverage);
     }
   }
   canvas.draw(wheel, x, y);
   const int text_x = x + 2 * kRadius + 16;
-  canvas.text(text_x, y + 26, fmt::format("rim: {} px/s", short_number(frame.full_flow_px_per_s)), kSmallTextHeight,
+  canvas.text(text_x, y + 26, fmt::format("rim: {} px/s", short_number(frame.full_speed_px_per_s)), kSmallTextHeight,
               kInk);
   canvas.text(text_x, y + 50, "hue: direction of motion", kSmallTextHeight, kFaintInk);
 }
@@ -182,14 +182,14 @@ Image<Rgb> draw_backdrop(const PreviewLayout& layout, const PreviewFrame& frame)
 }  // namespace
 
 PreviewLayout::PreviewLayout(int camera_width, int camera_height, int panel_count) : panels(panel_count) {
-  const double most_panel_width = (kMaxWidth - 2 * kMargin - (panels - 1) * kGap) / panels;
-  const double whole_factor = (kLeastPanelWidth + camera_width - 1) / camera_width;
+  const double max_panel_width = (kMaxWidth - 2 * kMargin - (panels - 1) * kGap) / panels;
+  const double whole_factor = (kMinPanelWidth + camera_width - 1) / camera_width;
   const double scale =
-      std::min({whole_factor, most_panel_width / camera_width, static_cast<double>(kMaxPanelHeight) / camera_height});
+      std::min({whole_factor, max_panel_width / camera_width, static_cast<double>(kMaxPanelHeight) / camera_height});
   const auto scaled = [scale](int extent) { return std::max(1, static_cast<int>(scale * extent + 1e-6)); };
   panel_width = scaled(camera_width);
   panel_height = scaled(camera_height);
-  column_width = std::max(panel_width, kLeastColumnWidth);
+  column_width = std::max(panel_width, kMinColumnWidth);
   width = 2 * kMargin + (panels - 1) * kGap + panels * column_width;
   height = kHeader + kTitle + panel_height + kLegend + kMargin;
   width += width % 2;
@@ -201,7 +201,7 @@ int PreviewLayout::panel_y() const { return kHeader + kTitle; }
 int PreviewLayout::legend_y() const { return panel_y() + panel_height + 16; }
 
 Image<Rgb> PreviewPage::compose(const PreviewFrame& frame) {
-  const Scales scales{frame.near_m, frame.far_m, frame.full_flow_px_per_s};
+  const Scales scales{frame.near_m, frame.far_m, frame.full_speed_px_per_s};
   if (backdrop_.empty() || scales != scales_) backdrop_ = draw_backdrop(layout_, frame);
   scales_ = scales;
 
@@ -217,7 +217,7 @@ Image<Rgb> PreviewPage::compose(const PreviewFrame& frame) {
     draw(1, panels.image());
   } else {
     draw(1, panels.depth());
-    draw(2, panels.flow());
+    draw(2, panels.motion_field());
   }
   return std::move(canvas).take();
 }

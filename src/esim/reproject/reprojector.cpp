@@ -15,11 +15,11 @@ namespace esim::inline reproject {
 namespace {
 
 double greatest_radius(const PixelRays& rays) {
-  double greatest = 0;
+  double longest = 0;
   for (int y = 0; y < rays.x.height(); ++y)
     for (int x = 0; x < rays.x.width(); ++x)
-      greatest = std::max(greatest, std::hypot(double{rays.x(x, y)}, double{rays.y(x, y)}));
-  return greatest * (1 + 1e-5);
+      longest = std::max(longest, std::hypot(double{rays.x(x, y)}, double{rays.y(x, y)}));
+  return longest * (1 + 1e-5);
 }
 
 /// Weight of the later keyframe; strictly between 0 and 1, because the other keyframe may not see a pixel.

@@ -33,9 +33,9 @@ struct MovingKeyframe {
 /// Two quantiles of the pixels' speed, px/s. Speeds that are not finite do not count.
 std::pair<double, double> speeds(const Sample& sample, double lower_share, double upper_share) {
   std::vector<float> squared;
-  squared.reserve(sample.flow_x.size());
-  for (std::size_t i = 0; i < sample.flow_x.size(); ++i) {
-    const float vx = sample.flow_x.pixels()[i], vy = sample.flow_y.pixels()[i], v2 = vx * vx + vy * vy;
+  squared.reserve(sample.motion_x.size());
+  for (std::size_t i = 0; i < sample.motion_x.size(); ++i) {
+    const float vx = sample.motion_x.pixels()[i], vy = sample.motion_y.pixels()[i], v2 = vx * vx + vy * vy;
     if (std::isfinite(v2)) squared.push_back(v2);
   }
   if (squared.empty()) return {0, 0};

@@ -17,6 +17,8 @@ namespace esim::inline scenario {
 /// keys `sampling`, `event_camera` and `frame_camera` at the top apply to every camera that does not set them itself.
 /// Calibration files are read here: the result has explicit geometry only.
 ///
+/// Old names of options are valid and give a notice in the result.
+///
 /// `overrides` ("dotted.key=value") are applied last. Throws UserError, usually an OptionError, with file, line, key
 /// and the valid values.
 Scenario read_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides = {});

@@ -10,7 +10,7 @@
 #include "esim/scenario/pose_options.h"
 #include "esim/scenario/trajectory_options.h"
 #include "esim/scene/engine_images.h"
-#include "esim/scene/layer.h"
+#include "esim/scene/sprite.h"
 
 /// What the cameras see. A new renderer is a struct with its describe(), an alternative of the variant at the end, and
 /// a function in compose/renderer_factory.cpp.
@@ -163,7 +163,7 @@ void describe(Visitor& visit, PlaneRendererOptions& o) {
 }
 
 template <class Visitor>
-void describe(Visitor& visit, LayerKeyframe& o) {
+void describe(Visitor& visit, SpritePose& o) {
   visit("t_s", o.t_s,
         About{"time on the trajectory's clock, which starts at 0 unless the trajectory is a file", "s", -1e8, 1e8});
   visit("position", o.position,
@@ -177,19 +177,19 @@ void describe(Visitor& visit, LayerKeyframe& o) {
 }
 
 /// A sprite: an image that moves over the sensor.
-struct LayerOptions {
+struct SpriteOptions {
   std::filesystem::path image;
-  LayerUnits units = LayerUnits::pixel;
-  LayerBeyond beyond = LayerBeyond::nothing;
+  SpriteUnits units = SpriteUnits::pixel;
+  SpriteBeyond beyond = SpriteBeyond::nothing;
   int median_px = 0;
   double gaussian_px = 0;
   Eigen::Vector2d pivot{0.5, 0.5};
-  KeyframeInterpolation interpolation = KeyframeInterpolation::spline;
-  std::vector<LayerKeyframe> keyframes{LayerKeyframe{}};  // at rest in the middle
+  SpriteInterpolation interpolation = SpriteInterpolation::spline;
+  std::vector<SpritePose> poses{SpritePose{}};  // at rest in the middle
 };
 
 template <class Visitor>
-void describe(Visitor& visit, LayerOptions& o) {
+void describe(Visitor& visit, SpriteOptions& o) {
   visit("image", o.image, About{"image file, with or without alpha"});
   visit("units", o.units,
         About{"unit of positions. pixel: at scale 1, a texel is a pixel; sensor: at scale 1, the image fills the "
@@ -199,11 +199,11 @@ void describe(Visitor& visit, LayerOptions& o) {
   visit(
       "pivot", o.pivot,
       About{
-          "point of the image that the keyframes place: [0, 0] is its upper left corner, [1, 1] its lower right corner",
+          "point of the image that the poses place: [0, 0] is its upper left corner, [1, 1] its lower right corner",
           "", -1e3, 1e3});
-  visit("interpolation", o.interpolation, About{"motion between keyframes: natural cubic splines, or linear"});
+  visit("interpolation", o.interpolation, About{"motion between poses: natural cubic splines, or linear"});
   visit(
-      "keyframes", o.keyframes,
+      "poses", o.poses,
       About{
           "in order of time; before the first and after the last, the sprite rests (default: it rests in the middle)"});
 }
@@ -213,17 +213,17 @@ struct SpritesRendererOptions {
   static constexpr const char* kType = "sprites";
   std::filesystem::path scene;
   std::vector<std::filesystem::path> search_path;
-  std::vector<LayerOptions> layers;
+  std::vector<SpriteOptions> sprites;
   double background = 0.2;
 };
 
 template <class Visitor>
 void describe(Visitor& visit, SpritesRendererOptions& o) {
   visit("scene", o.scene,
-        About{"instead of layers: a .scene file of the original ESIM; it also gives the duration and the camera's size "
+        About{"instead of sprites: a .scene file of the original ESIM; it also gives the duration and the camera's size "
               "if the scenario does not"});
   visit("search_path", o.search_path, About{"folders in which esim looks for the scene file's images"});
-  visit("layers", o.layers, About{"sprites on the sensor, the nearest first"});
+  visit("sprites", o.sprites, About{"sprites on the sensor, the nearest first"});
   visit("background", o.background, About{"irradiance where no sprite lies", "", 0, 1e6});
 }
 
@@ -334,11 +334,11 @@ inline const std::vector<EngineObjectOptions>* engine_objects(const RendererOpti
 namespace esim {
 
 template <>
-inline constexpr std::array<const char*, 2> kEnumNames<LayerUnits>{"pixel", "sensor"};
+inline constexpr std::array<const char*, 2> kEnumNames<SpriteUnits>{"pixel", "sensor"};
 template <>
-inline constexpr std::array<const char*, 4> kEnumNames<LayerBeyond>{"nothing", "clamp", "mirror", "repeat"};
+inline constexpr std::array<const char*, 4> kEnumNames<SpriteBeyond>{"nothing", "clamp", "mirror", "repeat"};
 template <>
-inline constexpr std::array<const char*, 2> kEnumNames<KeyframeInterpolation>{"spline", "linear"};
+inline constexpr std::array<const char*, 2> kEnumNames<SpriteInterpolation>{"spline", "linear"};
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<MeshEngine>{"raycast", "gl", "auto"};
 template <>

@@ -66,8 +66,8 @@ struct TruthOptions {
   double rate_hz = 30;
   bool images = true;
   bool depth = true;
-  bool flow = true;
-  bool displacement = false;
+  bool motion_field = true;
+  bool optical_flow = false;
   bool objects = false;
   bool event_points = false;
   double pose_rate_hz = 200;
@@ -96,6 +96,9 @@ struct Scenario {
   std::optional<RigImuOptions> imu;
   TruthOptions truth;
   OutputOptions output;
+
+  /// What users should know about the text from which the scenario was read: options that have other names now.
+  std::vector<std::string> notices{};
 };
 
 }  // namespace esim::inline scenario

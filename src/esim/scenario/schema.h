@@ -72,8 +72,8 @@ void describe(Visitor& visit, TruthOptions& o) {
   visit("rate_hz", o.rate_hz, About{"ground-truth frames per second; 0: no frames", "Hz", 0, 1e6});
   visit("images", o.images, About{"write images/, 8-bit sRGB"});
   visit("depth", o.depth, About{"write depth to truth.h5"});
-  visit("flow", o.flow, About{"write the motion field to truth.h5"});
-  visit("displacement", o.displacement,
+  visit("motion_field", o.motion_field, About{"write the motion field to truth.h5"});
+  visit("optical_flow", o.optical_flow,
         About{"write optical flow (px) from each frame to the next to truth.h5, with occlusions"});
   visit("objects", o.objects,
         About{"write the index of the moving object, or of the sprite, that each pixel sees to truth.h5"});
@@ -97,7 +97,7 @@ void describe(Visitor& visit, Scenario& o) {
   visit("seed", o.seed, About{"seed of all random numbers"});
   visit("start_s", o.start_s, About{"start of the simulation, after the trajectory's start", "s", 0, 1e9});
   visit("duration_s", o.duration_s,
-        About{"duration of the simulation (default: until the trajectory, or the sprites' keyframes, end)", "s", 0, 1e9,
+        About{"duration of the simulation (default: until the trajectory, or the sprites' poses, end)", "s", 0, 1e9,
               true});
   visit("renderer", o.renderer, About{"what the cameras see"});
   visit("trajectory", o.trajectory, About{"how the body moves"});

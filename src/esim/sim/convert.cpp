@@ -46,7 +46,7 @@ class Run {
     const Interpolator& interpolator = conversion_.interpolator;
     const TimeNs t0 = summary_.end, duration = frame_.t - t0;
     const auto steps = std::min<TimeNs>(interpolator.steps(), duration);
-    summary_.displacement_px = std::max(summary_.displacement_px, interpolator.displacement());
+    summary_.max_optical_flow_px = std::max(summary_.max_optical_flow_px, interpolator.max_flow_px());
     if (interpolator.is_held()) ++summary_.held;
 
     for (TimeNs step = 1; step <= steps; ++step) {

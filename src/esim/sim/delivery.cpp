@@ -73,12 +73,12 @@ void Delivery::deliver_truth(TimeNs t) {
     request.which_objects = world_.truth_objects;
     object_poses_.clear();
     for (const Kinematics& object : request.objects) object_poses_.push_back(object.T_world_body);
-    const Displacement* const displacement = stages_.render_truth(world_.cameras[i], request, truth_);
-    write(TruthRecord{number, t, request.camera.T_world_body, truth_.irradiance, truth_.depth, truth_.flow_x,
-                      truth_.flow_y, world_.truth_objects ? &truth_.object : nullptr, object_poses_});
-    if (displacement != nullptr) {
-      write(DisplacementRecord{number, displacement->t0, displacement->t1, displacement->x, displacement->y,
-                               displacement->visible});
+    const OpticalFlowImages* const optical_flow = stages_.render_truth(world_.cameras[i], request, truth_);
+    write(TruthRecord{number, t, request.camera.T_world_body, truth_.irradiance, truth_.depth, truth_.motion_x,
+                      truth_.motion_y, world_.truth_objects ? &truth_.object : nullptr, object_poses_});
+    if (optical_flow != nullptr) {
+      write(OpticalFlowRecord{number, optical_flow->t0, optical_flow->t1, optical_flow->x, optical_flow->y,
+                               optical_flow->visible});
     }
     ++summary_.truth_frames;
   }

@@ -45,10 +45,10 @@ void Stages::expose_frames(CameraChannel& camera, std::span<const Segment> segme
         [&] { camera.frame_camera->integrate(segments, camera.sampler->watermark(), *world_.workers); });
 }
 
-const Displacement* Stages::render_truth(CameraChannel& camera, const RenderRequest& request, Sample& truth) {
-  return timed(seconds_.truth, [&]() -> const Displacement* {
+const OpticalFlowImages* Stages::render_truth(CameraChannel& camera, const RenderRequest& request, Sample& truth) {
+  return timed(seconds_.truth, [&]() -> const OpticalFlowImages* {
     camera.renderer->render(request, truth);
-    return camera.displacement ? camera.displacement->advance(request, truth) : nullptr;
+    return camera.optical_flow ? camera.optical_flow->advance(request, truth) : nullptr;
   });
 }
 

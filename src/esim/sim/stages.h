@@ -41,7 +41,7 @@ class Stages {
   // --- truth
   /// Renders the ground truth of a camera. Returns the optical flow from the previous one; null if not requested, and
   /// for the first one.
-  const Displacement* render_truth(CameraChannel& camera, const RenderRequest& request, Sample& truth);
+  const OpticalFlowImages* render_truth(CameraChannel& camera, const RenderRequest& request, Sample& truth);
   /// The scene points of events, in their order.
   void locate_events(CameraChannel& camera, std::span<const Event> events, std::vector<Eigen::Vector3f>& points);
 

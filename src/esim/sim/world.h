@@ -15,8 +15,8 @@
 #include "esim/render/renderer.h"
 #include "esim/sampling/sampler.h"
 #include "esim/truth/clock.h"
-#include "esim/truth/displacement.h"
 #include "esim/truth/event_points.h"
+#include "esim/truth/optical_flow.h"
 
 namespace esim::inline sim {
 
@@ -31,7 +31,7 @@ struct CameraChannel {
   std::optional<FrameCamera> frame_camera{};
 
   // Ground truth, if requested.
-  std::unique_ptr<DisplacementField> displacement{};
+  std::unique_ptr<OpticalFlowFromDepth> optical_flow{};
   std::unique_ptr<EventPoints> event_points{};
 
   Renderer& asked_for(const SampleRequest& request) {

@@ -147,12 +147,12 @@ void draw_colour_bar(Canvas& canvas, const Tile& bar, double full_hz) {
 void draw_map(Canvas& canvas, const Cell& cell, const Statistics& s) {
   constexpr int kBarSpace = 84;
   const Tile diagram = cell.diagram();
-  const int left = cell.x() + kLeft - 56, most_width = diagram.x + diagram.width - left - kBarSpace;
+  const int left = cell.x() + kLeft - 56, max_width = diagram.x + diagram.width - left - kBarSpace;
   canvas.text(left, diagram.y - 32, "Rate of each pixel", 13, kInk);
   if (s.counts.empty()) return;
   const int width = s.counts.width(), height = s.counts.height();
   const double scale =
-      std::min(static_cast<double>(most_width) / width, static_cast<double>(diagram.height + 30) / height);
+      std::min(static_cast<double>(max_width) / width, static_cast<double>(diagram.height + 30) / height);
   const int shown_width = std::max(1, static_cast<int>(scale * width)),
             shown_height = std::max(1, static_cast<int>(scale * height));
 
@@ -193,14 +193,14 @@ void draw_pixel_rates(Canvas& canvas, const Cell& cell, const Statistics& s) {
     if (count > 0) ++pixels[bin_of(count)];
   }
   for (const HotPixel& pixel : s.hot_pixels) ++hot[bin_of(pixel.events)];
-  const double most = std::max(10.0, *std::max_element(pixels.begin(), pixels.end()));
+  const double max = std::max(10.0, *std::max_element(pixels.begin(), pixels.end()));
   const double rate_of_one = s.per_second(1) > 0 ? s.per_second(1) : 1.0;
   const auto edge_hz = [&](std::size_t i) { return (static_cast<double>(edges[i]) - 0.5) * rate_of_one; };
   const auto lowest = std::find_if(pixels.begin(), pixels.end(), [](double number) { return number > 0; });
   const double low_hz = edge_hz(lowest == pixels.end() ? 0 : static_cast<std::size_t>(lowest - pixels.begin()));
   Axes axes(canvas, cell.diagram(), "Histogram of the pixels' rates",
             decade_scale(0.8 * low_hz, std::max(8 * low_hz, 1.25 * edge_hz(edges.size() - 1)), "ev/s of a pixel"),
-            decade_scale(0.7, 1.6 * most, "pixels"));
+            decade_scale(0.7, 1.6 * max, "pixels"));
   for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
     axes.fill(edge_hz(i), edge_hz(i + 1), 0.7, pixels[i], kBarColour);
     axes.fill(edge_hz(i), edge_hz(i + 1), 0.7, hot[i], kAlarmColour);

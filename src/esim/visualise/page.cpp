@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kMargin = 20, kGap = 18, kHeader = 42, kTitle = 28, kLegend = 30;
 constexpr int kTextHeight = 12, kSmallTextHeight = 10;
-constexpr int kMostPanelHeight = 960, kLeastPanelExtent = 64;
+constexpr int kMaxPanelHeight = 960, kMinPanelExtent = 64;
 
 int draw_polarity(Canvas& canvas, int x, int baseline, Rgb colour, const char* name, const Theme& theme) {
   canvas.disc({x + 5.0, baseline - 5.0}, 5, colour);
@@ -36,12 +36,12 @@ void draw_motion_legend(Canvas& canvas, int x, int baseline, const Panel& panel,
     for (int column = 0; column < kExtent; ++column) {
       const auto u = static_cast<float>(column - kRadius - 1), v = static_cast<float>(row - kRadius - 1);
       const float radius = std::max(std::hypot(u, v), 1e-3f), inside = std::min(1.0f, kRadius / radius);
-      wheel(column, row) = mix(theme.page, colour_flow(u * inside, v * inside, kRadius),
+      wheel(column, row) = mix(theme.page, colour_motion(u * inside, v * inside, kRadius),
                                std::clamp(kRadius + 0.5f - radius, 0.0f, 1.0f));
     }
   }
   canvas.draw(wheel, x, baseline - kRadius - 6);
-  canvas.text(x + kExtent + 8, baseline, fmt::format("rim: {:.3g} px/s", panel.full_flow_px_per_s), kSmallTextHeight,
+  canvas.text(x + kExtent + 8, baseline, fmt::format("rim: {:.3g} px/s", panel.full_speed_px_per_s), kSmallTextHeight,
               theme.faint_ink);
 }
 
@@ -61,7 +61,7 @@ void draw_panel(Canvas& canvas, const Tile& place, View view, const Panel& panel
     draw_polarity(canvas, place.x + width, baseline, kOffColour, "OFF", theme);
   }
   if (panel.near_m > 0) draw_depth_legend(canvas, place.x, baseline, panel, theme);
-  if (panel.full_flow_px_per_s > 0) draw_motion_legend(canvas, place.x, baseline, panel, theme);
+  if (panel.full_speed_px_per_s > 0) draw_motion_legend(canvas, place.x, baseline, panel, theme);
 }
 
 }  // namespace
@@ -88,8 +88,8 @@ PageLayout::PageLayout(const std::vector<View>& shown, SensorSize sensor, int wa
   constexpr std::array<int, 3> kWidths = {960, 1440, 1920};
   const int full = wanted_width > 0 ? wanted_width : kWidths[static_cast<std::size_t>(columns - 1)];
   const double across = static_cast<double>(full - 2 * kMargin - (columns - 1) * kGap) / columns;
-  panel_width = std::max(kLeastPanelExtent, static_cast<int>(std::min(across, kMostPanelHeight * aspect / rows)));
-  panel_height = std::max(kLeastPanelExtent, static_cast<int>(std::lround(panel_width / aspect)));
+  panel_width = std::max(kMinPanelExtent, static_cast<int>(std::min(across, kMaxPanelHeight * aspect / rows)));
+  panel_height = std::max(kMinPanelExtent, static_cast<int>(std::lround(panel_width / aspect)));
   width = 2 * kMargin + columns * panel_width + (columns - 1) * kGap;
   height = kHeader + rows * (kTitle + panel_height + kLegend) + kMargin / 2;
   width += width % 2;

@@ -19,13 +19,13 @@
 namespace esim::inline visualise {
 namespace {
 
-constexpr double kMostFrames = 1e6;
-constexpr double kLeastVideo_s = 3.9;
-constexpr double kLeastWindow_s = 1e-3, kMostWindow_s = 50e-3, kEventsPerPixel = 1.0 / 12;
+constexpr double kMaxFrames = 1e6;
+constexpr double kMinVideo_s = 3.9;
+constexpr double kMinWindow_s = 1e-3, kMaxWindow_s = 50e-3, kEventsPerPixel = 1.0 / 12;
 constexpr double kWindowsPerTau = 1.5, kWindowsPerSpan = 20;
-constexpr std::size_t kMostEventsCounted = std::size_t{1} << 23;
-constexpr std::size_t kMostPoints = 160'000;
-constexpr std::size_t kMostEventsWaiting = std::size_t{1} << 22, kMostPicturesWaiting = 64;
+constexpr std::size_t kMaxEventsCounted = std::size_t{1} << 23;
+constexpr std::size_t kMaxPoints = 160'000;
+constexpr std::size_t kMaxEventsWaiting = std::size_t{1} << 22, kMaxPicturesWaiting = 64;
 
 // Rounds up to 1, 2 or 5 times a power of ten, within rounding errors.
 double round_up(double value) {
@@ -48,7 +48,7 @@ class PictureQueue {
  public:
   void add(TimeNs t, Image<Rgb> pixels) {
     waiting_.push_back({t, std::move(pixels)});
-    if (waiting_.size() > kMostPicturesWaiting) advance();
+    if (waiting_.size() > kMaxPicturesWaiting) advance();
   }
   const Image<Rgb>& at(TimeNs t) {
     while (!waiting_.empty() && waiting_.front().t <= t) advance();
@@ -117,12 +117,12 @@ PlayOptions choose_missing(PlayOptions options, const RecordingOverview& overvie
   }
   const double duration_s = to_seconds(overview.end - overview.start);
   if (options.slow_motion <= 0) {
-    options.slow_motion = duration_s > 0 ? round_up(std::max(1.0, std::min(kLeastVideo_s / duration_s, 1e6))) : 1;
+    options.slow_motion = duration_s > 0 ? round_up(std::max(1.0, std::min(kMinVideo_s / duration_s, 1e6))) : 1;
   }
   if (options.window_s <= 0) {
     const double pixels = static_cast<double>(overview.sensor.width) * overview.sensor.height;
     const double rate_hz = static_cast<double>(overview.events) / std::max(duration_s, 1e-9);
-    options.window_s = round_up(std::clamp(kEventsPerPixel * pixels / rate_hz, kLeastWindow_s, kMostWindow_s));
+    options.window_s = round_up(std::clamp(kEventsPerPixel * pixels / rate_hz, kMinWindow_s, kMaxWindow_s));
   }
   if (options.tau_s <= 0) options.tau_s = kWindowsPerTau * options.window_s;
   if (options.span_s <= 0) options.span_s = kWindowsPerSpan * options.window_s;
@@ -132,7 +132,7 @@ PlayOptions choose_missing(PlayOptions options, const RecordingOverview& overvie
 Instants video_instants(const RecordingOverview& overview, const PlayOptions& options) {
   const double step_ns = 1e9 / (options.frames_per_s * options.slow_motion);
   const double steps = static_cast<double>(overview.end - overview.start) / step_ns;
-  if (!(steps < kMostFrames)) {
+  if (!(steps < kMaxFrames)) {
     throw RemediableError(fmt::format("{} lasts {:.4g} s, too long for a video; choose a part of it, or show it faster",
                                       options.name, to_seconds(overview.end - overview.start)),
                           Remedy::shorter_video);
@@ -150,8 +150,8 @@ struct Player::Impl {
         layout(how.views, about.sensor, how.width),
         grid(picture_grid(about.sensor, layout.panel_width, layout.panel_height)),
         image_from(image_content(about)),
-        window(how.window_events > 0 ? how.window_events : kMostEventsCounted),
-        cloud(kMostPoints, true),
+        window(how.window_events > 0 ? how.window_events : kMaxEventsCounted),
+        cloud(kMaxPoints, true),
         surface(grid) {}
 
   bool shows(View view) const {
@@ -191,7 +191,7 @@ struct Player::Impl {
 // Time until which all records are known; kinds of records that have ended do not count.
 TimeNs Player::Impl::known_until() const {
   TimeNs until = std::numeric_limits<TimeNs>::max();
-  if (ended || waiting.size() > kMostEventsWaiting) return until;
+  if (ended || waiting.size() > kMaxEventsWaiting) return until;
   for (const auto& [content, last] : overview.last) {
     const auto now = seen.find(content);
     if (now == seen.end()) return std::numeric_limits<TimeNs>::min();
@@ -235,7 +235,7 @@ void Player::Impl::add(const TruthRecord& truth) {
     depths.add(truth.t, colour_depth(picked(truth.depth, grid), overview.depth.near_m(), overview.depth.far_m()));
   if (shows(View::motion)) {
     motions.add(truth.t,
-                colour_flow(picked(truth.flow_x, grid), picked(truth.flow_y, grid), overview.motion.full_px_per_s()));
+                colour_motion(picked(truth.motion_x, grid), picked(truth.motion_y, grid), overview.motion.full_px_per_s()));
   }
 }
 
@@ -302,7 +302,7 @@ Panel Player::Impl::draw(View view, TimeNs t) {
     case View::depth:
       return {.picture = large(depths), .near_m = overview.depth.near_m(), .far_m = overview.depth.far_m()};
     case View::motion:
-      return {.picture = large(motions), .full_flow_px_per_s = overview.motion.full_px_per_s()};
+      return {.picture = large(motions), .full_speed_px_per_s = overview.motion.full_px_per_s()};
   }
   return {};
 }

@@ -7,9 +7,9 @@
 namespace esim::inline visualise {
 namespace {
 
-constexpr double kMostSeconds = 1e9;  // limit of given times, so that sums stay in range
+constexpr double kMaxSeconds = 1e9;  // limit of given times, so that sums stay in range
 
-TimeNs bounded_ns(double seconds) { return to_ns(std::clamp(seconds, 0.0, kMostSeconds)); }
+TimeNs bounded_ns(double seconds) { return to_ns(std::clamp(seconds, 0.0, kMaxSeconds)); }
 
 }  // namespace
 
@@ -63,7 +63,7 @@ std::optional<RecordingOverview> read_overview(Source& source, const Extent& ext
       }
     } else if (const auto* truth = std::get_if<TruthRecord>(record)) {
       found.depth.include(truth->depth);
-      found.motion.include(truth->flow_x, truth->flow_y);
+      found.motion.include(truth->motion_x, truth->motion_y);
     }
     found.end = std::clamp(stamp->last, found.end, end);
     if (stamp->first > end && std::holds_alternative<EventsRecord>(*record)) break;

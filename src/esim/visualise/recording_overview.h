@@ -26,7 +26,7 @@ struct RecordingOverview {
   std::uint64_t events = 0;          ///< from start to end
   std::map<Content, TimeNs> last{};  ///< kinds of records that can be shown, with the time of the last one
   DepthScale depth{};                ///< scale for all depths that are shown
-  FlowScale motion{};
+  MotionScale motion{};
 };
 
 /// The views that the records support, in the order of View: depth and motion need ground truth, image any frame.

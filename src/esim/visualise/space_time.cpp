@@ -154,12 +154,12 @@ class Plot {
     label_axis(0, {0, bottom, front_[2]}, std::array{0.0, 0.0, front_[2] - back_[2]});
     label_axis(2, {front_[0], bottom, 0}, std::array{front_[0] - back_[0], 0.0, 0.0});
     std::array<double, 3> leftmost{};
-    double least = std::numeric_limits<double>::infinity();
+    double min = std::numeric_limits<double>::infinity();
     for (const double x : {axes_[0].low, axes_[0].high}) {
       for (const double t : {axes_[2].low, axes_[2].high}) {
         const double column = place({x, bottom, t}).spot.x;
-        if (column < least) leftmost = {x, 0, t};
-        least = std::min(least, column);
+        if (column < min) leftmost = {x, 0, t};
+        min = std::min(min, column);
       }
     }
     label_axis(1, leftmost, std::nullopt);

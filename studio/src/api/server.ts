@@ -69,8 +69,13 @@ export const eventPicture = (id: string, query: PictureQuery, signal?: AbortSign
     { ...query, t: Math.round(query.t), window: Math.round(query.window) },
     signal,
   );
-export const image = (id: string, camera: string, kind: "image" | "depth" | "flow", t: number, signal?: AbortSignal) =>
-  getPicture(recording(id, "image.png"), { camera, kind, t: Math.round(t) }, signal);
+export const image = (
+  id: string,
+  camera: string,
+  kind: "image" | "depth" | "motion_field",
+  t: number,
+  signal?: AbortSignal,
+) => getPicture(recording(id, "image.png"), { camera, kind, t: Math.round(t) }, signal);
 export const events = async (
   id: string,
   camera: string,

@@ -14,7 +14,7 @@ import { YamlEditor } from "./yaml_editor.ts";
 
 /** Options at the top of the scenario, without a group. */
 const general = "general";
-const most_hits = 40;
+const max_hits = 40;
 
 /** Every option of the scenario as a form, next to its text. */
 export class ConfigurePlace implements Place {
@@ -154,10 +154,10 @@ export class ConfigurePlace implements Place {
     this.found.textContent =
       hits.length === 0
         ? "nothing found"
-        : `${hits.length} found${hits.length > most_hits ? `, ${most_hits} shown` : ""}`;
+        : `${hits.length} found${hits.length > max_hits ? `, ${max_hits} shown` : ""}`;
     if (key === this.hits) return;
     this.hits = key;
-    const shown = hits.slice(0, most_hits);
+    const shown = hits.slice(0, max_hits);
     this.fields = shown
       .filter(({ needs }) => !needs)
       .map(({ where, node }) => makeField({ ...node, name: where }, where, this.context));

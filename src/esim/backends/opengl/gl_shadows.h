@@ -49,7 +49,7 @@ class GlShadows {
     Eigen::Matrix4d world_from_object;
   };
 
-  Maps make_maps(double most_texels) const;
+  Maps make_maps(double max_texels) const;
   void draw_views(const Maps& maps, const std::vector<Placed>& objects) const;
   void view_points(Maps& maps) const;
   View still_sun(const Scene& scene, const SunLight& sun) const;

@@ -18,7 +18,7 @@ Json json_of(const EventComparison& events) {
       {"count_ratio", events.count_ratio()},
       {"active_pixels", events.active_pixels},
       {"identical_pixels", events.identical_pixels},
-      {"identical_share", events.identical_share()},
+      {"identical_fraction", events.identical_fraction()},
       {"matched", events.matched},
       {"missing", events.missing},
       {"spurious", events.spurious},
@@ -111,7 +111,7 @@ std::string to_json(const SamplingEvaluation& evaluation) {
       {"motion",
        {{"rate_hz", evaluation.motion.rate_hz},
         {"mean_px_per_s", evaluation.motion.mean_px_per_s},
-        {"greatest_px_per_s", evaluation.motion.greatest_px_per_s},
+        {"max_px_per_s", evaluation.motion.max_px_per_s},
         {"fastest_turn_deg_per_s", evaluation.motion.fastest_turn_deg_per_s}}},
       {"windows", windows_json(evaluation)},
       {"schemes", schemes},
@@ -139,8 +139,8 @@ std::string text_line(const SchemeResult& scheme) {
       fmt::format("{:<28}{:>10.0f}{:>10.0f}", scheme.text, all.frame_equivalents_per_s, all.samples_per_s);
   for (const WindowResult& window : scheme.windows) text += fmt::format("{:>12.5f}", window.brightness.mean_rmse);
   if (all.events) {
-    text += fmt::format("{:>9.3f}{:>8.3f}{:>11.1f}{:>9.1f}", all.events->count_ratio(), all.events->identical_share(),
-                        all.events->median_s * 1e6, all.events->p95_s * 1e6);
+    text += fmt::format("{:>9.3f}{:>8.3f}{:>11.1f}{:>9.1f}", all.events->count_ratio(),
+                        all.events->identical_fraction(), all.events->median_s * 1e6, all.events->p95_s * 1e6);
   }
   return text + fmt::format("{:>8.3f}\n", scheme.real_time_factor);
 }

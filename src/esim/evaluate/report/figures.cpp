@@ -58,10 +58,10 @@ struct Range {
   Range with_room() const { return high > 0 ? Range{low / 1.4, high * 1.4} : Range{0.1, 1}; }
 };
 
-double quantile(std::vector<double> values, double share) {
+double quantile(std::vector<double> values, double rank) {
   if (values.empty()) return 0;
   std::sort(values.begin(), values.end());
-  const double position = share * static_cast<double>(values.size() - 1);
+  const double position = rank * static_cast<double>(values.size() - 1);
   const auto below = static_cast<std::size_t>(position);
   const double fraction = position - static_cast<double>(below);
   return values[below] + fraction * (values[std::min(below + 1, values.size() - 1)] - values[below]);

@@ -94,8 +94,8 @@ void for_each_number(const Field& field, std::size_t stride, std::span<const std
 template <typename Number>
 std::int64_t integer(Number value) {
   if constexpr (std::is_floating_point_v<Number>) {
-    constexpr Number kMost = 1 << 30;
-    return std::abs(value) < kMost && value == std::trunc(value) ? static_cast<std::int64_t>(value) : Array::kNoNumber;
+    constexpr Number kMax = 1 << 30;
+    return std::abs(value) < kMax && value == std::trunc(value) ? static_cast<std::int64_t>(value) : Array::kNoNumber;
   } else {
     return std::in_range<std::int64_t>(value) ? static_cast<std::int64_t>(value) : Array::kNoNumber;
   }
@@ -159,12 +159,12 @@ void Array::integers(const Field& field, std::vector<std::int64_t>& out) const {
 
 void Array::times(const Field& field, std::vector<std::int64_t>& out) const {
   if (field.kind == 'f') {
-    constexpr double kMost = 9e9;  // larger times do not fit into int64 ns
+    constexpr double kMax = 9e9;  // larger times do not fit into int64 ns
     out.clear();
     out.reserve(held_);
     for_each_number(field, item_bytes_, std::span(items_).first(held_ * item_bytes_), [&](auto value) {
       const auto seconds = static_cast<double>(value);
-      out.push_back(std::abs(seconds) < kMost ? to_ns(seconds) : kNoNumber);
+      out.push_back(std::abs(seconds) < kMax ? to_ns(seconds) : kNoNumber);
     });
     return;
   }

@@ -290,14 +290,14 @@ class Folder {
     if (model.width == 0) model.width = size.width, model.height = size.height;
   }
 
-  /// The names are "static", then the objects, then the layers.
+  /// The names are "static", then the objects, then the sprites.
   void learn_names(const TruthHdf5Reader& truth) {
     const std::vector<std::string>& names = truth.names();
     const std::size_t objects = info_.objects.empty() ? truth.objects() : info_.objects.size();
     if (names.size() < 1 + objects) return;
-    const auto layers = names.begin() + 1 + static_cast<std::ptrdiff_t>(objects);
-    info_.objects.assign(names.begin() + 1, layers);
-    info_.layers.assign(layers, names.end());
+    const auto sprites = names.begin() + 1 + static_cast<std::ptrdiff_t>(objects);
+    info_.objects.assign(names.begin() + 1, sprites);
+    info_.sprites.assign(sprites, names.end());
   }
 
   ReadOptions options_;
@@ -319,7 +319,7 @@ Format recording_format() {
       .description = "the folder of a recording, or of one of its cameras",
       .extensions = {""},
       .holds = {Content::events, Content::frames, Content::images, Content::imu, Content::poses, Content::truth,
-                Content::displacement},
+                Content::optical_flow},
       .several_cameras = true,
       .folder = true,
       .either_unit = true,

@@ -225,7 +225,7 @@ RosSource::Result RosSource::read_truth(const Assignment& to, const Channel& cha
     reader(message);
     if (!fits(to.camera, message.width, message.height)) return std::nullopt;
     TruthAssembler::Frame& frame = truth.begin(Part::flow, message.header.stamp);
-    to_images(message, frame.flow_x, frame.flow_y);
+    to_images(message, frame.motion_x, frame.motion_y);
   } else {
     ImageMessage message;
     reader(message);

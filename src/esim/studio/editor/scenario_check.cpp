@@ -105,7 +105,7 @@ std::string option_in(const std::string& message) {
 }
 
 CheckedScenario check_scenario(const std::string& yaml, const fs::path& file, const Roots& roots) {
-  constexpr int kMostProblems = 20;
+  constexpr int kMaxProblems = 20;
   CheckedScenario checked;
   checked.values = values_of(yaml, file.filename().string());
   ScenarioText text;
@@ -119,7 +119,7 @@ CheckedScenario check_scenario(const std::string& yaml, const fs::path& file, co
     }
     checked.problems.push_back({{"where", where}, {"what", what}});
   };
-  for (int i = 0; i < kMostProblems; ++i) {
+  for (int i = 0; i < kMaxProblems; ++i) {
     try {
       Scenario scenario = read_scenario(text);
       refuse_foreign_files(scenario, roots);

@@ -18,7 +18,7 @@ using Path = std::vector<std::string>;
 // --- text to values ---
 
 /// Aliases of anchors share nodes, so that a small text may be an endless tree.
-constexpr int kMostNodes = 1 << 20, kMostDeep = 64;
+constexpr int kMaxNodes = 1 << 20, kMaxDeep = 64;
 
 Json scalar_json(const YAML::Node& node) {
   const std::string& text = node.Scalar();
@@ -35,7 +35,7 @@ Json scalar_json(const YAML::Node& node) {
 }
 
 Json json_of(const YAML::Node& node, int depth, int& nodes) {
-  if (++nodes > kMostNodes || depth > kMostDeep)
+  if (++nodes > kMaxNodes || depth > kMaxDeep)
     throw UserError("the scenario is nested too deeply, is too large, or has an alias that contains itself");
   if (node.IsMap()) {
     Json object = Json::object();
@@ -194,8 +194,8 @@ std::size_t end_of_value(const std::string& text, std::size_t from, std::size_t 
 bool is_flow(const YAML::Node& node) { return node.Style() == YAML::EmitterStyle::Flow; }
 
 std::optional<std::size_t> index_of(const std::string& part) {
-  constexpr std::size_t kMostDigits = 6;
-  if (part.empty() || part.size() > kMostDigits || part.find_first_not_of("0123456789") != std::string::npos)
+  constexpr std::size_t kMaxDigits = 6;
+  if (part.empty() || part.size() > kMaxDigits || part.find_first_not_of("0123456789") != std::string::npos)
     return std::nullopt;
   return std::stoul(part);
 }
@@ -391,7 +391,7 @@ std::string with_option(const std::string& yaml, const std::string& key, const J
     if (path.back().empty()) throw UserError(fmt::format("'{}' is not an option", key));
     begin = end + 1;
   }
-  if (path.size() > static_cast<std::size_t>(kMostDeep)) throw UserError(fmt::format("'{}' is not an option", key));
+  if (path.size() > static_cast<std::size_t>(kMaxDeep)) throw UserError(fmt::format("'{}' is not an option", key));
   const Json before = values_of(yaml, "the scenario");
   Json wanted = before;
   set_in(wanted, path, value);

@@ -15,12 +15,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kMostBytes = std::uintmax_t{8} << 20;
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t{8} << 20;
 
 std::string read(const fs::path& file, const std::string& name) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) throw HttpError(404, name + ": no such file");
-  if (fs::file_size(file, error) > kMostBytes)
+  if (fs::file_size(file, error) > kMaxBytes)
     throw HttpError(413, name + ": is too large; a scenario must have at most 8 MiB");
   std::ifstream stream(file, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(stream), {}};

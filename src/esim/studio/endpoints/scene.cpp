@@ -49,7 +49,7 @@ struct DescribeKind {
     }
     answer["bounds"] = {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
   }
-  void operator()(const auto&) const { answer["kind"] = "layers"; }  // the page shows only the simulator's images
+  void operator()(const auto&) const { answer["kind"] = "sprites"; }  // the page shows only the simulator's images
 };
 
 Json cameras_json(const std::vector<CameraInfo>& cameras) {
@@ -157,16 +157,16 @@ CameraInfo camera_in(const Json& request, const std::vector<CameraInfo>& cameras
 
 /// The image of a camera at a time of the motion, or from a given pose.
 Response view(const Json& request, const Workshop& workshop) {
-  constexpr double kMostPixels = 4096, kMostTime_ns = 9e15;
+  constexpr double kMaxPixels = 4096, kMaxTime_ns = 9e15;
   const bool free = request.contains("pose") && !request["pose"].is_null();
   const Scenario scenario = scenario_of(request, workshop.roots, free ? ScenarioNeeds::scene : ScenarioNeeds::motion);
   const auto scene = workshop.scenes.of(scenario);
   const CameraInfo info = camera_in(request, cameras_of(scenario, scene->file()));
   Camera camera = info.model;
   if (!scene->on_sensor()) {
-    const auto width = static_cast<int>(number_member(request, "width", camera.width, 16, kMostPixels));
+    const auto width = static_cast<int>(number_member(request, "width", camera.width, 16, kMaxPixels));
     const double height = std::round(static_cast<double>(camera.height) * width / camera.width);
-    camera = scaled(camera, width, static_cast<int>(std::clamp(height, 1.0, kMostPixels)));
+    camera = scaled(camera, width, static_cast<int>(std::clamp(height, 1.0, kMaxPixels)));
   }
   RenderRequest look;
   std::optional<StudioMotion> motion;
@@ -177,7 +177,7 @@ Response view(const Json& request, const Workshop& workshop) {
   }
   if (motion) {
     const double start = static_cast<double>(motion->simulated.start);
-    const auto t = static_cast<TimeNs>(number_member(request, "t", start, -kMostTime_ns, kMostTime_ns));
+    const auto t = static_cast<TimeNs>(number_member(request, "t", start, -kMaxTime_ns, kMaxTime_ns));
     look.t = std::clamp(t, motion->body->start(), motion->body->end());
     look.camera = rigidly_attached(motion->body->at(look.t), info.T_body_camera);
     const TimeNs within = std::clamp(look.t, motion->simulated.start, motion->simulated.end);

@@ -57,7 +57,7 @@ std::vector<std::uint32_t> coarse_indices(const Surface& surface, std::size_t wa
 
   // A square of n x n cells has 2 n^2 triangles: the initial value of the search for other surfaces.
   constexpr int kTries = 4;
-  constexpr float kMostCells = 32'000;
+  constexpr float kMaxCells = 32'000;
   float cells = std::sqrt(static_cast<float>(wanted) / 2);
   std::vector<std::uint32_t> best;
   for (int i = 0; i < kTries; ++i) {
@@ -65,7 +65,7 @@ std::vector<std::uint32_t> coarse_indices(const Surface& surface, std::size_t wa
     const float ratio = static_cast<float>(wanted) / (static_cast<float>(indices.size() / 3) + 1);
     if (ratio >= 0.9F && indices.size() > best.size()) best = std::move(indices);
     if (ratio >= 0.9F && ratio < 1.5F) break;
-    cells = std::clamp(cells * std::sqrt(ratio) * 0.95F, 1.0F, kMostCells);
+    cells = std::clamp(cells * std::sqrt(ratio) * 0.95F, 1.0F, kMaxCells);
   }
   return best;
 }

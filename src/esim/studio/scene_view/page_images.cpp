@@ -80,9 +80,9 @@ std::optional<int> longest_side(const CodedTexture& texture) {
 
 /// A JPEG decoded at reduced size (down to one eighth), which is fast; empty if this is not possible.
 std::optional<cv::Mat> reduced(const CodedTexture& texture, int longest) {
-  constexpr int kMostSide = 8192, kFinest = 2;
+  constexpr int kMaxSide = 8192, kFinest = 2;
   const std::optional<int> side = longest_side(texture);
-  if (!is_plain_jpeg(text_of(texture)) || !side || *side > kMostSide || *side < kFinest * longest) return std::nullopt;
+  if (!is_plain_jpeg(text_of(texture)) || !side || *side > kMaxSide || *side < kFinest * longest) return std::nullopt;
   const int times = *side / longest;
   const int flags = times >= 8   ? cv::IMREAD_REDUCED_COLOR_8
                     : times >= 4 ? cv::IMREAD_REDUCED_COLOR_4

@@ -14,7 +14,7 @@ namespace {
 
 const Notices kSilent{[](const std::string&) {}, [](const std::string&) {}};
 
-constexpr std::size_t kMostScenes = 3;
+constexpr std::size_t kMaxScenes = 3;
 constexpr int kLongestPicture = 4096;
 constexpr int kFiner = 2;  // even: see ScenePictures::render()
 
@@ -82,7 +82,7 @@ StudioScene::StudioScene(const Scenario& scenario, std::string id, int threads)
       file_(load_scenes(scenario, SceneLook::coded, kSilent)) {
   if (fails_when_made(scenario.renderer)) pictures();
   if (std::holds_alternative<MeshRendererOptions>(scenario.renderer)) {
-    if (triangles() <= kMostTriangles) glb_ = make_glb(file_.scene, Workers(threads));
+    if (triangles() <= kMaxTriangles) glb_ = make_glb(file_.scene, Workers(threads));
     return;
   }
   const auto show = [&](const std::filesystem::path& image, const Softening& softening) {
@@ -134,7 +134,7 @@ std::shared_ptr<StudioScene> SceneStore::of(const Scenario& scenario) {
   auto scene = std::make_shared<StudioScene>(scenario, id, threads_);
   scenes_[id] = scene;
   order_.push_back(id);
-  if (order_.size() > kMostScenes) {
+  if (order_.size() > kMaxScenes) {
     scenes_.erase(order_.front());
     order_.erase(order_.begin());
   }

@@ -10,7 +10,7 @@
 namespace esim::inline truth {
 
 /// Optical flow of a camera from time t0 to t1.
-struct Displacement {
+struct OpticalFlowImages {
   TimeNs t0 = 0, t1 = 0;
 
   // From the pixel's centre at t0 to the image of the same scene point at t1, px, to the right and downwards; also
@@ -27,13 +27,13 @@ struct Displacement {
 /// The point is hidden if the frame at t1 shows a nearer surface at the point's pixel: if 1 / depth differs by more
 /// than its change within half a pixel plus 0.5 %. So at an edge, a point is visible if the centre of the nearest pixel
 /// sees the same side of the edge.
-class DisplacementField {
+class OpticalFlowFromDepth {
  public:
-  DisplacementField(const Camera& camera, const Workers& workers);
+  OpticalFlowFromDepth(const Camera& camera, const Workers& workers);
 
   /// Takes the next frame, a `sample` of the whole image rendered for `view`. Returns the optical flow from the
   /// previous frame to this one, valid until the next call; null for the first frame.
-  const Displacement* advance(const RenderRequest& view, const Sample& sample);
+  const OpticalFlowImages* advance(const RenderRequest& view, const Sample& sample);
 
  private:
   struct Frame {
@@ -48,7 +48,7 @@ class DisplacementField {
   Image<Eigen::Vector2d> bearings_;
   const Workers& workers_;
   std::optional<Frame> before_;
-  Displacement displacement_;
+  OpticalFlowImages optical_flow_;
 };
 
 }  // namespace esim::inline truth

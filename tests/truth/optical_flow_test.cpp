@@ -1,4 +1,4 @@
-#include "esim/truth/displacement.h"
+#include "esim/truth/optical_flow.h"
 
 #include <gtest/gtest.h>
 
@@ -49,19 +49,19 @@ class EveryRendererOfSpace : public test::EveryRenderer {
   }
 
   /// From now to `dt` seconds later.
-  Displacement displacement(double dt) const {
-    DisplacementField field(model_, test::two_threads());
+  OpticalFlowImages optical_flow(double dt) const {
+    OpticalFlowFromDepth field(model_, test::two_threads());
     EXPECT_EQ(field.advance(view(0), render(0)), nullptr);
     return *field.advance(view(dt), render(dt));
   }
 };
 
-TEST_P(EveryRendererOfSpace, DisplacementIsTheIntegralOfTheMotionFieldAlongThePath) {
+TEST_P(EveryRendererOfSpace, OpticalFlowIsTheIntegralOfTheMotionFieldAlongThePath) {
   constexpr int kSteps = 4;
   constexpr double kInterval = 0.04, kStep = kInterval / kSteps;
   std::vector<Sample> samples;
   for (int i = 0; i <= 2 * kSteps; ++i) samples.push_back(render(0.5 * kStep * i));
-  const Displacement found = displacement(kInterval);
+  const OpticalFlowImages found = optical_flow(kInterval);
   EXPECT_EQ(found.t0, test::kTime);
   EXPECT_EQ(found.t1, test::kTime + to_ns(kInterval));
 
@@ -77,7 +77,7 @@ TEST_P(EveryRendererOfSpace, DisplacementIsTheIntegralOfTheMotionFieldAlongThePa
                             (sample.object.empty() || sample.object(static_cast<int>(p.x()), static_cast<int>(p.y())) ==
                                                           samples[0].object(x, y));
         if (!smooth) return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
-        return {bilinear(sample.flow_x, p.x(), p.y()), bilinear(sample.flow_y, p.x(), p.y())};
+        return {bilinear(sample.motion_x, p.x(), p.y()), bilinear(sample.motion_y, p.x(), p.y())};
       };
       for (int i = 0; i < 2 * kSteps && at.allFinite(); i += 2) {
         const Eigen::Vector2d k1 = velocity(i, at), k2 = velocity(i + 1, at + 0.5 * kStep * k1),
@@ -98,7 +98,7 @@ TEST_P(EveryRendererOfSpace, DisplacementIsTheIntegralOfTheMotionFieldAlongThePa
 }
 
 TEST_P(EveryRendererOfSpace, DepthPosesAndCalibrationMapOneImageOntoAnother) {
-  const Displacement found = displacement(0.05);
+  const OpticalFlowImages found = optical_flow(0.05);
   const Sample here = render(0), there = render(0.05);
   double squared_error = 0, squared_change = 0;
   int count = 0;
@@ -155,8 +155,8 @@ class WallAndCard : public testing::TestWithParam<int> {
     return request;
   }
 
-  Displacement displacement(const RenderRequest& from, const RenderRequest& to) const {
-    DisplacementField field(model_, test::two_threads());
+  OpticalFlowImages optical_flow(const RenderRequest& from, const RenderRequest& to) const {
+    OpticalFlowFromDepth field(model_, test::two_threads());
     Sample sample;
     renderer_->render(from, sample);
     field.advance(from, sample);
@@ -176,7 +176,7 @@ class WallAndCard : public testing::TestWithParam<int> {
 
   /// Compares all pixels with rays, and returns the number of hidden pixels.
   int check(const RenderRequest& from, const RenderRequest& to) const {
-    const Displacement found = displacement(from, to);
+    const OpticalFlowImages found = optical_flow(from, to);
     const Eigen::Vector3d card_moves =
         to.objects[0].T_world_body.translation - from.objects[0].T_world_body.translation;
     int hidden = 0;
@@ -224,7 +224,7 @@ TEST_P(WallAndCard, TheCardMovesAndHidesTheWall) {
   const RenderRequest from = view(0, camera, {-0.2, 0, kCard}), to = view(1, camera, {0.2, 0.1, kCard - 0.3});
   EXPECT_GT(check(from, to), 200);
 
-  const Displacement found = displacement(from, to);
+  const OpticalFlowImages found = optical_flow(from, to);
   EXPECT_NEAR(found.x(5, 5), 0, 1e-4) << "the wall does not move";
   if (GetParam() == 0) {
     const double bearing = (60 - model_.cx) / model_.fx;  // on the card
@@ -234,14 +234,14 @@ TEST_P(WallAndCard, TheCardMovesAndHidesTheWall) {
 
 TEST_P(WallAndCard, AStandingViewIsSeenAgain) {
   const RenderRequest from = view(0, {0.1, 0.2, 0.3}, {0, 0, kCard});
-  const Displacement found = displacement(from, from);
+  const OpticalFlowImages found = optical_flow(from, from);
   for (const std::uint8_t visible : found.visible.pixels()) EXPECT_EQ(visible, 1);
   for (const float x : found.x.pixels()) EXPECT_NEAR(x, 0, 1e-4);
 }
 
 TEST_P(WallAndCard, WhatComesToLieBehindTheCameraHasNoImage) {
   const RenderRequest from = view(0, {0, 0, 0}, {0, 0, kCard}), to = view(1, {0, 0, 3}, {0, 0, kCard});
-  const Displacement found = displacement(from, to);
+  const OpticalFlowImages found = optical_flow(from, to);
   EXPECT_TRUE(std::isnan(found.x(61, 44)));
   EXPECT_EQ(found.visible(61, 44), 0);
 }

@@ -1,4 +1,4 @@
-#include "esim/scene/layer.h"
+#include "esim/scene/sprite.h"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 namespace esim::inline scene {
 namespace {
 
-using Parameters = LayerMotion::Parameters;
+using Parameters = SpriteMotion::Parameters;
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
 
@@ -34,32 +34,32 @@ std::vector<Parameters> natural_spline(const std::vector<double>& t, const std::
 
 }  // namespace
 
-LayerMotion::LayerMotion(const std::vector<LayerKeyframe>& keyframes, KeyframeInterpolation interpolation) {
-  if (keyframes.empty()) throw UserError("has no keyframes; add at least one, or remove the list");
-  for (const LayerKeyframe& key : keyframes) {
+SpriteMotion::SpriteMotion(const std::vector<SpritePose>& poses, SpriteInterpolation interpolation) {
+  if (poses.empty()) throw UserError("has no poses; add at least one, or remove the list");
+  for (const SpritePose& key : poses) {
     if (!t_s_.empty() && !(key.t_s > t_s_.back())) {
-      throw UserError(fmt::format(
-          "the times of keyframes must increase, but t_s = {} follows {}; sort them, and use each time once", key.t_s,
-          t_s_.back()));
+      throw UserError(
+          fmt::format("the times of poses must increase, but t_s = {} follows {}; sort them, and use each time once",
+                      key.t_s, t_s_.back()));
     }
     t_s_.push_back(key.t_s);
     Parameters value;
     value << key.position, key.rotation_deg * kRadiansPerDegree, key.scale, key.shear;
     values_.push_back(value);
   }
-  if (interpolation == KeyframeInterpolation::spline) {
+  if (interpolation == SpriteInterpolation::spline) {
     accelerations_ = natural_spline(t_s_, values_);
   } else {
     accelerations_.assign(t_s_.size(), Parameters::Zero());
   }
 }
 
-LayerMotion::State LayerMotion::at(TimeNs t) const {
+SpriteMotion::State SpriteMotion::at(TimeNs t) const {
   const double now_s = to_seconds(t);
   if (now_s < t_s_.front() || t_s_.size() == 1) return {values_.front(), Parameters::Zero()};
   if (now_s > t_s_.back()) return {values_.back(), Parameters::Zero()};
 
-  // Between keyframes i and i + 1; at the last keyframe the velocity is still that of the motion.
+  // Between poses i and i + 1; at the last pose the velocity is still that of the motion.
   const auto next = std::upper_bound(t_s_.begin(), t_s_.end() - 1, now_s);
   const auto i = static_cast<std::size_t>(next - t_s_.begin()) - 1;
   const double h = t_s_[i + 1] - t_s_[i], p = (t_s_[i + 1] - now_s) / h, q = (now_s - t_s_[i]) / h;
@@ -68,11 +68,11 @@ LayerMotion::State LayerMotion::at(TimeNs t) const {
           (values_[i + 1] - values_[i]) / h + h / 6 * ((1 - 3 * p * p) * a + (3 * q * q - 1) * b)};
 }
 
-LayerPlacement place(const LayerMotion::State& state, LayerUnits units, PixelSize image, PixelSize sensor,
-                     const Eigen::Vector2d& pivot) {
+SpritePlacement place(const SpriteMotion::State& state, SpriteUnits units, PixelSize image, PixelSize sensor,
+                      const Eigen::Vector2d& pivot) {
   const Eigen::Vector2d sensor_size(sensor.width, sensor.height);
   Eigen::Vector2d unit = Eigen::Vector2d::Ones(), extent(image.width, image.height);
-  if (units == LayerUnits::sensor) unit = sensor_size, extent = Eigen::Vector2d::Ones();
+  if (units == SpriteUnits::sensor) unit = sensor_size, extent = Eigen::Vector2d::Ones();
 
   const double c = std::cos(state.value[2]), s = std::sin(state.value[2]);
   Eigen::Matrix2d R, R_rate;
@@ -88,7 +88,7 @@ LayerPlacement place(const LayerMotion::State& state, LayerUnits units, PixelSiz
   S << scale.x(), shear * scale.y(), 0, scale.y();
   S_rate << scale_rate.x(), shear_rate * scale.y() + shear * scale_rate.y(), 0, scale_rate.y();
 
-  LayerPlacement placement;
+  SpritePlacement placement;
   placement.A = U * R * S * I;
   placement.A_rate = U * R_rate * S * I;
   placement.A_rate += U * R * S_rate * I;

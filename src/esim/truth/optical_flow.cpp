@@ -1,4 +1,4 @@
-#include "esim/truth/displacement.h"
+#include "esim/truth/optical_flow.h"
 
 #include <algorithm>
 #include <cmath>
@@ -36,23 +36,23 @@ bool is_seen(const Image<float>& depth, double u, double v, double nearness) {
 
 }  // namespace
 
-DisplacementField::DisplacementField(const Camera& camera, const Workers& workers)
+OpticalFlowFromDepth::OpticalFlowFromDepth(const Camera& camera, const Workers& workers)
     : camera_(camera), bearings_(bearings_of(camera)), workers_(workers) {
-  displacement_.x = displacement_.y = Image<float>(camera.width, camera.height);
-  displacement_.visible = Image<std::uint8_t>(camera.width, camera.height);
+  optical_flow_.x = optical_flow_.y = Image<float>(camera.width, camera.height);
+  optical_flow_.visible = Image<std::uint8_t>(camera.width, camera.height);
 }
 
-const Displacement* DisplacementField::advance(const RenderRequest& view, const Sample& sample) {
+const OpticalFlowImages* OpticalFlowFromDepth::advance(const RenderRequest& view, const Sample& sample) {
   const bool first = !before_;
   if (!first) compute(*before_, view, sample.depth);
   before_ = {view, sample.depth, sample.object};
-  return first ? nullptr : &displacement_;
+  return first ? nullptr : &optical_flow_;
 }
 
-void DisplacementField::compute(const Frame& from, const RenderRequest& to, const Image<float>& depth_there) {
+void OpticalFlowFromDepth::compute(const Frame& from, const RenderRequest& to, const Image<float>& depth_there) {
   const std::vector<SE3> T_there_here = motions(from.view, to);
-  displacement_.t0 = from.view.t;
-  displacement_.t1 = to.t;
+  optical_flow_.t0 = from.view.t;
+  optical_flow_.t1 = to.t;
   workers_.for_each(camera_.height, [&](int y) {
     for (int x = 0; x < camera_.width; ++x) {
       const SE3& motion = T_there_here[from.view.objects.empty() ? 0 : from.object(x, y)];
@@ -62,11 +62,11 @@ void DisplacementField::compute(const Frame& from, const RenderRequest& to, cons
       // The point divided by its depth: the scale does not affect the projection.
       const Eigen::Vector3d there = motion.rotation * bearing.homogeneous() + nearness * motion.translation;
       const auto image = camera_.project(there);
-      displacement_.x(x, y) = image ? static_cast<float>(image->pixel.x() - x) : kNone;
-      displacement_.y(x, y) = image ? static_cast<float>(image->pixel.y() - y) : kNone;
+      optical_flow_.x(x, y) = image ? static_cast<float>(image->pixel.x() - x) : kNone;
+      optical_flow_.y(x, y) = image ? static_cast<float>(image->pixel.y() - y) : kNone;
       const bool inside = image && image->pixel.x() >= -0.5 && image->pixel.x() < camera_.width - 0.5 &&
                           image->pixel.y() >= -0.5 && image->pixel.y() < camera_.height - 0.5;
-      displacement_.visible(x, y) =
+      optical_flow_.visible(x, y) =
           inside && is_seen(depth_there, image->pixel.x(), image->pixel.y(), nearness / there.z()) ? 1 : 0;
     }
   });

@@ -131,7 +131,8 @@ class Simulator::Run {
     std::vector<RenderRequest> views = {view(world_, index_of(camera), next->t, next->tiles)};
     for (const auto& [t, tiles] : next->later) views.push_back(view(world_, index_of(camera), t, tiles));
     for (RenderRequest& view : views) view.motion_rows = next->motion_rows;
-    camera.rendering = camera.asked_for(*next).start_together(std::move(views));
+    Renderer& renderer = next->renderer != nullptr ? *next->renderer : *camera.renderer;
+    camera.rendering = renderer.start_together(std::move(views));
   }
 
   /// Gives the frame camera the segments of the event camera.

@@ -13,11 +13,11 @@ constexpr int kLanes = 16;
 
 class PlaneRenderer final : public ProcessorRenderer {
  public:
-  PlaneRenderer(Poster poster, const Camera& camera, const Workers& workers, bool mosaic)
-      : poster_(std::move(poster)), rays_(camera), workers_(workers), mosaic_(mosaic) {}
+  PlaneRenderer(Poster poster, const Camera& camera, const Workers& workers, bool mosaic, double footprint)
+      : poster_(std::move(poster)), rays_(camera, footprint), workers_(workers), mosaic_(mosaic) {}
 
   RendererTraits traits() const override {
-    return {.name = "plane", .granularity = Granularity::tile, .at_infinity = false, .wide_pixels = true};
+    return {.name = "plane", .granularity = Granularity::tile, .at_infinity = false};
   }
 
  private:
@@ -103,9 +103,9 @@ class PlaneRenderer final : public ProcessorRenderer {
 }  // namespace
 
 std::unique_ptr<Renderer> make_plane_renderer(Poster poster, const Camera& camera, const Workers& workers,
-                                              ColourFilters filters) {
+                                              ColourFilters filters, double footprint) {
   const bool mosaic = filters == ColourFilters::rggb && poster.colours[0] != nullptr;
-  return std::make_unique<PlaneRenderer>(std::move(poster), camera, workers, mosaic);
+  return std::make_unique<PlaneRenderer>(std::move(poster), camera, workers, mosaic, footprint);
 }
 
 }  // namespace esim::inline backends::inline plane

@@ -168,11 +168,7 @@ Sequence AffineSequences::make(std::uint32_t index) const {
   scene.sprites.push_back({picture.light, nullptr, LayerUnits::pixel, LayerBeyond::mirror, layer, framing.pivot});
   auto renderer = make_sprites_renderer(std::move(scene), model, *world.workers);
   const SensorTraits traits{camera.contrast_threshold, camera.log_eps, false};
-  auto sampler = make_sampler(
-      o.sampling,
-      {traits, o.width, o.height, {0, world.info.end}, *world.workers, model, renderer->traits(), [](TimeNs t) {
-         return RenderRequest{.t = t, .camera = {}, .tiles = {}};
-       }});
+  auto sampler = make_sampler(o.sampling, {traits, o.width, o.height, {0, world.info.end}, *world.workers});
   world.cameras.push_back(
       {std::move(renderer), std::move(sampler), EventCamera(camera, o.width, o.height, sensor_seed), {}});
 

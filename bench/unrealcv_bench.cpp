@@ -1,5 +1,5 @@
-// The cost of UnrealCV's protocol without the engine's own time: from the request to E, Z and V, for frames of 346 x 260
-// that a server in this process has ready. Argument: light as PNG.
+// The cost of UnrealCV's protocol without the engine's own time: from the request to E, Z and V, for frames of 346 x
+// 260 that a server in this process has ready. Argument: light as PNG.
 #include <benchmark/benchmark.h>
 
 #include <string>

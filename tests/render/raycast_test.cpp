@@ -156,50 +156,31 @@ TEST(RaycastRenderer, SurfacesAreNoSharperWhereAnEdgeIs) {
 
 TEST(RaycastRenderer, NarrowPixelsAverageToWideOnes) {
   constexpr int kWide = 3;
-  Camera model = test::distorted_camera(1);
+  const Camera model = test::distorted_camera(1);
   const auto scene = build_raycast_scene(test::plain_moving_scene());
-  const auto see = [&] {
-    const auto renderer = make_raycast_renderer(scene, {0.5F, 64}, model, test::two_threads());
+  const auto see = [&](const PixelArea& area) {
+    const auto renderer =
+        make_raycast_renderer(scene, {0.5F, 64}, model, test::two_threads(), ColourFilters::none, area);
     Sample sample;
     renderer->render({test::kTime, test::moving_camera(), {{0, 0, model.width, model.height}}, test::moving_objects(0)},
                      sample);
     return sample;
   };
-  EXPECT_TRUE(see().narrow.empty());
-  model.footprint = kWide;
-  const Sample sample = see();
+  const Sample wide = see({kWide, kWide}), narrow = see({kWide, 1});
   double squares = 0, unlike = 0;
   int count = 0;
   for (int y = 1; y + 1 < model.height; ++y) {
     for (int x = 1; x + 1 < model.width; ++x, ++count) {
       double mean = 0;
       for (int j = -1; j <= 1; ++j)
-        for (int i = -1; i <= 1; ++i) mean += sample.narrow(x + i, y + j) / (kWide * kWide);
-      squares += std::pow(mean - sample.irradiance(x, y), 2);
-      unlike += std::pow(sample.narrow(x, y) - sample.irradiance(x, y), 2);
+        for (int i = -1; i <= 1; ++i) mean += narrow.irradiance(x + i, y + j) / (kWide * kWide);
+      squares += std::pow(mean - wide.irradiance(x, y), 2);
+      unlike += std::pow(narrow.irradiance(x, y) - wide.irradiance(x, y), 2);
+      ASSERT_EQ(wide.depth(x, y), narrow.depth(x, y));
     }
   }
   EXPECT_LT(std::sqrt(squares / count), 0.003);
   EXPECT_GT(std::sqrt(unlike / count), 0.015) << "edges should be narrower";
-}
-
-TEST(RaycastRenderer, MakesRoomForNarrowPixelsInAnySample) {
-  Camera model = test::distorted_camera(1);
-  const auto scene = build_raycast_scene(test::plain_moving_scene());
-  Sample sample;
-  const auto see = [&] {
-    make_raycast_renderer(scene, {0.5F, 16}, model, test::two_threads())
-        ->render({test::kTime, test::moving_camera(), {{0, 0, model.width, model.height}}, test::moving_objects(0)},
-                 sample);
-  };
-  model.footprint = 2;
-  see();
-  model.width += 40, model.height += 30;
-  see();
-  EXPECT_EQ(sample.narrow.bounds(), sample.irradiance.bounds());
-  model.footprint = 1;
-  see();
-  EXPECT_TRUE(sample.narrow.empty());
 }
 
 // --- moving objects

@@ -160,15 +160,18 @@ inline bool has_gl() { return !gl_devices().empty(); }
 inline constexpr std::array kRenderersOfSpace = {"panorama", "plane", "mesh", "moving_mesh", "gl", "moving_gl"};
 inline constexpr std::array kRenderersOnSensor = {"sprites"};
 
-/// Every renderer on a scene that fills the view from near the origin.
+/// Every renderer on a scene that fills the view from near the origin. Those of `gl` and `sprites` ignore `area`.
 inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Camera& camera,
-                                               const Workers& workers = two_threads()) {
-  if (name == "panorama") return make_panorama_renderer({smooth_texture(Wrap::repeat, Wrap::clamp)}, camera, workers);
-  if (name == "plane") return make_plane_renderer(test_plane(), camera, workers);
+                                               const Workers& workers = two_threads(), const PixelArea& area = {}) {
+  constexpr auto kNone = ColourFilters::none;
+  if (name == "panorama") {
+    return make_panorama_renderer({smooth_texture(Wrap::repeat, Wrap::clamp)}, camera, workers, kNone, area.texture);
+  }
+  if (name == "plane") return make_plane_renderer(test_plane(), camera, workers, kNone, area.texture);
   if (name == "sprites") return make_sprites_renderer(test_sprites(), camera, workers);
   const Scene scene = name.starts_with("moving") ? moving_scene() : still_scene(box_mesh());
   if (name.ends_with("gl")) return make_gl_renderer(scene, {}, camera);
-  return make_raycast_renderer(build_raycast_scene(scene), {}, camera, workers);
+  return make_raycast_renderer(build_raycast_scene(scene), {}, camera, workers, kNone, area);
 }
 
 /// The moving objects of that scene.

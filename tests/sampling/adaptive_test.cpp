@@ -94,9 +94,7 @@ void answer(const SampleRequest& request, const Movie& movie, Sample& sample) {
 
 Outcome sample(const AdaptiveSampling& options, const Movie& movie, TimeNs end, int threads = 2) {
   const Workers workers(threads);
-  const auto sampler = make_adaptive_sampler(
-      options,
-      {{kThreshold, kEps}, kWidth, kHeight, {0, end}, workers, Camera::from_fov(kWidth, kHeight, 1.0), {}, {}});
+  const auto sampler = make_adaptive_sampler(options, {{kThreshold, kEps}, kWidth, kHeight, {0, end}, workers});
   Outcome outcome;
   Sample sample;
   while (const auto request = sampler->next()) {

@@ -38,7 +38,8 @@ struct ServedView {
   Camera model() const { return Camera::from_fov(width, height, fov_deg * std::numbers::pi / 180); }
 };
 
-/// A server of UnrealCV's protocol on a separate thread. A function gives its images; it can be told to give wrong answers.
+/// A server of UnrealCV's protocol on a separate thread. A function gives its images; it can be told to give wrong
+/// answers.
 class UnrealcvServer {
  public:
   using Show = std::function<PinholeImage(const ServedView&)>;

@@ -5,9 +5,8 @@
 #include <numbers>
 
 #include "esim/compose/compose.h"
-#include "esim/core/error.h"
+#include "esim/core/engine_error.h"
 #include "esim/sampling/make_sampler.h"
-#include "esim/sampling/supersampling.h"
 #include "esim/scenario/read.h"
 
 namespace esim::inline compose {
@@ -49,15 +48,30 @@ SceneLook look_of(const Scenario& scenario) { return sees_colour(scenario) ? Sce
 /// filters.
 std::unique_ptr<Renderer> build_renderer(const RendererFactory& make_renderer, const CameraOptions& options,
                                          const Camera& model, const Workers& workers) {
-  if (!sees_colour(options)) return make_renderer(model, ColourFilters::none, workers);
-  if (std::holds_alternative<KeyframeSampling>(options.sampling)) {
-    throw UserError(fmt::format(
-        "camera {}: sampling: keyframes interpolates between neighbouring pixels, which see different colours; "
-        "use adaptive or flow, or colour: none",
-        options.name));
-  }
+  if (!sees_colour(options)) return make_renderer.make(model, ColourFilters::none, workers);
   try {
-    return make_renderer(model, options.colour, workers);
+    return make_renderer.make(model, options.colour, workers);
+  } catch (const UserError& error) {
+    throw UserError(fmt::format("camera {}: {}", options.name, error.what()));
+  }
+}
+
+std::unique_ptr<Sampler> build_sampler(const CameraOptions& options, const World& world, std::size_t index,
+                                       Renderer& renderer, const RendererFactory& make_renderer) {
+  const Workers& workers = *world.workers;
+  const Camera& model = world.info.cameras[index].model;
+  const EventCameraOptions& sensor = options.event_camera;
+  const SensorTraits traits{sensor.min_threshold(), sensor.log_eps, sees_colour(options)};
+  const auto make_other = [&](const Camera& camera, const std::optional<PixelArea>& area) -> std::unique_ptr<Renderer> {
+    if (!area) return make_renderer.make(camera, options.colour, workers);
+    return make_renderer.make_with_area ? make_renderer.make_with_area(camera, *area, workers) : nullptr;
+  };
+  const SceneAccess scene{model, renderer, view_at(world, index), make_other};
+  const TimeSpan span{world.info.start, world.info.end};
+  try {
+    return make_sampler(options.sampling, {traits, model.width, model.height, span, workers}, &scene);
+  } catch (const EngineError&) {
+    throw;
   } catch (const UserError& error) {
     throw UserError(fmt::format("camera {}: {}", options.name, error.what()));
   }
@@ -112,30 +126,20 @@ void name_what_has_no_effect(const Scenario& scenario, const World& world, std::
   }
 }
 
-/// The poses of a camera and of the moving objects at `t`; for an online motion, the last known pose of the body.
-RenderRequest known_view(const World& world, std::size_t index, TimeNs t) {
-  RenderRequest request;
-  request.t = t;
-  request.camera = rigidly_attached(world.trajectory->at(std::min(t, world.trajectory->end())),
-                                    world.info.cameras[index].T_body_camera);
-  for (const auto& object : world.objects) request.objects.push_back(object->at(t));
-  return request;
-}
-
 /// Renders a few images: if a camera never sees anything, its poses or frames are wrong.
 void require_a_view(const World& world, std::size_t index) {
   constexpr int kLooks = 9;
   if (world.cameras[index].renderer->traits().at_infinity) return;
   const CameraInfo& info = world.info.cameras[index];
+  const auto view_at = esim::view_at(world, index);
   Sample sample;
   for (int i = 0; i < kLooks; ++i) {
-    RenderRequest request =
-        known_view(world, index, world.info.start + (world.info.end - world.info.start) / (kLooks - 1) * i);
+    RenderRequest request = view_at(world.info.start + (world.info.end - world.info.start) / (kLooks - 1) * i);
     request.tiles = {{0, 0, info.model.width, info.model.height}};
     world.cameras[index].renderer->render(request, sample);
     if (sees_something(sample)) return;
   }
-  const Eigen::Vector3d position = known_view(world, index, world.info.start).camera.T_world_body.translation;
+  const Eigen::Vector3d position = view_at(world.info.start).camera.T_world_body.translation;
   throw UserError(
       fmt::format("camera {} never sees the scene (it starts at {:.3g} {:.3g} {:.3g} m); check "
                   "the trajectory's frame and T_body_camera",
@@ -212,26 +216,17 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
   }
   const RendererFactory make_renderer =
       substitutes.make_renderer
-          ? [&](const Camera& camera, ColourFilters,
-                const Workers& workers) { return substitutes.make_renderer(camera, workers); }
+          ? RendererFactory{[&](const Camera& camera, ColourFilters, const Workers& workers) {
+              return substitutes.make_renderer(camera, workers);
+            }}
           : build_renderer_factory(scenario.renderer, scene, sees_colour(scenario), world.info.cameras, notices);
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
     const CameraOptions& options = scenario.cameras[i];
     const Camera& model = world.info.cameras[i].model;
     const EventCameraOptions& sensor = options.event_camera;
-    const SensorTraits traits{sensor.min_threshold(), sensor.log_eps, sees_colour(options)};
     std::unique_ptr<Renderer> renderer = build_renderer(make_renderer, options, model, *world.workers);
-    SamplingContext context{traits,         model.width, model.height,       span,
-                            *world.workers, model,       renderer->traits(), view_at(world, i)};
-    SamplingOptions sampling = options.sampling;
-    std::unique_ptr<Renderer> keyframes;
-    if (auto* const wanted = std::get_if<KeyframeSampling>(&sampling)) {
-      const auto make = [&](const Camera& camera) { return make_renderer(camera, options.colour, *world.workers); };
-      *wanted = decide_supersampling(*wanted, known_view(world, i, span.start), context, *renderer, make);
-      keyframes = make(sampled_camera(sampling, context));
-    }
-    std::unique_ptr<Sampler> sampler = make_sampler(sampling, context);
-    world.cameras.push_back({std::move(renderer), std::move(sampler), std::nullopt, {}, nullptr, std::move(keyframes)});
+    std::unique_ptr<Sampler> sampler = build_sampler(options, world, i, *renderer, make_renderer);
+    world.cameras.push_back({std::move(renderer), std::move(sampler), std::nullopt, {}});
     if (options.events) {
       world.cameras.back().event_camera.emplace(sensor, model.width, model.height, scenario.seed,
                                                 static_cast<std::uint16_t>(i));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "esim/recording/format.h"
+#include "esim/render/pixel_area.h"
 #include "esim/scenario/conversion.h"
 #include "esim/scenario/scenario.h"
 #include "esim/scene/scene_file.h"
@@ -93,12 +94,17 @@ std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const S
 
 // --- renderers (renderer_factory.cpp, start_blender.cpp) -------------------------------------------------------------
 
-/// Makes the renderers of a scenario's cameras, which share one loaded scene. Throws UserError for colour filters that
-/// the renderer does not support.
-using RendererFactory =
-    std::function<std::unique_ptr<Renderer>(const Camera& camera, ColourFilters filters, const Workers& workers)>;
+/// Makes the renderers of a scenario's cameras, which share one loaded scene.
+struct RendererFactory {
+  /// Throws UserError for colour filters that the renderer does not support.
+  std::function<std::unique_ptr<Renderer>(const Camera& camera, ColourFilters filters, const Workers& workers)> make;
 
-/// Cameras may have colour filters if `colour`. Renderers are made for the sensors and for supersampled keyframes.
+  /// A renderer whose pixels average over `area`; null if they cannot. May be empty if they never can.
+  std::function<std::unique_ptr<Renderer>(const Camera& camera, const PixelArea& area, const Workers& workers)>
+      make_with_area{};
+};
+
+/// Cameras may have colour filters if `colour`. `sensors`: the cameras of the scenario; samplers may need others.
 RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene, bool colour,
                                        const std::vector<CameraInfo>& sensors, const Notices& notices);
 

@@ -64,7 +64,7 @@ EventPoints::MakeRenderer for_single_pixels(RendererFactory make_renderer, Rende
     make_renderer = build_renderer_factory(options, scene, false, world.info.cameras, notices);
   }
   return [make_renderer = std::move(make_renderer)](const Camera& camera, const Workers& workers) {
-    return make_renderer(camera, ColourFilters::none, workers);
+    return make_renderer.make(camera, ColourFilters::none, workers);
   };
 }
 

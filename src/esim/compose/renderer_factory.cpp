@@ -26,6 +26,25 @@ void refuse(ColourFilters filters, const char* renderer, const char* instead) {
     throw UserError(fmt::format("colour: {} renders luminance only; use {}, or colour: none", renderer, instead));
 }
 
+/// A factory of renderers whose pixels can average over other areas: make(camera, filters, area, workers).
+template <typename Make>
+RendererFactory with_area(const Make& make) {
+  return {[make](const Camera& camera, ColourFilters filters, const Workers& workers) -> std::unique_ptr<Renderer> {
+            return make(camera, filters, PixelArea{}, workers);
+          },
+          [make](const Camera& camera, const PixelArea& area, const Workers& workers) -> std::unique_ptr<Renderer> {
+            return make(camera, ColourFilters::none, area, workers);
+          }};
+}
+
+/// The same for scenes without edges, which have only one area: make(camera, filters, footprint, workers).
+template <typename Make>
+auto without_edges(const Make& make) {
+  return [make](const Camera& camera, ColourFilters filters, const PixelArea& area, const Workers& workers) {
+    return area.edges == area.texture ? make(camera, filters, area.texture, workers) : nullptr;
+  };
+}
+
 // One overload per type of renderer (scenario/renderer_options.h).
 
 /// OpenGL if there is a graphics card and no camera sees colour.
@@ -40,17 +59,17 @@ MeshEngine choose_engine(const MeshRendererOptions& options, bool colour) {
 RendererFactory factory(const MeshRendererOptions& options, const SceneFile& file, bool colour) {
   if (choose_engine(options, colour) == MeshEngine::gl) {
     const GlOptions gl{static_cast<float>(options.background), options.samples_per_pixel, options.gl_device};
-    return [gl, scene = std::make_shared<const Scene>(file.scene)](const Camera& camera, ColourFilters filters,
-                                                                   const Workers&) {
+    return {[gl, scene = std::make_shared<const Scene>(file.scene)](const Camera& camera, ColourFilters filters,
+                                                                    const Workers&) {
       refuse(filters, "engine: gl", "engine: raycast");
       return make_gl_renderer(*scene, gl, camera);
-    };
+    }};
   }
   const auto scene = build_raycast_scene(file.scene);
   const RaycastOptions raycast{static_cast<float>(options.background), options.samples_per_pixel};
-  return [=](const Camera& camera, ColourFilters filters, const Workers& workers) {
-    return make_raycast_renderer(scene, raycast, camera, workers, filters);
-  };
+  return with_area([=](const Camera& camera, ColourFilters filters, const PixelArea& area, const Workers& workers) {
+    return make_raycast_renderer(scene, raycast, camera, workers, filters, area);
+  });
 }
 
 RendererFactory factory(const PanoramaRendererOptions& options, const SceneFile&, bool colour) {
@@ -62,9 +81,10 @@ RendererFactory factory(const PanoramaRendererOptions& options, const SceneFile&
       std::make_shared<const Texture>(load_luminance(options.image, softening), Wrap::repeat, Wrap::clamp),
       Eigen::Quaterniond(options.orientation.normalized())};
   if (colour) panorama.colours = colour_textures(load_colours(options.image, softening), Wrap::repeat, Wrap::clamp);
-  return [=](const Camera& camera, ColourFilters filters, const Workers& workers) {
-    return make_panorama_renderer(panorama, camera, workers, filters);
-  };
+  return with_area(
+      without_edges([=](const Camera& camera, ColourFilters filters, double footprint, const Workers& workers) {
+        return make_panorama_renderer(panorama, camera, workers, filters, footprint);
+      }));
 }
 
 RendererFactory factory(const PlaneRendererOptions& options, const SceneFile&, bool colour) {
@@ -74,9 +94,10 @@ RendererFactory factory(const PlaneRendererOptions& options, const SceneFile&, b
   TexturedPlane plane{std::make_shared<const Texture>(load_luminance(options.image, softening), wrap, wrap),
                       pose_of(options.pose), options.width_m, options.endless, static_cast<float>(options.background)};
   if (colour) plane.colours = colour_textures(load_colours(options.image, softening), wrap, wrap);
-  return [=](const Camera& camera, ColourFilters filters, const Workers& workers) {
-    return make_plane_renderer(plane, camera, workers, filters);
-  };
+  return with_area(
+      without_edges([=](const Camera& camera, ColourFilters filters, double footprint, const Workers& workers) {
+        return make_plane_renderer(plane, camera, workers, filters, footprint);
+      }));
 }
 
 /// The textures of sprites. Sprites with the same image and filters share them.
@@ -117,10 +138,10 @@ RendererFactory factory(const SpritesRendererOptions& options, const SceneFile&,
       throw UserError(fmt::format("renderer.sprites.{}: {}", i, error.what()));
     }
   }
-  return [=](const Camera& camera, ColourFilters filters, const Workers& workers) {
+  return {[=](const Camera& camera, ColourFilters filters, const Workers& workers) {
     refuse(filters, "the renderer sprites", "a mesh, a plane or a panorama");
     return make_sprites_renderer(scene, camera, workers);
-  };
+  }};
 }
 
 RendererFactory factory(const UnrealcvRendererOptions& options, const SceneFile&, bool) {
@@ -136,10 +157,10 @@ RendererFactory factory(const UnrealcvRendererOptions& options, const SceneFile&
   engine.depth = options.depth;
   engine.mask = options.object_mask;
   for (const EngineObjectOptions& object : options.objects) engine.objects.push_back(object.name);
-  return [client = make_unrealcv_client(engine)](const Camera& camera, ColourFilters filters, const Workers& workers) {
+  return {[client = make_unrealcv_client(engine)](const Camera& camera, ColourFilters filters, const Workers& workers) {
     refuse(filters, "the renderer unrealcv", "a mesh, a plane or a panorama");
     return make_unrealcv_renderer(client, camera, workers);
-  };
+  }};
 }
 
 }  // namespace

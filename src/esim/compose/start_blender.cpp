@@ -70,13 +70,13 @@ RendererFactory start_blender(const BlenderRendererOptions& options, const std::
   }
   blender->client = make_unrealcv_client(engine);
   const std::shared_ptr<UnrealcvClient> client(blender, blender->client.get());
-  return [client, sensors, samples = options.samples](const Camera& camera, ColourFilters filters,
-                                                      const Workers& workers) {
+  return {[client, sensors, samples = options.samples](const Camera& camera, ColourFilters filters,
+                                                       const Workers& workers) {
     if (filters != ColourFilters::none)
       throw UserError(
           "colour: the renderer blender renders luminance only; use a mesh, a plane or a panorama, or colour: none");
     return make_unrealcv_renderer(client, camera, workers, samples_for(camera, sensors, samples));
-  };
+  }};
 }
 
 }  // namespace esim::inline compose

@@ -19,10 +19,6 @@ struct Sample {
   Image<float> motion_x;    // V, px/s, to the right           by motion_field() from Z, object and the twists, or by
   Image<float> motion_y;    // V, px/s, downwards              the renderer if its scene is not three-dimensional
 
-  // E over the area of one pixel if the camera's footprint is wider; E is its mean over the footprint. Empty otherwise,
-  // and for panorama and plane, which have no edges.
-  Image<float> narrow;
-
   // The visible moving object: 0 for none, i + 1 for the i-th of the request, or of the sprites drawn on the sensor.
   // Computed by the renderer; empty unless the request wants_objects().
   Image<std::uint16_t> object;

@@ -196,11 +196,9 @@ void describe(Visitor& visit, SpriteOptions& o) {
               "sensor, whose width and height are 1"});
   visit("beyond", o.beyond, About{"what lies beyond the image's edges"});
   describe_softening(visit, o);
-  visit(
-      "pivot", o.pivot,
-      About{
-          "point of the image that the poses place: [0, 0] is its upper left corner, [1, 1] its lower right corner",
-          "", -1e3, 1e3});
+  visit("pivot", o.pivot,
+        About{"point of the image that the poses place: [0, 0] is its upper left corner, [1, 1] its lower right corner",
+              "", -1e3, 1e3});
   visit("interpolation", o.interpolation, About{"motion between poses: natural cubic splines, or linear"});
   visit(
       "poses", o.poses,
@@ -219,9 +217,10 @@ struct SpritesRendererOptions {
 
 template <class Visitor>
 void describe(Visitor& visit, SpritesRendererOptions& o) {
-  visit("scene", o.scene,
-        About{"instead of sprites: a .scene file of the original ESIM; it also gives the duration and the camera's size "
-              "if the scenario does not"});
+  visit(
+      "scene", o.scene,
+      About{"instead of sprites: a .scene file of the original ESIM; it also gives the duration and the camera's size "
+            "if the scenario does not"});
   visit("search_path", o.search_path, About{"folders in which esim looks for the scene file's images"});
   visit("sprites", o.sprites, About{"sprites on the sensor, the nearest first"});
   visit("background", o.background, About{"irradiance where no sprite lies", "", 0, 1e6});

@@ -78,7 +78,7 @@ void Delivery::deliver_truth(TimeNs t) {
                       truth_.motion_y, world_.truth_objects ? &truth_.object : nullptr, object_poses_});
     if (optical_flow != nullptr) {
       write(OpticalFlowRecord{number, optical_flow->t0, optical_flow->t1, optical_flow->x, optical_flow->y,
-                               optical_flow->visible});
+                              optical_flow->visible});
     }
     ++summary_.truth_frames;
   }

@@ -12,7 +12,8 @@ void Stages::start_rendering(CameraChannel& camera, TimeNs known_until) {
     std::vector<RenderRequest> views = {view(world_, index, next->t, next->tiles)};
     for (const auto& [t, tiles] : next->later) views.push_back(view(world_, index, t, tiles));
     for (RenderRequest& view : views) view.motion_rows = next->motion_rows;
-    camera.rendering = camera.asked_for(*next).start_together(std::move(views));
+    Renderer& renderer = next->renderer != nullptr ? *next->renderer : *camera.renderer;
+    camera.rendering = renderer.start_together(std::move(views));
   });
 }
 

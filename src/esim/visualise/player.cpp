@@ -234,8 +234,8 @@ void Player::Impl::add(const TruthRecord& truth) {
   if (shows(View::depth))
     depths.add(truth.t, colour_depth(picked(truth.depth, grid), overview.depth.near_m(), overview.depth.far_m()));
   if (shows(View::motion)) {
-    motions.add(truth.t,
-                colour_motion(picked(truth.motion_x, grid), picked(truth.motion_y, grid), overview.motion.full_px_per_s()));
+    motions.add(truth.t, colour_motion(picked(truth.motion_x, grid), picked(truth.motion_y, grid),
+                                       overview.motion.full_px_per_s()));
   }
 }
 

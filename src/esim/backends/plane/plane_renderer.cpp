@@ -13,11 +13,11 @@ constexpr int kLanes = 16;
 
 class PlaneRenderer final : public ProcessorRenderer {
  public:
-  PlaneRenderer(TexturedPlane plane, const Camera& camera, const Workers& workers, bool mosaic)
-      : plane_(std::move(plane)), rays_(camera), workers_(workers), mosaic_(mosaic) {}
+  PlaneRenderer(TexturedPlane plane, const Camera& camera, const Workers& workers, bool mosaic, double footprint)
+      : plane_(std::move(plane)), rays_(camera, footprint), workers_(workers), mosaic_(mosaic) {}
 
   RendererTraits traits() const override {
-    return {.name = "plane", .granularity = Granularity::tile, .at_infinity = false, .wide_pixels = true};
+    return {.name = "plane", .granularity = Granularity::tile, .at_infinity = false};
   }
 
  private:
@@ -103,9 +103,9 @@ class PlaneRenderer final : public ProcessorRenderer {
 }  // namespace
 
 std::unique_ptr<Renderer> make_plane_renderer(TexturedPlane plane, const Camera& camera, const Workers& workers,
-                                              ColourFilters filters) {
+                                              ColourFilters filters, double footprint) {
   const bool mosaic = filters == ColourFilters::rggb && plane.colours[0] != nullptr;
-  return std::make_unique<PlaneRenderer>(std::move(plane), camera, workers, mosaic);
+  return std::make_unique<PlaneRenderer>(std::move(plane), camera, workers, mosaic, footprint);
 }
 
 }  // namespace esim::inline backends::inline plane

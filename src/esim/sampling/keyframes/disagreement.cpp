@@ -1,4 +1,4 @@
-#include "esim/sampling/disagreement.h"
+#include "esim/sampling/keyframes/disagreement.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "esim/sampling/keyframes.h"
+#include "esim/sampling/keyframes/keyframe_sampler.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,9 @@
 #include "esim/core/error.h"
 #include "esim/core/fast_log.h"
 #include "esim/core/random.h"
-#include "esim/sampling/disagreement.h"
+#include "esim/reproject/reprojector.h"
+#include "esim/sampling/keyframes/disagreement.h"
+#include "esim/sampling/keyframes/supersampling.h"
 
 namespace esim::inline sampling {
 namespace {
@@ -49,23 +51,22 @@ std::pair<double, double> speeds(const Sample& sample, double lower_share, doubl
 
 class KeyframeSampler final : public Sampler {
  public:
-  KeyframeSampler(const KeyframeSampling& options, const SamplingContext& context)
+  KeyframeSampler(const KeyframeSampling& options, const SamplingContext& context, const SceneAccess& scene)
       : options_(options),
         context_(context),
-        layout_(lay_out_keyframes(options, context)),
-        reprojector_(layout_, context.renderer.at_infinity, context.workers),
+        view_at_(scene.view_at),
+        setup_(set_up_keyframes(options, context, scene)),
+        reprojector_(setup_.layout, scene.renderer.traits().at_infinity, context.workers),
         random_(0, Purpose::sampling_audit),
         watermark_(context.span.start) {
     statistics_.tolerance = options.tolerance;
-    statistics_.supersampling = layout_.supersampling;
-    statistics_.resampling_floor = context.resampling_floor;
     request(context.span.start);
   }
 
   const SampleRequest* next() const override { return unsettled_ || step_ > 0 || !request_ ? nullptr : &*request_; }
 
   std::span<const Segment> accept(Sample& sample) override {
-    const bool first = statistics_.samples == 0, audit = request_->of_sensor;
+    const bool first = statistics_.samples == 0, audit = request_->renderer == nullptr;
     ++statistics_.samples;
     for (const Tile& tile : sample.tiles) statistics_.pixel_evaluations += static_cast<std::int64_t>(tile.area());
     if (audit) {
@@ -77,8 +78,8 @@ class KeyframeSampler final : public Sampler {
     if (!first) return settle();
     before_ = std::move(ahead_.back());
     ahead_.pop_back();
-    reprojector_.reconstruct(before_.keyframe, before_.keyframe, context_.view_at(before_.t()), Detail::whole, later_);
-    ++statistics_.reconstructions;
+    reprojector_.reconstruct(before_.keyframe, before_.keyframe, view_at_(before_.t()), Detail::whole, later_);
+    ++reconstructions_;
     segment_ = {sensor(), before_.t(), before_.t(), &later_.irradiance, &later_.irradiance};
     if (before_.t() < context_.span.end) {
       request(predicted());
@@ -101,24 +102,30 @@ class KeyframeSampler final : public Sampler {
   SamplingStatistics statistics() const override {
     SamplingStatistics result = statistics_;
     if (statistics_.audits > 0) result.measured_error = measured_error(errors_);
-    const double pixels = static_cast<double>(sensor().area()) * static_cast<double>(statistics_.reconstructions);
-    result.unseen_share = pixels > 0 ? static_cast<double>(unseen_) / pixels : 0;
+    const double pixels = static_cast<double>(sensor().area()) * static_cast<double>(reconstructions_);
+    result.others = {{"supersampling", std::int64_t{layout().supersampling}},
+                     {"resampling_floor", setup_.resampling_error},
+                     {"reconstructions", reconstructions_},
+                     {"unseen_share", pixels > 0 ? static_cast<double>(unseen_) / pixels : 0.0}};
     return result;
   }
 
  private:
-  Tile sensor() const { return {0, 0, layout_.sensor.width, layout_.sensor.height}; }
+  const KeyframeLayout& layout() const { return setup_.layout; }
+  Tile sensor() const { return {0, 0, layout().sensor.width, layout().sensor.height}; }
 
-  void request(TimeNs t) { request_ = SampleRequest{t, {{0, 0, layout_.camera.width, layout_.camera.height}}}; }
+  void request(TimeNs t) {
+    request_ = SampleRequest{t, {{0, 0, layout().camera.width, layout().camera.height}}, setup_.renderer.get()};
+  }
 
   /// Adds a rendered keyframe as the next of those ahead.
   void take(Sample& sample) {
     MovingKeyframe& taken = ahead_.emplace_back();
     std::tie(taken.typical_px_per_s, taken.fastest_px_per_s) = speeds(sample, 0.99, 0.999);
-    taken.typical_px_per_s /= layout_.supersampling;
-    taken.fastest_px_per_s /= layout_.supersampling;
-    const RenderRequest view = context_.view_at(sample.t);
-    reprojector_.prepare(view, sample, taken.keyframe);
+    taken.typical_px_per_s /= layout().supersampling;
+    taken.fastest_px_per_s /= layout().supersampling;
+    const RenderRequest view = view_at_(sample.t);
+    reprojector_.prepare(view, sample, setup_.renderer->take_light(sample), taken.keyframe);
     reprojector_.reconstruct(taken.keyframe, taken.keyframe, view, Detail::apart, apart_);
     taken.unseen = apart_.unseen;
   }
@@ -152,7 +159,7 @@ class KeyframeSampler final : public Sampler {
     if (intervals_++ % kAuditOneIn == 0 && interval > 1) {
       const auto [share, unused] = random_.uniforms(0, static_cast<std::uint64_t>(intervals_));
       const TimeNs t = before_.t() + 1 + static_cast<TimeNs>(share * static_cast<double>(interval - 1));
-      request_ = SampleRequest{t, {sensor()}, true};
+      request_ = SampleRequest{t, {sensor()}};
       return {};
     }
     return reconstruct();
@@ -167,7 +174,7 @@ class KeyframeSampler final : public Sampler {
     std::int64_t unseen = 0;
     for (const int quarter : {1, 2, 3}) {
       const TimeNs t = before_.t() + interval / 4 * quarter;
-      reprojector_.reconstruct(before_.keyframe, after.keyframe, context_.view_at(t), Detail::apart, apart_);
+      reprojector_.reconstruct(before_.keyframe, after.keyframe, view_at_(t), Detail::apart, apart_);
       worst = std::max(worst, disagreement(apart_, context_.sensor.log_eps));
       unseen = std::max(unseen, apart_.unseen);
     }
@@ -186,8 +193,8 @@ class KeyframeSampler final : public Sampler {
                          ? after.t()
                          : before_.t() + static_cast<TimeNs>(share * static_cast<double>(after.t() - before_.t()));
     std::swap(earlier_, later_);
-    reprojector_.reconstruct(before_.keyframe, after.keyframe, context_.view_at(t), Detail::whole, later_);
-    ++statistics_.reconstructions;
+    reprojector_.reconstruct(before_.keyframe, after.keyframe, view_at_(t), Detail::whole, later_);
+    ++reconstructions_;
     unseen_ += later_.unseen;
     segment_ = {sensor(), watermark_, t, &earlier_.irradiance, &later_.irradiance};
     if (watermark_ < truth_.t && truth_.t <= t) audit();
@@ -224,7 +231,8 @@ class KeyframeSampler final : public Sampler {
 
   KeyframeSampling options_;
   SamplingContext context_;
-  KeyframeLayout layout_;
+  std::function<RenderRequest(TimeNs)> view_at_;
+  KeyframeSetup setup_;
   Reprojector reprojector_;
 
   std::optional<SampleRequest> request_;
@@ -241,22 +249,26 @@ class KeyframeSampler final : public Sampler {
 
   SamplingStatistics statistics_;
   LogHistogram errors_;
-  std::int64_t unseen_ = 0;
+  std::int64_t reconstructions_ = 0;  // images between keyframes
+  std::int64_t unseen_ = 0;           // their pixels that no keyframe sees
 };
 
 }  // namespace
 
-KeyframeLayout lay_out_keyframes(const KeyframeSampling& options, const SamplingContext& context) {
-  if (context.renderer.on_sensor) {
-    throw UserError("sampling: type keyframes is not supported where " + context.renderer.name +
+std::unique_ptr<Sampler> make_keyframe_sampler(const KeyframeSampling& options, const SamplingContext& context,
+                                               const SceneAccess* scene) {
+  if (scene == nullptr)
+    throw UserError("sampling: type keyframes needs a scene that other cameras can see; use type flow or brightness");
+  if (const RendererTraits traits = scene->renderer.traits(); traits.on_sensor) {
+    throw UserError("sampling: type keyframes is not supported where " + traits.name +
                     " are drawn on the sensor itself; use type flow or brightness");
   }
-  return lay_out_keyframes(context.camera, options.supersampling > 0 ? options.supersampling : kLeastSupersampling,
-                           options.margin_px, context.renderer.wide_pixels);
-}
-
-std::unique_ptr<Sampler> make_keyframe_sampler(const KeyframeSampling& options, const SamplingContext& context) {
-  return std::make_unique<KeyframeSampler>(options, context);
+  if (context.sensor.mosaic) {
+    throw UserError(
+        "sampling: keyframes interpolates between neighbouring pixels, which see different colours; use adaptive or "
+        "flow, or colour: none");
+  }
+  return std::make_unique<KeyframeSampler>(options, context, *scene);
 }
 
 }  // namespace esim::inline sampling

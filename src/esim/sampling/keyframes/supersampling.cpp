@@ -1,22 +1,24 @@
-#include "esim/sampling/supersampling.h"
+#include "esim/sampling/keyframes/supersampling.h"
 
 #include <cmath>
 
 #include "esim/core/fast_log.h"
 #include "esim/geometry/so3.h"
 #include "esim/reproject/reprojector.h"
-#include "esim/sampling/keyframes.h"
 
 namespace esim::inline sampling {
+namespace {
 
-MeasuredError measure_resampling_floor(const KeyframeLayout& layout, RenderRequest request,
-                                       const SamplingContext& context, Renderer& sensor, Renderer& keyframes) {
+MeasuredError measure_resampling_error(const KeyframeSetup& setup, const SamplingContext& context,
+                                       const SceneAccess& scene) {
+  const KeyframeLayout& layout = setup.layout;
+  RenderRequest request = scene.view_at(context.span.start);
   request.tiles = {{0, 0, layout.camera.width, layout.camera.height}};
   Sample sample;
-  keyframes.render(request, sample);
+  setup.renderer->render(request, sample);
   Keyframe keyframe;
-  Reprojector reprojector(layout, context.renderer.at_infinity, context.workers);
-  reprojector.prepare(request, sample, keyframe);
+  Reprojector reprojector(layout, scene.renderer.traits().at_infinity, context.workers);
+  reprojector.prepare(request, sample, setup.renderer->take_light(sample), keyframe);
 
   // Turn the view so that its samples lie as far as possible from the keyframe's pixels. If s is odd, the centres of
   // the sensor's pixels and of the places within them lie on keyframe pixels: turn by half a keyframe pixel. If s is
@@ -27,7 +29,7 @@ MeasuredError measure_resampling_floor(const KeyframeLayout& layout, RenderReque
   SE3& pose = request.camera.T_world_body;
   pose.rotation = pose.rotation * so3_exp(Eigen::Vector3d(-turn / layout.sensor.fy, turn / layout.sensor.fx, 0));
   request.tiles = {{0, 0, layout.sensor.width, layout.sensor.height}};
-  sensor.render(request, sample);
+  scene.renderer.render(request, sample);
   Reconstruction found;
   reprojector.reconstruct(keyframe, keyframe, request, Detail::whole, found);
 
@@ -38,17 +40,18 @@ MeasuredError measure_resampling_floor(const KeyframeLayout& layout, RenderReque
   return measured_error(errors);
 }
 
-KeyframeSampling decide_supersampling(const KeyframeSampling& options, const RenderRequest& view,
-                                      SamplingContext& context, Renderer& sensor, const MakeRenderer& make_renderer) {
-  KeyframeSampling decided = options;
-  const double most = options.tolerance * context.sensor.contrast_threshold;
-  for (int s = kLeastSupersampling; s <= kMostSupersampling; ++s) {
-    if (options.supersampling == 0) decided.supersampling = s;
-    const KeyframeLayout layout = lay_out_keyframes(decided, context);
-    context.resampling_floor = measure_resampling_floor(layout, view, context, sensor, *make_renderer(layout.camera));
-    if (options.supersampling > 0 || context.resampling_floor->p99 <= most) break;
+}  // namespace
+
+KeyframeSetup set_up_keyframes(const KeyframeSampling& options, const SamplingContext& context,
+                               const SceneAccess& scene) {
+  const double max_error = options.tolerance * context.sensor.contrast_threshold;
+  const bool is_given = options.supersampling > 0;
+  for (int s = is_given ? options.supersampling : kMinSupersampling;; ++s) {
+    const KeyframeLayout layout = lay_out_keyframes(scene.camera, s, options.margin_px);
+    KeyframeSetup setup{layout, std::make_unique<KeyframeRenderer>(layout, scene), {}};
+    setup.resampling_error = measure_resampling_error(setup, context, scene);
+    if (is_given || s == kMaxSupersampling || setup.resampling_error.p99 <= max_error) return setup;
   }
-  return decided;
 }
 
 }  // namespace esim::inline sampling

@@ -30,7 +30,7 @@ void read_everything(const std::filesystem::path& path) {
 void read_truth(const std::filesystem::path& path) {
   const TruthHdf5Reader reader(path);
   TruthHdf5Reader::Frame frame;
-  TruthHdf5Reader::OpticalFlowImages optical_flow;
+  TruthHdf5Reader::OpticalFlow optical_flow;
   for (std::uint64_t i = 0; i < reader.size(); ++i) {
     reader.t(i);
     reader.read(i, frame);

@@ -54,7 +54,7 @@ ScenePictures::ScenePictures(const Scenario& scenario, int threads, const Notice
 }
 
 std::unique_ptr<Renderer> ScenePictures::renderer_for(const Camera& camera) const {
-  return factory_(camera, colour_ ? ColourFilters::rggb : ColourFilters::none, workers_);
+  return factory_.make(camera, colour_ ? ColourFilters::rggb : ColourFilters::none, workers_);
 }
 
 Image<Rgb> ScenePictures::render(const Camera& camera, int finer, RenderRequest view) {

@@ -191,7 +191,7 @@ Sequence AffineSequences::make(std::uint32_t index) const {
 
   // Ground truth, from the placements of the image.
   const auto lies = [&](TimeNs t) {
-    return place(sprite.at(t), SpriteUnits::pixel, {picture.light->width(), picture.light->height()}, sensor,
+    return place(sprite_motion.at(t), SpriteUnits::pixel, {picture.light->width(), picture.light->height()}, sensor,
                  framing.pivot);
   };
   const TimeNs start = 0, end = world.info.end;

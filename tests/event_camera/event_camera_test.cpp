@@ -9,8 +9,8 @@
 #include <tuple>
 
 #include "esim/core/error.h"
+#include "esim/event_camera/reference.h"
 #include "event_camera/feed.h"
-#include "event_camera/literal_event_camera.h"
 #include "support/errors.h"
 
 namespace esim {
@@ -39,7 +39,7 @@ std::vector<Image<float>> random_frames(int width, int height, int count, unsign
   return frames;
 }
 
-class EventCameraAgainstLiteral : public testing::TestWithParam<EventCameraOptions> {};
+class EventCameraAgainstReference : public testing::TestWithParam<EventCameraOptions> {};
 
 /// Expects the same events of each pixel, with times equal within the tolerance.
 void expect_same(std::vector<Event> events, std::vector<Event> expected, TimeNs tolerance_ns) {
@@ -58,17 +58,17 @@ void expect_same(std::vector<Event> events, std::vector<Event> expected, TimeNs 
   }
 }
 
-TEST_P(EventCameraAgainstLiteral, FiresTheSameEvents) {
+TEST_P(EventCameraAgainstReference, FiresTheSameEvents) {
   constexpr int kWidth = 37, kHeight = 11;
   const std::vector<Image<float>> frames = random_frames(kWidth, kHeight, 60, 5);
   Feed fast(GetParam(), kWidth, kHeight, 9);
-  test::LiteralEventCamera literal(GetParam(), kWidth, kHeight, 9, 0);
+  ReferenceEventCamera reference(GetParam(), kWidth, kHeight, 9, 0);
   std::mt19937 random(3);
   TimeNs t = -1000;
   std::vector<Event> expected;
   for (const Image<float>& frame : frames) {
     fast.frame(frame, t);
-    for (const Event& event : literal.process(frame, t)) expected.push_back(event);
+    for (const Event& event : reference.process(frame, t)) expected.push_back(event);
     t += 1 + static_cast<TimeNs>(random() % 2'000'000);
   }
   const std::vector<Event> events = fast.events();
@@ -79,7 +79,7 @@ TEST_P(EventCameraAgainstLiteral, FiresTheSameEvents) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Options, EventCameraAgainstLiteral,
+    Options, EventCameraAgainstReference,
     testing::Values(
         EventCameraOptions{}, EventCameraOptions{.contrast_threshold = 0.05},
         EventCameraOptions{.contrast_threshold_on = 0.2, .contrast_threshold_off = 0.7},

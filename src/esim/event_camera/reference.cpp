@@ -2,16 +2,24 @@
 #include "esim/event_camera/reference.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <numbers>
+#include <optional>
+#include <set>
 
 #include "esim/core/pixel_normals.h"
+#include "esim/core/random.h"
+#include "esim/event_camera/center_surround.h"
+#include "esim/event_camera/reference_signal.h"
 
 namespace esim::inline event_camera {
 namespace {
 
-constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kNever = ReferenceSignal::kNever;
+constexpr TimeNs kNoTime = std::numeric_limits<TimeNs>::max();
 constexpr double kToUnit = 0x1.0p-32;  // from a random word to [0, 1)
 
 /// Four standard normal deviates.
@@ -25,17 +33,76 @@ std::array<float, 4> normals_of(const AddressedRandom& random, std::uint32_t pix
 
 }  // namespace
 
+/// The state of the camera, and one function per step.
+class ReferenceEventCamera::Model {
+ public:
+  Model(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream);
+  std::vector<Event> process(const Image<float>& irradiance, TimeNs t);
+
+ private:
+  struct Pixel {
+    double light = 0, brightness = 0;     // E and L at the previous frame
+    double filtered1 = 0, filtered2 = 0;  // after each pole, then
+    double reference = 0;                 // R, then; it falls by `leak` per second
+    double on = 0, off = 0, leak = 0;     // thresholds, and 1/s; constant between two events
+    std::uint32_t draws = 0, shots = 0;   // number of draws for events, and of candidates of shot noise
+    TimeNs shot_at = kNoTime;             // next candidate of shot noise
+    std::optional<TimeNs> busy_until;     // end of the refractory period; kNoTime while it waits for the readout
+    double from = 0;                      // s after the previous frame: nothing is searched before
+    std::array<float, 4> normals{};       // n' of the last event: ON, OFF, leak, latency
+  };
+
+  // Signal.
+  double brightness(double light) const;
+  std::vector<double> brightness_of(const Image<float>& irradiance, TimeNs t);
+  double intensity(double light) const;
+  ReferenceSignal signal_of(const Pixel& pixel, double light, double brightness, TimeNs t0, TimeNs t1) const;
+
+  // Events.
+  void open(std::size_t i, double light, double brightness, TimeNs t);
+  void draw_parameters(std::size_t i);
+  void next_shot(Pixel& pixel, double uniform) const;
+  bool find_shot(std::size_t i, const ReferenceSignal& signal, double& tau, int& polarity);
+  std::optional<Event> next_event(std::size_t i, const ReferenceSignal& signal);
+
+  // Time stamps.
+  TimeNs delay(const Pixel& pixel, double light) const;
+  void read_out(const std::vector<ReferenceSignal>& signals, std::vector<Event>& events);
+  void find_requests(std::size_t i, const ReferenceSignal& signal);
+  void raise(const Event& request, const std::vector<ReferenceSignal>& signals);
+  void serve_row(TimeNs service, const std::vector<ReferenceSignal>& signals, std::vector<Event>& events);
+  void acknowledge(const Event& request, TimeNs t, const std::vector<ReferenceSignal>& signals);
+  std::size_t pixel_of(const Event& event) const;
+
+  EventCameraOptions options_;
+  int width_;
+  bool holds_;
+  TimeNs refractory_;
+  std::vector<Pixel> pixels_;
+  std::optional<CenterSurround> surround_;
+  Image<float> surrounded_;
+  AddressedRandom mismatch_, per_event_, leak_, shot_, defects_;
+  std::optional<TimeNs> last_t_;
+
+  // The readout: future requests, waiting requests, and the time at which the reader is free.
+  std::set<Event> requests_;
+  std::vector<Event> waiting_;
+  std::vector<TimeNs> blind_until_;
+  double free_at_ = -std::numeric_limits<double>::infinity();  // ns after `epoch_`
+  TimeNs epoch_ = 0;
+};
+
 // ---------------------------------------------------------------------------------------------------------- Signal --
 
 /// (1) L = ln(E + log_eps), or v2e's response.
-double ReferenceEventCamera::brightness(double light) const {
+double ReferenceEventCamera::Model::brightness(double light) const {
   if (options_.response == PixelResponse::log) return std::log(light + options_.log_eps);
   const double knee = options_.lin_log_knee;
   return light > knee ? std::log(255 * light) : light / knee * std::log(255 * knee);
 }
 
 /// (2) The brightness of all pixels, minus that of their surround: the only step in which pixels depend on each other.
-std::vector<double> ReferenceEventCamera::brightness_of(const Image<float>& irradiance, TimeNs t) {
+std::vector<double> ReferenceEventCamera::Model::brightness_of(const Image<float>& irradiance, TimeNs t) {
   std::vector<double> values;
   for (const float light : irradiance.pixels()) values.push_back(brightness(light));
   if (!surround_) return values;
@@ -49,78 +116,12 @@ std::vector<double> ReferenceEventCamera::brightness_of(const Image<float>& irra
 }
 
 /// (4) i = (E + d) / (1 + d).
-double ReferenceEventCamera::intensity(double light) const {
+double ReferenceEventCamera::Model::intensity(double light) const {
   return (light + options_.dark_irradiance) / (1 + options_.dark_irradiance);
 }
 
-/// What the comparator of a pixel sees between two frames. tau is in s after the first of them.
-struct ReferenceEventCamera::Signal {
-  TimeNs t0, t1;
-  double duration;                      // s
-  double light0, light1, start, slope;  // E at both frames; L at the first, and its change per s
-  int poles;                            // of the photoreceptor's low-pass
-  double rate, filtered1, filtered2;    // of each pole: 1 / its time constant, and its output at t0
-
-  double light(double tau) const { return light0 + (light1 - light0) * tau / duration; }
-
-  /// (3) L is linear in time. (5) F after one or two poles, with u = rate tau and m = 1 - exp(-u).
-  double after(int pole, double tau) const {
-    if (pole == 0) return start + slope * tau;
-    const double u = rate * tau, m = -std::expm1(-u), b = slope / rate;
-    if (pole == 1) return filtered1 + (start - filtered1) * m + b * (u - m);
-    return filtered2 + (start - filtered2) * m + (filtered1 - start) * u * (1 - m) + b * (2 * u - 2 * m - u * m);
-  }
-  double value(double tau) const { return after(poles, tau); }
-
-  /// (5) dF/dt: each pole follows its input.
-  double slope_at(double tau) const { return poles == 0 ? slope : rate * (after(poles - 1, tau) - after(poles, tau)); }
-
-  /// The times between which F + leak tau is monotone: after `from`, until the end. Its slope is monotone as well,
-  /// before and after the inflection of F, which exists after two poles.
-  std::vector<double> turning_points(double from, double leak) const {
-    std::vector<double> ends = {from, duration}, turns;
-    if (poles == 2) {
-      const double b = slope / rate, u = 2 - (filtered2 - start + 2 * b) / (filtered1 - start + b);
-      if (u > rate * from && u < rate * duration) ends.insert(ends.begin() + 1, u / rate);
-    }
-    for (std::size_t k = 1; k < ends.size(); ++k) {
-      const bool rises = slope_at(ends[k - 1]) + leak > 0;
-      if (rises == (slope_at(ends[k]) + leak > 0)) continue;
-      const auto turned = [&](double tau) { return (slope_at(tau) + leak > 0) != rises; };
-      turns.push_back(first_time(ends[k - 1], ends[k], turned));
-    }
-    turns.push_back(duration);
-    return turns;
-  }
-
-  /// The time between a and b from which on a condition holds, which holds at b.
-  template <class Condition>
-  static double first_time(double a, double b, const Condition& holds) {
-    for (int bisections = 0; bisections < 100 && a < b; ++bisections) (holds(0.5 * (a + b)) ? b : a) = 0.5 * (a + b);
-    return b;
-  }
-
-  /// (6) The first time at which F + leak tau reaches `upper` (polarity 1) or `lower` (-1); kNever if it does not.
-  double first_crossing(double from, double leak, double lower, double upper, int& polarity) const {
-    double begin = from;
-    for (const double end : turning_points(from, leak)) {
-      const double last = value(end) + leak * end;
-      if (last >= upper) {
-        polarity = 1;
-        return first_time(begin, end, [&](double tau) { return value(tau) + leak * tau >= upper; });
-      }
-      if (last <= lower) {
-        polarity = -1;
-        return first_time(begin, end, [&](double tau) { return value(tau) + leak * tau <= lower; });
-      }
-      begin = end;
-    }
-    return kNever;
-  }
-};
-
-ReferenceEventCamera::Signal ReferenceEventCamera::signal_of(const Pixel& pixel, double light, double brightness,
-                                                             TimeNs t0, TimeNs t1) const {
+ReferenceSignal ReferenceEventCamera::Model::signal_of(const Pixel& pixel, double light, double brightness, TimeNs t0,
+                                                       TimeNs t1) const {
   const double duration = to_seconds(t1 - t0);
   const int poles = options_.low_pass_hz > 0 ? options_.low_pass_order : 0;
   // (5) The -3 dB frequency of all poles together is low_pass_hz i, at the mean irradiance of the segment.
@@ -141,8 +142,8 @@ ReferenceEventCamera::Signal ReferenceEventCamera::signal_of(const Pixel& pixel,
 
 // ---------------------------------------------------------------------------------------------------------- Events --
 
-ReferenceEventCamera::ReferenceEventCamera(const EventCameraOptions& options, int width, int height, std::uint64_t seed,
-                                           std::uint16_t stream)
+ReferenceEventCamera::Model::Model(const EventCameraOptions& options, int width, int height, std::uint64_t seed,
+                                   std::uint16_t stream)
     : options_(options),
       width_(width),
       holds_(options.refractory_mode == RefractoryMode::hold),
@@ -159,9 +160,9 @@ ReferenceEventCamera::ReferenceEventCamera(const EventCameraOptions& options, in
   surrounded_ = Image<float>(width, height);
 }
 
-std::vector<Event> ReferenceEventCamera::process(const Image<float>& irradiance, TimeNs t) {
+std::vector<Event> ReferenceEventCamera::Model::process(const Image<float>& irradiance, TimeNs t) {
   const std::vector<double> brightness = brightness_of(irradiance, t);
-  std::vector<Signal> signals;
+  std::vector<ReferenceSignal> signals;
   std::vector<Event> events;
   for (std::size_t i = 0; i < pixels_.size(); ++i) {
     const double light = irradiance.pixels()[i];
@@ -192,7 +193,7 @@ std::vector<Event> ReferenceEventCamera::process(const Image<float>& irradiance,
 }
 
 /// The first frame.
-void ReferenceEventCamera::open(std::size_t i, double light, double brightness, TimeNs t) {
+void ReferenceEventCamera::Model::open(std::size_t i, double light, double brightness, TimeNs t) {
   Pixel& pixel = pixels_[i];
   const auto item = static_cast<std::uint32_t>(i);
   draw_parameters(i);
@@ -208,7 +209,7 @@ void ReferenceEventCamera::open(std::size_t i, double light, double brightness, 
 }
 
 /// Draws the parameters that hold until the next event.
-void ReferenceEventCamera::draw_parameters(std::size_t i) {
+void ReferenceEventCamera::Model::draw_parameters(std::size_t i) {
   Pixel& pixel = pixels_[i];
   const auto item = static_cast<std::uint32_t>(i);
   pixel.normals = normals_of(per_event_, item, pixel.draws++);
@@ -233,13 +234,13 @@ void ReferenceEventCamera::draw_parameters(std::size_t i) {
 }
 
 /// (9) Candidates of shot noise are a Poisson process at the rate in the dark.
-void ReferenceEventCamera::next_shot(Pixel& pixel, double uniform) const {
+void ReferenceEventCamera::Model::next_shot(Pixel& pixel, double uniform) const {
   pixel.shot_at += static_cast<TimeNs>(-std::log(uniform) / options_.shot_noise_hz * 1e9) + 1;
   ++pixel.shots;
 }
 
 /// (9) The first candidate before tau that is accepted, with probability 1 - (1 - w) i, replaces the crossing at tau.
-bool ReferenceEventCamera::find_shot(std::size_t i, const Signal& signal, double& tau, int& polarity) {
+bool ReferenceEventCamera::Model::find_shot(std::size_t i, const ReferenceSignal& signal, double& tau, int& polarity) {
   Pixel& pixel = pixels_[i];
   while (pixel.shot_at <= signal.t1 && to_seconds(pixel.shot_at - signal.t0) < tau) {
     const double at = to_seconds(pixel.shot_at - signal.t0);
@@ -256,7 +257,7 @@ bool ReferenceEventCamera::find_shot(std::size_t i, const Signal& signal, double
 }
 
 /// The next event of a pixel between two frames.
-std::optional<Event> ReferenceEventCamera::next_event(std::size_t i, const Signal& signal) {
+std::optional<Event> ReferenceEventCamera::Model::next_event(std::size_t i, const ReferenceSignal& signal) {
   Pixel& pixel = pixels_[i];
   while (true) {
     // (11) hold: until the end of the refractory period the pixel sees nothing; then R = F.
@@ -293,18 +294,18 @@ std::optional<Event> ReferenceEventCamera::next_event(std::size_t i, const Signa
 // ----------------------------------------------------------------------------------------------------- Time stamps --
 
 /// (12) max(0, latency + jitter n') (1 - s + s / i).
-TimeNs ReferenceEventCamera::delay(const Pixel& pixel, double light) const {
+TimeNs ReferenceEventCamera::Model::delay(const Pixel& pixel, double light) const {
   const double us = options_.latency_us + options_.latency_jitter_us * pixel.normals[3];
   const double s = options_.latency_light_share;
   return std::llround(std::max(us, 0.0) * (1 - s + s / intensity(light)) * 1e3);
 }
 
-std::size_t ReferenceEventCamera::pixel_of(const Event& event) const {
+std::size_t ReferenceEventCamera::Model::pixel_of(const Event& event) const {
   return static_cast<std::size_t>(event.y) * static_cast<std::size_t>(width_) + event.x;
 }
 
 /// (13) Between two frames: requests arrive, and the reader serves rows, in the order of time.
-void ReferenceEventCamera::read_out(const std::vector<Signal>& signals, std::vector<Event>& events) {
+void ReferenceEventCamera::Model::read_out(const std::vector<ReferenceSignal>& signals, std::vector<Event>& events) {
   for (std::size_t i = 0; i < pixels_.size(); ++i) find_requests(i, signals[i]);
   while (true) {
     const TimeNs arrival = requests_.empty() ? kNoTime : requests_.begin()->t;
@@ -322,7 +323,7 @@ void ReferenceEventCamera::read_out(const std::vector<Signal>& signals, std::vec
 }
 
 /// (14) A pixel that is held in reset waits for the acknowledgement of its event.
-void ReferenceEventCamera::find_requests(std::size_t i, const Signal& signal) {
+void ReferenceEventCamera::Model::find_requests(std::size_t i, const ReferenceSignal& signal) {
   while (const auto event = next_event(i, signal)) {
     requests_.insert(*event);
     if (!holds_) continue;
@@ -332,7 +333,7 @@ void ReferenceEventCamera::find_requests(std::size_t i, const Signal& signal) {
 }
 
 /// (14) One request per pixel. A request beyond the length of the queue is lost, as if it were read immediately.
-void ReferenceEventCamera::raise(const Event& request, const std::vector<Signal>& signals) {
+void ReferenceEventCamera::Model::raise(const Event& request, const std::vector<ReferenceSignal>& signals) {
   const auto same = [&](const Event& e) { return e.x == request.x && e.y == request.y; };
   const bool blind = request.t < blind_until_[pixel_of(request)] || std::ranges::any_of(waiting_, same);
   if (!holds_ && blind) return;
@@ -342,7 +343,8 @@ void ReferenceEventCamera::raise(const Event& request, const std::vector<Signal>
 }
 
 /// (13) The row of the first waiting request: all its events together; then the reader is busy.
-void ReferenceEventCamera::serve_row(TimeNs service, const std::vector<Signal>& signals, std::vector<Event>& events) {
+void ReferenceEventCamera::Model::serve_row(TimeNs service, const std::vector<ReferenceSignal>& signals,
+                                            std::vector<Event>& events) {
   const ReadoutOptions& o = options_.readout;
   const int row = waiting_[0].y;
   const auto in_row = [&](const Event& e) { return e.y == row; };
@@ -361,13 +363,26 @@ void ReferenceEventCamera::serve_row(TimeNs service, const std::vector<Signal>& 
 }
 
 /// (14) The refractory period begins at the acknowledgement, or at the event if that is practically the same.
-void ReferenceEventCamera::acknowledge(const Event& request, TimeNs t, const std::vector<Signal>& signals) {
+void ReferenceEventCamera::Model::acknowledge(const Event& request, TimeNs t,
+                                              const std::vector<ReferenceSignal>& signals) {
   const std::size_t i = pixel_of(request);
   blind_until_[i] = t + refractory_;
   if (!holds_) return;
   const TimeNs immediate = std::min<TimeNs>(1000, refractory_ / 100);
   pixels_[i].busy_until = (t - request.t > immediate ? t : request.t) + refractory_;
   find_requests(i, signals[i]);
+}
+
+// ---------------------------------------------------------------------------------------------------------- Public --
+
+ReferenceEventCamera::ReferenceEventCamera(const EventCameraOptions& options, int width, int height, std::uint64_t seed,
+                                           std::uint16_t stream)
+    : model_(std::make_unique<Model>(options, width, height, seed, stream)) {}
+
+ReferenceEventCamera::~ReferenceEventCamera() = default;
+
+std::vector<Event> ReferenceEventCamera::process(const Image<float>& irradiance, TimeNs t) {
+  return model_->process(irradiance, t);
 }
 
 }  // namespace esim::inline event_camera

@@ -1,3 +1,4 @@
+// Divides next_event() and draw_parameters() of reference.cpp into effects on a block of pixels.
 #pragma once
 
 #include <array>
@@ -25,18 +26,20 @@ struct PixelParameters {
 /// start.
 struct Round {
   const ActivePixels* active = nullptr;
-  double duration = 0;         ///< of the segment
-  double max_delay = 0;        ///< that a time stamp may have
-  Comparators compare{};       ///< in find(): the crossings, which an earlier event may replace
-  PixelNormals normals{};      ///< four deviates for each event: ON and OFF threshold, leak, latency
-  PerPixel<double> passed{};   ///< the level that the event crossed: the new reference
-  PerPixel<double> restarts{}; ///< 1: the new reference is the current signal instead
-  PerPixel<double> stamp{};    ///< time stamp of the event
+  double duration = 0;          ///< of the segment
+  double max_delay = 0;         ///< that a time stamp may have
+  Comparators compare{};        ///< in find(): the crossings, which an earlier event may replace
+  PixelNormals normals{};       ///< four deviates for each event: ON and OFF threshold, leak, latency
+  PerPixel<double> passed{};    ///< the level that the event crossed: the new reference
+  PerPixel<double> restarts{};  ///< 1: the new reference is the current signal instead
+  PerPixel<double> stamp{};     ///< time stamp of the event
 };
 
 /// An effect on the pixels after the low-pass: its options, its state per pixel, its contribution to the signal and its
 /// events. Derive from it, define `State`, `Lanes`, a constructor (options, seed, stream) and those of the functions
 /// below that the effect needs, and add the class to the list in effects.h. The functions here do nothing.
+///
+/// An effect that needs random numbers addresses them by a Purpose of its own, one of Purpose{40} to Purpose{79}.
 ///
 /// State: the values of one pixel, kept from segment to segment, with times in ns after the camera's epoch. Lanes: the
 /// same for the pixels of a block, with times in ns after the segment's start.
@@ -48,8 +51,8 @@ struct PixelEffect {
   /// make(state, parameters): sets the fixed parameters of a pixel, its State and `drift`.
   template <class... T>
   static void make(const T&...) {}
-  /// take(lanes, i, state, epoch_ns), store(lanes, i, state, epoch_ns): copies a pixel into a block, and back. epoch_ns:
-  /// from the epoch to the segment's start.
+  /// take(lanes, i, state, epoch_ns), store(lanes, i, state, epoch_ns): copies a pixel into a block, and back.
+  /// epoch_ns: from the epoch to the segment's start.
   template <class... T>
   static void take(const T&...) {}
   template <class... T>
@@ -72,10 +75,10 @@ struct PixelEffect {
   template <class... T>
   static void delay(const T&...) {}
 
-  /// next(lanes, i): the time of its next own event, which makes the pixel active.
+  /// next(lanes, i): the time of the next event of its own, which makes the pixel active.
   template <class Lanes>
   static double next(const Lanes&, std::size_t) {
-    return kAges;
+    return kNeverNs;
   }
   /// take_back(state, pixel, until): reverts to its state of an earlier time, `until`, ns after the epoch.
   template <class... T>

@@ -1,3 +1,4 @@
+// The options that reference.cpp tests for each event, (5) and (7) to (14), tested once per camera.
 #pragma once
 
 #include <cstdint>
@@ -31,18 +32,18 @@ struct EffectList : E... {
       if (effect.active) use(effect);
     });
   }
-  bool any(bool PixelEffect::* need) const {
+  bool any(bool PixelEffect::*need) const {
     bool found = false;
     each([&](const PixelEffect& effect) { found |= effect.*need; });
     return found;
   }
 
-  /// The time of the next event of any effect's own.
+  /// The time of the next event that an effect causes.
   double next(const Lanes& lanes, std::size_t i) const {
-    double time = kAges;
+    double time = kNeverNs;
     each([&](const auto& effect) {
-      const double own = effect.next(lanes, i);
-      time = own < time ? own : time;
+      const double of_effect = effect.next(lanes, i);
+      time = of_effect < time ? of_effect : time;
     });
     return time;
   }

@@ -1,4 +1,4 @@
-// Accelerates (12), ReferenceEventCamera::delay(), for a block of pixels.
+// Accelerates (12), delay() in reference.cpp, for a block of pixels.
 #pragma once
 
 #include <cmath>
@@ -16,7 +16,7 @@ struct Latency : PixelEffect {
   Latency(const EventCameraOptions& o, std::uint64_t, std::uint16_t)
       : mean_(o.latency_us * 1e3),
         jitter_(o.latency_jitter_us * 1e3),
-        share_(o.latency_light_share),
+        light_fraction_(o.latency_light_share),
         dark_(o.dark_irradiance) {
     active = mean_ > 0 || jitter_ > 0;
     draws = jitter_ > 0;
@@ -25,14 +25,14 @@ struct Latency : PixelEffect {
   void delay(const Lanes&, Round& round) const {
     const ActivePixels& pixels = *round.active;
     const Comparators& c = round.compare;
-    const double mean = mean_, jitter = jitter_, share = share_, dark = dark_, longest = round.max_delay;
+    const double mean = mean_, jitter = jitter_, fraction = light_fraction_, dark = dark_, longest = round.max_delay;
     const double per_duration = 1 / round.duration;
     const PerPixel<float>& normal = round.normals[3];
 #pragma omp simd
     for (std::size_t i = 0; i < c.count; ++i) {
       const double light = pixels.light0[i] + (pixels.light1[i] - pixels.light0[i]) * c.tau[i] * per_duration;
-      const double slower = 1.0 - share + share * (1.0 + dark) / (light + dark);
-      double ns = (mean + (jitter > 0 ? jitter * normal[i] : 0.0)) * (share > 0 ? slower : 1.0);
+      const double slower = 1.0 - fraction + fraction * (1.0 + dark) / (light + dark);
+      double ns = (mean + (jitter > 0 ? jitter * normal[i] : 0.0)) * (fraction > 0 ? slower : 1.0);
       ns = ns > 0 ? ns : 0.0;
       ns = ns < longest ? ns : longest;
       round.stamp[i] += std::floor(ns + 0.5);
@@ -40,7 +40,7 @@ struct Latency : PixelEffect {
   }
 
  private:
-  double mean_, jitter_, share_, dark_;  // ns, ns, fraction, irradiance
+  double mean_, jitter_, light_fraction_, dark_;  // ns, ns, fraction, irradiance
 };
 
 }  // namespace esim::inline event_camera

@@ -1,4 +1,4 @@
-// Accelerates (8), and the hot pixels of (10), in ReferenceEventCamera::open() and draw_parameters(), for a block of pixels.
+// Accelerates (8), with hot pixels (10): open() and draw_parameters() in reference.cpp, for a block of pixels.
 #pragma once
 
 #include <cmath>
@@ -26,7 +26,8 @@ struct Leak : PixelEffect {
   void make(State& state, PixelParameters& pixel) const {
     if (!active || pixel.dead) return;
     const bool hot = options_.hot_pixels > 0 && defects_.uniforms(pixel.pixel)[0] < options_.hot_pixels;
-    const double rate = hot ? options_.hot_pixel_rate_hz : options_.leak_rate_hz, decades = options_.leak_mismatch_decades;
+    const double rate = hot ? options_.hot_pixel_rate_hz : options_.leak_rate_hz,
+                 decades = options_.leak_mismatch_decades;
     const double spread = decades > 0 ? std::pow(10.0, decades * random_.normals(pixel.pixel)[0]) : 1;
     state.mean_leak = static_cast<float>(rate * spread * (pixel.threshold_on + pixel.on));
     pixel.drift = state.mean_leak;
@@ -52,8 +53,7 @@ struct Leak : PixelEffect {
 #pragma omp simd
     for (std::size_t i = 0; i < c.count; ++i) {
       const double interval = 1.0 + jitter * normal[i];
-      const auto rate =
-          static_cast<float>(lanes.mean_leak[i] / (interval > kMinInterval ? interval : kMinInterval));
+      const auto rate = static_cast<float>(lanes.mean_leak[i] / (interval > kMinInterval ? interval : kMinInterval));
       const double leak = c.polarity[i] != 0 ? rate * kPerNs : c.drift[i];
       // The new leak starts at this event, so that the signal is continuous.
       round.passed[i] += (leak - c.drift[i]) * c.tau[i];

@@ -1,4 +1,4 @@
-// Accelerates (9): ReferenceEventCamera::next_shot() and find_shot(), for a block of pixels.
+// Accelerates (9), next_shot() and find_shot() in reference.cpp, for a block of pixels.
 #pragma once
 
 #include <algorithm>
@@ -12,8 +12,8 @@ namespace esim::inline event_camera {
 /// A Poisson process at its maximum rate, thinned according to the current irradiance.
 struct ShotNoise : PixelEffect {
   struct State {
-    double shot_at = kAges;   // next candidate
-    std::uint32_t shots = 0;  // number of candidates
+    double shot_at = kNeverNs;  // next candidate
+    std::uint32_t shots = 0;    // number of candidates
   };
   struct Lanes {
     PerPixel<double> shot_at{};
@@ -39,7 +39,7 @@ struct ShotNoise : PixelEffect {
     const PerPixel<double> uniform = draw_uniforms(random_, *round.active, 0);
     for (std::size_t i = 0; i < round.compare.count; ++i) {
       const bool dead = std::isinf(round.compare.on[i]);
-      lanes.shot_at[i] = dead ? kAges : interval(uniform[i]);
+      lanes.shot_at[i] = dead ? kNeverNs : interval(uniform[i]);
       lanes.shots[i] = 1;
     }
   }
@@ -69,7 +69,7 @@ struct ShotNoise : PixelEffect {
 
   /// Time from one candidate to the next, ns.
   double interval(double uniform) const {
-    return std::floor(std::min(-std::log(uniform) / options_.shot_noise_hz * 1e9, kAges)) + 1;
+    return std::floor(std::min(-std::log(uniform) / options_.shot_noise_hz * 1e9, kNeverNs)) + 1;
   }
 
   /// The first accepted candidate before the crossing becomes the pixel's event.

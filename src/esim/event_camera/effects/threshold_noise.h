@@ -1,4 +1,4 @@
-// Accelerates the noise of (7) in ReferenceEventCamera::draw_parameters(), for a block of pixels.
+// Accelerates the noise of (7) in draw_parameters() of reference.cpp, for a block of pixels.
 #pragma once
 
 #include "esim/event_camera/effects/effect.h"

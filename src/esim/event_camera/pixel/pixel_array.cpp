@@ -103,9 +103,9 @@ void PixelArray::hold(std::uint32_t pixel, TimeNs end) {
 
 void PixelArray::take_back(std::uint32_t pixel, std::uint32_t events, TimeNs end) {
   if (effects.clean) return;
-  NoisyPixel& own = noisy_pixels[pixel];
-  if (effects.draws) own.draws -= events;
-  effects.each_active([&](const auto& effect) { effect.take_back(own, pixel, static_cast<double>(end - epoch)); });
+  NoisyPixel& state = noisy_pixels[pixel];
+  if (effects.draws) state.draws -= events;
+  effects.each_active([&](const auto& effect) { effect.take_back(state, pixel, static_cast<double>(end - epoch)); });
 }
 
 }  // namespace esim::inline event_camera

@@ -1,3 +1,4 @@
+// The state of struct Pixel in reference.cpp, and the fixed parameters of (7) and (10), for all pixels.
 #pragma once
 
 #include <cstdint>
@@ -85,9 +86,9 @@ class PixelArray {
   struct alignas(64) NoisyPixel : PixelEffects::States {
     double reference = 0;
     float on = 0, off = 0;
-    float drift = 0;          // 1/s
-    std::uint32_t draws = 0;  // number of draws for its events
-    double until = -kAges;    // end of the last refractory period, ns after the epoch
+    float drift = 0;           // 1/s
+    std::uint32_t draws = 0;   // number of draws for its events
+    double until = -kNeverNs;  // end of the last refractory period, ns after the epoch
   };
   LargeVector<NoisyPixel> noisy_pixels;
 

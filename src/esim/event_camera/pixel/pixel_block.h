@@ -1,3 +1,4 @@
+// The state of struct Pixel in reference.cpp, for a block of pixels.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +10,7 @@
 namespace esim::inline event_camera {
 
 /// Effectively never, ns: three years.
-inline constexpr double kAges = 1e17;
+inline constexpr double kNeverNs = 1e17;
 
 /// The active pixels of a segment. Unused values of the low-pass are arbitrary.
 struct ActivePixels {

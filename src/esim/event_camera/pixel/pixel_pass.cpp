@@ -25,22 +25,22 @@ std::size_t PixelPass<Signals>::take(const PixelArray& pixels, ActivePixels& act
   const std::size_t first = compare.count;
   std::size_t count = first, held_count = 0;
   for (std::size_t from = first; from < active.count; ++from) {
-    const PixelArray::NoisyPixel& own = pixels.noisy_pixels[active.pixel[from]];
-    const double until = own.until - epoch_ns;
-    const bool held = own.reference == kHeld;
+    const PixelArray::NoisyPixel& state = pixels.noisy_pixels[active.pixel[from]];
+    const double until = state.until - epoch_ns;
+    const bool held = state.reference == kHeld;
     if (held & (until > duration)) [[unlikely]]
       continue;
     const std::size_t i = count++;
     if (i != from) active.copy(from, i);
     held_[held_count] = static_cast<std::uint32_t>(i);
     held_count += held ? 1 : 0;
-    compare.reference[i] = own.reference - own.drift * epoch_s;
-    compare.on[i] = own.on, compare.off[i] = own.off;
-    compare.drift[i] = own.drift * kPerNs;
+    compare.reference[i] = state.reference - state.drift * epoch_s;
+    compare.on[i] = state.on, compare.off[i] = state.off;
+    compare.drift[i] = state.drift * kPerNs;
     compare.from[i] = 0;
-    draws_[i] = own.draws;
+    draws_[i] = state.draws;
     until_[i] = until;
-    pixels.effects.each([&](const auto& effect) { effect.take(lanes_, i, own, epoch_ns); });
+    pixels.effects.each([&](const auto& effect) { effect.take(lanes_, i, state, epoch_ns); });
   }
   active.count = compare.count = count;
   held_count_ = held_count;
@@ -73,11 +73,11 @@ void PixelPass<Signals>::draw_again(PixelArray& pixels, const ActivePixels& acti
   Comparators& compare = round_.compare;
   const std::size_t count = active.count;
   for (std::size_t i = 0; i < count; ++i) {
-    const PixelArray::NoisyPixel& own = pixels.noisy_pixels[active.pixel[i]];
-    compare.on[i] = own.on, compare.off[i] = own.off;
-    compare.drift[i] = own.drift * kPerNs;
-    draws_[i] = own.draws - 1;
-    pixels.effects.each([&](const auto& effect) { effect.take(lanes_, i, own, 0.0); });
+    const PixelArray::NoisyPixel& state = pixels.noisy_pixels[active.pixel[i]];
+    compare.on[i] = state.on, compare.off[i] = state.off;
+    compare.drift[i] = state.drift * kPerNs;
+    draws_[i] = state.draws - 1;
+    pixels.effects.each([&](const auto& effect) { effect.take(lanes_, i, state, 0.0); });
   }
   std::fill_n(compare.polarity.begin(), count, 1.0);
   std::fill_n(compare.tau.begin(), count, 0.0);
@@ -86,9 +86,9 @@ void PixelPass<Signals>::draw_again(PixelArray& pixels, const ActivePixels& acti
   round_.active = &active;
   renew(pixels);
   for (std::size_t i = 0; i < count; ++i) {
-    PixelArray::NoisyPixel& own = pixels.noisy_pixels[active.pixel[i]];
-    own.on = compare.on[i], own.off = compare.off[i];
-    own.drift = static_cast<float>(compare.drift[i] * kNsPerS);
+    PixelArray::NoisyPixel& state = pixels.noisy_pixels[active.pixel[i]];
+    state.on = compare.on[i], state.off = compare.off[i];
+    state.drift = static_cast<float>(compare.drift[i] * kNsPerS);
   }
   compare.count = 0;
 }
@@ -167,14 +167,13 @@ void PixelPass<Signals>::reset(const PixelArray& pixels, bool wait) {
   }
   if (!wait) return;
   for (std::size_t i = 0; i < compare.count; ++i) {
-    if (compare.polarity[i] != 0) until_[i] = kAges;
+    if (compare.polarity[i] != 0) until_[i] = kNeverNs;
   }
 }
 
 /// Makes the finished pixels inactive, and keeps the others.
 template <class Signals>
 void PixelPass<Signals>::deactivate(PixelArray& pixels, ActivePixels& active) {
-  constexpr double kForever = kAges;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   Comparators& compare = round_.compare;
   const double duration = round_.duration, since_epoch = epoch_ns_ + duration;
@@ -186,7 +185,7 @@ void PixelPass<Signals>::deactivate(PixelArray& pixels, ActivePixels& active) {
     // The drift lowers both levels: use the upper level at the timer's end and the current lower level, an upper bound.
     const double allowed = kDriftPerBounds * (upper - reference), room = 0.5 * (upper - now);
     double valid = (allowed < room ? allowed : room) / drift;
-    valid = drift > 0 && valid < kForever ? valid : kForever;
+    valid = drift > 0 && valid < kNeverNs ? valid : kNeverNs;
     const bool held = reference == kHeld;
     const double sinks = drift > 0 ? drift * (duration + valid) : 0.0;
     low_[i] = held ? kInfinity : static_cast<float>(lower - drift * duration);
@@ -222,15 +221,15 @@ void PixelPass<Signals>::keep(ActivePixels& active, std::size_t i, std::size_t t
 }
 
 template <class Signals>
-void PixelPass<Signals>::write_back(const PixelEffects& effects, PixelArray::NoisyPixel& own, std::size_t i) const {
+void PixelPass<Signals>::write_back(const PixelEffects& effects, PixelArray::NoisyPixel& state, std::size_t i) const {
   const Comparators& compare = round_.compare;
   const double drift = compare.drift[i];
-  own.reference = compare.reference[i] + drift * epoch_ns_;
-  own.on = compare.on[i], own.off = compare.off[i];
-  own.drift = static_cast<float>(drift * kNsPerS);
-  own.draws = draws_[i];
-  own.until = epoch_ns_ + until_[i];
-  effects.each([&](const auto& effect) { effect.store(lanes_, i, own, epoch_ns_); });
+  state.reference = compare.reference[i] + drift * epoch_ns_;
+  state.on = compare.on[i], state.off = compare.off[i];
+  state.drift = static_cast<float>(drift * kNsPerS);
+  state.draws = draws_[i];
+  state.until = epoch_ns_ + until_[i];
+  effects.each([&](const auto& effect) { effect.store(lanes_, i, state, epoch_ns_); });
 }
 
 template <class Signals>

@@ -1,3 +1,4 @@
+// Accelerates next_event() in reference.cpp, (6) to (12), for a block of pixels.
 #pragma once
 
 #include <cstddef>
@@ -44,7 +45,7 @@ class PixelPass {
   void deactivate(PixelArray& pixels, ActivePixels& active);
 
   void keep(ActivePixels& active, std::size_t i, std::size_t to);
-  void write_back(const PixelEffects& effects, PixelArray::NoisyPixel& own, std::size_t i) const;
+  void write_back(const PixelEffects& effects, PixelArray::NoisyPixel& state, std::size_t i) const;
 
   TimeNs t0_ = 0;
   double epoch_ns_ = 0;  // from the epoch to t0

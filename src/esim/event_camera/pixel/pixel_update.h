@@ -1,3 +1,4 @@
+// Accelerates process() in reference.cpp for rows of pixels, with the low-pass (5).
 #pragma once
 
 #include <array>

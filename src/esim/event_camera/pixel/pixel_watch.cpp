@@ -39,7 +39,7 @@ bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, i
   const std::int32_t now = pixels.effects.timers ? pixels.ticks(segment.t1) : 0;
   std::uint32_t* const columns = columns_.data();
   std::size_t found = count;
-  bool good = true;
+  bool valid = true;
 
   // Without branches: active pixels are as hard to predict as events.
   const auto look_at = [&](auto d, int from, int to) {
@@ -58,7 +58,7 @@ bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, i
       chosen.store_positions(static_cast<std::uint32_t>(x), columns + found);
       found += chosen.count();
     }
-    good &= check.passed();
+    valid &= check.passed();
   };
   const WatchTag whole;
   const int first = segment.tile.x, last = first + segment.tile.width;
@@ -66,7 +66,7 @@ bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, i
   look_at(whole, first, middle);
   look_at(hn::CappedTag<float, 1>(), middle, last);
   count = found;
-  return good;
+  return valid;
 }
 
 }  // namespace esim::inline event_camera

@@ -147,8 +147,8 @@ INSTANTIATE_TEST_SUITE_P(
         EventCameraOptions{.contrast_threshold = 0.2, .low_pass_hz = 300},
         EventCameraOptions{.contrast_threshold = 0.2, .low_pass_hz = 300, .low_pass_order = 2},
         EventCameraOptions{.contrast_threshold = 0.2, .surround_px = 2, .surround_ms = 3},
-        everything(1, RefractoryMode::hold), everything(2, RefractoryMode::hold),
-        everything(1, RefractoryMode::drop), everything(2, RefractoryMode::drop)));
+        everything(1, RefractoryMode::hold), everything(2, RefractoryMode::hold), everything(1, RefractoryMode::drop),
+        everything(2, RefractoryMode::drop)));
 
 TEST(EventCamera, TheFirstFrameFiresNothing) {
   Feed feed({}, 4, 4);

@@ -106,7 +106,8 @@ TEST_P(PixelReadoutTest, IsThatOfTheReference) {
   ReferenceEventCamera reference(GetParam().options, kWidth, kHeight, 7, 0);
   std::vector<Event> expected;
   for (std::size_t k = 0; k < frames.size(); ++k) {
-    for (const Event& event : reference.process(frames[k], static_cast<TimeNs>(k) * kNsPerMs)) expected.push_back(event);
+    for (const Event& event : reference.process(frames[k], static_cast<TimeNs>(k) * kNsPerMs))
+      expected.push_back(event);
   }
   const std::vector<Event> events = feed_whole(GetParam().options, frames);
   EXPECT_TRUE(std::ranges::is_sorted(events));

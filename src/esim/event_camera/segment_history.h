@@ -1,3 +1,4 @@
+// Keeps the past that reference.cpp has at hand in raise() and acknowledge(), because it runs frame by frame.
 #pragma once
 
 #include <cstddef>

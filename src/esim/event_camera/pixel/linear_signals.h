@@ -1,3 +1,4 @@
+// Accelerates (3) and (6), reference_signal.h without poles, for a block of pixels.
 #pragma once
 
 #include "esim/event_camera/pixel/pixel_block.h"

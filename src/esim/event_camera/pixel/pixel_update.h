@@ -1,3 +1,4 @@
+// Accelerates process() in reference.cpp for rows of pixels, with the low-pass (5).
 #pragma once
 
 #include <array>
@@ -73,7 +74,7 @@ class PixelUpdate {
   CleanPass clean_;
   MovedPixels moved_;
   ActivePixels active_;
-  std::size_t asked_ = 0;  // number of active pixels that have been prefetched
+  std::size_t prefetched_ = 0;  // number of active pixels that have been prefetched
   PixelPass<LinearSignals> linear_;
   PixelPass<RelaxingSignals> relaxing_;
   std::vector<double> row_;       // brightness at the first sample

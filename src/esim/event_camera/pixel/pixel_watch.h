@@ -1,3 +1,4 @@
+// Accelerates (6): finds the pixels for which next_event() in reference.cpp may return an event.
 #pragma once
 
 #include <cstddef>

@@ -1,3 +1,4 @@
+// Accelerates (13), read_out() and serve_row() in reference.cpp.
 #pragma once
 
 #include <algorithm>

@@ -10,7 +10,7 @@
 #include "esim/compose/waypoints.h"
 #include "esim/core/error.h"
 #include "esim/files/output_file.h"
-#include "esim/preview/canvas.h"
+#include "esim/preview/pictures.h"
 #include "esim/scenario/waypoint_file.h"
 #include "support.h"
 

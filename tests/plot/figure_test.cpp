@@ -225,6 +225,28 @@ TEST(AxesTest, LabelsDoNotTouchEachOther) {
   }
 }
 
+TEST(AxesTest, TheLegendIsNextToTheTitleOrBelowIt) {
+  constexpr Rgb kEntry{1, 2, 3};
+  int below = 0;
+  for (const auto& [x, y] : scales()) {
+    for (int width = 260; width <= 900; width += 20) {
+      Canvas canvas(width, 300, kWhite);
+      const std::string title = "Event rate over time";
+      const Axes axes(canvas, canvas.pixels().bounds(), x, y, {title, {{"ON", kEntry}, {"OFF", kEntry}}});
+      Image<Rgb> entries(width, 300, kWhite);
+      for (int i = 0; i < width * 300; ++i)
+        if (canvas.pixels().pixels()[i] == kEntry) entries.pixels()[i] = kEntry;
+      const Tile legend = drawn_part(entries);
+      ASSERT_GT(legend.width, 0);
+      EXPECT_LT(legend.y + legend.height, axes.area().y);
+      const int title_end = axes.area().x + Canvas::text_width(title, kTitleHeight), title_bottom = 6 + kTitleHeight;
+      EXPECT_TRUE(legend.x >= title_end + kTextHeight || legend.y > title_bottom) << x.title << " " << width;
+      below += legend.y > title_bottom ? 1 : 0;
+    }
+  }
+  EXPECT_GT(below, 5) << "both arrangements occur";
+}
+
 TEST(AxesTest, PlacesDataWhereTheTicksSayTheyAre) {
   Canvas canvas(600, 400, kWhite);
   Axes axes(canvas, canvas.pixels().bounds(), logarithmic_scale(1, 1000, ""), linear_scale(0, 10, ""));

@@ -11,7 +11,7 @@ namespace {
 // Distances in px.
 constexpr int kTick = 5, kMinorTick = 3, kLabelGap = 5, kTitleGap = 12, kEdge = 6, kDescent = 4;
 constexpr int kLeastRight = 12, kTitleRow = kTitleHeight + 16;
-constexpr int kPerRow = 44, kPerColumn = 60;  // of the diagram for each tick, at least
+constexpr int kPerRow = 36, kPerColumn = 60;  // of the diagram for each tick, at least
 constexpr int kMostTicks = 10;
 
 /// The title with the factor and the offset of the labels.
@@ -84,19 +84,13 @@ Axes::Axes(Canvas& canvas, const Tile& cell, Scale x, Scale y, AxesOptions optio
 }
 
 void Axes::lay_out(const Tile& cell) {
-  int top = kEdge + kTextHeight / 2;
   const bool has_title = !options_.title.empty(), has_legend = !options_.legend.empty();
-  if (has_title || has_legend) top = kEdge + kTitleRow;
+  lay_out_rows(cell, has_title || has_legend ? kEdge + kTitleRow : kEdge + kTextHeight / 2);
   const int needed = Canvas::text_width(options_.title, kTitleHeight) + 2 * kTextHeight + legend_width(options_.legend);
-  if (has_title && has_legend && needed > cell.width - options_.min_left - kLeastRight) top += kLegendLine;
-  const int bottom = kTick + kLabelGap + kTextHeight + (x_.title.empty() ? 0 : kTitleGap + kTextHeight) + kDescent;
-  area_.y = cell.y + top;
-  area_.height = std::max(1, cell.height - top - bottom);
-  y_ticks_ = ticks_that_fit(y_, area_.height, Side::left);
+  if (has_title && has_legend && needed > cell.x + cell.width - area_.x - kLeastRight)
+    lay_out_rows(cell, kEdge + kTitleRow + kLegendLine);
 
-  const int y_title = y_.title.empty() ? 0 : kTextHeight + kTitleGap;
-  const int left = std::max(options_.min_left, kEdge + y_title + widest_label(y_ticks_) + kLabelGap + kTick);
-  area_.x = cell.x + left;
+  const int left = area_.x - cell.x;
   int right = kLeastRight;
   for (int attempt = 0; attempt < 2; ++attempt) {
     area_.width = std::max(1, cell.width - left - right);
@@ -108,6 +102,16 @@ void Axes::lay_out(const Tile& cell) {
     if (beyond <= 0) break;
     right += beyond;
   }
+}
+
+/// The rows of the diagram, which begin `top` px below the edge of the cell; the labels in them; and its left end.
+void Axes::lay_out_rows(const Tile& cell, int top) {
+  const int bottom = kTick + kLabelGap + kTextHeight + (x_.title.empty() ? 0 : kTitleGap + kTextHeight) + kDescent;
+  area_.y = cell.y + top;
+  area_.height = std::max(1, cell.height - top - bottom);
+  y_ticks_ = ticks_that_fit(y_, area_.height, Side::left);
+  const int title = y_.title.empty() ? 0 : kTextHeight + kTitleGap;
+  area_.x = cell.x + std::max(options_.min_left, kEdge + title + widest_label(y_ticks_) + kLabelGap + kTick);
 }
 
 void Axes::draw_titles(const Tile& cell) {

@@ -1,5 +1,6 @@
 #include "esim/plot/legend.h"
 
+#include <algorithm>
 #include <array>
 
 namespace esim::inline plot {
@@ -31,6 +32,12 @@ void draw_entry(Canvas& canvas, int x, int baseline, const LegendEntry& entry, c
 int legend_width(std::span<const LegendEntry> entries) {
   int width = 0;
   for (const LegendEntry& entry : entries) width += entry_width(entry) + (width > 0 ? kEntryGap : 0);
+  return width;
+}
+
+int legend_column_width(std::span<const LegendEntry> entries) {
+  int width = 0;
+  for (const LegendEntry& entry : entries) width = std::max(width, entry_width(entry));
   return width;
 }
 

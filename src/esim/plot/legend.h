@@ -17,8 +17,9 @@ struct LegendEntry {
   Mark mark = Mark::bar;
 };
 
-/// The width of the entries in one row, px.
+/// The width of the entries in one row, and below each other, px.
 int legend_width(std::span<const LegendEntry> entries);
+int legend_column_width(std::span<const LegendEntry> entries);
 
 /// Draws the entries in one row that begins at x; text stands on `baseline`.
 void draw_legend_row(Canvas& canvas, int x, int baseline, std::span<const LegendEntry> entries, const Theme& theme);

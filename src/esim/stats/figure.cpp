@@ -219,19 +219,28 @@ void draw_phases(Canvas& canvas, const Cell& cell, const Statistics& s) {
 }
 
 void draw_report(Canvas& canvas, const Cell& cell, const Statistics& s) {
-  constexpr int kLine = 17, kValueColumn = 176;
+  constexpr int kMostLine = 17, kValueColumn = 176;
   const Tile area = cell.area();
-  int y = area.y + 6 + kTitleHeight;
-  for (const ReportSection& section : report_sections(s)) {
-    canvas.text(area.x, y, section.title, kTitleHeight - 1, kLightTheme.ink);
-    y += kLine + 3;
-    for (const ReportLine& line : section.lines) {
-      if (line.label.empty()) continue;  // hot pixels, which the map shows
-      canvas.text(area.x, y, line.label, kTextHeight, kLightTheme.faint_ink);
-      canvas.text(area.x + kValueColumn, y, line.value, kTextHeight, kLightTheme.ink);
-      y += kLine;
+  const std::vector<ReportSection> sections = report_sections(s);
+  const auto is_shown = [](const ReportLine& line) { return !line.label.empty(); };  // not hot pixels: see the map
+  double lines = 0;
+  for (const ReportSection& section : sections)
+    lines += 1.7 + static_cast<double>(std::ranges::count_if(section.lines, is_shown));
+  const double line = std::min<double>(kMostLine, (area.height - kTitleHeight) / lines);
+  double y = area.y + 6 + kTitleHeight;
+  const auto write = [&](int x, const std::string& text, int height, Rgb colour) {
+    canvas.text(x, static_cast<int>(std::lround(y)), text, height, colour);
+  };
+  for (const ReportSection& section : sections) {
+    write(area.x, section.title, kTitleHeight - 1, kLightTheme.ink);
+    y += 1.15 * line;
+    for (const auto& [label, value] : section.lines) {
+      if (label.empty()) continue;
+      write(area.x, label, kTextHeight, kLightTheme.faint_ink);
+      write(area.x + kValueColumn, value, kTextHeight, kLightTheme.ink);
+      y += line;
     }
-    y += 9;
+    y += 0.55 * line;
   }
 }
 

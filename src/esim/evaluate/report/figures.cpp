@@ -197,24 +197,25 @@ Image<Rgb> draw_error_over_cost(const SamplingEvaluation& evaluation) {
 }
 
 Image<Rgb> draw_timing(const SamplingEvaluation& evaluation) {
-  constexpr int kWidth = 1000, kLegend = 300, kTop = 34;
+  constexpr int kDiagram = 700, kTop = 34, kGap = 12;
   if (evaluation.event_spans.empty()) return {};
   const int height = std::max(480, kTop + 60 + kLegendLine * static_cast<int>(evaluation.schemes.size()));
-  Canvas canvas(kWidth, height, kLightTheme.page);
-  Axes axes(canvas, {0, 0, kWidth - kLegend, height},
+  std::vector<LegendEntry> legend;
+  for (const SchemeResult& scheme : evaluation.schemes)
+    legend.push_back({scheme.text, scheme_colour(evaluation, scheme), Mark::line});
+  Canvas canvas(kDiagram + legend_column_width(legend) + 2 * kGap, height, kLightTheme.page);
+  Axes axes(canvas, {0, 0, kDiagram, height},
             logarithmic_scale(1e-7, 2e-2, "|t − t of the reference|", LabelStyle::seconds),
             linear_scale(0, 100, "matched events (%)"),
             {fmt::format("Timing of the matched events, window {}", evaluation.windows.back().name)});
-  std::vector<LegendEntry> legend;
-  for (const SchemeResult& scheme : evaluation.schemes) {
-    legend.push_back({scheme.text, scheme_colour(evaluation, scheme), Mark::line});
-    const std::vector<double>& quantiles = scheme.windows.back().events->quantiles_s;
+  for (std::size_t i = 0; i < legend.size(); ++i) {
+    const std::vector<double>& quantiles = evaluation.schemes[i].windows.back().events->quantiles_s;
     std::vector<DataPoint> curve;
     for (std::size_t percent = 0; percent < quantiles.size(); ++percent)
       curve.push_back({std::max(quantiles[percent], 1e-9), static_cast<double>(percent)});
-    axes.line(curve, legend.back().colour, 2);
+    axes.line(curve, legend[i].colour, 2);
   }
-  draw_legend_column(canvas, kWidth - kLegend + 12, kTop + kTextHeight, legend, kLightTheme);
+  draw_legend_column(canvas, kDiagram + kGap, kTop + kTextHeight, legend, kLightTheme);
   axes.finish();
   return std::move(canvas).take();
 }

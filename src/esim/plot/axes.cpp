@@ -67,13 +67,6 @@ Ticks ticks_that_fit(const Scale& scale, int extent, Side side) {
   }
 }
 
-/// The largest height of text, up to `height`, at which it is at most `width` px wide.
-int height_that_fits(const std::string& text, int height, int width) {
-  constexpr int kLeastHeight = 6;
-  while (height > kLeastHeight && Canvas::text_width(text, height) > width) --height;
-  return height;
-}
-
 }  // namespace
 
 Axes::Axes(Canvas& canvas, const Tile& cell, Scale x, Scale y, AxesOptions options)
@@ -117,7 +110,7 @@ void Axes::lay_out_rows(const Tile& cell, int top) {
 void Axes::draw_titles(const Tile& cell) {
   const Theme& theme = options_.theme;
   const int baseline = cell.y + kEdge + kTitleHeight, right = area_.x + area_.width;
-  canvas_.text(area_.x, baseline, options_.title, height_that_fits(options_.title, kTitleHeight, right - area_.x),
+  canvas_.text(area_.x, baseline, options_.title, Canvas::fitting_height(options_.title, kTitleHeight, right - area_.x),
                theme.ink);
   if (!options_.legend.empty()) {
     const int width = legend_width(options_.legend);
@@ -130,8 +123,8 @@ void Axes::draw_titles(const Tile& cell) {
     return std::max(std::min(wanted, first + extent - (width + 1) / 2), first + width / 2);
   };
   const std::string y_title = full_title(y_, y_ticks_), x_title = full_title(x_, x_ticks_);
-  const int y_height = height_that_fits(y_title, kTextHeight, cell.height);
-  const int x_height = height_that_fits(x_title, kTextHeight, cell.width);
+  const int y_height = Canvas::fitting_height(y_title, kTextHeight, cell.height);
+  const int x_height = Canvas::fitting_height(x_title, kTextHeight, cell.width);
   canvas_.clip(cell);
   canvas_.vertical_text(cell.x + kEdge + kTextHeight,
                         middle(area_.y + area_.height / 2, Canvas::text_width(y_title, y_height), cell.y, cell.height),

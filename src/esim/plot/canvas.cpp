@@ -133,6 +133,12 @@ void Canvas::disc(Spot centre, double radius, Rgb colour) {
 
 int Canvas::text_width(std::string_view line, int height) { return draw_text(line, height).width; }
 
+int Canvas::fitting_height(std::string_view line, int height, int width) {
+  constexpr int kLeastHeight = 6;
+  while (height > kLeastHeight && text_width(line, height) > width) --height;
+  return height;
+}
+
 int Canvas::text(int x, int baseline, std::string_view line, int height, Rgb colour, Align align) {
   const TextMask& mask = draw_text(line, height);
   if (align == Align::centre) x -= mask.width / 2;

@@ -51,6 +51,9 @@ class Canvas {
   /// The width of the same line drawn by text().
   static int text_width(std::string_view line, int height);
 
+  /// The largest height up to `height`, and at least 6, at which the line is at most `width` px wide.
+  static int fitting_height(std::string_view line, int height, int width);
+
  private:
   void blend(const Image<std::uint8_t>& coverage, int x, int y, Rgb colour);
 

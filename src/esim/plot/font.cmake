@@ -1,7 +1,7 @@
 # The font of all figures becomes part of the library: text looks the same on every machine, whichever fonts it has.
 find_file(ESIM_FONT DejaVuSans.ttf PATHS /usr/share/fonts /usr/local/share/fonts
           PATH_SUFFIXES truetype/dejavu dejavu dejavu-sans-fonts TTF truetype NO_CMAKE_FIND_ROOT_PATH)
-if(NOT ESIM_FONT)
+if(NOT EXISTS "${ESIM_FONT}")
   message(FATAL_ERROR "The font DejaVu Sans, with which esim labels figures and videos, was not found. Install the package "
                       "fonts-dejavu-core (scripts/setup does), or set ESIM_FONT to the path of DejaVuSans.ttf")
 endif()

@@ -22,8 +22,6 @@ extern const unsigned char esim_font_begin[], esim_font_end[];  // font_file.S
 namespace esim::inline plot {
 namespace {
 
-constexpr double kCapitalHeight = 1493.0 / 2048.0;  // of DejaVu Sans at size 1
-
 /// The number of bytes of the UTF-8 character at the beginning of `text`; 0 if its bytes are invalid, or if the
 /// character is one that Cairo refuses.
 std::size_t character_length(std::string_view text) {
@@ -61,8 +59,10 @@ class Font {
     FT_Library library = nullptr;
     FT_Face face = nullptr;
     if (FT_Init_FreeType(&library) != 0 ||
-        FT_New_Memory_Face(library, esim_font_begin, esim_font_end - esim_font_begin, 0, &face) != 0)
+        FT_New_Memory_Face(library, esim_font_begin, esim_font_end - esim_font_begin, 0, &face) != 0 ||
+        FT_Load_Char(face, 'H', FT_LOAD_NO_SCALE) != 0 || face->glyph->metrics.horiBearingY <= 0)
       throw Error("the font of figures, DejaVu Sans, cannot be used: build esim with an intact DejaVuSans.ttf");
+    capital_height_ = static_cast<double>(face->glyph->metrics.horiBearingY) / face->units_per_EM;
     // Both live as long as the program.
     face_ = cairo_ft_font_face_create_for_ft_face(face, FT_LOAD_NO_HINTING | FT_LOAD_NO_BITMAP);
   }
@@ -71,7 +71,7 @@ class Font {
     const std::lock_guard lock(mutex_);
     const auto prepare = [&](cairo_t* context) {
       cairo_set_font_face(context, face_);
-      cairo_set_font_size(context, height / kCapitalHeight);
+      cairo_set_font_size(context, height / capital_height_);
       cairo_font_options_t* const options = cairo_font_options_create();
       cairo_font_options_set_hint_style(options, CAIRO_HINT_STYLE_NONE);
       cairo_font_options_set_hint_metrics(options, CAIRO_HINT_METRICS_OFF);
@@ -103,6 +103,7 @@ class Font {
  private:
   std::mutex mutex_;
   cairo_font_face_t* face_ = nullptr;
+  double capital_height_ = 1;  // at size 1
 };
 
 }  // namespace

@@ -229,6 +229,7 @@ void draw_report(Canvas& canvas, const Cell& cell, const Statistics& s) {
   const double line = std::min<double>(kMostLine, (area.height - kTitleHeight) / lines);
   double y = area.y + 6 + kTitleHeight;
   const auto write = [&](int x, const std::string& text, int height, Rgb colour) {
+    height = Canvas::fitting_height(text, height, area.x + area.width - x);
     canvas.text(x, static_cast<int>(std::lround(y)), text, height, colour);
   };
   for (const ReportSection& section : sections) {
@@ -249,7 +250,8 @@ void draw_report(Canvas& canvas, const Cell& cell, const Statistics& s) {
 Image<Rgb> draw_figure(const NamedStatistics& file) {
   const Statistics& s = file.statistics;
   Canvas canvas(kWidth, kHeight, kLightTheme.page);
-  canvas.text(kMargin, 32, file.name, kHeadlineHeight, kLightTheme.ink);
+  const int headline = Canvas::fitting_height(file.name, kHeadlineHeight, kWidth - 2 * kMargin);
+  canvas.text(kMargin, 32, file.name, headline, kLightTheme.ink);
   canvas.fill({kMargin, kHeader - 10, kWidth - 2 * kMargin, 1}, kLightTheme.grid);
   draw_rate(canvas, {0, 0}, s);
   draw_intervals(canvas, {1, 0}, s);

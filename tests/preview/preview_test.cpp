@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "esim/core/error.h"
-#include "esim/preview/canvas.h"
+#include "esim/plot/canvas.h"
 #include "esim/preview/colours.h"
 #include "esim/preview/panels.h"
 #include "esim/preview/preview_writer.h"

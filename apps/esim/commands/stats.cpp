@@ -5,7 +5,7 @@
 #include "commands.h"
 #include "esim/core/error.h"
 #include "esim/files/output_file.h"
-#include "esim/preview/canvas.h"
+#include "esim/preview/pictures.h"
 #include "esim/stats/figure.h"
 #include "support.h"
 

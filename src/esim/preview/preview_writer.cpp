@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "esim/files/output_file.h"
-#include "esim/preview/canvas.h"
 #include "esim/preview/panels.h"
+#include "esim/preview/pictures.h"
 #include "esim/preview/scales.h"
 #include "esim/preview/video_file.h"
 

@@ -6,27 +6,30 @@
 #include <array>
 #include <cmath>
 
+#include "esim/plot/canvas.h"
+#include "esim/preview/colours.h"
+#include "esim/preview/pictures.h"
+
 namespace esim::inline visualise {
 namespace {
 
 constexpr int kMargin = 20, kGap = 18, kHeader = 42, kTitle = 28, kLegend = 30;
-constexpr int kTextHeight = 12, kSmallTextHeight = 10;
 constexpr int kMaxPanelHeight = 960, kMinPanelExtent = 64;
 
 int draw_polarity(Canvas& canvas, int x, int baseline, Rgb colour, const char* name, const Theme& theme) {
   canvas.disc({x + 5.0, baseline - 5.0}, 5, colour);
-  return 16 + canvas.text(x + 16, baseline, name, kSmallTextHeight, theme.faint_ink) + 18;
+  return 16 + canvas.text(x + 16, baseline, name, kTextHeight, theme.faint_ink) + 18;
 }
 
 // A colour bar between two labels.
 void draw_depth_legend(Canvas& canvas, int x, int baseline, const Panel& panel, const Theme& theme) {
   constexpr int kBar = 140;
-  x += canvas.text(x, baseline, fmt::format("{:.3g} m", panel.near_m), kSmallTextHeight, theme.faint_ink) + 10;
+  x += canvas.text(x, baseline, fmt::format("{:.3g} m", panel.near_m), kTextHeight, theme.faint_ink) + 10;
   for (int i = 0; i < kBar; ++i) {
     const float depth = panel.near_m * std::pow(panel.far_m / panel.near_m, (static_cast<float>(i) + 0.5f) / kBar);
     canvas.fill({x + i, baseline - 10, 1, 10}, colour_depth(depth, panel.near_m, panel.far_m));
   }
-  canvas.text(x + kBar + 10, baseline, fmt::format("{:.3g} m", panel.far_m), kSmallTextHeight, theme.faint_ink);
+  canvas.text(x + kBar + 10, baseline, fmt::format("{:.3g} m", panel.far_m), kTextHeight, theme.faint_ink);
 }
 
 void draw_motion_legend(Canvas& canvas, int x, int baseline, const Panel& panel, const Theme& theme) {
@@ -41,14 +44,14 @@ void draw_motion_legend(Canvas& canvas, int x, int baseline, const Panel& panel,
     }
   }
   canvas.draw(wheel, x, baseline - kRadius - 6);
-  canvas.text(x + kExtent + 8, baseline, fmt::format("rim: {:.3g} px/s", panel.full_speed_px_per_s), kSmallTextHeight,
+  canvas.text(x + kExtent + 8, baseline, fmt::format("rim: {:.3g} px/s", panel.full_speed_px_per_s), kTextHeight,
               theme.faint_ink);
 }
 
 void draw_panel(Canvas& canvas, const Tile& place, View view, const Panel& panel, const Theme& theme) {
-  const int used = canvas.text(place.x, place.y - 10, title_of(view), kTextHeight, theme.ink);
-  if (used + Canvas::text_width(panel.note, kSmallTextHeight) + kGap < place.width)
-    canvas.text(place.x + place.width, place.y - 10, panel.note, kSmallTextHeight, theme.faint_ink, Align::right);
+  const int used = canvas.text(place.x, place.y - 10, title_of(view), kTitleHeight, theme.ink);
+  if (used + Canvas::text_width(panel.note, kTextHeight) + kGap < place.width)
+    canvas.text(place.x + place.width, place.y - 10, panel.note, kTextHeight, theme.faint_ink, Align::right);
   if (panel.picture.empty()) {
     canvas.fill(place, theme.ground);
   } else {
@@ -105,9 +108,9 @@ Tile PageLayout::panel(std::size_t index) const {
 Image<Rgb> draw_page(const PageLayout& layout, const std::vector<Panel>& panels, const std::string& left,
                      const std::string& right, const Theme& theme) {
   Canvas canvas(layout.width, layout.height, theme.page);
-  const int used = canvas.text(kMargin, 28, left, kTextHeight + 1, theme.ink);
-  if (used + Canvas::text_width(right, kSmallTextHeight) + 3 * kMargin < layout.width) {
-    canvas.text(layout.width - kMargin, 28, right, kSmallTextHeight, theme.faint_ink, Align::right);
+  const int used = canvas.text(kMargin, 28, left, kHeadlineHeight - 1, theme.ink);
+  if (used + Canvas::text_width(right, kTextHeight) + 3 * kMargin < layout.width) {
+    canvas.text(layout.width - kMargin, 28, right, kTextHeight, theme.faint_ink, Align::right);
   }
   canvas.fill({kMargin, kHeader - 2, layout.width - 2 * kMargin, 1}, theme.grid);
   for (std::size_t i = 0; i < panels.size(); ++i) {
@@ -124,7 +127,7 @@ Image<Rgb> draw_contact_sheet(const std::vector<CaptionedPicture>& pictures, int
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     const int x = kMargin + static_cast<int>(i) % columns * (width + kGap);
     const int y = kTitle + static_cast<int>(i) / columns * (kTitle + height);
-    canvas.text(x, y - 9, pictures[i].caption, kSmallTextHeight, theme.faint_ink);
+    canvas.text(x, y - 9, pictures[i].caption, kTextHeight, theme.faint_ink);
     canvas.draw(pictures[i].picture, x, y);
     canvas.outline({x - 1, y - 1, width + 2, height + 2}, theme.grid);
   }

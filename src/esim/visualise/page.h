@@ -4,9 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "esim/preview/canvas.h"
+#include "esim/plot/theme.h"
 #include "esim/recording/format.h"
-#include "esim/visualise/theme.h"
 
 namespace esim::inline visualise {
 

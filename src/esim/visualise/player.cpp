@@ -12,6 +12,7 @@
 #include "esim/core/parallel.h"
 #include "esim/core/remedy.h"
 #include "esim/files/number_text.h"
+#include "esim/preview/pictures.h"
 #include "esim/visualise/event_pictures.h"
 #include "esim/visualise/event_window.h"
 #include "esim/visualise/space_time.h"

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "esim/plot/theme.h"
 #include "esim/visualise/recording_overview.h"
-#include "esim/visualise/theme.h"
 
 namespace esim::inline visualise {
 

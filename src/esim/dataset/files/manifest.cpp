@@ -10,6 +10,7 @@
 #include "esim/dataset/files/checksum.h"
 #include "esim/dataset/files/preview.h"
 #include "esim/files/output_file.h"
+#include "esim/preview/pictures.h"
 
 namespace esim::inline dataset {
 namespace {

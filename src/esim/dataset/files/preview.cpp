@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "esim/stats/axes.h"
+#include "esim/plot/axes.h"
 #include "esim/visualise/page.h"
 
 namespace esim::inline dataset {
@@ -79,7 +79,7 @@ std::vector<double> fractions_of(std::span<const std::uint64_t> counts) {
 }
 
 Image<Rgb> draw_magnitudes(const MagnitudeHistogram& bins, bool is_target, std::span<const std::uint64_t> counts) {
-  constexpr int kWidth = 900, kHeight = 480, kTextHeight = 10;
+  constexpr int kWidth = 900, kHeight = 480;
   const double max = bins.edges.back(), min = max / 4096;
   const std::vector<DataPoint> made = outline(bins, fractions_of(counts), min);
   const std::vector<DataPoint> target = is_target ? outline(bins, bins.fractions, min) : std::vector<DataPoint>{};
@@ -87,19 +87,15 @@ Image<Rgb> draw_magnitudes(const MagnitudeHistogram& bins, bool is_target, std::
   for (const auto* points : {&made, &target}) {
     for (const DataPoint& point : *points) top = std::max(top, 1.15 * point.y);
   }
-  Canvas canvas(kWidth, kHeight, kPaper);
-  Axes axes(canvas, {80, 62, kWidth - 110, kHeight - 122}, "Optical flow of the pixels over a sequence",
-            decade_scale(min, max, "magnitude, px"), linear_scale(0, top, "% of pixels per doubling"));
-  for (std::size_t i = 0; i + 1 < made.size(); i += 2)
-    axes.fill(made[i].x, made[i + 1].x, 0, made[i].y, mix(kBarColour, kPaper, 0.5F));
+  const Rgb made_colour = mix(kBarColour, kLightTheme.page, 0.5F);
+  AxesOptions options{"Optical flow of the pixels over a sequence", {{"this dataset", made_colour}}};
+  if (is_target) options.legend.push_back({bins.source, kTargetColour, Mark::line});
+  Canvas canvas(kWidth, kHeight, kLightTheme.page);
+  Axes axes(canvas, canvas.pixels().bounds(), logarithmic_scale(min, max, "magnitude (px)"),
+            linear_scale(0, top, "pixels per doubling (%)"), std::move(options));
+  for (std::size_t i = 0; i + 1 < made.size(); i += 2) axes.fill(made[i].x, made[i + 1].x, 0, made[i].y, made_colour);
   axes.line(target, kTargetColour, 3);
   axes.finish();
-  canvas.fill({kWidth - 330, 32, 22, 8}, mix(kBarColour, kPaper, 0.5F));
-  canvas.text(kWidth - 300, 41, "this dataset", kTextHeight, kInk);
-  if (is_target) {
-    canvas.fill({kWidth - 190, 35, 22, 3}, kTargetColour);
-    canvas.text(kWidth - 160, 41, bins.source, kTextHeight, kInk);
-  }
   return std::move(canvas).take();
 }
 

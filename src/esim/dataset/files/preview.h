@@ -7,7 +7,7 @@
 
 #include "esim/dataset/generators/magnitudes.h"
 #include "esim/dataset/sequence.h"
-#include "esim/preview/canvas.h"
+#include "esim/preview/colours.h"
 
 namespace esim::inline dataset {
 

@@ -4,11 +4,11 @@
 #include <cstdlib>
 #include <span>
 
-#include "esim/preview/canvas.h"
+#include "esim/plot/theme.h"
+#include "esim/preview/pictures.h"
 #include "esim/scene/images/image_file.h"
 #include "esim/studio/endpoints/endpoints.h"
 #include "esim/visualise/event_pictures.h"
-#include "esim/visualise/theme.h"
 
 namespace esim::studio {
 namespace {

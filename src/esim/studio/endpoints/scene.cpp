@@ -2,7 +2,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "esim/preview/canvas.h"
+#include "esim/preview/pictures.h"
 #include "esim/scenario/read.h"
 #include "esim/studio/editor/scenario_check.h"
 #include "esim/studio/endpoints/endpoints.h"

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "esim/core/srgb.h"
-#include "esim/preview/canvas.h"
+#include "esim/preview/pictures.h"
 #include "esim/scene/images/image_header.h"
 
 namespace esim::studio {

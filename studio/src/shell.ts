@@ -88,6 +88,7 @@ export class Shell {
     this.go(
       address.place in this.places ? (address.place as PlaceName) : opened.kind === "recording" ? "look" : "design",
     );
+    requestIdleCallback(() => void this.configure.textEditor().catch(complain));
   }
 
   private bar(): HTMLElement {
@@ -270,7 +271,6 @@ export class Shell {
 
   /** Saves the scenario; returns its path, or null if it was not saved. */
   private async saved(): Promise<string | null> {
-    await this.document.revision.settled.catch(() => undefined);
     if ((this.document.dirty || this.document.path === null) && !(await this.save())) return null;
     return this.document.path;
   }
@@ -284,7 +284,7 @@ export class Shell {
   /** Runs the scenario, or reports why it cannot run. */
   private async startRun(): Promise<void> {
     commitTyping();
-    await this.document.revision.checked;
+    await this.document.checked();
     const { problems } = this.document;
     if (problems.length > 0) {
       const where = await refuseFor("Not run", "The scenario cannot be simulated as it is.", problems);

@@ -216,6 +216,7 @@ Scenario read_scenario(const ScenarioText& text) {
   YAML::Node root = parse_yaml(text.yaml, text.file);
   YamlSource source{text.file, {}, text.setter, text.has_lines, text.refuses};
   if (!root.IsMap()) YamlReader(root, "", source);
+  for (const std::string& key : text.removed) remove_option(root, key);
   for (const std::string& change : text.overrides) source.changed.push_back(apply_override(root, change, text.setter));
 
   Scenario scenario;

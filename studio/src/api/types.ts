@@ -21,6 +21,8 @@ export interface FileEntry {
 export interface Problem {
   where: string;
   what: string;
+  /** Of text that is not YAML. */
+  line?: number;
 }
 
 export interface ScenarioState {

@@ -21,7 +21,6 @@ export class ScenarioFile {
   ) {
     // Unsaved changes survive a reload of the page.
     document.changed.listen((revision) => {
-      if (revision.yaml === null) return;
       if (document.dirty)
         sessionStorage.setItem(
           draftKey,
@@ -65,16 +64,20 @@ export class ScenarioFile {
     );
   }
 
-  /** Returns whether it was saved; refuses to save while the form has invalid entries. */
+  /** Returns whether it was saved; refuses to save invalid entries of the form and text that is not YAML. */
   async save(): Promise<boolean> {
     if (await this.refused()) return false;
     return this.document.path === null ? this.saveAs() : this.write(this.document.path, this.document.onDisk, false);
   }
 
   private async refused(): Promise<boolean> {
-    const entries = this.document.problems.filter(({ where }) => this.document.refused.has(where));
+    const { problems, refused } = this.document;
+    const entries = problems.filter(({ where, line }) => refused.has(where) || line !== undefined);
     if (entries.length === 0) return false;
-    const why = "Some entries of the form are invalid, so that the saved scenario would differ from the form.";
+    const why =
+      refused.size > 0
+        ? "Some entries of the form are invalid, so that the saved scenario would differ from the form."
+        : "The text is not YAML, so that it could not be opened as a scenario.";
     const where = await refuseFor("Not saved", why, entries);
     if (where !== null) this.reveal(where);
     return true;
@@ -99,7 +102,7 @@ export class ScenarioFile {
   }
 
   private async write(path: string, onDisk: string | null, overwrite: boolean): Promise<boolean> {
-    const yaml = await this.document.revision.settled;
+    const { yaml } = this.document.revision;
     try {
       const { revision } = await server.saveScenario(path, yaml, onDisk, overwrite);
       this.document.saved(path, revision, yaml);

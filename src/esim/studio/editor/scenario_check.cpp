@@ -7,7 +7,7 @@
 
 #include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
-#include "esim/studio/editor/yaml_text.h"
+#include "esim/studio/editor/scenario_values.h"
 #include "esim/studio/server/http.h"
 
 namespace esim::studio {
@@ -64,23 +64,27 @@ void refuse_foreign_files(Scenario& scenario, const Roots& roots) {
   describe(visitor, scenario);
 }
 
-bool has(const Json& values, const std::string& key) {
-  const Json* node = &values;
+/// The place of an option, whose key is dotted, in the values: a JSON pointer.
+Json::json_pointer pointer_of(const std::string& key) {
+  Json::json_pointer pointer;
   for (std::size_t begin = 0; begin <= key.size();) {
     const std::size_t end = std::min(key.find('.', begin), key.size());
-    const std::string part = key.substr(begin, end - begin);
-    if (node->is_array()) {
-      const bool number = !part.empty() && part.size() < 7 && part.find_first_not_of("0123456789") == std::string::npos;
-      if (!number || std::stoul(part) >= node->size()) return false;
-      node = &(*node)[std::stoul(part)];
-    } else if (node->is_object() && node->contains(part)) {
-      node = &(*node)[part];
-    } else {
-      return false;
-    }
+    pointer /= key.substr(begin, end - begin);
     begin = end + 1;
   }
-  return true;
+  return pointer;
+}
+
+bool has(const Json& values, const std::string& key) { return values.contains(pointer_of(key)); }
+
+void remove(Json& values, const std::string& key) {
+  const Json::json_pointer pointer = pointer_of(key);
+  Json& parent = values[pointer.parent_pointer()];
+  if (parent.is_array()) {
+    parent.erase(std::stoul(pointer.back()));
+  } else {
+    parent.erase(pointer.back());
+  }
 }
 
 /// The key in the text of an option that all cameras share; the reader reports it with a camera's key.
@@ -108,6 +112,7 @@ CheckedScenario check_scenario(const std::string& yaml, const fs::path& file, co
   constexpr int kMostProblems = 20;
   CheckedScenario checked;
   checked.values = values_of(yaml, file.filename().string());
+  Json remaining = checked.values;
   ScenarioText text;
   text.yaml = yaml;
   text.file = file;
@@ -127,10 +132,11 @@ CheckedScenario check_scenario(const std::string& yaml, const fs::path& file, co
       return checked;
     } catch (const OptionError& error) {
       // Remove the invalid option to find the next problem.
-      const std::string place = place_in(values_of(text.yaml, ""), error.key());
+      const std::string place = place_in(remaining, error.key());
       note(place.empty() ? error.key() : place, error.problem());
       if (!place.empty()) {
-        text.yaml = with_option(text.yaml, place, nullptr);
+        text.removed.push_back(place);
+        remove(remaining, place);
       } else if (error.key() == "renderer") {
         text.needs_renderer = false;
       } else if (error.key() == "trajectory") {

@@ -121,7 +121,7 @@ test("two tabs: the second one to save is asked", async () => {
   await set(first, "0.63");
   await first.getByRole("button", { name: "Take theirs" }).click();
   await until(
-    async () => (await first.locator(".yaml-editor textarea").inputValue()).includes("0.42"),
+    async () => (await yaml(first)).includes("0.42"),
     "theirs in the page",
   );
   assert.ok(read("poster.yaml").includes("0.42"));

@@ -16,8 +16,9 @@ import { addShortcuts } from "./ui/shortcuts.ts";
 import { complain, message, say } from "./ui/status.ts";
 import { toggleTheme } from "./ui/theme.ts";
 
-type PlaceName = "design" | "configure" | "run" | "look";
-const placeNames: Record<PlaceName, string> = { design: "Design", configure: "Configure", run: "Run", look: "Look" };
+/** The places, in the order of their tabs. */
+const placeNames = { design: "Design", configure: "Configure", run: "Run", look: "Look" };
+type PlaceName = keyof typeof placeNames;
 
 /** The frame of the page: bar, places, status line; opening and saving. */
 export class Shell {

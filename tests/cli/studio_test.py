@@ -99,12 +99,16 @@ class Answers(StudioTest):
 
     def test_problems_are_told_together_and_name_their_options(self):
         yaml = self.yaml.replace("width: 64", "width: -3").replace("contrast_threshold: 0.2", "contrast_treshold: 0.2") + "sed: 1\n"
-        problems = {p["where"]: p["what"] for p in self.ask("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]}
+        found = self.ask("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]
+        problems = {problem["where"]: problem["what"] for problem in found}
         self.assertEqual(set(problems), {"camera.width", "event_camera.contrast_treshold", "sed"})
+        for problem in found:
+            self.assertIn(problem["where"].split(".")[-1], yaml.splitlines()[problem["line"] - 1])
         self.assertIn("did you mean contrast_threshold?", problems["event_camera.contrast_treshold"])
         self.assertEqual(self.ask("POST", "/api/scenario/check", self.scenario())["problems"], [])
         broken = self.ask("POST", "/api/scenario/check", {"yaml": "a: [", "dir": "work"})
         self.assertIn("not valid YAML", broken["problems"][0]["what"])
+        self.assertEqual([problem["line"] for problem in broken["problems"]], [1])
 
     def test_problems_behind_problems_are_found_in_lists_and_behind_aliases(self):
         yaml = ("renderer: {type: plane, image: none.png}\ntrajectory:\n  type: waypoints\n  points:\n  - {position: [0, 0, 0], look_at: [1, 0, 0], tt: 1}\n"

@@ -24,14 +24,16 @@ Scenario read_scenario(const std::filesystem::path& file, const std::vector<std:
 /// An invalid option of a scenario. The message also has the file and the line.
 class OptionError : public UserError {
  public:
-  OptionError(const std::string& message, std::string key, std::string problem)
-      : UserError(message), key_(std::move(key)), problem_(std::move(problem)) {}
+  OptionError(const std::string& message, std::string key, std::string problem, int line = 0)
+      : UserError(message), key_(std::move(key)), problem_(std::move(problem)), line_(line) {}
 
   const std::string& key() const { return key_; }          ///< dotted
   const std::string& problem() const { return problem_; }  ///< without the file and the key
+  int line() const { return line_; }                       ///< of the text, from 1; 0 if the option is not in it
 
  private:
   std::string key_, problem_;
+  int line_;
 };
 
 /// The default beginning of messages about overrides, which are options of a command.

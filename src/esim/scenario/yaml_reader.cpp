@@ -132,8 +132,9 @@ void YamlReader::fail(const YamlSource& source, const YAML::Node& node, const st
   });
   if (from_command_line) throw OptionError(fmt::format("{}{}: {}", source.setter, key, message), key, message);
   const YAML::Mark mark = node.IsDefined() ? node.Mark() : YAML::Mark::null_mark();
-  const std::string line = source.has_lines && mark.line >= 0 ? fmt::format(":{}", mark.line + 1) : "";
-  throw OptionError(fmt::format("{}{}: {}: {}", source.file.string(), line, key, message), key, message);
+  const int line = source.has_lines && mark.line >= 0 ? mark.line + 1 : 0;
+  const std::string place = source.file.string() + (line > 0 ? fmt::format(":{}", line) : "");
+  throw OptionError(fmt::format("{}: {}: {}", place, key, message), key, message, line);
 }
 
 void YamlReader::finish() const {

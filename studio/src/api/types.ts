@@ -21,7 +21,7 @@ export interface FileEntry {
 export interface Problem {
   where: string;
   what: string;
-  /** Of text that is not YAML. */
+  /** Of the text, from 1. */
   line?: number;
 }
 

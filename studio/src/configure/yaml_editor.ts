@@ -51,7 +51,7 @@ export class YamlEditor {
 
   /** `element` gets a shadow root, since the page's policy for security forbids the style elements of CodeMirror. */
   constructor(
-    private element: HTMLElement,
+    element: HTMLElement,
     private document: ScenarioDocument,
   ) {
     const root = element.attachShadow({ mode: "open", delegatesFocus: true });
@@ -121,7 +121,8 @@ export class YamlEditor {
   private diagnostics(): Diagnostic[] {
     const isYaml = yamlErrorOf(this.text) === null;
     return this.document.problems.flatMap(({ where, what, line }) => {
-      const place = line !== undefined ? this.lineAt(line) : isYaml && where ? placeOf(this.text, where) : null;
+      const option = isYaml && where ? placeOf(this.text, where) : null;
+      const place = option ?? (line !== undefined ? this.lineAt(line) : null);
       if (!place) return [];
       const to = Math.min(place.to, this.view.state.doc.lineAt(place.from).to);
       return [{ from: place.from, to, severity: "error" as const, message: where ? `${where}: ${what}` : what }];

@@ -8,6 +8,7 @@ import { chooseFile } from "../ui/files_dialog.ts";
 import { complain, say } from "../ui/status.ts";
 import type { ScenarioDocument } from "./document.ts";
 import { refuseFor } from "./problems.ts";
+import { yamlErrorOf } from "./yaml_values.ts";
 
 const draftKey = "esim-studio-draft";
 
@@ -71,8 +72,9 @@ export class ScenarioFile {
   }
 
   private async refused(): Promise<boolean> {
-    const { problems, refused } = this.document;
-    const entries = problems.filter(({ where, line }) => refused.has(where) || line !== undefined);
+    const { problems, refused, revision } = this.document;
+    const isYaml = yamlErrorOf(revision.yaml) === null;
+    const entries = problems.filter(({ where }) => refused.has(where) || !isYaml);
     if (entries.length === 0) return false;
     const why =
       refused.size > 0

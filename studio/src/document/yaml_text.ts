@@ -1,8 +1,9 @@
-import { isMap, isSeq, type Node, type Pair, parseDocument, visit } from "yaml";
+import { type Document, isMap, isSeq, type Node, type Pair, parseDocument, type ToStringOptions, visit } from "yaml";
 import type { Json, JsonMap } from "../api/types.ts";
 import { sameJson, setIn } from "./values.ts";
-import { spliced } from "./yaml_edit.ts";
-import { keyOf, parseYaml, YamlError } from "./yaml_values.ts";
+import { setValues } from "./yaml_edit.ts";
+import { withSpacesOf } from "./yaml_spaces.ts";
+import { keyOf, parseYaml, readYaml, YamlError } from "./yaml_values.ts";
 
 /** An option by its dotted key, and its new value; null removes it. */
 export interface Change {
@@ -15,15 +16,27 @@ export interface Change {
  * not YAML or an option is invalid.
  */
 export function withOptions(yaml: string, changes: readonly Change[]): string {
-  const parsed = parseYaml(yaml);
-  let wanted = parsed.values;
+  const { values } = parseYaml(yaml);
+  let wanted = values;
   for (const { where, value } of changes) wanted = setIn(wanted, where, value);
-  if (sameJson(wanted, parsed.values)) return yaml;
-  for (const edited of [() => spliced(yaml, parsed, wanted), () => reformatted(yaml, parsed.values, wanted)]) {
-    const text = edited();
-    if (means(text, wanted)) return text;
+  if (sameJson(wanted, values)) return yaml;
+  for (const original of [() => yaml, () => withoutAliases(yaml)]) {
+    for (const text of editions(original(), wanted)) if (means(text, wanted)) return text;
   }
   throw new Error(`${changes[0]!.where}: the text has no simple place for it; edit the text`);
+}
+
+const uniform: ToStringOptions = { flowCollectionPadding: false, lineWidth: 0 };
+
+/** The text with other values: first with its own spaces, then with uniform ones. */
+function* editions(yaml: string, wanted: JsonMap): Generator<string> {
+  const parsed = readYaml(yaml);
+  const before = parsed.document.toString(uniform);
+  setValues(parsed, wanted);
+  if (hasLostAnchor(parsed.document)) return;
+  const after = parsed.document.toString(uniform);
+  yield withSpacesOf(yaml, before, after);
+  yield after;
 }
 
 function means(text: string, wanted: JsonMap): boolean {
@@ -35,21 +48,18 @@ function means(text: string, wanted: JsonMap): boolean {
   }
 }
 
-/**
- * For values that several places share by an alias, and other rare cases: aliases are expanded, and groups that change
- * are written anew. Comments elsewhere stay; spaces become uniform.
- */
-function reformatted(yaml: string, before: JsonMap, wanted: JsonMap): string {
+/** For values that several places share by an alias. */
+function withoutAliases(yaml: string): string {
   const document = parseDocument(yaml, { uniqueKeys: false });
-  document.errors = [];
   visit(document, { Alias: (_, alias) => alias.resolve(document)?.clone() as Node | undefined });
   visit(document, { Node: (_, node) => void ("anchor" in node && delete node.anchor) });
-  for (const key of Object.keys({ ...before, ...wanted })) {
-    if (sameJson(before[key], wanted[key])) continue;
-    if (Object.hasOwn(wanted, key)) document.set(key, document.createNode(wanted[key]));
-    else document.delete(key);
-  }
-  return document.toString({ lineWidth: 0, flowCollectionPadding: false });
+  return document.toString(uniform);
+}
+
+function hasLostAnchor(document: Document): boolean {
+  let isLost = false;
+  visit(document, { Alias: (_, alias) => void (isLost ||= alias.resolve(document) === undefined) });
+  return isLost;
 }
 
 /** The place of an option in the text, from its key to the end of its value, or that of the nearest group around it. */

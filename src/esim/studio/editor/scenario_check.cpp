@@ -100,6 +100,12 @@ std::string place_in(const Json& values, const std::string& key) {
 
 }  // namespace
 
+Json problem_json(const std::string& where, const std::string& what, int line) {
+  Json problem{{"where", where}, {"what", what}};
+  if (line > 0) problem["line"] = line;
+  return problem;
+}
+
 std::string option_in(const std::string& message) {
   const std::size_t end = message.find(": ");
   if (end == std::string::npos || end == 0) return "";
@@ -118,11 +124,11 @@ CheckedScenario check_scenario(const std::string& yaml, const fs::path& file, co
   text.file = file;
   text.needs_waypoints = false;
   text.refuses = [&](const fs::path& named) { return roots.contains(named) ? "" : outside(named); };
-  const auto note = [&](const std::string& where, const std::string& what) {
+  const auto note = [&](const std::string& where, const std::string& what, int line) {
     for (const Json& problem : checked.problems) {
       if (problem["where"] == where) return;  // it is missing because of the removal below
     }
-    checked.problems.push_back({{"where", where}, {"what", what}});
+    checked.problems.push_back(problem_json(where, what, line));
   };
   for (int i = 0; i < kMostProblems; ++i) {
     try {
@@ -133,7 +139,7 @@ CheckedScenario check_scenario(const std::string& yaml, const fs::path& file, co
     } catch (const OptionError& error) {
       // Remove the invalid option to find the next problem.
       const std::string place = place_in(remaining, error.key());
-      note(place.empty() ? error.key() : place, error.problem());
+      note(place.empty() ? error.key() : place, error.problem(), error.line());
       if (!place.empty()) {
         text.removed.push_back(place);
         remove(remaining, place);
@@ -145,7 +151,7 @@ CheckedScenario check_scenario(const std::string& yaml, const fs::path& file, co
         return checked;
       }
     } catch (const UserError& error) {
-      note(option_in(error.what()), error.what());
+      note(option_in(error.what()), error.what(), 0);
       return checked;
     }
   }

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "esim/studio/server/http.h"
+#include "esim/scenario/read.h"
 
 namespace esim::studio {
 namespace {
@@ -53,7 +53,9 @@ YAML::Node parse(const std::string& yaml, const std::string& name) {
     if (!root.IsMap()) throw UserError(name + ": a scenario must be a map of keys and values");
     return root;
   } catch (const YAML::Exception& exception) {
-    throw UserError(fmt::format("{}:{}: not valid YAML: {}", name, exception.mark.line + 1, exception.msg));
+    const int line = exception.mark.line + 1;
+    const std::string problem = "not valid YAML: " + exception.msg;
+    throw OptionError(fmt::format("{}:{}: {}", name, line, problem), "", problem, line);
   }
 }
 

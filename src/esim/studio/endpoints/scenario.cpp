@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "esim/files/output_file.h"
+#include "esim/scenario/read.h"
 #include "esim/studio/editor/scenario_check.h"
 #include "esim/studio/editor/schema_json.h"
 #include "esim/studio/endpoints/endpoints.h"
@@ -42,8 +43,10 @@ Json checked(const std::string& yaml, const fs::path& file, const Roots& roots) 
     CheckedScenario result = check_scenario(yaml, file, roots);
     answer["values"] = std::move(result.values);
     answer["problems"] = std::move(result.problems);
+  } catch (const OptionError& error) {
+    answer["problems"].push_back(problem_json(error.key(), error.what(), error.line()));
   } catch (const UserError& error) {
-    answer["problems"].push_back({{"where", ""}, {"what", error.what()}});
+    answer["problems"].push_back(problem_json("", error.what(), 0));
   }
   return answer;
 }

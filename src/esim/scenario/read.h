@@ -42,8 +42,8 @@ inline constexpr const char* kSetter = "--set ";
 /// A scenario as text, with options for reading it.
 struct ScenarioText {
   std::string yaml;
-  std::filesystem::path file;  ///< for messages, and its folder for relative paths; it need not exist
-  bool has_lines = true;       ///< messages name the lines of `yaml`
+  std::filesystem::path file;        ///< for messages, and its folder for relative paths; it need not exist
+  bool has_lines = true;             ///< messages name the lines of `yaml`
   std::vector<std::string> removed;  ///< dotted keys of options of `yaml` that are not read, one after the other
   std::vector<std::string> overrides;
   std::string setter = kSetter;  ///< beginning of messages about overrides

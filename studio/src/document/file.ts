@@ -8,7 +8,6 @@ import { chooseFile } from "../ui/files_dialog.ts";
 import { complain, say } from "../ui/status.ts";
 import type { ScenarioDocument } from "./document.ts";
 import { refuseFor } from "./problems.ts";
-import { yamlErrorOf } from "./yaml_values.ts";
 
 const draftKey = "esim-studio-draft";
 
@@ -65,21 +64,16 @@ export class ScenarioFile {
     );
   }
 
-  /** Returns whether it was saved; refuses to save invalid entries of the form and text that is not YAML. */
+  /** Returns whether it was saved; refuses to save while the form has invalid entries. */
   async save(): Promise<boolean> {
     if (await this.refused()) return false;
     return this.document.path === null ? this.saveAs() : this.write(this.document.path, this.document.onDisk, false);
   }
 
   private async refused(): Promise<boolean> {
-    const { problems, refused, revision } = this.document;
-    const isYaml = yamlErrorOf(revision.yaml) === null;
-    const entries = problems.filter(({ where }) => refused.has(where) || !isYaml);
+    const entries = this.document.problems.filter(({ where }) => this.document.refused.has(where));
     if (entries.length === 0) return false;
-    const why =
-      refused.size > 0
-        ? "Some entries of the form are invalid, so that the saved scenario would differ from the form."
-        : "The text is not YAML, so that it could not be opened as a scenario.";
+    const why = "Some entries of the form are invalid, so that the saved scenario would differ from the form.";
     const where = await refuseFor("Not saved", why, entries);
     if (where !== null) this.reveal(where);
     return true;

@@ -42,9 +42,9 @@ inline constexpr const char* kSetter = "--set ";
 /// A scenario as text, with options for reading it.
 struct ScenarioText {
   std::string yaml;
-  std::filesystem::path file;        ///< for messages, and its folder for relative paths; it need not exist
-  bool has_lines = true;             ///< messages name the lines of `yaml`
-  std::vector<std::string> removed;  ///< dotted keys of options of `yaml` that are not read, one after the other
+  std::filesystem::path file;             ///< for messages, and its folder for relative paths; it need not exist
+  bool has_lines = true;                  ///< messages name the lines of `yaml`
+  std::vector<std::string> removed = {};  ///< dotted keys of options of `yaml` that are not read, one after the other
   std::vector<std::string> overrides;
   std::string setter = kSetter;  ///< beginning of messages about overrides
   bool needs_renderer = true;    ///< false: the key may be missing, since the caller brings its own renderer

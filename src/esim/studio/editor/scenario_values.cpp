@@ -11,7 +11,7 @@ namespace esim::studio {
 namespace {
 
 /// Aliases of anchors share nodes, so that a small text may be an endless tree.
-constexpr int kMostNodes = 1 << 20, kMostDeep = 64;
+constexpr int kMaxNodes = 1 << 20, kMaxDepth = 64;
 
 Json scalar_json(const YAML::Node& node) {
   const std::string& text = node.Scalar();
@@ -28,7 +28,7 @@ Json scalar_json(const YAML::Node& node) {
 }
 
 Json json_of(const YAML::Node& node, int depth, int& nodes) {
-  if (++nodes > kMostNodes || depth > kMostDeep)
+  if (++nodes > kMaxNodes || depth > kMaxDepth)
     throw UserError("the scenario is nested too deeply, is too large, or has an alias that contains itself");
   if (node.IsMap()) {
     Json object = Json::object();

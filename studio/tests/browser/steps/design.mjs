@@ -167,6 +167,8 @@ test("the form shows a problem where it is, and the text goes both ways", async 
   await until(async () => /contrast_threshold: 0\.35/.test(await yaml(page)), "the threshold in the text");
   await fillYaml(page, (await yaml(page)).replace("0.35", "1000"));
   await until(async () => (await page.locator(".problems li").count()) === 1, "the problem");
+  const underlined = async () => (await page.locator(".cm-lintRange-error").allTextContents()).join("");
+  await until(async () => (await underlined()) === "contrast_threshold: 1000", "the problem in the text");
   await page.locator(".problems button").click();
   assert.equal(await threshold.getAttribute("aria-invalid"), "true");
   assert.equal(await threshold.evaluate((element) => element === document.activeElement), true);
@@ -177,6 +179,20 @@ test("the form shows a problem where it is, and the text goes both ways", async 
   await until(async () => /preset: davis346/.test(await yaml(page)), "the preset in the text");
   await page.keyboard.press("Control+z");
   await until(async () => !/preset/.test(await yaml(page)), "undo of the preset");
+});
+
+test("a change in the form keeps comments and spaces of the text", async () => {
+  const { page } = main;
+  const before = await yaml(page);
+  const commented = before.replace(/^duration_s: 0\.4$/m, "\n# A short walk.\nduration_s:    0.4   # seconds");
+  assert.notEqual(commented, before);
+  await fillYaml(page, commented);
+  const threshold = page.locator("#option-event_camera-contrast_threshold");
+  await threshold.fill("0.25");
+  await threshold.press("Enter");
+  await until(async () => (await yaml(page)) === commented.replace("threshold: 0.3", "threshold: 0.25"), "one change");
+  await fillYaml(page, before);
+  await until(async () => (await threshold.inputValue()) === "0.3", "the form of before");
 });
 
 const runs = (page) => page.evaluate(async () => (await (await fetch("/api/runs")).json()).length);

@@ -99,17 +99,34 @@ class Answers(StudioTest):
 
     def test_problems_are_reported_together_and_name_their_options(self):
         yaml = self.yaml.replace("width: 64", "width: -3").replace("contrast_threshold: 0.2", "contrast_treshold: 0.2") + "sed: 1\n"
-        problems = {p["where"]: p["what"] for p in self.ask("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]}
+        found = self.ask("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]
+        problems = {problem["where"]: problem["what"] for problem in found}
         self.assertEqual(set(problems), {"camera.width", "event_camera.contrast_treshold", "sed"})
+        for problem in found:
+            self.assertIn(problem["where"].split(".")[-1], yaml.splitlines()[problem["line"] - 1])
         self.assertIn("did you mean contrast_threshold?", problems["event_camera.contrast_treshold"])
         self.assertEqual(self.ask("POST", "/api/scenario/check", self.scenario())["problems"], [])
         broken = self.ask("POST", "/api/scenario/check", {"yaml": "a: [", "dir": "work"})
         self.assertIn("not valid YAML", broken["problems"][0]["what"])
+        self.assertEqual([problem["line"] for problem in broken["problems"]], [1])
 
-    def test_an_edit_keeps_comments(self):
-        edited = self.ask("POST", "/api/scenario/edit", self.scenario(set=[{"where": "camera.width", "value": 80}]))
-        self.assertEqual(edited["yaml"], self.yaml.replace("width: 64", "width: 80"))
-        self.assertEqual(edited["values"]["camera"]["width"], 80)
+    def test_problems_behind_problems_are_found_in_lists_and_behind_aliases(self):
+        yaml = ("renderer: {type: plane, image: none.png}\ntrajectory:\n  type: waypoints\n  points:\n  - {position: [0, 0, 0], look_at: [1, 0, 0], tt: 1}\n"
+                "  - {position: [0, 0, 1], look_at: [1, 0, 0], ttt: 1}\n"
+                "cameras:\n- &first {name: a, width: -1, height: 24, fov: 3}\n- {name: b, width: -2, height: 24}\nsed: 1\n")
+        problems = [p["where"] for p in self.ask("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]]
+        self.assertEqual(sorted(problems), ["cameras.0.fov", "cameras.0.width", "cameras.1.width", "sed", "trajectory.points.0.tt", "trajectory.points.1.ttt"])
+        shared = yaml.replace("{name: b, width: -2, height: 24}", "*first")
+        problems = [p["where"] for p in self.ask("POST", "/api/scenario/check", {"yaml": shared, "dir": "work"})["problems"]]
+        self.assertEqual(set(problems) & {"cameras.0.width", "cameras.0.fov", "sed"}, {"cameras.0.width", "cameras.0.fov", "sed"})
+
+    def test_a_new_scenario_names_its_scene(self):
+        for name, written in (("plain.obj", "plain.obj"), ("a: b #1.obj", '"a: b #1.obj"')):
+            (self.work / name).write_text("v 0 0 0\n")
+            created = self.ask("POST", "/api/scenario/new", {"scene": f"work/{name}"})
+            self.assertIn(f"  scene: {written}\n", created["yaml"])
+            self.assertEqual(created["values"]["renderer"]["scene"], name)
+        self.assertEqual(self.ask("POST", "/api/scenario/new", {})["values"]["renderer"], {"type": "mesh", "scene": ""})
 
     def test_two_windows_do_not_undo_each_other(self):
         saved = self.ask("PUT", "/api/scenario", {"path": "work/two.yaml", "yaml": "seed: 1\n", "revision": None})
@@ -412,7 +429,7 @@ class Refusals(StudioTest):
             self.server.raw(data, 1)
         for body in (b"", b"[]", b"null", b"{", b"[" * 100000, b'{"yaml": 5}', b'{"yaml": "' + b"[" * 3000 + b'"}', b'{"yaml": "a: &a [*a]"}', b'\xff\xfe',
                      b'{"yaml": "camera: &a {x: *a}", "dir": "work"}', b'{"path": "\\u0000"}'):
-            for target in ("/api/scene", "/api/scenario/check", "/api/scenario/edit", "/api/trajectory", "/api/view", "/api/runs", "/api/recordings"):
+            for target in ("/api/scene", "/api/scenario/check", "/api/trajectory", "/api/view", "/api/runs", "/api/recordings"):
                 connection = http.client.HTTPConnection("127.0.0.1", self.server.port, timeout=20)
                 connection.request("POST", target, body, {"Authorization": f"Bearer {self.server.token}", "Content-Type": "application/json"})
                 response = connection.getresponse()

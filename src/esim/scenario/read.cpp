@@ -218,6 +218,7 @@ Scenario read_scenario(const ScenarioText& text) {
   if (!root.IsMap()) YamlReader(root, "", source);
   Scenario scenario;
   use_present_names(root, source, scenario.notices);
+  for (const std::string& key : text.removed) remove_option(root, with_present_names(key, scenario.notices));
   for (const std::string& change : text.overrides) {
     const std::size_t equals = std::min(change.find('='), change.size());
     const std::string present = with_present_names(change.substr(0, equals), scenario.notices);

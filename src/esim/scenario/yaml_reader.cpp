@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
+#include <limits>
 
 namespace esim::inline scenario {
 namespace {
@@ -50,6 +52,29 @@ YAML::Node parse_yaml(const std::string& yaml, const std::filesystem::path& file
     return YAML::Load(yaml);
   } catch (const YAML::Exception& exception) {
     throw UserError(fmt::format("{}:{}: not valid YAML: {}", file.string(), exception.mark.line + 1, exception.msg));
+  }
+}
+
+void remove_option(const YAML::Node& root, const std::string& key) {
+  const auto index = [](const std::string& part) {
+    std::size_t value = std::numeric_limits<std::size_t>::max();
+    std::from_chars(part.data(), part.data() + part.size(), value);
+    return value;
+  };
+  YAML::Node node = root;
+  for (std::size_t begin = 0, dot = 0; dot != std::string::npos; begin = dot + 1) {
+    dot = key.find('.', begin);
+    const std::string part = key.substr(begin, dot == std::string::npos ? dot : dot - begin);
+    const YAML::Node& parent = node;
+    const YAML::Node child = parent.IsSequence() ? parent[index(part)] : parent.IsMap() ? parent[part] : YAML::Node();
+    if (!child.IsDefined()) return;
+    if (dot != std::string::npos) {
+      node.reset(child);
+    } else if (node.IsSequence()) {
+      node.remove(index(part));
+    } else if (node.IsMap()) {
+      node.remove(part);
+    }
   }
 }
 
@@ -107,8 +132,9 @@ void YamlReader::fail(const YamlSource& source, const YAML::Node& node, const st
   });
   if (from_command_line) throw OptionError(fmt::format("{}{}: {}", source.setter, key, message), key, message);
   const YAML::Mark mark = node.IsDefined() ? node.Mark() : YAML::Mark::null_mark();
-  const std::string line = source.has_lines && mark.line >= 0 ? fmt::format(":{}", mark.line + 1) : "";
-  throw OptionError(fmt::format("{}{}: {}: {}", source.file.string(), line, key, message), key, message);
+  const int line = source.has_lines && mark.line >= 0 ? mark.line + 1 : 0;
+  const std::string place = source.file.string() + (line > 0 ? fmt::format(":{}", line) : "");
+  throw OptionError(fmt::format("{}: {}: {}", place, key, message), key, message, line);
 }
 
 void YamlReader::finish() const {

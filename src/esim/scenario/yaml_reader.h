@@ -34,6 +34,9 @@ std::string text_of(const std::filesystem::path& file, const char* kind);
 /// Throws UserError with file and line for text that is not YAML.
 YAML::Node parse_yaml(const std::string& yaml, const std::filesystem::path& file);
 
+/// Removes root[a][b][c] for the key "a.b.c", if it exists; list entries are given by their index.
+void remove_option(const YAML::Node& root, const std::string& key);
+
 /// Sets root[a][b][c] for "a.b.c=value" and returns the key; list entries are given by their index. Messages begin with
 /// `setter`.
 std::string apply_override(YAML::Node root, const std::string& text, const std::string& setter = kSetter);

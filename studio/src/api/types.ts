@@ -21,6 +21,8 @@ export interface FileEntry {
 export interface Problem {
   where: string;
   what: string;
+  /** Of the text, from 1. */
+  line?: number;
 }
 
 export interface ScenarioState {

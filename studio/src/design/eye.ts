@@ -33,7 +33,7 @@ export class Eye {
   private shown = "";
 
   constructor(
-    private text: () => Promise<server.Source>,
+    private text: () => server.Source,
     private changed: () => void,
     choose: (camera: string) => void,
   ) {
@@ -130,7 +130,7 @@ export class Eye {
     const { version } = this;
     const { name } = this.model;
     try {
-      const source = await this.text();
+      const source = this.text();
       const key = JSON.stringify([source.yaml, name, at]);
       if (key !== this.shown) {
         const picture = await server.view(source, name, at);

@@ -21,7 +21,6 @@ export class ScenarioFile {
   ) {
     // Unsaved changes survive a reload of the page.
     document.changed.listen((revision) => {
-      if (revision.yaml === null) return;
       if (document.dirty)
         sessionStorage.setItem(
           draftKey,
@@ -99,7 +98,7 @@ export class ScenarioFile {
   }
 
   private async write(path: string, onDisk: string | null, overwrite: boolean): Promise<boolean> {
-    const yaml = await this.document.revision.settled;
+    const { yaml } = this.document.revision;
     try {
       const { revision } = await server.saveScenario(path, yaml, onDisk, overwrite);
       this.document.saved(path, revision, yaml);

@@ -10,7 +10,15 @@ export const shot = async (page, name) => {
 };
 export const stage = (page) => page.locator(".design .stage");
 export const rows = (page) => page.locator(".waypoint");
-export const yaml = (page) => page.locator(".yaml-editor textarea").inputValue();
+const editor = (page) => page.locator(".yaml-editor .cm-content");
+/** The text in the editor, of which the document holds only the lines that are seen. */
+export const yaml = (page) => editor(page).evaluate((content) => content.cmTile.view.state.doc.toString());
+/** Types a text instead of the one in the editor. */
+export const fillYaml = async (page, text) => {
+  await editor(page).focus();
+  await page.keyboard.press("Control+a");
+  await page.keyboard.insertText(text);
+};
 export const clock = (page) => page.locator(".timeline .clock");
 export const place = (page, name) => page.getByRole("tab", { name }).click();
 export const ready = async (page) => {

@@ -16,8 +16,8 @@
 namespace esim::inline sampling {
 namespace {
 
-constexpr double kMostPerSecond = 50000;  // maximum rate of reconstructions, whatever the motion
-constexpr double kMostUnseen = 0.01;      // maximum fraction of pixels hidden from both keyframes, except at edges
+constexpr double kMaxPerSecond = 50000;  // maximum rate of reconstructions, whatever the motion
+constexpr double kMaxUnseen = 0.01;      // maximum fraction of pixels hidden from both keyframes, except at edges
 
 // The first of every kAuditOneIn intervals between keyframes is compared with the truth.
 constexpr std::int64_t kAuditOneIn = 6;
@@ -153,7 +153,7 @@ class KeyframeSampler final : public Sampler {
       ++statistics_.held_to_max_rate;
     }
     const double fastest = std::max(before_.fastest_px_per_s, ahead_.back().fastest_px_per_s);
-    const double steps = std::ceil(to_seconds(interval) * std::min(fastest / options_.lambda, kMostPerSecond));
+    const double steps = std::ceil(to_seconds(interval) * std::min(fastest / options_.lambda, kMaxPerSecond));
     steps_ = static_cast<TimeNs>(std::clamp(steps, 1.0, static_cast<double>(interval)));
     step_ = 0;
     if (intervals_++ % kAuditOneIn == 0 && interval > 1) {
@@ -180,7 +180,7 @@ class KeyframeSampler final : public Sampler {
     }
     return worst <= options_.tolerance * context_.sensor.contrast_threshold &&
            static_cast<double>(unseen - std::max(before_.unseen, after.unseen)) <=
-               kMostUnseen * static_cast<double>(sensor().area()) &&
+               kMaxUnseen * static_cast<double>(sensor().area()) &&
            moved <= 2 * options_.max_displacement_px;
   }
 

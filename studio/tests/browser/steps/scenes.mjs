@@ -4,7 +4,7 @@ import { cpSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { openPage, scenes, until } from "../harness.mjs";
-import { clock, differing, place, ready, rows, shot, stage, visit, yaml } from "../page.mjs";
+import { clock, differing, place, ready, rows, shot, stage, visit, yaml, fillYaml } from "../page.mjs";
 import { browser, files, main, read, server } from "../session.mjs";
 
 const camera = "camera: {width: 160, height: 120, horizontal_fov_deg: 75}\noutput: {preview: false}\n";
@@ -182,12 +182,11 @@ test("a scene that cannot be read is said to be so, and can be replaced", async 
   await until(async () => /broken\.obj/.test(await note.textContent()), "the reason why the scene is missing");
   await shot(page, "scene-broken-dark");
   await place(page, "Configure");
-  const text = page.locator(".yaml-editor textarea");
-  await text.fill((await text.inputValue()).replace("broken.obj", "absent.obj"));
+  await fillYaml(page, (await yaml(page)).replace("broken.obj", "absent.obj"));
   await place(page, "Design");
   await until(async () => /absent\.obj/.test(await note.textContent()), "what is not there");
   await place(page, "Configure");
-  await text.fill((await text.inputValue()).replace("absent.obj", "ball.glb"));
+  await fillYaml(page, (await yaml(page)).replace("absent.obj", "ball.glb"));
   await place(page, "Design");
   await page.waitForSelector(".design .stage[data-scene]", { state: "attached" });
   await until(async () => (await note.count()) === 0, "the scene");

@@ -10,6 +10,7 @@
 #include "esim/core/time.h"
 #include "esim/event_camera/options.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// Earlier than every time, but such that differences do not overflow.
@@ -24,7 +25,7 @@ inline constexpr double kAges = 1e17;
 /// Replaces the reference of a pixel that is held in reset.
 inline constexpr double kHeld = std::numeric_limits<double>::infinity();
 
-/// The state and the individual parameters of a camera's pixels. Private to the event camera.
+/// The state and the individual parameters of a camera's pixels.
 ///
 /// A pixel compares G, its brightness after the low-pass plus the leak since the epoch, with its reference. It is
 /// inactive while its signal stays within bounds around the reference, inside which no event is possible, and until its

@@ -95,7 +95,7 @@ class NpzWriter final : public EventsWriter {
     const auto add = [&](std::string name, std::string_view type) {
       columns_.push_back(std::make_unique<ColumnFile>(path, std::move(name), fmt::format("'{}'", type)));
     };
-    add("t", npy::time_type(options_.unit));
+    add("t", numpy::time_type(options_.unit));
     add("x", "<u2");
     add("y", "<u2");
     add("p", "|u1");
@@ -104,7 +104,7 @@ class NpzWriter final : public EventsWriter {
   void write(EventSpan events) override {
     const bool us = options_.unit == TimeUnit::us;
     columns_[0]->write<std::int64_t>(events,
-                                     [&](const Event& event) { return us ? npy::microseconds(event.t) : event.t; });
+                                     [&](const Event& event) { return us ? numpy::microseconds(event.t) : event.t; });
     columns_[1]->write<std::uint16_t>(events, [](const Event& event) { return event.x; });
     columns_[2]->write<std::uint16_t>(events, [](const Event& event) { return event.y; });
     columns_[3]->write<std::uint8_t>(events, [](const Event& event) { return std::uint8_t{event.polarity > 0}; });
@@ -161,18 +161,18 @@ class NpzWriter final : public EventsWriter {
   Archive archive_;
 };
 
-std::shared_ptr<npy::Array> open_array(const std::shared_ptr<zip_t>& archive, zip_uint64_t index, std::string name) {
+std::shared_ptr<numpy::Array> open_array(const std::shared_ptr<zip_t>& archive, zip_uint64_t index, std::string name) {
   zip_file_t* const opened = zip_fopen_index(archive.get(), index, 0);
   if (opened == nullptr) throw UserError(fmt::format("cannot read {}: {}", name, zip_strerror(archive.get())));
   const std::shared_ptr<zip_file_t> member(opened, [archive](zip_file_t* file) { zip_fclose(file); });
-  return std::make_shared<npy::Array>(name, [member, name](std::span<std::byte> out) {
+  return std::make_shared<numpy::Array>(name, [member, name](std::span<std::byte> out) {
     const zip_int64_t got = zip_fread(member.get(), out.data(), out.size());
     if (got < 0) throw UserError(fmt::format("cannot read {}: {}", name, zip_file_strerror(member.get())));
     return static_cast<std::size_t>(got);
   });
 }
 
-int extent(npy::Array& array) {
+int extent(numpy::Array& array) {
   std::vector<std::int64_t> value;
   if (array.count() != 1 || array.advance(1) != 1 || array.fields().size() != 1) return 0;
   array.integers(array.fields()[0], value);
@@ -183,7 +183,7 @@ std::unique_ptr<EventsReader> open_npz(const fs::path& path) {
   std::string reason;
   const std::shared_ptr<zip_t> archive = open_archive(path, ZIP_RDONLY, reason);
   if (!archive) throw UserError(fmt::format("cannot read {}: {}", path.string(), reason));
-  npy::EventColumns columns;
+  numpy::EventColumns columns;
   const zip_int64_t members = zip_get_num_entries(archive.get(), 0);
   for (zip_int64_t i = 0; i < members; ++i) {
     const auto index = static_cast<zip_uint64_t>(i);
@@ -196,13 +196,13 @@ std::unique_ptr<EventsReader> open_npz(const fs::path& path) {
     } else if (name == "height.npy") {
       columns.sensor.height = extent(*array);
     } else {
-      for (const npy::Field& field : array->fields()) {
-        npy::take_column(field.name.empty() ? name.stem().string() : field.name, {array, field}, columns);
+      for (const numpy::Field& field : array->fields()) {
+        numpy::take_column(field.name.empty() ? name.stem().string() : field.name, {array, field}, columns);
       }
     }
   }
   if (columns.sensor.width == 0 || columns.sensor.height == 0) columns.sensor = {};
-  return npy::make_columns_reader(path.string(), std::move(columns));
+  return numpy::make_columns_reader(path.string(), std::move(columns));
 }
 
 /// Whether the first member of the zip is a NumPy array.

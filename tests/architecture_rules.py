@@ -8,6 +8,38 @@ import re
 SOURCE = "src/esim"
 # Besides ours, only these may be included in public headers: the standard library, POSIX and Eigen.
 LIGHT = re.compile(r"[a-z_0-9]+|(sys|netinet|arpa)/\w+\.h|(unistd|fcntl|poll|signal)\.h|Eigen/\w+")
+# What any .cpp file may include besides: these are used in many folders, or need no linking.
+EVERYWHERE = re.compile(LIGHT.pattern + r"|(dlfcn|netdb|stdio|stdlib|termios|aedat4_generated)\.h|fmt/\w+\.h|hwy/.*|Random123/.*")
+# Headers of all other libraries, and the targets of CMake that folders link to for them.
+LIBRARIES = {
+    r"CLI/.*": "CLI11::CLI11",
+    r"Imf\w+\.h": "OpenEXR::OpenEXR",
+    r"assimp/.*": "assimp::assimp",
+    r"boost/.*": "Boost::headers",
+    r"bzlib\.h": "BZip2::BZip2",
+    r"embree[34]/.*": "embree",
+    r"epoxy/.*": "Epoxy::epoxy",
+    r"hdf5\.h": "HDF5::HDF5",
+    r"isa-l/.*": "ISAL::ISAL",
+    r"libavcodec/.*": "ffmpeg_avcodec",
+    r"libavformat/.*": "ffmpeg_avformat",
+    r"libavutil/.*": "ffmpeg_avutil",
+    r"libswscale/.*": "ffmpeg_swscale",
+    r"lz4\w*\.h": "LZ4::LZ4",
+    r"meshoptimizer\.h": "meshoptimizer::meshoptimizer",
+    r"nanobind/.*": "nanobind",
+    r"nlohmann/.*": "nlohmann_json::nlohmann_json",
+    r"opencv2/core\b.*": "opencv_core",
+    r"opencv2/imgcodecs\b.*": "opencv_imgcodecs",
+    r"opencv2/imgproc\b.*": "opencv_imgproc",
+    r"opencv2/video\b.*": "opencv_video",
+    r"tbb/.*": "TBB::tbb",
+    r"yaml-cpp/.*": "yaml-cpp",
+    r"zip\.h": "LibZip::zip",
+    r"zlib\.h": "ZLIB::ZLIB",
+    r"zstd\.h": "Zstd::Zstd",
+}
+NOT_INCLUDED = {"opencv_core"}  # linked without an #include of its own: the other modules of OpenCV include it
 MAX_FILES = 22
 MAX_LINES = 450
 
@@ -88,20 +120,63 @@ def dependencies_have_an_order(root):
         above.add(own)
 
 
+def modules(root):
+    """The modules of src/esim/CMakeLists.txt: their names with the folders and with the libraries that they link to."""
+    for name, arguments in re.findall(r"^esim_module\((\S+)(.*?)\)", text_of(root / SOURCE / "CMakeLists.txt"),
+                                      re.MULTILINE | re.DOTALL):
+        folders, external, names = set(), set(), set()
+        for word in arguments.split():
+            if word in ("DEPENDS", "PUBLIC", "PRIVATE"):
+                names = folders if word == "DEPENDS" else external
+            elif word != "UNITY":
+                names.add(word)
+        yield name, folders, external
+
+
 def cmake_matches_the_table(root):
     path = root / SOURCE / "CMakeLists.txt"
     linked = {}
-    for name, arguments in re.findall(r"^esim_module\((\S+)\s+(.*?)\)", text_of(path), re.MULTILINE | re.DOTALL):
-        depends = re.search(r"DEPENDS\s+(.*?)\s*(?:PUBLIC|PRIVATE|$)", arguments, re.DOTALL)
-        names = depends[1].split() if depends else []
+    for name, folders, _ in modules(root):
         own = name.split("/")[0]
-        linked.setdefault(own, set()).update("backends" if n.startswith("backends_") else n for n in names)
+        linked.setdefault(own, set()).update("backends" if n.startswith("backends_") else n for n in folders)
     allowed = libraries(root)
     for own in sorted(set(linked) | set(allowed)):
         for name in sorted(linked.get(own, set()) - allowed.get(own, set())):
             yield f"{path}: {own} links to {name}, which ARCHITECTURE.md does not list"
         for name in sorted(allowed.get(own, set()) - linked.get(own, set())):
             yield f"{path}: {own} does not link to {name}, which ARCHITECTURE.md lists"
+
+
+def external_libraries(folder):
+    """The libraries whose headers are included in a folder, with one of the files that do so; for an unknown header,
+    None."""
+    found = {}
+    for path in sources(folder):
+        for name in re.findall(r"^\s*#include\s+<([^>]+)>", text_of(path), re.MULTILINE):
+            libraries = [target for pattern, target in LIBRARIES.items() if re.fullmatch(pattern, name)]
+            if libraries:
+                found.setdefault(libraries[0], path)
+            elif not EVERYWHERE.fullmatch(name):
+                found[None] = f"{path}: includes {name}"
+    return found
+
+
+def libraries_are_linked(root):
+    """Headers of all libraries are in one folder of the system, so that the compiler would not notice a missing link."""
+    path = root / SOURCE / "CMakeLists.txt"
+    known = set(LIBRARIES.values())
+    for name, _, external in modules(root):
+        included = external_libraries(root / SOURCE / name)
+        if None in included:
+            yield f"{included.pop(None)}, which LIBRARIES in tests/architecture_rules.py must list"
+        for target in sorted(set(included) - external):
+            yield f"{included[target]}: includes a header of {target}, to which {path} does not link {name}"
+        for target in sorted((external & known) - set(included) - NOT_INCLUDED):
+            yield f"{path}: links {name} to {target}, of which none of its files includes a header"
+    for top, allowed in (("apps/esim", {"CLI11::CLI11"}), ("python/src", {"nanobind"})):
+        for target, user in external_libraries(root / top).items():
+            if target not in allowed:
+                yield f"{user}: only src/esim uses {target or 'other libraries'}"
 
 
 def private_headers(root):
@@ -249,6 +324,7 @@ RULES = [
     includes_are_listed,
     dependencies_have_an_order,
     cmake_matches_the_table,
+    libraries_are_linked,
     public_headers_are_light,
     private_headers_stay_private,
     namespaces_match_folders,

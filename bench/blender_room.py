@@ -176,7 +176,7 @@ def main():
     if not (ROOM / "studio_room.blend").exists():
         subprocess.run([BLENDER, "--background", "--factory-startup", "--python", ROOM / "make_room.py"], check=True,
                        capture_output=True, env=ENVIRONMENT)
-    steps = {"overhead": overhead, "noise": lambda: noise(16), "keyframes": lambda: keyframes(esim, out), 
+    steps = {"overhead": overhead, "noise": lambda: noise(16), "keyframes": lambda: keyframes(esim, out),
              "accuracy": lambda: accuracy(esim, out, arguments.span, arguments.speed)}
     for step in arguments.steps or steps:
         steps[step]()

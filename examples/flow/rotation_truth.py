@@ -84,7 +84,7 @@ class Calibration:
                 raise esim.Error(f"{path}:1: {name} = {centre:g} px cannot belong to a sensor of {width} x {height} px; "
                                  "is the calibration of another size?")
         try:
-            calibration.bearings  # may not exist
+            _ = calibration.bearings  # may not exist
         except esim.Error as problem:
             raise esim.Error(f"{path}:1: {problem}") from None
         return calibration

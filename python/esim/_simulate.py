@@ -5,7 +5,7 @@ import os
 import warnings
 
 from . import _checks, _core
-from ._errors import LossWarning, Error
+from ._errors import Error, LossWarning
 from ._events import of_bytes
 from ._renamed import OldAttributes, OldKeys, present_name
 from ._scenario import to_overrides, to_scenario

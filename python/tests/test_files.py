@@ -118,7 +118,7 @@ def test_what_is_refused(tmp_path):
 
 
 def test_a_damaged_file_names_the_place_of_the_damage(file):
-    path, events = file
+    path, _events = file
     text = path.read_text().splitlines()
     text[4000] = "rubbish"
     path.write_text("\n".join(text))

@@ -99,7 +99,7 @@ def test_pictures_show_every_event_and_refuse_others():
 
 
 def test_play_shows_what_there_is_side_by_side(recorded):
-    out, packets = recorded
+    out, _packets = recorded
     pages = esim.play(out, fps=20, slow_motion=1, size=900)
     pictures = list(pages)
     assert len(pictures) == len(pages) == 5

@@ -55,7 +55,7 @@ def test_seed_and_threads(poster):
 
 def test_poses_and_states_agree(poster):
     packet = next(esim.simulate(poster))
-    x, y, z, w = packet.body["orientation"][0]
+    x, y, _z, _w = packet.body["orientation"][0]
     np.testing.assert_allclose(packet.pose[0][:3, 3], packet.body["position"][0], atol=1e-12)
     assert packet.pose[0][2, 2] == pytest.approx(1 - 2 * (x * x + y * y))
     # Z of a wall at x = 1 m, on the optical axis: the distance along it.
@@ -73,7 +73,7 @@ def test_a_recording_is_that_of_the_program(poster, tmp_path):
     subprocess.run([program, "simulate", scenario, "-o", tmp_path / "there", "--set", "seed=7", "-q"], check=True)
     files = {str(p.relative_to(tmp_path / "there")) for p in (tmp_path / "there").rglob("*") if p.is_file()}
     assert {"report.json", "scenario.yaml", "imu.csv", "poses.txt"} < files
-    same, different, missing = filecmp.cmpfiles(tmp_path / "here", tmp_path / "there", files, shallow=False)
+    _same, different, missing = filecmp.cmpfiles(tmp_path / "here", tmp_path / "there", files, shallow=False)
     assert not missing and set(different) <= {"report.json"}  # which has times of the clock on the wall
 
 
@@ -150,9 +150,9 @@ def test_rigs_have_packets_by_name(poster):
     assert packet["left"].depth.shape == (2, 30, 40) and packet["right"].depth.shape == (2, 16, 20)
     assert (packet["right"].events["x"] < 20).all()
     with pytest.raises(esim.Error, match="several cameras"):
-        packet.events
+        _ = packet.events
     with pytest.raises(AttributeError):
-        packet.evnts
+        _ = packet.evnts
 
 
 def test_frames_of_the_frame_camera(poster):

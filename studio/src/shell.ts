@@ -10,7 +10,7 @@ import { RunPlace } from "./run/run.ts";
 import { type Address, readAddress, writeAddress } from "./ui/address.ts";
 import { showShortcuts } from "./ui/dialog.ts";
 import { button, commitTyping, h } from "./ui/dom.ts";
-import { chooseFile } from "./ui/files_dialog.ts";
+import { chooseFile } from "./document/files_dialog.ts";
 import type { Place } from "./ui/place.ts";
 import { addShortcuts } from "./ui/shortcuts.ts";
 import { complain, message, say } from "./ui/status.ts";

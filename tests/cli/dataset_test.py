@@ -4,7 +4,6 @@ Run as: dataset_test.py ESIM_PROGRAM, with the standard library of Python alone.
 """
 
 import json
-import pathlib
 import random
 import resource
 import signal

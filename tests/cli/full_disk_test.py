@@ -12,7 +12,7 @@ import subprocess
 import sys
 import unittest
 
-from program import ESIM, ProgramTest, run
+from program import ProgramTest, run
 
 SCENES = pathlib.Path(sys.argv[2]).absolute()
 EVENTFUL = ["--set", "camera.width=64", "--set", "camera.height=48", "--set", "sampling={type: uniform, rate_hz: 1000}",

@@ -414,9 +414,9 @@ class Refusals(StudioTest):
     def test_files_that_scenarios_name(self):
         outside = self.folder / "secret.yaml"
         for yaml, where in ((f"renderer: {{type: plane, image: {outside}}}\n", "renderer.image"),
-                            (f"renderer: {{type: mesh, scene: ../secret.yaml}}\n", "renderer.scene"),
+                            ("renderer: {type: mesh, scene: ../secret.yaml}\n", "renderer.scene"),
                             (f"camera: {{calibration: {outside}}}\n", "camera.calibration"),
-                            (f"trajectory: {{type: waypoints, file: up/secret.yaml}}\n", "trajectory.file"),
+                            ("trajectory: {type: waypoints, file: up/secret.yaml}\n", "trajectory.file"),
                             (f"imu: {{calibration: {outside}}}\n", "imu.calibration")):
             problems = {p["where"]: p["what"] for p in self.server.json("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]}
             if "up/" in yaml and not (self.work / "up").exists():

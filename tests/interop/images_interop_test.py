@@ -16,7 +16,7 @@ PROGRAM, SCENES = sys.argv[1], pathlib.Path(sys.argv[2])
 try:
     import cv2
     import h5py
-    import hdf5plugin  # noqa: F401: Blosc
+    import hdf5plugin  # noqa: F401 (reads Blosc)
     import numpy as np
     import OpenEXR
 except ImportError as missing:
@@ -55,7 +55,7 @@ class Images(unittest.TestCase):
     def test_flo(self):
         lines = timestamps(self.root / "flo")
         self.assertEqual(len(lines), len(self.optical_flow))
-        for k, (index, start, end, name) in enumerate(lines):
+        for k, (_index, start, end, name) in enumerate(lines):
             self.assertEqual(round(float(start) * 1e9), self.t[k])
             self.assertEqual(round(float(end) * 1e9), self.t[k + 1])
             flow = cv2.readOpticalFlow(str(self.root / "flo" / name))

@@ -364,7 +364,7 @@ class Learning(Temporary):
 
         predict, settings = load_predictor(self.folder / "last.pt")
         self.assertEqual(settings["simulation"]["duration"], 0.04)
-        tensors, flow, fired = training.validation_batches[0]
+        tensors, _flow, _fired = training.validation_batches[0]
         predicted = np.stack([predict(tensor.numpy()) for tensor in tensors])
         expected = training.network.full_flow(tensors).detach()
         np.testing.assert_allclose(predicted, expected, atol=1e-3)

@@ -7,7 +7,7 @@
 
 namespace esim::test {
 
-/// A result that only one sampling method has; empty if there is none of this name and type.
+/// A result that only one sampling method has; empty if no result has this name and type.
 template <typename T>
 std::optional<T> named_result(const SamplingStatistics& statistics, const std::string& name) {
   for (const NamedResult& result : statistics.others) {

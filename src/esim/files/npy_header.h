@@ -12,7 +12,7 @@
 #include "esim/files/input_file.h"
 
 /// The header of NumPy's files (https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html).
-namespace esim::inline formats::npy {
+namespace esim::inline files::npy {
 
 inline constexpr std::string_view kMagic = "\x93NUMPY";
 
@@ -42,4 +42,4 @@ using Fail = std::function<void(const std::string& problem)>;
 /// Reads a header of version 1 to 3, up to the first number.
 Header read_header(const Read& read, const Fail& fail);
 
-}  // namespace esim::inline formats::npy
+}  // namespace esim::inline files::npy

@@ -7,10 +7,10 @@
 #include <set>
 
 #include "esim/geometry/calibration.h"
-#include "esim/scenario/renamed_keys.h"
 #include "esim/scenario/sprite_scene.h"
 #include "esim/scenario/waypoint_file.h"
-#include "esim/scenario/yaml_reader.h"
+#include "esim/scenario/yaml/renamed_keys.h"
+#include "esim/scenario/yaml/yaml_reader.h"
 
 namespace esim::inline scenario {
 namespace {

@@ -4,7 +4,7 @@ import type { FileEntry } from "../api/types.ts";
 import { ask, type Answer } from "../ui/dialog.ts";
 import { diffLines } from "../ui/diff.ts";
 import { h } from "../ui/dom.ts";
-import { chooseFile } from "../ui/files_dialog.ts";
+import { chooseFile } from "./files_dialog.ts";
 import { complain, say } from "../ui/status.ts";
 import type { ScenarioDocument } from "./document.ts";
 import { refuseFor } from "./problems.ts";

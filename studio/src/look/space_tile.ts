@@ -128,8 +128,8 @@ export class SpaceTile implements Tile {
     const { height, camera } = this.stage;
     const size = (label_px / height) * 2 * Math.tan((camera.fov * Math.PI) / 360);
     for (const { scale, material } of this.labels) {
-      const { width, height } = material.map!.image as HTMLCanvasElement;
-      scale.set((size * width) / height, size, 1);
+      const image = material.map!.image as HTMLCanvasElement;
+      scale.set((size * image.width) / image.height, size, 1);
     }
   }
 

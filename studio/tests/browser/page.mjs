@@ -1,7 +1,7 @@
 // Parts of the page, and what one does with them.
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
-import { shots, until } from "./harness.mjs";
+import { shots } from "./harness.mjs";
 
 export const shot = async (page, name) => {
   if (!shots) return;
@@ -46,8 +46,8 @@ export const tabTo = async (page, name) => {
 /** What does not fit: the page itself, and rows of controls whose end is cut off. */
 export const cramped = (page) =>
   page.evaluate(() => {
-    const rows = [...document.querySelectorAll(".bar, .toolbar, .transport, .row, .status, .segmented, .run-foot")];
-    return [document.documentElement, ...rows]
+    const bars = [...document.querySelectorAll(".bar, .toolbar, .transport, .row, .status, .segmented, .run-foot")];
+    return [document.documentElement, ...bars]
       .filter((e) => e.offsetParent !== null || e === document.documentElement)
       .filter(
         (e) => e.scrollWidth > e.clientWidth + 1 || (e === document.documentElement && e.scrollHeight > innerHeight),

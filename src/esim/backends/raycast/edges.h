@@ -6,6 +6,7 @@
 #include "esim/backends/raycast/packet.h"
 #include "esim/backends/raycast/raycast_scene.h"
 
+// Private to backends/raycast.
 /// Finds pixels that are crossed by edges of surfaces or of the light on them.
 namespace esim::inline backends::inline raycast {
 

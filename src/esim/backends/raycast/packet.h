@@ -10,6 +10,7 @@
 #include "esim/backends/raycast/embree.h"
 #include "esim/backends/raycast/raycast_scene.h"
 
+// Private to backends/raycast: includes hwy/highway.h.
 namespace esim::inline backends::inline raycast {
 
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+// Private to backends/unrealcv.
 namespace esim::inline backends::inline unrealcv {
 
 using SteadyTime = std::chrono::steady_clock::time_point;

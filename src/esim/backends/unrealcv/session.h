@@ -14,6 +14,7 @@
 #include "esim/backends/unrealcv/connection.h"
 #include "esim/backends/unrealcv/unrealcv_options.h"
 
+// Private to backends/unrealcv.
 namespace esim::inline backends::inline unrealcv {
 
 /// Throws EngineError: "unrealcv 127.0.0.1:9000: PROBLEM; REMEDY".

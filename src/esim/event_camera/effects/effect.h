@@ -10,7 +10,8 @@
 #include "esim/core/random.h"
 #include "esim/event_camera/pixel/pixel_block.h"
 
-// What effects on the pixels have in common. Private to the event camera.
+// What effects on the pixels have in common.
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// The fixed parameters of a pixel.

@@ -9,7 +9,8 @@
 #include "esim/event_camera/effects/shot_noise.h"
 #include "esim/event_camera/effects/threshold_noise.h"
 
-// The effects of a camera's pixels. Private to the event camera.
+// The effects of a camera's pixels.
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// Several effects, with their options, in the order in which they are applied.

@@ -6,6 +6,7 @@
 #include "esim/event_camera/effects/effect.h"
 #include "esim/event_camera/options.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// Time stamps that are later than the crossings.

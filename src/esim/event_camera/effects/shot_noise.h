@@ -7,6 +7,7 @@
 #include "esim/event_camera/effects/effect.h"
 #include "esim/event_camera/options.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// A Poisson process at its maximum rate, thinned according to the current irradiance.

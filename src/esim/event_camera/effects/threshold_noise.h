@@ -4,6 +4,7 @@
 #include "esim/event_camera/effects/effect.h"
 #include "esim/event_camera/options.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// Thresholds that are new for each event.

@@ -3,6 +3,7 @@
 
 #include "esim/event_camera/pixel/pixel_block.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// The signals of comparators without a low-pass: straight lines in brightness.

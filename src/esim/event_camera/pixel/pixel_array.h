@@ -12,6 +12,7 @@
 #include "esim/event_camera/effects/effects.h"
 #include "esim/event_camera/options.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// Earlier than every time, but such that differences do not overflow.
@@ -23,7 +24,7 @@ inline constexpr TimeNs kFarAhead = std::numeric_limits<TimeNs>::max() / 2;
 /// Replaces the reference of a pixel that is held in reset.
 inline constexpr double kHeld = std::numeric_limits<double>::infinity();
 
-/// The state and the individual parameters of a camera's pixels. Private to the event camera.
+/// The state and the individual parameters of a camera's pixels.
 ///
 /// A pixel compares G, its brightness after the low-pass plus the drift since the epoch, with its reference. It is
 /// inactive while its signal stays within bounds around the reference, inside which no event is possible, and until its

@@ -6,7 +6,8 @@
 
 #include "esim/core/per_pixel.h"
 
-// Blocks of pixels that advance through a segment. Private to the event camera.
+// Blocks of pixels that advance through a segment.
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// Effectively never, ns: three years.

@@ -11,10 +11,11 @@
 #include "esim/event_camera/pixel/relaxing_signals.h"
 #include "esim/events/packed_events.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// Advances active pixels through a segment, with all random effects. In each round, every pixel of a block fires at
-/// most one event, in vectors. Private to the event camera; keep the object for its working memory.
+/// most one event, in vectors. Keep the object for its working memory.
 template <class Signals>
 class PixelPass {
  public:

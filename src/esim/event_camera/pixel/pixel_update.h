@@ -15,10 +15,10 @@
 #include "esim/event_camera/segment_history.h"
 #include "esim/render/sample.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// Advances rows of pixels from the start of a segment to its end. Use one object per thread, for its working memory.
-/// Private to the event camera.
 ///
 /// `brightness`, if not null, replaces the brightness from the irradiance. The functions return false, and change
 /// nothing, if an irradiance is not a finite number >= 0.

@@ -4,6 +4,7 @@
 #include "esim/event_camera/pixel/pixel_block.h"
 #include "esim/event_camera/pixel/relaxing_signal.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// RelaxingSignal for the pixels of a block, in vectors if there is one pole. Floats, relative to the reference, decide

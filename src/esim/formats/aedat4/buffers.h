@@ -6,8 +6,7 @@
 #include <cstdint>
 #include <span>
 
-// Private to formats/aedat4: includes flatbuffers.
-
+// Private to formats/aedat4: includes aedat4_generated.h.
 namespace esim::inline formats::aedat4 {
 
 inline constexpr char kVersionLine[] = "#!AER-DAT4.0\r\n";

@@ -15,7 +15,7 @@
 #include "esim/formats/events_reader.h"
 
 /// Arrays of numbers or of records of numbers, with at most one dimension.
-namespace esim::inline formats::npy {
+namespace esim::inline formats::numpy {
 
 /// The NumPy type of times: a plain number of us, which is the usual interpretation, or timedelta64[ns].
 std::string_view time_type(TimeUnit unit);
@@ -37,7 +37,7 @@ struct Field {
 class Array {
  public:
   /// Throws UserError if it is not a valid array. `name` is the name of the file in messages.
-  Array(std::string name, Read read);
+  Array(std::string name, npy::Read read);
 
   const std::vector<Field>& fields() const { return fields_; }  ///< a single nameless one if items are not records
   std::uint64_t count() const { return count_; }
@@ -58,10 +58,10 @@ class Array {
   [[noreturn]] void fail(const std::string& what) const;
 
  private:
-  void take_fields(const Literal& descr);
+  void take_fields(const npy::Literal& descr);
 
   std::string name_;
-  Read read_;
+  npy::Read read_;
   std::vector<Field> fields_;
   std::uint64_t count_ = 0;
   bool one_dimension_ = false;
@@ -86,4 +86,4 @@ void take_column(std::string_view name, EventColumns::Column column, EventColumn
 /// Throws UserError that names the file if a column is missing.
 std::unique_ptr<EventsReader> make_columns_reader(const std::string& file, EventColumns columns);
 
-}  // namespace esim::inline formats::npy
+}  // namespace esim::inline formats::numpy

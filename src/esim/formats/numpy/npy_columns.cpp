@@ -8,7 +8,7 @@
 #include "esim/core/error.h"
 #include "esim/formats/numpy/npy_array.h"
 
-namespace esim::inline formats::npy {
+namespace esim::inline formats::numpy {
 namespace {
 
 constexpr std::int64_t kMaxExtent = 65536;  // px
@@ -87,4 +87,4 @@ std::unique_ptr<EventsReader> make_columns_reader(const std::string& file, Event
   return std::make_unique<ColumnsReader>(std::move(columns));
 }
 
-}  // namespace esim::inline formats::npy
+}  // namespace esim::inline formats::numpy

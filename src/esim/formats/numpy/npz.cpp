@@ -77,7 +77,7 @@ class NpzWriter final : public EventsWriter {
     const auto add = [&](std::string name, std::string_view type) {
       columns_.push_back(std::make_unique<ColumnFile>(path, std::move(name), fmt::format("'{}'", type)));
     };
-    add("t", npy::time_type(options_.unit));
+    add("t", numpy::time_type(options_.unit));
     add("x", "<u2");
     add("y", "<u2");
     add("p", "|u1");
@@ -86,7 +86,7 @@ class NpzWriter final : public EventsWriter {
   void write(EventSpan events) override {
     const bool us = options_.unit == TimeUnit::us;
     columns_[0]->write<std::int64_t>(events,
-                                     [&](const Event& event) { return us ? npy::microseconds(event.t) : event.t; });
+                                     [&](const Event& event) { return us ? numpy::microseconds(event.t) : event.t; });
     columns_[1]->write<std::uint16_t>(events, [](const Event& event) { return event.x; });
     columns_[2]->write<std::uint16_t>(events, [](const Event& event) { return event.y; });
     columns_[3]->write<std::uint8_t>(events, [](const Event& event) { return std::uint8_t{event.polarity > 0}; });
@@ -139,13 +139,13 @@ std::unique_ptr<EventsReader> open_npz(const fs::path& path) {
     } else if (name == "height.npy") {
       columns.sensor.height = extent(*array);
     } else {
-      for (const npy::Field& field : array->fields()) {
-        npy::take_column(field.name.empty() ? name.stem().string() : field.name, {array, field}, columns);
+      for (const numpy::Field& field : array->fields()) {
+        numpy::take_column(field.name.empty() ? name.stem().string() : field.name, {array, field}, columns);
       }
     }
   }
   if (columns.sensor.width == 0 || columns.sensor.height == 0) columns.sensor = {};
-  return npy::make_columns_reader(path.string(), std::move(columns));
+  return numpy::make_columns_reader(path.string(), std::move(columns));
 }
 
 /// Whether the first member of the zip is a NumPy array.

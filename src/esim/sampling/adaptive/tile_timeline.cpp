@@ -57,8 +57,8 @@ struct TileTimeline::Curvature {
     const float a = before_outer * before[k] + before_near * first[k] + before_far * last[k];
     const float b = after_outer * after[k] + after_near * last[k] + after_far * first[k];
     const float size_a = std::fabs(a), size_b = std::fabs(b), mean = 0.5F * (a + b);
-    const float most = kMaxBend * (size_a < size_b ? size_a : size_b);
-    const float limited = mean > most ? most : (mean < -most ? -most : mean);
+    const float bound = kMaxBend * (size_a < size_b ? size_a : size_b);
+    const float limited = mean > bound ? bound : (mean < -bound ? -bound : mean);
     return a * b > 0 ? limited : 0.0F;
   }
 

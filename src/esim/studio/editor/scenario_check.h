@@ -8,6 +8,7 @@
 #include "esim/studio/roots.h"
 #include "esim/studio/server/json.h"
 
+// Private to studio.
 namespace esim::studio {
 
 /// The contents of a scenario's text, and its problems.

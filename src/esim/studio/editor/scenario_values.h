@@ -4,6 +4,7 @@
 
 #include "esim/studio/server/json.h"
 
+// Private to studio.
 namespace esim::studio {
 
 /// The options of a scenario's text as nested JSON: quoted values are text, numbers are numbers. `name` is the file in

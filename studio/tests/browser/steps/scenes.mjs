@@ -93,9 +93,9 @@ test("an object moves by waypoints of its own: dropped, drawn, flown and saved",
   await stage(page).focus();
   await page.keyboard.press("Control+s");
   await until(() => /name: ball[\s\S]*type: waypoints/.test(read("moving.yaml")), "the file");
-  const [from, to] = await page.evaluate(async (yaml) => {
+  const [from, to] = await page.evaluate(async (scenario) => {
     const headers = { "Content-Type": "application/json" };
-    const body = JSON.stringify({ yaml, dir: "project", samples: 9 });
+    const body = JSON.stringify({ yaml: scenario, dir: "project", samples: 9 });
     const { objects } = await (await fetch("/api/trajectory", { method: "POST", headers, body })).json();
     return [objects[0].poses[0], objects[0].poses.at(-1)];
   }, read("moving.yaml"));

@@ -1,4 +1,4 @@
-#include "esim/scenario/renamed_keys.h"
+#include "esim/scenario/yaml/renamed_keys.h"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,8 @@
 import * as server from "../api/server.ts";
 import type { FileEntry } from "../api/types.ts";
-import { button, h, icon } from "./dom.ts";
-import { bytes } from "./format.ts";
-import { complain } from "./status.ts";
+import { button, h, icon } from "../ui/dom.ts";
+import { bytes } from "../ui/format.ts";
+import { complain } from "../ui/status.ts";
 
 export interface FilesQuestion {
   title: string;

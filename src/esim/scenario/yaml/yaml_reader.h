@@ -15,6 +15,7 @@
 #include "esim/scenario/schema.h"
 #include "esim/scenario/suggest.h"
 
+// Private to scenario: includes yaml-cpp/yaml.h.
 namespace esim::inline scenario {
 
 /// The origin of a scenario's text, for messages and for resolving paths.

@@ -1,4 +1,4 @@
-#include "esim/scenario/yaml_reader.h"
+#include "esim/scenario/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
 

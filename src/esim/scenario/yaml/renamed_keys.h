@@ -3,8 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "esim/scenario/yaml_reader.h"
+#include "esim/scenario/yaml/yaml_reader.h"
 
+// Private to scenario.
 namespace esim::inline scenario {
 
 /// Replaces old names in a dotted key, such as "truth.flow", by the present ones. Appends a notice for each.

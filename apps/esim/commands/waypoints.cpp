@@ -22,7 +22,7 @@ constexpr int kWait_ms = 200;   // after which the terminal's size is checked
 constexpr int kEscape_ms = 40;  // after which an escape character is a key of its own
 constexpr int kFrame_ms = 66;   // frame interval while a motion is played
 
-struct Arguments {
+struct WaypointsArguments {
   std::string input, out;
   std::vector<std::string> overrides;
   std::optional<std::string> keys;
@@ -33,7 +33,7 @@ struct Arguments {
 };
 
 /// A scenario, whose trajectory or file of waypoints may be missing, or a scene file.
-Scenario read_input(const Arguments& arguments) {
+Scenario read_input(const WaypointsArguments& arguments) {
   ScenarioText text;
   text.needs_trajectory = text.needs_waypoints = false;
   text.overrides = arguments.overrides;
@@ -162,7 +162,7 @@ void walk_in_terminal(Walk& walk) {
   }
 }
 
-int run(const Arguments& arguments) {
+int run(const WaypointsArguments& arguments) {
   std::optional<std::vector<Key>> keys;
   if (arguments.keys) keys = keys_of(*arguments.keys);
   if (!keys && !Terminal::is_there()) {
@@ -190,7 +190,7 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 void add_waypoints(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<WaypointsArguments>();
   CLI::App* command = app.add_subcommand("waypoints", "Walk through a scene in the terminal and set waypoints");
   command->add_option("in", arguments->input, "Scenario, seen through its first camera, or scene file")
       ->required()

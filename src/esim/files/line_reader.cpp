@@ -12,7 +12,6 @@
 namespace esim::inline files {
 namespace {
 
-constexpr std::size_t kBlockBytes = 1 << 18;
 constexpr std::size_t kMaxLineBytes = 1 << 12;
 
 std::unique_ptr<std::istream> open(const std::filesystem::path& path) {
@@ -36,7 +35,7 @@ std::uintmax_t size_of(const std::filesystem::path& path) {
 LineReader::LineReader(std::filesystem::path path) : LineReader(open(path), path, size_of(path)) {}
 
 LineReader::LineReader(std::unique_ptr<std::istream> text, std::filesystem::path path, std::uintmax_t bytes)
-    : path_(std::move(path)), text_(std::move(text)), size_(bytes), block_(kBlockBytes) {}
+    : path_(std::move(path)), text_(std::move(text)), size_(bytes), block_(std::size_t{1} << 18) {}
 
 void LineReader::fail(const std::string& reason) const {
   throw UserError(path_.string() + ", line " + std::to_string(line_number_) + ": " + reason);

@@ -18,7 +18,7 @@ constexpr double kTimeLength = 1.5;    // of the box; all lengths are in units o
 constexpr double kViewerDistance = 5;  // from the middle of the box
 constexpr double kMiddleYaw_deg = -40, kSwing_deg = 18, kPitch_deg = 19;
 constexpr double kLabelSpace = 50;  // px around the box
-constexpr int kTextHeight = 10;
+constexpr int kLabelHeight = 10;
 constexpr float kNewOpacity = 0.95f, kOldOpacity = 0.45f;
 constexpr float kFade = 0.45f;   // of the most distant points towards the background
 constexpr double kRecent = 0.1;  // fraction of the time in which points lose most of their opacity
@@ -203,7 +203,7 @@ class Plot {
   int widest_label(std::size_t axis) const {
     int widest = 0;
     for (const Tick& tick : axes_[axis].scale.ticks)
-      widest = std::max(widest, Canvas::text_width(tick.label, kTextHeight));
+      widest = std::max(widest, Canvas::text_width(tick.label, kLabelHeight));
     return widest;
   }
 
@@ -215,7 +215,7 @@ class Plot {
     const double spaces = (axes_[axis].scale.high - axes_[axis].scale.low) / tick_step(axis);
     for (const long every : {1, 2, 5}) {
       const double share = static_cast<double>(every) / spaces;
-      if (share * across > 0.7 * widest + 4 || share * down > kTextHeight + 4) return every;
+      if (share * across > 0.7 * widest + 4 || share * down > kLabelHeight + 4) return every;
     }
     return 10;
   }
@@ -235,8 +235,8 @@ class Plot {
       const Spot spot = place(edge).spot, out = direction(edge);
       const Align align = out.x < -0.7 ? Align::right : out.x > 0.7 ? Align::left : Align::centre;
       canvas_.text(static_cast<int>(std::lround(spot.x + away * out.x)),
-                   static_cast<int>(std::lround(spot.y + away * out.y)) + kTextHeight / 2 + (outward ? 3 : 0), text,
-                   kTextHeight, colour, align);
+                   static_cast<int>(std::lround(spot.y + away * out.y)) + kLabelHeight / 2 + (outward ? 3 : 0), text,
+                   kLabelHeight, colour, align);
     };
     std::array<double, 3> from = edge, to = edge;
     from[axis] = axes_[axis].low;
@@ -259,7 +259,7 @@ class Plot {
       write(middle()[axis], 28 + 0.7 * widest_label(axis), axes_[axis].scale.title, theme_.faint_ink);
     } else {
       const Spot top = place(from).spot;
-      canvas_.text(static_cast<int>(top.x), static_cast<int>(top.y) - 14, axes_[axis].scale.title, kTextHeight,
+      canvas_.text(static_cast<int>(top.x), static_cast<int>(top.y) - 14, axes_[axis].scale.title, kLabelHeight,
                    theme_.faint_ink, Align::centre);
     }
   }

@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kAffine = "affine";
 
-struct Arguments {
+struct DatasetArguments {
   std::string what, out, check, share;
   std::uint32_t count = 10'000, shard_size = 0;
   std::uint64_t seed = 1;
@@ -48,7 +48,7 @@ struct Arguments {
   std::string slurm_options;
 };
 
-std::unique_ptr<SequenceMaker> make_affine(const Arguments& arguments) {
+std::unique_ptr<SequenceMaker> make_affine(const DatasetArguments& arguments) {
   AffineOptions options = arguments.affine;
   options.images = arguments.images;
   options.seed = arguments.seed;
@@ -80,7 +80,7 @@ std::vector<std::string> own_command() {
   return words;
 }
 
-int submit(const Arguments& arguments, const DatasetFolder& folder) {
+int submit(const DatasetArguments& arguments, const DatasetFolder& folder) {
   SlurmJob job;
   job.tasks = std::min(arguments.slurm_tasks, folder.plan().shards());
   job.folder = fs::absolute(folder.path());
@@ -99,7 +99,7 @@ int submit(const Arguments& arguments, const DatasetFolder& folder) {
   return kOk;
 }
 
-int check(const Arguments& arguments) {
+int check(const DatasetArguments& arguments) {
   const DatasetFolder folder(arguments.check);
   const std::vector<std::string> problems = check_dataset(folder);
   for (const std::string& problem : problems) tell(stderr, "{}\n", problem);
@@ -125,7 +125,7 @@ void report(const DatasetState& state, const fs::path& out) {
   tell(stderr, "{}: complete; look at {}\n", out.string(), (out / "preview.png").string());
 }
 
-int run(Arguments arguments) {
+int run(DatasetArguments arguments) {
   if (!arguments.check.empty()) return check(arguments);
   if (arguments.what.empty()) throw UserError("the kind of dataset is missing; give affine, or a scenario file");
   if (arguments.out.empty()) throw UserError("--out: is missing; name a folder");
@@ -188,7 +188,7 @@ int run(Arguments arguments) {
   return kOk;
 }
 
-void add_affine_options(CLI::App& command, Arguments& arguments) {
+void add_affine_options(CLI::App& command, DatasetArguments& arguments) {
   const char* const kGroup = "Affine motion";
   AffineOptions& affine = arguments.affine;
   const auto add = [&](const char* name, auto& value, const char* help, const char* type) {
@@ -220,7 +220,7 @@ void add_affine_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 void add_dataset(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<DatasetArguments>();
   CLI::App* command = app.add_subcommand("dataset", "Make many labelled sequences for learning");
   command
       ->add_option("what", arguments->what,

@@ -24,7 +24,7 @@ constexpr int kSheetColumns = 3, kSheetRows = 3;
 constexpr int kWidthOfGif = 960;           // px; limits the file size
 constexpr double kMaxFramesOfGif_hz = 50;  // browsers slow down faster ones
 
-struct Arguments {
+struct PlayArguments {
   std::string input, out, camera;
   std::vector<std::string> views;
   double window_ms = 0, tau_ms = 0, span_ms = 0;
@@ -36,7 +36,7 @@ struct Arguments {
 };
 
 // The default path: FILE.play.mp4 next to FILE.h5, FOLDER.play.mp4 next to a folder.
-fs::path out_path(const Arguments& arguments) {
+fs::path out_path(const PlayArguments& arguments) {
   if (!arguments.out.empty()) return arguments.out;
   const fs::path file = fs::path(arguments.input + "/").parent_path();  // without a slash at its end
   if (fs::is_directory(file)) return fs::path(file) += ".play.mp4";
@@ -46,7 +46,7 @@ fs::path out_path(const Arguments& arguments) {
 /// One output, from the overview to the finished file.
 class Showing {
  public:
-  Showing(const Arguments& arguments, const Playable& input, const RecordingOverview& found, const fs::path& out)
+  Showing(const PlayArguments& arguments, const Playable& input, const RecordingOverview& found, const fs::path& out)
       : arguments_(arguments), overview_(found), source_(input.open()), bar_(!arguments.quiet), out_(out) {
     options_ = choose_missing(arguments.play, found);
   }
@@ -128,7 +128,7 @@ class Showing {
     tell(stderr, "{}: {}; {} events\n", out_.string(), what, grouped(overview_.events));
   }
 
-  const Arguments& arguments_;
+  const PlayArguments& arguments_;
   const RecordingOverview& overview_;
   PlayOptions options_;
   std::unique_ptr<Source> source_;
@@ -136,7 +136,7 @@ class Showing {
   fs::path out_;
 };
 
-int run(Arguments& arguments) {
+int run(PlayArguments& arguments) {
   const fs::path out = out_path(arguments);
   const std::string extension = out.extension().string();
   if (extension != ".mp4" && extension != ".gif" && extension != ".png")
@@ -175,7 +175,7 @@ int run(Arguments& arguments) {
 }  // namespace
 
 void add_play(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<PlayArguments>();
   CLI::App* command = app.add_subcommand("play", "Make a video or an image of events");
   const auto positive = [&](const char* name, auto& value, const char* help, const char* unit, double min, double max) {
     return command->add_option(name, value, help)->type_name(unit)->check(CLI::Range(min, max));

@@ -21,7 +21,7 @@ Lighting lighting_of(const LambertOptions& options) {
   return lighting;
 }
 
-void require_path(const std::filesystem::path& path, const std::string& key) {
+void require_scene_path(const std::filesystem::path& path, const std::string& key) {
   if (path.empty()) throw UserError(fmt::format("renderer.{}: is missing; name a file", key));
 }
 
@@ -37,12 +37,12 @@ std::filesystem::path readable(const std::filesystem::path& scene, const Notices
 }
 
 SceneFile load(const MeshRendererOptions& options, SceneLook look, const Notices& notices) {
-  require_path(options.scene, "scene");
+  require_scene_path(options.scene, "scene");
   SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning, look);
   notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
   for (std::size_t i = 0; i < options.objects.size(); ++i) {
     const ObjectOptions& object = options.objects[i];
-    require_path(object.scene, fmt::format("objects.{}.scene", i));
+    require_scene_path(object.scene, fmt::format("objects.{}.scene", i));
     SceneObject loaded{object.name.empty() ? fmt::format("object{}", i) : object.name,
                        load_mesh(readable(object.scene, notices), notices.warning, look), true};
     for (const SceneObject& other : file.scene.objects) {

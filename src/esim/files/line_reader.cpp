@@ -10,19 +10,18 @@
 namespace esim::inline files {
 namespace {
 
-constexpr std::size_t kBlockBytes = 1 << 18;
 constexpr std::size_t kMaxLineBytes = 1 << 12;
 
 }  // namespace
 
-LineReader::LineReader(std::filesystem::path path) : path_(std::move(path)), block_(kBlockBytes) {
+LineReader::LineReader(std::filesystem::path path) : path_(std::move(path)), block_(std::size_t{1} << 18) {
   const auto file = std::make_shared<InputFile>(path_);
   size_ = file->size();
   read_ = [file](std::span<std::byte> out) { return file->read_into(out); };
 }
 
 LineReader::LineReader(Read read, std::filesystem::path path, std::uintmax_t bytes)
-    : path_(std::move(path)), read_(std::move(read)), size_(bytes), block_(kBlockBytes) {}
+    : path_(std::move(path)), read_(std::move(read)), size_(bytes), block_(std::size_t{1} << 18) {}
 
 void LineReader::fail(const std::string& reason) const {
   throw UserError(path_.string() + ", line " + std::to_string(line_number_) + ": " + reason);

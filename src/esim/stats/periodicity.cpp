@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "esim/stats/median.h"
 #include "esim/stats/probability.h"
 #include "esim/stats/time_sample.h"
 
@@ -60,12 +61,6 @@ double chi2_of(const std::array<std::uint64_t, PhaseTest::kBins>& histogram, std
     chi2 += excess * excess / expected;
   }
   return chi2;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 double fraction_near(const std::vector<TimeNs>& times, double frequency_hz, std::size_t bin) {

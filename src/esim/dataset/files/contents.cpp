@@ -12,13 +12,13 @@
 namespace esim::inline dataset {
 namespace {
 
-constexpr int kUsualBins = 5, kMaxBins = 100;
+constexpr int kUsualBins = 5, kMaxVoxelBins = 100;
 
 int bins_named(std::string_view text) {
   int bins = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), bins);
-  if (error != std::errc() || end != text.data() + text.size() || bins < 1 || bins > kMaxBins)
-    throw UserError(fmt::format("voxels={}: must be a number of bins from 1 to {}", text, kMaxBins));
+  if (error != std::errc() || end != text.data() + text.size() || bins < 1 || bins > kMaxVoxelBins)
+    throw UserError(fmt::format("voxels={}: must be a number of bins from 1 to {}", text, kMaxVoxelBins));
   return bins;
 }
 

@@ -14,7 +14,7 @@ namespace esim::inline dataset {
 namespace {
 
 constexpr double kMaxMagnitude_px = 1e4;
-constexpr std::size_t kMaxBins = 1000;
+constexpr std::size_t kMaxHistogramBins = 1000;
 
 void normalise(std::vector<double>& fractions) {
   const double sum = std::accumulate(fractions.begin(), fractions.end(), 0.0);
@@ -38,7 +38,8 @@ bool read_bin(const std::string& place, std::string line, MagnitudeHistogram& in
         fmt::format("{}: HIGH is {} px, but must be above {} and at most {} px", place, high, low, kMaxMagnitude_px));
   if (!(weight >= 0) || !std::isfinite(weight))
     throw UserError(fmt::format("{}: WEIGHT is {}, but must be at least 0", place, weight));
-  if (into.bins() == kMaxBins) throw UserError(fmt::format("{}: has more than {} bins; merge some", place, kMaxBins));
+  if (into.bins() == kMaxHistogramBins)
+    throw UserError(fmt::format("{}: has more than {} bins; merge some", place, kMaxHistogramBins));
   if (into.edges.empty()) into.edges.push_back(0);
   into.edges.push_back(high);
   into.fractions.push_back(weight);

@@ -14,9 +14,9 @@
 namespace esim::inline formats {
 namespace {
 
-class NpyWriter final : public EventsWriter {
+class EventArrayWriter final : public EventsWriter {
  public:
-  explicit NpyWriter(TimeUnit unit)
+  explicit EventArrayWriter(TimeUnit unit)
       : unit_(unit),
         descr_(fmt::format("[('t', '{}'), ('x', '<u2'), ('y', '<u2'), ('p', '|u1')]", numpy::time_type(unit))) {}
 
@@ -83,7 +83,7 @@ Format npy_format() {
       .open = [](const auto& path, const ReadOptions& options) { return make_events_source(open_npy(path), options); },
       .create =
           [](const auto& path, const WriteOptions& options) {
-            return make_events_sink(std::make_unique<NpyWriter>(options.unit), path, "npy");
+            return make_events_sink(std::make_unique<EventArrayWriter>(options.unit), path, "npy");
           },
   };
 }

@@ -38,9 +38,10 @@ std::string quoted(std::string_view type) { return fmt::format("'{}'", type); }
 
 /// An array that grows along its first dimension.
 template <typename T>
-class NpyWriter {
+class GrowingArray {
  public:
-  NpyWriter(const fs::path& path, std::vector<std::uint64_t> item_shape) : file_(path), shape_(std::move(item_shape)) {
+  GrowingArray(const fs::path& path, std::vector<std::uint64_t> item_shape)
+      : file_(path), shape_(std::move(item_shape)) {
     shape_.insert(shape_.begin(), 0);
     file_.append(npy::header_text(quoted(kType<T>), shape_));
   }
@@ -139,7 +140,8 @@ class NpyTruthWriter final : public Sink {
   }
 
   template <typename T>
-  NpyWriter<T>& array(std::optional<NpyWriter<T>>& writer, const char* name, std::vector<std::uint64_t> item_shape) {
+  GrowingArray<T>& array(std::optional<GrowingArray<T>>& writer, const char* name,
+                         std::vector<std::uint64_t> item_shape) {
     if (!writer) writer.emplace(folder_ / name, std::move(item_shape));
     return *writer;
   }
@@ -182,11 +184,11 @@ class NpyTruthWriter final : public Sink {
 
   fs::path folder_;
   bool has_irradiance_ = false;
-  std::optional<NpyWriter<TimeNs>> t_, optical_flow_t_;
-  std::optional<NpyWriter<double>> pose_;
-  std::optional<NpyWriter<float>> irradiance_, depth_, motion_field_, optical_flow_;
-  std::optional<NpyWriter<std::uint16_t>> objects_;
-  std::optional<NpyWriter<std::uint8_t>> optical_flow_valid_;
+  std::optional<GrowingArray<TimeNs>> t_, optical_flow_t_;
+  std::optional<GrowingArray<double>> pose_;
+  std::optional<GrowingArray<float>> irradiance_, depth_, motion_field_, optical_flow_;
+  std::optional<GrowingArray<std::uint16_t>> objects_;
+  std::optional<GrowingArray<std::uint8_t>> optical_flow_valid_;
 };
 
 /// The arrays in one folder; all images have one size.

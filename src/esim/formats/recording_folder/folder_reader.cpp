@@ -79,9 +79,9 @@ double rate_of(const TruthHdf5Reader& truth) {
 }
 
 /// Reads one folder: first the description of the recording, then its streams.
-class Folder {
+class RecordingFolder {
  public:
-  Folder(const fs::path& path, const ReadOptions& options) : options_(options) {
+  RecordingFolder(const fs::path& path, const ReadOptions& options) : options_(options) {
     if (!is_camera_folder(path)) {
       root_ = path;
       attempt([&] { read_rig(); });
@@ -324,7 +324,7 @@ Format recording_format() {
       .folder = true,
       .either_unit = true,
       .recognises = [](const auto& path, std::string_view) { return is_recording(path); },
-      .open = [](const auto& path, const ReadOptions& options) { return Folder(path, options).open(); },
+      .open = [](const auto& path, const ReadOptions& options) { return RecordingFolder(path, options).open(); },
       .create = [](const auto& path,
                    const WriteOptions& options) { return std::make_unique<RecordingWriter>(path, options); },
   };

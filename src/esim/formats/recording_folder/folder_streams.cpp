@@ -125,9 +125,9 @@ class EventsStream final : public RecordStream {
   std::optional<Record> record_;
 };
 
-class FramesStream final : public RecordStream {
+class PngFramesStream final : public RecordStream {
  public:
-  FramesStream(const fs::path& folder, int camera, bool unfinished)
+  PngFramesStream(const fs::path& folder, int camera, bool unfinished)
       : folder_(folder), camera_(camera), list_(folder / "frames.csv", 4, 1, unfinished) {}
 
   std::optional<TimeNs> due() override { return list_.next() ? std::optional(list_.t()) : std::nullopt; }
@@ -267,7 +267,7 @@ std::unique_ptr<RecordStream> events_stream(std::unique_ptr<Source> events, int 
 }
 
 std::unique_ptr<RecordStream> frames_stream(const fs::path& folder, int camera, bool unfinished) {
-  return std::make_unique<FramesStream>(folder, camera, unfinished);
+  return std::make_unique<PngFramesStream>(folder, camera, unfinished);
 }
 
 std::unique_ptr<RecordStream> truth_stream(std::shared_ptr<const TruthHdf5Reader> truth, int camera,

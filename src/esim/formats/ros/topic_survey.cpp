@@ -13,7 +13,7 @@ namespace esim::inline formats::ros {
 namespace {
 
 constexpr std::uint64_t kMaxBytes = 1U << 26;
-constexpr std::uint32_t kMaxExtent = 65536;  // px
+constexpr std::uint32_t kMaxImageExtent = 65536;  // px
 
 /// Facts from the first message of a channel.
 struct Facts {
@@ -117,7 +117,8 @@ CameraInfo Surveyor::camera(const std::string& name, int index, const std::vecto
   if (const Facts* facts = facts_of(Role::camera_info); facts != nullptr && facts->camera) info.model = *facts->camera;
   for (const Role role : {Role::events, Role::camera_info, Role::frame, Role::irradiance, Role::depth, Role::flow}) {
     const Facts* facts = facts_of(role);
-    if (facts == nullptr || facts->width == 0 || facts->width > kMaxExtent || facts->height > kMaxExtent) continue;
+    if (facts == nullptr || facts->width == 0 || facts->width > kMaxImageExtent || facts->height > kMaxImageExtent)
+      continue;
     info.model.width = static_cast<int>(facts->width), info.model.height = static_cast<int>(facts->height);
     break;
   }

@@ -10,6 +10,10 @@
 option(ESIM_UNITY "Compile several files of a folder at once" ON)
 function(esim_unity target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${ESIM_UNITY} UNITY_BUILD_BATCH_SIZE 10)
+  # In a unit of several files, GCC takes the types in their unnamed namespaces for those of a header.
+  if(ESIM_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+  endif()
 endfunction()
 
 function(esim_module name)

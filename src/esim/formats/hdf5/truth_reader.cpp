@@ -9,7 +9,7 @@
 namespace esim::inline formats {
 namespace {
 
-constexpr std::size_t kPoseNumbers = 7;
+constexpr std::size_t kNumbersPerPose = 7;
 
 SE3 pose_of(const hdf5::Input& file, const double* numbers) {
   const SE3 pose{Eigen::Quaterniond(numbers[6], numbers[3], numbers[4], numbers[5]), Eigen::Vector3d(numbers)};
@@ -86,7 +86,7 @@ std::optional<hdf5::Column> TruthHdf5Reader::Impl::open_images(const char* name,
 std::optional<hdf5::Column> TruthHdf5Reader::Impl::open_poses(const char* name, std::size_t item_rank) const {
   if (!file.has(name)) return std::nullopt;
   hdf5::Column column = file.open_items(name, item_rank);
-  if (column.item_shape.back() != kPoseNumbers) file.fail(std::string(name) + " does not hold poses of seven numbers");
+  if (column.item_shape.back() != kNumbersPerPose) file.fail(std::string(name) + " does not hold poses of seven numbers");
   return column;
 }
 
@@ -136,7 +136,7 @@ TimeNs TruthHdf5Reader::t(std::uint64_t frame) const {
 void TruthHdf5Reader::read(std::uint64_t frame, Frame& out) const {
   const Impl& impl = *impl_;
   if (impl.pose) {
-    std::array<double, kPoseNumbers> numbers{};
+    std::array<double, kNumbersPerPose> numbers{};
     impl.file.read(*impl.pose, frame, std::span<double>(numbers));
     out.T_world_camera = pose_of(impl.file, numbers.data());
   }
@@ -147,7 +147,7 @@ void TruthHdf5Reader::read(std::uint64_t frame, Frame& out) const {
   std::vector<double> numbers(impl.object_poses->item_numbers());
   impl.file.read(*impl.object_poses, frame, std::span(numbers));
   out.T_world_objects.clear();
-  for (std::size_t i = 0; i < numbers.size(); i += kPoseNumbers)
+  for (std::size_t i = 0; i < numbers.size(); i += kNumbersPerPose)
     out.T_world_objects.push_back(pose_of(impl.file, &numbers[i]));
 }
 

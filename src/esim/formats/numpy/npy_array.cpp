@@ -105,7 +105,7 @@ std::int64_t integer(Number value) {
 
 std::string_view time_type(TimeUnit unit) { return unit == TimeUnit::us ? "<i8" : "<m8[ns]"; }
 
-Array::Array(std::string name, npy::Read read) : name_(std::move(name)), read_(std::move(read)) {
+Array::Array(std::string name, Read read) : name_(std::move(name)), read_(std::move(read)) {
   const npy::Header header = npy::read_header(read_, [this](const std::string& problem) { fail(problem); });
   const auto count = count_of(header.shape);
   if (!count) fail("its header is damaged");

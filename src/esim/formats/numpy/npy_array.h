@@ -37,7 +37,7 @@ struct Field {
 class Array {
  public:
   /// Throws UserError if it is not a valid array. `name` is the name of the file in messages.
-  Array(std::string name, npy::Read read);
+  Array(std::string name, Read read);
 
   const std::vector<Field>& fields() const { return fields_; }  ///< a single nameless one if items are not records
   std::uint64_t count() const { return count_; }
@@ -61,7 +61,7 @@ class Array {
   void take_fields(const npy::Literal& descr);
 
   std::string name_;
-  npy::Read read_;
+  Read read_;
   std::vector<Field> fields_;
   std::uint64_t count_ = 0;
   bool one_dimension_ = false;

@@ -75,10 +75,10 @@ class NpyReader {
     if (header.shape.size() != item_rank + 1) file_.fail(0, fmt::format("it must have {} dimensions", item_rank + 1));
     items_ = header.shape[0];
     item_shape_.assign(header.shape.begin() + 1, header.shape.end());
-    constexpr std::uint64_t kMaxExtent = 65536, kMaxNumbers = std::uint64_t{1} << 28;
+    constexpr std::uint64_t kMaxImageExtent = 65536, kMaxNumbers = std::uint64_t{1} << 28;
     for (const std::uint64_t extent : item_shape_) {
       numbers_ *= extent;
-      if (extent < 1 || extent > kMaxExtent || numbers_ > kMaxNumbers)
+      if (extent < 1 || extent > kMaxImageExtent || numbers_ > kMaxNumbers)
         file_.fail(0, "its shape is not valid for images");
     }
   }

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kLocalHead = "PK\x03\x04";
-constexpr int kMaxExtent = 65536;  // px
+constexpr int kMaxArrayExtent = 65536;  // px
 
 /// One column of the events, in a separate file, ARCHIVE.t.npy, until the archive is packed at the end. If the process
 /// ends before that, these files hold the data recorded so far.
@@ -120,20 +120,20 @@ class NpzWriter final : public EventsWriter {
   std::vector<std::unique_ptr<ColumnFile>> columns_;
 };
 
-int extent(npy::Array& array) {
+int extent(numpy::Array& array) {
   std::vector<std::int64_t> value;
   if (array.count() != 1 || array.advance(1) != 1 || array.fields().size() != 1) return 0;
   array.integers(array.fields()[0], value);
-  return value[0] >= 1 && value[0] <= kMaxExtent ? static_cast<int>(value[0]) : 0;
+  return value[0] >= 1 && value[0] <= kMaxArrayExtent ? static_cast<int>(value[0]) : 0;
 }
 
 std::unique_ptr<EventsReader> open_npz(const fs::path& path) {
   const ZipReader zip(path);
-  npy::EventColumns columns;
+  numpy::EventColumns columns;
   for (std::size_t i = 0; i < zip.members().size(); ++i) {
     const fs::path name = zip.members()[i].name;
     if (name.extension() != ".npy") continue;
-    const auto array = std::make_shared<npy::Array>(path.string() + ": " + name.string(), zip.open(i));
+    const auto array = std::make_shared<numpy::Array>(path.string() + ": " + name.string(), zip.open(i));
     if (name == "width.npy") {
       columns.sensor.width = extent(*array);
     } else if (name == "height.npy") {

@@ -195,12 +195,12 @@ class RecordingFolder {
   /// rig.yaml has the cameras in the body frame; camchain.yaml has them relative to the IMU.
   void read_calibrations(const fs::path& folder) {
     std::vector<CameraInfo> cameras;
-    for (auto& [name, model, T_body_camera] : read_calibration(folder / "rig.yaml"))
+    for (auto& [name, model, T_body_camera] : geometry::read_calibration(folder / "rig.yaml"))
       cameras.push_back({name, model, T_body_camera});
     info_.cameras = std::move(cameras);
     if (!is_file(folder / "imu.yaml")) return;
     const CalibratedImu imu = read_imu_calibration(folder / "imu.yaml");
-    const SE3 T_imu_camera = read_calibration(folder / "camchain.yaml").front().T_body_camera;
+    const SE3 T_imu_camera = geometry::read_calibration(folder / "camchain.yaml").front().T_body_camera;
     info_.imu = ImuInfo{info_.cameras.front().T_body_camera * T_imu_camera.inverse(),
                         imu.rate_hz,
                         imu.gyroscope_noise_density,

@@ -21,7 +21,7 @@ namespace esim::inline formats {
 namespace {
 
 /// The camera of a record; -1: no camera.
-int camera_of(const Record& record) {
+int camera_index_of(const Record& record) {
   const auto camera = [](const auto& kind) {
     if constexpr (requires { kind.camera; }) return kind.camera;
     return -1;
@@ -85,7 +85,7 @@ void RecordingWriter::write(const Record& record) {
 }
 
 Sink& RecordingWriter::sink_of(Content content, const Record& record) {
-  std::unique_ptr<Sink>& sink = sinks_[{content, camera_of(record)}];
+  std::unique_ptr<Sink>& sink = sinks_[{content, camera_index_of(record)}];
   if (sink == nullptr) {
     sink = make_sink(content, record);
     sink->begin(info_);
@@ -94,7 +94,7 @@ Sink& RecordingWriter::sink_of(Content content, const Record& record) {
 }
 
 std::unique_ptr<Sink> RecordingWriter::make_sink(Content content, const Record& record) {
-  const int camera = camera_of(record);
+  const int camera = camera_index_of(record);
   std::filesystem::path place = folder_;
   if (camera >= 0) create_folder(place /= info_.cameras.at(static_cast<std::size_t>(camera)).name);
   switch (content) {

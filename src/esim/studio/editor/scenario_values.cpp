@@ -27,20 +27,20 @@ Json scalar_json(const YAML::Node& node) {
   return text;
 }
 
-Json json_of(const YAML::Node& node, int depth, int& nodes) {
+Json node_json(const YAML::Node& node, int depth, int& nodes) {
   if (++nodes > kMaxNodes || depth > kMaxDepth)
     throw UserError("the scenario is nested too deeply, is too large, or has an alias that contains itself");
   if (node.IsMap()) {
     Json object = Json::object();
     for (const auto& entry : node) {
       if (!entry.first.IsScalar()) throw UserError("the keys of a scenario must be plain words");
-      object[entry.first.Scalar()] = json_of(entry.second, depth + 1, nodes);
+      object[entry.first.Scalar()] = node_json(entry.second, depth + 1, nodes);
     }
     return object;
   }
   if (node.IsSequence()) {
     Json list = Json::array();
-    for (const auto& entry : node) list.push_back(json_of(entry, depth + 1, nodes));
+    for (const auto& entry : node) list.push_back(node_json(entry, depth + 1, nodes));
     return list;
   }
   return node.IsScalar() ? scalar_json(node) : Json();
@@ -63,7 +63,7 @@ YAML::Node parse(const std::string& yaml, const std::string& name) {
 
 Json values_of(const std::string& yaml, const std::string& name) {
   int nodes = 0;
-  return json_of(parse(yaml, name), 0, nodes);
+  return node_json(parse(yaml, name), 0, nodes);
 }
 
 }  // namespace esim::studio

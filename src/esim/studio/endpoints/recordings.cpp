@@ -182,11 +182,11 @@ void put(std::string& bytes, std::uint64_t value, int count) {
 
 Response events(const Request& request, const Asked& asked) {
   constexpr std::int64_t kMaxEvents = 500'000;
-  constexpr TimeNs kLongest = 0xffff'ffff;  // ns from the start, in 32 bits
+  constexpr TimeNs kLongestSpan = 0xffff'ffff;  // ns from the start, in 32 bits
   const CameraView& camera = camera_in(request, asked);
   const EventStore& store = events_of(camera);
   const TimeNs from = number_in(request, "from", asked.view->span().start, -kMaxTime, kMaxTime);
-  const TimeNs to = number_in(request, "to", from + 100 * kNsPerMs, from, from + kLongest);
+  const TimeNs to = number_in(request, "to", from + 100 * kNsPerMs, from, from + kLongestSpan);
   const auto max = static_cast<std::uint64_t>(number_in(request, "max", 100'000, 1, kMaxEvents));
   const EventStore::Range range = store.find(from, to + 1);
   const std::vector<Event> shown = store.thinned(range, max);

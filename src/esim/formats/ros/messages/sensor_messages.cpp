@@ -7,12 +7,12 @@
 namespace esim::inline formats::ros {
 namespace {
 
-constexpr std::uint32_t kMaxExtent = 65536;  // px
+constexpr std::uint32_t kMaxMessageExtent = 65536;  // px
 constexpr double kRoundingOfNorm = 1e-9;     // rotations within this error of unit norm stay unchanged
 constexpr float kMetresPerMillimetre = 1e-3F;
 
 void check_extent(std::uint32_t width, std::uint32_t height) {
-  if (width > kMaxExtent || height > kMaxExtent) {
+  if (width > kMaxMessageExtent || height > kMaxMessageExtent) {
     throw Malformed("an image of " + std::to_string(width) + " x " + std::to_string(height) + " px is too large");
   }
 }

@@ -296,7 +296,7 @@ bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, P
 bool PixelUpdate::advance(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
                           PastSegment* past, PackedEvents& events) {
   return pixels.effects.in_brightness ? filter(pixels, segment, brightness, rows, past, events)
-                              : cross(pixels, segment, rows, events);
+                                      : cross(pixels, segment, rows, events);
 }
 
 /// Makes these pixels the active ones, with their state at the segment's start.

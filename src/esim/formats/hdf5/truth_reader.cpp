@@ -86,7 +86,8 @@ std::optional<hdf5::Column> TruthHdf5Reader::Impl::open_images(const char* name,
 std::optional<hdf5::Column> TruthHdf5Reader::Impl::open_poses(const char* name, std::size_t item_rank) const {
   if (!file.has(name)) return std::nullopt;
   hdf5::Column column = file.open_items(name, item_rank);
-  if (column.item_shape.back() != kNumbersPerPose) file.fail(std::string(name) + " does not hold poses of seven numbers");
+  if (column.item_shape.back() != kNumbersPerPose)
+    file.fail(std::string(name) + " does not hold poses of seven numbers");
   return column;
 }
 

@@ -30,11 +30,11 @@ bool is_file(const fs::path& path) {
 
 /// The sensor's size if the file does not give it: the extent of the events.
 void learn_size(CameraView& camera) {
-  constexpr std::uint64_t kBlock = std::uint64_t{1} << 20;
+  constexpr std::uint64_t kBlockEvents = std::uint64_t{1} << 20;
   Camera& model = camera.info.model;
   if (model.width > 0 || camera.events == nullptr) return;
-  for (std::uint64_t at = 0; at < camera.events->size(); at += kBlock) {
-    for (const Event& event : camera.events->read(at, kBlock)) {
+  for (std::uint64_t at = 0; at < camera.events->size(); at += kBlockEvents) {
+    for (const Event& event : camera.events->read(at, kBlockEvents)) {
       model.width = std::max(model.width, event.x + 1);
       model.height = std::max(model.height, event.y + 1);
     }

@@ -8,7 +8,7 @@ namespace esim::inline formats::ros {
 namespace {
 
 constexpr std::uint32_t kMaxMessageExtent = 65536;  // px
-constexpr double kRoundingOfNorm = 1e-9;     // rotations within this error of unit norm stay unchanged
+constexpr double kRoundingOfNorm = 1e-9;            // rotations within this error of unit norm stay unchanged
 constexpr float kMetresPerMillimetre = 1e-3F;
 
 void check_extent(std::uint32_t width, std::uint32_t height) {

@@ -8,6 +8,7 @@
 #include "esim/core/error.h"
 #include "esim/files/number_text.h"
 #include "esim/files/output_file.h"
+#include "esim/preview/pictures.h"
 #include "esim/preview/video_file.h"
 #include "esim/recording/recording_file.h"
 #include "esim/visualise/playable.h"

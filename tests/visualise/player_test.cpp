@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "esim/core/error.h"
+#include "esim/preview/colours.h"
 
 namespace esim {
 namespace {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "esim/scene/import/folder.h"
 #include "esim/scene/import/scene_graph.h"
@@ -140,7 +141,7 @@ void GltfDocument::load_buffers(std::vector<std::byte> binary) {
   for (std::size_t i = 0; i < buffers.size(); ++i) {
     const std::string uri = text(buffers[i], "uri");
     if (uri.empty()) {
-      buffers_.push_back(i == 0 ? std::move(binary) : std::vector<std::byte>{});
+      buffers_.push_back(i == 0 ? std::exchange(binary, {}) : std::vector<std::byte>{});
     } else if (uri.starts_with("data:")) {
       buffers_.push_back(data_uri(uri));
     } else {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -106,12 +107,17 @@ TEST(Texture, TakesLightThatIsNoneAsDark) {
   EXPECT_NEAR(Texture(Image<float>(3, 3, 0.0F), Wrap::clamp, Wrap::clamp).texels()(1, 1), 0, 1e-9);
 }
 
-TEST(Texture, SurvivesCoordinatesThatAreNoNumbers) {
+TEST(Texture, CoordinatesThatAreNotNumbersGiveColoursOfTheTexture) {
   for (const Wrap wrap : {Wrap::repeat, Wrap::clamp}) {
-    const Texture texture(noise(33, 17, 4), wrap, wrap);
+    Image<float> texels = noise(33, 17, 4);
+    for (float& texel : texels.pixels()) texel = 2 + texel;  // memory around it contains other values, such as 0
+    const Texture texture(texels, wrap, wrap);
+    const auto expect_of_the_texture = [&](const std::array<float, kLanes>& colours, float bad) {
+      for (const float colour : colours) EXPECT_TRUE(colour >= 1.999F && colour <= 3.001F) << colour << " at " << bad;
+    };
     for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -1e38F}) {
-      texture.sample(lookup(bad, 0.5F, 0.1F, 0, 0, 0.1F));  // any value, but from within the texture
-      texture.sample(lookup(0.5F, bad, bad, bad, bad, bad));
+      expect_of_the_texture(texture.sample(lookup(bad, 0.5F, 0.1F, 0, 0, 0.1F)), bad);
+      expect_of_the_texture(texture.sample(lookup(0.5F, bad, bad, bad, bad, bad)), bad);
     }
   }
 }

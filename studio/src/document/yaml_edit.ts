@@ -5,7 +5,7 @@ import { isJsonMap, keyOf, type ParsedYaml } from "./yaml_values.ts";
 
 const max_line = 100;
 /** What readers of YAML 1.1 take for truth values, and control characters. */
-const needs_quotes = /^(?:y|yes|n|no|on|off)$|[\x00-\x1f\x7f-\x9f]/i;
+const needs_quotes = /^(?:y|yes|n|no|on|off)$|\p{Cc}/iu;
 
 /** Gives a document other values. Nodes whose value stays keep their comments and their style. */
 export function setValues(parsed: ParsedYaml, wanted: JsonMap): void {

@@ -66,7 +66,7 @@ class Margins {
     const lines = spaces.lastIndexOf("\n") + 1;
     if (lines === 0) return spaces;
     const indent = spaces.length - lines;
-    const { uniform, own } = this.open.findLast((line) => line.uniform <= indent) ?? { uniform: 0, own: 0 };
+    const { uniform, own } = this.open.findLast((columns) => columns.uniform <= indent) ?? { uniform: 0, own: 0 };
     return spaces.slice(0, lines) + " ".repeat(own + indent - uniform);
   }
 }

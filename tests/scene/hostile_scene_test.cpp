@@ -301,8 +301,11 @@ TEST(HostileScene, DamagedObjIsReadOrRefused) {
   expect_read_or_refused(read_damaged("scene.obj", obj, problem_with_scene, 150));  // one process per copy
 }
 
-TEST(HostileImage, DamagedPngIsReadOrRefused) {
-  expect_read_or_refused(read_damaged("image.png", png(), problem_with_image));
+TEST(HostileImage, DamagedPngIsRefused) {
+  const Outcome outcome = read_damaged("image.png", png(), problem_with_image);
+  EXPECT_EQ(outcome.failure, "");
+  EXPECT_EQ(outcome.read, 0);  // all parts of the file have checksums
+  EXPECT_EQ(outcome.refused, 300);
 }
 
 }  // namespace

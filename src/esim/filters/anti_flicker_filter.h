@@ -14,7 +14,7 @@ namespace esim::inline filters {
 /// `start_threshold` on until the counter has fallen to `stop_threshold`; without such a change for longer than the
 /// longest period, the counter starts again at 0.
 ///
-/// How the chip uses its duty cycle is not published, so there is none here.
+/// How the chip uses its duty cycle is not published, so it has no influence here.
 class AntiFlickerFilter final : public EventFilter {
  public:
   AntiFlickerFilter(const AntiFlickerOptions& options, int width, int height);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <random>
 
@@ -187,6 +188,15 @@ TEST(RateController, NeverPassesMoreThanTheLimitAndUsesMostOfIt) {
   }
 }
 
+// set_cd_event_rate() of OpenEB: rate = count / period. The IMX636 begins with 10000 events per 200 us.
+TEST(RateController, PassesFiftyMillionEventsPerSecondByDefault) {
+  const auto events = random_events(200'000, 100e6, 11);  // 2 ms
+  RateController controller({});
+  const auto out = passed(controller, events);
+  EXPECT_NEAR(static_cast<double>(out.size()), 50e6 * 2e-3, 1e4);
+  for (const auto& [period, count] : per_period(out, 200'000)) EXPECT_LE(count, 10'000);
+}
+
 // Rows are read one after the other: dropping must not favour those that come first in a period.
 TEST(RateController, DropsFromAllRowsAlike) {
   std::vector<Event> events;
@@ -249,6 +259,16 @@ TEST(ActivityFilter, PassesAllOrNothingWithHysteresis) {
   upper.upper_stop = 100'000, upper.upper_start = 40'000;
   EXPECT_EQ(shares(upper, {10e3, 60e3, 200e3, 60e3, 30e3, 60e3}), (std::vector<double>{1, 1, 0, 0, 1, 1}));
   EXPECT_EQ(shares({}, {1e3, 1e6}), (std::vector<double>{1, 1}));
+}
+
+// As in sensors whose filter has one bound and no hysteresis.
+TEST(ActivityFilter, WithoutASecondRateItHasNoHysteresis) {
+  ActivityFilterOptions lower;
+  lower.lower_start = 50'000;
+  EXPECT_EQ(shares(lower, {10e3, 60e3, 30e3, 60e3}), (std::vector<double>{0, 1, 0, 1}));
+  ActivityFilterOptions upper;
+  upper.upper_stop = 100'000;
+  EXPECT_EQ(shares(upper, {60e3, 200e3, 60e3, 200e3}), (std::vector<double>{1, 0, 1, 0}));
 }
 
 // --- all of them ----------------------------------------------------------------------------------------------------
@@ -318,6 +338,42 @@ TEST(FilterChain, RefusesContradictions) {
   std::vector<Event> out;
   const std::vector<Event> outside{{0, kWidth, 0, 1}};
   EXPECT_TRUE(contains(message_of<UserError>([&] { chain.process(outside, out); }), "outside the sensor of 24 x 16"));
+}
+
+TEST(FilterChain, RefusesOptionsWithoutEffect) {
+  const auto problem = [](const FilterOptions& options) {
+    return message_of<UserError>([&] { FilterChain(options, kWidth, kHeight); });
+  };
+  FilterOptions options;
+  options.activity = ActivityFilterOptions{};
+  EXPECT_TRUE(contains(problem(options), "activity: has no bound"));
+  options = {};
+  options.region = RegionFilterOptions{false, {{0, 0, 2, 2}, {kWidth, 3, 5, 5}}, {}};
+  EXPECT_TRUE(contains(problem(options), "region.windows.1: (24, 3) lies outside the sensor of 24 x 16 px"));
+  options.region = RegionFilterOptions{false, {}, {{3, kHeight}}};
+  EXPECT_TRUE(contains(problem(options), "region.masked_pixels.0: (3, 16) lies outside"));
+}
+
+TEST(FilterChain, RefusedEventsChangeNothing) {
+  constexpr TimeNs kLatest = std::numeric_limits<TimeNs>::max();
+  const auto events = random_events(2000, 50'000, 12);
+  const EventSpan first = EventSpan(events).first(1000), rest = EventSpan(events).subspan(1000);
+  FilterChain chain(everything(), kWidth, kHeight), expected(everything(), kWidth, kHeight);
+  std::vector<Event> out, none;
+  chain.process(first, out);
+  for (const std::vector<Event>& wrong :
+       std::vector<std::vector<Event>>{{{first.back().t + 5, 1, 1, 1}, {first.back().t + 4, 1, 1, 1}},  // within a call
+                                       {{first.back().t - 1, 1, 1, 1}},  // between two calls
+                                       {{first.back().t + 5, 1, 1, 1}, {first.back().t + 6, 1, kHeight, 1}},
+                                       {{kLatest, 1, 1, 1}}}) {
+    EXPECT_THROW(chain.process(wrong, none), UserError);
+  }
+  EXPECT_TRUE(none.empty());
+  chain.process({}, out);
+  chain.process(rest, out);
+  EXPECT_EQ(out, passed(expected, events));
+  FilterChain fresh({}, kWidth, kHeight);
+  EXPECT_THROW(fresh.process(std::vector<Event>{{-kLatest, 1, 1, 1}}, none), UserError);
 }
 
 }  // namespace

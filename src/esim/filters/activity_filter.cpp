@@ -7,7 +7,10 @@
 namespace esim::inline filters {
 
 ActivityFilter::ActivityFilter(const ActivityFilterOptions& options)
-    : options_(options), window_(std::llround(options.window_us * 1e3)), enough_(options.lower_start <= 0) {}
+    : options_(options), window_(std::llround(options.window_us * 1e3)), enough_(options.lower_start <= 0) {
+  if (options_.lower_stop <= 0) options_.lower_stop = options_.lower_start;
+  if (options_.upper_start <= 0) options_.upper_start = options_.upper_stop;
+}
 
 void ActivityFilter::end_window() {
   const double rate = static_cast<double>(count_) * 1e9 / static_cast<double>(window_);

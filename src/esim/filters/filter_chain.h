@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,13 +12,15 @@
 namespace esim::inline filters {
 
 /// The filters of a sensor, one after the other in the order of FilterOptions: region, activity, anti-flicker, trail,
-/// rate controller.
+/// rate controller. Its memory depends on the size of the sensor and of the largest call only.
 class FilterChain final : public EventFilter {
  public:
-  /// For a sensor of `width` x `height` px. Throws UserError for invalid options.
+  /// For a sensor of `width` x `height` px. Throws UserError for invalid options, and for windows and masked pixels
+  /// that lie outside the sensor.
   FilterChain(const FilterOptions& options, int width, int height);
 
-  /// Throws UserError if an event lies outside the sensor.
+  /// Throws UserError if an event lies outside the sensor, is earlier than the previous one, or is more than 146 years
+  /// from 0; then no event of the call has been processed.
   void process(EventSpan events, std::vector<Event>& out) override;
 
   /// The number of events that each filter has dropped so far, by its name.
@@ -33,7 +36,10 @@ class FilterChain final : public EventFilter {
     std::unique_ptr<EventFilter> filter;
   };
 
+  void check(EventSpan events) const;
+
   int width_, height_;
+  std::optional<TimeNs> last_;  // time of the last event
   std::vector<Stage> stages_;
   std::vector<Event> input_, output_;  // of a stage
 };

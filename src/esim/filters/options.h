@@ -48,17 +48,18 @@ struct TrailFilterOptions {
   double threshold_us = 10'000.0;
 };
 
-/// Passes all events or none, by the rate in the previous window. Bounds in events per second; 0: no bound.
+/// Passes all events or none, by the rate in the previous window. Rates in events per second. A bound at 0 is off; a
+/// rate at which the other state returns is, if 0, the bound itself (no hysteresis).
 struct ActivityFilterOptions {
   double window_us = 1'000.0;
   double lower_start = 0.0, lower_stop = 0.0;
   double upper_start = 0.0, upper_stop = 0.0;
 };
 
-/// Limits the number of events per period.
+/// Limits the number of events per period. The defaults are those of the IMX636: 50 million events per second.
 struct RateControllerOptions {
   double period_us = 200.0;
-  int events_per_period = 4'000;
+  int events_per_period = 10'000;
 };
 
 /// The digital blocks of a sensor, in the order in which events pass them.
@@ -113,8 +114,8 @@ void describe(Visitor& visit, AntiFlickerOptions& o) {
   visit("low_hz", o.low_hz, About{"minimum frequency of flicker", "Hz", 1, 5000});
   visit("high_hz", o.high_hz, About{"maximum frequency of flicker", "Hz", 1, 5000});
   visit("start_threshold", o.start_threshold,
-        About{"periods in the band after which a block counts as flickering", "", 1, 7});
-  visit("stop_threshold", o.stop_threshold, About{"value of this count at which it stops to", "", 0, 6});
+        About{"number of periods in the band after which a block flickers", "", 1, 7});
+  visit("stop_threshold", o.stop_threshold, About{"value of this count at which the flicker has ended", "", 0, 6});
 }
 
 template <class Visitor>
@@ -128,10 +129,11 @@ void describe(Visitor& visit, TrailFilterOptions& o) {
 template <class Visitor>
 void describe(Visitor& visit, ActivityFilterOptions& o) {
   visit("window_us", o.window_us, About{"time in which events are counted", "us", 1, 1e7});
-  visit("lower_start", o.lower_start, About{"events pass from this rate on; 0: no bound", "ev/s", 0, 1e12});
-  visit("lower_stop", o.lower_stop, About{"and until the rate falls below this one", "ev/s", 0, 1e12});
-  visit("upper_stop", o.upper_stop, About{"events are dropped above this rate; 0: no bound", "ev/s", 0, 1e12});
-  visit("upper_start", o.upper_start, About{"and pass again below this one", "ev/s", 0, 1e12});
+  visit("lower_start", o.lower_start, About{"events pass from this rate on; 0: no lower bound", "ev/s", 0, 1e12});
+  visit("lower_stop", o.lower_stop,
+        About{"and until the rate falls below this one; 0: below lower_start", "ev/s", 0, 1e12});
+  visit("upper_stop", o.upper_stop, About{"events are dropped above this rate; 0: no upper bound", "ev/s", 0, 1e12});
+  visit("upper_start", o.upper_start, About{"and pass again from this rate down; 0: upper_stop", "ev/s", 0, 1e12});
 }
 
 template <class Visitor>

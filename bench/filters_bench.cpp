@@ -1,6 +1,6 @@
 // Ten million random events of 1280 x 720 pixels in 0.5 s, in order of time, through each filter with its default
-// options and through all of them. "events/s" counts the events before the filter, by processor time; "kept" is the fraction
-// that passes. Random pixels are the worst case for filters with a state per pixel.
+// options and through all of them. "events/s" counts the events before the filter, by processor time; "kept" is the
+// fraction that passes. Random pixels are the worst case for filters with a state per pixel.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

@@ -188,7 +188,7 @@ class Filter(ProgramTest):
         refused(*out, *SIZE, "--roi", "64,2,3,4", says=["region.windows.0", "outside the sensor of 64 x 48 px"])
         refused(*out, *SIZE, "--roi", "1,2,3,4", "--roni", "1,2,3,4", says=["--ro"])
         refused(*out, *SIZE, "--mask-pixel", "1", says=["--mask-pixel", "X,Y"])
-        refused(*out, *SIZE, "--mask-file", self.folder / "none", says=["none: cannot be read"])
+        refused(*out, *SIZE, "--mask-file", self.folder / "none", says=["cannot read", "none"])
         refused(*out, *SIZE, "--mask-file", self.folder, says=[str(self.folder)])
         mask = self.folder / "mask.txt"
         for line in ("1", "1 2 3", "1 -2", "one 2", "1,2"):

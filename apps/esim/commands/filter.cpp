@@ -1,7 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
-#include <fstream>
+#include <memory>
 #include <sstream>
 #include <string_view>
 
@@ -9,6 +10,7 @@
 #include "commands.h"
 #include "copying.h"
 #include "esim/core/error.h"
+#include "esim/files/input_file.h"
 #include "esim/files/number_text.h"
 #include "esim/formats/filter_recording.h"
 #include "support.h"
@@ -51,16 +53,16 @@ std::array<int, N> numbers_in(const std::string& option, const std::string& text
 
 /// Adds the pixels of a text file: a line "x y" for each.
 void read_mask(const std::string& path, std::vector<MaskedPixelOptions>& pixels) {
-  std::ifstream file(path);
-  if (!file) throw UserError(fmt::format("{}: cannot be read; check the path and its permissions", path));
-  std::string line;
-  for (int number = 1; std::getline(file, line); ++number) {
-    std::string_view rest = std::string_view(line).substr(0, line.find_first_of("#\r"));
+  constexpr std::size_t kMaxLine = 4096;
+  InputFile file(path);
+  for (int number = 1; file.offset() < file.size(); ++number) {
+    const std::string_view line = file.read_line(kMaxLine, "a line");
+    std::string_view rest = line.substr(0, line.find('#'));
     const std::string_view x = take_word(rest), y = take_word(rest);
     if (x.empty()) continue;
     MaskedPixelOptions pixel;
-    if (!parse_number(x, pixel.x) || !parse_number(y, pixel.y) || !take_word(rest).empty() || pixel.x < 0 ||
-        pixel.y < 0)
+    const bool valid = parse_number(x, pixel.x) && parse_number(y, pixel.y) && take_word(rest).empty();
+    if (!valid || pixel.x < 0 || pixel.y < 0)
       throw UserError(
           fmt::format("{}:{}: must be a column and a row in px, such as 12 34, not '{}'", path, number, line));
     pixels.push_back(pixel);

@@ -117,7 +117,7 @@ class Filter(ProgramTest):
         for extension in (".h5", ".raw", ".dat", ".npy", ".npz", ".aedat4", ".bag", ".mcap"):
             other, out = self.folder / f"other{extension}", self.folder / f"filtered{extension}"
             self.assertEqual(run("convert", self.text, other, *SIZE).returncode, 0)
-            self.filter("-o", out, *arguments, source=other)
+            self.filter("-o", out, *arguments, *SIZE, source=other)  # .npy does not contain the size
             back = self.folder / "back.txt"
             self.assertEqual(run("convert", out, back, "--force").returncode, 0)
             self.assertEqual(back.read_text(), expected, extension)
@@ -183,6 +183,8 @@ class Filter(ProgramTest):
         refused(*out, *SIZE, "--roi", "1,2,3", says=["--roi", "X,Y,WIDTH,HEIGHT", "'1,2,3'"])
         refused(*out, *SIZE, "--roi", "1,2,3,4,5", says=["--roi"])
         refused(*out, *SIZE, "--roi", "1,2,3,", says=["--roi"])
+        refused(*out, *SIZE, "--roi", "1,2,3,4,", says=["--roi"])
+        refused(*out, *SIZE, "--roi", "", says=["--roi"])
         refused(*out, *SIZE, "--roi", "1,2,3,-4", says=["--roi"])
         refused(*out, *SIZE, "--roi", "1,2,0,4", says=["--roi", "at least 1 px"])
         refused(*out, *SIZE, "--roi", "64,2,3,4", says=["region.windows.0", "outside the sensor of 64 x 48 px"])

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "esim/core/error.h"
-#include "esim/scenario/conversion.h"
+#include "esim/scenario/filter_options.h"
 #include "support/errors.h"
 
 namespace esim {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <sstream>
 #include <string_view>
 
 #include "command_line.h"
@@ -38,16 +37,14 @@ struct Arguments : CopyArguments {
 template <std::size_t N>
 std::array<int, N> numbers_in(const std::string& option, const std::string& text, const char* expected) {
   std::array<int, N> numbers{};
-  std::istringstream words(text);
-  std::string word;
-  std::size_t count = 0;
-  while (std::getline(words, word, ',')) {
-    if (count >= N || !parse_number(std::string_view(word), numbers[count])) break;
-    if (numbers[count] < 0 || numbers[count] > 65536) break;
-    ++count;
+  std::string_view rest = text;
+  for (std::size_t i = 0; i < N; ++i) {
+    const std::size_t comma = rest.find(',');
+    const bool valid = parse_number(rest.substr(0, comma), numbers[i]) && numbers[i] >= 0 && numbers[i] <= 65536;
+    if (!valid || (comma == std::string_view::npos) != (i + 1 == N))
+      throw CLI::ValidationError(option, fmt::format("must be {} in px, not '{}'", expected, text));
+    rest.remove_prefix(std::min(comma, rest.size() - 1) + 1);
   }
-  if (count < N || !words.eof())
-    throw CLI::ValidationError(option, fmt::format("must be {} in px, not '{}'", expected, text));
   return numbers;
 }
 

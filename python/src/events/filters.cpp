@@ -4,7 +4,7 @@
 #include "arrays.h"
 #include "bindings.h"
 #include "esim/filters/filter_chain.h"
-#include "esim/scenario/conversion.h"
+#include "esim/scenario/filter_options.h"
 
 namespace esim::python {
 namespace {

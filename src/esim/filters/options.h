@@ -110,7 +110,7 @@ void describe(Visitor& visit, RegionFilterOptions& o) {
 
 template <class Visitor>
 void describe(Visitor& visit, AntiFlickerOptions& o) {
-  visit("mode", o.mode, About{"band_stop: drop events of flickering blocks; band_pass: keep only these"});
+  visit("mode", o.mode, About{"drop the events of flickering blocks (band_stop), or keep only these (band_pass)"});
   visit("low_hz", o.low_hz, About{"minimum frequency of flicker", "Hz", 1, 5000});
   visit("high_hz", o.high_hz, About{"maximum frequency of flicker", "Hz", 1, 5000});
   visit("start_threshold", o.start_threshold,
@@ -121,19 +121,18 @@ void describe(Visitor& visit, AntiFlickerOptions& o) {
 template <class Visitor>
 void describe(Visitor& visit, TrailFilterOptions& o) {
   visit("type", o.type,
-        About{"which event of a burst passes: trail: the first; stc_cut_trail: the second; stc_keep_trail: all but the "
-              "first"});
+        About{"events of a burst that pass: the first (trail), the second (stc_cut_trail), all but the first "
+              "(stc_keep_trail)"});
   visit("threshold_us", o.threshold_us, About{"maximum time between two events of a burst", "us", 1, 1e7});
 }
 
 template <class Visitor>
 void describe(Visitor& visit, ActivityFilterOptions& o) {
   visit("window_us", o.window_us, About{"time in which events are counted", "us", 1, 1e7});
-  visit("lower_start", o.lower_start, About{"events pass from this rate on; 0: no lower bound", "ev/s", 0, 1e12});
-  visit("lower_stop", o.lower_stop,
-        About{"and until the rate falls below this one; 0: below lower_start", "ev/s", 0, 1e12});
-  visit("upper_stop", o.upper_stop, About{"events are dropped above this rate; 0: no upper bound", "ev/s", 0, 1e12});
-  visit("upper_start", o.upper_start, About{"and pass again from this rate down; 0: upper_stop", "ev/s", 0, 1e12});
+  visit("lower_start", o.lower_start, About{"rate from which events pass; 0: no lower bound", "ev/s", 0, 1e12});
+  visit("lower_stop", o.lower_stop, About{"rate below which they no longer pass; 0: lower_start", "ev/s", 0, 1e12});
+  visit("upper_stop", o.upper_stop, About{"rate above which events are dropped; 0: no upper bound", "ev/s", 0, 1e12});
+  visit("upper_start", o.upper_start, About{"rate at which they pass again; 0: upper_stop", "ev/s", 0, 1e12});
 }
 
 template <class Visitor>

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "esim/event_camera/event_camera.h"
-#include "esim/filters/options.h"
 #include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
 #include "esim/video/frame_sequence.h"
@@ -55,11 +54,6 @@ namespace esim::inline scenario {
 /// The default event camera with overrides "event_camera.key=value", or "key=value" for short. Throws UserError, which
 /// begins with `setter`, with the key and the valid values.
 EventCameraOptions read_event_camera(const std::vector<std::string>& overrides, const std::string& setter = kSetter);
-
-/// No filters with overrides "trail.threshold_us=5000" or "anti_flicker={low_hz: 90}"; a filter of which any option is
-/// set, or that is set to {}, is used. Throws UserError, which begins with `setter` if one option is wrong, with the
-/// key.
-FilterOptions read_filters(const std::vector<std::string>& overrides, const std::string& setter = kSetter);
 
 /// A camera's options in full as YAML.
 std::string write_event_camera(const EventCameraOptions& options);

@@ -16,7 +16,7 @@
 namespace esim::app {
 namespace {
 
-struct Arguments {
+struct ConvertArguments {
   std::string input, out, format;
   CopyOptions copy;
   std::optional<SensorSize> sensor;
@@ -33,7 +33,7 @@ int list_formats() {
   return kOk;
 }
 
-void print_summary(const CopySummary& summary, const Arguments& arguments, double wall_s) {
+void print_summary(const CopySummary& summary, const ConvertArguments& arguments, double wall_s) {
   std::string copied;
   for (const auto& [content, count] : summary.copied)
     copied += fmt::format("{}{} {}", copied.empty() ? "" : ", ", grouped(count), describe(content));
@@ -41,7 +41,7 @@ void print_summary(const CopySummary& summary, const Arguments& arguments, doubl
        copied.empty() ? "nothing" : copied, wall_s, arguments.out);
 }
 
-int run(const Arguments& arguments, const CLI::App& command) {
+int run(const ConvertArguments& arguments, const CLI::App& command) {
   if (arguments.list) return list_formats();
   if (arguments.out.empty()) throw UserError("IN or OUT is missing; write: esim convert IN OUT");
   const auto start = std::chrono::steady_clock::now();
@@ -55,8 +55,8 @@ int run(const Arguments& arguments, const CLI::App& command) {
   }
   catch_interrupts();
   ProgressBar bar(!arguments.quiet);
-  const CopySummary summary = convert_recording(arguments.input, format, out, options, [&](double share) {
-    bar.show(share, [&] { return fmt::format("{:.0f} %", 100 * share); });
+  const CopySummary summary = convert_recording(arguments.input, format, out, options, [&](double fraction) {
+    bar.show(fraction, [&] { return fmt::format("{:.0f} %", 100 * fraction); });
     return !interrupted();
   });
   bar.clear();
@@ -70,7 +70,7 @@ int run(const Arguments& arguments, const CLI::App& command) {
 }  // namespace
 
 void add_convert(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ConvertArguments>();
   CLI::App* command = app.add_subcommand("convert", "Convert recordings and event files between formats");
   command->add_flag("--list", arguments->list, "List the formats");
   command

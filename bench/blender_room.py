@@ -42,7 +42,7 @@ class Session:
         self.client.receive()
 
     def seconds(self):
-        """(renderings, seconds in Blender with writing its file, seconds of the server beside)."""
+        """(renderings, seconds in Blender including writing its file, other seconds of the server)."""
         found = re.search(r"(\d+) renderings in ([\d.]+) s, ([\d.]+) s beside", self.client.text("vget /unrealcv/status"))
         return int(found[1]), float(found[2]), float(found[3])
 
@@ -176,7 +176,7 @@ def main():
     if not (ROOM / "studio_room.blend").exists():
         subprocess.run([BLENDER, "--background", "--factory-startup", "--python", ROOM / "make_room.py"], check=True,
                        capture_output=True, env=ENVIRONMENT)
-    steps = {"overhead": overhead, "noise": lambda: noise(16), "keyframes": lambda: keyframes(esim, out), 
+    steps = {"overhead": overhead, "noise": lambda: noise(16), "keyframes": lambda: keyframes(esim, out),
              "accuracy": lambda: accuracy(esim, out, arguments.span, arguments.speed)}
     for step in arguments.steps or steps:
         steps[step]()

@@ -1,6 +1,6 @@
 // Sequences of `esim dataset affine` by one thread, 240 x 180 pixels of 0.04 s: made in memory (make), and made and
-// written with flow, displacement and tensor (write/hdf5, write/webdataset). "sequences" are per second, "events" and
-// "bytes" per sequence.
+// written with motion_field, optical_flow and tensor (write/hdf5, write/webdataset). "sequences" are per second,
+// "events" and "bytes" per sequence.
 #include <benchmark/benchmark.h>
 
 #include <filesystem>

@@ -1,7 +1,7 @@
 // Ten million random events of 640 x 480 pixels (or the largest sensor that the format holds), in order of time,
-// written and read in every format that holds events, to a file in memory. "events/s" is by the
-// clock; "bytes" are those of the file per event. Names are read/FORMAT or write/FORMAT; where the format has a choice
-// of compression, all of them.
+// written and read in every format that holds events, to a file in memory. "events/s" is wall
+// time; "bytes" are the bytes of the file per event. Names are read/FORMAT or write/FORMAT. Formats with several
+// compressions are measured with each of them.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

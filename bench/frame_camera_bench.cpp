@@ -1,6 +1,6 @@
 // Frames and events from the same samples on one thread: 4,000 samples per second, 25 frames per second of 20 ms
-// each. Arguments: width, height, noise or none. "ns/px" is of the frame camera, per pixel and sample; "share" is its
-// time over that of the event camera.
+// each. Arguments: width, height, noise or none. "ns/px" is of the frame camera, per pixel and sample; "fraction" is
+// its time over that of the event camera.
 #include <benchmark/benchmark.h>
 
 #include <chrono>
@@ -51,7 +51,7 @@ void frames(benchmark::State& state) {
   }
   const double pixels = static_cast<double>(sample) * static_cast<double>(width * height);
   state.counters["ns/px"] = for_frames / pixels * 1e9;
-  state.counters["share"] = for_frames / for_events;
+  state.counters["fraction"] = for_frames / for_events;
 }
 
 BENCHMARK(frames)->Args({346, 260, 0})->Args({346, 260, 1})->Args({1280, 720, 0})->Args({1280, 720, 1});

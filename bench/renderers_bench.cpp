@@ -30,9 +30,9 @@ void sprites(benchmark::State& state) {
   const auto light = test::smooth_texture(Wrap::clamp, Wrap::clamp);
   const auto alpha = std::make_shared<const Texture>(Image<float>(1024, 512, 0.7F), Wrap::clamp, Wrap::clamp);
   for (int i = 0; i < 10; ++i) {
-    const LayerKeyframe key{0, {32.0 * i - 150, 20.0 * i - 90}, 20.0 * i, {0.1, 0.1}};
-    scene.sprites.insert(scene.sprites.begin(), {light, alpha, LayerUnits::pixel, LayerBeyond::nothing,
-                                                 LayerMotion({key}, KeyframeInterpolation::linear)});
+    const SpritePose key{0, {32.0 * i - 150, 20.0 * i - 90}, 20.0 * i, {0.1, 0.1}};
+    scene.sprites.insert(scene.sprites.begin(), {light, alpha, SpriteUnits::pixel, SpriteBeyond::nothing,
+                                                 SpriteMotion({key}, SpriteInterpolation::linear)});
   }
   const Workers workers(static_cast<int>(state.range(0)));
   bench::render_frames(state, *make_sprites_renderer(scene, kCamera, workers), kCamera, test::moving_camera());
@@ -81,7 +81,7 @@ void generated_room(benchmark::State& state) {
   bench::render_frames(state, *renderer, kCamera, test::moving_camera(), static_cast<int>(state.range(2)));
 }
 
-/// The same with OpenGL, whatever device there is. Arguments: triangles in thousands, tiles.
+/// The same with OpenGL on the default device. Arguments: triangles in thousands, tiles.
 void generated_room_gl(benchmark::State& state) {
   if (!test::has_gl()) return state.SkipWithError("OpenGL is not available");
   const Scene scene = still_scene(bench::generated_room(static_cast<int>(1000 * state.range(0))));

@@ -1,5 +1,5 @@
-// What UnrealCV's protocol costs beside the engine's own time: frames of 346 x 260 that a server in this process has
-// ready, from asking to E, Z and V. Argument: light as PNG.
+// The cost of UnrealCV's protocol without the engine's own time: from the request to E, Z and V, for frames of 346 x
+// 260 that a server in this process has ready. Argument: light as PNG.
 #include <benchmark/benchmark.h>
 
 #include <string>
@@ -22,7 +22,7 @@ void frames(benchmark::State& state, const Camera& camera) {
   for (auto _ : state) {
     at.T_world_body.translation.y() += 1e-4;
     renderer->render({0, at, whole}, sample);
-    benchmark::DoNotOptimize(sample.flow_x.data());
+    benchmark::DoNotOptimize(sample.motion_x.data());
   }
 }
 

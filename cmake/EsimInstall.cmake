@@ -17,7 +17,7 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/esimConfig.cmake.in ${
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/esimConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/esimConfig.cmake ${PROJECT_BINARY_DIR}/esimConfigVersion.cmake
               ${PROJECT_SOURCE_DIR}/cmake/FindOpenCVModules.cmake ${PROJECT_SOURCE_DIR}/cmake/FindFFmpegLibraries.cmake ${PROJECT_SOURCE_DIR}/cmake/FindEpoxy.cmake
-              ${PROJECT_SOURCE_DIR}/cmake/FindISAL.cmake
+              ${PROJECT_SOURCE_DIR}/cmake/FindCairo.cmake ${PROJECT_SOURCE_DIR}/cmake/FindISAL.cmake
               ${PROJECT_SOURCE_DIR}/cmake/FindLZ4.cmake ${PROJECT_SOURCE_DIR}/cmake/FindZstd.cmake
               ${PROJECT_SOURCE_DIR}/cmake/FindLibZip.cmake
               ${PROJECT_SOURCE_DIR}/cmake/EsimDependencies.cmake

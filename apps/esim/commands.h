@@ -19,8 +19,10 @@ void add_info(CLI::App& app, int& exit_code);
 void add_play(CLI::App& app, int& exit_code);
 void add_stats(CLI::App& app, int& exit_code);
 void add_studio(CLI::App& app, int& exit_code);
-void add_waypoints(CLI::App& app, int& exit_code);
 void add_evaluate(CLI::App& app, int& exit_code);
 void add_options(CLI::App& app, int& exit_code);
+
+/// Adds the commands of earlier versions, which name their successors.
+void add_removed(CLI::App& app);
 
 }  // namespace esim::app

@@ -22,7 +22,6 @@ int main(int argc, char** argv) {
       "  esim info out/room                                the contents of a recording\n"
       "  esim play out/room                                a video of a recording or of an event file\n"
       "  esim stats out/room --plot                        rates, intervals, hot pixels, banding of its events\n"
-      "  esim waypoints scenes/room.yaml --out walk.yaml   walk through a scene and set waypoints of a trajectory\n"
       "  esim dataset affine --out out/flow                10,000 sequences with optical flow, for learning\n"
       "  esim studio scenes/room.yaml                      design, make and view recordings in a browser\n"
       "  esim evaluate sampling --out out/sampling         accuracy and cost of sampling methods\n"
@@ -41,10 +40,10 @@ int main(int argc, char** argv) {
   add_play(app, exit_code);
   add_stats(app, exit_code);
   add_studio(app, exit_code);
-  add_waypoints(app, exit_code);
   add_dataset(app, exit_code);
   add_evaluate(app, exit_code);
   add_options(app, exit_code);
+  add_removed(app);
   try {
     app.parse(argc, argv);
     return exit_code;

@@ -8,7 +8,7 @@ from torch.nn import functional as F
 
 def turned_and_scaled(tensors, flow, fired, angle, scale):
     """A batch as it would be seen with the image turned and enlarged: with M = scale R(angle), what stood at p from the
-    middle stands at M p, and moves by M times its displacement.
+    middle stands at M p, and moves by M times its optical flow.
 
     Parameters
     ----------

@@ -68,7 +68,7 @@ def evaluate(events_path, calibration, gyroscope, predict=None, *, window_s=0.04
     Parameters
     ----------
     predict : callable, optional
-        Of an event tensor, float32 (4, height, width), `esim.event_tensor`'s: the displacement from the window's start
+        Of an event tensor, float32 (4, height, width), `esim.event_tensor`'s: the optical flow from the window's start
         to its end, float (2, height, width) px. No motion without.
     start_s, duration_s : float, optional
         What is evaluated, in s of the recording's clock; all that the gyroscope covers without.
@@ -101,7 +101,7 @@ def evaluate(events_path, calibration, gyroscope, predict=None, *, window_s=0.04
             continue
         t0, t1 = start + index * window, start + (index + 1) * window
         tensor = esim.event_tensor(events, *shape, t0=esim.ns(t0), t1=esim.ns(t1))
-        truth = calibration.displacement(gyroscope.rotation(t0, t1))
+        truth = calibration.optical_flow(gyroscope.rotation(t0, t1))
         predicted = np.zeros_like(truth) if predict is None else predict(tensor)
         fired = tensor[:2].sum(axis=0) > 0
         errors, zero = end_point_errors(predicted, truth, fired), end_point_errors(0 * truth, truth, fired)

@@ -34,7 +34,7 @@ def up_convolution(inputs, outputs):
 
 
 class FlowNetS(nn.Module):
-    """Displacement of every pixel, px, from event tensors.
+    """Optical flow of every pixel, px, from event tensors.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class FlowNetS(nn.Module):
     normalise : bool
         Batch normalisation after the convolutions of the contracting part; the paper has none.
     unit_px : float
-        What the network takes for 1; of the size of typical displacements.
+        What the network takes for 1; of the size of typical optical flow.
     """
 
     def __init__(self, width=1.0, levels=6, normalise=False, unit_px=20.0):
@@ -121,9 +121,9 @@ def training_loss(flows, truth, valid):
         height, width = flow.shape[-2:]
         cell = 4 * flows[0].shape[-1] // width
         bottom, right = height * cell - truth.shape[-2], width * cell - truth.shape[-1]
-        share = F.avg_pool2d(F.pad(valid, (0, right, 0, bottom)), cell)
-        mean = F.avg_pool2d(F.pad(truth * valid, (0, right, 0, bottom)), cell) / share.clamp(min=1e-6)
-        loss = loss + weight * end_point_error(flow, mean, (share > 0).to(share))
+        fraction = F.avg_pool2d(F.pad(valid, (0, right, 0, bottom)), cell)
+        mean = F.avg_pool2d(F.pad(truth * valid, (0, right, 0, bottom)), cell) / fraction.clamp(min=1e-6)
+        loss = loss + weight * end_point_error(flow, mean, (fraction > 0).to(fraction))
     return loss
 
 

@@ -84,7 +84,7 @@ class Calibration:
                 raise esim.Error(f"{path}:1: {name} = {centre:g} px cannot belong to a sensor of {width} x {height} px; "
                                  "is the calibration of another size?")
         try:
-            calibration.bearings  # may not exist
+            _ = calibration.bearings  # may not exist
         except esim.Error as problem:
             raise esim.Error(f"{path}:1: {problem}") from None
         return calibration
@@ -138,7 +138,7 @@ class Calibration:
         _, (a, b, d) = self._distort(x, y)
         return np.stack([self.fx * (a * moved_x + b * moved_y), self.fy * (b * moved_x + d * moved_y)])
 
-    def displacement(self, R_C0_C1):
+    def optical_flow(self, R_C0_C1):
         """Optical flow from t0 to t1: float64 (2, height, width), px.
 
         R_C0_C1 maps from the camera's frame at t1 to its frame at t0.

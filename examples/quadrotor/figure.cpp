@@ -1,10 +1,10 @@
 #include "figure.h"
 
 #include <esim/files/output_file.h>
-#include <esim/stats/axes.h>
+#include <esim/plot/axes.h>
+#include <esim/preview/pictures.h>
 
 #include <algorithm>
-#include <string>
 #include <utility>
 
 void draw(const Flight& flight, const std::filesystem::path& file) {
@@ -15,22 +15,21 @@ void draw(const Flight& flight, const std::filesystem::path& file) {
     low_x = std::min(low_x, p.x()), high_x = std::max(high_x, p.x());
     low_y = std::min(low_y, p.y()), high_y = std::max(high_y, p.y());
   }
-  esim::Canvas canvas(kWidth, kHeight, esim::kPaper);
-  esim::Axes axes(canvas, {70, 50, 800, 440}, "A quadrotor flown by its simulated IMU, seen from above",
-                  esim::linear_scale(low_x, high_x, "x, m"), esim::linear_scale(low_y, high_y, "y, m"));
-  int key = 80;
-  const auto path = [&](const std::vector<Eigen::Vector3d>& points, const std::string& name, esim::Rgb colour,
-                        double width) {
+  using esim::Mark;
+  esim::Canvas canvas(kWidth, kHeight, esim::kLightTheme.page);
+  esim::Axes axes(
+      canvas, canvas.pixels().bounds(), esim::linear_scale(low_x, high_x, "x (m)"),
+      esim::linear_scale(low_y, high_y, "y (m)"),
+      {"A quadrotor flown by its simulated IMU, seen from above",
+       {{"commanded", kCommanded, Mark::line}, {"flown", kFlown, Mark::line}, {"estimated", kEstimated, Mark::line}}});
+  const auto path = [&](const std::vector<Eigen::Vector3d>& points, esim::Rgb colour, double width) {
     std::vector<esim::DataPoint> line;
     for (const Eigen::Vector3d& p : points) line.push_back({p.x(), p.y()});
     axes.line(line, colour, width);
-    const esim::Spot ends[] = {{key + 0.0, 72}, {key + 24.0, 72}};
-    canvas.polyline(ends, width, colour);
-    key += 32 + canvas.text(key + 32, 77, name, 9, esim::kInk) + 30;
   };
-  path(flight.commanded, "commanded", kCommanded, 7);
-  path(flight.flown, "flown", kFlown, 2.5);
-  path(flight.estimated, "estimated", kEstimated, 1);
+  path(flight.commanded, kCommanded, 7);
+  path(flight.flown, kFlown, 2.5);
+  path(flight.estimated, kEstimated, 1);
   axes.finish();
   esim::write_file_atomically(file, esim::encode_png(std::move(canvas).take()));
 }

@@ -9,7 +9,7 @@ T_A_B maps points from frame B to frame A; quaternions are Hamilton, x y z w. `d
 from . import dataset, filters
 from ._checks import ns
 from ._core import __version__
-from ._errors import LossWarning, Error, InternalError, OutputError
+from ._errors import Error, InternalError, LossWarning, OutputError
 from ._event_camera import EventCamera, linear_light
 from ._events import Events
 from ._files import EventsIterator, formats, info, load_events, save_events

@@ -9,7 +9,10 @@ import numpy as np
 
 from ._errors import Error
 
-MOST_OPEN = 64  # files
+MAX_OPEN = 64  # files
+
+# Names of arrays in datasets that older versions have written.
+OLD_NAMES = {"motion_field": "flow", "optical_flow": "displacement"}
 
 
 class Hdf5Shard:
@@ -109,10 +112,10 @@ class Shards:
         return self._count
 
     def array(self, i, name):
-        """An array of sequence i: "flow", "events/t", ...; None if the dataset does not contain it."""
+        """An array of sequence i: "motion_field", "events/t", ...; None if the dataset does not contain it."""
         if not 0 <= i < self._count:
             raise IndexError(f"index must be between 0 and {self._count - 1}, not {i}")
-        if self._process != os.getpid() or len(self._open) >= MOST_OPEN:  # do not share open files with other processes
+        if self._process != os.getpid() or len(self._open) >= MAX_OPEN:  # do not share open files with other processes
             self._open, self._process = {}, os.getpid()
         number, k = divmod(i, self._size)
         if number not in self._open:
@@ -120,4 +123,5 @@ class Shards:
         shard = self._open[number]
         if k >= len(shard):
             raise Error(f"{self._paths[number]} has {len(shard)} sequences, but number {k} is missing: it is damaged")
-        return shard.array(k, name)
+        array = shard.array(k, name)
+        return shard.array(k, OLD_NAMES[name]) if array is None and name in OLD_NAMES else array

@@ -5,13 +5,14 @@ import os
 import warnings
 
 from . import _checks, _core
-from ._errors import LossWarning, Error
+from ._errors import Error, LossWarning
 from ._events import of_bytes
+from ._renamed import OldAttributes, OldKeys, present_name
 from ._scenario import to_overrides, to_scenario
 from ._types import IMU_DTYPE, STATE_DTYPE
 
 
-class CameraPacket:
+class CameraPacket(OldAttributes):
     """The records of one camera in a packet: N frames of ground truth, M frames of the frame camera.
 
     Attributes
@@ -25,14 +26,14 @@ class CameraPacket:
         Linear intensity, 1 = white.
     depth : float32, shape (N, height, width)
         Along the optical axis, m; inf without a surface.
-    flow : float32, shape (N, 2, height, width)
+    motion_field : float32, shape (N, 2, height, width)
         Motion field, px/s: to the right, and downwards.
     object : uint16, shape (N, height, width)
         i + 1 for moving object i, 0 for the static scene. N = 0 unless the scenario has `truth.objects`.
-    displacement : float32, shape (K, 2, height, width)
+    optical_flow : float32, shape (K, 2, height, width)
         Optical flow from a frame to the next, px; NaN if the point has no image there. K = 0 unless the scenario has
-        `truth.displacement`.
-    displacement_t : int64, shape (K, 2)
+        `truth.optical_flow`.
+    optical_flow_t : int64, shape (K, 2)
         Times of the two frames, ns.
     visible : uint8, shape (K, height, width)
         1 if the point is also visible in the later frame.
@@ -50,14 +51,16 @@ class CameraPacket:
     """
 
     __slots__ = (
-        "events truth_t pose irradiance depth flow object displacement displacement_t visible event_points "
+        "events truth_t pose irradiance depth motion_field object optical_flow optical_flow_t visible event_points "
         "images image_t exposure_start exposure trigger_t trigger_kind"
     ).split()
+
+    _renamed = {"flow": "motion_field", "displacement": "optical_flow", "displacement_t": "optical_flow_t"}
 
     def __init__(self, parts, width, height):
         self.events = of_bytes(parts["events"], width, height)
         self.truth_t = parts["t"]
-        self.displacement_t = parts["displacement_span"]
+        self.optical_flow_t = parts["optical_flow_span"]
         for name in self.__slots__:
             if name in parts and name != "events":
                 setattr(self, name, parts[name])
@@ -99,6 +102,7 @@ class Packet:
         return self.cameras[name]
 
     def __getattr__(self, name):
+        name = present_name(name, CameraPacket._renamed)
         if name not in CameraPacket.__slots__:
             raise AttributeError(f"a packet has no attribute {name}")
         if len(self.cameras) > 1:
@@ -125,8 +129,10 @@ class Renderer:
 
         - `irradiance`, (height, width) floats: linear intensity, 1 = white; `esim.linear_light` converts 8-bit images;
         - `depth`, (height, width) floats: along the optical axis, m; inf without a surface;
-        - `flow`, (2, height, width), optional: the motion field, px/s. By default computed from depth and motion;
-        - `object`, (height, width) ints, needed if objects move and flow is not given: i + 1 for object i, otherwise 0.
+        - `motion_field`, (2, height, width), optional: the motion field, px/s. By default computed from depth and
+          motion;
+        - `object`, (height, width) ints, needed if objects move and motion_field is not given: i + 1 for object i,
+          otherwise 0.
 
         The same arguments must give the same images.
     objects : dict of str to Trajectory, optional
@@ -143,14 +149,16 @@ class Renderer:
         images = self.render(t, T_world_camera, T_world_objects)
         if not isinstance(images, dict):
             raise TypeError(f"render() must return a dict of images, not a {type(images).__name__}")
-        unknown = set(images) - {"irradiance", "depth", "flow", "object"}
+        images = {present_name(name, {"flow": "motion_field"}): image for name, image in images.items()}
+        unknown = set(images) - {"irradiance", "depth", "motion_field", "object"}
         if unknown:
-            raise Error(f"render() must return irradiance, depth, flow and object only, not {', '.join(sorted(unknown))}")
+            raise Error("render() must return irradiance, depth, motion_field and object only, "
+                        f"not {', '.join(sorted(unknown))}")
         missing = {"irradiance", "depth"} - set(images)
         if missing:
             raise Error(f"render() must also return {' and '.join(sorted(missing))}")
-        if self.objects and not {"flow", "object"} & set(images):
-            raise Error("render() must return flow or object, since objects move")
+        if self.objects and not {"motion_field", "object"} & set(images):
+            raise Error("render() must return motion_field or object, since objects move")
 
         def checked(name, check, *arguments):
             return check(images[name], f"render() at {t} ns: {name}", *arguments) if name in images else None
@@ -158,7 +166,7 @@ class Renderer:
         return (
             checked("irradiance", _checks.rendered_irradiance, shape),
             checked("depth", _checks.depth, shape),
-            checked("flow", _checks.motion_field, (2, *shape)),
+            checked("motion_field", _checks.motion_field, (2, *shape)),
             checked("object", _checks.labels, shape, len(self.objects)),
         )
 
@@ -256,7 +264,7 @@ class Simulation:
     def report(self):
         """Report or None: results and cost (`report.json` of recordings); None before the end."""
         text = self._core.report()
-        return Report(json.loads(text)) if text else None
+        return Report(json.loads(text, object_hook=OldKeys)) if text else None
 
     def __enter__(self):
         return self

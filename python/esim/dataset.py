@@ -6,13 +6,14 @@ import os
 
 from . import _checks, _core
 from ._events import of_bytes
+from ._renamed import OldAttributes, OldKeys, old_arguments
 from ._represent import event_tensor, voxel_grid
 from ._scenario import to_overrides
 
 __all__ = ["AffineSequence", "AffineSequences"]
 
 
-class AffineSequence:
+class AffineSequence(OldAttributes):
     """A sequence with its labels. All values except the tensors are exact.
 
     Attributes
@@ -21,24 +22,26 @@ class AffineSequence:
     duration : int
         ns; it begins at 0.
     events : esim.Events
-    flow : numpy.ndarray, float32, shape (2, height, width)
-        Motion field, px/s, to the right and downwards, at the time `flow_t` (ns).
-    displacement : numpy.ndarray, float32, shape (2, height, width)
+    motion_field : numpy.ndarray, float32, shape (2, height, width)
+        Motion field, px/s, to the right and downwards, at the time `motion_field_t` (ns).
+    optical_flow : numpy.ndarray, float32, shape (2, height, width)
         Optical flow of each pixel from the start to the end, px, also to points outside the image.
     images : numpy.ndarray, float32, shape (2, height, width)
         Irradiance at the start and at the end: linear intensity, 1 = white.
     info : dict
-        The random values: image, contrast_threshold, displacement_rms_px, and the motion as the pivot and keyframes of a
+        The random values: image, contrast_threshold, optical_flow_rms_px, and the motion as the pivot and poses of a
         sprite (`docs/sprites.md`).
     """
 
-    __slots__ = ("index", "duration", "events", "flow", "flow_t", "displacement", "images", "info")
+    __slots__ = ("index", "duration", "events", "motion_field", "motion_field_t", "optical_flow", "images", "info")
+
+    _renamed = {"flow": "motion_field", "flow_t": "motion_field_t", "displacement": "optical_flow"}
 
     def __init__(self, index, made):
-        events, self.duration, self.flow_t, self.flow, self.displacement, self.images, info = made
+        events, self.duration, self.motion_field_t, self.motion_field, self.optical_flow, self.images, info = made
         self.index = index
-        self.events = of_bytes(events, *self.flow.shape[:0:-1])
-        self.info = json.loads(info)
+        self.events = of_bytes(events, *self.motion_field.shape[:0:-1])
+        self.info = json.loads(info, object_hook=OldKeys)
 
     def tensor(self, stamp="last"):
         """Computes the four channels of EV-FlowNet from all events: `esim.event_tensor`.
@@ -88,8 +91,8 @@ class AffineSequences:
         Histogram of optical flow over the duration: lines "LOW HIGH WEIGHT", px. Default: MPI Sintel's.
     flow_scale : float
         Factor on the magnitudes of the histogram.
-    flow_at : {"start", "middle", "end"}
-        Time of `flow`.
+    motion_field_at : {"start", "middle", "end"}
+        Time of `motion_field`.
     event_camera : dict, optional
         Additional options of `event_camera` in a scenario: {"threshold_mismatch": 0.03}.
 
@@ -99,6 +102,7 @@ class AffineSequences:
         For invalid options, and if there is no usable image.
     """
 
+    @old_arguments(flow_at="motion_field_at")
     def __init__(
         self,
         images=None,
@@ -110,21 +114,21 @@ class AffineSequences:
         contrast_threshold=(0.2, 0.5),
         flow_histogram=None,
         flow_scale=1.0,
-        flow_at="middle",
+        motion_field_at="middle",
         event_camera=None,
     ):
-        least, greatest = contrast_threshold if isinstance(contrast_threshold, (tuple, list)) else (contrast_threshold,) * 2
+        low, high = contrast_threshold if isinstance(contrast_threshold, (tuple, list)) else (contrast_threshold,) * 2
         named = {f"event_camera.{key}": value for key, value in (event_camera or {}).items()}
         self._core = _core.AffineSequences(
             "" if images is None else os.fspath(images),
             *_checks.sensor_size(width, height),
             _checks.time(duration, "duration") / 1e9,
             _checks.seed(seed),
-            _checks.number(least, "contrast_threshold"),
-            _checks.number(greatest, "contrast_threshold"),
+            _checks.number(low, "contrast_threshold"),
+            _checks.number(high, "contrast_threshold"),
             "" if flow_histogram is None else os.fspath(flow_histogram),
             _checks.number(flow_scale, "flow_scale"),
-            flow_at,
+            motion_field_at,
             to_overrides(named),
         )
 

@@ -12,9 +12,9 @@ class AffineSequence:
     index: int
     duration: int
     events: Events
-    flow: NDArray[np.float32]
-    flow_t: int
-    displacement: NDArray[np.float32]
+    motion_field: NDArray[np.float32]
+    motion_field_t: int
+    optical_flow: NDArray[np.float32]
     images: NDArray[np.float32]
     info: dict[str, Any]
     def __init__(self, index: int, made: tuple[Any, ...]) -> None: ...
@@ -33,7 +33,7 @@ class AffineSequences:
         contrast_threshold: Number | tuple[Number, Number] = (0.2, 0.5),
         flow_histogram: str | PathLike[str] | None = None,
         flow_scale: Number = 1.0,
-        flow_at: Literal["start", "middle", "end"] = "middle",
+        motion_field_at: Literal["start", "middle", "end"] = "middle",
         event_camera: Mapping[str, Any] | None = None,
     ) -> None: ...
     def __getitem__(self, index: int) -> AffineSequence: ...

@@ -3,8 +3,8 @@
 Samples are tuples of float32 tensors:
 
 - input, (4, height, width): `esim.event_tensor`, counts of ON and OFF events and their latest times from 0 to 1;
-- target, (2, height, width): to the right, and downwards; optical flow in px over the window (displacement), or motion
-  field in px/s (flow);
+- target, (2, height, width): to the right, and downwards; optical flow in px over the window (optical_flow), or motion
+  field in px/s (motion_field);
 - fired, (1, height, width): 1 for pixels with at least one event and a known target, otherwise 0; unknown targets are
   0.
 """
@@ -17,12 +17,14 @@ import torch.distributed
 import torch.utils.data
 
 from ._errors import Error
+from ._renamed import present_name
 from ._represent import event_tensor
 from ._shards import Shards
 from ._types import EVENT_DTYPE
 from .dataset import AffineSequences
 
-TARGETS = ("displacement", "flow")
+TARGETS = ("optical_flow", "motion_field")
+OLD_TARGETS = {"displacement": "optical_flow", "flow": "motion_field"}
 
 
 def to_sample(tensor, target):
@@ -52,15 +54,16 @@ class AffineFlowDataset(torch.utils.data.IterableDataset):
         an interrupted training, set first to the number of samples that it has used.
     block : int
         The batch size.
-    target : {"displacement", "flow"}
+    target : {"optical_flow", "motion_field"}
     rank, world : int, optional
         Rank of this process and number of processes. Default: from torch.distributed if initialised, otherwise 0 of 1.
     **options
         Options of `esim.dataset.AffineSequences`: width, height, duration, contrast_threshold, ....
     """
 
-    def __init__(self, images=None, *, seed=1, first=0, count=None, block=1, target="displacement", rank=None, world=None,
+    def __init__(self, images=None, *, seed=1, first=0, count=None, block=1, target="optical_flow", rank=None, world=None,
                  **options):
+        target = present_name(target, OLD_TARGETS)
         if target not in TARGETS:
             raise ValueError(f"target must be one of {TARGETS}, not {target!r}")
         if block < 1 or first < 0 or (count is not None and count < 0):
@@ -96,7 +99,7 @@ class EventTensorDataset(torch.utils.data.Dataset):
     Parameters
     ----------
     folder : path
-    target : {"displacement", "flow"}
+    target : {"optical_flow", "motion_field"}
 
     Raises
     ------
@@ -104,7 +107,8 @@ class EventTensorDataset(torch.utils.data.Dataset):
         If the folder is not a dataset, or if the dataset is incomplete, damaged, or lacks the target.
     """
 
-    def __init__(self, folder, *, target="displacement"):
+    def __init__(self, folder, *, target="optical_flow"):
+        target = present_name(target, OLD_TARGETS)
         if target not in TARGETS:
             raise ValueError(f"target must be one of {TARGETS}, not {target!r}")
         self.shards, self.target = Shards(folder), target

@@ -16,13 +16,13 @@ SMALL = {"width": 48, "height": 32, "flow_scale": 0.2}
 def test_a_sequence_is_labelled():
     sequence = esim.dataset.AffineSequences(**SMALL)[3]
     assert sequence.events.dtype == esim.EVENT_DTYPE and len(sequence.events) > 100
-    assert sequence.duration == 40_000_000 and sequence.flow_t == 20_000_000
+    assert sequence.duration == 40_000_000 and sequence.motion_field_t == 20_000_000
     assert sequence.events["t"].max() <= sequence.duration
-    for array in (sequence.flow, sequence.displacement, sequence.images):
+    for array in (sequence.motion_field, sequence.optical_flow, sequence.images):
         assert array.shape == (2, 32, 48) and array.dtype == np.float32
     assert 0.2 <= sequence.info["contrast_threshold"] <= 0.5
     # Fields are affine: all second differences vanish.
-    for field in (*sequence.flow, *sequence.displacement):
+    for field in (*sequence.motion_field, *sequence.optical_flow):
         for axis in (0, 1):
             assert np.abs(np.diff(field, 2, axis=axis)).max() <= 2e-6 * np.abs(field).max()
     assert np.array_equal(sequence.tensor()[:2].astype(int), esim.event_count(sequence.events, 48, 32))
@@ -36,7 +36,7 @@ def test_a_sequence_depends_on_options_and_index_alone():
     again = esim.dataset.AffineSequences(**SMALL)
     for i in reversed(range(8)):
         assert np.array_equal(made[i].events, again[i].events) and made[i].info == again[i].info
-    assert not np.array_equal(esim.dataset.AffineSequences(**SMALL, seed=2)[0].displacement, made[0].displacement)
+    assert not np.array_equal(esim.dataset.AffineSequences(**SMALL, seed=2)[0].optical_flow, made[0].optical_flow)
 
 
 def test_options_reach_the_camera():
@@ -51,8 +51,8 @@ def test_mistakes_are_named(tmp_path):
         esim.dataset.AffineSequences(event_camera={"thresh": 1})
     with pytest.raises(esim.Error, match="has no images"):
         esim.dataset.AffineSequences(tmp_path)
-    with pytest.raises(esim.Error, match="flow_at"):
-        esim.dataset.AffineSequences(flow_at="never")
+    with pytest.raises(esim.Error, match="motion_field_at"):
+        esim.dataset.AffineSequences(motion_field_at="never")
     with pytest.raises(IndexError):
         esim.dataset.AffineSequences(**SMALL)[-1]
 

@@ -155,7 +155,7 @@ CODES = [np.uint8, np.uint16, np.int64, bool, complex]
 
 
 @pytest.mark.parametrize("dtype", CODES)
-def test_light_that_is_none(poster, dtype):
+def test_invalid_irradiance(poster, dtype):
     frame = np.ones((30, 40), dtype)
     depth = np.ones((30, 40))
     refused(TypeError, "linear intensity.*linear_light", lambda: esim.EventCamera(40, 30).process(frame, 0))
@@ -177,7 +177,7 @@ def test_light_out_of_range(poster, value):
     refused(esim.Error, "irradiance", lambda: esim.simulate({**poster, **alone}, renderer=render).run())
 
 
-def test_objects_that_are_none(poster):
+def test_invalid_objects(poster):
     for seen in (np.full((30, 40), -1), np.full((30, 40), 70000), np.full((30, 40), np.nan), np.full((30, 40), 0.5)):
         images = {"irradiance": np.ones((30, 40)), "depth": np.ones((30, 40)), "object": seen}
         refused(esim.Error, "object .* of 0", lambda: esim.simulate(poster, renderer=lambda t, T, objects: images).run())

@@ -106,7 +106,7 @@ def test_sizes_that_are_no_sensor(size):
 
 
 @pytest.mark.parametrize("wrong", [{"seed": -1}, {"seed": 2**64}, {"seed": 1.5}, {"threads": -1}, {"threads": "2"}])
-def test_numbers_that_are_none(wrong):
+def test_invalid_numbers(wrong):
     (name,) = wrong
     with pytest.raises((esim.Error, TypeError), match=name):
         esim.EventCamera(4, 3, **wrong)
@@ -173,7 +173,7 @@ def test_options_have_the_schema_names():
         esim.EventCamera(4, 3, contrast_threshold=1000)
     with pytest.raises(esim.Error, match="davis346"):
         esim.EventCamera(4, 3, "davis345")
-    # A preset stands for what is not given beside it.
+    # A preset sets all options that are not given.
     own = esim.EventCamera(40, 30, "davis346", shot_noise_hz=0, leak_rate_hz=0, hot_pixels=0, contrast_threshold=0.5)
     assert own.dropped == 0
     limited = esim.EventCamera(40, 30, contrast_threshold=0.01, readout={"rate_mev_per_s": 0.001, "queue_events": 10})

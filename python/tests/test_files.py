@@ -117,8 +117,8 @@ def test_what_is_refused(tmp_path):
             esim.EventsIterator(tmp_path, **arguments)
 
 
-def test_a_damaged_file_names_the_place_after_what_is_whole(file):
-    path, events = file
+def test_a_damaged_file_names_the_place_of_the_damage(file):
+    path, _events = file
     text = path.read_text().splitlines()
     text[4000] = "rubbish"
     path.write_text("\n".join(text))

@@ -151,7 +151,7 @@ def test_several_cameras(scenario, tmp_path, extension):
             np.testing.assert_array_equal(a[name].truth_t, b[name].truth_t)
 
 
-def test_lengths_that_are_none(scenario, recording):
+def test_invalid_lengths(scenario, recording):
     for wrong in (0, -1, -0.5, float("nan"), float("inf")):
         for make in (lambda: esim.simulate(scenario, packet_s=wrong), lambda: esim.Recording(recording[0], wrong)):
             with pytest.raises(esim.Error, match="packet_s"):

@@ -44,7 +44,7 @@ def test_a_recording_reads_as_it_was_simulated(recorded, tmp_path, name):
     for field in ("events", "images", "image_t", "truth_t"):
         np.testing.assert_array_equal(joined(read, field), joined(packets, field), err_msg=field)
     np.testing.assert_allclose(joined(read, "depth"), joined(packets, "depth"))
-    np.testing.assert_allclose(joined(read, "flow"), joined(packets, "flow"), rtol=1e-6)
+    np.testing.assert_allclose(joined(read, "motion_field"), joined(packets, "motion_field"), rtol=1e-6)
     np.testing.assert_allclose(joined(read, "pose"), joined(packets, "pose"), atol=1e-8)
     np.testing.assert_array_equal(joined(read, "imu")["t"], joined(packets, "imu")["t"])
     for packet in read:
@@ -99,7 +99,7 @@ def test_pictures_show_every_event_and_refuse_others():
 
 
 def test_play_shows_what_there_is_side_by_side(recorded):
-    out, packets = recorded
+    out, _packets = recorded
     pages = esim.play(out, fps=20, slow_motion=1, size=900)
     pictures = list(pages)
     assert len(pictures) == len(pages) == 5

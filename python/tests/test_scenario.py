@@ -52,7 +52,7 @@ def test_messages_name_the_place(tmp_path):
         esim.Scenario.load(file)
 
 
-def test_what_yaml_has_no_words_for():
+def test_values_that_yaml_cannot_hold():
     with pytest.raises(TypeError, match="not a set"):
         esim.Scenario({"seed": {1}})
     with pytest.raises(TypeError, match="dict"):

@@ -29,7 +29,7 @@ def test_packets_end_at_frames_of_ground_truth(poster):
         assert packet.truth_t.tolist() == [packet.t1]
         assert ((packet.events["t"] > packet.t0) & (packet.events["t"] <= packet.t1)).all()
         assert packet.irradiance.shape == packet.depth.shape == (1, 30, 40)
-        assert packet.flow.shape == (1, 2, 30, 40) and packet.pose.shape == (1, 4, 4)
+        assert packet.motion_field.shape == (1, 2, 30, 40) and packet.pose.shape == (1, 4, 4)
         assert len(packet.imu) == 10 and len(packet.body) == 4
     assert len(joined(packets)) > 1000
 
@@ -38,7 +38,7 @@ def test_packets_of_any_length_hold_the_same(poster):
     usual = list(esim.simulate(poster))
     for packet_s in (0.007, 0.012345678, 1):
         others = list(esim.simulate(poster, packet_s=packet_s))
-        for name in ("events", "truth_t", "depth", "flow", "irradiance", "pose", "body", "imu"):
+        for name in ("events", "truth_t", "depth", "motion_field", "irradiance", "pose", "body", "imu"):
             np.testing.assert_array_equal(joined(usual, name), joined(others, name))
         assert others[0].t0 == 0 and others[-1].t1 == 200_000_000
         for packet in others:
@@ -55,7 +55,7 @@ def test_seed_and_threads(poster):
 
 def test_poses_and_states_agree(poster):
     packet = next(esim.simulate(poster))
-    x, y, z, w = packet.body["orientation"][0]
+    x, y, _z, _w = packet.body["orientation"][0]
     np.testing.assert_allclose(packet.pose[0][:3, 3], packet.body["position"][0], atol=1e-12)
     assert packet.pose[0][2, 2] == pytest.approx(1 - 2 * (x * x + y * y))
     # Z of a wall at x = 1 m, on the optical axis: the distance along it.
@@ -73,7 +73,7 @@ def test_a_recording_is_that_of_the_program(poster, tmp_path):
     subprocess.run([program, "simulate", scenario, "-o", tmp_path / "there", "--set", "seed=7", "-q"], check=True)
     files = {str(p.relative_to(tmp_path / "there")) for p in (tmp_path / "there").rglob("*") if p.is_file()}
     assert {"report.json", "scenario.yaml", "imu.csv", "poses.txt"} < files
-    same, different, missing = filecmp.cmpfiles(tmp_path / "here", tmp_path / "there", files, shallow=False)
+    _same, different, missing = filecmp.cmpfiles(tmp_path / "here", tmp_path / "there", files, shallow=False)
     assert not missing and set(different) <= {"report.json"}  # which has times of the clock on the wall
 
 
@@ -150,9 +150,9 @@ def test_rigs_have_packets_by_name(poster):
     assert packet["left"].depth.shape == (2, 30, 40) and packet["right"].depth.shape == (2, 16, 20)
     assert (packet["right"].events["x"] < 20).all()
     with pytest.raises(esim.Error, match="several cameras"):
-        packet.events
+        _ = packet.events
     with pytest.raises(AttributeError):
-        packet.evnts
+        _ = packet.evnts
 
 
 def test_frames_of_the_frame_camera(poster):
@@ -170,15 +170,15 @@ def test_frames_of_the_frame_camera(poster):
 
 
 def test_further_ground_truth(poster):
-    wanted = {"truth.displacement": True, "truth.objects": True, "truth.event_points": True, "truth.rate_hz": 50}
+    wanted = {"truth.optical_flow": True, "truth.objects": True, "truth.event_points": True, "truth.rate_hz": 50}
     packets = list(esim.simulate(poster, overrides=wanted, packet_s=0.013))
     assert joined(packets, "event_points").shape == (len(joined(packets)), 3)
     for packet in packets:
         assert len(packet.event_points) == len(packet.events)
         np.testing.assert_allclose(packet.event_points[:, 0], 1, atol=1e-3)  # the wall
     assert joined(packets, "object").shape == (11, 30, 40) and not joined(packets, "object").any()
-    displacement, times = joined(packets, "displacement"), joined(packets, "displacement_t")
-    assert displacement.shape == (10, 2, 30, 40) and joined(packets, "visible").shape == (10, 30, 40)
+    optical_flow, times = joined(packets, "optical_flow"), joined(packets, "optical_flow_t")
+    assert optical_flow.shape == (10, 2, 30, 40) and joined(packets, "visible").shape == (10, 30, 40)
     np.testing.assert_array_equal(times[:, 1] - times[:, 0], 20_000_000)
 
 
@@ -193,7 +193,7 @@ def test_trajectories_from_arrays(poster):
     np.testing.assert_allclose(packets[-1].pose[-1], trajectory.pose(0.2), atol=1e-12)
     # 0.3 m/s to the left, a wall 1 m away: the image moves to the right.
     fx = 20 / np.tan(np.deg2rad(37.5))
-    np.testing.assert_allclose(packets[-1].flow[0, 0], 0.3 * fx, rtol=1e-3)
+    np.testing.assert_allclose(packets[-1].motion_field[0, 0], 0.3 * fx, rtol=1e-3)
     with pytest.raises(esim.Error, match="duration_s"):
         esim.simulate(scenario, trajectory=trajectory, overrides={"duration_s": 3})
 
@@ -208,25 +208,25 @@ def wall(t, T, objects):
     return {"irradiance": 0.5 + 0.3 * np.sin(20 * y), "depth": depth}
 
 
-def test_a_renderer_of_ones_own(poster):
+def test_custom_renderer(poster):
     own = list(esim.simulate(poster, renderer=wall))
     ours = list(esim.simulate(poster))
     for a, b in zip(own, ours):
         np.testing.assert_allclose(a.depth, b.depth, rtol=1e-5)
-        np.testing.assert_allclose(a.flow, b.flow, atol=2e-3 * np.abs(b.flow).max())
+        np.testing.assert_allclose(a.motion_field, b.motion_field, atol=2e-3 * np.abs(b.motion_field).max())
     np.testing.assert_array_equal(own[0].irradiance[0], np.float32(wall(0, own[0].pose[0], [])["irradiance"]))
     assert len(joined(own)) > 1000
 
 
-def test_flow_of_ones_own_is_taken(poster):
+def test_motion_field_of_a_custom_renderer(poster):
     def render(t, T, objects):
-        return {**wall(t, T, objects), "flow": np.stack([np.full((30, 40), 3), np.full((30, 40), -4)])}
+        return {**wall(t, T, objects), "motion_field": np.stack([np.full((30, 40), 3), np.full((30, 40), -4)])}
 
     packet = next(esim.simulate(poster, renderer=esim.Renderer(render)))
-    assert (packet.flow[:, 0] == 3).all() and (packet.flow[:, 1] == -4).all()
+    assert (packet.motion_field[:, 0] == 3).all() and (packet.motion_field[:, 1] == -4).all()
 
 
-def test_objects_of_ones_own(poster):
+def test_objects_of_a_custom_renderer(poster):
     t = np.linspace(0, 0.2, 41)
     T = np.repeat(np.eye(4)[None], len(t), 0)
     T[:, 1, 3] = -0.5 * t
@@ -247,7 +247,7 @@ def test_objects_of_ones_own(poster):
     assert packet.objects.shape == (len(packet.body), 1, 4, 4)
     # It moves to the right at 0.5 m/s, 1 m away; the rest stands still.
     fx = 20 / np.tan(np.deg2rad(37.5))
-    np.testing.assert_allclose(packet.flow[-1, 0], np.where(seen == 1, 0.5 * fx, 0), atol=0.05)
+    np.testing.assert_allclose(packet.motion_field[-1, 0], np.where(seen == 1, 0.5 * fx, 0), atol=0.05)
 
 
 @pytest.mark.parametrize(

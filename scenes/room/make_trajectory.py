@@ -101,7 +101,7 @@ def trajectory():
     for k in range(len(t)):
         R = turn(camera_axes(target[k] - p[k], ang[k, 2]), ang[k, 0], ang[k, 1])
         q = quaternion(R)
-        if quats and np.dot(q, quats[-1]) < 0 or not quats and q[3] < 0:
+        if (quats and np.dot(q, quats[-1]) < 0) or (not quats and q[3] < 0):
             q = -q
         quats.append(q)
     return t, p, np.array(quats)

@@ -22,7 +22,7 @@ JITTER = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))
 # ------------------------------------------------------------------ textures
 def patch_block(patch):
     """Albedo and emission of one patch, supersampled, in atlas orientation."""
-    x, y, w, h = patch.rect
+    _x, _y, w, h = patch.rect
     ns, nt = (h, w) if patch.turned else (w, h)
     total, glow = 0.0, 0.0
     for ds, dt in JITTER:
@@ -187,7 +187,7 @@ def compose(atlases, blocks, light, target):
     lit, total, area = {}, 0.0, 0.0
     for name, patches in atlases.items():
         for p in patches:
-            rgb, glow = blocks[p]
+            rgb, _glow = blocks[p]
             e = 0.0 if p.mat in ("outdoor", "bulb") else patch_light(p, *light[name])
             lit[p] = rgb * e
             if p.mat not in ("outdoor", "bulb", "ceiling"):

@@ -107,7 +107,7 @@ def pouf(sc):
 def book(sc, lo, hi, seed, colour, spine="y", faces="xXyZ", **kw):
     """Closed book; `spine` is the face that carries the title."""
     opposite = {"y": "Y", "x": "X", "X": "x", "Y": "y"}[spine]
-    mats = {f: "pages" for f in "xXyYzZ"}
+    mats = dict.fromkeys("xXyYzZ", "pages")
     covers = "zZ" if hi[2] - lo[2] < hi[0] - lo[0] else "xX"
     for f in covers + spine:
         mats[f] = "spine"

@@ -146,8 +146,6 @@ def book(name, colour):
     height = graph.node("SeparateXYZ", {"Vector": graph.node("TexCoord").outputs["Generated"]}).outputs["Z"]
     bands = graph.ramp(height, (0.0, (0, 0, 0)), (0.74, (1, 1, 1)), (0.77, (0, 0, 0)), (0.80, (1, 1, 1)), (0.86, (0, 0, 0)), (0.13, (1, 1, 1)),
                        (0.16, (0, 0, 0)))
-    for stop in bands.node.color_ramp.elements:
-        pass
     bands.node.color_ramp.interpolation = "CONSTANT"
     worn = graph.ramp(graph.noise(graph.coordinates(), 14, 6), (0.35, shade(colour, 0.75)), (0.7, shade(colour, 1.2)))
     graph.set(shader.inputs["Base Color"], graph.mix(bands, worn, (0.62, 0.5, 0.26)))
@@ -272,9 +270,9 @@ def garden():
     """What the window shows: bright sky, trees and a hedge, out of focus."""
     random = np.random.default_rng(4)
     height, width = 150, 260
-    y, x = np.mgrid[0:height, 0:width] / height
+    y, _x = np.mgrid[0:height, 0:width] / height
     image = np.array([0.75, 0.86, 0.98]) + (np.array([0.97, 0.97, 0.93]) - [0.75, 0.86, 0.98]) * np.clip(y / 0.6, 0, 1)[..., None]
-    for k, (base, tone) in enumerate(((0.42, (0.55, 0.66, 0.52)), (0.52, (0.38, 0.52, 0.31)), (0.66, (0.26, 0.40, 0.20)))):
+    for base, tone in ((0.42, (0.55, 0.66, 0.52)), (0.52, (0.38, 0.52, 0.31)), (0.66, (0.26, 0.40, 0.20))):
         line = base + 0.10 * ridge(random, width, 0.72)
         inside = np.clip((y - line[None, :]) * 25, 0, 1)[..., None]
         image = image * (1 - inside) + np.array(tone) * (1 + 0.10 * random.standard_normal((height, width, 1))) * inside

@@ -10,14 +10,15 @@ import { RunPlace } from "./run/run.ts";
 import { type Address, readAddress, writeAddress } from "./ui/address.ts";
 import { showShortcuts } from "./ui/dialog.ts";
 import { button, commitTyping, h } from "./ui/dom.ts";
-import { chooseFile } from "./ui/files_dialog.ts";
+import { chooseFile } from "./document/files_dialog.ts";
 import type { Place } from "./ui/place.ts";
 import { addShortcuts } from "./ui/shortcuts.ts";
 import { complain, message, say } from "./ui/status.ts";
 import { toggleTheme } from "./ui/theme.ts";
 
-type PlaceName = "design" | "configure" | "run" | "look";
-const placeNames: Record<PlaceName, string> = { design: "Design", configure: "Configure", run: "Run", look: "Look" };
+/** The places, in the order of their tabs. */
+const placeNames = { design: "Design", configure: "Configure", run: "Run", look: "Look" };
+type PlaceName = keyof typeof placeNames;
 
 /** The frame of the page: bar, places, status line; opening and saving. */
 export class Shell {
@@ -88,6 +89,7 @@ export class Shell {
     this.go(
       address.place in this.places ? (address.place as PlaceName) : opened.kind === "recording" ? "look" : "design",
     );
+    requestIdleCallback(() => void this.configure.textEditor().catch(complain));
   }
 
   private bar(): HTMLElement {
@@ -270,7 +272,6 @@ export class Shell {
 
   /** Saves the scenario; returns its path, or null if it was not saved. */
   private async saved(): Promise<string | null> {
-    await this.document.revision.settled.catch(() => undefined);
     if ((this.document.dirty || this.document.path === null) && !(await this.save())) return null;
     return this.document.path;
   }
@@ -284,7 +285,7 @@ export class Shell {
   /** Runs the scenario, or reports why it cannot run. */
   private async startRun(): Promise<void> {
     commitTyping();
-    await this.document.revision.checked;
+    await this.document.checked();
     const { problems } = this.document;
     if (problems.length > 0) {
       const where = await refuseFor("Not run", "The scenario cannot be simulated as it is.", problems);

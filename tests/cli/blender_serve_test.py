@@ -111,7 +111,7 @@ class Serve(unittest.TestCase):
         self.assertEqual(self.client.ask_all(images), first)
         self.assertEqual(renderings(), count + 2)
 
-    def test_what_is_set_is_told(self):
+    def test_settings_are_reported(self):
         self.client.ask("vset /camera/0/pose 1.5 -2.25 3 10 20 30")
         self.assertEqual(self.client.numbers("vget /camera/0/pose"), [1.5, -2.25, 3, 10, 20, 30])
         self.client.ask_all(["vset /camera/0/location 4 5 6", "vset /camera/0/rotation 7 8 9"])

@@ -59,7 +59,7 @@ class Blender(ProgramTest):
         for command in (("check", self.scenario(blend)), ("simulate", self.scenario(blend), "--out", self.out)):
             self.assert_refused(run(*command, env={**os.environ, "ESIM_BLENDER": "/nowhere/blender"}), "apt install blender")
 
-    def test_an_address_where_nobody_serves_is_named(self):
+    def test_an_address_without_a_server_is_named(self):
         for address, part in (("127.0.0.1:1", "127.0.0.1:1"), ("somewhere", "HOST:PORT"), ("x:70000", "HOST:PORT"), (":9", "HOST:PORT")):
             scenario = self.scenario("none.blend", f", address: '{address}', timeout_s: 2")
             self.assert_refused(run("check", scenario), part)
@@ -128,7 +128,7 @@ class Blender(ProgramTest):
         self.assert_refused(result, "libegl1", "engine: cycles")
 
     @unittest.skipUnless(BLENDER, "there is no blender; apt install blender")
-    def test_blender_ends_with_esim_and_its_end_is_told(self):
+    def test_blender_ends_with_esim_and_its_end_is_reported(self):
         blend, before, temporary = make_scene(self.folder, "bright"), running_blenders(), self.folder / "temporary"
         temporary.mkdir()
         left_before = leftovers(temporary)

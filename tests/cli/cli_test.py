@@ -40,8 +40,16 @@ class Cli(ProgramTest):
         return process
 
 
+class RemovedCommands(Cli):
+    def test_waypoints_names_the_studio(self):
+        for arguments in ([], [SCENES / "room.yaml", "--out", "walk.yaml"], ["room.glb", "--out", "walk.yaml", "--keys", " w x"], ["--help"]):
+            self.assert_refused(run("waypoints", *arguments), "removed", "esim studio")
+        self.assertNotIn("esim waypoints", run("--help").stdout)
+        self.assertNotIn("\n  waypoints", run("--help").stdout)
+
+
 class Recordings(Cli):
-    def test_formats_beside_the_recordings_own(self):
+    def test_additional_formats(self):
         for name in ("xyz", "recording"):
             self.assert_refused(run("check", SCENES / "poster.yaml", "--set", f"output.formats=[{name}]"),
                                 "output.formats", name)
@@ -78,6 +86,18 @@ class Recordings(Cli):
         result = self.simulate(*FAST)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertNotIn("warning", result.stderr)
+
+    def test_old_names_of_options_are_valid_with_a_warning(self):
+        result = self.simulate(*FAST, "--set", "truth.flow=false", "--set", "truth={displacement: true}")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for text in ("truth.flow is now truth.motion_field", "truth.displacement is now truth.optical_flow"):
+            self.assertEqual(result.stderr.count(f"warning: {text}"), 1, result.stderr)
+            self.assertIn("warning: " + text, json.loads((self.out / "report.json").read_text())["notices"])
+        text = (self.out / "scenario.yaml").read_text()
+        self.assertIn("optical_flow: true", text)
+        self.assertNotIn("displacement: ", text)
+        both = self.simulate("--set", "truth={flow: true, motion_field: true}", "--force")
+        self.assert_refused(both, "truth.flow: must not be given together with truth.motion_field")
 
     def test_rendering_slower_than_real_time_names_a_faster_sampling(self):
         short = ["--set", "duration_s=0.03", "--set", "truth.rate_hz=0", "--threads", "1", "--force"]
@@ -127,7 +147,7 @@ class Recordings(Cli):
         scenario = self.folder / "s.yaml"
         text = (SCENES / "poster.yaml").read_text().replace("poster/", str(SCENES / "poster") + "/")
         scenario.write_text("\n".join(line for line in text.splitlines() if not line.startswith("camera:")))
-        truth = "truth={objects: true, displacement: true, event_points: true}"
+        truth = "truth={objects: true, optical_flow: true, event_points: true}"
         result = self.simulate("--set", cameras, "--set", truth, "--set", "duration_s=0.1", scenario=scenario)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertTrue((self.out / "cam0" / "events.h5").exists() and (self.out / "right" / "preview.png").exists())
@@ -200,7 +220,7 @@ class Recordings(Cli):
         self.assertLess(abs(keyframes["events"] / flow["events"] - 1), 0.15)
         self.assertEqual(keyframes["bisections"], 0)
         self.assertLess(keyframes["measured_error"]["mean"], 0.1)
-        self.assertGreater(keyframes["resampling_floor"]["p99"], 0)
+        self.assertGreater(keyframes["resampling_error"]["p99"], 0)
 
     def test_without_egl_says_what_to_install_and_the_ray_caster_works(self):
         nothing = {**os.environ, "__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}
@@ -253,7 +273,7 @@ class BadInput(Cli):
             "camera.width=0": "at least 1",
             "duration_s=-1": "above 0",
             "truth.rate_hz=-1": "at least 0",
-            "truth={rate_hz: 0, displacement: true}": "needs two frames",
+            "truth={rate_hz: 0, optical_flow: true}": "needs two frames",
             "renderer.image=none.jpg": "no such file",
             "trajectory={type: file, path: none.txt}": "none.txt",
             "renderer.pose.look_at=[-5, 0, 0]": "never sees",

@@ -33,7 +33,7 @@ class Convert(ProgramTest):
             self.assertEqual(back.read_text(), LINES)
         self.assertIn("64 x 48 px", run("info", self.folder / "other.h5").stdout)
 
-    def test_says_what_is_lost(self):
+    def test_lost_data_is_reported(self):
         self.assertRegex(self.convert(self.text, self.folder / "a.h5").stderr, "rounded down to 1 us; --time-unit ns keeps them")
 
     def test_messages_name_the_flag_that_helps(self):

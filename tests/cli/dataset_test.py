@@ -4,7 +4,6 @@ Run as: dataset_test.py ESIM_PROGRAM, with the standard library of Python alone.
 """
 
 import json
-import pathlib
 import random
 import resource
 import signal
@@ -28,7 +27,7 @@ class Dataset(ProgramTest):
         return run("dataset", "affine", "--out", out, "--count", count, *SMALL, *options, **settings)
 
     def test_a_dataset(self):
-        result = self.make(self.out, "--contents", "flow,displacement,images,tensor,voxels=3", "--format", "webdataset")
+        result = self.make(self.out, "--contents", "motion_field,optical_flow,images,tensor,voxels=3", "--format", "webdataset")
         self.assertEqual(result.returncode, 0, result.stderr)
         manifest = json.loads((self.out / "manifest.json").read_text())
         self.assertEqual(manifest["sequences"], 24)
@@ -41,12 +40,12 @@ class Dataset(ProgramTest):
                 keys += sorted({name.split(".")[0] for name in names})
                 sample = json.loads(tar.extractfile(f"{shard['first']:08}.json").read())
                 self.assertGreaterEqual(sample["contrast_threshold"], 0.2)
-                head = tar.extractfile(f"{shard['first']:08}.flow.npy").read(128)
+                head = tar.extractfile(f"{shard['first']:08}.motion_field.npy").read(128)
                 self.assertIn(b"'shape': (2, 32, 48", head)
             self.assertEqual(len(names), 10 * shard["count"])
         self.assertEqual(keys, [f"{i:08}" for i in range(24)], "each once, in order")
         report = json.loads((self.out / "report.json").read_text())
-        self.assertLess(report["displacement"]["total_variation"], 0.3)
+        self.assertLess(report["optical_flow"]["total_variation"], 0.3)
         for picture in ("preview.png", "magnitudes.png"):
             self.assertTrue((self.out / picture).read_bytes().startswith(b"\x89PNG"))
         check = run("dataset", "--check", self.out)
@@ -85,7 +84,17 @@ class Dataset(ProgramTest):
         self.assertEqual(check.returncode, 2)
         self.assertIn("are missing; run the command", check.stderr)
 
-    def test_ctrl_c_keeps_what_is_whole(self):
+    def test_old_names_of_options_are_valid_with_a_warning(self):
+        result = self.make(self.out, "--contents", "flow,displacement", "--flow-at", "end", count=2)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for text in ("flow is now motion_field", "displacement is now optical_flow", "--flow-at is now --motion-field-at"):
+            self.assertIn(text, result.stderr)
+        plan = json.loads((self.out / "dataset.json").read_text())
+        self.assertEqual(plan["contents"], ["events", "motion_field", "optical_flow"])
+        self.assertEqual(plan["made_by"]["motion_field_at"], "end")
+        self.assertNotIn("--flow-at", run("dataset", "--help").stdout)
+
+    def test_ctrl_c_keeps_complete_shards(self):
         process = subprocess.Popen([ESIM, *map(str, ["dataset", "affine", "--out", self.out, "--count", 4000, *SMALL, "--shard-size", 2])],
                                    stderr=subprocess.DEVNULL)
         while not (self.out / "shard-000001.json").exists():
@@ -111,8 +120,8 @@ class Dataset(ProgramTest):
     def test_another_dataset_is_refused(self):
         self.assertEqual(self.make(self.out).returncode, 0)
         before = content(self.out)
-        for options, named in ((["--seed", 2], "made_by.seed is 1 there, but 2 here"), (["--flow-at", "end"], 'flow_at is "middle" there, but "end" here'),
-                               (["--format", "webdataset"], "format"), (["--contents", "flow"], "contents")):
+        for options, named in ((["--seed", 2], "made_by.seed is 1 there, but 2 here"), (["--motion-field-at", "end"], 'motion_field_at is "middle" there, but "end" here'),
+                               (["--format", "webdataset"], "format"), (["--contents", "motion_field"], "contents")):
             result = self.make(self.out, *options)
             self.assertEqual(result.returncode, 2)
             self.assertIn(named, result.stderr)
@@ -175,7 +184,7 @@ class Dataset(ProgramTest):
                             "trajectory: {type: random, position_amplitude_m: [0.2, 0.2, 0.2]}\nduration_s: 0.05\n"
                             "camera: {width: 32, height: 24}\n"
                             "randomise:\n  event_camera.contrast_threshold: {uniform: [0.1, 0.3]}\n")
-        result = run("dataset", template, "--out", self.out, "--count", 6, "--contents", "flow,displacement,depth", "--format", "webdataset")
+        result = run("dataset", template, "--out", self.out, "--count", 6, "--contents", "motion_field,optical_flow,depth", "--format", "webdataset")
         self.assertEqual(result.returncode, 0, result.stderr)
         drawn = set()
         for shard in sorted(self.out.glob("*.tar")):

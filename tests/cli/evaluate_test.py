@@ -41,7 +41,7 @@ class EvaluateSampling(ProgramTest):
             if line.startswith("!["):
                 picture = self.out / line[line.index("(") + 1:-1]
                 self.assertEqual(picture.read_bytes()[:4], b"\x89PNG", picture)
-        # What was kept is a scenario of its own.
+        # The written scenario can be evaluated again.
         self.assertEqual(run("check", self.out / "scenario.yaml").returncode, 0)
         again = self.evaluate(SCENES / "panorama.yaml", "--quick")
         self.assertEqual(again.returncode, 2)

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import unittest
 
-from program import ESIM, ProgramTest, run
+from program import ProgramTest, run
 
 SCENES = pathlib.Path(sys.argv[2]).absolute()
 EVENTFUL = ["--set", "camera.width=64", "--set", "camera.height=48", "--set", "sampling={type: uniform, rate_hz: 1000}",
@@ -125,7 +125,7 @@ class FullDisk(ProgramTest):
         self.assert_refused(self.simulate("--set", "duration_s=1", **files_of(1000)), "out.incomplete")
 
     def test_a_disk_without_any_room(self):
-        """A file system of its own, where even the report finds no room."""
+        """A separate file system, so small that even the report does not fit."""
         disk = self.folder / "disk"
         disk.mkdir()
         mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=3m", "none", disk], capture_output=True)

@@ -131,7 +131,7 @@ class Hangup(ProgramTest):
         self.assertEqual(os.waitstatus_to_exitcode(status), INTERRUPTED)
         self.assert_interrupted(self.out)
 
-    def test_output_that_nobody_reads(self):
+    def test_output_without_a_reader(self):
         """Warnings and the summary go nowhere; the recording is whole."""
         reading, writing = os.pipe()
         process = self.start("simulate", SCENES / "poster.yaml", "--out", self.out, *EVENTFUL, "--set", "duration_s=0.3", stderr=writing)

@@ -22,7 +22,7 @@ SIZE = ["--set", "camera.width=64", "--set", "camera.height=48"]
 # All the files that a recording can have, and many events.
 EVERYTHING = [*SIZE, "--set", "duration_s=5000", "--set", "sampling={type: uniform, rate_hz: 1000}", "--set", "imu={rate_hz: 1000}",
               "--set", "event_camera={contrast_threshold: 0.02, refractory_period_us: 0}", "--set", "camera.frame_camera={rate_hz: 30}",
-              "--set", "truth={rate_hz: 20, event_points: true, displacement: true}",
+              "--set", "truth={rate_hz: 20, event_points: true, optical_flow: true}",
               "--set", "output.formats=[text, evt3, npz, aedat4, rosbag, mcap]"]
 
 

@@ -91,7 +91,7 @@ class Play(ProgramTest):
         self.assertEqual(run("play", one, "--out", self.folder / "one.png").returncode, 0)
         self.assert_refused(run("play", self.write("none.txt", "")), "none.txt", "no events")
         self.assert_refused(run("play", one, "--start", "3", "--out", self.folder / "b.mp4"), "no events")
-        self.assertEqual([name for name in self.names() if name.startswith("none.play") or name.startswith("b.")], [])
+        self.assertEqual([name for name in self.names() if name.startswith(("none.play", "b."))], [])
 
     def test_bad_input(self):
         events = self.write("a.txt", stream())

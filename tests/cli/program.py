@@ -16,7 +16,7 @@ def run(*arguments, **options):
 
 
 class ProgramTest(unittest.TestCase):
-    """A test with a folder of its own, in which `self.out` is to be written."""
+    """A test with a temporary folder. `self.out` is the path of its output in it."""
 
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="esim_cli_"))

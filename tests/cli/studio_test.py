@@ -97,19 +97,36 @@ class Answers(StudioTest):
         presets = {preset["name"]: preset for preset in self.ask("GET", "/api/presets")}
         self.assertEqual(presets["davis346"]["values"]["contrast_threshold"], 0.2)
 
-    def test_problems_are_told_together_and_name_their_options(self):
+    def test_problems_are_reported_together_and_name_their_options(self):
         yaml = self.yaml.replace("width: 64", "width: -3").replace("contrast_threshold: 0.2", "contrast_treshold: 0.2") + "sed: 1\n"
-        problems = {p["where"]: p["what"] for p in self.ask("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]}
+        found = self.ask("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]
+        problems = {problem["where"]: problem["what"] for problem in found}
         self.assertEqual(set(problems), {"camera.width", "event_camera.contrast_treshold", "sed"})
+        for problem in found:
+            self.assertIn(problem["where"].split(".")[-1], yaml.splitlines()[problem["line"] - 1])
         self.assertIn("did you mean contrast_threshold?", problems["event_camera.contrast_treshold"])
         self.assertEqual(self.ask("POST", "/api/scenario/check", self.scenario())["problems"], [])
         broken = self.ask("POST", "/api/scenario/check", {"yaml": "a: [", "dir": "work"})
         self.assertIn("not valid YAML", broken["problems"][0]["what"])
+        self.assertEqual([problem["line"] for problem in broken["problems"]], [1])
 
-    def test_an_edit_keeps_comments(self):
-        edited = self.ask("POST", "/api/scenario/edit", self.scenario(set=[{"where": "camera.width", "value": 80}]))
-        self.assertEqual(edited["yaml"], self.yaml.replace("width: 64", "width: 80"))
-        self.assertEqual(edited["values"]["camera"]["width"], 80)
+    def test_problems_behind_problems_are_found_in_lists_and_behind_aliases(self):
+        yaml = ("renderer: {type: plane, image: none.png}\ntrajectory:\n  type: waypoints\n  points:\n  - {position: [0, 0, 0], look_at: [1, 0, 0], tt: 1}\n"
+                "  - {position: [0, 0, 1], look_at: [1, 0, 0], ttt: 1}\n"
+                "cameras:\n- &first {name: a, width: -1, height: 24, fov: 3}\n- {name: b, width: -2, height: 24}\nsed: 1\n")
+        problems = [p["where"] for p in self.ask("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]]
+        self.assertEqual(sorted(problems), ["cameras.0.fov", "cameras.0.width", "cameras.1.width", "sed", "trajectory.points.0.tt", "trajectory.points.1.ttt"])
+        shared = yaml.replace("{name: b, width: -2, height: 24}", "*first")
+        problems = [p["where"] for p in self.ask("POST", "/api/scenario/check", {"yaml": shared, "dir": "work"})["problems"]]
+        self.assertEqual(set(problems) & {"cameras.0.width", "cameras.0.fov", "sed"}, {"cameras.0.width", "cameras.0.fov", "sed"})
+
+    def test_a_new_scenario_names_its_scene(self):
+        for name, written in (("plain.obj", "plain.obj"), ("a: b #1.obj", '"a: b #1.obj"')):
+            (self.work / name).write_text("v 0 0 0\n")
+            created = self.ask("POST", "/api/scenario/new", {"scene": f"work/{name}"})
+            self.assertIn(f"  scene: {written}\n", created["yaml"])
+            self.assertEqual(created["values"]["renderer"]["scene"], name)
+        self.assertEqual(self.ask("POST", "/api/scenario/new", {})["values"]["renderer"], {"type": "mesh", "scene": ""})
 
     def test_two_windows_do_not_undo_each_other(self):
         saved = self.ask("PUT", "/api/scenario", {"path": "work/two.yaml", "yaml": "seed: 1\n", "revision": None})
@@ -170,7 +187,7 @@ class Answers(StudioTest):
         json_length = struct.unpack("<I", glb[12:16])[0]
         return scene, json.loads(glb[20:20 + json_length]), glb[28 + json_length:]
 
-    def test_textures_come_small_and_whole(self):
+    def test_textures_are_small_and_complete(self):
         (self.work / "card.mtl").write_text(f"newmtl a\nmap_Kd {self.image}\nnewmtl b\nmap_Kd none.png\n")
         (self.work / "card.obj").write_text("mtllib card.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n"
                                             "usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 3/3 2/2\n")
@@ -241,14 +258,14 @@ class Answers(StudioTest):
         events.write_bytes(events.read_bytes()[:events.stat().st_size // 2])
         recording = self.ask("POST", "/api/recordings", {"path": "work/cut"})
         self.assertIn("events.h5", recording["note"])
-        self.assertEqual(recording["cameras"][0]["has"], {"events": False, "images": True, "depth": True, "flow": True})
+        self.assertEqual(recording["cameras"][0]["has"], {"events": False, "images": True, "depth": True, "motion_field": True})
         self.ask("GET", f"/api/recordings/{recording['id']}/rate", status=404)
 
     def check_recording(self, path):
         recording = self.ask("POST", "/api/recordings", {"path": path})
         camera = recording["cameras"][0]
         self.assertEqual((camera["width"], camera["height"], recording["incomplete"], recording["indexing"]), (64, 48, False, 1))
-        self.assertEqual(camera["has"], {"events": True, "images": True, "depth": True, "flow": True})
+        self.assertEqual(camera["has"], {"events": True, "images": True, "depth": True, "motion_field": True})
         base = f"/api/recordings/{recording['id']}"
         start, end = recording["start"], recording["end"]
         on, off = self.counts(self.ask("GET", f"{base}/rate?bins=7"))
@@ -261,7 +278,7 @@ class Answers(StudioTest):
         self.assertEqual(sum(y >> 15 for _, _, y in events), on)
         self.assertTrue(all(x < 64 and (y & 0x7FFF) < 48 for _, x, y in events))
         for query in ("picture.png?view=counts&over=image", "picture.png?view=onoff&theme=light", "picture.png?view=time_surface", "image.png?kind=image",
-                      "image.png?kind=depth", "image.png?kind=flow"):
+                      "image.png?kind=depth", "image.png?kind=motion_field"):
             status, headers, png = self.server.request("GET", f"{base}/{query}&t={(start + end) // 2}")
             self.assertEqual((status, png[1:4], struct.unpack(">II", png[16:24])), (200, b"PNG", (64, 48)), query)
         self.assertLessEqual(int(headers["X-Time-Ns"]), (start + end) // 2)
@@ -397,9 +414,9 @@ class Refusals(StudioTest):
     def test_files_that_scenarios_name(self):
         outside = self.folder / "secret.yaml"
         for yaml, where in ((f"renderer: {{type: plane, image: {outside}}}\n", "renderer.image"),
-                            (f"renderer: {{type: mesh, scene: ../secret.yaml}}\n", "renderer.scene"),
+                            ("renderer: {type: mesh, scene: ../secret.yaml}\n", "renderer.scene"),
                             (f"camera: {{calibration: {outside}}}\n", "camera.calibration"),
-                            (f"trajectory: {{type: waypoints, file: up/secret.yaml}}\n", "trajectory.file"),
+                            ("trajectory: {type: waypoints, file: up/secret.yaml}\n", "trajectory.file"),
                             (f"imu: {{calibration: {outside}}}\n", "imu.calibration")):
             problems = {p["where"]: p["what"] for p in self.server.json("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]}
             if "up/" in yaml and not (self.work / "up").exists():
@@ -412,7 +429,7 @@ class Refusals(StudioTest):
             self.server.raw(data, 1)
         for body in (b"", b"[]", b"null", b"{", b"[" * 100000, b'{"yaml": 5}', b'{"yaml": "' + b"[" * 3000 + b'"}', b'{"yaml": "a: &a [*a]"}', b'\xff\xfe',
                      b'{"yaml": "camera: &a {x: *a}", "dir": "work"}', b'{"path": "\\u0000"}'):
-            for target in ("/api/scene", "/api/scenario/check", "/api/scenario/edit", "/api/trajectory", "/api/view", "/api/runs", "/api/recordings"):
+            for target in ("/api/scene", "/api/scenario/check", "/api/trajectory", "/api/view", "/api/runs", "/api/recordings"):
                 connection = http.client.HTTPConnection("127.0.0.1", self.server.port, timeout=20)
                 connection.request("POST", target, body, {"Authorization": f"Bearer {self.server.token}", "Content-Type": "application/json"})
                 response = connection.getresponse()
@@ -496,7 +513,7 @@ class Lives(ProgramTest):
         first, second = self.server(self.work), self.server(self.work)
         self.assertNotEqual(first.port, second.port)
 
-    def test_what_is_in_the_way_of_a_run(self):
+    def test_existing_files_prevent_a_run(self):
         long = (self.work / "small.yaml").read_text().replace("type: waypoints", "type: waypoints\n  speed: 0.0005")
         (self.work / "long.yaml").write_text(long)
         server = self.server(self.work)
@@ -521,7 +538,7 @@ class Lives(ProgramTest):
         self.assertEqual(server.json("GET", f"/api/runs/{run_id}")["where"], "trajectory")
 
     def moved_program(self, place, **pages):
-        """The program in a folder of its own, and pages, each with its name in it, in others."""
+        """The program in a separate folder, and pages that contain their names in other folders."""
         program = self.folder / place
         program.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ESIM, program)
@@ -530,7 +547,7 @@ class Lives(ProgramTest):
             (self.folder / page / "index.html").write_text(name)
         return program
 
-    def test_a_program_that_was_moved_finds_the_page_beside_it(self):
+    def test_a_program_that_was_moved_finds_the_page_next_to_it(self):
         for place, page in (("usr/bin/esim", "usr/share/esim/studio"), ("archive/esim", "archive/share/esim/studio"),
                             ("tree/build/release/esim", "tree/studio/dist")):
             program = self.moved_program(place, **{place: page})

@@ -15,19 +15,19 @@ namespace {
 constexpr PixelSize kSensor{240, 180};
 constexpr AffineStart kStart{25, 0.7};
 
-LayerPlacement placed(const AffineMotion& motion, double t_s) {
-  const LayerMotion layer({motion.keyframes.begin(), motion.keyframes.end()}, KeyframeInterpolation::spline);
-  return place(layer.at(to_ns(t_s)), LayerUnits::pixel, {300, 200}, kSensor, {0.3, 0.6});
+SpritePlacement placed(const AffineMotion& motion, double t_s) {
+  const SpriteMotion sprite({motion.poses.begin(), motion.poses.end()}, SpriteInterpolation::spline);
+  return place(sprite.at(to_ns(t_s)), SpriteUnits::pixel, {300, 200}, kSensor, {0.3, 0.6});
 }
 
-AffineDisplacement displacement(const AffineMotion& motion) {
-  return displacement_between(placed(motion, 0), placed(motion, 0.04), kSensor);
+AffineFlow optical_flow(const AffineMotion& motion) {
+  return flow_between(placed(motion, 0), placed(motion, 0.04), kSensor);
 }
 
 TEST(AffineMotion, IsAsStrongAsItIsToBe) {
   for (const double wanted_px : {0.05, 3.0, 40.0, 150.0}) {
     for (std::uint32_t number = 0; number < 20; ++number) {
-      const AffineDisplacement d = displacement(draw_motion({}, kSensor, kStart, 0.04, wanted_px, 7, number));
+      const AffineFlow d = optical_flow(draw_motion({}, kSensor, kStart, 0.04, wanted_px, 7, number));
       double sum = 0;
       for (int y = 0; y < kSensor.height; ++y) {
         for (int x = 0; x < kSensor.width; ++x) sum += d.at({x - 119.5, y - 89.5}).squaredNorm();
@@ -37,10 +37,10 @@ TEST(AffineMotion, IsAsStrongAsItIsToBe) {
   }
 }
 
-TEST(AffineMotion, DisplacementIsWherePointsGo) {
+TEST(AffineMotion, OpticalFlowIsWherePointsGo) {
   const AffineMotion motion = draw_motion({}, kSensor, kStart, 0.04, 12, 7, 3);
-  const LayerPlacement from = placed(motion, 0), to = placed(motion, 0.04);
-  const AffineDisplacement d = displacement(motion);
+  const SpritePlacement from = placed(motion, 0), to = placed(motion, 0.04);
+  const AffineFlow d = optical_flow(motion);
   for (const Eigen::Vector2d& uv : {Eigen::Vector2d(0, 0), Eigen::Vector2d(0.9, 0.2), Eigen::Vector2d(-1, 3)}) {
     const Eigen::Vector2d middle(0.5, 0.5), centre(119.5, 89.5);
     const Eigen::Vector2d before = from.centre + from.A * (uv - middle), after = to.centre + to.A * (uv - middle);
@@ -49,17 +49,17 @@ TEST(AffineMotion, DisplacementIsWherePointsGo) {
 }
 
 TEST(AffineMotion, NothingMovesWithoutStrength) {
-  const AffineDisplacement d = displacement(draw_motion({}, kSensor, kStart, 0.04, 0, 7, 3));
+  const AffineFlow d = optical_flow(draw_motion({}, kSensor, kStart, 0.04, 0, 7, 3));
   EXPECT_LT(d.gradient.norm() + d.at_middle.norm(), 1e-9);
 }
 
 TEST(AffineMotion, IsOfTheKindsThatTheMixNames) {
-  const AffineDisplacement translation = displacement(draw_motion({1, 0, 0, 0}, kSensor, kStart, 0.04, 9, 7, 3));
+  const AffineFlow translation = optical_flow(draw_motion({1, 0, 0, 0}, kSensor, kStart, 0.04, 9, 7, 3));
   EXPECT_LT(translation.gradient.norm(), 1e-12);
-  const AffineDisplacement turn = displacement(draw_motion({1e-6, 1, 0, 0}, kSensor, kStart, 0.04, 9, 7, 3));
+  const AffineFlow turn = optical_flow(draw_motion({1e-6, 1, 0, 0}, kSensor, kStart, 0.04, 9, 7, 3));
   const Eigen::Matrix2d R = turn.gradient + Eigen::Matrix2d::Identity();
   EXPECT_LT(test::largest_difference(R * R.transpose(), Eigen::Matrix2d::Identity()), 1e-9);
-  const AffineDisplacement growth = displacement(draw_motion({1e-6, 0, 1, 0}, kSensor, kStart, 0.04, 9, 7, 3));
+  const AffineFlow growth = optical_flow(draw_motion({1e-6, 0, 1, 0}, kSensor, kStart, 0.04, 9, 7, 3));
   EXPECT_NEAR(growth.gradient(0, 0), growth.gradient(1, 1), 1e-9);
   EXPECT_NEAR(growth.gradient(0, 1), 0, 1e-9);
 }
@@ -82,7 +82,7 @@ std::vector<double> made_by(const MagnitudeHistogram& strengths, const MotionMix
   const AddressedRandom random(11, Purpose::test);
   for (std::uint32_t i = 0; i < kSequences; ++i) {
     const double rms_px = strengths.quantile((i + 0.5) / kSequences);
-    const AffineDisplacement d = displacement(draw_motion(mix, kSensor, kStart, 0.04, rms_px, 5, i));
+    const AffineFlow d = optical_flow(draw_motion(mix, kSensor, kStart, 0.04, rms_px, 5, i));
     for (std::uint32_t k = 0; k < 8; ++k) {
       const auto [u, v] = random.uniforms(i, k);
       const std::size_t bin = strengths.bin_of(d.at({240 * (u - 0.5), 180 * (v - 0.5)}).norm());
@@ -95,15 +95,15 @@ std::vector<double> made_by(const MagnitudeHistogram& strengths, const MotionMix
 TEST(Strengths, MakePixelsFollowTheTarget) {
   const MagnitudeHistogram target = sintel_magnitudes();
   const MagnitudeHistogram strengths = strengths_for(target, {}, kSensor);
-  EXPECT_NEAR(std::accumulate(strengths.shares.begin(), strengths.shares.end(), 0.0), 1, 1e-9);
-  const double off = total_variation(made_by(strengths, {}), target.shares);
+  EXPECT_NEAR(std::accumulate(strengths.fractions.begin(), strengths.fractions.end(), 0.0), 1, 1e-9);
+  const double off = total_variation(made_by(strengths, {}), target.fractions);
   EXPECT_LT(off, 0.03);
 
   // Of mostly turning motion, which differs more over the image, the correction is what makes it fit.
   const MotionMix turning{0.3, 1, 0.5, 0.3};
   const MagnitudeHistogram narrow{{0, 5, 10, 15, 20, 40}, {0.1, 0.5, 0.3, 0.1, 0}, ""};
-  const double corrected = total_variation(made_by(strengths_for(narrow, turning, kSensor), turning), narrow.shares),
-               uncorrected = total_variation(made_by(narrow, turning), narrow.shares);
+  const double corrected = total_variation(made_by(strengths_for(narrow, turning, kSensor), turning), narrow.fractions),
+               uncorrected = total_variation(made_by(narrow, turning), narrow.fractions);
   EXPECT_LT(corrected, 0.8 * uncorrected);
 }
 

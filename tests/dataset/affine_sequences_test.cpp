@@ -33,14 +33,14 @@ double at(const Image<float>& image, double x, double y) {
          fy * ((1 - fx) * image(x0, y0 + 1) + fx * image(x0 + 1, y0 + 1));
 }
 
-TEST(AffineSequences, DisplacementCarriesTheFirstImageToTheLast) {
+TEST(AffineSequences, OpticalFlowCarriesTheFirstImageToTheLast) {
   const AffineSequences sequences(small());
   for (const std::uint32_t index : {1U, 4U, 9U}) {
     const Sequence sequence = sequences.make(index);
     double with = 0, without = 0;
     for (int y = 0; y < 48; ++y) {
       for (int x = 0; x < 64; ++x) {
-        const double to_x = x + double{sequence.displacement.x(x, y)}, to_y = y + double{sequence.displacement.y(x, y)};
+        const double to_x = x + double{sequence.optical_flow.x(x, y)}, to_y = y + double{sequence.optical_flow.y(x, y)};
         const double there = at(sequence.last, to_x, to_y);
         if (std::isnan(there)) continue;
         with += std::fabs(there - sequence.first(x, y));
@@ -51,20 +51,29 @@ TEST(AffineSequences, DisplacementCarriesTheFirstImageToTheLast) {
   }
 }
 
+TEST(AffineSequences, ChecksSamplingLikeAScenario) {
+  AffineOptions options = small();
+  const auto refused = [&] { return test::message_of<UserError>([&] { AffineSequences(options).make(0); }); };
+  options.sampling = FlowSampling{0.5, {1000, 10}};
+  EXPECT_TRUE(test::contains(refused(), "min_rate_hz = 1000 is above max_rate_hz = 10"));
+  options.sampling = KeyframeSampling{};
+  EXPECT_TRUE(test::contains(refused(), "keyframes"));
+}
+
 TEST(AffineSequences, FlowIsTheRateOfDisplacement) {
   AffineOptions options = small();
   VectorField start, middle, end;
-  for (const auto& [time, flow] :
-       {std::pair{FlowTime::start, &start}, {FlowTime::middle, &middle}, {FlowTime::end, &end}}) {
-    options.flow_at = time;
-    *flow = AffineSequences(options).make(4).flow;
+  for (const auto& [time, motion_field] :
+       {std::pair{MotionFieldTime::start, &start}, {MotionFieldTime::middle, &middle}, {MotionFieldTime::end, &end}}) {
+    options.motion_field_at = time;
+    *motion_field = AffineSequences(options).make(4).motion_field;
   }
   const Sequence sequence = AffineSequences(options).make(4);
-  EXPECT_EQ(sequence.flow_t, to_ns(options.duration_s));
+  EXPECT_EQ(sequence.motion_field_t, to_ns(options.duration_s));
   for (const auto& [x, y] : {std::pair{0, 0}, {40, 10}, {63, 47}}) {
-    // A cubic spline of two pieces: Simpson's rule over the whole is nearly its integral, for small displacements.
+    // A cubic spline of two pieces: Simpson's rule over the whole is nearly its integral, for small optical flow.
     const double mean = (start.x(x, y) + 4 * middle.x(x, y) + end.x(x, y)) / 6 * options.duration_s;
-    EXPECT_NEAR(mean, sequence.displacement.x(x, y), 0.02 + 0.05 * std::fabs(mean));
+    EXPECT_NEAR(mean, sequence.optical_flow.x(x, y), 0.02 + 0.05 * std::fabs(mean));
   }
   EXPECT_NE(start.x(0, 0), end.x(0, 0));
 }
@@ -114,17 +123,17 @@ TEST(AffineSequences, MagnitudesFollowTheTarget) {
   options.flow_scale = 1;
   options.duration_s = 0.001;
   const AffineSequences sequences(options);
-  std::vector<double> shares(5);
+  std::vector<double> fractions(5);
   for (std::uint32_t i = 0; i < 50; ++i) {
-    const VectorField d = sequences.make(i).displacement;
+    const VectorField d = sequences.make(i).optical_flow;
     for (std::size_t k = 0; k < d.x.size(); ++k) {
       const double magnitude = std::hypot(d.x.data()[k], d.y.data()[k]);
-      shares[options.magnitudes.bin_of(magnitude)] += 0.02 / static_cast<double>(d.x.size());
+      fractions[options.magnitudes.bin_of(magnitude)] += 0.02 / static_cast<double>(d.x.size());
     }
   }
-  EXPECT_LT(shares.back(), 0.02);
-  shares.pop_back();
-  EXPECT_LT(total_variation(shares, options.magnitudes.shares), 0.1);
+  EXPECT_LT(fractions.back(), 0.02);
+  fractions.pop_back();
+  EXPECT_LT(total_variation(fractions, options.magnitudes.fractions), 0.1);
 }
 
 TEST(AffineSequences, RefuseWhatIsImpossible) {

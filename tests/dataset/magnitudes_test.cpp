@@ -14,13 +14,13 @@ namespace {
 
 TEST(Magnitudes, OfSintelHaveThePublishedShares) {
   const MagnitudeHistogram sintel = sintel_magnitudes();
-  ASSERT_EQ(sintel.edges.size(), sintel.shares.size() + 1);
-  EXPECT_NEAR(std::accumulate(sintel.shares.begin(), sintel.shares.end(), 0.0), 1, 1e-12);
+  ASSERT_EQ(sintel.edges.size(), sintel.fractions.size() + 1);
+  EXPECT_NEAR(std::accumulate(sintel.fractions.begin(), sintel.fractions.end(), 0.0), 1, 1e-12);
   double below_10 = 0, below_40 = 0;
   for (std::size_t i = 0; i < sintel.bins(); ++i) {
     EXPECT_GT(sintel.edges[i + 1], sintel.edges[i]);
-    if (sintel.edges[i + 1] <= 10.001) below_10 += sintel.shares[i];
-    if (sintel.edges[i + 1] <= 40.001) below_40 += sintel.shares[i];
+    if (sintel.edges[i + 1] <= 10.001) below_10 += sintel.fractions[i];
+    if (sintel.edges[i + 1] <= 40.001) below_40 += sintel.fractions[i];
   }
   EXPECT_NEAR(below_10, 0.593, 5e-4);
   EXPECT_NEAR(below_40, 0.881, 5e-4);
@@ -55,7 +55,7 @@ class MagnitudeFile : public testing::Test {
 TEST_F(MagnitudeFile, IsReadAndNormalised) {
   const MagnitudeHistogram read = read_magnitudes(write("# px\n0 1 3\n\n1 2.5 1  # the rest\n"));
   EXPECT_EQ(read.edges, (std::vector<double>{0, 1, 2.5}));
-  EXPECT_EQ(read.shares, (std::vector<double>{0.75, 0.25}));
+  EXPECT_EQ(read.fractions, (std::vector<double>{0.75, 0.25}));
 }
 
 TEST_F(MagnitudeFile, SaysWhatIsWrongAndWhere) {

@@ -41,8 +41,8 @@ class Numbers final : public SequenceMaker {
       sequence.events.push_back({i, static_cast<std::uint16_t>(words[0] % 16), static_cast<std::uint16_t>(words[1] % 8),
                                  static_cast<std::int8_t>(words[2] % 2 == 0 ? 1 : -1)});
     }
-    for (Image<float>* image : {&sequence.flow.x, &sequence.flow.y, &sequence.displacement.x, &sequence.displacement.y,
-                                &sequence.first, &sequence.last}) {
+    for (Image<float>* image : {&sequence.motion_field.x, &sequence.motion_field.y, &sequence.optical_flow.x,
+                                &sequence.optical_flow.y, &sequence.first, &sequence.last}) {
       *image = Image<float>(16, 8, static_cast<float>(index % 7) * 0.1F);
     }
     sequence.info = R"({"index": )" + std::to_string(index) + "}";
@@ -117,7 +117,7 @@ TEST_P(Produce, MakesTheSameBytesWithAnyNumberOfThreads) {
 }
 
 TEST_P(Produce, MakesTheSameBytesInShares) {
-  const fs::path out = folder_.path() / "shares";
+  const fs::path out = folder_.path() / "fractions";
   for (const std::uint32_t part : {2U, 0U, 1U}) make(out, GetParam(), 1, {part, 3});
   EXPECT_TRUE(content(out) == straight_);
 }
@@ -152,7 +152,7 @@ TEST_P(Produce, IsTheSameAfterBeingKilledAtAnyMoment) {
   EXPECT_TRUE(content(out) == straight_) << "and nothing else is left";
 }
 
-TEST_P(Produce, SharesAShardWithNobody) {
+TEST_P(Produce, SharesNoShard) {
   const fs::path out = folder_.path() / "locked";
   const DatasetFolder folder(out, plan_of(GetParam()), "1.0");
   const Numbers maker;
@@ -184,7 +184,7 @@ TEST_P(Produce, ProcessesMayWorkAtTheSameTime) {
   EXPECT_TRUE(content(out) == straight_);
 }
 
-TEST_P(Produce, KeepsWhatIsWholeWhenTheDiskIsFull) {
+TEST_P(Produce, KeepsCompleteShardsWhenTheDiskIsFull) {
   const fs::path out = folder_.path() / "full";
   const pid_t child = in_a_process([&] {
     std::signal(SIGXFSZ, SIG_IGN);
@@ -208,7 +208,7 @@ TEST_P(Produce, KeepsWhatIsWholeWhenTheDiskIsFull) {
   EXPECT_TRUE(content(out) == straight_);
 }
 
-TEST_P(Produce, EndsWhenItIsToldTo) {
+TEST_P(Produce, EndsWhenItIsStopped) {
   const fs::path out = folder_.path() / "ended";
   const DatasetFolder folder(out, plan_of(GetParam()), "1.0");
   const Numbers maker;

@@ -98,7 +98,7 @@ TEST_F(ScenarioTemplates, MakeSequencesWithWhatWasDrawn) {
     const Sequence sequence = sequences.make(i);
     widths.insert(sequence.width);
     EXPECT_EQ(sequence.events, again.make(i).events);
-    EXPECT_EQ(sequence.displacement.x.width(), sequence.width);
+    EXPECT_EQ(sequence.optical_flow.x.width(), sequence.width);
     EXPECT_EQ(sequence.depth.width(), sequence.width);
     EXPECT_EQ(sequence.span.end - sequence.span.start, 100'000'000);
   }

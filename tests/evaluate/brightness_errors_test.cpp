@@ -38,8 +38,8 @@ class PlaidRenderer final : public ProcessorRenderer {
       for (int y = tile.y; y < tile.y + tile.height; ++y) {
         for (int x = tile.x; x < tile.x + tile.width; ++x) {
           sample.irradiance(x, y) = static_cast<float>(std::exp(Plaid{}.brightness(x, y, request.t)) - kLogEps);
-          sample.flow_x(x, y) = static_cast<float>(30 + 10 * std::sin(20 * to_seconds(request.t)));
-          sample.flow_y(x, y) = 40;
+          sample.motion_x(x, y) = static_cast<float>(30 + 10 * std::sin(20 * to_seconds(request.t)));
+          sample.motion_y(x, y) = 40;
         }
       }
     }
@@ -141,7 +141,7 @@ TEST(Motion, IsMeasuredOverTime) {
   const MotionCurve motion = measure_motion(world, spread_pixels(kWidth, kHeight, 20), 100);
   ASSERT_EQ(motion.mean_px_per_s.size(), 101U);
   EXPECT_NEAR(motion.mean_px_per_s[0], 50, 1e-4);
-  EXPECT_NEAR(motion.greatest_px_per_s, std::hypot(40, 40), 0.01);
+  EXPECT_NEAR(motion.max_px_per_s, std::hypot(40, 40), 0.01);
   EXPECT_EQ(motion.fastest_turn_deg_per_s, 0);
 }
 

@@ -77,7 +77,7 @@ TEST(SamplingEvaluation, FindsNoErrorInTheReferenceItself) {
   EXPECT_EQ(found.goals.size(), 1U);
 }
 
-TEST(SamplingEvaluation, TakesEveryWayOfSampling) {
+TEST(SamplingEvaluation, AcceptsEverySamplingMethod) {
   const TemporaryDirectory folder;
   SamplingEvaluationOptions options = small_options();
   options.event_span_s = 0;
@@ -177,7 +177,7 @@ TEST(PaperScenario, MovesAsThePaperSays) {
   EXPECT_NEAR(windows[1].mean_px_per_s, 1075, 0.05 * 1075);
   EXPECT_NEAR(windows[2].mean_px_per_s, 580, 0.05 * 580);
   EXPECT_NEAR(motion.fastest_turn_deg_per_s, 1000, 50);
-  EXPECT_NEAR(motion.greatest_px_per_s, 4500, 0.08 * 4500);
+  EXPECT_NEAR(motion.max_px_per_s, 4500, 0.08 * 4500);
   EXPECT_EQ(std::get<PanoramaRendererOptions>(scenario.renderer).median_px, 5) << "as the original's configuration";
 }
 

@@ -34,7 +34,7 @@ TEST_P(CameraState, ARestoredCameraGoesOnWhereTheOtherWas) {
     EventCamera camera = made(), restored = made();
     process(camera, 0, frames);
     const std::vector<std::byte> state = camera.state();
-    process(restored, 20, 3);  // whatever its earlier input
+    process(restored, 20, 3);  // independent of its earlier input
     restored.restore(state);
     EXPECT_EQ(restored.statistics().dropped, camera.statistics().dropped);
     EXPECT_EQ(restored.statistics().in_flight, camera.statistics().in_flight);

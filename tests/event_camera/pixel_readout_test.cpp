@@ -6,8 +6,8 @@
 #include <random>
 #include <set>
 
+#include "esim/event_camera/reference.h"
 #include "event_camera/feed.h"
-#include "event_camera/literal_event_camera.h"
 
 // The effect of the readout on the pixels.
 namespace esim {
@@ -101,12 +101,13 @@ INSTANTIATE_TEST_SUITE_P(
                                    kBusy)}),
     name_of);
 
-TEST_P(PixelReadoutTest, IsThatOfTheLiteralCamera) {
+TEST_P(PixelReadoutTest, IsThatOfTheReference) {
   const std::vector<Image<float>> frames = frames_of(40, 3);
-  test::LiteralEventCamera literal(GetParam().options, kWidth, kHeight, 7, 0);
+  ReferenceEventCamera reference(GetParam().options, kWidth, kHeight, 7, 0);
   std::vector<Event> expected;
   for (std::size_t k = 0; k < frames.size(); ++k) {
-    for (const Event& event : literal.process(frames[k], static_cast<TimeNs>(k) * kNsPerMs)) expected.push_back(event);
+    for (const Event& event : reference.process(frames[k], static_cast<TimeNs>(k) * kNsPerMs))
+      expected.push_back(event);
   }
   const std::vector<Event> events = feed_whole(GetParam().options, frames);
   EXPECT_TRUE(std::ranges::is_sorted(events));

@@ -116,13 +116,13 @@ struct Block {
       active.filtered2[i] = static_cast<float>(c.filtered2);
       active.phase[i] = static_cast<float>(c.rate * Case::kDuration);
       active.moved[i] = static_cast<float>(-std::expm1(-active.phase[i]));
-      compare.leak[i] = 0.3 / duration * uniform(random);
+      compare.drift[i] = 0.3 / duration * uniform(random);
       compare.from[i] = i % 2 == 0 ? duration * uniform(random) : 0;
     }
     signals.take(active, 0, kPoles, duration);
     signals.advance(compare);
     for (std::size_t i = 0; i < kBlock; ++i) {
-      compare.reference[i] = signals.value(i) + compare.leak[i] * compare.from[i];
+      compare.reference[i] = signals.value(i) + compare.drift[i] * compare.from[i];
       compare.on[i] = static_cast<float>(0.7 * uniform(random));
       compare.off[i] = static_cast<float>(i % 50 == 0 ? -0.02 : 0.7 * uniform(random));  // some are outside already
     }
@@ -141,9 +141,9 @@ void expect_the_same_as_one_by_one(double duration) {
     block.signals.look_ahead(compare, again.data());
     for (std::size_t i = 0; i < kBlock; ++i) {
       const RelaxingSignal one = block.signals.signal(compare, i);
-      EXPECT_NEAR(block.signals.value(i) + compare.leak[i] * compare.from[i], one.value(),
+      EXPECT_NEAR(block.signals.value(i) + compare.drift[i] * compare.from[i], one.value(),
                   1e-9 * (1 + std::fabs(one.value())));
-      EXPECT_NEAR(block.signals.end(i) + compare.leak[i] * duration, one.value(duration),
+      EXPECT_NEAR(block.signals.end(i) + compare.drift[i] * duration, one.value(duration),
                   1e-5 * (1 + std::fabs(one.value(duration))));  // moved is a float
       const Crossing expected = one.first_crossing(duration, compare.lower(i), compare.upper(i));
       ASSERT_EQ(compare.polarity[i] == 0, expected.tau == kNever) << i;
@@ -182,7 +182,7 @@ TEST(RelaxingSignals, DoNotDependOnTheirNeighbours) {
       (single.active.*values)[0] = (block.active.*values)[i];
     }
     single.compare.on[0] = block.compare.on[i], single.compare.off[0] = block.compare.off[i];
-    single.compare.reference[0] = block.compare.reference[i], single.compare.leak[0] = block.compare.leak[i];
+    single.compare.reference[0] = block.compare.reference[i], single.compare.drift[0] = block.compare.drift[i];
     single.compare.from[0] = block.compare.from[i];
     single.active.count = single.compare.count = 1;
     single.signals.take(single.active, 0, 1, Case::kDuration);
@@ -205,7 +205,7 @@ TEST(LinearSignals, FindTheirCrossings) {
     compare.reference[i] = 1, compare.on[i] = static_cast<float>(on[i]), compare.off[i] = 0.5F;
     compare.from[i] = from[i];
   }
-  compare.leak[4] = 2e-6;
+  compare.drift[4] = 2e-6;
   signals.take(active, 0, 1e6);
   signals.advance(compare);
   signals.find(compare);

@@ -33,9 +33,9 @@ Bytes stored(const Bytes& data) {
   Bytes out = {0x78, 0x01};
   std::uint32_t a = 1, b = 0;
   for (const std::uint8_t byte : data) a = (a + byte) % 65521, b = (b + a) % 65521;
-  constexpr std::size_t kMost = 65535;
-  for (std::size_t at = 0; at < data.size(); at += kMost) {
-    const std::size_t size = std::min(kMost, data.size() - at);
+  constexpr std::size_t kMax = 65535;
+  for (std::size_t at = 0; at < data.size(); at += kMax) {
+    const std::size_t size = std::min(kMax, data.size() - at);
     out.push_back(at + size == data.size() ? 1 : 0);
     for (const std::size_t number : {size, ~size}) {
       out.push_back(static_cast<std::uint8_t>(number));

@@ -170,7 +170,7 @@ TEST(DatasetLayout, AnImageThatClaimsToBeHugeTakesNoMemory) {
   EXPECT_TRUE(test::contains(problem_of(folder), "not a PNG, or it is damaged"));
 }
 
-TEST(DatasetLayout, ACutZipIsToldAsThat) {
+TEST(DatasetLayout, ReportsATruncatedZip) {
   const test::TemporaryDirectory base;
   const fs::path path = base.path() / "a.zip";
   const auto frame = test::gradient_frame(0, 0, 64, 48, 8, 1);
@@ -185,8 +185,10 @@ TEST(DatasetLayout, ACutZipIsToldAsThat) {
 }
 
 std::string content_of(const FilesInput& files, const std::string& name) {
-  const auto text = files.open(name);
-  return {std::istreambuf_iterator<char>(*text), {}};
+  const Read read = files.open(name);
+  std::string content, block(10'000, '\0');
+  while (const std::size_t count = read(std::as_writable_bytes(std::span(block)))) content += block.substr(0, count);
+  return content;
 }
 
 TEST(ZipFiles, ReadBackFromAnyFolderOfTheZip) {
@@ -220,6 +222,70 @@ TEST(ZipFiles, WrongContentIsNoticedByItsChecksum) {
   const fs::path damaged = base.write("b.zip", bytes);
   const auto in = open_zip_input(damaged, "stored");
   EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { content_of(*in, "stored"); }), "checksum"));
+}
+
+TEST(ZipFiles, AnUnfinishedZipIsAFolderThatCanBeRead) {
+  const test::TemporaryDirectory base;
+  const fs::path path = base.path() / "a.zip";
+  const auto frame = test::gradient_frame(0, 0, 64, 48, 8, 1);
+  const auto events = test::random_events(150'000, 64, 48, 0, kEnd);
+  {
+    const auto sink = format_named("dataset").create(path, {});
+    sink->begin(test::recording_info(64, 48, 0, kEnd));
+    test::write_in_batches(*sink, events, 4096);
+    sink->write(frame.record());
+    // The process ends here.
+  }
+  EXPECT_EQ(fs::file_size(path), 0U);
+  const fs::path parts = base.path() / "a.zip.part";
+  EXPECT_EQ(format_of(parts).name, "dataset-folder");
+  EXPECT_TRUE(fs::exists(parts / "images/frame_00000000.png"));
+  const auto source = open_source(parts);
+  std::vector<Event> found;
+  while (const Record* record = source->next()) {
+    if (const auto* some = std::get_if<EventsRecord>(record))
+      found.insert(found.end(), some->events.begin(), some->events.end());
+  }
+  ASSERT_GT(found.size(), events.size() / 2);
+  EXPECT_TRUE(std::equal(found.begin(), found.end(), events.begin()));
+}
+
+TEST(ZipFiles, OnlyTheirOwnPartsAreRemoved) {
+  const test::TemporaryDirectory base;
+  fs::create_directories(base.path() / "a.zip.part" / "images");
+  base.write("a.zip.part/images/mine.png", "x");
+  const auto out = make_zip_output(base.path() / "a.zip");
+  out->add("images/1.png", "1");
+  out->add("other/2.png", "2");
+  out->append("t.txt", "text");
+  out->close();
+  EXPECT_EQ(std::distance(fs::recursive_directory_iterator(base.path() / "a.zip.part"), {}), 2);
+  EXPECT_EQ(test::content(base.path() / "a.zip.part/images/mine.png"), "x");
+  EXPECT_FALSE(open_zip_input(base.path() / "a.zip", "t.txt")->has("images/mine.png"));
+}
+
+/// Programs that read zips from their start, such as cnpy, take the sizes from the header of each file.
+TEST(ZipFiles, TheHeaderOfEachFileStatesItsSize) {
+  const test::TemporaryDirectory base;
+  const fs::path path = base.path() / "a.zip";
+  const auto out = make_zip_output(path);
+  out->add("stored", std::string(70'000, 's'));
+  out->append("text", std::string(700'000, 't'));
+  out->close();
+  const std::string bytes = test::content(path);
+  const auto number = [&](std::size_t at, std::size_t size) {
+    std::size_t value = 0;
+    for (std::size_t i = 0; i < size; ++i) value |= std::size_t{static_cast<std::uint8_t>(bytes.at(at + i))} << (8 * i);
+    return value;
+  };
+  std::vector<std::size_t> sizes;
+  std::size_t at = 0;
+  while (bytes.compare(at, 4, "PK\x03\x04") == 0) {
+    sizes.push_back(number(at + 22, 4));
+    at += 30 + number(at + 26, 2) + number(at + 28, 2) + number(at + 18, 4);
+  }
+  EXPECT_EQ(sizes, (std::vector<std::size_t>{70'000, 700'000}));
+  EXPECT_EQ(bytes.compare(at, 4, "PK\x01\x02"), 0) << "the list of files follows";
 }
 
 TEST(ZipFiles, TheSameContentGivesTheSameBytes) {

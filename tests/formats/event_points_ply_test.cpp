@@ -57,7 +57,7 @@ std::vector<Vertex> read_ply(const std::filesystem::path& path) {
   return vertices;
 }
 
-TEST(EventPointsPly, IsWholeWheneverItIsRead) {
+TEST(EventPointsPly, IsCompleteWheneverItIsRead) {
   const test::TemporaryDirectory directory;
   const auto path = directory.path() / "points.ply";
   const std::vector<Event> events = test::random_events(5000, 640, 480, 0, kNsPerSecond);

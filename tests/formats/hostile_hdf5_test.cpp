@@ -30,12 +30,12 @@ void read_everything(const std::filesystem::path& path) {
 void read_truth(const std::filesystem::path& path) {
   const TruthHdf5Reader reader(path);
   TruthHdf5Reader::Frame frame;
-  TruthHdf5Reader::Displacement displacement;
+  TruthHdf5Reader::OpticalFlow optical_flow;
   for (std::uint64_t i = 0; i < reader.size(); ++i) {
     reader.t(i);
     reader.read(i, frame);
   }
-  for (std::uint64_t i = 0; i < reader.displacements(); ++i) reader.read(i, displacement);
+  for (std::uint64_t i = 0; i < reader.optical_flows(); ++i) reader.read(i, optical_flow);
 }
 
 // Reading must succeed or fail with a UserError that names the file.
@@ -66,9 +66,9 @@ std::string valid_truth(const TemporaryDirectory& directory, Compression compres
   const Image<std::uint8_t> visible(9, 7);
   const SE3 pose;
   for (TimeNs t = 0; t < 3; ++t) {
-    writer.write(TruthRecord{0, t, pose, images.irradiance, images.depth, images.flow_x, images.flow_y, &object,
+    writer.write(TruthRecord{0, t, pose, images.irradiance, images.depth, images.motion_x, images.motion_y, &object,
                              std::span(&pose, 1)});
-    if (t > 0) writer.write(DisplacementRecord{0, t - 1, t, images.flow_x, images.flow_y, visible});
+    if (t > 0) writer.write(OpticalFlowRecord{0, t - 1, t, images.motion_x, images.motion_y, visible});
   }
   writer.end(true);
   return test::content(path);

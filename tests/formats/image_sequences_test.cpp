@@ -37,16 +37,16 @@ struct Found {
   struct Frame {
     TimeNs t;
     SE3 pose;
-    Image<float> irradiance, depth, flow_x, flow_y;
+    Image<float> irradiance, depth, motion_x, motion_y;
     Image<std::uint16_t> object;
   };
-  struct Displacement {
+  struct OpticalFlowImages {
     TimeNs t0, t1;
     Image<float> x, y;
     Image<std::uint8_t> visible;
   };
   std::vector<Frame> frames;
-  std::vector<Displacement> moved;
+  std::vector<OpticalFlowImages> moved;
   std::string order;
   RecordingInfo info;
 };
@@ -58,10 +58,10 @@ Found read(const fs::path& path, const ReadOptions& options = {}) {
   while (const Record* record = source->next()) {
     if (const auto* truth = std::get_if<TruthRecord>(record)) {
       found.order += 't';
-      found.frames.push_back({truth->t, truth->T_world_camera, truth->irradiance, truth->depth, truth->flow_x,
-                              truth->flow_y, truth->object != nullptr ? *truth->object : Image<std::uint16_t>()});
+      found.frames.push_back({truth->t, truth->T_world_camera, truth->irradiance, truth->depth, truth->motion_x,
+                              truth->motion_y, truth->object != nullptr ? *truth->object : Image<std::uint16_t>()});
     } else {
-      const auto& moved = std::get<DisplacementRecord>(*record);
+      const auto& moved = std::get<OpticalFlowRecord>(*record);
       found.order += 'd';
       found.moved.push_back({moved.t0, moved.t1, moved.x, moved.y, moved.visible});
     }
@@ -85,7 +85,7 @@ void expect_near(const Image<float>& found, const Image<float>& expected, double
 class ImageSequences : public testing::TestWithParam<std::string> {
  protected:
   /// Frames, with or without optical flow between them.
-  fs::path write(const std::string& format, bool displacements) const {
+  fs::path write(const std::string& format, bool optical_flows) const {
     const fs::path path = base_.path() / format;
     const auto sink = format_named(format).create(path, {});
     sink->begin(test::recording_info(kWidth, kHeight, 0, kNsPerSecond));
@@ -93,15 +93,15 @@ class ImageSequences : public testing::TestWithParam<std::string> {
       sink->write(
           test::TruthImages(kWidth, kHeight, i).at(i * kStep, {Eigen::Quaterniond::Identity(), {1, 2, 1.0 * i}}));
       const Moved moved(i);
-      if (displacements && i > 0)
-        sink->write(DisplacementRecord{0, (i - 1) * kStep, i * kStep, moved.x, moved.y, moved.visible});
+      if (optical_flows && i > 0)
+        sink->write(OpticalFlowRecord{0, (i - 1) * kStep, i * kStep, moved.x, moved.y, moved.visible});
     }
     sink->end(true);
     EXPECT_EQ(format_of(path).name, format);
     return path;
   }
 
-  static void expect_displacements(const Found& found, double tolerance) {
+  static void expect_optical_flows(const Found& found, double tolerance) {
     ASSERT_EQ(found.moved.size(), kFrames - 1U);
     for (int i = 1; i < kFrames; ++i) {
       const auto& [t0, t1, x, y, visible] = found.moved[static_cast<std::size_t>(i) - 1];
@@ -121,8 +121,8 @@ class ImageSequences : public testing::TestWithParam<std::string> {
     ASSERT_EQ(found.moved.size(), kFrames - 1U);
     for (int i = 0; i + 1 < kFrames; ++i) {
       test::TruthImages images(kWidth, kHeight, i);
-      for (float& value : images.flow_x.pixels()) value *= static_cast<float>(to_seconds(kStep));
-      expect_near(found.moved[static_cast<std::size_t>(i)].x, images.flow_x, tolerance);
+      for (float& value : images.motion_x.pixels()) value *= static_cast<float>(to_seconds(kStep));
+      expect_near(found.moved[static_cast<std::size_t>(i)].x, images.motion_x, tolerance);
     }
   }
 
@@ -131,7 +131,7 @@ class ImageSequences : public testing::TestWithParam<std::string> {
 
 TEST_F(ImageSequences, FloKeepsFlowExactly) {
   const Found found = read(write("flo", true));
-  expect_displacements(found, 0);
+  expect_optical_flows(found, 0);
   EXPECT_EQ(found.order, "ddd");
   expect_motion_field(read(write("flo", false)), 1e-5);
 }
@@ -152,7 +152,7 @@ TEST_F(ImageSequences, FloIsMiddleburys) {
 
 TEST_F(ImageSequences, KittiKeepsFlowToA64thAndDepthToA256th) {
   const Found found = read(write("kitti", true));
-  expect_displacements(found, 0.5 / 64);
+  expect_optical_flows(found, 0.5 / 64);
   EXPECT_EQ(found.order, "ttdtdtd");
   ASSERT_EQ(found.frames.size(), static_cast<std::size_t>(kFrames));
   for (int i = 0; i < kFrames; ++i) {
@@ -169,7 +169,8 @@ TEST_F(ImageSequences, KittiDoesNotKnowWhatIsTooLarge) {
   sink->begin(test::recording_info(4, 1, 0, kNsPerSecond));
   test::TruthImages images(4, 1, 0);
   const float depths[] = {255.99F, 256.1F, 0.001F, 10.0F}, flows[] = {511.9F, 512.5F, -512.0F, -512.1F};
-  for (int x = 0; x < 4; ++x) images.depth(x, 0) = depths[x], images.flow_x(x, 0) = flows[x], images.flow_y(x, 0) = 0;
+  for (int x = 0; x < 4; ++x)
+    images.depth(x, 0) = depths[x], images.motion_x(x, 0) = flows[x], images.motion_y(x, 0) = 0;
   for (int i = 0; i < 2; ++i) sink->write(images.at(i * kNsPerSecond));
   sink->end(true);
   const Found found = read(path);
@@ -187,7 +188,7 @@ TEST_F(ImageSequences, KittiDoesNotKnowWhatIsTooLarge) {
 
 TEST_F(ImageSequences, DsecKeepsFlowToA128thAndMicroseconds) {
   const fs::path path = write("dsec-flow", true);
-  expect_displacements(read(path), 0.5 / 128);
+  expect_optical_flows(read(path), 0.5 / 128);
   EXPECT_EQ(test::lines(path / "forward_timestamps.txt")[1], "0, 50000");
   fs::remove(path / "forward" / "000002.png");
   EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { read(path); }), "only 2 files"));
@@ -202,8 +203,8 @@ TEST_F(ImageSequences, ExrKeepsIrradianceDepthAndMotionFieldExactly) {
     EXPECT_EQ(frame.t, i * kStep);
     expect_near(frame.irradiance, expected.irradiance, 0);
     expect_near(frame.depth, expected.depth, 0);
-    expect_near(frame.flow_x, expected.flow_x, 0);
-    expect_near(frame.flow_y, expected.flow_y, 0);
+    expect_near(frame.motion_x, expected.motion_x, 0);
+    expect_near(frame.motion_y, expected.motion_y, 0);
   }
 }
 
@@ -211,7 +212,7 @@ TEST_F(ImageSequences, NpyKeepsEverything) {
   const fs::path path = write("npy-truth", true);
   const Found found = read(path);
   EXPECT_EQ(found.order, "ttdtdtd");
-  expect_displacements(found, 0);
+  expect_optical_flows(found, 0);
   EXPECT_EQ(found.moved[0].visible(3, 1), 0) << "known, but occluded";
   for (int i = 0; i < kFrames; ++i) {
     const auto& frame = found.frames[static_cast<std::size_t>(i)];
@@ -219,9 +220,9 @@ TEST_F(ImageSequences, NpyKeepsEverything) {
     EXPECT_EQ(frame.pose.translation.z(), i);
     expect_near(frame.irradiance, expected.irradiance, 0);
     expect_near(frame.depth, expected.depth, 0);
-    expect_near(frame.flow_y, expected.flow_y, 0);
+    expect_near(frame.motion_y, expected.motion_y, 0);
   }
-  const std::string head = test::content(path / "flow.npy").substr(0, 192);
+  const std::string head = test::content(path / "motion_field.npy").substr(0, 192);
   EXPECT_TRUE(test::contains(head, "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 2, 11, 18), }"));
   EXPECT_EQ(head.back(), '\n');
   EXPECT_TRUE(test::contains(test::content(path / "t.npy").substr(0, 192), "'shape': (4,), }"));
@@ -248,8 +249,8 @@ TEST(NpyHeader, ReadsOtherVersionsAndRefusesDamage) {
 
 TEST_F(ImageSequences, NpyOfOtherLayoutsIsRefused) {
   const fs::path path = write("npy-truth", true);
-  const std::string name = fs::relative(path / "flow.npy", base_.path()).string(),
-                    sound = test::content(path / "flow.npy");
+  const std::string name = fs::relative(path / "motion_field.npy", base_.path()).string(),
+                    sound = test::content(path / "motion_field.npy");
   for (const auto& [from, to] : {std::pair<std::string, std::string>{"False", "True "},
                                  {"'<f4'", "'>f4'"},
                                  {"'<f4'", "[]   "},
@@ -258,7 +259,7 @@ TEST_F(ImageSequences, NpyOfOtherLayoutsIsRefused) {
     std::string other = sound;
     other.replace(other.find(from), from.size(), to);
     base_.write(name, other);
-    EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { read(path); }), "flow.npy")) << to;
+    EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { read(path); }), "motion_field.npy")) << to;
   }
 }
 

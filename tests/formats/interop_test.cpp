@@ -30,11 +30,11 @@ with h5py.File(sys.argv[1] + "/events.h5") as f:
 
 with h5py.File(sys.argv[1] + "/truth.h5") as f:
     assert f["depth"].shape == (2, 48, 64) and f["depth"].dtype == np.float32
-    assert f["flow"].shape == (2, 2, 48, 64)
-    assert np.isinf(f["depth"][0, 0, 0]) and abs(f["flow"][1, 1, 0, 0] + 15) < 1e-3
+    assert f["motion_field"].shape == (2, 2, 48, 64)
+    assert np.isinf(f["depth"][0, 0, 0]) and abs(f["motion_field"][1, 1, 0, 0] + 15) < 1e-3
     assert f["T_world_camera"].shape == (2, 7) and (f["T_world_camera"][0] == [0, 0, 0, 0, 0, 0, 1]).all()
     assert f["t"][:].tolist() == [1500000000, 1600000000]
-    assert "convention" in f["flow"].attrs
+    assert "convention" in f["motion_field"].attrs
 )py";
 
 TEST(Interop, H5py) {

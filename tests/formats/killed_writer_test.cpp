@@ -51,10 +51,10 @@ std::optional<bool> killed_at_write(int number, const Work& work) {
 /// Checks that look() never finds less data after more writes.
 template <typename Work, typename Look>
 void at_any_write(const Work& work, const Look& look) {
-  std::uint64_t most = 0;
+  std::uint64_t max = 0;
   bool readable = false;
-  constexpr int kMost = 5000;
-  for (int number = 1; number < kMost;
+  constexpr int kMax = 5000;
+  for (int number = 1; number < kMax;
        number += number < 80 ? 1 : 11) {  // later, only some writes of each of the many flushes
     const auto killed = killed_at_write(number, work);
     if (!killed) GTEST_SKIP() << "processes cannot be traced here";
@@ -65,8 +65,8 @@ void at_any_write(const Work& work, const Look& look) {
     } catch (const UserError& error) {
       ASSERT_FALSE(readable) << "write " << number << ": " << error.what();
     }
-    ASSERT_GE(found, most) << "write " << number;
-    most = found;
+    ASSERT_GE(found, max) << "write " << number;
+    max = found;
     if (!*killed) return;
   }
   FAIL() << "the writer did not end";
@@ -117,7 +117,7 @@ TEST(KilledWriter, GroundTruthIsReadAsFarAsTheLastFlush) {
         for (std::uint64_t i = 0; i < reader.size(); ++i) {
           EXPECT_EQ(reader.t(i), static_cast<TimeNs>(i) * kNsPerMs);
           reader.read(i, frame);
-          EXPECT_EQ(frame.flow_x(3, 5), test::TruthImages(kWidth, kHeight, static_cast<double>(i)).flow_x(3, 5));
+          EXPECT_EQ(frame.motion_x(3, 5), test::TruthImages(kWidth, kHeight, static_cast<double>(i)).motion_x(3, 5));
         }
         return reader.size();
       });

@@ -127,6 +127,17 @@ TEST_F(Npy, CountsAreNotTrusted) {
                "events.npy"));
 }
 
+TEST_F(Npy, ACutNpzIsToldAsThat) {
+  const auto path = base_.path() / "whole.npz";
+  test::record(*format_for(path).create(path, {}), test::recording_info(64, 48, 0, kNsPerSecond),
+               test::random_events(1000, 64, 48, 0, kNsPerSecond));
+  const std::string bytes = test::content(path);
+  const auto cut = base_.write("cut.npz", bytes.substr(0, bytes.size() - 30));
+  const std::string problem = test::message_of<UserError>([&] { open_source(cut); });
+  EXPECT_TRUE(contains(problem, "cut.npz")) << problem;
+  EXPECT_TRUE(contains(problem, "the zip is truncated")) << problem;
+}
+
 TEST_F(Npy, CompressionOfNpz) {
   const auto events = test::random_events(50'000, 64, 48, 0, kNsPerSecond);
   std::uintmax_t sizes[2];

@@ -53,7 +53,7 @@ void expect_same(const Image<T>& a, const Image<T>& b) {
   }
 }
 
-/// The rig of a simulation with everything: two cameras with different lenses, an IMU, an object and a layer.
+/// The rig of a simulation with everything: two cameras with different lenses, an IMU, an object and a sprite.
 RecordingInfo rig() {
   RecordingInfo info;
   Camera left = Camera::from_fov(kWidth, kHeight, 1), right = left;
@@ -64,7 +64,7 @@ RecordingInfo rig() {
   info.start = kNsPerSecond;
   info.end = 2 * kNsPerSecond;
   info.objects = {"a car", "a/car"};
-  info.layers = {"sky"};
+  info.sprites = {"sky"};
   return info;
 }
 
@@ -103,7 +103,7 @@ Image<std::uint16_t> objects_at(int i) {
   return Image<std::uint16_t>(kWidth, kHeight, static_cast<std::uint16_t>(i % 4));
 }
 
-Image<float> displacement_at(int i, double scale) {
+Image<float> optical_flow_at(int i, double scale) {
   Image<float> image(kWidth, kHeight, static_cast<float>(scale * i));
   image(1, 1) = std::numeric_limits<float>::quiet_NaN();
   return image;
@@ -139,12 +139,12 @@ void write_all(Sink& sink, TimeUnit unit) {
     const test::TruthImages images = truth_at(i);
     const Image<std::uint16_t> objects = objects_at(i);
     const SE3 poses[] = {some_pose(i), some_pose(i + 0.5)};
-    sink.write(TruthRecord{0, t, some_pose(0.3 * i), images.irradiance, images.depth, images.flow_x, images.flow_y,
+    sink.write(TruthRecord{0, t, some_pose(0.3 * i), images.irradiance, images.depth, images.motion_x, images.motion_y,
                            &objects, poses});
     if (i == 0) continue;
-    const Image<float> x = displacement_at(i, 0.5), y = displacement_at(i, -3);
+    const Image<float> x = optical_flow_at(i, 0.5), y = optical_flow_at(i, -3);
     const Image<std::uint8_t> visible(kWidth, kHeight, static_cast<std::uint8_t>(i % 2));
-    sink.write(DisplacementRecord{0, time_of_step(i - 1), t, x, y, visible});
+    sink.write(OpticalFlowRecord{0, time_of_step(i - 1), t, x, y, visible});
   }
   sink.end(true);
 }
@@ -205,18 +205,18 @@ class Checker {
     expect_same(record.T_world_camera, some_pose(0.3 * i));
     expect_same(record.irradiance, expected.irradiance);
     expect_same(record.depth, expected.depth);
-    expect_same(record.flow_x, expected.flow_x);
-    expect_same(record.flow_y, expected.flow_y);
+    expect_same(record.motion_x, expected.motion_x);
+    expect_same(record.motion_y, expected.motion_y);
     ASSERT_NE(record.object, nullptr);
     expect_same(*record.object, objects_at(i));
     ASSERT_EQ(record.T_world_objects.size(), 2U);
     expect_same(record.T_world_objects[1], some_pose(i + 0.5));
   }
-  void check_kind(const DisplacementRecord& record) {
+  void check_kind(const OpticalFlowRecord& record) {
     const int i = step_of(record.t1);
     EXPECT_EQ(record.t0, time_of_step(i - 1));
-    expect_same(record.x, displacement_at(i, 0.5));
-    expect_same(record.y, displacement_at(i, -3));
+    expect_same(record.x, optical_flow_at(i, 0.5));
+    expect_same(record.y, optical_flow_at(i, -3));
     EXPECT_EQ(record.visible(0, 0), i % 2);
   }
   void check_kind(const TriggerRecord&) { ADD_FAILURE() << "triggers are not read"; }
@@ -277,7 +277,7 @@ TEST_F(RecordingFolder, EveryRecordReadsBackInOneOrderOfTime) {
     EXPECT_EQ(count(content, 0), kSteps) << describe(content);
   EXPECT_FALSE(found.count.contains({Content::images, 0})) << "the irradiance of the ground truth must not come twice";
   EXPECT_EQ(count(Content::frames, 1), kSteps);
-  EXPECT_EQ(count(Content::displacement, 0), kSteps - 1);
+  EXPECT_EQ(count(Content::optical_flow, 0), kSteps - 1);
   EXPECT_FALSE(fs::exists(path_ / "right" / "truth.h5")) << "no file without a record";
 }
 
@@ -287,7 +287,7 @@ TEST_F(RecordingFolder, TheRigReadsBack) {
   EXPECT_EQ(found.start, expected.start);
   EXPECT_EQ(found.end, expected.end);
   EXPECT_EQ(found.objects, expected.objects);
-  EXPECT_EQ(found.layers, expected.layers);
+  EXPECT_EQ(found.sprites, expected.sprites);
   EXPECT_NEAR(found.truth_rate_hz, 10, 1e-6);
   ASSERT_EQ(found.cameras.size(), 2U);
   for (std::size_t i = 0; i < 2; ++i) {
@@ -400,13 +400,13 @@ TEST_F(RecordingFolder, MissingFilesAreNamed) {
   }
 }
 
-TEST_F(RecordingFolder, DisplacementsWithoutTheirFramesAreRefused) {
+TEST_F(RecordingFolder, OpticalFlowWithoutItsFramesIsRefused) {
   const auto sink = format_named("recording").create(path_, {});
   sink->begin(rig());
   const Image<float> x(kWidth, kHeight);
   const Image<std::uint8_t> visible(kWidth, kHeight);
   EXPECT_TRUE(test::contains(test::message_of<OutputError>([&] {
-                               sink->write(DisplacementRecord{0, 1, 2, x, x, visible});
+                               sink->write(OpticalFlowRecord{0, 1, 2, x, x, visible});
                              }),
                              "flo"));
 }

@@ -96,22 +96,22 @@ inline std::vector<std::string> lines(const std::filesystem::path& path) {
 /// Images of one ground-truth frame, smooth and different at each time, with a sky without depth.
 struct TruthImages {
   TruthImages(int width, int height, double t_s)
-      : irradiance(width, height), depth(width, height), flow_x(width, height), flow_y(width, height) {
+      : irradiance(width, height), depth(width, height), motion_x(width, height), motion_y(width, height) {
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
         const double u = static_cast<double>(x) / width, v = static_cast<double>(y) / height;
         irradiance(x, y) = static_cast<float>(0.5 + 0.5 * std::sin(20 * (u + t_s)) * std::cos(15 * v));
         depth(x, y) = v < 0.2 ? std::numeric_limits<float>::infinity() : static_cast<float>(1 + u + v);
-        flow_x(x, y) = static_cast<float>(-100 * (1 - v) + 10 * t_s);
-        flow_y(x, y) = static_cast<float>(30 * (u - 0.5));
+        motion_x(x, y) = static_cast<float>(-100 * (1 - v) + 10 * t_s);
+        motion_y(x, y) = static_cast<float>(30 * (u - 0.5));
       }
     }
   }
   TruthRecord at(TimeNs t, SE3 T_world_camera = {}) const {
-    return {0, t, T_world_camera, irradiance, depth, flow_x, flow_y};
+    return {0, t, T_world_camera, irradiance, depth, motion_x, motion_y};
   }
 
-  Image<float> irradiance, depth, flow_x, flow_y;
+  Image<float> irradiance, depth, motion_x, motion_y;
 };
 
 /// While it exists, files of this process cannot grow beyond `bytes`: writing fails as on a full disk.

@@ -157,7 +157,7 @@ TEST_P(RosFormats, EverythingReadsBackAsItWas) {
     EXPECT_EQ(truth.t, t + 3);
     expect_equal(truth.T_world_camera, T_world_camera, "T_world_camera");
     EXPECT_TRUE(same_pixels(truth.irradiance, images.irradiance) && same_pixels(truth.depth, images.depth));
-    EXPECT_TRUE(same_pixels(truth.flow_x, images.flow_x) && same_pixels(truth.flow_y, images.flow_y));
+    EXPECT_TRUE(same_pixels(truth.motion_x, images.motion_x) && same_pixels(truth.motion_y, images.motion_y));
 
     EXPECT_EQ(all.imu[i].t, t + 2);
     EXPECT_EQ(all.imu[i].measured.angular_rate, vector_at(to_seconds(t), 7));
@@ -187,12 +187,12 @@ TEST_P(RosFormats, FramesOfVideosAreIrradiance) {
 }
 
 TEST_P(RosFormats, TimesThatRosCannotHoldAreRefused) {
-  const TimeNs most = (is_bag() ? std::numeric_limits<std::uint32_t>::max()
-                                : static_cast<TimeNs>(std::numeric_limits<std::int32_t>::max())) *
-                          kNsPerSecond +
-                      999'999'999;
+  const TimeNs max = (is_bag() ? std::numeric_limits<std::uint32_t>::max()
+                               : static_cast<TimeNs>(std::numeric_limits<std::int32_t>::max())) *
+                         kNsPerSecond +
+                     999'999'999;
   const RecordingInfo info = test::recording_info(4, 4, 0, 1);
-  for (const TimeNs t : {TimeNs{-1}, most + 1}) {
+  for (const TimeNs t : {TimeNs{-1}, max + 1}) {
     const auto sink = format_.create(path(), {});
     sink->begin(info);
     const std::vector<Event> events{{t, 1, 1, 1}};
@@ -200,7 +200,7 @@ TEST_P(RosFormats, TimesThatRosCannotHoldAreRefused) {
     EXPECT_TRUE(test::contains(message, path().string()) && test::contains(message, "does not fit")) << message;
     EXPECT_THROW(sink->write(pose_at(t)), UserError);
   }
-  const std::vector<Event> last{{most, 1, 1, 1}};
+  const std::vector<Event> last{{max, 1, 1, 1}};
   test::record(*format_.create(path(), {}), info, last);
   EXPECT_EQ(test::read_back(path()).events[0], last);
 }
@@ -261,7 +261,7 @@ TEST_P(RosFormats, TopicsOfOthers) {
   EXPECT_EQ(all.imu.size(), 1U);
   ASSERT_EQ(all.truth.size(), 1U);
   EXPECT_EQ(all.truth[0].depth(0, 0), 1.0F) << "1000 mm";
-  EXPECT_TRUE(std::isnan(all.truth[0].flow_x(0, 0)));
+  EXPECT_TRUE(std::isnan(all.truth[0].motion_x(0, 0)));
 }
 
 TEST_P(RosFormats, MessagesThatAreTooShortAreNamed) {

@@ -31,7 +31,7 @@ struct ReadBack {
     int camera = 0;
     TimeNs t = 0;
     SE3 T_world_camera{};
-    Image<float> irradiance{}, depth{}, flow_x{}, flow_y{};
+    Image<float> irradiance{}, depth{}, motion_x{}, motion_y{};
   };
 
   RecordingInfo info{};
@@ -59,7 +59,7 @@ inline ReadBack read_back(const std::filesystem::path& path) {
                             frame->camera, frame->image});
     } else if (const auto* truth = std::get_if<TruthRecord>(record)) {
       all.truth.push_back({truth->camera, truth->t, truth->T_world_camera, truth->irradiance, truth->depth,
-                           truth->flow_x, truth->flow_y});
+                           truth->motion_x, truth->motion_y});
     } else if (const auto* image = std::get_if<ImageRecord>(record)) {
       all.images.push_back(image->t);
     } else if (const auto* imu = std::get_if<ImuRecord>(record)) {

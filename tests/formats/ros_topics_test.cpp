@@ -211,7 +211,7 @@ TEST_P(RosTopics, UnknownTypesAreNamed) {
   EXPECT_FALSE(fs::exists(base_.path() / "events.txt"));
 }
 
-TEST_P(RosTopics, UnknownTypesBesideOthersAreToldOf) {
+TEST_P(RosTopics, ReportsUnknownTypesNextToOthers) {
   const ros::ImuMessage imu{.header = {1, ""}};
   const ros::PoseMessage pose{{1, "map"}, SE3()};
   {
@@ -253,7 +253,7 @@ TEST_P(RosTopics, ACameraWithoutEventsThatCanBeReadIsNoEmptyOne) {
   EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { file.read(events, 10); }), "/cam0/events (vendors__"));
 }
 
-TEST_P(RosTopics, EncodingsThatAreNotReadAreToldOf) {
+TEST_P(RosTopics, ReportsUnsupportedEncodings) {
   const std::string data(8, '\0');
   const auto file = output();
   const ros::ImageMessage image{{1, ""}, 1, 4, "yuv422", 0, 8, ros::as_bytes(data)};

@@ -63,7 +63,8 @@ TEST(TruthHdf5, HoldsWhatWasWritten) {
     const auto t = read_dataset<std::int64_t>(path, "t", H5T_NATIVE_INT64, {kFrames});
     const auto poses = read_dataset<double>(path, "T_world_camera", H5T_NATIVE_DOUBLE, {kFrames, 7});
     const auto depth = read_dataset<float>(path, "depth", H5T_NATIVE_FLOAT, {kFrames, kRows, kColumns});
-    const auto flow = read_dataset<float>(path, "flow", H5T_NATIVE_FLOAT, {kFrames, 2, kRows, kColumns});
+    const auto motion_field =
+        read_dataset<float>(path, "motion_field", H5T_NATIVE_FLOAT, {kFrames, 2, kRows, kColumns});
     for (std::size_t i = 0; i < kFrames; ++i) {
       const double t_s = 0.1 * static_cast<double>(i);
       const TruthImages images(kColumns, kRows, t_s);
@@ -72,8 +73,8 @@ TEST(TruthHdf5, HoldsWhatWasWritten) {
       EXPECT_EQ(poses[7 * i + 6], some_pose(t_s).rotation.w());
       const std::size_t n = kRows * kColumns;
       EXPECT_TRUE(std::equal(images.depth.data(), images.depth.data() + n, &depth[i * n]));
-      EXPECT_TRUE(std::equal(images.flow_x.data(), images.flow_x.data() + n, &flow[2 * i * n]));
-      EXPECT_TRUE(std::equal(images.flow_y.data(), images.flow_y.data() + n, &flow[(2 * i + 1) * n]));
+      EXPECT_TRUE(std::equal(images.motion_x.data(), images.motion_x.data() + n, &motion_field[2 * i * n]));
+      EXPECT_TRUE(std::equal(images.motion_y.data(), images.motion_y.data() + n, &motion_field[(2 * i + 1) * n]));
     }
   }
 }
@@ -90,10 +91,10 @@ TEST(TruthHdf5, OptionsAndBytes) {
     content = test::content(path);
   }
   EXPECT_TRUE(bytes[0] == bytes[1]);
-  EXPECT_EQ(bytes[0].find("flow"), std::string::npos);
+  EXPECT_EQ(bytes[0].find("motion_field"), std::string::npos);
 }
 
-TEST(TruthHdf5, HoldsObjectsByNameAndDisplacementsBetweenFrames) {
+TEST(TruthHdf5, HoldsObjectsByNameAndOpticalFlowBetweenFrames) {
   const TemporaryDirectory directory;
   const auto path = directory.path() / "truth.h5";
   TruthHdf5Writer writer(path, 0, {false, false, Compression::gzip, true, true});
@@ -108,11 +109,12 @@ TEST(TruthHdf5, HoldsObjectsByNameAndDisplacementsBetweenFrames) {
     TruthRecord truth = images.at(k);
     EXPECT_THROW(writer.write(truth), InternalError) << "objects are missing";
     const SE3 poses[] = {some_pose(k), some_pose(k + 0.5)};
-    const TruthRecord complete{0, k, {}, images.irradiance, images.depth, images.flow_x, images.flow_y, &object, poses};
+    const TruthRecord complete{0,       k,    {}, images.irradiance, images.depth, images.motion_x, images.motion_y,
+                               &object, poses};
     writer.write(complete);
     visible(0, 0) = static_cast<std::uint8_t>(k % 2);
-    if (k > 0) writer.write(DisplacementRecord{0, k - 1, k, images.flow_x, images.flow_y, visible});
-    writer.write(DisplacementRecord{1, 0, 1, images.flow_x, images.flow_y, visible});  // of another camera
+    if (k > 0) writer.write(OpticalFlowRecord{0, k - 1, k, images.motion_x, images.motion_y, visible});
+    writer.write(OpticalFlowRecord{1, 0, 1, images.motion_x, images.motion_y, visible});  // of another camera
   }
   writer.end(true);
 
@@ -123,10 +125,10 @@ TEST(TruthHdf5, HoldsObjectsByNameAndDisplacementsBetweenFrames) {
   const auto poses = read_dataset<double>(path, "T_world_objects", H5T_NATIVE_DOUBLE, {3, 2, 7});
   EXPECT_EQ(poses[14 + 7], some_pose(1.5).translation.x());
   EXPECT_EQ(poses[28 + 6], some_pose(2).rotation.w());
-  const auto displacement = read_dataset<float>(path, "displacement", H5T_NATIVE_FLOAT, {2, 2, 3, 4});
-  EXPECT_EQ(displacement[12], images.flow_y(0, 0));
-  EXPECT_EQ(displacement[24 + 5], images.flow_x(1, 1));
-  const auto valid = read_dataset<std::uint8_t>(path, "displacement_valid", H5T_NATIVE_UINT8, {2, 3, 4});
+  const auto optical_flow = read_dataset<float>(path, "optical_flow", H5T_NATIVE_FLOAT, {2, 2, 3, 4});
+  EXPECT_EQ(optical_flow[12], images.motion_y(0, 0));
+  EXPECT_EQ(optical_flow[24 + 5], images.motion_x(1, 1));
+  const auto valid = read_dataset<std::uint8_t>(path, "optical_flow_valid", H5T_NATIVE_UINT8, {2, 3, 4});
   EXPECT_EQ(valid[0], 1);
   EXPECT_EQ(valid[12], 0);
 

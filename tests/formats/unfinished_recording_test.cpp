@@ -107,7 +107,7 @@ class UnfinishedRecording : public testing::Test {
   std::vector<Event> events_;
 };
 
-TEST_F(UnfinishedRecording, EarlyStatesAreToldInOrder) {
+TEST_F(UnfinishedRecording, ReportsEarlyStatesInOrder) {
   fs::create_directory(folder_);
   expect_order();
   base_.write("out.incomplete/report.json.tmp", "{\"sta");
@@ -151,7 +151,7 @@ TEST_F(UnfinishedRecording, IsBeingWrittenOrWasEnded) {
   EXPECT_TRUE(contains(message_of<UserError>([&] { open_source(folder_); }), "holds no records"));
 }
 
-TEST_F(UnfinishedRecording, MissingAndCutFilesAreToldInOrder) {
+TEST_F(UnfinishedRecording, ReportsMissingAndTruncatedFilesInOrder) {
   const std::vector<std::string> files = {"report.json",
                                           "calibration/rig.yaml",
                                           "calibration/camchain.yaml",
@@ -295,7 +295,7 @@ TEST(FullDisk, LeavesTheBeginningOfTheEvents) {
       test::record(writer, test::recording_info(640, 480, 0, 10 * kNsPerSecond), events);
     }
     const auto bytes = fs::file_size(whole);
-    std::uint64_t most = 0;
+    std::uint64_t max = 0;
     for (std::uintmax_t limit = 4096; limit < bytes; limit += bytes / 97) {
       const fs::path cut = base.path() / "cut.h5";
       {
@@ -313,9 +313,9 @@ TEST(FullDisk, LeavesTheBeginningOfTheEvents) {
       ASSERT_LE(left.size(), events.size());
       ASSERT_TRUE(std::equal(left.begin(), left.end(), events.begin())) << "limit " << limit;
       EXPECT_EQ(reader.complete(), false);
-      most = std::max(most, reader.size());
+      max = std::max(max, reader.size());
     }
-    EXPECT_GT(most, events.size() / 2);
+    EXPECT_GT(max, events.size() / 2);
   }
 }
 

@@ -409,7 +409,7 @@ TEST(FrameCamera, AdaptsItsExposureToTheLight) {
   }
 }
 
-TEST(FrameCamera, RefusesAnIrradianceThatIsNone) {
+TEST(FrameCamera, RefusesInvalidIrradiance) {
   for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), -0.1}) {
     const Light light = [&](int x, int y, double t) {
       return x == 2 && y == 1 && t > 0.0095 && t < 0.0105 ? bad : 0.5;
@@ -423,7 +423,7 @@ TEST(FrameCamera, RefusesAnIrradianceThatIsNone) {
   }
 }
 
-TEST(FrameCamera, RefusesAnIrradianceThatIsNoneAheadOfItsTime) {
+TEST(FrameCamera, RefusesInvalidIrradianceAheadOfItsTime) {
   // A tile is so far ahead that the exposures are not known yet.
   FrameCameraOptions options = precise(100, 0.004);
   options.auto_exposure = AutoExposureOptions{};

@@ -1,4 +1,4 @@
-// Reads whatever libFuzzer makes up as a file of one format: everything is handed out or a UserError, in bounded memory
+// Reads arbitrary bytes from libFuzzer as a file of one format: the result is records or a UserError, in bounded memory
 // and time.
 #include <sys/mman.h>
 #include <unistd.h>

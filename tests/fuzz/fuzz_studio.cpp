@@ -98,12 +98,12 @@ class Server {
 
   /// What has been saved goes again before it is much; nothing may have been saved elsewhere.
   void tidy() const {
-    constexpr int kMostFiles = 20;
+    constexpr int kMaxFiles = 20;
     const auto count = [](const fs::path& folder) {
       return std::distance(fs::directory_iterator(folder), fs::directory_iterator());
     };
     require(count(folder_) == 2 && count(folder_ / "page") == 1);
-    if (count(folder_ / "project") < kMostFiles) return;
+    if (count(folder_ / "project") < kMaxFiles) return;
     for (const auto& entry : fs::directory_iterator(folder_ / "project")) {
       if (entry.path().filename() != "scene.yaml" && entry.path().filename() != "events.txt")
         fs::remove_all(entry.path());

@@ -16,7 +16,7 @@ PROGRAM, SCENES = sys.argv[1], pathlib.Path(sys.argv[2])
 try:
     import cv2
     import h5py
-    import hdf5plugin  # noqa: F401: Blosc
+    import hdf5plugin  # noqa: F401 (reads Blosc)
     import numpy as np
     import OpenEXR
 except ImportError as missing:
@@ -41,10 +41,10 @@ class Images(unittest.TestCase):
         root = pathlib.Path(cls.folder.name)
         cls.root = root
         run("simulate", SCENES / "poster.yaml", "--out", root / "recording", "--set", "duration_s=0.2", "--set",
-            "truth.displacement=true", "--set", "output.preview=false")
+            "truth.optical_flow=true", "--set", "output.preview=false")
         with h5py.File(root / "recording" / "cam0" / "truth.h5") as file:
-            cls.t, cls.depth, cls.flow, cls.displacement = (
-                file[name][:] for name in ("t", "depth", "flow", "displacement"))
+            cls.t, cls.depth, cls.motion_field, cls.optical_flow = (
+                file[name][:] for name in ("t", "depth", "motion_field", "optical_flow"))
         for name in ("flo", "kitti", "dsec-flow", "exr", "npy-truth"):
             run("convert", root / "recording", root / name, "--format", name)
 
@@ -54,14 +54,14 @@ class Images(unittest.TestCase):
 
     def test_flo(self):
         lines = timestamps(self.root / "flo")
-        self.assertEqual(len(lines), len(self.displacement))
-        for k, (index, start, end, name) in enumerate(lines):
+        self.assertEqual(len(lines), len(self.optical_flow))
+        for k, (_index, start, end, name) in enumerate(lines):
             self.assertEqual(round(float(start) * 1e9), self.t[k])
             self.assertEqual(round(float(end) * 1e9), self.t[k + 1])
             flow = cv2.readOpticalFlow(str(self.root / "flo" / name))
-            known = ~np.isnan(self.displacement[k, 0])
-            np.testing.assert_array_equal(flow[..., 0][known], self.displacement[k, 0][known])
-            np.testing.assert_array_equal(flow[..., 1][known], self.displacement[k, 1][known])
+            known = ~np.isnan(self.optical_flow[k, 0])
+            np.testing.assert_array_equal(flow[..., 0][known], self.optical_flow[k, 0][known])
+            np.testing.assert_array_equal(flow[..., 1][known], self.optical_flow[k, 1][known])
             self.assertTrue((np.abs(flow[~known]) > 1e9).all())
 
     def check_png_flow(self, path, expected, scale):
@@ -75,7 +75,7 @@ class Images(unittest.TestCase):
 
     def test_kitti(self):
         for k, (*_, name) in enumerate(timestamps(self.root / "kitti" / "flow")):
-            self.check_png_flow(self.root / "kitti" / "flow" / name, self.displacement[k], 64)
+            self.check_png_flow(self.root / "kitti" / "flow" / name, self.optical_flow[k], 64)
         for k, (*_, name) in enumerate(timestamps(self.root / "kitti" / "depth")):
             depth = cv2.imread(str(self.root / "kitti" / "depth" / name), cv2.IMREAD_UNCHANGED)
             self.assertEqual(depth.dtype, np.uint16)
@@ -87,7 +87,7 @@ class Images(unittest.TestCase):
         spans = np.loadtxt(self.root / "dsec-flow" / "forward_timestamps.txt", delimiter=",", dtype=np.int64)
         np.testing.assert_array_equal(spans, np.stack([self.t[:-1], self.t[1:]], axis=1) // 1000)
         for k, path in enumerate(sorted((self.root / "dsec-flow" / "forward").iterdir())):
-            self.check_png_flow(path, self.displacement[k], 128)
+            self.check_png_flow(path, self.optical_flow[k], 128)
 
     def test_exr(self):
         lines = timestamps(self.root / "exr")
@@ -96,8 +96,8 @@ class Images(unittest.TestCase):
             with OpenEXR.File(str(self.root / "exr" / name), separate_channels=True) as file:
                 channels = file.channels()
                 np.testing.assert_array_equal(channels["Z"].pixels, self.depth[k])
-                np.testing.assert_array_equal(channels["V.x"].pixels, self.flow[k, 0])
-                np.testing.assert_array_equal(channels["V.y"].pixels, self.flow[k, 1])
+                np.testing.assert_array_equal(channels["V.x"].pixels, self.motion_field[k, 0])
+                np.testing.assert_array_equal(channels["V.y"].pixels, self.motion_field[k, 1])
 
     def test_npy(self):
         def array(name):
@@ -105,9 +105,9 @@ class Images(unittest.TestCase):
 
         np.testing.assert_array_equal(array("t"), self.t)
         np.testing.assert_array_equal(array("depth"), self.depth)
-        np.testing.assert_array_equal(array("flow"), self.flow)
-        np.testing.assert_array_equal(array("displacement"), self.displacement)
-        self.assertEqual(array("displacement_valid").dtype, np.uint8)
+        np.testing.assert_array_equal(array("motion_field"), self.motion_field)
+        np.testing.assert_array_equal(array("optical_flow"), self.optical_flow)
+        self.assertEqual(array("optical_flow_valid").dtype, np.uint8)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ def package(name):
     try:
         return importlib.import_module(name)
     except ImportError:
-        raise unittest.SkipTest(f"{name} is not installed")
+        raise unittest.SkipTest(f"{name} is not installed") from None
 
 
 def convert(source, target, *arguments):

@@ -208,11 +208,11 @@ class Datasets(unittest.TestCase):
         tensor, target, fired = next(iter(esim.torch.AffineFlowDataset(first=2, **self.OPTIONS)))
         sequence = esim.dataset.AffineSequences(**self.OPTIONS)[2]
         np.testing.assert_array_equal(tensor, esim.event_tensor(sequence.events, 24, 16, t0=0, t1=esim.ns(sequence.duration)))
-        np.testing.assert_array_equal(target, sequence.displacement)
+        np.testing.assert_array_equal(target, sequence.optical_flow)
         np.testing.assert_array_equal(fired[0], tensor[0] + tensor[1] > 0)
         self.assertEqual({part.dtype for part in (tensor, target, fired)}, {torch.float32})
-        flow = next(iter(esim.torch.AffineFlowDataset(first=2, target="flow", **self.OPTIONS)))[1]
-        np.testing.assert_array_equal(flow, sequence.flow)
+        flow = next(iter(esim.torch.AffineFlowDataset(first=2, target="motion_field", **self.OPTIONS)))[1]
+        np.testing.assert_array_equal(flow, sequence.motion_field)
 
     def test_what_is_refused(self):
         for options in ({"target": "depth"}, {"block": 0}, {"first": -1}, {"count": -1}, {"rank": 2, "world": 2}):
@@ -254,10 +254,10 @@ class Stored(Temporary):
             events["x"], events["y"] = random.integers(0, self.WIDTH, len(events)), random.integers(0, self.HEIGHT, len(events))
             events["p"] = random.choice([-1, 1], len(events))
             tensor = esim.event_tensor(events, self.WIDTH, self.HEIGHT, t0=0, t1=0.04)
-            displacement, flow = random.normal(size=(2, 2, self.HEIGHT, self.WIDTH)).astype(np.float32)
-            displacement[:, 0, 0] = np.nan
+            optical_flow, flow = random.normal(size=(2, 2, self.HEIGHT, self.WIDTH)).astype(np.float32)
+            optical_flow[:, 0, 0] = np.nan
             sequences.append({**{f"events/{name}": events[name] for name in "txyp"},
-                              "tensor": tensor, "displacement": displacement, "flow": flow})
+                              "tensor": tensor, "optical_flow": optical_flow, "motion_field": flow})
         for number, start in enumerate(range(0, self.COUNT, self.SIZE)):
             own = [{name: s[name] for name in contents} for s in sequences[start : start + self.SIZE]]
             path = folder / f"shard-{number:06}"
@@ -289,30 +289,30 @@ class Stored(Temporary):
 
     def test_samples(self):
         events = [f"events/{name}" for name in "txyp"]
-        for kind, contents in itertools.product(("hdf5", "webdataset"), (["tensor", "displacement"], [*events, "displacement", "flow"])):
+        for kind, contents in itertools.product(("hdf5", "webdataset"), (["tensor", "optical_flow"], [*events, "optical_flow", "motion_field"])):
             folder, sequences = self.write(kind, contents)
             stored = esim.torch.EventTensorDataset(folder)
             self.assertEqual(len(stored), self.COUNT)
             for i in (6, 0, 3, 2, 5):
-                tensor, displacement, fired = stored[i]
+                tensor, optical_flow, fired = stored[i]
                 np.testing.assert_array_equal(tensor, sequences[i]["tensor"])
-                np.testing.assert_array_equal(displacement, np.nan_to_num(sequences[i]["displacement"]))
-                known = np.isfinite(sequences[i]["displacement"][0])
+                np.testing.assert_array_equal(optical_flow, np.nan_to_num(sequences[i]["optical_flow"]))
+                known = np.isfinite(sequences[i]["optical_flow"][0])
                 np.testing.assert_array_equal(fired[0], (sequences[i]["tensor"][:2].sum(axis=0) > 0) & known)
             with self.assertRaises(IndexError):
                 stored[self.COUNT]
             loaded = list(torch.utils.data.DataLoader(stored, batch_size=4, num_workers=2))  # after it was opened here
             self.assertTrue(torch.equal(loaded[1][0][2], stored[6][0]))
-            if "flow" in contents:
-                np.testing.assert_array_equal(esim.torch.EventTensorDataset(folder, target="flow")[4][1], sequences[4]["flow"])
+            if "motion_field" in contents:
+                np.testing.assert_array_equal(esim.torch.EventTensorDataset(folder, target="motion_field")[4][1], sequences[4]["motion_field"])
             else:
-                with self.assertRaisesRegex(esim.Error, "has no flow"):
-                    esim.torch.EventTensorDataset(folder, target="flow")[0]
+                with self.assertRaisesRegex(esim.Error, "has no motion_field"):
+                    esim.torch.EventTensorDataset(folder, target="motion_field")[0]
 
     @unittest.skipUnless("ESIM_PROGRAM" in os.environ, "needs the program, as ESIM_PROGRAM")
     def test_what_the_program_writes(self):
         sequences = esim.dataset.AffineSequences(width=24, height=16, seed=3)
-        for kind, contents in (("hdf5", "displacement"), ("webdataset", "displacement,tensor")):
+        for kind, contents in (("hdf5", "optical_flow"), ("webdataset", "optical_flow,tensor")):
             folder = self.folder / kind
             subprocess.run([os.environ["ESIM_PROGRAM"], "dataset", "affine", "--count", "3", "--width", "24", "--height", "16", "--seed", "3",
                             "--format", kind, "--contents", contents, "--out", folder], check=True, capture_output=True)
@@ -320,11 +320,11 @@ class Stored(Temporary):
             self.assertEqual(len(stored), 3)
             for i in range(3):
                 np.testing.assert_array_equal(stored[i][0], sequences[i].tensor())
-                np.testing.assert_array_equal(stored[i][1], sequences[i].displacement)
+                np.testing.assert_array_equal(stored[i][1], sequences[i].optical_flow)
 
     def test_what_is_damaged(self):
         for kind, ending in (("hdf5", "h5"), ("webdataset", "tar")):
-            folder, _ = self.write(kind, ["tensor", "displacement"])
+            folder, _ = self.write(kind, ["tensor", "optical_flow"])
             shard = folder / f"shard-000001.{ending}"
             whole = shard.read_bytes()
             for content in (b"", whole[:600], b"nonsense" * 1000, whole[: len(whole) // 2]):
@@ -364,7 +364,7 @@ class Learning(Temporary):
 
         predict, settings = load_predictor(self.folder / "last.pt")
         self.assertEqual(settings["simulation"]["duration"], 0.04)
-        tensors, flow, fired = training.validation_batches[0]
+        tensors, _flow, _fired = training.validation_batches[0]
         predicted = np.stack([predict(tensor.numpy()) for tensor in tensors])
         expected = training.network.full_flow(tensors).detach()
         np.testing.assert_allclose(predicted, expected, atol=1e-3)

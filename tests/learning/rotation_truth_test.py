@@ -46,7 +46,7 @@ def scenario(folder):
         "frame_camera": {"rate_hz": 25},
         "imu": {"rate_hz": 1000, "gyroscope": quiet, "accelerometer": quiet,
                 "T_body_imu": {"position": [0.1, 0, 0], "quaternion": [0.5, 0.5, 0.5, 0.5]}},
-        "truth": {"rate_hz": 25, "displacement": True, "images": False},
+        "truth": {"rate_hz": 25, "optical_flow": True, "images": False},
         "output": {"preview": False},
     }
 
@@ -74,27 +74,27 @@ class OfARecording(unittest.TestCase):
     def test_the_motion_field_is_the_simulators(self):
         (packet,) = self.packets
         self.assertGreaterEqual(len(packet.truth_t), 10)
-        for t, flow in zip(packet.truth_t, packet.flow):
+        for t, flow in zip(packet.truth_t, packet.motion_field):
             field = self.calibration.motion_field(self.gyroscope.at(t))
             self.assertGreater(np.abs(flow).max(), 20)
             self.assertLess(np.abs(field - flow).max(), 0.002 * np.abs(flow).max())
 
-    def test_the_displacement_is_the_simulators(self):
+    def test_the_optical_flow_is_the_simulators(self):
         (packet,) = self.packets
-        self.assertGreaterEqual(len(packet.displacement_t), 9)
-        for (t0, t1), displacement in zip(packet.displacement_t, packet.displacement):
-            ours = self.calibration.displacement(self.gyroscope.rotation(t0, t1))
-            known = np.isfinite(displacement).all(axis=0)
+        self.assertGreaterEqual(len(packet.optical_flow_t), 9)
+        for (t0, t1), optical_flow in zip(packet.optical_flow_t, packet.optical_flow):
+            ours = self.calibration.optical_flow(self.gyroscope.rotation(t0, t1))
+            known = np.isfinite(optical_flow).all(axis=0)
             self.assertGreater(known.mean(), 0.5)
-            error = np.linalg.norm(ours - displacement, axis=0)[known]
-            self.assertLess(error.max(), 0.003 * np.linalg.norm(displacement, axis=0)[known].max())
+            error = np.linalg.norm(ours - optical_flow, axis=0)[known]
+            self.assertLess(error.max(), 0.003 * np.linalg.norm(optical_flow, axis=0)[known].max())
 
     def test_errors_are_those_of_the_prediction(self):
         def offset(tensor):
             self.assertEqual(tensor.shape, (4, 48, 64))
             windows.append(tensor)
             t0 = int(self.gyroscope.t[0]) + 40_000_000 * (len(windows) - 1)
-            truth = self.calibration.displacement(self.gyroscope.rotation(t0, t0 + 40_000_000))
+            truth = self.calibration.optical_flow(self.gyroscope.rotation(t0, t0 + 40_000_000))
             return truth + np.array([3.0, 4.0])[:, None, None]
 
         windows = []
@@ -151,16 +151,16 @@ class Maths(unittest.TestCase):
         np.testing.assert_allclose(CALIBRATION.project(np.stack([2 * x, 2 * y, 2 + 0 * x])), [u, v], atol=1e-9)
         self.assertTrue(np.isnan(CALIBRATION.project(np.array([0.1, 0.1, -1.0]))).all())
 
-    def test_the_motion_field_is_the_derivative_of_the_displacement(self):
+    def test_the_motion_field_is_the_derivative_of_the_optical_flow(self):
         omega = np.array([0.7, -0.4, 1.1])
         h = 1e-4
-        numeric = (CALIBRATION.displacement(rotation_of(h * omega)) - CALIBRATION.displacement(rotation_of(-h * omega))) / (2 * h)
+        numeric = (CALIBRATION.optical_flow(rotation_of(h * omega)) - CALIBRATION.optical_flow(rotation_of(-h * omega))) / (2 * h)
         np.testing.assert_allclose(CALIBRATION.motion_field(omega), numeric, atol=1e-4)
 
     def test_turning_about_the_optical_axis(self):
         """What stood at the angle a about the principal point stands at a - 90 degrees after a quarter turn."""
         straight = Calibration(64, 48, 50.0, 50.0, 31.0, 23.0)
-        moved = straight.displacement(rotation_of([0, 0, np.pi / 2]))
+        moved = straight.optical_flow(rotation_of([0, 0, np.pi / 2]))
         v, u = np.mgrid[:48, :64]
         np.testing.assert_allclose(moved, [(v - 23) - (u - 31), -(u - 31) - (v - 23)], atol=1e-9)
 

@@ -223,8 +223,8 @@ TEST(Fit, ReachesTheMinimumOfItsCosts) {
     positions[j] += step;
     return Se3Spline(5, 0.0, h, rotations, positions);
   };
-  const double least_rotation = rotation_cost(best, poses, weight), least_position = position_cost(best, poses, weight);
-  EXPECT_GT(least_rotation, 0.1);
+  const double min_rotation = rotation_cost(best, poses, weight), min_position = position_cost(best, poses, weight);
+  EXPECT_GT(min_rotation, 0.1);
   for (std::size_t j = 0; j < best.rotations().size(); ++j) {
     for (int axis = 0; axis < 3; ++axis) {
       const auto rotated = [&](double s) {
@@ -233,10 +233,10 @@ TEST(Fit, ReachesTheMinimumOfItsCosts) {
       const auto shifted = [&](double s) {
         return position_cost(changed(j, Vector3d::Zero(), s * Vector3d::Unit(axis)), poses, weight);
       };
-      EXPECT_LT(std::abs(numeric_derivative(rotated, 0.0)), 1e-11 * least_rotation) << j;
-      EXPECT_LT(std::abs(numeric_derivative(shifted, 0.0)), 1e-11 * least_position) << j;
-      EXPECT_GT(rotated(1e-4), least_rotation);
-      EXPECT_GT(rotated(-1e-4), least_rotation);
+      EXPECT_LT(std::abs(numeric_derivative(rotated, 0.0)), 1e-11 * min_rotation) << j;
+      EXPECT_LT(std::abs(numeric_derivative(shifted, 0.0)), 1e-11 * min_position) << j;
+      EXPECT_GT(rotated(1e-4), min_rotation);
+      EXPECT_GT(rotated(-1e-4), min_rotation);
     }
   }
 }

@@ -43,7 +43,7 @@ TEST(RandomTrajectory, IsAFunctionOfItsSeed) {
   EXPECT_GT(one.at(t).T_world_body.rotation.angularDistance(other.at(t).T_world_body.rotation), 1e-3);
 }
 
-TEST(RandomTrajectory, LastsExactlyAsLongAsAsked) {
+TEST(RandomTrajectory, LastsExactlyAsLongAsRequested) {
   for (const TimeNs duration :
        {TimeNs{1}, 99'999'999 * TimeNs{1}, kSecond / 10, 3 * kSecond / 10, 7 * kSecond / 10 + 1}) {
     const auto trajectory = random_trajectory(lively(), kStart, duration, 1);

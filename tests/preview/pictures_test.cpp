@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <random>
 
-#include "esim/preview/canvas.h"
+#include "esim/preview/pictures.h"
 #include "esim/preview/yuv.h"
 
 namespace esim {
@@ -62,19 +62,6 @@ TEST(Enlarge, WholeFactorsRepeatPixels) {
   for (int y = 0; y < 12; ++y) {
     for (int x = 0; x < 15; ++x) ASSERT_EQ(large(x, y), image(x / 3, y / 3));
   }
-}
-
-TEST(Text, IsTheSameEachTime) {
-  for (const char* line : {"t = 0.1 s", "", "t = 0.1 s", "another", "t = 0.1 s"}) {
-    Canvas first(200, 40, {}), second(200, 40, {});
-    const int width = first.text(5, 30, line, 12, {255, 255, 255});
-    EXPECT_EQ(second.text(5, 30, line, 12, {255, 255, 255}), width);
-    EXPECT_EQ(Canvas::text_width(line, 12), width);
-    EXPECT_TRUE(
-        std::equal(first.pixels().pixels().begin(), first.pixels().pixels().end(), second.pixels().pixels().begin()));
-  }
-  EXPECT_LT(Canvas::text_width("text", 10), Canvas::text_width("text", 20)) << "each size is drawn separately";
-  for (int i = 0; i < 2000; ++i) EXPECT_GT(Canvas::text_width(std::to_string(i), 10), 0);
 }
 
 TEST(Yuv, IsThatOfBt601) {

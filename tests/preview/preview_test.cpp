@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "esim/core/error.h"
-#include "esim/preview/canvas.h"
+#include "esim/plot/canvas.h"
 #include "esim/preview/colours.h"
 #include "esim/preview/panels.h"
 #include "esim/preview/preview_writer.h"
@@ -27,24 +27,24 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 int brightness(Rgb colour) { return colour.r + colour.g + colour.b; }
 
 TEST(Colours, FlowWheel) {
-  EXPECT_EQ(colour_flow(0, 0, 10), (Rgb{255, 255, 255}));
+  EXPECT_EQ(colour_motion(0, 0, 10), (Rgb{255, 255, 255}));
   // Opposite directions and the axes have different colours; on the rim no colour contains white.
   std::set<std::tuple<int, int, int>> seen;
   for (int i = 0; i < 24; ++i) {
     const double angle = 2 * 3.14159265358979 * i / 24;
     const Rgb c =
-        colour_flow(static_cast<float>(10 * std::cos(angle)), static_cast<float>(10 * std::sin(angle)), 10.00001f);
+        colour_motion(static_cast<float>(10 * std::cos(angle)), static_cast<float>(10 * std::sin(angle)), 10.00001f);
     EXPECT_LE(std::min({c.r, c.g, c.b}), 1) << i;
     seen.insert({c.r, c.g, c.b});
   }
   EXPECT_EQ(seen.size(), 24u);
   // Motion to the right is red, as in the reference implementation; beyond full scale it is darker.
-  const Rgb right = colour_flow(9.999f, 0, 10);
+  const Rgb right = colour_motion(9.999f, 0, 10);
   EXPECT_GT(right.r, 250);
   EXPECT_LT(right.g + right.b, 60);
-  EXPECT_LT(brightness(colour_flow(20, 0, 10)), brightness(right));
-  EXPECT_EQ(colour_flow(kNaN, 0, 10), Rgb{});
-  EXPECT_EQ(colour_flow(kInfinity, 0, 10), Rgb{});
+  EXPECT_LT(brightness(colour_motion(20, 0, 10)), brightness(right));
+  EXPECT_EQ(colour_motion(kNaN, 0, 10), Rgb{});
+  EXPECT_EQ(colour_motion(kInfinity, 0, 10), Rgb{});
 }
 
 TEST(Colours, Depth) {
@@ -88,7 +88,7 @@ TEST(Scales, OnlyGrow) {
   EXPECT_EQ(depth.near_m(), near_before);
   EXPECT_GE(depth.far_m(), 50.0f);
 
-  FlowScale flow;
+  MotionScale flow;
   flow.include(Image<float>(10, 10, 3.0f), Image<float>(10, 10, 4.0f));
   EXPECT_EQ(flow.full_px_per_s(), 5.0f);
   flow.include(Image<float>(10, 10, 0.0f), Image<float>(10, 10, kNaN));
@@ -122,7 +122,7 @@ TEST(PreviewLayoutTest, FitsAnyCamera) {
     const TruthImages images(width, height, 0);
     const Image<float> none(width, height);
     const auto image = PreviewPage(layout).compose(
-        {0, 0, none, none, images.irradiance, &images.depth, &images.flow_x, &images.flow_y, 1, 3, 100, "caption"});
+        {0, 0, none, none, images.irradiance, &images.depth, &images.motion_x, &images.motion_y, 1, 3, 100, "caption"});
     EXPECT_EQ(image.width(), layout.width);
     EXPECT_EQ(image.height(), layout.height);
   }
@@ -133,7 +133,7 @@ TEST(PreviewPageTest, KeepsNothingOfThePreviousFrame) {
   const TruthImages images(64, 48, 0);
   Image<float> none(64, 48), many(64, 48, 3);
   const auto frame = [&](TimeNs t, const Image<float>& on, float far_m, float full_flow) {
-    return PreviewFrame{t, 0,     on,       none, images.irradiance, &images.depth, &images.flow_x, &images.flow_y,
+    return PreviewFrame{t, 0,     on,       none, images.irradiance, &images.depth, &images.motion_x, &images.motion_y,
                         1, far_m, full_flow};
   };
   PreviewPage page(layout);

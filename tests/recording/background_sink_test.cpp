@@ -83,7 +83,7 @@ class Summer final : public Sink {
       truth->object ? add(*truth->object) : add(truth->depth);
       for (const SE3& pose : truth->T_world_objects) sums_.push_back(pose.translation.sum());
     }
-    if (const auto* part = std::get_if<DisplacementRecord>(&record)) {
+    if (const auto* part = std::get_if<OpticalFlowRecord>(&record)) {
       add(part->x), add(part->y), add(part->visible);
       sums_.push_back(static_cast<double>(part->t0 + 10 * part->t1));
     }
@@ -110,7 +110,7 @@ TEST(BackgroundSink, KeepsCopiesOfGroundTruth) {
   sink.write(TruthRecord{0, 1, {}, image, image, image, image});
   std::vector<SE3> poses = {{Eigen::Quaterniond::Identity(), {1, 2, 3}}};
   sink.write(TruthRecord{0, 2, {}, image, image, image, image, &object, poses});
-  sink.write(DisplacementRecord{0, 1, 2, image, other, visible});
+  sink.write(OpticalFlowRecord{0, 1, 2, image, other, visible});
   sink.write(EventPointsRecord{0, events, points});
   image.fill(-1), other.fill(-1), object.fill(9), visible.fill(9);
   points[0].setZero(), poses[0].translation.setZero(), events[0].x = 0;

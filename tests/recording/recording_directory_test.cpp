@@ -55,7 +55,7 @@ class RecordingDirectoryTest : public testing::Test {
   fs::path incomplete_ = base_.path() / "out.incomplete";
 };
 
-TEST_F(RecordingDirectoryTest, AppearsWholeOrNotAtAll) {
+TEST_F(RecordingDirectoryTest, AppearsCompleteOrNotAtAll) {
   {
     RecordingDirectory directory(out_, false);
     EXPECT_EQ(directory.path(), incomplete_);

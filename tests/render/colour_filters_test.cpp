@@ -29,10 +29,10 @@ std::unique_ptr<Renderer> make(const std::string& name, const std::shared_ptr<co
                                const Workers& workers = test::two_threads()) {
   if (name == "panorama") return make_panorama_renderer({luminance, {0, 0, 0, 1}, colours}, model, workers, filters);
   if (name == "plane") {
-    Poster poster = test::test_poster();
-    poster.radiance = luminance;
-    poster.colours = colours;
-    return make_plane_renderer(poster, model, workers, filters);
+    TexturedPlane plane = test::test_plane();
+    plane.radiance = luminance;
+    plane.colours = colours;
+    return make_plane_renderer(plane, model, workers, filters);
   }
   Scene scene = name == "moving mesh" ? test::moving_scene() : still_scene(test::box_mesh());
   for (SceneObject& object : scene.objects) {
@@ -66,7 +66,7 @@ TEST_P(EveryColourfulRenderer, APixelSeesItsColourAsAGreyCameraSeesAWorldOfThatC
   for (std::size_t colour = 0; colour < 3; ++colour) {
     const Sample grey = seen(kPatterns[colour], {}, ColourFilters::none);
     EXPECT_TRUE(std::ranges::equal(mosaic.depth.pixels(), grey.depth.pixels()));
-    EXPECT_TRUE(std::ranges::equal(mosaic.flow_x.pixels(), grey.flow_x.pixels()));
+    EXPECT_TRUE(std::ranges::equal(mosaic.motion_x.pixels(), grey.motion_x.pixels()));
     for (int y = 0; y < model_.height; ++y) {
       for (int x = 0; x < model_.width; ++x) {
         if (static_cast<std::size_t>(x % 2 + y % 2) != colour) continue;
@@ -76,7 +76,7 @@ TEST_P(EveryColourfulRenderer, APixelSeesItsColourAsAGreyCameraSeesAWorldOfThatC
   }
 }
 
-TEST_P(EveryColourfulRenderer, AGreyCameraBesideSeesLuminanceAsIfThereWereNoColours) {
+TEST_P(EveryColourfulRenderer, AGreyCameraNextToItSeesLuminanceWithoutColours) {
   const Sample with = seen(kPatterns[3], kColours, ColourFilters::none);
   const Sample without = seen(kPatterns[3], {}, ColourFilters::none);
   EXPECT_TRUE(std::ranges::equal(with.irradiance.pixels(), without.irradiance.pixels()));
@@ -120,8 +120,8 @@ TEST(ColourFilters, PureColoursAreSeenByTheirPixelsAlone) {
   }
   const Camera model = Camera::from_fov(91, 40, 1.0);
   const double width_m = 2 * std::tan(0.5);  // fills the view from 1 m
-  Poster poster{kPatterns[3], {Eigen::Quaterniond::Identity(), {0, 0, 1}}, width_m, true, 0.2F, colours};
-  const auto renderer = make_plane_renderer(poster, model, test::two_threads(), ColourFilters::rggb);
+  TexturedPlane plane{kPatterns[3], {Eigen::Quaterniond::Identity(), {0, 0, 1}}, width_m, true, 0.2F, colours};
+  const auto renderer = make_plane_renderer(plane, model, test::two_threads(), ColourFilters::rggb);
   const Sample sample = test::render(*renderer, model, Kinematics{});
   for (int y = 0; y < model.height; ++y) {
     for (const auto& [x, column] : {std::pair(15, 0), {14, 0}, {45, 1}, {46, 1}, {75, 2}, {76, 2}}) {

@@ -30,6 +30,9 @@ class ServedRenderer final : public Renderer {
   std::unique_ptr<Renderer> renderer_;
 };
 
+/// The engines that make_any_renderer() makes.
+inline constexpr std::array kEngines = {"unrealcv", "moving_unrealcv"};
+
 /// make_renderer, also for engines.
 inline std::unique_ptr<Renderer> make_any_renderer(const std::string& name, const Camera& camera,
                                                    const Workers& workers = two_threads()) {

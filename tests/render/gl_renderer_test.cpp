@@ -59,8 +59,8 @@ Difference compare(const Sample& a, const Sample& b) {
         continue;
       }
       if (!a.object.empty() && a.object(x, y) != b.object(x, y)) ++result.other_objects;
-      const double flow = std::hypot(a.flow_x(x, y), a.flow_y(x, y));
-      const double off = std::hypot(a.flow_x(x, y) - b.flow_x(x, y), a.flow_y(x, y) - b.flow_y(x, y));
+      const double flow = std::hypot(a.motion_x(x, y), a.motion_y(x, y));
+      const double off = std::hypot(a.motion_x(x, y) - b.motion_x(x, y), a.motion_y(x, y) - b.motion_y(x, y));
       result.flow = std::max(result.flow, off / (0.05 + 1e-3 * flow));
       if (std::isinf(a.depth(x, y)) && std::isinf(b.depth(x, y))) continue;
       result.depth = std::max(result.depth, std::fabs(1.0 - double{b.depth(x, y)} / a.depth(x, y)));
@@ -139,9 +139,9 @@ TEST_F(GlRendererTest, TheMotionFieldIsThatOfTheProcessor) {
       int outside = 0;
       for (int y = 0; y < model.height; ++y) {
         for (int x = 0; x < model.width; ++x) {
-          const double off =
-              std::hypot(sample.flow_x(x, y) - expected.flow_x(x, y), sample.flow_y(x, y) - expected.flow_y(x, y));
-          ASSERT_LT(off, 0.01 + 1e-5 * std::hypot(expected.flow_x(x, y), expected.flow_y(x, y))) << x << ", " << y;
+          const double off = std::hypot(sample.motion_x(x, y) - expected.motion_x(x, y),
+                                        sample.motion_y(x, y) - expected.motion_y(x, y));
+          ASSERT_LT(off, 0.01 + 1e-5 * std::hypot(expected.motion_x(x, y), expected.motion_y(x, y))) << x << ", " << y;
           if (std::isinf(sample.depth(x, y))) ++outside;
         }
       }

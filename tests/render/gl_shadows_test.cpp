@@ -85,15 +85,15 @@ Sample rendered(Renderer& renderer, const RenderRequest& request) {
   return sample;
 }
 
-/// Whether an image changes by less than `most` within two pixels around one.
-bool is_smooth(const Image<float>& image, int x, int y, float most) {
+/// Whether an image changes by less than `max` within two pixels around one.
+bool is_smooth(const Image<float>& image, int x, int y, float max) {
   constexpr int kReach = 2;
   float low = image(x, y), high = low;
   for (int v = std::max(0, y - kReach); v <= std::min(image.height() - 1, y + kReach); ++v) {
     for (int u = std::max(0, x - kReach); u <= std::min(image.width() - 1, x + kReach); ++u)
       low = std::min(low, image(u, v)), high = std::max(high, image(u, v));
   }
-  return high - low < most;
+  return high - low < max;
 }
 
 /// Differences of E from the expected sample; `without` has no shadows.

@@ -49,7 +49,7 @@ TEST_P(MotionField, IsTheVelocityOfTheImageOfAPointOfWhateverIsSeen) {
   motion_field(rays, relative_twists(request), request.tiles[0], sample);
 
   constexpr double kStep = 1e-4;
-  double greatest_dynamic = 0;
+  double max_dynamic = 0;
   for (int y = 0; y < model.height; y += 3) {
     for (int x = 0; x < model.width; ++x) {
       const Eigen::Vector3d bearing = model.back_project(Eigen::Vector2d(x, y))->bearing;
@@ -62,12 +62,12 @@ TEST_P(MotionField, IsTheVelocityOfTheImageOfAPointOfWhateverIsSeen) {
         return model.project(later(request.camera, dt).inverse() * moved)->pixel;
       };
       const Eigen::Vector2d expected = (image_of_it(kStep) - image_of_it(-kStep)) / (2 * kStep);
-      const Eigen::Vector2d actual(sample.flow_x(x, y), sample.flow_y(x, y));
+      const Eigen::Vector2d actual(sample.motion_x(x, y), sample.motion_y(x, y));
       ASSERT_LT((actual - expected).norm(), 0.02 + 2e-4 * expected.norm()) << x << ", " << y << ", object " << seen;
-      if (seen != 0) greatest_dynamic = std::max(greatest_dynamic, expected.norm());
+      if (seen != 0) max_dynamic = std::max(max_dynamic, expected.norm());
     }
   }
-  EXPECT_GT(greatest_dynamic, 300) << "the test's objects should move";
+  EXPECT_GT(max_dynamic, 300) << "the test's objects should move";
 }
 
 INSTANTIATE_TEST_SUITE_P(Distortions, MotionField, testing::Range(0, 4));
@@ -83,8 +83,8 @@ TEST(MotionField, VanishesOnWhatMovesWithTheCamera) {
   sample.depth.fill(1.5F);
   sample.object.fill(1);
   motion_field(PixelRays(model), relative_twists(request), request.tiles[0], sample);
-  for (const float v : sample.flow_x.pixels()) ASSERT_NEAR(v, 0, 1e-4);
-  for (const float v : sample.flow_y.pixels()) ASSERT_NEAR(v, 0, 1e-4);
+  for (const float v : sample.motion_x.pixels()) ASSERT_NEAR(v, 0, 1e-4);
+  for (const float v : sample.motion_y.pixels()) ASSERT_NEAR(v, 0, 1e-4);
 }
 
 TEST(MotionField, IsTheSameWhetherOrNotThereAreObjectsOutOfSight) {
@@ -97,8 +97,8 @@ TEST(MotionField, IsTheSameWhetherOrNotThereAreObjectsOutOfSight) {
     motion_field(PixelRays(model), relative_twists(request), request.tiles[0], *sample);
     request.objects.resize(2);
   }
-  EXPECT_TRUE(std::equal(with.flow_x.pixels().begin(), with.flow_x.pixels().end(), without.flow_x.pixels().begin(),
-                         [](float a, float b) { return std::fabs(a - b) < 1e-3F; }));
+  EXPECT_TRUE(std::equal(with.motion_x.pixels().begin(), with.motion_x.pixels().end(),
+                         without.motion_x.pixels().begin(), [](float a, float b) { return std::fabs(a - b) < 1e-3F; }));
   EXPECT_TRUE(without.object.empty());
   EXPECT_EQ(with.object.size(), with.depth.size());
 }

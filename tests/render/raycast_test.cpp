@@ -50,7 +50,7 @@ Sample half_plane_seen(double angle, double offset, int rays) {
 }
 
 /// The fraction of a pixel that the half-plane leaves white, by a fine grid.
-double white_share(double x, double y, double angle, double offset) {
+double white_fraction(double x, double y, double angle, double offset) {
   constexpr int kGrid = 40;
   int white = 0;
   for (int i = 0; i < kGrid * kGrid; ++i) {
@@ -70,7 +70,7 @@ TEST(RaycastRenderer, APixelOnAnEdgeIsTheMeanOverItsArea) {
       int between = 0;
       for (int y = 0; y < model.height; ++y) {
         for (int x = 0; x < model.width; ++x) {
-          const double expected = white_share(x - model.cx, y - model.cy, angle, offset);
+          const double expected = white_fraction(x - model.cx, y - model.cy, angle, offset);
           const double error = sample.irradiance(x, y) - expected;
           EXPECT_NEAR(error, 0, worst) << x << ", " << y << " at " << angle;
           if (expected > 0.01 && expected < 0.99) squares += error * error, ++between;
@@ -156,50 +156,31 @@ TEST(RaycastRenderer, SurfacesAreNoSharperWhereAnEdgeIs) {
 
 TEST(RaycastRenderer, NarrowPixelsAverageToWideOnes) {
   constexpr int kWide = 3;
-  Camera model = test::distorted_camera(1);
+  const Camera model = test::distorted_camera(1);
   const auto scene = build_raycast_scene(test::plain_moving_scene());
-  const auto see = [&] {
-    const auto renderer = make_raycast_renderer(scene, {0.5F, 64}, model, test::two_threads());
+  const auto see = [&](const PixelArea& area) {
+    const auto renderer =
+        make_raycast_renderer(scene, {0.5F, 64}, model, test::two_threads(), ColourFilters::none, area);
     Sample sample;
     renderer->render({test::kTime, test::moving_camera(), {{0, 0, model.width, model.height}}, test::moving_objects(0)},
                      sample);
     return sample;
   };
-  EXPECT_TRUE(see().narrow.empty());
-  model.footprint = kWide;
-  const Sample sample = see();
+  const Sample wide = see({kWide, kWide}), narrow = see({kWide, 1});
   double squares = 0, unlike = 0;
   int count = 0;
   for (int y = 1; y + 1 < model.height; ++y) {
     for (int x = 1; x + 1 < model.width; ++x, ++count) {
       double mean = 0;
       for (int j = -1; j <= 1; ++j)
-        for (int i = -1; i <= 1; ++i) mean += sample.narrow(x + i, y + j) / (kWide * kWide);
-      squares += std::pow(mean - sample.irradiance(x, y), 2);
-      unlike += std::pow(sample.narrow(x, y) - sample.irradiance(x, y), 2);
+        for (int i = -1; i <= 1; ++i) mean += narrow.irradiance(x + i, y + j) / (kWide * kWide);
+      squares += std::pow(mean - wide.irradiance(x, y), 2);
+      unlike += std::pow(narrow.irradiance(x, y) - wide.irradiance(x, y), 2);
+      ASSERT_EQ(wide.depth(x, y), narrow.depth(x, y));
     }
   }
   EXPECT_LT(std::sqrt(squares / count), 0.003);
   EXPECT_GT(std::sqrt(unlike / count), 0.015) << "edges should be narrower";
-}
-
-TEST(RaycastRenderer, MakesRoomForNarrowPixelsInAnySample) {
-  Camera model = test::distorted_camera(1);
-  const auto scene = build_raycast_scene(test::plain_moving_scene());
-  Sample sample;
-  const auto see = [&] {
-    make_raycast_renderer(scene, {0.5F, 16}, model, test::two_threads())
-        ->render({test::kTime, test::moving_camera(), {{0, 0, model.width, model.height}}, test::moving_objects(0)},
-                 sample);
-  };
-  model.footprint = 2;
-  see();
-  model.width += 40, model.height += 30;
-  see();
-  EXPECT_EQ(sample.narrow.bounds(), sample.irradiance.bounds());
-  model.footprint = 1;
-  see();
-  EXPECT_TRUE(sample.narrow.empty());
 }
 
 // --- moving objects
@@ -259,7 +240,7 @@ TEST(RaycastRenderer, ShowsAMovingMeshAsTheSameMeshAtRestThere) {
   for (std::size_t i = 0; i < sample.depth.size(); ++i) {
     ASSERT_NEAR(sample.depth.pixels()[i], expected.depth.pixels()[i], 1e-4);
     differ += std::fabs(sample.irradiance.pixels()[i] - expected.irradiance.pixels()[i]) > 2e-3F ? 1 : 0;
-    ASSERT_NEAR(sample.flow_x.pixels()[i], expected.flow_x.pixels()[i], 0.05);
+    ASSERT_NEAR(sample.motion_x.pixels()[i], expected.motion_x.pixels()[i], 0.05);
   }
   EXPECT_LT(differ, 20) << "but at the box's edges";
 }
@@ -271,7 +252,7 @@ TEST(RaycastRenderer, StaysFiniteWhenAnObjectPassesThroughTheCamera) {
     Kinematics square = at_distance(distance);
     square.velocity_world = {0.1, 0, -1};
     const Sample sample = render_scene(scene, {square});
-    for (const float v : sample.flow_x.pixels()) ASSERT_TRUE(std::isfinite(v));
+    for (const float v : sample.motion_x.pixels()) ASSERT_TRUE(std::isfinite(v));
     for (const float z : sample.depth.pixels()) ASSERT_GT(z, 0.0F);
     EXPECT_EQ(sample.object(60, 45), distance > 5e-3 ? 1 : 0) << "in front of the lens or not";
   }

@@ -1,4 +1,4 @@
-// The contract of every renderer. To test a new one, add its name to the list at the end.
+// The contract of every renderer. To test a new one, add it to render/scenes.h.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -45,7 +45,7 @@ TEST_P(EveryRendererOfSpace, MotionFieldIsTheVelocityOfTheImageOfWhatIsSeen) {
       const auto before = image_of_it(-kStep), after = image_of_it(kStep);
       ASSERT_TRUE(before && after);
       const Eigen::Vector2d expected = (after->pixel - before->pixel) / (2 * kStep);
-      squared_error += (expected - Eigen::Vector2d(sample.flow_x(x, y), sample.flow_y(x, y))).squaredNorm();
+      squared_error += (expected - Eigen::Vector2d(sample.motion_x(x, y), sample.motion_y(x, y))).squaredNorm();
       squared += expected.squaredNorm();
       ++count;
     }
@@ -66,7 +66,7 @@ TEST_P(EveryRenderer, SeveralRenderingsMayBeUnderWay) {
     EXPECT_EQ(sample.t, expected.t);
     EXPECT_TRUE(std::ranges::equal(sample.irradiance.pixels(), expected.irradiance.pixels()));
     EXPECT_TRUE(std::ranges::equal(sample.depth.pixels(), expected.depth.pixels()));
-    EXPECT_TRUE(std::ranges::equal(sample.flow_x.pixels(), expected.flow_x.pixels()));
+    EXPECT_TRUE(std::ranges::equal(sample.motion_x.pixels(), expected.motion_x.pixels()));
     EXPECT_TRUE(std::ranges::equal(sample.object.pixels(), expected.object.pixels()));
   };
   const auto first = renderer_->start(view(0));
@@ -101,7 +101,7 @@ TEST_P(EveryRenderer, EvaluatesTilesOfSeveralTimesTogether) {
         ASSERT_EQ(together.irradiance(x, y), alone.irradiance(x, y)) << x << ", " << y;
         ASSERT_EQ(together.depth(x, y), alone.depth(x, y)) << x << ", " << y;
         if (y % 4 == 0) {
-          ASSERT_EQ(together.flow_x(x, y), alone.flow_x(x, y)) << x << ", " << y;
+          ASSERT_EQ(together.motion_x(x, y), alone.motion_x(x, y)) << x << ", " << y;
         }
       }
     }
@@ -122,7 +122,7 @@ TEST_P(EveryRenderer, BrightnessMovesWithTheMotionField) {
     for (int x = 1; x + 1 < model_.width; ++x) {
       const double gradient_x = (sample.irradiance(x + 1, y) - sample.irradiance(x - 1, y)) / 2.0;
       const double gradient_y = (sample.irradiance(x, y + 1) - sample.irradiance(x, y - 1)) / 2.0;
-      const double expected = -(gradient_x * sample.flow_x(x, y) + gradient_y * sample.flow_y(x, y));
+      const double expected = -(gradient_x * sample.motion_x(x, y) + gradient_y * sample.motion_y(x, y));
       const double measured = (after.irradiance(x, y) - before.irradiance(x, y)) / (2 * kStep);
       errors.push_back(std::fabs(measured - expected));
       squared += expected * expected;
@@ -146,8 +146,8 @@ TEST_P(EveryRenderer, ATileIsTheSameAsInTheWholeFrame) {
       for (int x = tile.x; x < tile.x + tile.width; ++x) {
         ASSERT_EQ(sample.irradiance(x, y), whole.irradiance(x, y)) << x << ", " << y;
         ASSERT_EQ(sample.depth(x, y), whole.depth(x, y));
-        ASSERT_EQ(sample.flow_x(x, y), whole.flow_x(x, y));
-        ASSERT_EQ(sample.flow_y(x, y), whole.flow_y(x, y));
+        ASSERT_EQ(sample.motion_x(x, y), whole.motion_x(x, y));
+        ASSERT_EQ(sample.motion_y(x, y), whole.motion_y(x, y));
         ASSERT_TRUE(objects_.empty() || sample.object(x, y) == whole.object(x, y));
       }
     }
@@ -162,7 +162,7 @@ TEST_P(EveryRenderer, SaysWhichObjectEachPixelSeesWhereAsked) {
   Sample whole, tile;
   renderer_->render(request, whole);
   EXPECT_TRUE(std::ranges::equal(whole.irradiance.pixels(), plain.irradiance.pixels()));
-  EXPECT_TRUE(std::ranges::equal(whole.flow_x.pixels(), plain.flow_x.pixels()));
+  EXPECT_TRUE(std::ranges::equal(whole.motion_x.pixels(), plain.motion_x.pixels()));
   request.tiles = {{17, 3, 35, 21}};
   renderer_->render(request, tile);
 
@@ -204,18 +204,20 @@ TEST_P(EveryRenderer, DoesNotDependOnThreadsOrHistory) {
   const Sample a = test::render(*renderer_, model_, camera_, objects_),
                b = test::render(*other, model_, camera_, objects_);
   EXPECT_TRUE(std::equal(a.irradiance.pixels().begin(), a.irradiance.pixels().end(), b.irradiance.pixels().begin()));
-  EXPECT_TRUE(std::equal(a.flow_x.pixels().begin(), a.flow_x.pixels().end(), b.flow_x.pixels().begin()));
+  EXPECT_TRUE(std::equal(a.motion_x.pixels().begin(), a.motion_x.pixels().end(), b.motion_x.pixels().begin()));
 }
 
-INSTANTIATE_TEST_SUITE_P(Renderers, EveryRenderer,
-                         testing::Combine(testing::Values("panorama", "plane", "mesh", "moving_mesh", "gl", "moving_gl",
-                                                          "sprites", "unrealcv", "moving_unrealcv"),
-                                          testing::Values(0, 1, 2, 3)),
+const auto kLenses = testing::Range(0, 4);
+
+INSTANTIATE_TEST_SUITE_P(OfSpace, EveryRenderer, testing::Combine(testing::ValuesIn(test::kRenderersOfSpace), kLenses),
                          EveryRenderer::name);
-INSTANTIATE_TEST_SUITE_P(Renderers, EveryRendererOfSpace,
-                         testing::Combine(testing::Values("panorama", "plane", "mesh", "moving_mesh", "gl", "moving_gl",
-                                                          "unrealcv", "moving_unrealcv"),
-                                          testing::Values(0, 1, 2, 3)),
+INSTANTIATE_TEST_SUITE_P(OnSensor, EveryRenderer,
+                         testing::Combine(testing::ValuesIn(test::kRenderersOnSensor), kLenses), EveryRenderer::name);
+INSTANTIATE_TEST_SUITE_P(Engines, EveryRenderer, testing::Combine(testing::ValuesIn(test::kEngines), kLenses),
+                         EveryRenderer::name);
+INSTANTIATE_TEST_SUITE_P(OfSpace, EveryRendererOfSpace,
+                         testing::Combine(testing::ValuesIn(test::kRenderersOfSpace), kLenses), EveryRenderer::name);
+INSTANTIATE_TEST_SUITE_P(Engines, EveryRendererOfSpace, testing::Combine(testing::ValuesIn(test::kEngines), kLenses),
                          EveryRenderer::name);
 
 // --- closed forms ---------------------------------------------------------------------------------------------------
@@ -275,16 +277,16 @@ TEST(SpritesRenderer, SaysWhoseMotionEachPixelHas) {
   bool uncovered = false;
   for (int y = 0; y < model.height; ++y) {
     for (int x = 0; x < model.width; ++x) {
-      const Sample& layer = alone[found.object(x, y) - 1];
-      ASSERT_EQ(found.flow_x(x, y), layer.flow_x(x, y)) << x << ", " << y;
+      const Sample& sprite = alone[found.object(x, y) - 1];
+      ASSERT_EQ(found.motion_x(x, y), sprite.motion_x(x, y)) << x << ", " << y;
       uncovered = uncovered || alone[0].object(x, y) == 0;
     }
   }
-  EXPECT_TRUE(uncovered) << "0 outside the only layer";
+  EXPECT_TRUE(uncovered) << "0 outside the only sprite";
 }
 
 TEST(PlaneRenderer, ShowsEachPointWhereItIs) {
-  const Poster poster = test::test_poster();
+  const TexturedPlane plane = test::test_plane();
   for (int kind = 0; kind < 4; ++kind) {
     const Camera model = test::distorted_camera(kind);
     const Kinematics camera = test::moving_camera();
@@ -292,8 +294,8 @@ TEST(PlaneRenderer, ShowsEachPointWhereItIs) {
     for (int y = 0; y < model.height; y += 7) {
       for (int x = 0; x < model.width; x += 7) {
         const Eigen::Vector3d bearing = model.back_project(Eigen::Vector2d(x, y))->bearing;
-        const SE3 T_poster_camera = poster.T_world_poster.inverse() * camera.T_world_body;
-        const Eigen::Vector3d o = T_poster_camera.translation, d = T_poster_camera.rotation * bearing;
+        const SE3 T_plane_camera = plane.T_world_plane.inverse() * camera.T_world_body;
+        const Eigen::Vector3d o = T_plane_camera.translation, d = T_plane_camera.rotation * bearing;
         const double depth = -o.z() / d.z();
         const Eigen::Vector3d point = o + depth * d;
         EXPECT_NEAR(sample.depth(x, y), depth, 1e-5 * depth);
@@ -303,16 +305,16 @@ TEST(PlaneRenderer, ShowsEachPointWhereItIs) {
   }
 }
 
-TEST(PlaneRenderer, ShowsTheBackgroundBesideThePosterAndBehindTheCamera) {
-  Poster poster = test::test_poster();
-  poster.endless = false;
-  poster.width_m = 0.1;
+TEST(PlaneRenderer, ShowsTheBackgroundBesideThePlaneAndBehindTheCamera) {
+  TexturedPlane plane = test::test_plane();
+  plane.endless = false;
+  plane.width_m = 0.1;
   const Camera model = test::distorted_camera(0);
-  const auto renderer = make_plane_renderer(poster, model, test::two_threads());
+  const auto renderer = make_plane_renderer(plane, model, test::two_threads());
   Sample sample = test::render(*renderer, model, test::moving_camera());
   EXPECT_EQ(sample.irradiance(0, 0), 0.2F);
   EXPECT_TRUE(std::isinf(sample.depth(0, 0)));
-  EXPECT_TRUE(std::isfinite(sample.flow_x(0, 0)));
+  EXPECT_TRUE(std::isfinite(sample.motion_x(0, 0)));
 
   Kinematics away = test::moving_camera();
   away.T_world_body.rotation =

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -66,7 +67,7 @@ inline Mesh box_mesh() {
 }
 
 /// The plane of make_renderer("plane"): 5 m wide, 2 m in front of the world's origin along x, slightly tilted.
-inline Poster test_poster() {
+inline TexturedPlane test_plane() {
   SE3 pose;
   pose.translation = {2.0, 0.1, -0.05};
   Eigen::Matrix3d R;
@@ -76,18 +77,16 @@ inline Poster test_poster() {
   return {smooth_texture(Wrap::repeat, Wrap::repeat), pose, 5.0, true, 0.2F};
 }
 
-/// The layers of make_renderer("sprites"): a rectangle that rotates and grows in front of an image that fills the
+/// The sprites of make_renderer("sprites"): a rectangle that rotates and grows in front of an image that fills the
 /// sensor.
 inline SpriteScene test_sprites() {
   const auto texture = smooth_texture(Wrap::clamp, Wrap::clamp);
-  const auto spline = [](std::vector<LayerKeyframe> keyframes) {
-    return LayerMotion(keyframes, KeyframeInterpolation::spline);
-  };
+  const auto spline = [](std::vector<SpritePose> poses) { return SpriteMotion(poses, SpriteInterpolation::spline); };
   Sprite near{
-      texture, nullptr, LayerUnits::pixel, LayerBeyond::nothing,
+      texture, nullptr, SpriteUnits::pixel, SpriteBeyond::nothing,
       spline({{-1, {-60, -20}, -70, {0.04, 0.08}}, {0.1, {5, 3}, 12, {0.06, 0.1}}, {1, {70, 10}, 80, {0.1, 0.1}}})};
   Sprite far{
-      texture, nullptr, LayerUnits::sensor, LayerBeyond::mirror,
+      texture, nullptr, SpriteUnits::sensor, SpriteBeyond::mirror,
       spline({{-1, {-0.3, 0.2}, 20, {1.5, 2.1}}, {0, {0.05, 0.1}, 5, {1.6, 2}}, {1, {0.4, 0.1}, -20, {1.9, 2}}})};
   return {{near, far}, 0.2F};
 }
@@ -156,15 +155,23 @@ inline std::vector<Kinematics> moving_objects(double t_s) {
 /// False if OpenGL is not available.
 inline bool has_gl() { return !gl_devices().empty(); }
 
-/// Every renderer on a scene that fills the view from near the origin.
+/// The renderers that make_renderer() makes: those of a 3D scene, and those that draw on the sensor. "moving": two
+/// objects move.
+inline constexpr std::array kRenderersOfSpace = {"panorama", "plane", "mesh", "moving_mesh", "gl", "moving_gl"};
+inline constexpr std::array kRenderersOnSensor = {"sprites"};
+
+/// Every renderer on a scene that fills the view from near the origin. Those of `gl` and `sprites` ignore `area`.
 inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Camera& camera,
-                                               const Workers& workers = two_threads()) {
-  if (name == "panorama") return make_panorama_renderer({smooth_texture(Wrap::repeat, Wrap::clamp)}, camera, workers);
-  if (name == "plane") return make_plane_renderer(test_poster(), camera, workers);
+                                               const Workers& workers = two_threads(), const PixelArea& area = {}) {
+  constexpr auto kNone = ColourFilters::none;
+  if (name == "panorama") {
+    return make_panorama_renderer({smooth_texture(Wrap::repeat, Wrap::clamp)}, camera, workers, kNone, area.texture);
+  }
+  if (name == "plane") return make_plane_renderer(test_plane(), camera, workers, kNone, area.texture);
   if (name == "sprites") return make_sprites_renderer(test_sprites(), camera, workers);
   const Scene scene = name.starts_with("moving") ? moving_scene() : still_scene(box_mesh());
   if (name.ends_with("gl")) return make_gl_renderer(scene, {}, camera);
-  return make_raycast_renderer(build_raycast_scene(scene), {}, camera, workers);
+  return make_raycast_renderer(build_raycast_scene(scene), {}, camera, workers, kNone, area);
 }
 
 /// The moving objects of that scene.

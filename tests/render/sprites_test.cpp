@@ -1,4 +1,4 @@
-// Closed forms and slow references for the layers of the sprites renderer.
+// Closed forms and slow references for the sprites of the sprites renderer.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -29,13 +29,11 @@ std::shared_ptr<const Texture> textured(int width, int height, const Function& o
   return std::make_shared<const Texture>(image, Wrap::clamp, Wrap::clamp);
 }
 
-LayerMotion linear(std::vector<LayerKeyframe> keyframes) {
-  return LayerMotion(keyframes, KeyframeInterpolation::linear);
-}
+SpriteMotion linear(std::vector<SpritePose> poses) { return SpriteMotion(poses, SpriteInterpolation::linear); }
 
-/// An opaque layer of one brightness that moves right by 10 px/s.
+/// An opaque sprite of one brightness that moves right by 10 px/s.
 Sprite plain(float light, Eigen::Vector2d scale, double velocity = 10.0) {
-  return {constant(light), nullptr, LayerUnits::pixel, LayerBeyond::nothing,
+  return {constant(light), nullptr, SpriteUnits::pixel, SpriteBeyond::nothing,
           linear({{0, {0, 0}, 0, scale}, {1, {velocity, 0}, 0, scale}})};
 }
 
@@ -61,7 +59,7 @@ Moments moments_of(const Image<float>& image) {
   return moments;
 }
 
-TEST(SpritesRenderer, ATranslatingLayerMovesByVelocityTimesTime) {
+TEST(SpritesRenderer, ATranslatingSpriteMovesByVelocityTimesTime) {
   const Eigen::Vector2d start(-11.3, 6.2), velocity(17.7, -9.1);
   const auto blob = textured(33, 27, [](double u, double v) {
     const double r2 = (u - 0.5) * (u - 0.5) + (v - 0.5) * (v - 0.5);
@@ -70,10 +68,10 @@ TEST(SpritesRenderer, ATranslatingLayerMovesByVelocityTimesTime) {
   for (const double rotation_deg : {0.0, 31.0}) {
     for (const double scale : {1.0, 0.6, 1.7}) {
       const double tolerance_px = scale < 1 ? 0.01 : 2e-3;  // mip levels of an odd size are not exactly centred
-      const LayerMotion motion =
+      const SpriteMotion motion =
           linear({{0, start, rotation_deg, {scale, scale}}, {1, start + velocity, rotation_deg, {scale, scale}}});
       for (const auto& [light, alpha] : {std::pair(blob, blob), std::pair(constant(0.8F, 33, 27), constant(1, 1, 1))}) {
-        const SpriteScene scene{{{light, alpha, LayerUnits::pixel, LayerBeyond::nothing, motion}}, 0.0F};
+        const SpriteScene scene{{{light, alpha, SpriteUnits::pixel, SpriteBeyond::nothing, motion}}, 0.0F};
         const Moments at_start = moments_of(render(scene, 0).irradiance);
         EXPECT_LT((at_start.centre - Eigen::Vector2d(59.5, 44.5) - start).norm(), tolerance_px);
         for (const double t_s : {0.01, 0.123, 0.5, 1.0}) {
@@ -84,8 +82,8 @@ TEST(SpritesRenderer, ATranslatingLayerMovesByVelocityTimesTime) {
           EXPECT_NEAR(now.mass / at_start.mass, 1.0, 2e-3);
           const auto x = static_cast<int>(std::lround(now.centre.x())),
                      y = static_cast<int>(std::lround(now.centre.y()));
-          EXPECT_FLOAT_EQ(sample.flow_x(x, y), 17.7F);
-          EXPECT_FLOAT_EQ(sample.flow_y(x, y), -9.1F);
+          EXPECT_FLOAT_EQ(sample.motion_x(x, y), 17.7F);
+          EXPECT_FLOAT_EQ(sample.motion_y(x, y), -9.1F);
           EXPECT_TRUE(std::isinf(sample.depth(x, y)));
         }
       }
@@ -94,55 +92,55 @@ TEST(SpritesRenderer, ATranslatingLayerMovesByVelocityTimesTime) {
 }
 
 TEST(SpritesRenderer, TheMotionFieldIsTheVelocityOfThePointThatIsSeen) {
-  const std::vector<LayerKeyframe> keyframes = {
+  const std::vector<SpritePose> poses = {
       {0, {-20, 4}, -20, {3, 2}}, {0.4, {3, -9}, 70, {4, 5}}, {1, {22, 10}, 300, {2, 3}}};
-  for (const auto units : {LayerUnits::pixel, LayerUnits::sensor}) {
-    std::vector<LayerKeyframe> keys = keyframes;
-    if (units == LayerUnits::sensor) {
-      for (LayerKeyframe& key : keys) key.position /= 100, key.scale /= 5;
+  for (const auto units : {SpriteUnits::pixel, SpriteUnits::sensor}) {
+    std::vector<SpritePose> keys = poses;
+    if (units == SpriteUnits::sensor) {
+      for (SpritePose& key : keys) key.position /= 100, key.scale /= 5;
     }
-    const LayerMotion motion(keys, KeyframeInterpolation::spline);
-    const Sprite sprite{constant(0.5F, 20, 10), nullptr, units, LayerBeyond::clamp, motion};
+    const SpriteMotion motion(keys, SpriteInterpolation::spline);
+    const Sprite sprite{constant(0.5F, 20, 10), nullptr, units, SpriteBeyond::clamp, motion};
     for (const double t_s : {0.1, 0.37, 0.9}) {
       const Sample sample = render({{sprite}, 0.0F}, t_s);
       const auto where = [&](double t, const Eigen::Vector2d& uv) -> Eigen::Vector2d {
-        const LayerPlacement at = place(motion.at(to_ns(t)), units, {20, 10}, {120, 90});
+        const SpritePlacement at = place(motion.at(to_ns(t)), units, {20, 10}, {120, 90});
         return at.centre + at.A * (uv - Eigen::Vector2d(0.5, 0.5));
       };
-      const LayerPlacement now = place(motion.at(to_ns(t_s)), units, {20, 10}, {120, 90});
+      const SpritePlacement now = place(motion.at(to_ns(t_s)), units, {20, 10}, {120, 90});
       for (int y = 0; y < 90; y += 11) {
         for (int x = 0; x < 120; x += 13) {
           const Eigen::Vector2d uv = Eigen::Vector2d(0.5, 0.5) + now.A.inverse() * (Eigen::Vector2d(x, y) - now.centre);
           const Eigen::Vector2d expected = (where(t_s + 1e-5, uv) - where(t_s - 1e-5, uv)) / 2e-5;
-          EXPECT_NEAR(sample.flow_x(x, y), expected.x(), 2e-5 * (1 + expected.norm()));
-          EXPECT_NEAR(sample.flow_y(x, y), expected.y(), 2e-5 * (1 + expected.norm()));
+          EXPECT_NEAR(sample.motion_x(x, y), expected.x(), 2e-5 * (1 + expected.norm()));
+          EXPECT_NEAR(sample.motion_y(x, y), expected.y(), 2e-5 * (1 + expected.norm()));
         }
       }
     }
   }
 }
 
-TEST(SpritesRenderer, TheFirstLayerIsTheNearest) {
+TEST(SpritesRenderer, TheFirstSpriteIsTheNearest) {
   const Sprite bright = plain(0.9F, {5, 5}, 10), dark = plain(0.1F, {3, 8}, -20);
   const Sample bright_first = render({{bright, dark}, 0.4F}, 0), dark_first = render({{dark, bright}, 0.4F}, 0);
   EXPECT_NEAR(bright_first.irradiance(60, 45), 0.9F, kTexel);
-  EXPECT_FLOAT_EQ(bright_first.flow_x(60, 45), 10.0F);
+  EXPECT_FLOAT_EQ(bright_first.motion_x(60, 45), 10.0F);
   EXPECT_NEAR(dark_first.irradiance(60, 45), 0.1F, kTexel);
-  EXPECT_FLOAT_EQ(dark_first.flow_x(60, 45), -20.0F);
+  EXPECT_FLOAT_EQ(dark_first.motion_x(60, 45), -20.0F);
   EXPECT_NEAR(bright_first.irradiance(60, 72), 0.1F, kTexel) << "beyond the bright one";
   EXPECT_NEAR(bright_first.irradiance(3, 3), 0.4F, kTexel) << "outside of both";
-  EXPECT_EQ(bright_first.flow_x(3, 3), 0.0F);
+  EXPECT_EQ(bright_first.motion_x(3, 3), 0.0F);
 }
 
-TEST(SpritesRenderer, TheMotionFieldIsOfTheLayerWithTheLargestShare) {
+TEST(SpritesRenderer, TheMotionFieldIsOfTheSpriteWithTheLargestWeight) {
   for (const float alpha : {0.3F, 0.45F, 0.55F, 0.8F}) {
     Sprite glass = plain(0.9F * alpha, {5, 5}, 10);
     glass.alpha = constant(alpha);
-    const Sample over_layer = render({{glass, plain(0.1F, {9, 9}, -20)}, 0.0F}, 0);
-    EXPECT_FLOAT_EQ(over_layer.flow_x(60, 45), alpha > 0.5F ? 10.0F : -20.0F) << alpha;
-    EXPECT_NEAR(over_layer.irradiance(60, 45), 0.9F * alpha + 0.1F * (1 - alpha), kTexel);
+    const Sample over_sprite = render({{glass, plain(0.1F, {9, 9}, -20)}, 0.0F}, 0);
+    EXPECT_FLOAT_EQ(over_sprite.motion_x(60, 45), alpha > 0.5F ? 10.0F : -20.0F) << alpha;
+    EXPECT_NEAR(over_sprite.irradiance(60, 45), 0.9F * alpha + 0.1F * (1 - alpha), kTexel);
     const Sample over_background = render({{glass}, 0.5F}, 0);
-    EXPECT_FLOAT_EQ(over_background.flow_x(60, 45), alpha > 0.5F ? 10.0F : 0.0F) << alpha;
+    EXPECT_FLOAT_EQ(over_background.motion_x(60, 45), alpha > 0.5F ? 10.0F : 0.0F) << alpha;
     EXPECT_NEAR(over_background.irradiance(60, 45), 0.9F * alpha + 0.5F * (1 - alpha), kTexel);
   }
 }
@@ -150,10 +148,10 @@ TEST(SpritesRenderer, TheMotionFieldIsOfTheLayerWithTheLargestShare) {
 TEST(SpritesRenderer, EdgesCoverTheirShareOfEveryPixel) {
   constexpr int kFine = 64;
   for (const double rotation_deg : {0.0, 3.0, 17.0, 45.0, 90.0}) {
-    const Sprite sheet{constant(1), nullptr, LayerUnits::pixel, LayerBeyond::nothing,
+    const Sprite sheet{constant(1), nullptr, SpriteUnits::pixel, SpriteBeyond::nothing,
                        linear({{0, {0.37, -0.81}, rotation_deg, {6.3, 4.1}}})};
     const Sample sample = render({{sheet}, 0.0F}, 0);
-    const LayerPlacement at = place(sheet.motion.at(0), sheet.units, {8, 8}, {120, 90});
+    const SpritePlacement at = place(sheet.motion.at(0), sheet.units, {8, 8}, {120, 90});
     const Eigen::Matrix2d uv_from_pixel = at.A.inverse();
     double largest = 0, total = 0;
     for (int y = 0; y < 90; ++y) {
@@ -173,20 +171,20 @@ TEST(SpritesRenderer, EdgesCoverTheirShareOfEveryPixel) {
 }
 
 TEST(SpritesRenderer, CompositesLikeASlowReference) {
-  // Three layers with smooth light and alpha; the reference evaluates their formulas at 8 x 8 points per pixel.
+  // Three sprites with smooth light and alpha; the reference evaluates their formulas at 8 x 8 points per pixel.
   const auto light = [](int i, double u, double v) { return 0.5 + 0.3 * std::sin(7 * u + i) * std::cos(5 * v - i); };
   const auto alpha = [](int i, double u, double v) {
     return 0.5 + 0.45 * std::cos(6 * u - 2 * i) * std::sin(4 * v + i);
   };
   SpriteScene scene{{}, 0.3F};
-  std::vector<LayerPlacement> placements;
+  std::vector<SpritePlacement> placements;
   for (int i = 0; i < 3; ++i) {
-    const LayerMotion motion =
+    const SpriteMotion motion =
         linear({{0, {9.0 * i - 12, 5.0 - 7 * i}, 25.0 * i - 10, {1.1 - 0.3 * i, 0.7 + 0.2 * i}}});
     scene.sprites.push_back({textured(80, 60, [&](double u, double v) { return light(i, u, v) * alpha(i, u, v); }),
-                             textured(80, 60, [&](double u, double v) { return alpha(i, u, v); }), LayerUnits::pixel,
-                             LayerBeyond::nothing, motion});
-    placements.push_back(place(motion.at(0), LayerUnits::pixel, {80, 60}, {120, 90}));
+                             textured(80, 60, [&](double u, double v) { return alpha(i, u, v); }), SpriteUnits::pixel,
+                             SpriteBeyond::nothing, motion});
+    placements.push_back(place(motion.at(0), SpriteUnits::pixel, {80, 60}, {120, 90}));
   }
   const Sample sample = render(scene, 0);
 
@@ -199,7 +197,7 @@ TEST(SpritesRenderer, CompositesLikeASlowReference) {
         const Eigen::Vector2d point(x - 0.5 + (k % kFine + 0.5) / kFine, y - 0.5 + (k / kFine + 0.5) / kFine);
         double behind = 0.3;
         for (int i = 2; i >= 0; --i) {
-          const LayerPlacement& at = placements[static_cast<std::size_t>(i)];
+          const SpritePlacement& at = placements[static_cast<std::size_t>(i)];
           const Eigen::Vector2d from_centre = at.A.inverse() * (point - at.centre);
           if (from_centre.cwiseAbs().maxCoeff() > 0.5) continue;
           const double u = from_centre.x() + 0.5, v = from_centre.y() + 0.5, a = alpha(i, u, v);
@@ -212,14 +210,14 @@ TEST(SpritesRenderer, CompositesLikeASlowReference) {
   }
   std::sort(errors.begin(), errors.end());
   EXPECT_LT(errors[errors.size() * 95 / 100], 2e-3);
-  EXPECT_LT(errors.back(), 0.05) << "where edges of two layers cross a pixel";
+  EXPECT_LT(errors.back(), 0.05) << "where edges of two sprites cross a pixel";
 }
 
 TEST(SpritesRenderer, TransparentTexelsDarkenNoEdge) {
   // A white disc cut out by alpha, on black that must not be visible, in front of a white background.
   const auto disc = textured(64, 64, [](double u, double v) { return std::hypot(u - 0.5, v - 0.5) < 0.4 ? 1.0 : 0.0; });
   for (const double scale : {0.13, 0.5, 1.0, 1.6}) {
-    const Sprite sprite{disc, disc, LayerUnits::pixel, LayerBeyond::nothing,
+    const Sprite sprite{disc, disc, SpriteUnits::pixel, SpriteBeyond::nothing,
                         linear({{0, {1.3, 2.4}, 20, {scale, scale}}})};
     const Sample sample = render({{sprite}, 1.0F}, 0);
     for (const float value : sample.irradiance.pixels()) ASSERT_NEAR(value, 1.0, 1e-5) << scale;
@@ -228,38 +226,38 @@ TEST(SpritesRenderer, TransparentTexelsDarkenNoEdge) {
 
 TEST(SpritesRenderer, GoesOnBeyondTheEdgesAsAsked) {
   // A ramp of 40 texels in the middle of the sensor, seen 30 texels beyond its right edge (u = 1.75).
-  const auto seen = [](LayerBeyond beyond) {
+  const auto seen = [](SpriteBeyond beyond) {
     Image<float> ramp(40, 4);
     for (int y = 0; y < 4; ++y) {
       for (int x = 0; x < 40; ++x) ramp(x, y) = (static_cast<float>(x) + 0.5F) / 40;
     }
-    const Wrap wrap = beyond == LayerBeyond::repeat ? Wrap::repeat : Wrap::clamp;
-    const Sprite sprite{std::make_shared<const Texture>(ramp, wrap, wrap), nullptr, LayerUnits::pixel, beyond,
+    const Wrap wrap = beyond == SpriteBeyond::repeat ? Wrap::repeat : Wrap::clamp;
+    const Sprite sprite{std::make_shared<const Texture>(ramp, wrap, wrap), nullptr, SpriteUnits::pixel, beyond,
                         linear({{0, {-10, 0.5}, 0, {1, 1}}})};
     return render({{sprite}, 0.123F}, 0).irradiance(99, 45);
   };
-  EXPECT_NEAR(seen(LayerBeyond::nothing), 0.123, 1e-6);
-  EXPECT_NEAR(seen(LayerBeyond::clamp), 1.0 - 0.5 / 40, kTexel);
-  EXPECT_NEAR(seen(LayerBeyond::mirror), 0.2625, 0.02);
-  EXPECT_NEAR(seen(LayerBeyond::repeat), 0.7375, 0.02);
+  EXPECT_NEAR(seen(SpriteBeyond::nothing), 0.123, 1e-6);
+  EXPECT_NEAR(seen(SpriteBeyond::clamp), 1.0 - 0.5 / 40, kTexel);
+  EXPECT_NEAR(seen(SpriteBeyond::mirror), 0.2625, 0.02);
+  EXPECT_NEAR(seen(SpriteBeyond::repeat), 0.7375, 0.02);
 }
 
 TEST(SpritesRenderer, DoesNotSeeTheCameraMove) {
   const Sample a = render(test::test_sprites(), 0.2), b = render(test::test_sprites(), 0.2, test::moving_camera());
   EXPECT_TRUE(std::ranges::equal(a.irradiance.pixels(), b.irradiance.pixels()));
-  EXPECT_TRUE(std::ranges::equal(a.flow_x.pixels(), b.flow_x.pixels()));
+  EXPECT_TRUE(std::ranges::equal(a.motion_x.pixels(), b.motion_x.pixels()));
   EXPECT_TRUE(make_sprites_renderer(test::test_sprites(), kCamera, test::two_threads())->traits().on_sensor);
 }
 
-TEST(SpritesRenderer, DegenerateLayersAreNotSeenAndLeaveNumbersFinite) {
-  for (const auto beyond : {LayerBeyond::nothing, LayerBeyond::clamp, LayerBeyond::mirror, LayerBeyond::repeat}) {
+TEST(SpritesRenderer, DegenerateSpritesAreNotSeenAndLeaveNumbersFinite) {
+  for (const auto beyond : {SpriteBeyond::nothing, SpriteBeyond::clamp, SpriteBeyond::mirror, SpriteBeyond::repeat}) {
     for (const Eigen::Vector2d& scale : {Eigen::Vector2d(0, 1), Eigen::Vector2d(0, 0), Eigen::Vector2d(1e-5, 1e6),
                                          Eigen::Vector2d(1e6, 1e6), Eigen::Vector2d(-2, 3)}) {
       for (const double away : {0.0, 1e6}) {
-        const Sprite sprite{constant(0.5F), constant(0.5F), LayerUnits::pixel, beyond,
+        const Sprite sprite{constant(0.5F), constant(0.5F), SpriteUnits::pixel, beyond,
                             linear({{0, {away, -away}, 33, scale}, {1, {0, 0}, -1e9, {1, 1}}})};
         const Sample sample = render({{sprite}, 0.25F}, 0);
-        for (const auto* field : {&sample.irradiance, &sample.flow_x, &sample.flow_y}) {
+        for (const auto* field : {&sample.irradiance, &sample.motion_x, &sample.motion_y}) {
           EXPECT_TRUE(std::ranges::all_of(field->pixels(), [](float value) { return std::isfinite(value); }));
         }
         EXPECT_TRUE(std::ranges::all_of(sample.irradiance.pixels(), [](float e) { return e > 0.24F && e < 0.64F; }));

@@ -14,7 +14,7 @@ namespace esim {
 namespace {
 
 // With more triangles than this, Embree is used.
-constexpr std::size_t kMostInTree = 20'000;
+constexpr std::size_t kMaxInTree = 20'000;
 
 /// A box with objects in it, in view of the moving camera.
 Mesh furnished_box() {
@@ -36,7 +36,7 @@ Mesh furnished_box() {
 Mesh with_crowd_outside(Mesh mesh) {
   const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
   for (const float x : {20.0F, 20.1F, 20.2F}) mesh.vertices.emplace_back(x, x * x / 20, 1);
-  mesh.triangles.resize(mesh.triangles.size() + kMostInTree, {first, first + 1, first + 2});
+  mesh.triangles.resize(mesh.triangles.size() + kMaxInTree, {first, first + 1, first + 2});
   mesh.texture_uv.resize(mesh.triangles.size());
   mesh.material.resize(mesh.triangles.size(), 0);
   return mesh;
@@ -73,7 +73,7 @@ TEST(TriangleTree, HasNoHolesBetweenTriangles) {
   const auto vector = [&] { return Eigen::Vector3d(uniform(random), uniform(random), uniform(random)); };
   for (const int n : {3, 10, 60}) {
     Mesh ball = test::ball_mesh(1, n);
-    ASSERT_LE(ball.triangles.size(), kMostInTree);
+    ASSERT_LE(ball.triangles.size(), kMaxInTree);
     for (Eigen::Vector3f& vertex : ball.vertices) vertex = 5 * vertex + Eigen::Vector3f(100, -20, 7);
     const Camera model = test::distorted_camera(0);
     const auto renderer = make_raycast_renderer(build_raycast_scene(still_scene(ball)), {}, model, test::two_threads());

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "esim/core/error.h"
 #include "render/scenes.h"
@@ -35,6 +36,24 @@ RenderRequest view_of(const std::string& scene, const Camera& camera, double dt)
           test::objects_of(scene, dt)};
 }
 
+/// A rendered keyframe.
+struct Rendered {
+  Sample sample;
+  KeyframeLight light;
+};
+
+/// Renders a keyframe with wide pixels, and with narrow ones too if `narrow`. make(area) makes the renderers.
+template <typename Make>
+Rendered wide_keyframe(const Make& make, const RenderRequest& request, double supersampling, bool narrow) {
+  Rendered result;
+  make(PixelArea{supersampling, supersampling})->render(request, result.sample);
+  result.light.wide = result.sample.irradiance;
+  Sample narrow_sample;
+  if (narrow) make(PixelArea{supersampling, 1})->render(request, narrow_sample);
+  result.light.narrow = narrow_sample.irradiance;
+  return result;
+}
+
 /// One of the test scenes with two keyframes and the views between them.
 class Between {
  public:
@@ -42,25 +61,30 @@ class Between {
       : name_(name),
         sensor_(test::distorted_camera(distortion)),
         workers_(workers),
-        layout_(lay_out_keyframes(sensor_, 2, 12, wide)),
+        wide_(wide),
+        layout_(lay_out_keyframes(sensor_, 2, 12)),
         renderer_(test::make_renderer(name, sensor_, workers)),
-        keyframes_(test::make_renderer(name, layout_.camera, workers)),
         reprojector_(layout_, renderer_->traits().at_infinity, workers) {}
 
   RenderRequest view(double dt, const Camera& camera) const { return view_of(name_, camera, dt); }
 
-  Keyframe keyframe(double dt) const {
-    Sample sample;
+  Rendered render(double dt) const {
     const RenderRequest request = view(dt, layout_.camera);
-    keyframes_->render(request, sample);
-    Keyframe result;
-    reprojector_.prepare(request, sample, result);
+    const auto make = [&](const PixelArea& area) { return test::make_renderer(name_, layout_.camera, workers_, area); };
+    if (wide_) return wide_keyframe(make, request, layout_.supersampling, name_.ends_with("mesh"));
+    Rendered result;
+    make({})->render(request, result.sample);
+    result.light.narrow = result.sample.irradiance;
     return result;
   }
 
-  void prepare(const RenderRequest& view, Sample& sample, Keyframe& keyframe) const {
-    reprojector_.prepare(view, sample, keyframe);
+  Keyframe prepare(double dt, Rendered rendered) const {
+    Keyframe result;
+    reprojector_.prepare(view(dt, layout_.camera), rendered.sample, std::move(rendered.light), result);
+    return result;
   }
+
+  Keyframe keyframe(double dt) const { return prepare(dt, render(dt)); }
 
   Reconstruction reconstruct(const Keyframe& before, const Keyframe& after, double dt, Detail detail = Detail::apart) {
     Reconstruction result;
@@ -74,14 +98,13 @@ class Between {
     return sample;
   }
 
-  const KeyframeLayout& layout() const { return layout_; }
-
  private:
   std::string name_;
   Camera sensor_;
   const Workers& workers_;
+  bool wide_;
   KeyframeLayout layout_;
-  std::unique_ptr<Renderer> renderer_, keyframes_;
+  std::unique_ptr<Renderer> renderer_;
   Reprojector reprojector_;
 };
 
@@ -151,7 +174,6 @@ TEST(Reprojector, DoesNotDependOnThreads) {
 TEST(Reprojector, AveragesFinePixelsWhereTheRendererDoesNot) {
   for (const char* name : {"panorama", "plane"}) {
     Between scene(name, 0, test::two_threads(), false);
-    EXPECT_EQ(scene.layout().camera.footprint, 1.0);
     const Reconstruction found = scene.reconstruct(scene.keyframe(0), scene.keyframe(0.06), 0.03);
     EXPECT_LT(difference(found.irradiance, scene.direct(0.03).irradiance).rms, 0.003);
   }
@@ -159,14 +181,13 @@ TEST(Reprojector, AveragesFinePixelsWhereTheRendererDoesNot) {
 
 TEST(Reprojector, BearsDepthThatIsNoNumber) {
   Between scene("mesh", 0);
-  Sample sample;
-  test::make_renderer("mesh", scene.layout().camera)->render(scene.view(0, scene.layout().camera), sample);
-  sample.depth(100, 80) = std::numeric_limits<float>::quiet_NaN();
-  sample.depth(101, 80) = std::numeric_limits<float>::infinity();
-  sample.depth(102, 80) = -1;
-  sample.depth(103, 80) = 0;
-  Keyframe damaged;
-  scene.prepare(scene.view(0, scene.layout().camera), sample, damaged);
+  Rendered rendered = scene.render(0);
+  Image<float>& depth = rendered.sample.depth;
+  depth(100, 80) = std::numeric_limits<float>::quiet_NaN();
+  depth(101, 80) = std::numeric_limits<float>::infinity();
+  depth(102, 80) = -1;
+  depth(103, 80) = 0;
+  const Keyframe damaged = scene.prepare(0, std::move(rendered));
   for (const Detail detail : {Detail::apart, Detail::whole}) {
     const Reconstruction found = scene.reconstruct(damaged, scene.keyframe(0.05), 0.02, detail);
     for (const float light : found.irradiance.pixels()) EXPECT_TRUE(light > 0 && light < 2);
@@ -204,21 +225,22 @@ struct SquaredErrors {
 SquaredErrors squared_errors(const Scene& described, const Camera& sensor) {
   const Workers& workers = test::two_threads();
   const auto scene = build_raycast_scene(described);
-  const KeyframeLayout layout = lay_out_keyframes(sensor, 3, 8, true);
+  const KeyframeLayout layout = lay_out_keyframes(sensor, 3, 8);
   Reprojector reprojector(layout, false, workers);
-  const auto render = [&](const Camera& camera, double dt) {
-    Sample sample;
-    make_raycast_renderer(scene, {0.5F, 64}, camera, workers)->render(view_of("mesh", camera, dt), sample);
-    return sample;
+  const auto make = [&](const Camera& camera, const PixelArea& area) {
+    return make_raycast_renderer(scene, {0.5F, 64}, camera, workers, ColourFilters::none, area);
   };
   Keyframe before, after;
   for (auto [keyframe, dt] : {std::pair{&before, 0.0}, {&after, 0.06}}) {
-    Sample sample = render(layout.camera, dt);
-    reprojector.prepare(view_of("mesh", layout.camera, dt), sample, *keyframe);
+    const RenderRequest view = view_of("mesh", layout.camera, dt);
+    const auto make_keyframes = [&](const PixelArea& area) { return make(layout.camera, area); };
+    Rendered rendered = wide_keyframe(make_keyframes, view, layout.supersampling, true);
+    reprojector.prepare(view, rendered.sample, std::move(rendered.light), *keyframe);
   }
   SquaredErrors errors;
   for (const double dt : {0.01, 0.03, 0.05}) {
-    const Sample direct = render(sensor, dt);
+    Sample direct;
+    make(sensor, {})->render(view_of("mesh", sensor, dt), direct);
     for (auto [detail, sum] : {std::pair{Detail::whole, &errors.whole}, {Detail::apart, &errors.apart}}) {
       Reconstruction found;
       reprojector.reconstruct(before, after, view_of("mesh", sensor, dt), detail, found);
@@ -251,9 +273,8 @@ TEST(Reprojector, SeesThroughNarrowGaps) {
 
 TEST(KeyframeLayout, PutsTheSensorsPixelsIntoItsMiddle) {
   const Camera sensor = test::distorted_camera(2);
-  const KeyframeLayout layout = lay_out_keyframes(sensor, 3, 7, true);
+  const KeyframeLayout layout = lay_out_keyframes(sensor, 3, 7);
   EXPECT_EQ(layout.camera.width, 3 * (120 + 14));
-  EXPECT_EQ(layout.camera.footprint, 3);
   const auto bearing = sensor.back_project({10, 20})->bearing;
   const auto there = layout.camera.project(bearing)->pixel;
   EXPECT_NEAR(there.x(), 3 * (10 + 7 + 0.5) - 0.5, 1e-9);
@@ -263,7 +284,7 @@ TEST(KeyframeLayout, PutsTheSensorsPixelsIntoItsMiddle) {
 TEST(KeyframeLayout, EndsWhereTheLensDoes) {
   Camera sensor = test::distorted_camera(1);
   sensor.distortion = RadialTangential{-0.2, 0.0, 0, 0, 0};
-  const KeyframeLayout layout = lay_out_keyframes(sensor, 2, 500, true);
+  const KeyframeLayout layout = lay_out_keyframes(sensor, 2, 500);
   EXPECT_LT(layout.margin_px, 500);
   EXPECT_NO_THROW(layout.camera.validate());
 }

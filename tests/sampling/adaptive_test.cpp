@@ -79,7 +79,7 @@ void evaluate(const TilesAt& wanted, const Movie& movie, Sample& sample) {
     for (int y = tile.y; y < tile.y + tile.height; ++y) {
       for (int x = tile.x; x < tile.x + tile.width; ++x) {
         sample.irradiance(x, y) = static_cast<float>(std::exp(movie.brightness(x, y, t)) - kEps);
-        sample.flow_x(x, y) = static_cast<float>(movie.speed(x, y, t)), sample.flow_y(x, y) = 0;
+        sample.motion_x(x, y) = static_cast<float>(movie.speed(x, y, t)), sample.motion_y(x, y) = 0;
       }
     }
   }
@@ -94,9 +94,7 @@ void answer(const SampleRequest& request, const Movie& movie, Sample& sample) {
 
 Outcome sample(const AdaptiveSampling& options, const Movie& movie, TimeNs end, int threads = 2) {
   const Workers workers(threads);
-  const auto sampler = make_adaptive_sampler(
-      options,
-      {{kThreshold, kEps}, kWidth, kHeight, {0, end}, workers, Camera::from_fov(kWidth, kHeight, 1.0), {}, {}});
+  const auto sampler = make_adaptive_sampler(options, {{kThreshold, kEps}, kWidth, kHeight, {0, end}, workers});
   Outcome outcome;
   Sample sample;
   while (const auto request = sampler->next()) {

@@ -24,28 +24,45 @@ Sample moving_ramp(TimeNs t, float gradient, float vx, float vy, double log_eps,
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       sample.irradiance(x, y) = static_cast<float>(std::exp(gradient * static_cast<float>(x - kWidth)) - log_eps);
-      sample.flow_x(x, y) = vx;
-      sample.flow_y(x, y) = vy;
+      sample.motion_x(x, y) = vx;
+      sample.motion_y(x, y) = vy;
     }
   }
   return sample;
 }
 
-/// A camera at rest; the scene is infinitely far away.
-SamplingContext context(const TimeSpan& span, const SensorTraits& sensor = {}) {
-  return {sensor,
-          kWidth,
-          kHeight,
-          span,
-          kWorkers,
-          Camera::from_fov(kWidth, kHeight, 1.0),
-          {.name = "test", .at_infinity = true, .wide_pixels = true},
-          [](TimeNs t) {
-            RenderRequest view;
-            view.t = t;
-            return view;
-          }};
-}
+SamplingContext context(const TimeSpan& span) { return {{}, kWidth, kHeight, span, kWorkers}; }
+
+/// The moving ramp, infinitely far away, for a camera of any size.
+class RampRenderer final : public ProcessorRenderer {
+ public:
+  explicit RampRenderer(const Camera& camera) : camera_(camera) {}
+  RendererTraits traits() const override { return {.name = "test", .at_infinity = true}; }
+
+ private:
+  void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
+    sample = moving_ramp(requests[0].t, 0.05F, 100.0F, 200.0F, 0.001, camera_.width, camera_.height);
+    sample.tiles.clear();
+    for (const RenderRequest& request : requests)
+      sample.tiles.insert(sample.tiles.end(), request.tiles.begin(), request.tiles.end());
+  }
+
+  Camera camera_;
+};
+
+/// A camera at rest in front of the ramp.
+struct RampScene {
+  Camera camera = Camera::from_fov(kWidth, kHeight, 1.0);
+  RampRenderer renderer{camera};
+  SceneAccess access{
+      camera, renderer,
+      [](TimeNs t) {
+        RenderRequest view;
+        view.t = t;
+        return view;
+      },
+      [](const Camera& other, const std::optional<PixelArea>&) { return std::make_unique<RampRenderer>(other); }};
+};
 
 class EverySampler : public testing::TestWithParam<SamplingOptions> {};
 
@@ -53,8 +70,8 @@ class EverySampler : public testing::TestWithParam<SamplingOptions> {};
 // watermark advances with them.
 TEST_P(EverySampler, KeepsItsContract) {
   const TimeSpan span{-3 * kNsPerMs, 17 * kNsPerMs + 123};
-  const Camera camera = sampled_camera(GetParam(), context(span));
-  const auto sampler = make_sampler(GetParam(), context(span));
+  RampScene scene;
+  const auto sampler = make_sampler(GetParam(), context(span), &scene.access);
   EXPECT_EQ(sampler->watermark(), span.start);
   Image<TimeNs> known(kWidth, kHeight, span.start);
   Image<int> segments(kWidth, kHeight, 0);
@@ -73,10 +90,12 @@ TEST_P(EverySampler, KeepsItsContract) {
     EXPECT_EQ(request->t, sampler->next()->t) << "next() is not idempotent";
     ASSERT_TRUE(samples == 0 ? request->t == span.start : request->t > sampler->watermark()) << "requests a known time";
     ASSERT_LE(request->t, span.end);
-    const int width = request->of_sensor ? kWidth : camera.width, height = request->of_sensor ? kHeight : camera.height;
-    Sample sample = moving_ramp(request->t, 0.05F, 100.0F, 200.0F, 0.001, width, height);
-    sample.tiles = request->tiles;
-    for (const Tile& tile : request->tiles) evaluations += static_cast<std::int64_t>(tile.area());
+    Renderer& renderer = request->renderer != nullptr ? *request->renderer : scene.renderer;
+    std::vector<RenderRequest> views = {{.t = request->t, .camera = {}, .tiles = request->tiles}};
+    for (const auto& [t, tiles] : request->later) views.push_back({.t = t, .camera = {}, .tiles = tiles});
+    Sample sample;
+    renderer.start_together(std::move(views))->finish(sample);
+    for (const Tile& tile : sample.tiles) evaluations += static_cast<std::int64_t>(tile.area());
     for (auto found = sampler->accept(sample); !found.empty(); found = sampler->more()) {
       for (const Segment& segment : found) take(segment);
     }
@@ -117,15 +136,15 @@ TEST(FrameSampler, HandsOutWhatWasRendered) {
 TEST(FlowSampling, BoundsTheMotionBetweenSamples) {
   Sample sample = moving_ramp(0, 0.1F, 30.0F, -40.0F, 0.001);
   EXPECT_NEAR(fastest_motion_px_per_s(sample, kWorkers), 50.0, 1e-4);
-  sample.flow_x(kWidth - 1, kHeight - 1) = 300.0F;
-  sample.flow_y(kWidth - 1, kHeight - 1) = 400.0F;
+  sample.motion_x(kWidth - 1, kHeight - 1) = 300.0F;
+  sample.motion_y(kWidth - 1, kHeight - 1) = 400.0F;
   EXPECT_NEAR(wanted_interval_s(FlowSampling{.lambda = 0.25, .bounds = {}}, {}, sample, kWorkers), 0.25 / 500, 1e-8);
 }
 
 TEST(FlowSampling, IgnoresMotionThatIsNotFinite) {
   Sample sample = moving_ramp(0, 0.1F, 3.0F, 4.0F, 0.001);
-  sample.flow_x(1, 1) = std::numeric_limits<float>::quiet_NaN();
-  sample.flow_y(2, 1) = std::numeric_limits<float>::infinity();
+  sample.motion_x(1, 1) = std::numeric_limits<float>::quiet_NaN();
+  sample.motion_y(2, 1) = std::numeric_limits<float>::infinity();
   EXPECT_NEAR(fastest_motion_px_per_s(sample, kWorkers), 5.0, 1e-5);
 }
 

@@ -1,23 +1,20 @@
-#include "esim/sampling/supersampling.h"
+#include "esim/sampling/keyframes/supersampling.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "esim/sampling/keyframes.h"
-
 namespace esim {
 namespace {
 
 const Workers kWorkers(2);
-constexpr RendererTraits kTraits{.name = "test", .at_infinity = true, .wide_pixels = true};
 
 /// Stripes at infinity, `period` sensor pixels wide; each pixel sees only one direction.
 class Stripes final : public ProcessorRenderer {
  public:
   Stripes(const Camera& camera, double period) : camera_(camera), period_(period) {}
-  RendererTraits traits() const override { return kTraits; }
+  RendererTraits traits() const override { return {.name = "test", .at_infinity = true}; }
 
  private:
   void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
@@ -38,52 +35,43 @@ class Stripes final : public ProcessorRenderer {
   double period_;
 };
 
-struct Setting {
-  explicit Setting(double stripes) : period(stripes) {}
-
-  double period;
-  Camera sensor = [] {
-    Camera camera = Camera::from_fov(60, 40, 1.0);
-    camera.fx = camera.fy = 60;
-    return camera;
-  }();
-  SamplingContext context{{.contrast_threshold = 0.3}, 60, 40, {0, kNsPerMs}, kWorkers, sensor, kTraits, [](TimeNs t) {
-                            RenderRequest view;
-                            view.t = t;
-                            return view;
-                          }};
-  Stripes renderer{sensor, period};
-
-  KeyframeSampling decide(const KeyframeSampling& options) {
-    return decide_supersampling(options, RenderRequest{}, context, renderer,
-                                [&](const Camera& camera) { return std::make_unique<Stripes>(camera, period); });
-  }
-};
+/// The keyframes that the options give for stripes of a period.
+KeyframeSetup set_up(double period, const KeyframeSampling& options) {
+  Camera sensor = Camera::from_fov(60, 40, 1.0);
+  sensor.fx = sensor.fy = 60;
+  Stripes renderer(sensor, period);
+  const SceneAccess scene{
+      sensor, renderer,
+      [](TimeNs t) {
+        RenderRequest view;
+        view.t = t;
+        return view;
+      },
+      [&](const Camera& camera, const std::optional<PixelArea>&) { return std::make_unique<Stripes>(camera, period); }};
+  return set_up_keyframes(options, {{.contrast_threshold = 0.3}, 60, 40, {0, kNsPerMs}, kWorkers}, scene);
+}
 
 TEST(Supersampling, LowersTheFloorThatItMeasures) {
   double last = 1;
   for (const int s : {1, 2, 3, 4}) {
-    Setting setting(4);
-    EXPECT_EQ(setting.decide({.supersampling = s}).supersampling, s);
-    ASSERT_TRUE(setting.context.resampling_floor.has_value());
-    EXPECT_LT(setting.context.resampling_floor->p99, 0.7 * last) << s;
-    EXPECT_GT(setting.context.resampling_floor->mean, 0) << s << ": looked up between the pixels";
-    last = setting.context.resampling_floor->p99;
+    const KeyframeSetup setup = set_up(4, {.supersampling = s});
+    EXPECT_EQ(setup.layout.supersampling, s);
+    EXPECT_LT(setup.resampling_error.p99, 0.7 * last) << s;
+    EXPECT_GT(setup.resampling_error.mean, 0) << s << ": looked up between the pixels";
+    last = setup.resampling_error.p99;
   }
 }
 
 TEST(Supersampling, FollowsFromTheTolerance) {
   const auto chosen = [](double period, double tolerance) {
-    Setting setting(period);
-    const int s = setting.decide({.tolerance = tolerance}).supersampling;
+    const KeyframeSetup setup = set_up(period, {.tolerance = tolerance});
+    const int s = setup.layout.supersampling;
     const double most = tolerance * 0.3;
-    if (s < kMostSupersampling) {
-      EXPECT_LE(setting.context.resampling_floor->p99, most);
+    if (s < kMaxSupersampling) {
+      EXPECT_LE(setup.resampling_error.p99, most);
     }
-    if (s > kLeastSupersampling) {
-      Setting coarser(period);
-      coarser.decide({.supersampling = s - 1});
-      EXPECT_GT(coarser.context.resampling_floor->p99, most);
+    if (s > kMinSupersampling) {
+      EXPECT_GT(set_up(period, {.supersampling = s - 1}).resampling_error.p99, most);
     }
     return s;
   };
@@ -98,11 +86,7 @@ TEST(Supersampling, FollowsFromTheTolerance) {
   EXPECT_EQ(last, 2);
 }
 
-TEST(Supersampling, FindsNoFloorUnderAnEvenLight) {
-  Setting setting(1e9);
-  setting.decide({});
-  EXPECT_LT(setting.context.resampling_floor->max, 1e-5);
-}
+TEST(Supersampling, FindsNoFloorUnderAnEvenLight) { EXPECT_LT(set_up(1e9, {}).resampling_error.max, 1e-5); }
 
 }  // namespace
 }  // namespace esim

@@ -50,7 +50,7 @@ TEST_F(ScenarioFile, GivesDefaultsToWhatItDoesNotName) {
   EXPECT_EQ(std::get<PanoramaRendererOptions>(scenario.renderer).gaussian_px, 0);
 }
 
-TEST_F(ScenarioFile, SoftensImagesOfPanoramasAndPosters) {
+TEST_F(ScenarioFile, SoftensImagesOfPanoramasAndPlanes) {
   const auto with = [](const std::string& renderer) {
     return "duration_s: 1\ntrajectory: {type: static}\nrenderer: {image: p.jpg, " + renderer + "}\n";
   };
@@ -58,9 +58,9 @@ TEST_F(ScenarioFile, SoftensImagesOfPanoramasAndPosters) {
       std::get<PanoramaRendererOptions>(read(with("type: panorama, median_px: 5, gaussian_px: 1.5")).renderer);
   EXPECT_EQ(panorama.median_px, 5);
   EXPECT_EQ(panorama.gaussian_px, 1.5);
-  const auto poster = std::get<PlaneRendererOptions>(read(with("type: plane, median_px: 3, gaussian_px: 2")).renderer);
-  EXPECT_EQ(poster.median_px, 3);
-  EXPECT_EQ(poster.gaussian_px, 2);
+  const auto plane = std::get<PlaneRendererOptions>(read(with("type: plane, median_px: 3, gaussian_px: 2")).renderer);
+  EXPECT_EQ(plane.median_px, 3);
+  EXPECT_EQ(plane.gaussian_px, 2);
   EXPECT_TRUE(contains(error(with("type: panorama, median_px: 257")), "renderer.median_px"));
   EXPECT_TRUE(contains(error(with("type: panorama, gaussian_px: -1")), "renderer.gaussian_px"));
 }
@@ -154,6 +154,26 @@ renderer:
   EXPECT_TRUE(contains(error(yaml, {"renderer.objects.0.scale=0"}), "renderer.objects.0.scale"));
   EXPECT_TRUE(contains(error(yaml, {"renderer.objects=3"}), "must be a list"));
   EXPECT_TRUE(contains(error(yaml, {"renderer.lighting.type=phong"}), "is not one of unlit, lambert"));
+}
+
+TEST_F(ScenarioFile, ReadsTheWaypointsOfObjectsInEveryRenderer) {
+  std::ofstream(folder_.path() / "walk.yaml") << "points: [{position: [0, 0, 1]}, {position: [2, 0, 1]}]\n";
+  for (const std::string renderer : {"mesh, scene: room.obj", "unrealcv", "blender, scene: room.blend"}) {
+    const Scenario scenario = read("trajectory: {type: static}\nrenderer: {type: " + renderer +
+                                   ", objects: [{name: a, trajectory: {type: waypoints, file: walk.yaml}}]}\n");
+    std::visit(
+        [&](const auto& options) {
+          if constexpr (requires { options.objects; }) {
+            ASSERT_EQ(options.objects.size(), 1U) << renderer;
+            const auto& path = std::get<WaypointTrajectoryOptions>(options.objects[0].trajectory);
+            EXPECT_EQ(path.points.size(), 2U) << renderer;
+            EXPECT_EQ(path.points_file, folder_.path() / "walk.yaml") << renderer;
+          } else {
+            ADD_FAILURE() << renderer;
+          }
+        },
+        scenario.renderer);
+  }
 }
 
 TEST_F(ScenarioFile, TakesOverrides) {

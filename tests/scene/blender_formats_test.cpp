@@ -91,9 +91,9 @@ std::vector<Eigen::Vector3d> cube(double size, const Eigen::Vector3d& scale, dou
 }
 
 double distance(const Eigen::Vector3d& point, const std::vector<Eigen::Vector3d>& others) {
-  double least = 1e9;
-  for (const Eigen::Vector3d& other : others) least = std::min(least, (point - other).norm());
-  return least;
+  double min = 1e9;
+  for (const Eigen::Vector3d& other : others) min = std::min(min, (point - other).norm());
+  return min;
 }
 
 void expect_same_points(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vector3d>& b,

@@ -150,7 +150,7 @@ TEST_F(ColourCamera, ExposesAMosaic) {
 
 TEST_F(ColourCamera, IsRefusedByWhatShowsGreyOnly) {
   SpritesRendererOptions sprites;
-  sprites.layers.emplace_back().image = folder_.path() / "paint.png";
+  sprites.sprites.emplace_back().image = folder_.path() / "paint.png";
   scenario_.renderer = sprites;
   EXPECT_TRUE(test::contains(refusal(), "camera cam0: colour: the renderer sprites renders luminance only"));
 

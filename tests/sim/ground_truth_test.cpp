@@ -16,7 +16,7 @@ class Collector final : public Sink {
     int camera;
     TimeNs t;
     SE3 T_world_camera;
-    Image<float> depth, flow_x;
+    Image<float> depth, motion_x;
     Image<std::uint16_t> object;
     std::vector<SE3> T_world_objects;
   };
@@ -29,11 +29,11 @@ class Collector final : public Sink {
   void begin(const RecordingInfo& recording) override { info = recording; }
   void write(const Record& record) override {
     if (const auto* truth = std::get_if<TruthRecord>(&record)) {
-      frames.push_back({truth->camera, truth->t, truth->T_world_camera, truth->depth, truth->flow_x, {}, {}});
+      frames.push_back({truth->camera, truth->t, truth->T_world_camera, truth->depth, truth->motion_x, {}, {}});
       frames.back().T_world_objects.assign(truth->T_world_objects.begin(), truth->T_world_objects.end());
       if (truth->object != nullptr) frames.back().object = *truth->object;
     }
-    if (const auto* part = std::get_if<DisplacementRecord>(&record)) {
+    if (const auto* part = std::get_if<OpticalFlowRecord>(&record)) {
       EXPECT_EQ(part->t1, frames.back().t);
       intervals.push_back({part->t0, part->t1, part->x, part->y, part->visible});
     }
@@ -72,7 +72,7 @@ TEST_F(GroundTruth, IsWhatIsAskedForAndChangesNoEvent) {
   const Collector plain = run();
   EXPECT_TRUE(plain.intervals.empty() && plain.points.empty());
   EXPECT_TRUE(plain.frames[0].object.empty());
-  scenario_.truth.objects = scenario_.truth.displacement = scenario_.truth.event_points = true;
+  scenario_.truth.objects = scenario_.truth.optical_flow = scenario_.truth.event_points = true;
   const Collector all = run();
   EXPECT_EQ(all.events, plain.events);
   EXPECT_GT(all.events.size(), 100U);
@@ -87,7 +87,7 @@ TEST_F(GroundTruth, IsWhatIsAskedForAndChangesNoEvent) {
 }
 
 TEST_F(GroundTruth, KnowsTheCardWhereverItIs) {
-  scenario_.truth.objects = scenario_.truth.displacement = true;
+  scenario_.truth.objects = scenario_.truth.optical_flow = true;
   const Collector out = run();
   const double fx = 32 / std::tan(20 * std::numbers::pi / 180);
   for (std::size_t k = 0; k < out.frames.size(); ++k) {
@@ -101,7 +101,7 @@ TEST_F(GroundTruth, KnowsTheCardWhereverItIs) {
         if (k + 1 == out.frames.size()) continue;
         // The card moves along world y, to the left of the image, by 2 m/s at 2 m for 10 ms; the wall does not.
         ASSERT_NEAR(out.intervals[k].x(x, y), card ? -fx * 0.01 : 0.0, 0.01) << x << ", " << y << ", frame " << k;
-        ASSERT_NEAR(out.intervals[k].x(x, y), frame.flow_x(x, y) * 0.01, 0.01);
+        ASSERT_NEAR(out.intervals[k].x(x, y), frame.motion_x(x, y) * 0.01, 0.01);
       }
     }
     EXPECT_GT(on_card, 100);
@@ -181,10 +181,10 @@ TEST_F(GroundTruth, OfAStereoPairObeysTheEpipolarConstraint) {
 }
 
 TEST_F(GroundTruth, SaysWhyItCannotBeHad) {
-  scenario_.truth.displacement = true;
+  scenario_.truth.optical_flow = true;
   scenario_.truth.rate_hz = 0;
   EXPECT_TRUE(
-      test::contains(error(), "truth.displacement: needs two frames of ground truth, but truth.rate_hz = 0 gives 0"));
+      test::contains(error(), "truth.optical_flow: needs two frames of ground truth, but truth.rate_hz = 0 gives 0"));
   scenario_.truth.rate_hz = 4;
   EXPECT_TRUE(test::contains(error(), "rate_hz = 4 gives 1 in 0.2 s; raise truth.rate_hz"));
   scenario_.truth.rate_hz = 5;
@@ -203,13 +203,13 @@ TEST_F(GroundTruth, SaysWhyItCannotBeHad) {
   EXPECT_TRUE(test::contains(error(), "truth.event_points: needs finite depth, but everything in panorama"));
 
   scenario_.truth = {};
-  scenario_.truth.displacement = true;
+  scenario_.truth.optical_flow = true;
   EXPECT_EQ(error(), "nothing was thrown") << "directions move in the image, too";
   SpritesRendererOptions sprites;
-  sprites.layers.resize(1);
-  sprites.layers[0].image = folder_.path() / "sky.pgm";
+  sprites.sprites.resize(1);
+  sprites.sprites[0].image = folder_.path() / "sky.pgm";
   scenario_.renderer = sprites;
-  EXPECT_TRUE(test::contains(error(), "truth.displacement: needs depth, but sprites are drawn on the sensor"));
+  EXPECT_TRUE(test::contains(error(), "truth.optical_flow: needs depth, but sprites are drawn on the sensor"));
 }
 
 }  // namespace

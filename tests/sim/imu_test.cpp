@@ -51,7 +51,7 @@ class Logbook final : public Sink {
   TimeNs now_ = 0, last_event_ = 0;
 };
 
-/// A random flight in front of layers on the sensor, which need no files, with an IMU.
+/// A random flight in front of sprites on the sensor, which need no files, with an IMU.
 Scenario scenario_with_imu() {
   Scenario scenario;
   SpritesRendererOptions renderer;
@@ -75,7 +75,7 @@ class ImuSimulation : public testing::Test {
  protected:
   void SetUp() override {
     std::ofstream(folder_.path() / "p.pgm") << "P2 4 4 255\n0 255 0 255 9 200 30 40 255 0 255 0 90 80 70 60\n";
-    std::get<SpritesRendererOptions>(scenario_.renderer).layers = {layer()};
+    std::get<SpritesRendererOptions>(scenario_.renderer).sprites = {sprite()};
     scenario_.cameras.resize(2);
     for (CameraOptions& camera : scenario_.cameras) camera.width = 16, camera.height = 12;
     scenario_.cameras[0].name = "left", scenario_.cameras[1].name = "right";
@@ -84,14 +84,14 @@ class ImuSimulation : public testing::Test {
     scenario_.cameras[1].sampling = UniformSampling{300};
   }
 
-  LayerOptions layer() const {
-    LayerOptions layer;
-    layer.image = folder_.path() / "p.pgm";
-    layer.units = LayerUnits::sensor;
-    layer.keyframes = {LayerKeyframe{}, LayerKeyframe{}};
-    layer.keyframes[1].t_s = 1;
-    layer.keyframes[1].position = {0.5, 0.2};
-    return layer;
+  SpriteOptions sprite() const {
+    SpriteOptions sprite;
+    sprite.image = folder_.path() / "p.pgm";
+    sprite.units = SpriteUnits::sensor;
+    sprite.poses = {SpritePose{}, SpritePose{}};
+    sprite.poses[1].t_s = 1;
+    sprite.poses[1].position = {0.5, 0.2};
+    return sprite;
   }
 
   Summary run(Logbook& out, int threads = 1) {

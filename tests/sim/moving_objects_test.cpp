@@ -13,7 +13,7 @@ class Counter final : public Sink {
   void write(const Record& record) override {
     if (const auto* part = std::get_if<EventsRecord>(&record))
       events.insert(events.end(), part->events.begin(), part->events.end());
-    if (const auto* truth = std::get_if<TruthRecord>(&record)) flow_x = truth->flow_x;
+    if (const auto* truth = std::get_if<TruthRecord>(&record)) motion_x = truth->motion_x;
     if (const auto* pose = std::get_if<PoseRecord>(&record)) poses.push_back(*pose);
   }
   void end(bool) override {}
@@ -21,7 +21,7 @@ class Counter final : public Sink {
   RecordingInfo info;
   std::vector<Event> events;
   std::vector<PoseRecord> poses;
-  Image<float> flow_x;
+  Image<float> motion_x;
 };
 
 class MovingObjects : public test::CardScene {

@@ -39,7 +39,7 @@ constexpr int kSteps = 40;
 const Notices kQuiet{[](const std::string&) {}, [](const std::string&) {}};
 const Monitor kOn = [](const Progress&) { return true; };
 
-/// A camera that looks down at a poster, which it crosses while turning.
+/// A camera that looks down at a plane, which it crosses while turning.
 SE3 pose(int step) {
   const double s = 0.01 * std::max(step, 0);
   const Eigen::Quaterniond down(0, 1, 0, 0);

@@ -9,6 +9,7 @@
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
 #include "support/errors.h"
+#include "support/named_result.h"
 #include "support/temporary_directory.h"
 
 namespace esim {
@@ -143,7 +144,7 @@ TEST_F(Simulation, SeesTheSameThroughKeyframes) {
   const SamplingStatistics& sampling = summary.cameras[0].sampling;
   EXPECT_LT(sampling.samples - sampling.audits, dense / 10);
   EXPECT_EQ(sampling.audits, 1);
-  EXPECT_TRUE(sampling.resampling_floor.has_value());
+  EXPECT_TRUE(test::named_result<MeasuredError>(sampling, "resampling_floor").has_value());
   EXPECT_GT(flow.events[0].size(), 10000U);
   const double ratio = static_cast<double>(keyframes.events[0].size()) / static_cast<double>(flow.events[0].size());
   EXPECT_NEAR(ratio, 1, 0.03);

@@ -1,4 +1,4 @@
-// Whole simulations of layers on the sensor, from a scenario's file.
+// Whole simulations of sprites on the sensor, from a scenario's file.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ class LastFrame final : public Sink {
     if (const auto* part = std::get_if<EventsRecord>(&record)) events += part->events.size();
     if (const auto* truth = std::get_if<TruthRecord>(&record)) {
       brightest = *std::max_element(truth->irradiance.pixels().begin(), truth->irradiance.pixels().end());
-      fastest = *std::max_element(truth->flow_x.pixels().begin(), truth->flow_x.pixels().end());
+      fastest = *std::max_element(truth->motion_x.pixels().begin(), truth->motion_x.pixels().end());
     }
   }
   void end(bool) override {}
@@ -53,10 +53,10 @@ class SpritesScenario : public testing::Test {
 };
 
 constexpr const char* kMoving =
-    "renderer: {type: sprites, layers: [{image: a.png, keyframes: [{t_s: 0}, {t_s: 0.2, position: [10, 0]}]}]}\n"
+    "renderer: {type: sprites, sprites: [{image: a.png, poses: [{t_s: 0}, {t_s: 0.2, position: [10, 0]}]}]}\n"
     "event_camera: {contrast_threshold: 0.2}\n";
 
-TEST_F(SpritesScenario, NeedsNoTrajectoryAndEndsWithItsKeyframes) {
+TEST_F(SpritesScenario, NeedsNoTrajectoryAndEndsWithItsPoses) {
   const LastFrame out = simulate_all(build(kMoving));
   EXPECT_EQ(out.info.end, to_ns(0.2));
   EXPECT_GT(out.events, 100U);
@@ -73,18 +73,19 @@ TEST_F(SpritesScenario, SaysWhatHasNoEffect) {
   EXPECT_TRUE(test::contains(warnings_, "camera cam0: distortion has no effect"));
 }
 
-TEST_F(SpritesScenario, NamesTheLayerThatIsWrong) {
-  const auto of_layers = [](const std::string& layers) {
-    return "duration_s: 1\nrenderer: {type: sprites, layers: [{image: a.png}, " + layers + "]}\n";
+TEST_F(SpritesScenario, NamesTheInvalidSprite) {
+  const auto of_sprites = [](const std::string& sprites) {
+    return "duration_s: 1\nrenderer: {type: sprites, sprites: [{image: a.png}, " + sprites + "]}\n";
   };
   EXPECT_TRUE(test::contains(error("duration_s: 1\nrenderer: {type: sprites}\n"), "list sprites"));
-  EXPECT_TRUE(test::contains(error("renderer: {type: sprites, layers: [{image: a.png}]}\n"), "duration_s: is missing"));
-  EXPECT_TRUE(test::contains(error(of_layers("{}")), "renderer.layers.1.image: is missing"));
-  EXPECT_TRUE(test::contains(error(of_layers("{image: b.png}")), "renderer.layers.1: image"));
-  EXPECT_TRUE(test::contains(error(of_layers("{image: b.png}")), "no such file"));
-  EXPECT_TRUE(test::contains(error(of_layers("{image: a.png, keyframes: []}")), "renderer.layers.1: has no keyframes"));
-  EXPECT_TRUE(test::contains(error(of_layers("{image: a.png, median_px: 4}")), "renderer.layers.1: image"));
-  EXPECT_TRUE(test::contains(error(of_layers("{image: a.png, keyframes: [{t_s: 1}, {t_s: 1}]}")), "must increase"));
+  EXPECT_TRUE(
+      test::contains(error("renderer: {type: sprites, sprites: [{image: a.png}]}\n"), "duration_s: is missing"));
+  EXPECT_TRUE(test::contains(error(of_sprites("{}")), "renderer.sprites.1.image: is missing"));
+  EXPECT_TRUE(test::contains(error(of_sprites("{image: b.png}")), "renderer.sprites.1: image"));
+  EXPECT_TRUE(test::contains(error(of_sprites("{image: b.png}")), "no such file"));
+  EXPECT_TRUE(test::contains(error(of_sprites("{image: a.png, poses: []}")), "renderer.sprites.1: has no poses"));
+  EXPECT_TRUE(test::contains(error(of_sprites("{image: a.png, median_px: 4}")), "renderer.sprites.1: image"));
+  EXPECT_TRUE(test::contains(error(of_sprites("{image: a.png, poses: [{t_s: 1}, {t_s: 1}]}")), "must increase"));
 }
 
 TEST_F(SpritesScenario, TheOriginalsExampleRuns) {

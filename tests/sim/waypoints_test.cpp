@@ -1,4 +1,4 @@
-#include "esim/compose/waypoints.h"
+#include "esim/compose/waypoint_trajectory.h"
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ WaypointPointOptions looking(const Vector3d& position, const Vector3d& at) {
   return point;
 }
 
-/// A camera beside its body and turned against it.
+/// A camera next to its body, with another orientation.
 SE3 odd_mount() { return {so3_exp({0.7, -1.1, 0.4}), {0.3, -0.2, 0.5}}; }
 
 TEST(WaypointAim, PutsTheTargetOnTheOpticalAxis) {
@@ -99,14 +99,15 @@ TEST_F(WaypointScenario, TheFirstCameraLooksAtTheTarget) {
 }
 
 TEST_F(WaypointScenario, PointsMayStandInAFile) {
-  WaypointPointOptions one = looking({-3, 0, 0}, {0, 0, 0}), other = looking({-2, 0.1, 1.0 / 3}, {0, 0, 0});
-  one.pause_s = 0.25, one.speed = 2;
-  const std::vector<WaypointPointOptions> points{one, other};
-  folder_.write("walk.yaml", write_waypoints(points));
-  EXPECT_EQ(write_waypoints(read_waypoints(folder_.path() / "walk.yaml")), write_waypoints(points));
+  folder_.write("walk.yaml",
+                "points:\n"
+                "  - {position: [-3, 0, 0], look_at: [0, 0, 0], pause_s: 0.25, speed: 2}\n"
+                "  - {position: [-2, 0.1, 0.33333333333333331], look_at: [0, 0, 0]}\n");
   const Scenario scenario = read("{type: waypoints, file: walk.yaml, turn_deg_per_s: 90}");
   const auto& options = std::get<WaypointTrajectoryOptions>(scenario.trajectory);
   ASSERT_EQ(options.points.size(), 2U);
+  EXPECT_EQ(options.points[0].pause_s, 0.25);
+  EXPECT_EQ(options.points[0].speed, 2);
   EXPECT_EQ(options.points[1].position.z(), 1.0 / 3) << "to the last digit";
 
   // The recording's scenario holds the points themselves.
@@ -157,7 +158,7 @@ TEST_F(WaypointScenario, SaysWhatIsWrongAndWhere) {
 
 TEST_F(WaypointScenario, DamagedFilesAreRefusedOrRead) {
   const std::string whole =
-      write_waypoints(std::vector{looking({-3, 0, 0}, {0, 0, 0}), looking({-2, 0, 0}, {0, 1, 0})});
+      "points:\n  - {position: [-3, 0, 0], look_at: [0, 0, 0]}\n  - {position: [-2, 0, 0], look_at: [0, 1, 0]}\n";
   for (std::size_t length = 0; length <= whole.size(); ++length) {
     const auto file = folder_.write("cut.yaml", whole.substr(0, length));
     try {

@@ -90,15 +90,15 @@ TEST(RateCurve, CountsWindows) {
       t += to_ns(random() % 4 == 0 ? wait(random) : 1e-5);
     }
     curve.finish();
-    std::uint64_t most_in_1 = 0, most_in_10 = 0;
+    std::uint64_t max_in_1 = 0, max_in_10 = 0;
     for (const auto& [ms, events] : windows) {
-      most_in_1 = std::max(most_in_1, events);
+      max_in_1 = std::max(max_in_1, events);
       std::uint64_t sum = 0;
       for (auto it = windows.lower_bound(ms - 9); it != windows.end() && it->first <= ms; ++it) sum += it->second;
-      most_in_10 = std::max(most_in_10, sum);
+      max_in_10 = std::max(max_in_10, sum);
     }
-    EXPECT_EQ(curve.most_in_1_ms(), most_in_1);
-    EXPECT_EQ(curve.most_in_10_ms(), most_in_10);
+    EXPECT_EQ(curve.max_in_1_ms(), max_in_1);
+    EXPECT_EQ(curve.max_in_10_ms(), max_in_10);
 
     std::vector<std::uint64_t> expected(curve.bins().size());
     for (const auto& [ms, events] : windows)

@@ -41,10 +41,10 @@ TEST(EventStatistics, EqualsBruteForce) {
     of_pixel[{event.x, event.y}].push_back(event.t);
     on += event.polarity > 0 ? 1 : 0;
   }
-  std::uint64_t simultaneous = 0, most = 0, intervals = 0;
+  std::uint64_t simultaneous = 0, max = 0, intervals = 0;
   for (const auto& [t, number] : at) {
     simultaneous += number > 1 ? number : 0;
-    most = std::max(most, number);
+    max = std::max(max, number);
   }
   TimeNs shortest = kNsPerSecond;
   std::vector<double> all;
@@ -61,7 +61,7 @@ TEST(EventStatistics, EqualsBruteForce) {
   EXPECT_EQ(s.last, events.back().t);
   EXPECT_EQ(s.distinct_times, at.size());
   EXPECT_EQ(s.simultaneous, simultaneous);
-  EXPECT_EQ(s.most_simultaneous, most);
+  EXPECT_EQ(s.max_simultaneous, max);
   EXPECT_EQ(s.intervals.total(), intervals);
   EXPECT_EQ(s.intervals.shortest(), shortest);
   EXPECT_EQ(s.silent_pixels, kWidth * kHeight - of_pixel.size());
@@ -79,8 +79,8 @@ TEST(EventStatistics, PoissonStreamOfKnownRate) {
   EXPECT_NEAR(s.median_count, 400, 5);
   EXPECT_TRUE(s.hot_pixels.empty());
   EXPECT_EQ(s.banding(), Banding::none);
-  EXPECT_LT(static_cast<double>(s.rate.most_in_10_ms()), kRate * 0.01 + 6 * std::sqrt(kRate * 0.01));
-  EXPECT_GT(static_cast<double>(s.rate.most_in_1_ms()), kRate * 0.001);
+  EXPECT_LT(static_cast<double>(s.rate.max_in_10_ms()), kRate * 0.01 + 6 * std::sqrt(kRate * 0.01));
+  EXPECT_GT(static_cast<double>(s.rate.max_in_1_ms()), kRate * 0.001);
 }
 
 TEST(EventStatistics, PortionsDoNotMatter) {

@@ -48,7 +48,7 @@ TEST(PhaseTest, StatisticsByBruteForce) {
   }
   EXPECT_NEAR(test.chi2_per_dof, chi2 / 63, 1e-9);
   EXPECT_NEAR(test.periods, 2 * 29.97, 0.01);
-  EXPECT_NEAR(test.share_at_peak, 0.02, 0.003);
+  EXPECT_NEAR(test.fraction_at_peak, 0.02, 0.003);
 }
 
 // Without periodicity, p is uniform on [0, 1].
@@ -91,7 +91,7 @@ TEST(PhaseTest, BandsAreFlagged) {
     const PhaseTest test = test_phase(in_whole_microseconds(times), 30);
     EXPECT_EQ(test.banding, Banding::strong) << stamps;
     EXPECT_LT(test.p_value, 1e-100) << stamps;
-    EXPECT_NEAR(test.share_at_peak, 1.0 / stamps, 0.02) << stamps;
+    EXPECT_NEAR(test.fraction_at_peak, 1.0 / stamps, 0.02) << stamps;
     EXPECT_NEAR(test.modulation, std::sqrt(64.0 / stamps - 1), 0.1) << stamps;
   }
   // One in 200 events at the frames: rms of at most sqrt(64) / 200 = 4 %.

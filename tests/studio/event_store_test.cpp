@@ -125,10 +125,10 @@ TEST(EventRates, EdgesCoverTheSpanInWholeUnits) {
     const auto upTo = [&](TimeNs limit) { return static_cast<TimeNs>(random() % static_cast<std::uint64_t>(limit)); };
     const TimeNs unit = i % 2 == 0 ? kNsPerMs : kNsPerUs, origin = upTo(kNsPerSecond) - kNsPerSecond / 2;
     const TimeNs from = upTo(10 * kNsPerSecond) - 5 * kNsPerSecond, to = from + 1 + upTo(2000 * unit);
-    const std::size_t most = 1 + static_cast<std::size_t>(random() % 50);
-    const std::vector<TimeNs> edges = bin_edges(from, to, most, unit, origin);
+    const std::size_t max = 1 + static_cast<std::size_t>(random() % 50);
+    const std::vector<TimeNs> edges = bin_edges(from, to, max, unit, origin);
     ASSERT_GE(edges.size(), 2U);
-    ASSERT_LE(edges.size(), most + 1);
+    ASSERT_LE(edges.size(), max + 1);
     EXPECT_EQ(edges.front(), from);
     EXPECT_EQ(edges.back(), to);
     if (edges.size() < 4) continue;

@@ -29,12 +29,12 @@ Vector3d axis(const SE3& view) { return view.rotation * Vector3d::UnitZ(); }
 
 /// The largest angle between the optical axis and a corner of a box [rad].
 double widest(const SE3& view, const Eigen::AlignedBox3d& box) {
-  double most = 0;
+  double max = 0;
   for (int i = 0; i < 8; ++i) {
     const Vector3d to = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)) - view.translation;
-    most = std::max(most, std::acos(to.normalized().dot(axis(view))));
+    max = std::max(max, std::acos(to.normalized().dot(axis(view))));
   }
-  return most;
+  return max;
 }
 
 TEST(FirstView, OfAnObjectIsFromOutsideAndAbove) {

@@ -38,7 +38,8 @@ struct ServedView {
   Camera model() const { return Camera::from_fov(width, height, fov_deg * std::numbers::pi / 180); }
 };
 
-/// A server of UnrealCV's protocol on a thread of its own, which shows what a function says, and lies as it is told.
+/// A server of UnrealCV's protocol on a separate thread. A function gives its images; it can be told to give wrong
+/// answers.
 class UnrealcvServer {
  public:
   using Show = std::function<PinholeImage(const ServedView&)>;
@@ -126,7 +127,7 @@ class UnrealcvServer {
   Tamper tamper;
   std::string greeting = "connected to test";
   bool greets = true;
-  std::map<std::string, std::string> ready;  ///< answers that need no work, by what is asked for: "lit npy"
+  std::map<std::string, std::string> ready;  ///< answers that are ready, by request: "lit npy"
 
  private:
   void open(int port) {
@@ -341,7 +342,7 @@ class UnrealcvServer {
   Show show_;
   std::vector<std::string> names_;
   ServedView view_;
-  std::optional<PinholeImage> image_;  // of the view, once it was asked for
+  std::optional<PinholeImage> image_;  // of the view, after the first request
 
   int listener_ = -1, client_ = -1, port_ = 0;
   std::string incoming_;

@@ -34,26 +34,26 @@ std::vector<Event> some_events(const Camera& camera, int count) {
   return events;
 }
 
-EventPoints points_on(const Poster& poster, const Camera& camera, const Workers& workers) {
+EventPoints points_on(const TexturedPlane& plane, const Camera& camera, const Workers& workers) {
   const auto make_renderer = [&](const Camera& model, const Workers& alone) {
-    return make_plane_renderer(poster, model, alone);
+    return make_plane_renderer(plane, model, alone);
   };
   return {camera, make_renderer, view_at, kCovered, workers};
 }
 
 TEST(EventPoints, LieWhereTheRayOfTheEventMeetsThePlane) {
-  const Poster poster = test::test_poster();
+  const TexturedPlane plane = test::test_plane();
   for (int kind = 0; kind < 4; ++kind) {
     const Camera camera = test::distorted_camera(kind);
     const std::vector<Event> events = some_events(camera, 2000);
     std::vector<Eigen::Vector3f> points;
-    points_on(poster, camera, test::two_threads()).locate(events, points);
+    points_on(plane, camera, test::two_threads()).locate(events, points);
     ASSERT_EQ(points.size(), events.size());
     for (std::size_t i = 0; i < events.size(); ++i) {
       const SE3 T_world_camera = view_at(events[i].t).camera.T_world_body;
-      const SE3 T_poster_camera = poster.T_world_poster.inverse() * T_world_camera;
+      const SE3 T_plane_camera = plane.T_world_plane.inverse() * T_world_camera;
       const Eigen::Vector3d bearing = camera.back_project(Eigen::Vector2d(events[i].x, events[i].y))->bearing;
-      const double depth = -T_poster_camera.translation.z() / (T_poster_camera.rotation * bearing).z();
+      const double depth = -T_plane_camera.translation.z() / (T_plane_camera.rotation * bearing).z();
       const Eigen::Vector3d expected = T_world_camera * (depth * bearing);
       ASSERT_LT((points[i].cast<double>() - expected).norm(), 1e-5 * depth) << i << ", distortion " << kind;
     }
@@ -65,8 +65,8 @@ TEST(EventPoints, DoNotDependOnThreadsOrOnWhatElseIsAsked) {
   const std::vector<Event> events = some_events(camera, 1000);
   const Workers one(1);
   std::vector<Eigen::Vector3f> all, some;
-  points_on(test::test_poster(), camera, test::two_threads()).locate(events, all);
-  EventPoints points = points_on(test::test_poster(), camera, one);
+  points_on(test::test_plane(), camera, test::two_threads()).locate(events, all);
+  EventPoints points = points_on(test::test_plane(), camera, one);
   for (std::size_t i = 0; i < events.size(); i += 7) {
     points.locate(EventSpan(events).subspan(i, 1), some);
     ASSERT_EQ(some.size(), 1U);
@@ -77,14 +77,14 @@ TEST(EventPoints, DoNotDependOnThreadsOrOnWhatElseIsAsked) {
 }
 
 TEST(EventPoints, AreNoneWhereNothingIsSeenAndThoseOfTheEndAfterIt) {
-  Poster poster = test::test_poster();
-  poster.endless = false;
-  poster.width_m = 0.5;
+  TexturedPlane plane = test::test_plane();
+  plane.endless = false;
+  plane.width_m = 0.5;
   const Camera camera = test::distorted_camera(0);
-  EventPoints points = points_on(poster, camera, test::two_threads());
+  EventPoints points = points_on(plane, camera, test::two_threads());
   std::vector<Eigen::Vector3f> found;
   const SE3 T_camera_world = view_at(kCovered.end).camera.T_world_body.inverse();
-  const Eigen::Vector2d centre = camera.project(T_camera_world * poster.T_world_poster.translation)->pixel;
+  const Eigen::Vector2d centre = camera.project(T_camera_world * plane.T_world_plane.translation)->pixel;
   const auto x = static_cast<std::uint16_t>(centre.x()), y = static_cast<std::uint16_t>(centre.y());
   const std::vector<Event> events = {{1000, 119, 89, 1}, {kCovered.end, x, y, 1}, {kCovered.end + 5000, x, y, 1}};
   points.locate(events, found);

@@ -13,7 +13,7 @@ using test::UnrealcvServer;
 bool same(const Sample& a, const Sample& b) {
   return std::ranges::equal(a.irradiance.pixels(), b.irradiance.pixels()) &&
          std::ranges::equal(a.depth.pixels(), b.depth.pixels()) &&
-         std::ranges::equal(a.flow_x.pixels(), b.flow_x.pixels());
+         std::ranges::equal(a.motion_x.pixels(), b.motion_x.pixels());
 }
 
 TEST(UnrealcvReconnection, AsksAgainForWhatIsUnderWay) {

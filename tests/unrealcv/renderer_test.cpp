@@ -50,7 +50,7 @@ TEST_P(UnrealcvRenderer, ShowsWhatTheRayCasterShows) {
   for (std::size_t i = 0; i < sample.depth.size(); ++i) {
     light += std::fabs(sample.irradiance.data()[i] - expected.irradiance.data()[i]) / count;
     depths.push_back(std::fabs(sample.depth.data()[i] / expected.depth.data()[i] - 1));
-    flow += std::fabs(sample.flow_x.data()[i] - expected.flow_x.data()[i]) / count;
+    flow += std::fabs(sample.motion_x.data()[i] - expected.motion_x.data()[i]) / count;
     if (!names().empty()) other_object += sample.object.data()[i] != expected.object.data()[i];
   }
   std::sort(depths.begin(), depths.end());

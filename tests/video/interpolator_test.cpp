@@ -99,9 +99,9 @@ TEST(Interpolator, NoPixelMovesFartherThanLambdaInAStep) {
   for (const double lambda : {0.25, 0.5, 2.0}) {
     Interpolator interpolator({.lambda = lambda}, kEps);
     for (const double t : {0, 1}) interpolator.advance({view(translation(3, 1), kWidth, kHeight, t)}, workers);
-    EXPECT_GE(interpolator.steps() * lambda, interpolator.displacement());
-    EXPECT_GE(interpolator.displacement(), 0.98 * std::hypot(3, 1));
-    EXPECT_LT(interpolator.displacement(), 1.4 * std::hypot(3, 1)) << "wastes steps";
+    EXPECT_GE(interpolator.steps() * lambda, interpolator.max_flow_px());
+    EXPECT_GE(interpolator.max_flow_px(), 0.98 * std::hypot(3, 1));
+    EXPECT_LT(interpolator.max_flow_px(), 1.4 * std::hypot(3, 1)) << "wastes steps";
     EXPECT_FALSE(interpolator.is_held());
   }
   Interpolator held({.max_steps = 3}, kEps);
@@ -116,7 +116,7 @@ TEST(Interpolator, AStillSceneNeedsNoSteps) {
   Interpolator interpolator({}, kEps);
   for (int i = 0; i < 3; ++i) interpolator.advance({frame}, workers);
   EXPECT_EQ(interpolator.steps(), 1);
-  EXPECT_EQ(interpolator.displacement(), 0);
+  EXPECT_EQ(interpolator.max_flow_px(), 0);
 }
 
 TEST(Interpolator, BrightnessThatChangesInPlaceIsBlended) {
@@ -160,7 +160,7 @@ TEST(Interpolator, TheSameBitsOnAnyNumberOfThreads) {
     Planes light;
     interpolator.at(0.37, workers, light);
     results.emplace_back(light[1].pixels().begin(), light[1].pixels().end());
-    results.back().push_back(static_cast<float>(interpolator.displacement()));
+    results.back().push_back(static_cast<float>(interpolator.max_flow_px()));
   }
   EXPECT_EQ(results[0], results[1]);
   EXPECT_EQ(results[0], results[2]);

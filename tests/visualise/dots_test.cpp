@@ -28,12 +28,12 @@ Image<Rgb> drawn_slowly(std::vector<Dot> dots, Image<Rgb> picture) {
 }
 
 int largest_difference(const Image<Rgb>& a, const Image<Rgb>& b) {
-  int most = 0;
+  int max = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     const Rgb p = a.pixels()[i], q = b.pixels()[i];
-    most = std::max({most, std::abs(p.r - q.r), std::abs(p.g - q.g), std::abs(p.b - q.b)});
+    max = std::max({max, std::abs(p.r - q.r), std::abs(p.g - q.g), std::abs(p.b - q.b)});
   }
-  return most;
+  return max;
 }
 
 TEST(Dots, AreDrawnAsDefined) {

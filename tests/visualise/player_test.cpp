@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "esim/core/error.h"
+#include "esim/preview/colours.h"
 
 namespace esim {
 namespace {
@@ -47,8 +48,8 @@ std::vector<Event> regular(int count, TimeNs start = 0) {
 
 const auto kProceed = [](double) { return true; };
 
-Survey surveyed(Memory& source, const Extent& extent = {}) {
-  Survey found = *survey(source, extent, kProceed);
+RecordingOverview overview_of(Memory& source, const Extent& extent = {}) {
+  RecordingOverview found = *read_overview(source, extent, kProceed);
   source.rewind();
   return found;
 }
@@ -60,38 +61,38 @@ std::size_t pixels_with(const Image<Rgb>& picture, Rgb colour) {
   return static_cast<std::size_t>(std::count(picture.pixels().begin(), picture.pixels().end(), colour));
 }
 
-TEST(Survey, KnowsTheRecording) {
+TEST(RecordingOverview, KnowsTheRecording) {
   Memory source(kSensor, 5 * kNsPerSecond);
   const auto events = regular(100, 5 * kNsPerSecond);
   source.add(EventsRecord{0, EventSpan(events).first(60)});
   source.add(EventsRecord{0, EventSpan(events).last(40)});
-  const Survey all = surveyed(source);
+  const RecordingOverview all = overview_of(source);
   EXPECT_EQ(all.events, 100u);
   EXPECT_EQ(all.origin, 5 * kNsPerSecond);
   EXPECT_EQ(all.end, events.back().t);
-  const Survey part = surveyed(source, {.start_s = 0.0205, .duration_s = 0.03});
+  const RecordingOverview part = overview_of(source, {.start_s = 0.0205, .duration_s = 0.03});
   EXPECT_EQ(part.events, 30u);
   EXPECT_EQ(part.start, 5 * kNsPerSecond + 20'500'000);
   EXPECT_EQ(part.end, part.start + 30'000'000);
 }
 
-TEST(Survey, FindsAnUnknownSensor) {
+TEST(RecordingOverview, FindsAnUnknownSensor) {
   Memory source({0, 0}, 0);
   const std::vector<Event> events = {{1, 5, 300, 1}, {2, 700, 2, 1}};
   source.add(EventsRecord{0, events});
-  EXPECT_EQ(surveyed(source).sensor.width, 701);
-  EXPECT_EQ(surveyed(source).sensor.height, 301);
+  EXPECT_EQ(overview_of(source).sensor.width, 701);
+  EXPECT_EQ(overview_of(source).sensor.height, 301);
 }
 
-TEST(Survey, StopsWhenToldTo) {
+TEST(RecordingOverview, StopsWhenToldTo) {
   Memory source(kSensor, 0);
   const auto events = regular(3);
   source.add(EventsRecord{0, events});
-  EXPECT_FALSE(survey(source, {}, [](double) { return false; }));
+  EXPECT_FALSE(read_overview(source, {}, [](double) { return false; }));
 }
 
 TEST(PlayOptions, AreChosenToBeSeen) {
-  Survey found{.sensor = {346, 260}, .start = 0, .end = kNsPerSecond / 2, .events = 355'000};
+  RecordingOverview found{.sensor = {346, 260}, .start = 0, .end = kNsPerSecond / 2, .events = 355'000};
   const PlayOptions slow = choose_missing({}, found);
   EXPECT_EQ(slow.slow_motion, 10);
   EXPECT_EQ(video_instants(found, slow).count, 151u);
@@ -108,7 +109,7 @@ TEST(Player, ShowsEveryEventOnceWhereWindowsMeet) {
   Memory source(kSensor, 0);
   const auto events = regular(160);
   source.add(EventsRecord{0, events});
-  const Survey found = surveyed(source);
+  const RecordingOverview found = overview_of(source);
   PlayOptions options = choose_missing(events_only(), found);
   options.width = 40 + 16 * 20;
   // Windows of 10 ms that end at 10, 20, ... ms: ten pixels each.
@@ -127,7 +128,7 @@ TEST(Player, CountsTheLatestEventsWhereAskedTo) {
   Memory source(kSensor, 0);
   const auto events = regular(160);
   source.add(EventsRecord{0, events});
-  const Survey found = surveyed(source);
+  const RecordingOverview found = overview_of(source);
   PlayOptions options = events_only();
   options.window_events = 24;
   options.width = 40 + 16 * 20;
@@ -144,7 +145,7 @@ TEST(Player, WaitsForPicturesThatComeLate) {
   source.add(ImageRecord{0, 0, black});
   source.add(ImageRecord{0, 10 * kNsPerMs, white});
   source.add(ImageRecord{0, 20 * kNsPerMs, black});
-  const Survey found = surveyed(source);
+  const RecordingOverview found = overview_of(source);
   PlayOptions options = events_only();
   options.views = {View::image};
   Player player(source, 0, found, choose_missing(options, found), {.first = 5 * kNsPerMs, .step_ns = 1e7, .count = 3});
@@ -159,10 +160,11 @@ TEST(Player, ShowsAllThatGroundTruthTells) {
   const auto events = regular(30);
   const Image<float> grey(16, 12, 0.2f), depth(16, 12, 3.0f), x(16, 12, 50.0f), y(16, 12, 0.0f);
   Image<std::uint16_t> frame(16, 12, 1023);
-  source.add(TruthRecord{.t = 0, .T_world_camera = {}, .irradiance = grey, .depth = depth, .flow_x = x, .flow_y = y});
+  source.add(
+      TruthRecord{.t = 0, .T_world_camera = {}, .irradiance = grey, .depth = depth, .motion_x = x, .motion_y = y});
   source.add(EventsRecord{0, events});
   source.add(FrameRecord{.t = 3 * kNsPerMs, .image = frame, .bits = 10});
-  const Survey found = surveyed(source);
+  const RecordingOverview found = overview_of(source);
   const PlayOptions options = choose_missing({.slow_motion = 1}, found);
   EXPECT_EQ(options.views.size(), static_cast<std::size_t>(kViews));
   Player player(source, 0, found, options, {.first = 10 * kNsPerMs});
@@ -177,7 +179,7 @@ TEST(Player, ShowsAllThatGroundTruthTells) {
   };
   EXPECT_EQ(middle_of(View::image), (Rgb{255, 255, 255}));  // the frame, not the ground truth
   EXPECT_EQ(middle_of(View::depth), colour_depth(3, found.depth.near_m(), found.depth.far_m()));
-  EXPECT_EQ(middle_of(View::motion), colour_flow(50, 0, found.motion.full_px_per_s()));
+  EXPECT_EQ(middle_of(View::motion), colour_motion(50, 0, found.motion.full_px_per_s()));
 }
 
 TEST(Player, OneEventAndExtremeSensors) {
@@ -186,7 +188,7 @@ TEST(Player, OneEventAndExtremeSensors) {
     const std::vector<Event> events = {
         {0, static_cast<std::uint16_t>(sensor.width - 1), static_cast<std::uint16_t>(sensor.height - 1), -1}};
     source.add(EventsRecord{0, events});
-    const Survey found = surveyed(source);
+    const RecordingOverview found = overview_of(source);
     const PlayOptions options = choose_missing({.width = 400}, found);
     Player player(source, 0, found, options, video_instants(found, options));
     const auto page = player.next();

@@ -27,11 +27,11 @@ int run(const std::string& file, const std::vector<std::string>& overrides) {
 }  // namespace
 
 void add_check(CLI::App& app, int& exit_code) {
-  struct Arguments {
+  struct CheckArguments {
     std::string scenario;
     std::vector<std::string> overrides;
   };
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<CheckArguments>();
   CLI::App* command =
       app.add_subcommand("check", "Check a scenario and the files that it names, without writing anything");
   command->add_option("scenario", arguments->scenario, "Scenario file (YAML)")->required()->type_name("SCENARIO.yaml");

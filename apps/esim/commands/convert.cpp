@@ -8,7 +8,7 @@
 namespace esim::app {
 namespace {
 
-struct Arguments : CopyArguments {
+struct ConvertArguments : CopyArguments {
   bool list = false;
 };
 
@@ -22,7 +22,7 @@ int list_formats() {
   return kOk;
 }
 
-int run(const Arguments& arguments, const CLI::App& command) {
+int run(const ConvertArguments& arguments, const CLI::App& command) {
   if (arguments.list) return list_formats();
   if (arguments.out.empty()) throw UserError("IN or OUT is missing; write: esim convert IN OUT");
   return run_copy(arguments, command, [&](const Format& format, const ConvertOptions& options, const auto& go_on) {
@@ -33,7 +33,7 @@ int run(const Arguments& arguments, const CLI::App& command) {
 }  // namespace
 
 void add_convert(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ConvertArguments>();
   CLI::App* command = app.add_subcommand("convert", "Convert recordings and event files between formats");
   command->add_flag("--list", arguments->list, "List the formats");
   command

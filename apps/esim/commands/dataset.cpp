@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kAffine = "affine";
 
-struct Arguments {
+struct DatasetArguments {
   std::string what, out, check, share;
   std::uint32_t count = 10'000, shard_size = 0;
   std::uint64_t seed = 1;
@@ -39,7 +39,7 @@ struct Arguments {
 
   // Of affine motion.
   AffineOptions affine;
-  std::string images, histogram, flow_at = "middle", sampling;
+  std::string images, histogram, motion_field_at = "middle", sampling;
   std::vector<double> thresholds, mix;
 
   // Of Slurm.
@@ -48,7 +48,7 @@ struct Arguments {
   std::string slurm_options;
 };
 
-std::unique_ptr<SequenceMaker> make_affine(const Arguments& arguments) {
+std::unique_ptr<SequenceMaker> make_affine(const DatasetArguments& arguments) {
   AffineOptions options = arguments.affine;
   options.images = arguments.images;
   options.seed = arguments.seed;
@@ -57,8 +57,9 @@ std::unique_ptr<SequenceMaker> make_affine(const Arguments& arguments) {
   if (!arguments.thresholds.empty())
     options.contrast_threshold = {arguments.thresholds.front(), arguments.thresholds.back()};
   if (!arguments.mix.empty()) options.mix = {arguments.mix[0], arguments.mix[1], arguments.mix[2], arguments.mix[3]};
-  for (std::size_t i = 0; i < kEnumNames<FlowTime>.size(); ++i) {
-    if (arguments.flow_at == kEnumNames<FlowTime>[i]) options.flow_at = static_cast<FlowTime>(i);
+  for (std::size_t i = 0; i < kEnumNames<MotionFieldTime>.size(); ++i) {
+    if (arguments.motion_field_at == kEnumNames<MotionFieldTime>[i])
+      options.motion_field_at = static_cast<MotionFieldTime>(i);
   }
   options.event_camera = read_event_camera(arguments.overrides);
   return std::make_unique<AffineSequences>(std::move(options));
@@ -79,7 +80,7 @@ std::vector<std::string> own_command() {
   return words;
 }
 
-int submit(const Arguments& arguments, const DatasetFolder& folder) {
+int submit(const DatasetArguments& arguments, const DatasetFolder& folder) {
   SlurmJob job;
   job.tasks = std::min(arguments.slurm_tasks, folder.plan().shards());
   job.folder = fs::absolute(folder.path());
@@ -98,7 +99,7 @@ int submit(const Arguments& arguments, const DatasetFolder& folder) {
   return kOk;
 }
 
-int check(const Arguments& arguments) {
+int check(const DatasetArguments& arguments) {
   const DatasetFolder folder(arguments.check);
   const std::vector<std::string> problems = check_dataset(folder);
   for (const std::string& problem : problems) tell(stderr, "{}\n", problem);
@@ -124,13 +125,17 @@ void report(const DatasetState& state, const fs::path& out) {
   tell(stderr, "{}: complete; look at {}\n", out.string(), (out / "preview.png").string());
 }
 
-int run(Arguments arguments) {
+int run(DatasetArguments arguments) {
   if (!arguments.check.empty()) return check(arguments);
   if (arguments.what.empty()) throw UserError("the kind of dataset is missing; give affine, or a scenario file");
   if (arguments.out.empty()) throw UserError("--out: is missing; name a folder");
   const bool affine = arguments.what == kAffine;
   std::vector<std::string> names = arguments.contents;
-  if (names.empty()) names = {"flow", "displacement"};
+  if (names.empty()) names = {"motion_field", "optical_flow"};
+  for (const std::string& name : names) {
+    if (const std::string present = present_content_name(name); present != name)
+      tell(stderr, "warning: --contents: {} is now {}\n", name, present);
+  }
   DatasetPlan plan{.count = arguments.count,
                    .shard_size = arguments.shard_size > 0 ? arguments.shard_size : usual_shard_size(arguments.count),
                    .format = arguments.format == "hdf5" ? ShardFormat::hdf5 : ShardFormat::webdataset,
@@ -139,7 +144,7 @@ int run(Arguments arguments) {
   const std::unique_ptr<SequenceMaker> maker =
       affine ? make_affine(arguments)
              : std::make_unique<ScenarioSequences>(arguments.what, arguments.overrides, arguments.seed,
-                                                   plan.contents.displacement);
+                                                   plan.contents.optical_flow);
   plan.maker = maker->options();
   if (share.part == 0) SequenceArrays(maker->make(0), plan.contents);  // a sample, before anything is written
   const DatasetFolder folder(arguments.out, plan, ESIM_VERSION);
@@ -183,7 +188,7 @@ int run(Arguments arguments) {
   return kOk;
 }
 
-void add_affine_options(CLI::App& command, Arguments& arguments) {
+void add_affine_options(CLI::App& command, DatasetArguments& arguments) {
   const char* const kGroup = "Affine motion";
   AffineOptions& affine = arguments.affine;
   const auto add = [&](const char* name, auto& value, const char* help, const char* type) {
@@ -196,8 +201,13 @@ void add_affine_options(CLI::App& command, Arguments& arguments) {
   add("--flow-histogram", arguments.histogram,
       "Histogram of the optical flow over the duration: lines LOW HIGH WEIGHT, px (default: MPI Sintel's)", "FILE");
   add("--flow-scale", affine.flow_scale, "Factor on the histogram's magnitudes", "F");
-  add("--flow-at", arguments.flow_at, "Time of the motion field: start, middle (default) or end", "TIME")
+  add("--motion-field-at", arguments.motion_field_at, "Time of the motion field: start, middle (default) or end",
+      "TIME")
       ->check(CLI::IsMember({"start", "middle", "end"}));
+  add("--flow-at", arguments.motion_field_at, "Old name of --motion-field-at", "TIME")
+      ->check(CLI::IsMember({"start", "middle", "end"}))
+      ->each([](const std::string&) { tell(stderr, "warning: --flow-at is now --motion-field-at\n"); })
+      ->group("");
   add("--threshold", arguments.thresholds, "Range of the random contrast threshold of each sequence (default: 0.2 0.5)",
       "LOW [HIGH]")
       ->expected(1, 2);
@@ -210,7 +220,7 @@ void add_affine_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 void add_dataset(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<DatasetArguments>();
   CLI::App* command = app.add_subcommand("dataset", "Make many labelled sequences for learning");
   command
       ->add_option("what", arguments->what,
@@ -222,9 +232,9 @@ void add_dataset(CLI::App& app, int& exit_code) {
       ->type_name("N")
       ->check(CLI::Range(1U, 4'000'000'000U));
   command
-      ->add_option(
-          "--contents", arguments->contents,
-          "Contents in addition to events: flow, displacement (default: both), images, tensor, voxels=BINS, depth")
+      ->add_option("--contents", arguments->contents,
+                   "Contents in addition to events: motion_field, optical_flow (default: both), images, tensor, "
+                   "voxels=BINS, depth")
       ->type_name("NAME,...")
       ->delimiter(',');
   command->add_option("--format", arguments->format, "Format of the files: hdf5 (default) or webdataset")
@@ -270,7 +280,7 @@ void add_dataset(CLI::App& app, int& exit_code) {
   command->footer(
       "Examples:\n"
       "  esim dataset affine --out flow                              10,000 sequences of 0.04 s, as in the paper\n"
-      "  esim dataset affine --out flow --images photographs --contents flow,tensor --format webdataset\n"
+      "  esim dataset affine --out flow --images photographs --contents motion_field,tensor --format webdataset\n"
       "  esim dataset room.yaml --count 500 --out rooms              from a scenario with the key randomise\n"
       "  esim dataset affine --out flow --slurm --slurm-tasks 50 --slurm-options \"--cpus-per-task=8\"\n"
       "  esim dataset --check flow                                   check that the dataset is complete\n"

@@ -7,8 +7,8 @@
 #include "commands.h"
 #include "esim/core/error.h"
 #include "esim/evaluate/paper_scenario.h"
+#include "esim/evaluate/report/evaluation_text.h"
 #include "esim/evaluate/report/report_files.h"
-#include "esim/evaluate/report/report_json.h"
 #include "esim/evaluate/schemes.h"
 #include "esim/recording/keep_on_failure.h"
 #include "esim/recording/recording_directory.h"
@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kRotation = "rotation.txt";
 
-struct Arguments : RunOptions {
+struct EvaluateArguments : RunOptions {
   std::string scenario = "scenes/panorama.yaml", panorama, out, pixels = "400";
   std::vector<std::string> schemes;
   SamplingEvaluationOptions options;
@@ -31,7 +31,7 @@ struct Arguments : RunOptions {
 };
 
 /// The scenario to evaluate. Writes the files of the built-in scenario into `folder`.
-Scenario base_scenario(const Arguments& arguments, const fs::path& folder) {
+Scenario base_scenario(const EvaluateArguments& arguments, const fs::path& folder) {
   if (arguments.panorama.empty()) return read_scenario(arguments.scenario, arguments.overrides);
   if (!arguments.overrides.empty())
     throw UserError("--set: changes SCENARIO.yaml, which --panorama replaces; remove one of them");
@@ -40,7 +40,7 @@ Scenario base_scenario(const Arguments& arguments, const fs::path& folder) {
 }
 
 /// The scenario with paths for the folder's final name.
-Scenario to_keep(Scenario scenario, const Arguments& arguments, const fs::path& folder) {
+Scenario to_keep(Scenario scenario, const EvaluateArguments& arguments, const fs::path& folder) {
   if (!arguments.panorama.empty())
     std::get<FileTrajectoryOptions>(scenario.trajectory).path = fs::absolute(folder / kRotation);
   return scenario;
@@ -94,7 +94,7 @@ class Table {
   bool wanted_;
 };
 
-int run(Arguments arguments) {
+int run(EvaluateArguments arguments) {
   SamplingEvaluationOptions& options = arguments.options;
   options.pixels = number_of_pixels(arguments.pixels);
   options.threads = arguments.threads;
@@ -135,7 +135,7 @@ int run(Arguments arguments) {
 }
 
 void add_sampling(CLI::App& evaluate, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<EvaluateArguments>();
   SamplingEvaluationOptions& options = arguments->options;
   CLI::App* command = evaluate.add_subcommand(
       "sampling", "Measure the accuracy and cost of sampling methods, as in Section 4.1 of the ESIM paper");

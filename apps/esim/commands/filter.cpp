@@ -27,7 +27,7 @@ struct Filters {
   std::string mask_file;
 };
 
-struct Arguments : CopyArguments {
+struct FilterArguments : CopyArguments {
   Filters filters;
   std::function<FilterOptions()> requested;  // to be called after parsing
   bool json = false;
@@ -117,7 +117,7 @@ std::shared_ptr<CommandLine> add_filter_options(CLI::App& command, const std::st
 }
 
 /// Adds the options of all filters, in the order in which events pass them.
-void add_all_filters(CLI::App& command, Arguments& arguments) {
+void add_all_filters(CLI::App& command, FilterArguments& arguments) {
   Filters& filters = arguments.filters;
   const auto region = std::make_shared<CommandLine>(command);
   region->titled("1. Regions and masked pixels");
@@ -149,7 +149,7 @@ void add_all_filters(CLI::App& command, Arguments& arguments) {
   };
 }
 
-int run(const Arguments& arguments, const CLI::App& command) {
+int run(const FilterArguments& arguments, const CLI::App& command) {
   const FilterOptions filters = arguments.requested();
   std::vector<FilteredCamera> cameras;
   const int code =
@@ -169,7 +169,7 @@ int run(const Arguments& arguments, const CLI::App& command) {
 }  // namespace
 
 void add_filter(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<FilterArguments>();
   CLI::App* command =
       app.add_subcommand("filter", "Filter the events of a recording, as the digital blocks of Prophesee's sensors do");
   command

@@ -12,7 +12,7 @@
 namespace esim::app {
 namespace {
 
-struct Arguments {
+struct ImportArguments {
   std::string scene;
   std::string out;
   bool bake = false;
@@ -43,7 +43,7 @@ class Steps {
   std::string shown_;
 };
 
-std::filesystem::path output_of(const Arguments& arguments) {
+std::filesystem::path output_of(const ImportArguments& arguments) {
   const std::filesystem::path scene = arguments.scene;
   std::filesystem::path out = arguments.out;
   if (out.empty()) out = scene.parent_path() / (scene.stem().string() + (arguments.bake ? "_baked.glb" : ".glb"));
@@ -56,7 +56,7 @@ std::filesystem::path output_of(const Arguments& arguments) {
   return out;
 }
 
-int run(const Arguments& arguments) {
+int run(const ImportArguments& arguments) {
   const std::filesystem::path out = output_of(arguments);
   catch_interrupts();
   Steps steps(!arguments.quiet);
@@ -82,7 +82,7 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 void add_import(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ImportArguments>();
   CLI::App* command = app.add_subcommand(
       "import", "Convert a scene (.blend and others) to GLB with Blender, optionally with baked lighting");
   command->add_option("scene", arguments->scene, "Scene file")->required()->type_name("SCENE");

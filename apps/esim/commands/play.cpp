@@ -8,6 +8,7 @@
 #include "esim/core/error.h"
 #include "esim/files/number_text.h"
 #include "esim/files/output_file.h"
+#include "esim/preview/pictures.h"
 #include "esim/preview/video_file.h"
 #include "esim/recording/recording_file.h"
 #include "esim/visualise/playable.h"
@@ -21,10 +22,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kSheetColumns = 3, kSheetRows = 3;
-constexpr int kWidthOfGif = 960;            // px; limits the file size
-constexpr double kMostFramesOfGif_hz = 50;  // browsers slow down faster ones
+constexpr int kWidthOfGif = 960;           // px; limits the file size
+constexpr double kMaxFramesOfGif_hz = 50;  // browsers slow down faster ones
 
-struct Arguments {
+struct PlayArguments {
   std::string input, out, camera;
   std::vector<std::string> views;
   double window_ms = 0, tau_ms = 0, span_ms = 0;
@@ -36,38 +37,38 @@ struct Arguments {
 };
 
 // The default path: FILE.play.mp4 next to FILE.h5, FOLDER.play.mp4 next to a folder.
-fs::path out_path(const Arguments& arguments) {
+fs::path out_path(const PlayArguments& arguments) {
   if (!arguments.out.empty()) return arguments.out;
   const fs::path file = fs::path(arguments.input + "/").parent_path();  // without a slash at its end
   if (fs::is_directory(file)) return fs::path(file) += ".play.mp4";
   return fs::path(file).replace_extension(".play.mp4");
 }
 
-/// One output, from the survey to the finished file.
+/// One output, from the overview to the finished file.
 class Showing {
  public:
-  Showing(const Arguments& arguments, const Playable& input, const Survey& found, const fs::path& out)
-      : arguments_(arguments), survey_(found), source_(input.open()), bar_(!arguments.quiet), out_(out) {
+  Showing(const PlayArguments& arguments, const Playable& input, const RecordingOverview& found, const fs::path& out)
+      : arguments_(arguments), overview_(found), source_(input.open()), bar_(!arguments.quiet), out_(out) {
     options_ = choose_missing(arguments.play, found);
   }
 
   int still() {
     if (!arguments_.at_s) return contact_sheet();
-    const TimeNs t = survey_.origin + to_ns(*arguments_.at_s);
-    if (t < survey_.start || t > survey_.end) {
+    const TimeNs t = overview_.origin + to_ns(*arguments_.at_s);
+    if (t < overview_.start || t > overview_.end) {
       throw UserError(fmt::format("--at {}: must be within the shown time, from {} to {} s", *arguments_.at_s,
-                                  to_seconds(survey_.start - survey_.origin),
-                                  to_seconds(survey_.end - survey_.origin)));
+                                  to_seconds(overview_.start - overview_.origin),
+                                  to_seconds(overview_.end - overview_.origin)));
     }
-    Player player(*source_, arguments_.extent.camera, survey_, options_, {.first = t});
+    Player player(*source_, arguments_.extent.camera, overview_, options_, {.first = t});
     write_png(*player.next());
     say(fmt::format("t = {:g} s", *arguments_.at_s));
     return kOk;
   }
 
   int video(VideoKind kind) {
-    const Instants instants = video_instants(survey_, options_);
-    Player player(*source_, arguments_.extent.camera, survey_, options_, instants);
+    const Instants instants = video_instants(overview_, options_);
+    Player player(*source_, arguments_.extent.camera, overview_, options_, instants);
     RecordingFile file(out_, arguments_.force);
     VideoFile video(file.path(), player.layout().width, player.layout().height, options_.frames_per_s, kind);
     std::size_t frames = 0;
@@ -100,13 +101,13 @@ class Showing {
     options_.width = options_.width > 0 ? options_.width : 620;
     constexpr std::size_t kCount = kSheetColumns * kSheetRows;
     // The centres of equal intervals.
-    const double step_ns = static_cast<double>(survey_.end - survey_.start) / kCount;
-    const Instants instants{survey_.start + static_cast<TimeNs>(0.5 * step_ns), step_ns, kCount};
-    Player player(*source_, arguments_.extent.camera, survey_, options_, instants);
+    const double step_ns = static_cast<double>(overview_.end - overview_.start) / kCount;
+    const Instants instants{overview_.start + static_cast<TimeNs>(0.5 * step_ns), step_ns, kCount};
+    Player player(*source_, arguments_.extent.camera, overview_, options_, instants);
     std::vector<CaptionedPicture> pictures;
     for (std::size_t i = 0; i < kCount && !interrupted(); ++i) {
       pictures.push_back(
-          {*player.next_picture(), fmt::format("t = {:.4f} s", to_seconds(instants.at(i) - survey_.origin))});
+          {*player.next_picture(), fmt::format("t = {:.4f} s", to_seconds(instants.at(i) - overview_.origin))});
       show(i + 1, kCount);
     }
     bar_.clear();
@@ -125,18 +126,18 @@ class Showing {
 
   void say(const std::string& what) {
     if (arguments_.quiet) return;
-    tell(stderr, "{}: {}; {} events\n", out_.string(), what, grouped(survey_.events));
+    tell(stderr, "{}: {}; {} events\n", out_.string(), what, grouped(overview_.events));
   }
 
-  const Arguments& arguments_;
-  const Survey& survey_;
+  const PlayArguments& arguments_;
+  const RecordingOverview& overview_;
   PlayOptions options_;
   std::unique_ptr<Source> source_;
   ProgressBar bar_;
   fs::path out_;
 };
 
-int run(Arguments& arguments) {
+int run(PlayArguments& arguments) {
   const fs::path out = out_path(arguments);
   const std::string extension = out.extension().string();
   if (extension != ".mp4" && extension != ".gif" && extension != ".png")
@@ -151,8 +152,8 @@ int run(Arguments& arguments) {
   play.tau_s = 1e-3 * arguments.tau_ms;
   play.span_s = 1e-3 * arguments.span_ms;
   play.frames_per_s = arguments.fps.value_or(extension == ".gif" ? 20 : 30);
-  if (extension == ".gif" && play.frames_per_s > kMostFramesOfGif_hz)
-    throw UserError(fmt::format("--fps: must be at most {} for a GIF; lower it", kMostFramesOfGif_hz));
+  if (extension == ".gif" && play.frames_per_s > kMaxFramesOfGif_hz)
+    throw UserError(fmt::format("--fps: must be at most {} for a GIF; lower it", kMaxFramesOfGif_hz));
   if (extension == ".gif" && play.width == 0) play.width = kWidthOfGif;
   play.theme = arguments.light ? kLightTheme : kDarkTheme;
 
@@ -161,8 +162,8 @@ int run(Arguments& arguments) {
   play.name = input.name();
   arguments.extent.camera = input.camera(arguments.camera);
   ProgressBar bar(!arguments.quiet);
-  const auto found = survey(*input.open(), arguments.extent, [&](double share) {
-    bar.show(share, [&] { return fmt::format("reading, {:.0f} %", 100 * share); });
+  const auto found = read_overview(*input.open(), arguments.extent, [&](double fraction) {
+    bar.show(fraction, [&] { return fmt::format("reading, {:.0f} %", 100 * fraction); });
     return !interrupted();
   });
   bar.clear();
@@ -175,11 +176,10 @@ int run(Arguments& arguments) {
 }  // namespace
 
 void add_play(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<PlayArguments>();
   CLI::App* command = app.add_subcommand("play", "Make a video or an image of events");
-  const auto positive = [&](const char* name, auto& value, const char* help, const char* unit, double least,
-                            double most) {
-    return command->add_option(name, value, help)->type_name(unit)->check(CLI::Range(least, most));
+  const auto positive = [&](const char* name, auto& value, const char* help, const char* unit, double min, double max) {
+    return command->add_option(name, value, help)->type_name(unit)->check(CLI::Range(min, max));
   };
   command->add_option("in", arguments->input, "Recording folder, or file of events of any format")
       ->required()

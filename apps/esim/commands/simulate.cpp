@@ -12,7 +12,7 @@
 namespace esim::app {
 namespace {
 
-struct Arguments : RunOptions {
+struct SimulateArguments : RunOptions {
   std::string scenario;
   std::string out;
   std::optional<std::uint64_t> seed;
@@ -34,7 +34,7 @@ void print_summary(const Summary& summary, const std::filesystem::path& out, boo
   }
 }
 
-int run(const Arguments& arguments) {
+int run(const SimulateArguments& arguments) {
   Scenario scenario = read_scenario(arguments.scenario, arguments.overrides);
   if (arguments.seed) scenario.seed = *arguments.seed;
   const std::filesystem::path out =
@@ -68,7 +68,7 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 void add_simulate(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SimulateArguments>();
   CLI::App* command = app.add_subcommand("simulate", "Simulate a scenario and write a recording");
   command->add_option("scenario", arguments->scenario, "Scenario file (YAML)")->required()->type_name("SCENARIO.yaml");
   command->add_option("-o,--out", arguments->out, "Folder to write (default: out/NAME of the scenario)")

@@ -5,7 +5,7 @@
 #include "commands.h"
 #include "esim/core/error.h"
 #include "esim/files/output_file.h"
-#include "esim/preview/canvas.h"
+#include "esim/preview/pictures.h"
 #include "esim/stats/figure.h"
 #include "support.h"
 
@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kPortion = 1 << 20;
 
-struct Arguments {
+struct StatsArguments {
   std::vector<std::string> files;
   std::optional<double> fps, frame_period_s;
   std::optional<SensorSize> sensor;
@@ -25,7 +25,7 @@ struct Arguments {
   bool plot = false, json = false, force = false;
 };
 
-NamedStatistics compute(const std::string& path, const Arguments& arguments) {
+NamedStatistics compute(const std::string& path, const StatsArguments& arguments) {
   EventsFile file(path, {arguments.sensor, {}});
   EventStatistics statistics(file.sensor());
   std::vector<Event> events;
@@ -39,7 +39,7 @@ NamedStatistics compute(const std::string& path, const Arguments& arguments) {
 }
 
 // The path of the figure, if requested: FILE.stats.png next to FILE.h5, FOLDER.stats.png next to a folder.
-std::optional<fs::path> figure_path(const Arguments& arguments) {
+std::optional<fs::path> figure_path(const StatsArguments& arguments) {
   if (!arguments.out.empty()) return arguments.out;
   if (!arguments.plot) return std::nullopt;
   const fs::path file = fs::path(arguments.files.front() + "/").parent_path();  // without a slash at its end
@@ -47,7 +47,7 @@ std::optional<fs::path> figure_path(const Arguments& arguments) {
   return fs::path(file).replace_extension(".stats.png");
 }
 
-int run(const Arguments& arguments) {
+int run(const StatsArguments& arguments) {
   const std::optional<fs::path> figure = figure_path(arguments);
   if (figure && arguments.files.size() > 1)
     throw UserError("a figure shows one file only; give one file, or remove --plot and --out");
@@ -71,7 +71,7 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 void add_stats(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<StatsArguments>();
   CLI::App* command =
       app.add_subcommand("stats", "Print and draw statistics of events; compare two files side by side");
   command

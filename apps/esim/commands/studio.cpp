@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments : studio::StudioOptions {
+struct StudioArguments : studio::StudioOptions {
   std::string input, page;
   std::vector<std::string> folders;
 };
@@ -30,7 +30,7 @@ fs::path page_folder() {
   return installed;
 }
 
-int run(Arguments& arguments) {
+int run(StudioArguments& arguments) {
   arguments.opened = arguments.input;
   arguments.roots.assign(arguments.folders.begin(), arguments.folders.end());
   arguments.pages = arguments.page.empty() ? page_folder() : fs::path(arguments.page);
@@ -55,7 +55,7 @@ int run(Arguments& arguments) {
 }  // namespace
 
 void add_studio(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<StudioArguments>();
   CLI::App* command = app.add_subcommand("studio", "Design, make and view recordings in a browser");
   command
       ->add_option("in", arguments->input,

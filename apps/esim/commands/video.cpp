@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments : RunOptions {
+struct VideoArguments : RunOptions {
   ConversionOptions options;
   std::string input, out;
 };
@@ -29,7 +29,7 @@ void report_losses(const ConversionSummary& summary, const ConversionOptions& op
     notices.warning(
         fmt::format("between {} of {} pairs of frames, the motion is too large for {} steps (up to {:.0f} px); "
                     "raise --lambda or --max-steps, or use a video with more frames per second",
-                    summary.held, summary.frames - 1, options.interpolation.max_steps, summary.displacement_px));
+                    summary.held, summary.frames - 1, options.interpolation.max_steps, summary.max_optical_flow_px));
   }
   std::ranges::for_each(losses(options, summary), notices.warning);
 }
@@ -65,7 +65,7 @@ void print_summary(const ConversionSummary& summary) {
 /// A conversion from the opened input to the summary.
 class Converter {
  public:
-  explicit Converter(const Arguments& arguments)
+  explicit Converter(const VideoArguments& arguments)
       : arguments_(arguments),
         workers_(arguments.threads),
         frames_(arguments.input, arguments.options.video, arguments.options.bayer) {}
@@ -98,7 +98,7 @@ class Converter {
   const bool& has_converted() const { return has_converted_; }
 
  private:
-  const Arguments& arguments_;
+  const VideoArguments& arguments_;
   Workers workers_;
   FrameSequence frames_;
   bool has_converted_ = false;
@@ -113,7 +113,8 @@ int outcome(const ConversionSummary& summary, const fs::path& out) {
   return summary.complete ? kOk : kInterrupted;
 }
 
-int convert_to_file(const Arguments& arguments, const fs::path& out, const Format& format, const Notices& notices) {
+int convert_to_file(const VideoArguments& arguments, const fs::path& out, const Format& format,
+                    const Notices& notices) {
   RecordingFile file(out, arguments.force);
   Converter converter(arguments);
   const ConversionSummary summary = keep_on_failure(file, converter.has_converted(), [&] {
@@ -130,7 +131,7 @@ int convert_to_file(const Arguments& arguments, const fs::path& out, const Forma
   return outcome(summary, out);
 }
 
-int convert_to_folder(const Arguments& arguments, const fs::path& out, const Notices& notices,
+int convert_to_folder(const VideoArguments& arguments, const fs::path& out, const Notices& notices,
                       const std::vector<std::string>& given) {
   RecordingDirectory directory(out, arguments.force);
   Converter converter(arguments);
@@ -149,7 +150,7 @@ int convert_to_folder(const Arguments& arguments, const fs::path& out, const Not
   return outcome(summary, out);
 }
 
-int run(Arguments& arguments) {
+int run(VideoArguments& arguments) {
   std::error_code error;
   arguments.options.event_camera = read_event_camera(arguments.overrides);
   arguments.options.input = fs::absolute(arguments.input, error);
@@ -168,7 +169,7 @@ int run(Arguments& arguments) {
 }  // namespace
 
 void add_video(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<VideoArguments>();
   CLI::App* command = app.add_subcommand("video", "Convert a video, or a folder of images, to events");
   command
       ->add_option("input", arguments->input,

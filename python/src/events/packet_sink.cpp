@@ -119,7 +119,7 @@ void PacketSink::require_size(const Image<T>& image, int camera, TimeNs t) const
 }
 
 void PacketSink::write(const TruthRecord& record) {
-  for (const Image<float>* image : {&record.irradiance, &record.depth, &record.flow_x, &record.flow_y}) {
+  for (const Image<float>* image : {&record.irradiance, &record.depth, &record.motion_x, &record.motion_y}) {
     if (!image->empty()) require_size(*image, record.camera, record.t);
   }
   reached_ = std::max(reached_, record.t);
@@ -128,17 +128,17 @@ void PacketSink::write(const TruthRecord& record) {
   append_matrix(record.T_world_camera, camera.poses);
   append(record.irradiance, camera.irradiance);
   append(record.depth, camera.depth);
-  append(record.flow_x, camera.flow);
-  append(record.flow_y, camera.flow);
+  append(record.motion_x, camera.motion_field);
+  append(record.motion_y, camera.motion_field);
   if (record.object != nullptr) append(*record.object, camera.object);
 }
 
-void PacketSink::write(const DisplacementRecord& record) {
+void PacketSink::write(const OpticalFlowRecord& record) {
   require_size(record.x, record.camera, record.t1);
   CameraPart& camera = part(record.camera, record.t1);
-  camera.displacement_span.insert(camera.displacement_span.end(), {record.t0, record.t1});
-  append(record.x, camera.displacement);
-  append(record.y, camera.displacement);
+  camera.optical_flow_span.insert(camera.optical_flow_span.end(), {record.t0, record.t1});
+  append(record.x, camera.optical_flow);
+  append(record.y, camera.optical_flow);
   append(record.visible, camera.visible);
 }
 

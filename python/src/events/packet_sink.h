@@ -18,10 +18,10 @@ struct CameraPart {
   // Ground truth.
   std::vector<TimeNs> t;
   std::vector<double> poses;
-  std::vector<float> irradiance, depth, flow;  // flow: x, then y
+  std::vector<float> irradiance, depth, motion_field;  // motion_field: x, then y
   std::vector<std::uint16_t> object;
-  std::vector<TimeNs> displacement_span;  // t0, t1
-  std::vector<float> displacement;        // x, then y
+  std::vector<TimeNs> optical_flow_span;  // t0, t1
+  std::vector<float> optical_flow;        // x, then y
   std::vector<std::uint8_t> visible;
 
   // Of the frame camera.
@@ -73,7 +73,7 @@ class PacketSink final : public Sink {
  private:
   void write(const EventsRecord& record);
   void write(const TruthRecord& record);
-  void write(const DisplacementRecord& record);
+  void write(const OpticalFlowRecord& record);
   void write(const EventPointsRecord& record);
   void write(const ImageRecord& record);
   void write(const FrameRecord& record);

@@ -32,11 +32,11 @@ nb::dict to_dict(CameraPart part, const Camera& model) {
   view["pose"] = to_numpy(std::move(part.poses), {frames, 4, 4});
   view["irradiance"] = images(std::move(part.irradiance), model);
   view["depth"] = images(std::move(part.depth), model);
-  view["flow"] = image_pairs(std::move(part.flow), model);
+  view["motion_field"] = image_pairs(std::move(part.motion_field), model);
   view["object"] = images(std::move(part.object), model);
-  const std::size_t displacements = part.displacement_span.size() / 2;
-  view["displacement_span"] = to_numpy(std::move(part.displacement_span), {displacements, 2});
-  view["displacement"] = image_pairs(std::move(part.displacement), model);
+  const std::size_t optical_flows = part.optical_flow_span.size() / 2;
+  view["optical_flow_span"] = to_numpy(std::move(part.optical_flow_span), {optical_flows, 2});
+  view["optical_flow"] = image_pairs(std::move(part.optical_flow), model);
   view["visible"] = images(std::move(part.visible), model);
   view["image_t"] = to_numpy(std::move(part.image_t));
   view["exposure_start"] = to_numpy(std::move(part.exposure_start));

@@ -75,7 +75,7 @@ class Pages {
     const Playable input(path, sensor);
     extent.camera = input.camera(camera);
     options.name = input.name();
-    const auto found = survey(*input.open(), extent, [](double) { return true; });
+    const auto found = read_overview(*input.open(), extent, [](double) { return true; });
     options = choose_missing(std::move(options), *found);
     instants_ = at_s ? Instants{.first = found->origin + to_ns(*at_s)} : video_instants(*found, options);
     if (instants_.first < found->start || instants_.first > found->end)

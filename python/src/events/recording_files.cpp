@@ -25,7 +25,7 @@ constexpr TimeNs kEndless = std::numeric_limits<TimeNs>::max() / 2;
 
 /// Sources give records of one camera and kind in order. Records of other cameras and kinds may be late by at most this
 /// time: the duration of drivers' messages, or half an exposure.
-constexpr TimeNs kMostDisorder = 500 * kNsPerMs;
+constexpr TimeNs kMaxDisorder = 500 * kNsPerMs;
 
 /// Reads the recording of a file packet by packet.
 class RecordingReader {
@@ -77,7 +77,7 @@ class RecordingReader {
       const Record* const record = source_->next();
       if (record == nullptr) return false;
       packets_->write(*record);
-      packets_->know(packets_->reached() - kMostDisorder);
+      packets_->know(packets_->reached() - kMaxDisorder);
       return true;
     } catch (const UserError&) {
       damage_ = std::current_exception();

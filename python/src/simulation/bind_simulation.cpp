@@ -24,7 +24,9 @@ void make_simulation(Simulation* self, const CheckedScenario& scenario, const st
   std::optional<PythonFunction> function;
   if (!render.is_none()) {
     function.emplace(render);
-    substitutes.make_renderer = [function](const Camera& camera) { return make_python_renderer(*function, camera); };
+    substitutes.make_renderer = [function](const Camera& camera, const Workers&) {
+      return make_python_renderer(*function, camera);
+    };
   }
   for (const auto& [name, trajectory] : objects) substitutes.objects.push_back({name, trajectory.motion});
   new (self) Simulation(scenario.value, substitutes, function, origin, {threads, packet, out, force});

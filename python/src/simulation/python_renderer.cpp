@@ -47,8 +47,8 @@ class PythonRenderer final : public ProcessorRenderer {
   void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
     prepare(requests, width_, height_, sample);
     for (const RenderRequest& request : requests) {
-      const bool has_flow = ask(request, sample);
-      if (has_flow) continue;
+      const bool has_motion_field = ask(request, sample);
+      if (has_motion_field) continue;
       const std::vector<Twist> twists = relative_twists(request);
       for (const Tile& tile : request.tiles) motion_field(rays_, twists, tile, sample);
     }
@@ -63,13 +63,13 @@ class PythonRenderer final : public ProcessorRenderer {
         render_.get()(request.t, matrix(request.camera.T_world_body), objects, nb::make_tuple(height_, width_));
     copy(nb::cast<Plane<float>>(rendered[0]).data(), request.tiles, sample.irradiance);
     copy(nb::cast<Plane<float>>(rendered[1]).data(), request.tiles, sample.depth);
-    const nb::object flow = rendered[2], object = rendered[3];
+    const nb::object motion_field = rendered[2], object = rendered[3];
     if (request.wants_objects() && !object.is_none())
       copy(nb::cast<Plane<std::uint16_t>>(object).data(), request.tiles, sample.object);
-    if (flow.is_none()) return false;
-    const auto planes = nb::cast<TwoPlanes>(flow);
-    copy(planes.data(), request.tiles, sample.flow_x);
-    copy(planes.data() + sample.flow_x.size(), request.tiles, sample.flow_y);
+    if (motion_field.is_none()) return false;
+    const auto planes = nb::cast<TwoPlanes>(motion_field);
+    copy(planes.data(), request.tiles, sample.motion_x);
+    copy(planes.data() + sample.motion_x.size(), request.tiles, sample.motion_y);
     return true;
   }
 

@@ -10,7 +10,6 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 
-
 class CommandError(Exception):
     """A client's command cannot be executed."""
 
@@ -145,7 +144,7 @@ class Engine:
     """Renders the open scene. The last result is kept until something changes."""
 
     def __init__(self, options):
-        self.scene = scene = bpy.context.scene
+        self.scene = bpy.context.scene
         self.size, self.samples, self.seed = options.size, options.samples, options.seed
         self.cached_key, self.cached = None, None
         self.seconds_rendering = 0.0  # by Blender, including writing its file

@@ -24,8 +24,8 @@ import numpy as np
 
 MAGIC = 0x9E2B83C1
 LONGEST_REQUEST = 1 << 16  # bytes
-LARGEST_SIDE, MOST_PIXELS = 16384, 1 << 26
-MOST_HEADS = 64  # of arrays, in the cache
+LARGEST_SIDE, MAX_PIXELS = 16384, 1 << 26
+MAX_HEADS = 64  # of arrays, in the cache
 FARTHEST = 1e9  # m; Blender writes 1e10 where no surface is visible
 
 
@@ -127,9 +127,9 @@ class Commands:
 
     def resize(self, width, height):
         width, height = int(width), int(height)
-        if not (4 <= width <= LARGEST_SIDE and 4 <= height <= LARGEST_SIDE and width * height <= MOST_PIXELS):
+        if not (4 <= width <= LARGEST_SIDE and 4 <= height <= LARGEST_SIDE and width * height <= MAX_PIXELS):
             raise CommandError(f"images must have at least 4x4 pixels, at most {LARGEST_SIDE} per side and "
-                               f"{MOST_PIXELS} in total")
+                               f"{MAX_PIXELS} in total")
         self.engine.size = width, height
 
     def set_samples(self, count):
@@ -155,7 +155,7 @@ class Commands:
         if kind not in self.heads:
             head = io.BytesIO()
             np.lib.format.write_array_header_1_0(head, np.lib.format.header_data_from_array_1_0(array))
-            if len(self.heads) == MOST_HEADS:
+            if len(self.heads) == MAX_HEADS:
                 self.heads.clear()
             self.heads[kind] = head.getvalue()
         return self.heads[kind], array.data.cast("B")

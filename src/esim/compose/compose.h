@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "esim/recording/format.h"
+#include "esim/render/pixel_area.h"
 #include "esim/scenario/conversion.h"
 #include "esim/scenario/scenario.h"
 #include "esim/scene/scene_file.h"
@@ -15,6 +16,7 @@
 #include "esim/sim/simulate.h"
 #include "esim/sim/world.h"
 
+/// From a scenario to a recording. simulate() (sim/simulate.h) runs the world that build_world() builds.
 namespace esim::inline compose {
 
 /// Receives one line that the user should know about; the program continues.
@@ -28,6 +30,8 @@ struct Notices {
 
 /// Forwards notices, and appends them to `given` for reports.
 Notices keeping(Notices notify, std::vector<std::string>& given);
+
+// --- the world (build_world.cpp) -------------------------------------------------------------------------------------
 
 /// Builds everything that a scenario describes, ready to simulate on `threads` threads (0: every processor). Loads
 /// scenes and trajectories, and checks everything that can be checked before the simulation. Throws UserError for
@@ -43,8 +47,9 @@ World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> bo
 struct Substitutes {
   std::shared_ptr<const Trajectory> body;  ///< completely known
 
-  /// Replaces the scenario's renderer, with its scenes and objects.
-  std::function<std::unique_ptr<Renderer>(const Camera& camera)> make_renderer;
+  /// Replaces the scenario's renderer, with its scenes and objects. The workers are those of the world, which outlives
+  /// its renderers.
+  std::function<std::unique_ptr<Renderer>(const Camera& camera, const Workers& workers)> make_renderer;
 
   /// A moving object of make_renderer's renderers, in the order of RenderRequest::objects. Trajectories cover the
   /// simulated time.
@@ -58,6 +63,14 @@ struct Substitutes {
 /// The same with substitutes. Throws UserError if the scenario has an option that custom renderers do not support.
 World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices);
 
+/// The part of the body's trajectory that a scenario simulates. Throws UserError if the trajectory does not cover it.
+TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory);
+
+/// A camera as it is recorded. If its options give no field of view, it has that of the followed camera (may be null).
+CameraInfo camera_info(CameraOptions options, const SceneCamera* followed);
+
+// --- scenes and motions (load_scenes.cpp, build_trajectories.cpp) ----------------------------------------------------
+
 /// The contents of the scene files of a scenario's renderer: for a mesh renderer, the objects of the scene file
 /// followed by those that the scenario lists; for Blender, only the cameras, and only if the trajectory follows one.
 /// Empty for renderers without scene files. Notes describe the contents.
@@ -67,15 +80,9 @@ SceneFile load_scenes(const Scenario& scenario, SceneLook look, const Notices& n
 std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const SceneFile& scene,
                                                    const Notices& notices);
 
-/// The part of the body's trajectory that a scenario simulates. Throws UserError if the trajectory does not cover it.
-TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory);
-
 /// The camera of the scene file that the scenario's trajectory follows; null for trajectories of other types. Throws
 /// UserError with the names of the cameras in the file.
 const SceneCamera* followed_camera(const Scenario& scenario, const SceneFile& scene);
-
-/// A camera as it is recorded. If its options give no field of view, it has that of the followed camera (may be null).
-CameraInfo camera_info(CameraOptions options, const SceneCamera* followed);
 
 /// The motions of the moving objects that a scenario's renderer shows, in the renderer's order. All cover `simulated`.
 /// Trajectories that do not define a duration, and the scene file's animation, begin with the body's trajectory. After
@@ -85,12 +92,19 @@ std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const S
                                                                          const TimeSpan& simulated,
                                                                          const Notices& notices);
 
-/// Makes the renderers of a scenario's cameras, which share one loaded scene. Throws UserError for colour filters that
-/// the renderer does not support.
-using RendererFactory =
-    std::function<std::unique_ptr<Renderer>(const Camera& camera, ColourFilters filters, const Workers& workers)>;
+// --- renderers (renderer_factory.cpp, start_blender.cpp) -------------------------------------------------------------
 
-/// Cameras may have colour filters if `colour`. Renderers are made for the sensors and for supersampled keyframes.
+/// Makes the renderers of a scenario's cameras, which share one loaded scene.
+struct RendererFactory {
+  /// Throws UserError for colour filters that the renderer does not support.
+  std::function<std::unique_ptr<Renderer>(const Camera& camera, ColourFilters filters, const Workers& workers)> make;
+
+  /// A renderer whose pixels average over `area`; null if they cannot. May be empty if they never can.
+  std::function<std::unique_ptr<Renderer>(const Camera& camera, const PixelArea& area, const Workers& workers)>
+      make_with_area{};
+};
+
+/// Cameras may have colour filters if `colour`. `sensors`: the cameras of the scenario; samplers may need others.
 RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene, bool colour,
                                        const std::vector<CameraInfo>& sensors, const Notices& notices);
 
@@ -98,9 +112,13 @@ RendererFactory build_renderer_factory(const RendererOptions& options, const Sce
 RendererFactory start_blender(const BlenderRendererOptions& options, const std::vector<CameraInfo>& sensors,
                               const Notices& notices);
 
+// --- ground truth (prepare_truth.cpp) --------------------------------------------------------------------------------
+
 /// Sets up the ground truth of a world with cameras. Throws UserError if the renderer cannot provide it.
 void prepare_truth(const Scenario& scenario, const SceneFile& scene, const RendererFactory& make_renderer,
                    const Notices& notices, World& world);
+
+// --- files (build_sinks.cpp) -----------------------------------------------------------------------------------------
 
 /// Throws UserError for unknown names in output.formats.
 void check_output(const Scenario& scenario);
@@ -114,8 +132,14 @@ std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& folder)
 /// One file of a format.
 std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& file, const Format& format);
 
+// --- reports (recording_report.cpp, losses_and_hints.cpp) ------------------------------------------------------------
+
 /// The text of report.json: results, cost, time by stage, and notices.
 std::string report_json(const Scenario& scenario, const Summary& summary, int threads,
+                        const std::vector<std::string>& notices);
+
+/// The text of report.json of a conversion.
+std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,
                         const std::vector<std::string>& notices);
 
 /// Losses of a simulation or a conversion: events that the readout dropped or delayed, samples limited by the maximum
@@ -126,6 +150,8 @@ std::vector<std::string> losses(const ConversionOptions& options, const Conversi
 /// Faster alternatives, one line each: flow sampling, if adaptive sampling of a mesh was slower than real time because
 /// of rendering.
 std::vector<std::string> hints(const Scenario& scenario, const Summary& summary);
+
+// --- all together (make_recording.cpp) -------------------------------------------------------------------------------
 
 /// Options of make_recording().
 struct RecordingOptions {
@@ -142,9 +168,5 @@ struct RecordingOptions {
 /// RecordingDirectory. The report contains the notices, and also losses and hints, which `notify` does not receive.
 std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions options, const Notices& notify,
                                       const Monitor& monitor);
-
-/// The text of report.json of a conversion.
-std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,
-                        const std::vector<std::string>& notices);
 
 }  // namespace esim::inline compose

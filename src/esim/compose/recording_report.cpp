@@ -3,10 +3,18 @@
 #include "esim/compose/compose.h"
 
 namespace esim::inline compose {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json(const MeasuredError& error) { return {{"mean", error.mean}, {"p99", error.p99}, {"max", error.max}}; }
+Json json(double number) { return number; }
+Json json(std::int64_t number) { return number; }
+
+}  // namespace
 
 std::string report_json(const Scenario& scenario, const Summary& summary, int threads,
                         const std::vector<std::string>& notices) {
-  using Json = nlohmann::ordered_json;
   const double simulated_s = to_seconds(summary.end - summary.start);
 
   Json cameras = Json::array();
@@ -34,19 +42,16 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
         {"events_per_second", simulated_s > 0 ? static_cast<double>(events) / simulated_s : 0.0},
     });
     if (scenario.cameras[i].frame_camera) cameras.back()["frames_written"] = camera.frames;
-    if (sampling.resampling_floor) {
-      const auto& [mean, p99, max] = *sampling.resampling_floor;
-      cameras.back()["supersampling"] = sampling.supersampling;
-      cameras.back()["resampling_floor"] = {{"mean", mean}, {"p99", p99}, {"max", max}};
+    if (sampling.measured_error) {
+      cameras.back()["tolerance"] = sampling.tolerance;
+      cameras.back()["measured_error"] = json(*sampling.measured_error);
+      cameras.back()["bisections"] = sampling.bisections;
+      cameras.back()["audits"] = sampling.audits;
+      cameras.back()["reconstructions"] = 0;  // methods that reconstruct images replace these two
+      cameras.back()["unseen_fraction"] = 0.0;
     }
-    if (!sampling.measured_error) continue;
-    const auto& [mean, p99, max] = *sampling.measured_error;
-    cameras.back()["tolerance"] = sampling.tolerance;
-    cameras.back()["measured_error"] = {{"mean", mean}, {"p99", p99}, {"max", max}};
-    cameras.back()["bisections"] = sampling.bisections;
-    cameras.back()["audits"] = sampling.audits;
-    cameras.back()["reconstructions"] = sampling.reconstructions;
-    cameras.back()["unseen_share"] = sampling.unseen_share;
+    for (const auto& [name, value] : sampling.others)
+      cameras.back()[name] = std::visit([](const auto& result) { return json(result); }, value);
   }
 
   const StageSeconds& s = summary.seconds;
@@ -79,7 +84,6 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
 
 std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,
                         const std::vector<std::string>& notices) {
-  using Json = nlohmann::ordered_json;
   const double converted_s = to_seconds(summary.end - summary.start);
   const std::int64_t events = summary.events_on + summary.events_off;
   const ConversionSummary::Seconds& s = summary.seconds;
@@ -106,7 +110,7 @@ std::string report_json(const ConversionOptions& options, const ConversionSummar
       {"frames", summary.frames},
       {"steps", summary.steps},
       {"intervals_held_to_max_steps", summary.held},
-      {"greatest_displacement_px", summary.displacement_px},
+      {"max_optical_flow_px", summary.max_optical_flow_px},
       {"events", events},
       {"events_on", summary.events_on},
       {"events_off", summary.events_off},

@@ -1,7 +1,5 @@
 #include "esim/compose/scene_pictures.h"
 
-#include <algorithm>
-#include <cmath>
 #include <tuple>
 #include <utility>
 
@@ -37,19 +35,6 @@ Camera scaled(const Camera& camera, int width, int height) {
   return result;
 }
 
-SE3 before_the_meshes(const Scene& scene, const Camera& camera) {
-  Eigen::AlignedBox3d box;
-  for (const SceneObject& object : scene.objects) {
-    for (const Eigen::Vector3f& vertex : object.mesh.vertices) box.extend(vertex.cast<double>());
-  }
-  SE3 pose{looking_along(Eigen::Vector3d::UnitX()), Eigen::Vector3d::Zero()};
-  if (box.isEmpty()) return pose;
-  const double fov_rad = 2 * std::atan(0.5 * camera.width / camera.fx);
-  const double radius = 0.5 * box.diagonal().norm();
-  pose.translation = box.center() - radius / std::sin(0.5 * std::min(fov_rad, 1.5)) * Eigen::Vector3d::UnitX();
-  return pose;
-}
-
 ScenePictures::ScenePictures(const Scenario& scenario, int threads, const Notices& notices) : workers_(threads) {
   const CameraOptions& options = scenario.cameras.front();
   const Camera camera = camera_model(options);
@@ -69,7 +54,7 @@ ScenePictures::ScenePictures(const Scenario& scenario, int threads, const Notice
 }
 
 std::unique_ptr<Renderer> ScenePictures::renderer_for(const Camera& camera) const {
-  return factory_(camera, colour_ ? ColourFilters::rggb : ColourFilters::none, workers_);
+  return factory_.make(camera, colour_ ? ColourFilters::rggb : ColourFilters::none, workers_);
 }
 
 Image<Rgb> ScenePictures::render(const Camera& camera, int finer, RenderRequest view) {

@@ -37,8 +37,4 @@ class ScenePictures {
 /// The same view with width x height pixels.
 Camera scaled(const Camera& camera, int width, int height);
 
-/// A pose in front of the meshes, looking along world x, so far away that all of them are in view; at the origin
-/// without meshes.
-SE3 before_the_meshes(const Scene& scene, const Camera& camera);
-
 }  // namespace esim::inline compose

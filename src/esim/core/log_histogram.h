@@ -21,12 +21,12 @@ class LogHistogram {
   double max() const { return max_; }
 
   /// The value that a fraction of the weight does not exceed: the upper edge of its bin. 0 without values.
-  double quantile(double share) const {
+  double quantile(double fraction) const {
     if (total_ == 0) return 0;
     double below = 0;
     for (std::size_t i = 0; i < weights_.size(); ++i) {
       below += weights_[i];
-      if (below >= share * total_) return std::pow(10.0, kLowest + (static_cast<double>(i) + 1) / kPerDecade);
+      if (below >= fraction * total_) return std::pow(10.0, kLowest + (static_cast<double>(i) + 1) / kPerDecade);
     }
     return 1e3;
   }

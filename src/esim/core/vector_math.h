@@ -10,7 +10,8 @@
 #include <cstdint>
 #include <limits>
 
-// Functions on vectors of values. Private: only .cpp files include it.
+// Functions on vectors of values.
+// Private to .cpp files: includes hwy/highway.h.
 namespace esim::inline core {
 
 namespace hn = hwy::HWY_NAMESPACE;

@@ -14,6 +14,7 @@
 #include "esim/dataset/files/checksum.h"
 #include "esim/dataset/files/preview.h"
 #include "esim/files/output_file.h"
+#include "esim/preview/pictures.h"
 
 namespace esim::inline dataset {
 namespace {
@@ -21,10 +22,10 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Counts pixels by the magnitude of their optical flow.
-void count_magnitudes(const VectorField& displacement, const MagnitudeHistogram& bins,
+void count_magnitudes(const VectorField& optical_flow, const MagnitudeHistogram& bins,
                       std::vector<std::uint64_t>& counts) {
-  for (std::size_t i = 0; i < displacement.x.size(); ++i) {
-    const double magnitude = std::hypot(displacement.x.data()[i], displacement.y.data()[i]);
+  for (std::size_t i = 0; i < optical_flow.x.size(); ++i) {
+    const double magnitude = std::hypot(optical_flow.x.data()[i], optical_flow.y.data()[i]);
     if (std::isfinite(magnitude)) ++counts[bins.bin_of(magnitude)];
   }
 }
@@ -113,9 +114,9 @@ class Run {
       writer->add(SequenceArrays(sequence, plan.contents).shard_sequence());
       record.events += sequence.events.size();
       record.passed_over.insert(sequence.passed_over.begin(), sequence.passed_over.end());
-      count_magnitudes(sequence.displacement, maker_.magnitudes(), record.magnitudes);
+      count_magnitudes(sequence.optical_flow, maker_.magnitudes(), record.magnitudes);
       if (!count_made(sequence.events.size())) return count_lost(i + 1);
-      if (shard == 0 && shown.size() < kMostShown) shown.push_back(std::move(sequence));
+      if (shard == 0 && shown.size() < kMaxShown) shown.push_back(std::move(sequence));
     }
     writer->finish();
     const FileChecksum written = checksum_of(working.path);

@@ -25,9 +25,9 @@ struct Sequence {
   TimeSpan span{};
   std::vector<Event> events{};
 
-  TimeNs flow_t = 0;
-  VectorField flow{};            ///< motion field at flow_t, px/s
-  VectorField displacement{};    ///< optical flow from the start to the end, at the pixels of the start, px
+  TimeNs motion_field_t = 0;
+  VectorField motion_field{};    ///< motion field at motion_field_t, px/s
+  VectorField optical_flow{};    ///< optical flow from the start to the end, at the pixels of the start, px
   Image<float> first{}, last{};  ///< irradiance at the start and at the end
   Image<float> depth{};          ///< at the start, m; +inf without a surface
 

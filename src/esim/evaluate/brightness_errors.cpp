@@ -55,8 +55,8 @@ void BrightnessErrors::compare(WindowSums& window, const Segment& segment, std::
       PixelSums& sums = window.pixels[static_cast<std::size_t>(line.pixel)];
       const float* const row = truth.row(line.pixel);
       for (std::int64_t k = first; k < block_end; ++k) {
-        const double share = static_cast<double>(reference_.time(k) - segment.t0) / duration;
-        const double error = std::abs(line.before + share * (line.after - line.before) - row[k - origin]);
+        const double fraction = static_cast<double>(reference_.time(k) - segment.t0) / duration;
+        const double error = std::abs(line.before + fraction * (line.after - line.before) - row[k - origin]);
         sums.squares += error * error;
         window.histogram.add(error);
         if (places.empty()) continue;

@@ -58,7 +58,7 @@ struct EventComparison {
   double count_ratio() const {
     return reference > 0 ? static_cast<double>(events) / static_cast<double>(reference) : 0;
   }
-  double identical_share() const {
+  double identical_fraction() const {
     return active_pixels > 0 ? static_cast<double>(identical_pixels) / static_cast<double>(active_pixels) : 1;
   }
 };

@@ -96,7 +96,7 @@ class Evaluation {
     result_.threads = world_.workers->threads();
     result_.span = {world_.info.start, world_.info.end};
     const EventCameraOptions& sensor = scenario_.cameras[0].event_camera;
-    result_.contrast_threshold = std::min(sensor.threshold_on(), sensor.threshold_off());
+    result_.contrast_threshold = sensor.min_threshold();
     result_.log_eps = sensor.log_eps;
     result_.pixels = spread_pixels(model.width, model.height, options.pixels);
   }

@@ -45,11 +45,11 @@ MotionCurve measure_motion(const World& world, const std::vector<PixelPosition>&
     double sum = 0;
     int counted = 0;
     for (const PixelPosition& p : pixels) {
-      const double speed = std::hypot(sample.flow_x(p.x, p.y), sample.flow_y(p.x, p.y));
+      const double speed = std::hypot(sample.motion_x(p.x, p.y), sample.motion_y(p.x, p.y));
       if (!std::isfinite(speed)) continue;
       sum += speed;
       ++counted;
-      motion.greatest_px_per_s = std::max(motion.greatest_px_per_s, speed);
+      motion.max_px_per_s = std::max(motion.max_px_per_s, speed);
     }
     motion.mean_px_per_s.push_back(counted > 0 ? sum / counted : 0.0);
     motion.fastest_turn_deg_per_s =

@@ -13,7 +13,7 @@ struct MotionCurve {
   TimeNs start = 0;
   double rate_hz = 0;
   std::vector<double> mean_px_per_s;  ///< mean |V| over the pixels, at each instant
-  double greatest_px_per_s = 0;       ///< maximum |V| of all pixels and instants
+  double max_px_per_s = 0;            ///< maximum |V| of all pixels and instants
   double fastest_turn_deg_per_s = 0;  ///< maximum angular speed of the camera
 
   /// Mean over the instants in a span; if it holds none, the value at the nearest one.

@@ -1,3 +1,4 @@
+// (2), which reference.cpp uses as well. tests/event_camera/center_surround_test.cpp has its slow definition.
 #pragma once
 
 #include <vector>

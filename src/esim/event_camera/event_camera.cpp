@@ -133,24 +133,24 @@ bool EventCamera::State::integrate_one(std::size_t i, const Workers& workers) {
     given = &brightness;
   }
   const RowPieces pieces(segment.tile);
-  std::atomic<bool> good = true;
+  std::atomic<bool> valid = true;
   workers.for_each_with_worker(pieces.count, [&](int piece, int worker) {
-    if (!advance(i, given, {pieces.begin(piece), pieces.end(piece)}, worker)) good = false;
+    if (!advance(i, given, {pieces.begin(piece), pieces.end(piece)}, worker)) valid = false;
   });
-  return good;
+  return valid;
 }
 
 /// Integrates several tiles in parallel.
 bool EventCamera::State::integrate_tiles(const Workers& workers) {
-  std::atomic<bool> good = true;
+  std::atomic<bool> valid = true;
   workers.for_each_with_worker(static_cast<int>(tile_begins.size()) - 1, [&](int i, int worker) {
     const auto tile = static_cast<std::size_t>(i);
     for (std::size_t k = tile_begins[tile]; k < tile_begins[tile + 1]; ++k) {
       const Tile& where = segments[k].tile;
-      if (!advance(k, nullptr, {where.y, where.y + where.height}, worker)) good = false;
+      if (!advance(k, nullptr, {where.y, where.y + where.height}, worker)) valid = false;
     }
   });
-  return good;
+  return valid;
 }
 
 bool EventCamera::State::integrate(const Workers& workers) {

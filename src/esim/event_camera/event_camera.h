@@ -1,3 +1,4 @@
+// Accelerates reference.h: the same camera, for any segments of any tiles, with threads.
 #pragma once
 
 #include <cstddef>

@@ -21,7 +21,7 @@ V lin_log(D d, V irradiance, float knee) {
 }  // namespace
 
 bool respond(const EventCameraOptions& options, std::size_t count, const float* irradiance, float* brightness) {
-  bool good = true;
+  bool valid = true;
   const auto run = [&](auto d, std::size_t first, std::size_t end) {
     const auto eps = hn::Set(d, static_cast<float>(options.log_eps));
     IrradianceCheck check(d);
@@ -33,13 +33,13 @@ bool respond(const EventCameraOptions& options, std::size_t count, const float* 
                              : lin_log(d, e, static_cast<float>(options.lin_log_knee));
       hn::StoreU(value, d, brightness + i);
     }
-    good &= check.passed();
+    valid &= check.passed();
   };
   const hn::ScalableTag<float> whole;
   const std::size_t in_vectors = count / hn::Lanes(whole) * hn::Lanes(whole);
   run(whole, 0, in_vectors);
   run(hn::CappedTag<float, 1>(), in_vectors, count);
-  return good;
+  return valid;
 }
 
 }  // namespace esim::inline event_camera

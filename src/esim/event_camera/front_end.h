@@ -1,3 +1,4 @@
+// Accelerates (1), brightness() in reference.cpp, for a row of pixels.
 #pragma once
 
 #include <cstddef>

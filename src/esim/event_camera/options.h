@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "esim/core/describe.h"
@@ -71,6 +72,9 @@ struct EventCameraOptions {
 
   double threshold_on() const { return contrast_threshold_on.value_or(contrast_threshold); }
   double threshold_off() const { return contrast_threshold_off.value_or(contrast_threshold); }
+
+  /// The smaller of the two, C of Eq. 2: what tolerances of sampling are multiples of.
+  double min_threshold() const { return std::min(threshold_on(), threshold_off()); }
 };
 
 /// Minimum threshold of any pixel, whatever the noise: keeps the number of events per step finite.

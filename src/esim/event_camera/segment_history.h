@@ -1,3 +1,4 @@
+// Keeps the past that reference.cpp has at hand in raise() and acknowledge(), because it runs frame by frame.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +11,7 @@
 #include "esim/event_camera/pixel/pixel_array.h"
 #include "esim/render/sample.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// A segment of a tile with the data that pixels need to resume in it.
@@ -21,8 +23,7 @@ struct PastSegment {
   Image<float> start, end;            // brightness at t0 and t1 if a surround is subtracted
 };
 
-/// The segments in which a pixel may resume: those that end after the time that the readout has reached. Private to the
-/// event camera.
+/// The segments in which a pixel may resume: those that end after the time that the readout has reached.
 class SegmentHistory {
  public:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();

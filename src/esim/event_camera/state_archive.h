@@ -10,10 +10,11 @@
 #include "esim/core/error.h"
 #include "esim/core/image.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// Serialises the state of an object. An object lists its members once, in a template `transfer(archive, self)`, for
-/// the writer and the reader. Private to the sensors.
+/// the writer and the reader.
 class StateWriter {
  public:
   explicit StateWriter(std::vector<std::byte>& out) : out_(out) {}

@@ -73,12 +73,12 @@ void InputFile::fill(std::size_t count) {
   }
 }
 
-std::span<const std::byte> InputFile::read(std::size_t most) {
+std::span<const std::byte> InputFile::read(std::size_t max) {
   // Damaged files do not cause allocations larger than their size. If the size is unknown, as of pipes, the stated size
   // is used.
-  if (size_ > 0) most = std::min<std::uint64_t>(most, std::max(size_, offset_) - offset_);
-  fill(most);
-  const std::size_t count = std::min(most, end_ - begin_);
+  if (size_ > 0) max = std::min<std::uint64_t>(max, std::max(size_, offset_) - offset_);
+  fill(max);
+  const std::size_t count = std::min(max, end_ - begin_);
   const std::span<const std::byte> bytes(buffer_.data() + begin_, count);
   begin_ += count, offset_ += count;
   return bytes;
@@ -97,12 +97,12 @@ std::span<const std::byte> InputFile::read_exactly(std::size_t count, std::strin
   return bytes;
 }
 
-std::string_view InputFile::read_line(std::size_t most, std::string_view what) {
-  fill(most + 2);
+std::string_view InputFile::read_line(std::size_t max, std::string_view what) {
+  fill(max + 2);
   const auto* const start = reinterpret_cast<const char*>(buffer_.data()) + begin_;
-  const std::string_view there(start, std::min(most + 2, end_ - begin_));
+  const std::string_view there(start, std::min(max + 2, end_ - begin_));
   const std::size_t end = there.find('\n');
-  if (end == std::string_view::npos && there.size() > most) fail(offset_, fmt::format("{} is too long", what));
+  if (end == std::string_view::npos && there.size() > max) fail(offset_, fmt::format("{} is too long", what));
   std::string_view line = there.substr(0, end);
   const std::size_t used = std::min(line.size() + 1, there.size());
   begin_ += used, offset_ += used;
@@ -127,10 +127,10 @@ void InputFile::fail(std::uint64_t offset, std::string_view reason) const {
   throw UserError(fmt::format("cannot read {}: at byte {}: {}", path_.string(), offset, reason));
 }
 
-std::string read_head(const std::filesystem::path& path, std::size_t most) {
-  std::string head(most, '\0');
+std::string read_head(const std::filesystem::path& path, std::size_t max) {
+  std::string head(max, '\0');
   std::ifstream file(path, std::ios::binary);
-  file.read(head.data(), static_cast<std::streamsize>(most));
+  file.read(head.data(), static_cast<std::streamsize>(max));
   head.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
   return head;
 }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -23,7 +24,7 @@ class InputFile {
   std::uint64_t offset() const { return offset_; }  ///< position of the next byte
 
   /// The next bytes, at most so many; fewer only at the end of the file. Borrowed until the next call.
-  std::span<const std::byte> read(std::size_t most);
+  std::span<const std::byte> read(std::size_t max);
 
   /// Fills `out` with the next bytes and returns their number; fewer only at the end of the file.
   std::size_t read_into(std::span<std::byte> out);
@@ -31,8 +32,8 @@ class InputFile {
   /// Exactly so many bytes; if the file ends earlier, fails with "the file ends within WHAT".
   std::span<const std::byte> read_exactly(std::size_t count, std::string_view what);
 
-  /// The next line without its end ("\n" or "\r\n"), or the rest of the file. Fails if it is longer than `most` bytes.
-  std::string_view read_line(std::size_t most, std::string_view what);
+  /// The next line without its end ("\n" or "\r\n"), or the rest of the file. Fails if it is longer than `max` bytes.
+  std::string_view read_line(std::size_t max, std::string_view what);
 
   /// Continues at another position, at most the end of the file.
   void seek(std::uint64_t offset);
@@ -55,7 +56,10 @@ class InputFile {
   std::size_t begin_ = 0, end_ = 0;  // unread part of the buffer
 };
 
+/// Reads the next bytes into a buffer and returns their number; fewer than requested only at the end. Throws UserError.
+using Read = std::function<std::size_t(std::span<std::byte>)>;
+
 /// The first bytes of a file, at most so many; empty if it cannot be read.
-std::string read_head(const std::filesystem::path& path, std::size_t most);
+std::string read_head(const std::filesystem::path& path, std::size_t max);
 
 }  // namespace esim::inline files

@@ -1,42 +1,27 @@
 #include "esim/files/line_reader.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
-#include <fstream>
+#include <memory>
 #include <utility>
 
 #include "esim/core/error.h"
-#include "esim/files/output_file.h"
 
 namespace esim::inline files {
 namespace {
 
-constexpr std::size_t kBlockBytes = 1 << 18;
 constexpr std::size_t kMaxLineBytes = 1 << 12;
-
-std::unique_ptr<std::istream> open(const std::filesystem::path& path) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) {
-    throw UserError("cannot read " + path.string() + ": it is a directory");
-  }
-  auto file = std::make_unique<std::ifstream>(path, std::ios::binary);
-  if (!*file) throw UserError("cannot read " + path.string() + ": " + system_reason(errno));
-  return file;
-}
-
-std::uintmax_t size_of(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  return error ? 0 : size;
-}
 
 }  // namespace
 
-LineReader::LineReader(std::filesystem::path path) : LineReader(open(path), path, size_of(path)) {}
+LineReader::LineReader(std::filesystem::path path) : path_(std::move(path)), block_(std::size_t{1} << 18) {
+  const auto file = std::make_shared<InputFile>(path_);
+  size_ = file->size();
+  read_ = [file](std::span<std::byte> out) { return file->read_into(out); };
+}
 
-LineReader::LineReader(std::unique_ptr<std::istream> text, std::filesystem::path path, std::uintmax_t bytes)
-    : path_(std::move(path)), text_(std::move(text)), size_(bytes), block_(kBlockBytes) {}
+LineReader::LineReader(Read read, std::filesystem::path path, std::uintmax_t bytes)
+    : path_(std::move(path)), read_(std::move(read)), size_(bytes), block_(std::size_t{1} << 18) {}
 
 void LineReader::fail(const std::string& reason) const {
   throw UserError(path_.string() + ", line " + std::to_string(line_number_) + ": " + reason);
@@ -45,13 +30,14 @@ void LineReader::fail(const std::string& reason) const {
 bool LineReader::next(std::string_view& line) {
   const auto find_newline = [&] { return std::find(block_.begin() + begin_, block_.begin() + end_, '\n'); };
   auto newline = find_newline();
-  if (newline == block_.begin() + end_ && *text_) {
+  if (newline == block_.begin() + end_ && !ended_) {
     // Moves the rest of the block to its start and reads more text after it.
     std::memmove(block_.data(), block_.data() + begin_, end_ - begin_);
     end_ -= std::exchange(begin_, 0);
-    text_->read(block_.data() + end_, static_cast<std::streamsize>(block_.size() - end_));
-    end_ += static_cast<std::size_t>(text_->gcount()), read_ += static_cast<std::uintmax_t>(text_->gcount());
-    if (text_->bad()) fail("the file cannot be read further");
+    const std::span<char> rest = std::span(block_).subspan(end_);
+    const std::size_t count = read_(std::as_writable_bytes(rest));
+    ended_ = count < rest.size();
+    end_ += count, bytes_read_ += count;
     newline = find_newline();
   }
   if (begin_ == end_) return false;

@@ -2,11 +2,11 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <istream>
-#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "esim/files/input_file.h"
 
 namespace esim::inline files {
 
@@ -17,7 +17,7 @@ class LineReader {
   explicit LineReader(std::filesystem::path path);
 
   /// Reads a text of so many bytes, called `path` in messages.
-  LineReader(std::unique_ptr<std::istream> text, std::filesystem::path path, std::uintmax_t bytes);
+  LineReader(Read read, std::filesystem::path path, std::uintmax_t bytes);
 
   /// The next line without its end ("\n"), borrowed until the next call; returns false at the end.
   bool next(std::string_view& line);
@@ -25,14 +25,15 @@ class LineReader {
   [[noreturn]] void fail(const std::string& reason) const;
 
   /// The fraction of the text that has been read.
-  double progress() const { return size_ > 0 ? static_cast<double>(read_) / static_cast<double>(size_) : 1.0; }
+  double progress() const { return size_ > 0 ? static_cast<double>(bytes_read_) / static_cast<double>(size_) : 1.0; }
 
  private:
   std::filesystem::path path_;
-  std::unique_ptr<std::istream> text_;
-  std::uintmax_t size_ = 0, read_ = 0;  // bytes
+  Read read_;
+  std::uintmax_t size_ = 0, bytes_read_ = 0;
   std::vector<char> block_;
   std::size_t begin_ = 0, end_ = 0;  // unread part of the block
+  bool ended_ = false;
   std::uint64_t line_number_ = 0;
 };
 

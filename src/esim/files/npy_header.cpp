@@ -4,7 +4,7 @@
 #include <charconv>
 #include <utility>
 
-namespace esim::inline formats::npy {
+namespace esim::inline files::npy {
 namespace {
 
 constexpr std::size_t kHeaderBytes = 192;
@@ -105,4 +105,4 @@ Header read_header(const Read& read, const Fail& fail) {
   return header;
 }
 
-}  // namespace esim::inline formats::npy
+}  // namespace esim::inline files::npy

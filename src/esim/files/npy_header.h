@@ -9,8 +9,10 @@
 #include <string_view>
 #include <vector>
 
+#include "esim/files/input_file.h"
+
 /// The header of NumPy's files (https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html).
-namespace esim::inline formats::npy {
+namespace esim::inline files::npy {
 
 inline constexpr std::string_view kMagic = "\x93NUMPY";
 
@@ -34,13 +36,10 @@ struct Header {
   std::vector<std::uint64_t> shape{};
 };
 
-/// Reads bytes into a buffer; returns their number, which is less than requested only at the end of the file.
-using Read = std::function<std::size_t(std::span<std::byte>)>;
-
 /// Throws the caller's exception; `problem` says what is wrong with the file: "it ends within its header".
 using Fail = std::function<void(const std::string& problem)>;
 
 /// Reads a header of version 1 to 3, up to the first number.
 Header read_header(const Read& read, const Fail& fail);
 
-}  // namespace esim::inline formats::npy
+}  // namespace esim::inline files::npy

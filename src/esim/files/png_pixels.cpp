@@ -185,8 +185,8 @@ void swap_bytes(std::vector<std::uint8_t>& bytes) {
 
 /// False if the stream is damaged or does not fill `out` exactly.
 bool inflate(std::span<const std::uint8_t> compressed, std::span<std::uint8_t> out) {
-  constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
-  if (compressed.size() > kMost || out.size() > kMost) return false;
+  constexpr std::size_t kMax = std::numeric_limits<std::uint32_t>::max();
+  if (compressed.size() > kMax || out.size() > kMax) return false;
   thread_local const auto kState = std::make_unique<inflate_state>();
   isal_inflate_init(kState.get());
   kState->crc_flag = ISAL_ZLIB;  // with its header and its checksum
@@ -213,9 +213,9 @@ bool decode_png_pixels(std::span<const std::byte> file, PngPixels& pixels) {
   const std::span<const std::uint8_t> compressed = compressed_bytes(rest, joined);
 
   // Each row follows the number of its filter.
-  constexpr std::size_t kMostPerByte = 1040;  // deflate's limit, with a margin
+  constexpr std::size_t kMaxPerByte = 1040;  // deflate's limit, with a margin
   const std::size_t stride = pixels.row_bytes + 1, height = static_cast<std::size_t>(pixels.height);
-  if (stride > kMostPerByte * compressed.size() / height) return false;
+  if (stride > kMaxPerByte * compressed.size() / height) return false;
   thread_local std::vector<std::uint8_t> filtered;
   filtered.resize(stride * height);
   if (!inflate(compressed, filtered)) return false;

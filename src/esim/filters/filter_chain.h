@@ -18,6 +18,8 @@ class FilterChain final : public EventFilter {
   /// For a sensor of `width` x `height` px. Throws UserError for invalid options, and for windows and masked pixels
   /// that lie outside the sensor.
   FilterChain(const FilterOptions& options, int width, int height);
+  FilterChain(FilterChain&&) = default;
+  FilterChain& operator=(FilterChain&&) = default;
 
   /// Throws UserError if an event lies outside the sensor, is earlier than the previous one, or is more than 146 years
   /// from 0; then no event of the call has been processed.

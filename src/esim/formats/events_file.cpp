@@ -18,8 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMaxExtent = 65536;  // px
-constexpr std::uintmax_t kMaxReportBytes = std::uintmax_t{1} << 24;
+constexpr int kMaxFileExtent = 65536;  // px
+constexpr std::uintmax_t kMaxEventsReportBytes = std::uintmax_t{1} << 24;
 
 // The events file that a path stands for.
 fs::path find_any_file(const fs::path& path) {
@@ -56,7 +56,7 @@ std::optional<SensorSize> sensor_in_report(const nlohmann::json& report, const s
   for (const auto& camera : cameras) {
     if (cameras.size() > 1 && camera.at("name") != name) continue;
     const SensorSize sensor{camera.at("width").get<int>(), camera.at("height").get<int>()};
-    if (std::min(sensor.width, sensor.height) >= 1 && std::max(sensor.width, sensor.height) <= kMaxExtent)
+    if (std::min(sensor.width, sensor.height) >= 1 && std::max(sensor.width, sensor.height) <= kMaxFileExtent)
       return sensor;
   }
   return std::nullopt;
@@ -67,7 +67,7 @@ std::optional<SensorSize> reported_sensor(const fs::path& folder) {
   for (const fs::path& path : {folder / "report.json", folder.parent_path() / "report.json"}) {
     std::error_code error;
     const std::uintmax_t bytes = fs::file_size(path, error);
-    if (error || bytes > kMaxReportBytes) continue;
+    if (error || bytes > kMaxEventsReportBytes) continue;
     try {
       std::ifstream file(path);
       return sensor_in_report(nlohmann::json::parse(file), folder.filename().string());

@@ -17,7 +17,7 @@
 namespace esim::inline frame_camera {
 namespace {
 
-constexpr std::size_t kMostPoints = 1 << 20;
+constexpr std::size_t kMaxPoints = 1 << 20;
 
 /// Takes a number, and the blanks, comma or semicolon after it, from the front of `text`.
 std::optional<double> take_number(std::string_view& text) {
@@ -58,7 +58,7 @@ CameraResponse::CameraResponse(const ResponseOptions& options) : options_(option
     if (!points.empty() && *level < points.back().second)
       fail(fmt::format("the level must not fall, but {} is below the previous {}; give a monotonic response", *level,
                        points.back().second));
-    if (points.size() == kMostPoints) fail("a measured response must have at most 2^20 lines");
+    if (points.size() == kMaxPoints) fail("a measured response must have at most 2^20 lines");
     points.emplace_back(*signal, *level);
   }
   if (points.size() < 2 || points.back().second <= points.front().second)
@@ -98,8 +98,8 @@ double CameraResponse::inverse(double level) const {
   if (above == points_.begin()) return static_cast<double>(above->signal);
   if (above == points_.end()) return 1;
   const Point &a = *std::prev(above), &b = *above;
-  const double share = (level - static_cast<double>(a.level)) / static_cast<double>(b.level - a.level);
-  return static_cast<double>(a.signal) + share * static_cast<double>(b.signal - a.signal);
+  const double fraction = (level - static_cast<double>(a.level)) / static_cast<double>(b.level - a.level);
+  return static_cast<double>(a.signal) + fraction * static_cast<double>(b.signal - a.signal);
 }
 
 }  // namespace esim::inline frame_camera

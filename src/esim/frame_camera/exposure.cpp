@@ -40,10 +40,10 @@ Exposure::Weights Exposure::weigh(const Segment& segment, TimeNs begin) const {
   const TimeNs from = std::max(segment.t0, begin), to = std::min(segment.t1, begin + duration_);
   if (from >= to) return {begin, 0, 0};
   // The mean over the overlap is E in its middle.
-  const double share = static_cast<double>(to - from) / static_cast<double>(duration_);
+  const double fraction = static_cast<double>(to - from) / static_cast<double>(duration_);
   const double twice_middle = static_cast<double>(from - segment.t0) + static_cast<double>(to - segment.t0);
   const double middle = twice_middle / (2 * static_cast<double>(segment.t1 - segment.t0));
-  return {begin, static_cast<float>(share * (1 - middle)), static_cast<float>(share * middle)};
+  return {begin, static_cast<float>(fraction * (1 - middle)), static_cast<float>(fraction * middle)};
 }
 
 bool Exposure::add(const Segment& segment, Rows rows) {

@@ -8,10 +8,10 @@
 #include "esim/core/time.h"
 #include "esim/render/sample.h"
 
+// Private to frame_camera.
 namespace esim::inline frame_camera {
 
-/// A frame during its exposure: accumulates the mean irradiance of each pixel over its row's exposure. Private to the
-/// frame camera.
+/// A frame during its exposure: accumulates the mean irradiance of each pixel over its row's exposure.
 ///
 /// Between two samples irradiance is linear in time, so that its integral is exact. (A straight line in the logarithm
 /// would lie below it: moving edges would reduce the irradiance.)

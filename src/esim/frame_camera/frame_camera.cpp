@@ -44,15 +44,15 @@ const FrameCameraOptions& checked(const FrameCameraOptions& o, int height) {
   if (o.black_level >= o.largest_number())
     fail("black_level", fmt::format("{} leaves no range within {} bits", o.black_level, o.bits));
   if (!o.auto_exposure) return o;
-  const double least = o.auto_exposure->min_exposure_s, most = o.auto_exposure->max_exposure_s.value_or(interval_s);
-  check_exposure("auto_exposure.max_exposure_s", most);
-  if (least > most)
-    fail("auto_exposure.min_exposure_s", fmt::format("{} s is above max_exposure_s, {:.6g} s; swap them", least, most));
-  if (o.exposure_s < least || o.exposure_s > most * slack) {
+  const double min = o.auto_exposure->min_exposure_s, max = o.auto_exposure->max_exposure_s.value_or(interval_s);
+  check_exposure("auto_exposure.max_exposure_s", max);
+  if (min > max)
+    fail("auto_exposure.min_exposure_s", fmt::format("{} s is above max_exposure_s, {:.6g} s; swap them", min, max));
+  if (o.exposure_s < min || o.exposure_s > max * slack) {
     fail("exposure_s",
          fmt::format("{} s, the first exposure, must be between min_exposure_s = {} s and max_exposure_s = "
                      "{:.6g} s of auto_exposure",
-                     o.exposure_s, least, most));
+                     o.exposure_s, min, max));
   }
   return o;
 }

@@ -58,8 +58,8 @@ void FrameReadout::read_block(Block& block, std::size_t first, std::uint32_t num
   }
 
   // Electrons: collected, limited by the full well, read.
-  const float most = 2 * well + 1000;  // above this the well is always full
-  for (std::size_t i = 0; i < count; ++i) signal[i] = std::min(irradiance[i] * scale, most);
+  const float max = 2 * well + 1000;  // above this the well is always full
+  for (std::size_t i = 0; i < count; ++i) signal[i] = std::min(irradiance[i] * scale, max);
   if (options_.shot_noise) {
     for (std::size_t i = 0; i < count; ++i) signal[i] = poisson(signal[i], block.normals[0][i]);
   }

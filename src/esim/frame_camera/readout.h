@@ -9,10 +9,10 @@
 #include "esim/frame_camera/camera_response.h"
 #include "esim/frame_camera/options.h"
 
+// Private to frame_camera.
 namespace esim::inline frame_camera {
 
-/// Converts irradiance to digital numbers: electrons, full well, noise, gain, response and quantisation. Private to the
-/// frame camera.
+/// Converts irradiance to digital numbers: electrons, full well, noise, gain, response and quantisation.
 class FrameReadout {
  public:
   FrameReadout(const FrameCameraOptions& options, std::uint64_t seed, std::uint16_t stream);

@@ -56,7 +56,6 @@ struct Camera {
   double fx = 0.0, fy = 0.0;  // px
   double cx = 0.0, cy = 0.0;  // px
   Distortion distortion;
-  double footprint = 1.0;  // px: side of the square that a pixel averages over
 
   /// An ideal camera with square pixels, the principal point in the middle of the image, and a field of view of
   /// horizontal_fov_rad between its left and right borders. Throws UserError unless 0 < horizontal_fov_rad < π and

@@ -20,16 +20,19 @@ constexpr float kSaturatingEvents = 8.0f;
 
 std::uint8_t to_byte(float value) { return static_cast<std::uint8_t>(std::clamp(value, 0.0f, 255.0f) + 0.5f); }
 
-std::array<Rgb, 256> viridis() {
-  cv::Mat ramp(1, 256, CV_8UC1), coloured;
-  for (int i = 0; i < 256; ++i) ramp.at<std::uint8_t>(0, i) = static_cast<std::uint8_t>(i);
-  cv::applyColorMap(ramp, coloured, cv::COLORMAP_VIRIDIS);
-  std::array<Rgb, 256> map;
-  for (int i = 0; i < 256; ++i) {
-    const auto bgr = coloured.at<cv::Vec3b>(0, i);
-    map[static_cast<std::size_t>(i)] = {bgr[2], bgr[1], bgr[0]};
-  }
-  return map;
+const std::array<Rgb, 256>& viridis_map() {
+  static const std::array<Rgb, 256> kMap = [] {
+    cv::Mat ramp(1, 256, CV_8UC1), coloured;
+    for (int i = 0; i < 256; ++i) ramp.at<std::uint8_t>(0, i) = static_cast<std::uint8_t>(i);
+    cv::applyColorMap(ramp, coloured, cv::COLORMAP_VIRIDIS);
+    std::array<Rgb, 256> map;
+    for (int i = 0; i < 256; ++i) {
+      const auto bgr = coloured.at<cv::Vec3b>(0, i);
+      map[static_cast<std::size_t>(i)] = {bgr[2], bgr[1], bgr[0]};
+    }
+    return map;
+  }();
+  return kMap;
 }
 
 // The hues of the flow colour wheel: six arcs, in each of which one component changes linearly, with as many steps as
@@ -136,9 +139,8 @@ class DepthColours {
       : log_near_(fast_log2(near_m)), levels_per_log_(255.0f / (fast_log2(far_m) - log_near_)) {}
 
   Rgb of(float depth_m) const {
-    static const std::array<Rgb, 256> kMap = viridis();
     if (!(depth_m > 0.0f) || depth_m == std::numeric_limits<float>::infinity()) return kNoDepthColour;
-    return kMap[to_byte(255.0f - levels_per_log_ * (fast_log2(depth_m) - log_near_))];
+    return viridis_map()[to_byte(255.0f - levels_per_log_ * (fast_log2(depth_m) - log_near_))];
   }
 
  private:
@@ -188,14 +190,16 @@ Image<Rgb> grey(const Image<float>& irradiance) {
   return coloured_levels(irradiance, [](Rgb grey) { return grey; });
 }
 
-Rgb colour_flow(float x, float y, float full_scale) { return FlowColours(full_scale).of(x, y); }
+Rgb colour_motion(float x, float y, float full_scale) { return FlowColours(full_scale).of(x, y); }
 
-Image<Rgb> colour_flow(const Image<float>& flow_x, const Image<float>& flow_y, float full_scale_px_per_s) {
+Image<Rgb> colour_motion(const Image<float>& motion_x, const Image<float>& motion_y, float full_scale_px_per_s) {
   const FlowColours colours(full_scale_px_per_s);
-  Image<Rgb> out(flow_x.width(), flow_x.height());
-  colours.row(flow_x.data(), flow_y.data(), out.size(), out.data());
+  Image<Rgb> out(motion_x.width(), motion_x.height());
+  colours.row(motion_x.data(), motion_y.data(), out.size(), out.data());
   return out;
 }
+
+Rgb viridis(float position) { return viridis_map()[to_byte(255.0f * position)]; }
 
 Rgb colour_depth(float depth_m, float near_m, float far_m) { return DepthColours(near_m, far_m).of(depth_m); }
 

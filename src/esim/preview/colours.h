@@ -1,24 +1,9 @@
 #pragma once
 
-#include <cstdint>
-
 #include "esim/core/image.h"
+#include "esim/plot/colour.h"
 
 namespace esim::inline preview {
-
-struct Rgb {
-  std::uint8_t r = 0, g = 0, b = 0;
-  bool operator==(const Rgb&) const = default;
-};
-
-/// Blends two colours: `amount` (0 to 1) of the second.
-inline Rgb mix(Rgb from, Rgb to, float amount) {
-  const auto blend = [amount](std::uint8_t a, std::uint8_t b) {
-    const float value = static_cast<float>(a) + amount * static_cast<float>(b - a);
-    return static_cast<std::uint8_t>((value < 0.0f ? 0.0f : value > 255.0f ? 255.0f : value) + 0.5f);
-  };
-  return {blend(from.r, to.r), blend(from.g, to.g), blend(from.b, to.b)};
-}
 
 // Orange and blue are distinguishable with any kind of colour vision.
 inline constexpr Rgb kOnColour{255, 152, 20};
@@ -42,8 +27,11 @@ Image<Rgb> grey(const Image<float>& irradiance);
 
 /// The motion field in the colour code of Baker et al., "A Database and Evaluation Methodology for Optical Flow", IJCV
 /// 2011: hue by direction, white at rest, saturated at `full_scale_px_per_s`, darker beyond it.
-Image<Rgb> colour_flow(const Image<float>& flow_x, const Image<float>& flow_y, float full_scale_px_per_s);
-Rgb colour_flow(float x, float y, float full_scale);
+Image<Rgb> colour_motion(const Image<float>& motion_x, const Image<float>& motion_y, float full_scale_px_per_s);
+Rgb colour_motion(float x, float y, float full_scale);
+
+/// The colour map viridis, from 0 (violet) to 1 (yellow), clamped.
+Rgb viridis(float position);
 
 /// Depth in the colour map viridis, on a logarithmic scale from near_m (yellow) to far_m (violet), clamped;
 /// kNoDepthColour for invalid depth (infinite, NaN or not positive). 0 < near_m < far_m.

@@ -34,17 +34,17 @@ struct Box {
 
 Box box_of(const std::vector<Cell>& cells, std::size_t first, std::size_t end) {
   Box box{first, end};
-  std::array<int, 3> least{31, 31, 31}, most{};
+  std::array<int, 3> min{31, 31, 31}, max{};
   for (std::size_t i = first; i < end; ++i) {
     box.count += cells[i].count;
     for (std::size_t component = 0; component < 3; ++component) {
-      least[component] = std::min(least[component], cells[i].level(component));
-      most[component] = std::max(most[component], cells[i].level(component));
+      min[component] = std::min(min[component], cells[i].level(component));
+      max[component] = std::max(max[component], cells[i].level(component));
     }
   }
   for (std::size_t component = 0; component < 3; ++component) {
-    if (most[component] - least[component] <= box.extent) continue;
-    box.extent = most[component] - least[component];
+    if (max[component] - min[component] <= box.extent) continue;
+    box.extent = max[component] - min[component];
     box.longest = component;
   }
   return box;

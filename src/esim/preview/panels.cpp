@@ -6,23 +6,19 @@
 #include <cmath>
 
 #include "esim/files/number_text.h"
-#include "esim/preview/canvas.h"
+#include "esim/plot/canvas.h"
+#include "esim/plot/theme.h"
+#include "esim/preview/pictures.h"
 
 namespace esim::inline preview {
 namespace {
 
 constexpr int kMaxWidth = 1920;
-constexpr int kLeastPanelWidth = 320;
+constexpr int kMinPanelWidth = 320;
 constexpr int kMaxPanelHeight = 960;
-constexpr int kLeastColumnWidth = 320;  // for the legends of narrow panels
+constexpr int kMinColumnWidth = 320;  // for the legends of narrow panels
 constexpr int kMargin = 18, kGap = 14;
 constexpr int kHeader = 44, kTitle = 30, kLegend = 84;
-constexpr int kTextHeight = 11, kSmallTextHeight = 10;
-
-constexpr Rgb kPaper{255, 255, 255};
-constexpr Rgb kInk{30, 30, 30};
-constexpr Rgb kFaintInk{110, 110, 110};
-
 // Three significant digits, without an exponent.
 std::string short_number(float value) {
   const int decimals = value > 0.0f ? std::clamp(2 - static_cast<int>(std::floor(std::log10(value))), 0, 6) : 0;
@@ -65,10 +61,10 @@ class Panels {
     return colour_depth(nearest(*frame_.depth_m), near_m, far_m);
   }
 
-  Image<Rgb> flow() const {
-    const Image<float>&x = *frame_.flow_x_px_per_s, &y = *frame_.flow_y_px_per_s;
-    if (!large_) return fit(colour_flow(x, y, frame_.full_flow_px_per_s));
-    return colour_flow(nearest(x), nearest(y), frame_.full_flow_px_per_s);
+  Image<Rgb> motion_field() const {
+    const Image<float>&x = *frame_.motion_x_px_per_s, &y = *frame_.motion_y_px_per_s;
+    if (!large_) return fit(colour_motion(x, y, frame_.full_speed_px_per_s));
+    return colour_motion(nearest(x), nearest(y), frame_.full_speed_px_per_s);
   }
 
  private:
@@ -93,15 +89,15 @@ class Panels {
 
 void draw_panel_frame(Canvas& canvas, const PreviewLayout& layout, int panel, const char* title) {
   const int x = layout.panel_x(panel), y = layout.panel_y();
-  canvas.text(x, y - 10, title, kTextHeight + 1, kInk);
-  canvas.outline({x - 1, y - 1, layout.panel_width + 2, layout.panel_height + 2}, kFaintInk);
+  canvas.text(x, y - 10, title, kTitleHeight, kLightTheme.ink);
+  canvas.outline({x - 1, y - 1, layout.panel_width + 2, layout.panel_height + 2}, kLightTheme.faint_ink);
 }
 
 int draw_swatch(Canvas& canvas, int x, int y, Rgb colour, const std::string& label) {
   constexpr int kSide = 14;
   canvas.fill({x, y, kSide, kSide}, colour);
-  canvas.outline({x, y, kSide, kSide}, kFaintInk);
-  return kSide + 8 + canvas.text(x + kSide + 8, y + 12, label, kSmallTextHeight, kInk);
+  canvas.outline({x, y, kSide, kSide}, kLightTheme.faint_ink);
+  return kSide + 8 + canvas.text(x + kSide + 8, y + 12, label, kTextHeight, kLightTheme.ink);
 }
 
 void draw_events_legend(Canvas& canvas, const PreviewLayout& layout, const PreviewFrame& frame) {
@@ -112,7 +108,7 @@ void draw_events_legend(Canvas& canvas, const PreviewLayout& layout, const Previ
   const std::string total = frame.since_previous > 0
                                 ? fmt::format("{} events in {}", grouped(on + off), duration(frame.since_previous))
                                 : fmt::format("{} events", grouped(on + off));
-  canvas.text(x, y + 38, total, kSmallTextHeight, kInk);
+  canvas.text(x, y + 38, total, kTextHeight, kLightTheme.ink);
 }
 
 void draw_depth_legend(Canvas& canvas, const PreviewLayout& layout, const PreviewFrame& frame) {
@@ -129,44 +125,44 @@ void draw_depth_legend(Canvas& canvas, const PreviewLayout& layout, const Previe
     const float depth = depth_at((static_cast<float>(i) + 0.5f) / static_cast<float>(bar));
     canvas.fill({x + i, y, 1, kBarHeight}, colour_depth(depth, frame.near_m, frame.far_m));
   }
-  canvas.outline({x, y, bar, kBarHeight}, kFaintInk);
+  canvas.outline({x, y, bar, kBarHeight}, kLightTheme.faint_ink);
   const int ticks = bar < 280 ? 3 : 5;
   for (int tick = 0; tick < ticks; ++tick) {
     const float position = static_cast<float>(tick) / static_cast<float>(ticks - 1);
     const int at = x + static_cast<int>(std::lround(position * static_cast<float>(bar - 1)));
     const Align align = tick == 0 ? Align::left : tick == ticks - 1 ? Align::right : Align::centre;
-    canvas.fill({at, y + kBarHeight, 1, 5}, kFaintInk);
+    canvas.fill({at, y + kBarHeight, 1, 5}, kLightTheme.faint_ink);
     const char* unit = tick == ticks - 1 ? " m" : "";
-    canvas.text(at, y + kBarHeight + 21, short_number(depth_at(position)) + unit, kSmallTextHeight, kInk, align);
+    canvas.text(at, y + kBarHeight + 21, short_number(depth_at(position)) + unit, kTextHeight, kLightTheme.ink, align);
   }
 }
 
 void draw_flow_legend(Canvas& canvas, const PreviewLayout& layout, const PreviewFrame& frame) {
   constexpr int kRadius = 32;
   const int x = layout.panel_x(2), y = layout.legend_y() - 2;
-  Image<Rgb> wheel(2 * kRadius + 1, 2 * kRadius + 1, kPaper);
+  Image<Rgb> wheel(2 * kRadius + 1, 2 * kRadius + 1, kLightTheme.page);
   for (int v = -kRadius; v <= kRadius; ++v) {
     for (int u = -kRadius; u <= kRadius; ++u) {
       const float radius = std::hypot(static_cast<float>(u), static_cast<float>(v));
       const float coverage = std::clamp(kRadius + 0.5f - radius, 0.0f, 1.0f);
       const float inside = std::min(1.0f, static_cast<float>(kRadius) / std::max(radius, 1.0f));
-      const Rgb colour = colour_flow(static_cast<float>(u) * inside, static_cast<float>(v) * inside, kRadius);
-      wheel(u + kRadius, v + kRadius) = mix(kPaper, colour, coverage);
+      const Rgb colour = colour_motion(static_cast<float>(u) * inside, static_cast<float>(v) * inside, kRadius);
+      wheel(u + kRadius, v + kRadius) = mix(kLightTheme.page, colour, coverage);
     }
   }
   canvas.draw(wheel, x, y);
   const int text_x = x + 2 * kRadius + 16;
-  canvas.text(text_x, y + 26, fmt::format("rim: {} px/s", short_number(frame.full_flow_px_per_s)), kSmallTextHeight,
-              kInk);
-  canvas.text(text_x, y + 50, "hue: direction of motion", kSmallTextHeight, kFaintInk);
+  canvas.text(text_x, y + 26, fmt::format("rim: {} px/s", short_number(frame.full_speed_px_per_s)), kTextHeight,
+              kLightTheme.ink);
+  canvas.text(text_x, y + 50, "hue: direction of motion", kTextHeight, kLightTheme.faint_ink);
 }
 
 /// The parts that do not change from frame to frame.
 Image<Rgb> draw_backdrop(const PreviewLayout& layout, const PreviewFrame& frame) {
-  Canvas canvas(layout.width, layout.height, kPaper);
+  Canvas canvas(layout.width, layout.height, kLightTheme.page);
   const int right = layout.panel_x(layout.panels - 1) + layout.column_width;
-  canvas.text(right, 30, frame.caption, kSmallTextHeight, kFaintInk, Align::right);
-  canvas.fill({kMargin, kHeader - 4, right - kMargin, 1}, {210, 210, 210});
+  canvas.text(right, 30, frame.caption, kTextHeight, kLightTheme.faint_ink, Align::right);
+  canvas.fill({kMargin, kHeader - 4, right - kMargin, 1}, kLightTheme.grid);
   draw_panel_frame(canvas, layout, 0, "Events");
   if (frame.depth_m == nullptr) {
     draw_panel_frame(canvas, layout, 1, "Image");
@@ -182,14 +178,14 @@ Image<Rgb> draw_backdrop(const PreviewLayout& layout, const PreviewFrame& frame)
 }  // namespace
 
 PreviewLayout::PreviewLayout(int camera_width, int camera_height, int panel_count) : panels(panel_count) {
-  const double most_panel_width = (kMaxWidth - 2 * kMargin - (panels - 1) * kGap) / panels;
-  const double whole_factor = (kLeastPanelWidth + camera_width - 1) / camera_width;
+  const double max_panel_width = (kMaxWidth - 2 * kMargin - (panels - 1) * kGap) / panels;
+  const double whole_factor = (kMinPanelWidth + camera_width - 1) / camera_width;
   const double scale =
-      std::min({whole_factor, most_panel_width / camera_width, static_cast<double>(kMaxPanelHeight) / camera_height});
+      std::min({whole_factor, max_panel_width / camera_width, static_cast<double>(kMaxPanelHeight) / camera_height});
   const auto scaled = [scale](int extent) { return std::max(1, static_cast<int>(scale * extent + 1e-6)); };
   panel_width = scaled(camera_width);
   panel_height = scaled(camera_height);
-  column_width = std::max(panel_width, kLeastColumnWidth);
+  column_width = std::max(panel_width, kMinColumnWidth);
   width = 2 * kMargin + (panels - 1) * kGap + panels * column_width;
   height = kHeader + kTitle + panel_height + kLegend + kMargin;
   width += width % 2;
@@ -201,12 +197,12 @@ int PreviewLayout::panel_y() const { return kHeader + kTitle; }
 int PreviewLayout::legend_y() const { return panel_y() + panel_height + 16; }
 
 Image<Rgb> PreviewPage::compose(const PreviewFrame& frame) {
-  const Scales scales{frame.near_m, frame.far_m, frame.full_flow_px_per_s};
+  const Scales scales{frame.near_m, frame.far_m, frame.full_speed_px_per_s};
   if (backdrop_.empty() || scales != scales_) backdrop_ = draw_backdrop(layout_, frame);
   scales_ = scales;
 
   Canvas canvas(backdrop_);
-  canvas.text(kMargin, 30, fmt::format("t = {:.4f} s", to_seconds(frame.t)), kTextHeight + 2, kInk);
+  canvas.text(kMargin, 30, fmt::format("t = {:.4f} s", to_seconds(frame.t)), kHeadlineHeight - 1, kLightTheme.ink);
   const auto draw = [&](int panel, const Image<Rgb>& image) {
     canvas.draw(image, layout_.panel_x(panel), layout_.panel_y());
   };
@@ -217,7 +213,7 @@ Image<Rgb> PreviewPage::compose(const PreviewFrame& frame) {
     draw(1, panels.image());
   } else {
     draw(1, panels.depth());
-    draw(2, panels.flow());
+    draw(2, panels.motion_field());
   }
   return std::move(canvas).take();
 }

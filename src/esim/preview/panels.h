@@ -17,11 +17,11 @@ struct PreviewFrame {
   const Image<float>& off_events;
   const Image<float>& irradiance;
   const Image<float>* depth_m = nullptr;  ///< null, like the motion field, if only images are known
-  const Image<float>* flow_x_px_per_s = nullptr;
-  const Image<float>* flow_y_px_per_s = nullptr;
-  float near_m = 0, far_m = 0;   ///< range of the depth colours; 0: no depth is known
-  float full_flow_px_per_s = 1;  ///< full scale of the motion-field colours
-  std::string caption{};         ///< text above the panels, on the right
+  const Image<float>* motion_x_px_per_s = nullptr;
+  const Image<float>* motion_y_px_per_s = nullptr;
+  float near_m = 0, far_m = 0;    ///< range of the depth colours; 0: no depth is known
+  float full_speed_px_per_s = 1;  ///< full scale of the motion-field colours
+  std::string caption{};          ///< text above the panels, on the right
 };
 
 /// The layout of panels and captions for a camera of this size: events, depth and motion field, or events and image.
@@ -51,7 +51,7 @@ class PreviewPage {
  private:
   /// Draws the numbers of the legends.
   struct Scales {
-    float near_m = 0, far_m = 0, full_flow_px_per_s = 0;
+    float near_m = 0, far_m = 0, full_speed_px_per_s = 0;
     bool operator==(const Scales&) const = default;
   };
 

@@ -8,18 +8,18 @@
 #include <vector>
 
 #include "esim/files/output_file.h"
-#include "esim/preview/canvas.h"
 #include "esim/preview/panels.h"
+#include "esim/preview/pictures.h"
 #include "esim/preview/scales.h"
 #include "esim/preview/video_file.h"
 
 namespace esim::inline preview {
 namespace {
 
-constexpr double kLeastDuration_s = 2.0;
-constexpr double kMostFrames_hz = 60.0;
-constexpr double kLeastFrames_hz = 4.0;
-constexpr std::size_t kMostCandidates = 12;
+constexpr double kMinDuration_s = 2.0;
+constexpr double kMaxFrames_hz = 60.0;
+constexpr double kMinFrames_hz = 4.0;
+constexpr std::size_t kMaxCandidates = 12;
 
 /// Candidates for preview.png: every stride-th frame; the stride doubles, so that their number stays small.
 class Candidates {
@@ -30,7 +30,7 @@ class Candidates {
 
   void add(std::uint64_t events, Image<Rgb> image) {
     kept_.push_back({seen_++, events, std::move(image)});
-    if (kept_.size() <= kMostCandidates) return;
+    if (kept_.size() <= kMaxCandidates) return;
     stride_ *= 2;
     std::erase_if(kept_, [this](const Candidate& candidate) { return candidate.frame % stride_ != 0; });
   }
@@ -64,12 +64,12 @@ Playback choose_playback(double duration_s, double truth_rate_hz) {
   Playback playback;
   if (!(truth_rate_hz > 0)) return playback;
   const auto enough = [&](int slowdown) {
-    return duration_s * slowdown >= kLeastDuration_s && truth_rate_hz / slowdown <= kMostFrames_hz;
+    return duration_s * slowdown >= kMinDuration_s && truth_rate_hz / slowdown <= kMaxFrames_hz;
   };
-  constexpr int kMostSlowdown = 1'000'000;
-  for (int decade = 1; decade < kMostSlowdown; decade *= 10) {
+  constexpr int kMaxSlowdown = 1'000'000;
+  for (int decade = 1; decade < kMaxSlowdown; decade *= 10) {
     for (const int slowdown : {decade, 2 * decade, 5 * decade}) {
-      const bool too_jerky = slowdown > 1 && truth_rate_hz / slowdown < kLeastFrames_hz;
+      const bool too_jerky = slowdown > 1 && truth_rate_hz / slowdown < kMinFrames_hz;
       if (too_jerky) return playback;
       playback = {truth_rate_hz / slowdown, slowdown};
       if (enough(slowdown)) return playback;
@@ -99,7 +99,7 @@ struct PreviewWriter::Impl {
   std::optional<TimeNs> previous;
 
   DepthScale depth_scale;
-  FlowScale flow_scale;
+  MotionScale motion_scale;
   Candidates candidates;
 };
 
@@ -113,17 +113,17 @@ void PreviewWriter::Impl::count(EventSpan span) {
 
 void PreviewWriter::Impl::add_frame(const TruthRecord& truth) {
   depth_scale.include(truth.depth);
-  flow_scale.include(truth.flow_x, truth.flow_y);
+  motion_scale.include(truth.motion_x, truth.motion_y);
   show({.t = truth.t,
         .on_events = on,
         .off_events = off,
         .irradiance = truth.irradiance,
         .depth_m = &truth.depth,
-        .flow_x_px_per_s = &truth.flow_x,
-        .flow_y_px_per_s = &truth.flow_y,
+        .motion_x_px_per_s = &truth.motion_x,
+        .motion_y_px_per_s = &truth.motion_y,
         .near_m = depth_scale.near_m(),
         .far_m = depth_scale.far_m(),
-        .full_flow_px_per_s = flow_scale.full_px_per_s()});
+        .full_speed_px_per_s = motion_scale.full_px_per_s()});
 }
 
 void PreviewWriter::Impl::add_frame(const ImageRecord& image) {

@@ -9,7 +9,7 @@ namespace esim::inline preview {
 namespace {
 
 constexpr std::size_t kSamples = 20'000;
-constexpr float kLeastRatio = 1.5f;  // minimum ratio of far to near
+constexpr float kMinRatio = 1.5f;  // minimum ratio of far to near
 
 float quantile(std::vector<float>& values, double q) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
@@ -47,17 +47,17 @@ void DepthScale::include(const Image<float>& depth_m) {
   const bool first = far_m_ == 0.0f;
   if (first || low < near_m_) near_m_ = two_digits(0.9f * low, false);
   if (first || high > far_m_) far_m_ = two_digits(1.1f * high, true);
-  if (far_m_ < kLeastRatio * near_m_) {
+  if (far_m_ < kMinRatio * near_m_) {
     const float middle = std::sqrt(near_m_ * far_m_);
-    near_m_ = two_digits(middle / std::sqrt(kLeastRatio), false);
-    far_m_ = two_digits(middle * std::sqrt(kLeastRatio), true);
+    near_m_ = two_digits(middle / std::sqrt(kMinRatio), false);
+    far_m_ = two_digits(middle * std::sqrt(kMinRatio), true);
   }
 }
 
-void FlowScale::include(const Image<float>& flow_x, const Image<float>& flow_y) {
+void MotionScale::include(const Image<float>& motion_x, const Image<float>& motion_y) {
   std::vector<float> speeds;
-  for (std::size_t i = 0; i < flow_x.size(); i += stride_of(flow_x)) {
-    const float speed = std::hypot(flow_x.pixels()[i], flow_y.pixels()[i]);
+  for (std::size_t i = 0; i < motion_x.size(); i += stride_of(motion_x)) {
+    const float speed = std::hypot(motion_x.pixels()[i], motion_y.pixels()[i]);
     if (std::isfinite(speed)) speeds.push_back(speed);
   }
   if (speeds.empty()) return;

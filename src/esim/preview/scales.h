@@ -17,9 +17,9 @@ class DepthScale {
 };
 
 /// The speed with the most saturated colour in the preview: a round number that never decreases.
-class FlowScale {
+class MotionScale {
  public:
-  void include(const Image<float>& flow_x, const Image<float>& flow_y);
+  void include(const Image<float>& motion_x, const Image<float>& motion_y);
 
   float full_px_per_s() const { return full_px_per_s_; }
 

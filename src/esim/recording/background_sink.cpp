@@ -29,33 +29,34 @@ Copy copy_of(const EventsRecord& record) {
 
 Copy copy_of(const TruthRecord& record) {
   struct Images {
-    Image<float> irradiance, depth, flow_x, flow_y;
+    Image<float> irradiance, depth, motion_x, motion_y;
     std::optional<Image<std::uint16_t>> object;
     std::vector<SE3> T_world_objects;
   };
   auto images = std::make_shared<Images>(Images{record.irradiance,
                                                 record.depth,
-                                                record.flow_x,
-                                                record.flow_y,
+                                                record.motion_x,
+                                                record.motion_y,
                                                 {},
                                                 {record.T_world_objects.begin(), record.T_world_objects.end()}});
   if (record.object != nullptr) images->object = *record.object;
-  return {[camera = record.camera, t = record.t, pose = record.T_world_camera,
-           images = std::shared_ptr<const Images>(images)](Sink& sink) {
-            sink.write(TruthRecord{camera, t, pose, images->irradiance, images->depth, images->flow_x, images->flow_y,
-                                   images->object ? &*images->object : nullptr, images->T_world_objects});
-          },
-          4 * record.irradiance.size() * sizeof(float)};
+  return {
+      [camera = record.camera, t = record.t, pose = record.T_world_camera,
+       images = std::shared_ptr<const Images>(images)](Sink& sink) {
+        sink.write(TruthRecord{camera, t, pose, images->irradiance, images->depth, images->motion_x, images->motion_y,
+                               images->object ? &*images->object : nullptr, images->T_world_objects});
+      },
+      4 * record.irradiance.size() * sizeof(float)};
 }
 
-Copy copy_of(const DisplacementRecord& record) {
+Copy copy_of(const OpticalFlowRecord& record) {
   struct Images {
     Image<float> x, y;
     Image<std::uint8_t> visible;
   };
   auto images = std::make_shared<const Images>(Images{record.x, record.y, record.visible});
   return {[camera = record.camera, t0 = record.t0, t1 = record.t1, images](Sink& sink) {
-            sink.write(DisplacementRecord{camera, t0, t1, images->x, images->y, images->visible});
+            sink.write(OpticalFlowRecord{camera, t0, t1, images->x, images->y, images->visible});
           },
           2 * record.x.size() * sizeof(float)};
 }

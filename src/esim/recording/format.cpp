@@ -13,7 +13,7 @@ Content content_of(const Record& record) {
     if constexpr (std::is_same_v<Kind, ImuRecord>) return Content::imu;
     if constexpr (std::is_same_v<Kind, PoseRecord>) return Content::poses;
     if constexpr (std::is_same_v<Kind, TruthRecord>) return Content::truth;
-    if constexpr (std::is_same_v<Kind, DisplacementRecord>) return Content::displacement;
+    if constexpr (std::is_same_v<Kind, OpticalFlowRecord>) return Content::optical_flow;
     if constexpr (std::is_same_v<Kind, EventPointsRecord>) return Content::event_points;
     if constexpr (std::is_same_v<Kind, TriggerRecord>) return Content::triggers;
   };
@@ -34,8 +34,8 @@ std::string_view describe(Content content) {
       return "poses";
     case Content::truth:
       return "ground-truth frames";
-    case Content::displacement:
-      return "displacement";
+    case Content::optical_flow:
+      return "optical flow";
     case Content::event_points:
       return "event points";
     case Content::triggers:

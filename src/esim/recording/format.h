@@ -35,7 +35,7 @@ struct WriteOptions {
 };
 
 /// Kinds of record.
-enum class Content { events, frames, images, imu, poses, truth, displacement, event_points, triggers };
+enum class Content { events, frames, images, imu, poses, truth, optical_flow, event_points, triggers };
 
 /// A format: its name, its functions and its limits. One file in `formats/` describes each; `formats/formats.cpp` lists
 /// them.

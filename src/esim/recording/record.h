@@ -43,9 +43,9 @@ struct RecordingInfo {
   double truth_rate_hz = 0;  ///< rate of ground-truth frames, or of video frames; 0: none
   std::optional<ImuInfo> imu{};
 
-  // Names of what moves, in the order of their numbers: objects of the scene, or layers on the sensor.
+  // Names of what moves, in the order of their numbers: objects of the scene, or sprites on the sensor.
   std::vector<std::string> objects{};
-  std::vector<std::string> layers{};
+  std::vector<std::string> sprites{};
 };
 
 /// Events of one camera, in order of time, and none at or before earlier events of the same camera.
@@ -62,19 +62,19 @@ struct TruthRecord {
   SE3 T_world_camera;
   const Image<float>& irradiance;  ///< E, 1.0 = diffuse white
   const Image<float>& depth;       ///< Z, planar, m; +inf: no surface
-  const Image<float>& flow_x;      ///< motion field, px/s, positive to the right
-  const Image<float>& flow_y;      ///< motion field, px/s, positive downwards
+  const Image<float>& motion_x;    ///< motion field, px/s, positive to the right
+  const Image<float>& motion_y;    ///< motion field, px/s, positive downwards
 
   /// If requested: i + 1 for pixels that see moving object i, otherwise 0.
   const Image<std::uint16_t>* object = nullptr;
 
-  /// Poses of the moving objects; empty for layers, which are not in the world.
+  /// Poses of the moving objects; empty for sprites, which are not in the world.
   std::span<const SE3> T_world_objects{};
 };
 
 /// Optical flow of one camera from t0 to t1, the times of consecutive TruthRecords; follows the later one of them. The
 /// images are borrowed for the duration of the call.
-struct DisplacementRecord {
+struct OpticalFlowRecord {
   int camera = 0;
   TimeNs t0 = 0, t1 = 0;
   const Image<float>& x;               ///< px, positive to the right; NaN: the point has no image at t1
@@ -141,7 +141,7 @@ struct TriggerRecord {
   TriggerKind kind = TriggerKind::external_rising;
 };
 
-using Record = std::variant<EventsRecord, TruthRecord, DisplacementRecord, EventPointsRecord, ImageRecord, FrameRecord,
+using Record = std::variant<EventsRecord, TruthRecord, OpticalFlowRecord, EventPointsRecord, ImageRecord, FrameRecord,
                             PoseRecord, ImuRecord, TriggerRecord>;
 
 /// The output of a simulation: one class per format, each taking the kinds of record that it can hold.

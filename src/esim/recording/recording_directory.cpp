@@ -250,10 +250,10 @@ bool has_begun(const fs::path& file) {
 }
 
 bool has_conversion_report(const fs::path& folder) {
-  constexpr std::streamsize kMostBytes = 1 << 16;
+  constexpr std::streamsize kMaxBytes = 1 << 16;
   std::ifstream file(folder / "report.json", std::ios::binary);
-  std::string text(static_cast<std::size_t>(kMostBytes), '\0');
-  file.read(text.data(), kMostBytes);
+  std::string text(static_cast<std::size_t>(kMaxBytes), '\0');
+  file.read(text.data(), kMaxBytes);
   text.resize(static_cast<std::size_t>(file.gcount()));
   return text.find("\"converted_from\"") != std::string::npos;
 }

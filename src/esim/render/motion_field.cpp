@@ -26,8 +26,8 @@ inline void fill_row(const PixelRays& rays, int row, int begin, int end, Sample&
   const float *const du_dx = rays.du_dx.row(row), *const du_dy = rays.du_dy.row(row);
   const float *const dv_dx = rays.dv_dx.row(row), *const dv_dy = rays.dv_dy.row(row);
   const float* const depth = sample.depth.row(row);
-  float* const flow_x = sample.flow_x.row(row);
-  float* const flow_y = sample.flow_y.row(row);
+  float* const motion_x = sample.motion_x.row(row);
+  float* const motion_y = sample.motion_y.row(row);
 #pragma GCC ivdep
   for (int i = begin; i < end; ++i) {
     const auto& [v, omega] = twist_at(i);
@@ -41,8 +41,8 @@ inline void fill_row(const PixelRays& rays, int row, int begin, int end, Sample&
     // Velocity of the bearing, then of the pixel.
     const float bearing_x = wx - x[i] * wz;
     const float bearing_y = wy - y[i] * wz;
-    flow_x[i] = du_dx[i] * bearing_x + du_dy[i] * bearing_y;
-    flow_y[i] = dv_dx[i] * bearing_x + dv_dy[i] * bearing_y;
+    motion_x[i] = du_dx[i] * bearing_x + du_dy[i] * bearing_y;
+    motion_y[i] = dv_dx[i] * bearing_x + dv_dy[i] * bearing_y;
   }
 }
 

@@ -20,7 +20,7 @@ using Ints = hn::RebindToSigned<Floats>;
 using Vector = hn::Vec<Floats>;
 using IntVector = hn::Vec<Ints>;
 
-constexpr std::size_t kMostLanes = hn::MaxLanes(Floats());
+constexpr std::size_t kMaxLanes = hn::MaxLanes(Floats());
 
 /// The pixel to the left of and above an image position, clamped to at least `margin` pixels from the far borders.
 struct Place {
@@ -113,7 +113,7 @@ void for_each_vector(const PinholeView& view, const Tile& tile, Image<float>& ou
         continue;
       }
       const std::size_t count = width - x;
-      float own_centres[2 * kMostLanes] = {}, own_footprints[4 * kMostLanes] = {}, own[kMostLanes];
+      float own_centres[2 * kMaxLanes] = {}, own_footprints[4 * kMaxLanes] = {}, own[kMaxLanes];
       std::copy_n(centres, 2 * count, own_centres);
       std::copy_n(footprints, 4 * count, own_footprints);
       look_up(own_centres, own_footprints, own);

@@ -23,7 +23,7 @@ PixelTable::PixelTable(Image<float> values) : width_(values.width()), height_(va
   }
 }
 
-PixelRays::PixelRays(const Camera& camera) {
+PixelRays::PixelRays(const Camera& camera, double footprint) {
   std::array<Image<float>, 10> values;
   for (Image<float>& image : values) image = Image<float>(camera.width, camera.height);
   for (int v = 0; v < camera.height; ++v) {
@@ -34,12 +34,18 @@ PixelRays::PixelRays(const Camera& camera) {
                         std::to_string(v) + "); check its coefficients or make the image smaller");
       }
       const Eigen::Matrix2d bearing_from_pixel = ray->jacobian.topRows<2>();
-      const Eigen::Matrix2d footprint = camera.footprint * bearing_from_pixel;
+      const Eigen::Matrix2d area = footprint * bearing_from_pixel;
       const Eigen::Matrix2d pixel_from_bearing = bearing_from_pixel.inverse();
-      const double row[] = {ray->bearing.x(),         ray->bearing.y(),         pixel_from_bearing(0, 0),
-                            pixel_from_bearing(0, 1), pixel_from_bearing(1, 0), pixel_from_bearing(1, 1),
-                            footprint(0, 0),          footprint(0, 1),          footprint(1, 0),
-                            footprint(1, 1)};
+      const double row[] = {ray->bearing.x(),
+                            ray->bearing.y(),
+                            pixel_from_bearing(0, 0),
+                            pixel_from_bearing(0, 1),
+                            pixel_from_bearing(1, 0),
+                            pixel_from_bearing(1, 1),
+                            area(0, 0),
+                            area(0, 1),
+                            area(1, 0),
+                            area(1, 1)};
       for (std::size_t i = 0; i < values.size(); ++i) values[i](u, v) = static_cast<float>(row[i]);
     }
   }

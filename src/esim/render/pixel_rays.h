@@ -29,7 +29,8 @@ class PixelTable {
 
 /// A camera's geometry, including lens distortion, as tables with a value per pixel.
 struct PixelRays {
-  explicit PixelRays(const Camera& camera);
+  /// `footprint`: side of the square that a pixel averages over, px.
+  explicit PixelRays(const Camera& camera, double footprint = 1);
 
   // Bearing of the pixel's centre in the camera frame: (x, y, 1).
   PixelTable x, y;
@@ -37,7 +38,7 @@ struct PixelRays {
   // d(pixel) / d(bearing), px.
   PixelTable du_dx, du_dy, dv_dx, dv_dy;
 
-  // d(bearing) / d(pixel) times the camera's footprint: the area that the pixel averages over.
+  // d(bearing) / d(pixel) times the footprint: the area that the pixel averages over.
   PixelTable dx_du, dx_dv, dy_du, dy_dv;
 };
 

@@ -33,9 +33,8 @@ struct RendererTraits {
   std::string name;                             ///< as in the scenario; used in reports
   Granularity granularity = Granularity::tile;  ///< frame: a tile costs as much as the full image
   bool at_infinity = false;                     ///< all surfaces are infinitely far away
-  bool on_sensor = false;    ///< drawn on the sensor: the camera's pose, twist and lens have no effect
-  bool wide_pixels = false;  ///< averages over the camera's footprint even if that is wider than a pixel
-  std::string device{};      ///< that it runs on; empty for the processor
+  bool on_sensor = false;  ///< drawn on the sensor: the camera's pose, twist and lens have no effect
+  std::string device{};    ///< that it runs on; empty for the processor
 
   /// A name to display.
   std::string label() const { return device.empty() ? name : name + " on " + device; }

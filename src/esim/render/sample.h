@@ -16,21 +16,17 @@ struct Sample {
 
   Image<float> irradiance;  // E, linear, 1.0 = white          computed by the renderer
   Image<float> depth;       // Z, planar, m; +inf: no surface  computed by the renderer
-  Image<float> flow_x;      // V, px/s, to the right           by motion_field() from Z, object and the twists, or by
-  Image<float> flow_y;      // V, px/s, downwards              the renderer if its scene is not three-dimensional
+  Image<float> motion_x;    // V, px/s, to the right           by motion_field() from Z, object and the twists, or by
+  Image<float> motion_y;    // V, px/s, downwards              the renderer if its scene is not three-dimensional
 
-  // E over the area of one pixel if the camera's footprint is wider; E is its mean over the footprint. Empty otherwise,
-  // and for panorama and plane, which have no edges.
-  Image<float> narrow;
-
-  // The visible moving object: 0 for none, i + 1 for the i-th of the request, or of the layers drawn on the sensor.
+  // The visible moving object: 0 for none, i + 1 for the i-th of the request, or of the sprites drawn on the sensor.
   // Computed by the renderer; empty unless the request wants_objects().
   Image<std::uint16_t> object;
 
   /// Resizes to width x height pixels; keeps the content if that is already the size.
   void resize(int width, int height, bool with_objects = false) {
     if (irradiance.width() != width || irradiance.height() != height) {
-      for (Image<float>* field : {&irradiance, &depth, &flow_x, &flow_y}) *field = Image<float>(width, height);
+      for (Image<float>* field : {&irradiance, &depth, &motion_x, &motion_y}) *field = Image<float>(width, height);
     }
     const int object_width = with_objects ? width : 0, object_height = with_objects ? height : 0;
     if (object.width() != object_width || object.height() != object_height)

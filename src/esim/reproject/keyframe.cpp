@@ -12,9 +12,9 @@ namespace esim::inline reproject {
 namespace {
 
 /// Mean over the s x s pixels that begin at each pixel.
-void box_mean(const Image<float>& in, int s, const Workers& workers, Image<float>& out) {
+Image<float> box_mean(const Image<float>& in, int s, const Workers& workers) {
   const int width = in.width(), height = in.height();
-  if (out.bounds() != in.bounds()) out = Image<float>(width, height);
+  Image<float> out(width, height);
   const float scale = 1.0F / static_cast<float>(s * s);
   workers.for_each(height, [&](int y) {
     float* const to = out.row(y);
@@ -28,6 +28,7 @@ void box_mean(const Image<float>& in, int s, const Workers& workers, Image<float
     }
     for (int x = 0; x < width; ++x) to[x] *= scale;
   });
+  return out;
 }
 
 /// Computes the spline through the square roots of an image of E.
@@ -75,8 +76,8 @@ Camera denser(const Camera& sensor, int s, int margin) {
   return camera;
 }
 
-KeyframeLayout lay_out_keyframes(const Camera& sensor, int supersampling, int margin_px, bool wide_pixels) {
-  KeyframeLayout layout{sensor, supersampling, margin_px, denser(sensor, supersampling, margin_px), wide_pixels};
+KeyframeLayout lay_out_keyframes(const Camera& sensor, int supersampling, int margin_px) {
+  KeyframeLayout layout{sensor, supersampling, margin_px, denser(sensor, supersampling, margin_px)};
   while (layout.margin_px > 0) {
     try {
       layout.camera.validate();
@@ -85,20 +86,16 @@ KeyframeLayout lay_out_keyframes(const Camera& sensor, int supersampling, int ma
       layout.camera = denser(sensor, supersampling, --layout.margin_px);
     }
   }
-  if (wide_pixels) layout.camera.footprint = supersampling * sensor.footprint;
   return layout;
 }
 
 void prepare_keyframe(const KeyframeLayout& layout, const PixelRays& rays, bool at_infinity, RenderRequest view,
-                      Sample& sample, const Workers& workers, Keyframe& keyframe) {
+                      const Sample& sample, KeyframeLight light, const Workers& workers, Keyframe& keyframe) {
   keyframe.view = std::move(view);
-  if (layout.wide_pixels) {
-    std::swap(keyframe.wide.root, sample.irradiance);
-    std::swap(keyframe.narrow.root, sample.narrow);
-  } else {
-    box_mean(sample.irradiance, layout.supersampling, workers, keyframe.wide.root);
-    std::swap(keyframe.narrow.root, sample.irradiance);
-  }
+  keyframe.wide.offset = light.wide.empty() ? 0.5F * static_cast<float>(layout.supersampling - 1) : 0.0F;
+  if (light.wide.empty()) light.wide = box_mean(light.narrow, layout.supersampling, workers);
+  keyframe.wide.root = std::move(light.wide);
+  keyframe.narrow.root = std::move(light.narrow);
   to_root(keyframe.wide.root, workers);
   if (at_infinity) return;
   if (!keyframe.narrow.root.empty()) to_root(keyframe.narrow.root, workers);

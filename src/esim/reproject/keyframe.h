@@ -17,21 +17,23 @@ struct KeyframeLayout {
   Camera sensor;
   int supersampling = 2;
   int margin_px = 0;
-  Camera camera;            ///< of the keyframes
-  bool wide_pixels = true;  ///< the renderer averages over the footprint of a sensor pixel
+  Camera camera;  ///< of the keyframes
 
   /// The first row and column of the points that are projected into views.
   int first() const { return supersampling / 2; }
-
-  /// Offset of the mean over a sensor pixel from the keyframe pixel that stores it, px.
-  float offset() const { return wide_pixels ? 0.0F : 0.5F * static_cast<float>(supersampling - 1); }
 };
 
 /// A camera with `s` pixels per sensor pixel along each side, and a margin of `margin` sensor pixels on each side.
 Camera denser(const Camera& sensor, int s, int margin);
 
 /// Lays out keyframes. The margin is reduced if the lens cannot be inverted that far outside the sensor.
-KeyframeLayout lay_out_keyframes(const Camera& sensor, int supersampling, int margin_px, bool wide_pixels);
+KeyframeLayout lay_out_keyframes(const Camera& sensor, int supersampling, int margin_px);
+
+/// E of a keyframe as it was rendered. One of the images may be empty.
+struct KeyframeLight {
+  Image<float> wide;    ///< each pixel is the mean over the area of a sensor pixel; if empty, computed from `narrow`
+  Image<float> narrow;  ///< each pixel is the mean over its own area; if empty, edges are not looked up more closely
+};
 
 /// A rendered keyframe, prepared for lookups from other views.
 struct Keyframe {
@@ -41,18 +43,19 @@ struct Keyframe {
   struct Light {
     Image<float> root;   ///< spline coefficients of the square root of E
     Image<float> front;  ///< nearness; next to a nearer surface, which E then contains, that of the nearer one
+    float offset = 0;    ///< from the pixel that stores a mean to the centre of its area, px to the right and below
   };
   Light wide;    ///< each pixel is the mean over the area of a sensor pixel
-  Light narrow;  ///< each pixel is the mean over its own area; empty if the renderer cannot compute it
+  Light narrow;  ///< each pixel is the mean over its own area; may be empty
 
   SurfacePoints sparse;  ///< every s-th pixel of every s-th row, from KeyframeLayout::first() on
   SurfacePoints dense;  ///< all pixels at edges, and every second pixel of every second row: each point covers the four
                         ///< pixels around it; empty without `narrow`
 };
 
-/// Prepares a keyframe from a sample of the whole image, and takes the sample's buffers. `rays`: of the layout's
-/// camera.
+/// Prepares a keyframe from its light, and from the depth and the objects of a sample of the whole image. `rays`: of
+/// the layout's camera.
 void prepare_keyframe(const KeyframeLayout& layout, const PixelRays& rays, bool at_infinity, RenderRequest view,
-                      Sample& sample, const Workers& workers, Keyframe& keyframe);
+                      const Sample& sample, KeyframeLight light, const Workers& workers, Keyframe& keyframe);
 
 }  // namespace esim::inline reproject

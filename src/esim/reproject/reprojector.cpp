@@ -15,11 +15,11 @@ namespace esim::inline reproject {
 namespace {
 
 double greatest_radius(const PixelRays& rays) {
-  double greatest = 0;
+  double longest = 0;
   for (int y = 0; y < rays.x.height(); ++y)
     for (int x = 0; x < rays.x.width(); ++x)
-      greatest = std::max(greatest, std::hypot(double{rays.x(x, y)}, double{rays.y(x, y)}));
-  return greatest * (1 + 1e-5);
+      longest = std::max(longest, std::hypot(double{rays.x(x, y)}, double{rays.y(x, y)}));
+  return longest * (1 + 1e-5);
 }
 
 /// Weight of the later keyframe; strictly between 0 and 1, because the other keyframe may not see a pixel.
@@ -110,8 +110,9 @@ Reprojector::Reprojector(const KeyframeLayout& layout, bool at_infinity, const W
   surface_.resize(layout.sensor.width, layout.sensor.height, false);  // initially everything is at infinity
 }
 
-void Reprojector::prepare(RenderRequest view, Sample& sample, Keyframe& keyframe) const {
-  prepare_keyframe(layout_, keyframe_rays_, at_infinity_, std::move(view), sample, workers_, keyframe);
+void Reprojector::prepare(RenderRequest view, const Sample& sample, KeyframeLight light, Keyframe& keyframe) const {
+  prepare_keyframe(layout_, keyframe_rays_, at_infinity_, std::move(view), sample, std::move(light), workers_,
+                   keyframe);
 }
 
 void Reprojector::reconstruct(const Keyframe& before, const Keyframe& after, const RenderRequest& view, Detail detail,
@@ -151,8 +152,7 @@ void Reprojector::look_up(const Between& between, const Model& model, Detail det
     between.project(project, {rays_.x.row(y), rays_.y.row(y), w, objects ? surface_.object.row(y) : nullptr, width},
                     row0, row1);
     const auto look = [&](const Keyframe& keyframe, RowLookup& row) {
-      at_infinity_ ? look_up_row<false>(keyframe.wide, layout_.offset(), row)
-                   : look_up_row<true>(keyframe.wide, layout_.offset(), row);
+      at_infinity_ ? look_up_row<false>(keyframe.wide, row) : look_up_row<true>(keyframe.wide, row);
     };
     look(between.before, row0);
     look(between.after, row1);
@@ -204,8 +204,8 @@ void Reprojector::refine(const Between& between, const Model& model, Reconstruct
     between.project(project,
                     {bx.data(), by.data(), w.data(), objects ? object.data() : nullptr, static_cast<int>(w.size())},
                     row0, row1);
-    look_up_row<true>(between.before.narrow, 0, row0);
-    look_up_row<true>(between.after.narrow, 0, row1);
+    look_up_row<true>(between.before.narrow, row0);
+    look_up_row<true>(between.after.narrow, row1);
     std::size_t i = 0;
     for (const int x : pixels) {
       float seen = 0, all = 0, count = 0;

@@ -35,8 +35,8 @@ class Reprojector {
 
   const KeyframeLayout& layout() const { return layout_; }
 
-  /// Prepares a keyframe from a sample of the whole image, and takes the sample's buffers.
-  void prepare(RenderRequest view, Sample& sample, Keyframe& keyframe) const;
+  /// Prepares a keyframe from its light, and from the depth and the objects of a sample of the whole image.
+  void prepare(RenderRequest view, const Sample& sample, KeyframeLight light, Keyframe& keyframe) const;
 
   /// Reconstructs E of the sensor at `view`; view.t must lie between the times of the keyframes.
   void reconstruct(const Keyframe& before, const Keyframe& after, const RenderRequest& view, Detail detail,

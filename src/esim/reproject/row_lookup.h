@@ -37,10 +37,11 @@ void project_row(const Projector<Model>& project, const ViewChange& c, const flo
   }
 }
 
-/// Looks up the points with the spline; a pixel stores the value at `offset` pixels to its right and below. `seen` is 1
-/// if a point lies in the image and, with `depth`, on the surface there.
+/// Looks up the points with the spline. `seen` is 1 if a point lies in the image and, with `depth`, on the surface
+/// there.
 template <bool depth>
-void look_up_row(const Keyframe::Light& light, float offset, RowLookup& row) {
+void look_up_row(const Keyframe::Light& light, RowLookup& row) {
+  const float offset = light.offset;
   const int stride = light.root.width(), count = static_cast<int>(row.u.size());
   const float right = static_cast<float>(stride - 1), bottom = static_cast<float>(light.root.height() - 1);
   const float* const c = light.root.data();

@@ -19,7 +19,7 @@ double fastest_brightness_change_per_s(const Sample& sample, double log_eps, con
     const int below = std::min(y == 0 ? y + reach : y + 1, height - 1);
     const float *const row = irradiance.row(y), *const row_above = irradiance.row(above),
                        *const row_below = irradiance.row(below);
-    const float *const vx = sample.flow_x.row(y), *const vy = sample.flow_y.row(y);
+    const float *const vx = sample.motion_x.row(y), *const vy = sample.motion_y.row(y);
     const float per_dy = below > above ? 1.0F / static_cast<float>(below - above) : 0.0F;
     const auto rate_at = [&](int x, int left, int right, float per_dx) {
       const float gradient_x = fast_log((row[right] + eps) / (row[left] + eps)) * per_dx;

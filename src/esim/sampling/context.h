@@ -1,13 +1,14 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "esim/core/parallel.h"
 #include "esim/core/time.h"
 #include "esim/geometry/camera.h"
+#include "esim/render/pixel_area.h"
 #include "esim/render/renderer.h"
-#include "esim/sampling/measured_error.h"
 
 namespace esim::inline sampling {
 
@@ -24,12 +25,18 @@ struct SamplingContext {
   int width = 0, height = 0;  ///< of the image, px
   TimeSpan span;              ///< to sample: from the first sample at its start to the last one exactly at its end
   const Workers& workers;     ///< outlives the sampler
+};
 
-  // For schemes that reproject: what is known of the views in advance.
-  Camera camera{};
-  RendererTraits renderer{};                        ///< of the scene's renderer
-  std::function<RenderRequest(TimeNs)> view_at{};   ///< poses of the camera and of the moving objects; no tiles
-  std::optional<MeasuredError> resampling_floor{};  ///< of keyframes, if it was measured
+/// The scene, for samplers that request images of other cameras at the same pose.
+struct SceneAccess {
+  Camera camera;       ///< of the sampler
+  Renderer& renderer;  ///< of this camera; outlives the making of the sampler, like make_renderer
+
+  /// Poses of the camera and of the moving objects; no tiles. May be copied, and called at any known time.
+  std::function<RenderRequest(TimeNs)> view_at;
+
+  /// A renderer of the scene for another camera. With `area`, its pixels average over that; null if they cannot.
+  std::function<std::unique_ptr<Renderer>(const Camera& camera, const std::optional<PixelArea>& area)> make_renderer;
 };
 
 }  // namespace esim::inline sampling

@@ -7,9 +7,9 @@
 namespace esim::inline sampling {
 
 double fastest_motion_px_per_s(const Sample& sample, const Workers& workers) {
-  const int width = sample.flow_x.width();
-  const float squared = row_maximum(sample.flow_x.height(), workers, [&](int y) {
-    const float *const vx = sample.flow_x.row(y), *const vy = sample.flow_y.row(y);
+  const int width = sample.motion_x.width();
+  const float squared = row_maximum(sample.motion_x.height(), workers, [&](int y) {
+    const float *const vx = sample.motion_x.row(y), *const vy = sample.motion_y.row(y);
     float maximum = 0;
 #pragma omp simd reduction(max : maximum)
     for (int x = 0; x < width; ++x) {

@@ -2,16 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "esim/sampling/criterion.h"
+#include <utility>
+#include <variant>
 
 namespace esim::inline sampling {
 namespace {
 
+struct Criterion {
+  WantedInterval wanted_s;
+  RateBounds bounds;
+};
+
+using Times = std::variant<Criterion, UniformSampling>;
+
 class FrameSampler final : public Sampler {
  public:
-  FrameSampler(const FrameScheme& scheme, const SamplingContext& context)
-      : scheme_(scheme),
+  FrameSampler(Times times, const SamplingContext& context)
+      : times_(std::move(times)),
         context_(context),
         image_{0, 0, context.width, context.height},
         request_(SampleRequest{context.span.start, {image_}}),
@@ -45,7 +52,7 @@ class FrameSampler final : public Sampler {
       request_.reset();
       return;
     }
-    const TimeNs t = std::visit([this](const auto& criterion) { return next_time(criterion); }, scheme_);
+    const TimeNs t = std::visit([this](const auto& times) { return next_time(times); }, times_);
     request_->t = std::clamp(t, current_.t + 1, context_.span.end);
   }
 
@@ -54,18 +61,16 @@ class FrameSampler final : public Sampler {
     return context_.span.start + to_ns(static_cast<double>(statistics_.samples) / uniform.rate_hz);
   }
 
-  template <typename Adaptive>
-  TimeNs next_time(const Adaptive& criterion) {
+  TimeNs next_time(const Criterion& criterion) {
     const TimeNs shortest = std::max<TimeNs>(1, to_ns(1.0 / criterion.bounds.max_rate_hz));
     const TimeNs longest = std::max(shortest, to_ns(1.0 / criterion.bounds.min_rate_hz));
-    const double wanted_s = wanted_interval_s(criterion, context_.sensor, current_, context_.workers);
     // Rounded down, so that the criterion's bound holds exactly.
-    const auto wanted = static_cast<TimeNs>(std::min(wanted_s * 1e9, static_cast<double>(longest)));
+    const auto wanted = static_cast<TimeNs>(std::min(criterion.wanted_s(current_) * 1e9, static_cast<double>(longest)));
     if (wanted < shortest) ++statistics_.held_to_max_rate;
     return current_.t + std::max(wanted, shortest);
   }
 
-  FrameScheme scheme_;
+  Times times_;
   SamplingContext context_;
   Tile image_;
 
@@ -78,8 +83,13 @@ class FrameSampler final : public Sampler {
 
 }  // namespace
 
-std::unique_ptr<Sampler> make_frame_sampler(const FrameScheme& scheme, const SamplingContext& context) {
-  return std::make_unique<FrameSampler>(scheme, context);
+std::unique_ptr<Sampler> make_frame_sampler(const WantedInterval& wanted_s, const RateBounds& bounds,
+                                            const SamplingContext& context) {
+  return std::make_unique<FrameSampler>(Criterion{wanted_s, bounds}, context);
+}
+
+std::unique_ptr<Sampler> make_frame_sampler(const UniformSampling& uniform, const SamplingContext& context) {
+  return std::make_unique<FrameSampler>(uniform, context);
 }
 
 }  // namespace esim::inline sampling

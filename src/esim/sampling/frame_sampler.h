@@ -1,7 +1,7 @@
 #pragma once
 
+#include <functional>
 #include <memory>
-#include <variant>
 
 #include "esim/sampling/context.h"
 #include "esim/sampling/options.h"
@@ -9,11 +9,17 @@
 
 namespace esim::inline sampling {
 
-/// The schemes that sample the whole image at once, as the paper does.
-using FrameScheme = std::variant<FlowSampling, BrightnessSampling, UniformSampling>;
+/// Time from a sample until the next one, s.
+using WantedInterval = std::function<double(const Sample& sample)>;
 
-/// Places the first sample at the span's start and the last exactly at its end. The scheme determines each interval in
-/// between from the sample at its start, within the bounds on the rate.
-std::unique_ptr<Sampler> make_frame_sampler(const FrameScheme& scheme, const SamplingContext& context);
+// Samplers of the whole image at once, as in the paper. The first sample is at the span's start and the last exactly at
+// its end.
+
+/// The interval is the wanted one, within the bounds on the rate.
+std::unique_ptr<Sampler> make_frame_sampler(const WantedInterval& wanted_s, const RateBounds& bounds,
+                                            const SamplingContext& context);
+
+/// The rate is fixed.
+std::unique_ptr<Sampler> make_frame_sampler(const UniformSampling& uniform, const SamplingContext& context);
 
 }  // namespace esim::inline sampling

@@ -8,10 +8,9 @@
 
 namespace esim::inline sampling {
 
-/// Makes the sampler that the options describe. Throws UserError if it does not support the renderer.
-std::unique_ptr<Sampler> make_sampler(const SamplingOptions& options, const SamplingContext& context);
-
-/// The camera whose images or tiles the sampler requests: the context's own, or the keyframes' camera.
-Camera sampled_camera(const SamplingOptions& options, const SamplingContext& context);
+/// Makes the sampler that the options describe. Throws UserError if it does not support the camera or the renderer, or
+/// needs `scene` and it is null.
+std::unique_ptr<Sampler> make_sampler(const SamplingOptions& options, const SamplingContext& context,
+                                      const SceneAccess* scene = nullptr);
 
 }  // namespace esim::inline sampling

@@ -3,11 +3,13 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
+#include <variant>
 #include <vector>
 
 #include "esim/core/image.h"
 #include "esim/core/time.h"
-#include "esim/render/sample.h"
+#include "esim/render/renderer.h"
 #include "esim/sampling/measured_error.h"
 
 namespace esim::inline sampling {
@@ -22,11 +24,17 @@ struct TilesAt {
 struct SampleRequest {
   TimeNs t = 0;
   std::vector<Tile> tiles;
-  bool of_sensor = false;        ///< use the sensor's own camera if the sampler otherwise uses another (sampled_camera)
+  Renderer* renderer = nullptr;  ///< renders this request: the sampler's own; null: the renderer of the camera
   int motion_rows = 1;           ///< V is needed in every motion_rows-th row, from the image's first on
   std::vector<TilesAt> later{};  ///< other tiles that go into the same sample, in order of time
 
   TimeNs last() const { return later.empty() ? t : later.back().t; }
+};
+
+/// A result that only one method has, under its name in report.json.
+struct NamedResult {
+  std::string name;
+  std::variant<std::int64_t, double, MeasuredError> value;
 };
 
 /// The sampler's decisions so far, for the report.
@@ -35,20 +43,18 @@ struct SamplingStatistics {
   std::int64_t pixel_evaluations = 0;  ///< pixels in them
   std::int64_t held_to_max_rate = 0;   ///< intervals that would have been shorter without max_rate_hz
 
-  // Only schemes that measure their error:
+  // Only methods that measure their error:
   std::optional<MeasuredError> measured_error;
-  double tolerance = 0;                           ///< required, in contrast thresholds
-  std::int64_t bisections = 0;                    ///< samples taken because the predicted error was too large
-  std::int64_t audits = 0;                        ///< samples taken only to measure the error
-  std::int64_t reconstructions = 0;               ///< images made between samples
-  double unseen_share = 0;                        ///< fraction of the reconstructed pixels that no sample sees
-  int supersampling = 1;                          ///< sample pixels per sensor pixel, along each side
-  std::optional<MeasuredError> resampling_floor;  ///< error of the brightness that more samples do not reduce
+  double tolerance = 0;         ///< required, in contrast thresholds
+  std::int64_t bisections = 0;  ///< samples taken because the predicted error was too large
+  std::int64_t audits = 0;      ///< samples taken only to measure the error
+
+  std::vector<NamedResult> others;
 };
 
 /// Decides which pixels of one camera are evaluated at which times, and converts the samples into segments. A sampler
-/// never renders. Use: while next() returns a request, render it, pass the sample to accept(), and call more() until it
-/// returns nothing.
+/// requests renderings and does not start them. Use: while next() returns a request, render it, pass the sample to
+/// accept(), and call more() until it returns nothing.
 class Sampler {
  public:
   virtual ~Sampler() = default;

@@ -1,6 +1,6 @@
 #include "esim/scenario/conversion.h"
 
-#include "esim/scenario/yaml_reader.h"
+#include "esim/scenario/yaml/yaml_reader.h"
 
 namespace esim::inline scenario {
 namespace {

@@ -1,6 +1,6 @@
 #include "esim/scenario/filter_options.h"
 
-#include "esim/scenario/yaml_reader.h"
+#include "esim/scenario/yaml/yaml_reader.h"
 
 namespace esim::inline scenario {
 

@@ -9,7 +9,8 @@
 #include "esim/geometry/calibration.h"
 #include "esim/scenario/sprite_scene.h"
 #include "esim/scenario/waypoint_file.h"
-#include "esim/scenario/yaml_reader.h"
+#include "esim/scenario/yaml/renamed_keys.h"
+#include "esim/scenario/yaml/yaml_reader.h"
 
 namespace esim::inline scenario {
 namespace {
@@ -141,15 +142,15 @@ void name_cameras(std::vector<CameraOptions>& cameras, const YamlSource& source)
 }
 
 /// Replaces the scene file, if given, by its sprites; the camera gets the size given in the file.
-void read_layers(SpritesRendererOptions& renderer, const YAML::Node& node, const YamlSource& source,
-                 CameraOptions& camera) {
+void read_sprites(SpritesRendererOptions& renderer, const YAML::Node& node, const YamlSource& source,
+                  CameraOptions& camera) {
   if (renderer.scene.empty()) return;
-  if (!renderer.layers.empty()) {
-    YamlReader::fail(source, node["layers"], "renderer.layers",
+  if (!renderer.sprites.empty()) {
+    YamlReader::fail(source, node["sprites"], "renderer.sprites",
                      "must not be given together with a scene file, which sets them; remove one");
   }
   SpriteSceneFile scene = read_sprite_scene(renderer.scene, renderer.search_path);
-  renderer.layers = std::move(scene.layers);
+  renderer.sprites = std::move(scene.sprites);
   renderer.scene.clear();
   renderer.search_path.clear();
   camera.width = scene.width, camera.height = scene.height;
@@ -172,26 +173,25 @@ void read_points(TrajectoryOptions& trajectory, const YAML::Node& node, const st
   options->file.clear();
 }
 
-/// The time of the last keyframe of all sprites; 0 without keyframes.
-double last_keyframe_s(const SpritesRendererOptions& renderer) {
+/// The time of the last pose of all sprites; 0 without poses.
+double last_pose_s(const SpritesRendererOptions& renderer) {
   double last = 0;
-  for (const LayerOptions& layer : renderer.layers) {
-    for (const LayerKeyframe& key : layer.keyframes) last = std::max(last, key.t_s);
+  for (const SpriteOptions& sprite : renderer.sprites) {
+    for (const SpritePose& pose : sprite.poses) last = std::max(last, pose.t_s);
   }
   return last;
 }
 
 /// Sprites lie on the sensor, so that their scenario needs no trajectory. Unless its trajectory defines a duration, it
-/// ends with the last keyframe.
-void complete_for_layers(Scenario& scenario, const SpritesRendererOptions& renderer, bool has_trajectory) {
+/// ends with the last pose.
+void complete_for_sprites(Scenario& scenario, const SpritesRendererOptions& renderer, bool has_trajectory) {
   if (!has_trajectory) scenario.trajectory = StaticTrajectoryOptions{};
-  const double end_s = last_keyframe_s(renderer);
-  const bool has_end = std::holds_alternative<FileTrajectoryOptions>(scenario.trajectory) ||
-                       std::holds_alternative<WaypointTrajectoryOptions>(scenario.trajectory);
+  const double end_s = last_pose_s(renderer);
+  const bool has_end = std::visit([](const auto& trajectory) { return trajectory.kHasDuration; }, scenario.trajectory);
   if (scenario.duration_s || end_s <= 0 || has_end) return;
   if (scenario.start_s >= end_s) {
     throw UserError(
-        fmt::format("start_s: {} s is beyond the last keyframe of the sprites, at {} s; start earlier, or set "
+        fmt::format("start_s: {} s is beyond the last pose of the sprites, at {} s; start earlier, or set "
                     "duration_s",
                     scenario.start_s, end_s));
   }
@@ -216,9 +216,16 @@ Scenario read_scenario(const ScenarioText& text) {
   YAML::Node root = parse_yaml(text.yaml, text.file);
   YamlSource source{text.file, {}, text.setter, text.has_lines, text.refuses};
   if (!root.IsMap()) YamlReader(root, "", source);
-  for (const std::string& change : text.overrides) source.changed.push_back(apply_override(root, change, text.setter));
-
   Scenario scenario;
+  use_present_names(root, source, scenario.notices);
+  for (const std::string& key : text.removed) remove_option(root, with_present_names(key, scenario.notices));
+  for (const std::string& change : text.overrides) {
+    const std::size_t equals = std::min(change.find('='), change.size());
+    const std::string present = with_present_names(change.substr(0, equals), scenario.notices);
+    source.changed.push_back(apply_override(root, present + change.substr(equals), text.setter));
+  }
+  use_present_names(root, source, scenario.notices);  // in values of overrides
+
   YamlReader reader(root, "", source);
   describe(reader, scenario);
   for (const char* key : {"camera", "cameras", "sampling", "event_camera", "frame_camera"}) reader.know(key);
@@ -233,17 +240,21 @@ Scenario read_scenario(const ScenarioText& text) {
   require("trajectory", text.needs_trajectory);
   if (scenario.imu) read_imu(*scenario.imu, std::as_const(root)["imu"], source);
   read_points(scenario.trajectory, trajectory, "trajectory", source, !text.needs_waypoints);
-  if (auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer)) {
-    for (std::size_t i = 0; i < mesh->objects.size(); ++i) {
-      read_points(mesh->objects[i].trajectory, renderer["objects"][i]["trajectory"],
-                  fmt::format("renderer.objects.{}.trajectory", i), source, false);
-    }
-  }
+  std::visit(
+      [&](auto& options) {
+        if constexpr (requires { options.objects; }) {
+          for (std::size_t i = 0; i < options.objects.size(); ++i) {
+            read_points(options.objects[i].trajectory, renderer["objects"][i]["trajectory"],
+                        fmt::format("renderer.objects.{}.trajectory", i), source, false);
+          }
+        }
+      },
+      scenario.renderer);
   CameraOptions camera;
   camera.sampling = usual_sampling(scenario.renderer, text.needs_renderer && text.needs_trajectory);
   if (sprites != nullptr) {
-    read_layers(*sprites, renderer, source, camera);
-    complete_for_layers(scenario, *sprites, trajectory.IsDefined());
+    read_sprites(*sprites, renderer, source, camera);
+    complete_for_sprites(scenario, *sprites, trajectory.IsDefined());
   }
   scenario.cameras = read_cameras(std::as_const(root), source, camera);
   name_cameras(scenario.cameras, source);

@@ -17,6 +17,8 @@ namespace esim::inline scenario {
 /// keys `sampling`, `event_camera` and `frame_camera` at the top apply to every camera that does not set them itself.
 /// Calibration files are read here: the result has explicit geometry only.
 ///
+/// Old names of options are valid and give a notice in the result.
+///
 /// `overrides` ("dotted.key=value") are applied last. Throws UserError, usually an OptionError, with file, line, key
 /// and the valid values.
 Scenario read_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides = {});
@@ -24,14 +26,16 @@ Scenario read_scenario(const std::filesystem::path& file, const std::vector<std:
 /// An invalid option of a scenario. The message also has the file and the line.
 class OptionError : public UserError {
  public:
-  OptionError(const std::string& message, std::string key, std::string problem)
-      : UserError(message), key_(std::move(key)), problem_(std::move(problem)) {}
+  OptionError(const std::string& message, std::string key, std::string problem, int line = 0)
+      : UserError(message), key_(std::move(key)), problem_(std::move(problem)), line_(line) {}
 
   const std::string& key() const { return key_; }          ///< dotted
   const std::string& problem() const { return problem_; }  ///< without the file and the key
+  int line() const { return line_; }                       ///< of the text, from 1; 0 if the option is not in it
 
  private:
   std::string key_, problem_;
+  int line_;
 };
 
 /// The default beginning of messages about overrides, which are options of a command.
@@ -40,8 +44,9 @@ inline constexpr const char* kSetter = "--set ";
 /// A scenario as text, with options for reading it.
 struct ScenarioText {
   std::string yaml;
-  std::filesystem::path file;  ///< for messages, and its folder for relative paths; it need not exist
-  bool has_lines = true;       ///< messages name the lines of `yaml`
+  std::filesystem::path file;             ///< for messages, and its folder for relative paths; it need not exist
+  bool has_lines = true;                  ///< messages name the lines of `yaml`
+  std::vector<std::string> removed = {};  ///< dotted keys of options of `yaml` that are not read, one after the other
   std::vector<std::string> overrides;
   std::string setter = kSetter;  ///< beginning of messages about overrides
   bool needs_renderer = true;    ///< false: the key may be missing, since the caller brings its own renderer

@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "esim/scenario/read.h"
-#include "esim/scenario/yaml_reader.h"
+#include "esim/scenario/yaml/yaml_reader.h"
 
 namespace esim::inline scenario {
 namespace {

@@ -29,7 +29,7 @@ class SceneWords {
     while (std::getline(stream, line)) {
       ++line_count_;
       bytes += line.size();
-      if (bytes > kMostBytes || line.find('\0') != std::string::npos) {
+      if (bytes > kMaxBytes || line.find('\0') != std::string::npos) {
         throw UserError(fmt::format("scene {}: must be a .scene file, which is a few lines of text", file.string()));
       }
       std::istringstream words(line);
@@ -41,7 +41,7 @@ class SceneWords {
 
   const std::string& word(const char* what) {
     if (at_end()) {
-      throw UserError(fmt::format("scene {}:{}: ends where {} should follow; a layer is an image and 12 numbers",
+      throw UserError(fmt::format("scene {}:{}: ends where {} should follow; a sprite is an image and 12 numbers",
                                   file_.string(), line_count_, what));
     }
     return words_[next_++].text;
@@ -69,7 +69,7 @@ class SceneWords {
   }
 
  private:
-  static constexpr std::size_t kMostBytes = std::size_t{1} << 20;
+  static constexpr std::size_t kMaxBytes = std::size_t{1} << 20;
   struct Word {
     std::string text;
     int line;
@@ -99,25 +99,25 @@ fs::path find_image(const fs::path& name, const fs::path& scene, const std::vect
                   name.filename().string(), tried));
 }
 
-LayerOptions read_layer(SceneWords& words, double duration_s, const fs::path& scene,
-                        const std::vector<fs::path>& search_path) {
+SpriteOptions read_sprite(SceneWords& words, double duration_s, const fs::path& scene,
+                          const std::vector<fs::path>& search_path) {
   constexpr Range kAngle{-1e9, 1e9}, kLength{-1e6, 1e6};
-  LayerOptions layer;
-  layer.image = find_image(words.word("an image"), scene, search_path, words);
-  layer.units = LayerUnits::sensor;
-  layer.median_px = words.whole_number("the median filter's side", {0, 255});
-  layer.gaussian_px = words.number("the blur", {0, 100});
-  LayerKeyframe start, end;
+  SpriteOptions sprite;
+  sprite.image = find_image(words.word("an image"), scene, search_path, words);
+  sprite.units = SpriteUnits::sensor;
+  sprite.median_px = words.whole_number("the median filter's side", {0, 255});
+  sprite.gaussian_px = words.number("the blur", {0, 100});
+  SpritePose start, end;
   end.t_s = duration_s;
-  for (LayerKeyframe* key : {&start, &end}) key->rotation_deg = words.number("a rotation", kAngle);
+  for (SpritePose* key : {&start, &end}) key->rotation_deg = words.number("a rotation", kAngle);
   for (const int axis : {0, 1}) {
-    for (LayerKeyframe* key : {&start, &end}) key->position[axis] = words.number("a position", kLength);
+    for (SpritePose* key : {&start, &end}) key->position[axis] = words.number("a position", kLength);
   }
   for (const int axis : {0, 1}) {
-    for (LayerKeyframe* key : {&start, &end}) key->scale[axis] = words.number("a scale", kLength);
+    for (SpritePose* key : {&start, &end}) key->scale[axis] = words.number("a scale", kLength);
   }
-  layer.keyframes = {start, end};
-  return layer;
+  sprite.poses = {start, end};
+  return sprite;
 }
 
 }  // namespace
@@ -130,10 +130,10 @@ SpriteSceneFile read_sprite_scene(const fs::path& file, const std::vector<fs::pa
   scene.width = words.whole_number("the width", {1, 16384});
   scene.height = words.whole_number("the height", {1, 16384});
   const double duration_s = words.number("the duration", {1e-6, 1e8});
-  while (!words.at_end()) scene.layers.push_back(read_layer(words, duration_s, file, search_path));
-  if (scene.layers.empty()) words.fail("layers are missing; a layer is an image and 12 numbers");
-  scene.layers.front().beyond = LayerBeyond::mirror;
-  std::reverse(scene.layers.begin(), scene.layers.end());
+  while (!words.at_end()) scene.sprites.push_back(read_sprite(words, duration_s, file, search_path));
+  if (scene.sprites.empty()) words.fail("sprites are missing; a sprite is an image and 12 numbers");
+  scene.sprites.front().beyond = SpriteBeyond::mirror;
+  std::reverse(scene.sprites.begin(), scene.sprites.end());
   return scene;
 }
 

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "esim/scenario/yaml_reader.h"
+#include "esim/scenario/yaml/yaml_reader.h"
 
 namespace esim::inline scenario {
 

@@ -9,7 +9,6 @@
 #include "esim/scenario/conversion.h"
 #include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
-#include "esim/scenario/waypoint_file.h"
 
 namespace esim::inline scenario {
 namespace {
@@ -232,19 +231,6 @@ std::string write_option(const Options& options) {
 std::string write_sampling(const SamplingOptions& options) { return write_option(options); }
 
 std::string write_event_camera(const EventCameraOptions& options) { return write_option(options); }
-
-std::string write_waypoints(std::span<const WaypointPointOptions> points) {
-  std::string text = points.empty() ? "points: []\n" : "points:\n";
-  for (WaypointPointOptions point : points) {
-    YAML::Emitter out;
-    out << YAML::Flow << YAML::BeginMap;
-    YamlWriter writer(out);
-    describe(writer, point);
-    out << YAML::EndMap;
-    text += fmt::format("  - {}\n", out.c_str());
-  }
-  return text;
-}
 
 std::string write_conversion(const ConversionOptions& options) {
   YAML::Emitter out;

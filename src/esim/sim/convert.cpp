@@ -13,7 +13,7 @@
 namespace esim::inline sim {
 namespace {
 
-/// One conversion: processes each frame and collects the summary.
+/// One conversion: processes each frame and collects the summary. The end of this file says in which order.
 class Run {
  public:
   Run(const Conversion& conversion, Sink& out, const Monitor& monitor)
@@ -24,12 +24,8 @@ class Run {
 
   /// Reads the next frame and measures how the image moves towards it; false at the end of the input.
   bool take_frame() {
-    {
-      Stopwatch stopwatch(summary_.seconds.decode);
-      if (!conversion_.frames.next(frame_)) return false;
-    }
-    Stopwatch stopwatch(summary_.seconds.motion);
-    conversion_.interpolator.advance(frame_.planes, conversion_.workers);
+    if (!timed(summary_.seconds.decode, [&] { return conversion_.frames.next(frame_); })) return false;
+    timed(summary_.seconds.motion, [&] { conversion_.interpolator.advance(frame_.planes, conversion_.workers); });
     return true;
   }
 
@@ -50,17 +46,16 @@ class Run {
     const Interpolator& interpolator = conversion_.interpolator;
     const TimeNs t0 = summary_.end, duration = frame_.t - t0;
     const auto steps = std::min<TimeNs>(interpolator.steps(), duration);
-    summary_.displacement_px = std::max(summary_.displacement_px, interpolator.displacement());
+    summary_.max_optical_flow_px = std::max(summary_.max_optical_flow_px, interpolator.max_flow_px());
     if (interpolator.is_held()) ++summary_.held;
 
     for (TimeNs step = 1; step <= steps; ++step) {
       const double fraction = static_cast<double>(step) / static_cast<double>(steps);
       const TimeNs t = step < steps ? t0 + static_cast<TimeNs>(fraction * static_cast<double>(duration)) : frame_.t;
-      {
-        Stopwatch stopwatch(summary_.seconds.interpolation);
+      timed(summary_.seconds.interpolation, [&] {
         if (step < steps) interpolator.at(fraction, conversion_.workers, between_);
         seen_by_pixels(step < steps ? between_ : frame_.planes, after_);
-      }
+      });
       see(t);
       deliver_events(t);
       ++summary_.steps;
@@ -71,10 +66,7 @@ class Run {
   }
 
   ConversionSummary finish(bool complete, std::string problem) {
-    {
-      Stopwatch stopwatch(summary_.seconds.write);
-      out_.end(complete);
-    }
+    timed(summary_.seconds.write, [&] { out_.end(complete); });
     summary_.sensor = conversion_.event_camera.statistics();
     summary_.complete = complete;
     summary_.problem = std::move(problem);
@@ -108,23 +100,19 @@ class Run {
 
   /// Changes the irradiance of the pixels linearly to `after_` at time t.
   void see(TimeNs t) {
-    Stopwatch stopwatch(summary_.seconds.events);
     const bool first = before_.empty();
     const Segment segment{after_.bounds(), summary_.end, t, first ? &after_ : &before_, &after_};
-    conversion_.event_camera.integrate({&segment, 1}, t, conversion_.workers);
+    timed(summary_.seconds.events, [&] { conversion_.event_camera.integrate({&segment, 1}, t, conversion_.workers); });
     std::swap(before_, after_);
     summary_.end = t;
   }
 
   void deliver_events(TimeNs until) {
     events_.clear();
-    {
-      Stopwatch stopwatch(summary_.seconds.events);
-      conversion_.event_camera.release_until(until, events_);
-      const auto on = std::count_if(events_.begin(), events_.end(), [](const Event& e) { return e.polarity > 0; });
-      summary_.events_on += on;
-      summary_.events_off += static_cast<std::int64_t>(events_.size()) - on;
-    }
+    timed(summary_.seconds.events, [&] { conversion_.event_camera.release_until(until, events_); });
+    const auto on = std::count_if(events_.begin(), events_.end(), [](const Event& e) { return e.polarity > 0; });
+    summary_.events_on += on;
+    summary_.events_off += static_cast<std::int64_t>(events_.size()) - on;
     if (!events_.empty()) write(EventsRecord{0, events_});
   }
 
@@ -134,8 +122,7 @@ class Run {
   }
 
   void write(const Record& record) {
-    Stopwatch stopwatch(summary_.seconds.write);
-    out_.write(record);
+    timed(summary_.seconds.write, [&] { out_.write(record); });
   }
 
   double elapsed() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count(); }

@@ -19,13 +19,13 @@ inline constexpr const char* kConversionCamera = "cam0";
 /// Results of a conversion, for the report.
 struct ConversionSummary {
   bool complete = false;
-  std::string problem;         ///< why it failed before the end of the input; empty if complete or interrupted
-  TimeNs start = 0, end = 0;   ///< of the converted time
-  int width = 0, height = 0;   ///< px
-  std::int64_t frames = 0;     ///< of the input
-  std::int64_t steps = 0;      ///< of the interpolation
-  std::int64_t held = 0;       ///< intervals that needed more than max_steps
-  double displacement_px = 0;  ///< maximum between two frames
+  std::string problem;             ///< why it failed before the end of the input; empty if complete or interrupted
+  TimeNs start = 0, end = 0;       ///< of the converted time
+  int width = 0, height = 0;       ///< px
+  std::int64_t frames = 0;         ///< of the input
+  std::int64_t steps = 0;          ///< of the interpolation
+  std::int64_t held = 0;           ///< intervals that needed more than max_steps
+  double max_optical_flow_px = 0;  ///< maximum between two frames
   std::int64_t events_on = 0, events_off = 0;
   EventCameraStatistics sensor;
 

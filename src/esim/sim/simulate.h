@@ -3,46 +3,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <string>
-#include <vector>
 
 #include "esim/recording/record.h"
+#include "esim/sim/summary.h"
 #include "esim/sim/world.h"
 
 namespace esim::inline sim {
-
-/// Wall-clock seconds by stage.
-struct StageSeconds {
-  double render = 0;    ///< samples for the event cameras
-  double sampling = 0;  ///< choosing times, reconstructing between keyframes
-  double events = 0;    ///< pixels, and ordering of events
-  double frames = 0;    ///< exposing and reading out frame cameras
-  double truth = 0;     ///< computing ground truth
-  double write = 0;     ///< calls of sinks; their background threads do not count
-};
-
-/// Results of one camera.
-struct CameraSummary {
-  std::string name;
-  std::string renderer;
-  std::int64_t width = 0, height = 0;
-  SamplingStatistics sampling;
-  std::int64_t events_on = 0, events_off = 0;
-  EventCameraStatistics sensor;
-  std::int64_t frames = 0;  ///< of the frame camera
-};
-
-/// Results of a simulation, for the report.
-struct Summary {
-  bool complete = false;
-  std::string problem;        ///< why it failed before its end; empty if complete or interrupted
-  TimeNs start = 0, end = 0;  ///< of the simulated time
-  std::vector<CameraSummary> cameras;
-  std::int64_t truth_frames = 0;
-  std::int64_t imu_samples = 0;
-  StageSeconds seconds;
-  double wall_seconds = 0;
-};
 
 /// Progress of a simulation.
 struct Progress {
@@ -73,8 +39,7 @@ class Simulator {
   Summary finish();
 
  private:
-  class Run;
-  World& world_;
+  struct Run;
   std::unique_ptr<Run> run_;
 };
 

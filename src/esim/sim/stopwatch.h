@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <utility>
 
 namespace esim::inline sim {
 
@@ -16,5 +17,12 @@ class Stopwatch {
   double& total_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
+
+/// Calls `work` and returns its result. Adds the wall-clock time that it takes to a total, also if it throws.
+template <typename Work>
+decltype(auto) timed(double& total_seconds, Work&& work) {
+  const Stopwatch stopwatch(total_seconds);
+  return std::forward<Work>(work)();
+}
 
 }  // namespace esim::inline sim

@@ -3,7 +3,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "esim/core/parallel.h"
@@ -15,8 +14,8 @@
 #include "esim/render/renderer.h"
 #include "esim/sampling/sampler.h"
 #include "esim/truth/clock.h"
-#include "esim/truth/displacement.h"
 #include "esim/truth/event_points.h"
+#include "esim/truth/optical_flow.h"
 
 namespace esim::inline sim {
 
@@ -27,16 +26,11 @@ struct CameraChannel {
   std::optional<EventCamera> event_camera;
   Sample sample;                           // the latest sample; renderer and sampler exchange its buffers
   std::unique_ptr<Rendering> rendering{};  // the running rendering of the sampler's next request
-  std::unique_ptr<Renderer> keyframes{};   // the renderer of supersampled keyframes
   std::optional<FrameCamera> frame_camera{};
 
   // Ground truth, if requested.
-  std::unique_ptr<DisplacementField> displacement{};
+  std::unique_ptr<OpticalFlowFromDepth> optical_flow{};
   std::unique_ptr<EventPoints> event_points{};
-
-  Renderer& asked_for(const SampleRequest& request) {
-    return keyframes != nullptr && !request.of_sensor ? *keyframes : *renderer;
-  }
 };
 
 /// The rig's inertial measurement unit.
@@ -58,11 +52,8 @@ struct World {
   bool truth_objects = false;  // whether ground truth has the object of each pixel
 };
 
-/// The poses of a camera and of the moving objects at `t`, without tiles.
-RenderRequest view(const Trajectory& body, const SE3& T_body_camera,
-                   std::span<const std::shared_ptr<const Trajectory>> objects, TimeNs t);
-
-/// The same for a camera of the world, as a function that may outlive the world.
+/// The poses of a camera of the world and of the moving objects at a time, without tiles, as a function that may
+/// outlive the world. While the body's motion at that time is not known yet, its last known pose.
 std::function<RenderRequest(TimeNs)> view_at(const World& world, std::size_t camera);
 
 /// The request to render `tiles` of a camera of the world at `t`; evaluates the motions.

@@ -60,7 +60,7 @@ void EventStatistics::count_stamp(TimeNs t) {
     same_time_ = 1;
   }
   s.last = t;
-  s.most_simultaneous = std::max(s.most_simultaneous, same_time_);
+  s.max_simultaneous = std::max(s.max_simultaneous, same_time_);
 }
 
 void EventStatistics::add(EventSpan events) {

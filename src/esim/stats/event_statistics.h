@@ -30,8 +30,8 @@ struct Statistics {
   IntervalHistogram intervals;  ///< between consecutive events of the same pixel
 
   std::uint64_t distinct_times = 0;
-  std::uint64_t simultaneous = 0;       ///< events that share their time stamp with another
-  std::uint64_t most_simultaneous = 0;  ///< events with the same time stamp
+  std::uint64_t simultaneous = 0;      ///< events that share their time stamp with another
+  std::uint64_t max_simultaneous = 0;  ///< events with the same time stamp
 
   std::optional<Periodicity> periodicity;  ///< not set if the period was given or cannot be searched for
   std::optional<PhaseTest> phase;          ///< at the given frequency, or that of `periodicity`

@@ -5,24 +5,23 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
-#include "esim/stats/axes.h"
+#include "esim/plot/axes.h"
+#include "esim/preview/pictures.h"
 
 namespace esim::inline stats {
 namespace {
 
 constexpr int kWidth = 1920, kHeight = 1104;
-constexpr int kHeader = 62, kMargin = 18;
-constexpr int kCellWidth = (kWidth - 2 * kMargin) / 3, kCellHeight = (kHeight - kHeader) / 2;
-constexpr int kLeft = 66, kTop = 62, kRight = 24, kBottom = 62;  // around the diagram of a cell
+constexpr int kHeader = 56, kMargin = 16, kGap = 14;
+constexpr int kCellWidth = (kWidth - 2 * kMargin + kGap) / 3, kCellHeight = (kHeight - kHeader) / 2;
 constexpr std::size_t kMarkedHotPixels = 50;
 
 struct Cell {
   int column = 0, row = 0;
-  int x() const { return kMargin + column * kCellWidth; }
-  int y() const { return kHeader + row * kCellHeight; }
-  Tile diagram() const { return {x() + kLeft, y() + kTop, kCellWidth - kLeft - kRight, kCellHeight - kTop - kBottom}; }
+  Tile area() const {
+    return {kMargin + column * kCellWidth, kHeader + row * kCellHeight, kCellWidth - kGap, kCellHeight - kGap};
+  }
 };
 
 // A unit and its factor.
@@ -33,22 +32,6 @@ struct Unit {
 Unit rate_unit(double largest) {
   if (largest >= 1e6) return {1e-6, "Mev/s"};
   return largest >= 1e3 ? Unit{1e-3, "kev/s"} : Unit{1, "ev/s"};
-}
-
-Rgb viridis(double position) {
-  static const cv::Mat kColours = [] {
-    cv::Mat ramp(1, 256, CV_8UC1), coloured;
-    for (int i = 0; i < 256; ++i) ramp.at<std::uint8_t>(0, i) = static_cast<std::uint8_t>(i);
-    cv::applyColorMap(ramp, coloured, cv::COLORMAP_VIRIDIS);
-    return coloured;
-  }();
-  const auto bgr = kColours.at<cv::Vec3b>(0, static_cast<int>(std::lround(255 * std::clamp(position, 0.0, 1.0))));
-  return {bgr[2], bgr[1], bgr[0]};
-}
-
-void draw_swatch(Canvas& canvas, int x, int baseline, Rgb colour, const std::string& label) {
-  canvas.fill({x, baseline - 11, 12, 12}, colour);
-  canvas.text(x + 18, baseline, label, 10, kInk);
 }
 
 // ON upwards, OFF downwards, in at most 260 bars.
@@ -79,17 +62,15 @@ void draw_rate(Canvas& canvas, const Cell& cell, const Statistics& s) {
   const Unit unit = rate_unit(largest);
   const double top = largest > 0 ? 1.08 * largest * unit.factor : 1.0;
   const double first_s = to_seconds(s.first), last_s = first_s + std::max(s.duration_s(), 1e-6);
-  Axes axes(canvas, cell.diagram(), "Event rate over time", linear_scale(first_s, last_s, "time, s"),
-            linear_scale(-top, top, unit.name, true));
+  Axes axes(canvas, cell.area(), linear_scale(first_s, last_s, "time (s)"),
+            linear_scale(-top, top, fmt::format("event rate ({})", unit.name), LabelStyle::magnitudes),
+            {"Event rate over time", {{"ON", kOnColour}, {"OFF", kOffColour}}});
   for (const Bar& bar : bars) {
     axes.fill(first_s + bar.start_s, first_s + bar.end_s, 0, bar.on_hz * unit.factor, kOnColour);
     axes.fill(first_s + bar.start_s, first_s + bar.end_s, -bar.off_hz * unit.factor, 0, kOffColour);
   }
-  axes.horizontal_line(0, kInk);
+  axes.horizontal_line(0, kLightTheme.ink);
   axes.finish();
-  const int right = cell.diagram().x + cell.diagram().width;
-  draw_swatch(canvas, right - 130, cell.diagram().y - 10, kOnColour, "ON");
-  draw_swatch(canvas, right - 62, cell.diagram().y - 10, kOffColour, "OFF");
 }
 
 void draw_intervals(Canvas& canvas, const Cell& cell, const Statistics& s) {
@@ -105,18 +86,17 @@ void draw_intervals(Canvas& canvas, const Cell& cell, const Statistics& s) {
   std::vector<double> bars = intervals.bars(kBinsPerBar);
   for (double& bar : bars) bar *= 100;
   const double largest = *std::max_element(bars.begin(), bars.end());
-  Axes axes(canvas, cell.diagram(), "Time between events of a pixel",
-            decade_scale(low, high, "interval (20 bins per decade)", true),
-            linear_scale(0, largest > 0 ? 1.15 * largest : 1.0, "% of the intervals"));
+  Axes axes(canvas, cell.area(), logarithmic_scale(low, high, "interval (20 bins per decade)", LabelStyle::seconds),
+            linear_scale(0, largest > 0 ? 1.15 * largest : 1.0, "intervals (%)"), {"Time between events of a pixel"});
   for (std::size_t i = 0; i < bars.size(); ++i) {
     const int bin = static_cast<int>(i) * kBinsPerBar;
     if (IntervalHistogram::edge_s(bin + kBinsPerBar) <= low || IntervalHistogram::edge_s(bin) >= high) continue;
     axes.fill(IntervalHistogram::edge_s(bin), IntervalHistogram::edge_s(bin + kBinsPerBar), 0, bars[i], kBarColour);
   }
   if (intervals.total() > 0) {
-    axes.vertical_line(intervals.quantile_s(0.01), "1 %", kFaintInk);
-    axes.vertical_line(intervals.quantile_s(0.5), "median", kAlarmColour);
-    axes.vertical_line(intervals.quantile_s(0.99), "99 %", kFaintInk);
+    axes.vertical_line(intervals.quantile_s(0.01), "1 %", kLightTheme.faint_ink);
+    axes.vertical_line(intervals.quantile_s(0.5), "median", kHighlightColour);
+    axes.vertical_line(intervals.quantile_s(0.99), "99 %", kLightTheme.faint_ink);
   }
   axes.finish();
 }
@@ -134,29 +114,33 @@ std::uint32_t bright_count(const Statistics& s) {
 
 void draw_colour_bar(Canvas& canvas, const Tile& bar, double full_hz) {
   for (int i = 0; i < bar.height; ++i) {
-    canvas.fill({bar.x, bar.y + i, bar.width, 1}, viridis(1 - (i + 0.5) / bar.height));
+    const float position = 1 - (static_cast<float>(i) + 0.5f) / static_cast<float>(bar.height);
+    canvas.fill({bar.x, bar.y + i, bar.width, 1}, viridis(position));
   }
-  canvas.outline({bar.x - 1, bar.y - 1, bar.width + 2, bar.height + 2}, kFaintInk);
-  for (const Tick& tick : linear_scale(0, full_hz, "").ticks) {
-    const int y = bar.y + static_cast<int>(std::lround((1 - tick.value / full_hz) * (bar.height - 1)));
-    canvas.fill({bar.x + bar.width, y, 5, 1}, kFaintInk);
-    canvas.text(bar.x + bar.width + 9, y + 5, tick.label, 10, kInk);
+  canvas.outline({bar.x - 1, bar.y - 1, bar.width + 2, bar.height + 2}, kLightTheme.faint_ink);
+  const Scale scale = linear_scale(0, full_hz, "");
+  const Ticks ticks = scale.ticks(std::clamp(bar.height / 44, 3, 10));
+  for (const Tick& tick : ticks.major) {
+    const int y = bar.y + static_cast<int>(std::lround((1 - scale.position(tick.value)) * (bar.height - 1)));
+    canvas.fill({bar.x + bar.width, y, 5, 1}, kLightTheme.faint_ink);
+    canvas.text(bar.x + bar.width + 10, y + kTextHeight / 2, tick.label, kTextHeight, kLightTheme.ink);
   }
+  canvas.text(bar.x, bar.y - 10, "ev/s" + (ticks.factor.empty() ? "" : " " + ticks.factor), kTextHeight,
+              kLightTheme.ink);
 }
 
 void draw_map(Canvas& canvas, const Cell& cell, const Statistics& s) {
-  constexpr int kBarSpace = 84;
-  const Tile diagram = cell.diagram();
-  const int left = cell.x() + kLeft - 56, most_width = diagram.x + diagram.width - left - kBarSpace;
-  canvas.text(left, diagram.y - 32, "Rate of each pixel", 13, kInk);
+  constexpr int kTop = 34, kBelow = 46, kBarSpace = 100;
+  const Tile area = cell.area();
+  canvas.text(area.x, area.y + 6 + kTitleHeight, "Rate of each pixel", kTitleHeight, kLightTheme.ink);
   if (s.counts.empty()) return;
-  const int width = s.counts.width(), height = s.counts.height();
-  const double scale =
-      std::min(static_cast<double>(most_width) / width, static_cast<double>(diagram.height + 30) / height);
+  const int width = s.counts.width(), height = s.counts.height(), y0 = area.y + kTop;
+  const double scale = std::min(static_cast<double>(area.width - kBarSpace) / width,
+                                static_cast<double>(area.height - kTop - kBelow) / height);
   const int shown_width = std::max(1, static_cast<int>(scale * width)),
             shown_height = std::max(1, static_cast<int>(scale * height));
 
-  const double full = bright_count(s);
+  const float full = static_cast<float>(bright_count(s));
   Image<float> counts(width, height);
   std::copy(s.counts.pixels().begin(), s.counts.pixels().end(), counts.pixels().begin());
   const bool reduced = shown_width < width;
@@ -164,19 +148,19 @@ void draw_map(Canvas& canvas, const Cell& cell, const Statistics& s) {
   Image<Rgb> colours(counts.width(), counts.height());
   std::transform(counts.pixels().begin(), counts.pixels().end(), colours.pixels().begin(),
                  [&](float count) { return viridis(count / full); });
-  canvas.draw(reduced ? colours : enlarge(colours, shown_width, shown_height), left, diagram.y);
-  canvas.outline({left - 1, diagram.y - 1, shown_width + 2, shown_height + 2}, kFaintInk);
+  canvas.draw(reduced ? colours : enlarge(colours, shown_width, shown_height), area.x, y0);
+  canvas.outline({area.x - 1, y0 - 1, shown_width + 2, shown_height + 2}, kLightTheme.faint_ink);
   for (std::size_t i = 0; i < std::min(s.hot_pixels.size(), kMarkedHotPixels); ++i) {
-    const int x = left + static_cast<int>(scale * (s.hot_pixels[i].x + 0.5));
-    const int y = diagram.y + static_cast<int>(scale * (s.hot_pixels[i].y + 0.5));
-    for (const int side : {13, 15}) canvas.outline({x - side / 2, y - side / 2, side, side}, kAlarmColour);
+    const int x = area.x + static_cast<int>(scale * (s.hot_pixels[i].x + 0.5));
+    const int y = y0 + static_cast<int>(scale * (s.hot_pixels[i].y + 0.5));
+    for (const int side : {13, 15}) canvas.outline({x - side / 2, y - side / 2, side, side}, kHighlightColour);
   }
-  draw_colour_bar(canvas, {left + shown_width + 16, diagram.y, 16, shown_height}, full * s.per_second(1));
-  canvas.text(left, diagram.y - 11, "ev/s, ON and OFF; full scale: 99.5 % of the active pixels are below", 10,
-              kFaintInk);
-  if (!s.hot_pixels.empty()) {
-    canvas.text(left, diagram.y + shown_height + 19, "red squares: hot pixels", 10, kAlarmColour);
-  }
+  draw_colour_bar(canvas, {area.x + shown_width + 16, y0, 16, shown_height}, full * s.per_second(1));
+  const int baseline = y0 + shown_height + 2 * kTextHeight;
+  canvas.text(area.x, baseline, "ON and OFF; 99.5 % of the active pixels are within the scale", kTextHeight,
+              kLightTheme.faint_ink);
+  if (!s.hot_pixels.empty())
+    canvas.text(area.x, baseline + 2 * kTextHeight, "red squares: hot pixels", kTextHeight, kHighlightColour);
 }
 
 // Bins of whole counts, up to 20 per decade.
@@ -193,21 +177,22 @@ void draw_pixel_rates(Canvas& canvas, const Cell& cell, const Statistics& s) {
     if (count > 0) ++pixels[bin_of(count)];
   }
   for (const HotPixel& pixel : s.hot_pixels) ++hot[bin_of(pixel.events)];
-  const double most = std::max(10.0, *std::max_element(pixels.begin(), pixels.end()));
+  const double max = std::max(10.0, *std::max_element(pixels.begin(), pixels.end()));
   const double rate_of_one = s.per_second(1) > 0 ? s.per_second(1) : 1.0;
   const auto edge_hz = [&](std::size_t i) { return (static_cast<double>(edges[i]) - 0.5) * rate_of_one; };
   const auto lowest = std::find_if(pixels.begin(), pixels.end(), [](double number) { return number > 0; });
   const double low_hz = edge_hz(lowest == pixels.end() ? 0 : static_cast<std::size_t>(lowest - pixels.begin()));
-  Axes axes(canvas, cell.diagram(), "Histogram of the pixels' rates",
-            decade_scale(0.8 * low_hz, std::max(8 * low_hz, 1.25 * edge_hz(edges.size() - 1)), "ev/s of a pixel"),
-            decade_scale(0.7, 1.6 * most, "pixels"));
+  AxesOptions options{"Histogram of the pixels' rates"};
+  if (!s.hot_pixels.empty()) options.legend = {{fmt::format("hot: {}", s.hot_pixels.size()), kHighlightColour}};
+  Axes axes(
+      canvas, cell.area(),
+      logarithmic_scale(0.8 * low_hz, std::max(8 * low_hz, 1.25 * edge_hz(edges.size() - 1)), "rate of a pixel (ev/s)"),
+      logarithmic_scale(0.7, 1.6 * max, "pixels"), std::move(options));
   for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
     axes.fill(edge_hz(i), edge_hz(i + 1), 0.7, pixels[i], kBarColour);
-    axes.fill(edge_hz(i), edge_hz(i + 1), 0.7, hot[i], kAlarmColour);
+    axes.fill(edge_hz(i), edge_hz(i + 1), 0.7, hot[i], kHighlightColour);
   }
   axes.finish();
-  const int right = cell.diagram().x + cell.diagram().width;
-  draw_swatch(canvas, right - 110, cell.diagram().y - 10, kAlarmColour, fmt::format("hot: {}", s.hot_pixels.size()));
 }
 
 void draw_phases(Canvas& canvas, const Cell& cell, const Statistics& s) {
@@ -220,33 +205,43 @@ void draw_phases(Canvas& canvas, const Cell& cell, const Statistics& s) {
   }
   const double even = std::max(1.0, static_cast<double>(phase.events)) / PhaseTest::kBins;
   const double largest = static_cast<double>(*std::max_element(phase.histogram.begin(), phase.histogram.end())) / even;
-  Axes axes(canvas, cell.diagram(), title, linear_scale(0, 1, "phase in the period"),
-            linear_scale(0, std::max(1.5, 1.2 * largest), "events, relative to an even spread"));
+  Axes axes(canvas, cell.area(), linear_scale(0, 1, "phase in the period"),
+            linear_scale(0, std::max(1.5, 1.2 * largest), "events / events if spread evenly"), {title});
   const bool bands = s.banding() == Banding::strong || s.banding() == Banding::weak;
   for (std::size_t i = 0; i < phase.histogram.size(); ++i) {
     const double left = static_cast<double>(i) / PhaseTest::kBins;
     axes.fill(left, left + 1.0 / PhaseTest::kBins, 0, static_cast<double>(phase.histogram[i]) / even,
-              bands ? kAlarmColour : kBarColour);
+              bands ? kHighlightColour : kBarColour);
   }
-  axes.horizontal_line(1, kInk);
+  axes.horizontal_line(1, kLightTheme.ink);
+  axes.note(verdict(s), bands ? kHighlightColour : kLightTheme.ink);
   axes.finish();
-  const Tile diagram = cell.diagram();
-  canvas.text(diagram.x + 10, diagram.y + 20, verdict(s), 11, bands ? kAlarmColour : kInk);
 }
 
 void draw_report(Canvas& canvas, const Cell& cell, const Statistics& s) {
-  constexpr int kLine = 15, kValueColumn = 168;
-  int y = cell.y() + kTop - 32;
-  for (const ReportSection& section : report_sections(s)) {
-    canvas.text(cell.x() + 10, y, section.title, 11, kInk);
-    y += kLine + 2;
-    for (const ReportLine& line : section.lines) {
-      if (line.label.empty()) continue;  // hot pixels, which the map shows
-      canvas.text(cell.x() + 10, y, line.label, 10, kFaintInk);
-      canvas.text(cell.x() + kValueColumn, y, line.value, 10, kInk);
-      y += kLine;
+  constexpr int kMaxLine = 17, kValueColumn = 176;
+  const Tile area = cell.area();
+  const std::vector<StatisticsSection> sections = statistics_sections(s);
+  const auto is_shown = [](const StatisticsLine& line) { return !line.label.empty(); };  // not hot pixels: see the map
+  double lines = 0;
+  for (const StatisticsSection& section : sections)
+    lines += 1.7 + static_cast<double>(std::ranges::count_if(section.lines, is_shown));
+  const double line = std::min<double>(kMaxLine, (area.height - kTitleHeight) / lines);
+  double y = area.y + 6 + kTitleHeight;
+  const auto write = [&](int x, const std::string& text, int height, Rgb colour) {
+    height = Canvas::fitting_height(text, height, area.x + area.width - x);
+    canvas.text(x, static_cast<int>(std::lround(y)), text, height, colour);
+  };
+  for (const StatisticsSection& section : sections) {
+    write(area.x, section.title, kTitleHeight - 1, kLightTheme.ink);
+    y += 1.15 * line;
+    for (const auto& [label, value] : section.lines) {
+      if (label.empty()) continue;
+      write(area.x, label, kTextHeight, kLightTheme.faint_ink);
+      write(area.x + kValueColumn, value, kTextHeight, kLightTheme.ink);
+      y += line;
     }
-    y += 8;
+    y += 0.55 * line;
   }
 }
 
@@ -254,9 +249,10 @@ void draw_report(Canvas& canvas, const Cell& cell, const Statistics& s) {
 
 Image<Rgb> draw_figure(const NamedStatistics& file) {
   const Statistics& s = file.statistics;
-  Canvas canvas(kWidth, kHeight, kPaper);
-  canvas.text(kMargin + 10, 36, file.name, 15, kInk);
-  canvas.fill({kMargin, kHeader - 8, kWidth - 2 * kMargin, 1}, kGrid);
+  Canvas canvas(kWidth, kHeight, kLightTheme.page);
+  const int headline = Canvas::fitting_height(file.name, kHeadlineHeight, kWidth - 2 * kMargin);
+  canvas.text(kMargin, 32, file.name, headline, kLightTheme.ink);
+  canvas.fill({kMargin, kHeader - 10, kWidth - 2 * kMargin, 1}, kLightTheme.grid);
   draw_rate(canvas, {0, 0}, s);
   draw_intervals(canvas, {1, 0}, s);
   draw_map(canvas, {2, 0}, s);

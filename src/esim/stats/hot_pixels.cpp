@@ -6,6 +6,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "esim/stats/median.h"
 #include "esim/stats/probability.h"
 
 namespace esim::inline stats {
@@ -14,13 +15,6 @@ namespace {
 // A hot pixel exceeds its neighbours by this multiple of their difference. Pixels at the rims of wheels, recorded and
 // simulated, reach 2.9.
 constexpr double kUneven = 4;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return values.size() % 2 == 1 ? *middle : 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
 
 struct Neighbours {
   double busy = 0;   // the second largest count of the neighbours

@@ -6,14 +6,15 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "esim/stats/median.h"
 #include "esim/stats/probability.h"
 #include "esim/stats/time_sample.h"
 
 namespace esim::inline stats {
 namespace {
 
-constexpr std::size_t kLeastEvents = 100;
-constexpr double kLeastPeriods = 20;
+constexpr std::size_t kMinEvents = 100;
+constexpr double kMinPeriods = 20;
 
 constexpr int kNeighbours = 16;  // on either side
 constexpr double kBandingP = 1e-4;
@@ -62,13 +63,7 @@ double chi2_of(const std::array<std::uint64_t, PhaseTest::kBins>& histogram, std
   return chi2;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-double share_near(const std::vector<TimeNs>& times, double frequency_hz, std::size_t bin) {
+double fraction_near(const std::vector<TimeNs>& times, double frequency_hz, std::size_t bin) {
   const Phase phase(frequency_hz);
   const std::uint64_t centre = (2 * std::uint64_t{bin} + 1) << 57;
   const auto within = static_cast<std::uint64_t>(std::ldexp(0.01, 64));
@@ -163,12 +158,12 @@ Line find_line(const std::vector<double>& z, const std::vector<double>& level, s
   std::size_t line = first;
   while (ratio[line] < 0.25 * highest) ++line;
 
-  const double least = std::max(highest / 64, std::log(static_cast<double>(end - first) / kFoundP));
+  const double min = std::max(highest / 64, std::log(static_cast<double>(end - first) / kFoundP));
   for (std::size_t divisor = 16; divisor > 1; --divisor) {
     const std::size_t k = (line + divisor / 2) / divisor;
     if (k < first + 2) continue;
     const auto nearby = ratio.begin() + static_cast<std::ptrdiff_t>(k);
-    if (*std::max_element(nearby - 2, nearby + 3) >= least) return {line, divisor};
+    if (*std::max_element(nearby - 2, nearby + 3) >= min) return {line, divisor};
   }
   return {line, 1};
 }
@@ -202,7 +197,7 @@ PhaseTest test_phase(std::span<const TimeNs> given, double frequency_hz) {
   test.periods = span_s(given) * frequency_hz;
   const std::vector<TimeNs> times = spread_over_microseconds(given);
   test.histogram = phase_histogram(times, frequency_hz);
-  if (times.size() < kLeastEvents || test.periods < kLeastPeriods) return test;
+  if (times.size() < kMinEvents || test.periods < kMinPeriods) return test;
 
   constexpr double kDof = PhaseTest::kBins - 1;
   const double chi2 = chi2_of(test.histogram, times.size());
@@ -220,7 +215,7 @@ PhaseTest test_phase(std::span<const TimeNs> given, double frequency_hz) {
   test.p_value = chi2_tail(chi2 / inflation, kDof);
   test.modulation = std::sqrt(std::max(0.0, chi2 - kDof * inflation) / static_cast<double>(times.size()));
   const auto fullest = std::max_element(test.histogram.begin(), test.histogram.end()) - test.histogram.begin();
-  test.share_at_peak = share_near(times, frequency_hz, static_cast<std::size_t>(fullest));
+  test.fraction_at_peak = fraction_near(times, frequency_hz, static_cast<std::size_t>(fullest));
   test.banding = test.p_value >= kBandingP              ? Banding::none
                  : test.modulation >= kStrongModulation ? Banding::strong
                                                         : Banding::weak;
@@ -231,8 +226,8 @@ std::optional<Periodicity> find_periodicity(std::span<const TimeNs> times) {
   if (times.empty()) return std::nullopt;
   const TimeNs end_ns = times.front() + to_ns(kMaxSearch_s);
   times = times.first(static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), end_ns) - times.begin()));
-  const double lowest_hz = std::max(kLowestHz, kLeastPeriods / span_s(times));
-  if (times.size() < kLeastEvents || !(lowest_hz < kHighestHz)) return std::nullopt;
+  const double lowest_hz = std::max(kLowestHz, kMinPeriods / span_s(times));
+  if (times.size() < kMinEvents || !(lowest_hz < kHighestHz)) return std::nullopt;
 
   const Tapered tapered(times);
   const Spectrum spectrum = compute_spectrum(tapered);

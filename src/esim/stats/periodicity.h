@@ -42,7 +42,8 @@ struct PhaseTest {
   double neighbours_chi2_per_dof = 0;  ///< the median, before it is limited to 1
   double p_value = 1;
   double modulation = 0;
-  double share_at_peak = 0;  ///< of the events within 1 % of a period from the middle of the fullest bin; 0.02 if even
+  double fraction_at_peak =
+      0;  ///< of the events within 1 % of a period from the middle of the fullest bin; 0.02 if even
   Banding banding = Banding::unknown;
 };
 

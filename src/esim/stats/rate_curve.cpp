@@ -19,8 +19,8 @@ void RateCurve::close_window() {
   if (events == 0) return;
   recent_[static_cast<std::size_t>(ms_ % 10)] += events;
   recent_sum_ += events;
-  most_in_1_ = std::max(most_in_1_, events);
-  most_in_10_ = std::max(most_in_10_, recent_sum_);
+  max_in_1_ = std::max(max_in_1_, events);
+  max_in_10_ = std::max(max_in_10_, recent_sum_);
 
   const auto ms = static_cast<std::uint64_t>(ms_);
   while ((ms >> doublings_) >= kMaxBins) {

@@ -33,8 +33,8 @@ class RateCurve {
   TimeNs bin_width() const { return kNsPerMs << doublings_; }
 
   /// Maximum number of events in one window of 1 ms, and in ten consecutive windows.
-  std::uint64_t most_in_1_ms() const { return most_in_1_; }
-  std::uint64_t most_in_10_ms() const { return most_in_10_; }
+  std::uint64_t max_in_1_ms() const { return max_in_1_; }
+  std::uint64_t max_in_10_ms() const { return max_in_10_; }
 
  private:
   void start_window(std::int64_t ms);
@@ -43,7 +43,7 @@ class RateCurve {
   std::int64_t ms_ = 0;  // the open window
   Bin window_;
   std::array<std::uint64_t, 10> recent_{};  // of the last windows, by ms modulo 10
-  std::uint64_t recent_sum_ = 0, most_in_1_ = 0, most_in_10_ = 0;
+  std::uint64_t recent_sum_ = 0, max_in_1_ = 0, max_in_10_ = 0;
   std::vector<Bin> bins_;
   int doublings_ = 0;
 };

@@ -20,7 +20,7 @@ std::string three_digits(double value) {
   return fmt::format("{:.{}f}", value, magnitude >= 99.95 ? 0 : magnitude >= 9.995 ? 1 : 2);
 }
 
-std::string percent(double share) { return fmt::format("{:.3g} %", 100 * share); }
+std::string percent(double fraction) { return fmt::format("{:.3g} %", 100 * fraction); }
 
 double ratio(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
@@ -37,8 +37,8 @@ double mean_count(const Statistics& s) {
   return s.counts.empty() ? 0.0 : static_cast<double>(s.events()) / static_cast<double>(s.counts.size());
 }
 
-ReportSection stream_section(const Statistics& s) {
-  ReportSection section{"stream", {}};
+StatisticsSection stream_section(const Statistics& s) {
+  StatisticsSection section{"stream", {}};
   section.lines.push_back({"events", grouped(s.events())});
   section.lines.push_back(
       {"ON, OFF", fmt::format("{:.1f} %, {:.1f} %", 100 * ratio(s.on, s.events()), 100 * ratio(s.off, s.events()))});
@@ -46,13 +46,13 @@ ReportSection stream_section(const Statistics& s) {
   section.lines.push_back({"duration", format_duration(s.duration_s())});
   section.lines.push_back({"first, last", fmt::format("{:.6f} s, {:.6f} s", to_seconds(s.first), to_seconds(s.last))});
   section.lines.push_back({"mean rate", format_rate(s.mean_rate_hz())});
-  section.lines.push_back({"peak in 10 ms", format_rate(static_cast<double>(s.rate.most_in_10_ms()) / 10e-3)});
-  section.lines.push_back({"peak in 1 ms", format_rate(static_cast<double>(s.rate.most_in_1_ms()) / 1e-3)});
+  section.lines.push_back({"peak in 10 ms", format_rate(static_cast<double>(s.rate.max_in_10_ms()) / 10e-3)});
+  section.lines.push_back({"peak in 1 ms", format_rate(static_cast<double>(s.rate.max_in_1_ms()) / 1e-3)});
   return section;
 }
 
-ReportSection pixel_section(const Statistics& s) {
-  ReportSection section{"pixels", {}};
+StatisticsSection pixel_section(const Statistics& s) {
+  StatisticsSection section{"pixels", {}};
   section.lines.push_back({"sensor", fmt::format("{} x {} px", s.sensor.width, s.sensor.height)});
   section.lines.push_back({"counts", fmt::format("mean {}, median {:g}, max {} events", three_digits(mean_count(s)),
                                                  s.median_count, grouped(s.largest_count))});
@@ -67,7 +67,7 @@ ReportSection pixel_section(const Statistics& s) {
   return section;
 }
 
-ReportSection interval_section(const Statistics& s) {
+StatisticsSection interval_section(const Statistics& s) {
   const IntervalHistogram& intervals = s.intervals;
   const bool any = intervals.total() > 0;
   const auto quantile = [&](double fraction) -> std::string {
@@ -88,13 +88,13 @@ std::string period_text(const Statistics& s) {
   return fmt::format("{} ({:.6g} Hz), {}", format_duration(1 / f), f, s.periodicity ? "strongest found" : "given");
 }
 
-ReportSection stamp_section(const Statistics& s) {
-  ReportSection section{"time stamps", {}};
+StatisticsSection stamp_section(const Statistics& s) {
+  StatisticsSection section{"time stamps", {}};
   const auto line = [&](const char* label, const std::string& value) { section.lines.push_back({label, value}); };
   line("distinct",
        fmt::format("{} ({} of the events)", grouped(s.distinct_times), percent(ratio(s.distinct_times, s.events()))));
   line("simultaneous", fmt::format("{} of the events, at most {} at the same time",
-                                   percent(ratio(s.simultaneous, s.events())), grouped(s.most_simultaneous)));
+                                   percent(ratio(s.simultaneous, s.events())), grouped(s.max_simultaneous)));
   line("period", period_text(s));
   line("Rayleigh",
        s.periodicity ? fmt::format("z = {:.4g}, {}", s.periodicity->rayleigh, corrected_p_text(*s.periodicity)) : "-");
@@ -104,7 +104,7 @@ ReportSection stamp_section(const Statistics& s) {
                                           phase.neighbours_chi2_per_dof, p_text(phase.p_value))
                             : "-");
   line("modulation", tested ? percent(phase.modulation) + " rms" : "-");
-  line("within 1 % of peak", tested ? percent(phase.share_at_peak) + " of the events (uniform: 2 %)" : "-");
+  line("within 1 % of peak", tested ? percent(phase.fraction_at_peak) + " of the events (uniform: 2 %)" : "-");
   line("verdict", verdict(s));
   return section;
 }
@@ -129,8 +129,8 @@ const char* banding_word(Banding banding) {
 nlohmann::ordered_json stamps_json(const Statistics& s) {
   nlohmann::ordered_json stamps = {{"distinct", s.distinct_times},
                                    {"distinct_per_event", ratio(s.distinct_times, s.events())},
-                                   {"simultaneous_share", ratio(s.simultaneous, s.events())},
-                                   {"most_simultaneous", s.most_simultaneous},
+                                   {"simultaneous_fraction", ratio(s.simultaneous, s.events())},
+                                   {"max_simultaneous", s.max_simultaneous},
                                    {"period_given", !s.periodicity},
                                    {"rayleigh_z", nullptr},
                                    {"rayleigh_p", nullptr},
@@ -148,7 +148,7 @@ nlohmann::ordered_json stamps_json(const Statistics& s) {
     stamps["neighbours_chi2_per_dof"] = s.phase->neighbours_chi2_per_dof;
     stamps["p_value"] = s.phase->p_value;
     stamps["modulation_rms"] = s.phase->modulation;
-    stamps["share_within_1_percent_of_peak"] = s.phase->share_at_peak;
+    stamps["fraction_within_1_percent_of_peak"] = s.phase->fraction_at_peak;
     stamps["phase_histogram"] = s.phase->histogram;
   }
   return stamps;
@@ -189,21 +189,21 @@ std::string verdict(const Statistics& s) {
   return "too few events or periods to tell";
 }
 
-std::vector<ReportSection> report_sections(const Statistics& statistics) {
+std::vector<StatisticsSection> statistics_sections(const Statistics& statistics) {
   return {stream_section(statistics), pixel_section(statistics), interval_section(statistics),
           stamp_section(statistics)};
 }
 
 std::string describe(std::span<const NamedStatistics> files) {
-  std::vector<std::vector<ReportSection>> reports;
+  std::vector<std::vector<StatisticsSection>> reports;
   std::vector<std::string> names;
   std::vector<std::size_t> widths;
   for (const NamedStatistics& file : files) {
-    reports.push_back(report_sections(file.statistics));
+    reports.push_back(statistics_sections(file.statistics));
     names.push_back(file.name);
     widths.push_back(file.name.size());
-    for (const ReportSection& section : reports.back()) {
-      for (const ReportLine& line : section.lines) widths.back() = std::max(widths.back(), line.value.size());
+    for (const StatisticsSection& section : reports.back()) {
+      for (const StatisticsLine& line : section.lines) widths.back() = std::max(widths.back(), line.value.size());
     }
   }
   std::string text;
@@ -245,15 +245,15 @@ std::string to_json(const NamedStatistics& file) {
         {"last_s", to_seconds(s.last)},
         {"duration_s", s.duration_s()},
         {"mean_rate_hz", s.mean_rate_hz()},
-        {"peak_rate_10_ms_hz", static_cast<double>(s.rate.most_in_10_ms()) / 10e-3},
-        {"peak_rate_1_ms_hz", static_cast<double>(s.rate.most_in_1_ms()) / 1e-3}}},
+        {"peak_rate_10_ms_hz", static_cast<double>(s.rate.max_in_10_ms()) / 10e-3},
+        {"peak_rate_1_ms_hz", static_cast<double>(s.rate.max_in_1_ms()) / 1e-3}}},
       {"pixels",
        {{"width", s.sensor.width},
         {"height", s.sensor.height},
         {"mean_events", mean_count(s)},
         {"median_events", s.median_count},
         {"max_events", s.largest_count},
-        {"silent_share", ratio(s.silent_pixels, s.counts.size())},
+        {"silent_fraction", ratio(s.silent_pixels, s.counts.size())},
         {"hot", hot}}},
       {"intervals",
        {{"number", intervals.total()},

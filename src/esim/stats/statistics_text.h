@@ -15,18 +15,18 @@ struct NamedStatistics {
 };
 
 /// A line of text: label, and value with unit. A line without a label continues the previous one.
-struct ReportLine {
+struct StatisticsLine {
   std::string label, value;
 };
 
 /// A group of lines.
-struct ReportSection {
+struct StatisticsSection {
   std::string title;
-  std::vector<ReportLine> lines;
+  std::vector<StatisticsLine> lines;
 };
 
 /// The statistics as text: always the same sections with the same lines.
-std::vector<ReportSection> report_sections(const Statistics& statistics);
+std::vector<StatisticsSection> statistics_sections(const Statistics& statistics);
 
 /// The same as aligned plain text, with one column per file.
 std::string describe(std::span<const NamedStatistics> files);

@@ -3,10 +3,10 @@
 namespace esim::inline stats {
 
 void TimeSample::thin() {
-  ++least_zeros_;
+  ++min_zeros_;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < times_.size(); ++i) {
-    if (zeros_[i] < least_zeros_) continue;
+    if (zeros_[i] < min_zeros_) continue;
     times_[kept] = times_[i];
     zeros_[kept++] = zeros_[i];
   }

@@ -25,9 +25,9 @@ class TimeSample {
 
   void add(TimeNs t) {
     const int zeros = trailing_zeros(index_++);
-    if (zeros < least_zeros_) return;
+    if (zeros < min_zeros_) return;
     if (times_.size() == kCapacity) thin();
-    if (zeros < least_zeros_) return;
+    if (zeros < min_zeros_) return;
     times_.push_back(t);
     zeros_.push_back(static_cast<std::uint8_t>(zeros));
   }
@@ -39,7 +39,7 @@ class TimeSample {
   void thin();
 
   std::uint64_t index_ = 0;
-  int least_zeros_ = 0;
+  int min_zeros_ = 0;
   std::vector<TimeNs> times_;
   std::vector<std::uint8_t> zeros_;  // trailing zeros of each hash
 };

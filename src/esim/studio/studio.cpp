@@ -33,7 +33,7 @@ std::vector<fs::path> roots_of(const StudioOptions& options) {
 }
 
 std::string token_of(const StudioOptions& options) {
-  constexpr std::size_t kLeast = 16;
+  constexpr std::size_t kMin = 16;
   if (options.token.empty()) {
     if (is_loopback(options.host)) return random_token();
     throw UserError(
@@ -41,8 +41,8 @@ std::string token_of(const StudioOptions& options) {
   }
   const bool plain = options.token.find_first_not_of(
                          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == std::string::npos;
-  if (!plain || options.token.size() < kLeast)
-    throw UserError(fmt::format("--token: must have at least {} characters: letters, digits, _ and -", kLeast));
+  if (!plain || options.token.size() < kMin)
+    throw UserError(fmt::format("--token: must have at least {} characters: letters, digits, _ and -", kMin));
   return options.token;
 }
 

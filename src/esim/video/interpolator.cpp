@@ -90,9 +90,9 @@ V blend(D d, const View& frame0, const View& frame1, int x, int y, float s, V ux
   const Shares shares(s);
   const V column = hn::Add(hn::Set(d, static_cast<float>(x)), hn::Iota(d, 0)), row = hn::Set(d, static_cast<float>(y));
   const auto moved = [&](const View& frame, float u, float v) {
-    const V u_share = hn::Set(d, u), v_share = hn::Set(d, v);
-    return sample(d, frame, hn::MulAdd(u_share, ux, hn::MulAdd(v_share, vx, column)),
-                  hn::MulAdd(u_share, uy, hn::MulAdd(v_share, vy, row)));
+    const V u_fraction = hn::Set(d, u), v_fraction = hn::Set(d, v);
+    return sample(d, frame, hn::MulAdd(u_fraction, ux, hn::MulAdd(v_fraction, vx, column)),
+                  hn::MulAdd(u_fraction, uy, hn::MulAdd(v_fraction, vy, row)));
   };
   const V moved0 = moved(frame0, shares.u0, shares.v0), moved1 = moved(frame1, shares.u1, shares.v1);
   const V change = hn::Sub(moved1, moved0);
@@ -152,18 +152,18 @@ void Interpolator::measure_motion(const Planes& frame, const Workers& workers) {
   optical_flow_->estimate(luminance_before_, luminance_after_, workers, forward_, backward_);
 
   // The speed along the parabola changes linearly: its maximum is at one of the ends.
-  std::vector<float> greatest(static_cast<std::size_t>(height), 0.0F);  // squared, per row
+  std::vector<float> row_max(static_cast<std::size_t>(height), 0.0F);  // squared, per row
   for_rows(height, workers, [&](int y) {
     for (int x = 0; x < width; ++x) {
       const float ux = forward_.x(x, y), uy = forward_.y(x, y), vx = backward_.x(x, y), vy = backward_.y(x, y);
       const float x0 = 0.5F * ux + 1.5F * vx, x1 = 1.5F * ux + 0.5F * vx;
       const float y0 = 0.5F * uy + 1.5F * vy, y1 = 1.5F * uy + 0.5F * vy;
-      float& most = greatest[static_cast<std::size_t>(y)];
-      most = std::max({most, x0 * x0 + y0 * y0, x1 * x1 + y1 * y1});
+      float& largest = row_max[static_cast<std::size_t>(y)];
+      largest = std::max({largest, x0 * x0 + y0 * y0, x1 * x1 + y1 * y1});
     }
   });
-  displacement_ = std::sqrt(static_cast<double>(*std::max_element(greatest.begin(), greatest.end())));
-  const double steps = std::max(1.0, std::ceil(displacement_ / options_.lambda));
+  max_flow_px_ = std::sqrt(static_cast<double>(*std::max_element(row_max.begin(), row_max.end())));
+  const double steps = std::max(1.0, std::ceil(max_flow_px_ / options_.lambda));
   held_ = steps > options_.max_steps;
   steps_ = held_ ? options_.max_steps : static_cast<int>(steps);
 }

@@ -40,7 +40,7 @@ class Interpolator {
   int steps() const { return steps_; }
 
   /// Maximum speed of any pixel, px per frame.
-  double displacement() const { return displacement_; }
+  double max_flow_px() const { return max_flow_px_; }
 
   /// Whether max_steps limits steps().
   bool is_held() const { return held_; }
@@ -66,7 +66,7 @@ class Interpolator {
   FlowField forward_, backward_;
   std::unique_ptr<OpticalFlow> optical_flow_;
   int steps_ = 1;
-  double displacement_ = 0;
+  double max_flow_px_ = 0;
   bool held_ = false;
 };
 

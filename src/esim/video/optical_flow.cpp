@@ -11,7 +11,7 @@
 namespace esim::inline video {
 namespace {
 
-constexpr int kLeastSide = 16;        // px; smaller images have no search pyramid
+constexpr int kMinSide = 16;          // px; smaller images have no search pyramid
 constexpr float kNoise = 0.1F;        // px; slower motion counts as 0
 constexpr std::size_t kLooks = 4096;  // pixels that determine the scale
 constexpr int kRowsPerPiece = 16;
@@ -104,7 +104,7 @@ void OpticalFlow::estimate(const Image<float>& before, const Image<float>& after
   for (Image<float>* field : {&forward.x, &forward.y, &backward.x, &backward.y}) {
     if (field->width() != width || field->height() != height) *field = Image<float>(width, height);
   }
-  if (std::min(width, height) >= kLeastSide) {
+  if (std::min(width, height) >= kMinSide) {
     const float white = std::max(white_level(before), white_level(after));
     workers.for_each(2, [&](int i) { impl.encode(i == 0 ? before : after, white, impl.images[i]); });
     cv::setNumThreads(1);  // the result of the search depends on the number of threads

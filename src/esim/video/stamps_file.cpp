@@ -12,7 +12,7 @@
 namespace esim::inline video {
 namespace {
 
-constexpr double kMostSeconds = 9e9;
+constexpr double kMaxSeconds = 9e9;
 
 using Words = std::vector<std::string>;
 
@@ -70,7 +70,7 @@ std::vector<StampedName> read_lines(const std::filesystem::path& path, const Par
 std::optional<TimeNs> parse_seconds(const std::string& text) {
   double approximate = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), approximate);
-  if (error != std::errc() || end != text.data() + text.size() || !(std::fabs(approximate) < kMostSeconds)) {
+  if (error != std::errc() || end != text.data() + text.size() || !(std::fabs(approximate) < kMaxSeconds)) {
     return std::nullopt;
   }
   if (text.find_first_of("eE") != std::string::npos) return to_ns(approximate);

@@ -75,13 +75,13 @@ class Stamps {
   std::vector<Stamp> all_;
 };
 
-constexpr float kMostRadius = 32;  // px
+constexpr float kMaxRadius = 32;  // px
 
 /// The stamps of a radius, in steps of 1/8 px, created on first use.
 const Stamps& stamps_of(float radius) {
   constexpr float kSteps = 8;
-  thread_local std::array<std::unique_ptr<Stamps>, static_cast<std::size_t>(kSteps * kMostRadius) + 1> all;
-  const auto index = static_cast<std::size_t>(std::clamp(radius, 1 / kSteps, kMostRadius) * kSteps + 0.5f);
+  thread_local std::array<std::unique_ptr<Stamps>, static_cast<std::size_t>(kSteps * kMaxRadius) + 1> all;
+  const auto index = static_cast<std::size_t>(std::clamp(radius, 1 / kSteps, kMaxRadius) * kSteps + 0.5f);
   if (all[index] == nullptr) all[index] = std::make_unique<Stamps>(static_cast<float>(index) / kSteps);
   return *all[index];
 }
@@ -98,8 +98,8 @@ class Padded {
   }
 
   void draw(const Dot& dot) {
-    const bool reaches = dot.x > -kMostReach && dot.x < static_cast<float>(width_) + kMostReach &&
-                         dot.y > -kMostReach && dot.y < static_cast<float>(height_) + kMostReach;
+    const bool reaches = dot.x > -kMaxReach && dot.x < static_cast<float>(width_) + kMaxReach && dot.y > -kMaxReach &&
+                         dot.y < static_cast<float>(height_) + kMaxReach;
     if (!reaches) return;
     const int x = static_cast<int>(std::floor(dot.x * Stamps::kSteps + 0.5f));
     const int y = static_cast<int>(std::floor(dot.y * Stamps::kSteps + 0.5f));
@@ -125,8 +125,8 @@ class Padded {
   }
 
  private:
-  static constexpr float kMostReach = kMostRadius + 1;
-  static constexpr int kPad = 2 * static_cast<int>(kMostReach) + kTogether;
+  static constexpr float kMaxReach = kMaxRadius + 1;
+  static constexpr int kPad = 2 * static_cast<int>(kMaxReach) + kTogether;
 
   static std::uint32_t wide(Rgb colour) {
     return std::uint32_t{colour.r} | std::uint32_t{colour.g} << 8 | std::uint32_t{colour.b} << 16;

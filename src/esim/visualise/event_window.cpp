@@ -8,9 +8,9 @@ void EventWindow::add(EventSpan events) {
   for (const Event& event : events) {
     const std::uint64_t number = seen_++;
     if (number % stride_ != 0) continue;
-    if (events_.size() - head_ >= most_) make_room();
+    if (events_.size() - head_ >= max_) make_room();
     if (number % stride_ != 0) continue;
-    if (head_ > most_) {
+    if (head_ > max_) {
       events_.erase(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(head_));
       if (thin_) numbers_.erase(numbers_.begin(), numbers_.begin() + static_cast<std::ptrdiff_t>(head_));
       head_ = 0;

@@ -10,9 +10,9 @@ namespace esim::inline visualise {
 /// The latest events of a stream, in order, in bounded memory.
 class EventWindow {
  public:
-  /// Holds at most `most` events. With `thin`, further events reduce the window to every 2nd, 4th, 8th ... event of the
+  /// Holds at most `max` events. With `thin`, further events reduce the window to every 2nd, 4th, 8th ... event of the
   /// stream; otherwise they replace the oldest ones.
-  explicit EventWindow(std::size_t most, bool thin = false) : most_(most), thin_(thin) {}
+  explicit EventWindow(std::size_t max, bool thin = false) : max_(max), thin_(thin) {}
 
   void add(EventSpan events);
 
@@ -27,7 +27,7 @@ class EventWindow {
  private:
   void make_room();
 
-  std::size_t most_;
+  std::size_t max_;
   bool thin_;
   std::vector<Event> events_;
   std::vector<std::uint64_t> numbers_;  // index of each event in the stream; only with thin_

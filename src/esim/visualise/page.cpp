@@ -6,27 +6,30 @@
 #include <array>
 #include <cmath>
 
+#include "esim/plot/canvas.h"
+#include "esim/preview/colours.h"
+#include "esim/preview/pictures.h"
+
 namespace esim::inline visualise {
 namespace {
 
 constexpr int kMargin = 20, kGap = 18, kHeader = 42, kTitle = 28, kLegend = 30;
-constexpr int kTextHeight = 12, kSmallTextHeight = 10;
-constexpr int kMostPanelHeight = 960, kLeastPanelExtent = 64;
+constexpr int kMaxPanelHeight = 960, kMinPanelExtent = 64;
 
 int draw_polarity(Canvas& canvas, int x, int baseline, Rgb colour, const char* name, const Theme& theme) {
   canvas.disc({x + 5.0, baseline - 5.0}, 5, colour);
-  return 16 + canvas.text(x + 16, baseline, name, kSmallTextHeight, theme.faint_ink) + 18;
+  return 16 + canvas.text(x + 16, baseline, name, kTextHeight, theme.faint_ink) + 18;
 }
 
 // A colour bar between two labels.
 void draw_depth_legend(Canvas& canvas, int x, int baseline, const Panel& panel, const Theme& theme) {
   constexpr int kBar = 140;
-  x += canvas.text(x, baseline, fmt::format("{:.3g} m", panel.near_m), kSmallTextHeight, theme.faint_ink) + 10;
+  x += canvas.text(x, baseline, fmt::format("{:.3g} m", panel.near_m), kTextHeight, theme.faint_ink) + 10;
   for (int i = 0; i < kBar; ++i) {
     const float depth = panel.near_m * std::pow(panel.far_m / panel.near_m, (static_cast<float>(i) + 0.5f) / kBar);
     canvas.fill({x + i, baseline - 10, 1, 10}, colour_depth(depth, panel.near_m, panel.far_m));
   }
-  canvas.text(x + kBar + 10, baseline, fmt::format("{:.3g} m", panel.far_m), kSmallTextHeight, theme.faint_ink);
+  canvas.text(x + kBar + 10, baseline, fmt::format("{:.3g} m", panel.far_m), kTextHeight, theme.faint_ink);
 }
 
 void draw_motion_legend(Canvas& canvas, int x, int baseline, const Panel& panel, const Theme& theme) {
@@ -36,19 +39,19 @@ void draw_motion_legend(Canvas& canvas, int x, int baseline, const Panel& panel,
     for (int column = 0; column < kExtent; ++column) {
       const auto u = static_cast<float>(column - kRadius - 1), v = static_cast<float>(row - kRadius - 1);
       const float radius = std::max(std::hypot(u, v), 1e-3f), inside = std::min(1.0f, kRadius / radius);
-      wheel(column, row) = mix(theme.page, colour_flow(u * inside, v * inside, kRadius),
+      wheel(column, row) = mix(theme.page, colour_motion(u * inside, v * inside, kRadius),
                                std::clamp(kRadius + 0.5f - radius, 0.0f, 1.0f));
     }
   }
   canvas.draw(wheel, x, baseline - kRadius - 6);
-  canvas.text(x + kExtent + 8, baseline, fmt::format("rim: {:.3g} px/s", panel.full_flow_px_per_s), kSmallTextHeight,
+  canvas.text(x + kExtent + 8, baseline, fmt::format("rim: {:.3g} px/s", panel.full_speed_px_per_s), kTextHeight,
               theme.faint_ink);
 }
 
 void draw_panel(Canvas& canvas, const Tile& place, View view, const Panel& panel, const Theme& theme) {
-  const int used = canvas.text(place.x, place.y - 10, title_of(view), kTextHeight, theme.ink);
-  if (used + Canvas::text_width(panel.note, kSmallTextHeight) + kGap < place.width)
-    canvas.text(place.x + place.width, place.y - 10, panel.note, kSmallTextHeight, theme.faint_ink, Align::right);
+  const int used = canvas.text(place.x, place.y - 10, title_of(view), kTitleHeight, theme.ink);
+  if (used + Canvas::text_width(panel.note, kTextHeight) + kGap < place.width)
+    canvas.text(place.x + place.width, place.y - 10, panel.note, kTextHeight, theme.faint_ink, Align::right);
   if (panel.picture.empty()) {
     canvas.fill(place, theme.ground);
   } else {
@@ -61,7 +64,7 @@ void draw_panel(Canvas& canvas, const Tile& place, View view, const Panel& panel
     draw_polarity(canvas, place.x + width, baseline, kOffColour, "OFF", theme);
   }
   if (panel.near_m > 0) draw_depth_legend(canvas, place.x, baseline, panel, theme);
-  if (panel.full_flow_px_per_s > 0) draw_motion_legend(canvas, place.x, baseline, panel, theme);
+  if (panel.full_speed_px_per_s > 0) draw_motion_legend(canvas, place.x, baseline, panel, theme);
 }
 
 }  // namespace
@@ -88,8 +91,8 @@ PageLayout::PageLayout(const std::vector<View>& shown, SensorSize sensor, int wa
   constexpr std::array<int, 3> kWidths = {960, 1440, 1920};
   const int full = wanted_width > 0 ? wanted_width : kWidths[static_cast<std::size_t>(columns - 1)];
   const double across = static_cast<double>(full - 2 * kMargin - (columns - 1) * kGap) / columns;
-  panel_width = std::max(kLeastPanelExtent, static_cast<int>(std::min(across, kMostPanelHeight * aspect / rows)));
-  panel_height = std::max(kLeastPanelExtent, static_cast<int>(std::lround(panel_width / aspect)));
+  panel_width = std::max(kMinPanelExtent, static_cast<int>(std::min(across, kMaxPanelHeight * aspect / rows)));
+  panel_height = std::max(kMinPanelExtent, static_cast<int>(std::lround(panel_width / aspect)));
   width = 2 * kMargin + columns * panel_width + (columns - 1) * kGap;
   height = kHeader + rows * (kTitle + panel_height + kLegend) + kMargin / 2;
   width += width % 2;
@@ -105,9 +108,9 @@ Tile PageLayout::panel(std::size_t index) const {
 Image<Rgb> draw_page(const PageLayout& layout, const std::vector<Panel>& panels, const std::string& left,
                      const std::string& right, const Theme& theme) {
   Canvas canvas(layout.width, layout.height, theme.page);
-  const int used = canvas.text(kMargin, 28, left, kTextHeight + 1, theme.ink);
-  if (used + Canvas::text_width(right, kSmallTextHeight) + 3 * kMargin < layout.width) {
-    canvas.text(layout.width - kMargin, 28, right, kSmallTextHeight, theme.faint_ink, Align::right);
+  const int used = canvas.text(kMargin, 28, left, kHeadlineHeight - 1, theme.ink);
+  if (used + Canvas::text_width(right, kTextHeight) + 3 * kMargin < layout.width) {
+    canvas.text(layout.width - kMargin, 28, right, kTextHeight, theme.faint_ink, Align::right);
   }
   canvas.fill({kMargin, kHeader - 2, layout.width - 2 * kMargin, 1}, theme.grid);
   for (std::size_t i = 0; i < panels.size(); ++i) {
@@ -124,7 +127,7 @@ Image<Rgb> draw_contact_sheet(const std::vector<CaptionedPicture>& pictures, int
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     const int x = kMargin + static_cast<int>(i) % columns * (width + kGap);
     const int y = kTitle + static_cast<int>(i) / columns * (kTitle + height);
-    canvas.text(x, y - 9, pictures[i].caption, kSmallTextHeight, theme.faint_ink);
+    canvas.text(x, y - 9, pictures[i].caption, kTextHeight, theme.faint_ink);
     canvas.draw(pictures[i].picture, x, y);
     canvas.outline({x - 1, y - 1, width + 2, height + 2}, theme.grid);
   }

@@ -4,9 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "esim/preview/canvas.h"
+#include "esim/plot/theme.h"
 #include "esim/recording/format.h"
-#include "esim/visualise/theme.h"
 
 namespace esim::inline visualise {
 
@@ -41,7 +40,7 @@ struct Panel {
   // Legends below the panel: for polarities, for depth (if near_m > 0), for motion (if its full scale is > 0).
   bool polarities = false;
   float near_m = 0, far_m = 0;
-  float full_flow_px_per_s = 0;
+  float full_speed_px_per_s = 0;
 };
 
 /// Draws the panels in the layout's order, below a headline on the left and one on the right.

@@ -11,7 +11,7 @@
 
 namespace esim::inline visualise {
 
-/// A recording or event file that can be opened repeatedly: to survey it, and to show it. For a folder that has no
+/// A recording or event file that can be opened repeatedly: for its overview, and to show it. For a folder that has no
 /// known format, the event file in it.
 class Playable {
  public:

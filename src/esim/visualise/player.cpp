@@ -12,6 +12,7 @@
 #include "esim/core/parallel.h"
 #include "esim/core/remedy.h"
 #include "esim/files/number_text.h"
+#include "esim/preview/pictures.h"
 #include "esim/visualise/event_pictures.h"
 #include "esim/visualise/event_window.h"
 #include "esim/visualise/space_time.h"
@@ -19,13 +20,13 @@
 namespace esim::inline visualise {
 namespace {
 
-constexpr double kMostFrames = 1e6;
-constexpr double kLeastVideo_s = 3.9;
-constexpr double kLeastWindow_s = 1e-3, kMostWindow_s = 50e-3, kEventsPerPixel = 1.0 / 12;
+constexpr double kMaxFrames = 1e6;
+constexpr double kMinVideo_s = 3.9;
+constexpr double kMinWindow_s = 1e-3, kMaxWindow_s = 50e-3, kEventsPerPixel = 1.0 / 12;
 constexpr double kWindowsPerTau = 1.5, kWindowsPerSpan = 20;
-constexpr std::size_t kMostEventsCounted = std::size_t{1} << 23;
-constexpr std::size_t kMostPoints = 160'000;
-constexpr std::size_t kMostEventsWaiting = std::size_t{1} << 22, kMostPicturesWaiting = 64;
+constexpr std::size_t kMaxEventsCounted = std::size_t{1} << 23;
+constexpr std::size_t kMaxPoints = 160'000;
+constexpr std::size_t kMaxEventsWaiting = std::size_t{1} << 22, kMaxPicturesWaiting = 64;
 
 // Rounds up to 1, 2 or 5 times a power of ten, within rounding errors.
 double round_up(double value) {
@@ -48,7 +49,7 @@ class PictureQueue {
  public:
   void add(TimeNs t, Image<Rgb> pixels) {
     waiting_.push_back({t, std::move(pixels)});
-    if (waiting_.size() > kMostPicturesWaiting) advance();
+    if (waiting_.size() > kMaxPicturesWaiting) advance();
   }
   const Image<Rgb>& at(TimeNs t) {
     while (!waiting_.empty() && waiting_.front().t <= t) advance();
@@ -94,63 +95,64 @@ Image<Rgb> grey(const FrameRecord& frame, const PictureGrid& grid) {
 }
 
 // Frames of a camera are preferred to images of a video, and these to ground truth.
-std::optional<Content> image_content(const Survey& survey) {
+std::optional<Content> image_content(const RecordingOverview& overview) {
   for (const Content content : {Content::frames, Content::images, Content::truth}) {
-    if (survey.last.contains(content)) return content;
+    if (overview.last.contains(content)) return content;
   }
   return std::nullopt;
 }
 
 }  // namespace
 
-PlayOptions choose_missing(PlayOptions options, const Survey& survey) {
-  if (survey.events == 0) {
+PlayOptions choose_missing(PlayOptions options, const RecordingOverview& overview) {
+  if (overview.events == 0) {
     throw UserError(fmt::format("{}: there are no events between {} and {} s", options.name,
-                                to_seconds(survey.start - survey.origin), to_seconds(survey.end - survey.origin)));
+                                to_seconds(overview.start - overview.origin),
+                                to_seconds(overview.end - overview.origin)));
   }
-  const std::vector<View> all = views_of(survey);
+  const std::vector<View> all = views_of(overview);
   if (options.views.empty()) options.views = all;
   for (const View view : options.views) {
     if (std::find(all.begin(), all.end(), view) == all.end())
       throw UserError(fmt::format("{} has nothing to show as {}", options.name, name_of(view)));
   }
-  const double duration_s = to_seconds(survey.end - survey.start);
+  const double duration_s = to_seconds(overview.end - overview.start);
   if (options.slow_motion <= 0) {
-    options.slow_motion = duration_s > 0 ? round_up(std::max(1.0, std::min(kLeastVideo_s / duration_s, 1e6))) : 1;
+    options.slow_motion = duration_s > 0 ? round_up(std::max(1.0, std::min(kMinVideo_s / duration_s, 1e6))) : 1;
   }
   if (options.window_s <= 0) {
-    const double pixels = static_cast<double>(survey.sensor.width) * survey.sensor.height;
-    const double rate_hz = static_cast<double>(survey.events) / std::max(duration_s, 1e-9);
-    options.window_s = round_up(std::clamp(kEventsPerPixel * pixels / rate_hz, kLeastWindow_s, kMostWindow_s));
+    const double pixels = static_cast<double>(overview.sensor.width) * overview.sensor.height;
+    const double rate_hz = static_cast<double>(overview.events) / std::max(duration_s, 1e-9);
+    options.window_s = round_up(std::clamp(kEventsPerPixel * pixels / rate_hz, kMinWindow_s, kMaxWindow_s));
   }
   if (options.tau_s <= 0) options.tau_s = kWindowsPerTau * options.window_s;
   if (options.span_s <= 0) options.span_s = kWindowsPerSpan * options.window_s;
   return options;
 }
 
-Instants video_instants(const Survey& survey, const PlayOptions& options) {
+Instants video_instants(const RecordingOverview& overview, const PlayOptions& options) {
   const double step_ns = 1e9 / (options.frames_per_s * options.slow_motion);
-  const double steps = static_cast<double>(survey.end - survey.start) / step_ns;
-  if (!(steps < kMostFrames)) {
+  const double steps = static_cast<double>(overview.end - overview.start) / step_ns;
+  if (!(steps < kMaxFrames)) {
     throw RemediableError(fmt::format("{} lasts {:.4g} s, too long for a video; choose a part of it, or show it faster",
-                                      options.name, to_seconds(survey.end - survey.start)),
+                                      options.name, to_seconds(overview.end - overview.start)),
                           Remedy::shorter_video);
   }
-  return {survey.start, step_ns, static_cast<std::size_t>(std::ceil(steps - 1e-6)) + 1};
+  return {overview.start, step_ns, static_cast<std::size_t>(std::ceil(steps - 1e-6)) + 1};
 }
 
 struct Player::Impl {
-  Impl(Source& from, int which, const Survey& about, const PlayOptions& how, const Instants& when)
+  Impl(Source& from, int which, const RecordingOverview& about, const PlayOptions& how, const Instants& when)
       : source(from),
         camera(which),
-        survey(about),
+        overview(about),
         options(how),
         instants(when),
         layout(how.views, about.sensor, how.width),
         grid(picture_grid(about.sensor, layout.panel_width, layout.panel_height)),
         image_from(image_content(about)),
-        window(how.window_events > 0 ? how.window_events : kMostEventsCounted),
-        cloud(kMostPoints, true),
+        window(how.window_events > 0 ? how.window_events : kMaxEventsCounted),
+        cloud(kMaxPoints, true),
         surface(grid) {}
 
   bool shows(View view) const {
@@ -170,7 +172,7 @@ struct Player::Impl {
 
   Source& source;
   int camera;
-  Survey survey;
+  RecordingOverview overview;
   PlayOptions options;
   Instants instants;
   PageLayout layout;
@@ -190,8 +192,8 @@ struct Player::Impl {
 // Time until which all records are known; kinds of records that have ended do not count.
 TimeNs Player::Impl::known_until() const {
   TimeNs until = std::numeric_limits<TimeNs>::max();
-  if (ended || waiting.size() > kMostEventsWaiting) return until;
-  for (const auto& [content, last] : survey.last) {
+  if (ended || waiting.size() > kMaxEventsWaiting) return until;
+  for (const auto& [content, last] : overview.last) {
     const auto now = seen.find(content);
     if (now == seen.end()) return std::numeric_limits<TimeNs>::min();
     // Further records with the same time may follow.
@@ -231,10 +233,10 @@ void Player::Impl::add(const TruthRecord& truth) {
     add_image(truth.t, esim::grey(reduced(truth.irradiance, grid)));
   }
   if (shows(View::depth))
-    depths.add(truth.t, colour_depth(picked(truth.depth, grid), survey.depth.near_m(), survey.depth.far_m()));
+    depths.add(truth.t, colour_depth(picked(truth.depth, grid), overview.depth.near_m(), overview.depth.far_m()));
   if (shows(View::motion)) {
-    motions.add(truth.t,
-                colour_flow(picked(truth.flow_x, grid), picked(truth.flow_y, grid), survey.motion.full_px_per_s()));
+    motions.add(truth.t, colour_motion(picked(truth.motion_x, grid), picked(truth.motion_y, grid),
+                                       overview.motion.full_px_per_s()));
   }
 }
 
@@ -275,7 +277,7 @@ Panel Player::Impl::draw_events(TimeNs t) {
 
 Panel Player::Impl::draw_cloud(TimeNs t) {
   cloud.forget_until(t - to_ns(options.span_s));
-  const SpaceTimeBox box{survey.sensor, t - std::max<TimeNs>(1, to_ns(options.span_s)), t, survey.origin};
+  const SpaceTimeBox box{overview.sensor, t - std::max<TimeNs>(1, to_ns(options.span_s)), t, overview.origin};
   const double share = instants.count > 1 ? static_cast<double>(shown) / static_cast<double>(instants.count) : 0.25;
   std::string note = milliseconds(options.span_s);
   if (cloud.stride() > 1) note += fmt::format(", 1 of {} events", cloud.stride());
@@ -299,9 +301,9 @@ Panel Player::Impl::draw(View view, TimeNs t) {
     case View::image:
       return {.picture = large(images)};
     case View::depth:
-      return {.picture = large(depths), .near_m = survey.depth.near_m(), .far_m = survey.depth.far_m()};
+      return {.picture = large(depths), .near_m = overview.depth.near_m(), .far_m = overview.depth.far_m()};
     case View::motion:
-      return {.picture = large(motions), .full_flow_px_per_s = survey.motion.full_px_per_s()};
+      return {.picture = large(motions), .full_speed_px_per_s = overview.motion.full_px_per_s()};
   }
   return {};
 }
@@ -316,8 +318,9 @@ std::vector<Panel> Player::Impl::draw_all(TimeNs t) {
   return panels;
 }
 
-Player::Player(Source& source, int camera, const Survey& survey, const PlayOptions& options, const Instants& instants)
-    : impl_(std::make_unique<Impl>(source, camera, survey, options, instants)) {}
+Player::Player(Source& source, int camera, const RecordingOverview& overview, const PlayOptions& options,
+               const Instants& instants)
+    : impl_(std::make_unique<Impl>(source, camera, overview, options, instants)) {}
 
 Player::~Player() = default;
 
@@ -337,11 +340,11 @@ std::optional<Image<Rgb>> Player::next() {
   const TimeNs t = impl_->advance();
   std::vector<Panel> panels = impl_->draw_all(t);
   ++impl_->shown;
-  const SensorSize sensor = impl_->survey.sensor;
+  const SensorSize sensor = impl_->overview.sensor;
   std::string about = fmt::format("{}   {} x {} px", impl_->options.name, sensor.width, sensor.height);
   if (impl_->options.slow_motion != 1 && impl_->instants.count > 1)
     about += fmt::format("   1/{:g} of real time", impl_->options.slow_motion);
-  return draw_page(impl_->layout, panels, fmt::format("t = {:.4f} s", to_seconds(t - impl_->survey.origin)), about,
+  return draw_page(impl_->layout, panels, fmt::format("t = {:.4f} s", to_seconds(t - impl_->overview.origin)), about,
                    impl_->options.theme);
 }
 

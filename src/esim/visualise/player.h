@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "esim/visualise/survey.h"
-#include "esim/visualise/theme.h"
+#include "esim/plot/theme.h"
+#include "esim/visualise/recording_overview.h"
 
 namespace esim::inline visualise {
 
@@ -27,7 +27,7 @@ struct PlayOptions {
 /// The same with every value set: all available views; slow motion of 1, 2 or 5 times a power of ten such that the
 /// video lasts at least about 4 s; a window of 1 to 50 ms with, on average, one event per twelve pixels; tau of 1.5
 /// windows; a span of 20 windows. Throws UserError if there are no events, and for views without records.
-PlayOptions choose_missing(PlayOptions options, const Survey& survey);
+PlayOptions choose_missing(PlayOptions options, const RecordingOverview& overview);
 
 /// The instants to show.
 struct Instants {
@@ -39,14 +39,15 @@ struct Instants {
 };
 
 /// The instants of a video. Throws UserError if there are more than a million.
-Instants video_instants(const Survey& survey, const PlayOptions& options);
+Instants video_instants(const RecordingOverview& overview, const PlayOptions& options);
 
 /// Shows one camera of a recording, instant by instant: the events up to the instant and the images that are due.
 /// Memory is bounded for any length and rates of the recording.
 class Player {
  public:
   /// `source` must be at its first record; `options` must come from choose_missing().
-  Player(Source& source, int camera, const Survey& survey, const PlayOptions& options, const Instants& instants);
+  Player(Source& source, int camera, const RecordingOverview& overview, const PlayOptions& options,
+         const Instants& instants);
   ~Player();
 
   /// The page of the next instant; nothing after the last one. Passes on exceptions of the source.

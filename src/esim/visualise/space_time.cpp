@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "esim/stats/axes.h"
+#include "esim/plot/scale.h"
 #include "esim/visualise/dots.h"
 
 namespace esim::inline visualise {
@@ -18,7 +18,6 @@ constexpr double kTimeLength = 1.5;    // of the box; all lengths are in units o
 constexpr double kViewerDistance = 5;  // from the middle of the box
 constexpr double kMiddleYaw_deg = -40, kSwing_deg = 18, kPitch_deg = 19;
 constexpr double kLabelSpace = 50;  // px around the box
-constexpr int kTextHeight = 10;
 constexpr float kNewOpacity = 0.95f, kOldOpacity = 0.45f;
 constexpr float kFade = 0.45f;   // of the most distant points towards the background
 constexpr double kRecent = 0.1;  // fraction of the time in which points lose most of their opacity
@@ -76,9 +75,9 @@ class Plot {
         theme_(theme),
         projection_(box, view, {0, 0, width, height}),
         canvas_(width, height, theme.ground),
-        axes_{{{linear_scale(0, box.sensor.width, "x, px"), -0.5, box.sensor.width - 0.5},
-               {linear_scale(0, box.sensor.height, "y, px"), -0.5, box.sensor.height - 0.5},
-               {time_scale(box), double(box.start), double(box.end)}}} {
+        axes_{{{"x (px)", linear_ticks(0, box.sensor.width).major, -0.5, box.sensor.width - 0.5},
+               {"y (px)", linear_ticks(0, box.sensor.height).major, -0.5, box.sensor.height - 0.5},
+               {"t (s)", time_ticks(box), double(box.start), double(box.end)}}} {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       // Of two opposite sides, the one whose middle is farther away is behind the content.
       std::array<double, 3> low = middle(), high = middle();
@@ -91,32 +90,26 @@ class Plot {
   }
 
   void draw_back() {
+    std::vector<Stroke> grid, edges, far_edges;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (const Tick& tick : axes_[axis].scale.ticks) {
-        const double at = value_of(axis, tick);
-        if (at < axes_[axis].low || at > axes_[axis].high) continue;
-        // On the two back sides that are parallel to this axis.
-        for (const std::size_t other : {(axis + 1) % 3, (axis + 2) % 3}) {
-          std::array<double, 3> from = back_, to = back_;
-          from[axis] = to[axis] = at;
-          from[other] = axes_[other].low;
-          to[other] = axes_[other].high;
-          line(from, to, theme_.grid);
-        }
-      }
-    }
-    for (std::size_t axis = 0; axis < 3; ++axis) {
+      // On the two back sides that are parallel to this axis.
       for (const std::size_t other : {(axis + 1) % 3, (axis + 2) % 3}) {
-        std::array<double, 3> from = back_, to = back_;
-        from[other] = to[other] = front_[other];
-        from[axis] = axes_[axis].low;
-        to[axis] = axes_[axis].high;
-        line(from, to, mix(theme_.grid, theme_.faint_ink, 0.6f));
+        for (const Tick& tick : axes_[axis].ticks) {
+          const double at = value_of(axis, tick);
+          if (!is_within(axis, at)) continue;
+          std::array<double, 3> from = back_;
+          from[axis] = at;
+          grid.push_back(along(other, from));
+        }
+        std::array<double, 3> from = back_;
+        from[other] = front_[other];
+        edges.push_back(along(axis, from));
       }
-      std::array<double, 3> from = back_, to = back_;
-      to[axis] = front_[axis];
-      line(from, to, mix(theme_.grid, theme_.faint_ink, 0.3f));
+      far_edges.push_back(along(axis, back_));
     }
+    canvas_.strokes(grid, 1, theme_.grid);
+    canvas_.strokes(edges, 1, mix(theme_.grid, theme_.faint_ink, 0.6f));
+    canvas_.strokes(far_edges, 1, mix(theme_.grid, theme_.faint_ink, 0.3f));
   }
 
   void draw_points(EventSpan events) {
@@ -154,12 +147,12 @@ class Plot {
     label_axis(0, {0, bottom, front_[2]}, std::array{0.0, 0.0, front_[2] - back_[2]});
     label_axis(2, {front_[0], bottom, 0}, std::array{front_[0] - back_[0], 0.0, 0.0});
     std::array<double, 3> leftmost{};
-    double least = std::numeric_limits<double>::infinity();
+    double min = std::numeric_limits<double>::infinity();
     for (const double x : {axes_[0].low, axes_[0].high}) {
       for (const double t : {axes_[2].low, axes_[2].high}) {
         const double column = place({x, bottom, t}).spot.x;
-        if (column < least) leftmost = {x, 0, t};
-        least = std::min(least, column);
+        if (column < min) leftmost = {x, 0, t};
+        min = std::min(min, column);
       }
     }
     label_axis(1, leftmost, std::nullopt);
@@ -169,14 +162,16 @@ class Plot {
 
  private:
   struct Axis {
-    Scale scale;  // as labelled
+    std::string title;
+    std::vector<Tick> ticks;
     double low = 0, high = 1;
   };
 
-  static Scale time_scale(const SpaceTimeBox& box) {
+  static std::vector<Tick> time_ticks(const SpaceTimeBox& box) {
+    constexpr int kWanted = 6;
     const double low = to_seconds(box.start - box.origin), high = to_seconds(box.end - box.origin);
     const bool too_fine = high - low < 1e-9 * std::max(std::abs(low), std::abs(high));  // for tick labels
-    return too_fine ? Scale{low, high, false, {}, "t, s"} : linear_scale(low, high, "t, s");
+    return too_fine ? std::vector<Tick>{} : linear_ticks(low, high, kWanted, LabelStyle::full).major;
   }
 
   // Ticks of the time axis are labelled in seconds, but placed in ns.
@@ -190,35 +185,45 @@ class Plot {
   SpaceTimeProjection::Place place(const std::array<double, 3>& at) const {
     return projection_.place(at[0], at[1], at[2]);
   }
-  void line(const std::array<double, 3>& from, const std::array<double, 3>& to, Rgb colour) {
-    const std::array<Spot, 2> ends = {place(from).spot, place(to).spot};
-    canvas_.polyline(ends, 1, colour);
+  bool is_within(std::size_t axis, double at) const { return at >= axes_[axis].low && at <= axes_[axis].high; }
+  /// The line through `at` along an axis.
+  Stroke along(std::size_t axis, const std::array<double, 3>& at) const {
+    std::array<double, 3> from = at, to = at;
+    from[axis] = axes_[axis].low;
+    to[axis] = axes_[axis].high;
+    return {place(from).spot, place(to).spot};
   }
 
   double tick_step(std::size_t axis) const {
-    const std::vector<Tick>& ticks = axes_[axis].scale.ticks;
+    const std::vector<Tick>& ticks = axes_[axis].ticks;
     return ticks.size() > 1 ? ticks[1].value - ticks[0].value : 1;
   }
 
   int widest_label(std::size_t axis) const {
     int widest = 0;
-    for (const Tick& tick : axes_[axis].scale.ticks)
-      widest = std::max(widest, Canvas::text_width(tick.label, kTextHeight));
+    for (const Tick& tick : axes_[axis].ticks) widest = std::max(widest, Canvas::text_width(tick.label, kTextHeight));
     return widest;
   }
 
-  // Distance of the ticks with labels, so that labels fit; the same ticks keep labels as time advances.
-  long labelled_ticks(std::size_t axis, const std::array<double, 3>& from, const std::array<double, 3>& to) const {
-    const Spot first = place(from).spot, last = place(to).spot;
-    const double across = std::abs(last.x - first.x), down = std::abs(last.y - first.y);
-    const int widest = widest_label(axis);
-    const double spaces = (axes_[axis].scale.high - axes_[axis].scale.low) / tick_step(axis);
-    for (const long every : {1, 2, 5}) {
-      const double share = static_cast<double>(every) / spaces;
-      if (share * across > 0.7 * widest + 4 || share * down > kTextHeight + 4) return every;
+  /// The number of ticks from one label to the next, so that labels fit and are multiples of 1, 2 or 5 times a power of
+  /// ten; the same ticks keep labels as time advances.
+  long labelled_ticks(std::size_t axis, const Stroke& edge) const {
+    const double across = std::abs(edge[1].x - edge[0].x), down = std::abs(edge[1].y - edge[0].y);
+    const double step = tick_step(axis);
+    const long mantissa = std::lround(step / std::pow(10.0, std::floor(std::log10(step) + 1e-6)));
+    const double spaces = extent(axis) / step;
+    long every = 1;
+    for (const long candidate : {1, 2, 4, 5, 10, 20}) {
+      const long leading = mantissa * candidate;
+      if (leading != 1 && leading != 2 && leading != 5 && leading % 10 != 0) continue;
+      every = candidate;
+      const double fraction = static_cast<double>(every) / spaces;
+      if (fraction * across > widest_label(axis) + kTextHeight || fraction * down > 1.8 * kTextHeight) break;
     }
-    return 10;
+    return every;
   }
+  /// The extent of an axis in the unit of its labels.
+  double extent(std::size_t axis) const { return (axes_[axis].high - axes_[axis].low) * (axis == 2 ? 1e-9 : 1.0); }
 
   // Draws ticks and title of an axis along an edge, in the direction `outward`, or to the left without it.
   void label_axis(std::size_t axis, std::array<double, 3> edge, std::optional<std::array<double, 3>> outward) {
@@ -238,28 +243,26 @@ class Plot {
                    static_cast<int>(std::lround(spot.y + away * out.y)) + kTextHeight / 2 + (outward ? 3 : 0), text,
                    kTextHeight, colour, align);
     };
-    std::array<double, 3> from = edge, to = edge;
-    from[axis] = axes_[axis].low;
-    to[axis] = axes_[axis].high;
-    line(from, to, theme_.faint_ink);
-    const long every = labelled_ticks(axis, from, to);
-    for (const Tick& tick : axes_[axis].scale.ticks) {
+    const Stroke whole = along(axis, edge);
+    const long every = labelled_ticks(axis, whole);
+    std::vector<Stroke> lines = {whole};
+    for (const Tick& tick : axes_[axis].ticks) {
       const double at = value_of(axis, tick);
-      if (at < axes_[axis].low || at > axes_[axis].high) continue;
+      if (!is_within(axis, at)) continue;
       edge[axis] = at;
       const Spot spot = place(edge).spot, out = direction(edge);
-      const std::array<Spot, 2> ends = {spot, Spot{spot.x + 4 * out.x, spot.y + 4 * out.y}};
-      canvas_.polyline(ends, 1, theme_.faint_ink);
+      lines.push_back({spot, Spot{spot.x + 4 * out.x, spot.y + 4 * out.y}});
       const bool at_corner = axis == 2 && at - axes_[axis].low < 0.04 * (axes_[axis].high - axes_[axis].low);
       if (at_corner) continue;  // the labels of y end here
       if (every > 1 && std::lround(tick.value / tick_step(axis)) % every != 0) continue;
       write(at, 11, tick.label, theme_.ink);
     }
+    canvas_.strokes(lines, 1, theme_.faint_ink);
     if (outward) {
-      write(middle()[axis], 28 + 0.7 * widest_label(axis), axes_[axis].scale.title, theme_.faint_ink);
+      write(middle()[axis], 28 + 0.7 * widest_label(axis), axes_[axis].title, theme_.faint_ink);
     } else {
-      const Spot top = place(from).spot;
-      canvas_.text(static_cast<int>(top.x), static_cast<int>(top.y) - 14, axes_[axis].scale.title, kTextHeight,
+      const Spot top = whole[0];
+      canvas_.text(static_cast<int>(top.x), static_cast<int>(top.y) - 14, axes_[axis].title, kTextHeight,
                    theme_.faint_ink, Align::centre);
     }
   }

@@ -2,9 +2,9 @@
 
 #include "esim/core/image.h"
 #include "esim/events/event.h"
-#include "esim/preview/canvas.h"
+#include "esim/plot/canvas.h"
+#include "esim/plot/theme.h"
 #include "esim/recording/format.h"
-#include "esim/visualise/theme.h"
 
 namespace esim::inline visualise {
 

@@ -3,7 +3,6 @@ import { parseEvents, type EventCloud } from "./events_bin.ts";
 import type {
   FileEntry,
   ImuData,
-  Json,
   Pose,
   Preset,
   Rate,
@@ -32,8 +31,6 @@ export const openScenario = (path: string) =>
 export const newScenario = (scene?: string) =>
   sendJson<ScenarioState & { dir: string }>("POST", "/api/scenario/new", scene ? { scene } : {});
 export const checkScenario = (source: Source) => sendJson<ScenarioState>("POST", "/api/scenario/check", source);
-export const editScenario = (source: Source, set: { where: string; value: Json }[]) =>
-  sendJson<ScenarioState>("POST", "/api/scenario/edit", { ...source, set });
 export const saveScenario = (path: string, yaml: string, revision: string | null, overwrite = false) =>
   sendJson<{ revision: string }>("PUT", "/api/scenario", { path, yaml, revision, overwrite });
 
@@ -69,8 +66,13 @@ export const eventPicture = (id: string, query: PictureQuery, signal?: AbortSign
     { ...query, t: Math.round(query.t), window: Math.round(query.window) },
     signal,
   );
-export const image = (id: string, camera: string, kind: "image" | "depth" | "flow", t: number, signal?: AbortSignal) =>
-  getPicture(recording(id, "image.png"), { camera, kind, t: Math.round(t) }, signal);
+export const image = (
+  id: string,
+  camera: string,
+  kind: "image" | "depth" | "motion_field",
+  t: number,
+  signal?: AbortSignal,
+) => getPicture(recording(id, "image.png"), { camera, kind, t: Math.round(t) }, signal);
 export const events = async (
   id: string,
   camera: string,

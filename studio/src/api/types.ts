@@ -21,6 +21,8 @@ export interface FileEntry {
 export interface Problem {
   where: string;
   what: string;
+  /** Of the text, from 1. */
+  line?: number;
 }
 
 export interface ScenarioState {
@@ -66,7 +68,7 @@ export interface CameraModel {
 }
 
 export interface SceneInfo {
-  kind: "mesh" | "panorama" | "plane" | "layers" | "engine";
+  kind: "mesh" | "panorama" | "plane" | "sprites" | "engine";
   glb: string | null;
   texture: string | null;
   triangles: number;
@@ -130,11 +132,11 @@ export interface RecordingInfo {
     width: number;
     height: number;
     events: number;
-    has: { events: boolean; images: boolean; depth: boolean; flow: boolean };
+    has: { events: boolean; images: boolean; depth: boolean; motion_field: boolean };
     /** The range of the depth colours [m]. */
     depth_m?: [number, number];
     /** The speed at which the colour saturates. */
-    flow_px_per_s?: number;
+    motion_px_per_s?: number;
   }[];
   imu: boolean;
   poses: boolean;

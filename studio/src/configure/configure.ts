@@ -10,11 +10,11 @@ import { complain } from "../ui/status.ts";
 import { type FieldView, type FormContext, idOf } from "./field.ts";
 import { makeField } from "./fields.ts";
 import { findOptions, type Hit } from "./search.ts";
-import { YamlEditor } from "./yaml_editor.ts";
+import type { YamlEditor } from "./yaml_editor.ts";
 
 /** Options at the top of the scenario, without a group. */
 const general = "general";
-const most_hits = 40;
+const max_hits = 40;
 
 /** Every option of the scenario as a form, next to its text. */
 export class ConfigurePlace implements Place {
@@ -28,7 +28,8 @@ export class ConfigurePlace implements Place {
   });
   private found = h("span", { class: "quiet found", attrs: { role: "status" } });
   private hits = "";
-  private text: YamlEditor;
+  private text = h("div", { class: "yaml-editor" });
+  private editor: Promise<YamlEditor> | null = null;
   private loading: Promise<void> | null = null;
   private problems = h("ul", { class: "problems", attrs: { "aria-label": "Problems" } });
   private summary = h("p", { class: "problem-summary", attrs: { role: "status" } });
@@ -43,7 +44,6 @@ export class ConfigurePlace implements Place {
     chooseFile: () => Promise<string | null>,
   ) {
     this.context = { document, chooseFile, defaultOf: (where, node) => this.defaultOf(where, node) };
-    this.text = new YamlEditor(document);
     this.element = h(
       "main",
       { class: "place configure", attrs: { "aria-label": "Configure" } },
@@ -56,7 +56,7 @@ export class ConfigurePlace implements Place {
           "section",
           { class: "yaml-section" },
           h("header", {}, h("h2", { text: "Scenario" }), h("span", { class: "quiet", text: "YAML" })),
-          this.text.element,
+          this.text,
         ),
         h(
           "section",
@@ -83,7 +83,14 @@ export class ConfigurePlace implements Place {
   show(visible: boolean): void {
     this.element.hidden = !visible;
     if (visible && !this.schema) this.loading = this.load();
+    if (visible) void this.textEditor().catch(complain);
     if (visible) this.update();
+  }
+
+  /** The editor of the text. Its code is large, so that the page loads it after the rest. */
+  textEditor(): Promise<YamlEditor> {
+    this.editor ??= import("./yaml_editor.ts").then(({ YamlEditor }) => new YamlEditor(this.text, this.document));
+    return this.editor;
   }
 
   private async load(): Promise<void> {
@@ -154,10 +161,10 @@ export class ConfigurePlace implements Place {
     this.found.textContent =
       hits.length === 0
         ? "nothing found"
-        : `${hits.length} found${hits.length > most_hits ? `, ${most_hits} shown` : ""}`;
+        : `${hits.length} found${hits.length > max_hits ? `, ${max_hits} shown` : ""}`;
     if (key === this.hits) return;
     this.hits = key;
-    const shown = hits.slice(0, most_hits);
+    const shown = hits.slice(0, max_hits);
     this.fields = shown
       .filter(({ needs }) => !needs)
       .map(({ where, node }) => makeField({ ...node, name: where }, where, this.context));
@@ -223,7 +230,7 @@ export class ConfigurePlace implements Place {
       field.scrollIntoView({ block: "center" });
       return;
     }
-    this.text.reveal(where);
+    (await this.textEditor()).reveal(where);
   }
 
   private defaultOf(where: string, node: SchemaNode): Json | undefined {

@@ -8,7 +8,7 @@ import { complain } from "../ui/status.ts";
 type Source = "preview" | "simulator";
 const inset_width_px = 294;
 /** Maximum fraction of the stage's width. */
-const inset_share = 0.5;
+const inset_fraction = 0.5;
 const tallest_inset_px = 222;
 
 /** The view of a camera of the rig: drawn by the browser or by the simulator's renderer; small in a corner or large. */
@@ -33,7 +33,7 @@ export class Eye {
   private shown = "";
 
   constructor(
-    private text: () => Promise<server.Source>,
+    private text: () => server.Source,
     private changed: () => void,
     choose: (camera: string) => void,
   ) {
@@ -92,7 +92,7 @@ export class Eye {
     if (!this.model) return;
     const aspect = this.model.width / this.model.height;
     const stage_px = this.element.parentElement?.clientWidth || Infinity;
-    const inset_px = Math.min(inset_width_px, inset_share * stage_px);
+    const inset_px = Math.min(inset_width_px, inset_fraction * stage_px);
     let [width, height] = [inset_px, inset_px / aspect];
     if (height > tallest_inset_px) [width, height] = [tallest_inset_px * aspect, tallest_inset_px];
     if (this.large) {
@@ -130,7 +130,7 @@ export class Eye {
     const { version } = this;
     const { name } = this.model;
     try {
-      const source = await this.text();
+      const source = this.text();
       const key = JSON.stringify([source.yaml, name, at]);
       if (key !== this.shown) {
         const picture = await server.view(source, name, at);

@@ -91,9 +91,10 @@ export class DesignState {
   async refresh(): Promise<void> {
     if (!this.active) return;
     const { revision } = this.document;
-    const source = await this.document.source().catch(() => null);
+    await this.document.checked();
+    const source = this.document.source();
     // Later changes send their own requests.
-    if (!source || source.yaml === this.seen || revision !== this.document.revision) return;
+    if (source.yaml === this.seen || revision !== this.document.revision) return;
     this.seen = source.yaml;
     await Promise.all([this.refreshScene(source), this.refreshTrajectory(source)]);
   }

@@ -221,7 +221,7 @@ export class Viewport {
     const first = !this.placed || this.info?.kind !== info.kind;
     this.info = info;
     this.showEye();
-    const flat = info.kind === "layers" || info.kind === "engine";
+    const flat = info.kind === "sprites" || info.kind === "engine";
     this.eye.onlySimulator(flat);
     if (flat !== this.eye.large && (flat || first)) this.eye.setLarge(flat);
     this.navigation.canMove = info.kind !== "panorama";

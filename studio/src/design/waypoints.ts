@@ -1,5 +1,5 @@
 import type { Json, JsonMap, Pose } from "../api/types.ts";
-import type { Change } from "../document/document.ts";
+import type { Change } from "../document/yaml_text.ts";
 import { getIn } from "../document/values.ts";
 
 /** A waypoint as in a scenario (docs/waypoints.md). */

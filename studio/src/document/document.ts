@@ -5,6 +5,8 @@ import { Signal } from "../ui/signal.ts";
 import { complain } from "../ui/status.ts";
 import { History } from "./history.ts";
 import { getIn, samePlace, setIn } from "./values.ts";
+import { type Change, withOptions } from "./yaml_text.ts";
+import { parseYaml, YamlError } from "./yaml_values.ts";
 
 /** Invalid text in the fields of an option. */
 export interface Refused {
@@ -13,28 +15,20 @@ export interface Refused {
   what: string;
 }
 
-/** One state of the design. The server writes its text shortly after its values change. */
+/** One state of the design. */
 export interface Revision {
+  yaml: string;
+  /** Of the text, or of the last text that was YAML. */
   values: JsonMap;
-  /** The problems that the server finds in the text. */
+  /** The problems of the text; before it is checked, those of the text before. */
   problems: Problem[];
   /** Invalid entries of the form, by option. They are not in the text, so that the form differs from the scenario. */
   refused: ReadonlyMap<string, Refused>;
-  /** Null until the server has written it. */
-  yaml: string | null;
-  /** The text, as soon as it exists. */
-  settled: Promise<string>;
-  /** Resolves when `problems` are those of the text. */
-  checked: Promise<void>;
+  isChecked: boolean;
 }
 
-export interface Change {
-  where: string;
-  value: Json;
-}
-
-function revisionOf(state: ScenarioState): Revision {
-  return { ...state, refused: new Map(), settled: Promise.resolve(state.yaml), checked: Promise.resolve() };
+function revisionOf({ yaml, values, problems }: ScenarioState): Revision {
+  return { yaml, values, problems, refused: new Map(), isChecked: true };
 }
 
 /** Whether one option contains the other or equals it. */
@@ -75,6 +69,7 @@ export class ScenarioDocument {
   private savedYaml: string | null = null;
   private untitledFolder = "";
   private history: History<Revision>;
+  private checking: Promise<void> | null = null;
 
   constructor() {
     const empty = revisionOf({ yaml: "", values: {}, problems: [] });
@@ -111,7 +106,7 @@ export class ScenarioDocument {
 
   get dirty(): boolean {
     const { yaml, refused } = this.revision;
-    return yaml === null || yaml !== this.savedYaml || refused.size > 0;
+    return yaml !== this.savedYaml || refused.size > 0;
   }
 
   get(where: string): Json | undefined {
@@ -119,8 +114,13 @@ export class ScenarioDocument {
   }
 
   /** The current text for requests. */
-  async source(): Promise<server.Source> {
-    return { yaml: await this.revision.settled, dir: this.dir };
+  source(): server.Source {
+    return { yaml: this.revision.yaml, dir: this.dir };
+  }
+
+  /** Resolves when `problems` are those of the current text. */
+  async checked(): Promise<void> {
+    await this.checking;
   }
 
   /** Begins with another scenario and an empty history. */
@@ -140,16 +140,23 @@ export class ScenarioDocument {
     this.show();
   }
 
-  /** Sets options at once; the server then writes the text. Consecutive edits with the same `merge` are one undo step. */
+  /**
+   * Sets options, in the text too. Consecutive edits with the same `merge` are one undo step. A text that is not YAML
+   * stays as it is, with a message.
+   */
   edit(label: string, changes: Change[], merge: string | null = null): void {
     const base = this.revision;
-    let values = base.values;
-    for (const { where, value } of changes) values = setIn(values, where, value);
-    const settled = base.settled.then((yaml) =>
-      persistently(() => server.editScenario({ yaml, dir: this.dir }, changes)),
-    );
-    const refused = new Map([...base.refused].filter(([entry]) => !changes.some(({ where }) => related(entry, where))));
-    this.push({ ...base, values, refused, yaml: null }, settled, label, merge);
+    try {
+      const yaml = withOptions(base.yaml, changes);
+      let values = base.values;
+      for (const { where, value } of changes) values = setIn(values, where, value);
+      const refused = [...base.refused].filter(([entry]) => !changes.some(({ where }) => related(entry, where)));
+      const isChecked = base.isChecked && yaml === base.yaml;
+      this.push({ ...base, yaml, values, refused: new Map(refused), isChecked }, label, merge);
+    } catch (error) {
+      complain(error);
+      this.show(); // the form shows the previous values again
+    }
   }
 
   /** Stores invalid text of an option's fields; without `entry`, removes it. */
@@ -158,23 +165,14 @@ export class ScenarioDocument {
     const refused = new Map(base.refused);
     if (entry) refused.set(where, entry);
     else if (!refused.delete(where)) return;
-    const settled = base.settled.then(async (yaml) => {
-      await base.checked;
-      return { yaml, values: base.values, problems: base.problems };
-    });
-    this.push({ ...base, refused }, settled, `Type into ${where}`, `entry ${where}`);
+    this.push({ ...base, refused }, `Type into ${where}`, `entry ${where}`);
   }
 
   /** Takes typed text. */
   type(yaml: string): void {
     const base = this.revision;
     if (base.yaml === yaml) return;
-    const checked = persistently(() => server.checkScenario({ yaml, dir: this.dir })).catch((error: unknown) => {
-      if (!(error instanceof ApiError) || error.status !== 400) throw error;
-      return { values: base.values, problems: [{ where: error.where ?? "", what: error.message }] };
-    });
-    const settled = checked.then((state) => ({ ...state, yaml }));
-    this.push({ ...base, yaml }, settled, "Edit text", "text");
+    this.push(completed({ ...base, yaml, isChecked: false }, textState(yaml, base)), "Edit text", "text");
   }
 
   undo(): void {
@@ -190,33 +188,46 @@ export class ScenarioDocument {
     this.history.seal();
   }
 
-  /** Adds a new state, which the server's answer completes; existing text is available at once. */
-  private push(known: Revision, answer: Promise<ScenarioState>, label: string, merge: string | null): void {
-    const settled = known.yaml === null ? answer.then((state) => state.yaml) : Promise.resolve(known.yaml);
-    const checked = answer.then(
-      () => undefined,
-      () => undefined,
-    );
-    const revision = { ...known, settled, checked };
+  private push(revision: Revision, label: string, merge: string | null): void {
     this.history.push(revision, label, merge);
     this.show();
-    settled.catch(() => undefined);
-    answer.then(
-      (state) => {
-        const refused = [...revision.refused].filter(([where]) => samePlace(revision.values, state.values, where));
-        Object.assign(revision, state, { refused: new Map(refused) });
-        if (this.revision === revision) this.changed.notify();
-      },
-      (error: unknown) => {
-        this.history.drop(revision);
-        complain(error);
-        this.show();
-      },
-    );
   }
 
   private show(): void {
+    if (!this.revision.isChecked) this.checking ??= this.check().finally(() => (this.checking = null));
     if (this.changed.value === this.revision) this.changed.notify();
     else this.changed.set(this.revision);
   }
+
+  /** Asks the server for the problems of the current text, until it is checked. */
+  private async check(): Promise<void> {
+    for (let revision = this.revision; !revision.isChecked; revision = this.revision) {
+      const source = this.source();
+      const state = await persistently(() => server.checkScenario(source)).catch((error: unknown) => {
+        if (!(error instanceof ApiError) || error.status !== 400) complain(error);
+        const where = error instanceof ApiError ? (error.where ?? "") : "";
+        return { values: revision.values, problems: [{ where, what: String((error as Error).message) }] };
+      });
+      Object.assign(revision, completed(revision, state), { isChecked: true });
+      if (this.revision === revision) this.changed.notify();
+    }
+  }
+}
+
+/** The values and problems that the page itself finds in a typed text. */
+function textState(yaml: string, base: Revision): Partial<Revision> {
+  try {
+    return { values: parseYaml(yaml).values };
+  } catch (error) {
+    if (!(error instanceof YamlError)) throw error;
+    const problems = [{ where: "", what: error.message, line: error.line }];
+    return { values: base.values, problems, isChecked: true };
+  }
+}
+
+/** A revision with a new state, without the entries of options that the state changes. */
+function completed(revision: Revision, state: Partial<Revision>): Revision {
+  const values = state.values ?? revision.values;
+  const refused = [...revision.refused].filter(([where]) => samePlace(revision.values, values, where));
+  return { ...revision, ...state, refused: new Map(refused) };
 }

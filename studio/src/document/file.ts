@@ -4,7 +4,7 @@ import type { FileEntry } from "../api/types.ts";
 import { ask, type Answer } from "../ui/dialog.ts";
 import { diffLines } from "../ui/diff.ts";
 import { h } from "../ui/dom.ts";
-import { chooseFile } from "../ui/files_dialog.ts";
+import { chooseFile } from "./files_dialog.ts";
 import { complain, say } from "../ui/status.ts";
 import type { ScenarioDocument } from "./document.ts";
 import { refuseFor } from "./problems.ts";
@@ -21,7 +21,6 @@ export class ScenarioFile {
   ) {
     // Unsaved changes survive a reload of the page.
     document.changed.listen((revision) => {
-      if (revision.yaml === null) return;
       if (document.dirty)
         sessionStorage.setItem(
           draftKey,
@@ -99,7 +98,7 @@ export class ScenarioFile {
   }
 
   private async write(path: string, onDisk: string | null, overwrite: boolean): Promise<boolean> {
-    const yaml = await this.document.revision.settled;
+    const { yaml } = this.document.revision;
     try {
       const { revision } = await server.saveScenario(path, yaml, onDisk, overwrite);
       this.document.saved(path, revision, yaml);

@@ -37,17 +37,6 @@ export class History<T> {
     this.merging = null;
   }
 
-  /** Removes `state` from the history. */
-  drop(state: T): void {
-    if (this.state === state) {
-      const before = this.past.pop();
-      if (before) this.state = before.state;
-    } else {
-      this.past = this.past.filter((entry) => entry.state !== state);
-    }
-    this.merging = null;
-  }
-
   undo(): boolean {
     const before = this.past.pop();
     if (!before) return false;

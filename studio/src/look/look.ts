@@ -74,7 +74,7 @@ export class LookPlace implements Place {
       if (![...this.kinds].some(fits)) for (const kind of all.filter(fits)) this.kinds.add(kind);
       if (which === 0) this.clock.set(Math.min(this.slots[0]!.length * 0.5, this.clock.time.value || Infinity));
       this.refresh();
-      this.opened(this.slots.flatMap((slot) => (slot.info ? [slot.info.path] : [])));
+      this.opened(this.slots.flatMap(({ info }) => (info ? [info.path] : [])));
     } catch (error) {
       complain(error);
     }
@@ -261,7 +261,7 @@ export class LookPlace implements Place {
   private closeSecond(): void {
     this.slots[1]!.close();
     this.refresh();
-    this.opened(this.slots.flatMap((slot) => (slot.info ? [slot.info.path] : [])));
+    this.opened(this.slots.flatMap(({ info }) => (info ? [info.path] : [])));
   }
 
   private showPlots(open: Slot[]): void {

@@ -12,7 +12,7 @@ import { complain } from "../ui/status.ts";
 import { colour, theme } from "../ui/theme.ts";
 import type { Tile, TileSource } from "./tiles.ts";
 
-const most_poses = 4000;
+const max_poses = 4000;
 
 /** The path of the body in the world, and its current pose. */
 export class PathTile implements Tile {
@@ -53,7 +53,7 @@ export class PathTile implements Tile {
   private async load(): Promise<void> {
     const { recording } = this.source;
     try {
-      const { t, poses } = await server.poses(recording.id, recording.start, recording.end, most_poses);
+      const { t, poses } = await server.poses(recording.id, recording.start, recording.end, max_poses);
       if (poses.length === 0) return;
       this.track = new PoseTrack(t, poses);
       const box = new Box3().setFromPoints(poses.map((pose) => new Vector3(pose[0], pose[1], pose[2])));

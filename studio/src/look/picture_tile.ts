@@ -69,11 +69,11 @@ export class PictureTile implements Tile {
 
   /** The meaning of the colours. */
   private scale(): string {
-    const { depth_m, flow_px_per_s } = this.source.camera;
+    const { depth_m, motion_px_per_s } = this.source.camera;
     if (this.kind === "depth" && depth_m)
       return `; ${shortNumber(depth_m[0], 2)} m yellow to ${shortNumber(depth_m[1], 2)} m violet`;
-    if (this.kind === "flow" && flow_px_per_s)
-      return `; hue by direction, saturated at ${shortNumber(flow_px_per_s, 3)} px/s`;
+    if (this.kind === "motion_field" && motion_px_per_s)
+      return `; hue by direction, saturated at ${shortNumber(motion_px_per_s, 3)} px/s`;
     return "";
   }
 

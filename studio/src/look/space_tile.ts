@@ -25,7 +25,7 @@ import { colour, theme } from "../ui/theme.ts";
 import { Latest } from "./latest.ts";
 import type { Display, Tile, TileSource } from "./tiles.ts";
 
-const most_points = 200_000;
+const max_points = 200_000;
 const label_px = 15;
 /** Length of the time axis, in image widths. */
 const depth = 1.6;
@@ -128,8 +128,8 @@ export class SpaceTile implements Tile {
     const { height, camera } = this.stage;
     const size = (label_px / height) * 2 * Math.tan((camera.fov * Math.PI) / 360);
     for (const { scale, material } of this.labels) {
-      const { width, height } = material.map!.image as HTMLCanvasElement;
-      scale.set((size * width) / height, size, 1);
+      const image = material.map!.image as HTMLCanvasElement;
+      scale.set((size * image.width) / image.height, size, 1);
     }
   }
 
@@ -145,7 +145,7 @@ export class SpaceTile implements Tile {
     if (key === this.shown) return;
     if (!this.shown.endsWith(` ${this.display.span}`)) this.label();
     try {
-      const cloud = await server.events(recording.id, camera.name, from, to, most_points);
+      const cloud = await server.events(recording.id, camera.name, from, to, max_points);
       this.fill(cloud, to);
       this.shown = key;
       const thinned = cloud.total > cloud.x.length ? `, of which ${count(cloud.x.length)} are shown` : "";

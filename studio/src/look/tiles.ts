@@ -1,12 +1,12 @@
 import type { RecordingInfo } from "../api/types.ts";
 
-export type TileKind = "events" | "image" | "depth" | "flow" | "space" | "path";
+export type TileKind = "events" | "image" | "depth" | "motion_field" | "space" | "path";
 
 export const tileNames: Record<TileKind, string> = {
   events: "Events",
   image: "Image",
   depth: "Depth",
-  flow: "Flow",
+  motion_field: "Motion field",
   space: "Space-time",
   path: "Path",
 };

@@ -158,15 +158,16 @@ export function icon(name: IconName): SVGSVGElement {
 /** Applies the text typed into a field, as if the field lost the focus. */
 export function commitTyping(): void {
   const at = document.activeElement;
-  if (at instanceof HTMLTextAreaElement || (at instanceof HTMLInputElement && typing(at)))
-    at.dispatchEvent(new Event("change"));
+  if (at && typing(at) && !(at instanceof HTMLSelectElement)) at.dispatchEvent(new Event("change"));
 }
 
-/** Whether keyboard input goes to a field. */
+/** Whether keyboard input goes to a field, or to a field in the shadow root of an element. */
 export function typing(target: EventTarget | null): boolean {
+  const inner = (target instanceof HTMLElement && target.shadowRoot?.activeElement) || target;
   return (
-    target instanceof HTMLTextAreaElement ||
-    target instanceof HTMLSelectElement ||
-    (target instanceof HTMLInputElement && !["checkbox", "radio", "range", "button"].includes(target.type))
+    inner instanceof HTMLTextAreaElement ||
+    inner instanceof HTMLSelectElement ||
+    (inner instanceof HTMLInputElement && !["checkbox", "radio", "range", "button"].includes(inner.type)) ||
+    (inner instanceof HTMLElement && inner.isContentEditable)
   );
 }

@@ -1,7 +1,7 @@
 // Parts of the page, and what one does with them.
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
-import { shots, until } from "./harness.mjs";
+import { shots } from "./harness.mjs";
 
 export const shot = async (page, name) => {
   if (!shots) return;
@@ -10,7 +10,15 @@ export const shot = async (page, name) => {
 };
 export const stage = (page) => page.locator(".design .stage");
 export const rows = (page) => page.locator(".waypoint");
-export const yaml = (page) => page.locator(".yaml-editor textarea").inputValue();
+const editor = (page) => page.locator(".yaml-editor .cm-content");
+/** The text in the editor, of which the document holds only the lines that are seen. */
+export const yaml = (page) => editor(page).evaluate((content) => content.cmTile.view.state.doc.toString());
+/** Types a text instead of the one in the editor. */
+export const fillYaml = async (page, text) => {
+  await editor(page).focus();
+  await page.keyboard.press("Control+a");
+  await page.keyboard.insertText(text);
+};
 export const clock = (page) => page.locator(".timeline .clock");
 export const place = (page, name) => page.getByRole("tab", { name }).click();
 export const ready = async (page) => {
@@ -38,8 +46,8 @@ export const tabTo = async (page, name) => {
 /** What does not fit: the page itself, and rows of controls whose end is cut off. */
 export const cramped = (page) =>
   page.evaluate(() => {
-    const rows = [...document.querySelectorAll(".bar, .toolbar, .transport, .row, .status, .segmented, .run-foot")];
-    return [document.documentElement, ...rows]
+    const bars = [...document.querySelectorAll(".bar, .toolbar, .transport, .row, .status, .segmented, .run-foot")];
+    return [document.documentElement, ...bars]
       .filter((e) => e.offsetParent !== null || e === document.documentElement)
       .filter(
         (e) => e.scrollWidth > e.clientWidth + 1 || (e === document.documentElement && e.scrollHeight > innerHeight),

@@ -6,7 +6,7 @@ import { cpus, loadavg } from "node:os";
 import { join } from "node:path";
 import { after, test } from "node:test";
 import { chromiumOrSkip, makeFiles, openPage, Server, until } from "./harness.mjs";
-import { press, ready, rows, shot, stage } from "./page.mjs";
+import { press, ready, rows, shot, stage, yaml as textOf } from "./page.mjs";
 
 const browser = await chromiumOrSkip();
 const files = makeFiles();
@@ -139,7 +139,7 @@ test("half a million triangles: flown through in few, rested on in all, picked e
   expectQuick(context, rate > 5, `${rate.toFixed(1)} frames/s while flying, of ${drawn / 3} triangles`);
   await until(async () => (await rows(page).count()) === 3, "a waypoint");
   const yaml = await until(async () => {
-    const text = await page.locator(".yaml-editor textarea").inputValue();
+    const text = await textOf(page);
     return text.split("look_at").length === 4 ? text : null;
   }, "its text");
   const aims = [...yaml.matchAll(/look_at: *\[([^\]]*)\]/g)].map((match) => match[1].split(",").map(Number));

@@ -8,12 +8,13 @@ import { build } from "esbuild";
 const here = fileURLToPath(new URL(".", import.meta.url));
 const out = mkdtempSync(join(here, "../../node_modules/.unit-"));
 try {
-  const tests = readdirSync(here).filter((name) => name.endsWith(".test.ts"));
+  const tests = readdirSync(here).filter((name) => name.endsWith(".test.ts") && name.includes(process.env.ONLY ?? ""));
   await build({
     entryPoints: tests.map((name) => join(here, name)),
     outdir: out,
     bundle: true,
-    platform: "node",
+    platform: "browser", // packages as the page has them
+    external: ["node:*"],
     format: "esm",
     outExtension: { ".js": ".mjs" },
     logLevel: "warning",

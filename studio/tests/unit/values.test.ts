@@ -15,6 +15,17 @@ test("missing groups are made, null removes, lists close up", () => {
   assert.deepEqual(setIn({}, "event_camera.readout.row_time_us", 3), { event_camera: { readout: { row_time_us: 3 } } });
   assert.deepEqual(setIn({ a: { b: 1, c: 2 } }, "a.b", null), { a: { c: 2 } });
   assert.deepEqual(setIn({ list: [1, 2, 3] }, "list.1", null), { list: [1, 3] });
+  assert.deepEqual(setIn({ list: [1] }, "list.1", 2), { list: [1, 2] });
+});
+
+test("what is not there is not removed, and nothing is made for it", () => {
+  for (const where of ["imu", "imu.rate_hz", "seed.x", "list.7", "list.0.x"])
+    assert.deepEqual(setIn({ seed: 1, list: [1] }, where, null), { seed: 1, list: [1] }, where);
+});
+
+test("paths that name no option are rejected", () => {
+  for (const where of ["", "a..b", "list.x", "list.2", "list.-1"])
+    assert.throws(() => setIn({ list: [1] }, where, 1), Error, where);
 });
 
 test("paths that lead nowhere are undefined", () => {

@@ -4,9 +4,10 @@
 #include <optional>
 #include <string>
 
+// Private to backends/opengl.
 namespace esim::inline backends::inline opengl {
 
-/// An OpenGL 4.5 context without a window. Private to the renderer.
+/// An OpenGL 4.5 context without a window.
 class GlContext {
  public:
   /// Opens the device with this index, by default the first one that is not software. Throws UserError.

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+// Private to backends/opengl: includes epoxy/gl.h.
 namespace esim::inline backends::inline opengl {
 
 /// The parts of a shader's source, in order, without the #version line.

@@ -67,11 +67,11 @@ void GlReadBack::finish(Sample& sample) {
   for (const Tile& tile : sample.tiles) {
     for (int y = tile.y; y < tile.y + tile.height; ++y) {
       float *const irradiance = sample.irradiance.row(y) + tile.x, *const depth = sample.depth.row(y) + tile.x;
-      float *const flow_x = sample.flow_x.row(y) + tile.x, *const flow_y = sample.flow_y.row(y) + tile.x;
+      float *const motion_x = sample.motion_x.row(y) + tile.x, *const motion_y = sample.motion_y.row(y) + tile.x;
 #pragma GCC ivdep
       for (int x = 0; x < tile.width; ++x) {
         irradiance[x] = seen[4 * x], depth[x] = seen[4 * x + 1];
-        flow_x[x] = seen[4 * x + 2], flow_y[x] = seen[4 * x + 3];
+        motion_x[x] = seen[4 * x + 2], motion_y[x] = seen[4 * x + 3];
       }
       seen += 4 * tile.width;
     }

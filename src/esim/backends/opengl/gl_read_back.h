@@ -7,10 +7,10 @@
 #include "esim/backends/opengl/gl_targets.h"
 #include "esim/render/sample.h"
 
+// Private to backends/opengl: includes epoxy/gl.h.
 namespace esim::inline backends::inline opengl {
 
-/// An asynchronous copy of pixels from the device to memory. Use and destroy it with its context current. Private to
-/// the renderer.
+/// An asynchronous copy of pixels from the device to memory. Use and destroy it with its context current.
 class GlReadBack {
  public:
   /// Begins to copy E, Z and V of the tiles, and with `with_objects` the visible objects, after all previous draw

@@ -7,9 +7,10 @@
 
 #include "esim/scene/scene.h"
 
+// Private to backends/opengl: includes epoxy/gl.h.
 namespace esim::inline backends::inline opengl {
 
-/// A scene in the device memory of the current context. Private to the renderer.
+/// A scene in the device memory of the current context.
 class GlScene {
  public:
   explicit GlScene(const Scene& scene);

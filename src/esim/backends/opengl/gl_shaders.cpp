@@ -65,11 +65,11 @@ layout(location = 1) out uint which;
 // Mean over the pixel's footprint, as in Texture::sample(): up to four probes along the footprint's longer side, each
 // between two levels of the mip pyramid. The anisotropic filters of drivers differ.
 float mean_colour(sampler2D image) {
-  const float most_probes = 4;
+  const float max_probes = 4;
   vec2 size = vec2(textureSize(image, 0)), dx = dFdx(uv), dy = dFdy(uv);
   float x = length(dx * size), y = length(dy * size);
   float major = min(max(x, y), 1e6), minor = max(min(x, y), 1e-6);
-  float probes = clamp(ceil(min(major, major / minor) - 0.25), 1, most_probes);
+  float probes = clamp(ceil(min(major, major / minor) - 0.25), 1, max_probes);
   float lod = min(log2(max(max(major / probes, minor), 1)), float(textureQueryLevels(image) - 1));
   vec2 along = x >= y ? dx : dy;
   float sum = 0;
@@ -93,7 +93,7 @@ float light_on_surface() {
     float fall_off = lights[i].place.w > 0 ? 1 / distance2 : 1.0;
     float received = lights[i].strength.x * fall_off * max(dot(n, to_light) * inversesqrt(distance2), 0);
 #ifdef SHADOWS
-    if (received > 0) received *= visible_share(i, lights[i].place.w > 0, to_light, Seen(point, right, down, flat_normal));
+    if (received > 0) received *= visible_fraction(i, lights[i].place.w > 0, to_light, Seen(point, right, down, flat_normal));
 #endif
     sum += received;
   }

@@ -2,6 +2,7 @@
 
 #include <epoxy/gl.h>
 
+// Private to backends/opengl: includes epoxy/gl.h.
 /// The shaders, as parts of sources for make_program().
 namespace esim::inline backends::inline opengl {
 

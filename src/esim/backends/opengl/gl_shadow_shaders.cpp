@@ -64,7 +64,7 @@ vec4 lit_texels(sampler2DArray depths, int layer, vec2 corner, Mapped seen, floa
 }
 
 // The lit fraction of a box of 3 x 3 texels, out of 4 x 4, that moves continuously with `place`.
-float share_of_box(sampler2DArray depths, int layer, vec2 place, Mapped seen) {
+float fraction_of_box(sampler2DArray depths, int layer, vec2 place, Mapped seen) {
   float depth = seen.depth + dot(seen.slope, place - seen.place);
   vec2 corner = floor(place) - 1, f = fract(place);
   float sum = 0;
@@ -80,10 +80,10 @@ float share_of_box(sampler2DArray depths, int layer, vec2 place, Mapped seen) {
 
 // The lit fraction of the footprint, by as many boxes as necessary, up to 4 x 4. If its corners and its centre agree,
 // no straight edge crosses it.
-float share_of_footprint(sampler2DArray depths, int layer, Mapped seen) {
-  const float most_boxes = 4;
+float fraction_of_footprint(sampler2DArray depths, int layer, Mapped seen) {
+  const float max_boxes = 4;
   vec2 low = vec2(1), high = vec2(textureSize(depths, 0).xy) - 3;
-  vec2 boxes = clamp(ceil(vec2(length(seen.along), length(seen.across)) / 3 - 0.25), 1, most_boxes);
+  vec2 boxes = clamp(ceil(vec2(length(seen.along), length(seen.across)) / 3 - 0.25), 1, max_boxes);
   if (boxes.x * boxes.y > 1) {
     float alike = 0;
     for (int i = 0; i < 5; ++i) {
@@ -99,13 +99,13 @@ float share_of_footprint(sampler2DArray depths, int layer, Mapped seen) {
     for (float i = 0; i < boxes.x; ++i) {
       vec2 off = vec2(i + 0.5, j + 0.5) / boxes - 0.5;
       vec2 place = clamp(seen.place + off.x * seen.along + off.y * seen.across, low, high);
-      sum += share_of_box(depths, layer, place, seen);
+      sum += fraction_of_box(depths, layer, place, seen);
     }
   }
   return sum / (boxes.x * boxes.y);
 }
 
-float share_in_view(sampler2DArray depths, int layer, int view, Seen seen) {
+float fraction_in_view(sampler2DArray depths, int layer, int view, Seen seen) {
   if (views[view].texel.y == 0) return 1;
   // Slightly above the surface: by a quarter of a texel plus the rounding error of the point.
   mat4 clip_from_camera = views[view].clip_from_camera;
@@ -129,14 +129,14 @@ float share_in_view(sampler2DArray depths, int layer, int view, Seen seen) {
   if (plane.z == 0) return 0;
   vec2 slope = -2 / size * plane.xy / plane.z;
 
-  return share_of_footprint(depths, layer, Mapped(place, along, across, at.z, slope));
+  return fraction_of_footprint(depths, layer, Mapped(place, along, across, at.z, slope));
 }
 
-float visible_share(int light, bool is_point, vec3 to_light, Seen seen) {
+float visible_fraction(int light, bool is_point, vec3 to_light, Seen seen) {
   if (dot(seen.normal, to_light) <= 0) return 0;
   int layer = is_point ? shadow_suns + 6 * (light - shadow_suns) + face_of(world_from_camera * -to_light) : light;
-  float still = share_in_view(still_shadows, layer, layer, seen);
-  return still > 0 ? min(still, share_in_view(moving_shadows, layer, shadow_layers + layer, seen)) : 0;
+  float still = fraction_in_view(still_shadows, layer, layer, seen);
+  return still > 0 ? min(still, fraction_in_view(moving_shadows, layer, shadow_layers + layer, seen)) : 0;
 }
 )";
 

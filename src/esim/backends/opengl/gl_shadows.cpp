@@ -14,8 +14,8 @@
 namespace esim::inline backends::inline opengl {
 namespace {
 
-constexpr int kLargestMap = 4096;                                          // texels
-constexpr double kMostStillTexels = 1 << 26, kMostMovingTexels = 1 << 23;  // of all layers, 4 bytes each
+constexpr int kLargestMap = 4096;                                        // texels
+constexpr double kMaxStillTexels = 1 << 26, kMaxMovingTexels = 1 << 23;  // of all layers, 4 bytes each
 constexpr int kMargin = 4;          // texels around a view: more than the radius of the filter
 constexpr double kNearLamp = 1e-3;  // m
 constexpr int kFaces = 6;
@@ -68,19 +68,19 @@ bool sees(const Eigen::Matrix4d& clip_from_world, const Eigen::Vector3d& centre,
 
 /// Enlarges boxes that have no extent in a direction.
 Eigen::AlignedBox3d with_some_size(Eigen::AlignedBox3d box) {
-  const Eigen::Vector3d least = Eigen::Vector3d::Constant(1e-6 * (1 + box.center().lpNorm<1>()));
-  return {box.min() - least, box.max() + least};
+  const Eigen::Vector3d min = Eigen::Vector3d::Constant(1e-6 * (1 + box.center().lpNorm<1>()));
+  return {box.min() - min, box.max() + min};
 }
 
 }  // namespace
 
 GlShadows::GlShadows(const Scene& scene, const GlScene& drawn) : drawn_(drawn), lighting_(*scene.lighting) {
-  GLint most_layers = 0;
-  glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &most_layers);
+  GLint max_layers = 0;
+  glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &max_layers);
   layers_ = static_cast<int>(lighting_.suns.size() + kFaces * lighting_.points.size());
-  if (layers_ > most_layers) {
+  if (layers_ > max_layers) {
     throw UserError("gl: too many lights cast shadows: their shadow maps need more than the device's " +
-                    std::to_string(most_layers) +
+                    std::to_string(max_layers) +
                     " layers (six for each point light); use fewer lights, or engine: raycast");
   }
   for (const SceneObject& object : scene.objects) {
@@ -100,10 +100,10 @@ GlShadows::GlShadows(const Scene& scene, const GlScene& drawn) : drawn_(drawn), 
   glCreateBuffers(1, &views_);
   if (layers_ == 0) return;
 
-  still_ = make_maps(kMostStillTexels);
+  still_ = make_maps(kMaxStillTexels);
   for (const SunLight& sun : lighting_.suns) still_.views.push_back(still_sun(scene, sun));
   view_points(still_);
-  if (!balls_.empty()) moving_ = make_maps(kMostMovingTexels);
+  if (!balls_.empty()) moving_ = make_maps(kMaxMovingTexels);
   std::vector<Placed> objects;
   for (const GlScene::Object& object : drawn_.objects()) {
     if (!object.moves) objects.push_back({&object, Eigen::Matrix4d::Identity()});
@@ -111,14 +111,13 @@ GlShadows::GlShadows(const Scene& scene, const GlScene& drawn) : drawn_(drawn), 
   draw_views(still_, objects);
 }
 
-/// Layers of the largest power of two that have at most `most_texels` in total.
-GlShadows::Maps GlShadows::make_maps(double most_texels) const {
+/// Layers of the largest power of two that have at most `max_texels` in total.
+GlShadows::Maps GlShadows::make_maps(double max_texels) const {
   GLint largest = 0;
   glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
   Maps maps;
   maps.size = kLargestMap;
-  while (maps.size > 256 && (maps.size > largest || 1.0 * maps.size * maps.size * layers_ > most_texels))
-    maps.size /= 2;
+  while (maps.size > 256 && (maps.size > largest || 1.0 * maps.size * maps.size * layers_ > max_texels)) maps.size /= 2;
   glCreateTextures(GL_TEXTURE_2D_ARRAY, 1, &maps.texture);
   glTextureStorage3D(maps.texture, 1, GL_DEPTH_COMPONENT32F, maps.size, maps.size, layers_);
   for (const GLenum direction : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})

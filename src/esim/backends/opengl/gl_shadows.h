@@ -9,11 +9,12 @@
 #include "esim/render/renderer.h"
 #include "esim/scene/scene.h"
 
+// Private to backends/opengl: includes epoxy/gl.h.
 namespace esim::inline backends::inline opengl {
 
 /// Shadow maps: a layer for each sun, six for each point light. Static objects are drawn once: their texels are fixed
 /// in the world, so that the edges of their shadows do not shimmer when the camera moves. Moving objects have separate
-/// maps, which are drawn again for every request. Belongs to the current context. Private to the renderer.
+/// maps, which are drawn again for every request. Belongs to the current context.
 class GlShadows {
  public:
   /// Both must outlive it. Throws UserError if the device does not have enough layers for the lights.
@@ -49,7 +50,7 @@ class GlShadows {
     Eigen::Matrix4d world_from_object;
   };
 
-  Maps make_maps(double most_texels) const;
+  Maps make_maps(double max_texels) const;
   void draw_views(const Maps& maps, const std::vector<Placed>& objects) const;
   void view_points(Maps& maps) const;
   View still_sun(const Scene& scene, const SunLight& sun) const;

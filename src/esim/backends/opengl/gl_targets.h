@@ -2,10 +2,11 @@
 
 #include <epoxy/gl.h>
 
+// Private to backends/opengl: includes epoxy/gl.h.
 namespace esim::inline backends::inline opengl {
 
 /// A framebuffer with floats and the object (16 bits) per pixel, in textures. The floats depend on the pass: E, Z and V
-/// after the last one; E, 1 / Z and its slopes before. Belongs to its context. Private to the renderer.
+/// after the last one; E, 1 / Z and its slopes before. Belongs to its context.
 struct GlTarget {
   GLuint framebuffer = 0, seen = 0, which = 0;
   int width = 0, height = 0;

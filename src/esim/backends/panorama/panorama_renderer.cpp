@@ -25,11 +25,11 @@ inline float arc_tangent(float y, float x) {
 
 class PanoramaRenderer final : public ProcessorRenderer {
  public:
-  PanoramaRenderer(Panorama panorama, const Camera& camera, const Workers& workers, bool mosaic)
-      : panorama_(std::move(panorama)), rays_(camera), workers_(workers), mosaic_(mosaic) {}
+  PanoramaRenderer(Panorama panorama, const Camera& camera, const Workers& workers, bool mosaic, double footprint)
+      : panorama_(std::move(panorama)), rays_(camera, footprint), workers_(workers), mosaic_(mosaic) {}
 
   RendererTraits traits() const override {
-    return {.name = "panorama", .granularity = Granularity::tile, .at_infinity = true, .wide_pixels = true};
+    return {.name = "panorama", .granularity = Granularity::tile, .at_infinity = true};
   }
 
  private:
@@ -93,9 +93,9 @@ class PanoramaRenderer final : public ProcessorRenderer {
 }  // namespace
 
 std::unique_ptr<Renderer> make_panorama_renderer(Panorama panorama, const Camera& camera, const Workers& workers,
-                                                 ColourFilters filters) {
+                                                 ColourFilters filters, double footprint) {
   const bool mosaic = filters == ColourFilters::rggb && panorama.colours[0] != nullptr;
-  return std::make_unique<PanoramaRenderer>(std::move(panorama), camera, workers, mosaic);
+  return std::make_unique<PanoramaRenderer>(std::move(panorama), camera, workers, mosaic, footprint);
 }
 
 }  // namespace esim::inline backends::inline panorama

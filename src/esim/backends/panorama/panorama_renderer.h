@@ -21,7 +21,8 @@ struct Panorama {
   ColourTextures colours{};  ///< for cameras with colour filters; without them these see luminance
 };
 
+/// `footprint`: side of the square that a pixel averages over, px.
 std::unique_ptr<Renderer> make_panorama_renderer(Panorama panorama, const Camera& camera, const Workers& workers,
-                                                 ColourFilters filters = ColourFilters::none);
+                                                 ColourFilters filters = ColourFilters::none, double footprint = 1);
 
 }  // namespace esim::inline backends::inline panorama

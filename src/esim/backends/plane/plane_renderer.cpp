@@ -13,20 +13,20 @@ constexpr int kLanes = 16;
 
 class PlaneRenderer final : public ProcessorRenderer {
  public:
-  PlaneRenderer(Poster poster, const Camera& camera, const Workers& workers, bool mosaic)
-      : poster_(std::move(poster)), rays_(camera), workers_(workers), mosaic_(mosaic) {}
+  PlaneRenderer(TexturedPlane plane, const Camera& camera, const Workers& workers, bool mosaic, double footprint)
+      : plane_(std::move(plane)), rays_(camera, footprint), workers_(workers), mosaic_(mosaic) {}
 
   RendererTraits traits() const override {
-    return {.name = "plane", .granularity = Granularity::tile, .at_infinity = false, .wide_pixels = true};
+    return {.name = "plane", .granularity = Granularity::tile, .at_infinity = false};
   }
 
  private:
   void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
     std::vector<View> views;
     for (const RenderRequest& request : requests) {
-      const SE3 T_poster_camera = poster_.T_world_poster.inverse() * request.camera.T_world_body;
+      const SE3 T_plane_camera = plane_.T_world_plane.inverse() * request.camera.T_world_body;
       views.push_back(
-          {T_poster_camera.rotation.toRotationMatrix().cast<float>(), T_poster_camera.translation.cast<float>()});
+          {T_plane_camera.rotation.toRotationMatrix().cast<float>(), T_plane_camera.translation.cast<float>()});
     }
     render_in_bands(requests, rays_, workers_, sample, [&](std::size_t which, const Tile& band) {
       for (int y = band.y; y < band.y + band.height; ++y) {
@@ -38,7 +38,7 @@ class PlaneRenderer final : public ProcessorRenderer {
   }
 
   struct View {
-    Eigen::Matrix3f R_poster_camera;
+    Eigen::Matrix3f R_plane_camera;
     Eigen::Vector3f origin;  // of the camera, in the plane's frame
   };
 
@@ -46,16 +46,16 @@ class PlaneRenderer final : public ProcessorRenderer {
     const RayLanes<kLanes> rays(rays_, first, row, count);
     TextureLookup<kLanes> at;
     alignas(64) std::array<float, kLanes> depth;
-    const Eigen::Matrix3f& R = view.R_poster_camera;
+    const Eigen::Matrix3f& R = view.R_plane_camera;
     const float r00 = R(0, 0), r01 = R(0, 1), r02 = R(0, 2);
     const float r10 = R(1, 0), r11 = R(1, 1), r12 = R(1, 2);
     const float r20 = R(2, 0), r21 = R(2, 1), r22 = R(2, 2);
     const float ox = view.origin.x(), oy = view.origin.y(), oz = view.origin.z();
-    const float per_width = 1.0F / static_cast<float>(poster_.width_m);
+    const float per_width = 1.0F / static_cast<float>(plane_.width_m);
     const float per_height =
-        per_width * static_cast<float>(poster_.radiance->width()) / static_cast<float>(poster_.radiance->height());
+        per_width * static_cast<float>(plane_.radiance->width()) / static_cast<float>(plane_.radiance->height());
     // The edge of the plane, in texture coordinates around its centre.
-    const float reach = poster_.endless ? 1e6F : 0.5F;
+    const float reach = plane_.endless ? 1e6F : 0.5F;
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
 #pragma omp simd
     for (int i = 0; i < kLanes; ++i) {
@@ -85,16 +85,16 @@ class PlaneRenderer final : public ProcessorRenderer {
       at.du_dy[i] = per_u * (down_x - dx * down_along);
       at.dv_dy[i] = per_v * (down_y - dy * down_along);
     }
-    const auto radiance = mosaic_ ? sample_mosaic(poster_.colours, first, row, at) : poster_.radiance->sample(at);
+    const auto radiance = mosaic_ ? sample_mosaic(plane_.colours, first, row, at) : plane_.radiance->sample(at);
     float* const irradiance = sample.irradiance.row(row) + first;
     for (int i = 0; i < count; ++i) {
       const auto lane = static_cast<unsigned>(i);
-      irradiance[i] = depth[lane] < kInfinity ? radiance[lane] : poster_.background;
+      irradiance[i] = depth[lane] < kInfinity ? radiance[lane] : plane_.background;
     }
     std::copy_n(depth.begin(), count, sample.depth.row(row) + first);
   }
 
-  Poster poster_;
+  TexturedPlane plane_;
   PixelRays rays_;
   const Workers& workers_;
   bool mosaic_;
@@ -102,10 +102,10 @@ class PlaneRenderer final : public ProcessorRenderer {
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_plane_renderer(Poster poster, const Camera& camera, const Workers& workers,
-                                              ColourFilters filters) {
-  const bool mosaic = filters == ColourFilters::rggb && poster.colours[0] != nullptr;
-  return std::make_unique<PlaneRenderer>(std::move(poster), camera, workers, mosaic);
+std::unique_ptr<Renderer> make_plane_renderer(TexturedPlane plane, const Camera& camera, const Workers& workers,
+                                              ColourFilters filters, double footprint) {
+  const bool mosaic = filters == ColourFilters::rggb && plane.colours[0] != nullptr;
+  return std::make_unique<PlaneRenderer>(std::move(plane), camera, workers, mosaic, footprint);
 }
 
 }  // namespace esim::inline backends::inline plane

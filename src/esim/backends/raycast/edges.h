@@ -6,6 +6,7 @@
 #include "esim/backends/raycast/packet.h"
 #include "esim/backends/raycast/raycast_scene.h"
 
+// Private to backends/raycast.
 /// Finds pixels that are crossed by edges of surfaces or of the light on them.
 namespace esim::inline backends::inline raycast {
 
@@ -40,10 +41,10 @@ std::uint32_t pixels_on_edges(const RaycastScene& scene, const RayBlock& block, 
     const float off = hit0.Ng_x[i] * dx + hit0.Ng_y[i] * dy + hit0.Ng_z[i] * dz;
     const int k = first + i;
     const float area = std::fabs(block.dx_du[k] * block.dy_dv[k] - block.dx_dv[k] * block.dy_du[k]);
-    const float most = kApart * ray0.tfar[i];
+    const float max = kApart * ray0.tfar[i];
     const float dark = std::min(centre.light[i], corner.light[i]), bright = std::max(centre.light[i], corner.light[i]);
     other_triangle[i] = centre.triangles[i] ^ corner.triangles[i];
-    const bool turned = n01 * std::fabs(n01)<kTurned * n00 * n11, apart = off * off> most * most * area * n00;
+    const bool turned = n01 * std::fabs(n01)<kTurned * n00 * n11, apart = off * off> max * max * area * n00;
     const bool bent = (turned | apart) & (other_triangle[i] != 0);
     const bool lit_otherwise = dark < kOtherLight * bright, other_group = hit0.instID[0][i] != hit1.instID[0][i];
     on_edge[i] = bent | lit_otherwise | other_group ? 1 : 0;

@@ -10,7 +10,8 @@
 
 #include <type_traits>
 
-namespace esim::embree {
+// Private to backends/raycast: includes Embree.
+namespace esim::inline backends::inline raycast::embree {
 
 /// K rays that are traced together: 4, 8 or 16.
 template <int K>
@@ -62,4 +63,4 @@ void occlude(const int* valid, RTCScene scene, Rays<K>& rays) {
   if constexpr (K == 4) query(rtcOccluded4);
 }
 
-}  // namespace esim::embree
+}  // namespace esim::inline backends::inline raycast::embree

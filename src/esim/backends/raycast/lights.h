@@ -4,6 +4,7 @@
 
 #include "esim/backends/raycast/surface.h"
 
+// Private to backends/raycast.
 /// Light on the surfaces that a packet of rays has hit. Vectors are in the camera frame unless stated otherwise.
 namespace esim::inline backends::inline raycast {
 

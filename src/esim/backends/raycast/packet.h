@@ -10,6 +10,7 @@
 #include "esim/backends/raycast/embree.h"
 #include "esim/backends/raycast/raycast_scene.h"
 
+// Private to backends/raycast: includes hwy/highway.h.
 namespace esim::inline backends::inline raycast {
 
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -137,8 +138,8 @@ void Packet<K>::intersect(const PlacedGroup& placed, unsigned group, std::span<c
     for (const SeenTriangle& triangle : triangles) {
       const V w0 = along(triangle.weight[0]), w1 = along(triangle.weight[1]), w2 = along(triangle.weight[2]);
       const V this_facing = along(triangle.facing);
-      const V least = hn::Min(hn::Min(w0, w1), w2);
-      auto nearer = hn::And(hn::Ge(least, hn::Zero(d)), hn::Gt(this_facing, hn::Set(d, triangle.least_facing)));
+      const V min = hn::Min(hn::Min(w0, w1), w2);
+      auto nearer = hn::And(hn::Ge(min, hn::Zero(d)), hn::Gt(this_facing, hn::Set(d, triangle.min_facing)));
       if (hn::AllFalse(d, nearer)) continue;
       const V this_depth = hn::Div(hn::Set(d, triangle.distance), this_facing);
       nearer = hn::And(nearer, hn::And(hn::Ge(this_depth, nearest), hn::Lt(this_depth, depth)));

@@ -18,10 +18,12 @@ namespace {
 /// The square over which pixels average, and the footprint of rays on textures. A single ray filters its surface with
 /// the triangle of bilinear interpolation between texels of a pixel's size, whose variance is 1/6 of a squared pixel.
 /// Rays spread over the pixel have the variance 1/12, and each covers half the area to supply the rest, so that
-/// surfaces do not suddenly become sharper when an edge enters a pixel. For pixels narrower than the camera's
+/// surfaces do not suddenly become sharper when an edge enters a pixel. If edges are averaged over less than the
 /// footprint, the mean over the footprint is equally sharp.
 struct Area {
   float side;  // of the square, in footprints
+
+  explicit Area(const PixelArea& area) : side(static_cast<float>(area.edges) / static_cast<float>(area.texture)) {}
 
   /// In footprints: the footprint of a ray on a texture, for a single ray and for one of many.
   float alone() const { return std::sqrt(0.5F * (1 + side * side)); }
@@ -106,12 +108,12 @@ void store(const Work<K>& work, const T* values, const Tile& tile, Image<T>& ima
 class RaycastRenderer final : public ProcessorRenderer {
  public:
   RaycastRenderer(std::shared_ptr<const RaycastScene> scene, const RaycastOptions& options, const Camera& camera,
-                  const Workers& workers, ColourFilters filters)
+                  const Workers& workers, ColourFilters filters, const PixelArea& area)
       : scene_(std::move(scene)),
         background_(options.background),
         places_(lattice(options.samples_per_pixel)),
-        footprint_(static_cast<float>(camera.footprint)),
-        rays_(camera),
+        area_(area),
+        rays_(camera, area.texture),
         blocks_(rays_),
         workers_(workers),
         mosaic_(filters == ColourFilters::rggb && scene_->has_colours()) {
@@ -123,13 +125,11 @@ class RaycastRenderer final : public ProcessorRenderer {
   }
 
   RendererTraits traits() const override {
-    return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false, .wide_pixels = true};
+    return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false};
   }
 
  private:
   void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
-    const Tile narrow = footprint_ > 1 ? Tile{0, 0, rays_.x.width(), rays_.x.height()} : Tile{};
-    if (sample.narrow.bounds() != narrow) sample.narrow = Image<float>(narrow.width, narrow.height);
     std::vector<Moment> moments;
     for (const RenderRequest& request : requests) {
       moments.push_back({scene_->place(request), scene_->lighting()});
@@ -199,23 +199,18 @@ class RaycastRenderer final : public ProcessorRenderer {
                     Sample& sample) const {
     for (Work<K>& work : batch) trace(moment, views, {0, 0}, work.rays);
     for (Work<K>& work : batch) store_geometry(work, band, sample);
-    const auto average = [&](const Area& area, Image<float>& image) {
-      shade<K>(moment, batch, area.alone());
-      if (places_.size() > 1) smooth_edges<K>(moment, views, area, batch);
-      for (Work<K>& work : batch) store(work, work.rays.irradiance.data(), band, image);
-    };
-    average({1}, sample.irradiance);
-    if (!sample.narrow.empty()) average({1 / footprint_}, sample.narrow);
+    shade<K>(moment, batch, area_.alone());
+    if (places_.size() > 1) smooth_edges<K>(moment, views, batch);
+    for (Work<K>& work : batch) store(work, work.rays.irradiance.data(), band, sample.irradiance);
   }
 
   /// Traces additional rays in the pixels that edges cross.
   template <int K>
-  void smooth_edges(const Moment& moment, std::span<const CellView> views, const Area& area,
-                    std::span<Work<K>> batch) const {
+  void smooth_edges(const Moment& moment, std::span<const CellView> views, std::span<Work<K>> batch) const {
     std::array<EdgeWork<K>, 8> closer;
     std::size_t count = 0;
     for (Work<K>& work : batch) {
-      for (std::uint32_t edges = edges_of(moment, views, area, work); edges != 0; edges &= edges - 1) {
+      for (std::uint32_t edges = edges_of(moment, views, work); edges != 0; edges &= edges - 1) {
         const auto lane = static_cast<unsigned>(std::countr_zero(edges));
         work.rays.irradiance[lane] = 0;
         for (std::size_t ray = 0; ray < places_.size(); ray += K) {
@@ -224,7 +219,7 @@ class RaycastRenderer final : public ProcessorRenderer {
           edge.rays.block = &edge.block, edge.rays.first = 0;
           edge.rays.first_material =
               mosaic_ ? first_material_of_edge(work.rays.first + static_cast<int>(lane)) : nullptr;
-          spread<K>(*work.rays.block, work.rays.first + static_cast<int>(lane), area, ray, edge.block);
+          spread<K>(*work.rays.block, work.rays.first + static_cast<int>(lane), ray, edge.block);
           if (count < closer.size()) continue;
           look_closer<K>(moment, views, std::span(closer));
           count = 0;
@@ -236,8 +231,7 @@ class RaycastRenderer final : public ProcessorRenderer {
 
   /// The pixels that edges cross, a bit per lane.
   template <int K>
-  std::uint32_t edges_of(const Moment& moment, std::span<const CellView> views, const Area& area,
-                         const Work<K>& work) const {
+  std::uint32_t edges_of(const Moment& moment, std::span<const CellView> views, const Work<K>& work) const {
     const bool shadows = moment.lighting && moment.lighting->shadows;
     const SeenSurfaces<K> centre{work.rays.packet, work.rays.triangle, work.rays.light};
     Rays<K> corner;
@@ -245,7 +239,7 @@ class RaycastRenderer final : public ProcessorRenderer {
     GroupRotations<K> rotations;
     std::uint32_t edges = 0;
     for (const Eigen::Vector2f& place : kCorners) {
-      trace(moment, views, area.side * place, corner);
+      trace(moment, views, area_.side * place, corner);
       corner.light = work.rays.light;
       if (const std::uint32_t lit = corner.hits & work.rays.lit; shadows && lit != 0)
         light_up(moment, rotations, lit, corner);
@@ -257,9 +251,9 @@ class RaycastRenderer final : public ProcessorRenderer {
 
   /// Makes a block of K rays in the pixel of lane `lane` of `from`, at the lattice's positions from `first` on.
   template <int K>
-  void spread(const RayBlock& from, int lane, const Area& area, std::size_t first, RayBlock& to) const {
+  void spread(const RayBlock& from, int lane, std::size_t first, RayBlock& to) const {
     for (std::size_t i = 0; i < K; ++i) {
-      const Eigen::Vector2f place = area.side * places_[first + i];
+      const Eigen::Vector2f place = area_.side * places_[first + i];
       to.x[i] = from.x[lane] + from.dx_du[lane] * place.x() + from.dx_dv[lane] * place.y();
       to.y[i] = from.y[lane] + from.dy_du[lane] * place.x() + from.dy_dv[lane] * place.y();
       to.dx_du[i] = from.dx_du[lane], to.dx_dv[i] = from.dx_dv[lane];
@@ -368,7 +362,7 @@ class RaycastRenderer final : public ProcessorRenderer {
   std::shared_ptr<const RaycastScene> scene_;
   float background_;
   std::vector<Eigen::Vector2f> places_;  // of the rays in a pixel that an edge crosses
-  float footprint_;                      // of the camera, px
+  Area area_;
   PixelRays rays_;
   RayBlocks blocks_;
   const Workers& workers_;
@@ -383,12 +377,12 @@ class RaycastRenderer final : public ProcessorRenderer {
 
 std::unique_ptr<Renderer> make_raycast_renderer(std::shared_ptr<const RaycastScene> scene,
                                                 const RaycastOptions& options, const Camera& camera,
-                                                const Workers& workers, ColourFilters filters) {
+                                                const Workers& workers, ColourFilters filters, const PixelArea& area) {
   const int n = options.samples_per_pixel;
   if (n != 1 && n != 16 && n != 64) {
     throw UserError("samples_per_pixel: " + std::to_string(n) + " is not supported; use 1, 16 or 64");
   }
-  return std::make_unique<RaycastRenderer>(std::move(scene), options, camera, workers, filters);
+  return std::make_unique<RaycastRenderer>(std::move(scene), options, camera, workers, filters, area);
 }
 
 }  // namespace esim::inline backends::inline raycast

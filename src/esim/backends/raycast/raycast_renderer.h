@@ -5,6 +5,7 @@
 #include "esim/core/colour.h"
 #include "esim/core/parallel.h"
 #include "esim/geometry/camera.h"
+#include "esim/render/pixel_area.h"
 #include "esim/render/renderer.h"
 #include "esim/scene/scene.h"
 
@@ -20,10 +21,11 @@ struct RaycastOptions {
 };
 
 /// Renders triangles by ray casting with Embree: the cost is proportional to the tiles, lens distortion is exact, and
-/// textures are averaged over the pixel's footprint. With colour filters, all rays of a pixel see the materials in its
+/// edges and textures are averaged over `area`. With colour filters, all rays of a pixel see the materials in its
 /// colour, or luminance if the scene has no colours.
 std::unique_ptr<Renderer> make_raycast_renderer(std::shared_ptr<const RaycastScene> scene,
                                                 const RaycastOptions& options, const Camera& camera,
-                                                const Workers& workers, ColourFilters filters = ColourFilters::none);
+                                                const Workers& workers, ColourFilters filters = ColourFilters::none,
+                                                const PixelArea& area = {});
 
 }  // namespace esim::inline backends::inline raycast

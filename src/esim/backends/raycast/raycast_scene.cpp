@@ -36,7 +36,7 @@ TriangleShading shading_of(const Mesh& mesh, std::size_t index, std::uint32_t fi
 }
 
 // With more triangles, most parts of an image see too many of them.
-constexpr std::size_t kMostInTree = 20'000;
+constexpr std::size_t kMaxInTree = 20'000;
 
 void throw_on_error(RTCDevice device, const char* what) {
   const RTCError error = rtcGetDeviceError(device);
@@ -139,7 +139,7 @@ void RaycastScene::add_group(const std::vector<const Mesh*>& meshes) {
   const Mesh all = meshes.size() == 1 ? Mesh() : joined(meshes);
   const Mesh& mesh = meshes.size() == 1 ? *meshes[0] : all;
   attach(device_.get(), group.accelerator.get(), mesh);
-  if (mesh.triangles.size() <= kMostInTree) group.tree = TriangleTree(mesh.vertices, mesh.triangles);
+  if (mesh.triangles.size() <= kMaxInTree) group.tree = TriangleTree(mesh.vertices, mesh.triangles);
   // One thread builds the tree, so that it is the same in every run. (The device's own limit on threads would affect
   // the complete process.)
   tbb::task_arena(1).execute([&group] { rtcJoinCommitScene(group.accelerator.get()); });

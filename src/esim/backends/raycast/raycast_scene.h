@@ -10,6 +10,7 @@
 #include "esim/backends/raycast/raycast_renderer.h"
 #include "esim/backends/raycast/triangle_tree.h"
 
+// Private to backends/raycast.
 namespace esim::inline backends::inline raycast {
 
 /// A triangle's data for shading, in one cache line. Texture coordinates are uv0 + b1 uv1 + b2 uv2 (barycentric b), and

@@ -6,6 +6,7 @@
 #include "esim/backends/raycast/packet.h"
 #include "esim/backends/raycast/raycast_scene.h"
 
+// Private to backends/raycast.
 /// Colours of the surfaces that a packet of rays has hit. All vectors are in the camera frame.
 namespace esim::inline backends::inline raycast {
 

@@ -38,7 +38,7 @@ std::span<Piece>::iterator cut(std::span<Piece> pieces) {
     return along < 1 ? static_cast<int>(along * kBins) : kBins - 1;
   };
 
-  float least = std::numeric_limits<float>::infinity();
+  float min = std::numeric_limits<float>::infinity();
   int best_axis = -1, best_bin = 0;
   for (int axis = 0; axis < 3; ++axis) {
     if (!(middles.sizes()[axis] > 0)) continue;
@@ -58,8 +58,8 @@ std::span<Piece>::iterator cut(std::span<Piece> pieces) {
       const Bin& bin = bins[static_cast<std::size_t>(i)];
       sum.box.extend(bin.box), sum.count += bin.count;
       const float cost = before[static_cast<std::size_t>(i)] + half_area(sum.box) * static_cast<float>(sum.count);
-      if (sum.count > 0 && sum.count < static_cast<int>(pieces.size()) && cost < least)
-        least = cost, best_axis = axis, best_bin = i;
+      if (sum.count > 0 && sum.count < static_cast<int>(pieces.size()) && cost < min)
+        min = cost, best_axis = axis, best_bin = i;
     }
   }
   if (best_axis < 0) return pieces.begin() + static_cast<std::ptrdiff_t>(pieces.size() / 2);
@@ -215,11 +215,11 @@ SeenTriangle seen(const std::array<Vector, 3>& corners, std::uint32_t index, con
   const float distance = facing.dot(p[0]), side = distance < 0 ? -1.0F : 1.0F;
   SeenTriangle triangle;
   const auto set = [](std::array<float, 3>& to, const Vector& v) { to = {v.x(), v.y(), v.z()}; };
-  triangle.least_facing = 0;
+  triangle.min_facing = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const Vector &from = p[(k + 1) % 3], &to = p[(k + 2) % 3];
     set(triangle.weight[k], side * edge_normal(from, to));
-    triangle.least_facing += kRounding * from.lpNorm<1>() * (to - from).lpNorm<1>();
+    triangle.min_facing += kRounding * from.lpNorm<1>() * (to - from).lpNorm<1>();
   }
   set(triangle.facing, side * facing);
   triangle.distance = side * distance;

@@ -18,7 +18,7 @@ struct SeenTriangle {
   std::array<std::array<float, 3>, 3> weight;
   std::array<float, 3> facing;  ///< normal to the plane, away from the camera
   float distance;
-  float least_facing;           ///< lower bound of facing . r unless the triangle is seen edge-on
+  float min_facing;             ///< lower bound of facing . r unless the triangle is seen edge-on
   std::array<float, 3> normal;  ///< (p1 - p0) x (p2 - p0) in the triangles' own frame
   std::uint32_t index;
 };
@@ -26,10 +26,10 @@ struct SeenTriangle {
 /// A container for a few triangles.
 class SeenTriangles {
  public:
-  static constexpr std::size_t kMost = 48;
+  static constexpr std::size_t kMax = 48;
 
   std::size_t size() const { return count_; }
-  bool full() const { return count_ == kMost; }
+  bool full() const { return count_ == kMax; }
   void add(const SeenTriangle& triangle) { triangles_[count_++] = triangle; }
 
   /// Keeps only the first `count`.
@@ -41,7 +41,7 @@ class SeenTriangles {
   }
 
  private:
-  std::array<SeenTriangle, kMost> triangles_;
+  std::array<SeenTriangle, kMax> triangles_;
   std::size_t count_ = 0;
 };
 

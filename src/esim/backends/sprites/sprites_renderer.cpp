@@ -26,12 +26,12 @@ class EdgeCoverage {
         per_area_(0.5F * per_wide_ / std::max(narrow_, 1e-9F * wide_)) {}
 
   float operator()(float coordinate) const {
-    return std::max(0.0F, share_inside(coordinate) + share_inside(1.0F - coordinate) - 1.0F);
+    return std::max(0.0F, fraction_inside(coordinate) + fraction_inside(1.0F - coordinate) - 1.0F);
   }
 
  private:
   /// The fraction inside an edge, for a pixel's centre at `distance` inside of it.
-  float share_inside(float distance) const {
+  float fraction_inside(float distance) const {
     const float depth = std::fabs(distance);
     const float tail = std::max(0.0F, 0.5F * (wide_ + narrow_) - depth);
     const float beyond = depth <= 0.5F * (wide_ - narrow_) ? 0.5F - depth * per_wide_ : tail * tail * per_area_;
@@ -47,7 +47,7 @@ inline float mirrored(float coordinate) {
   return turn > 1.0F ? 2.0F - turn : turn;
 }
 
-/// A layer on the sensor at one time.
+/// A sprite on the sensor at one time.
 struct PlacedSprite {
   const Sprite* sprite;
   std::uint16_t number;           // in the scene, from 1
@@ -63,17 +63,17 @@ struct PlacedSprite {
   }
 };
 
-/// Empty if the layer is degenerate: seen edge-on, or too small to be visible.
+/// Empty if the sprite is degenerate: seen edge-on, or too small to be visible.
 std::optional<PlacedSprite> place_on_sensor(const Sprite& sprite, std::uint16_t number, TimeNs t, PixelSize sensor) {
-  constexpr double kLeastArea_px2 = 1e-6;
-  const LayerPlacement at =
+  constexpr double kMinArea_px2 = 1e-6;
+  const SpritePlacement at =
       place(sprite.motion.at(t), sprite.units, {sprite.light->width(), sprite.light->height()}, sensor, sprite.pivot);
-  if (!(std::fabs(at.A.determinant()) > kLeastArea_px2)) return std::nullopt;
+  if (!(std::fabs(at.A.determinant()) > kMinArea_px2)) return std::nullopt;
   const Eigen::Matrix2d inverse = at.A.inverse();
 
   // Half of the image's extent on the sensor, half a pixel, and a margin for rounding.
   Eigen::Vector2d reach = 0.5 * at.A.cwiseAbs().rowwise().sum() + Eigen::Vector2d::Constant(1.0);
-  if (sprite.beyond != LayerBeyond::nothing) reach.setConstant(std::numeric_limits<double>::infinity());
+  if (sprite.beyond != SpriteBeyond::nothing) reach.setConstant(std::numeric_limits<double>::infinity());
   return PlacedSprite{&sprite,
                       number,
                       inverse,
@@ -85,10 +85,10 @@ std::optional<PlacedSprite> place_on_sensor(const Sprite& sprite, std::uint16_t 
                       reach};
 }
 
-/// Some pixels of a row, onto which layers are composited from front to back.
+/// Some pixels of a row, onto which sprites are composited from front to back.
 class Span {
  public:
-  /// `which`: determine which layer each pixel sees.
+  /// `which`: determine which sprite each pixel sees.
   Span(int first, int row, bool which) : first_(first), row_(row), which_(which) { transmittance_.fill(1.0F); }
 
   void lay_under(const PlacedSprite& placed);
@@ -108,8 +108,8 @@ class Span {
 
   void store(int count, Sample& sample) const {
     std::copy_n(irradiance_.begin(), count, sample.irradiance.row(row_) + first_);
-    std::copy_n(flow_x_.begin(), count, sample.flow_x.row(row_) + first_);
-    std::copy_n(flow_y_.begin(), count, sample.flow_y.row(row_) + first_);
+    std::copy_n(flow_x_.begin(), count, sample.motion_x.row(row_) + first_);
+    std::copy_n(flow_y_.begin(), count, sample.motion_y.row(row_) + first_);
     std::fill_n(sample.depth.row(row_) + first_, count, std::numeric_limits<float>::infinity());
     if (which_) std::copy_n(number_.begin(), count, sample.object.row(row_) + first_);
   }
@@ -119,11 +119,11 @@ class Span {
 
   int first_, row_;
   bool which_;
-  alignas(64) Lanes transmittance_{};  // of all layers so far
+  alignas(64) Lanes transmittance_{};  // of all sprites so far
   alignas(64) Lanes irradiance_{};
-  alignas(64) Lanes weight_{};  // the largest contribution of a layer to its pixel
+  alignas(64) Lanes weight_{};  // the largest contribution of a sprite to its pixel
   alignas(64) Lanes flow_x_{}, flow_y_{};
-  std::array<std::uint16_t, kLanes> number_{};  // of the layer with that contribution
+  std::array<std::uint16_t, kLanes> number_{};  // of the sprite with that contribution
 };
 
 TextureLookup<kLanes> Span::lookup(const PlacedSprite& placed) const {
@@ -149,9 +149,9 @@ void Span::lay_under(const PlacedSprite& placed) {
   TextureLookup<kLanes> at = lookup(placed);
   alignas(64) Lanes coverage;
   coverage.fill(1.0F);
-  if (sprite.beyond == LayerBeyond::nothing) {
+  if (sprite.beyond == SpriteBeyond::nothing) {
     for (unsigned i = 0; i < kLanes; ++i) coverage[i] = placed.coverage_u(at.u[i]) * placed.coverage_v(at.v[i]);
-  } else if (sprite.beyond == LayerBeyond::mirror) {
+  } else if (sprite.beyond == SpriteBeyond::mirror) {
     for (unsigned i = 0; i < kLanes; ++i) at.u[i] = mirrored(at.u[i]), at.v[i] = mirrored(at.v[i]);
   }
   const Lanes light = sprite.light->sample(at);

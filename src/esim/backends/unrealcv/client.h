@@ -12,6 +12,7 @@
 #include "esim/backends/unrealcv/session.h"
 #include "esim/core/parallel.h"
 
+// Private to backends/unrealcv.
 namespace esim::inline backends::inline unrealcv {
 
 /// A program with UnrealCV's protocol, of which one camera is moved. The client connects when a view is first waited

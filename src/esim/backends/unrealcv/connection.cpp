@@ -135,12 +135,12 @@ bool MessageConnection::read_into(char* to, std::size_t size, std::size_t& have,
   return true;
 }
 
-bool MessageConnection::receive(std::string& payload, std::size_t most_bytes, SteadyTime deadline) {
+bool MessageConnection::receive(std::string& payload, std::size_t max_bytes, SteadyTime deadline) {
   if (!read_into(header_, sizeof header_, have_header_, deadline)) return false;
   if (number_at(header_) != kMagic)
     throw ProtocolError("sent a message with a wrong magic number, which is not UnrealCV's protocol");
   const std::size_t size = number_at(header_ + 4);
-  if (size > most_bytes)
+  if (size > max_bytes)
     throw ProtocolError("announced a message of " + std::to_string(size) + " bytes, more than any answer can have");
   while (have_ < size) {
     incoming_.resize(std::min(size, have_ + kPortion));

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+// Private to backends/unrealcv.
 namespace esim::inline backends::inline unrealcv {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
@@ -44,9 +45,9 @@ class MessageConnection {
   /// ConnectionLost.
   void send(std::string_view payload);
 
-  /// Receives the next message, of at most `most_bytes`; false if it is not complete by the deadline. Throws
+  /// Receives the next message, of at most `max_bytes`; false if it is not complete by the deadline. Throws
   /// ConnectionLost, and ProtocolError for an invalid message.
-  bool receive(std::string& payload, std::size_t most_bytes, SteadyTime deadline);
+  bool receive(std::string& payload, std::size_t max_bytes, SteadyTime deadline);
 
  private:
   void write_some();

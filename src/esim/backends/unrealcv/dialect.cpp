@@ -30,10 +30,10 @@ std::string rotation_text(const UnrealPose& pose) {
 bool offers(const EngineRequest& request) { return request.answer && is_npy(*request.answer); }
 
 std::string shortened(const std::string& text) {
-  constexpr std::size_t kMost = 120;
+  constexpr std::size_t kMax = 120;
   std::string plain;
-  for (const char c : text.substr(0, kMost)) plain += c >= ' ' && c < 127 ? c : '?';
-  return text.size() > kMost ? plain + "..." : plain;
+  for (const char c : text.substr(0, kMax)) plain += c >= ' ' && c < 127 ? c : '?';
+  return text.size() > kMax ? plain + "..." : plain;
 }
 
 }  // namespace

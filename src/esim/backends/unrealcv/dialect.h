@@ -10,6 +10,7 @@
 #include "esim/geometry/se3.h"
 #include "esim/render/pinhole_lookup.h"
 
+// Private to backends/unrealcv.
 namespace esim::inline backends::inline unrealcv {
 
 /// A pinhole image that is requested from a program.

@@ -7,6 +7,7 @@
 #include "esim/core/image.h"
 #include "esim/render/pinhole_lookup.h"
 
+// Private to backends/unrealcv.
 /// Images in answers of UnrealCV, as PNG or NPY files. Errors are EngineErrors whose message is the end of a sentence
 /// about the image, without the address and the command.
 namespace esim::inline backends::inline unrealcv {

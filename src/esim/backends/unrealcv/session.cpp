@@ -12,13 +12,13 @@ namespace esim::inline backends::inline unrealcv {
 namespace {
 
 constexpr const char* kOneAtATime = "an UnrealCV server serves one client at a time";
-constexpr std::uint32_t kMostIds = 100'000'000;  // eight digits
+constexpr std::uint32_t kMaxIds = 100'000'000;  // eight digits
 
 /// The id at the beginning of an answer, and the position of its body. Notifications have no id.
 std::optional<std::pair<std::uint32_t, std::size_t>> id_of(std::string_view message) {
-  constexpr std::size_t kMostDigits = 8;
+  constexpr std::size_t kMaxDigits = 8;
   const std::size_t digits = std::min(message.find_first_not_of("0123456789"), message.size());
-  if (digits == 0 || digits > kMostDigits || digits == message.size() || message[digits] != ':') return std::nullopt;
+  if (digits == 0 || digits > kMaxDigits || digits == message.size() || message[digits] != ':') return std::nullopt;
   std::uint32_t id = 0;
   std::from_chars(message.data(), message.data() + digits, id);
   return std::pair{id, digits + 1};
@@ -40,10 +40,10 @@ EngineSession::EngineSession(const UnrealcvOptions& options, SteadyTime deadline
 }
 
 void EngineSession::require_greeting(SteadyTime deadline) {
-  constexpr std::size_t kMostGreeting = 4096;
+  constexpr std::size_t kMaxGreeting = 4096;
   bool came = false;
   try {
-    came = connection_.receive(message_, kMostGreeting, deadline);
+    came = connection_.receive(message_, kMaxGreeting, deadline);
   } catch (const ConnectionLost&) {
     throw ConnectionLost(std::string("it closed the connection at once; ") + kOneAtATime);
   }
@@ -59,7 +59,7 @@ void EngineSession::send(EngineBatch& batch) {
 
 void EngineSession::send_waiting() {
   while (!waiting_.empty() && (options_.pipelined || pending_.empty())) {
-    last_id_ = (last_id_ + 1) % kMostIds;
+    last_id_ = (last_id_ + 1) % kMaxIds;
     EngineRequest& request = *waiting_.front();
     waiting_.pop_front();
     pending_[last_id_] = &request;
@@ -86,7 +86,7 @@ void EngineSession::wait_for(std::span<const EngineRequest> batch) {
       bool is_answer = false, came = false;
       try {
         send_waiting();
-        came = connection_.receive(message_, most_bytes_, patience);
+        came = connection_.receive(message_, max_bytes_, patience);
         is_answer = came && take(message_);
       } catch (const ProtocolError& error) {
         fail(options_, fmt::format("after the request '{}', it {}", request.command, error.what()),

@@ -14,6 +14,7 @@
 #include "esim/backends/unrealcv/connection.h"
 #include "esim/backends/unrealcv/unrealcv_options.h"
 
+// Private to backends/unrealcv.
 namespace esim::inline backends::inline unrealcv {
 
 /// Throws EngineError: "unrealcv 127.0.0.1:9000: PROBLEM; REMEDY".
@@ -38,7 +39,7 @@ class EngineSession {
   EngineSession(const UnrealcvOptions& options, SteadyTime deadline);
 
   /// Allows answers of up to this number of bytes.
-  void expect_up_to(std::size_t bytes) { most_bytes_ = std::max(most_bytes_, bytes); }
+  void expect_up_to(std::size_t bytes) { max_bytes_ = std::max(max_bytes_, bytes); }
 
   /// Sends a batch, or queues it; it must exist until it is answered or the session ends.
   void send(EngineBatch& batch);
@@ -57,7 +58,7 @@ class EngineSession {
 
   const UnrealcvOptions& options_;
   MessageConnection connection_;
-  std::size_t most_bytes_ = std::size_t{1} << 27;  // maximum of a message
+  std::size_t max_bytes_ = std::size_t{1} << 27;  // maximum of a message
   std::string message_;
   std::uint32_t last_id_ = 0;
   std::deque<EngineRequest*> waiting_;               // to be sent

@@ -12,25 +12,32 @@
 namespace esim::inline dataset {
 namespace {
 
-constexpr int kUsualBins = 5, kMostBins = 100;
+constexpr int kUsualBins = 5, kMaxVoxelBins = 100;
 
 int bins_named(std::string_view text) {
   int bins = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), bins);
-  if (error != std::errc() || end != text.data() + text.size() || bins < 1 || bins > kMostBins)
-    throw UserError(fmt::format("voxels={}: must be a number of bins from 1 to {}", text, kMostBins));
+  if (error != std::errc() || end != text.data() + text.size() || bins < 1 || bins > kMaxVoxelBins)
+    throw UserError(fmt::format("voxels={}: must be a number of bins from 1 to {}", text, kMaxVoxelBins));
   return bins;
 }
 
 }  // namespace
 
+std::string present_content_name(const std::string& name) {
+  if (name == "flow") return "motion_field";
+  if (name == "displacement") return "optical_flow";
+  return name;
+}
+
 DatasetContents contents_named(const std::vector<std::string>& names) {
-  DatasetContents contents{.flow = false, .displacement = false};
-  for (const std::string& name : names) {
-    if (name == "flow") {
-      contents.flow = true;
-    } else if (name == "displacement") {
-      contents.displacement = true;
+  DatasetContents contents{.motion_field = false, .optical_flow = false};
+  for (const std::string& given : names) {
+    const std::string name = present_content_name(given);
+    if (name == "motion_field") {
+      contents.motion_field = true;
+    } else if (name == "optical_flow") {
+      contents.optical_flow = true;
     } else if (name == "depth") {
       contents.depth = true;
     } else if (name == "images") {
@@ -41,7 +48,8 @@ DatasetContents contents_named(const std::vector<std::string>& names) {
       contents.voxel_bins = name == "voxels" ? kUsualBins : bins_named(std::string_view(name).substr(7));
     } else if (name != "events") {
       throw UserError(fmt::format(
-          "contents: must be of events, flow, displacement, depth, images, tensor and voxels=BINS, not '{}'", name));
+          "contents: must be of events, motion_field, optical_flow, depth, images, tensor and voxels=BINS, not '{}'",
+          name));
     }
   }
   return contents;
@@ -49,8 +57,8 @@ DatasetContents contents_named(const std::vector<std::string>& names) {
 
 std::vector<std::string> names_of(const DatasetContents& contents) {
   std::vector<std::string> names{"events"};
-  if (contents.flow) names.emplace_back("flow");
-  if (contents.displacement) names.emplace_back("displacement");
+  if (contents.motion_field) names.emplace_back("motion_field");
+  if (contents.optical_flow) names.emplace_back("optical_flow");
   if (contents.depth) names.emplace_back("depth");
   if (contents.images) names.emplace_back("images");
   if (contents.tensor) names.emplace_back("tensor");
@@ -85,10 +93,11 @@ SequenceArrays::SequenceArrays(const Sequence& sequence, const DatasetContents& 
   ragged("events/y", made_->y, "px");
   ragged("events/p", made_->p, "1: brighter, -1: darker");
 
-  if (contents.flow)
-    add_pair("flow", sequence.flow.x, sequence.flow.y, "motion field at flow_t, px/s: to the right, downwards");
-  if (contents.displacement) {
-    add_pair("displacement", sequence.displacement.x, sequence.displacement.y,
+  if (contents.motion_field)
+    add_pair("motion_field", sequence.motion_field.x, sequence.motion_field.y,
+             "motion field at motion_field_t, px/s: to the right, downwards");
+  if (contents.optical_flow) {
+    add_pair("optical_flow", sequence.optical_flow.x, sequence.optical_flow.y,
              "from the start to the end, px: to the right, downwards; NaN outside the image");
   }
   const auto width = static_cast<std::uint64_t>(sequence.width), height = static_cast<std::uint64_t>(sequence.height);

@@ -12,16 +12,19 @@ namespace esim::inline dataset {
 
 /// The contents of a sequence in addition to its events.
 struct DatasetContents {
-  bool flow = true;
-  bool displacement = true;
+  bool motion_field = true;
+  bool optical_flow = true;
   bool depth = false;
   bool images = false;  ///< at the start and at the end, 8-bit sRGB
   bool tensor = false;  ///< EV-FlowNet's four channels
   int voxel_bins = 0;   ///< 0: no voxel grid
 };
 
-/// Parses "flow", "displacement", "depth", "images", "tensor", "voxels" (5 bins) or "voxels=BINS". Throws UserError
-/// for any other name.
+/// The present name of one of the contents: "motion_field" for "flow", "optical_flow" for "displacement".
+std::string present_content_name(const std::string& name);
+
+/// Parses "motion_field", "optical_flow", "depth", "images", "tensor", "voxels" (5 bins) or "voxels=BINS". Throws
+/// UserError for any other name. Old names are valid.
 DatasetContents contents_named(const std::vector<std::string>& names);
 
 /// The inverse of contents_named().

@@ -77,9 +77,9 @@ std::string difference(const Json& there, const Json& here, const std::string& w
     if (found != there.end() && *found == value) continue;
     if (found != there.end() && value.is_object() && found->is_object()) return difference(*found, value, key + ".");
     std::string before = found == there.end() ? "missing" : found->dump(), now = value.dump();
-    constexpr std::size_t kMost = 60;
+    constexpr std::size_t kMax = 60;
     for (std::string* text : {&before, &now}) {
-      if (text->size() > kMost) *text = "different";
+      if (text->size() > kMax) *text = "different";
     }
     return before == now ? fmt::format("{}{} differs", within, key)
                          : fmt::format("{}{} is {} there, but {} here", within, key, before, now);
@@ -118,8 +118,8 @@ int lock_byte(const fs::path& folder, std::uint64_t byte, bool wait) {
 }  // namespace
 
 std::uint32_t usual_shard_size(std::uint32_t count) {
-  constexpr std::uint32_t kMost = 100, kFiles = 16;
-  return std::clamp((count + kFiles - 1) / kFiles, 1U, kMost);
+  constexpr std::uint32_t kMax = 100, kFiles = 16;
+  return std::clamp((count + kFiles - 1) / kFiles, 1U, kMax);
 }
 
 DatasetFolder::DatasetFolder(fs::path folder, const DatasetPlan& plan, const std::string& version)

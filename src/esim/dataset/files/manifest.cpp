@@ -10,6 +10,7 @@
 #include "esim/dataset/files/checksum.h"
 #include "esim/dataset/files/preview.h"
 #include "esim/files/output_file.h"
+#include "esim/preview/pictures.h"
 
 namespace esim::inline dataset {
 namespace {
@@ -52,12 +53,12 @@ std::vector<std::uint64_t> magnitudes_of(const DatasetState& state) {
 
 std::string report_text(const DatasetState& state, const MagnitudeHistogram& bins, bool is_target,
                         const std::vector<std::uint64_t>& counts) {
-  const std::vector<double> shares = shares_of(counts);
-  Json magnitudes{{"edges_px", bins.edges}, {"shares", shares}};
+  const std::vector<double> fractions = fractions_of(counts);
+  Json magnitudes{{"edges_px", bins.edges}, {"fractions", fractions}};
   if (is_target) {
     magnitudes["target"] = bins.source;
-    magnitudes["target_shares"] = bins.shares;
-    magnitudes["total_variation"] = total_variation(shares, bins.shares);
+    magnitudes["target_fractions"] = bins.fractions;
+    magnitudes["total_variation"] = total_variation(fractions, bins.fractions);
   }
   std::map<std::string, std::string> passed_over;
   for (const ShardRecord& record : state.shards)
@@ -65,7 +66,7 @@ std::string report_text(const DatasetState& state, const MagnitudeHistogram& bin
   return Json{{"sequences", state.sequences},
               {"events", state.events},
               {"events_per_sequence", static_cast<double>(state.events) / static_cast<double>(state.sequences)},
-              {"displacement", std::move(magnitudes)},
+              {"optical_flow", std::move(magnitudes)},
               {"images_passed_over", passed_over.size()},
               {"passed_over", passed_over}}
              .dump(1) +

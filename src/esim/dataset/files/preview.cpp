@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "esim/stats/axes.h"
+#include "esim/plot/axes.h"
 #include "esim/visualise/page.h"
 
 namespace esim::inline dataset {
@@ -21,12 +21,12 @@ Image<Rgb> draw_events(const Sequence& sequence) {
   return render_events(on, off, sequence.first);
 }
 
-Image<Rgb> draw_flow(const Sequence& sequence) {
-  if (sequence.flow.empty()) return Image<Rgb>(sequence.width, sequence.height, kNoDepthColour);
+Image<Rgb> draw_motion_field(const Sequence& sequence) {
+  if (sequence.motion_field.empty()) return Image<Rgb>(sequence.width, sequence.height, kNoDepthColour);
   float fastest = 1e-3F;
-  for (std::size_t i = 0; i < sequence.flow.x.size(); ++i)
-    fastest = std::max(fastest, std::hypot(sequence.flow.x.data()[i], sequence.flow.y.data()[i]));
-  return colour_flow(sequence.flow.x, sequence.flow.y, fastest);
+  for (std::size_t i = 0; i < sequence.motion_field.x.size(); ++i)
+    fastest = std::max(fastest, std::hypot(sequence.motion_field.x.data()[i], sequence.motion_field.y.data()[i]));
+  return colour_motion(sequence.motion_field.x, sequence.motion_field.y, fastest);
 }
 
 double mean_magnitude(const VectorField& field) {
@@ -40,12 +40,12 @@ double mean_magnitude(const VectorField& field) {
 }
 
 /// The histogram's outline: fractions per doubling over the magnitude.
-std::vector<DataPoint> outline(const MagnitudeHistogram& bins, const std::vector<double>& shares, double least) {
+std::vector<DataPoint> outline(const MagnitudeHistogram& bins, const std::vector<double>& fractions, double min) {
   std::vector<DataPoint> points;
-  for (std::size_t i = 0; i < shares.size(); ++i) {
-    const double low = std::max(bins.edges[i], least), high = bins.edges[i + 1];
+  for (std::size_t i = 0; i < fractions.size(); ++i) {
+    const double low = std::max(bins.edges[i], min), high = bins.edges[i + 1];
     if (high <= low) continue;
-    const double density = shares[i] / std::log2(high / low);
+    const double density = fractions[i] / std::log2(high / low);
     points.push_back({low, 100 * density});
     points.push_back({high, 100 * density});
   }
@@ -62,44 +62,40 @@ Image<Rgb> draw_sequences(std::span<const Sequence> sequences) {
     Canvas canvas(kPanels * width + (kPanels - 1) * kGap_px, height, kDarkTheme.page);
     canvas.draw(grey(sequence.first), 0, 0);
     canvas.draw(draw_events(sequence), width + kGap_px, 0);
-    canvas.draw(draw_flow(sequence), 2 * (width + kGap_px), 0);
+    canvas.draw(draw_motion_field(sequence), 2 * (width + kGap_px), 0);
     pictures.push_back(
         {std::move(canvas).take(), fmt::format("{}:  {} events,  mean optical flow {:.3g} px", sequence.index,
-                                               sequence.events.size(), mean_magnitude(sequence.displacement))});
+                                               sequence.events.size(), mean_magnitude(sequence.optical_flow))});
   }
   return draw_contact_sheet(pictures, kColumns, kDarkTheme);
 }
 
-std::vector<double> shares_of(std::span<const std::uint64_t> counts) {
+std::vector<double> fractions_of(std::span<const std::uint64_t> counts) {
   const double sum = static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}));
-  std::vector<double> shares;
+  std::vector<double> fractions;
   for (const std::uint64_t count : counts.first(counts.size() - 1))
-    shares.push_back(sum > 0 ? static_cast<double>(count) / sum : 0.0);
-  return shares;
+    fractions.push_back(sum > 0 ? static_cast<double>(count) / sum : 0.0);
+  return fractions;
 }
 
 Image<Rgb> draw_magnitudes(const MagnitudeHistogram& bins, bool is_target, std::span<const std::uint64_t> counts) {
-  constexpr int kWidth = 900, kHeight = 480, kTextHeight = 10;
-  const double most = bins.edges.back(), least = most / 4096;
-  const std::vector<DataPoint> made = outline(bins, shares_of(counts), least);
-  const std::vector<DataPoint> target = is_target ? outline(bins, bins.shares, least) : std::vector<DataPoint>{};
+  constexpr int kWidth = 900, kHeight = 480;
+  const double max = bins.edges.back(), min = max / 4096;
+  const std::vector<DataPoint> made = outline(bins, fractions_of(counts), min);
+  const std::vector<DataPoint> target = is_target ? outline(bins, bins.fractions, min) : std::vector<DataPoint>{};
   double top = 1;
   for (const auto* points : {&made, &target}) {
     for (const DataPoint& point : *points) top = std::max(top, 1.15 * point.y);
   }
-  Canvas canvas(kWidth, kHeight, kPaper);
-  Axes axes(canvas, {80, 62, kWidth - 110, kHeight - 122}, "Optical flow of the pixels over a sequence",
-            decade_scale(least, most, "magnitude, px"), linear_scale(0, top, "% of pixels per doubling"));
-  for (std::size_t i = 0; i + 1 < made.size(); i += 2)
-    axes.fill(made[i].x, made[i + 1].x, 0, made[i].y, mix(kBarColour, kPaper, 0.5F));
+  const Rgb made_colour = mix(kBarColour, kLightTheme.page, 0.5F);
+  AxesOptions options{"Optical flow of the pixels over a sequence", {{"this dataset", made_colour}}};
+  if (is_target) options.legend.push_back({bins.source, kTargetColour, Mark::line});
+  Canvas canvas(kWidth, kHeight, kLightTheme.page);
+  Axes axes(canvas, canvas.pixels().bounds(), logarithmic_scale(min, max, "magnitude (px)"),
+            linear_scale(0, top, "pixels per doubling (%)"), std::move(options));
+  for (std::size_t i = 0; i + 1 < made.size(); i += 2) axes.fill(made[i].x, made[i + 1].x, 0, made[i].y, made_colour);
   axes.line(target, kTargetColour, 3);
   axes.finish();
-  canvas.fill({kWidth - 330, 32, 22, 8}, mix(kBarColour, kPaper, 0.5F));
-  canvas.text(kWidth - 300, 41, "this dataset", kTextHeight, kInk);
-  if (is_target) {
-    canvas.fill({kWidth - 190, 35, 22, 3}, kTargetColour);
-    canvas.text(kWidth - 160, 41, bins.source, kTextHeight, kInk);
-  }
   return std::move(canvas).take();
 }
 

@@ -7,11 +7,11 @@
 
 #include "esim/dataset/generators/magnitudes.h"
 #include "esim/dataset/sequence.h"
-#include "esim/preview/canvas.h"
+#include "esim/preview/colours.h"
 
 namespace esim::inline dataset {
 
-inline constexpr std::size_t kMostShown = 12;
+inline constexpr std::size_t kMaxShown = 12;
 inline constexpr const char* kPreviewName = "preview.png";
 inline constexpr const char* kMagnitudesName = "magnitudes.png";
 
@@ -23,6 +23,6 @@ Image<Rgb> draw_sequences(std::span<const Sequence> sequences);
 Image<Rgb> draw_magnitudes(const MagnitudeHistogram& bins, bool is_target, std::span<const std::uint64_t> counts);
 
 /// Counts as fractions of all; those beyond the bins are left out.
-std::vector<double> shares_of(std::span<const std::uint64_t> counts);
+std::vector<double> fractions_of(std::span<const std::uint64_t> counts);
 
 }  // namespace esim::inline dataset

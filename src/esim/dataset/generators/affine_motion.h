@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "esim/dataset/generators/magnitudes.h"
-#include "esim/scene/layer.h"
+#include "esim/scene/sprite.h"
 
 namespace esim::inline dataset {
 
@@ -20,14 +20,14 @@ struct MotionMix {
 
 /// An affine motion of an image about the centre of the sensor.
 struct AffineMotion {
-  std::array<LayerKeyframe, 3> keyframes{};  ///< at the start, half-way and at the end
+  std::array<SpritePose, 3> poses{};  ///< at the start, half-way and at the end
 
-  /// Root mean square over the sensor's pixels of the displacement from the start to the end, px.
-  double displacement_rms_px = 0;
+  /// Root mean square over the sensor's pixels of the optical flow from the start to the end, px.
+  double optical_flow_rms_px = 0;
 };
 
-/// An affine map of pixels about the centre of the sensor: p -> p + displacement(p).
-struct AffineDisplacement {
+/// An affine map of pixels about the centre of the sensor: p -> p + d(p).
+struct AffineFlow {
   Eigen::Matrix2d gradient = Eigen::Matrix2d::Zero();
   Eigen::Vector2d at_middle = Eigen::Vector2d::Zero();
 
@@ -35,7 +35,7 @@ struct AffineDisplacement {
 };
 
 /// The map from one placement of a sprite to another, on a sensor of this size.
-AffineDisplacement displacement_between(const LayerPlacement& from, const LayerPlacement& to, PixelSize sensor);
+AffineFlow flow_between(const SpritePlacement& from, const SpritePlacement& to, PixelSize sensor);
 
 /// The initial rotation and scale of a sprite.
 struct AffineStart {
@@ -43,7 +43,7 @@ struct AffineStart {
   double scale = 1;  ///< px per texel
 };
 
-/// Random motion `number` of a seed, scaled so that its displacement has the root mean square `rms_px`. Its speed
+/// Random motion `number` of a seed, scaled so that its optical flow has the root mean square `rms_px`. Its speed
 /// changes smoothly, by up to a third, and differently for each kind of motion, so that paths are curved.
 AffineMotion draw_motion(const MotionMix& mix, PixelSize sensor, const AffineStart& start, double duration_s,
                          double rms_px, std::uint64_t seed, std::uint32_t number);

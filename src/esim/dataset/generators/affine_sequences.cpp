@@ -11,13 +11,13 @@
 #include <utility>
 
 #include "esim/backends/sprites/sprites_renderer.h"
+#include "esim/compose/compose.h"
 #include "esim/core/error.h"
 #include "esim/core/random.h"
 #include "esim/dataset/collector.h"
 #include "esim/dataset/files/checksum.h"
 #include "esim/dataset/generators/image_folder.h"
 #include "esim/motion/static.h"
-#include "esim/sampling/make_sampler.h"
 #include "esim/scenario/conversion.h"
 #include "esim/scene/images/dead_leaves.h"
 #include "esim/sim/simulate.h"
@@ -33,25 +33,25 @@ struct Framing {
 
 /// A slightly rotated placement in which the image covers the sensor, unless a small image would be blurred.
 Framing draw_framing(PixelSize sensor, const Texture& image, const AddressedRandom& random, std::uint32_t index) {
-  constexpr double kMostTurn_deg = 30, kMostEnlarged = 1.5;
+  constexpr double kMaxTurn_deg = 30, kMaxEnlarged = 1.5;
   const auto [turn, size] = random.uniforms(index, 1);
   const auto [u, v] = random.uniforms(index, 2);
   Framing framing;
-  framing.start.rotation_deg = kMostTurn_deg * (2 * turn - 1);
+  framing.start.rotation_deg = kMaxTurn_deg * (2 * turn - 1);
   const double angle = framing.start.rotation_deg * std::numbers::pi / 180;
   const double c = std::fabs(std::cos(angle)), s = std::fabs(std::sin(angle));
 
   // Width and height of the sensor in the image, at scale 1, and the scale at which they just fit.
   const Eigen::Vector2d seen(sensor.width * c + sensor.height * s, sensor.width * s + sensor.height * c);
   const Eigen::Vector2d extent(image.width(), image.height());
-  const double least = seen.cwiseQuotient(extent).maxCoeff(), most = std::max(1.0, kMostEnlarged * least);
-  framing.start.scale = least * std::pow(most / least, size);
+  const double min = seen.cwiseQuotient(extent).maxCoeff(), max = std::max(1.0, kMaxEnlarged * min);
+  framing.start.scale = min * std::pow(max / min, size);
   const Eigen::Vector2d margin = 0.5 * seen.cwiseQuotient(extent) / framing.start.scale;
   framing.pivot = margin + (Eigen::Vector2d::Ones() - 2 * margin).cwiseProduct(Eigen::Vector2d(u, v));
   return framing;
 }
 
-VectorField affine_field(PixelSize size, const AffineDisplacement& map) {
+VectorField affine_field(PixelSize size, const AffineFlow& map) {
   VectorField field{Image<float>(size.width, size.height), Image<float>(size.width, size.height)};
   const Eigen::Vector2d middle((size.width - 1) / 2.0, (size.height - 1) / 2.0);
   for (int y = 0; y < size.height; ++y) {
@@ -65,10 +65,32 @@ VectorField affine_field(PixelSize size, const AffineDisplacement& map) {
 }
 
 /// The motion field, V = c' + A' A^-1 (pixel - c).
-AffineDisplacement velocity(const LayerPlacement& at, PixelSize sensor) {
+AffineFlow velocity(const SpritePlacement& at, PixelSize sensor) {
   const Eigen::Matrix2d gradient = at.A_rate * at.A.inverse();
   const Eigen::Vector2d middle((sensor.width - 1) / 2.0, (sensor.height - 1) / 2.0);
   return {gradient, at.centre_velocity + gradient * (middle - at.centre)};
+}
+
+/// A camera at rest that sees the sprites, without ground truth, on one thread.
+World world_of(const AffineOptions& o, const EventCameraOptions& event_camera, std::uint64_t seed,
+               const SpriteScene& scene) {
+  CameraOptions camera;
+  camera.name = "cam0";
+  camera.width = o.width;
+  camera.height = o.height;
+  camera.sampling = o.sampling;
+  camera.event_camera = event_camera;
+  Scenario scenario;
+  scenario.seed = seed;
+  scenario.cameras = {camera};
+  scenario.truth.rate_hz = scenario.truth.pose_rate_hz = 0;
+  Substitutes substitutes;
+  substitutes.body = std::make_shared<const StaticTrajectory>(SE3{}, 0, to_ns(o.duration_s));
+  substitutes.make_renderer = [&](const Camera& model, const Workers& workers) {
+    return make_sprites_renderer(scene, model, workers);
+  };
+  const auto ignore = [](const std::string&) {};
+  return build_world(scenario, substitutes, 1, {ignore, ignore});
 }
 
 void check(const AffineOptions& o) {
@@ -124,12 +146,12 @@ std::string AffineSequences::options() const {
       {"height", o.height},
       {"duration_s", o.duration_s},
       {"seed", o.seed},
-      {"flow_at", kEnumNames<FlowTime>[static_cast<std::size_t>(o.flow_at)]},
+      {"motion_field_at", kEnumNames<MotionFieldTime>[static_cast<std::size_t>(o.motion_field_at)]},
       {"contrast_threshold", {o.contrast_threshold.low, o.contrast_threshold.high}},
       {"mix", {o.mix.translation, o.mix.rotation, o.mix.scale, o.mix.shear}},
       {"sampling", write_sampling(o.sampling)},
       {"event_camera", write_event_camera(o.event_camera)},
-      {"magnitudes", {{"edges_px", o.magnitudes.edges}, {"shares", o.magnitudes.shares}}}};
+      {"magnitudes", {{"edges_px", o.magnitudes.edges}, {"fractions", o.magnitudes.fractions}}}};
   return json.dump();
 }
 
@@ -146,35 +168,21 @@ Sequence AffineSequences::make(std::uint32_t index) const {
   const double u = std::modf(AddressedRandom::open_unit(all[1], all[2]) + std::numbers::phi * index, &turn);
   const AffineMotion motion =
       draw_motion(o.mix, sensor, framing.start, o.duration_s, impl_->strengths.quantile(u), o.seed, index);
-  const LayerMotion layer({motion.keyframes.begin(), motion.keyframes.end()}, KeyframeInterpolation::spline);
+  const SpriteMotion sprite_motion({motion.poses.begin(), motion.poses.end()}, SpriteInterpolation::spline);
+  const Sprite sprite{picture.light, nullptr, SpriteUnits::pixel, SpriteBeyond::mirror, sprite_motion, framing.pivot};
 
   // The pixels.
   EventCameraOptions camera = o.event_camera;
   const AddressedRandom sensor_random(o.seed, Purpose::dataset_sensor);
   const auto words = sensor_random.bits(index);
-  const double share = sensor_random.uniforms(index, 1)[0];
-  camera.contrast_threshold = o.contrast_threshold.low + share * (o.contrast_threshold.high - o.contrast_threshold.low);
+  const double fraction = sensor_random.uniforms(index, 1)[0];
+  camera.contrast_threshold =
+      o.contrast_threshold.low + fraction * (o.contrast_threshold.high - o.contrast_threshold.low);
   camera.contrast_threshold_on.reset();
   camera.contrast_threshold_off.reset();
   const std::uint64_t sensor_seed = (std::uint64_t{words[0]} << 32) | words[1];
 
-  World world;
-  world.workers = std::make_unique<const Workers>(1);
-  world.info.end = to_ns(o.duration_s);
-  world.trajectory = std::make_shared<const StaticTrajectory>(SE3{}, 0, world.info.end);
-  const Camera model = Camera::from_fov(o.width, o.height, 1.0);
-  world.info.cameras.push_back({"cam0", model, {}});
-  SpriteScene scene;
-  scene.sprites.push_back({picture.light, nullptr, LayerUnits::pixel, LayerBeyond::mirror, layer, framing.pivot});
-  auto renderer = make_sprites_renderer(std::move(scene), model, *world.workers);
-  const SensorTraits traits{camera.contrast_threshold, camera.log_eps, false};
-  auto sampler = make_sampler(
-      o.sampling,
-      {traits, o.width, o.height, {0, world.info.end}, *world.workers, model, renderer->traits(), [](TimeNs t) {
-         return RenderRequest{.t = t, .camera = {}, .tiles = {}};
-       }});
-  world.cameras.push_back(
-      {std::move(renderer), std::move(sampler), EventCamera(camera, o.width, o.height, sensor_seed), {}});
+  World world = world_of(o, camera, sensor_seed, SpriteScene{{sprite}});
 
   Sequence sequence;
   sequence.index = index;
@@ -183,19 +191,21 @@ Sequence AffineSequences::make(std::uint32_t index) const {
 
   // Ground truth, from the placements of the image.
   const auto lies = [&](TimeNs t) {
-    return place(layer.at(t), LayerUnits::pixel, {picture.light->width(), picture.light->height()}, sensor,
+    return place(sprite_motion.at(t), SpriteUnits::pixel, {picture.light->width(), picture.light->height()}, sensor,
                  framing.pivot);
   };
   const TimeNs start = 0, end = world.info.end;
-  sequence.flow_t = o.flow_at == FlowTime::start ? start : o.flow_at == FlowTime::end ? end : end / 2;
-  sequence.flow = affine_field(sensor, velocity(lies(sequence.flow_t), sensor));
-  sequence.displacement = affine_field(sensor, displacement_between(lies(start), lies(end), sensor));
+  sequence.motion_field_t = o.motion_field_at == MotionFieldTime::start ? start
+                            : o.motion_field_at == MotionFieldTime::end ? end
+                                                                        : end / 2;
+  sequence.motion_field = affine_field(sensor, velocity(lies(sequence.motion_field_t), sensor));
+  sequence.optical_flow = affine_field(sensor, flow_between(lies(start), lies(end), sensor));
   Sample sample;
   for (const auto& [t, image] : {std::pair{start, &sequence.first}, std::pair{end, &sequence.last}}) {
     world.cameras[0].renderer->render(view(world, 0, t), sample);
     *image = sample.irradiance;
   }
-  const auto keyframe = [](const LayerKeyframe& k) {
+  const auto pose = [](const SpritePose& k) {
     return nlohmann::ordered_json{{"t_s", k.t_s},
                                   {"position", {k.position.x(), k.position.y()}},
                                   {"rotation_deg", k.rotation_deg},
@@ -203,13 +213,12 @@ Sequence AffineSequences::make(std::uint32_t index) const {
                                   {"shear", k.shear}};
   };
   sequence.passed_over = picture.passed_over;
-  const nlohmann::ordered_json info{
-      {"image", picture.name},
-      {"flow_t", sequence.flow_t},
-      {"contrast_threshold", camera.contrast_threshold},
-      {"displacement_rms_px", motion.displacement_rms_px},
-      {"pivot", {framing.pivot.x(), framing.pivot.y()}},
-      {"keyframes", {keyframe(motion.keyframes[0]), keyframe(motion.keyframes[1]), keyframe(motion.keyframes[2])}}};
+  const nlohmann::ordered_json info{{"image", picture.name},
+                                    {"motion_field_t", sequence.motion_field_t},
+                                    {"contrast_threshold", camera.contrast_threshold},
+                                    {"optical_flow_rms_px", motion.optical_flow_rms_px},
+                                    {"pivot", {framing.pivot.x(), framing.pivot.y()}},
+                                    {"poses", {pose(motion.poses[0]), pose(motion.poses[1]), pose(motion.poses[2])}}};
   sequence.info = info.dump();
   return sequence;
 }

@@ -16,13 +16,13 @@
 namespace esim::inline dataset {
 
 /// The time of the motion field.
-enum class FlowTime { start, middle, end };
+enum class MotionFieldTime { start, middle, end };
 }  // namespace esim::inline dataset
 
 namespace esim {
 
 template <>
-inline constexpr std::array<const char*, 3> kEnumNames<FlowTime>{"start", "middle", "end"};
+inline constexpr std::array<const char*, 3> kEnumNames<MotionFieldTime>{"start", "middle", "end"};
 
 }  // namespace esim
 
@@ -40,7 +40,7 @@ struct AffineOptions {
   MagnitudeHistogram magnitudes = sintel_magnitudes();  ///< of the optical flow over the duration
   double flow_scale = 1;                                ///< factor on the magnitudes
   MotionMix mix{};
-  FlowTime flow_at = FlowTime::middle;
+  MotionFieldTime motion_field_at = MotionFieldTime::middle;
   Range contrast_threshold{0.2, 0.5};  ///< C+ = C-, random for each sequence
   EventCameraOptions event_camera{};   ///< all other options
   SamplingOptions sampling = FlowSampling{};

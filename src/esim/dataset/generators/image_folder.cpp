@@ -20,10 +20,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kLeastSide_px = 32;
-constexpr std::int64_t kMostPixels = std::int64_t{1} << 26;
+constexpr int kMinSide_px = 32;
+constexpr std::int64_t kMaxPixels = std::int64_t{1} << 26;
 constexpr int kLargestSide_px = 1536;  // larger images are reduced to this
-constexpr std::size_t kMostTexelsKept = std::size_t{1} << 27;
+constexpr std::size_t kMaxTexelsKept = std::size_t{1} << 27;
 
 constexpr std::array<const char*, 13> kExtensions{".png", ".jpg",  ".jpeg", ".tif", ".tiff", ".bmp", ".exr",
                                                   ".hdr", ".webp", ".jp2",  ".ppm", ".pgm",  ".pnm"};
@@ -37,11 +37,11 @@ bool is_image(const fs::path& file) {
 
 /// Throws UserError for an unsupported size.
 void check_size(const fs::path& file, std::int64_t width, std::int64_t height) {
-  if (std::min(width, height) < kLeastSide_px) {
+  if (std::min(width, height) < kMinSide_px) {
     throw UserError(fmt::format("image {}: {}x{} px is too small; each side must have at least {} px", file.string(),
-                                width, height, kLeastSide_px));
+                                width, height, kMinSide_px));
   }
-  if (width > kMostPixels / height) {
+  if (width > kMaxPixels / height) {
     throw UserError(
         fmt::format("image {}: {}x{} px is too large; it must have at most 2^26 px", file.string(), width, height));
   }
@@ -129,7 +129,7 @@ std::shared_ptr<const Texture> ImageFolder::texture(std::size_t index) const {
   kept_.emplace_front(index, loaded);
   where_[index] = kept_.begin();
   kept_texels_ += texels(*loaded);
-  while (kept_texels_ > kMostTexelsKept && kept_.size() > 1) {
+  while (kept_texels_ > kMaxTexelsKept && kept_.size() > 1) {
     kept_texels_ -= texels(*kept_.back().second);
     where_.erase(kept_.back().first);
     kept_.pop_back();

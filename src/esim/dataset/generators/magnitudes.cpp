@@ -13,12 +13,12 @@
 namespace esim::inline dataset {
 namespace {
 
-constexpr double kMostMagnitude_px = 1e4;
-constexpr std::size_t kMostBins = 1000;
+constexpr double kMaxMagnitude_px = 1e4;
+constexpr std::size_t kMaxHistogramBins = 1000;
 
-void normalise(std::vector<double>& shares) {
-  const double sum = std::accumulate(shares.begin(), shares.end(), 0.0);
-  for (double& share : shares) share /= sum;
+void normalise(std::vector<double>& fractions) {
+  const double sum = std::accumulate(fractions.begin(), fractions.end(), 0.0);
+  for (double& fraction : fractions) fraction /= sum;
 }
 
 /// Reads one line of a file; false for a blank line.
@@ -33,15 +33,16 @@ bool read_bin(const std::string& place, std::string line, MagnitudeHistogram& in
     throw UserError(place + ": must be three numbers, LOW HIGH WEIGHT");
   const double before = into.edges.empty() ? 0 : into.edges.back();
   if (low != before) throw UserError(fmt::format("{}: LOW is {} px, but must continue at {} px", place, low, before));
-  if (!(high > low) || !(high <= kMostMagnitude_px))
+  if (!(high > low) || !(high <= kMaxMagnitude_px))
     throw UserError(
-        fmt::format("{}: HIGH is {} px, but must be above {} and at most {} px", place, high, low, kMostMagnitude_px));
+        fmt::format("{}: HIGH is {} px, but must be above {} and at most {} px", place, high, low, kMaxMagnitude_px));
   if (!(weight >= 0) || !std::isfinite(weight))
     throw UserError(fmt::format("{}: WEIGHT is {}, but must be at least 0", place, weight));
-  if (into.bins() == kMostBins) throw UserError(fmt::format("{}: has more than {} bins; merge some", place, kMostBins));
+  if (into.bins() == kMaxHistogramBins)
+    throw UserError(fmt::format("{}: has more than {} bins; merge some", place, kMaxHistogramBins));
   if (into.edges.empty()) into.edges.push_back(0);
   into.edges.push_back(high);
-  into.shares.push_back(weight);
+  into.fractions.push_back(weight);
   return true;
 }
 
@@ -54,8 +55,8 @@ std::size_t MagnitudeHistogram::bin_of(double magnitude) const {
 
 double MagnitudeHistogram::quantile(double u) const {
   for (std::size_t i = 0; i < bins(); ++i) {
-    if (u < shares[i]) return edges[i] + u / shares[i] * (edges[i + 1] - edges[i]);
-    u -= shares[i];
+    if (u < fractions[i]) return edges[i] + u / fractions[i] * (edges[i + 1] - edges[i]);
+    u -= fractions[i];
   }
   return edges.back();  // rounding
 }
@@ -77,9 +78,9 @@ MagnitudeHistogram sintel_magnitudes() {
   for (int i = 0; i < kBins; ++i) {  // two bins per doubling
     result.edges.push_back(kLast_px * std::exp2(-0.5 * (kBins - 1 - i)));
     const double before = result.edges.end()[-2];
-    result.shares.push_back(below(result.edges.back()) - (before > 0 ? below(before) : 0.0));
+    result.fractions.push_back(below(result.edges.back()) - (before > 0 ? below(before) : 0.0));
   }
-  normalise(result.shares);
+  normalise(result.fractions);
   return result;
 }
 
@@ -91,9 +92,9 @@ MagnitudeHistogram read_magnitudes(const std::filesystem::path& file) {
   std::string line;
   for (int number = 1; std::getline(stream, line); ++number)
     read_bin(fmt::format("{}:{}", file.string(), number), line, result);
-  if (!(std::accumulate(result.shares.begin(), result.shares.end(), 0.0) > 0))
+  if (!(std::accumulate(result.fractions.begin(), result.fractions.end(), 0.0) > 0))
     throw UserError(file.string() + ": needs at least one line LOW HIGH WEIGHT with a weight above 0");
-  normalise(result.shares);
+  normalise(result.fractions);
   return result;
 }
 

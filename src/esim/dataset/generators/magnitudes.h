@@ -7,13 +7,14 @@
 
 namespace esim::inline dataset {
 
-/// A histogram of magnitudes of optical flow: the fraction `shares[i]` lies between `edges[i]` and `edges[i + 1]`, px.
+/// A histogram of magnitudes of optical flow: the fraction `fractions[i]` lies between `edges[i]` and `edges[i + 1]`,
+/// px.
 struct MagnitudeHistogram {
-  std::vector<double> edges{};   ///< increasing, from 0 on; one more than shares
-  std::vector<double> shares{};  ///< not negative, sum 1
-  std::string source{};          ///< name of its origin, for reports
+  std::vector<double> edges{};      ///< increasing, from 0 on; one more than fractions
+  std::vector<double> fractions{};  ///< not negative, sum 1
+  std::string source{};             ///< name of its origin, for reports
 
-  std::size_t bins() const { return shares.size(); }
+  std::size_t bins() const { return fractions.size(); }
 
   /// The bin of a magnitude >= 0; bins() beyond the last edge.
   std::size_t bin_of(double magnitude) const;

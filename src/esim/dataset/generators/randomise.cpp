@@ -41,10 +41,10 @@ std::pair<Number, Number> two_numbers(const Place& place, const YAML::Node& valu
 
 /// Reads LOW and HIGH, LOW first.
 template <typename Number>
-std::pair<Number, Number> range(const Place& place, const YAML::Node& value, Number least) {
+std::pair<Number, Number> range(const Place& place, const YAML::Node& value, Number min) {
   const auto [low, high] = two_numbers<Number>(place, value, "[LOW, HIGH]");
   if (low > high) place.fail(fmt::format("LOW is {}, but must be at most HIGH, {}; swap them", low, high));
-  if (low < least) place.fail(fmt::format("LOW is {}, but must be at least {}", low, least));
+  if (low < min) place.fail(fmt::format("LOW is {}, but must be at least {}", low, min));
   return {low, high};
 }
 

@@ -12,7 +12,7 @@
 #include "esim/core/random.h"
 #include "esim/dataset/collector.h"
 #include "esim/scenario/read.h"
-#include "esim/truth/displacement.h"
+#include "esim/truth/optical_flow.h"
 
 namespace esim::inline dataset {
 namespace {
@@ -48,12 +48,12 @@ std::vector<std::string> extremes(const Distribution& distribution) {
 }  // namespace
 
 ScenarioSequences::ScenarioSequences(const std::filesystem::path& file, std::vector<std::string> overrides,
-                                     std::uint64_t seed, bool displacement)
+                                     std::uint64_t seed, bool optical_flow)
     : file_(file),
       template_(read_template(text_of(file), file.string())),
       overrides_(std::move(overrides)),
       seed_(seed),
-      displacement_(displacement),
+      optical_flow_(optical_flow),
       magnitudes_(sintel_magnitudes()) {
   const auto read = [&](std::vector<std::string> set, const char* setter) {
     return read_scenario(
@@ -78,7 +78,7 @@ std::string ScenarioSequences::options() const {
   }
   return nlohmann::ordered_json{{"kind", "scenario"},      {"scenario", template_.yaml},
                                 {"randomise", drawn_from}, {"set", overrides_},
-                                {"seed", seed_},           {"displacement", displacement_}}
+                                {"seed", seed_},           {"optical_flow", optical_flow_}}
       .dump();
 }
 
@@ -120,22 +120,22 @@ Sequence ScenarioSequences::make(std::uint32_t index) const {
   const TimeNs start = world.info.start, end = world.info.end;
   Renderer& renderer = *world.cameras[0].renderer;
   Sample sample;
-  DisplacementField field(world.info.cameras[0].model, *world.workers);
+  OpticalFlowFromDepth field(world.info.cameras[0].model, *world.workers);
   const RenderRequest first = view(world, 0, start), last = view(world, 0, end);
   renderer.render(first, sample);
   sequence.first = sample.irradiance;
   sequence.depth = sample.depth;
-  const bool has_displacement = displacement_ && !renderer.traits().on_sensor;
-  if (has_displacement) field.advance(first, sample);
+  const bool has_optical_flow = optical_flow_ && !renderer.traits().on_sensor;
+  if (has_optical_flow) field.advance(first, sample);
   renderer.render(last, sample);
   sequence.last = sample.irradiance;
-  sequence.flow = {sample.flow_x, sample.flow_y};
-  sequence.flow_t = end - start;
-  if (has_displacement) {
-    const Displacement* const displacement = field.advance(last, sample);
-    sequence.displacement = {displacement->x, displacement->y};
+  sequence.motion_field = {sample.motion_x, sample.motion_y};
+  sequence.motion_field_t = end - start;
+  if (has_optical_flow) {
+    const OpticalFlowImages* const optical_flow = field.advance(last, sample);
+    sequence.optical_flow = {optical_flow->x, optical_flow->y};
   }
-  info["flow_t"] = sequence.flow_t;
+  info["motion_field_t"] = sequence.motion_field_t;
   sequence.info = info.dump();
   return sequence;
 }

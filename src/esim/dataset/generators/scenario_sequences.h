@@ -19,7 +19,7 @@ class ScenarioSequences final : public SequenceMaker {
   /// `overrides` are "key=value" as for `--set`. Throws UserError if the scenario cannot be read (tested with the first
   /// sequence), if it has several cameras, and for ground truth that the renderer does not support.
   ScenarioSequences(const std::filesystem::path& file, std::vector<std::string> overrides, std::uint64_t seed,
-                    bool displacement);
+                    bool optical_flow);
 
   std::string options() const override;
   const MagnitudeHistogram& magnitudes() const override { return magnitudes_; }
@@ -34,7 +34,7 @@ class ScenarioSequences final : public SequenceMaker {
   ScenarioTemplate template_;
   std::vector<std::string> overrides_;
   std::uint64_t seed_;
-  bool displacement_;
+  bool optical_flow_;
   MagnitudeHistogram magnitudes_;
 };
 

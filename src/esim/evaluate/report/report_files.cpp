@@ -5,7 +5,7 @@
 #include "esim/evaluate/report/figures.h"
 #include "esim/evaluate/report/report_markdown.h"
 #include "esim/files/output_file.h"
-#include "esim/preview/canvas.h"
+#include "esim/preview/pictures.h"
 
 namespace esim::inline evaluate {
 namespace {

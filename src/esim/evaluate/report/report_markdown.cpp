@@ -19,7 +19,7 @@ std::string setup(const SamplingEvaluation& e) {
       "turns at up to {:.0f} deg/s.\n"
       "- Brightness: L = ln(E + {:g}) of {} pixels, compared with renderings at {:g} Hz{}.\n",
       e.renderer, e.width, e.height, to_seconds(e.span.end - e.span.start), e.motion.mean(e.span),
-      e.motion.greatest_px_per_s, e.motion.fastest_turn_deg_per_s, e.log_eps, e.pixels.size(), options.truth_rate_hz,
+      e.motion.max_px_per_s, e.motion.fastest_turn_deg_per_s, e.log_eps, e.pixels.size(), options.truth_rate_hz,
       options.truth_rays > 0 ? fmt::format(", with {} rays per pixel at edges", options.truth_rays) : "");
   if (!e.event_spans.empty()) {
     text += fmt::format(
@@ -98,7 +98,7 @@ std::string events_table(const SamplingEvaluation& e, std::size_t w) {
     const EventComparison& c = *scheme.windows[w].events;
     const double reference = static_cast<double>(std::max<std::int64_t>(1, c.reference));
     text += fmt::format("| {} | {:.3f} | {:.1f} | {:.2f} | {:.1f} | {:.2f} | {:.2f} |\n", scheme.text, c.count_ratio(),
-                        100 * c.identical_share(), c.median_s * 1e6, c.p95_s * 1e6,
+                        100 * c.identical_fraction(), c.median_s * 1e6, c.p95_s * 1e6,
                         100 * static_cast<double>(c.missing) / reference,
                         100 * static_cast<double>(c.spurious) / reference);
   }

@@ -178,11 +178,11 @@ void CleanPass::Block::settle(PixelArray& pixels) {
   }
   PixelArray::CleanPixel* const states = pixels.clean_pixels.data();
   for (std::size_t i = 0; i < all.count; ++i) states[pixel[i]].reference = all.reference[i];
-  pixels.set_bands(all.count, pixel.data(), low.data(), high.data());
-  if (pixels.holds) {
+  pixels.set_bounds(all.count, pixel.data(), low.data(), high.data());
+  if (pixels.effects.holds) {
     for (std::size_t i = 0; i < all.count; ++i) {
       if (all.reference[i] == kHeld) [[unlikely]]
-        pixels.empty_band(pixel[i]);
+        pixels.empty_bounds(pixel[i]);
     }
   }
   all.count = 0;
@@ -197,12 +197,12 @@ void CleanPass::run_block(PixelArray& pixels, const Segment& segment, PackedEven
   if (block.some_held) block.resume(pixels, segment);
 
   const double duration = static_cast<double>(segment.t1 - segment.t0);
-  const double refractory = pixels.holds ? static_cast<double>(pixels.refractory) : -1.0;
+  const double refractory = pixels.effects.holds ? static_cast<double>(pixels.refractory) : -1.0;
   const auto round = [&](Lanes& lanes, const std::uint32_t* which) {
     const double last_reset = lanes.fire(duration, refractory);
     const double* const polarity = lanes.polarity.data();
     events.add(lanes.count, segment.t0, lanes.crossing.data(), lanes.place.data(), polarity, polarity);
-    if (pixels.holds && !wait && last_reset > duration) block.hold(pixels, lanes, which, segment.t0, duration);
+    if (pixels.effects.holds && !wait && last_reset > duration) block.hold(pixels, lanes, which, segment.t0, duration);
   };
   // Most active pixels fire once; the others continue in a smaller group.
   round(block.all, nullptr);

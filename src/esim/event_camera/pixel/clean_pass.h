@@ -1,3 +1,4 @@
+// Accelerates next_event() in reference.cpp, only (6) and `hold` of (11), for a block of pixels.
 #pragma once
 
 #include <cstddef>
@@ -10,11 +11,11 @@
 #include "esim/events/packed_events.h"
 #include "esim/render/sample.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// Advances the active pixels through a segment if only changes of irradiance make pixels fire and their bounds are of
-/// irradiance: as PixelPass, but in whole vectors and without branches. Private to the event camera; keeps its working
-/// memory.
+/// irradiance: as PixelPass, but in whole vectors and without branches. Keeps its working memory.
 class CleanPass {
  public:
   CleanPass();

@@ -21,7 +21,7 @@ void LinearSignals::find(Comparators& c) const {
   const double duration = duration_;
 #pragma omp simd
   for (std::size_t i = 0; i < c.count; ++i) {
-    const double rate = slope(i) + c.leak[i], last = end_[i] + c.leak[i] * duration;
+    const double rate = slope(i) + c.drift[i], last = end_[i] + c.drift[i] * duration;
     const double upper = c.upper(i), lower = c.lower(i), from = c.from[i];
     const bool on = last >= upper, off = last <= lower;
     double tau = rate != 0 ? ((on ? upper : lower) - start_[i]) / rate : from;
@@ -39,7 +39,7 @@ void LinearSignals::advance(const Comparators& c) {
 void LinearSignals::look_ahead(const Comparators& c, double* again) const {
 #pragma omp simd
   for (std::size_t i = 0; i < c.count; ++i) {
-    const double last = end_[i] + c.leak[i] * duration_;
+    const double last = end_[i] + c.drift[i] * duration_;
     again[i] = last >= c.upper(i) || last <= c.lower(i) ? 1.0 : 0.0;
   }
 }

@@ -1,7 +1,9 @@
+// Accelerates (3) and (6), reference_signal.h without poles, for a block of pixels.
 #pragma once
 
 #include "esim/event_camera/pixel/pixel_block.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// The signals of comparators without a low-pass: straight lines in brightness.

@@ -1,3 +1,4 @@
+// The state of struct Pixel in reference.cpp, for a block of pixels.
 #pragma once
 
 #include <cstddef>
@@ -5,8 +6,12 @@
 
 #include "esim/core/per_pixel.h"
 
-// Blocks of pixels that advance through a segment. Private to the event camera.
+// Blocks of pixels that advance through a segment.
+// Private to event_camera.
 namespace esim::inline event_camera {
+
+/// Effectively never, ns: three years.
+inline constexpr double kNeverNs = 1e17;
 
 /// The active pixels of a segment. Unused values of the low-pass are arbitrary.
 struct ActivePixels {
@@ -25,12 +30,12 @@ struct ActivePixels {
 };
 
 /// The comparators of a block: levels and results. Times are in ns after the segment's start. The signal is G minus the
-/// leak until the segment's start: F(tau) + leak tau, where F is the brightness after the low-pass.
+/// drift until the segment's start: F(tau) + drift tau, where F is the brightness after the low-pass.
 struct Comparators {
   double threshold_on = 0, threshold_off = 0;
   PerPixel<float> on, off;  ///< the pixel's thresholds relative to these two
   PerPixel<double> reference;
-  PerPixel<double> leak;      ///< 1/ns
+  PerPixel<double> drift;     ///< contribution of the effects to the signal, 1/ns
   PerPixel<double> from;      ///< start of the search
   PerPixel<double> tau;       ///< first time at which the signal leaves the levels
   PerPixel<double> polarity;  ///< crossed level: 1 upper, -1 lower, 0 none
@@ -40,7 +45,7 @@ struct Comparators {
   double lower(std::size_t i) const { return reference[i] - (threshold_off + static_cast<double>(off[i])); }
 
   void copy(std::size_t i, std::size_t to) {
-    on[to] = on[i], off[to] = off[i], reference[to] = reference[i], leak[to] = leak[i], from[to] = from[i];
+    on[to] = on[i], off[to] = off[i], reference[to] = reference[i], drift[to] = drift[i], from[to] = from[i];
   }
 };
 

@@ -1,19 +1,21 @@
+// Accelerates next_event() in reference.cpp, (6) to (12), for a block of pixels.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
-#include "esim/core/pixel_normals.h"
+#include "esim/event_camera/effects/effects.h"
 #include "esim/event_camera/pixel/linear_signals.h"
 #include "esim/event_camera/pixel/pixel_array.h"
 #include "esim/event_camera/pixel/pixel_block.h"
 #include "esim/event_camera/pixel/relaxing_signals.h"
 #include "esim/events/packed_events.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// Advances active pixels through a segment, with all random effects. In each round, every pixel of a block fires at
-/// most one event, in vectors. Private to the event camera; keep the object for its working memory.
+/// most one event, in vectors. Keep the object for its working memory.
 template <class Signals>
 class PixelPass {
  public:
@@ -38,20 +40,15 @@ class PixelPass {
   void resume_held();
 
   // The steps of a round, for all remaining pixels.
-  void find_shots(const PixelArray& pixels, const ActivePixels& active);
-  void find_shot(const PixelArray& pixels, const ActivePixels& active, std::size_t i);
-  void renew(const PixelArray& pixels, const ActivePixels& active);
-  void fire(const PixelArray& pixels, const ActivePixels& active, const EventPacking& packing);
-  void delay(const PixelArray& pixels, const ActivePixels& active, const EventPacking& packing);
+  void renew(const PixelArray& pixels);
+  void fire(const PixelArray& pixels);
   void reset(const PixelArray& pixels, bool wait);
   void deactivate(PixelArray& pixels, ActivePixels& active);
 
-  void draw_uniforms(const AddressedRandom& random, const ActivePixels& active, std::uint32_t draw);
   void keep(ActivePixels& active, std::size_t i, std::size_t to);
-  void write_back(PixelArray::NoisyPixel& own, std::size_t i) const;
+  void write_back(const PixelEffects& effects, PixelArray::NoisyPixel& state, std::size_t i) const;
 
   TimeNs t0_ = 0;
-  double duration_ = 0;  // ns
   double epoch_ns_ = 0;  // from the epoch to t0
 
   // Pixels that have not resumed yet, and whose refractory period ends in the segment.
@@ -59,18 +56,12 @@ class PixelPass {
   std::size_t held_count_ = 0;
 
   // Per remaining pixel. Times are in ns after t0.
-  Comparators compare_{};
-  PerPixel<std::uint32_t> draws_{}, shots_{};
-  PerPixel<float> mean_on_{}, mean_off_{}, mean_leak_{};
-  PerPixel<double> shot_{};     // next candidate of shot noise
-  PerPixel<double> until_{};    // end of the last refractory period
-  PerPixel<double> passed_{};   // the level that the event crossed
-  PerPixel<double> anew_{};     // 1: the new reference is the current signal, not the level
-  PerPixel<double> stamp_{};    // time stamp of the event
-  PerPixel<double> reports_{};  // 0 if the event is lost
-  PerPixel<double> again_{};    // 1 if another event may follow
-  PixelNormals normals_{};
-  PerPixel<double> uniform_{};
+  Round round_;
+  PixelEffects::Lanes lanes_;
+  PerPixel<std::uint32_t> draws_{};  // number of draws for events
+  PerPixel<double> until_{};         // end of the last refractory period
+  PerPixel<double> reports_{};       // 0 if the event is lost
+  PerPixel<double> again_{};         // 1 if another event may follow
 
   // The bounds of inactive pixels.
   PerPixel<float> low_{}, high_{};

@@ -39,7 +39,7 @@ struct PixelUpdate::Filter {
     const double per_light = at_white / (1 + o.dark_irradiance);
     phase_per_light = static_cast<float>(per_light / 6);
     phase_in_dark = static_cast<float>(per_light * o.dark_irradiance);
-    if (pixels.has_timers) later = pixels.ticks(segment.t1) + 1;
+    if (pixels.effects.timers) later = pixels.ticks(segment.t1) + 1;
   }
 
   /// Duration of the segment in time constants, at the mean irradiance: Simpson's rule for an exponential.
@@ -54,7 +54,7 @@ struct PixelUpdate::Filter {
 struct PixelUpdate::FilterRow {
   const float *light0, *light1, *end;    // irradiance at both ends of the segment, brightness at its end
   float *start, *filtered1, *filtered2;  // brightness at its start, and after each pole: to be advanced
-  const float *band_low, *band_high;
+  const float *bound_low, *bound_high;
   const std::int32_t* timers;  // timers, or null
   std::uint32_t pixel, place;  // of the first pixel
   // Storage of the past segment for filtered1, filtered2, start and end, or null.
@@ -75,7 +75,7 @@ struct PixelUpdate::FilterRow {
   template <int kOrder>
   void prefetch(int x) const {
     constexpr int kAhead = 512;
-    for (const float* values : {static_cast<const float*>(start), band_low, band_high, light0}) {
+    for (const float* values : {static_cast<const float*>(start), bound_low, bound_high, light0}) {
       __builtin_prefetch(values + x + kAhead);
     }
     if constexpr (kOrder > 0) __builtin_prefetch(filtered1 + x + kAhead);
@@ -122,7 +122,7 @@ HWY_INLINE void PixelUpdate::move_vector(D d, const FilterRow& row, const Filter
     }
   }
   auto leaving =
-      hn::Or(hn::Le(lowest, hn::LoadU(d, row.band_low + x)), hn::Ge(highest, hn::LoadU(d, row.band_high + x)));
+      hn::Or(hn::Le(lowest, hn::LoadU(d, row.bound_low + x)), hn::Ge(highest, hn::LoadU(d, row.bound_high + x)));
   if (row.timers != nullptr) {
     const auto expired = hn::Lt(hn::LoadU(di, row.timers + x), hn::Set(di, filter.later));
     leaving = hn::Or(leaving, hn::RebindMask(d, expired));
@@ -139,8 +139,8 @@ std::span<const std::uint32_t> PixelUpdate::move(D d, const PixelArray& pixels, 
     move_vector<kOrder>(d, row, filter, x, x - begin);
     row.prefetch<kOrder>(x);
     // Prefetch the previous active pixels, a few at a time.
-    pixels.prefetch(active_.pixel[asked_]), pixels.prefetch(active_.pixel[asked_ + 1]);
-    asked_ = std::min(asked_ + 2, active_.count);
+    pixels.prefetch(active_.pixel[prefetched_]), pixels.prefetch(active_.pixel[prefetched_ + 1]);
+    prefetched_ = std::min(prefetched_ + 2, active_.count);
   }
   // Without a branch: active pixels are as hard to predict as events.
   std::size_t count = 0, vector = 0;
@@ -178,12 +178,12 @@ template <int kOrder>
 void PixelUpdate::run_active(PixelArray& pixels, const Segment& segment, bool all, PackedEvents& events) {
   const auto duration = static_cast<double>(segment.t1 - segment.t0);
   const auto run = [&](auto& pass, const auto& take) {
-    for (; asked_ < active_.count; ++asked_) pixels.prefetch(active_.pixel[asked_]);
+    for (; prefetched_ < active_.count; ++prefetched_) pixels.prefetch(active_.pixel[prefetched_]);
     take(pass.signals, pass.take(pixels, active_, segment.t0, segment.t1));
     do {
       pass.round(pixels, active_, events);
     } while (all ? active_.count > 0 : active_.count == kBlock);
-    asked_ = active_.count;
+    prefetched_ = active_.count;
   };
   if constexpr (kOrder == 0) {
     run(linear_, [&](LinearSignals& signals, std::size_t first) { signals.take(active_, first, duration); });
@@ -215,8 +215,8 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
                 .start = from(pixels.brightness),
                 .filtered1 = from(pixels.filtered1),
                 .filtered2 = from(pixels.filtered2),
-                .band_low = from(pixels.band_low),
-                .band_high = from(pixels.band_high),
+                .bound_low = from(pixels.bound_low),
+                .bound_high = from(pixels.bound_high),
                 .timers = from(pixels.timers),
                 .pixel = static_cast<std::uint32_t>(first),
                 .place = static_cast<std::uint32_t>(events.packing().place(left, y))};
@@ -248,7 +248,7 @@ void PixelUpdate::filter_row(PixelArray& pixels, const Segment& segment, const F
 bool PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
                          PastSegment* past, PackedEvents& events) {
   const Filter common(pixels, segment);
-  const int order = pixels.options.low_pass_hz > 0 ? pixels.options.low_pass_order : 0;
+  const int order = pixels.effects.poles;
   for (int y = rows.first; y < rows.last; ++y) {
     if (y + 1 < rows.last) prefetch_row(segment, y + 1);
     const float* const row = brightness_row(pixels, segment, brightness, y);
@@ -266,7 +266,7 @@ bool PixelUpdate::filter(PixelArray& pixels, const Segment& segment, const Image
 /// If bounds are of irradiance: advances the pixels that become active in the segment.
 bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, PackedEvents& events) {
   if (!watch_.look(pixels, segment, rows)) return false;
-  if (pixels.clean) {
+  if (pixels.effects.clean) {
     clean_.run(pixels, segment, watch_, rows, events);
     return true;
   }
@@ -295,8 +295,8 @@ bool PixelUpdate::cross(PixelArray& pixels, const Segment& segment, Rows rows, P
 
 bool PixelUpdate::advance(PixelArray& pixels, const Segment& segment, const Image<float>* brightness, Rows rows,
                           PastSegment* past, PackedEvents& events) {
-  return pixels.in_brightness ? filter(pixels, segment, brightness, rows, past, events)
-                              : cross(pixels, segment, rows, events);
+  return pixels.effects.in_brightness ? filter(pixels, segment, brightness, rows, past, events)
+                                      : cross(pixels, segment, rows, events);
 }
 
 /// Makes these pixels the active ones, with their state at the segment's start.
@@ -315,8 +315,8 @@ void PixelUpdate::gather(const PixelArray& pixels, const PastSegment& past, std:
     a.filtered1[i] = at(past.filtered1), a.filtered2[i] = at(past.filtered2);
     a.start[i] = at(past.start), a.end[i] = at(past.end);
   }
-  a.count = asked_ = which.size();
-  if (!pixels.in_brightness || !past.start.empty()) return;
+  a.count = prefetched_ = which.size();
+  if (!pixels.effects.in_brightness || !past.start.empty()) return;
   respond(pixels.options, a.count, a.light0.data(), a.start.data());
   respond(pixels.options, a.count, a.light1.data(), a.end.data());
 }
@@ -335,21 +335,21 @@ void PixelUpdate::find_phases(const Filter& filter) {
 void PixelUpdate::resume(PixelArray& pixels, const PastSegment& past, std::span<const std::uint32_t> which,
                          PackedEvents& events) {
   const Segment& segment = past.segment;
-  if (pixels.clean) return clean_.resume(pixels, segment, which, events);
+  if (pixels.effects.clean) return clean_.resume(pixels, segment, which, events);
   const auto duration = static_cast<double>(segment.t1 - segment.t0);
-  const int order = pixels.options.low_pass_hz > 0 ? pixels.options.low_pass_order : 0;
+  const int order = pixels.effects.poles;
   const Filter filter(pixels, segment);
   for (; !which.empty(); which = which.subspan(std::min(kBlock, which.size()))) {
     gather(pixels, past, which.first(std::min(kBlock, which.size())), events.packing());
     const auto run = [&](auto& pass, const auto& take) {
       take(pass.signals, pass.take(pixels, active_, segment.t0, segment.t1));
       pass.round(pixels, active_, events, true);
-      active_.count = asked_ = 0;
+      active_.count = prefetched_ = 0;
     };
     if (order > 0) {
       find_phases(filter);
       run(relaxing_, [&](RelaxingSignals& signals, std::size_t i) { signals.take(active_, i, order, duration); });
-    } else if (pixels.in_brightness) {
+    } else if (pixels.effects.in_brightness) {
       run(linear_, [&](LinearSignals& signals, std::size_t i) { signals.take(active_, i, duration); });
     } else {
       const double eps = pixels.options.log_eps;
@@ -359,7 +359,7 @@ void PixelUpdate::resume(PixelArray& pixels, const PastSegment& past, std::span<
 }
 
 void PixelUpdate::draw_again(PixelArray& pixels, std::span<const std::uint32_t> which) {
-  if (pixels.clean) return;
+  if (pixels.effects.clean) return;
   for (; !which.empty(); which = which.subspan(std::min(kBlock, which.size()))) {
     active_.count = std::min(kBlock, which.size());
     std::copy_n(which.begin(), active_.count, active_.pixel.begin());
@@ -374,7 +374,7 @@ bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<f
   if (row_.size() < width + kVectorPadding) row_.resize(width + kVectorPadding, 1.0);
   for (int y = rows.first; y < rows.last; ++y) {
     const std::size_t first = index(pixels, segment.tile.x, y);
-    if (pixels.in_brightness) {
+    if (pixels.effects.in_brightness) {
       const float* const row = brightness_row(pixels, segment, brightness, y);  // checked above
       std::copy_n(row, width, row_.data());
       for (auto* values : {&pixels.brightness, &pixels.filtered1, &pixels.filtered2}) {
@@ -385,7 +385,7 @@ bool PixelUpdate::open(PixelArray& pixels, const Segment& segment, const Image<f
       for (std::size_t i = 0; i < width; ++i) row_[i] = row[i] + pixels.options.log_eps;
       logarithms(width, row_.data());
     }
-    if (pixels.clean) {
+    if (pixels.effects.clean) {
       clean_.open(pixels, static_cast<std::uint32_t>(first), {row_.data(), width});
       continue;
     }

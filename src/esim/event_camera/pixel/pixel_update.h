@@ -1,3 +1,4 @@
+// Accelerates process() in reference.cpp for rows of pixels, with the low-pass (5).
 #pragma once
 
 #include <array>
@@ -14,10 +15,10 @@
 #include "esim/event_camera/segment_history.h"
 #include "esim/render/sample.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// Advances rows of pixels from the start of a segment to its end. Use one object per thread, for its working memory.
-/// Private to the event camera.
 ///
 /// `brightness`, if not null, replaces the brightness from the irradiance. The functions return false, and change
 /// nothing, if an irradiance is not a finite number >= 0.
@@ -73,7 +74,7 @@ class PixelUpdate {
   CleanPass clean_;
   MovedPixels moved_;
   ActivePixels active_;
-  std::size_t asked_ = 0;  // number of active pixels that have been prefetched
+  std::size_t prefetched_ = 0;  // number of active pixels that have been prefetched
   PixelPass<LinearSignals> linear_;
   PixelPass<RelaxingSignals> relaxing_;
   std::vector<double> row_;       // brightness at the first sample

@@ -34,12 +34,12 @@ bool PixelWatch::look(const PixelArray& pixels, const Segment& segment, Rows row
 bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, int y, std::size_t& count) {
   const std::size_t row = static_cast<std::size_t>(y) * static_cast<std::size_t>(pixels.width);
   const float* const irradiance = segment.irradiance1.row(y);
-  const float *const low = pixels.band_low.data() + row, *const high = pixels.band_high.data() + row;
-  const std::int32_t* const timers = pixels.has_timers ? pixels.timers.data() + row : nullptr;
-  const std::int32_t now = pixels.has_timers ? pixels.ticks(segment.t1) : 0;
+  const float *const low = pixels.bound_low.data() + row, *const high = pixels.bound_high.data() + row;
+  const std::int32_t* const timers = pixels.effects.timers ? pixels.timers.data() + row : nullptr;
+  const std::int32_t now = pixels.effects.timers ? pixels.ticks(segment.t1) : 0;
   std::uint32_t* const columns = columns_.data();
   std::size_t found = count;
-  bool good = true;
+  bool valid = true;
 
   // Without branches: active pixels are as hard to predict as events.
   const auto look_at = [&](auto d, int from, int to) {
@@ -51,14 +51,14 @@ bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, i
       check.see(d, value);
       auto active = hn::Not(hn::And(hn::Gt(value, hn::LoadU(d, low + x)), hn::Lt(value, hn::LoadU(d, high + x))));
       if (timers != nullptr) {
-        const auto has_timers = hn::Lt(hn::LoadU(di, timers + x), hn::Set(di, now + 1));
-        active = hn::Or(active, hn::RebindMask(d, has_timers));
+        const auto expired = hn::Lt(hn::LoadU(di, timers + x), hn::Set(di, now + 1));
+        active = hn::Or(active, hn::RebindMask(d, expired));
       }
       const ChosenLanes chosen(d, active);
       chosen.store_positions(static_cast<std::uint32_t>(x), columns + found);
       found += chosen.count();
     }
-    good &= check.passed();
+    valid &= check.passed();
   };
   const WatchTag whole;
   const int first = segment.tile.x, last = first + segment.tile.width;
@@ -66,7 +66,7 @@ bool PixelWatch::look_at_row(const PixelArray& pixels, const Segment& segment, i
   look_at(whole, first, middle);
   look_at(hn::CappedTag<float, 1>(), middle, last);
   count = found;
-  return good;
+  return valid;
 }
 
 }  // namespace esim::inline event_camera

@@ -1,3 +1,4 @@
+// Accelerates (6): finds the pixels for which next_event() in reference.cpp may return an event.
 #pragma once
 
 #include <cstddef>
@@ -8,10 +9,11 @@
 #include "esim/event_camera/pixel/pixel_array.h"
 #include "esim/render/sample.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// Finds the pixels of some rows that become active: whose irradiance leaves its bounds, or whose timer expires.
-/// Private to the event camera; keeps its working memory.
+/// Keeps its working memory.
 class PixelWatch {
  public:
   /// Checks rows of the segment without changing the pixels. False if an irradiance is not a finite number >= 0.

@@ -1,3 +1,4 @@
+// Accelerates (5) and (6), reference_signal.h, by Halley's method instead of bisection.
 #pragma once
 
 #include <array>
@@ -15,7 +16,7 @@ struct Crossing {
   bool on = false;      ///< through the upper level
 };
 
-/// The signal of a comparator on a segment after a low-pass with one pole, or with two equal poles, plus the leak. tau
+/// The signal of a comparator on a segment after a low-pass with one pole, or with two equal poles, plus the drift. tau
 /// is in ns after the segment's start; the search starts at from(). With u = rate tau, m = 1 - exp(-u) and the input
 /// L(u) = start + rise u, the poles respond with
 ///     F1 = F1(0) + (start - F1(0)) m + rise (u - m)
@@ -76,7 +77,7 @@ class RelaxingSignal {
   double rate_ = 0;                       // 1/ns
   double start_ = 0, rise_ = 0;           // of the input; rise per u
   double filtered1_ = 0, filtered2_ = 0;  // at the segment's start
-  double offset_ = 0, drift_ = 0;         // of the leak; drift per u
+  double offset_ = 0, drift_ = 0;         // drift per u
   double moved_ = 0;                      // m at the segment's end
   Point at_from_;
 };

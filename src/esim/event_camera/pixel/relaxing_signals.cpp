@@ -17,7 +17,7 @@ using D = hn::Rebind<double, hn::Half<F>>;
 constexpr D kD;
 
 constexpr double kToleranceNs = 0.05;
-constexpr int kMostSteps = 3;
+constexpr int kMaxSteps = 3;
 
 // Minimum distance of an extremum from the levels for floats to decide that it does not reach them.
 constexpr float kTooClose = 1e-5F;
@@ -70,7 +70,7 @@ RelaxingSignal RelaxingSignals::signal(const Comparators& c, std::size_t i) cons
   RelaxingSignal one =
       poles_ == 2 ? RelaxingSignal::second_order(rate, a.moved[i], a.filtered1[i], a.filtered2[i], a.start[i], slope)
                   : RelaxingSignal::first_order(rate, a.moved[i], a.filtered1[i], a.start[i], slope);
-  one.add(0, c.leak[i]);
+  one.add(0, c.drift[i]);
   if (c.from[i] > 0) one.advance(c.from[i]);
   return one;
 }
@@ -80,12 +80,12 @@ void RelaxingSignals::copy(std::size_t i, std::size_t to) {
   value_[to] = value_[i];
 }
 
-/// Some neighbouring signals after one pole relative to their references, plus the leak, between `from` and the
+/// Some neighbouring signals after one pole relative to their references, plus the drift, between `from` and the
 /// segment's end. Their slope is monotone.
 struct RelaxingSignals::Span {
-  V filtered, distance, rise, leak;  // F at u = 0, its distance from the input; slopes of input and leak per u
-  V first, last;                     // u at `from` and at the end
-  V v0, v1, g0, g1;                  // the signal at both, and its slopes
+  V filtered, distance, rise, drift;  // F at u = 0, its distance from the input; slopes of input and drift per u
+  V first, last;                      // u at `from` and at the end
+  V v0, v1, g0, g1;                   // the signal at both, and its slopes
   V upper, lower;
 
   Span(const RelaxingSignals& s, const Comparators& c, std::size_t i) {
@@ -94,8 +94,8 @@ struct RelaxingSignals::Span {
     first = load(s.u_, i), last = load(a.phase, i);
     filtered = relative(a.filtered1, c.reference, i);
     distance = hn::Sub(start, f1), rise = load(s.rise_, i);
-    const auto part = [&](std::size_t k) { return hn::DemoteTo(hn::Half<F>(), load_double(c.leak, k)); };
-    leak =
+    const auto part = [&](std::size_t k) { return hn::DemoteTo(hn::Half<F>(), load_double(c.drift, k)); };
+    drift =
         hn::Div(hn::Mul(hn::Combine(kF, part(i + hn::Lanes(kD)), part(i)), set(static_cast<float>(s.duration_))), last);
     v0 = value(first, m0), v1 = value(last, m1);
     g0 = slope(m0), g1 = slope(m1);
@@ -105,9 +105,9 @@ struct RelaxingSignals::Span {
 
   V value(V u, V m) const {
     const V light = hn::MulAdd(distance, m, hn::Mul(rise, hn::Sub(u, m)));
-    return hn::Add(filtered, hn::MulAdd(leak, u, light));
+    return hn::Add(filtered, hn::MulAdd(drift, u, light));
   }
-  V slope(V m) const { return hn::Add(hn::MulAdd(hn::Sub(rise, distance), m, distance), leak); }
+  V slope(V m) const { return hn::Add(hn::MulAdd(hn::Sub(rise, distance), m, distance), drift); }
   V bend(V m) const { return hn::NegMulAdd(hn::Sub(rise, distance), m, hn::Sub(rise, distance)); }
 
   Mask between_levels(V value) const { return hn::And(hn::Lt(value, upper), hn::Gt(value, lower)); }
@@ -120,7 +120,7 @@ struct RelaxingSignals::Span {
 
   /// Whether the extremum, of signals whose slopes at the ends have different signs, is certainly between the levels.
   Mask turns_inside() const {
-    const V m = hn::Div(hn::Add(distance, leak), hn::Sub(distance, rise));
+    const V m = hn::Div(hn::Add(distance, drift), hn::Sub(distance, rise));
     const V q = hn::Max(hn::Sub(set(1), m), set(1e-30F)), there = value(hn::Neg(logarithm(kF, q)), m);
     return hn::And(hn::Lt(there, hn::Sub(upper, set(kTooClose))), hn::Gt(there, hn::Add(lower, set(kTooClose))));
   }
@@ -186,7 +186,7 @@ void RelaxingSignals::solve(Comparators& c) {
   for (std::size_t i = 0; i < c.count; i += hn::Lanes(kD)) {
     const auto polarity = load_double(c.polarity, i), zero = set_double(0);
     const auto last = promoted(kD, a.phase, i), per_u = hn::Div(set_double(duration_), last);
-    const auto leak = hn::Mul(load_double(c.leak, i), per_u), first = promoted(kD, u_, i);
+    const auto drift = hn::Mul(load_double(c.drift, i), per_u), first = promoted(kD, u_, i);
     const auto f1 = promoted(kD, a.filtered1, i), rise = promoted(kD, rise_, i);
     const auto distance = hn::Sub(promoted(kD, a.start, i), f1), steepens = hn::Sub(rise, distance);
     const auto upper = hn::Add(promoted(kD, c.on, i), set_double(c.threshold_on));
@@ -198,11 +198,11 @@ void RelaxingSignals::solve(Comparators& c) {
     const auto idle = hn::Eq(polarity, zero);
     auto u = hn::IfThenElse(idle, first, promoted(kD, guess_, i));
     auto found = idle;
-    for (int step = 0; step < kMostSteps; ++step) {
+    for (int step = 0; step < kMaxSteps; ++step) {
       const auto m = precisely_moved_after(kD, u);
       const auto light = hn::MulAdd(distance, m, hn::Mul(rise, hn::Sub(u, m)));
-      const auto miss = hn::Add(above, hn::MulAdd(leak, u, light));
-      const auto slope = hn::Add(hn::MulAdd(steepens, m, distance), leak), bend = hn::NegMulAdd(steepens, m, steepens);
+      const auto miss = hn::Add(above, hn::MulAdd(drift, u, light));
+      const auto slope = hn::Add(hn::MulAdd(steepens, m, distance), drift), bend = hn::NegMulAdd(steepens, m, steepens);
       const auto slope2 = hn::Mul(slope, slope), curved = hn::Mul(hn::Mul(miss, set_double(0.5)), bend);
       auto next = hn::Sub(u, hn::Div(hn::Mul(miss, slope), hn::Sub(slope2, curved)));
       next = hn::Min(hn::Max(next, first), last);
@@ -261,7 +261,7 @@ void RelaxingSignals::advance(const Comparators& c, std::size_t i) {
   if (poles_ == 1) {
     advance(hn::CappedTag<double, 1>(), c, i);
   } else {
-    value_[i] = signal(c, i).value() - c.leak[i] * c.from[i];
+    value_[i] = signal(c, i).value() - c.drift[i] * c.from[i];
   }
 }
 

@@ -1,8 +1,10 @@
+// Accelerates (5) and (6), reference_signal.h with one pole, for a block of pixels.
 #pragma once
 
 #include "esim/event_camera/pixel/pixel_block.h"
 #include "esim/event_camera/pixel/relaxing_signal.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// RelaxingSignal for the pixels of a block, in vectors if there is one pole. Floats, relative to the reference, decide
@@ -24,7 +26,7 @@ class RelaxingSignals {
   double end(std::size_t i) const { return static_cast<double>(end_[i]); }  ///< F at the segment's end
   void copy(std::size_t i, std::size_t to);
 
-  /// One of the signals, plus its leak.
+  /// One of the signals, plus its drift.
   RelaxingSignal signal(const Comparators& c, std::size_t i) const;
 
  private:

@@ -1,3 +1,4 @@
+// Accelerates (13), read_out() and serve_row() in reference.cpp.
 #pragma once
 
 #include <algorithm>
@@ -10,13 +11,14 @@
 #include "esim/event_camera/options.h"
 #include "esim/events/event.h"
 
+// Private to event_camera.
 namespace esim::inline event_camera {
 
 /// The arbiter of the readout. Pixels with an event raise a request in their row. One reader serves the rows in the
 /// order of their first requests: it takes all requests of a row that have arrived, and is then busy for the row's time
 /// plus that of its events. Requests beyond the length of the queue are lost.
 ///
-/// Private to the event camera. A pixel must not raise a second request before its first is served (PixelReadout).
+/// A pixel must not raise a second request before its first is served (PixelReadout).
 class Readout {
  public:
   Readout(const ReadoutOptions& options, int height);

@@ -6,8 +6,7 @@
 #include <cstdint>
 #include <span>
 
-// Private to formats/aedat4: includes flatbuffers.
-
+// Private to formats/aedat4: includes aedat4_generated.h.
 namespace esim::inline formats::aedat4 {
 
 inline constexpr char kVersionLine[] = "#!AER-DAT4.0\r\n";
@@ -24,8 +23,8 @@ template <typename Table>
 const Table* verified(std::span<const std::byte> bytes, const char* identifier) {
   const auto* const data = reinterpret_cast<const std::uint8_t*>(bytes.data());
   // The smallest table has eight bytes.
-  const auto most_tables = static_cast<flatbuffers::uoffset_t>(bytes.size() / 8 + 1);
-  flatbuffers::Verifier verifier(data, bytes.size(), 64, most_tables);
+  const auto max_tables = static_cast<flatbuffers::uoffset_t>(bytes.size() / 8 + 1);
+  flatbuffers::Verifier verifier(data, bytes.size(), 64, max_tables);
   // The verifier does not check the prefix, the root's offset and the identifier before it reads them.
   if (bytes.size() < 3 * sizeof(flatbuffers::uoffset_t)) return nullptr;
   if (!verifier.VerifySizePrefixedBuffer<Table>(identifier)) return nullptr;

@@ -10,7 +10,7 @@ namespace esim::inline formats::aedat4 {
 namespace {
 
 constexpr std::size_t kDeepest = 32;
-constexpr std::size_t kMostStreams = 1024;
+constexpr std::size_t kMaxStreams = 1024;
 constexpr int kLargestExtent = 65536;  // px
 
 constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kEntities = {
@@ -117,7 +117,7 @@ std::optional<std::vector<Stream>> parse_description(std::string_view xml) {
       if (nodes.size() > kDeepest) return std::nullopt;
       const auto id = nodes.size() == 2 && nodes[0] == "outInfo" ? whole_number(nodes[1]) : std::nullopt;
       if (id) streams.push_back({*id});
-      if (streams.size() > kMostStreams) return std::nullopt;
+      if (streams.size() > kMaxStreams) return std::nullopt;
     } else if (tag.starts_with("attr ") && !streams.empty() && nodes.size() >= 2 && nodes[0] == "outInfo") {
       const bool of_stream = nodes.size() == 2, of_info = nodes.size() == 3 && nodes[2] == "info";
       const std::string_view value = xml.substr(at, xml.find('<', at) - at);

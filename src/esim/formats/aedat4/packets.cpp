@@ -9,7 +9,7 @@
 namespace esim::inline formats::aedat4 {
 namespace {
 
-constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 24;
+constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 24;
 
 std::string_view text(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -34,7 +34,7 @@ void PacketReader::read_header() {
   const std::uint64_t offset = file_.offset();
   std::uint32_t size = 0;
   std::memcpy(&size, file_.read_exactly(sizeof(size), "the header").data(), sizeof(size));
-  if (size > kMostHeaderBytes) file_.fail(offset, "the header is damaged: its stated size is too large");
+  if (size > kMaxHeaderBytes) file_.fail(offset, "the header is damaged: its stated size is too large");
   file_.seek(offset);
   const auto borrowed = file_.read_exactly(sizeof(size) + size, "the header");
   const std::vector<std::byte> bytes(borrowed.begin(), borrowed.end());  // aligned
@@ -55,7 +55,7 @@ void PacketReader::read_header() {
 
 /// Reads the optional table; a damaged or truncated one is ignored.
 void PacketReader::read_data_table() {
-  if (!data_table_ || *data_table_ >= file_.size() || file_.size() - *data_table_ > Unpacker::kMostBytes) return;
+  if (!data_table_ || *data_table_ >= file_.size() || file_.size() - *data_table_ > Unpacker::kMaxBytes) return;
   file_.seek(*data_table_);
   const auto plain = unpacker_->unpack(file_.read(static_cast<std::size_t>(file_.size() - *data_table_)));
   const fb::DataTable* table = plain ? verified<fb::DataTable>(*plain, "FTAB") : nullptr;
@@ -76,7 +76,7 @@ std::optional<Packet> PacketReader::next(std::span<const int> wanted) {
     std::memcpy(&header, file_.read_exactly(sizeof(header), "a packet header").data(), sizeof(header));
     packet.stream = header.stream_id();
     const auto size = static_cast<std::uint64_t>(header.size());
-    if (header.size() < 0 || size > Unpacker::kMostBytes) fail(packet, "the size of the packet is invalid");
+    if (header.size() < 0 || size > Unpacker::kMaxBytes) fail(packet, "the size of the packet is invalid");
     if (std::find(wanted.begin(), wanted.end(), packet.stream) == wanted.end()) {
       if (size > file_.size() - file_.offset()) file_.fail(file_.size(), "the file ends within a packet");
       file_.seek(file_.offset() + size);

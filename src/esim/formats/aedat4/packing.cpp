@@ -106,8 +106,8 @@ struct Unpacker::Contexts {
   ZSTD_DCtx* zstd = nullptr;
 };
 
-Unpacker::Unpacker(Packing packing, std::size_t most_bytes)
-    : packing_(packing), most_bytes_(most_bytes), contexts_(std::make_unique<Contexts>()) {
+Unpacker::Unpacker(Packing packing, std::size_t max_bytes)
+    : packing_(packing), max_bytes_(max_bytes), contexts_(std::make_unique<Contexts>()) {
   if (packing == Packing::none) return;
   if (is_lz4(packing)) {
     if (LZ4F_isError(LZ4F_createDecompressionContext(&contexts_->lz4, LZ4F_VERSION))) throw std::bad_alloc();
@@ -128,7 +128,7 @@ std::optional<std::span<const std::byte>> Unpacker::unpack(std::span<const std::
   std::size_t done = 0;
   for (bool more = true; more;) {
     if (done == plain_.size()) {
-      if (done >= most_bytes_) return std::nullopt;
+      if (done >= max_bytes_) return std::nullopt;
       plain_.resize(std::max(kFirstBytes, 2 * done));
     }
     std::span<std::byte> out = std::span(plain_).subspan(done);

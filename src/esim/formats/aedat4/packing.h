@@ -36,19 +36,19 @@ class Packer {
 class Unpacker {
  public:
   /// No program writes larger packets.
-  static constexpr std::size_t kMostBytes = std::size_t{1} << 28;
+  static constexpr std::size_t kMaxBytes = std::size_t{1} << 28;
 
-  explicit Unpacker(Packing packing, std::size_t most_bytes = kMostBytes);
+  explicit Unpacker(Packing packing, std::size_t max_bytes = kMaxBytes);
   ~Unpacker();
 
   /// Borrowed until the next call, and aligned to 8 bytes. Nothing if the packet is damaged or larger than
-  /// `most_bytes`. Memory grows only with the data that exist, whatever size the packet claims.
+  /// `max_bytes`. Memory grows only with the data that exist, whatever size the packet claims.
   std::optional<std::span<const std::byte>> unpack(std::span<const std::byte> packed);
 
  private:
   struct Contexts;
   Packing packing_;
-  std::size_t most_bytes_;
+  std::size_t max_bytes_;
   std::unique_ptr<Contexts> contexts_;
   std::vector<std::byte> plain_;
 };

@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kPacketEvents = 1 << 14;
 constexpr std::size_t kPacketMeasurements = 1 << 10;
 constexpr std::int64_t kPacketUs = 100'000;
-constexpr int kLargestExtent = 32768;  // px
+constexpr int kMaxWritableExtent = 32768;  // px
 
 std::int64_t to_us(TimeNs t) { return t / kNsPerUs - (t % kNsPerUs < 0 ? 1 : 0); }
 
@@ -81,9 +81,9 @@ void Writer::begin(const RecordingInfo& info) {
   for (std::size_t i = 0; i < info.cameras.size(); ++i) {
     const CameraInfo& camera = info.cameras[i];
     const int width = camera.model.width, height = camera.model.height;
-    if (std::max(width, height) > kLargestExtent) {
+    if (std::max(width, height) > kMaxWritableExtent) {
       throw UserError(fmt::format("{}: AEDAT 4 holds sensors of at most {} px per side, but {} has {} x {} px",
-                                  path_.string(), kLargestExtent, camera.name, width, height));
+                                  path_.string(), kMaxWritableExtent, camera.name, width, height));
     }
     streams.push_back({events_stream(i), "EVTS", camera.name, width, height});
     streams.push_back({frames_stream(i), "FRME", camera.name, width, height});

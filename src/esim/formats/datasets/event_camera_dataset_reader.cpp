@@ -22,7 +22,7 @@ namespace esim::inline formats {
 namespace {
 
 constexpr std::size_t kPortion = 1 << 16;  // events
-constexpr std::size_t kMostImageBytes = std::size_t{1} << 28;
+constexpr std::size_t kMaxImageBytes = std::size_t{1} << 28;
 constexpr double kLargestNormError = 0.01;  // of a quaternion; some files have few digits
 
 LineReader lines_of(const FilesInput& files, const std::string& name) {
@@ -162,11 +162,9 @@ class FramesPart final : public LinesPart {
       lines.fail(fmt::format("the image {} is missing from the dataset", name));
     }
     const std::string shown = files_.path_of(name).string();
-    if (files_.size(name) > kMostImageBytes) throw UserError(fmt::format("cannot read {}: it is too large", shown));
-    const auto file = files_.open(name);
+    if (files_.size(name) > kMaxImageBytes) throw UserError(fmt::format("cannot read {}: it is too large", shown));
     std::string bytes(static_cast<std::size_t>(files_.size(name)), '\0');
-    file->read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    bytes.resize(static_cast<std::size_t>(file->gcount()));
+    bytes.resize(files_.open(name)(std::as_writable_bytes(std::span(bytes))));
     auto png = decode_grey_png(bytes);
     if (!png) throw UserError(fmt::format("cannot read {}: it is not a PNG, or it is damaged", shown));
     image_ = std::move(*png);

@@ -2,10 +2,10 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <istream>
 #include <memory>
-#include <optional>
 #include <string>
+
+#include "esim/files/input_file.h"
 
 namespace esim::inline formats {
 
@@ -20,7 +20,7 @@ class FilesInput {
   virtual std::uintmax_t size(const std::string& name) const = 0;
 
   /// Opens a file at its start. In a zip, reading damaged data throws UserError.
-  virtual std::unique_ptr<std::istream> open(const std::string& name) const = 0;
+  virtual Read open(const std::string& name) const = 0;
 
   /// The name of a file for messages.
   virtual std::filesystem::path path_of(const std::string& name) const = 0;
@@ -28,8 +28,7 @@ class FilesInput {
 
 std::unique_ptr<FilesInput> open_folder_input(const std::filesystem::path& folder);
 
-/// The files are those in the folder that contains a file named `beside`: the top folder or any other. Compression:
-/// none or deflate.
+/// The files are those in the folder that contains a file named `beside`: the top folder or any other.
 std::unique_ptr<FilesInput> open_zip_input(const std::filesystem::path& path, const std::string& beside);
 
 }  // namespace esim::inline formats

@@ -24,8 +24,8 @@ class FilesOutput {
 
 std::unique_ptr<FilesOutput> make_folder_output(const std::filesystem::path& folder);
 
-/// Added files are stored uncompressed. Growing texts are compressed into separate files next to the zip and copied
-/// into it at the end, so that memory does not grow with them. The same content gives the same bytes.
+/// Until close(), the files are in the folder PATH.part, which stays if the process ends before. In the zip, added
+/// files are stored and texts compressed. The same content gives the same bytes.
 std::unique_ptr<FilesOutput> make_zip_output(const std::filesystem::path& path);
 
 }  // namespace esim::inline formats

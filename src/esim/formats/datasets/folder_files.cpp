@@ -1,9 +1,6 @@
-#include <cerrno>
-#include <fstream>
 #include <map>
 #include <utility>
 
-#include "esim/core/error.h"
 #include "esim/files/output_file.h"
 #include "esim/formats/datasets/files_input.h"
 #include "esim/formats/datasets/files_output.h"
@@ -66,10 +63,9 @@ class FolderInput final : public FilesInput {
     return error ? 0 : size;
   }
 
-  std::unique_ptr<std::istream> open(const std::string& name) const override {
-    auto file = std::make_unique<std::ifstream>(folder_ / name, std::ios::binary);
-    if (!*file) throw UserError("cannot read " + path_of(name).string() + ": " + system_reason(errno));
-    return file;
+  Read open(const std::string& name) const override {
+    const auto file = std::make_shared<InputFile>(folder_ / name);
+    return [file](std::span<std::byte> out) { return file->read_into(out); };
   }
 
   fs::path path_of(const std::string& name) const override { return folder_ / name; }

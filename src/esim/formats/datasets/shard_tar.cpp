@@ -12,7 +12,7 @@
 namespace esim::inline formats {
 namespace {
 
-constexpr std::size_t kBlock = 512;
+constexpr std::size_t kTarBlock = 512;
 
 struct NumpyType {
   const char* descr;
@@ -37,10 +37,11 @@ NumpyType numpy_type(NumberType type) {
   throw InternalError("this number type is not supported in NumPy files");
 }
 
-/// The header of a file in an archive: ustar, of POSIX.1-1988, without an owner, dated 1970.
+/// The header of a file in an archive: ustar, of POSIX.1-1988, without an owner, dated 1970. Written here, since calls
+/// of libarchive would be as long.
 std::string tar_header(const std::string& name, std::size_t bytes) {
   if (name.size() >= 100) throw InternalError(name + ": the name is too long for a tar file");
-  std::string header(kBlock, '\0');
+  std::string header(kTarBlock, '\0');
   const auto put = [&](std::size_t at, const std::string& text) { text.copy(header.data() + at, text.size()); };
   put(0, name);
   put(100, "0000644");
@@ -77,7 +78,7 @@ class TarShard final : public ShardWriter {
   }
 
   void finish() override {
-    file_.append(std::string(2 * kBlock, '\0'));
+    file_.append(std::string(2 * kTarBlock, '\0'));
     file_.close();
   }
 
@@ -87,7 +88,7 @@ class TarShard final : public ShardWriter {
     file_.append(tar_header(name, bytes));
     file_.append(head);
     file_.append(content);
-    file_.append(std::string((kBlock - bytes % kBlock) % kBlock, '\0'));
+    file_.append(std::string((kTarBlock - bytes % kTarBlock) % kTarBlock, '\0'));
   }
 
   OutputFile file_;

@@ -12,7 +12,7 @@
 namespace esim::inline formats {
 namespace {
 
-constexpr std::uint64_t kBlock = 1 << 16;
+constexpr std::uint64_t kReadBlock = 1 << 16;
 
 std::optional<int> extent(const hdf5::Input& file, const char* name) {
   const auto value = file.integer_attribute(name);
@@ -169,12 +169,12 @@ std::vector<Event> EventsHdf5Reader::read(std::uint64_t first, std::uint64_t cou
   if (first >= impl.size) return {};
   count = std::min(count, impl.size - first);
   std::vector<Event> events;
-  std::vector<std::int64_t> t(std::min(count, kBlock)), x(t.size()), y(t.size());
+  std::vector<std::int64_t> t(std::min(count, kReadBlock)), x(t.size()), y(t.size());
   std::vector<std::int64_t> p(t.size());
   const std::int64_t x_end = impl.width.value_or(65536), y_end = impl.height.value_or(65536);
 
   for (std::uint64_t done = 0; done < count; done += t.size()) {
-    for (auto* column : {&t, &x, &y, &p}) column->resize(std::min(count - done, kBlock));
+    for (auto* column : {&t, &x, &y, &p}) column->resize(std::min(count - done, kReadBlock));
     impl.file.read(impl.t, first + done, std::span(t));
     impl.file.read(impl.x, first + done, std::span(x));
     impl.file.read(impl.y, first + done, std::span(y));
@@ -203,8 +203,8 @@ std::vector<Event> EventsHdf5Reader::read_window(TimeNs t0, TimeNs t1) const {
 
 std::uint64_t EventsHdf5Reader::count_on() const {
   std::uint64_t on = 0;
-  for (std::uint64_t done = 0; done < impl_->size; done += kBlock) {
-    const std::vector<std::int8_t> p = read_polarities(done, kBlock);
+  for (std::uint64_t done = 0; done < impl_->size; done += kReadBlock) {
+    const std::vector<std::int8_t> p = read_polarities(done, kReadBlock);
     on += static_cast<std::uint64_t>(std::count_if(p.begin(), p.end(), [](std::int8_t value) { return value > 0; }));
   }
   return on;

@@ -46,12 +46,12 @@ bool Input::has(const char* name) const {
 }
 
 std::string Input::contents() const {
-  constexpr hsize_t kMost = 100;
+  constexpr hsize_t kMax = 100;
   const Quiet quiet;
   H5G_info_t group{};
   if (H5Gget_info(file_, &group) < 0) return "nothing that can be listed";
   std::vector<std::string> names;
-  for (hsize_t i = 0; i < std::min(group.nlinks, kMost); ++i) {
+  for (hsize_t i = 0; i < std::min(group.nlinks, kMax); ++i) {
     std::array<char, 64> name{};
     if (H5Lget_name_by_idx(file_, ".", H5_INDEX_NAME, H5_ITER_INC, i, name.data(), name.size(), H5P_DEFAULT) >= 0)
       names.emplace_back(name.data());

@@ -9,8 +9,7 @@
 
 #include "esim/formats/hdf5/library.h"
 
-// Private to formats: includes hdf5.h.
-
+// Private to formats.
 namespace esim::inline formats::hdf5 {
 
 /// A dataset of items, counted by its first dimension. Its storage is known to hold the stated number of items.

@@ -13,7 +13,6 @@
 #include "esim/recording/compression.h"
 
 // Private to formats: includes hdf5.h.
-
 namespace esim::inline formats::hdf5 {
 
 inline constexpr H5Z_filter_t kBloscFilter = 32001;

@@ -7,6 +7,7 @@
 #include "esim/core/time.h"
 #include "esim/formats/hdf5/library.h"
 
+// Private to formats/hdf5.
 namespace esim::inline formats::hdf5 {
 
 /// The millisecond index of files in the layouts of DSEC and M3ED: entry ms is the number of events before that time,

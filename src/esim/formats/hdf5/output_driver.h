@@ -5,7 +5,6 @@
 #include <vector>
 
 // Private to formats: includes hdf5.h.
-
 namespace esim::inline formats::hdf5 {
 
 struct DriverFile;

@@ -14,10 +14,10 @@ namespace esim::inline formats {
 
 struct TruthHdf5Options {
   bool depth = true;
-  bool flow = true;
+  bool motion_field = true;
   Compression compression = Compression::blosc;
   bool objects = false;
-  bool displacement = false;  ///< false: the dataset is created with the first record of optical flow
+  bool optical_flow = false;  ///< false: the dataset is created with the first record of optical flow
 };
 
 /// Ground truth of one camera:
@@ -25,11 +25,11 @@ struct TruthHdf5Options {
 ///   t                   int64 [N]              ns
 ///   T_world_camera      float64 [N, 7]         tx ty tz (m) qx qy qz qw
 ///   depth               float32 [N, H, W]      m, planar; +inf: no surface
-///   flow                float32 [N, 2, H, W]   px/s, x to the right, then y downwards
+///   motion_field        float32 [N, 2, H, W]   px/s, x to the right, then y downwards
 ///   objects             uint16 [N, H, W]       index into the attribute `names`; 0: static scene
 ///   T_world_objects     float64 [N, K, 7]      poses of the K moving objects in the world, without [0]
-///   displacement        float32 [N-1, 2, H, W] px, from frame k to frame k + 1; NaN: point has no image
-///   displacement_valid  uint8 [N-1, H, W]      1: visible in frame k + 1
+///   optical_flow        float32 [N-1, 2, H, W] px, from frame k to frame k + 1; NaN: point has no image
+///   optical_flow_valid  uint8 [N-1, H, W]      1: visible in frame k + 1
 ///
 /// Units and conventions are attributes of each dataset. One frame is one chunk, and is in the file when write()
 /// returns.
@@ -48,17 +48,18 @@ class TruthHdf5Writer final : public Sink {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Reads such files, frame by frame. Other, damaged or truncated files are a UserError that names the file.
+/// Reads such files, frame by frame, also older ones, in which motion_field is named flow, and optical_flow
+/// displacement. Other, damaged or truncated files are a UserError that names the file.
 class TruthHdf5Reader {
  public:
   /// One frame; quantities that the file lacks are empty.
   struct Frame {
     SE3 T_world_camera;
-    Image<float> depth, flow_x, flow_y;
+    Image<float> depth, motion_x, motion_y;
     Image<std::uint16_t> object;
     std::vector<SE3> T_world_objects;
   };
-  struct Displacement {
+  struct OpticalFlow {
     Image<float> x, y;
     Image<std::uint8_t> visible;
   };
@@ -67,16 +68,16 @@ class TruthHdf5Reader {
   ~TruthHdf5Reader();
 
   std::uint64_t size() const;           ///< number of frames
-  std::uint64_t displacements() const;  ///< number of fields from a frame to the next
+  std::uint64_t optical_flows() const;  ///< number of fields from a frame to the next
   SensorSize sensor() const;            ///< 0 x 0 if there are no images
 
-  /// Names for the numbers in Frame::object: "static", then objects, then layers.
+  /// Names for the numbers in Frame::object: "static", then objects, then sprites.
   const std::vector<std::string>& names() const;
   std::size_t objects() const;  ///< number of objects with a pose
 
   TimeNs t(std::uint64_t frame) const;
   void read(std::uint64_t frame, Frame& out) const;
-  void read(std::uint64_t frame, Displacement& out) const;
+  void read(std::uint64_t frame, OpticalFlow& out) const;
 
  private:
   struct Impl;

@@ -9,7 +9,7 @@
 namespace esim::inline formats {
 namespace {
 
-constexpr std::size_t kPoseNumbers = 7;
+constexpr std::size_t kNumbersPerPose = 7;
 
 SE3 pose_of(const hdf5::Input& file, const double* numbers) {
   const SE3 pose{Eigen::Quaterniond(numbers[6], numbers[3], numbers[4], numbers[5]), Eigen::Vector3d(numbers)};
@@ -27,6 +27,11 @@ struct TruthHdf5Reader::Impl {
 
   /// An optional dataset of images of the common size, `planes` per frame.
   std::optional<hdf5::Column> open_images(const char* name, std::size_t planes);
+
+  /// The same for a dataset that older recordings have under another name.
+  std::optional<hdf5::Column> open_images(const char* name, const char* old_name, std::size_t planes) {
+    return open_images(file.has(name) ? name : old_name, planes);
+  }
   std::optional<hdf5::Column> open_poses(const char* name, std::size_t item_rank) const;
 
   template <typename T>
@@ -35,9 +40,9 @@ struct TruthHdf5Reader::Impl {
 
   hdf5::Input file;
   hdf5::Column t;
-  std::optional<hdf5::Column> pose, depth, flow, objects, object_poses, displacement, displacement_valid;
+  std::optional<hdf5::Column> pose, depth, motion_field, objects, object_poses, optical_flow, optical_flow_valid;
   std::vector<std::string> names;
-  std::uint64_t size = 0, displacements = 0;
+  std::uint64_t size = 0, optical_flows = 0;
   SensorSize sensor;
   mutable std::vector<float> vectors;
 };
@@ -46,24 +51,24 @@ void TruthHdf5Reader::Impl::open() {
   t = file.open_column("t");
   pose = open_poses("T_world_camera", 1);
   depth = open_images("depth", 1);
-  flow = open_images("flow", 2);
+  motion_field = open_images("motion_field", "flow", 2);
   objects = open_images("objects", 1);
   object_poses = open_poses("T_world_objects", 2);
-  displacement = open_images("displacement", 2);
-  displacement_valid = open_images("displacement_valid", 1);
+  optical_flow = open_images("optical_flow", "displacement", 2);
+  optical_flow_valid = open_images("optical_flow_valid", "displacement_valid", 1);
   if (objects) names = file.text_list_attribute(*objects, "names");
 
   // A killed writer may leave datasets of different lengths: their common part is valid.
   size = t.size;
-  for (const auto* column : {&pose, &depth, &flow, &objects, &object_poses}) {
+  for (const auto* column : {&pose, &depth, &motion_field, &objects, &object_poses}) {
     if (*column) size = std::min<std::uint64_t>(size, (*column)->size);
   }
   const bool whole = file.integer_attribute("esim_complete").value_or(1) != 0;
   if (whole && size != t.size) file.fail("its datasets differ in length");
-  if (displacement.has_value() != displacement_valid.has_value())
-    file.fail("it must hold both displacement and displacement_valid, or neither");
-  if (displacement && size > 0)
-    displacements = std::min<std::uint64_t>({displacement->size, displacement_valid->size, size - 1});
+  if (optical_flow.has_value() != optical_flow_valid.has_value())
+    file.fail("it must hold both optical_flow and optical_flow_valid, or neither");
+  if (optical_flow && size > 0)
+    optical_flows = std::min<std::uint64_t>({optical_flow->size, optical_flow_valid->size, size - 1});
 }
 
 std::optional<hdf5::Column> TruthHdf5Reader::Impl::open_images(const char* name, std::size_t planes) {
@@ -81,7 +86,8 @@ std::optional<hdf5::Column> TruthHdf5Reader::Impl::open_images(const char* name,
 std::optional<hdf5::Column> TruthHdf5Reader::Impl::open_poses(const char* name, std::size_t item_rank) const {
   if (!file.has(name)) return std::nullopt;
   hdf5::Column column = file.open_items(name, item_rank);
-  if (column.item_shape.back() != kPoseNumbers) file.fail(std::string(name) + " does not hold poses of seven numbers");
+  if (column.item_shape.back() != kNumbersPerPose)
+    file.fail(std::string(name) + " does not hold poses of seven numbers");
   return column;
 }
 
@@ -110,7 +116,7 @@ TruthHdf5Reader::~TruthHdf5Reader() {
 }
 
 std::uint64_t TruthHdf5Reader::size() const { return impl_->size; }
-std::uint64_t TruthHdf5Reader::displacements() const { return impl_->displacements; }
+std::uint64_t TruthHdf5Reader::optical_flows() const { return impl_->optical_flows; }
 SensorSize TruthHdf5Reader::sensor() const { return impl_->sensor; }
 const std::vector<std::string>& TruthHdf5Reader::names() const { return impl_->names; }
 
@@ -131,24 +137,24 @@ TimeNs TruthHdf5Reader::t(std::uint64_t frame) const {
 void TruthHdf5Reader::read(std::uint64_t frame, Frame& out) const {
   const Impl& impl = *impl_;
   if (impl.pose) {
-    std::array<double, kPoseNumbers> numbers{};
+    std::array<double, kNumbersPerPose> numbers{};
     impl.file.read(*impl.pose, frame, std::span<double>(numbers));
     out.T_world_camera = pose_of(impl.file, numbers.data());
   }
   if (impl.depth) impl.read(*impl.depth, frame, out.depth);
-  if (impl.flow) impl.read(*impl.flow, frame, out.flow_x, out.flow_y);
+  if (impl.motion_field) impl.read(*impl.motion_field, frame, out.motion_x, out.motion_y);
   if (impl.objects) impl.read(*impl.objects, frame, out.object);
   if (!impl.object_poses) return;
   std::vector<double> numbers(impl.object_poses->item_numbers());
   impl.file.read(*impl.object_poses, frame, std::span(numbers));
   out.T_world_objects.clear();
-  for (std::size_t i = 0; i < numbers.size(); i += kPoseNumbers)
+  for (std::size_t i = 0; i < numbers.size(); i += kNumbersPerPose)
     out.T_world_objects.push_back(pose_of(impl.file, &numbers[i]));
 }
 
-void TruthHdf5Reader::read(std::uint64_t frame, Displacement& out) const {
-  impl_->read(*impl_->displacement, frame, out.x, out.y);
-  impl_->read(*impl_->displacement_valid, frame, out.visible);
+void TruthHdf5Reader::read(std::uint64_t frame, OpticalFlow& out) const {
+  impl_->read(*impl_->optical_flow, frame, out.x, out.y);
+  impl_->read(*impl_->optical_flow_valid, frame, out.visible);
 }
 
 }  // namespace esim::inline formats

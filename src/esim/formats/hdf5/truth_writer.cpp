@@ -19,16 +19,17 @@ struct TruthHdf5Writer::Impl {
   }
 
   void create(const RecordingInfo& recording);
-  void create_displacement();
+  void create_optical_flow();
   void append(const TruthRecord& truth);
-  void append(const DisplacementRecord& displacement);
+  void append(const OpticalFlowRecord& optical_flow);
   void append(hdf5::Series& series, const Image<float>& x, const Image<float>& y);
   void append(hdf5::Series& series, std::span<const SE3> poses);
   void append_object_poses(std::span<const SE3> poses);
   void describe(const hdf5::Series& series, const char* unit, const char* convention) const;
   void close_series() {
     esim_complete.reset();
-    for (hdf5::Series* series : {&t, &pose, &depth, &flow, &objects, &object_poses, &displacement, &displacement_valid})
+    for (hdf5::Series* series :
+         {&t, &pose, &depth, &motion_field, &objects, &object_poses, &optical_flow, &optical_flow_valid})
       *series = hdf5::Series();
   }
   template <typename T>
@@ -43,7 +44,7 @@ struct TruthHdf5Writer::Impl {
   // Declared last, so that the series close before the file.
   std::optional<hdf5::Output> file;
   hdf5::Handle esim_complete;
-  hdf5::Series t, pose, depth, flow, objects, object_poses, displacement, displacement_valid;
+  hdf5::Series t, pose, depth, motion_field, objects, object_poses, optical_flow, optical_flow_valid;
 };
 
 void TruthHdf5Writer::Impl::create(const RecordingInfo& recording) {
@@ -64,35 +65,36 @@ void TruthHdf5Writer::Impl::create(const RecordingInfo& recording) {
     depth = hdf5::Series(*file, "depth", {H5T_IEEE_F32LE, {rows, columns}, 1, options.compression});
     describe(depth, "m", "[frame, y, x]: z in the camera frame (planar depth); +inf where nothing is seen");
   }
-  if (options.flow) {
-    flow = hdf5::Series(*file, "flow", {H5T_IEEE_F32LE, {2, rows, columns}, 1, options.compression});
-    describe(flow, "px/s", "[frame, component, y, x]: velocity of the image point, x to the right, then y downwards");
+  if (options.motion_field) {
+    motion_field = hdf5::Series(*file, "motion_field", {H5T_IEEE_F32LE, {2, rows, columns}, 1, options.compression});
+    describe(motion_field, "px/s",
+             "[frame, component, y, x]: velocity of the image point, x to the right, then y downwards");
   }
   if (options.objects) {
     objects = hdf5::Series(*file, "objects", {H5T_STD_U16LE, {rows, columns}, 1, options.compression});
     describe(objects, "index of names", "[frame, y, x]: index of the object seen; 0: the static scene, or nothing");
     std::vector<std::string> names = {"static"};
     names.insert(names.end(), recording.objects.begin(), recording.objects.end());
-    names.insert(names.end(), recording.layers.begin(), recording.layers.end());
+    names.insert(names.end(), recording.sprites.begin(), recording.sprites.end());
     file->create_text_attribute(objects.id(), "names", names);
   }
-  if (options.displacement) create_displacement();
+  if (options.optical_flow) create_optical_flow();
   file->create_attribute(file->id(), "width", static_cast<std::uint32_t>(width));
   file->create_attribute(file->id(), "height", static_cast<std::uint32_t>(height));
   esim_complete = file->create_attribute(file->id(), "esim_complete", std::uint8_t{0});
   file->flush();
 }
 
-void TruthHdf5Writer::Impl::create_displacement() {
+void TruthHdf5Writer::Impl::create_optical_flow() {
   const auto rows = static_cast<hsize_t>(height), columns = static_cast<hsize_t>(width);
-  displacement = hdf5::Series(*file, "displacement", {H5T_IEEE_F32LE, {2, rows, columns}, 1, options.compression});
+  optical_flow = hdf5::Series(*file, "optical_flow", {H5T_IEEE_F32LE, {2, rows, columns}, 1, options.compression});
   describe(
-      displacement, "px",
+      optical_flow, "px",
       "[frame k, component, y, x]: position in frame k + 1 of the point seen in frame k, minus its position in frame "
       "k; x to the right, then y downwards; NaN where the point has no image in frame k + 1");
-  displacement_valid =
-      hdf5::Series(*file, "displacement_valid", {H5T_STD_U8LE, {rows, columns}, 1, options.compression});
-  describe(displacement_valid, "1",
+  optical_flow_valid =
+      hdf5::Series(*file, "optical_flow_valid", {H5T_STD_U8LE, {rows, columns}, 1, options.compression});
+  describe(optical_flow_valid, "1",
            "[frame k, y, x]: 1 where frame k + 1 shows the point; 0 where it is occluded or outside the image");
 }
 
@@ -115,7 +117,7 @@ void TruthHdf5Writer::Impl::append(const TruthRecord& truth) {
     check_size(truth.depth);
     depth.append(truth.depth.pixels());
   }
-  if (options.flow) append(flow, truth.flow_x, truth.flow_y);
+  if (options.motion_field) append(motion_field, truth.motion_x, truth.motion_y);
   if (options.objects) {
     if (truth.object == nullptr)
       throw InternalError(path.string() + ": a ground-truth frame has no image of its objects");
@@ -129,12 +131,12 @@ void TruthHdf5Writer::Impl::append(const TruthRecord& truth) {
   file->flush();
 }
 
-void TruthHdf5Writer::Impl::append(const DisplacementRecord& record) {
+void TruthHdf5Writer::Impl::append(const OpticalFlowRecord& record) {
   const hdf5::Quiet quiet;
-  if (displacement.id() < 0) create_displacement();
-  append(displacement, record.x, record.y);
+  if (optical_flow.id() < 0) create_optical_flow();
+  append(optical_flow, record.x, record.y);
   check_size(record.visible);
-  displacement_valid.append(record.visible.pixels());
+  optical_flow_valid.append(record.visible.pixels());
   file->flush();
 }
 
@@ -176,8 +178,8 @@ void TruthHdf5Writer::begin(const RecordingInfo& info) { impl_->create(info); }
 void TruthHdf5Writer::write(const Record& record) {
   const auto* truth = std::get_if<TruthRecord>(&record);
   if (truth != nullptr && truth->camera == impl_->camera) impl_->append(*truth);
-  const auto* displacement = std::get_if<DisplacementRecord>(&record);
-  if (displacement != nullptr && displacement->camera == impl_->camera) impl_->append(*displacement);
+  const auto* optical_flow = std::get_if<OpticalFlowRecord>(&record);
+  if (optical_flow != nullptr && optical_flow->camera == impl_->camera) impl_->append(*optical_flow);
 }
 
 void TruthHdf5Writer::end(bool complete) {

@@ -14,9 +14,9 @@ namespace esim::inline formats {
 namespace {
 
 constexpr char kEvents[] = "events";
-constexpr std::size_t kChunk = 1 << 14;  // events
-constexpr std::int64_t kLargestExtent = 65536;
-constexpr std::int64_t kLatestUs = std::numeric_limits<std::uint32_t>::max();
+constexpr std::size_t kV2eChunk = 1 << 14;  // events
+constexpr std::int64_t kV2eLargestExtent = 65536;
+constexpr std::int64_t kV2eLatestUs = std::numeric_limits<std::uint32_t>::max();
 
 class V2eReader final : public EventBlocksReader {
  public:
@@ -32,8 +32,8 @@ class V2eReader final : public EventBlocksReader {
     file_.read(events_, first, std::span(numbers_));
     for (std::size_t i = 0; i < count; ++i) {
       const std::int64_t* row = &numbers_[4 * i];
-      if (row[0] < 0 || row[0] > kLatestUs || row[1] < 0 || row[1] >= kLargestExtent || row[2] < 0 ||
-          row[2] >= kLargestExtent) {
+      if (row[0] < 0 || row[0] > kV2eLatestUs || row[1] < 0 || row[1] >= kV2eLargestExtent || row[2] < 0 ||
+          row[2] >= kV2eLargestExtent) {
         file_.fail("event " + std::to_string(first + i) + " at " + std::to_string(row[0]) + " us and (" +
                    std::to_string(row[1]) + ", " + std::to_string(row[2]) + ") is out of range");
       }
@@ -58,7 +58,7 @@ class V2eWriter final : public Sink {
   void begin(const RecordingInfo&) override {
     const hdf5::Quiet quiet;
     file_.emplace(path_);
-    series_ = hdf5::Series(*file_, kEvents, {H5T_STD_U32LE, {4}, kChunk, compression_});
+    series_ = hdf5::Series(*file_, kEvents, {H5T_STD_U32LE, {4}, kV2eChunk, compression_});
     file_->flush();
   }
 
@@ -66,7 +66,7 @@ class V2eWriter final : public Sink {
     const auto* events = std::get_if<EventsRecord>(&record);
     if (events == nullptr || events->camera != 0) return;
     for (const Event& event : events->events) {
-      if (event.t < 0 || event.t / kNsPerUs > kLatestUs) {
+      if (event.t < 0 || event.t / kNsPerUs > kV2eLatestUs) {
         throw RemediableError(path_.string() + ": v2e holds times from 0 to 71 minutes, so an event at " +
                                   std::to_string(event.t / kNsPerSecond) + " s does not fit: choose another format",
                               Remedy::times_from_zero);
@@ -75,7 +75,7 @@ class V2eWriter final : public Sink {
            {event.t / kNsPerUs, std::int64_t{event.x}, std::int64_t{event.y}, std::int64_t{event.polarity > 0}}) {
         rows_.push_back(static_cast<std::uint32_t>(number));
       }
-      if (rows_.size() == 4 * kChunk) write_chunk();
+      if (rows_.size() == 4 * kV2eChunk) write_chunk();
     }
   }
 

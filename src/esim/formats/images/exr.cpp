@@ -24,7 +24,7 @@ std::size_t row_bytes(const Image<float>& image) { return static_cast<std::size_
 
 /// Reads the channels that exist, as floats. Returns false if the file has none.
 bool write_exr(const fs::path& path, const TruthRecord& truth) {
-  const std::array images = {&truth.irradiance, &truth.depth, &truth.flow_x, &truth.flow_y};
+  const std::array images = {&truth.irradiance, &truth.depth, &truth.motion_x, &truth.motion_y};
   std::optional<Imf::Header> header;
   Imf::FrameBuffer buffer;
   for (std::size_t i = 0; i < kChannels.size(); ++i) {
@@ -61,7 +61,7 @@ void decode(const InputFile& file, std::span<const std::byte> bytes, SequenceIma
       (width * height > kSmall && width * height / kMaxPixelsPerByte > static_cast<std::int64_t>(bytes.size())))
     file.fail(0, fmt::format("the file is damaged: {} x {} px in {} bytes", width, height, bytes.size()));
   Imf::FrameBuffer buffer;
-  const std::array planes = {&images.irradiance, &images.depth, &images.flow_x, &images.flow_y};
+  const std::array planes = {&images.irradiance, &images.depth, &images.field_x, &images.field_y};
   for (std::size_t i = 0; i < kChannels.size(); ++i) {
     Image<float>& plane = *planes[i] = {};
     if (image.header().channels().findChannel(kChannels[i]) == nullptr) continue;
@@ -69,7 +69,7 @@ void decode(const InputFile& file, std::span<const std::byte> bytes, SequenceIma
     buffer.insert(kChannels[i], Imf::Slice::Make(Imf::FLOAT, plane.data(), window, sizeof(float), row_bytes(plane)));
   }
   if (buffer.begin() == buffer.end()) file.fail(0, "it has none of the channels Y, Z, V.x and V.y");
-  if (images.flow_x.empty() != images.flow_y.empty()) file.fail(0, "it has only one of the channels V.x and V.y");
+  if (images.field_x.empty() != images.field_y.empty()) file.fail(0, "it has only one of the channels V.x and V.y");
   image.setFrameBuffer(buffer);
   image.readPixels(window.min.y, window.max.y);
 }

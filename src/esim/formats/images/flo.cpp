@@ -48,7 +48,7 @@ void read_flo(const fs::path& path, SequenceImages& images) {
   if (file.size() < bytes)
     file.fail(file.size(), fmt::format("the file is too short: {} x {} px need {} bytes", width, height, bytes));
 
-  images.flow_x = images.flow_y = Image<float>(width, height);
+  images.field_x = images.field_y = Image<float>(width, height);
   for (int row = 0; row < height; ++row) {
     const auto line = file.read_exactly(8 * static_cast<std::size_t>(width), "a row");
     for (int column = 0; column < width; ++column) {
@@ -56,8 +56,8 @@ void read_flo(const fs::path& path, SequenceImages& images) {
       std::memcpy(flow.data(), &line[8 * static_cast<std::size_t>(column)], sizeof flow);
       const bool known = std::abs(flow[0]) <= kUnknownAbove && std::abs(flow[1]) <= kUnknownAbove;
       if (!known) flow.fill(std::numeric_limits<float>::quiet_NaN());
-      images.flow_x(column, row) = flow[0];
-      images.flow_y(column, row) = flow[1];
+      images.field_x(column, row) = flow[0];
+      images.field_y(column, row) = flow[1];
     }
   }
 }
@@ -88,7 +88,7 @@ Format flo_format() {
   return {
       .name = "flo",
       .description = "a folder of Middlebury .flo files: optical flow from frame to frame",
-      .holds = {Content::truth, Content::displacement},
+      .holds = {Content::truth, Content::optical_flow},
       .folder = true,
       .recognises = [](const auto& path, std::string_view) { return lists_files(path, ".flo"); },
       .open =

@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 const Image<float>& image_in(const SequenceImages& images) {
-  for (const Image<float>* image : {&images.depth, &images.flow_x}) {
+  for (const Image<float>* image : {&images.depth, &images.field_x}) {
     if (!image->empty()) return *image;
   }
   return images.irradiance;
@@ -35,19 +35,19 @@ class SequenceStream final : public RecordStream {
 
   std::optional<TimeNs> due() override {
     if (!std::exchange(ahead_, false) && !files_.next(span_, file_)) return std::nullopt;
-    return files_.displacements ? span_.end : span_.start;
+    return files_.optical_flows ? span_.end : span_.start;
   }
 
   const Record* next(TimeNs) override {
     if (!std::exchange(read_, false)) read();
     read_ = false;
-    const auto& [irradiance, depth, flow_x, flow_y] = images_;
-    if (!files_.displacements)
-      return &record_.emplace(TruthRecord{0, span_.start, {}, irradiance, depth, flow_x, flow_y});
-    known_ = Image<std::uint8_t>(flow_x.width(), flow_x.height());
-    std::transform(flow_x.pixels().begin(), flow_x.pixels().end(), known_.pixels().begin(),
+    const auto& [irradiance, depth, field_x, field_y] = images_;
+    if (!files_.optical_flows)
+      return &record_.emplace(TruthRecord{0, span_.start, {}, irradiance, depth, field_x, field_y});
+    known_ = Image<std::uint8_t>(field_x.width(), field_x.height());
+    std::transform(field_x.pixels().begin(), field_x.pixels().end(), known_.pixels().begin(),
                    [](float x) { return static_cast<std::uint8_t>(std::isnan(x) ? 0 : 1); });
-    return &record_.emplace(DisplacementRecord{0, span_.start, span_.end, flow_x, flow_y, known_});
+    return &record_.emplace(OpticalFlowRecord{0, span_.start, span_.end, field_x, field_y, known_});
   }
 
  private:
@@ -76,7 +76,7 @@ class SequenceStream final : public RecordStream {
 }  // namespace
 
 void FrameFlow::add(const Record& record) {
-  if (const auto* moved = std::get_if<DisplacementRecord>(&record); moved != nullptr && moved->camera == 0) {
+  if (const auto* moved = std::get_if<OpticalFlowRecord>(&record); moved != nullptr && moved->camera == 0) {
     pending_.reset();
     write_({moved->t0, moved->t1}, moved->x, moved->y);
   }
@@ -92,7 +92,7 @@ void FrameFlow::add(const Record& record) {
     }
   }
   field_.reset();
-  if (!truth->flow_x.empty()) field_ = Field{{truth->t, truth->t}, truth->flow_x, truth->flow_y};
+  if (!truth->motion_x.empty()) field_ = Field{{truth->t, truth->t}, truth->motion_x, truth->motion_y};
 }
 
 void FrameFlow::finish() { flush(); }
@@ -102,15 +102,15 @@ void FrameFlow::flush() {
   pending_.reset();
 }
 
-FileSequence listed_files(const fs::path& folder, bool displacements) {
-  const auto list = std::make_shared<TimedFilesReader>(folder, displacements);
+FileSequence listed_files(const fs::path& folder, bool optical_flows) {
+  const auto list = std::make_shared<TimedFilesReader>(folder, optical_flows);
   const auto next = [list](TimeSpan& span, fs::path& file) {
     if (!list->next()) return false;
     span = list->span();
     file = list->file();
     return true;
   };
-  return {next, {}, displacements};
+  return {next, {}, optical_flows};
 }
 
 std::unique_ptr<Source> open_sequences(std::vector<FileSequence> sequences, const ReadOptions& options) {

@@ -12,7 +12,7 @@
 namespace esim::inline formats {
 
 // Formats of ground truth with one file per frame in a folder: one camera, without poses. Their readers give optical
-// flow as DisplacementRecord, visible where it is known, and everything else as TruthRecord.
+// flow as OpticalFlowRecord, visible where it is known, and everything else as TruthRecord.
 
 /// `flo`: optical flow from frame to frame, in the format of the Middlebury benchmark.
 Format flo_format();
@@ -54,7 +54,8 @@ class FrameFlow {
 
 /// The contents of one file of a sequence; what the file lacks is empty.
 struct SequenceImages {
-  Image<float> irradiance, depth, flow_x, flow_y;
+  Image<float> irradiance, depth;
+  Image<float> field_x, field_y;  ///< motion field, px/s, or optical flow, px
 };
 
 /// Files in order of time.
@@ -65,11 +66,11 @@ struct FileSequence {
   /// Reads a file; throws UserError if it is damaged.
   std::function<void(const std::filesystem::path& file, SequenceImages& images)> read{};
 
-  bool displacements = false;  ///< the flow is optical flow, px, from the span's start to its end; NaN: unknown
+  bool optical_flows = false;  ///< the flow is optical flow, px, from the span's start to its end; NaN: unknown
 };
 
 /// The files that a folder's timestamps.txt lists.
-FileSequence listed_files(const std::filesystem::path& folder, bool displacements);
+FileSequence listed_files(const std::filesystem::path& folder, bool optical_flows);
 
 /// Sequences of one camera as a recording. All images have the first one's size.
 std::unique_ptr<Source> open_sequences(std::vector<FileSequence> sequences, const ReadOptions& options);

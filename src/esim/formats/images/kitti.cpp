@@ -48,11 +48,12 @@ PngImage read_numbers(const fs::path& path, std::size_t channels) {
 void read_flow(const fs::path& path, SequenceImages& images, float per_pixel) {
   const PngImage png = read_numbers(path, 3);
   const Image<std::uint16_t>& known = png.channels[2];
-  images.flow_x = images.flow_y = Image<float>(known.width(), known.height(), std::numeric_limits<float>::quiet_NaN());
+  images.field_x = images.field_y =
+      Image<float>(known.width(), known.height(), std::numeric_limits<float>::quiet_NaN());
   for (std::size_t i = 0; i < known.size(); ++i) {
     if (known.data()[i] == 0) continue;
-    images.flow_x.data()[i] = static_cast<float>(png.channels[0].data()[i] - kOffset) / per_pixel;
-    images.flow_y.data()[i] = static_cast<float>(png.channels[1].data()[i] - kOffset) / per_pixel;
+    images.field_x.data()[i] = static_cast<float>(png.channels[0].data()[i] - kOffset) / per_pixel;
+    images.field_y.data()[i] = static_cast<float>(png.channels[1].data()[i] - kOffset) / per_pixel;
   }
 }
 
@@ -168,7 +169,7 @@ Format kitti_format() {
   return {
       .name = "kitti",
       .description = "folders flow/ and depth/ of 16-bit PNG files, as in KITTI",
-      .holds = {Content::truth, Content::displacement},
+      .holds = {Content::truth, Content::optical_flow},
       .folder = true,
       .recognises =
           [](const auto& path, std::string_view) {
@@ -197,7 +198,7 @@ Format dsec_flow_format() {
   return {
       .name = "dsec-flow",
       .description = "DSEC's folder of optical flow: 16-bit PNG files in forward/, forward_timestamps.txt",
-      .holds = {Content::truth, Content::displacement},
+      .holds = {Content::truth, Content::optical_flow},
       .folder = true,
       .recognises =
           [](const auto& path, std::string_view) {

@@ -63,8 +63,8 @@ std::string problem_of(std::string_view bytes) {
   if (!bytes.starts_with("\x89PNG\r\n\x1a\n")) return "it is not a PNG image";
   if (bytes.size() < kHeadBytes || bytes.substr(12, 4) != "IHDR") return "the header is damaged or truncated";
   const std::uint64_t width = big_endian(bytes.substr(16, 4)), height = big_endian(bytes.substr(20, 4));
-  const std::uint64_t most = std::min(kMaxPixels, bytes.size() * kMaxPixelsPerByte);
-  if (width > 0 && height > 0 && width <= most && height <= most / width) return "";
+  const std::uint64_t max = std::min(kMaxPixels, bytes.size() * kMaxPixelsPerByte);
+  if (width > 0 && height > 0 && width <= max && height <= max / width) return "";
   return fmt::format("the file is damaged: {} x {} px in {} bytes", width, height, bytes.size());
 }
 

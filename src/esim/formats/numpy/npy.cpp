@@ -14,11 +14,11 @@
 namespace esim::inline formats {
 namespace {
 
-class NpyWriter final : public EventsWriter {
+class EventArrayWriter final : public EventsWriter {
  public:
-  explicit NpyWriter(TimeUnit unit)
+  explicit EventArrayWriter(TimeUnit unit)
       : unit_(unit),
-        descr_(fmt::format("[('t', '{}'), ('x', '<u2'), ('y', '<u2'), ('p', '|u1')]", npy::time_type(unit))) {}
+        descr_(fmt::format("[('t', '{}'), ('x', '<u2'), ('y', '<u2'), ('p', '|u1')]", numpy::time_type(unit))) {}
 
   void begin(const std::filesystem::path& path, SensorSize) override {
     file_.emplace(path);
@@ -31,7 +31,7 @@ class NpyWriter final : public EventsWriter {
     bytes.resize(before + events.size() * kItemBytes);
     char* out = bytes.data() + before;
     for (const Event& event : events) {
-      const std::int64_t t = unit_ == TimeUnit::us ? npy::microseconds(event.t) : event.t;
+      const std::int64_t t = unit_ == TimeUnit::us ? numpy::microseconds(event.t) : event.t;
       std::memcpy(out, &t, 8);
       std::memcpy(out + 8, &event.x, 2);
       std::memcpy(out + 10, &event.y, 2);
@@ -64,10 +64,10 @@ class NpyWriter final : public EventsWriter {
 std::unique_ptr<EventsReader> open_npy(const std::filesystem::path& path) {
   const auto file = std::make_shared<InputFile>(path);
   const auto array =
-      std::make_shared<npy::Array>(path.string(), [file](std::span<std::byte> out) { return file->read_into(out); });
-  npy::EventColumns columns;
-  for (const npy::Field& field : array->fields()) npy::take_column(field.name, {array, field}, columns);
-  return npy::make_columns_reader(path.string(), std::move(columns));
+      std::make_shared<numpy::Array>(path.string(), [file](std::span<std::byte> out) { return file->read_into(out); });
+  numpy::EventColumns columns;
+  for (const numpy::Field& field : array->fields()) numpy::take_column(field.name, {array, field}, columns);
+  return numpy::make_columns_reader(path.string(), std::move(columns));
 }
 
 }  // namespace
@@ -83,7 +83,7 @@ Format npy_format() {
       .open = [](const auto& path, const ReadOptions& options) { return make_events_source(open_npy(path), options); },
       .create =
           [](const auto& path, const WriteOptions& options) {
-            return make_events_sink(std::make_unique<NpyWriter>(options.unit), path, "npy");
+            return make_events_sink(std::make_unique<EventArrayWriter>(options.unit), path, "npy");
           },
   };
 }

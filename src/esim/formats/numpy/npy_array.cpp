@@ -11,7 +11,7 @@
 #include "esim/core/error.h"
 #include "esim/files/number_text.h"
 
-namespace esim::inline formats::npy {
+namespace esim::inline formats::numpy {
 namespace {
 
 constexpr std::size_t kMaxItemBytes = 1 << 16;
@@ -94,8 +94,8 @@ void for_each_number(const Field& field, std::size_t stride, std::span<const std
 template <typename Number>
 std::int64_t integer(Number value) {
   if constexpr (std::is_floating_point_v<Number>) {
-    constexpr Number kMost = 1 << 30;
-    return std::abs(value) < kMost && value == std::trunc(value) ? static_cast<std::int64_t>(value) : Array::kNoNumber;
+    constexpr Number kMax = 1 << 30;
+    return std::abs(value) < kMax && value == std::trunc(value) ? static_cast<std::int64_t>(value) : Array::kNoNumber;
   } else {
     return std::in_range<std::int64_t>(value) ? static_cast<std::int64_t>(value) : Array::kNoNumber;
   }
@@ -106,7 +106,7 @@ std::int64_t integer(Number value) {
 std::string_view time_type(TimeUnit unit) { return unit == TimeUnit::us ? "<i8" : "<m8[ns]"; }
 
 Array::Array(std::string name, Read read) : name_(std::move(name)), read_(std::move(read)) {
-  const Header header = read_header(read_, [this](const std::string& problem) { fail(problem); });
+  const npy::Header header = npy::read_header(read_, [this](const std::string& problem) { fail(problem); });
   const auto count = count_of(header.shape);
   if (!count) fail("its header is damaged");
   count_ = count->numbers;
@@ -116,8 +116,8 @@ Array::Array(std::string name, Read read) : name_(std::move(name)), read_(std::m
 
 void Array::fail(const std::string& what) const { throw UserError(fmt::format("cannot read {}: {}", name_, what)); }
 
-void Array::take_fields(const Literal& descr) {
-  const auto add = [&](const Literal& type, std::string name, std::uint64_t repeats) {
+void Array::take_fields(const npy::Literal& descr) {
+  const auto add = [&](const npy::Literal& type, std::string name, std::uint64_t repeats) {
     auto field = type.sequence ? std::nullopt : field_of(type.text);
     if (!field) fail(fmt::format("field \"{}\" has a type that is not supported: {}", name, type.text));
     field->name = std::move(name);
@@ -132,10 +132,10 @@ void Array::take_fields(const Literal& descr) {
     fields_ = {field_of(descr.text).value_or(Field{.kind = 'V', .bytes = 1})};
     item_bytes_ = fields_[0].bytes;
   } else {
-    for (const Literal& item : descr.items) {
+    for (const npy::Literal& item : descr.items) {
       if (item.items.size() < 2) fail("its header is damaged");
-      const Literal& name = item.items[0];  // or title and name
-      const auto shape = item.items.size() > 2 ? shape_of(item.items[2]) : std::vector<std::uint64_t>{};
+      const npy::Literal& name = item.items[0];  // or title and name
+      const auto shape = item.items.size() > 2 ? npy::shape_of(item.items[2]) : std::vector<std::uint64_t>{};
       const auto repeats = shape ? count_of(*shape) : std::nullopt;
       if (!repeats) fail("its header is damaged");
       add(item.items[1], name.sequence && !name.items.empty() ? name.items.back().text : name.text, repeats->numbers);
@@ -159,12 +159,12 @@ void Array::integers(const Field& field, std::vector<std::int64_t>& out) const {
 
 void Array::times(const Field& field, std::vector<std::int64_t>& out) const {
   if (field.kind == 'f') {
-    constexpr double kMost = 9e9;  // larger times do not fit into int64 ns
+    constexpr double kMax = 9e9;  // larger times do not fit into int64 ns
     out.clear();
     out.reserve(held_);
     for_each_number(field, item_bytes_, std::span(items_).first(held_ * item_bytes_), [&](auto value) {
       const auto seconds = static_cast<double>(value);
-      out.push_back(std::abs(seconds) < kMost ? to_ns(seconds) : kNoNumber);
+      out.push_back(std::abs(seconds) < kMax ? to_ns(seconds) : kNoNumber);
     });
     return;
   }
@@ -175,4 +175,4 @@ void Array::times(const Field& field, std::vector<std::int64_t>& out) const {
   }
 }
 
-}  // namespace esim::inline formats::npy
+}  // namespace esim::inline formats::numpy

@@ -15,7 +15,7 @@
 #include "esim/formats/events_reader.h"
 
 /// Arrays of numbers or of records of numbers, with at most one dimension.
-namespace esim::inline formats::npy {
+namespace esim::inline formats::numpy {
 
 /// The NumPy type of times: a plain number of us, which is the usual interpretation, or timedelta64[ns].
 std::string_view time_type(TimeUnit unit);
@@ -58,7 +58,7 @@ class Array {
   [[noreturn]] void fail(const std::string& what) const;
 
  private:
-  void take_fields(const Literal& descr);
+  void take_fields(const npy::Literal& descr);
 
   std::string name_;
   Read read_;
@@ -86,4 +86,4 @@ void take_column(std::string_view name, EventColumns::Column column, EventColumn
 /// Throws UserError that names the file if a column is missing.
 std::unique_ptr<EventsReader> make_columns_reader(const std::string& file, EventColumns columns);
 
-}  // namespace esim::inline formats::npy
+}  // namespace esim::inline formats::numpy

@@ -8,10 +8,10 @@
 #include "esim/core/error.h"
 #include "esim/formats/numpy/npy_array.h"
 
-namespace esim::inline formats::npy {
+namespace esim::inline formats::numpy {
 namespace {
 
-constexpr std::int64_t kMaxExtent = 65536;  // px
+constexpr std::int64_t kMaxColumnExtent = 65536;  // px
 
 class ColumnsReader final : public EventsReader {
  public:
@@ -37,7 +37,7 @@ class ColumnsReader final : public EventsReader {
     columns_.p.array->integers(columns_.p.field, p_);
     for (std::size_t i = 0; i < there; ++i, ++done_) {
       if (t_[i] == Array::kNoNumber || p_[i] == Array::kNoNumber || std::min(x_[i], y_[i]) < 0 ||
-          std::max(x_[i], y_[i]) >= kMaxExtent) {
+          std::max(x_[i], y_[i]) >= kMaxColumnExtent) {
         columns_.t.array->fail(fmt::format("event {} has an invalid time, position or polarity", done_));
       }
       events.push_back({t_[i], static_cast<std::uint16_t>(x_[i]), static_cast<std::uint16_t>(y_[i]),
@@ -87,4 +87,4 @@ std::unique_ptr<EventsReader> make_columns_reader(const std::string& file, Event
   return std::make_unique<ColumnsReader>(std::move(columns));
 }
 
-}  // namespace esim::inline formats::npy
+}  // namespace esim::inline formats::numpy

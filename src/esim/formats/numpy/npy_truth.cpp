@@ -38,9 +38,10 @@ std::string quoted(std::string_view type) { return fmt::format("'{}'", type); }
 
 /// An array that grows along its first dimension.
 template <typename T>
-class NpyWriter {
+class GrowingArray {
  public:
-  NpyWriter(const fs::path& path, std::vector<std::uint64_t> item_shape) : file_(path), shape_(std::move(item_shape)) {
+  GrowingArray(const fs::path& path, std::vector<std::uint64_t> item_shape)
+      : file_(path), shape_(std::move(item_shape)) {
     shape_.insert(shape_.begin(), 0);
     file_.append(npy::header_text(quoted(kType<T>), shape_));
   }
@@ -74,10 +75,10 @@ class NpyReader {
     if (header.shape.size() != item_rank + 1) file_.fail(0, fmt::format("it must have {} dimensions", item_rank + 1));
     items_ = header.shape[0];
     item_shape_.assign(header.shape.begin() + 1, header.shape.end());
-    constexpr std::uint64_t kMaxExtent = 65536, kMaxNumbers = std::uint64_t{1} << 28;
+    constexpr std::uint64_t kMaxImageExtent = 65536, kMaxNumbers = std::uint64_t{1} << 28;
     for (const std::uint64_t extent : item_shape_) {
       numbers_ *= extent;
-      if (extent < 1 || extent > kMaxExtent || numbers_ > kMaxNumbers)
+      if (extent < 1 || extent > kMaxImageExtent || numbers_ > kMaxNumbers)
         file_.fail(0, "its shape is not valid for images");
     }
   }
@@ -114,6 +115,7 @@ class NpyReader {
 };
 
 constexpr std::size_t kPoseNumbers = 7;
+constexpr const char *kSpans = "optical_flow_t.npy", *kOldSpans = "displacement_t.npy";
 
 class NpyTruthWriter final : public Sink {
  public:
@@ -123,12 +125,12 @@ class NpyTruthWriter final : public Sink {
 
   void write(const Record& record) override {
     if (const auto* truth = std::get_if<TruthRecord>(&record); truth != nullptr && truth->camera == 0) write(*truth);
-    if (const auto* moved = std::get_if<DisplacementRecord>(&record); moved != nullptr && moved->camera == 0)
+    if (const auto* moved = std::get_if<OpticalFlowRecord>(&record); moved != nullptr && moved->camera == 0)
       write(*moved);
   }
 
   void end(bool) override {
-    close(t_, pose_, irradiance_, depth_, flow_, objects_, displacement_t_, displacement_, displacement_valid_);
+    close(t_, pose_, irradiance_, depth_, motion_field_, objects_, optical_flow_t_, optical_flow_, optical_flow_valid_);
   }
 
  private:
@@ -138,7 +140,8 @@ class NpyTruthWriter final : public Sink {
   }
 
   template <typename T>
-  NpyWriter<T>& array(std::optional<NpyWriter<T>>& writer, const char* name, std::vector<std::uint64_t> item_shape) {
+  GrowingArray<T>& array(std::optional<GrowingArray<T>>& writer, const char* name,
+                         std::vector<std::uint64_t> item_shape) {
     if (!writer) writer.emplace(folder_ / name, std::move(item_shape));
     return *writer;
   }
@@ -165,26 +168,27 @@ class NpyTruthWriter final : public Sink {
     if (has_irradiance_)
       array(irradiance_, "irradiance.npy", shape_of(truth.irradiance)).append({truth.irradiance.pixels()});
     if (!truth.depth.empty()) array(depth_, "depth.npy", shape_of(truth.depth)).append({truth.depth.pixels()});
-    if (!truth.flow_x.empty())
-      array(flow_, "flow.npy", shape_of_vectors(truth.flow_x)).append({truth.flow_x.pixels(), truth.flow_y.pixels()});
+    if (!truth.motion_x.empty())
+      array(motion_field_, "motion_field.npy", shape_of_vectors(truth.motion_x))
+          .append({truth.motion_x.pixels(), truth.motion_y.pixels()});
     if (truth.object != nullptr)
       array(objects_, "objects.npy", shape_of(*truth.object)).append({truth.object->pixels()});
   }
 
-  void write(const DisplacementRecord& moved) {
+  void write(const OpticalFlowRecord& moved) {
     const std::array<TimeNs, 2> span = {moved.t0, moved.t1};
-    array(displacement_t_, "displacement_t.npy", {2}).append({span});
-    array(displacement_, "displacement.npy", shape_of_vectors(moved.x)).append({moved.x.pixels(), moved.y.pixels()});
-    array(displacement_valid_, "displacement_valid.npy", shape_of(moved.visible)).append({moved.visible.pixels()});
+    array(optical_flow_t_, kSpans, {2}).append({span});
+    array(optical_flow_, "optical_flow.npy", shape_of_vectors(moved.x)).append({moved.x.pixels(), moved.y.pixels()});
+    array(optical_flow_valid_, "optical_flow_valid.npy", shape_of(moved.visible)).append({moved.visible.pixels()});
   }
 
   fs::path folder_;
   bool has_irradiance_ = false;
-  std::optional<NpyWriter<TimeNs>> t_, displacement_t_;
-  std::optional<NpyWriter<double>> pose_;
-  std::optional<NpyWriter<float>> irradiance_, depth_, flow_, displacement_;
-  std::optional<NpyWriter<std::uint16_t>> objects_;
-  std::optional<NpyWriter<std::uint8_t>> displacement_valid_;
+  std::optional<GrowingArray<TimeNs>> t_, optical_flow_t_;
+  std::optional<GrowingArray<double>> pose_;
+  std::optional<GrowingArray<float>> irradiance_, depth_, motion_field_, optical_flow_;
+  std::optional<GrowingArray<std::uint16_t>> objects_;
+  std::optional<GrowingArray<std::uint8_t>> optical_flow_valid_;
 };
 
 /// The arrays in one folder; all images have one size.
@@ -196,6 +200,9 @@ class Folder {
     std::error_code error;
     return fs::is_regular_file(path_ / name, error);
   }
+
+  /// The name of a file that older recordings have under another name.
+  const char* either(const char* name, const char* old_name) const { return has(name) ? name : old_name; }
 
   /// Nothing if the file does not exist. `vectors`: images of x and y.
   template <typename T>
@@ -251,7 +258,7 @@ class FramesStream final : public RecordStream {
         times_(folder->numbers<TimeNs>("t.npy", {})),
         irradiance_(folder->images<float>("irradiance.npy")),
         depth_(folder->images<float>("depth.npy")),
-        flow_(folder->images<float>("flow.npy", true)),
+        motion_field_(folder->images<float>(folder->either("motion_field.npy", "flow.npy"), true)),
         objects_(folder->images<std::uint16_t>("objects.npy")) {
     if (folder->has("T_world_camera.npy")) poses_ = folder->numbers<double>("T_world_camera.npy", {kPoseNumbers});
   }
@@ -275,17 +282,17 @@ class FramesStream final : public RecordStream {
     }
     folder_->read(irradiance_, images_.irradiance);
     folder_->read(depth_, images_.depth);
-    folder_->read(flow_, images_.flow_x, images_.flow_y);
+    folder_->read(motion_field_, images_.field_x, images_.field_y);
     folder_->read(objects_, object_);
-    return &record_.emplace(TruthRecord{0, *t_, pose, images_.irradiance, images_.depth, images_.flow_x, images_.flow_y,
-                                        object_.empty() ? nullptr : &object_});
+    return &record_.emplace(TruthRecord{0, *t_, pose, images_.irradiance, images_.depth, images_.field_x,
+                                        images_.field_y, object_.empty() ? nullptr : &object_});
   }
 
  private:
   std::shared_ptr<const Folder> folder_;
   NpyReader<TimeNs> times_;
   std::optional<NpyReader<double>> poses_;
-  std::optional<NpyReader<float>> irradiance_, depth_, flow_;
+  std::optional<NpyReader<float>> irradiance_, depth_, motion_field_;
   std::optional<NpyReader<std::uint16_t>> objects_;
   std::optional<TimeNs> t_;
   SequenceImages images_;
@@ -293,15 +300,15 @@ class FramesStream final : public RecordStream {
   std::optional<Record> record_;
 };
 
-class DisplacementsStream final : public RecordStream {
+class OpticalFlowStream final : public RecordStream {
  public:
-  explicit DisplacementsStream(const std::shared_ptr<Folder>& folder)
+  explicit OpticalFlowStream(const std::shared_ptr<Folder>& folder)
       : folder_(folder),
-        times_(folder->numbers<TimeNs>("displacement_t.npy", {2})),
-        displacement_(folder->images<float>("displacement.npy", true)),
-        valid_(folder->images<std::uint8_t>("displacement_valid.npy")) {
-    if (!displacement_ || !valid_)
-      times_.fail("displacement.npy or displacement_valid.npy is missing from the same folder");
+        times_(folder->numbers<TimeNs>(folder->either(kSpans, kOldSpans), {2})),
+        optical_flow_(folder->images<float>(folder->either("optical_flow.npy", "displacement.npy"), true)),
+        valid_(folder->images<std::uint8_t>(folder->either("optical_flow_valid.npy", "displacement_valid.npy"))) {
+    if (!optical_flow_ || !valid_)
+      times_.fail("optical_flow.npy or optical_flow_valid.npy is missing from the same folder");
   }
 
   std::optional<TimeNs> due() override {
@@ -316,15 +323,15 @@ class DisplacementsStream final : public RecordStream {
   }
 
   const Record* next(TimeNs) override {
-    folder_->read(displacement_, x_, y_);
+    folder_->read(optical_flow_, x_, y_);
     folder_->read(valid_, visible_);
-    return &record_.emplace(DisplacementRecord{0, span_[0], span_[1], x_, y_, visible_});
+    return &record_.emplace(OpticalFlowRecord{0, span_[0], span_[1], x_, y_, visible_});
   }
 
  private:
   std::shared_ptr<const Folder> folder_;
   NpyReader<TimeNs> times_;
-  std::optional<NpyReader<float>> displacement_;
+  std::optional<NpyReader<float>> optical_flow_;
   std::optional<NpyReader<std::uint8_t>> valid_;
   std::array<TimeNs, 2> span_{};
   bool times_read_ = false;
@@ -338,7 +345,7 @@ std::unique_ptr<Source> open_folder(const fs::path& path, const ReadOptions& opt
   const auto folder = std::make_shared<Folder>(path);
   std::vector<std::unique_ptr<RecordStream>> streams;
   if (folder->has("t.npy")) streams.push_back(std::make_unique<FramesStream>(folder));
-  if (folder->has("displacement_t.npy")) streams.push_back(std::make_unique<DisplacementsStream>(folder));
+  if (folder->has(folder->either(kSpans, kOldSpans))) streams.push_back(std::make_unique<OpticalFlowStream>(folder));
   RecordingInfo info;
   CameraInfo& camera = info.cameras.emplace_back();
   camera.name = "cam0";
@@ -351,12 +358,13 @@ std::unique_ptr<Source> open_folder(const fs::path& path, const ReadOptions& opt
 Format npy_truth_format() {
   return {
       .name = "npy-truth",
-      .description = "a folder of NumPy arrays: t, depth, flow, displacement, ... of all frames",
-      .holds = {Content::truth, Content::displacement},
+      .description = "a folder of NumPy arrays: t, depth, motion_field, optical_flow, ... of all frames",
+      .holds = {Content::truth, Content::optical_flow},
       .folder = true,
       .recognises =
           [](const auto& path, std::string_view) {
-            return Folder(path).has("t.npy") || Folder(path).has("displacement_t.npy");
+            const Folder folder(path);
+            return folder.has("t.npy") || folder.has(folder.either(kSpans, kOldSpans));
           },
       .open = open_folder,
       .create = [](const auto& path, const WriteOptions&) { return std::make_unique<NpyTruthWriter>(path); },

@@ -10,7 +10,7 @@ namespace esim::inline formats::prophesee {
 namespace {
 
 constexpr std::size_t kMaxHeaderBytes = 1 << 16;
-constexpr int kMaxExtent = 65536;  // px
+constexpr int kMaxStatedExtent = 65536;  // px
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(" \t\r");
@@ -35,7 +35,7 @@ std::string in_case(std::string_view text, int (*convert)(int)) {
 int extent(std::string_view text) {
   int value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() && value > 0 && value <= kMaxExtent ? value : 0;
+  return error == std::errc() && end == text.data() + text.size() && value > 0 && value <= kMaxStatedExtent ? value : 0;
 }
 
 void take_property(std::string_view key, std::string_view value, Header& header) {

@@ -49,12 +49,12 @@ std::string raw_header(std::string_view encoding, std::string_view version, Sens
 
 /// The next words of the file, at most so many; fails if only a part of a word is left.
 template <typename Word>
-std::span<const Word> read_words(InputFile& file, std::unique_ptr<Word[]>& words, std::size_t most) {
+std::span<const Word> read_words(InputFile& file, std::unique_ptr<Word[]>& words, std::size_t max) {
   const std::uint64_t start = file.offset();
-  const std::span<const std::byte> bytes = file.read(most * sizeof(Word));
+  const std::span<const std::byte> bytes = file.read(max * sizeof(Word));
   const std::size_t count = bytes.size() / sizeof(Word);
   if (count == 0 && !bytes.empty()) file.fail(start, "the file ends within a word");
-  if (!words) words = std::make_unique<Word[]>(most);
+  if (!words) words = std::make_unique<Word[]>(max);
   std::memcpy(words.get(), bytes.data(), count * sizeof(Word));
   if (bytes.size() % sizeof(Word) != 0) file.seek(start + count * sizeof(Word));
   return {words.get(), count};

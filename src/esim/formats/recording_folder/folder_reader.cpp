@@ -79,9 +79,9 @@ double rate_of(const TruthHdf5Reader& truth) {
 }
 
 /// Reads one folder: first the description of the recording, then its streams.
-class Folder {
+class RecordingFolder {
  public:
-  Folder(const fs::path& path, const ReadOptions& options) : options_(options) {
+  RecordingFolder(const fs::path& path, const ReadOptions& options) : options_(options) {
     if (!is_camera_folder(path)) {
       root_ = path;
       attempt([&] { read_rig(); });
@@ -195,12 +195,12 @@ class Folder {
   /// rig.yaml has the cameras in the body frame; camchain.yaml has them relative to the IMU.
   void read_calibrations(const fs::path& folder) {
     std::vector<CameraInfo> cameras;
-    for (auto& [name, model, T_body_camera] : read_calibration(folder / "rig.yaml"))
+    for (auto& [name, model, T_body_camera] : geometry::read_calibration(folder / "rig.yaml"))
       cameras.push_back({name, model, T_body_camera});
     info_.cameras = std::move(cameras);
     if (!is_file(folder / "imu.yaml")) return;
     const CalibratedImu imu = read_imu_calibration(folder / "imu.yaml");
-    const SE3 T_imu_camera = read_calibration(folder / "camchain.yaml").front().T_body_camera;
+    const SE3 T_imu_camera = geometry::read_calibration(folder / "camchain.yaml").front().T_body_camera;
     info_.imu = ImuInfo{info_.cameras.front().T_body_camera * T_imu_camera.inverse(),
                         imu.rate_hz,
                         imu.gyroscope_noise_density,
@@ -290,14 +290,14 @@ class Folder {
     if (model.width == 0) model.width = size.width, model.height = size.height;
   }
 
-  /// The names are "static", then the objects, then the layers.
+  /// The names are "static", then the objects, then the sprites.
   void learn_names(const TruthHdf5Reader& truth) {
     const std::vector<std::string>& names = truth.names();
     const std::size_t objects = info_.objects.empty() ? truth.objects() : info_.objects.size();
     if (names.size() < 1 + objects) return;
-    const auto layers = names.begin() + 1 + static_cast<std::ptrdiff_t>(objects);
-    info_.objects.assign(names.begin() + 1, layers);
-    info_.layers.assign(layers, names.end());
+    const auto sprites = names.begin() + 1 + static_cast<std::ptrdiff_t>(objects);
+    info_.objects.assign(names.begin() + 1, sprites);
+    info_.sprites.assign(sprites, names.end());
   }
 
   ReadOptions options_;
@@ -319,12 +319,12 @@ Format recording_format() {
       .description = "the folder of a recording, or of one of its cameras",
       .extensions = {""},
       .holds = {Content::events, Content::frames, Content::images, Content::imu, Content::poses, Content::truth,
-                Content::displacement},
+                Content::optical_flow},
       .several_cameras = true,
       .folder = true,
       .either_unit = true,
       .recognises = [](const auto& path, std::string_view) { return is_recording(path); },
-      .open = [](const auto& path, const ReadOptions& options) { return Folder(path, options).open(); },
+      .open = [](const auto& path, const ReadOptions& options) { return RecordingFolder(path, options).open(); },
       .create = [](const auto& path,
                    const WriteOptions& options) { return std::make_unique<RecordingWriter>(path, options); },
   };

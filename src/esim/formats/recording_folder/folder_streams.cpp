@@ -125,9 +125,9 @@ class EventsStream final : public RecordStream {
   std::optional<Record> record_;
 };
 
-class FramesStream final : public RecordStream {
+class PngFramesStream final : public RecordStream {
  public:
-  FramesStream(const fs::path& folder, int camera, bool unfinished)
+  PngFramesStream(const fs::path& folder, int camera, bool unfinished)
       : folder_(folder), camera_(camera), list_(folder / "frames.csv", 4, 1, unfinished) {}
 
   std::optional<TimeNs> due() override { return list_.next() ? std::optional(list_.t()) : std::nullopt; }
@@ -168,16 +168,16 @@ class TruthStream final : public RecordStream {
   }
 
   std::optional<TimeNs> due() override {
-    if (displacement_due_) return truth_->t(frame_ - 1);
+    if (optical_flow_due_) return truth_->t(frame_ - 1);
     if (frame_ == truth_->size()) return std::nullopt;
     return truth_->t(frame_);
   }
 
   const Record* next(TimeNs) override {
-    if (std::exchange(displacement_due_, false)) {
-      truth_->read(frame_ - 2, displacement_);
-      return &record_.emplace(DisplacementRecord{camera_, truth_->t(frame_ - 2), truth_->t(frame_ - 1), displacement_.x,
-                                                 displacement_.y, displacement_.visible});
+    if (std::exchange(optical_flow_due_, false)) {
+      truth_->read(frame_ - 2, optical_flow_);
+      return &record_.emplace(OpticalFlowRecord{camera_, truth_->t(frame_ - 2), truth_->t(frame_ - 1), optical_flow_.x,
+                                                optical_flow_.y, optical_flow_.visible});
     }
     if (damage_) std::rethrow_exception(damage_);
     const TimeNs t = truth_->t(frame_);
@@ -195,9 +195,9 @@ class TruthStream final : public RecordStream {
       return &record_.emplace(ImageRecord{camera_, t, irradiance});
     }
     ++frame_;
-    displacement_due_ = frame_ >= 2 && frame_ - 2 < truth_->displacements();
-    const auto& [T_world_camera, depth, flow_x, flow_y, object, T_world_objects] = images_of_frame_;
-    return &record_.emplace(TruthRecord{camera_, t, T_world_camera, irradiance, depth, flow_x, flow_y,
+    optical_flow_due_ = frame_ >= 2 && frame_ - 2 < truth_->optical_flows();
+    const auto& [T_world_camera, depth, motion_x, motion_y, object, T_world_objects] = images_of_frame_;
+    return &record_.emplace(TruthRecord{camera_, t, T_world_camera, irradiance, depth, motion_x, motion_y,
                                         object.empty() ? nullptr : &object, T_world_objects});
   }
 
@@ -212,9 +212,9 @@ class TruthStream final : public RecordStream {
   ImagesStream* images_;
   std::uint64_t frame_ = 0;        // index of the next frame
   std::exception_ptr damage_;      // damage of that frame, whose image is still handed out
-  bool displacement_due_ = false;  // optical flow to the previous frame is due
+  bool optical_flow_due_ = false;  // optical flow to the previous frame is due
   TruthHdf5Reader::Frame images_of_frame_;
-  TruthHdf5Reader::Displacement displacement_;
+  TruthHdf5Reader::OpticalFlow optical_flow_;
   std::optional<Record> record_;
 };
 
@@ -267,7 +267,7 @@ std::unique_ptr<RecordStream> events_stream(std::unique_ptr<Source> events, int 
 }
 
 std::unique_ptr<RecordStream> frames_stream(const fs::path& folder, int camera, bool unfinished) {
-  return std::make_unique<FramesStream>(folder, camera, unfinished);
+  return std::make_unique<PngFramesStream>(folder, camera, unfinished);
 }
 
 std::unique_ptr<RecordStream> truth_stream(std::shared_ptr<const TruthHdf5Reader> truth, int camera,

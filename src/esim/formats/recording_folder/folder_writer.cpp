@@ -21,7 +21,7 @@ namespace esim::inline formats {
 namespace {
 
 /// The camera of a record; -1: no camera.
-int camera_of(const Record& record) {
+int camera_index_of(const Record& record) {
   const auto camera = [](const auto& kind) {
     if constexpr (requires { kind.camera; }) return kind.camera;
     return -1;
@@ -73,19 +73,19 @@ void RecordingWriter::write(const Record& record) {
     before = std::exchange(last, truth->t);
     if (!truth->irradiance.empty()) sink_of(Content::images, record).write(record);
   }
-  if (const auto* displacement = std::get_if<DisplacementRecord>(&record)) {
-    if (truth_times_[displacement->camera] !=
-        std::pair(std::optional(displacement->t0), std::optional(displacement->t1)))
+  if (const auto* optical_flow = std::get_if<OpticalFlowRecord>(&record)) {
+    if (truth_times_[optical_flow->camera] !=
+        std::pair(std::optional(optical_flow->t0), std::optional(optical_flow->t1)))
       throw OutputError("cannot write " + folder_.string() +
                         ": recordings store optical flow with the ground-truth frames that it connects, but the input "
                         "has no such frames; write the format flo or kitti instead");
   }
   const Content content = content_of(record);
-  sink_of(content == Content::displacement ? Content::truth : content, record).write(record);
+  sink_of(content == Content::optical_flow ? Content::truth : content, record).write(record);
 }
 
 Sink& RecordingWriter::sink_of(Content content, const Record& record) {
-  std::unique_ptr<Sink>& sink = sinks_[{content, camera_of(record)}];
+  std::unique_ptr<Sink>& sink = sinks_[{content, camera_index_of(record)}];
   if (sink == nullptr) {
     sink = make_sink(content, record);
     sink->begin(info_);
@@ -94,7 +94,7 @@ Sink& RecordingWriter::sink_of(Content content, const Record& record) {
 }
 
 std::unique_ptr<Sink> RecordingWriter::make_sink(Content content, const Record& record) {
-  const int camera = camera_of(record);
+  const int camera = camera_index_of(record);
   std::filesystem::path place = folder_;
   if (camera >= 0) create_folder(place /= info_.cameras.at(static_cast<std::size_t>(camera)).name);
   switch (content) {
@@ -118,18 +118,18 @@ std::unique_ptr<Sink> RecordingWriter::make_sink(Content content, const Record& 
     case Content::triggers:
       throw InternalError("recordings have no file of triggers");
     case Content::truth:
-    case Content::displacement:
+    case Content::optical_flow:
       break;
   }
   const auto& truth = std::get<TruthRecord>(record);
   Camera& model = info_.cameras[static_cast<std::size_t>(camera)].model;
   if (model.width == 0) {
-    const Image<float>& image = truth.depth.empty() ? truth.flow_x : truth.depth;
+    const Image<float>& image = truth.depth.empty() ? truth.motion_x : truth.depth;
     model.width = image.width(), model.height = image.height();
   }
   return std::make_unique<TruthHdf5Writer>(
       place / "truth.h5", camera,
-      TruthHdf5Options{!truth.depth.empty(), !truth.flow_x.empty(), options_.compression, truth.object != nullptr});
+      TruthHdf5Options{!truth.depth.empty(), !truth.motion_x.empty(), options_.compression, truth.object != nullptr});
 }
 
 void RecordingWriter::end(bool complete) {

@@ -38,7 +38,7 @@ class RosSink final : public Sink {
   void put_irradiance(int camera, TimeNs t, const Image<float>& irradiance);
   void put(const PoseRecord& record);
   void put(const ImuRecord& record);
-  void put(const DisplacementRecord&) {}
+  void put(const OpticalFlowRecord&) {}
   void put(const EventPointsRecord&) {}
   void put(const TriggerRecord&) {}
 
@@ -67,11 +67,11 @@ class RosSink final : public Sink {
 };
 
 TimeNs RosSink::checked(TimeNs t) const {
-  const TimeNs most = encoding_ == Encoding::cdr ? std::numeric_limits<std::int32_t>::max()
-                                                 : std::numeric_limits<std::uint32_t>::max();  // s
-  if (t >= 0 && t / kNsPerSecond <= most) return t;
+  const TimeNs max = encoding_ == Encoding::cdr ? std::numeric_limits<std::int32_t>::max()
+                                                : std::numeric_limits<std::uint32_t>::max();  // s
+  if (t >= 0 && t / kNsPerSecond <= max) return t;
   throw UserError(fmt::format("cannot write {}: the time {} s does not fit: ROS holds times from 0 to {} s",
-                              path_.string(), to_seconds(t), most));
+                              path_.string(), to_seconds(t), max));
 }
 
 template <typename T>
@@ -175,8 +175,8 @@ void RosSink::put(const TruthRecord& record) {
     depth.header = of_camera;
     send(topic_of(camera, topic::kDepth), MessageType::image, record.t, depth);
   }
-  if (!record.flow_x.empty()) {
-    FlowMessage flow = to_message(record.flow_x, record.flow_y);
+  if (!record.motion_x.empty()) {
+    FlowMessage flow = to_message(record.motion_x, record.motion_y);
     flow.header = of_camera;
     send(topic_of(camera, topic::kFlow), MessageType::flow, record.t, flow);
   }

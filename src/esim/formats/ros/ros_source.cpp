@@ -42,7 +42,7 @@ struct CameraState {
 
 class RosSource final : public Source {
  public:
-  RosSource(std::unique_ptr<MessageInput> input, Survey survey);
+  RosSource(std::unique_ptr<MessageInput> input, TopicSurvey survey);
 
   const RecordingInfo& info() const override { return survey_.info; }
   const Record* next() override;
@@ -66,7 +66,7 @@ class RosSource final : public Source {
   bool fits(int camera, std::uint32_t width, std::uint32_t height) const;
 
   std::unique_ptr<MessageInput> input_;
-  Survey survey_;
+  TopicSurvey survey_;
   std::vector<CameraState> cameras_;
   std::vector<Event> events_;
   EventSpan rest_;  // events that have not been handed out
@@ -80,7 +80,7 @@ class RosSource final : public Source {
   std::exception_ptr damage_;
 };
 
-RosSource::RosSource(std::unique_ptr<MessageInput> input, Survey survey)
+RosSource::RosSource(std::unique_ptr<MessageInput> input, TopicSurvey survey)
     : input_(std::move(input)), survey_(std::move(survey)), cameras_(survey_.info.cameras.size()) {
   pose_.objects.resize(survey_.info.objects.size());
   for (const Assignment& to : survey_.channels) {
@@ -225,7 +225,7 @@ RosSource::Result RosSource::read_truth(const Assignment& to, const Channel& cha
     reader(message);
     if (!fits(to.camera, message.width, message.height)) return std::nullopt;
     TruthAssembler::Frame& frame = truth.begin(Part::flow, message.header.stamp);
-    to_images(message, frame.flow_x, frame.flow_y);
+    to_images(message, frame.motion_x, frame.motion_y);
   } else {
     ImageMessage message;
     reader(message);
@@ -300,7 +300,7 @@ std::unique_ptr<Source> make_source(const std::filesystem::path& path,
                                     const std::function<std::unique_ptr<MessageInput>()>& open,
                                     const ReadOptions& options) {
   const std::unique_ptr<MessageInput> surveyed = open();
-  Survey survey = ros::survey(*surveyed, options);
+  TopicSurvey survey = survey_topics(*surveyed, options);
   if (!survey.damaged && std::all_of(survey.channels.begin(), survey.channels.end(), has_no_role))
     fail_for_want_of_topics(path, surveyed->channels());
   return std::make_unique<RosSource>(open(), std::move(survey));

@@ -13,7 +13,7 @@ namespace esim::inline formats::ros {
 namespace {
 
 constexpr std::uint64_t kMaxBytes = 1U << 26;
-constexpr std::uint32_t kMaxExtent = 65536;  // px
+constexpr std::uint32_t kMaxImageExtent = 65536;  // px
 
 /// Facts from the first message of a channel.
 struct Facts {
@@ -26,7 +26,7 @@ class Surveyor {
  public:
   /// Returns false when nothing more can be learned.
   bool look(const MessageInput& input, const Message& message);
-  Survey conclude(const MessageInput& input, const ReadOptions& options) const;
+  TopicSurvey conclude(const MessageInput& input, const ReadOptions& options) const;
 
  private:
   template <typename T>
@@ -117,7 +117,8 @@ CameraInfo Surveyor::camera(const std::string& name, int index, const std::vecto
   if (const Facts* facts = facts_of(Role::camera_info); facts != nullptr && facts->camera) info.model = *facts->camera;
   for (const Role role : {Role::events, Role::camera_info, Role::frame, Role::irradiance, Role::depth, Role::flow}) {
     const Facts* facts = facts_of(role);
-    if (facts == nullptr || facts->width == 0 || facts->width > kMaxExtent || facts->height > kMaxExtent) continue;
+    if (facts == nullptr || facts->width == 0 || facts->width > kMaxImageExtent || facts->height > kMaxImageExtent)
+      continue;
     info.model.width = static_cast<int>(facts->width), info.model.height = static_cast<int>(facts->height);
     break;
   }
@@ -131,8 +132,8 @@ SE3 Surveyor::pose_in_body(const std::string& frame) const {
   return found != T_body_frames_.end() ? found->second : SE3();
 }
 
-Survey Surveyor::conclude(const MessageInput& input, const ReadOptions& options) const {
-  Survey result;
+TopicSurvey Surveyor::conclude(const MessageInput& input, const ReadOptions& options) const {
+  TopicSurvey result;
   Assignments roles = assign_roles(input.channels(), has_body_);
   result.channels = std::move(roles.of_channels);
   RecordingInfo& info = result.info;
@@ -165,7 +166,7 @@ Survey Surveyor::conclude(const MessageInput& input, const ReadOptions& options)
 
 }  // namespace
 
-Survey survey(MessageInput& input, const ReadOptions& options) {
+TopicSurvey survey_topics(MessageInput& input, const ReadOptions& options) {
   Surveyor surveyor;
   bool damaged = false;
   try {
@@ -177,7 +178,7 @@ Survey survey(MessageInput& input, const ReadOptions& options) {
   } catch (const Malformed&) {
     damaged = true;
   }
-  Survey result = surveyor.conclude(input, options);
+  TopicSurvey result = surveyor.conclude(input, options);
   result.damaged = damaged;
   return result;
 }

@@ -9,7 +9,7 @@
 namespace esim::inline formats::ros {
 
 /// The properties of a file of messages that are needed before its first record.
-struct Survey {
+struct TopicSurvey {
   RecordingInfo info{};
   std::vector<Assignment> channels{};
   bool damaged = false;  ///< the survey ended at damage
@@ -17,6 +17,6 @@ struct Survey {
 
 /// Reads messages until each channel has had one, or up to 64 MiB; if the file has no index, reads all of it.
 /// Stops at damage, which the reader reports.
-Survey survey(MessageInput& input, const ReadOptions& options);
+TopicSurvey survey_topics(MessageInput& input, const ReadOptions& options);
 
 }  // namespace esim::inline formats::ros

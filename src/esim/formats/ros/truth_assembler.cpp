@@ -30,13 +30,14 @@ std::optional<Record> TruthAssembler::take(int camera) {
   if (!geometry && !has(Part::irradiance)) return std::nullopt;
   if (!geometry) return ImageRecord{camera, frame.t, frame.irradiance};
 
-  const Image<float>& known = has(Part::depth) ? frame.depth : frame.flow_x;
+  const Image<float>& known = has(Part::depth) ? frame.depth : frame.motion_x;
   const Image<float> unknown(known.width(), known.height(), std::numeric_limits<float>::quiet_NaN());
   if (!has(Part::irradiance)) frame.irradiance = unknown;
   if (!has(Part::depth)) frame.depth = unknown;
-  if (!has(Part::flow)) frame.flow_x = frame.flow_y = unknown;
+  if (!has(Part::flow)) frame.motion_x = frame.motion_y = unknown;
   if (!has(Part::pose)) frame.T_world_camera = SE3();
-  return TruthRecord{camera, frame.t, frame.T_world_camera, frame.irradiance, frame.depth, frame.flow_x, frame.flow_y};
+  return TruthRecord{camera,      frame.t,        frame.T_world_camera, frame.irradiance,
+                     frame.depth, frame.motion_x, frame.motion_y};
 }
 
 }  // namespace esim::inline formats::ros

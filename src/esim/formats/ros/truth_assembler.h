@@ -15,7 +15,7 @@ class TruthAssembler {
   struct Frame {
     TimeNs t = 0;
     std::bitset<4> parts{};
-    Image<float> irradiance{}, depth{}, flow_x{}, flow_y{};
+    Image<float> irradiance{}, depth{}, motion_x{}, motion_y{};
     SE3 T_world_camera{};
   };
 

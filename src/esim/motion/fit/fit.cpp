@@ -24,8 +24,8 @@ constexpr double kSparseSmoothingPerKnot = 0.05;
 // Poses with at most this interval are averaged by wider knot intervals; the spline passes through sparser poses.
 constexpr double kLongestDenseInterval_s = 0.015;
 constexpr double kDenseKnotInterval_s = 0.02;
-constexpr double kMostDenseTurn_rad = std::numbers::pi / 3.0;
-constexpr double kMostSparseTurn_rad = std::numbers::pi / 8.0;
+constexpr double kMaxDenseTurn_rad = std::numbers::pi / 3.0;
+constexpr double kMaxSparseTurn_rad = std::numbers::pi / 8.0;
 constexpr double kLargestTurn_rad = 0.9 * std::numbers::pi;
 
 /// The poses as plain columns, with times in seconds since the first.
@@ -120,7 +120,7 @@ double whole_segments(const PoseColumns& poses, double knot_interval_s) {
   return std::max(1.0, std::ceil(poses.times_s.back() / knot_interval_s - 1e-6));
 }
 
-double most_segments(const PoseColumns& poses) { return 64.0 * static_cast<double>(poses.times_s.size()); }
+double max_segments(const PoseColumns& poses) { return 64.0 * static_cast<double>(poses.times_s.size()); }
 
 std::string describe(const FastestTurn& turn) {
   return fmt::format("the body turns by {:.0f} degrees between two knots near {:.6f} s after the first pose",
@@ -129,10 +129,10 @@ std::string describe(const FastestTurn& turn) {
 
 UniformBasis basis_with_knot_interval(const PoseColumns& poses, int order, double knot_interval_s) {
   const double segments = whole_segments(poses, knot_interval_s);
-  if (segments > most_segments(poses)) {
+  if (segments > max_segments(poses)) {
     throw UserError(fmt::format(
         "trajectory fit: a knot interval of {} s is too short for {} poses in {} s; choose more than {:.3g} s",
-        knot_interval_s, poses.times_s.size(), poses.times_s.back(), poses.times_s.back() / most_segments(poses)));
+        knot_interval_s, poses.times_s.size(), poses.times_s.back(), poses.times_s.back() / max_segments(poses)));
   }
   const UniformBasis basis = basis_of(poses, order, static_cast<int>(segments));
   if (const FastestTurn turn = fastest_turn(poses, basis); turn.angle_rad > kLargestTurn_rad) {
@@ -145,16 +145,16 @@ UniformBasis chosen_basis(const PoseColumns& poses, int order, double median_int
   if (median_interval_s <= kLongestDenseInterval_s) {
     const double interval_s = std::clamp(kDenseKnotInterval_s, 2.0 * median_interval_s, 4.0 * median_interval_s);
     const UniformBasis basis = basis_of(poses, order, static_cast<int>(whole_segments(poses, interval_s)));
-    if (fastest_turn(poses, basis).angle_rad <= kMostDenseTurn_rad) return basis;
+    if (fastest_turn(poses, basis).angle_rad <= kMaxDenseTurn_rad) return basis;
   }
   // Knots at twice the rate of the poses: at the same rate, poses hardly constrain an oscillation of a spline of odd
   // order from knot to knot.
   FastestTurn turn;
-  for (double segments = whole_segments(poses, 0.5 * median_interval_s); segments <= most_segments(poses);
+  for (double segments = whole_segments(poses, 0.5 * median_interval_s); segments <= max_segments(poses);
        segments *= 2.0) {
     const UniformBasis basis = basis_of(poses, order, static_cast<int>(segments));
     turn = fastest_turn(poses, basis);
-    if (turn.angle_rad <= kMostSparseTurn_rad) return basis;
+    if (turn.angle_rad <= kMaxSparseTurn_rad) return basis;
   }
   throw UserError(fmt::format("trajectory fit: {}; check the poses for jumps, or give more", describe(turn)));
 }

@@ -16,7 +16,7 @@ namespace {
 constexpr double kSamePlace_m = 1e-6;
 constexpr double kSameRotation_rad = 1e-9;
 constexpr double kShortestLeg_s = 1e-6;
-constexpr double kMostTime_s = 1e8;
+constexpr double kMaxTime_s = 1e8;
 constexpr double kLargestRampOfLeg = 1.0 / 3.0;
 
 [[noreturn]] void fail(std::size_t point, const std::string& message) {
@@ -48,8 +48,8 @@ void validate(std::span<const Waypoint> points, const WaypointOptions& options) 
     const SE3& pose = point.T_world_body;
     if (!pose.translation.allFinite() || !(std::abs(pose.rotation.norm() - 1.0) < 1e-3))
       fail(i, "is not finite, or its quaternion does not have unit norm; correct it");
-    if (!(point.pause_s >= 0.0 && point.pause_s <= kMostTime_s))
-      fail(i, fmt::format("pause_s: {} is out of range; it must be 0 to {:g} s", point.pause_s, kMostTime_s));
+    if (!(point.pause_s >= 0.0 && point.pause_s <= kMaxTime_s))
+      fail(i, fmt::format("pause_s: {} is out of range; it must be 0 to {:g} s", point.pause_s, kMaxTime_s));
     if (point.t_s.has_value() != timed) {
       fail(i, timed ? "has no t, but points.0 has; give a time to every point or to none"
                     : "has t, but points.0 has none; give a time to every point or to none");
@@ -58,8 +58,8 @@ void validate(std::span<const Waypoint> points, const WaypointOptions& options) 
       fail(i, "has both t and speed, but times already define the speed; remove one of the two");
     if (point.speed_m_per_s && (!(*point.speed_m_per_s > 0.0) || !std::isfinite(*point.speed_m_per_s)))
       fail(i, fmt::format("speed: {} must be positive and finite", *point.speed_m_per_s));
-    if (timed && !(std::abs(*point.t_s) <= kMostTime_s))
-      fail(i, fmt::format("t: {} is out of range; it must be within {:g} s", *point.t_s, kMostTime_s));
+    if (timed && !(std::abs(*point.t_s) <= kMaxTime_s))
+      fail(i, fmt::format("t: {} is out of range; it must be within {:g} s", *point.t_s, kMaxTime_s));
     if (!timed || i == 0) continue;
     const double before = *points[i - 1].t_s;
     if (to_ns(*point.t_s) == to_ns(before))
@@ -130,8 +130,8 @@ void set_leg_times_by_speed(std::span<const Waypoint> points, const WaypointOpti
     if (course.leg_s.back() < kShortestLeg_s)
       fail(i + 1, "is less than a microsecond after the previous point; remove it, or reduce the speed");
     whole_s += course.leg_s.back() + points[i].pause_s;
-    if (!(whole_s <= kMostTime_s))
-      fail(i, fmt::format("has so low a speed that the motion takes more than {:g} s; increase speed", kMostTime_s));
+    if (!(whole_s <= kMaxTime_s))
+      fail(i, fmt::format("has so low a speed that the motion takes more than {:g} s; increase speed", kMaxTime_s));
   }
   for (int round = 0; round < kRounds; ++round) {
     const std::vector<QuinticBezier> path = smooth_path(course);

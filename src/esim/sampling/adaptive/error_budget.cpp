@@ -10,11 +10,11 @@ namespace {
 constexpr double kShareAbove = 0.01;
 
 // Bounds of e_0 relative to its value for normally distributed errors.
-constexpr double kLeastGain = 0.25, kMostGain = 2;
+constexpr double kMinGain = 0.25, kMaxGain = 2;
 
 // An audit of a typical interval with all errors above the tolerance changes ln(e_0) by kFirstStep. The step decreases
-// to kLastStep; it is halved after kHalvedAfter audits. The weight of a longer interval is at most kMostWeight.
-constexpr double kFirstStep = 1, kLastStep = 0.25, kHalvedAfter = 64, kMostWeight = 4;
+// to kLastStep; it is halved after kHalvedAfter audits. The weight of a longer interval is at most kMaxWeight.
+constexpr double kFirstStep = 1, kLastStep = 0.25, kHalvedAfter = 64, kMaxWeight = 4;
 
 // Tiles in which no pixel changes by more than this fraction of the tolerance do not count.
 constexpr double kActive = 0.25;
@@ -44,9 +44,9 @@ void ErrorBudget::audit(std::span<const float> errors, float most_change, double
   }
   if (static_cast<double>(most_change) <= kActive * tolerance_) return;
   const double excess = static_cast<double>(above) / static_cast<double>(errors.size()) - kShareAbove;
-  const double weight = std::min(duration / typical_interval(), kMostWeight);
+  const double weight = std::min(duration / typical_interval(), kMaxWeight);
   const double step = std::max(kLastStep, kFirstStep / (1 + steering_audits_++ / kHalvedAfter));
-  gain_ = std::clamp(gain_ * std::exp(-step * weight * excess), kLeastGain, kMostGain);
+  gain_ = std::clamp(gain_ * std::exp(-step * weight * excess), kMinGain, kMaxGain);
 }
 
 }  // namespace esim::inline sampling

@@ -25,7 +25,7 @@ constexpr double kGrid = 0.03125;
 double fastest_in(const Sample& sample, const Tile& tile, int every) {
   float most = 0;
   for (int y = tile.y; y < tile.y + tile.height; y += every) {
-    const float *const vx = sample.flow_x.row(y) + tile.x, *const vy = sample.flow_y.row(y) + tile.x;
+    const float *const vx = sample.motion_x.row(y) + tile.x, *const vy = sample.motion_y.row(y) + tile.x;
 #pragma omp simd reduction(max : most)
     for (int x = 0; x < tile.width; ++x) {
       const float v2 = vx[x] * vx[x] + vy[x] * vy[x];

@@ -12,7 +12,7 @@ namespace {
 
 // Near a jump, the second difference on one side does not describe the interval: the curvature term is at most this
 // multiple of the smaller one.
-constexpr float kMostBend = 2;
+constexpr float kMaxBend = 2;
 
 // Every third row is watched, alternating its left and its right half: errors of neighbours are similar.
 constexpr int kRowsPerRun = 3;
@@ -57,8 +57,8 @@ struct TileTimeline::Curvature {
     const float a = before_outer * before[k] + before_near * first[k] + before_far * last[k];
     const float b = after_outer * after[k] + after_near * last[k] + after_far * first[k];
     const float size_a = std::fabs(a), size_b = std::fabs(b), mean = 0.5F * (a + b);
-    const float most = kMostBend * (size_a < size_b ? size_a : size_b);
-    const float limited = mean > most ? most : (mean < -most ? -most : mean);
+    const float bound = kMaxBend * (size_a < size_b ? size_a : size_b);
+    const float limited = mean > bound ? bound : (mean < -bound ? -bound : mean);
     return a * b > 0 ? limited : 0.0F;
   }
 

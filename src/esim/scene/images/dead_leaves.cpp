@@ -29,8 +29,8 @@ struct Leaf {
 
 /// The radius that a fraction u of the leaves does not exceed, for the density 1 / r^3.
 double radius(const DeadLeavesOptions& options, double u) {
-  const double low = 1 / (options.least_radius_px * options.least_radius_px),
-               high = 1 / (options.greatest_radius_px * options.greatest_radius_px);
+  const double low = 1 / (options.min_radius_px * options.min_radius_px),
+               high = 1 / (options.max_radius_px * options.max_radius_px);
   return 1 / std::sqrt(low + u * (high - low));
 }
 
@@ -88,7 +88,7 @@ int lay_under(const Leaf& leaf, Image<float>& log_light, Image<std::uint8_t>& ta
 }  // namespace
 
 Image<float> dead_leaves(const DeadLeavesOptions& options, std::uint64_t seed, std::uint32_t number) {
-  constexpr std::uint64_t kMostLeaves = 100'000;
+  constexpr std::uint64_t kMaxLeaves = 100'000;
   constexpr std::int64_t kCovered = 200;  // one pixel in this number may show the background
   constexpr double kLens_px = 0.6;
   const AddressedRandom random(seed, Purpose::dead_leaves);
@@ -96,7 +96,7 @@ Image<float> dead_leaves(const DeadLeavesOptions& options, std::uint64_t seed, s
   Image<float> image(options.width, options.height, ground);
   Image<std::uint8_t> taken(options.width, options.height);
   auto left = static_cast<std::int64_t>(image.size());
-  for (std::uint64_t leaf = 0; left > static_cast<std::int64_t>(image.size()) / kCovered && leaf < kMostLeaves; ++leaf)
+  for (std::uint64_t leaf = 0; left > static_cast<std::int64_t>(image.size()) / kCovered && leaf < kMaxLeaves; ++leaf)
     left -= lay_under(draw_leaf(options, random, number, leaf), image, taken);
 
   const float low = static_cast<float>(options.darkest), high = static_cast<float>(options.lightest);

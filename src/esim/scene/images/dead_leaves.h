@@ -9,8 +9,8 @@ namespace esim::inline scene {
 /// Options of a collage of opaque leaves.
 struct DeadLeavesOptions {
   int width = 512, height = 512;         ///< px
-  double least_radius_px = 4;            ///< minimum, of a leaf
-  double greatest_radius_px = 160;       ///< maximum, of a leaf
+  double min_radius_px = 4;              ///< minimum, of a leaf
+  double max_radius_px = 160;            ///< maximum, of a leaf
   double darkest = 0.1, lightest = 1.0;  ///< bounds of the irradiance, whose logarithm is uniform
 };
 

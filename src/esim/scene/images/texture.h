@@ -136,9 +136,9 @@ std::array<float, K> Texture::sample(const TextureLookup<K>& at, std::uint32_t l
     const bool blend = !hn::AllTrue(d, hn::Eq(fraction, zero));
     const auto fine = grid(d, finer), coarse = grid(d, coarser);
 
-    const float most_probes = hn::GetLane(hn::MaxOfLanes(d, f.probes));
+    const float max_probes = hn::GetLane(hn::MaxOfLanes(d, f.probes));
     V sum = zero;
-    for (float probe = 0; probe < most_probes; ++probe) {
+    for (float probe = 0; probe < max_probes; ++probe) {
       const V offset = hn::Sub(hn::Mul(hn::Set(d, probe + 0.5F), f.per_probe), hn::Set(d, 0.5F));
       const V u = wrapped(d, hn::MulAdd(offset, f.step_u, at_u), wrap_u_);
       const V v = wrapped(d, hn::MulAdd(offset, f.step_v, at_v), wrap_v_);
@@ -190,8 +190,8 @@ auto Texture::footprint(D d, const Lookup& at, std::size_t i) const {
   const auto longer_than = [&](float times) { return hn::Gt(major2, hn::Mul(minor2, hn::Set(d, times * times))); };
   const auto two = longer_than(1.25F), three = longer_than(2.25F), four = longer_than(3.25F);
   const auto choose = [&](float for_two, float for_three, float for_four) {
-    const V least = hn::IfThenElse(two, hn::Set(d, for_two), one);
-    return hn::IfThenElse(four, hn::Set(d, for_four), hn::IfThenElse(three, hn::Set(d, for_three), least));
+    const V min = hn::IfThenElse(two, hn::Set(d, for_two), one);
+    return hn::IfThenElse(four, hn::Set(d, for_four), hn::IfThenElse(three, hn::Set(d, for_three), min));
   };
   f.probes = choose(2, 3, 4), f.per_probe = choose(1.0F / 2, 1.0F / 3, 1.0F / 4);
   const V blur2 = hn::Max(hn::Mul(major2, hn::Mul(f.per_probe, f.per_probe)), minor2);

@@ -136,11 +136,11 @@ Materials convert_materials(const SceneGraph& graph, TextureStore& textures) {
 }
 
 void give_warnings(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn) {
-  constexpr std::size_t kMost = 10;  // one line each; a scene can have thousands of faults
-  for (std::size_t i = 0; i < std::min(graph.warnings.size(), kMost); ++i) warn(graph.warnings[i]);
-  if (graph.warnings.size() > kMost)
-    warn(fmt::format("scene {}: {} more warnings of this kind", file.filename().string(),
-                     graph.warnings.size() - kMost));
+  constexpr std::size_t kMax = 10;  // one line each; a scene can have thousands of faults
+  for (std::size_t i = 0; i < std::min(graph.warnings.size(), kMax); ++i) warn(graph.warnings[i]);
+  if (graph.warnings.size() > kMax)
+    warn(
+        fmt::format("scene {}: {} more warnings of this kind", file.filename().string(), graph.warnings.size() - kMax));
   if (graph.normal_maps > 0)
     warn(fmt::format("scene {}: {} of its materials have a normal or bump map, which is ignored",
                      file.filename().string(), graph.normal_maps));

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+// Private to scene: includes nlohmann/json.hpp.
 namespace esim::inline scene {
 
 /// A glTF 2.0 file as text and bytes. The content is not trusted: a value that is missing, of the wrong type or out of

@@ -10,7 +10,7 @@ namespace {
 
 // A hand-held camera stays below these limits.
 constexpr double kFastTurn_rad_per_s = 720 * std::numbers::pi / 180, kFast_m_per_s2 = 50;
-constexpr double kMostTests = 4e8;    // of two triangles' boxes: about a second
+constexpr double kMaxTests = 4e8;     // of two triangles' boxes: about a second
 constexpr std::size_t kStretch = 16;  // intervals of the path that are first tested together
 
 /// Whether the segment from a to b intersects a triangle (Möller and Trumbore 1997).
@@ -57,7 +57,7 @@ std::vector<bool> ways_through(const std::vector<Eigen::Vector3f>& eyes, const S
   double triangles = 0;
   for (const SceneObject& object : scene.objects)
     triangles += object.moves ? 0 : static_cast<double>(object.mesh.triangles.size());
-  if (count == 0 || triangles * static_cast<double>(stretches.size()) > kMostTests) return through;
+  if (count == 0 || triangles * static_cast<double>(stretches.size()) > kMaxTests) return through;
 
   const auto test = [&](const Eigen::AlignedBox3f& around, const std::array<Eigen::Vector3f, 3>& triangle,
                         std::size_t from) {

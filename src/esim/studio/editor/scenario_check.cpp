@@ -7,7 +7,7 @@
 
 #include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
-#include "esim/studio/editor/yaml_text.h"
+#include "esim/studio/editor/scenario_values.h"
 #include "esim/studio/server/http.h"
 
 namespace esim::studio {
@@ -64,23 +64,27 @@ void refuse_foreign_files(Scenario& scenario, const Roots& roots) {
   describe(visitor, scenario);
 }
 
-bool has(const Json& values, const std::string& key) {
-  const Json* node = &values;
+/// The place of an option, whose key is dotted, in the values: a JSON pointer.
+Json::json_pointer pointer_of(const std::string& key) {
+  Json::json_pointer pointer;
   for (std::size_t begin = 0; begin <= key.size();) {
     const std::size_t end = std::min(key.find('.', begin), key.size());
-    const std::string part = key.substr(begin, end - begin);
-    if (node->is_array()) {
-      const bool number = !part.empty() && part.size() < 7 && part.find_first_not_of("0123456789") == std::string::npos;
-      if (!number || std::stoul(part) >= node->size()) return false;
-      node = &(*node)[std::stoul(part)];
-    } else if (node->is_object() && node->contains(part)) {
-      node = &(*node)[part];
-    } else {
-      return false;
-    }
+    pointer /= key.substr(begin, end - begin);
     begin = end + 1;
   }
-  return true;
+  return pointer;
+}
+
+bool has(const Json& values, const std::string& key) { return values.contains(pointer_of(key)); }
+
+void remove(Json& values, const std::string& key) {
+  const Json::json_pointer pointer = pointer_of(key);
+  Json& parent = values[pointer.parent_pointer()];
+  if (parent.is_array()) {
+    parent.erase(std::stoul(pointer.back()));
+  } else {
+    parent.erase(pointer.back());
+  }
 }
 
 /// The key in the text of an option that all cameras share; the reader reports it with a camera's key.
@@ -96,6 +100,12 @@ std::string place_in(const Json& values, const std::string& key) {
 
 }  // namespace
 
+Json problem_json(const std::string& where, const std::string& what, int line) {
+  Json problem{{"where", where}, {"what", what}};
+  if (line > 0) problem["line"] = line;
+  return problem;
+}
+
 std::string option_in(const std::string& message) {
   const std::size_t end = message.find(": ");
   if (end == std::string::npos || end == 0) return "";
@@ -105,21 +115,22 @@ std::string option_in(const std::string& message) {
 }
 
 CheckedScenario check_scenario(const std::string& yaml, const fs::path& file, const Roots& roots) {
-  constexpr int kMostProblems = 20;
+  constexpr int kMaxProblems = 20;
   CheckedScenario checked;
   checked.values = values_of(yaml, file.filename().string());
+  Json remaining = checked.values;
   ScenarioText text;
   text.yaml = yaml;
   text.file = file;
   text.needs_waypoints = false;
   text.refuses = [&](const fs::path& named) { return roots.contains(named) ? "" : outside(named); };
-  const auto note = [&](const std::string& where, const std::string& what) {
+  const auto note = [&](const std::string& where, const std::string& what, int line) {
     for (const Json& problem : checked.problems) {
       if (problem["where"] == where) return;  // it is missing because of the removal below
     }
-    checked.problems.push_back({{"where", where}, {"what", what}});
+    checked.problems.push_back(problem_json(where, what, line));
   };
-  for (int i = 0; i < kMostProblems; ++i) {
+  for (int i = 0; i < kMaxProblems; ++i) {
     try {
       Scenario scenario = read_scenario(text);
       refuse_foreign_files(scenario, roots);
@@ -127,10 +138,11 @@ CheckedScenario check_scenario(const std::string& yaml, const fs::path& file, co
       return checked;
     } catch (const OptionError& error) {
       // Remove the invalid option to find the next problem.
-      const std::string place = place_in(values_of(text.yaml, ""), error.key());
-      note(place.empty() ? error.key() : place, error.problem());
+      const std::string place = place_in(remaining, error.key());
+      note(place.empty() ? error.key() : place, error.problem(), error.line());
       if (!place.empty()) {
-        text.yaml = with_option(text.yaml, place, nullptr);
+        text.removed.push_back(place);
+        remove(remaining, place);
       } else if (error.key() == "renderer") {
         text.needs_renderer = false;
       } else if (error.key() == "trajectory") {
@@ -139,7 +151,7 @@ CheckedScenario check_scenario(const std::string& yaml, const fs::path& file, co
         return checked;
       }
     } catch (const UserError& error) {
-      note(option_in(error.what()), error.what());
+      note(option_in(error.what()), error.what(), 0);
       return checked;
     }
   }

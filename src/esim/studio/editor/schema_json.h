@@ -2,6 +2,7 @@
 
 #include "esim/studio/server/json.h"
 
+// Private to studio.
 namespace esim::studio {
 
 /// All options of a scenario as a tree for forms: {kind: "group", name, help, members: [...]}, made from their

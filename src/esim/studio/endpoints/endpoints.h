@@ -7,6 +7,7 @@
 #include "esim/studio/server/router.h"
 #include "esim/studio/studio.h"
 
+// Private to studio.
 namespace esim::studio {
 
 /// The state on which requests work.

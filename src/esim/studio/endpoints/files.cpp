@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostEntries = 10'000;
+constexpr std::size_t kMaxEntries = 10'000;
 
 Json list(const Roots& roots, const fs::path& folder, const std::string& name) {
   struct Entry {
@@ -21,7 +21,7 @@ Json list(const Roots& roots, const fs::path& folder, const std::string& name) {
   };
   std::vector<Entry> found;
   std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end && found.size() < kMostEntries;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end && found.size() < kMaxEntries;
        entry.increment(error)) {
     const std::string file = entry->path().filename().string();
     if (file.starts_with('.') || !roots.contains(entry->path())) continue;

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "esim/compose/waypoints.h"
+#include "esim/compose/waypoint_trajectory.h"
 #include "esim/scenario/read.h"
 #include "esim/studio/editor/motion_warnings.h"
 #include "esim/studio/editor/scenario_check.h"
@@ -39,8 +39,8 @@ Json waypoints_json(const Scenario& scenario, const CameraInfo& camera) {
 }
 
 Json trajectory_json(const Json& request, const Workshop& workshop) {
-  constexpr double kMostSamples = 20'000, kDefaultSamples = 400, kDegree = std::numbers::pi / 180;
-  const auto samples = static_cast<int>(number_member(request, "samples", kDefaultSamples, 2, kMostSamples));
+  constexpr double kMaxSamples = 20'000, kDefaultSamples = 400, kDegree = std::numbers::pi / 180;
+  const auto samples = static_cast<int>(number_member(request, "samples", kDefaultSamples, 2, kMaxSamples));
   const Scenario scenario = scenario_of(request, workshop.roots, ScenarioNeeds::motion);
   const bool engine = engine_objects(scenario.renderer) != nullptr;
   const auto scene = engine ? nullptr : workshop.scenes.of(scenario);

@@ -4,16 +4,16 @@
 #include <cstdlib>
 #include <span>
 
-#include "esim/preview/canvas.h"
+#include "esim/plot/theme.h"
+#include "esim/preview/pictures.h"
 #include "esim/scene/images/image_file.h"
 #include "esim/studio/endpoints/endpoints.h"
 #include "esim/visualise/event_pictures.h"
-#include "esim/visualise/theme.h"
 
 namespace esim::studio {
 namespace {
 
-constexpr TimeNs kMostTime = TimeNs{1} << 61;
+constexpr TimeNs kMaxTime = TimeNs{1} << 61;
 
 std::string text_in(const Request& request, const char* name, const std::string& otherwise) {
   const auto found = request.query.find(name);
@@ -75,9 +75,9 @@ Json recording_json(const std::string& id, const std::string& path, const OpenRe
                                 {{"events", camera.events != nullptr},
                                  {"images", !camera.images.empty()},
                                  {"depth", camera.depth},
-                                 {"flow", camera.flow}}}});
+                                 {"motion_field", camera.motion_field}}}});
     if (camera.depth) json["cameras"].back()["depth_m"] = {camera.depth_scale.near_m(), camera.depth_scale.far_m()};
-    if (camera.flow) json["cameras"].back()["flow_px_per_s"] = camera.flow_scale.full_px_per_s();
+    if (camera.motion_field) json["cameras"].back()["motion_px_per_s"] = camera.motion_scale.full_px_per_s();
   }
   json["imu"] = view->has_imu();
   json["poses"] = view->has_poses();
@@ -115,20 +115,20 @@ Image<Rgb> background_of(const Request& request, const Asked& asked, const Camer
 }
 
 Response picture(const Request& request, const Asked& asked) {
-  constexpr std::uint64_t kMostEvents = std::uint64_t{1} << 22;
+  constexpr std::uint64_t kMaxEvents = std::uint64_t{1} << 22;
   constexpr double kWindowsPerTau = 1.5;
-  constexpr TimeNs kTausSeen = 5, kDefaultWindow = 20 * kNsPerMs, kMostWindow = 3600 * kNsPerSecond;
+  constexpr TimeNs kTausSeen = 5, kDefaultWindow = 20 * kNsPerMs, kMaxWindow = 3600 * kNsPerSecond;
   const CameraView& camera = camera_in(request, asked);
   const EventStore& store = events_of(camera);
   const Camera& model = camera.info.model;
   if (model.width == 0) throw HttpError(404, camera.info.name + ": has no events");
-  const TimeNs t = number_in(request, "t", asked.view->span().start, -kMostTime, kMostTime);
-  const TimeNs window = number_in(request, "window", kDefaultWindow, 1, kMostWindow);
+  const TimeNs t = number_in(request, "t", asked.view->span().start, -kMaxTime, kMaxTime);
+  const TimeNs window = number_in(request, "window", kDefaultWindow, 1, kMaxWindow);
   const std::string view = text_in(request, "view", "counts");
   const bool surface = view == "time_surface";
   const TimeNs shown = surface ? static_cast<TimeNs>(kWindowsPerTau * static_cast<double>(kTausSeen * window)) : window;
   EventStore::Range range = store.find(t - shown + 1, t + 1);
-  range.first = std::max(range.first, range.end - std::min(range.end, kMostEvents));
+  range.first = std::max(range.first, range.end - std::min(range.end, kMaxEvents));
   const std::vector<Event> events = store.read(range.first, range.end - range.first);
   const PictureGrid grid = picture_grid({model.width, model.height}, model.width, model.height);
   Image<Rgb> image;
@@ -152,7 +152,7 @@ Response picture(const Request& request, const Asked& asked) {
 
 Response image(const Request& request, const Asked& asked) {
   const CameraView& camera = camera_in(request, asked);
-  const TimeNs t = number_in(request, "t", asked.view->span().start, -kMostTime, kMostTime);
+  const TimeNs t = number_in(request, "t", asked.view->span().start, -kMaxTime, kMaxTime);
   const std::string kind = text_in(request, "kind", "image");
   Response response;
   TimeNs seen = 0;
@@ -163,14 +163,14 @@ Response image(const Request& request, const Asked& asked) {
     if (!bytes) throw HttpError(404, file->file.filename().string() + ": cannot be read");
     response = png_response(*std::move(bytes));
     seen = file->t;
-  } else if (kind == "depth" || kind == "flow") {
-    const auto truth =
-        asked.view->truth_at(camera, kind == "depth" ? RecordingView::Kind::depth : RecordingView::Kind::flow, t);
+  } else if (kind == "depth" || kind == "motion_field") {
+    const auto truth = asked.view->truth_at(
+        camera, kind == "depth" ? RecordingView::Kind::depth : RecordingView::Kind::motion_field, t);
     if (!truth) throw HttpError(404, fmt::format("{}: has no {}", camera.info.name, kind));
     response = png_response(encode_png(truth->first));
     seen = truth->second;
   } else {
-    throw HttpError(400, fmt::format("kind: must be one of image, depth, flow, not '{}'", kind));
+    throw HttpError(400, fmt::format("kind: must be one of image, depth, motion_field, not '{}'", kind));
   }
   response.headers = {{"X-Time-Ns", std::to_string(seen)}};
   return response;
@@ -181,15 +181,15 @@ void put(std::string& bytes, std::uint64_t value, int count) {
 }
 
 Response events(const Request& request, const Asked& asked) {
-  constexpr std::int64_t kMostEvents = 500'000;
-  constexpr TimeNs kLongest = 0xffff'ffff;  // ns from the start, in 32 bits
+  constexpr std::int64_t kMaxEvents = 500'000;
+  constexpr TimeNs kLongestSpan = 0xffff'ffff;  // ns from the start, in 32 bits
   const CameraView& camera = camera_in(request, asked);
   const EventStore& store = events_of(camera);
-  const TimeNs from = number_in(request, "from", asked.view->span().start, -kMostTime, kMostTime);
-  const TimeNs to = number_in(request, "to", from + 100 * kNsPerMs, from, from + kLongest);
-  const auto most = static_cast<std::uint64_t>(number_in(request, "max", 100'000, 1, kMostEvents));
+  const TimeNs from = number_in(request, "from", asked.view->span().start, -kMaxTime, kMaxTime);
+  const TimeNs to = number_in(request, "to", from + 100 * kNsPerMs, from, from + kLongestSpan);
+  const auto max = static_cast<std::uint64_t>(number_in(request, "max", 100'000, 1, kMaxEvents));
   const EventStore::Range range = store.find(from, to + 1);
-  const std::vector<Event> shown = store.thinned(range, most);
+  const std::vector<Event> shown = store.thinned(range, max);
   Response response;
   response.content_type = "application/octet-stream";
   constexpr std::size_t kHead = 24, kEach = 8;
@@ -208,8 +208,8 @@ Response events(const Request& request, const Asked& asked) {
 
 Response rate(const Request& request, const Asked& asked) {
   const TimeSpan span = asked.view->span();
-  const TimeNs from = number_in(request, "from", span.start, -kMostTime, kMostTime);
-  const TimeNs to = std::max(from + 1, number_in(request, "to", span.end + 1, -kMostTime, kMostTime));
+  const TimeNs from = number_in(request, "from", span.start, -kMaxTime, kMaxTime);
+  const TimeNs to = std::max(from + 1, number_in(request, "to", span.end + 1, -kMaxTime, kMaxTime));
   const auto bins = static_cast<std::size_t>(number_in(request, "bins", 500, 1, 10'000));
   const EventRate counted = events_of(camera_in(request, asked)).rate(from, to, bins);
   Json on = Json::array(), off = on;
@@ -224,35 +224,35 @@ Response rate(const Request& request, const Asked& asked) {
 /// The records between two times.
 template <typename T>
 std::span<const T> part_of(const std::vector<T>& records, const Request& request, const TimeSpan& span) {
-  const TimeNs from = number_in(request, "from", span.start, -kMostTime, kMostTime);
-  const TimeNs to = number_in(request, "to", span.end, -kMostTime, kMostTime);
+  const TimeNs from = number_in(request, "from", span.start, -kMaxTime, kMaxTime);
+  const TimeNs to = number_in(request, "to", span.end, -kMaxTime, kMaxTime);
   const auto before = [](const T& record, TimeNs t) { return record.t < t; };
   const auto first = std::lower_bound(records.begin(), records.end(), from, before);
   return {first, std::lower_bound(first, records.end(), std::max(from, to + 1), before)};
 }
 
-std::size_t most_in(const Request& request) {
+std::size_t max_in(const Request& request) {
   return static_cast<std::size_t>(number_in(request, "max", 2000, 1, 100'000));
 }
 
-/// Reduces more than `most` measurements for drawing: from each interval, the minimum of every axis, at its start, and
+/// Reduces more than `count` measurements for drawing: from each interval, the minimum of every axis, at its start, and
 /// the maximum, at its end. Mere subsampling would alias vibrations.
-std::vector<ImuRecord> envelope(std::span<const ImuRecord> records, std::size_t most) {
-  if (records.size() <= most) return {records.begin(), records.end()};
-  const std::size_t stretches = std::max<std::size_t>(1, most / 2);
+std::vector<ImuRecord> envelope(std::span<const ImuRecord> records, std::size_t count) {
+  if (records.size() <= count) return {records.begin(), records.end()};
+  const std::size_t stretches = std::max<std::size_t>(1, count / 2);
   std::vector<ImuRecord> drawn;
   for (std::size_t i = 0; i < stretches; ++i) {
     const std::size_t first = i * records.size() / stretches, end = (i + 1) * records.size() / stretches;
-    ImuRecord least = records[first], greatest = records[first];
-    greatest.t = records[end - 1].t;
+    ImuRecord min = records[first], max = records[first];
+    max.t = records[end - 1].t;
     for (const ImuRecord& record : records.subspan(first, end - first)) {
       for (auto signal : {&InertialSignals::angular_rate, &InertialSignals::specific_force}) {
-        least.measured.*signal = (least.measured.*signal).cwiseMin(record.measured.*signal);
-        greatest.measured.*signal = (greatest.measured.*signal).cwiseMax(record.measured.*signal);
+        min.measured.*signal = (min.measured.*signal).cwiseMin(record.measured.*signal);
+        max.measured.*signal = (max.measured.*signal).cwiseMax(record.measured.*signal);
       }
     }
-    drawn.push_back(least);
-    drawn.push_back(greatest);
+    drawn.push_back(min);
+    drawn.push_back(max);
   }
   return drawn;
 }
@@ -260,7 +260,7 @@ std::vector<ImuRecord> envelope(std::span<const ImuRecord> records, std::size_t 
 Response imu(const Request& request, const Asked& asked) {
   if (!asked.view->has_imu()) throw HttpError(404, "the recording has no IMU");
   Json t = Json::array(), rates = t, forces = t;
-  for (const ImuRecord& record : envelope(part_of(asked.view->imu(), request, asked.view->span()), most_in(request))) {
+  for (const ImuRecord& record : envelope(part_of(asked.view->imu(), request, asked.view->span()), max_in(request))) {
     t.push_back(record.t);
     rates.push_back(json_of(record.measured.angular_rate));
     forces.push_back(json_of(record.measured.specific_force));
@@ -272,7 +272,7 @@ Response poses(const Request& request, const Asked& asked) {
   if (!asked.view->has_poses()) throw HttpError(404, "the recording has no poses");
   Json t = Json::array(), poses = t;
   const std::span<const PoseRecord> all = part_of(asked.view->poses(), request, asked.view->span());
-  const std::size_t kept = std::min(all.size(), most_in(request));
+  const std::size_t kept = std::min(all.size(), max_in(request));
   for (std::size_t i = 0; i < kept; ++i) {
     const PoseRecord& record = all[i * all.size() / kept];
     t.push_back(record.t);

@@ -73,8 +73,8 @@ Response start(const Json& request, const Workshop& workshop) {
 
 int id_of(const Request& request) {
   const std::string& text = request.captured.front();
-  constexpr std::size_t kMostDigits = 8;
-  if (text.empty() || text.size() > kMostDigits || text.find_first_not_of("0123456789") != std::string::npos) return 0;
+  constexpr std::size_t kMaxDigits = 8;
+  if (text.empty() || text.size() > kMaxDigits || text.find_first_not_of("0123456789") != std::string::npos) return 0;
   return std::stoi(text);
 }
 

@@ -1,13 +1,14 @@
 #include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
 
 #include <fstream>
 #include <iterator>
 #include <mutex>
 
 #include "esim/files/output_file.h"
+#include "esim/scenario/read.h"
 #include "esim/studio/editor/scenario_check.h"
 #include "esim/studio/editor/schema_json.h"
-#include "esim/studio/editor/yaml_text.h"
 #include "esim/studio/endpoints/endpoints.h"
 
 namespace esim::studio {
@@ -15,12 +16,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kMostBytes = std::uintmax_t{8} << 20;
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t{8} << 20;
 
 std::string read(const fs::path& file, const std::string& name) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) throw HttpError(404, name + ": no such file");
-  if (fs::file_size(file, error) > kMostBytes)
+  if (fs::file_size(file, error) > kMaxBytes)
     throw HttpError(413, name + ": is too large; a scenario must have at most 8 MiB");
   std::ifstream stream(file, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(stream), {}};
@@ -42,16 +43,18 @@ Json checked(const std::string& yaml, const fs::path& file, const Roots& roots) 
     CheckedScenario result = check_scenario(yaml, file, roots);
     answer["values"] = std::move(result.values);
     answer["problems"] = std::move(result.problems);
+  } catch (const OptionError& error) {
+    answer["problems"].push_back(problem_json(error.key(), error.what(), error.line()));
   } catch (const UserError& error) {
-    answer["problems"].push_back({{"where", ""}, {"what", error.what()}});
+    answer["problems"].push_back(problem_json("", error.what(), 0));
   }
   return answer;
 }
 
 std::string new_scenario(const std::string& scene) {
-  const std::string renderer = scene.empty() ? "renderer:\n  type: mesh\n  scene: \"\"\n"
-                                             : fmt::format("renderer:\n  type: mesh\n  scene: {}\n", yaml_of(scene));
-  return renderer +
+  YAML::Emitter name;  // with quotes if they are needed
+  name << scene;
+  return fmt::format("renderer:\n  type: mesh\n  scene: {}\n", name.c_str()) +
          "trajectory:\n  type: waypoints\n  speed: 1\n  points: []\n"
          "camera: {width: 346, height: 260, horizontal_fov_deg: 75}\n"
          "event_camera: {contrast_threshold: 0.3}\n";
@@ -128,17 +131,6 @@ void add_scenarios(Router& router, const Roots& roots) {
   router.add("POST", "/api/scenario/check", [&roots](const Request& request) {
     const Json body = parse_object(request.body);
     return json_response(checked(text_member(body, "yaml"), place_of(body, roots), roots));
-  });
-  router.add("POST", "/api/scenario/edit", [&roots](const Request& request) {
-    const Json body = parse_object(request.body);
-    std::string yaml = text_member(body, "yaml");
-    const auto changes = body.find("set");
-    if (changes == body.end() || !changes->is_array()) throw HttpError(400, "set: must be a list");
-    for (const Json& change : *changes) {
-      if (!change.is_object() || !change.contains("value")) throw HttpError(400, "set: entries must be {where, value}");
-      yaml = with_option(yaml, text_member(change, "where"), change["value"]);
-    }
-    return json_response(checked(yaml, place_of(body, roots), roots));
   });
   router.add("PUT", "/api/scenario",
              [&roots](const Request& request) { return save(parse_object(request.body), roots); });

@@ -2,7 +2,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "esim/preview/canvas.h"
+#include "esim/preview/pictures.h"
 #include "esim/scenario/read.h"
 #include "esim/studio/editor/scenario_check.h"
 #include "esim/studio/endpoints/endpoints.h"
@@ -27,35 +27,30 @@ Json bounds_of(const Scene& scene) {
   return {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
 }
 
-/// The kind of scene, and the pose of a panorama or a plane in the world.
-void describe_kind(const RendererOptions& renderer, const StudioScene& scene, Json& answer) {
-  struct Visit {
-    const StudioScene& scene;
-    Json& answer;
-    void operator()(const MeshRendererOptions&) const { answer["kind"] = "mesh"; }
-    void operator()(const PanoramaRendererOptions& panorama) const {
-      const Eigen::Vector4d q = panorama.orientation.normalized();
-      answer["kind"] = "panorama";
-      answer["world"]["panorama"] = {{"orientation", {q.x(), q.y(), q.z(), q.w()}}};
+/// Sets the kind of scene, and the pose of a panorama or a plane in the world.
+struct DescribeKind {
+  const StudioScene& scene;
+  Json& answer;
+  void operator()(const MeshRendererOptions&) const { answer["kind"] = "mesh"; }
+  void operator()(const PanoramaRendererOptions& panorama) const {
+    const Eigen::Vector4d q = panorama.orientation.normalized();
+    answer["kind"] = "panorama";
+    answer["world"]["panorama"] = {{"orientation", {q.x(), q.y(), q.z(), q.w()}}};
+  }
+  void operator()(const PlaneRendererOptions& plane) const {
+    const SE3 pose = pose_named("renderer.pose", plane.pose);
+    const double height_m = plane.width_m * scene.texture_aspect();
+    answer["kind"] = "plane";
+    answer["world"]["plane"] = {
+        {"pose", json_of(pose)}, {"width_m", plane.width_m}, {"height_m", height_m}, {"endless", plane.endless}};
+    Eigen::AlignedBox3d box;
+    for (const double x : {-0.5, 0.5}) {
+      for (const double y : {-0.5, 0.5}) box.extend(pose * Eigen::Vector3d(x * plane.width_m, y * height_m, 0));
     }
-    void operator()(const PlaneRendererOptions& plane) const {
-      const SE3 pose = pose_named("renderer.pose", plane.pose);
-      const double height_m = plane.width_m * scene.texture_aspect();
-      answer["kind"] = "plane";
-      answer["world"]["plane"] = {
-          {"pose", json_of(pose)}, {"width_m", plane.width_m}, {"height_m", height_m}, {"endless", plane.endless}};
-      Eigen::AlignedBox3d box;
-      for (const double x : {-0.5, 0.5}) {
-        for (const double y : {-0.5, 0.5}) box.extend(pose * Eigen::Vector3d(x * plane.width_m, y * height_m, 0));
-      }
-      answer["bounds"] = {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
-    }
-    void operator()(const SpritesRendererOptions&) const { answer["kind"] = "layers"; }
-    void operator()(const UnrealcvRendererOptions&) const {}
-    void operator()(const BlenderRendererOptions&) const {}
-  };
-  std::visit(Visit{scene, answer}, renderer);
-}
+    answer["bounds"] = {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
+  }
+  void operator()(const auto&) const { answer["kind"] = "sprites"; }  // the page shows only the simulator's images
+};
 
 Json cameras_json(const std::vector<CameraInfo>& cameras) {
   Json all = Json::array();
@@ -88,7 +83,7 @@ Json scene_json(const Scenario& scenario, SceneStore& scenes) {
               {"texture", scene->texture() ? Json(base + ".jpg") : Json()},
               {"triangles", scene->triangles()},
               {"bounds", bounds_of(scene->file().scene)}};
-  describe_kind(scenario.renderer, *scene, answer);
+  std::visit(DescribeKind{*scene, answer}, scenario.renderer);
   answer["cameras"] = cameras_json(cameras_of(scenario, scene->file()));
   answer["start"] =
       json_of(scene->file().cameras.empty() ? first_view(scene->file().scene)
@@ -162,16 +157,16 @@ CameraInfo camera_in(const Json& request, const std::vector<CameraInfo>& cameras
 
 /// The image of a camera at a time of the motion, or from a given pose.
 Response view(const Json& request, const Workshop& workshop) {
-  constexpr double kMostPixels = 4096, kMostTime_ns = 9e15;
+  constexpr double kMaxPixels = 4096, kMaxTime_ns = 9e15;
   const bool free = request.contains("pose") && !request["pose"].is_null();
   const Scenario scenario = scenario_of(request, workshop.roots, free ? ScenarioNeeds::scene : ScenarioNeeds::motion);
   const auto scene = workshop.scenes.of(scenario);
   const CameraInfo info = camera_in(request, cameras_of(scenario, scene->file()));
   Camera camera = info.model;
   if (!scene->on_sensor()) {
-    const auto width = static_cast<int>(number_member(request, "width", camera.width, 16, kMostPixels));
+    const auto width = static_cast<int>(number_member(request, "width", camera.width, 16, kMaxPixels));
     const double height = std::round(static_cast<double>(camera.height) * width / camera.width);
-    camera = scaled(camera, width, static_cast<int>(std::clamp(height, 1.0, kMostPixels)));
+    camera = scaled(camera, width, static_cast<int>(std::clamp(height, 1.0, kMaxPixels)));
   }
   RenderRequest look;
   std::optional<StudioMotion> motion;
@@ -182,7 +177,7 @@ Response view(const Json& request, const Workshop& workshop) {
   }
   if (motion) {
     const double start = static_cast<double>(motion->simulated.start);
-    const auto t = static_cast<TimeNs>(number_member(request, "t", start, -kMostTime_ns, kMostTime_ns));
+    const auto t = static_cast<TimeNs>(number_member(request, "t", start, -kMaxTime_ns, kMaxTime_ns));
     look.t = std::clamp(t, motion->body->start(), motion->body->end());
     look.camera = rigidly_attached(motion->body->at(look.t), info.T_body_camera);
     const TimeNs within = std::clamp(look.t, motion->simulated.start, motion->simulated.end);

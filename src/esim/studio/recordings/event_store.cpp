@@ -115,13 +115,13 @@ class FileStore final : public EventStore {
   }
 
   std::vector<std::uint64_t> index_by_reading() const {
-    constexpr std::size_t kMostMs = std::size_t{1} << 25;  // nine hours; limits memory if a time is damaged
+    constexpr std::size_t kMaxMs = std::size_t{1} << 25;  // nine hours; limits memory if a time is damaged
     std::vector<std::uint64_t> first;
     for (std::uint64_t at = 0; at < reader_.size(); at += kBlock) {
       const std::vector<Event> block = reader_.read(at, kBlock);
       for (std::size_t i = 0; i < block.size(); ++i) {
         const TimeNs ms = (block[i].t - reader_.t_offset()) / kNsPerMs;
-        while (static_cast<TimeNs>(first.size()) <= ms && first.size() < kMostMs) first.push_back(at + i);
+        while (static_cast<TimeNs>(first.size()) <= ms && first.size() < kMaxMs) first.push_back(at + i);
       }
     }
     return first;
@@ -135,9 +135,9 @@ class FileStore final : public EventStore {
 
 }  // namespace
 
-std::vector<TimeNs> bin_edges(TimeNs from, TimeNs to, std::size_t most, TimeNs unit, TimeNs origin) {
+std::vector<TimeNs> bin_edges(TimeNs from, TimeNs to, std::size_t max, TimeNs unit, TimeNs origin) {
   const auto up = [](TimeNs value, TimeNs step) { return value / step * step + (value % step > 0 ? step : 0); };
-  TimeNs width = std::max(unit, up((to - from + static_cast<TimeNs>(most) - 1) / static_cast<TimeNs>(most), unit));
+  TimeNs width = std::max(unit, up((to - from + static_cast<TimeNs>(max) - 1) / static_cast<TimeNs>(max), unit));
   std::vector<TimeNs> edges;
   do {  // repeat if the partial bins at both ends are one too many
     edges.assign(1, from);
@@ -145,14 +145,14 @@ std::vector<TimeNs> bin_edges(TimeNs from, TimeNs to, std::size_t most, TimeNs u
       edges.push_back(edge);
     edges.push_back(to);
     width += unit;
-  } while (edges.size() - 1 > most);
+  } while (edges.size() - 1 > max);
   return edges;
 }
 
-EventRate EventStore::rate(TimeNs from, TimeNs to, std::size_t most) const {
-  const TimeNs unit = is_coarse(from, to, most) ? kNsPerMs : kNsPerUs;
+EventRate EventStore::rate(TimeNs from, TimeNs to, std::size_t max) const {
+  const TimeNs unit = is_coarse(from, to, max) ? kNsPerMs : kNsPerUs;
   EventRate rate;
-  rate.edges = bin_edges(from, to, most, unit, origin());
+  rate.edges = bin_edges(from, to, max, unit, origin());
   rate.on.resize(rate.edges.size() - 1);
   rate.off.resize(rate.on.size());
   count(rate);
@@ -170,15 +170,15 @@ void EventStore::count(EventRate& rate) const {
   }
 }
 
-std::vector<Event> EventStore::thinned(Range range, std::uint64_t most) const {
+std::vector<Event> EventStore::thinned(Range range, std::uint64_t max) const {
   const std::uint64_t all = range.end - range.first;
-  if (all <= most) return read(range.first, all);
+  if (all <= max) return read(range.first, all);
   std::vector<Event> kept;
-  kept.reserve(most);
+  kept.reserve(max);
   // Reads a small range completely; takes runs of consecutive events from a larger one.
   constexpr std::uint64_t kReadAll = std::uint64_t{1} << 22, kRun = 64;
   const std::uint64_t run = all <= kReadAll ? 1 : kRun;
-  const std::uint64_t runs = std::max<std::uint64_t>(1, most / run);
+  const std::uint64_t runs = std::max<std::uint64_t>(1, max / run);
   const std::vector<Event> events = run == 1 ? read(range.first, all) : std::vector<Event>();
   for (std::uint64_t i = 0; i < runs; ++i) {
     const auto at =

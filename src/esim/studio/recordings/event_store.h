@@ -16,10 +16,10 @@ struct EventRate {
   std::vector<std::uint64_t> on, off;  ///< events with edges[i] <= t < edges[i + 1]
 };
 
-/// Edges of at most `most` bins (at least 1) that cover from <= t < to, in ns. Inner edges are multiples of one width,
+/// Edges of at most `max` bins (at least 1) that cover from <= t < to, in ns. Inner edges are multiples of one width,
 /// counted from `origin`, and the width is a multiple of `unit`, so that time stamps in this unit fall evenly into all
 /// bins. The first and the last bin are between half and one and a half times as wide.
-std::vector<TimeNs> bin_edges(TimeNs from, TimeNs to, std::size_t most, TimeNs unit, TimeNs origin);
+std::vector<TimeNs> bin_edges(TimeNs from, TimeNs to, std::size_t max, TimeNs unit, TimeNs origin);
 
 /// The events of one camera of a recording, with random access. Thread-safe.
 class EventStore {
@@ -35,12 +35,12 @@ class EventStore {
   /// Up to `count` events, starting at index `first`.
   virtual std::vector<Event> read(std::uint64_t first, std::uint64_t count) const = 0;
 
-  /// Counts in at most `most` bins that cover from <= t < to. Widths are multiples of 1 ms, for which files have an
+  /// Counts in at most `max` bins that cover from <= t < to. Widths are multiples of 1 ms, for which files have an
   /// index, or of 1 us for bins shorter than a few ms.
-  EventRate rate(TimeNs from, TimeNs to, std::size_t most) const;
+  EventRate rate(TimeNs from, TimeNs to, std::size_t max) const;
 
-  /// At most `most` events of a range, evenly spread over it.
-  std::vector<Event> thinned(Range range, std::uint64_t most) const;
+  /// At most `max` events of a range, evenly spread over it.
+  std::vector<Event> thinned(Range range, std::uint64_t max) const;
 
  protected:
   /// The start of the first ms.

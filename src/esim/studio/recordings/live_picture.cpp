@@ -1,8 +1,8 @@
 #include "esim/studio/recordings/live_picture.h"
 
-#include "esim/preview/canvas.h"
+#include "esim/plot/theme.h"
+#include "esim/preview/pictures.h"
 #include "esim/visualise/event_pictures.h"
-#include "esim/visualise/theme.h"
 
 namespace esim::studio {
 namespace {

@@ -30,11 +30,11 @@ bool is_file(const fs::path& path) {
 
 /// The sensor's size if the file does not give it: the extent of the events.
 void learn_size(CameraView& camera) {
-  constexpr std::uint64_t kBlock = std::uint64_t{1} << 20;
+  constexpr std::uint64_t kBlockEvents = std::uint64_t{1} << 20;
   Camera& model = camera.info.model;
   if (model.width > 0 || camera.events == nullptr) return;
-  for (std::uint64_t at = 0; at < camera.events->size(); at += kBlock) {
-    for (const Event& event : camera.events->read(at, kBlock)) {
+  for (std::uint64_t at = 0; at < camera.events->size(); at += kBlockEvents) {
+    for (const Event& event : camera.events->read(at, kBlockEvents)) {
       model.width = std::max(model.width, event.x + 1);
       model.height = std::max(model.height, event.y + 1);
     }
@@ -111,9 +111,9 @@ std::optional<std::string> RecordingView::bytes_of(const TimedFile& image) const
 
 void RecordingView::read_report(const fs::path& file) {
   if (!has_file(file)) return;
-  constexpr std::size_t kMostBytes = std::size_t{1} << 24;
+  constexpr std::size_t kMaxBytes = std::size_t{1} << 24;
   InputFile input(file);
-  const auto bytes = input.read(kMostBytes);
+  const auto bytes = input.read(kMaxBytes);
   const auto* const text = reinterpret_cast<const char*>(bytes.data());
   const auto report = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
   if (!report.is_object() || !report.contains("status")) return;
@@ -166,15 +166,15 @@ void RecordingView::open_truth(const fs::path& file, CameraView& camera) {
   for (std::uint64_t look = 0; look < kLooks; ++look) {
     camera.truth->read(look * (camera.truth->size() - 1) / (kLooks - 1), frame);
     if (!frame.depth.empty()) camera.depth_scale.include(frame.depth);
-    if (!frame.flow_x.empty()) camera.flow_scale.include(frame.flow_x, frame.flow_y);
+    if (!frame.motion_x.empty()) camera.motion_scale.include(frame.motion_x, frame.motion_y);
   }
   camera.depth = camera.depth_scale.near_m() > 0;
-  camera.flow = !frame.flow_x.empty();
+  camera.motion_field = !frame.motion_x.empty();
 }
 
 std::unique_ptr<RecordingView> RecordingView::beginning_of(const fs::path& path) {
-  constexpr std::uint64_t kMostEvents = 2'000'000;
-  constexpr auto kMostTime = std::chrono::milliseconds(700);
+  constexpr std::uint64_t kMaxEvents = 2'000'000;
+  constexpr auto kMaxTime = std::chrono::milliseconds(700);
   const auto start = std::chrono::steady_clock::now();
   std::unique_ptr<RecordingView> view(new RecordingView);
   ReadOptions recovering;
@@ -185,7 +185,7 @@ std::unique_ptr<RecordingView> RecordingView::beginning_of(const fs::path& path)
   std::uint64_t count = 0;
   TimeNs last = info.end;
   try {
-    while (count < kMostEvents && std::chrono::steady_clock::now() - start < kMostTime) {
+    while (count < kMaxEvents && std::chrono::steady_clock::now() - start < kMaxTime) {
       const Record* const record = source->next();
       if (record == nullptr) break;
       const auto* const seen = std::get_if<EventsRecord>(record);
@@ -219,7 +219,7 @@ const CameraView& RecordingView::camera(const std::string& name) const {
 
 std::optional<std::pair<Image<Rgb>, TimeNs>> RecordingView::truth_at(const CameraView& camera, Kind kind,
                                                                      TimeNs t) const {
-  if (kind == Kind::depth ? !camera.depth : !camera.flow) return std::nullopt;
+  if (kind == Kind::depth ? !camera.depth : !camera.motion_field) return std::nullopt;
   const auto& times = camera.truth_times;
   const auto later = std::upper_bound(times.begin(), times.end(), t);
   const std::size_t index = later == times.begin() ? 0 : static_cast<std::size_t>(later - times.begin()) - 1;
@@ -230,7 +230,7 @@ std::optional<std::pair<Image<Rgb>, TimeNs>> RecordingView::truth_at(const Camer
   }
   return std::pair(kind == Kind::depth
                        ? colour_depth(frame.depth, camera.depth_scale.near_m(), camera.depth_scale.far_m())
-                       : colour_flow(frame.flow_x, frame.flow_y, camera.flow_scale.full_px_per_s()),
+                       : colour_motion(frame.motion_x, frame.motion_y, camera.motion_scale.full_px_per_s()),
                    times[index]);
 }
 

@@ -28,15 +28,15 @@ struct CameraView {
   std::vector<TimedFile> images{};           ///< PNG; frames of a frame camera if there are any, otherwise other images
   std::unique_ptr<TruthHdf5Reader> truth{};  ///< null: none
   std::vector<TimeNs> truth_times{};
-  bool depth = false, flow = false;
+  bool depth = false, motion_field = false;
   DepthScale depth_scale{};
-  FlowScale flow_scale{};
+  MotionScale motion_scale{};
 };
 
 /// A recording with random access: only indices are in memory.
 class RecordingView {
  public:
-  enum class Kind { depth, flow };
+  enum class Kind { depth, motion_field };
 
   /// Opens the folder of a recording or of one of its cameras, or an event file in DSEC's layout. Unreadable parts are
   /// left out with a note. Throws UserError if nothing can be read, and for other formats.

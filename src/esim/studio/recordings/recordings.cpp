@@ -83,7 +83,7 @@ std::string OpenRecording::problem() const {
 }
 
 std::string Recordings::open(const fs::path& path) {
-  constexpr std::size_t kMost = 6;
+  constexpr std::size_t kMax = 6;
   const std::string key = key_of(path);
   {
     const std::lock_guard lock(mutex_);
@@ -95,7 +95,7 @@ std::string Recordings::open(const fs::path& path) {
   std::shared_ptr<OpenRecording> forgotten;  // destroyed after the lock is released
   const std::lock_guard lock(mutex_);
   entries_[++last_] = {key, std::move(recording)};
-  if (entries_.size() > kMost) {
+  if (entries_.size() > kMax) {
     forgotten = std::move(entries_.begin()->second.recording);
     entries_.erase(entries_.begin());
   }

@@ -1,9 +1,10 @@
 #include "esim/studio/scene_view/coarse.h"
 
+#include <meshoptimizer.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
 
 namespace esim::studio {
 namespace {
@@ -28,45 +29,22 @@ std::uint64_t key_of(const Surface& surface, std::size_t vertex, const Eigen::Ve
   return key;
 }
 
-/// The vertex that replaces each vertex.
-std::vector<std::uint32_t> representatives(const Surface& surface, const Eigen::AlignedBox3f& box, float cells) {
-  struct Cell {
-    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-    float vertices = 0, distance2 = 0;
-    std::uint32_t nearest = 0;
-  };
-  const std::size_t count = surface.positions.size() / 3;
-  const float cells_per_m = cells / std::max(box.sizes().maxCoeff(), 1e-30F);
-  std::unordered_map<std::uint64_t, std::uint32_t> known;
-  known.reserve(count / 4);
-  std::vector<Cell> merged;
-  std::vector<std::uint32_t> cell_of(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto next = static_cast<std::uint32_t>(merged.size());
-    const auto [entry, is_new] = known.try_emplace(key_of(surface, i, box.min(), cells_per_m), next);
-    if (is_new) merged.emplace_back();
-    cell_of[i] = entry->second;
-    merged[entry->second].sum += position(surface, i) - box.min();
-    merged[entry->second].vertices += 1;
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    Cell& cell = merged[cell_of[i]];
-    const float distance2 = (box.min() + cell.sum / cell.vertices - position(surface, i)).squaredNorm();
-    if (cell.distance2 > 0 && distance2 >= cell.distance2) continue;
-    cell.distance2 = std::max(distance2, 1e-30F), cell.nearest = static_cast<std::uint32_t>(i);
-  }
-  for (std::uint32_t& cell : cell_of) cell = merged[cell].nearest;
-  return cell_of;
-}
-
+/// The triangles that are left if the first vertex of each cell replaces all others.
 std::vector<std::uint32_t> merged_triangles(const Surface& surface, const Eigen::AlignedBox3f& box, float cells) {
-  const std::vector<std::uint32_t> stands_for = representatives(surface, box, cells);
-  std::vector<std::uint32_t> indices;
-  for (std::size_t i = 0; i < surface.indices.size(); i += 3) {
-    const std::uint32_t a = stands_for[surface.indices[i]], b = stands_for[surface.indices[i + 1]],
-                        c = stands_for[surface.indices[i + 2]];
-    if (a != b && b != c && c != a) indices.insert(indices.end(), {a, b, c});
+  const float cells_per_m = cells / std::max(box.sizes().maxCoeff(), 1e-30F);
+  std::vector<std::uint64_t> keys(surface.positions.size() / 3);
+  for (std::size_t i = 0; i < keys.size(); ++i) keys[i] = key_of(surface, i, box.min(), cells_per_m);
+  std::vector<std::uint32_t> indices(surface.indices.size());
+  meshopt_generateShadowIndexBuffer(indices.data(), surface.indices.data(), indices.size(), keys.data(), keys.size(),
+                                    sizeof(std::uint64_t), sizeof(std::uint64_t));
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    const std::uint32_t a = indices[i], b = indices[i + 1], c = indices[i + 2];
+    if (a == b || b == c || c == a) continue;
+    indices[kept] = a, indices[kept + 1] = b, indices[kept + 2] = c;
+    kept += 3;
   }
+  indices.resize(kept);
   return indices;
 }
 
@@ -79,7 +57,7 @@ std::vector<std::uint32_t> coarse_indices(const Surface& surface, std::size_t wa
 
   // A square of n x n cells has 2 n^2 triangles: the initial value of the search for other surfaces.
   constexpr int kTries = 4;
-  constexpr float kMostCells = 32'000;
+  constexpr float kMaxCells = 32'000;
   float cells = std::sqrt(static_cast<float>(wanted) / 2);
   std::vector<std::uint32_t> best;
   for (int i = 0; i < kTries; ++i) {
@@ -87,7 +65,7 @@ std::vector<std::uint32_t> coarse_indices(const Surface& surface, std::size_t wa
     const float ratio = static_cast<float>(wanted) / (static_cast<float>(indices.size() / 3) + 1);
     if (ratio >= 0.9F && indices.size() > best.size()) best = std::move(indices);
     if (ratio >= 0.9F && ratio < 1.5F) break;
-    cells = std::clamp(cells * std::sqrt(ratio) * 0.95F, 1.0F, kMostCells);
+    cells = std::clamp(cells * std::sqrt(ratio) * 0.95F, 1.0F, kMaxCells);
   }
   return best;
 }

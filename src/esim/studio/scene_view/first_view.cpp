@@ -20,7 +20,7 @@ constexpr float kClearance_m = 0.45F;     // from walls and furniture
 constexpr float kLevel = 0.95F;           // minimum upward component of a floor's normal
 constexpr float kStorey_m = 0.3F;         // maximum height difference within one floor
 constexpr float kWide = 0.25F;            // minimum area of a wide floor, relative to the widest
-constexpr std::size_t kMostFloors = 6;
+constexpr std::size_t kMaxFloors = 6;
 constexpr float kHighest_m = 1e5F;
 constexpr double kDown = 0.12;                // downward slope of the view, so that the floor is visible
 constexpr int kDirections = 48, kPlaces = 5;  // even; odd
@@ -74,22 +74,22 @@ Sight sight(const std::vector<Wall>& walls, const Vector2f& from, const Vector2f
     const Vector2f way = wall.b - wall.a, to = wall.a - from;
     const float across = cross(along, way);
     if (across == 0) continue;
-    const float distance = cross(to, way) / across, share = cross(to, along) / across;
-    if (distance < 0 || distance >= nearest.distance || share < 0 || share > 1) continue;
+    const float distance = cross(to, way) / across, fraction = cross(to, along) / across;
+    if (distance < 0 || distance >= nearest.distance || fraction < 0 || fraction > 1) continue;
     nearest = {distance, wall.front.dot(along) < 0};
   }
   return nearest;
 }
 
 float clearance(const std::vector<Wall>& walls, const Vector2f& at) {
-  float least = std::numeric_limits<float>::infinity();
+  float min = std::numeric_limits<float>::infinity();
   for (const Wall& wall : walls) {
     const Vector2f way = wall.b - wall.a;
     const float length2 = way.squaredNorm();
-    const float share = length2 > 0 ? std::clamp((at - wall.a).dot(way) / length2, 0.0F, 1.0F) : 0;
-    least = std::min(least, (wall.a + share * way - at).norm());
+    const float fraction = length2 > 0 ? std::clamp((at - wall.a).dot(way) / length2, 0.0F, 1.0F) : 0;
+    min = std::min(min, (wall.a + fraction * way - at).norm());
   }
-  return least;
+  return min;
 }
 
 /// The floor area at one level.
@@ -119,7 +119,7 @@ std::vector<Floor> floors_of(const Scene& scene) {
   for (const auto& [level, floor] : levels) widest = std::max(widest, floor.area);
   std::vector<Floor> floors;
   for (const auto& [level, floor] : levels) {
-    if (floor.area >= kWide * widest && floors.size() < kMostFloors) floors.push_back(floor);
+    if (floor.area >= kWide * widest && floors.size() < kMaxFloors) floors.push_back(floor);
   }
   return floors;
 }
@@ -148,8 +148,8 @@ std::optional<SE3> view_inside(const Scene& scene, const Floor& floor, float cei
   float longest = 0;
   for (int place = 0; place < kPlaces * kPlaces; ++place) {
     constexpr int kHalf = kPlaces / 2;
-    const Vector2f share(static_cast<float>(place % kPlaces - kHalf), static_cast<float>(place / kPlaces - kHalf));
-    const Vector2f at = centre + share.cwiseProduct(size) / (2 * kPlaces);
+    const Vector2f fraction(static_cast<float>(place % kPlaces - kHalf), static_cast<float>(place / kPlaces - kHalf));
+    const Vector2f at = centre + fraction.cwiseProduct(size) / (2 * kPlaces);
     std::array<Sight, kDirections> around;
     std::array<Vector2f, kDirections> directions;
     int seen = 0;

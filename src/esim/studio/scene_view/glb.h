@@ -25,6 +25,6 @@ struct Glb {
 Glb make_glb(const Scene& scene, const Workers& workers);
 
 /// The maximum number of triangles for a browser.
-inline constexpr std::size_t kMostTriangles = std::size_t{4} << 20;
+inline constexpr std::size_t kMaxTriangles = std::size_t{4} << 20;
 
 }  // namespace esim::studio

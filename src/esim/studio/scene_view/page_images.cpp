@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "esim/core/srgb.h"
-#include "esim/preview/canvas.h"
+#include "esim/preview/pictures.h"
 #include "esim/scene/images/image_header.h"
 
 namespace esim::studio {
@@ -29,7 +29,7 @@ std::string jpeg_of(const cv::Mat& bgr) {
   return {jpeg.begin(), jpeg.end()};
 }
 
-std::string_view text_of(const CodedTexture& texture) {
+std::string_view bytes_of(const CodedTexture& texture) {
   return {reinterpret_cast<const char*>(texture.bytes.data()), texture.bytes.size()};
 }
 
@@ -80,9 +80,9 @@ std::optional<int> longest_side(const CodedTexture& texture) {
 
 /// A JPEG decoded at reduced size (down to one eighth), which is fast; empty if this is not possible.
 std::optional<cv::Mat> reduced(const CodedTexture& texture, int longest) {
-  constexpr int kMostSide = 8192, kFinest = 2;
+  constexpr int kMaxSide = 8192, kFinest = 2;
   const std::optional<int> side = longest_side(texture);
-  if (!is_plain_jpeg(text_of(texture)) || !side || *side > kMostSide || *side < kFinest * longest) return std::nullopt;
+  if (!is_plain_jpeg(bytes_of(texture)) || !side || *side > kMaxSide || *side < kFinest * longest) return std::nullopt;
   const int times = *side / longest;
   const int flags = times >= 8   ? cv::IMREAD_REDUCED_COLOR_8
                     : times >= 4 ? cv::IMREAD_REDUCED_COLOR_4
@@ -99,7 +99,7 @@ std::optional<cv::Mat> reduced(const CodedTexture& texture, int longest) {
 }  // namespace
 
 PageImage page_image(const CodedTexture& texture) {
-  const std::string_view bytes = text_of(texture);
+  const std::string_view bytes = bytes_of(texture);
   const std::optional<int> side = longest_side(texture);
   if (side && *side <= kLongest) {
     if (is_plain_jpeg(bytes)) return {"image/jpeg", std::string(bytes)};

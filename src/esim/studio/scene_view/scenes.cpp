@@ -6,6 +6,7 @@
 
 #include "esim/core/error.h"
 #include "esim/scenario/read.h"
+#include "esim/scenario/schema.h"
 #include "esim/scene/images/image_file.h"
 
 namespace esim::studio {
@@ -13,7 +14,7 @@ namespace {
 
 const Notices kSilent{[](const std::string&) {}, [](const std::string&) {}};
 
-constexpr std::size_t kMostScenes = 3;
+constexpr std::size_t kMaxScenes = 3;
 constexpr int kLongestPicture = 4096;
 constexpr int kFiner = 2;  // even: see ScenePictures::render()
 
@@ -24,30 +25,40 @@ std::string stamp_of(const std::filesystem::path& file) {
   return fmt::format("{}:{}:{};", file.string(), time.time_since_epoch().count(), error ? 0 : bytes);
 }
 
+/// A visitor of describe() that stamps the files of a renderer's scene, and removes the motions of its objects.
+class SceneFiles {
+ public:
+  template <typename T>
+  void operator()(const char*, T& value, const About&) {
+    look_at(value);
+  }
+
+  const std::string& stamps() const { return stamps_; }
+
+ private:
+  void look_at(std::filesystem::path& file) {
+    if (!file.empty()) stamps_ += stamp_of(file);
+  }
+  void look_at(TrajectoryOptions& motion) { motion = StaticTrajectoryOptions{}; }
+  template <typename T>
+  void look_at(std::vector<T>& values) {
+    for (T& value : values) look_at(value);
+  }
+  template <typename T>
+  void look_at(T& value) {
+    if constexpr (requires { describe(*this, value); }) describe(*this, value);
+  }
+
+  std::string stamps_;
+};
+
 /// A text that identifies a loaded scene: the renderer without the motions of its objects, and the state of the files.
 std::string key_of(const RendererOptions& renderer) {
   Scenario bare;
   bare.renderer = renderer;
-  std::string files;
-  struct Visit {
-    std::string& files;
-    void operator()(MeshRendererOptions& mesh) const {
-      files += stamp_of(mesh.scene);
-      for (ObjectOptions& object : mesh.objects) {
-        files += stamp_of(object.scene);
-        object.trajectory = StaticTrajectoryOptions{};
-      }
-    }
-    void operator()(PanoramaRendererOptions& panorama) const { files += stamp_of(panorama.image); }
-    void operator()(PlaneRendererOptions& plane) const { files += stamp_of(plane.image); }
-    void operator()(SpritesRendererOptions& sprites) const {
-      for (const LayerOptions& layer : sprites.layers) files += stamp_of(layer.image);
-    }
-    void operator()(UnrealcvRendererOptions&) const {}
-    void operator()(BlenderRendererOptions&) const {}
-  };
-  std::visit(Visit{files}, bare.renderer);
-  return files + write_scenario(bare);
+  SceneFiles files;
+  std::visit([&](auto& options) { describe(files, options); }, bare.renderer);
+  return files.stamps() + write_scenario(bare);
 }
 
 /// Whether making the renderer may fail for a reason other than an unreadable scene.
@@ -71,7 +82,7 @@ StudioScene::StudioScene(const Scenario& scenario, std::string id, int threads)
       file_(load_scenes(scenario, SceneLook::coded, kSilent)) {
   if (fails_when_made(scenario.renderer)) pictures();
   if (std::holds_alternative<MeshRendererOptions>(scenario.renderer)) {
-    if (triangles() <= kMostTriangles) glb_ = make_glb(file_.scene, Workers(threads));
+    if (triangles() <= kMaxTriangles) glb_ = make_glb(file_.scene, Workers(threads));
     return;
   }
   const auto show = [&](const std::filesystem::path& image, const Softening& softening) {
@@ -123,7 +134,7 @@ std::shared_ptr<StudioScene> SceneStore::of(const Scenario& scenario) {
   auto scene = std::make_shared<StudioScene>(scenario, id, threads_);
   scenes_[id] = scene;
   order_.push_back(id);
-  if (order_.size() > kMostScenes) {
+  if (order_.size() > kMaxScenes) {
     scenes_.erase(order_.front());
     order_.erase(order_.begin());
   }

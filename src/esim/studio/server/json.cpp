@@ -9,10 +9,10 @@
 namespace esim::studio {
 
 Json parse_object(const std::string& body) {
-  constexpr int kMostDeep = 64;
+  constexpr int kMaxDeep = 64;
   bool too_deep = false;
   const auto watch = [&](int depth, Json::parse_event_t, Json&) {
-    too_deep |= depth > kMostDeep;
+    too_deep |= depth > kMaxDeep;
     return !too_deep;
   };
   const Json json = Json::parse(body, watch, false);

@@ -6,7 +6,6 @@
 #include "esim/geometry/se3.h"
 
 // Private to studio: includes nlohmann/json.hpp.
-
 namespace esim::studio {
 
 /// Members keep their order.

@@ -7,6 +7,7 @@
 #include "esim/studio/server/http.h"
 #include "esim/studio/server/json.h"
 
+// Private to studio.
 namespace esim::studio {
 
 /// Maps requests to handlers.

@@ -171,9 +171,9 @@ class HttpServer::Impl::Session : public std::enable_shared_from_this<Session> {
 
   void drain() {
     stream_.async_read_some(asio::buffer(waste_), [self = shared_from_this()](Failure failure, std::size_t bytes) {
-      constexpr std::size_t kMostWaste = std::size_t{1} << 20;
+      constexpr std::size_t kMaxWaste = std::size_t{1} << 20;
       self->wasted_ += bytes;
-      if (failure || self->wasted_ > kMostWaste) return self->close();
+      if (failure || self->wasted_ > kMaxWaste) return self->close();
       self->drain();
     });
   }

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { until } from "../harness.mjs";
-import { clock, cramped, differing, place, press, rows, shot, stage, yaml } from "../page.mjs";
+import { clock, cramped, differing, place, press, rows, shot, stage, yaml, fillYaml } from "../page.mjs";
 import { main, read } from "../session.mjs";
 
 test("fly, and drop four waypoints by clicking", async () => {
@@ -164,20 +164,35 @@ test("the form shows a problem where it is, and the text goes both ways", async 
   const threshold = page.locator("#option-event_camera-contrast_threshold");
   await threshold.fill("0.35");
   await threshold.press("Enter");
-  const text = page.locator(".yaml-editor textarea");
-  await until(async () => /contrast_threshold: 0\.35/.test(await text.inputValue()), "the threshold in the text");
-  await text.fill((await text.inputValue()).replace("0.35", "1000"));
+  await until(async () => /contrast_threshold: 0\.35/.test(await yaml(page)), "the threshold in the text");
+  await fillYaml(page, (await yaml(page)).replace("0.35", "1000"));
   await until(async () => (await page.locator(".problems li").count()) === 1, "the problem");
+  const underlined = async () => (await page.locator(".cm-lintRange-error").allTextContents()).join("");
+  await until(async () => (await underlined()) === "contrast_threshold: 1000", "the problem in the text");
   await page.locator(".problems button").click();
   assert.equal(await threshold.getAttribute("aria-invalid"), "true");
   assert.equal(await threshold.evaluate((element) => element === document.activeElement), true);
   await shot(page, "configure-dark");
-  await text.fill((await text.inputValue()).replace("1000", "0.3"));
+  await fillYaml(page, (await yaml(page)).replace("1000", "0.3"));
   await until(async () => (await page.locator(".problems li").count()) === 0, "no problem");
   await page.locator("#option-event_camera-preset").selectOption("davis346");
-  await until(async () => /preset: davis346/.test(await text.inputValue()), "the preset in the text");
+  await until(async () => /preset: davis346/.test(await yaml(page)), "the preset in the text");
   await page.keyboard.press("Control+z");
-  await until(async () => !/preset/.test(await text.inputValue()), "undo of the preset");
+  await until(async () => !/preset/.test(await yaml(page)), "undo of the preset");
+});
+
+test("a change in the form keeps comments and spaces of the text", async () => {
+  const { page } = main;
+  const before = await yaml(page);
+  const commented = before.replace(/^duration_s: 0\.4$/m, "\n# A short walk.\nduration_s:    0.4   # seconds");
+  assert.notEqual(commented, before);
+  await fillYaml(page, commented);
+  const threshold = page.locator("#option-event_camera-contrast_threshold");
+  await threshold.fill("0.25");
+  await threshold.press("Enter");
+  await until(async () => (await yaml(page)) === commented.replace("threshold: 0.3", "threshold: 0.25"), "one change");
+  await fillYaml(page, before);
+  await until(async () => (await threshold.inputValue()) === "0.3", "the form of before");
 });
 
 const runs = (page) => page.evaluate(async () => (await (await fetch("/api/runs")).json()).length);
@@ -242,8 +257,7 @@ test("what is typed and not left is saved as it is shown, in the form and in the
   await page.locator("#option-event_camera-contrast_threshold").fill("0.31");
   await page.keyboard.press("Control+s");
   await until(() => /contrast_threshold: 0\.31/.test(read("walk.yaml")), "the form's value in the file");
-  const text = page.locator(".yaml-editor textarea");
-  await text.fill((await text.inputValue()).replace("0.31", "0.3"));
+  await fillYaml(page, (await yaml(page)).replace("0.31", "0.3"));
   await page.keyboard.press("Control+s");
   await until(() => /contrast_threshold: 0\.3\b/.test(read("walk.yaml")), "the text's value in the file");
 });

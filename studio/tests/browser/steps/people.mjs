@@ -120,10 +120,7 @@ test("two tabs: the second one to save is asked", async () => {
   await until(async () => read("poster.yaml").includes("0.42"), "mine in the file");
   await set(first, "0.63");
   await first.getByRole("button", { name: "Take theirs" }).click();
-  await until(
-    async () => (await first.locator(".yaml-editor textarea").inputValue()).includes("0.42"),
-    "theirs in the page",
-  );
+  await until(async () => (await yaml(first)).includes("0.42"), "theirs in the page");
   assert.ok(read("poster.yaml").includes("0.42"));
   for (const { faults, context } of states) {
     assert.deepEqual(faults, []);

@@ -48,13 +48,13 @@ test("playing slowly, other pictures, the plots", async () => {
   await until(async () => (await time.textContent()) !== before, "the clock");
   await page.keyboard.press("p");
   for (const name of ["Counts", "Time surface", "On/off"]) await page.getByRole("radio", { name }).click();
-  for (const name of ["Depth", "Flow", "Path"])
+  for (const name of ["Depth", "Motion field", "Path"])
     await page.locator(".look .toolbar").getByRole("button", { name }).click();
   await until(
     async () =>
       /Depth of/.test(await page.locator(".look").textContent()) &&
-      /Flow of/.test(await page.locator(".look").textContent()),
-    "depth and flow",
+      /Motion field of/.test(await page.locator(".look").textContent()),
+    "depth and motion field",
   );
   await page.keyboard.press("End");
   await page.waitForTimeout(800);

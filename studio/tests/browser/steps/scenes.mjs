@@ -4,7 +4,7 @@ import { cpSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { openPage, scenes, until } from "../harness.mjs";
-import { clock, differing, place, ready, rows, shot, stage, visit, yaml } from "../page.mjs";
+import { clock, differing, place, ready, rows, shot, stage, visit, yaml, fillYaml } from "../page.mjs";
 import { browser, files, main, read, server } from "../session.mjs";
 
 const camera = "camera: {width: 160, height: 120, horizontal_fov_deg: 75}\noutput: {preview: false}\n";
@@ -93,9 +93,9 @@ test("an object moves by waypoints of its own: dropped, drawn, flown and saved",
   await stage(page).focus();
   await page.keyboard.press("Control+s");
   await until(() => /name: ball[\s\S]*type: waypoints/.test(read("moving.yaml")), "the file");
-  const [from, to] = await page.evaluate(async (yaml) => {
+  const [from, to] = await page.evaluate(async (scenario) => {
     const headers = { "Content-Type": "application/json" };
-    const body = JSON.stringify({ yaml, dir: "project", samples: 9 });
+    const body = JSON.stringify({ yaml: scenario, dir: "project", samples: 9 });
     const { objects } = await (await fetch("/api/trajectory", { method: "POST", headers, body })).json();
     return [objects[0].poses[0], objects[0].poses.at(-1)];
   }, read("moving.yaml"));
@@ -182,12 +182,11 @@ test("a scene that cannot be read is said to be so, and can be replaced", async 
   await until(async () => /broken\.obj/.test(await note.textContent()), "the reason why the scene is missing");
   await shot(page, "scene-broken-dark");
   await place(page, "Configure");
-  const text = page.locator(".yaml-editor textarea");
-  await text.fill((await text.inputValue()).replace("broken.obj", "absent.obj"));
+  await fillYaml(page, (await yaml(page)).replace("broken.obj", "absent.obj"));
   await place(page, "Design");
   await until(async () => /absent\.obj/.test(await note.textContent()), "what is not there");
   await place(page, "Configure");
-  await text.fill((await text.inputValue()).replace("absent.obj", "ball.glb"));
+  await fillYaml(page, (await yaml(page)).replace("absent.obj", "ball.glb"));
   await place(page, "Design");
   await page.waitForSelector(".design .stage[data-scene]", { state: "attached" });
   await until(async () => (await note.count()) === 0, "the scene");

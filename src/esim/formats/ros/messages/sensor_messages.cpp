@@ -7,12 +7,12 @@
 namespace esim::inline formats::ros {
 namespace {
 
-constexpr std::uint32_t kMaxExtent = 65536;  // px
-constexpr double kRoundingOfNorm = 1e-9;     // rotations within this error of unit norm stay unchanged
+constexpr std::uint32_t kMaxMessageExtent = 65536;  // px
+constexpr double kRoundingOfNorm = 1e-9;            // rotations within this error of unit norm stay unchanged
 constexpr float kMetresPerMillimetre = 1e-3F;
 
 void check_extent(std::uint32_t width, std::uint32_t height) {
-  if (width > kMaxExtent || height > kMaxExtent) {
+  if (width > kMaxMessageExtent || height > kMaxMessageExtent) {
     throw Malformed("an image of " + std::to_string(width) + " x " + std::to_string(height) + " px is too large");
   }
 }
@@ -81,7 +81,7 @@ struct DistortionMessage {
   std::vector<double> d;
 };
 
-DistortionMessage to_message(const Distortion& distortion) {
+DistortionMessage distortion_message(const Distortion& distortion) {
   if (const auto* d = std::get_if<RadialTangential>(&distortion))
     return {"plumb_bob", {d->k1, d->k2, d->p1, d->p2, d->k3}};
   if (const auto* d = std::get_if<Equidistant>(&distortion)) return {"equidistant", {d->k1, d->k2, d->k3, d->k4}};
@@ -105,7 +105,7 @@ std::optional<Distortion> to_distortion(const std::string& model, std::vector<do
 CameraInfoMessage to_message(const Camera& camera) {
   CameraInfoMessage message;
   message.width = static_cast<std::uint32_t>(camera.width), message.height = static_cast<std::uint32_t>(camera.height);
-  auto [model, d] = to_message(camera.distortion);
+  auto [model, d] = distortion_message(camera.distortion);
   message.distortion_model = std::move(model), message.d = std::move(d);
   message.k = {camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, camera.fx > 0 ? 1.0 : 0.0};
   message.r = {1, 0, 0, 0, 1, 0, 0, 0, 1};

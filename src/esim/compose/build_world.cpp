@@ -1,0 +1,292 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "esim/compose/compose.h"
+#include "esim/core/engine_error.h"
+#include "esim/sampling/make_sampler.h"
+#include "esim/scenario/read.h"
+
+namespace esim::inline compose {
+namespace {
+
+/// Throws UserError for options that contradict each other, and warns of those that are probably not intended.
+void check_sampling(const CameraOptions& camera, const Notices& notices) {
+  const auto check = [&]<typename Criterion>(const Criterion& criterion) {
+    if constexpr (requires { criterion.lambda; }) {
+      if (criterion.lambda > 1) {
+        notices.warning(
+            fmt::format("camera {}: sampling.lambda = {} is above 1: changes between two samples are no longer bounded",
+                        camera.name, criterion.lambda));
+      }
+    }
+    if constexpr (requires { criterion.bounds; }) {
+      if (criterion.bounds.min_rate_hz > criterion.bounds.max_rate_hz) {
+        throw UserError(fmt::format("camera {}: sampling.min_rate_hz = {} is above max_rate_hz = {}; swap them",
+                                    camera.name, criterion.bounds.min_rate_hz, criterion.bounds.max_rate_hz));
+      }
+    }
+  };
+  std::visit(check, camera.sampling);
+}
+
+/// Whether the pixels have colour filters.
+bool sees_colour(const CameraOptions& camera) { return camera.colour != ColourFilters::none; }
+
+/// Whether any camera sees colour.
+bool sees_colour(const Scenario& scenario) {
+  return std::any_of(scenario.cameras.begin(), scenario.cameras.end(),
+                     [](const CameraOptions& camera) { return sees_colour(camera); });
+}
+
+/// What cameras need of the scene's textures.
+SceneLook look_of(const Scenario& scenario) { return sees_colour(scenario) ? SceneLook::colour : SceneLook::luminance; }
+
+/// The renderer of a sensor. Throws UserError if the renderer or the sampling method does not support its colour
+/// filters.
+std::unique_ptr<Renderer> build_renderer(const RendererFactory& make_renderer, const CameraOptions& options,
+                                         const Camera& model, const Workers& workers) {
+  if (!sees_colour(options)) return make_renderer.make(model, ColourFilters::none, workers);
+  try {
+    return make_renderer.make(model, options.colour, workers);
+  } catch (const UserError& error) {
+    throw UserError(fmt::format("camera {}: {}", options.name, error.what()));
+  }
+}
+
+std::unique_ptr<Sampler> build_sampler(const CameraOptions& options, const World& world, std::size_t index,
+                                       Renderer& renderer, const RendererFactory& make_renderer) {
+  const Workers& workers = *world.workers;
+  const Camera& model = world.info.cameras[index].model;
+  const EventCameraOptions& sensor = options.event_camera;
+  const SensorTraits traits{sensor.min_threshold(), sensor.log_eps, sees_colour(options)};
+  const auto make_other = [&](const Camera& camera, const std::optional<PixelArea>& area) -> std::unique_ptr<Renderer> {
+    if (!area) return make_renderer.make(camera, options.colour, workers);
+    return make_renderer.make_with_area ? make_renderer.make_with_area(camera, *area, workers) : nullptr;
+  };
+  const SceneAccess scene{model, renderer, view_at(world, index), make_other};
+  const TimeSpan span{world.info.start, world.info.end};
+  try {
+    return make_sampler(options.sampling, {traits, model.width, model.height, span, workers}, &scene);
+  } catch (const EngineError&) {
+    throw;
+  } catch (const UserError& error) {
+    throw UserError(fmt::format("camera {}: {}", options.name, error.what()));
+  }
+}
+
+/// The frame camera of a camera.
+FrameCamera build_frame_camera(const CameraOptions& options, const Camera& model, const TimeSpan& span,
+                               std::uint64_t seed, std::size_t index, const Notices& notices) {
+  try {
+    FrameCamera camera(*options.frame_camera, model.width, model.height, span, seed, static_cast<std::uint16_t>(index));
+    if (camera.due() == FrameCamera::kNever) {
+      notices.warning(fmt::format("camera {}: frame_camera: no exposure fits into the simulated time, {:.6g} s",
+                                  options.name, to_seconds(span.end - span.start)));
+    }
+    return camera;
+  } catch (const UserError& error) {
+    throw UserError(fmt::format("camera {}: {}", options.name, error.what()));
+  }
+}
+
+/// Sets the IMU of a world, and its description.
+void add_imu(const RigImuOptions& options, std::uint64_t seed, World& world) {
+  const SE3 T_body_imu = pose_named("imu.T_body_imu", options.T_body_imu);
+  const TimeSpan span{world.info.start, world.info.end};
+  world.imu = {Imu(options, span.start, seed), T_body_imu, PeriodicClock(span.start, span.end, options.rate_hz)};
+  world.info.imu = {T_body_imu,
+                    options.rate_hz,
+                    options.gyroscope.noise_density,
+                    options.gyroscope.random_walk,
+                    options.accelerometer.noise_density,
+                    options.accelerometer.random_walk};
+}
+
+/// Whether any pixel of a sample sees a surface.
+bool sees_something(const Sample& sample) {
+  const auto depth = sample.depth.pixels();
+  return std::any_of(depth.begin(), depth.end(), [](float z) { return std::isfinite(z); });
+}
+
+/// Warns of options that have no effect with a renderer that draws on the sensor.
+void name_what_has_no_effect(const Scenario& scenario, const World& world, std::size_t index, const Notices& notices) {
+  if (!world.cameras[index].renderer->traits().on_sensor) return;
+  const CameraInfo& info = world.info.cameras[index];
+  if (!std::holds_alternative<NoDistortion>(info.model.distortion)) {
+    notices.warning(fmt::format("camera {}: distortion has no effect: {} are drawn on the sensor", info.name,
+                                world.cameras[index].renderer->traits().name));
+  }
+  if (index == 0 && !std::holds_alternative<StaticTrajectoryOptions>(scenario.trajectory)) {
+    notices.warning(
+        fmt::format("trajectory: has no effect on the images, since {} are drawn on the sensor; it is only recorded",
+                    world.cameras[index].renderer->traits().name));
+  }
+}
+
+/// Renders a few images: if a camera never sees anything, its poses or frames are wrong.
+void require_a_view(const World& world, std::size_t index) {
+  constexpr int kLooks = 9;
+  if (world.cameras[index].renderer->traits().at_infinity) return;
+  const CameraInfo& info = world.info.cameras[index];
+  const auto view_at = esim::view_at(world, index);
+  Sample sample;
+  for (int i = 0; i < kLooks; ++i) {
+    RenderRequest request = view_at(world.info.start + (world.info.end - world.info.start) / (kLooks - 1) * i);
+    request.tiles = {{0, 0, info.model.width, info.model.height}};
+    world.cameras[index].renderer->render(request, sample);
+    if (sees_something(sample)) return;
+  }
+  const Eigen::Vector3d position = view_at(world.info.start).camera.T_world_body.translation;
+  throw UserError(
+      fmt::format("camera {} never sees the scene (it starts at {:.3g} {:.3g} {:.3g} m); check "
+                  "the trajectory's frame and T_body_camera",
+                  info.name, position.x(), position.y(), position.z()));
+}
+
+/// Names the moving objects and sprites, in the order in which renderers number them.
+void name_what_moves(const RendererOptions& renderer, const SceneFile& scene, RecordingInfo& info) {
+  for (const SceneObject& object : scene.scene.objects) {
+    if (object.moves) info.objects.push_back(object.name);
+  }
+  if (const auto* const sprites = std::get_if<SpritesRendererOptions>(&renderer)) {
+    for (std::size_t i = 0; i < sprites->sprites.size(); ++i) info.sprites.push_back(fmt::format("sprite{}", i));
+  }
+  if (const auto* const objects = engine_objects(renderer)) {
+    for (const EngineObjectOptions& object : *objects) info.objects.push_back(object.name);
+  }
+}
+
+/// Throws UserError for options that custom renderers do not support.
+void check_substitutes(const Scenario& scenario, const Substitutes& substitutes, const TimeSpan& span) {
+  if (!substitutes.make_renderer) return;
+  if (sees_colour(scenario)) throw UserError("colour: a custom renderer gives luminance only; use colour: none");
+  if (scenario.truth.event_points) {
+    throw UserError(
+        "truth.event_points: needs single pixels at the time of each event, which a custom renderer cannot render; "
+        "remove it");
+  }
+  for (const Substitutes::Object& object : substitutes.objects) {
+    if (object.trajectory->start() <= span.start && object.trajectory->end() >= span.end) continue;
+    throw UserError(
+        fmt::format("object {}: its trajectory lasts from {:.9g} to {:.9g} s, but must cover the simulation from "
+                    "{:.9g} to {:.9g} s; shorten the simulation, or give the object a longer trajectory",
+                    object.name, to_seconds(object.trajectory->start()), to_seconds(object.trajectory->end()),
+                    to_seconds(span.start), to_seconds(span.end)));
+  }
+}
+
+/// A world without cameras: its time, the motions of the body and of the objects, and the IMU.
+World build_motions(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<const Trajectory> body,
+                    const TimeSpan& span, const Substitutes& substitutes, int threads, const Notices& notices) {
+  World world;
+  world.workers = std::make_unique<const Workers>(threads);
+  world.trajectory = std::move(body);
+  world.info.start = span.start;
+  world.info.end = span.end;
+  world.info.truth_rate_hz = scenario.truth.rate_hz;
+  world.truth_clock = PeriodicClock(span.start, span.end, scenario.truth.rate_hz);
+  world.pose_clock = PeriodicClock(span.start, span.end, scenario.truth.pose_rate_hz);
+  if (scenario.imu) add_imu(*scenario.imu, scenario.seed, world);
+  if (substitutes.make_renderer) {
+    for (const Substitutes::Object& object : substitutes.objects) {
+      world.objects.push_back(object.trajectory);
+      world.info.objects.push_back(object.name);
+    }
+  } else {
+    world.objects = build_object_trajectories(scenario, scene, *world.trajectory, span, notices);
+    name_what_moves(scenario.renderer, scene, world.info);
+  }
+  return world;
+}
+
+/// Everything. All other functions that build a world end here.
+World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<const Trajectory> body,
+            const TimeSpan& span, const Substitutes& substitutes, int threads, const Notices& notices) {
+  std::ranges::for_each(scenario.notices, notices.warning);
+  check_substitutes(scenario, substitutes, span);
+  World world = build_motions(scenario, scene, std::move(body), span, substitutes, threads, notices);
+  const SceneCamera* const followed = substitutes.body != nullptr ? nullptr : followed_camera(scenario, scene);
+  check_output(scenario);
+  for (const CameraOptions& options : scenario.cameras) {
+    check_sampling(options, notices);
+    world.info.cameras.push_back(camera_info(options, followed));
+  }
+  const RendererFactory make_renderer =
+      substitutes.make_renderer
+          ? RendererFactory{[&](const Camera& camera, ColourFilters, const Workers& workers) {
+              return substitutes.make_renderer(camera, workers);
+            }}
+          : build_renderer_factory(scenario.renderer, scene, sees_colour(scenario), world.info.cameras, notices);
+  for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
+    const CameraOptions& options = scenario.cameras[i];
+    const Camera& model = world.info.cameras[i].model;
+    const EventCameraOptions& sensor = options.event_camera;
+    std::unique_ptr<Renderer> renderer = build_renderer(make_renderer, options, model, *world.workers);
+    std::unique_ptr<Sampler> sampler = build_sampler(options, world, i, *renderer, make_renderer);
+    world.cameras.push_back({std::move(renderer), std::move(sampler), std::nullopt, {}});
+    if (options.events) {
+      world.cameras.back().event_camera.emplace(sensor, model.width, model.height, scenario.seed,
+                                                static_cast<std::uint16_t>(i));
+    }
+    if (options.frame_camera)
+      world.cameras.back().frame_camera = build_frame_camera(options, model, span, scenario.seed, i, notices);
+    require_a_view(world, i);
+    name_what_has_no_effect(scenario, world, i, notices);
+  }
+  prepare_truth(scenario, scene, make_renderer, notices, world);
+  return world;
+}
+
+}  // namespace
+
+TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory) {
+  const TimeNs start = trajectory.start() + to_ns(scenario.start_s);
+  const double available_s = to_seconds(trajectory.end() - start);
+  if (available_s <= 0) {
+    throw UserError(fmt::format("start_s: {} s is beyond the end of the trajectory, which lasts {:.3f} s",
+                                scenario.start_s, to_seconds(trajectory.end() - trajectory.start())));
+  }
+  if (!scenario.duration_s) return {start, trajectory.end()};
+  const TimeNs end = start + to_ns(*scenario.duration_s);
+  if (end > trajectory.end()) {
+    throw UserError(
+        fmt::format("duration_s: {} s is longer than the rest of the trajectory, {:.9g} s; shorten it, or make the "
+                    "trajectory longer (for a trajectory file, with trajectory.time_scale)",
+                    *scenario.duration_s, available_s));
+  }
+  return {start, end};
+}
+
+CameraInfo camera_info(CameraOptions options, const SceneCamera* followed) {
+  if (followed != nullptr && followed->horizontal_fov_rad && !options.horizontal_fov_deg)
+    options.horizontal_fov_deg = *followed->horizontal_fov_rad * 180.0 / std::numbers::pi;
+  return {options.name, camera_model(options),
+          pose_named(fmt::format("camera {}: T_body_camera", options.name), options.T_body_camera),
+          options.frame_camera.has_value()};
+}
+
+World build_world(const Scenario& scenario, int threads, const Notices& notices) {
+  return build_world(scenario, Substitutes{}, threads, notices);
+}
+
+World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices) {
+  const SceneFile scene = substitutes.make_renderer ? SceneFile{} : load_scenes(scenario, look_of(scenario), notices);
+  std::shared_ptr<const Trajectory> body =
+      substitutes.body != nullptr ? substitutes.body : build_trajectory(scenario, scene, notices);
+  const TimeSpan span = simulated_span(scenario, *body);
+  return build(scenario, scene, std::move(body), span, substitutes, threads, notices);
+}
+
+World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> body, int threads,
+                  const Notices& notices) {
+  if (!scenario.duration_s) throw UserError("duration_s: is missing; an online motion does not define one");
+  const TimeNs start = body->start() + to_ns(scenario.start_s);
+  const TimeSpan span{start, start + to_ns(*scenario.duration_s)};
+  const SceneFile scene = load_scenes(scenario, look_of(scenario), notices);
+  return build(scenario, scene, std::move(body), span, Substitutes{}, threads, notices);
+}
+
+}  // namespace esim::inline compose

@@ -1,0 +1,90 @@
+#include <fmt/format.h>
+
+#include "esim/blender/blender.h"
+#include "esim/compose/compose.h"
+#include "esim/core/error.h"
+
+namespace esim::inline compose {
+namespace {
+
+Lighting lighting_of(const LambertOptions& options) {
+  Lighting lighting;
+  lighting.ambient = static_cast<float>(options.ambient);
+  for (const SunOptions& sun : options.suns) {
+    if (!(sun.direction.norm() > 1e-6))
+      throw UserError("renderer.lighting.suns: direction must not be [0, 0, 0]; [0, 0, -1] shines straight down");
+    lighting.suns.push_back({sun.direction.cast<float>(), static_cast<float>(sun.strength)});
+  }
+  for (const PointLightOptions& point : options.points)
+    lighting.points.push_back({point.position.cast<float>(), static_cast<float>(point.strength)});
+  lighting.shadows = options.shadows;
+  return lighting;
+}
+
+void require_scene_path(const std::filesystem::path& path, const std::string& key) {
+  if (path.empty()) throw UserError(fmt::format("renderer.{}: is missing; name a file", key));
+}
+
+/// The file to read for the scene file that a scenario names: itself, or Blender's export of a .blend.
+std::filesystem::path readable(const std::filesystem::path& scene, const Notices& notices) {
+  if (!is_blend(scene)) return scene;
+  BlenderWatch watch;
+  watch.warning = notices.warning;
+  std::filesystem::path glb = cached_glb(scene, watch);
+  notices.note(fmt::format("scene {}: reading the GLB that Blender exported from it, {}", scene.filename().string(),
+                           glb.string()));
+  return glb;
+}
+
+SceneFile load(const MeshRendererOptions& options, SceneLook look, const Notices& notices) {
+  require_scene_path(options.scene, "scene");
+  SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning, look);
+  notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
+  for (std::size_t i = 0; i < options.objects.size(); ++i) {
+    const ObjectOptions& object = options.objects[i];
+    require_scene_path(object.scene, fmt::format("objects.{}.scene", i));
+    SceneObject loaded{object.name.empty() ? fmt::format("object{}", i) : object.name,
+                       load_mesh(readable(object.scene, notices), notices.warning, look), true};
+    for (const SceneObject& other : file.scene.objects) {
+      if (!other.moves || other.name != loaded.name) continue;
+      throw UserError(fmt::format(
+          "renderer.objects.{}.name: must be unique, but another object is also named {}; rename one", i, loaded.name));
+    }
+    for (Eigen::Vector3f& vertex : loaded.mesh.vertices) vertex *= static_cast<float>(object.scale);
+    file.scene.objects.push_back(std::move(loaded));
+  }
+  if (const auto* lambert = std::get_if<LambertOptions>(&options.lighting)) file.scene.lighting = lighting_of(*lambert);
+  return file;
+}
+
+template <typename Renderer>
+SceneFile load(const Renderer&, SceneLook, const Notices&) {
+  return {};
+}
+
+/// Only the cameras and the animation's time span of the scene that Blender renders.
+SceneFile load_cameras(const BlenderRendererOptions& options, const Notices& notices) {
+  if (options.scene.empty()) {
+    throw UserError(
+        "renderer.scene: is missing, but the trajectory follows a camera of the scene; name the file that the Blender "
+        "at renderer.address has opened");
+  }
+  SceneFile file = load_scene_file(readable(options.scene, notices), [](const std::string&) {});
+  if (file.cameras.empty())
+    throw UserError(fmt::format("trajectory: {} has no camera; use file, random or static", options.scene.string()));
+  SceneFile cameras;
+  cameras.cameras = std::move(file.cameras);
+  cameras.animation = file.animation;
+  return cameras;
+}
+
+}  // namespace
+
+SceneFile load_scenes(const Scenario& scenario, SceneLook look, const Notices& notices) {
+  const auto* const blender = std::get_if<BlenderRendererOptions>(&scenario.renderer);
+  if (blender != nullptr && std::holds_alternative<SceneTrajectoryOptions>(scenario.trajectory))
+    return load_cameras(*blender, notices);
+  return std::visit([&](const auto& renderer) { return load(renderer, look, notices); }, scenario.renderer);
+}
+
+}  // namespace esim::inline compose

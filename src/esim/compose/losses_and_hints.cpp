@@ -1,0 +1,103 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <type_traits>
+
+#include "esim/compose/compose.h"
+#include "esim/files/number_text.h"
+
+namespace esim::inline compose {
+namespace {
+
+// A readout counts as saturated if more than this fraction of the events waited for it.
+constexpr double kSaturated = 0.01;
+
+double percent(std::int64_t part, std::int64_t whole) {
+  return 100.0 * static_cast<double>(part) / static_cast<double>(std::max<std::int64_t>(whole, 1));
+}
+
+std::string grouped(std::int64_t count) { return esim::grouped(static_cast<std::uint64_t>(count)); }
+
+void add_readout(const std::string& name, const ReadoutOptions& readout, const EventCameraStatistics& sensor,
+                 std::int64_t events, std::vector<std::string>& lines) {
+  if (sensor.dropped > 0) {
+    lines.push_back(
+        fmt::format("{}the readout dropped {} of {} events ({:.3g} %), because its queue of {} events was full: raise "
+                    "event_camera.readout.queue_events, or set it to 0 for one event per pixel",
+                    name, grouped(sensor.dropped), grouped(events + sensor.dropped),
+                    percent(sensor.dropped, events + sensor.dropped), readout.queue_events));
+  }
+  if (static_cast<double>(sensor.delayed) > kSaturated * static_cast<double>(events)) {
+    lines.push_back(fmt::format(
+        "{}the readout was saturated: {:.3g} % of the events waited for it, for up to {:.3g} ms, and their pixels were "
+        "blind while they waited. Its limits are event_camera.readout.rate_mev_per_s ({:g} Mev/s) and "
+        "event_camera.readout.row_time_us ({:g} us)",
+        name, percent(sensor.delayed, events), to_seconds(sensor.longest_delay) * 1e3, readout.rate_mev_per_s,
+        readout.row_time_us));
+  }
+}
+
+template <typename Scheme>
+double max_rate_hz(const Scheme& scheme) {
+  if constexpr (std::is_same_v<Scheme, UniformSampling>) {
+    return scheme.rate_hz;
+  } else {
+    return scheme.bounds.max_rate_hz;
+  }
+}
+
+void add_sampling(const std::string& name, const CameraOptions& camera, const SamplingStatistics& sampling,
+                  std::vector<std::string>& lines) {
+  if (sampling.held_to_max_rate > 0) {
+    const double rate = std::visit([](const auto& scheme) { return max_rate_hz(scheme); }, camera.sampling);
+    lines.push_back(fmt::format(
+        "{}{} intervals between samples were limited by sampling.max_rate_hz ({:g} Hz): the error there is larger than "
+        "the sampling method allows. Raise max_rate_hz, or move more slowly",
+        name, grouped(sampling.held_to_max_rate), rate));
+  }
+  const double budget = sampling.tolerance * camera.event_camera.min_threshold();
+  if (sampling.measured_error && sampling.measured_error->p99 > budget) {
+    lines.push_back(fmt::format(
+        "{}sampling missed its tolerance: the 99th percentile of the measured error is {:.3g} in brightness, "
+        "sampling.tolerance ({:g} contrast thresholds) allows {:.3g}. Raise sampling.max_rate_hz",
+        name, sampling.measured_error->p99, sampling.tolerance, budget));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> losses(const Scenario& scenario, const Summary& summary) {
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < summary.cameras.size(); ++i) {
+    const CameraSummary& done = summary.cameras[i];
+    const CameraOptions& camera = scenario.cameras[i];
+    const std::string name = done.name + ": ";
+    if (camera.events) {
+      add_readout(name, camera.event_camera.readout, done.sensor, done.events_on + done.events_off, lines);
+    }
+    add_sampling(name, camera, done.sampling, lines);
+  }
+  return lines;
+}
+
+std::vector<std::string> hints(const Scenario& scenario, const Summary& summary) {
+  const double simulated_s = to_seconds(summary.end - summary.start);
+  const bool adaptive = std::ranges::any_of(scenario.cameras, [](const CameraOptions& camera) {
+    return std::holds_alternative<AdaptiveSampling>(camera.sampling);
+  });
+  if (!adaptive || !std::holds_alternative<MeshRendererOptions>(scenario.renderer)) return {};
+  if (summary.wall_seconds < simulated_s || summary.seconds.render < 0.5 * summary.wall_seconds) return {};
+  return {
+      fmt::format("rendering took {:.3g} of {:.3g} s. If edges of objects fill the image, flow sampling "
+                  "(sampling={{type: flow}}) is "
+                  "often several times faster than adaptive sampling",
+                  summary.seconds.render, summary.wall_seconds)};
+}
+
+std::vector<std::string> losses(const ConversionOptions& options, const ConversionSummary& summary) {
+  std::vector<std::string> lines;
+  add_readout("", options.event_camera.readout, summary.sensor, summary.events_on + summary.events_off, lines);
+  return lines;
+}
+
+}  // namespace esim::inline compose

@@ -1,0 +1,181 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <tuple>
+
+#include "esim/backends/opengl/gl_renderer.h"
+#include "esim/backends/panorama/panorama_renderer.h"
+#include "esim/backends/plane/plane_renderer.h"
+#include "esim/backends/raycast/raycast_renderer.h"
+#include "esim/backends/sprites/sprites_renderer.h"
+#include "esim/backends/unrealcv/unrealcv_renderer.h"
+#include "esim/compose/compose.h"
+#include "esim/core/error.h"
+#include "esim/scene/images/image_file.h"
+
+namespace esim::inline compose {
+namespace {
+
+void require_path(const std::filesystem::path& path, const std::string& key) {
+  if (path.empty()) throw UserError(fmt::format("renderer.{}: is missing; name a file", key));
+}
+
+void refuse(ColourFilters filters, const char* renderer, const char* instead) {
+  if (filters != ColourFilters::none)
+    throw UserError(fmt::format("colour: {} renders luminance only; use {}, or colour: none", renderer, instead));
+}
+
+/// A factory of renderers whose pixels can average over other areas: make(camera, filters, area, workers).
+template <typename Make>
+RendererFactory with_area(const Make& make) {
+  return {[make](const Camera& camera, ColourFilters filters, const Workers& workers) -> std::unique_ptr<Renderer> {
+            return make(camera, filters, PixelArea{}, workers);
+          },
+          [make](const Camera& camera, const PixelArea& area, const Workers& workers) -> std::unique_ptr<Renderer> {
+            return make(camera, ColourFilters::none, area, workers);
+          }};
+}
+
+/// The same for scenes without edges, which have only one area: make(camera, filters, footprint, workers).
+template <typename Make>
+auto without_edges(const Make& make) {
+  return [make](const Camera& camera, ColourFilters filters, const PixelArea& area, const Workers& workers) {
+    return area.edges == area.texture ? make(camera, filters, area.texture, workers) : nullptr;
+  };
+}
+
+// One overload per type of renderer (scenario/renderer_options.h).
+
+/// OpenGL if there is a graphics card and no camera sees colour.
+MeshEngine choose_engine(const MeshRendererOptions& options, bool colour) {
+  if (options.engine != MeshEngine::automatic) return options.engine;
+  if (colour) return MeshEngine::raycast;
+  const std::vector<GlDevice> devices = gl_devices();
+  const bool hardware = std::any_of(devices.begin(), devices.end(), [](const GlDevice& d) { return !d.software; });
+  return hardware ? MeshEngine::gl : MeshEngine::raycast;
+}
+
+RendererFactory factory(const MeshRendererOptions& options, const SceneFile& file, bool colour) {
+  if (choose_engine(options, colour) == MeshEngine::gl) {
+    const GlOptions gl{static_cast<float>(options.background), options.samples_per_pixel, options.gl_device};
+    return {[gl, scene = std::make_shared<const Scene>(file.scene)](const Camera& camera, ColourFilters filters,
+                                                                    const Workers&) {
+      refuse(filters, "engine: gl", "engine: raycast");
+      return make_gl_renderer(*scene, gl, camera);
+    }};
+  }
+  const auto scene = build_raycast_scene(file.scene);
+  const RaycastOptions raycast{static_cast<float>(options.background), options.samples_per_pixel};
+  return with_area([=](const Camera& camera, ColourFilters filters, const PixelArea& area, const Workers& workers) {
+    return make_raycast_renderer(scene, raycast, camera, workers, filters, area);
+  });
+}
+
+RendererFactory factory(const PanoramaRendererOptions& options, const SceneFile&, bool colour) {
+  require_path(options.image, "image");
+  if (!(options.orientation.norm() > 1e-6))
+    throw UserError("renderer.orientation: must not be [0, 0, 0, 0]; use [0, 0, 0, 1]");
+  const Softening softening{options.median_px, options.gaussian_px, true};
+  Panorama panorama{
+      std::make_shared<const Texture>(load_luminance(options.image, softening), Wrap::repeat, Wrap::clamp),
+      Eigen::Quaterniond(options.orientation.normalized())};
+  if (colour) panorama.colours = colour_textures(load_colours(options.image, softening), Wrap::repeat, Wrap::clamp);
+  return with_area(
+      without_edges([=](const Camera& camera, ColourFilters filters, double footprint, const Workers& workers) {
+        return make_panorama_renderer(panorama, camera, workers, filters, footprint);
+      }));
+}
+
+RendererFactory factory(const PlaneRendererOptions& options, const SceneFile&, bool colour) {
+  require_path(options.image, "image");
+  const Wrap wrap = options.endless ? Wrap::repeat : Wrap::clamp;
+  const Softening softening{options.median_px, options.gaussian_px};
+  TexturedPlane plane{std::make_shared<const Texture>(load_luminance(options.image, softening), wrap, wrap),
+                      pose_of(options.pose), options.width_m, options.endless, static_cast<float>(options.background)};
+  if (colour) plane.colours = colour_textures(load_colours(options.image, softening), wrap, wrap);
+  return with_area(
+      without_edges([=](const Camera& camera, ColourFilters filters, double footprint, const Workers& workers) {
+        return make_plane_renderer(plane, camera, workers, filters, footprint);
+      }));
+}
+
+/// The textures of sprites. Sprites with the same image and filters share them.
+class SpriteTextures {
+ public:
+  struct Textures {
+    std::shared_ptr<const Texture> light, alpha;
+  };
+
+  const Textures& of(const SpriteOptions& sprite) {
+    const Wrap wrap = sprite.beyond == SpriteBeyond::repeat ? Wrap::repeat : Wrap::clamp;
+    const auto [entry, is_new] = loaded_.try_emplace({sprite.image, sprite.median_px, sprite.gaussian_px, wrap});
+    if (is_new) {
+      const TranslucentImage image = load_translucent(sprite.image, {sprite.median_px, sprite.gaussian_px});
+      entry->second.light = std::make_shared<const Texture>(image.light, wrap, wrap);
+      if (!image.alpha.empty()) entry->second.alpha = std::make_shared<const Texture>(image.alpha, wrap, wrap);
+    }
+    return entry->second;
+  }
+
+ private:
+  std::map<std::tuple<std::filesystem::path, int, double, Wrap>, Textures> loaded_;
+};
+
+RendererFactory factory(const SpritesRendererOptions& options, const SceneFile&, bool) {
+  if (options.sprites.empty())
+    throw UserError("renderer.sprites: is missing; list sprites, or name a .scene file in renderer.scene");
+  SpriteScene scene{{}, static_cast<float>(options.background)};
+  SpriteTextures textures;
+  for (std::size_t i = 0; i < options.sprites.size(); ++i) {
+    const SpriteOptions& sprite = options.sprites[i];
+    require_path(sprite.image, fmt::format("sprites.{}.image", i));
+    try {
+      const auto& [light, alpha] = textures.of(sprite);
+      scene.sprites.push_back(
+          {light, alpha, sprite.units, sprite.beyond, SpriteMotion(sprite.poses, sprite.interpolation), sprite.pivot});
+    } catch (const UserError& error) {
+      throw UserError(fmt::format("renderer.sprites.{}: {}", i, error.what()));
+    }
+  }
+  return {[=](const Camera& camera, ColourFilters filters, const Workers& workers) {
+    refuse(filters, "the renderer sprites", "a mesh, a plane or a panorama");
+    return make_sprites_renderer(scene, camera, workers);
+  }};
+}
+
+RendererFactory factory(const UnrealcvRendererOptions& options, const SceneFile&, bool) {
+  UnrealcvOptions engine;
+  engine.host = options.host;
+  engine.port = options.port;
+  engine.timeout_s = options.timeout_s;
+  engine.camera = options.camera;
+  engine.pipelined = options.pipelined;
+  engine.lag_frames = options.lag_frames;
+  engine.light = options.light;
+  engine.exposure = options.exposure;
+  engine.depth = options.depth;
+  engine.mask = options.object_mask;
+  for (const EngineObjectOptions& object : options.objects) engine.objects.push_back(object.name);
+  return {[client = make_unrealcv_client(engine)](const Camera& camera, ColourFilters filters, const Workers& workers) {
+    refuse(filters, "the renderer unrealcv", "a mesh, a plane or a panorama");
+    return make_unrealcv_renderer(client, camera, workers);
+  }};
+}
+
+}  // namespace
+
+RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene, bool colour,
+                                       const std::vector<CameraInfo>& sensors, const Notices& notices) {
+  return std::visit(
+      [&]<typename Options>(const Options& renderer) {
+        if constexpr (std::is_same_v<Options, BlenderRendererOptions>) {
+          return start_blender(renderer, sensors, notices);
+        } else {
+          return factory(renderer, scene, colour);
+        }
+      },
+      options);
+}
+
+}  // namespace esim::inline compose

@@ -1,0 +1,353 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "esim/core/describe.h"
+#include "esim/scenario/pose_options.h"
+#include "esim/scenario/trajectory_options.h"
+#include "esim/scene/engine_images.h"
+#include "esim/scene/sprite.h"
+
+/// What the cameras see. A new renderer is a struct with its describe(), an alternative of the variant at the end, and
+/// a function in compose/renderer_factory.cpp.
+namespace esim::inline scenario {
+
+/// A moving object of the scene.
+struct ObjectOptions {
+  std::string name;
+  std::filesystem::path scene;
+  double scale = 1.0;
+  TrajectoryOptions trajectory;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, ObjectOptions& o) {
+  visit("name", o.name, About{"unique name in messages and ground truth (default: object0, object1, ...)"});
+  visit("scene", o.scene, About{"scene file, in the coordinates of the object"});
+  visit("scale", o.scale, About{"factor that converts its coordinates to metres", "", 0, 1e6, true});
+  visit("trajectory", o.trajectory, About{"motion: pose of the object's coordinates in the world"});
+}
+
+struct SunOptions {
+  Eigen::Vector3d direction = {0, 0, -1};
+  double strength = 1.0;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, SunOptions& o) {
+  visit("direction", o.direction, About{"direction in which the light travels, world frame"});
+  visit("strength", o.strength, About{"irradiance of a white surface that faces the sun", "", 0, 1e6});
+}
+
+struct PointLightOptions {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  double strength = 1.0;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, PointLightOptions& o) {
+  visit("position", o.position, About{"position, world frame", "m"});
+  visit("strength", o.strength,
+        About{"irradiance of a white surface that faces the light at a distance of 1 m", "", 0, 1e9});
+}
+
+/// Surfaces show their base colour, independent of lights.
+struct UnlitOptions {
+  static constexpr const char* kType = "unlit";
+};
+
+template <class Visitor>
+void describe(Visitor&, UnlitOptions&) {}
+
+/// Diffuse surfaces under lights.
+struct LambertOptions {
+  static constexpr const char* kType = "lambert";
+  double ambient = 0.3;
+  std::vector<SunOptions> suns;
+  std::vector<PointLightOptions> points;
+  bool shadows = false;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, LambertOptions& o) {
+  visit("ambient", o.ambient, About{"irradiance of a white surface that no light reaches", "", 0, 1e6});
+  visit("suns", o.suns, About{"directional lights: a list of maps of"});
+  visit("points", o.points, About{"point lights, whose irradiance falls with the squared distance: a list of maps of"});
+  visit("shadows", o.shadows, About{"whether surfaces cast shadows"});
+}
+
+using LightingOptions = std::variant<UnlitOptions, LambertOptions>;
+
+/// The renderer of triangles.
+enum class MeshEngine { raycast, gl, automatic };
+
+/// Triangles.
+struct MeshRendererOptions {
+  static constexpr const char* kType = "mesh";
+  MeshEngine engine = MeshEngine::raycast;
+  std::optional<int> gl_device;
+  std::filesystem::path scene;
+  double time_scale = 1.0;
+  std::vector<ObjectOptions> objects;
+  LightingOptions lighting;
+  int samples_per_pixel = 1;
+  double background = 0.2;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, MeshRendererOptions& o) {
+  visit("engine", o.engine,
+        About{"raycast: Embree; gl: OpenGL; auto: gl if there is a graphics card, raycast otherwise"});
+  visit("gl_device", o.gl_device,
+        About{"index of the graphics device, from 0 (default: the first hardware device)", "", 0, 31});
+  visit("scene", o.scene,
+        About{"scene file: GLB, glTF, Blender's .blend, OBJ, PLY, STL, FBX, Collada; its animations are played"});
+  visit("time_scale", o.time_scale,
+        About{"factor on the duration of the scene file's animation: 2 takes twice as long", "", 0, 1e6, true});
+  visit("objects", o.objects, About{"objects that move through the scene: a list of maps of"});
+  visit("lighting", o.lighting, About{"unlit: a surface is as bright as its texture, as in scenes with baked light"});
+  visit("samples_per_pixel", o.samples_per_pixel,
+        About{"rays per pixel at edges: 1, 16 or 64; more rays smooth the edges of objects and shadows", "", 1, 64});
+  visit("background", o.background, About{"irradiance of pixels that see no surface", "", 0, 1e6});
+}
+
+/// The filters of an image (scene/images/image_file.h, Softening).
+template <class Visitor, class Options>
+void describe_softening(Visitor& visit, Options& o) {
+  visit("median_px", o.median_px, About{"side of a median filter over the image, odd; 0: no filter", "px", 0, 255});
+  visit("gaussian_px", o.gaussian_px,
+        About{"standard deviation of a Gaussian blur of the image; 0: no blur", "px", 0, 100});
+}
+
+/// An equirectangular image at infinity.
+struct PanoramaRendererOptions {
+  static constexpr const char* kType = "panorama";
+  std::filesystem::path image;
+  Eigen::Vector4d orientation = {0, 0, 0, 1};
+  int median_px = 0;
+  double gaussian_px = 0;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, PanoramaRendererOptions& o) {
+  visit("image", o.image,
+        About{"equirectangular image: its centre lies along world x, its upper edge at the zenith (z)"});
+  visit("orientation", o.orientation, About{"orientation of the panorama in the world, quaternion x y z w"});
+  describe_softening(visit, o);
+}
+
+/// A textured rectangle.
+struct PlaneRendererOptions {
+  static constexpr const char* kType = "plane";
+  std::filesystem::path image;
+  double width_m = 1.0;
+  PoseOptions pose;
+  bool endless = false;
+  int median_px = 0;
+  double gaussian_px = 0;
+  double background = 0.2;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, PlaneRendererOptions& o) {
+  visit("image", o.image, About{"image on the plane"});
+  visit("width_m", o.width_m, About{"width of the image; the height follows from its aspect ratio", "m", 0, 1e6, true});
+  visit("pose", o.pose, About{"pose of the image: origin at its centre, x right, y down, z away from the viewer"});
+  visit("endless", o.endless, About{"whether the image is repeated over the infinite plane"});
+  describe_softening(visit, o);
+  visit("background", o.background, About{"irradiance outside the image", "", 0, 1e6});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, SpritePose& o) {
+  visit("t_s", o.t_s,
+        About{"time on the trajectory's clock, which starts at 0 unless the trajectory is a file", "s", -1e8, 1e8});
+  visit("position", o.position,
+        About{"position of the pivot relative to the sensor's centre, to the right and downwards, in units", "", -1e6,
+              1e6});
+  visit("rotation_deg", o.rotation_deg, About{"rotation about the pivot, clockwise", "deg", -1e9, 1e9});
+  visit("scale", o.scale, About{"factors on width and height; a negative factor mirrors", "", -1e6, 1e6});
+  visit("shear", o.shear,
+        About{"shift to the right per distance downwards, applied after the scale and before the rotation", "", -1e6,
+              1e6});
+}
+
+/// A sprite: an image that moves over the sensor.
+struct SpriteOptions {
+  std::filesystem::path image;
+  SpriteUnits units = SpriteUnits::pixel;
+  SpriteBeyond beyond = SpriteBeyond::nothing;
+  int median_px = 0;
+  double gaussian_px = 0;
+  Eigen::Vector2d pivot{0.5, 0.5};
+  SpriteInterpolation interpolation = SpriteInterpolation::spline;
+  std::vector<SpritePose> poses{SpritePose{}};  // at rest in the middle
+};
+
+template <class Visitor>
+void describe(Visitor& visit, SpriteOptions& o) {
+  visit("image", o.image, About{"image file, with or without alpha"});
+  visit("units", o.units,
+        About{"unit of positions. pixel: at scale 1, a texel is a pixel; sensor: at scale 1, the image fills the "
+              "sensor, whose width and height are 1"});
+  visit("beyond", o.beyond, About{"what lies beyond the image's edges"});
+  describe_softening(visit, o);
+  visit("pivot", o.pivot,
+        About{"point of the image that the poses place: [0, 0] is its upper left corner, [1, 1] its lower right corner",
+              "", -1e3, 1e3});
+  visit("interpolation", o.interpolation, About{"motion between poses: natural cubic splines, or linear"});
+  visit(
+      "poses", o.poses,
+      About{
+          "in order of time; before the first and after the last, the sprite rests (default: it rests in the middle)"});
+}
+
+/// Sprites on the sensor. If `scene` is given, they come from that file.
+struct SpritesRendererOptions {
+  static constexpr const char* kType = "sprites";
+  std::filesystem::path scene;
+  std::vector<std::filesystem::path> search_path;
+  std::vector<SpriteOptions> sprites;
+  double background = 0.2;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, SpritesRendererOptions& o) {
+  visit(
+      "scene", o.scene,
+      About{"instead of sprites: a .scene file of the original ESIM; it also gives the duration and the camera's size "
+            "if the scenario does not"});
+  visit("search_path", o.search_path, About{"folders in which esim looks for the scene file's images"});
+  visit("sprites", o.sprites, About{"sprites on the sensor, the nearest first"});
+  visit("background", o.background, About{"irradiance where no sprite lies", "", 0, 1e6});
+}
+
+/// An object in another program's scene that esim moves.
+struct EngineObjectOptions {
+  std::string name;
+  TrajectoryOptions trajectory;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, EngineObjectOptions& o) {
+  visit("name", o.name, About{"name of the object in that program"});
+  visit("trajectory", o.trajectory, About{"motion: pose of its frame (x forward, y left, z up) in the world"});
+}
+
+/// A program that speaks UnrealCV's protocol.
+struct UnrealcvRendererOptions {
+  static constexpr const char* kType = "unrealcv";
+  std::string host = "127.0.0.1";
+  int port = 9000;
+  double timeout_s = 10;
+  int camera = 0;
+  std::vector<EngineObjectOptions> objects;
+  EngineLight light = EngineLight::automatic;
+  double exposure = 1.0;
+  EngineDepth depth = EngineDepth::automatic;
+  EngineMask object_mask = EngineMask::automatic;
+  bool pipelined = true;
+  int lag_frames = 0;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, UnrealcvRendererOptions& o) {
+  visit("host", o.host, About{"host that runs the program (default: 127.0.0.1)"});
+  visit("port", o.port, About{"port on which the program listens", "", 1, 65535});
+  visit(
+      "timeout_s", o.timeout_s,
+      About{"maximum wait for the connection, for each answer, and for a program that restarts", "s", 0, 86400, true});
+  visit("camera", o.camera,
+        About{"id of the program's camera that esim moves; it serves all cameras of the rig", "", 0, 1e6});
+  visit("objects", o.objects, About{"objects of the program's scene that esim moves: a list of maps of"});
+  visit("light", o.light, About{"format of requested images; auto: npy if the program offers it, png otherwise"});
+  visit("exposure", o.exposure, About{"factor from the program's linear intensity to irradiance", "", 0, 1e6, true});
+  visit("depth", o.depth,
+        About{"which depth esim requests, and its meaning; auto: plane_depth if the program offers it, otherwise as "
+              "usual for its version"});
+  visit("object_mask", o.object_mask,
+        About{"format of requested object masks; none: the motion field treats all objects as static"});
+  visit("pipelined", o.pipelined,
+        About{"whether esim sends all commands of a frame together instead of waiting for each answer"});
+  visit("lag_frames", o.lag_frames,
+        About{"images to discard after each move, for programs that show a move late", "", 0, 100});
+}
+
+enum class BlenderEngine { cycles, eevee };
+
+/// Blender, which esim starts or which runs already.
+struct BlenderRendererOptions {
+  static constexpr const char* kType = "blender";
+  std::filesystem::path scene;
+  std::string address;
+  BlenderEngine engine = BlenderEngine::cycles;
+  int samples = 16;
+  int noise_seed = 0;
+  int threads = 0;
+  std::vector<EngineObjectOptions> objects;
+  double exposure = 1.0;
+  double timeout_s = 600;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, BlenderRendererOptions& o) {
+  visit("scene", o.scene, About{"file that Blender opens: .blend, .glb, .obj, .ply, .fbx or .dae"});
+  visit("address", o.address,
+        About{"HOST:PORT of a Blender that already serves; esim then starts none, and that Blender determines scene, "
+              "engine, noise_seed and threads"});
+  visit("engine", o.engine, About{"cycles: path tracing; eevee: Blender's rasteriser"});
+  visit("samples", o.samples,
+        About{"light paths per pixel of the sensor; supersampled keyframes divide them among their pixels", "", 1,
+              65536});
+  visit("noise_seed", o.noise_seed, About{"seed of the path tracer", "", 0, 2147483647});
+  visit("threads", o.threads, About{"number of Blender's render threads; 0: all processors", "", 0, 1024});
+  visit("objects", o.objects, About{"objects of the scene that esim moves: a list of maps of"});
+  visit("exposure", o.exposure, About{"factor from Blender's linear intensity to irradiance", "", 0, 1e6, true});
+  visit("timeout_s", o.timeout_s,
+        About{"maximum wait for Blender to open the scene, and for each image", "s", 0, 86400, true});
+}
+
+using RendererOptions = std::variant<MeshRendererOptions, PanoramaRendererOptions, PlaneRendererOptions,
+                                     SpritesRendererOptions, UnrealcvRendererOptions, BlenderRendererOptions>;
+
+/// The moving objects in the scene of another program that renders; null if esim renders. Renderers of other programs
+/// are those with a list of EngineObjectOptions.
+inline const std::vector<EngineObjectOptions>* engine_objects(const RendererOptions& renderer) {
+  return std::visit(
+      [](const auto& options) -> const std::vector<EngineObjectOptions>* {
+        if constexpr (requires(const std::vector<EngineObjectOptions>* objects) { objects = &options.objects; }) {
+          return &options.objects;
+        } else {
+          return nullptr;
+        }
+      },
+      renderer);
+}
+
+}  // namespace esim::inline scenario
+
+namespace esim {
+
+template <>
+inline constexpr std::array<const char*, 2> kEnumNames<SpriteUnits>{"pixel", "sensor"};
+template <>
+inline constexpr std::array<const char*, 4> kEnumNames<SpriteBeyond>{"nothing", "clamp", "mirror", "repeat"};
+template <>
+inline constexpr std::array<const char*, 2> kEnumNames<SpriteInterpolation>{"spline", "linear"};
+template <>
+inline constexpr std::array<const char*, 3> kEnumNames<MeshEngine>{"raycast", "gl", "auto"};
+template <>
+inline constexpr std::array<const char*, 2> kEnumNames<BlenderEngine>{"cycles", "eevee"};
+template <>
+inline constexpr std::array<const char*, 3> kEnumNames<EngineLight>{"auto", "png", "npy"};
+template <>
+inline constexpr std::array<const char*, 6> kEnumNames<EngineDepth>{"auto",   "plane_depth", "ray_m",
+                                                                    "ray_cm", "planar_m",    "planar_cm"};
+template <>
+inline constexpr std::array<const char*, 4> kEnumNames<EngineMask>{"auto", "png", "npy", "none"};
+
+}  // namespace esim

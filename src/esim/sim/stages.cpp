@@ -1,0 +1,68 @@
+#include "esim/sim/stages.h"
+
+#include "esim/sim/stopwatch.h"
+
+namespace esim::inline sim {
+
+void Stages::start_rendering(CameraChannel& camera, TimeNs known_until) {
+  timed(seconds_.render, [&] {
+    const SampleRequest* const next = camera.sampler->next();
+    if (next == nullptr || next->last() > known_until) return camera.rendering.reset();
+    const auto index = static_cast<std::size_t>(&camera - world_.cameras.data());
+    std::vector<RenderRequest> views = {view(world_, index, next->t, next->tiles)};
+    for (const auto& [t, tiles] : next->later) views.push_back(view(world_, index, t, tiles));
+    for (RenderRequest& view : views) view.motion_rows = next->motion_rows;
+    Renderer& renderer = next->renderer != nullptr ? *next->renderer : *camera.renderer;
+    camera.rendering = renderer.start_together(std::move(views));
+  });
+}
+
+void Stages::finish_rendering(CameraChannel& camera) {
+  timed(seconds_.render, [&] { camera.rendering->finish(camera.sample); });
+}
+
+std::span<const Segment> Stages::accept_sample(CameraChannel& camera) {
+  return timed(seconds_.sampling, [&] { return camera.sampler->accept(camera.sample); });
+}
+
+std::span<const Segment> Stages::more_segments(CameraChannel& camera) {
+  return timed(seconds_.sampling, [&] { return camera.sampler->more(); });
+}
+
+void Stages::make_events(CameraChannel& camera, std::span<const Segment> segments) {
+  if (!camera.event_camera) return;
+  timed(seconds_.events,
+        [&] { camera.event_camera->integrate(segments, camera.sampler->watermark(), *world_.workers); });
+}
+
+void Stages::release_events(CameraChannel& camera, TimeNs until, std::vector<Event>& events) {
+  events.clear();
+  if (camera.event_camera) timed(seconds_.events, [&] { camera.event_camera->release_until(until, events); });
+}
+
+void Stages::expose_frames(CameraChannel& camera, std::span<const Segment> segments) {
+  if (!camera.frame_camera) return;
+  timed(seconds_.frames,
+        [&] { camera.frame_camera->integrate(segments, camera.sampler->watermark(), *world_.workers); });
+}
+
+const OpticalFlowImages* Stages::render_truth(CameraChannel& camera, const RenderRequest& request, Sample& truth) {
+  return timed(seconds_.truth, [&]() -> const OpticalFlowImages* {
+    camera.renderer->render(request, truth);
+    return camera.optical_flow ? camera.optical_flow->advance(request, truth) : nullptr;
+  });
+}
+
+void Stages::locate_events(CameraChannel& camera, std::span<const Event> events, std::vector<Eigen::Vector3f>& points) {
+  timed(seconds_.truth, [&] { camera.event_points->locate(events, points); });
+}
+
+void Stages::write(Sink& out, const Record& record) {
+  timed(seconds_.write, [&] { out.write(record); });
+}
+
+void Stages::end(Sink& out, bool complete) {
+  timed(seconds_.write, [&] { out.end(complete); });
+}
+
+}  // namespace esim::inline sim

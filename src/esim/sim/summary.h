@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "esim/core/time.h"
+#include "esim/event_camera/event_camera.h"
+#include "esim/sampling/sampler.h"
+
+namespace esim::inline sim {
+
+/// Wall-clock seconds by stage.
+struct StageSeconds {
+  double render = 0;    ///< samples for the event cameras
+  double sampling = 0;  ///< choosing times, reconstructing between keyframes
+  double events = 0;    ///< pixels, and ordering of events
+  double frames = 0;    ///< exposing and reading out frame cameras
+  double truth = 0;     ///< computing ground truth
+  double write = 0;     ///< calls of sinks; their background threads do not count
+};
+
+/// Results of one camera.
+struct CameraSummary {
+  std::string name;
+  std::string renderer;
+  std::int64_t width = 0, height = 0;
+  SamplingStatistics sampling;
+  std::int64_t events_on = 0, events_off = 0;
+  EventCameraStatistics sensor;
+  std::int64_t frames = 0;  ///< of the frame camera
+};
+
+/// Results of a simulation, for the report.
+struct Summary {
+  bool complete = false;
+  std::string problem;        ///< why it failed before its end; empty if complete or interrupted
+  TimeNs start = 0, end = 0;  ///< of the simulated time
+  std::vector<CameraSummary> cameras;
+  std::int64_t truth_frames = 0;
+  std::int64_t imu_samples = 0;
+  StageSeconds seconds;
+  double wall_seconds = 0;
+};
+
+}  // namespace esim::inline sim

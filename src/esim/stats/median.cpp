@@ -1,0 +1,15 @@
+#include "esim/stats/median.h"
+
+#include <algorithm>
+#include <cstddef>
+
+namespace esim::inline stats {
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return values.size() % 2 == 1 ? *middle : 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+}  // namespace esim::inline stats

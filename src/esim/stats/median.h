@@ -1,0 +1,10 @@
+#pragma once
+
+#include <vector>
+
+namespace esim::inline stats {
+
+/// The median; of an even number of values, the mean of the two in the middle; 0 if there are none.
+double median(std::vector<double> values);
+
+}  // namespace esim::inline stats

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "esim/core/parallel.h"
+#include "esim/render/renderer.h"
+#include "esim/truth/bearings.h"
+
+namespace esim::inline truth {
+
+/// Optical flow of a camera from time t0 to t1.
+struct OpticalFlowImages {
+  TimeNs t0 = 0, t1 = 0;
+
+  // From the pixel's centre at t0 to the image of the same scene point at t1, px, to the right and downwards; also
+  // defined if the point is hidden then or outside the image. NaN if the camera does not project the point.
+  Image<float> x, y;
+
+  // 1 if the camera also sees the point at t1; 0 if it is hidden then or outside the image.
+  Image<std::uint8_t> visible;
+};
+
+/// Computes the optical flow between consecutive frames of one camera from depth, poses, objects and lens. A pixel of
+/// depth Z and bearing b that sees the object O (constant pose for the static scene) moves to
+///     project(T_C_W(t1) T_W_O(t1) T_O_W(t0) T_W_C(t0) Z b).
+/// The point is hidden if the frame at t1 shows a nearer surface at the point's pixel: if 1 / depth differs by more
+/// than its change within half a pixel plus 0.5 %. So at an edge, a point is visible if the centre of the nearest pixel
+/// sees the same side of the edge.
+class OpticalFlowFromDepth {
+ public:
+  OpticalFlowFromDepth(const Camera& camera, const Workers& workers);
+
+  /// Takes the next frame, a `sample` of the whole image rendered for `view`. Returns the optical flow from the
+  /// previous frame to this one, valid until the next call; null for the first frame.
+  const OpticalFlowImages* advance(const RenderRequest& view, const Sample& sample);
+
+ private:
+  struct Frame {
+    RenderRequest view;
+    Image<float> depth;
+    Image<std::uint16_t> object;
+  };
+
+  void compute(const Frame& from, const RenderRequest& to, const Image<float>& depth_there);
+
+  Camera camera_;
+  Image<Eigen::Vector2d> bearings_;
+  const Workers& workers_;
+  std::optional<Frame> before_;
+  OpticalFlowImages optical_flow_;
+};
+
+}  // namespace esim::inline truth

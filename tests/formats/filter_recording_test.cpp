@@ -121,8 +121,7 @@ TEST(FilterRecording, OtherCamerasThanTheChosenOneAreLeftAlone) {
 
 TEST(FilterRecording, PointsOfEventsAreLeftOutAndNamed) {
   auto given = std::make_unique<Given>(5);
-  given->records_.emplace(given->records_.begin() + 1,
-                          EventPointsRecord{0, EventSpan(given->events_[0]).first(100), given->points_});
+  given->records_.emplace_back(EventPointsRecord{0, EventSpan(given->events_[0]).first(100), given->points_});
   std::vector<FilteredCamera> cameras;
   const auto source = filtered(std::move(given), some_filters(), "", cameras);
   while (const Record* record = source->next()) EXPECT_FALSE(std::holds_alternative<EventPointsRecord>(*record));

@@ -15,8 +15,7 @@ struct CircuitPoles {
   double t2_ns = 0;       ///< of the source follower
 };
 
-/// The part of the brightness signal that follows light, after an instant. Light is L = ln(E + dark), natural
-/// logarithm.
+/// The part of the brightness signal that follows light, after an instant. Light is L = ln(E + dark), natural logarithm.
 ///
 /// Photodiode (large signal): Q dy/dt = I - exp(y), or (1 + lag)' = lambda (1 + lag) - lag I / Q with
 /// 1 + lag = exp(L - y) and lambda = dL/dt. In steady light, lag = 0 and y = L.

@@ -9,6 +9,7 @@
 
 #include "esim/core/error.h"
 #include "esim/event_camera/center_surround.h"
+#include "esim/event_camera/circuit/circuit_array.h"
 #include "esim/event_camera/front_end.h"
 #include "esim/event_camera/pixel/pixel_array.h"
 #include "esim/event_camera/pixel/pixel_update.h"
@@ -41,7 +42,11 @@ struct RowPieces {
 /// From irradiance to events: surround, pixels, queue, readout.
 struct EventCamera::State {
   State(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream)
-      : pixels(options, width, height, seed, stream), packing(width, height), size{0, 0, width, height} {
+      : pixels(options, options.circuit ? 0 : width, options.circuit ? 0 : height, seed, stream),
+        packing(width, height),
+        size{0, 0, width, height} {
+    check(options);
+    if (options.circuit) circuit.emplace(options, width, height, seed, stream);
     if (options.surround_px > 0) surround.emplace(options.surround_px, options.surround_ms * 1e-3, width, height);
     if (options.readout.limited()) readout.emplace(options, width, height);
   }
@@ -57,6 +62,7 @@ struct EventCamera::State {
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     PixelArray::transfer(archive, self.pixels);
+    if (self.circuit) CircuitArray::transfer(archive, *self.circuit);
     if (self.surround) CenterSurround::transfer(archive, *self.surround);
     if (self.readout) PixelReadout::transfer(archive, *self.readout);
     archive.value(self.spoiled);
@@ -65,7 +71,9 @@ struct EventCamera::State {
     if (self.frames > 0) archive.image(self.last_frame);
   }
 
-  PixelArray pixels;
+  PixelArray pixels;                     // without pixels if there is a circuit
+  std::optional<CircuitArray> circuit;
+  std::vector<CircuitBuffer> buffers;    // per worker
   EventPacking packing;
   Tile size;
   bool spoiled = false;  // a segment was integrated only partly
@@ -118,6 +126,11 @@ void EventCamera::State::refuse_long_time(TimeNs duration) const {
 /// Integrates rows of the i-th segment.
 bool EventCamera::State::advance(std::size_t i, const Image<float>* given, Rows rows, int worker) {
   const Segment& segment = segments[i];
+  if (circuit) {
+    if (segment.t0 == segment.t1) return circuit->open(segment, rows);
+    return circuit->advance(segment, rows, buffers[static_cast<std::size_t>(worker)],
+                            events[static_cast<std::size_t>(worker)]);
+  }
   PixelUpdate& update = updates[static_cast<std::size_t>(worker)];
   if (segment.t0 == segment.t1) return update.open(pixels, segment, given, rows);
   PastSegment* const past = readout ? &readout->history.added(i) : nullptr;
@@ -157,7 +170,10 @@ bool EventCamera::State::integrate(const Workers& workers) {
   tile_begins.clear();
   int pixels_seen = 0;  // since the last tile_begins
   for (std::size_t i = 0; i < segments.size(); ++i) {
-    if (segments[i].t0 == segments[i].t1) pixels.set_epoch(segments[i].t0);
+    if (segments[i].t0 == segments[i].t1) {
+      pixels.set_epoch(segments[i].t0);
+      if (circuit) circuit->set_epoch(segments[i].t0);
+    }
     if (i == 0 || (segments[i].tile != segments[i - 1].tile && pixels_seen >= kPixelsPerPiece))
       tile_begins.push_back(i), pixels_seen = 0;
     pixels_seen += static_cast<int>(segments[i].tile.area());
@@ -175,7 +191,7 @@ void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
   if (state.spoiled)
     throw UserError("event camera: an earlier irradiance was invalid, and the camera cannot go on; create a new one");
   const auto threads = static_cast<std::size_t>(workers.threads());
-  if (state.updates.size() < threads) state.updates.resize(threads), state.events.resize(threads);
+  if (state.updates.size() < threads) state.updates.resize(threads), state.events.resize(threads), state.buffers.resize(threads);
   TimeNs first = std::numeric_limits<TimeNs>::max(), last = std::numeric_limits<TimeNs>::min();
   for (const Segment& segment : segments) first = std::min(first, segment.t0), last = std::max(last, segment.t1);
   state.packing.origin = first;

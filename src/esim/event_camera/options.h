@@ -33,6 +33,34 @@ struct ReadoutOptions {
   bool limited() const { return rate_mev_per_s > 0 || row_time_us > 0; }
 };
 
+/// The circuit of the pixels before their comparators: photodiode, photoreceptor and source follower, with the shot
+/// noise of the photocurrent (docs/methods/circuit.md). It replaces log_eps, dark_irradiance, the low-pass, shot noise,
+/// threshold noise and latency, all of which follow from it.
+struct CircuitOptions {
+  double white_lux = 500.0;
+  double f_number = 2.0;
+  double transmission = 0.9;
+  double photocurrent_fa_per_lux = 10.0;
+  double dark_current_fa = 1.0;
+  double photodiode_charge_e = 600.0;
+  double source_follower_hz = 200.0;
+  double noise = 1.0;
+
+  double threshold_mismatch_common = 0.0;
+  double noise_mismatch_decades = 0.0;
+  double refractory_mismatch_decades = 0.0;
+  double hot_mismatch_decades = 0.7;
+  double hot_off_fraction = 0.0;
+
+  /// The photocurrent of a pixel that sees a diffuse white surface at irradiance 1, fA. The illuminance of the sensor is
+  /// that of the surface times transmission / (4 f_number^2).
+  double white_photocurrent_fa() const {
+    return photocurrent_fa_per_lux * white_lux * transmission / (4 * f_number * f_number);
+  }
+  /// The dark current in units of the irradiance: L = ln(E + this), plus a constant.
+  double dark_irradiance() const { return dark_current_fa / white_photocurrent_fa(); }
+};
+
 /// Parameters of an event camera. Thresholds are changes of brightness, in natural logarithms. Effects that depend on
 /// the irradiance use the relative intensity i = (E + dark_irradiance) / (1 + dark_irradiance), which is 1 at white.
 struct EventCameraOptions {
@@ -69,6 +97,7 @@ struct EventCameraOptions {
   double latency_jitter_us = 0.0;
   double latency_light_share = 0.0;
   ReadoutOptions readout{};
+  std::optional<CircuitOptions> circuit{};
 
   double threshold_on() const { return contrast_threshold_on.value_or(contrast_threshold); }
   double threshold_off() const { return contrast_threshold_off.value_or(contrast_threshold); }
@@ -76,6 +105,9 @@ struct EventCameraOptions {
   /// The smaller of the two, C of Eq. 2: what tolerances of sampling are multiples of.
   double min_threshold() const { return std::min(threshold_on(), threshold_off()); }
 };
+
+/// Throws UserError if options contradict each other.
+void check(const EventCameraOptions& options);
 
 /// Minimum threshold of any pixel, whatever the noise: keeps the number of events per step finite.
 inline constexpr double kMinContrastThreshold = 0.01;
@@ -106,6 +138,30 @@ void describe(Visitor& visit, ReadoutOptions& o) {
   visit(
       "queue_events", o.queue_events,
       About{"maximum number of waiting events; further events are dropped and counted; 0: one per pixel", "", 0, 1e9});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, CircuitOptions& o) {
+  visit("white_lux", o.white_lux, About{"illuminance of a diffuse white surface at irradiance 1", "lux", 0, 1e9, true});
+  visit("f_number", o.f_number, About{"f-number of the lens", "", 0.1, 100});
+  visit("transmission", o.transmission, About{"fraction of the light that the lens transmits", "", 0, 1, true});
+  visit("photocurrent_fa_per_lux", o.photocurrent_fa_per_lux,
+        About{"photocurrent of a pixel per illuminance of the sensor", "fA/lux", 0, 1e9, true});
+  visit("dark_current_fa", o.dark_current_fa, About{"dark current of a pixel", "fA", 0, 1e9, true});
+  visit("photodiode_charge_e", o.photodiode_charge_e,
+        About{"charge that moves the photoreceptor by a factor of e: sets noise and time constant", "electrons", 1, 1e9});
+  visit("source_follower_hz", o.source_follower_hz,
+        About{"cut-off (-3 dB) of the source follower", "Hz", 0, 1e9, true});
+  visit("noise", o.noise, About{"factor on the standard deviation of the noise; 0: no noise", "", 0, 10});
+  visit("threshold_mismatch_common", o.threshold_mismatch_common,
+        About{"relative standard deviation, from pixel to pixel, that both thresholds share", "", 0, 1});
+  visit("noise_mismatch_decades", o.noise_mismatch_decades,
+        About{"standard deviation of log10 of the noise from pixel to pixel", "", 0, 1});
+  visit("refractory_mismatch_decades", o.refractory_mismatch_decades,
+        About{"standard deviation of log10 of the refractory period from pixel to pixel", "", 0, 1});
+  visit("hot_mismatch_decades", o.hot_mismatch_decades,
+        About{"standard deviation of log10 of the hot pixels' leak", "", 0, 2});
+  visit("hot_off_fraction", o.hot_off_fraction, About{"fraction of hot pixels that leak downwards", "", 0, 1});
 }
 
 template <class Visitor>
@@ -161,6 +217,8 @@ void describe(Visitor& visit, EventCameraOptions& o) {
   visit("latency_light_share", o.latency_light_share,
         About{"fraction of latency and jitter that is proportional to 1 / intensity", "", 0, 1});
   visit("readout", o.readout, About{"readout of the events from the pixels"});
+  visit("circuit", o.circuit,
+        About{"simulates the pixels' circuit, from light in lux, with its noise (default: none, but the effects above)"});
 }
 
 }  // namespace esim::inline event_camera

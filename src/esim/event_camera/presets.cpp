@@ -1,3 +1,6 @@
+#include <fmt/format.h>
+
+#include "esim/core/error.h"
 #include "esim/event_camera/options.h"
 
 namespace esim::inline event_camera {
@@ -61,6 +64,23 @@ EventCameraOptions values_of(SensorPreset preset) {
 }
 
 }  // namespace
+
+void check(const EventCameraOptions& o) {
+  if (!o.circuit) return;
+  const auto refuse = [](const char* name, double value) {
+    if (value == 0) return;
+    throw UserError(fmt::format("event camera: {} = {:.6g}, but with circuit this follows from the circuit; remove it",
+                                name, value));
+  };
+  refuse("threshold_noise", o.threshold_noise);
+  refuse("low_pass_hz", o.low_pass_hz);
+  refuse("surround_px", o.surround_px);
+  refuse("shot_noise_hz", o.shot_noise_hz);
+  refuse("latency_us", o.latency_us);
+  refuse("latency_jitter_us", o.latency_jitter_us);
+  if (o.response != PixelResponse::log) throw UserError("event camera: response: circuit needs log");
+  if (o.refractory_mode != RefractoryMode::hold) throw UserError("event camera: refractory_mode: circuit needs hold");
+}
 
 EventCameraOptions preset_options(SensorPreset preset) {
   EventCameraOptions options = values_of(preset);

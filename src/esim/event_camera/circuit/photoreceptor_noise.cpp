@@ -151,6 +151,21 @@ PhotoreceptorNoise::Interval PhotoreceptorNoise::next(const NoiseState& from, st
   return interval;
 }
 
+NoiseState PhotoreceptorNoise::after(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
+                                     std::int32_t pole) const {
+  // The closed form of added(), which is exact enough except for steps far below the time constants.
+  const double t1 = poles_[static_cast<std::size_t>(pole)].t1, h = std::max(gap, 1e-3 * std::min(t1, t2_));
+  const double e1 = std::exp(-h / t1), e2 = std::exp(-h / t2_), gain = t1 / (t1 - t2_), power = 2 * variance_ / t1;
+  const double yy = variance_ * (1 - e1 * e1), uu = gain * gain * power * t2_ / 2 * (1 - e2 * e2);
+  const double cross = -gain * power * t1 * t2_ / (t1 + t2_) * (1 - e1 * e2);
+  const auto n = random_.normals(pixel, (std::uint64_t{node} << 32) | 1);
+  const NoiseState drawn =
+      root({yy, cross + gain * yy, uu + 2 * gain * cross + gain * gain * yy}) * NoiseState{n[0], n[1]};
+  const NoiseState drifted = drift(t1, t2_, gap) * from;
+  const double part = gap < h ? std::sqrt(gap / h) : 1.0;
+  return {drifted.y + part * drawn.y, drifted.x + part * drawn.x};
+}
+
 NoiseState PhotoreceptorNoise::middle(const Interval& interval, const Piece& piece, const Bridge& bridge) const {
   const auto n = normals(interval, 2 * piece.index);  // index 1 is the draw of the interval's end
   return plus(plus(bridge.from_start * piece.from, bridge.from_end * piece.to), bridge.spread * NoiseState{n[0], n[1]});

@@ -75,6 +75,7 @@ export class Shell {
     const address = readAddress(location.hash);
     const { opened } = this.session;
     this.address = { ...address, place: address.place in this.places ? address.place : "design" };
+    void this.configure.textEditor().catch(complain);
     try {
       const scenario = address.scenario ?? (opened.kind === "scenario" ? opened.path : undefined);
       if (scenario) await this.openScenario(scenario);
@@ -89,7 +90,6 @@ export class Shell {
     this.go(
       address.place in this.places ? (address.place as PlaceName) : opened.kind === "recording" ? "look" : "design",
     );
-    requestIdleCallback(() => void this.configure.textEditor().catch(complain));
   }
 
   private bar(): HTMLElement {

@@ -88,6 +88,8 @@ class Recordings(Cli):
         self.assertNotIn("warning", result.stderr)
 
     def test_old_names_of_options_are_valid_with_a_warning(self):
+        both = self.simulate("--set", "truth={flow: true, motion_field: true}")
+        self.assert_refused(both, "truth.flow: must not be given together with truth.motion_field")
         result = self.simulate(*FAST, "--set", "truth.flow=false", "--set", "truth={displacement: true}")
         self.assertEqual(result.returncode, 0, result.stderr)
         for text in ("truth.flow is now truth.motion_field", "truth.displacement is now truth.optical_flow"):
@@ -96,8 +98,6 @@ class Recordings(Cli):
         text = (self.out / "scenario.yaml").read_text()
         self.assertIn("optical_flow: true", text)
         self.assertNotIn("displacement: ", text)
-        both = self.simulate("--set", "truth={flow: true, motion_field: true}", "--force")
-        self.assert_refused(both, "truth.flow: must not be given together with truth.motion_field")
 
     def test_rendering_slower_than_real_time_names_a_faster_sampling(self):
         short = ["--set", "duration_s=0.03", "--set", "truth.rate_hz=0", "--threads", "1", "--force"]

@@ -77,7 +77,7 @@ TEST(EventsText, ErrorsNameTheLine) {
   EXPECT_TRUE(contains(message(std::string(1'000'000, '1')), "the line is too long"));
   EXPECT_TRUE(contains(message(std::string("\0\0\0", 3)), "expected four numbers"));
   EXPECT_TRUE(contains(message_of<UserError>([] { EventsTextReader("/nonexistent"); }), "No such file"));
-  EXPECT_TRUE(contains(message_of<UserError>([] { EventsTextReader("/tmp"); }), "directory"));
+  EXPECT_TRUE(contains(message_of<UserError>([] { EventsTextReader("/tmp"); }), "folder"));
 }
 
 TEST(EventsText, FullDisk) {

@@ -123,7 +123,7 @@ TEST(Keyframes, AreAsFarApartAsTheImageMoves) {
   EXPECT_NEAR(static_cast<double>(outcome.reconstructions()), 220, 20) << "half a pixel each";
   EXPECT_EQ(outcome.statistics.bisections, 0);
   EXPECT_LT(outcome.rmse, 1e-3);
-  EXPECT_EQ(test::named_result<double>(outcome.statistics, "unseen_share"), 0.0);
+  EXPECT_EQ(test::named_result<double>(outcome.statistics, "unseen_fraction"), 0.0);
 }
 
 TEST(Keyframes, ComeAtTheLeastRateWhereNothingMoves) {

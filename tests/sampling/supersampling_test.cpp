@@ -86,7 +86,7 @@ TEST(Supersampling, FollowsFromTheTolerance) {
   EXPECT_EQ(last, 2);
 }
 
-TEST(Supersampling, FindsNoFloorUnderAnEvenLight) { EXPECT_LT(set_up(1e9, {}).resampling_error.max, 1e-5); }
+TEST(Supersampling, FindsNoErrorUnderEvenLight) { EXPECT_LT(set_up(1e9, {}).resampling_error.max, 1e-5); }
 
 }  // namespace
 }  // namespace esim

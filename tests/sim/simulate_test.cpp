@@ -144,7 +144,7 @@ TEST_F(Simulation, SeesTheSameThroughKeyframes) {
   const SamplingStatistics& sampling = summary.cameras[0].sampling;
   EXPECT_LT(sampling.samples - sampling.audits, dense / 10);
   EXPECT_EQ(sampling.audits, 1);
-  EXPECT_TRUE(test::named_result<MeasuredError>(sampling, "resampling_floor").has_value());
+  EXPECT_TRUE(test::named_result<MeasuredError>(sampling, "resampling_error").has_value());
   EXPECT_GT(flow.events[0].size(), 10000U);
   const double ratio = static_cast<double>(keyframes.events[0].size()) / static_cast<double>(flow.events[0].size());
   EXPECT_NEAR(ratio, 1, 0.03);

@@ -79,10 +79,16 @@ Axes::Axes(Canvas& canvas, const Tile& cell, Scale x, Scale y, AxesOptions optio
 void Axes::lay_out(const Tile& cell) {
   const bool has_title = !options_.title.empty(), has_legend = !options_.legend.empty();
   lay_out_rows(cell, has_title || has_legend ? kEdge + kTitleRow : kEdge + kTextHeight / 2);
+  lay_out_columns(cell);
   const int needed = Canvas::text_width(options_.title, kTitleHeight) + 2 * kTextHeight + legend_width(options_.legend);
-  if (has_title && has_legend && needed > cell.x + cell.width - area_.x - kMinRight)
+  if (has_title && has_legend && needed > area_.width) {
     lay_out_rows(cell, kEdge + kTitleRow + kLegendLine);
+    lay_out_columns(cell);
+  }
+}
 
+/// The right end of the diagram, and the labels below it.
+void Axes::lay_out_columns(const Tile& cell) {
   const int left = area_.x - cell.x;
   int right = kMinRight;
   for (int attempt = 0; attempt < 2; ++attempt) {

@@ -56,6 +56,7 @@ class Axes {
 
   void lay_out(const Tile& cell);
   void lay_out_rows(const Tile& cell, int top);
+  void lay_out_columns(const Tile& cell);
   void draw_titles(const Tile& cell);
   void draw_grid();
   void draw_line_labels();

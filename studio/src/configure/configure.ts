@@ -87,10 +87,15 @@ export class ConfigurePlace implements Place {
     if (visible) this.update();
   }
 
-  /** The editor of the text. Its code is large, so that the page loads it after the rest. */
-  textEditor(): Promise<YamlEditor> {
-    this.editor ??= import("./yaml_editor.ts").then(({ YamlEditor }) => new YamlEditor(this.text, this.document));
-    return this.editor;
+  /** The editor of the text. Its code is large, so that the page does not wait for it. */
+  async textEditor(): Promise<YamlEditor> {
+    try {
+      this.editor ??= import("./yaml_editor.ts").then(({ YamlEditor }) => new YamlEditor(this.text, this.document));
+      return await this.editor;
+    } catch (error) {
+      this.editor = null; // the next call tries again
+      throw error;
+    }
   }
 
   private async load(): Promise<void> {

@@ -27,6 +27,20 @@ const colours = HighlightStyle.define([
 /** Ctrl+Enter runs the scenario, and undo is that of the page; Tab leaves the editor and does not indent. */
 const keys = [...searchKeymap, ...lintKeymap, ...defaultKeymap].filter(({ key }) => key !== "Mod-Enter");
 
+/**
+ * Typing over a selection. The browser would keep the colours of the replaced text in style attributes, which the page's
+ * policy for security forbids.
+ */
+const typingOver = EditorView.domEventHandlers({
+  beforeinput(event, view) {
+    if (event.inputType !== "insertText" || event.data === null || view.composing) return false;
+    if (view.state.selection.main.empty) return false;
+    view.dispatch(view.state.replaceSelection(event.data), { userEvent: "input.type", scrollIntoView: true });
+    event.preventDefault();
+    return true;
+  },
+});
+
 const extensions: Extension = [
   lineNumbers(),
   lintGutter(),
@@ -40,6 +54,7 @@ const extensions: Extension = [
   search({ top: true }),
   highlightSelectionMatches(),
   keymap.of(keys),
+  typingOver,
   editorTheme,
   EditorView.contentAttributes.of({ "aria-label": "The scenario as YAML", "aria-multiline": "true" }),
 ];

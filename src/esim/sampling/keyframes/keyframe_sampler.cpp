@@ -104,9 +104,9 @@ class KeyframeSampler final : public Sampler {
     if (statistics_.audits > 0) result.measured_error = measured_error(errors_);
     const double pixels = static_cast<double>(sensor().area()) * static_cast<double>(reconstructions_);
     result.others = {{"supersampling", std::int64_t{layout().supersampling}},
-                     {"resampling_floor", setup_.resampling_error},
+                     {"resampling_error", setup_.resampling_error},
                      {"reconstructions", reconstructions_},
-                     {"unseen_share", pixels > 0 ? static_cast<double>(unseen_) / pixels : 0.0}};
+                     {"unseen_fraction", pixels > 0 ? static_cast<double>(unseen_) / pixels : 0.0}};
     return result;
   }
 

@@ -119,13 +119,18 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
   const auto set = [d](double value) { return hn::Set(d, value); };
   const V one = set(1), length = set(row.length), dark = set(dark_);
   const std::size_t i = row.first + x;
-  const V e0 = hn::Add(hn::PromoteTo(d, hn::LoadU(df, row.light0 + x)), dark);
-  const V e1 = hn::Add(hn::PromoteTo(d, hn::LoadU(df, row.light1 + x)), dark);
+  const auto irradiance = [&](const float* values) {
+    if (x + hn::Lanes(d) <= row.count) return hn::Add(hn::PromoteTo(d, hn::LoadU(df, values + x)), dark);
+    std::array<float, kVectorPadding> last{};  // nothing may lie behind the last pixel of an image
+    std::copy(values + x, values + row.count, last.begin());
+    return hn::Add(hn::PromoteTo(d, hn::LoadU(df, last.data())), dark);
+  };
+  const V e0 = irradiance(row.light0), e1 = irradiance(row.light1);
   const V light0 = hn::LoadU(d, &light_[i]), lag0 = hn::LoadU(d, &lag_[i]), y0 = hn::LoadU(d, &y_[i]),
           v0 = hn::LoadU(d, &v_[i]);
 
   V light1 = light0, lag1 = lag0, y1 = y0, v1 = v0, lowest = v0, highest = v0;
-  auto several = hn::MaskFalse(d);
+  auto several = hn::FirstN(d, 0);
   const auto still = hn::And(hn::And(hn::Eq(e0, e1), hn::Eq(lag0, hn::Zero(d))), hn::Eq(v0, y0));
   if (!hn::AllTrue(d, still)) {
     light1 = hn::Log(d, e1);
@@ -286,7 +291,7 @@ bool CircuitArray::advance(const Segment& segment, Rows rows, CircuitBuffer& buf
     const float* const light1 = segment.irradiance1.row(y) + segment.tile.x;
     std::size_t x = 0;
     for (; x + hn::Lanes(df) <= width; x += hn::Lanes(df)) check.see(df, hn::LoadU(df, light1 + x));
-    if (x < width) check.see(df, hn::LoadN(df, light1 + x, width - x));
+    for (; x < width; ++x) check.see(df, hn::Set(df, light1[x]));
   }
   if (!check.passed()) return false;
   for (int y = rows.first; y < rows.last; ++y) {

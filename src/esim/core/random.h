@@ -26,6 +26,7 @@ enum class Purpose : std::uint16_t {
   imu_bias = 21,
   circuit_noise = 24,
   circuit_mismatch = 25,
+  circuit_start = 26,
   test = 1000,
 };
 

@@ -11,9 +11,9 @@ namespace esim::inline event_camera {
 namespace {
 
 constexpr double kElectron_fC = 1.602176634e-4;  // elementary charge, fA s
-constexpr double kMaxSimpleLag = 0.02, kMaxSimpleDecay = 0.25;  // as steps_for()
-constexpr double kSettled = 1e-13;  // brightness: differences below this are zero
-constexpr double kGuard = 1e-9;     // between bounds and levels, above all rounding errors
+constexpr double kMaxDecay = 0.25;               // in one step far from equilibrium: as steps_for()
+constexpr double kSettled = 1e-13;               // brightness: differences below this are zero
+constexpr double kGuard = 1e-9;                  // between bounds and levels, above all rounding errors
 
 }  // namespace
 
@@ -30,11 +30,12 @@ struct CircuitArray::Row {
 
 CircuitArray::CircuitArray(const EventCameraOptions& options, int width, int height, std::uint64_t seed,
                            std::uint16_t stream)
-    : width_(width), height_(height) {
+    : width_(width), height_(height), starts_(seed, Purpose::circuit_start, stream) {
   const CircuitOptions& o = *options.circuit;
   const double white_fa = o.white_photocurrent_fa();
   dark_ = o.dark_current_fa / white_fa;
   circuit_.poles.t1_unit_ns = 1e9 * o.photodiode_charge_e * kElectron_fC / white_fa;
+  circuit_.waits = options.readout.acknowledges();
   circuit_.poles.t2_ns = 1e9 / (2 * std::numbers::pi * o.source_follower_hz);
   if (o.noise > 0) {
     constexpr double kBrightest = 1e5;  // irradiance; brighter light has the same time constant for the noise
@@ -74,8 +75,8 @@ void CircuitArray::make_pixels(const EventCameraOptions& options, std::uint64_t 
     p.refractory = static_cast<float>(refractory_ns * std::pow(10.0, o.refractory_mismatch_decades * refractory));
     double rate = options.leak_rate_hz * options.threshold_on() * std::pow(10.0, options.leak_mismatch_decades * leak);
     if (hot < options.hot_pixels) {
-      rate += options.hot_pixel_rate_hz * options.threshold_on() * std::pow(10.0, o.hot_mismatch_decades * hot_decades) *
-              (sign < o.hot_off_fraction ? -1 : 1);
+      rate += options.hot_pixel_rate_hz * options.threshold_on() *
+              std::pow(10.0, o.hot_mismatch_decades * hot_decades) * (sign < o.hot_off_fraction ? -1 : 1);
     }
     leak_[i] = static_cast<float>(rate);
     until_[i] = -1;
@@ -92,8 +93,8 @@ bool CircuitArray::open(const Segment& segment, Rows rows) {
   }
   for (int y = rows.first; y < rows.last; ++y) {
     const float* const irradiance = segment.irradiance1.row(y) + segment.tile.x;
-    const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-                              static_cast<std::size_t>(segment.tile.x);
+    const std::size_t first =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(segment.tile.x);
     std::vector<double> lights(width + kVectorPadding, 1.0);
     for (std::size_t x = 0; x < width; ++x) lights[x] = static_cast<double>(irradiance[x]) + dark_;
     logarithms(width, lights.data());
@@ -103,7 +104,7 @@ bool CircuitArray::open(const Segment& segment, Rows rows) {
       lag_[i] = 0;
       const auto pixel = static_cast<std::uint32_t>(i);
       CircuitPixel(circuit_, pixel, parameters_[i], leak_[i], states_[i])
-          .open(lights[x], static_cast<double>(segment.t1 - epoch_));
+          .open(lights[x], static_cast<double>(segment.t1 - epoch_), starts_.uniforms(pixel, 0)[0]);
       until_[i] = -1;  // looks at once
     }
   }
@@ -130,6 +131,7 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
           v0 = hn::LoadU(d, &v_[i]);
 
   V light1 = light0, lag1 = lag0, y1 = y0, v1 = v0, lowest = v0, highest = v0;
+  V level = v0, slope = hn::Zero(d), fast = slope, slow = slope, k1 = one;
   auto several = hn::FirstN(d, 0);
   const auto still = hn::And(hn::And(hn::Eq(e0, e1), hn::Eq(lag0, hn::Zero(d))), hn::Eq(v0, y0));
   if (!hn::AllTrue(d, still)) {
@@ -139,8 +141,10 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
     const auto changes = hn::Ne(growth, hn::Zero(d));
     const V mean_over_first = hn::IfThenElse(changes, hn::Div(rho, hn::IfThenElse(changes, growth, one)), one);
     const V area = hn::Mul(hn::Mul(rate0, length), mean_over_first);
-    several = hn::Or(hn::Gt(hn::Abs(growth), set(kMaxLightStep)),
-                     hn::And(hn::Gt(hn::Abs(lag0), set(kMaxSimpleLag)), hn::Gt(area, set(kMaxSimpleDecay))));
+    several =
+        hn::Or(hn::Gt(hn::Abs(growth), set(kMaxLightStep)),
+               hn::And(hn::Gt(hn::Abs(hn::Sub(lag0, hn::Div(growth, hn::Mul(rate0, length)))), set(kMaxTransient)),
+                       hn::Gt(area, set(kMaxDecay))));
 
     // exponential_moments()
     const V safe = hn::Max(area, set(1e-9)), inverse = hn::Div(one, safe);
@@ -149,8 +153,7 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
     const V up3 = hn::Mul(hn::NegMulAdd(set(3), up2, one), inverse);
     const V low_area = hn::Min(area, set(2));
     V down3 = one;
-    for (int j = 18; j >= 1; --j)
-      down3 = hn::NegMulAdd(hn::Mul(low_area, set(1.0 / (4 + j))), down3, one);
+    for (int j = 18; j >= 1; --j) down3 = hn::NegMulAdd(hn::Mul(low_area, set(1.0 / (4 + j))), down3, one);
     down3 = hn::Mul(down3, set(0.25));
     const V down2 = hn::Mul(hn::NegMulAdd(low_area, down3, one), set(1.0 / 3));
     const V down1 = hn::Mul(hn::NegMulAdd(low_area, down2, one), set(0.5)), down0 = hn::NegMulAdd(low_area, down1, one);
@@ -178,30 +181,28 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
     const V slope0 = hn::Div(hn::Mul(rate0, lag0), hn::Add(one, lag0));
     const V a_plain = hn::Max(area, set(1e-3));
     const V per_length = set(1 / row.length);
-    V k = hn::Mul(a_plain, per_length);
+    k1 = hn::Mul(a_plain, per_length);
     const V t2 = set(circuit_.poles.t2_ns);
-    const auto resonates = hn::Lt(hn::Abs(hn::MulSub(k, t2, one)), set(0.005));
-    k = hn::IfThenElse(resonates, set(1.005 / circuit_.poles.t2_ns), k);
-    const V a = hn::Mul(k, length);
+    const auto resonates = hn::Lt(hn::Abs(hn::MulSub(k1, t2, one)), set(0.005));
+    k1 = hn::IfThenElse(resonates, set(1.005 / circuit_.poles.t2_ns), k1);
+    const V a = hn::Mul(k1, length);
     const auto exact = hn::And(hn::Eq(a_plain, area), hn::Not(resonates));
     const V e_k = hn::IfThenElse(exact, decay, hn::Exp(d, hn::Neg(a)));
     const V mean_decay = hn::Div(hn::Sub(one, e_k), a);
-    const V slope = hn::Div(hn::NegMulAdd(slope0, mean_decay, hn::Mul(hn::Sub(y1, y0), per_length)),
-                            hn::Sub(one, mean_decay));
-    const V gap = hn::Div(hn::Sub(slope, slope0), k);
-    const V level = hn::Sub(hn::Sub(y0, gap), hn::Mul(slope, t2));
-    const V fast = hn::Div(gap, hn::NegMulAdd(k, t2, one));
-    const V slow = hn::Sub(hn::Sub(v0, level), fast);
+    slope = hn::Div(hn::NegMulAdd(slope0, mean_decay, hn::Mul(hn::Sub(y1, y0), per_length)), hn::Sub(one, mean_decay));
+    const V gap = hn::Div(hn::Sub(slope, slope0), k1);
+    level = hn::Sub(hn::Sub(y0, gap), hn::Mul(slope, t2));
+    fast = hn::Div(gap, hn::NegMulAdd(k1, t2, one));
+    slow = hn::Sub(hn::Sub(v0, level), fast);
     const double e_2 = std::exp(-row.length / circuit_.poles.t2_ns), k_2 = 1 / circuit_.poles.t2_ns;
     v1 = hn::MulAdd(slow, set(e_2), hn::MulAdd(fast, e_k, hn::MulAdd(slope, length, level)));
-    const auto settles = hn::And(hn::And(hn::Eq(lag1, hn::Zero(d)), hn::Eq(e0, e1)),
-                                 hn::Lt(hn::Abs(hn::Sub(v1, y1)), set(kSettled)));
+    const auto settles =
+        hn::And(hn::And(hn::Eq(lag1, hn::Zero(d)), hn::Eq(e0, e1)), hn::Lt(hn::Abs(hn::Sub(v1, y1)), set(kSettled)));
     v1 = hn::IfThenElse(settles, y1, v1);
 
     const V size_fast = hn::Abs(fast), size_slow = hn::Abs(slow);
-    const V curvature = hn::MulAdd(hn::Mul(size_fast, k), k, hn::Mul(size_slow, set(k_2 * k_2)));
-    const V beyond =
-        hn::Min(hn::Mul(curvature, set(0.125 * row.length * row.length)), hn::Add(size_fast, size_slow));
+    const V curvature = hn::MulAdd(hn::Mul(size_fast, k1), k1, hn::Mul(size_slow, set(k_2 * k_2)));
+    const V beyond = hn::Min(hn::Mul(curvature, set(0.125 * row.length * row.length)), hn::Add(size_fast, size_slow));
     lowest = hn::Sub(hn::Min(v0, v1), beyond);
     highest = hn::Add(hn::Max(v0, v1), beyond);
   }
@@ -215,16 +216,22 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
   const V node_light = hn::PromoteTo(d, hn::LoadU(df, &node_light_[i]));
   const V guard = set(kGuard);
   auto uncertain = hn::Or(several, hn::Le(hn::LoadU(d, &until_[i]), set(row.start + row.length)));
-  uncertain = hn::Or(uncertain, hn::Le(hn::Sub(hn::Add(lowest, hn::Min(leaked0, leaked1)), guard),
-                                       hn::LoadU(d, &low_[i])));
-  uncertain = hn::Or(uncertain, hn::Ge(hn::Add(hn::Add(highest, hn::Max(leaked0, leaked1)), guard),
-                                       hn::LoadU(d, &high_[i])));
+  uncertain =
+      hn::Or(uncertain, hn::Le(hn::Sub(hn::Add(lowest, hn::Min(leaked0, leaked1)), guard), hn::LoadU(d, &low_[i])));
+  uncertain =
+      hn::Or(uncertain, hn::Ge(hn::Add(hn::Add(highest, hn::Max(leaked0, leaked1)), guard), hn::LoadU(d, &high_[i])));
   uncertain = hn::Or(uncertain, hn::Ge(hn::Abs(hn::Sub(light1, node_light)), set(kLightReach)));
   const std::size_t lanes = std::min(hn::Lanes(d), row.count - x);
   const hn::RebindToUnsigned<D> du;
   alignas(64) std::array<std::uint64_t, 16> flags;
   hn::StoreU(hn::BitCast(du, hn::VecFromMask(d, uncertain)), du, flags.data());
   if (hn::AllFalse(d, uncertain)) return false;
+  hn::StoreU(level, d, &buffer.level[at]);
+  hn::StoreU(slope, d, &buffer.rate[at]);
+  hn::StoreU(fast, d, &buffer.fast[at]);
+  hn::StoreU(slow, d, &buffer.slow[at]);
+  hn::StoreU(k1, d, &buffer.k1[at]);
+  hn::StoreU(hn::IfThenElseZero(several, one), d, &buffer.several[at]);
   for (std::size_t k = 0; k < lanes; ++k) {
     if (flags[k] != 0) buffer.uncertain.push_back(static_cast<std::uint32_t>(x + k));
   }
@@ -240,13 +247,9 @@ void CircuitArray::set_bounds(std::size_t pixel, const CircuitBounds& bounds) {
 }
 
 /// Takes a pixel to the segment's end in as many steps as needed.
-void CircuitArray::advance_one(const Row& row, std::uint32_t column, CircuitBuffer& buffer, PackedEvents& events) {
+void CircuitArray::advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer,
+                               PackedEvents& events) {
   const std::size_t i = row.first + column;
-  CircuitState front{lag_[i], v_[i]};
-  const double light1 = std::log(static_cast<double>(row.light1[column]) + dark_);
-  const LightRamp ramp{light_[i], (light1 - light_[i]) / row.length};
-  const int steps = steps_for(circuit_.poles, front, ramp, row.length);
-  CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], leak_[i], states_[i]);
   const std::uint32_t place = static_cast<std::uint32_t>(row.packing.place(row.x + static_cast<int>(column), row.y));
   const auto emit = [&](double t, int polarity) {
     if (buffer.events == kBlock) flush(row, buffer, events);
@@ -256,24 +259,71 @@ void CircuitArray::advance_one(const Row& row, std::uint32_t column, CircuitBuff
     buffer.reported[n] = 1;
     buffer.place[n] = place;
   };
+  const double light1 = buffer.light[at];
+  const LightRamp ramp{light_[i], (light1 - light_[i]) / row.length};
+  if (buffer.several[at] == 0) {
+    const CircuitPiece piece{buffer.level[at], buffer.rate[at],          buffer.fast[at], buffer.slow[at],
+                             buffer.k1[at],    1 / circuit_.poles.t2_ns, row.length};
+    CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], leak_[i], states_[i]);
+    pixel.set(piece, ramp, row.start);
+    set_bounds(i, pixel.run(emit));
+    light_[i] = light1, lag_[i] = buffer.lag[at], y_[i] = buffer.y[at], v_[i] = buffer.v[at];
+    return;
+  }
+  CircuitState front{lag_[i], v_[i]};
+  run(i, front, ramp, row.start, row.length, false, emit);
+  light_[i] = light1;
+  lag_[i] = std::abs(front.lag) < kSettled ? 0.0 : front.lag;
+  y_[i] = light1 - std::log1p(lag_[i]);
+  v_[i] = lag_[i] == 0 && ramp.rate == 0 && std::abs(front.v - y_[i]) < kSettled ? y_[i] : front.v;
+}
+
+/// Takes a pixel along a ramp of light, in as many steps as needed; skips those within its bounds unless `always`.
+template <typename Emit>
+void CircuitArray::run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length,
+                       bool always, const Emit& emit) {
+  CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], leak_[i], states_[i]);
+  const int steps = steps_for(circuit_.poles, front, ramp, length);
   for (int k = 0; k < steps; ++k) {
-    const double h = row.length / steps, from = row.start + h * k;
+    const double h = length / steps, from = start + h * k;
     const LightRamp part{ramp.light + ramp.rate * h * k, ramp.rate};
     const CircuitPiece piece = esim::advance(circuit_.poles, front, part, h);
     const auto [lowest, highest] = piece.range(0, h);
     const double leaked0 = 1e-9 * static_cast<double>(leak_[i]) * from,
                  leaked1 = 1e-9 * static_cast<double>(leak_[i]) * (from + h);
     const double change = part.light + part.rate * h - static_cast<double>(node_light_[i]);
-    if (lowest + std::min(leaked0, leaked1) - kGuard > low_[i] && highest + std::max(leaked0, leaked1) + kGuard < high_[i] &&
-        from + h < until_[i] && std::abs(change) < kLightReach)
-      continue;
+    const bool quiet = lowest + std::min(leaked0, leaked1) - kGuard > low_[i] &&
+                       highest + std::max(leaked0, leaked1) + kGuard < high_[i] && from + h < until_[i] &&
+                       std::abs(change) < kLightReach;
+    if (quiet && !always) continue;
     pixel.set(piece, part, from);
     set_bounds(i, pixel.run(emit));
   }
-  light_[i] = light1;
-  lag_[i] = std::abs(front.lag) < kSettled ? 0.0 : front.lag;
-  y_[i] = light1 - std::log1p(lag_[i]);
-  v_[i] = lag_[i] == 0 && ramp.rate == 0 && std::abs(front.v - y_[i]) < kSettled ? y_[i] : front.v;
+}
+
+TimeNs CircuitArray::acknowledge(std::uint32_t pixel, TimeNs t) {
+  CircuitPixelState& state = states_[pixel];
+  state.held_until = static_cast<double>(t - epoch_) + static_cast<double>(parameters_[pixel].refractory);
+  until_[pixel] = state.held_until;
+  return epoch_ + static_cast<TimeNs>(std::ceil(state.held_until));
+}
+
+void CircuitArray::resume(std::uint32_t pixel, const PastSegment& past, CircuitBuffer& buffer,
+                          std::vector<Event>& requests) {
+  const Segment& segment = past.segment;
+  const int x = static_cast<int>(pixel) % width_, y = static_cast<int>(pixel) / width_;
+  const double length = static_cast<double>(segment.t1 - segment.t0), start = static_cast<double>(segment.t0 - epoch_);
+  const double light0 = std::log(static_cast<double>(segment.irradiance0.row(y)[x]) + dark_),
+               light1 = std::log(static_cast<double>(segment.irradiance1.row(y)[x]) + dark_);
+  const int column = x - segment.tile.x, row = y - segment.tile.y;
+  CircuitState front{static_cast<double>(past.filtered1(column, row)),
+                     light0 + static_cast<double>(past.filtered2(column, row))};
+  static_cast<void>(buffer);
+  const auto emit = [&](double t, int polarity) {
+    requests.push_back({epoch_ + static_cast<TimeNs>(std::ceil(t)), static_cast<std::uint16_t>(x),
+                        static_cast<std::uint16_t>(y), static_cast<std::int8_t>(polarity)});
+  };
+  run(pixel, front, {light0, (light1 - light0) / length}, start, length, false, emit);
 }
 
 void CircuitArray::flush(const Row& row, CircuitBuffer& buffer, PackedEvents& events) {
@@ -282,7 +332,8 @@ void CircuitArray::flush(const Row& row, CircuitBuffer& buffer, PackedEvents& ev
   buffer.events = 0;
 }
 
-bool CircuitArray::advance(const Segment& segment, Rows rows, CircuitBuffer& buffer, PackedEvents& events) {
+bool CircuitArray::advance(const Segment& segment, Rows rows, CircuitBuffer& buffer, PastSegment* past,
+                           PackedEvents& events) {
   const hn::ScalableTag<double> d;
   const hn::ScalableTag<float> df;
   const auto width = static_cast<std::size_t>(segment.tile.width);
@@ -295,11 +346,26 @@ bool CircuitArray::advance(const Segment& segment, Rows rows, CircuitBuffer& buf
   }
   if (!check.passed()) return false;
   for (int y = rows.first; y < rows.last; ++y) {
-    const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-                              static_cast<std::size_t>(segment.tile.x);
-    const Row row{segment.irradiance0.row(y) + segment.tile.x, segment.irradiance1.row(y) + segment.tile.x, first, y,
-                  segment.tile.x, width, segment.t0, static_cast<double>(segment.t0 - epoch_),
-                  static_cast<double>(segment.t1 - segment.t0), events.packing()};
+    const std::size_t first =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(segment.tile.x);
+    const Row row{segment.irradiance0.row(y) + segment.tile.x,
+                  segment.irradiance1.row(y) + segment.tile.x,
+                  first,
+                  y,
+                  segment.tile.x,
+                  width,
+                  segment.t0,
+                  static_cast<double>(segment.t0 - epoch_),
+                  static_cast<double>(segment.t1 - segment.t0),
+                  events.packing()};
+    if (past != nullptr) {
+      float* const lags = past->filtered1.row(y - segment.tile.y);
+      float* const signals = past->filtered2.row(y - segment.tile.y);
+      for (std::size_t x = 0; x < width; ++x) {
+        lags[x] = static_cast<float>(lag_[first + x]);
+        signals[x] = static_cast<float>(v_[first + x] - light_[first + x]);
+      }
+    }
     for (std::size_t begin = 0; begin < width; begin += CircuitBuffer::kTogether) {
       const std::size_t count = std::min(CircuitBuffer::kTogether, width - begin);
       buffer.uncertain.clear();
@@ -314,7 +380,7 @@ bool CircuitArray::advance(const Segment& segment, Rows rows, CircuitBuffer& buf
         const std::size_t i = first + begin + x;
         light_[i] = buffer.light[x], lag_[i] = buffer.lag[x], y_[i] = buffer.y[x], v_[i] = buffer.v[x];
       }
-      for (const std::uint32_t column : buffer.uncertain) advance_one(row, column, buffer, events);
+      for (const std::uint32_t column : buffer.uncertain) advance_one(row, column, column - begin, buffer, events);
     }
     flush(row, buffer, events);
   }

@@ -7,9 +7,11 @@
 
 #include "esim/core/large_vector.h"
 #include "esim/core/per_pixel.h"
+#include "esim/core/random.h"
 #include "esim/core/time.h"
 #include "esim/event_camera/circuit/circuit_pixel.h"
 #include "esim/event_camera/options.h"
+#include "esim/event_camera/segment_history.h"
 #include "esim/events/packed_events.h"
 #include "esim/render/sample.h"
 
@@ -22,9 +24,10 @@ struct CircuitBuffer {
   template <typename T>
   using Values = std::array<T, kTogether + kVectorPadding>;
 
-  Values<double> light, lag, y, v;        // at the segment's end
-  std::vector<std::uint32_t> uncertain;   // columns whose pixels may fire, or need more than one step
-  PerPixel<double> time, polarity, reported;  // of events
+  Values<double> light, lag, y, v;                      // at the segment's end
+  Values<double> level, rate, fast, slow, k1, several;  // of CircuitPiece; several: not 0 if one step is not enough
+  std::vector<std::uint32_t> uncertain;                 // columns whose pixels may fire, or need more than one step
+  PerPixel<double> time, polarity, reported;            // of events
   PerPixel<std::uint32_t> place;
   std::size_t events = 0;
 };
@@ -40,7 +43,13 @@ class CircuitArray {
   bool open(const Segment& segment, Rows rows);
 
   /// For any other segment: adds the events of rows of its pixels to `events`. Returns false likewise.
-  bool advance(const Segment& segment, Rows rows, CircuitBuffer& buffer, PackedEvents& events);
+  bool advance(const Segment& segment, Rows rows, CircuitBuffer& buffer, PastSegment* past, PackedEvents& events);
+
+  /// Ends the wait of a pixel whose request has been read at `t`. Returns the end of its refractory period.
+  TimeNs acknowledge(std::uint32_t pixel, TimeNs t);
+
+  /// Takes a pixel that is held in reset through a past segment; appends its next request, if there is one.
+  void resume(std::uint32_t pixel, const PastSegment& past, CircuitBuffer& buffer, std::vector<Event>& requests);
 
   void set_epoch(TimeNs t) {
     if (epoch_ == kNoEpoch) epoch_ = t;
@@ -63,20 +72,24 @@ class CircuitArray {
   void make_pixels(const EventCameraOptions& options, std::uint64_t seed, std::uint16_t stream);
   template <class D>
   bool move_vector(D d, const Row& row, std::size_t x, CircuitBuffer& buffer, std::size_t at);
-  void advance_one(const Row& row, std::uint32_t column, CircuitBuffer& buffer, PackedEvents& events);
+  template <typename Emit>
+  void run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length, bool always,
+           const Emit& emit);
+  void advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer, PackedEvents& events);
   void set_bounds(std::size_t pixel, const CircuitBounds& bounds);
   static void flush(const Row& row, CircuitBuffer& buffer, PackedEvents& events);
 
   Circuit circuit_;
   int width_, height_;
+  AddressedRandom starts_;
   double dark_ = 0;  // L = ln(E + dark)
   TimeNs epoch_ = kNoEpoch;
 
   // Per pixel.
   LargeVector<CircuitParameters> parameters_;
   LargeVector<CircuitPixelState> states_;
-  LargeVector<double> light_, lag_, y_, v_;    // at the last sample
-  LargeVector<double> low_, high_, until_;     // CircuitBounds, with absolute levels
+  LargeVector<double> light_, lag_, y_, v_;  // at the last sample
+  LargeVector<double> low_, high_, until_;   // CircuitBounds, with absolute levels
   LargeVector<float> node_light_, leak_;
 };
 

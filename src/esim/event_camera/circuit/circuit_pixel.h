@@ -21,9 +21,7 @@ struct Circuit {
 
   double t1_ns(double light) const { return poles.t1_unit_ns * std::exp(-light); }
   /// Standard deviation of the noise in steady light.
-  double deviation(double light) const {
-    return noise->deviation_at(t1_ns(light));
-  }
+  double deviation(double light) const { return noise->deviation_at(t1_ns(light)); }
 };
 
 /// The fixed parameters of a pixel.
@@ -52,9 +50,10 @@ struct CircuitBounds {
   double low = 0, high = 0, until = 0;
 };
 
-inline constexpr double kLightReach = 0.2;     ///< change of L within which the noise keeps its time constant
-inline constexpr double kWakeDeviations = 6.5;   ///< distance to a threshold, in deviations, at which noise begins to matter
-inline constexpr double kSleepDeviations = 7.0;  ///< distance at a node at which it ceases to matter
+inline constexpr double kLightReach = 0.2;  ///< change of L within which the noise keeps its time constant
+inline constexpr double kWakeDeviations =
+    5.5;  ///< distance to a threshold, in deviations, at which noise begins to matter
+inline constexpr double kSleepDeviations = 6.0;  ///< distance at a node at which it ceases to matter
 
 /// Takes a pixel through a piece of its signal: its events, its refractory periods, its noise. The comparator's signal
 /// is S(s) = piece.value(s) + leak (start + s), to which the noise is added.
@@ -71,8 +70,9 @@ class CircuitPixel {
         leak_(1e-9 * static_cast<double>(leak)),
         gain_(static_cast<double>(parameters.noise)) {}
 
-  /// Sets the reference and the noise at the start, for a signal at rest.
-  void open(double light, double time);
+  /// Sets the noise and the reference at the start, as if the camera had been running before. `place`, from 0 to 1, is
+  /// where the signal then is between the two thresholds.
+  void open(double light, double time, double place);
 
   /// The stretch that the next functions are about: its signal, its light, and its start in ns after the epoch.
   void set(const CircuitPiece& piece, const LightRamp& light, double start) {
@@ -103,6 +103,11 @@ class CircuitPixel {
   }
 
   std::optional<double> find_near(double a, double b) const;
+  /// Whether the slope of the signal has one sign on [a, b], by its ends and its greatest curvature.
+  bool is_monotone(double a, double b) const {
+    const double sa = piece_.slope(a) + leak_, sb = piece_.slope(b) + leak_;
+    return sa * sb > 0 && std::min(std::abs(sa), std::abs(sb)) > 0.25 * std::abs(sa - sb);
+  }
   void activate(double s);
   void start_interval(const NoiseState& from, double s);
   NoiseState noise_at(double s);
@@ -121,7 +126,12 @@ class CircuitPixel {
   };
 
   PhotoreceptorNoise::Interval interval() const {
-    return {state_.from, state_.to, pixel_, state_.node, state_.pole, state_.level,
+    return {state_.from,
+            state_.to,
+            pixel_,
+            state_.node,
+            state_.pole,
+            state_.level,
             noise_->length(state_.pole, state_.level)};
   }
   void set_interval(const PhotoreceptorNoise::Interval& interval) {
@@ -182,9 +192,8 @@ CircuitBounds CircuitPixel::run(const Emit& emit) {
     }
     const double offset = state_.node_time - start_;
     PhotoreceptorNoise::Quiet quiet;
-    const auto crossing =
-        noise_->first_crossing(noise, Scaled{*this, offset, 1 / gain_}, lower() / gain_, upper() / gain_,
-                               s - offset, end - offset, quiet);
+    const auto crossing = noise_->first_crossing(noise, Scaled{*this, offset, 1 / gain_}, lower() / gain_,
+                                                 upper() / gain_, s - offset, end - offset, quiet);
     if (crossing) {
       s = std::max(s, crossing->tau + offset);
       fire(s, crossing->polarity);

@@ -144,7 +144,11 @@ class PhotoreceptorNoise {
   std::optional<Crossing> search(const Pole& pole, const Interval& interval, const Piece& piece, const Signal& signal,
                                  double lower, double upper, double from, double to, Quiet& quiet) const;
 
+  /// Longer pieces are leaves too while the signal moves so fast that what a cubic neglects hardly moves the crossing.
+  static constexpr double kCoarse = 0.3;  // neglected deviation, in changes of the signal over the piece
+
   double variance_, t2_, log_step_, log_first_;
+  double coarse_ = 0;  // greatest length of such a piece, ns
   AddressedRandom random_;
   std::vector<Pole> poles_;
 };
@@ -185,7 +189,8 @@ std::optional<PhotoreceptorNoise::Crossing> PhotoreceptorNoise::search(const Pol
   const Bridge& bridge = pole.bridges[piece.bridge];
   const double a = std::max(from, piece.start), b = std::min(to, piece.start + bridge.h);
   if (a >= b) return std::nullopt;
-  if (bridge.leaf) {
+  const double slope_here = std::abs(signal.slope(a));
+  if (bridge.leaf || (bridge.h <= coarse_ && bridge.deviation < kCoarse * slope_here * bridge.h)) {
     const NoiseCubic noise{piece.from.x, slope(piece.from), piece.to.x, slope(piece.to), bridge.h};
     const double u = a - piece.start, v = b - piece.start;
     const NoiseCubic sum{noise.value(u) + signal.value(a), noise.slope(u) + signal.slope(a),
@@ -193,8 +198,8 @@ std::optional<PhotoreceptorNoise::Crossing> PhotoreceptorNoise::search(const Pol
     const auto exit = sum.first_exit(lower, upper);
     if (!exit) {
       // A cubic lies between the control points of its Bezier curve.
-      const auto [low, high] = std::minmax({noise.v0, noise.v1, noise.v0 + noise.s0 * noise.h / 3,
-                                            noise.v1 - noise.s1 * noise.h / 3});
+      const auto [low, high] =
+          std::minmax({noise.v0, noise.v1, noise.v0 + noise.s0 * noise.h / 3, noise.v1 - noise.s1 * noise.h / 3});
       if (b >= to) quiet = {piece.start + bridge.h, low, high};
       return std::nullopt;
     }

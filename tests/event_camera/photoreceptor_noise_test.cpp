@@ -68,8 +68,9 @@ std::vector<TimedEvent> run(const PhotoreceptorNoise& noise, const Pixel& pixel,
         held_until = -1;
       }
       const Ramp ramp{pixel.leak_per_ns * start, pixel.leak_per_ns};
+      PhotoreceptorNoise::Quiet quiet;
       const auto crossing = noise.first_crossing(interval, ramp, reference - pixel.theta_off,
-                                                 reference + pixel.theta_on, now - start, stop - start);
+                                                 reference + pixel.theta_on, now - start, stop - start, quiet);
       if (!crossing) {
         now = stop;
         continue;

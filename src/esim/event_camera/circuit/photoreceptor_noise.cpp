@@ -10,7 +10,7 @@ namespace {
 constexpr double kPoleStep = 1.01;  // ratio of successive time constants t1
 constexpr double kLeaf = 0.14;      // maximum length of a leaf, in min(t1, t2)
 constexpr int kLevelsBelowLeaves = 4;
-constexpr double kBoundDeviations = 3.3;
+constexpr double kBoundDeviations = 5;
 
 /// A symmetric 2 x 2 matrix.
 struct Covariance {
@@ -83,6 +83,7 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
       t2_(t2_ns),
       log_step_(std::log(kPoleStep)),
       log_first_(std::log(t1_min_ns)),
+      coarse_(0.6 * t2_ns),
       random_(random) {
   if (!(variance > 0) || !(t2_ns > 0) || !(t1_min_ns > 0) || !(t1_max_ns >= t1_min_ns))
     throw UserError(
@@ -125,7 +126,8 @@ PhotoreceptorNoise::Bridge PhotoreceptorNoise::make_bridge(double t1, double h) 
   bridge.from_start = difference(a, product(k, product(a, a)));
   bridge.spread = root({covariance.yy, 0.5 * (covariance.xy + covariance.yx), covariance.xx});
   bridge.deviation = std::sqrt(std::max(covariance.xx, 0.0));
-  bridge.leaf = h <= kLeaf * std::min(t1, t2_) && bridge.deviation < 0.06 * std::sqrt(variance_ * t1 / (t1 + t2_));
+  const double deviation = std::sqrt(variance_ * t1 / (t1 + t2_));
+  bridge.leaf = h <= kLeaf * std::min(t1, t2_) && bridge.deviation < 0.06 * deviation;
   return bridge;
 }
 
@@ -149,6 +151,21 @@ PhotoreceptorNoise::Interval PhotoreceptorNoise::next(const NoiseState& from, st
   const auto n = normals(interval, 1);
   interval.to = plus(step.drift * from, step.spread * NoiseState{n[0], n[1]});
   return interval;
+}
+
+NoiseState PhotoreceptorNoise::after(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
+                                     std::int32_t pole) const {
+  // The closed form of added(), which is exact enough except for steps far below the time constants.
+  const double t1 = poles_[static_cast<std::size_t>(pole)].t1, h = std::max(gap, 1e-3 * std::min(t1, t2_));
+  const double e1 = std::exp(-h / t1), e2 = std::exp(-h / t2_), gain = t1 / (t1 - t2_), power = 2 * variance_ / t1;
+  const double yy = variance_ * (1 - e1 * e1), uu = gain * gain * power * t2_ / 2 * (1 - e2 * e2);
+  const double cross = -gain * power * t1 * t2_ / (t1 + t2_) * (1 - e1 * e2);
+  const auto n = random_.normals(pixel, (std::uint64_t{node} << 32) | 1);
+  const NoiseState drawn =
+      root({yy, cross + gain * yy, uu + 2 * gain * cross + gain * gain * yy}) * NoiseState{n[0], n[1]};
+  const NoiseState drifted = drift(t1, t2_, gap) * from;
+  const double part = gap < h ? std::sqrt(gap / h) : 1.0;
+  return {drifted.y + part * drawn.y, drifted.x + part * drawn.x};
 }
 
 NoiseState PhotoreceptorNoise::middle(const Interval& interval, const Piece& piece, const Bridge& bridge) const {
@@ -207,11 +224,19 @@ std::optional<std::pair<double, int>> NoiseCubic::first_exit(double lower, doubl
     const int polarity = v >= upper ? 1 : v <= lower ? -1 : 0;
     if (polarity == 0) continue;
     double before = ends[i - 1], after = ends[i];
-    for (int k = 0; k < 60 && after - before > 1e-3; ++k) {
+    const double level = polarity > 0 ? upper : lower;
+    for (int k = 0; k < 60 && after - before > 1e-3 * h; ++k) {
       const double centre = 0.5 * (before + after), here = value(centre);
       (polarity > 0 ? here >= upper : here <= lower) ? after = centre : before = centre;
     }
-    return std::pair{after, polarity};
+    // Newton's method, so that the time hardly depends on where the search began.
+    double t = 0.5 * (before + after);
+    for (int k = 0; k < 4; ++k) {
+      const double rate = slope(t);
+      if (rate * polarity <= 0) return std::pair{after, polarity};
+      t = std::clamp(t - (value(t) - level) / rate, before, after);
+    }
+    return std::pair{t, polarity};
   }
   return std::nullopt;
 }

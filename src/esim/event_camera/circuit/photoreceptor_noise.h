@@ -59,9 +59,14 @@ class PhotoreceptorNoise {
   std::int32_t pole_of(double t1_ns) const;
   double t1_ns(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].t1; }
   double t2_ns() const { return t2_; }
+  /// The length of an interval, ns.
+  double length(std::int32_t pole, std::int32_t level) const {
+    return poles_[static_cast<std::size_t>(pole)].steps[static_cast<std::size_t>(level)].h;
+  }
 
   /// Standard deviation of x in steady light.
   double deviation(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].deviation; }
+  double deviation_at(double t1_ns) const { return std::sqrt(variance_ * t1_ns / (t1_ns + t2_)); }
 
   /// The level of the next interval, for the distance of the nearer threshold in standard deviations.
   static std::int32_t level_for(double z) { return z < 2.5 ? 4 : z < 3.5 ? 3 : z < 4.5 ? 2 : z < 5.5 ? 1 : 0; }
@@ -73,6 +78,10 @@ class PhotoreceptorNoise {
   Interval next(const NoiseState& from, std::uint32_t pixel, std::uint32_t node, std::int32_t pole,
                 std::int32_t level) const;
 
+  /// The state `gap` ns after the state `from`, with the draw of node `node` of the pixel: for times without intervals.
+  NoiseState after(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
+                   std::int32_t pole) const;
+
   /// The state `tau` ns after the start of an interval, 0 <= tau <= length.
   NoiseState at(const Interval& interval, double tau) const;
 
@@ -82,11 +91,18 @@ class PhotoreceptorNoise {
     int polarity = 0;
   };
 
+  /// Bounds of x until some time after the end of a search.
+  struct Quiet {
+    double until = 0;  ///< ns after the start of the interval
+    double low = 0, high = 0;
+  };
+
   /// The first time in [from, to], ns after the start of the interval, at which x + signal reaches `upper` or `lower`.
-  /// The signal has value(tau), slope(tau) in 1/ns, and range(a, b), which contains its values on [a, b].
+  /// The signal has value(tau), slope(tau) in 1/ns, and range(a, b), which contains its values on [a, b]. Without a
+  /// crossing, sets `quiet`.
   template <typename Signal>
   std::optional<Crossing> first_crossing(const Interval& interval, const Signal& signal, double lower, double upper,
-                                         double from, double to) const;
+                                         double from, double to, Quiet& quiet) const;
 
  private:
   /// A step of this process: state(t + h) = drift state(t) + spread (n1, n2), n1 and n2 standard normal.
@@ -126,9 +142,13 @@ class PhotoreceptorNoise {
 
   template <typename Signal>
   std::optional<Crossing> search(const Pole& pole, const Interval& interval, const Piece& piece, const Signal& signal,
-                                 double lower, double upper, double from, double to) const;
+                                 double lower, double upper, double from, double to, Quiet& quiet) const;
+
+  /// Longer pieces are leaves too while the signal moves so fast that what a cubic neglects hardly moves the crossing.
+  static constexpr double kCoarse = 0.3;  // neglected deviation, in changes of the signal over the piece
 
   double variance_, t2_, log_step_, log_first_;
+  double coarse_ = 0;  // greatest length of such a piece, ns
   AddressedRandom random_;
   std::vector<Pole> poles_;
 };
@@ -153,38 +173,49 @@ struct NoiseCubic {
 template <typename Signal>
 std::optional<PhotoreceptorNoise::Crossing> PhotoreceptorNoise::first_crossing(const Interval& interval,
                                                                                const Signal& signal, double lower,
-                                                                               double upper, double from,
-                                                                               double to) const {
+                                                                               double upper, double from, double to,
+                                                                               Quiet& quiet) const {
+  quiet = {to, 0, 0};
   const Pole& pole = poles_[static_cast<std::size_t>(interval.pole)];
   const Piece whole{interval.from, interval.to, 0.0, 1, static_cast<std::size_t>(interval.level)};
-  return search(pole, interval, whole, signal, lower, upper, from, to);
+  return search(pole, interval, whole, signal, lower, upper, from, to, quiet);
 }
 
 template <typename Signal>
 std::optional<PhotoreceptorNoise::Crossing> PhotoreceptorNoise::search(const Pole& pole, const Interval& interval,
                                                                        const Piece& piece, const Signal& signal,
                                                                        double lower, double upper, double from,
-                                                                       double to) const {
+                                                                       double to, Quiet& quiet) const {
   const Bridge& bridge = pole.bridges[piece.bridge];
   const double a = std::max(from, piece.start), b = std::min(to, piece.start + bridge.h);
   if (a >= b) return std::nullopt;
-  if (bridge.leaf) {
+  const double slope_here = std::abs(signal.slope(a));
+  if (bridge.leaf || (bridge.h <= coarse_ && bridge.deviation < kCoarse * slope_here * bridge.h)) {
     const NoiseCubic noise{piece.from.x, slope(piece.from), piece.to.x, slope(piece.to), bridge.h};
     const double u = a - piece.start, v = b - piece.start;
     const NoiseCubic sum{noise.value(u) + signal.value(a), noise.slope(u) + signal.slope(a),
                          noise.value(v) + signal.value(b), noise.slope(v) + signal.slope(b), b - a};
     const auto exit = sum.first_exit(lower, upper);
-    if (!exit) return std::nullopt;
+    if (!exit) {
+      // A cubic lies between the control points of its Bezier curve.
+      const auto [low, high] =
+          std::minmax({noise.v0, noise.v1, noise.v0 + noise.s0 * noise.h / 3, noise.v1 - noise.s1 * noise.h / 3});
+      if (b >= to) quiet = {piece.start + bridge.h, low, high};
+      return std::nullopt;
+    }
     return Crossing{a + exit->first, exit->second};
   }
   const auto [low, high] = bounds(piece, bridge);
   const auto [signal_low, signal_high] = signal.range(a, b);
-  if (low + signal_low > lower && high + signal_high < upper) return std::nullopt;
+  if (low + signal_low > lower && high + signal_high < upper) {
+    if (b >= to) quiet = {piece.start + bridge.h, low, high};
+    return std::nullopt;
+  }
   const NoiseState centre = middle(interval, piece, bridge);
   const Piece first{piece.from, centre, piece.start, 2 * piece.index, piece.bridge + 1};
-  if (const auto crossing = search(pole, interval, first, signal, lower, upper, from, to)) return crossing;
+  if (const auto crossing = search(pole, interval, first, signal, lower, upper, from, to, quiet)) return crossing;
   const Piece second{centre, piece.to, piece.start + 0.5 * bridge.h, 2 * piece.index + 1, piece.bridge + 1};
-  return search(pole, interval, second, signal, lower, upper, from, to);
+  return search(pole, interval, second, signal, lower, upper, from, to, quiet);
 }
 
 }  // namespace esim::inline event_camera

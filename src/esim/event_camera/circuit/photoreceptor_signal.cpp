@@ -17,9 +17,10 @@ std::array<double, 4> exponential_moments(double a) {
 int steps_for(const CircuitPoles& poles, const CircuitState& state, const LightRamp& ramp, double length) {
   const double change = std::abs(ramp.rate) * length;
   double steps = std::max(1.0, std::ceil(change / kMaxLightStep - 1e-9));
-  // Far from equilibrium, the response is not an exponential: short steps until the lag has decayed.
-  if (std::abs(state.lag) > 0.02) {
-    const double decays = std::exp(std::max(ramp.light, ramp.light + ramp.rate * length)) / poles.t1_unit_ns * length;
+  // Far from the lag that the ramp keeps up, the response is not an exponential: short steps until it has decayed.
+  const double rate = std::exp(ramp.light) / poles.t1_unit_ns;
+  if (std::abs(state.lag - ramp.rate / rate) > kMaxTransient) {
+    const double decays = rate * std::exp(std::max(0.0, ramp.rate * length)) * length;
     steps = std::max(steps, std::ceil(4 * std::min(decays, 12.0)));
   }
   return static_cast<int>(std::min(steps, 1e4));

@@ -15,7 +15,8 @@ struct CircuitPoles {
   double t2_ns = 0;       ///< of the source follower
 };
 
-/// The part of the brightness signal that follows light, after an instant. Light is L = ln(E + dark), natural logarithm.
+/// The part of the brightness signal that follows light, after an instant. Light is L = ln(E + dark), natural
+/// logarithm.
 ///
 /// Photodiode (large signal): Q dy/dt = I - exp(y), or (1 + lag)' = lambda (1 + lag) - lag I / Q with
 /// 1 + lag = exp(L - y) and lambda = dL/dt. In steady light, lag = 0 and y = L.
@@ -55,6 +56,9 @@ std::array<double, 4> exponential_moments(double a);
 
 /// Longest stretch that advance() takes in one step: the light may change by at most this.
 inline constexpr double kMaxLightStep = 0.1;
+
+/// Distance of the lag from that of a steady ramp, beyond which steps must be short compared with Q / I.
+inline constexpr double kMaxTransient = 0.03;
 
 /// Number of equal steps of advance() for a change of L over `length` ns. More are needed while the photodiode is far
 /// from equilibrium.

@@ -51,9 +51,9 @@ struct CircuitBounds {
 };
 
 inline constexpr double kLightReach = 0.2;  ///< change of L within which the noise keeps its time constant
-inline constexpr double kWakeDeviations =
+inline constexpr double kActiveDeviations =
     5.5;  ///< distance to a threshold, in deviations, at which noise begins to matter
-inline constexpr double kSleepDeviations = 6.0;  ///< distance at a node at which it ceases to matter
+inline constexpr double kInactiveDeviations = 6.0;  ///< distance at a node at which it ceases to matter
 
 /// Takes a pixel through a piece of its signal: its events, its refractory periods, its noise. The comparator's signal
 /// is S(s) = piece.value(s) + leak (start + s), to which the noise is added.
@@ -103,7 +103,7 @@ class CircuitPixel {
   }
 
   std::optional<double> find_near(double a, double b) const;
-  /// Whether the slope of the signal has one sign on [a, b], by its ends and its greatest curvature.
+  /// Whether the slope of the signal has one sign on [a, b], by its ends and its maximum curvature.
   bool is_monotone(double a, double b) const {
     const double sa = piece_.slope(a) + leak_, sb = piece_.slope(b) + leak_;
     return sa * sb > 0 && std::min(std::abs(sa), std::abs(sb)) > 0.25 * std::abs(sa - sb);

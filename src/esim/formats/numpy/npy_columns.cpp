@@ -69,10 +69,15 @@ void take_column(std::string_view name, EventColumns::Column column, EventColumn
   const auto is_one_of = [&](std::initializer_list<std::string_view> names) {
     return std::find(names.begin(), names.end(), key) != names.end();
   };
-  if (is_one_of({"t", "ts", "time", "timestamp", "timestamps"})) columns.t = std::move(column);
-  if (is_one_of({"x"})) columns.x = std::move(column);
-  if (is_one_of({"y"})) columns.y = std::move(column);
-  if (is_one_of({"p", "pol", "polarity", "polarities"})) columns.p = std::move(column);
+  if (is_one_of({"t", "ts", "time", "timestamp", "timestamps"})) {
+    columns.t = std::move(column);
+  } else if (is_one_of({"x"})) {
+    columns.x = std::move(column);
+  } else if (is_one_of({"y"})) {
+    columns.y = std::move(column);
+  } else if (is_one_of({"p", "pol", "polarity", "polarities"})) {
+    columns.p = std::move(column);
+  }
 }
 
 std::unique_ptr<EventsReader> make_columns_reader(const std::string& file, EventColumns columns) {

@@ -78,7 +78,7 @@ void remove_option(const YAML::Node& root, const std::string& key) {
   }
 }
 
-std::string apply_override(YAML::Node root, const std::string& text, const std::string& setter) {
+std::string apply_override(const YAML::Node& root, const std::string& text, const std::string& setter) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) {
     throw UserError(

@@ -40,7 +40,7 @@ void remove_option(const YAML::Node& root, const std::string& key);
 
 /// Sets root[a][b][c] for "a.b.c=value" and returns the key; list entries are given by their index. Messages begin with
 /// `setter`.
-std::string apply_override(YAML::Node root, const std::string& text, const std::string& setter = kSetter);
+std::string apply_override(const YAML::Node& root, const std::string& text, const std::string& setter = kSetter);
 
 template <typename T>
 inline constexpr bool kIsVariant = false;

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "esim/plot/axes.h"
+#include "esim/plot/colour_bar.h"
 #include "esim/plot/text.h"
 
 namespace esim {
@@ -261,6 +262,32 @@ TEST(AxesTest, PlacesDataWhereTheTicksSayTheyAre) {
   EXPECT_EQ(canvas.pixels()(x(2) + 1, y(1)), kBarColour);
   EXPECT_NE(canvas.pixels()(x(2) - 2, y(1)), kBarColour);
   EXPECT_NE(canvas.pixels()(x(2.5), y(2) - 2), kBarColour);
+}
+
+TEST(ColourBar, ShowsTheColoursOfTheValuesAtItsTicks) {
+  const auto colour_of = [](double value) { return value < 2 ? Rgb{0, 0, 250} : value < 5 ? Rgb{0, 250, 0} : kBlack; };
+  for (const Direction direction : {Direction::horizontal, Direction::vertical}) {
+    const bool is_horizontal = direction == Direction::horizontal;
+    Canvas canvas(400, 400, kWhite);
+    const Tile bar = is_horizontal ? Tile{50, 100, 300, 14} : Tile{100, 50, 14, 300};
+    const Scale scale = logarithmic_scale(1, 10, "m");
+    draw_colour_bar(canvas, bar, scale, direction, colour_of, kLightTheme);
+    for (const double value : {1.01, 1.9, 2.1, 4.9, 5.1, 9.9}) {
+      const int at = static_cast<int>(scale.position(value) * 300);
+      EXPECT_EQ(canvas.pixels()(is_horizontal ? 50 + at : 107, is_horizontal ? 107 : 349 - at), colour_of(value))
+          << value;
+    }
+    for (const double value : {2.0, 5.0}) {  // the ticks, next to the border of the colours
+      const int at = static_cast<int>(std::lround(scale.position(value) * 299));
+      EXPECT_EQ(canvas.pixels()(is_horizontal ? 50 + at : 117, is_horizontal ? 117 : 349 - at), kLightTheme.faint_ink);
+    }
+  }
+}
+
+TEST(Scales, ValueIsTheInverseOfPosition) {
+  for (const auto& [x, y] : scales()) {
+    for (const double position : {0.0, 0.25, 0.9, 1.0}) EXPECT_NEAR(x.position(x.value(position)), position, 1e-6);
+  }
 }
 
 }  // namespace

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
+
+#include "esim/plot/tick_layout.h"
 
 namespace esim::inline plot {
 namespace {
@@ -11,8 +12,6 @@ namespace {
 // Distances in px.
 constexpr int kTick = 5, kMinorTick = 3, kLabelGap = 5, kTitleGap = 12, kEdge = 6, kDescent = 4;
 constexpr int kMinRight = 12, kTitleRow = kTitleHeight + 16;
-constexpr int kPerRow = 36, kPerColumn = 60;  // of the diagram for each tick, at least
-constexpr int kMaxTicks = 10;
 
 /// The title with the factor and the offset of the labels.
 std::string full_title(const Scale& scale, const Ticks& ticks) {
@@ -26,45 +25,6 @@ int widest_label(const Ticks& ticks) {
   int widest = 0;
   for (const Tick& tick : ticks.major) widest = std::max(widest, Canvas::text_width(tick.label, kTextHeight));
   return widest;
-}
-
-enum class Side { bottom, left };
-
-/// Whether the labels along an axis of `extent` px have space between each other.
-bool labels_fit(const Scale& scale, const Ticks& ticks, int extent, Side side) {
-  const double gap = (side == Side::bottom ? 1.2 : 0.6) * kTextHeight;
-  double end = -std::numeric_limits<double>::infinity();
-  std::vector<std::pair<double, double>> labels;
-  for (const Tick& tick : ticks.major) {
-    if (tick.label.empty()) continue;
-    const double middle = scale.position(tick.value) * extent;
-    const double half = 0.5 * (side == Side::bottom ? Canvas::text_width(tick.label, kTextHeight) : kTextHeight);
-    labels.emplace_back(middle - half, middle + half);
-  }
-  std::sort(labels.begin(), labels.end());
-  for (const auto& [first, last] : labels) {
-    if (first < end + gap) return false;
-    end = last;
-  }
-  return true;
-}
-
-/// As many ticks as have space for their labels. If even the smallest number has not, only every second, third, ...
-/// tick has a label.
-Ticks ticks_that_fit(const Scale& scale, int extent, Side side) {
-  Ticks ticks;
-  const int max = extent / (side == Side::bottom ? kPerColumn : kPerRow);
-  for (int wanted = std::clamp(max, 3, kMaxTicks); wanted >= 3; --wanted) {
-    ticks = scale.ticks(wanted);
-    if (labels_fit(scale, ticks, extent, side)) return ticks;
-  }
-  for (std::size_t every = 2;; ++every) {
-    Ticks sparse = ticks;
-    for (std::size_t i = 0; i < sparse.major.size(); ++i) {
-      if (i % every != 0) sparse.major[i].label.clear();
-    }
-    if (every >= sparse.major.size() || labels_fit(scale, sparse, extent, side)) return sparse;
-  }
 }
 
 }  // namespace
@@ -93,7 +53,7 @@ void Axes::lay_out_columns(const Tile& cell) {
   int right = kMinRight;
   for (int attempt = 0; attempt < 2; ++attempt) {
     area_.width = std::max(1, cell.width - left - right);
-    x_ticks_ = ticks_that_fit(x_, area_.width, Side::bottom);
+    x_ticks_ = ticks_that_fit(x_, area_.width, Direction::horizontal);
     if (x_ticks_.major.empty()) break;
     const Tick& last = x_ticks_.major.back();
     const int beyond =
@@ -108,7 +68,7 @@ void Axes::lay_out_rows(const Tile& cell, int top) {
   const int bottom = kTick + kLabelGap + kTextHeight + (x_.title.empty() ? 0 : kTitleGap + kTextHeight) + kDescent;
   area_.y = cell.y + top;
   area_.height = std::max(1, cell.height - top - bottom);
-  y_ticks_ = ticks_that_fit(y_, area_.height, Side::left);
+  y_ticks_ = ticks_that_fit(y_, area_.height, Direction::vertical);
   const int title = y_.title.empty() ? 0 : kTextHeight + kTitleGap;
   area_.x = cell.x + std::max(options_.min_left, kEdge + title + widest_label(y_ticks_) + kLabelGap + kTick);
 }

@@ -12,6 +12,10 @@ double Scale::position(double value) const {
   return value > 0 ? std::log(value / low) / std::log(high / low) : kFarBelow;
 }
 
+double Scale::value(double position) const {
+  return logarithmic ? low * std::pow(high / low, position) : low + position * (high - low);
+}
+
 Ticks Scale::ticks(int wanted) const {
   if (!names.empty()) return {names, {}, {}, {}};
   return logarithmic ? logarithmic_ticks(low, high, wanted, style) : linear_ticks(low, high, wanted, style);

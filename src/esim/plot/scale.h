@@ -18,6 +18,8 @@ struct Scale {
 
   /// 0 at low, 1 at high; outside [0, 1] beyond them.
   double position(double value) const;
+  /// The value at a position.
+  double value(double position) const;
 
   Ticks ticks(int wanted) const;
 };

@@ -7,6 +7,7 @@
 
 #include "esim/files/number_text.h"
 #include "esim/plot/canvas.h"
+#include "esim/plot/colour_bar.h"
 #include "esim/plot/theme.h"
 #include "esim/preview/pictures.h"
 
@@ -118,23 +119,11 @@ void draw_depth_legend(Canvas& canvas, const PreviewLayout& layout, const Previe
   draw_swatch(canvas, x + bar + 24, y, kNoDepthColour, "no surface");
   if (frame.near_m <= 0) return;
 
-  // Logarithmic, like the colours: the number in the middle is the geometric mean.
-  const float ratio = frame.far_m / frame.near_m;
-  const auto depth_at = [&](float position) { return frame.near_m * std::pow(ratio, position); };
-  for (int i = 0; i < bar; ++i) {
-    const float depth = depth_at((static_cast<float>(i) + 0.5f) / static_cast<float>(bar));
-    canvas.fill({x + i, y, 1, kBarHeight}, colour_depth(depth, frame.near_m, frame.far_m));
-  }
-  canvas.outline({x, y, bar, kBarHeight}, kLightTheme.faint_ink);
-  const int ticks = bar < 280 ? 3 : 5;
-  for (int tick = 0; tick < ticks; ++tick) {
-    const float position = static_cast<float>(tick) / static_cast<float>(ticks - 1);
-    const int at = x + static_cast<int>(std::lround(position * static_cast<float>(bar - 1)));
-    const Align align = tick == 0 ? Align::left : tick == ticks - 1 ? Align::right : Align::centre;
-    canvas.fill({at, y + kBarHeight, 1, 5}, kLightTheme.faint_ink);
-    const char* unit = tick == ticks - 1 ? " m" : "";
-    canvas.text(at, y + kBarHeight + 21, short_number(depth_at(position)) + unit, kTextHeight, kLightTheme.ink, align);
-  }
+  const auto colour_of = [&](double depth_m) {
+    return colour_depth(static_cast<float>(depth_m), frame.near_m, frame.far_m);
+  };
+  draw_colour_bar(canvas, {x, y, bar, kBarHeight}, logarithmic_scale(frame.near_m, frame.far_m, "m"),
+                  Direction::horizontal, colour_of, kLightTheme);
 }
 
 void draw_flow_legend(Canvas& canvas, const PreviewLayout& layout, const PreviewFrame& frame) {

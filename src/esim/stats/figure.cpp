@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "esim/plot/axes.h"
+#include "esim/plot/colour_bar.h"
 #include "esim/preview/pictures.h"
 
 namespace esim::inline stats {
@@ -112,23 +113,6 @@ std::uint32_t bright_count(const Statistics& s) {
   return *at;
 }
 
-void draw_colour_bar(Canvas& canvas, const Tile& bar, double full_hz) {
-  for (int i = 0; i < bar.height; ++i) {
-    const float position = 1 - (static_cast<float>(i) + 0.5f) / static_cast<float>(bar.height);
-    canvas.fill({bar.x, bar.y + i, bar.width, 1}, viridis(position));
-  }
-  canvas.outline({bar.x - 1, bar.y - 1, bar.width + 2, bar.height + 2}, kLightTheme.faint_ink);
-  const Scale scale = linear_scale(0, full_hz, "");
-  const Ticks ticks = scale.ticks(std::clamp(bar.height / 44, 3, 10));
-  for (const Tick& tick : ticks.major) {
-    const int y = bar.y + static_cast<int>(std::lround((1 - scale.position(tick.value)) * (bar.height - 1)));
-    canvas.fill({bar.x + bar.width, y, 5, 1}, kLightTheme.faint_ink);
-    canvas.text(bar.x + bar.width + 10, y + kTextHeight / 2, tick.label, kTextHeight, kLightTheme.ink);
-  }
-  canvas.text(bar.x, bar.y - 10, "ev/s" + (ticks.factor.empty() ? "" : " " + ticks.factor), kTextHeight,
-              kLightTheme.ink);
-}
-
 void draw_map(Canvas& canvas, const Cell& cell, const Statistics& s) {
   constexpr int kTop = 34, kBelow = 46, kBarSpace = 100;
   const Tile area = cell.area();
@@ -155,7 +139,10 @@ void draw_map(Canvas& canvas, const Cell& cell, const Statistics& s) {
     const int y = y0 + static_cast<int>(scale * (s.hot_pixels[i].y + 0.5));
     for (const int side : {13, 15}) canvas.outline({x - side / 2, y - side / 2, side, side}, kHighlightColour);
   }
-  draw_colour_bar(canvas, {area.x + shown_width + 16, y0, 16, shown_height}, full * s.per_second(1));
+  const double full_hz = full * s.per_second(1);
+  draw_colour_bar(
+      canvas, {area.x + shown_width + 16, y0, 16, shown_height}, linear_scale(0, full_hz, "ev/s"), Direction::vertical,
+      [&](double rate_hz) { return viridis(static_cast<float>(rate_hz / full_hz)); }, kLightTheme);
   const int baseline = y0 + shown_height + 2 * kTextHeight;
   canvas.text(area.x, baseline, "ON and OFF; 99.5 % of the active pixels are within the scale", kTextHeight,
               kLightTheme.faint_ink);

@@ -48,7 +48,7 @@ void StatesCsvWriter::begin(const RecordingInfo& info) {
     objects_.emplace_back(folder_ / "objects" / file, kHeader);
     std::string line = name;
     std::replace(line.begin(), line.end(), '\n', ' ');
-    names += file + " " + line + "\n";
+    names.append(file).append(" ").append(line).append("\n");
   }
   write_file_atomically(folder_ / "objects" / "names.txt", names);
 }

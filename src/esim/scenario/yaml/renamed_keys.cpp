@@ -79,7 +79,7 @@ std::string with_present_names(const std::string& key, std::vector<std::string>&
   return changed ? joined(parts) : key;
 }
 
-void use_present_names(YAML::Node root, const YamlSource& source, std::vector<std::string>& notices) {
+void use_present_names(const YAML::Node& root, const YamlSource& source, std::vector<std::string>& notices) {
   for (const RenamedKey& renamed : kRenamedKeys) {
     visit_maps(root, parts_of(renamed.map), 0, "", [&](YAML::Node map, const std::string& key) {
       const YAML::Node value = std::as_const(map)[renamed.before];

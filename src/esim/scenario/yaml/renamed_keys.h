@@ -12,6 +12,6 @@ namespace esim::inline scenario {
 std::string with_present_names(const std::string& key, std::vector<std::string>& notices);
 
 /// The same for all keys of a scenario. Throws OptionError if a map has an option under both names.
-void use_present_names(YAML::Node root, const YamlSource& source, std::vector<std::string>& notices);
+void use_present_names(const YAML::Node& root, const YamlSource& source, std::vector<std::string>& notices);
 
 }  // namespace esim::inline scenario

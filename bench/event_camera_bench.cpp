@@ -142,6 +142,20 @@ void event_camera_everything_slow_readout(benchmark::State& state) {
   options.readout.row_time_us = 0.01;
   run_event_camera(state, options, 1);
 }
+/// Pixels by their circuit, in a lit room and in the dark.
+EventCameraOptions by_circuit(double white_lux) {
+  EventCameraOptions options;
+  options.threshold_mismatch = 0.01;
+  options.refractory_period_us = 100;
+  options.leak_rate_hz = 0.1;
+  options.leak_mismatch_decades = 0.2;
+  options.hot_pixels = 0.001;
+  options.circuit = CircuitOptions{.white_lux = white_lux};
+  options.circuit->photocurrent_fa_per_lux = 20;
+  return options;
+}
+void event_camera_circuit(benchmark::State& state) { run_event_camera(state, by_circuit(1000), 1); }
+void event_camera_circuit_dark(benchmark::State& state) { run_event_camera(state, by_circuit(1), 1); }
 void event_camera_everything_two_threads(benchmark::State& state) { run_event_camera(state, everything(), 2); }
 
 void sizes(benchmark::internal::Benchmark* benchmark) {
@@ -158,6 +172,8 @@ BENCHMARK(event_camera)->Apply(sizes);
 BENCHMARK(event_camera_two_threads)->Apply(sizes);
 BENCHMARK(event_camera_everything)->Apply(sizes);
 BENCHMARK(event_camera_everything_slow_readout)->Apply(sizes);
+BENCHMARK(event_camera_circuit)->Apply(sizes);
+BENCHMARK(event_camera_circuit_dark)->Apply(sizes);
 BENCHMARK(event_camera_everything_two_threads)->Apply(sizes);
 
 }  // namespace

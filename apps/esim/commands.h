@@ -13,6 +13,7 @@ void add_video(CLI::App& app, int& exit_code);
 void add_check(CLI::App& app, int& exit_code);
 void add_dataset(CLI::App& app, int& exit_code);
 void add_convert(CLI::App& app, int& exit_code);
+void add_filter(CLI::App& app, int& exit_code);
 void add_import(CLI::App& app, int& exit_code);
 void add_info(CLI::App& app, int& exit_code);
 void add_play(CLI::App& app, int& exit_code);

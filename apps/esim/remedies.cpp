@@ -20,6 +20,8 @@ Advice advice_on(Remedy remedy) {
       return {"--from-zero", ", or pass --from-zero"};
     case Remedy::nanoseconds:
       return {"--time-unit", "; --time-unit ns keeps them"};
+    case Remedy::sensor_size:
+      return {"--width", " with --width and --height"};
     case Remedy::shorter_video:
       return {"--slow-motion", " (--start, --duration, --slow-motion)"};
     case Remedy::none:

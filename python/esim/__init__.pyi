@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import dataset as dataset
+from . import filters as filters
 
 Path: TypeAlias = str | PathLike[str]
 Int: TypeAlias = int | np.integer[Any]

@@ -12,6 +12,7 @@ void bind_event_camera(nanobind::module_& module);
 void bind_simulation(nanobind::module_& module);
 void bind_event_files(nanobind::module_& module);
 void bind_recording_files(nanobind::module_& module);
+void bind_filters(nanobind::module_& module);
 void bind_representations(nanobind::module_& module);
 void bind_pictures(nanobind::module_& module);
 void bind_dataset(nanobind::module_& module);

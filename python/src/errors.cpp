@@ -30,6 +30,8 @@ std::string with_remedy(const std::string& message, Remedy remedy) {
       return message + ", or let times begin at 0, as esim.convert(..., from_zero=True) does";
     case Remedy::nanoseconds:
       return message + "; time_unit=\"ns\" keeps them";
+    case Remedy::sensor_size:
+      return message + " with width= and height=";
     case Remedy::shorter_video:
       return message + " (start_s=, duration_s=, slow_motion=)";
     case Remedy::none:

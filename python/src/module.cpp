@@ -10,6 +10,7 @@ NB_MODULE(_core, module) {
   bind_simulation(module);
   bind_event_files(module);
   bind_recording_files(module);
+  bind_filters(module);
   bind_representations(module);
   bind_pictures(module);
   bind_dataset(module);

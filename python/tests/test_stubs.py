@@ -7,9 +7,12 @@ import re
 import subprocess
 import sys
 
+import pytest
+
 import esim
 
-STUBS = ast.parse((pathlib.Path(__file__).parents[1] / "esim" / "__init__.pyi").read_text())
+FOLDER = pathlib.Path(__file__).parents[1] / "esim"
+STUBS = ast.parse((FOLDER / "__init__.pyi").read_text())
 
 
 def stubbed_parameters(function):
@@ -43,17 +46,18 @@ def compare(stub, real, name):
     assert expected == actual, name
 
 
-def test_stubs_and_package_agree():
+@pytest.mark.parametrize("module, file", [(esim, "__init__.pyi"), (esim.dataset, "dataset.pyi"), (esim.filters, "filters.pyi")])
+def test_stubs_and_package_agree(module, file):
     named = set()
-    for node in STUBS.body:
+    for node in ast.parse((FOLDER / file).read_text()).body:
         if isinstance(node, ast.AnnAssign) and getattr(node.annotation, "id", "") != "TypeAlias":
             named.add(node.target.id)
         if isinstance(node, ast.FunctionDef):
             named.add(node.name)
-            compare(node, getattr(esim, node.name), node.name)
+            compare(node, getattr(module, node.name), node.name)
         if isinstance(node, ast.ClassDef):
             named.add(node.name)
-            real = getattr(esim, node.name)
+            real = getattr(module, node.name)
             assert real.__doc__, node.name
             members = [m for m in node.body if isinstance(m, ast.FunctionDef)]
             for member in members:
@@ -67,7 +71,7 @@ def test_stubs_and_package_agree():
             public = {name for name, value in vars(real).items() if not name.startswith("_")}
             fields = {m.target.id for m in node.body if isinstance(m, ast.AnnAssign)}
             assert public <= {m.name for m in members} | fields | {"render", "objects"}, node.name
-    assert named == set(esim.__all__)
+    assert named == set(module.__all__)
 
 
 def test_the_fields_of_packets_are_those_of_the_stubs():

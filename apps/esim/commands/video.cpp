@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 
+#include "command_line.h"
 #include "commands.h"
 #include "esim/core/error.h"
 #include "esim/formats/formats.h"
@@ -22,63 +22,6 @@ namespace fs = std::filesystem;
 struct VideoArguments : RunOptions {
   ConversionOptions options;
   std::string input, out;
-};
-
-/// A visitor of describe() that adds a command-line option for every member: --max-steps for max_steps.
-class CommandLine {
- public:
-  explicit CommandLine(CLI::App& command) : command_(command) {}
-
-  void operator()(const char* name, bool& value, const About& about) {
-    if (value) {
-      command_.add_flag_callback(
-          "--no-" + dashed(name), [&value] { value = false; }, fmt::format("Do not {}", about.help));
-    } else {
-      command_.add_flag("--" + dashed(name), value, help(about));
-    }
-  }
-
-  template <typename T>
-  void operator()(const char* name, T& value, const About& about) {
-    CLI::Option* option = command_.add_option("--" + dashed(name), value, help(about));
-    if constexpr (std::is_enum_v<T>) {
-      std::map<std::string, T> names;
-      std::string choices;
-      for (const char* word : kEnumNames<T>) {
-        choices += (names.empty() ? "" : "|") + std::string(word);
-        names.emplace(word, static_cast<T>(names.size()));
-      }
-      option->type_name(choices)->transform(CLI::CheckedTransformer(names).description(""));
-    } else {
-      option->type_name(*about.unit != '\0' ? about.unit : "N")->check([about](const std::string& text) {
-        return out_of_range(text, about);
-      });
-      if constexpr (std::is_arithmetic_v<T>) option->capture_default_str();
-    }
-  }
-
- private:
-  static std::string dashed(std::string name) {
-    std::replace(name.begin(), name.end(), '_', '-');
-    return name;
-  }
-
-  static std::string help(const About& about) {
-    std::string text = about.help;
-    text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
-    return text;
-  }
-
-  /// Returns the error, or an empty text, as CLI11 expects.
-  static std::string out_of_range(const std::string& text, const About& about) {
-    double value = 0;
-    if (!CLI::detail::lexical_cast(text, value)) return fmt::format("'{}' is not a number", text);
-    if (value <= about.max && (about.above_min ? value > about.min : value >= about.min)) return "";
-    return fmt::format("{} is out of range: must be {} {} and at most {}", text, about.above_min ? "above" : "at least",
-                       about.min, about.max);
-  }
-
-  CLI::App& command_;
 };
 
 void report_losses(const ConversionSummary& summary, const ConversionOptions& options, const Notices& notices) {

@@ -24,6 +24,9 @@ enum class Purpose : std::uint16_t {
   frame_noise = 16,
   imu_noise = 20,
   imu_bias = 21,
+  circuit_noise = 24,
+  circuit_mismatch = 25,
+  circuit_start = 26,
   test = 1000,
 };
 

@@ -15,6 +15,7 @@ enum class Remedy {
   extract_camera,   ///< first copy one of several cameras into a separate file
   times_from_zero,  ///< count times from the start of the recording
   nanoseconds,      ///< write event times in nanoseconds
+  sensor_size,      ///< state the size of the sensor
   shorter_video,    ///< show a part of the recording, or play it faster
 };
 

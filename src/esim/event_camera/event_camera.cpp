@@ -9,6 +9,8 @@
 
 #include "esim/core/error.h"
 #include "esim/event_camera/center_surround.h"
+#include "esim/event_camera/circuit/circuit_array.h"
+#include "esim/event_camera/circuit/circuit_readout.h"
 #include "esim/event_camera/front_end.h"
 #include "esim/event_camera/pixel/pixel_array.h"
 #include "esim/event_camera/pixel/pixel_update.h"
@@ -41,9 +43,14 @@ struct RowPieces {
 /// From irradiance to events: surround, pixels, queue, readout.
 struct EventCamera::State {
   State(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream)
-      : pixels(options, width, height, seed, stream), packing(width, height), size{0, 0, width, height} {
+      : pixels(options, options.circuit ? 0 : width, options.circuit ? 0 : height, seed, stream),
+        packing(width, height),
+        size{0, 0, width, height} {
+    check(options);
+    if (options.circuit) circuit.emplace(options, width, height, seed, stream);
     if (options.surround_px > 0) surround.emplace(options.surround_px, options.surround_ms * 1e-3, width, height);
-    if (options.readout.limited()) readout.emplace(options, width, height);
+    if (!options.circuit && options.readout.limited()) readout.emplace(options, width, height);
+    if (options.circuit && options.readout.acknowledges()) circuit_readout.emplace(options.readout, width, height);
   }
 
   bool integrate(const Workers& workers);
@@ -57,15 +64,19 @@ struct EventCamera::State {
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     PixelArray::transfer(archive, self.pixels);
+    if (self.circuit) CircuitArray::transfer(archive, *self.circuit);
     if (self.surround) CenterSurround::transfer(archive, *self.surround);
     if (self.readout) PixelReadout::transfer(archive, *self.readout);
+    if (self.circuit_readout) CircuitReadout::transfer(archive, *self.circuit_readout);
     archive.value(self.spoiled);
     archive.value(self.last_time);
     archive.value(self.frames);
     if (self.frames > 0) archive.image(self.last_frame);
   }
 
-  PixelArray pixels;
+  PixelArray pixels;  // without pixels if there is a circuit
+  std::optional<CircuitArray> circuit;
+  std::vector<CircuitBuffer> buffers;  // per worker
   EventPacking packing;
   Tile size;
   bool spoiled = false;  // a segment was integrated only partly
@@ -77,6 +88,7 @@ struct EventCamera::State {
   std::vector<std::size_t> tile_begins;  // first segment of each group of tiles, and the end
   EventQueue queue;
   std::optional<PixelReadout> readout;
+  std::optional<CircuitReadout> circuit_readout;
 
   // For process().
   Image<float> last_frame, next_frame;
@@ -118,6 +130,12 @@ void EventCamera::State::refuse_long_time(TimeNs duration) const {
 /// Integrates rows of the i-th segment.
 bool EventCamera::State::advance(std::size_t i, const Image<float>* given, Rows rows, int worker) {
   const Segment& segment = segments[i];
+  if (circuit) {
+    if (segment.t0 == segment.t1) return circuit->open(segment, rows);
+    PastSegment* const past = circuit_readout ? &circuit_readout->history.added(i) : nullptr;
+    return circuit->advance(segment, rows, buffers[static_cast<std::size_t>(worker)], past,
+                            events[static_cast<std::size_t>(worker)]);
+  }
   PixelUpdate& update = updates[static_cast<std::size_t>(worker)];
   if (segment.t0 == segment.t1) return update.open(pixels, segment, given, rows);
   PastSegment* const past = readout ? &readout->history.added(i) : nullptr;
@@ -157,7 +175,10 @@ bool EventCamera::State::integrate(const Workers& workers) {
   tile_begins.clear();
   int pixels_seen = 0;  // since the last tile_begins
   for (std::size_t i = 0; i < segments.size(); ++i) {
-    if (segments[i].t0 == segments[i].t1) pixels.set_epoch(segments[i].t0);
+    if (segments[i].t0 == segments[i].t1) {
+      pixels.set_epoch(segments[i].t0);
+      if (circuit) circuit->set_epoch(segments[i].t0);
+    }
     if (i == 0 || (segments[i].tile != segments[i - 1].tile && pixels_seen >= kPixelsPerPiece))
       tile_begins.push_back(i), pixels_seen = 0;
     pixels_seen += static_cast<int>(segments[i].tile.area());
@@ -175,7 +196,8 @@ void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
   if (state.spoiled)
     throw UserError("event camera: an earlier irradiance was invalid, and the camera cannot go on; create a new one");
   const auto threads = static_cast<std::size_t>(workers.threads());
-  if (state.updates.size() < threads) state.updates.resize(threads), state.events.resize(threads);
+  if (state.updates.size() < threads)
+    state.updates.resize(threads), state.events.resize(threads), state.buffers.resize(threads);
   TimeNs first = std::numeric_limits<TimeNs>::max(), last = std::numeric_limits<TimeNs>::min();
   for (const Segment& segment : segments) first = std::min(first, segment.t0), last = std::max(last, segment.t1);
   state.packing.origin = first;
@@ -183,16 +205,19 @@ void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
   for (PackedEvents& events : state.events) events.expect(state.packing, last - first);
   state.segments = segments;
   if (state.readout) state.readout->history.add(segments, state.pixels);
+  if (state.circuit_readout) state.circuit_readout->history.add(segments, state.size.width, state.size.height);
   if (!state.integrate(workers)) {
     state.spoiled = true;
     for (const Segment& segment : segments) check_irradiance(segment);
   }
   state.queue.add(state.events, workers);
   if (state.readout) state.readout->advance(state.pixels, state.updates[0], state.queue, watermark);
+  if (state.circuit_readout) state.circuit_readout->advance(*state.circuit, state.queue, watermark);
 }
 
 void EventCamera::release_until(TimeNs until, std::vector<Event>& out) {
   if (state_->readout) return state_->readout->release_until(until, out);
+  if (state_->circuit_readout) return state_->circuit_readout->release_until(until, out);
   const EventSpan released = state_->queue.release_until(until);
   out.insert(out.end(), released.begin(), released.end());
 }
@@ -239,6 +264,13 @@ void EventCamera::process(std::span<const float> irradiance, TimeNs t, std::vect
 
 EventCameraStatistics EventCamera::statistics() const {
   const auto found = static_cast<std::int64_t>(state_->queue.size());
+  if (state_->circuit_readout) {
+    const CircuitReadout& readout = *state_->circuit_readout;
+    return {.dropped = readout.dropped(),
+            .delayed = readout.delayed(),
+            .longest_delay = readout.longest_delay(),
+            .in_flight = found + static_cast<std::int64_t>(readout.waiting())};
+  }
   if (!state_->readout) return {.in_flight = found};
   const PixelReadout& readout = *state_->readout;
   return {.dropped = readout.dropped(),

@@ -8,7 +8,18 @@
 namespace esim::inline event_camera {
 
 /// Sensors with published parameters (docs/methods/pixel.md has the sources).
-enum class SensorPreset { ideal, dvs128, davis240c, davis346, dvxplorer, gen31_vga, imx636, v2e_clean, v2e_noisy };
+enum class SensorPreset {
+  ideal,
+  dvs128,
+  davis240c,
+  davis346,
+  dvxplorer,
+  gen31_vga,
+  imx636,
+  v2e_clean,
+  v2e_noisy,
+  davis240c_2,  ///< by its circuit
+};
 
 /// How irradiance becomes brightness.
 enum class PixelResponse {
@@ -29,8 +40,42 @@ struct ReadoutOptions {
   double rate_mev_per_s = 0.0;
   double row_time_us = 0.0;
   int queue_events = 0;
+  double row_scan_us = 0.0;
+  double row_rest_us = 0.0;
+  double scan_period_us = 0.0;
+  bool scan_hold = false;
 
   bool limited() const { return rate_mev_per_s > 0 || row_time_us > 0; }
+  /// Whether the pixels wait for it.
+  bool acknowledges() const { return limited() || row_scan_us > 0 || row_rest_us > 0 || scan_period_us > 0; }
+};
+
+/// The circuit of the pixels before their comparators: photodiode, photoreceptor and source follower, with the shot
+/// noise of the photocurrent (docs/methods/circuit.md). It replaces log_eps, dark_irradiance, the low-pass, shot noise,
+/// threshold noise and latency, all of which follow from it.
+struct CircuitOptions {
+  double white_lux = 1000.0;
+  double f_number = 2.0;
+  double transmission = 0.9;
+  double photocurrent_fa_per_lux = 10.0;
+  double dark_current_fa = 1.0;
+  double photodiode_charge_e = 600.0;
+  double source_follower_hz = 200.0;
+  double noise = 1.0;
+
+  double threshold_mismatch_common = 0.0;
+  double noise_mismatch_decades = 0.0;
+  double refractory_mismatch_decades = 0.0;
+  double hot_mismatch_decades = 0.7;
+  double hot_off_fraction = 0.0;
+
+  /// The photocurrent of a pixel that sees a diffuse white surface at irradiance 1, fA. The illuminance of the sensor
+  /// is that of the surface times transmission / (4 f_number^2).
+  double white_photocurrent_fa() const {
+    return photocurrent_fa_per_lux * white_lux * transmission / (4 * f_number * f_number);
+  }
+  /// The dark current in units of the irradiance: L = ln(E + this), plus a constant.
+  double dark_irradiance() const { return dark_current_fa / white_photocurrent_fa(); }
 };
 
 /// Parameters of an event camera. Thresholds are changes of brightness, in natural logarithms. Effects that depend on
@@ -41,6 +86,7 @@ struct EventCameraOptions {
   double contrast_threshold = 0.5;
   std::optional<double> contrast_threshold_on{};   ///< C+; default: contrast_threshold
   std::optional<double> contrast_threshold_off{};  ///< C-; default: contrast_threshold
+  double threshold_ratio = 1.0;                    ///< C- / C+, unless C- is given
   double threshold_mismatch = 0.0;
   double threshold_noise = 0.0;
 
@@ -69,13 +115,17 @@ struct EventCameraOptions {
   double latency_jitter_us = 0.0;
   double latency_light_share = 0.0;
   ReadoutOptions readout{};
+  std::optional<CircuitOptions> circuit{};
 
   double threshold_on() const { return contrast_threshold_on.value_or(contrast_threshold); }
-  double threshold_off() const { return contrast_threshold_off.value_or(contrast_threshold); }
+  double threshold_off() const { return contrast_threshold_off.value_or(threshold_ratio * contrast_threshold); }
 
   /// The smaller of the two, C of Eq. 2: what tolerances of sampling are multiples of.
   double min_threshold() const { return std::min(threshold_on(), threshold_off()); }
 };
+
+/// Throws UserError if options contradict each other.
+void check(const EventCameraOptions& options);
 
 /// Minimum threshold of any pixel, whatever the noise: keeps the number of events per step finite.
 inline constexpr double kMinContrastThreshold = 0.01;
@@ -88,8 +138,9 @@ EventCameraOptions preset_options(SensorPreset preset);
 namespace esim {
 
 template <>
-inline constexpr std::array<const char*, 9> kEnumNames<SensorPreset>{
-    "ideal", "dvs128", "davis240c", "davis346", "dvxplorer", "gen3.1-vga", "imx636", "v2e-clean", "v2e-noisy"};
+inline constexpr std::array<const char*, 10> kEnumNames<SensorPreset>{
+    "ideal",      "dvs128", "davis240c", "davis346",  "dvxplorer",
+    "gen3.1-vga", "imx636", "v2e-clean", "v2e-noisy", "davis240c@2"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<PixelResponse>{"log", "lin_log"};
 template <>
@@ -106,6 +157,39 @@ void describe(Visitor& visit, ReadoutOptions& o) {
   visit(
       "queue_events", o.queue_events,
       About{"maximum number of waiting events; further events are dropped and counted; 0: one per pixel", "", 0, 1e9});
+  visit("row_scan_us", o.row_scan_us,
+        About{"with circuit: time in which the arbiter passes a row without requests; it visits the rows in turn", "us",
+              0, 1e6});
+  visit("row_rest_us", o.row_rest_us, About{"with circuit: minimum time between two readings of a row", "us", 0, 1e6});
+  visit("scan_period_us", o.scan_period_us,
+        About{"with circuit: period in which all columns are read one after the other; 0: rows are read on request",
+              "us", 0, 1e6});
+  visit("scan_hold", o.scan_hold, About{"whether a scan reports only events from before it began"});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, CircuitOptions& o) {
+  visit("white_lux", o.white_lux, About{"illuminance of a diffuse white surface at irradiance 1", "lux", 0, 1e9, true});
+  visit("f_number", o.f_number, About{"f-number of the lens", "", 0.1, 100});
+  visit("transmission", o.transmission, About{"fraction of the light that the lens transmits", "", 0, 1, true});
+  visit("photocurrent_fa_per_lux", o.photocurrent_fa_per_lux,
+        About{"photocurrent of a pixel per illuminance of the sensor", "fA/lux", 0, 1e9, true});
+  visit("dark_current_fa", o.dark_current_fa, About{"dark current of a pixel", "fA", 0, 1e9, true});
+  visit(
+      "photodiode_charge_e", o.photodiode_charge_e,
+      About{"charge that moves the photoreceptor by a factor of e: sets noise and time constant", "electrons", 1, 1e9});
+  visit("source_follower_hz", o.source_follower_hz,
+        About{"cut-off (-3 dB) of the source follower", "Hz", 0, 1e9, true});
+  visit("noise", o.noise, About{"factor on the standard deviation of the noise; 0: no noise", "", 0, 10});
+  visit("threshold_mismatch_common", o.threshold_mismatch_common,
+        About{"relative standard deviation, from pixel to pixel, that both thresholds share", "", 0, 1});
+  visit("noise_mismatch_decades", o.noise_mismatch_decades,
+        About{"standard deviation of log10 of the noise from pixel to pixel", "", 0, 1});
+  visit("refractory_mismatch_decades", o.refractory_mismatch_decades,
+        About{"standard deviation of log10 of the refractory period from pixel to pixel", "", 0, 1});
+  visit("hot_mismatch_decades", o.hot_mismatch_decades,
+        About{"standard deviation of log10 of the hot pixels' leak", "", 0, 2});
+  visit("hot_off_fraction", o.hot_off_fraction, About{"fraction of hot pixels that leak downwards", "", 0, 1});
 }
 
 template <class Visitor>
@@ -120,7 +204,8 @@ void describe(Visitor& visit, EventCameraOptions& o) {
   visit("contrast_threshold_on", o.contrast_threshold_on,
         About{"the same for ON events, C+ (default: contrast_threshold)", "", 0.01, 100});
   visit("contrast_threshold_off", o.contrast_threshold_off,
-        About{"the same for OFF events, C- (default: contrast_threshold)", "", 0.01, 100});
+        About{"the same for OFF events, C- (default: contrast_threshold times threshold_ratio)", "", 0.01, 100});
+  visit("threshold_ratio", o.threshold_ratio, About{"C- / C+, if contrast_threshold_off is not given", "", 0.01, 100});
   visit("threshold_mismatch", o.threshold_mismatch,
         About{"standard deviation of the thresholds from pixel to pixel, fixed in time", "", 0, 10});
   visit("threshold_noise", o.threshold_noise,
@@ -161,6 +246,9 @@ void describe(Visitor& visit, EventCameraOptions& o) {
   visit("latency_light_share", o.latency_light_share,
         About{"fraction of latency and jitter that is proportional to 1 / intensity", "", 0, 1});
   visit("readout", o.readout, About{"readout of the events from the pixels"});
+  visit(
+      "circuit", o.circuit,
+      About{"simulates the pixels' circuit, from light in lux, with its noise (default: none, but the effects above)"});
 }
 
 }  // namespace esim::inline event_camera

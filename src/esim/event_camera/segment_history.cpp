@@ -21,15 +21,24 @@ void keep(ImageView<float>& view, Image<float>& copy, const Tile& tile) {
 
 void SegmentHistory::add(std::span<const Segment> segments, const PixelArray& pixels) {
   width_ = pixels.width, height_ = pixels.height;
+  append(segments, !pixels.filtered1.empty(), !pixels.filtered2.empty(), pixels.options.surround_px > 0);
+}
+
+void SegmentHistory::add(std::span<const Segment> segments, int width, int height) {
+  width_ = width, height_ = height;
+  append(segments, true, true, false);
+}
+
+void SegmentHistory::append(std::span<const Segment> segments, bool filtered1, bool filtered2, bool ends) {
   added_ = count_;
   count_ += segments.size();
   if (segments_.size() < count_) segments_.resize(count_);
   for (std::size_t i = 0; i < segments.size(); ++i) {
     PastSegment& past = segments_[added_ + i];
     past.segment = segments[i];
-    if (!pixels.filtered1.empty()) make_size(past.filtered1, segments[i].tile);
-    if (!pixels.filtered2.empty()) make_size(past.filtered2, segments[i].tile);
-    if (pixels.options.surround_px > 0) make_size(past.start, segments[i].tile), make_size(past.end, segments[i].tile);
+    if (filtered1) make_size(past.filtered1, segments[i].tile);
+    if (filtered2) make_size(past.filtered2, segments[i].tile);
+    if (ends) make_size(past.start, segments[i].tile), make_size(past.end, segments[i].tile);
   }
   indexed_ = false;
 }

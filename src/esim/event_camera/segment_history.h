@@ -31,6 +31,8 @@ class SegmentHistory {
   /// Adds segments, whose irradiance is borrowed until keep_after(). The segments of a tile must be consecutive, and
   /// tiles must not overlap.
   void add(std::span<const Segment> segments, const PixelArray& pixels);
+  /// The same for pixels of a circuit: filtered1 receives their lag, filtered2 the signal minus the light.
+  void add(std::span<const Segment> segments, int width, int height);
   /// The i-th of the segments in the last add(), to fill in the state of the pixels.
   PastSegment& added(std::size_t i) { return segments_[added_ + i]; }
   bool empty() const { return count_ == 0; }
@@ -45,6 +47,7 @@ class SegmentHistory {
   const PastSegment& operator[](std::uint32_t i) const { return segments_[i]; }
 
  private:
+  void append(std::span<const Segment> segments, bool filtered1, bool filtered2, bool ends);
   void index();
 
   int width_ = 0, height_ = 0;

@@ -111,7 +111,10 @@ class Copy {
     const bool held = format_.can_hold(content);
     (held ? summary_.copied : summary_.left_out)[content] += size_of(record);
     if (!held) return;
-    if (const auto* events = std::get_if<EventsRecord>(&record)) note_rounding(*events);
+    if (const auto* events = std::get_if<EventsRecord>(&record)) {
+      if (events->events.empty()) return;
+      note_rounding(*events);
+    }
     to_->write(record);
   }
 
@@ -132,7 +135,8 @@ class Copy {
 };
 
 /// The report.json that makes a folder, with the files of its format, recognisable as a recording.
-std::string conversion_report(const RecordingInfo& info, const std::string& from, bool complete) {
+std::string conversion_report(const RecordingInfo& info, const std::string& from, bool complete,
+                              const std::function<std::map<std::string, std::string>()>& further) {
   auto cameras = nlohmann::ordered_json::array();
   for (const CameraInfo& camera : info.cameras) {
     cameras.push_back({{"name", camera.name}, {"width", camera.model.width}, {"height", camera.model.height}});
@@ -143,6 +147,9 @@ std::string conversion_report(const RecordingInfo& info, const std::string& from
     report["simulated_s"] = to_seconds(info.end - info.start);
   }
   report["cameras"] = cameras;
+  if (further) {
+    for (const auto& [name, json] : further()) report[name] = nlohmann::ordered_json::parse(json);
+  }
   return report.dump(2) + "\n";
 }
 
@@ -175,7 +182,8 @@ CopySummary convert_recording(const fs::path& from, const Format& format, const 
       options.read.recover(problem);
     };
   }
-  const std::unique_ptr<Source> source = open_source(from, reading);
+  std::unique_ptr<Source> source = open_source(from, reading);
+  if (options.change) source = options.change(std::move(source));
   if (!format.can_hold(Content::imu) && !format.can_hold(Content::poses)) require_camera(*source, from);
   bool copied = false;
   const auto copy_to = [&](const fs::path& path) {
@@ -198,7 +206,7 @@ CopySummary convert_recording(const fs::path& from, const Format& format, const 
     RecordingDirectory directory(to, options.replace);
     return keep_on_failure(directory, copied, [&] {
       const CopySummary summary = copy_to(directory.path());
-      directory.finish(conversion_report(source->info(), from.string(), summary.complete));
+      directory.finish(conversion_report(source->info(), from.string(), summary.complete, options.report));
       return summary;
     });
   }

@@ -37,6 +37,12 @@ struct ConvertOptions {
   CopyOptions copy{};
   ReadOptions read{};
   bool replace = false;  ///< replace existing output
+
+  /// If set, makes the source that is copied of the input, to change its records.
+  std::function<std::unique_ptr<Source>(std::unique_ptr<Source> input)> change{};
+
+  /// If set, called at the end if the output is a folder: further entries of its report.json, as JSON by their names.
+  std::function<std::map<std::string, std::string>()> report{};
 };
 
 /// Converts `from` to the file or folder `to`, which appears only when it is complete; see copy_recording(). What is

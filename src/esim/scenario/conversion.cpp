@@ -3,20 +3,24 @@
 #include "esim/scenario/yaml/yaml_reader.h"
 
 namespace esim::inline scenario {
+namespace {
+
+struct EventCameraAlone {
+  EventCameraOptions event_camera;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, EventCameraAlone& o) {
+  visit("event_camera", o.event_camera, About{});
+}
+
+}  // namespace
 
 EventCameraOptions read_event_camera(const std::vector<std::string>& overrides, const std::string& setter) {
   const std::string prefix = "event_camera.";
-  YAML::Node root(YAML::NodeType::Map);
-  YamlSource source;
-  source.setter = setter;
-  for (const std::string& text : overrides) {
-    source.changed.push_back(apply_override(root, text.starts_with(prefix) ? text : prefix + text, setter));
-  }
-  EventCameraOptions options;
-  YamlReader reader(root, "", source);
-  reader("event_camera", options, About{});
-  reader.finish();
-  return options;
+  std::vector<std::string> prefixed;
+  for (const std::string& text : overrides) prefixed.push_back(text.starts_with(prefix) ? text : prefix + text);
+  return read_overrides<EventCameraAlone>(prefixed, setter).event_camera;
 }
 
 }  // namespace esim::inline scenario

@@ -149,4 +149,18 @@ class YamlReader {
   std::set<std::string> known_;
 };
 
+/// The default options with overrides "key=value". Throws UserError, which begins with `setter`, with the key.
+template <typename Options>
+Options read_overrides(const std::vector<std::string>& overrides, const std::string& setter) {
+  YAML::Node root(YAML::NodeType::Map);
+  YamlSource source;
+  source.setter = setter;
+  for (const std::string& text : overrides) source.changed.push_back(apply_override(root, text, setter));
+  Options options;
+  YamlReader reader(root, "", source);
+  describe(reader, options);
+  reader.finish();
+  return options;
+}
+
 }  // namespace esim::inline scenario

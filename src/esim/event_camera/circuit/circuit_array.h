@@ -1,0 +1,96 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "esim/core/large_vector.h"
+#include "esim/core/per_pixel.h"
+#include "esim/core/random.h"
+#include "esim/core/time.h"
+#include "esim/event_camera/circuit/circuit_pixel.h"
+#include "esim/event_camera/options.h"
+#include "esim/event_camera/segment_history.h"
+#include "esim/events/packed_events.h"
+#include "esim/render/sample.h"
+
+// Private to event_camera.
+namespace esim::inline event_camera {
+
+/// The working memory of a thread.
+struct CircuitBuffer {
+  static constexpr std::size_t kTogether = 128;
+  template <typename T>
+  using Values = std::array<T, kTogether + kVectorPadding>;
+
+  Values<double> light, lag, y, v;                      // at the segment's end
+  Values<double> level, rate, fast, slow, k1, several;  // of CircuitPiece; several: not 0 if one step is not enough
+  std::vector<std::uint32_t> uncertain;                 // columns whose pixels may fire, or need more than one step
+  PerPixel<double> time, polarity, reported;            // of events
+  PerPixel<std::uint32_t> place;
+  std::size_t events = 0;
+};
+
+/// The pixels of a camera, by their circuit. In most segments, one vectorised solution of the front end and a
+/// comparison with bounds suffice for most pixels; CircuitPixel takes the others to the segment's end.
+class CircuitArray {
+ public:
+  CircuitArray(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream);
+
+  /// For a segment that is an instant: sets the references. Returns false, and changes nothing, if an irradiance is not
+  /// a finite number >= 0.
+  bool open(const Segment& segment, Rows rows);
+
+  /// For any other segment: adds the events of rows of its pixels to `events`. Returns false likewise.
+  bool advance(const Segment& segment, Rows rows, CircuitBuffer& buffer, PastSegment* past, PackedEvents& events);
+
+  /// Ends the wait of a pixel whose request has been read at `t`. Returns the end of its refractory period.
+  TimeNs acknowledge(std::uint32_t pixel, TimeNs t);
+
+  /// Takes a pixel that is held in reset through a past segment; appends its next request, if there is one.
+  void resume(std::uint32_t pixel, const PastSegment& past, CircuitBuffer& buffer, std::vector<Event>& requests);
+
+  void set_epoch(TimeNs t) {
+    if (epoch_ == kNoEpoch) epoch_ = t;
+  }
+
+  /// The variable state, for state_archive.h.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.value(self.epoch_);
+    archive.fixed(self.states_);
+    for (auto* values : {&self.light_, &self.lag_, &self.y_, &self.v_, &self.low_, &self.high_, &self.until_})
+      archive.fixed(*values);
+    archive.fixed(self.node_light_);
+  }
+
+ private:
+  static constexpr TimeNs kNoEpoch = std::numeric_limits<TimeNs>::min();
+
+  struct Row;
+  void make_pixels(const EventCameraOptions& options, std::uint64_t seed, std::uint16_t stream);
+  template <class D>
+  bool move_vector(D d, const Row& row, std::size_t x, CircuitBuffer& buffer, std::size_t at);
+  template <typename Emit>
+  void run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length, bool always,
+           const Emit& emit);
+  void advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer, PackedEvents& events);
+  void set_bounds(std::size_t pixel, const CircuitBounds& bounds);
+  static void flush(const Row& row, CircuitBuffer& buffer, PackedEvents& events);
+
+  Circuit circuit_;
+  int width_, height_;
+  AddressedRandom starts_;
+  double dark_ = 0;  // L = ln(E + dark)
+  TimeNs epoch_ = kNoEpoch;
+
+  // Per pixel.
+  LargeVector<CircuitParameters> parameters_;
+  LargeVector<CircuitPixelState> states_;
+  LargeVector<double> light_, lag_, y_, v_;  // at the last sample
+  LargeVector<double> low_, high_, until_;   // CircuitBounds, with absolute levels
+  LargeVector<float> node_light_, leak_;
+};
+
+}  // namespace esim::inline event_camera

@@ -1,0 +1,126 @@
+#include "esim/event_camera/circuit/circuit_pixel.h"
+
+namespace esim::inline event_camera {
+namespace {
+
+// Of the times at which a signal without noise crosses a level, and at which noise begins to matter.
+constexpr double kResolution_ns = 0.25, kNoiseResolution_ns = 30;
+
+constexpr double kRestingDeviations = 3.5;
+
+}  // namespace
+
+/// The first time in [a, b] at which the signal is so near to a threshold that the noise matters; without noise, at
+/// which it reaches the threshold.
+std::optional<double> CircuitPixel::find_near(double a, double b) const {
+  // The reach of the noise falls with rising light, so that it is greatest at one of the ends.
+  const double reach_a = reach(a, kWakeDeviations), reach_b = reach(b, kWakeDeviations);
+  const double value = signal(a);
+  if (value + reach_a >= upper() || value - reach_a <= lower()) return a;
+  const auto [low, high] = range(a, b);
+  const double reach_max = std::max(reach_a, reach_b);
+  if (high + reach_max < upper() && low - reach_max > lower()) return std::nullopt;
+  if (b - a <= (noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns)) {
+    const double last = signal(b);
+    return last + reach_b >= upper() || last - reach_b <= lower() ? std::optional(b) : std::nullopt;
+  }
+  const auto distance = [&](double s) {
+    const double here = signal(s);
+    return std::min(upper() - here, here - lower()) - reach(s, kWakeDeviations);
+  };
+  if (const double last = distance(b); last <= 0 && is_monotone(a, b)) {
+    // The Illinois method, between a positive and a negative distance.
+    double from = a, to = b, at_from = distance(a), at_to = last;
+    const double resolution = noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns;
+    for (int i = 0, side = 0; i < 60 && to - from > resolution; ++i) {
+      const double s = from + (to - from) * std::clamp(at_from / (at_from - at_to), 1e-3, 1 - 1e-3);
+      const double here = distance(s);
+      if (here <= 0) {
+        to = s, at_to = here;
+        if (side == 1) at_from *= 0.5;
+        side = 1;
+      } else {
+        from = s, at_from = here;
+        if (side == -1) at_to *= 0.5;
+        side = -1;
+      }
+      if (std::abs(here) < 1e-9) break;
+    }
+    return to;
+  }
+  const double middle = 0.5 * (a + b);
+  if (const auto found = find_near(a, middle)) return found;
+  return find_near(middle, b);
+}
+
+void CircuitPixel::start_interval(const NoiseState& from, double s) {
+  const double here = light(s), value = signal(s);
+  const double distance = std::min(upper() - value, value - lower()) / (gain_ * circuit_.deviation(here));
+  state_.node_time = start_ + s;
+  state_.node_light = static_cast<float>(here);
+  state_.active = distance < kSleepDeviations;
+  state_.node += 1;
+  state_.from = from;
+  if (!state_.active) return;
+  set_interval(noise_->next(from, pixel_, state_.node, noise_->pole_of(circuit_.t1_ns(here)),
+                            PhotoreceptorNoise::level_for(distance)));
+}
+
+void CircuitPixel::activate(double s) {
+  const double here = light(s);
+  const std::int32_t pole = noise_->pole_of(circuit_.t1_ns(here));
+  state_.node += 1;
+  const NoiseState from = noise_->after(state_.from, start_ + s - state_.node_time, pixel_, state_.node, pole);
+  start_interval(from, s);
+  if (state_.active) return;
+  state_.active = true;  // between the distances at which it falls asleep and wakes up
+  set_interval(noise_->next(from, pixel_, state_.node, pole, 0));
+}
+
+/// The noise at `s`, at the end of a reset. It continues from the last node before, whatever the signal did meanwhile.
+NoiseState CircuitPixel::noise_at(double s) {
+  if (state_.active) {
+    const PhotoreceptorNoise::Interval last = interval();
+    if (state_.node_time + last.length > start_ + s) return noise_->at(last, start_ + s - state_.node_time);
+    state_.from = last.to;
+    state_.node_time += last.length;
+    state_.node += 1;
+    state_.active = false;
+  }
+  state_.node += 1;
+  state_.from = noise_->after(state_.from, start_ + s - state_.node_time, pixel_, state_.node,
+                              noise_->pole_of(circuit_.t1_ns(light(s))));
+  state_.node_time = start_ + s;
+  state_.node_light = static_cast<float>(light(s));
+  return state_.from;
+}
+
+void CircuitPixel::open(double light, double time, double place) {
+  state_ = {};
+  // The noise fires a pixel before it comes nearer to a threshold than its reach.
+  const double reach = noise_ == nullptr ? 0.0 : kRestingDeviations * gain_ * circuit_.deviation(light);
+  const double above = std::max(0.0, static_cast<double>(parameters_.on) - reach),
+               below = std::max(0.0, static_cast<double>(parameters_.off) - reach);
+  state_.reference = light + leak_ * time - (place * (above + below) - below);
+  state_.node_time = time;
+  state_.node_light = static_cast<float>(light);
+  if (noise_ == nullptr) return;
+  state_.active = true;
+  state_.node = 1;
+  set_interval(noise_->first(pixel_, noise_->pole_of(circuit_.t1_ns(light)), PhotoreceptorNoise::kLevels - 1));
+  state_.reference += gain_ * state_.from.x;
+}
+
+void CircuitPixel::release(double s) {
+  state_.held_until = -1;
+  state_.reference = signal(s) + (noise_ != nullptr ? gain_ * noise_at(s).x : 0.0);
+}
+
+CircuitBounds CircuitPixel::bounds_without_noise() {
+  const double light_now = light(piece_.length);
+  state_.node_light = static_cast<float>(light_now);
+  const double margin = noise_ == nullptr ? 0.0 : kWakeDeviations * gain_ * circuit_.deviation(light_now - kLightReach);
+  return {margin - static_cast<double>(parameters_.off), static_cast<double>(parameters_.on) - margin, kNever};
+}
+
+}  // namespace esim::inline event_camera

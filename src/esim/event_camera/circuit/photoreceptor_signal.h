@@ -1,0 +1,70 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <utility>
+
+namespace esim::inline event_camera {
+
+/// Time constants of a pixel's circuit before its comparators (docs/methods/circuit.md).
+struct CircuitPoles {
+  double t1_unit_ns = 0;  ///< of the photodiode, Q / I, at the photocurrent of L = 0
+  double t2_ns = 0;       ///< of the source follower
+};
+
+/// The part of the brightness signal that follows light, after an instant. Light is L = ln(E + dark), natural
+/// logarithm.
+///
+/// Photodiode (large signal): Q dy/dt = I - exp(y), or (1 + lag)' = lambda (1 + lag) - lag I / Q with
+/// 1 + lag = exp(L - y) and lambda = dL/dt. In steady light, lag = 0 and y = L.
+/// Source follower: t2 dv/dt = y - v.
+struct CircuitState {
+  double lag = 0;  ///< exp(L - y) - 1
+  double v = 0;
+};
+
+/// The source follower's output on a stretch of time in which the photodiode's response is an exponential plus a line:
+/// v(s) = level + rate s + fast exp(-k1 s) + slow exp(-s / t2), s in ns after its start.
+struct CircuitPiece {
+  double level = 0, rate = 0, fast = 0, slow = 0, k1 = 0, k2 = 0;
+  double length = 0;  ///< ns
+
+  double value(double s) const { return level + rate * s + fast * std::exp(-k1 * s) + slow * std::exp(-k2 * s); }
+  double slope(double s) const { return rate - fast * k1 * std::exp(-k1 * s) - slow * k2 * std::exp(-k2 * s); }
+
+  /// Bounds of the values on [a, b], from the chord and the greatest curvature.
+  std::pair<double, double> range(double a, double b) const {
+    const double e1 = std::exp(-k1 * a), e2 = std::exp(-k2 * a);
+    const double va = level + rate * a + fast * e1 + slow * e2, vb = value(b);
+    const double curvature = std::abs(fast) * k1 * k1 * e1 + std::abs(slow) * k2 * k2 * e2;
+    // Either the curvature, or that each exponential is monotone, limits how far the values leave the chord.
+    const double beyond = std::min(0.125 * (b - a) * (b - a) * curvature, std::abs(fast) * e1 + std::abs(slow) * e2);
+    return {std::min(va, vb) - beyond, std::max(va, vb) + beyond};
+  }
+};
+
+/// The light of a pixel on a stretch: L(s) = light + rate s.
+struct LightRamp {
+  double light = 0, rate = 0;  ///< rate in 1/ns
+};
+
+/// The moments psi_k(a) = integral over x from 0 to 1 of x^k exp(-a (1 - x)), k = 0 to 3, for a >= 0.
+std::array<double, 4> exponential_moments(double a);
+
+/// Longest stretch that advance() takes in one step: the light may change by at most this.
+inline constexpr double kMaxLightStep = 0.1;
+
+/// Distance of the lag from that of a steady ramp, beyond which steps must be short compared with Q / I.
+inline constexpr double kMaxTransient = 0.03;
+
+/// Number of equal steps of advance() for a change of L over `length` ns. More are needed while the photodiode is far
+/// from equilibrium.
+int steps_for(const CircuitPoles& poles, const CircuitState& state, const LightRamp& ramp, double length);
+
+/// Advances the state by `length` ns, and returns the signal on the way.
+CircuitPiece advance(const CircuitPoles& poles, CircuitState& state, const LightRamp& ramp, double length);
+
+}  // namespace esim::inline event_camera

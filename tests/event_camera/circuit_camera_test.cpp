@@ -1,0 +1,203 @@
+// Cameras whose pixels are simulated by their circuit: what does not change their events, and what they do.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <tuple>
+#include <vector>
+
+#include "esim/core/error.h"
+#include "esim/event_camera/event_camera.h"
+#include "support/errors.h"
+
+namespace esim {
+namespace {
+
+constexpr int kWidth = 37, kHeight = 21;
+
+EventCameraOptions dim() {
+  EventCameraOptions options;
+  options.contrast_threshold = 0.12;
+  options.threshold_ratio = 1.2;
+  options.threshold_mismatch = 0.005;
+  options.refractory_period_us = 300;
+  options.leak_rate_hz = 0.2;
+  options.leak_mismatch_decades = 0.3;
+  options.hot_pixels = 0.02;
+  options.circuit = CircuitOptions{};
+  options.circuit->white_lux = 5;
+  options.circuit->threshold_mismatch_common = 0.07;
+  options.circuit->noise_mismatch_decades = 0.05;
+  return options;
+}
+
+using Light = std::function<float(int x, int y, double t_s)>;
+
+Image<float> image_of(const Light& light, double t_s) {
+  Image<float> image(kWidth, kHeight);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) image(x, y) = light(x, y, t_s);
+  }
+  return image;
+}
+
+/// All events of a camera that gets samples of the light at a rate.
+std::vector<Event> events_of(const EventCameraOptions& options, const Light& light, double rate_hz, double duration_s,
+                             int threads = 1) {
+  EventCamera camera(options, kWidth, kHeight, 3);
+  const Workers workers(threads);
+  std::vector<Event> events;
+  const auto count = static_cast<int>(std::lround(duration_s * rate_hz));
+  for (int k = 0; k <= count; ++k) {
+    const double t_s = k / rate_hz;
+    camera.process(image_of(light, t_s), static_cast<TimeNs>(std::llround(t_s * 1e9)), events, workers);
+  }
+  return events;
+}
+
+Light moving_waves() {
+  return [](int x, int y, double t) {
+    return static_cast<float>(0.5 + 0.45 * std::sin(0.9 * x + 0.4 * y + 12 * t) * std::cos(0.35 * y - 5 * t));
+  };
+}
+
+TEST(CircuitCamera, ThreadsAndTilesDoNotChangeItsEvents) {
+  for (const bool has_readout : {false, true}) {
+    EventCameraOptions options = dim();
+    if (has_readout) options.readout = {.rate_mev_per_s = 2, .row_time_us = 1, .row_scan_us = 0.5, .row_rest_us = 3};
+    const std::vector<Event> expected = events_of(options, moving_waves(), 500, 1);
+    ASSERT_GT(expected.size(), 2000U);
+    EXPECT_EQ(events_of(options, moving_waves(), 500, 1, 3), expected);
+
+    // The left part in segments of one sample, the right part in pairs of samples.
+    EventCamera camera(options, kWidth, kHeight, 3);
+    const Workers workers(2);
+    const Tile left{0, 0, 16, kHeight}, right{16, 0, kWidth - 16, kHeight};
+    std::vector<Image<float>> images;
+    for (int k = 0; k <= 500; ++k) images.push_back(image_of(moving_waves(), k / 500.0));
+    std::vector<Event> events;
+    const auto segment = [&](const Tile& tile, int from, int to) {
+      return Segment{tile, from * 2 * kNsPerMs, to * 2 * kNsPerMs, &images[static_cast<std::size_t>(from)],
+                     &images[static_cast<std::size_t>(to)]};
+    };
+    camera.integrate(std::vector{segment(left, 0, 0), segment(right, 0, 0)}, 0, workers);
+    for (int k = 0; k < 500; k += 2) {
+      camera.integrate(std::vector{segment(left, k, k + 1)}, k * 2 * kNsPerMs, workers);
+      camera.integrate(std::vector{segment(right, k, k + 1), segment(right, k + 1, k + 2), segment(left, k + 1, k + 2)},
+                       (k + 2) * 2 * kNsPerMs, workers);
+      camera.release_until((k + 2) * 2 * kNsPerMs, events);
+    }
+    EXPECT_EQ(events, expected) << has_readout;
+  }
+}
+
+TEST(CircuitCamera, EventsInConstantLightDoNotDependOnTheSampling) {
+  const Light constant = [](int x, int y, double) { return 0.02F + 0.01F * static_cast<float>((x + y) % 7); };
+  const std::vector<Event> expected = events_of(dim(), constant, 200, 2);
+  ASSERT_GT(expected.size(), 500U);
+  EXPECT_TRUE(events_of(dim(), constant, 1000, 2) == expected);
+  EXPECT_TRUE(events_of(dim(), constant, 20000, 2) == expected);
+}
+
+TEST(CircuitCamera, EventsOnRampsDoNotDependOnTheSampling) {
+  // Linear in log-irradiance after the first instant, as segments are.
+  const Light ramp = [](int x, int y, double t) {
+    return static_cast<float>(0.2 * std::exp((0.3 * ((x * 7 + y * 3) % 11) - 1.5) * t));
+  };
+  EventCameraOptions options = dim();
+  options.circuit->white_lux = 100;
+  options.circuit->dark_current_fa = 1e-6;  // otherwise the ramp of L would not be linear between samples
+  const std::vector<Event> expected = events_of(options, ramp, 20000, 1);
+  ASSERT_GT(expected.size(), 3000U);
+  for (const double rate_hz : {200.0, 1000.0}) {
+    const std::vector<Event> events = events_of(options, ramp, rate_hz, 1);
+    std::size_t near = 0;
+    std::multimap<std::tuple<int, int, int>, TimeNs> times;
+    for (const Event& e : expected) times.emplace(std::tuple{e.x, e.y, e.polarity}, e.t);
+    for (const Event& e : events) {
+      const auto [begin, end] = times.equal_range({e.x, e.y, e.polarity});
+      const auto found =
+          std::find_if(begin, end, [&](const auto& entry) { return std::abs(entry.second - e.t) <= kNsPerUs; });
+      if (found == end) continue;
+      times.erase(found);
+      ++near;
+    }
+    EXPECT_GE(static_cast<double>(near), 0.999 * static_cast<double>(std::max(events.size(), expected.size())))
+        << rate_hz;
+  }
+}
+
+TEST(CircuitCamera, ContinuesFromASavedState) {
+  const EventCameraOptions options = dim();
+  const Workers workers(1);
+  EventCamera first(options, kWidth, kHeight, 3), second(options, kWidth, kHeight, 3);
+  std::vector<Event> whole, parts;
+  for (int k = 0; k <= 200; ++k) first.process(image_of(moving_waves(), k * 1e-3), k * kNsPerMs, whole, workers);
+  EventCamera before(options, kWidth, kHeight, 3);
+  for (int k = 0; k <= 100; ++k) before.process(image_of(moving_waves(), k * 1e-3), k * kNsPerMs, parts, workers);
+  second.restore(before.state());
+  for (int k = 101; k <= 200; ++k) second.process(image_of(moving_waves(), k * 1e-3), k * kNsPerMs, parts, workers);
+  EXPECT_EQ(parts, whole);
+}
+
+TEST(CircuitCamera, NoiseAlternatesInTheDarkAndFallsSilentInLight) {
+  const auto rate_and_alternation = [](double irradiance) {
+    EventCameraOptions options = dim();
+    options.leak_rate_hz = 0, options.hot_pixels = 0;
+    const auto events = events_of(
+        options, [&](int, int, double) { return static_cast<float>(irradiance); }, 100, 10);
+    std::map<std::pair<int, int>, int> last;
+    double pairs = 0, alternating = 0;
+    for (const Event& e : events) {
+      int& before = last[{e.x, e.y}];
+      if (before != 0) pairs += 1, alternating += before != e.polarity ? 1 : 0;
+      before = e.polarity;
+    }
+    return std::pair{static_cast<double>(events.size()) / (10.0 * kWidth * kHeight),
+                     alternating / std::max(pairs, 1.0)};
+  };
+  const auto [dark_hz, alternation] = rate_and_alternation(0.02);
+  const auto [light_hz, unused] = rate_and_alternation(1e5);
+  static_cast<void>(unused);
+  EXPECT_GT(dark_hz, 0.2);
+  EXPECT_GT(alternation, 0.9);
+  EXPECT_LT(light_hz, 1e-3);
+}
+
+TEST(CircuitCamera, RowsAreReadAtOneTimeAndRest) {
+  EventCameraOptions options = dim();
+  options.readout = {.rate_mev_per_s = 5, .row_time_us = 0.3, .row_scan_us = 0.2, .row_rest_us = 200};
+  const std::vector<Event> events = events_of(options, moving_waves(), 500, 1);
+  std::map<int, TimeNs> last;
+  std::size_t shared = 0;
+  for (const Event& e : events) {
+    const auto found = last.find(e.y);
+    if (found != last.end() && found->second == e.t) ++shared;
+    if (found != last.end() && found->second != e.t) {
+      EXPECT_GE(e.t - found->second, 200 * kNsPerUs);
+    }
+    last[e.y] = e.t;
+  }
+  EXPECT_GT(shared, events.size() / 100);
+}
+
+TEST(CircuitCamera, ScansStampByColumnAndScan) {
+  EventCameraOptions options = dim();
+  options.readout.scan_period_us = 197.3;
+  const TimeNs period = to_ns(197.3e-6);
+  const std::vector<Event> events = events_of(options, moving_waves(), 500, 0.5);
+  ASSERT_GT(events.size(), 500U);
+  for (const Event& e : events) EXPECT_EQ((e.t - period * e.x / kWidth) % period, 0);
+}
+
+TEST(CircuitCamera, OptionsOfTheOtherModelAreRefused) {
+  EventCameraOptions options = dim();
+  options.shot_noise_hz = 5;
+  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { EventCamera(options, 8, 8); }), "shot_noise_hz"));
+}
+
+}  // namespace
+}  // namespace esim

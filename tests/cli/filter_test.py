@@ -3,6 +3,7 @@
 Run as: filter_test.py ESIM_PROGRAM SCENES, with the standard library of Python alone.
 """
 
+import itertools
 import json
 import os
 import pathlib
@@ -104,7 +105,7 @@ class Filter(ProgramTest):
     def test_the_order_of_the_options_does_not_matter(self):
         several = [["--rate-controller-events-per-period", "2", "--rate-controller-period-us", "1000"], ["--trail"],
                    ["--roi", "0,0,40,40"], ["--mask-pixel", "8,8"]]
-        results = {self.filtered(*sum(order, [])) for order in (several, several[::-1])}
+        results = {self.filtered(*itertools.chain(*order)) for order in (several, several[::-1])}
         self.assertEqual(len(results), 1)
 
     def test_every_format_gives_the_same_events(self):

@@ -13,7 +13,7 @@ constexpr double kRestingDeviations = 3.5;
 /// The first time in [a, b] at which the signal is so near to a threshold that the noise matters; without noise, at
 /// which it reaches the threshold.
 std::optional<double> CircuitPixel::find_near(double a, double b) const {
-  // The reach of the noise falls with rising light, so that it is greatest at one of the ends.
+  // The reach of the noise falls with rising light, so that it has its maximum at one of the ends.
   const double reach_a = reach(a, kWakeDeviations), reach_b = reach(b, kWakeDeviations);
   const double value = signal(a);
   if (value + reach_a >= upper() || value - reach_a <= lower()) return a;
@@ -73,7 +73,7 @@ void CircuitPixel::activate(double s) {
   const NoiseState from = noise_->after(state_.from, start_ + s - state_.node_time, pixel_, state_.node, pole);
   start_interval(from, s);
   if (state_.active) return;
-  state_.active = true;  // between the distances at which it falls asleep and wakes up
+  state_.active = true;  // between the distances at which it becomes inactive and active
   set_interval(noise_->next(from, pixel_, state_.node, pole, 0));
 }
 

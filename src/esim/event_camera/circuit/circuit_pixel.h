@@ -103,7 +103,7 @@ class CircuitPixel {
   }
 
   std::optional<double> find_near(double a, double b) const;
-  /// Whether the slope of the signal has one sign on [a, b], by its ends and its greatest curvature.
+  /// Whether the slope of the signal has one sign on [a, b], by its ends and its maximum curvature.
   bool is_monotone(double a, double b) const {
     const double sa = piece_.slope(a) + leak_, sb = piece_.slope(b) + leak_;
     return sa * sb > 0 && std::min(std::abs(sa), std::abs(sb)) > 0.25 * std::abs(sa - sb);

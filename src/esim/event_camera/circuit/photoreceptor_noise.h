@@ -148,7 +148,7 @@ class PhotoreceptorNoise {
   static constexpr double kCoarse = 0.3;  // neglected deviation, in changes of the signal over the piece
 
   double variance_, t2_, log_step_, log_first_;
-  double coarse_ = 0;  // greatest length of such a piece, ns
+  double coarse_ = 0;  // maximum length of such a piece, ns
   AddressedRandom random_;
   std::vector<Pole> poles_;
 };

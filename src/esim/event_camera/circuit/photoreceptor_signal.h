@@ -35,7 +35,7 @@ struct CircuitPiece {
   double value(double s) const { return level + rate * s + fast * std::exp(-k1 * s) + slow * std::exp(-k2 * s); }
   double slope(double s) const { return rate - fast * k1 * std::exp(-k1 * s) - slow * k2 * std::exp(-k2 * s); }
 
-  /// Bounds of the values on [a, b], from the chord and the greatest curvature.
+  /// Bounds of the values on [a, b], from the chord and the maximum curvature.
   std::pair<double, double> range(double a, double b) const {
     const double e1 = std::exp(-k1 * a), e2 = std::exp(-k2 * a);
     const double va = level + rate * a + fast * e1 + slow * e2, vb = value(b);

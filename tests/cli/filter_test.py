@@ -3,7 +3,6 @@
 Run as: filter_test.py ESIM_PROGRAM SCENES, with the standard library of Python alone.
 """
 
-import itertools
 import json
 import os
 import pathlib
@@ -74,10 +73,12 @@ class Filter(ProgramTest):
         return "".join(map(to_line, events))
 
     def test_regions_and_masks(self):
-        inside = lambda e: 8 <= e[1] < 32 and 16 <= e[2] < 40
+        def inside(e):
+            return 8 <= e[1] < 32 and 16 <= e[2] < 40
         self.assertEqual(self.filtered("--roi", "8,16,24,24"), self.lines(filter(inside, self.events)))
         self.assertEqual(self.filtered("--roni", "8,16,24,24"), self.lines(e for e in self.events if not inside(e)))
-        both = lambda e: inside(e) or (e[1], e[2]) == (56, 40)
+        def both(e):
+            return inside(e) or (e[1], e[2]) == (56, 40)
         self.assertEqual(self.filtered("--roi", "8,16,24,24", "--roi", "56,40,1,1"), self.lines(filter(both, self.events)))
         masked = [e for e in self.events if (e[1], e[2]) not in ((8, 8), (16, 0), (24, 32))]
         mask = self.folder / "mask.txt"
@@ -105,7 +106,7 @@ class Filter(ProgramTest):
     def test_the_order_of_the_options_does_not_matter(self):
         several = [["--rate-controller-events-per-period", "2", "--rate-controller-period-us", "1000"], ["--trail"],
                    ["--roi", "0,0,40,40"], ["--mask-pixel", "8,8"]]
-        results = {self.filtered(*itertools.chain(*order)) for order in (several, several[::-1])}
+        results = {self.filtered(*(word for option in order for word in option)) for order in (several, several[::-1])}
         self.assertEqual(len(results), 1)
 
     def test_every_format_gives_the_same_events(self):
@@ -152,7 +153,8 @@ class Filter(ProgramTest):
         self.assertGreater(report["filtered"][0]["dropped"]["trail"], 0)
         plain = self.folder / "plain"
         self.assertEqual(run("convert", recording, plain, "--time-unit", "ns").returncode, 0)
-        names = lambda folder: {p.relative_to(folder) for p in folder.rglob("*") if p.is_file()}
+        def names(folder):
+            return {p.relative_to(folder) for p in folder.rglob("*") if p.is_file()}
         self.assertEqual(names(self.out), names(plain))
         for name in names(plain) - {pathlib.Path("report.json"), pathlib.Path("cam0/events.h5")}:
             self.assertEqual((self.out / name).read_bytes(), (plain / name).read_bytes(), name)
@@ -173,7 +175,8 @@ class Filter(ProgramTest):
 
     def test_what_is_refused(self):
         out = ["-o", self.out.with_suffix(".txt")]
-        refused = lambda *arguments, **options: self.assert_refused(run("filter", self.text, *arguments), *options["says"])
+        def refused(*arguments, **options):
+            return self.assert_refused(run("filter", self.text, *arguments), *options["says"])
         refused(*out, *SIZE, says=["no filter is chosen", "--trail"])
         refused("--trail", says=["--out"])
         refused(*out, "--trail", says=["size of the sensor", "--width and --height"])

@@ -61,7 +61,7 @@ std::unique_ptr<Sampler> build_sampler(const CameraOptions& options, const World
   const Workers& workers = *world.workers;
   const Camera& model = world.info.cameras[index].model;
   const EventCameraOptions& sensor = options.event_camera;
-  const SensorTraits traits{sensor.min_threshold(), sensor.log_eps, sees_colour(options)};
+  const SensorTraits traits{sensor.min_threshold(), sensor.dark_light(), sees_colour(options)};
   const auto make_other = [&](const Camera& camera, const std::optional<PixelArea>& area) -> std::unique_ptr<Renderer> {
     if (!area) return make_renderer.make(camera, options.colour, workers);
     return make_renderer.make_with_area ? make_renderer.make_with_area(camera, *area, workers) : nullptr;

@@ -41,9 +41,9 @@ Scenario bare(const Scenario& scenario) {
   EventCameraOptions& sensor = bare.cameras[0].event_camera;
   sensor = {};
   sensor.contrast_threshold = given.contrast_threshold;
-  sensor.contrast_threshold_on = given.contrast_threshold_on;
-  sensor.contrast_threshold_off = given.contrast_threshold_off;
-  sensor.log_eps = given.log_eps;
+  sensor.contrast_threshold_on = given.threshold_on();
+  sensor.contrast_threshold_off = given.threshold_off();
+  sensor.log_eps = given.dark_light();
   bare.cameras[0].events = true;
   bare.cameras[0].frame_camera.reset();
   bare.truth.rate_hz = bare.truth.pose_rate_hz = 0;
@@ -97,7 +97,7 @@ class Evaluation {
     result_.span = {world_.info.start, world_.info.end};
     const EventCameraOptions& sensor = scenario_.cameras[0].event_camera;
     result_.contrast_threshold = sensor.min_threshold();
-    result_.log_eps = sensor.log_eps;
+    result_.log_eps = sensor.dark_light();
     result_.pixels = spread_pixels(model.width, model.height, options.pixels);
   }
 

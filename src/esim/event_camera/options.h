@@ -117,6 +117,8 @@ struct EventCameraOptions {
   ReadoutOptions readout{};
   std::optional<CircuitOptions> circuit{};
 
+  /// What is added to the irradiance before the logarithm.
+  double dark_light() const { return circuit ? circuit->dark_irradiance() : log_eps; }
   double threshold_on() const { return contrast_threshold_on.value_or(contrast_threshold); }
   double threshold_off() const { return contrast_threshold_off.value_or(threshold_ratio * contrast_threshold); }
 

@@ -13,8 +13,8 @@ constexpr double kRestingDeviations = 3.5;
 /// The first time in [a, b] at which the signal is so near to a threshold that the noise matters; without noise, at
 /// which it reaches the threshold.
 std::optional<double> CircuitPixel::find_near(double a, double b) const {
-  // The reach of the noise falls with rising light, so that it has its maximum at one of the ends.
-  const double reach_a = reach(a, kWakeDeviations), reach_b = reach(b, kWakeDeviations);
+  // The reach of the noise falls with rising light, so that it is maximal at one of the ends.
+  const double reach_a = reach(a, kActiveDeviations), reach_b = reach(b, kActiveDeviations);
   const double value = signal(a);
   if (value + reach_a >= upper() || value - reach_a <= lower()) return a;
   const auto [low, high] = range(a, b);
@@ -26,7 +26,7 @@ std::optional<double> CircuitPixel::find_near(double a, double b) const {
   }
   const auto distance = [&](double s) {
     const double here = signal(s);
-    return std::min(upper() - here, here - lower()) - reach(s, kWakeDeviations);
+    return std::min(upper() - here, here - lower()) - reach(s, kActiveDeviations);
   };
   if (const double last = distance(b); last <= 0 && is_monotone(a, b)) {
     // The Illinois method, between a positive and a negative distance.
@@ -58,7 +58,7 @@ void CircuitPixel::start_interval(const NoiseState& from, double s) {
   const double distance = std::min(upper() - value, value - lower()) / (gain_ * circuit_.deviation(here));
   state_.node_time = start_ + s;
   state_.node_light = static_cast<float>(here);
-  state_.active = distance < kSleepDeviations;
+  state_.active = distance < kInactiveDeviations;
   state_.node += 1;
   state_.from = from;
   if (!state_.active) return;
@@ -119,7 +119,8 @@ void CircuitPixel::release(double s) {
 CircuitBounds CircuitPixel::bounds_without_noise() {
   const double light_now = light(piece_.length);
   state_.node_light = static_cast<float>(light_now);
-  const double margin = noise_ == nullptr ? 0.0 : kWakeDeviations * gain_ * circuit_.deviation(light_now - kLightReach);
+  const double margin =
+      noise_ == nullptr ? 0.0 : kActiveDeviations * gain_ * circuit_.deviation(light_now - kLightReach);
   return {margin - static_cast<double>(parameters_.off), static_cast<double>(parameters_.on) - margin, kNever};
 }
 

@@ -51,9 +51,9 @@ struct CircuitBounds {
 };
 
 inline constexpr double kLightReach = 0.2;  ///< change of L within which the noise keeps its time constant
-inline constexpr double kWakeDeviations =
+inline constexpr double kActiveDeviations =
     5.5;  ///< distance to a threshold, in deviations, at which noise begins to matter
-inline constexpr double kSleepDeviations = 6.0;  ///< distance at a node at which it ceases to matter
+inline constexpr double kInactiveDeviations = 6.0;  ///< distance at a node at which it ceases to matter
 
 /// Takes a pixel through a piece of its signal: its events, its refractory periods, its noise. The comparator's signal
 /// is S(s) = piece.value(s) + leak (start + s), to which the noise is added.

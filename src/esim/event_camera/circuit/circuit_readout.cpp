@@ -16,6 +16,8 @@ CircuitReadout::CircuitReadout(const ReadoutOptions& options, int width, int hei
     : options_(options),
       width_(width),
       scan_(to_ns(options.scan_period_us * 1e-6)),
+      usual_delay_(to_ns(1e-6 * (1 + options.scan_period_us * (options.scan_hold ? 2 : 1) + options.row_rest_us +
+                                 options.row_scan_us * height))),
       row_time_(1e3 * options.row_time_us),
       event_time_(options.rate_mev_per_s > 0 ? 1e3 / options.rate_mev_per_s : 0.0),
       pass_(1e3 * options.row_scan_us),
@@ -58,7 +60,7 @@ void CircuitReadout::take(const Event& request) {
 void CircuitReadout::stamp(CircuitArray& pixels, const Event& request, TimeNs t) {
   read_.push_back({t, request.x, request.y, request.polarity});
   longest_delay_ = std::max(longest_delay_, t - request.t);
-  delayed_ += t - request.t > kNsPerUs ? 1 : 0;
+  delayed_ += t - request.t > usual_delay_ ? 1 : 0;
   const auto pixel = static_cast<std::uint32_t>(request.y) * static_cast<std::uint32_t>(width_) +
                      static_cast<std::uint32_t>(request.x);
   const TimeNs resumes = pixels.acknowledge(pixel, t);

@@ -76,6 +76,7 @@ class CircuitReadout {
   ReadoutOptions options_;
   int width_;
   TimeNs scan_;
+  TimeNs usual_delay_;                          // of an idle readout, at most
   double row_time_, event_time_, pass_, rest_;  // ns
 
   std::vector<Event> requests_;       // not yet taken: a heap with the earliest on top

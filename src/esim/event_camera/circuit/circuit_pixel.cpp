@@ -4,7 +4,7 @@ namespace esim::inline event_camera {
 namespace {
 
 // Of the times at which a signal without noise crosses a level, and at which noise begins to matter.
-constexpr double kResolution_ns = 0.25, kNoiseResolution_ns = 30;
+constexpr double kResolution_ns = 0.25, kNoiseResolution_ns = 1e-3;
 
 constexpr double kRestingDeviations = 3.5;
 
@@ -44,7 +44,7 @@ std::optional<double> CircuitPixel::find_near(double a, double b) const {
         if (side == -1) at_to *= 0.5;
         side = -1;
       }
-      if (std::abs(here) < 1e-9) break;
+      if (here == 0) break;
     }
     return to;
   }

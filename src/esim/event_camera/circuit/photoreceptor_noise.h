@@ -68,8 +68,9 @@ class PhotoreceptorNoise {
   double deviation(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].deviation; }
   double deviation_at(double t1_ns) const { return std::sqrt(variance_ * t1_ns / (t1_ns + t2_)); }
 
-  /// The level of the next interval, for the distance of the nearer threshold in standard deviations.
-  static std::int32_t level_for(double z) { return z < 2.5 ? 4 : z < 3.5 ? 3 : z < 4.5 ? 2 : z < 5.5 ? 1 : 0; }
+  /// The level of the next interval, for the distance of the nearer threshold in standard deviations. No limit may be
+  /// the distance at which noise begins to matter, where rounding would decide.
+  static std::int32_t level_for(double z) { return z < 2.5 ? 4 : z < 3.5 ? 3 : z < 4.5 ? 2 : z < 5.2 ? 1 : 0; }
 
   /// The first interval of a pixel, from the stationary distribution.
   Interval first(std::uint32_t pixel, std::int32_t pole, std::int32_t level) const;

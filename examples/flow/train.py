@@ -181,7 +181,7 @@ def train(training, folder):
 
     def report(losses, errors):
         epe, zero = training.validate()
-        mean = lambda values: sum(values) / len(values) if values else float("nan")  # noqa: E731
+        mean = lambda values: sum(values) / len(values) if values else float("nan")
         log.add(dict(zip(COLUMNS, (training.iteration, training.seconds, training.rate(), mean(losses), mean(errors), epe, zero))))
 
     if training.iteration == 0:

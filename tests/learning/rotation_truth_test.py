@@ -248,7 +248,7 @@ class BadInput(unittest.TestCase):
         return self.path
 
     def test_calibration(self):
-        read = lambda path: Calibration.read(path, 240, 180)  # noqa: E731
+        read = lambda path: Calibration.read(path, 240, 180)
         good = "199.09 198.83 132.19 110.71 -0.368 0.151 -0.0003 -0.0008 0"
         self.assertEqual(read(self.write(good)).p2, -0.0008)
         self.refused(read, "199.09 198.83 132.19 110.71 -0.368 0.151 -0.0003 -0.0008", ":1: 8 columns instead of 9")

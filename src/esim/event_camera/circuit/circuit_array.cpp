@@ -64,8 +64,8 @@ void CircuitArray::make_pixels(const EventCameraOptions& options, std::uint64_t 
     const auto [hot, sign] = random.uniforms(pixel, 3);
     const auto [hot_decades, unused] = random.normals(pixel, 4);
     static_cast<void>(unused);
-    const auto threshold = [&](double mean, double own) {
-      return std::max(mean * (1 + o.threshold_mismatch_common * common) + options.threshold_mismatch * own,
+    const auto threshold = [&, both = common](double mean, double own) {  // clang 14 does not capture `common` itself
+      return std::max(mean * (1 + o.threshold_mismatch_common * both) + options.threshold_mismatch * own,
                       std::max(kMinContrastThreshold, 0.2 * mean));
     };
     CircuitParameters& p = parameters_[i];

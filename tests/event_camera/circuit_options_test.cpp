@@ -1,4 +1,5 @@
-// Options of pixels by their circuit: values that are refused, the estimate of the noise, the maximum rate, time stamps.
+// Options of pixels by their circuit: values that are refused, the estimate of the noise, the maximum rate, time
+// stamps.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -25,7 +26,7 @@ struct Outcome {
 
 /// Events of a uniform field with irradiance(t_s).
 Outcome run(const EventCameraOptions& options, const std::function<double(double)>& irradiance, double rate_hz,
-        double duration_s, int threads = 1) {
+            double duration_s, int threads = 1) {
   EventCamera camera(options, kWidth, kHeight, 5);
   const Workers workers(threads);
   Outcome out;
@@ -204,12 +205,15 @@ TEST(CircuitOptions, TimeStampsAreMultiplesOfTheirUnit) {
 TEST(CircuitOptions, DeadPixelsAreSilent) {
   EventCameraOptions options = circuit(0.05);
   options.dead_pixels = 0.25;
-  const Outcome done = run(options, [](double t) { return 0.3 + 0.2 * std::sin(40 * t); }, 100, 0.3);
+  const Outcome done = run(
+      options, [](double t) { return 0.3 + 0.2 * std::sin(40 * t); }, 100, 0.3);
   std::map<std::pair<int, int>, int> counts;
   for (const Event& e : done.events) ++counts[{e.x, e.y}];
   EXPECT_NEAR(static_cast<double>(counts.size()) / (kWidth * kHeight), 0.75, 0.06);
   options.dead_pixels = 1;
-  EXPECT_TRUE(run(options, [](double t) { return 0.3 + 0.2 * std::sin(40 * t); }, 100, 0.3).events.empty());
+  EXPECT_TRUE(run(
+                  options, [](double t) { return 0.3 + 0.2 * std::sin(40 * t); }, 100, 0.3)
+                  .events.empty());
 }
 
 TEST(CircuitOptions, AnyLightIsSafe) {
@@ -219,7 +223,9 @@ TEST(CircuitOptions, AnyLightIsSafe) {
       options.circuit->white_lux = lux;
       options.circuit->dark_current_fa = dark_fa;
       options.refractory_period_us = 1000;
-      EXPECT_NO_THROW(run(options, [](double t) { return 5 * t; }, 100, 0.05)) << lux << " " << dark_fa;
+      EXPECT_NO_THROW(run(
+          options, [](double t) { return 5 * t; }, 100, 0.05))
+          << lux << " " << dark_fa;
     }
   }
 }

@@ -487,8 +487,9 @@ TEST_F(ScenarioFile, APresetHasVersions) {
   EXPECT_TRUE(contains(write_scenario(read(kMinimal, {"event_camera.preset=davis346"})), "preset: davis346@2"));
 
   const auto problem = [&](const std::string& name) { return error(kMinimal, {"event_camera.preset=" + name}); };
-  EXPECT_TRUE(contains(problem("davis346@3"), "event_camera.preset: 'davis346@3' does not exist; davis346 has the "
-                                              "versions 1 and 2"));
+  EXPECT_TRUE(contains(problem("davis346@3"),
+                       "event_camera.preset: 'davis346@3' does not exist; davis346 has the "
+                       "versions 1 and 2"));
   EXPECT_TRUE(contains(problem("genx320@1"), "genx320 has the version 2"));
   EXPECT_TRUE(contains(problem("ideal@1"), "ideal has no versions"));
   EXPECT_TRUE(contains(problem("davis346@"), "davis346 has the versions 1 and 2"));
@@ -517,10 +518,10 @@ TEST_F(ScenarioFile, TheLightAppliesToEveryEventCamera) {
   for (const char* value : {"0", "-1", "1e10", ".nan", ".inf"}) {
     EXPECT_TRUE(contains(error(kMinimal, {std::string("light.white_lux=") + value}), "light.white_lux: ")) << value;
   }
-  for (const char* bad : {"white_lux: -2", "white_lux: 0", "f_number: 0", "transmission: 0", "transmission: 1.5",
-                          "photocurrent_fa_per_lux: 0", "dark_current_fa: 0", "photodiode_charge_e: 0",
-                          "source_follower_hz: 0", "source_follower_hz: .inf", "noise: -1", "noise: .nan",
-                          "max_rate_hz: -1"}) {
+  for (const char* bad :
+       {"white_lux: -2", "white_lux: 0", "f_number: 0", "transmission: 0", "transmission: 1.5",
+        "photocurrent_fa_per_lux: 0", "dark_current_fa: 0", "photodiode_charge_e: 0", "source_follower_hz: 0",
+        "source_follower_hz: .inf", "noise: -1", "noise: .nan", "max_rate_hz: -1"}) {
     const std::string key = std::string(bad).substr(0, std::string(bad).find(':'));
     const std::string message = error(kMinimal, {"event_camera.circuit={" + std::string(bad) + "}"});
     EXPECT_TRUE(contains(message, "event_camera.circuit." + key)) << message;

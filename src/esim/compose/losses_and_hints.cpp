@@ -20,7 +20,7 @@ double percent(std::int64_t part, std::int64_t whole) {
 std::string grouped(std::int64_t count) { return esim::grouped(static_cast<std::uint64_t>(count)); }
 
 void add_sensor(const std::string& name, const ReadoutOptions& readout, const EventCameraStatistics& sensor,
-                 std::int64_t events, std::vector<std::string>& lines) {
+                std::int64_t events, std::vector<std::string>& lines) {
   if (sensor.dropped > 0) {
     lines.push_back(
         fmt::format("{}the readout dropped {} of {} events ({:.3g} %), because its queue of {} events was full: raise "

@@ -1,12 +1,7 @@
 #pragma once
 
 #include <array>
-#include <concepts>
 #include <limits>
-#include <optional>
-#include <string>
-#include <string_view>
-#include <vector>
 
 namespace esim::inline core {
 
@@ -26,15 +21,5 @@ struct About {
 /// The names of an option's enumerators as they are written, in order; specialised for each enumeration.
 template <typename Enum>
 inline constexpr std::array<const char*, 0> kEnumNames{};
-
-/// A class whose values have names and are written as these: T::names() lists them, T::find(name) is the value of a
-/// name, if there is one, and T::problem(name) may say why there is none.
-template <typename T>
-concept NamedValue = requires(const T& value, std::string_view name) {
-  { value.name() } -> std::same_as<std::string>;
-  { T::names() } -> std::same_as<std::vector<std::string>>;
-  { T::find(name) } -> std::same_as<std::optional<T>>;
-  { T::problem(name) } -> std::same_as<std::string>;
-};
 
 }  // namespace esim::inline core

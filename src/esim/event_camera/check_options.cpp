@@ -18,7 +18,8 @@ class RangeCheck {
   explicit RangeCheck(std::string where) : where_(std::move(where)) {}
 
   void operator()(const char* name, double value, const About& about) const {
-    if (std::isfinite(value) && value <= about.max && (about.above_min ? value > about.min : value >= about.min)) return;
+    if (std::isfinite(value) && value <= about.max && (about.above_min ? value > about.min : value >= about.min))
+      return;
     throw UserError(fmt::format("event camera: {}.{} = {}; it must be {} {:g} and at most {:g}", where_, name, value,
                                 about.above_min ? "above" : "at least", about.min, about.max));
   }
@@ -41,7 +42,8 @@ void check_ranges(const char* where, Options options) {
 
 void refuse_without_circuit(const char* name, double value) {
   if (value == 0) return;
-  throw UserError(fmt::format("event camera: readout.{} = {:.6g} needs circuit; set circuit, or remove it", name, value));
+  throw UserError(
+      fmt::format("event camera: readout.{} = {:.6g} needs circuit; set circuit, or remove it", name, value));
 }
 
 }  // namespace
@@ -60,8 +62,8 @@ void check(const EventCameraOptions& o) {
   const std::string remedy = older.empty() ? "remove it" : "remove it, or choose preset " + older;
   const auto refuse = [&](const char* name, double value) {
     if (value == 0) return;
-    throw UserError(
-        fmt::format("event camera: {} = {:.6g}, but with circuit this follows from the circuit; {}", name, value, remedy));
+    throw UserError(fmt::format("event camera: {} = {:.6g}, but with circuit this follows from the circuit; {}", name,
+                                value, remedy));
   };
   refuse("threshold_noise", o.threshold_noise);
   refuse("low_pass_hz", o.low_pass_hz);

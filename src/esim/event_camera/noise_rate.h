@@ -25,7 +25,7 @@ struct NoiseEstimate {
 /// deviation in the dark.
 std::optional<NoiseEstimate> excessive_noise(const EventCameraOptions& options);
 
-/// The maximum rate of events of a pixel by CircuitOptions::max_rate_hz, Hz; infinity if there is none.
+/// The maximum rate of events of a pixel by CircuitOptions::max_rate_hz, Hz; infinity: no maximum.
 double max_rate_hz(const EventCameraOptions& options);
 
 }  // namespace esim::inline event_camera

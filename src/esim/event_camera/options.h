@@ -187,8 +187,9 @@ void describe(Visitor& visit, ReadoutOptions& o) {
 
 template <class Visitor>
 void describe(Visitor& visit, CircuitOptions& o) {
-  visit("white_lux", o.white_lux,
-        About{"illuminance of a diffuse white surface at irradiance 1 (default: light.white_lux)", "lux", 0, 1e9, true});
+  visit(
+      "white_lux", o.white_lux,
+      About{"illuminance of a diffuse white surface at irradiance 1 (default: light.white_lux)", "lux", 0, 1e9, true});
   visit("f_number", o.f_number, About{"f-number of the lens", "", 0.1, 100});
   visit("transmission", o.transmission, About{"fraction of the light that the lens transmits", "", 0, 1, true});
   visit("photocurrent_fa_per_lux", o.photocurrent_fa_per_lux,

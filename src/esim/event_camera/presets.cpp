@@ -153,20 +153,44 @@ struct Entry {
 constexpr std::array<Entry, 16> kPresets{{
     {"ideal", 0, [] { return EventCameraOptions{}; }},
     {"dvs128", 2, dvs128_by_circuit},
-    {"dvs128", 1, [] { return options_of({0.20, 0.021, 0.1, 5, 3000, 500, 15, 2, 1, 0}); }},
+    {"dvs128", 1,
+     [] {
+       return options_of({0.20, 0.021, 0.1, 5, 3000, 500, 15, 2, 1, 0});
+     }},
     {"davis240c", 2, davis240c_by_circuit},
-    {"davis240c", 1, [] { return options_of({0.20, 0.034, 0.1, 10, 300, 500, 3, 2, 10, 0.1}); }},
+    {"davis240c", 1,
+     [] {
+       return options_of({0.20, 0.034, 0.1, 10, 300, 500, 3, 2, 10, 0.1});
+     }},
     {"davis346", 2, davis346_by_circuit},
-    {"davis346", 1, [] { return options_of({0.20, 0.034, 0.2, 10, 300, 500, 20, 2, 12, 0.08}); }},
+    {"davis346", 1,
+     [] {
+       return options_of({0.20, 0.034, 0.2, 10, 300, 500, 20, 2, 12, 0.08});
+     }},
     {"dvxplorer", 2, dvxplorer_by_circuit},
-    {"dvxplorer", 1, [] { return options_of({0.243, 0.040, 0.03, 5, 300, 200, 150, 58, 165, 0.31}); }},
+    {"dvxplorer", 1,
+     [] {
+       return options_of({0.243, 0.040, 0.03, 5, 300, 200, 150, 58, 165, 0.31});
+     }},
     {"gen3.1-vga", 2, gen31_by_circuit},
-    {"gen3.1-vga", 1, [] { return options_of({0.182, 0.03, 0.07, 5, 800, 100, 40, 20, 50, 0}); }},
+    {"gen3.1-vga", 1,
+     [] {
+       return options_of({0.182, 0.03, 0.07, 5, 800, 100, 40, 20, 50, 0});
+     }},
     {"imx636", 2, imx636_by_circuit},
-    {"imx636", 1, [] { return options_of({0.223, 0.03, 0.1, 5, 1600, 100, 20, 10, 1066, 0.1}); }},
+    {"imx636", 1,
+     [] {
+       return options_of({0.223, 0.03, 0.1, 5, 1600, 100, 20, 10, 1066, 0.1});
+     }},
     {"genx320", 2, genx320_by_circuit},
-    {"v2e-clean", 0, [] { return v2e_options({0.2, 0.02, 0, 0, 0, 0, 0, 0, 0, 0}); }},
-    {"v2e-noisy", 0, [] { return v2e_options({0.2, 0.05, 0.1, 5, 30, 0, 0, 0, 0, 0}); }},
+    {"v2e-clean", 0,
+     [] {
+       return v2e_options({0.2, 0.02, 0, 0, 0, 0, 0, 0, 0, 0});
+     }},
+    {"v2e-noisy", 0,
+     [] {
+       return v2e_options({0.2, 0.05, 0.1, 5, 30, 0, 0, 0, 0, 0});
+     }},
 }};
 
 SensorPreset preset_of(const Entry& entry) { return {entry.sensor, entry.version}; }

@@ -13,9 +13,10 @@ struct LightOptions {
 
 template <class Visitor>
 void describe(Visitor& visit, LightOptions& o) {
-  visit("white_lux", o.white_lux,
-        About{"illuminance of a diffuse white surface at irradiance 1, for event cameras with a circuit (default: 1000)",
-              "lux", 0, 1e9, true});
+  visit(
+      "white_lux", o.white_lux,
+      About{"illuminance of a diffuse white surface at irradiance 1, for event cameras with a circuit (default: 1000)",
+            "lux", 0, 1e9, true});
 }
 
 }  // namespace esim::inline scenario

@@ -6,6 +6,7 @@
 #include <type_traits>
 #include <variant>
 
+#include "esim/core/named_value.h"
 #include "esim/scenario/conversion.h"
 #include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
@@ -77,8 +78,7 @@ class YamlWriter {
   }
 
   template <typename T>
-  requires std::is_class_v<T> &&
-      (!NamedValue<T>)void write(const T& value) {
+  requires std::is_class_v<T> &&(!NamedValue<T>)void write(const T& value) {
     out_ << YAML::BeginMap;
     describe_const(value);
     out_ << YAML::EndMap;
@@ -161,10 +161,7 @@ class ReferenceWriter {
     return fmt::format(" {} ({})", value.name(), names);
   }
   template <typename T>
-  requires std::is_class_v<T> &&
-      (!NamedValue<T>)static std::string default_of(const T&) {
-    return "";
-  }
+  requires std::is_class_v<T> &&(!NamedValue<T>)static std::string default_of(const T&) { return ""; }
   template <typename... T>
   static std::string default_of(const std::variant<T...>&) {
     return "";

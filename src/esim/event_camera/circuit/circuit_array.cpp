@@ -42,8 +42,8 @@ CircuitArray::CircuitArray(const EventCameraOptions& options, int width, int hei
   if (o.noise > 0) {
     constexpr double kBrightest = 1e5;  // irradiance; brighter light has the same time constant for the noise
     circuit_.noise.emplace(o.noise * o.noise / o.photodiode_charge_e, circuit_.poles.t2_ns,
-                           circuit_.poles.t1_unit_ns / std::max(kBrightest, 10 * dark_), circuit_.poles.t1_unit_ns / dark_,
-                           AddressedRandom(seed, Purpose::circuit_noise, stream));
+                           circuit_.poles.t1_unit_ns / std::max(kBrightest, 10 * dark_),
+                           circuit_.poles.t1_unit_ns / dark_, AddressedRandom(seed, Purpose::circuit_noise, stream));
   }
   make_pixels(options, seed, stream);
 }

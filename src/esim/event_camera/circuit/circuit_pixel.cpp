@@ -115,7 +115,8 @@ void CircuitPixel::release(double s) {
   state_.held_until = -1;
   const double value = signal(s) + (noise_ != nullptr ? gain_ * noise_at(s).x : 0.0);
   const double change = value - state_.reference;
-  lost_ += static_cast<std::int64_t>(std::abs(change) / static_cast<double>(change > 0 ? parameters_.on : parameters_.off));
+  lost_ +=
+      static_cast<std::int64_t>(std::abs(change) / static_cast<double>(change > 0 ? parameters_.on : parameters_.off));
   state_.reference = value;
 }
 

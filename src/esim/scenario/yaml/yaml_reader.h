@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "esim/core/error.h"
+#include "esim/core/named_value.h"
 #include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
 #include "esim/scenario/suggest.h"
@@ -123,7 +124,8 @@ class YamlReader {
 
   template <typename T>
   requires std::is_class_v<T> &&
-      (!kIsVariant<T> && !NamedValue<T>)void read(const YAML::Node& node, const std::string& key, T& value, const About&) {
+      (!kIsVariant<T> && !NamedValue<T>)void read(const YAML::Node& node, const std::string& key, T& value,
+                                                  const About&) {
     YamlReader reader(node, key, source_);
     describe(reader, value);
     reader.finish();

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "esim/core/named_value.h"
 #include "esim/event_camera/options.h"
 #include "esim/scenario/schema.h"
 
@@ -171,13 +172,12 @@ Json presets_json() {
     Json values = Json::object();
     ValueWriter writer(values);
     describe(writer, options);
-    const std::string help =
-        name == "ideal" ? "the paper's ideal pixel: no noise, no latency, unlimited bandwidth"
-        : options.circuit
-            ? fmt::format("by the circuit: contrast threshold {}, photocurrent {} fA/lux", options.contrast_threshold,
-                          options.circuit->photocurrent_fa_per_lux)
-            : fmt::format("contrast threshold {}, bandwidth {} Hz, latency {} us", options.contrast_threshold,
-                          options.low_pass_hz, options.latency_us);
+    const std::string help = name == "ideal" ? "the paper's ideal pixel: no noise, no latency, unlimited bandwidth"
+                             : options.circuit
+                                 ? fmt::format("by the circuit: contrast threshold {}, photocurrent {} fA/lux",
+                                               options.contrast_threshold, options.circuit->photocurrent_fa_per_lux)
+                                 : fmt::format("contrast threshold {}, bandwidth {} Hz, latency {} us",
+                                               options.contrast_threshold, options.low_pass_hz, options.latency_us);
     presets.push_back({{"name", name}, {"help", help}, {"values", values}});
   }
   return presets;

@@ -21,7 +21,7 @@ class EventCamera:
     width, height : int
         Size of the sensor, px.
     preset : str, optional
-        Sensor model that gives the default values: "ideal", "davis346", ... (`docs/pixel.md`).
+        Sensor that gives the default values: "ideal", "davis346", ... (`docs/pixel.md`); "davis346@1" is an older version.
     seed : int
         Seed of all random numbers.
     threads : int

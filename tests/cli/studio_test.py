@@ -95,7 +95,10 @@ class Answers(StudioTest):
         for member in members.values():
             check(member)
         presets = {preset["name"]: preset for preset in self.ask("GET", "/api/presets")}
-        self.assertEqual(presets["davis346"]["values"]["contrast_threshold"], 0.2)
+        self.assertEqual(presets["davis346@1"]["values"]["contrast_threshold"], 0.2)
+        self.assertNotIn("circuit", presets["davis346@1"]["values"])
+        self.assertEqual(presets["davis346"]["values"], presets["davis346@2"]["values"])
+        self.assertEqual(presets["davis346"]["values"]["circuit"]["photocurrent_fa_per_lux"], 33)
 
     def test_problems_are_reported_together_and_name_their_options(self):
         yaml = self.yaml.replace("width: 64", "width: -3").replace("contrast_threshold: 0.2", "contrast_treshold: 0.2") + "sed: 1\n"

@@ -442,12 +442,12 @@ TEST(Suggest, FindsTheNearestWord) {
 }
 
 TEST_F(ScenarioFile, APresetStandsForWhatIsNotGiven) {
-  const EventCameraOptions davis = preset_options(SensorPreset::davis346);
+  const EventCameraOptions davis = preset_options("davis346@1");
   const EventCameraOptions given =
-      read(std::string(kMinimal) + "event_camera: {contrast_threshold: 0.25, preset: davis346}\n")
+      read(std::string(kMinimal) + "event_camera: {contrast_threshold: 0.25, preset: davis346@1}\n")
           .cameras[0]
           .event_camera;
-  EXPECT_EQ(given.preset, SensorPreset::davis346);
+  EXPECT_EQ(given.preset.name(), "davis346@1");
   EXPECT_EQ(given.threshold_on(), 0.25);
   EXPECT_EQ(given.threshold_off(), 0.25);
   EXPECT_EQ(given.low_pass_hz, davis.low_pass_hz);
@@ -456,15 +456,76 @@ TEST_F(ScenarioFile, APresetStandsForWhatIsNotGiven) {
 
   const EventCameraOptions set =
       read(kMinimal, {"event_camera.preset=gen3.1-vga", "event_camera.readout.queue_events=7"}).cameras[0].event_camera;
-  EXPECT_EQ(set.preset, SensorPreset::gen31_vga);
+  EXPECT_EQ(set.preset.name(), "gen3.1-vga@2");
   EXPECT_EQ(set.readout.queue_events, 7);
   EXPECT_TRUE(contains(error(std::string(kMinimal) + "event_camera: {preset: davis364}\n"), "davis346"));
 }
 
 TEST_F(ScenarioFile, PresetsAreWithinTheRangesOfTheirOptions) {
-  for (const char* name : kEnumNames<SensorPreset>) {
-    const Scenario scenario = read(kMinimal, {std::string("event_camera.preset=") + name});
+  EXPECT_EQ(SensorPreset::names().size(), 3 + 6 * 3 + 2U);
+  for (const std::string& name : SensorPreset::names()) {
+    const Scenario scenario = read(kMinimal, {"event_camera.preset=" + name});
     EXPECT_EQ(write_scenario(read(write_scenario(scenario))), write_scenario(scenario)) << name;
+    EXPECT_NO_THROW(check(scenario.cameras[0].event_camera)) << name;
+  }
+}
+
+TEST_F(ScenarioFile, APresetHasVersions) {
+  const auto preset = [&](const std::string& name) {
+    return read(kMinimal, {"event_camera.preset=" + name}).cameras[0].event_camera;
+  };
+  for (const char* sensor : {"dvs128", "davis240c", "davis346", "dvxplorer", "gen3.1-vga", "imx636"}) {
+    const std::string name = sensor;
+    EXPECT_EQ(preset(name).preset.name(), name + "@2");
+    EXPECT_TRUE(preset(name + "@2").circuit) << name;
+    EXPECT_EQ(preset(name + "@1").preset.name(), name + "@1");
+    EXPECT_FALSE(preset(name + "@1").circuit) << name;
+    EXPECT_GT(preset(name + "@1").shot_noise_hz, 0) << name;
+  }
+  EXPECT_EQ(preset("genx320").preset.name(), "genx320@2");
+  for (const char* name : {"ideal", "v2e-clean", "v2e-noisy"}) EXPECT_EQ(preset(name).preset.name(), name);
+  EXPECT_TRUE(contains(write_scenario(read(kMinimal, {"event_camera.preset=davis346"})), "preset: davis346@2"));
+
+  const auto problem = [&](const std::string& name) { return error(kMinimal, {"event_camera.preset=" + name}); };
+  EXPECT_TRUE(contains(problem("davis346@3"),
+                       "event_camera.preset: 'davis346@3' does not exist; davis346 has the "
+                       "versions 1 and 2"));
+  EXPECT_TRUE(contains(problem("genx320@1"), "genx320 has the version 2"));
+  EXPECT_TRUE(contains(problem("ideal@1"), "ideal has no versions"));
+  EXPECT_TRUE(contains(problem("davis346@"), "davis346 has the versions 1 and 2"));
+  EXPECT_TRUE(contains(problem("davis364@2"), "did you mean davis346@2?"));
+  EXPECT_TRUE(contains(problem("gen3.1vga"), "did you mean gen3.1-vga?"));
+  EXPECT_TRUE(contains(problem("[1]"), "event_camera.preset"));
+  EXPECT_TRUE(contains(test::message_of<UserError>([] { preset_options("davis346@3"); }), "versions 1 and 2"));
+  EXPECT_TRUE(contains(test::message_of<UserError>([] { preset_options("davis"); }), "there is no 'davis'"));
+}
+
+TEST_F(ScenarioFile, TheLightAppliesToEveryEventCamera) {
+  const Scenario scenario = read(std::string(kMinimal) +
+                                 "light: {white_lux: 20}\nevent_camera: {preset: davis346}\ncameras:\n- {}\n"
+                                 "- event_camera: {circuit: {white_lux: 3}}\n- event_camera: {preset: davis346@1}\n");
+  const auto in_light = [&](std::size_t i) { return event_camera_of(scenario, scenario.cameras[i]); };
+  EXPECT_EQ(in_light(0).circuit->white_lux, 20);
+  EXPECT_EQ(in_light(1).circuit->white_lux, 3);
+  EXPECT_FALSE(in_light(2).circuit);
+  EXPECT_FALSE(scenario.cameras[0].event_camera.circuit->white_lux);
+  // The recorded scenario keeps the light in one place, so that it can still be changed there.
+  const Scenario again = read(write_scenario(scenario), {"light.white_lux=5"});
+  EXPECT_EQ(event_camera_of(again, again.cameras[0]).circuit->white_lux, 5);
+  const Scenario dark = read(kMinimal, {"event_camera.preset=davis346"});
+  EXPECT_DOUBLE_EQ(event_camera_of(dark, dark.cameras[0]).circuit->white_photocurrent_fa(), 33 * 1000 * 0.9 / 16);
+
+  for (const char* value : {"0", "-1", "1e10", ".nan", ".inf"}) {
+    EXPECT_TRUE(contains(error(kMinimal, {std::string("light.white_lux=") + value}), "light.white_lux: ")) << value;
+  }
+  for (const char* bad :
+       {"white_lux: -2", "white_lux: 0", "f_number: 0", "transmission: 0", "transmission: 1.5",
+        "photocurrent_fa_per_lux: 0", "dark_current_fa: 0", "photodiode_charge_e: 0", "source_follower_hz: 0",
+        "source_follower_hz: .inf", "noise: -1", "noise: .nan", "max_rate_hz: -1"}) {
+    const std::string key = std::string(bad).substr(0, std::string(bad).find(':'));
+    const std::string message = error(kMinimal, {"event_camera.circuit={" + std::string(bad) + "}"});
+    EXPECT_TRUE(contains(message, "event_camera.circuit." + key)) << message;
+    EXPECT_FALSE(contains(message, "\n")) << message;
   }
 }
 

@@ -39,7 +39,7 @@ std::string ways_to_spread(const ConversionOptions& options) {
   if (!options.interpolation.interpolation) return "without --no-interpolation, edges would move between the frames";
   constexpr double kFineLambda_px = 0.25;
   std::string ways;
-  if (options.event_camera.low_pass_hz == 0)
+  if (options.event_camera.low_pass_hz == 0 && !options.event_camera.circuit)
     ways =
         "the pixels of a real camera (--set preset=davis346), or a limited bandwidth (--set low_pass_hz=50), spread "
         "them";
@@ -72,7 +72,7 @@ class Converter {
 
   ConversionSummary run(std::unique_ptr<Sink> out) {
     const ConversionOptions& options = arguments_.options;
-    Interpolator interpolator(options.interpolation, options.event_camera.log_eps);
+    Interpolator interpolator(options.interpolation, options.event_camera.dark_light());
     EventCamera event_camera(options.event_camera, frames_.width(), frames_.height(), options.seed, 0);
     auto watching = std::make_unique<BetweenFrames>();
     const BetweenFrames& between_frames = *watching;
@@ -157,6 +157,7 @@ int run(VideoArguments& arguments) {
   std::vector<std::string> given;
   const Notices notices = print_and_keep(given, arguments.quiet);
   catch_interrupts();
+  warn_of_noise("", arguments.options.event_camera, notices);
 
   const fs::path name = fs::path(arguments.input).lexically_normal();
   const fs::path out = arguments.out.empty() ? "out" / (name.has_filename() ? name : name.parent_path()).stem()

@@ -147,6 +147,9 @@ std::string report_json(const ConversionOptions& options, const ConversionSummar
 std::vector<std::string> losses(const Scenario& scenario, const Summary& summary);
 std::vector<std::string> losses(const ConversionOptions& options, const ConversionSummary& summary);
 
+/// Warns if the noise of a sensor's circuit fires its pixels all the time. `name` precedes the message.
+void warn_of_noise(const std::string& name, const EventCameraOptions& options, const Notices& notices);
+
 /// Faster alternatives, one line each: flow sampling, if adaptive sampling of a mesh was slower than real time because
 /// of rendering.
 std::vector<std::string> hints(const Scenario& scenario, const Summary& summary);

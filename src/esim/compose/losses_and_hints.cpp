@@ -4,6 +4,7 @@
 #include <type_traits>
 
 #include "esim/compose/compose.h"
+#include "esim/event_camera/noise_rate.h"
 #include "esim/files/number_text.h"
 
 namespace esim::inline compose {
@@ -18,8 +19,8 @@ double percent(std::int64_t part, std::int64_t whole) {
 
 std::string grouped(std::int64_t count) { return esim::grouped(static_cast<std::uint64_t>(count)); }
 
-void add_readout(const std::string& name, const ReadoutOptions& readout, const EventCameraStatistics& sensor,
-                 std::int64_t events, std::vector<std::string>& lines) {
+void add_sensor(const std::string& name, const ReadoutOptions& readout, const EventCameraStatistics& sensor,
+                std::int64_t events, std::vector<std::string>& lines) {
   if (sensor.dropped > 0) {
     lines.push_back(
         fmt::format("{}the readout dropped {} of {} events ({:.3g} %), because its queue of {} events was full: raise "
@@ -34,6 +35,12 @@ void add_readout(const std::string& name, const ReadoutOptions& readout, const E
         "event_camera.readout.row_time_us ({:g} us)",
         name, percent(sensor.delayed, events), to_seconds(sensor.longest_delay) * 1e3, readout.rate_mev_per_s,
         readout.row_time_us));
+  }
+  if (sensor.lost > 0) {
+    lines.push_back(
+        fmt::format("{}{} events were lost, because their pixels fire at most event_camera.circuit.max_rate_hz: set "
+                    "refractory_period_us, or raise contrast_threshold above the noise",
+                    name, grouped(sensor.lost)));
   }
 }
 
@@ -73,11 +80,20 @@ std::vector<std::string> losses(const Scenario& scenario, const Summary& summary
     const CameraOptions& camera = scenario.cameras[i];
     const std::string name = done.name + ": ";
     if (camera.events) {
-      add_readout(name, camera.event_camera.readout, done.sensor, done.events_on + done.events_off, lines);
+      add_sensor(name, camera.event_camera.readout, done.sensor, done.events_on + done.events_off, lines);
     }
     add_sampling(name, camera, done.sampling, lines);
   }
   return lines;
+}
+
+void warn_of_noise(const std::string& name, const EventCameraOptions& options, const Notices& notices) {
+  const std::optional<NoiseEstimate> noise = excessive_noise(options);
+  if (!noise) return;
+  notices.warning(fmt::format(
+      "{}event_camera: the contrast threshold, {:.3g}, is below twice the noise of the circuit, {:.3g} in the dark: "
+      "expect up to {:.2g} noise events per second of each pixel (at irradiance {:.2g}). Raise contrast_threshold",
+      name, noise->threshold, noise->deviation, noise->rate_hz, noise->irradiance));
 }
 
 std::vector<std::string> hints(const Scenario& scenario, const Summary& summary) {
@@ -96,7 +112,7 @@ std::vector<std::string> hints(const Scenario& scenario, const Summary& summary)
 
 std::vector<std::string> losses(const ConversionOptions& options, const ConversionSummary& summary) {
   std::vector<std::string> lines;
-  add_readout("", options.event_camera.readout, summary.sensor, summary.events_on + summary.events_off, lines);
+  add_sensor("", options.event_camera.readout, summary.sensor, summary.events_on + summary.events_off, lines);
   return lines;
 }
 

@@ -69,6 +69,7 @@ struct EventCamera::State {
     if (self.readout) PixelReadout::transfer(archive, *self.readout);
     if (self.circuit_readout) CircuitReadout::transfer(archive, *self.circuit_readout);
     archive.value(self.spoiled);
+    archive.value(self.lost);
     archive.value(self.last_time);
     archive.value(self.frames);
     if (self.frames > 0) archive.image(self.last_frame);
@@ -79,7 +80,8 @@ struct EventCamera::State {
   std::vector<CircuitBuffer> buffers;  // per worker
   EventPacking packing;
   Tile size;
-  bool spoiled = false;  // a segment was integrated only partly
+  bool spoiled = false;   // a segment was integrated only partly
+  std::int64_t lost = 0;  // events beyond the maximum rate of their pixels
   std::optional<CenterSurround> surround;
   Image<float> brightness;               // minus the surround
   std::vector<PixelUpdate> updates;      // per worker
@@ -212,7 +214,11 @@ void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
   }
   state.queue.add(state.events, workers);
   if (state.readout) state.readout->advance(state.pixels, state.updates[0], state.queue, watermark);
-  if (state.circuit_readout) state.circuit_readout->advance(*state.circuit, state.queue, watermark);
+  if (state.circuit_readout) {
+    state.circuit_readout->advance(*state.circuit, state.queue, watermark);
+    state.lost += state.circuit_readout->take_lost();
+  }
+  for (CircuitBuffer& buffer : state.buffers) state.lost += std::exchange(buffer.lost, 0);
 }
 
 void EventCamera::release_until(TimeNs until, std::vector<Event>& out) {
@@ -269,9 +275,10 @@ EventCameraStatistics EventCamera::statistics() const {
     return {.dropped = readout.dropped(),
             .delayed = readout.delayed(),
             .longest_delay = readout.longest_delay(),
+            .lost = state_->lost,
             .in_flight = found + static_cast<std::int64_t>(readout.waiting())};
   }
-  if (!state_->readout) return {.in_flight = found};
+  if (!state_->readout) return {.lost = state_->lost, .in_flight = found};
   const PixelReadout& readout = *state_->readout;
   return {.dropped = readout.dropped(),
           .delayed = readout.delayed(),

@@ -20,6 +20,7 @@ struct EventCameraStatistics {
   std::int64_t dropped = 0;  ///< dropped by the readout because its queue was full
   std::int64_t delayed = 0;  ///< read out more than 1 us after the request, or 1 % of the refractory period if shorter
   TimeNs longest_delay = 0;  ///< from a pixel's request to its readout
+  std::int64_t lost = 0;     ///< beyond the maximum rate of their pixels (CircuitOptions::max_rate_hz)
   std::int64_t in_flight = 0;  ///< generated, but not read out by the last watermark
 };
 

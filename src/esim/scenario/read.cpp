@@ -261,6 +261,12 @@ Scenario read_scenario(const ScenarioText& text) {
   return scenario;
 }
 
+EventCameraOptions event_camera_of(const Scenario& scenario, const CameraOptions& camera) {
+  EventCameraOptions options = camera.event_camera;
+  if (options.circuit && !options.circuit->white_lux) options.circuit->white_lux = scenario.light.white_lux;
+  return options;
+}
+
 Camera camera_model(const CameraOptions& options) {
   constexpr double kDefaultFov_deg = 75;
   const double fov_deg = options.horizontal_fov_deg.value_or(kDefaultFov_deg);

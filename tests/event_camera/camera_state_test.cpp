@@ -99,7 +99,7 @@ INSTANTIATE_TEST_SUITE_P(
         EventCameraOptions{.contrast_threshold = 0.2,
                            .latency_us = 2500,
                            .filters = {.region = RegionFilterOptions{true, {{3, 3, 4, 4}}, {{20, 5}}},
-                                       .activity = ActivityFilterOptions{2000, 0, 0, 1.3e6, 1e6},
+                                       .activity = ActivityFilterOptions{2000, 1e5, 5e4, 0, 0},
                                        .anti_flicker = AntiFlickerOptions{FlickerMode::band_stop, 200, 5000, 2, 1},
                                        .trail = TrailFilterOptions{TrailType::trail, 500},
                                        .rate_controller = RateControllerOptions{2000, 900}}},

@@ -164,14 +164,15 @@ class Filter(ProgramTest):
         filters = {
             "region": ("{windows: [{x: 8, y: 4, width: 50, height: 40}], masked_pixels: [{x: 20, y: 20}]}",
                        ["--roi", "8,4,50,40", "--mask-pixel", "20,20"]),
-            "activity": ("{lower_start: 2e5, lower_stop: 1e5}",
-                         ["--activity-lower-start", "2e5", "--activity-lower-stop", "1e5"]),
+            "activity": ("{window_us: 5000, lower_start: 2e4, lower_stop: 1e4}",
+                         ["--activity-window-us", "5000", "--activity-lower-start", "2e4",
+                          "--activity-lower-stop", "1e4"]),
             "anti_flicker": ("{high_hz: 5000, start_threshold: 2, stop_threshold: 1}",
                              ["--anti-flicker-high-hz", "5000", "--anti-flicker-start-threshold", "2",
                               "--anti-flicker-stop-threshold", "1"]),
             "trail": ("{threshold_us: 20000}", ["--trail-threshold-us", "20000"]),
-            "rate_controller": ("{period_us: 1000, events_per_period: 100}",
-                                ["--rate-controller-period-us", "1000", "--rate-controller-events-per-period", "100"]),
+            "rate_controller": ("{period_us: 5000, events_per_period: 50}",
+                                ["--rate-controller-period-us", "5000", "--rate-controller-events-per-period", "50"]),
         }
 
         def simulate(out, *changes):

@@ -147,7 +147,7 @@ TEST_F(ScenarioFile, RefusesFiltersThatContradictThemselves) {
                        "event_camera.filters.region.windows.1: (64, 2) lies outside the sensor of 64 x 48 px"));
   EXPECT_TRUE(
       contains(with("region: {masked_pixels: [{x: 3, y: 48}]}"), "filters.region.masked_pixels.0: (3, 48) lies"));
-  EXPECT_TRUE(contains(with("trail: {threshold_us: 0}"), "event_camera.filters.trail.threshold_us: must be"));
+  EXPECT_TRUE(contains(with("trail: {threshold_us: 0}"), "event_camera.filters.trail.threshold_us: 0 is out of range"));
   EXPECT_TRUE(contains(with("trails: {}"), "trail"));
   EXPECT_TRUE(contains(with("trail: 5"), "event_camera.filters.trail: must be a map"));
   EXPECT_TRUE(contains(error(std::string(kMinimal) + "cameras: [{}, {event_camera: {filters: {activity: {}}}}]\n"),

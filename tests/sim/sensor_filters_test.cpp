@@ -147,7 +147,7 @@ TEST_P(SensorFilters, GiveTheSameEventsAsFilteringAfterwards) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, SensorFilters, testing::ValuesIn(cases()),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& instance) { return std::string(instance.param.name); });
 
 using FilteredSensor = SensorFilters;
 

@@ -188,7 +188,7 @@ SENSOR = {  # for the 40 x 30 px of `poster`
     "activity": {"lower_start": 3e4, "lower_stop": 1e4},
     "anti_flicker": {"high_hz": 5000, "start_threshold": 2, "stop_threshold": 1},
     "trail": {"type": "stc_keep_trail", "threshold_us": 20_000},
-    "rate_controller": {"period_us": 1000, "events_per_period": 40},
+    "rate_controller": {"period_us": 1000, "events_per_period": 15},
 }
 
 

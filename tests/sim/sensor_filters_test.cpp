@@ -22,10 +22,10 @@ constexpr int kWidth = 48, kHeight = 32;
 FilterOptions everything() {
   FilterOptions options;
   options.region = RegionFilterOptions{false, {{2, 1, 45, 30}}, {{5, 5}, {20, 9}}};
-  options.activity = ActivityFilterOptions{1000, 2e5, 1e5, 0, 0};
+  options.activity = ActivityFilterOptions{1000, 5e4, 2.5e4, 0, 0};
   options.anti_flicker = AntiFlickerOptions{FlickerMode::band_stop, 50, 5000, 2, 1};
   options.trail = TrailFilterOptions{TrailType::stc_keep_trail, 20'000};
-  options.rate_controller = RateControllerOptions{1000, 60};
+  options.rate_controller = RateControllerOptions{1000, 40};
   return options;
 }
 

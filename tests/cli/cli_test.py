@@ -69,7 +69,7 @@ class Recordings(Cli):
             self.assertIn(f"preset: {used}\n", (self.out / "scenario.yaml").read_text())
 
     def test_thresholds_below_the_noise_are_reported_and_limited(self):
-        result = self.simulate(*FAST, "--set", "duration_s=0.05", "--set", "event_camera={contrast_threshold: 0.01, circuit: {}}",
+        result = self.simulate(*FAST, "--set", "duration_s=0.05", "--set", "event_camera={contrast_threshold: 0.01, circuit: {max_rate_hz: 50}}",
                                "--set", "light.white_lux=0.001")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertRegex(result.stderr, r"warning: camera cam0: event_camera: the contrast threshold, 0.01, is below twice the noise .* "
@@ -78,7 +78,7 @@ class Recordings(Cli):
         report = json.loads((self.out / "report.json").read_text())
         camera = report["cameras"][0]
         self.assertGreater(camera["events_lost_by_max_rate"], 0)
-        self.assertLess(camera["events"], 0.05 * 1e4 * camera["width"] * camera["height"])
+        self.assertLess(camera["events"], (0.05 * 50 + 1) * camera["width"] * camera["height"])
         self.assertTrue(any("is below twice the noise" in notice for notice in report["notices"]), report["notices"])
 
     def test_light_is_named_if_nothing_uses_it(self):

@@ -109,6 +109,53 @@ cameras:
   EXPECT_TRUE(contains(error(std::string(kMinimal) + "event_camera: [1]\n"), "camera.event_camera: must be a map"));
 }
 
+TEST_F(ScenarioFile, ReadsTheFiltersOfTheSensor) {
+  const std::string yaml = std::string(kMinimal) + R"(
+event_camera: {preset: imx636, filters: {trail: {}, region: {windows: [{x: 3, y: 4, width: 5, height: 6}]}}}
+cameras:
+  - {width: 100, height: 80}
+  - {event_camera: {filters: {anti_flicker: {low_hz: 90}, rate_controller: {}}}}
+)";
+  const Scenario scenario = read(yaml);
+  const FilterOptions &first = scenario.cameras[0].event_camera.filters,
+                      &second = scenario.cameras[1].event_camera.filters;
+  ASSERT_TRUE(first.trail && first.region && !first.activity && !first.anti_flicker && !first.rate_controller);
+  EXPECT_EQ(first.region->windows.at(0).width, 5);
+  EXPECT_EQ(first.trail->threshold_us, TrailFilterOptions{}.threshold_us);
+  ASSERT_TRUE(second.anti_flicker && second.rate_controller && !second.trail) << "a camera's own filters";
+  EXPECT_EQ(second.anti_flicker->low_hz, 90);
+  EXPECT_EQ(scenario.cameras[1].event_camera.preset, SensorPreset::imx636);
+  EXPECT_EQ(write_scenario(read(write_scenario(scenario))), write_scenario(scenario));
+  EXPECT_FALSE(read(kMinimal).cameras[0].event_camera.filters.any());
+  EXPECT_TRUE(read(kMinimal, {"event_camera.filters.trail={}"}).cameras[0].event_camera.filters.trail);
+  EXPECT_FALSE(read(yaml, {"event_camera.filters.trail=null"}).cameras[0].event_camera.filters.trail);
+}
+
+TEST_F(ScenarioFile, RefusesFiltersThatContradictThemselves) {
+  const auto with = [&](const std::string& filters, const std::string& camera = "{width: 64, height: 48}") {
+    return error(std::string(kMinimal) + "camera: " + camera + "\nevent_camera:\n  filters:\n    " + filters + "\n");
+  };
+  EXPECT_EQ(with("anti_flicker: {low_hz: 300, high_hz: 200}"),
+            file().string() +
+                ":8: camera.event_camera.filters.anti_flicker.low_hz: must be below high_hz, 200 Hz; it "
+                "is 300 Hz");
+  EXPECT_TRUE(contains(with("anti_flicker: {high_hz: 20}"),  // the key of the message is not in the file
+                       ":8: camera.event_camera.filters.anti_flicker.low_hz: must be below high_hz, 20 Hz"));
+  EXPECT_TRUE(contains(with("activity: {}"), "event_camera.filters.activity: has no bound"));
+  EXPECT_TRUE(contains(with("activity: {lower_start: 5, lower_stop: 6}"), "event_camera.filters.activity.lower_stop"));
+  EXPECT_TRUE(contains(with("region: {windows: [{x: 1, y: 1}, {x: 64, y: 2}]}"),
+                       "event_camera.filters.region.windows.1: (64, 2) lies outside the sensor of 64 x 48 px"));
+  EXPECT_TRUE(
+      contains(with("region: {masked_pixels: [{x: 3, y: 48}]}"), "filters.region.masked_pixels.0: (3, 48) lies"));
+  EXPECT_TRUE(contains(with("trail: {threshold_us: 0}"), "event_camera.filters.trail.threshold_us: 0 is out of range"));
+  EXPECT_TRUE(contains(with("trails: {}"), "trail"));
+  EXPECT_TRUE(contains(with("trail: 5"), "event_camera.filters.trail: must be a map"));
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "cameras: [{}, {event_camera: {filters: {activity: {}}}}]\n"),
+                       "cameras.1.event_camera.filters.activity: has no bound"));
+  EXPECT_TRUE(contains(error(kMinimal, {"camera.event_camera.filters.region.masked_pixels=[{x: 400, y: 3}]"}),
+                       "--set camera.event_camera.filters.region.masked_pixels.0: (400, 3) lies outside"));
+}
+
 TEST_F(ScenarioFile, IsTheSameAfterWritingAndReading) {
   const Scenario scenario = read(std::string(kMinimal) + R"(
 seed: 18446744073709551615

@@ -60,6 +60,7 @@ void print_summary(const ConversionSummary& summary) {
   tell(stderr, "{}: {} frames, {:.3f} s, converted in {:.1f} s ({:.2f}x real time), {} steps, {} events\n",
        summary.complete ? "done" : "interrupted", summary.frames, converted_s, summary.wall_seconds,
        converted_s / summary.wall_seconds, summary.steps, summary.events_on + summary.events_off);
+  tell(stderr, "{}", describe(filtered_cameras(summary)));
 }
 
 /// A conversion from the opened input to the summary.
@@ -156,6 +157,7 @@ int run(VideoArguments& arguments) {
   arguments.options.input = fs::absolute(arguments.input, error);
   std::vector<std::string> given;
   const Notices notices = print_and_keep(given, arguments.quiet);
+  std::ranges::for_each(warnings_of_filters(arguments.options.event_camera), notices.warning);
   catch_interrupts();
   warn_of_noise("", arguments.options.event_camera, notices);
 

@@ -32,6 +32,13 @@ void check_sampling(const CameraOptions& camera, const Notices& notices) {
   std::visit(check, camera.sampling);
 }
 
+/// Warns of filters that the camera's sensor does not have.
+void check_filters(const CameraOptions& camera, const Notices& notices) {
+  if (!camera.events) return;
+  for (const std::string& line : warnings_of_filters(camera.event_camera))
+    notices.warning(fmt::format("camera {}: {}", camera.name, line));
+}
+
 /// Whether the pixels have colour filters.
 bool sees_colour(const CameraOptions& camera) { return camera.colour != ColourFilters::none; }
 
@@ -223,6 +230,7 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
   warn_of_light_without_effect(scenario, notices);
   for (const CameraOptions& options : scenario.cameras) {
     check_sampling(options, notices);
+    check_filters(options, notices);
     world.info.cameras.push_back(camera_info(options, followed));
   }
   const RendererFactory make_renderer =

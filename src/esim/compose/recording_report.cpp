@@ -8,6 +8,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json json(const MeasuredError& error) { return {{"mean", error.mean}, {"p99", error.p99}, {"max", error.max}}; }
+void add_filtered(const std::vector<FilteredCamera>& cameras, Json& report) {
+  if (!cameras.empty()) report["filtered"] = Json::parse(to_json(cameras));
+}
 Json json(double number) { return number; }
 Json json(std::int64_t number) { return number; }
 
@@ -80,6 +83,7 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
       {"cameras", cameras},
       {"notices", notices},
   };
+  add_filtered(filtered_cameras(summary), report);
   if (!summary.problem.empty()) report["reason"] = summary.problem;
   return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -125,6 +129,7 @@ std::string report_json(const ConversionOptions& options, const ConversionSummar
       {"modulation_between_frames_rms", summary.modulation ? Json(*summary.modulation) : Json(nullptr)},
       {"notices", notices},
   };
+  add_filtered(filtered_cameras(summary), report);
   if (!summary.problem.empty()) report["reason"] = summary.problem;
   return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "esim/core/describe.h"
+#include "esim/filters/options.h"
 
 namespace esim::inline event_camera {
 
@@ -131,6 +132,7 @@ struct EventCameraOptions {
   double latency_light_share = 0.0;
   ReadoutOptions readout{};
   std::optional<CircuitOptions> circuit{};
+  FilterOptions filters{};
 
   /// What is added to the irradiance before the logarithm.
   double dark_light() const { return circuit ? circuit->dark_irradiance() : log_eps; }
@@ -275,6 +277,8 @@ void describe(Visitor& visit, EventCameraOptions& o) {
   visit(
       "circuit", o.circuit,
       About{"simulates the pixels' circuit, from light in lux, with its noise (default: none, but the effects above)"});
+  visit("filters", o.filters,
+        About{"digital filters behind the readout, in the order in which events pass them (default: none)"});
 }
 
 }  // namespace esim::inline event_camera

@@ -50,13 +50,11 @@ TEST(Bench, SCurvesReturnThresholdMismatchAndNoise) {
   options.threshold_mismatch = 0.02;
   for (const double sign : {1.0, -1.0}) {
     const double lux = 5;
-    const SensorUnderTest sensor = simulated_sensor(options, 32, 16, 1);
+    const SensorUnderTest sensor = simulated_sensor(options, 16, 16, 1);
     const TrialCounts counts = measure(sensor, steps_for(options, lux, around(sign * 0.2, 0.6), 16));
     const PixelEstimate estimate = fit_steps(std::vector{counts}, times_of(options));
     const double noise = std::sqrt(1 / (600 * (1 + times_of(options).t2_s / times_of(options).t1_s(lux))));
-    const auto plain = fit_cumulative_normal(counts);
-    std::printf("sign %g threshold %.5f mismatch %.5f noise %.5f (true .25 .02 %.5f), charge %.1f, plain %.4f %.4f\n", sign, estimate.threshold,
-                estimate.mismatch, estimate.noise(lux), noise, estimate.charge_e, plain.centre, plain.deviation);
+    EXPECT_LT(fit_cumulative_normal(counts).centre, 0.23);  // noise moves it below the threshold
     EXPECT_NEAR(estimate.threshold / 0.25, 1, 0.02);
     EXPECT_NEAR(estimate.noise(lux) / noise, 1, 0.02);
     EXPECT_NEAR(estimate.mismatch / 0.02, 1, 0.1);
@@ -66,22 +64,19 @@ TEST(Bench, SCurvesReturnThresholdMismatchAndNoise) {
 TEST(Bench, SCurvesAtTwoLightLevelsReturnTheDarkCurrent) {
   EventCameraOptions options = slow_to_fire();
   options.threshold_mismatch = 0.02;
-  const SensorUnderTest sensor = simulated_sensor(options, 32, 16, 2);
+  const SensorUnderTest sensor = simulated_sensor(options, 24, 16, 2);
   const ResponseTimes truth = times_of(options);
   std::vector<TrialCounts> recordings;
-  for (const double lux : {20.0, 0.4}) {
+  for (const double lux : {20.0, 0.3}) {
     const double contrast = std::log1p(std::expm1(lux > 1 ? 0.22 : 0.18) * (1 + truth.dark_lux / lux));
     recordings.push_back(measure(sensor, steps_for(options, lux, around(contrast, 0.6), 12)));
   }
   ResponseTimes times = truth;
   times.dark_lux = 0;
   const PixelEstimate estimate = fit_steps(recordings, times, {.dark_current = true});
-  std::printf("dark %.4f lux (true %.4f), %.3f fA, threshold %.4f mismatch %.4f charge %.1f, %.3f fA/lux\n", estimate.times.dark_lux,
-              truth.dark_lux, estimate.dark_current_fa(), estimate.threshold, estimate.mismatch, estimate.charge_e,
-              estimate.photocurrent_fa_per_lux());
   EXPECT_NEAR(estimate.times.dark_lux / truth.dark_lux, 1, 0.02);
   EXPECT_NEAR(estimate.threshold / 0.25, 1, 0.02);
-  EXPECT_NEAR(estimate.noise(0.4) / std::sqrt(1 / (600 * (1 + truth.t2_s / truth.t1_s(0.4)))), 1, 0.02);
+  EXPECT_NEAR(estimate.noise(0.3) / std::sqrt(1 / (600 * (1 + truth.t2_s / truth.t1_s(0.3)))), 1, 0.02);
 }
 
 TEST(Bench, LatencyFollowsTheCircuitInAnyLight) {
@@ -95,12 +90,10 @@ TEST(Bench, LatencyFollowsTheCircuitInAnyLight) {
     const double contrast = 1, effective = truth.effective(contrast, lux);
     const double measured = measure(sensor, steps_for(options, lux, {contrast}, 1)).median_latency_s(0);
     const double expected = step_latency_s(effective, 0.25, truth.t1_s(lux * std::exp(contrast)), truth.t2_s);
-    std::printf("%g lux: %.4g ms, %.4g ms\n", lux, 1e3 * measured, 1e3 * expected);
     EXPECT_NEAR(measured / expected, 1, 0.02) << lux;
     points.push_back({lux, measured});
   }
   const ResponseTimes times = fit_latencies(points, 1, 0.25, truth.dark_lux);
-  std::printf("t1 %.5g (%.5g), t2 %.5g (%.5g)\n", times.t1_lux_s, truth.t1_lux_s, times.t2_s, truth.t2_s);
   EXPECT_NEAR(times.t1_lux_s / truth.t1_lux_s, 1, 0.02);
   EXPECT_NEAR(times.t2_s / truth.t2_s, 1, 0.02);
 }
@@ -108,19 +101,17 @@ TEST(Bench, LatencyFollowsTheCircuitInAnyLight) {
 TEST(Bench, BandwidthFollowsTheCircuitInAnyLight) {
   EventCameraOptions options = slow_to_fire();
   options.circuit->noise = 0;
-  options.threshold_mismatch = 0.01;
+  options.contrast_threshold = 0.06;
+  options.threshold_mismatch = 0.002;
   const ResponseTimes truth = times_of(options);
   const SensorUnderTest sensor = simulated_sensor(options, 16, 8, 4);
-  for (const double lux : {1.0, 10.0, 200.0}) {
+  for (const double lux : {5.0, 20.0, 200.0}) {
     const double expected = truth.bandwidth_hz(lux);
     std::vector<double> frequencies;
-    for (const double factor : {0.25, 0.5, 1.0, 1.6, 2.5}) frequencies.push_back(factor * expected);
-    const Bandwidth bandwidth =
-        measure_bandwidth(sensor, steps_for(options, lux, {1}, 1), frequencies, 0.25);
-    std::printf("%g lux: %.5g Hz (%.5g), t1 %.4g (%.4g) t2 %.4g (%.4g) theta %.4f\n", lux, bandwidth.bandwidth_hz, expected,
-                bandwidth.t1_s, truth.t1_s(lux), bandwidth.t2_s, truth.t2_s, bandwidth.threshold);
+    for (const double factor : {0.25, 0.7, 1.4, 2.5}) frequencies.push_back(factor * expected);
+    const Bandwidth bandwidth = measure_bandwidth(sensor, steps_for(options, lux, {1}, 1), frequencies, 0.06);
     EXPECT_NEAR(bandwidth.bandwidth_hz / expected, 1, 0.02) << lux;
-    EXPECT_NEAR(bandwidth.threshold / 0.25, 1, 0.02);
+    EXPECT_NEAR(bandwidth.threshold / (0.06 * (1 + truth.dark_lux / lux)), 1, 0.02) << lux;
   }
 }
 
@@ -128,8 +119,7 @@ TEST(Bench, NoiseAlternatesInTheDark) {
   EventCameraOptions options = slow_to_fire();
   options.contrast_threshold = 0.13;
   options.refractory_period_us = 1000;
-  const NoiseRates dark = measure_noise(simulated_sensor(options, 32, 16, 5), 0, 1, 20);
-  std::printf("dark on %.4f off %.4f alternating %.4f\n", dark.on_hz, dark.off_hz, dark.alternating);
+  const NoiseRates dark = measure_noise(simulated_sensor(options, 16, 16, 5), 0, 1, 10);
   EXPECT_GT(dark.alternating, 0.9);
 }
 
@@ -137,8 +127,7 @@ TEST(Bench, LeakIsWhatRemainsInLight) {
   EventCameraOptions options = slow_to_fire();
   options.leak_rate_hz = 0.5;
   options.refractory_period_us = 1000;
-  const NoiseRates rates = measure_noise(simulated_sensor(options, 32, 32, 6), 1e5, 1, 40);
-  std::printf("leak %.5f off %.5f\n", rates.leak_hz(), rates.off_hz);
+  const NoiseRates rates = measure_noise(simulated_sensor(options, 16, 16, 6), 5000, 1, 20);
   EXPECT_NEAR(rates.leak_hz() / 0.5, 1, 0.02);
 }
 
@@ -147,8 +136,8 @@ TEST(Bench, RampsReturnTheRefractoryPeriod) {
   options.refractory_period_us = 1500;
   options.circuit->noise = 0;
   options.circuit->source_follower_hz = 5000;
-  const Refractory refractory = measure_refractory(simulated_sensor(options, 16, 16, 7), 200, 8, std::vector{100.0, 200.0, 400.0}, 0.1);
-  std::printf("refractory %.6g threshold %.5f\n", refractory.period_s, refractory.threshold);
+  const Refractory refractory =
+      measure_refractory(simulated_sensor(options, 16, 16, 7), 200, 8, std::vector{100.0, 200.0, 400.0}, 0.1);
   EXPECT_NEAR(refractory.period_s / 1.5e-3, 1, 0.02);
   EXPECT_NEAR(refractory.threshold / 0.25, 1, 0.02);
 }

@@ -34,8 +34,13 @@ class Light {
   explicit Light(double lux) : points_{{0, lux}} {}
 
   double now_s() const { return to_seconds(points_.back().t); }
-  /// Keeps the light for a time.
-  void keep(double duration_s) { move_to(points_.back().lux, duration_s); }
+  /// Keeps the light for a time. The points are closer near the start, where pixels still respond to what was before.
+  void keep(double duration_s) {
+    const LightPoint from = points_.back();
+    for (double after_s = 1e-6; after_s < duration_s / 1.4; after_s *= 1.4)
+      points_.push_back({from.t + to_ns(after_s), from.lux});
+    points_.push_back({from.t + to_ns(duration_s), from.lux});
+  }
   /// Changes the light within 1 us.
   void step_to(double lux) { move_to(lux, 1e-6); }
   /// Changes the logarithm of the light linearly.

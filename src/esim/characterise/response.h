@@ -50,7 +50,8 @@ CumulativeNormal fit_cumulative_normal(const TrialCounts& counts);
 /// polarity must be that with the lower threshold.
 struct Bandwidth {
   std::vector<AmplitudePoint> points;
-  double t1_s = 0, t2_s = 0, threshold = 0;
+  double t1_s = 0, t2_s = 0;
+  double threshold = 0;     ///< in the contrast of the light, ln: with dark current, larger than that of the signal
   double bandwidth_hz = 0;  ///< -3 dB
 };
 Bandwidth measure_bandwidth(const SensorUnderTest& sensor, const TrialProtocol& steps,

@@ -39,9 +39,10 @@ struct Noise {
   double hazard(double z, double fall) const {
     const double middle_s = std::sqrt(t1_s * t2_s), m = fall * middle_s;
     if (z < -6) return std::max(0.0, -z) * (m * normal_cdf(m) + normal_pdf(m)) / middle_s;
-    const double w = std::max(0.05, std::abs(z) * middle_s / (t1_s + t2_s));
+    // Crossings come in clusters, which was measured with simulated noise; a level that falls fast is crossed once.
+    const double w = std::max(2.2, z) * middle_s / (t1_s + t2_s);
     const double clusters = 1 / (1 + 0.165 * -std::expm1(-4 * w) / (w * w));
-    const double single = m > 3 ? 1 : clusters;  // a falling level is crossed once
+    const double single = clusters + (1 - clusters) * std::min(1.0, m * m);
     return single * normal_pdf(z) * (normal_pdf(m) + m * normal_cdf(m)) / (middle_s * normal_cdf(z));
   }
 

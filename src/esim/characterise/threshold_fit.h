@@ -36,7 +36,8 @@ struct FitOptions {
 ///
 ///   r(t) = c(z) (s'/s) phi(z) (phi(m) + m Phi(m)),   P = 1 - E over n0 of exp(-integral of r / Phi(z) dt)
 ///
-/// c(z), 0.9 to 1, accounts for crossings in clusters.
+/// c = 1 / (1 + 0.165 (1 - exp(-4 w)) / w^2) with w = max(z, 2.2) sqrt(t1 t2) / (t1 + t2), 0.7 to 1, accounts for
+/// crossings in clusters, and tends to 1 as m tends to 1.
 double response_probability(const TrialProtocol& steps, double contrast, double threshold,
                             const PixelEstimate& estimate);
 

@@ -13,7 +13,7 @@
 namespace esim::inline characterise {
 namespace {
 
-constexpr int kPointsPerPeriod = 24;
+constexpr int kPointsPerPeriod = 48;
 
 struct Trial {
   std::size_t contrast;

@@ -8,15 +8,17 @@
 namespace esim::inline stats {
 namespace {
 
-constexpr double kChance = 1e-3;
+constexpr double kSignificance = 1e-3;
+constexpr double kMaxChance = 0.3;
 
 int extent(int block, int size) { return std::min(BlockCounts::kSize, size - block * BlockCounts::kSize); }
 
 bool moves(const BlockCounts& block, int pixels, double duration_s) {
   const double events = block.events;
   const double neighbours_hz = 8 * events / (pixels * duration_s);
-  const double expected = events * -std::expm1(-neighbours_hz * to_seconds(kSupport));
-  return block.supported > 0 && poisson_tail(block.supported, expected) < kChance;
+  const double chance = -std::expm1(-neighbours_hz * to_seconds(kSupport));
+  if (block.supported == 0) return false;
+  return chance > kMaxChance || poisson_tail(block.supported, events * chance) < kSignificance;
 }
 
 }  // namespace

@@ -26,7 +26,8 @@ struct QuietAreas {
 
 /// Motion crosses neighbouring pixels within a short time, and noise does not. In a block with n events of a pixels in
 /// the duration T, independent events would be supported with the probability p = 1 - exp(-8 n kSupport / (a T)). The
-/// block moves if it has s supported events and P(X >= s) < 0.001 for X ~ Poisson(n p). A block is quiet if neither it
+/// block moves if it has s supported events and P(X >= s) < 0.001 for X ~ Poisson(n p), or if
+/// p > 0.3 (9 Hz): there, motion and noise cannot be distinguished. A block is quiet if neither it
 /// nor its 8 neighbours move. The selection depends on neighbours in time only, and hardly on the rate of the noise.
 QuietAreas find_quiet_areas(const Image<BlockCounts>& blocks, int width, int height, double duration_s);
 

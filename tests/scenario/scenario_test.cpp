@@ -124,7 +124,7 @@ cameras:
   EXPECT_EQ(first.trail->threshold_us, TrailFilterOptions{}.threshold_us);
   ASSERT_TRUE(second.anti_flicker && second.rate_controller && !second.trail) << "a camera's own filters";
   EXPECT_EQ(second.anti_flicker->low_hz, 90);
-  EXPECT_EQ(scenario.cameras[1].event_camera.preset, SensorPreset::imx636);
+  EXPECT_EQ(scenario.cameras[1].event_camera.preset, SensorPreset::find("imx636"));
   EXPECT_EQ(write_scenario(read(write_scenario(scenario))), write_scenario(scenario));
   EXPECT_FALSE(read(kMinimal).cameras[0].event_camera.filters.any());
   EXPECT_TRUE(read(kMinimal, {"event_camera.filters.trail={}"}).cameras[0].event_camera.filters.trail);

@@ -192,10 +192,10 @@ TEST_F(FilteredSensor, LossesOfTheReadoutDoNotDependOnTheFilters) {
 }
 
 TEST_F(FilteredSensor, WarnsOfFiltersThatTheSensorDoesNotHave) {
-  scenario_.cameras[0].event_camera.preset = SensorPreset::davis346;
+  scenario_.cameras[0].event_camera.preset = *SensorPreset::find("davis346");
   scenario_.cameras[0].event_camera.filters.anti_flicker.emplace();
   scenario_.cameras[0].event_camera.filters.region = everything().region;
-  scenario_.cameras[1].event_camera.preset = SensorPreset::imx636;
+  scenario_.cameras[1].event_camera.preset = *SensorPreset::find("imx636");
   scenario_.cameras[1].event_camera.filters.anti_flicker.emplace();
   Collector out;
   run(out);

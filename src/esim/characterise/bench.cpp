@@ -11,8 +11,7 @@ namespace {
 
 double irradiance_of_a_lux(const EventCameraOptions& options) {
   if (!options.circuit) return 1;
-  const CircuitOptions& circuit = *options.circuit;
-  return 4 * circuit.f_number * circuit.f_number / (circuit.transmission * circuit.white_lux);
+  return options.circuit->photocurrent_fa_per_lux / options.circuit->white_photocurrent_fa();
 }
 
 struct Simulation {

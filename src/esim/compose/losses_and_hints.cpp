@@ -21,7 +21,7 @@ double percent(std::int64_t part, std::int64_t whole) {
 std::string grouped(std::int64_t count) { return esim::grouped(static_cast<std::uint64_t>(count)); }
 
 void add_sensor(const std::string& name, const ReadoutOptions& readout, const EventCameraStatistics& sensor,
-                 std::vector<std::string>& lines) {
+                std::vector<std::string>& lines) {
   const std::int64_t events = sensor.read_out;
   if (sensor.dropped > 0) {
     lines.push_back(
@@ -80,8 +80,7 @@ void add_sampling(const std::string& name, const CameraOptions& camera, const Sa
 }  // namespace
 
 std::vector<std::string> warnings_of_filters(const EventCameraOptions& sensor) {
-  std::vector<std::string> lines =
-      missing_blocks(sensor.filters, kEnumNames<SensorPreset>[static_cast<std::size_t>(sensor.preset)]);
+  std::vector<std::string> lines = missing_blocks(sensor.filters, sensor.preset.name());
   for (std::string& line : lines) line = "event_camera.filters." + line;
   return lines;
 }

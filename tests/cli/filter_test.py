@@ -159,6 +159,22 @@ class Filter(ProgramTest):
         for name in names(plain) - {pathlib.Path("report.json"), pathlib.Path("cam0/events.h5")}:
             self.assertEqual((self.out / name).read_bytes(), (plain / name).read_bytes(), name)
 
+    def test_removes_the_flicker_of_lamps(self):
+        recording = self.folder / "recording"
+        simulated = run("simulate", SCENES / "poster.yaml", "--out", recording, "--set", "duration_s=0.5",
+                        "--set", "trajectory={type: static}", "--set", "light.flicker={depth: 0.6, frequency_hz: 120}",
+                        "--set", "camera.width=64", "--set", "camera.height=48")
+        self.assertEqual(simulated.returncode, 0, simulated.stderr)
+
+        def dropped(*arguments):
+            result = self.filter("-o", self.out, "--force", "--json", "--anti-flicker", *arguments, source=recording)
+            (camera,) = json.loads(result.stdout)
+            self.assertGreater(camera["events"], 60 * 64 * 48)  # more than an event per period of each pixel
+            return camera["dropped"]["anti_flicker"] / camera["events"]
+        self.assertGreater(dropped(), 0.85)  # a block is known to flicker after 6 of 60 periods
+        self.assertGreater(dropped("--anti-flicker-low-hz", "110", "--anti-flicker-high-hz", "130"), 0.85)
+        self.assertEqual(dropped("--anti-flicker-high-hz", "110"), 0)
+
     def test_one_camera_of_several(self):
         rig = self.folder / "rig"
         for camera in ("left", "right"):

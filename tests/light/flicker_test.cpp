@@ -34,14 +34,14 @@ std::vector<float> pixels_of(const ImageView<float>& view, const Tile& tile) {
 
 /// Divides segments, and checks that the watermarks are valid.
 std::vector<Divided> divide(
-    Flicker& flicker, std::span<const Segment> segments, TimeNs watermark, Between between = Between::brightness,
+    Flicker& flicker, std::span<const Segment> segments, TimeNs watermark,
     const Flicker::RenderObjects& render = [](TimeNs, const Tile&, Sample&) { FAIL(); }) {
   std::vector<Divided> all;
   TimeNs last = std::numeric_limits<TimeNs>::min();
   std::vector<TimeNs> watermarks;
   std::vector<std::size_t> ends;
   flicker.look(segments, 1000, 1000, render);
-  flicker.divide(watermark, between, kWorkers, [&](std::span<const Segment> some, TimeNs until) {
+  flicker.divide(watermark, kWorkers, [&](std::span<const Segment> some, TimeNs until) {
     for (const Segment& segment : some) {
       const Tile& tile = segment.tile;
       all.push_back(
@@ -66,27 +66,23 @@ TEST(Flicker, MultipliesSegmentsThatStayContiguous) {
   const std::vector<Segment> segments = {{whole, 0, 0, &first, &first},
                                          {whole, 0, 4 * kNsPerMs, &first, &second},
                                          {whole, 4 * kNsPerMs, 13 * kNsPerMs, &second, &first}};
-  for (const Between between : {Between::brightness, Between::irradiance}) {
-    const std::vector<Divided> divided = divide(flicker, segments, 13 * kNsPerMs, between);
-    ASSERT_GT(divided.size(), 30U);
-    EXPECT_EQ(divided[0].t0, divided[0].t1);
-    for (std::size_t i = 1; i < divided.size(); ++i) {
-      EXPECT_EQ(divided[i].t0, divided[i - 1].t1);
-      EXPECT_LT(divided[i].t0, divided[i].t1);
-      EXPECT_EQ(divided[i].before, divided[i - 1].after);
-    }
-    EXPECT_EQ(divided.back().t1, 13 * kNsPerMs);
-    for (const Divided& part : divided) {
-      const bool early = part.t1 <= 4 * kNsPerMs;
-      const Image<float>&from = early ? first : second, &to = early ? second : first;
-      const double s = early ? static_cast<double>(part.t1) / 4e6 : static_cast<double>(part.t1 - 4'000'000) / 9e6;
-      for (std::size_t k = 0; k < part.after.size(); ++k) {
-        const double a = from.pixels()[k], b = to.pixels()[k];
-        const double e = between == Between::irradiance
-                             ? (1 - s) * a + s * b
-                             : std::exp((1 - s) * std::log(a + kDark) + s * std::log(b + kDark)) - kDark;
-        EXPECT_NEAR(part.after[k], e * modulation.at(part.t1), 2e-6);
-      }
+  const std::vector<Divided> divided = divide(flicker, segments, 13 * kNsPerMs);
+  ASSERT_GT(divided.size(), 30U);
+  EXPECT_EQ(divided[0].t0, divided[0].t1);
+  for (std::size_t i = 1; i < divided.size(); ++i) {
+    EXPECT_EQ(divided[i].t0, divided[i - 1].t1);
+    EXPECT_LT(divided[i].t0, divided[i].t1);
+    EXPECT_EQ(divided[i].before, divided[i - 1].after);
+  }
+  EXPECT_EQ(divided.back().t1, 13 * kNsPerMs);
+  for (const Divided& part : divided) {
+    const bool early = part.t1 <= 4 * kNsPerMs;
+    const Image<float>&from = early ? first : second, &to = early ? second : first;
+    const double s = early ? static_cast<double>(part.t1) / 4e6 : static_cast<double>(part.t1 - 4'000'000) / 9e6;
+    for (std::size_t k = 0; k < part.after.size(); ++k) {
+      const double a = from.pixels()[k], b = to.pixels()[k];
+      const double e = std::exp((1 - s) * std::log(a + kDark) + s * std::log(b + kDark)) - kDark;
+      EXPECT_NEAR(part.after[k], e * modulation.at(part.t1), 2e-6);
     }
   }
 }
@@ -132,10 +128,10 @@ TEST(Flicker, GivesObjectsThatAreLightsTheirOwn) {
   const std::vector<float> e = {0.5F, 0.5F, 0.5F};
   const ImageView<float> view(e.data(), tile);
   const std::vector<Segment> opening = {{tile, 0, 0, view, view}}, next = {{tile, 0, 4'250'000, view, view}};
-  divide(flicker, opening, 0, Between::brightness, render);
-  const std::vector<Divided> divided = divide(flicker, next, 4'250'000, Between::brightness, render);
-  EXPECT_EQ(flicker.objects_before(0)(11, 20), 0);
-  EXPECT_EQ(flicker.objects_after(0)(11, 20), 3);
+  divide(flicker, opening, 0, render);
+  const std::vector<Divided> divided = divide(flicker, next, 4'250'000, render);
+  EXPECT_EQ(flicker.light_of(0).before(11, 20), 0);
+  EXPECT_EQ(flicker.light_of(0).after(11, 20), 3);
   for (const Divided& part : divided) {
     const double s = static_cast<double>(part.t1) / 4'250'000;
     EXPECT_NEAR(part.after[0], 0.5 * own.at(part.t1), 1e-6);

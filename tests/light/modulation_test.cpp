@@ -57,13 +57,38 @@ TEST(Modulation, KeepsTheMeanLight) {
   }
 }
 
+TEST(Modulation, HasTheIntegralsOfItsValues) {
+  for (const FlickerShape shape : {FlickerShape::mains, FlickerShape::sine, FlickerShape::pwm}) {
+    const Modulation modulation({100, 0.9, shape, 0.3, 0.15}, 0, {});
+    for (const auto& [t0, t1] : {std::pair<TimeNs, TimeNs>(0, 1'000'000),
+                                 {3'000'000, 31'400'000},
+                                 {12'000, 12'000},
+                                 {9'000'000, 9'000'001},
+                                 {0, 10'000'000}}) {
+      double m = 0, tm = 0;
+      const int steps = 200'000;
+      const double step_ns = static_cast<double>(t1 - t0) / steps, step = step_ns * 1e-9;
+      for (int i = 0; i < steps; ++i) {
+        const double value = modulation.at(t0 + static_cast<TimeNs>((i + 0.5) * step_ns));
+        m += value * step;
+        tm += value * (i + 0.5) * step * step;
+      }
+      const Modulation::Integrals integrals = modulation.integrals(t0, t1);
+      const double duration = to_seconds(t1 - t0);
+      EXPECT_NEAR(integrals.m, m, 1e-4 * duration + 1e-17) << static_cast<int>(shape) << ' ' << t0;
+      EXPECT_NEAR(integrals.tm, tm, 1e-4 * duration * duration + 1e-17) << static_cast<int>(shape) << ' ' << t0;
+    }
+  }
+}
+
 TEST(Modulation, StaysOnLinesBetweenNodesForPixelsOfAnyIrradiance) {
   for (const FlickerShape shape : {FlickerShape::mains, FlickerShape::sine}) {
     for (const double depth : {0.01, 0.5, 0.999, 1.0}) {
       for (const double tolerance : {1e-5, 5e-4, 1e-2}) {
         const double dark = 1e-3;
-        const Modulation modulation({100, depth, shape, 0.5, 0.37}, 0, {tolerance, dark});
-        const std::vector<TimeNs> nodes = nodes_between(modulation, 0, 10 * kNsPerMs);
+        // A slow light, since nodes are rounded to nanoseconds.
+        const Modulation modulation({1, depth, shape, 0.5, 0.37}, 0, {tolerance, dark});
+        const std::vector<TimeNs> nodes = nodes_between(modulation, 0, kNsPerSecond);
         double largest = 0;
         for (const double e : {1e-5, 0.01, 1.0, 100.0}) {
           const auto L = [&](TimeNs t) { return std::log(e * modulation.at(t) + dark); };

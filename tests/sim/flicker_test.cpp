@@ -258,6 +258,33 @@ TEST_F(FlickeringLight, IsInGroundTruthAndFrames) {
   }
 }
 
+TEST_F(FlickeringLight, OfAnObjectIsInItsPixelsOfFramesAndGroundTruth) {
+  scenario_.light.flicker.reset();
+  scenario_.truth.rate_hz = 40;
+  scenario_.duration_s = 0.2;
+  add_card(kPwm);
+  FrameCameraOptions frames;
+  frames.rate_hz = 40, frames.bits = 12, frames.saturation_irradiance = 4;
+  for (const SamplingOptions& sampling : {SamplingOptions(AdaptiveSampling{}), SamplingOptions(UniformSampling{70})}) {
+    camera().sampling = sampling;
+    for (const double exposure_s : {0.001, 0.0002}) {  // a period; a part of it in which the card is on
+      frames.exposure_s = exposure_s;
+      camera().frame_camera = frames;
+      const Keeper out = run();
+      ASSERT_EQ(out.frames.size(), 7U);
+      const double card = exposure_s == 0.001 ? 1 : 1 / 0.3;
+      for (const Image<std::uint16_t>& frame : out.frames) {
+        EXPECT_NEAR(frame(32, 24), card / 4 * 4095, 1);
+        EXPECT_NEAR(frame(3, 3), 0.2 / 4 * 4095, 1);
+      }
+      for (const auto& [t, image] : out.images) {
+        EXPECT_NEAR(image(32, 24), 1 / 0.3, 1e-5);
+        EXPECT_NEAR(image(3, 3), 0.2, 1e-6);
+      }
+    }
+  }
+}
+
 TEST_F(FlickeringLight, ThatGoesDarkIsSeenByEverySensor) {
   scenario_.light.flicker = kPwm;
   scenario_.duration_s = 0.02;

@@ -11,20 +11,17 @@ namespace {
 constexpr std::size_t kPixelsPerBatch = 1U << 20U, kPlatesPerBatch = 8;  // at least
 constexpr int kPixelsPerPiece = 16384;                                   // per task of a parallel loop
 
-/// The irradiance of a row at fraction `s` of a segment in constant light, times `factor`. `dark` > 0: E + dark is
-/// interpolated in its logarithm; 0: E is linear.
+/// The irradiance E of a row at fraction `s` of a segment in constant light, times `factor`. ln(E + dark) is linear in
+/// time.
 void interpolate(std::size_t count, const float* e0, const float* e1, float s, float dark, float factor, float* out) {
   const auto run = [&](auto d, std::size_t first, std::size_t end) {
     const auto smallest = hn::Set(d, std::numeric_limits<float>::min()), one = hn::Set(d, 1.0F);
     const auto add = hn::Set(d, dark), fraction = hn::Set(d, s), m = hn::Set(d, factor);
     for (std::size_t i = first; i + hn::Lanes(d) <= end; i += hn::Lanes(d)) {
       const auto a = hn::LoadU(d, e0 + i), b = hn::LoadU(d, e1 + i);
-      auto e = hn::MulAdd(fraction, hn::Sub(b, a), a);
-      if (dark > 0) {
-        const auto from = hn::Max(hn::Add(a, add), smallest), to = hn::Max(hn::Add(b, add), smallest);
-        const auto change = hn::Mul(fraction, logarithm(d, hn::Max(hn::Div(to, from), smallest)));
-        e = hn::Max(hn::MulAdd(from, hn::Sub(hn::Exp(d, change), one), a), hn::Zero(d));
-      }
+      const auto from = hn::Max(hn::Add(a, add), smallest), to = hn::Max(hn::Add(b, add), smallest);
+      const auto change = hn::Mul(fraction, logarithm(d, hn::Max(hn::Div(to, from), smallest)));
+      const auto e = hn::Max(hn::MulAdd(from, hn::Sub(hn::Exp(d, change), one), a), hn::Zero(d));
       hn::StoreU(hn::Mul(m, e), d, out + i);
     }
   };
@@ -106,7 +103,7 @@ void Flicker::add_plate(std::size_t segment, TimeNs t) {
     factors_.push_back(static_cast<float>(light_.at_of_light(t, light)));
 }
 
-void Flicker::divide(TimeNs watermark, Between between, const Workers& workers, const Take& take) {
+void Flicker::divide(TimeNs watermark, const Workers& workers, const Take& take) {
   // Before the rest of the i-th segment and all later ones.
   std::vector<TimeNs> earliest(segments_.size() + 1, watermark);
   for (std::size_t i = segments_.size(); i-- > 0;) earliest[i] = std::min(earliest[i + 1], segments_[i].t0);
@@ -117,15 +114,15 @@ void Flicker::divide(TimeNs watermark, Between between, const Workers& workers, 
       t = next_node(i, t);
       add_plate(i, t);
       if (memory_.size() < kPixelsPerBatch || plates_.size() < kPlatesPerBatch) continue;
-      pass_on(t < segment.t1 ? std::min(t, earliest[i + 1]) : earliest[i + 1], between, workers, take);
+      pass_on(t < segment.t1 ? std::min(t, earliest[i + 1]) : earliest[i + 1], workers, take);
       if (t < segment.t1) add_plate(i, t);
     }
   }
-  pass_on(watermark, between, workers, take);
+  pass_on(watermark, workers, take);
 }
 
 /// Computes the plates' irradiance, and passes the segments between them on.
-void Flicker::pass_on(TimeNs watermark, Between between, const Workers& workers, const Take& take) {
+void Flicker::pass_on(TimeNs watermark, const Workers& workers, const Take& take) {
   struct Piece {
     std::size_t plate;
     Rows rows;
@@ -145,14 +142,14 @@ void Flicker::pass_on(TimeNs watermark, Between between, const Workers& workers,
   }
   workers.for_each(static_cast<int>(pieces.size()), [&](int i) {
     const Piece& piece = pieces[static_cast<std::size_t>(i)];
-    for (int y = piece.rows.first; y < piece.rows.last; ++y) fill(piece.plate, between, y);
+    for (int y = piece.rows.first; y < piece.rows.last; ++y) fill(piece.plate, y);
   });
   if (!divided_.empty()) take(divided_, watermark);
   plates_.clear(), memory_.clear(), factors_.clear();
 }
 
 /// Computes a row of a plate.
-void Flicker::fill(std::size_t plate, Between between, int y) {
+void Flicker::fill(std::size_t plate, int y) {
   const auto& [i, first, t] = plates_[plate];
   const Segment& segment = segments_[i];
   const Tile& tile = segment.tile;
@@ -172,7 +169,7 @@ void Flicker::fill(std::size_t plate, Between between, int y) {
   } else if (t == segment.t1) {
     scale(width, e1, factor, out);
   } else {
-    interpolate(width, e0, e1, s, between == Between::brightness ? dark_ : 0.0F, factor, out);
+    interpolate(width, e0, e1, s, dark_, factor, out);
   }
   if (one_light) return;
   const std::uint16_t* const before = ends_[i].before.row(y) + tile.x;

@@ -14,12 +14,16 @@
 
 namespace esim::inline light {
 
-/// What is linear in time within a rendered segment, as a sensor interprets it.
-enum class Between { brightness, irradiance };
+/// The light of a segment, by which its irradiance is to be multiplied.
+struct SegmentLight {
+  const SceneLight* scene = nullptr;
+  // The objects that the pixels see at t0 and t1, as in Sample::object; only if objects are lights.
+  ImageView<std::uint16_t> before{}, after{};
+};
 
-/// The stage between the sampler and the sensors of a camera that makes the light flicker. Samplers see the scene in
-/// constant light; this stage divides their segments at the nodes of the modulation and multiplies their irradiance by
-/// it, so that the events do not depend on the sampling. docs/methods/light.md gives the equations.
+/// The flicker of the light in front of one camera. Samplers see the scene in constant light; this stage between the
+/// sampler and the event camera divides their segments at the nodes of the modulation and multiplies their irradiance
+/// by it, so that the events do not depend on the sampling. docs/methods/light.md gives the equations.
 class Flicker {
  public:
   /// Renders which object each pixel of a tile sees at t.
@@ -33,16 +37,15 @@ class Flicker {
   /// The modulation of the light, at any time.
   const SceneLight& light() const { return light_; }
 
-  /// Takes the next segments of a sampler for divide(). If objects are lights, renders which of them the pixels see at
-  /// the segments' ends.
+  /// Takes the next segments of a sampler, for the functions below. If objects are lights, renders which of them the
+  /// pixels see at the segments' ends.
   void look(std::span<const Segment> segments, int width, int height, const RenderObjects& render);
 
-  /// The objects that the pixels of segment i see at its two ends; only if objects are lights.
-  ImageView<std::uint16_t> objects_before(std::size_t i) const { return ends_[i].before; }
-  ImageView<std::uint16_t> objects_after(std::size_t i) const { return ends_[i].after; }
+  /// The light of the i-th of these segments. Valid until the next look().
+  SegmentLight light_of(std::size_t i) const { return {&light_, ends_[i].before, ends_[i].after}; }
 
-  /// Divides the segments of look(), a few at a time. `watermark` is that of the sampler after them.
-  void divide(TimeNs watermark, Between between, const Workers& workers, const Take& take);
+  /// Divides these segments for an event camera, a few at a time. `watermark` is that of the sampler after them.
+  void divide(TimeNs watermark, const Workers& workers, const Take& take);
 
   /// Multiplies an image at t by its light. `object`: as in Sample; read only if objects are lights.
   void illuminate(TimeNs t, const Image<std::uint16_t>& object, Image<float>& irradiance) const;
@@ -60,8 +63,8 @@ class Flicker {
   };
 
   void add_plate(std::size_t segment, TimeNs t);
-  void fill(std::size_t plate, Between between, int row);
-  void pass_on(TimeNs watermark, Between between, const Workers& workers, const Take& take);
+  void fill(std::size_t plate, int row);
+  void pass_on(TimeNs watermark, const Workers& workers, const Take& take);
   TimeNs next_node(std::size_t segment, TimeNs t) const;
   std::vector<std::size_t> lights_of(const Tile& tile, const Ends& ends) const;
   void keep_objects();

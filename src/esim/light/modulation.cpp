@@ -51,6 +51,27 @@ double mean_of(const FlickerOptions& o) {
   return o.duty;
 }
 
+/// Antiderivatives over the phase p in [0, 1), from 0: `first` of the part that varies minus its mean, `second` of
+/// `first` minus its mean. Both are periodic.
+struct Antiderivatives {
+  double first, mean_of_first, second;
+};
+
+Antiderivatives antiderivatives(const FlickerOptions& o, double p) {
+  const double d = o.duty;
+  switch (o.shape) {
+    case FlickerShape::mains:
+      return {(1 - std::cos(kPi * p) - 2 * p) / kPi, 0, (p - p * p - std::sin(kPi * p) / kPi) / kPi};
+    case FlickerShape::sine:
+      return {-std::sin(2 * kPi * p) / (4 * kPi), 0, (std::cos(2 * kPi * p) - 1) / (8 * kPi * kPi)};
+    case FlickerShape::pwm:
+      break;
+  }
+  const double mean = d * (1 - d) / 2;
+  if (p < d) return {p * (1 - d), mean, (1 - d) * p * p / 2 - mean * p};
+  return {d * (1 - p), mean, (1 - d) * d * d / 2 + d * (p - d - (p * p - d * d) / 2) - mean * p};
+}
+
 double fraction(double value) { return value - std::floor(value); }
 
 }  // namespace
@@ -88,6 +109,16 @@ double Modulation::shape(double phase) const {
 
 double Modulation::at(TimeNs t) const {
   return scale_ * (1 - options_.depth + options_.depth * shape(fraction(periods(t))));
+}
+
+Modulation::Integrals Modulation::integrals(TimeNs t0, TimeNs t1) const {
+  const Antiderivatives a = antiderivatives(options_, fraction(periods(t0)));
+  const Antiderivatives b = antiderivatives(options_, fraction(periods(t1)));
+  const double duration = to_seconds(t1 - t0), period = 1 / options_.frequency_hz;
+  const double first = period * b.first;
+  const double second = period * (b.mean_of_first * duration + period * (b.second - a.second));
+  const double depth = scale_ * options_.depth;  // m = 1 + depth (g - mean of g)
+  return {duration + depth * (first - period * a.first), duration * duration / 2 + depth * (duration * first - second)};
 }
 
 /// A bound on the second derivative of ln(m + d) by the phase, for any d >= `dark`.

@@ -27,7 +27,13 @@ class Modulation {
   /// m(t).
   double at(TimeNs t) const;
 
-  /// The first node after t; the largest time if there is none. Between two nodes, L is linear in time to within the
+  struct Integrals {
+    double m, tm;  ///< of m(t) dt, and of (t - t0) m(t) dt; s, s^2
+  };
+  /// The integrals from t0 to t1, exactly.
+  Integrals integrals(TimeNs t0, TimeNs t1) const;
+
+  /// The first node after t; the largest time after the last one. Between two nodes, L is linear in time to within the
   /// tolerance. The nodes depend neither on samples nor on cameras with the same accuracy.
   TimeNs next_node(TimeNs t) const;
 

@@ -33,6 +33,9 @@ class SceneLight {
   double at(TimeNs t, std::uint16_t object = 0) const { return at_of_light(t, light_of(object)); }
   double at_of_light(TimeNs t, std::size_t light) const { return lights_[light] ? lights_[light]->at(t) : 1; }
 
+  /// Integrals of a light from t0 to t1.
+  Modulation::Integrals integrals(TimeNs t0, TimeNs t1, std::size_t light) const;
+
   /// The first node of a light after t (Modulation::next_node).
   TimeNs next_node(TimeNs t, std::size_t light) const;
 

@@ -50,7 +50,7 @@ void Stages::make_events(CameraChannel& camera, std::span<const Segment> segment
     };
     const TimeNs watermark = camera.sampler->watermark();
     if (!camera.flicker) return integrate(segments, watermark);
-    camera.flicker->divide(watermark, Between::brightness, *world_.workers, integrate);
+    camera.flicker->divide(watermark, *world_.workers, integrate);
   });
 }
 
@@ -62,12 +62,8 @@ void Stages::release_events(CameraChannel& camera, TimeNs until, std::vector<Eve
 void Stages::expose_frames(CameraChannel& camera, std::span<const Segment> segments) {
   if (!camera.frame_camera) return;
   timed(seconds_.frames, [&] {
-    const auto integrate = [&](std::span<const Segment> some, TimeNs watermark) {
-      camera.frame_camera->integrate(some, watermark, *world_.workers);
-    };
-    const TimeNs watermark = camera.sampler->watermark();
-    if (!camera.flicker || segments.empty()) return integrate(segments, watermark);
-    camera.flicker->divide(watermark, Between::irradiance, *world_.workers, integrate);
+    camera.frame_camera->integrate(segments, camera.sampler->watermark(), *world_.workers,
+                                   camera.flicker ? &*camera.flicker : nullptr);
   });
 }
 

@@ -192,6 +192,7 @@ TEST_F(FlickeringLight, OfAMovingSceneGivesTheSameEventsWithEverySamplingMethod)
 
 TEST_F(FlickeringLight, OfAnObjectIsSeenOnItOnly) {
   scenario_.light.flicker.reset();
+  scenario_.duration_s = 0.02;
   add_card(kPwm);
   for (const SamplingOptions& sampling : {SamplingOptions(AdaptiveSampling{}), SamplingOptions(UniformSampling{70}),
                                           SamplingOptions(KeyframeSampling{})}) {
@@ -232,6 +233,7 @@ TEST_F(FlickeringLight, OfASpriteIsSeenOnItOnly) {
 TEST_F(FlickeringLight, IsInGroundTruthAndFrames) {
   scenario_.truth.rate_hz = 130;
   scenario_.duration_s = 0.2;
+  camera().events = false;
   FrameCameraOptions frames;
   frames.rate_hz = 40, frames.exposure_s = 0.01, frames.bits = 12;
   for (const FlickerOptions& flicker :
@@ -267,6 +269,7 @@ TEST_F(FlickeringLight, OfAnObjectIsInItsPixelsOfFramesAndGroundTruth) {
   scenario_.light.flicker.reset();
   scenario_.truth.rate_hz = 40;
   scenario_.duration_s = 0.2;
+  camera().events = false;
   add_card(kPwm);
   FrameCameraOptions frames;
   frames.rate_hz = 40, frames.bits = 12, frames.saturation_irradiance = 4;
@@ -314,6 +317,7 @@ TEST_F(FlickeringLight, ThatGoesDarkIsSeenByEverySensor) {
 
 TEST_F(FlickeringLight, OfTheHighestFrequencyIsSeen) {
   scenario_.duration_s = 0.0005;
+  take_few_pixels();
   scenario_.light.flicker = FlickerOptions{1e6, 1, FlickerShape::pwm, 0.5, 0};
   EXPECT_GT(run().of(5, 5).size(), 499U * 2 * 50);
   scenario_.light.flicker->shape = FlickerShape::mains;

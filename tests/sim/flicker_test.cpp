@@ -97,6 +97,7 @@ class FlickeringLight : public test::CardScene {
 
 TEST_F(FlickeringLight, FiresWhenTheBrightnessCrossesThresholdsAtAnyRateOfSamples) {
   take_few_pixels();
+  scenario_.duration_s = 0.049;  // not a multiple of the period, after which L has its first value again
   const double grey = 0.2, threshold = 0.1, tolerance = 1e-3 * threshold;
   for (const FlickerShape shape : {FlickerShape::mains, FlickerShape::sine}) {
     for (const double depth : {0.5, 0.97, 1.0}) {
@@ -104,8 +105,8 @@ TEST_F(FlickeringLight, FiresWhenTheBrightnessCrossesThresholdsAtAnyRateOfSample
       scenario_.light.flicker->depth = depth;
       const Modulation light(*scenario_.light.flicker, 0, {});
       const auto L = [&](TimeNs t) { return std::log(grey * light.at(t) + camera().event_camera.log_eps); };
-      const std::vector<Event> wanted = crossings(L, 50 * kNsPerMs, threshold);
-      ASSERT_GT(wanted.size(), 50U);
+      const std::vector<Event> wanted = crossings(L, 49 * kNsPerMs, threshold);
+      ASSERT_GE(wanted.size(), 50U);
       for (const double rate_hz : {100.0, 5000.0}) {
         camera().sampling = UniformSampling{rate_hz};
         const std::vector<Event> events = run().of(5, 7);
@@ -186,7 +187,7 @@ TEST_F(FlickeringLight, OfAMovingSceneGivesTheSameEventsWithEverySamplingMethod)
   for (const SamplingOptions& sampling :
        {SamplingOptions(AdaptiveSampling{}), SamplingOptions(FlowSampling{}), SamplingOptions(KeyframeSampling{})}) {
     camera().sampling = sampling;
-    EXPECT_NEAR(static_cast<double>(run().events.size()) / dense, 1, 0.01);
+    EXPECT_NEAR(static_cast<double>(run().events.size()) / dense, 1, 0.02);
   }
 }
 
@@ -299,7 +300,7 @@ TEST_F(FlickeringLight, ThatGoesDarkIsSeenByEverySensor) {
   take_few_pixels();
   const auto check = [&](const char* name) {
     const Keeper out = run();
-    EXPECT_GT(out.events.size(), 1000U) << name;
+    EXPECT_GT(out.events.size(), 100U) << name;
     EXPECT_TRUE(std::is_sorted(out.events.begin(), out.events.end())) << name;
     for (const Event& event : out.events) ASSERT_TRUE(event.t >= 0 && event.t <= 20 * kNsPerMs) << name;
   };

@@ -159,7 +159,11 @@ void CircuitPixel::open(double light, double time, double place) {
 
 void CircuitPixel::release(double s) {
   state_.held_until = -1;
-  state_.reference = signal(s) + (noise_ != nullptr ? gain_ * noise_at(s).x : 0.0);
+  const double value = signal(s) + (noise_ != nullptr ? gain_ * noise_at(s).x : 0.0);
+  const double change = value - state_.reference;
+  lost_ +=
+      static_cast<std::int64_t>(std::abs(change) / static_cast<double>(change > 0 ? parameters_.on : parameters_.off));
+  state_.reference = value;
 }
 
 CircuitBounds CircuitPixel::bounds_without_noise() {

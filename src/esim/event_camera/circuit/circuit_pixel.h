@@ -81,12 +81,15 @@ class CircuitPixel {
 
   /// The stretch that the next functions are about: its signal, its light, and its start in ns after the epoch.
   void set(const CircuitPiece& piece, const LightRamp& light, double start) {
-    piece_ = piece, light_ = light, start_ = start;
+    piece_ = piece, light_ = light, start_ = start, lost_ = 0;
   }
 
   /// Calls emit(time, polarity) for each event, and returns the bounds that hold afterwards.
   template <typename Emit>
   CircuitBounds run(const Emit& emit);
+
+  /// Events that would have fired during resets since the last set().
+  std::int64_t lost() const { return lost_; }
 
   /// Ends the reset of a pixel at `s`: its new reference is signal plus noise.
   void release(double s);
@@ -166,6 +169,7 @@ class CircuitPixel {
   LightRamp light_;
   double start_ = 0, leak_, gain_;
   PhotoreceptorNoise::StepDraws draws_;
+  std::int64_t lost_ = 0;
 };
 
 template <typename Emit>

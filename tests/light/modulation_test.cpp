@@ -81,32 +81,65 @@ TEST(Modulation, HasTheIntegralsOfItsValues) {
   }
 }
 
+struct Distance {
+  double brightness = 0, late_ns = 0;  ///< the largest; of L, and of the times at which L has a value
+};
+
+/// The distance of L = ln(E m + dark) from straight lines between nodes, at eight times in each interval.
+Distance distance_from_lines(const Modulation& modulation, double e, double dark, TimeNs duration) {
+  const std::vector<TimeNs> nodes = nodes_between(modulation, 0, duration);
+  const auto L = [&](TimeNs t) { return std::log(e * modulation.at(t) + dark); };
+  Distance largest;
+  for (std::size_t i = 1; i < nodes.size(); ++i) {
+    const TimeNs a = nodes[i - 1], b = nodes[i];
+    for (int k = 1; k < 8; ++k) {
+      const TimeNs t = a + (b - a) * k / 8;
+      const double s = static_cast<double>(t - a) / static_cast<double>(b - a);
+      const double distance = std::abs(L(t) - ((1 - s) * L(a) + s * L(b)));
+      largest.brightness = std::max(largest.brightness, distance);
+      if (b - a < 100)
+        largest.late_ns = std::max(largest.late_ns, distance / std::abs(L(b) - L(a)) * static_cast<double>(b - a));
+    }
+  }
+  return largest;
+}
+
 TEST(Modulation, StaysOnLinesBetweenNodesForPixelsOfAnyIrradiance) {
   for (const FlickerShape shape : {FlickerShape::mains, FlickerShape::sine}) {
     for (const double depth : {0.01, 0.5, 0.999, 1.0}) {
       for (const double tolerance : {1e-5, 5e-4, 1e-2}) {
         const double dark = 1e-3;
-        // A slow light, since nodes are rounded to nanoseconds.
+        // A slow light, since nodes are rounded to nanoseconds (see the next test).
         const Modulation modulation({0.1, depth, shape, 0.5, 0.37}, 0, {tolerance, dark});
-        const std::vector<TimeNs> nodes = nodes_between(modulation, 0, 10 * kNsPerSecond);
         double largest = 0;
-        for (const double e : {1e-5, 0.01, 1.0, 100.0}) {
-          const auto L = [&](TimeNs t) { return std::log(e * modulation.at(t) + dark); };
-          for (std::size_t i = 1; i < nodes.size(); ++i) {
-            const TimeNs a = nodes[i - 1], b = nodes[i];
-            for (int k = 1; k < 8; ++k) {
-              const TimeNs t = a + (b - a) * k / 8;
-              const double s = static_cast<double>(t - a) / static_cast<double>(b - a);
-              largest = std::max(largest, std::abs(L(t) - ((1 - s) * L(a) + s * L(b))));
-            }
-          }
-        }
+        for (const double e : {1e-5, 0.01, 1.0, 100.0})
+          largest = std::max(largest, distance_from_lines(modulation, e, dark, 10 * kNsPerSecond).brightness);
         EXPECT_LT(largest, 1.02 * tolerance) << static_cast<int>(shape) << ' ' << depth;
         if (depth > 0.1) {
           EXPECT_GT(largest, 0.5 * tolerance) << "more nodes than needed";
         }
       }
     }
+  }
+}
+
+TEST(Modulation, ExceedsTheToleranceByRoundingOnlyInBrightPixelsNearADarkCusp) {
+  const double tolerance = 1e-4, dark = 1e-3;
+  for (const double depth : {0.5, 0.97, 1.0}) {
+    const Modulation mains({100, depth, FlickerShape::mains, 0.5, 0.37}, 0, {tolerance, dark});
+    const Modulation sine({100, depth, FlickerShape::sine, 0.5, 0.37}, 0, {tolerance, dark});
+    for (const double e : {0.01, 1.0, 10.0, 100.0}) {
+      EXPECT_LT(distance_from_lines(sine, e, dark, 10 * kNsPerMs).brightness, 1.02 * tolerance) << depth << ' ' << e;
+      const double distance = distance_from_lines(mains, e, dark, 10 * kNsPerMs).brightness;
+      EXPECT_LT(distance, (depth == 1 && e == 100 ? 3 : 1.02) * tolerance) << depth << ' ' << e;
+    }
+  }
+  // In these intervals of nanoseconds, L is so steep that events are late or early by less than half a nanosecond.
+  for (const double frequency : {100.0, 1000.0}) {
+    const Modulation mains({frequency, 1, FlickerShape::mains, 0.5, 0.37}, 0, {tolerance, dark});
+    const Distance distance = distance_from_lines(mains, 100, dark, to_ns(1 / frequency));
+    EXPECT_GT(distance.brightness, 2 * tolerance);
+    EXPECT_LT(distance.late_ns, 0.5) << frequency;
   }
 }
 

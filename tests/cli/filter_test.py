@@ -209,7 +209,7 @@ class Filter(ProgramTest):
         total = text(plain).count(b"\n")
         for names in [[name] for name in filters] + [list(filters)]:
             result = simulate(inside, *(f"event_camera.filters.{name}={filters[name][0]}" for name in names))
-            self.filter("-o", after, "--force", "--time-unit", "ns", *sum((filters[name][1] for name in names), []),
+            self.filter("-o", after, "--force", "--time-unit", "ns", *(word for name in names for word in filters[name][1]),
                         source=plain)
             self.assertEqual(text(inside), text(after), names)
             reports = [json.loads((out / "report.json").read_text()) for out in (inside, after)]

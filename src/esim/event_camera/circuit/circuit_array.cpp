@@ -12,7 +12,6 @@ namespace esim::inline event_camera {
 namespace {
 
 constexpr double kElectron_fC = 1.602176634e-4;  // elementary charge, fA s
-constexpr double kMaxDecay = 0.25;               // in one step far from equilibrium: as steps_for()
 constexpr double kSettled = 1e-13;               // brightness: differences below this are zero
 constexpr float kUnreachable = 1e6F;             // threshold of a dead pixel
 constexpr double kGuard = 1e-9;                  // between bounds and levels, above all rounding errors
@@ -279,25 +278,25 @@ void CircuitArray::advance_one(const Row& row, std::uint32_t column, std::size_t
     return;
   }
   CircuitState front{lag_[i], v_[i]};
-  buffer.lost += run(i, front, ramp, row.start, row.length, false, emit);
+  buffer.lost += run(i, front, ramp, row.start, row.length, emit);
   light_[i] = light1;
   lag_[i] = std::abs(front.lag) < kSettled ? 0.0 : front.lag;
   y_[i] = light1 - std::log1p(lag_[i]);
   v_[i] = lag_[i] == 0 && ramp.rate == 0 && std::abs(front.v - y_[i]) < kSettled ? y_[i] : front.v;
 }
 
-/// Takes a pixel along a ramp of light, in as many steps as needed; skips those within its bounds unless `always`.
+/// Takes a pixel along a ramp of light, in as many steps as needed; skips those within its bounds.
 /// Returns the number of events that a maximum rate has lost.
 template <typename Emit>
 std::int64_t CircuitArray::run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length,
-                               bool always, const Emit& emit) {
+                               const Emit& emit) {
   std::int64_t lost = 0;
   CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], leak_[i], states_[i]);
-  const int steps = steps_for(circuit_.poles, front, ramp, length);
-  for (int k = 0; k < steps; ++k) {
-    const double h = length / steps, from = start + h * k;
-    const LightRamp part{ramp.light + ramp.rate * h * k, ramp.rate};
+  for (double done = 0; done < length;) {
+    const LightRamp part{ramp.light + ramp.rate * done, ramp.rate};
+    const double h = step_length(circuit_.poles, front, part, length - done), from = start + done;
     const CircuitPiece piece = esim::advance(circuit_.poles, front, part, h);
+    done = h < length - done ? done + h : length;
     const auto [lowest, highest] = piece.range(0, h);
     const double leaked0 = 1e-9 * static_cast<double>(leak_[i]) * from,
                  leaked1 = 1e-9 * static_cast<double>(leak_[i]) * (from + h);
@@ -305,7 +304,7 @@ std::int64_t CircuitArray::run(std::size_t i, CircuitState& front, const LightRa
     const bool quiet = lowest + std::min(leaked0, leaked1) - kGuard > low_[i] &&
                        highest + std::max(leaked0, leaked1) + kGuard < high_[i] && from + h < until_[i] &&
                        std::abs(change) < kLightReach;
-    if (quiet && !always) continue;
+    if (quiet) continue;
     pixel.set(piece, part, from);
     set_bounds(i, pixel.run(emit));
     lost += limits_ ? pixel.lost() : 0;
@@ -334,7 +333,7 @@ void CircuitArray::resume(std::uint32_t pixel, const PastSegment& past, CircuitB
     requests.push_back({epoch_ + static_cast<TimeNs>(std::ceil(t)), static_cast<std::uint16_t>(x),
                         static_cast<std::uint16_t>(y), static_cast<std::int8_t>(polarity)});
   };
-  buffer.lost += run(pixel, front, {light0, (light1 - light0) / length}, start, length, false, emit);
+  buffer.lost += run(pixel, front, {light0, (light1 - light0) / length}, start, length, emit);
 }
 
 void CircuitArray::flush(const Row& row, CircuitBuffer& buffer, PackedEvents& events) {

@@ -74,7 +74,7 @@ class CircuitArray {
   template <class D>
   bool move_vector(D d, const Row& row, std::size_t x, CircuitBuffer& buffer, std::size_t at);
   template <typename Emit>
-  std::int64_t run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length, bool always,
+  std::int64_t run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length,
                    const Emit& emit);
   void advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer, PackedEvents& events);
   void set_bounds(std::size_t pixel, const CircuitBounds& bounds);

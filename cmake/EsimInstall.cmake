@@ -6,9 +6,7 @@ get_property(targets GLOBAL PROPERTY ESIM_TARGETS)
 install(TARGETS esim_app RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS ${targets} esim_build_flags EXPORT esimTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/esim DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/esim PATTERN "*.py" EXCLUDE PATTERN "__pycache__" EXCLUDE)
-
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/studio/dist/ DESTINATION ${CMAKE_INSTALL_DATADIR}/esim/studio OPTIONAL)  # if scripts/studio has built it
+esim_install_data(${CMAKE_INSTALL_DATADIR}/esim)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/esim)
 install(EXPORT esimTargets NAMESPACE esim:: DESTINATION ${package_dir})
@@ -19,6 +17,6 @@ install(FILES ${PROJECT_BINARY_DIR}/esimConfig.cmake ${PROJECT_BINARY_DIR}/esimC
               ${PROJECT_SOURCE_DIR}/cmake/FindOpenCVModules.cmake ${PROJECT_SOURCE_DIR}/cmake/FindFFmpegLibraries.cmake ${PROJECT_SOURCE_DIR}/cmake/FindEpoxy.cmake
               ${PROJECT_SOURCE_DIR}/cmake/FindCairo.cmake ${PROJECT_SOURCE_DIR}/cmake/FindISAL.cmake
               ${PROJECT_SOURCE_DIR}/cmake/FindLZ4.cmake ${PROJECT_SOURCE_DIR}/cmake/FindZstd.cmake
-              ${PROJECT_SOURCE_DIR}/cmake/FindLibZip.cmake
+              ${PROJECT_SOURCE_DIR}/cmake/FindLibZip.cmake ${PROJECT_SOURCE_DIR}/cmake/FindWebP.cmake ${PROJECT_SOURCE_DIR}/cmake/FindBlosc.cmake
               ${PROJECT_SOURCE_DIR}/cmake/EsimDependencies.cmake
         DESTINATION ${package_dir})

@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
       "  esim dataset affine --out out/flow                10,000 sequences with optical flow, for learning\n"
       "  esim studio scenes/room.yaml                      design, make and view recordings in a browser\n"
       "  esim evaluate sampling --out out/sampling         accuracy and cost of sampling methods\n"
+      "  esim scenes --copy scenes                         a copy of the scenes that come with esim\n"
       "  esim options                                      every option of a scenario\n"
       "\n"
       "Exit status: 0 success, 1 internal error, 2 error in the input or on this machine, 130 interrupted.");
@@ -42,6 +43,7 @@ int main(int argc, char** argv) {
   add_studio(app, exit_code);
   add_dataset(app, exit_code);
   add_evaluate(app, exit_code);
+  add_scenes(app, exit_code);
   add_options(app, exit_code);
   add_removed(app);
   try {

@@ -30,6 +30,17 @@ bool is_ignored(int signal) {
 
 void write_or_not(std::FILE* file, const std::string& text) noexcept { std::fputs(text.c_str(), file); }
 
+std::filesystem::path data_folder(const std::string& name, const std::string& built, const std::string& file) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error).parent_path();
+  const fs::path installed = (program / ESIM_DATA_INSTALLED / name).lexically_normal();
+  for (const fs::path& folder : {installed, program / "share/esim" / name, program / built}) {
+    if (fs::exists(folder / file, error)) return folder.lexically_normal();
+  }
+  return installed;
+}
+
 bool interrupted() { return signal_came != 0; }
 
 Notices printing(bool quiet) {

@@ -6,7 +6,11 @@ T_A_B maps points from frame B to frame A; quaternions are Hamilton, x y z w. `d
 `docs/scenario.md` lists the options of scenarios.
 """
 
-from . import dataset, filters
+from . import _needs, _processor
+
+_processor.require(_needs.PROCESSOR_FEATURES, _processor.present())
+
+from . import dataset, filters  # noqa: E402
 from ._checks import ns
 from ._core import __version__
 from ._errors import Error, InternalError, LossWarning, OutputError

@@ -126,12 +126,12 @@ Bytes encode(const Picture& picture, int filter, std::size_t chunks = 1) {
   return file;
 }
 
-bool decode(const Bytes& file, PngPixels& pixels) {
+bool decode(const Bytes& file, ImagePixels& pixels) {
   return decode_png_pixels({reinterpret_cast<const std::byte*>(file.data()), file.size()}, pixels);
 }
 
 TEST(PngPixels, EveryKindAndFilter) {
-  PngPixels pixels;  // reused for all images
+  ImagePixels pixels;  // reused for all images
   for (const int channels : {1, 2, 3, 4}) {
     for (const int bits : {8, 16}) {
       for (const int filter : {0, 1, 2, 3, 4, -1}) {
@@ -155,7 +155,7 @@ TEST(PngPixels, EveryKindAndFilter) {
 }
 
 TEST(PngPixels, OnePixelAndManyChunks) {
-  PngPixels pixels;
+  ImagePixels pixels;
   const Picture one = picture_of(1, 1, 3, 8), large = picture_of(200, 150, 4, 8);
   ASSERT_TRUE(decode(encode(one, 4), pixels));
   EXPECT_EQ(pixels.bytes, one.bytes);
@@ -165,7 +165,7 @@ TEST(PngPixels, OnePixelAndManyChunks) {
 
 TEST(PngPixels, DamageIsFoundWhereverItIs) {
   const Bytes file = encode(picture_of(5, 4, 3, 8), -1, 2);
-  PngPixels pixels;
+  ImagePixels pixels;
   ASSERT_TRUE(decode(file, pixels));
   for (std::size_t i = 0; i < file.size(); ++i) {
     EXPECT_FALSE(decode(Bytes(file.begin(), file.begin() + static_cast<std::ptrdiff_t>(i)), pixels)) << "cut at " << i;
@@ -179,7 +179,7 @@ TEST(PngPixels, DamageIsFoundWhereverItIs) {
 
 TEST(PngPixels, OtherKindsAreLeftToOthers) {
   const Picture picture = picture_of(5, 4, 3, 8);
-  PngPixels pixels;
+  ImagePixels pixels;
   const auto with_head = [&](const Bytes& head, const std::string& extra = "") {
     Bytes file = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
     append_chunk(file, "IHDR", head);

@@ -343,18 +343,20 @@ TEST(EventsHdf5Writer, UnwritablePlacesAreNamed) {
   EXPECT_EQ(begin("/"), "cannot write /: Is a directory");
 }
 
-TEST(EventsHdf5WriterDeathTest, MissingPluginIsExplained) {
+TEST(EventsHdf5WriterDeathTest, BloscNeedsNoPlugin) {
   testing::FLAGS_gtest_death_test_style =
       "threadsafe";  // a new process, in which HDF5 has not searched for plugins yet
   EXPECT_EXIT(
       {
         setenv("HDF5_PLUGIN_PATH", "/nonexistent", 1);
-        const std::string message = message_of<UserError>([] { EventsHdf5Writer("/tmp/never_written.h5", 0); });
-        std::fputs(message.c_str(), stderr);
-        EventsHdf5Writer("/tmp/never_written.h5", 0, {TimeUnit::us, Compression::gzip});
-        std::exit(0);
+        const test::TemporaryDirectory folder;
+        const std::vector<Event> events(100'000, Event{5, 1, 2, 1});
+        const auto path = folder.path() / "events.h5";
+        EventsHdf5Writer writer(path, 0, {TimeUnit::us, Compression::blosc});
+        test::record(writer, recording_info(10, 10, 0, 10), events);
+        std::exit(std::filesystem::file_size(path) < 100'000 ? 0 : 1);  // 1.3 MB without compression
       },
-      testing::ExitedWithCode(0), "install the package hdf5-filter-plugin-blosc-serial.*gzip");
+      testing::ExitedWithCode(0), "");
 }
 
 }  // namespace

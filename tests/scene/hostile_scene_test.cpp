@@ -159,16 +159,15 @@ TEST(HostileImage, AbsurdSizesAreRefusedBeforeDecoding) {
   text.replace(frame + 5, 4, "\xFF\xFF\xFF\xFF");
   EXPECT_TRUE(test::contains(message("a.jpg", text), "65535x65535 pixels"));
 
-  std::vector<unsigned char> tiff;
-  cv::imencode(".tif", cv::Mat(8, 8, CV_8UC3, cv::Scalar(1, 2, 3)), tiff);
-  std::string tiff_text(tiff.begin(), tiff.end());
-  const std::string width_entry("\x00\x01", 2);  // tag 256
-  std::size_t at = tiff_text.find(width_entry + std::string("\x03\x00\x01\x00\x00\x00\x08\x00", 8));
-  if (at != std::string::npos) {
-    tiff_text.replace(at + 2, 2, std::string("\x04\x00", 2));
-    tiff_text.replace(at + 8, 4, "\xFF\xFF\xFF\x7F");
-    EXPECT_TRUE(test::contains(message("a.tif", tiff_text), "pixels are not supported"));
+  for (const int quality : {80, 101}) {  // lossy and lossless
+    std::vector<unsigned char> webp;
+    cv::imencode(".webp", cv::Mat(8, 8, CV_8UC3, cv::Scalar(1, 2, 3)), webp, {cv::IMWRITE_WEBP_QUALITY, quality});
+    std::string claim(webp.begin(), webp.end());
+    claim.replace(quality > 100 ? 21 : 26, 4, quality > 100 ? "\xFF\xFF\xFF\x0F" : "\xFF\x3F\xFF\x3F");
+    const std::string refusal = message("a.webp", claim);
+    EXPECT_TRUE(test::contains(refusal, quality > 100 ? "16384x16384 pixels" : "16383x16383 pixels")) << refusal;
   }
+  EXPECT_TRUE(test::contains(message("a.pgm", "P5 20000 20000 255\n1234"), "cannot be decoded"));
   EXPECT_TRUE(test::contains(message("a.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 100000 +X 100000\n"),
                              "100000x100000 pixels"));
 }

@@ -54,7 +54,7 @@ TEST(PageImages, WhatIsTurnedOrTransparentOrLargeOrOfAnotherKindIsMadeAnew) {
   cv::Mat glass(64, 64, CV_8UC4, cv::Scalar(0, 0, 200, 255));
   glass.colRange(0, 32).setTo(cv::Scalar(200, 0, 0, 255));
   for (const auto& bytes :
-       {turned, encoded(glass, ".png"), encoded(halves(2100), ".png"), encoded(halves(64), ".bmp")}) {
+       {turned, encoded(glass, ".png"), encoded(halves(2100), ".png"), encoded(halves(64), ".webp")}) {
     const PageImage image = page_image({.name = "halves", .bytes = bytes, .opaque = true});
     EXPECT_EQ(image.type, "image/jpeg");
     EXPECT_NE(image.bytes, as_text(bytes));

@@ -36,12 +36,23 @@ struct PlayArguments {
   bool light = false, quiet = false, force = false;
 };
 
-// The default path: FILE.play.mp4 next to FILE.h5, FOLDER.play.mp4 next to a folder.
+// The default path: FILE.play.mp4 next to FILE.h5, FOLDER.play.mp4 next to a folder; .webp without FFmpeg.
 fs::path out_path(const PlayArguments& arguments) {
   if (!arguments.out.empty()) return arguments.out;
+  const char* const ending = can_write(VideoKind::mp4) ? ".play.mp4" : ".play.webp";
   const fs::path file = fs::path(arguments.input + "/").parent_path();  // without a slash at its end
-  if (fs::is_directory(file)) return fs::path(file) += ".play.mp4";
-  return fs::path(file).replace_extension(".play.mp4");
+  if (fs::is_directory(file)) return fs::path(file) += ending;
+  return fs::path(file).replace_extension(ending);
+}
+
+// The kind of video with this ending; empty for .png, an image.
+std::optional<VideoKind> kind_of(const fs::path& out) {
+  const std::string extension = out.extension().string();
+  if (extension == ".png") return std::nullopt;
+  if (extension == ".mp4") return VideoKind::compact_mp4;
+  if (extension == ".gif") return VideoKind::gif;
+  if (extension == ".webp") return VideoKind::webp;
+  throw UserError(fmt::format("--out {}: must end in .mp4, .gif, .webp or .png", out.string()));
 }
 
 /// One output, from the overview to the finished file.
@@ -139,22 +150,22 @@ class Showing {
 
 int run(PlayArguments& arguments) {
   const fs::path out = out_path(arguments);
-  const std::string extension = out.extension().string();
-  if (extension != ".mp4" && extension != ".gif" && extension != ".png")
-    throw UserError(fmt::format("--out {}: must end in .mp4, .gif or .png", out.string()));
+  const std::optional<VideoKind> kind = kind_of(out);
+  if (kind && !can_write(*kind))
+    throw UserError(fmt::format("--out {}: must end in .webp or .png, since this esim was built without FFmpeg", out.string()));
   if (fs::exists(out) && (!arguments.force || fs::is_directory(out)))
     throw UserError(out.string() + " exists; choose another --out, or replace a file with --force");
-  if (arguments.at_s && extension != ".png") throw UserError("--at gives a single image; add --out FILE.png");
+  if (arguments.at_s && kind) throw UserError("--at gives a single image; add --out FILE.png");
 
   PlayOptions& play = arguments.play;
   play.views = views_named(arguments.views);
   play.window_s = 1e-3 * arguments.window_ms;
   play.tau_s = 1e-3 * arguments.tau_ms;
   play.span_s = 1e-3 * arguments.span_ms;
-  play.frames_per_s = arguments.fps.value_or(extension == ".gif" ? 20 : 30);
-  if (extension == ".gif" && play.frames_per_s > kMaxFramesOfGif_hz)
+  play.frames_per_s = arguments.fps.value_or(kind == VideoKind::gif ? 20 : 30);
+  if (kind == VideoKind::gif && play.frames_per_s > kMaxFramesOfGif_hz)
     throw UserError(fmt::format("--fps: must be at most {} for a GIF; lower it", kMaxFramesOfGif_hz));
-  if (extension == ".gif" && play.width == 0) play.width = kWidthOfGif;
+  if (kind == VideoKind::gif && play.width == 0) play.width = kWidthOfGif;
   play.theme = arguments.light ? kLightTheme : kDarkTheme;
 
   catch_interrupts();
@@ -169,8 +180,7 @@ int run(PlayArguments& arguments) {
   bar.clear();
   if (!found) return kInterrupted;
   Showing showing(arguments, input, *found, out);
-  return extension == ".png" ? showing.still()
-                             : showing.video(extension == ".gif" ? VideoKind::gif : VideoKind::compact_mp4);
+  return kind ? showing.video(*kind) : showing.still();
 }
 
 }  // namespace
@@ -189,7 +199,7 @@ void add_play(CLI::App& app, int& exit_code) {
           "-o,--out", arguments->out,
           "File to write (default: NAME.play.mp4 next to IN). A .png file shows a contact sheet, or with --at a "
           "single time")
-      ->type_name("FILE.mp4|.gif|.png");
+      ->type_name("FILE.mp4|.gif|.webp|.png");
   command
       ->add_option(
           "--view", arguments->views,

@@ -19,21 +19,10 @@ struct StudioArguments : studio::StudioOptions {
   std::vector<std::string> folders;
 };
 
-/// The folder of the page relative to this program: installed, next to it in an unpacked archive, or in the build tree.
-fs::path page_folder() {
-  std::error_code error;
-  const fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
-  const fs::path installed = (folder / ESIM_PAGE_INSTALLED).lexically_normal();
-  for (const fs::path& page : {installed, folder / "share/esim/studio", folder / ESIM_PAGE_BUILT}) {
-    if (fs::is_regular_file(page / "index.html", error)) return page.lexically_normal();
-  }
-  return installed;
-}
-
 int run(StudioArguments& arguments) {
   arguments.opened = arguments.input;
   arguments.roots.assign(arguments.folders.begin(), arguments.folders.end());
-  arguments.pages = arguments.page.empty() ? page_folder() : fs::path(arguments.page);
+  arguments.pages = arguments.page.empty() ? data_folder("studio", ESIM_PAGE_BUILT, "index.html") : fs::path(arguments.page);
 
   // Blocked in all threads; this one waits for them.
   sigset_t signals;

@@ -41,7 +41,7 @@ bool take_chunk(std::span<const std::uint8_t>& rest, Chunk& chunk) {
 }
 
 /// Reads the size and the type of pixels from IHDR; false if the type is not supported.
-bool read_header(const Chunk& chunk, PngPixels& pixels) {
+bool read_header(const Chunk& chunk, ImagePixels& pixels) {
   if (chunk.name != "IHDR" || chunk.data.size() != 13) return false;
   const std::uint8_t* const head = chunk.data.data();
   const std::uint32_t width = big_endian(head), height = big_endian(head + 4);
@@ -200,7 +200,7 @@ bool inflate(std::span<const std::uint8_t> compressed, std::span<std::uint8_t> o
 
 }  // namespace
 
-bool decode_png_pixels(std::span<const std::byte> file, PngPixels& pixels) {
+bool decode_png_pixels(std::span<const std::byte> file, ImagePixels& pixels) {
   std::span<const std::uint8_t> rest(reinterpret_cast<const std::uint8_t*>(file.data()), file.size());
   if (rest.size() < kSignature.size() ||
       !std::equal(kSignature.begin(), kSignature.end(), file.begin(),

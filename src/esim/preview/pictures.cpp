@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 #include <vector>
+
+#include "esim/files/codecs/image_codecs.h"
 
 namespace esim::inline preview {
 namespace {
@@ -68,11 +69,12 @@ Image<float> reduce_nearest(const Image<float>& image, int width, int height) {
 }
 
 std::string encode_png(const Image<Rgb>& image) {
-  cv::Mat bgr;
-  cv::cvtColor(view(image), bgr, cv::COLOR_RGB2BGR);
-  std::vector<unsigned char> png;
-  cv::imencode(".png", bgr, png, {cv::IMWRITE_PNG_COMPRESSION, 3});
-  return {png.begin(), png.end()};
+  const PixelView pixels{.data = image.data(),
+                         .row_bytes = sizeof(Rgb) * static_cast<std::size_t>(image.width()),
+                         .width = image.width(),
+                         .height = image.height(),
+                         .channels = 3};
+  return encode_png(pixels, PngEffort::small);
 }
 
 Image<Rgb> enlarge(const Image<Rgb>& image, int width, int height) {

@@ -136,7 +136,11 @@ void PreviewWriter::Impl::show(PreviewFrame frame) {
   frame.since_previous = previous ? frame.t - *previous : 0;
   frame.caption = caption;
   Image<Rgb> image = page->compose(frame);
-  if (!video) video.emplace(folder / "preview.mp4", image.width(), image.height(), playback.frames_per_s);
+  if (!video) {
+    const bool mp4 = can_write(VideoKind::mp4);
+    video.emplace(folder / (mp4 ? "preview.mp4" : "preview.webp"), image.width(), image.height(), playback.frames_per_s,
+                  mp4 ? VideoKind::mp4 : VideoKind::webp);
+  }
   video->append(image);
   if (candidates.wants_next()) {
     candidates.add(events, std::move(image));

@@ -7,8 +7,8 @@
 
 namespace esim::inline preview {
 
-/// Writes preview.mp4, a video of one camera's events next to its ground truth or its input video, and preview.png, one
-/// frame of it: the one with the median number of events in the second half. The video has one frame per frame of
+/// Writes preview.mp4 (preview.webp without FFmpeg), a video of one camera's events next to its ground truth or its
+/// input video, and preview.png, one frame of it: the one with the median number of events in the second half. The video has one frame per frame of
 /// ground truth or input video and plays in real time or, if that were too short or too fast to watch, slower, as its
 /// caption states.
 class PreviewWriter final : public Sink {

@@ -9,15 +9,21 @@
 
 namespace esim::inline preview {
 
-/// MP4 with H.264 in yuv420p, which browsers play; the same with about a quarter fewer bytes; or an endless GIF with
-/// 256 colours per frame.
-enum class VideoKind { mp4, compact_mp4, gif };
+/// MP4 with H.264 in yuv420p, which browsers play; the same with about a quarter fewer bytes; an endless GIF with 256
+/// colours per frame; or an endless animated WebP, which browsers and image viewers play.
+enum class VideoKind { mp4, compact_mp4, gif, webp };
+
+/// Whether this build writes such videos: without FFmpeg, only WebP.
+bool can_write(VideoKind kind);
+
+class VideoEncoder;
 
 /// Writes a video. Throws OutputError on failure.
 class VideoFile {
  public:
-  /// Width and height must be even. Times in GIFs have steps of 1/100 s.
-  VideoFile(std::filesystem::path path, int width, int height, double frames_per_s, VideoKind kind = VideoKind::mp4);
+  /// Width and height must be even. Times in GIFs have steps of 1/100 s, those in WebP files 1/1000 s.
+  VideoFile(const std::filesystem::path& path, int width, int height, double frames_per_s,
+            VideoKind kind = VideoKind::mp4);
   ~VideoFile();
 
   void append(const Image<Rgb>& image);
@@ -26,8 +32,7 @@ class VideoFile {
   void close();
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<VideoEncoder> encoder_;
 };
 
 }  // namespace esim::inline preview

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <utility>
 
 namespace esim::inline scene {
 namespace {
@@ -58,8 +57,7 @@ void decode_pixels(const CodedImage& image, float full_scale, const Linear& line
     float* const green = planes.size() == 1 ? nullptr : planes[1].row(y);
     float* const blue = planes.size() == 1 ? nullptr : planes[2].row(y);
     for (int x = 0; x < image.width; ++x, pixel += kChannels) {
-      Light light = light_of<kChannels>(pixel, image.opaque, full_scale, linear);
-      if (image.blue_first) std::swap(light.red, light.blue);
+      const Light light = light_of<kChannels>(pixel, image.opaque, full_scale, linear);
       if (green == nullptr) {
         red[x] = luminance(light.red, light.green, light.blue);
       } else {

@@ -1,3 +1,4 @@
+#ifdef ESIM_FFMPEG
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
@@ -246,3 +247,23 @@ std::unique_ptr<FrameSource> open_video_file(const std::filesystem::path& path, 
 }
 
 }  // namespace esim::inline video
+
+#else
+
+#include <fmt/format.h>
+
+#include "esim/core/error.h"
+#include "esim/video/frame_source.h"
+
+namespace esim::inline video {
+
+std::unique_ptr<FrameSource> open_video_file(const std::filesystem::path& path, Encoding, bool) {
+  throw UserError(fmt::format(
+      "{}: video files cannot be read, since this esim was built without FFmpeg; extract the frames, for example with "
+      "`ffmpeg -i {} frames/%06d.png`, and use that folder with its frame rate",
+      path.string(), path.string()));
+}
+
+}  // namespace esim::inline video
+
+#endif

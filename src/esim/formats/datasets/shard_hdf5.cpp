@@ -86,7 +86,6 @@ class Growing {
 class Hdf5Shard final : public ShardWriter {
  public:
   explicit Hdf5Shard(const std::filesystem::path& path) {
-    hdf5::require_available(Compression::blosc);
     const hdf5::Quiet quiet;
     file_.emplace(path);
     file_->create_text_attribute(file_->id(), "format", "esim sequences 1");

@@ -67,7 +67,6 @@ struct EventsHdf5Writer::Impl {
 };
 
 void EventsHdf5Writer::Impl::create(const RecordingInfo& info) {
-  hdf5::require_available(options.compression);
   const CameraInfo& model = info.cameras.at(static_cast<std::size_t>(camera));
   width = model.model.width;
   height = model.model.height;
@@ -159,7 +158,6 @@ void EventsHdf5Writer::Impl::close_series() {
 
 EventsHdf5Writer::EventsHdf5Writer(std::filesystem::path path, int camera, EventsHdf5Options options)
     : impl_(std::make_unique<Impl>(std::move(path), camera, options)) {
-  hdf5::require_available(options.compression);
 }
 
 EventsHdf5Writer::~EventsHdf5Writer() = default;

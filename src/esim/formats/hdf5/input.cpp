@@ -29,6 +29,7 @@ Input::Input(std::filesystem::path path) : path_(std::move(path)) {
   }
   if (!std::ifstream(path_)) fail(system_reason(errno));
   const Quiet quiet;
+  register_blosc();
   file_ = Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!file_.valid()) fail("it is not an HDF5 file, or it is damaged (" + last_error() + ")");
 }
@@ -114,7 +115,6 @@ void Input::open_chunks(hid_t creation, Column& column, const std::string& name)
   }
   if (!std::equal(column.item_shape.begin(), column.item_shape.end(), shape.begin() + 1))
     fail(name + " has chunks that hold only parts of items, which is not supported");
-  // Blosc's filter reads four values without checking their number.
   const int filters = H5Pget_nfilters(creation);
   for (int i = 0; i < filters; ++i) {
     unsigned flags = 0;
@@ -134,8 +134,7 @@ void Input::fail_short(const Column& column, const std::string& name) const {
   fail(name + " should hold " + std::to_string(column.size) + " numbers, but the file has fewer");
 }
 
-// Blosc's filter trusts the sizes in the header of each compressed chunk: the size of its allocation and the number of
-// bytes for the library to read.
+// The sizes in the header of each compressed chunk must agree with the file before the filter allocates memory for it.
 void Input::require_sound_chunks(const Column& column, hsize_t first, hsize_t count) const {
   if (!column.only_blosc) return;
   std::vector<std::uint8_t> packed;
@@ -172,7 +171,6 @@ void Input::read(const Column& column, hsize_t first, hsize_t count, hid_t type,
   if (H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, shape.data(), nullptr) < 0 ||
       H5Dread(column.dataset, type, in_memory, in_file, H5P_DEFAULT, out) < 0) {
     const std::string reason = last_error();
-    require_available(Compression::blosc);  // the usual cause, which has a remedy
     fail("it is damaged, or compressed by a filter that is not available (" + reason + ")");
   }
 }

@@ -98,16 +98,9 @@ std::string last_error() {
   return text;
 }
 
-void require_available(Compression compression) {
-  const Quiet quiet;
-  if (compression != Compression::blosc || H5Zfilter_avail(kBloscFilter) > 0) return;
-  throw UserError(
-      "the HDF5 library cannot find its Blosc filter: install the package hdf5-filter-plugin-blosc-serial (if "
-      "HDF5_PLUGIN_PATH is set, it must name the folder of the plugins), or choose gzip compression");
-}
-
 Output::Output(std::filesystem::path path) : path_(std::move(path)) {
   const Quiet quiet;
+  register_blosc();
   const Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
   check(H5Pset_obj_track_times(creation, false));
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);

@@ -9,13 +9,12 @@
 #include <utility>
 #include <vector>
 
+#include "esim/formats/hdf5/blosc_filter.h"
 #include "esim/formats/hdf5/output_driver.h"
 #include "esim/recording/compression.h"
 
 // Private to formats: includes hdf5.h.
 namespace esim::inline formats::hdf5 {
-
-inline constexpr H5Z_filter_t kBloscFilter = 32001;
 
 /// While it exists, the library prints nothing from this thread.
 class Quiet {
@@ -139,8 +138,5 @@ class Series {
   hsize_t item_numbers_ = 1;
   hsize_t items_ = 0;
 };
-
-/// Throws UserError, with what to install, if Blosc is requested and its plugin cannot be found.
-void require_available(Compression compression);
 
 }  // namespace esim::inline formats::hdf5

@@ -42,7 +42,6 @@ void create_list(const hdf5::Output& file, const char* name, hid_t type, std::sp
 class M3edWriter final : public Sink {
  public:
   M3edWriter(std::filesystem::path path, Compression compression) : path_(std::move(path)), compression_(compression) {
-    hdf5::require_available(compression);
   }
   ~M3edWriter() override {
     const hdf5::Quiet quiet;

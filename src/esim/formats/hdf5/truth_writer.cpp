@@ -168,7 +168,6 @@ void TruthHdf5Writer::Impl::append_object_poses(std::span<const SE3> poses) {
 
 TruthHdf5Writer::TruthHdf5Writer(std::filesystem::path path, int camera, TruthHdf5Options options)
     : impl_(std::make_unique<Impl>(std::move(path), camera, options)) {
-  hdf5::require_available(options.compression);
 }
 
 TruthHdf5Writer::~TruthHdf5Writer() = default;

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <span>
 #include <vector>
 
+#include "esim/files/codecs/image_codecs.h"
 #include "esim/files/input_file.h"
 #include "esim/files/output_file.h"
 #include "esim/files/png_pixels.h"
@@ -30,16 +30,18 @@ cv::Mat demosaicked(const cv::Mat& mosaic) {
   cv::Mat wide, colours;
   cv::copyMakeBorder(mosaic, wide, kBorder, kBorder, kBorder, kBorder, cv::BORDER_REFLECT_101);
   cv::cvtColor(wide, colours,
-               cv::COLOR_BayerBG2BGR_EA);  // OpenCV names the pattern by the second row, from its second column on
+               cv::COLOR_BayerBG2RGB_EA);  // OpenCV names the pattern by the second row, from its second column on
   return colours({kBorder, kBorder, mosaic.cols, mosaic.rows});
 }
 
-// OpenCV's default compression is its fastest: gradients and runs, which suit simulated images. With an explicit level,
-// OpenCV tries all filters, for twice the time and larger files.
 std::string encode(const cv::Mat& image) {
-  std::vector<unsigned char> png;
-  cv::imencode(".png", image, png);
-  return {png.begin(), png.end()};
+  return encode_png({.data = image.data,
+                     .row_bytes = image.step[0],
+                     .width = image.cols,
+                     .height = image.rows,
+                     .channels = image.channels(),
+                     .bits = image.depth() == CV_16U ? 16 : 8},
+                    PngEffort::fast);
 }
 
 void write(const std::filesystem::path& path, const cv::Mat& image) {
@@ -68,37 +70,44 @@ std::string problem_of(std::string_view bytes) {
   return fmt::format("the file is damaged: {} x {} px in {} bytes", width, height, bytes.size());
 }
 
-/// Empty if it is damaged.
-cv::Mat decode(std::string_view bytes, int mode) {
-  thread_local PngPixels png;
-  const bool decoded = decode_png_pixels(std::as_bytes(std::span(bytes)), png);
-  if (decoded && (png.channels == 1 || (png.channels == 3 && mode == cv::IMREAD_UNCHANGED))) {
-    const cv::Mat pixels(png.height, png.width, CV_MAKETYPE(png.bits == 8 ? CV_8U : CV_16U, png.channels),
-                         png.bytes.data(), png.row_bytes);
-    if (png.channels == 1) return pixels.clone();
-    cv::Mat blue_first;
-    cv::cvtColor(pixels, blue_first, cv::COLOR_RGB2BGR);
-    return blue_first;
-  }
-  const cv::Mat coded(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
-  try {
-    return cv::imdecode(coded, mode);
-  } catch (const cv::Exception&) {
-    return {};
+/// False if it is damaged.
+bool decode(std::string_view bytes, ImagePixels& pixels) {
+  const auto content = std::as_bytes(std::span(bytes));
+  return (decode_png_pixels(content, pixels) && pixels.channels != 2) || decode_image(content, pixels);
+}
+
+template <typename Code>
+void separate(const ImagePixels& pixels, std::vector<Image<std::uint16_t>>& channels) {
+  for (int y = 0; y < pixels.height; ++y) {
+    const auto* code = reinterpret_cast<const Code*>(pixels.row(y));
+    for (int x = 0; x < pixels.width; ++x) {
+      for (Image<std::uint16_t>& channel : channels) channel(x, y) = *code++;
+    }
   }
 }
 
-PngImage to_png_image(cv::Mat image) {
-  PngImage result{image.depth() == CV_16U ? 16 : 8, {}};
-  image.convertTo(image, CV_16U);
-  std::vector<cv::Mat> channels;
-  cv::split(image, channels);
-  std::reverse(channels.begin(), channels.end());  // OpenCV stores blue first
-  for (const cv::Mat& channel : channels) {
-    result.channels.emplace_back(channel.cols, channel.rows);
-    std::copy_n(channel.ptr<std::uint16_t>(), channel.total(), result.channels.back().data());
+PngImage to_png_image(const ImagePixels& pixels) {
+  PngImage result{pixels.bits, {}};
+  for (int i = 0; i < pixels.channels; ++i) result.channels.emplace_back(pixels.width, pixels.height);
+  if (pixels.bits == 16) {
+    separate<std::uint16_t>(pixels, result.channels);
+  } else {
+    separate<std::uint8_t>(pixels, result.channels);
   }
   return result;
+}
+
+/// Luma of Rec. 601, rounded as libpng and OpenCV do.
+Image<std::uint16_t> grey_of(const PngImage& colours) {
+  constexpr std::uint64_t kRed = 9798, kGreen = 19235, kBlue = 3735;  // of 2^15
+  const std::uint64_t half = colours.bits == 16 ? 1 << 14 : 0;
+  const auto &red = colours.channels[0], &green = colours.channels[1], &blue = colours.channels[2];
+  Image<std::uint16_t> grey(red.width(), red.height());
+  for (std::size_t i = 0; i < grey.size(); ++i) {
+    const std::uint64_t sum = kRed * red.data()[i] + kGreen * green.data()[i] + kBlue * blue.data()[i];
+    grey.data()[i] = static_cast<std::uint16_t>((sum + half) >> 15);
+  }
+  return grey;
 }
 
 }  // namespace
@@ -122,7 +131,7 @@ void write_demosaicked_png(const std::filesystem::path& path, const Image<std::u
 void write_png(const std::filesystem::path& path, const PerColour<Image<std::uint16_t>>& channels) {
   const auto& [red, green, blue] = channels;
   cv::Mat image;
-  cv::merge(std::vector{copy_of(blue, CV_16UC1), copy_of(green, CV_16UC1), copy_of(red, CV_16UC1)}, image);
+  cv::merge(std::vector{copy_of(red, CV_16UC1), copy_of(green, CV_16UC1), copy_of(blue, CV_16UC1)}, image);
   write(path, image);
 }
 
@@ -133,11 +142,11 @@ PngImage read_png(const std::filesystem::path& path) {
   const auto content = file.read(kMaxFileBytes);
   const std::string_view bytes(reinterpret_cast<const char*>(content.data()), content.size());
   if (const std::string problem = problem_of(bytes); !problem.empty()) file.fail(0, problem);
-  const cv::Mat image = decode(bytes, cv::IMREAD_UNCHANGED);
-  if (image.empty()) file.fail(0, "it cannot be decoded: it is truncated or damaged");
-  if (image.channels() != 1 && image.channels() != 3)
-    file.fail(0, fmt::format("it has {} channels, not 1 or 3", image.channels()));
-  return to_png_image(image);
+  thread_local ImagePixels pixels;
+  if (!decode(bytes, pixels)) file.fail(0, "it cannot be decoded: it is truncated or damaged");
+  if (pixels.channels != 1 && pixels.channels != 3)
+    file.fail(0, fmt::format("it has {} channels, not 1 or 3", pixels.channels));
+  return to_png_image(pixels);
 }
 
 std::string encode_png(const Image<std::uint16_t>& image, int bits) {
@@ -148,9 +157,11 @@ std::string encode_png(const Image<std::uint16_t>& image, int bits) {
 
 std::optional<PngImage> decode_grey_png(std::string_view bytes) {
   if (!problem_of(bytes).empty()) return std::nullopt;
-  const cv::Mat image = decode(bytes, cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);
-  if (image.empty()) return std::nullopt;
-  return to_png_image(image);
+  thread_local ImagePixels pixels;
+  if (!decode(bytes, pixels)) return std::nullopt;
+  PngImage image = to_png_image(pixels);
+  if (image.channels.size() > 1) image.channels = {grey_of(image)};
+  return image;
 }
 
 }  // namespace esim::inline formats

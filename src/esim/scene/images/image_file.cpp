@@ -9,14 +9,12 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <iterator>
-#include <limits>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string_view>
 #include <vector>
 
 #include "esim/core/error.h"
+#include "esim/files/codecs/image_codecs.h"
 #include "esim/files/png_pixels.h"
 #include "esim/scene/images/image_header.h"
 
@@ -95,76 +93,44 @@ void load_exr(const std::filesystem::path& path, Encoding encoding, bool colour,
   }
 }
 
-/// Whether a JPEG file has an end-of-image marker near its end. The decoder silently fills missing parts with grey.
-bool is_whole_jpeg(const std::filesystem::path& path) {
-  constexpr std::streamoff kTailBytes = 1 << 16;  // cameras append their own data
-  std::ifstream file(path, std::ios::binary | std::ios::ate);
-  const std::streamoff size = file.tellg();
-  file.seekg(std::max<std::streamoff>(0, size - kTailBytes));
-  const std::string tail{std::istreambuf_iterator<char>(file), {}};
-  return tail.find("\xff\xd9") != std::string::npos;
+/// Whether a JPEG image has an end-of-image marker near its end. The decoder silently fills missing parts with grey.
+bool is_whole_jpeg(std::string_view content) {
+  constexpr std::size_t kTailBytes = 1 << 16;  // cameras append their own data
+  const std::string_view tail = content.substr(content.size() - std::min(content.size(), kTailBytes));
+  return tail.find("\xff\xd9") != std::string_view::npos;
+}
+
+bool is_jpeg(std::string_view content) { return content.starts_with("\xff\xd8"); }
+
+std::string_view as_text(std::span<const std::byte> content) {
+  return {reinterpret_cast<const char*>(content.data()), content.size()};
 }
 
 /// Rejects an image by the size in its header, before a decoder allocates memory for it.
-void check_header(const std::filesystem::path& path, std::span<const std::byte> head, std::uintmax_t bytes) {
-  if (const auto size = size_in_header(head)) check_claim(path, size->width, size->height, bytes);
+void check_header(const std::filesystem::path& path, std::span<const std::byte> content) {
+  if (const auto size = size_in_header(content)) check_claim(path, size->width, size->height, content.size());
 }
 
-void check_header(const std::filesystem::path& path) {
-  std::vector<std::byte> head(kImageHeadBytes);
-  std::ifstream file(path, std::ios::binary);
-  file.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
-  check_header(path, std::span(head).first(static_cast<std::size_t>(file.gcount())), size_of(path));
-}
-
-PixelType pixel_type(const std::filesystem::path& path, const cv::Mat& image) {
-  switch (image.depth()) {
-    case CV_8U:
-      return PixelType::uint8;
-    case CV_16U:
-      return PixelType::uint16;
-    case CV_32F:
-      return PixelType::float32;
-    default:
-      fail(path, "has an unsupported pixel type; convert it to 8 or 16 bit, EXR or HDR");
-  }
-}
-
-/// The encoded pixel values of a file that is not OpenEXR. `read` decodes it with OpenCV.
-template <typename Read>
-cv::Mat read_pixels(const std::filesystem::path& path, const Read& read) {
-  cv::Mat image;
-  try {
-    image = read();
-  } catch (const cv::Exception& exception) {
-    fail(path, "cannot be decoded: " + exception.err);
-  }
-  if (image.empty()) fail(path, "cannot be decoded; it must be a complete PNG, JPEG, TIFF, EXR or HDR image");
-  check_size(path, image.cols, image.rows);
+/// The encoded pixel values of a file that is not OpenEXR.
+ImagePixels decode_pixels(const std::filesystem::path& path, std::span<const std::byte> content) {
+  check_header(path, content);
+  ImagePixels image;
+  if (!decode_image(content, image))
+    fail(path, fmt::format("cannot be decoded; it must be a complete {} image, or OpenEXR", kImageFormats));
+  check_size(path, image.width, image.height);
   return image;
 }
 
-void decode_pixels(const std::filesystem::path& path, const cv::Mat& image, Encoding encoding, bool colour,
-                   Planes& planes) {
-  decode({.data = image.data,
-          .row_bytes = static_cast<std::ptrdiff_t>(image.step[0]),
-          .width = image.cols,
-          .height = image.rows,
-          .channels = image.channels(),
-          .blue_first = true,
-          .type = pixel_type(path, image)},
-         encoding, colour, planes);
-}
-
-/// The pixels as an opaque image, whatever their alpha.
-CodedImage coded_image(const PngPixels& png) {
-  return {.data = png.bytes.data(),
-          .row_bytes = static_cast<std::ptrdiff_t>(png.row_bytes),
-          .width = png.width,
-          .height = png.height,
-          .channels = png.channels,
-          .opaque = true,
-          .type = png.bits == 8 ? PixelType::uint8 : PixelType::uint16};
+/// Of decoded pixels, borrowed.
+CodedImage coded_image(const ImagePixels& image) {
+  return {.data = image.bytes.data(),
+          .row_bytes = static_cast<std::ptrdiff_t>(image.row_bytes),
+          .width = image.width,
+          .height = image.height,
+          .channels = image.channels,
+          .type = image.bits == 8    ? PixelType::uint8
+                  : image.bits == 16 ? PixelType::uint16
+                                     : PixelType::float32};
 }
 
 std::string lower_case_extension(const std::filesystem::path& path) {
@@ -174,14 +140,21 @@ std::string lower_case_extension(const std::filesystem::path& path) {
   return extension;
 }
 
-/// As above, for a file on disk.
-cv::Mat read_pixels(const std::filesystem::path& path) {
+std::vector<std::byte> content_of(const std::filesystem::path& path) {
+  std::vector<std::byte> content(size_of(path));
+  std::ifstream file(path, std::ios::binary);
+  file.read(reinterpret_cast<char*>(content.data()), static_cast<std::streamsize>(content.size()));
+  if (!file) fail(path, "cannot be read; check its permissions");
+  return content;
+}
+
+/// The encoded pixel values of a file on disk that is not OpenEXR.
+ImagePixels read_pixels(const std::filesystem::path& path) {
+  const std::vector<std::byte> content = content_of(path);
   const std::string extension = lower_case_extension(path);
-  if ((extension == ".jpg" || extension == ".jpeg") && !is_whole_jpeg(path)) {
-    fail(path, "is not a JPEG image, or is cut off");
-  }
-  check_header(path);
-  return read_pixels(path, [&] { return cv::imread(path.string(), cv::IMREAD_UNCHANGED); });
+  const bool should_be_jpeg = extension == ".jpg" || extension == ".jpeg" || is_jpeg(as_text(content));
+  if (should_be_jpeg && !is_whole_jpeg(as_text(content))) fail(path, "is not a JPEG image, or is cut off");
+  return decode_pixels(path, content);
 }
 
 void require_file(const std::filesystem::path& path) {
@@ -191,6 +164,12 @@ void require_file(const std::filesystem::path& path) {
 
 constexpr const char* kMedianNeedsBytes =
     "does not have 8 bits per channel, which the median filter requires; remove the median";
+
+/// The pixels as a matrix, borrowed.
+cv::Mat matrix_of(ImagePixels& image) {
+  const int depth = image.bits == 8 ? CV_8U : image.bits == 16 ? CV_16U : CV_32F;
+  return {image.height, image.width, CV_MAKETYPE(depth, image.channels), image.bytes.data(), image.row_bytes};
+}
 
 /// Applies a filter with a radius of `reach` pixels; `around`: across the left and right edge.
 template <typename Filter>
@@ -202,20 +181,21 @@ void apply(cv::Mat& image, int reach, bool around, const Filter& filter) {
   wide.colRange(reach, reach + image.cols).copyTo(image);
 }
 
-void take_median(const std::filesystem::path& path, const Softening& softening, cv::Mat& image) {
+void take_median(const std::filesystem::path& path, const Softening& softening, ImagePixels& image) {
   const int side = softening.median_px;
   if (side <= 1) return;
   if (side % 2 == 0) fail(path, fmt::format("the width of the median must be an odd number of pixels, not {}", side));
-  if (image.depth() != CV_8U) fail(path, kMedianNeedsBytes);
-  apply(image, side / 2, softening.around, [&](cv::Mat& pixels) { cv::medianBlur(pixels, pixels, side); });
+  if (image.bits != 8) fail(path, kMedianNeedsBytes);
+  cv::Mat matrix = matrix_of(image);
+  apply(matrix, side / 2, softening.around, [&](cv::Mat& pixels) { cv::medianBlur(pixels, pixels, side); });
 }
 
 /// Decoding composites `coded` over white, light + (1 - alpha); this subtracts the white.
-void separate_alpha(const cv::Mat& coded, TranslucentImage& image) {
-  image.alpha = Image<float>(coded.cols, coded.rows);
-  cv::Mat channel, alpha(coded.rows, coded.cols, CV_32F, image.alpha.data());
-  cv::extractChannel(coded, channel, 3);
-  channel.convertTo(alpha, CV_32F, coded.depth() == CV_8U ? 1.0 / 255 : 1.0 / 65535);
+void separate_alpha(ImagePixels& coded, TranslucentImage& image) {
+  image.alpha = Image<float>(coded.width, coded.height);
+  cv::Mat channel, alpha(coded.height, coded.width, CV_32F, image.alpha.data());
+  cv::extractChannel(matrix_of(coded), channel, coded.channels - 1);
+  channel.convertTo(alpha, CV_32F, coded.bits == 8 ? 1.0 / 255 : 1.0 / 65535);
   for (std::size_t i = 0; i < image.light.size(); ++i) {
     image.light.data()[i] = std::max(0.0F, image.light.data()[i] - (1.0F - image.alpha.data()[i]));
   }
@@ -234,7 +214,7 @@ void blur(const Softening& softening, Image<float>& image) {
 /// An image after its median filter, and the pixels from which it was decoded (empty for OpenEXR).
 struct Decoded {
   Planes planes;
-  cv::Mat pixels;
+  ImagePixels pixels;
 };
 
 Decoded load_after_median(const std::filesystem::path& path, const Softening& softening, bool colour) {
@@ -246,7 +226,7 @@ Decoded load_after_median(const std::filesystem::path& path, const Softening& so
   } else {
     result.pixels = read_pixels(path);
     take_median(path, softening, result.pixels);
-    decode_pixels(path, result.pixels, Encoding::automatic, colour, result.planes);
+    decode(coded_image(result.pixels), Encoding::automatic, colour, result.planes);
   }
   return result;
 }
@@ -256,27 +236,23 @@ Decoded load_after_median(const std::filesystem::path& path, const Softening& so
 void load_planes(const std::filesystem::path& path, Encoding encoding, bool colour, Planes& planes) {
   require_file(path);
   if (lower_case_extension(path) == ".exr") return load_exr(path, encoding, colour, planes);
-  decode_pixels(path, read_pixels(path), encoding, colour, planes);
+  decode(coded_image(read_pixels(path)), encoding, colour, planes);
 }
 
 void decode_planes(std::span<const std::byte> content, const std::string& name, Encoding encoding, bool colour,
                    Planes& planes) {
-  constexpr std::size_t kTailBytes = std::size_t{1} << 16;
-  check_header(name, content, content.size());
-  const std::string_view text(reinterpret_cast<const char*>(content.data()), content.size());
-  const std::string_view tail = text.substr(text.size() - std::min(text.size(), kTailBytes));
-  if (text.starts_with("\xff\xd8") && tail.find("\xff\xd9") == std::string_view::npos) fail(name, "is cut off");
-  if (content.size() > std::numeric_limits<int>::max()) fail(name, "is larger than 2 GiB");
+  check_header(name, content);
+  if (is_jpeg(as_text(content)) && !is_whole_jpeg(as_text(content))) fail(name, "is cut off");
 
-  thread_local PngPixels png;
-  if (decode_png_pixels(content, png)) {
-    check_size(name, png.width, png.height);
-    return decode(coded_image(png), encoding, colour, planes);
+  thread_local ImagePixels pixels;
+  if (decode_png_pixels(content, pixels)) {
+    check_size(name, pixels.width, pixels.height);
+  } else {
+    pixels = decode_pixels(name, content);
   }
-  const cv::Mat coded(1, static_cast<int>(content.size()), CV_8U, const_cast<std::byte*>(content.data()));
-  cv::Mat image = read_pixels(name, [&] { return cv::imdecode(coded, cv::IMREAD_UNCHANGED); });
-  if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);
-  decode_pixels(name, image, encoding, colour, planes);
+  CodedImage coded = coded_image(pixels);
+  coded.opaque = true;
+  decode(coded, encoding, colour, planes);
 }
 
 Image<float> load_luminance(const std::filesystem::path& path, const Softening& softening) {
@@ -292,9 +268,9 @@ Planes load_colours(const std::filesystem::path& path, const Softening& softenin
 }
 
 TranslucentImage load_translucent(const std::filesystem::path& path, const Softening& softening) {
-  auto [planes, pixels] = load_after_median(path, softening, false);
-  TranslucentImage result{std::move(planes.front()), {}};
-  if (pixels.channels() == 4 && pixels.depth() != CV_32F) separate_alpha(pixels, result);
+  Decoded decoded = load_after_median(path, softening, false);
+  TranslucentImage result{std::move(decoded.planes.front()), {}};
+  if (decoded.pixels.channels == 4) separate_alpha(decoded.pixels, result);
   blur(softening, result.light);
   blur(softening, result.alpha);
   return result;

@@ -11,8 +11,8 @@
 namespace esim::inline scene {
 
 /// Reads an image file as linear light, 1.0 = white: R, G and B if `colour`, luminance otherwise. With automatic
-/// encoding, 8- and 16-bit files (PNG, JPEG, TIFF, ...) are sRGB; OpenEXR, Radiance HDR and other floating-point files
-/// are linear, and keep values above 1. Transparent integer files are composited over white.
+/// encoding, 8- and 16-bit files (PNG, JPEG, WebP, PNM) are sRGB; OpenEXR and Radiance HDR files are
+/// linear, and keep values above 1. Transparent integer files are composited over white.
 /// Throws UserError, naming the file, if it is missing, unreadable, or larger than 2^28 pixels.
 void load_planes(const std::filesystem::path& path, Encoding encoding, bool colour, Planes& planes);
 

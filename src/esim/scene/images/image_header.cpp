@@ -45,20 +45,14 @@ std::optional<ImageSize> size_of_jpeg(std::span<const std::byte> head) {
   return std::nullopt;
 }
 
-/// The first directory's width and length.
-std::optional<ImageSize> size_of_tiff(std::span<const std::byte> head) {
-  constexpr std::int64_t kWidth = 256, kLength = 257, kShort = 3;
-  const Bytes bytes(head, head[0] == std::byte{'M'});
-  const auto directory = static_cast<std::size_t>(bytes.at(4, 4));
-  ImageSize size;
-  for (std::int64_t i = 0; i < bytes.at(directory, 2); ++i) {
-    const std::size_t entry = directory + 2 + 12 * static_cast<std::size_t>(i);
-    const std::int64_t value = bytes.at(entry + 8, bytes.at(entry + 2, 2) == kShort ? 2 : 4);
-    if (bytes.at(entry, 2) == kWidth) size.width = value;
-    if (bytes.at(entry, 2) == kLength) size.height = value;
-  }
-  if (size.width == 0 || size.height == 0) return std::nullopt;
-  return size;
+/// Sizes are stored minus one, except in lossy images.
+std::optional<ImageSize> size_of_webp(std::span<const std::byte> head, std::string_view kind) {
+  const Bytes bytes(head, false);
+  constexpr std::int64_t kSide = (1 << 14) - 1;  // 14 bits
+  if (kind == "VP8X") return ImageSize{bytes.at(24, 3) + 1, bytes.at(27, 3) + 1};
+  if (kind == "VP8L") return ImageSize{(bytes.at(21, 4) & kSide) + 1, (bytes.at(21, 4) >> 14 & kSide) + 1};
+  if (kind == "VP8 ") return ImageSize{bytes.at(26, 2) & kSide, bytes.at(28, 2) & kSide};
+  return std::nullopt;
 }
 
 /// "-Y 512 +X 768" after an empty line.
@@ -83,12 +77,9 @@ std::optional<ImageSize> size_in_header(std::span<const std::byte> head) {
   if (head.size() < 26) return std::nullopt;
   if (text.starts_with("\x89PNG")) return ImageSize{Bytes(head).at(16, 4), Bytes(head).at(20, 4)};
   if (text.starts_with("\xFF\xD8")) return size_of_jpeg(head);
-  if (text.starts_with("II*") || text.starts_with(std::string_view("MM\0*", 4))) return size_of_tiff(head);
   if (text.starts_with("#?")) return size_of_hdr(text);
-  if (!text.starts_with("BM")) return std::nullopt;
-  const Bytes bytes(head, false);
-  const auto height = static_cast<std::int32_t>(bytes.at(22, 4));  // negative: from the top downwards
-  return ImageSize{bytes.at(18, 4), std::abs(std::int64_t{height})};
+  if (text.starts_with("RIFF") && text.substr(8, 4) == "WEBP") return size_of_webp(head, text.substr(12, 4));
+  return std::nullopt;
 }
 
 }  // namespace esim::inline scene

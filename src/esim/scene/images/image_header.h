@@ -11,7 +11,7 @@ struct ImageSize {
   std::int64_t width = 0, height = 0;
 };
 
-/// The size in the header of a PNG, JPEG, TIFF, BMP or Radiance HDR image, from its first bytes, so that an absurd size
+/// The size in the header of a PNG, JPEG, WebP or Radiance HDR image, from its first bytes, so that an absurd size
 /// can be rejected before a decoder allocates memory. Empty for other formats, or if these bytes do not contain the
 /// size.
 std::optional<ImageSize> size_in_header(std::span<const std::byte> head);

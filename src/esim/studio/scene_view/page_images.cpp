@@ -1,12 +1,12 @@
 #include "esim/studio/scene_view/page_images.h"
 
 #include <algorithm>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <span>
 #include <string_view>
 
 #include "esim/core/srgb.h"
+#include "esim/files/codecs/image_codecs.h"
 #include "esim/preview/pictures.h"
 #include "esim/scene/images/image_header.h"
 
@@ -22,11 +22,14 @@ Image<float> at_most(const Image<float>& image, int longest) {
   return reduce_mean(image, scaled(image.width()), scaled(image.height()));
 }
 
-std::string jpeg_of(const cv::Mat& bgr) {
+std::string jpeg_of(const ImagePixels& rgb) {
   constexpr int kQuality = 90;
-  std::vector<unsigned char> jpeg;
-  cv::imencode(".jpg", bgr, jpeg, {cv::IMWRITE_JPEG_QUALITY, kQuality});
-  return {jpeg.begin(), jpeg.end()};
+  return encode_jpeg({.data = rgb.bytes.data(),
+                      .row_bytes = rgb.row_bytes,
+                      .width = rgb.width,
+                      .height = rgb.height,
+                      .channels = 3},
+                     kQuality);
 }
 
 std::string_view bytes_of(const CodedTexture& texture) {
@@ -79,21 +82,14 @@ std::optional<int> longest_side(const CodedTexture& texture) {
 }
 
 /// A JPEG decoded at reduced size (down to one eighth), which is fast; empty if this is not possible.
-std::optional<cv::Mat> reduced(const CodedTexture& texture, int longest) {
+std::optional<ImagePixels> reduced(const CodedTexture& texture, int longest) {
   constexpr int kMaxSide = 8192, kFinest = 2;
   const std::optional<int> side = longest_side(texture);
   if (!is_plain_jpeg(bytes_of(texture)) || !side || *side > kMaxSide || *side < kFinest * longest) return std::nullopt;
   const int times = *side / longest;
-  const int flags = times >= 8   ? cv::IMREAD_REDUCED_COLOR_8
-                    : times >= 4 ? cv::IMREAD_REDUCED_COLOR_4
-                                 : cv::IMREAD_REDUCED_COLOR_2;
-  const cv::Mat coded(1, static_cast<int>(texture.bytes.size()), CV_8U, const_cast<std::byte*>(texture.bytes.data()));
-  try {
-    const cv::Mat bgr = cv::imdecode(coded, flags);
-    return bgr.empty() ? std::nullopt : std::optional(bgr);
-  } catch (const cv::Exception&) {
-    return std::nullopt;
-  }
+  ImagePixels pixels;
+  if (!decode_reduced_jpeg(texture.bytes, times >= 8 ? 8 : times >= 4 ? 4 : 2, pixels)) return std::nullopt;
+  return pixels;
 }
 
 }  // namespace
@@ -109,7 +105,7 @@ PageImage page_image(const CodedTexture& texture) {
 }
 
 Thumbnail thumbnail(const CodedTexture& texture, int longest) {
-  if (const auto bgr = reduced(texture, longest)) return {jpeg_of(*bgr), false};
+  if (const auto rgb = reduced(texture, longest)) return {jpeg_of(*rgb), false};
   const Planes planes = decoded(texture, true);
   return {make_jpeg(planes, longest), std::max(planes.front().width(), planes.front().height()) <= longest};
 }
@@ -118,12 +114,17 @@ std::string make_jpeg(const Planes& linear, int longest) {
   std::vector<Image<std::uint8_t>> channels;
   for (const Image<float>& plane : linear) channels.push_back(encode_srgb(at_most(plane, longest)));
   const Image<std::uint8_t>&red = channels.front(), &green = channels[channels.size() / 2], &blue = channels.back();
-  cv::Mat bgr(red.height(), red.width(), CV_8UC3);
+  ImagePixels rgb;
+  rgb.resize(red.width(), red.height(), 3, 8);
   for (int y = 0; y < red.height(); ++y) {
-    auto* out = bgr.ptr<cv::Vec3b>(y);
-    for (int x = 0; x < red.width(); ++x) out[x] = {blue(x, y), green(x, y), red(x, y)};
+    std::uint8_t* out = rgb.row(y);
+    for (int x = 0; x < red.width(); ++x) {
+      *out++ = red(x, y);
+      *out++ = green(x, y);
+      *out++ = blue(x, y);
+    }
   }
-  return jpeg_of(bgr);
+  return jpeg_of(rgb);
 }
 
 }  // namespace esim::studio

@@ -1,0 +1,8 @@
+# The static HDF5 that packaging/build-libraries has built.
+set(HDF5_FOUND TRUE)
+if(NOT TARGET HDF5::HDF5)
+  add_library(HDF5::HDF5 STATIC IMPORTED)
+  set_target_properties(HDF5::HDF5 PROPERTIES
+    IMPORTED_LOCATION ${ESIM_WHEEL_LIBRARIES}/lib/libhdf5.a INTERFACE_INCLUDE_DIRECTORIES ${ESIM_WHEEL_LIBRARIES}/include
+    INTERFACE_LINK_LIBRARIES "ZLIB::ZLIB;${CMAKE_DL_LIBS};m")
+endif()

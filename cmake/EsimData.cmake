@@ -1,6 +1,6 @@
-# esim_install_data(FOLDER ...) installs the scenes, and the studio's page if scripts/studio has built it.
+# esim_install_data(FOLDER ...) installs the scenes that need no Blender, and the studio's page if scripts/studio has built it.
 function(esim_install_data folder)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/scenes DESTINATION ${folder} ${ARGN}
-          PATTERN "*.py" EXCLUDE PATTERN "*.blend" EXCLUDE PATTERN "__pycache__" EXCLUDE)
+          PATTERN "*.py" EXCLUDE PATTERN "*.blend" EXCLUDE PATTERN "studio_room.yaml" EXCLUDE PATTERN "__pycache__" EXCLUDE)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/studio/dist/ DESTINATION ${folder}/studio ${ARGN} OPTIONAL)
 endfunction()

@@ -98,7 +98,7 @@ class Play(ProgramTest):
         self.assert_refused(run("play"), "in is required")
         self.assert_refused(run("play", self.folder / "missing"), "missing")
         self.assert_refused(run("play", self.folder), "no events.h5")
-        self.assert_refused(run("play", events, "--out", self.folder / "a.avi"), ".mp4, .gif or .png")
+        self.assert_refused(run("play", events, "--out", self.folder / "a.avi"), ".mp4, .gif, .webp or .png")
         self.assert_refused(run("play", events, "--out", self.folder / "none" / "a.mp4"), "none")
         self.assert_refused(run("play", events, "--view", "cube"), "no view cube", "space-time")
         self.assert_refused(run("play", events, "--view", "vents"), "no view vents")

@@ -27,7 +27,7 @@ void list(const fs::path& folder) {
 }
 
 /// The copies are writable, even if the originals are not.
-void copy(const fs::path& folder, const fs::path& to) {
+void copy_scenes(const fs::path& folder, const fs::path& to) {
   std::error_code error;
   if (fs::exists(to, error)) throw UserError(to.string() + " exists; choose another --copy, or remove it");
   fs::copy(folder, to, fs::copy_options::recursive, error);
@@ -56,7 +56,7 @@ void add_scenes(CLI::App& app, int& exit_code) {
     if (to->empty()) {
       list(folder);
     } else {
-      copy(folder, *to);
+      copy_scenes(folder, *to);
       list(*to);
     }
     exit_code = kOk;

@@ -25,8 +25,8 @@ constexpr std::int64_t kMaxPixels = std::int64_t{1} << 26;
 constexpr int kLargestSide_px = 1536;  // larger images are reduced to this
 constexpr std::size_t kMaxTexelsKept = std::size_t{1} << 27;
 
-constexpr std::array<const char*, 13> kExtensions{".png", ".jpg",  ".jpeg", ".tif", ".tiff", ".bmp", ".exr",
-                                                  ".hdr", ".webp", ".jp2",  ".ppm", ".pgm",  ".pnm"};
+constexpr std::array<const char*, 9> kExtensions{".png",  ".jpg", ".jpeg", ".exr", ".hdr",
+                                                 ".webp", ".ppm", ".pgm",  ".pnm"};
 
 bool is_image(const fs::path& file) {
   std::string extension = file.extension().string();
@@ -83,7 +83,7 @@ ImageFolder::ImageFolder(fs::path folder) : folder_(std::move(folder)) {
   }
   if (error) throw UserError(fmt::format("{}: cannot be listed: {}", folder_.string(), error.message()));
   if (files_.empty())
-    throw UserError(fmt::format("{}: has no images; supported are PNG, JPEG, TIFF, EXR, ...", folder_.string()));
+    throw UserError(fmt::format("{}: has no images; supported are PNG, JPEG, WebP, PGM, PPM, EXR and HDR", folder_.string()));
   std::sort(files_.begin(), files_.end(), [](const File& a, const File& b) { return a.name < b.name; });
 
   for (const File& file : files_) fingerprint_ = crc32(fmt::format("{}\n{}\n", file.name, file.bytes), fingerprint_);

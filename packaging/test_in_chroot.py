@@ -1,0 +1,89 @@
+"""Run by packaging/test-wheel: installs the wheel in /wheels and uses it."""
+
+import os
+import subprocess
+import sys
+import time
+import urllib.request
+
+BIN = "/venv/bin"
+
+
+def run(*command, **options):
+    result = subprocess.run(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options)
+    assert result.returncode == 0, f"{command}: {result.stdout}{result.stderr}"
+    return result.stdout
+
+
+def timed(name, function):
+    start = time.monotonic()
+    result = function()
+    seconds = time.monotonic() - start
+    print(f"  {seconds:5.1f} s  {name}", flush=True)
+    return result, seconds
+
+
+def install():
+    run(sys.executable, "-m", "venv", "/venv")
+    run(f"{BIN}/pip", "install", "--quiet", "--disable-pip-version-check", "--no-index", "--find-links=/wheels", "esim-events")
+
+
+def simulate():
+    poster = next(path for path in run(f"{BIN}/esim", "scenes").split() if path.endswith("poster.yaml"))
+    run(f"{BIN}/esim", "simulate", poster, "--out", "/out", "--quiet", "--set", "duration_s=0.2")
+    sizes = {name: os.path.getsize(f"/out/cam0/{name}") for name in ("events.h5", "truth.h5", "preview.webp", "preview.png")}
+    assert min(sizes.values()) > 1000, sizes
+    run(f"{BIN}/esim", "convert", "/out", "/events.txt")
+    assert sum(1 for _ in open("/events.txt")) > 1000
+
+
+def simulate_in_python():
+    return run(f"{BIN}/python", "-c", """
+import esim, subprocess
+poster = [path for path in subprocess.check_output(["esim", "scenes"], text=True).split() if "poster" in path][0]
+print(sum(len(packet.events) for packet in esim.simulate(poster, overrides={"duration_s": 0.1})))
+""", env={**os.environ, "PATH": f"{BIN}:{os.environ['PATH']}"})
+
+
+def render_every_scene():
+    for path in run(f"{BIN}/esim", "scenes").split():
+        run(f"{BIN}/esim", "simulate", path, "--out", f"/out-{os.path.basename(path)}", "--quiet", "--set", "duration_s=0.02")
+
+
+def studio():
+    server = subprocess.Popen([f"{BIN}/esim", "studio", "/out", "--token", "secret"], stdout=subprocess.PIPE, text=True)
+    try:
+        address = server.stdout.readline().strip()
+        page = urllib.request.urlopen(address, timeout=20).read().decode()
+        assert "<script" in page, page
+    finally:
+        server.terminate()
+        server.wait()
+
+
+def refuse(*command, reason):
+    result = subprocess.run(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert result.returncode == 2 and result.stdout.count("\n") == 1 and reason in result.stdout, result
+
+
+def main():
+    start = time.monotonic()
+    timed("venv and pip install", install)
+    timed("first `esim --version`", lambda: run(f"{BIN}/esim", "--version"))
+    timed("first events, by `esim simulate`", simulate)
+    first = time.monotonic() - start
+    events, _ = timed("events in Python", simulate_in_python)
+    assert int(events) > 100, events
+    timed("every scene", render_every_scene)
+    timed("the studio's page over HTTP", studio)
+    run(f"{BIN}/python", "-m", "esim", "--version")
+    refuse(f"{BIN}/esim", "video", "/clip.mp4", "--out", "/clip", reason="no such file")
+    open("/clip.mp4", "w").close()
+    refuse(f"{BIN}/esim", "video", "/clip.mp4", "--out", "/clip", reason="without FFmpeg")
+    room = next(path for path in run(f"{BIN}/esim", "scenes").split() if path.endswith("/room.yaml"))
+    refuse(f"{BIN}/esim", "simulate", room, "--out", "/gl", "--set", "renderer.engine=gl", reason="libegl1")
+    print(f"  {first:5.1f} s  from the file to the first events")
+    assert first < 60, "this must take less than 60 s"
+
+
+main()

@@ -1,8 +1,9 @@
 #include <unistd.h>
 
-// Before main() and before the constructors of other files, which may need AVX2: without this, the program would end with
-// "Illegal instruction". Only the C library is used, since other headers could contain code that needs AVX2.
+// Before main() and before the constructors of other files, which may need AVX2: without this, the program would end
+// with "Illegal instruction". Only the C library is used, since other headers could contain code that needs AVX2.
 #ifdef ESIM_USES_AVX2
+namespace esim::app {
 namespace {
 
 [[gnu::constructor(101)]] void require_avx2() {
@@ -16,4 +17,5 @@ namespace {
 }
 
 }  // namespace
+}  // namespace esim::app
 #endif

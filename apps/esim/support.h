@@ -52,8 +52,8 @@ void add_run_options(CLI::App& command, RunOptions& options, const std::string& 
 /// Adds --width and --height of the sensor, for files that do not contain it.
 void add_sensor_options(CLI::App& command, std::optional<SensorSize>& sensor);
 
-/// The folder share/esim/NAME of this program: installed, or next to it in an unpacked archive; in the build tree `built`,
-/// as seen from the program. The first of them that contains `file`; the installed one if none does.
+/// The folder share/esim/NAME of this program: installed, or next to it in an unpacked archive; in the build tree
+/// `built`, as seen from the program. The first of them that contains `file`; the installed one if none does.
 std::filesystem::path data_folder(const std::string& name, const std::string& built, const std::string& file);
 
 void write_text(const std::filesystem::path& path, const std::string& text);

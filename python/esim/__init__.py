@@ -6,11 +6,7 @@ T_A_B maps points from frame B to frame A; quaternions are Hamilton, x y z w. `d
 `docs/scenario.md` lists the options of scenarios.
 """
 
-from . import _needs, _processor
-
-_processor.require(_needs.PROCESSOR_FEATURES, _processor.present())
-
-from . import dataset, filters  # noqa: E402
+from . import _processor, dataset, filters  # first, _processor checks that the module can run
 from ._checks import ns
 from ._core import __version__
 from ._errors import Error, InternalError, LossWarning, OutputError

@@ -37,7 +37,8 @@ cv::Mat picture(int type) {
   for (int y = 0; y < image.rows; ++y) {
     auto* number = image.ptr<float>(y);
     for (int i = 0; i < image.cols * image.channels(); ++i)
-      number[i] = 0.5F + 0.4F * std::sin(0.1F * static_cast<float>(i + 5 * y)) + 1e-4F * static_cast<float>(random() % 900);
+      number[i] =
+          0.5F + 0.4F * std::sin(0.1F * static_cast<float>(i + 5 * y)) + 1e-4F * static_cast<float>(random() % 900);
   }
   const double full = CV_MAT_DEPTH(type) == CV_8U ? 255 : CV_MAT_DEPTH(type) == CV_16U ? 65535 : 3;
   image.convertTo(image, type, full);
@@ -51,11 +52,24 @@ struct Kind {
 };
 
 std::vector<Kind> kinds() {
-  return {{".png", CV_8UC1}, {".png", CV_8UC3}, {".png", CV_8UC4}, {".png", CV_16UC1}, {".png", CV_16UC3}, {".png", CV_16UC4},
-          {".png", CV_8UC1, {cv::IMWRITE_PNG_BILEVEL, 1}}, {".jpg", CV_8UC1}, {".jpg", CV_8UC3},
-          {".jpg", CV_8UC3, {cv::IMWRITE_JPEG_PROGRESSIVE, 1}}, {".webp", CV_8UC3, {cv::IMWRITE_WEBP_QUALITY, 60}},
-          {".webp", CV_8UC4, {cv::IMWRITE_WEBP_QUALITY, 101}}, {".hdr", CV_32FC3}, {".pgm", CV_8UC1}, {".ppm", CV_8UC3},
-          {".pgm", CV_16UC1}, {".ppm", CV_16UC3}, {".pgm", CV_8UC1, {cv::IMWRITE_PXM_BINARY, 0}},
+  return {{".png", CV_8UC1},
+          {".png", CV_8UC3},
+          {".png", CV_8UC4},
+          {".png", CV_16UC1},
+          {".png", CV_16UC3},
+          {".png", CV_16UC4},
+          {".png", CV_8UC1, {cv::IMWRITE_PNG_BILEVEL, 1}},
+          {".jpg", CV_8UC1},
+          {".jpg", CV_8UC3},
+          {".jpg", CV_8UC3, {cv::IMWRITE_JPEG_PROGRESSIVE, 1}},
+          {".webp", CV_8UC3, {cv::IMWRITE_WEBP_QUALITY, 60}},
+          {".webp", CV_8UC4, {cv::IMWRITE_WEBP_QUALITY, 101}},
+          {".hdr", CV_32FC3},
+          {".pgm", CV_8UC1},
+          {".ppm", CV_8UC3},
+          {".pgm", CV_16UC1},
+          {".ppm", CV_16UC3},
+          {".pgm", CV_8UC1, {cv::IMWRITE_PXM_BINARY, 0}},
           {".ppm", CV_8UC3, {cv::IMWRITE_PXM_BINARY, 0}}};
 }
 
@@ -80,8 +94,12 @@ TEST(ImageCodecs, EncodeAsOpenCV) {
     const cv::Mat image = picture(type);
     cv::Mat swapped = image;
     if (image.channels() == 3) cv::cvtColor(image, swapped, cv::COLOR_BGR2RGB);
-    const PixelView view{.data = swapped.data, .row_bytes = swapped.step[0], .width = swapped.cols, .height = swapped.rows,
-                         .channels = swapped.channels(), .bits = swapped.depth() == CV_8U ? 8 : 16};
+    const PixelView view{.data = swapped.data,
+                         .row_bytes = swapped.step[0],
+                         .width = swapped.cols,
+                         .height = swapped.rows,
+                         .channels = swapped.channels(),
+                         .bits = swapped.depth() == CV_8U ? 8 : 16};
     Bytes fast, small, jpeg;
     cv::imencode(".png", image, fast);
     cv::imencode(".png", image, small, {cv::IMWRITE_PNG_COMPRESSION, 3});
@@ -165,8 +183,8 @@ TEST(ImageCodecs, ScalePortableMaps) {
   ASSERT_TRUE(decode_text(std::string_view("P5 2 1 1023\n\x03\xff\x00\x00", 16)));
   EXPECT_EQ(pixels.bits, 16);
   EXPECT_EQ(pixels.bytes, (Bytes{255, 255, 0, 0}));
-  for (const std::string_view bad : {"P2 3 1 10\n0 5", "P5 3 1 255\nab", "P5 3 1 0\nabc", "P5 3 1 70000\nabcdef", "P4 1 1\n1", "P",
-                                     "P5 -3 1 255\nabc", "P2 99999 99999 255\n1", "P5 3 1 255"})
+  for (const std::string_view bad : {"P2 3 1 10\n0 5", "P5 3 1 255\nab", "P5 3 1 0\nabc", "P5 3 1 70000\nabcdef",
+                                     "P4 1 1\n1", "P", "P5 -3 1 255\nabc", "P2 99999 99999 255\n1", "P5 3 1 255"})
     EXPECT_FALSE(decode_text(bad)) << bad;
 }
 
@@ -177,7 +195,8 @@ TEST(ImageCodecs, SurviveDamage) {
     const Bytes file = encoded(kind);
     for (std::size_t size = 0; size < file.size(); size += 1 + size / 8) {
       const bool decoded = decode(Bytes(file.begin(), file.begin() + static_cast<std::ptrdiff_t>(size)), pixels);
-      EXPECT_TRUE(!decoded || kind.extension == std::string(".jpg") || kind.extension[2] == 'p') << kind.extension << size;
+      EXPECT_TRUE(!decoded || kind.extension == std::string(".jpg") || kind.extension[2] == 'p')
+          << kind.extension << size;
     }
     for (int trial = 0; trial < 200; ++trial) {
       Bytes damaged = file;

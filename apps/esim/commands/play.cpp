@@ -152,7 +152,8 @@ int run(PlayArguments& arguments) {
   const fs::path out = out_path(arguments);
   const std::optional<VideoKind> kind = kind_of(out);
   if (kind && !can_write(*kind))
-    throw UserError(fmt::format("--out {}: must end in .webp or .png, since this esim was built without FFmpeg", out.string()));
+    throw UserError(
+        fmt::format("--out {}: must end in .webp or .png, since this esim was built without FFmpeg", out.string()));
   if (fs::exists(out) && (!arguments.force || fs::is_directory(out)))
     throw UserError(out.string() + " exists; choose another --out, or replace a file with --force");
   if (arguments.at_s && kind) throw UserError("--at gives a single image; add --out FILE.png");

@@ -22,7 +22,8 @@ struct StudioArguments : studio::StudioOptions {
 int run(StudioArguments& arguments) {
   arguments.opened = arguments.input;
   arguments.roots.assign(arguments.folders.begin(), arguments.folders.end());
-  arguments.pages = arguments.page.empty() ? data_folder("studio", ESIM_PAGE_BUILT, "index.html") : fs::path(arguments.page);
+  arguments.pages =
+      arguments.page.empty() ? data_folder("studio", ESIM_PAGE_BUILT, "index.html") : fs::path(arguments.page);
 
   // Blocked in all threads; this one waits for them.
   sigset_t signals;

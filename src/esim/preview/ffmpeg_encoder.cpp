@@ -41,8 +41,8 @@ std::string reason_of(int error) {
 class FFmpegEncoder final : public VideoEncoder {
  public:
   FFmpegEncoder(const std::filesystem::path& path, VideoShape shape, VideoKind kind) : path_(path) {
-    av_log_set_level(AV_LOG_QUIET);    // failures become exceptions
-    OutputFile(path_).close();  // throws with the reason if the file cannot be created
+    av_log_set_level(AV_LOG_QUIET);  // failures become exceptions
+    OutputFile(path_).close();       // throws with the reason if the file cannot be created
     open_encoder(kind, shape);
     open_file(kind);
   }

@@ -8,9 +8,9 @@
 namespace esim::inline preview {
 
 /// Writes preview.mp4 (preview.webp without FFmpeg), a video of one camera's events next to its ground truth or its
-/// input video, and preview.png, one frame of it: the one with the median number of events in the second half. The video has one frame per frame of
-/// ground truth or input video and plays in real time or, if that were too short or too fast to watch, slower, as its
-/// caption states.
+/// input video, and preview.png, one frame of it: the one with the median number of events in the second half. The
+/// video has one frame per frame of ground truth or input video and plays in real time or, if that were too short or
+/// too fast to watch, slower, as its caption states.
 class PreviewWriter final : public Sink {
  public:
   /// Both files go into `folder`, which must exist.

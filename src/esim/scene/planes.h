@@ -25,7 +25,7 @@ struct CodedImage {
   const void* data = nullptr;
   std::ptrdiff_t row_bytes = 0;
   int width = 0, height = 0;
-  int channels = 1;  ///< 1: grey, 2: grey and alpha, 3: colour, 4: colour and alpha
+  int channels = 1;     ///< 1: grey, 2: grey and alpha, 3: colour, 4: colour and alpha
   bool opaque = false;  ///< ignore alpha
   PixelType type = PixelType::uint8;
 };

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<std::string_view, 9> kImageExtensions = {".png", ".jpg", ".jpeg", ".exr", ".hdr",
-                                                             ".pgm", ".ppm", ".pnm",  ".webp"};
+                                                              ".pgm", ".ppm", ".pnm",  ".webp"};
 
 bool is_image(const fs::path& path) {
   std::string extension = path.extension().string();
@@ -73,7 +73,8 @@ class ImageFolder final : public FrameSource {
     }
     listing_.frames = names_.size();
     if (names_.empty()) {
-      throw UserError(fmt::format("{}: holds no images; put PNG, JPEG, WebP, PGM, PPM, EXR or HDR files there", folder.string()));
+      throw UserError(
+          fmt::format("{}: holds no images; put PNG, JPEG, WebP, PGM, PPM, EXR or HDR files there", folder.string()));
     }
   }
 

@@ -83,7 +83,8 @@ ImageFolder::ImageFolder(fs::path folder) : folder_(std::move(folder)) {
   }
   if (error) throw UserError(fmt::format("{}: cannot be listed: {}", folder_.string(), error.message()));
   if (files_.empty())
-    throw UserError(fmt::format("{}: has no images; supported are PNG, JPEG, WebP, PGM, PPM, EXR and HDR", folder_.string()));
+    throw UserError(
+        fmt::format("{}: has no images; supported are PNG, JPEG, WebP, PGM, PPM, EXR and HDR", folder_.string()));
   std::sort(files_.begin(), files_.end(), [](const File& a, const File& b) { return a.name < b.name; });
 
   for (const File& file : files_) fingerprint_ = crc32(fmt::format("{}\n{}\n", file.name, file.bytes), fingerprint_);

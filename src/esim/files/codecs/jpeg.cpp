@@ -50,7 +50,7 @@ void convert_inks(const std::uint8_t* inks, int width, std::uint8_t* rgb) {
 }
 
 bool read_jpeg_image(JpegReader& reader, std::span<const std::byte> file, int factor, bool colour, ImagePixels& pixels,
-                std::vector<std::uint8_t>& inks) {
+                     std::vector<std::uint8_t>& inks) {
   jpeg_decompress_struct& state = reader.state;
   jpeg_create_decompress(&state);
   jpeg_mem_src(&state, reinterpret_cast<const unsigned char*>(file.data()), file.size());
@@ -119,7 +119,9 @@ void write_jpeg_image(JpegWriter& writer, const PixelView& image, int quality) {
 
 }  // namespace
 
-bool decode_jpeg(std::span<const std::byte> file, ImagePixels& pixels) { return decode_any_jpeg(file, 1, false, pixels); }
+bool decode_jpeg(std::span<const std::byte> file, ImagePixels& pixels) {
+  return decode_any_jpeg(file, 1, false, pixels);
+}
 
 bool decode_reduced_jpeg(std::span<const std::byte> file, int factor, ImagePixels& pixels) {
   return decode_any_jpeg(file, factor, true, pixels);

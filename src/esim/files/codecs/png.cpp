@@ -46,8 +46,8 @@ struct PngReader {
 int request_channels(const PngReader& reader) {
   const int type = png_get_color_type(reader.png, reader.info);
   const bool palette = type == PNG_COLOR_TYPE_PALETTE, grey = type == PNG_COLOR_TYPE_GRAY;
-  const bool transparent = (type & PNG_COLOR_MASK_ALPHA) != 0 ||
-                           (palette && png_get_valid(reader.png, reader.info, PNG_INFO_tRNS) != 0);
+  const bool transparent =
+      (type & PNG_COLOR_MASK_ALPHA) != 0 || (palette && png_get_valid(reader.png, reader.info, PNG_INFO_tRNS) != 0);
   if (palette) png_set_palette_to_rgb(reader.png);
   if (grey) png_set_expand_gray_1_2_4_to_8(reader.png);
   if (type == PNG_COLOR_TYPE_GRAY_ALPHA) png_set_gray_to_rgb(reader.png);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kRgbeBytes = 4;  // of a pixel
 
-/// Removes a line from `rest`; empty if there is none.
+/// Removes a line from `rest`; empty if it has no end.
 std::optional<std::string_view> take_line(std::string_view& rest) {
   const std::size_t end = rest.find('\n');
   if (end == std::string_view::npos) return std::nullopt;
@@ -53,7 +53,8 @@ bool take_component(std::string_view& rest, std::uint8_t* out, std::size_t width
     const bool run = count > kRun;
     const std::size_t length = run ? count - kRun : count, coded = run ? 1 : length;
     if (length == 0 || length > width - x || rest.size() < 1 + coded) return false;
-    for (std::size_t i = 0; i < length; ++i, ++x) out[kRgbeBytes * x] = static_cast<std::uint8_t>(rest[1 + (run ? 0 : i)]);
+    for (std::size_t i = 0; i < length; ++i, ++x)
+      out[kRgbeBytes * x] = static_cast<std::uint8_t>(rest[1 + (run ? 0 : i)]);
     rest.remove_prefix(1 + coded);
   }
   return true;

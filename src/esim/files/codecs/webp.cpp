@@ -12,8 +12,8 @@ bool decode_webp(std::span<const std::byte> file, ImagePixels& pixels) {
   if (!is_plausible(width, height, file.size())) return false;
   pixels.resize(features.width, features.height, features.has_alpha != 0 ? 4 : 3, 8);
   const auto decode_into = features.has_alpha != 0 ? WebPDecodeRGBAInto : WebPDecodeRGBInto;
-  return decode_into(bytes, file.size(), pixels.bytes.data(), pixels.bytes.size(), static_cast<int>(pixels.row_bytes)) !=
-         nullptr;
+  return decode_into(bytes, file.size(), pixels.bytes.data(), pixels.bytes.size(),
+                     static_cast<int>(pixels.row_bytes)) != nullptr;
 }
 
 }  // namespace esim::inline files

@@ -157,8 +157,7 @@ void EventsHdf5Writer::Impl::close_series() {
 }
 
 EventsHdf5Writer::EventsHdf5Writer(std::filesystem::path path, int camera, EventsHdf5Options options)
-    : impl_(std::make_unique<Impl>(std::move(path), camera, options)) {
-}
+    : impl_(std::make_unique<Impl>(std::move(path), camera, options)) {}
 
 EventsHdf5Writer::~EventsHdf5Writer() = default;
 

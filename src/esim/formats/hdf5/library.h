@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "esim/formats/hdf5/blosc_filter.h"
-#include "esim/formats/hdf5/output_driver.h"
+#include "esim/formats/hdf5/extensions/blosc_filter.h"
+#include "esim/formats/hdf5/extensions/output_driver.h"
 #include "esim/recording/compression.h"
 
 // Private to formats: includes hdf5.h.

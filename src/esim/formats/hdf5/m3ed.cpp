@@ -41,8 +41,7 @@ void create_list(const hdf5::Output& file, const char* name, hid_t type, std::sp
 
 class M3edWriter final : public Sink {
  public:
-  M3edWriter(std::filesystem::path path, Compression compression) : path_(std::move(path)), compression_(compression) {
-  }
+  M3edWriter(std::filesystem::path path, Compression compression) : path_(std::move(path)), compression_(compression) {}
   ~M3edWriter() override {
     const hdf5::Quiet quiet;
     close_series();

@@ -167,8 +167,7 @@ void TruthHdf5Writer::Impl::append_object_poses(std::span<const SE3> poses) {
 }
 
 TruthHdf5Writer::TruthHdf5Writer(std::filesystem::path path, int camera, TruthHdf5Options options)
-    : impl_(std::make_unique<Impl>(std::move(path), camera, options)) {
-}
+    : impl_(std::make_unique<Impl>(std::move(path), camera, options)) {}
 
 TruthHdf5Writer::~TruthHdf5Writer() = default;
 

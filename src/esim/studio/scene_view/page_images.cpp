@@ -24,12 +24,9 @@ Image<float> at_most(const Image<float>& image, int longest) {
 
 std::string jpeg_of(const ImagePixels& rgb) {
   constexpr int kQuality = 90;
-  return encode_jpeg({.data = rgb.bytes.data(),
-                      .row_bytes = rgb.row_bytes,
-                      .width = rgb.width,
-                      .height = rgb.height,
-                      .channels = 3},
-                     kQuality);
+  return encode_jpeg(
+      {.data = rgb.bytes.data(), .row_bytes = rgb.row_bytes, .width = rgb.width, .height = rgb.height, .channels = 3},
+      kQuality);
 }
 
 std::string_view bytes_of(const CodedTexture& texture) {

@@ -1,4 +1,4 @@
-#include "esim/formats/hdf5/blosc_filter.h"
+#include "esim/formats/hdf5/extensions/blosc_filter.h"
 
 #include <blosc.h>
 
@@ -8,12 +8,21 @@
 #include <stdexcept>
 #include <utility>
 
-// HDF5's Blosc filter, as its registration describes it (number 32001). The values of a dataset's filter: version of the
-// filter, version of Blosc's format, bytes of a number, bytes of a chunk, level, shuffle, codec.
+// HDF5's Blosc filter, as its registration describes it (number 32001). The values of a dataset's filter: version of
+// the filter, version of Blosc's format, bytes of a number, bytes of a chunk, level, shuffle, codec.
 namespace esim::inline formats::hdf5 {
 namespace {
 
-enum Value : std::size_t { kFilterVersion, kFormatVersion, kNumberBytes, kChunkBytes, kLevel, kShuffle, kCodec, kValues };
+enum Value : std::size_t {
+  kFilterVersion,
+  kFormatVersion,
+  kNumberBytes,
+  kChunkBytes,
+  kLevel,
+  kShuffle,
+  kCodec,
+  kValues
+};
 using Values = std::array<unsigned, kValues>;
 
 /// Bytes that the HDF5 library allocated.

@@ -1,4 +1,4 @@
-#include "esim/formats/hdf5/output_driver.h"
+#include "esim/formats/hdf5/extensions/output_driver.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>

@@ -1,0 +1,17 @@
+"""The command `esim` of an installed package, also as `python -m esim`: runs the program in the package's folder."""
+
+import os
+import sys
+from pathlib import Path
+
+PROGRAM = Path(__file__).parent / "bin" / "esim"
+
+
+def main():
+    if not PROGRAM.is_file():
+        sys.exit(f"esim: {PROGRAM} does not exist: install the package with pip, which includes the program")
+    os.execv(PROGRAM, ["esim", *sys.argv[1:]])
+
+
+if __name__ == "__main__":
+    main()

@@ -10,7 +10,7 @@ BIN = "/venv/bin"
 
 
 def run(*command, **options):
-    result = subprocess.run(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options)
+    result = subprocess.run(command, text=True, capture_output=True, **options)
     assert result.returncode == 0, f"{command}: {result.stdout}{result.stderr}"
     return result.stdout
 

@@ -2,6 +2,7 @@ import subprocess
 import sys
 
 import pytest
+
 from esim import _processor
 
 
@@ -16,10 +17,15 @@ def test_the_processor_is_checked_before_the_module_is_loaded(tmp_path):
 
 
 def test_the_module_is_not_imported_for_other_processors():
-    code = "import builtins, io, sys\n" \
-           "real = builtins.open\n" \
-           "builtins.open = lambda path, *a, **k: io.StringIO('flags : sse') if path == '/proc/cpuinfo' else real(path, *a, **k)\n" \
-           "try:\n    import esim\nexcept ImportError as error:\n    print(error, 'esim._core' in sys.modules)\n"
+    code = """
+import builtins, io, sys
+real = builtins.open
+builtins.open = lambda path, *a, **k: io.StringIO("flags : sse") if path == "/proc/cpuinfo" else real(path, *a, **k)
+try:
+    import esim
+except ImportError as error:
+    print(error, "esim._core" in sys.modules)
+"""
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     if _processor.NEEDED:
         assert "does not have AVX2 and FMA" in result.stdout and result.stdout.endswith("False\n"), result

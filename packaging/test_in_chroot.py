@@ -51,10 +51,11 @@ def render_every_scene():
 
 
 def studio():
-    server = subprocess.Popen([f"{BIN}/esim", "studio", "/out", "--token", "secret"], stdout=subprocess.PIPE, text=True)
+    server = subprocess.Popen([f"{BIN}/esim", "studio", "/out"], stdout=subprocess.PIPE, text=True)
     try:
         address = server.stdout.readline().strip()
-        page = urllib.request.urlopen(address, timeout=20).read().decode()
+        browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+        page = browser.open(address, timeout=20).read().decode()
         assert "<script" in page, page
     finally:
         server.terminate()

@@ -37,6 +37,11 @@ def simulate():
     assert sum(1 for _ in open("/events.txt")) > 1000
 
 
+def play():
+    run(f"{BIN}/esim", "play", "/out", "--size", "300")
+    assert open("/out.play.webp", "rb").read(16).endswith(b"WEBPVP8X")
+
+
 def simulate_in_python():
     return run(f"{BIN}/python", "-c", """
 import esim, subprocess
@@ -76,13 +81,15 @@ def main():
     events, _ = timed("events in Python", simulate_in_python)
     assert int(events) > 100, events
     timed("every scene", render_every_scene)
+    timed("a video of the events", play)
     timed("the studio's page over HTTP", studio)
     run(f"{BIN}/python", "-m", "esim", "--version")
     refuse(f"{BIN}/esim", "video", "/clip.mp4", "--out", "/clip", reason="no such file")
     open("/clip.mp4", "w").close()
     refuse(f"{BIN}/esim", "video", "/clip.mp4", "--out", "/clip", reason="without FFmpeg")
+    refuse(f"{BIN}/esim", "play", "/out", "--out", "/out.mp4", reason="must end in .webp or .png")
     room = next(path for path in run(f"{BIN}/esim", "scenes").split() if path.endswith("/room.yaml"))
-    refuse(f"{BIN}/esim", "simulate", room, "--out", "/gl", "--set", "renderer.engine=gl", reason="libegl1")
+    refuse(f"{BIN}/esim", "simulate", room, "--out", "/gl", "--set", "renderer.engine=gl", "--quiet", reason="libegl1")
     print(f"  {first:5.1f} s  from the file to the first events")
     assert first < 60, "this must take less than 60 s"
 

@@ -12,6 +12,7 @@
 #include "esim/event_camera/circuit/circuit_array.h"
 #include "esim/event_camera/circuit/circuit_readout.h"
 #include "esim/event_camera/front_end.h"
+#include "esim/event_camera/labels/pending_labels.h"
 #include "esim/event_camera/pixel/pixel_array.h"
 #include "esim/event_camera/pixel/pixel_update.h"
 #include "esim/event_camera/pixel/pixel_watch.h"
@@ -51,6 +52,7 @@ struct EventCamera::State {
     if (options.surround_px > 0) surround.emplace(options.surround_px, options.surround_ms * 1e-3, width, height);
     if (!options.circuit && options.readout.limited()) readout.emplace(options, width, height);
     if (options.circuit && options.readout.acknowledges()) circuit_readout.emplace(options.readout, width, height);
+    if (options.labels) labels.emplace(width, height, circuit ? circuit->hot() : pixels.hot(seed, stream));
   }
 
   bool integrate(const Workers& workers);
@@ -89,6 +91,10 @@ struct EventCamera::State {
   EventQueue queue;
   std::optional<PixelReadout> readout;
   std::optional<CircuitReadout> circuit_readout;
+
+  std::optional<PendingLabels> labels;
+  std::vector<EventLabel> released_labels;
+  TimeNs watermark = std::numeric_limits<TimeNs>::min();
 
   // For process().
   Image<float> last_frame, next_frame;
@@ -211,15 +217,38 @@ void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
     for (const Segment& segment : segments) check_irradiance(segment);
   }
   state.queue.add(state.events, workers);
-  if (state.readout) state.readout->advance(state.pixels, state.updates[0], state.queue, watermark);
-  if (state.circuit_readout) state.circuit_readout->advance(*state.circuit, state.queue, watermark);
+  PendingLabels* const labels = state.labels ? &*state.labels : nullptr;
+  if (labels != nullptr) {
+    for (PackedEvents& events : state.events) labels->add(events.labels);
+    for (CircuitBuffer& buffer : state.buffers) labels->add(buffer.labels);
+  }
+  if (state.readout) state.readout->advance(state.pixels, state.updates[0], state.queue, watermark, labels);
+  if (state.circuit_readout) state.circuit_readout->advance(*state.circuit, state.queue, watermark, labels);
+  state.watermark = watermark;
 }
 
 void EventCamera::release_until(TimeNs until, std::vector<Event>& out) {
-  if (state_->readout) return state_->readout->release_until(until, out);
-  if (state_->circuit_readout) return state_->circuit_readout->release_until(until, out);
-  const EventSpan released = state_->queue.release_until(until);
-  out.insert(out.end(), released.begin(), released.end());
+  State& state = *state_;
+  const std::size_t before = out.size();
+  if (state.readout) {
+    state.readout->release_until(until, out);
+  } else if (state.circuit_readout) {
+    state.circuit_readout->release_until(until, out);
+  } else {
+    const EventSpan released = state.queue.release_until(until);
+    out.insert(out.end(), released.begin(), released.end());
+  }
+  if (!state.labels) return;
+  state.released_labels.clear();
+  state.labels->take(EventSpan(out).subspan(before), state.released_labels);
+}
+
+LabelSpan EventCamera::labels() const { return state_->released_labels; }
+
+bool EventCamera::has_labels() const { return state_->labels.has_value(); }
+
+TimeNs EventCamera::labels_from() const {
+  return state_->labels ? std::min(state_->labels->earliest(), state_->watermark) : state_->watermark;
 }
 
 void EventCamera::process(const Image<float>& irradiance, TimeNs t, std::vector<Event>& out, const Workers& workers) {
@@ -289,6 +318,7 @@ std::vector<std::byte> EventCamera::state() const {
   StateWriter archive(bytes);
   State::transfer(archive, *state_);
   archive.list(state_->queue.waiting());
+  if (state_->labels) archive.list(state_->labels->waiting());
   return bytes;
 }
 
@@ -298,7 +328,9 @@ void EventCamera::restore(std::span<const std::byte> state) {
   State::transfer(archive, *state_);
   std::vector<Event> waiting;
   archive.list(waiting);
-  if (!archive.at_end()) StateReader::fail();
+  std::vector<PendingLabels::Waiting> labels;
+  if (state_->labels) archive.list(labels);
+  if (!archive.at_end() || (state_->labels && !state_->labels->restore(labels))) StateReader::fail();
   state_->queue.restore(waiting);
 }
 

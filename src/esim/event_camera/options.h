@@ -117,6 +117,8 @@ struct EventCameraOptions {
   ReadoutOptions readout{};
   std::optional<CircuitOptions> circuit{};
 
+  bool labels = false;
+
   /// What is added to the irradiance before the logarithm.
   double dark_light() const { return circuit ? circuit->dark_irradiance() : log_eps; }
   double threshold_on() const { return contrast_threshold_on.value_or(contrast_threshold); }
@@ -251,6 +253,7 @@ void describe(Visitor& visit, EventCameraOptions& o) {
   visit(
       "circuit", o.circuit,
       About{"simulates the pixels' circuit, from light in lux, with its noise (default: none, but the effects above)"});
+  visit("labels", o.labels, About{"explains each event: its cause, its ideal time, and the object that the pixel saw"});
 }
 
 }  // namespace esim::inline event_camera

@@ -57,12 +57,13 @@ class FilteredSource final : public Source {
  public:
   FilteredSource(std::unique_ptr<Source> inner, const FilterOptions& filters, const std::string& camera,
                  std::vector<FilteredCamera>& cameras)
-      : inner_(std::move(inner)), filters_(filters), reports_(cameras) {
+      : inner_(std::move(inner)), info_(inner_->info()), filters_(filters), reports_(cameras) {
     validate(filters_);
     reports_.clear();
-    for (const CameraInfo& each : info().cameras) {
+    for (CameraInfo& each : info_.cameras) {
       std::optional<std::size_t> report;
       if (camera.empty() || camera == each.name) {
+        each.has_labels = false;
         report = reports_.size();
         reports_.push_back({each.name, 0, {}});
       }
@@ -70,12 +71,13 @@ class FilteredSource final : public Source {
     }
   }
 
-  const RecordingInfo& info() const override { return inner_->info(); }
+  const RecordingInfo& info() const override { return info_; }
   double progress() const override { return inner_->progress(); }
 
   std::vector<std::string> not_read() const override {
     std::vector<std::string> all = inner_->not_read();
     if (has_points_) all.emplace_back("the points of events");
+    if (has_labels_) all.emplace_back("the labels of events");
     return all;
   }
 
@@ -99,12 +101,13 @@ class FilteredSource final : public Source {
     FilteredStream& stream = cameras_.at(static_cast<std::size_t>(events.camera));
     if (!stream.report) return &record;
     if (stream.chain == nullptr) stream.chain = make_chain(events.camera);
+    has_labels_ |= !events.labels.empty();
     passed_.clear();
     stream.chain->process(events.events, passed_);
     FilteredCamera& report = reports_[*stream.report];
     report.events += events.events.size();
     report.dropped = stream.chain->dropped();
-    return &record_.emplace(EventsRecord{events.camera, passed_});
+    return &record_.emplace(EventsRecord{events.camera, passed_, {}});
   }
 
   std::unique_ptr<FilterChain> make_chain(int camera) const {
@@ -116,12 +119,14 @@ class FilteredSource final : public Source {
   }
 
   std::unique_ptr<Source> inner_;
+  RecordingInfo info_;
   FilterOptions filters_;
   std::vector<FilteredCamera>& reports_;
   std::vector<FilteredStream> cameras_;
   std::vector<Event> passed_;
   std::optional<Record> record_;
   bool has_points_ = false;
+  bool has_labels_ = false;
 };
 
 }  // namespace

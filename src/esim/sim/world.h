@@ -16,6 +16,7 @@
 #include "esim/truth/clock.h"
 #include "esim/truth/event_points.h"
 #include "esim/truth/optical_flow.h"
+#include "esim/truth/seen_objects.h"
 
 namespace esim::inline sim {
 
@@ -31,6 +32,7 @@ struct CameraChannel {
   // Ground truth, if requested.
   std::unique_ptr<OpticalFlowFromDepth> optical_flow{};
   std::unique_ptr<EventPoints> event_points{};
+  std::optional<SeenObjects> seen_objects{};  // for labels, if anything moves
 };
 
 /// The rig's inertial measurement unit.

@@ -54,6 +54,7 @@ void CircuitArray::make_pixels(const EventCameraOptions& options, std::uint64_t 
   for (auto* values : {&light_, &lag_, &y_, &v_, &low_, &high_, &until_}) values->resize(count + kVectorPadding);
   node_light_.resize(count + kVectorPadding);
   leak_.resize(count + kVectorPadding);
+  if (options.labels) origins_.resize(count), hot_.resize(count);
   const AddressedRandom random(seed, Purpose::circuit_mismatch, stream);
   const double refractory_ns = 1e3 * options.refractory_period_us;
   for (std::size_t i = 0; i < count; ++i) {
@@ -78,6 +79,7 @@ void CircuitArray::make_pixels(const EventCameraOptions& options, std::uint64_t 
       rate += options.hot_pixel_rate_hz * options.threshold_on() *
               std::pow(10.0, o.hot_mismatch_decades * hot_decades) * (sign < o.hot_off_fraction ? -1 : 1);
     }
+    if (options.labels) hot_[i] = hot < options.hot_pixels;
     leak_[i] = static_cast<float>(rate);
     until_[i] = -1;
   }
@@ -102,9 +104,8 @@ bool CircuitArray::open(const Segment& segment, Rows rows) {
       const std::size_t i = first + x;
       light_[i] = y_[i] = v_[i] = lights[x];
       lag_[i] = 0;
-      const auto pixel = static_cast<std::uint32_t>(i);
-      CircuitPixel(circuit_, pixel, parameters_[i], leak_[i], states_[i])
-          .open(lights[x], static_cast<double>(segment.t1 - epoch_), starts_.uniforms(pixel, 0)[0]);
+      const double place = starts_.uniforms(static_cast<std::uint32_t>(i), 0)[0];
+      pixel(i).open(lights[x], static_cast<double>(segment.t1 - epoch_), place);
       until_[i] = -1;  // looks at once
     }
   }
@@ -246,6 +247,19 @@ void CircuitArray::set_bounds(std::size_t pixel, const CircuitBounds& bounds) {
   node_light_[pixel] = states_[pixel].node_light;
 }
 
+CircuitPixel CircuitArray::pixel(std::size_t i) {
+  CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], leak_[i], states_[i]);
+  if (!origins_.empty()) pixel.explain(&origins_[i]);
+  return pixel;
+}
+
+/// Adds the label of the last event of a pixel.
+void CircuitArray::label(std::size_t i, TimeNs t, int polarity, std::vector<NewLabel>& labels) const {
+  const CircuitOrigin& parts = origins_[i];
+  labels.push_back({t, t, static_cast<std::uint32_t>(i), parts.signal, parts.noise, parts.leak,
+                    static_cast<std::int8_t>(polarity), 0, {}});
+}
+
 /// Takes a pixel to the segment's end in as many steps as needed.
 void CircuitArray::advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer,
                                PackedEvents& events) {
@@ -258,13 +272,14 @@ void CircuitArray::advance_one(const Row& row, std::uint32_t column, std::size_t
     buffer.polarity[n] = polarity;
     buffer.reported[n] = 1;
     buffer.place[n] = place;
+    if (!origins_.empty()) label(i, row.t0 + static_cast<TimeNs>(buffer.time[n]), polarity, buffer.labels);
   };
   const double light1 = buffer.light[at];
   const LightRamp ramp{light_[i], (light1 - light_[i]) / row.length};
   if (buffer.several[at] == 0) {
     const CircuitPiece piece{buffer.level[at], buffer.rate[at],          buffer.fast[at], buffer.slow[at],
                              buffer.k1[at],    1 / circuit_.poles.t2_ns, row.length};
-    CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], leak_[i], states_[i]);
+    CircuitPixel pixel = this->pixel(i);
     pixel.set(piece, ramp, row.start);
     set_bounds(i, pixel.run(emit));
     light_[i] = light1, lag_[i] = buffer.lag[at], y_[i] = buffer.y[at], v_[i] = buffer.v[at];
@@ -282,7 +297,7 @@ void CircuitArray::advance_one(const Row& row, std::uint32_t column, std::size_t
 template <typename Emit>
 void CircuitArray::run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length,
                        bool always, const Emit& emit) {
-  CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], leak_[i], states_[i]);
+  CircuitPixel pixel = this->pixel(i);
   const int steps = steps_for(circuit_.poles, front, ramp, length);
   for (int k = 0; k < steps; ++k) {
     const double h = length / steps, from = start + h * k;
@@ -318,10 +333,10 @@ void CircuitArray::resume(std::uint32_t pixel, const PastSegment& past, CircuitB
   const int column = x - segment.tile.x, row = y - segment.tile.y;
   CircuitState front{static_cast<double>(past.filtered1(column, row)),
                      light0 + static_cast<double>(past.filtered2(column, row))};
-  static_cast<void>(buffer);
   const auto emit = [&](double t, int polarity) {
     requests.push_back({epoch_ + static_cast<TimeNs>(std::ceil(t)), static_cast<std::uint16_t>(x),
                         static_cast<std::uint16_t>(y), static_cast<std::int8_t>(polarity)});
+    if (!origins_.empty()) label(pixel, requests.back().t, polarity, buffer.labels);
   };
   run(pixel, front, {light0, (light1 - light0) / length}, start, length, false, emit);
 }

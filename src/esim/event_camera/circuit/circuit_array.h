@@ -30,6 +30,7 @@ struct CircuitBuffer {
   PerPixel<double> time, polarity, reported;            // of events
   PerPixel<std::uint32_t> place;
   std::size_t events = 0;
+  std::vector<NewLabel> labels;  // if they are wanted
 };
 
 /// The pixels of a camera, by their circuit. In most segments, one vectorised solution of the front end and a
@@ -51,6 +52,9 @@ class CircuitArray {
   /// Takes a pixel that is held in reset through a past segment; appends its next request, if there is one.
   void resume(std::uint32_t pixel, const PastSegment& past, CircuitBuffer& buffer, std::vector<Event>& requests);
 
+  /// Whether each pixel is hot; only with labels.
+  const std::vector<bool>& hot() const { return hot_; }
+
   void set_epoch(TimeNs t) {
     if (epoch_ == kNoEpoch) epoch_ = t;
   }
@@ -63,6 +67,7 @@ class CircuitArray {
     for (auto* values : {&self.light_, &self.lag_, &self.y_, &self.v_, &self.low_, &self.high_, &self.until_})
       archive.fixed(*values);
     archive.fixed(self.node_light_);
+    archive.fixed(self.origins_);
   }
 
  private:
@@ -77,6 +82,8 @@ class CircuitArray {
            const Emit& emit);
   void advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer, PackedEvents& events);
   void set_bounds(std::size_t pixel, const CircuitBounds& bounds);
+  CircuitPixel pixel(std::size_t i);
+  void label(std::size_t i, TimeNs t, int polarity, std::vector<NewLabel>& labels) const;
   static void flush(const Row& row, CircuitBuffer& buffer, PackedEvents& events);
 
   Circuit circuit_;
@@ -91,6 +98,8 @@ class CircuitArray {
   LargeVector<double> light_, lag_, y_, v_;  // at the last sample
   LargeVector<double> low_, high_, until_;   // CircuitBounds, with absolute levels
   LargeVector<float> node_light_, leak_;
+  LargeVector<CircuitOrigin> origins_;  // with labels
+  std::vector<bool> hot_;               // with labels
 };
 
 }  // namespace esim::inline event_camera

@@ -44,6 +44,13 @@ struct CircuitPixelState {
   bool active = false;  ///< its noise matters at present
 };
 
+/// For labels: where the change of a pixel's signal begins, and its parts at the last event, ln.
+struct CircuitOrigin {
+  double v = 0;     ///< the source follower's output when the reference was set
+  double time = 0;  ///< when that was, ns after the epoch
+  float signal = 0, noise = 0, leak = 0;
+};
+
 /// No event is possible while the signal minus the reference stays strictly within (low, high), the light within
 /// kLightReach of node_light, and before the time `until`.
 struct CircuitBounds {
@@ -74,6 +81,9 @@ class CircuitPixel {
   /// where the signal then is between the two thresholds.
   void open(double light, double time, double place);
 
+  /// Keeps the parts of the change at events in `origin`.
+  void explain(CircuitOrigin* origin) { origin_ = origin; }
+
   /// The stretch that the next functions are about: its signal, its light, and its start in ns after the epoch.
   void set(const CircuitPiece& piece, const LightRamp& light, double start) {
     piece_ = piece, light_ = light, start_ = start;
@@ -102,6 +112,7 @@ class CircuitPixel {
     return {low + leak_ * (start_ + a), high + leak_ * (start_ + b)};
   }
 
+  void take_apart(double s, int polarity);
   std::optional<double> find_near(double a, double b) const;
   /// Whether the slope of the signal has one sign on [a, b], by its ends and its maximum curvature.
   bool is_monotone(double a, double b) const {
@@ -147,12 +158,14 @@ class CircuitPixel {
   CircuitPiece piece_;
   LightRamp light_;
   double start_ = 0, leak_, gain_;
+  CircuitOrigin* origin_ = nullptr;
 };
 
 template <typename Emit>
 CircuitBounds CircuitPixel::run(const Emit& emit) {
   const double length = piece_.length;
   const auto fire = [&](double s, int polarity) {
+    if (origin_ != nullptr) take_apart(s, polarity);
     emit(start_ + s, polarity);
     state_.reference = polarity > 0 ? upper() : lower();
     if (circuit_.waits) {

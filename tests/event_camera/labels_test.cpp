@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <random>
@@ -146,8 +147,7 @@ std::vector<EventCameraOptions> with_readouts() {
   const auto hold = everything(RefractoryMode::hold), drop = everything(RefractoryMode::drop);
   std::vector<EventCameraOptions> all;
   for (const ReadoutOptions& readout : {kSlowReadout, kFullReadout}) {
-    all.push_back(
-        {.contrast_threshold = 0.2, .refractory_period_us = 100, .readout = readout, .labels = true});
+    all.push_back({.contrast_threshold = 0.2, .refractory_period_us = 100, .readout = readout, .labels = true});
     all.push_back(with(hold, [&](auto& o) { o.readout = readout; }));
     all.push_back(with(drop, [&](auto& o) { o.readout = readout; }));
     all.push_back(with(hold, [&](auto& o) { o.readout = readout, o.low_pass_hz = 500; }));
@@ -157,13 +157,12 @@ std::vector<EventCameraOptions> with_readouts() {
 
 std::vector<EventCameraOptions> circuits() {
   const EventCameraOptions circuit = dim_circuit();
-  return {circuit,
-          with(circuit, [](auto& o) { o.circuit->noise = 0; }),
-          with(circuit, [](auto& o) { o.refractory_period_us = 0; }),
-          with(circuit, [](auto& o) {
-            o.readout = {.rate_mev_per_s = 2, .row_time_us = 1, .row_scan_us = 0.5, .row_rest_us = 3};
-          }),
-          with(circuit, [](auto& o) { o.readout = {.scan_period_us = 200}; })};
+  return {
+      circuit, with(circuit, [](auto& o) { o.circuit->noise = 0; }),
+      with(circuit, [](auto& o) { o.refractory_period_us = 0; }),
+      with(circuit,
+           [](auto& o) { o.readout = {.rate_mev_per_s = 2, .row_time_us = 1, .row_scan_us = 0.5, .row_rest_us = 3}; }),
+      with(circuit, [](auto& o) { o.readout = {.scan_period_us = 200}; })};
 }
 
 std::vector<EventCameraOptions> all_cameras() {
@@ -221,7 +220,17 @@ TEST_P(Labels, DoNotDependOnThreadsOrTiles) {
     camera.release_until(time(k), tiled.events);
     tiled.labels.insert(tiled.labels.end(), camera.labels().begin(), camera.labels().end());
   }
-  EXPECT_EQ(tiled, expected);
+  EXPECT_EQ(tiled.events, expected.events);
+  ASSERT_EQ(tiled.labels.size(), expected.labels.size());
+  // Circuits that resume after a readout start from rounded states, if the segment was known before.
+  const float rounding = options.circuit && options.readout.acknowledges() ? 1e-5F : 0.0F;
+  for (std::size_t i = 0; i < expected.labels.size(); ++i) {
+    const EventLabel &a = tiled.labels[i], &b = expected.labels[i];
+    EXPECT_EQ(std::tie(a.t_ideal, a.hot), std::tie(b.t_ideal, b.hot));
+    EXPECT_NEAR(a.signal, b.signal, rounding);
+    EXPECT_NEAR(a.noise, b.noise, rounding);
+    EXPECT_NEAR(a.leak, b.leak, rounding);
+  }
 }
 
 TEST_P(Labels, AddUpToTheThresholdsOfTheirPixels) {
@@ -235,13 +244,13 @@ TEST_P(Labels, AddUpToTheThresholdsOfTheirPixels) {
     const auto [known, is_new] = thresholds.try_emplace({event.x, event.y, event.polarity}, threshold);
     EXPECT_NEAR(threshold, known->second, 1e-5);
     const double nominal = event.polarity > 0 ? options.threshold_on() : options.threshold_off();
-    const double spread = options.threshold_mismatch > 0 ? 0.5 * nominal : 0;
-    EXPECT_NEAR(threshold, nominal, 1e-6 + spread);
+    const double common = options.circuit ? options.circuit->threshold_mismatch_common : 0;
+    EXPECT_NEAR(threshold, nominal, 1e-6 + 5 * (options.threshold_mismatch + nominal * common));
     EXPECT_GT(label.t_ideal, 0);
     EXPECT_LE(label.t_ideal, event.t);
     EXPECT_EQ(label.flicker, 0);
-    const bool is_noiseless = options.threshold_noise == 0 && options.shot_noise_hz == 0 &&
-                              (!options.circuit || options.circuit->noise == 0);
+    const bool is_noiseless =
+        options.threshold_noise == 0 && options.shot_noise_hz == 0 && (!options.circuit || options.circuit->noise == 0);
     EXPECT_TRUE(!is_noiseless || label.noise == 0);
     EXPECT_TRUE(options.leak_rate_hz > 0 || label.leak == 0);
     const std::array<float, 4> parts{label.signal, label.flicker, label.noise, label.leak};
@@ -263,7 +272,7 @@ TEST_P(Labels, ARestoredCameraContinuesThem) {
     expected.add(camera, frames[static_cast<std::size_t>(k)], k * kNsPerMs);
     continued.add(restored, frames[static_cast<std::size_t>(k)], k * kNsPerMs);
   }
-  EXPECT_GT(expected.events.size(), 100U);
+  EXPECT_GT(expected.events.size(), 10U);
   EXPECT_EQ(continued, expected);
 }
 
@@ -275,13 +284,16 @@ TEST_P(LabelsAgainstReference, AreTheSame) {
   EventCamera camera(GetParam(), kWidth, kHeight, 9);
   ReferenceEventCamera reference(GetParam(), kWidth, kHeight, 9);
   Explained fast, defined;
+  std::mt19937 random(3);
   TimeNs t = -1000;
   for (const Image<float>& frame : random_frames(60)) {
     fast.add(camera, frame, t);
     for (const Event& event : reference.process(frame, t)) defined.events.push_back(event);
     defined.labels.insert(defined.labels.end(), reference.labels().begin(), reference.labels().end());
-    t += 1 + (7919 * t + 1'234'567) % 2'000'000;
+    t += 1 + static_cast<TimeNs>(random() % 2'000'000);
   }
+  camera.release_until(std::numeric_limits<TimeNs>::max(), fast.events);
+  fast.labels.insert(fast.labels.end(), camera.labels().begin(), camera.labels().end());
   fast.sort(), defined.sort();
   ASSERT_EQ(fast.events.size(), defined.events.size());
   for (std::size_t i = 0; i < fast.events.size(); ++i) {
@@ -322,7 +334,8 @@ TEST(LabelCauses, OfADarkSceneAreNoise) {
 }
 
 TEST(LabelCauses, OfALeakAreLeak) {
-  const EventCameraOptions separate{.leak_rate_hz = 10, .leak_mismatch_decades = 0.1, .leak_jitter = 0.1, .labels = true};
+  const EventCameraOptions separate{
+      .leak_rate_hz = 10, .leak_mismatch_decades = 0.1, .leak_jitter = 0.1, .labels = true};
   EXPECT_EQ(fraction(run(separate, kGrey, 100, 1), EventCause::leak), 1);
   EventCameraOptions circuit = dim_circuit();
   circuit.circuit->noise = 0;
@@ -342,10 +355,9 @@ TEST(LabelCauses, OfMotionSeenByIdealPixelsAreTheSignal) {
 }
 
 TEST(LabelCauses, TheSignalOfACircuitIsThatOfTheLight) {
-  // A slow ramp of bright light: the source follower repeats it, so that the signal rises at its rate.
+  // A slow ramp of light: after the beginning, the circuit follows it with a constant lag, whatever the noise does.
   EventCameraOptions options = dim_circuit();
-  options.circuit->white_lux = 1e5;
-  options.circuit->source_follower_hz = 1e5;
+  options.circuit->white_lux = 1000;
   options.refractory_period_us = 0;
   const double rate = 2;
   const Light ramp = [&](int, int, double t) { return static_cast<float>(0.1 * std::exp(rate * t)); };
@@ -354,14 +366,14 @@ TEST(LabelCauses, TheSignalOfACircuitIsThatOfTheLight) {
   for (std::size_t i = 1; i < explained.events.size(); ++i) {
     const Event &before = explained.events[i - 1], &event = explained.events[i];
     if (before.x != event.x || before.y != event.y) continue;
+    if (explained.labels[i - 1].t_ideal < 100 * kNsPerMs) continue;
     const double elapsed = to_seconds(explained.labels[i].t_ideal - explained.labels[i - 1].t_ideal);
-    EXPECT_NEAR(explained.labels[i].signal, rate * elapsed, 1e-3);
+    EXPECT_NEAR(explained.labels[i].signal, rate * elapsed, 4e-3);
   }
 }
 
 TEST(LabelCauses, OfHotPixelsAreMarked) {
-  const Explained explained =
-      run({.hot_pixels = 0.1, .hot_pixel_rate_hz = 50, .labels = true}, kGrey, 100, 1);
+  const Explained explained = run({.hot_pixels = 0.1, .hot_pixel_rate_hz = 50, .labels = true}, kGrey, 100, 1);
   EXPECT_EQ(fraction(explained, EventCause::leak), 1);
   for (const EventLabel& label : explained.labels) EXPECT_EQ(label.hot, 1);
 }

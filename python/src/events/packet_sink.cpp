@@ -86,8 +86,7 @@ void PacketSink::write(const EventsRecord& record) {
   for (EventsRecord rest = record; !rest.events.empty();) {
     Packet& packet = at(rest.events.front().t);
     const bool is_last = &packet == &packets_.back();
-    const auto beyond =
-        is_last ? rest.events.end() : std::ranges::upper_bound(rest.events, packet.t1, {}, &Event::t);
+    const auto beyond = is_last ? rest.events.end() : std::ranges::upper_bound(rest.events, packet.t1, {}, &Event::t);
     const auto count = static_cast<std::size_t>(beyond - rest.events.begin());
     const EventsRecord taken = rest.part(0, count);
     CameraPart& camera = packet.cameras[static_cast<std::size_t>(record.camera)];

@@ -70,6 +70,7 @@ struct EventCamera::State {
     if (self.surround) CenterSurround::transfer(archive, *self.surround);
     if (self.readout) PixelReadout::transfer(archive, *self.readout);
     if (self.circuit_readout) CircuitReadout::transfer(archive, *self.circuit_readout);
+    if (self.labels) archive.value(self.watermark);
     archive.value(self.spoiled);
     archive.value(self.last_time);
     archive.value(self.frames);

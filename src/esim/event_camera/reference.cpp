@@ -53,12 +53,12 @@ class ReferenceEventCamera::Model {
     double on = 0, off = 0, leak = 0;     // thresholds, and 1/s; constant between two events
     double mean_on = 0, mean_off = 0;     // C+ and C- of the pixel: thresholds without their noise
     bool hot = false;
-    std::uint32_t draws = 0, shots = 0;   // number of draws for events, and of candidates of shot noise
-    TimeNs shot_at = kNoTime;             // next candidate of shot noise
-    std::optional<TimeNs> busy_until;     // end of the refractory period; kNoTime while it waits for the readout
-    double from = 0;                      // s after the previous frame: nothing is searched before
-    double set_at = 0;                    // when the reference was set, s after the previous frame
-    std::array<float, 4> normals{};       // n' of the last event: ON, OFF, leak, latency
+    std::uint32_t draws = 0, shots = 0;  // number of draws for events, and of candidates of shot noise
+    TimeNs shot_at = kNoTime;            // next candidate of shot noise
+    std::optional<TimeNs> busy_until;    // end of the refractory period; kNoTime while it waits for the readout
+    double from = 0;                     // s after the previous frame: nothing is searched before
+    double set_at = 0;                   // when the reference was set, s after the previous frame
+    std::array<float, 4> normals{};      // n' of the last event: ON, OFF, leak, latency
   };
 
   // Signal.
@@ -346,8 +346,7 @@ std::size_t ReferenceEventCamera::Model::pixel_of(const Event& event) const {
 }
 
 /// (13) Between two frames: requests arrive, and the reader serves rows, in the order of time.
-void ReferenceEventCamera::Model::read_out(const std::vector<ReferenceSignal>& signals,
-                                           std::vector<Labelled>& events) {
+void ReferenceEventCamera::Model::read_out(const std::vector<ReferenceSignal>& signals, std::vector<Labelled>& events) {
   for (std::size_t i = 0; i < pixels_.size(); ++i) find_requests(i, signals[i]);
   while (true) {
     const TimeNs arrival = requests_.empty() ? kNoTime : requests_.begin()->t;

@@ -12,7 +12,7 @@ namespace esim::inline formats {
 template <typename Number>
 struct LabelColumn {
   const char* name;
-  Number EventLabel::* member;
+  Number EventLabel::*member;
 };
 
 inline constexpr std::array<LabelColumn<float>, 4> kLabelParts{{{"signal", &EventLabel::signal},

@@ -15,8 +15,8 @@ class SeenObjects {
  public:
   SeenObjects(int width, int height);
 
-  /// Adds the objects that tiles of a sample show at `t`, 0 for none. The samples of a pixel must come in order of time;
-  /// earlier ones are ignored. Nothing, if the image is empty.
+  /// Adds the objects that tiles of a sample show at `t`, 0 for none. The samples of a pixel must come in order of
+  /// time; earlier ones are ignored. Nothing, if the image is empty.
   void add(const Image<std::uint16_t>& object, TimeNs t, std::span<const Tile> tiles);
 
   /// The object that a pixel saw; before its first sample, that of the first, and after the last, that of the last.

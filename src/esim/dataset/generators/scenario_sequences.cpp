@@ -68,8 +68,8 @@ ScenarioSequences::ScenarioSequences(const std::filesystem::path& file, std::vec
                                 scenario.cameras.size()));
   }
   if (scenario.cameras[0].event_camera.labels)
-    throw UserError(fmt::format("{}: event_camera.labels: data sets have no labels of events; remove it",
-                                file_.string()));
+    throw UserError(
+        fmt::format("{}: event_camera.labels: data sets have no labels of events; remove it", file_.string()));
 }
 
 std::string ScenarioSequences::options() const {

@@ -256,8 +256,15 @@ CircuitPixel CircuitArray::pixel(std::size_t i) {
 /// Adds the label of the last event of a pixel.
 void CircuitArray::label(std::size_t i, TimeNs t, int polarity, std::vector<NewLabel>& labels) const {
   const CircuitOrigin& parts = origins_[i];
-  labels.push_back({t, t, static_cast<std::uint32_t>(i), parts.signal, parts.noise, parts.leak,
-                    static_cast<std::int8_t>(polarity), 0, {}});
+  labels.push_back({t,
+                    t,
+                    static_cast<std::uint32_t>(i),
+                    parts.signal,
+                    parts.noise,
+                    parts.leak,
+                    static_cast<std::int8_t>(polarity),
+                    0,
+                    {}});
 }
 
 /// Takes a pixel to the segment's end in as many steps as needed.

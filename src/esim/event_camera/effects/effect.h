@@ -27,13 +27,13 @@ struct PixelParameters {
 /// start.
 struct Round {
   const ActivePixels* active = nullptr;
-  double duration = 0;          ///< of the segment
-  double max_delay = 0;         ///< that a time stamp may have
-  Comparators compare{};        ///< in find(): the crossings, which an earlier event may replace
-  PixelNormals normals{};       ///< four deviates for each event: ON and OFF threshold, leak, latency
-  PerPixel<double> passed{};    ///< the level that the event crossed: the new reference
-  PerPixel<double> restarts{};  ///< 1: the new reference is the current signal instead
-  PerPixel<double> stamp{};     ///< time stamp of the event
+  double duration = 0;           ///< of the segment
+  double max_delay = 0;          ///< that a time stamp may have
+  Comparators compare{};         ///< in find(): the crossings, which an earlier event may replace
+  PixelNormals normals{};        ///< four deviates for each event: ON and OFF threshold, leak, latency
+  PerPixel<double> passed{};     ///< the level that the event crossed: the new reference
+  PerPixel<double> restarts{};   ///< 1: the new reference is the current signal instead
+  PerPixel<double> stamp{};      ///< time stamp of the event
   PerPixel<std::uint8_t> own{};  ///< 1: the event is an effect's own, not a crossing; only valid with labels
 };
 

@@ -38,7 +38,7 @@ class PendingLabels {
   /// Appends the labels of events that leave the camera, in their order, and forgets them.
   void take(EventSpan events, std::vector<EventLabel>& labels);
 
-  /// The earliest crossing among the labels; the maximum time if there are none.
+  /// The earliest crossing among the labels; the maximum time without labels.
   TimeNs earliest() const;
 
   /// A label and whether its event has been read, for state_archive.h.
@@ -62,9 +62,7 @@ class PendingLabels {
     std::uint32_t first = kNone, last = kNone;
   };
 
-  std::uint32_t pixel_of(const Event& event) const {
-    return static_cast<std::uint32_t>(event.y) * width_ + event.x;
-  }
+  std::uint32_t pixel_of(const Event& event) const { return static_cast<std::uint32_t>(event.y) * width_ + event.x; }
   void insert(const NewLabel& label, bool was_read);
   /// The node before the event's (kNone: it is the first) and the event's. Throws InternalError if it does not exist.
   std::pair<std::uint32_t, std::uint32_t> find(const Event& event, bool was_read) const;

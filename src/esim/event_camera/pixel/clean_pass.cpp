@@ -157,8 +157,15 @@ void CleanPass::Block::label(const Lanes& lanes, const std::uint32_t* which, Tim
     if (lanes.polarity[i] == 0) continue;
     const TimeNs t = t0 + static_cast<TimeNs>(lanes.crossing[i]);
     const double signal = lanes.polarity[i] > 0 ? lanes.on[i] : -lanes.off[i];
-    labels.push_back({t, t, pixel[which != nullptr ? which[i] : i], static_cast<float>(signal), 0, 0,
-                      static_cast<std::int8_t>(lanes.polarity[i]), 0, {}});
+    labels.push_back({t,
+                      t,
+                      pixel[which != nullptr ? which[i] : i],
+                      static_cast<float>(signal),
+                      0,
+                      0,
+                      static_cast<std::int8_t>(lanes.polarity[i]),
+                      0,
+                      {}});
   }
 }
 

@@ -98,8 +98,8 @@ class PixelReadout {
   PixelArray* pixels_ = nullptr;
   EventQueue* found_ = nullptr;
   PendingLabels* labels_ = nullptr;  // null: none are wanted
-  EventSpan arrived_;     // events in `found` up to the watermark
-  std::size_t next_ = 0;  // index into arrived_
+  EventSpan arrived_;                // events in `found` up to the watermark
+  std::size_t next_ = 0;             // index into arrived_
   bool counted_ = false;
   std::vector<std::uint32_t> superseded_, to_draw_;  // pixels
 

@@ -67,8 +67,7 @@ class LabelColumns {
   explicit LabelColumns(const Input& file) {
     t_ideal_ = file.open_column(label_name("t_ideal").c_str());
     for (const auto& part : kLabelParts) parts_.push_back(file.open_items(label_name(part.name).c_str(), 0));
-    for (const auto& surface : kLabelSurfaces)
-      surfaces_.push_back(file.open_column(label_name(surface.name).c_str()));
+    for (const auto& surface : kLabelSurfaces) surfaces_.push_back(file.open_column(label_name(surface.name).c_str()));
     cause_ = file.open_column(label_name("cause").c_str());
     hot_ = file.open_column(label_name("hot").c_str());
   }

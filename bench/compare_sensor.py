@@ -2,11 +2,13 @@
 
     bench/compare_sensor.py build/release/esim noise IEBCS/data
     bench/compare_sensor.py build/release/esim clip davis240c_poster_rotation
+    bench/compare_sensor.py build/release/esim stamps recording.raw
 
 noise: noise_{pos,neg}_{0.1lux,161lux}.npy of https://github.com/neuromorphicsystems/IEBCS: how many intervals of each
 pixel lie below a rate, in 10 s of constant light. One set of parameters serves for both levels.
 clip: a rotation of the Event Camera Dataset: events.txt (t x y p), flow.npy (px) and one image 000000000.png with the
 camera's frame in its lower half. The frame moves with the flow; preset davis240c@2 makes the events.
+stamps: the time stamps of any recording, at a resolution of 1 us (docs/methods/presets.md).
 
 Needs numpy, SciPy and OpenCV.
 """
@@ -67,17 +69,17 @@ def compare_noise(esim, data):
                   f"of intervals {np.abs(cumulative - below[:71]).max():.3f}")
 
 
-def same_row(t, y, low, high):
-    """How often events `low` to `high` us later are of the same row, relative to chance."""
+def same_line(t, y, low, high, lines):
+    """How often events `low` to `high` us later are of the same row or column, relative to chance."""
     same = pairs = 0
-    for k in range(1, 200):
+    for k in range(1, 1500):
         gap = t[k:] - t[:-k]
         near = (gap >= low) & (gap <= high)
         if not near.any() and gap.min() > high:
             break
         same += np.sum(y[k:][near] == y[:-k][near])
         pairs += near.sum()
-    return same / max(1, pairs) * HEIGHT
+    return same / max(1, pairs) * lines
 
 
 def figures(t, x, y, p):
@@ -85,7 +87,7 @@ def figures(t, x, y, p):
     same = np.diff((y * WIDTH + x)[order]) == 0
     counts = np.bincount(t // 100)[:-1]
     return {
-        "events": len(t), "same row, same us": same_row(t, y, 0, 0), "same row, 1 to 5 us later": same_row(t, y, 1, 5),
+        "events": len(t), "same row, same us": same_line(t, y, 0, 0, HEIGHT), "same row, 1 to 5 us later": same_line(t, y, 1, 5, HEIGHT),
         "1 % interval (ms)": np.quantile(np.diff(t[order])[same], 0.01) / 1e3, "Fano factor (100 us)": counts.var() / counts.mean(),
         "ON": p.mean(), "next event of the same polarity": (p[order][1:] == p[order][:-1])[same].mean(),
     }
@@ -110,15 +112,30 @@ def compare_clip(esim, clip, before_s=0.03, step_s=2.5e-4):
         print(f"{name}: {value:.3g} real, {ours[name]:.3g} esim")
 
 
+def describe_stamps(esim, recording):
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([esim, "convert", recording, f"{folder}/events.npy", "-q"], check=True)
+        events = np.load(f"{folder}/events.npy")
+    t, x, y = events["t"].astype(np.int64), events["x"].astype(int), events["y"].astype(int)
+    order = np.lexsort((t, y * (x.max() + 1) + x))
+    pixel = (y * (x.max() + 1) + x)[order]
+    interval = np.diff(t[order])[np.diff(pixel) == 0]
+    print(f"{len(t)} events in {(t[-1] - t[0]) / 1e3:.3g} ms; 1 % interval {np.quantile(interval, 0.01):.3g} us; intervals below "
+          + ", ".join(f"{us} us: {(interval < us).mean():.3f}" for us in (100, 20, 10)))
+    for name, line in (("row", y), ("column", x)):
+        print(f"same {name}, over chance: " + ", ".join(
+            f"{low} to {high} us later {same_line(t, line, low, high, line.max() + 1):.3g}" for low, high in ((0, 0), (1, 5), (100, 105))))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("esim")
-    parser.add_argument("what", choices=["noise", "clip"])
+    parser.add_argument("what", choices=["noise", "clip", "stamps"])
     parser.add_argument("data", type=pathlib.Path)
     arguments = parser.parse_args()
-    if not arguments.data.is_dir():
+    if arguments.what != "stamps" and not arguments.data.is_dir():
         sys.exit(f"{arguments.data} is not a folder; see --help")
-    (compare_noise if arguments.what == "noise" else compare_clip)(arguments.esim, arguments.data)
+    {"noise": compare_noise, "clip": compare_clip, "stamps": describe_stamps}[arguments.what](arguments.esim, arguments.data)
 
 
 if __name__ == "__main__":

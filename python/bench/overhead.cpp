@@ -21,9 +21,7 @@ int main(int, char** arguments) {
     frames.push_back(frame);
   }
   const esim::Workers workers(1);
-  const bool is_ideal = std::string(arguments[1]) == "ideal";
-  esim::EventCamera camera(esim::preset_options(is_ideal ? esim::SensorPreset::ideal : esim::SensorPreset::davis346),
-                           kWidth, kHeight);
+  esim::EventCamera camera(esim::preset_options(arguments[1]), kWidth, kHeight);
   const auto began = std::chrono::steady_clock::now();
   std::size_t count = 0;
   for (int k = 0; k < kFrames; ++k) {

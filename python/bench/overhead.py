@@ -38,7 +38,7 @@ def in_cpp(preset, program):
 
 def main():
     images = frames()
-    for preset in ("ideal", "davis346"):
+    for preset in ("ideal", "davis346@1", "davis346@2"):
         here, there = [], []
         for _ in range(ROUNDS):
             seconds, count = in_python(preset, images)

@@ -1,5 +1,7 @@
 """The event sensor for given frames."""
 
+import warnings
+
 import numpy as np
 
 from . import _checks, _core
@@ -22,13 +24,14 @@ class EventCamera:
     width, height : int
         Size of the sensor, px.
     preset : str, optional
-        Sensor model that gives the default values: "ideal", "davis346", ... (`docs/pixel.md`).
+        Sensor that gives the default values: "ideal", "davis346", ... (`docs/pixel.md`); "davis346@1" is an older version.
     seed : int
         Seed of all random numbers.
     threads : int
         Number of threads; 0 uses every processor. The result does not depend on it.
     **options
-        Options of `event_camera` in a scenario: `contrast_threshold=0.2, readout={"row_time_us": 1}`.
+        Options of `event_camera` in a scenario: `contrast_threshold=0.2, readout={"row_time_us": 1}`. `filters` takes
+        the arguments of `esim.filters.FilterChain`: `filters={"trail": {"threshold_us": 5000}}`.
 
     Raises
     ------
@@ -46,6 +49,8 @@ class EventCamera:
             _checks.seed(seed),
             _checks.threads(threads),
         )
+        for text in self._core.warnings:
+            warnings.warn(text, stacklevel=2)
 
     def _make(self, size, overrides, seed, threads):
         self._made = size, overrides, seed, threads

@@ -114,7 +114,8 @@ def test_invalid_numbers(wrong):
 
 STATES = {
     "ideal": {},
-    "davis346": {"preset": "davis346", "latency_us": 2500.0, "latency_jitter_us": 900.0},
+    "davis346@1": {"preset": "davis346@1", "latency_us": 2500.0, "latency_jitter_us": 900.0},
+    "davis346@2": {"preset": "davis346"},
     "surround": {"surround_px": 2.0, "surround_ms": 3.0},
     "readout": {"contrast_threshold": 0.1, "readout": {"rate_mev_per_s": 0.7, "row_time_us": 5, "queue_events": 500}},
 }
@@ -161,8 +162,8 @@ def test_a_pickle_of_another_version_is_refused():
 
 
 def test_a_camera_prints_what_it_is():
-    assert repr(esim.EventCamera(4, 3, "davis346", seed=7, shot_noise_hz=1)) == (
-        "<esim.EventCamera 4 x 3 px, preset='davis346', shot_noise_hz=1, seed=7>"
+    assert repr(esim.EventCamera(4, 3, "davis346@1", seed=7, shot_noise_hz=1)) == (
+        "<esim.EventCamera 4 x 3 px, preset='davis346@1', shot_noise_hz=1, seed=7>"
     )
 
 
@@ -174,12 +175,30 @@ def test_options_have_the_schema_names():
     with pytest.raises(esim.Error, match="davis346"):
         esim.EventCamera(4, 3, "davis345")
     # A preset sets all options that are not given.
-    own = esim.EventCamera(40, 30, "davis346", shot_noise_hz=0, leak_rate_hz=0, hot_pixels=0, contrast_threshold=0.5)
+    own = esim.EventCamera(40, 30, "davis346@1", shot_noise_hz=0, leak_rate_hz=0, hot_pixels=0, contrast_threshold=0.5)
     assert own.dropped == 0
     limited = esim.EventCamera(40, 30, contrast_threshold=0.01, readout={"rate_mev_per_s": 0.001, "queue_events": 10})
     limited.process(np.full((30, 40), 0.1, np.float32), 0)
     limited.process(np.full((30, 40), 1, np.float32), 1e-6)
     assert limited.dropped > 0
+
+
+def test_presets_have_versions():
+    frames = np.random.default_rng(2).random((5, 30, 40), dtype=np.float32)
+
+    def events(preset):
+        camera = esim.EventCamera(40, 30, preset, seed=5)
+        return np.concatenate([camera.process(frame, 0.01 * k) for k, frame in enumerate(frames)])
+
+    newest = events("davis346")
+    assert len(newest) > 1000 and np.array_equal(newest, events("davis346@2"))
+    assert not np.array_equal(newest, events("davis346@1"))
+    with pytest.raises(esim.Error, match="davis346 has the versions 1 and 2"):
+        esim.EventCamera(4, 3, "davis346@3")
+    with pytest.raises(esim.Error, match="choose preset davis346@1"):
+        esim.EventCamera(4, 3, "davis346", shot_noise_hz=1)
+    with pytest.raises(esim.Error, match="circuit.white_lux"):
+        esim.EventCamera(4, 3, "davis346", circuit={"white_lux": -1})
 
 
 def test_linear_light_decodes_srgb():

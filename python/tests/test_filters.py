@@ -1,5 +1,7 @@
 """esim.filters against slow definitions of what OpenEB documents of each filter."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -179,3 +181,47 @@ def test_refused_events_leave_the_filters_unchanged():
     with pytest.raises(esim.Error, match="outside the sensor of 24 x 16 px"):
         chain.process(outside)
     np.testing.assert_array_equal(np.concatenate([first, chain.process(given[1000:])]), expected)
+
+
+SENSOR = {  # for the 40 x 30 px of `poster`
+    "region": {"windows": [{"x": 2, "y": 1, "width": 36, "height": 28}], "masked_pixels": [{"x": 20, "y": 15}]},
+    "activity": {"lower_start": 3e4, "lower_stop": 1e4},
+    "anti_flicker": {"high_hz": 5000, "start_threshold": 2, "stop_threshold": 1},
+    "trail": {"type": "stc_keep_trail", "threshold_us": 20_000},
+    "rate_controller": {"period_us": 1000, "events_per_period": 15},
+}
+
+
+@pytest.mark.parametrize("names", [*([name] for name in SENSOR), list(SENSOR)], ids=lambda names: "+".join(names))
+def test_filters_of_a_simulated_sensor(poster, names):
+    """The same events as filtering afterwards, whatever the length of the packets and the number of threads."""
+    unfiltered = np.concatenate([packet.events for packet in esim.simulate(poster)])
+    chain = esim.filters.FilterChain(40, 30, **{name: SENSOR[name] for name in names})
+    expected = chain.process(unfiltered)
+    assert 100 < len(expected) < len(unfiltered)
+    overrides = {f"event_camera.filters.{name}": SENSOR[name] for name in names}
+    for packet_s, threads in [(None, 1), (0.0123, 2), (1, 1), (0.0004, 2)]:
+        simulation = esim.simulate(poster, overrides=overrides, threads=threads, **({"packet_s": packet_s} if packet_s else {}))
+        out = np.concatenate([packet.events for packet in simulation])
+        np.testing.assert_array_equal(out, expected)
+    (camera,) = simulation.report["filtered"]
+    assert camera["events"] == len(unfiltered) and camera["kept"] == len(expected)
+    assert camera["dropped"] == chain.dropped
+
+
+def test_filters_of_a_sensor_for_given_frames():
+    frames = np.random.default_rng(1).random((9, HEIGHT, WIDTH), dtype=np.float32)
+    options = {"trail": {"threshold_us": 1500}, "rate_controller": {"period_us": 1000, "events_per_period": 300}}
+    plain = esim.EventCamera(WIDTH, HEIGHT, contrast_threshold=0.2)
+    camera = esim.EventCamera(WIDTH, HEIGHT, contrast_threshold=0.2, filters=options)
+    chain = esim.filters.FilterChain(WIDTH, HEIGHT, **options)
+    for k, frame in enumerate(frames):
+        np.testing.assert_array_equal(camera.process(frame, 1e-3 * k), chain.process(plain.process(frame, 1e-3 * k)))
+        camera = pickle.loads(pickle.dumps(camera))  # with the state of its filters
+    assert all(count > 0 for count in chain.dropped.values())
+    with pytest.raises(esim.Error, match=r"^event_camera\.filters\.region\.windows\.0: \(24, 0\) lies outside"):
+        esim.EventCamera(WIDTH, HEIGHT, filters={"region": {"windows": [{"x": 24}]}})
+    with pytest.raises(esim.Error, match=r"event_camera\.filters\.anti_flicker\.low_hz: must be below high_hz"):
+        esim.EventCamera(WIDTH, HEIGHT, filters={"anti_flicker": {"low_hz": 600}})
+    with pytest.warns(UserWarning, match="the dvs128 has no such filter"):
+        esim.EventCamera(WIDTH, HEIGHT, "dvs128", filters={"trail": {}})

@@ -61,6 +61,31 @@ class Recordings(Cli):
             text = (self.out / "cam0" / "events.txt").read_text()
             self.assertEqual(len(back.read_text().splitlines()), len(text.splitlines()))
 
+    def test_reports_name_the_version_of_the_preset(self):
+        for given, used in (("davis346", "davis346@2"), ("davis346@1", "davis346@1"), ("ideal", "ideal")):
+            result = self.simulate(*FAST, "--force", "--set", "duration_s=0.02", "--set", f"event_camera.preset={given}")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(json.loads((self.out / "report.json").read_text())["cameras"][0]["preset"], used)
+            self.assertIn(f"preset: {used}\n", (self.out / "scenario.yaml").read_text())
+
+    def test_thresholds_below_the_noise_are_reported_and_limited(self):
+        result = self.simulate(*FAST, "--set", "duration_s=0.05", "--set", "event_camera={contrast_threshold: 0.01, circuit: {max_rate_hz: 50}}",
+                               "--set", "light.white_lux=0.001")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stderr, r"warning: camera cam0: event_camera: the contrast threshold, 0.01, is below twice the noise .* "
+                                        r"expect up to \d+ noise events per second of each pixel")
+        self.assertRegex(result.stderr, r"warning: cam0: [\d,]+ events were lost, .*event_camera.circuit.max_rate_hz")
+        report = json.loads((self.out / "report.json").read_text())
+        camera = report["cameras"][0]
+        self.assertGreater(camera["events_lost_by_max_rate"], 0)
+        self.assertLess(camera["events"], (0.05 * 50 + 1) * camera["width"] * camera["height"])
+        self.assertTrue(any("is below twice the noise" in notice for notice in report["notices"]), report["notices"])
+
+    def test_light_is_named_if_nothing_uses_it(self):
+        result = self.simulate(*FAST, "--set", "duration_s=0.02", "--set", "light.white_lux=10")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("warning: light.white_lux: has no effect", result.stderr)
+
     def test_a_saturated_readout_is_reported(self):
         result = self.simulate(*FAST, "--set", "event_camera.contrast_threshold=0.1",
                                "--set", "event_camera.readout.rate_mev_per_s=0.05", "--set", "output.formats=[text]")

@@ -17,7 +17,7 @@ from program import ESIM, ProgramTest, run
 
 PROJECT = pathlib.Path(sys.argv[2]).absolute()
 SMALL = "--set duration_s=0.1 --set camera.width=64 --set camera.height=48"
-MIGRATING = ["docs/migrating.md", "docs/migrating-rpg-esim.md", "docs/migrating-video.md"]
+MIGRATING = ["docs/migrating.md", "docs/migrating-rpg-esim.md", "docs/migrating-video.md"]  # pages with tables of options
 WIDTH, HEIGHT, FRAMES, FPS = 64, 48, 31, 30
 
 
@@ -29,6 +29,13 @@ def blocks(page):
 def file_of(block):
     name = re.match(r"# ([\w-]+\.(?:yaml|txt))\b", block)
     return name and name[1]
+
+
+def anchors(page):
+    """The anchors of its headings, as GitHub names them."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading)).strip().lower().replace(" ", "-") for heading in headings}
 
 
 def option_in(token):
@@ -75,8 +82,11 @@ class Pages(ProgramTest):
             self.assertTrue((self.folder / path).exists(), f"docs/getting-started.md names {path}, which no command makes")
 
     def test_migrating(self):
-        for page in MIGRATING:
+        for page in ("docs/migrating.md", "docs/migrating-rpg-esim-examples.md", "docs/migrating-video.md"):
             self.run_page(page)
+
+    def test_motion(self):
+        self.run_page("docs/motion.md")
 
     def test_waypoints(self):
         self.run_page("docs/waypoints.md")
@@ -114,9 +124,12 @@ class Options(unittest.TestCase):
 class Links(unittest.TestCase):
     def test_every_link_leads_somewhere(self):
         for page in [*PROJECT.glob("*.md"), *(PROJECT / "docs").rglob("*.md")]:
-            for target in re.findall(r"\]\(([^)#\s]+)(?:#[\w-]*)?\)", page.read_text()):
+            for target, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([\w-]*))?\)", page.read_text()):
                 if "://" not in target:
-                    self.assertTrue((page.parent / target).exists(), f"{page.relative_to(PROJECT)} links to {target}")
+                    path = page.parent / target if target else page
+                    self.assertTrue(path.exists(), f"{page.relative_to(PROJECT)} links to {target}")
+                    if anchor:
+                        self.assertIn(anchor, anchors(path), f"{page.relative_to(PROJECT)} links to {target}#{anchor}")
 
     def test_the_readme_lists_every_page(self):
         listed = set(re.findall(r"\]\((docs/[\w/-]+\.md)\)", (PROJECT / "README.md").read_text()))

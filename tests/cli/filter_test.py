@@ -159,6 +159,91 @@ class Filter(ProgramTest):
         for name in names(plain) - {pathlib.Path("report.json"), pathlib.Path("cam0/events.h5")}:
             self.assertEqual((self.out / name).read_bytes(), (plain / name).read_bytes(), name)
 
+    def test_a_scenario_with_filters_gives_the_same_events(self):
+        """Filters in the sensor against `esim filter` on the recording without them."""
+        filters = {
+            "region": ("{windows: [{x: 8, y: 4, width: 50, height: 40}], masked_pixels: [{x: 20, y: 20}]}",
+                       ["--roi", "8,4,50,40", "--mask-pixel", "20,20"]),
+            "activity": ("{window_us: 5000, lower_start: 2e4, lower_stop: 1e4}",
+                         ["--activity-window-us", "5000", "--activity-lower-start", "2e4",
+                          "--activity-lower-stop", "1e4"]),
+            "anti_flicker": ("{high_hz: 5000, start_threshold: 2, stop_threshold: 1}",
+                             ["--anti-flicker-high-hz", "5000", "--anti-flicker-start-threshold", "2",
+                              "--anti-flicker-stop-threshold", "1"]),
+            "trail": ("{threshold_us: 20000}", ["--trail-threshold-us", "20000"]),
+            "rate_controller": ("{period_us: 5000, events_per_period: 50}",
+                                ["--rate-controller-period-us", "5000", "--rate-controller-events-per-period", "50"]),
+        }
+
+        def simulate(out, *changes):
+            result = run("simulate", SCENES / "poster.yaml", "--out", out, "--force", *(word for change in (
+                "duration_s=0.1", "camera.width=64", "camera.height=48", "output.time_unit=ns", "output.preview=false",
+                "event_camera.contrast_threshold=0.15", "event_camera.leak_rate_hz=5", *changes)
+                for word in ("--set", change)))
+            self.assertEqual(result.returncode, 0, result.stderr)
+            return result
+
+        def text(recording):
+            out = self.folder / "events_of.txt"
+            self.assertEqual(run("convert", recording, out, "--force", "--time-unit", "ns").returncode, 0)
+            return out.read_bytes()
+
+        plain, inside, after = (self.folder / name for name in ("plain", "inside", "after"))
+        simulate(plain)
+        total = text(plain).count(b"\n")
+        for names in [[name] for name in filters] + [list(filters)]:
+            result = simulate(inside, *(f"event_camera.filters.{name}={filters[name][0]}" for name in names))
+            self.filter("-o", after, "--force", "--time-unit", "ns", *sum((filters[name][1] for name in names), []),
+                        source=plain)
+            self.assertEqual(text(inside), text(after), names)
+            reports = [json.loads((out / "report.json").read_text()) for out in (inside, after)]
+            self.assertEqual(reports[0]["filtered"], reports[1]["filtered"])
+            (camera,) = reports[0]["filtered"]
+            self.assertEqual(camera["events"], total)
+            self.assertEqual(list(camera["dropped"]), names)
+            self.assertGreater(min(camera["dropped"].values()), 0, camera)
+            self.assertGreater(camera["kept"], 50)
+            self.assertRegex(result.stderr, rf"(?m)^  {names[-1]} +[\d,]+ dropped +[\d.]+ %$")
+        for change in ("truth.rate_hz=1234", "truth.rate_hz=0"):  # other divisions of the stream of events
+            simulate(after, change, *(f"event_camera.filters.{name}={filters[name][0]}" for name in names))
+            self.assertEqual(text(inside), text(after), change)
+
+    def test_filters_of_the_sensor_in_messages(self):
+        made = self.folder / "made"
+        def simulate(*changes, out=made):
+            return run("simulate", SCENES / "poster.yaml", "--out", out, "--force", "--set", "duration_s=0.02",
+                       "--set", "output.preview=false", *(word for change in changes for word in ("--set", change)))
+        result = simulate("event_camera.preset=davis346", "event_camera.filters.anti_flicker={}")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("warning: camera cam0: event_camera.filters.anti_flicker: the davis346 has no such filter, but "
+                      "these have: gen4.1, imx636, genx320; it is applied anyway\n", result.stderr)
+        self.assertIn("anti_flicker", json.loads((made / "report.json").read_text())["notices"][0])
+        result = simulate("event_camera.preset=imx636", "event_camera.filters.anti_flicker={}")
+        self.assertNotIn("no such filter", result.stderr)
+        for change, says in {
+            "anti_flicker={low_hz: 300, high_hz: 200}": ["anti_flicker.low_hz", "must be below high_hz, 200 Hz"],
+            "activity={}": ["activity: has no bound"],
+            "region={windows: [{x: 4000, y: 0}]}": ["region.windows.0", "(4000, 0) lies outside the sensor"],
+            "region={masked_pixels: [{x: 0, y: 4000}]}": ["region.masked_pixels.0", "lies outside the sensor"],
+            "trail={threshold_us: 0}": ["trail.threshold_us", "must be"],
+            "tail={}": ["tail", "trail"],
+        }.items():
+            refused = simulate(f"event_camera.filters.{change}", out=self.out)
+            self.assert_refused(refused, "event_camera.filters.", *says)
+        video = self.folder / "frames"
+        video.mkdir()
+        for k in range(3):
+            (video / f"{k}.pgm").write_bytes(b"P5 32 24 255\n" + bytes((x * 5 + k * 40) % 256 for x in range(32 * 24)))
+        def convert(*changes, out=made):
+            return run("video", video, "--fps", "100", "--out", out, "--force",
+                       *(word for change in changes for word in ("--set", change)))
+        self.assert_refused(convert("filters.region.windows=[{x: 32, y: 0}]", out=self.out),
+                            "event_camera.filters.region.windows.0: (32, 0) lies outside the sensor of 32 x 24 px")
+        result = convert("preset=dvs128", "filters.trail={}")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("event_camera.filters.trail: the dvs128 has no such filter", result.stderr)
+        self.assertGreater(json.loads((made / "report.json").read_text())["filtered"][0]["events"], 0)
+
     def test_one_camera_of_several(self):
         rig = self.folder / "rig"
         for camera in ("left", "right"):

@@ -82,6 +82,13 @@ class Answers(StudioTest):
         members = {member["name"]: member for member in self.ask("GET", "/api/schema")["members"]}
         threshold = next(m for m in members["event_camera"]["members"] if m["name"] == "contrast_threshold")
         self.assertEqual((threshold["kind"], threshold["default"], threshold["low"]), ("number", 0.5, 0.01))
+        filters = next(m for m in members["event_camera"]["members"] if m["name"] == "filters")
+        self.assertNotIn("optional", filters)
+        self.assertEqual({m["name"]: (m["kind"], m.get("optional")) for m in filters["members"]},
+                         dict.fromkeys(["region", "activity", "anti_flicker", "trail", "rate_controller"], ("group", True)))
+        region = {member["name"]: member for member in filters["members"][0]["members"]}
+        self.assertEqual(region["windows"]["kind"], "list")
+        self.assertEqual([m["name"] for m in region["windows"]["element"]["members"]], ["x", "y", "width", "height"])
         names = [option["name"] for option in members["trajectory"]["options"]]
         self.assertEqual(names, ["file", "random", "static", "scene", "waypoints"])
         reference = run("options").stdout
@@ -95,7 +102,10 @@ class Answers(StudioTest):
         for member in members.values():
             check(member)
         presets = {preset["name"]: preset for preset in self.ask("GET", "/api/presets")}
-        self.assertEqual(presets["davis346"]["values"]["contrast_threshold"], 0.2)
+        self.assertEqual(presets["davis346@1"]["values"]["contrast_threshold"], 0.2)
+        self.assertNotIn("circuit", presets["davis346@1"]["values"])
+        self.assertEqual(presets["davis346"]["values"], presets["davis346@2"]["values"])
+        self.assertEqual(presets["davis346"]["values"]["circuit"]["photocurrent_fa_per_lux"], 33)
 
     def test_problems_are_reported_together_and_name_their_options(self):
         yaml = self.yaml.replace("width: 64", "width: -3").replace("contrast_threshold: 0.2", "contrast_treshold: 0.2") + "sed: 1\n"
@@ -106,6 +116,12 @@ class Answers(StudioTest):
             self.assertIn(problem["where"].split(".")[-1], yaml.splitlines()[problem["line"] - 1])
         self.assertIn("did you mean contrast_threshold?", problems["event_camera.contrast_treshold"])
         self.assertEqual(self.ask("POST", "/api/scenario/check", self.scenario())["problems"], [])
+        yaml = self.yaml.replace("contrast_threshold: 0.2", "contrast_threshold: 0.2, filters: {activity: {}, anti_flicker: {low_hz: 900}}")
+        found = self.ask("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]
+        self.assertEqual([problem["where"] for problem in found],
+                         ["event_camera.filters.activity", "event_camera.filters.anti_flicker.low_hz"])
+        for problem in found:
+            self.assertIn("filters", yaml.splitlines()[problem["line"] - 1])
         broken = self.ask("POST", "/api/scenario/check", {"yaml": "a: [", "dir": "work"})
         self.assertIn("not valid YAML", broken["problems"][0]["what"])
         self.assertEqual([problem["line"] for problem in broken["problems"]], [1])

@@ -26,6 +26,11 @@ class CameraState : public testing::TestWithParam<EventCameraOptions> {
     }
     return events;
   }
+  static std::vector<std::uint64_t> dropped_by_filters(const EventCamera& camera) {
+    std::vector<std::uint64_t> dropped;
+    for (const FilterChain::Dropped& filter : camera.statistics().filtered) dropped.push_back(filter.events);
+    return dropped;
+  }
   EventCamera made() const { return EventCamera(GetParam(), kWidth, kHeight, 5, 2); }
 };
 
@@ -41,6 +46,8 @@ TEST_P(CameraState, ARestoredCameraGoesOnWhereTheOtherWas) {
     const std::vector<Event> expected = process(camera, frames, 6);
     EXPECT_GT(expected.size(), 500U);
     EXPECT_EQ(process(restored, frames, 6), expected);
+    EXPECT_EQ(dropped_by_filters(restored), dropped_by_filters(camera));
+    EXPECT_EQ(restored.statistics().read_out, camera.statistics().read_out);
     EXPECT_EQ(restored.statistics().dropped, camera.statistics().dropped);
     EXPECT_EQ(restored.statistics().in_flight, camera.statistics().in_flight);
   }
@@ -69,29 +76,36 @@ TEST_P(CameraState, OtherLengthsAreRefused) {
 
 INSTANTIATE_TEST_SUITE_P(
     Options, CameraState,
-    testing::Values(EventCameraOptions{.contrast_threshold = 0.2},
-                    EventCameraOptions{
-                        .contrast_threshold = 0.2, .threshold_mismatch = 0.03, .refractory_period_us = 700},
-                    EventCameraOptions{.contrast_threshold = 0.2, .low_pass_hz = 300, .low_pass_order = 2},
-                    EventCameraOptions{.contrast_threshold = 0.2, .response = PixelResponse::lin_log},
-                    EventCameraOptions{.contrast_threshold = 0.2, .surround_px = 2, .surround_ms = 3},
-                    // Latencies of several frames, so that events are still in the queue.
-                    EventCameraOptions{.contrast_threshold = 0.3,
-                                       .threshold_mismatch = 0.05,
-                                       .threshold_noise = 0.02,
-                                       .refractory_period_us = 50,
-                                       .leak_rate_hz = 20,
-                                       .leak_mismatch_decades = 0.1,
-                                       .leak_jitter = 0.1,
-                                       .shot_noise_hz = 50,
-                                       .hot_pixels = 0.02,
-                                       .dead_pixels = 0.02,
-                                       .latency_us = 2500,
-                                       .latency_jitter_us = 900,
-                                       .latency_light_share = 0.7},
-                    // A queue that overflows, with waiting rows of several events each.
-                    EventCameraOptions{.contrast_threshold = 0.2,
-                                       .readout = {.rate_mev_per_s = 0.7, .row_time_us = 5, .queue_events = 500}}));
+    testing::Values(
+        EventCameraOptions{.contrast_threshold = 0.2},
+        EventCameraOptions{.contrast_threshold = 0.2, .threshold_mismatch = 0.03, .refractory_period_us = 700},
+        EventCameraOptions{.contrast_threshold = 0.2, .low_pass_hz = 300, .low_pass_order = 2},
+        EventCameraOptions{.contrast_threshold = 0.2, .response = PixelResponse::lin_log},
+        EventCameraOptions{.contrast_threshold = 0.2, .surround_px = 2, .surround_ms = 3},
+        // Latencies of several frames, so that events are still in the queue.
+        EventCameraOptions{.contrast_threshold = 0.3,
+                           .threshold_mismatch = 0.05,
+                           .threshold_noise = 0.02,
+                           .refractory_period_us = 50,
+                           .leak_rate_hz = 20,
+                           .leak_mismatch_decades = 0.1,
+                           .leak_jitter = 0.1,
+                           .shot_noise_hz = 50,
+                           .hot_pixels = 0.02,
+                           .dead_pixels = 0.02,
+                           .latency_us = 2500,
+                           .latency_jitter_us = 900,
+                           .latency_light_share = 0.7},
+        EventCameraOptions{.contrast_threshold = 0.2,
+                           .latency_us = 2500,
+                           .filters = {.region = RegionFilterOptions{true, {{3, 3, 4, 4}}, {{20, 5}}},
+                                       .activity = ActivityFilterOptions{2000, 1e5, 5e4, 0, 0},
+                                       .anti_flicker = AntiFlickerOptions{FlickerMode::band_stop, 200, 5000, 2, 1},
+                                       .trail = TrailFilterOptions{TrailType::trail, 500},
+                                       .rate_controller = RateControllerOptions{2000, 900}}},
+        // A queue that overflows, with waiting rows of several events each.
+        EventCameraOptions{.contrast_threshold = 0.2,
+                           .readout = {.rate_mev_per_s = 0.7, .row_time_us = 5, .queue_events = 500}}));
 
 }  // namespace
 }  // namespace esim

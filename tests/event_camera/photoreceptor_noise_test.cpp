@@ -43,10 +43,10 @@ std::vector<TimedEvent> run(const PhotoreceptorNoise& noise, const Pixel& pixel,
   double start = 0, reference = pixel.offset, held_until = -1;
   const auto level_at = [&](double t) {
     const double signal = pixel.leak_per_ns * t, s = noise.deviation(0);
-    return PhotoreceptorNoise::level_for(
-        std::min(reference + pixel.theta_on - signal, signal - reference + pixel.theta_off) / s);
+    return noise.level_for(0, std::min(reference + pixel.theta_on - signal, signal - reference + pixel.theta_off) / s);
   };
-  auto interval = noise.first(index, 0, level_at(0));
+  PhotoreceptorNoise::StepDraws draws;
+  auto interval = noise.first(index, 0, level_at(0), draws);
   reference += pixel.hold_ns > 0 ? interval.from.x : 0;
   for (std::int64_t window = 0; static_cast<double>(window) * window_ns < duration_ns; ++window) {
     const double until = std::min(static_cast<double>(window + 1) * window_ns, duration_ns);
@@ -54,7 +54,7 @@ std::vector<TimedEvent> run(const PhotoreceptorNoise& noise, const Pixel& pixel,
     while (now < until) {
       if (now >= start + interval.length) {
         start += interval.length;
-        interval = noise.next(interval.to, index, interval.node + 1, 0, level_at(start));
+        interval = noise.next(interval.to, index, interval.node + 1, 0, level_at(start), draws);
         continue;
       }
       const double stop = std::min(until, start + interval.length);
@@ -123,7 +123,8 @@ TEST(PhotoreceptorNoise, HasTheVarianceAndTheMemoryOfTheCircuit) {
     double xx = 0, yy = 0, xy = 0, lagged = 0;
     constexpr int kPixels = 40'000;
     for (std::uint32_t i = 0; i < kPixels; ++i) {
-      const auto interval = noise.first(i, 0, static_cast<std::int32_t>(i % PhotoreceptorNoise::kLevels));
+      PhotoreceptorNoise::StepDraws draws;
+      const auto interval = noise.first(i, 0, static_cast<std::int32_t>(i % PhotoreceptorNoise::kSteps), draws);
       const double tau = (0.05 + 0.9 * (i % 97) / 97.0) * (interval.length - lag);
       const NoiseState a = noise.at(interval, tau), b = noise.at(interval, tau + lag);
       xx += a.x * a.x, yy += a.y * a.y, xy += a.x * a.y, lagged += a.x * b.x;
@@ -133,6 +134,34 @@ TEST(PhotoreceptorNoise, HasTheVarianceAndTheMemoryOfTheCircuit) {
     const double tolerance = 4 * std::sqrt(2.0 / kPixels);
     EXPECT_NEAR(yy / kPixels, 1.0, tolerance) << t1_ms;
     EXPECT_NEAR(xx / kPixels, s2, tolerance * s2) << t1_ms;
+    EXPECT_NEAR(xy / kPixels, s2, tolerance) << t1_ms;
+    EXPECT_NEAR(lagged / kPixels, expected, tolerance * s2) << t1_ms;
+  }
+}
+
+TEST(PhotoreceptorNoise, StepsKeepTheVarianceAndTheMemoryOfTheCircuit) {
+  for (const auto& [t1_ms, t2_ms] : {std::pair{5.0, 1.5}, {100.0, 1.5}, {0.15, 1.5}, {1.5, 1.5}}) {
+    const PhotoreceptorNoise noise = make_noise(t1_ms, t2_ms);
+    const double t1 = noise.t1_ns(0), t2 = noise.t2_ns(), s2 = t1 / (t1 + t2);
+    const double h = noise.length(0, PhotoreceptorNoise::kSteps);
+    double xx = 0, yy = 0, xy = 0, lagged = 0, within = 0;
+    constexpr int kPixels = 40'000;
+    for (std::uint32_t i = 0; i < kPixels; ++i) {
+      PhotoreceptorNoise::StepDraws draws;
+      auto interval = noise.first(i, 0, PhotoreceptorNoise::kSteps, draws);
+      const double before = interval.from.x;
+      for (std::uint32_t node = 1; node < 12; ++node)
+        interval = noise.next(interval.to, i, node, 0, PhotoreceptorNoise::kSteps, draws);
+      const NoiseState& a = interval.to;
+      xx += a.x * a.x, yy += a.y * a.y, xy += a.x * a.y, lagged += before * a.x;
+      const NoiseState middle = noise.at(interval, (0.05 + 0.9 * (i % 97) / 97.0) * h);
+      within += middle.x * middle.x;
+    }
+    const double lag = 12 * h, tolerance = 4 * std::sqrt(2.0 / kPixels);
+    const double expected = s2 * (t1 * std::exp(-lag / t1) - t2 * std::exp(-lag / t2)) / (t1 - t2);
+    EXPECT_NEAR(yy / kPixels, 1.0, tolerance) << t1_ms;
+    EXPECT_NEAR(xx / kPixels, s2, tolerance * s2) << t1_ms;
+    EXPECT_NEAR(within / kPixels, s2, tolerance * s2) << t1_ms;
     EXPECT_NEAR(xy / kPixels, s2, tolerance) << t1_ms;
     EXPECT_NEAR(lagged / kPixels, expected, tolerance * s2) << t1_ms;
   }

@@ -10,6 +10,7 @@
 #include "esim/core/error.h"
 #include "esim/filters/activity_filter.h"
 #include "esim/filters/anti_flicker_filter.h"
+#include "esim/filters/chip_blocks.h"
 #include "esim/filters/filter_chain.h"
 #include "esim/filters/rate_controller.h"
 #include "esim/filters/trail_filter.h"
@@ -352,6 +353,25 @@ TEST(FilterChain, RefusesOptionsWithoutEffect) {
   EXPECT_TRUE(contains(problem(options), "region.windows.1: (24, 3) lies outside the sensor of 24 x 16 px"));
   options.region = RegionFilterOptions{false, {}, {{3, kHeight}}};
   EXPECT_TRUE(contains(problem(options), "region.masked_pixels.0: (3, 16) lies outside"));
+}
+
+TEST(ChipBlocks, NamesTheSensorsThatHaveAFilter) {
+  using Lines = std::vector<std::string>;
+  EXPECT_EQ(missing_blocks(everything(), "genx320"), Lines{});
+  EXPECT_EQ(missing_blocks(everything(), "ideal"), Lines{}) << "no real sensor";
+  EXPECT_EQ(missing_blocks(everything(), "v2e-noisy"), Lines{});
+  EXPECT_EQ(missing_blocks({}, "dvs128"), Lines{});
+  EXPECT_EQ(missing_blocks(everything(), "dvs128").size(), 5U);
+  EXPECT_EQ(missing_blocks(everything(), "imx636"),
+            Lines{"activity: the imx636 has no such filter, but these have: dvxplorer, gen3.1-vga, genx320; it is "
+                  "applied anyway"});
+  EXPECT_EQ(missing_blocks(everything(), "imx636@2"), missing_blocks(everything(), "imx636"));
+  const Lines davis = missing_blocks(everything(), "davis346");
+  ASSERT_EQ(davis.size(), 4U);
+  EXPECT_TRUE(contains(davis[1], "anti_flicker: the davis346 has no such filter, but these have: gen4.1, imx636"));
+  FilterOptions trail;
+  trail.trail.emplace();
+  EXPECT_EQ(missing_blocks(trail, "gen3.1-vga").size(), 1U);
 }
 
 TEST(FilterChain, RefusedEventsChangeNothing) {

@@ -109,6 +109,53 @@ cameras:
   EXPECT_TRUE(contains(error(std::string(kMinimal) + "event_camera: [1]\n"), "camera.event_camera: must be a map"));
 }
 
+TEST_F(ScenarioFile, ReadsTheFiltersOfTheSensor) {
+  const std::string yaml = std::string(kMinimal) + R"(
+event_camera: {preset: imx636, filters: {trail: {}, region: {windows: [{x: 3, y: 4, width: 5, height: 6}]}}}
+cameras:
+  - {width: 100, height: 80}
+  - {event_camera: {filters: {anti_flicker: {low_hz: 90}, rate_controller: {}}}}
+)";
+  const Scenario scenario = read(yaml);
+  const FilterOptions &first = scenario.cameras[0].event_camera.filters,
+                      &second = scenario.cameras[1].event_camera.filters;
+  ASSERT_TRUE(first.trail && first.region && !first.activity && !first.anti_flicker && !first.rate_controller);
+  EXPECT_EQ(first.region->windows.at(0).width, 5);
+  EXPECT_EQ(first.trail->threshold_us, TrailFilterOptions{}.threshold_us);
+  ASSERT_TRUE(second.anti_flicker && second.rate_controller && !second.trail) << "a camera's own filters";
+  EXPECT_EQ(second.anti_flicker->low_hz, 90);
+  EXPECT_EQ(scenario.cameras[1].event_camera.preset, SensorPreset::find("imx636"));
+  EXPECT_EQ(write_scenario(read(write_scenario(scenario))), write_scenario(scenario));
+  EXPECT_FALSE(read(kMinimal).cameras[0].event_camera.filters.any());
+  EXPECT_TRUE(read(kMinimal, {"event_camera.filters.trail={}"}).cameras[0].event_camera.filters.trail);
+  EXPECT_FALSE(read(yaml, {"event_camera.filters.trail=null"}).cameras[0].event_camera.filters.trail);
+}
+
+TEST_F(ScenarioFile, RefusesFiltersThatContradictThemselves) {
+  const auto with = [&](const std::string& filters, const std::string& camera = "{width: 64, height: 48}") {
+    return error(std::string(kMinimal) + "camera: " + camera + "\nevent_camera:\n  filters:\n    " + filters + "\n");
+  };
+  EXPECT_EQ(with("anti_flicker: {low_hz: 300, high_hz: 200}"),
+            file().string() +
+                ":8: camera.event_camera.filters.anti_flicker.low_hz: must be below high_hz, 200 Hz; it "
+                "is 300 Hz");
+  EXPECT_TRUE(contains(with("anti_flicker: {high_hz: 20}"),  // the key of the message is not in the file
+                       ":8: camera.event_camera.filters.anti_flicker.low_hz: must be below high_hz, 20 Hz"));
+  EXPECT_TRUE(contains(with("activity: {}"), "event_camera.filters.activity: has no bound"));
+  EXPECT_TRUE(contains(with("activity: {lower_start: 5, lower_stop: 6}"), "event_camera.filters.activity.lower_stop"));
+  EXPECT_TRUE(contains(with("region: {windows: [{x: 1, y: 1}, {x: 64, y: 2}]}"),
+                       "event_camera.filters.region.windows.1: (64, 2) lies outside the sensor of 64 x 48 px"));
+  EXPECT_TRUE(
+      contains(with("region: {masked_pixels: [{x: 3, y: 48}]}"), "filters.region.masked_pixels.0: (3, 48) lies"));
+  EXPECT_TRUE(contains(with("trail: {threshold_us: 0}"), "event_camera.filters.trail.threshold_us: 0 is out of range"));
+  EXPECT_TRUE(contains(with("trails: {}"), "trail"));
+  EXPECT_TRUE(contains(with("trail: 5"), "event_camera.filters.trail: must be a map"));
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "cameras: [{}, {event_camera: {filters: {activity: {}}}}]\n"),
+                       "cameras.1.event_camera.filters.activity: has no bound"));
+  EXPECT_TRUE(contains(error(kMinimal, {"camera.event_camera.filters.region.masked_pixels=[{x: 400, y: 3}]"}),
+                       "--set camera.event_camera.filters.region.masked_pixels.0: (400, 3) lies outside"));
+}
+
 TEST_F(ScenarioFile, IsTheSameAfterWritingAndReading) {
   const Scenario scenario = read(std::string(kMinimal) + R"(
 seed: 18446744073709551615
@@ -442,12 +489,12 @@ TEST(Suggest, FindsTheNearestWord) {
 }
 
 TEST_F(ScenarioFile, APresetStandsForWhatIsNotGiven) {
-  const EventCameraOptions davis = preset_options(SensorPreset::davis346);
+  const EventCameraOptions davis = preset_options("davis346@1");
   const EventCameraOptions given =
-      read(std::string(kMinimal) + "event_camera: {contrast_threshold: 0.25, preset: davis346}\n")
+      read(std::string(kMinimal) + "event_camera: {contrast_threshold: 0.25, preset: davis346@1}\n")
           .cameras[0]
           .event_camera;
-  EXPECT_EQ(given.preset, SensorPreset::davis346);
+  EXPECT_EQ(given.preset.name(), "davis346@1");
   EXPECT_EQ(given.threshold_on(), 0.25);
   EXPECT_EQ(given.threshold_off(), 0.25);
   EXPECT_EQ(given.low_pass_hz, davis.low_pass_hz);
@@ -456,15 +503,76 @@ TEST_F(ScenarioFile, APresetStandsForWhatIsNotGiven) {
 
   const EventCameraOptions set =
       read(kMinimal, {"event_camera.preset=gen3.1-vga", "event_camera.readout.queue_events=7"}).cameras[0].event_camera;
-  EXPECT_EQ(set.preset, SensorPreset::gen31_vga);
+  EXPECT_EQ(set.preset.name(), "gen3.1-vga@2");
   EXPECT_EQ(set.readout.queue_events, 7);
   EXPECT_TRUE(contains(error(std::string(kMinimal) + "event_camera: {preset: davis364}\n"), "davis346"));
 }
 
 TEST_F(ScenarioFile, PresetsAreWithinTheRangesOfTheirOptions) {
-  for (const char* name : kEnumNames<SensorPreset>) {
-    const Scenario scenario = read(kMinimal, {std::string("event_camera.preset=") + name});
+  EXPECT_EQ(SensorPreset::names().size(), 3 + 6 * 3 + 2U);
+  for (const std::string& name : SensorPreset::names()) {
+    const Scenario scenario = read(kMinimal, {"event_camera.preset=" + name});
     EXPECT_EQ(write_scenario(read(write_scenario(scenario))), write_scenario(scenario)) << name;
+    EXPECT_NO_THROW(check(scenario.cameras[0].event_camera)) << name;
+  }
+}
+
+TEST_F(ScenarioFile, APresetHasVersions) {
+  const auto preset = [&](const std::string& name) {
+    return read(kMinimal, {"event_camera.preset=" + name}).cameras[0].event_camera;
+  };
+  for (const char* sensor : {"dvs128", "davis240c", "davis346", "dvxplorer", "gen3.1-vga", "imx636"}) {
+    const std::string name = sensor;
+    EXPECT_EQ(preset(name).preset.name(), name + "@2");
+    EXPECT_TRUE(preset(name + "@2").circuit) << name;
+    EXPECT_EQ(preset(name + "@1").preset.name(), name + "@1");
+    EXPECT_FALSE(preset(name + "@1").circuit) << name;
+    EXPECT_GT(preset(name + "@1").shot_noise_hz, 0) << name;
+  }
+  EXPECT_EQ(preset("genx320").preset.name(), "genx320@2");
+  for (const char* name : {"ideal", "v2e-clean", "v2e-noisy"}) EXPECT_EQ(preset(name).preset.name(), name);
+  EXPECT_TRUE(contains(write_scenario(read(kMinimal, {"event_camera.preset=davis346"})), "preset: davis346@2"));
+
+  const auto problem = [&](const std::string& name) { return error(kMinimal, {"event_camera.preset=" + name}); };
+  EXPECT_TRUE(contains(problem("davis346@3"),
+                       "event_camera.preset: 'davis346@3' does not exist; davis346 has the "
+                       "versions 1 and 2"));
+  EXPECT_TRUE(contains(problem("genx320@1"), "genx320 has the version 2"));
+  EXPECT_TRUE(contains(problem("ideal@1"), "ideal has no versions"));
+  EXPECT_TRUE(contains(problem("davis346@"), "davis346 has the versions 1 and 2"));
+  EXPECT_TRUE(contains(problem("davis364@2"), "did you mean davis346@2?"));
+  EXPECT_TRUE(contains(problem("gen3.1vga"), "did you mean gen3.1-vga?"));
+  EXPECT_TRUE(contains(problem("[1]"), "event_camera.preset"));
+  EXPECT_TRUE(contains(test::message_of<UserError>([] { preset_options("davis346@3"); }), "versions 1 and 2"));
+  EXPECT_TRUE(contains(test::message_of<UserError>([] { preset_options("davis"); }), "there is no 'davis'"));
+}
+
+TEST_F(ScenarioFile, TheLightAppliesToEveryEventCamera) {
+  const Scenario scenario = read(std::string(kMinimal) +
+                                 "light: {white_lux: 20}\nevent_camera: {preset: davis346}\ncameras:\n- {}\n"
+                                 "- event_camera: {circuit: {white_lux: 3}}\n- event_camera: {preset: davis346@1}\n");
+  const auto in_light = [&](std::size_t i) { return event_camera_of(scenario, scenario.cameras[i]); };
+  EXPECT_EQ(in_light(0).circuit->white_lux, 20);
+  EXPECT_EQ(in_light(1).circuit->white_lux, 3);
+  EXPECT_FALSE(in_light(2).circuit);
+  EXPECT_FALSE(scenario.cameras[0].event_camera.circuit->white_lux);
+  // The recorded scenario keeps the light in one place, so that it can still be changed there.
+  const Scenario again = read(write_scenario(scenario), {"light.white_lux=5"});
+  EXPECT_EQ(event_camera_of(again, again.cameras[0]).circuit->white_lux, 5);
+  const Scenario dark = read(kMinimal, {"event_camera.preset=davis346"});
+  EXPECT_DOUBLE_EQ(event_camera_of(dark, dark.cameras[0]).circuit->white_photocurrent_fa(), 33 * 1000 * 0.9 / 16);
+
+  for (const char* value : {"0", "-1", "1e10", ".nan", ".inf"}) {
+    EXPECT_TRUE(contains(error(kMinimal, {std::string("light.white_lux=") + value}), "light.white_lux: ")) << value;
+  }
+  for (const char* bad :
+       {"white_lux: -2", "white_lux: 0", "f_number: 0", "transmission: 0", "transmission: 1.5",
+        "photocurrent_fa_per_lux: 0", "dark_current_fa: 0", "photodiode_charge_e: 0", "source_follower_hz: 0",
+        "source_follower_hz: .inf", "noise: -1", "noise: .nan", "max_rate_hz: -1"}) {
+    const std::string key = std::string(bad).substr(0, std::string(bad).find(':'));
+    const std::string message = error(kMinimal, {"event_camera.circuit={" + std::string(bad) + "}"});
+    EXPECT_TRUE(contains(message, "event_camera.circuit." + key)) << message;
+    EXPECT_FALSE(contains(message, "\n")) << message;
   }
 }
 

@@ -6,7 +6,7 @@
 
 #include "esim/stats/interval_histogram.h"
 #include "esim/stats/rate_curve.h"
-#include "esim/stats/time_sample.h"
+#include "esim/stats/stream_sample.h"
 #include "stats/streams.h"
 
 namespace esim {
@@ -117,11 +117,11 @@ TEST(RateCurve, CountsWindows) {
 TEST(TimeSample, KeepsAllOfFewAndAnEvenPartOfMany) {
   TimeSample few, many;
   for (TimeNs t = 0; t < 1000; ++t) few.add(t);
-  EXPECT_EQ(few.times().size(), 1000u);
+  EXPECT_EQ(few.items().size(), 1000u);
 
   constexpr TimeNs kMany = 5'000'000;
   for (TimeNs t = 0; t < kMany; ++t) many.add(t);
-  const auto& times = many.times();
+  const auto& times = many.items();
   EXPECT_TRUE(std::is_sorted(times.begin(), times.end()));
   EXPECT_NEAR(static_cast<double>(times.size()), kMany / 8.0, 4000);
   for (const TimeNs period : {2, 3, 64, 1000}) {

@@ -139,9 +139,7 @@ void add_all_filters(CLI::App& command, FilterArguments& arguments) {
     if (anti_flicker->given()) options.anti_flicker = filters.anti_flicker;
     if (trail->given()) options.trail = filters.trail;
     if (rate_controller->given()) options.rate_controller = filters.rate_controller;
-    const bool any =
-        options.region || options.activity || options.anti_flicker || options.trail || options.rate_controller;
-    if (!any)
+    if (!options.any())
       throw UserError(
           "no filter is chosen; add --roi, --roni, --mask-pixel, --mask-file, --activity-lower-start, "
           "--anti-flicker, --trail or --rate-controller");

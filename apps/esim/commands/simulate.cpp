@@ -28,7 +28,7 @@ void print_summary(const Summary& summary, const std::filesystem::path& out, boo
   tell(stderr, "{}: {:.3f} s simulated in {:.1f} s ({:.2f}x real time), {} samples, {} events\n",
        summary.complete ? "done" : "interrupted", simulated_s, summary.wall_seconds, simulated_s / summary.wall_seconds,
        samples, events);
-  tell(stderr, "recording: {}\n", out.string());
+  tell(stderr, "{}recording: {}\n", describe(filtered_cameras(summary)), out.string());
   for (const CameraSummary& camera : summary.cameras) {
     if (previews) tell(stderr, "look at:   {}\n", (out / camera.name / "preview.png").string());
   }

@@ -39,7 +39,7 @@ std::string ways_to_spread(const ConversionOptions& options) {
   if (!options.interpolation.interpolation) return "without --no-interpolation, edges would move between the frames";
   constexpr double kFineLambda_px = 0.25;
   std::string ways;
-  if (options.event_camera.low_pass_hz == 0)
+  if (options.event_camera.low_pass_hz == 0 && !options.event_camera.circuit)
     ways =
         "the pixels of a real camera (--set preset=davis346), or a limited bandwidth (--set low_pass_hz=50), spread "
         "them";
@@ -60,6 +60,7 @@ void print_summary(const ConversionSummary& summary) {
   tell(stderr, "{}: {} frames, {:.3f} s, converted in {:.1f} s ({:.2f}x real time), {} steps, {} events\n",
        summary.complete ? "done" : "interrupted", summary.frames, converted_s, summary.wall_seconds,
        converted_s / summary.wall_seconds, summary.steps, summary.events_on + summary.events_off);
+  tell(stderr, "{}", describe(filtered_cameras(summary)));
 }
 
 /// A conversion from the opened input to the summary.
@@ -72,7 +73,7 @@ class Converter {
 
   ConversionSummary run(std::unique_ptr<Sink> out) {
     const ConversionOptions& options = arguments_.options;
-    Interpolator interpolator(options.interpolation, options.event_camera.log_eps);
+    Interpolator interpolator(options.interpolation, options.event_camera.dark_light());
     EventCamera event_camera(options.event_camera, frames_.width(), frames_.height(), options.seed, 0);
     auto watching = std::make_unique<BetweenFrames>();
     const BetweenFrames& between_frames = *watching;
@@ -162,7 +163,9 @@ int run(VideoArguments& arguments) {
   arguments.options.input = fs::absolute(arguments.input, error);
   std::vector<std::string> given;
   const Notices notices = print_and_keep(given, arguments.quiet);
+  std::ranges::for_each(warnings_of_filters(arguments.options.event_camera), notices.warning);
   catch_interrupts();
+  warn_of_noise("", arguments.options.event_camera, notices);
 
   const fs::path name = fs::path(arguments.input).lexically_normal();
   const fs::path out = arguments.out.empty() ? "out" / (name.has_filename() ? name : name.parent_path()).stem()

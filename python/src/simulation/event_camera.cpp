@@ -5,6 +5,7 @@
 
 #include "arrays.h"
 #include "bindings.h"
+#include "esim/compose/compose.h"
 #include "esim/core/parallel.h"
 #include "esim/scenario/conversion.h"
 
@@ -16,7 +17,10 @@ using Frame = nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::device::cp
 /// An event camera and its threads. _checks.py ensures that frames have its size.
 struct OwnedEventCamera {
   OwnedEventCamera(int columns, int rows, const std::vector<std::string>& options, std::uint64_t seed, int threads)
-      : workers(threads), camera(read_event_camera(options, ""), columns, rows, seed) {}
+      : OwnedEventCamera(columns, rows, read_event_camera(options, ""), seed, threads) {}
+
+  OwnedEventCamera(int columns, int rows, const EventCameraOptions& options, std::uint64_t seed, int threads)
+      : workers(threads), camera(options, columns, rows, seed), warnings(warnings_of_filters(options)) {}
 
   nb::object process(const Frame& frame, TimeNs t) {
     std::vector<Event> events;
@@ -44,6 +48,7 @@ struct OwnedEventCamera {
 
   Workers workers;
   EventCamera camera;
+  std::vector<std::string> warnings;
 };
 
 }  // namespace
@@ -56,6 +61,7 @@ void bind_event_camera(nb::module_& module) {
       .def("labels", &OwnedEventCamera::labels)
       .def("state", &OwnedEventCamera::state)
       .def("restore", &OwnedEventCamera::restore, nb::arg("state"))
+      .def_ro("warnings", &OwnedEventCamera::warnings)
       .def("statistics", [](const OwnedEventCamera& self) {
         const EventCameraStatistics statistics = self.camera.statistics();
         return nb::make_tuple(statistics.dropped, statistics.delayed);

@@ -33,6 +33,13 @@ void check_sampling(const CameraOptions& camera, const Notices& notices) {
   std::visit(check, camera.sampling);
 }
 
+/// Warns of filters that the camera's sensor does not have.
+void check_filters(const CameraOptions& camera, const Notices& notices) {
+  if (!camera.events) return;
+  for (const std::string& line : warnings_of_filters(camera.event_camera))
+    notices.warning(fmt::format("camera {}: {}", camera.name, line));
+}
+
 /// Whether the pixels have colour filters.
 bool sees_colour(const CameraOptions& camera) { return camera.colour != ColourFilters::none; }
 
@@ -57,11 +64,11 @@ std::unique_ptr<Renderer> build_renderer(const RendererFactory& make_renderer, c
   }
 }
 
-std::unique_ptr<Sampler> build_sampler(const CameraOptions& options, const World& world, std::size_t index,
-                                       Renderer& renderer, const RendererFactory& make_renderer) {
+std::unique_ptr<Sampler> build_sampler(const CameraOptions& options, const EventCameraOptions& sensor,
+                                       const World& world, std::size_t index, Renderer& renderer,
+                                       const RendererFactory& make_renderer) {
   const Workers& workers = *world.workers;
   const Camera& model = world.info.cameras[index].model;
-  const EventCameraOptions& sensor = options.event_camera;
   const SensorTraits traits{sensor.min_threshold(), sensor.dark_light(), sees_colour(options)};
   const auto make_other = [&](const Camera& camera, const std::optional<PixelArea>& area) -> std::unique_ptr<Renderer> {
     if (!area) return make_renderer.make(camera, options.colour, workers);
@@ -125,6 +132,16 @@ void name_what_has_no_effect(const Scenario& scenario, const World& world, std::
         fmt::format("trajectory: has no effect on the images, since {} are drawn on the sensor; it is only recorded",
                     world.cameras[index].renderer->traits().name));
   }
+}
+
+void warn_of_light_without_effect(const Scenario& scenario, const Notices& notices) {
+  const auto uses_light = [](const CameraOptions& camera) {
+    return camera.events && camera.event_camera.circuit && !camera.event_camera.circuit->white_lux;
+  };
+  if (!scenario.light.white_lux || std::ranges::any_of(scenario.cameras, uses_light)) return;
+  notices.warning(
+      "light.white_lux: has no effect: it is for event cameras with a circuit (such as preset davis346) that have no "
+      "circuit.white_lux");
 }
 
 /// Renders a few images: if a camera never sees anything, its poses or frames are wrong.
@@ -224,8 +241,10 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
   const SceneCamera* const followed = substitutes.body != nullptr ? nullptr : followed_camera(scenario, scene);
   check_output(scenario);
   name_formats_without_labels(scenario, notices);
+  warn_of_light_without_effect(scenario, notices);
   for (const CameraOptions& options : scenario.cameras) {
     check_sampling(options, notices);
+    check_filters(options, notices);
     world.info.cameras.push_back(camera_info(options, followed));
     world.info.cameras.back().has_labels = options.events && options.event_camera.labels;
   }
@@ -238,11 +257,12 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
     const CameraOptions& options = scenario.cameras[i];
     const Camera& model = world.info.cameras[i].model;
-    const EventCameraOptions& sensor = options.event_camera;
+    const EventCameraOptions sensor = event_camera_of(scenario, options);
     std::unique_ptr<Renderer> renderer = build_renderer(make_renderer, options, model, *world.workers);
-    std::unique_ptr<Sampler> sampler = build_sampler(options, world, i, *renderer, make_renderer);
+    std::unique_ptr<Sampler> sampler = build_sampler(options, sensor, world, i, *renderer, make_renderer);
     world.cameras.push_back({std::move(renderer), std::move(sampler), std::nullopt, {}});
     if (options.events) {
+      warn_of_noise(fmt::format("camera {}: ", options.name), sensor, notices);
       world.cameras.back().event_camera.emplace(sensor, model.width, model.height, scenario.seed,
                                                 static_cast<std::uint16_t>(i));
       const bool moves = !world.info.objects.empty() || !world.info.sprites.empty();

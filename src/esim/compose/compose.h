@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "esim/formats/filter_recording.h"
 #include "esim/recording/format.h"
 #include "esim/render/pixel_area.h"
 #include "esim/scenario/conversion.h"
@@ -142,10 +143,20 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
 std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,
                         const std::vector<std::string>& notices);
 
+/// One line for each filter of a sensor that the real sensor of its preset does not have.
+std::vector<std::string> warnings_of_filters(const EventCameraOptions& sensor);
+
+/// The events that the filters of each camera have received and dropped; cameras without filters are omitted.
+std::vector<FilteredCamera> filtered_cameras(const Summary& summary);
+std::vector<FilteredCamera> filtered_cameras(const ConversionSummary& summary);
+
 /// Losses of a simulation or a conversion: events that the readout dropped or delayed, samples limited by the maximum
 /// rate, a tolerance that was not met. One line each, with the option that controls it.
 std::vector<std::string> losses(const Scenario& scenario, const Summary& summary);
 std::vector<std::string> losses(const ConversionOptions& options, const ConversionSummary& summary);
+
+/// Warns if the noise of a sensor's circuit fires its pixels all the time. `name` precedes the message.
+void warn_of_noise(const std::string& name, const EventCameraOptions& options, const Notices& notices);
 
 /// Faster alternatives, one line each: flow sampling, if adaptive sampling of a mesh was slower than real time because
 /// of rendering.

@@ -4,7 +4,9 @@
 #include <type_traits>
 
 #include "esim/compose/compose.h"
+#include "esim/event_camera/noise_rate.h"
 #include "esim/files/number_text.h"
+#include "esim/filters/chip_blocks.h"
 
 namespace esim::inline compose {
 namespace {
@@ -18,8 +20,9 @@ double percent(std::int64_t part, std::int64_t whole) {
 
 std::string grouped(std::int64_t count) { return esim::grouped(static_cast<std::uint64_t>(count)); }
 
-void add_readout(const std::string& name, const ReadoutOptions& readout, const EventCameraStatistics& sensor,
-                 std::int64_t events, std::vector<std::string>& lines) {
+void add_sensor(const std::string& name, const ReadoutOptions& readout, const EventCameraStatistics& sensor,
+                std::vector<std::string>& lines) {
+  const std::int64_t events = sensor.read_out;
   if (sensor.dropped > 0) {
     lines.push_back(
         fmt::format("{}the readout dropped {} of {} events ({:.3g} %), because its queue of {} events was full: raise "
@@ -35,6 +38,16 @@ void add_readout(const std::string& name, const ReadoutOptions& readout, const E
         name, percent(sensor.delayed, events), to_seconds(sensor.longest_delay) * 1e3, readout.rate_mev_per_s,
         readout.row_time_us));
   }
+  if (sensor.lost > 0) {
+    lines.push_back(
+        fmt::format("{}{} events were lost, because their pixels fire at most event_camera.circuit.max_rate_hz: set "
+                    "refractory_period_us, or raise contrast_threshold above the noise",
+                    name, grouped(sensor.lost)));
+  }
+}
+
+void add_filtered(const std::string& name, const EventCameraStatistics& sensor, std::vector<FilteredCamera>& cameras) {
+  if (!sensor.filtered.empty()) cameras.push_back({name, static_cast<std::uint64_t>(sensor.read_out), sensor.filtered});
 }
 
 template <typename Scheme>
@@ -66,18 +79,43 @@ void add_sampling(const std::string& name, const CameraOptions& camera, const Sa
 
 }  // namespace
 
+std::vector<std::string> warnings_of_filters(const EventCameraOptions& sensor) {
+  std::vector<std::string> lines = missing_blocks(sensor.filters, sensor.preset.name());
+  for (std::string& line : lines) line = "event_camera.filters." + line;
+  return lines;
+}
+
+std::vector<FilteredCamera> filtered_cameras(const Summary& summary) {
+  std::vector<FilteredCamera> cameras;
+  for (const CameraSummary& camera : summary.cameras) add_filtered(camera.name, camera.sensor, cameras);
+  return cameras;
+}
+
+std::vector<FilteredCamera> filtered_cameras(const ConversionSummary& summary) {
+  std::vector<FilteredCamera> cameras;
+  add_filtered(kConversionCamera, summary.sensor, cameras);
+  return cameras;
+}
+
 std::vector<std::string> losses(const Scenario& scenario, const Summary& summary) {
   std::vector<std::string> lines;
   for (std::size_t i = 0; i < summary.cameras.size(); ++i) {
     const CameraSummary& done = summary.cameras[i];
     const CameraOptions& camera = scenario.cameras[i];
     const std::string name = done.name + ": ";
-    if (camera.events) {
-      add_readout(name, camera.event_camera.readout, done.sensor, done.events_on + done.events_off, lines);
-    }
+    if (camera.events) add_sensor(name, camera.event_camera.readout, done.sensor, lines);
     add_sampling(name, camera, done.sampling, lines);
   }
   return lines;
+}
+
+void warn_of_noise(const std::string& name, const EventCameraOptions& options, const Notices& notices) {
+  const std::optional<NoiseEstimate> noise = excessive_noise(options);
+  if (!noise) return;
+  notices.warning(fmt::format(
+      "{}event_camera: the contrast threshold, {:.3g}, is below twice the noise of the circuit, {:.3g} in the dark: "
+      "expect up to {:.0f} noise events per second of each pixel (at irradiance {:.2g}). Raise contrast_threshold",
+      name, noise->threshold, noise->deviation, noise->rate_hz, noise->irradiance));
 }
 
 std::vector<std::string> hints(const Scenario& scenario, const Summary& summary) {
@@ -96,7 +134,7 @@ std::vector<std::string> hints(const Scenario& scenario, const Summary& summary)
 
 std::vector<std::string> losses(const ConversionOptions& options, const ConversionSummary& summary) {
   std::vector<std::string> lines;
-  add_readout("", options.event_camera.readout, summary.sensor, summary.events_on + summary.events_off, lines);
+  add_sensor("", options.event_camera.readout, summary.sensor, lines);
   return lines;
 }
 

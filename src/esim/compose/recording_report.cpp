@@ -8,6 +8,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json json(const MeasuredError& error) { return {{"mean", error.mean}, {"p99", error.p99}, {"max", error.max}}; }
+void add_filtered(const std::vector<FilteredCamera>& cameras, Json& report) {
+  if (!cameras.empty()) report["filtered"] = Json::parse(to_json(cameras));
+}
 Json json(double number) { return number; }
 Json json(std::int64_t number) { return number; }
 
@@ -39,8 +42,10 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
         {"events_dropped_by_readout", camera.sensor.dropped},
         {"events_delayed_by_readout", camera.sensor.delayed},
         {"longest_readout_delay_s", to_seconds(camera.sensor.longest_delay)},
+        {"events_lost_by_max_rate", camera.sensor.lost},
         {"events_per_second", simulated_s > 0 ? static_cast<double>(events) / simulated_s : 0.0},
     });
+    if (scenario.cameras[i].events) cameras.back()["preset"] = scenario.cameras[i].event_camera.preset.name();
     if (scenario.cameras[i].frame_camera) cameras.back()["frames_written"] = camera.frames;
     if (sampling.measured_error) {
       cameras.back()["tolerance"] = sampling.tolerance;
@@ -78,6 +83,7 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
       {"cameras", cameras},
       {"notices", notices},
   };
+  add_filtered(filtered_cameras(summary), report);
   if (!summary.problem.empty()) report["reason"] = summary.problem;
   return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -107,6 +113,7 @@ std::string report_json(const ConversionOptions& options, const ConversionSummar
         {"other", other}}},
       {"width", summary.width},
       {"height", summary.height},
+      {"preset", options.event_camera.preset.name()},
       {"frames", summary.frames},
       {"steps", summary.steps},
       {"intervals_held_to_max_steps", summary.held},
@@ -117,10 +124,12 @@ std::string report_json(const ConversionOptions& options, const ConversionSummar
       {"events_dropped_by_readout", summary.sensor.dropped},
       {"events_delayed_by_readout", summary.sensor.delayed},
       {"longest_readout_delay_s", to_seconds(summary.sensor.longest_delay)},
+      {"events_lost_by_max_rate", summary.sensor.lost},
       {"events_per_second", converted_s > 0 ? static_cast<double>(events) / converted_s : 0.0},
       {"modulation_between_frames_rms", summary.modulation ? Json(*summary.modulation) : Json(nullptr)},
       {"notices", notices},
   };
+  add_filtered(filtered_cameras(summary), report);
   if (!summary.problem.empty()) report["reason"] = summary.problem;
   return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -37,7 +37,7 @@ class EventStore final : public Sink {
 Scenario bare(const Scenario& scenario) {
   Scenario bare = scenario;
   bare.cameras.resize(1);
-  const EventCameraOptions given = scenario.cameras.at(0).event_camera;
+  const EventCameraOptions given = event_camera_of(scenario, scenario.cameras.at(0));
   EventCameraOptions& sensor = bare.cameras[0].event_camera;
   sensor = {};
   sensor.contrast_threshold = given.contrast_threshold;

@@ -41,20 +41,24 @@ struct RowPieces {
 
 }  // namespace
 
-/// From irradiance to events: surround, pixels, queue, readout.
+/// From irradiance to events: surround, pixels, queue, readout, filters.
 struct EventCamera::State {
   State(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream)
       : pixels(options, options.circuit ? 0 : width, options.circuit ? 0 : height, seed, stream),
         packing(width, height),
         size{0, 0, width, height} {
     check(options);
+    refuse(find_problem(options.filters, width, height), "event_camera.filters.");
     if (options.circuit) circuit.emplace(options, width, height, seed, stream);
     if (options.surround_px > 0) surround.emplace(options.surround_px, options.surround_ms * 1e-3, width, height);
     if (!options.circuit && options.readout.limited()) readout.emplace(options, width, height);
     if (options.circuit && options.readout.acknowledges()) circuit_readout.emplace(options.readout, width, height);
     if (options.labels) labels.emplace(width, height, circuit ? circuit->hot() : pixels.hot(seed, stream));
+    if (options.filters.any()) filters.emplace(options.filters, width, height);
   }
 
+  void read_out_until(TimeNs until, std::vector<Event>& out);
+  void filter(std::size_t begin, std::vector<Event>& out);
   bool integrate(const Workers& workers);
   bool integrate_one(std::size_t i, const Workers& workers);
   bool integrate_tiles(const Workers& workers);
@@ -71,7 +75,10 @@ struct EventCamera::State {
     if (self.readout) PixelReadout::transfer(archive, *self.readout);
     if (self.circuit_readout) CircuitReadout::transfer(archive, *self.circuit_readout);
     if (self.labels) archive.value(self.watermark);
+    if (self.filters) FilterChain::transfer(archive, *self.filters);
+    archive.value(self.read_out);
     archive.value(self.spoiled);
+    archive.value(self.lost);
     archive.value(self.last_time);
     archive.value(self.frames);
     if (self.frames > 0) archive.image(self.last_frame);
@@ -82,7 +89,8 @@ struct EventCamera::State {
   std::vector<CircuitBuffer> buffers;  // per worker
   EventPacking packing;
   Tile size;
-  bool spoiled = false;  // a segment was integrated only partly
+  bool spoiled = false;   // a segment was integrated only partly
+  std::int64_t lost = 0;  // events beyond the maximum rate of their pixels
   std::optional<CenterSurround> surround;
   Image<float> brightness;               // minus the surround
   std::vector<PixelUpdate> updates;      // per worker
@@ -92,6 +100,9 @@ struct EventCamera::State {
   EventQueue queue;
   std::optional<PixelReadout> readout;
   std::optional<CircuitReadout> circuit_readout;
+  std::optional<FilterChain> filters;
+  std::vector<Event> unfiltered;
+  std::int64_t read_out = 0;  // number of events
 
   std::optional<PendingLabels> labels;
   std::vector<EventLabel> released_labels;
@@ -224,24 +235,46 @@ void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
     for (CircuitBuffer& buffer : state.buffers) labels->add(buffer.labels);
   }
   if (state.readout) state.readout->advance(state.pixels, state.updates[0], state.queue, watermark, labels);
-  if (state.circuit_readout) state.circuit_readout->advance(*state.circuit, state.queue, watermark, labels);
+  if (state.circuit_readout) {
+    state.circuit_readout->advance(*state.circuit, state.queue, watermark, labels);
+    state.lost += state.circuit_readout->take_lost();
+  }
+  for (CircuitBuffer& buffer : state.buffers) state.lost += std::exchange(buffer.lost, 0);
   state.watermark = watermark;
+}
+
+/// Appends to `out` the events that leave the readout.
+void EventCamera::State::read_out_until(TimeNs until, std::vector<Event>& out) {
+  if (readout) return readout->release_until(until, out);
+  if (circuit_readout) return circuit_readout->release_until(until, out);
+  const EventSpan released = queue.release_until(until);
+  out.insert(out.end(), released.begin(), released.end());
+}
+
+/// Passes the events of the readout from `begin` in `out` on through the filters. Keeps the labels of those that pass.
+void EventCamera::State::filter(std::size_t begin, std::vector<Event>& out) {
+  unfiltered.assign(out.begin() + static_cast<std::ptrdiff_t>(begin), out.end());
+  out.resize(begin);
+  filters->process(unfiltered, out);
+  if (!labels) return;
+  // Filters only drop events: those that pass keep their order.
+  std::size_t passed = 0;
+  for (std::size_t i = 0; begin + passed < out.size(); ++i) {
+    if (unfiltered[i] == out[begin + passed]) released_labels[passed++] = released_labels[i];
+  }
+  released_labels.resize(passed);
 }
 
 void EventCamera::release_until(TimeNs until, std::vector<Event>& out) {
   State& state = *state_;
-  const std::size_t before = out.size();
-  if (state.readout) {
-    state.readout->release_until(until, out);
-  } else if (state.circuit_readout) {
-    state.circuit_readout->release_until(until, out);
-  } else {
-    const EventSpan released = state.queue.release_until(until);
-    out.insert(out.end(), released.begin(), released.end());
+  const std::size_t begin = out.size();
+  state.read_out_until(until, out);
+  state.read_out += static_cast<std::int64_t>(out.size() - begin);
+  if (state.labels) {
+    state.released_labels.clear();
+    state.labels->take(EventSpan(out).subspan(begin), state.released_labels);
   }
-  if (!state.labels) return;
-  state.released_labels.clear();
-  state.labels->take(EventSpan(out).subspan(before), state.released_labels);
+  if (state.filters) state.filter(begin, out);
 }
 
 LabelSpan EventCamera::labels() const { return state_->released_labels; }
@@ -293,20 +326,20 @@ void EventCamera::process(std::span<const float> irradiance, TimeNs t, std::vect
 }
 
 EventCameraStatistics EventCamera::statistics() const {
-  const auto found = static_cast<std::int64_t>(state_->queue.size());
-  if (state_->circuit_readout) {
-    const CircuitReadout& readout = *state_->circuit_readout;
-    return {.dropped = readout.dropped(),
-            .delayed = readout.delayed(),
-            .longest_delay = readout.longest_delay(),
-            .in_flight = found + static_cast<std::int64_t>(readout.waiting())};
-  }
-  if (!state_->readout) return {.in_flight = found};
-  const PixelReadout& readout = *state_->readout;
-  return {.dropped = readout.dropped(),
-          .delayed = readout.delayed(),
-          .longest_delay = readout.longest_delay(),
-          .in_flight = found + static_cast<std::int64_t>(readout.waiting())};
+  EventCameraStatistics statistics;
+  statistics.in_flight = static_cast<std::int64_t>(state_->queue.size());
+  const auto add = [&](const auto& readout) {
+    statistics.dropped = readout.dropped();
+    statistics.delayed = readout.delayed();
+    statistics.longest_delay = readout.longest_delay();
+    statistics.in_flight += static_cast<std::int64_t>(readout.waiting());
+  };
+  if (state_->readout) add(*state_->readout);
+  if (state_->circuit_readout) add(*state_->circuit_readout);
+  statistics.lost = state_->lost;
+  statistics.read_out = state_->read_out;
+  if (state_->filters) statistics.filtered = state_->filters->dropped();
+  return statistics;
 }
 
 std::vector<std::byte> EventCamera::state() const {

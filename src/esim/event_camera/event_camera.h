@@ -12,16 +12,21 @@
 #include "esim/event_camera/options.h"
 #include "esim/events/event.h"
 #include "esim/events/event_label.h"
+#include "esim/filters/filter_chain.h"
 #include "esim/render/sample.h"
 
 namespace esim::inline event_camera {
 
-/// Statistics of a camera's readout.
+/// Statistics of a camera's readout and of its filters.
 struct EventCameraStatistics {
   std::int64_t dropped = 0;  ///< dropped by the readout because its queue was full
   std::int64_t delayed = 0;  ///< read out more than 1 us after the request, or 1 % of the refractory period if shorter
   TimeNs longest_delay = 0;  ///< from a pixel's request to its readout
+  std::int64_t lost = 0;     ///< beyond the maximum rate of their pixels (CircuitOptions::max_rate_hz)
   std::int64_t in_flight = 0;  ///< generated, but not read out by the last watermark
+  std::int64_t read_out = 0;   ///< events that left the readout, and that the filters received
+
+  std::vector<FilterChain::Dropped> filtered{};  ///< events dropped by each filter, in the order of the filters
 };
 
 /// The event sensor: an array of independent pixels (paper, Section 3). The brightness L(t) of a pixel is linear in
@@ -31,12 +36,13 @@ struct EventCameraStatistics {
 /// Every effect is defined in continuous time, so that none depends on the sampling density: the photoreceptor's
 /// low-pass is solved exactly on each segment, thresholds and leaks are drawn once per event, and shot noise is a
 /// separate Poisson process. EventCameraOptions lists the effects; docs/methods/pixel.md gives the formulae.
+/// The events that leave the readout pass the filters of the options; those that a filter drops never leave the camera.
 ///
 /// Use either process() for whole frames in order, or integrate() and release_until() for samples of tiles.
 class EventCamera {
  public:
   /// `stream` separates the random numbers of cameras with the same seed. Throws UserError if the size does not support
-  /// the options.
+  /// the options, or if these contradict each other.
   EventCamera(const EventCameraOptions& options, int width, int height, std::uint64_t seed = 0,
               std::uint16_t stream = 0);
   ~EventCamera();

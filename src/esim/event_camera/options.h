@@ -2,23 +2,33 @@
 
 #include <algorithm>
 #include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "esim/core/describe.h"
+#include "esim/filters/options.h"
 
 namespace esim::inline event_camera {
 
-/// Sensors with published parameters (docs/methods/pixel.md has the sources).
-enum class SensorPreset {
-  ideal,
-  dvs128,
-  davis240c,
-  davis346,
-  dvxplorer,
-  gen31_vga,
-  imx636,
-  v2e_clean,
-  v2e_noisy,
-  davis240c_2,  ///< by its circuit
+/// A sensor with published parameters and the version of these (docs/methods/presets.md).
+struct SensorPreset {
+  std::string sensor = "ideal";
+  int version = 0;  ///< 1: separate effects; 2: by the circuit; 0: the sensor has no versions
+
+  bool operator==(const SensorPreset&) const = default;
+
+  /// As scenarios write it: "davis346@2".
+  std::string name() const;
+
+  /// All valid names. A name without a version means the newest one; it comes before those with versions.
+  static std::vector<std::string> names();
+
+  /// The preset of a name, if there is one.
+  static std::optional<SensorPreset> find(std::string_view name);
+
+  /// "davis346 has the versions 1 and 2" for the name of a sensor with another version; otherwise empty.
+  static std::string problem(std::string_view name);
 };
 
 /// How irradiance becomes brightness.
@@ -44,17 +54,20 @@ struct ReadoutOptions {
   double row_rest_us = 0.0;
   double scan_period_us = 0.0;
   bool scan_hold = false;
+  double time_stamp_us = 0.0;
 
   bool limited() const { return rate_mev_per_s > 0 || row_time_us > 0; }
   /// Whether the pixels wait for it.
-  bool acknowledges() const { return limited() || row_scan_us > 0 || row_rest_us > 0 || scan_period_us > 0; }
+  bool acknowledges() const {
+    return limited() || row_scan_us > 0 || row_rest_us > 0 || scan_period_us > 0 || time_stamp_us > 0;
+  }
 };
 
 /// The circuit of the pixels before their comparators: photodiode, photoreceptor and source follower, with the shot
 /// noise of the photocurrent (docs/methods/circuit.md). It replaces log_eps, dark_irradiance, the low-pass, shot noise,
 /// threshold noise and latency, all of which follow from it.
 struct CircuitOptions {
-  double white_lux = 1000.0;
+  std::optional<double> white_lux{};  ///< unset: kUsualWhiteLux
   double f_number = 2.0;
   double transmission = 0.9;
   double photocurrent_fa_per_lux = 10.0;
@@ -68,11 +81,14 @@ struct CircuitOptions {
   double refractory_mismatch_decades = 0.0;
   double hot_mismatch_decades = 0.7;
   double hot_off_fraction = 0.0;
+  double max_rate_hz = 0.0;
+
+  static constexpr double kUsualWhiteLux = 1000;
 
   /// The photocurrent of a pixel that sees a diffuse white surface at irradiance 1, fA. The illuminance of the sensor
   /// is that of the surface times transmission / (4 f_number^2).
   double white_photocurrent_fa() const {
-    return photocurrent_fa_per_lux * white_lux * transmission / (4 * f_number * f_number);
+    return photocurrent_fa_per_lux * white_lux.value_or(kUsualWhiteLux) * transmission / (4 * f_number * f_number);
   }
   /// The dark current in units of the irradiance: L = ln(E + this), plus a constant.
   double dark_irradiance() const { return dark_current_fa / white_photocurrent_fa(); }
@@ -81,7 +97,7 @@ struct CircuitOptions {
 /// Parameters of an event camera. Thresholds are changes of brightness, in natural logarithms. Effects that depend on
 /// the irradiance use the relative intensity i = (E + dark_irradiance) / (1 + dark_irradiance), which is 1 at white.
 struct EventCameraOptions {
-  SensorPreset preset = SensorPreset::ideal;
+  SensorPreset preset{};
 
   double contrast_threshold = 0.5;
   std::optional<double> contrast_threshold_on{};   ///< C+; default: contrast_threshold
@@ -116,6 +132,7 @@ struct EventCameraOptions {
   double latency_light_share = 0.0;
   ReadoutOptions readout{};
   std::optional<CircuitOptions> circuit{};
+  FilterOptions filters{};
 
   bool labels = false;
 
@@ -128,23 +145,22 @@ struct EventCameraOptions {
   double min_threshold() const { return std::min(threshold_on(), threshold_off()); }
 };
 
-/// Throws UserError if options contradict each other.
+/// Throws UserError if options contradict each other, or if a value of the circuit or of the readout is out of range.
 void check(const EventCameraOptions& options);
 
 /// Minimum threshold of any pixel, whatever the noise: keeps the number of events per step finite.
 inline constexpr double kMinContrastThreshold = 0.01;
 
-/// The parameters of a sensor.
-EventCameraOptions preset_options(SensorPreset preset);
+/// The parameters of a sensor. Throws UserError if there is no such preset.
+EventCameraOptions preset_options(const SensorPreset& preset);
+
+/// The same by name, such as "davis346" or "davis346@1".
+EventCameraOptions preset_options(std::string_view name);
 
 }  // namespace esim::inline event_camera
 
 namespace esim {
 
-template <>
-inline constexpr std::array<const char*, 10> kEnumNames<SensorPreset>{
-    "ideal",      "dvs128", "davis240c", "davis346",  "dvxplorer",
-    "gen3.1-vga", "imx636", "v2e-clean", "v2e-noisy", "davis240c@2"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<PixelResponse>{"log", "lin_log"};
 template <>
@@ -169,16 +185,20 @@ void describe(Visitor& visit, ReadoutOptions& o) {
         About{"with circuit: period in which all columns are read one after the other; 0: rows are read on request",
               "us", 0, 1e6});
   visit("scan_hold", o.scan_hold, About{"whether a scan reports only events from before it began"});
+  visit("time_stamp_us", o.time_stamp_us,
+        About{"with circuit: time stamps are rounded up to multiples of this; 0: to 1 ns", "us", 0, 1e6});
 }
 
 template <class Visitor>
 void describe(Visitor& visit, CircuitOptions& o) {
-  visit("white_lux", o.white_lux, About{"illuminance of a diffuse white surface at irradiance 1", "lux", 0, 1e9, true});
+  visit(
+      "white_lux", o.white_lux,
+      About{"illuminance of a diffuse white surface at irradiance 1 (default: light.white_lux)", "lux", 0, 1e9, true});
   visit("f_number", o.f_number, About{"f-number of the lens", "", 0.1, 100});
   visit("transmission", o.transmission, About{"fraction of the light that the lens transmits", "", 0, 1, true});
   visit("photocurrent_fa_per_lux", o.photocurrent_fa_per_lux,
         About{"photocurrent of a pixel per illuminance of the sensor", "fA/lux", 0, 1e9, true});
-  visit("dark_current_fa", o.dark_current_fa, About{"dark current of a pixel", "fA", 0, 1e9, true});
+  visit("dark_current_fa", o.dark_current_fa, About{"dark current of a pixel", "fA", 1e-9, 1e9});
   visit(
       "photodiode_charge_e", o.photodiode_charge_e,
       About{"charge that moves the photoreceptor by a factor of e: sets noise and time constant", "electrons", 1, 1e9});
@@ -194,13 +214,19 @@ void describe(Visitor& visit, CircuitOptions& o) {
   visit("hot_mismatch_decades", o.hot_mismatch_decades,
         About{"standard deviation of log10 of the hot pixels' leak", "", 0, 2});
   visit("hot_off_fraction", o.hot_off_fraction, About{"fraction of hot pixels that leak downwards", "", 0, 1});
+  visit("max_rate_hz", o.max_rate_hz,
+        About{"maximum rate of events of a pixel; the others are lost and counted; 0: 10 kHz if the noise reaches the "
+              "thresholds and neither a refractory period nor the readout limits the rate, otherwise no maximum",
+              "Hz", 0, 1e9});
 }
 
 template <class Visitor>
 void describe(Visitor& visit, EventCameraOptions& o) {
   // A preset sets all values that are not given explicitly.
   const SensorPreset before = o.preset;
-  visit("preset", o.preset, About{"sensor that sets the defaults of all other options"});
+  visit("preset", o.preset,
+        About{"sensor that sets the defaults of all other options; NAME is the newest version, NAME@1 the older one by "
+              "separate effects"});
   if (o.preset != before) o = preset_options(o.preset);
 
   visit("contrast_threshold", o.contrast_threshold,
@@ -254,6 +280,8 @@ void describe(Visitor& visit, EventCameraOptions& o) {
       "circuit", o.circuit,
       About{"simulates the pixels' circuit, from light in lux, with its noise (default: none, but the effects above)"});
   visit("labels", o.labels, About{"explains each event: its cause, its ideal time, and the object that the pixel saw"});
+  visit("filters", o.filters,
+        About{"digital filters behind the readout, in the order in which events pass them (default: none)"});
 }
 
 }  // namespace esim::inline event_camera

@@ -13,8 +13,8 @@
 namespace esim::inline event_camera {
 
 /// The definition of the event camera: one pixel at a time and one event at a time, in double precision, with every
-/// effect of EventCameraOptions. Numbers in brackets in reference.cpp, reference_signal.h and the files of EventCamera
-/// are those of the equations in docs/methods/pixel.md.
+/// effect of EventCameraOptions except the filters, which belong to the folder `filters`. Numbers in brackets in
+/// reference.cpp, reference_signal.h and the files of EventCamera are those of the equations in docs/methods/pixel.md.
 ///
 /// EventCamera accelerates it, and draws the same random numbers: their events are the same, with times that agree
 /// within the rounding of EventCamera's floats. This class is much slower; it serves to read and to test.

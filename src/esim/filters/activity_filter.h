@@ -18,6 +18,14 @@ class ActivityFilter final : public EventFilter {
 
   void process(EventSpan events, std::vector<Event>& out) override;
 
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.value(self.index_);
+    archive.value(self.count_);
+    archive.value(self.enough_);
+    archive.value(self.few_);
+  }
+
  private:
   void end_window();
 

@@ -21,6 +21,11 @@ class AntiFlickerFilter final : public EventFilter {
 
   void process(EventSpan events, std::vector<Event>& out) override;
 
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.fixed(self.blocks_);
+  }
+
   static constexpr int kBlock_px = 4;
   static constexpr TimeNs kTick = 128 * kNsPerUs;  ///< unit of periods
 

@@ -6,67 +6,17 @@
 #include <utility>
 
 #include "esim/core/error.h"
-#include "esim/filters/activity_filter.h"
-#include "esim/filters/anti_flicker_filter.h"
-#include "esim/filters/rate_controller.h"
-#include "esim/filters/region_filter.h"
-#include "esim/filters/trail_filter.h"
 
 namespace esim::inline filters {
 
-void validate(const FilterOptions& options) {
-  if (const auto& flicker = options.anti_flicker) {
-    if (flicker->low_hz >= flicker->high_hz)
-      throw UserError(fmt::format("anti_flicker.low_hz: must be below high_hz, {} Hz; it is {} Hz", flicker->high_hz,
-                                  flicker->low_hz));
-    if (flicker->stop_threshold >= flicker->start_threshold)
-      throw UserError(fmt::format("anti_flicker.stop_threshold: must be below start_threshold, {}; it is {}",
-                                  flicker->start_threshold, flicker->stop_threshold));
-  }
-  if (const auto& activity = options.activity) {
-    if (activity->lower_start <= 0 && activity->upper_stop <= 0)
-      throw UserError("activity: has no bound; set lower_start or upper_stop");
-    if (activity->lower_stop > activity->lower_start)
-      throw UserError(fmt::format("activity.lower_stop: must not be above lower_start, {} ev/s; it is {} ev/s",
-                                  activity->lower_start, activity->lower_stop));
-    if (activity->upper_start > activity->upper_stop)
-      throw UserError(fmt::format("activity.upper_start: must not be above upper_stop, {} ev/s; it is {} ev/s",
-                                  activity->upper_stop, activity->upper_start));
-    if (activity->upper_stop > 0 && activity->lower_start >= activity->upper_stop)
-      throw UserError(fmt::format("activity.upper_stop: must be above lower_start, {} ev/s; it is {} ev/s",
-                                  activity->lower_start, activity->upper_stop));
-  }
-}
-
-namespace {
-
-/// Throws UserError for windows and pixels outside the sensor.
-void validate(const RegionFilterOptions& region, int width, int height) {
-  const auto require = [&](const char* list, std::size_t i, int x, int y) {
-    if (x < width && y < height) return;
-    throw UserError(
-        fmt::format("region.{}.{}: ({}, {}) lies outside the sensor of {} x {} px", list, i, x, y, width, height));
-  };
-  for (std::size_t i = 0; i < region.windows.size(); ++i)
-    require("windows", i, region.windows[i].x, region.windows[i].y);
-  for (std::size_t i = 0; i < region.masked_pixels.size(); ++i)
-    require("masked_pixels", i, region.masked_pixels[i].x, region.masked_pixels[i].y);
-}
-
-}  // namespace
-
 FilterChain::FilterChain(const FilterOptions& options, int width, int height) : width_(width), height_(height) {
-  filters::validate(options);
-  if (options.region) validate(*options.region, width, height);
-  const auto add = [&]<typename Filter>(const char* name, std::unique_ptr<Filter> filter) {
-    stages_.push_back({{name, 0}, std::move(filter)});
-  };
-  if (options.region) add("region", std::make_unique<RegionFilter>(*options.region, width, height));
-  if (options.activity) add("activity", std::make_unique<ActivityFilter>(*options.activity));
+  refuse(find_problem(options, width, height));
+  if (options.region) stages_.push_back({{"region", 0}, RegionFilter(*options.region, width, height)});
+  if (options.activity) stages_.push_back({{"activity", 0}, ActivityFilter(*options.activity)});
   if (options.anti_flicker)
-    add("anti_flicker", std::make_unique<AntiFlickerFilter>(*options.anti_flicker, width, height));
-  if (options.trail) add("trail", std::make_unique<TrailFilter>(*options.trail, width, height));
-  if (options.rate_controller) add("rate_controller", std::make_unique<RateController>(*options.rate_controller));
+    stages_.push_back({{"anti_flicker", 0}, AntiFlickerFilter(*options.anti_flicker, width, height)});
+  if (options.trail) stages_.push_back({{"trail", 0}, TrailFilter(*options.trail, width, height)});
+  if (options.rate_controller) stages_.push_back({{"rate_controller", 0}, RateController(*options.rate_controller)});
 }
 
 void FilterChain::check(EventSpan events) const {
@@ -95,7 +45,7 @@ void FilterChain::process(EventSpan events, std::vector<Event>& out) {
   EventSpan current = events;
   for (Stage& stage : stages_) {
     output_.clear();
-    stage.filter->process(current, output_);
+    std::visit([&](EventFilter& filter) { filter.process(current, output_); }, stage.filter);
     stage.dropped.events += current.size() - output_.size();
     std::swap(input_, output_);
     current = input_;

@@ -1,13 +1,19 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
+#include <variant>
 #include <vector>
 
+#include "esim/filters/activity_filter.h"
+#include "esim/filters/anti_flicker_filter.h"
 #include "esim/filters/event_filter.h"
 #include "esim/filters/options.h"
+#include "esim/filters/rate_controller.h"
+#include "esim/filters/region_filter.h"
+#include "esim/filters/trail_filter.h"
 
 namespace esim::inline filters {
 
@@ -18,8 +24,6 @@ class FilterChain final : public EventFilter {
   /// For a sensor of `width` x `height` px. Throws UserError for invalid options, and for windows and masked pixels
   /// that lie outside the sensor.
   FilterChain(const FilterOptions& options, int width, int height);
-  FilterChain(FilterChain&&) = default;
-  FilterChain& operator=(FilterChain&&) = default;
 
   /// Throws UserError if an event lies outside the sensor, is earlier than the previous one, or is more than 146 years
   /// from 0; then no event of the call has been processed.
@@ -32,10 +36,21 @@ class FilterChain final : public EventFilter {
   };
   std::vector<Dropped> dropped() const;
 
+  /// Saves or restores the state, for a chain that continues elsewhere. Archives have the functions of
+  /// event_camera/state_archive.h.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.value(self.last_);
+    for (auto& stage : self.stages_) {
+      archive.value(stage.dropped.events);
+      std::visit([&]<class Filter>(Filter& filter) { Filter::transfer(archive, filter); }, stage.filter);
+    }
+  }
+
  private:
   struct Stage {
     Dropped dropped;
-    std::unique_ptr<EventFilter> filter;
+    std::variant<RegionFilter, ActivityFilter, AntiFlickerFilter, TrailFilter, RateController> filter;
   };
 
   void check(EventSpan events) const;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "esim/core/describe.h"
@@ -69,10 +70,25 @@ struct FilterOptions {
   std::optional<AntiFlickerOptions> anti_flicker{};
   std::optional<TrailFilterOptions> trail{};
   std::optional<RateControllerOptions> rate_controller{};
+
+  /// Whether there is any filter.
+  bool any() const { return region || activity || anti_flicker || trail || rate_controller; }
 };
 
-/// Throws UserError that names the option, as in a scenario, if it is out of range or contradicts another one.
-void validate(const FilterOptions& options);
+/// An option with an invalid value.
+struct FilterProblem {
+  std::string key;      ///< of the option within FilterOptions, dotted: "region.windows.0"
+  std::string problem;  ///< what is wrong, and what to do
+};
+
+/// The first option that contradicts another one, or that has no effect; empty if all are valid.
+std::optional<FilterProblem> find_problem(const FilterOptions& options);
+
+/// The same for a sensor of `width` x `height` px: windows and masked pixels must not lie outside it.
+std::optional<FilterProblem> find_problem(const FilterOptions& options, int width, int height);
+
+/// Throws UserError "PREFIXKEY: PROBLEM" if there is a problem.
+void refuse(const std::optional<FilterProblem>& problem, const std::string& prefix = "");
 
 }  // namespace esim::inline filters
 

@@ -19,6 +19,16 @@ class RateController final : public EventFilter {
 
   void process(EventSpan events, std::vector<Event>& out) override;
 
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.value(self.index_);
+    archive.value(self.arrived_);
+    archive.value(self.passed_);
+    archive.value(self.expected_);
+    archive.value(self.remainder_);
+    archive.value(self.dropped_);
+  }
+
   std::uint64_t dropped() const { return dropped_; }  ///< number of events so far
 
  private:

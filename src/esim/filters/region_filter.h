@@ -16,6 +16,9 @@ class RegionFilter final : public EventFilter {
 
   void process(EventSpan events, std::vector<Event>& out) override;
 
+  template <class Archive, class Self>
+  static void transfer(Archive&, Self&) {}  // no state
+
  private:
   std::size_t width_;
   std::vector<std::uint8_t> passes_;  // one per pixel, in rows

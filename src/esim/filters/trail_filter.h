@@ -16,6 +16,11 @@ class TrailFilter final : public EventFilter {
 
   void process(EventSpan events, std::vector<Event>& out) override;
 
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.fixed(self.bursts_);
+  }
+
  private:
   struct Burst {
     TimeNs last = 0;            // time of its last event

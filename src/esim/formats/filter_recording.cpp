@@ -58,7 +58,7 @@ class FilteredSource final : public Source {
   FilteredSource(std::unique_ptr<Source> inner, const FilterOptions& filters, const std::string& camera,
                  std::vector<FilteredCamera>& cameras)
       : inner_(std::move(inner)), info_(inner_->info()), filters_(filters), reports_(cameras) {
-    validate(filters_);
+    refuse(find_problem(filters_));
     reports_.clear();
     for (CameraInfo& each : info_.cameras) {
       std::optional<std::size_t> report;

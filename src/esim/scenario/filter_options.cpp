@@ -6,7 +6,7 @@ namespace esim::inline scenario {
 
 FilterOptions read_filters(const std::vector<std::string>& overrides, const std::string& setter) {
   FilterOptions options = read_overrides<FilterOptions>(overrides, setter);
-  validate(options);
+  refuse(find_problem(options));
   return options;
 }
 

@@ -62,6 +62,30 @@ void refuse_geometry_beside_calibration(const YAML::Node& entry, const std::stri
   }
 }
 
+/// The value of a dotted key; if it is missing, that of the innermost map or list that should contain it.
+YAML::Node find_innermost(const YAML::Node& root, const std::string& key) {
+  YAML::Node node = root;
+  for (std::size_t begin = 0; begin <= key.size();) {
+    const std::size_t end = std::min(key.find('.', begin), key.size());
+    const std::string part = key.substr(begin, end - begin);
+    const YAML::Node& parent = node;
+    const YAML::Node child = parent.IsSequence() ? parent[std::stoul(part)] : parent[part];
+    if (!child.IsDefined()) return node;
+    node.reset(child);
+    begin = end + 1;
+  }
+  return node;
+}
+
+/// Throws OptionError if filters contradict each other or do not suit the size of the camera, whose map is `node`.
+void check_filters(const CameraOptions& camera, const YAML::Node& node, const std::string& key,
+                   const YamlSource& source) {
+  const auto problem = find_problem(camera.event_camera.filters, camera.width, camera.height);
+  if (!problem) return;
+  const std::string option = "event_camera.filters." + problem->key;
+  YamlReader::fail(source, find_innermost(node, option), key + "." + option, problem->problem);
+}
+
 /// The default sampling method: flow for renderers of complete images and for parts that the scenario does not
 /// describe (custom renderers and online motion), keyframes if another program renders, otherwise adaptive.
 SamplingOptions usual_sampling(const RendererOptions& renderer, bool described) {
@@ -98,7 +122,10 @@ std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource
     YamlReader reader(merged, key, source);
     describe(reader, options);
     reader.finish();
-    for (CameraOptions& camera : with_calibration(options)) cameras.push_back(std::move(camera));
+    for (CameraOptions& camera : with_calibration(options)) {
+      check_filters(camera, merged, key, source);
+      cameras.push_back(std::move(camera));
+    }
   }
   return cameras;
 }
@@ -259,6 +286,12 @@ Scenario read_scenario(const ScenarioText& text) {
   scenario.cameras = read_cameras(std::as_const(root), source, camera);
   name_cameras(scenario.cameras, source);
   return scenario;
+}
+
+EventCameraOptions event_camera_of(const Scenario& scenario, const CameraOptions& camera) {
+  EventCameraOptions options = camera.event_camera;
+  if (options.circuit && !options.circuit->white_lux) options.circuit->white_lux = scenario.light.white_lux;
+  return options;
 }
 
 Camera camera_model(const CameraOptions& options) {

@@ -13,6 +13,7 @@
 #include "esim/geometry/camera.h"
 #include "esim/imu/options.h"
 #include "esim/sampling/options.h"
+#include "esim/scenario/light_options.h"
 #include "esim/scenario/pose_options.h"
 #include "esim/scenario/renderer_options.h"
 #include "esim/scenario/trajectory_options.h"
@@ -91,6 +92,7 @@ struct Scenario {
   double start_s = 0.0;              ///< after the trajectory's start
   std::optional<double> duration_s;  ///< unset: until the trajectory's end
   RendererOptions renderer;
+  LightOptions light;
   TrajectoryOptions trajectory;
   std::vector<CameraOptions> cameras;
   std::optional<RigImuOptions> imu;

@@ -6,6 +6,7 @@
 #include <type_traits>
 #include <variant>
 
+#include "esim/core/named_value.h"
 #include "esim/scenario/conversion.h"
 #include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
@@ -71,9 +72,13 @@ class YamlWriter {
   requires std::is_enum_v<T>
   void write(T value) { out_ << kEnumNames<T>[static_cast<std::size_t>(value)]; }
 
-  template <typename T>
-  requires std::is_class_v<T>
+  template <NamedValue T>
   void write(const T& value) {
+    out_ << value.name();
+  }
+
+  template <typename T>
+  requires std::is_class_v<T> &&(!NamedValue<T>)void write(const T& value) {
     out_ << YAML::BeginMap;
     describe_const(value);
     out_ << YAML::EndMap;
@@ -147,9 +152,16 @@ class ReferenceWriter {
     for (const char* name : kEnumNames<T>) names += fmt::format("{}{}", names.empty() ? "" : " | ", name);
     return fmt::format(" {} ({})", kEnumNames<T>[static_cast<std::size_t>(value)], names);
   }
+  template <NamedValue T>
+  static std::string default_of(const T& value) {
+    std::string names;
+    for (const std::string& name : T::names()) {
+      if (name.find('@') == std::string::npos) names += (names.empty() ? "" : " | ") + name;
+    }
+    return fmt::format(" {} ({})", value.name(), names);
+  }
   template <typename T>
-  requires std::is_class_v<T>
-  static std::string default_of(const T&) { return ""; }
+  requires std::is_class_v<T> &&(!NamedValue<T>)static std::string default_of(const T&) { return ""; }
   template <typename... T>
   static std::string default_of(const std::variant<T...>&) {
     return "";

@@ -28,8 +28,8 @@ PhaseTest BetweenFrames::test() const {
   if (frames_.size() < 2) return {};
   std::vector<TimeNs> places;
   std::size_t next = 1;  // the frame at or after an event
-  for (std::size_t i = 0; i < events_.times().size(); ++i) {
-    const TimeNs t = events_.times()[i];
+  for (std::size_t i = 0; i < events_.items().size(); ++i) {
+    const TimeNs t = events_.items()[i];
     if (t < frames_.front()) continue;
     while (next < frames_.size() && frames_[next] < t) ++next;
     if (next == frames_.size()) break;

@@ -4,7 +4,7 @@
 
 #include "esim/recording/record.h"
 #include "esim/stats/periodicity.h"
-#include "esim/stats/time_sample.h"
+#include "esim/stats/stream_sample.h"
 
 namespace esim::inline stats {
 

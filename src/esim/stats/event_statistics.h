@@ -10,8 +10,9 @@
 #include "esim/stats/hot_pixels.h"
 #include "esim/stats/interval_histogram.h"
 #include "esim/stats/periodicity.h"
+#include "esim/stats/pixel_map.h"
 #include "esim/stats/rate_curve.h"
-#include "esim/stats/time_sample.h"
+#include "esim/stats/stream_sample.h"
 
 namespace esim::inline stats {
 
@@ -70,11 +71,9 @@ class EventStatistics {
     TimeNs last_t = 0;
     std::uint32_t on = 0, off = 0;
   };
-  void make_room(const Event& event);
   void count_stamp(TimeNs t);
 
-  bool grows_;
-  Image<Pixel> pixels_;
+  PixelMap<Pixel> pixels_;
   Statistics statistics_;
   TimeSample sample_;
   std::uint64_t same_time_ = 0;  // events at the last time

@@ -8,7 +8,7 @@
 
 #include "esim/stats/median.h"
 #include "esim/stats/probability.h"
-#include "esim/stats/time_sample.h"
+#include "esim/stats/stream_sample.h"
 
 namespace esim::inline stats {
 namespace {
@@ -21,8 +21,7 @@ constexpr double kBandingP = 1e-4;
 constexpr double kStrongModulation = 0.1;
 
 constexpr double kFoundP = 1e-6;
-constexpr double kLowestHz = 10, kHighestHz = 2000;
-constexpr double kSearchBin_s = 1e-4, kMaxSearch_s = 800;
+constexpr double kBinsPerPeriod = 5, kMaxSearchBins = 8e6;
 constexpr std::size_t kRefinedEvents = 1 << 17;
 
 double span_s(std::span<const TimeNs> times) { return times.empty() ? 0.0 : to_seconds(times.back() - times.front()); }
@@ -109,19 +108,19 @@ struct Spectrum {
   double step_hz = 0;
 };
 
-Spectrum compute_spectrum(const Tapered& tapered) {
+Spectrum compute_spectrum(const Tapered& tapered, double bin_s) {
   const std::span<const TimeNs> times = tapered.times();
-  const int size = cv::getOptimalDFTSize(static_cast<int>(span_s(times) / kSearchBin_s) + 2);
+  const int size = cv::getOptimalDFTSize(static_cast<int>(span_s(times) / bin_s) + 2);
   cv::Mat bins = cv::Mat::zeros(1, size, CV_32F), packed;
   double weights2 = 0;
   for (std::size_t i = 0; i < times.size(); ++i) {
     const double w = tapered.weights()[i];
-    bins.at<float>(0, static_cast<int>(to_seconds(times[i] - times.front()) / kSearchBin_s)) += static_cast<float>(w);
+    bins.at<float>(0, static_cast<int>(to_seconds(times[i] - times.front()) / bin_s)) += static_cast<float>(w);
     weights2 += w * w;
   }
   cv::dft(bins, packed);  // real, then real and imaginary parts in turn
   Spectrum spectrum;
-  spectrum.step_hz = 1.0 / (kSearchBin_s * size);
+  spectrum.step_hz = 1.0 / (bin_s * size);
   spectrum.z.resize(static_cast<std::size_t>((size - 1) / 2 + 1));
   for (int k = 1; 2 * k < size; ++k) {
     const double real = packed.at<float>(0, 2 * k - 1), imaginary = packed.at<float>(0, 2 * k);
@@ -222,17 +221,18 @@ PhaseTest test_phase(std::span<const TimeNs> given, double frequency_hz) {
   return test;
 }
 
-std::optional<Periodicity> find_periodicity(std::span<const TimeNs> times) {
+std::optional<Periodicity> find_periodicity(std::span<const TimeNs> times, const FrequencyRange& range) {
   if (times.empty()) return std::nullopt;
-  const TimeNs end_ns = times.front() + to_ns(kMaxSearch_s);
+  const double bin_s = 1 / (kBinsPerPeriod * range.highest_hz);
+  const TimeNs end_ns = times.front() + to_ns(kMaxSearchBins * bin_s);
   times = times.first(static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), end_ns) - times.begin()));
-  const double lowest_hz = std::max(kLowestHz, kMinPeriods / span_s(times));
-  if (times.size() < kMinEvents || !(lowest_hz < kHighestHz)) return std::nullopt;
+  const double lowest_hz = std::max(range.lowest_hz, kMinPeriods / span_s(times));
+  if (times.size() < kMinEvents || !(lowest_hz < range.highest_hz)) return std::nullopt;
 
   const Tapered tapered(times);
-  const Spectrum spectrum = compute_spectrum(tapered);
+  const Spectrum spectrum = compute_spectrum(tapered, bin_s);
   const auto first = static_cast<std::size_t>(std::ceil(lowest_hz / spectrum.step_hz));
-  const auto end = std::min(spectrum.z.size(), static_cast<std::size_t>(kHighestHz / spectrum.step_hz) + 1);
+  const auto end = std::min(spectrum.z.size(), static_cast<std::size_t>(range.highest_hz / spectrum.step_hz) + 1);
   if (end <= first) return std::nullopt;
   const std::vector<double> level = typical(spectrum.z, first, end);
   const Line line = find_line(spectrum.z, level, first, end);

@@ -50,17 +50,22 @@ struct PhaseTest {
 /// `times` must be in order, ns; 0 < frequency_hz < 1e8.
 PhaseTest test_phase(std::span<const TimeNs> times, double frequency_hz);
 
-/// The frequency that the time stamps prefer, from 10 Hz (or 20 periods in the recording) to 2 kHz:
+/// Frequencies to search. Periods of frames are in the default range.
+struct FrequencyRange {
+  double lowest_hz = 10, highest_hz = 2000;
+};
+
+/// The frequency that the time stamps prefer, in a range that begins at 20 periods in the recording or above:
 ///
 ///   z(f) = |sum over i of w_i exp(2 pi j f t_i)|^2 / sum of w_i^2,    w_i = sin^2(pi (t_i - t_0) / T)
 ///
 /// This is Rayleigh's statistic with a Hann taper, exponentially distributed with mean 1 for a Poisson process. It is
-/// computed at all multiples of 1 / T by a Fourier transform of bins of 0.1 ms, and divided by the typical z of nearby
-/// frequencies: their median / ln 2, but at least 1. Bands have harmonics: of all frequencies with at least a quarter
-/// of the highest ratio, the lowest is taken, and then divided by the largest integer up to 16 that yields another
-/// significant frequency with at least 1/64 of the highest ratio. The maximum near it is found from the time stamps
-/// themselves. With its ratio r, p = min(1, candidates exp(-r)): with Bonferroni's correction, p is 1 if the strongest
-/// frequency is no stronger than expected by chance.
+/// computed at all multiples of 1 / T by a Fourier transform of bins of a fifth of the shortest period, and divided by
+/// the typical z of nearby frequencies: their median / ln 2, but at least 1. Bands have harmonics: of all frequencies
+/// with at least a quarter of the highest ratio, the lowest is taken, and then divided by the largest integer up to 16
+/// that yields another significant frequency with at least 1/64 of the highest ratio. The maximum near it is found from
+/// the time stamps themselves. With its ratio r, p = min(1, candidates exp(-r)): with Bonferroni's correction, p is 1
+/// if the strongest frequency is no stronger than expected by chance.
 struct Periodicity {
   double frequency_hz = 0;
   double rayleigh = 0;         ///< z
@@ -69,8 +74,8 @@ struct Periodicity {
   bool found() const;          ///< p < 1e-6
 };
 
-/// `times` must be in order, ns; only the first 800 s are searched. Nothing if there are fewer than 100 time stamps or
-/// fewer than 20 periods of 2 kHz.
-std::optional<Periodicity> find_periodicity(std::span<const TimeNs> times);
+/// `times` must be in order, ns; only the first 1.6 million shortest periods are searched, 800 s of the default range.
+/// Nothing if there are fewer than 100 time stamps or fewer than 20 of the shortest periods.
+std::optional<Periodicity> find_periodicity(std::span<const TimeNs> times, const FrequencyRange& range = {});
 
 }  // namespace esim::inline stats

@@ -11,6 +11,20 @@ const schema: SchemaNode[] = [
     members: [
       { name: "contrast_threshold", kind: "number", help: "change that fires an event" },
       { name: "readout", kind: "group", optional: true, members: [{ name: "row_time_us", kind: "number" }] },
+      {
+        name: "filters",
+        kind: "group",
+        members: [
+          {
+            name: "region",
+            kind: "group",
+            optional: true,
+            members: [
+              { name: "windows", kind: "list", element: { kind: "group", members: [{ name: "x", kind: "integer" }] } },
+            ],
+          },
+        ],
+      },
     ],
   },
   {
@@ -51,4 +65,15 @@ test("an option of what is not chosen is found too, with what it needs", () => {
 test("in lists every entry has its options, and without one the list is named", () => {
   assert.deepEqual(found("width", { cameras: [{}, {}] }), ["cameras.0.width", "cameras.1.width"]);
   assert.deepEqual(needs("width"), ["cameras"]);
+});
+
+test("an option of a list in a group that is not used needs the group", () => {
+  assert.deepEqual(found("filters x"), ["event_camera.filters.region.windows.0.x"]);
+  assert.deepEqual(needs("filters x"), ["event_camera.filters.region"]);
+  const region = { event_camera: { filters: { region: { windows: [{ x: 1 }, { x: 2 }] } } } };
+  assert.deepEqual(
+    found("windows x", region),
+    [0, 1].map((i) => `event_camera.filters.region.windows.${i}.x`),
+  );
+  assert.deepEqual(needs("windows x", region), [undefined, undefined]);
 });

@@ -6,6 +6,7 @@
 
 #include "esim/core/random.h"
 #include "esim/core/vector_math.h"
+#include "esim/event_camera/noise_rate.h"
 
 namespace esim::inline event_camera {
 namespace {
@@ -13,6 +14,7 @@ namespace {
 constexpr double kElectron_fC = 1.602176634e-4;  // elementary charge, fA s
 constexpr double kMaxDecay = 0.25;               // in one step far from equilibrium: as steps_for()
 constexpr double kSettled = 1e-13;               // brightness: differences below this are zero
+constexpr float kUnreachable = 1e6F;             // threshold of a dead pixel
 constexpr double kGuard = 1e-9;                  // between bounds and levels, above all rounding errors
 
 }  // namespace
@@ -40,8 +42,8 @@ CircuitArray::CircuitArray(const EventCameraOptions& options, int width, int hei
   if (o.noise > 0) {
     constexpr double kBrightest = 1e5;  // irradiance; brighter light has the same time constant for the noise
     circuit_.noise.emplace(o.noise * o.noise / o.photodiode_charge_e, circuit_.poles.t2_ns,
-                           circuit_.poles.t1_unit_ns / kBrightest, circuit_.poles.t1_unit_ns / dark_,
-                           AddressedRandom(seed, Purpose::circuit_noise, stream));
+                           circuit_.poles.t1_unit_ns / std::max(kBrightest, 10 * dark_),
+                           circuit_.poles.t1_unit_ns / dark_, AddressedRandom(seed, Purpose::circuit_noise, stream));
   }
   make_pixels(options, seed, stream);
 }
@@ -56,15 +58,18 @@ void CircuitArray::make_pixels(const EventCameraOptions& options, std::uint64_t 
   leak_.resize(count + kVectorPadding);
   if (options.labels) origins_.resize(count), hot_.resize(count);
   const AddressedRandom random(seed, Purpose::circuit_mismatch, stream);
-  const double refractory_ns = 1e3 * options.refractory_period_us;
+  const double refractory_ns = 1e3 * options.refractory_period_us, max_rate = max_rate_hz(options);
+  limits_ = std::isfinite(max_rate);
+  const double min_interval_ns = 1e9 / max_rate;
   for (std::size_t i = 0; i < count; ++i) {
     const auto pixel = static_cast<std::uint32_t>(i);
     const auto [common, on] = random.normals(pixel, 0);
     const auto [off, noise] = random.normals(pixel, 1);
     const auto [leak, refractory] = random.normals(pixel, 2);
     const auto [hot, sign] = random.uniforms(pixel, 3);
+    const auto [dead, ignored] = random.uniforms(pixel, 5);
     const auto [hot_decades, unused] = random.normals(pixel, 4);
-    static_cast<void>(unused);
+    static_cast<void>(unused), static_cast<void>(ignored);
     const auto threshold = [&, both = common](double mean, double own) {  // clang 14 does not capture `common` itself
       return std::max(mean * (1 + o.threshold_mismatch_common * both) + options.threshold_mismatch * own,
                       std::max(kMinContrastThreshold, 0.2 * mean));
@@ -72,8 +77,10 @@ void CircuitArray::make_pixels(const EventCameraOptions& options, std::uint64_t 
     CircuitParameters& p = parameters_[i];
     p.on = static_cast<float>(threshold(options.threshold_on(), on));
     p.off = static_cast<float>(threshold(options.threshold_off(), off));
+    if (dead < options.dead_pixels) p.on = p.off = kUnreachable;
     p.noise = static_cast<float>(std::pow(10.0, o.noise_mismatch_decades * noise));
-    p.refractory = static_cast<float>(refractory_ns * std::pow(10.0, o.refractory_mismatch_decades * refractory));
+    p.refractory = static_cast<float>(
+        std::max(min_interval_ns, refractory_ns * std::pow(10.0, o.refractory_mismatch_decades * refractory)));
     double rate = options.leak_rate_hz * options.threshold_on() * std::pow(10.0, options.leak_mismatch_decades * leak);
     if (hot < options.hot_pixels) {
       rate += options.hot_pixel_rate_hz * options.threshold_on() *
@@ -289,11 +296,12 @@ void CircuitArray::advance_one(const Row& row, std::uint32_t column, std::size_t
     CircuitPixel pixel = this->pixel(i);
     pixel.set(piece, ramp, row.start);
     set_bounds(i, pixel.run(emit));
+    buffer.lost += limits_ ? pixel.lost() : 0;
     light_[i] = light1, lag_[i] = buffer.lag[at], y_[i] = buffer.y[at], v_[i] = buffer.v[at];
     return;
   }
   CircuitState front{lag_[i], v_[i]};
-  run(i, front, ramp, row.start, row.length, false, emit);
+  buffer.lost += run(i, front, ramp, row.start, row.length, false, emit);
   light_[i] = light1;
   lag_[i] = std::abs(front.lag) < kSettled ? 0.0 : front.lag;
   y_[i] = light1 - std::log1p(lag_[i]);
@@ -301,9 +309,11 @@ void CircuitArray::advance_one(const Row& row, std::uint32_t column, std::size_t
 }
 
 /// Takes a pixel along a ramp of light, in as many steps as needed; skips those within its bounds unless `always`.
+/// Returns the number of events that a maximum rate has lost.
 template <typename Emit>
-void CircuitArray::run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length,
-                       bool always, const Emit& emit) {
+std::int64_t CircuitArray::run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length,
+                               bool always, const Emit& emit) {
+  std::int64_t lost = 0;
   CircuitPixel pixel = this->pixel(i);
   const int steps = steps_for(circuit_.poles, front, ramp, length);
   for (int k = 0; k < steps; ++k) {
@@ -320,7 +330,9 @@ void CircuitArray::run(std::size_t i, CircuitState& front, const LightRamp& ramp
     if (quiet && !always) continue;
     pixel.set(piece, part, from);
     set_bounds(i, pixel.run(emit));
+    lost += limits_ ? pixel.lost() : 0;
   }
+  return lost;
 }
 
 TimeNs CircuitArray::acknowledge(std::uint32_t pixel, TimeNs t) {
@@ -345,7 +357,7 @@ void CircuitArray::resume(std::uint32_t pixel, const PastSegment& past, CircuitB
                         static_cast<std::uint16_t>(y), static_cast<std::int8_t>(polarity)});
     if (!origins_.empty()) label(pixel, requests.back().t, polarity, buffer.labels);
   };
-  run(pixel, front, {light0, (light1 - light0) / length}, start, length, false, emit);
+  buffer.lost += run(pixel, front, {light0, (light1 - light0) / length}, start, length, false, emit);
 }
 
 void CircuitArray::flush(const Row& row, CircuitBuffer& buffer, PackedEvents& events) {

@@ -30,6 +30,7 @@ struct CircuitBuffer {
   PerPixel<double> time, polarity, reported;            // of events
   PerPixel<std::uint32_t> place;
   std::size_t events = 0;
+  std::int64_t lost = 0;  // events beyond the maximum rate of their pixels
   std::vector<NewLabel> labels;  // if they are wanted
 };
 
@@ -78,8 +79,8 @@ class CircuitArray {
   template <class D>
   bool move_vector(D d, const Row& row, std::size_t x, CircuitBuffer& buffer, std::size_t at);
   template <typename Emit>
-  void run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length, bool always,
-           const Emit& emit);
+  std::int64_t run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length, bool always,
+                   const Emit& emit);
   void advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer, PackedEvents& events);
   void set_bounds(std::size_t pixel, const CircuitBounds& bounds);
   CircuitPixel pixel(std::size_t i);
@@ -89,7 +90,8 @@ class CircuitArray {
   Circuit circuit_;
   int width_, height_;
   AddressedRandom starts_;
-  double dark_ = 0;  // L = ln(E + dark)
+  double dark_ = 0;      // L = ln(E + dark)
+  bool limits_ = false;  // there is a maximum rate of events of a pixel
   TimeNs epoch_ = kNoEpoch;
 
   // Per pixel.

@@ -4,9 +4,10 @@ namespace esim::inline event_camera {
 namespace {
 
 // Of the times at which a signal without noise crosses a level, and at which noise begins to matter.
-constexpr double kResolution_ns = 0.25, kNoiseResolution_ns = 1e-3;
+constexpr double kResolution_ns = 0.25, kNoiseResolution_ns = 0.05;
 
 constexpr double kRestingDeviations = 3.5;
+constexpr std::uint8_t kFirstSteps = 16;
 
 }  // namespace
 
@@ -14,12 +15,12 @@ constexpr double kRestingDeviations = 3.5;
 /// which it reaches the threshold.
 std::optional<double> CircuitPixel::find_near(double a, double b) const {
   // The reach of the noise falls with rising light, so that it is maximal at one of the ends.
+  const double reach_max = reach(light_.rate > 0 ? a : b, kActiveDeviations);
+  const auto [low, high] = range(a, b);
+  if (high + reach_max < upper() && low - reach_max > lower()) return std::nullopt;
   const double reach_a = reach(a, kActiveDeviations), reach_b = reach(b, kActiveDeviations);
   const double value = signal(a);
   if (value + reach_a >= upper() || value - reach_a <= lower()) return a;
-  const auto [low, high] = range(a, b);
-  const double reach_max = std::max(reach_a, reach_b);
-  if (high + reach_max < upper() && low - reach_max > lower()) return std::nullopt;
   if (b - a <= (noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns)) {
     const double last = signal(b);
     return last + reach_b >= upper() || last - reach_b <= lower() ? std::optional(b) : std::nullopt;
@@ -53,28 +54,74 @@ std::optional<double> CircuitPixel::find_near(double a, double b) const {
   return find_near(middle, b);
 }
 
+/// Chooses the pole for the light at `s`.
+void CircuitPixel::follow_light(double s) {
+  state_.node_light = static_cast<float>(light(s));
+  state_.pole = circuit_.pole(light(s));
+}
+
 void CircuitPixel::start_interval(const NoiseState& from, double s) {
-  const double here = light(s), value = signal(s);
-  const double distance = std::min(upper() - value, value - lower()) / (gain_ * circuit_.deviation(here));
+  if (std::abs(light(s) - static_cast<double>(state_.node_light)) > kPoleReach) follow_light(s);
+  const auto level = level_at(signal(s), per_deviation());
   state_.node_time = start_ + s;
-  state_.node_light = static_cast<float>(here);
-  state_.active = distance < kInactiveDeviations;
+  state_.active = level.has_value();
   state_.node += 1;
   state_.from = from;
-  if (!state_.active) return;
-  set_interval(noise_->next(from, pixel_, state_.node, noise_->pole_of(circuit_.t1_ns(here)),
-                            PhotoreceptorNoise::level_for(distance)));
+  if (level) set_interval(noise_->next(from, pixel_, state_.node, state_.pole, *level, draws_));
+}
+
+/// Moves `s` through steps of the noise in which surely no threshold is reached: to the beginning of the first one that
+/// may contain a crossing or is followed by an interval of another level, or to the end of the piece; then, returns
+/// bounds.
+std::optional<CircuitBounds> CircuitPixel::skip_quiet_steps(double& s) {
+  double scale = per_deviation();
+  double h = noise_->length(state_.pole, PhotoreceptorNoise::kSteps);
+  double decay1 = std::exp(-piece_.k1 * h), decay2 = std::exp(-piece_.k2 * h);
+  const double curve1 = 0.125 * piece_.k1 * piece_.k1, curve2 = 0.125 * piece_.k2 * piece_.k2;
+  double fast = piece_.fast * std::exp(-piece_.k1 * s), slow = piece_.slow * std::exp(-piece_.k2 * s);
+  double value = piece_.level + piece_.rate * s + fast + slow + leak_ * (start_ + s);
+  for (bool at_node = false;; at_node = true) {
+    const double node = state_.node_time + h, end = std::min(node - start_, piece_.length), length = end - s;
+    const auto [low, high] = noise_->step_bounds(state_.from, state_.to, h);
+    const double beyond = std::min((std::abs(fast) * curve1 + std::abs(slow) * curve2) * length * length,
+                                   std::abs(fast) + std::abs(slow));
+    const bool whole = at_node && node - start_ <= piece_.length;
+    fast *= whole ? decay1 : std::exp(-piece_.k1 * length), slow *= whole ? decay2 : std::exp(-piece_.k2 * length);
+    const double next = piece_.level + piece_.rate * end + fast + slow + leak_ * (start_ + end);
+    const double change = std::abs(light(end) - static_cast<double>(state_.node_light));
+    if (std::min(value, next) - beyond + gain_ * low <= lower() ||
+        std::max(value, next) + beyond + gain_ * high >= upper() || change > kLightReach)
+      return std::nullopt;
+    if (node - start_ > piece_.length)
+      return CircuitBounds{-gain_ * low - static_cast<double>(parameters_.off),
+                           static_cast<double>(parameters_.on) - gain_ * high, node};
+    if (change > kPoleReach) {
+      start_interval(state_.to, end);
+      s = end, value = next;
+      if (!state_.active || state_.level != PhotoreceptorNoise::kSteps) return std::nullopt;
+      scale = per_deviation();
+      h = noise_->length(state_.pole, PhotoreceptorNoise::kSteps);
+      decay1 = std::exp(-piece_.k1 * h), decay2 = std::exp(-piece_.k2 * h);
+      continue;
+    }
+    if (level_at(next, scale) != PhotoreceptorNoise::kSteps) return std::nullopt;
+    state_.from = state_.to;
+    state_.node += 1;
+    state_.to = noise_->after_step(state_.from, pixel_, state_.node, state_.pole, draws_);
+    state_.node_time = node;
+    s = end, value = next;
+  }
 }
 
 void CircuitPixel::activate(double s) {
-  const double here = light(s);
-  const std::int32_t pole = noise_->pole_of(circuit_.t1_ns(here));
+  follow_light(s);
+  state_.first_steps = kFirstSteps;
   state_.node += 1;
-  const NoiseState from = noise_->after(state_.from, start_ + s - state_.node_time, pixel_, state_.node, pole);
+  const NoiseState from = noise_->after(state_.from, start_ + s - state_.node_time, pixel_, state_.node, state_.pole);
   start_interval(from, s);
   if (state_.active) return;
   state_.active = true;  // between the distances at which it becomes inactive and active
-  set_interval(noise_->next(from, pixel_, state_.node, pole, 0));
+  set_interval(noise_->next(from, pixel_, state_.node, state_.pole, 0, draws_));
 }
 
 /// The noise at `s`, at the end of a reset. It continues from the last node before, whatever the signal did meanwhile.
@@ -88,10 +135,9 @@ NoiseState CircuitPixel::noise_at(double s) {
     state_.active = false;
   }
   state_.node += 1;
-  state_.from = noise_->after(state_.from, start_ + s - state_.node_time, pixel_, state_.node,
-                              noise_->pole_of(circuit_.t1_ns(light(s))));
+  follow_light(s);
+  state_.from = noise_->after(state_.from, start_ + s - state_.node_time, pixel_, state_.node, state_.pole);
   state_.node_time = start_ + s;
-  state_.node_light = static_cast<float>(light(s));
   return state_.from;
 }
 
@@ -112,14 +158,18 @@ void CircuitPixel::open(double light, double time, double place) {
   if (noise_ == nullptr) return;
   state_.active = true;
   state_.node = 1;
-  set_interval(noise_->first(pixel_, noise_->pole_of(circuit_.t1_ns(light)), PhotoreceptorNoise::kLevels - 1));
+  set_interval(noise_->first(pixel_, circuit_.pole(light), PhotoreceptorNoise::kSteps, draws_));
   state_.reference += gain_ * state_.from.x;
 }
 
 void CircuitPixel::release(double s) {
   state_.held_until = -1;
   if (origin_ != nullptr) origin_->v = piece_.value(s), origin_->time = start_ + s;
-  state_.reference = signal(s) + (noise_ != nullptr ? gain_ * noise_at(s).x : 0.0);
+  const double value = signal(s) + (noise_ != nullptr ? gain_ * noise_at(s).x : 0.0);
+  const double change = value - state_.reference;
+  lost_ +=
+      static_cast<std::int64_t>(std::abs(change) / static_cast<double>(change > 0 ? parameters_.on : parameters_.off));
+  state_.reference = value;
 }
 
 /// (15) of docs/methods/pixel.md. Noise is the rest of the threshold; without noise, the signal is.

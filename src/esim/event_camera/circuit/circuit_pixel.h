@@ -20,6 +20,9 @@ struct Circuit {
   bool waits = false;  ///< after an event, a pixel waits until it is acknowledged
 
   double t1_ns(double light) const { return poles.t1_unit_ns * std::exp(-light); }
+  std::int16_t pole(double light) const {
+    return static_cast<std::int16_t>(noise->pole_of(std::log(poles.t1_unit_ns) - light));
+  }
   /// Standard deviation of the noise in steady light.
   double deviation(double light) const { return noise->deviation_at(t1_ns(light)); }
 };
@@ -38,10 +41,11 @@ struct CircuitPixelState {
   double node_time = 0;    ///< start of the noise's interval
   NoiseState from, to;     ///< at the ends of the interval; if inactive, `from` is the state at node_time
   std::uint32_t node = 0;  ///< number of the node at the start of the interval
-  float node_light = 0;    ///< L at the last node, or at the last bounds without noise
+  float node_light = 0;    ///< L where the pole was chosen, or at the last bounds without noise
   std::int16_t pole = 0;
   std::int8_t level = 0;
-  bool active = false;  ///< its noise matters at present
+  bool active = false;           ///< its noise matters at present
+  std::uint8_t first_steps = 0;  ///< that remain since it became active
 };
 
 /// For labels: where the change of a pixel's signal begins, and its parts at the last event, ln.
@@ -57,7 +61,8 @@ struct CircuitBounds {
   double low = 0, high = 0, until = 0;
 };
 
-inline constexpr double kLightReach = 0.2;  ///< change of L within which the noise keeps its time constant
+inline constexpr double kLightReach = 0.2;  ///< change of L within which an interval of the noise keeps its pole
+inline constexpr double kPoleReach = 0.05;  ///< change of L within which the next interval keeps it
 inline constexpr double kActiveDeviations =
     5.5;  ///< distance to a threshold, in deviations, at which noise begins to matter
 inline constexpr double kInactiveDeviations = 6.0;  ///< distance at a node at which it ceases to matter
@@ -86,12 +91,15 @@ class CircuitPixel {
 
   /// The stretch that the next functions are about: its signal, its light, and its start in ns after the epoch.
   void set(const CircuitPiece& piece, const LightRamp& light, double start) {
-    piece_ = piece, light_ = light, start_ = start;
+    piece_ = piece, light_ = light, start_ = start, lost_ = 0;
   }
 
   /// Calls emit(time, polarity) for each event, and returns the bounds that hold afterwards.
   template <typename Emit>
   CircuitBounds run(const Emit& emit);
+
+  /// Events that would have fired during resets since the last set().
+  std::int64_t lost() const { return lost_; }
 
   /// Ends the reset of a pixel at `s`: its new reference is signal plus noise.
   void release(double s);
@@ -120,7 +128,20 @@ class CircuitPixel {
     return sa * sb > 0 && std::min(std::abs(sa), std::abs(sb)) > 0.25 * std::abs(sa - sb);
   }
   void activate(double s);
+
+  /// From ln to standard deviations of the noise.
+  double per_deviation() const { return 1 / (gain_ * noise_->deviation(state_.pole)); }
+  /// The level of the interval after a node with this signal; none if the pixel becomes inactive. A signal that has
+  /// just come near a threshold will probably move on: its first intervals are steps.
+  std::optional<std::int32_t> level_at(double value, double per_deviation) {
+    const double distance = std::min(upper() - value, value - lower()) * per_deviation;
+    if (distance >= kInactiveDeviations) return std::nullopt;
+    if (state_.first_steps > 0) return --state_.first_steps, PhotoreceptorNoise::kSteps;
+    return noise_->level_for(state_.pole, distance);
+  }
+  void follow_light(double s);
   void start_interval(const NoiseState& from, double s);
+  std::optional<CircuitBounds> skip_quiet_steps(double& s);
   NoiseState noise_at(double s);
   CircuitBounds bounds_without_noise();
 
@@ -159,6 +180,8 @@ class CircuitPixel {
   LightRamp light_;
   double start_ = 0, leak_, gain_;
   CircuitOrigin* origin_ = nullptr;
+  PhotoreceptorNoise::StepDraws draws_;
+  std::int64_t lost_ = 0;
 };
 
 template <typename Emit>
@@ -193,6 +216,10 @@ CircuitBounds CircuitPixel::run(const Emit& emit) {
       if (!near) return bounds_without_noise();
       s = *near;
       activate(s);
+    }
+    if (state_.level == PhotoreceptorNoise::kSteps) {
+      if (const auto bounds = skip_quiet_steps(s)) return *bounds;
+      if (!state_.active) continue;
     }
     const PhotoreceptorNoise::Interval noise = interval();
     const double node = state_.node_time + noise.length - start_;

@@ -10,12 +10,19 @@ namespace {
 
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
+/// The first multiple of `period` at `t` or later.
+TimeNs next_multiple(TimeNs t, TimeNs period) {
+  const TimeNs multiple = t / period * period;
+  return multiple < t ? multiple + period : multiple;
+}
+
 }  // namespace
 
 CircuitReadout::CircuitReadout(const ReadoutOptions& options, int width, int height)
     : options_(options),
       width_(width),
       scan_(to_ns(options.scan_period_us * 1e-6)),
+      time_stamp_(std::max<TimeNs>(1, to_ns(options.time_stamp_us * 1e-6))),
       usual_delay_(to_ns(1e-6 * (1 + options.scan_period_us * (options.scan_hold ? 2 : 1) + options.row_rest_us +
                                  options.row_scan_us * height))),
       row_time_(1e3 * options.row_time_us),
@@ -38,9 +45,7 @@ double CircuitReadout::visit(std::uint32_t row, double t) const {
 TimeNs CircuitReadout::scan_time(const Event& request) const {
   const TimeNs phase = scan_ * request.x / width_;
   const TimeNs since = options_.scan_hold ? request.t : request.t - phase;
-  TimeNs scan = since / scan_ * scan_;
-  if (scan < since) scan += scan_;
-  return scan + phase;
+  return next_multiple(since, scan_) + phase;
 }
 
 void CircuitReadout::take(const Event& request) {
@@ -58,8 +63,9 @@ void CircuitReadout::take(const Event& request) {
 
 /// Stamps a request, and lets its pixel continue.
 void CircuitReadout::stamp(CircuitArray& pixels, const Event& request, TimeNs t) {
-  read_.push_back({t, request.x, request.y, request.polarity});
-  if (labels_ != nullptr) labels_->read(request, t);
+  const TimeNs time_stamp = next_multiple(t, time_stamp_);
+  read_.push_back({time_stamp, request.x, request.y, request.polarity});
+  if (labels_ != nullptr) labels_->read(request, time_stamp);
   longest_delay_ = std::max(longest_delay_, t - request.t);
   delayed_ += t - request.t > usual_delay_ ? 1 : 0;
   const auto pixel = static_cast<std::uint32_t>(request.y) * static_cast<std::uint32_t>(width_) +
@@ -127,7 +133,7 @@ void CircuitReadout::advance(CircuitArray& pixels, EventQueue& found, TimeNs wat
       take(request);
     }
   }
-  if (scan_ > 0) {  // stamps are not in the order of requests
+  if (scan_ > 0 || time_stamp_ > 1) {  // stamps are not in the order of requests
     std::sort(read_.begin() + static_cast<std::ptrdiff_t>(released_), read_.end());
   }
   history.keep_after(watermark);

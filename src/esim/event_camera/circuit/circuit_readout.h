@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "esim/event_camera/circuit/circuit_array.h"
@@ -33,6 +34,9 @@ class CircuitReadout {
 
   /// Appends the events with t <= until that were not released before, in order.
   void release_until(TimeNs until, std::vector<Event>& out);
+
+  /// Events that a maximum rate of the pixels has lost since the last call.
+  std::int64_t take_lost() { return std::exchange(buffer_.lost, 0); }
 
   std::int64_t dropped() const { return dropped_; }
   std::int64_t delayed() const { return delayed_; }
@@ -76,7 +80,7 @@ class CircuitReadout {
 
   ReadoutOptions options_;
   int width_;
-  TimeNs scan_;
+  TimeNs scan_, time_stamp_;
   TimeNs usual_delay_;                          // of an idle readout, at most
   double row_time_, event_time_, pass_, rest_;  // ns
 

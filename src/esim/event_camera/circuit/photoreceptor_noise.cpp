@@ -3,13 +3,15 @@
 #include <fmt/format.h>
 
 #include "esim/core/error.h"
+#include "esim/core/vector_math.h"
 
 namespace esim::inline event_camera {
 namespace {
 
-constexpr double kPoleStep = 1.01;  // ratio of successive time constants t1
-constexpr double kLeaf = 0.14;      // maximum length of a leaf, in min(t1, t2)
+constexpr double kPoleStep = 1.01;   // ratio of successive time constants t1
+constexpr double kNeglected = 0.02;  // maximum deviation of x from a cubic within a step, in deviations of x
 constexpr int kLevelsBelowLeaves = 4;
+constexpr std::uint32_t kStepAddresses = 0x80000000;  // above those of the tree of node 0
 constexpr double kBoundDeviations = 5;
 
 /// A symmetric 2 x 2 matrix.
@@ -81,8 +83,8 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
                                        const AddressedRandom& random)
     : variance_(variance),
       t2_(t2_ns),
-      log_step_(std::log(kPoleStep)),
       log_first_(std::log(t1_min_ns)),
+      per_log_step_(1 / std::log(kPoleStep)),
       coarse_(0.6 * t2_ns),
       random_(random) {
   if (!(variance > 0) || !(t2_ns > 0) || !(t1_min_ns > 0) || !(t1_max_ns >= t1_min_ns))
@@ -90,26 +92,42 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
         fmt::format("photoreceptor noise: variance ({}), time constants t2 ({} ns) and t1 ({} to {} ns) must "
                     "be above 0, in this order",
                     variance, t2_ns, t1_min_ns, t1_max_ns));
-  const auto count = static_cast<std::size_t>(std::ceil((std::log(t1_max_ns) - log_first_) / log_step_)) + 1;
+  const auto count = static_cast<std::size_t>(std::ceil((std::log(t1_max_ns) - log_first_) * per_log_step_)) + 1;
   for (std::size_t i = 0; i < count; ++i) {
     Pole pole;
-    pole.t1 = std::exp(log_first_ + static_cast<double>(i) * log_step_);
+    pole.t1 = std::exp(log_first_ + static_cast<double>(i) / per_log_step_);
     if (std::abs(pole.t1 / t2_ - 1) < 0.004) pole.t1 = t2_ * 1.004;  // the formulae divide by t1 - t2
     pole.deviation = std::sqrt(variance_ * pole.t1 / (pole.t1 + t2_));
     const double longest = 4 * (pole.t1 + t2_);
-    for (std::size_t level = 0; level < kLevels; ++level)
-      pole.steps[level] = make_step(pole.t1, std::ldexp(longest, -static_cast<int>(level)));
+    for (int k = 0; k < kSteps; ++k)
+      pole.steps[static_cast<std::size_t>(k)] = make_step(pole.t1, std::ldexp(longest, -k));
     int leaves = 0;
-    for (int k = 0; k < kLevels || leaves <= kLevelsBelowLeaves; ++k) {
+    for (int k = 0; leaves <= kLevelsBelowLeaves; ++k) {
       pole.bridges.push_back(make_bridge(pole.t1, std::ldexp(longest, -k)));
       leaves += pole.bridges.back().leaf ? 1 : 0;
     }
+    pole.step_bridge = pole.bridges.size();
+    const double step = step_length(pole.t1);
+    pole.steps[kSteps] = make_step(pole.t1, step);
+    while (pole.first_in_steps < kSteps && pole.steps[static_cast<std::size_t>(pole.first_in_steps)].h > 8 * step)
+      ++pole.first_in_steps;
+    for (int k = 0; k <= kLevelsBelowLeaves; ++k) pole.bridges.push_back(make_bridge(pole.t1, std::ldexp(step, -k)));
     poles_.push_back(std::move(pole));
   }
 }
 
 PhotoreceptorNoise::Step PhotoreceptorNoise::make_step(double t1, double h) const {
   return {h, drift(t1, t2_, h), root(added(variance_, t1, t2_, h))};
+}
+
+/// The longest interval within which x is a cubic, except for kNeglected.
+double PhotoreceptorNoise::step_length(double t1) const {
+  double shortest = 0.1 * std::min(t1, t2_), longest = 4 * std::max(t1, t2_);
+  for (int k = 0; k < 30; ++k) {
+    const double h = std::sqrt(shortest * longest);
+    (make_bridge(t1, h).leaf ? shortest : longest) = h;
+  }
+  return shortest;
 }
 
 PhotoreceptorNoise::Bridge PhotoreceptorNoise::make_bridge(double t1, double h) const {
@@ -127,30 +145,54 @@ PhotoreceptorNoise::Bridge PhotoreceptorNoise::make_bridge(double t1, double h) 
   bridge.spread = root({covariance.yy, 0.5 * (covariance.xy + covariance.yx), covariance.xx});
   bridge.deviation = std::sqrt(std::max(covariance.xx, 0.0));
   const double deviation = std::sqrt(variance_ * t1 / (t1 + t2_));
-  bridge.leaf = h <= kLeaf * std::min(t1, t2_) && bridge.deviation < 0.06 * deviation;
+  bridge.leaf = bridge.deviation <= kNeglected * deviation;
   return bridge;
 }
 
-std::int32_t PhotoreceptorNoise::pole_of(double t1_ns) const {
-  const double place = std::round((std::log(t1_ns) - log_first_) / log_step_);
-  return static_cast<std::int32_t>(std::clamp(place, 0.0, static_cast<double>(poles_.size() - 1)));
-}
-
-PhotoreceptorNoise::Interval PhotoreceptorNoise::first(std::uint32_t pixel, std::int32_t pole,
-                                                       std::int32_t level) const {
+PhotoreceptorNoise::Interval PhotoreceptorNoise::first(std::uint32_t pixel, std::int32_t pole, std::int32_t level,
+                                                       StepDraws& draws) const {
   // Stationary: Var y = v, Var x = Cov xy = v t1 / (t1 + t2). Draw 0 of node 0 belongs to this state alone.
   const double t1 = poles_[static_cast<std::size_t>(pole)].t1, common = variance_ * t1 / (t1 + t2_);
   const auto n = random_.normals(pixel, 0);
-  return next(root({variance_, common, common}) * NoiseState{n[0], n[1]}, pixel, 0, pole, level);
+  return next(root({variance_, common, common}) * NoiseState{n[0], n[1]}, pixel, 0, pole, level, draws);
 }
 
 PhotoreceptorNoise::Interval PhotoreceptorNoise::next(const NoiseState& from, std::uint32_t pixel, std::uint32_t node,
-                                                      std::int32_t pole, std::int32_t level) const {
+                                                      std::int32_t pole, std::int32_t level, StepDraws& draws) const {
   const Step& step = poles_[static_cast<std::size_t>(pole)].steps[static_cast<std::size_t>(level)];
   Interval interval{from, {}, pixel, node, pole, level, step.h};
+  if (level == kSteps) {
+    interval.to = after_step(from, pixel, node, pole, draws);
+    return interval;
+  }
   const auto n = normals(interval, 1);
   interval.to = plus(step.drift * from, step.spread * NoiseState{n[0], n[1]});
   return interval;
+}
+
+/// Standard normal deviates by the Box-Muller method in single precision: the radius from 32 random bits, at most 6.7.
+void PhotoreceptorNoise::draw_block(std::uint32_t pixel, std::uint32_t block, StepDraws& draws) const {
+  alignas(64) std::array<std::uint32_t, 16> items, addresses;
+  items.fill(pixel);
+  for (std::uint32_t i = 0; i < 16; ++i) addresses[i] = kStepAddresses | (kBlock * block + i);
+  alignas(64) std::array<std::array<std::uint32_t, 16>, 4> words;
+  random_.bits(kBlock, items.data(), addresses.data(),
+               {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
+  const hn::ScalableTag<float> d;
+  const hn::RebindToSigned<decltype(d)> di;
+  const hn::RebindToUnsigned<decltype(d)> du;
+  const auto unit = [&](const std::uint32_t* from) {  // in (0, 1): the upper 31 bits and a half
+    const auto halves = hn::BitCast(di, hn::ShiftRight<1>(hn::LoadU(du, from)));
+    return hn::MulAdd(hn::ConvertTo(d, halves), hn::Set(d, 0x1p-31F), hn::Set(d, 0x1p-32F));
+  };
+  for (std::size_t i = 0; i < kBlock; i += hn::Lanes(d)) {
+    const auto radius = hn::Sqrt(hn::Max(hn::Zero(d), hn::Mul(hn::Set(d, -2.0F), logarithm(d, unit(&words[0][i])))));
+    auto cosine = hn::Zero(d), sine = cosine;
+    cosine_and_sine(d, unit(&words[1][i]), cosine, sine);
+    hn::StoreU(hn::Mul(radius, cosine), d, &draws.first[i]);
+    hn::StoreU(hn::Mul(radius, sine), d, &draws.second[i]);
+  }
+  draws.block = block;
 }
 
 NoiseState PhotoreceptorNoise::after(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
@@ -175,7 +217,8 @@ NoiseState PhotoreceptorNoise::middle(const Interval& interval, const Piece& pie
 
 NoiseState PhotoreceptorNoise::at(const Interval& interval, double tau) const {
   const Pole& pole = poles_[static_cast<std::size_t>(interval.pole)];
-  Piece piece{interval.from, interval.to, 0.0, 1, static_cast<std::size_t>(interval.level)};
+  Piece piece{interval.from, interval.to, 0.0, 1, pole.bridge_of(interval.level)};
+  const std::size_t last = interval.level == kSteps ? pole.bridges.size() - 1 : pole.step_bridge - 1;
   const auto descend = [&](const Bridge& bridge) {
     const NoiseState centre = middle(interval, piece, bridge);
     const double half = piece.start + 0.5 * bridge.h;
@@ -189,7 +232,7 @@ NoiseState PhotoreceptorNoise::at(const Interval& interval, double tau) const {
   const NoiseCubic x{piece.from.x, slope(piece.from), piece.to.x, slope(piece.to), pole.bridges[piece.bridge].h};
   const double here = x.value(tau - piece.start);
   // y is rough: the line between the ends of a much shorter piece has its variance.
-  while (piece.bridge + 1 < pole.bridges.size()) descend(pole.bridges[piece.bridge]);
+  while (piece.bridge < last) descend(pole.bridges[piece.bridge]);
   const double u = (tau - piece.start) / pole.bridges[piece.bridge].h;
   return {piece.from.y + u * (piece.to.y - piece.from.y), here};
 }

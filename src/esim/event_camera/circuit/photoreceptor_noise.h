@@ -33,14 +33,15 @@ struct NoiseMatrix {
 ///
 /// with the elementary charge q and the charge Q that moves the photoreceptor by one e-fold.
 ///
-/// The noise is a function of time that is evaluated only where it is needed. A pixel draws its state at nodes, up to
-/// 4 (t1 + t2) apart; between two nodes, the state in the middle of an interval follows from the states at its ends by
-/// the bridge of the process, and so on down to leaves of at most 0.14 min(t1, t2), in which x is a cubic. Every draw
-/// is addressed by pixel, node and place in this tree. So the noise does not depend on the times at which it is
-/// evaluated.
+/// The noise is a function of time that is evaluated only where it is needed. A pixel draws its state at nodes. Near a
+/// threshold, and while the signal moves, the intervals between nodes are steps, so short that x is a cubic in them.
+/// Elsewhere they are 2 or 4 (t1 + t2) long; the state in the middle of such an interval follows from the states at
+/// its ends by the bridge of the process, and so on down to leaves as short as steps. Every draw is addressed by pixel,
+/// node and place in this tree. So the noise does not depend on the times at which it is evaluated.
 class PhotoreceptorNoise {
  public:
-  static constexpr int kLevels = 5;  ///< of intervals between nodes: 4, 2, 1, 1/2, 1/4 times (t1 + t2)
+  static constexpr int kLevels = 6;  ///< of intervals between nodes: 4, 2, 1, 1/2, 1/4 times (t1 + t2), and steps
+  static constexpr int kSteps = kLevels - 1;
 
   /// `variance` is q / Q, `t2_ns` the time constant of the second pole, [t1_min_ns, t1_max_ns] those of the first one
   /// in the brightest and in the darkest light. First poles are rounded to steps of 1 %.
@@ -56,7 +57,10 @@ class PhotoreceptorNoise {
   };
 
   /// The number of the first pole, for Interval::pole.
-  std::int32_t pole_of(double t1_ns) const;
+  std::int32_t pole_of(double log_t1_ns) const {
+    const double place = (log_t1_ns - log_first_) * per_log_step_ + 0.5;
+    return static_cast<std::int32_t>(std::clamp(place, 0.0, static_cast<double>(poles_.size()) - 0.5));
+  }
   double t1_ns(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].t1; }
   double t2_ns() const { return t2_; }
   /// The length of an interval, ns.
@@ -70,14 +74,39 @@ class PhotoreceptorNoise {
 
   /// The level of the next interval, for the distance of the nearer threshold in standard deviations. No limit may be
   /// the distance at which noise begins to matter, where rounding would decide.
-  static std::int32_t level_for(double z) { return z < 2.5 ? 4 : z < 3.5 ? 3 : z < 4.5 ? 2 : z < 5.2 ? 1 : 0; }
+  std::int32_t level_for(std::int32_t pole, double z) const {
+    const std::int32_t level = z < 2.5 ? 4 : z < 3.5 ? 3 : z < 4.5 ? 2 : z < 5.2 ? 1 : 0;
+    return level >= poles_[static_cast<std::size_t>(pole)].first_in_steps ? kSteps : level;
+  }
+
+  /// The draws of a pixel's steps, for 8 nodes at a time.
+  struct StepDraws {
+    std::uint32_t block = ~0U;  ///< nodes 8 block to 8 block + 7
+    alignas(64) std::array<float, 16> first, second;
+  };
 
   /// The first interval of a pixel, from the stationary distribution.
-  Interval first(std::uint32_t pixel, std::int32_t pole, std::int32_t level) const;
+  Interval first(std::uint32_t pixel, std::int32_t pole, std::int32_t level, StepDraws& draws) const;
 
-  /// The interval that begins with state `from` at node `node`.
-  Interval next(const NoiseState& from, std::uint32_t pixel, std::uint32_t node, std::int32_t pole,
-                std::int32_t level) const;
+  /// The interval that begins with state `from` at node `node`. `draws` are those of the pixel.
+  Interval next(const NoiseState& from, std::uint32_t pixel, std::uint32_t node, std::int32_t pole, std::int32_t level,
+                StepDraws& draws) const;
+
+  /// The state at the end of the step that begins with state `from` at node `node`.
+  NoiseState after_step(const NoiseState& from, std::uint32_t pixel, std::uint32_t node, std::int32_t pole,
+                        StepDraws& draws) const {
+    if (draws.block != node / kBlock) draw_block(pixel, node / kBlock, draws);
+    const Step& step = poles_[static_cast<std::size_t>(pole)].steps[kSteps];
+    const double n1 = static_cast<double>(draws.first[node % kBlock]),
+                 n2 = static_cast<double>(draws.second[node % kBlock]);
+    return {step.drift.yy * from.y + step.spread.yy * n1,
+            step.drift.xy * from.y + step.drift.xx * from.x + step.spread.xy * n1 + step.spread.xx * n2};
+  }
+
+  /// Bounds of x during a step: a cubic lies between the control points of its Bezier curve.
+  std::pair<double, double> step_bounds(const NoiseState& from, const NoiseState& to, double h) const {
+    return std::minmax({from.x, to.x, from.x + slope(from) * h / 3, to.x - slope(to) * h / 3});
+  }
 
   /// The state `gap` ns after the state `from`, with the draw of node `node` of the pixel: for times without intervals.
   NoiseState after(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
@@ -106,6 +135,8 @@ class PhotoreceptorNoise {
                                          double from, double to, Quiet& quiet) const;
 
  private:
+  static constexpr std::uint32_t kBlock = 8;  // of StepDraws
+
   /// A step of this process: state(t + h) = drift state(t) + spread (n1, n2), n1 and n2 standard normal.
   struct Step {
     double h = 0;
@@ -121,7 +152,13 @@ class PhotoreceptorNoise {
   struct Pole {
     double t1 = 0, deviation = 0;
     std::array<Step, kLevels> steps;  // by level
-    std::vector<Bridge> bridges;      // by level plus depth
+    std::vector<Bridge> bridges;      // of the long intervals, by level plus depth, then those of steps
+    std::size_t step_bridge = 0;      // the first of steps
+    std::int32_t first_in_steps = 0;  // this level and further ones are of at most 8 steps
+
+    std::size_t bridge_of(std::int32_t level) const {
+      return level == kSteps ? step_bridge : static_cast<std::size_t>(level);
+    }
   };
   struct Piece {
     NoiseState from, to;
@@ -132,6 +169,8 @@ class PhotoreceptorNoise {
 
   Step make_step(double t1, double h) const;
   Bridge make_bridge(double t1, double h) const;
+  double step_length(double t1) const;
+  void draw_block(std::uint32_t pixel, std::uint32_t block, StepDraws& draws) const;
   NoiseState middle(const Interval& interval, const Piece& piece, const Bridge& bridge) const;
   std::array<double, 2> normals(const Interval& interval, std::uint32_t index) const {
     return random_.normals(interval.pixel, (std::uint64_t{interval.node} << 32) | index);
@@ -148,7 +187,7 @@ class PhotoreceptorNoise {
   /// Longer pieces are leaves too while the signal moves so fast that what a cubic neglects hardly moves the crossing.
   static constexpr double kCoarse = 0.3;  // neglected deviation, in changes of the signal over the piece
 
-  double variance_, t2_, log_step_, log_first_;
+  double variance_, t2_, log_first_, per_log_step_;
   double coarse_ = 0;  // maximum length of such a piece, ns
   AddressedRandom random_;
   std::vector<Pole> poles_;
@@ -178,7 +217,7 @@ std::optional<PhotoreceptorNoise::Crossing> PhotoreceptorNoise::first_crossing(c
                                                                                Quiet& quiet) const {
   quiet = {to, 0, 0};
   const Pole& pole = poles_[static_cast<std::size_t>(interval.pole)];
-  const Piece whole{interval.from, interval.to, 0.0, 1, static_cast<std::size_t>(interval.level)};
+  const Piece whole{interval.from, interval.to, 0.0, 1, pole.bridge_of(interval.level)};
   return search(pole, interval, whole, signal, lower, upper, from, to, quiet);
 }
 

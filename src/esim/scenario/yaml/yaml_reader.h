@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "esim/core/error.h"
+#include "esim/core/named_value.h"
 #include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
 #include "esim/scenario/suggest.h"
@@ -108,9 +109,23 @@ class YamlReader {
     value = static_cast<T>(index_of_name(node, key, {kEnumNames<T>.begin(), kEnumNames<T>.end()}));
   }
 
+  template <NamedValue T>
+  void read(const YAML::Node& node, const std::string& key, T& value, const About&) {
+    const std::vector<std::string> names = T::names();
+    if (node.IsScalar()) {
+      if (const std::string problem = T::problem(node.Scalar()); !problem.empty()) fail(source_, node, key, problem);
+      if (const std::optional<T> found = T::find(node.Scalar())) {
+        value = *found;
+        return;
+      }
+    }
+    index_of_name(node, key, names);  // throws
+  }
+
   template <typename T>
   requires std::is_class_v<T> &&
-      (!kIsVariant<T>)void read(const YAML::Node& node, const std::string& key, T& value, const About&) {
+      (!kIsVariant<T> && !NamedValue<T>)void read(const YAML::Node& node, const std::string& key, T& value,
+                                                  const About&) {
     YamlReader reader(node, key, source_);
     describe(reader, value);
     reader.finish();

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "esim/core/named_value.h"
 #include "esim/event_camera/options.h"
 #include "esim/scenario/schema.h"
 
@@ -78,6 +79,12 @@ class SchemaWriter {
     for (const char* name : kEnumNames<T>) entry["choices"].push_back(name);
   }
 
+  template <NamedValue T>
+  static void fill(const T& value, Json& entry) {
+    leaf(entry, "choice", value.name());
+    entry["choices"] = T::names();
+  }
+
   template <typename T>
   requires requires(SchemaWriter writer, T options) { describe(writer, options); }
   static void fill(T& value, Json& entry) {
@@ -118,6 +125,10 @@ class ValueWriter {
       values_[name] = value;
     } else if constexpr (std::is_enum_v<T>) {
       values_[name] = kEnumNames<T>[static_cast<std::size_t>(value)];
+    } else if constexpr (NamedValue<T>) {
+      values_[name] = value.name();
+    } else if constexpr (requires { value.has_value(); }) {
+      if (value) (*this)(name, *value, About{});
     } else if constexpr (requires(ValueWriter writer, T options) { describe(writer, options); }) {
       ValueWriter inner(values_[name] = Json::object());
       describe(inner, value);
@@ -156,15 +167,18 @@ Json schema_json() {
 
 Json presets_json() {
   Json presets = Json::array();
-  for (std::size_t i = 0; i < kEnumNames<SensorPreset>.size(); ++i) {
-    EventCameraOptions options = preset_options(static_cast<SensorPreset>(i));
+  for (const std::string& name : SensorPreset::names()) {
+    EventCameraOptions options = preset_options(name);
     Json values = Json::object();
     ValueWriter writer(values);
     describe(writer, options);
-    const std::string help = i == 0 ? "the paper's ideal pixel: no noise, no latency, unlimited bandwidth"
-                                    : fmt::format("contrast threshold {}, bandwidth {} Hz, latency {} us",
-                                                  options.contrast_threshold, options.low_pass_hz, options.latency_us);
-    presets.push_back({{"name", kEnumNames<SensorPreset>[i]}, {"help", help}, {"values", values}});
+    const std::string help = name == "ideal" ? "the paper's ideal pixel: no noise, no latency, unlimited bandwidth"
+                             : options.circuit
+                                 ? fmt::format("by the circuit: contrast threshold {}, photocurrent {} fA/lux",
+                                               options.contrast_threshold, options.circuit->photocurrent_fa_per_lux)
+                                 : fmt::format("contrast threshold {}, bandwidth {} Hz, latency {} us",
+                                               options.contrast_threshold, options.low_pass_hz, options.latency_us);
+    presets.push_back({{"name", name}, {"help", help}, {"values", values}});
   }
   return presets;
 }

@@ -19,6 +19,7 @@
 #include "esim/event_camera/readout/pixel_readout.h"
 #include "esim/event_camera/state_archive.h"
 #include "esim/events/event_queue.h"
+#include "esim/filters/labels_of_passed.h"
 #include "esim/render/irradiance_check.h"
 
 namespace esim::inline event_camera {
@@ -256,13 +257,7 @@ void EventCamera::State::filter(std::size_t begin, std::vector<Event>& out) {
   unfiltered.assign(out.begin() + static_cast<std::ptrdiff_t>(begin), out.end());
   out.resize(begin);
   filters->process(unfiltered, out);
-  if (!labels) return;
-  // Filters only drop events: those that pass keep their order.
-  std::size_t passed = 0;
-  for (std::size_t i = 0; begin + passed < out.size(); ++i) {
-    if (unfiltered[i] == out[begin + passed]) released_labels[passed++] = released_labels[i];
-  }
-  released_labels.resize(passed);
+  if (labels) keep_labels_of_passed(unfiltered, EventSpan(out).subspan(begin), released_labels);
 }
 
 void EventCamera::release_until(TimeNs until, std::vector<Event>& out) {
@@ -343,7 +338,9 @@ EventCameraStatistics EventCamera::statistics() const {
 }
 
 std::vector<std::byte> EventCamera::state() const {
-  if (state_->readout && !state_->readout->history.empty()) {
+  const bool has_history = (state_->readout && !state_->readout->history.empty()) ||
+                           (state_->circuit_readout && !state_->circuit_readout->history.empty());
+  if (has_history) {
     throw UserError(
         "event camera: its state cannot be saved while the segments of its tiles end at different times; save it when "
         "every segment ends at the watermark");

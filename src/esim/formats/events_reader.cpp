@@ -42,24 +42,20 @@ class EventsSource final : public Source {
     events_.clear();
     labels_.clear();
     if (ended_) return;
-    try {
+    const auto up_to_damage = [&](const auto& step) {
+      try {
+        step();
+      } catch (const UserError&) {
+        if (!damage_) damage_ = std::current_exception();
+        ended_ = true;
+      }
+    };
+    up_to_damage([&] {
       while (events_.empty() && !ended_) ended_ = !reader_->read(events_);
-      if (info_.cameras[0].has_labels) read_labels();
-    } catch (const UserError&) {
-      damage_ = std::current_exception();
-      ended_ = true;
-    }
-  }
-
-  /// If the file ends before the labels of the last events, or is damaged there, these events are left out.
-  void read_labels() {
-    try {
-      reader_->read_labels(labels_);
-    } catch (const UserError&) {
-      damage_ = std::current_exception();
-      ended_ = true;
-    }
-    if (labels_.size() < events_.size()) ended_ = true;
+    });
+    if (!info_.cameras[0].has_labels) return;
+    up_to_damage([&] { reader_->read_labels(labels_); });
+    if (labels_.size() < events_.size()) ended_ = true;  // events without labels are left out
     events_.resize(std::min(events_.size(), labels_.size()));
   }
 

@@ -12,6 +12,7 @@
 
 #include "esim/core/remedy.h"
 #include "esim/files/number_text.h"
+#include "esim/filters/labels_of_passed.h"
 
 namespace esim::inline formats {
 namespace {
@@ -57,13 +58,12 @@ class FilteredSource final : public Source {
  public:
   FilteredSource(std::unique_ptr<Source> inner, const FilterOptions& filters, const std::string& camera,
                  std::vector<FilteredCamera>& cameras)
-      : inner_(std::move(inner)), info_(inner_->info()), filters_(filters), reports_(cameras) {
+      : inner_(std::move(inner)), filters_(filters), reports_(cameras) {
     refuse(find_problem(filters_));
     reports_.clear();
-    for (CameraInfo& each : info_.cameras) {
+    for (const CameraInfo& each : info().cameras) {
       std::optional<std::size_t> report;
       if (camera.empty() || camera == each.name) {
-        each.has_labels = false;
         report = reports_.size();
         reports_.push_back({each.name, 0, {}});
       }
@@ -71,13 +71,12 @@ class FilteredSource final : public Source {
     }
   }
 
-  const RecordingInfo& info() const override { return info_; }
+  const RecordingInfo& info() const override { return inner_->info(); }
   double progress() const override { return inner_->progress(); }
 
   std::vector<std::string> not_read() const override {
     std::vector<std::string> all = inner_->not_read();
     if (has_points_) all.emplace_back("the points of events");
-    if (has_labels_) all.emplace_back("the labels of events");
     return all;
   }
 
@@ -101,13 +100,14 @@ class FilteredSource final : public Source {
     FilteredStream& stream = cameras_.at(static_cast<std::size_t>(events.camera));
     if (!stream.report) return &record;
     if (stream.chain == nullptr) stream.chain = make_chain(events.camera);
-    has_labels_ |= !events.labels.empty();
     passed_.clear();
     stream.chain->process(events.events, passed_);
     FilteredCamera& report = reports_[*stream.report];
     report.events += events.events.size();
     report.dropped = stream.chain->dropped();
-    return &record_.emplace(EventsRecord{events.camera, passed_, {}});
+    labels_.assign(events.labels.begin(), events.labels.end());
+    if (!labels_.empty()) keep_labels_of_passed(events.events, passed_, labels_);
+    return &record_.emplace(EventsRecord{events.camera, passed_, labels_});
   }
 
   std::unique_ptr<FilterChain> make_chain(int camera) const {
@@ -119,14 +119,13 @@ class FilteredSource final : public Source {
   }
 
   std::unique_ptr<Source> inner_;
-  RecordingInfo info_;
   FilterOptions filters_;
   std::vector<FilteredCamera>& reports_;
   std::vector<FilteredStream> cameras_;
   std::vector<Event> passed_;
+  std::vector<EventLabel> labels_;
   std::optional<Record> record_;
   bool has_points_ = false;
-  bool has_labels_ = false;
 };
 
 }  // namespace

@@ -274,19 +274,16 @@ void CircuitArray::label(std::size_t i, TimeNs t, int polarity, std::vector<NewL
                     {}});
 }
 
-/// Takes a pixel to the segment's end in as many steps as needed.
+/// Takes a pixel to the segment's end in as many steps as needed. Calls emit(t, polarity) for each event, t in whole ns
+/// after the segment's start.
+template <typename Emit>
 void CircuitArray::advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer,
-                               PackedEvents& events) {
+                               const Emit& emit_event) {
   const std::size_t i = row.first + column;
-  const std::uint32_t place = static_cast<std::uint32_t>(row.packing.place(row.x + static_cast<int>(column), row.y));
   const auto emit = [&](double t, int polarity) {
-    if (buffer.events == kBlock) flush(row, buffer, events);
-    const std::size_t n = buffer.events++;
-    buffer.time[n] = std::clamp(std::ceil(t - row.start), 0.0, row.length);
-    buffer.polarity[n] = polarity;
-    buffer.reported[n] = 1;
-    buffer.place[n] = place;
-    if (!origins_.empty()) label(i, row.t0 + static_cast<TimeNs>(buffer.time[n]), polarity, buffer.labels);
+    const double time = std::clamp(std::ceil(t - row.start), 0.0, row.length);
+    emit_event(time, polarity);
+    if (!origins_.empty()) label(i, row.t0 + static_cast<TimeNs>(time), polarity, buffer.labels);
   };
   const double light1 = buffer.light[at];
   const LightRamp ramp{light_[i], (light1 - light_[i]) / row.length};
@@ -301,18 +298,18 @@ void CircuitArray::advance_one(const Row& row, std::uint32_t column, std::size_t
     return;
   }
   CircuitState front{lag_[i], v_[i]};
-  buffer.lost += run(i, front, ramp, row.start, row.length, false, emit);
+  buffer.lost += run(i, front, ramp, row.start, row.length, emit);
   light_[i] = light1;
   lag_[i] = std::abs(front.lag) < kSettled ? 0.0 : front.lag;
   y_[i] = light1 - std::log1p(lag_[i]);
   v_[i] = lag_[i] == 0 && ramp.rate == 0 && std::abs(front.v - y_[i]) < kSettled ? y_[i] : front.v;
 }
 
-/// Takes a pixel along a ramp of light, in as many steps as needed; skips those within its bounds unless `always`.
-/// Returns the number of events that a maximum rate has lost.
+/// Takes a pixel along a ramp of light, in as many steps as needed; skips those within its bounds. Returns the number
+/// of events that a maximum rate has lost.
 template <typename Emit>
 std::int64_t CircuitArray::run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length,
-                               bool always, const Emit& emit) {
+                               const Emit& emit) {
   std::int64_t lost = 0;
   CircuitPixel pixel = this->pixel(i);
   const int steps = steps_for(circuit_.poles, front, ramp, length);
@@ -327,7 +324,7 @@ std::int64_t CircuitArray::run(std::size_t i, CircuitState& front, const LightRa
     const bool quiet = lowest + std::min(leaked0, leaked1) - kGuard > low_[i] &&
                        highest + std::max(leaked0, leaked1) + kGuard < high_[i] && from + h < until_[i] &&
                        std::abs(change) < kLightReach;
-    if (quiet && !always) continue;
+    if (quiet) continue;
     pixel.set(piece, part, from);
     set_bounds(i, pixel.run(emit));
     lost += limits_ ? pixel.lost() : 0;
@@ -342,22 +339,34 @@ TimeNs CircuitArray::acknowledge(std::uint32_t pixel, TimeNs t) {
   return epoch_ + static_cast<TimeNs>(std::ceil(state.held_until));
 }
 
+/// As advance(), from the pixel's state at the start of the segment.
 void CircuitArray::resume(std::uint32_t pixel, const PastSegment& past, CircuitBuffer& buffer,
                           std::vector<Event>& requests) {
   const Segment& segment = past.segment;
   const int x = static_cast<int>(pixel) % width_, y = static_cast<int>(pixel) / width_;
-  const double length = static_cast<double>(segment.t1 - segment.t0), start = static_cast<double>(segment.t0 - epoch_);
-  const double light0 = std::log(static_cast<double>(segment.irradiance0.row(y)[x]) + dark_),
-               light1 = std::log(static_cast<double>(segment.irradiance1.row(y)[x]) + dark_);
-  const int column = x - segment.tile.x, row = y - segment.tile.y;
-  CircuitState front{static_cast<double>(past.filtered1(column, row)),
-                     light0 + static_cast<double>(past.filtered2(column, row))};
-  const auto emit = [&](double t, int polarity) {
-    requests.push_back({epoch_ + static_cast<TimeNs>(std::ceil(t)), static_cast<std::uint16_t>(x),
+  const int column = x - segment.tile.x, line = y - segment.tile.y;
+  const Row row{segment.irradiance0.row(y) + x,
+                segment.irradiance1.row(y) + x,
+                pixel,
+                y,
+                x,
+                1,
+                segment.t0,
+                static_cast<double>(segment.t0 - epoch_),
+                static_cast<double>(segment.t1 - segment.t0),
+                EventPacking(width_, height_)};
+  const std::array front{&light_[pixel], &lag_[pixel], &y_[pixel], &v_[pixel]};
+  const std::array<double, 4> present{light_[pixel], lag_[pixel], y_[pixel], v_[pixel]};
+  light_[pixel] = past.light(column, line), lag_[pixel] = past.lag(column, line);
+  y_[pixel] = past.y(column, line), v_[pixel] = past.v(column, line);
+  buffer.uncertain.clear();
+  const auto emit = [&](double time, int polarity) {
+    requests.push_back({row.t0 + static_cast<TimeNs>(time), static_cast<std::uint16_t>(x),
                         static_cast<std::uint16_t>(y), static_cast<std::int8_t>(polarity)});
-    if (!origins_.empty()) label(pixel, requests.back().t, polarity, buffer.labels);
   };
-  buffer.lost += run(pixel, front, {light0, (light1 - light0) / length}, start, length, false, emit);
+  if (move_vector(hn::ScalableTag<double>(), row, 0, buffer, 0) && !buffer.uncertain.empty())
+    advance_one(row, 0, 0, buffer, emit);
+  for (std::size_t k = 0; k < front.size(); ++k) *front[k] = present[k];
 }
 
 void CircuitArray::flush(const Row& row, CircuitBuffer& buffer, PackedEvents& events) {
@@ -393,12 +402,11 @@ bool CircuitArray::advance(const Segment& segment, Rows rows, CircuitBuffer& buf
                   static_cast<double>(segment.t1 - segment.t0),
                   events.packing()};
     if (past != nullptr) {
-      float* const lags = past->filtered1.row(y - segment.tile.y);
-      float* const signals = past->filtered2.row(y - segment.tile.y);
-      for (std::size_t x = 0; x < width; ++x) {
-        lags[x] = static_cast<float>(lag_[first + x]);
-        signals[x] = static_cast<float>(v_[first + x] - light_[first + x]);
-      }
+      const int line = y - segment.tile.y;
+      std::copy_n(&light_[first], width, past->light.row(line));
+      std::copy_n(&lag_[first], width, past->lag.row(line));
+      std::copy_n(&y_[first], width, past->y.row(line));
+      std::copy_n(&v_[first], width, past->v.row(line));
     }
     for (std::size_t begin = 0; begin < width; begin += CircuitBuffer::kTogether) {
       const std::size_t count = std::min(CircuitBuffer::kTogether, width - begin);
@@ -414,7 +422,14 @@ bool CircuitArray::advance(const Segment& segment, Rows rows, CircuitBuffer& buf
         const std::size_t i = first + begin + x;
         light_[i] = buffer.light[x], lag_[i] = buffer.lag[x], y_[i] = buffer.y[x], v_[i] = buffer.v[x];
       }
-      for (const std::uint32_t column : buffer.uncertain) advance_one(row, column, column - begin, buffer, events);
+      for (const std::uint32_t column : buffer.uncertain) {
+        const auto place = static_cast<std::uint32_t>(row.packing.place(row.x + static_cast<int>(column), row.y));
+        advance_one(row, column, column - begin, buffer, [&](double time, int polarity) {
+          if (buffer.events == kBlock) flush(row, buffer, events);
+          const std::size_t n = buffer.events++;
+          buffer.time[n] = time, buffer.polarity[n] = polarity, buffer.reported[n] = 1, buffer.place[n] = place;
+        });
+      }
     }
     flush(row, buffer, events);
   }

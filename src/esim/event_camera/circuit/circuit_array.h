@@ -30,7 +30,7 @@ struct CircuitBuffer {
   PerPixel<double> time, polarity, reported;            // of events
   PerPixel<std::uint32_t> place;
   std::size_t events = 0;
-  std::int64_t lost = 0;  // events beyond the maximum rate of their pixels
+  std::int64_t lost = 0;         // events beyond the maximum rate of their pixels
   std::vector<NewLabel> labels;  // if they are wanted
 };
 
@@ -79,9 +79,10 @@ class CircuitArray {
   template <class D>
   bool move_vector(D d, const Row& row, std::size_t x, CircuitBuffer& buffer, std::size_t at);
   template <typename Emit>
-  std::int64_t run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length, bool always,
+  std::int64_t run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length,
                    const Emit& emit);
-  void advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer, PackedEvents& events);
+  template <typename Emit>
+  void advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer, const Emit& emit);
   void set_bounds(std::size_t pixel, const CircuitBounds& bounds);
   CircuitPixel pixel(std::size_t i);
   void label(std::size_t i, TimeNs t, int polarity, std::vector<NewLabel>& labels) const;

@@ -87,12 +87,11 @@ class LabelColumns {
   /// Appends labels; `to_ns` converts times.
   template <typename ToNs>
   void read(const Input& file, hsize_t first, hsize_t count, const ToNs& to_ns, std::vector<EventLabel>& labels) const {
-    const std::size_t begin = labels.size();
-    labels.resize(begin + count);
+    std::vector<EventLabel> block(count);
     const auto each = [&]<typename Number>(const Column& column, Number, const auto& set) {
       std::vector<Number> numbers(count);
       file.read(column, first, std::span(numbers));
-      for (std::size_t i = 0; i < count; ++i) set(labels[begin + i], numbers[i]);
+      for (std::size_t i = 0; i < count; ++i) set(block[i], numbers[i]);
     };
     each(t_ideal_, std::int64_t{}, [&](EventLabel& label, std::int64_t t) { label.t_ideal = to_ns(t); });
     for (std::size_t k = 0; k < parts_.size(); ++k)
@@ -101,12 +100,17 @@ class LabelColumns {
       each(surfaces_[k], std::uint16_t{},
            [&](EventLabel& label, std::uint16_t number) { label.*kLabelSurfaces[k].member = number; });
     }
+    const auto below = [&](const char* name, std::uint8_t number, std::size_t end) {
+      if (number >= end)
+        file.fail(label_name(name) + " has the value " + std::to_string(number) + ", but must be from 0 to " +
+                  std::to_string(end - 1));
+      return number;
+    };
     each(cause_, std::uint8_t{}, [&](EventLabel& label, std::uint8_t cause) {
-      if (cause >= kEnumNames<EventCause>.size())
-        file.fail(label_name("cause") + " has the value " + std::to_string(cause) + ", but must be from 0 to 3");
-      label.cause = static_cast<EventCause>(cause);
+      label.cause = static_cast<EventCause>(below("cause", cause, kEnumNames<EventCause>.size()));
     });
-    each(hot_, std::uint8_t{}, [](EventLabel& label, std::uint8_t hot) { label.hot = hot; });
+    each(hot_, std::uint8_t{}, [&](EventLabel& label, std::uint8_t hot) { label.hot = below("hot", hot, 2); });
+    labels.insert(labels.end(), block.begin(), block.end());
   }
 
  private:

@@ -41,6 +41,7 @@ class ColumnsReader final : public EventsReader {
     for (std::size_t i = 0; i < there; ++i, ++done_) {
       if (t_[i] == Array::kNoNumber || p_[i] == Array::kNoNumber || std::min(x_[i], y_[i]) < 0 ||
           std::max(x_[i], y_[i]) >= kMaxColumnExtent) {
+        if (has_labels()) take_labels(i);
         columns_.t.array->fail(fmt::format("event {} has an invalid time, position or polarity", done_));
       }
       events.push_back({t_[i], static_cast<std::uint16_t>(x_[i]), static_cast<std::uint16_t>(y_[i]),
@@ -62,22 +63,26 @@ class ColumnsReader final : public EventsReader {
 
   /// The labels of the `count` items in memory.
   void take_labels(std::size_t count) {
-    const std::size_t begin = labels_.size();
-    labels_.resize(begin + count);
+    std::vector<EventLabel> labels(count);
     const auto column = [&](const char* name) -> const EventColumns::Column& { return columns_.labels.at(name); };
     const auto number = [&](const char* name, std::int64_t end, const auto& set) {
       column(name).array->integers(column(name).field, numbers_);
       for (std::size_t i = 0; i < count; ++i) {
         if (numbers_[i] < 0 || numbers_[i] >= end)
-          column(name).array->fail(fmt::format("item {} must be a whole number below {}", done_ - count + i, end));
-        set(labels_[begin + i], numbers_[i]);
+          column(name).array->fail(
+              fmt::format("the {} of event {} must be a whole number from 0 to {}", name, done_ - count + i, end - 1));
+        set(labels[i], numbers_[i]);
       }
     };
     column("t_ideal").array->times(column("t_ideal").field, numbers_);
-    for (std::size_t i = 0; i < count; ++i) labels_[begin + i].t_ideal = numbers_[i];
+    for (std::size_t i = 0; i < count; ++i) {
+      if (numbers_[i] == Array::kNoNumber)
+        column("t_ideal").array->fail(fmt::format("the label of event {} has an invalid time", done_ - count + i));
+      labels[i].t_ideal = numbers_[i];
+    }
     for (const auto& [name, part] : kLabelParts) {
       column(name).array->floats(column(name).field, parts_);
-      for (std::size_t i = 0; i < count; ++i) labels_[begin + i].*part = parts_[i];
+      for (std::size_t i = 0; i < count; ++i) labels[i].*part = parts_[i];
     }
     for (const auto& [name, surface] : kLabelSurfaces) {
       number(name, 65536, [member = surface](EventLabel& label, std::int64_t value) {
@@ -87,6 +92,7 @@ class ColumnsReader final : public EventsReader {
     number("cause", static_cast<std::int64_t>(kEnumNames<EventCause>.size()),
            [](EventLabel& label, std::int64_t value) { label.cause = static_cast<EventCause>(value); });
     number("hot", 2, [](EventLabel& label, std::int64_t value) { label.hot = static_cast<std::uint8_t>(value); });
+    labels_.insert(labels_.end(), labels.begin(), labels.end());
   }
 
   EventColumns columns_;

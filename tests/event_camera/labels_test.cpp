@@ -276,8 +276,8 @@ TEST_P(Labels, ARestoredCameraContinuesThem) {
 FilterOptions all_filters() {
   FilterOptions filters;
   filters.region = RegionFilterOptions{false, {{2, 1, kWidth - 5, kHeight - 2}}, {{5, 5}, {20, 8}}};
-  filters.activity = ActivityFilterOptions{1000, 5e3, 2.5e3, 0, 0};
-  filters.anti_flicker = AntiFlickerOptions{FlickerMode::band_stop, 50, 5000, 2, 1};
+  filters.activity = ActivityFilterOptions{1000, 500, 250, 0, 0};
+  filters.anti_flicker = AntiFlickerOptions{FlickerMode::band_stop, 50, 5000, 4, 2};
   filters.trail = TrailFilterOptions{TrailType::stc_keep_trail, 20'000};
   filters.rate_controller = RateControllerOptions{1000, 40};
   return filters;
@@ -292,7 +292,7 @@ TEST_P(Labels, PassTheFiltersOfTheSensorWithTheirEvents) {
     options.filters = filters;
     const Explained passed = run(options, waves, 500, 0.5);
     EXPECT_LT(passed.events.size(), all.events.size());
-    EXPECT_GT(passed.events.size(), 50U);
+    EXPECT_GT(passed.events.size(), 10U);
     ASSERT_EQ(passed.labels.size(), passed.events.size());
     // One of the labels that the same event has without filters. Different events may be equal.
     std::multimap<std::tuple<TimeNs, int, int, int>, EventLabel> labels;
@@ -310,9 +310,8 @@ INSTANTIATE_TEST_SUITE_P(Cameras, Labels, testing::ValuesIn(all_cameras()));
 class LabelsAgainstReference : public testing::TestWithParam<EventCameraOptions> {};
 
 TEST_P(LabelsAgainstReference, AreTheSame) {
-  const int kSeed = getenv("SEED") ? atoi(getenv("SEED")) : 9;
-  EventCamera camera(GetParam(), kWidth, kHeight, kSeed);
-  ReferenceEventCamera reference(GetParam(), kWidth, kHeight, kSeed, 0);
+  EventCamera camera(GetParam(), kWidth, kHeight, 9);
+  ReferenceEventCamera reference(GetParam(), kWidth, kHeight, 9);
   Explained fast, defined;
   std::mt19937 random(3);
   TimeNs t = -1000;

@@ -374,6 +374,25 @@ def test_nothing_dropped_is_no_warning(poster):
         assert isinstance(summary, dict) and summary["status"] == "complete"
 
 
+def test_light_that_flickers(poster):
+    still = {"trajectory": {"type": "static"}, "duration_s": 0.1, "truth.rate_hz": 400}
+    assert len(joined(esim.simulate(poster, overrides=still))) == 0
+    packets = list(esim.simulate(poster, overrides={**still, "light.flicker": {"depth": 0.4, "frequency_hz": 100}}))
+    events, light = joined(packets), joined(packets, "irradiance")
+    # Darkest at the multiples of 10 ms: it brightens in the first half of each period.
+    first_half = events["t"] % 10_000_000 < 5_000_000
+    assert ((events["p"] > 0) == first_half).all()
+    counts = np.zeros((30, 40), int)
+    np.add.at(counts, (events["y"], events["x"]), 1)
+    assert counts.min() > 50 and counts.max() <= 100
+    depth = 1 - light.min(axis=0) / light.max(axis=0)
+    np.testing.assert_allclose(depth, 0.4, atol=1e-5)
+    by_pwm = joined(esim.simulate(poster, overrides={**still, "light.flicker.shape": "pwm"}))
+    assert len(by_pwm) > 1000 and set((by_pwm["t"] % 5_000_000).tolist()) <= {0, 1, 4_999_999}
+    with pytest.raises(esim.Error, match=r"light\.flicker\.depth: must be"):
+        esim.simulate(poster, overrides={"light.flicker.depth": 2})
+
+
 def test_scenes_of_the_repository():
     packet = next(esim.simulate(ROOT / "scenes" / "poster.yaml"))
     assert packet.depth.shape == (2, 180, 240) and len(packet.events) > 10000

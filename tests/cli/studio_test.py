@@ -89,6 +89,12 @@ class Answers(StudioTest):
         region = {member["name"]: member for member in filters["members"][0]["members"]}
         self.assertEqual(region["windows"]["kind"], "list")
         self.assertEqual([m["name"] for m in region["windows"]["element"]["members"]], ["x", "y", "width", "height"])
+        light = {member["name"]: member for member in members["light"]["members"]}
+        self.assertEqual((light["flicker"]["kind"], light["flicker"]["optional"], light["flicker"]["default"]), ("group", True, None))
+        flicker = {member["name"]: member for member in light["flicker"]["members"]}
+        self.assertEqual(flicker["shape"]["choices"], ["mains", "sine", "pwm"])
+        self.assertEqual((flicker["depth"]["default"], flicker["depth"]["low"], flicker["depth"]["high"]), (0.5, 0, 1))
+        self.assertTrue(flicker["frequency_hz"]["positive"])
         names = [option["name"] for option in members["trajectory"]["options"]]
         self.assertEqual(names, ["file", "random", "static", "scene", "waypoints"])
         reference = run("options").stdout
@@ -122,6 +128,11 @@ class Answers(StudioTest):
                          ["event_camera.filters.activity", "event_camera.filters.anti_flicker.low_hz"])
         for problem in found:
             self.assertIn("filters", yaml.splitlines()[problem["line"] - 1])
+        yaml = self.yaml + "light: {flicker: {depth: 2, shape: square}, white_lux: 100}\n"
+        found = self.ask("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"]
+        self.assertEqual({problem["where"] for problem in found}, {"light.flicker.depth", "light.flicker.shape"})
+        yaml = self.yaml + "light: {flicker: {}, white_lux: 100}\n"
+        self.assertEqual(self.ask("POST", "/api/scenario/check", {"yaml": yaml, "dir": "work"})["problems"], [])
         broken = self.ask("POST", "/api/scenario/check", {"yaml": "a: [", "dir": "work"})
         self.assertIn("not valid YAML", broken["problems"][0]["what"])
         self.assertEqual([problem["line"] for problem in broken["problems"]], [1])

@@ -45,10 +45,10 @@ std::vector<TimedEvent> run(const PixelSetup& setup, const Circuit& circuit, std
   for (std::int64_t i = 0; static_cast<double>(i) * dt < duration; ++i) {
     const double start = static_cast<double>(i) * dt;
     const LightRamp ramp{light(start), (light(start + dt) - light(start)) / dt};
-    const int steps = steps_for(setup.poles, front, ramp, dt);
-    for (int k = 0; k < steps; ++k) {
-      const double h = dt / steps, from = start + h * k;
-      const LightRamp part{ramp.light + ramp.rate * h * k, ramp.rate};
+    for (double done = 0, h = 0; done < 0.999999 * dt; done += h) {
+      const LightRamp part{ramp.light + ramp.rate * done, ramp.rate};
+      h = step_length(setup.poles, front, part, dt - done);
+      const double from = start + done;
       const CircuitPiece piece = advance(setup.poles, front, part, h);
       const auto [low, high] = piece.range(0, h);
       const double leak = 1e-9 * static_cast<double>(setup.leak);

@@ -54,7 +54,7 @@ std::vector<TimedEvent> run(const PhotoreceptorNoise& noise, const Pixel& pixel,
     while (now < until) {
       if (now >= start + interval.length) {
         start += interval.length;
-        interval = noise.next(interval.to, index, interval.node + 1, 0, level_at(start), draws);
+        interval = noise.next(interval.to, index, interval.node + 1, 0, level_at(start), 0, draws);
         continue;
       }
       const double stop = std::min(until, start + interval.length);
@@ -151,7 +151,7 @@ TEST(PhotoreceptorNoise, StepsKeepTheVarianceAndTheMemoryOfTheCircuit) {
       auto interval = noise.first(i, 0, PhotoreceptorNoise::kSteps, draws);
       const double before = interval.from.x;
       for (std::uint32_t node = 1; node < 12; ++node)
-        interval = noise.next(interval.to, i, node, 0, PhotoreceptorNoise::kSteps, draws);
+        interval = noise.next(interval.to, i, node, 0, PhotoreceptorNoise::kSteps, 0, draws);
       const NoiseState& a = interval.to;
       xx += a.x * a.x, yy += a.y * a.y, xy += a.x * a.y, lagged += before * a.x;
       const NoiseState middle = noise.at(interval, (0.05 + 0.9 * (i % 97) / 97.0) * h);

@@ -40,10 +40,10 @@ double worst(const CircuitPoles& poles, const std::vector<double>& lights, doubl
   double worst = 0;
   for (std::size_t i = 1; i < lights.size(); ++i) {
     const LightRamp ramp{lights[i - 1], (lights[i] - lights[i - 1]) / dt};
-    const int steps = steps_for(poles, state, ramp, dt);
-    for (int k = 0; k < steps; ++k) {
-      const double h = dt / steps;
-      const LightRamp part{ramp.light + ramp.rate * h * k, ramp.rate};
+    for (double done = 0; done < 0.999999 * dt;) {
+      const LightRamp part{ramp.light + ramp.rate * done, ramp.rate};
+      const double h = step_length(poles, state, part, dt - done);
+      done += h;
       const CircuitPiece piece = advance(poles, state, part, h);
       Slow middle = slow;
       middle.run(poles, part, h / 2);
@@ -80,6 +80,29 @@ TEST(PhotoreceptorSignal, AStepOfLightFallsFasterThanItRises) {
   EXPECT_LT(settle(down, -1), 0.75);
 }
 
+TEST(PhotoreceptorSignal, ALongSegmentAfterAStepOfLightHasTheSameLatency) {
+  // Time at which v has done a third of a step by 1, from samples after the step: exact steps, or one segment of 16 ms.
+  for (const double t1 : {0.05e6, 0.3e6, 2e6}) {
+    const CircuitPoles poles{t1, 0.2e6};
+    Slow slow{-1, -1};
+    double expected = 0;
+    while (slow.v < -2.0 / 3) slow.run(poles, {0, 0}, 500), expected += 500;
+    CircuitState state{std::expm1(1.0), -1};
+    double time = -1;
+    for (double done = 0; done < 16e6 && time < 0;) {
+      const double h = step_length(poles, state, {0, 0}, 16e6 - done);
+      const CircuitPiece piece = advance(poles, state, {0, 0}, h);
+      if (piece.value(h) >= -2.0 / 3) {
+        double a = 0, b = h;
+        for (int i = 0; i < 50; ++i) (piece.value(0.5 * (a + b)) < -2.0 / 3 ? a : b) = 0.5 * (a + b);
+        time = done + b;
+      }
+      done += h;
+    }
+    EXPECT_NEAR(time, expected, 0.003 * expected + 500) << t1;
+  }
+}
+
 TEST(PhotoreceptorSignal, SteadyLightChangesNothing) {
   const CircuitPoles poles{1e6, 0.5e6};
   CircuitState state{0, -1.25};
@@ -100,8 +123,12 @@ TEST(PhotoreceptorSignal, DoesNotDependOnHowARampIsCut) {
       for (int i = 0; i < cuts; ++i) {
         const double dt = 20e6 / cuts;
         const LightRamp ramp{0.2 + rate * dt * i, rate};
-        const int steps = steps_for(poles, state, ramp, dt);
-        for (int k = 0; k < steps; ++k) advance(poles, state, {ramp.light + rate * dt / steps * k, rate}, dt / steps);
+        for (double done = 0; done < 0.999999 * dt;) {
+          const LightRamp part{ramp.light + rate * done, rate};
+          const double h = step_length(poles, state, part, dt - done);
+          advance(poles, state, part, h);
+          done += h;
+        }
       }
       ends.push_back(state.v);
     }

@@ -27,7 +27,9 @@ constexpr const char* kRunning = "{\"status\": \"running\"}\n";
 constexpr int kWidth = 24, kHeight = 16, kSteps = 40;
 constexpr TimeNs kStep = 10 * kNsPerMs;
 
-ImuRecord imu_at(int i) { return {i * kStep, {{0.1 * i, 1.0 / 3, 2}, {0, 0, 9.81}}, {{1e-5, 2e-5, 3e-5 * i}, {}}}; }
+ImuRecord imu_at(int i) {
+  return {i * kStep, {{0.1 * i, 1.0 / 3, 2}, {0, 0, 9.81}}, {{1e-5, 2e-5, 3e-5 * i}, {0, 0, 0}}};
+}
 
 PoseRecord pose_at(int i) {
   PoseRecord pose{i * kStep, {}};

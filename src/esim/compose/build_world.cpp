@@ -270,6 +270,7 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
     }
     if (options.frame_camera)
       world.cameras.back().frame_camera = build_frame_camera(options, model, span, scenario.seed, i, notices);
+    world.cameras.back().flicker = build_flicker(scenario, options, world.info.objects.size(), span.start);
     require_a_view(world, i);
     name_what_has_no_effect(scenario, world, i, notices);
   }

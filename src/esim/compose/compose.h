@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "esim/formats/filter_recording.h"
+#include "esim/light/flicker.h"
 #include "esim/recording/format.h"
 #include "esim/render/pixel_area.h"
 #include "esim/scenario/conversion.h"
@@ -112,6 +113,14 @@ RendererFactory build_renderer_factory(const RendererOptions& options, const Sce
 /// Starts Blender, which runs as long as any renderer of the factory, or connects to a running one.
 RendererFactory start_blender(const BlenderRendererOptions& options, const std::vector<CameraInfo>& sensors,
                               const Notices& notices);
+
+// --- light (build_light.cpp) -----------------------------------------------------------------------------------------
+
+/// The flicker of a scenario's lights as one of its cameras sees it; empty if the light is constant. `moving`: number
+/// of moving objects, of which the scenario's own are the last. Throws UserError, naming the option, for values out of
+/// range.
+std::optional<Flicker> build_flicker(const Scenario& scenario, const CameraOptions& camera, std::size_t moving,
+                                     TimeNs start);
 
 // --- ground truth (prepare_truth.cpp) --------------------------------------------------------------------------------
 

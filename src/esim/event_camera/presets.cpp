@@ -76,10 +76,10 @@ EventCameraOptions davis240c_by_circuit() {
   o.refractory_period_us = 1450;
   o.leak_rate_hz = 0.04;
   o.leak_mismatch_decades = 0.7;
-  o.readout.rate_mev_per_s = 4;
-  o.readout.row_time_us = 0.3;
-  o.readout.row_scan_us = 0.01;
-  o.readout.row_rest_us = 5.5;
+  o.readout.rate_mev_per_s = 10;
+  o.readout.row_time_us = 0.61;
+  o.readout.row_scan_us = 0.003;
+  o.readout.row_rest_us = 6;
   return o;
 }
 
@@ -94,8 +94,8 @@ EventCameraOptions davis346_by_circuit() {
   o.leak_mismatch_decades = 0.7;
   o.readout.rate_mev_per_s = 12;
   o.readout.row_time_us = 0.08;
-  o.readout.row_scan_us = 0.01;
-  o.readout.row_rest_us = 5.5;
+  o.readout.row_scan_us = 0.003;
+  o.readout.row_rest_us = 6;
   return o;
 }
 

@@ -1,7 +1,10 @@
 #include "esim/frame_camera/exposure.h"
 
 #include <algorithm>
+#include <limits>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "esim/core/vector_math.h"
 
@@ -36,25 +39,54 @@ void Exposure::open(Image<float> memory) {
 }
 
 /// Weights of a segment's ends in the mean of a row whose exposure begins at `begin`.
-Exposure::Weights Exposure::weigh(const Segment& segment, TimeNs begin) const {
+Exposure::Weights Exposure::weigh(const Segment& segment, TimeNs begin, const SceneLight* light,
+                                  std::size_t which) const {
   const TimeNs from = std::max(segment.t0, begin), to = std::min(segment.t1, begin + duration_);
-  if (from >= to) return {begin, 0, 0};
+  if (from >= to) return {0, 0};
+  if (light != nullptr) {
+    const auto [m, tm] = light->integrals(from, to, which);
+    const double late = (to_seconds(from - segment.t0) * m + tm) / to_seconds(segment.t1 - segment.t0);
+    return {static_cast<float>((m - late) / to_seconds(duration_)), static_cast<float>(late / to_seconds(duration_))};
+  }
   // The mean over the overlap is E in its middle.
   const double fraction = static_cast<double>(to - from) / static_cast<double>(duration_);
   const double twice_middle = static_cast<double>(from - segment.t0) + static_cast<double>(to - segment.t0);
   const double middle = twice_middle / (2 * static_cast<double>(segment.t1 - segment.t0));
-  return {begin, static_cast<float>(fraction * (1 - middle)), static_cast<float>(fraction * middle)};
+  return {static_cast<float>(fraction * (1 - middle)), static_cast<float>(fraction * middle)};
 }
 
-bool Exposure::add(const Segment& segment, Rows rows) {
+/// Adds a row whose pixels see several lights.
+bool Exposure::add_lights(const Segment& segment, int y, const SegmentLight& light, std::span<const Weights> weights) {
+  bool good = true;
+  const auto valid = [](float e) { return e >= 0 && e <= std::numeric_limits<float>::max(); };
+  float* const mean = mean_.row(y);
+  for (int x = segment.tile.x; x < segment.tile.x + segment.tile.width; ++x) {
+    const float e0 = segment.irradiance0(x, y), e1 = segment.irradiance1(x, y);
+    good &= valid(e0) && valid(e1);
+    mean[x] += weights[light.scene->light_of(light.before(x, y))].first * e0 +
+               weights[light.scene->light_of(light.after(x, y))].last * e1;
+  }
+  return good;
+}
+
+bool Exposure::add(const Segment& segment, Rows rows, const SegmentLight* light) {
   const auto width = static_cast<std::size_t>(segment.tile.width);
-  Weights weights = weigh(segment, first_row_);
+  const SceneLight* const scene = light != nullptr ? light->scene : nullptr;
+  std::vector<Weights> weights(scene != nullptr ? scene->lights() : 1);
+  std::optional<TimeNs> weighed;  // the beginning of the exposure that the weights are for
   bool good = true;
   for (int y = rows.first; y < rows.last; ++y) {
     const TimeNs begin = first_row_ + row_delays_[static_cast<std::size_t>(y)];
-    if (begin != weights.begin) weights = weigh(segment, begin);
-    if (weights.first + weights.last == 0) continue;
-    good &= add_row(width, weights.first, segment.irradiance0.row(y) + segment.tile.x, weights.last,
+    if (std::max(segment.t0, begin) >= std::min(segment.t1, begin + duration_)) continue;
+    if (begin != weighed) {
+      for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = weigh(segment, begin, scene, i);
+    }
+    weighed = begin;
+    if (weights.size() > 1) {
+      good &= add_lights(segment, y, *light, weights);
+      continue;
+    }
+    good &= add_row(width, weights[0].first, segment.irradiance0.row(y) + segment.tile.x, weights[0].last,
                     segment.irradiance1.row(y) + segment.tile.x, mean_.row(y) + segment.tile.x);
   }
   return good;

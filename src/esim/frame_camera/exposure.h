@@ -6,6 +6,7 @@
 
 #include "esim/core/image.h"
 #include "esim/core/time.h"
+#include "esim/light/flicker.h"
 #include "esim/render/sample.h"
 
 // Private to frame_camera.
@@ -13,8 +14,8 @@ namespace esim::inline frame_camera {
 
 /// A frame during its exposure: accumulates the mean irradiance of each pixel over its row's exposure.
 ///
-/// Between two samples irradiance is linear in time, so that its integral is exact. (A straight line in the logarithm
-/// would lie below it: moving edges would reduce the irradiance.)
+/// Between two samples irradiance is linear in time, times the light's modulation, so that its integral is exact. (A
+/// straight line in the logarithm would lie below it: moving edges would reduce the irradiance.)
 class Exposure {
  public:
   /// Row y is exposed from first_row + row_delays[y] on; the delays must outlive the exposure.
@@ -31,18 +32,19 @@ class Exposure {
   void open(Image<float> memory);
   bool is_open() const { return !mean_.empty(); }
 
-  /// Adds rows of a segment. False if an irradiance is not a finite number >= 0.
-  bool add(const Segment& segment, Rows rows);
+  /// Adds rows of a segment in a light; null: constant. False if an irradiance is not a finite number >= 0.
+  bool add(const Segment& segment, Rows rows, const SegmentLight* light);
 
   const Image<float>& mean() const { return mean_; }
   Image<float> take_memory() { return std::move(mean_); }
 
  private:
+  /// Of a segment's ends in the mean of a row.
   struct Weights {
-    TimeNs begin;  // of the row's exposure
     float first, last;
   };
-  Weights weigh(const Segment& segment, TimeNs begin) const;
+  Weights weigh(const Segment& segment, TimeNs begin, const SceneLight* light, std::size_t which) const;
+  bool add_lights(const Segment& segment, int y, const SegmentLight& light, std::span<const Weights> weights);
 
   std::int64_t number_;
   TimeNs first_row_, duration_;

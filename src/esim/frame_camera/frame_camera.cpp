@@ -7,6 +7,7 @@
 #include <cassert>
 #include <cstddef>
 #include <deque>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -66,8 +67,9 @@ void check_both_ends(const Segment& segment) {
 }
 
 /// A tile's part of an image.
-Image<float> part(const ImageView<float>& image, const Tile& tile) {
-  Image<float> copy(tile.width, tile.height);
+template <typename T>
+Image<T> part(const ImageView<T>& image, const Tile& tile) {
+  Image<T> copy(tile.width, tile.height);
   for (int y = 0; y < tile.height; ++y)
     std::copy_n(image.row(tile.y + y) + tile.x, static_cast<std::size_t>(tile.width), copy.row(y));
   return copy;
@@ -86,7 +88,8 @@ struct FrameCamera::State {
   struct Held {
     Tile tile;
     TimeNs t0, t1;
-    Image<float> irradiance0, irradiance1;  // of the tile's size
+    Image<float> irradiance0, irradiance1;        // of the tile's size
+    Image<std::uint16_t> objects0{}, objects1{};  // the same; only if objects are lights
   };
 
   State(const FrameCameraOptions& o, int width, int height, TimeSpan simulated, std::uint64_t seed,
@@ -96,8 +99,9 @@ struct FrameCamera::State {
   bool plan();
   void open(Exposure& exposure);
   void expose(std::span<const Segment> segments, const Workers& workers);
+  std::optional<SegmentLight> light_of(std::size_t segment) const;
   void cut(std::span<const Segment> segments);
-  void hold(const Segment& segment);
+  void hold(const Segment& segment, const SegmentLight* light);
   void expose_held(Exposure& exposure);
   void finish_first(const Workers& workers);
   void adapt(const CameraFrame& frame);
@@ -115,6 +119,7 @@ struct FrameCamera::State {
   TimeNs horizon = 0;       // earliest possible start of it; kNever after the last frame
   std::deque<Exposure> exposing;
   std::deque<CameraFrame> finished;
+  const Flicker* flicker = nullptr;  // of the current call
   std::vector<Held> held;
   std::vector<Image<float>> memory;  // of finished exposures, to reuse
   std::vector<Piece> pieces;
@@ -177,6 +182,12 @@ void FrameCamera::State::open(Exposure& exposure) {
   memory.pop_back();
 }
 
+/// The light of one of the current segments; empty if it is constant.
+std::optional<SegmentLight> FrameCamera::State::light_of(std::size_t segment) const {
+  if (flicker == nullptr) return std::nullopt;
+  return flicker->light_of(segment);
+}
+
 /// Adds segments to the current exposures.
 void FrameCamera::State::expose(std::span<const Segment> segments, const Workers& workers) {
   TimeNs first = kNever, last = std::numeric_limits<TimeNs>::min();
@@ -192,9 +203,11 @@ void FrameCamera::State::expose(std::span<const Segment> segments, const Workers
   std::atomic<bool> good = true;
   workers.for_each(static_cast<int>(pieces.size()), [&](int i) {
     const Piece& piece = pieces[static_cast<std::size_t>(i)];
-    for (const Segment& segment : segments.subspan(piece.first, piece.last - piece.first)) {
+    for (std::size_t k = piece.first; k < piece.last; ++k) {
+      const std::optional<SegmentLight> light = light_of(k);
       for (Exposure& exposure : exposing) {
-        if (exposure.overlaps(segment.t0, segment.t1) && !exposure.add(segment, piece.rows)) good = false;
+        if (!exposure.overlaps(segments[k].t0, segments[k].t1)) continue;
+        if (!exposure.add(segments[k], piece.rows, light ? &*light : nullptr)) good = false;
       }
     }
   });
@@ -203,10 +216,13 @@ void FrameCamera::State::expose(std::span<const Segment> segments, const Workers
 }
 
 /// Keeps a copy of a segment that ends after the horizon.
-void FrameCamera::State::hold(const Segment& segment) {
+void FrameCamera::State::hold(const Segment& segment, const SegmentLight* light) {
   check_both_ends(segment);
   held.push_back({segment.tile, segment.t0, segment.t1, part(segment.irradiance0, segment.tile),
                   part(segment.irradiance1, segment.tile)});
+  if (light == nullptr || !light->scene->has_sources()) return;
+  held.back().objects0 = part(light->before, segment.tile);
+  held.back().objects1 = part(light->after, segment.tile);
 }
 
 /// Reads out the exposure that ends first, and starts another one.
@@ -230,11 +246,13 @@ void FrameCamera::State::finish_first(const Workers& workers) {
 
 /// Adds the held segments to a new exposure.
 void FrameCamera::State::expose_held(Exposure& exposure) {
-  for (const auto& [tile, t0, t1, irradiance0, irradiance1] : held) {
+  for (const auto& [tile, t0, t1, irradiance0, irradiance1, objects0, objects1] : held) {
     if (!exposure.overlaps(t0, t1)) continue;
     open(exposure);
-    exposure.add({tile, t0, t1, {irradiance0.data(), tile}, {irradiance1.data(), tile}},
-                 {tile.y, tile.y + tile.height});
+    SegmentLight light;
+    if (flicker != nullptr) light = {&flicker->light(), {objects0.data(), tile}, {objects1.data(), tile}};
+    exposure.add({tile, t0, t1, {irradiance0.data(), tile}, {irradiance1.data(), tile}}, {tile.y, tile.y + tile.height},
+                 flicker != nullptr ? &light : nullptr);
   }
 }
 
@@ -255,14 +273,18 @@ FrameCamera::~FrameCamera() = default;
 FrameCamera::FrameCamera(FrameCamera&&) noexcept = default;
 FrameCamera& FrameCamera::operator=(FrameCamera&&) noexcept = default;
 
-void FrameCamera::integrate(std::span<const Segment> segments, TimeNs watermark, const Workers& workers) {
+void FrameCamera::integrate(std::span<const Segment> segments, TimeNs watermark, const Workers& workers,
+                            const Flicker* flicker) {
   State& state = *state_;
+  state.flicker = flicker;
   if (state.spoiled)
     throw UserError("frame camera: an earlier irradiance was invalid, and the camera cannot go on; create a new one");
   state.spoiled = true;  // reset on success
   state.expose(segments, workers);
-  for (const Segment& segment : segments) {
-    if (segment.t1 > state.horizon) state.hold(segment);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    if (segments[i].t1 <= state.horizon) continue;
+    const std::optional<SegmentLight> light = state.light_of(i);
+    state.hold(segments[i], light ? &*light : nullptr);
   }
   while (!state.exposing.empty() && state.exposing.front().end() <= watermark) state.finish_first(workers);
   state.spoiled = false;

@@ -9,6 +9,7 @@
 #include "esim/core/parallel.h"
 #include "esim/core/time.h"
 #include "esim/frame_camera/options.h"
+#include "esim/light/flicker.h"
 #include "esim/render/sample.h"
 
 namespace esim::inline frame_camera {
@@ -40,9 +41,11 @@ class FrameCamera {
   FrameCamera& operator=(FrameCamera&&) noexcept;
 
   /// Takes new segments of the pixels' irradiance; the segments of a tile must be contiguous in time. No future segment
-  /// begins before the watermark. Throws UserError naming the pixel and the time if an irradiance within an exposure is
-  /// not a finite number >= 0; the camera can then no longer be used.
-  void integrate(std::span<const Segment> segments, TimeNs watermark, const Workers& workers);
+  /// begins before the watermark. `flicker`: the light of the scene, which has looked at the same segments; the same in
+  /// every call, null if the light is constant. Throws UserError naming the pixel and the time if an irradiance within
+  /// an exposure is not a finite number >= 0; the camera can then no longer be used.
+  void integrate(std::span<const Segment> segments, TimeNs watermark, const Workers& workers,
+                 const Flicker* flicker = nullptr);
 
   /// End of the next frame's exposure; kNever after the last one. The frame can be taken once the watermark has reached
   /// this time.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "esim/core/describe.h"
+#include "esim/light/options.h"
 #include "esim/scenario/pose_options.h"
 #include "esim/scenario/trajectory_options.h"
 #include "esim/scene/engine_images.h"
@@ -22,6 +23,7 @@ struct ObjectOptions {
   std::filesystem::path scene;
   double scale = 1.0;
   TrajectoryOptions trajectory;
+  std::optional<FlickerOptions> flicker{};  ///< unset: lit by the light of the scene
 };
 
 template <class Visitor>
@@ -30,6 +32,7 @@ void describe(Visitor& visit, ObjectOptions& o) {
   visit("scene", o.scene, About{"scene file, in the coordinates of the object"});
   visit("scale", o.scale, About{"factor that converts its coordinates to metres", "", 0, 1e6, true});
   visit("trajectory", o.trajectory, About{"motion: pose of the object's coordinates in the world"});
+  visit("flicker", o.flicker, About{"makes the object a light of its own, such as a screen or a lamp, that flickers"});
 }
 
 struct SunOptions {
@@ -186,6 +189,7 @@ struct SpriteOptions {
   Eigen::Vector2d pivot{0.5, 0.5};
   SpriteInterpolation interpolation = SpriteInterpolation::spline;
   std::vector<SpritePose> poses{SpritePose{}};  // at rest in the middle
+  std::optional<FlickerOptions> flicker{};      // unset: lit by the light of the scene
 };
 
 template <class Visitor>
@@ -204,6 +208,7 @@ void describe(Visitor& visit, SpriteOptions& o) {
       "poses", o.poses,
       About{
           "in order of time; before the first and after the last, the sprite rests (default: it rests in the middle)"});
+  visit("flicker", o.flicker, About{"makes the sprite a light of its own, such as a screen or a lamp, that flickers"});
 }
 
 /// Sprites on the sensor. If `scene` is given, they come from that file.

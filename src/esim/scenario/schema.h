@@ -100,7 +100,7 @@ void describe(Visitor& visit, Scenario& o) {
         About{"duration of the simulation (default: until the trajectory, or the sprites' poses, end)", "s", 0, 1e9,
               true});
   visit("renderer", o.renderer, About{"what the cameras see"});
-  visit("light", o.light, About{"the light that irradiance 1 stands for"});
+  visit("light", o.light, About{"the light of the scene: its flicker, and the unit of irradiance"});
   visit("trajectory", o.trajectory, About{"how the body moves"});
   visit("imu", o.imu, About{"inertial measurement unit; {} gives one with default values (default: none)"});
   visit("truth", o.truth, About{"ground truth"});

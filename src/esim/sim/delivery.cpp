@@ -71,7 +71,8 @@ void Delivery::deliver_truth(TimeNs t) {
   for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
     const int number = static_cast<int>(i);
     RenderRequest request = view(world_, i, t);
-    request.which_objects = world_.truth_objects;
+    const std::optional<Flicker>& flicker = world_.cameras[i].flicker;
+    request.which_objects = world_.truth_objects || (flicker && flicker->light().has_sources());
     object_poses_.clear();
     for (const Kinematics& object : request.objects) object_poses_.push_back(object.T_world_body);
     const OpticalFlowImages* const optical_flow = stages_.render_truth(world_.cameras[i], request, truth_);

@@ -71,6 +71,7 @@ void Simulator::Run::advance(CameraChannel& camera) {
   std::span<const Segment> segments = stages.accept_sample(camera);
   stages.start_rendering(camera, known_until);
   for (; !segments.empty(); segments = stages.more_segments(camera)) {
+    stages.look_at_lights(camera, segments);
     stages.make_events(camera, segments);
     stages.expose_frames(camera, segments);
   }

@@ -38,10 +38,29 @@ std::span<const Segment> Stages::more_segments(CameraChannel& camera) {
   return timed(seconds_.sampling, [&] { return camera.sampler->more(); });
 }
 
+void Stages::look_at_lights(CameraChannel& camera, std::span<const Segment> segments) {
+  if (!camera.flicker) return;
+  timed(seconds_.sampling, [&] {
+    const auto index = static_cast<std::size_t>(&camera - world_.cameras.data());
+    const Camera& model = world_.info.cameras[index].model;
+    camera.flicker->look(segments, model.width, model.height, [&](TimeNs t, const Tile& tile, Sample& sample) {
+      RenderRequest request = view(world_, index, t, {tile});
+      request.which_objects = true;
+      camera.renderer->render(std::move(request), sample);
+    });
+  });
+}
+
 void Stages::make_events(CameraChannel& camera, std::span<const Segment> segments) {
   if (!camera.event_camera) return;
-  timed(seconds_.events,
-        [&] { camera.event_camera->integrate(segments, camera.sampler->watermark(), *world_.workers); });
+  timed(seconds_.events, [&] {
+    const auto integrate = [&](std::span<const Segment> some, TimeNs watermark) {
+      camera.event_camera->integrate(some, watermark, *world_.workers);
+    };
+    const TimeNs watermark = camera.sampler->watermark();
+    if (!camera.flicker) return integrate(segments, watermark);
+    camera.flicker->divide(watermark, *world_.workers, integrate);
+  });
 }
 
 void Stages::release_events(CameraChannel& camera, TimeNs until, std::vector<Event>& events) {
@@ -51,13 +70,16 @@ void Stages::release_events(CameraChannel& camera, TimeNs until, std::vector<Eve
 
 void Stages::expose_frames(CameraChannel& camera, std::span<const Segment> segments) {
   if (!camera.frame_camera) return;
-  timed(seconds_.frames,
-        [&] { camera.frame_camera->integrate(segments, camera.sampler->watermark(), *world_.workers); });
+  timed(seconds_.frames, [&] {
+    camera.frame_camera->integrate(segments, camera.sampler->watermark(), *world_.workers,
+                                   camera.flicker ? &*camera.flicker : nullptr);
+  });
 }
 
 const OpticalFlowImages* Stages::render_truth(CameraChannel& camera, const RenderRequest& request, Sample& truth) {
   return timed(seconds_.truth, [&]() -> const OpticalFlowImages* {
     camera.renderer->render(request, truth);
+    if (camera.flicker) camera.flicker->illuminate(request.t, truth.object, truth.irradiance);
     return camera.optical_flow ? camera.optical_flow->advance(request, truth) : nullptr;
   });
 }

@@ -28,8 +28,11 @@ class Stages {
   /// The next ones; none after the last.
   std::span<const Segment> more_segments(CameraChannel& camera);
 
+  /// If the light flickers: finds out which light the segments' pixels see, for make_events() and expose_frames().
+  void look_at_lights(CameraChannel& camera, std::span<const Segment> segments);
+
   // --- events
-  /// Gives segments to the event camera, if there is one.
+  /// Gives segments to the event camera, if there is one, divided if the light flickers.
   void make_events(CameraChannel& camera, std::span<const Segment> segments);
   /// Replaces `events` by the next events of the event camera up to `until`.
   void release_events(CameraChannel& camera, TimeNs until, std::vector<Event>& events);
@@ -39,8 +42,8 @@ class Stages {
   void expose_frames(CameraChannel& camera, std::span<const Segment> segments);
 
   // --- truth
-  /// Renders the ground truth of a camera. Returns the optical flow from the previous one; null if not requested, and
-  /// for the first one.
+  /// Renders the ground truth of a camera in the light of that time. Returns the optical flow from the previous one;
+  /// null if not requested, and for the first one.
   const OpticalFlowImages* render_truth(CameraChannel& camera, const RenderRequest& request, Sample& truth);
   /// The labels of the events that release_events() returned last, with the objects that the pixels saw; none unless
   /// the event camera has labels.

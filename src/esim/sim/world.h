@@ -9,6 +9,7 @@
 #include "esim/event_camera/event_camera.h"
 #include "esim/frame_camera/frame_camera.h"
 #include "esim/imu/imu.h"
+#include "esim/light/flicker.h"
 #include "esim/motion/trajectory.h"
 #include "esim/recording/record.h"
 #include "esim/render/renderer.h"
@@ -28,6 +29,7 @@ struct CameraChannel {
   Sample sample;                           // the latest sample; renderer and sampler exchange its buffers
   std::unique_ptr<Rendering> rendering{};  // the running rendering of the sampler's next request
   std::optional<FrameCamera> frame_camera{};
+  std::optional<Flicker> flicker{};  // unset: constant light
 
   // Ground truth, if requested.
   std::unique_ptr<OpticalFlowFromDepth> optical_flow{};

@@ -12,7 +12,6 @@ namespace esim::inline event_camera {
 namespace {
 
 constexpr double kElectron_fC = 1.602176634e-4;  // elementary charge, fA s
-constexpr double kMaxDecay = 0.25;               // in one step far from equilibrium: as steps_for()
 constexpr double kSettled = 1e-13;               // brightness: differences below this are zero
 constexpr float kUnreachable = 1e6F;             // threshold of a dead pixel
 constexpr double kGuard = 1e-9;                  // between bounds and levels, above all rounding errors
@@ -305,18 +304,18 @@ void CircuitArray::advance_one(const Row& row, std::uint32_t column, std::size_t
   v_[i] = lag_[i] == 0 && ramp.rate == 0 && std::abs(front.v - y_[i]) < kSettled ? y_[i] : front.v;
 }
 
-/// Takes a pixel along a ramp of light, in as many steps as needed; skips those within its bounds. Returns the number
-/// of events that a maximum rate has lost.
+/// Takes a pixel along a ramp of light, in as many steps as needed; skips those within its bounds.
+/// Returns the number of events that a maximum rate has lost.
 template <typename Emit>
 std::int64_t CircuitArray::run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length,
                                const Emit& emit) {
   std::int64_t lost = 0;
   CircuitPixel pixel = this->pixel(i);
-  const int steps = steps_for(circuit_.poles, front, ramp, length);
-  for (int k = 0; k < steps; ++k) {
-    const double h = length / steps, from = start + h * k;
-    const LightRamp part{ramp.light + ramp.rate * h * k, ramp.rate};
+  for (double done = 0; done < length;) {
+    const LightRamp part{ramp.light + ramp.rate * done, ramp.rate};
+    const double h = step_length(circuit_.poles, front, part, length - done), from = start + done;
     const CircuitPiece piece = esim::advance(circuit_.poles, front, part, h);
+    done = h < length - done ? done + h : length;
     const auto [lowest, highest] = piece.range(0, h);
     const double leaked0 = 1e-9 * static_cast<double>(leak_[i]) * from,
                  leaked1 = 1e-9 * static_cast<double>(leak_[i]) * (from + h);

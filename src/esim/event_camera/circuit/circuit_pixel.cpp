@@ -54,29 +54,29 @@ std::optional<double> CircuitPixel::find_near(double a, double b) const {
   return find_near(middle, b);
 }
 
-/// Chooses the pole for the light at `s`.
+/// Chooses the lengths of intervals for the light at `s`.
 void CircuitPixel::follow_light(double s) {
   state_.node_light = static_cast<float>(light(s));
   state_.pole = circuit_.pole(light(s));
 }
 
 void CircuitPixel::start_interval(const NoiseState& from, double s) {
-  if (std::abs(light(s) - static_cast<double>(state_.node_light)) > kPoleReach) follow_light(s);
+  if (std::abs(light(s) - static_cast<double>(state_.node_light)) > kLightReach) follow_light(s);
   const auto level = level_at(signal(s), per_deviation());
   state_.node_time = start_ + s;
   state_.active = level.has_value();
   state_.node += 1;
   state_.from = from;
-  if (level) set_interval(noise_->next(from, pixel_, state_.node, state_.pole, *level, draws_));
+  if (level) set_interval(noise_->next(from, pixel_, state_.node, state_.pole, *level, drift(s), draws_));
 }
 
 /// Moves `s` through steps of the noise in which surely no threshold is reached: to the beginning of the first one that
 /// may contain a crossing or is followed by an interval of another level, or to the end of the piece; then, returns
 /// bounds.
 std::optional<CircuitBounds> CircuitPixel::skip_quiet_steps(double& s) {
-  double scale = per_deviation();
-  double h = noise_->length(state_.pole, PhotoreceptorNoise::kSteps);
-  double decay1 = std::exp(-piece_.k1 * h), decay2 = std::exp(-piece_.k2 * h);
+  const double scale = per_deviation();
+  const double h = noise_->length(state_.pole, PhotoreceptorNoise::kSteps);
+  const double decay1 = std::exp(-piece_.k1 * h), decay2 = std::exp(-piece_.k2 * h);
   const double curve1 = 0.125 * piece_.k1 * piece_.k1, curve2 = 0.125 * piece_.k2 * piece_.k2;
   double fast = piece_.fast * std::exp(-piece_.k1 * s), slow = piece_.slow * std::exp(-piece_.k2 * s);
   double value = piece_.level + piece_.rate * s + fast + slow + leak_ * (start_ + s);
@@ -95,19 +95,10 @@ std::optional<CircuitBounds> CircuitPixel::skip_quiet_steps(double& s) {
     if (node - start_ > piece_.length)
       return CircuitBounds{-gain_ * low - static_cast<double>(parameters_.off),
                            static_cast<double>(parameters_.on) - gain_ * high, node};
-    if (change > kPoleReach) {
-      start_interval(state_.to, end);
-      s = end, value = next;
-      if (!state_.active || state_.level != PhotoreceptorNoise::kSteps) return std::nullopt;
-      scale = per_deviation();
-      h = noise_->length(state_.pole, PhotoreceptorNoise::kSteps);
-      decay1 = std::exp(-piece_.k1 * h), decay2 = std::exp(-piece_.k2 * h);
-      continue;
-    }
     if (level_at(next, scale) != PhotoreceptorNoise::kSteps) return std::nullopt;
     state_.from = state_.to;
     state_.node += 1;
-    state_.to = noise_->after_step(state_.from, pixel_, state_.node, state_.pole, draws_);
+    state_.to = noise_->after_step(state_.from, pixel_, state_.node, state_.pole, drift(end), draws_);
     state_.node_time = node;
     s = end, value = next;
   }
@@ -121,7 +112,7 @@ void CircuitPixel::activate(double s) {
   start_interval(from, s);
   if (state_.active) return;
   state_.active = true;  // between the distances at which it becomes inactive and active
-  set_interval(noise_->next(from, pixel_, state_.node, state_.pole, 0, draws_));
+  set_interval(noise_->next(from, pixel_, state_.node, state_.pole, 0, 0, draws_));
 }
 
 /// The noise at `s`, at the end of a reset. It continues from the last node before, whatever the signal did meanwhile.

@@ -61,8 +61,7 @@ struct CircuitBounds {
   double low = 0, high = 0, until = 0;
 };
 
-inline constexpr double kLightReach = 0.2;  ///< change of L within which an interval of the noise keeps its pole
-inline constexpr double kPoleReach = 0.05;  ///< change of L within which the next interval keeps it
+inline constexpr double kLightReach = 0.2;  ///< change of L within which intervals of the noise keep their length
 inline constexpr double kActiveDeviations =
     5.5;  ///< distance to a threshold, in deviations, at which noise begins to matter
 inline constexpr double kInactiveDeviations = 6.0;  ///< distance at a node at which it ceases to matter
@@ -131,6 +130,10 @@ class CircuitPixel {
 
   /// From ln to standard deviations of the noise.
   double per_deviation() const { return 1 / (gain_ * noise_->deviation(state_.pole)); }
+  /// The drift of PhotoreceptorNoise for the light at `s`.
+  double drift(double s) const {
+    return (static_cast<double>(state_.node_light) - light(s)) * (1 / PhotoreceptorNoise::kDriftStep);
+  }
   /// The level of the interval after a node with this signal; none if the pixel becomes inactive. A signal that has
   /// just come near a threshold will probably move on: its first intervals are steps.
   std::optional<std::int32_t> level_at(double value, double per_deviation) {
@@ -241,6 +244,7 @@ CircuitBounds CircuitPixel::run(const Emit& emit) {
     }
     s = end;
     if (recuts) {
+      follow_light(s);
       start_interval(noise_->at(noise, s - offset), s);
     } else if (node <= length) {
       start_interval(noise.to, s);

@@ -9,7 +9,7 @@ namespace esim::inline event_camera {
 namespace {
 
 constexpr double kPoleStep = 1.01;   // ratio of successive time constants t1
-constexpr double kNeglected = 0.02;  // maximum deviation of x from a cubic within a step, in deviations of x
+constexpr double kNeglected = 0.01;  // maximum deviation of x from a cubic within a step, in deviations of x
 constexpr int kLevelsBelowLeaves = 4;
 constexpr std::uint32_t kStepAddresses = 0x80000000;  // above those of the tree of node 0
 constexpr double kBoundDeviations = 5;
@@ -108,7 +108,12 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
     }
     pole.step_bridge = pole.bridges.size();
     const double step = step_length(pole.t1);
-    pole.steps[kSteps] = make_step(pole.t1, step);
+    for (int k = -kDrifts; k <= kDrifts; ++k) {
+      double t1 = pole.t1 * std::exp(kDriftStep * k);
+      if (std::abs(t1 / t2_ - 1) < 0.004) t1 = t2_ * 1.004;
+      pole.drifting[static_cast<std::size_t>(k + kDrifts)] = make_step(t1, step);
+    }
+    pole.steps[kSteps] = pole.drifting[kDrifts];
     while (pole.first_in_steps < kSteps && pole.steps[static_cast<std::size_t>(pole.first_in_steps)].h > 8 * step)
       ++pole.first_in_steps;
     for (int k = 0; k <= kLevelsBelowLeaves; ++k) pole.bridges.push_back(make_bridge(pole.t1, std::ldexp(step, -k)));
@@ -154,15 +159,16 @@ PhotoreceptorNoise::Interval PhotoreceptorNoise::first(std::uint32_t pixel, std:
   // Stationary: Var y = v, Var x = Cov xy = v t1 / (t1 + t2). Draw 0 of node 0 belongs to this state alone.
   const double t1 = poles_[static_cast<std::size_t>(pole)].t1, common = variance_ * t1 / (t1 + t2_);
   const auto n = random_.normals(pixel, 0);
-  return next(root({variance_, common, common}) * NoiseState{n[0], n[1]}, pixel, 0, pole, level, draws);
+  return next(root({variance_, common, common}) * NoiseState{n[0], n[1]}, pixel, 0, pole, level, 0, draws);
 }
 
 PhotoreceptorNoise::Interval PhotoreceptorNoise::next(const NoiseState& from, std::uint32_t pixel, std::uint32_t node,
-                                                      std::int32_t pole, std::int32_t level, StepDraws& draws) const {
+                                                      std::int32_t pole, std::int32_t level, double drift,
+                                                      StepDraws& draws) const {
   const Step& step = poles_[static_cast<std::size_t>(pole)].steps[static_cast<std::size_t>(level)];
   Interval interval{from, {}, pixel, node, pole, level, step.h};
   if (level == kSteps) {
-    interval.to = after_step(from, pixel, node, pole, draws);
+    interval.to = after_step(from, pixel, node, pole, drift, draws);
     return interval;
   }
   const auto n = normals(interval, 1);

@@ -51,7 +51,7 @@ class PhotoreceptorNoise {
   struct Interval {
     NoiseState from, to;
     std::uint32_t pixel = 0, node = 0;  // the number of the node at its start
-    std::int32_t pole = 0;              // of t1
+    std::int32_t pole = 0;              // of t1, by which the length is chosen
     std::int32_t level = 0;
     double length = 0;  // ns
   };
@@ -61,6 +61,10 @@ class PhotoreceptorNoise {
     const double place = (log_t1_ns - log_first_) * per_log_step_ + 0.5;
     return static_cast<std::int32_t>(std::clamp(place, 0.0, static_cast<double>(poles_.size()) - 0.5));
   }
+  /// Steps keep the length of their `pole` in other light, where ln(t1) is larger by `drift` times kDriftStep, |drift|
+  /// up to kDrifts. What they do is interpolated, so that rounding errors of the light have no large consequences.
+  static constexpr int kDrifts = 4;
+  static constexpr double kDriftStep = 0.05;
   double t1_ns(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].t1; }
   double t2_ns() const { return t2_; }
   /// The length of an interval, ns.
@@ -88,19 +92,23 @@ class PhotoreceptorNoise {
   /// The first interval of a pixel, from the stationary distribution.
   Interval first(std::uint32_t pixel, std::int32_t pole, std::int32_t level, StepDraws& draws) const;
 
-  /// The interval that begins with state `from` at node `node`. `draws` are those of the pixel.
+  /// The interval that begins with state `from` at node `node`. `drift` matters for steps only; `draws` are those of
+  /// the pixel.
   Interval next(const NoiseState& from, std::uint32_t pixel, std::uint32_t node, std::int32_t pole, std::int32_t level,
-                StepDraws& draws) const;
+                double drift, StepDraws& draws) const;
 
   /// The state at the end of the step that begins with state `from` at node `node`.
   NoiseState after_step(const NoiseState& from, std::uint32_t pixel, std::uint32_t node, std::int32_t pole,
-                        StepDraws& draws) const {
+                        double drift, StepDraws& draws) const {
     if (draws.block != node / kBlock) draw_block(pixel, node / kBlock, draws);
-    const Step& step = poles_[static_cast<std::size_t>(pole)].steps[kSteps];
     const double n1 = static_cast<double>(draws.first[node % kBlock]),
                  n2 = static_cast<double>(draws.second[node % kBlock]);
-    return {step.drift.yy * from.y + step.spread.yy * n1,
-            step.drift.xy * from.y + step.drift.xx * from.x + step.spread.xy * n1 + step.spread.xx * n2};
+    const double place = drift + kDrifts, below = std::clamp(std::floor(place), 0.0, 2.0 * kDrifts - 1);
+    const Step* const steps = &poles_[static_cast<std::size_t>(pole)].drifting[static_cast<std::size_t>(below)];
+    const auto between = [&](double a, double b) { return a + (place - below) * (b - a); };
+    const NoiseMatrix &d0 = steps[0].drift, &d1 = steps[1].drift, &s0 = steps[0].spread, &s1 = steps[1].spread;
+    return {between(d0.yy, d1.yy) * from.y + between(s0.yy, s1.yy) * n1,
+            between(d0.xy, d1.xy) * from.y + d0.xx * from.x + between(s0.xy, s1.xy) * n1 + between(s0.xx, s1.xx) * n2};
   }
 
   /// Bounds of x during a step: a cubic lies between the control points of its Bezier curve.
@@ -151,10 +159,11 @@ class PhotoreceptorNoise {
   };
   struct Pole {
     double t1 = 0, deviation = 0;
-    std::array<Step, kLevels> steps;  // by level
-    std::vector<Bridge> bridges;      // of the long intervals, by level plus depth, then those of steps
-    std::size_t step_bridge = 0;      // the first of steps
-    std::int32_t first_in_steps = 0;  // this level and further ones are of at most 8 steps
+    std::array<Step, kLevels> steps;             // by level
+    std::array<Step, 2 * kDrifts + 1> drifting;  // of steps, by drift
+    std::vector<Bridge> bridges;                 // of the long intervals, by level plus depth, then those of steps
+    std::size_t step_bridge = 0;                 // the first of steps
+    std::int32_t first_in_steps = 0;             // this level and further ones are of at most 8 steps
 
     std::size_t bridge_of(std::int32_t level) const {
       return level == kSteps ? step_bridge : static_cast<std::size_t>(level);

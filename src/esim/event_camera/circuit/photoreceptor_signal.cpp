@@ -14,16 +14,13 @@ std::array<double, 4> exponential_moments(double a) {
   return {1 - a * p1, p1, p2, p3};
 }
 
-int steps_for(const CircuitPoles& poles, const CircuitState& state, const LightRamp& ramp, double length) {
+double step_length(const CircuitPoles& poles, const CircuitState& state, const LightRamp& ramp, double length) {
   const double change = std::abs(ramp.rate) * length;
-  double steps = std::max(1.0, std::ceil(change / kMaxLightStep - 1e-9));
-  // Far from the lag that the ramp keeps up, the response is not an exponential: short steps until it has decayed.
+  const double step = length / std::max(1.0, std::ceil(change / kMaxLightStep - 1e-9));
+  // Far from the lag that the ramp keeps up, the response is not an exponential.
   const double rate = std::exp(ramp.light) / poles.t1_unit_ns;
-  if (std::abs(state.lag - ramp.rate / rate) > kMaxTransient) {
-    const double decays = rate * std::exp(std::max(0.0, ramp.rate * length)) * length;
-    steps = std::max(steps, std::ceil(4 * std::min(decays, 12.0)));
-  }
-  return static_cast<int>(std::min(steps, 1e4));
+  if (std::abs(state.lag - ramp.rate / rate) <= kMaxTransient) return step;
+  return std::min(step, kMaxDecay / (rate * std::exp(std::max(0.0, ramp.rate * step))));
 }
 
 CircuitPiece advance(const CircuitPoles& poles, CircuitState& state, const LightRamp& ramp, double length) {

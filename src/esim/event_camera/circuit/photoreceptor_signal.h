@@ -57,12 +57,13 @@ std::array<double, 4> exponential_moments(double a);
 /// Longest stretch that advance() takes in one step: the light may change by at most this.
 inline constexpr double kMaxLightStep = 0.1;
 
-/// Distance of the lag from that of a steady ramp, beyond which steps must be short compared with Q / I.
+/// Distance of the lag from that of a steady ramp, beyond which steps must be shorter than kMaxDecay Q / I.
 inline constexpr double kMaxTransient = 0.03;
+inline constexpr double kMaxDecay = 0.25;
 
-/// Number of equal steps of advance() for a change of L over `length` ns. More are needed while the photodiode is far
-/// from equilibrium.
-int steps_for(const CircuitPoles& poles, const CircuitState& state, const LightRamp& ramp, double length);
+/// Length of the next step of advance() on a ramp that goes on for `length` ns. Far from equilibrium, steps are short
+/// compared with Q / I.
+double step_length(const CircuitPoles& poles, const CircuitState& state, const LightRamp& ramp, double length);
 
 /// Advances the state by `length` ns, and returns the signal on the way.
 CircuitPiece advance(const CircuitPoles& poles, CircuitState& state, const LightRamp& ramp, double length);

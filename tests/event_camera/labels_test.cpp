@@ -328,7 +328,9 @@ TEST_P(LabelsAgainstReference, AreTheSame) {
   // The front end and the low-pass use floats, which limits the accuracy of times and parts.
   const EventCameraOptions& o = GetParam();
   const bool in_floats = o.response != PixelResponse::log || o.low_pass_hz > 0 || o.surround_px > 0;
-  const double tolerance_ns = in_floats ? 2000 : 1;
+  // Thresholds with noise are floats, and their rounding adds up in the references: seeds 1 to 70 differ by up to 101
+  // ns.
+  const double tolerance_ns = in_floats ? 2000 : o.threshold_noise > 0 ? 200 : 1;
   const double tolerance = in_floats ? 1e-3 : 1e-6;
   for (std::size_t i = 0; i < fast.events.size(); ++i) {
     const EventLabel &a = fast.labels[i], &b = defined.labels[i];

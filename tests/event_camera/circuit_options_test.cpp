@@ -68,6 +68,7 @@ TEST(CircuitOptions, ValuesOutOfRangeAreRefusedByName) {
       {"circuit.max_rate_hz", [&](auto& o) { o.circuit->max_rate_hz = kNan; }},
       {"readout.scan_period_us", [](auto& o) { o.readout.scan_period_us = -1; }},
       {"readout.time_stamp_us", [&](auto& o) { o.readout.time_stamp_us = kInf; }},
+      {"readout.queue_events", [](auto& o) { o.readout.queue_events = 100; }},
   };
   EXPECT_NO_THROW(EventCamera(circuit(0.2), 4, 4));
   for (const Case& bad : cases) {

@@ -72,6 +72,7 @@ void check(const EventCameraOptions& o) {
   refuse("shot_noise_hz", o.shot_noise_hz);
   refuse("latency_us", o.latency_us);
   refuse("latency_jitter_us", o.latency_jitter_us);
+  refuse("readout.queue_events", o.readout.queue_events);  // each pixel keeps its request
   if (o.response != PixelResponse::log) throw UserError("event camera: response: circuit needs log; " + remedy);
   if (o.refractory_mode != RefractoryMode::hold)
     throw UserError("event camera: refractory_mode: circuit needs hold; " + remedy);

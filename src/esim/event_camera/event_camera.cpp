@@ -324,12 +324,14 @@ EventCameraStatistics EventCamera::statistics() const {
   EventCameraStatistics statistics;
   statistics.in_flight = static_cast<std::int64_t>(state_->queue.size());
   const auto add = [&](const auto& readout) {
-    statistics.dropped = readout.dropped();
     statistics.delayed = readout.delayed();
     statistics.longest_delay = readout.longest_delay();
     statistics.in_flight += static_cast<std::int64_t>(readout.waiting());
   };
-  if (state_->readout) add(*state_->readout);
+  if (state_->readout) {
+    add(*state_->readout);
+    statistics.dropped = state_->readout->dropped();
+  }
   if (state_->circuit_readout) add(*state_->circuit_readout);
   statistics.lost = state_->lost;
   statistics.read_out = state_->read_out;

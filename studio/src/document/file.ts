@@ -13,6 +13,8 @@ const draftKey = "esim-studio-draft";
 
 /** Opening and saving, including conflicts with other programs. */
 export class ScenarioFile {
+  private saving: Promise<boolean> = Promise.resolve(false);
+
   constructor(
     private document: ScenarioDocument,
     private roots: string[],
@@ -65,7 +67,14 @@ export class ScenarioFile {
   }
 
   /** Returns whether it was saved; refuses to save while the form has invalid entries. */
-  async save(): Promise<boolean> {
+  save(): Promise<boolean> {
+    // After an earlier save: its revision is that of the file.
+    const saved = this.saving.then(() => this.saveNow());
+    this.saving = saved.catch(() => false);
+    return saved;
+  }
+
+  private async saveNow(): Promise<boolean> {
     if (await this.refused()) return false;
     return this.document.path === null ? this.saveAs() : this.write(this.document.path, this.document.onDisk, false);
   }

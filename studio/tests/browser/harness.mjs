@@ -112,7 +112,16 @@ export async function openPage(browser, server, options = {}) {
   const page = await context.newPage();
   const faults = [];
   const state = { page, context, faults, serverIsAway: false };
+  // A page that is left while it loads textures says that it cannot load them.
+  const textures = /GLTFLoader: Couldn't load texture blob:/;
+  let left = 0;
+  page.on("framenavigated", (frame) => {
+    if (frame !== page.mainFrame()) return;
+    left = Date.now();
+    faults.splice(0, faults.length, ...faults.filter((fault) => !textures.test(fault)));
+  });
   page.on("console", (line) => {
+    if (textures.test(line.text()) && Date.now() - left < 2000) return;
     const lost = /ERR_CONNECTION_REFUSED|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET|ERR_INCOMPLETE_CHUNKED/.test(
       line.text(),
     );

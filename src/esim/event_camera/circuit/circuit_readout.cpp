@@ -49,7 +49,6 @@ TimeNs CircuitReadout::scan_time(const Event& request) const {
 }
 
 void CircuitReadout::take(const Event& request) {
-  if (options_.queue_events > 0 && waiting_ >= static_cast<std::size_t>(options_.queue_events)) ++dropped_;
   if (epoch_ == kNoTime) epoch_ = request.t;
   std::uint32_t& first = first_[request.y];
   if (first == kNone) {

@@ -38,7 +38,6 @@ class CircuitReadout {
   /// Events that a maximum rate of the pixels has lost since the last call.
   std::int64_t take_lost() { return std::exchange(buffer_.lost, 0); }
 
-  std::int64_t dropped() const { return dropped_; }
   std::int64_t delayed() const { return delayed_; }
   TimeNs longest_delay() const { return longest_delay_; }
   std::size_t waiting() const { return requests_.size() + waiting_ + read_.size() - released_; }
@@ -58,7 +57,6 @@ class CircuitReadout {
     archive.value(self.free_at_);
     archive.value(self.waiting_);
     archive.value(self.released_);
-    archive.value(self.dropped_);
     archive.value(self.delayed_);
     archive.value(self.longest_delay_);
   }
@@ -96,7 +94,7 @@ class CircuitReadout {
   std::size_t waiting_ = 0;
   std::vector<Event> read_;  // in order; the first released_ have been released
   std::size_t released_ = 0;
-  std::int64_t dropped_ = 0, delayed_ = 0;
+  std::int64_t delayed_ = 0;
   TimeNs longest_delay_ = 0;
   CircuitBuffer buffer_;
   PendingLabels* labels_ = nullptr;  // during advance()

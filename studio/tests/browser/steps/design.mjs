@@ -269,7 +269,10 @@ test("options are searched for by name and description, and lead to what they ne
   await page.keyboard.type("refractory");
   const names = page.locator(".form .option-name code");
   await until(async () => (await names.count()) > 0, "what is found");
-  for (const name of await names.allTextContents()) assert.match(name, /event_camera\..*refractory/);
+  const hits = await names.allTextContents();
+  assert.match(hits[0], /event_camera\..*refractory/);
+  assert.ok(hits.at(-1).endsWith("event_camera.circuit.max_rate_hz"), "found by its description");
+  for (const name of hits) assert.match(name, /event_camera\./);
   await page.keyboard.press("Control+a");
   await page.keyboard.type("rate_hz");
   await until(async () => (await names.count()) > 3, "what is found now");

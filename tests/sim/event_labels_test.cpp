@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "esim/sim/flicker_labels.h"
 #include "esim/truth/seen_objects.h"
 #include "sim/card_scene.h"
 
@@ -122,6 +123,43 @@ TEST_F(SeenCards, PassTheFiltersOfTheSensorWithTheirEvents) {
   }
   EXPECT_EQ(passed.events, expected.events);
   EXPECT_EQ(passed.labels, expected.labels);
+}
+
+TEST_F(SeenCards, SaysWhichEventsFlickerMakes) {
+  scenario_.light.flicker = FlickerOptions{.depth = 0.6, .shape = FlickerShape::sine};
+  const Collector lit = run();
+  ASSERT_TRUE(lit.aligned);
+  std::array<std::size_t, 4> causes{};
+  for (const EventLabel& label : lit.labels) ++causes.at(static_cast<std::size_t>(label.cause));
+  // ln 1.6 / 0.4 = 1.39 up and down, 100 times a second
+  EXPECT_GT(causes[1], 9 * causes[0]);
+  EXPECT_GT(causes[0], 100U) << "edges of the cards still make events";
+  scenario_.light.flicker = FlickerOptions{.depth = 0.001, .shape = FlickerShape::sine};
+  const Collector dim = run();
+  for (const EventLabel& label : dim.labels) {
+    ASSERT_EQ(label.cause, EventCause::signal);
+    ASSERT_LE(std::abs(label.flicker), 0.0021F);
+  }
+}
+
+TEST(FlickerLabels, TakeTheChangeOfTheLightOutOfTheSignal) {
+  SceneLight light(Modulation(FlickerOptions{.depth = 0.5, .shape = FlickerShape::sine}, 0, {1e-4, 0.001}));
+  const double before = std::log(light.at(0) + 0.001), after = std::log(light.at(2 * kNsPerMs) + 0.001);
+  const auto change = static_cast<float>(after - before);
+  const Flicker flicker(std::move(light), 0.001);
+  FlickerLabels labels(2, 1, 0);
+  const std::array<Event, 3> events{{{2 * kNsPerMs, 0, 0, 1}, {2 * kNsPerMs, 1, 0, -1}, {2 * kNsPerMs, 0, 0, 1}}};
+  std::array<EventLabel, 3> found;
+  for (EventLabel& label : found) label.t_ideal = 2 * kNsPerMs;
+  ASSERT_GT(change, 0.1F);
+  found[0].signal = 1.5F * change, found[1].signal = -0.2F, found[2].signal = 0.2F;
+  labels.set(flicker, events, found);
+  EXPECT_NEAR(found[0].flicker, change, 1e-6F);
+  EXPECT_NEAR(found[0].signal, 0.5F * change, 1e-6F);
+  EXPECT_EQ(found[0].cause, EventCause::flicker);
+  EXPECT_EQ(found[1].flicker, 0.0F) << "brighter light makes no OFF event";
+  EXPECT_EQ(found[1].signal, -0.2F);
+  EXPECT_EQ(found[2].flicker, 0.0F) << "no time since the previous event";
 }
 
 TEST(SeenObjects, AreThoseOfTheNearestSampleOfThePixel) {

@@ -271,6 +271,8 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
     if (options.frame_camera)
       world.cameras.back().frame_camera = build_frame_camera(options, model, span, scenario.seed, i, notices);
     world.cameras.back().flicker = build_flicker(scenario, options, world.info.objects.size(), span.start);
+    if (world.cameras.back().flicker && options.events && options.event_camera.labels)
+      world.cameras.back().flicker_labels.emplace(model.width, model.height, span.start);
     require_a_view(world, i);
     name_what_has_no_effect(scenario, world, i, notices);
   }

@@ -40,21 +40,27 @@ struct NewLabel {
   std::array<std::uint8_t, 6> padding{};
 };
 
+/// The largest part with the sign of the event.
+inline EventCause largest_part(const EventLabel& label, int polarity) {
+  const auto sign = static_cast<float>(polarity);
+  EventCause cause = EventCause::signal;
+  float largest = sign * label.signal;
+  const auto compare = [&](float part, EventCause its) {
+    if (sign * part > largest) largest = sign * part, cause = its;
+  };
+  compare(label.flicker, EventCause::flicker);
+  compare(label.noise, EventCause::noise);
+  compare(label.leak, EventCause::leak);
+  return cause;
+}
+
 /// The label without what the pixel saw.
 inline EventLabel to_label(const NewLabel& event, bool hot) {
   EventLabel label;
   label.t_ideal = event.t_ideal;
   label.signal = event.signal, label.noise = event.noise, label.leak = event.leak;
   label.hot = hot ? 1 : 0;
-  const float sign = event.polarity;
-  float largest = sign * label.signal;
-  const auto compare = [&](float part, EventCause cause) {
-    if (sign * part > largest) largest = sign * part, label.cause = cause;
-  };
-  compare(label.flicker, EventCause::flicker);
-  compare(label.noise, EventCause::noise);
-  compare(label.leak, EventCause::leak);
-  if (event.is_noise != 0) label.cause = EventCause::noise;
+  label.cause = event.is_noise != 0 ? EventCause::noise : largest_part(label, event.polarity);
   return label;
 }
 

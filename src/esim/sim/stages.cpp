@@ -87,11 +87,14 @@ const OpticalFlowImages* Stages::render_truth(CameraChannel& camera, const Rende
 void Stages::label_events(CameraChannel& camera, std::span<const Event> events, std::vector<EventLabel>& labels) {
   const LabelSpan made = camera.event_camera->labels();
   labels.assign(made.begin(), made.end());
-  if (labels.empty() || !camera.seen_objects) return;
+  if (labels.empty()) return;
   timed(seconds_.truth, [&] {
-    for (std::size_t i = 0; i < labels.size(); ++i)
-      labels[i].object = camera.seen_objects->at(events[i].x, events[i].y, labels[i].t_ideal);
-    if (camera.seen_objects->is_long()) camera.seen_objects->forget_before(camera.event_camera->labels_from());
+    if (camera.seen_objects) {
+      for (std::size_t i = 0; i < labels.size(); ++i)
+        labels[i].object = camera.seen_objects->at(events[i].x, events[i].y, labels[i].t_ideal);
+      if (camera.seen_objects->is_long()) camera.seen_objects->forget_before(camera.event_camera->labels_from());
+    }
+    if (camera.flicker_labels) camera.flicker_labels->set(*camera.flicker, events, labels);
   });
 }
 

@@ -14,6 +14,7 @@
 #include "esim/recording/record.h"
 #include "esim/render/renderer.h"
 #include "esim/sampling/sampler.h"
+#include "esim/sim/flicker_labels.h"
 #include "esim/truth/clock.h"
 #include "esim/truth/event_points.h"
 #include "esim/truth/optical_flow.h"
@@ -34,7 +35,10 @@ struct CameraChannel {
   // Ground truth, if requested.
   std::unique_ptr<OpticalFlowFromDepth> optical_flow{};
   std::unique_ptr<EventPoints> event_points{};
-  std::optional<SeenObjects> seen_objects{};  // for labels, if anything moves
+
+  // For labels.
+  std::optional<SeenObjects> seen_objects{};      // if anything moves
+  std::optional<FlickerLabels> flicker_labels{};  // if the light flickers
 };
 
 /// The rig's inertial measurement unit.

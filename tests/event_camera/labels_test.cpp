@@ -323,29 +323,45 @@ TEST_P(LabelsAgainstReference, AreTheSame) {
   }
   camera.release_until(std::numeric_limits<TimeNs>::max(), fast.events);
   fast.labels.insert(fast.labels.end(), camera.labels().begin(), camera.labels().end());
-  fast.sort(), defined.sort();
-  ASSERT_EQ(fast.events.size(), defined.events.size());
-  // The front end and the low-pass use floats, which limits the accuracy of times and parts.
+  // The front end and the low-pass use floats, which limits the accuracy of times and parts. Thresholds with noise are
+  // floats, too, and their rounding adds up in the references.
   const EventCameraOptions& o = GetParam();
   const bool in_floats = o.response != PixelResponse::log || o.low_pass_hz > 0 || o.surround_px > 0;
-  // Thresholds with noise are floats, and their rounding adds up in the references: seeds 1 to 70 differ by up to 101
-  // ns.
   const double tolerance_ns = in_floats ? 2000 : o.threshold_noise > 0 ? 200 : 1;
-  const double tolerance = in_floats ? 1e-3 : 1e-6;
-  for (std::size_t i = 0; i < fast.events.size(); ++i) {
-    const EventLabel &a = fast.labels[i], &b = defined.labels[i];
-    EXPECT_EQ(std::tie(fast.events[i].x, fast.events[i].y, fast.events[i].polarity),
-              std::tie(defined.events[i].x, defined.events[i].y, defined.events[i].polarity));
-    EXPECT_NEAR(static_cast<double>(a.t_ideal), static_cast<double>(b.t_ideal), tolerance_ns);
-    EXPECT_NEAR(a.signal, b.signal, tolerance);
-    EXPECT_NEAR(a.noise, b.noise, tolerance);
-    EXPECT_NEAR(a.leak, b.leak, tolerance);
-    EXPECT_EQ(a.hot, b.hot);
-    // Parts of equal size may be ordered by rounding.
-    const auto differ = [&](float one, float other) { return std::abs(one - other) > tolerance; };
-    const bool is_clear = differ(a.signal, a.noise) && differ(a.signal, a.leak) && differ(a.noise, a.leak);
-    EXPECT_TRUE(!is_clear || a.cause == b.cause);
+  const double tolerance = in_floats ? 1e-3 : o.threshold_noise > 0 ? 1e-5 : 1e-6;
+  // With shot noise or dropped requests, rounding decides now and then which event comes next, or whether a request is
+  // dropped, which moves the reference. From there on, a pixel goes another way, and is not compared.
+  const bool goes_other_ways = o.shot_noise_hz > 0 || o.refractory_mode == RefractoryMode::drop;
+  const auto by_pixel = [](const Explained& all) {
+    std::map<std::pair<int, int>, std::vector<std::pair<EventLabel, int>>> pixels;
+    for (std::size_t i = 0; i < all.events.size(); ++i)
+      pixels[{all.events[i].x, all.events[i].y}].emplace_back(all.labels[i], all.events[i].polarity);
+    for (auto& [pixel, labels] : pixels)
+      std::ranges::stable_sort(labels, {}, [](const auto& label) { return label.first.t_ideal; });
+    return pixels;
+  };
+  auto fast_pixels = by_pixel(fast);
+  std::size_t compared = 0;
+  for (const auto& [pixel, labels] : by_pixel(defined)) {
+    const auto& found = fast_pixels[pixel];
+    for (std::size_t i = 0; i < std::min(found.size(), labels.size()); ++i) {
+      const auto& [a, polarity] = found[i];
+      const auto& [b, expected_polarity] = labels[i];
+      if (polarity != expected_polarity || std::abs(static_cast<double>(a.t_ideal - b.t_ideal)) > tolerance_ns) break;
+      if (goes_other_ways && std::abs(a.signal - b.signal) > tolerance) break;
+      ++compared;
+      EXPECT_NEAR(a.signal, b.signal, tolerance);
+      EXPECT_NEAR(a.noise, b.noise, tolerance);
+      EXPECT_NEAR(a.leak, b.leak, tolerance);
+      EXPECT_EQ(a.hot, b.hot);
+      // Parts of equal size may be ordered by rounding.
+      const auto differ = [&](float one, float other) { return std::abs(one - other) > tolerance; };
+      const bool is_clear = differ(a.signal, a.noise) && differ(a.signal, a.leak) && differ(a.noise, a.leak);
+      EXPECT_TRUE(!is_clear || a.cause == b.cause);
+    }
   }
+  EXPECT_GE(static_cast<double>(compared), (goes_other_ways ? 0.99 : 1.0) * static_cast<double>(defined.events.size()));
+  EXPECT_GT(compared, 1000U);
 }
 
 INSTANTIATE_TEST_SUITE_P(SeparateEffects, LabelsAgainstReference, testing::ValuesIn(separate_effects()));

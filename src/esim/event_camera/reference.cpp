@@ -211,6 +211,12 @@ void ReferenceEventCamera::Model::open(std::size_t i, double light, double brigh
   Pixel& pixel = pixels_[i];
   const auto item = static_cast<std::uint32_t>(i);
   draw_parameters(i);
+  const auto mismatch = mismatch_.normals(item);
+  const auto mean = [&](double nominal, double normal) {
+    return std::max(nominal + options_.threshold_mismatch * normal, kMinContrastThreshold);
+  };
+  pixel.mean_on = mean(options_.threshold_on(), mismatch[0]),
+  pixel.mean_off = mean(options_.threshold_off(), mismatch[1]);
   pixel.light = light;
   pixel.brightness = pixel.filtered1 = pixel.filtered2 = pixel.reference = brightness;
   // (8) Each pixel is at a random phase between two leak events.
@@ -239,7 +245,6 @@ void ReferenceEventCamera::Model::draw_parameters(std::size_t i) {
   const auto fixed = mismatch_.normals(item);
   const float mean_on = deviation(c_on, options_.threshold_mismatch * fixed[0]);
   const float mean_off = deviation(c_off, options_.threshold_mismatch * fixed[1]);
-  pixel.mean_on = c_on + mean_on, pixel.mean_off = c_off + mean_off;
   pixel.on = c_on + deviation(c_on, mean_on + noise * pixel.normals[0]);
   pixel.off = c_off + deviation(c_off, mean_off + noise * pixel.normals[1]);
   // (8) R falls by f kappa theta per second, kappa = 10^(decades n); jitter changes the time to the next leak event.

@@ -18,8 +18,7 @@ void FlickerLabels::set(const Flicker& flicker, std::span<const Event> events, s
     TimeNs& last =
         last_[static_cast<std::size_t>(events[i].y) * static_cast<std::size_t>(width_) + std::size_t{events[i].x}];
     const TimeNs before = std::exchange(last, label.t_ideal);
-    const auto change =
-        static_cast<float>(log_light(label.t_ideal, label.object) - log_light(before, label.object));
+    const auto change = static_cast<float>(log_light(label.t_ideal, label.object) - log_light(before, label.object));
     label.flicker = std::clamp(change, std::min(label.signal, 0.0F), std::max(label.signal, 0.0F));
     label.signal -= label.flicker;
     if (label.cause == EventCause::signal) label.cause = largest_part(label, events[i].polarity);

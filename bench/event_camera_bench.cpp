@@ -157,6 +157,14 @@ EventCameraOptions by_circuit(double white_lux) {
 void event_camera_circuit(benchmark::State& state) { run_event_camera(state, by_circuit(1000), 1); }
 void event_camera_circuit_dark(benchmark::State& state) { run_event_camera(state, by_circuit(1), 1); }
 void event_camera_everything_two_threads(benchmark::State& state) { run_event_camera(state, everything(), 2); }
+/// The same with labels of the events.
+EventCameraOptions labelled(EventCameraOptions options) {
+  options.labels = true;
+  return options;
+}
+void event_camera_everything_labels(benchmark::State& state) { run_event_camera(state, labelled(everything()), 1); }
+void event_camera_circuit_labels(benchmark::State& state) { run_event_camera(state, labelled(by_circuit(1000)), 1); }
+void event_camera_circuit_dark_labels(benchmark::State& state) { run_event_camera(state, labelled(by_circuit(1)), 1); }
 
 void sizes(benchmark::internal::Benchmark* benchmark) {
   for (const int hundredths : {15, 20, 30, 50}) benchmark->Args({346, 260, hundredths});
@@ -171,9 +179,12 @@ BENCHMARK(literal_loop)->Apply(sizes);
 BENCHMARK(event_camera)->Apply(sizes);
 BENCHMARK(event_camera_two_threads)->Apply(sizes);
 BENCHMARK(event_camera_everything)->Apply(sizes);
+BENCHMARK(event_camera_everything_labels)->Apply(sizes);
 BENCHMARK(event_camera_everything_slow_readout)->Apply(sizes);
 BENCHMARK(event_camera_circuit)->Apply(sizes);
+BENCHMARK(event_camera_circuit_labels)->Apply(sizes);
 BENCHMARK(event_camera_circuit_dark)->Apply(sizes);
+BENCHMARK(event_camera_circuit_dark_labels)->Apply(sizes);
 BENCHMARK(event_camera_everything_two_threads)->Apply(sizes);
 
 }  // namespace

@@ -25,11 +25,13 @@ from ._represent import (
 from ._scenario import Scenario
 from ._simulate import CameraPacket, Packet, Renderer, Report, Simulation, simulate
 from ._trajectory import Trajectory
-from ._types import EVENT_DTYPE, IMU_DTYPE, STATE_DTYPE
+from ._types import CAUSES, EVENT_DTYPE, IMU_DTYPE, LABEL_DTYPE, STATE_DTYPE
 
 __all__ = [
+    "CAUSES",
     "EVENT_DTYPE",
     "IMU_DTYPE",
+    "LABEL_DTYPE",
     "STATE_DTYPE",
     "CameraPacket",
     "LossWarning",

@@ -23,6 +23,8 @@ __version__: str
 
 EVENT_DTYPE: np.dtype[np.void]
 IMU_DTYPE: np.dtype[np.void]
+LABEL_DTYPE: np.dtype[np.void]
+CAUSES: tuple[str, ...]
 STATE_DTYPE: np.dtype[np.void]
 
 class Error(ValueError): ...
@@ -74,6 +76,8 @@ class EventCamera:
     ) -> None: ...
     def process(self, frame: NDArray[np.floating], t: Time) -> Events: ...
     @property
+    def labels(self) -> NDArray[np.void]: ...
+    @property
     def dropped(self) -> int: ...
     @property
     def delayed(self) -> int: ...
@@ -82,6 +86,7 @@ def linear_light(image: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.fl
 
 class CameraPacket:
     events: Events
+    labels: NDArray[np.void]
     truth_t: NDArray[np.int64]
     pose: NDArray[np.float64]
     irradiance: NDArray[np.float32]

@@ -8,6 +8,7 @@ from . import _checks, _core
 from ._errors import Error
 from ._events import of_bytes
 from ._scenario import to_overrides
+from ._types import LABEL_DTYPE
 
 _FLOAT32 = np.dtype(np.float32)
 
@@ -86,6 +87,12 @@ class EventCamera:
         ):
             frame = _checks.irradiance(frame, "frame", self._shape)
         return of_bytes(self._core.process(frame, _checks.time(t)), *self._made[0])
+
+    @property
+    def labels(self):
+        """numpy.ndarray of esim.LABEL_DTYPE: why each event of the last process() fired. Empty unless the camera was made
+        with `labels=True`. A copy made by pickle begins without them."""
+        return self._core.labels().view(LABEL_DTYPE)
 
     @property
     def dropped(self):

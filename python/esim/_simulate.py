@@ -9,7 +9,7 @@ from ._errors import Error, LossWarning
 from ._events import of_bytes
 from ._renamed import OldAttributes, OldKeys, present_name
 from ._scenario import to_overrides, to_scenario
-from ._types import IMU_DTYPE, STATE_DTYPE
+from ._types import IMU_DTYPE, LABEL_DTYPE, STATE_DTYPE
 
 
 class CameraPacket(OldAttributes):
@@ -37,6 +37,8 @@ class CameraPacket(OldAttributes):
         Times of the two frames, ns.
     visible : uint8, shape (K, height, width)
         1 if the point is also visible in the later frame.
+    labels : numpy.ndarray of esim.LABEL_DTYPE, shape (number of events,)
+        Why each event fired, and what its pixel saw. Empty unless the scenario has `event_camera.labels`.
     event_points : float32, shape (number of events, 3)
         Scene point of each event, world frame, m; NaN without a surface. Empty unless the scenario has
         `truth.event_points`.
@@ -51,7 +53,7 @@ class CameraPacket(OldAttributes):
     """
 
     __slots__ = (
-        "events truth_t pose irradiance depth motion_field object optical_flow optical_flow_t visible event_points "
+        "events labels truth_t pose irradiance depth motion_field object optical_flow optical_flow_t visible event_points "
         "images image_t exposure_start exposure trigger_t trigger_kind"
     ).split()
 
@@ -59,10 +61,11 @@ class CameraPacket(OldAttributes):
 
     def __init__(self, parts, width, height):
         self.events = of_bytes(parts["events"], width, height)
+        self.labels = parts["labels"].view(LABEL_DTYPE)
         self.truth_t = parts["t"]
         self.optical_flow_t = parts["optical_flow_span"]
         for name in self.__slots__:
-            if name in parts and name != "events":
+            if name in parts and name not in ("events", "labels"):
                 setattr(self, name, parts[name])
 
 

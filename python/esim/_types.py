@@ -7,6 +7,21 @@ EVENT_DTYPE = np.dtype(
     {"names": ["t", "x", "y", "p"], "formats": ["<i8", "<u2", "<u2", "i1"], "offsets": [0, 8, 10, 12], "itemsize": 16}
 )
 
+#: Labels of events: `t_ideal` ns, before latency and readout; the parts of the change, `signal`, `flicker`, `noise` and
+#: `leak`, ln, whose sum is the threshold of the pixel; what the pixel saw, `object` (i + 1 for object i, 0 for none) and
+#: `semantic_class` (0 for none); `cause`, an index into esim.CAUSES; and whether the pixel is `hot`.
+LABEL_DTYPE = np.dtype(
+    {
+        "names": ["t_ideal", "signal", "flicker", "noise", "leak", "object", "semantic_class", "cause", "hot"],
+        "formats": ["<i8", "<f4", "<f4", "<f4", "<f4", "<u2", "<u2", "u1", "?"],
+        "offsets": [0, 8, 12, 16, 20, 24, 26, 28, 29],
+        "itemsize": 32,
+    }
+)
+
+#: The causes of events, by their numbers in labels.
+CAUSES = ("signal", "flicker", "noise", "leak")
+
 #: The motion of a body: `t` ns, `position` m and `orientation` (Hamilton, x y z w) of T_world_body, `velocity` m/s and
 #: `acceleration` m/s² in the world frame, `angular_velocity` rad/s and `angular_acceleration` rad/s² in the body frame.
 STATE_DTYPE = np.dtype(

@@ -210,3 +210,49 @@ def test_linear_light_decodes_srgb():
     np.testing.assert_allclose(esim.linear_light(white), 1, rtol=1e-6)
     with pytest.raises(TypeError):
         esim.linear_light(codes.astype(float))
+
+
+LABELLED = {"contrast_threshold": 0.2, "threshold_noise": 0.02, "leak_rate_hz": 5, "shot_noise_hz": 20, "latency_us": 100}
+
+
+def labels_of(camera, frames):
+    """Events and labels of all frames."""
+    events, labels = [], []
+    for k, frame in enumerate(frames):
+        events.append(camera.process(frame, 1e-3 * k))
+        labels.append(camera.labels)
+        assert labels[-1].dtype == esim.LABEL_DTYPE  # NumPy leaves out padding when it joins arrays
+    return np.concatenate(events), np.concatenate(labels)
+
+
+def test_labels_explain_the_events():
+    frames = np.random.default_rng(1).random((9, 30, 40), dtype=np.float32)
+    plain = esim.EventCamera(40, 30, seed=2, **LABELLED)
+    expected = np.concatenate([plain.process(frame, 1e-3 * k) for k, frame in enumerate(frames)])
+    assert len(plain.labels) == 0 and plain.labels.dtype == esim.LABEL_DTYPE
+    events, labels = labels_of(esim.EventCamera(40, 30, seed=2, labels=True, **LABELLED), frames)
+    np.testing.assert_array_equal(events, expected)
+    assert len(labels) == len(events) > 1000
+    parts = np.stack([labels[name].astype(np.float64) for name in esim.CAUSES])
+    np.testing.assert_allclose(parts.sum(axis=0), 0.2 * events["p"], atol=1e-6)
+    np.testing.assert_array_equal(events["t"] - labels["t_ideal"], 100_000)
+    crossings = labels["cause"] != esim.CAUSES.index("noise")
+    assert 0 < crossings.sum() < len(events)
+    np.testing.assert_array_equal(labels["cause"][crossings], np.argmax(parts * events["p"], axis=0)[crossings])
+
+
+def test_labels_of_filtered_and_copied_cameras():
+    frames = np.random.default_rng(1).random((9, 30, 40), dtype=np.float32)
+    options = {"labels": True, **LABELLED}
+    events, labels = labels_of(esim.EventCamera(40, 30, **options), frames)
+    inside = (events["x"] >= 3) & (events["y"] < 20)
+    window = {"region": {"windows": [{"x": 3, "y": 0, "width": 37, "height": 20}]}}
+    camera = esim.EventCamera(40, 30, filters=window, **options)
+    for k, frame in enumerate(frames):
+        passed = camera.process(frame, 1e-3 * k)
+        assert len(camera.labels) == len(passed)
+        now = inside & (events["t"] <= 1_000_000 * k) & (events["t"] > 1_000_000 * (k - 1))
+        np.testing.assert_array_equal(passed, events[now])
+        np.testing.assert_array_equal(camera.labels, labels[now])
+        camera = pickle.loads(pickle.dumps(camera))  # with the labels of the events that wait for their time stamp
+        assert len(camera.labels) == 0

@@ -160,3 +160,17 @@ def test_invalid_lengths(scenario, recording):
         for make in (lambda: esim.simulate(scenario, packet_s=wrong), lambda: esim.Recording(recording[0], wrong)):
             with pytest.raises(TypeError, match="packet_s"):
                 make()
+
+
+def test_packets_have_the_labels_of_their_events(poster):
+    overrides = {"event_camera.labels": True, "event_camera.leak_rate_hz": 5, "event_camera.latency_us": 700}
+    whole = [(packet.events, packet.labels) for packet in esim.simulate(poster, overrides=overrides, packet_s=1)]
+    events, labels = (np.concatenate(part) for part in zip(*whole))
+    assert whole[0][1].dtype == esim.LABEL_DTYPE and len(labels) == len(events) > 100
+    np.testing.assert_array_equal(events["t"] - labels["t_ideal"], 700_000)
+    for packet_s in (0.0123, 0.0004):
+        packets = list(esim.simulate(poster, overrides=overrides, packet_s=packet_s))
+        assert all(len(packet.labels) == len(packet.events) for packet in packets)
+        np.testing.assert_array_equal(np.concatenate([packet.labels for packet in packets]), labels)
+    for packet in esim.simulate(poster):
+        assert len(packet.labels) == 0

@@ -94,6 +94,39 @@ TEST(KilledWriter, EventsAreReadAsFarAsTheLastFlush) {
       });
 }
 
+TEST(KilledWriter, LabelsAreReadWithTheirEvents) {
+#if !defined(__x86_64__)
+  GTEST_SKIP() << "supports one processor architecture only";
+#endif
+  const test::TemporaryDirectory base;
+  const fs::path file = base.path() / "events.h5";
+  const auto events = test::random_events(150'000, kWidth, kHeight, 0, 4 * kNsPerSecond);
+  std::vector<EventLabel> labels(events.size());
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    labels[i].t_ideal = events[i].t - static_cast<TimeNs>(i);
+    labels[i].signal = static_cast<float>(i), labels[i].hot = i % 2;
+  }
+  at_any_write(
+      [&] {
+        EventsHdf5Writer writer(file, 0, {TimeUnit::ns, Compression::gzip});
+        RecordingInfo info = test::recording_info(kWidth, kHeight, 0, 4 * kNsPerSecond);
+        info.cameras[0].has_labels = true;
+        writer.begin(info);
+        writer.write(EventsRecord{0, events, labels});
+        writer.end(true);
+      },
+      [&] {
+        const EventsHdf5Reader reader(file);
+        const auto found = reader.read(0, events.size());
+        std::vector<EventLabel> found_labels;
+        reader.read_labels(0, found.size(), found_labels);
+        EXPECT_TRUE(std::equal(found.begin(), found.end(), events.begin()));
+        EXPECT_EQ(found_labels.size(), found.size());
+        EXPECT_TRUE(std::equal(found_labels.begin(), found_labels.end(), labels.begin()));
+        return found.size();
+      });
+}
+
 TEST(KilledWriter, GroundTruthIsReadAsFarAsTheLastFlush) {
 #if !defined(__x86_64__)
   GTEST_SKIP() << "supports one processor architecture only";

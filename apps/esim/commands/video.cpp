@@ -116,6 +116,12 @@ int outcome(const ConversionSummary& summary, const fs::path& out) {
 
 int convert_to_file(const VideoArguments& arguments, const fs::path& out, const Format& format,
                     const Notices& notices) {
+  if (arguments.options.event_camera.labels && !format.can_hold(Content::event_labels)) {
+    throw UserError(
+        fmt::format("event_camera.labels: {} cannot hold the labels of events; choose another format, such "
+                    "as dsec or npz, or a folder",
+                    format.name));
+  }
   RecordingFile file(out, arguments.force);
   Converter converter(arguments);
   const ConversionSummary summary = keep_on_failure(file, converter.has_converted(), [&] {

@@ -83,14 +83,16 @@ void PacketSink::write(const Record& record) {
 void PacketSink::write(const EventsRecord& record) {
   if (record.events.empty()) return;
   cover(record.events.back().t);
-  for (EventSpan rest = record.events; !rest.empty();) {
-    Packet& packet = at(rest.front().t);
-    const auto is_later = [](TimeNs t1, const Event& event) { return t1 < event.t; };
+  for (EventsRecord rest = record; !rest.events.empty();) {
+    Packet& packet = at(rest.events.front().t);
     const bool is_last = &packet == &packets_.back();
-    const auto beyond = is_last ? rest.end() : std::upper_bound(rest.begin(), rest.end(), packet.t1, is_later);
-    std::vector<Event>& events = packet.cameras[static_cast<std::size_t>(record.camera)].events;
-    events.insert(events.end(), rest.begin(), beyond);
-    rest = rest.subspan(static_cast<std::size_t>(beyond - rest.begin()));
+    const auto beyond = is_last ? rest.events.end() : std::ranges::upper_bound(rest.events, packet.t1, {}, &Event::t);
+    const auto count = static_cast<std::size_t>(beyond - rest.events.begin());
+    const EventsRecord taken = rest.part(0, count);
+    CameraPart& camera = packet.cameras[static_cast<std::size_t>(record.camera)];
+    camera.events.insert(camera.events.end(), taken.events.begin(), taken.events.end());
+    camera.labels.insert(camera.labels.end(), taken.labels.begin(), taken.labels.end());
+    rest = rest.part(count, rest.events.size() - count);
   }
   filled_ = std::max(filled_, record.events.back().t);
   reached_ = std::max(reached_, record.events.back().t);

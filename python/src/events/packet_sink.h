@@ -13,6 +13,7 @@ namespace esim::python {
 /// The records of one camera in a packet. Images are stored one after the other.
 struct CameraPart {
   std::vector<Event> events;
+  std::vector<EventLabel> labels;
   std::vector<float> event_points;
 
   // Ground truth.

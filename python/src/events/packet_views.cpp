@@ -27,6 +27,7 @@ nb::dict to_dict(CameraPart part, const Camera& model) {
   nb::dict view;
   const std::size_t frames = part.t.size(), points = part.event_points.size() / 3;
   view["events"] = bytes_to_numpy(std::move(part.events));
+  view["labels"] = bytes_to_numpy(std::move(part.labels));
   view["event_points"] = to_numpy(std::move(part.event_points), {points, 3});
   view["t"] = to_numpy(std::move(part.t));
   view["pose"] = to_numpy(std::move(part.poses), {frames, 4, 4});

@@ -31,6 +31,11 @@ struct OwnedEventCamera {
     return bytes_to_numpy(std::move(events));
   }
 
+  nb::object labels() const {
+    const LabelSpan labels = camera.labels();
+    return bytes_to_numpy(std::vector<EventLabel>(labels.begin(), labels.end()));
+  }
+
   nb::bytes state() const {
     const std::vector<std::byte> state = [&] {
       const nb::gil_scoped_release released;
@@ -53,6 +58,7 @@ void bind_event_camera(nb::module_& module) {
       .def(nb::init<int, int, const std::vector<std::string>&, std::uint64_t, int>(), nb::arg("width"),
            nb::arg("height"), nb::arg("options"), nb::arg("seed"), nb::arg("threads"))
       .def("process", &OwnedEventCamera::process, nb::arg("frame").noconvert(), nb::arg("t"))
+      .def("labels", &OwnedEventCamera::labels)
       .def("state", &OwnedEventCamera::state)
       .def("restore", &OwnedEventCamera::restore, nb::arg("state"))
       .def_ro("warnings", &OwnedEventCamera::warnings)

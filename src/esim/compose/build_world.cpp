@@ -6,6 +6,7 @@
 
 #include "esim/compose/compose.h"
 #include "esim/core/engine_error.h"
+#include "esim/formats/formats.h"
 #include "esim/sampling/make_sampler.h"
 #include "esim/scenario/read.h"
 
@@ -195,6 +196,18 @@ void check_substitutes(const Scenario& scenario, const Substitutes& substitutes,
   }
 }
 
+/// Notes formats that lose labels which the scenario requests.
+void name_formats_without_labels(const Scenario& scenario, const Notices& notices) {
+  const auto has_labels = [](const CameraOptions& camera) { return camera.events && camera.event_camera.labels; };
+  if (std::ranges::none_of(scenario.cameras, has_labels)) return;
+  for (const std::string& name : scenario.output.formats) {
+    if (format_named(name).can_hold(Content::event_labels)) continue;
+    notices.warning(fmt::format(
+        "output.formats: {} cannot hold the labels of events; they are only in events.h5 and in other formats that can",
+        name));
+  }
+}
+
 /// A world without cameras: its time, the motions of the body and of the objects, and the IMU.
 World build_motions(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<const Trajectory> body,
                     const TimeSpan& span, const Substitutes& substitutes, int threads, const Notices& notices) {
@@ -227,11 +240,13 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
   World world = build_motions(scenario, scene, std::move(body), span, substitutes, threads, notices);
   const SceneCamera* const followed = substitutes.body != nullptr ? nullptr : followed_camera(scenario, scene);
   check_output(scenario);
+  name_formats_without_labels(scenario, notices);
   warn_of_light_without_effect(scenario, notices);
   for (const CameraOptions& options : scenario.cameras) {
     check_sampling(options, notices);
     check_filters(options, notices);
     world.info.cameras.push_back(camera_info(options, followed));
+    world.info.cameras.back().has_labels = options.events && options.event_camera.labels;
   }
   const RendererFactory make_renderer =
       substitutes.make_renderer
@@ -250,10 +265,14 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
       warn_of_noise(fmt::format("camera {}: ", options.name), sensor, notices);
       world.cameras.back().event_camera.emplace(sensor, model.width, model.height, scenario.seed,
                                                 static_cast<std::uint16_t>(i));
+      const bool moves = !world.info.objects.empty() || !world.info.sprites.empty();
+      if (sensor.labels && moves) world.cameras.back().seen_objects.emplace(model.width, model.height);
     }
     if (options.frame_camera)
       world.cameras.back().frame_camera = build_frame_camera(options, model, span, scenario.seed, i, notices);
     world.cameras.back().flicker = build_flicker(scenario, options, world.info.objects.size(), span.start);
+    if (world.cameras.back().flicker && options.events && options.event_camera.labels)
+      world.cameras.back().flicker_labels.emplace(model.width, model.height, span.start);
     require_a_view(world, i);
     name_what_has_no_effect(scenario, world, i, notices);
   }

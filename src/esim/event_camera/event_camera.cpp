@@ -12,12 +12,14 @@
 #include "esim/event_camera/circuit/circuit_array.h"
 #include "esim/event_camera/circuit/circuit_readout.h"
 #include "esim/event_camera/front_end.h"
+#include "esim/event_camera/labels/pending_labels.h"
 #include "esim/event_camera/pixel/pixel_array.h"
 #include "esim/event_camera/pixel/pixel_update.h"
 #include "esim/event_camera/pixel/pixel_watch.h"
 #include "esim/event_camera/readout/pixel_readout.h"
 #include "esim/event_camera/state_archive.h"
 #include "esim/events/event_queue.h"
+#include "esim/filters/labels_of_passed.h"
 #include "esim/render/irradiance_check.h"
 
 namespace esim::inline event_camera {
@@ -52,10 +54,12 @@ struct EventCamera::State {
     if (options.surround_px > 0) surround.emplace(options.surround_px, options.surround_ms * 1e-3, width, height);
     if (!options.circuit && options.readout.limited()) readout.emplace(options, width, height);
     if (options.circuit && options.readout.acknowledges()) circuit_readout.emplace(options.readout, width, height);
+    if (options.labels) labels.emplace(width, height, circuit ? circuit->hot() : pixels.hot(seed, stream));
     if (options.filters.any()) filters.emplace(options.filters, width, height);
   }
 
   void read_out_until(TimeNs until, std::vector<Event>& out);
+  void filter(std::size_t begin, std::vector<Event>& out);
   bool integrate(const Workers& workers);
   bool integrate_one(std::size_t i, const Workers& workers);
   bool integrate_tiles(const Workers& workers);
@@ -71,6 +75,7 @@ struct EventCamera::State {
     if (self.surround) CenterSurround::transfer(archive, *self.surround);
     if (self.readout) PixelReadout::transfer(archive, *self.readout);
     if (self.circuit_readout) CircuitReadout::transfer(archive, *self.circuit_readout);
+    if (self.labels) archive.value(self.watermark);
     if (self.filters) FilterChain::transfer(archive, *self.filters);
     archive.value(self.read_out);
     archive.value(self.spoiled);
@@ -99,6 +104,10 @@ struct EventCamera::State {
   std::optional<FilterChain> filters;
   std::vector<Event> unfiltered;
   std::int64_t read_out = 0;  // number of events
+
+  std::optional<PendingLabels> labels;
+  std::vector<EventLabel> released_labels;
+  TimeNs watermark = std::numeric_limits<TimeNs>::min();
 
   // For process().
   Image<float> last_frame, next_frame;
@@ -221,12 +230,18 @@ void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
     for (const Segment& segment : segments) check_irradiance(segment);
   }
   state.queue.add(state.events, workers);
-  if (state.readout) state.readout->advance(state.pixels, state.updates[0], state.queue, watermark);
+  PendingLabels* const labels = state.labels ? &*state.labels : nullptr;
+  if (labels != nullptr) {
+    for (PackedEvents& events : state.events) labels->add(events.labels);
+    for (CircuitBuffer& buffer : state.buffers) labels->add(buffer.labels);
+  }
+  if (state.readout) state.readout->advance(state.pixels, state.updates[0], state.queue, watermark, labels);
   if (state.circuit_readout) {
-    state.circuit_readout->advance(*state.circuit, state.queue, watermark);
+    state.circuit_readout->advance(*state.circuit, state.queue, watermark, labels);
     state.lost += state.circuit_readout->take_lost();
   }
   for (CircuitBuffer& buffer : state.buffers) state.lost += std::exchange(buffer.lost, 0);
+  state.watermark = watermark;
 }
 
 /// Appends to `out` the events that leave the readout.
@@ -237,18 +252,32 @@ void EventCamera::State::read_out_until(TimeNs until, std::vector<Event>& out) {
   out.insert(out.end(), released.begin(), released.end());
 }
 
+/// Passes the events of the readout from `begin` in `out` on through the filters. Keeps the labels of those that pass.
+void EventCamera::State::filter(std::size_t begin, std::vector<Event>& out) {
+  unfiltered.assign(out.begin() + static_cast<std::ptrdiff_t>(begin), out.end());
+  out.resize(begin);
+  filters->process(unfiltered, out);
+  if (labels) keep_labels_of_passed(unfiltered, EventSpan(out).subspan(begin), released_labels);
+}
+
 void EventCamera::release_until(TimeNs until, std::vector<Event>& out) {
   State& state = *state_;
-  if (!state.filters) {
-    const std::size_t before = out.size();
-    state.read_out_until(until, out);
-    state.read_out += static_cast<std::int64_t>(out.size() - before);
-    return;
+  const std::size_t begin = out.size();
+  state.read_out_until(until, out);
+  state.read_out += static_cast<std::int64_t>(out.size() - begin);
+  if (state.labels) {
+    state.released_labels.clear();
+    state.labels->take(EventSpan(out).subspan(begin), state.released_labels);
   }
-  state.unfiltered.clear();
-  state.read_out_until(until, state.unfiltered);
-  state.read_out += static_cast<std::int64_t>(state.unfiltered.size());
-  state.filters->process(state.unfiltered, out);
+  if (state.filters) state.filter(begin, out);
+}
+
+LabelSpan EventCamera::labels() const { return state_->released_labels; }
+
+bool EventCamera::has_labels() const { return state_->labels.has_value(); }
+
+TimeNs EventCamera::labels_from() const {
+  return state_->labels ? std::min(state_->labels->earliest(), state_->watermark) : state_->watermark;
 }
 
 void EventCamera::process(const Image<float>& irradiance, TimeNs t, std::vector<Event>& out, const Workers& workers) {
@@ -311,7 +340,9 @@ EventCameraStatistics EventCamera::statistics() const {
 }
 
 std::vector<std::byte> EventCamera::state() const {
-  if (state_->readout && !state_->readout->history.empty()) {
+  const bool has_history = (state_->readout && !state_->readout->history.empty()) ||
+                           (state_->circuit_readout && !state_->circuit_readout->history.empty());
+  if (has_history) {
     throw UserError(
         "event camera: its state cannot be saved while the segments of its tiles end at different times; save it when "
         "every segment ends at the watermark");
@@ -320,6 +351,7 @@ std::vector<std::byte> EventCamera::state() const {
   StateWriter archive(bytes);
   State::transfer(archive, *state_);
   archive.list(state_->queue.waiting());
+  if (state_->labels) archive.list(state_->labels->waiting());
   return bytes;
 }
 
@@ -329,7 +361,9 @@ void EventCamera::restore(std::span<const std::byte> state) {
   State::transfer(archive, *state_);
   std::vector<Event> waiting;
   archive.list(waiting);
-  if (!archive.at_end()) StateReader::fail();
+  std::vector<PendingLabels::Waiting> labels;
+  if (state_->labels) archive.list(labels);
+  if (!archive.at_end() || (state_->labels && !state_->labels->restore(labels))) StateReader::fail();
   state_->queue.restore(waiting);
 }
 

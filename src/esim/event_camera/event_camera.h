@@ -11,6 +11,7 @@
 #include "esim/core/parallel.h"
 #include "esim/event_camera/options.h"
 #include "esim/events/event.h"
+#include "esim/events/event_label.h"
 #include "esim/filters/filter_chain.h"
 #include "esim/render/sample.h"
 
@@ -66,6 +67,14 @@ class EventCamera {
   /// Appends to `out`, in order, the events with t <= until that were not released before. `until` must not be later
   /// than the watermark of the last integrate().
   void release_until(TimeNs until, std::vector<Event>& out);
+
+  /// The labels of the events that the last release_until() or process() appended, in their order, with object 0 and
+  /// semantic class 0; empty unless the options request labels.
+  LabelSpan labels() const;
+  bool has_labels() const;
+
+  /// No label of a later event has an earlier ideal time.
+  TimeNs labels_from() const;
 
   EventCameraStatistics statistics() const;
 

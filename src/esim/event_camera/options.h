@@ -134,6 +134,8 @@ struct EventCameraOptions {
   std::optional<CircuitOptions> circuit{};
   FilterOptions filters{};
 
+  bool labels = false;
+
   /// What is added to the irradiance before the logarithm.
   double dark_light() const { return circuit ? circuit->dark_irradiance() : log_eps; }
   double threshold_on() const { return contrast_threshold_on.value_or(contrast_threshold); }
@@ -277,6 +279,7 @@ void describe(Visitor& visit, EventCameraOptions& o) {
   visit(
       "circuit", o.circuit,
       About{"simulates the pixels' circuit, from light in lux, with its noise (default: none, but the effects above)"});
+  visit("labels", o.labels, About{"explains each event: its cause, its ideal time, and the object that the pixel saw"});
   visit("filters", o.filters,
         About{"digital filters behind the readout, in the order in which events pass them (default: none)"});
 }

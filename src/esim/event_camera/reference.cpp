@@ -31,6 +31,11 @@ std::array<float, 4> normals_of(const AddressedRandom& random, std::uint32_t pix
   return {normals[0][0], normals[1][0], normals[2][0], normals[3][0]};
 }
 
+/// An event with its label, which does not matter for the order of events.
+struct Labelled : Event {
+  EventLabel label;
+};
+
 }  // namespace
 
 /// The state of the camera, and one function per step.
@@ -38,6 +43,7 @@ class ReferenceEventCamera::Model {
  public:
   Model(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream);
   std::vector<Event> process(const Image<float>& irradiance, TimeNs t);
+  const std::vector<EventLabel>& labels() const { return labels_; }
 
  private:
   struct Pixel {
@@ -45,11 +51,14 @@ class ReferenceEventCamera::Model {
     double filtered1 = 0, filtered2 = 0;  // after each pole, then
     double reference = 0;                 // R, then; it falls by `leak` per second
     double on = 0, off = 0, leak = 0;     // thresholds, and 1/s; constant between two events
-    std::uint32_t draws = 0, shots = 0;   // number of draws for events, and of candidates of shot noise
-    TimeNs shot_at = kNoTime;             // next candidate of shot noise
-    std::optional<TimeNs> busy_until;     // end of the refractory period; kNoTime while it waits for the readout
-    double from = 0;                      // s after the previous frame: nothing is searched before
-    std::array<float, 4> normals{};       // n' of the last event: ON, OFF, leak, latency
+    double mean_on = 0, mean_off = 0;     // C+ and C- of the pixel: thresholds without their noise
+    bool hot = false;
+    std::uint32_t draws = 0, shots = 0;  // number of draws for events, and of candidates of shot noise
+    TimeNs shot_at = kNoTime;            // next candidate of shot noise
+    std::optional<TimeNs> busy_until;    // end of the refractory period; kNoTime while it waits for the readout
+    double from = 0;                     // s after the previous frame: nothing is searched before
+    double set_at = 0;                   // when the reference was set, s after the previous frame
+    std::array<float, 4> normals{};      // n' of the last event: ON, OFF, leak, latency
   };
 
   // Signal.
@@ -63,14 +72,15 @@ class ReferenceEventCamera::Model {
   void draw_parameters(std::size_t i);
   void next_shot(Pixel& pixel, double uniform) const;
   bool find_shot(std::size_t i, const ReferenceSignal& signal, double& tau, int& polarity);
-  std::optional<Event> next_event(std::size_t i, const ReferenceSignal& signal);
+  NewLabel label(const Pixel& pixel, const ReferenceSignal& signal, double tau, int polarity, bool shot) const;
+  std::optional<Labelled> next_event(std::size_t i, const ReferenceSignal& signal);
 
   // Time stamps.
   TimeNs delay(const Pixel& pixel, double light) const;
-  void read_out(const std::vector<ReferenceSignal>& signals, std::vector<Event>& events);
+  void read_out(const std::vector<ReferenceSignal>& signals, std::vector<Labelled>& events);
   void find_requests(std::size_t i, const ReferenceSignal& signal);
-  void raise(const Event& request, const std::vector<ReferenceSignal>& signals);
-  void serve_row(TimeNs service, const std::vector<ReferenceSignal>& signals, std::vector<Event>& events);
+  void raise(const Labelled& request, const std::vector<ReferenceSignal>& signals);
+  void serve_row(TimeNs service, const std::vector<ReferenceSignal>& signals, std::vector<Labelled>& events);
   void acknowledge(const Event& request, TimeNs t, const std::vector<ReferenceSignal>& signals);
   std::size_t pixel_of(const Event& event) const;
 
@@ -83,10 +93,11 @@ class ReferenceEventCamera::Model {
   Image<float> surrounded_;
   AddressedRandom mismatch_, per_event_, leak_, shot_, defects_;
   std::optional<TimeNs> last_t_;
+  std::vector<EventLabel> labels_;
 
   // The readout: future requests, waiting requests, and the time at which the reader is free.
-  std::set<Event> requests_;
-  std::vector<Event> waiting_;
+  std::set<Labelled> requests_;
+  std::vector<Labelled> waiting_;
   std::vector<TimeNs> blind_until_;
   double free_at_ = -std::numeric_limits<double>::infinity();  // ns after `epoch_`
   TimeNs epoch_ = 0;
@@ -163,7 +174,7 @@ ReferenceEventCamera::Model::Model(const EventCameraOptions& options, int width,
 std::vector<Event> ReferenceEventCamera::Model::process(const Image<float>& irradiance, TimeNs t) {
   const std::vector<double> brightness = brightness_of(irradiance, t);
   std::vector<ReferenceSignal> signals;
-  std::vector<Event> events;
+  std::vector<Labelled> events;
   for (std::size_t i = 0; i < pixels_.size(); ++i) {
     const double light = irradiance.pixels()[i];
     if (!last_t_) open(i, light, brightness[i], t);
@@ -186,10 +197,13 @@ std::vector<Event> ReferenceEventCamera::Model::process(const Image<float>& irra
     if (signals[i].poles > 1) pixel.filtered2 = signals[i].after(2, duration);
     pixel.reference -= pixel.leak * duration;
     pixel.from = 0;
+    pixel.set_at -= duration;
   }
   last_t_ = t;
-  std::sort(events.begin(), events.end());
-  return events;
+  std::stable_sort(events.begin(), events.end());
+  labels_.clear();
+  for (const Labelled& event : events) labels_.push_back(event.label);
+  return {events.begin(), events.end()};
 }
 
 /// The first frame.
@@ -197,10 +211,20 @@ void ReferenceEventCamera::Model::open(std::size_t i, double light, double brigh
   Pixel& pixel = pixels_[i];
   const auto item = static_cast<std::uint32_t>(i);
   draw_parameters(i);
+  const auto mismatch = mismatch_.normals(item);
+  const auto mean = [&](double nominal, double normal) {
+    return std::max(nominal + options_.threshold_mismatch * normal, kMinContrastThreshold);
+  };
+  pixel.mean_on = mean(options_.threshold_on(), mismatch[0]),
+  pixel.mean_off = mean(options_.threshold_off(), mismatch[1]);
   pixel.light = light;
   pixel.brightness = pixel.filtered1 = pixel.filtered2 = pixel.reference = brightness;
   // (8) Each pixel is at a random phase between two leak events.
-  if (pixel.leak > 0) pixel.reference -= pixel.on * leak_.uniforms(item, 1)[0];
+  if (pixel.leak > 0) {
+    const double leaked = pixel.on * leak_.uniforms(item, 1)[0];
+    pixel.reference -= leaked;
+    pixel.set_at = -leaked / pixel.leak;
+  }
   // (9) The first candidate of shot noise. (10) A dead pixel has none.
   if (options_.shot_noise_hz > 0 && pixel.on < kNever) {
     pixel.shot_at = t;
@@ -226,7 +250,8 @@ void ReferenceEventCamera::Model::draw_parameters(std::size_t i) {
   // (8) R falls by f kappa theta per second, kappa = 10^(decades n); jitter changes the time to the next leak event.
   // (10) Hot pixels leak at their own rate. Dead pixels never reach a threshold.
   const auto [hot, dead] = defects_.uniforms(item);
-  const double f = hot < options_.hot_pixels ? options_.hot_pixel_rate_hz : options_.leak_rate_hz;
+  pixel.hot = hot < options_.hot_pixels;
+  const double f = pixel.hot ? options_.hot_pixel_rate_hz : options_.leak_rate_hz;
   const double kappa = std::pow(10.0, options_.leak_mismatch_decades * leak_.normals(item)[0]);
   const auto mean_leak = static_cast<float>(f * kappa * (c_on + mean_on));
   pixel.leak = static_cast<float>(mean_leak / std::max(1 + options_.leak_jitter * pixel.normals[2], 0.05));
@@ -256,8 +281,25 @@ bool ReferenceEventCamera::Model::find_shot(std::size_t i, const ReferenceSignal
   return false;
 }
 
+/// (15) What the change of F - R since the reference was set consists of. Noise is what thresholds with noise, or shot
+/// noise, add to signal and leak.
+NewLabel ReferenceEventCamera::Model::label(const Pixel& pixel, const ReferenceSignal& signal, double tau, int polarity,
+                                            bool shot) const {
+  const double nominal = polarity > 0 ? pixel.mean_on : -pixel.mean_off;
+  const double reached = polarity > 0 ? pixel.on : -pixel.off;
+  const double leak = pixel.leak * (tau - pixel.set_at);
+  const double change = shot ? signal.value(tau) + pixel.leak * tau - pixel.reference : reached;
+  NewLabel label;
+  label.signal = static_cast<float>(change - leak);
+  label.noise = static_cast<float>(nominal - change);
+  label.leak = static_cast<float>(leak);
+  label.polarity = static_cast<std::int8_t>(polarity);
+  label.is_noise = shot ? 1 : 0;
+  return label;
+}
+
 /// The next event of a pixel between two frames.
-std::optional<Event> ReferenceEventCamera::Model::next_event(std::size_t i, const ReferenceSignal& signal) {
+std::optional<Labelled> ReferenceEventCamera::Model::next_event(std::size_t i, const ReferenceSignal& signal) {
   Pixel& pixel = pixels_[i];
   while (true) {
     // (11) hold: until the end of the refractory period the pixel sees nothing; then R = F.
@@ -265,6 +307,7 @@ std::optional<Event> ReferenceEventCamera::Model::next_event(std::size_t i, cons
       if (*pixel.busy_until > signal.t1) return std::nullopt;
       pixel.from = to_seconds(*pixel.busy_until - signal.t0);
       pixel.reference = signal.value(pixel.from) + pixel.leak * pixel.from;
+      pixel.set_at = pixel.from;
       pixel.busy_until.reset();
     }
     // (6) The comparator: F against R + theta+ and R - theta-, or F + leak tau against these levels at t0.
@@ -275,19 +318,22 @@ std::optional<Event> ReferenceEventCamera::Model::next_event(std::size_t i, cons
     const bool shot = find_shot(i, signal, tau, polarity);
     if (tau == kNever) return std::nullopt;
     const TimeNs t = std::clamp<TimeNs>(signal.t0 + std::llround(tau * 1e9), signal.t0 + 1, signal.t1);
+    NewLabel label = this->label(pixel, signal, tau, polarity, shot);
+    label.t_ideal = t;
     // (6) The level becomes the reference; (9) after shot noise, F. (7), (8) New thresholds and leak.
     const double level = shot ? signal.value(tau) : (polarity > 0 ? upper : lower) - pixel.leak * tau;
     draw_parameters(i);
     pixel.reference = level + pixel.leak * tau;  // at t0, as before
-    pixel.from = tau;
+    pixel.from = pixel.set_at = tau;
     // (11) drop: the event is lost, but R has changed. With a readout, read_out() decides.
     const bool readout = options_.readout.limited();
     if (!holds_ && !readout && pixel.busy_until && t < *pixel.busy_until) continue;
     if (refractory_ > 0 && !readout) pixel.busy_until = t + refractory_;
     // (12) The time stamp.
     const auto pixels_per_row = static_cast<std::size_t>(width_);
-    return Event{t + delay(pixel, signal.light(tau)), static_cast<std::uint16_t>(i % pixels_per_row),
-                 static_cast<std::uint16_t>(i / pixels_per_row), static_cast<std::int8_t>(polarity)};
+    return Labelled{{t + delay(pixel, signal.light(tau)), static_cast<std::uint16_t>(i % pixels_per_row),
+                     static_cast<std::uint16_t>(i / pixels_per_row), static_cast<std::int8_t>(polarity)},
+                    to_label(label, pixel.hot)};
   }
 }
 
@@ -305,7 +351,7 @@ std::size_t ReferenceEventCamera::Model::pixel_of(const Event& event) const {
 }
 
 /// (13) Between two frames: requests arrive, and the reader serves rows, in the order of time.
-void ReferenceEventCamera::Model::read_out(const std::vector<ReferenceSignal>& signals, std::vector<Event>& events) {
+void ReferenceEventCamera::Model::read_out(const std::vector<ReferenceSignal>& signals, std::vector<Labelled>& events) {
   for (std::size_t i = 0; i < pixels_.size(); ++i) find_requests(i, signals[i]);
   while (true) {
     const TimeNs arrival = requests_.empty() ? kNoTime : requests_.begin()->t;
@@ -313,7 +359,7 @@ void ReferenceEventCamera::Model::read_out(const std::vector<ReferenceSignal>& s
     const TimeNs service = waiting_.empty() ? kNoTime : std::max(epoch_ + static_cast<TimeNs>(free), waiting_[0].t);
     if (std::min(arrival, service) > signals[0].t1) return;
     if (arrival <= service) {  // requests that arrive at the time of a service are included
-      const Event request = *requests_.begin();
+      const Labelled request = *requests_.begin();
       requests_.erase(requests_.begin());
       raise(request, signals);
     } else {
@@ -333,7 +379,7 @@ void ReferenceEventCamera::Model::find_requests(std::size_t i, const ReferenceSi
 }
 
 /// (14) One request per pixel. A request beyond the length of the queue is lost, as if it were read immediately.
-void ReferenceEventCamera::Model::raise(const Event& request, const std::vector<ReferenceSignal>& signals) {
+void ReferenceEventCamera::Model::raise(const Labelled& request, const std::vector<ReferenceSignal>& signals) {
   const auto same = [&](const Event& e) { return e.x == request.x && e.y == request.y; };
   const bool blind = request.t < blind_until_[pixel_of(request)] || std::ranges::any_of(waiting_, same);
   if (!holds_ && blind) return;
@@ -344,11 +390,11 @@ void ReferenceEventCamera::Model::raise(const Event& request, const std::vector<
 
 /// (13) The row of the first waiting request: all its events together; then the reader is busy.
 void ReferenceEventCamera::Model::serve_row(TimeNs service, const std::vector<ReferenceSignal>& signals,
-                                            std::vector<Event>& events) {
+                                            std::vector<Labelled>& events) {
   const ReadoutOptions& o = options_.readout;
   const int row = waiting_[0].y;
   const auto in_row = [&](const Event& e) { return e.y == row; };
-  std::vector<Event> served;
+  std::vector<Labelled> served;
   std::ranges::copy_if(waiting_, std::back_inserter(served), in_row);
   std::erase_if(waiting_, in_row);
   const double per_event = o.rate_mev_per_s > 0 ? 1e3 / o.rate_mev_per_s : 0;
@@ -356,8 +402,8 @@ void ReferenceEventCamera::Model::serve_row(TimeNs service, const std::vector<Re
   // Fractions of a nanosecond count while the reader is continuously busy.
   const auto start = static_cast<double>(service - epoch_);
   free_at_ = (start > std::ceil(free_at_) ? start : free_at_) + busy;
-  for (const Event& request : served) {
-    events.push_back({service, request.x, request.y, request.polarity});
+  for (const Labelled& request : served) {
+    events.push_back({{service, request.x, request.y, request.polarity}, request.label});
     acknowledge(request, service, signals);
   }
 }
@@ -384,5 +430,7 @@ ReferenceEventCamera::~ReferenceEventCamera() = default;
 std::vector<Event> ReferenceEventCamera::process(const Image<float>& irradiance, TimeNs t) {
   return model_->process(irradiance, t);
 }
+
+const std::vector<EventLabel>& ReferenceEventCamera::labels() const { return model_->labels(); }
 
 }  // namespace esim::inline event_camera

@@ -8,6 +8,7 @@
 #include "esim/core/time.h"
 #include "esim/event_camera/options.h"
 #include "esim/events/event.h"
+#include "esim/events/event_label.h"
 
 namespace esim::inline event_camera {
 
@@ -27,6 +28,9 @@ class ReferenceEventCamera {
   /// order, the events since the previous frame. The first frame sets the references. Time stamps include latencies, so
   /// that they may be later than t.
   std::vector<Event> process(const Image<float>& irradiance, TimeNs t);
+
+  /// The labels of the events that the last process() returned, in their order; whatever `labels` of the options says.
+  const std::vector<EventLabel>& labels() const;
 
  private:
   class Model;

@@ -6,8 +6,9 @@
 namespace esim::inline event_camera {
 namespace {
 
-void make_size(Image<float>& image, const Tile& tile) {
-  if (image.width() != tile.width || image.height() != tile.height) image = Image<float>(tile.width, tile.height);
+template <typename T>
+void make_size(Image<T>& image, const Tile& tile) {
+  if (image.width() != tile.width || image.height() != tile.height) image = Image<T>(tile.width, tile.height);
 }
 
 /// Copies a view's pixels of the tile, and redirects the view to the copy.
@@ -26,7 +27,11 @@ void SegmentHistory::add(std::span<const Segment> segments, const PixelArray& pi
 
 void SegmentHistory::add(std::span<const Segment> segments, int width, int height) {
   width_ = width, height_ = height;
-  append(segments, true, true, false);
+  append(segments, false, false, false);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    PastSegment& past = segments_[added_ + i];
+    for (auto* const image : {&past.light, &past.lag, &past.y, &past.v}) make_size(*image, segments[i].tile);
+  }
 }
 
 void SegmentHistory::append(std::span<const Segment> segments, bool filtered1, bool filtered2, bool ends) {

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "esim/events/event_label.h"
 #include "esim/events/event_packing.h"
 
 namespace esim::inline events {
@@ -20,6 +21,9 @@ class PackedEvents {
   void expect(const EventPacking& packing, TimeNs duration);
 
   const EventPacking& packing() const { return packing_; }
+
+  /// Labels of the events, in the order of each pixel's events; only if they are wanted. clear() keeps them.
+  std::vector<NewLabel> labels;
 
   /// Adds `count` events, except those with `reported` = 0. `time` is in whole ns after `start`.
   void add(std::size_t count, TimeNs start, const double* time, const std::uint32_t* place, const double* polarity,

@@ -113,6 +113,10 @@ class Copy {
     if (!held) return;
     if (const auto* events = std::get_if<EventsRecord>(&record)) {
       if (events->events.empty()) return;
+      if (!events->labels.empty()) {
+        const bool labelled = format_.can_hold(Content::event_labels);
+        (labelled ? summary_.copied : summary_.left_out)[Content::event_labels] += events->labels.size();
+      }
       note_rounding(*events);
     }
     to_->write(record);

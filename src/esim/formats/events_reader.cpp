@@ -16,6 +16,7 @@ class EventsSource final : public Source {
     CameraInfo& camera = info_.cameras.emplace_back();
     camera.name = "cam0";
     camera.model.width = sensor.width, camera.model.height = sensor.height;
+    camera.has_labels = reader_->has_labels();
     // If the file does not state the start, the first portion determines it.
     read();
     waiting_ = true;
@@ -31,7 +32,7 @@ class EventsSource final : public Source {
 
   const Record* next() override {
     if (!std::exchange(waiting_, false)) read();
-    if (!events_.empty()) return &record_.emplace(EventsRecord{0, events_});
+    if (!events_.empty()) return &record_.emplace(EventsRecord{0, events_, labels_});
     if (damage_) std::rethrow_exception(std::exchange(damage_, nullptr));
     return nullptr;
   }
@@ -39,18 +40,29 @@ class EventsSource final : public Source {
  private:
   void read() {
     events_.clear();
+    labels_.clear();
     if (ended_) return;
-    try {
+    const auto up_to_damage = [&](const auto& step) {
+      try {
+        step();
+      } catch (const UserError&) {
+        if (!damage_) damage_ = std::current_exception();
+        ended_ = true;
+      }
+    };
+    up_to_damage([&] {
       while (events_.empty() && !ended_) ended_ = !reader_->read(events_);
-    } catch (const UserError&) {
-      damage_ = std::current_exception();
-      ended_ = true;
-    }
+    });
+    if (!info_.cameras[0].has_labels) return;
+    up_to_damage([&] { reader_->read_labels(labels_); });
+    if (labels_.size() < events_.size()) ended_ = true;  // events without labels are left out
+    events_.resize(std::min(events_.size(), labels_.size()));
   }
 
   std::unique_ptr<EventsReader> reader_;
   RecordingInfo info_;
   std::vector<Event> events_;
+  std::vector<EventLabel> labels_;
   std::optional<Record> record_;
   bool waiting_ = false;  // a portion has been read but not handed out
   bool ended_ = false;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "esim/events/event.h"
+#include "esim/events/event_label.h"
 #include "esim/recording/format.h"
 
 namespace esim::inline formats {
@@ -25,6 +26,11 @@ class EventsReader {
   /// Appends the next events, some 10^4 to 10^5; returns false at the end. If the file is damaged, appends the events
   /// before the damage and throws UserError.
   virtual bool read(std::vector<Event>& events) = 0;
+
+  /// Whether the file has labels.
+  virtual bool has_labels() const { return false; }
+  /// Appends the labels of all events that have been read since the last call.
+  virtual void read_labels(std::vector<EventLabel>&) {}
 
   /// The fraction of the file that has been read.
   virtual double progress() const = 0;

@@ -29,6 +29,7 @@ class EventsSink final : public Sink {
       fail_limits(fmt::format("the sensor has {} x {} px, but format {} holds at most {} x {} px", camera.width,
                               camera.height, format_.name, format_.max_width, format_.max_height));
     }
+    if (info.cameras[0].has_labels) writer_->expect_labels();
     const bool known = camera.width > 0 && camera.height > 0;
     width_ = known ? camera.width : format_.max_width;
     height_ = known ? camera.height : format_.max_height;
@@ -41,6 +42,7 @@ class EventsSink final : public Sink {
     if (events == nullptr || events->camera != 0 || events->events.empty()) return;
     check(events->events);
     writer_->write(events->events);
+    if (!events->labels.empty()) writer_->write_labels(events->labels);
     count_ += events->events.size();
   }
 

@@ -20,6 +20,11 @@ class EventsWriter {
   /// Appends events that are within the limits and in order of time.
   virtual void write(EventSpan events) = 0;
 
+  /// Before begin(), if labels follow their events. Formats that can hold them override both functions.
+  virtual void expect_labels() {}
+  /// Appends the labels of the events that were written last.
+  virtual void write_labels(LabelSpan) {}
+
   /// Makes everything durable.
   virtual void end() = 0;
 };

@@ -12,6 +12,7 @@
 
 #include "esim/core/remedy.h"
 #include "esim/files/number_text.h"
+#include "esim/filters/labels_of_passed.h"
 
 namespace esim::inline formats {
 namespace {
@@ -104,7 +105,9 @@ class FilteredSource final : public Source {
     FilteredCamera& report = reports_[*stream.report];
     report.events += events.events.size();
     report.dropped = stream.chain->dropped();
-    return &record_.emplace(EventsRecord{events.camera, passed_});
+    labels_.assign(events.labels.begin(), events.labels.end());
+    if (!labels_.empty()) keep_labels_of_passed(events.events, passed_, labels_);
+    return &record_.emplace(EventsRecord{events.camera, passed_, labels_});
   }
 
   std::unique_ptr<FilterChain> make_chain(int camera) const {
@@ -120,6 +123,7 @@ class FilteredSource final : public Source {
   std::vector<FilteredCamera>& reports_;
   std::vector<FilteredStream> cameras_;
   std::vector<Event> passed_;
+  std::vector<EventLabel> labels_;
   std::optional<Record> record_;
   bool has_points_ = false;
 };

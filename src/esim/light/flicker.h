@@ -36,6 +36,8 @@ class Flicker {
 
   /// The modulation of the light, at any time.
   const SceneLight& light() const { return light_; }
+  /// What the event camera adds to the irradiance before the logarithm.
+  double dark() const { return static_cast<double>(dark_); }
 
   /// Takes the next segments of a sampler, for the functions below. If objects are lights, renders which of them the
   /// pixels see at the segments' ends.

@@ -39,6 +39,11 @@ void FromZero::write(const Record& record) {
       for (Event& event : events_) event.t -= start_;
       shifted.events = events_;
     }
+    if constexpr (requires { shifted.labels; }) {
+      labels_.assign(shifted.labels.begin(), shifted.labels.end());
+      for (EventLabel& label : labels_) label.t_ideal -= start_;
+      shifted.labels = labels_;
+    }
     inner_->write(shifted);
   };
   std::visit(pass_on, record);

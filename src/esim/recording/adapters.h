@@ -37,6 +37,7 @@ class FromZero final : public Sink {
   std::unique_ptr<Sink> inner_;
   TimeNs start_ = 0;
   std::vector<Event> events_;
+  std::vector<EventLabel> labels_;
 };
 
 }  // namespace esim::inline recording

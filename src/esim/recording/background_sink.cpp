@@ -21,10 +21,11 @@ struct Copy {
 
 Copy copy_of(const EventsRecord& record) {
   auto events = std::make_shared<const std::vector<Event>>(record.events.begin(), record.events.end());
-  return {[camera = record.camera, events](Sink& sink) {
-            sink.write(EventsRecord{camera, *events});
+  auto labels = std::make_shared<const std::vector<EventLabel>>(record.labels.begin(), record.labels.end());
+  return {[camera = record.camera, events, labels](Sink& sink) {
+            sink.write(EventsRecord{camera, *events, *labels});
           },
-          record.events.size_bytes()};
+          record.events.size_bytes() + record.labels.size_bytes()};
 }
 
 Copy copy_of(const TruthRecord& record) {

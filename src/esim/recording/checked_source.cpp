@@ -55,9 +55,9 @@ const Record* CheckedSource::checked(const EventsRecord& record) {
   if (good > 0) stream.last = last;
   stream.count += good;
   const EventSpan rest = record.events.subspan(good);
-  if (!rest.empty()) rest_ = EventsRecord{record.camera, rest};
+  if (!rest.empty()) rest_ = EventsRecord{record.camera, rest, {}};
   if (!rest.empty() && good == 0) fail(rest.front(), record.camera);
-  return &part_.emplace(EventsRecord{record.camera, record.events.first(good)});
+  return &part_.emplace(record.part(0, good));
 }
 
 void CheckedSource::fail(const Event& event, int camera) const {

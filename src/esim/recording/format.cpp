@@ -24,6 +24,8 @@ std::string_view describe(Content content) {
   switch (content) {
     case Content::events:
       return "events";
+    case Content::event_labels:
+      return "labels of events";
     case Content::frames:
       return "frames";
     case Content::images:

@@ -34,8 +34,8 @@ struct WriteOptions {
   Compression compression = Compression::blosc;
 };
 
-/// Kinds of record.
-enum class Content { events, frames, images, imu, poses, truth, optical_flow, event_points, triggers };
+/// Kinds of record, and parts of records that not every format can hold.
+enum class Content { events, event_labels, frames, images, imu, poses, truth, optical_flow, event_points, triggers };
 
 /// A format: its name, its functions and its limits. One file in `formats/` describes each; `formats/formats.cpp` lists
 /// them.

@@ -10,6 +10,7 @@
 #include "esim/core/image.h"
 #include "esim/core/time.h"
 #include "esim/events/event.h"
+#include "esim/events/event_label.h"
 #include "esim/geometry/camera.h"
 #include "esim/geometry/kinematics.h"
 #include "esim/geometry/se3.h"
@@ -22,6 +23,7 @@ struct CameraInfo {
   Camera model;             ///< intrinsics and distortion; 0 if unknown, as in files of other programs
   SE3 T_body_camera;        ///< pose of the camera in the body frame
   bool has_frames = false;  ///< a frame camera shares the lens: FrameRecords are possible
+  bool has_labels = false;  ///< all of its EventsRecords have labels
 };
 
 /// The inertial measurement unit of the recording. Densities are continuous-time.
@@ -52,6 +54,12 @@ struct RecordingInfo {
 struct EventsRecord {
   int camera = 0;  ///< index into RecordingInfo::cameras
   EventSpan events;
+  LabelSpan labels{};  ///< of these events, in their order; empty without CameraInfo::has_labels
+
+  /// A part of the record.
+  EventsRecord part(std::size_t first, std::size_t count) const {
+    return {camera, events.subspan(first, count), labels.empty() ? labels : labels.subspan(first, count)};
+  }
 };
 
 /// Ground truth of one camera at one time. The images are borrowed for the duration of the call. Quantities that a

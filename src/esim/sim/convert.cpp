@@ -86,6 +86,7 @@ class Run {
     camera.name = kConversionCamera;
     camera.model.width = summary_.width;
     camera.model.height = summary_.height;
+    camera.has_labels = conversion_.event_camera.has_labels();
     info.cameras.push_back(camera);
     return info;
   }
@@ -113,7 +114,7 @@ class Run {
     const auto on = std::count_if(events_.begin(), events_.end(), [](const Event& e) { return e.polarity > 0; });
     summary_.events_on += on;
     summary_.events_off += static_cast<std::int64_t>(events_.size()) - on;
-    if (!events_.empty()) write(EventsRecord{0, events_});
+    if (!events_.empty()) write(EventsRecord{0, events_, conversion_.event_camera.labels()});
   }
 
   void write_image() {

@@ -42,7 +42,8 @@ void Delivery::deliver_events(TimeNs until) {
     const auto on = std::count_if(events_.begin(), events_.end(), [](const Event& e) { return e.polarity > 0; });
     summary_.cameras[i].events_on += on;
     summary_.cameras[i].events_off += static_cast<std::int64_t>(events_.size()) - on;
-    write(EventsRecord{number, events_});
+    stages_.label_events(camera, events_, labels_);
+    write(EventsRecord{number, events_, labels_});
     if (!camera.event_points) continue;
     stages_.locate_events(camera, events_, event_points_);
     write(EventPointsRecord{number, events_, event_points_});

@@ -45,6 +45,7 @@ class Delivery {
 
   // Buffers.
   std::vector<Event> events_;
+  std::vector<EventLabel> labels_;
   std::vector<Eigen::Vector3f> event_points_;
   std::vector<SE3> object_poses_;
   Sample truth_;

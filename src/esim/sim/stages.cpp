@@ -11,7 +11,10 @@ void Stages::start_rendering(CameraChannel& camera, TimeNs known_until) {
     const auto index = static_cast<std::size_t>(&camera - world_.cameras.data());
     std::vector<RenderRequest> views = {view(world_, index, next->t, next->tiles)};
     for (const auto& [t, tiles] : next->later) views.push_back(view(world_, index, t, tiles));
-    for (RenderRequest& view : views) view.motion_rows = next->motion_rows;
+    for (RenderRequest& view : views) {
+      view.motion_rows = next->motion_rows;
+      view.which_objects = camera.seen_objects.has_value();
+    }
     Renderer& renderer = next->renderer != nullptr ? *next->renderer : *camera.renderer;
     camera.rendering = renderer.start_together(std::move(views));
   });
@@ -19,6 +22,12 @@ void Stages::start_rendering(CameraChannel& camera, TimeNs known_until) {
 
 void Stages::finish_rendering(CameraChannel& camera) {
   timed(seconds_.render, [&] { camera.rendering->finish(camera.sample); });
+  if (!camera.seen_objects) return;
+  timed(seconds_.truth, [&] {
+    const SampleRequest& request = *camera.sampler->next();
+    camera.seen_objects->add(camera.sample.object, request.t, request.tiles);
+    for (const auto& [t, tiles] : request.later) camera.seen_objects->add(camera.sample.object, t, tiles);
+  });
 }
 
 std::span<const Segment> Stages::accept_sample(CameraChannel& camera) {
@@ -72,6 +81,20 @@ const OpticalFlowImages* Stages::render_truth(CameraChannel& camera, const Rende
     camera.renderer->render(request, truth);
     if (camera.flicker) camera.flicker->illuminate(request.t, truth.object, truth.irradiance);
     return camera.optical_flow ? camera.optical_flow->advance(request, truth) : nullptr;
+  });
+}
+
+void Stages::label_events(CameraChannel& camera, std::span<const Event> events, std::vector<EventLabel>& labels) {
+  const LabelSpan made = camera.event_camera->labels();
+  labels.assign(made.begin(), made.end());
+  if (labels.empty()) return;
+  timed(seconds_.truth, [&] {
+    if (camera.seen_objects) {
+      for (std::size_t i = 0; i < labels.size(); ++i)
+        labels[i].object = camera.seen_objects->at(events[i].x, events[i].y, labels[i].t_ideal);
+      if (camera.seen_objects->is_long()) camera.seen_objects->forget_before(camera.event_camera->labels_from());
+    }
+    if (camera.flicker_labels) camera.flicker_labels->set(*camera.flicker, events, labels);
   });
 }
 

@@ -45,6 +45,9 @@ class Stages {
   /// Renders the ground truth of a camera in the light of that time. Returns the optical flow from the previous one;
   /// null if not requested, and for the first one.
   const OpticalFlowImages* render_truth(CameraChannel& camera, const RenderRequest& request, Sample& truth);
+  /// The labels of the events that release_events() returned last, with the objects that the pixels saw; none unless
+  /// the event camera has labels.
+  void label_events(CameraChannel& camera, std::span<const Event> events, std::vector<EventLabel>& labels);
   /// The scene points of events, in their order.
   void locate_events(CameraChannel& camera, std::span<const Event> events, std::vector<Eigen::Vector3f>& points);
 

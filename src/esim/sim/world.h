@@ -14,9 +14,11 @@
 #include "esim/recording/record.h"
 #include "esim/render/renderer.h"
 #include "esim/sampling/sampler.h"
+#include "esim/sim/flicker_labels.h"
 #include "esim/truth/clock.h"
 #include "esim/truth/event_points.h"
 #include "esim/truth/optical_flow.h"
+#include "esim/truth/seen_objects.h"
 
 namespace esim::inline sim {
 
@@ -33,6 +35,10 @@ struct CameraChannel {
   // Ground truth, if requested.
   std::unique_ptr<OpticalFlowFromDepth> optical_flow{};
   std::unique_ptr<EventPoints> event_points{};
+
+  // For labels.
+  std::optional<SeenObjects> seen_objects{};      // if anything moves
+  std::optional<FlickerLabels> flicker_labels{};  // if the light flickers
 };
 
 /// The rig's inertial measurement unit.

@@ -107,6 +107,7 @@ void check(const AffineOptions& o) {
                       o.contrast_threshold.high, kMinContrastThreshold));
   require(o.flow_scale >= 1e-3 && o.flow_scale <= 1e3,
           fmt::format("flow scale of {}: must be from 0.001 to 1000", o.flow_scale));
+  require(!o.event_camera.labels, "event_camera.labels: data sets have no labels of events; remove it");
   const MotionMix& mix = o.mix;
   require(std::min({mix.translation, mix.rotation, mix.scale, mix.shear}) >= 0 &&
               std::isfinite(mix.translation + mix.rotation + mix.scale + mix.shear) && mix.translation > 0,

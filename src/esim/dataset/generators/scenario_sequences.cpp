@@ -67,6 +67,9 @@ ScenarioSequences::ScenarioSequences(const std::filesystem::path& file, std::vec
     throw UserError(fmt::format("{}: has {} cameras, but must have one; remove the others", file_.string(),
                                 scenario.cameras.size()));
   }
+  if (scenario.cameras[0].event_camera.labels)
+    throw UserError(
+        fmt::format("{}: event_camera.labels: data sets have no labels of events; remove it", file_.string()));
 }
 
 std::string ScenarioSequences::options() const {

@@ -55,6 +55,7 @@ void CircuitArray::make_pixels(const EventCameraOptions& options, std::uint64_t 
   for (auto* values : {&light_, &lag_, &y_, &v_, &low_, &high_, &until_}) values->resize(count + kVectorPadding);
   node_light_.resize(count + kVectorPadding);
   leak_.resize(count + kVectorPadding);
+  if (options.labels) origins_.resize(count), hot_.resize(count);
   const AddressedRandom random(seed, Purpose::circuit_mismatch, stream);
   const double refractory_ns = 1e3 * options.refractory_period_us, max_rate = max_rate_hz(options);
   limits_ = std::isfinite(max_rate);
@@ -84,6 +85,7 @@ void CircuitArray::make_pixels(const EventCameraOptions& options, std::uint64_t 
       rate += options.hot_pixel_rate_hz * options.threshold_on() *
               std::pow(10.0, o.hot_mismatch_decades * hot_decades) * (sign < o.hot_off_fraction ? -1 : 1);
     }
+    if (options.labels) hot_[i] = hot < options.hot_pixels;
     leak_[i] = static_cast<float>(rate);
     until_[i] = -1;
   }
@@ -108,9 +110,8 @@ bool CircuitArray::open(const Segment& segment, Rows rows) {
       const std::size_t i = first + x;
       light_[i] = y_[i] = v_[i] = lights[x];
       lag_[i] = 0;
-      const auto pixel = static_cast<std::uint32_t>(i);
-      CircuitPixel(circuit_, pixel, parameters_[i], leak_[i], states_[i])
-          .open(lights[x], static_cast<double>(segment.t1 - epoch_), starts_.uniforms(pixel, 0)[0]);
+      const double place = starts_.uniforms(static_cast<std::uint32_t>(i), 0)[0];
+      pixel(i).open(lights[x], static_cast<double>(segment.t1 - epoch_), place);
       until_[i] = -1;  // looks at once
     }
   }
@@ -252,25 +253,43 @@ void CircuitArray::set_bounds(std::size_t pixel, const CircuitBounds& bounds) {
   node_light_[pixel] = states_[pixel].node_light;
 }
 
-/// Takes a pixel to the segment's end in as many steps as needed.
+CircuitPixel CircuitArray::pixel(std::size_t i) {
+  CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], leak_[i], states_[i]);
+  if (!origins_.empty()) pixel.explain(&origins_[i]);
+  return pixel;
+}
+
+/// Adds the label of the last event of a pixel.
+void CircuitArray::label(std::size_t i, TimeNs t, int polarity, std::vector<NewLabel>& labels) const {
+  const CircuitOrigin& parts = origins_[i];
+  labels.push_back({t,
+                    t,
+                    static_cast<std::uint32_t>(i),
+                    parts.signal,
+                    parts.noise,
+                    parts.leak,
+                    static_cast<std::int8_t>(polarity),
+                    0,
+                    {}});
+}
+
+/// Takes a pixel to the segment's end in as many steps as needed. Calls emit(t, polarity) for each event, t in whole ns
+/// after the segment's start.
+template <typename Emit>
 void CircuitArray::advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer,
-                               PackedEvents& events) {
+                               const Emit& emit_event) {
   const std::size_t i = row.first + column;
-  const std::uint32_t place = static_cast<std::uint32_t>(row.packing.place(row.x + static_cast<int>(column), row.y));
   const auto emit = [&](double t, int polarity) {
-    if (buffer.events == kBlock) flush(row, buffer, events);
-    const std::size_t n = buffer.events++;
-    buffer.time[n] = std::clamp(std::ceil(t - row.start), 0.0, row.length);
-    buffer.polarity[n] = polarity;
-    buffer.reported[n] = 1;
-    buffer.place[n] = place;
+    const double time = std::clamp(std::ceil(t - row.start), 0.0, row.length);
+    emit_event(time, polarity);
+    if (!origins_.empty()) label(i, row.t0 + static_cast<TimeNs>(time), polarity, buffer.labels);
   };
   const double light1 = buffer.light[at];
   const LightRamp ramp{light_[i], (light1 - light_[i]) / row.length};
   if (buffer.several[at] == 0) {
     const CircuitPiece piece{buffer.level[at], buffer.rate[at],          buffer.fast[at], buffer.slow[at],
                              buffer.k1[at],    1 / circuit_.poles.t2_ns, row.length};
-    CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], leak_[i], states_[i]);
+    CircuitPixel pixel = this->pixel(i);
     pixel.set(piece, ramp, row.start);
     set_bounds(i, pixel.run(emit));
     buffer.lost += limits_ ? pixel.lost() : 0;
@@ -291,7 +310,7 @@ template <typename Emit>
 std::int64_t CircuitArray::run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length,
                                const Emit& emit) {
   std::int64_t lost = 0;
-  CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], leak_[i], states_[i]);
+  CircuitPixel pixel = this->pixel(i);
   for (double done = 0; done < length;) {
     const LightRamp part{ramp.light + ramp.rate * done, ramp.rate};
     const double h = step_length(circuit_.poles, front, part, length - done), from = start + done;
@@ -319,21 +338,34 @@ TimeNs CircuitArray::acknowledge(std::uint32_t pixel, TimeNs t) {
   return epoch_ + static_cast<TimeNs>(std::ceil(state.held_until));
 }
 
+/// As advance(), from the pixel's state at the start of the segment.
 void CircuitArray::resume(std::uint32_t pixel, const PastSegment& past, CircuitBuffer& buffer,
                           std::vector<Event>& requests) {
   const Segment& segment = past.segment;
   const int x = static_cast<int>(pixel) % width_, y = static_cast<int>(pixel) / width_;
-  const double length = static_cast<double>(segment.t1 - segment.t0), start = static_cast<double>(segment.t0 - epoch_);
-  const double light0 = std::log(static_cast<double>(segment.irradiance0.row(y)[x]) + dark_),
-               light1 = std::log(static_cast<double>(segment.irradiance1.row(y)[x]) + dark_);
-  const int column = x - segment.tile.x, row = y - segment.tile.y;
-  CircuitState front{static_cast<double>(past.filtered1(column, row)),
-                     light0 + static_cast<double>(past.filtered2(column, row))};
-  const auto emit = [&](double t, int polarity) {
-    requests.push_back({epoch_ + static_cast<TimeNs>(std::ceil(t)), static_cast<std::uint16_t>(x),
+  const int column = x - segment.tile.x, line = y - segment.tile.y;
+  const Row row{segment.irradiance0.row(y) + x,
+                segment.irradiance1.row(y) + x,
+                pixel,
+                y,
+                x,
+                1,
+                segment.t0,
+                static_cast<double>(segment.t0 - epoch_),
+                static_cast<double>(segment.t1 - segment.t0),
+                EventPacking(width_, height_)};
+  const std::array front{&light_[pixel], &lag_[pixel], &y_[pixel], &v_[pixel]};
+  const std::array<double, 4> present{light_[pixel], lag_[pixel], y_[pixel], v_[pixel]};
+  light_[pixel] = past.light(column, line), lag_[pixel] = past.lag(column, line);
+  y_[pixel] = past.y(column, line), v_[pixel] = past.v(column, line);
+  buffer.uncertain.clear();
+  const auto emit = [&](double time, int polarity) {
+    requests.push_back({row.t0 + static_cast<TimeNs>(time), static_cast<std::uint16_t>(x),
                         static_cast<std::uint16_t>(y), static_cast<std::int8_t>(polarity)});
   };
-  buffer.lost += run(pixel, front, {light0, (light1 - light0) / length}, start, length, emit);
+  if (move_vector(hn::ScalableTag<double>(), row, 0, buffer, 0) && !buffer.uncertain.empty())
+    advance_one(row, 0, 0, buffer, emit);
+  for (std::size_t k = 0; k < front.size(); ++k) *front[k] = present[k];
 }
 
 void CircuitArray::flush(const Row& row, CircuitBuffer& buffer, PackedEvents& events) {
@@ -369,12 +401,11 @@ bool CircuitArray::advance(const Segment& segment, Rows rows, CircuitBuffer& buf
                   static_cast<double>(segment.t1 - segment.t0),
                   events.packing()};
     if (past != nullptr) {
-      float* const lags = past->filtered1.row(y - segment.tile.y);
-      float* const signals = past->filtered2.row(y - segment.tile.y);
-      for (std::size_t x = 0; x < width; ++x) {
-        lags[x] = static_cast<float>(lag_[first + x]);
-        signals[x] = static_cast<float>(v_[first + x] - light_[first + x]);
-      }
+      const int line = y - segment.tile.y;
+      std::copy_n(&light_[first], width, past->light.row(line));
+      std::copy_n(&lag_[first], width, past->lag.row(line));
+      std::copy_n(&y_[first], width, past->y.row(line));
+      std::copy_n(&v_[first], width, past->v.row(line));
     }
     for (std::size_t begin = 0; begin < width; begin += CircuitBuffer::kTogether) {
       const std::size_t count = std::min(CircuitBuffer::kTogether, width - begin);
@@ -390,7 +421,14 @@ bool CircuitArray::advance(const Segment& segment, Rows rows, CircuitBuffer& buf
         const std::size_t i = first + begin + x;
         light_[i] = buffer.light[x], lag_[i] = buffer.lag[x], y_[i] = buffer.y[x], v_[i] = buffer.v[x];
       }
-      for (const std::uint32_t column : buffer.uncertain) advance_one(row, column, column - begin, buffer, events);
+      for (const std::uint32_t column : buffer.uncertain) {
+        const auto place = static_cast<std::uint32_t>(row.packing.place(row.x + static_cast<int>(column), row.y));
+        advance_one(row, column, column - begin, buffer, [&](double time, int polarity) {
+          if (buffer.events == kBlock) flush(row, buffer, events);
+          const std::size_t n = buffer.events++;
+          buffer.time[n] = time, buffer.polarity[n] = polarity, buffer.reported[n] = 1, buffer.place[n] = place;
+        });
+      }
     }
     flush(row, buffer, events);
   }

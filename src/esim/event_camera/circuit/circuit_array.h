@@ -30,7 +30,8 @@ struct CircuitBuffer {
   PerPixel<double> time, polarity, reported;            // of events
   PerPixel<std::uint32_t> place;
   std::size_t events = 0;
-  std::int64_t lost = 0;  // events beyond the maximum rate of their pixels
+  std::int64_t lost = 0;         // events beyond the maximum rate of their pixels
+  std::vector<NewLabel> labels;  // if they are wanted
 };
 
 /// The pixels of a camera, by their circuit. In most segments, one vectorised solution of the front end and a
@@ -52,6 +53,9 @@ class CircuitArray {
   /// Takes a pixel that is held in reset through a past segment; appends its next request, if there is one.
   void resume(std::uint32_t pixel, const PastSegment& past, CircuitBuffer& buffer, std::vector<Event>& requests);
 
+  /// Whether each pixel is hot; only with labels.
+  const std::vector<bool>& hot() const { return hot_; }
+
   void set_epoch(TimeNs t) {
     if (epoch_ == kNoEpoch) epoch_ = t;
   }
@@ -64,6 +68,7 @@ class CircuitArray {
     for (auto* values : {&self.light_, &self.lag_, &self.y_, &self.v_, &self.low_, &self.high_, &self.until_})
       archive.fixed(*values);
     archive.fixed(self.node_light_);
+    archive.fixed(self.origins_);
   }
 
  private:
@@ -76,8 +81,11 @@ class CircuitArray {
   template <typename Emit>
   std::int64_t run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length,
                    const Emit& emit);
-  void advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer, PackedEvents& events);
+  template <typename Emit>
+  void advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer, const Emit& emit);
   void set_bounds(std::size_t pixel, const CircuitBounds& bounds);
+  CircuitPixel pixel(std::size_t i);
+  void label(std::size_t i, TimeNs t, int polarity, std::vector<NewLabel>& labels) const;
   static void flush(const Row& row, CircuitBuffer& buffer, PackedEvents& events);
 
   Circuit circuit_;
@@ -93,6 +101,8 @@ class CircuitArray {
   LargeVector<double> light_, lag_, y_, v_;  // at the last sample
   LargeVector<double> low_, high_, until_;   // CircuitBounds, with absolute levels
   LargeVector<float> node_light_, leak_;
+  LargeVector<CircuitOrigin> origins_;  // with labels
+  std::vector<bool> hot_;               // with labels
 };
 
 }  // namespace esim::inline event_camera

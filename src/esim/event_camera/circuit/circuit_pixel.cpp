@@ -141,6 +141,11 @@ void CircuitPixel::open(double light, double time, double place) {
   state_.reference = light + leak_ * time - (place * (above + below) - below);
   state_.node_time = time;
   state_.node_light = static_cast<float>(light);
+  if (origin_ != nullptr) {
+    // If the pixel leaks, the leak has brought it to its place; otherwise noise, or what it saw before.
+    const double leaked = light + leak_ * time - state_.reference;
+    *origin_ = {light, leak_ != 0 ? time - leaked / leak_ : time};
+  }
   if (noise_ == nullptr) return;
   state_.active = true;
   state_.node = 1;
@@ -150,11 +155,21 @@ void CircuitPixel::open(double light, double time, double place) {
 
 void CircuitPixel::release(double s) {
   state_.held_until = -1;
+  if (origin_ != nullptr) origin_->v = piece_.value(s), origin_->time = start_ + s;
   const double value = signal(s) + (noise_ != nullptr ? gain_ * noise_at(s).x : 0.0);
   const double change = value - state_.reference;
   lost_ +=
       static_cast<std::int64_t>(std::abs(change) / static_cast<double>(change > 0 ? parameters_.on : parameters_.off));
   state_.reference = value;
+}
+
+/// (15) of docs/methods/pixel.md. Noise is the rest of the threshold; without noise, the signal is.
+void CircuitPixel::take_apart(double s, int polarity) {
+  CircuitOrigin& o = *origin_;
+  const double threshold = polarity > 0 ? static_cast<double>(parameters_.on) : -static_cast<double>(parameters_.off);
+  const double v = piece_.value(s), time = start_ + s, leak = leak_ * (time - o.time);
+  const double signal = noise_ != nullptr ? v - o.v : threshold - leak;
+  o = {v, time, static_cast<float>(signal), static_cast<float>(threshold - leak - signal), static_cast<float>(leak)};
 }
 
 CircuitBounds CircuitPixel::bounds_without_noise() {

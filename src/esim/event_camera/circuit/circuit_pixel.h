@@ -48,6 +48,13 @@ struct CircuitPixelState {
   std::uint8_t first_steps = 0;  ///< that remain since it became active
 };
 
+/// For labels: where the change of a pixel's signal begins, and its parts at the last event, ln.
+struct CircuitOrigin {
+  double v = 0;     ///< the source follower's output when the reference was set
+  double time = 0;  ///< when that was, ns after the epoch
+  float signal = 0, noise = 0, leak = 0;
+};
+
 /// No event is possible while the signal minus the reference stays strictly within (low, high), the light within
 /// kLightReach of node_light, and before the time `until`.
 struct CircuitBounds {
@@ -77,6 +84,9 @@ class CircuitPixel {
   /// Sets the noise and the reference at the start, as if the camera had been running before. `place`, from 0 to 1, is
   /// where the signal then is between the two thresholds.
   void open(double light, double time, double place);
+
+  /// Keeps the parts of the change at events in `origin`.
+  void explain(CircuitOrigin* origin) { origin_ = origin; }
 
   /// The stretch that the next functions are about: its signal, its light, and its start in ns after the epoch.
   void set(const CircuitPiece& piece, const LightRamp& light, double start) {
@@ -109,6 +119,7 @@ class CircuitPixel {
     return {low + leak_ * (start_ + a), high + leak_ * (start_ + b)};
   }
 
+  void take_apart(double s, int polarity);
   std::optional<double> find_near(double a, double b) const;
   /// Whether the slope of the signal has one sign on [a, b], by its ends and its maximum curvature.
   bool is_monotone(double a, double b) const {
@@ -171,6 +182,7 @@ class CircuitPixel {
   CircuitPiece piece_;
   LightRamp light_;
   double start_ = 0, leak_, gain_;
+  CircuitOrigin* origin_ = nullptr;
   PhotoreceptorNoise::StepDraws draws_;
   std::int64_t lost_ = 0;
 };
@@ -179,6 +191,7 @@ template <typename Emit>
 CircuitBounds CircuitPixel::run(const Emit& emit) {
   const double length = piece_.length;
   const auto fire = [&](double s, int polarity) {
+    if (origin_ != nullptr) take_apart(s, polarity);
     emit(start_ + s, polarity);
     state_.reference = polarity > 0 ? upper() : lower();
     if (circuit_.waits) {

@@ -62,7 +62,9 @@ void CircuitReadout::take(const Event& request) {
 
 /// Stamps a request, and lets its pixel continue.
 void CircuitReadout::stamp(CircuitArray& pixels, const Event& request, TimeNs t) {
-  read_.push_back({next_multiple(t, time_stamp_), request.x, request.y, request.polarity});
+  const TimeNs time_stamp = next_multiple(t, time_stamp_);
+  read_.push_back({time_stamp, request.x, request.y, request.polarity});
+  if (labels_ != nullptr) labels_->read(request, time_stamp);
   longest_delay_ = std::max(longest_delay_, t - request.t);
   delayed_ += t - request.t > usual_delay_ ? 1 : 0;
   const auto pixel = static_cast<std::uint32_t>(request.y) * static_cast<std::uint32_t>(width_) +
@@ -72,6 +74,7 @@ void CircuitReadout::stamp(CircuitArray& pixels, const Event& request, TimeNs t)
     resumed_.clear();
     pixels.resume(pixel, history[i], buffer_, resumed_);
     if (resumed_.empty()) continue;
+    if (labels_ != nullptr) labels_->add(buffer_.labels);
     requests_.push_back(resumed_.front());
     std::ranges::push_heap(requests_, std::greater<>());
     break;
@@ -101,7 +104,8 @@ void CircuitReadout::serve(CircuitArray& pixels) {
   for (std::size_t i = 0; i < rows_.size(); ++i) visits_[i] = visit(rows_[i], now);
 }
 
-void CircuitReadout::advance(CircuitArray& pixels, EventQueue& found, TimeNs watermark) {
+void CircuitReadout::advance(CircuitArray& pixels, EventQueue& found, TimeNs watermark, PendingLabels* labels) {
+  labels_ = labels;
   const auto known = found.release_until(watermark);
   std::size_t next = 0;
   while (true) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "esim/event_camera/circuit/circuit_array.h"
+#include "esim/event_camera/labels/pending_labels.h"
 #include "esim/event_camera/segment_history.h"
 #include "esim/events/event_queue.h"
 
@@ -28,8 +29,8 @@ class CircuitReadout {
   /// The recent segments: add segments before the pixels are advanced through them.
   SegmentHistory history;
 
-  /// Reads out the requests up to the watermark. `found` are new requests.
-  void advance(CircuitArray& pixels, EventQueue& found, TimeNs watermark);
+  /// Reads out the requests up to the watermark. `found` are new requests. `labels`: of the events, or null.
+  void advance(CircuitArray& pixels, EventQueue& found, TimeNs watermark, PendingLabels* labels);
 
   /// Appends the events with t <= until that were not released before, in order.
   void release_until(TimeNs until, std::vector<Event>& out);
@@ -96,6 +97,7 @@ class CircuitReadout {
   std::int64_t delayed_ = 0;
   TimeNs longest_delay_ = 0;
   CircuitBuffer buffer_;
+  PendingLabels* labels_ = nullptr;  // during advance()
   std::vector<Event> resumed_;
 };
 

@@ -27,13 +27,14 @@ struct PixelParameters {
 /// start.
 struct Round {
   const ActivePixels* active = nullptr;
-  double duration = 0;          ///< of the segment
-  double max_delay = 0;         ///< that a time stamp may have
-  Comparators compare{};        ///< in find(): the crossings, which an earlier event may replace
-  PixelNormals normals{};       ///< four deviates for each event: ON and OFF threshold, leak, latency
-  PerPixel<double> passed{};    ///< the level that the event crossed: the new reference
-  PerPixel<double> restarts{};  ///< 1: the new reference is the current signal instead
-  PerPixel<double> stamp{};     ///< time stamp of the event
+  double duration = 0;           ///< of the segment
+  double max_delay = 0;          ///< that a time stamp may have
+  Comparators compare{};         ///< in find(): the crossings, which an earlier event may replace
+  PixelNormals normals{};        ///< four deviates for each event: ON and OFF threshold, leak, latency
+  PerPixel<double> passed{};     ///< the level that the event crossed: the new reference
+  PerPixel<double> restarts{};   ///< 1: the new reference is the current signal instead
+  PerPixel<double> stamp{};      ///< time stamp of the event
+  PerPixel<std::uint8_t> own{};  ///< 1: the event is an effect's own, not a crossing; only valid with labels
 };
 
 /// An effect on the pixels after the low-pass: its options, its state per pixel, its contribution to the signal and its
@@ -65,7 +66,7 @@ struct PixelEffect {
   /// open(lanes, round): at the first sample, after the references have been set.
   template <class... T>
   static void open(const T&...) {}
-  /// find(lanes, round): replaces crossings by earlier events of its own, and sets `restarts` for these.
+  /// find(lanes, round): replaces crossings by earlier events of its own, and sets `restarts` and `own` for these.
   template <class... T>
   static void find(const T&...) {}
   /// renew(lanes, round): draws the parameters that hold after the event, such as thresholds and `drift`. If it changes

@@ -91,6 +91,7 @@ struct ShotNoise : PixelEffect {
       c.tau[i] = tau;
       c.polarity[i] = (bits[2] & 1U) != 0 ? 1.0 : -1.0;
       round.restarts[i] = 1;
+      round.own[i] = 1;
       return;
     }
   }

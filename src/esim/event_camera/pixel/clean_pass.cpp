@@ -88,6 +88,7 @@ struct CleanPass::Block {
   void wait(PixelArray& pixels);
   void resume(const PixelArray& pixels, const Segment& segment);
   void hold(PixelArray& pixels, Lanes& lanes, const std::uint32_t* which, TimeNs t0, double duration);
+  void label(const Lanes& lanes, const std::uint32_t* which, TimeNs t0, std::vector<NewLabel>& labels) const;
   std::size_t take_rest();
   void settle(PixelArray& pixels);
 };
@@ -149,6 +150,25 @@ void CleanPass::Block::hold(PixelArray& pixels, Lanes& lanes, const std::uint32_
   }
 }
 
+/// (15) The labels of the pixels that fired: the signal alone makes events. `which` as in hold().
+void CleanPass::Block::label(const Lanes& lanes, const std::uint32_t* which, TimeNs t0,
+                             std::vector<NewLabel>& labels) const {
+  for (std::size_t i = 0; i < lanes.count; ++i) {
+    if (lanes.polarity[i] == 0) continue;
+    const TimeNs t = t0 + static_cast<TimeNs>(lanes.crossing[i]);
+    const double signal = lanes.polarity[i] > 0 ? lanes.on[i] : -lanes.off[i];
+    labels.push_back({t,
+                      t,
+                      pixel[which != nullptr ? which[i] : i],
+                      static_cast<float>(signal),
+                      0,
+                      0,
+                      static_cast<std::int8_t>(lanes.polarity[i]),
+                      0,
+                      {}});
+  }
+}
+
 /// Holds the pixels that fired in reset until they are released.
 void CleanPass::Block::wait(PixelArray& pixels) {
   for (std::size_t i = 0; i < all.count; ++i) {
@@ -202,6 +222,7 @@ void CleanPass::run_block(PixelArray& pixels, const Segment& segment, PackedEven
     const double last_reset = lanes.fire(duration, refractory);
     const double* const polarity = lanes.polarity.data();
     events.add(lanes.count, segment.t0, lanes.crossing.data(), lanes.place.data(), polarity, polarity);
+    if (pixels.options.labels) block.label(lanes, which, segment.t0, events.labels);
     if (pixels.effects.holds && !wait && last_reset > duration) block.hold(pixels, lanes, which, segment.t0, duration);
   };
   // Most active pixels fire once; the others continue in a smaller group.

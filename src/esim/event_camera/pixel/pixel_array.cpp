@@ -31,6 +31,7 @@ PixelArray::PixelArray(const EventCameraOptions& o, int width_px, int height_px,
     if (effects.holds) until.assign(pixels, kLongAgo);
   } else {
     noisy_pixels.resize(pixels);
+    if (o.labels && static_cast<const Leak&>(effects).active) set_at.resize(pixels);
   }
   bound_low.assign(pixels, std::numeric_limits<float>::infinity());
   bound_high.assign(pixels, -std::numeric_limits<float>::infinity());
@@ -66,6 +67,15 @@ void PixelArray::make_pixels(std::uint64_t seed, std::uint16_t stream) {
       pixel.on = on, pixel.off = off, pixel.drift = parameters.drift;
     }
   }
+}
+
+std::vector<bool> PixelArray::hot(std::uint64_t seed, std::uint16_t stream) const {
+  if (options.hot_pixels == 0) return {};
+  const AddressedRandom defects(seed, Purpose::pixel_defects, stream);
+  std::vector<bool> hot(bound_low.size());
+  for (std::size_t i = 0; i < hot.size(); ++i)
+    hot[i] = defects.uniforms(static_cast<std::uint32_t>(i))[0] < options.hot_pixels;
+  return hot;
 }
 
 void PixelArray::set_bounds(std::size_t count, const std::uint32_t* which, float* low, float* high) {

@@ -33,6 +33,9 @@ class PixelArray {
  public:
   PixelArray(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream);
 
+  /// Whether each pixel is hot; empty if none is.
+  std::vector<bool> hot(std::uint64_t seed, std::uint16_t stream) const;
+
   /// Sets the time origin of drifts and timers, unless it is set.
   void set_epoch(TimeNs t) {
     if (epoch == kLongAgo) epoch = t;
@@ -93,6 +96,9 @@ class PixelArray {
   };
   LargeVector<NoisyPixel> noisy_pixels;
 
+  // With labels and a leak: when each reference was set, ns after the epoch.
+  LargeVector<double> set_at;
+
   // Bounds of the irradiance, or of the filtered brightness; strictly within them no event is possible.
   LargeVector<float> bound_low, bound_high;
   LargeVector<std::int32_t> timers;  // timers, in ticks
@@ -109,6 +115,7 @@ class PixelArray {
     archive.fixed(self.clean_pixels);
     archive.fixed(self.until);
     archive.fixed(self.noisy_pixels);
+    archive.fixed(self.set_at);
     archive.fixed(self.bound_low);
     archive.fixed(self.bound_high);
     archive.fixed(self.timers);

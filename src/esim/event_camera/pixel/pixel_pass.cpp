@@ -44,6 +44,9 @@ std::size_t PixelPass<Signals>::take(const PixelArray& pixels, ActivePixels& act
   }
   active.count = compare.count = count;
   held_count_ = held_count;
+  if (!pixels.set_at.empty()) {
+    for (std::size_t i = first; i < count; ++i) set_at_[i] = pixels.set_at[active.pixel[i]] - epoch_ns;
+  }
   return first;
 }
 
@@ -56,12 +59,15 @@ void PixelPass<Signals>::round(PixelArray& pixels, ActivePixels& active, PackedE
   resume_held();
   signals.find(compare);
   std::fill_n(round_.restarts.begin(), compare.count, pixels.effects.holds ? 1.0 : 0.0);
+  if (pixels.options.labels) std::fill_n(round_.own.begin(), compare.count, std::uint8_t{0});
   pixels.effects.each_active([&](const auto& effect) { effect.find(lanes_, round_); });
   for (std::size_t i = 0; i < compare.count; ++i) {
     round_.passed[i] = compare.polarity[i] > 0 ? compare.upper(i) : compare.lower(i);
   }
+  if (pixels.options.labels) take_apart(pixels);
   if (pixels.effects.draws) renew(pixels);
   fire(pixels);
+  if (pixels.options.labels) label(events);
   events.add(compare.count, t0_, round_.stamp.data(), active.place.data(), compare.polarity.data(), reports_.data());
   reset(pixels, wait);
   deactivate(pixels, active);
@@ -99,11 +105,58 @@ void PixelPass<Signals>::resume_held() {
   Comparators& compare = round_.compare;
   for (std::size_t k = 0; k < held_count_; ++k) {
     const std::size_t i = held_[k];
-    compare.from[i] = until_[i];
+    compare.from[i] = set_at_[i] = until_[i];
     signals.advance(compare, i);
     compare.reference[i] = signals.value(i) + compare.drift[i] * until_[i];
   }
   held_count_ = 0;
+}
+
+/// (15) The parts of the change at the new events.
+template <class Signals>
+void PixelPass<Signals>::take_apart(const PixelArray& pixels) {
+  Comparators& compare = round_.compare;
+  const ThresholdNoise::Lanes& means = lanes_;
+  const bool leaks = !pixels.set_at.empty();
+  for (std::size_t i = 0; i < compare.count; ++i) {
+    if (round_.own[i] == 0) [[likely]]
+      continue;
+    compare.from[i] = compare.tau[i];  // fire() sets it for all pixels that fire
+    signals.advance(compare, i);
+  }
+#pragma omp simd
+  for (std::size_t i = 0; i < compare.count; ++i) {
+    const bool on = compare.polarity[i] > 0;
+    const double tau = compare.tau[i], drift = compare.drift[i];
+    const double reached = on ? compare.threshold_on + static_cast<double>(compare.on[i])
+                              : -(compare.threshold_off + static_cast<double>(compare.off[i]));
+    const double nominal = on ? compare.threshold_on + static_cast<double>(means.mean_on[i])
+                              : -(compare.threshold_off + static_cast<double>(means.mean_off[i]));
+    const double leak = leaks ? drift * (tau - set_at_[i]) : 0.0;
+    const double change = round_.own[i] != 0 ? signals.value(i) + drift * tau - compare.reference[i] : reached;
+    signal_[i] = static_cast<float>(change - leak);
+    noise_[i] = static_cast<float>(nominal - change);
+    leak_[i] = static_cast<float>(leak);
+  }
+}
+
+/// Adds the labels of the events that are reported.
+template <class Signals>
+void PixelPass<Signals>::label(PackedEvents& events) const {
+  const Comparators& compare = round_.compare;
+  for (std::size_t i = 0; i < compare.count; ++i) {
+    if (reports_[i] == 0) continue;
+    const double crossing = std::clamp(std::floor(compare.tau[i] + 0.5), 1.0, round_.duration);
+    events.labels.push_back({t0_ + static_cast<TimeNs>(round_.stamp[i]),
+                             t0_ + static_cast<TimeNs>(crossing),
+                             round_.active->pixel[i],
+                             signal_[i],
+                             noise_[i],
+                             leak_[i],
+                             static_cast<std::int8_t>(compare.polarity[i]),
+                             round_.own[i],
+                             {}});
+  }
 }
 
 /// Draws the parameters after the new events.
@@ -156,6 +209,10 @@ void PixelPass<Signals>::reset(const PixelArray& pixels, bool wait) {
     const double next = round_.restarts[i] != 0 ? now : round_.passed[i];
     compare.reference[i] = compare.polarity[i] != 0 ? next : compare.reference[i];
   }
+  if (!pixels.set_at.empty()) {
+    for (std::size_t i = 0; i < compare.count; ++i)
+      set_at_[i] = compare.polarity[i] != 0 ? compare.from[i] : set_at_[i];
+  }
   signals.look_ahead(compare, again_.data());
   const double held_beyond = wait ? -kNever : (pixels.effects.holds ? duration : kNever);
 #pragma omp simd
@@ -198,6 +255,9 @@ void PixelPass<Signals>::deactivate(PixelArray& pixels, ActivePixels& active) {
   if (pixels.effects.timers) {
     for (std::size_t i = 0; i < compare.count; ++i) pixels.timers[active.pixel[i]] = timer_[i];
   }
+  if (!pixels.set_at.empty()) {
+    for (std::size_t i = 0; i < compare.count; ++i) pixels.set_at[active.pixel[i]] = epoch_ns_ + set_at_[i];
+  }
   pixels.set_bounds(compare.count, active.pixel.data(), low_.data(), high_.data());
   std::size_t kept = 0;
   for (std::size_t i = 0; i < compare.count; ++i) {
@@ -217,7 +277,7 @@ void PixelPass<Signals>::keep(ActivePixels& active, std::size_t i, std::size_t t
   active.copy(i, to);
   round_.compare.copy(i, to);
   signals.copy(i, to);
-  draws_[to] = draws_[i], until_[to] = until_[i];
+  draws_[to] = draws_[i], until_[to] = until_[i], set_at_[to] = set_at_[i];
 }
 
 template <class Signals>
@@ -243,6 +303,10 @@ void PixelPass<Signals>::open(PixelArray& pixels, ActivePixels& active) {
   if (pixels.effects.draws) renew(pixels);
   for (std::size_t i = 0; i < count; ++i) compare.reference[i] = signals.end(i);
   pixels.effects.each_active([&](const auto& effect) { effect.open(lanes_, round_); });
+  for (std::size_t i = 0; i < count; ++i) {
+    const double leaked = signals.end(i) - compare.reference[i], drift = compare.drift[i];
+    set_at_[i] = drift > 0 ? -leaked / drift : 0.0;
+  }
   deactivate(pixels, active);
 }
 

@@ -40,8 +40,10 @@ class PixelPass {
   void resume_held();
 
   // The steps of a round, for all remaining pixels.
+  void take_apart(const PixelArray& pixels);
   void renew(const PixelArray& pixels);
   void fire(const PixelArray& pixels);
+  void label(PackedEvents& events) const;
   void reset(const PixelArray& pixels, bool wait);
   void deactivate(PixelArray& pixels, ActivePixels& active);
 
@@ -62,6 +64,10 @@ class PixelPass {
   PerPixel<double> until_{};         // end of the last refractory period
   PerPixel<double> reports_{};       // 0 if the event is lost
   PerPixel<double> again_{};         // 1 if another event may follow
+
+  // With labels.
+  PerPixel<double> set_at_{};  // when the reference was set; 0 without a leak
+  PerPixel<float> signal_{}, noise_{}, leak_{};
 
   // The bounds of inactive pixels.
   PerPixel<float> low_{}, high_{};

@@ -48,9 +48,11 @@ inline bool PixelReadout::raises(const Event& request) {
   if (counted_) --to_come_[pixel];
   if (readout_.waiting() > 0 && (states_[pixel] & kRequests) != 0) {
     ++ignored_[pixel];
-    return false;
+  } else if (holds_ || request.t >= blind_until_[pixel]) {
+    return true;
   }
-  return holds_ || request.t >= blind_until_[pixel];
+  if (labels_ != nullptr) labels_->drop(request);
+  return false;
 }
 
 /// Reads out the requests that are acknowledged immediately: most of them, if the readout is fast enough. Their pixels
@@ -59,8 +61,10 @@ inline void PixelReadout::read_prompt(TimeNs watermark) {
   if (!holds_ || counted_ || !again_.empty() || !resuming_.empty()) return;
   const std::size_t begin = read_.size();
   const std::size_t count = readout_.serve_singly(arrived_.subspan(next_), watermark + 1, tolerance_, read_);
-  for (std::size_t i = 0; i < count; ++i)
+  for (std::size_t i = 0; i < count; ++i) {
     longest_delay_ = std::max(longest_delay_, read_[begin + i].t - arrived_[next_ + i].t);
+    if (labels_ != nullptr) labels_->read(arrived_[next_ + i], read_[begin + i].t);
+  }
   next_ += count;
 }
 
@@ -79,6 +83,7 @@ inline void PixelReadout::wait(const Event& request) {
   if (readout_.take(request)) {
     states_[index(request)] |= kRequests;
   } else {
+    if (labels_ != nullptr) labels_->drop(request);
     acknowledge(request, request.t);
   }
 }
@@ -94,6 +99,7 @@ void PixelReadout::read_row(TimeNs t) {
 inline void PixelReadout::stamp(const Event& request, TimeNs t) {
   read_.push_back({t, request.x, request.y, request.polarity});
   longest_delay_ = std::max(longest_delay_, t - request.t);
+  if (labels_ != nullptr) labels_->read(request, t);
 }
 
 /// Lets the pixel continue after its refractory period, if it has not already.
@@ -116,6 +122,7 @@ void PixelReadout::release(std::uint32_t pixel, TimeNs until, bool waits, bool l
     pixels_->take_back(pixel, ignored + to_come_[pixel], until);
     to_draw_.push_back(pixel);
     superseded_.push_back(pixel);
+    if (labels_ != nullptr) labels_->drop_unread(pixel);
     states_[pixel] |= kSuperseded;
   }
   pixels_->hold(pixel, until);
@@ -173,10 +180,12 @@ void PixelReadout::collect() {
     }
   }
   packed_.clear();
+  if (labels_ != nullptr) labels_->add(packed_.labels);
 }
 
-void PixelReadout::advance(PixelArray& pixels, PixelUpdate& update, EventQueue& found, TimeNs watermark) {
-  pixels_ = &pixels, found_ = &found;
+void PixelReadout::advance(PixelArray& pixels, PixelUpdate& update, EventQueue& found, TimeNs watermark,
+                           PendingLabels* labels) {
+  pixels_ = &pixels, found_ = &found, labels_ = labels;
   arrived_ = found.release_until(watermark);
   next_ = 0;
   counted_ = false;

@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "esim/event_camera/labels/pending_labels.h"
 #include "esim/event_camera/pixel/pixel_update.h"
 #include "esim/event_camera/readout/readout.h"
 #include "esim/event_camera/segment_history.h"
@@ -29,8 +30,9 @@ class PixelReadout {
   SegmentHistory history;
 
   /// Reads out the requests up to the watermark; all segments must be known up to it. `found` are the events under the
-  /// assumption that all requests are acknowledged immediately; events that do not occur are removed.
-  void advance(PixelArray& pixels, PixelUpdate& update, EventQueue& found, TimeNs watermark);
+  /// assumption that all requests are acknowledged immediately; events that do not occur are removed. `labels`: of the
+  /// events, or null.
+  void advance(PixelArray& pixels, PixelUpdate& update, EventQueue& found, TimeNs watermark, PendingLabels* labels);
 
   /// Appends the events with t <= until that were not released before, in order.
   void release_until(TimeNs until, std::vector<Event>& out);
@@ -95,8 +97,9 @@ class PixelReadout {
   // For one advance().
   PixelArray* pixels_ = nullptr;
   EventQueue* found_ = nullptr;
-  EventSpan arrived_;     // events in `found` up to the watermark
-  std::size_t next_ = 0;  // index into arrived_
+  PendingLabels* labels_ = nullptr;  // null: none are wanted
+  EventSpan arrived_;                // events in `found` up to the watermark
+  std::size_t next_ = 0;             // index into arrived_
   bool counted_ = false;
   std::vector<std::uint32_t> superseded_, to_draw_;  // pixels
 

@@ -8,6 +8,7 @@
 
 #include "esim/core/time.h"
 #include "esim/events/event.h"
+#include "esim/events/event_label.h"
 #include "esim/recording/format.h"
 
 namespace esim::inline formats {
@@ -24,6 +25,14 @@ struct EventsHdf5Options {
 ///   events/p   uint8 [N]              1: ON, 0: OFF
 ///   ms_to_idx  uint64 [M]             ms_to_idx[ms] = first i with t[i] >= ms milliseconds, otherwise N
 ///   t_offset   int64                  start of the recording, rounded down to the unit; if unknown, to a second
+///
+/// and, if the camera has labels, for each event
+///
+///   events/labels/t_ideal   int64 [N]  as t, but of the ideal crossing
+///   events/labels/signal, flicker, noise, leak  float32 [N]   parts of the change, ln
+///   events/labels/object, semantic_class  uint16 [N]
+///   events/labels/cause     uint8 [N]  0: signal, 1: flicker, 2: noise, 3: leak; also in its attribute "names"
+///   events/labels/hot       uint8 [N]  1: the pixel is hot
 ///
 /// with M = 1 + the duration in ms, rounded up. M covers at least the time just after the last event, since readers
 /// such as DSEC's look up the first millisecond at or after the end of a window.
@@ -79,6 +88,10 @@ class EventsHdf5Reader {
   /// Indices of the events with t0 <= t < t1, found through ms_to_idx.
   IndexRange find(TimeNs t0, TimeNs t1) const;
   std::vector<Event> read_window(TimeNs t0, TimeNs t1) const;
+
+  bool has_labels() const;
+  /// Appends the labels of events that exist; only if the file has labels.
+  void read_labels(std::uint64_t first, std::uint64_t count, std::vector<EventLabel>& labels) const;
 
   /// Number of ON events; reads only the polarities.
   std::uint64_t count_on() const;

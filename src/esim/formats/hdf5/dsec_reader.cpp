@@ -8,6 +8,7 @@
 #include "esim/formats/hdf5/event_blocks.h"
 #include "esim/formats/hdf5/event_columns.h"
 #include "esim/formats/hdf5/input.h"
+#include "esim/formats/hdf5/label_datasets.h"
 
 namespace esim::inline formats {
 namespace {
@@ -44,6 +45,7 @@ struct EventsHdf5Reader::Impl {
   hdf5::Input file;
   hdf5::Column t, x, y, p;
   std::optional<hdf5::Column> ms_to_idx;
+  std::optional<hdf5::LabelColumns> labels;
   std::uint64_t size = 0;
   std::optional<int> width, height;
   TimeUnit unit = TimeUnit::us;
@@ -67,11 +69,17 @@ void EventsHdf5Reader::Impl::open() {
   x = file.open_column("events/x");
   y = file.open_column("events/y");
   p = file.open_column("events/p");
+  if (file.has(hdf5::kLabels)) labels.emplace(file);
   if (file.has("ms_to_idx")) ms_to_idx = file.open_column("ms_to_idx");
 
   // A killed writer may leave columns of different lengths: their common part is valid.
   size = std::min({t.size, x.size, y.size, p.size});
-  const bool equal = t.size == size && x.size == size && y.size == size && p.size == size;
+  bool equal = t.size == size && x.size == size && y.size == size && p.size == size;
+  if (labels) {
+    const auto [count, all] = labels->size();
+    equal = equal && all && count == size;
+    size = std::min<std::uint64_t>(size, count);
+  }
   if (!equal && complete.value_or(true)) file.fail("the datasets in the group events differ in length");
 }
 
@@ -217,6 +225,14 @@ std::vector<std::int8_t> EventsHdf5Reader::read_polarities(std::uint64_t first, 
   return p;
 }
 
+bool EventsHdf5Reader::has_labels() const { return impl_->labels.has_value(); }
+
+void EventsHdf5Reader::read_labels(std::uint64_t first, std::uint64_t count, std::vector<EventLabel>& labels) const {
+  const auto to_ns = [&](std::int64_t t) { return impl_->to_ns(t); };
+  for (const std::uint64_t end = first + count; first < end; first += kReadBlock)
+    impl_->labels->read(impl_->file, first, std::min(kReadBlock, end - first), to_ns, labels);
+}
+
 std::vector<std::uint64_t> EventsHdf5Reader::ms_to_idx() const {
   if (!impl_->ms_to_idx) return {};
   std::vector<std::uint64_t> index(impl_->ms_to_idx->size);
@@ -236,14 +252,22 @@ class WholeFile final : public EventBlocksReader {
   std::optional<TimeNs> start() const override { return reader_.t_offset(); }
   std::optional<TimeNs> end() const override { return reader_.end(); }
 
+  bool has_labels() const override { return reader_.has_labels(); }
+  void read_labels(std::vector<EventLabel>& labels) override {
+    const std::uint64_t first = std::exchange(labelled_, read_);
+    reader_.read_labels(first, read_ - first, labels);
+  }
+
  private:
   std::uint64_t event_count() const override { return reader_.size(); }
   void read_block(std::uint64_t first, std::uint64_t count, std::vector<Event>& events) override {
     const std::vector<Event> block = reader_.read(first, count);
     events.insert(events.end(), block.begin(), block.end());
+    read_ = first + block.size();
   }
 
   EventsHdf5Reader reader_;
+  std::uint64_t read_ = 0, labelled_ = 0;  // events, labels
 };
 
 }  // namespace
@@ -253,7 +277,7 @@ Format dsec_format() {
       .name = "dsec",
       .description = "HDF5 in DSEC's layout",
       .extensions = {".h5", ".hdf5"},
-      .holds = {Content::events},
+      .holds = {Content::events, Content::event_labels},
       .either_unit = true,
       .recognises = [](const auto&, std::string_view head) { return is_hdf5(head); },
       .open = [](const auto& path,

@@ -3,6 +3,7 @@
 
 #include "esim/core/error.h"
 #include "esim/formats/hdf5/dsec.h"
+#include "esim/formats/hdf5/label_datasets.h"
 #include "esim/formats/hdf5/library.h"
 #include "esim/formats/hdf5/millisecond_index.h"
 
@@ -35,7 +36,7 @@ struct EventsHdf5Writer::Impl {
   }
 
   void create(const RecordingInfo& info);
-  void append(EventSpan events);
+  void append(const EventsRecord& record);
   void store(const Event& event);
   void write_chunk();
   void close_series();
@@ -64,6 +65,7 @@ struct EventsHdf5Writer::Impl {
   hdf5::Handle esim_complete;
   hdf5::Series t_series, x_series, y_series, p_series;
   hdf5::MillisecondIndex milliseconds;
+  std::optional<hdf5::LabelSeries> labels;
 };
 
 void EventsHdf5Writer::Impl::create(const RecordingInfo& info) {
@@ -93,6 +95,7 @@ void EventsHdf5Writer::Impl::create(const RecordingInfo& info) {
   x_series = series("events/x", H5T_STD_U16LE);
   y_series = series("events/y", H5T_STD_U16LE);
   p_series = series("events/p", H5T_STD_U8LE);
+  if (model.has_labels) labels.emplace(*file, kChunkEvents, options.compression);
   milliseconds.open(hdf5::Series(*file, "ms_to_idx", {H5T_STD_U64LE, {}, kChunkMs, Compression::none}));
   file->create_scalar("t_offset", t_offset);
   file->create_text_attribute(file->id(), "unit", options.unit == TimeUnit::us ? "us" : "ns");
@@ -102,8 +105,13 @@ void EventsHdf5Writer::Impl::create(const RecordingInfo& info) {
   file->flush();
 }
 
-void EventsHdf5Writer::Impl::append(EventSpan events) {
-  for (const Event& event : events) {
+void EventsHdf5Writer::Impl::append(const EventsRecord& record) {
+  const EventSpan events = record.events;
+  if (labels && record.labels.size() != events.size())
+    throw InternalError(path.string() + ": " + std::to_string(record.labels.size()) + " labels of " +
+                        std::to_string(events.size()) + " events");
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const Event& event = events[i];
     const bool inside = (width == 0 || event.x < width) && (height == 0 || event.y < height);
     if (event.t < last_t || event.t < origin || !inside) {
       throw InternalError(path.string() + ": event (t, x, y) = (" + std::to_string(event.t) + " ns, " +
@@ -112,6 +120,7 @@ void EventsHdf5Writer::Impl::append(EventSpan events) {
     }
     last_t = event.t;
     store(event);
+    if (labels) labels->store(record.labels[i]);
     if (fill == kChunkEvents) write_chunk();
   }
   if (!events.empty()) last_seen = std::max(last_seen, events.back().t);
@@ -146,6 +155,7 @@ void EventsHdf5Writer::Impl::write_chunk() {
   y_series.append(std::span<const std::uint16_t>(y).first(fill));
   p_series.append(std::span<const std::uint8_t>(p).first(fill));
   fill = 0;
+  if (labels) labels->write([&](TimeNs t) { return floor_divide(t - origin, ns_per_unit); });
   milliseconds.write();
   file->flush();
 }
@@ -153,6 +163,7 @@ void EventsHdf5Writer::Impl::write_chunk() {
 void EventsHdf5Writer::Impl::close_series() {
   esim_complete.reset();
   for (hdf5::Series* series : {&t_series, &x_series, &y_series, &p_series}) *series = hdf5::Series();
+  labels.reset();
   milliseconds.close();
 }
 
@@ -165,7 +176,7 @@ void EventsHdf5Writer::begin(const RecordingInfo& info) { impl_->create(info); }
 
 void EventsHdf5Writer::write(const Record& record) {
   if (const auto* events = std::get_if<EventsRecord>(&record)) {
-    if (events->camera == impl_->camera) impl_->append(events->events);
+    if (events->camera == impl_->camera) impl_->append(*events);
   } else if (const auto* truth = std::get_if<TruthRecord>(&record)) {
     impl_->last_seen = std::max(impl_->last_seen, truth->t);
   } else if (const auto* image = std::get_if<ImageRecord>(&record)) {

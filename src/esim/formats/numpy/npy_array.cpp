@@ -157,6 +157,13 @@ void Array::integers(const Field& field, std::vector<std::int64_t>& out) const {
                   [&](auto value) { out.push_back(integer(value)); });
 }
 
+void Array::floats(const Field& field, std::vector<float>& out) const {
+  out.clear();
+  out.reserve(held_);
+  for_each_number(field, item_bytes_, std::span(items_).first(held_ * item_bytes_),
+                  [&](auto value) { out.push_back(static_cast<float>(value)); });
+}
+
 void Array::times(const Field& field, std::vector<std::int64_t>& out) const {
   if (field.kind == 'f') {
     constexpr double kMax = 9e9;  // larger times do not fit into int64 ns

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -52,6 +53,9 @@ class Array {
   /// A field of all items in memory: integers, or kNoNumber for other values.
   void integers(const Field& field, std::vector<std::int64_t>& out) const;
 
+  /// The same as floating-point numbers.
+  void floats(const Field& field, std::vector<float>& out) const;
+
   /// The same as times in ns: integers are in us, floating-point numbers in s.
   void times(const Field& field, std::vector<std::int64_t>& out) const;
 
@@ -77,10 +81,12 @@ struct EventColumns {
     Field field{};
   };
   Column t{}, x{}, y{}, p{};
+  std::map<std::string, Column> labels{};  ///< columns of labels by name; unless all exist, none is read
   SensorSize sensor{};
 };
 
-/// Sets the column for this name: t, ts, time, timestamp(s); x; y; p, pol, polarity, polarities. Ignores other names.
+/// Sets the column for this name: t, ts, time, timestamp(s); x; y; p, pol, polarity, polarities; or one of the labels.
+/// Ignores other names.
 void take_column(std::string_view name, EventColumns::Column column, EventColumns& columns);
 
 /// Throws UserError that names the file if a column is missing.

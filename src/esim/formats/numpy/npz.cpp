@@ -6,6 +6,7 @@
 #include "esim/core/error.h"
 #include "esim/files/output_file.h"
 #include "esim/formats/events_writer.h"
+#include "esim/formats/label_columns.h"
 #include "esim/formats/numpy/npy.h"
 #include "esim/formats/numpy/npy_array.h"
 #include "esim/formats/zip_archive.h"
@@ -27,19 +28,19 @@ class ColumnFile {
     file_.append(npy::header_text(descr_, std::array{std::uint64_t{0}}));
   }
 
-  /// Appends number(event) for each event.
-  template <typename Number, typename Function>
-  void write(EventSpan events, const Function& number) {
+  /// Appends number(item) for each event or label.
+  template <typename Number, typename Item, typename Function>
+  void write(std::span<const Item> items, const Function& number) {
     std::string& bytes = file_.buffer();
     const std::size_t before = bytes.size();
-    bytes.resize(before + events.size() * sizeof(Number));
+    bytes.resize(before + items.size() * sizeof(Number));
     char* out = bytes.data() + before;
-    for (const Event& event : events) {
-      const Number value = number(event);
+    for (const Item& item : items) {
+      const Number value = number(item);
       std::memcpy(out, &value, sizeof(Number));
       out += sizeof(Number);
     }
-    count_ += events.size();
+    count_ += items.size();
     if (file_.flush_if_full()) write_count();
   }
 
@@ -81,6 +82,28 @@ class NpzWriter final : public EventsWriter {
     add("x", "<u2");
     add("y", "<u2");
     add("p", "|u1");
+    if (!has_labels_) return;
+    add("t_ideal", numpy::time_type(options_.unit));
+    for (const LabelColumn<float>& column : kLabelParts) add(column.name, "<f4");
+    for (const LabelColumn<std::uint16_t>& column : kLabelSurfaces) add(column.name, "<u2");
+    add("cause", "|u1");
+    add("hot", "|u1");
+  }
+
+  void expect_labels() override { has_labels_ = true; }
+
+  void write_labels(LabelSpan labels) override {
+    const bool us = options_.unit == TimeUnit::us;
+    auto column = columns_.begin() + 4;
+    const auto next = [&]() -> ColumnFile& { return **column++; };
+    next().write<std::int64_t>(
+        labels, [&](const EventLabel& label) { return us ? numpy::microseconds(label.t_ideal) : label.t_ideal; });
+    for (const auto& [name, part] : kLabelParts)
+      next().write<float>(labels, [member = part](const EventLabel& label) { return label.*member; });
+    for (const auto& [name, surface] : kLabelSurfaces)
+      next().write<std::uint16_t>(labels, [member = surface](const EventLabel& label) { return label.*member; });
+    next().write<std::uint8_t>(labels, [](const EventLabel& label) { return static_cast<std::uint8_t>(label.cause); });
+    next().write<std::uint8_t>(labels, [](const EventLabel& label) { return label.hot; });
   }
 
   void write(EventSpan events) override {
@@ -117,6 +140,7 @@ class NpzWriter final : public EventsWriter {
   WriteOptions options_;
   fs::path path_;
   SensorSize sensor_;
+  bool has_labels_ = false;
   std::vector<std::unique_ptr<ColumnFile>> columns_;
 };
 
@@ -162,9 +186,9 @@ bool is_npz(std::string_view head) {
 Format npz_format() {
   return {
       .name = "npz",
-      .description = "NumPy arrays t, x, y, p in a zip file",
+      .description = "NumPy arrays t, x, y, p, and labels, in a zip file",
       .extensions = {".npz"},
-      .holds = {Content::events},
+      .holds = {Content::events, Content::event_labels},
       .either_unit = true,
       .recognises = [](const auto&, std::string_view head) { return is_npz(head); },
       .open = [](const auto& path, const ReadOptions& options) { return make_events_source(open_npz(path), options); },

@@ -257,6 +257,7 @@ class RecordingFolder {
         std::make_unique<CheckedSource>((text ? events_text_format() : dsec_format()).open(file, told), file, told);
     const Camera& found = events->info().cameras.front().model;
     learn_size(i, {found.width, found.height});
+    info_.cameras[i].has_labels = events->info().cameras.front().has_labels;
     info_.end = std::max(info_.end, events->info().end);
     if (const RecordingInfo& own = events->info(); own.start_known)
       events_start_ = std::min(events_start_.value_or(own.start), own.start);
@@ -318,8 +319,8 @@ Format recording_format() {
       .name = "recording",
       .description = "the folder of a recording, or of one of its cameras",
       .extensions = {""},
-      .holds = {Content::events, Content::frames, Content::images, Content::imu, Content::poses, Content::truth,
-                Content::optical_flow},
+      .holds = {Content::events, Content::event_labels, Content::frames, Content::images, Content::imu, Content::poses,
+                Content::truth, Content::optical_flow},
       .several_cameras = true,
       .folder = true,
       .either_unit = true,

@@ -101,27 +101,27 @@ class EventsStream final : public RecordStream {
   EventsStream(std::unique_ptr<Source> events, int camera) : events_(std::move(events)), camera_(camera) {}
 
   std::optional<TimeNs> due() override {
-    while (rest_.empty()) {
+    while (rest_.events.empty()) {
       const Record* const record = events_->next();
       if (record == nullptr) return std::nullopt;
-      rest_ = std::get<EventsRecord>(*record).events;
+      rest_ = std::get<EventsRecord>(*record);
+      rest_.camera = camera_;
     }
-    return rest_.front().t;
+    return rest_.events.front().t;
   }
 
   const Record* next(TimeNs until) override {
-    const auto later =
-        std::upper_bound(rest_.begin(), rest_.end(), until, [](TimeNs t, const Event& event) { return t < event.t; });
-    const std::size_t count = std::max<std::size_t>(1, static_cast<std::size_t>(later - rest_.begin()));
-    record_.emplace(EventsRecord{camera_, rest_.first(count)});
-    rest_ = rest_.subspan(count);
+    const auto later = std::ranges::upper_bound(rest_.events, until, {}, &Event::t);
+    const std::size_t count = std::max<std::size_t>(1, static_cast<std::size_t>(later - rest_.events.begin()));
+    record_.emplace(rest_.part(0, count));
+    rest_ = rest_.part(count, rest_.events.size() - count);
     return &*record_;
   }
 
  private:
   std::unique_ptr<Source> events_;
   int camera_;
-  EventSpan rest_;
+  EventsRecord rest_;
   std::optional<Record> record_;
 };
 

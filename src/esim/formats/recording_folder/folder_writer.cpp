@@ -99,6 +99,7 @@ std::unique_ptr<Sink> RecordingWriter::make_sink(Content content, const Record& 
   if (camera >= 0) create_folder(place /= info_.cameras.at(static_cast<std::size_t>(camera)).name);
   switch (content) {
     case Content::events:
+    case Content::event_labels:
       return std::make_unique<EventsHdf5Writer>(place / "events.h5", camera,
                                                 EventsHdf5Options{options_.unit, options_.compression});
     case Content::frames:

@@ -287,6 +287,20 @@ def test_ctrl_c_interrupts_and_leaves_a_simulation_that_goes_on(poster):
     np.testing.assert_array_equal(joined(simulation), uninterrupted)
 
 
+@pytest.mark.parametrize("after_s", [0.001, 0.002, 0.005])
+def test_ctrl_c_shortly_before_a_packet_does_not_lose_it(poster, after_s):
+    short = {"camera.width": 80, "camera.height": 60}  # done before the simulation first looks for signals
+    uninterrupted = joined(esim.simulate(poster, overrides=short))
+    simulation = esim.simulate(poster, overrides=short, packet_s=10.0)
+    packets = []
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, after_s)
+    with pytest.raises(KeyboardInterrupt):
+        packets.append(next(simulation))
+        time.sleep(10)
+    np.testing.assert_array_equal(joined([*packets, *simulation]), uninterrupted)
+
+
 def test_other_threads_run_meanwhile(poster):
     import threading
 

@@ -148,7 +148,8 @@ std::optional<Packet> Simulation::next() {
   if (!packets_->has_packet() && !over_) {
     bool undisturbed = true;
     or_keep_the_recording([&] { undisturbed = advance(); });
-    if (!undisturbed) throw *std::exchange(signal_, std::nullopt);
+    // A signal after the last look would otherwise raise in Python after the packet was taken, and lose it.
+    if (!undisturbed || signal_came()) throw *std::exchange(signal_, std::nullopt);
   }
   if (!packets_->has_packet()) return std::nullopt;
   return packets_->take();

@@ -95,6 +95,16 @@ TEST(Realism, TheFrameMovesAlongTheFlow) {
   }
 }
 
+TEST(Realism, TimesAreWholeMicrosecondsButForRounding) {
+  const test::TemporaryDirectory folder;
+  write_scene(folder.path());
+  write_file(folder.path() / "events.txt", "0.0 1 1 1\n0.6367649989999999 5 6 1\n0.700001001 5 6 0\n");
+  EXPECT_EQ(read_real_clip(folder.path()).events[1].t, 636'765'000);
+  EXPECT_EQ(read_real_clip(folder.path()).events[2].t, 700'001'000);
+  write_file(folder.path() / "events.txt", "0.0 1 1 1\n0.6367649989999999 5 6 1\n0.700001300 5 6 0\n");
+  EXPECT_EQ(read_real_clip(folder.path()).events[2].t, 700'001'300);
+}
+
 TEST(Realism, TheSensorThatRecordedIsTheNearest) {
   const test::TemporaryDirectory folder;
   write_scene(folder.path() / "clip");

@@ -91,7 +91,6 @@ EventCameraOptions davis346_by_circuit() {
   o.circuit->threshold_mismatch_common = 0.07;
   o.refractory_period_us = 500;
   o.leak_rate_hz = 0.2;
-  o.leak_mismatch_decades = 0.7;
   o.readout.rate_mev_per_s = 12;
   o.readout.row_time_us = 0.08;
   o.readout.row_scan_us = 0.003;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <optional>
 #include <span>
 
@@ -142,6 +143,16 @@ std::optional<fs::path> only_png(const fs::path& folder) {
   return found;
 }
 
+/// Time stamps in whole us as text of seconds are often off by a few ns, from arithmetic on doubles.
+void repair_microseconds(std::vector<Event>& events) {
+  constexpr TimeNs kRounding = 10;
+  const auto rounded = [](TimeNs t) { return (t + kNsPerUs / 2) / kNsPerUs * kNsPerUs; };
+  const bool whole = std::all_of(events.begin(), events.end(),
+                                 [&](const Event& event) { return std::abs(rounded(event.t) - event.t) <= kRounding; });
+  if (!whole) return;
+  for (Event& event : events) event.t = rounded(event.t);
+}
+
 }  // namespace
 
 Image<float> RealClip::image_at(double s) const {
@@ -180,6 +191,7 @@ RealClip read_real_clip(const fs::path& folder) {
   while (file.read(events, std::size_t{1} << 20)) clip.events.insert(clip.events.end(), events.begin(), events.end());
   if (clip.events.size() < 2 || clip.events.front().t == clip.events.back().t)
     throw UserError((folder / "events.txt").string() + ": holds no span of time");
+  repair_microseconds(clip.events);
   const TimeNs start = clip.events.front().t;
   for (Event& event : clip.events) event.t -= start;
   clip.duration_s = to_seconds(clip.events.back().t);

@@ -27,7 +27,8 @@ struct RealClip {
 /// Reads `events.txt` (lines t x y p), `flow.npy` (1, 2, height, width; x, y; px, float64) and the only PNG file of a
 /// folder, of the sensor's size or with the frame below another one in its left column, as in the excerpts of the Event
 /// Camera Dataset at https://github.com/tub-rip/event_based_image_rec_inverse_problem. The frame is blurred by a
-/// Gaussian of 0.4 px, for its noise, and is at least 2/255. Throws UserError.
+/// Gaussian of 0.4 px, for its noise, and is at least 2/255. Times that are whole us but for errors of
+/// a few ns become whole us. Throws UserError.
 RealClip read_real_clip(const std::filesystem::path& folder);
 
 /// Events of real pixels in constant light, for 10 s, as counts of intervals by rate: the files noise_pos_*lux.npy and

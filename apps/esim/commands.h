@@ -21,6 +21,7 @@ void add_stats(CLI::App& app, int& exit_code);
 void add_studio(CLI::App& app, int& exit_code);
 void add_evaluate(CLI::App& app, int& exit_code);
 void add_scenes(CLI::App& app, int& exit_code);
+void add_docs(CLI::App& app, int& exit_code);
 void add_options(CLI::App& app, int& exit_code);
 
 /// Adds the commands of earlier versions, which name their successors.

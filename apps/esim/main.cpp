@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
       "  esim studio scenes/room.yaml                      design, make and view recordings in a browser\n"
       "  esim evaluate sampling --out out/sampling         accuracy and cost of sampling methods\n"
       "  esim scenes --copy scenes                         a copy of the scenes that come with esim\n"
+      "  esim docs                                         where the documentation is\n"
       "  esim options                                      every option of a scenario\n"
       "\n"
       "Exit status: 0 success, 1 internal error, 2 error in the input or on this machine, 130 interrupted.");
@@ -44,6 +45,7 @@ int main(int argc, char** argv) {
   add_dataset(app, exit_code);
   add_evaluate(app, exit_code);
   add_scenes(app, exit_code);
+  add_docs(app, exit_code);
   add_options(app, exit_code);
   add_removed(app);
   try {

@@ -196,6 +196,7 @@ void add_sampling(CLI::App& evaluate, int& exit_code) {
 void add_evaluate(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("evaluate", "Measure the accuracy of a simulation");
   command->require_subcommand(1);
+  command->footer("Example:\n  esim evaluate sampling scenes/room.yaml --out out/room --quick");
   add_sampling(*command, exit_code);
 }
 

@@ -14,6 +14,13 @@ OPTIONS = re.compile(r"^```yaml-options\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 OPTION = re.compile(r"(?P<indent> *)(?P<name>\w+)(?P<colon>:?) ?(?P<value>.*?) *(?:# (?P<help>.*))?$")
 
 
+def on_startup(**_):
+    """Types such as `float32, shape (N,)` in docstrings are text. Griffe would parse them as Python, and lose the comma."""
+    from griffe._internal.docstrings import numpy
+
+    numpy.parse_docstring_annotation = lambda annotation, *_, **__: annotation
+
+
 def on_config(config):
     config.site_name = f"esim {os.environ['ESIM_VERSION']}"
     config.nav = [{"Home": "README.md"}, *navigation(Path(config.docs_dir, "README.md").read_text())]

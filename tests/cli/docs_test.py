@@ -167,6 +167,13 @@ class Site(unittest.TestCase):
                     wrong.add(f"{path.relative_to(SITE)} links to {link}")
         self.assertEqual(sorted(wrong), [])
 
+    def test_the_references_have_every_command_and_every_python_name(self):
+        package = (PROJECT / "python/esim/__init__.py").read_text().split("__all__ = [")[1]
+        names = {f"esim.{name}" for name in re.findall(r'"(\w+)"', package)} - {"esim.__version__"}
+        self.assertLessEqual(names, self.pages[SITE / "reference/python.html"].anchors)
+        commands = re.findall(r"^  (\w+) ", run("--help").stdout.split("Subcommands:\n")[1].split("\n\n")[0], re.MULTILINE)
+        self.assertLessEqual({f"esim-{name}" for name in commands}, self.pages[SITE / "reference/commands.html"].anchors)
+
     def test_nothing_is_loaded_from_another_host(self):
         loaded = {link for page in self.pages.values() for link in page.loaded}
         for sheet in SITE.rglob("*.css"):

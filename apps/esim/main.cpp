@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
       "  esim check scenes/room.yaml                       check a scenario without writing anything\n"
       "  esim video clip.mp4 --out out/clip                events of a video, or of a folder of images\n"
       "  esim convert out/room room.bag                    other formats: esim convert --list\n"
-      "  esim filter events.raw -o clean.raw --trail        digital filters of event cameras, on any recording\n"
+      "  esim filter events.raw -o clean.raw --trail       digital filters of event cameras, on any recording\n"
       "  esim import room.blend --bake                     path-traced lighting for fast rendering, by Blender\n"
       "  esim info out/room                                the contents of a recording\n"
       "  esim play out/room                                a video of a recording or of an event file\n"

@@ -6,12 +6,10 @@
 #include "commands.h"
 #include "esim/characterise/characterisation_figure.h"
 #include "esim/core/error.h"
-#include "esim/core/parallel.h"
 #include "esim/files/output_file.h"
 #include "esim/preview/pictures.h"
-#include "esim/scenario/conversion.h"
-#include "esim/scenario/read.h"
 #include "progress_bar.h"
+#include "sensor_argument.h"
 #include "support.h"
 
 namespace esim::app {
@@ -22,23 +20,10 @@ namespace fs = std::filesystem;
 struct CharacteriseArguments {
   std::vector<std::string> sensors, overrides;
   CharacterisationOptions options;
-  int pixels = 24;
+  int pixels = 16;
   std::string out;
   bool json = false, force = false, quiet = false;
 };
-
-/// A preset by its name, or the event camera of the first camera of a scenario.
-EventCameraOptions sensor_of(const std::string& sensor, const std::vector<std::string>& overrides) {
-  std::vector<std::string> options;
-  if (!fs::exists(sensor)) {
-    options.push_back("preset=" + sensor);
-    options.insert(options.end(), overrides.begin(), overrides.end());
-    return read_event_camera(options);
-  }
-  for (const std::string& override : overrides) options.push_back("event_camera." + override);
-  const Scenario scenario = read_scenario(sensor, options);
-  return event_camera_of(scenario, scenario.cameras.front());
-}
 
 int run(CharacteriseArguments arguments) {
   if (!arguments.out.empty() && fs::exists(arguments.out) && !arguments.force)

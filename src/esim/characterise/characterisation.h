@@ -12,9 +12,9 @@ namespace esim::inline characterise {
 
 struct CharacterisationOptions {
   std::vector<double> lux{0.1, 1, 10, 100, 1000};  ///< illuminances of the sensor
-  int width = 24, height = 24;                     ///< pixels on the bench
-  int repeats = 10;                                ///< trials of each contrast
-  double noise_s = 10;                             ///< recording in constant light
+  int width = 16, height = 16;                     ///< pixels on the bench
+  int repeats = 8;                                 ///< trials of each contrast
+  double noise_s = 5;                              ///< recording in constant light
   int sensor_width = 346, sensor_height = 260;     ///< pixels of the peak rate
   std::uint64_t seed = 0;
   int threads = 1;  ///< that measure at the same time, as in Workers; the result does not depend on it

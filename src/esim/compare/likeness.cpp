@@ -72,8 +72,9 @@ Scatter scatter_of(std::vector<double> values) {
 
 double deviations(double distance, double deviation) {
   if (std::isnan(distance) || std::isnan(deviation)) return kNaN;
+  constexpr double kRounding = 1e-9;
   if (distance == 0) return 0;
-  return deviation > 0 ? std::abs(distance) / deviation : kInfinity;
+  return deviation > kRounding * std::abs(distance) ? std::abs(distance) / deviation : kInfinity;
 }
 
 bool has_parts(const std::vector<StreamSums>& blocks) {

@@ -46,7 +46,7 @@ EventCameraOptions v2e_options(const SensorFigures& figures) {
 EventCameraOptions by_circuit(double fa_per_lux, double dark_fa, double source_follower_hz) {
   EventCameraOptions o;
   o.leak_mismatch_decades = 0.3;
-  o.hot_pixels = 0.02;
+  o.hot_pixels = 0.0012;
   o.hot_pixel_rate_hz = 2;
   CircuitOptions& circuit = o.circuit.emplace();
   circuit.photocurrent_fa_per_lux = fa_per_lux;
@@ -74,12 +74,12 @@ EventCameraOptions davis240c_by_circuit() {
   o.threshold_mismatch = 0.02;
   o.circuit->threshold_mismatch_common = 0.07;
   o.refractory_period_us = 1450;
-  o.leak_rate_hz = 0.04;
-  o.leak_mismatch_decades = 0.7;
+  o.leak_rate_hz = 0.02;
   o.readout.rate_mev_per_s = 10;
   o.readout.row_time_us = 0.61;
   o.readout.row_scan_us = 0.003;
   o.readout.row_rest_us = 6;
+  o.readout.time_stamp_us = 1;
   return o;
 }
 
@@ -96,6 +96,7 @@ EventCameraOptions davis346_by_circuit() {
   o.readout.row_time_us = 0.08;
   o.readout.row_scan_us = 0.003;
   o.readout.row_rest_us = 6;
+  o.readout.time_stamp_us = 1;
   return o;
 }
 

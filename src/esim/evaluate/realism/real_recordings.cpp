@@ -1,0 +1,229 @@
+#include "esim/evaluate/realism/real_recordings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <span>
+
+#include "esim/core/error.h"
+#include "esim/files/codecs/image_codecs.h"
+#include "esim/files/input_file.h"
+#include "esim/files/npy_header.h"
+#include "esim/files/number_text.h"
+#include "esim/formats/events_file.h"
+
+namespace esim::inline evaluate {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kBlur_px = 0.4, kDarkest = 2.0 / 255;
+constexpr const char* kPositive = "noise_pos_";
+constexpr std::uint64_t kMostNumbers = 1U << 28;
+
+struct Array {
+  std::vector<std::uint64_t> shape;
+  std::vector<double> values;  // in C order
+};
+
+Array read_doubles(const fs::path& path) {
+  InputFile file(path);
+  const auto fail = [&](const std::string& problem) { throw UserError(path.string() + ": " + problem); };
+  const npy::Header header = npy::read_header([&](std::span<std::byte> out) { return file.read_into(out); }, fail);
+  if (header.descr.text != "<f8" || header.fortran_order) fail("must hold float64 in C order");
+  std::uint64_t count = 1;
+  for (const std::uint64_t size : header.shape) {
+    if (size == 0 || size > kMostNumbers / count) fail("its shape is not supported");
+    count *= size;
+  }
+  Array array{header.shape, std::vector<double>(count)};
+  if (file.read_into(std::as_writable_bytes(std::span(array.values))) != 8 * count)
+    fail("it ends before its last number");
+  return array;
+}
+
+/// Grey values from 0 to 1 of the sensor's part of a picture.
+Image<float> read_frame(const fs::path& path, int width, int height) {
+  ImagePixels pixels;
+  InputFile file(path);
+  if (!decode_image(file.read_exactly(file.size(), "the image"), pixels) || pixels.bits != 8)
+    throw UserError(path.string() + ": must be a PNG image of 8 bits");
+  const int top = pixels.height >= 2 * height ? height : 0;
+  if (pixels.width < width || pixels.height < height) {
+    throw UserError(fmt::format("{}: {} x {} px is less than the sensor of {} x {} px", path.string(), pixels.width,
+                                pixels.height, width, height));
+  }
+  Image<float> frame(width, height);
+  for (int y = 0; y < height; ++y) {
+    const std::uint8_t* const row = pixels.row(top + y);
+    for (int x = 0; x < width; ++x) {
+      const std::uint8_t* const p = row + static_cast<std::ptrdiff_t>(x) * pixels.channels;
+      const float grey = pixels.channels < 3 ? static_cast<float>(p[0])
+                                             : 0.299F * static_cast<float>(p[0]) + 0.587F * static_cast<float>(p[1]) +
+                                                   0.114F * static_cast<float>(p[2]);
+      frame(x, y) = grey / 255;
+    }
+  }
+  return frame;
+}
+
+/// A Gaussian filter; the border repeats.
+Image<float> blurred(const Image<float>& image, double deviation) {
+  const int reach = static_cast<int>(std::ceil(4 * deviation));
+  std::vector<double> weights;
+  double sum = 0;
+  for (int k = -reach; k <= reach; ++k) sum += weights.emplace_back(std::exp(-0.5 * k * k / (deviation * deviation)));
+  const auto filter = [&](const Image<float>& from, int dx, int dy) {
+    Image<float> to(from.width(), from.height());
+    for (int y = 0; y < from.height(); ++y) {
+      for (int x = 0; x < from.width(); ++x) {
+        double value = 0;
+        for (int k = -reach; k <= reach; ++k) {
+          const int u = std::clamp(x + k * dx, 0, from.width() - 1), v = std::clamp(y + k * dy, 0, from.height() - 1);
+          value += weights[static_cast<std::size_t>(k + reach)] * static_cast<double>(from(u, v));
+        }
+        to(x, y) = static_cast<float>(value / sum);
+      }
+    }
+    return to;
+  };
+  return filter(filter(image, 1, 0), 0, 1);
+}
+
+/// Catmull and Rom's cubic, whose third-order accuracy keeps moving textures free of steps; the border repeats.
+double cubic_value(const Image<float>& image, double x, double y) {
+  const double left = std::floor(x), top = std::floor(y);
+  const auto weights = [](double u) {
+    return std::array{((-0.5 * u + 1) * u - 0.5) * u, (1.5 * u - 2.5) * u * u + 1, ((-1.5 * u + 2) * u + 0.5) * u,
+                      (0.5 * u - 0.5) * u * u};
+  };
+  const auto wx = weights(x - left), wy = weights(y - top);
+  double sum = 0;
+  for (int j = 0; j < 4; ++j) {
+    const int v = std::clamp(static_cast<int>(top) + j - 1, 0, image.height() - 1);
+    for (int i = 0; i < 4; ++i) {
+      const int u = std::clamp(static_cast<int>(left) + i - 1, 0, image.width() - 1);
+      sum += wx[static_cast<std::size_t>(i)] * wy[static_cast<std::size_t>(j)] * static_cast<double>(image(u, v));
+    }
+  }
+  return sum;
+}
+
+RealNoise::Polarity read_polarity(const fs::path& path, RealNoise& noise) {
+  constexpr std::size_t kNumbers = 72, kRates = 71;
+  const Array array = read_doubles(path);
+  if (array.shape.size() != 3 || array.shape[2] != kNumbers || array.shape[0] > 4096 || array.shape[1] > 4096)
+    throw UserError(path.string() + ": its shape must be (rows, columns, 72)");
+  noise.height = static_cast<int>(array.shape[0]), noise.width = static_cast<int>(array.shape[1]);
+  RealNoise::Polarity polarity;
+  for (int decade = -3; decade <= 4; ++decade) {
+    for (int digit = 1; digit <= 9; ++digit) polarity.rates_hz.push_back(digit * std::pow(10.0, decade));
+  }
+  polarity.rates_hz.erase(polarity.rates_hz.begin());  // the number k counts the rates below the limit k + 1
+  std::vector<double> sums(kRates);
+  for (std::size_t i = 0; i < array.values.size(); i += kNumbers) {
+    polarity.counts.add(static_cast<std::uint64_t>(std::max(0.0, array.values[i + kRates - 1])));
+    for (std::size_t k = 0; k < kRates; ++k) sums[k] += array.values[i + k];
+  }
+  for (const double sum : sums) polarity.fraction.push_back(sums.back() > 0 ? sum / sums.back() : 0);
+  return polarity;
+}
+
+std::optional<fs::path> only_png(const fs::path& folder) {
+  std::optional<fs::path> found;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.path().extension() != ".png") continue;
+    if (found) throw UserError(folder.string() + ": must contain one PNG file only");
+    found = entry.path();
+  }
+  return found;
+}
+
+}  // namespace
+
+Image<float> RealClip::image_at(double s) const {
+  const double part = s / duration_s - 0.5;
+  Image<float> image(frame.width(), frame.height());
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      const double value = cubic_value(frame, x - part * static_cast<double>(flow_x(x, y)),
+                                       y - part * static_cast<double>(flow_y(x, y)));
+      image(x, y) = static_cast<float>(std::clamp(value, 0.0, 1.0));
+    }
+  }
+  return image;
+}
+
+RealClip read_real_clip(const fs::path& folder) {
+  RealClip clip;
+  clip.name = folder.filename().string();
+  const Array flow = read_doubles(folder / "flow.npy");
+  if (flow.shape.size() != 4 || flow.shape[0] != 1 || flow.shape[1] != 2 || flow.shape[2] > 4096 ||
+      flow.shape[3] > 4096)
+    throw UserError((folder / "flow.npy").string() + ": its shape must be (1, 2, height, width)");
+  const auto height = static_cast<int>(flow.shape[2]), width = static_cast<int>(flow.shape[3]);
+  clip.flow_x = Image<float>(width, height), clip.flow_y = Image<float>(width, height);
+  const std::size_t pixels = clip.flow_x.pixels().size();
+  for (std::size_t i = 0; i < pixels; ++i) {
+    clip.flow_x.pixels()[i] = static_cast<float>(flow.values[i]);
+    clip.flow_y.pixels()[i] = static_cast<float>(flow.values[pixels + i]);
+  }
+  const std::optional<fs::path> png = only_png(folder);
+  if (!png) throw UserError(folder.string() + ": contains no PNG file");
+  clip.frame = blurred(read_frame(*png, width, height), kBlur_px);
+  for (float& value : clip.frame.pixels()) value = std::clamp(value, static_cast<float>(kDarkest), 1.0F);
+  EventsFile file(folder / "events.txt", {SensorSize{width, height}, {}});
+  std::vector<Event> events;
+  while (file.read(events, std::size_t{1} << 20)) clip.events.insert(clip.events.end(), events.begin(), events.end());
+  if (clip.events.size() < 2 || clip.events.front().t == clip.events.back().t)
+    throw UserError((folder / "events.txt").string() + ": holds no span of time");
+  const TimeNs start = clip.events.front().t;
+  for (Event& event : clip.events) event.t -= start;
+  clip.duration_s = to_seconds(clip.events.back().t);
+  return clip;
+}
+
+RealNoise read_real_noise(const fs::path& positive) {
+  const std::string name = positive.stem().string();
+  RealNoise noise;
+  noise.name = name;
+  const std::size_t at = name.find(kPositive);
+  std::string_view level = name;
+  if (at == std::string::npos || !level.ends_with("lux") ||
+      !parse_number(level.substr(at + 10, level.size() - at - 13), noise.lux)) {
+    throw UserError(positive.string() + ": must be called noise_pos_NUMBERlux.npy");
+  }
+  noise.name.replace(at, 10, "noise_");
+  std::string other = positive.filename().string();
+  other.replace(at, 10, "noise_neg_");
+  noise.on = read_polarity(positive, noise);
+  noise.off = read_polarity(positive.parent_path() / other, noise);
+  return noise;
+}
+
+RealRecordings read_real_recordings(const fs::path& folder) {
+  if (!fs::is_directory(folder)) throw UserError(folder.string() + ": is not a folder");
+  std::vector<fs::path> folders{folder}, files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.is_directory()) folders.push_back(entry.path());
+    if (entry.path().extension() == ".npy" && entry.path().filename().string().find(kPositive) != std::string::npos)
+      files.push_back(entry.path());
+  }
+  std::sort(folders.begin(), folders.end()), std::sort(files.begin(), files.end());
+  RealRecordings recordings;
+  for (const fs::path& each : folders) {
+    if (fs::exists(each / "events.txt") && fs::exists(each / "flow.npy"))
+      recordings.clips.push_back(read_real_clip(each));
+  }
+  for (const fs::path& file : files) recordings.noise.push_back(read_real_noise(file));
+  if (recordings.clips.empty() && recordings.noise.empty()) {
+    throw UserError(folder.string() +
+                    ": contains neither folders with events.txt and flow.npy nor files noise_pos_NUMBERlux.npy");
+  }
+  return recordings;
+}
+
+}  // namespace esim::inline evaluate

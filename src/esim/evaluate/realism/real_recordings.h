@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "esim/core/image.h"
+#include "esim/events/event.h"
+#include "esim/stats/sensor/integer_histogram.h"
+
+// Private to evaluate.
+namespace esim::inline evaluate {
+
+/// A short recording of a real event camera that rotates, with what it saw: a frame, and how it moves.
+struct RealClip {
+  std::string name;
+  std::vector<Event> events;  ///< from time 0 on
+  double duration_s = 0;
+  Image<float> frame;           ///< linear intensity, 1 = white, at the middle of the recording
+  Image<float> flow_x, flow_y;  ///< displacement of each pixel during the recording, px
+
+  /// The frame displaced along the flow, at a time (from 0 to duration_s, or beyond).
+  Image<float> image_at(double s) const;
+};
+
+/// Reads `events.txt` (lines t x y p), `flow.npy` (1, 2, height, width; x, y; px, float64) and the only PNG file of a
+/// folder, of the sensor's size or with the frame below another one in its left column, as in the excerpts of the Event
+/// Camera Dataset at https://github.com/tub-rip/event_based_image_rec_inverse_problem. The frame is blurred by a
+/// Gaussian of 0.4 px, for its noise, and is at least 2/255. Throws UserError.
+RealClip read_real_clip(const std::filesystem::path& folder);
+
+/// Events of real pixels in constant light, for 10 s, as counts of intervals by rate: the files noise_pos_*lux.npy and
+/// noise_neg_*lux.npy of https://github.com/neuromorphicsystems/IEBCS.
+struct RealNoise {
+  static constexpr double kDuration_s = 10;
+
+  struct Polarity {
+    IntegerHistogram counts;                 ///< events of a pixel
+    std::vector<double> rates_hz, fraction;  ///< fraction of the intervals whose rate (1 / interval) is below
+  };
+  std::string name;
+  double lux = 0;
+  int width = 0, height = 0;
+  Polarity on, off;
+};
+
+/// `positive`: the path of the file of ON events. Throws UserError.
+RealNoise read_real_noise(const std::filesystem::path& positive);
+
+/// Both kinds of recordings in a folder and the folders in it, by name.
+struct RealRecordings {
+  std::vector<RealClip> clips;
+  std::vector<RealNoise> noise;
+};
+RealRecordings read_real_recordings(const std::filesystem::path& folder);
+
+}  // namespace esim::inline evaluate

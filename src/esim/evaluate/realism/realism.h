@@ -1,0 +1,64 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "esim/compare/likeness.h"
+#include "esim/event_camera/options.h"
+
+namespace esim::inline evaluate {
+
+/// A model of a sensor to compare with real recordings: an event camera, or another program.
+struct SensorModel {
+  std::string name;
+  EventCameraOptions options{};
+  /// If not empty, a command of the shell that makes the events: {frames} is a folder with 16-bit images of linear
+  /// intensity and images.csv (time in ns, file name), {events} the file to write: lines t x y p, or any other format.
+  std::string command{};
+};
+
+struct RealismOptions {
+  std::uint64_t seed = 1;
+  int threads = 1;
+  double frame_step_s = 2.5e-4;  ///< of the frames that move
+  double before_s = 0.03;        ///< motion before the clip, which does not count
+};
+
+/// A model against a clip of a real sensor.
+struct ClipResult {
+  std::string clip, model;
+  std::vector<ComparedStatistic> statistics;  ///< first: real; second: the model's
+  double seconds = 0;                         ///< that the model took
+
+  /// The sum over all statistics of the distance in standard deviations, at most kCap each.
+  static constexpr double kCap = 20;
+  double sum_of_deviations() const;
+};
+
+/// A model against a recording of real noise: Kolmogorov-Smirnov distances, NaN without events.
+struct NoiseResult {
+  std::string recording, model;
+  double lux = 0;
+  double real_on = 0, real_off = 0, on = 0, off = 0;  ///< mean events of a pixel
+  double ks_counts_on = 0, ks_counts_off = 0, ks_intervals_on = 0, ks_intervals_off = 0;
+};
+
+struct RealismEvaluation {
+  std::vector<ClipResult> clips;
+  std::vector<NoiseResult> noise;
+};
+
+/// Compares models with the real recordings in a folder (docs/methods/realism.md). Other programs are compared with
+/// clips only. `progress` gets the finished part, 0 to 1, and what is next; false ends the evaluation, which then
+/// returns what is finished. Throws UserError if the folder contains no recordings, or if a command fails.
+RealismEvaluation evaluate_realism(const std::filesystem::path& folder, const std::vector<SensorModel>& models,
+                                   const RealismOptions& options,
+                                   const std::function<bool(double, const std::string&)>& progress);
+
+/// Tables, and JSON in SI units with null for what is not defined.
+std::string describe(const RealismEvaluation& evaluation);
+std::string to_json(const RealismEvaluation& evaluation);
+
+}  // namespace esim::inline evaluate

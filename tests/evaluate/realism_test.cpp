@@ -1,0 +1,189 @@
+// Sensors against "real" recordings that are simulated here, so that the right answer is known.
+#include "esim/evaluate/realism/realism.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include "esim/core/error.h"
+#include "esim/core/parallel.h"
+#include "esim/evaluate/realism/real_recordings.h"
+#include "esim/event_camera/event_camera.h"
+#include "esim/files/codecs/image_codecs.h"
+#include "esim/files/npy_header.h"
+#include "support/errors.h"
+#include "support/temporary_directory.h"
+
+namespace esim {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kWidth = 64, kHeight = 48;
+
+void write_file(const fs::path& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
+
+std::string npy_of(const std::vector<std::uint64_t>& shape, const std::vector<double>& values) {
+  std::string bytes = npy::header_text("'<f8'", shape);
+  bytes.append(reinterpret_cast<const char*>(values.data()), 8 * values.size());
+  return bytes;
+}
+
+/// A clip of 50 ms in which a random texture moves by 6 px to the right and 3 px upwards, without events.
+void write_scene(const fs::path& folder) {
+  fs::create_directories(folder);
+  std::mt19937 random(1);
+  std::vector<std::uint8_t> grey(kWidth * kHeight);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x)
+      grey[static_cast<std::size_t>(y * kWidth + x)] =
+          static_cast<std::uint8_t>(120 + 80 * std::sin(0.5 * x + 0.2 * y) + static_cast<double>(random() % 40));
+  }
+  write_file(folder / "frame.png", encode_png({grey.data(), kWidth, kWidth, kHeight}, PngEffort::small));
+  std::vector<double> flow(2 * kWidth * kHeight, 6.0);
+  std::fill(flow.begin() + kWidth * kHeight, flow.end(), -3.0);
+  write_file(folder / "flow.npy", npy_of({1, 2, kHeight, kWidth}, flow));
+}
+
+EventCameraOptions usual_sensor() {
+  EventCameraOptions options;
+  options.contrast_threshold = 0.2;
+  options.threshold_mismatch = 0.02;
+  options.refractory_period_us = 300;
+  return options;
+}
+
+/// Records the clip's own scene with a sensor.
+void record(const fs::path& folder, const EventCameraOptions& options) {
+  write_file(folder / "events.txt", "10.0 0 0 1\n10.05 0 0 1\n");
+  const RealClip clip = read_real_clip(folder);
+  EventCamera camera(options, kWidth, kHeight, 77);
+  const Workers workers(1);
+  std::vector<Event> events;
+  for (int k = -20; k <= 200; ++k) {
+    camera.process(clip.image_at(k * 2.5e-4), to_ns(10 + k * 2.5e-4), events, workers);
+    if (k == 0) events.clear();
+  }
+  std::string text;
+  char line[80];
+  for (const Event& e : events) {
+    std::snprintf(line, sizeof line, "%.9f %d %d %d\n", to_seconds(e.t), e.x, e.y, e.polarity > 0 ? 1 : 0);
+    text += line;
+  }
+  write_file(folder / "events.txt", text);
+}
+
+TEST(Realism, TheFrameMovesAlongTheFlow) {
+  const test::TemporaryDirectory folder;
+  write_scene(folder.path());
+  write_file(folder.path() / "events.txt", "1.0 5 6 1\n1.1 5 6 0\n");
+  const RealClip clip = read_real_clip(folder.path());
+  EXPECT_DOUBLE_EQ(clip.duration_s, 0.1);
+  EXPECT_EQ(clip.events.front().t, 0);
+  const Image<float> middle = clip.image_at(0.05), end = clip.image_at(0.1), begin = clip.image_at(0);
+  for (int y = 8; y < kHeight - 8; ++y) {
+    for (int x = 8; x < kWidth - 8; ++x) {
+      EXPECT_EQ(middle(x, y), clip.frame(x, y));
+      // Half of (6, -3) px before and after the middle: whole pixels in x, half pixels in y.
+      EXPECT_NEAR(begin(x - 6, y + 3), end(x, y), 1e-6F);
+    }
+  }
+}
+
+TEST(Realism, TheSensorThatRecordedIsTheNearest) {
+  const test::TemporaryDirectory folder;
+  write_scene(folder.path() / "clip");
+  record(folder.path() / "clip", usual_sensor());
+  EventCameraOptions higher = usual_sensor(), slower = usual_sensor();
+  higher.contrast_threshold = 0.3;
+  slower.refractory_period_us = 3000;
+  const RealismEvaluation found = evaluate_realism(
+      folder.path(), {{"usual", usual_sensor(), {}}, {"higher", higher, {}}, {"slower", slower, {}}}, {}, {});
+  ASSERT_EQ(found.clips.size(), 3U);
+  EXPECT_LT(found.clips[0].sum_of_deviations(), 25);  // 20 statistics of equal sensors: 0.8 each
+  EXPECT_GT(found.clips[1].sum_of_deviations(), 2 * found.clips[0].sum_of_deviations());
+  EXPECT_GT(found.clips[2].sum_of_deviations(), 2 * found.clips[0].sum_of_deviations());
+  EXPECT_TRUE(distinguishing(found.clips[0].statistics).empty());
+  EXPECT_TRUE(test::contains(describe(found), "| sum of deviations"));
+  EXPECT_TRUE(test::contains(to_json(found), "\"model\": \"slower\""));
+}
+
+TEST(Realism, OtherProgramsGetTheFramesAndWriteEvents) {
+  const test::TemporaryDirectory folder;
+  write_scene(folder.path());
+  record(folder.path(), usual_sensor());
+  // This program writes the real events, 30 ms later: there, its frames begin.
+  const std::string script =
+      "test -f {frames}/00000.png && test -f {frames}/images.csv && awk '{print $1 - 10 + 0.03, "
+      "$2, $3, $4}' '" +
+      (folder.path() / "events.txt").string() + "' > {events}";
+  const RealismEvaluation found = evaluate_realism(folder.path(), {{"copy", {}, script}}, {}, {});
+  for (const ComparedStatistic& statistic : found.clips.at(0).statistics) {
+    if (statistic.name == "ON fraction" || statistic.name == "next event of the same polarity") {
+      EXPECT_NEAR(statistic.distance, 0, 0.01) << statistic.name;
+    }
+  }
+  const std::string problem = test::message_of<UserError>([&] {
+    evaluate_realism(folder.path(), {{"bad", {}, "exit 3"}}, {}, {});
+  });
+  EXPECT_TRUE(test::contains(problem, "the command of bad failed with status 3"));
+}
+
+TEST(Realism, NoiseIsComparedByRates) {
+  const test::TemporaryDirectory folder;
+  // 20 x 20 pixels; each has n ON events at 2 Hz with intervals of 1/2 s, and no OFF events.
+  std::vector<double> on(20 * 20 * 72), off(20 * 20 * 72);
+  for (std::size_t pixel = 0; pixel < 400; ++pixel) {
+    for (std::size_t k = 0; k < 71; ++k) on[pixel * 72 + k] = k >= 28 ? 19.0 : 0.0;  // below 3 Hz
+  }
+  write_file(folder.path() / "noise_pos_5lux.npy", npy_of({20, 20, 72}, on));
+  write_file(folder.path() / "noise_neg_5lux.npy", npy_of({20, 20, 72}, off));
+  const RealNoise noise = read_real_noise(folder.path() / "noise_pos_5lux.npy");
+  EXPECT_EQ(noise.lux, 5);
+  EXPECT_EQ(noise.on.counts.quantile(0.5), 19);
+  EXPECT_EQ(noise.off.counts.quantile(1), 0);
+  for (std::size_t k = 0; k < 71; ++k) EXPECT_EQ(noise.on.fraction[k], noise.on.rates_hz[k] > 2.5 ? 1.0 : 0.0) << k;
+
+  EventCameraOptions leaky;
+  leaky.leak_rate_hz = 2.2;
+  const RealismEvaluation found = evaluate_realism(folder.path(), {{"leaky", leaky, {}}}, {}, {});
+  ASSERT_EQ(found.noise.size(), 1U);
+  EXPECT_NEAR(found.noise[0].on, 22, 0.5);
+  EXPECT_EQ(found.noise[0].off, 0);
+  EXPECT_EQ(found.noise[0].ks_counts_off, 0);
+  EXPECT_EQ(found.noise[0].ks_counts_on, 1);     // 22 is not 19
+  EXPECT_EQ(found.noise[0].ks_intervals_on, 0);  // both between 2 and 3 Hz
+  EXPECT_TRUE(std::isnan(found.noise[0].ks_intervals_off));
+}
+
+TEST(Realism, RefusesWhatIsNoRecording) {
+  const test::TemporaryDirectory folder;
+  const auto refusal = [&] { return test::message_of<UserError>([&] { read_real_recordings(folder.path()); }); };
+  EXPECT_TRUE(test::contains(refusal(), "contains neither folders with events.txt"));
+  write_scene(folder.path());
+  write_file(folder.path() / "events.txt", "1.0 5 6 1\n");
+  EXPECT_TRUE(test::contains(refusal(), "holds no span of time"));
+  write_file(folder.path() / "events.txt", "1.0 5 6 1\n1.1 900 6 1\n");
+  EXPECT_NE(refusal(), "nothing was thrown");
+  write_file(folder.path() / "events.txt", "1.0 5 6 1\n1.1 5 6 1\n");
+  write_file(folder.path() / "flow.npy", npy_of({1, 2, kHeight, kWidth}, std::vector<double>(100)));
+  EXPECT_TRUE(test::contains(refusal(), "it ends before its last number"));
+  write_file(folder.path() / "flow.npy", npy_of({2, kHeight}, std::vector<double>(2 * kHeight)));
+  EXPECT_TRUE(test::contains(refusal(), "its shape must be (1, 2, height, width)"));
+  write_scene(folder.path());
+  fs::copy(folder.path() / "frame.png", folder.path() / "other.png");
+  EXPECT_TRUE(test::contains(refusal(), "must contain one PNG file only"));
+  fs::remove(folder.path() / "other.png");
+  write_file(folder.path() / "frame.png", "no image");
+  EXPECT_TRUE(test::contains(refusal(), "must be a PNG image of 8 bits"));
+  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { read_real_noise(folder.path() / "noise_pos_lux.npy"); }),
+                             "NUMBERlux"));
+}
+
+}  // namespace
+}  // namespace esim

@@ -24,6 +24,7 @@ void add_studio(CLI::App& app, int& exit_code);
 void add_evaluate(CLI::App& app, int& exit_code);
 void add_realism(CLI::App& evaluate, int& exit_code);
 void add_scenes(CLI::App& app, int& exit_code);
+void add_docs(CLI::App& app, int& exit_code);
 void add_options(CLI::App& app, int& exit_code);
 
 /// Adds the commands of earlier versions, which name their successors.

@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
       "  esim check scenes/room.yaml                       check a scenario without writing anything\n"
       "  esim video clip.mp4 --out out/clip                events of a video, or of a folder of images\n"
       "  esim convert out/room room.bag                    other formats: esim convert --list\n"
-      "  esim filter events.raw -o clean.raw --trail        digital filters of event cameras, on any recording\n"
+      "  esim filter events.raw -o clean.raw --trail       digital filters of event cameras, on any recording\n"
       "  esim import room.blend --bake                     path-traced lighting for fast rendering, by Blender\n"
       "  esim info out/room                                the contents of a recording\n"
       "  esim play out/room                                a video of a recording or of an event file\n"
@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
       "  esim studio scenes/room.yaml                      design, make and view recordings in a browser\n"
       "  esim evaluate sampling --out out/sampling         accuracy and cost of sampling methods\n"
       "  esim scenes --copy scenes                         a copy of the scenes that come with esim\n"
+      "  esim docs                                         where the documentation is\n"
       "  esim options                                      every option of a scenario\n"
       "\n"
       "Exit status: 0 success, 1 internal error, 2 error in the input or on this machine, 130 interrupted.");
@@ -46,6 +47,7 @@ int main(int argc, char** argv) {
   add_dataset(app, exit_code);
   add_evaluate(app, exit_code);
   add_scenes(app, exit_code);
+  add_docs(app, exit_code);
   add_options(app, exit_code);
   add_removed(app);
   try {

@@ -6,6 +6,7 @@ Run as: cli_test.py ESIM_PROGRAM SCENES_FOLDER, with the standard library of Pyt
 import json
 import os
 import pathlib
+import re
 import resource
 import shutil
 import signal
@@ -268,7 +269,10 @@ class Recordings(Cli):
         reference = (SCENES.parent / "docs" / "scenario.md").read_text()
         self.assertIn(run("options").stdout, reference, "docs/scenario.md is out of date: scripts/update-docs")
         self.assertIn("Examples", run("--help").stdout)
-        self.assertIn("Example", run("simulate", "--help").stdout)
+        commands = re.findall(r"^  (\w+) ", run("--help").stdout.split("Subcommands:\n")[1].split("\n\n")[0], re.MULTILINE)
+        self.assertIn("docs", commands)
+        for command in commands:
+            self.assertRegex(run(command, "--help").stdout, rf"Examples?:\n  esim .*\b{command}\b", command)
 
 
 @unittest.skipUnless(os.environ.get("ESIM_TEST_DATA") and os.path.isdir(os.environ["ESIM_TEST_DATA"]), "needs ESIM_TEST_DATA")

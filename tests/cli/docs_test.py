@@ -1,34 +1,27 @@
-"""The documentation as its readers meet it: its commands run, its scenarios are right, its options exist.
+"""The documentation as its readers meet it: its examples run, its options exist, its links lead somewhere.
 
-Run as: docs_test.py ESIM_PROGRAM PROJECT_FOLDER, with the standard library of Python alone. Of a page, blocks of `sh` are run one after
-the other in a folder that holds `scenes`, `clip.mp4` and a program `esim`, which simulates a short time and few pixels; blocks that begin
-with `# NAME.yaml` or `# NAME.txt` are files of that folder. What is not to be run is a block of `console`.
+Run as: docs_test.py ESIM_PROGRAM PROJECT_FOLDER [SITE [TEST ...]], with the standard library of Python alone. SITE is the folder of a site
+that scripts/docs has built. The blocks of Python are run by python/tests/test_docs.py. See pages.py.
 """
 
-import os
+import html.parser
 import pathlib
 import re
-import shlex
-import subprocess
 import sys
+import tempfile
 import unittest
+import urllib.parse
 
+from pages import NEVER_RUN, RUN, Examples, blocks, make_recording, pages
 from program import ESIM, ProgramTest, run
 
 PROJECT = pathlib.Path(sys.argv[2]).absolute()
-SMALL = "--set duration_s=0.1 --set camera.width=64 --set camera.height=48"
+sys.path.insert(0, str(PROJECT / "docs/site"))
+import hooks  # noqa: E402
+
+SITE = pathlib.Path(sys.argv[3]).absolute() if len(sys.argv) > 3 else None
 MIGRATING = ["docs/migrating.md", "docs/migrating-rpg-esim.md", "docs/migrating-video.md"]  # pages with tables of options
-WIDTH, HEIGHT, FRAMES, FPS = 64, 48, 31, 30
-
-
-def blocks(page):
-    """The fenced blocks of a page: language and text."""
-    return re.findall(r"^```(\w*)\n(.*?)^```$", (PROJECT / page).read_text(), re.MULTILINE | re.DOTALL)
-
-
-def file_of(block):
-    name = re.match(r"# ([\w-]+\.(?:yaml|txt))\b", block)
-    return name and name[1]
+INSTALL = "docs/install.md"  # scripts/wheel runs its commands, in bare systems
 
 
 def anchors(page):
@@ -44,58 +37,40 @@ def option_in(token):
     return (setting[1] or setting[3], setting[2] or setting[4]) if setting else (None, None)
 
 
-def video():
-    """A grey ramp that moves to the right, as uncompressed video."""
-    frames = []
-    for k in range(FRAMES):
-        luma = bytes((4 * (x - k)) % 200 + 20 for x in range(WIDTH)) * HEIGHT
-        frames.append(b"FRAME\n" + luma + bytes([128]) * (WIDTH * HEIGHT // 2))
-    return b"YUV4MPEG2 W%d H%d F%d:1 Ip A1:1 C420jpeg\n" % (WIDTH, HEIGHT, FPS) + b"".join(frames)
+class Blocks(ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        scratch = tempfile.TemporaryDirectory(prefix="esim_docs_")
+        cls.addClassCleanup(scratch.cleanup)
+        cls.recording = pathlib.Path(scratch.name, "recording")
+        make_recording(ESIM, cls.recording)
+
+    def test_what_does_not_run_says_why(self):
+        for page in pages():
+            for block in blocks(page):
+                if page != INSTALL and block.language in NEVER_RUN:
+                    self.assertTrue(block.reason, f"{page}:{block.line}: a block of {block.language} needs <!-- not run: REASON --> above it")
+                self.assertIn(block.language, RUN | NEVER_RUN | {"", "text", "bibtex", "yaml-options"}, f"{page}:{block.line}")
+
+    def test_the_files_that_getting_started_names_are_made(self):
+        page = "docs/getting-started.md"
+        Examples(page, ESIM, self.folder, self.recording).run()
+        for path in re.findall(r"`(out/[\w./]+\.\w+)`", (PROJECT / page).read_text()):
+            self.assertTrue((self.folder / path).exists(), f"{page} names {path}, which no command makes")
 
 
-class Pages(ProgramTest):
-    def setUp(self):
-        super().setUp()
-        (self.folder / "scenes").symlink_to(PROJECT / "scenes")
-        (self.folder / "clip.mp4").write_bytes(video())
-        program = self.folder / "bin" / "esim"
-        program.parent.mkdir()
-        program.write_text(f'#!/bin/sh\ncase "$1" in simulate) exec {shlex.quote(ESIM)} "$@" {SMALL} ;; esac\nexec {shlex.quote(ESIM)} "$@"\n')
-        program.chmod(0o755)
+def add_page(page):
+    """Adds the test of one page."""
 
-    def run_page(self, page):
-        found = blocks(page)
-        for _, text in found:
-            if file_of(text):
-                (self.folder / file_of(text)).write_text(text)
-        commands = [text for language, text in found if language == "sh"]
-        self.assertGreater(len(commands), 0)
-        path = f"{self.folder / 'bin'}:{os.environ['PATH']}"
-        for text in commands:
-            result = subprocess.run(["bash", "-euo", "pipefail", "-c", text], cwd=self.folder, env={**os.environ, "PATH": path},
-                                    capture_output=True, text=True, timeout=300)
-            self.assertEqual(result.returncode, 0, f"{page}:\n{text}\n{result.stderr}")
+    def test(self):
+        Examples(page, ESIM, self.folder, self.recording).run()
 
-    def test_getting_started(self):
-        self.run_page("docs/getting-started.md")
-        for path in re.findall(r"`(out/[\w./]+\.\w+)`", (PROJECT / "docs/getting-started.md").read_text()):
-            self.assertTrue((self.folder / path).exists(), f"docs/getting-started.md names {path}, which no command makes")
+    setattr(Blocks, f"test_{re.sub('[^a-z]', '_', page)}", test)
 
-    def test_migrating(self):
-        for page in ("docs/migrating.md", "docs/migrating-rpg-esim-examples.md", "docs/migrating-video.md"):
-            self.run_page(page)
 
-    def test_motion(self):
-        self.run_page("docs/motion.md")
-
-    def test_waypoints(self):
-        self.run_page("docs/waypoints.md")
-
-    def test_sampling(self):
-        self.run_page("docs/sampling.md")
-
-    def test_sensors(self):
-        self.run_page("docs/pixel.md")
+for name in pages():
+    if name != "docs/getting-started.md" and any(block.language in ("sh", "yaml") and not block.reason for block in blocks(name)):
+        add_page(name)
 
 
 class Options(unittest.TestCase):
@@ -123,8 +98,9 @@ class Options(unittest.TestCase):
 
 class Links(unittest.TestCase):
     def test_every_link_leads_somewhere(self):
-        for page in [*PROJECT.glob("*.md"), *(PROJECT / "docs").rglob("*.md")]:
-            for target, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([\w-]*))?\)", page.read_text()):
+        for page in [*PROJECT.glob("*.md"), *(PROJECT / "docs").rglob("*.md"), PROJECT / "studio/README.md"]:
+            text = re.sub(r"^```.*?^```$|`[^`\n]*`", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+            for target, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([^)\s]*))?\)", text):
                 if "://" not in target:
                     path = page.parent / target if target else page
                     self.assertTrue(path.exists(), f"{page.relative_to(PROJECT)} links to {target}")
@@ -136,5 +112,75 @@ class Links(unittest.TestCase):
         self.assertEqual({str(page.relative_to(PROJECT)) for page in (PROJECT / "docs").rglob("*.md")}, listed)
 
 
+class Navigation(unittest.TestCase):
+    """Of the site: docs/site/hooks.py."""
+
+    def test_it_has_every_page_that_the_readme_lists(self):
+        readme = (PROJECT / "README.md").read_text()
+        found = re.findall(r"[\w/-]+\.md", str(hooks.navigation(readme)))
+        self.assertLessEqual(set(re.findall(r"\]\((docs/[\w/-]+\.md)\)", readme)), set(found))
+        self.assertEqual(len(found), len(set(found)))
+
+    def test_every_option_has_an_anchor(self):
+        listing = run("options").stdout
+        table = hooks.option_tables(listing)
+        self.assertEqual(table.count("<tr"), len(listing.splitlines()))
+        for anchor in ("duration_s", "renderer.mesh.engine", "cameras.event_camera.contrast_threshold"):
+            self.assertIn(f'<tr id="{anchor}">', table)
+
+
+class Page(html.parser.HTMLParser):
+    """Of a page of the site: its anchors, its links, and what browsers load with it."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.anchors, self.links, self.loaded = {"", "__comments"}, set(), set()
+        self.feed(path.read_text())
+
+    def handle_starttag(self, tag, attributes):
+        attributes = dict(attributes)
+        self.anchors |= {attributes.get("id"), attributes.get("name")}
+        if tag in ("a", "area"):
+            self.links.add(attributes.get("href") or "")
+        self.loaded |= {attributes[name] for name in ("src", "poster", "data") if attributes.get(name)}
+        if tag == "link" and attributes.get("rel") not in ("canonical", "next", "prev"):
+            self.loaded.add(attributes.get("href") or "")
+
+
+@unittest.skipUnless(SITE, "needs a site: scripts/docs --check")
+class Site(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.pages = {path: Page(path) for path in SITE.rglob("*.html")}
+
+    def test_every_link_leads_somewhere(self):
+        wrong = set()
+        of_doxygen = "#nested-classes"  # its links to private classes, which it does not show
+        for path, page in self.pages.items():
+            for link in (page.links | page.loaded) - {of_doxygen}:
+                target = urllib.parse.urlsplit(link)
+                if target.scheme or target.netloc:
+                    continue
+                file = (path.parent / urllib.parse.unquote(target.path)).resolve() if target.path else path
+                anchor = urllib.parse.unquote(target.fragment)
+                if not file.exists() or (file in self.pages and anchor not in self.pages[file].anchors):
+                    wrong.add(f"{path.relative_to(SITE)} links to {link}")
+        self.assertEqual(sorted(wrong), [])
+
+    def test_the_references_have_every_command_and_every_python_name(self):
+        package = (PROJECT / "python/esim/__init__.py").read_text().split("__all__ = [")[1]
+        names = {f"esim.{name}" for name in re.findall(r'"(\w+)"', package)} - {"esim.__version__"}
+        self.assertLessEqual(names, self.pages[SITE / "reference/python.html"].anchors)
+        commands = re.findall(r"^  (\w+) ", run("--help").stdout.split("Subcommands:\n")[1].split("\n\n")[0], re.MULTILINE)
+        self.assertLessEqual({f"esim-{name}" for name in commands}, self.pages[SITE / "reference/commands.html"].anchors)
+
+    def test_nothing_is_loaded_from_another_host(self):
+        loaded = {link for page in self.pages.values() for link in page.loaded}
+        for sheet in SITE.rglob("*.css"):
+            loaded |= set(re.findall(r"""(?:@import\s*|url\()["']?([^"')]+)""", sheet.read_text()))
+        self.assertGreater(len(loaded), 10)
+        self.assertEqual({link for link in loaded if re.match(r"(https?:)?//", link)}, set())
+
+
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1], verbosity=1)
+    unittest.main(argv=[sys.argv[0], *sys.argv[4:]], verbosity=1)

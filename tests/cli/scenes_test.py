@@ -1,4 +1,4 @@
-"""`esim scenes`, from an installed program whose files are read-only.
+"""`esim scenes` and `esim docs`, from an installed program whose files are read-only.
 
 Run as: scenes_test.py ESIM_PROGRAM SCENES_FOLDER, with the standard library of Python alone.
 """
@@ -10,12 +10,12 @@ import subprocess
 import sys
 import unittest
 
-from program import ESIM, ProgramTest
+from program import ESIM, ProgramTest, run
 
 SCENES = pathlib.Path(sys.argv[2]).absolute()
 
 
-class Scenes(ProgramTest):
+class Installed(ProgramTest):
     def setUp(self):
         super().setUp()
         self.program = self.folder / "usr/bin/esim"
@@ -24,14 +24,20 @@ class Scenes(ProgramTest):
             os.link(ESIM, self.program)
         except OSError:
             shutil.copy(ESIM, self.program)
-        self.scenes = self.folder / "usr/share/esim/scenes"
+        self.share = self.folder / "usr/share/esim"
+
+    def esim(self, *arguments):
+        return subprocess.run([self.program, *arguments], capture_output=True, text=True, timeout=60, cwd=self.folder)
+
+
+class Scenes(Installed):
+    def setUp(self):
+        super().setUp()
+        self.scenes = self.share / "scenes"
         shutil.copytree(SCENES, self.scenes, ignore=shutil.ignore_patterns("*.blend", "room", "studio_room"))
         for path in (*self.scenes.rglob("*"), self.scenes):
             path.chmod(0o555 if path.is_dir() else 0o444)
         self.addCleanup(lambda: [path.chmod(0o755) for path in (self.scenes, *self.scenes.rglob("*")) if path.is_dir()])
-
-    def esim(self, *arguments):
-        return subprocess.run([self.program, *arguments], capture_output=True, text=True, timeout=60, cwd=self.folder)
 
     def test_they_are_listed_and_run(self):
         result = self.esim("scenes")
@@ -60,6 +66,25 @@ class Scenes(ProgramTest):
         shutil.move(self.program, elsewhere)
         self.program = elsewhere
         self.assert_refused(self.esim("scenes"), "elsewhere/share/esim/scenes", "missing")
+
+
+class Docs(Installed):
+    def test_the_site_is_preferred_to_the_pages(self):
+        pages, site = self.share / "docs", self.share / "site"
+        self.assert_refused(self.esim("docs"), str(pages), "missing", "install esim again")
+        pages.mkdir(parents=True)
+        (pages / "getting-started.md").touch()
+        self.assertEqual(self.esim("docs").stdout, f"{pages}\n")
+        site.mkdir()
+        (site / "index.html").touch()
+        result = self.esim("docs")
+        self.assertEqual((result.returncode, result.stdout), (0, f"{site}/index.html\n"))
+
+    def test_the_build_tree_has_the_documentation_of_the_sources(self):
+        result = run("docs")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        path = pathlib.Path(result.stdout.strip())
+        self.assertTrue((path.is_file() and path.name == "index.html") or (path / "getting-started.md").is_file(), path)
 
 
 if __name__ == "__main__":

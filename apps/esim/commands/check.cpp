@@ -46,6 +46,7 @@ void add_check(CLI::App& app, int& exit_code) {
 void add_options(CLI::App& app, int& exit_code) {
   CLI::App* command =
       app.add_subcommand("options", "Print every option of a scenario with default, unit, range and meaning");
+  command->footer("Example:\n  esim options | grep contrast_threshold");
   command->callback([&exit_code] {
     fmt::print("{}", scenario_reference());
     exit_code = kOk;

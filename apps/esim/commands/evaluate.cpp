@@ -197,6 +197,7 @@ void add_evaluate(CLI::App& app, int& exit_code) {
   CLI::App* command =
       app.add_subcommand("evaluate", "Measure the accuracy of a simulation, and how real its sensors are");
   command->require_subcommand(1);
+  command->footer("Example:\n  esim evaluate sampling scenes/room.yaml --out out/room --quick");
   add_sampling(*command, exit_code);
   add_realism(*command, exit_code);
 }

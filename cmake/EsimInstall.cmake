@@ -3,10 +3,10 @@ include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 get_property(targets GLOBAL PROPERTY ESIM_TARGETS)
-install(TARGETS esim_app RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS esim_app RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
 install(TARGETS ${targets} esim_build_flags EXPORT esimTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/esim DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
-esim_install_data(${CMAKE_INSTALL_DATADIR}/esim)
+esim_install_data(${CMAKE_INSTALL_DATADIR}/esim COMPONENT program)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/esim)
 install(EXPORT esimTargets NAMESPACE esim:: DESTINATION ${package_dir})

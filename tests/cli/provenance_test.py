@@ -121,6 +121,25 @@ imu: {calibration: imu.yaml}
         (files / "leaf.yaml").write_text("renderer: {type: sprites, scene: leaf.scene}\n")
         self.assertEqual(len(self.assert_lists_what_it_opens(files, files / "leaf.yaml")), 3)
 
+    def test_of_a_scene_that_blender_reads(self):
+        room = PROJECT / "scenes/studio_room"
+        blend, texture, cache = self.folder / "a.blend", self.folder / "wood.png", self.folder / "cache"
+        blend.write_bytes(b"BLENDER")
+        texture.write_bytes(PIXEL)
+        fake = self.folder / "blender"  # its last argument is the file to write
+        fake.write_text(f'#!/bin/bash\ncp {shlex.quote(str(room / "baked.glb"))} "${{@: -1}}"\n'
+                        f'echo "esim warning file {texture}"\necho "esim warning file /nowhere/stone.png"\n')
+        fake.chmod(0o755)
+        scenario = self.folder / "s.yaml"
+        scenario.write_text(f"renderer: {{type: mesh, scene: a.blend}}\ntrajectory: {{type: file, path: {room}/camera.txt}}\n"
+                            "camera: {width: 16, height: 12}\n")
+        for _ in range(2):  # exported, and from the cache
+            result = self.simulate(scenario, *settings(*SHORT), env={**os.environ, "ESIM_BLENDER": str(fake), "XDG_CACHE_HOME": str(cache)})
+            self.assertEqual(result.returncode, 0, result.stderr)
+            (exported,) = cache.rglob("*.glb")
+            self.assertEqual(self.inputs(), sums([scenario, blend, texture, exported, room / "camera.txt"]))
+            fake.write_text("#!/bin/sh\nexit 1\n")
+
     def test_of_a_trajectory_from_a_pipe(self):
         (self.folder / "s.yaml").write_text("renderer: {type: panorama, image: p.png}\ntrajectory: {type: file, path: pipe}\n"
                                             "camera: {width: 16, height: 12}\n")

@@ -18,6 +18,8 @@ void add_import(CLI::App& app, int& exit_code);
 void add_info(CLI::App& app, int& exit_code);
 void add_play(CLI::App& app, int& exit_code);
 void add_stats(CLI::App& app, int& exit_code);
+void add_compare(CLI::App& app, int& exit_code);
+void add_characterise(CLI::App& app, int& exit_code);
 void add_studio(CLI::App& app, int& exit_code);
 void add_evaluate(CLI::App& app, int& exit_code);
 void add_scenes(CLI::App& app, int& exit_code);

@@ -40,6 +40,8 @@ int main(int argc, char** argv) {
   add_info(app, exit_code);
   add_play(app, exit_code);
   add_stats(app, exit_code);
+  add_compare(app, exit_code);
+  add_characterise(app, exit_code);
   add_studio(app, exit_code);
   add_dataset(app, exit_code);
   add_evaluate(app, exit_code);

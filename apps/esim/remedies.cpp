@@ -24,6 +24,8 @@ Advice advice_on(Remedy remedy) {
       return {"--width", " with --width and --height"};
     case Remedy::shorter_video:
       return {"--slow-motion", " (--start, --duration, --slow-motion)"};
+    case Remedy::shift_times:
+      return {"--shift", "; shift the second one with --shift SECONDS"};
     case Remedy::none:
       break;
   }

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <random>
+#include <set>
 
 #include "esim/core/error.h"
 #include "stats/streams.h"
@@ -24,14 +26,6 @@ SensorStatistics statistics_of(const std::vector<Event>& events,
   for (std::size_t i = 0; i < events.size(); i += portion)
     counter.add(std::span(events).subspan(i, std::min(portion, events.size() - i)));
   return std::move(counter).finish();
-}
-
-double value_of(const SensorStatistics& statistics, std::string_view name) {
-  for (const NamedValue& value : values_of(statistics)) {
-    if (value.name == name) return value.value;
-  }
-  ADD_FAILURE() << name;
-  return 0;
 }
 
 std::vector<Event> poisson_events(double rate_hz, double duration_s, unsigned seed) {
@@ -53,18 +47,18 @@ TEST(SensorStatistics, OfPoissonEventsAreThoseOfChance) {
   EXPECT_NEAR(s.same_us.column_over_chance(kWidth), 1, 0.03);
   EXPECT_NEAR(s.after.row_over_chance(kHeight), 1, 0.01);
   EXPECT_NEAR(s.after.column_over_chance(kWidth), 1, 0.01);
-  EXPECT_NEAR(s.fano[0], 1, 5 * std::sqrt(2 / 2e4));
-  EXPECT_NEAR(s.fano[1], 1, 5 * std::sqrt(2 / 2e3));
+  EXPECT_NEAR(s.fano[0].factor(), 1, 5 * std::sqrt(2 / 2e4));
+  EXPECT_NEAR(s.fano[1].factor(), 1, 5 * std::sqrt(2 / 2e3));
   // Exponential intervals: the quantile p is -mean ln(1 - p).
   const double mean_us = 1e6 * kPixels / kRate;
   for (const double p : {0.01, 0.1, 0.5, 0.9})
     EXPECT_NEAR(s.intervals_us.quantile(p) / (-mean_us * std::log1p(-p)), 1, 0.03) << p;
   EXPECT_NEAR(s.intervals_us.fraction_below(100), -std::expm1(-100 / mean_us), 0.001);
   // At 833 Hz, noise cannot be distinguished from motion; at 4 Hz it can.
-  EXPECT_EQ(s.quiet.pixels, 0U);
+  EXPECT_EQ(s.quiet.all.pixels, 0U);
   const SensorStatistics slow = statistics_of(poisson_events(4.0 * kPixels, 20, 3));
-  EXPECT_GT(static_cast<double>(slow.quiet.pixels), 0.9 * kPixels);
-  EXPECT_NEAR(slow.quiet.rate_hz / 4, 1, 0.03);
+  EXPECT_GT(static_cast<double>(slow.quiet.all.pixels), 0.9 * kPixels);
+  EXPECT_NEAR(slow.quiet.rate_hz() / 4, 1, 0.03);
   EXPECT_FALSE(s.scan);
 }
 
@@ -107,7 +101,7 @@ TEST(SensorStatistics, EqualDefinitionsByBruteForce) {
   EXPECT_DOUBLE_EQ(s.same_us.row_over_chance(5), same_row / same * 5);
   EXPECT_DOUBLE_EQ(s.same_us.column_over_chance(7), same_column / same * 7);
   EXPECT_DOUBLE_EQ(s.after.row_over_chance(5), after_row / after * 5);
-  EXPECT_NEAR(s.fano[0], variance / mean, 1e-9);
+  EXPECT_NEAR(s.fano[0].factor(), variance / mean, 1e-9);
   EXPECT_DOUBLE_EQ(s.alike_fraction(), alike / static_cast<double>(intervals.size()));
   for (const double p : {0.0, 0.01, 0.1, 0.5, 1.0}) {
     const double place = p * static_cast<double>(intervals.size() - 1);
@@ -138,14 +132,12 @@ TEST(SensorStatistics, OfHardlyAnyEventsAreUndefined) {
     const SensorStatistics s = statistics_of(events);
     EXPECT_EQ(s.events, events.size());
     for (const NamedValue& value : values_of(s)) {
-      const bool defined = value.name == "events" || (value.name == "ON fraction" && !events.empty());
+      const bool of_one = value.name == "ON fraction" || value.name == "events per time stamp" ||
+                          value.name == "correlation of neighbouring pixels";
+      const bool defined = of_one && !events.empty();
       EXPECT_EQ(std::isnan(value.value), !defined) << value.name;
     }
-    const SensorComparison comparison = compare(s, s);
-    EXPECT_TRUE(std::isnan(comparison.ks_intervals));
-    EXPECT_EQ(comparison.ks_counts_on, 0);
   }
-  EXPECT_TRUE(values_of(statistics_of({}, std::nullopt)).front().value == 0);
 }
 
 TEST(SensorStatistics, OfOnePixelAreThoseOfThatPixel) {
@@ -156,10 +148,10 @@ TEST(SensorStatistics, OfOnePixelAreThoseOfThatPixel) {
   EXPECT_EQ(s.intervals_us.quantile(0.5), 50);
   EXPECT_EQ(s.intervals_us.fraction_below(100), 1);
   EXPECT_EQ(s.intervals_us.fraction_below(50), 0);
-  EXPECT_EQ(s.fano[0], 0);
+  EXPECT_EQ(s.fano[0].factor(), 0);
   EXPECT_TRUE(std::isnan(s.same_us.row_over_chance(kHeight)));
   EXPECT_EQ(s.counts_on.bins()[0], kWidth * kHeight - 1U);
-  EXPECT_NEAR(s.quiet.rate_hz, 10'001 / 0.5 / (kWidth * kHeight), 1e-6);
+  EXPECT_NEAR(s.quiet.rate_hz(), 10'001 / 0.5 / (kWidth * kHeight), 1e-6);
 }
 
 TEST(SensorStatistics, RefuseEventsOutOfOrderOrOutsideTheSensor) {
@@ -192,8 +184,8 @@ TEST(SensorStatistics, FindTheNoiseBesideMotion) {
   }
   std::sort(events.begin(), events.end());
   const SensorStatistics s = statistics_of(events);
-  EXPECT_EQ(s.quiet.pixels, 16U * kHeight);  // without the blocks next to the motion
-  EXPECT_NEAR(s.quiet.rate_hz, 2, 5 * std::sqrt(2 / (16.0 * kHeight * kDuration)));
+  EXPECT_EQ(s.quiet.all.pixels, 16U * kHeight);  // without the blocks next to the motion
+  EXPECT_NEAR(s.quiet.rate_hz(), 2, 5 * std::sqrt(2 / (16.0 * kHeight * kDuration)));
 }
 
 TEST(SensorStatistics, FindScansAndTheirPhases) {
@@ -222,28 +214,57 @@ TEST(SensorStatistics, FindScansAndTheirPhases) {
   }
 }
 
-TEST(SensorStatistics, CompareTwoStreams) {
-  const SensorStatistics slow = statistics_of(poisson_events(1e5, 1, 1)),
-                         fast = statistics_of(poisson_events(2e5, 1, 3));
-  const SensorComparison comparison = compare(slow, fast);
-  for (const ComparedValue& value : comparison.values) {
-    if (value.name == "events") {
-      EXPECT_NEAR(value.ratio(), 2, 0.03);
-    }
-    if (value.name == "50 % of the intervals") {
-      EXPECT_NEAR(value.ratio(), 0.5, 0.01);
-    }
-    if (value.name == "ON fraction") {
-      EXPECT_NEAR(value.difference(), 0, 0.01);
-    }
-    if (!std::isnan(value.first)) {
-      EXPECT_EQ(value.first, value_of(slow, value.name)) << value.name;
+TEST(SensorStatistics, AreTheSumsOfBlocksAndOfTiles) {
+  const std::vector<Event> events = poisson_events(1e5, 3, 11);
+  const SensorStatistics s = statistics_of(events);
+  EXPECT_EQ(s.block_s, 0.128);  // the smallest power of 2 ms of which at most 32 are needed
+  ASSERT_EQ(s.blocks.size(), 24U);
+  std::vector<std::uint64_t> expected(24);
+  for (const Event& event : events) ++expected[static_cast<std::size_t>((event.t - events[0].t + 500) / 128'000'000)];
+  StreamSums sums;
+  for (std::size_t i = 0; i < s.blocks.size(); ++i) {
+    EXPECT_EQ(s.blocks[i].events, expected[i]) << i;
+    sums.add(s.blocks[i]);
+  }
+  EXPECT_EQ(sums.events, events.size());
+  EXPECT_EQ(sums.intervals_us.quantile(0.3), s.intervals_us.quantile(0.3));
+  EXPECT_EQ(sums.pairs, s.pairs);
+  ASSERT_EQ(s.tiles.size(), 64U);
+  PixelSums pixels;
+  for (const PixelSums& tile : s.tiles) pixels.add(tile);
+  EXPECT_EQ(pixels.counts_on.total(), static_cast<std::uint64_t>(kWidth * kHeight));
+  EXPECT_EQ(ks_distance(pixels.counts_off, s.counts_off), 0);
+}
+
+TEST(SensorStatistics, KnowTimeStampsAndNeighbours) {
+  std::vector<Event> events;
+  for (int i = 0; i < 1000; ++i) {
+    const int x = i * 7 % kWidth;
+    for (int k = 0; k < x; ++k) events.push_back(event_at(6 * i + 4 * (k % 2), x, i % kHeight, 1));
+  }
+  std::sort(events.begin(), events.end());
+  const SensorStatistics s = statistics_of(events);
+  EXPECT_EQ(s.stamp_unit, 2 * kNsPerUs);
+  std::set<TimeNs> stamps;
+  std::map<std::pair<int, int>, double> counts;
+  for (const Event& event : events) stamps.insert(event.t), ++counts[{event.x, event.y}];
+  EXPECT_EQ(s.stamps, stamps.size());
+  std::vector<double> a, b;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      if (x + 1 < kWidth) a.push_back(counts[{x, y}]), b.push_back(counts[{x + 1, y}]);
+      if (y + 1 < kHeight) a.push_back(counts[{x, y}]), b.push_back(counts[{x, y + 1}]);
     }
   }
-  // exp(-x) - exp(-2 x) is at most 1/4.
-  EXPECT_NEAR(comparison.ks_intervals, 0.25, 0.02);
-  EXPECT_GT(comparison.ks_counts_on, 0.9);
-  EXPECT_EQ(compare(slow, slow).ks_intervals, 0);
+  const auto mean = [](const std::vector<double>& v) {
+    return std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size());
+  };
+  double ab = 0, aa = 0, bb = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double da = a[i] - mean(a), db = b[i] - mean(b);
+    ab += da * db, aa += da * da, bb += db * db;
+  }
+  EXPECT_NEAR(s.neighbours.value(), ab / std::sqrt(aa * bb), 1e-9);
 }
 
 TEST(IntegerHistogram, HasQuantilesOfValuesOfAnySize) {

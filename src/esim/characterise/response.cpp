@@ -1,5 +1,7 @@
 #include "esim/characterise/response.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -7,11 +9,14 @@
 #include <numbers>
 
 #include "esim/characterise/minimise.h"
+#include "esim/core/error.h"
 
 namespace esim::inline characterise {
 namespace {
 
 using Complex = std::complex<double>;
+
+constexpr double kLargestAmplitude = 5;  // ln
 
 double bandwidth_of(double t1_s, double t2_s) {
   double low = 0, high = 1 / (t1_s + t2_s);
@@ -117,7 +122,13 @@ Bandwidth measure_bandwidth(const SensorUnderTest& sensor, const TrialProtocol& 
       sines.contrasts.clear();
       for (int i = -4; i <= 4; ++i) sines.contrasts.push_back(sign * guess * std::pow(reach, 0.25 * i));
       fit = fit_cumulative_normal(measure(sensor, sines));
-      guess = fit.centre;
+      guess = std::abs(fit.centre);
+      if (!(guess > 0 && guess < kLargestAmplitude)) {
+        throw UserError(
+            fmt::format("no amplitude of sinusoids of {:.3g} Hz makes half of the pixels respond; noise is too near to "
+                        "the threshold",
+                        frequency_hz));
+      }
     }
     result.points.push_back({frequency_hz, guess});
   }

@@ -47,7 +47,7 @@ CumulativeNormal fit_cumulative_normal(const TrialCounts& counts);
 /// constants t1 >= t2 at `lux` that explain it: amplitude = threshold / gain, corrected for the photodiode's
 /// second-order response (a rise is faster than a fall). `steps`: a protocol of steps at this light, whose sign of the
 /// contrasts, reset and repeats are used. The signal's noise must be small compared with the threshold, and the
-/// polarity must be that with the lower threshold.
+/// polarity must be that with the lower threshold. Throws UserError if no amplitude fires half of the pixels.
 struct Bandwidth {
   std::vector<AmplitudePoint> points;
   double t1_s = 0, t2_s = 0;

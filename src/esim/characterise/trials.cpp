@@ -46,8 +46,8 @@ std::vector<Trial> run_trials(const TrialProtocol& protocol, Light& light) {
       if (protocol.frequency_hz > 0) {
         add_sinusoid(protocol, protocol.contrasts[k], light);
       } else {
-        light.step_to(protocol.lux * std::exp(protocol.contrasts[k]));
-        light.keep(protocol.window_s);
+        light.move_to(protocol.lux * std::exp(protocol.contrasts[k]), protocol.change_s);
+        light.keep(protocol.window_s - protocol.change_s);
       }
       trial.end = now();
       light.step_to(protocol.lux);

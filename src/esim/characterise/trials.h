@@ -23,6 +23,7 @@ struct TrialProtocol {
 
   double pulse_contrast = 3, pulse_s = 0;  ///< ln
   double settle_s = 0;                     ///< longer than the refractory period
+  double change_s = 1e-6;                  ///< how long a step takes: longer for a ramp; part of the window
   double window_s = 0;                     ///< of a step; that of a sinusoid is kSinePeriods periods
 
   /// A sinusoid swells during its first periods, so that its onset causes no response.

@@ -27,6 +27,7 @@ enum class Purpose : std::uint16_t {
   circuit_noise = 24,
   circuit_mismatch = 25,
   circuit_start = 26,
+  resampling = 27,
   test = 1000,
 };
 

@@ -17,6 +17,7 @@ enum class Remedy {
   nanoseconds,      ///< write event times in nanoseconds
   sensor_size,      ///< state the size of the sensor
   shorter_video,    ///< show a part of the recording, or play it faster
+  shift_times,      ///< shift the times of a recording
 };
 
 /// A UserError with a remedy. The message itself names neither a flag nor an argument.

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "esim/compare/event_matching.h"
 #include "esim/compose/compose.h"
 #include "esim/evaluate/brightness_errors.h"
-#include "esim/evaluate/event_comparison.h"
 #include "esim/evaluate/windows.h"
 
 namespace esim::inline evaluate {

@@ -14,6 +14,10 @@ class Coincidences {
  public:
   struct Pairs {
     std::uint64_t all = 0, same_row = 0, same_column = 0;
+
+    void add(const Pairs& other, std::uint64_t times = 1) {
+      all += times * other.all, same_row += times * other.same_row, same_column += times * other.same_column;
+    }
     double row_over_chance(int height) const { return over_chance(same_row, height); }
     double column_over_chance(int width) const { return over_chance(same_column, width); }
 
@@ -24,22 +28,20 @@ class Coincidences {
     }
   };
 
-  /// In order of time, us.
-  void add(std::int64_t t_us, std::uint16_t x, std::uint16_t y) {
+  /// In order of time, us. The pairs of this event with earlier ones are added to `same_us` if they have the same time
+  /// stamp in us, and to `after` if they are 1 to 5 us apart.
+  void add(std::int64_t t_us, std::uint16_t x, std::uint16_t y, Pairs& same_us, Pairs& after) {
     for (std::size_t back = 1; back <= kReach && back <= added_; ++back) {
       const Place& before = last_[(added_ - back) % kRing];
       const std::int64_t gap = t_us - before.t_us;
       if (gap > kAfter_us) break;
-      Pairs& pairs = gap == 0 ? same_us_ : after_;
+      Pairs& pairs = gap == 0 ? same_us : after;
       ++pairs.all;
       pairs.same_row += before.y == y;
       pairs.same_column += before.x == x;
     }
     last_[added_++ % kRing] = {t_us, x, y};
   }
-
-  const Pairs& same_us() const { return same_us_; }  ///< with the same time stamp in us
-  const Pairs& after() const { return after_; }      ///< 1 to 5 us later
 
  private:
   static constexpr std::size_t kReach = 199, kRing = 256;
@@ -50,7 +52,6 @@ class Coincidences {
   };
   std::array<Place, kRing> last_{};
   std::size_t added_ = 0;
-  Pairs same_us_, after_;
 };
 
 }  // namespace esim::inline stats

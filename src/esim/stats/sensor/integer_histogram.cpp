@@ -12,6 +12,12 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
+void IntegerHistogram::add(const IntegerHistogram& other, std::uint64_t times) {
+  if (other.counts_.size() > counts_.size()) counts_.resize(other.counts_.size());
+  for (std::size_t i = 0; i < other.counts_.size(); ++i) counts_[i] += times * other.counts_[i];
+  total_ += times * other.total_;
+}
+
 std::uint64_t IntegerHistogram::edge(std::size_t bin) {
   if (bin < kExact) return bin;
   const std::size_t shift = (bin >> kBits) - 1;

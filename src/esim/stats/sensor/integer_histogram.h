@@ -18,6 +18,9 @@ class IntegerHistogram {
     ++total_;
   }
 
+  /// Adds each value of another histogram `times` times.
+  void add(const IntegerHistogram& other, std::uint64_t times = 1);
+
   std::uint64_t total() const { return total_; }
 
   /// Fraction of values below `limit` <= 2048; NaN without values.

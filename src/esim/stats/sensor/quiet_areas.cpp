@@ -25,6 +25,7 @@ bool moves(const BlockCounts& block, int pixels, double duration_s) {
 
 QuietAreas find_quiet_areas(const Image<BlockCounts>& blocks, int width, int height, double duration_s) {
   QuietAreas quiet;
+  quiet.duration_s = duration_s;
   if (!(duration_s > 0)) return quiet;
   Image<std::uint8_t> moving(blocks.width(), blocks.height());
   for (int v = 0; v < blocks.height(); ++v) {
@@ -38,12 +39,12 @@ QuietAreas find_quiet_areas(const Image<BlockCounts>& blocks, int width, int hei
         for (int i = std::max(0, u - 1); i <= std::min(blocks.width() - 1, u + 1); ++i) near |= moving(i, j) != 0;
       }
       if (near) continue;
-      quiet.pixels += static_cast<std::uint64_t>(extent(u, width)) * static_cast<std::uint64_t>(extent(v, height));
-      quiet.events += blocks(u, v).events;
+      const int pixels = extent(u, width) * extent(v, height);
+      quiet.blocks.push_back({static_cast<std::uint64_t>(pixels), blocks(u, v).events});
+      quiet.all.pixels += quiet.blocks.back().pixels;
+      quiet.all.events += quiet.blocks.back().events;
     }
   }
-  if (quiet.pixels > 0)
-    quiet.rate_hz = static_cast<double>(quiet.events) / (static_cast<double>(quiet.pixels) * duration_s);
   return quiet;
 }
 

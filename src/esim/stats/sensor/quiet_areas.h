@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include "esim/core/image.h"
 #include "esim/core/time.h"
@@ -20,8 +21,18 @@ inline constexpr TimeNs kSupport = 5 * kNsPerMs;
 
 /// The part of a sensor without motion, which shows the noise of its pixels.
 struct QuietAreas {
-  std::uint64_t pixels = 0, events = 0;
-  double rate_hz = std::numeric_limits<double>::quiet_NaN();  ///< of a pixel; NaN without quiet pixels
+  struct Block {
+    std::uint64_t pixels = 0, events = 0;
+  };
+  std::vector<Block> blocks;
+  Block all;
+  double duration_s = 0;
+
+  /// Of a pixel; NaN without quiet pixels.
+  double rate_hz() const {
+    if (all.pixels == 0) return std::numeric_limits<double>::quiet_NaN();
+    return static_cast<double>(all.events) / (static_cast<double>(all.pixels) * duration_s);
+  }
 };
 
 /// Motion crosses neighbouring pixels within a short time, and noise does not. In a block with n events of a pixels in

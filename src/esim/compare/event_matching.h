@@ -6,7 +6,7 @@
 
 #include "esim/events/event.h"
 
-namespace esim::inline evaluate {
+namespace esim::inline compare {
 
 /// An event of one pixel.
 struct PixelEvent {
@@ -66,4 +66,4 @@ struct EventComparison {
 /// Both streams must come from the same sensor and time span, and from equal initial states.
 EventComparison compare_events(const EventsByPixel& reference, const EventsByPixel& events);
 
-}  // namespace esim::inline evaluate
+}  // namespace esim::inline compare

@@ -1,10 +1,10 @@
-#include "esim/evaluate/event_comparison.h"
+#include "esim/compare/event_matching.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-namespace esim::inline evaluate {
+namespace esim::inline compare {
 namespace {
 
 enum class Step : std::uint8_t { pair, missing, spurious };
@@ -35,28 +35,43 @@ EventMatch match_events(std::span<const PixelEvent> reference, std::span<const P
     for (std::size_t i = 0; i < reference.size(); ++i) pair(i, i);
     return match;
   }
-  // cost[i][j]: minimum cost of the first i and j events; step[i][j]: the last step of that solution.
-  const std::size_t rows = reference.size() + 1, columns = events.size() + 1;
-  std::vector<TimeNs> cost(rows * columns);
-  std::vector<Step> step(rows * columns);
+  // A state (i, j) means that the first i and j events have their counterparts or none; its cost is the lowest. Events
+  // further apart than `reach` are never a pair, so that of row i only the columns from first[i] to last[i] are needed.
+  constexpr TimeNs reach = 2 * kUnmatchedCost;
+  const std::size_t rows = reference.size() + 1;
+  std::vector<std::size_t> first(rows), last(rows, events.size()), begin(rows + 1);
+  const auto before = [&](TimeNs t) {  // number of events before t
+    const auto end =
+        std::partition_point(events.begin(), events.end(), [t](const PixelEvent& event) { return event.t < t; });
+    return static_cast<std::size_t>(end - events.begin());
+  };
   for (std::size_t i = 0; i < rows; ++i) {
-    for (std::size_t j = 0; j < columns; ++j) {
-      TimeNs& best = cost[i * columns + j];
-      if (i + j == 0) continue;
-      best = std::numeric_limits<TimeNs>::max();
+    if (i > 0) first[i] = before(reference[i - 1].t - reach);
+    if (i + 1 < rows) last[i] = before(reference[i].t + reach + 1);
+    begin[i + 1] = begin[i] + last[i] - first[i] + 1;
+  }
+  std::vector<Step> step(begin[rows]);  // the last step to each state
+  std::vector<TimeNs> cost, above;      // of row i, and of the row before
+  for (std::size_t i = 0; i < rows; ++i) {
+    above.swap(cost);
+    cost.assign(last[i] - first[i] + 1, std::numeric_limits<TimeNs>::max());
+    const auto is_above = [&](std::size_t j) { return i > 0 && j >= first[i - 1] && j <= last[i - 1]; };
+    if (i == 0) cost[0] = 0;
+    for (std::size_t j = first[i]; j <= last[i]; ++j) {
+      TimeNs& best = cost[j - first[i]];
       const auto consider = [&](TimeNs total, Step way) {
         if (total >= best) return;
         best = total;
-        step[i * columns + j] = way;
+        step[begin[i] + j - first[i]] = way;
       };
-      if (i > 0 && j > 0 && reference[i - 1].polarity == events[j - 1].polarity)
-        consider(cost[(i - 1) * columns + j - 1] + std::abs(events[j - 1].t - reference[i - 1].t), Step::pair);
-      if (i > 0) consider(cost[(i - 1) * columns + j] + kUnmatchedCost, Step::missing);
-      if (j > 0) consider(cost[i * columns + j - 1] + kUnmatchedCost, Step::spurious);
+      if (j > 0 && is_above(j - 1) && reference[i - 1].polarity == events[j - 1].polarity)
+        consider(above[j - 1 - first[i - 1]] + std::abs(events[j - 1].t - reference[i - 1].t), Step::pair);
+      if (is_above(j)) consider(above[j - first[i - 1]] + kUnmatchedCost, Step::missing);
+      if (j > first[i]) consider(cost[j - 1 - first[i]] + kUnmatchedCost, Step::spurious);
     }
   }
-  for (std::size_t i = rows - 1, j = columns - 1; i + j > 0;) {
-    switch (step[i * columns + j]) {
+  for (std::size_t i = rows - 1, j = events.size(); i + j > 0;) {
+    switch (step[begin[i] + j - first[i]]) {
       case Step::pair:
         pair(--i, --j);
         break;
@@ -95,4 +110,4 @@ EventComparison compare_events(const EventsByPixel& reference, const EventsByPix
   return all;
 }
 
-}  // namespace esim::inline evaluate
+}  // namespace esim::inline compare

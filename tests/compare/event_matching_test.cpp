@@ -1,9 +1,12 @@
-#include "esim/evaluate/event_comparison.h"
+#include "esim/compare/event_matching.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <map>
+#include <random>
 
 namespace esim {
 namespace {
@@ -62,6 +65,52 @@ TEST(EventMatching, LeavesEventsAloneThatAreTooFarApart) {
   const EventMatch found = match({1}, {21.1, 30});
   EXPECT_EQ(found.missing, 1);
   EXPECT_EQ(found.spurious, 2);
+}
+
+TEST(EventMatching, HasTheLowestCostOfAllPairings) {
+  std::mt19937 random(3);
+  for (int trial = 0; trial < 300; ++trial) {
+    const double duration_ms = trial % 3 == 0 ? 10 : trial % 3 == 1 ? 60 : 300;
+    const auto draw = [&] {
+      std::vector<PixelEvent> drawn;
+      for (auto i = random() % 12; i > 0; --i) {
+        const double t = duration_ms * 1e-3 * static_cast<double>(random()) / 4294967296.0;
+        drawn.push_back({to_ns(t), static_cast<std::int8_t>(random() % 2 == 0 ? 1 : -1)});
+      }
+      std::sort(drawn.begin(), drawn.end(), [](const PixelEvent& a, const PixelEvent& b) { return a.t < b.t; });
+      return drawn;
+    };
+    const std::vector<PixelEvent> a = draw(), b = draw();
+    const EventMatch found = match_events(a, b);
+    if (found.identical) continue;
+    std::map<std::pair<std::size_t, std::size_t>, double> known;
+    const std::function<double(std::size_t, std::size_t)> lowest = [&](std::size_t i, std::size_t j) {
+      const auto [at, is_new] = known.try_emplace({i, j}, 1e9);
+      if (!is_new) return at->second;
+      double best = static_cast<double>(i + j) * 10e-3;
+      if (i > 0) best = std::min(best, lowest(i - 1, j) + 10e-3);
+      if (j > 0) best = std::min(best, lowest(i, j - 1) + 10e-3);
+      if (i > 0 && j > 0 && a[i - 1].polarity == b[j - 1].polarity)
+        best = std::min(best, lowest(i - 1, j - 1) + std::abs(to_seconds(a[i - 1].t - b[j - 1].t)));
+      return known[{i, j}] = best;
+    };
+    double cost = static_cast<double>(found.missing + found.spurious) * 10e-3;
+    for (const double difference_s : found.differences_s) cost += std::abs(difference_s);
+    EXPECT_NEAR(cost, lowest(a.size(), b.size()), 1e-9) << trial;
+    EXPECT_EQ(a.size() - found.differences_s.size(), static_cast<std::size_t>(found.missing));
+    EXPECT_EQ(b.size() - found.differences_s.size(), static_cast<std::size_t>(found.spurious));
+  }
+}
+
+TEST(EventMatching, OfHotPixelsNeedsLittleMemory) {
+  std::vector<PixelEvent> a, b;  // all pairs would be 4e10
+  for (int i = 0; i < 200'000; ++i) {
+    a.push_back({i * kNsPerMs, 1});
+    if (i % 100 != 0) b.push_back({i * kNsPerMs + 1000, 1});
+  }
+  const EventMatch found = match_events(a, b);
+  EXPECT_EQ(found.missing, 2000);
+  EXPECT_EQ(found.spurious, 0);
 }
 
 TEST(EventMatching, OfNothingAndSomething) {

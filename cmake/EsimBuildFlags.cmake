@@ -33,6 +33,11 @@ if(ESIM_MARCH AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   endif()
 endif()
 
+# Highway compiles its code for the cryptographic extension, and code that calls it must have the same features.
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL "aarch64")
+  add_compile_options(-march=armv8-a+crypto)
+endif()
+
 if(ESIM_SANITIZE)
   add_compile_options(-fsanitize=${ESIM_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${ESIM_SANITIZE})

@@ -11,6 +11,10 @@ add_library(esim_build_flags INTERFACE)
 # g++ 12 reports restrict, maybe-uninitialized, stringop-overflow and array-bounds in the standard library's own strings and optionals.
 target_compile_options(esim_build_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
                                                   -Wno-sign-conversion -Wno-restrict -Wno-maybe-uninitialized -Wno-stringop-overflow -Wno-array-bounds -fno-math-errno -fno-trapping-math -fopenmp-simd)
+# g++ 13 and later report references to objects that exist for the whole program, such as the formats.
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 13)
+  target_compile_options(esim_build_flags INTERFACE -Wno-dangling-reference)
+endif()
 if(ESIM_WERROR)
   target_compile_options(esim_build_flags INTERFACE -Werror)
 endif()
@@ -27,6 +31,11 @@ if(ESIM_MARCH AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
       set(ESIM_USES_AVX2 ON)
     endif()
   endif()
+endif()
+
+# Highway compiles its code for the cryptographic extension, and code that calls it must have the same features.
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL "aarch64")
+  add_compile_options(-march=armv8-a+crypto)
 endif()
 
 if(ESIM_SANITIZE)

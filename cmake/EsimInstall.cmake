@@ -3,12 +3,12 @@ include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 get_property(targets GLOBAL PROPERTY ESIM_TARGETS)
-install(TARGETS esim_app RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS esim_app RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
 install(TARGETS ${targets} esim_build_flags EXPORT esimTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/esim DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
-esim_install_data(${CMAKE_INSTALL_DATADIR}/esim)
+esim_install_data(${CMAKE_INSTALL_DATADIR}/esim COMPONENT program)
 # The documentation as a site, if scripts/docs has built it; too large for a wheel.
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/build/site/${PROJECT_VERSION}/ DESTINATION ${CMAKE_INSTALL_DATADIR}/esim/site OPTIONAL)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/build/site/${PROJECT_VERSION}/ DESTINATION ${CMAKE_INSTALL_DATADIR}/esim/site COMPONENT program OPTIONAL)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/esim)
 install(EXPORT esimTargets NAMESPACE esim:: DESTINATION ${package_dir})

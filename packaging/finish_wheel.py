@@ -20,7 +20,7 @@ HERE = Path(__file__).parent
 COMMON = Path("/usr/share/common-licenses")
 MAX_BYTES = 60_000_000
 ALLOWED = re.compile(
-    r"(MIT|Apache-2\.0|BSD-[23]-Clause|Zlib|libpng-2\.0|bzip2-1\.0\.6|FTL|IJG|BSL-1\.0|LGPL-[23](\.\d)?(-or-later|-only)?|MPL-1\.1|HPND)"
+    r"(MIT|Apache-2\.0|BSD-[23]-Clause|Zlib|libpng-2\.0|bzip2-1\.0\.6|FTL|IJG|BSL-1\.0|LGPL-[23](\.\d)?(-or-later|-only)?|MPL-(1\.1|2\.0)|HPND)"
 )
 
 

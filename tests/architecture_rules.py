@@ -9,7 +9,7 @@ SOURCE = "src/esim"
 # Besides ours, only these may be included in public headers: the standard library, POSIX and Eigen.
 LIGHT = re.compile(r"[a-z_0-9]+|(sys|netinet|arpa)/\w+\.h|(unistd|fcntl|poll|signal)\.h|Eigen/\w+")
 # What any .cpp file may include besides: these are used in many folders, or need no linking.
-EVERYWHERE = re.compile(LIGHT.pattern + r"|(dlfcn|netdb|stdio|stdlib|termios|aedat4_generated)\.h|fmt/\w+\.h|hwy/.*|Random123/.*")
+EVERYWHERE = re.compile(LIGHT.pattern + r"|(cpuid|dlfcn|immintrin|netdb|stdio|stdlib|termios|aedat4_generated)\.h|fmt/\w+\.h|hwy/.*|Random123/.*")
 # Headers of all other libraries, and the targets of CMake that folders link to for them.
 LIBRARIES = {
     r"CLI/.*": "CLI11::CLI11",
@@ -302,6 +302,18 @@ def messages_of_the_library_name_no_flags(root):
             yield f"{path}: a message names a flag: {found.group()}"
 
 
+def input_files_are_noted(root):
+    """Reports of recordings list every file that was read: core/inputs/used_files.h."""
+    readers = {"geometry", "motion", "scene", "frame_camera", "video", "scenario"}
+    for path in sources(root / SOURCE):
+        if folder_of(root, path) not in readers:
+            continue
+        for line in text_of(path).splitlines():
+            found = re.search(r"std::ifstream|\bfopen\(|YAML::LoadFile", line)
+            if found and "open_input(" not in line and '"/proc/' not in line:
+                yield f"{path}: must open input files by open_input(), not by {found.group()}"
+
+
 def the_page_imports_in_order(root):
     allowed = table(root, "folder of `studio/src/`")
     page = root / "studio" / "src"
@@ -342,5 +354,6 @@ RULES = [
     files_stay_small,
     the_library_neither_prints_nor_exits,
     messages_of_the_library_name_no_flags,
+    input_files_are_noted,
     the_page_imports_in_order,
 ]

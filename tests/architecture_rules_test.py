@@ -107,6 +107,8 @@ VIOLATIONS = [
     (rules.the_library_neither_prints_nor_exits, "src/esim/scene/scene.cpp", "{\n", "{\nauto& out = std::cout;\n", "std::cout"),
     (rules.the_library_neither_prints_nor_exits, "src/esim/scene/scene.cpp", "{\n", "{\nstd::exit(1);\n", "std::exit"),
     (rules.messages_of_the_library_name_no_flags, "src/esim/scene/scene.cpp", "{\n", '{\nauto x = "use --force";\n', "--force"),
+    (rules.input_files_are_noted, "src/esim/scene/scene.cpp", "{\n", "{\nstd::ifstream file(path);\n", "open_input"),
+    (rules.input_files_are_noted, "src/esim/scene/scene.cpp", "{\n", "{\nYAML::LoadFile(path);\n", "YAML::LoadFile"),
     (rules.the_page_imports_in_order, "studio/src/ui/dom.ts", "export", 'import "../api/http.ts";\nexport', "list api for ui"),
     (rules.the_page_imports_in_order, "studio/src/ui/dom.ts", "export", 'const x = import("../api/http.ts");\nexport',
      "list api for ui"),

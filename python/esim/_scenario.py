@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 
 import numpy as np
 
@@ -68,6 +69,16 @@ class Scenario:
         """The values in C++. If `renderer` or `trajectory` is false, the scenario need not have one."""
         return _core.Scenario(*self._text, self._overrides + overrides, renderer, trajectory)
 
+    def _command(self, overrides, seed, out):
+        """The command that simulates the same; for scenarios without a file, from the recording `out` itself."""
+        _, file, from_file = self._text
+        if not from_file:
+            return shlex.join(["esim", "simulate", os.path.join(out, "scenario.yaml"), "--out", f"{out}-again"])
+        settings = [word for override in self._overrides + overrides for word in ("--set", override)]
+        if seed is not None:
+            settings += ["--seed", str(int(seed))]
+        return shlex.join(["esim", "simulate", file, "--out", out, *settings])
+
     @classmethod
     def load(cls, path):
         """Reads a YAML file. Relative paths in it start at its folder.
@@ -82,7 +93,7 @@ class Scenario:
         """
         path = os.fspath(path)
         try:
-            with open(path, encoding="utf-8") as file:
+            with open(path, encoding="utf-8", newline="") as file:  # the same bytes, for their checksum
                 text = file.read()
         except OSError as error:
             raise Error(f"{path}: cannot read the scenario: {error.strerror}") from None

@@ -327,11 +327,14 @@ def simulate(
     """
     if renderer is not None and not isinstance(renderer, Renderer):
         renderer = Renderer(renderer)
-    values = to_scenario(scenario)._read(to_overrides(overrides), renderer is None, trajectory is None)
+    scenario = to_scenario(scenario)
+    values = scenario._read(to_overrides(overrides), renderer is None, trajectory is None)
     if seed is not None:
         values.seed = _checks.seed(seed)
     given = [name for name, part in (("renderer", renderer), ("trajectory", trajectory)) if part is not None]
     origin = "".join(f"# A program replaced the {name}: the entry {name} was not used.\n" for name in given)
+    out = "" if out is None else os.fspath(out)
+    obstacle = f"a program replaced the {' and the '.join(given)}" if given else ""
     return Simulation(
         _core.Simulation(
             values,
@@ -341,7 +344,9 @@ def simulate(
             origin,
             _checks.threads(threads),
             _checks.packet_length(packet_s),
-            "" if out is None else os.fspath(out),
+            out,
             _checks.flag(force, "force"),
+            "" if given else scenario._command(to_overrides(overrides), seed, out),
+            obstacle,
         )
     )

@@ -1,8 +1,10 @@
 import filecmp
 import gc
+import hashlib
 import json
 import os
 import resource
+import shlex
 import signal
 import subprocess
 import time
@@ -75,6 +77,56 @@ def test_a_recording_is_that_of_the_program(poster, tmp_path):
     assert {"report.json", "scenario.yaml", "imu.csv", "poses.txt"} < files
     _same, different, missing = filecmp.cmpfiles(tmp_path / "here", tmp_path / "there", files, shallow=False)
     assert not missing and set(different) <= {"report.json"}  # which has times of the clock on the wall
+
+
+def report_of(out):
+    return json.loads((out / "report.json").read_text())
+
+
+def test_a_recording_names_its_inputs_and_its_command(poster, tmp_path):
+    image = poster["renderer"]["image"]
+    digest = hashlib.sha256(image.read_bytes()).hexdigest()
+    file = tmp_path / "it's a.yaml"
+    file.write_bytes(esim.Scenario(poster).to_yaml().replace("\n", "\r\n").encode())
+    scenario = esim.Scenario.load(file).set("event_camera.contrast_threshold", 0.2)
+    report = esim.simulate(scenario, overrides={"duration_s": 0.1}, seed=3, out=tmp_path / "a").run()
+    assert report == report_of(tmp_path / "a")
+    assert {i["file"]: i["sha256"] for i in report["inputs"]} == {
+        str(file): hashlib.sha256(file.read_bytes()).hexdigest(), str(image): digest}
+    assert shlex.split(report["command"]) == [
+        "esim", "simulate", str(file), "--out", str(tmp_path / "a"), "--set", "event_camera.contrast_threshold=0.2", "--set",
+        "duration_s=0.1", "--seed", "3"]
+    esim.simulate(poster, seed=3, out=tmp_path / "b").run()  # without a file
+    command = shlex.split(report_of(tmp_path / "b")["command"])
+    assert command == ["esim", "simulate", str(tmp_path / "b/scenario.yaml"), "--out", str(tmp_path / "b-again")]
+    assert [i["sha256"] for i in report_of(tmp_path / "b")["inputs"]] == [digest]
+    assert "inputs" not in esim.simulate(poster, overrides={"duration_s": 0.01}).run()  # only recordings have inputs
+    program = os.environ.get("ESIM_PROGRAM")
+    if program is not None:
+        for name in "ab":
+            words = shlex.split(report_of(tmp_path / name)["command"])
+            again = words[4] = tmp_path / f"{name}-again"
+            subprocess.run([program, *words[1:], "-q"], check=True)
+            assert filecmp.cmp(tmp_path / name / "cam0/events.h5", again / "cam0/events.h5", shallow=False)
+
+
+def test_a_recording_says_what_a_program_replaced(poster, tmp_path):
+    motion = esim.Trajectory.from_poses([0, 0.1, 0.2, 0.3], np.tile(np.eye(4), (4, 1, 1)))
+    esim.simulate(poster, trajectory=motion, out=tmp_path / "a").run()
+    report = report_of(tmp_path / "a")
+    assert report["command"] is None and report["no_command_because"] == "a program replaced the trajectory"
+
+
+def test_a_changed_input_has_no_checksum(poster, tmp_path):
+    calibration = tmp_path / "c.yaml"
+    calibration.write_text("cam0: {camera_model: pinhole, intrinsics: [40, 40, 20, 15], resolution: [40, 30]}\n")
+    scenario = esim.Scenario({**poster, "camera": {"calibration": calibration}})
+    calibration.write_text("cam0: {camera_model: pinhole, intrinsics: [99, 99, 20, 15], resolution: [40, 30]}\n")
+    esim.simulate(scenario, out=tmp_path / "a").run()
+    # It is read again at the start, so that its sum is of what was used.
+    assert {i["file"]: i["sha256"] for i in report_of(tmp_path / "a")["inputs"]}[str(calibration)] == hashlib.sha256(
+        calibration.read_bytes()).hexdigest()
+    assert "fx: 99" in (tmp_path / "a/scenario.yaml").read_text()
 
 
 def test_a_recording_holds_the_packets_events(poster, tmp_path):

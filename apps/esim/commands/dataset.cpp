@@ -67,14 +67,11 @@ std::unique_ptr<SequenceMaker> make_affine(const DatasetArguments& arguments) {
 
 /// The command line of this process without the options for Slurm.
 std::vector<std::string> own_command() {
-  std::ifstream file("/proc/self/cmdline", std::ios::binary);
   std::vector<std::string> words;
-  for (std::string word; std::getline(file, word, '\0');) {
-    if (word == "--slurm-tasks" || word == "--slurm-options") {
-      std::getline(file, word, '\0');  // its value
-    } else if (!word.starts_with("--slurm")) {
-      words.push_back(word);
-    }
+  bool is_value = false;  // of an option for Slurm
+  for (const std::string& word : own_command_line()) {
+    if (!is_value && !word.starts_with("--slurm")) words.push_back(word);
+    is_value = !is_value && (word == "--slurm-tasks" || word == "--slurm-options");
   }
   words.front() = fs::read_symlink("/proc/self/exe").string();
   return words;

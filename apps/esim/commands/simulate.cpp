@@ -43,11 +43,12 @@ int run(const SimulateArguments& arguments) {
 
   catch_interrupts();
   ProgressBar bar(!arguments.quiet);
-  const auto made = make_recording(scenario, {out, arguments.force, arguments.threads, nullptr},
-                                   printing(arguments.quiet), [&](const Progress& progress) {
-                                     bar.show(progress);
-                                     return !interrupted();
-                                   });
+  const auto made =
+      make_recording(scenario, {out, arguments.force, arguments.threads, nullptr, {shell_command(own_command_line())}},
+                     printing(arguments.quiet), [&](const Progress& progress) {
+                       bar.show(progress);
+                       return !interrupted();
+                     });
   bar.clear();
   if (!made) return kInterrupted;  // while loading: nothing was worth keeping
   const Summary& summary = *made;

@@ -141,13 +141,16 @@ int convert_to_file(const VideoArguments& arguments, const fs::path& out, const 
 int convert_to_folder(const VideoArguments& arguments, const fs::path& out, const Notices& notices,
                       const std::vector<std::string>& given) {
   RecordingDirectory directory(out, arguments.force);
+  ProvenanceRecorder provenance({shell_command(own_command_line())});
+  const UsedFilesListener listener([&](const UsedFile& file) { provenance.add(file); });
   Converter converter(arguments);
   write_text(directory.path() / "video.yaml", write_conversion(arguments.options));
   const ConversionSummary summary = keep_on_failure(directory, converter.has_converted(), [&] {
     ConversionSummary converted = converter.run(build_conversion_sink(directory.path()));
     report_losses(converted, arguments.options, notices);
     report_bunching(converted, arguments.options, notices);
-    directory.finish(report_json(arguments.options, converted, converter.threads(), given));
+    directory.finish(
+        report_json(arguments.options, converted, converter.threads(), given, provenance.finish(converted.complete)));
     return converted;
   });
   if (!arguments.quiet) {

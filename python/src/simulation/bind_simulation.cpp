@@ -18,7 +18,8 @@ using NamedTrajectories = std::vector<std::pair<std::string, SharedTrajectory>>;
 
 void make_simulation(Simulation* self, const CheckedScenario& scenario, const std::optional<SharedTrajectory>& body,
                      const nb::object& render, const NamedTrajectories& objects, const std::string& origin, int threads,
-                     TimeNs packet, const std::filesystem::path& out, bool force) {
+                     TimeNs packet, const std::filesystem::path& out, bool force, const std::string& command,
+                     const std::string& obstacle) {
   Substitutes substitutes;
   if (body) substitutes.body = body->motion;
   std::optional<PythonFunction> function;
@@ -29,7 +30,8 @@ void make_simulation(Simulation* self, const CheckedScenario& scenario, const st
     };
   }
   for (const auto& [name, trajectory] : objects) substitutes.objects.push_back({name, trajectory.motion});
-  new (self) Simulation(scenario.value, substitutes, function, origin, {threads, packet, out, force});
+  new (self)
+      Simulation(scenario.value, substitutes, function, origin, {threads, packet, out, force, {command, obstacle}});
 }
 
 // A renderer often refers to the owner of the simulation: the garbage collector must be able to traverse this cycle.
@@ -58,7 +60,7 @@ void bind_simulation(nb::module_& module) {
   nb::class_<Simulation>(module, "Simulation", nb::type_slots(slots))
       .def("__init__", &make_simulation, nb::arg("scenario"), nb::arg("trajectory").none(), nb::arg("render").none(),
            nb::arg("objects"), nb::arg("origin"), nb::arg("threads"), nb::arg("packet"), nb::arg("out"),
-           nb::arg("force"))
+           nb::arg("force"), nb::arg("command"), nb::arg("obstacle"))
       .def("next",
            [](Simulation& self) -> std::optional<nb::dict> {
              std::optional<Packet> packet = self.next();

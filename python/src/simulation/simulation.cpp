@@ -76,6 +76,12 @@ void Simulation::build(const Substitutes& substitutes, const std::string& origin
     notices_.push_back("warning: " + text);
   };
   notices.note = [this](const std::string& text) { notices_.push_back(text); };
+  std::optional<UsedFilesListener> listener;
+  if (directory_ != nullptr) {
+    provenance_ = std::make_unique<ProvenanceRecorder>(options.repetition);
+    provenance_->add(scenario_.files);
+    listener.emplace([this](const UsedFile& file) { provenance_->add(file); });
+  }
   world_ = std::make_unique<World>(build_world(scenario_, substitutes, options.threads, notices));
   packets_ = std::make_unique<PacketSink>(packet_clock(*world_, options.packet));
   if (directory_ != nullptr) {
@@ -117,7 +123,9 @@ void Simulation::finish() {
   losses_ = esim::losses(scenario_, summary);
   for (const std::string& loss : losses_) notices_.push_back("warning: " + loss);
   std::ranges::copy(hints(scenario_, summary), std::back_inserter(notices_));
-  report_ = report_json(scenario_, summary, world_->workers->threads(), notices_);
+  std::optional<Provenance> provenance;
+  if (provenance_ != nullptr) provenance = provenance_->finish(summary.complete);
+  report_ = report_json(scenario_, summary, world_->workers->threads(), notices_, provenance);
   if (directory_ != nullptr) directory_->finish(report_);
 }
 

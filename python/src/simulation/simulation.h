@@ -21,6 +21,7 @@ struct SimulationOptions {
   TimeNs packet = 0;          ///< length of packets; 0: from one frame of ground truth to the next
   std::filesystem::path out;  ///< folder of the recording; empty: none is written
   bool force = false;         ///< replace an existing recording
+  Repetition repetition{};    ///< for the report of the recording
 };
 
 /// A simulation packet by packet. Callers hold the GIL, which is released during the simulation.
@@ -64,6 +65,7 @@ class Simulation {
   std::optional<PythonFunction> render_;
   std::vector<std::string> warnings_, notices_, losses_;
   std::unique_ptr<RecordingDirectory> directory_;
+  std::unique_ptr<ProvenanceRecorder> provenance_;  // of the recording
   std::unique_ptr<World> world_;
   std::unique_ptr<PacketSink> packets_;
   std::unique_ptr<Sink> recorder_, sink_;

@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <cstdlib>
 #include <fstream>
+#include <optional>
 #include <vector>
 
 #include "esim/blender/blender.h"
 #include "esim/blender/scripts.h"
 #include "esim/core/error.h"
+#include "esim/core/inputs/used_files.h"
 
 namespace esim::inline blender {
 namespace {
@@ -33,7 +35,7 @@ class ContentHash {
 };
 
 std::string hash_of(const fs::path& blend) {
-  std::ifstream file(blend, std::ios::binary);
+  std::ifstream file = open_input(blend);
   if (!file) throw UserError(fmt::format("scene {}: no such file, or no permission to read it", blend.string()));
   ContentHash hash;
   std::string buffer(1 << 20, '\0');
@@ -68,15 +70,26 @@ std::string state_of(const fs::path& file) {
   return fmt::format("{} {}", fs::file_size(file, error), fs::last_write_time(file, error).time_since_epoch().count());
 }
 
-/// Whether the files in the list of a cached scene are unchanged. The list has lines "STATE<tab>PATH".
-bool is_current(const fs::path& list) {
+/// The files in the list of a cached scene; nothing if the list is missing or a file has changed. The list has lines
+/// "STATE<tab>PATH".
+std::optional<std::vector<std::string>> unchanged_files(const fs::path& list) {
   std::ifstream file(list);
-  if (!file) return false;
+  if (!file) return std::nullopt;
+  std::vector<std::string> files;
   for (std::string line; std::getline(file, line);) {
     const std::size_t tab = line.find('\t');
-    if (tab == std::string::npos || state_of(line.substr(tab + 1)) != line.substr(0, tab)) return false;
+    if (tab == std::string::npos || state_of(line.substr(tab + 1)) != line.substr(0, tab)) return std::nullopt;
+    files.push_back(line.substr(tab + 1));
   }
-  return true;
+  return files;
+}
+
+/// Tells listeners of the files that Blender read for a scene, as far as they exist.
+void note_files(const std::vector<std::string>& files) {
+  std::error_code error;
+  for (const fs::path file : files) {
+    if (fs::is_regular_file(file, error)) note_used(file);
+  }
 }
 
 }  // namespace
@@ -86,7 +99,10 @@ fs::path cached_glb(const fs::path& blend, const BlenderWatch& watch) {
   const fs::path folder = cache_folder();
   const fs::path glb = folder / (hash + ".glb"), list = folder / (hash + ".files");
   std::error_code error;
-  if (fs::is_regular_file(glb, error) && is_current(list)) return glb;
+  if (const auto unchanged = unchanged_files(list); unchanged && fs::is_regular_file(glb, error)) {
+    note_files(*unchanged);
+    return glb;
+  }
 
   // The exporter reports the files to which the scene refers. Without their list, the cached scene is not used.
   std::vector<std::string> files;
@@ -104,6 +120,7 @@ fs::path cached_glb(const fs::path& blend, const BlenderWatch& watch) {
   out.close();
   if (!out) throw OutputError(fmt::format("cannot write {}; is the disk full?", draft.string()));
   fs::rename(draft, list, error);
+  note_files(files);
   return glb;
 }
 

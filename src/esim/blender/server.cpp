@@ -8,6 +8,7 @@
 #include "esim/blender/script.h"
 #include "esim/blender/scripts.h"
 #include "esim/core/error.h"
+#include "esim/core/inputs/used_files.h"
 
 namespace esim::inline blender {
 
@@ -39,12 +40,17 @@ BlenderServer::BlenderServer(const BlenderServerOptions& options, const BlenderN
   blender_program(options.scene);
   if (!fs::is_regular_file(options.scene, error))
     throw UserError(fmt::format("scene {}: no such file", options.scene.string()));
+  note_used(options.scene);
   parts_ = std::make_unique<Parts>(options);
   const bool serves = parts_->process.read_until(
       [&](const std::string& line) {
-        constexpr std::string_view kServing = "esim serving 127.0.0.1:", kWarning = "esim warning ";
-        const bool names_file = line.starts_with("esim warning file ");  // for the cache of exports
-        if (line.starts_with(kWarning) && !names_file) warning(line.substr(kWarning.size()));
+        constexpr std::string_view kServing = "esim serving 127.0.0.1:", kWarning = "esim warning ",
+                                   kFile = "esim warning file ";
+        if (line.starts_with(kFile)) {
+          if (fs::is_regular_file(line.substr(kFile.size()), error)) note_used(line.substr(kFile.size()));
+        } else if (line.starts_with(kWarning)) {
+          warning(line.substr(kWarning.size()));
+        }
         if (line.starts_with(kServing))
           std::from_chars(line.data() + kServing.size(), line.data() + line.size(), port_);
         return port_ == 0;

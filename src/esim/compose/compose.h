@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "esim/compose/provenance.h"
 #include "esim/formats/filter_recording.h"
 #include "esim/light/flicker.h"
 #include "esim/recording/format.h"
@@ -144,13 +145,13 @@ std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& file, c
 
 // --- reports (recording_report.cpp, losses_and_hints.cpp) ------------------------------------------------------------
 
-/// The text of report.json: results, cost, time by stage, and notices.
+/// The text of report.json: results, cost, time by stage, notices, and of recordings, their provenance.
 std::string report_json(const Scenario& scenario, const Summary& summary, int threads,
-                        const std::vector<std::string>& notices);
+                        const std::vector<std::string>& notices, const std::optional<Provenance>& provenance = {});
 
 /// The text of report.json of a conversion.
 std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,
-                        const std::vector<std::string>& notices);
+                        const std::vector<std::string>& notices, const std::optional<Provenance>& provenance = {});
 
 /// One line for each filter of a sensor that the real sensor of its preset does not have.
 std::vector<std::string> warnings_of_filters(const EventCameraOptions& sensor);
@@ -180,6 +181,7 @@ struct RecordingOptions {
   int threads = 0;              ///< 0: every processor
 
   std::unique_ptr<Sink> beside{};  ///< if set, receives every record too
+  Repetition repetition{};         ///< for the report
 };
 
 /// Simulates a scenario into a recording's folder with scenario.yaml and report.json, as `esim simulate` does. The

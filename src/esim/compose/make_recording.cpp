@@ -26,6 +26,9 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
   const Notices notices = keeping(notify, given);
   // The directory comes first, so that an existing one is reported before a scene is loaded.
   RecordingDirectory directory(options.out, options.replace);
+  ProvenanceRecorder provenance(options.repetition);
+  provenance.add(scenario.files);
+  const UsedFilesListener listener([&](const UsedFile& file) { provenance.add(file); });
   World world = build_world(scenario, options.threads, notices);
   write_file_atomically(directory.path() / "scenario.yaml", write_scenario(scenario));
   std::unique_ptr<Sink> sink = build_sink(scenario, directory.path());
@@ -44,7 +47,8 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
     });
     for (const std::string& loss : losses(scenario, summary)) given.push_back("warning: " + loss);
     std::ranges::copy(hints(scenario, summary), std::back_inserter(given));
-    directory.finish(report_json(scenario, summary, world.workers->threads(), given));
+    directory.finish(
+        report_json(scenario, summary, world.workers->threads(), given, provenance.finish(summary.complete)));
     return summary;
   });
 }

@@ -11,13 +11,32 @@ Json json(const MeasuredError& error) { return {{"mean", error.mean}, {"p99", er
 void add_filtered(const std::vector<FilteredCamera>& cameras, Json& report) {
   if (!cameras.empty()) report["filtered"] = Json::parse(to_json(cameras));
 }
+
+Json json(const HashedFile& input) {
+  const UsedFile& file = input.file;
+  Json result = {{"file", file.path.string()}};
+  if (file.regular) result["bytes"] = file.bytes;
+  result["sha256"] = file.sha256.empty() ? Json(nullptr) : Json(file.sha256);
+  if (!input.problem.empty()) result["problem"] = input.problem;
+  return result;
+}
+
+void add_provenance(const Provenance& provenance, Json& report) {
+  const Repetition& repetition = provenance.repetition;
+  report["command"] = repetition.command.empty() ? Json(nullptr) : Json(repetition.command);
+  if (!repetition.obstacle.empty()) report["no_command_because"] = repetition.obstacle;
+  report["working_folder"] = provenance.working_folder.string();
+  report["inputs"] = Json::array();
+  for (const HashedFile& input : provenance.inputs) report["inputs"].push_back(json(input));
+}
+
 Json json(double number) { return number; }
 Json json(std::int64_t number) { return number; }
 
 }  // namespace
 
 std::string report_json(const Scenario& scenario, const Summary& summary, int threads,
-                        const std::vector<std::string>& notices) {
+                        const std::vector<std::string>& notices, const std::optional<Provenance>& provenance) {
   const double simulated_s = to_seconds(summary.end - summary.start);
 
   Json cameras = Json::array();
@@ -64,6 +83,7 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
   Json report = {
       {"status", summary.complete ? "complete" : "interrupted"},
       {"esim_version", ESIM_VERSION},
+      {"esim_commit", source_commit()},
       {"seed", scenario.seed},
       {"start_s", to_seconds(summary.start)},
       {"simulated_s", simulated_s},
@@ -85,11 +105,12 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
   };
   add_filtered(filtered_cameras(summary), report);
   if (!summary.problem.empty()) report["reason"] = summary.problem;
+  if (provenance) add_provenance(*provenance, report);
   return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::string report_json(const ConversionOptions& options, const ConversionSummary& summary, int threads,
-                        const std::vector<std::string>& notices) {
+                        const std::vector<std::string>& notices, const std::optional<Provenance>& provenance) {
   const double converted_s = to_seconds(summary.end - summary.start);
   const std::int64_t events = summary.events_on + summary.events_off;
   const ConversionSummary::Seconds& s = summary.seconds;
@@ -97,6 +118,7 @@ std::string report_json(const ConversionOptions& options, const ConversionSummar
   Json report = {
       {"status", summary.complete ? "complete" : "interrupted"},
       {"esim_version", ESIM_VERSION},
+      {"esim_commit", source_commit()},
       {"input", options.input.string()},
       {"seed", options.seed},
       {"start_s", to_seconds(summary.start)},
@@ -131,6 +153,7 @@ std::string report_json(const ConversionOptions& options, const ConversionSummar
   };
   add_filtered(filtered_cameras(summary), report);
   if (!summary.problem.empty()) report["reason"] = summary.problem;
+  if (provenance) add_provenance(*provenance, report);
   return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

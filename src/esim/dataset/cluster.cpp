@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <optional>
 
+#include "esim/compose/provenance.h"
 #include "esim/core/error.h"
 
 namespace esim::inline dataset {
@@ -55,12 +56,6 @@ Share share_named(const std::string& text) {
 }
 
 int slurm_processors() { return static_cast<int>(from_environment("SLURM_CPUS_PER_TASK").value_or(0)); }
-
-std::string shell_quoted(const std::string& word) {
-  std::string quoted = "'";
-  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return quoted + "'";
-}
 
 std::string slurm_script(const SlurmJob& job) {
   std::string script = "#!/bin/bash\n";

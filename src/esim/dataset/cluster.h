@@ -29,7 +29,4 @@ struct SlurmJob {
 /// last task to finish writes the manifest.
 std::string slurm_script(const SlurmJob& job);
 
-/// A text quoted as one word of a shell.
-std::string shell_quoted(const std::string& word);
-
 }  // namespace esim::inline dataset

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "esim/core/error.h"
+#include "esim/core/inputs/used_files.h"
 
 namespace esim::inline frame_camera {
 namespace {
@@ -36,7 +36,7 @@ CameraResponse::CameraResponse(const ResponseOptions& options) : options_(option
   if (measured == nullptr) return;
   const std::string name = measured->path.string();
   if (name.empty()) throw UserError("frame_camera.response.path: is missing; give the file of the measured response");
-  std::ifstream file(measured->path);
+  std::ifstream file = open_input(measured->path);
   if (!file) throw UserError(fmt::format("frame_camera.response.path: {}: cannot be read", name));
 
   std::vector<std::pair<double, double>> points;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "esim/core/error.h"
+#include "esim/core/inputs/used_files.h"
 
 namespace esim::inline geometry {
 namespace {
@@ -160,7 +161,9 @@ YAML::Node load(const std::filesystem::path& file) {
   if (!std::filesystem::is_regular_file(file, error))
     throw UserError(fmt::format("calibration {}: no such file", file.string()));
   try {
-    return YAML::LoadFile(file.string());
+    std::ifstream stream = open_input(file);
+    if (!stream) throw UserError(fmt::format("calibration {}: cannot be read; check its permissions", file.string()));
+    return YAML::Load(stream);
   } catch (const YAML::Exception& exception) {
     throw UserError(fmt::format("calibration {}:{}: {}", file.string(), exception.mark.line + 1, exception.msg));
   }

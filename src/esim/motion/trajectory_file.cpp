@@ -9,13 +9,13 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "esim/core/error.h"
+#include "esim/core/inputs/used_files.h"
 
 namespace esim::inline motion {
 
@@ -138,7 +138,7 @@ TimedPose parse_pose(std::string_view line, const Format& format, const Fail& fa
 
 std::vector<TimedPose> read_trajectory(const std::filesystem::path& path) {
   const std::string file = path.string();
-  std::ifstream in(path);
+  std::ifstream in = open_input(path);
   if (!in) throw UserError(fmt::format("{}: cannot open the trajectory: {}", file, std::strerror(errno)));
 
   std::vector<TimedPose> poses;

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <set>
 
+#include "esim/core/inputs/used_files.h"
 #include "esim/geometry/calibration.h"
 #include "esim/scenario/sprite_scene.h"
 #include "esim/scenario/waypoint_file.h"
@@ -240,6 +241,9 @@ Scenario read_scenario(const std::filesystem::path& file, ScenarioText otherwise
 }
 
 Scenario read_scenario(const ScenarioText& text) {
+  std::vector<UsedFile> files;
+  if (text.has_lines) files.push_back(used_text(text.file, text.yaml));
+  const UsedFilesListener listener([&](const UsedFile& file) { files.push_back(file); });
   YAML::Node root = parse_yaml(text.yaml, text.file);
   YamlSource source{text.file, {}, text.setter, text.has_lines, text.refuses};
   if (!root.IsMap()) YamlReader(root, "", source);
@@ -285,6 +289,7 @@ Scenario read_scenario(const ScenarioText& text) {
   }
   scenario.cameras = read_cameras(std::as_const(root), source, camera);
   name_cameras(scenario.cameras, source);
+  scenario.files = std::move(files);
   return scenario;
 }
 

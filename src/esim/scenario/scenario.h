@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "esim/core/colour.h"
+#include "esim/core/inputs/used_files.h"
 #include "esim/event_camera/event_camera.h"
 #include "esim/frame_camera/options.h"
 #include "esim/geometry/camera.h"
@@ -101,6 +102,10 @@ struct Scenario {
 
   /// What users should know about the text from which the scenario was read: options that have other names now.
   std::vector<std::string> notices{};
+
+  /// The files from which it was read: its own, and those that are replaced by their contents here, such as
+  /// calibrations.
+  std::vector<UsedFile> files{};
 };
 
 }  // namespace esim::inline scenario

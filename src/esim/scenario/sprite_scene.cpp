@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <sstream>
 
 #include "esim/core/error.h"
+#include "esim/core/inputs/used_files.h"
 
 namespace esim::inline scenario {
 namespace {
@@ -23,7 +23,7 @@ struct Range {
 class SceneWords {
  public:
   explicit SceneWords(const fs::path& file) : file_(file) {
-    std::ifstream stream(file, std::ios::binary);
+    std::ifstream stream = open_input(file);
     std::string line;
     std::size_t bytes = 0;
     while (std::getline(stream, line)) {

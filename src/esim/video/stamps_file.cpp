@@ -4,10 +4,10 @@
 
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <functional>
 
 #include "esim/core/error.h"
+#include "esim/core/inputs/used_files.h"
 
 namespace esim::inline video {
 namespace {
@@ -46,7 +46,7 @@ std::optional<Integer> parse_integer(const std::string& text) {
 /// Parses the lines that are not comments; the first one may be a heading that `parse` rejects.
 using ParseLine = std::function<std::optional<StampedName>(const std::string& line)>;
 std::vector<StampedName> read_lines(const std::filesystem::path& path, const ParseLine& parse, const char* expected) {
-  std::ifstream file(path);
+  std::ifstream file = open_input(path);
   if (!file) throw UserError(fmt::format("{}: cannot be read; check its permissions", path.string()));
   std::vector<StampedName> entries;
   int number = 0;

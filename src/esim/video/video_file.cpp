@@ -11,6 +11,7 @@ extern "C" {
 #include <algorithm>
 
 #include "esim/core/error.h"
+#include "esim/core/inputs/used_files.h"
 #include "esim/video/frame_source.h"
 
 namespace esim::inline video {
@@ -39,6 +40,7 @@ struct Demuxer {
     const auto check = [&](int result, const char* what) {
       if (result < 0) throw UserError(fmt::format("{}: {}: {}", path.string(), what, reason_of(result)));
     };
+    note_used(path);
     AVFormatContext* context = nullptr;
     check(avformat_open_input(&context, ("file:" + path.string()).c_str(), nullptr, nullptr),
           "is not a readable video, or is cut off");

@@ -6,9 +6,10 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
 #include <iterator>
 #include <limits>
+
+#include "esim/core/inputs/used_files.h"
 
 namespace esim::inline scenario {
 namespace {
@@ -41,7 +42,7 @@ std::string text_of(const std::filesystem::path& file, const char* kind) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error))
     throw UserError(fmt::format("{}: no such {}", file.string(), kind));
-  std::ifstream stream(file, std::ios::binary);
+  std::ifstream stream = open_input(file);
   std::string text{std::istreambuf_iterator<char>(stream), {}};
   if (!stream) throw UserError(fmt::format("{}: cannot be read; check its permissions", file.string()));
   return text;

@@ -8,12 +8,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <opencv2/imgproc.hpp>
 #include <string_view>
 #include <vector>
 
 #include "esim/core/error.h"
+#include "esim/core/inputs/used_files.h"
 #include "esim/files/codecs/image_codecs.h"
 #include "esim/files/png_pixels.h"
 #include "esim/scene/images/image_header.h"
@@ -58,6 +58,7 @@ std::vector<const char*> colour_channels(const std::filesystem::path& path, cons
 }
 
 void read_exr(const std::filesystem::path& path, Encoding encoding, bool colour, Planes& planes) {
+  note_used(path);
   Imf::InputFile file(path.c_str());
   const auto window = file.header().dataWindow();
   const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
@@ -142,7 +143,7 @@ std::string lower_case_extension(const std::filesystem::path& path) {
 
 std::vector<std::byte> content_of(const std::filesystem::path& path) {
   std::vector<std::byte> content(size_of(path));
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file = open_input(path);
   file.read(reinterpret_cast<char*>(content.data()), static_cast<std::streamsize>(content.size()));
   if (!file) fail(path, "cannot be read; check its permissions");
   return content;

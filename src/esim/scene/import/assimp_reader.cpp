@@ -12,6 +12,7 @@
 #include <span>
 #include <tuple>
 
+#include "esim/core/inputs/used_files.h"
 #include "esim/scene/import/folder.h"
 #include "esim/scene/import/graph_archive.h"
 #include "esim/scene/import/isolated.h"
@@ -28,7 +29,9 @@ class FolderFiles final : public Assimp::DefaultIOSystem {
   bool Exists(const char* name) const override { return allowed(name) && DefaultIOSystem::Exists(name); }
 
   Assimp::IOStream* Open(const char* name, const char* mode) override {
-    return allowed(name) && mode[0] == 'r' ? DefaultIOSystem::Open(name, "rb") : nullptr;
+    if (!allowed(name) || mode[0] != 'r') return nullptr;
+    note_used(name);
+    return DefaultIOSystem::Open(name, "rb");
   }
 
  private:
@@ -325,6 +328,8 @@ class Converter {
 SceneGraph read_here(const std::filesystem::path& file, const std::string& format) {
   Assimp::Importer importer;
   importer.SetIOHandler(new FolderFiles(std::filesystem::absolute(file).parent_path()));  // which it deletes
+  std::vector<std::string> files;
+  const UsedFilesListener listener([&](const UsedFile& used) { files.push_back(used.path.string()); });
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, false);
   const aiScene* const scene = importer.ReadFile(
       std::filesystem::absolute(file).string(),
@@ -334,7 +339,9 @@ SceneGraph read_here(const std::filesystem::path& file, const std::string& forma
     std::replace(reason.begin(), reason.end(), '\n', ' ');
     fail_scene(file, "cannot be read: " + reason);
   }
-  return Converter(file, format, *scene).convert();
+  SceneGraph graph = Converter(file, format, *scene).convert();
+  graph.files = std::move(files);
+  return graph;
 }
 
 }  // namespace
@@ -352,8 +359,11 @@ SceneGraph read_with_assimp(const std::filesystem::path& file) {
       run_isolated([&] { return to_bytes(read_here(file, format)); }, kMemoryBytes + kMemoryPerByte * bytes,
                    kProcessor_s + static_cast<unsigned>(bytes >> 20));
   switch (result.end) {
-    case IsolatedResult::End::done:
-      return graph_from_bytes(result.bytes);
+    case IsolatedResult::End::done: {
+      SceneGraph graph = graph_from_bytes(result.bytes);
+      for (const std::string& used : graph.files) note_used(used);
+      return graph;
+    }
     case IsolatedResult::End::refused:
       throw UserError(result.bytes);
     default:

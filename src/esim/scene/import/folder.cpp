@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
-#include <fstream>
 
 #include "esim/core/error.h"
+#include "esim/core/inputs/used_files.h"
 
 namespace esim::inline scene {
 namespace {
@@ -62,7 +62,7 @@ std::vector<std::byte> read_bytes(const std::filesystem::path& file) {
   const std::uintmax_t size = std::filesystem::file_size(file, error);
   if (error || size > kMaxFileBytes) throw UserError(fmt::format("{}: is larger than 2 GiB; split it", file.string()));
   std::vector<std::byte> bytes(size);
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in = open_input(file);
   if (!in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size)))
     throw UserError(fmt::format("{}: cannot be read; check its permissions", file.string()));
   return bytes;

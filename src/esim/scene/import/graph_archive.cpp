@@ -47,7 +47,7 @@ void archive(Archive& a, GraphCamera& o) {
 template <class Archive>
 void archive(Archive& a, SceneGraph& o) {
   a(o.nodes), a(o.meshes), a(o.materials), a(o.images), a(o.cameras), a(o.ignores_alpha), a(o.normal_maps),
-      a(o.warnings);
+      a(o.warnings), a(o.files);
 }
 
 /// Whether a type is stored as its bytes.

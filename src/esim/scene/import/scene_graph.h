@@ -82,6 +82,7 @@ struct SceneGraph {
   bool ignores_alpha = false;  ///< whether surfaces of the format are opaque by default
   int normal_maps = 0;         ///< number of materials with a normal map, which is ignored
   std::vector<std::string> warnings;
+  std::vector<std::string> files;  ///< that another process opened to read the scene
 };
 
 /// Limits of a scene, so that a small file cannot request gigabytes.

@@ -32,6 +32,17 @@ struct Runs::Run {
   LivePicture picture;
 };
 
+namespace {
+
+/// The command that makes the same recording.
+std::string command_of(const std::filesystem::path& scenario, const std::filesystem::path& out, bool replace) {
+  std::vector<std::string> words{"esim", "simulate", scenario.string(), "--out", out.string()};
+  if (replace) words.push_back("--force");
+  return shell_command(words);
+}
+
+}  // namespace
+
 Runs::Runs(int threads) : threads_(threads), thread_([this] { work(); }) {}
 
 Runs::~Runs() {
@@ -144,7 +155,11 @@ void Runs::make(Run& run) {
     }
     return !run.cancelled;
   };
-  RecordingOptions options{run.status.out, run.replace, threads_, std::make_unique<LiveSink>(run.picture)};
+  RecordingOptions options{run.status.out,
+                           run.replace,
+                           threads_,
+                           std::make_unique<LiveSink>(run.picture),
+                           {command_of(run.status.scenario, run.status.out, run.replace)}};
   const std::optional<Summary> summary = make_recording(run.scenario, std::move(options), notices, monitor);
 
   if (summary) std::ranges::for_each(losses(run.scenario, *summary), notices.warning);

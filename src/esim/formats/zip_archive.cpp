@@ -13,12 +13,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Whether libzip says that the list of files at the end is missing; since 1.10, it has an error of its own for this.
+bool is_truncated(int code) {
+#ifdef ZIP_ER_TRUNCATED_ZIP
+  if (code == ZIP_ER_TRUNCATED_ZIP) return true;
+#endif
+  return code == ZIP_ER_NOZIP;
+}
+
 /// Null if it fails, with the reason.
 zip_t* open_archive(const fs::path& path, int flags, std::string& reason) {
   int code = 0;
   zip_t* const archive = zip_open(path.c_str(), flags, &code);
   if (archive != nullptr) return archive;
-  if (code == ZIP_ER_NOZIP && read_head(path, 2) == "PK") {
+  if (is_truncated(code) && read_head(path, 2) == "PK") {
     reason = "the zip is truncated: the list of files at its end is missing";
     return nullptr;
   }

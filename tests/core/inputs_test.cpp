@@ -89,7 +89,7 @@ TEST(FileHashes, RefuseFilesThatHaveChanged) {
   const fs::path a = folder.write("a", "abc"), gone = folder.write("gone", "abc");
   const UsedFile before = used_file(a), there = used_file(gone);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  folder.write("a", "abd");
+  folder.write("a", "xyz");
   fs::remove(gone);
   FileHashes hashes;
   hashes.add(before);

@@ -221,6 +221,7 @@ class Simulation:
 
     def __init__(self, core):
         self._core = core
+        self._made = []  # a packet, or None at the end, that has not been returned: after a signal
         self._told = 0
         for text in core.warnings():
             warnings.warn(text, stacklevel=3)
@@ -233,11 +234,14 @@ class Simulation:
         return self
 
     def __next__(self):
-        parts = self._core.next()
-        if parts is None:
+        if not self._made:
+            self._core.append_next(self._made)
+        if self._made[0] is None:
             self._warn_of_losses()
             raise StopIteration
-        return Packet(parts, self.cameras)
+        packet = Packet(self._made[0], self.cameras)
+        del self._made[0]  # Python does not look for signals from here to the return
+        return packet
 
     def run(self):
         """Simulates to the end without returning packets; a recording is written if `out` is given.
@@ -246,8 +250,9 @@ class Simulation:
         -------
         Report
         """
-        while self._core.next() is not None:
-            pass
+        while self._made != [None]:
+            self._made.clear()
+            self._core.append_next(self._made)
         self._warn_of_losses()
         return self.report
 

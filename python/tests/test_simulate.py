@@ -353,6 +353,35 @@ def test_ctrl_c_shortly_before_a_packet_does_not_lose_it(poster, after_s):
     np.testing.assert_array_equal(joined([*packets, *simulation]), uninterrupted)
 
 
+def test_ctrl_c_while_a_packet_is_made_does_not_lose_it(poster, monkeypatch):
+    uninterrupted = joined(esim.simulate(poster))
+    simulation = esim.simulate(poster, packet_s=10.0)
+
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("esim._simulate.Packet", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            next(simulation)
+    np.testing.assert_array_equal(joined(simulation), uninterrupted)
+    assert simulation.report["status"] == "complete"
+
+
+def test_ctrl_c_at_any_time_loses_no_packet(poster):
+    large = {"camera.width": 320, "camera.height": 240, "truth.rate_hz": 100.0}  # copied to Python for milliseconds
+    uninterrupted = joined(esim.simulate(poster, overrides=large))
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    for delay in np.linspace(0.01, 0.2, 20):
+        simulation = esim.simulate(poster, overrides=large, packet_s=10.0)
+        packets = []
+        signal.setitimer(signal.ITIMER_REAL, delay)
+        with pytest.raises(KeyboardInterrupt):
+            packets.append(next(simulation))
+            time.sleep(10)
+        np.testing.assert_array_equal(joined([*packets, *simulation]), uninterrupted)
+
+
 def test_other_threads_run_meanwhile(poster):
     import threading
 

@@ -61,11 +61,11 @@ void bind_simulation(nb::module_& module) {
       .def("__init__", &make_simulation, nb::arg("scenario"), nb::arg("trajectory").none(), nb::arg("render").none(),
            nb::arg("objects"), nb::arg("origin"), nb::arg("threads"), nb::arg("packet"), nb::arg("out"),
            nb::arg("force"), nb::arg("command"), nb::arg("obstacle"))
-      .def("next",
-           [](Simulation& self) -> std::optional<nb::dict> {
+      // Appends the next packet, or None, to a list: a signal that raises in Python on the way back cannot lose it.
+      .def("append_next",
+           [](Simulation& self, nb::list to) {
              std::optional<Packet> packet = self.next();
-             if (!packet) return std::nullopt;
-             return to_dict(std::move(*packet), self.info());
+             to.append(packet ? nb::object(to_dict(std::move(*packet), self.info())) : nb::none());
            })
       .def("close", &Simulation::close)
       .def("info", [](const Simulation& self) { return to_dict(self.info()); })

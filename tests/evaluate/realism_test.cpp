@@ -123,6 +123,37 @@ TEST(Realism, TheSensorThatRecordedIsTheNearest) {
   EXPECT_TRUE(test::contains(to_json(found), "\"model\": \"slower\""));
 }
 
+TEST(Realism, ThresholdsAreFittedToAPartAndJudgedByTheRest) {
+  const test::TemporaryDirectory folder;
+  write_scene(folder.path() / "clip");
+  record(folder.path() / "clip", usual_sensor());
+  const RealClip clip = read_real_clip(folder.path() / "clip");
+  const RealClip begin = clip.part(0, 0.4), rest = clip.part(0.4, 1);
+  EXPECT_EQ(begin.events.size() + rest.events.size(), clip.events.size());
+  const Image<float> here = rest.image_at(0.003), there = clip.image_at(0.4 * clip.duration_s + 0.003);
+  for (std::size_t i = 0; i < here.size(); ++i) ASSERT_NEAR(here.pixels()[i], there.pixels()[i], 1e-6F);
+
+  EventCameraOptions other = usual_sensor();
+  other.contrast_threshold_on = 0.35, other.contrast_threshold_off = 0.12;
+  RealismOptions options;
+  options.fit_to = ClipPart{"clip", 0, 0.4};
+  const RealismEvaluation found = evaluate_realism(folder.path(), {{"other", other, {}}}, options, {});
+  ASSERT_EQ(found.clips.size(), 2U);
+  double on = 0, off = 0;
+  ASSERT_EQ(std::sscanf(found.clips[1].model.c_str(), "other (C+ %lf, C- %lf)", &on, &off), 2) << found.clips[1].model;
+  EXPECT_NEAR(on, 0.2, 0.01);  // other pixels than those that recorded
+  EXPECT_NEAR(off, 0.2, 0.01);
+  EXPECT_LT(found.clips[1].sum_of_deviations(), 25);
+  EXPECT_GT(found.clips[0].sum_of_deviations(), 2 * found.clips[1].sum_of_deviations());
+  const auto message = [&](const ClipPart& part) {
+    options.fit_to = part;
+    return test::message_of<UserError>([&] { evaluate_realism(folder.path(), {{"other", other, {}}}, options, {}); });
+  };
+  EXPECT_TRUE(test::contains(message({"none", 0, 0.5}), "no clip none"));
+  EXPECT_TRUE(test::contains(message({"clip", 0, 1}), "not to all of it"));
+  EXPECT_TRUE(test::contains(message({"clip", 0.2, 0.5}), "not to all of it"));
+}
+
 TEST(Realism, OtherProgramsGetTheFramesAndWriteEvents) {
   const test::TemporaryDirectory folder;
   write_scene(folder.path());

@@ -15,6 +15,7 @@ constexpr double kIdealThreshold = 0.25;
 struct RealismArguments {
   std::string folder;
   std::vector<std::string> sensors, programs;
+  std::string fit_to;
   RealismOptions options;
   bool json = false, quiet = false;
 };
@@ -39,8 +40,22 @@ std::vector<SensorModel> models_of(const RealismArguments& arguments) {
   return models;
 }
 
-int run(const RealismArguments& arguments) {
+/// CLIP:FROM:TO
+ClipPart clip_part_of(const std::string& text) {
+  const std::size_t second = text.rfind(':'), first = second == 0 ? second : text.rfind(':', second - 1);
+  ClipPart part;
+  if (second == std::string::npos || first == std::string::npos || first == 0 ||
+      !CLI::detail::lexical_cast(text.substr(first + 1, second - first - 1), part.from) ||
+      !CLI::detail::lexical_cast(text.substr(second + 1), part.to) || !(part.from < part.to))
+    throw UserError("--fit-to " + text +
+                    ": must be CLIP:FROM:TO, with fractions of the clip's duration, such as 0:0.5");
+  part.clip = text.substr(0, first);
+  return part;
+}
+
+int run(RealismArguments arguments) {
   catch_interrupts();
+  if (!arguments.fit_to.empty()) arguments.options.fit_to = clip_part_of(arguments.fit_to);
   ProgressBar bar(!arguments.quiet);
   const RealismEvaluation evaluation = evaluate_realism(arguments.folder, models_of(arguments), arguments.options,
                                                         [&](double fraction, const std::string& what) {
@@ -79,6 +94,12 @@ void add_realism(CLI::App& evaluate, int& exit_code) {
       ->type_name("NAME=COMMAND")
       ->expected(1)
       ->take_all();
+  command
+      ->add_option(
+          "--fit-to", arguments->fit_to,
+          "Also compare each sensor with its thresholds fitted to the numbers of ON and OFF events of this part "
+          "of a clip, in fractions of its duration. Of that clip, only the rest is then compared")
+      ->type_name("CLIP:FROM:TO");
   command->add_option("--frame-step", arguments->options.frame_step_s, "Time between the frames of the clips, s")
       ->type_name("S")
       ->check(CLI::Range(1e-6, 0.1))
@@ -96,6 +117,7 @@ void add_realism(CLI::App& evaluate, int& exit_code) {
       "Examples:\n"
       "  esim evaluate realism recordings\n"
       "  esim evaluate realism recordings --sensor davis240c --sensor my_sensor.yaml --json > realism.json\n"
+      "  esim evaluate realism recordings --sensor davis346 --fit-to poster:0:0.5\n"
       "  esim evaluate realism recordings --program 'v2e=python3 run_v2e.py {frames} {events}'");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

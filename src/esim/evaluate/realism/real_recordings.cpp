@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 
+#include "esim/compare/same_scene.h"
 #include "esim/core/error.h"
 #include "esim/files/codecs/image_codecs.h"
 #include "esim/files/input_file.h"
@@ -156,7 +157,7 @@ void repair_microseconds(std::vector<Event>& events) {
 }  // namespace
 
 Image<float> RealClip::image_at(double s) const {
-  const double part = s / duration_s - 0.5;
+  const double part = (start_s + s) / complete_s - 0.5;
   Image<float> image(frame.width(), frame.height());
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {
@@ -166,6 +167,16 @@ Image<float> RealClip::image_at(double s) const {
     }
   }
   return image;
+}
+
+RealClip RealClip::part(double from, double to) const {
+  RealClip clip = *this;
+  clip.start_s += from * duration_s, clip.duration_s *= to - from;
+  const TimeNs first = to_ns(from * duration_s), last = to_ns(to * duration_s);
+  clip.events.clear();
+  for (const Event& event : events_within(events, {first, last}))
+    clip.events.push_back({event.t - first, event.x, event.y, event.polarity});
+  return clip;
 }
 
 RealClip read_real_clip(const fs::path& folder) {
@@ -194,7 +205,7 @@ RealClip read_real_clip(const fs::path& folder) {
   repair_microseconds(clip.events);
   const TimeNs start = clip.events.front().t;
   for (Event& event : clip.events) event.t -= start;
-  clip.duration_s = to_seconds(clip.events.back().t);
+  clip.duration_s = clip.complete_s = to_seconds(clip.events.back().t);
   return clip;
 }
 

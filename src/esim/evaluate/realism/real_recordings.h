@@ -17,8 +17,13 @@ struct RealClip {
   std::string name;
   std::vector<Event> events;  ///< from time 0 on
   double duration_s = 0;
-  Image<float> frame;           ///< linear intensity, 1 = white, at the middle of the recording
-  Image<float> flow_x, flow_y;  ///< displacement of each pixel during the recording, px
+  Image<float> frame;           ///< linear intensity, 1 = white, at the middle of the complete recording
+  Image<float> flow_x, flow_y;  ///< displacement of each pixel during the complete recording, px
+  double start_s = 0;           ///< of this part, after the start of the complete recording
+  double complete_s = 0;        ///< duration of the complete recording
+
+  /// From one fraction of the duration to another.
+  RealClip part(double from, double to) const;
 
   /// The frame displaced along the flow, at a time (from 0 to duration_s, or beyond).
   Image<float> image_at(double s) const;

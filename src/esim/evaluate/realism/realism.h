@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,11 +20,20 @@ struct SensorModel {
   std::string command{};
 };
 
+/// A part of a clip, in fractions of its duration: from its start, or to its end.
+struct ClipPart {
+  std::string clip;
+  double from = 0, to = 0.5;
+};
+
 struct RealismOptions {
   std::uint64_t seed = 1;
   int threads = 1;
   double frame_step_s = 2.5e-4;  ///< of the frames that move
   double before_s = 0.03;        ///< motion before the clip, which does not count
+  /// If set, each event camera is also compared with its thresholds fitted to the numbers of ON and OFF events of this
+  /// part. Of that clip, only the rest is then compared.
+  std::optional<ClipPart> fit_to{};
 };
 
 /// A model against a clip of a real sensor.

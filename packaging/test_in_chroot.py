@@ -88,7 +88,7 @@ def main():
     refuse(f"{BIN}/esim", "play", "/out", "--out", "/out.mp4", reason="must end in .webp or .png")
     room = next(path for path in run(f"{BIN}/esim", "scenes").split() if path.endswith("/room.yaml"))
     refuse(f"{BIN}/esim", "simulate", room, "--out", "/gl", "--set", "renderer.engine=gl", "--quiet", reason="libegl1")
-    as_another_user = ("setpriv", "--reuid=nobody", "--clear-groups")
+    as_another_user = ("setpriv", "--reuid=65534", "--clear-groups")
     refuse(*as_another_user, f"{BIN}/esim", "simulate", room, "--out", f"{os.path.dirname(room)}/out", "--quiet", reason="choose another folder")
     imported = import_time()
     print(f"  {imported:5.2f} s  of processor time to import the package")

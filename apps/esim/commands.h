@@ -20,6 +20,7 @@ void add_play(CLI::App& app, int& exit_code);
 void add_stats(CLI::App& app, int& exit_code);
 void add_compare(CLI::App& app, int& exit_code);
 void add_characterise(CLI::App& app, int& exit_code);
+void add_fit(CLI::App& app, int& exit_code);
 void add_studio(CLI::App& app, int& exit_code);
 void add_evaluate(CLI::App& app, int& exit_code);
 void add_realism(CLI::App& evaluate, int& exit_code);

@@ -8,8 +8,8 @@
 #include <limits>
 #include <numbers>
 
-#include "esim/characterise/minimise.h"
 #include "esim/core/error.h"
+#include "esim/stats/numerics/minimise.h"
 
 namespace esim::inline characterise {
 namespace {

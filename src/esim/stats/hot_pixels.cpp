@@ -6,8 +6,8 @@
 #include <numeric>
 #include <tuple>
 
-#include "esim/stats/median.h"
-#include "esim/stats/probability.h"
+#include "esim/stats/numerics/median.h"
+#include "esim/stats/numerics/probability.h"
 
 namespace esim::inline stats {
 namespace {

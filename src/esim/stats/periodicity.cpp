@@ -6,8 +6,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "esim/stats/median.h"
-#include "esim/stats/probability.h"
+#include "esim/stats/numerics/median.h"
+#include "esim/stats/numerics/probability.h"
 #include "esim/stats/stream_sample.h"
 
 namespace esim::inline stats {

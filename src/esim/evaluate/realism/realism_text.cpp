@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "esim/evaluate/realism/realism.h"
+#include "esim/files/markdown_table.h"
 #include "esim/stats/statistics_text.h"
 
 namespace esim::inline evaluate {
@@ -12,25 +13,6 @@ namespace {
 
 using Cells = std::vector<std::string>;
 using Kind = ComparedStatistic::Kind;
-
-/// A table of Markdown, with aligned columns.
-std::string table_text(const std::vector<Cells>& rows) {
-  std::vector<std::size_t> widths;
-  for (const Cells& row : rows) {
-    widths.resize(std::max(widths.size(), row.size()));
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
-  }
-  std::string text;
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    for (std::size_t i = 0; i < widths.size(); ++i)
-      text += fmt::format("| {:<{}} ", i < rows[r].size() ? rows[r][i] : "", widths[i]);
-    text += "|\n";
-    if (r > 0) continue;
-    for (const std::size_t width : widths) text += "|" + std::string(width + 2, '-');
-    text += "|\n";
-  }
-  return text;
-}
 
 std::string value_text(double value, const std::string& unit) {
   if (std::isnan(value)) return "-";
@@ -57,7 +39,7 @@ std::string clip_table(const std::vector<const ClipResult*>& results) {
   }
   rows.push_back({"sum of deviations", ""});
   for (const ClipResult* result : results) rows.back().push_back(fmt::format("{:.0f}", result->sum_of_deviations()));
-  return table_text(rows);
+  return markdown_table(rows);
 }
 
 std::string noise_table(const std::vector<const NoiseResult*>& results) {
@@ -69,7 +51,7 @@ std::string noise_table(const std::vector<const NoiseResult*>& results) {
                     value_text(r->ks_counts_off, ""), value_text(r->ks_intervals_on, ""),
                     value_text(r->ks_intervals_off, "")});
   }
-  return table_text(rows);
+  return markdown_table(rows);
 }
 
 /// The tables of successive results of the same recording.

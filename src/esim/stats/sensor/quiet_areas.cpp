@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "esim/stats/probability.h"
+#include "esim/stats/numerics/probability.h"
 
 namespace esim::inline stats {
 namespace {

@@ -1,4 +1,4 @@
-#include "esim/stats/median.h"
+#include "esim/stats/numerics/median.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -7,8 +7,7 @@
 #include <utility>
 #include <vector>
 
-// Private to characterise.
-namespace esim::inline characterise {
+namespace esim::inline stats {
 
 /// A local minimum of a function by the simplex method of Nelder and Mead (Computer Journal 7, 1965). `steps` are the
 /// sizes of the first simplex. Ends when all corners are within `tolerance` times the steps of the best one.
@@ -65,4 +64,4 @@ inline std::vector<double> minimise(const std::function<double(const std::vector
   return std::min_element(simplex.begin(), simplex.end(), by_value)->at;
 }
 
-}  // namespace esim::inline characterise
+}  // namespace esim::inline stats

@@ -1,4 +1,4 @@
-#include "esim/stats/probability.h"
+#include "esim/stats/numerics/probability.h"
 
 #include <cmath>
 #include <limits>

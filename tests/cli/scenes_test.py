@@ -69,7 +69,7 @@ class Scenes(Installed):
 
         command = [self.program, "scenes", "--copy", "mine"]
         result = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=self.folder, preexec_fn=limit_files)
-        self.assert_refused(result, "cannot write mine/", "File too large")
+        self.assert_refused(result, "cannot write mine/")
 
     def test_missing_scenes_are_explained(self):
         elsewhere = self.folder / "elsewhere/bin/esim"

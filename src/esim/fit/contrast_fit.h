@@ -8,6 +8,7 @@
 #include "esim/core/image.h"
 #include "esim/core/time.h"
 #include "esim/events/event.h"
+#include "esim/fit/equations.h"
 #include "esim/fit/estimate.h"
 
 namespace esim::inline fit {
@@ -23,7 +24,7 @@ namespace esim::inline fit {
 ///   L(t) = c + C+ P - C- M - leak t + D L'(t) + d p - o / E(t)
 ///
 /// with the leak in ln/s, the delay D of the events, the polarity p of the events, and the offset o of the logarithm,
-/// L = ln(E + o). This is linear in all unknowns: least squares. If images follow each other four times faster than the
+/// L = ln(E + o). This is linear in all unknowns: least squares. If images follow each other twice as fast as the
 /// events of the pixel, t is the time of an event, and L is interpolated between the two images around it, which then
 /// also tell what the pixel misses. Otherwise, t is the time of an image, and P or M is interpolated between two events
 /// of the same polarity.
@@ -63,10 +64,6 @@ class ContrastFit {
   Result finish();
 
  private:
-  // An equation: C+, C-, leak; D C+, d, o; and L.
-  static constexpr std::size_t kOfPixel = 3, kShared = 3, kColumns = kOfPixel + kShared, kValues = kColumns + 1;
-  using Products = std::array<double, kValues*(kValues + 1) / 2>;  // of two values each, by rows
-
   struct KeptImage {
     TimeNs t;
     std::vector<float> logs;  // L; NaN: unknown
@@ -91,9 +88,9 @@ class ContrastFit {
     std::uint32_t events = 0;  // all
     // Sums over the open stretch.
     std::uint32_t count = 0, stretches = 0;
-    std::array<double, kValues> sums{};
-    Products products{};
-    std::array<Products, 2> halves{};  // of closed stretches, centred
+    Equation sums{};
+    EquationProducts products{};
+    std::array<EquationProducts, 2> halves{};  // of closed stretches, about their means
     std::array<std::uint32_t, 2> equations{};
   };
 
@@ -105,10 +102,6 @@ class ContrastFit {
   void compare_at_image(Pixel& pixel, const Event& event, double way) const;
   void add_equation(Pixel& pixel, const Chain& chain, TimeNs t, double slope, double brightness) const;
   static void close(Pixel& pixel);
-  struct Algebra;
-  struct Solved;
-  std::vector<Solved> solve() const;
-  std::size_t block_of(int x, int y) const;
   Estimate find_dead_pixels() const;
 
   Options options_;

@@ -23,6 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kPortion = std::size_t{1} << 18;
 constexpr std::uint64_t kForReadout = 10'000'000;  // events of a recording from which the readout is found
+constexpr TimeNs kRounding = 10;                   // of seconds as text, in double precision
 constexpr double kClearRows = 3;                   // over chance
 constexpr double kClearScan = 0.9;                 // concentration
 
@@ -65,8 +66,9 @@ class Fitter {
     return *size;
   }
 
-  void show(const fs::path& path) {
-    if (options_.progress && !options_.progress(std::min(1.0, done_ / work_), path.filename().string()))
+  /// `part` of this recording has been read.
+  void show(const fs::path& path, double part) {
+    if (options_.progress && !options_.progress(std::min(1.0, (done_ + part) / work_), path.filename().string()))
       throw Interrupted();
   }
 
@@ -79,13 +81,17 @@ class Fitter {
     std::optional<TimeNs> first;
     TimeNs last = 0;
     while (file.read(events, kPortion)) {
-      show(path);
+      show(path, file.progress());
       if (events.empty()) continue;
       if (!first) first = events.front().t;
       last = events.back().t;
       intervals_->add(events);
       if (recording.events < kForReadout) readout.add(events);
       recording.events += events.size();
+      for (const Event& event : events) {
+        const TimeNs rest = event.t % kNsPerUs;
+        in_us_ += std::min(std::abs(rest), kNsPerUs - std::abs(rest)) <= kRounding;
+      }
       add(events);
     }
     intervals_->end_recording();
@@ -134,7 +140,7 @@ class Fitter {
     std::vector<Event> waiting, events;  // for their image
     bool more = true;
     while (images.next()) {
-      show(path);
+      show(path, images.progress());
       while (more && (waiting.empty() || waiting.back().t <= images.time())) {
         more = file.read(events, kPortion);
         if (more) waiting.insert(waiting.end(), events.begin(), events.end());
@@ -233,6 +239,9 @@ class Fitter {
       if (s.stamp_unit > 0) unit = std::min(unit, s.stamp_unit);
     }
     if (unit == std::numeric_limits<TimeNs>::max()) unit = 1;
+    std::uint64_t events = 0;
+    for (const FittedRecording& recording : fit_.recordings) events += recording.events;
+    if (unit < kNsPerUs && events > 0 && in_us_ == events) unit = kNsPerUs;
     stamp_unit_ = unit;
     const ShortestIntervals::Result shortest = intervals_->finish(unit);
     const Estimate& found = shortest.refractory;
@@ -301,6 +310,7 @@ class Fitter {
   std::optional<BackgroundFit::Result> background_, noisiest_;
   std::optional<ContrastFit::Result> thresholds_;
   TimeNs stamp_unit_ = 1;
+  std::uint64_t in_us_ = 0;  // events with time stamps in whole us, but for rounding
   double refractory_s_ = 0;  // as far as known
 };
 

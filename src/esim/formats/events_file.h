@@ -18,6 +18,7 @@ class EventsFile {
 
   const std::filesystem::path& path() const { return path_; }  ///< path of the events file
   std::optional<SensorSize> sensor() const { return sensor_; }
+  double progress() const { return source_->progress(); }  ///< fraction of the file that has been read, 0 to 1
 
   /// Replaces `events` by the next ones, at most `count`; returns false at the end. Throws UserError if a file with
   /// unsupported contents has no events at all.

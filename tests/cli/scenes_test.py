@@ -5,7 +5,9 @@ Run as: scenes_test.py ESIM_PROGRAM SCENES_FOLDER, with the standard library of 
 
 import os
 import pathlib
+import resource
 import shutil
+import signal
 import subprocess
 import sys
 import unittest
@@ -59,6 +61,15 @@ class Scenes(Installed):
         self.assertEqual(self.esim("check", "mine/poster.yaml").returncode, 0)
         self.assert_refused(self.esim("scenes", "--copy", "mine"), "mine exists", "--copy")
         self.assert_refused(self.esim("scenes", "--copy", "no/such/folder"), "no/such/folder", "No such file")
+
+    def test_incomplete_copies_are_errors(self):
+        def limit_files():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
+
+        command = [self.program, "scenes", "--copy", "mine"]
+        result = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=self.folder, preexec_fn=limit_files)
+        self.assert_refused(result, "cannot write mine/")
 
     def test_missing_scenes_are_explained(self):
         elsewhere = self.folder / "elsewhere/bin/esim"

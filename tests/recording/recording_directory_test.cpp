@@ -192,6 +192,7 @@ TEST_F(RecordingDirectoryTest, UnwritableParentIsNamed) {
   };
   EXPECT_TRUE(contains(failure("/proc/out"), "cannot create the directory /proc/out.incomplete: "));
   EXPECT_TRUE(contains(failure("/proc/a/out"), "cannot create the directory /proc/a: "));
+  EXPECT_TRUE(contains(failure("/proc/a/out"), "; choose another folder for the output"));
 }
 
 TEST_F(RecordingDirectoryTest, AFullDiskAtTheReportKeepsTheRecording) {

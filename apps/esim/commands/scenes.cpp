@@ -3,6 +3,7 @@
 
 #include "commands.h"
 #include "esim/core/error.h"
+#include "esim/files/output_file.h"
 #include "support.h"
 
 namespace esim::app {
@@ -30,13 +31,21 @@ void list(const fs::path& folder) {
 void copy_scenes(const fs::path& folder, const fs::path& to) {
   std::error_code error;
   if (fs::exists(to, error)) throw UserError(to.string() + " exists; choose another --copy, or remove it");
-  fs::copy(folder, to, fs::copy_options::recursive, error);
-  for (auto entry = fs::recursive_directory_iterator(to, error); !error && entry != fs::end(entry);
-       entry.increment(error)) {
-    fs::permissions(entry->path(), fs::perms::owner_write, fs::perm_options::add, error);
+  const auto require = [&](const fs::path& path) {
+    if (error) throw_cannot_write(path, error.message());
+  };
+  fs::create_directory(to, error);
+  require(to);
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
+    const fs::path copy = to / entry.path().lexically_relative(folder);
+    if (entry.is_directory()) {
+      fs::create_directory(copy, error);
+    } else {
+      fs::copy_file(entry.path(), copy, error);
+      if (!error) fs::permissions(copy, fs::perms::owner_write, fs::perm_options::add, error);
+    }
+    require(copy);
   }
-  if (!error) fs::permissions(to, fs::perms::owner_write, fs::perm_options::add, error);
-  if (error) throw OutputError(fmt::format("cannot write {}: {}", to.string(), error.message()));
 }
 
 }  // namespace

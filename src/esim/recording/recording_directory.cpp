@@ -52,6 +52,12 @@ void remove_recording(const fs::path& directory, std::error_code& error) {
   fs::remove_all(directory, error);
 }
 
+// Must be called before anything changes errno.
+[[noreturn]] void throw_cannot_create(const fs::path& directory) {
+  throw OutputError("cannot create the directory " + directory.string() + ": " + system_reason(errno) +
+                    "; choose another folder for the output");
+}
+
 bool is_home(const fs::path& directory) {
   const char* home = std::getenv("HOME");
   std::error_code error;
@@ -165,7 +171,7 @@ void RecordingDirectory::create_parents() {
     if (::mkdir(parent->c_str(), 0777) == 0) {
       created_parents_.push_back(*parent);
     } else if (errno != EEXIST) {
-      throw OutputError("cannot create the directory " + parent->string() + ": " + system_reason(errno));
+      throw_cannot_create(*parent);
     }
   }
 }
@@ -186,7 +192,7 @@ void RecordingDirectory::create_working_directory(bool force) {
     if (error) throw OutputError("cannot remove " + working_.string() + ": " + error.message());
   }
   if (::mkdir(working_.c_str(), 0777) != 0) {
-    throw OutputError("cannot create the directory " + working_.string() + ": " + system_reason(errno));
+    throw_cannot_create(working_);
   }
   owned_ = true;
   lock_ = lock_directory(working_);

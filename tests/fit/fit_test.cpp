@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "esim/core/error.h"
+#include "esim/fit/jackknife.h"
 #include "fit/known_sensors.h"
 #include "support/errors.h"
 
@@ -118,6 +119,16 @@ TEST(Fit, RefusesToInvent) {
   }
   const auto wrong = other.finish();
   EXPECT_TRUE(test::contains(wrong.on.reason, "same motion")) << wrong.on.value << " " << wrong.on.reason;
+}
+
+TEST(Fit, FractionsHaveWilsonsInterval) {
+  const Estimate some = fraction_estimate("dead_pixels", 10, 100, "");
+  EXPECT_NEAR(some.low, 0.0552, 1e-4);
+  EXPECT_NEAR(some.high, 0.1744, 1e-4);
+  const Estimate none = fraction_estimate("dead_pixels", 0, 100, ""), all = fraction_estimate("dead_pixels", 7, 7, "");
+  EXPECT_EQ(none.low, 0);
+  EXPECT_NEAR(none.high, 0.0370, 1e-4);
+  EXPECT_EQ(all.high, 1);
 }
 
 TEST(Fit, RefusesWrongImages) {

@@ -31,7 +31,8 @@ Estimate fraction_estimate(const char* name, std::uint64_t part, std::uint64_t a
   const double half = z / (1 + z2 / n) * std::sqrt(p * (1 - p) / n + z2 / (4 * n * n));
   Estimate e;
   e.name = name, e.source = source;
-  e.value = p, e.low = std::max(0.0, centre - half), e.high = std::min(1.0, centre + half);
+  // Exact at the ends, but for rounding.
+  e.value = p, e.low = part == 0 ? 0.0 : centre - half, e.high = part == all ? 1.0 : centre + half;
   return e;
 }
 

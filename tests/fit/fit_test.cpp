@@ -121,6 +121,38 @@ TEST(Fit, RefusesToInvent) {
   EXPECT_TRUE(test::contains(wrong.on.reason, "same motion")) << wrong.on.value << " " << wrong.on.reason;
 }
 
+TEST(Fit, TimesMayBeNegative) {
+  EventCameraOptions leaking, noisy;
+  leaking.leak_rate_hz = 0.3, leaking.leak_mismatch_decades = 0.2;
+  noisy.shot_noise_hz = 20, noisy.refractory_period_us = 200;
+  const auto fit = [&](double shift_s) {
+    std::vector<Event> leak = test::constant_light(leaking, 0.5F, 12, 1),
+                       noise = test::constant_light(noisy, 0.5F, 12, 1);
+    for (Event& event : leak) event.t += to_ns(shift_s);
+    for (Event& event : noise) event.t += to_ns(shift_s);
+    BackgroundFit regular(kSide, kSide), random(kSide, kSide);
+    regular.add(leak), random.add(noise);
+    ShortestIntervals intervals(kSide, kSide);
+    intervals.add(noise);
+    const auto a = regular.finish(12, 1), b = random.finish(12, 1);
+    return std::array{a.leak_rate.value, a.leak_decades.value, b.leak_rate.high, intervals.finish(1).refractory.value};
+  };
+  EXPECT_EQ(fit(0), fit(-100));
+}
+
+TEST(Fit, WrongTimeStampsAreNoRates) {
+  EventCameraOptions sensor;
+  sensor.leak_rate_hz = 1;
+  std::vector<Event> events = test::constant_light(sensor, 0.5F, 12, 1);
+  for (Event& event : events) event.t = kNsPerSecond;  // a clock that stands still
+  BackgroundFit background(kSide, kSide);
+  background.add(events);
+  const auto found = background.finish(12, 1);
+  EXPECT_NEAR(found.leak_rate.value, 1, 0.05);
+  EXPECT_FALSE(found.leak_jitter.determined());
+  EXPECT_FALSE(found.leak_decades.determined() && found.leak_decades.value > 0.1);
+}
+
 TEST(Fit, FractionsHaveWilsonsInterval) {
   const Estimate some = fraction_estimate("dead_pixels", 10, 100, "");
   EXPECT_NEAR(some.low, 0.0552, 1e-4);

@@ -88,8 +88,7 @@ void add_fit(CLI::App& app, int& exit_code) {
       "Examples:\n"
       "  esim fit --static wall.raw --moving desk.bag --base davis346 --out my_davis\n"
       "  esim fit street.raw                                     refractory period and readout, from events alone\n"
-      "  esim evaluate realism recordings --sensor my_davis/sensor.yaml\n"
-      "  esim simulate scenes/room.yaml --out out/room --set event_camera.preset=davis346");
+      "  esim evaluate realism recordings --sensor my_davis/sensor.yaml");
   command->callback([arguments, &exit_code] { exit_code = run(std::move(*arguments)); });
 }
 

@@ -15,7 +15,6 @@
 namespace esim::inline fit {
 namespace {
 
-constexpr double kQuantile = 1.959964;  // of the normal distribution, for 95 %
 constexpr double kFewestEvents = 200;
 constexpr double kPeriodic = 0.5;       // coefficient of variation of a pixel's intervals; 1: Poisson
 constexpr double kWithoutNoise = 0.02;  // OFF events as a fraction of the ON events
@@ -59,11 +58,16 @@ double surprisal(const LogNormal& d, const std::vector<KnownRate>& known, std::s
   return sum - static_cast<double>(silent) * std::log(std::max(probability, 1e-300));
 }
 
-Estimate make(const char* name, const char* unit, double value, double error) {
-  Estimate e;
-  e.name = name, e.unit = unit, e.source = kSource;
-  e.value = value, e.low = std::max(0.0, value - kQuantile * error), e.high = value + kQuantile * error;
-  return e;
+/// With a normal error.
+Estimate with_error(const char* name, const char* unit, double value, double error) {
+  const double reach = kNormalQuantile * error;
+  return Estimate::found(name, unit, value, std::max(0.0, value - reach), value + reach, kSource);
+}
+
+/// 10^value, with an error of the value; `quantile` of its distribution.
+Estimate of_log10(const char* name, const char* unit, double value, double error, double quantile) {
+  return Estimate::found(name, unit, std::pow(10, value), std::pow(10, value - quantile * error),
+                         std::pow(10, value + quantile * error), kSource);
 }
 
 }  // namespace
@@ -76,13 +80,14 @@ struct BackgroundFit::Kept {
   std::vector<One> pixels;
   double variation = 1;  // coefficient of variation of the intervals between ON events
   double intervals = 0;  // how many determine it
+  bool regular = true;   // every pixel has a rate
 };
 
 void BackgroundFit::add(EventSpan events) {
   for (const Event& event : events) {
-    if (start_ < 0) start_ = event.t;
+    if (!start_) start_ = event.t;
     Pixel& pixel = pixels_(event.x, event.y);
-    const std::size_t half = static_cast<std::size_t>((event.t - start_) / kStretch) % 2;
+    const std::size_t half = static_cast<std::size_t>((event.t - *start_) / kStretch) % 2;
     if (event.polarity < 0) {
       ++pixel.off[half];
       continue;
@@ -100,9 +105,8 @@ void BackgroundFit::add(EventSpan events) {
 
 BackgroundFit::Kept BackgroundFit::separate_hot_pixels(double duration_s, Result& result) const {
   const AreaGrid areas(pixels_.width(), pixels_.height());
-  std::vector<double> counts;
-  for (const Pixel& pixel : pixels_.pixels()) counts.push_back(pixel.count_on() + pixel.count_off());
-  std::vector<double> sorted = counts;
+  std::vector<double> sorted;
+  for (const Pixel& pixel : pixels_.pixels()) sorted.push_back(pixel.count_on() + pixel.count_off());
   std::sort(sorted.begin(), sorted.end());
   const auto quantile = [&](double part) {
     return sorted[static_cast<std::size_t>(part * static_cast<double>(sorted.size() - 1))];
@@ -125,7 +129,8 @@ BackgroundFit::Kept BackgroundFit::separate_hot_pixels(double duration_s, Result
       }
       kept.pixels.push_back({&pixel, areas.of(x, y)});
       const double intervals = pixel.count_on() - 1;
-      if (intervals < 2) continue;
+      if (intervals >= 1 && pixel.last == pixel.first) kept.regular = false;  // time stamps are wrong
+      if (intervals < 2 || pixel.last == pixel.first) continue;
       const double mean = to_seconds(pixel.last - pixel.first) / intervals;
       squares += (pixel.squares - intervals * mean * mean) / (mean * mean);
       kept.intervals += intervals - 1;
@@ -146,10 +151,9 @@ BackgroundFit::Kept BackgroundFit::separate_hot_pixels(double duration_s, Result
   for (const double value : hot) mean += value / n;
   for (const double value : hot) variance += (value - mean) * (value - mean) / (n - 1);
   const double error = std::sqrt(variance / n), t = student_quantile(n - 1);
-  result.hot_rate = make("hot_pixel_rate_hz", "Hz", std::pow(10, mean), 0);
-  result.hot_rate.low = std::pow(10, mean - t * error), result.hot_rate.high = std::pow(10, mean + t * error);
+  result.hot_rate = of_log10("hot_pixel_rate_hz", "Hz", mean, error, t);
   result.hot_decades =
-      make("circuit.hot_mismatch_decades", "", std::sqrt(variance), std::sqrt(variance / (2 * (n - 1))));
+      with_error("circuit.hot_mismatch_decades", "", std::sqrt(variance), std::sqrt(variance / (2 * (n - 1))));
   return kept;
 }
 
@@ -188,13 +192,10 @@ void BackgroundFit::fit_periodic(const Kept& kept, double duration_s, Result& re
     result.leak_decades = Estimate::unknown("leak_mismatch_decades", "", why);
     return;
   }
-  const double centre_error = std::sqrt(dd / determinant);
-  result.leak_rate = make("leak_rate_hz", "Hz", std::pow(10, centre), 0);
-  result.leak_rate.low = std::pow(10, centre - kQuantile * centre_error);
-  result.leak_rate.high = std::pow(10, centre + kQuantile * centre_error);
-  result.leak_decades = make("leak_mismatch_decades", "", decades, std::sqrt(cc / determinant));
+  result.leak_rate = of_log10("leak_rate_hz", "Hz", centre, std::sqrt(dd / determinant), kNormalQuantile);
+  result.leak_decades = with_error("leak_mismatch_decades", "", decades, std::sqrt(cc / determinant));
   if (kept.intervals > 0) {
-    result.leak_jitter = make("leak_jitter", "", kept.variation, kept.variation / std::sqrt(2 * kept.intervals));
+    result.leak_jitter = with_error("leak_jitter", "", kept.variation, kept.variation / std::sqrt(2 * kept.intervals));
   }
   result.leak.title = "Leak rates of the pixels", result.leak.axis = "log10(rate / Hz)";
   for (const KnownRate& pixel : known) result.leak.values.push_back(pixel.log_rate);
@@ -225,8 +226,8 @@ void BackgroundFit::fit_moments(const Kept& kept, double duration_s, double rati
     return;
   }
   const Jackknifed &rate = (*found)[0], &spread = (*found)[1];
-  result.leak_rate = make("leak_rate_hz", "Hz", std::max(0.0, rate.value), 0);
-  result.leak_rate.low = std::max(0.0, rate.low()), result.leak_rate.high = std::max(0.0, rate.high());
+  result.leak_rate = Estimate::found("leak_rate_hz", "Hz", std::max(0.0, rate.value), std::max(0.0, rate.low()),
+                                     std::max(0.0, rate.high()), kSource);
   const double stretches = duration_s / to_seconds(kStretch);
   if (rate.low() <= 0 || stretches < kFewestStretches) {
     result.leak_decades = Estimate::unknown(
@@ -234,9 +235,8 @@ void BackgroundFit::fit_moments(const Kept& kept, double duration_s, double rati
         rate.low() <= 0 ? "the leak cannot be told from the noise" : "noise hides it in recordings shorter than 10 s");
     return;
   }
-  result.leak_decades = make("leak_mismatch_decades", "", std::sqrt(spread.value), 0);
-  result.leak_decades.low = std::sqrt(std::max(0.0, spread.low()));
-  result.leak_decades.high = std::sqrt(std::max(0.0, spread.high()));
+  result.leak_decades = Estimate::found("leak_mismatch_decades", "", std::sqrt(spread.value),
+                                        std::sqrt(std::max(0.0, spread.low())), std::sqrt(spread.high()), kSource);
 }
 
 BackgroundFit::Result BackgroundFit::finish(double duration_s, double ratio) const {
@@ -251,17 +251,16 @@ BackgroundFit::Result BackgroundFit::finish(double duration_s, double ratio) con
 
   constexpr double kNoneSeen = 3.7;  // mean of a Poisson variable that is 0 with a probability of 2.5 %
   const double off_error = std::sqrt(std::max(off, off_squares - off * off / n)) / (n * duration_s);
-  result.noise = make("shot_noise_hz", "Hz", 2 * result.off_hz, 2 * off_error);
+  result.noise = with_error("shot_noise_hz", "Hz", 2 * result.off_hz, 2 * off_error);
   if (off == 0) result.noise.high = 2 * kNoneSeen / (n * duration_s);
 
   if (on < kFewestEvents) {
-    const std::string why = fmt::format(
-        "the recording has only {:.0f} ON events of pixels that are not hot; at least "
-        "{:.0f} are necessary",
-        on, kFewestEvents);
+    const std::string why =
+        fmt::format("the recording has only {:.0f} ON events of pixels that are not hot; at least {:.0f} are necessary",
+                    on, kFewestEvents);
     result.leak_rate = Estimate::unknown("leak_rate_hz", "Hz", why);
     result.leak_decades = Estimate::unknown("leak_mismatch_decades", "", why);
-  } else if (off < kWithoutNoise * on && kept.variation < kPeriodic) {
+  } else if (kept.regular && off < kWithoutNoise * on && kept.variation < kPeriodic) {
     fit_periodic(kept, duration_s, result);
   } else {
     fit_moments(kept, duration_s, ratio, result);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "esim/core/image.h"
@@ -49,7 +50,7 @@ class BackgroundFit {
   void fit_moments(const Kept& kept, double duration_s, double ratio, Result& result) const;
 
   Image<Pixel> pixels_;
-  TimeNs start_ = -1;
+  std::optional<TimeNs> start_;
 };
 
 }  // namespace esim::inline fit

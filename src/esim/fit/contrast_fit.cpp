@@ -158,10 +158,7 @@ ContrastFit::Result ContrastFit::finish() {
   const auto estimate = [&](const char* name, const char* unit, PixelThresholds::Value which, double factor) {
     if (problem) return Estimate::unknown(name, unit, *problem);
     const Jackknifed& found = pixels.values()[which];
-    Estimate e;
-    e.name = name, e.unit = unit, e.source = kSource;
-    e.value = factor * found.value, e.low = factor * found.low(), e.high = factor * found.high();
-    return e;
+    return Estimate::found(name, unit, factor * found.value, factor * found.low(), factor * found.high(), kSource);
   };
   const auto root = [&](const char* name, PixelThresholds::Value which) {  // of a variance
     if (!problem && !pixels.knows_spread())

@@ -26,14 +26,11 @@ std::optional<std::vector<Jackknifed>> jackknife(
 Estimate fraction_estimate(const char* name, std::uint64_t part, std::uint64_t all, const char* source) {
   if (all == 0) return Estimate::unknown(name, "", "no pixel has enough events around it");
   const auto n = static_cast<double>(all);
-  const double p = static_cast<double>(part) / n, z = 1.959964, z2 = z * z;
+  const double p = static_cast<double>(part) / n, z = kNormalQuantile, z2 = z * z;
   const double centre = (p + z2 / (2 * n)) / (1 + z2 / n);
   const double half = z / (1 + z2 / n) * std::sqrt(p * (1 - p) / n + z2 / (4 * n * n));
-  Estimate e;
-  e.name = name, e.source = source;
-  // Exact at the ends, but for rounding.
-  e.value = p, e.low = part == 0 ? 0.0 : centre - half, e.high = part == all ? 1.0 : centre + half;
-  return e;
+  // At 0 and 1, the interval ends there, but for rounding.
+  return Estimate::found(name, "", p, part == 0 ? 0.0 : centre - half, part == all ? 1.0 : centre + half, source);
 }
 
 }  // namespace esim::inline fit

@@ -23,9 +23,11 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kPortion = std::size_t{1} << 18;
 constexpr std::uint64_t kForReadout = 10'000'000;  // events of a recording from which the readout is found
-constexpr TimeNs kRounding = 10;                   // of seconds as text, in double precision
-constexpr double kClearRows = 3;                   // over chance
-constexpr double kClearScan = 0.9;                 // concentration
+constexpr std::uint64_t kFewestForReadout = 1000;
+constexpr double kSmallestUnit_us = 0.1;  // finer time stamps are not rounded
+constexpr TimeNs kRounding = 10;          // of seconds as text, in double precision
+constexpr double kClearRows = 3;          // over chance
+constexpr double kClearScan = 0.9;        // concentration
 
 struct Interrupted {};
 
@@ -109,7 +111,7 @@ class Fitter {
     const RecordingInfo info = open_source(path, read_options())->info();
     if (info.start_known && info.end > info.start) recording.duration_s = to_seconds(info.end - info.start);
     fit_.recordings.push_back(recording);
-    constant_.push_back({std::move(background), recording.duration_s, path.filename().string()});
+    constant_.push_back({std::move(background), recording.duration_s});
   }
 
   void read_other(const fs::path& path, const char* use) {
@@ -207,7 +209,8 @@ class Fitter {
     const bool known = thresholds_ && thresholds_->on.determined();
     read_leak(known ? thresholds_->off.value / thresholds_->on.value : base_.threshold_off() / base_.threshold_on());
     if (!background_) {
-      const char* const why = "no recording in constant light";
+      const char* const why =
+          constant_.empty() ? "no recording in constant light" : "the recordings in constant light have no duration";
       for (const auto& [name, unit] : {std::pair{"leak_rate_hz", "Hz"},
                                        {"leak_mismatch_decades", ""},
                                        {"hot_pixels", ""},
@@ -264,23 +267,21 @@ class Fitter {
     for (const SensorStatistics& s : readouts_) {
       if (busiest == nullptr || s.events > busiest->events) busiest = &s;
     }
-    const auto value = [&](const char* name, const char* unit, double number, double precision, const char* source) {
-      Estimate e;
-      e.name = name, e.unit = unit, e.value = number, e.low = number - precision, e.high = number + precision;
-      e.source = source;
-      return e;
-    };
-    if (busiest == nullptr || busiest->events < 1000) {
-      add(Estimate::unknown("readout.time_stamp_us", "us", "fewer than 1000 events"));
+    if (busiest == nullptr || busiest->events < kFewestForReadout) {
+      add(Estimate::unknown("readout.time_stamp_us", "us", fmt::format("fewer than {} events", kFewestForReadout)));
       return;
     }
     const double unit_us = 1e-3 * static_cast<double>(stamp_unit_);
-    if (base_.circuit) add(value("readout.time_stamp_us", "us", unit_us >= 0.1 ? unit_us : 0, 0, "time stamps"));
+    if (base_.circuit) {
+      const double rounded_us = unit_us >= kSmallestUnit_us ? unit_us : 0;
+      add(Estimate::found("readout.time_stamp_us", "us", rounded_us, rounded_us, rounded_us, "time stamps"));
+    }
     if (busiest->scan && busiest->scan->concentration > kClearScan) {
       // The phase is known to a part of the period in the whole recording.
       const double period_us = 1e6 * busiest->scan->period_s,
                    error_us = period_us * busiest->scan->period_s / std::max(1e-3, busiest->duration_s);
-      const Estimate period = value("readout.scan_period_us", "us", period_us, error_us, "time stamps of the columns");
+      const Estimate period = Estimate::found("readout.scan_period_us", "us", period_us, period_us - error_us,
+                                              period_us + error_us, "time stamps of the columns");
       base_.circuit ? add(period) : fit_.observations.push_back(period);
     }
     const double rows = busiest->same_us.row_over_chance(fit_.sensor.height);
@@ -295,7 +296,6 @@ class Fitter {
   struct Constant {
     BackgroundFit background;
     double duration_s;
-    std::string name;
   };
 
   const FitInput& input_;
@@ -315,14 +315,6 @@ class Fitter {
 };
 
 }  // namespace
-
-std::vector<std::string> SensorFit::overrides() const {
-  std::vector<std::string> texts;
-  for (const Estimate& e : estimates) {
-    if (e.determined()) texts.push_back(fmt::format("{}={:.6g}", e.name, e.value));
-  }
-  return texts;
-}
 
 std::optional<SensorFit> fit_sensor(const FitInput& input, const FitOptions& options) {
   try {

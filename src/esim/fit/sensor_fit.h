@@ -46,9 +46,6 @@ struct SensorFit {
   std::vector<Estimate> observations;  ///< that are no parameters, such as the delay of the events
   std::vector<std::string> notes;
   std::vector<FittedDistribution> distributions;
-
-  /// Those that are determined, as options of an event camera with the preset `base`: "leak_rate_hz=0.1".
-  std::vector<std::string> overrides() const;
 };
 
 /// Fits a sensor to recordings (docs/methods/fitting.md). What they do not determine says why. Throws UserError if

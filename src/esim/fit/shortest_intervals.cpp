@@ -66,11 +66,10 @@ ShortestIntervals::Result ShortestIntervals::finish(TimeNs stamp_unit) const {
                     t.front()));
   }
   const double mean = reach / n;  // between the shortest intervals
-  Estimate& e = result.refractory;
-  e.name = "refractory_period_us", e.unit = "us", e.source = "shortest intervals between events";
   // Rounded time stamps move an interval by up to their unit.
-  e.value = std::max(0.0, t.front() - mean);
-  e.low = std::max(0.0, t.front() - kHigh * mean - unit), e.high = t.front() - kLow * mean + unit;
+  result.refractory = Estimate::found("refractory_period_us", "us", std::max(0.0, t.front() - mean),
+                                      std::max(0.0, t.front() - kHigh * mean - unit), t.front() - kLow * mean + unit,
+                                      "shortest intervals between events");
   return result;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "esim/core/image.h"
@@ -32,7 +33,7 @@ class ShortestIntervals {
   Result finish(TimeNs stamp_unit) const;
 
  private:
-  static constexpr TimeNs kNone = -1;
+  static constexpr TimeNs kNone = std::numeric_limits<TimeNs>::min();
   static constexpr std::size_t kKept = 256;
 
   Image<TimeNs> last_;

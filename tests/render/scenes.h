@@ -10,6 +10,7 @@
 #include "esim/backends/opengl/gl_renderer.h"
 #include "esim/backends/panorama/panorama_renderer.h"
 #include "esim/backends/plane/plane_renderer.h"
+#include "esim/backends/raycast/raster/raster_renderer.h"
 #include "esim/backends/raycast/raycast_renderer.h"
 #include "esim/backends/sprites/sprites_renderer.h"
 #include "esim/geometry/so3.h"
@@ -157,7 +158,8 @@ inline bool has_gl() { return !gl_devices().empty(); }
 
 /// The renderers that make_renderer() makes: those of a 3D scene, and those that draw on the sensor. "moving": two
 /// objects move.
-inline constexpr std::array kRenderersOfSpace = {"panorama", "plane", "mesh", "moving_mesh", "gl", "moving_gl"};
+inline constexpr std::array kRenderersOfSpace = {"panorama", "plane",         "mesh", "moving_mesh",
+                                                 "raster",   "moving_raster", "gl",   "moving_gl"};
 inline constexpr std::array kRenderersOnSensor = {"sprites"};
 
 /// Every renderer on a scene that fills the view from near the origin. Those of `gl` and `sprites` ignore `area`.
@@ -171,6 +173,8 @@ inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Ca
   if (name == "sprites") return make_sprites_renderer(test_sprites(), camera, workers);
   const Scene scene = name.starts_with("moving") ? moving_scene() : still_scene(box_mesh());
   if (name.ends_with("gl")) return make_gl_renderer(scene, {}, camera);
+  if (name.ends_with("raster"))
+    return make_raster_renderer(build_raster_scene(scene), {}, camera, workers, kNone, area);
   return make_raycast_renderer(build_raycast_scene(scene), {}, camera, workers, kNone, area);
 }
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "esim/backends/raycast/edges.h"
-#include "esim/backends/raycast/lights.h"
+#include "esim/backends/raycast/shading.h"
 #include "esim/core/error.h"
 #include "esim/render/bands.h"
 
@@ -42,28 +42,6 @@ std::vector<Eigen::Vector2f> lattice(int count) {
   }
   return places;
 }
-
-/// The scene at one time, seen from one pose.
-struct Moment {
-  std::vector<PlacedGroup> groups;
-  std::optional<Lighting> lighting;  // in the camera frame
-};
-
-/// K rays in the stages of rendering.
-template <int K>
-struct Rays {
-  const RayBlock* block;
-  int first;                            // of the block's lanes
-  const std::uint32_t* first_material;  // per lane, for its pixel's colour; null: luminance
-  Packet<K> packet;
-  std::uint32_t hits;                                 // a bit per lane, like `lit`
-  std::uint32_t lit;                                  // lanes whose surfaces are lit
-  alignas(64) std::array<std::uint32_t, K> triangle;  // index in the scene; 0 without a hit
-  TextureLookup<K> at;
-  alignas(64) std::array<std::uint32_t, K> material;
-  alignas(64) std::array<float, K> light;  // that the surface receives
-  alignas(64) std::array<float, K> irradiance;
-};
 
 /// The triangles of a group that a cell of the image may see.
 struct CellView {
@@ -110,7 +88,7 @@ class RaycastRenderer final : public ProcessorRenderer {
   RaycastRenderer(std::shared_ptr<const RaycastScene> scene, const RaycastOptions& options, const Camera& camera,
                   const Workers& workers, ColourFilters filters, const PixelArea& area)
       : scene_(std::move(scene)),
-        background_(options.background),
+        shading_(*scene_, options.background),
         places_(lattice(options.samples_per_pixel)),
         area_(area),
         rays_(camera, area.texture),
@@ -131,11 +109,7 @@ class RaycastRenderer final : public ProcessorRenderer {
  private:
   void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
     std::vector<Moment> moments;
-    for (const RenderRequest& request : requests) {
-      moments.push_back({scene_->place(request), scene_->lighting()});
-      Moment& moment = moments.back();
-      if (moment.lighting) moment.lighting = in_camera_frame(*moment.lighting, moment.groups[0]);
-    }
+    for (const RenderRequest& request : requests) moments.emplace_back(*scene_, request);
     render_in_bands(requests, rays_, workers_, sample, [&](std::size_t which, const Tile& band) {
       switch (scene_->packet_size()) {
         case 16:
@@ -199,7 +173,7 @@ class RaycastRenderer final : public ProcessorRenderer {
                     Sample& sample) const {
     for (Work<K>& work : batch) trace(moment, views, {0, 0}, work.rays);
     for (Work<K>& work : batch) store_geometry(work, band, sample);
-    shade<K>(moment, batch, area_.alone());
+    shading_.shade<K>(moment, batch, area_.alone());
     if (places_.size() > 1) smooth_edges<K>(moment, views, batch);
     for (Work<K>& work : batch) store(work, work.rays.irradiance.data(), band, sample.irradiance);
   }
@@ -242,7 +216,7 @@ class RaycastRenderer final : public ProcessorRenderer {
       trace(moment, views, area_.side * place, corner);
       corner.light = work.rays.light;
       if (const std::uint32_t lit = corner.hits & work.rays.lit; shadows && lit != 0)
-        light_up(moment, rotations, lit, corner);
+        shading_.light_up(moment, rotations, lit, corner);
       edges |= pixels_on_edges<K>(*scene_, *corner.block, corner.first, centre,
                                   {corner.packet, corner.triangle, corner.light});
     }
@@ -264,7 +238,7 @@ class RaycastRenderer final : public ProcessorRenderer {
   template <int K>
   void look_closer(const Moment& moment, std::span<const CellView> views, std::span<EdgeWork<K>> edges) const {
     for (EdgeWork<K>& edge : edges) trace(moment, views, {0, 0}, edge.rays);
-    shade<K>(moment, edges, Area::together());
+    shading_.shade<K>(moment, edges, Area::together());
     for (EdgeWork<K>& edge : edges) {
       const float sum = std::accumulate(edge.rays.irradiance.begin(), edge.rays.irradiance.end(), 0.0F);
       edge.pixel->rays.irradiance[edge.lane] += sum / static_cast<float>(places_.size());
@@ -303,55 +277,9 @@ class RaycastRenderer final : public ProcessorRenderer {
     store(work, objects.data(), band, sample.object);
   }
 
-  /// Processes the rays in stages, so that memory for a stage arrives while other rays are in the previous one. Each
-  /// ray covers `footprint` pixels along each side.
-  template <int K, typename W>
-  void shade(const Moment& moment, std::span<W> batch, float footprint) const {
-    GroupRotations<K> rotations;
-    for (W& work : batch) locate(moment, rotations, footprint, work.rays);
-    for (W& work : batch) shade(moment, rotations, work.rays);
-  }
-  template <int K>
-  void locate(const Moment& moment, GroupRotations<K>& rotations, float footprint, Rays<K>& rays) const {
-    if (rays.hits == 0) return;
-    HitTriangles<K> triangles;
-    triangles.gather(*scene_, rays.triangle);
-    rotations.select(rays.packet, moment.groups);
-    locate_on_textures<K>(rays.packet, *rays.block, rays.first, footprint, rotations, triangles, rays.at);
-    rays.material = triangles.material;
-    if (rays.first_material == nullptr) return;
-    for (unsigned i = 0; i < K; ++i) rays.material[i] += rays.first_material[i];
-  }
-
-  template <int K>
-  void shade(const Moment& moment, GroupRotations<K>& rotations, Rays<K>& rays) const {
-    SurfaceColours<K> colours;
-    colours.look_up(*scene_, rays.material, rays.at, rays.hits);
-    rays.light.fill(1);
-    rays.lit = moment.lighting ? rays.hits & ~colours.unlit : 0;
-    if (rays.lit != 0) light_up(moment, rotations, rays.lit, rays);
-    const std::uint32_t hits = rays.hits;
-    const float background = background_;
-#pragma omp simd
-    for (unsigned i = 0; i < K; ++i) {
-      const float seen = colours.base[i] * rays.light[i] + colours.emission[i];
-      rays.irradiance[i] = (hits >> i & 1U) != 0 ? seen : background;
-    }
-  }
-
   /// For rays that are all in the pixel `lane` of a block.
   const std::uint32_t* first_material_of_edge(int lane) const {
     return first_material_of_edges_[colour_at(lane % RayBlock::kSide, lane / RayBlock::kSide)].data();
-  }
-
-  /// Computes the light on the surfaces that the lanes of `lit` have hit.
-  template <int K>
-  void light_up(const Moment& moment, GroupRotations<K>& rotations, std::uint32_t lit, Rays<K>& rays) const {
-    rotations.select(rays.packet, moment.groups);
-    SurfacePoints<K> surface;
-    surface.take(*scene_, rays.packet, rays.triangle, rotations);
-    const std::array<float, K> light = LightOnSurfaces<K>(*moment.lighting, moment.groups).at(surface, lit);
-    for (unsigned i = 0; i < K; ++i) rays.light[i] = (lit >> i & 1U) != 0 ? light[i] : rays.light[i];
   }
 
   static constexpr float kHalf = 0.5F;
@@ -360,7 +288,7 @@ class RaycastRenderer final : public ProcessorRenderer {
       Eigen::Vector2f{kHalf, kHalf}};
 
   std::shared_ptr<const RaycastScene> scene_;
-  float background_;
+  Shading shading_;
   std::vector<Eigen::Vector2f> places_;  // of the rays in a pixel that an edge crosses
   Area area_;
   PixelRays rays_;

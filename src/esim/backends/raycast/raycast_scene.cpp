@@ -92,7 +92,7 @@ BearingBounds bounds_in_view(const Eigen::AlignedBox3f& box, const SE3& T_group_
 
 }  // namespace
 
-RaycastScene::RaycastScene(const Scene& scene) : lighting_(scene.lighting) {
+RaycastScene::RaycastScene(const Scene& scene, SceneUse use) : use_(use), lighting_(scene.lighting) {
   device_.reset(rtcNewDevice("hugepages=1"));
   if (device_ == nullptr) throw_on_error(nullptr, "start");
   if (rtcGetDeviceProperty(device_.get(), RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0) packet_size_ = 8;
@@ -133,13 +133,15 @@ void RaycastScene::add_group(const std::vector<const Mesh*>& meshes) {
     for (const Eigen::Vector3f& vertex : mesh->vertices) group.bounds.extend(vertex);
   }
   if (triangles_.size() == group.first_triangle) return;
+  const Mesh all = meshes.size() == 1 ? Mesh() : joined(meshes);
+  const Mesh& mesh = meshes.size() == 1 ? *meshes[0] : all;
+  if (use_ == SceneUse::surfaces || mesh.triangles.size() <= kMaxInTree)
+    group.tree = TriangleTree(mesh.vertices, mesh.triangles);
+  if (use_ == SceneUse::surfaces && !(lighting_ && lighting_->shadows)) return;
   group.accelerator.reset(rtcNewScene(device_.get()));
   rtcSetSceneFlags(group.accelerator.get(), RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(group.accelerator.get(), RTC_BUILD_QUALITY_HIGH);  // slower to build, faster to query
-  const Mesh all = meshes.size() == 1 ? Mesh() : joined(meshes);
-  const Mesh& mesh = meshes.size() == 1 ? *meshes[0] : all;
   attach(device_.get(), group.accelerator.get(), mesh);
-  if (mesh.triangles.size() <= kMaxInTree) group.tree = TriangleTree(mesh.vertices, mesh.triangles);
   // One thread builds the tree, so that it is the same in every run. (The device's own limit on threads would affect
   // the complete process.)
   tbb::task_arena(1).execute([&group] { rtcJoinCommitScene(group.accelerator.get()); });
@@ -171,7 +173,8 @@ std::vector<PlacedGroup> RaycastScene::place(const RenderRequest& request) const
     const SE3 T_group_camera = T_world_group.inverse() * request.camera.T_world_body;
     const Eigen::Matrix3f R_group_camera = T_group_camera.rotation.toRotationMatrix().cast<float>();
     placed.push_back({group.accelerator.get(), &group.tree, R_group_camera, R_group_camera.transpose(),
-                      T_group_camera.translation.cast<float>(), bounds_in_view(group.bounds, T_group_camera)});
+                      T_group_camera.translation.cast<float>(), bounds_in_view(group.bounds, T_group_camera),
+                      group.first_triangle});
   }
   return placed;
 }

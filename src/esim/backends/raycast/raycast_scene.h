@@ -32,18 +32,25 @@ using ScenePointer = std::unique_ptr<RTCSceneTy, ReleaseScene>;
 
 /// A rigid group of triangles, as a camera sees it at one time.
 struct PlacedGroup {
-  RTCScene triangles;        // in the group's frame; null if it is empty
+  RTCScene triangles;        // in the group's frame, for rays; null if there are none
   const TriangleTree* tree;  // of the same triangles
   Eigen::Matrix3f R_group_camera, R_camera_group;
-  Eigen::Vector3f camera;  // position of the camera in the group's frame
-  BearingBounds bounds;    // contain the visible part of the group
+  Eigen::Vector3f camera;        // position of the camera in the group's frame
+  BearingBounds bounds;          // contain the visible part of the group
+  std::uint32_t first_triangle;  // index in the scene
+};
+
+/// What a scene is prepared for.
+enum class SceneUse {
+  rays,     ///< rays of the camera and of shadows
+  surfaces  ///< projecting its triangles, and rays of shadows
 };
 
 /// The triangles of a scene in rigid groups: group 0 is static, group i + 1 is the i-th moving object. Immutable, so
 /// that any number of threads can use it for any times of the scene.
 class RaycastScene {
  public:
-  explicit RaycastScene(const Scene& scene);
+  explicit RaycastScene(const Scene& scene, SceneUse use = SceneUse::rays);
 
   int packet_size() const { return packet_size_; }
 
@@ -72,8 +79,8 @@ class RaycastScene {
  private:
   struct Group {
     std::uint32_t first_triangle;
-    ScenePointer accelerator;    // null without triangles
-    TriangleTree tree;           // empty if there are many triangles
+    ScenePointer accelerator;    // null without triangles, or if no ray is needed
+    TriangleTree tree;           // empty for rays if there are many triangles
     Eigen::AlignedBox3f bounds;  // of its vertices
   };
 
@@ -81,6 +88,7 @@ class RaycastScene {
   void append(const Mesh& mesh);
   void append_colours(const std::vector<const Mesh*>& meshes);
 
+  SceneUse use_;
   DevicePointer device_;
   int packet_size_ = 4;
   std::optional<Lighting> lighting_;

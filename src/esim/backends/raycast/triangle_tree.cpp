@@ -230,26 +230,32 @@ SeenTriangle seen(const std::array<Vector, 3>& corners, std::uint32_t index, con
 
 }  // namespace
 
-bool TriangleTree::find(const BearingBounds& bounds, const Eigen::Matrix3f& R_tree_camera, const Vector& camera,
-                        SeenTriangles& found) const {
-  if (nodes_.empty()) return false;
-  const Pyramid pyramid(bounds, R_tree_camera, camera, extent_);
-  constexpr std::size_t kDeep = 256;
-  std::array<std::uint32_t, kDeep> waiting;
-  std::size_t count = 0;
-  waiting[count++] = 0;
-  while (count > 0) {
-    const std::uint32_t next = waiting[--count];
+template <class Visit>
+bool TriangleTree::walk(const Pyramid& pyramid, const Visit& visit) const {
+  std::vector<std::uint32_t> waiting;
+  waiting.reserve(256);
+  waiting.push_back(0);
+  while (!waiting.empty()) {
+    const std::uint32_t next = waiting.back();
+    waiting.pop_back();
     if ((next & kLeaf) == 0) {
       const Node& node = nodes_[next];
-      for (unsigned met = pyramid.meets(node); met != 0; met &= met - 1) {
-        if (count == kDeep) return false;
-        waiting[count++] = node.child[static_cast<std::size_t>(std::countr_zero(met))];
-      }
+      for (unsigned met = pyramid.meets(node); met != 0; met &= met - 1)
+        waiting.push_back(node.child[static_cast<std::size_t>(std::countr_zero(met))]);
       continue;
     }
     const Leaf& leaf = leaves_[next & ~kLeaf];
-    for (unsigned met = pyramid.meets(leaf); met != 0; met &= met - 1) {
+    const unsigned met = pyramid.meets(leaf);
+    if (met != 0 && !visit(leaf, met)) return false;
+  }
+  return true;
+}
+
+bool TriangleTree::find(const BearingBounds& bounds, const Eigen::Matrix3f& R_tree_camera, const Vector& camera,
+                        SeenTriangles& found) const {
+  if (nodes_.empty()) return false;
+  return walk(Pyramid(bounds, R_tree_camera, camera, extent_), [&](const Leaf& leaf, unsigned met) {
+    for (; met != 0; met &= met - 1) {
       if (found.full()) return false;
       const auto i = static_cast<std::size_t>(std::countr_zero(met));
       const auto corner = [&](std::size_t c) {
@@ -257,8 +263,17 @@ bool TriangleTree::find(const BearingBounds& bounds, const Eigen::Matrix3f& R_tr
       };
       found.add(seen({corner(0), corner(1), corner(2)}, leaf.index[i], R_tree_camera, camera));
     }
-  }
-  return true;
+    return true;
+  });
+}
+
+void TriangleTree::find(const BearingBounds& bounds, const Eigen::Matrix3f& R_tree_camera, const Vector& camera,
+                        std::vector<LeafTriangles>& found) const {
+  if (nodes_.empty()) return;
+  walk(Pyramid(bounds, R_tree_camera, camera, extent_), [&](const Leaf& leaf, unsigned met) {
+    found.push_back({&leaf, met});
+    return true;
+  });
 }
 
 }  // namespace esim::inline backends::inline raycast

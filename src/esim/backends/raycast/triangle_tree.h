@@ -52,31 +52,48 @@ class TriangleTree {
   TriangleTree() = default;
   TriangleTree(std::span<const Eigen::Vector3f> vertices, std::span<const std::array<std::uint32_t, 3>> triangles);
 
+  static constexpr int kWide = 8;
+  using Lanes = std::array<float, kWide>;
+
+  /// Up to eight triangles: corner by corner, coordinate by coordinate. Lanes from `count` on repeat the last one.
+  struct alignas(64) Leaf {
+    std::array<std::array<Lanes, 3>, 3> corner;
+    std::array<std::uint32_t, kWide> index;
+    int count;
+  };
+
+  /// Triangles of a leaf, a bit for each.
+  struct LeafTriangles {
+    const Leaf* leaf;
+    unsigned triangles;
+  };
+
+  bool empty() const { return nodes_.empty(); }
+
   /// Adds the triangles that a camera may see in these bounds, in an order that depends on nothing else. False if they
   /// do not all fit, or if there is no tree.
   bool find(const BearingBounds& bounds, const Eigen::Matrix3f& R_tree_camera, const Eigen::Vector3f& camera,
             SeenTriangles& found) const;
 
- private:
-  static constexpr int kWide = 8;
-  using Lanes = std::array<float, kWide>;
+  /// The same triangles by their leaves, any number of them.
+  void find(const BearingBounds& bounds, const Eigen::Matrix3f& R_tree_camera, const Eigen::Vector3f& camera,
+            std::vector<LeafTriangles>& found) const;
 
+ private:
   /// The boxes of eight nodes or leaves: centres and half sides.
   struct alignas(64) Node {
     std::array<Lanes, 3> middle, half;
     std::array<std::uint32_t, kWide> child;  // kLeaf: of leaves_
     int count;
   };
-  /// Eight triangles: corner by corner, coordinate by coordinate.
-  struct alignas(64) Leaf {
-    std::array<std::array<Lanes, 3>, 3> corner;
-    std::array<std::uint32_t, kWide> index;
-    int count;
-  };
   static constexpr std::uint32_t kLeaf = 1U << 31;
 
   struct Pyramid;
   class Builder;
+
+  /// Calls visit(leaf, triangles) for every leaf with triangles in the pyramid, until it returns false.
+  template <class Visit>
+  bool walk(const Pyramid& pyramid, const Visit& visit) const;
 
   std::vector<Node> nodes_;  // the root first
   std::vector<Leaf> leaves_;

@@ -1,0 +1,216 @@
+#include "esim/backends/raycast/raster/coverage.h"
+
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+namespace esim::inline backends::inline raycast {
+namespace {
+
+constexpr float kMaxInverseDepth = 1 / kNearestDepth;
+constexpr float kTouch = 1e-4F;         // px; triangles that overlap by less touch each other
+constexpr float kSameDepth = 2e-6F;     // relative; surfaces at the same depth: the first one is visible
+constexpr std::size_t kMaxPieces = 24;  // of a fragment
+
+/// A rank-1 lattice, with no two positions in the same row or column.
+std::vector<PixelPoint> lattice(int count) {
+  const int generator = count == 64 ? 19 : 5;
+  const auto place = [count](int k) {
+    return (static_cast<float>(k % count) + 0.5F) / static_cast<float>(count) - 0.5F;
+  };
+  std::vector<PixelPoint> places;
+  for (int i = 0; i < count; ++i) places.push_back({place(i), place(generator * i)});
+  return places;
+}
+
+}  // namespace
+
+Coverage::Coverage(int samples, bool store_samples)
+    : samples_(lattice(samples)), store_samples_(store_samples), every_sample_(~std::uint64_t{0} >> (64 - samples)) {
+  for (std::size_t i = 0; i < samples_.size(); ++i) s_[i] = samples_[i].s, t_[i] = samples_[i].t;
+}
+
+SeenInMiddle Coverage::divide(const CellSurfaces& surfaces, const ImageCell& cell, int pixel,
+                              std::vector<Fragment>& fragments) {
+  const std::span<const Candidate> found = surfaces.at(pixel);
+  if (found.empty()) return {};
+  const auto k = static_cast<std::size_t>(pixel);
+  if (found.size() == 1 && found[0].fills_pixel != 0) {
+    const ScreenTriangle& triangle = surfaces.triangle(found[0].triangle);
+    fragments.push_back({found[0].triangle, static_cast<std::uint16_t>(pixel), {0, 0}, 1, every_sample_});
+    return {triangle.inverse_depth.at(cell.x[k], cell.y[k]), triangle.group};
+  }
+  localise(surfaces, cell, pixel);
+  const std::size_t before = fragments.size();
+  const bool may_be_exact = samples_.size() > 1 && candidates_.size() <= kMaxExact;
+  if (!may_be_exact || !divide_exactly(pixel, fragments)) {
+    fragments.resize(before);
+    divide_by_samples(pixel, fragments);
+  }
+  if (store_samples_) store_samples(std::span(fragments).subspan(before));
+  return look_at_middle();
+}
+
+void Coverage::localise(const CellSurfaces& surfaces, const ImageCell& cell, int pixel) {
+  const auto k = static_cast<std::size_t>(pixel);
+  const auto in_pixel = [&](const OfBearing& f) {
+    return OfPixel{f.at(cell.x[k], cell.y[k]), f.x * cell.dx_du[k] + f.y * cell.dy_du[k],
+                   f.x * cell.dx_dv[k] + f.y * cell.dy_dv[k]};
+  };
+  candidates_.clear();
+  for (const Candidate& candidate : surfaces.at(pixel)) {
+    const ScreenTriangle& triangle = surfaces.triangle(candidate.triangle);
+    Local local;
+    local.inverse_depth = in_pixel(triangle.inverse_depth);
+    const float depth_reach = local.inverse_depth.reach();
+    local.nearest = local.inverse_depth.middle + depth_reach;
+    local.farthest = local.inverse_depth.middle - depth_reach;
+    local.edges = 0;
+    local.triangle = candidate.triangle, local.group = triangle.group, local.index = triangle.index;
+    local.fills_pixel = candidate.fills_pixel;
+    bool outside = false;
+    std::size_t end = 3;
+    for (const OfBearing& weight : triangle.weight) {
+      const OfPixel edge = in_pixel(weight);
+      const float reach = edge.reach();
+      outside = outside || edge.middle < -reach;
+      local.weight[edge.middle < reach ? local.edges++ : --end] = edge;
+    }
+    if (!outside) candidates_.push_back(local);
+  }
+}
+
+SeenInMiddle Coverage::look_at_middle() const {
+  SeenInMiddle seen;
+  std::uint32_t index = ~0U;
+  for (const Local& local : candidates_) {
+    const float z = local.inverse_depth.middle;
+    const bool inside = local.weight[0].middle >= 0 && local.weight[1].middle >= 0 && local.weight[2].middle >= 0;
+    if (!inside || !(z > 0) || !(z <= kMaxInverseDepth)) continue;
+    if (z > seen.inverse_depth || (z == seen.inverse_depth && local.index < index))
+      seen = {z, local.group}, index = local.index;
+  }
+  return seen;
+}
+
+/// False if that takes too many polygons.
+bool Coverage::divide_exactly(int pixel, std::vector<Fragment>& fragments) {
+  for (const Local& local : candidates_) {
+    if (!add_visible(local, pixel, fragments)) return false;
+  }
+  return true;
+}
+
+bool Coverage::add_visible(const Local& surface, int pixel, std::vector<Fragment>& fragments) {
+  Convex whole = Convex::pixel(), rest;
+  for (std::size_t e = 0; e < surface.edges; ++e) whole.cut(surface.weight[e], rest);
+  const OfPixel& z = surface.inverse_depth;
+  if (surface.nearest > kMaxInverseDepth) whole.cut({kMaxInverseDepth - z.middle, -z.s, -z.t}, rest);
+  if (whole.empty()) return true;
+  pieces_.assign(1, whole);
+  for (const Local& other : candidates_) {
+    if (&other == &surface || other.nearest < surface.farthest) continue;
+    if (!hide(surface, other)) return false;
+    if (pieces_.empty()) return true;
+  }
+  float area = 0, s = 0, t = 0;
+  for (const Convex& piece : pieces_) piece.integrate(area, s, t);
+  if (area > kSmallestArea)
+    fragments.push_back({surface.triangle, static_cast<std::uint16_t>(pixel), {s / area, t / area}, area});
+  return true;
+}
+
+/// Removes from the pieces of a surface what another one hides. False if too many remain.
+bool Coverage::hide(const Local& surface, const Local& other) {
+  const OfPixel &z = surface.inverse_depth, &other_z = other.inverse_depth;
+  const OfPixel nearer{other_z.middle - z.middle, other_z.s - z.s, other_z.t - z.t};
+  const bool surely_nearer = other.farthest > surface.nearest;
+  kept_.clear();
+  for (Convex& piece : pieces_) {
+    bool apart = false;
+    for (std::size_t e = 0; e < other.edges && !apart; ++e) {
+      const OfPixel& edge = other.weight[e];
+      apart = piece.max(edge) <= kTouch * 2 * edge.reach();
+    }
+    bool same_depth = false;
+    if (!apart && !surely_nearer) {
+      same_depth = piece.max_abs(nearer) <= kSameDepth * std::max(surface.nearest, other.nearest);
+      apart = same_depth ? surface.index < other.index : piece.max(nearer) <= 0;
+    }
+    if (apart) {
+      kept_.push_back(piece);
+      continue;
+    }
+    constexpr std::size_t kMaxCuts = 5;
+    if (!piece.can_be_cut(kMaxCuts)) return false;
+    Convex rest;
+    const auto cut = [&](const OfPixel& f) {
+      piece.cut(f, rest);
+      if (!rest.empty()) kept_.push_back(rest);
+    };
+    for (std::size_t e = 0; e < other.edges; ++e) cut(other.weight[e]);
+    if (other.nearest > kMaxInverseDepth) cut({kMaxInverseDepth - other_z.middle, -other_z.s, -other_z.t});
+    if (!surely_nearer && !same_depth) cut(nearer);
+    if (kept_.size() > kMaxPieces) return false;
+  }
+  std::swap(pieces_, kept_);
+  return true;
+}
+
+void Coverage::look_at_samples() {
+  const std::size_t count = samples_.size();
+  alignas(64) std::array<float, kMaxSamples> depth;
+  alignas(64) std::array<std::uint32_t, kMaxSamples> index;
+  for (std::size_t i = 0; i < count; ++i) depth[i] = 0, index[i] = kNone, seen_[i] = kNone;
+  for (std::size_t c = 0; c < candidates_.size(); ++c) {
+    const Local& local = candidates_[c];
+    const auto [w0, w1, w2] = local.weight;
+    const OfPixel z = local.inverse_depth;
+    const std::uint32_t local_index = local.index, id = static_cast<std::uint32_t>(c);
+#pragma omp simd
+    for (std::size_t i = 0; i < count; ++i) {
+      const float s = s_[i], t = t_[i];
+      const float a = w0.middle + w0.s * s + w0.t * t, b = w1.middle + w1.s * s + w1.t * t;
+      const float e = w2.middle + w2.s * s + w2.t * t, at = z.middle + z.s * s + z.t * t;
+      const bool inside = (a >= 0) & (b >= 0) & (e >= 0) & (at > 0) & (at <= kMaxInverseDepth);
+      const bool nearer = inside & ((at > depth[i]) | ((at == depth[i]) & (local_index < index[i])));
+      depth[i] = nearer ? at : depth[i];
+      index[i] = nearer ? local_index : index[i];
+      seen_[i] = nearer ? id : seen_[i];
+    }
+  }
+}
+
+void Coverage::divide_by_samples(int pixel, std::vector<Fragment>& fragments) {
+  struct Sum {
+    float count = 0, s = 0, t = 0;
+  };
+  look_at_samples();
+  const std::size_t count = samples_.size();
+  std::vector<Sum> sums(candidates_.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    if (seen_[i] == kNone) continue;
+    Sum& sum = sums[seen_[i]];
+    sum.count += 1, sum.s += s_[i], sum.t += t_[i];
+  }
+  for (std::size_t c = 0; c < candidates_.size(); ++c) {
+    const Sum& sum = sums[c];
+    if (sum.count == 0) continue;
+    const PixelPoint centroid{sum.s / sum.count, sum.t / sum.count};
+    fragments.push_back(
+        {candidates_[c].triangle, static_cast<std::uint16_t>(pixel), centroid, sum.count / static_cast<float>(count)});
+  }
+}
+
+/// Fragments between samples have none.
+void Coverage::store_samples(std::span<Fragment> fragments) {
+  look_at_samples();
+  for (Fragment& fragment : fragments) {
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      if (seen_[i] != kNone && candidates_[seen_[i]].triangle == fragment.triangle)
+        fragment.samples |= std::uint64_t{1} << i;
+    }
+  }
+}
+
+}  // namespace esim::inline backends::inline raycast

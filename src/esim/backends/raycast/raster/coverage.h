@@ -1,0 +1,79 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "esim/backends/raycast/raster/cell_surfaces.h"
+#include "esim/backends/raycast/raster/convex.h"
+
+// Private to backends/raycast.
+namespace esim::inline backends::inline raycast {
+
+/// Smaller parts of a pixel are ignored.
+inline constexpr float kSmallestArea = 2e-5F;
+
+/// The visible part of a triangle in a pixel.
+struct Fragment {
+  std::uint32_t triangle;  ///< of the cell's
+  std::uint16_t pixel;     ///< of the cell
+  PixelPoint centroid;
+  float area;               ///< fraction of the pixel
+  std::uint64_t samples{};  ///< a bit for each position at which it is visible, if requested
+};
+
+/// What is seen in the middle of a pixel.
+struct SeenInMiddle {
+  float inverse_depth = 0;  ///< 0: nothing
+  std::uint32_t group = 0;
+};
+
+/// Divides a pixel among the triangles that are visible in it.
+class Coverage {
+ public:
+  /// More triangles are tested at sample positions.
+  static constexpr std::size_t kMaxExact = 24;
+
+  /// `samples` per pixel: 1, 16 or 64. `store_samples`: of fragments.
+  Coverage(int samples, bool store_samples);
+
+  /// Appends the fragments of a pixel. The sum of their areas is 1 if no background is visible. Areas are exact if
+  /// there are few candidates and several samples, and multiples of 1 / samples otherwise.
+  SeenInMiddle divide(const CellSurfaces& surfaces, const ImageCell& cell, int pixel, std::vector<Fragment>& fragments);
+
+  std::span<const PixelPoint> samples() const { return samples_; }
+
+ private:
+  /// A candidate in the pixel's coordinates.
+  struct Local {
+    std::array<OfPixel, 3> weight;
+    OfPixel inverse_depth;
+    float nearest, farthest;  // bounds of the inverse depth in the pixel
+    std::size_t edges;        // the first of `weight` that cross the pixel
+    std::uint32_t triangle, group, index;
+    std::uint16_t fills_pixel;
+  };
+
+  void localise(const CellSurfaces& surfaces, const ImageCell& cell, int pixel);
+  SeenInMiddle look_at_middle() const;
+  bool divide_exactly(int pixel, std::vector<Fragment>& fragments);
+  bool add_visible(const Local& surface, int pixel, std::vector<Fragment>& fragments);
+  bool hide(const Local& surface, const Local& other);
+  void look_at_samples();
+  void divide_by_samples(int pixel, std::vector<Fragment>& fragments);
+  void store_samples(std::span<Fragment> fragments);
+
+  static constexpr std::size_t kMaxSamples = 64;
+  static constexpr std::uint32_t kNone = ~0U;
+
+  std::vector<PixelPoint> samples_;
+  bool store_samples_;
+  std::uint64_t every_sample_;
+  alignas(64) std::array<float, kMaxSamples> s_, t_;
+  std::array<std::uint32_t, kMaxSamples> seen_;  // the candidate that is visible at each sample
+  std::vector<Local> candidates_;
+  std::vector<Convex> pieces_, kept_;
+};
+
+}  // namespace esim::inline backends::inline raycast

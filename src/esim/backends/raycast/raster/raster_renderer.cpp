@@ -1,0 +1,118 @@
+#include "esim/backends/raycast/raster/raster_renderer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <string>
+
+#include "esim/backends/raycast/raster/fragment_shading.h"
+#include "esim/core/error.h"
+#include "esim/render/bands.h"
+
+namespace esim::inline backends::inline raycast {
+namespace {
+
+class RasterRenderer final : public ProcessorRenderer {
+ public:
+  RasterRenderer(std::shared_ptr<const RaycastScene> scene, const RasterOptions& options, const Camera& camera,
+                 const Workers& workers, ColourFilters filters, const PixelArea& area)
+      : scene_(std::move(scene)),
+        options_(options),
+        side_(static_cast<float>(area.edges) / static_cast<float>(area.texture)),
+        rays_(camera, area.texture),
+        cells_(rays_, side_),
+        workers_(workers),
+        mosaic_(filters == ColourFilters::rggb && scene_->has_colours()) {}
+
+  RendererTraits traits() const override {
+    return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false};
+  }
+
+ private:
+  void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
+    std::vector<Moment> moments;
+    for (const RenderRequest& request : requests) moments.emplace_back(*scene_, request);
+    render_in_bands(requests, rays_, workers_, sample, [&](std::size_t which, const Tile& band) {
+      switch (scene_->packet_size()) {
+        case 16:
+          return render_band<16>(moments[which], band, sample);
+        case 8:
+          return render_band<8>(moments[which], band, sample);
+        default:
+          return render_band<4>(moments[which], band, sample);
+      }
+    });
+  }
+
+  template <int K>
+  void render_band(const Moment& moment, const Tile& band, Sample& sample) const {
+    constexpr int kWidth = ImageCell::kWidth, kHeight = ImageCell::kHeight;
+    CellSurfaces surfaces;
+    const bool shadows = moment.lighting && moment.lighting->shadows;
+    Coverage coverage(options_.samples_per_pixel, shadows);
+    FragmentShading<K> shading(*scene_, moment, side_, coverage.samples());
+    std::vector<Fragment> fragments;
+    for (int top = band.y / kHeight * kHeight; top < band.y + band.height; top += kHeight) {
+      for (int left = band.x / kWidth * kWidth; left < band.x + band.width; left += kWidth) {
+        const ImageCell& cell = cells_.at(left, top);
+        const CellPart part{{std::max(band.x - left, 0), std::min(band.x + band.width - left, kWidth) - 1},
+                            {std::max(band.y - top, 0), std::min(band.y + band.height - top, kHeight) - 1}};
+        surfaces.collect(moment.groups, cell, part);
+        fragments.clear();
+        for (int row = part.rows.first; row <= part.rows.last; ++row) {
+          for (int column = part.columns.first; column <= part.columns.last; ++column) {
+            const SeenInMiddle seen = coverage.divide(surfaces, cell, row * kWidth + column, fragments);
+            sample.depth(left + column, top + row) = seen.inverse_depth > 0 ? 1 / seen.inverse_depth : kInfinity;
+            if (!sample.object.empty())
+              sample.object(left + column, top + row) = static_cast<std::uint16_t>(seen.group);
+          }
+        }
+        shading.shade(surfaces, cell, fragments, mosaic_);
+        add_up(shading, fragments, left, top, part, sample.irradiance);
+      }
+    }
+  }
+
+  /// Sums the fragments of each pixel, which are adjacent; the background fills what they leave.
+  template <int K>
+  void add_up(const FragmentShading<K>& shading, std::span<const Fragment> fragments, int left, int top,
+              const CellPart& part, Image<float>& irradiance) const {
+    std::size_t next = 0;
+    for (int row = part.rows.first; row <= part.rows.last; ++row) {
+      for (int column = part.columns.first; column <= part.columns.last; ++column) {
+        const int pixel = row * ImageCell::kWidth + column;
+        float sum = 0, area = 0;
+        for (; next < fragments.size() && fragments[next].pixel == pixel; ++next)
+          sum += fragments[next].area * shading.irradiance(next), area += fragments[next].area;
+        irradiance(left + column, top + row) =
+            area > 1 - kSmallestArea ? sum / area : sum + (1 - area) * options_.background;
+      }
+    }
+  }
+
+  std::shared_ptr<const RaycastScene> scene_;
+  RasterOptions options_;
+  float side_;  // of the square that edges are averaged over, in footprints
+  PixelRays rays_;
+  ImageCells cells_;
+  const Workers& workers_;
+  bool mosaic_;
+};
+
+}  // namespace
+
+std::shared_ptr<const RaycastScene> build_raster_scene(const Scene& scene) {
+  return std::make_shared<const RaycastScene>(scene, SceneUse::surfaces);
+}
+
+std::unique_ptr<Renderer> make_raster_renderer(std::shared_ptr<const RaycastScene> scene, const RasterOptions& options,
+                                               const Camera& camera, const Workers& workers, ColourFilters filters,
+                                               const PixelArea& area) {
+  const int n = options.samples_per_pixel;
+  if (n != 1 && n != 16 && n != 64) {
+    throw UserError("samples_per_pixel: " + std::to_string(n) + " is not supported; use 1, 16 or 64");
+  }
+  return std::make_unique<RasterRenderer>(std::move(scene), options, camera, workers, filters, area);
+}
+
+}  // namespace esim::inline backends::inline raycast

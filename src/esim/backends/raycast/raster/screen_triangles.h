@@ -1,0 +1,52 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+
+#include "esim/backends/raycast/ray_blocks.h"
+#include "esim/backends/raycast/triangle_tree.h"
+
+namespace esim::inline backends::inline raycast {
+
+/// Closer surfaces are invisible; m.
+inline constexpr float kNearestDepth = 1e-3F;
+
+/// A linear function of the bearing (x, y, 1).
+struct OfBearing {
+  float x, y, one;
+
+  float at(float bearing_x, float bearing_y) const { return x * bearing_x + y * bearing_y + one; }
+};
+
+/// A triangle as a camera sees it. A bearing hits it where no weight is negative; then the barycentric coordinates are
+/// the weights divided by their sum, and the point's inverse depth is `inverse_depth`. No triangle needs to be clipped:
+/// behind the camera, a weight is negative. The weights of two triangles at their common edge are opposite, up to a
+/// power of two, so that no bearing passes between them.
+struct ScreenTriangle {
+  std::array<OfBearing, 3> weight;
+  OfBearing inverse_depth;
+  std::array<float, 3> normal;  ///< (p1 - p0) x (p2 - p0) in the frame of its group
+  std::uint32_t group;          ///< of the scene
+  std::uint32_t index;          ///< in the scene
+};
+
+/// Triangles of a leaf of a triangle tree, as a camera sees them.
+struct ScreenLeaf {
+  static constexpr int kWide = TriangleTree::kWide;
+  using Lanes = TriangleTree::Lanes;
+
+  alignas(64) std::array<std::array<Lanes, 3>, 3> weight;
+  alignas(64) std::array<Lanes, 3> inverse_depth, normal;
+  alignas(64) Lanes left, right, top,
+      bottom;        ///< bounds of their bearings; infinite if one is partly behind the camera
+  unsigned visible;  ///< a bit for each triangle that is neither edge-on nor too close
+
+  /// Projects the triangles; those that are not finite are invisible.
+  void project(const TriangleTree::Leaf& leaf, const Eigen::Matrix3f& R_camera_tree, const Eigen::Vector3f& camera);
+
+  BearingBounds bounds(std::size_t lane) const { return {left[lane], right[lane], top[lane], bottom[lane]}; }
+  ScreenTriangle triangle(std::size_t lane) const;  ///< without group and index
+};
+
+}  // namespace esim::inline backends::inline raycast

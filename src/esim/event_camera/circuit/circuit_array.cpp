@@ -15,6 +15,9 @@ constexpr double kElectron_fC = 1.602176634e-4;  // elementary charge, fA s
 constexpr double kSettled = 1e-13;               // brightness: differences below this are zero
 constexpr float kUnreachable = 1e6F;             // threshold of a dead pixel
 constexpr double kGuard = 1e-9;                  // between bounds and levels, above all rounding errors
+// Irradiance is rounded to multiples of 1 / (2 kPerLight) where it is summed over time, so that sums over whole ns are
+// exact, however a stretch of constant light is cut.
+constexpr double kPerLight = 4096;
 
 }  // namespace
 
@@ -38,6 +41,7 @@ CircuitArray::CircuitArray(const EventCameraOptions& options, int width, int hei
   circuit_.poles.t1_unit_ns = 1e9 * o.photodiode_charge_e * kElectron_fC / white_fa;
   circuit_.waits = options.readout.acknowledges();
   circuit_.poles.t2_ns = 1e9 / (2 * std::numbers::pi * o.source_follower_hz);
+  circuit_.poles.high_pass_per_ns = 1e-9 * 2 * std::numbers::pi * o.high_pass_hz;
   if (o.noise > 0) {
     constexpr double kBrightest = 1e5;  // irradiance; brighter light has the same time constant for the noise
     circuit_.noise.emplace(o.noise * o.noise / o.photodiode_charge_e, circuit_.poles.t2_ns,
@@ -55,6 +59,8 @@ void CircuitArray::make_pixels(const EventCameraOptions& options, std::uint64_t 
   for (auto* values : {&light_, &lag_, &y_, &v_, &low_, &high_, &until_}) values->resize(count + kVectorPadding);
   node_light_.resize(count + kVectorPadding);
   leak_.resize(count + kVectorPadding);
+  if (o.high_pass_hz > 0) w_.resize(count + kVectorPadding);
+  if (o.leak_hz_per_klux > 0) light_sum_.resize(count + kVectorPadding), light_leak_.resize(count + kVectorPadding);
   if (options.labels) origins_.resize(count), hot_.resize(count);
   const AddressedRandom random(seed, Purpose::circuit_mismatch, stream);
   const double refractory_ns = 1e3 * options.refractory_period_us, max_rate = max_rate_hz(options);
@@ -80,7 +86,11 @@ void CircuitArray::make_pixels(const EventCameraOptions& options, std::uint64_t 
     p.noise = static_cast<float>(std::pow(10.0, o.noise_mismatch_decades * noise));
     p.refractory = static_cast<float>(
         std::max(min_interval_ns, refractory_ns * std::pow(10.0, o.refractory_mismatch_decades * refractory)));
-    double rate = options.leak_rate_hz * options.threshold_on() * std::pow(10.0, options.leak_mismatch_decades * leak);
+    const double leak_unit = options.threshold_on() * std::pow(10.0, options.leak_mismatch_decades * leak);
+    double rate = options.leak_rate_hz * leak_unit;
+    if (!light_leak_.empty()) {
+      light_leak_[i] = static_cast<float>(1e-3 * o.leak_hz_per_klux * o.white_sensor_lux() * leak_unit);
+    }
     if (hot < options.hot_pixels) {
       rate += options.hot_pixel_rate_hz * options.threshold_on() *
               std::pow(10.0, o.hot_mismatch_decades * hot_decades) * (sign < o.hot_off_fraction ? -1 : 1);
@@ -110,8 +120,11 @@ bool CircuitArray::open(const Segment& segment, Rows rows) {
       const std::size_t i = first + x;
       light_[i] = y_[i] = v_[i] = lights[x];
       lag_[i] = 0;
+      if (!w_.empty()) w_[i] = v_[i];
       const double place = starts_.uniforms(static_cast<std::uint32_t>(i), 0)[0];
-      pixel(i).open(lights[x], static_cast<double>(segment.t1 - epoch_), place);
+      const auto time = static_cast<double>(segment.t1 - epoch_);
+      const double light_rate = std::round(2 * kPerLight * static_cast<double>(irradiance[x]));
+      pixel(i).open(lights[x], w_.empty() ? v_[i] : 0.0, leak(i, light_rate, time), time, place);
       until_[i] = -1;  // looks at once
     }
   }
@@ -137,10 +150,14 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
   const V light0 = hn::LoadU(d, &light_[i]), lag0 = hn::LoadU(d, &lag_[i]), y0 = hn::LoadU(d, &y_[i]),
           v0 = hn::LoadU(d, &v_[i]);
 
-  V light1 = light0, lag1 = lag0, y1 = y0, v1 = v0, lowest = v0, highest = v0;
-  V level = v0, slope = hn::Zero(d), fast = slope, slow = slope, k1 = one;
+  const bool high_pass = !w_.empty();
+  const V w0 = high_pass ? hn::LoadU(d, &w_[i]) : hn::Zero(d), in0 = hn::Sub(v0, w0);  // in: into the comparators
+
+  V light1 = light0, lag1 = lag0, y1 = y0, v1 = v0, w1 = w0, lowest = in0, highest = in0;
+  V level = in0, slope = hn::Zero(d), fast = slope, slow = slope, passed = slope, k1 = one;
   auto several = hn::FirstN(d, 0);
-  const auto still = hn::And(hn::And(hn::Eq(e0, e1), hn::Eq(lag0, hn::Zero(d))), hn::Eq(v0, y0));
+  auto still = hn::And(hn::And(hn::Eq(e0, e1), hn::Eq(lag0, hn::Zero(d))), hn::Eq(v0, y0));
+  if (high_pass) still = hn::And(still, hn::Eq(v0, w0));
   if (!hn::AllTrue(d, still)) {
     light1 = hn::Log(d, e1);
     const V growth = hn::Sub(light1, light0), rho = hn::Div(hn::Sub(e1, e0), e0);
@@ -190,8 +207,14 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
     const V per_length = set(1 / row.length);
     k1 = hn::Mul(a_plain, per_length);
     const V t2 = set(circuit_.poles.t2_ns);
-    const auto resonates = hn::Lt(hn::Abs(hn::MulSub(k1, t2, one)), set(0.005));
+    auto resonates = hn::Lt(hn::Abs(hn::MulSub(k1, t2, one)), set(0.005));
     k1 = hn::IfThenElse(resonates, set(1.005 / circuit_.poles.t2_ns), k1);
+    const double k_3 = circuit_.poles.high_pass_per_ns;
+    if (high_pass) {
+      const auto resonates3 = hn::Lt(hn::Abs(hn::Sub(k1, set(k_3))), set(0.005 * k_3));
+      k1 = hn::IfThenElse(resonates3, set(1.005 * k_3), k1);
+      resonates = hn::Or(resonates, resonates3);
+    }
     const V a = hn::Mul(k1, length);
     const auto exact = hn::And(hn::Eq(a_plain, area), hn::Not(resonates));
     const V e_k = hn::IfThenElse(exact, decay, hn::Exp(d, hn::Neg(a)));
@@ -206,20 +229,43 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
     const auto settles =
         hn::And(hn::And(hn::Eq(lag1, hn::Zero(d)), hn::Eq(e0, e1)), hn::Lt(hn::Abs(hn::Sub(v1, y1)), set(kSettled)));
     v1 = hn::IfThenElse(settles, y1, v1);
+    V in1 = v1;
+    if (high_pass) {  // as high_passed()
+      level = hn::Div(slope, set(k_3));
+      slope = hn::Zero(d);
+      fast = hn::Div(hn::Mul(fast, k1), hn::Sub(k1, set(k_3)));
+      slow = hn::Mul(slow, set(k_2 / (k_2 - k_3)));
+      passed = hn::Sub(hn::Sub(hn::Sub(in0, level), fast), slow);
+      in1 = hn::MulAdd(passed, set(std::exp(-k_3 * row.length)),
+                       hn::MulAdd(slow, set(e_2), hn::MulAdd(fast, e_k, level)));
+      w1 = hn::Sub(v1, in1);
+      w1 = hn::IfThenElse(hn::And(settles, hn::Lt(hn::Abs(in1), set(kSettled))), v1, w1);
+    }
 
-    const V size_fast = hn::Abs(fast), size_slow = hn::Abs(slow);
-    const V curvature = hn::MulAdd(hn::Mul(size_fast, k1), k1, hn::Mul(size_slow, set(k_2 * k_2)));
-    const V beyond = hn::Min(hn::Mul(curvature, set(0.125 * row.length * row.length)), hn::Add(size_fast, size_slow));
-    lowest = hn::Sub(hn::Min(v0, v1), beyond);
-    highest = hn::Add(hn::Max(v0, v1), beyond);
+    const V size_fast = hn::Abs(fast), size_slow = hn::Abs(slow), size_passed = hn::Abs(passed);
+    V curvature = hn::MulAdd(hn::Mul(size_fast, k1), k1, hn::Mul(size_slow, set(k_2 * k_2)));
+    curvature = hn::MulAdd(size_passed, set(k_3 * k_3), curvature);
+    const V beyond = hn::Min(hn::Mul(curvature, set(0.125 * row.length * row.length)),
+                             hn::Add(hn::Add(size_fast, size_slow), size_passed));
+    lowest = hn::Sub(hn::Min(in0, in1), beyond);
+    highest = hn::Add(hn::Max(in0, in1), beyond);
   }
   hn::StoreU(light1, d, &buffer.light[at]);
   hn::StoreU(lag1, d, &buffer.lag[at]);
   hn::StoreU(y1, d, &buffer.y[at]);
   hn::StoreU(v1, d, &buffer.v[at]);
+  if (high_pass) hn::StoreU(w1, d, &buffer.w[at]);
 
   const V leak = hn::Mul(hn::PromoteTo(d, hn::LoadU(df, &leak_[i])), set(1e-9));
-  const V leaked0 = hn::Mul(leak, set(row.start)), leaked1 = hn::Mul(leak, set(row.start + row.length));
+  V leaked0 = hn::Mul(leak, set(row.start)), leaked1 = hn::Mul(leak, set(row.start + row.length));
+  if (!light_leak_.empty()) {
+    const V light_leak = hn::Mul(hn::PromoteTo(d, hn::LoadU(df, &light_leak_[i])), set(0.5e-9 / kPerLight));
+    const V rounded = hn::Round(hn::Mul(hn::Sub(hn::Sub(hn::Add(e0, e1), dark), dark), set(kPerLight)));
+    const V sum0 = hn::LoadU(d, &light_sum_[i]), sum1 = hn::MulAdd(rounded, length, sum0);
+    leaked0 = hn::MulAdd(light_leak, sum0, leaked0);
+    leaked1 = hn::MulAdd(light_leak, sum1, leaked1);
+    hn::StoreU(sum1, d, &buffer.light_sum[at]);
+  }
   const V node_light = hn::PromoteTo(d, hn::LoadU(df, &node_light_[i]));
   const V guard = set(kGuard);
   auto uncertain = hn::Or(several, hn::Le(hn::LoadU(d, &until_[i]), set(row.start + row.length)));
@@ -238,6 +284,7 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
   hn::StoreU(fast, d, &buffer.fast[at]);
   hn::StoreU(slow, d, &buffer.slow[at]);
   hn::StoreU(k1, d, &buffer.k1[at]);
+  hn::StoreU(passed, d, &buffer.passed[at]);
   hn::StoreU(hn::IfThenElseZero(several, one), d, &buffer.several[at]);
   for (std::size_t k = 0; k < lanes; ++k) {
     if (flags[k] != 0) buffer.uncertain.push_back(static_cast<std::uint32_t>(x + k));
@@ -254,9 +301,20 @@ void CircuitArray::set_bounds(std::size_t pixel, const CircuitBounds& bounds) {
 }
 
 CircuitPixel CircuitArray::pixel(std::size_t i) {
-  CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], leak_[i], states_[i]);
+  CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], states_[i]);
   if (!origins_.empty()) pixel.explain(&origins_[i]);
   return pixel;
+}
+
+/// The leak of a pixel on a stretch that begins at `start`, in ns after the epoch. `light_rate` is that of light_sum_.
+LeakRamp CircuitArray::leak(std::size_t i, double light_rate, double start) const {
+  LeakRamp leak{1e-9 * static_cast<double>(leak_[i]) * start, 1e-9 * static_cast<double>(leak_[i])};
+  if (!light_leak_.empty()) {
+    const double per_sum = 0.5e-9 / kPerLight * static_cast<double>(light_leak_[i]);
+    leak.leaked += per_sum * light_sum_[i];
+    leak.rate += per_sum * light_rate;
+  }
+  return leak;
 }
 
 /// Adds the label of the last event of a pixel.
@@ -286,29 +344,41 @@ void CircuitArray::advance_one(const Row& row, std::uint32_t column, std::size_t
   };
   const double light1 = buffer.light[at];
   const LightRamp ramp{light_[i], (light1 - light_[i]) / row.length};
+  const double light_rate = light_leak_.empty() ? 0.0 : (buffer.light_sum[at] - light_sum_[i]) / row.length;
+  const LeakRamp leak = this->leak(i, light_rate, row.start);
   if (buffer.several[at] == 0) {
-    const CircuitPiece piece{buffer.level[at], buffer.rate[at],          buffer.fast[at], buffer.slow[at],
-                             buffer.k1[at],    1 / circuit_.poles.t2_ns, row.length};
+    const CircuitPiece piece{buffer.level[at], buffer.rate[at],   buffer.fast[at],
+                             buffer.slow[at],  buffer.k1[at],     1 / circuit_.poles.t2_ns,
+                             row.length,       buffer.passed[at], circuit_.poles.high_pass_per_ns};
     CircuitPixel pixel = this->pixel(i);
-    pixel.set(piece, ramp, row.start);
+    pixel.set(piece, ramp, leak, row.start);
     set_bounds(i, pixel.run(emit));
     buffer.lost += limits_ ? pixel.lost() : 0;
-    light_[i] = light1, lag_[i] = buffer.lag[at], y_[i] = buffer.y[at], v_[i] = buffer.v[at];
+    keep(i, at, buffer);
     return;
   }
-  CircuitState front{lag_[i], v_[i]};
-  buffer.lost += run(i, front, ramp, row.start, row.length, emit);
-  light_[i] = light1;
-  lag_[i] = std::abs(front.lag) < kSettled ? 0.0 : front.lag;
-  y_[i] = light1 - std::log1p(lag_[i]);
-  v_[i] = lag_[i] == 0 && ramp.rate == 0 && std::abs(front.v - y_[i]) < kSettled ? y_[i] : front.v;
+  CircuitState front{lag_[i], v_[i], w_.empty() ? 0.0 : w_[i]};
+  buffer.lost += run(i, front, ramp, leak, row.start, row.length, emit);
+  buffer.lag[at] = std::abs(front.lag) < kSettled ? 0.0 : front.lag;
+  buffer.y[at] = light1 - std::log1p(buffer.lag[at]);
+  const bool settles = buffer.lag[at] == 0 && ramp.rate == 0 && std::abs(front.v - buffer.y[at]) < kSettled;
+  buffer.v[at] = settles ? buffer.y[at] : front.v;
+  buffer.w[at] = settles && std::abs(front.v - front.w) < kSettled ? buffer.v[at] : front.w;
+  keep(i, at, buffer);
+}
+
+/// Takes the front end of a pixel to the end of the segment.
+void CircuitArray::keep(std::size_t i, std::size_t at, const CircuitBuffer& buffer) {
+  light_[i] = buffer.light[at], lag_[i] = buffer.lag[at], y_[i] = buffer.y[at], v_[i] = buffer.v[at];
+  if (!w_.empty()) w_[i] = buffer.w[at];
+  if (!light_leak_.empty()) light_sum_[i] = buffer.light_sum[at];
 }
 
 /// Takes a pixel along a ramp of light, in as many steps as needed; skips those within its bounds.
 /// Returns the number of events that a maximum rate has lost.
 template <typename Emit>
-std::int64_t CircuitArray::run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length,
-                               const Emit& emit) {
+std::int64_t CircuitArray::run(std::size_t i, CircuitState& front, const LightRamp& ramp, const LeakRamp& leak,
+                               double start, double length, const Emit& emit) {
   std::int64_t lost = 0;
   CircuitPixel pixel = this->pixel(i);
   for (double done = 0; done < length;) {
@@ -317,14 +387,14 @@ std::int64_t CircuitArray::run(std::size_t i, CircuitState& front, const LightRa
     const CircuitPiece piece = esim::advance(circuit_.poles, front, part, h);
     done = h < length - done ? done + h : length;
     const auto [lowest, highest] = piece.range(0, h);
-    const double leaked0 = 1e-9 * static_cast<double>(leak_[i]) * from,
-                 leaked1 = 1e-9 * static_cast<double>(leak_[i]) * (from + h);
+    const LeakRamp leak_here{leak.leaked + leak.rate * (from - start), leak.rate};
+    const double leaked0 = leak_here.leaked, leaked1 = leaked0 + leak.rate * h;
     const double change = part.light + part.rate * h - static_cast<double>(node_light_[i]);
     const bool quiet = lowest + std::min(leaked0, leaked1) - kGuard > low_[i] &&
                        highest + std::max(leaked0, leaked1) + kGuard < high_[i] && from + h < until_[i] &&
                        std::abs(change) < kLightReach;
     if (quiet) continue;
-    pixel.set(piece, part, from);
+    pixel.set(piece, part, leak_here, from);
     set_bounds(i, pixel.run(emit));
     lost += limits_ ? pixel.lost() : 0;
   }
@@ -354,10 +424,13 @@ void CircuitArray::resume(std::uint32_t pixel, const PastSegment& past, CircuitB
                 static_cast<double>(segment.t0 - epoch_),
                 static_cast<double>(segment.t1 - segment.t0),
                 EventPacking(width_, height_)};
-  const std::array front{&light_[pixel], &lag_[pixel], &y_[pixel], &v_[pixel]};
-  const std::array<double, 4> present{light_[pixel], lag_[pixel], y_[pixel], v_[pixel]};
-  light_[pixel] = past.light(column, line), lag_[pixel] = past.lag(column, line);
-  y_[pixel] = past.y(column, line), v_[pixel] = past.v(column, line);
+  std::array<double, 6> present{};
+  std::size_t used = 0;
+  for (auto* const values : front()) {
+    if (values->empty()) continue;
+    present[used] = (*values)[pixel];
+    (*values)[pixel] = past.front[used++](column, line);
+  }
   buffer.uncertain.clear();
   const auto emit = [&](double time, int polarity) {
     requests.push_back({row.t0 + static_cast<TimeNs>(time), static_cast<std::uint16_t>(x),
@@ -365,7 +438,10 @@ void CircuitArray::resume(std::uint32_t pixel, const PastSegment& past, CircuitB
   };
   if (move_vector(hn::ScalableTag<double>(), row, 0, buffer, 0) && !buffer.uncertain.empty())
     advance_one(row, 0, 0, buffer, emit);
-  for (std::size_t k = 0; k < front.size(); ++k) *front[k] = present[k];
+  used = 0;
+  for (auto* const values : front()) {
+    if (!values->empty()) (*values)[pixel] = present[used++];
+  }
 }
 
 void CircuitArray::flush(const Row& row, CircuitBuffer& buffer, PackedEvents& events) {
@@ -401,11 +477,10 @@ bool CircuitArray::advance(const Segment& segment, Rows rows, CircuitBuffer& buf
                   static_cast<double>(segment.t1 - segment.t0),
                   events.packing()};
     if (past != nullptr) {
-      const int line = y - segment.tile.y;
-      std::copy_n(&light_[first], width, past->light.row(line));
-      std::copy_n(&lag_[first], width, past->lag.row(line));
-      std::copy_n(&y_[first], width, past->y.row(line));
-      std::copy_n(&v_[first], width, past->v.row(line));
+      std::size_t used = 0;
+      for (const auto* const values : front()) {
+        if (!values->empty()) std::copy_n(&(*values)[first], width, past->front[used++].row(y - segment.tile.y));
+      }
     }
     for (std::size_t begin = 0; begin < width; begin += CircuitBuffer::kTogether) {
       const std::size_t count = std::min(CircuitBuffer::kTogether, width - begin);
@@ -418,8 +493,7 @@ bool CircuitArray::advance(const Segment& segment, Rows rows, CircuitBuffer& buf
           ++next;
           continue;
         }
-        const std::size_t i = first + begin + x;
-        light_[i] = buffer.light[x], lag_[i] = buffer.lag[x], y_[i] = buffer.y[x], v_[i] = buffer.v[x];
+        keep(first + begin + x, x, buffer);
       }
       for (const std::uint32_t column : buffer.uncertain) {
         const auto place = static_cast<std::uint32_t>(row.packing.place(row.x + static_cast<int>(column), row.y));

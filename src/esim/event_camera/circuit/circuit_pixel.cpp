@@ -78,16 +78,20 @@ std::optional<CircuitBounds> CircuitPixel::skip_quiet_steps(double& s) {
   const double h = noise_->length(state_.pole, PhotoreceptorNoise::kSteps);
   const double decay1 = std::exp(-piece_.k1 * h), decay2 = std::exp(-piece_.k2 * h);
   const double curve1 = 0.125 * piece_.k1 * piece_.k1, curve2 = 0.125 * piece_.k2 * piece_.k2;
+  const double curve3 = 0.125 * piece_.k3 * piece_.k3;
+  const auto passed_at = [&](double at) { return piece_.k3 == 0 ? 0.0 : piece_.passed * std::exp(-piece_.k3 * at); };
   double fast = piece_.fast * std::exp(-piece_.k1 * s), slow = piece_.slow * std::exp(-piece_.k2 * s);
-  double value = piece_.level + piece_.rate * s + fast + slow + leak_ * (start_ + s);
+  double passed = passed_at(s);
+  double value = piece_.level + piece_.rate * s + fast + slow + passed + leaked(s);
   for (bool at_node = false;; at_node = true) {
     const double node = state_.node_time + h, end = std::min(node - start_, piece_.length), length = end - s;
     const auto [low, high] = noise_->step_bounds(state_.from, state_.to, h);
-    const double beyond = std::min((std::abs(fast) * curve1 + std::abs(slow) * curve2) * length * length,
-                                   std::abs(fast) + std::abs(slow));
+    const double curvature = std::abs(fast) * curve1 + std::abs(slow) * curve2 + std::abs(passed) * curve3;
+    const double beyond = std::min(curvature * length * length, std::abs(fast) + std::abs(slow) + std::abs(passed));
     const bool whole = at_node && node - start_ <= piece_.length;
     fast *= whole ? decay1 : std::exp(-piece_.k1 * length), slow *= whole ? decay2 : std::exp(-piece_.k2 * length);
-    const double next = piece_.level + piece_.rate * end + fast + slow + leak_ * (start_ + end);
+    passed = passed_at(end);
+    const double next = piece_.level + piece_.rate * end + fast + slow + passed + leaked(end);
     const double change = std::abs(light(end) - static_cast<double>(state_.node_light));
     if (std::min(value, next) - beyond + gain_ * low <= lower() ||
         std::max(value, next) + beyond + gain_ * high >= upper() || change > kLightReach)
@@ -132,19 +136,19 @@ NoiseState CircuitPixel::noise_at(double s) {
   return state_.from;
 }
 
-void CircuitPixel::open(double light, double time, double place) {
+void CircuitPixel::open(double light, double signal, const LeakRamp& leak, double time, double place) {
   state_ = {};
   // The noise fires a pixel before it comes nearer to a threshold than its reach.
   const double reach = noise_ == nullptr ? 0.0 : kRestingDeviations * gain_ * circuit_.deviation(light);
   const double above = std::max(0.0, static_cast<double>(parameters_.on) - reach),
                below = std::max(0.0, static_cast<double>(parameters_.off) - reach);
-  state_.reference = light + leak_ * time - (place * (above + below) - below);
+  const double beyond = place * (above + below) - below;
+  state_.reference = signal + leak.leaked - beyond;
   state_.node_time = time;
   state_.node_light = static_cast<float>(light);
   if (origin_ != nullptr) {
     // If the pixel leaks, the leak has brought it to its place; otherwise noise, or what it saw before.
-    const double leaked = light + leak_ * time - state_.reference;
-    *origin_ = {light, leak_ != 0 ? time - leaked / leak_ : time};
+    *origin_ = {signal, leak.rate != 0 ? leak.leaked - beyond : leak.leaked};
   }
   if (noise_ == nullptr) return;
   state_.active = true;
@@ -155,7 +159,7 @@ void CircuitPixel::open(double light, double time, double place) {
 
 void CircuitPixel::release(double s) {
   state_.held_until = -1;
-  if (origin_ != nullptr) origin_->v = piece_.value(s), origin_->time = start_ + s;
+  if (origin_ != nullptr) origin_->v = piece_.value(s), origin_->leaked = leaked(s);
   const double value = signal(s) + (noise_ != nullptr ? gain_ * noise_at(s).x : 0.0);
   const double change = value - state_.reference;
   lost_ +=
@@ -167,9 +171,9 @@ void CircuitPixel::release(double s) {
 void CircuitPixel::take_apart(double s, int polarity) {
   CircuitOrigin& o = *origin_;
   const double threshold = polarity > 0 ? static_cast<double>(parameters_.on) : -static_cast<double>(parameters_.off);
-  const double v = piece_.value(s), time = start_ + s, leak = leak_ * (time - o.time);
+  const double v = piece_.value(s), all = leaked(s), leak = all - o.leaked;
   const double signal = noise_ != nullptr ? v - o.v : threshold - leak;
-  o = {v, time, static_cast<float>(signal), static_cast<float>(threshold - leak - signal), static_cast<float>(leak)};
+  o = {v, all, static_cast<float>(signal), static_cast<float>(threshold - leak - signal), static_cast<float>(leak)};
 }
 
 CircuitBounds CircuitPixel::bounds_without_noise() {

@@ -50,8 +50,8 @@ struct CircuitPixelState {
 
 /// For labels: where the change of a pixel's signal begins, and its parts at the last event, ln.
 struct CircuitOrigin {
-  double v = 0;     ///< the source follower's output when the reference was set
-  double time = 0;  ///< when that was, ns after the epoch
+  double v = 0;       ///< the comparators' input without leak and noise when the reference was set
+  double leaked = 0;  ///< the leak then
   float signal = 0, noise = 0, leak = 0;
 };
 
@@ -66,31 +66,35 @@ inline constexpr double kActiveDeviations =
     5.5;  ///< distance to a threshold, in deviations, at which noise begins to matter
 inline constexpr double kInactiveDeviations = 6.0;  ///< distance at a node at which it ceases to matter
 
+/// The leak on a stretch of time: leaked + rate s, s in ns after its start.
+struct LeakRamp {
+  double leaked = 0, rate = 0;  ///< ln; rate in 1/ns
+};
+
 /// Takes a pixel through a piece of its signal: its events, its refractory periods, its noise. The comparator's signal
-/// is S(s) = piece.value(s) + leak (start + s), to which the noise is added.
+/// is S(s) = piece.value(s) + leak, to which the noise is added.
 class CircuitPixel {
  public:
-  /// `leak` in 1/s.
-  CircuitPixel(const Circuit& circuit, std::uint32_t pixel, const CircuitParameters& parameters, float leak,
+  CircuitPixel(const Circuit& circuit, std::uint32_t pixel, const CircuitParameters& parameters,
                CircuitPixelState& state)
       : circuit_(circuit),
         noise_(circuit.noise ? &*circuit.noise : nullptr),
         pixel_(pixel),
         parameters_(parameters),
         state_(state),
-        leak_(1e-9 * static_cast<double>(leak)),
         gain_(static_cast<double>(parameters.noise)) {}
 
-  /// Sets the noise and the reference at the start, as if the camera had been running before. `place`, from 0 to 1, is
-  /// where the signal then is between the two thresholds.
-  void open(double light, double time, double place);
+  /// Sets the noise and the reference at the start, `time` after the epoch, as if the camera had been running before in
+  /// this light. `signal` is the comparators' input; `place`, from 0 to 1, is where it then is between the two
+  /// thresholds.
+  void open(double light, double signal, const LeakRamp& leak, double time, double place);
 
   /// Keeps the parts of the change at events in `origin`.
   void explain(CircuitOrigin* origin) { origin_ = origin; }
 
-  /// The stretch that the next functions are about: its signal, its light, and its start in ns after the epoch.
-  void set(const CircuitPiece& piece, const LightRamp& light, double start) {
-    piece_ = piece, light_ = light, start_ = start, lost_ = 0;
+  /// The stretch that the next functions are about: its signal, light and leak, and its start in ns after the epoch.
+  void set(const CircuitPiece& piece, const LightRamp& light, const LeakRamp& leak, double start) {
+    piece_ = piece, light_ = light, leak_ = leak, start_ = start, lost_ = 0;
   }
 
   /// Calls emit(time, polarity) for each event, and returns the bounds that hold afterwards.
@@ -103,7 +107,7 @@ class CircuitPixel {
   /// Ends the reset of a pixel at `s`: its new reference is signal plus noise.
   void release(double s);
 
-  double signal(double s) const { return piece_.value(s) + leak_ * (start_ + s); }
+  double signal(double s) const { return piece_.value(s) + leaked(s); }
 
  private:
   static constexpr double kNever = std::numeric_limits<double>::infinity();
@@ -111,19 +115,20 @@ class CircuitPixel {
   double upper() const { return state_.reference + static_cast<double>(parameters_.on); }
   double lower() const { return state_.reference - static_cast<double>(parameters_.off); }
   double light(double s) const { return light_.light + light_.rate * s; }
+  double leaked(double s) const { return leak_.leaked + leak_.rate * s; }
   double reach(double s, double deviations) const {
     return noise_ == nullptr ? 0.0 : deviations * gain_ * circuit_.deviation(light(s));
   }
   std::pair<double, double> range(double a, double b) const {
     const auto [low, high] = piece_.range(a, b);
-    return {low + leak_ * (start_ + a), high + leak_ * (start_ + b)};
+    return {low + std::min(leaked(a), leaked(b)), high + std::max(leaked(a), leaked(b))};
   }
 
   void take_apart(double s, int polarity);
   std::optional<double> find_near(double a, double b) const;
   /// Whether the slope of the signal has one sign on [a, b], by its ends and its maximum curvature.
   bool is_monotone(double a, double b) const {
-    const double sa = piece_.slope(a) + leak_, sb = piece_.slope(b) + leak_;
+    const double sa = piece_.slope(a) + leak_.rate, sb = piece_.slope(b) + leak_.rate;
     return sa * sb > 0 && std::min(std::abs(sa), std::abs(sb)) > 0.25 * std::abs(sa - sb);
   }
   void activate(double s);
@@ -153,7 +158,7 @@ class CircuitPixel {
     const CircuitPixel& pixel;
     double offset, scale;
     double value(double tau) const { return scale * pixel.signal(tau + offset); }
-    double slope(double tau) const { return scale * (pixel.piece_.slope(tau + offset) + pixel.leak_); }
+    double slope(double tau) const { return scale * (pixel.piece_.slope(tau + offset) + pixel.leak_.rate); }
     std::pair<double, double> range(double a, double b) const {
       const auto [low, high] = pixel.range(a + offset, b + offset);
       return {scale * low, scale * high};
@@ -181,7 +186,8 @@ class CircuitPixel {
   CircuitPixelState& state_;
   CircuitPiece piece_;
   LightRamp light_;
-  double start_ = 0, leak_, gain_;
+  LeakRamp leak_;
+  double start_ = 0, gain_;
   CircuitOrigin* origin_ = nullptr;
   PhotoreceptorNoise::StepDraws draws_;
   std::int64_t lost_ = 0;

@@ -45,14 +45,18 @@ struct CircuitPiece {
     return k3 == 0 ? v : v - passed * k3 * std::exp(-k3 * s);
   }
 
-  /// Bounds of the values on [a, b], from the chord and the maximum curvature.
-  std::pair<double, double> range(double a, double b) const {
+  /// How far the values leave the chord between those at a and b, at most.
+  double beyond_chord(double a, double b) const {
     const double e1 = std::abs(fast) * std::exp(-k1 * a), e2 = std::abs(slow) * std::exp(-k2 * a);
     const double e3 = k3 == 0 ? 0.0 : std::abs(passed) * std::exp(-k3 * a);
-    const double va = value(a), vb = value(b);
     const double curvature = e1 * k1 * k1 + e2 * k2 * k2 + e3 * k3 * k3;
-    // Either the curvature, or that each exponential is monotone, limits how far the values leave the chord.
-    const double beyond = std::min(0.125 * (b - a) * (b - a) * curvature, e1 + e2 + e3);
+    // Either the curvature limits it, or that each exponential is monotone.
+    return std::min(0.125 * (b - a) * (b - a) * curvature, e1 + e2 + e3);
+  }
+
+  /// Bounds of the values on [a, b].
+  std::pair<double, double> range(double a, double b) const {
+    const double va = value(a), vb = value(b), beyond = beyond_chord(a, b);
     return {std::min(va, vb) - beyond, std::max(va, vb) + beyond};
   }
 };

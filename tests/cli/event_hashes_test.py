@@ -7,7 +7,7 @@ Simulates the beginning of each scenario, and some variants with other samplings
 the events with tests/event_hashes.json. `scripts/renew-event-hashes` rewrites that file after a deliberate change, which
 needs a reason in CHANGELOG.md. The sums hold for the toolchain that the file names, because compilers and libraries round
 differently; elsewhere the test is skipped. With --compare, it compares anyway; `elsewhere` in the file has the sums that are
-known to differ on other systems (ID and VERSION_ID of /etc/os-release), whose causes are in docs/install.md.
+known to differ on other systems (ID and VERSION_ID of /etc/os-release), whose causes are in docs/install-details.md.
 """
 
 import hashlib

@@ -208,7 +208,7 @@ void describe(Visitor& visit, CircuitOptions& o) {
   visit("source_follower_hz", o.source_follower_hz,
         About{"cut-off (-3 dB) of the source follower", "Hz", 0, 1e9, true});
   visit("high_pass_hz", o.high_pass_hz,
-        About{"cut-off (-3 dB) of the high-pass before the comparators; 0: there is none", "Hz", 0, 1e6});
+        About{"cut-off (-3 dB) of the high-pass before the comparators; 0: no high-pass", "Hz", 0, 1e6});
   visit("leak_hz_per_klux", o.leak_hz_per_klux,
         About{"leak that light adds to leak_rate_hz, per 1000 lux on the sensor", "Hz", 0, 1e6});
   visit("noise", o.noise, About{"factor on the standard deviation of the noise; 0: no noise", "", 0, 10});

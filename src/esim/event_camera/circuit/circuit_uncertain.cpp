@@ -72,8 +72,8 @@ void CircuitArray::finish(const Row& row, std::uint32_t column, std::size_t at, 
   }
 }
 
-/// Prepares inactive pixels, which are not held, for the pieces in their lanes: those which become active are put into
-/// their lanes anew. Returns them, and those that rest, of which `rests` are those that rest.
+/// Prepares inactive pixels, which are not held, for the pieces in their lanes. Returns those that become active, which
+/// it has put into their lanes again; `rests` are the others.
 CircuitLanes::Lanes CircuitArray::wake(CircuitLanes& lanes, const std::array<std::size_t, CircuitLanes::kLanes>& pixels,
                                        CircuitLanes::Lanes inactive, CircuitLanes::Lanes& rests) {
   rests = inactive != 0 ? lanes.find_resting(circuit_, inactive) : 0;

@@ -13,7 +13,7 @@ namespace esim::inline event_camera {
 struct CircuitPoles {
   double t1_unit_ns = 0;        ///< of the photodiode, Q / I, at the photocurrent of L = 0
   double t2_ns = 0;             ///< of the source follower
-  double high_pass_per_ns = 0;  ///< k3, angular cut-off frequency of the high-pass; 0: there is none
+  double high_pass_per_ns = 0;  ///< k3, angular cut-off frequency of the high-pass; 0: without one
 };
 
 /// The part of the brightness signal that follows light, after an instant. Light is L = ln(E + dark), natural

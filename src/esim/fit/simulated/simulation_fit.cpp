@@ -23,6 +23,7 @@ constexpr int kMostSteps = 12;
 constexpr double kClose = 0.004;  // relative distance of matched numbers
 constexpr double kChange = 1.15;  // of a parameter, for derivatives
 constexpr double kWidest = 0.5;   // half a 95 % interval, in units of the logarithm
+constexpr double kRestless = 3;   // simulated events in quiet areas, in recorded ones, if the simulated scene is wrong
 
 /// What the thresholds and the refractory period are matched to.
 struct Moments {
@@ -171,6 +172,16 @@ class Fitter {
     if (!trouble_.empty()) return fail(trouble_);
     const EventCameraOptions& o = fit_.options;
     const SensorStatistics at = simulate(o);
+    const double restless = at.quiet.rate_hz() / real_.quiet.rate_hz();
+    if (leak_quiet_hz_ > 0 && restless > kRestless) {
+      fit_.options.contrast_threshold_on = base_.threshold_on();
+      fit_.options.contrast_threshold_off = base_.threshold_off();
+      fit_.options.refractory_period_us = base_.refractory_period_us;
+      return fail(
+          fmt::format("areas without motion have {:.3g} times as many events in the simulation, so that its images "
+                      "are not those of the scene",
+                      restless));
+    }
     const Eigen::Vector3d here = Moments(at).logarithms();
     Eigen::Matrix3d slopes;
     // Without a refractory period, its derivative is one-sided.
@@ -229,6 +240,9 @@ class Fitter {
           fmt::format("1 % of the simulated intervals are below {:.4g} us whatever it is, of the recorded "
                       "ones below {:.4g} us",
                       shortest_us, target_.shortest_us));
+    if (value_us <= 0)
+      return give_up(fmt::format("the simulated intervals are not too short without one; it is at most {:.4g} us",
+                                 real_.intervals_us.quantile(0.001)));
     if (!(reach_us < std::max(value_us, 0.25 * target_.shortest_us)))
       return give_up("the short intervals depend too little on it");
     fit_.estimates.push_back(Estimate::found(name, "us", value_us, std::max(0.0, value_us - reach_us),

@@ -23,7 +23,7 @@ constexpr int kMostSteps = 12;
 constexpr double kClose = 0.004;  // relative distance of matched numbers
 constexpr double kChange = 1.15;  // of a parameter, for derivatives
 constexpr double kWidest = 0.5;   // half a 95 % interval, in units of the logarithm
-constexpr double kRestless = 3;   // simulated events in quiet areas, in recorded ones, if the simulated scene is wrong
+constexpr double kMaxExcess = 3;  // simulated events in quiet areas, in recorded ones, if the simulated scene is wrong
 
 /// What the thresholds and the refractory period are matched to.
 struct Moments {
@@ -172,15 +172,15 @@ class Fitter {
     if (!trouble_.empty()) return fail(trouble_);
     const EventCameraOptions& o = fit_.options;
     const SensorStatistics at = simulate(o);
-    const double restless = at.quiet.rate_hz() / real_.quiet.rate_hz();
-    if (leak_quiet_hz_ > 0 && restless > kRestless) {
+    const double excess = at.quiet.rate_hz() / real_.quiet.rate_hz();
+    if (leak_quiet_hz_ > 0 && excess > kMaxExcess) {
       fit_.options.contrast_threshold_on = base_.threshold_on();
       fit_.options.contrast_threshold_off = base_.threshold_off();
       fit_.options.refractory_period_us = base_.refractory_period_us;
       return fail(
           fmt::format("areas without motion have {:.3g} times as many events in the simulation, so that its images "
                       "are not those of the scene",
-                      restless));
+                      excess));
     }
     const Eigen::Vector3d here = Moments(at).logarithms();
     Eigen::Matrix3d slopes;

@@ -60,7 +60,7 @@ class Scenes(Installed):
                 self.assertEqual(path.read_bytes(), (self.scenes / path.relative_to(self.folder / "mine")).read_bytes())
         self.assertEqual(self.esim("check", "mine/poster.yaml").returncode, 0)
         self.assert_refused(self.esim("scenes", "--copy", "mine"), "mine exists", "--copy")
-        self.assert_refused(self.esim("scenes", "--copy", "no/such/folder"), "no/such/folder", "No such file")
+        self.assert_refused(self.esim("scenes", "--copy", "no/such/folder"), "no/such/folder", "No such file", "choose another --copy")
 
     def test_incomplete_copies_are_errors(self):
         def limit_files():

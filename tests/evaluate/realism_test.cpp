@@ -123,7 +123,7 @@ TEST(Realism, TheSensorThatRecordedIsTheNearest) {
   EXPECT_TRUE(test::contains(to_json(found), "\"model\": \"slower\""));
 }
 
-TEST(Realism, ThresholdsAreFittedToAPartAndJudgedByTheRest) {
+TEST(Realism, SensorsAreFittedToAPartAndJudgedByTheRest) {
   const test::TemporaryDirectory folder;
   write_scene(folder.path() / "clip");
   record(folder.path() / "clip", usual_sensor());
@@ -134,17 +134,27 @@ TEST(Realism, ThresholdsAreFittedToAPartAndJudgedByTheRest) {
   for (std::size_t i = 0; i < here.size(); ++i) ASSERT_NEAR(here.pixels()[i], there.pixels()[i], 1e-6F);
 
   EventCameraOptions other = usual_sensor();
-  other.contrast_threshold_on = 0.35, other.contrast_threshold_off = 0.12;
+  other.contrast_threshold_on = 0.35, other.contrast_threshold_off = 0.12, other.refractory_period_us = 2000;
   RealismOptions options;
   options.fit_to = ClipPart{"clip", 0, 0.4};
   const RealismEvaluation found = evaluate_realism(folder.path(), {{"other", other, {}}}, options, {});
   ASSERT_EQ(found.clips.size(), 2U);
-  double on = 0, off = 0;
-  ASSERT_EQ(std::sscanf(found.clips[1].model.c_str(), "other (C+ %lf, C- %lf)", &on, &off), 2) << found.clips[1].model;
-  EXPECT_NEAR(on, 0.2, 0.01);  // other pixels than those that recorded
-  EXPECT_NEAR(off, 0.2, 0.01);
+  ASSERT_EQ(found.fitted.size(), 1U);
+  const auto expect_truth = [&](const char* name, double truth, double tolerance) {
+    for (const Estimate& e : found.fitted[0].fit.estimates) {
+      if (e.name != name) continue;
+      ASSERT_TRUE(e.determined()) << e.reason;
+      EXPECT_NEAR(e.value, truth, tolerance) << name;
+      EXPECT_TRUE(e.low <= truth && truth <= e.high) << name << ": " << e.low << " to " << e.high;
+    }
+  };
+  expect_truth("contrast_threshold_on", 0.2, 0.01);  // other pixels than those that recorded
+  expect_truth("contrast_threshold_off", 0.2, 0.01);
+  expect_truth("refractory_period_us", 300, 400);  // few intervals are that short
   EXPECT_LT(found.clips[1].sum_of_deviations(), 25);
   EXPECT_GT(found.clips[0].sum_of_deviations(), 2 * found.clips[1].sum_of_deviations());
+  EXPECT_TRUE(test::contains(describe(found), "leak_rate_hz: not determined, because areas without motion"));
+  EXPECT_TRUE(test::contains(to_json(found), "\"name\": \"refractory_period_us\""));
   const auto message = [&](const ClipPart& part) {
     options.fit_to = part;
     return test::message_of<UserError>([&] { evaluate_realism(folder.path(), {{"other", other, {}}}, options, {}); });
@@ -152,6 +162,41 @@ TEST(Realism, ThresholdsAreFittedToAPartAndJudgedByTheRest) {
   EXPECT_TRUE(test::contains(message({"none", 0, 0.5}), "no clip none"));
   EXPECT_TRUE(test::contains(message({"clip", 0, 1}), "not to all of it"));
   EXPECT_TRUE(test::contains(message({"clip", 0.2, 0.5}), "not to all of it"));
+}
+
+/// The readout of a circuit is found again, from a base that has none.
+TEST(Realism, AReadoutOfRowsIsFitted) {
+  const test::TemporaryDirectory folder;
+  write_scene(folder.path() / "clip");
+  EventCameraOptions sensor = preset_options("davis240c");
+  sensor.contrast_threshold = 0.1, sensor.hot_pixels = 0, sensor.circuit->noise = 0;
+  sensor.readout = {};
+  sensor.readout.time_stamp_us = 1, sensor.readout.row_scan_us = 10.0 / kHeight;
+  record(folder.path() / "clip", sensor);
+  EventCameraOptions base = sensor;
+  base.readout = {};
+  RealismOptions options;
+  options.frame_step_s = 1e-3;
+  options.fit_to = ClipPart{"clip", 0, 0.6};
+  const RealismEvaluation found = evaluate_realism(folder.path(), {{"base", base, {}}}, options, {});
+  const ReadoutOptions& readout = found.fitted.at(0).fit.options.readout;
+  EXPECT_EQ(readout.time_stamp_us, 1);
+  EXPECT_NEAR(readout.row_scan_us, 10.0 / kHeight, 6.0 / kHeight);
+  EXPECT_LT(found.clips[1].sum_of_deviations(), 0.7 * found.clips[0].sum_of_deviations());
+}
+
+TEST(Realism, APartWithFewEventsDeterminesNothing) {
+  const test::TemporaryDirectory folder;
+  write_scene(folder.path() / "clip");
+  write_file(folder.path() / "clip" / "events.txt", "1.0 5 6 1\n1.01 7 6 0\n1.05 5 6 1\n");
+  RealismOptions options;
+  options.fit_to = ClipPart{"clip", 0, 0.5};
+  const RealismEvaluation found = evaluate_realism(folder.path(), {{"usual", usual_sensor(), {}}}, options, {});
+  for (const Estimate& e : found.fitted.at(0).fit.estimates) {
+    EXPECT_FALSE(e.determined()) << e.name;
+    EXPECT_TRUE(test::contains(e.reason, "1 ON and 1 OFF events")) << e.reason;
+  }
+  EXPECT_EQ(found.fitted[0].fit.options.threshold_on(), usual_sensor().threshold_on());
 }
 
 TEST(Realism, OtherProgramsGetTheFramesAndWriteEvents) {

@@ -34,6 +34,14 @@ EventCameraOptions dim() {
   return options;
 }
 
+/// With all parts that not every circuit has.
+EventCameraOptions filtered() {
+  EventCameraOptions options = dim();
+  options.circuit->high_pass_hz = 0.4;
+  options.circuit->leak_hz_per_klux = 300;  // in this light, three times the leak without light
+  return options;
+}
+
 using Light = std::function<float(int x, int y, double t_s)>;
 
 Image<float> image_of(const Light& light, double t_s) {
@@ -66,7 +74,7 @@ Light moving_waves() {
 
 TEST(CircuitCamera, ThreadsAndTilesDoNotChangeItsEvents) {
   for (const bool has_readout : {false, true}) {
-    EventCameraOptions options = dim();
+    EventCameraOptions options = filtered();
     if (has_readout) options.readout = {.rate_mev_per_s = 2, .row_time_us = 1, .row_scan_us = 0.5, .row_rest_us = 3};
     const std::vector<Event> expected = events_of(options, moving_waves(), 500, 1);
     ASSERT_GT(expected.size(), 2000U);
@@ -96,10 +104,61 @@ TEST(CircuitCamera, ThreadsAndTilesDoNotChangeItsEvents) {
 
 TEST(CircuitCamera, EventsInConstantLightDoNotDependOnTheSampling) {
   const Light constant = [](int x, int y, double) { return 0.02F + 0.01F * static_cast<float>((x + y) % 7); };
-  const std::vector<Event> expected = events_of(dim(), constant, 200, 2);
-  ASSERT_GT(expected.size(), 500U);
-  EXPECT_TRUE(events_of(dim(), constant, 1000, 2) == expected);
-  EXPECT_TRUE(events_of(dim(), constant, 20000, 2) == expected);
+  for (const EventCameraOptions& options : {dim(), filtered()}) {
+    const std::vector<Event> expected = events_of(options, constant, 200, 2);
+    ASSERT_GT(expected.size(), 500U);
+    EXPECT_TRUE(events_of(options, constant, 1000, 2) == expected);
+    EXPECT_TRUE(events_of(options, constant, 20000, 2) == expected);
+  }
+}
+
+/// The mean rate of ON minus OFF events of a pixel.
+double drift_hz(const std::vector<Event>& events, double from_s, double to_s) {
+  double sum = 0;
+  for (const Event& e : events) {
+    const double t_s = 1e-9 * static_cast<double>(e.t);
+    if (t_s >= from_s && t_s < to_s) sum += e.polarity;
+  }
+  return sum / (kWidth * kHeight * (to_s - from_s));
+}
+
+TEST(CircuitCamera, LeakRisesWithLight) {
+  EventCameraOptions options = dim();
+  options.hot_pixels = 0;
+  options.leak_mismatch_decades = 0;
+  options.threshold_ratio = 1;
+  options.circuit->threshold_mismatch_common = 0;
+  options.circuit->noise = 0;
+  options.circuit->white_lux = 20000;
+  options.circuit->leak_hz_per_klux = 0.4;
+  const double lux = options.circuit->white_sensor_lux();
+  ASSERT_NEAR(lux, 20000 * options.circuit->transmission / (4 * std::pow(options.circuit->f_number, 2)), 1e-9);
+  for (const double irradiance : {0.0, 0.3, 1.0}) {
+    const std::vector<Event> events = events_of(
+        options, [&](int, int, double) { return static_cast<float>(irradiance); }, 100, 40);
+    const double expected = options.leak_rate_hz + 1e-3 * options.circuit->leak_hz_per_klux * lux * irradiance;
+    EXPECT_NEAR(drift_hz(events, 5, 40), expected, 0.02 * expected) << irradiance;
+  }
+}
+
+TEST(CircuitCamera, AHighPassForgetsSlowChanges) {
+  EventCameraOptions options = dim();
+  options.leak_rate_hz = 0, options.hot_pixels = 0, options.threshold_mismatch = 0, options.threshold_ratio = 1;
+  options.circuit->threshold_mismatch_common = 0;
+  options.circuit->noise = 0;
+  options.circuit->dark_current_fa = 1e-6;
+  options.circuit->white_lux = 1000;
+  const double rate = 2, theta = options.contrast_threshold;
+  const Light rising = [&](int, int, double t) { return static_cast<float>(0.01 * std::exp(rate * t)); };
+  // Behind a high-pass, brightness that rises evenly settles at rate / (2 pi f). The references begin anywhere between
+  // both thresholds, so that half a threshold is missing in the mean.
+  options.circuit->high_pass_hz = 0.5;
+  const double settled = rate / (2 * std::numbers::pi * 0.5);
+  const std::vector<Event> events = events_of(options, rising, 1000, 3);
+  EXPECT_NEAR(drift_hz(events, 0, 3) * 3 * theta, settled - 0.5 * theta, 0.01 * settled);
+  EXPECT_EQ(drift_hz(events, 2.5, 3), 0);
+  options.circuit->high_pass_hz = 0;
+  EXPECT_NEAR(drift_hz(events_of(options, rising, 1000, 3), 0, 3) * 3 * theta, rate * 3 - 0.5 * theta, 0.02 * rate);
 }
 
 TEST(CircuitCamera, EventsOnRampsDoNotDependOnTheSampling) {
@@ -135,7 +194,7 @@ TEST(CircuitCamera, EventsOnRampsDoNotDependOnTheSampling) {
 }
 
 TEST(CircuitCamera, ContinuesFromASavedState) {
-  const EventCameraOptions options = dim();
+  const EventCameraOptions options = filtered();
   const Workers workers(1);
   EventCamera first(options, kWidth, kHeight, 3), second(options, kWidth, kHeight, 3);
   std::vector<Event> whole, parts;

@@ -36,10 +36,12 @@ Circuit circuit_of(const PixelSetup& setup, std::uint64_t seed) {
 /// Events of a pixel whose light is sampled every dt, and linear in L between samples.
 std::vector<TimedEvent> run(const PixelSetup& setup, const Circuit& circuit, std::uint32_t index, const Light& light,
                             double duration, double dt) {
-  CircuitState front{0, light(0)};
+  const bool high_pass = setup.poles.high_pass_per_ns > 0;
+  CircuitState front{0, light(0), high_pass ? light(0) : 0.0};
+  const double leak = 1e-9 * static_cast<double>(setup.leak);
   CircuitPixelState state;
-  CircuitPixel pixel(circuit, index, setup.pixel, setup.leak, state);
-  pixel.open(front.v, 0, 0.5);
+  CircuitPixel pixel(circuit, index, setup.pixel, state);
+  pixel.open(light(0), high_pass ? 0.0 : front.v, {0, leak}, 0, 0.5);
   std::vector<TimedEvent> events;
   CircuitBounds bounds{1, -1, -1};
   for (std::int64_t i = 0; static_cast<double>(i) * dt < duration; ++i) {
@@ -51,12 +53,11 @@ std::vector<TimedEvent> run(const PixelSetup& setup, const Circuit& circuit, std
       const double from = start + done;
       const CircuitPiece piece = advance(setup.poles, front, part, h);
       const auto [low, high] = piece.range(0, h);
-      const double leak = 1e-9 * static_cast<double>(setup.leak);
       const bool quiet = low + leak * from - state.reference > bounds.low &&
                          high + leak * (from + h) - state.reference < bounds.high && from + h < bounds.until &&
                          std::abs(part.light + part.rate * h - static_cast<double>(state.node_light)) < kLightReach;
       if (quiet) continue;
-      pixel.set(piece, part, from);
+      pixel.set(piece, part, {leak * from, leak}, from);
       bounds = pixel.run([&](double t, int polarity) { events.push_back({t, polarity}); });
     }
   }
@@ -74,7 +75,8 @@ std::vector<TimedEvent> run_by_steps(const PixelSetup& setup, const Light& light
   const double common = t1 / (t1 + t2);
   double nx = common * ny + std::sqrt(common - common * common) * normal(random);
   const double sigma = gain * std::sqrt(setup.variance);
-  double y = light(0), v = y, reference = v + sigma * nx, held_until = -1;
+  const double k3 = setup.poles.high_pass_per_ns;
+  double y = light(0), v = y, w = k3 > 0 ? v : 0.0, reference = v - w + sigma * nx, held_until = -1;
   std::vector<TimedEvent> events;
   for (double t = 0; t < duration; t += h) {
     t1 = setup.poles.t1_unit_ns * std::exp(-light(t + 0.5 * h));
@@ -87,8 +89,10 @@ std::vector<TimedEvent> run_by_steps(const PixelSetup& setup, const Light& light
     };
     const double k1 = rate(t, y), k2 = rate(t + h, y + h * k1), y1 = y + 0.5 * h * (k1 + k2);
     const double w1 = (y - v) / t2, w2 = (y1 - (v + h * w1)) / t2;
-    v += 0.5 * h * (w1 + w2), y = y1;
-    const double s = v + sigma * nx + 1e-9 * static_cast<double>(setup.leak) * (t + h);
+    const double v1 = v + 0.5 * h * (w1 + w2);
+    w += (0.5 * (v + v1) - w) * -std::expm1(-k3 * h);
+    v = v1, y = y1;
+    const double s = v - w + sigma * nx + 1e-9 * static_cast<double>(setup.leak) * (t + h);
     if (held_until >= 0) {
       if (t + h < held_until) continue;
       reference = s, held_until = -1;
@@ -178,6 +182,13 @@ TEST(CircuitPixel, FollowsMovingLightAsItsEquationsDo) {
   setup.pixel.noise = 0.5F;
   compare(
       setup, [](double t) { return 4 + kSine(t); }, 4, 10e9, 0.5e3);
+}
+
+TEST(CircuitPixel, ForgetsSlowChangesWithAHighPassAsItsEquationsDo) {
+  PixelSetup setup;
+  setup.pixel = {0.12F, 0.16F, 1, 1e6F};
+  setup.poles.high_pass_per_ns = 2e-9 * std::numbers::pi * 5;  // above the 2 Hz of the light
+  compare(setup, kSine, 10, 30e9, 15e3);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 namespace esim {
@@ -10,7 +11,7 @@ namespace {
 
 /// The circuit's equations by Runge-Kutta steps that are short compared with every time constant.
 struct Slow {
-  double y, v;
+  double y, v, w = 0;
 
   void run(const CircuitPoles& p, const LightRamp& ramp, double length) {
     const double fastest =
@@ -23,20 +24,25 @@ struct Slow {
         return (std::exp(ramp.light + ramp.rate * at) - std::exp(y_)) / p.t1_unit_ns;
       };
       const auto dv = [&](double y_, double v_) { return (y_ - v_) / p.t2_ns; };
-      const double a1 = dy(s, y), b1 = dv(y, v);
-      const double a2 = dy(s + h / 2, y + h / 2 * a1), b2 = dv(y + h / 2 * a1, v + h / 2 * b1);
-      const double a3 = dy(s + h / 2, y + h / 2 * a2), b3 = dv(y + h / 2 * a2, v + h / 2 * b2);
-      const double a4 = dy(s + h, y + h * a3), b4 = dv(y + h * a3, v + h * b3);
+      const auto dw = [&](double v_, double w_) { return (v_ - w_) * p.high_pass_per_ns; };
+      const double a1 = dy(s, y), b1 = dv(y, v), c1 = dw(v, w);
+      const double a2 = dy(s + h / 2, y + h / 2 * a1), b2 = dv(y + h / 2 * a1, v + h / 2 * b1),
+                   c2 = dw(v + h / 2 * b1, w + h / 2 * c1);
+      const double a3 = dy(s + h / 2, y + h / 2 * a2), b3 = dv(y + h / 2 * a2, v + h / 2 * b2),
+                   c3 = dw(v + h / 2 * b2, w + h / 2 * c2);
+      const double a4 = dy(s + h, y + h * a3), b4 = dv(y + h * a3, v + h * b3), c4 = dw(v + h * b3, w + h * c3);
       y += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
       v += h / 6 * (b1 + 2 * b2 + 2 * b3 + b4);
+      w += h / 6 * (c1 + 2 * c2 + 2 * c3 + c4);
     }
   }
 };
 
-/// Runs both over ramps; returns the largest differences of v on the way.
+/// Runs both over ramps; returns the largest differences of what the comparators see on the way.
 double worst(const CircuitPoles& poles, const std::vector<double>& lights, double dt) {
-  CircuitState state{0, lights[0]};
-  Slow slow{lights[0], lights[0]};
+  const double w = poles.high_pass_per_ns > 0 ? lights[0] : 0.0;
+  CircuitState state{0, lights[0], w};
+  Slow slow{lights[0], lights[0], w};
   double worst = 0;
   for (std::size_t i = 1; i < lights.size(); ++i) {
     const LightRamp ramp{lights[i - 1], (lights[i] - lights[i - 1]) / dt};
@@ -47,9 +53,9 @@ double worst(const CircuitPoles& poles, const std::vector<double>& lights, doubl
       const CircuitPiece piece = advance(poles, state, part, h);
       Slow middle = slow;
       middle.run(poles, part, h / 2);
-      worst = std::max(worst, std::abs(piece.value(h / 2) - middle.v));
+      worst = std::max(worst, std::abs(piece.value(h / 2) - (middle.v - middle.w)));
       slow.run(poles, part, h);
-      worst = std::max(worst, std::abs(state.v - slow.v));
+      worst = std::max(worst, std::abs((state.v - state.w) - (slow.v - slow.w)));
       EXPECT_NEAR(std::log1p(state.lag), part.light + part.rate * h - slow.y, 1e-3);
     }
   }
@@ -63,6 +69,11 @@ TEST(PhotoreceptorSignal, FollowsTheCircuitsEquations) {
       for (int i = 0; i < 60; ++i)
         lights.push_back(-0.5 + std::sin(0.3 * i) + (i > 30 ? 0.8 : 0));  // an edge of 800 per s: 0.5 us
       EXPECT_LT(worst({t1, t2}, lights, 1e6), 4e-4) << t1 << " " << t2;
+      for (const double high_pass_hz : {0.1, 20.0, 150.0}) {
+        const double k3 = 2e-9 * std::numbers::pi * high_pass_hz;
+        if (k3 > 0.5 / t2) continue;
+        EXPECT_LT(worst({t1, t2, k3}, lights, 1e6), 4e-4) << t1 << " " << t2 << " " << high_pass_hz;
+      }
     }
   }
 }
@@ -138,17 +149,19 @@ TEST(PhotoreceptorSignal, DoesNotDependOnHowARampIsCut) {
 }
 
 TEST(PhotoreceptorSignal, RangesContainEveryValue) {
-  const CircuitPoles poles{1.3e6, 0.6e6};
-  for (const double lag : {-0.3, 0.0, 0.4}) {
-    for (const double rate : {-1e-7, 0.0, 1e-7}) {
-      CircuitState state{lag, 0.1};
-      const CircuitPiece piece = advance(poles, state, {0, rate}, 1e6);
-      for (double a = 0; a < 0.9e6; a += 0.13e6) {
-        for (double b = a + 1e3; b < 1e6; b += 0.17e6) {
-          const auto [low, high] = piece.range(a, b);
-          for (double s = a; s <= b; s += (b - a) / 50) {
-            EXPECT_GE(piece.value(s), low - 1e-12);
-            EXPECT_LE(piece.value(s), high + 1e-12);
+  for (const double high_pass : {0.0, 3e-7}) {
+    const CircuitPoles poles{1.3e6, 0.6e6, high_pass};
+    for (const double lag : {-0.3, 0.0, 0.4}) {
+      for (const double rate : {-1e-7, 0.0, 1e-7}) {
+        CircuitState state{lag, 0.1, high_pass > 0 ? 0.05 : 0.0};
+        const CircuitPiece piece = advance(poles, state, {0, rate}, 1e6);
+        for (double a = 0; a < 0.9e6; a += 0.13e6) {
+          for (double b = a + 1e3; b < 1e6; b += 0.17e6) {
+            const auto [low, high] = piece.range(a, b);
+            for (double s = a; s <= b; s += (b - a) / 50) {
+              EXPECT_GE(piece.value(s), low - 1e-12);
+              EXPECT_LE(piece.value(s), high + 1e-12);
+            }
           }
         }
       }

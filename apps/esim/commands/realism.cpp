@@ -1,8 +1,12 @@
 #include <fmt/format.h>
 
+#include <filesystem>
+#include <regex>
+
 #include "commands.h"
 #include "esim/core/error.h"
 #include "esim/evaluate/realism/realism.h"
+#include "esim/scenario/conversion.h"
 #include "progress_bar.h"
 #include "sensor_argument.h"
 #include "support.h"
@@ -15,7 +19,7 @@ constexpr double kIdealThreshold = 0.25;
 struct RealismArguments {
   std::string folder;
   std::vector<std::string> sensors, programs;
-  std::string fit_to;
+  std::string fit_to, save;
   RealismOptions options;
   bool json = false, quiet = false;
 };
@@ -55,6 +59,8 @@ ClipPart clip_part_of(const std::string& text) {
 
 int run(RealismArguments arguments) {
   catch_interrupts();
+  if (!arguments.save.empty() && arguments.fit_to.empty())
+    throw UserError("--save-fitted " + arguments.save + ": nothing is fitted without --fit-to");
   if (!arguments.fit_to.empty()) arguments.options.fit_to = clip_part_of(arguments.fit_to);
   ProgressBar bar(!arguments.quiet);
   const RealismEvaluation evaluation = evaluate_realism(arguments.folder, models_of(arguments), arguments.options,
@@ -63,6 +69,15 @@ int run(RealismArguments arguments) {
                                                           return !interrupted();
                                                         });
   bar.clear();
+  if (!arguments.save.empty()) {
+    std::filesystem::create_directories(arguments.save);
+    for (const FittedModel& fitted : evaluation.fitted) {
+      const std::filesystem::path name = std::filesystem::path(fitted.model).stem();
+      write_text(std::filesystem::path(arguments.save) / (name.string() + "_fitted.yaml"),
+                 "event_camera:\n  " +
+                     std::regex_replace(write_event_camera(fitted.fit.options), std::regex("\n(?=.)"), "\n  "));
+    }
+  }
   tell(stdout, "{}", arguments.json ? to_json(evaluation) : describe(evaluation));
   return interrupted() ? kInterrupted : kOk;
 }
@@ -97,9 +112,12 @@ void add_realism(CLI::App& evaluate, int& exit_code) {
   command
       ->add_option(
           "--fit-to", arguments->fit_to,
-          "Also compare each sensor with its thresholds fitted to the numbers of ON and OFF events of this part "
-          "of a clip, in fractions of its duration. Of that clip, only the rest is then compared")
+          "Also fit each sensor to this part of a clip, in fractions of its duration: thresholds, refractory period, "
+          "readout and leak. Of that clip, only the rest is then compared")
       ->type_name("CLIP:FROM:TO");
+  command
+      ->add_option("--save-fitted", arguments->save, "Write the fitted sensors to this folder, as SENSOR_fitted.yaml")
+      ->type_name("FOLDER");
   command->add_option("--frame-step", arguments->options.frame_step_s, "Time between the frames of the clips, s")
       ->type_name("S")
       ->check(CLI::Range(1e-6, 0.1))

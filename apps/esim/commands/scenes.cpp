@@ -31,11 +31,8 @@ void list(const fs::path& folder) {
 void copy_scenes(const fs::path& folder, const fs::path& to) {
   std::error_code error;
   if (fs::exists(to, error)) throw UserError(to.string() + " exists; choose another --copy, or remove it");
-  const auto require = [&](const fs::path& path) {
-    if (error) throw_cannot_write(path, error.message());
-  };
   fs::create_directory(to, error);
-  require(to);
+  if (error) throw_cannot_write(to, error.message() + "; choose another --copy");
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
     const fs::path copy = to / entry.path().lexically_relative(folder);
     if (entry.is_directory()) {
@@ -44,7 +41,7 @@ void copy_scenes(const fs::path& folder, const fs::path& to) {
       fs::copy_file(entry.path(), copy, error);
       if (!error) fs::permissions(copy, fs::perms::owner_write, fs::perm_options::add, error);
     }
-    require(copy);
+    if (error) throw_cannot_write(copy, error.message());
   }
 }
 

@@ -58,6 +58,12 @@ void check(const EventCameraOptions& o) {
     return;
   }
   check_ranges("circuit", *o.circuit);
+  if (o.circuit->high_pass_hz > 0.5 * o.circuit->source_follower_hz) {
+    throw UserError(
+        fmt::format("event camera: circuit.high_pass_hz = {:.6g}, but it must be at most half of "
+                    "circuit.source_follower_hz = {:.6g}; lower it",
+                    o.circuit->high_pass_hz, o.circuit->source_follower_hz));
+  }
   const std::string older = SensorPreset::find(o.preset.sensor + "@1") ? o.preset.sensor + "@1" : "";
   const std::string remedy = older.empty() ? "remove it" : "remove it, or choose preset " + older;
   const auto refuse = [&](const char* name, double value) {

@@ -224,7 +224,9 @@ void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
   for (PackedEvents& events : state.events) events.expect(state.packing, last - first);
   state.segments = segments;
   if (state.readout) state.readout->history.add(segments, state.pixels);
-  if (state.circuit_readout) state.circuit_readout->history.add(segments, state.size.width, state.size.height);
+  if (state.circuit_readout) {
+    state.circuit_readout->history.add(segments, state.size.width, state.size.height, state.circuit->front_values());
+  }
   if (!state.integrate(workers)) {
     state.spoiled = true;
     for (const Segment& segment : segments) check_irradiance(segment);

@@ -74,6 +74,8 @@ struct CircuitOptions {
   double dark_current_fa = 1.0;
   double photodiode_charge_e = 600.0;
   double source_follower_hz = 200.0;
+  double high_pass_hz = 0.0;
+  double leak_hz_per_klux = 0.0;
   double noise = 1.0;
 
   double threshold_mismatch_common = 0.0;
@@ -85,11 +87,12 @@ struct CircuitOptions {
 
   static constexpr double kUsualWhiteLux = 1000;
 
-  /// The photocurrent of a pixel that sees a diffuse white surface at irradiance 1, fA. The illuminance of the sensor
-  /// is that of the surface times transmission / (4 f_number^2).
-  double white_photocurrent_fa() const {
-    return photocurrent_fa_per_lux * white_lux.value_or(kUsualWhiteLux) * transmission / (4 * f_number * f_number);
+  /// The illuminance of a pixel that sees a diffuse white surface at irradiance 1, lux.
+  double white_sensor_lux() const {
+    return white_lux.value_or(kUsualWhiteLux) * transmission / (4 * f_number * f_number);
   }
+  /// The photocurrent of such a pixel, fA.
+  double white_photocurrent_fa() const { return photocurrent_fa_per_lux * white_sensor_lux(); }
   /// The dark current in units of the irradiance: L = ln(E + this), plus a constant.
   double dark_irradiance() const { return dark_current_fa / white_photocurrent_fa(); }
 };
@@ -204,6 +207,10 @@ void describe(Visitor& visit, CircuitOptions& o) {
       About{"charge that moves the photoreceptor by a factor of e: sets noise and time constant", "electrons", 1, 1e9});
   visit("source_follower_hz", o.source_follower_hz,
         About{"cut-off (-3 dB) of the source follower", "Hz", 0, 1e9, true});
+  visit("high_pass_hz", o.high_pass_hz,
+        About{"cut-off (-3 dB) of the high-pass before the comparators; 0: no high-pass", "Hz", 0, 1e6});
+  visit("leak_hz_per_klux", o.leak_hz_per_klux,
+        About{"leak that light adds to leak_rate_hz, per 1000 lux on the sensor", "Hz", 0, 1e6});
   visit("noise", o.noise, About{"factor on the standard deviation of the noise; 0: no noise", "", 0, 10});
   visit("threshold_mismatch_common", o.threshold_mismatch_common,
         About{"relative standard deviation, from pixel to pixel, that both thresholds share", "", 0, 1});

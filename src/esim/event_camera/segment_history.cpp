@@ -25,12 +25,13 @@ void SegmentHistory::add(std::span<const Segment> segments, const PixelArray& pi
   append(segments, !pixels.filtered1.empty(), !pixels.filtered2.empty(), pixels.options.surround_px > 0);
 }
 
-void SegmentHistory::add(std::span<const Segment> segments, int width, int height) {
+void SegmentHistory::add(std::span<const Segment> segments, int width, int height, int front_values) {
   width_ = width, height_ = height;
   append(segments, false, false, false);
   for (std::size_t i = 0; i < segments.size(); ++i) {
     PastSegment& past = segments_[added_ + i];
-    for (auto* const image : {&past.light, &past.lag, &past.y, &past.v}) make_size(*image, segments[i].tile);
+    past.front.resize(static_cast<std::size_t>(front_values));
+    for (Image<double>& image : past.front) make_size(image, segments[i].tile);
   }
 }
 

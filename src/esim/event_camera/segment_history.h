@@ -18,8 +18,8 @@ namespace esim::inline event_camera {
 struct PastSegment {
   Segment segment;
   Image<float> light0, light1;  // copies of the segment's irradiance if it is kept, of the tile's size
-  // Filled in by CircuitArray::advance(), of the tile's size: the state of the front end at t0.
-  Image<double> light, lag, y, v;
+  // Filled in by CircuitArray::advance(), of the tile's size: CircuitArray::front() at t0.
+  std::vector<Image<double>> front;
   // Filled in by PixelUpdate::advance() if needed, of the tile's size:
   Image<float> filtered1, filtered2;  // after each pole at t0
   Image<float> start, end;            // brightness at t0 and t1 if a surround is subtracted
@@ -33,8 +33,8 @@ class SegmentHistory {
   /// Adds segments, whose irradiance is borrowed until keep_after(). The segments of a tile must be consecutive, and
   /// tiles must not overlap.
   void add(std::span<const Segment> segments, const PixelArray& pixels);
-  /// The same for pixels of a circuit.
-  void add(std::span<const Segment> segments, int width, int height);
+  /// The same for pixels of a circuit, with so many values in PastSegment::front.
+  void add(std::span<const Segment> segments, int width, int height, int front_values);
   /// The i-th of the segments in the last add(), to fill in the state of the pixels.
   PastSegment& added(std::size_t i) { return segments_[added_ + i]; }
   bool empty() const { return count_ == 0; }

@@ -191,66 +191,34 @@ double ClipResult::sum_of_deviations() const {
 
 namespace {
 
-struct Counts {
-  double on = 0, off = 0;
-};
-
-Counts count(const std::vector<Event>& events) {
-  Counts counts;
-  for (const Event& event : events) ++(event.polarity > 0 ? counts.on : counts.off);
-  return counts;
-}
-
-/// The thresholds with which the event camera has as many ON and OFF events as the clip: each event adds a threshold to
-/// the reference, so that numbers are about inversely proportional to thresholds.
-EventCameraOptions fit_thresholds(const SensorModel& model, const RealClip& clip, const RealismOptions& options) {
-  constexpr int kMost = 12;
-  constexpr double kClose = 0.003;
-  const Counts real = count(clip.events);
-  SensorModel fitted = model;
-  for (int k = 0; k < kMost; ++k) {
-    const Counts found = count(within_clip(simulate(fitted, clip, options), clip, options.before_s));
-    if (std::min({real.on, real.off, found.on, found.off}) < 100)
-      throw UserError(fmt::format("{}: too few events to fit the thresholds of {} to", clip.name, model.name));
-    const double on = found.on / real.on, off = found.off / real.off;
-    if (std::max(std::abs(on - 1), std::abs(off - 1)) < kClose) break;
-    EventCameraOptions& o = fitted.options;
-    const double c_on = o.threshold_on() * on, c_off = o.threshold_off() * off;
-    o.contrast_threshold_on = c_on, o.contrast_threshold_off = c_off;
-    check(o);
-  }
-  return fitted.options;
-}
-
 /// The part of a clip that is compared.
 RealClip compared_part(const RealClip& clip, const std::optional<ClipPart>& fitted) {
   if (!fitted || fitted->clip != clip.name) return clip;
   return fitted->from > 0 ? clip.part(0, fitted->from) : clip.part(fitted->to, 1);
 }
 
-/// The models, and after each event camera the same with fitted thresholds.
-std::vector<SensorModel> with_fitted(const std::vector<SensorModel>& models, const RealRecordings& real,
-                                     const RealismOptions& options) {
-  if (!options.fit_to) return models;
-  const ClipPart& part = *options.fit_to;
+struct Interrupted {};
+
+/// The part of a clip that sensors are fitted to.
+RealClip part_to_fit(const RealRecordings& real, const ClipPart& part) {
   const auto clip =
       std::find_if(real.clips.begin(), real.clips.end(), [&](const RealClip& c) { return c.name == part.clip; });
   if (clip == real.clips.end()) throw UserError("there is no clip " + part.clip + " to fit to");
   const bool at_an_end = part.from == 0 ? part.to > 0 && part.to < 1 : part.from > 0 && part.from < 1 && part.to == 1;
   if (!at_an_end)
     throw UserError(
-        "thresholds can be fitted to the beginning of a clip, from 0, or to its end, to 1, but not to all of it");
-  const RealClip seen = clip->part(part.from, part.to);
-  std::vector<SensorModel> all;
-  for (const SensorModel& model : models) {
-    all.push_back(model);
-    if (!model.command.empty()) continue;
-    const EventCameraOptions fitted = fit_thresholds(model, seen, options);
-    all.push_back({fmt::format("{} (C+ {:.3f}, C- {:.3f})", model.name, fitted.threshold_on(), fitted.threshold_off()),
-                   fitted,
-                   {}});
-  }
-  return all;
+        "sensors can be fitted to the beginning of a clip, from 0, or to its end, to 1, but not to all of it");
+  return clip->part(part.from, part.to);
+}
+
+/// Fits an event camera to a part of a clip, by simulation of this part.
+SimulationFit fit_to_clip(const SensorModel& model, const RealClip& clip, const RealismOptions& options,
+                          const std::function<bool(const std::string&)>& goes_on) {
+  const auto simulated = [&](const EventCameraOptions& sensor) {
+    if (!goes_on(model.name + ": fit to " + clip.name)) throw Interrupted();
+    return statistics_of(within_clip(simulate({model.name, sensor, {}}, clip, options), clip, options.before_s), clip);
+  };
+  return fit_by_simulation(model.options, statistics_of(clip.events, clip), simulated);
 }
 
 }  // namespace
@@ -259,8 +227,23 @@ RealismEvaluation evaluate_realism(const fs::path& folder, const std::vector<Sen
                                    const RealismOptions& options,
                                    const std::function<bool(double, const std::string&)>& progress) {
   const RealRecordings real = read_real_recordings(folder);
-  const std::vector<SensorModel> models = with_fitted(given, real, options);
   RealismEvaluation evaluation;
+  std::vector<SensorModel> models = given;  // and after each event camera the fitted one
+  if (options.fit_to) {
+    const RealClip seen = part_to_fit(real, *options.fit_to);
+    models.clear();
+    for (const SensorModel& model : given) {
+      models.push_back(model);
+      if (!model.command.empty()) continue;
+      try {
+        const auto goes_on = [&](const std::string& what) { return !progress || progress(0, what); };
+        evaluation.fitted.push_back({model.name, fit_to_clip(model, seen, options, goes_on)});
+      } catch (const Interrupted&) {
+        return evaluation;
+      }
+      models.push_back({model.name + kFitted, evaluation.fitted.back().fit.options, {}});
+    }
+  }
   const std::size_t steps = (real.clips.size() + real.noise.size()) * models.size();
   auto goes_on = [&, done = std::size_t{0}](const std::string& recording, const SensorModel& model) mutable {
     return !progress ||

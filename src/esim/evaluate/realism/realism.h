@@ -8,6 +8,7 @@
 
 #include "esim/compare/likeness.h"
 #include "esim/event_camera/options.h"
+#include "esim/fit/simulated/simulation_fit.h"
 
 namespace esim::inline evaluate {
 
@@ -31,8 +32,8 @@ struct RealismOptions {
   int threads = 1;
   double frame_step_s = 2.5e-4;  ///< of the frames that move
   double before_s = 0.03;        ///< motion before the clip, which does not count
-  /// If set, each event camera is also compared with its thresholds fitted to the numbers of ON and OFF events of this
-  /// part. Of that clip, only the rest is then compared.
+  /// If set, each event camera is also fitted to this part, by simulation, and compared. Of that clip, only the rest is
+  /// then compared.
   std::optional<ClipPart> fit_to{};
 };
 
@@ -55,7 +56,15 @@ struct NoiseResult {
   double ks_counts_on = 0, ks_counts_off = 0, ks_intervals_on = 0, ks_intervals_off = 0;
 };
 
+/// An event camera that was fitted to a part of a clip.
+struct FittedModel {
+  std::string model;  ///< the one it was made from; results name it model + kFitted
+  SimulationFit fit;
+};
+inline constexpr const char* kFitted = ", fitted";
+
 struct RealismEvaluation {
+  std::vector<FittedModel> fitted;
   std::vector<ClipResult> clips;
   std::vector<NoiseResult> noise;
 };

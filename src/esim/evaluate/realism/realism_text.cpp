@@ -74,7 +74,11 @@ nlohmann::ordered_json number(double value) {
 }  // namespace
 
 std::string describe(const RealismEvaluation& evaluation) {
-  std::string text = tables_of(
+  std::string text;
+  for (const FittedModel& fitted : evaluation.fitted)
+    text += fmt::format("{}{} ({} simulations)\n\n{}\n", fitted.model, kFitted, fitted.fit.simulations,
+                        describe(fitted.fit));
+  text += tables_of(
       evaluation.clips, [](const ClipResult& r) { return r.clip; }, clip_table);
   text += tables_of(
       evaluation.noise, [](const NoiseResult& r) { return r.recording; }, noise_table);
@@ -116,7 +120,20 @@ std::string to_json(const RealismEvaluation& evaluation) {
                      {"ks_intervals_on", number(r.ks_intervals_on)},
                      {"ks_intervals_off", number(r.ks_intervals_off)}});
   }
-  return nlohmann::ordered_json{{"clips", clips}, {"noise", noise}}.dump(2) + "\n";
+  nlohmann::ordered_json fitted = nlohmann::ordered_json::array();
+  for (const FittedModel& f : evaluation.fitted) {
+    nlohmann::ordered_json parameters = nlohmann::ordered_json::array();
+    for (const Estimate& e : f.fit.estimates) {
+      parameters.push_back({{"name", e.name},
+                            {"unit", e.unit},
+                            {"value", number(e.value)},
+                            {"low", number(e.low)},
+                            {"high", number(e.high)},
+                            {"reason", e.reason}});
+    }
+    fitted.push_back({{"model", f.model}, {"simulations", f.fit.simulations}, {"parameters", parameters}});
+  }
+  return nlohmann::ordered_json{{"fitted", fitted}, {"clips", clips}, {"noise", noise}}.dump(2) + "\n";
 }
 
 }  // namespace esim::inline evaluate

@@ -3,12 +3,14 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "esim/core/large_vector.h"
 #include "esim/core/per_pixel.h"
 #include "esim/core/random.h"
 #include "esim/core/time.h"
+#include "esim/event_camera/circuit/circuit_lanes.h"
 #include "esim/event_camera/circuit/circuit_pixel.h"
 #include "esim/event_camera/options.h"
 #include "esim/event_camera/segment_history.h"
@@ -24,18 +26,27 @@ struct CircuitBuffer {
   template <typename T>
   using Values = std::array<T, kTogether + kVectorPadding>;
 
-  Values<double> light, lag, y, v;                      // at the segment's end
-  Values<double> level, rate, fast, slow, k1, several;  // of CircuitPiece; several: not 0 if one step is not enough
-  std::vector<std::uint32_t> uncertain;                 // columns whose pixels may fire, or need more than one step
-  PerPixel<double> time, polarity, reported;            // of events
+  Values<double> light, lag, y, v, w, light_sum;  // at the segment's end
+  Values<double> level, rate, fast, slow, k1, passed,
+      several;                           // of CircuitPiece; several: not 0 if one step is not enough
+  std::vector<std::uint32_t> uncertain;  // columns whose pixels may fire, or need more than one step
+  struct Found {
+    std::uint32_t column;
+    int polarity;
+    double time;  // ns after the start of the segment
+  };
+  std::vector<Found> found;                   // events of uncertain pixels
+  PerPixel<double> time, polarity, reported;  // of events
   PerPixel<std::uint32_t> place;
   std::size_t events = 0;
   std::int64_t lost = 0;         // events beyond the maximum rate of their pixels
   std::vector<NewLabel> labels;  // if they are wanted
+  CircuitLanes lanes;
 };
 
 /// The pixels of a camera, by their circuit. In most segments, one vectorised solution of the front end and a
-/// comparison with bounds suffice for most pixels; CircuitPixel takes the others to the segment's end.
+/// comparison with bounds suffice for inactive pixels. CircuitLanes takes active ones along, and CircuitPixel those in
+/// which something happens.
 class CircuitArray {
  public:
   CircuitArray(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream);
@@ -53,6 +64,9 @@ class CircuitArray {
   /// Takes a pixel that is held in reset through a past segment; appends its next request, if there is one.
   void resume(std::uint32_t pixel, const PastSegment& past, CircuitBuffer& buffer, std::vector<Event>& requests);
 
+  /// Number of values per pixel that a PastSegment keeps.
+  int front_values() const { return 4 + (w_.empty() ? 0 : 1) + (light_sum_.empty() ? 0 : 1); }
+
   /// Whether each pixel is hot; only with labels.
   const std::vector<bool>& hot() const { return hot_; }
 
@@ -65,26 +79,47 @@ class CircuitArray {
   static void transfer(Archive& archive, Self& self) {
     archive.value(self.epoch_);
     archive.fixed(self.states_);
-    for (auto* values : {&self.light_, &self.lag_, &self.y_, &self.v_, &self.low_, &self.high_, &self.until_})
-      archive.fixed(*values);
+    for (auto* values : self.front()) archive.fixed(*values);
+    for (auto* values : {&self.low_, &self.high_, &self.until_}) archive.fixed(*values);
     archive.fixed(self.node_light_);
     archive.fixed(self.origins_);
   }
 
  private:
   static constexpr TimeNs kNoEpoch = std::numeric_limits<TimeNs>::min();
+  static constexpr double kGuard = 1e-9;  // between bounds and levels, above all rounding errors
 
-  struct Row;
+  /// A row of a segment's tile, from the tile's first pixel on.
+  struct Row {
+    const float *light0, *light1;  // irradiance at both ends
+    std::size_t first;             // pixel
+    int y, x;
+    std::size_t count;
+    TimeNs t0;
+    double start, length;  // ns after the epoch; ns
+    EventPacking packing;
+  };
+
+  /// What the front end of a pixel keeps from segment to segment; what is not in use is empty.
+  std::array<LargeVector<double>*, 6> front() { return {&light_, &lag_, &y_, &v_, &w_, &light_sum_}; }
+  std::array<const LargeVector<double>*, 6> front() const { return {&light_, &lag_, &y_, &v_, &w_, &light_sum_}; }
   void make_pixels(const EventCameraOptions& options, std::uint64_t seed, std::uint16_t stream);
   template <class D>
   bool move_vector(D d, const Row& row, std::size_t x, CircuitBuffer& buffer, std::size_t at);
-  template <typename Emit>
-  std::int64_t run(std::size_t i, CircuitState& front, const LightRamp& ramp, double start, double length,
-                   const Emit& emit);
-  template <typename Emit>
-  void advance_one(const Row& row, std::uint32_t column, std::size_t at, CircuitBuffer& buffer, const Emit& emit);
+  void advance_uncertain(const Row& row, std::size_t begin, CircuitBuffer& buffer);
+  void advance_in_one(const Row& row, std::span<const std::uint32_t> columns, std::size_t begin, CircuitBuffer& buffer);
+  void advance_in_several(const Row& row, std::span<const std::uint32_t> columns, std::size_t begin,
+                          CircuitBuffer& buffer);
+  void finish(const Row& row, std::uint32_t column, std::size_t at, const CircuitPiece& piece, double done, double s,
+              CircuitState& front, CircuitBuffer& buffer);
+  CircuitLanes::Lanes wake(CircuitLanes& lanes, const std::array<std::size_t, CircuitLanes::kLanes>& pixels,
+                           CircuitLanes::Lanes inactive, CircuitLanes::Lanes& rests);
+  bool is_quiet(const CircuitLanes& lanes, std::size_t lane, std::size_t i) const;
+  LeakRamp leak_in(const Row& row, std::size_t column, std::size_t at, const CircuitBuffer& buffer) const;
   void set_bounds(std::size_t pixel, const CircuitBounds& bounds);
   CircuitPixel pixel(std::size_t i);
+  LeakRamp leak(std::size_t i, double light_rate, double start) const;
+  void keep(std::size_t i, std::size_t at, const CircuitBuffer& buffer);
   void label(std::size_t i, TimeNs t, int polarity, std::vector<NewLabel>& labels) const;
   static void flush(const Row& row, CircuitBuffer& buffer, PackedEvents& events);
 
@@ -99,10 +134,13 @@ class CircuitArray {
   LargeVector<CircuitParameters> parameters_;
   LargeVector<CircuitPixelState> states_;
   LargeVector<double> light_, lag_, y_, v_;  // at the last sample
+  LargeVector<double> w_;                    // likewise, with a high-pass
+  LargeVector<double> light_sum_;            // rounded irradiance times ns, summed; if light causes leak
   LargeVector<double> low_, high_, until_;   // CircuitBounds, with absolute levels
-  LargeVector<float> node_light_, leak_;
-  LargeVector<CircuitOrigin> origins_;  // with labels
-  std::vector<bool> hot_;               // with labels
+  LargeVector<float> node_light_, leak_;     // leak: without the part that light causes, 1/s
+  LargeVector<float> light_leak_;            // the part that light causes, 1/s at irradiance 1
+  LargeVector<CircuitOrigin> origins_;       // with labels
+  std::vector<bool> hot_;                    // with labels
 };
 
 }  // namespace esim::inline event_camera

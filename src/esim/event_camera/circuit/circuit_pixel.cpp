@@ -7,7 +7,6 @@ namespace {
 constexpr double kResolution_ns = 0.25, kNoiseResolution_ns = 0.05;
 
 constexpr double kRestingDeviations = 3.5;
-constexpr std::uint8_t kFirstSteps = 16;
 
 }  // namespace
 
@@ -54,109 +53,118 @@ std::optional<double> CircuitPixel::find_near(double a, double b) const {
   return find_near(middle, b);
 }
 
-/// Chooses the lengths of intervals for the light at `s`.
+std::optional<std::pair<double, int>> CircuitPixel::find_crossing(const PhotoreceptorNoise::Part& part, double a,
+                                                                  double b, double at_a, double at_b,
+                                                                  PhotoreceptorNoise::Middles& middles) const {
+  if (a >= b && part.index != 1) return std::nullopt;
+  const auto [low, high] = noise_->bounds(state_.pole, part);
+  const double beyond = piece_.beyond_chord(a, b);
+  if (std::min(at_a, at_b) - beyond + gain_ * low > lower() && std::max(at_a, at_b) + beyond + gain_ * high < upper())
+    return std::nullopt;
+  const double start = state_.node_time - start_;
+  if (noise_->is_cubic(state_.pole, part)) {
+    const NoiseCubic noise = noise_->cubic(state_.pole, part);
+    const double u = a - start - part.start, v = b - start - part.start;
+    const NoiseCubic sum{at_a + gain_ * noise.value(u), slope(a) + gain_ * noise.slope(u),
+                         at_b + gain_ * noise.value(v), slope(b) + gain_ * noise.slope(v), b - a};
+    const auto exit = sum.first_exit(lower(), upper());
+    return exit ? std::optional(std::pair{a + exit->first, exit->second}) : std::nullopt;
+  }
+  const auto [first, second] = noise_->halves(state_.pole, part, middles);
+  const double middle = std::clamp(start + second.start, a, b);
+  const double at_middle = middle == a ? at_a : middle == b ? at_b : signal(middle);
+  if (const auto crossing = find_crossing(first, a, middle, at_a, at_middle, middles)) return crossing;
+  return find_crossing(second, middle, b, at_middle, at_b, middles);
+}
+
+/// Chooses the length of steps for the light at `s`.
 void CircuitPixel::follow_light(double s) {
   state_.node_light = static_cast<float>(light(s));
   state_.pole = circuit_.pole(light(s));
 }
 
-void CircuitPixel::start_interval(const NoiseState& from, double s) {
-  if (std::abs(light(s) - static_cast<double>(state_.node_light)) > kLightReach) follow_light(s);
-  const auto level = level_at(signal(s), per_deviation());
-  state_.node_time = start_ + s;
-  state_.active = level.has_value();
+/// Begins a step at a node, whose number is the next one.
+void CircuitPixel::start_step(const NoiseState& from, double time) {
   state_.node += 1;
+  state_.node_time = time;
   state_.from = from;
-  if (level) set_interval(noise_->next(from, pixel_, state_.node, state_.pole, *level, drift(s), draws_));
-}
-
-/// Moves `s` through steps of the noise in which surely no threshold is reached: to the beginning of the first one that
-/// may contain a crossing or is followed by an interval of another level, or to the end of the piece; then, returns
-/// bounds.
-std::optional<CircuitBounds> CircuitPixel::skip_quiet_steps(double& s) {
-  const double scale = per_deviation();
-  const double h = noise_->length(state_.pole, PhotoreceptorNoise::kSteps);
-  const double decay1 = std::exp(-piece_.k1 * h), decay2 = std::exp(-piece_.k2 * h);
-  const double curve1 = 0.125 * piece_.k1 * piece_.k1, curve2 = 0.125 * piece_.k2 * piece_.k2;
-  double fast = piece_.fast * std::exp(-piece_.k1 * s), slow = piece_.slow * std::exp(-piece_.k2 * s);
-  double value = piece_.level + piece_.rate * s + fast + slow + leak_ * (start_ + s);
-  for (bool at_node = false;; at_node = true) {
-    const double node = state_.node_time + h, end = std::min(node - start_, piece_.length), length = end - s;
-    const auto [low, high] = noise_->step_bounds(state_.from, state_.to, h);
-    const double beyond = std::min((std::abs(fast) * curve1 + std::abs(slow) * curve2) * length * length,
-                                   std::abs(fast) + std::abs(slow));
-    const bool whole = at_node && node - start_ <= piece_.length;
-    fast *= whole ? decay1 : std::exp(-piece_.k1 * length), slow *= whole ? decay2 : std::exp(-piece_.k2 * length);
-    const double next = piece_.level + piece_.rate * end + fast + slow + leak_ * (start_ + end);
-    const double change = std::abs(light(end) - static_cast<double>(state_.node_light));
-    if (std::min(value, next) - beyond + gain_ * low <= lower() ||
-        std::max(value, next) + beyond + gain_ * high >= upper() || change > kLightReach)
-      return std::nullopt;
-    if (node - start_ > piece_.length)
-      return CircuitBounds{-gain_ * low - static_cast<double>(parameters_.off),
-                           static_cast<double>(parameters_.on) - gain_ * high, node};
-    if (level_at(next, scale) != PhotoreceptorNoise::kSteps) return std::nullopt;
-    state_.from = state_.to;
-    state_.node += 1;
-    state_.to = noise_->after_step(state_.from, pixel_, state_.node, state_.pole, drift(end), draws_);
-    state_.node_time = node;
-    s = end, value = next;
+  state_.active = true;
+  if (drawn_ != (state_.node & ~3U)) {
+    drawn_ = state_.node & ~3U;
+    noise_->draw(1, &pixel_, &drawn_, draws_);
   }
+  const auto& n = draws_[state_.node - drawn_];
+  const double drift = (static_cast<double>(state_.node_light) - light(time - start_)) / PhotoreceptorNoise::kDriftStep;
+  state_.to = noise_->after_step(from, {n[0][0], n[1][0]}, state_.pole, drift);
 }
 
+/// At the end of a step, where the signal is `value`: begins the next one, if the noise still matters.
+void CircuitPixel::pass_node(double s, double value) {
+  const double time = state_.node_time + noise_->step_ns(state_.pole);
+  if (std::abs(light(s) - static_cast<double>(state_.node_light)) > kLightReach) follow_light(s);
+  const double distance = std::min(upper() - value, value - lower());
+  if (distance < kInactiveDeviations * gain_ * noise_->deviation(state_.pole)) {
+    start_step(state_.to, time);
+    return;
+  }
+  state_.from = state_.to;
+  state_.node += 1;
+  state_.node_time = time;
+  state_.active = false;
+}
+
+/// Begins with steps, somewhere between the last node and the next one.
 void CircuitPixel::activate(double s) {
   follow_light(s);
-  state_.first_steps = kFirstSteps;
   state_.node += 1;
-  const NoiseState from = noise_->after(state_.from, start_ + s - state_.node_time, pixel_, state_.node, state_.pole);
-  start_interval(from, s);
-  if (state_.active) return;
-  state_.active = true;  // between the distances at which it becomes inactive and active
-  set_interval(noise_->next(from, pixel_, state_.node, state_.pole, 0, 0, draws_));
+  start_step(noise_->after_gap(state_.from, start_ + s - state_.node_time, pixel_, state_.node, state_.pole),
+             start_ + s);
 }
 
 /// The noise at `s`, at the end of a reset. It continues from the last node before, whatever the signal did meanwhile.
-NoiseState CircuitPixel::noise_at(double s) {
+double CircuitPixel::noise_at(double s) {
   if (state_.active) {
-    const PhotoreceptorNoise::Interval last = interval();
-    if (state_.node_time + last.length > start_ + s) return noise_->at(last, start_ + s - state_.node_time);
-    state_.from = last.to;
-    state_.node_time += last.length;
+    const double end = state_.node_time + noise_->step_ns(state_.pole);
+    if (end > start_ + s) {
+      PhotoreceptorNoise::Middles middles(pixel_, state_.node);
+      return noise_->at(state_.pole, {state_.from, state_.to}, start_ + s - state_.node_time, middles);
+    }
+    state_.from = state_.to;
+    state_.node_time = end;
     state_.node += 1;
     state_.active = false;
   }
-  state_.node += 1;
   follow_light(s);
-  state_.from = noise_->after(state_.from, start_ + s - state_.node_time, pixel_, state_.node, state_.pole);
+  state_.node += 1;
+  state_.from = noise_->after_gap(state_.from, start_ + s - state_.node_time, pixel_, state_.node, state_.pole);
   state_.node_time = start_ + s;
-  return state_.from;
+  return state_.from.x;
 }
 
-void CircuitPixel::open(double light, double time, double place) {
+void CircuitPixel::open(double light, double signal, const LeakRamp& leak, double time, double place) {
   state_ = {};
   // The noise fires a pixel before it comes nearer to a threshold than its reach.
   const double reach = noise_ == nullptr ? 0.0 : kRestingDeviations * gain_ * circuit_.deviation(light);
   const double above = std::max(0.0, static_cast<double>(parameters_.on) - reach),
                below = std::max(0.0, static_cast<double>(parameters_.off) - reach);
-  state_.reference = light + leak_ * time - (place * (above + below) - below);
+  const double beyond = place * (above + below) - below;
+  state_.reference = signal + leak.leaked - beyond;
   state_.node_time = time;
   state_.node_light = static_cast<float>(light);
   if (origin_ != nullptr) {
     // If the pixel leaks, the leak has brought it to its place; otherwise noise, or what it saw before.
-    const double leaked = light + leak_ * time - state_.reference;
-    *origin_ = {light, leak_ != 0 ? time - leaked / leak_ : time};
+    *origin_ = {signal, leak.rate != 0 ? leak.leaked - beyond : leak.leaked};
   }
   if (noise_ == nullptr) return;
-  state_.active = true;
-  state_.node = 1;
-  set_interval(noise_->first(pixel_, circuit_.pole(light), PhotoreceptorNoise::kSteps, draws_));
+  state_.pole = circuit_.pole(light);
+  state_.from = noise_->first(pixel_, state_.pole);
   state_.reference += gain_ * state_.from.x;
 }
 
 void CircuitPixel::release(double s) {
   state_.held_until = -1;
-  if (origin_ != nullptr) origin_->v = piece_.value(s), origin_->time = start_ + s;
-  const double value = signal(s) + (noise_ != nullptr ? gain_ * noise_at(s).x : 0.0);
+  if (origin_ != nullptr) origin_->v = piece_.value(s), origin_->leaked = leaked(s);
+  const double value = signal(s) + (noise_ != nullptr ? gain_ * noise_at(s) : 0.0);
   const double change = value - state_.reference;
   lost_ +=
       static_cast<std::int64_t>(std::abs(change) / static_cast<double>(change > 0 ? parameters_.on : parameters_.off));
@@ -167,9 +175,9 @@ void CircuitPixel::release(double s) {
 void CircuitPixel::take_apart(double s, int polarity) {
   CircuitOrigin& o = *origin_;
   const double threshold = polarity > 0 ? static_cast<double>(parameters_.on) : -static_cast<double>(parameters_.off);
-  const double v = piece_.value(s), time = start_ + s, leak = leak_ * (time - o.time);
+  const double v = piece_.value(s), all = leaked(s), leak = all - o.leaked;
   const double signal = noise_ != nullptr ? v - o.v : threshold - leak;
-  o = {v, time, static_cast<float>(signal), static_cast<float>(threshold - leak - signal), static_cast<float>(leak)};
+  o = {v, all, static_cast<float>(signal), static_cast<float>(threshold - leak - signal), static_cast<float>(leak)};
 }
 
 CircuitBounds CircuitPixel::bounds_without_noise() {

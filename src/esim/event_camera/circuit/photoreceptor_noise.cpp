@@ -2,17 +2,27 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "esim/core/error.h"
 #include "esim/core/vector_math.h"
 
 namespace esim::inline event_camera {
 namespace {
 
-constexpr double kPoleStep = 1.01;   // ratio of successive time constants t1
-constexpr double kNeglected = 0.01;  // maximum deviation of x from a cubic within a step, in deviations of x
-constexpr int kLevelsBelowLeaves = 4;
-constexpr std::uint32_t kStepAddresses = 0x80000000;  // above those of the tree of node 0
-constexpr double kBoundDeviations = 5;
+constexpr double kPoleStep = 1.01;  // ratio of successive time constants t1
+// Standard deviation of x in the middle of an interval with known ends, in deviations of x: of steps, and where x is
+// taken for a cubic.
+constexpr double kUnknown = 0.12, kNeglected = 0.015;
+// Addresses of draws: those of steps, 8 i + j with j = 1 to 7 within steps, 0 of the first state, others above 32 bits.
+constexpr std::uint32_t kStepAddresses = 0x80000000;
+
+/// A 2 x 2 matrix that acts on (y, x).
+struct NoiseMatrix {
+  double yy = 0, yx = 0, xy = 0, xx = 0;
+
+  NoiseState operator*(const NoiseState& s) const { return {yy * s.y + yx * s.x, xy * s.y + xx * s.x}; }
+};
 
 /// A symmetric 2 x 2 matrix.
 struct Covariance {
@@ -40,8 +50,6 @@ NoiseMatrix inverse(const NoiseMatrix& m) {
   const double determinant = m.yy * m.xx - m.yx * m.xy;
   return {m.xx / determinant, -m.yx / determinant, -m.xy / determinant, m.yy / determinant};
 }
-
-NoiseState plus(const NoiseState& a, const NoiseState& b) { return {a.y + b.y, a.x + b.x}; }
 
 /// Drift over h: y decays with t1, x follows it with t2.
 NoiseMatrix drift(double t1, double t2, double h) {
@@ -77,6 +85,29 @@ Covariance added(double variance, double t1, double t2, double h) {
   return sum;
 }
 
+/// Pairs of standard normal deviates from two words each, by the Box-Muller method in single precision: the radius from
+/// 31 random bits, at most 6.7. All arrays have 16 elements.
+void normals(std::size_t count, const std::uint32_t* first, const std::uint32_t* second, float* n1, float* n2) {
+  const hn::CappedTag<float, 16> d;
+  const hn::RebindToSigned<decltype(d)> di;
+  const hn::RebindToUnsigned<decltype(d)> du;
+  const auto unit = [&](const std::uint32_t* from) {  // in (0, 1): the upper 31 bits and a half
+    const auto halves = hn::BitCast(di, hn::ShiftRight<1>(hn::LoadU(du, from)));
+    return hn::MulAdd(hn::ConvertTo(d, halves), hn::Set(d, 0x1p-31F), hn::Set(d, 0x1p-32F));
+  };
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const auto logarithms = logarithm(d, unit(first + i));
+    const auto radius = hn::Sqrt(hn::Max(hn::Zero(d), hn::Mul(hn::Set(d, -2.0F), logarithms)));
+    auto cosine = hn::Zero(d), sine = cosine;
+    cosine_and_sine(d, unit(second + i), cosine, sine);
+    hn::StoreU(hn::Mul(radius, cosine), d, n1 + i);
+    hn::StoreU(hn::Mul(radius, sine), d, n2 + i);
+  }
+}
+
+/// `t1` at a distance from t2, since the formulas divide by t1 - t2.
+double apart(double t1, double t2) { return std::abs(t1 / t2 - 1) < 0.004 ? t2 * 1.004 : t1; }
+
 }  // namespace
 
 PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_min_ns, double t1_max_ns,
@@ -85,7 +116,6 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
       t2_(t2_ns),
       log_first_(std::log(t1_min_ns)),
       per_log_step_(1 / std::log(kPoleStep)),
-      coarse_(0.6 * t2_ns),
       random_(random) {
   if (!(variance > 0) || !(t2_ns > 0) || !(t1_min_ns > 0) || !(t1_max_ns >= t1_min_ns))
     throw UserError(
@@ -95,115 +125,119 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
   const auto count = static_cast<std::size_t>(std::ceil((std::log(t1_max_ns) - log_first_) * per_log_step_)) + 1;
   for (std::size_t i = 0; i < count; ++i) {
     Pole pole;
-    pole.t1 = std::exp(log_first_ + static_cast<double>(i) / per_log_step_);
-    if (std::abs(pole.t1 / t2_ - 1) < 0.004) pole.t1 = t2_ * 1.004;  // the formulae divide by t1 - t2
-    pole.deviation = std::sqrt(variance_ * pole.t1 / (pole.t1 + t2_));
-    const double longest = 4 * (pole.t1 + t2_);
-    for (int k = 0; k < kSteps; ++k)
-      pole.steps[static_cast<std::size_t>(k)] = make_step(pole.t1, std::ldexp(longest, -k));
-    int leaves = 0;
-    for (int k = 0; leaves <= kLevelsBelowLeaves; ++k) {
-      pole.bridges.push_back(make_bridge(pole.t1, std::ldexp(longest, -k)));
-      leaves += pole.bridges.back().leaf ? 1 : 0;
+    pole.t1 = apart(std::exp(log_first_ + static_cast<double>(i) / per_log_step_), t2_);
+    pole.deviation = deviation_at(pole.t1);
+    double shortest = 0.1 * std::min(pole.t1, t2_), longest = 4 * std::max(pole.t1, t2_);
+    for (int k = 0; k < 30; ++k) {
+      const double h = std::sqrt(shortest * longest);
+      (make_bridge(pole.t1, h).deviation <= kUnknown * pole.deviation ? shortest : longest) = h;
     }
-    pole.step_bridge = pole.bridges.size();
-    const double step = step_length(pole.t1);
+    pole.first_bridge = bridges_.size();
+    const auto is_cubic = [&](double h) { return make_bridge(pole.t1, h).deviation <= kNeglected * pole.deviation; };
+    while (!is_cubic(std::ldexp(shortest, -static_cast<int>(kMaxDepth)))) shortest *= 0.9;
+    pole.step = shortest;
+    for (double h = pole.step; !is_cubic(h); h *= 0.5, ++pole.bridges) bridges_.push_back(make_bridge(pole.t1, h));
+    pole.decay = std::exp(-pole.step / t2_);
+    poles_.push_back(pole);
     for (int k = -kDrifts; k <= kDrifts; ++k) {
-      double t1 = pole.t1 * std::exp(kDriftStep * k);
-      if (std::abs(t1 / t2_ - 1) < 0.004) t1 = t2_ * 1.004;
-      pole.drifting[static_cast<std::size_t>(k + kDrifts)] = make_step(t1, step);
+      const double t1 = apart(pole.t1 * std::exp(kDriftStep * k), t2_);
+      const NoiseMatrix moved = drift(t1, t2_, pole.step), drawn = root(added(variance_, t1, t2_, pole.step));
+      steps_.push_back({moved.yy, moved.xy, drawn.yy, drawn.xy, drawn.xx});
     }
-    pole.steps[kSteps] = pole.drifting[kDrifts];
-    while (pole.first_in_steps < kSteps && pole.steps[static_cast<std::size_t>(pole.first_in_steps)].h > 8 * step)
-      ++pole.first_in_steps;
-    for (int k = 0; k <= kLevelsBelowLeaves; ++k) pole.bridges.push_back(make_bridge(pole.t1, std::ldexp(step, -k)));
-    poles_.push_back(std::move(pole));
   }
-}
-
-PhotoreceptorNoise::Step PhotoreceptorNoise::make_step(double t1, double h) const {
-  return {h, drift(t1, t2_, h), root(added(variance_, t1, t2_, h))};
-}
-
-/// The longest interval within which x is a cubic, except for kNeglected.
-double PhotoreceptorNoise::step_length(double t1) const {
-  double shortest = 0.1 * std::min(t1, t2_), longest = 4 * std::max(t1, t2_);
-  for (int k = 0; k < 30; ++k) {
-    const double h = std::sqrt(shortest * longest);
-    (make_bridge(t1, h).leaf ? shortest : longest) = h;
-  }
-  return shortest;
 }
 
 PhotoreceptorNoise::Bridge PhotoreceptorNoise::make_bridge(double t1, double h) const {
   // Middle M = A S0 + n1, end S1 = A M + n2, n1 and n2 of covariance C. Given both ends, M has the mean
   // A S0 + K (S1 - A^2 S0) with K = C A' (A C A' + C)^-1, and the covariance C - K A C.
-  const NoiseMatrix a = drift(t1, t2_, 0.5 * h);
-  const NoiseMatrix c = full(added(variance_, t1, t2_, 0.5 * h));
-  const NoiseMatrix c_end = full(added(variance_, t1, t2_, h));  // A C A' + C
-  const NoiseMatrix k = product(product(c, transposed(a)), inverse(c_end));
+  const NoiseMatrix a = drift(t1, t2_, 0.5 * h), c = full(added(variance_, t1, t2_, 0.5 * h));
+  const NoiseMatrix k = product(product(c, transposed(a)), inverse(full(added(variance_, t1, t2_, h))));
   const NoiseMatrix covariance = difference(c, product(product(k, a), c));
-  Bridge bridge;
-  bridge.h = h;
-  bridge.from_end = k;
-  bridge.from_start = difference(a, product(k, product(a, a)));
-  bridge.spread = root({covariance.yy, 0.5 * (covariance.xy + covariance.yx), covariance.xx});
-  bridge.deviation = std::sqrt(std::max(covariance.xx, 0.0));
-  const double deviation = std::sqrt(variance_ * t1 / (t1 + t2_));
-  bridge.leaf = bridge.deviation <= kNeglected * deviation;
-  return bridge;
+  const NoiseMatrix from = difference(a, product(k, product(a, a)));
+  const NoiseMatrix spread = root({covariance.yy, 0.5 * (covariance.xy + covariance.yx), covariance.xx});
+  return {{from.yy, from.yx, k.yy, k.yx, spread.yy, 0.0},
+          {from.xy, from.xx, k.xy, k.xx, spread.xy, spread.xx},
+          std::sqrt(std::max(covariance.xx, 0.0))};
 }
 
-PhotoreceptorNoise::Interval PhotoreceptorNoise::first(std::uint32_t pixel, std::int32_t pole, std::int32_t level,
-                                                       StepDraws& draws) const {
-  // Stationary: Var y = v, Var x = Cov xy = v t1 / (t1 + t2). Draw 0 of node 0 belongs to this state alone.
+void PhotoreceptorNoise::draw(Middles& middles) const {
+  alignas(64) std::array<std::uint32_t, 16> items, addresses;
+  items.fill(middles.pixel);
+  for (std::uint32_t i = 0; i < 16; ++i) addresses[i] = (8 * middles.node + i) & ~kStepAddresses;
+  alignas(64) std::array<std::array<std::uint32_t, 16>, 4> words;
+  random_.bits(8, items.data(), addresses.data(), {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
+  normals(8, words[0].data(), words[1].data(), middles.n1.data(), middles.n2.data());
+  middles.drawn = true;
+}
+
+std::pair<PhotoreceptorNoise::Part, PhotoreceptorNoise::Part> PhotoreceptorNoise::halves(std::int32_t pole,
+                                                                                         const Part& part,
+                                                                                         Middles& middles) const {
+  if (!middles.drawn) draw(middles);
+  const Bridge& bridge = bridges_[poles_[static_cast<std::size_t>(pole)].first_bridge + part.depth];
+  const auto n1 = static_cast<double>(middles.n1[part.index]), n2 = static_cast<double>(middles.n2[part.index]);
+  const auto sum = [&](const std::array<double, 6>& row) {
+    return row[0] * part.from.y + row[1] * part.from.x + row[2] * part.to.y + row[3] * part.to.x + row[4] * n1 +
+           row[5] * n2;
+  };
+  const NoiseState middle{sum(bridge.y), sum(bridge.x)};
+  return {{part.from, middle, part.start, 2 * part.index, part.depth + 1},
+          {middle, part.to, part.start + 0.5 * length(pole, part), 2 * part.index + 1, part.depth + 1}};
+}
+
+double PhotoreceptorNoise::at(std::int32_t pole, Part part, double tau, Middles& middles) const {
+  while (!is_cubic(pole, part)) {
+    const auto [first, second] = halves(pole, part, middles);
+    part = tau < second.start ? first : second;
+  }
+  return cubic(pole, part).value(tau - part.start);
+}
+
+NoiseState PhotoreceptorNoise::first(std::uint32_t pixel, std::int32_t pole) const {
+  // Stationary: Var y = v, Var x = Cov xy = v t1 / (t1 + t2). Draw 0 belongs to this state alone.
   const double t1 = poles_[static_cast<std::size_t>(pole)].t1, common = variance_ * t1 / (t1 + t2_);
   const auto n = random_.normals(pixel, 0);
-  return next(root({variance_, common, common}) * NoiseState{n[0], n[1]}, pixel, 0, pole, level, 0, draws);
+  return root({variance_, common, common}) * NoiseState{n[0], n[1]};
 }
 
-PhotoreceptorNoise::Interval PhotoreceptorNoise::next(const NoiseState& from, std::uint32_t pixel, std::uint32_t node,
-                                                      std::int32_t pole, std::int32_t level, double drift,
-                                                      StepDraws& draws) const {
-  const Step& step = poles_[static_cast<std::size_t>(pole)].steps[static_cast<std::size_t>(level)];
-  Interval interval{from, {}, pixel, node, pole, level, step.h};
-  if (level == kSteps) {
-    interval.to = after_step(from, pixel, node, pole, drift, draws);
-    return interval;
-  }
-  const auto n = normals(interval, 1);
-  interval.to = plus(step.drift * from, step.spread * NoiseState{n[0], n[1]});
-  return interval;
-}
-
-/// Standard normal deviates by the Box-Muller method in single precision: the radius from 32 random bits, at most 6.7.
-void PhotoreceptorNoise::draw_block(std::uint32_t pixel, std::uint32_t block, StepDraws& draws) const {
-  alignas(64) std::array<std::uint32_t, 16> items, addresses;
-  items.fill(pixel);
-  for (std::uint32_t i = 0; i < 16; ++i) addresses[i] = kStepAddresses | (kBlock * block + i);
-  alignas(64) std::array<std::array<std::uint32_t, 16>, 4> words;
-  random_.bits(kBlock, items.data(), addresses.data(),
-               {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
-  const hn::ScalableTag<float> d;
-  const hn::RebindToSigned<decltype(d)> di;
-  const hn::RebindToUnsigned<decltype(d)> du;
-  const auto unit = [&](const std::uint32_t* from) {  // in (0, 1): the upper 31 bits and a half
-    const auto halves = hn::BitCast(di, hn::ShiftRight<1>(hn::LoadU(du, from)));
-    return hn::MulAdd(hn::ConvertTo(d, halves), hn::Set(d, 0x1p-31F), hn::Set(d, 0x1p-32F));
+NoiseState PhotoreceptorNoise::after_step(const NoiseState& from, const std::array<float, 2>& n, std::int32_t pole,
+                                          double drift) const {
+  const double place = drift + kDrifts, below = std::clamp(std::floor(place), 0.0, 2.0 * kDrifts - 1);
+  const Step* const step = steps(pole) + static_cast<std::size_t>(below);
+  const auto at = [&](double Step::*value) {
+    return step[0].*value + (place - below) * (step[1].*value - step[0].*value);
   };
-  for (std::size_t i = 0; i < kBlock; i += hn::Lanes(d)) {
-    const auto radius = hn::Sqrt(hn::Max(hn::Zero(d), hn::Mul(hn::Set(d, -2.0F), logarithm(d, unit(&words[0][i])))));
-    auto cosine = hn::Zero(d), sine = cosine;
-    cosine_and_sine(d, unit(&words[1][i]), cosine, sine);
-    hn::StoreU(hn::Mul(radius, cosine), d, &draws.first[i]);
-    hn::StoreU(hn::Mul(radius, sine), d, &draws.second[i]);
-  }
-  draws.block = block;
+  const auto n1 = static_cast<double>(n[0]), n2 = static_cast<double>(n[1]);
+  return {at(&Step::yy) * from.y + at(&Step::n_yy) * n1,
+          at(&Step::xy) * from.y + decay(pole) * from.x + at(&Step::n_xy) * n1 + at(&Step::n_xx) * n2};
 }
 
-NoiseState PhotoreceptorNoise::after(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
-                                     std::int32_t pole) const {
-  // The closed form of added(), which is exact enough except for steps far below the time constants.
+void PhotoreceptorNoise::draw(std::size_t count, const std::uint32_t* pixels, const std::uint32_t* first,
+                              Draws& n) const {
+  // Four words serve two nodes. Words of the nodes first and first + 1 of all pixels come before those of the next two.
+  constexpr std::size_t kWords = 2 * kDrawn;
+  alignas(64) std::array<std::uint32_t, kWords> items{}, addresses{};
+  for (std::size_t i = 0; i < count; ++i) {
+    items[i] = items[count + i] = pixels[i];
+    addresses[i] = kStepAddresses | (first[i] >> 1);
+    addresses[count + i] = addresses[i] + 1;
+  }
+  alignas(64) std::array<std::array<std::uint32_t, kWords>, 4> words;
+  random_.bits(2 * count, items.data(), addresses.data(),
+               {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
+  alignas(64) std::array<float, kWords> cosines, sines;
+  for (std::size_t parity = 0; parity < 2; ++parity) {
+    normals(2 * count, words[2 * parity].data(), words[2 * parity + 1].data(), cosines.data(), sines.data());
+    for (std::size_t half = 0; half < 2; ++half) {
+      std::copy_n(&cosines[half * count], count, n[2 * half + parity][0].begin());
+      std::copy_n(&sines[half * count], count, n[2 * half + parity][1].begin());
+    }
+  }
+}
+
+NoiseState PhotoreceptorNoise::after_gap(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
+                                         std::int32_t pole) const {
+  // The closed form of added(), which is exact enough except for gaps far below the time constants.
   const double t1 = poles_[static_cast<std::size_t>(pole)].t1, h = std::max(gap, 1e-3 * std::min(t1, t2_));
   const double e1 = std::exp(-h / t1), e2 = std::exp(-h / t2_), gain = t1 / (t1 - t2_), power = 2 * variance_ / t1;
   const double yy = variance_ * (1 - e1 * e1), uu = gain * gain * power * t2_ / 2 * (1 - e2 * e2);
@@ -214,40 +248,6 @@ NoiseState PhotoreceptorNoise::after(const NoiseState& from, double gap, std::ui
   const NoiseState drifted = drift(t1, t2_, gap) * from;
   const double part = gap < h ? std::sqrt(gap / h) : 1.0;
   return {drifted.y + part * drawn.y, drifted.x + part * drawn.x};
-}
-
-NoiseState PhotoreceptorNoise::middle(const Interval& interval, const Piece& piece, const Bridge& bridge) const {
-  const auto n = normals(interval, 2 * piece.index);  // index 1 is the draw of the interval's end
-  return plus(plus(bridge.from_start * piece.from, bridge.from_end * piece.to), bridge.spread * NoiseState{n[0], n[1]});
-}
-
-NoiseState PhotoreceptorNoise::at(const Interval& interval, double tau) const {
-  const Pole& pole = poles_[static_cast<std::size_t>(interval.pole)];
-  Piece piece{interval.from, interval.to, 0.0, 1, pole.bridge_of(interval.level)};
-  const std::size_t last = interval.level == kSteps ? pole.bridges.size() - 1 : pole.step_bridge - 1;
-  const auto descend = [&](const Bridge& bridge) {
-    const NoiseState centre = middle(interval, piece, bridge);
-    const double half = piece.start + 0.5 * bridge.h;
-    if (tau < half) {
-      piece = {piece.from, centre, piece.start, 2 * piece.index, piece.bridge + 1};
-    } else {
-      piece = {centre, piece.to, half, 2 * piece.index + 1, piece.bridge + 1};
-    }
-  };
-  while (!pole.bridges[piece.bridge].leaf) descend(pole.bridges[piece.bridge]);
-  const NoiseCubic x{piece.from.x, slope(piece.from), piece.to.x, slope(piece.to), pole.bridges[piece.bridge].h};
-  const double here = x.value(tau - piece.start);
-  // y is rough: the line between the ends of a much shorter piece has its variance.
-  while (piece.bridge < last) descend(pole.bridges[piece.bridge]);
-  const double u = (tau - piece.start) / pole.bridges[piece.bridge].h;
-  return {piece.from.y + u * (piece.to.y - piece.from.y), here};
-}
-
-std::pair<double, double> PhotoreceptorNoise::bounds(const Piece& piece, const Bridge& bridge) const {
-  const double reach = std::min(bridge.h / 3, t2_), margin = kBoundDeviations * bridge.deviation;
-  const auto [low, high] = std::minmax(
-      {piece.from.x, piece.to.x, piece.from.x + slope(piece.from) * reach, piece.to.x - slope(piece.to) * reach});
-  return {low - margin, high + margin};
 }
 
 std::optional<std::pair<double, int>> NoiseCubic::first_exit(double lower, double upper) const {
@@ -274,16 +274,17 @@ std::optional<std::pair<double, int>> NoiseCubic::first_exit(double lower, doubl
     if (polarity == 0) continue;
     double before = ends[i - 1], after = ends[i];
     const double level = polarity > 0 ? upper : lower;
-    for (int k = 0; k < 60 && after - before > 1e-3 * h; ++k) {
+    for (int k = 0; k < 6; ++k) {
       const double centre = 0.5 * (before + after), here = value(centre);
       (polarity > 0 ? here >= upper : here <= lower) ? after = centre : before = centre;
     }
     // Newton's method, so that the time hardly depends on where the search began.
     double t = 0.5 * (before + after);
-    for (int k = 0; k < 4; ++k) {
+    for (int k = 0; k < 8; ++k) {
       const double rate = slope(t);
       if (rate * polarity <= 0) return std::pair{after, polarity};
-      t = std::clamp(t - (value(t) - level) / rate, before, after);
+      const double last = std::exchange(t, std::clamp(t - (value(t) - level) / rate, before, after));
+      if (std::abs(t - last) < 1e-9 * h) break;
     }
     return std::pair{t, polarity};
   }

@@ -23,6 +23,22 @@ double step_length(const CircuitPoles& poles, const CircuitState& state, const L
   return std::min(step, kMaxDecay / (rate * std::exp(std::max(0.0, ramp.rate * step))));
 }
 
+namespace {
+
+/// The output of the high-pass, of the source follower's `v`. Advances the state.
+CircuitPiece high_passed(const CircuitPiece& v, double k3, CircuitState& state) {
+  CircuitPiece passed = v;
+  passed.k3 = k3;
+  passed.level = v.rate / k3, passed.rate = 0;
+  passed.fast = v.fast * v.k1 / (v.k1 - k3), passed.slow = v.slow * v.k2 / (v.k2 - k3);
+  passed.passed = (state.v - state.w) - passed.level - passed.fast - passed.slow;
+  state.v = v.value(v.length);
+  state.w = state.v - passed.value(v.length);
+  return passed;
+}
+
+}  // namespace
+
 CircuitPiece advance(const CircuitPoles& poles, CircuitState& state, const LightRamp& ramp, double length) {
   // With a = integral of I / Q, in which I is linear: lag1 = (1 + rho) [lag0 exp(-A) + rho integral of
   // exp(-A (1 - x)) / (1 + rho x)^2 over x], 1 + rho = I1 / I0. The quotient is replaced by a cubic through
@@ -43,7 +59,10 @@ CircuitPiece advance(const CircuitPoles& poles, CircuitState& state, const Light
   const double y0 = ramp.light - std::log1p(state.lag), rise = growth - std::log1p(lag1) + std::log1p(state.lag);
   const double slope0 = rate0 * state.lag / (1 + state.lag);
   double a = std::max(area, 1e-3), k = a / length;
-  if (std::abs(k * poles.t2_ns - 1) < 0.005) k = 1.005 / poles.t2_ns, a = k * length;
+  for (const double other :
+       {1 / poles.t2_ns, poles.high_pass_per_ns}) {  // at resonance, the quotients below would fail
+    if (std::abs(k - other) < 0.005 * other) k = 1.005 * other, a = k * length;
+  }
   const double mean_decay = a == area ? psi[0] : -std::expm1(-a) / a;
   const double slope = (rise / length - slope0 * mean_decay) / (1 - mean_decay), gap = (slope - slope0) / k;
 
@@ -55,8 +74,9 @@ CircuitPiece advance(const CircuitPoles& poles, CircuitState& state, const Light
   piece.level = y0 - gap - slope * poles.t2_ns;
   piece.fast = gap / (1 - k * poles.t2_ns);
   piece.slow = state.v - piece.level - piece.fast;
-  state.v = piece.value(length);
   state.lag = lag1;
+  if (poles.high_pass_per_ns > 0) return high_passed(piece, poles.high_pass_per_ns, state);
+  state.v = piece.value(length);
   return piece;
 }
 

@@ -33,6 +33,14 @@ struct SensorStatistics : StreamSums, PixelSums {
   std::vector<PixelSums> tiles;
 };
 
+// Names of statistics that others look for.
+inline constexpr std::string_view kEventRate = "events per second";
+inline constexpr std::string_view kOnFraction = "ON fraction";
+inline constexpr std::string_view kRowSameUs = "same row, same us, over chance";
+inline constexpr std::string_view kRowLater = "same row, 1 to 5 us later, over chance";
+inline constexpr std::string_view kColumnSameUs = "same column, same us, over chance";
+inline constexpr std::string_view kShortIntervals = "1 % of the intervals";
+inline constexpr std::string_view kEventsPerStamp = "events per time stamp";
 inline constexpr std::string_view kScanPeriod = "period of the scan";
 
 /// How two values of a statistic are compared.

@@ -1,0 +1,134 @@
+#pragma once
+
+#include "esim/core/vector_math.h"
+#include "esim/event_camera/circuit/photoreceptor_signal.h"
+
+// advance() of photoreceptor_signal.h for several pixels side by side.
+// Private to .cpp files: includes hwy/highway.h.
+namespace esim::inline event_camera {
+
+inline constexpr double kSettled = 1e-13;  ///< brightness: differences below this are zero
+
+/// CircuitState with L = light and y = light - ln(1 + lag).
+template <class D>
+struct CircuitStates {
+  hn::Vec<D> light, lag, y, v, w;
+};
+
+/// CircuitPiece; k2 and k3 are those of all pixels.
+template <class D>
+struct CircuitPieces {
+  hn::Vec<D> level, rate, fast, slow, k1, passed;
+};
+
+/// A change of the light over `length` ns, to `light1`. growth = light1 - L, e: its factor minus 1, and rate0 = I / Q
+/// at the start. Each decay is exp(-k length) of the pole of its number.
+template <class D>
+struct CircuitRamps {
+  hn::Vec<D> light1, growth, rho, rate0, length, decay2, decay3;
+};
+
+/// The integral of I / Q over a ramp.
+template <class D>
+HWY_INLINE hn::Vec<D> area_of(D d, const CircuitRamps<D>& ramp) {
+  const auto one = hn::Set(d, 1.0);
+  const auto changes = hn::Ne(ramp.growth, hn::Zero(d));
+  const auto mean = hn::IfThenElse(changes, hn::Div(ramp.rho, hn::IfThenElse(changes, ramp.growth, one)), one);
+  return hn::Mul(hn::Mul(ramp.rate0, ramp.length), mean);
+}
+
+/// Whether the lag is far from the one that the ramp keeps up.
+template <class D>
+HWY_INLINE hn::Mask<D> is_transient(D d, const CircuitRamps<D>& ramp, hn::Vec<D> lag) {
+  const auto kept = hn::Div(ramp.growth, hn::Mul(ramp.rate0, ramp.length));
+  return hn::Gt(hn::Abs(hn::Sub(lag, kept)), hn::Set(d, kMaxTransient));
+}
+
+/// As advance(), which has the equations. `area` is that of area_of().
+template <class D>
+HWY_INLINE CircuitPieces<D> advance(D d, const CircuitPoles& poles, const CircuitRamps<D>& ramp, hn::Vec<D> area,
+                                    CircuitStates<D>& state) {
+  using V = hn::Vec<D>;
+  const auto set = [d](double value) { return hn::Set(d, value); };
+  const V one = set(1), light0 = state.light, lag0 = state.lag, y0 = state.y, v0 = state.v, in0 = hn::Sub(v0, state.w);
+  const bool high_pass = poles.high_pass_per_ns > 0;
+
+  // exponential_moments()
+  const V safe = hn::Max(area, set(1e-9)), inverse = hn::Div(one, safe);
+  const V up0 = hn::Mul(hn::Sub(one, hn::Exp(d, hn::Neg(safe))), inverse);
+  const V up1 = hn::Mul(hn::Sub(one, up0), inverse), up2 = hn::Mul(hn::NegMulAdd(set(2), up1, one), inverse);
+  const V up3 = hn::Mul(hn::NegMulAdd(set(3), up2, one), inverse);
+  const V low_area = hn::Min(area, set(2));
+  V down3 = one;
+  for (int j = 18; j >= 1; --j) down3 = hn::NegMulAdd(hn::Mul(low_area, set(1.0 / (4 + j))), down3, one);
+  down3 = hn::Mul(down3, set(0.25));
+  const V down2 = hn::Mul(hn::NegMulAdd(low_area, down3, one), set(1.0 / 3));
+  const V down1 = hn::Mul(hn::NegMulAdd(low_area, down2, one), set(0.5)), down0 = hn::NegMulAdd(low_area, down1, one);
+  const auto large = hn::Gt(area, set(2));
+  const V p0 = hn::IfThenElse(large, up0, down0), p1 = hn::IfThenElse(large, up1, down1),
+          p2 = hn::IfThenElse(large, up2, down2), p3 = hn::IfThenElse(large, up3, down3);
+  const V decay = hn::NegMulAdd(area, p0, one);
+
+  // The lag at the end
+  const auto quotient = [&](double part) {
+    const V g = hn::MulAdd(ramp.rho, set(part), one);
+    return hn::Div(one, hn::Mul(g, g));
+  };
+  const V f1 = quotient(1.0 / 3), f2 = quotient(2.0 / 3), f3 = quotient(1.0);
+  const auto sum = [&](double a, double b, double c, double e) {
+    return hn::MulAdd(set(b), f1, hn::MulAdd(set(c), f2, hn::MulAdd(set(e), f3, set(a))));
+  };
+  const V c1 = sum(-5.5, 9, -4.5, 1), c2 = sum(9, -22.5, 18, -4.5), c3 = sum(-4.5, 13.5, -13.5, 4.5);
+  const V integral = hn::MulAdd(c3, p3, hn::MulAdd(c2, p2, hn::MulAdd(c1, p1, p0)));
+  const V grown = hn::Add(one, ramp.rho);
+  V lag1 = hn::Mul(grown, hn::MulAdd(lag0, decay, hn::Mul(ramp.rho, integral)));
+  lag1 = hn::IfThenElse(hn::Lt(hn::Abs(lag1), set(kSettled)), hn::Zero(d), lag1);
+  const V y1 = hn::Sub(ramp.light1, hn::Log1p(d, lag1));
+
+  // An exponential plus a line through y, and what the source follower makes of it
+  const V slope0 = hn::Div(hn::Mul(ramp.rate0, lag0), hn::Add(one, lag0));
+  const V a_plain = hn::Max(area, set(1e-3));
+  const V per_length = hn::Div(one, ramp.length);
+  const V t2 = set(poles.t2_ns);
+  CircuitPieces<D> piece;
+  piece.k1 = hn::Mul(a_plain, per_length);
+  auto resonates = hn::Lt(hn::Abs(hn::MulSub(piece.k1, t2, one)), set(0.005));
+  piece.k1 = hn::IfThenElse(resonates, set(1.005 / poles.t2_ns), piece.k1);
+  const double k_2 = 1 / poles.t2_ns, k_3 = poles.high_pass_per_ns;
+  if (high_pass) {
+    const auto resonates3 = hn::Lt(hn::Abs(hn::Sub(piece.k1, set(k_3))), set(0.005 * k_3));
+    piece.k1 = hn::IfThenElse(resonates3, set(1.005 * k_3), piece.k1);
+    resonates = hn::Or(resonates, resonates3);
+  }
+  const V a = hn::Mul(piece.k1, ramp.length);
+  const auto exact = hn::And(hn::Eq(a_plain, area), hn::Not(resonates));
+  const V decay1 = hn::IfThenElse(exact, decay, hn::Exp(d, hn::Neg(a)));
+  const V mean_decay = hn::Div(hn::Sub(one, decay1), a);
+  piece.rate =
+      hn::Div(hn::NegMulAdd(slope0, mean_decay, hn::Mul(hn::Sub(y1, y0), per_length)), hn::Sub(one, mean_decay));
+  const V gap = hn::Div(hn::Sub(piece.rate, slope0), piece.k1);
+  piece.level = hn::Sub(hn::Sub(y0, gap), hn::Mul(piece.rate, t2));
+  piece.fast = hn::Div(gap, hn::NegMulAdd(piece.k1, t2, one));
+  piece.slow = hn::Sub(hn::Sub(v0, piece.level), piece.fast);
+  piece.passed = hn::Zero(d);
+  V v1 = hn::MulAdd(piece.slow, ramp.decay2,
+                    hn::MulAdd(piece.fast, decay1, hn::MulAdd(piece.rate, ramp.length, piece.level)));
+  const auto settles = hn::And(hn::And(hn::Eq(lag1, hn::Zero(d)), hn::Eq(light0, ramp.light1)),
+                               hn::Lt(hn::Abs(hn::Sub(v1, y1)), set(kSettled)));
+  v1 = hn::IfThenElse(settles, y1, v1);
+  V w1 = state.w;
+  if (high_pass) {  // as high_passed()
+    piece.level = hn::Div(piece.rate, set(k_3));
+    piece.rate = hn::Zero(d);
+    piece.fast = hn::Div(hn::Mul(piece.fast, piece.k1), hn::Sub(piece.k1, set(k_3)));
+    piece.slow = hn::Mul(piece.slow, set(k_2 / (k_2 - k_3)));
+    piece.passed = hn::Sub(hn::Sub(hn::Sub(in0, piece.level), piece.fast), piece.slow);
+    const V in1 = hn::MulAdd(piece.passed, ramp.decay3,
+                             hn::MulAdd(piece.slow, ramp.decay2, hn::MulAdd(piece.fast, decay1, piece.level)));
+    w1 = hn::IfThenElse(hn::And(settles, hn::Lt(hn::Abs(in1), set(kSettled))), v1, hn::Sub(v1, in1));
+  }
+  state = {ramp.light1, lag1, y1, v1, w1};
+  return piece;
+}
+
+}  // namespace esim::inline event_camera

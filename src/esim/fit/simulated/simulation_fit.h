@@ -1,0 +1,32 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "esim/event_camera/options.h"
+#include "esim/fit/estimate.h"
+#include "esim/stats/sensor/sensor_statistics.h"
+
+namespace esim::inline fit {
+
+/// Simulates a sensor that sees the scene of a recording. Returns the statistics of its events.
+using SimulatedStatistics = std::function<SensorStatistics(const EventCameraOptions&)>;
+
+/// A sensor fitted to a recording of a moving scene.
+struct SimulationFit {
+  EventCameraOptions options;       ///< the base, with what the recording determines
+  std::vector<Estimate> estimates;  ///< one for each parameter that is considered, determined or not
+  int simulations = 0;
+};
+
+/// Tables of the parameters, and what is not determined.
+std::string describe(const SimulationFit& fit);
+
+/// Fits thresholds, refractory period, readout and leak of a sensor to the statistics of a recording, by repeated
+/// simulation of the same scene (docs/methods/fitting.md, section 4). Parameters that the recording does not determine
+/// stay as in `base`.
+SimulationFit fit_by_simulation(const EventCameraOptions& base, const SensorStatistics& real,
+                                const SimulatedStatistics& simulate);
+
+}  // namespace esim::inline fit

@@ -7,6 +7,7 @@
 #include "esim/backends/opengl/gl_renderer.h"
 #include "esim/backends/panorama/panorama_renderer.h"
 #include "esim/backends/plane/plane_renderer.h"
+#include "esim/backends/raycast/raster/raster_renderer.h"
 #include "esim/backends/raycast/raycast_renderer.h"
 #include "esim/backends/sprites/sprites_renderer.h"
 #include "esim/backends/unrealcv/unrealcv_renderer.h"
@@ -57,13 +58,21 @@ MeshEngine choose_engine(const MeshRendererOptions& options, bool colour) {
 }
 
 RendererFactory factory(const MeshRendererOptions& options, const SceneFile& file, bool colour) {
-  if (choose_engine(options, colour) == MeshEngine::gl) {
+  const MeshEngine engine = choose_engine(options, colour);
+  if (engine == MeshEngine::gl) {
     const GlOptions gl{static_cast<float>(options.background), options.samples_per_pixel, options.gl_device};
     return {[gl, scene = std::make_shared<const Scene>(file.scene)](const Camera& camera, ColourFilters filters,
                                                                     const Workers&) {
       refuse(filters, "engine: gl", "engine: raycast");
       return make_gl_renderer(*scene, gl, camera);
     }};
+  }
+  if (engine == MeshEngine::raster) {
+    const RasterOptions raster{static_cast<float>(options.background), options.samples_per_pixel};
+    return with_area([raster, scene = build_raster_scene(file.scene)](const Camera& camera, ColourFilters filters,
+                                                                      const PixelArea& area, const Workers& workers) {
+      return make_raster_renderer(scene, raster, camera, workers, filters, area);
+    });
   }
   const auto scene = build_raycast_scene(file.scene);
   const RaycastOptions raycast{static_cast<float>(options.background), options.samples_per_pixel};

@@ -86,7 +86,7 @@ void describe(Visitor& visit, LambertOptions& o) {
 using LightingOptions = std::variant<UnlitOptions, LambertOptions>;
 
 /// The renderer of triangles.
-enum class MeshEngine { raycast, gl, automatic };
+enum class MeshEngine { raycast, raster, gl, automatic };
 
 /// Triangles.
 struct MeshRendererOptions {
@@ -104,7 +104,8 @@ struct MeshRendererOptions {
 template <class Visitor>
 void describe(Visitor& visit, MeshRendererOptions& o) {
   visit("engine", o.engine,
-        About{"raycast: Embree; gl: OpenGL; auto: gl if there is a graphics card, raycast otherwise"});
+        About{"raycast: Embree; raster: exact coverage of pixels; gl: OpenGL; auto: gl if there is a graphics card, "
+              "raycast otherwise"});
   visit("gl_device", o.gl_device,
         About{"index of the graphics device, from 0 (default: the first hardware device)", "", 0, 31});
   visit("scene", o.scene,
@@ -344,7 +345,7 @@ inline constexpr std::array<const char*, 4> kEnumNames<SpriteBeyond>{"nothing", 
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<SpriteInterpolation>{"spline", "linear"};
 template <>
-inline constexpr std::array<const char*, 3> kEnumNames<MeshEngine>{"raycast", "gl", "auto"};
+inline constexpr std::array<const char*, 4> kEnumNames<MeshEngine>{"raycast", "raster", "gl", "auto"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<BlenderEngine>{"cycles", "eevee"};
 template <>

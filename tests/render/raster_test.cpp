@@ -1,0 +1,194 @@
+// The rasteriser against areas in closed form, and against a slow search of all triangles at many points of each pixel.
+#include "esim/backends/raycast/raster/raster_renderer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "esim/core/error.h"
+#include "render/scenes.h"
+
+namespace esim {
+namespace {
+
+Sample seen(const Scene& scene, const Camera& camera, int samples = 16, float background = 1.0F) {
+  const auto renderer =
+      make_raster_renderer(build_raster_scene(scene), {background, samples}, camera, test::two_threads());
+  return test::render(*renderer, camera, Kinematics{});
+}
+
+/// Plain triangles, each with its own albedo.
+Scene plain_scene(const std::vector<Eigen::Vector3f>& corners, const std::vector<float>& albedos) {
+  Mesh mesh;
+  mesh.vertices = corners;
+  const Eigen::Vector2f origin(0, 0);
+  for (std::uint32_t i = 0; i < albedos.size(); ++i) {
+    mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    mesh.texture_uv.push_back({origin, origin, origin});
+    mesh.material.push_back(static_cast<std::uint16_t>(i));
+    mesh.materials.push_back({"plain", nullptr, albedos[i]});
+  }
+  return still_scene(mesh);
+}
+
+/// A black half-plane at z = 1 over a white background: where u cos(a) + v sin(a) < offset, px from the image's centre.
+Scene black_half_plane(double angle, double offset, const Camera& camera) {
+  std::vector<Eigen::Vector3f> corners;
+  const Eigen::Vector2d normal(std::cos(angle), std::sin(angle)), along(-normal.y(), normal.x());
+  for (const auto& [n, s] : {std::pair{offset, -1e3}, {offset, 1e3}, {-1e3, 0.0}}) {
+    const Eigen::Vector2d at = n * normal + s * along;
+    corners.emplace_back(static_cast<float>(at.x() / camera.fx), static_cast<float>(at.y() / camera.fy), 1.0F);
+  }
+  return plain_scene(corners, {0.0F});
+}
+
+/// The area of a unit square around (x, y) in which u cos(a) + v sin(a) >= offset.
+double white_area(double x, double y, double angle, double offset) {
+  // The integral of a box over the projection of the square: a trapezium with these half-widths.
+  const double a = std::abs(std::cos(angle)) / 2, b = std::abs(std::sin(angle)) / 2;
+  const double d = x * std::cos(angle) + y * std::sin(angle) - offset;
+  const double big = std::max(a, b), small = std::max(std::min(a, b), 1e-5);
+  if (std::abs(d) > big + small) return d > 0 ? 1 : 0;
+  const auto ramp2 = [](double t) { return t > 0 ? 0.5 * t * t : 0.0; };
+  const double sum = ramp2(d + big + small) - ramp2(d + big - small) - ramp2(d - big + small) + ramp2(d - big - small);
+  return std::clamp(sum / (4 * big * small), 0.0, 1.0);
+}
+
+TEST(RasterRenderer, APixelOnAnEdgeIsTheExactMeanOverItsArea) {
+  const Camera model = test::distorted_camera(0);
+  for (const double angle : {0.0, 0.3, 0.8, std::numbers::pi / 2, 2.0}) {
+    for (const double offset : {1.37, 1.5, 1.81}) {
+      const Sample sample = seen(black_half_plane(angle, offset, model), model);
+      int between = 0;
+      for (int y = 0; y < model.height; ++y) {
+        for (int x = 0; x < model.width; ++x) {
+          const double expected = white_area(x - model.cx, y - model.cy, angle, offset);
+          EXPECT_NEAR(sample.irradiance(x, y), expected, 1e-3) << x << ", " << y << " at " << angle;
+          between += expected > 0.01 && expected < 0.99 ? 1 : 0;
+        }
+      }
+      ASSERT_GT(between, 50);
+    }
+  }
+}
+
+TEST(RasterRenderer, SharedEdgesHaveNeitherCracksNorDoubleCoverage) {
+  // Grids of random points that fill the view, of the same albedo as nothing else: any crack lets the background
+  // through, and any double coverage would make a pixel brighter.
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> jitter(-0.45F, 0.45F), depth(1.0F, 1.6F);
+  for (const int distortion : {0, 1, 2, 3}) {
+    const Camera model = test::distorted_camera(distortion);
+    for (int mesh = 0; mesh < 12; ++mesh) {
+      constexpr int kCells = 24;
+      std::vector<Eigen::Vector3f> points;
+      for (int i = 0; i < (kCells + 1) * (kCells + 1); ++i) {
+        const auto column = static_cast<float>(i % (kCells + 1)), row = static_cast<float>(i / (kCells + 1));
+        const float z = depth(random);
+        const float half = 0.5F * kCells;
+        points.emplace_back(4 * z * (column - half + jitter(random)) / half,
+                            4 * z * (row - half + jitter(random)) / half, z);
+      }
+      std::vector<Eigen::Vector3f> corners;
+      for (int row = 0; row < kCells; ++row) {
+        for (int column = 0; column < kCells; ++column) {
+          const auto at = [&](int dx, int dy) {
+            return points[static_cast<std::size_t>((row + dy) * (kCells + 1) + column + dx)];
+          };
+          for (const auto& corner : {at(0, 0), at(1, 0), at(1, 1), at(0, 0), at(1, 1), at(0, 1)})
+            corners.push_back(corner);
+        }
+      }
+      const Sample sample = seen(plain_scene(corners, std::vector<float>(corners.size() / 3, 0.5F)), model, 16, 100.0F);
+      for (const float e : sample.irradiance.pixels()) ASSERT_NEAR(e, 0.5, 0.004) << distortion << " " << mesh;
+    }
+  }
+}
+
+/// The mean albedo of what is seen in a pixel, by a search of all triangles at a grid of points.
+double searched(const std::vector<Eigen::Vector3f>& corners, const std::vector<float>& albedos, const Camera& camera,
+                int x, int y, double background) {
+  constexpr int kGrid = 24;
+  double sum = 0;
+  for (int i = 0; i < kGrid * kGrid; ++i) {
+    const Eigen::Vector3d ray((x + (i % kGrid + 0.5) / kGrid - 0.5 - camera.cx) / camera.fx,
+                              (y + (i / kGrid + 0.5) / kGrid - 0.5 - camera.cy) / camera.fy, 1);
+    double nearest = std::numeric_limits<double>::infinity(), value = background;
+    for (std::size_t k = 0; k < albedos.size(); ++k) {
+      const Eigen::Vector3d a = corners[3 * k].cast<double>(), b = corners[3 * k + 1].cast<double>(),
+                            c = corners[3 * k + 2].cast<double>(), normal = (b - a).cross(c - a);
+      const double z = normal.dot(a) / normal.dot(ray);  // of the point on the plane
+      if (!(z > 1e-3) || z >= nearest) continue;
+      const Eigen::Vector3d p = z * ray;
+      const double u = normal.dot((b - a).cross(p - a)), v = normal.dot((c - b).cross(p - b)),
+                   w = normal.dot((a - c).cross(p - c));
+      if (std::min({u, v, w}) < 0) continue;
+      nearest = z, value = static_cast<double>(albedos[k]);
+    }
+    sum += value;
+  }
+  return sum / (kGrid * kGrid);
+}
+
+TEST(RasterRenderer, RandomTrianglesAreWhatASlowSearchSees) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> across(-1.2F, 1.2F), depth(-0.5F, 3.0F), albedo(0.0F, 1.0F);
+  Camera model = test::distorted_camera(0);
+  double squares = 0, count = 0;
+  for (int mesh = 0; mesh < 40; ++mesh) {
+    std::vector<Eigen::Vector3f> corners;
+    std::vector<float> albedos;
+    for (int k = 0; k < 12; ++k) {
+      albedos.push_back(albedo(random));
+      for (int corner = 0; corner < 3; ++corner) {
+        const float z = depth(random);  // also behind the camera: triangles are clipped
+        corners.emplace_back(2 * across(random), 2 * across(random), z);
+      }
+    }
+    const Sample sample = seen(plain_scene(corners, albedos), model, 16, 0.3F);
+    std::uniform_int_distribution<int> column(0, model.width - 1), row(0, model.height - 1);
+    for (int i = 0; i < 60; ++i) {
+      const int x = column(random), y = row(random);
+      const double error = static_cast<double>(sample.irradiance(x, y)) - searched(corners, albedos, model, x, y, 0.3);
+      EXPECT_LT(std::abs(error), 0.06) << mesh << ": " << x << ", " << y;
+      squares += error * error, ++count;
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / count), 0.006);
+}
+
+TEST(RasterRenderer, WhatNoSceneShouldContainIsSafe) {
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
+  const Camera model = test::distorted_camera(1);
+  const std::vector<std::vector<Eigen::Vector3f>> corners{
+      {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}},   // no area
+      {{-1, 0, 1}, {1, 0, 1}, {0, 0, 1}},  // a line
+      {{-1e30F, -1e30F, 1}, {1e30F, -1e30F, 1}, {0, 1e30F, 1}},
+      {{-1, -1, 1e30F}, {1, -1, 1e30F}, {0, 1, 1e30F}},
+      {{-1, -1, 1e-30F}, {1, -1, 1e-30F}, {0, 1, -1e-30F}},
+      {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}},  // the camera is in it
+      {{-1, -1, -1}, {1, -1, 2}, {0, 1, -3}},
+  };
+  for (const auto& triangle : corners) {
+    for (const int samples : {1, 16, 64}) {
+      const Sample sample = seen(plain_scene(triangle, {0.5F}), model, samples);
+      for (const float e : sample.irradiance.pixels()) ASSERT_TRUE(e >= 0.49F && e <= 1.01F) << e;
+    }
+  }
+  for (const float bad : {kNaN, kInfinity}) {
+    try {  // an error, or a picture
+      const Sample sample = seen(plain_scene({{bad, 0, 1}, {1, bad, 1}, {0, 1, 1}}, {0.5F}), model);
+      for (const float e : sample.irradiance.pixels()) ASSERT_TRUE(std::isfinite(e));
+    } catch (const UserError&) {
+    }
+  }
+}
+
+TEST(RasterRenderer, NumbersOfSamplesAreChecked) {
+  EXPECT_THROW(seen(plain_scene({{0, 0, 1}, {1, 0, 1}, {0, 1, 1}}, {0.5F}), test::distorted_camera(0), 4), UserError);
+}
+
+}  // namespace
+}  // namespace esim

@@ -8,6 +8,7 @@
 namespace esim::inline backends::inline raycast {
 namespace {
 
+
 namespace hn = hwy::HWY_NAMESPACE;
 
 using D = hn::CappedTag<float, 8>;
@@ -94,6 +95,7 @@ void CellSurfaces::scan(const ScreenTriangle& triangle, const BearingBounds& bou
   const float z_reach = std::fabs(z.x) * cell.half_width + std::fabs(z.y) * cell.half_height + rounding(z, cell.extent);
   const V zx = hn::Set(d, z.x), zy = hn::Set(d, z.y), z1 = hn::Set(d, z.one), zr = hn::Set(d, z_reach);
   const V zero = hn::Zero(d), max = hn::Set(d, 1 / kNearestDepth);
+  const V min_depth = hn::Set(d, triangle.farthest), max_depth = hn::Set(d, triangle.nearest);
   const auto id = static_cast<std::uint32_t>(triangles_.size());
   const std::size_t found_before = found_count_;
   for (int row = first_row; row <= last_row; ++row) {
@@ -101,7 +103,7 @@ void CellSurfaces::scan(const ScreenTriangle& triangle, const BearingBounds& bou
       const auto k = static_cast<std::size_t>(row * ImageCell::kWidth + column);
       const V x = hn::Load(d, &cell.x[k]), y = hn::Load(d, &cell.y[k]);
       const V depth = hn::MulAdd(zx, x, hn::MulAdd(zy, y, z1));
-      const V farthest = hn::Sub(depth, zr), nearest = hn::Add(depth, zr);
+      const V farthest = hn::Max(hn::Sub(depth, zr), min_depth), nearest = hn::Min(hn::Add(depth, zr), max_depth);
       const V hidden = hn::Load(d, &hidden_below_[k]);
       auto visible = hn::And(hn::Ge(nearest, hidden), hn::And(hn::Gt(nearest, zero), hn::Lt(farthest, max)));
       auto fills = hn::And(hn::Gt(farthest, zero), hn::Lt(nearest, max));

@@ -1,11 +1,17 @@
 #pragma once
 
+#include <hwy/highway.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
+// Private to backends/raycast: includes hwy/highway.h.
 namespace esim::inline backends::inline raycast {
+
+namespace hn = hwy::HWY_NAMESPACE;
 
 /// A position in a pixel, from its centre: [-0.5, 0.5] x [-0.5, 0.5].
 struct PixelPoint {
@@ -24,66 +30,96 @@ struct OfPixel {
 
 /// A convex polygon in a pixel, empty if it has fewer than three corners.
 class Convex {
+  using D = hn::CappedTag<float, 8>;
+  static constexpr std::size_t kVector = hn::MaxLanes(D());
+
+  /// Of f at the corners from i on.
+  auto values(const OfPixel& f, std::size_t i) const {
+    const D d;
+    const auto middle = hn::MulAdd(hn::Set(d, f.t), hn::Load(d, &t_[i]), hn::Set(d, f.middle));
+    return hn::MulAdd(hn::Set(d, f.s), hn::Load(d, &s_[i]), middle);
+  }
+
  public:
-  static constexpr std::size_t kMaxCorners = 32;
+  static constexpr std::size_t kMaxCorners = 16;
 
   static Convex pixel() {
     Convex square;
-    for (const auto& [s, t] : {PixelPoint{-0.5F, -0.5F}, {0.5F, -0.5F}, {0.5F, 0.5F}, {-0.5F, 0.5F}})
-      square.add({s, t});
+    for (const auto& [s, t] : {PixelPoint{-0.5F, -0.5F}, {0.5F, -0.5F}, {0.5F, 0.5F}, {-0.5F, 0.5F}}) square.add(s, t);
+    square.close();
     return square;
   }
 
   bool empty() const { return count_ < 3; }
 
   /// Whether there is room for the corners of this many cuts.
-  bool can_be_cut(std::size_t times) const { return count_ + times + 1 <= kMaxCorners; }
+  bool can_be_cut(std::size_t times) const { return count_ + times <= kMaxCorners; }
 
-  /// The largest value of f on it, or an upper bound of |f| (f times a sign).
-  float max(const OfPixel& f) const {
-    float most = f.at(corners_[0]);
-    for (std::size_t i = 1; i < count_; ++i) most = std::max(most, f.at(corners_[i]));
-    return most;
+  /// Whether f is at most `max` on it; whether |f| is. It must not be empty.
+  bool is_below(const OfPixel& f, float max) const {
+    const D d;
+    const auto limit = hn::Set(d, max);
+    for (std::size_t i = 0; i < count_; i += kVector) {
+      if (!hn::AllTrue(d, hn::Le(values(f, i), limit))) return false;
+    }
+    return true;
   }
-  float max_abs(const OfPixel& f) const {
-    float most = 0;
-    for (std::size_t i = 0; i < count_; ++i) most = std::max(most, std::fabs(f.at(corners_[i])));
-    return most;
+  bool is_near_zero(const OfPixel& f, float max) const {
+    const D d;
+    const auto limit = hn::Set(d, max);
+    for (std::size_t i = 0; i < count_; i += kVector) {
+      if (!hn::AllTrue(d, hn::Le(hn::Abs(values(f, i)), limit))) return false;
+    }
+    return true;
   }
 
   /// Keeps the part where f is not negative; the remainder becomes `rest`. Only if it can be cut.
   void cut(const OfPixel& f, Convex& rest) {
-    Convex kept;
-    rest.count_ = 0;
-    float here = count_ > 0 ? f.at(corners_[0]) : 0;
-    for (std::size_t i = 0; i < count_; ++i) {
-      const PixelPoint &from = corners_[i], &to = corners_[i + 1 < count_ ? i + 1 : 0];
-      const float next = f.at(to);
-      (here >= 0 ? kept : rest).add(from);
-      if ((here >= 0) != (next >= 0)) {
-        const float along = here / (here - next);
-        const PixelPoint crossing{from.s + along * (to.s - from.s), from.t + along * (to.t - from.t)};
-        kept.add(crossing), rest.add(crossing);
-      }
-      here = next;
+    const D d;
+    alignas(64) std::array<float, kMaxCorners> at;
+    bool none_below = true, all_below = true;
+    for (std::size_t i = 0; i < count_; i += kVector) {
+      const auto value = values(f, i);
+      hn::Store(value, d, &at[i]);
+      const auto below = hn::Lt(value, hn::Zero(d));
+      none_below = none_below && hn::AllFalse(d, below);
+      all_below = all_below && hn::AllTrue(d, below);
     }
+    rest.count_ = 0;
+    if (none_below) return;
+    if (all_below) return std::swap(*this, rest);
+    Convex kept;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const std::size_t j = i + 1 < count_ ? i + 1 : 0;
+      (at[i] >= 0 ? kept : rest).add(s_[i], t_[i]);
+      if ((at[i] >= 0) == (at[j] >= 0)) continue;
+      const float along = at[i] / (at[i] - at[j]);
+      const float s = s_[i] + along * (s_[j] - s_[i]), t = t_[i] + along * (t_[j] - t_[i]);
+      kept.add(s, t), rest.add(s, t);
+    }
+    kept.close(), rest.close();
     *this = kept;
   }
 
   /// Adds the area, and the area times the centroid.
   void integrate(float& area, float& first_s, float& first_t) const {
     for (std::size_t i = 2; i < count_; ++i) {
-      const PixelPoint &a = corners_[0], &b = corners_[i - 1], &c = corners_[i];
-      const float twice = std::fabs((b.s - a.s) * (c.t - a.t) - (b.t - a.t) * (c.s - a.s));
+      const float twice =
+          std::fabs((s_[i - 1] - s_[0]) * (t_[i] - t_[0]) - (t_[i - 1] - t_[0]) * (s_[i] - s_[0]));
       area += 0.5F * twice;
-      first_s += twice * (a.s + b.s + c.s) / 6, first_t += twice * (a.t + b.t + c.t) / 6;
+      first_s += twice * (s_[0] + s_[i - 1] + s_[i]) / 6, first_t += twice * (t_[0] + t_[i - 1] + t_[i]) / 6;
     }
   }
 
  private:
-  void add(const PixelPoint& corner) { corners_[count_++] = corner; }
+  void add(float s, float t) { s_[count_] = s, t_[count_] = t, ++count_; }
 
-  std::array<PixelPoint, kMaxCorners> corners_;
+  /// Repeats the first corner in the remaining lanes of the last vector.
+  void close() {
+    for (std::size_t i = count_; i % kVector != 0; ++i) s_[i] = s_[0], t_[i] = t_[0];
+  }
+
+  alignas(64) std::array<float, kMaxCorners> s_, t_;
   std::size_t count_ = 0;
 };
 

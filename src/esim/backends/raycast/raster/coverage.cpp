@@ -1,7 +1,8 @@
 #include "esim/backends/raycast/raster/coverage.h"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 namespace esim::inline backends::inline raycast {
@@ -40,50 +41,64 @@ SeenInMiddle Coverage::divide(const CellSurfaces& surfaces, const ImageCell& cel
     fragments.push_back({found[0].triangle, static_cast<std::uint16_t>(pixel), {0, 0}, 1, every_sample_});
     return {triangle.inverse_depth.at(cell.x[k], cell.y[k]), triangle.group};
   }
-  localise(surfaces, cell, pixel);
+  surfaces_ = &surfaces, cell_ = &cell, pixel_ = static_cast<std::uint16_t>(pixel);
+  candidates_.clear();
+  found_ = found;
+  order_.clear();
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    // Positive numbers have the order of their bits.
+    const std::uint64_t key = std::uint64_t{std::bit_cast<std::uint32_t>(found[i].nearest)} << 32 | i;
+    std::size_t at = order_.size();
+    order_.push_back(key);
+    for (; at > 0 && order_[at - 1] < key; --at) order_[at] = order_[at - 1];
+    order_[at] = key;
+  }
   const std::size_t before = fragments.size();
-  const bool may_be_exact = samples_.size() > 1 && candidates_.size() <= kMaxExact;
-  if (!may_be_exact || !divide_exactly(pixel, fragments)) {
+  if (samples_.size() == 1 || !divide_exactly(fragments)) {
     fragments.resize(before);
-    divide_by_samples(pixel, fragments);
+    divide_by_samples(fragments);
   }
   if (store_samples_) store_samples(std::span(fragments).subspan(before));
   return look_at_middle();
 }
 
-void Coverage::localise(const CellSurfaces& surfaces, const ImageCell& cell, int pixel) {
-  const auto k = static_cast<std::size_t>(pixel);
-  const auto in_pixel = [&](const OfBearing& f) {
-    return OfPixel{f.at(cell.x[k], cell.y[k]), f.x * cell.dx_du[k] + f.y * cell.dy_du[k],
-                   f.x * cell.dx_dv[k] + f.y * cell.dy_dv[k]};
-  };
-  candidates_.clear();
-  for (const Candidate& candidate : surfaces.at(pixel)) {
-    const ScreenTriangle& triangle = surfaces.triangle(candidate.triangle);
-    Local local;
+float Coverage::nearest(std::size_t candidate) const {
+  return std::bit_cast<float>(static_cast<std::uint32_t>(order_[candidate] >> 32));
+}
+
+/// The candidate of that place in the order. Only those that are needed are transformed.
+const Coverage::Local& Coverage::local(std::size_t candidate) {
+  for (std::size_t i = candidates_.size(); i <= candidate; ++i) {
+    const ScreenTriangle& triangle = surfaces_->triangle(found(i).triangle);
+    const std::size_t k = pixel_;
+    const float x = cell_->x[k], y = cell_->y[k];
+    const float dx_du = cell_->dx_du[k], dx_dv = cell_->dx_dv[k], dy_du = cell_->dy_du[k], dy_dv = cell_->dy_dv[k];
+    const auto in_pixel = [&](const OfBearing& f) {
+      return OfPixel{f.at(x, y), f.x * dx_du + f.y * dy_du, f.x * dx_dv + f.y * dy_dv};
+    };
+    Local& local = candidates_.emplace_back();
     local.inverse_depth = in_pixel(triangle.inverse_depth);
     const float depth_reach = local.inverse_depth.reach();
-    local.nearest = local.inverse_depth.middle + depth_reach;
-    local.farthest = local.inverse_depth.middle - depth_reach;
-    local.edges = 0;
-    local.triangle = candidate.triangle, local.group = triangle.group, local.index = triangle.index;
-    local.fills_pixel = candidate.fills_pixel;
-    bool outside = false;
+    local.nearest = std::min(local.inverse_depth.middle + depth_reach, triangle.nearest);
+    local.farthest = std::max(local.inverse_depth.middle - depth_reach, triangle.farthest);
+    local.edges = 0, local.outside = false;
+    local.triangle = found(i).triangle, local.group = triangle.group, local.index = triangle.index;
     std::size_t end = 3;
     for (const OfBearing& weight : triangle.weight) {
       const OfPixel edge = in_pixel(weight);
       const float reach = edge.reach();
-      outside = outside || edge.middle < -reach;
+      local.outside = local.outside || edge.middle < -reach;
       local.weight[edge.middle < reach ? local.edges++ : --end] = edge;
     }
-    if (!outside) candidates_.push_back(local);
   }
+  return candidates_[candidate];
 }
 
-SeenInMiddle Coverage::look_at_middle() const {
+SeenInMiddle Coverage::look_at_middle() {
   SeenInMiddle seen;
-  std::uint32_t index = ~0U;
-  for (const Local& local : candidates_) {
+  std::uint32_t index = kNone;
+  for (std::size_t i = 0; i < order_.size() && nearest(i) >= seen.inverse_depth; ++i) {
+    const Local& local = this->local(i);
     const float z = local.inverse_depth.middle;
     const bool inside = local.weight[0].middle >= 0 && local.weight[1].middle >= 0 && local.weight[2].middle >= 0;
     if (!inside || !(z > 0) || !(z <= kMaxInverseDepth)) continue;
@@ -93,30 +108,43 @@ SeenInMiddle Coverage::look_at_middle() const {
   return seen;
 }
 
-/// False if that takes too many polygons.
-bool Coverage::divide_exactly(int pixel, std::vector<Fragment>& fragments) {
-  for (const Local& local : candidates_) {
-    if (!add_visible(local, pixel, fragments)) return false;
+/// The visible parts of triangles are a partition of the pixel, so that none is left to see when their areas add up to
+/// 1. False if that takes too many polygons.
+bool Coverage::divide_exactly(std::vector<Fragment>& fragments) {
+  float sum = 0, sum_s = 0, sum_t = 0;
+  for (std::size_t i = 0; i < order_.size() && sum < 1 - kSmallestArea; ++i) {
+    if (i == kMaxExact) return false;
+    float area = 0, s = 0, t = 0;
+    if (i + 1 == order_.size() && found(i).fills_pixel != 0) {
+      area = 1 - sum, s = -sum_s, t = -sum_t;  // behind the others
+    } else {
+      if (local(i).outside) continue;
+      if (!keep_visible(i)) return false;
+      for (const Convex& piece : pieces_) piece.integrate(area, s, t);
+    }
+    if (!(area > kSmallestArea)) continue;
+    fragments.push_back({found(i).triangle, pixel_, {s / area, t / area}, area});
+    sum += area, sum_s += s, sum_t += t;
   }
   return true;
 }
 
-bool Coverage::add_visible(const Local& surface, int pixel, std::vector<Fragment>& fragments) {
-  Convex whole = Convex::pixel(), rest;
+/// Makes pieces_ the visible part of a surface. False if that takes too many polygons.
+bool Coverage::keep_visible(std::size_t self) {
+  const Local surface = local(self);  // a copy, since the list grows
+  pieces_.assign(1, Convex::pixel());
+  Convex &whole = pieces_[0], rest;
   for (std::size_t e = 0; e < surface.edges; ++e) whole.cut(surface.weight[e], rest);
   const OfPixel& z = surface.inverse_depth;
   if (surface.nearest > kMaxInverseDepth) whole.cut({kMaxInverseDepth - z.middle, -z.s, -z.t}, rest);
-  if (whole.empty()) return true;
-  pieces_.assign(1, whole);
-  for (const Local& other : candidates_) {
-    if (&other == &surface || other.nearest < surface.farthest) continue;
-    if (!hide(surface, other)) return false;
-    if (pieces_.empty()) return true;
+  if (whole.empty()) pieces_.clear();
+  const float farthest = surface.farthest;
+  for (std::size_t i = 0; i < order_.size() && nearest(i) >= farthest && !pieces_.empty(); ++i) {
+    if (i == self) continue;
+    if (i == kMaxExact) return false;
+    const Local& other = local(i);
+    if (!other.outside && other.nearest >= farthest && !hide(surface, other)) return false;
   }
-  float area = 0, s = 0, t = 0;
-  for (const Convex& piece : pieces_) piece.integrate(area, s, t);
-  if (area > kSmallestArea)
-    fragments.push_back({surface.triangle, static_cast<std::uint16_t>(pixel), {s / area, t / area}, area});
   return true;
 }
 
@@ -125,19 +153,19 @@ bool Coverage::hide(const Local& surface, const Local& other) {
   const OfPixel &z = surface.inverse_depth, &other_z = other.inverse_depth;
   const OfPixel nearer{other_z.middle - z.middle, other_z.s - z.s, other_z.t - z.t};
   const bool surely_nearer = other.farthest > surface.nearest;
+  bool same_depth = false;
+  const auto is_apart = [&](const Convex& piece) {
+    for (std::size_t e = 0; e < other.edges; ++e) {
+      if (piece.is_below(other.weight[e], kTouch * 2 * other.weight[e].reach())) return true;
+    }
+    if (surely_nearer) return false;
+    same_depth = piece.is_near_zero(nearer, kSameDepth * std::max(surface.nearest, other.nearest));
+    return same_depth ? surface.index < other.index : piece.is_below(nearer, 0);
+  };
+  if (pieces_.size() == 1 && is_apart(pieces_[0])) return true;
   kept_.clear();
   for (Convex& piece : pieces_) {
-    bool apart = false;
-    for (std::size_t e = 0; e < other.edges && !apart; ++e) {
-      const OfPixel& edge = other.weight[e];
-      apart = piece.max(edge) <= kTouch * 2 * edge.reach();
-    }
-    bool same_depth = false;
-    if (!apart && !surely_nearer) {
-      same_depth = piece.max_abs(nearer) <= kSameDepth * std::max(surface.nearest, other.nearest);
-      apart = same_depth ? surface.index < other.index : piece.max(nearer) <= 0;
-    }
-    if (apart) {
+    if (is_apart(piece)) {
       kept_.push_back(piece);
       continue;
     }
@@ -162,8 +190,8 @@ void Coverage::look_at_samples() {
   alignas(64) std::array<float, kMaxSamples> depth;
   alignas(64) std::array<std::uint32_t, kMaxSamples> index;
   for (std::size_t i = 0; i < count; ++i) depth[i] = 0, index[i] = kNone, seen_[i] = kNone;
-  for (std::size_t c = 0; c < candidates_.size(); ++c) {
-    const Local& local = candidates_[c];
+  for (std::size_t c = 0; c < order_.size(); ++c) {
+    const Local& local = this->local(c);
     const auto [w0, w1, w2] = local.weight;
     const OfPixel z = local.inverse_depth;
     const std::uint32_t local_index = local.index, id = static_cast<std::uint32_t>(c);
@@ -181,7 +209,7 @@ void Coverage::look_at_samples() {
   }
 }
 
-void Coverage::divide_by_samples(int pixel, std::vector<Fragment>& fragments) {
+void Coverage::divide_by_samples(std::vector<Fragment>& fragments) {
   struct Sum {
     float count = 0, s = 0, t = 0;
   };
@@ -198,7 +226,7 @@ void Coverage::divide_by_samples(int pixel, std::vector<Fragment>& fragments) {
     if (sum.count == 0) continue;
     const PixelPoint centroid{sum.s / sum.count, sum.t / sum.count};
     fragments.push_back(
-        {candidates_[c].triangle, static_cast<std::uint16_t>(pixel), centroid, sum.count / static_cast<float>(count)});
+        {candidates_[c].triangle, pixel_, centroid, sum.count / static_cast<float>(count)});
   }
 }
 

@@ -51,17 +51,19 @@ class Coverage {
     OfPixel inverse_depth;
     float nearest, farthest;  // bounds of the inverse depth in the pixel
     std::size_t edges;        // the first of `weight` that cross the pixel
+    bool outside;             // of the pixel
     std::uint32_t triangle, group, index;
-    std::uint16_t fills_pixel;
   };
 
-  void localise(const CellSurfaces& surfaces, const ImageCell& cell, int pixel);
-  SeenInMiddle look_at_middle() const;
-  bool divide_exactly(int pixel, std::vector<Fragment>& fragments);
-  bool add_visible(const Local& surface, int pixel, std::vector<Fragment>& fragments);
+  const Candidate& found(std::size_t candidate) const { return found_[order_[candidate] & 0xffffffffU]; }
+  float nearest(std::size_t candidate) const;
+  const Local& local(std::size_t candidate);
+  SeenInMiddle look_at_middle();
+  bool divide_exactly(std::vector<Fragment>& fragments);
+  bool keep_visible(std::size_t candidate);
   bool hide(const Local& surface, const Local& other);
   void look_at_samples();
-  void divide_by_samples(int pixel, std::vector<Fragment>& fragments);
+  void divide_by_samples(std::vector<Fragment>& fragments);
   void store_samples(std::span<Fragment> fragments);
 
   static constexpr std::size_t kMaxSamples = 64;
@@ -72,8 +74,14 @@ class Coverage {
   std::uint64_t every_sample_;
   alignas(64) std::array<float, kMaxSamples> s_, t_;
   std::array<std::uint32_t, kMaxSamples> seen_;  // the candidate that is visible at each sample
-  std::vector<Local> candidates_;
-  std::vector<Convex> pieces_, kept_;
+  // Of the current pixel.
+  const CellSurfaces* surfaces_;
+  const ImageCell* cell_;
+  std::uint16_t pixel_;
+  std::span<const Candidate> found_;
+  std::vector<std::uint64_t> order_;   // the nearest first: inverse depth, and the place in found_
+  std::vector<Local> candidates_;    // the first of these
+  std::vector<Convex> pieces_, kept_;  // of the visible part of a candidate
 };
 
 }  // namespace esim::inline backends::inline raycast

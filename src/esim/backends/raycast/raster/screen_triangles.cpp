@@ -73,8 +73,10 @@ void ScreenLeaf::project(const TriangleTree::Leaf& leaf, const Eigen::Matrix3f& 
 #pragma omp simd
   for (std::size_t i = 0; i < kWide; ++i) {
     const float z0 = p[0][2][i], z1 = p[1][2][i], z2 = p[2][2][i];
-    const float nearest = std::min(std::min(z0, z1), z2), farthest = std::max(std::max(z0, z1), z2);
-    const bool in_front = nearest > kNearestDepth;
+    const float min_z = std::min(std::min(z0, z1), z2), max_z = std::max(std::max(z0, z1), z2);
+    const bool in_front = min_z > kNearestDepth;
+    nearest[i] = in_front ? (1 + kRounding) / min_z : kInfinity;
+    farthest[i] = (1 - kRounding) / max_z;
     const float x0 = p[0][0][i] / z0, x1 = p[1][0][i] / z1, x2 = p[2][0][i] / z2;
     const float y0 = p[0][1][i] / z0, y1 = p[1][1][i] / z1, y2 = p[2][1][i] / z2;
     const float l = std::min(std::min(x0, x1), x2), r = std::max(std::max(x0, x1), x2);
@@ -83,7 +85,7 @@ void ScreenLeaf::project(const TriangleTree::Leaf& leaf, const Eigen::Matrix3f& 
     right[i] = in_front ? r + kRounding * (1 + std::fabs(r)) : kInfinity;
     top[i] = in_front ? t - kRounding * (1 + std::fabs(t)) : -kInfinity;
     bottom[i] = in_front ? b + kRounding * (1 + std::fabs(b)) : kInfinity;
-    usable[i] = farthest > kNearestDepth ? usable[i] : 0.0F;
+    usable[i] = max_z > kNearestDepth ? usable[i] : 0.0F;
 
     const float ax = leaf.corner[1][0][i] - leaf.corner[0][0][i], bx = leaf.corner[2][0][i] - leaf.corner[0][0][i];
     const float ay = leaf.corner[1][1][i] - leaf.corner[0][1][i], by = leaf.corner[2][1][i] - leaf.corner[0][1][i];
@@ -98,6 +100,7 @@ ScreenTriangle ScreenLeaf::triangle(std::size_t lane) const {
   ScreenTriangle out{};
   for (std::size_t k = 0; k < 3; ++k) out.weight[k] = {weight[k][0][lane], weight[k][1][lane], weight[k][2][lane]};
   out.inverse_depth = {inverse_depth[0][lane], inverse_depth[1][lane], inverse_depth[2][lane]};
+  out.farthest = farthest[lane], out.nearest = nearest[lane];
   out.normal = {normal[0][lane], normal[1][lane], normal[2][lane]};
   return out;
 }

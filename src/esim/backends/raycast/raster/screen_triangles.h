@@ -26,6 +26,7 @@ struct OfBearing {
 struct ScreenTriangle {
   std::array<OfBearing, 3> weight;
   OfBearing inverse_depth;
+  float farthest, nearest;      ///< bounds of the inverse depth on the triangle
   std::array<float, 3> normal;  ///< (p1 - p0) x (p2 - p0) in the frame of its group
   std::uint32_t group;          ///< of the scene
   std::uint32_t index;          ///< in the scene
@@ -40,6 +41,7 @@ struct ScreenLeaf {
   alignas(64) std::array<Lanes, 3> inverse_depth, normal;
   alignas(64) Lanes left, right, top,
       bottom;        ///< bounds of their bearings; infinite if one is partly behind the camera
+  alignas(64) Lanes farthest, nearest;         ///< bounds of their inverse depths
   unsigned visible;  ///< a bit for each triangle that is neither edge-on nor too close
 
   /// Projects the triangles; those that are not finite are invisible.

@@ -114,8 +114,11 @@ void describe(Visitor& visit, MeshRendererOptions& o) {
         About{"factor on the duration of the scene file's animation: 2 takes twice as long", "", 0, 1e6, true});
   visit("objects", o.objects, About{"objects that move through the scene: a list of maps of"});
   visit("lighting", o.lighting, About{"unlit: a surface is as bright as its texture, as in scenes with baked light"});
-  visit("samples_per_pixel", o.samples_per_pixel,
-        About{"rays per pixel at edges: 1, 16 or 64; more rays smooth the edges of objects and shadows", "", 1, 64});
+  visit(
+      "samples_per_pixel", o.samples_per_pixel,
+      About{"rays per pixel at edges: 1, 16 or 64; more rays smooth the edges of objects and shadows. raster: with 1, "
+            "pixels see only their centres",
+            "", 1, 64});
   visit("background", o.background, About{"irradiance of pixels that see no surface", "", 0, 1e6});
 }
 

@@ -8,7 +8,6 @@
 namespace esim::inline backends::inline raycast {
 namespace {
 
-
 namespace hn = hwy::HWY_NAMESPACE;
 
 using D = hn::CappedTag<float, 8>;

@@ -104,8 +104,7 @@ class Convex {
   /// Adds the area, and the area times the centroid.
   void integrate(float& area, float& first_s, float& first_t) const {
     for (std::size_t i = 2; i < count_; ++i) {
-      const float twice =
-          std::fabs((s_[i - 1] - s_[0]) * (t_[i] - t_[0]) - (t_[i - 1] - t_[0]) * (s_[i] - s_[0]));
+      const float twice = std::fabs((s_[i - 1] - s_[0]) * (t_[i] - t_[0]) - (t_[i - 1] - t_[0]) * (s_[i] - s_[0]));
       area += 0.5F * twice;
       first_s += twice * (s_[0] + s_[i - 1] + s_[i]) / 6, first_t += twice * (t_[0] + t_[i - 1] + t_[i]) / 6;
     }

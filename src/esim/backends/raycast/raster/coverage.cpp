@@ -225,8 +225,7 @@ void Coverage::divide_by_samples(std::vector<Fragment>& fragments) {
     const Sum& sum = sums[c];
     if (sum.count == 0) continue;
     const PixelPoint centroid{sum.s / sum.count, sum.t / sum.count};
-    fragments.push_back(
-        {candidates_[c].triangle, pixel_, centroid, sum.count / static_cast<float>(count)});
+    fragments.push_back({candidates_[c].triangle, pixel_, centroid, sum.count / static_cast<float>(count)});
   }
 }
 

@@ -80,7 +80,7 @@ class Coverage {
   std::uint16_t pixel_;
   std::span<const Candidate> found_;
   std::vector<std::uint64_t> order_;   // the nearest first: inverse depth, and the place in found_
-  std::vector<Local> candidates_;    // the first of these
+  std::vector<Local> candidates_;      // the first of these
   std::vector<Convex> pieces_, kept_;  // of the visible part of a candidate
 };
 

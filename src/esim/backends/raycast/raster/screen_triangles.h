@@ -40,9 +40,9 @@ struct ScreenLeaf {
   alignas(64) std::array<std::array<Lanes, 3>, 3> weight;
   alignas(64) std::array<Lanes, 3> inverse_depth, normal;
   alignas(64) Lanes left, right, top,
-      bottom;        ///< bounds of their bearings; infinite if one is partly behind the camera
-  alignas(64) Lanes farthest, nearest;         ///< bounds of their inverse depths
-  unsigned visible;  ///< a bit for each triangle that is neither edge-on nor too close
+      bottom;                           ///< bounds of their bearings; infinite if one is partly behind the camera
+  alignas(64) Lanes farthest, nearest;  ///< bounds of their inverse depths
+  unsigned visible;                     ///< a bit for each triangle that is neither edge-on nor too close
 
   /// Projects the triangles; those that are not finite are invisible.
   void project(const TriangleTree::Leaf& leaf, const Eigen::Matrix3f& R_camera_tree, const Eigen::Vector3f& camera);

@@ -32,7 +32,7 @@ using ScenePointer = std::unique_ptr<RTCSceneTy, ReleaseScene>;
 
 /// A rigid group of triangles, as a camera sees it at one time.
 struct PlacedGroup {
-  RTCScene triangles;        // in the group's frame, for rays; null if that is empty
+  RTCScene triangles;        // in the group's frame, for rays; null without triangles
   const TriangleTree* tree;  // of the same triangles
   Eigen::Matrix3f R_group_camera, R_camera_group;
   Eigen::Vector3f camera;        // position of the camera in the group's frame

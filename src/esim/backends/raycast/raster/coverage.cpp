@@ -192,7 +192,7 @@ void Coverage::look_at_samples() {
   for (std::size_t i = 0; i < count; ++i) depth[i] = 0, index[i] = kNone, seen_[i] = kNone;
   for (std::size_t c = 0; c < order_.size(); ++c) {
     const Local& local = this->local(c);
-    const auto [w0, w1, w2] = local.weight;
+    const OfPixel w0 = local.weight[0], w1 = local.weight[1], w2 = local.weight[2];
     const OfPixel z = local.inverse_depth;
     const std::uint32_t local_index = local.index, id = static_cast<std::uint32_t>(c);
 #pragma omp simd

@@ -224,7 +224,7 @@ class Recordings(Cli):
         self.assertLess(abs(events[0] / events[1] - 1), 0.1)
         self.assert_refused(run("check", room, "--set", "renderer.engine=gl", "--set", "renderer.gl_device=30"),
                             "gl_device", "30")
-        self.assert_refused(run("check", room, "--set", "renderer.engine=vulkan"), "renderer.engine", "raycast, gl")
+        self.assert_refused(run("check", room, "--set", "renderer.engine=vulkan"), "renderer.engine", "raycast, raster, gl")
 
     def test_opengl_renders_keyframes(self):
         room = SCENES / "room.yaml"

@@ -291,7 +291,7 @@ def the_library_neither_prints_nor_exits(root):
 
 def messages_of_the_library_name_no_flags(root):
     """Python's users read them too: a RemediableError lets each interface say what to do (core/remedy.h)."""
-    commands = {"blender", "dataset", "evaluate", "studio", "video"}  # only for the command line, or for other programs
+    commands = {"blender", "dataset", "evaluate", "studio"}  # only for the command line, or for other programs
     manual = {"read.h", "schema.h"}  # kSetter, for interfaces that give no other; help of options, in docs/scenario.md
     for path in sources(root / SOURCE):
         if folder_of(root, path) in commands or path.name in manual:

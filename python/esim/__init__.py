@@ -6,7 +6,7 @@ T_A_B maps points from frame B to frame A; quaternions are Hamilton, x y z w. `d
 `docs/scenario.md` lists the options of scenarios.
 """
 
-from . import _processor, dataset, filters  # first, _processor checks that the module can run
+from . import _processor, dataset, filters, interpolators  # first, _processor checks that the module can run
 from ._checks import ns
 from ._core import __version__
 from ._errors import Error, InternalError, LossWarning, OutputError
@@ -26,6 +26,7 @@ from ._scenario import Scenario
 from ._simulate import CameraPacket, Packet, Renderer, Report, Simulation, simulate
 from ._trajectory import Trajectory
 from ._types import CAUSES, EVENT_DTYPE, IMU_DTYPE, LABEL_DTYPE, STATE_DTYPE
+from .interpolators._video import video
 
 __all__ = [
     "CAUSES",
@@ -64,5 +65,6 @@ __all__ = [
     "space_time_plot",
     "time_surface",
     "time_surface_picture",
+    "video",
     "voxel_grid",
 ]

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import dataset as dataset
 from . import filters as filters
+from . import interpolators as interpolators
 
 Path: TypeAlias = str | PathLike[str]
 Int: TypeAlias = int | np.integer[Any]
@@ -252,6 +253,25 @@ def space_time_plot(
     yaw_deg: Number = 35.0,
     pitch_deg: Number = 20.0,
 ) -> NDArray[np.uint8]: ...
+def video(
+    input: Path,
+    out: Path,
+    *,
+    interpolator: interpolators.Interpolator | None = None,
+    overrides: Mapping[str, Any] | Iterable[str] | None = None,
+    threads: Int = 0,
+    seed: Int = 0,
+    force: bool = False,
+    fps: Number | None = None,
+    slow_motion: Number = 1.0,
+    start_s: Number = 0.0,
+    duration_s: Number | None = None,
+    encoding: Literal["auto", "srgb", "linear"] = "auto",
+    bayer: bool = False,
+    interpolation: bool = True,
+    lambda_px: Number = 0.5,
+    max_steps: Int = 200,
+) -> dict[str, Any]: ...
 
 class play(Iterator[NDArray[np.uint8]]):
     times: NDArray[np.int64]

@@ -209,10 +209,26 @@ def irradiance(image, name, shape):
 def rendered_irradiance(image, name, shape):
     """The same, with its values checked."""
     image = irradiance(image, name, shape)
+    _require_irradiance(image, name)
+    return image
+
+
+def _require_irradiance(image, name):
     wrong = ~((image >= 0) & (image < np.inf))
     if wrong.any():
-        y, x = np.argwhere(wrong)[0]
-        raise Error(f"{name} must be finite and at least 0, not {image[y, x]} at pixel ({x}, {y})")
+        at = tuple(np.argwhere(wrong)[0])
+        raise Error(f"{name} must be finite and at least 0, not {image[at]} at pixel ({at[1]}, {at[0]})")
+
+
+def interpolated(image, name, shape):
+    """Linear intensity of shape (height, width) or (height, width, 3) as contiguous float32, with its values checked."""
+    image = np.asarray(image)
+    if image.dtype.kind != "f":
+        raise TypeError(f"{name} must be floats, linear intensity with 1 = white, not {image.dtype}")
+    if image.shape != shape:
+        raise Error(f"{name} must have the shape of the frames, {shape}, not {image.shape}")
+    image = _to_float32(image)
+    _require_irradiance(image, name)
     return image
 
 

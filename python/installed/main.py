@@ -10,7 +10,8 @@ PROGRAM = Path(__file__).parent / "bin" / "esim"
 def main():
     if not PROGRAM.is_file():
         sys.exit(f"esim: {PROGRAM} does not exist: install the package with pip, which includes the program")
-    os.execv(PROGRAM, ["esim", *sys.argv[1:]])
+    # The program runs interpolators in this Python, which has their packages (esim video --interpolator).
+    os.execve(PROGRAM, ["esim", *sys.argv[1:]], {"ESIM_PYTHON": sys.executable, **os.environ})
 
 
 if __name__ == "__main__":

@@ -16,5 +16,6 @@ void bind_filters(nanobind::module_& module);
 void bind_representations(nanobind::module_& module);
 void bind_pictures(nanobind::module_& module);
 void bind_dataset(nanobind::module_& module);
+void bind_video(nanobind::module_& module);
 
 }  // namespace esim::python

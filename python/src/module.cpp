@@ -14,4 +14,5 @@ NB_MODULE(_core, module) {
   bind_representations(module);
   bind_pictures(module);
   bind_dataset(module);
+  bind_video(module);
 }

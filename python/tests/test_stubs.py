@@ -46,7 +46,7 @@ def compare(stub, real, name):
     assert expected == actual, name
 
 
-@pytest.mark.parametrize("module, file", [(esim, "__init__.pyi"), (esim.dataset, "dataset.pyi"), (esim.filters, "filters.pyi")])
+@pytest.mark.parametrize("module, file", [(esim, "__init__.pyi"), (esim.dataset, "dataset.pyi"), (esim.filters, "filters.pyi"), (esim.interpolators, "interpolators/__init__.pyi")])
 def test_stubs_and_package_agree(module, file):
     named = set()
     for node in ast.parse((FOLDER / file).read_text()).body:

@@ -92,11 +92,11 @@ class Video(ProgramTest):
         self.assertEqual(contents[0], contents[2])
 
     def test_bad_input_leaves_nothing(self):
-        self.assert_refused(self.video(), "--fps")
+        self.assert_refused(self.video(), "frames per second (fps)")
         self.assert_refused(self.video(source=self.folder / "none.mp4"), "none.mp4", "no such file")
         self.assert_refused(self.video("--fps", "0"), "--fps", "above 0")
         self.assert_refused(self.video("--fps", "nan"), "--fps")
-        self.assert_refused(self.video("--fps", "50", "--start", "9"), "--start 9")
+        self.assert_refused(self.video("--fps", "50", "--start", "9"), "the start, 9 s,")
         self.assert_refused(self.video("--fps", "50", "--encoding", "gamma"), "--encoding")
         self.assert_refused(self.video("--fps", "50", "--set", "contrast_treshold=1"), "did you mean contrast_threshold")
         self.assert_refused(self.video("--fps", "50", "--duration", "0.001"), "one frame")

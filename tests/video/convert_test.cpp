@@ -155,6 +155,21 @@ TEST_F(ConvertTest, TheSameEventsOnAnyNumberOfThreads) {
   EXPECT_EQ(results[0], results[2]);
 }
 
+TEST_F(ConvertTest, CountsThePixelsThatTheFlowDoesNotFollow) {
+  const auto summary_of = [&](double speed, const Settings& settings = {}) {
+    write_frames(4, speed);
+    Memory out;
+    return convert_folder(path(), out, settings);
+  };
+  const ConversionSummary slow = summary_of(3), fast = summary_of(60);  // of 96 px
+  EXPECT_LT(*not_followed_fraction(slow), 0.15);
+  EXPECT_EQ(slow.mostly_not_followed, 0);
+  EXPECT_GT(*not_followed_fraction(fast), 0.5);
+  EXPECT_EQ(fast.mostly_not_followed, 3);
+  EXPECT_FALSE(not_followed_fraction(summary_of(3, {.interpolation = {.interpolation = false}})));
+  EXPECT_FALSE(not_followed_fraction(summary_of(0))) << "nothing changes";
+}
+
 TEST_F(ConvertTest, ABadFrameKeepsWhatCameBefore) {
   write_frames(5, 3);
   Memory whole, cut;

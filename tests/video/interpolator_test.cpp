@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <random>
 
+#include "esim/core/error.h"
+#include "support/errors.h"
 #include "video/videos.h"
 
 namespace esim {
@@ -37,6 +40,8 @@ double occlusion(double x, double y, double t) {
   return inside * kOther(u, v) + (1 - inside) * kPattern(x + 2 * t, y);
 }
 
+Frame frame_of(Image<float> image, TimeNs t = 0) { return {t, {std::move(image)}}; }
+
 double brightness(float light) { return std::log(static_cast<double>(light) + kEps); }
 
 struct Errors {
@@ -47,8 +52,8 @@ Errors errors(const Scene& scene, double fraction) {
   const Workers workers(1);
   const Image<float> frame0 = view(scene, kWidth, kHeight, 0), frame1 = view(scene, kWidth, kHeight, 1);
   Interpolator interpolator({}, kEps);
-  interpolator.advance({frame0}, workers);
-  interpolator.advance({frame1}, workers);
+  interpolator.advance(frame_of(frame0), workers);
+  interpolator.advance(frame_of(frame1), workers);
   Planes light;
   interpolator.at(fraction, workers, light);
   const Image<float> truth = view(scene, kWidth, kHeight, fraction);
@@ -81,8 +86,8 @@ TEST(Interpolator, TendsToTheFramesAtBothEnds) {
   const Workers workers(1);
   const Image<float> frame0 = view(occlusion, kWidth, kHeight, 0), frame1 = view(occlusion, kWidth, kHeight, 1);
   Interpolator interpolator({}, kEps);
-  interpolator.advance({frame0}, workers);
-  interpolator.advance({frame1}, workers);
+  interpolator.advance(frame_of(frame0), workers);
+  interpolator.advance(frame_of(frame1), workers);
   Planes light;
   for (const double fraction : {0.0, 1.0, 1e-4, 1 - 1e-4}) {
     interpolator.at(fraction, workers, light);
@@ -98,14 +103,14 @@ TEST(Interpolator, NoPixelMovesFartherThanLambdaInAStep) {
   const Workers workers(1);
   for (const double lambda : {0.25, 0.5, 2.0}) {
     Interpolator interpolator({.lambda = lambda}, kEps);
-    for (const double t : {0, 1}) interpolator.advance({view(translation(3, 1), kWidth, kHeight, t)}, workers);
+    for (const double t : {0, 1}) interpolator.advance(frame_of(view(translation(3, 1), kWidth, kHeight, t)), workers);
     EXPECT_GE(interpolator.steps() * lambda, interpolator.max_flow_px());
     EXPECT_GE(interpolator.max_flow_px(), 0.98 * std::hypot(3, 1));
     EXPECT_LT(interpolator.max_flow_px(), 1.4 * std::hypot(3, 1)) << "wastes steps";
     EXPECT_FALSE(interpolator.is_held());
   }
   Interpolator held({.max_steps = 3}, kEps);
-  for (const double t : {0, 1}) held.advance({view(translation(3, 1), kWidth, kHeight, t)}, workers);
+  for (const double t : {0, 1}) held.advance(frame_of(view(translation(3, 1), kWidth, kHeight, t)), workers);
   EXPECT_EQ(held.steps(), 3);
   EXPECT_TRUE(held.is_held());
 }
@@ -114,7 +119,7 @@ TEST(Interpolator, AStillSceneNeedsNoSteps) {
   const Workers workers(1);
   const Image<float> frame = view(translation(0, 0), kWidth, kHeight);
   Interpolator interpolator({}, kEps);
-  for (int i = 0; i < 3; ++i) interpolator.advance({frame}, workers);
+  for (int i = 0; i < 3; ++i) interpolator.advance(frame_of(frame), workers);
   EXPECT_EQ(interpolator.steps(), 1);
   EXPECT_EQ(interpolator.max_flow_px(), 0);
 }
@@ -134,7 +139,7 @@ TEST(Interpolator, AnyContentStaysWithinWhatTheFramesHold) {
       Image<float> frame(width, height);
       for (float& light : frame.pixels())
         light = random() % 3 == 0 ? 0.0F : static_cast<float>(random() % 1000) * 10.0F;
-      interpolator.advance({frame}, workers);
+      interpolator.advance(frame_of(frame), workers);
     }
     EXPECT_LE(interpolator.steps(), 200);
     Planes light;
@@ -148,6 +153,71 @@ TEST(Interpolator, AnyContentStaysWithinWhatTheFramesHold) {
   }
 }
 
+double followed_fraction(const Scene& scene) {
+  const Workers workers(1);
+  Interpolator interpolator({}, kEps);
+  for (const double t : {0, 1}) interpolator.advance(frame_of(view(scene, kWidth, kHeight, t)), workers);
+  const FollowedPixels pixels = interpolator.followed_pixels();
+  EXPECT_GT(pixels.changed, kWidth * kHeight / 10);
+  return static_cast<double>(pixels.followed) / static_cast<double>(pixels.changed);
+}
+
+TEST(Interpolator, CountsThePixelsThatTheFlowFollows) {
+  EXPECT_GT(followed_fraction(translation(3, 1)), 0.95);
+  EXPECT_GT(followed_fraction(translation(8, -3)), 0.9);
+  EXPECT_GT(followed_fraction(rotation(3)), 0.95);
+  // Motion across most of the image, a change without motion, and frames that have nothing in common.
+  EXPECT_LT(followed_fraction(translation(120, 0)), 0.5);
+  EXPECT_LT(followed_fraction([](double x, double y, double t) { return kPattern(x, y) * std::exp(0.7 * t); }), 0.1);
+  EXPECT_LT(followed_fraction([](double x, double y, double t) { return t == 0 ? kPattern(x, y) : kOther(x, y); }),
+            0.5);
+}
+
+TEST(Interpolator, NothingChangesInAStillScene) {
+  const Workers workers(1);
+  Interpolator interpolator({}, kEps);
+  for (int i = 0; i < 2; ++i) interpolator.advance(frame_of(view(occlusion, kWidth, kHeight)), workers);
+  EXPECT_EQ(interpolator.followed_pixels().changed, 0);
+}
+
+/// Returns what it is told to, and keeps what it was asked.
+struct Told final : FrameInterpolator {
+  std::string name() const override { return "the test's interpolator"; }
+  void between(const Frame& frame0, const Frame& frame1, double fraction, Planes& light) override {
+    EXPECT_EQ(frame0.t, 1'000'000'000);
+    EXPECT_EQ(frame1.t, 1'040'000'000);
+    asked = fraction;
+    light = {answer};
+  }
+
+  Image<float> answer;
+  double asked = -1;
+};
+
+TEST(Interpolator, AnInterpolatorOfTheUserMakesTheImages) {
+  const Workers workers(1);
+  auto images = std::make_unique<Told>();
+  Told& told = *images;
+  Interpolator interpolator({}, kEps, std::move(images));
+  interpolator.advance(frame_of(view(translation(3, 1), kWidth, kHeight, 0), 1'000'000'000), workers);
+  interpolator.advance(frame_of(view(translation(3, 1), kWidth, kHeight, 1), 1'040'000'000), workers);
+  EXPECT_GE(interpolator.steps(), 6) << "the number of steps follows from the optical flow";
+
+  told.answer = Image<float>(kWidth, kHeight, 0.4F);
+  Planes light;
+  interpolator.at(0.25, workers, light);
+  EXPECT_EQ(told.asked, 0.25);
+  EXPECT_EQ(light[0](5, 6), 0.4F);
+
+  const auto problem = [&] { return test::message_of<UserError>([&] { interpolator.at(0.25, workers, light); }); };
+  told.answer(7, 9) = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(problem(),
+            "the test's interpolator, for the image at 1.010000000 s between the frames at 1.000000000 s and "
+            "1.040000000 s: pixel (7, 9) is nan; irradiance must be finite and >= 0");
+  told.answer = Image<float>(kWidth, kHeight - 1, 0.4F);
+  EXPECT_TRUE(test::contains(problem(), "must have the size and the number of planes of the frames"));
+}
+
 TEST(Interpolator, TheSameBitsOnAnyNumberOfThreads) {
   std::vector<std::vector<float>> results;
   for (const int threads : {1, 2, 5}) {
@@ -155,7 +225,7 @@ TEST(Interpolator, TheSameBitsOnAnyNumberOfThreads) {
     Interpolator interpolator({}, kEps);
     for (const double t : {0, 1}) {
       const Image<float> grey = view(occlusion, kWidth, kHeight, t);
-      interpolator.advance({grey, view(rotation(2), kWidth, kHeight, t), grey}, workers);
+      interpolator.advance({0, {grey, view(rotation(2), kWidth, kHeight, t), grey}}, workers);
     }
     Planes light;
     interpolator.at(0.37, workers, light);

@@ -1,16 +1,9 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "command_line.h"
 #include "commands.h"
+#include "esim/compose/compose.h"
 #include "esim/core/error.h"
-#include "esim/formats/formats.h"
-#include "esim/recording/fan_out.h"
-#include "esim/recording/keep_on_failure.h"
-#include "esim/recording/recording_directory.h"
-#include "esim/recording/recording_file.h"
-#include "esim/stats/between_frames.h"
 #include "progress_bar.h"
 #include "support.h"
 
@@ -21,17 +14,15 @@ namespace fs = std::filesystem;
 
 struct VideoArguments : RunOptions {
   ConversionOptions options;
-  std::string input, out;
+  std::string input, out, interpolator;
 };
 
-void report_losses(const ConversionSummary& summary, const ConversionOptions& options, const Notices& notices) {
-  if (summary.held > 0) {
-    notices.warning(
-        fmt::format("between {} of {} pairs of frames, the motion is too large for {} steps (up to {:.0f} px); "
-                    "raise --lambda or --max-steps, or use a video with more frames per second",
-                    summary.held, summary.frames - 1, options.interpolation.max_steps, summary.max_optical_flow_px));
-  }
-  std::ranges::for_each(losses(options, summary), notices.warning);
+void report_held(const ConversionSummary& summary, const ConversionOptions& options, const Notices& notices) {
+  if (summary.held == 0) return;
+  notices.warning(
+      fmt::format("between {} of {} pairs of frames, the motion is too large for {} steps (up to {:.0f} px); "
+                  "raise --lambda or --max-steps, or use a video with more frames per second",
+                  summary.held, summary.frames - 1, options.interpolation.max_steps, summary.max_optical_flow_px));
 }
 
 /// Options that the user has not tried and that would spread events that bunch at the frames.
@@ -63,48 +54,6 @@ void print_summary(const ConversionSummary& summary) {
   tell(stderr, "{}", describe(filtered_cameras(summary)));
 }
 
-/// A conversion from the opened input to the summary.
-class Converter {
- public:
-  explicit Converter(const VideoArguments& arguments)
-      : arguments_(arguments),
-        workers_(arguments.threads),
-        frames_(arguments.input, arguments.options.video, arguments.options.bayer) {}
-
-  ConversionSummary run(std::unique_ptr<Sink> out) {
-    const ConversionOptions& options = arguments_.options;
-    Interpolator interpolator(options.interpolation, options.event_camera.dark_light());
-    EventCamera event_camera(options.event_camera, frames_.width(), frames_.height(), options.seed, 0);
-    auto watching = std::make_unique<BetweenFrames>();
-    const BetweenFrames& between_frames = *watching;
-    FanOut both;
-    both.add(std::move(out));
-    both.add(std::move(watching));
-    ProgressBar bar(!arguments_.quiet);
-    ConversionSummary summary =
-        convert({frames_, interpolator, event_camera, workers_}, both, [&](const Progress& progress) {
-          bar.show(progress);
-          has_converted_ = true;
-          return !interrupted();
-        });
-    bar.clear();
-    const PhaseTest test = between_frames.test();
-    if (test.banding != Banding::unknown) summary.modulation = test.modulation;
-    return summary;
-  }
-
-  int threads() const { return workers_.threads(); }
-
-  /// Whether anything has been converted.
-  const bool& has_converted() const { return has_converted_; }
-
- private:
-  const VideoArguments& arguments_;
-  Workers workers_;
-  FrameSequence frames_;
-  bool has_converted_ = false;
-};
-
 /// The exit code. Throws UserError if a problem ended the conversion early.
 int outcome(const ConversionSummary& summary, const fs::path& out) {
   if (!summary.problem.empty()) {
@@ -114,68 +63,42 @@ int outcome(const ConversionSummary& summary, const fs::path& out) {
   return summary.complete ? kOk : kInterrupted;
 }
 
-int convert_to_file(const VideoArguments& arguments, const fs::path& out, const Format& format,
-                    const Notices& notices) {
-  if (arguments.options.event_camera.labels && !format.can_hold(Content::event_labels)) {
-    throw UserError(
-        fmt::format("event_camera.labels: {} cannot hold the labels of events; choose another format, such "
-                    "as dsec or npz, or a folder",
-                    format.name));
-  }
-  RecordingFile file(out, arguments.force);
-  Converter converter(arguments);
-  const ConversionSummary summary = keep_on_failure(file, converter.has_converted(), [&] {
-    ConversionSummary converted = converter.run(build_conversion_sink(file.path(), format));
-    file.finish();
-    return converted;
-  });
-  report_losses(summary, arguments.options, notices);
-  report_bunching(summary, arguments.options, notices);
-  if (!arguments.quiet) {
-    print_summary(summary);
-    tell(stderr, "events: {}\n", out.string());
-  }
-  return outcome(summary, out);
-}
-
-int convert_to_folder(const VideoArguments& arguments, const fs::path& out, const Notices& notices,
-                      const std::vector<std::string>& given) {
-  RecordingDirectory directory(out, arguments.force);
-  ProvenanceRecorder provenance({shell_command(own_command_line())});
-  const UsedFilesListener listener([&](const UsedFile& file) { provenance.add(file); });
-  Converter converter(arguments);
-  write_text(directory.path() / "video.yaml", write_conversion(arguments.options));
-  const ConversionSummary summary = keep_on_failure(directory, converter.has_converted(), [&] {
-    ConversionSummary converted = converter.run(build_conversion_sink(directory.path()));
-    report_losses(converted, arguments.options, notices);
-    report_bunching(converted, arguments.options, notices);
-    directory.finish(
-        report_json(arguments.options, converted, converter.threads(), given, provenance.finish(converted.complete)));
-    return converted;
-  });
-  if (!arguments.quiet) {
-    print_summary(summary);
-    tell(stderr, "recording: {}\nlook at:   {}\n", out.string(), (out / kConversionCamera / "preview.png").string());
-  }
-  return outcome(summary, out);
-}
-
 int run(VideoArguments& arguments) {
   std::error_code error;
-  arguments.options.event_camera = read_event_camera(arguments.overrides);
-  arguments.options.input = fs::absolute(arguments.input, error);
-  std::vector<std::string> given;
-  const Notices notices = print_and_keep(given, arguments.quiet);
-  std::ranges::for_each(warnings_of_filters(arguments.options.event_camera), notices.warning);
-  catch_interrupts();
-  warn_of_noise("", arguments.options.event_camera, notices);
-
+  ConversionOptions& options = arguments.options;
+  options.event_camera = read_event_camera(arguments.overrides);
+  options.input = fs::absolute(arguments.input, error);
+  if (!arguments.interpolator.empty()) options.interpolator = fs::absolute(arguments.interpolator, error).string();
   const fs::path name = fs::path(arguments.input).lexically_normal();
   const fs::path out = arguments.out.empty() ? "out" / (name.has_filename() ? name : name.parent_path()).stem()
                                              : fs::path(arguments.out);
-  const Format* format = find_format_for(out);
-  if (format != nullptr && !format->folder) return convert_to_file(arguments, out, *format, notices);
-  return convert_to_folder(arguments, out, notices, given);
+  catch_interrupts();
+
+  ProgressBar bar(!arguments.quiet);
+  ConversionOutput output;
+  output.out = out;
+  output.replace = arguments.force;
+  output.threads = arguments.threads;
+  output.repetition = {shell_command(own_command_line())};
+  output.comment = [&](const ConversionSummary& summary, const Notices& notices) {
+    bar.clear();
+    report_held(summary, options, notices);
+    report_bunching(summary, options, notices);
+  };
+  const auto [summary, report] =
+      make_conversion(options, std::move(output), printing(arguments.quiet), [&](const Progress& progress) {
+        bar.show(progress);
+        return !interrupted();
+      });
+  if (!arguments.quiet) {
+    print_summary(summary);
+    if (fs::is_directory(out, error)) {
+      tell(stderr, "recording: {}\nlook at:   {}\n", out.string(), (out / kConversionCamera / "preview.png").string());
+    } else {
+      tell(stderr, "events: {}\n", out.string());
+    }
+  }
+  return outcome(summary, out);
 }
 
 }  // namespace
@@ -194,6 +117,12 @@ void add_video(CLI::App& app, int& exit_code) {
       ->type_name("FILE_OR_DIR");
   CommandLine options(*command);
   describe_command_line(options, arguments->options);
+  command
+      ->add_option(
+          "--interpolator", arguments->interpolator,
+          "Model in ONNX that makes the images between frames; needs the Python package of esim with onnxruntime")
+      ->type_name("MODEL.onnx")
+      ->excludes("--no-interpolation");
   add_run_options(*command, *arguments,
                   "Change one option of the event camera, for example --set contrast_threshold=0.2");
   command->footer(
@@ -201,7 +130,8 @@ void add_video(CLI::App& app, int& exit_code) {
       "  esim video clip.mp4 --out out/clip                        then look at out/clip/cam0/preview.png\n"
       "  esim video clip.mp4 --out events.h5 --set contrast_threshold=0.2\n"
       "  esim video images/ --fps 240 --out out/images\n"
-      "  esim video slow.mp4 --slow-motion 8 --start 2 --duration 1.5 --out out/slow");
+      "  esim video slow.mp4 --slow-motion 8 --start 2 --duration 1.5 --out out/slow\n"
+      "  esim video clip.mp4 --interpolator model.onnx --lambda 1  frames between frames by a neural network");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -191,4 +191,33 @@ struct RecordingOptions {
 std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions options, const Notices& notify,
                                       const Monitor& monitor);
 
+// --- videos (make_conversion.cpp) ------------------------------------------------------------------------------------
+
+/// Where a conversion writes, and what it needs beside its options.
+struct ConversionOutput {
+  std::filesystem::path out{};  ///< a recording's folder, or a file of events
+  bool replace = false;         ///< existing output
+  int threads = 0;              ///< 0: every processor
+
+  /// Makes the images between frames, in place of the options' model; may be null.
+  std::unique_ptr<FrameInterpolator> interpolator{};
+
+  Repetition repetition{};  ///< for the report
+
+  /// Called at the end of the conversion, to say what its options can improve.
+  std::function<void(const ConversionSummary&, const Notices&)> comment = [](const auto&, const auto&) {};
+};
+
+/// A conversion, and the text of its report.json.
+struct MadeConversion {
+  ConversionSummary summary;
+  std::string report;
+};
+
+/// Converts a video to a recording's folder with video.yaml and report.json, or to one file of events, as `esim video`
+/// does. The monitor can end it early. The report contains the notices. Throws UserError for unusable input and
+/// options; a frame that becomes unusable later ends the conversion as incomplete, with the problem in the summary.
+MadeConversion make_conversion(const ConversionOptions& options, ConversionOutput output, const Notices& notify,
+                               const Monitor& monitor);
+
 }  // namespace esim::inline compose

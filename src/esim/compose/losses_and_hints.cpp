@@ -77,6 +77,18 @@ void add_sampling(const std::string& name, const CameraOptions& camera, const Sa
   }
 }
 
+/// Motion between frames that the optical flow did not follow.
+void add_motion(const ConversionSummary& summary, std::vector<std::string>& lines) {
+  constexpr double kMuch = 0.2;
+  const std::optional<double> not_followed = not_followed_fraction(summary);
+  if (!not_followed || (*not_followed < kMuch && summary.mostly_not_followed == 0)) return;
+  lines.push_back(fmt::format(
+      "the optical flow does not follow {:.0f} % of the pixels that change between frames (between {} of {} "
+      "pairs of frames, less than half of them): their motion is too large or too complex; use a video with "
+      "more frames per second",
+      100 * *not_followed, summary.mostly_not_followed, summary.frames - 1));
+}
+
 }  // namespace
 
 std::vector<std::string> warnings_of_filters(const EventCameraOptions& sensor) {
@@ -135,6 +147,7 @@ std::vector<std::string> hints(const Scenario& scenario, const Summary& summary)
 std::vector<std::string> losses(const ConversionOptions& options, const ConversionSummary& summary) {
   std::vector<std::string> lines;
   add_sensor("", options.event_camera.readout, summary.sensor, lines);
+  add_motion(summary, lines);
   return lines;
 }
 

@@ -113,6 +113,7 @@ std::string report_json(const ConversionOptions& options, const ConversionSummar
                         const std::vector<std::string>& notices, const std::optional<Provenance>& provenance) {
   const double converted_s = to_seconds(summary.end - summary.start);
   const std::int64_t events = summary.events_on + summary.events_off;
+  const std::optional<double> not_followed = not_followed_fraction(summary);
   const ConversionSummary::Seconds& s = summary.seconds;
   const double other = summary.wall_seconds - (s.decode + s.motion + s.interpolation + s.events + s.write);
   Json report = {
@@ -140,6 +141,9 @@ std::string report_json(const ConversionOptions& options, const ConversionSummar
       {"steps", summary.steps},
       {"intervals_held_to_max_steps", summary.held},
       {"max_optical_flow_px", summary.max_optical_flow_px},
+      {"changed_pixels_not_followed", not_followed ? Json(*not_followed) : Json(nullptr)},
+      {"intervals_mostly_not_followed", summary.mostly_not_followed},
+      {"interpolator", options.interpolator.empty() ? Json(nullptr) : Json(options.interpolator)},
       {"events", events},
       {"events_on", summary.events_on},
       {"events_off", summary.events_off},

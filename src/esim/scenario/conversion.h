@@ -20,6 +20,7 @@ struct ConversionOptions {
   std::uint64_t seed = 0;
   VideoOptions video;
   InterpolationOptions interpolation;
+  std::string interpolator{};  ///< path of a model in ONNX, or the name of a function; empty: along the optical flow
   bool bayer = false;
   EventCameraOptions event_camera;
 };
@@ -37,6 +38,8 @@ template <class Visitor>
 void describe(Visitor& visit, ConversionOptions& o) {
   visit("input", o.input, About{"video file, or folder of images"});
   describe_command_line(visit, o);
+  visit("interpolator", o.interpolator,
+        About{"what makes the images between frames in place of the optical flow: a model in ONNX"});
   visit("event_camera", o.event_camera, About{"the event sensor"});
 }
 

@@ -25,7 +25,7 @@ class Run {
   /// Reads the next frame and measures how the image moves towards it; false at the end of the input.
   bool take_frame() {
     if (!timed(summary_.seconds.decode, [&] { return conversion_.frames.next(frame_); })) return false;
-    timed(summary_.seconds.motion, [&] { conversion_.interpolator.advance(frame_.planes, conversion_.workers); });
+    timed(summary_.seconds.motion, [&] { conversion_.interpolator.advance(frame_, conversion_.workers); });
     return true;
   }
 
@@ -48,6 +48,7 @@ class Run {
     const auto steps = std::min<TimeNs>(interpolator.steps(), duration);
     summary_.max_optical_flow_px = std::max(summary_.max_optical_flow_px, interpolator.max_flow_px());
     if (interpolator.is_held()) ++summary_.held;
+    count(interpolator.followed_pixels());
 
     for (TimeNs step = 1; step <= steps; ++step) {
       const double fraction = static_cast<double>(step) / static_cast<double>(steps);
@@ -97,6 +98,13 @@ class Run {
     } else {
       mosaic(planes[0], planes[1], planes[2], irradiance);
     }
+  }
+
+  void count(const FollowedPixels& pixels) {
+    summary_.followed_pixels.changed += pixels.changed;
+    summary_.followed_pixels.followed += pixels.followed;
+    const std::int64_t few = std::int64_t{summary_.width} * summary_.height / 100;
+    if (pixels.changed > few && 2 * pixels.followed < pixels.changed) ++summary_.mostly_not_followed;
   }
 
   /// Changes the irradiance of the pixels linearly to `after_` at time t.
@@ -149,6 +157,12 @@ class Run {
 };
 
 }  // namespace
+
+std::optional<double> not_followed_fraction(const ConversionSummary& summary) {
+  const auto [changed, followed] = summary.followed_pixels;
+  if (changed == 0) return std::nullopt;
+  return static_cast<double>(changed - followed) / static_cast<double>(changed);
+}
 
 ConversionSummary convert(const Conversion& conversion, Sink& out, const Monitor& monitor) {
   Run run(conversion, out, monitor);

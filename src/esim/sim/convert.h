@@ -26,6 +26,11 @@ struct ConversionSummary {
   std::int64_t steps = 0;          ///< of the interpolation
   std::int64_t held = 0;           ///< intervals that needed more than max_steps
   double max_optical_flow_px = 0;  ///< maximum between two frames
+  FollowedPixels followed_pixels;  ///< sums over all intervals
+
+  /// Intervals in which the optical flow follows fewer than half of the pixels that change, if more than 1 % change.
+  std::int64_t mostly_not_followed = 0;
+
   std::int64_t events_on = 0, events_off = 0;
   EventCameraStatistics sensor;
 
@@ -39,6 +44,10 @@ struct ConversionSummary {
   } seconds;
   double wall_seconds = 0;
 };
+
+/// Fraction of the changed pixels that the optical flow does not follow; empty if no pixel changed, or without optical
+/// flow.
+std::optional<double> not_followed_fraction(const ConversionSummary& summary);
 
 /// The parts of a conversion.
 struct Conversion {

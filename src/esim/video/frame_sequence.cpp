@@ -24,7 +24,7 @@ std::unique_ptr<FrameSource> open(const fs::path& input, const VideoOptions& opt
 std::string out_of_order(TimeNs t, TimeNs before) {
   return fmt::format(
       "its time, {:.9f} s, is not after that of the previous frame, {:.9f} s; correct the time stamps, or replace them "
-      "with --fps",
+      "by a constant frame rate (fps)",
       to_seconds(t), to_seconds(before));
 }
 
@@ -34,13 +34,25 @@ bool is_irradiance(float value) { return value >= 0 && value <= std::numeric_lim
 
 }  // namespace
 
+std::string problem_of(const Planes& planes) {
+  for (const Image<float>& plane : planes) {
+    const auto pixels = plane.pixels();
+    const auto bad = std::find_if_not(pixels.begin(), pixels.end(), is_irradiance);
+    if (bad == pixels.end()) continue;
+    const int at = static_cast<int>(bad - pixels.begin());
+    return fmt::format("pixel ({}, {}) is {}; irradiance must be finite and >= 0", at % plane.width(),
+                       at / plane.width(), *bad);
+  }
+  return "";
+}
+
 FrameSequence::FrameSequence(const fs::path& input, const VideoOptions& options, bool colour)
     : input_(input), source_(open(input, options, colour)), fps_(options.fps), slow_motion_(options.slow_motion) {
   const FrameSource::Listing& listing = source_->listing();
   if (listing.frames == 0) throw UserError(fmt::format("{}: holds no frames", input.string()));
   if (!fps_ && listing.stamps.empty()) {
-    throw UserError(fmt::format("{}: the frames have no time stamps; pass the number of frames per second with --fps",
-                                input.string()));
+    throw UserError(
+        fmt::format("{}: the frames have no time stamps; state the number of frames per second (fps)", input.string()));
   }
   choose_window(options);
   first_.emplace();
@@ -79,8 +91,8 @@ void FrameSequence::choose_window(const VideoOptions& options) {
   }
   const TimeNs input_end = stamp_of(count - 1);
   if (first_stamp_ > input_end) {
-    throw UserError(fmt::format("{}: --start {} s is beyond the last frame, {:.3f} s after the first", input_.string(),
-                                options.start, to_seconds(input_end - origin_)));
+    throw UserError(fmt::format("{}: the start, {} s, is beyond the last frame, {:.3f} s after the first",
+                                input_.string(), options.start, to_seconds(input_end - origin_)));
   }
 }
 
@@ -101,7 +113,7 @@ bool FrameSequence::read(Frame& frame) {
   while (source_->advance()) {
     const std::size_t index = index_++;
     const std::optional<TimeNs> stamp = fps_ ? stamp_of(index) : source_->stamp();
-    if (!stamp) fail("has no time stamp; pass the number of frames per second with --fps");
+    if (!stamp) fail("has no time stamp; state the number of frames per second (fps)");
     if (*stamp > last_stamp_) return false;
     if (*stamp < first_stamp_) continue;
     source_->read(frame.planes);
@@ -118,14 +130,7 @@ void FrameSequence::check(const Frame& frame) const {
     fail(fmt::format("is {} x {} px, but the first one {} x {}; all frames must have the same size", plane.width(),
                      plane.height(), width_, height_));
   }
-  for (const Image<float>& values : frame.planes) {
-    const auto pixels = values.pixels();
-    const auto bad = std::find_if_not(pixels.begin(), pixels.end(), is_irradiance);
-    if (bad == pixels.end()) continue;
-    const int at = static_cast<int>(bad - pixels.begin());
-    fail(fmt::format("pixel ({}, {}) is {}; irradiance must be finite and >= 0", at % values.width(),
-                     at / values.width(), *bad));
-  }
+  if (const std::string problem = problem_of(frame.planes); !problem.empty()) fail(problem);
 }
 
 void FrameSequence::fail(const std::string& what) const {

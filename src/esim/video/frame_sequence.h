@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "esim/core/describe.h"
 #include "esim/core/time.h"
@@ -36,6 +37,9 @@ struct Frame {
   TimeNs t = 0;
   Planes planes;
 };
+
+/// The first pixel whose irradiance is negative or not finite, and why it is refused; empty if all pixels are valid.
+std::string problem_of(const Planes& planes);
 
 /// Reads the chosen frames of a video or of a folder of images and checks that times increase, all sizes are equal, and
 /// every irradiance is finite and >= 0. Holds at most one frame.

@@ -90,7 +90,7 @@ class ImageFolder final : public FrameSource {
     try {
       load_planes(folder_ / names_[index()], encoding_, colour_, planes);
     } catch (const UserError& error) {
-      throw UserError(fmt::format("frame {}: {}; replace it, or end before it with --duration", index(), error.what()));
+      throw UserError(fmt::format("frame {}: {}; replace it, or end before it (duration)", index(), error.what()));
     }
   }
 
@@ -101,8 +101,9 @@ class ImageFolder final : public FrameSource {
 
   void take(const std::vector<StampedName>& entries, const char* file) {
     if (entries.empty()) {
-      throw UserError(fmt::format("{}: names no frames; list the frames, or remove the file and pass --fps",
-                                  (folder_ / file).string()));
+      throw UserError(
+          fmt::format("{}: names no frames; list the frames, or remove the file and state the frame rate (fps)",
+                      (folder_ / file).string()));
     }
     const bool named = !entries.front().name.empty();
     if (!named) names_ = images_of(folder_);

@@ -1,5 +1,6 @@
 #include "esim/video/interpolator.h"
 
+#include <fmt/format.h>
 #include <hwy/highway.h>
 //
 #include <hwy/contrib/math/math-inl.h>
@@ -7,7 +8,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 #include <utility>
+
+#include "esim/core/error.h"
 
 namespace esim::inline video {
 namespace {
@@ -21,6 +25,9 @@ constexpr int kRowsPerPiece = 16;
 
 /// Change of brightness along the motion that is attributed to noise and aliased texture.
 constexpr float kUnexplained = 0.5F;
+
+/// Change of brightness above that of the noise of most videos.
+constexpr float kChange = 0.2F;
 
 template <typename Body>
 void for_rows(int height, const Workers& workers, const Body& body) {
@@ -64,6 +71,16 @@ V sample(D d, const View& image, V x, V y) {
     sum = hn::MulAdd(wy[static_cast<std::size_t>(j)], across, sum);
   }
   return sum;
+}
+
+/// The image at a point; points outside are moved to its edge.
+float bilinear(const Image<float>& image, float x, float y) {
+  x = std::clamp(x, 0.0F, static_cast<float>(image.width() - 1));
+  y = std::clamp(y, 0.0F, static_cast<float>(image.height() - 1));
+  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
+  const int x1 = std::min(x0 + 1, image.width() - 1), y1 = std::min(y0 + 1, image.height() - 1);
+  const float u = x - static_cast<float>(x0), v = y - static_cast<float>(y0);
+  return (1 - v) * ((1 - u) * image(x0, y0) + u * image(x1, y0)) + v * ((1 - u) * image(x0, y1) + u * image(x1, y1));
 }
 
 /// Weights of the displacements u and v towards frame 0 and frame 1, at the fraction s between them.
@@ -125,13 +142,18 @@ void Interpolator::PaddedLog::assign(const Image<float>& light, float log_eps, c
   });
 }
 
-void Interpolator::advance(const Planes& frame, const Workers& workers) {
-  std::swap(before_, after_);
-  after_.resize(frame.size());
-  for (std::size_t i = 0; i < frame.size(); ++i) {
-    after_[i].assign(frame[i], static_cast<float>(log_eps_), workers);
+void Interpolator::advance(const Frame& frame, const Workers& workers) {
+  if (images_ != nullptr) {
+    std::swap(frame0_, frame1_);
+    frame1_ = frame;
+  } else {
+    std::swap(before_, after_);
+    after_.resize(frame.planes.size());
+    for (std::size_t i = 0; i < frame.planes.size(); ++i) {
+      after_[i].assign(frame.planes[i], static_cast<float>(log_eps_), workers);
+    }
   }
-  if (options_.interpolation) measure_motion(frame, workers);
+  if (options_.interpolation) measure_motion(frame.planes, workers);
 }
 
 void Interpolator::measure_motion(const Planes& frame, const Workers& workers) {
@@ -150,8 +172,13 @@ void Interpolator::measure_motion(const Planes& frame, const Workers& workers) {
     return;
   }
   optical_flow_->estimate(luminance_before_, luminance_after_, workers, forward_, backward_);
+  choose_steps(workers);
+  count_followed(workers);
+}
 
-  // The speed along the parabola changes linearly: its maximum is at one of the ends.
+/// The speed along the parabola changes linearly: its maximum is at one of the ends.
+void Interpolator::choose_steps(const Workers& workers) {
+  const int width = luminance_after_.width(), height = luminance_after_.height();
   std::vector<float> row_max(static_cast<std::size_t>(height), 0.0F);  // squared, per row
   for_rows(height, workers, [&](int y) {
     for (int x = 0; x < width; ++x) {
@@ -168,7 +195,49 @@ void Interpolator::measure_motion(const Planes& frame, const Workers& workers) {
   steps_ = held_ ? options_.max_steps : static_cast<int>(steps);
 }
 
+void Interpolator::count_followed(const Workers& workers) {
+  const int width = luminance_after_.width(), height = luminance_after_.height();
+  const float log_eps = static_cast<float>(log_eps_), smallest_ratio = std::exp(kChange);
+  std::vector<FollowedPixels> rows(static_cast<std::size_t>(height));
+  for_rows(height, workers, [&](int y) {
+    FollowedPixels& row = rows[static_cast<std::size_t>(y)];
+    for (int x = 0; x < width; ++x) {
+      const float before = luminance_before_(x, y) + log_eps, after = luminance_after_(x, y) + log_eps;
+      if (std::max(before, after) < smallest_ratio * std::min(before, after)) continue;
+      ++row.changed;
+      if (forward_.found(x, y) == 0) continue;
+      const float there = bilinear(luminance_after_, static_cast<float>(x) + forward_.x(x, y),
+                                   static_cast<float>(y) + forward_.y(x, y));
+      const float difference = std::abs(std::log((there + log_eps) / before));
+      if (difference < std::max(0.5F * std::abs(std::log(after / before)), kUnexplained)) ++row.followed;
+    }
+  });
+  followed_ = {};
+  for (const FollowedPixels& row : rows) {
+    followed_.changed += row.changed;
+    followed_.followed += row.followed;
+  }
+}
+
+void Interpolator::ask_for_image(double fraction, Planes& light) const {
+  const auto fail = [&](const std::string& what) {
+    const double t = static_cast<double>(frame0_.t) + fraction * static_cast<double>(frame1_.t - frame0_.t);
+    throw UserError(fmt::format("{}, for the image at {:.9f} s between the frames at {:.9f} s and {:.9f} s: {}",
+                                images_->name(), 1e-9 * t, to_seconds(frame0_.t), to_seconds(frame1_.t), what));
+  };
+  try {
+    images_->between(frame0_, frame1_, fraction, light);
+  } catch (const UserError& error) {
+    fail(error.what());
+  }
+  const bool fits = light.size() == frame0_.planes.size() && light.front().width() == frame0_.planes.front().width() &&
+                    light.front().height() == frame0_.planes.front().height();
+  if (!fits) fail("the image must have the size and the number of planes of the frames");
+  if (const std::string problem = problem_of(light); !problem.empty()) fail(problem);
+}
+
 void Interpolator::at(double fraction, const Workers& workers, Planes& light) const {
+  if (images_ != nullptr) return ask_for_image(fraction, light);
   const int width = after_.front().pixels.width() - kBorderBefore - kBorderAfter;
   const int height = after_.front().pixels.height() - kBorderBefore - kBorderAfter;
   resize(light, width, height, after_.size() == 3);

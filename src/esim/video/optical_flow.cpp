@@ -83,6 +83,7 @@ struct OpticalFlow::Impl {
       u = without_noise(u), v = without_noise(v);
       forward.x(x, y) = u[0], forward.y(x, y) = u[1];
       backward.x(x, y) = v[0], backward.y(x, y) = v[1];
+      forward.found(x, y) = backward.found(x, y) = u_holds || v_holds ? 1 : 0;
     }
   }
 
@@ -101,8 +102,9 @@ void OpticalFlow::estimate(const Image<float>& before, const Image<float>& after
                            FlowField& forward, FlowField& backward) {
   Impl& impl = *impl_;
   const int width = before.width(), height = before.height();
-  for (Image<float>* field : {&forward.x, &forward.y, &backward.x, &backward.y}) {
-    if (field->width() != width || field->height() != height) *field = Image<float>(width, height);
+  for (FlowField* field : {&forward, &backward}) {
+    if (field->x.width() != width || field->x.height() != height)
+      *field = {Image<float>(width, height), Image<float>(width, height), Image<std::uint8_t>(width, height)};
   }
   if (std::min(width, height) >= kMinSide) {
     const float white = std::max(white_level(before), white_level(after));

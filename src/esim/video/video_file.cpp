@@ -215,15 +215,15 @@ class VideoFileSource final : public FrameSource {
     if (frame_->color_trc == AVCOL_TRC_LINEAR) return Encoding::linear;
     if (frame_->color_trc == AVCOL_TRC_SMPTE2084 || frame_->color_trc == AVCOL_TRC_ARIB_STD_B67) {
       fail(
-          "is encoded for high dynamic range (PQ or HLG), which is not supported; convert the video to SDR, or pass "
-          "--encoding srgb to read it as sRGB");
+          "is encoded for high dynamic range (PQ or HLG), which is not supported; convert the video to SDR, or read it "
+          "as sRGB (encoding)");
     }
     return Encoding::srgb;
   }
 
   [[noreturn]] void fail(const std::string& what) const {
     throw UserError(
-        fmt::format("{}: {} {}; end before it with --duration, or repair the video", path_.string(), name(), what));
+        fmt::format("{}: {} {}; end before it (duration), or repair the video", path_.string(), name(), what));
   }
 
   std::filesystem::path path_;

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 import esim
+from conftest import ROOT
 
 PROGRAM = os.environ.get("ESIM_PROGRAM", "")
 WIDTH, HEIGHT = 64, 48
@@ -345,3 +347,17 @@ def test_the_command_names_the_image_that_is_invalid(images, tmp_path):
     result = run_command(images, "--fps", FPS, "--out", tmp_path / "out", "--interpolator", model)
     assert result.returncode == 2
     assert "model.onnx, for the image at 0.00" in result.stderr and "pixel (0, 0) is nan" in result.stderr
+
+
+def test_the_installed_command_runs_models_in_its_own_python(tmp_path):
+    (tmp_path / "bin").mkdir()
+    program = tmp_path / "bin" / "esim"
+    program.write_text('#!/bin/sh\necho "$ESIM_PYTHON" "$@"\n')
+    program.chmod(0o755)
+    shutil.copy(ROOT / "python" / "installed" / "main.py", tmp_path / "main.py")
+    environment = {name: value for name, value in os.environ.items() if name != "ESIM_PYTHON"}
+    command = [sys.executable, tmp_path / "main.py", "video", "clip.mp4"]
+    shown = subprocess.run(command, capture_output=True, text=True, env=environment, check=True).stdout
+    assert shown == f"{sys.executable} video clip.mp4\n"
+    shown = subprocess.run(command, capture_output=True, text=True, env={**environment, "ESIM_PYTHON": "mine"}, check=True).stdout
+    assert shown == "mine video clip.mp4\n"

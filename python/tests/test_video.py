@@ -280,7 +280,7 @@ def test_models_that_do_not_fit_are_refused(tmp_path):
 
 def test_without_onnxruntime(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "onnxruntime", None)
-    with pytest.raises(ImportError, match=r"onnxruntime is not installed: pip install onnxruntime"):
+    with pytest.raises(ImportError, match=r"onnxruntime is not installed; install it with `pip install onnxruntime`"):
         esim.interpolators.onnx(make_model(tmp_path / "model.onnx"))
 
 
@@ -331,14 +331,14 @@ def test_the_command_refuses_what_does_not_fit(images, tmp_path):
     refused("takes frames that are 100 px wide, not 64 px")
     make_model(tmp_path / "model.onnx")
     refused("--no-interpolation", "--no-interpolation")
-    refused("/none/python was not found; models need a Python with the packages of esim and onnxruntime: pip install", ESIM_PYTHON="/none/python")
+    refused("/none/python was not found; models need a Python with the package of esim (docs/install.md) and with onnxruntime", ESIM_PYTHON="/none/python")
     # A Python that has no package esim.
-    refused("ended with exit status 1 before it was ready; models need a Python with the packages", PYTHONPATH="", PYTHONNOUSERSITE="1")
+    refused("ended with exit status 1 before it was ready; models need a Python with the package of esim", PYTHONPATH="", PYTHONNOUSERSITE="1")
     # A package without onnxruntime.
     (tmp_path / "absent").mkdir()
     (tmp_path / "absent" / "onnxruntime.py").write_text("raise ImportError('No module', name='onnxruntime')")
     path = os.pathsep.join([str(tmp_path / "absent"), os.environ["PYTHONPATH"]])
-    refused("model.onnx: onnxruntime is not installed: pip install onnxruntime", PYTHONPATH=path)
+    refused("model.onnx: onnxruntime is not installed; install it with `pip install onnxruntime`", PYTHONPATH=path)
 
 
 @needs_program

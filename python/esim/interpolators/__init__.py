@@ -15,7 +15,7 @@ from .._errors import Error
 __all__ = ["onnx", "srgb"]
 
 _LUMINANCE = np.float32([0.2126, 0.7152, 0.0722])
-_NEEDS = "onnxruntime is not installed: pip install onnxruntime, or 'esim-events[onnx]'"
+_NEEDS = "onnxruntime is not installed; install it with `pip install onnxruntime`"
 
 
 def _to_srgb(light):

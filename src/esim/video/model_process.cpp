@@ -24,9 +24,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kRequirements =
-    "models need a Python with the packages of esim and onnxruntime: pip install 'esim-events[onnx]' installs both, "
-    "and "
-    "the environment variable ESIM_PYTHON names another Python";
+    "models need a Python with the package of esim (docs/install.md) and with onnxruntime (pip install onnxruntime); "
+    "the "
+    "environment variable ESIM_PYTHON names another Python";
 constexpr int kNotFound = 127;  // exit status of a process that could not become the program
 
 /// Runs the program in the new process, with the socket as its input. What it prints goes to the standard error.

@@ -203,7 +203,7 @@ void Interpolator::count_followed(const Workers& workers) {
     FollowedPixels& row = rows[static_cast<std::size_t>(y)];
     for (int x = 0; x < width; ++x) {
       const float before = luminance_before_(x, y) + log_eps, after = luminance_after_(x, y) + log_eps;
-      if (std::max(before, after) < smallest_ratio * std::min(before, after)) continue;
+      if (std::max(before, after) <= smallest_ratio * std::min(before, after)) continue;  // also 0 and 0
       ++row.changed;
       if (forward_.found(x, y) == 0) continue;
       const float there = bilinear(luminance_after_, static_cast<float>(x) + forward_.x(x, y),

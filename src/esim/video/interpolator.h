@@ -28,9 +28,9 @@ void describe(Visitor& visit, InterpolationOptions& o) {
 }
 
 /// How many of the pixels that change between two frames the optical flow follows. A pixel changes if its brightness
-/// ln(E + log_eps) differs by at least 0.2. The flow follows it if it is found there, and leads from the pixel in frame
-/// 0 to a point whose brightness in frame 1 differs by less than half as much, or by less than 0.5, which noise and
-/// aliased texture explain.
+/// ln(E + log_eps) differs by more than 0.2. The flow follows it if it is found there, and leads from the pixel in
+/// frame 0 to a point whose brightness in frame 1 differs by less than half as much, or by less than 0.5, which noise
+/// and aliased texture explain.
 struct FollowedPixels {
   std::int64_t changed = 0, followed = 0;
 };

@@ -18,6 +18,7 @@ import time
 
 import numpy as np
 import torch
+import torch.utils.data
 import yaml
 
 import esim
@@ -34,40 +35,75 @@ KEYS = {"training", "seeds", "sensors", "near_px"}
 
 
 class StoredTraining(Training):
-    """A training whose samples, if they are used repeatedly, are simulated once and kept in a folder."""
+    """A training whose samples, if they are used repeatedly, are simulated once into a folder."""
 
     def __init__(self, settings, device, folder):
         super().__init__(settings, device)
         self.folder = folder
 
-    def simulated(self, **options):
-        path = self.folder / ("validation.pt" if "seed" in options else "training.pt")
+    def loader(self, dataset, **options):
+        if isinstance(dataset, StoredSamples):  # quick enough without other processes
+            return torch.utils.data.DataLoader(dataset, **options)
+        return super().loader(dataset, **options)
+
+    def stored(self, **options):
         made_by = {**{name: self.settings[name] for name in ("images", "lead", "simulation")}, **options}
-        if not path.exists():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            parts = [torch.cat(part) for part in zip(*self.reported(super().simulated(**options), options["count"]))]
-            save({"made_by": made_by, "parts": parts}, path)
-        kept = torch.load(path)
-        if kept["made_by"] != made_by:
-            raise esim.Error(f"{path} was simulated with other settings; use the same settings, or another --out")
-        return zip(*(part.split(self.settings["batch"]) for part in kept["parts"]))
-
-    def reported(self, batches, count):
-        """The batches; prints from time to time how many sequences are done."""
-        began, done, said = time.monotonic(), 0, 0
-        for batch in batches:
-            yield batch
-            done += len(batch[0])
-            if done >= said + count / 10:
-                said = done
-                print(f"{self.folder.name}: {done} of {count} sequences simulated, {time_left(began, done, count)}", flush=True)
+        samples = StoredSamples(self.folder / ("validation" if "seed" in options else "training"), made_by)
+        first, count = samples.done, options["count"]
+        began = time.monotonic()
+        for batch in self.simulated(**{**options, "first": first, "count": count - first}) if first < count else ():
+            before = samples.done
+            samples.add(batch)
+            if 10 * before // count < 10 * samples.done // count:
+                print(f"{self.folder.name}: {samples.done} of {count} sequences simulated, "
+                      f"{time_left(began, samples.done - first, count - first)}", flush=True)
+        return samples
 
 
-def save(values, path):
-    """Replaces a file atomically."""
-    part = path.with_suffix(".part")
-    torch.save(values, part)
-    os.replace(part, path)
+class StoredSamples(torch.utils.data.Dataset):
+    """Samples of one size in a file, added batch by batch; what is there is found again after an interruption.
+
+    NAME.npy: float32 (count, channels of the tensor, the optical flow and the mask, height, width); NAME.json: the options
+    that it was made with (`made_by`, with `count`), and how many samples are complete.
+    """
+
+    CHANNELS = 4, 2, 1
+
+    def __init__(self, path, made_by):
+        self.values, self.head = path.with_suffix(".npy"), path.with_suffix(".json")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        made_by = json.loads(json.dumps(made_by))
+        if not self.head.exists():
+            size = made_by["simulation"]
+            np.lib.format.open_memmap(self.values, "w+", np.float32, (made_by["count"], sum(self.CHANNELS), size["height"], size["width"]))
+            self.write({"made_by": made_by, "done": 0})
+        self.state = json.loads(self.head.read_text())
+        if self.state["made_by"] != made_by:
+            raise esim.Error(f"{self.head}: the samples were simulated with other settings; use the same settings, or another --out")
+        self.array = None
+
+    done = property(lambda self: self.state["done"])
+
+    def write(self, state):
+        part = self.head.with_suffix(".part")
+        part.write_text(json.dumps(state))
+        os.replace(part, self.head)
+        self.state = state
+
+    def add(self, batch):
+        array = np.load(self.values, mmap_mode="r+")
+        done = self.done + len(batch[0])
+        array[self.done : done] = np.concatenate([part.numpy() for part in batch], axis=1)
+        array.flush()
+        self.write({**self.state, "done": done})
+
+    def __len__(self):
+        return self.done
+
+    def __getitem__(self, i):
+        if self.array is None:
+            self.array = np.load(self.values, mmap_mode="r")
+        return torch.from_numpy(self.array[i].copy()).split(self.CHANNELS)
 
 
 def read_experiment(path, training=None):
@@ -95,15 +131,15 @@ def fit_of(sensor, where):
     return clip, part
 
 
-def fitted(clips, sensor, folder):
+def fitted(clips, sensor, folder, program):
     """Fits a sensor by `esim evaluate realism`, unless it has been done: options of esim.dataset.AffineSequences."""
     path = folder / "base_fitted.yaml"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "base.yaml").write_text(yaml.safe_dump({"event_camera": sensor["base"]}))
         print(f"fitting a sensor to {sensor['fit']}", flush=True)
-        done = subprocess.run([sys.executable, "-m", "esim", "evaluate", "realism", clips, "--sensor", folder / "base.yaml",
-                               "--fit-to", sensor["fit"], "--save-fitted", folder, "--quiet"], stdout=subprocess.PIPE, text=True)
+        done = subprocess.run([*program, "evaluate", "realism", clips, "--sensor", folder / "base.yaml", "--fit-to",
+                               sensor["fit"], "--save-fitted", folder, "--quiet"], stdout=subprocess.PIPE, text=True)
         if done.returncode:
             raise esim.Error(f"esim evaluate realism could not fit a sensor to {sensor['fit']}; its message is above")
         (folder / "fit.txt").write_text(done.stdout)
@@ -261,18 +297,20 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, required=True, help="folder to write, or to continue")
     parser.add_argument("--settings", type=pathlib.Path, default=HERE / "sim_to_real.yaml", help="sensors and seeds")
     parser.add_argument("--training", type=pathlib.Path, help="settings of train.py, instead of those that --settings names")
+    parser.add_argument("--esim", help="the program esim (default: that of the Python package), for sensors that are fitted")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
     parser.add_argument("--threads", type=int, help="number of PyTorch's processor threads")
     options = parser.parse_args()
     if options.threads:
         torch.set_num_threads(options.threads)
+    program = [options.esim] if options.esim else [sys.executable, "-m", "esim"]
     experiment = read_experiment(options.settings, options.training)
     clips = read_clips(options.clips)
     sensors, parts = {}, []
     for name, sensor in experiment["sensors"].items():
         if "fit" in sensor:
             parts.append(fit_of(sensor, name))
-            sensor = fitted(options.clips, sensor, options.out / name)
+            sensor = fitted(options.clips, sensor, options.out / name, program)
         sensors[name] = sensor
     rows, validations, first = [], {name: [] for name in sensors}, {}
     for seed in experiment["seeds"]:

@@ -76,6 +76,10 @@ class Training:
         loader = self.loader(self.dataset(**options), batch_size=self.settings["batch"])
         return ([part.clone() for part in batch] for batch in loader)
 
+    def stored(self, **options):
+        """Simulated samples, to be used repeatedly."""
+        return [sample for batch in self.simulated(**options) for sample in zip(*batch)]
+
     def batches(self):
         """Batches of training samples, starting at the current iteration; the same after resuming."""
         first, size, count = self.iteration * self.settings["batch"], self.settings["batch"], self.settings["sequences"]
@@ -83,7 +87,7 @@ class Training:
         if self.settings["dataset"] is not None:
             stored = esim.torch.EventTensorDataset(self.settings["dataset"])
         elif count:
-            stored = [sample for batch in self.simulated(count=count) for sample in zip(*batch)]
+            stored = self.stored(count=count)
         else:
             return self.loader(self.dataset(first=first), batch_size=size, pin_memory=pinned)
         return self.loader(stored, batch_sampler=Passes(len(stored), first, size), pin_memory=pinned)
@@ -119,7 +123,8 @@ class Training:
         """End-point errors on pixels with events, px, of the network and of predicting no motion."""
         if self.validation_batches is None:
             seed = self.settings["simulation"].get("seed", self.settings["seed"]) + VALIDATION_SEED
-            self.validation_batches = list(self.simulated(seed=seed, count=self.settings["validation"]))
+            stored = self.stored(seed=seed, count=self.settings["validation"])
+            self.validation_batches = list(DataLoader(stored, batch_size=self.settings["batch"]))
         self.network.eval()
         errors, zeros, pixels = 0.0, 0.0, 0.0
         with torch.no_grad():

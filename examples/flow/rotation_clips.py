@@ -60,5 +60,5 @@ def read_clips(folder):
     """The clips in a folder, by name."""
     found = sorted(path.parent for path in pathlib.Path(folder).glob("*/motion.txt"))
     if not found:
-        raise esim.Error(f"{folder} contains no clip, that is no folder with a motion.txt")
+        raise esim.Error(f"{folder} contains no clip, which is a folder with a motion.txt")
     return [read_clip(path) for path in found]

@@ -215,24 +215,29 @@ def tested(clips, parts, sensor, seed, training):
 
 
 def errors_of(rows, truth, clip):
-    """Errors by sensor, (trainings, windows), and of no motion, in the windows that no sensor was fitted to."""
+    """Errors by sensor, (trainings, windows), and of no motion, in the windows that no sensor was fitted to; empty without
+    such windows."""
     chosen = [row for row in rows if row["truth"] == truth and not row["fitted"] and clip in (row["clip"], ALL)]
     errors = {}
     for row in chosen:
         errors.setdefault(row["sensor"], {}).setdefault(row["seed"], []).append(row["epe_px"])
+    if not chosen:
+        return {}
     errors = {sensor: list(by_seed.values()) for sensor, by_seed in errors.items()}
     sensor, seed = chosen[0]["sensor"], chosen[0]["seed"]
     zero = [row["zero_epe_px"] for row in chosen if (row["sensor"], row["seed"]) == (sensor, seed)]
     return {"no motion": [zero], **errors}
 
 
-def summary_of(rows, validations, clips):
+def summary_of(rows, validations, clips, near_px):
     """What table.md says, as numbers."""
-    summary = {"level": LEVEL, "validation": validations, "rates_rad_per_s": {
+    summary = {"level": LEVEL, "near_px": near_px, "validation": validations, "rates_rad_per_s": {
         clip.name: {name: truth.rate[0].round(4).tolist() for name, truth in clip.truths.items()} for clip in clips}, "clips": []}
     for truth in clips[0].truths:
         for clip in [*(clip.name for clip in clips), ALL]:
             errors = errors_of(rows, truth, clip)
+            if not errors:
+                continue
             means, pairs = compared(errors)
             summary["clips"].append({
                 "truth": truth, "clip": clip, "windows": len(errors["no motion"][0]),
@@ -247,8 +252,9 @@ def text_of(value, limits):
 
 def table_of(summary):
     """The summary as Markdown."""
+    low, high = summary["near_px"]
     lines = ["End-point errors on simulated validation sequences, px (mean of the trainings; no motion in brackets)", "",
-             "| sensor | all | slow |", "|---|---|---|"]
+             f"| sensor | all pixels | pixels that move by {low:g} to {high:g} px |", "|---|---|---|"]
     for sensor, values in summary["validation"].items():
         mean = {key: np.mean([value[key] for value in values]) for key in values[0]}
         lines.append(f"| {sensor} | {mean['epe_px']:.2f} ({mean['zero_epe_px']:.2f}) "
@@ -312,6 +318,9 @@ def main():
             parts.append(fit_of(sensor, name))
             sensor = fitted(options.clips, sensor, options.out / name, program)
         sensors[name] = sensor
+    for clip, _ in parts:
+        if clip not in [one.name for one in clips]:
+            raise esim.Error(f"{options.settings}: a sensor is fitted to {clip}, which is not one of the clips in {options.clips}")
     rows, validations, first = [], {name: [] for name in sensors}, {}
     for seed in experiment["seeds"]:
         for name, sensor in sensors.items():
@@ -319,8 +328,8 @@ def main():
             validations[name].append(validation(training, experiment["near_px"]))
             rows += tested(clips, parts, name, seed, training)
             first.setdefault(name, training)
-        write(options.out, rows, summary_of(rows, validations, clips), samples_of(clips, first))
-        print(f"{seed}: {options.out / 'table.md'} has the results of the trainings up to this seed", flush=True)
+        write(options.out, rows, summary_of(rows, validations, clips, experiment["near_px"]), samples_of(clips, first))
+        print(f"seed {seed} is complete: {options.out / 'table.md'}", flush=True)
     print((options.out / "table.md").read_text())
 
 

@@ -194,7 +194,7 @@ def train(training, folder):
     settings = training.settings
     log = Log(folder, training.iteration)
 
-    first, started = training.iteration, time.monotonic()
+    first = training.iteration
 
     def report(losses, errors):
         epe, zero = training.validate()
@@ -208,7 +208,9 @@ def train(training, folder):
     losses, errors, began = [], [], time.monotonic()
     if training.iteration >= settings["iterations"]:
         return
-    for batch in training.batches():
+    batches = training.batches()  # may simulate first
+    started = time.monotonic()
+    for batch in batches:
         loss, error = training.step(batch)
         losses.append(loss)
         errors.append(error)

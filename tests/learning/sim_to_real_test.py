@@ -232,6 +232,7 @@ class Experiment(Temporary):
         errors = errors_of(rows, "motion.txt", "c")
         self.assertEqual(errors, {"no motion": [[1.0, 1.0]], "a": [[12.0, 13.0], [22.0, 23.0]], "b": [[12.0, 13.0], [22.0, 23.0]]})
         self.assertEqual(errors_of(rows, "motion.txt", "all windows"), errors)
+        self.assertEqual(errors_of([{**row, "fitted": 1} for row in rows], "motion.txt", "c"), {})
 
     def test_a_tiny_run(self):
         self.clip("first"), self.clip("second", start_s=0.2)
@@ -276,6 +277,11 @@ class Experiment(Temporary):
         self.assertNotIn("training on ideal, seed 1", again.stdout)
         self.assertEqual((out / "windows.csv").read_bytes(), windows)
         self.assertEqual((out / "table.md").read_text(), table)
+        settings["sensors"]["other"] = {"fit": "third:0:1", "base": {}}
+        (out / "other").mkdir()
+        (out / "other/base_fitted.yaml").write_text("event_camera: {contrast_threshold: 0.4}")
+        self.assertIn("a sensor is fitted to third, which is not one of the clips", run([1]).stderr)
+        del settings["sensors"]["other"]
         settings["sensors"]["ideal"]["contrast_threshold"] = 0.7
         refused = run([1, 2])
         self.assertEqual(refused.returncode, 1)
@@ -302,7 +308,8 @@ class Experiment(Temporary):
         rows = [{"clip": "clip", "truth": truth, "sensor": sensor, "seed": 1, "fitted": 0, "epe_px": error + 0.01 * i, "zero_epe_px": 1.0}
                 for truth in clip.truths for sensor, error in (("ideal", 0.5), ("preset", 0.2)) for i in range(6)]
         values = {"epe_px": 0.4, "zero_epe_px": 3.0, "near_epe_px": 0.1, "near_zero_epe_px": 1.0}
-        table = table_of(summary_of(rows, {"ideal": [values], "preset": [values]}, [clip]))
+        table = table_of(summary_of(rows, {"ideal": [values], "preset": [values]}, [clip], [0.5, 1.5]))
+        self.assertIn("pixels that move by 0.5 to 1.5 px", table)
         self.assertIn("| ideal | 0.40 (3.00) | 0.10 (1.00) |", table)
         self.assertIn("| sharpest | clip | ideal | preset | 0.30 [0.30, 0.30] | higher |", table)
 

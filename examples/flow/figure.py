@@ -62,3 +62,55 @@ def draw_curve(log, path):
     figure.tight_layout(pad=0.4)
     figure.savefig(path, dpi=110)
     plt.close(figure)
+
+
+def draw_sim_to_real(summary, samples, path):
+    """Errors of each sensor on each clip, with intervals; below, a window of each clip.
+
+    Parameters
+    ----------
+    summary : dict
+        Of sim_to_real.py.
+    samples : dict of clip to {"tensor", "truth", "predicted": dict of sensor to optical flow}
+    """
+    sensors = list(next(iter(samples.values()))["predicted"])
+    columns = 2 + len(sensors)
+    figure = plt.figure(figsize=(2.2 * columns, 3.4 + 1.7 * len(samples)))
+    grid = figure.add_gridspec(1 + len(samples), columns, height_ratios=[1.8] + [1] * len(samples))
+    draw_errors(figure.add_subplot(grid[0, :]), summary)
+    for row, (clip, sample) in enumerate(samples.items(), 1):
+        longest = np.percentile(np.hypot(*sample["truth"]), 99)
+        fired = sample["tensor"][:2].sum(axis=0) > 0
+        shown = {"events": event_colours(sample["tensor"]), "truth": flow_colours(sample["truth"], longest)}
+        for sensor, predicted in sample["predicted"].items():
+            shown[sensor] = np.where(fired[..., None], flow_colours(predicted, longest), 1)
+        for column, (title, image) in enumerate(shown.items()):
+            axis = figure.add_subplot(grid[row, column])
+            axis.imshow(image)
+            axis.set_xticks([])
+            axis.set_yticks([])
+            if row == 1:
+                axis.set_title(title, fontsize=9)
+            if column == 0:
+                axis.set_ylabel(clip.replace("_", "\n"), fontsize=7)
+    figure.tight_layout(pad=0.5, h_pad=0.2)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def draw_errors(axis, summary):
+    """Mean errors and intervals, in groups: the truths of each clip."""
+    names = list(summary["clips"][0]["epe_px"])
+    for number, name in enumerate(names):
+        for group, entry in enumerate(summary["clips"]):
+            value = entry["epe_px"][name]
+            low, high = value["interval"] or (value["mean"], value["mean"])
+            at = group + 0.15 * (number - (len(names) - 1) / 2)
+            axis.errorbar(at, value["mean"], [[value["mean"] - low], [high - value["mean"]]], fmt="o", markersize=4,
+                          color=f"C{number}", label=name if group == 0 else None)
+    labels = [f"{entry['clip'].replace('_', chr(10))}\n{entry['truth']}" for entry in summary["clips"]]
+    axis.set_xticks(range(len(labels)), labels, fontsize=7)
+    axis.set_ylabel("end-point error, px")
+    axis.set_ylim(bottom=0)
+    axis.grid(axis="y", alpha=0.3)
+    axis.legend(fontsize=8, ncol=len(names))

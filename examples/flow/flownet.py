@@ -134,7 +134,8 @@ def load_checkpoint(path):
     except FileNotFoundError:
         raise esim.Error(f"the checkpoint {path} does not exist") from None
     except Exception as problem:  # zip, pickle and PyTorch raise many types
-        raise esim.Error(f"{path} is not a checkpoint of train.py, or is damaged: {str(problem).splitlines()[0]}") from None
+        reason = (str(problem).splitlines() or [type(problem).__name__])[0]
+        raise esim.Error(f"{path} is not a checkpoint of train.py, or is damaged: {reason}") from None
     if not isinstance(checkpoint, dict) or not {"settings", "network"} <= set(checkpoint):
         raise esim.Error(f"{path} is not a checkpoint of train.py")
     return checkpoint

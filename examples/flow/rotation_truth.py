@@ -216,6 +216,17 @@ class Gyroscope:
                              f"allow gaps longer than {max_gap_s:g} s (--max-gap-s) or cut the recording")
         return Gyroscope(t, rows[:, 4:] @ np.asarray(axes).T)
 
+    @staticmethod
+    def constant(path, t0, t1):
+        """From the motion.txt of a short clip, `wx wy wz` in the camera's axes (rad/s), from t0 to t1 (ns).
+
+        Raises esim.Error for damaged files.
+        """
+        rows, _ = rows_of(path, 3, "wx wy wz")
+        if len(rows) != 1:
+            raise esim.Error(f"{path}: {len(rows)} lines of numbers instead of one: wx wy wz")
+        return Gyroscope(np.array([t0, t1]), np.repeat(rows, 2, axis=0))
+
     def less(self, bias_C):
         """The same without a bias, rad/s in C."""
         return Gyroscope(self.t, self.rate - bias_C)
@@ -273,3 +284,16 @@ def sharpness(events, calibration, omega_C, t0):
     x, y = events["x"].astype(int), events["y"].astype(int)
     flow = calibration.motion_field(omega_C)[:, y, x] * ((events["t"] - t0) * 1e-9)
     return variance(x - flow[0], y - flow[1]) / variance(x, y)
+
+
+def sharpest_rate(events, calibration, omega_C, t0, step=0.1, least_step=0.003):
+    """The constant rate, rad/s (3,), that fits the events best by `sharpness`, from omega_C on by steps along the axes."""
+    best, score = np.array(omega_C, float), sharpness(events, calibration, omega_C, t0)
+    while step >= least_step:
+        tried = [best + sign * step * axis for axis in np.eye(3) for sign in (1, -1)]
+        scores = [sharpness(events, calibration, omega, t0) for omega in tried]
+        if max(scores) > score:
+            best, score = tried[np.argmax(scores)], max(scores)
+        else:
+            step /= 2
+    return best

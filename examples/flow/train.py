@@ -22,6 +22,7 @@ import esim.torch
 from augment import random_change, turned_and_scaled
 from figure import draw, draw_curve
 from flownet import FlowNetS, end_point_error, enlarged, load_checkpoint, training_loss
+from lead import LeadFlowDataset
 from settings import read_settings
 
 COLUMNS = ("iteration", "seconds", "rate", "loss", "train_epe_px", "validation_epe_px", "zero_epe_px")
@@ -60,17 +61,24 @@ class Training:
 
     def dataset(self, **options):
         settings = self.settings
-        return esim.torch.AffineFlowDataset(settings["images"], block=settings["batch"],
-                                            **{"seed": settings["seed"], **settings["simulation"], **options})
+        options = {"block": settings["batch"], "seed": settings["seed"], **settings["simulation"], **options}
+        if settings["lead"]:
+            return LeadFlowDataset(settings["images"], lead_s=settings["lead"], **options)
+        return esim.torch.AffineFlowDataset(settings["images"], **options)
 
     def loader(self, dataset, **options):
-        return DataLoader(dataset, num_workers=self.settings["workers"], **options)
+        workers = 0 if isinstance(dataset, list) else self.settings["workers"]  # lists are in memory
+        return DataLoader(dataset, num_workers=workers, **options)
 
     def simulated(self, **options):
         """Batches of simulated samples that can be kept: copies, because each tensor from a worker keeps a file of shared
         memory open."""
         loader = self.loader(self.dataset(**options), batch_size=self.settings["batch"])
         return ([part.clone() for part in batch] for batch in loader)
+
+    def stored(self, **options):
+        """Simulated samples, to be used repeatedly."""
+        return [sample for batch in self.simulated(**options) for sample in zip(*batch)]
 
     def batches(self):
         """Batches of training samples, starting at the current iteration; the same after resuming."""
@@ -79,7 +87,7 @@ class Training:
         if self.settings["dataset"] is not None:
             stored = esim.torch.EventTensorDataset(self.settings["dataset"])
         elif count:
-            stored = [sample for batch in self.simulated(count=count) for sample in zip(*batch)]
+            stored = self.stored(count=count)
         else:
             return self.loader(self.dataset(first=first), batch_size=size, pin_memory=pinned)
         return self.loader(stored, batch_sampler=Passes(len(stored), first, size), pin_memory=pinned)
@@ -114,8 +122,9 @@ class Training:
     def validate(self):
         """End-point errors on pixels with events, px, of the network and of predicting no motion."""
         if self.validation_batches is None:
-            seed = self.settings["seed"] + VALIDATION_SEED
-            self.validation_batches = list(self.simulated(seed=seed, count=self.settings["validation"]))
+            seed = self.settings["simulation"].get("seed", self.settings["seed"]) + VALIDATION_SEED
+            stored = self.stored(seed=seed, count=self.settings["validation"])
+            self.validation_batches = list(DataLoader(stored, batch_size=self.settings["batch"]))
         self.network.eval()
         errors, zeros, pixels = 0.0, 0.0, 0.0
         with torch.no_grad():
@@ -146,6 +155,12 @@ class Training:
         self.iteration, self.seconds = checkpoint["iteration"], checkpoint["seconds"]
 
 
+def time_left(began, done, count):
+    """How much longer a work takes of which `done` of `count` parts are done, as text, since `began` (of time.monotonic)."""
+    seconds = round((time.monotonic() - began) / done * (count - done))
+    return f"{seconds // 3600}:{seconds // 60 % 60:02}:{seconds % 60:02} left"
+
+
 class Log:
     """Writes log.csv, and TensorBoard logs if it is installed."""
 
@@ -166,10 +181,10 @@ class Log:
         except ImportError:
             self.board = None
 
-    def add(self, row):
+    def add(self, row, note=""):
         with open(self.path, "a", newline="") as file:
             csv.DictWriter(file, COLUMNS).writerow({name: f"{value:.6g}" for name, value in row.items()})
-        print("  ".join(f"{name} {value:.4g}" for name, value in row.items()), flush=True)
+        print("  ".join([*(f"{name} {value:.4g}" for name, value in row.items()), note]).rstrip(), flush=True)
         for name, value in row.items() if self.board else ():
             self.board.add_scalar(name, value, row["iteration"])
 
@@ -179,17 +194,23 @@ def train(training, folder):
     settings = training.settings
     log = Log(folder, training.iteration)
 
+    first = training.iteration
+
     def report(losses, errors):
         epe, zero = training.validate()
         mean = lambda values: sum(values) / len(values) if values else float("nan")
-        log.add(dict(zip(COLUMNS, (training.iteration, training.seconds, training.rate(), mean(losses), mean(errors), epe, zero))))
+        row = (training.iteration, training.seconds, training.rate(), mean(losses), mean(errors), epe, zero)
+        done = training.iteration - first
+        log.add(dict(zip(COLUMNS, row)), time_left(started, done, settings["iterations"] - first) if done else "")
 
     if training.iteration == 0:
         report([], [])
     losses, errors, began = [], [], time.monotonic()
     if training.iteration >= settings["iterations"]:
         return
-    for batch in training.batches():
+    batches = training.batches()  # may simulate first
+    started = time.monotonic()
+    for batch in batches:
         loss, error = training.step(batch)
         losses.append(loss)
         errors.append(error)

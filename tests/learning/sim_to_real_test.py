@@ -30,7 +30,16 @@ import bootstrap  # noqa: E402
 from lead import LeadFlowDataset, flow_between, window_of  # noqa: E402
 from rotation_clips import read_clip, read_clips  # noqa: E402
 from rotation_truth import Calibration, rotation_of  # noqa: E402
-from sim_to_real import StoredSamples, errors_of, fit_of, fitted, read_experiment, sequence_options, summary_of, table_of  # noqa: E402
+from sim_to_real import (  # noqa: E402
+    StoredSamples,
+    errors_of,
+    fit_of,
+    fitted,
+    read_experiment,
+    sequence_options,
+    summary_of,
+    table_of,
+)
 
 torch.set_num_threads(1)
 SIZE = 64, 48
@@ -123,12 +132,12 @@ class Clips(Temporary):
             self.assertEqual(len(rows), 12)  # of 100 ms
             self.assertEqual(len(kept), 12)
             flow = clip.calibration.optical_flow(rotation_of(clip.truths[truth].rate[0] * 0.008))
-            for row, (tensor, predicted, known) in zip(rows, kept):
+            for row, (tensor, _, known) in zip(rows, kept, strict=True):
                 np.testing.assert_allclose(known, flow, atol=1e-9)
                 fired = tensor[:2].sum(axis=0) > 0
                 self.assertAlmostEqual(row["epe_px"], np.linalg.norm(flow, axis=0)[fired].mean())
                 self.assertEqual(row["pixels"], fired.sum())
-            perfect = clip.rows(truth, lambda tensor: flow, 0.008)[0]
+            perfect = clip.rows(truth, lambda tensor, flow=flow: flow, 0.008)[0]
             self.assertLess(max(row["epe_px"] for row in perfect), 1e-9)
 
     def test_windows_that_a_fit_has_seen(self):

@@ -75,7 +75,7 @@ def draw_sim_to_real(summary, samples, path):
     """
     sensors = list(next(iter(samples.values()))["predicted"])
     columns = 2 + len(sensors)
-    figure = plt.figure(figsize=(2.2 * columns, 3.4 + 1.7 * len(samples)))
+    figure = plt.figure(figsize=(2 * columns, 2.8 + 1.6 * len(samples)), layout="constrained")
     grid = figure.add_gridspec(1 + len(samples), columns, height_ratios=[1.8] + [1] * len(samples))
     draw_errors(figure.add_subplot(grid[0, :]), summary)
     for row, (clip, sample) in enumerate(samples.items(), 1):
@@ -93,7 +93,6 @@ def draw_sim_to_real(summary, samples, path):
                 axis.set_title(title, fontsize=9)
             if column == 0:
                 axis.set_ylabel(clip.replace("_", "\n"), fontsize=7)
-    figure.tight_layout(pad=0.5, h_pad=0.2)
     figure.savefig(path, dpi=110)
     plt.close(figure)
 

@@ -3,39 +3,25 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
-#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
 #include <chrono>
-#include <cstdlib>
 #include <cstring>
 #include <deque>
 #include <mutex>
-#include <sstream>
 #include <thread>
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/core/programs/program.h"
 
 namespace esim::inline blender {
 namespace {
 
 constexpr std::size_t kTailLines = 40, kLongestLine = 2000;
-
-/// Runs the program in the new process. Makes only calls that are allowed after a fork.
-[[noreturn]] void become(char* const* arguments, int output) {
-  ::setpgid(0, 0);
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (const int nothing = ::open("/dev/null", O_RDONLY); nothing >= 0) ::dup2(nothing, STDIN_FILENO);
-  ::dup2(output, STDOUT_FILENO);
-  ::dup2(output, STDERR_FILENO);
-  for (const int signal : {SIGINT, SIGTERM, SIGPIPE}) ::signal(signal, SIG_DFL);
-  ::execv(arguments[0], arguments);
-  ::_exit(127);
-}
 
 /// Splits what a program writes into lines, and keeps the last of them.
 class Lines {
@@ -88,15 +74,14 @@ struct Started {
 Started start(const std::vector<std::string>& command) {
   int pipe[2];
   if (::pipe2(pipe, O_CLOEXEC) != 0) throw InternalError(std::string("cannot create a pipe: ") + std::strerror(errno));
-  std::vector<char*> arguments;
-  for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
-  arguments.push_back(nullptr);
-  const pid_t child = ::fork();
-  if (child == 0) become(arguments.data(), pipe[1]);
-  ::close(pipe[1]);
-  if (child >= 0) return {child, pipe[0]};
-  ::close(pipe[0]);
-  throw UserError(command.front() + ": cannot be started: " + std::strerror(errno));
+  try {
+    const Started started{start_program(command, {-1, pipe[1], pipe[1]}), pipe[0]};
+    ::close(pipe[1]);
+    return started;
+  } catch (...) {
+    ::close(pipe[0]), ::close(pipe[1]);
+    throw;
+  }
 }
 
 enum class Came { nothing, something, end };
@@ -113,16 +98,6 @@ Came read_some(int output, Lines& lines, bool& go_on) {
   return Came::something;
 }
 
-/// As in ProcessResult.
-int exit_status_of(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
-
-int wait_for_end(pid_t child) {
-  int status = 0;
-  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  return exit_status_of(status);
-}
-
 /// Ends a process and its child processes, first with SIGTERM.
 void end_group(pid_t leader) {
   ::kill(-leader, SIGTERM);
@@ -135,17 +110,6 @@ void end_group(pid_t leader) {
 }
 
 }  // namespace
-
-std::string find_program(const std::string& name) {
-  if (name.find('/') != std::string::npos) return ::access(name.c_str(), X_OK) == 0 ? name : "";
-  const char* const path = std::getenv("PATH");
-  std::istringstream folders(path != nullptr ? path : "");
-  for (std::string folder; std::getline(folders, folder, ':');) {
-    const std::string candidate = (folder.empty() ? "." : folder) + "/" + name;
-    if (::access(candidate.c_str(), X_OK) == 0) return candidate;
-  }
-  return "";
-}
 
 ProcessResult run_process(const std::vector<std::string>& command, const LineHandler& on_line) {
   const Started program = start(command);
@@ -162,7 +126,7 @@ ProcessResult run_process(const std::vector<std::string>& command, const LineHan
   }
   ::close(program.output);
   lines.finish();
-  result.exit_status = wait_for_end(program.child);
+  result.exit_status = wait_for_program(program.child);
   result.output_tail = lines.tail();
   return result;
 }
@@ -183,7 +147,7 @@ RunningProcess::RunningProcess(const std::vector<std::string>& command) : state_
 RunningProcess::~RunningProcess() {
   if (!exit_status()) {
     end_group(state_->program.child);
-    wait_for_end(state_->program.child);
+    wait_for_program(state_->program.child);
   }
   state_->stop = true;
   if (state_->reader.joinable()) state_->reader.join();

@@ -47,7 +47,4 @@ class RunningProcess {
   std::unique_ptr<State> state_;
 };
 
-/// The path of a program: `name` itself if it has a slash, otherwise the first match on PATH; empty if not found.
-std::string find_program(const std::string& name);
-
 }  // namespace esim::inline blender

@@ -12,6 +12,7 @@
 
 #include "esim/blender/process.h"
 #include "esim/core/error.h"
+#include "esim/core/programs/program.h"
 
 namespace esim::inline blender {
 

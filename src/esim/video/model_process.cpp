@@ -1,11 +1,8 @@
 #include "esim/video/model_process.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
-#include <sys/prctl.h>
 #include <sys/socket.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
@@ -13,10 +10,12 @@
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include "esim/core/error.h"
 #include "esim/core/inputs/used_files.h"
+#include "esim/core/programs/program.h"
 
 namespace esim::inline video {
 namespace {
@@ -25,21 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kRequirements =
     "models need a Python with the package of esim (docs/install.md) and with onnxruntime (pip install onnxruntime); "
-    "the "
-    "environment variable ESIM_PYTHON names another Python";
-constexpr int kNotFound = 127;  // exit status of a process that could not become the program
-
-/// Runs the program in the new process, with the socket as its input. What it prints goes to the standard error.
-/// Makes only calls that are allowed after a fork.
-[[noreturn]] void become(char* const* arguments, int socket) {
-  ::setpgid(0, 0);  // Ctrl-C is for this process, which ends the other one
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  ::dup2(socket, STDIN_FILENO);
-  ::dup2(STDERR_FILENO, STDOUT_FILENO);
-  for (const int signal : {SIGINT, SIGTERM, SIGPIPE}) ::signal(signal, SIG_DFL);
-  ::execvp(arguments[0], arguments);
-  ::_exit(kNotFound);
-}
+    "the environment variable ESIM_PYTHON names another Python";
 
 /// A process at the other end of a socket.
 class Process {
@@ -48,21 +33,21 @@ class Process {
     std::array<int, 2> sockets{};
     if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, sockets.data()) != 0)
       throw InternalError(std::string("cannot create a socket: ") + std::strerror(errno));
-    std::vector<char*> arguments;
-    for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
-    arguments.push_back(nullptr);
-    child_ = ::fork();
-    if (child_ == 0) become(arguments.data(), sockets[1]);
-    const int problem = errno;
+    try {
+      // What it prints goes to the standard error.
+      child_ = start_program(command, {sockets[1], STDERR_FILENO, STDERR_FILENO});
+    } catch (...) {
+      ::close(sockets[0]), ::close(sockets[1]);
+      throw;
+    }
     ::close(sockets[1]);
     socket_ = sockets[0];
-    if (child_ < 0) throw UserError(command.front() + ": cannot be started: " + std::strerror(problem));
   }
   ~Process() {
     ::close(socket_);
-    if (child_ <= 0) return;
+    if (child_ < 0) return;
     ::kill(-child_, SIGKILL);
-    wait();
+    wait_for_program(child_);
   }
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
@@ -94,31 +79,23 @@ class Process {
 
   /// How the process ended, which has closed its socket.
   std::string end() {
-    const int status = wait();
-    if (WIFSIGNALED(status)) return fmt::format("ended by signal {}", WTERMSIG(status));
-    return fmt::format("ended with exit status {}", WEXITSTATUS(status));
-  }
-
-  bool was_not_found() {
-    const int status = wait();
-    return WIFEXITED(status) && WEXITSTATUS(status) == kNotFound;
+    if (child_ >= 0) exit_status_ = wait_for_program(std::exchange(child_, -1));
+    return exit_status_ > 128 ? fmt::format("ended by signal {}", exit_status_ - 128)
+                              : fmt::format("ended with exit status {}", exit_status_);
   }
 
  private:
-  int wait() {
-    while (child_ > 0 && ::waitpid(child_, &status_, 0) < 0 && errno == EINTR) {
-    }
-    child_ = -1;
-    return status_;
-  }
-
   pid_t child_ = -1;
-  int socket_ = -1, status_ = 0;
+  int socket_ = -1, exit_status_ = 0;
 };
 
-std::string python() {
+/// Throws UserError if it is not found.
+std::string python_for(const std::string& model) {
   const char* const chosen = std::getenv("ESIM_PYTHON");
-  return chosen != nullptr && *chosen != '\0' ? chosen : "python3";
+  const std::string name = chosen != nullptr && *chosen != '\0' ? chosen : "python3";
+  const std::string program = find_program(name);
+  if (program.empty()) throw UserError(fmt::format("{}: {} was not found; {}", model, name, kRequirements));
+  return program;
 }
 
 /// Both sides send their numbers as they lie in memory. A request is the fraction as a double, and the planes of the
@@ -128,7 +105,7 @@ class ModelProcess final : public FrameInterpolator {
  public:
   ModelProcess(const fs::path& model, int width, int height, bool colour)
       : model_(model.string()),
-        python_(python()),
+        python_(python_for(model_)),
         width_(width),
         height_(height),
         colour_(colour),
@@ -136,8 +113,7 @@ class ModelProcess final : public FrameInterpolator {
                   colour ? "3" : "1"}) {
     std::uint32_t error_bytes = 0;
     if (!process_.receive(&error_bytes, sizeof(error_bytes))) {
-      const std::string reason = process_.was_not_found() ? "was not found" : process_.end() + " before it was ready";
-      throw UserError(fmt::format("{}: {} {}; {}", model_, python_, reason, kRequirements));
+      throw UserError(fmt::format("{}: {} {} before it was ready; {}", model_, python_, process_.end(), kRequirements));
     }
     if (error_bytes > 0) throw UserError(message(error_bytes));
   }

@@ -5,11 +5,10 @@
 #include <cmath>
 #include <numeric>
 #include <span>
-#include <string>
 
 #include "esim/backends/raycast/edges.h"
+#include "esim/backends/raycast/sample_places.h"
 #include "esim/backends/raycast/shading.h"
-#include "esim/core/error.h"
 #include "esim/render/bands.h"
 
 namespace esim::inline backends::inline raycast {
@@ -29,19 +28,6 @@ struct Area {
   float alone() const { return std::sqrt(0.5F * (1 + side * side)); }
   static float together() { return 0.70710678F; }
 };
-
-/// Positions of rays in a pixel, from its centre: a rank-1 lattice, with no two rays in the same row or column.
-std::vector<Eigen::Vector2f> lattice(int count) {
-  const int generator = count == 64 ? 19 : 5;
-  std::vector<Eigen::Vector2f> places;
-  for (int i = 0; i < count; ++i) {
-    const auto place = [count](int k) {
-      return (static_cast<float>(k % count) + 0.5F) / static_cast<float>(count) - 0.5F;
-    };
-    places.emplace_back(place(i), place(generator * i));
-  }
-  return places;
-}
 
 /// The triangles of a group that a cell of the image may see.
 struct CellView {
@@ -89,7 +75,7 @@ class RaycastRenderer final : public ProcessorRenderer {
                   const Workers& workers, ColourFilters filters, const PixelArea& area)
       : scene_(std::move(scene)),
         shading_(*scene_, options.background),
-        places_(lattice(options.samples_per_pixel)),
+        places_(sample_places(options.samples_per_pixel)),
         area_(area),
         rays_(camera, area.texture),
         blocks_(rays_),
@@ -108,17 +94,9 @@ class RaycastRenderer final : public ProcessorRenderer {
 
  private:
   void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
-    std::vector<Moment> moments;
-    for (const RenderRequest& request : requests) moments.emplace_back(*scene_, request);
+    const std::vector<Moment> moments = moments_of(*scene_, requests);
     render_in_bands(requests, rays_, workers_, sample, [&](std::size_t which, const Tile& band) {
-      switch (scene_->packet_size()) {
-        case 16:
-          return render_band<16>(moments[which], band, sample);
-        case 8:
-          return render_band<8>(moments[which], band, sample);
-        default:
-          return render_band<4>(moments[which], band, sample);
-      }
+      scene_->with_packet_size([&](auto K) { render_band<K.value>(moments[which], band, sample); });
     });
   }
 
@@ -306,10 +284,6 @@ class RaycastRenderer final : public ProcessorRenderer {
 std::unique_ptr<Renderer> make_raycast_renderer(std::shared_ptr<const RaycastScene> scene,
                                                 const RaycastOptions& options, const Camera& camera,
                                                 const Workers& workers, ColourFilters filters, const PixelArea& area) {
-  const int n = options.samples_per_pixel;
-  if (n != 1 && n != 16 && n != 64) {
-    throw UserError("samples_per_pixel: " + std::to_string(n) + " is not supported; use 1, 16 or 64");
-  }
   return std::make_unique<RaycastRenderer>(std::move(scene), options, camera, workers, filters, area);
 }
 

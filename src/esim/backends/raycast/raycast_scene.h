@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <memory>
 #include <optional>
+#include <type_traits>
 #include <vector>
 
 #include "esim/backends/raycast/embree.h"
@@ -52,7 +53,13 @@ class RaycastScene {
  public:
   explicit RaycastScene(const Scene& scene, SceneUse use = SceneUse::rays);
 
-  int packet_size() const { return packet_size_; }
+  /// Calls f with the number of rays in a packet that suits this processor, as a std::integral_constant.
+  template <class F>
+  void with_packet_size(const F& f) const {
+    if (packet_size_ == 16) return f(std::integral_constant<int, 16>());
+    if (packet_size_ == 8) return f(std::integral_constant<int, 8>());
+    f(std::integral_constant<int, 4>());
+  }
 
   /// The groups as a camera sees them. Throws InternalError if the request has another number of moving objects.
   std::vector<PlacedGroup> place(const RenderRequest& request) const;

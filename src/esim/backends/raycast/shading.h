@@ -22,6 +22,12 @@ struct Moment {
   }
 };
 
+inline std::vector<Moment> moments_of(const RaycastScene& scene, std::span<const RenderRequest> requests) {
+  std::vector<Moment> moments;
+  for (const RenderRequest& request : requests) moments.emplace_back(scene, request);
+  return moments;
+}
+
 /// K rays in the stages of rendering.
 template <int K>
 struct Rays {

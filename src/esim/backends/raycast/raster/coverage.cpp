@@ -13,22 +13,14 @@ constexpr float kTouch = 1e-4F;         // px; triangles that overlap by less to
 constexpr float kSameDepth = 2e-6F;     // relative; surfaces at the same depth: the first one is visible
 constexpr std::size_t kMaxPieces = 24;  // of a fragment
 
-/// A rank-1 lattice, with no two positions in the same row or column.
-std::vector<PixelPoint> lattice(int count) {
-  const int generator = count == 64 ? 19 : 5;
-  const auto place = [count](int k) {
-    return (static_cast<float>(k % count) + 0.5F) / static_cast<float>(count) - 0.5F;
-  };
-  std::vector<PixelPoint> places;
-  for (int i = 0; i < count; ++i) places.push_back({place(i), place(generator * i)});
-  return places;
-}
-
 }  // namespace
 
-Coverage::Coverage(int samples, bool store_samples)
-    : samples_(lattice(samples)), store_samples_(store_samples), every_sample_(~std::uint64_t{0} >> (64 - samples)) {
-  for (std::size_t i = 0; i < samples_.size(); ++i) s_[i] = samples_[i].s, t_[i] = samples_[i].t;
+Coverage::Coverage(std::span<const Eigen::Vector2f> places, bool store_samples)
+    : store_samples_(store_samples), every_sample_(~std::uint64_t{0} >> (64 - places.size())) {
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    samples_.push_back({places[i].x(), places[i].y()});
+    s_[i] = samples_[i].s, t_[i] = samples_[i].t;
+  }
 }
 
 SeenInMiddle Coverage::divide(const CellSurfaces& surfaces, const ImageCell& cell, int pixel,
@@ -54,7 +46,9 @@ SeenInMiddle Coverage::divide(const CellSurfaces& surfaces, const ImageCell& cel
     order_[at] = key;
   }
   const std::size_t before = fragments.size();
-  if (samples_.size() == 1 || !divide_exactly(fragments)) {
+  const bool exact = samples_.size() > 1 && divide_exactly(fragments);
+  if (!exact || store_samples_) look_at_samples();
+  if (!exact) {
     fragments.resize(before);
     divide_by_samples(fragments);
   }
@@ -185,6 +179,7 @@ bool Coverage::hide(const Local& surface, const Local& other) {
   return true;
 }
 
+/// Finds what each sample sees.
 void Coverage::look_at_samples() {
   const std::size_t count = samples_.size();
   alignas(64) std::array<float, kMaxSamples> depth;
@@ -213,7 +208,6 @@ void Coverage::divide_by_samples(std::vector<Fragment>& fragments) {
   struct Sum {
     float count = 0, s = 0, t = 0;
   };
-  look_at_samples();
   const std::size_t count = samples_.size();
   std::vector<Sum> sums(candidates_.size());
   for (std::size_t i = 0; i < count; ++i) {
@@ -231,7 +225,6 @@ void Coverage::divide_by_samples(std::vector<Fragment>& fragments) {
 
 /// Fragments between samples have none.
 void Coverage::store_samples(std::span<Fragment> fragments) {
-  look_at_samples();
   for (Fragment& fragment : fragments) {
     for (std::size_t i = 0; i < samples_.size(); ++i) {
       if (seen_[i] != kNone && candidates_[seen_[i]].triangle == fragment.triangle)

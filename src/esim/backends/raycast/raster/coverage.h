@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -35,8 +36,8 @@ class Coverage {
   /// More triangles are tested at sample positions.
   static constexpr std::size_t kMaxExact = 24;
 
-  /// `samples` per pixel: 1, 16 or 64. `store_samples`: of fragments.
-  Coverage(int samples, bool store_samples);
+  /// `places` of samples in a pixel, at most 64. `store_samples`: of fragments.
+  Coverage(std::span<const Eigen::Vector2f> places, bool store_samples);
 
   /// Appends the fragments of a pixel. The sum of their areas is 1 if no background is visible. Areas are exact if
   /// there are few candidates and several samples, and multiples of 1 / samples otherwise.

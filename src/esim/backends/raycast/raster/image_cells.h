@@ -7,6 +7,7 @@
 #include "esim/backends/raycast/ray_blocks.h"
 #include "esim/core/image.h"
 
+// Private to backends/raycast.
 namespace esim::inline backends::inline raycast {
 
 /// Columns or rows of a cell, from `first` to `last`; none if first > last.

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
-#include <string>
+#include <vector>
 
 #include "esim/backends/raycast/raster/fragment_shading.h"
-#include "esim/core/error.h"
+#include "esim/backends/raycast/sample_places.h"
 #include "esim/render/bands.h"
 
 namespace esim::inline backends::inline raycast {
@@ -17,7 +17,8 @@ class RasterRenderer final : public ProcessorRenderer {
   RasterRenderer(std::shared_ptr<const RaycastScene> scene, const RasterOptions& options, const Camera& camera,
                  const Workers& workers, ColourFilters filters, const PixelArea& area)
       : scene_(std::move(scene)),
-        options_(options),
+        background_(options.background),
+        places_(sample_places(options.samples_per_pixel)),
         side_(static_cast<float>(area.edges) / static_cast<float>(area.texture)),
         rays_(camera, area.texture),
         cells_(rays_, side_),
@@ -30,17 +31,9 @@ class RasterRenderer final : public ProcessorRenderer {
 
  private:
   void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
-    std::vector<Moment> moments;
-    for (const RenderRequest& request : requests) moments.emplace_back(*scene_, request);
+    const std::vector<Moment> moments = moments_of(*scene_, requests);
     render_in_bands(requests, rays_, workers_, sample, [&](std::size_t which, const Tile& band) {
-      switch (scene_->packet_size()) {
-        case 16:
-          return render_band<16>(moments[which], band, sample);
-        case 8:
-          return render_band<8>(moments[which], band, sample);
-        default:
-          return render_band<4>(moments[which], band, sample);
-      }
+      scene_->with_packet_size([&](auto K) { render_band<K.value>(moments[which], band, sample); });
     });
   }
 
@@ -49,7 +42,7 @@ class RasterRenderer final : public ProcessorRenderer {
     constexpr int kWidth = ImageCell::kWidth, kHeight = ImageCell::kHeight;
     CellSurfaces surfaces;
     const bool shadows = moment.lighting && moment.lighting->shadows;
-    Coverage coverage(options_.samples_per_pixel, shadows);
+    Coverage coverage(places_, shadows);
     FragmentShading<K> shading(*scene_, moment, side_, coverage.samples());
     std::vector<Fragment> fragments;
     for (int top = band.y / kHeight * kHeight; top < band.y + band.height; top += kHeight) {
@@ -84,15 +77,15 @@ class RasterRenderer final : public ProcessorRenderer {
         float sum = 0, area = 0;
         for (; next < fragments.size() && fragments[next].pixel == pixel; ++next)
           sum += fragments[next].area * shading.irradiance(next), area += fragments[next].area;
-        irradiance(left + column, top + row) =
-            area > 1 - kSmallestArea ? sum / area : sum + (1 - area) * options_.background;
+        irradiance(left + column, top + row) = area > 1 - kSmallestArea ? sum / area : sum + (1 - area) * background_;
       }
     }
   }
 
   std::shared_ptr<const RaycastScene> scene_;
-  RasterOptions options_;
-  float side_;  // of the square that edges are averaged over, in footprints
+  float background_;
+  std::vector<Eigen::Vector2f> places_;  // of samples in a pixel
+  float side_;                           // of the square that edges are averaged over, in footprints
   PixelRays rays_;
   ImageCells cells_;
   const Workers& workers_;
@@ -108,10 +101,6 @@ std::shared_ptr<const RaycastScene> build_raster_scene(const Scene& scene) {
 std::unique_ptr<Renderer> make_raster_renderer(std::shared_ptr<const RaycastScene> scene, const RasterOptions& options,
                                                const Camera& camera, const Workers& workers, ColourFilters filters,
                                                const PixelArea& area) {
-  const int n = options.samples_per_pixel;
-  if (n != 1 && n != 16 && n != 64) {
-    throw UserError("samples_per_pixel: " + std::to_string(n) + " is not supported; use 1, 16 or 64");
-  }
   return std::make_unique<RasterRenderer>(std::move(scene), options, camera, workers, filters, area);
 }
 

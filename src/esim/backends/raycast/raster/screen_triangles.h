@@ -7,6 +7,7 @@
 #include "esim/backends/raycast/ray_blocks.h"
 #include "esim/backends/raycast/triangle_tree.h"
 
+// Private to backends/raycast.
 namespace esim::inline backends::inline raycast {
 
 /// Closer surfaces are invisible; m.

@@ -287,9 +287,10 @@ def test_without_onnxruntime(tmp_path, monkeypatch):
 # The command, which runs models in a process of its own.
 
 
-def run_command(*arguments, **environment):
+def run_command(*arguments, cwd=None, **environment):
     environment = {**os.environ, "ESIM_PYTHON": sys.executable, **environment}
-    return subprocess.run([PROGRAM, "video", *map(str, arguments)], capture_output=True, text=True, env=environment)
+    command = [PROGRAM, "video", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, env=environment, cwd=cwd)
 
 
 needs_program = pytest.mark.skipif(not PROGRAM, reason="needs the program: ESIM_PROGRAM")
@@ -339,6 +340,15 @@ def test_the_command_refuses_what_does_not_fit(images, tmp_path):
     (tmp_path / "absent" / "onnxruntime.py").write_text("raise ImportError('No module', name='onnxruntime')")
     path = os.pathsep.join([str(tmp_path / "absent"), os.environ["PYTHONPATH"]])
     refused("model.onnx: onnxruntime is not installed; install it with `pip install onnxruntime`", PYTHONPATH=path)
+
+
+@needs_program
+def test_the_command_imports_nothing_from_the_current_folder(images, tmp_path):
+    model = make_model(tmp_path / "model.onnx")
+    for name in ("esim", "numpy", "socket"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('a file of the user')\n")
+    result = run_command(images, "--fps", FPS, "--out", tmp_path / "out", "--interpolator", model, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
 
 
 @needs_program

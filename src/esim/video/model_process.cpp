@@ -26,6 +26,12 @@ constexpr const char* kRequirements =
     "models need a Python with the package of esim (docs/install.md) and with onnxruntime (pip install onnxruntime); "
     "the environment variable ESIM_PYTHON names another Python";
 
+/// Runs the module esim.interpolators like `python3 -m`, but never what the current folder calls esim or numpy. (Python
+/// has an option for that from 3.11 on.)
+constexpr const char* kRun =
+    "import runpy, sys; sys.path = [folder for folder in sys.path if folder]; "
+    "runpy.run_module('esim.interpolators', run_name='__main__', alter_sys=True)";
+
 /// A process at the other end of a socket.
 class Process {
  public:
@@ -109,8 +115,7 @@ class ModelProcess final : public FrameInterpolator {
         width_(width),
         height_(height),
         colour_(colour),
-        process_({python_, "-m", "esim.interpolators", model_, std::to_string(width), std::to_string(height),
-                  colour ? "3" : "1"}) {
+        process_({python_, "-c", kRun, model_, std::to_string(width), std::to_string(height), colour ? "3" : "1"}) {
     std::uint32_t error_bytes = 0;
     if (!process_.receive(&error_bytes, sizeof(error_bytes))) {
       throw UserError(fmt::format("{}: {} {} before it was ready; {}", model_, python_, process_.end(), kRequirements));

@@ -76,7 +76,8 @@ void CellSurfaces::scan(const ScreenTriangle& triangle, const BearingBounds& bou
   };
   std::array<Edge, 3> edges;
   std::size_t edge_count = 0;
-  for (const OfBearing& weight : triangle.weight) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const OfBearing weight = triangle.weight(k);
     const OnRectangle range(weight, cell.bounds);
     const float error = rounding(weight, cell.extent);
     if (range.middle + range.reach < -error) return;
@@ -90,7 +91,7 @@ void CellSurfaces::scan(const ScreenTriangle& triangle, const BearingBounds& bou
   const int first_row = std::max(rows.first, part.rows.first), last_row = std::min(rows.last, part.rows.last);
   if (first_column > last_column || first_row > last_row) return;
 
-  const OfBearing& z = triangle.inverse_depth;
+  const OfBearing z = triangle.inverse_depth();
   const float z_reach = std::fabs(z.x) * cell.half_width + std::fabs(z.y) * cell.half_height + rounding(z, cell.extent);
   const V zx = hn::Set(d, z.x), zy = hn::Set(d, z.y), z1 = hn::Set(d, z.one), zr = hn::Set(d, z_reach);
   const V zero = hn::Zero(d), max = hn::Set(d, 1 / kNearestDepth);

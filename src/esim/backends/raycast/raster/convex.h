@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 
 // Private to backends/raycast: includes hwy/highway.h.
@@ -73,31 +75,34 @@ class Convex {
     return true;
   }
 
-  /// Keeps the part where f is not negative; the remainder becomes `rest`. Only if it can be cut.
-  void cut(const OfPixel& f, Convex& rest) {
+  /// Keeps the part where f is not negative; the remainder becomes `rest`. Only if it can be cut. It stays whole if f
+  /// is at least -`touch` on it, or at most `touch`.
+  void cut(const OfPixel& f, Convex& rest, float touch = 0) {
     const D d;
+    const auto low = hn::Set(d, -touch), high = hn::Set(d, touch);
     alignas(64) std::array<float, kMaxCorners> at;
     bool none_below = true, all_below = true;
+    std::uint32_t inside = 0;  // a bit for each corner
     for (std::size_t i = 0; i < count_; i += kVector) {
       const auto value = values(f, i);
       hn::Store(value, d, &at[i]);
-      const auto below = hn::Lt(value, hn::Zero(d));
-      none_below = none_below && hn::AllFalse(d, below);
-      all_below = all_below && hn::AllTrue(d, below);
+      none_below = none_below && hn::AllTrue(d, hn::Ge(value, low));
+      all_below = all_below && hn::AllTrue(d, hn::Lt(value, high));
+      std::array<std::uint8_t, 8> bits{};
+      hn::StoreMaskBits(d, hn::Ge(value, hn::Zero(d)), bits.data());
+      inside |= std::uint32_t{bits[0]} << i;
     }
     rest.count_ = 0;
     if (none_below) return;
     if (all_below) return std::swap(*this, rest);
+    const std::uint32_t all = (1U << count_) - 1, next = (inside & all) >> 1 | (inside & 1) << (count_ - 1);
+    const auto last_inside = static_cast<std::size_t>(std::countr_zero(all & inside & ~next));
+    const auto last_outside = static_cast<std::size_t>(std::countr_zero(all & ~inside & next));
+    const PixelPoint exit = between(at, last_inside), entry = between(at, last_outside);
     Convex kept;
-    for (std::size_t i = 0; i < count_; ++i) {
-      const std::size_t j = i + 1 < count_ ? i + 1 : 0;
-      (at[i] >= 0 ? kept : rest).add(s_[i], t_[i]);
-      if ((at[i] >= 0) == (at[j] >= 0)) continue;
-      const float along = at[i] / (at[i] - at[j]);
-      const float s = s_[i] + along * (s_[j] - s_[i]), t = t_[i] + along * (t_[j] - t_[i]);
-      kept.add(s, t), rest.add(s, t);
-    }
-    kept.close(), rest.close();
+    kept.add(*this, last_outside, last_inside), rest.add(*this, last_inside, last_outside);
+    kept.add(exit.s, exit.t), kept.add(entry.s, entry.t), kept.close();
+    rest.add(entry.s, entry.t), rest.add(exit.s, exit.t), rest.close();
     *this = kept;
   }
 
@@ -112,6 +117,21 @@ class Convex {
 
  private:
   void add(float s, float t) { s_[count_] = s, t_[count_] = t, ++count_; }
+
+  /// Adds the corners of a polygon after `first`, up to `last`.
+  void add(const Convex& from, std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i != last;) {
+      i = i + 1 < from.count_ ? i + 1 : 0;
+      add(from.s_[i], from.t_[i]);
+    }
+  }
+
+  /// Where a function is 0 between corner i and the next one, with different signs at both.
+  PixelPoint between(const std::array<float, kMaxCorners>& at, std::size_t i) const {
+    const std::size_t j = i + 1 < count_ ? i + 1 : 0;
+    const float along = at[i] / (at[i] - at[j]);
+    return {s_[i] + along * (s_[j] - s_[i]), t_[i] + along * (t_[j] - t_[i])};
+  }
 
   /// Repeats the first corner in the remaining lanes of the last vector.
   void close() {

@@ -9,9 +9,10 @@ namespace esim::inline backends::inline raycast {
 namespace {
 
 constexpr float kMaxInverseDepth = 1 / kNearestDepth;
-constexpr float kTouch = 1e-4F;         // px; triangles that overlap by less touch each other
+constexpr float kTouch = 1e-4F;         // px; what overlaps by less touches only
 constexpr float kSameDepth = 2e-6F;     // relative; surfaces at the same depth: the first one is visible
-constexpr std::size_t kMaxPieces = 24;  // of a fragment
+constexpr std::size_t kMaxPieces = 24;  // of a fragment, or of what is left of a pixel
+constexpr std::size_t kMaxCuts = 5;     // of a piece by a surface
 
 }  // namespace
 
@@ -31,7 +32,7 @@ SeenInMiddle Coverage::divide(const CellSurfaces& surfaces, const ImageCell& cel
   if (found.size() == 1 && found[0].fills_pixel != 0) {
     const ScreenTriangle& triangle = surfaces.triangle(found[0].triangle);
     fragments.push_back({found[0].triangle, static_cast<std::uint16_t>(pixel), {0, 0}, 1, every_sample_});
-    return {triangle.inverse_depth.at(cell.x[k], cell.y[k]), triangle.group};
+    return {triangle.inverse_depth().at(cell.x[k], cell.y[k]), triangle.group};
   }
   surfaces_ = &surfaces, cell_ = &cell, pixel_ = static_cast<std::uint16_t>(pixel);
   candidates_.clear();
@@ -65,24 +66,22 @@ const Coverage::Local& Coverage::local(std::size_t candidate) {
   for (std::size_t i = candidates_.size(); i <= candidate; ++i) {
     const ScreenTriangle& triangle = surfaces_->triangle(found(i).triangle);
     const std::size_t k = pixel_;
-    const float x = cell_->x[k], y = cell_->y[k];
-    const float dx_du = cell_->dx_du[k], dx_dv = cell_->dx_dv[k], dy_du = cell_->dy_du[k], dy_dv = cell_->dy_dv[k];
-    const auto in_pixel = [&](const OfBearing& f) {
-      return OfPixel{f.at(x, y), f.x * dx_du + f.y * dy_du, f.x * dx_dv + f.y * dy_dv};
-    };
     Local& local = candidates_.emplace_back();
-    local.inverse_depth = in_pixel(triangle.inverse_depth);
-    const float depth_reach = local.inverse_depth.reach();
-    local.nearest = std::min(local.inverse_depth.middle + depth_reach, triangle.nearest);
-    local.farthest = std::max(local.inverse_depth.middle - depth_reach, triangle.farthest);
+    const hn::FixedTag<float, 4> d;
+    const auto x = hn::Load(d, triangle.x.data()), y = hn::Load(d, triangle.y.data());
+    const auto along = [&](float dx, float dy) { return hn::MulAdd(x, hn::Set(d, dx), hn::Mul(y, hn::Set(d, dy))); };
+    const auto middle = hn::Add(along(cell_->x[k], cell_->y[k]), hn::Load(d, triangle.one.data()));
+    const auto s = along(cell_->dx_du[k], cell_->dy_du[k]), t = along(cell_->dx_dv[k], cell_->dy_dv[k]);
+    const auto reach = hn::Mul(hn::Set(d, 0.5F), hn::Add(hn::Abs(s), hn::Abs(t)));
+    hn::Store(middle, d, local.middle.data()), hn::Store(s, d, local.s.data());
+    hn::Store(t, d, local.t.data()), hn::Store(reach, d, local.reach.data());
+    local.nearest = std::min(local.middle[3] + local.reach[3], triangle.nearest);
+    local.farthest = std::max(local.middle[3] - local.reach[3], triangle.farthest);
     local.edges = 0, local.outside = false;
     local.triangle = found(i).triangle, local.group = triangle.group, local.index = triangle.index;
-    std::size_t end = 3;
-    for (const OfBearing& weight : triangle.weight) {
-      const OfPixel edge = in_pixel(weight);
-      const float reach = edge.reach();
-      local.outside = local.outside || edge.middle < -reach;
-      local.weight[edge.middle < reach ? local.edges++ : --end] = edge;
+    for (std::uint8_t e = 0; e < 3; ++e) {
+      local.outside = local.outside || local.middle[e] < -local.reach[e];
+      if (local.middle[e] < local.reach[e]) local.edge[local.edges++] = e;
     }
   }
   return candidates_[candidate];
@@ -93,8 +92,8 @@ SeenInMiddle Coverage::look_at_middle() {
   std::uint32_t index = kNone;
   for (std::size_t i = 0; i < order_.size() && nearest(i) >= seen.inverse_depth; ++i) {
     const Local& local = this->local(i);
-    const float z = local.inverse_depth.middle;
-    const bool inside = local.weight[0].middle >= 0 && local.weight[1].middle >= 0 && local.weight[2].middle >= 0;
+    const float z = local.middle[3];
+    const bool inside = local.middle[0] >= 0 && local.middle[1] >= 0 && local.middle[2] >= 0;
     if (!inside || !(z > 0) || !(z <= kMaxInverseDepth)) continue;
     if (z > seen.inverse_depth || (z == seen.inverse_depth && local.index < index))
       seen = {z, local.group}, index = local.index;
@@ -102,81 +101,100 @@ SeenInMiddle Coverage::look_at_middle() {
   return seen;
 }
 
-/// The visible parts of triangles are a partition of the pixel, so that none is left to see when their areas add up to
-/// 1. False if that takes too many polygons.
+/// Divides the pixel from front to back: each surface takes its part of what those before it have left. False if that
+/// takes too many polygons.
 bool Coverage::divide_exactly(std::vector<Fragment>& fragments) {
-  float sum = 0, sum_s = 0, sum_t = 0;
-  for (std::size_t i = 0; i < order_.size() && sum < 1 - kSmallestArea; ++i) {
+  left_.assign(1, Convex::pixel());
+  candidates_.reserve(order_.size());  // so that references to its elements remain valid
+  for (std::size_t i = 0; i < order_.size() && !left_.empty(); ++i) {
     if (i == kMaxExact) return false;
     float area = 0, s = 0, t = 0;
     if (i + 1 == order_.size() && found(i).fills_pixel != 0) {
-      area = 1 - sum, s = -sum_s, t = -sum_t;  // behind the others
-    } else {
-      if (local(i).outside) continue;
-      if (!keep_visible(i)) return false;
-      for (const Convex& piece : pieces_) piece.integrate(area, s, t);
+      for (const Convex& piece : left_) piece.integrate(area, s, t);
+      left_.clear();
+    } else if (!local(i).outside) {
+      remaining_.clear();
+      for (Convex& piece : left_) {
+        if (!take(piece, i)) return false;
+        for (const Convex& visible : visible_) visible.integrate(area, s, t);
+      }
+      std::swap(left_, remaining_);
     }
-    if (!(area > kSmallestArea)) continue;
-    fragments.push_back({found(i).triangle, pixel_, {s / area, t / area}, area});
-    sum += area, sum_s += s, sum_t += t;
+    if (area > kSmallestArea) fragments.push_back({found(i).triangle, pixel_, {s / area, t / area}, area});
   }
   return true;
 }
 
-/// Makes pieces_ the visible part of a surface. False if that takes too many polygons.
-bool Coverage::keep_visible(std::size_t self) {
-  const Local surface = local(self);  // a copy, since the list grows
-  pieces_.assign(1, Convex::pixel());
-  Convex &whole = pieces_[0], rest;
-  for (std::size_t e = 0; e < surface.edges; ++e) whole.cut(surface.weight[e], rest);
-  const OfPixel& z = surface.inverse_depth;
-  if (surface.nearest > kMaxInverseDepth) whole.cut({kMaxInverseDepth - z.middle, -z.s, -z.t}, rest);
-  if (whole.empty()) pieces_.clear();
-  const float farthest = surface.farthest;
-  for (std::size_t i = 0; i < order_.size() && nearest(i) >= farthest && !pieces_.empty(); ++i) {
-    if (i == self) continue;
+/// Makes visible_ the part of a piece that a surface covers and no other one hides; adds all others to remaining_.
+/// False if that takes too many polygons.
+bool Coverage::take(Convex& piece, std::size_t candidate) {
+  const Local& surface = local(candidate);
+  visible_.clear();
+  if (is_apart(piece, surface)) {
+    remaining_.push_back(piece);
+    return true;
+  }
+  if (!keep_covered(piece, surface, remaining_)) return false;
+  if (piece.empty()) return true;
+  visible_.push_back(piece);
+  // Surfaces are in the order of their nearest points, so that one after this may be in front of it elsewhere.
+  for (std::size_t i = candidate + 1; i < order_.size() && nearest(i) >= surface.farthest; ++i) {
     if (i == kMaxExact) return false;
     const Local& other = local(i);
-    if (!other.outside && other.nearest >= farthest && !hide(surface, other)) return false;
+    if (!other.outside && other.nearest >= surface.farthest && !hide(surface, other)) return false;
+  }
+  return remaining_.size() <= kMaxPieces;
+}
+
+/// Whether a piece is outside a surface, or touches it only.
+bool Coverage::is_apart(const Convex& piece, const Local& surface) {
+  for (std::size_t i = 0; i < surface.edges; ++i) {
+    const std::size_t e = surface.edge[i];
+    if (piece.is_below(surface.function(e), 2 * kTouch * surface.reach[e])) return true;
+  }
+  return false;
+}
+
+/// Cuts a piece down to what a surface covers; adds the others to `rests`. False if it has too many corners.
+bool Coverage::keep_covered(Convex& piece, const Local& surface, std::vector<Convex>& rests) {
+  if (!piece.can_be_cut(kMaxCuts)) return false;
+  Convex rest;
+  const auto cut = [&](const OfPixel& f, float reach) {
+    piece.cut(f, rest, 2 * kTouch * reach);
+    if (!rest.empty()) rests.push_back(rest);
+  };
+  for (std::size_t i = 0; i < surface.edges; ++i) {
+    const std::size_t e = surface.edge[i];
+    cut(surface.function(e), surface.reach[e]);
+  }
+  if (surface.nearest > kMaxInverseDepth) {
+    const OfPixel z = surface.inverse_depth();
+    cut({kMaxInverseDepth - z.middle, -z.s, -z.t}, surface.reach[3]);
   }
   return true;
 }
 
-/// Removes from the pieces of a surface what another one hides. False if too many remain.
+/// Moves the parts of visible_ that another surface hides to remaining_. False if too many polygons remain.
 bool Coverage::hide(const Local& surface, const Local& other) {
-  const OfPixel &z = surface.inverse_depth, &other_z = other.inverse_depth;
+  const OfPixel z = surface.inverse_depth(), other_z = other.inverse_depth();
   const OfPixel nearer{other_z.middle - z.middle, other_z.s - z.s, other_z.t - z.t};
-  const bool surely_nearer = other.farthest > surface.nearest;
-  bool same_depth = false;
-  const auto is_apart = [&](const Convex& piece) {
-    for (std::size_t e = 0; e < other.edges; ++e) {
-      if (piece.is_below(other.weight[e], kTouch * 2 * other.weight[e].reach())) return true;
+  const float same = kSameDepth * std::max(surface.nearest, other.nearest);
+  const std::size_t count = visible_.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    Convex piece = visible_[i];
+    if (is_apart(piece, other)) continue;
+    const bool same_depth = piece.is_near_zero(nearer, same);
+    if (same_depth ? surface.index < other.index : piece.is_below(nearer, same)) continue;
+    visible_[i] = {};
+    if (!keep_covered(piece, other, visible_)) return false;
+    if (!same_depth) {
+      Convex rest;
+      piece.cut(nearer, rest, same);
+      if (!rest.empty()) visible_.push_back(rest);
     }
-    if (surely_nearer) return false;
-    same_depth = piece.is_near_zero(nearer, kSameDepth * std::max(surface.nearest, other.nearest));
-    return same_depth ? surface.index < other.index : piece.is_below(nearer, 0);
-  };
-  if (pieces_.size() == 1 && is_apart(pieces_[0])) return true;
-  kept_.clear();
-  for (Convex& piece : pieces_) {
-    if (is_apart(piece)) {
-      kept_.push_back(piece);
-      continue;
-    }
-    constexpr std::size_t kMaxCuts = 5;
-    if (!piece.can_be_cut(kMaxCuts)) return false;
-    Convex rest;
-    const auto cut = [&](const OfPixel& f) {
-      piece.cut(f, rest);
-      if (!rest.empty()) kept_.push_back(rest);
-    };
-    for (std::size_t e = 0; e < other.edges; ++e) cut(other.weight[e]);
-    if (other.nearest > kMaxInverseDepth) cut({kMaxInverseDepth - other_z.middle, -other_z.s, -other_z.t});
-    if (!surely_nearer && !same_depth) cut(nearer);
-    if (kept_.size() > kMaxPieces) return false;
+    if (!piece.empty()) remaining_.push_back(piece);
   }
-  std::swap(pieces_, kept_);
-  return true;
+  return visible_.size() <= kMaxPieces;
 }
 
 /// Finds what each sample sees.
@@ -187,8 +205,8 @@ void Coverage::look_at_samples() {
   for (std::size_t i = 0; i < count; ++i) depth[i] = 0, index[i] = kNone, seen_[i] = kNone;
   for (std::size_t c = 0; c < order_.size(); ++c) {
     const Local& local = this->local(c);
-    const OfPixel w0 = local.weight[0], w1 = local.weight[1], w2 = local.weight[2];
-    const OfPixel z = local.inverse_depth;
+    const OfPixel w0 = local.function(0), w1 = local.function(1), w2 = local.function(2);
+    const OfPixel z = local.inverse_depth();
     const std::uint32_t local_index = local.index, id = static_cast<std::uint32_t>(c);
 #pragma omp simd
     for (std::size_t i = 0; i < count; ++i) {

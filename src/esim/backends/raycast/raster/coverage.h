@@ -48,12 +48,16 @@ class Coverage {
  private:
   /// A candidate in the pixel's coordinates.
   struct Local {
-    std::array<OfPixel, 3> weight;
-    OfPixel inverse_depth;
+    // Its weights and its inverse depth as functions of the position, and half of the ranges of their values.
+    alignas(16) std::array<float, 4> middle, s, t, reach;
     float nearest, farthest;  // bounds of the inverse depth in the pixel
-    std::size_t edges;        // the first of `weight` that cross the pixel
     bool outside;             // of the pixel
+    std::uint8_t edges;       // number of edges that cross the pixel
+    std::array<std::uint8_t, 3> edge;
     std::uint32_t triangle, group, index;
+
+    OfPixel function(std::size_t k) const { return {middle[k], s[k], t[k]}; }
+    OfPixel inverse_depth() const { return function(3); }
   };
 
   const Candidate& found(std::size_t candidate) const { return found_[order_[candidate] & 0xffffffffU]; }
@@ -61,7 +65,9 @@ class Coverage {
   const Local& local(std::size_t candidate);
   SeenInMiddle look_at_middle();
   bool divide_exactly(std::vector<Fragment>& fragments);
-  bool keep_visible(std::size_t candidate);
+  bool take(Convex& piece, std::size_t candidate);
+  static bool is_apart(const Convex& piece, const Local& surface);
+  static bool keep_covered(Convex& piece, const Local& surface, std::vector<Convex>& rests);
   bool hide(const Local& surface, const Local& other);
   void look_at_samples();
   void divide_by_samples(std::vector<Fragment>& fragments);
@@ -80,9 +86,11 @@ class Coverage {
   const ImageCell* cell_;
   std::uint16_t pixel_;
   std::span<const Candidate> found_;
-  std::vector<std::uint64_t> order_;   // the nearest first: inverse depth, and the place in found_
-  std::vector<Local> candidates_;      // the first of these
-  std::vector<Convex> pieces_, kept_;  // of the visible part of a candidate
+  std::vector<std::uint64_t> order_;  // the nearest first: inverse depth, and the place in found_
+  std::vector<Local> candidates_;     // the first of these
+  std::vector<Convex> left_;          // of the pixel, for the next candidate
+  std::vector<Convex> visible_;       // what a candidate takes of a piece
+  std::vector<Convex> remaining_;     // what it leaves
 };
 
 }  // namespace esim::inline backends::inline raycast

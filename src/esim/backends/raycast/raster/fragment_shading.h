@@ -74,9 +74,9 @@ class FragmentShading {
       const float x = cell.x[k] + cell.dx_du[k] * s + cell.dx_dv[k] * t;
       const float y = cell.y[k] + cell.dy_du[k] * s + cell.dy_dv[k] * t;
       rays.packet.bearing_x[i] = x, rays.packet.bearing_y[i] = y;
-      rays.packet.ray.ray.tfar[i] = 1 / triangle.inverse_depth.at(x, y);
-      const float w1 = triangle.weight[1].at(x, y), w2 = triangle.weight[2].at(x, y);
-      const float sum = triangle.weight[0].at(x, y) + w1 + w2, per_sum = sum > 0 ? 1 / sum : 0;
+      rays.packet.ray.ray.tfar[i] = 1 / triangle.inverse_depth().at(x, y);
+      const float w1 = triangle.weight(1).at(x, y), w2 = triangle.weight(2).at(x, y);
+      const float sum = triangle.weight(0).at(x, y) + w1 + w2, per_sum = sum > 0 ? 1 / sum : 0;
       hit.u[i] = w1 * per_sum, hit.v[i] = w2 * per_sum;
       hit.Ng_x[i] = triangle.normal[0], hit.Ng_y[i] = triangle.normal[1], hit.Ng_z[i] = triangle.normal[2];
       hit.instID[0][i] = triangle.group;

@@ -98,8 +98,9 @@ void ScreenLeaf::project(const TriangleTree::Leaf& leaf, const Eigen::Matrix3f& 
 
 ScreenTriangle ScreenLeaf::triangle(std::size_t lane) const {
   ScreenTriangle out{};
-  for (std::size_t k = 0; k < 3; ++k) out.weight[k] = {weight[k][0][lane], weight[k][1][lane], weight[k][2][lane]};
-  out.inverse_depth = {inverse_depth[0][lane], inverse_depth[1][lane], inverse_depth[2][lane]};
+  for (std::size_t k = 0; k < 3; ++k)
+    out.x[k] = weight[k][0][lane], out.y[k] = weight[k][1][lane], out.one[k] = weight[k][2][lane];
+  out.x[3] = inverse_depth[0][lane], out.y[3] = inverse_depth[1][lane], out.one[3] = inverse_depth[2][lane];
   out.farthest = farthest[lane], out.nearest = nearest[lane];
   out.normal = {normal[0][lane], normal[1][lane], normal[2][lane]};
   return out;

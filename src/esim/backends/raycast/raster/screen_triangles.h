@@ -25,12 +25,15 @@ struct OfBearing {
 /// behind the camera, a weight is negative. The weights of two triangles at their common edge are opposite, up to a
 /// power of two, so that no bearing passes between them.
 struct ScreenTriangle {
-  std::array<OfBearing, 3> weight;
-  OfBearing inverse_depth;
+  // Coefficients of its linear functions of the bearing: of the three weights, and of the inverse depth.
+  alignas(16) std::array<float, 4> x, y, one;
   float farthest, nearest;      ///< bounds of the inverse depth on the triangle
   std::array<float, 3> normal;  ///< (p1 - p0) x (p2 - p0) in the frame of its group
   std::uint32_t group;          ///< of the scene
   std::uint32_t index;          ///< in the scene
+
+  OfBearing weight(std::size_t k) const { return {x[k], y[k], one[k]}; }
+  OfBearing inverse_depth() const { return {x[3], y[3], one[3]}; }
 };
 
 /// Triangles of a leaf of a triangle tree, as a camera sees them.

@@ -53,6 +53,7 @@ class Convex {
   }
 
   bool empty() const { return count_ < 3; }
+  PixelPoint first() const { return {s_[0], t_[0]}; }  ///< corner
 
   /// Whether there is room for the corners of this many cuts.
   bool can_be_cut(std::size_t times) const { return count_ + times <= kMaxCorners; }

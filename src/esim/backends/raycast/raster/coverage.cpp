@@ -77,12 +77,12 @@ const Coverage::Local& Coverage::local(std::size_t candidate) {
     hn::Store(t, d, local.t.data()), hn::Store(reach, d, local.reach.data());
     local.nearest = std::min(local.middle[3] + local.reach[3], triangle.nearest);
     local.farthest = std::max(local.middle[3] - local.reach[3], triangle.farthest);
-    local.edges = 0, local.outside = false;
     local.triangle = found(i).triangle, local.group = triangle.group, local.index = triangle.index;
-    for (std::uint8_t e = 0; e < 3; ++e) {
-      local.outside = local.outside || local.middle[e] < -local.reach[e];
-      if (local.middle[e] < local.reach[e]) local.edge[local.edges++] = e;
-    }
+    constexpr unsigned kEdges = 7;  // without the inverse depth
+    std::array<std::uint8_t, 8> crossing{}, outside{};
+    hn::StoreMaskBits(d, hn::Lt(middle, reach), crossing.data());
+    hn::StoreMaskBits(d, hn::Lt(middle, hn::Neg(reach)), outside.data());
+    local.crossing = crossing[0] & kEdges, local.outside = (outside[0] & kEdges) != 0;
   }
   return candidates_[candidate];
 }
@@ -148,8 +148,18 @@ bool Coverage::take(Convex& piece, std::size_t candidate) {
 
 /// Whether a piece is outside a surface, or touches it only.
 bool Coverage::is_apart(const Convex& piece, const Local& surface) {
-  for (std::size_t i = 0; i < surface.edges; ++i) {
-    const std::size_t e = surface.edge[i];
+  if (piece.empty()) return true;
+  // Only an edge with a corner outside it may have all of them there.
+  const hn::FixedTag<float, 4> d;
+  const PixelPoint corner = piece.first();
+  const auto at =
+      hn::MulAdd(hn::Load(d, surface.s.data()), hn::Set(d, corner.s),
+                 hn::MulAdd(hn::Load(d, surface.t.data()), hn::Set(d, corner.t), hn::Load(d, surface.middle.data())));
+  const auto touch = hn::Mul(hn::Load(d, surface.reach.data()), hn::Set(d, 2 * kTouch));
+  std::array<std::uint8_t, 8> bits{};
+  hn::StoreMaskBits(d, hn::Le(at, touch), bits.data());
+  for (unsigned left = bits[0] & surface.crossing; left != 0; left &= left - 1) {
+    const auto e = static_cast<std::size_t>(std::countr_zero(left));
     if (piece.is_below(surface.function(e), 2 * kTouch * surface.reach[e])) return true;
   }
   return false;
@@ -163,8 +173,8 @@ bool Coverage::keep_covered(Convex& piece, const Local& surface, std::vector<Con
     piece.cut(f, rest, 2 * kTouch * reach);
     if (!rest.empty()) rests.push_back(rest);
   };
-  for (std::size_t i = 0; i < surface.edges; ++i) {
-    const std::size_t e = surface.edge[i];
+  for (unsigned left = surface.crossing; left != 0; left &= left - 1) {
+    const auto e = static_cast<std::size_t>(std::countr_zero(left));
     cut(surface.function(e), surface.reach[e]);
   }
   if (surface.nearest > kMaxInverseDepth) {

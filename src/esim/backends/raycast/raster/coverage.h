@@ -52,8 +52,7 @@ class Coverage {
     alignas(16) std::array<float, 4> middle, s, t, reach;
     float nearest, farthest;  // bounds of the inverse depth in the pixel
     bool outside;             // of the pixel
-    std::uint8_t edges;       // number of edges that cross the pixel
-    std::array<std::uint8_t, 3> edge;
+    unsigned crossing;        // a bit for each weight that is not positive in the whole pixel
     std::uint32_t triangle, group, index;
 
     OfPixel function(std::size_t k) const { return {middle[k], s[k], t[k]}; }

@@ -117,7 +117,7 @@ EventCameraOptions prophesee(EventCameraOptions o, double rate_mev_per_s, double
 }
 
 EventCameraOptions gen31_by_circuit() {
-  EventCameraOptions o = prophesee(by_circuit(25, 1, 800), 50, 0);
+  EventCameraOptions o = prophesee(by_circuit(25, 1, 800), 150, 0.18);
   o.contrast_threshold = 0.182;
   o.threshold_mismatch = 0.03;
   o.refractory_period_us = 10;

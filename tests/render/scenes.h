@@ -5,6 +5,7 @@
 #include <memory>
 #include <numbers>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "esim/backends/opengl/gl_renderer.h"
@@ -15,6 +16,7 @@
 #include "esim/backends/sprites/sprites_renderer.h"
 #include "esim/geometry/so3.h"
 #include "esim/motion/trajectory.h"
+#include "esim/render/point_spread.h"
 
 namespace esim::test {
 
@@ -157,14 +159,21 @@ inline std::vector<Kinematics> moving_objects(double t_s) {
 inline bool has_gl() { return !gl_devices().empty(); }
 
 /// The renderers that make_renderer() makes: those of a 3D scene, and those that draw on the sensor. "moving": two
-/// objects move.
-inline constexpr std::array kRenderersOfSpace = {"panorama", "plane",         "mesh", "moving_mesh",
-                                                 "raster",   "moving_raster", "gl",   "moving_gl"};
-inline constexpr std::array kRenderersOnSensor = {"sprites"};
+/// objects move; "blurred": the lens blurs.
+inline constexpr std::array kRenderersOfSpace = {
+    "panorama",      "plane", "mesh",      "moving_mesh",      "raster",
+    "moving_raster", "gl",    "moving_gl", "blurred_panorama", "moving_blurred_raster"};
+inline constexpr std::array kRenderersOnSensor = {"sprites", "blurred_sprites"};
 
 /// Every renderer on a scene that fills the view from near the origin. Those of `gl` and `sprites` ignore `area`.
 inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Camera& camera,
                                                const Workers& workers = two_threads(), const PixelArea& area = {}) {
+  constexpr std::string_view kBlurred = "blurred_";
+  if (const std::size_t at = name.find(kBlurred); at != std::string::npos) {
+    const std::string sharp = name.substr(0, at) + name.substr(at + kBlurred.size());
+    const auto make_sharp = [&](const Camera& larger) { return make_renderer(sharp, larger, workers, area); };
+    return with_point_spread(make_sharp, camera, 0.8, true, workers);
+  }
   constexpr auto kNone = ColourFilters::none;
   if (name == "panorama") {
     return make_panorama_renderer({smooth_texture(Wrap::repeat, Wrap::clamp)}, camera, workers, kNone, area.texture);

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "esim/compose/camera_renderers.h"
 #include "esim/compose/compose.h"
 #include "esim/core/engine_error.h"
 #include "esim/formats/formats.h"
-#include "esim/render/point_spread.h"
 #include "esim/sampling/make_sampler.h"
 #include "esim/scenario/read.h"
 
@@ -41,9 +41,6 @@ void check_filters(const CameraOptions& camera, const Notices& notices) {
     notices.warning(fmt::format("camera {}: {}", camera.name, line));
 }
 
-/// Whether the pixels have colour filters.
-bool sees_colour(const CameraOptions& camera) { return camera.colour != ColourFilters::none; }
-
 /// Whether any camera sees colour.
 bool sees_colour(const Scenario& scenario) {
   return std::any_of(scenario.cameras.begin(), scenario.cameras.end(),
@@ -53,52 +50,9 @@ bool sees_colour(const Scenario& scenario) {
 /// What cameras need of the scene's textures.
 SceneLook look_of(const Scenario& scenario) { return sees_colour(scenario) ? SceneLook::colour : SceneLook::luminance; }
 
-/// Makes the renderers of a camera with the blur of its lens.
-class RenderersOfLens {
- public:
-  /// `sees_more`: renderers can see more than the image. All arguments must outlive it. Throws UserError for options
-  /// that exclude each other.
-  RenderersOfLens(const RendererFactory& factory, const CameraOptions& options, const Camera& model, bool sees_more,
-                  const Workers& workers)
-      : factory_(factory), options_(options), model_(model), sees_more_(sees_more), workers_(workers) {
-    if (options.psf_px > 0 && sees_colour(options)) {
-      throw UserError(fmt::format(
-          "camera {}: psf_px: cannot be given together with colour filters; remove psf_px or colour", options.name));
-    }
-  }
-
-  /// That of the image. Throws UserError if the renderer does not support the colour filters.
-  std::unique_ptr<Renderer> make() const {
-    try {
-      return make(model_, std::nullopt);
-    } catch (const EngineError&) {
-      throw;
-    } catch (const UserError& error) {
-      if (!sees_colour(options_) && options_.psf_px == 0) throw;
-      throw UserError(fmt::format("camera {}: {}", options_.name, error.what()));
-    }
-  }
-
-  /// That of a denser image of the same view; null if its pixels cannot average over `area`.
-  std::unique_ptr<Renderer> make(const Camera& camera, const std::optional<PixelArea>& area) const {
-    const auto make_sharp = [&](const Camera& image) -> std::unique_ptr<Renderer> {
-      if (!area) return factory_.make(image, options_.colour, workers_);
-      return factory_.make_with_area ? factory_.make_with_area(image, *area, workers_) : nullptr;
-    };
-    return with_point_spread(make_sharp, camera, options_.psf_px * camera.fx / model_.fx, sees_more_, workers_);
-  }
-
- private:
-  const RendererFactory& factory_;
-  const CameraOptions& options_;
-  const Camera& model_;
-  bool sees_more_;
-  const Workers& workers_;
-};
-
 std::unique_ptr<Sampler> build_sampler(const CameraOptions& options, const EventCameraOptions& sensor,
                                        const World& world, std::size_t index, Renderer& renderer,
-                                       const RenderersOfLens& renderers) {
+                                       const CameraRenderers& renderers) {
   const Workers& workers = *world.workers;
   const Camera& model = world.info.cameras[index].model;
   const SensorTraits traits{sensor.min_threshold(), sensor.dark_light(), sees_colour(options)};
@@ -290,7 +244,7 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
     const Camera& model = world.info.cameras[i].model;
     const EventCameraOptions sensor = event_camera_of(scenario, options);
     const bool sees_more = !substitutes.make_renderer && engine_objects(scenario.renderer) == nullptr;
-    const RenderersOfLens renderers(make_renderer, options, model, sees_more, *world.workers);
+    const CameraRenderers renderers(make_renderer, options, model, sees_more, *world.workers);
     std::unique_ptr<Renderer> renderer = renderers.make();
     std::unique_ptr<Sampler> sampler = build_sampler(options, sensor, world, i, *renderer, renderers);
     world.cameras.push_back({std::move(renderer), std::move(sampler), std::nullopt, {}});

@@ -46,6 +46,7 @@ struct CameraOptions {
   std::optional<double> horizontal_fov_deg;
   std::optional<double> fx, fy, cx, cy;
   DistortionOptions distortion;
+  double fill_factor = 1;
   double psf_px = 0;
   PoseOptions T_body_camera;
   ColourFilters colour = ColourFilters::none;

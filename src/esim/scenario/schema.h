@@ -48,6 +48,8 @@ void describe(Visitor& visit, CameraOptions& o) {
   visit("cx", o.cx, About{"principal point, column (default: the middle)", "px", -1e6, 1e6});
   visit("cy", o.cy, About{"principal point, row (default: the middle)", "px", -1e6, 1e6});
   visit("distortion", o.distortion, About{"distortion of the lens"});
+  visit("fill_factor", o.fill_factor,
+        About{"the part of a pixel's area that sees light, a square in its middle", "", 0.01, 1});
   visit("psf_px", o.psf_px,
         About{"blur of the lens: standard deviation of its Gaussian point spread function; 0: none", "px", 0, 10});
   visit("T_body_camera", o.T_body_camera, About{"pose of the camera (x right, y down, z forward) in the body"});

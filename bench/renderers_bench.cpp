@@ -38,13 +38,35 @@ void sprites(benchmark::State& state) {
   bench::render_frames(state, *make_sprites_renderer(scene, kCamera, workers), kCamera, test::moving_camera());
 }
 
+/// How pixels average: the argument `engine` of the benchmarks of meshes.
+enum Engine : std::int64_t { kOneRay, kRaysAtEdges, kRaster };
+
+/// Renderers of a mesh, whose scenes are built once each.
+class MeshRenderers {
+ public:
+  explicit MeshRenderers(Mesh mesh) : scene_(still_scene(std::move(mesh))) {}
+
+  std::unique_ptr<Renderer> make(std::int64_t engine, const Workers& workers) {
+    if (engine == kRaster) {
+      if (raster_ == nullptr) raster_ = build_raster_scene(scene_);
+      return make_raster_renderer(raster_, {}, kCamera, workers);
+    }
+    if (raycast_ == nullptr) raycast_ = build_raycast_scene(scene_);
+    return make_raycast_renderer(raycast_, {.samples_per_pixel = engine == kOneRay ? 1 : 16}, kCamera, workers);
+  }
+
+ private:
+  Scene scene_;
+  std::shared_ptr<const RaycastScene> raycast_, raster_;
+};
+
 void mesh_file(benchmark::State& state, const std::filesystem::path& file, const Eigen::Vector3d& position) {
   if (!std::filesystem::exists(file)) return state.SkipWithError("the scene file is missing");
   const Workers workers(static_cast<int>(state.range(0)));
-  const auto scene = build_raycast_scene(still_scene(load_mesh(file, [](const std::string&) {})));
+  MeshRenderers renderers(load_mesh(file, [](const std::string&) {}));
   Kinematics camera = test::moving_camera();
   camera.T_world_body.translation = position;
-  bench::render_frames(state, *make_raycast_renderer(scene, {}, kCamera, workers), kCamera, camera);
+  bench::render_frames(state, *renderers.make(state.range(1), workers), kCamera, camera);
 }
 
 void room(benchmark::State& state) {
@@ -70,15 +92,15 @@ void moving_objects(benchmark::State& state) {
   bench::render_frames(state, *renderer, kCamera, test::moving_camera(), 1, objects);
 }
 
-/// Arguments: threads, triangles in thousands, tiles (every how manieth of 32 x 20 pixels).
+/// Arguments: threads, engine, triangles in thousands, tiles (every how manieth of 32 x 20 pixels).
 void generated_room(benchmark::State& state) {
   const Workers workers(static_cast<int>(state.range(0)));
-  static std::map<std::int64_t, std::shared_ptr<const RaycastScene>> scenes;  // built once each
-  auto& scene = scenes[state.range(1)];
-  if (scene == nullptr)
-    scene = build_raycast_scene(still_scene(bench::generated_room(static_cast<int>(1000 * state.range(1)))));
-  const auto renderer = make_raycast_renderer(scene, {}, kCamera, workers);
-  bench::render_frames(state, *renderer, kCamera, test::moving_camera(), static_cast<int>(state.range(2)));
+  static std::map<std::int64_t, MeshRenderers> rooms;
+  const std::int64_t thousands = state.range(2);
+  if (!rooms.contains(thousands))
+    rooms.emplace(thousands, MeshRenderers(bench::generated_room(static_cast<int>(1000 * thousands))));
+  const auto renderer = rooms.at(thousands).make(state.range(1), workers);
+  bench::render_frames(state, *renderer, kCamera, test::moving_camera(), static_cast<int>(state.range(3)));
 }
 
 /// The same with OpenGL on the default device. Arguments: triangles in thousands, tiles.
@@ -110,8 +132,12 @@ void shadows_gl(benchmark::State& state) {
 BENCHMARK(panorama)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(plane)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(sprites)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
-BENCHMARK(room)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
-BENCHMARK(flying_room)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+void threads_and_engines(benchmark::internal::Benchmark* benchmark) {
+  benchmark->ArgNames({"threads", "engine"})->ArgsProduct({{1, 2}, {kOneRay, kRaysAtEdges, kRaster}});
+  benchmark->UseRealTime()->Unit(benchmark::kMillisecond);
+}
+BENCHMARK(room)->Apply(threads_and_engines);
+BENCHMARK(flying_room)->Apply(threads_and_engines);
 
 BENCHMARK(moving_objects)
     ->ArgNames({"threads", "objects"})
@@ -119,9 +145,9 @@ BENCHMARK(moving_objects)
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(generated_room)
-    ->ArgNames({"threads", "thousands", "nth_tile"})
-    ->ArgsProduct({{1, 2}, {10, 127, 1000}, {1}})
-    ->Args({1, 127, 10})
+    ->ArgNames({"threads", "engine", "thousands", "nth_tile"})
+    ->ArgsProduct({{1, 2}, {kOneRay, kRaysAtEdges, kRaster}, {10, 127, 1000}, {1}})
+    ->ArgsProduct({{1}, {kOneRay, kRaysAtEdges, kRaster}, {127}, {10}})
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 

@@ -18,7 +18,7 @@ RAYS = (1, 16, 64)
 def render(rays, folder):
     """The first frame of the room's scenario, as rows of grey values."""
     out = pathlib.Path(folder) / str(rays)
-    settings = {"renderer.samples_per_pixel": rays, "start_s": 1.5, "duration_s": 0.01, "output.preview": "false"}
+    settings = {"renderer.engine": "raycast", "renderer.samples_per_pixel": rays, "start_s": 1.5, "duration_s": 0.01, "output.preview": "false"}
     arguments = [argument for key, value in settings.items() for argument in ("--set", f"{key}={value}")]
     subprocess.run([ROOT / "build/release/esim", "simulate", ROOT / "scenes/room.yaml", "--out", out, "--quiet", *arguments], check=True)
     return read_grey_png(out / "images" / "000000.png")

@@ -219,7 +219,7 @@ class Recordings(Cli):
             self.assertEqual(result.returncode, 0, result.stderr)
             reports[engine] = json.loads((out / "report.json").read_text())["cameras"][0]
         self.assertIn("OpenGL", reports["gl"]["renderer"])
-        self.assertEqual(reports["raycast"]["renderer"], "mesh")
+        self.assertEqual(reports["raycast"]["renderer"], "mesh (raycast)")
         events = [reports[engine]["events"] for engine in ("gl", "raycast")]
         self.assertLess(abs(events[0] / events[1] - 1), 0.1)
         self.assert_refused(run("check", room, "--set", "renderer.engine=gl", "--set", "renderer.gl_device=30"),

@@ -48,22 +48,31 @@ auto without_edges(const Make& make) {
 
 // One overload per type of renderer (scenario/renderer_options.h).
 
-/// OpenGL if there is a graphics card and no camera sees colour.
-MeshEngine choose_engine(const MeshRendererOptions& options, bool colour) {
-  if (options.engine != MeshEngine::automatic) return options.engine;
-  if (colour) return MeshEngine::raycast;
+/// Whether OpenGL is preferable: if there is a graphics card and no camera sees colour.
+bool prefers_gl(bool colour) {
+  if (colour) return false;
   const std::vector<GlDevice> devices = gl_devices();
-  const bool hardware = std::any_of(devices.begin(), devices.end(), [](const GlDevice& d) { return !d.software; });
-  return hardware ? MeshEngine::gl : MeshEngine::raycast;
+  return std::any_of(devices.begin(), devices.end(), [](const GlDevice& device) { return !device.software; });
+}
+
+/// The engine on the processor that suits the scene. Rays are faster if there are many triangles in each pixel, or if
+/// one ray per pixel is enough (bench_renderers).
+MeshEngine choose_for_processor(const MeshRendererOptions& options, const Scene& scene) {
+  constexpr std::size_t kMostTriangles = 200'000;
+  std::size_t triangles = 0;
+  for (const SceneObject& object : scene.objects) triangles += object.mesh.triangles.size();
+  return options.samples_per_pixel > 1 && triangles <= kMostTriangles ? MeshEngine::raster : MeshEngine::raycast;
 }
 
 RendererFactory factory(const MeshRendererOptions& options, const SceneFile& file, bool colour) {
-  const MeshEngine engine = choose_engine(options, colour);
+  MeshEngine engine = options.engine;
+  if (engine == MeshEngine::automatic) engine = prefers_gl(colour) ? MeshEngine::gl : MeshEngine::processor;
+  if (engine == MeshEngine::processor) engine = choose_for_processor(options, file.scene);
   if (engine == MeshEngine::gl) {
     const GlOptions gl{static_cast<float>(options.background), options.samples_per_pixel, options.gl_device};
     return {[gl, scene = std::make_shared<const Scene>(file.scene)](const Camera& camera, ColourFilters filters,
                                                                     const Workers&) {
-      refuse(filters, "engine: gl", "engine: raycast");
+      refuse(filters, "engine: gl", "engine: processor");
       return make_gl_renderer(*scene, gl, camera);
     }};
   }

@@ -35,9 +35,12 @@ struct RendererTraits {
   bool at_infinity = false;                     ///< all surfaces are infinitely far away
   bool on_sensor = false;  ///< drawn on the sensor: the camera's pose, twist and lens have no effect
   std::string device{};    ///< that it runs on; empty for the processor
+  std::string engine{};    ///< on the processor, if there are several
 
   /// A name to display.
-  std::string label() const { return device.empty() ? name : name + " on " + device; }
+  std::string label() const {
+    return name + (engine.empty() ? "" : " (" + engine + ")") + (device.empty() ? "" : " on " + device);
+  }
 };
 
 /// An evaluation in progress. It must be destroyed before its renderer; finish() may be omitted if the result is not

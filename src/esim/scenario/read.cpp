@@ -92,8 +92,7 @@ void check_filters(const CameraOptions& camera, const YAML::Node& node, const st
 SamplingOptions usual_sampling(const RendererOptions& renderer, bool described) {
   if (engine_objects(renderer) != nullptr) return KeyframeSampling{};
   const auto* const mesh = std::get_if<MeshRendererOptions>(&renderer);
-  const bool tiles =
-      described && (mesh == nullptr || mesh->engine == MeshEngine::raycast || mesh->engine == MeshEngine::raster);
+  const bool tiles = described && (mesh == nullptr || on_processor(mesh->engine));
   if (tiles) return AdaptiveSampling{};
   return FlowSampling{};
 }

@@ -86,12 +86,15 @@ void describe(Visitor& visit, LambertOptions& o) {
 using LightingOptions = std::variant<UnlitOptions, LambertOptions>;
 
 /// The renderer of triangles.
-enum class MeshEngine { raycast, raster, gl, automatic };
+enum class MeshEngine { processor, raycast, raster, gl, automatic };
+
+/// Whether it certainly runs on the processor.
+inline bool on_processor(MeshEngine engine) { return engine != MeshEngine::gl && engine != MeshEngine::automatic; }
 
 /// Triangles.
 struct MeshRendererOptions {
   static constexpr const char* kType = "mesh";
-  MeshEngine engine = MeshEngine::raycast;
+  MeshEngine engine = MeshEngine::processor;
   std::optional<int> gl_device;
   std::filesystem::path scene;
   double time_scale = 1.0;
@@ -104,8 +107,9 @@ struct MeshRendererOptions {
 template <class Visitor>
 void describe(Visitor& visit, MeshRendererOptions& o) {
   visit("engine", o.engine,
-        About{"raycast: Embree; raster: exact coverage of pixels; gl: OpenGL; auto: gl if there is a graphics card, "
-              "raycast otherwise"});
+        About{"raycast: Embree; raster: exact coverage of pixels; processor: raster if samples_per_pixel is above 1 and "
+              "the scene has at most 200,000 triangles, raycast otherwise; gl: OpenGL; auto: gl if there is a graphics "
+              "card, processor otherwise"});
   visit("gl_device", o.gl_device,
         About{"index of the graphics device, from 0 (default: the first hardware device)", "", 0, 31});
   visit("scene", o.scene,
@@ -348,7 +352,7 @@ inline constexpr std::array<const char*, 4> kEnumNames<SpriteBeyond>{"nothing", 
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<SpriteInterpolation>{"spline", "linear"};
 template <>
-inline constexpr std::array<const char*, 4> kEnumNames<MeshEngine>{"raycast", "raster", "gl", "auto"};
+inline constexpr std::array<const char*, 5> kEnumNames<MeshEngine>{"processor", "raycast", "raster", "gl", "auto"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<BlenderEngine>{"cycles", "eevee"};
 template <>

@@ -89,7 +89,7 @@ class RaycastRenderer final : public ProcessorRenderer {
   }
 
   RendererTraits traits() const override {
-    return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false};
+    return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false, .engine = "raycast"};
   }
 
  private:

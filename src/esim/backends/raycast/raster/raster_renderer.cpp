@@ -26,7 +26,7 @@ class RasterRenderer final : public ProcessorRenderer {
         mosaic_(filters == ColourFilters::rggb && scene_->has_colours()) {}
 
   RendererTraits traits() const override {
-    return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false};
+    return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false, .engine = "raster"};
   }
 
  private:

@@ -62,22 +62,26 @@ uniform uint object;
 layout(location = 0) out vec4 seen;
 layout(location = 1) out uint which;
 
-// Mean over the pixel's footprint, as in Texture::sample(): up to four probes along the footprint's longer side, each
-// between two levels of the mip pyramid. The anisotropic filters of drivers differ.
+// Mean over the pixel's footprint, a parallelogram with the sides dx and dy, by probes on one level of the mip pyramid.
+// In squares of widths, which are 12 times the variance, its texels average over 1 and their interpolation over 2; that
+// of level 0 belongs to the image. The probes supply the rest: n of them at a distance s have the square width
+// (n^2 - 1) s^2. The anisotropic filters of drivers differ.
 float mean_colour(sampler2D image) {
-  const float max_probes = 4;
   vec2 size = vec2(textureSize(image, 0)), dx = dFdx(uv), dy = dFdy(uv);
-  float x = length(dx * size), y = length(dy * size);
-  float major = min(max(x, y), 1e6), minor = max(min(x, y), 1e-6);
-  float probes = clamp(ceil(min(major, major / minor) - 0.25), 1, max_probes);
-  float lod = min(log2(max(max(major / probes, minor), 1)), float(textureQueryLevels(image) - 1));
-  vec2 along = x >= y ? dx : dy;
+  vec2 sides = clamp(vec2(length(dx * size), length(dy * size)), 1e-6, 1e6);
+  float major = max(sides.x, sides.y), minor = min(sides.x, sides.y);
+  float level = clamp(floor(log2(max(minor / 2, major / 8))), 0, float(textureQueryLevels(image) - 1));
+  float texel = exp2(level), blur = 3 * (1 - 1 / (texel * texel));
+  vec2 widths = sqrt(max(sides * sides / (texel * texel) - blur, 0));
+  vec2 probes = min(ceil(widths) + 1, 17);
+  vec2 distances = widths / sqrt(max(probes * probes - 1, 1)) * texel / sides;  // in sides
   float sum = 0;
-  for (float probe = 0; probe < probes; ++probe) {
-    vec2 at = uv + ((probe + 0.5) / probes - 0.5) * along;
-    sum += mix(textureLod(image, at, floor(lod)).r, textureLod(image, at, floor(lod) + 1).r, fract(lod));
+  for (float j = 0; j < probes.y; ++j) {
+    vec2 row = uv + (j - 0.5 * (probes.y - 1)) * distances.y * dy;
+    for (float i = 0; i < probes.x; ++i)
+      sum += textureLod(image, row + (i - 0.5 * (probes.x - 1)) * distances.x * dx, level).r;
   }
-  return sum / probes;
+  return sum / (probes.x * probes.y);
 }
 
 float light_on_surface() {

@@ -14,19 +14,18 @@
 namespace esim::inline backends::inline raycast {
 namespace {
 
-/// The square over which pixels average, and the footprint of rays on textures. A single ray filters its surface with
-/// the triangle of bilinear interpolation between texels of a pixel's size, whose variance is 1/6 of a squared pixel.
-/// Rays spread over the pixel have the variance 1/12, and each covers half the area to supply the rest, so that
-/// surfaces do not suddenly become sharper when an edge enters a pixel. If edges are averaged over less than the
-/// footprint, the mean over the footprint is equally sharp.
+/// The square over which edges are averaged, and the footprint of rays on textures. A single ray averages its texture
+/// over the complete footprint. Rays spread over a smaller square each cover the rest of the footprint's variance, or
+/// their part of the square, so that surfaces are equally sharp whether an edge enters a pixel or not.
 struct Area {
   float side;  // of the square, in footprints
 
   explicit Area(const PixelArea& area) : side(static_cast<float>(area.edges) / static_cast<float>(area.texture)) {}
 
-  /// In footprints: the footprint of a ray on a texture, for a single ray and for one of many.
-  float alone() const { return std::sqrt(0.5F * (1 + side * side)); }
-  static float together() { return 0.70710678F; }
+  /// The footprint of one of `count` rays in a pixel, in footprints of a single ray.
+  float of_one_of(std::size_t count) const {
+    return std::sqrt(std::max(1 - side * side, side * side / static_cast<float>(count)));
+  }
 };
 
 /// The triangles of a group that a cell of the image may see.
@@ -151,7 +150,7 @@ class RaycastRenderer final : public ProcessorRenderer {
                     Sample& sample) const {
     for (Work<K>& work : batch) trace(moment, views, {0, 0}, work.rays);
     for (Work<K>& work : batch) store_geometry(work, band, sample);
-    shading_.shade<K>(moment, batch, area_.alone());
+    shading_.shade<K>(moment, batch, 1);
     if (places_.size() > 1) smooth_edges<K>(moment, views, batch);
     for (Work<K>& work : batch) store(work, work.rays.irradiance.data(), band, sample.irradiance);
   }
@@ -216,7 +215,7 @@ class RaycastRenderer final : public ProcessorRenderer {
   template <int K>
   void look_closer(const Moment& moment, std::span<const CellView> views, std::span<EdgeWork<K>> edges) const {
     for (EdgeWork<K>& edge : edges) trace(moment, views, {0, 0}, edge.rays);
-    shading_.shade<K>(moment, edges, Area::together());
+    shading_.shade<K>(moment, edges, area_.of_one_of(places_.size()));
     for (EdgeWork<K>& edge : edges) {
       const float sum = std::accumulate(edge.rays.irradiance.begin(), edge.rays.irradiance.end(), 0.0F);
       edge.pixel->rays.irradiance[edge.lane] += sum / static_cast<float>(places_.size());

@@ -52,7 +52,7 @@ class Shading {
   Shading(const RaycastScene& scene, float background) : scene_(scene), background_(background) {}
 
   /// Processes the rays in stages, so that memory for a stage arrives while other rays are in the previous one. Each
-  /// ray covers `footprint` pixels along each side.
+  /// ray covers `footprint` of the footprint's sides.
   template <int K, typename W>
   void shade(const Moment& moment, std::span<W> batch, float footprint) const {
     GroupRotations<K> rotations;

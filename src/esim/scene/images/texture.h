@@ -9,6 +9,11 @@
 #include <vector>
 
 #include "esim/core/image.h"
+#include "esim/scene/images/box_filter.h"
+
+namespace cv {
+class Mat;
+}
 
 namespace esim::inline scene {
 
@@ -24,9 +29,12 @@ struct TextureLookup {
   alignas(64) std::array<float, K> du_dy, dv_dy;  // change of (u, v) over one pixel downwards
 };
 
-/// A linear-light image that can be averaged over a pixel's footprint: a mip pyramid, sampled trilinearly at up to
-/// kMaxProbes positions along the longer side of the footprint, so that there is no aliasing at large distances or
-/// grazing angles.
+/// A linear-light image that can be averaged over a pixel's footprint, a parallelogram. Between its texels, the image
+/// is interpolated bilinearly; docs/methods/rendering.md has the filter and its accuracy.
+///
+/// A pyramid holds the image at resolutions that decrease by sqrt(2). On one of its levels, the filter has 4 x 4 taps,
+/// with the widths of the footprint along u and v; a long or slanted footprint takes several such probes along its
+/// longer side. All weights are >= 0, so that nothing rings around bright light.
 ///
 /// Since rendering is limited by memory bandwidth, a texel is stored in 16 bits: an unsigned floating-point number with
 /// 11 bits of mantissa, relative to the brightest texel. The relative error is at most 2^-12, far below that of 8-bit
@@ -50,52 +58,85 @@ class Texture {
   Image<float> texels() const;
 
  private:
-  static constexpr int kMaxLevels = 18;
-  static constexpr int kMaxProbes = 4;
+  static constexpr int kMaxLevels = 36;
+  static constexpr int kMaxProbes = 8;
+
+  // Texels that continue a level beyond its edges: as far as any tap reaches.
+  static constexpr int kBefore = 3, kAfter = 4;
 
   // A code is the upper 16 bits of value / scale_ as a float, without those that are the same in all: see encode().
   static constexpr int kCodeShift = 12;
   static constexpr std::uint32_t kCodeBias = 96U << 23;
 
+  // Footprints are measured by squares of widths, in texels: 12 times the variance, that is w^2 for a box of width w.
+  // A footprint of the square width kWidestBox2 or more is filtered on a coarser level.
+  static constexpr float kBlend = 0.1F;     // the part of the range of a level in which it is blended with the next
+  static constexpr float kFirstLevel2 = 9;  // below the square widths of that part, on the first level
+  static constexpr float kReduction2 = 2;   // of the second level
+
   /// The mip levels that the lanes of a vector sample.
   template <class V, class I>
   struct Grid {
-    V width, height;       // texels
-    I offset, row_stride;  // bytes
+    V width, height;               // texels
+    V squared_u, squared_v, blur;  // squares of its width and height over those of level 0; see level_blur_
+    I offset, row_stride;          // bytes
+  };
+
+  /// The second moments of footprints, times 12, in square texels of level 0.
+  template <class V>
+  struct Moments {
+    V uu, uv, vv;
   };
 
   /// The footprints of pixels on the texture.
   template <class V>
   struct Footprint {
-    V step_u, step_v;     // the longer side
-    V probes, per_probe;  // along it; 1 / probes
-    V lod;                // level of the mip pyramid
+    V width2_u, width2_v;  // square widths of a probe, in texels of level 0
+    V step_u, step_v;      // from one probe to the next
+    V probes, per_probe;   // 1 / probes
+    V lod;                 // level of the pyramid
   };
 
+  template <class V>
+  struct TwoOf {
+    V first, second;
+  };
+
+  void append(const cv::Mat& level);
+  cv::Mat reduced(const cv::Mat& image) const;
   std::uint16_t encode(float value) const;
   template <class D, class Lookup>
-  auto sides2(D d, const Lookup& at, std::size_t i) const;
-  template <class D, class Lookup>
-  auto largest_side2(D d, const Lookup& at, std::size_t i) const;
-  template <class D, class Lookup>
-  auto footprint(D d, const Lookup& at, std::size_t i) const;
+  auto moments(D d, const Lookup& at, std::size_t i) const;
+  template <class D, class V>
+  Footprint<V> footprint(D d, const Moments<V>& moments) const;
   template <class D, class I>
   auto grid(D d, I level) const;
   template <class D, class V>
   static V binary_logarithm(D d, V x);
   template <class D, class V>
   static auto to_integer(D d, V x);
-  template <class D, class V, class I>
-  V bilinear(D d, V u, V v, const Grid<V, I>& on) const;
   template <class D, class V>
-  static V wrapped(D d, V coordinate, Wrap wrap);
+  V interpolated(D d, V u, V v) const;
+  template <class D, class V, class I>
+  V mean(D d, const Footprint<V>& footprint, V u, V v, const Grid<V, I>& on) const;
+  template <class D, class W>
+  static auto decoded(D d, W words);
+  template <class D, class I>
+  auto two_texels(D d, I position) const;
+  template <class D>
+  auto words(D d, const std::int32_t* bytes) const;
+  template <class D, class I>
+  auto four_texels(D d, I position) const;
+  template <class D, class V>
+  static void locate(D d, V coordinate, V size, Wrap wrap, V& first, V& t);
 
   Wrap wrap_u_, wrap_v_;
   int levels_ = 0;
   float scale_ = 1;
-  std::array<float, kMaxLevels> level_width_{}, level_height_{};
+  std::array<float, kMaxLevels> level_width_{}, level_height_{}, level_squared_u_{}, level_squared_v_{};
+  std::array<float, kMaxLevels> level_blur_{};  // what the square width of the taps leaves to the level's texels
   std::array<std::int32_t, kMaxLevels> level_offset_{}, level_stride_{};  // bytes
-  std::vector<std::uint16_t> codes_;  // all levels, row-major; each row and column is followed by its continuation
+  std::vector<std::uint16_t> codes_;  // all levels, row-major, with their continuations
 };
 
 template <int K>
@@ -105,105 +146,118 @@ std::array<float, K> Texture::sample(const TextureLookup<K>& at, std::uint32_t l
   using V = hn::Vec<decltype(d)>;
   constexpr std::size_t kVector = hn::MaxLanes(decltype(d)());
   const hn::RebindToSigned<decltype(d)> di;
-  const V zero = hn::Zero(d), one = hn::Set(d, 1.0F);
+  const V zero = hn::Zero(d);
   alignas(64) std::array<float, K> result;
 
-  const auto skips = [lanes](std::size_t i) { return (lanes >> i & ((std::uint64_t{1} << kVector) - 1)) == 0; };
-
-  V largest2 = zero;
-  for (std::size_t i = 0; i < K; i += kVector) largest2 = hn::Max(largest2, largest_side2(d, at, i));
-  if (hn::AllTrue(d, hn::Le(largest2, one))) {
-    // Close view: footprints within a texel, where the general code gives the same result.
-    const auto finest = grid(d, hn::Zero(di));
+  const auto for_each_vector = [lanes](const auto& function) {
     for (std::size_t i = 0; i < K; i += kVector) {
-      if (skips(i)) continue;
-      const V u = wrapped(d, hn::Load(d, &at.u[i]), wrap_u_), v = wrapped(d, hn::Load(d, &at.v[i]), wrap_v_);
-      hn::Store(hn::Mul(bilinear(d, u, v, finest), hn::Set(d, scale_)), d, &result[i]);
+      if ((lanes >> i & ((std::uint64_t{1} << kVector) - 1)) != 0) function(i);
     }
+  };
+  std::array<Moments<V>, K / kVector> spreads;
+  V widest = zero;
+  for (std::size_t i = 0; i < K; i += kVector) {
+    Moments<V>& spread = spreads[i / kVector];
+    spread = moments(d, at, i);
+    widest = hn::Max(widest, hn::Max(spread.uu, spread.vv));
+  }
+  if (hn::AllTrue(d, hn::Lt(widest, hn::Set(d, 0.99F * kNarrowBox2)))) {
+    // Close view: here the general code gives the same result.
+    for_each_vector([&](std::size_t i) {
+      const V value = interpolated(d, hn::Load(d, &at.u[i]), hn::Load(d, &at.v[i]));
+      hn::Store(hn::Mul(value, hn::Set(d, scale_)), d, &result[i]);
+    });
     return result;
   }
 
   // First for all vectors, so that none waits for another.
   std::array<Footprint<V>, K / kVector> footprints;
-  for (std::size_t i = 0; i < K; i += kVector) footprints[i / kVector] = footprint(d, at, i);
-  for (std::size_t i = 0; i < K; i += kVector) {
-    if (skips(i)) continue;
+  for (std::size_t i = 0; i < K; i += kVector) footprints[i / kVector] = footprint(d, spreads[i / kVector]);
+  for_each_vector([&](std::size_t i) {
     const Footprint<V>& f = footprints[i / kVector];
-    const V at_u = hn::Load(d, &at.u[i]), at_v = hn::Load(d, &at.v[i]);
-    const auto finer = to_integer(d, hn::Floor(f.lod));
-    const auto coarser = hn::Min(hn::Add(finer, hn::Set(di, 1)), hn::Set(di, levels_ - 1));
-    const V fraction = hn::Sub(f.lod, hn::Floor(f.lod));
-    const bool blend = !hn::AllTrue(d, hn::Eq(fraction, zero));
-    const auto fine = grid(d, finer), coarse = grid(d, coarser);
-
-    const float max_probes = hn::GetLane(hn::MaxOfLanes(d, f.probes));
-    V sum = zero;
-    for (float probe = 0; probe < max_probes; ++probe) {
-      const V offset = hn::Sub(hn::Mul(hn::Set(d, probe + 0.5F), f.per_probe), hn::Set(d, 0.5F));
-      const V u = wrapped(d, hn::MulAdd(offset, f.step_u, at_u), wrap_u_);
-      const V v = wrapped(d, hn::MulAdd(offset, f.step_v, at_v), wrap_v_);
-      V value = bilinear(d, u, v, fine);
-      if (blend) value = hn::MulAdd(fraction, hn::Sub(bilinear(d, u, v, coarse), value), value);
-      sum = hn::MulAdd(hn::IfThenElseZero(hn::Lt(hn::Set(d, probe), f.probes), f.per_probe), value, sum);
+    const V u = hn::Load(d, &at.u[i]), v = hn::Load(d, &at.v[i]);
+    const V level = hn::Floor(f.lod);
+    const auto finer = to_integer(d, level);
+    V value = mean(d, f, u, v, grid(d, finer));
+    const V fraction = hn::Mul(hn::Sub(hn::Sub(f.lod, level), hn::Set(d, 1 - kBlend)), hn::Set(d, 1 / kBlend));
+    if (!hn::AllTrue(d, hn::Le(fraction, zero))) {
+      const auto coarser = hn::Min(hn::Add(finer, hn::Set(di, 1)), hn::Set(di, levels_ - 1));
+      value = hn::MulAdd(hn::Max(fraction, zero), hn::Sub(mean(d, f, u, v, grid(d, coarser)), value), value);
     }
-    hn::Store(hn::Mul(sum, hn::Set(d, scale_)), d, &result[i]);
-  }
+    hn::Store(hn::Mul(value, hn::Set(d, scale_)), d, &result[i]);
+  });
   return result;
 }
 
-/// Squares of the sides of the footprints of the lanes from i on, texels: rightwards and downwards.
+/// For the lanes from i on. With the sides a and b of a footprint, a parallelogram, these are a a^T + b b^T.
 template <class D, class Lookup>
-auto Texture::sides2(D d, const Lookup& at, std::size_t i) const {
-  namespace hn = hwy::HWY_NAMESPACE;
-  const auto squared_length = [&](const auto& du, const auto& dv) {
-    const auto a = hn::Mul(hn::Load(d, &du[i]), hn::Set(d, level_width_[0]));
-    const auto b = hn::Mul(hn::Load(d, &dv[i]), hn::Set(d, level_height_[0]));
-    return hn::MulAdd(a, a, hn::Mul(b, b));
-  };
-  return std::pair(squared_length(at.du_dx, at.dv_dx), squared_length(at.du_dy, at.dv_dy));
-}
-
-template <class D, class Lookup>
-auto Texture::largest_side2(D d, const Lookup& at, std::size_t i) const {
-  const auto [x2, y2] = sides2(d, at, i);
-  return hwy::HWY_NAMESPACE::Max(x2, y2);
-}
-
-/// For the lanes from i on: probes lie along the longer side, the shorter side sets the blur.
-template <class D, class Lookup>
-auto Texture::footprint(D d, const Lookup& at, std::size_t i) const {
+HWY_INLINE auto Texture::moments(D d, const Lookup& at, std::size_t i) const {
   namespace hn = hwy::HWY_NAMESPACE;
   using V = hn::Vec<D>;
-  const V one = hn::Set(d, 1.0F);
-  const V du_dx = hn::Load(d, &at.du_dx[i]), dv_dx = hn::Load(d, &at.dv_dx[i]);
-  const V du_dy = hn::Load(d, &at.du_dy[i]), dv_dy = hn::Load(d, &at.dv_dy[i]);
-  const auto [x2, y2] = sides2(d, at, i);
-  const auto along_x = hn::Ge(x2, y2);
-  Footprint<V> f;
-  f.step_u = hn::IfThenElse(along_x, du_dx, du_dy), f.step_v = hn::IfThenElse(along_x, dv_dx, dv_dy);
+  const V width = hn::Set(d, level_width_[0]), height = hn::Set(d, level_height_[0]);
+  const V a_u = hn::Mul(hn::Load(d, &at.du_dx[i]), width), a_v = hn::Mul(hn::Load(d, &at.dv_dx[i]), height);
+  const V b_u = hn::Mul(hn::Load(d, &at.du_dy[i]), width), b_v = hn::Mul(hn::Load(d, &at.dv_dy[i]), height);
+  // The bounds keep a degenerate footprint (a pole, a horizon) finite.
+  const V bound = hn::Set(d, 1e12F);
+  return Moments<V>{hn::Min(hn::MulAdd(a_u, a_u, hn::Mul(b_u, b_u)), bound),
+                    hn::Min(hn::Max(hn::MulAdd(a_u, a_v, hn::Mul(b_u, b_v)), hn::Neg(bound)), bound),
+                    hn::Min(hn::MulAdd(a_v, a_v, hn::Mul(b_v, b_v)), bound)};
+}
 
-  // One texel is the finest resolution: there is one more probe if the longer side exceeds 1.25, 2.25 and 3.25 times
-  // a texel and the shorter side. Squares avoid roots. The upper bound keeps a degenerate footprint (a pole, a horizon)
-  // finite.
-  static_assert(kMaxProbes == 4);
-  const V major2 = hn::Min(hn::Max(x2, y2), hn::Set(d, 1e12F)), minor2 = hn::Max(hn::Min(x2, y2), one);
-  const auto longer_than = [&](float times) { return hn::Gt(major2, hn::Mul(minor2, hn::Set(d, times * times))); };
-  const auto two = longer_than(1.25F), three = longer_than(2.25F), four = longer_than(3.25F);
-  const auto choose = [&](float for_two, float for_three, float for_four) {
-    const V min = hn::IfThenElse(two, hn::Set(d, for_two), one);
-    return hn::IfThenElse(four, hn::Set(d, for_four), hn::IfThenElse(three, hn::Set(d, for_three), min));
-  };
-  f.probes = choose(2, 3, 4), f.per_probe = choose(1.0F / 2, 1.0F / 3, 1.0F / 4);
-  const V blur2 = hn::Max(hn::Mul(major2, hn::Mul(f.per_probe, f.per_probe)), minor2);
-  const V lod = hn::Mul(binary_logarithm(d, blur2), hn::Set(d, 0.5F));
-  f.lod = hn::Min(lod, hn::Set(d, static_cast<float>(levels_ - 1)));
+/// A part of the larger moment is left to the distance of the probes, so that the rest is nearly a rectangle along u
+/// and v.
+template <class D, class V>
+HWY_INLINE auto Texture::footprint(D d, const Moments<V>& moments) const -> Footprint<V> {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const V zero = hn::Zero(d), one = hn::Set(d, 1.0F), half = hn::Set(d, 0.5F);
+  const auto& [uu, uv, vv] = moments;
+  const V middle = hn::Mul(hn::Add(uu, vv), half), apart = hn::Mul(hn::Sub(uu, vv), half);
+  const V radius = hn::Sqrt(hn::MulAdd(apart, apart, hn::Mul(uv, uv)));
+  const V major = hn::Add(middle, radius), minor = hn::Max(hn::Sub(middle, radius), zero);
+
+  // Texels, and the longest row of probes, limit how narrow a footprint can be.
+  constexpr float kMaxElongation2 = 1.5F * kMaxProbes * kMaxProbes, kTolerance = 0.2F, kRectangle2 = 1.25F;
+  const V narrowest = hn::Mul(major, hn::Set(d, 1 / kMaxElongation2));
+  const V extra = hn::Max(hn::Sub(narrowest, minor), zero);
+  const V across = hn::Max(hn::Max(minor, narrowest), one);
+
+  Footprint<V> f;
+  f.step_u = f.step_v = zero, f.probes = f.per_probe = one;
+  f.width2_u = hn::Add(uu, extra), f.width2_v = hn::Add(vv, extra);
+
+  // `along` is left to the probes: what exceeds a rectangle, and what makes it oblique.
+  const V oblique = hn::Max(hn::Abs(uv), hn::Set(d, 1e-20F));
+  const V too_oblique = hn::Sub(one, hn::Div(hn::Mul(across, hn::Set(d, kTolerance)), oblique));
+  const V too_long = hn::Sub(major, hn::Max(hn::Mul(hn::Set(d, kRectangle2), across), hn::Set(d, kFirstLevel2)));
+  const V along = hn::Max(zero, hn::Max(hn::Mul(hn::Add(radius, radius), too_oblique), too_long));
+  if (!hn::AllTrue(d, hn::Le(along, zero))) {
+    const V direction = hn::Mul(half, hn::Div(apart, hn::Max(radius, hn::Set(d, 1e-20F))));
+    const V part_u = hn::Mul(along, hn::Add(half, direction)), part_v = hn::Mul(along, hn::Sub(half, direction));
+    f.width2_u = hn::Max(hn::Sub(f.width2_u, part_u), zero), f.width2_v = hn::Max(hn::Sub(f.width2_v, part_v), zero);
+    // n probes at a distance s have the square width (n^2 - 1) s^2. They are not farther apart than a probe is wide.
+    const V width2 = hn::Max(hn::Sub(major, along), across);
+    for (int n = 1; n < kMaxProbes; ++n) {
+      const V longest = hn::Mul(hn::Set(d, static_cast<float>(n * n - 1)), width2);
+      f.probes = hn::IfThenElse(hn::Gt(along, longest), hn::Set(d, static_cast<float>(n + 1)), f.probes);
+    }
+    const V per_distance = hn::Max(hn::MulSub(f.probes, f.probes, one), one);
+    f.per_probe = hn::Div(one, f.probes);
+    const auto distance = [&](V part, float size) {
+      return hn::Mul(hn::Sqrt(hn::Max(hn::Div(part, per_distance), zero)), hn::Set(d, 1 / size));
+    };
+    f.step_u = distance(part_u, level_width_[0]);
+    f.step_v = hn::CopySign(distance(part_v, level_height_[0]), uv);
+  }
+  const V width2 = hn::Max(hn::Max(f.width2_u, f.width2_v), one);
+  const V lod = hn::Add(binary_logarithm(d, hn::Mul(width2, hn::Set(d, 1 / kWidestBox2))), one);
+  f.lod = hn::Min(hn::Max(lod, zero), hn::Set(d, static_cast<float>(levels_ - 1)));
   return f;
 }
 
 /// Converts integers from 0 to 2^22, which are the last bits of the number plus 2^23. A general conversion takes three
 /// times as long.
 template <class D, class V>
-auto Texture::to_integer(D d, V x) {
+HWY_INLINE auto Texture::to_integer(D d, V x) {
   namespace hn = hwy::HWY_NAMESPACE;
   const hn::RebindToSigned<D> di;
   return hn::And(hn::BitCast(di, hn::Add(x, hn::Set(d, 8388608.0F))), hn::Set(di, 0x007fffff));
@@ -211,7 +265,7 @@ auto Texture::to_integer(D d, V x) {
 
 /// fast_log2() of each lane.
 template <class D, class V>
-V Texture::binary_logarithm(D d, V x) {
+HWY_INLINE V Texture::binary_logarithm(D d, V x) {
   namespace hn = hwy::HWY_NAMESPACE;
   const hn::RebindToSigned<D> di;
   const auto bits = hn::BitCast(di, x);
@@ -226,7 +280,7 @@ V Texture::binary_logarithm(D d, V x) {
 }
 
 template <class D, class I>
-auto Texture::grid(D d, I level) const {
+HWY_INLINE auto Texture::grid(D d, I level) const {
   namespace hn = hwy::HWY_NAMESPACE;
   const hn::RebindToSigned<D> di;
   using AnyGrid = Grid<hn::Vec<D>, I>;
@@ -234,55 +288,147 @@ auto Texture::grid(D d, I level) const {
   const std::int32_t first = hn::GetLane(level);
   if (hn::AllTrue(di, hn::Eq(level, hn::Set(di, first)))) {
     const auto i = static_cast<std::size_t>(first);
-    return AnyGrid{hn::Set(d, level_width_[i]), hn::Set(d, level_height_[i]), hn::Set(di, level_offset_[i]),
+    const auto all = [&](const auto& values) { return hn::Set(d, values[i]); };
+    return AnyGrid{all(level_width_),
+                   all(level_height_),
+                   all(level_squared_u_),
+                   all(level_squared_v_),
+                   all(level_blur_),
+                   hn::Set(di, level_offset_[i]),
                    hn::Set(di, level_stride_[i])};
   }
-  return AnyGrid{hn::GatherIndex(d, level_width_.data(), level), hn::GatherIndex(d, level_height_.data(), level),
-                 hn::GatherIndex(di, level_offset_.data(), level), hn::GatherIndex(di, level_stride_.data(), level)};
+  const auto each = [&](const auto& values) { return hn::GatherIndex(d, values.data(), level); };
+  return AnyGrid{each(level_width_),
+                 each(level_height_),
+                 each(level_squared_u_),
+                 each(level_squared_v_),
+                 each(level_blur_),
+                 hn::GatherIndex(di, level_offset_.data(), level),
+                 hn::GatherIndex(di, level_stride_.data(), level)};
 }
 
-/// Maps any coordinate into the image, on [0, 1]; NaN becomes 0.
+/// The first of the four taps around a coordinate, counted from the continuation, and the position t between the two in
+/// the middle. Texel centres are at half-integers. NaN becomes a position in the image.
 template <class D, class V>
-V Texture::wrapped(D d, V coordinate, Wrap wrap) {
+HWY_INLINE void Texture::locate(D d, V coordinate, V size, Wrap wrap, V& first, V& t) {
   namespace hn = hwy::HWY_NAMESPACE;
-  if (wrap == Wrap::repeat) coordinate = hn::Sub(coordinate, hn::Floor(coordinate));
-  return hn::Min(hn::Max(coordinate, hn::Zero(d)), hn::Set(d, 1.0F));
+  const V one = hn::Set(d, 1.0F), half = hn::Set(d, 0.5F);
+  V x;
+  if (wrap == Wrap::repeat) {
+    const V unit = hn::Min(hn::Max(hn::Sub(coordinate, hn::Floor(coordinate)), hn::Zero(d)), one);
+    x = hn::MulSub(unit, size, half);
+  } else {
+    // Farther beyond an edge, all taps are on the continuation.
+    x = hn::Min(hn::Max(hn::MulSub(coordinate, size, half), hn::Set(d, -2.0F)), hn::Add(size, one));
+  }
+  const V floor = hn::Floor(x);
+  t = hn::Sub(x, floor);
+  first = hn::Add(floor, hn::Set(d, static_cast<float>(kBefore - 1)));
+}
+
+/// The two texels in each word.
+template <class D, class W>
+HWY_INLINE auto Texture::decoded(D d, W words) {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::RebindToUnsigned<D> du;
+  const auto bias = hn::Set(du, kCodeBias);
+  const auto left = hn::ShiftLeft<kCodeShift>(hn::And(words, hn::Set(du, 0xffffU)));
+  const auto right = hn::And(hn::ShiftRight<16 - kCodeShift>(words), hn::Set(du, 0xffffU << kCodeShift));
+  return TwoOf<hn::Vec<D>>{hn::BitCast(d, hn::Add(left, bias)), hn::BitCast(d, hn::Add(right, bias))};
+}
+
+/// Two neighbouring texels of a row, from a byte of codes_ on.
+template <class D, class I>
+HWY_INLINE auto Texture::two_texels(D d, I position) const {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::RebindToUnsigned<D> du;
+  return decoded(d, hn::GatherOffset(du, reinterpret_cast<const std::uint32_t*>(codes_.data()), position));
+}
+
+/// The words at bytes of codes_. Single loads are faster than gathering words of this size.
+template <class D>
+HWY_INLINE auto Texture::words(D d, const std::int32_t* bytes) const {
+  namespace hn = hwy::HWY_NAMESPACE;
+  if constexpr (hn::MaxLanes(D()) == 1) {
+    const auto* const from = reinterpret_cast<const char*>(codes_.data()) + *bytes;
+    return hn::LoadU(d, reinterpret_cast<const hn::TFromD<D>*>(from));
+  } else {
+    const hn::Half<D> half;
+    return hn::Combine(d, words(half, bytes + hn::MaxLanes(half)), words(half, bytes));
+  }
+}
+
+/// Four neighbouring texels of a row, from a byte of codes_ on.
+template <class D, class I>
+HWY_INLINE auto Texture::four_texels(D d, I position) const {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::RebindToUnsigned<D> du;
+  const hn::Repartition<std::uint64_t, D> du64;
+  constexpr std::size_t kLanes = hn::MaxLanes(D());
+  alignas(64) std::array<std::int32_t, kLanes> bytes;
+  hn::Store(position, hn::RebindToSigned<D>(), bytes.data());
+  const auto lower = hn::BitCast(du, words(du64, &bytes[0])), upper = hn::BitCast(du, words(du64, &bytes[kLanes / 2]));
+  const auto [first, second] = decoded(d, hn::ConcatEven(du, upper, lower));
+  const auto [third, fourth] = decoded(d, hn::ConcatOdd(du, upper, lower));
+  return FourOf<hn::Vec<D>>{first, second, third, fourth};
+}
+
+/// The bilinear interpolation between texels.
+template <class D, class V>
+HWY_INLINE V Texture::interpolated(D d, V u, V v) const {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::RebindToSigned<D> di;
+  const V one = hn::Set(d, 1.0F), half = hn::Set(d, 0.5F);
+  V column, row, t_u, t_v;
+  locate(d, u, hn::Set(d, level_width_[0]), wrap_u_, column, t_u);
+  locate(d, v, hn::Set(d, level_height_[0]), wrap_v_, row, t_v);
+  const V left = hn::Add(hn::Sub(half, t_u), half), above = hn::Add(hn::Sub(half, t_v), half);
+  const V right = hn::Sub(one, left), below = hn::Sub(one, above);
+  const auto stride = hn::Set(di, level_stride_[0]);
+  // After the first of four taps, and one row below.
+  const auto position = hn::Add(hn::Add(to_integer(d, hn::Add(column, column)), hn::Set(di, 2)),
+                                hn::Mul(hn::Add(to_integer(d, row), hn::Set(di, 1)), stride));
+  const auto mean_of_row = [&](auto at) {
+    const auto [first, second] = two_texels(d, at);
+    return hn::MulAdd(right, second, hn::Mul(left, first));
+  };
+  return hn::MulAdd(below, mean_of_row(hn::Add(position, stride)), hn::Mul(above, mean_of_row(position)));
 }
 
 template <class D, class V, class I>
-V Texture::bilinear(D d, V u, V v, const Grid<V, I>& on) const {
+HWY_INLINE V Texture::mean(D d, const Footprint<V>& f, V u, V v, const Grid<V, I>& on) const {
   namespace hn = hwy::HWY_NAMESPACE;
-  const hn::RebindToUnsigned<D> du;
-  const V zero = hn::Zero(d), one = hn::Set(d, 1.0F), half = hn::Set(d, 0.5F);
+  const BoxFilter<D> filter_u(d, hn::Mul(f.width2_u, on.squared_u), on.blur);
+  const BoxFilter<D> filter_v(d, hn::Mul(f.width2_v, on.squared_v), on.blur);
 
-  // Texel centres are at half-integers of the level's grid. `first` is the one before the coordinate; the next one
-  // follows in memory, also at the end.
-  const auto locate = [&](V unit, V size, Wrap wrap, V& first, V& fraction) {
-    const V last = hn::Sub(size, one);
-    V x = hn::MulSub(unit, size, half);
-    if (wrap == Wrap::clamp) x = hn::Min(hn::Max(x, zero), last);
-    first = hn::Floor(x);
-    fraction = hn::Sub(x, first);
-    first = hn::IfThenElse(hn::Lt(first, zero), last, first);
+  const auto probe_at = [&](V at_u, V at_v) {
+    V column, row, t_u, t_v;
+    locate(d, at_u, on.width, wrap_u_, column, t_u);
+    locate(d, at_v, on.height, wrap_v_, row, t_v);
+    const FourOf<V> across = filter_u.weights(t_u), down = filter_v.weights(t_v);
+    const I first =
+        hn::Add(hn::Add(on.offset, to_integer(d, hn::Add(column, column))), hn::Mul(to_integer(d, row), on.row_stride));
+    const auto mean_of_row = [&](I position) {
+      const FourOf<V> texels = four_texels(d, position);
+      const V middle = hn::MulAdd(across.third, texels.third, hn::Mul(across.second, texels.second));
+      return hn::MulAdd(across.fourth, texels.fourth, hn::MulAdd(across.first, texels.first, middle));
+    };
+    const I second = hn::Add(first, on.row_stride), third = hn::Add(second, on.row_stride);
+    const V middle = hn::MulAdd(down.third, mean_of_row(third), hn::Mul(down.second, mean_of_row(second)));
+    return hn::MulAdd(down.fourth, mean_of_row(hn::Add(third, on.row_stride)),
+                      hn::MulAdd(down.first, mean_of_row(first), middle));
   };
-  V x, y, fx, fy;
-  locate(u, on.width, wrap_u_, x, fx);
-  locate(v, on.height, wrap_v_, y, fy);
-  const I column = to_integer(d, hn::Add(x, x));  // in bytes
-  const I upper_row = hn::Add(hn::Add(on.offset, column), hn::Mul(to_integer(d, y), on.row_stride));
-  const I lower_row = hn::Add(upper_row, on.row_stride);
 
-  // One word contains two neighbouring texels.
-  const auto bias = hn::Set(du, kCodeBias);
-  const auto row = [&](I position) {
-    const auto pair = hn::GatherOffset(du, reinterpret_cast<const std::uint32_t*>(codes_.data()), position);
-    const auto left_code = hn::ShiftLeft<kCodeShift>(hn::And(pair, hn::Set(du, 0xffffU)));
-    const auto right_code = hn::And(hn::ShiftRight<16 - kCodeShift>(pair), hn::Set(du, 0xffffU << kCodeShift));
-    const V left = hn::BitCast(d, hn::Add(left_code, bias)), right = hn::BitCast(d, hn::Add(right_code, bias));
-    return hn::MulAdd(fx, hn::Sub(right, left), left);
-  };
-  const V upper = row(upper_row), lower = row(lower_row);
-  return hn::MulAdd(fy, hn::Sub(lower, upper), upper);
+  const float max_probes = hn::GetLane(hn::MaxOfLanes(d, f.probes));
+  if (max_probes == 1) return probe_at(u, v);
+  V sum = hn::Zero(d);
+  const V middle = hn::Mul(hn::Set(d, 0.5F), hn::Sub(f.probes, hn::Set(d, 1.0F)));
+  for (float probe = 0; probe < max_probes; ++probe) {
+    const V steps = hn::Sub(hn::Set(d, probe), middle);
+    const V value = probe_at(hn::MulAdd(steps, f.step_u, u), hn::MulAdd(steps, f.step_v, v));
+    sum = hn::MulAdd(hn::IfThenElseZero(hn::Lt(hn::Set(d, probe), f.probes), f.per_probe), value, sum);
+  }
+  return sum;
 }
 
 }  // namespace esim::inline scene

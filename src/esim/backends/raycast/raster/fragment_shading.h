@@ -92,11 +92,11 @@ class FragmentShading {
     for (const std::uint32_t index : rays.triangle) __builtin_prefetch(&scene_.triangle(index));
   }
 
-  /// Side of the footprint on the texture of a fragment that covers a part of its pixel, in footprints. The filter of a
-  /// complete pixel has the variance 1/6 of a squared footprint. Fragments contribute their own variance and that of
-  /// their centroids: a stripe of the width a varies by a^2 / 12 across and 1/12 along it. The filter supplies the
-  /// rest, so that surfaces are equally sharp where edges cross a pixel.
-  float footprint(float area) const { return std::sqrt(0.5F + 0.25F * side_ * side_ * (1 + area * area)); }
+  /// Side of the footprint on the texture of a fragment that covers a part of its pixel, in footprints of a complete
+  /// pixel, whose variance is 1/12. The centroids of stripes of the width a vary by (1 - a^2) / 12 across and not at
+  /// all along the stripes, of squared sides of the square that edges are averaged over. The filter supplies the rest,
+  /// so that surfaces are equally sharp where edges cross a pixel.
+  float footprint(float area) const { return std::sqrt(std::max(0.0F, 1 - 0.5F * side_ * side_ * (1 - area * area))); }
 
   /// Averages the light over the samples of fragments in which it may vary.
   void smooth_shadows(const CellSurfaces& surfaces, const ImageCell& cell, std::span<const Fragment> fragments) {

@@ -54,6 +54,71 @@ class Fit(ProgramTest):
         self.assertIn("no recording of a moving scene", found["contrast_threshold_on"]["reason"])
         self.assertIsNone(found["leak_rate_hz"]["value"])
 
+    def lamp(self, name, periods=40, pixels=10):
+        """A lamp of 50 Hz: three ON events of each pixel, then three OFF events."""
+        path = self.folder / name
+        with path.open("w") as file:
+            for period in range(periods):
+                for k, phase in enumerate((0, 0.01, 0.3, 0.5, 0.51, 0.8)):
+                    for y in range(pixels):
+                        for x in range(pixels):
+                            file.write(f"{(period + phase) / 50:.6f} {x} {y} {int(k < 3)}\n")
+        return path
+
+    def test_known_light_that_determines_nothing(self):
+        lamp, short = self.lamp("lamp.txt"), self.lamp("short.txt", periods=4)
+        noise = self.folder / "noise.txt"  # in constant light
+        noise.write_text("".join(f"{0.000731 * k:.6f} {k % 10} {k // 10 % 10} {k % 2}\n" for k in range(3000)))
+        sensor = ("--width", "10", "--height", "10", "--base", "davis346")
+        for recording, light, part in (
+            (lamp, "50:0.5:20", "two frequencies"),
+            (lamp, "50:0.5:?", "illuminance is unknown"),
+            (lamp, "50:?:20", "modulation of the lamp is unknown"),
+            (lamp, "33.3:0.5:20", "do not follow a lamp of 33.3 Hz"),
+            (lamp, "100:0.5:20", "repeat 50 times per second, or less often, not 100 times"),
+            (noise, "50:0.5:20", "do not follow a lamp of 50 Hz: constant light"),
+            (short, "50:0.5:20", "short.txt (50 Hz at 20 lux): 1800 events in 3 periods; at least 500 in 10 are necessary: record longer"),
+        ):
+            found = self.parameters("--flicker", f"{recording}:{light}", *sensor)
+            self.assertIn(part, found["circuit.photocurrent_fa_per_lux"]["reason"])
+            self.assertIn(part, found["contrast_threshold_on"]["reason"])
+            self.assertIn(part, found["circuit.source_follower_hz"]["reason"])
+        # The same illuminance twice.
+        again = self.lamp("again.txt")
+        found = self.parameters("--static", f"{lamp}:5", "--static", f"{again}:5", *sensor)
+        self.assertIn("at 1 different illuminance; 3 are necessary", found["circuit.dark_current_fa"]["reason"])
+        found = self.parameters("--flicker", f"{lamp}:50:0.5:5", "--flicker", f"{again}:50:0.5:5", *sensor)
+        self.assertIn("two frequencies", found["contrast_threshold_on"]["reason"])
+        # A base without circuit.
+        found = self.parameters("--flicker", f"{lamp}:50:0.5:20", "--width", "10", "--height", "10")
+        self.assertIn("choose a preset with one, such as davis346", found["contrast_threshold_on"]["reason"])
+
+    def test_known_light_that_is_refused(self):
+        lamp = self.lamp("lamp.txt", periods=2)
+        small = self.record("small", "duration_s=0.05", "camera.width=40")
+        large = self.record("large", "duration_s=0.05")
+        sensor = ("--width", "10", "--height", "10", "--base", "davis346")
+        for arguments, *parts in (
+            (("--flicker", lamp, *sensor), "RECORDING:HZ:MODULATION:LUX"),
+            (("--flicker", f"{lamp}:?:0.5:20", *sensor), "frequency of the lamp must be known"),
+            (("--flicker", f"{lamp}:fast:0.5:20", *sensor), "'fast' must be the frequency of the lamp in Hz"),
+            (("--flicker", f"{lamp}:0:0.5:20", *sensor), "lamp.txt", "frequency of the lamp must be above 0, not 0 Hz"),
+            (("--flicker", f"{lamp}:50:1.5:20", *sensor), "modulation of the lamp must be above 0 and below 1, not 1.5"),
+            (("--flicker", f"{lamp}:50:0:20", *sensor), "modulation of the lamp must be above 0 and below 1, not 0"),
+            (("--flicker", f"{lamp}:50:0.5:0", *sensor), "illuminance must be above 0, not 0 lux"),
+            (("--flicker", f"{lamp}:50:0.5:-3", *sensor), "illuminance must be above 0, not -3 lux"),
+            (("--static", f"{lamp}:-1", *sensor), "illuminance must be 0 or more, not -1 lux"),
+            (("--static", f"{lamp}:bright", *sensor), "'bright' must be the illuminance"),
+            (("--static", f"{lamp}:0", "--static", f"{lamp}:5", *sensor), "lamp.txt", "is given twice"),
+            (("--flicker", f"{small}:50:0.5:9", "--static", large), "40 x 72", "96 x 72"),
+            (("--flicker", f"{self.folder / 'none.txt'}:50:0.5:9", *sensor), "none.txt"),
+        ):
+            result = run("fit", "--quiet", *arguments)
+            self.assertEqual(result.returncode, 2, result.stdout)
+            self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+            for part in parts:
+                self.assertIn(part, result.stderr)
+
     def test_bad_input(self):
         moving = self.record("one", "duration_s=0.05")
         small = self.record("small", "duration_s=0.05", "camera.width=40")

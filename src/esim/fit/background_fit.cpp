@@ -72,6 +72,18 @@ Estimate of_log10(const char* name, const char* unit, double value, double error
 
 }  // namespace
 
+double hot_pixel_limit(std::vector<double> events) {
+  std::sort(events.begin(), events.end());
+  const auto quantile = [&](double part) {
+    return events[static_cast<std::size_t>(part * static_cast<double>(events.size() - 1))];
+  };
+  // Counts are at least as uncertain as one event, and spread by noise like those of a Poisson process.
+  const double centre = std::max(1.0, quantile(0.5));
+  const double decades =
+      std::max({std::log10(std::max(1.0, quantile(0.84)) / centre), 1 / (kLn10 * std::sqrt(centre)), 0.02});
+  return centre * std::max(kTimesAbove, std::pow(10, kFarAbove * decades));
+}
+
 struct BackgroundFit::Kept {
   struct One {
     const Pixel* pixel;
@@ -105,17 +117,9 @@ void BackgroundFit::add(EventSpan events) {
 
 BackgroundFit::Kept BackgroundFit::separate_hot_pixels(double duration_s, Result& result) const {
   const AreaGrid areas(pixels_.width(), pixels_.height());
-  std::vector<double> sorted;
-  for (const Pixel& pixel : pixels_.pixels()) sorted.push_back(pixel.count_on() + pixel.count_off());
-  std::sort(sorted.begin(), sorted.end());
-  const auto quantile = [&](double part) {
-    return sorted[static_cast<std::size_t>(part * static_cast<double>(sorted.size() - 1))];
-  };
-  // Counts are at least as uncertain as one event, and spread by noise like those of a Poisson process.
-  const double centre = std::max(1.0, quantile(0.5));
-  const double decades =
-      std::max({std::log10(std::max(1.0, quantile(0.84)) / centre), 1 / (kLn10 * std::sqrt(centre)), 0.02});
-  const double limit = centre * std::max(kTimesAbove, std::pow(10, kFarAbove * decades));
+  std::vector<double> counts;
+  for (const Pixel& pixel : pixels_.pixels()) counts.push_back(pixel.count_on() + pixel.count_off());
+  const double limit = hot_pixel_limit(counts);
   Kept kept;
   std::vector<double> hot;
   double squares = 0;

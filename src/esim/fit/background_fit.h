@@ -12,6 +12,9 @@
 
 namespace esim::inline fit {
 
+/// Pixels with more events than this are hot, by the numbers of events of all pixels.
+double hot_pixel_limit(std::vector<double> events);
+
 /// Leak, noise and hot pixels of a sensor that saw a scene without motion, in constant light
 /// (docs/methods/fitting.md, section 2).
 ///

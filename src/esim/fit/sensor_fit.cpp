@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <limits>
+#include <set>
 
 #include "esim/core/error.h"
 #include "esim/core/remedy.h"
 #include "esim/fit/background_fit.h"
+#include "esim/fit/circuit/circuit_fit.h"
 #include "esim/fit/contrast_fit.h"
 #include "esim/fit/image_stream.h"
 #include "esim/fit/shortest_intervals.h"
@@ -26,6 +30,7 @@ constexpr std::uint64_t kForReadout = 10'000'000;  // events of a recording from
 constexpr std::uint64_t kFewestForReadout = 1000;
 constexpr double kSmallestUnit_us = 0.1;  // finer time stamps are not rounded
 constexpr TimeNs kRounding = 10;          // of seconds as text, in double precision
+constexpr double kCircuitWork = 2;        // reading a recording is 1
 constexpr double kClearRows = 3;          // over chance
 constexpr double kClearScan = 0.9;        // concentration
 
@@ -36,17 +41,25 @@ class Fitter {
   Fitter(const FitInput& input, const FitOptions& options) : input_(input), options_(options) {
     base_ = preset_options(options.base);
     fit_.base = options.base;
-    work_ = static_cast<double>(2 * input.moving.size() + input.constant.size() + input.other.size());
+    work_ = static_cast<double>(2 * input.moving.size() + input.constant.size() + input.flicker.size() +
+                                input.other.size());
     if (work_ == 0) throw UserError("there is nothing to fit to; give recordings of the sensor");
+    fits_circuit_ = !input.flicker.empty() ||
+                    std::any_of(input.constant.begin(), input.constant.end(),
+                                [](const LitRecording& recording) { return !std::isnan(recording.light.lux); });
+    if (fits_circuit_) work_ += kCircuitWork;
+    check_lights();
   }
 
   SensorFit run() {
-    for (const fs::path& path : input_.constant) read_constant(path);
+    for (const LitRecording& recording : input_.constant) read_constant(recording);
+    for (const LitRecording& recording : input_.flicker) read_flicker(recording);
     for (const fs::path& path : input_.moving) read_other(path, "moving");
     for (const fs::path& path : input_.other) read_other(path, "other");
     find_refractory();
     for (const fs::path& path : input_.moving) read_moving(path);
     find_thresholds();
+    find_circuit();
     find_background();
     find_readout();
     return std::move(fit_);
@@ -54,6 +67,26 @@ class Fitter {
 
  private:
   ReadOptions read_options() const { return {input_.sensor, {}}; }
+
+  /// NaN is unknown.
+  void check_lights() const {
+    std::set<fs::path> paths;
+    const auto check = [&](const LitRecording& recording, bool flickers) {
+      const auto& [lux, frequency_hz, modulation] = recording.light;
+      const auto fail = [&](const std::string& what) { throw UserError(recording.path.string() + ": " + what); };
+      if (!paths.insert(recording.path).second) fail("is given twice; give each recording in known light once");
+      if (flickers ? lux <= 0 : lux < 0)
+        fail(fmt::format("the illuminance must be {}, not {} lux", flickers ? "above 0" : "0 or more", lux));
+      if (!std::isnan(lux) && !std::isfinite(lux)) fail("the illuminance must be finite");
+      if (!flickers) return;
+      if (!(frequency_hz > 0 && std::isfinite(frequency_hz)))
+        fail(fmt::format("the frequency of the lamp must be above 0, not {} Hz", frequency_hz));
+      if (modulation <= 0 || modulation >= 1)
+        fail(fmt::format("the modulation of the lamp must be above 0 and below 1, not {}", modulation));
+    };
+    for (const LitRecording& recording : input_.constant) check(recording, false);
+    for (const LitRecording& recording : input_.flicker) check(recording, true);
+  }
 
   /// The size of the sensor, which all recordings must have.
   SensorSize size_of(const fs::path& path, std::optional<SensorSize> size) {
@@ -103,15 +136,37 @@ class Fitter {
     return recording;
   }
 
-  void read_constant(const fs::path& path) {
+  void read_constant(const LitRecording& constant) {
+    const fs::path& path = constant.path;
     EventsFile file(path, read_options());
     const SensorSize size = size_of(path, file.sensor());
     BackgroundFit background(size.width, size.height);
-    FittedRecording recording = read_events(file, path, "static", [&](EventSpan events) { background.add(events); });
+    const bool known = !std::isnan(constant.light.lux);
+    PixelCounter counter(constant.light, size.width, size.height);
+    FittedRecording recording = read_events(file, path, "static", [&](EventSpan events) {
+      background.add(events);
+      if (known) counter.add(events);
+    });
     const RecordingInfo info = open_source(path, read_options())->info();
     if (info.start_known && info.end > info.start) recording.duration_s = to_seconds(info.end - info.start);
     fit_.recordings.push_back(recording);
     constant_.push_back({std::move(background), recording.duration_s});
+    if (known) add_counts(counter, recording);
+  }
+
+  void read_flicker(const LitRecording& flicker) {
+    EventsFile file(flicker.path, read_options());
+    const SensorSize size = size_of(flicker.path, file.sensor());
+    PixelCounter counter(flicker.light, size.width, size.height);
+    const FittedRecording recording =
+        read_events(file, flicker.path, "flicker", [&](EventSpan events) { counter.add(events); });
+    fit_.recordings.push_back(recording);
+    add_counts(counter, recording);
+  }
+
+  void add_counts(const PixelCounter& counter, const FittedRecording& recording) {
+    counts_.push_back(counter.finish(recording.duration_s));
+    counts_.back().file = fs::path(recording.path).filename().string();
   }
 
   void read_other(const fs::path& path, const char* use) {
@@ -122,6 +177,7 @@ class Fitter {
 
   /// The leak from the recording with the least noise.
   void read_leak(double ratio) {
+    background_.reset(), noisiest_.reset();
     for (const Constant& constant : constant_) {
       if (constant.duration_s <= 0) continue;
       const BackgroundFit::Result result = constant.background.finish(constant.duration_s, ratio);
@@ -168,15 +224,20 @@ class Fitter {
   void find_thresholds() {
     if (!contrast_) {
       const char* const why = "no recording of a moving scene with images";
-      for (const char* name : {"contrast_threshold_on", "contrast_threshold_off", "threshold_mismatch"})
-        add(Estimate::unknown(name, "", why));
+      if (input_.flicker.empty()) {
+        for (const char* name : {"contrast_threshold_on", "contrast_threshold_off"})
+          add(Estimate::unknown(name, "", why));
+      }
+      add(Estimate::unknown("threshold_mismatch", "", why));
       if (base_.circuit) add(Estimate::unknown("circuit.threshold_mismatch_common", "", why));
       add(Estimate::unknown("dead_pixels", "", why));
       return;
     }
     thresholds_ = contrast_->finish();
-    add(thresholds_->on);
-    add(thresholds_->off);
+    if (input_.flicker.empty() || thresholds_->on.determined()) {
+      add(thresholds_->on);
+      add(thresholds_->off);
+    }
     Estimate mismatch = thresholds_->mismatch;
     if (!base_.circuit && mismatch.determined()) {  // without a circuit, the thresholds share no part
       const double mean = 0.5 * (thresholds_->on.value + thresholds_->off.value);
@@ -205,9 +266,43 @@ class Fitter {
     }
   }
 
+  /// What the recordings have determined so far, and the base in the rest.
+  EventCameraOptions known_sensor() const {
+    EventCameraOptions sensor = base_;
+    for (const Estimate& e : fit_.estimates) {
+      if (!e.determined()) continue;
+      if (e.name == "contrast_threshold_on") sensor.contrast_threshold_on = e.value;
+      if (e.name == "contrast_threshold_off") sensor.contrast_threshold_off = e.value;
+      if (e.name == "threshold_mismatch") sensor.threshold_mismatch = e.value;
+      if (e.name == "refractory_period_us") sensor.refractory_period_us = e.value;
+      if (sensor.circuit && e.name == "circuit.threshold_mismatch_common")
+        sensor.circuit->threshold_mismatch_common = e.value;
+    }
+    return sensor;
+  }
+
+  /// The circuit from lamps and from noise at known illuminances.
+  void find_circuit() {
+    if (!fits_circuit_) return;
+    CircuitInput input{known_sensor(), counts_};
+    if (thresholds_ && thresholds_->on.determined()) input.on = thresholds_->on, input.off = thresholds_->off;
+    read_leak(input.base.threshold_off() / input.base.threshold_on());
+    if (background_ && background_->leak_rate.determined()) input.base.leak_rate_hz = background_->leak_rate.value;
+    input.progress = [&](double part) { show("simulation of the circuit", kCircuitWork * part); };
+    const CircuitFit found = fit_circuit(input);
+    done_ += kCircuitWork;
+    const auto known = [&, before = fit_.estimates](const Estimate& e) {
+      return std::any_of(before.begin(), before.end(), [&](const Estimate& other) { return other.name == e.name; });
+    };
+    std::copy_if(found.estimates.begin(), found.estimates.end(), std::back_inserter(fit_.estimates),
+                 std::not_fn(known));
+    fit_.observations.insert(fit_.observations.end(), found.observations.begin(), found.observations.end());
+    fit_.notes.insert(fit_.notes.end(), found.notes.begin(), found.notes.end());
+  }
+
   void find_background() {
-    const bool known = thresholds_ && thresholds_->on.determined();
-    read_leak(known ? thresholds_->off.value / thresholds_->on.value : base_.threshold_off() / base_.threshold_on());
+    const EventCameraOptions sensor = known_sensor();
+    read_leak(sensor.threshold_off() / sensor.threshold_on());
     if (!background_) {
       const char* const why =
           constant_.empty() ? "no recording in constant light" : "the recordings in constant light have no duration";
@@ -228,10 +323,10 @@ class Fitter {
     if (!base_.circuit) {
       add(noisiest_->noise);
     } else {
-      fit_.notes.push_back(
-          fmt::format("noise: {:.3g} Hz OFF events of a pixel; the noise of the circuit is not fitted, "
-                      "but that of {}",
-                      noisiest_->off_hz, fit_.base));
+      fit_.notes.push_back(fmt::format(
+          "noise: {:.3g} Hz OFF events of a pixel{}", noisiest_->off_hz,
+          fits_circuit_ ? ""
+                        : "; the noise of the circuit is that of " + fit_.base + ", since no illuminance is stated"));
     }
     if (!background_->leak.values.empty()) fit_.distributions.push_back(background_->leak);
   }
@@ -303,7 +398,9 @@ class Fitter {
   EventCameraOptions base_;
   SensorFit fit_;
   double work_ = 0, done_ = 0;
+  bool fits_circuit_ = false;
   std::vector<Constant> constant_;
+  std::vector<PixelCounts> counts_;  // in known light
   std::optional<ContrastFit> contrast_;
   std::optional<ShortestIntervals> intervals_;
   std::vector<SensorStatistics> readouts_;

@@ -9,18 +9,26 @@
 
 #include "esim/core/image.h"
 #include "esim/event_camera/options.h"
+#include "esim/fit/circuit/pixel_counts.h"
 #include "esim/fit/estimate.h"
 #include "esim/plot/colour.h"
 #include "esim/recording/format.h"
 
 namespace esim::inline fit {
 
+/// A recording of light that fills the view.
+struct LitRecording {
+  std::filesystem::path path;
+  KnownLight light{};
+};
+
 /// Recordings of one sensor, in any format that can be read.
 struct FitInput {
-  std::vector<std::filesystem::path> moving;    ///< a moving scene: events, and images of the same view
-  std::vector<std::filesystem::path> constant;  ///< a scene without motion, in constant light
-  std::vector<std::filesystem::path> other;     ///< any other events
-  std::optional<SensorSize> sensor{};           ///< replaces the size in the files
+  std::vector<std::filesystem::path> moving;  ///< a moving scene: events, and images of the same view
+  std::vector<LitRecording> constant;         ///< a scene without motion, in constant light, whose lux may be unknown
+  std::vector<LitRecording> flicker;          ///< a flickering lamp
+  std::vector<std::filesystem::path> other;   ///< any other events
+  std::optional<SensorSize> sensor{};         ///< replaces the size in the files
 };
 
 struct FitOptions {
@@ -32,7 +40,7 @@ struct FitOptions {
 
 /// A recording that was used.
 struct FittedRecording {
-  std::string path, use;  ///< "moving", "static", "other"
+  std::string path, use;  ///< "moving", "static", "flicker", "other"
   std::uint64_t events = 0, images = 0;
   double duration_s = 0;
 };

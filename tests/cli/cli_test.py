@@ -231,9 +231,10 @@ class Recordings(Cli):
         if "libegl1" in run("check", room, "--set", "renderer.engine=gl").stderr:
             self.skipTest("no OpenGL: libegl1, libgl1-mesa-dri")
         cameras = {}
-        for sampling in ("{type: flow, lambda: 1}", "{type: keyframes, supersampling: 2}"):
+        # The samples of a software driver are too few for exact edges; those of a keyframe are four times as dense.
+        for engine, sampling in (("raster", "{type: flow, lambda: 1}"), ("gl", "{type: keyframes, supersampling: 2}")):
             out = self.folder / sampling[7:11]
-            result = run("simulate", room, "--out", out, "--set", "renderer.engine=gl", "--set", f"sampling={sampling}",
+            result = run("simulate", room, "--out", out, "--set", f"renderer.engine={engine}", "--set", f"sampling={sampling}",
                          "--set", "duration_s=0.1", "--set", "output.preview=false",
                          "--set", "camera={width: 120, height: 90, horizontal_fov_deg: 75}")
             self.assertEqual(result.returncode, 0, result.stderr)

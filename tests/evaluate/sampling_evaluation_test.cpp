@@ -132,6 +132,7 @@ TEST_F(PlacesOfErrors, AddUp) {
 }
 
 TEST_F(PlacesOfErrors, AreOnEdgesWhereTheTruthAloneHasMoreRays) {
+  mesh().engine = MeshEngine::raycast;
   EXPECT_LT(errors_of(UniformSampling{500}).max_abs, 1e-6);
   options_.truth_rays = 64;
   const BrightnessError error = errors_of(UniformSampling{500});

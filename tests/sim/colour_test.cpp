@@ -157,7 +157,8 @@ TEST_F(ColourCamera, IsRefusedByWhatShowsGreyOnly) {
   MeshRendererOptions mesh = wall();
   mesh.engine = MeshEngine::gl;
   scenario_.renderer = mesh;
-  EXPECT_TRUE(test::contains(refusal(), "camera cam0: colour: engine: gl renders luminance only; use engine: processor"));
+  EXPECT_TRUE(
+      test::contains(refusal(), "camera cam0: colour: engine: gl renders luminance only; use engine: processor"));
   mesh.engine = MeshEngine::automatic;
   scenario_.renderer = mesh;
   EXPECT_EQ(refusal(), "nothing was thrown");

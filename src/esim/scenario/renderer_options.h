@@ -106,10 +106,11 @@ struct MeshRendererOptions {
 
 template <class Visitor>
 void describe(Visitor& visit, MeshRendererOptions& o) {
-  visit("engine", o.engine,
-        About{"raycast: Embree; raster: exact coverage of pixels; processor: raster if samples_per_pixel is above 1 and "
-              "the scene has at most 200,000 triangles, raycast otherwise; gl: OpenGL; auto: gl if there is a graphics "
-              "card, processor otherwise"});
+  visit(
+      "engine", o.engine,
+      About{"raycast: Embree; raster: exact coverage of pixels; processor: raster if samples_per_pixel is above 1 and "
+            "the scene has at most 200,000 triangles, raycast otherwise; gl: OpenGL; auto: gl if there is a graphics "
+            "card, processor otherwise"});
   visit("gl_device", o.gl_device,
         About{"index of the graphics device, from 0 (default: the first hardware device)", "", 0, 31});
   visit("scene", o.scene,

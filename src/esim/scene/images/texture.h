@@ -345,6 +345,16 @@ HWY_INLINE auto Texture::two_texels(D d, I position) const {
   return decoded(d, hn::GatherOffset(du, reinterpret_cast<const std::uint32_t*>(codes_.data()), position));
 }
 
+#if HWY_TARGET == HWY_SCALAR
+/// For programs that include this header and are compiled without vectors.
+template <class D, class I>
+HWY_INLINE auto Texture::four_texels(D d, I position) const {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const auto [first, second] = two_texels(d, position);
+  const auto [third, fourth] = two_texels(d, hn::Add(position, hn::Set(hn::RebindToSigned<D>(), 4)));
+  return FourOf<hn::Vec<D>>{first, second, third, fourth};
+}
+#else
 /// The words at bytes of codes_. Single loads are faster than gathering words of this size.
 template <class D>
 HWY_INLINE auto Texture::words(D d, const std::int32_t* bytes) const {
@@ -372,6 +382,7 @@ HWY_INLINE auto Texture::four_texels(D d, I position) const {
   const auto [third, fourth] = decoded(d, hn::ConcatOdd(du, upper, lower));
   return FourOf<hn::Vec<D>>{first, second, third, fourth};
 }
+#endif
 
 /// The bilinear interpolation between texels.
 template <class D, class V>

@@ -19,10 +19,7 @@ inline constexpr int kCircuitSide = 32;  // px
 /// A circuit with random thresholds and time constants. `noise`: the range of its thresholds in standard deviations of
 /// the noise in the dark.
 inline EventCameraOptions random_circuit(std::uint32_t number, std::array<double, 2> noise) {
-  const AddressedRandom random(11, Purpose::test);
-  const auto between = [&](std::uint64_t draw, double low, double high) {
-    return low * std::pow(high / low, random.uniforms(number, draw)[0]);
-  };
+  const auto between = random_parameters(11, number);
   EventCameraOptions o;
   o.contrast_threshold_on = between(0, 0.12, 0.3);
   o.contrast_threshold_off = *o.contrast_threshold_on * between(1, 0.8, 1.25);

@@ -19,12 +19,16 @@ namespace esim::test {
 inline constexpr int kSide = 64, kStepsPerImage = 5;
 inline constexpr double kStep_s = 1e-3, kImageNoise = 0.01;
 
-/// A sensor with random parameters.
-inline EventCameraOptions random_sensor(std::uint32_t number) {
-  const AddressedRandom random(7, Purpose::test);
-  const auto between = [&](std::uint64_t draw, double low, double high) {
+/// Draws of parameters of a sensor, between(draw, low, high), whose logarithms are uniform.
+inline auto random_parameters(std::uint64_t seed, std::uint32_t number) {
+  return [random = AddressedRandom(seed, Purpose::test), number](std::uint64_t draw, double low, double high) {
     return low * std::pow(high / low, random.uniforms(number, draw)[0]);
   };
+}
+
+/// A sensor with random parameters.
+inline EventCameraOptions random_sensor(std::uint32_t number) {
+  const auto between = random_parameters(7, number);
   EventCameraOptions o;
   o.contrast_threshold_on = between(0, 0.12, 0.4);
   o.contrast_threshold_off = *o.contrast_threshold_on * between(1, 0.8, 1.25);

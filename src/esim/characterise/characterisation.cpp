@@ -16,7 +16,6 @@
 namespace esim::inline characterise {
 namespace {
 
-constexpr double kElectron_fC = 1.602176634e-4;
 constexpr double kBrightest_lux = 1e5, kDarkest_lux = 1e-4;
 constexpr double kMaxContrast = 4;         // ln; no S-curve beyond
 constexpr double kRefractoryPeriods = 10;  // response times
@@ -27,8 +26,7 @@ double response_time_s(const EventCameraOptions& sensor, double lux) {
   constexpr double kShortest = 1e-4;
   if (const auto& c = sensor.circuit) {
     const double current = c->photocurrent_fa_per_lux * lux + c->dark_current_fa;
-    return kShortest + c->photodiode_charge_e * kElectron_fC / current +
-           1 / (2 * std::numbers::pi * c->source_follower_hz);
+    return kShortest + c->photodiode_s(current) + c->source_follower_s();
   }
   const double low_pass_s =
       sensor.low_pass_hz > 0 ? sensor.low_pass_order / (2 * std::numbers::pi * sensor.low_pass_hz) : 0.0;

@@ -14,8 +14,6 @@
 namespace esim::inline characterise {
 namespace {
 
-constexpr double kElementaryCharge_fC = 1.602176634e-4;
-
 // Gauss-Hermite: E f(n) = sum of weights f(x) for a standard normal n.
 constexpr std::array<double, 9> kNormalAt{
     -4.512745863399783, -3.205429002856470, -2.076847978677830, -1.023255663789133, 0.0,
@@ -100,7 +98,9 @@ double PixelEstimate::noise(double lux) const {
   return std::sqrt(times.t1_s(lux) / (charge_e * (times.t1_s(lux) + times.t2_s)));
 }
 
-double PixelEstimate::photocurrent_fa_per_lux() const { return charge_e * kElementaryCharge_fC / times.t1_lux_s; }
+double PixelEstimate::photocurrent_fa_per_lux() const {
+  return charge_e * CircuitOptions::kElementaryCharge_fC / times.t1_lux_s;
+}
 
 double response_probability(const TrialProtocol& steps, double contrast, double threshold,
                             const PixelEstimate& estimate) {

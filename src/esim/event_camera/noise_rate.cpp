@@ -8,8 +8,7 @@
 namespace esim::inline event_camera {
 namespace {
 
-constexpr double kElectron_fC = 1.602176634e-4;  // elementary charge, fA s
-constexpr double kExcessive = 2;                 // thresholds in standard deviations
+constexpr double kExcessive = 2;  // thresholds in standard deviations
 constexpr double kUsualMaxRate_hz = 1e4;
 
 /// Time constants of the two poles, s.
@@ -19,8 +18,7 @@ struct Poles {
 
 Poles poles_at(const CircuitOptions& circuit, double irradiance) {
   const double current_fa = circuit.white_photocurrent_fa() * irradiance + circuit.dark_current_fa;
-  return {circuit.photodiode_charge_e * kElectron_fC / current_fa,
-          1 / (2 * std::numbers::pi * circuit.source_follower_hz)};
+  return {circuit.photodiode_s(current_fa), circuit.source_follower_s()};
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -86,6 +87,7 @@ struct CircuitOptions {
   double max_rate_hz = 0.0;
 
   static constexpr double kUsualWhiteLux = 1000;
+  static constexpr double kElementaryCharge_fC = 1.602176634e-4;  ///< fA s
 
   /// The illuminance of a pixel that sees a diffuse white surface at irradiance 1, lux.
   double white_sensor_lux() const {
@@ -93,6 +95,9 @@ struct CircuitOptions {
   }
   /// The photocurrent of such a pixel, fA.
   double white_photocurrent_fa() const { return photocurrent_fa_per_lux * white_sensor_lux(); }
+  /// The time constants of the photodiode at a photocurrent, dark current included, and of the source follower, s.
+  double photodiode_s(double current_fa) const { return photodiode_charge_e * kElementaryCharge_fC / current_fa; }
+  double source_follower_s() const { return 1 / (2 * std::numbers::pi * source_follower_hz); }
   /// The dark current in units of the irradiance: L = ln(E + this), plus a constant.
   double dark_irradiance() const { return dark_current_fa / white_photocurrent_fa(); }
 };

@@ -119,6 +119,7 @@ std::unique_ptr<Rendering> BlurredRenderer::start_together(std::vector<RenderReq
   return std::make_unique<Blurring>(*this, std::move(requests));
 }
 
+// Not a filter of OpenCV, which rounds pixels differently by their place in a tile.
 void BlurredRenderer::blur(const Sample& sharp, const Tile& tile, Sample& sample) const {
   const int reach = this->reach(), last_column = sharp.irradiance.width() - 1, last_row = sharp.irradiance.height() - 1;
   Image<float> across(tile.width, tile.height + 2 * reach);

@@ -12,8 +12,7 @@
 namespace esim::inline event_camera {
 namespace {
 
-constexpr double kElectron_fC = 1.602176634e-4;  // elementary charge, fA s
-constexpr float kUnreachable = 1e6F;             // threshold of a dead pixel
+constexpr float kUnreachable = 1e6F;  // threshold of a dead pixel
 // Irradiance is rounded to multiples of 1 / (2 kPerLight) where it is summed over time, so that sums over whole ns are
 // exact, however a stretch of constant light is cut.
 constexpr double kPerLight = 4096;
@@ -26,7 +25,7 @@ CircuitArray::CircuitArray(const EventCameraOptions& options, int width, int hei
   const CircuitOptions& o = *options.circuit;
   const double white_fa = o.white_photocurrent_fa();
   dark_ = o.dark_current_fa / white_fa;
-  circuit_.poles.t1_unit_ns = 1e9 * o.photodiode_charge_e * kElectron_fC / white_fa;
+  circuit_.poles.t1_unit_ns = 1e9 * o.photodiode_charge_e * CircuitOptions::kElementaryCharge_fC / white_fa;
   circuit_.waits = options.readout.acknowledges();
   circuit_.poles.t2_ns = 1e9 / (2 * std::numbers::pi * o.source_follower_hz);
   circuit_.poles.high_pass_per_ns = 1e-9 * 2 * std::numbers::pi * o.high_pass_hz;

@@ -16,12 +16,11 @@ namespace esim::inline fit {
 
 /// The time constants of the circuit of a sensor on the bench, s.
 struct TimeConstants {
-  static constexpr double kElectron_fC = 1.602176634e-4;  // elementary charge, fA s
   double photodiode = 0, follower = 0;
 
   TimeConstants(const CircuitOptions& c, double lux)
-      : photodiode(c.photodiode_charge_e * kElectron_fC / (c.photocurrent_fa_per_lux * lux + c.dark_current_fa)),
-        follower(1 / (2 * std::numbers::pi * c.source_follower_hz)) {}
+      : photodiode(c.photodiode_s(c.photocurrent_fa_per_lux * lux + c.dark_current_fa)),
+        follower(c.source_follower_s()) {}
 
   double latency_s() const { return photodiode + follower; }
   /// -3 dB of both poles: (1 + w^2 t1^2) (1 + w^2 t2^2) = 2.

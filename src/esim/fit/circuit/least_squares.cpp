@@ -24,14 +24,13 @@ Eigen::MatrixXd slopes_at(const Residuals& residuals, const Eigen::VectorXd& at,
 }
 
 LeastSquares least_squares(const Residuals& residuals, Eigen::VectorXd start, double step) {
-  LeastSquares best{std::move(start), 0, {}};
+  LeastSquares best{std::move(start), 0};
   Eigen::VectorXd r = residuals(best.at);
   best.squares = r.squaredNorm();
   double damping = 1e-2;
   for (int i = 0; i < kMaxSteps; ++i) {
-    best.slopes = slopes_at(residuals, best.at, step);
-    const Eigen::MatrixXd normal = best.slopes.transpose() * best.slopes;
-    const Eigen::VectorXd gradient = best.slopes.transpose() * r;
+    const Eigen::MatrixXd slopes = slopes_at(residuals, best.at, step), normal = slopes.transpose() * slopes;
+    const Eigen::VectorXd gradient = slopes.transpose() * r;
     double gain = 0;
     for (int attempt = 0; attempt < kMaxAttempts && gain == 0; ++attempt) {
       Eigen::MatrixXd damped = normal;

@@ -7,9 +7,8 @@
 namespace esim::inline fit {
 
 struct LeastSquares {
-  Eigen::VectorXd at;      ///< the minimum
-  double squares = 0;      ///< the sum there
-  Eigen::MatrixXd slopes;  ///< derivatives of the residuals there
+  Eigen::VectorXd at;  ///< the minimum
+  double squares = 0;  ///< the sum there
 };
 using Residuals = std::function<Eigen::VectorXd(const Eigen::VectorXd&)>;
 

@@ -1,5 +1,6 @@
-// The ray caster on all processors, and OpenGL, on the same scenes from the same places: one full frame (E, Z and V),
-// 16 samples per pixel as in the shipped scenarios. Names: SCENE/WIDTHxHEIGHT/ENGINE. The label of gl is its device.
+// The ray caster and the rasteriser on all processors, and OpenGL, on the same scenes from the same places: one full frame
+// (E, Z and V), 16 samples per pixel as in the shipped scenarios. Names: SCENE/WIDTHxHEIGHT/ENGINE. The label of gl is its
+// device.
 // compare_engines.py makes tables of it.
 #include <benchmark/benchmark.h>
 
@@ -60,13 +61,14 @@ struct Prepared {
   std::string name;
   Scene scene;
   std::shared_ptr<const RaycastScene> raycast;  // null until the ray caster asks for it
+  std::shared_ptr<const RaycastScene> raster;   // null until the rasteriser asks for it
 };
 
 Prepared& prepared(const View& view) {
   static Prepared last;
   if (last.name != view.name) {
     last = {};  // frees its memory first
-    last = {view.name, still_scene(view.load()), nullptr};
+    last = {view.name, still_scene(view.load()), nullptr, nullptr};
   }
   return last;
 }
@@ -76,6 +78,14 @@ void raycast(benchmark::State& state, const View& view, const Camera& camera) {
   Prepared& room = prepared(view);
   if (room.raycast == nullptr) room.raycast = build_raycast_scene(room.scene);
   const auto renderer = make_raycast_renderer(room.raycast, {.samples_per_pixel = kSamplesPerPixel}, camera, workers);
+  bench::render_frames(state, *renderer, camera, motion_from(view.T_world_camera));
+}
+
+void raster(benchmark::State& state, const View& view, const Camera& camera) {
+  const Workers workers(static_cast<int>(std::thread::hardware_concurrency()));
+  Prepared& room = prepared(view);
+  if (room.raster == nullptr) room.raster = build_raster_scene(room.scene);
+  const auto renderer = make_raster_renderer(room.raster, {.samples_per_pixel = kSamplesPerPixel}, camera, workers);
   bench::render_frames(state, *renderer, camera, motion_from(view.T_world_camera));
 }
 
@@ -91,7 +101,8 @@ const bool kRegistered = [] {
   for (const View& view : views()) {
     for (const auto& [width, height] : {std::pair{346, 260}, std::pair{1280, 720}}) {
       const Camera camera = Camera::from_fov(width, height, kFieldOfView);
-      for (const auto& [engine, function] : {std::pair{"raycast", &raycast}, std::pair{"gl", &gl}}) {
+      for (const auto& [engine, function] :
+           {std::pair{"raycast", &raycast}, std::pair{"raster", &raster}, std::pair{"gl", &gl}}) {
         const std::string name = view.name + "/" + std::to_string(width) + "x" + std::to_string(height) + "/" + engine;
         benchmark::RegisterBenchmark(name.c_str(),
                                      [=, run = function](benchmark::State& state) { run(state, view, camera); })

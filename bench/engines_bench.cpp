@@ -1,7 +1,6 @@
-// The ray caster and the rasteriser on all processors, and OpenGL, on the same scenes from the same places: one full frame
-// (E, Z and V), 16 samples per pixel as in the shipped scenarios. Names: SCENE/WIDTHxHEIGHT/ENGINE. The label of gl is its
-// device.
-// compare_engines.py makes tables of it.
+// The ray caster and the rasteriser on all processors, and OpenGL, on the same scenes from the same places: one full
+// frame (E, Z and V), 16 samples per pixel as in the shipped scenarios. Names: SCENE/WIDTHxHEIGHT/ENGINE. The label of
+// gl is its device. compare_engines.py makes tables of it.
 #include <benchmark/benchmark.h>
 
 #include <filesystem>

@@ -58,7 +58,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::Success& success) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "esim: %s (see esim --help)\n", error.what());
+    std::fprintf(stderr, "esim: %s\n", problem_of(error, app).c_str());
     return kUsersFault;
   } catch (const esim::RemediableError& error) {
     std::fprintf(stderr, "esim: %s\n", with_remedy(error.what(), error.remedy(), app).c_str());

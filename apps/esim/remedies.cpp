@@ -1,5 +1,12 @@
 #include "remedies.h"
 
+#include <fmt/format.h>
+
+#include <string>
+#include <vector>
+
+#include "esim/scenario/suggest.h"
+
 namespace esim::app {
 namespace {
 
@@ -39,6 +46,37 @@ std::string with_remedy(const std::string& message, Remedy remedy, const CLI::Ap
   const auto [flag, text] = advice_on(remedy);
   if (*flag != '\0' && command.get_option_no_throw(flag) == nullptr) return message;
   return message + text;
+}
+
+std::string problem_of(const CLI::ParseError& error, const CLI::App& app) {
+  const CLI::App* command = &app;
+  std::string path = app.get_name();
+  for (auto given = app.get_subcommands(); !given.empty(); given = command->get_subcommands()) {
+    command = given.front();
+    path += " " + command->get_name();
+  }
+  const std::string help = fmt::format(" (see {} --help)", path);
+  const std::vector<std::string> unknown = app.remaining(true);
+
+  std::vector<std::string> commands, options;
+  for (const CLI::App* known : command->get_subcommands([](const CLI::App*) { return true; })) {
+    if (!known->get_group().empty()) commands.push_back(known->get_name());
+  }
+  for (const CLI::Option* known : command->get_options()) {
+    for (const std::string& name : known->get_lnames()) options.push_back("--" + name);
+  }
+  const auto refuse = [&](const std::string& kind, const std::string& word, const std::vector<std::string>& known) {
+    const std::string similar = nearest(word, known);
+    const std::string advice =
+        similar.empty() ? fmt::format("{}s are {}", kind, list(known)) : fmt::format("did you mean {}?", similar);
+    return fmt::format("{} has no {} {}; {}", path, kind, word, advice) + help;
+  };
+  for (const std::string& word : unknown) {
+    if (word.starts_with("-")) return refuse("option", word.substr(0, word.find('=')), options);
+  }
+  if (commands.empty()) return error.what() + help;
+  if (unknown.empty()) return fmt::format("{} needs a command, one of {}", path, list(commands)) + help;
+  return refuse("command", unknown.front(), commands);
 }
 
 }  // namespace esim::app

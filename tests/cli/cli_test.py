@@ -294,6 +294,14 @@ class BadInput(Cli):
         self.assert_refused(run("simulate", self.folder / "none.yaml", "--out", self.out), "none.yaml", "no such")
         self.assert_refused(run("info", self.folder / "none"))
 
+    def test_unknown_words_are_named_with_the_most_similar_ones(self):
+        for arguments, *words in ((["simulat"], "no command simulat", "did you mean simulate?"), (["--hlp"], "--help"),
+                                  ([], "needs a command", "simulate, video"), (["evaluate", "relism"], "mean realism?"),
+                                  (["simulate", "x.yaml", "--outt", "x"], "no option --outt", "--out?", "esim simulate --help"),
+                                  (["simulate", "x.yaml", "--qqqqqqq=5"], "no option --qqqqqqq;", "options are --help, --out")):
+            with self.subTest(arguments=arguments):
+                self.assert_refused(run(*arguments), *words)
+
     def test_values(self):
         cases = {
             "event_camera.contrast_treshold=0.2": "did you mean contrast_threshold?",

@@ -109,6 +109,23 @@ cameras:
   EXPECT_TRUE(contains(error(std::string(kMinimal) + "event_camera: [1]\n"), "camera.event_camera: must be a map"));
 }
 
+TEST_F(ScenarioFile, NamesTheLineOrTheOptionOfACamerasValue) {
+  const std::string yaml = std::string(kMinimal) + "camera:\n  width: 64\n  psf_px: -3\n";
+  const auto line = std::to_string(std::count(yaml.begin(), yaml.end(), '\n'));
+  EXPECT_TRUE(contains(error(yaml), ":" + line + ": camera.psf_px: -3 is out of range"));
+  const std::string shared = std::string(kMinimal) + "event_camera:\n  leak_rate_hz: -1\ncamera: {width: 64}\n";
+  const auto before_last = std::to_string(std::count(shared.begin(), shared.end(), '\n') - 1);
+  EXPECT_TRUE(contains(error(shared), ":" + before_last + ": camera.event_camera.leak_rate_hz: -1"));
+  EXPECT_TRUE(
+      contains(error(kMinimal, {"event_camera.leak_rate_hz=no"}), "--set camera.event_camera.leak_rate_hz: must"));
+  const std::string two = std::string(kMinimal) + "cameras: [{event_camera: {leak_rate_hz: 1}}, {}]\n";
+  const Scenario scenario = read(two, {"event_camera.leak_rate_hz=2", "event_camera.hot_pixels=0.5"});
+  EXPECT_EQ(scenario.cameras[0].event_camera.leak_rate_hz, 1) << "a camera's own value";
+  EXPECT_EQ(scenario.cameras[0].event_camera.hot_pixels, 0.5);
+  EXPECT_EQ(scenario.cameras[1].event_camera.leak_rate_hz, 2);
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "camera: {width: 5, width: 6}\n"), "appears twice"));
+}
+
 TEST_F(ScenarioFile, ReadsTheFiltersOfTheSensor) {
   const std::string yaml = std::string(kMinimal) + R"(
 event_camera: {preset: imx636, filters: {trail: {}, region: {windows: [{x: 3, y: 4, width: 5, height: 6}]}}}

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <numbers>
 #include <set>
 
@@ -16,6 +17,19 @@
 namespace esim::inline scenario {
 namespace {
 
+constexpr std::array<const char*, 3> kInherited{"sampling", "event_camera", "frame_camera"};
+
+/// A map with the entries of `base`, of which those of `over` replace the ones with the same key. Entries keep their
+/// lines, which YAML::Clone() would lose.
+YAML::Node merged(const YAML::Node& base, const YAML::Node& over) {
+  YAML::Node map(YAML::NodeType::Map);
+  for (const auto& entry : base) {
+    if (!entry.first.IsScalar() || !over[entry.first.Scalar()].IsDefined()) map.force_insert(entry.first, entry.second);
+  }
+  for (const auto& entry : over) map.force_insert(entry.first, entry.second);
+  return map;
+}
+
 /// The map that applies to a camera: the shared map, overridden entry by entry by the camera's own. A map with another
 /// `type` replaces the shared one.
 YAML::Node inherit(const YAML::Node& shared, const YAML::Node& own) {
@@ -23,9 +37,18 @@ YAML::Node inherit(const YAML::Node& shared, const YAML::Node& own) {
   if (!shared.IsMap() || !own.IsMap()) return own;
   const YAML::Node own_type = own["type"], shared_type = shared["type"];
   if (own_type.IsDefined() && (!shared_type.IsDefined() || own_type.Scalar() != shared_type.Scalar())) return own;
-  YAML::Node merged = YAML::Clone(shared);
-  for (const auto& entry : own) merged[entry.first.Scalar()] = entry.second;
-  return merged;
+  return merged(shared, own);
+}
+
+/// The same source, in which what was set for all cameras on the command line is also set for the camera `key`.
+YamlSource with_inherited(YamlSource source, const std::string& key) {
+  const std::vector<std::string> changed = source.changed;
+  for (const std::string& set : changed) {
+    const bool inherited = std::any_of(kInherited.begin(), kInherited.end(),
+                                       [&](const char* part) { return set.substr(0, set.find('.')) == part; });
+    if (inherited) source.changed.push_back(key + "." + set);
+  }
+  return source;
 }
 
 /// One camera for each camera of the calibration file; the camera itself if it names none.
@@ -111,20 +134,23 @@ std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource
   for (std::size_t i = 0; i < count; ++i) {
     const std::string key = several.IsDefined() ? fmt::format("cameras.{}", i) : "camera";
     const YAML::Node entry = several.IsDefined() ? several[i] : one;
-    YAML::Node merged = entry.IsDefined() ? YAML::Clone(entry) : YAML::Node(YAML::NodeType::Map);
-    if (merged.IsMap()) {
-      for (const char* part : {"sampling", "event_camera", "frame_camera"}) {
-        const YAML::Node inherited = inherit(root[part], std::as_const(merged)[part]);
-        if (inherited.IsDefined()) merged[part] = inherited;
+    const YamlSource of_camera = with_inherited(source, key);
+    YAML::Node map = entry.IsDefined() ? entry : YAML::Node(YAML::NodeType::Map);
+    if (map.IsMap()) {
+      YAML::Node parts(YAML::NodeType::Map);
+      for (const char* part : kInherited) {
+        const YAML::Node inherited = inherit(root[part], std::as_const(map)[part]);
+        if (inherited.IsDefined()) parts.force_insert(part, inherited);
       }
-      refuse_geometry_beside_calibration(std::as_const(merged), key, source);
+      map.reset(merged(map, parts));
+      refuse_geometry_beside_calibration(std::as_const(map), key, of_camera);
     }
     CameraOptions options = otherwise;
-    YamlReader reader(merged, key, source);
+    YamlReader reader(map, key, of_camera);
     describe(reader, options);
     reader.finish();
     for (CameraOptions& camera : with_calibration(options)) {
-      check_filters(camera, merged, key, source);
+      check_filters(camera, std::as_const(map), key, of_camera);
       cameras.push_back(std::move(camera));
     }
   }

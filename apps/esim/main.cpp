@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
       "  esim info out/room                                the contents of a recording\n"
       "  esim play out/room                                a video of a recording or of an event file\n"
       "  esim stats out/room --plot                        rates, intervals, hot pixels, banding of its events\n"
-      "  esim fit --static wall.raw --out my_sensor      parameters of a sensor from its recordings\n"
+      "  esim fit --static wall.raw --out my_sensor        parameters of a sensor from its recordings\n"
       "  esim dataset affine --out out/flow                10,000 sequences with optical flow, for learning\n"
       "  esim studio scenes/room.yaml                      design, make and view recordings in a browser\n"
       "  esim evaluate sampling --out out/sampling         accuracy and cost of sampling methods\n"

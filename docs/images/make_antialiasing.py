@@ -21,7 +21,7 @@ def render(rays, folder):
     settings = {"renderer.engine": "raycast", "renderer.samples_per_pixel": rays, "start_s": 1.5, "duration_s": 0.01, "output.preview": "false"}
     arguments = [argument for key, value in settings.items() for argument in ("--set", f"{key}={value}")]
     subprocess.run([ROOT / "build/release/esim", "simulate", ROOT / "scenes/room.yaml", "--out", out, "--quiet", *arguments], check=True)
-    return read_grey_png(out / "images" / "000000.png")
+    return read_grey_png(out / "cam0" / "images" / "000000.png")
 
 
 def read_grey_png(path):

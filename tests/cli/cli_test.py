@@ -138,7 +138,15 @@ class Recordings(Cli):
         result = self.simulate(*FAST, "--set", "sampling={type: flow, lambda: 0.1, max_rate_hz: 100}")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertRegex(result.stderr, r"warning: cam0: \d+ intervals between samples were limited by sampling.max_rate_hz "
-                                        r"\(100 Hz\)")
+                                        r"\(100 Hz\).* Raise max_rate_hz, or move more slowly")
+
+    def test_edges_that_move_in_steps_are_reported(self):
+        short = ["--set", "start_s=1.5", "--set", "duration_s=0.02", "--set", "truth.rate_hz=0", "--set", "sampling={type: adaptive}", "--force"]
+        steps = self.simulate(*short, "--set", "renderer.samples_per_pixel=1", scenario=SCENES / "room.yaml")
+        self.assertEqual(steps.returncode, 0, steps.stderr)
+        self.assertRegex(steps.stderr, r"warning: cam0: .* limited by sampling.max_rate_hz .* Set renderer.samples_per_pixel to 16")
+        smooth = self.simulate(*short, "--set", "renderer.samples_per_pixel=16", scenario=SCENES / "room.yaml")
+        self.assertNotIn("max_rate_hz", smooth.stderr)
 
     def test_a_recording_holds_what_the_manual_says(self):
         result = self.simulate(*FAST, "--set", "output.formats=[text]")

@@ -59,14 +59,23 @@ double max_rate_hz(const Scheme& scheme) {
   }
 }
 
-void add_sampling(const std::string& name, const CameraOptions& camera, const SamplingStatistics& sampling,
-                  std::vector<std::string>& lines) {
+/// Whether edges move in steps of whole pixels, each of which `adaptive` tries to bisect.
+bool has_stepping_edges(const Scenario& scenario) {
+  const auto* mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
+  return mesh && mesh->samples_per_pixel == 1;
+}
+
+void add_sampling(const std::string& name, const Scenario& scenario, const CameraOptions& camera,
+                  const SamplingStatistics& sampling, std::vector<std::string>& lines) {
   if (sampling.held_to_max_rate > 0) {
+    const bool steps = std::holds_alternative<AdaptiveSampling>(camera.sampling) && has_stepping_edges(scenario);
     const double rate = std::visit([](const auto& scheme) { return max_rate_hz(scheme); }, camera.sampling);
     lines.push_back(fmt::format(
         "{}{} intervals between samples were limited by sampling.max_rate_hz ({:g} Hz): the error there is larger than "
-        "the sampling method allows. Raise max_rate_hz, or move more slowly",
-        name, grouped(sampling.held_to_max_rate), rate));
+        "the sampling method allows. {}",
+        name, grouped(sampling.held_to_max_rate), rate,
+        steps ? "Set renderer.samples_per_pixel to 16: with 1, edges move in steps of whole pixels"
+              : "Raise max_rate_hz, or move more slowly"));
   }
   const double budget = sampling.tolerance * camera.event_camera.min_threshold();
   if (sampling.measured_error && sampling.measured_error->p99 > budget) {
@@ -116,7 +125,7 @@ std::vector<std::string> losses(const Scenario& scenario, const Summary& summary
     const CameraOptions& camera = scenario.cameras[i];
     const std::string name = done.name + ": ";
     if (camera.events) add_sensor(name, camera.event_camera.readout, done.sensor, lines);
-    add_sampling(name, camera, done.sampling, lines);
+    add_sampling(name, scenario, camera, done.sampling, lines);
   }
   return lines;
 }

@@ -53,7 +53,7 @@ std::string summary(const SceneFile& file) {
   for (const SceneObject& object : file.scene.objects) {
     if (object.moves) names += (names.empty() ? "" : ", ") + object.name;
   }
-  text += names.empty() ? "; nothing moves"
+  text += names.empty() ? "; no moving objects"
                         : fmt::format("; moving {}: {}", counted(file.motions.size(), "object", "objects"), names);
   if (file.animation.end > file.animation.start) {
     text += fmt::format("; animation from {:.3f} to {:.3f} s", to_seconds(file.animation.start),

@@ -100,7 +100,7 @@ struct MeshRendererOptions {
   double time_scale = 1.0;
   std::vector<ObjectOptions> objects;
   LightingOptions lighting;
-  int samples_per_pixel = 1;
+  int samples_per_pixel = 16;
   double background = 0.2;
 };
 
@@ -121,9 +121,10 @@ void describe(Visitor& visit, MeshRendererOptions& o) {
   visit("lighting", o.lighting, About{"unlit: a surface is as bright as its texture, as in scenes with baked light"});
   visit(
       "samples_per_pixel", o.samples_per_pixel,
-      About{"rays per pixel at edges: 1, 16 or 64; more rays smooth the edges of objects and shadows. raster: with 1, "
-            "pixels see only their centres",
-            "", 1, 64});
+      About{
+          "1, 16 or 64. Above 1, pixels see their whole area, with this number of rays at edges (raycast, and shadows "
+          "of raster). 1 is faster: pixels see only their centres, so that edges move in steps",
+          "", 1, 64});
   visit("background", o.background, About{"irradiance of pixels that see no surface", "", 0, 1e6});
 }
 

@@ -102,7 +102,7 @@ class FragmentShading {
 
   /// The parallelogram whose positions vary like those of the fragment, and in addition by what the footprint of a
   /// complete pixel exceeds the square that edges are averaged over: all fragments of a pixel together are as sharp as
-  /// a pixel without edges, and none sees more of the texture than it covers.
+  /// a pixel without edges, and each sees little of the texture beside what it covers.
   Footprint footprint(const Spread& spread) const {
     constexpr float kSquare = 12, kSmallest = 1e-6F;
     const float of_edges = side_ * side_, others = 1 - of_edges;

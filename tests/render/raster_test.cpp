@@ -159,6 +159,32 @@ TEST(RasterRenderer, RandomTrianglesAreWhatASlowSearchSees) {
   EXPECT_LT(std::sqrt(squares / count), 0.006);
 }
 
+TEST(RasterRenderer, NoSurfaceShowsTheTextureBesideIt) {
+  // A black surface over a black background, whose texture continues in white next to the part that the surface shows,
+  // as in an atlas of many surfaces. A pixel has 12 texels along each side.
+  const Camera model = test::distorted_camera(0);
+  constexpr int kSize = 2048;
+  Image<float> atlas(kSize, kSize, 1.0F);
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize / 2; ++x) atlas(x, y) = 0;
+  const auto texture = std::make_shared<const Texture>(atlas, Wrap::clamp, Wrap::clamp);
+  for (const double angle : {0.0, 0.3, 0.8, 2.0}) {
+    Scene scene = black_half_plane(angle, 1.37, model);
+    Mesh& mesh = scene.objects[0].mesh;
+    mesh.materials[0] = {"atlas", texture, 1.0F};
+    const double texels = 12 / (kSize / 2.0);  // half of the texture per px
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const double n = corner < 2 ? 0 : -1e3 - 1.37, s = corner == 0 ? -1e3 : corner == 1 ? 1e3 : 0;
+      mesh.texture_uv[0][corner] = {static_cast<float>(0.5 + 0.5 * texels * n),
+                                    static_cast<float>(0.5 + 0.5 * texels * s)};
+    }
+    const Sample sample = seen(scene, model, 16, 0.0F);
+    float brightest = 0;
+    for (const float e : sample.irradiance.pixels()) brightest = std::max(brightest, e);
+    EXPECT_LT(brightest, 0.04F) << angle;
+  }
+}
+
 TEST(RasterRenderer, WhatNoSceneShouldContainIsSafe) {
   constexpr float kNaN = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
   const Camera model = test::distorted_camera(1);

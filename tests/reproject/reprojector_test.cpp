@@ -49,7 +49,7 @@ Rendered wide_keyframe(const Make& make, const RenderRequest& request, double su
   make(PixelArea{supersampling, supersampling})->render(request, result.sample);
   result.light.wide = result.sample.irradiance;
   Sample narrow_sample;
-  if (narrow) make(PixelArea{supersampling, 1})->render(request, narrow_sample);
+  if (narrow) make(PixelArea{})->render(request, narrow_sample);
   result.light.narrow = narrow_sample.irradiance;
   return result;
 }

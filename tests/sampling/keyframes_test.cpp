@@ -199,8 +199,9 @@ TEST(Keyframes, AreRefusedForColourFilters) {
 /// Shows how wide its pixels are: E is the side for edges, Z that for textures; the pixels' own are 1 and 1.
 class AreaRenderer final : public ProcessorRenderer {
  public:
-  AreaRenderer(const Camera& camera, const PixelArea& area) : camera_(camera), area_(area) {}
-  RendererTraits traits() const override { return {.name = "test"}; }
+  AreaRenderer(const Camera& camera, const PixelArea& area, bool has_edges)
+      : camera_(camera), area_(area), has_edges_(has_edges) {}
+  RendererTraits traits() const override { return {.name = "test", .has_edges = has_edges_}; }
 
  private:
   void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
@@ -212,6 +213,7 @@ class AreaRenderer final : public ProcessorRenderer {
 
   Camera camera_;
   PixelArea area_;
+  bool has_edges_;
 };
 
 struct Lit {
@@ -219,14 +221,13 @@ struct Lit {
   Sample sample;
 };
 
-/// One keyframe of a scene whose renderer supports the areas for which `supports` is true.
-Lit keyframe_of(int supersampling, const std::function<bool(const PixelArea&)>& supports) {
+/// One keyframe of a scene, whose renderer averages over other areas or does not.
+Lit keyframe_of(int supersampling, bool averages, bool has_edges = true) {
   const Camera sensor = Camera::from_fov(8, 6, 1.0);
-  AreaRenderer renderer(sensor, {});
+  AreaRenderer renderer(sensor, {}, has_edges);
   const SceneAccess access{sensor, renderer, {}, [&](const Camera& camera, const std::optional<PixelArea>& area) {
-                             const bool possible = !area || supports(*area);
-                             return possible ? std::make_unique<AreaRenderer>(camera, area.value_or(PixelArea{}))
-                                             : nullptr;
+                             if (area && !averages) return std::unique_ptr<AreaRenderer>();
+                             return std::make_unique<AreaRenderer>(camera, area.value_or(PixelArea{}), has_edges);
                            }};
   const KeyframeLayout layout = lay_out_keyframes(sensor, supersampling, 1);
   KeyframeRenderer keyframes(layout, access);
@@ -242,23 +243,23 @@ Lit keyframe_of(int supersampling, const std::function<bool(const PixelArea&)>& 
 }
 
 TEST(KeyframeRenderer, RendersWideAndNarrowPixelsIfItCan) {
-  const Lit both = keyframe_of(3, [](const PixelArea&) { return true; });
+  const Lit both = keyframe_of(3, true);
   EXPECT_EQ(both.light.wide(4, 5), 3);
   EXPECT_EQ(both.light.narrow(4, 5), 1);
   EXPECT_EQ(both.sample.depth(4, 5), 3);
 
-  const Lit wide = keyframe_of(3, [](const PixelArea& area) { return area.edges == area.texture; });
+  const Lit wide = keyframe_of(3, true, false);
   EXPECT_EQ(wide.light.wide(4, 5), 3);
   EXPECT_TRUE(wide.light.narrow.empty());
 
-  const Lit narrow = keyframe_of(3, [](const PixelArea&) { return false; });
+  const Lit narrow = keyframe_of(3, false);
   EXPECT_TRUE(narrow.light.wide.empty());
   EXPECT_EQ(narrow.light.narrow(4, 5), 1);
   EXPECT_EQ(narrow.sample.depth(4, 5), 1);
 }
 
 TEST(KeyframeRenderer, RendersOnceWithoutSupersampling) {
-  const Lit lit = keyframe_of(1, [](const PixelArea&) { return true; });
+  const Lit lit = keyframe_of(1, true);
   EXPECT_EQ(lit.light.wide(4, 5), 1);
   EXPECT_TRUE(lit.light.narrow.empty());
 }

@@ -33,6 +33,7 @@ struct RendererTraits {
   std::string name;                             ///< as in the scenario; used in reports
   Granularity granularity = Granularity::tile;  ///< frame: a tile costs as much as the full image
   bool at_infinity = false;                     ///< all surfaces are infinitely far away
+  bool has_edges = true;                        ///< surfaces may end in the image
   bool on_sensor = false;  ///< drawn on the sensor: the camera's pose, twist and lens have no effect
   std::string device{};    ///< that it runs on; empty for the processor
   std::string engine{};    ///< on the processor, if there are several

@@ -29,7 +29,7 @@ class PanoramaRenderer final : public ProcessorRenderer {
       : panorama_(std::move(panorama)), rays_(camera, footprint), workers_(workers), mosaic_(mosaic) {}
 
   RendererTraits traits() const override {
-    return {.name = "panorama", .granularity = Granularity::tile, .at_infinity = true};
+    return {.name = "panorama", .granularity = Granularity::tile, .at_infinity = true, .has_edges = false};
   }
 
  private:

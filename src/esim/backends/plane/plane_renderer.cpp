@@ -17,7 +17,7 @@ class PlaneRenderer final : public ProcessorRenderer {
       : plane_(std::move(plane)), rays_(camera, footprint), workers_(workers), mosaic_(mosaic) {}
 
   RendererTraits traits() const override {
-    return {.name = "plane", .granularity = Granularity::tile, .at_infinity = false};
+    return {.name = "plane", .granularity = Granularity::tile, .at_infinity = false, .has_edges = false};
   }
 
  private:

@@ -129,12 +129,17 @@ void RaycastScene::add_group(const std::vector<const Mesh*>& meshes) {
   Group& group = groups_.emplace_back();
   group.first_triangle = static_cast<std::uint32_t>(triangles_.size());
   for (const Mesh* mesh : meshes) {
-    append(*mesh);
     for (const Eigen::Vector3f& vertex : mesh->vertices) group.bounds.extend(vertex);
   }
-  if (triangles_.size() == group.first_triangle) return;
+  build_trees(meshes, group);
+  for (const Mesh* mesh : meshes) append(*mesh);  // last: building a tree takes memory of its own
+}
+
+/// Prepares the triangles of a group for what the scene is used for.
+void RaycastScene::build_trees(const std::vector<const Mesh*>& meshes, Group& group) const {
   const Mesh all = meshes.size() == 1 ? Mesh() : joined(meshes);
   const Mesh& mesh = meshes.size() == 1 ? *meshes[0] : all;
+  if (mesh.triangles.empty()) return;
   if (use_ == SceneUse::surfaces || mesh.triangles.size() <= kMaxInTree)
     group.tree = TriangleTree(mesh.vertices, mesh.triangles);
   if (use_ == SceneUse::surfaces && !(lighting_ && lighting_->shadows)) return;

@@ -92,6 +92,7 @@ class RaycastScene {
   };
 
   void add_group(const std::vector<const Mesh*>& meshes);
+  void build_trees(const std::vector<const Mesh*>& meshes, Group& group) const;
   void append(const Mesh& mesh);
   void append_colours(const std::vector<const Mesh*>& meshes);
 

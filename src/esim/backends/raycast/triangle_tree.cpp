@@ -6,6 +6,8 @@
 #include <limits>
 #include <tuple>
 
+#include "esim/core/error.h"
+
 namespace esim::inline backends::inline raycast {
 namespace {
 
@@ -106,7 +108,6 @@ class TriangleTree::Builder {
  private:
   std::uint32_t add_leaf(std::span<const Piece> pieces) {
     Leaf leaf;
-    leaf.count = static_cast<int>(pieces.size());
     for (std::size_t i = 0; i < kWide; ++i) {
       leaf.index[i] = pieces[std::min(i, pieces.size() - 1)].index;
       for (std::size_t corner = 0; corner < 3; ++corner) {
@@ -116,7 +117,9 @@ class TriangleTree::Builder {
       }
     }
     tree_.leaves_.push_back(leaf);
-    return kLeaf | static_cast<std::uint32_t>(tree_.leaves_.size() - 1);
+    const auto place = static_cast<std::uint32_t>(tree_.leaves_.size() - 1);
+    if (place >= kLastLane) throw UserError("mesh: has too many triangles; use a mesh with fewer than 200 million");
+    return kLeaf | static_cast<std::uint32_t>(pieces.size() - 1) * kLastLane | place;
   }
 
   TriangleTree& tree_;
@@ -125,7 +128,11 @@ class TriangleTree::Builder {
 };
 
 TriangleTree::TriangleTree(std::span<const Vector> vertices, std::span<const std::array<std::uint32_t, 3>> triangles) {
+  // Most leaves are more than half full. Memory that is reserved but never written does not count, and a vector that
+  // grows would hold its leaves twice.
+  leaves_.reserve(triangles.size() / (kWide / 2) + 1);
   std::vector<Piece> pieces;
+  pieces.reserve(triangles.size());
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     Piece piece{{}, static_cast<std::uint32_t>(i)};
     for (const std::uint32_t corner : triangles[i]) piece.box.extend(vertices[corner]);
@@ -171,8 +178,8 @@ struct TriangleTree::Pyramid {
     return not_negative(inside) & ((1U << node.count) - 1);
   }
 
-  /// A bit for each of the triangles that may intersect it.
-  unsigned meets(const Leaf& leaf) const {
+  /// A bit for each of the triangles, up to the lane `last`, that may intersect it.
+  unsigned meets(const Leaf& leaf, unsigned last) const {
     alignas(32) std::array<float, kWide> inside;
     inside.fill(1);
     for (std::size_t p = 0; p < 4; ++p) {
@@ -185,7 +192,7 @@ struct TriangleTree::Pyramid {
         inside[i] = std::min(inside[i], std::max(std::max(side(0), side(1)), side(2)) + offset[p]);
       }
     }
-    return not_negative(inside) & ((1U << leaf.count) - 1);
+    return not_negative(inside) & ((2U << last) - 1);
   }
 
   static unsigned not_negative(const std::array<float, kWide>& values) {
@@ -244,8 +251,8 @@ bool TriangleTree::walk(const Pyramid& pyramid, const Visit& visit) const {
         waiting.push_back(node.child[static_cast<std::size_t>(std::countr_zero(met))]);
       continue;
     }
-    const Leaf& leaf = leaves_[next & ~kLeaf];
-    const unsigned met = pyramid.meets(leaf);
+    const Leaf& leaf = leaves_[next % kLastLane];
+    const unsigned met = pyramid.meets(leaf, (next & ~kLeaf) / kLastLane);
     if (met != 0 && !visit(leaf, met)) return false;
   }
   return true;

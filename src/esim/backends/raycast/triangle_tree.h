@@ -55,11 +55,10 @@ class TriangleTree {
   static constexpr int kWide = 8;
   using Lanes = std::array<float, kWide>;
 
-  /// Up to eight triangles: corner by corner, coordinate by coordinate. Lanes from `count` on repeat the last one.
+  /// Up to eight triangles: corner by corner, coordinate by coordinate. The remaining lanes repeat the last one.
   struct alignas(64) Leaf {
     std::array<std::array<Lanes, 3>, 3> corner;
     std::array<std::uint32_t, kWide> index;
-    int count;
   };
 
   /// Triangles of a leaf, a bit for each.
@@ -83,10 +82,10 @@ class TriangleTree {
   /// The boxes of eight nodes or leaves: centres and half sides.
   struct alignas(64) Node {
     std::array<Lanes, 3> middle, half;
-    std::array<std::uint32_t, kWide> child;  // kLeaf: of leaves_
+    std::array<std::uint32_t, kWide> child;  // in nodes_; or kLeaf, a leaf's last lane, and its place in leaves_
     int count;
   };
-  static constexpr std::uint32_t kLeaf = 1U << 31;
+  static constexpr std::uint32_t kLeaf = 1U << 31, kLastLane = 1U << 28;
 
   struct Pyramid;
   class Builder;

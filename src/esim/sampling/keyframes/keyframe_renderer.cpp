@@ -28,8 +28,8 @@ KeyframeRenderer::KeyframeRenderer(const KeyframeLayout& layout, const SceneAcce
   wide_ = scene.make_renderer(layout.camera, PixelArea{s, s});
   if (wide_ == nullptr) {
     narrow_ = scene.make_renderer(layout.camera, std::nullopt);
-  } else if (s > 1) {
-    narrow_ = scene.make_renderer(layout.camera, PixelArea{s, 1});
+  } else if (s > 1 && wide_->traits().has_edges) {
+    narrow_ = scene.make_renderer(layout.camera, PixelArea{1, 1});
   }
 }
 

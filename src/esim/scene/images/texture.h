@@ -229,17 +229,20 @@ HWY_INLINE auto Texture::footprint(D d, const Moments<V>& moments) const -> Foot
   const V oblique = hn::Max(hn::Abs(uv), hn::Set(d, 1e-20F));
   const V too_oblique = hn::Sub(one, hn::Div(hn::Mul(across, hn::Set(d, kTolerance)), oblique));
   const V too_long = hn::Sub(major, hn::Max(hn::Mul(hn::Set(d, kRectangle2), across), hn::Set(d, kFirstLevel2)));
-  const V along = hn::Max(zero, hn::Max(hn::Mul(hn::Add(radius, radius), too_oblique), too_long));
+  V along = hn::Max(zero, hn::Max(hn::Mul(hn::Add(radius, radius), too_oblique), too_long));
   if (!hn::AllTrue(d, hn::Le(along, zero))) {
-    const V direction = hn::Mul(half, hn::Div(apart, hn::Max(radius, hn::Set(d, 1e-20F))));
-    const V part_u = hn::Mul(along, hn::Add(half, direction)), part_v = hn::Mul(along, hn::Sub(half, direction));
-    f.width2_u = hn::Max(hn::Sub(f.width2_u, part_u), zero), f.width2_v = hn::Max(hn::Sub(f.width2_v, part_v), zero);
-    // n probes at a distance s have the square width (n^2 - 1) s^2. They are not farther apart than a probe is wide.
+    // n probes at a distance s have the square width (n^2 - 1) s^2. They are not farther apart than a probe is wide. If
+    // the footprint is long enough, they are not closer either: so the row of probes ends where the footprint ends.
     const V width2 = hn::Max(hn::Sub(major, along), across);
     for (int n = 1; n < kMaxProbes; ++n) {
       const V longest = hn::Mul(hn::Set(d, static_cast<float>(n * n - 1)), width2);
       f.probes = hn::IfThenElse(hn::Gt(along, longest), hn::Set(d, static_cast<float>(n + 1)), f.probes);
     }
+    const V side_by_side = hn::Mul(major, hn::Sub(one, hn::Div(one, hn::Mul(f.probes, f.probes))));
+    along = hn::Max(along, hn::Min(side_by_side, hn::Add(radius, radius)));
+    const V direction = hn::Mul(half, hn::Div(apart, hn::Max(radius, hn::Set(d, 1e-20F))));
+    const V part_u = hn::Mul(along, hn::Add(half, direction)), part_v = hn::Mul(along, hn::Sub(half, direction));
+    f.width2_u = hn::Max(hn::Sub(f.width2_u, part_u), zero), f.width2_v = hn::Max(hn::Sub(f.width2_v, part_v), zero);
     const V per_distance = hn::Max(hn::MulSub(f.probes, f.probes, one), one);
     f.per_probe = hn::Div(one, f.probes);
     const auto distance = [&](V part, float size) {

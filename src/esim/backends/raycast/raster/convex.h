@@ -30,6 +30,16 @@ struct OfPixel {
   float reach() const { return 0.5F * (std::fabs(s) + std::fabs(t)); }
 };
 
+/// Integrals over an area in a pixel.
+struct Moments {
+  float area = 0, s = 0, t = 0, ss = 0, st = 0, tt = 0;  ///< of 1, of the position, and of its products
+
+  void add(float weight, float at_s, float at_t) { area += weight, s += weight * at_s, t += weight * at_t; }
+  void add_products(float weight, float at_s, float at_t) {
+    ss += weight * at_s * at_s, st += weight * at_s * at_t, tt += weight * at_t * at_t;
+  }
+};
+
 /// A convex polygon in a pixel, empty if it has fewer than three corners.
 class Convex {
   using D = hn::CappedTag<float, 8>;
@@ -107,12 +117,14 @@ class Convex {
     *this = kept;
   }
 
-  /// Adds the area, and the area times the centroid.
-  void integrate(float& area, float& first_s, float& first_t) const {
+  void integrate(Moments& sum) const {
     for (std::size_t i = 2; i < count_; ++i) {
       const float twice = std::fabs((s_[i - 1] - s_[0]) * (t_[i] - t_[0]) - (t_[i - 1] - t_[0]) * (s_[i] - s_[0]));
-      area += 0.5F * twice;
-      first_s += twice * (s_[0] + s_[i - 1] + s_[i]) / 6, first_t += twice * (t_[0] + t_[i - 1] + t_[i]) / 6;
+      const float s = s_[0] + s_[i - 1] + s_[i], t = t_[0] + t_[i - 1] + t_[i];
+      sum.add(0.5F * twice, s / 3, t / 3);
+      // The products over a triangle: a twelfth of its area times those of its corners, and of the sum of its corners.
+      for (const std::size_t corner : {std::size_t{0}, i - 1, i}) sum.add_products(twice / 24, s_[corner], t_[corner]);
+      sum.add_products(twice / 24, s, t);
     }
   }
 

@@ -14,6 +14,15 @@ constexpr float kSameDepth = 2e-6F;     // relative; surfaces at the same depth:
 constexpr std::size_t kMaxPieces = 24;  // of a fragment, or of what is left of a pixel
 constexpr std::size_t kMaxCuts = 5;     // of a piece by a surface
 
+Fragment fragment_of(std::uint32_t triangle, std::uint16_t pixel, const Moments& sum) {
+  const float s = sum.s / sum.area, t = sum.t / sum.area;
+  return {triangle,
+          pixel,
+          {s, t},
+          {sum.ss / sum.area - s * s, sum.st / sum.area - s * t, sum.tt / sum.area - t * t},
+          sum.area};
+}
+
 }  // namespace
 
 Coverage::Coverage(std::span<const Eigen::Vector2f> places, bool store_samples)
@@ -31,7 +40,7 @@ SeenInMiddle Coverage::divide(const CellSurfaces& surfaces, const ImageCell& cel
   const auto k = static_cast<std::size_t>(pixel);
   if (found.size() == 1 && found[0].fills_pixel != 0) {
     const ScreenTriangle& triangle = surfaces.triangle(found[0].triangle);
-    fragments.push_back({found[0].triangle, static_cast<std::uint16_t>(pixel), {0, 0}, 1, every_sample_});
+    fragments.push_back({found[0].triangle, static_cast<std::uint16_t>(pixel), {0, 0}, {}, 1, every_sample_});
     return {triangle.inverse_depth().at(cell.x[k], cell.y[k]), triangle.group};
   }
   surfaces_ = &surfaces, cell_ = &cell, pixel_ = static_cast<std::uint16_t>(pixel);
@@ -108,19 +117,19 @@ bool Coverage::divide_exactly(std::vector<Fragment>& fragments) {
   candidates_.reserve(order_.size());  // so that references to its elements remain valid
   for (std::size_t i = 0; i < order_.size() && !left_.empty(); ++i) {
     if (i == kMaxExact) return false;
-    float area = 0, s = 0, t = 0;
+    Moments sum;
     if (i + 1 == order_.size() && found(i).fills_pixel != 0) {
-      for (const Convex& piece : left_) piece.integrate(area, s, t);
+      for (const Convex& piece : left_) piece.integrate(sum);
       left_.clear();
     } else if (!local(i).outside) {
       remaining_.clear();
       for (Convex& piece : left_) {
         if (!take(piece, i)) return false;
-        for (const Convex& visible : visible_) visible.integrate(area, s, t);
+        for (const Convex& visible : visible_) visible.integrate(sum);
       }
       std::swap(left_, remaining_);
     }
-    if (area > kSmallestArea) fragments.push_back({found(i).triangle, pixel_, {s / area, t / area}, area});
+    if (sum.area > kSmallestArea) fragments.push_back(fragment_of(found(i).triangle, pixel_, sum));
   }
   return true;
 }
@@ -233,21 +242,18 @@ void Coverage::look_at_samples() {
 }
 
 void Coverage::divide_by_samples(std::vector<Fragment>& fragments) {
-  struct Sum {
-    float count = 0, s = 0, t = 0;
-  };
+  // Each sample stands for a square of its part of the pixel.
   const std::size_t count = samples_.size();
-  std::vector<Sum> sums(candidates_.size());
+  const float part = 1 / static_cast<float>(count);
+  std::vector<Moments> sums(candidates_.size());
   for (std::size_t i = 0; i < count; ++i) {
     if (seen_[i] == kNone) continue;
-    Sum& sum = sums[seen_[i]];
-    sum.count += 1, sum.s += s_[i], sum.t += t_[i];
+    Moments& sum = sums[seen_[i]];
+    sum.add(part, s_[i], t_[i]), sum.add_products(part, s_[i], t_[i]);
+    sum.ss += part * part / 12, sum.tt += part * part / 12;
   }
   for (std::size_t c = 0; c < candidates_.size(); ++c) {
-    const Sum& sum = sums[c];
-    if (sum.count == 0) continue;
-    const PixelPoint centroid{sum.s / sum.count, sum.t / sum.count};
-    fragments.push_back({candidates_[c].triangle, pixel_, centroid, sum.count / static_cast<float>(count)});
+    if (sums[c].area > 0) fragments.push_back(fragment_of(candidates_[c].triangle, pixel_, sums[c]));
   }
 }
 

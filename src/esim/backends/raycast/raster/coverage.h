@@ -15,11 +15,17 @@ namespace esim::inline backends::inline raycast {
 /// Smaller parts of a pixel are ignored.
 inline constexpr float kSmallestArea = 2e-5F;
 
+/// Variances and covariance of the positions in an area. The defaults are those of a complete pixel.
+struct Spread {
+  float ss = 1.0F / 12, st = 0, tt = 1.0F / 12;
+};
+
 /// The visible part of a triangle in a pixel.
 struct Fragment {
   std::uint32_t triangle;  ///< of the cell's
   std::uint16_t pixel;     ///< of the cell
   PixelPoint centroid;
+  Spread spread;
   float area;               ///< fraction of the pixel
   std::uint64_t samples{};  ///< a bit for each position at which it is visible, if requested
 };

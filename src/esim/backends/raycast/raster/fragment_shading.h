@@ -81,9 +81,11 @@ class FragmentShading {
       hit.Ng_x[i] = triangle.normal[0], hit.Ng_y[i] = triangle.normal[1], hit.Ng_z[i] = triangle.normal[2];
       hit.instID[0][i] = triangle.group;
       rays.triangle[i] = triangle.index;
-      const float scale = footprint(fragment.area) / side_;
-      work.block.dx_du[i] = scale * cell.dx_du[k], work.block.dx_dv[i] = scale * cell.dx_dv[k];
-      work.block.dy_du[i] = scale * cell.dy_du[k], work.block.dy_dv[i] = scale * cell.dy_dv[k];
+      const Footprint print = footprint(fragment.spread);
+      const float dx_ds = cell.dx_du[k] / side_, dx_dt = cell.dx_dv[k] / side_;
+      const float dy_ds = cell.dy_du[k] / side_, dy_dt = cell.dy_dv[k] / side_;
+      work.block.dx_du[i] = print.u_s * dx_ds + print.u_t * dx_dt, work.block.dx_dv[i] = print.v_t * dx_dt;
+      work.block.dy_du[i] = print.u_s * dy_ds + print.u_t * dy_dt, work.block.dy_dv[i] = print.v_t * dy_dt;
       if (mosaic) {
         const int column = fragment.pixel % ImageCell::kWidth, row = fragment.pixel / ImageCell::kWidth;
         work.first_material[i] = scene_.first_material(colour_at(column, row));
@@ -92,11 +94,23 @@ class FragmentShading {
     for (const std::uint32_t index : rays.triangle) __builtin_prefetch(&scene_.triangle(index));
   }
 
-  /// Side of the footprint on the texture of a fragment that covers a part of its pixel, in footprints of a complete
-  /// pixel, whose variance is 1/12. The centroids of stripes of the width a vary by (1 - a^2) / 12 across and not at
-  /// all along the stripes, of squared sides of the square that edges are averaged over. The filter supplies the rest,
-  /// so that surfaces are equally sharp where edges cross a pixel.
-  float footprint(float area) const { return std::sqrt(std::max(0.0F, 1 - 0.5F * side_ * side_ * (1 - area * area))); }
+  /// Sides of the parallelogram over which the texture of a fragment is averaged, in footprints of a complete pixel:
+  /// u = (u_s, u_t) and v = (0, v_t).
+  struct Footprint {
+    float u_s, u_t, v_t;
+  };
+
+  /// The parallelogram whose positions vary like those of the fragment, and in addition by what the footprint of a
+  /// complete pixel exceeds the square that edges are averaged over: all fragments of a pixel together are as sharp as
+  /// a pixel without edges, and each sees little of the texture beside what it covers.
+  Footprint footprint(const Spread& spread) const {
+    constexpr float kSquare = 12, kSmallest = 1e-6F;
+    const float of_edges = side_ * side_, others = 1 - of_edges;
+    const float ss = std::max(others + of_edges * kSquare * spread.ss, kSmallest), st = of_edges * kSquare * spread.st;
+    const float tt = others + of_edges * kSquare * spread.tt;
+    const float u_s = std::sqrt(ss), u_t = st / u_s;
+    return {u_s, u_t, std::sqrt(std::max(tt - u_t * u_t, kSmallest))};
+  }
 
   /// Averages the light over the samples of fragments in which it may vary.
   void smooth_shadows(const CellSurfaces& surfaces, const ImageCell& cell, std::span<const Fragment> fragments) {

@@ -167,6 +167,21 @@ TEST(Fit, LosesNoDigitsFarFromTheOrigin) {
   }
 }
 
+// The rounding errors of a linear solve, which sparse poses amplify, would depend on the unit of length.
+TEST(Fit, OfSparsePositionsIsExactToRounding) {
+  const auto poses = sample(smooth_motion, 251, 5.0, 0.0);
+  auto tripled = poses;
+  for (TimedPose& pose : tripled) pose.T_world_body.translation *= 3;
+  const FittedTrajectory one = fit_trajectory(poses, {}), three = fit_trajectory(tripled, {});
+  ASSERT_LT(one.report.knot_interval_s, 0.015) << "closer than the poses";
+  double largest_m = 0;
+  for (double t = 0; t < 5; t += 0.0037) {
+    const Vector3d difference_m = pose_at(three, t).translation / 3 - pose_at(one, t).translation;
+    largest_m = std::max(largest_m, difference_m.norm());
+  }
+  EXPECT_LT(largest_m, 1e-13);
+}
+
 TEST(Fit, DoesNotMindTheSignsOfQuaternions) {
   const auto poses = sample(smooth_motion, 201, 1.0);
   std::vector<TimedPose> flipped = poses;

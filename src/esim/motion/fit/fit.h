@@ -44,8 +44,8 @@ struct FittedTrajectory {
 /// with Δt the median interval of the poses and the integrals taken from differences of control points: with knot
 /// interval h, ∫|p‴|² ≈ Σ_j |third difference of p_j|² h⁻⁵, and ∫|ω″|² ≈ Σ_j |second difference of d_j|² h⁻⁵ with
 /// d_j = Log(R_j⁻¹ R_{j+1}). With only two poses the second derivative is penalised instead of the third (and τ⁴ h⁻³
-/// replaces τ⁶ h⁻⁵). Positions require one linear solve; rotations require Gauss-Newton steps with exact Jacobians
-/// until convergence.
+/// replaces τ⁶ h⁻⁵). Positions require one linear problem, solved to rounding errors; rotations require Gauss-Newton
+/// steps with exact Jacobians until convergence.
 ///
 /// Between successive poses, the shorter of the two rotations is assumed. Stamps need not be uniform, within the limit
 /// of find_stamp_fault(). Throws UserError for fewer than two poses, faulty stamps, poses that are not finite, a span

@@ -83,6 +83,31 @@ class RotationProblem {
   SmoothnessPenalty penalty_;
 };
 
+using PositionProblem = BandedLeastSquares<1, 3>;
+
+/// The position problem for changes of the control points `controls`; all positions relative to `origin`.
+PositionProblem linearise_positions(const UniformBasis& basis, std::span<const double> times_s,
+                                    std::span<const Eigen::Vector3d> positions, const Eigen::Vector3d& origin,
+                                    const SmoothnessPenalty& penalty, const PositionProblem::Solution& controls) {
+  PositionProblem problem(basis.control_points(), reach(basis, penalty));
+  const auto add = [&](int first, std::span<const double> factors, PositionProblem::Value residual, double weight) {
+    std::array<PositionProblem::Block, kMaxSplineOrder> jacobian;
+    for (std::size_t j = 0; j < factors.size(); ++j) {
+      jacobian[j](0) = factors[j];
+      residual += factors[j] * controls.row(first + static_cast<Eigen::Index>(j));
+    }
+    problem.add(first, std::span(jacobian).first(factors.size()), residual, weight);
+  };
+  for (std::size_t i = 0; i < times_s.size(); ++i) {
+    const BasisWeights weights = basis.weights(times_s[i]);
+    add(weights.first, std::span(weights.value).first(static_cast<std::size_t>(basis.order())),
+        (origin - positions[i]).transpose(), 1.0);
+  }
+  for (int j = 0; j + penalty.difference_order < basis.control_points(); ++j)
+    add(j, difference_coefficients(penalty.difference_order), PositionProblem::Value::Zero(), penalty.weight);
+  return problem;
+}
+
 So3Spline moved(const So3Spline& spline, const Eigen::VectorXd& step) {
   std::vector<Eigen::Quaterniond> rotations = spline.rotations();
   for (std::size_t j = 0; j < rotations.size(); ++j) {
@@ -96,24 +121,15 @@ So3Spline moved(const So3Spline& spline, const Eigen::VectorXd& step) {
 std::vector<Eigen::Vector3d> fit_control_positions(const UniformBasis& basis, std::span<const double> times_s,
                                                    std::span<const Eigen::Vector3d> positions,
                                                    const SmoothnessPenalty& penalty) {
-  using LeastSquares = BandedLeastSquares<1, 3>;
-  LeastSquares problem(basis.control_points(), reach(basis, penalty));
+  // The first step solves the linear problem. The others remove its rounding errors, which some motions of the control
+  // points amplify by 1e8, since the poses hardly constrain them.
+  constexpr int kSteps = 3;
+
   // Relative to the first position, to keep precision for coordinates far from the origin.
   const Eigen::Vector3d origin = positions.front();
-  for (std::size_t i = 0; i < times_s.size(); ++i) {
-    const BasisWeights weights = basis.weights(times_s[i]);
-    std::array<LeastSquares::Block, kMaxSplineOrder> jacobian;
-    for (int j = 0; j < basis.order(); ++j) jacobian[j](0) = weights.value[j];
-    problem.add(weights.first, std::span(jacobian).first(basis.order()), (origin - positions[i]).transpose(), 1.0);
-  }
-  const auto coefficients = difference_coefficients(penalty.difference_order);
-  std::array<LeastSquares::Block, kMaxDifferenceOrder + 1> jacobian;
-  for (std::size_t k = 0; k < coefficients.size(); ++k) jacobian[k](0) = coefficients[k];
-  for (int j = 0; j + penalty.difference_order < basis.control_points(); ++j) {
-    problem.add(j, std::span(jacobian).first(coefficients.size()), LeastSquares::Value::Zero(), penalty.weight);
-  }
-
-  const LeastSquares::Solution solution = problem.solve();
+  PositionProblem::Solution solution = PositionProblem::Solution::Zero(basis.control_points(), 3);
+  for (int step = 0; step < kSteps; ++step)
+    solution += linearise_positions(basis, times_s, positions, origin, penalty, solution).solve();
   std::vector<Eigen::Vector3d> controls;
   for (Eigen::Index j = 0; j < solution.rows(); ++j) controls.push_back(origin + solution.row(j).transpose());
   return controls;

@@ -72,20 +72,24 @@ Prepared& prepared(const View& view) {
   return last;
 }
 
-void raycast(benchmark::State& state, const View& view, const Camera& camera) {
+/// An engine of the processor, on all of it. `built` is its scene of the last view.
+template <typename Options, typename Build, typename Make>
+void on_processor(benchmark::State& state, const View& view, const Camera& camera,
+                  std::shared_ptr<const RaycastScene> Prepared::*built, const Build& build, const Make& make) {
   const Workers workers(static_cast<int>(std::thread::hardware_concurrency()));
   Prepared& room = prepared(view);
-  if (room.raycast == nullptr) room.raycast = build_raycast_scene(room.scene);
-  const auto renderer = make_raycast_renderer(room.raycast, {.samples_per_pixel = kSamplesPerPixel}, camera, workers);
+  if (room.*built == nullptr) room.*built = build(room.scene);
+  const auto renderer = make(room.*built, Options{.samples_per_pixel = kSamplesPerPixel}, camera, workers,
+                             ColourFilters::none, PixelArea{});
   bench::render_frames(state, *renderer, camera, motion_from(view.T_world_camera));
 }
 
+void raycast(benchmark::State& state, const View& view, const Camera& camera) {
+  on_processor<RaycastOptions>(state, view, camera, &Prepared::raycast, build_raycast_scene, make_raycast_renderer);
+}
+
 void raster(benchmark::State& state, const View& view, const Camera& camera) {
-  const Workers workers(static_cast<int>(std::thread::hardware_concurrency()));
-  Prepared& room = prepared(view);
-  if (room.raster == nullptr) room.raster = build_raster_scene(room.scene);
-  const auto renderer = make_raster_renderer(room.raster, {.samples_per_pixel = kSamplesPerPixel}, camera, workers);
-  bench::render_frames(state, *renderer, camera, motion_from(view.T_world_camera));
+  on_processor<RasterOptions>(state, view, camera, &Prepared::raster, build_raster_scene, make_raster_renderer);
 }
 
 void gl(benchmark::State& state, const View& view, const Camera& camera) {

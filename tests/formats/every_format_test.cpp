@@ -89,7 +89,8 @@ TEST_P(EveryFormat, EventsReadBackAsTheyWere) {
   for (const std::size_t count : {0, 1, 1000, 300'000}) {
     const std::vector<Event> events = random_events(count);
     const fs::path path = write(events);
-    ASSERT_EQ(format_of(path).name, format_.name) << "recognised by its content";
+    const Format& found = format_of(path);
+    ASSERT_TRUE(found.name == format_.name || !format_.recognises) << "recognised by its content: " << found.name;
     EXPECT_EQ(read(path), events) << count;
     const auto source = open_source(path);
     EXPECT_LE(source->info().start, events.empty() ? 0 : events.front().t);

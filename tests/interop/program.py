@@ -31,9 +31,9 @@ class InteropTest(unittest.TestCase):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="esim_interop_"))
         self.addCleanup(shutil.rmtree, self.folder)
 
-    def convert(self, source, out):
+    def convert(self, source, out, *options):
         path = self.folder / out
-        result = subprocess.run([ESIM, "convert", str(source), str(path)], capture_output=True, text=True, timeout=120)
+        result = subprocess.run([ESIM, "convert", str(source), str(path), *options], capture_output=True, text=True, timeout=120)
         self.assertEqual(result.returncode, 0, result.stderr)
         return path
 

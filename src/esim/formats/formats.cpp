@@ -57,7 +57,9 @@ const std::vector<Format>& all_formats() {
       aedat4_zstd_format(),
       aedat4_format(),
       rosbag_format(),
+      rosbag_packets_format(),
       mcap_format(),
+      mcap_packets_format(),
       dataset_format(),
       dataset_folder_format(),
       m3ed_format(),
@@ -90,7 +92,7 @@ const Format& format_of(const fs::path& path) {
   const bool folder = fs::is_directory(path, error);
   const std::string head = folder ? std::string() : read_head(path, kHeadBytes);
   for (const Format& format : all_formats()) {
-    if (format.folder == folder && format.recognises(path, head)) return format;
+    if (format.folder == folder && format.recognises && format.recognises(path, head)) return format;
   }
   if (head.starts_with("SQLite format 3")) {
     throw UserError(

@@ -28,7 +28,7 @@ std::uint32_t lanes_equal(const std::uint32_t* values, std::uint32_t value) {
   for (std::size_t i = 0; i < K; i += hn::Lanes(d)) {
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, hn::Eq(hn::Load(d, values + i), hn::Set(d, value)), bits);
-    lanes |= static_cast<std::uint32_t>(bits[0]) << i;
+    lanes |= (bits[0] | std::uint32_t{bits[1]} << 8) << i;
   }
   return lanes;
 }

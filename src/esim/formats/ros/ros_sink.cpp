@@ -23,8 +23,9 @@ std::array<double, 9> isotropic(double variance) { return {variance, 0, 0, 0, va
 
 class RosSink final : public Sink {
  public:
-  RosSink(std::filesystem::path path, Encoding encoding, std::function<std::unique_ptr<MessageOutput>()> create)
-      : path_(std::move(path)), encoding_(encoding), create_(std::move(create)) {}
+  RosSink(std::filesystem::path path, Encoding encoding, std::optional<PacketEncoding> packets,
+          std::function<std::unique_ptr<MessageOutput>()> create)
+      : path_(std::move(path)), encoding_(encoding), packets_(packets), create_(std::move(create)) {}
 
   void begin(const RecordingInfo& info) override;
   void write(const Record& record) override;
@@ -55,13 +56,16 @@ class RosSink final : public Sink {
     return {header(t, frame), ros_name(child), T_frame_child};
   }
   TimeNs checked(TimeNs t) const;
+  void require_fit(int width, int height) const;
 
   std::filesystem::path path_;
   Encoding encoding_;
+  std::optional<PacketEncoding> packets_;
   std::function<std::unique_ptr<MessageOutput>()> create_;
   std::unique_ptr<MessageOutput> output_;
   RecordingInfo info_;
-  std::vector<std::vector<Event>> events_;  // of each camera, not yet written
+  std::vector<std::vector<Event>> events_;    // of each camera, not yet written
+  std::vector<EventPacketEncoder> encoders_;  // of each camera, if events are packets
   std::string payload_;
   std::vector<std::uint8_t> pixels_;
 };
@@ -74,6 +78,13 @@ TimeNs RosSink::checked(TimeNs t) const {
                               path_.string(), to_seconds(t), max));
 }
 
+void RosSink::require_fit(int width, int height) const {
+  if (!packets_ || (width <= kMaxPacketExtent && height <= kMaxPacketExtent)) return;
+  throw UserError(
+      fmt::format("cannot write {}: a sensor of {} x {} px does not fit: EventPackets hold at most {} x {} px",
+                  path_.string(), width, height, kMaxPacketExtent, kMaxPacketExtent));
+}
+
 template <typename T>
 void RosSink::send(std::string_view topic, MessageType type, TimeNs t, const T& message) {
   MessageWriter(encoding_, payload_)(message);
@@ -83,7 +94,9 @@ void RosSink::send(std::string_view topic, MessageType type, TimeNs t, const T& 
 void RosSink::begin(const RecordingInfo& info) {
   info_ = info;
   events_.resize(info.cameras.size());
+  if (packets_) encoders_.assign(info.cameras.size(), EventPacketEncoder(*packets_));
   checked(info.start);
+  for (const CameraInfo& camera : info.cameras) require_fit(camera.model.width, camera.model.height);
   output_ = create_();
   for (std::size_t i = 0; i < info.cameras.size(); ++i) send_camera_info(static_cast<int>(i), info.start);
   send_static_transforms();
@@ -113,6 +126,10 @@ void RosSink::put(const EventsRecord& record) {
   if (record.events.empty()) return;
   checked(record.events.front().t);
   checked(record.events.back().t);
+  int width = 0, height = 0;
+  for (const Event& event : record.events)
+    width = std::max<int>(width, event.x + 1), height = std::max<int>(height, event.y + 1);
+  require_fit(width, height);
   std::vector<Event>& waiting = events_[static_cast<std::size_t>(record.camera)];
   for (EventSpan rest = record.events; !rest.empty();) {
     const TimeNs end = (waiting.empty() ? rest.front().t : waiting.front().t) + kEventsDuration;
@@ -129,11 +146,17 @@ void RosSink::flush_events(int camera) {
   if (events.empty()) return;
   const TimeNs t = events.back().t;
   const Camera& model = camera_of(camera).model;
-  MessageWriter writer(encoding_, payload_);
-  writer(EventArrayHead{header(t, camera_of(camera).name), static_cast<std::uint32_t>(model.height),
-                        static_cast<std::uint32_t>(model.width)});
-  write_events(writer, events);
-  output_->write(topic_of(camera, topic::kEvents), MessageType::events, t, payload_);
+  const auto height = static_cast<std::uint32_t>(model.height), width = static_cast<std::uint32_t>(model.width);
+  if (packets_) {
+    EventPacketMessage packet{.header = header(t, camera_of(camera).name), .height = height, .width = width};
+    encoders_[static_cast<std::size_t>(camera)].encode(events, packet);
+    send(topic_of(camera, topic::kEvents), MessageType::event_packet, t, packet);
+  } else {
+    MessageWriter writer(encoding_, payload_);
+    writer(EventArrayHead{header(t, camera_of(camera).name), height, width});
+    write_events(writer, events);
+    output_->write(topic_of(camera, topic::kEvents), MessageType::events, t, payload_);
+  }
   events.clear();
 }
 
@@ -237,9 +260,9 @@ void RosSink::end(bool) {
 
 }  // namespace
 
-std::unique_ptr<Sink> make_sink(std::filesystem::path path, Encoding encoding,
+std::unique_ptr<Sink> make_sink(std::filesystem::path path, Encoding encoding, std::optional<PacketEncoding> packets,
                                 std::function<std::unique_ptr<MessageOutput>()> create) {
-  return std::make_unique<RosSink>(std::move(path), encoding, std::move(create));
+  return std::make_unique<RosSink>(std::move(path), encoding, packets, std::move(create));
 }
 
 }  // namespace esim::inline formats::ros

@@ -9,6 +9,7 @@
 #include "esim/core/error.h"
 #include "esim/files/number_text.h"
 #include "esim/formats/ros/messages/event_array.h"
+#include "esim/formats/ros/messages/event_packet.h"
 #include "esim/formats/ros/messages/sensor_messages.h"
 #include "esim/formats/ros/topic_survey.h"
 #include "esim/formats/ros/truth_assembler.h"
@@ -38,6 +39,7 @@ struct CameraState {
   bool has_frame_info = false;  // every frame has it; an image without it is a picture of the irradiance
   Remembered<FrameInfoMessage> frame_info{};
   Image<std::uint16_t> frame{};
+  EventPacketDecoder packets{};
 };
 
 class RosSource final : public Source {
@@ -54,9 +56,10 @@ class RosSource final : public Source {
 
   const Record* hold(const Result& result) { return result ? &record_.emplace(*result) : nullptr; }
   const Record* next_events();
+  const Record* next_trigger();
   const Record* last_truth();
   Result read(const Message& message);
-  Result read_events(const Assignment& to, MessageReader& reader);
+  Result read_events(const Assignment& to, const Channel& channel, MessageReader& reader);
   Result read_frame(const Assignment& to, const Channel& channel, MessageReader& reader);
   void read_frame_info(const Assignment& to, MessageReader& reader);
   Result read_truth(const Assignment& to, const Channel& channel, MessageReader& reader);
@@ -69,7 +72,8 @@ class RosSource final : public Source {
   TopicSurvey survey_;
   std::vector<CameraState> cameras_;
   std::vector<Event> events_;
-  EventSpan rest_;  // events that have not been handed out
+  EventSpan rest_;                                     // events that have not been handed out
+  std::vector<EventPacketDecoder::Trigger> triggers_;  // likewise
   int events_camera_ = 0;
   Remembered<ImuMessage> imu_bias_;
   Remembered<TwistMessage> twist_, accel_;
@@ -104,6 +108,7 @@ const Record* RosSource::next() {
   try {
     for (Message message; !ended_;) {
       if (!rest_.empty()) return next_events();
+      if (!triggers_.empty()) return next_trigger();
       ended_ = !input_->next(message);
       if (ended_) break;
       try {
@@ -125,6 +130,13 @@ const Record* RosSource::next_events() {
   const EventSpan portion = rest_.first(std::min(rest_.size(), kPortion));
   rest_ = rest_.subspan(portion.size());
   return &record_.emplace(EventsRecord{events_camera_, portion});
+}
+
+const Record* RosSource::next_trigger() {
+  const EventPacketDecoder::Trigger trigger = triggers_.front();
+  triggers_.erase(triggers_.begin());
+  return &record_.emplace(TriggerRecord{events_camera_, trigger.t,
+                                        trigger.rising ? TriggerKind::external_rising : TriggerKind::external_falling});
 }
 
 /// Data of times at which the file ended early.
@@ -149,7 +161,7 @@ RosSource::Result RosSource::read(const Message& message) {
   };
   switch (to.role) {
     case Role::events:
-      return read_events(to, reader);
+      return read_events(to, channel, reader);
     case Role::frame:
       return read_frame(to, channel, reader);
     case Role::frame_info:
@@ -176,10 +188,16 @@ RosSource::Result RosSource::read(const Message& message) {
   }
 }
 
-RosSource::Result RosSource::read_events(const Assignment& to, MessageReader& reader) {
-  EventArrayHead head;
-  reader(head);
-  ros::read_events(reader, events_);
+RosSource::Result RosSource::read_events(const Assignment& to, const Channel& channel, MessageReader& reader) {
+  if (channel.type == MessageType::event_packet) {
+    EventPacketMessage packet;
+    reader(packet);
+    camera(to).packets.decode(packet, events_, triggers_);
+  } else {
+    EventArrayHead head;
+    reader(head);
+    ros::read_events(reader, events_);
+  }
   rest_ = events_;
   events_camera_ = to.camera;
   return std::nullopt;

@@ -7,6 +7,7 @@
 
 #include "esim/core/error.h"
 #include "esim/formats/ros/messages/event_array.h"
+#include "esim/formats/ros/messages/event_packet.h"
 #include "esim/formats/ros/messages/sensor_messages.h"
 
 namespace esim::inline formats::ros {
@@ -71,6 +72,9 @@ void Surveyor::look_at_first(const Channel& channel, Bytes payload, Facts& facts
     std::vector<Event> events;
     read_events(reader, events);
     if (!events.empty()) facts.start = events.front().t;
+  } else if (channel.type == MessageType::event_packet) {
+    const auto message = decode<EventPacketMessage>(channel, payload);
+    facts = {message.header.stamp, message.width, message.height};
   } else if (channel.type == MessageType::image) {
     const auto message = decode<ImageMessage>(channel, payload);
     facts = {message.header.stamp, message.width, message.height};

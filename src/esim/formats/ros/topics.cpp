@@ -23,9 +23,13 @@ bool is_at_or_below(const std::string& path, const std::string& above) {
 
 bool has_depth(const std::string& topic) { return topic.find("depth") != std::string::npos; }
 
+bool has_events(const Channel& channel) {
+  return channel.type == MessageType::events || channel.type == MessageType::event_packet;
+}
+
 bool is_of_camera(const Channel& channel) {
-  return channel.type == MessageType::events || channel.type == MessageType::camera_info ||
-         channel.type == MessageType::image || channel.type == MessageType::flow;
+  return has_events(channel) || channel.type == MessageType::camera_info || channel.type == MessageType::image ||
+         channel.type == MessageType::flow;
 }
 
 class Assigner {
@@ -54,15 +58,15 @@ class Assigner {
 std::vector<std::string> Assigner::find_cameras() {
   std::vector<std::string> with_events;
   for (std::size_t i = 0; i < channels_.size(); ++i) {
-    if (channels_[i].type == MessageType::events) with_events.push_back(paths_[i].parent);
+    if (has_events(channels_[i])) with_events.push_back(paths_[i].parent);
   }
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     const std::string& parent = paths_[i].parent;
     const bool is_below_another = std::any_of(with_events.begin(), with_events.end(), [&](const std::string& other) {
       return parent != other && is_at_or_below(parent, other);
     });
-    const bool has_events = std::find(with_events.begin(), with_events.end(), parent) != with_events.end();
-    if (!is_of_camera(channels_[i]) || (is_below_another && !has_events)) continue;
+    const bool is_camera = std::find(with_events.begin(), with_events.end(), parent) != with_events.end();
+    if (!is_of_camera(channels_[i]) || (is_below_another && !is_camera)) continue;
     if (std::find(cameras_.begin(), cameras_.end(), parent) == cameras_.end()) cameras_.push_back(parent);
   }
   std::vector<std::string> names;
@@ -110,7 +114,9 @@ void Assigner::assign_to_cameras() {
       return [leaf](const Path& path) { return path.leaf == leaf ? 0 : -1; };
     };
     const auto is_depth = [](const Path& path) { return has_depth(path.parent + "/" + path.leaf); };
-    assign(Role::events, MessageType::events, first);
+    assign_best(Role::events, camera, [&](const Channel& channel, const Path& path) {
+      return has_events(channel) && camera_of(path) == camera ? 0 : -1;
+    });
     assign(Role::camera_info, MessageType::camera_info,
            [&](const Path& path) { return path.parent == cameras_[static_cast<std::size_t>(camera)] ? 0 : -1; });
     assign(Role::irradiance, MessageType::image, named(topic::kIrradiance));

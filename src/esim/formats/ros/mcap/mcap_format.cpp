@@ -6,6 +6,16 @@
 #include "esim/formats/ros/ros_source.h"
 
 namespace esim::inline formats {
+namespace {
+
+std::unique_ptr<Sink> make_sink(const std::filesystem::path& path, const WriteOptions& options,
+                                std::optional<ros::PacketEncoding> packets) {
+  const auto codec = options.compression == Compression::none ? ros::ChunkCodec::none : ros::ChunkCodec::zstd;
+  return ros::make_sink(path, ros::Encoding::cdr, packets,
+                        [=] { return std::make_unique<mcap::McapOutput>(path, codec); });
+}
+
+}  // namespace
 
 Format mcap_format() {
   return {
@@ -20,13 +30,21 @@ Format mcap_format() {
             return ros::make_source(
                 path, [path] { return std::make_unique<mcap::McapInput>(path); }, options);
           },
-      .create =
-          [](const auto& path, const WriteOptions& options) {
-            const auto codec = options.compression == Compression::none ? ros::ChunkCodec::none : ros::ChunkCodec::zstd;
-            return ros::make_sink(path, ros::Encoding::cdr,
-                                  [=] { return std::make_unique<mcap::McapOutput>(path, codec); });
-          },
+      .create = [](const auto& path, const WriteOptions& options) { return make_sink(path, options, std::nullopt); },
   };
+}
+
+Format mcap_packets_format() {
+  Format format = mcap_format();
+  format.name = "mcap-packets";
+  format.description = "MCAP of ROS 2: event_camera_msgs, sensor_msgs, geometry_msgs, tf2_msgs";
+  format.either_unit = true;
+  format.max_width = format.max_height = ros::kMaxPacketExtent;
+  format.recognises = {};
+  format.create = [](const auto& path, const WriteOptions& options) {
+    return make_sink(path, options, ros::packet_encoding(options.unit));
+  };
+  return format;
 }
 
 }  // namespace esim::inline formats

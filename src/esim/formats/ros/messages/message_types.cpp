@@ -31,6 +31,7 @@ constexpr std::array kKnown = {
     Known{MessageType::transforms, "tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec"},
     Known{MessageType::flow, "esim_msgs/OpticFlow", "1d447e443e01be233472e6f68c671fd7"},
     Known{MessageType::frame_info, "esim_msgs/FrameInfo", "ae9f8dcd7e0bf684080d955778c3ad6f"},
+    Known{MessageType::event_packet, "event_camera_msgs/EventPacket", "8a6101b351a64529ac77bd8b71074e52"},
     // Other names for the same fields.
     Known{MessageType::events, "prophesee_event_msgs/EventArray", ""},
     Known{MessageType::transforms, "tf/tfMessage", ""},
@@ -76,6 +77,10 @@ const std::vector<Definition>& definitions() {
       {"esim_msgs/FrameInfo",
        "# How the frame with the same stamp, the middle of its exposure, was exposed.\n"
        "std_msgs/Header header\nint64 exposure_start_ns\nint64 exposure_duration_ns\nfloat64 gain\nuint8 bits\n",
+       {"std_msgs/Header"}},
+      {"event_camera_msgs/EventPacket",
+       "std_msgs/Header header\nuint32 height\nuint32 width\nuint64 seq\nuint64 time_base\nstring encoding\n"
+       "bool is_bigendian\nuint8[] events\n",
        {"std_msgs/Header"}},
 
       {"dvs_msgs/Event",

@@ -9,7 +9,19 @@
 namespace esim::inline formats::ros {
 
 /// The supported message types.
-enum class MessageType { events, image, camera_info, imu, pose, twist, accel, transforms, flow, frame_info };
+enum class MessageType {
+  events,
+  image,
+  camera_info,
+  imu,
+  pose,
+  twist,
+  accel,
+  transforms,
+  flow,
+  frame_info,
+  event_packet
+};
 
 /// The name in ROS 1: "sensor_msgs/Image".
 std::string_view name_of(MessageType type);

@@ -6,6 +6,16 @@
 #include "esim/formats/ros/rosbag/rosbag_output.h"
 
 namespace esim::inline formats {
+namespace {
+
+std::unique_ptr<Sink> make_sink(const std::filesystem::path& path, const WriteOptions& options,
+                                std::optional<ros::PacketEncoding> packets) {
+  const auto codec = options.compression == Compression::none ? ros::ChunkCodec::none : ros::ChunkCodec::lz4;
+  return ros::make_sink(path, ros::Encoding::ros1, packets,
+                        [=] { return std::make_unique<rosbag::RosbagOutput>(path, codec); });
+}
+
+}  // namespace
 
 Format rosbag_format() {
   return {
@@ -20,13 +30,21 @@ Format rosbag_format() {
             return ros::make_source(
                 path, [path] { return std::make_unique<rosbag::RosbagInput>(path); }, options);
           },
-      .create =
-          [](const auto& path, const WriteOptions& options) {
-            const auto codec = options.compression == Compression::none ? ros::ChunkCodec::none : ros::ChunkCodec::lz4;
-            return ros::make_sink(path, ros::Encoding::ros1,
-                                  [=] { return std::make_unique<rosbag::RosbagOutput>(path, codec); });
-          },
+      .create = [](const auto& path, const WriteOptions& options) { return make_sink(path, options, std::nullopt); },
   };
+}
+
+Format rosbag_packets_format() {
+  Format format = rosbag_format();
+  format.name = "rosbag-packets";
+  format.description = "ROS 1 bag: event_camera_msgs, sensor_msgs, geometry_msgs, tf2_msgs";
+  format.either_unit = true;
+  format.max_width = format.max_height = ros::kMaxPacketExtent;
+  format.recognises = {};
+  format.create = [](const auto& path, const WriteOptions& options) {
+    return make_sink(path, options, ros::packet_encoding(options.unit));
+  };
+  return format;
 }
 
 }  // namespace esim::inline formats

@@ -40,10 +40,7 @@ struct Steps {
     ++node;
     to = step(from);
   }
-  double at(double tau) const {
-    PhotoreceptorNoise::Middles middles(pixel, node);
-    return noise.at(0, {from, to}, tau, middles);
-  }
+  double at(double tau) const { return noise.at(noise.path(from, to, pixel, node, 0), tau, 0); }
 };
 
 constexpr std::array<std::pair<double, double>, 4> kTimeConstants_ms{
@@ -106,7 +103,7 @@ TEST(PhotoreceptorNoise, BoundsOfPartsContainItsValues) {
     int outside = 0;
     for (std::uint32_t i = 0; i < 4000; ++i) {
       const Steps steps(noise, i);
-      const auto [low, high] = noise.bounds(0, {steps.from, steps.to});
+      const auto [low, high] = noise.bounds(steps.from, steps.to, 0);
       for (double tau = 0.01 * h; tau < h; tau += 0.045 * h) {
         const double x = steps.at(tau);
         outside += x < low || x > high ? 1 : 0;

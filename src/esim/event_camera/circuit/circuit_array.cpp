@@ -111,7 +111,8 @@ bool CircuitArray::open(const Segment& segment, Rows rows) {
       const double place = starts_.uniforms(static_cast<std::uint32_t>(i), 0)[0];
       const auto time = static_cast<double>(segment.t1 - epoch_);
       const double light_rate = std::round(2 * kPerLight * static_cast<double>(irradiance[x]));
-      pixel(i).open(lights[x], w_.empty() ? v_[i] : 0.0, leak(i, light_rate, time), time, place);
+      KnownPath unused;
+      pixel(i, unused).open(lights[x], w_.empty() ? v_[i] : 0.0, leak(i, light_rate, time), time, place);
       until_[i] = -1;  // looks at once
     }
   }
@@ -207,8 +208,8 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
   return true;
 }
 
-CircuitPixel CircuitArray::pixel(std::size_t i) {
-  CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], states_[i]);
+CircuitPixel CircuitArray::pixel(std::size_t i, KnownPath& known) {
+  CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], states_[i], known);
   if (!origins_.empty()) pixel.explain(&origins_[i]);
   return pixel;
 }

@@ -110,14 +110,14 @@ class CircuitArray {
   void advance_in_one(const Row& row, std::span<const std::uint32_t> columns, std::size_t begin, CircuitBuffer& buffer);
   void advance_in_several(const Row& row, std::span<const std::uint32_t> columns, std::size_t begin,
                           CircuitBuffer& buffer);
-  void finish(const Row& row, std::uint32_t column, std::size_t at, const CircuitPiece& piece, double done, double s,
-              CircuitState& front, CircuitBuffer& buffer);
+  void finish(const Row& row, std::uint32_t column, std::size_t at, const CircuitPiece& piece, double done,
+              std::size_t lane, CircuitState& front, CircuitBuffer& buffer);
   CircuitLanes::Lanes wake(CircuitLanes& lanes, const std::array<std::size_t, CircuitLanes::kLanes>& pixels,
                            CircuitLanes::Lanes inactive, CircuitLanes::Lanes& rests);
   bool is_quiet(const CircuitLanes& lanes, std::size_t lane, std::size_t i) const;
   LeakRamp leak_in(const Row& row, std::size_t column, std::size_t at, const CircuitBuffer& buffer) const;
   void set_bounds(std::size_t pixel, const CircuitBounds& bounds);
-  CircuitPixel pixel(std::size_t i);
+  CircuitPixel pixel(std::size_t i, KnownPath& known);
   LeakRamp leak(std::size_t i, double light_rate, double start) const;
   void keep(std::size_t i, std::size_t at, const CircuitBuffer& buffer);
   void label(std::size_t i, TimeNs t, int polarity, std::vector<NewLabel>& labels) const;

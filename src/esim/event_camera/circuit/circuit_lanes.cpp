@@ -36,6 +36,7 @@ void CircuitLanes::enter(std::size_t lane, const Circuit& circuit, std::uint32_t
   node_time_[lane] = state.node_time;
   use_pole(*circuit.noise, lane, state.pole, state.node_light);
   pixels_[lane] = pixel, nodes_[lane] = state.node;
+  crossings_[lane].reset(), known_[lane].node = KnownPath::kNone;
   drawn_[lane] = state.node - static_cast<std::uint32_t>(PhotoreceptorNoise::kNodesDrawn);  // none
 }
 
@@ -43,7 +44,7 @@ void CircuitLanes::use_pole(const PhotoreceptorNoise& noise, std::size_t lane, s
   poles_[lane] = pole, node_light_[lane] = static_cast<double>(node_light);
   inactive_[lane] = kInactiveDeviations * gain_[lane] * noise.deviation(pole);
   step_[lane] = noise.step_ns(pole), decay_[lane] = noise.decay(pole);
-  along_[lane] = noise.reach(pole, 0) / noise.t2_ns(), margin_[lane] = noise.margin(pole, 0);
+  along_[lane] = noise.along(pole), margin_[lane] = noise.margin(pole);
   steps_[lane] = static_cast<std::int64_t>(kDoublesPerStep) * (noise.steps(pole) - noise.steps(0));
 }
 
@@ -108,14 +109,15 @@ CircuitLanes::Lanes CircuitLanes::find_resting(D d, const Circuit& circuit, Lane
   return bits_of(d, rests) & lanes;
 }
 
-/// Whether a pixel reaches a threshold between `s` and `end`, within its step.
-bool CircuitLanes::crosses(const Circuit& circuit, std::size_t lane, double end, double at_s, double at_end) const {
+/// The event of a lane between two times, within its step.
+std::optional<CircuitCrossing> CircuitLanes::find_crossing(const Circuit& circuit, std::size_t lane,
+                                                           const SignalAt& from, const SignalAt& to) {
   CircuitPixelState state;
   leave(lane, state);
   state.reference = references_[lane];
-  CircuitPixel pixel(circuit, pixels_[lane], *parameters_[lane], state);
+  CircuitPixel pixel(circuit, pixels_[lane], *parameters_[lane], state, known_[lane]);
   pixel.set(piece(circuit, lane), {light[lane], light_rate[lane]}, {leaked[lane], leak_rate[lane]}, start[lane]);
-  return pixel.find_crossing(s[lane], end, at_s, at_end).has_value();
+  return pixel.find_crossing(from, to);
 }
 
 template <class D>
@@ -163,13 +165,29 @@ CircuitLanes::Lanes CircuitLanes::take_quiet_steps(D d, const Circuit& circuit, 
     auto quiet = hn::And(hn::Gt(hn::MulAdd(v_gain, low_here, hn::Sub(hn::Min(value, next), beyond)), v_lower),
                          hn::Lt(hn::MulAdd(v_gain, high_here, hn::Add(hn::Max(value, next), beyond)), v_upper));
     if (const Lanes doubtful = running & ~bits_of(d, quiet); doubtful != 0) {
-      alignas(64) Values ends, at_s, at_end;
-      store(end, ends), store(value, at_s), store(next, at_end), store(here, s), store(node_time, node_time_);
+      store(here, s), store(node_time, node_time_);
       store(from_y, from_y_), store(from_x, from_x_), store(to_y, to_y_), store(to_x, to_x_);
+      struct Ends {
+        Values time, value, slope, fast, slow, passed;
+        SignalAt at(std::size_t lane) const {
+          return {time[lane], value[lane], slope[lane], fast[lane], slow[lane], passed[lane], 1};
+        }
+      };
+      const auto ends = [&](V times, V values, V fasts, V slows, V passeds) {
+        alignas(64) Ends e;
+        const V slope =
+            hn::NegMulAdd(passeds, set(k_3), hn::NegMulAdd(slows, set(k_2), hn::NegMulAdd(fasts, v_k1, v_rate)));
+        store(times, e.time), store(values, e.value), store(slope, e.slope);
+        store(fasts, e.fast), store(slows, e.slow), store(passeds, e.passed);
+        return e;
+      };
+      const Ends from = ends(here, value, fast_here, slow_here, passed_here),
+                 to = ends(end, next, fast_end, slow_end, passed_end);
       Lanes bits = bits_of(d, quiet);
       for (std::size_t lane = 0; lane < count(); ++lane) {
-        if ((doubtful >> lane & 1U) != 0 && !crosses(circuit, lane, ends[lane], at_s[lane], at_end[lane]))
-          bits |= 1U << lane;
+        if ((doubtful >> lane & 1U) == 0) continue;
+        crossings_[lane] = find_crossing(circuit, lane, from.at(lane), to.at(lane));
+        if (!crossings_[lane]) bits |= 1U << lane;
       }
       quiet = mask_of(d, bits);
     }

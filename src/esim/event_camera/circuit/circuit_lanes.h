@@ -33,6 +33,10 @@ struct CircuitLanes {
   /// their pieces; their bounds are bounds().
   Lanes take_quiet_steps(const Circuit& circuit, Lanes lanes);
 
+  /// The event at which a lane has stopped.
+  std::optional<CircuitCrossing> crossing(std::size_t lane) const { return crossings_[lane]; }
+  KnownPath& known(std::size_t lane) { return known_[lane]; }
+
   /// Writes the noise of a lane back.
   void leave(std::size_t lane, CircuitPixelState& state) const;
 
@@ -64,7 +68,8 @@ struct CircuitLanes {
   Lanes find_resting(D d, const Circuit& circuit, Lanes lanes);
   void use_pole(const PhotoreceptorNoise& noise, std::size_t lane, std::int16_t pole, float node_light);
   void draw(const Circuit& circuit, Lanes lanes, Values& n1, Values& n2);
-  bool crosses(const Circuit& circuit, std::size_t lane, double end, double at_s, double at_end) const;
+  std::optional<CircuitCrossing> find_crossing(const Circuit& circuit, std::size_t lane, const SignalAt& from,
+                                               const SignalAt& to);
 
   alignas(64) Values upper_, lower_, gain_, inactive_, node_light_;
   alignas(64) Values from_y_, from_x_, to_y_, to_x_, node_time_, step_, decay_, along_, margin_;
@@ -75,6 +80,8 @@ struct CircuitLanes {
   std::array<std::int16_t, kLanes> poles_;
   std::array<std::uint32_t, kLanes> pixels_, nodes_, drawn_;
   PhotoreceptorNoise::Draws draws_;
+  std::array<std::optional<CircuitCrossing>, kLanes> crossings_;
+  std::array<KnownPath, kLanes> known_;
 };
 
 }  // namespace esim::inline event_camera

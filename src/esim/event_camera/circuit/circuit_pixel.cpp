@@ -1,5 +1,7 @@
 #include "esim/event_camera/circuit/circuit_pixel.h"
 
+#include "esim/core/vector_math.h"
+
 namespace esim::inline event_camera {
 namespace {
 
@@ -8,73 +10,124 @@ constexpr double kResolution_ns = 0.25, kNoiseResolution_ns = 0.05;
 
 constexpr double kRestingDeviations = 3.5;
 
+/// exp() of several values side by side.
+void exponentials(std::array<double, 4>& values) {
+  const hn::CappedTag<double, 4> d;
+  for (std::size_t i = 0; i < values.size(); i += hn::Lanes(d))
+    hn::StoreU(hn::Exp(d, hn::LoadU(d, &values[i])), d, &values[i]);
+}
+
 }  // namespace
 
-/// The first time in [a, b] at which the signal is so near to a threshold that the noise matters; without noise, at
-/// which it reaches the threshold.
-std::optional<double> CircuitPixel::find_near(double a, double b) const {
+SignalAt CircuitPixel::at(double s) const {
+  std::array<double, 4> e{-piece_.k1 * s, -piece_.k2 * s, -piece_.k3 * s, light(s)};
+  exponentials(e);
+  SignalAt at{s, 0, 0, piece_.fast * e[0], piece_.slow * e[1], piece_.passed * e[2], e[3]};
+  at.value = piece_.level + piece_.rate * s + at.fast + at.slow + at.passed + leaked(s);
+  at.slope = piece_.rate - at.fast * piece_.k1 - at.slow * piece_.k2 - at.passed * piece_.k3 + leak_.rate;
+  return at;
+}
+
+CircuitPixel::Reach CircuitPixel::reach(const SignalAt& a) const {
+  if (noise_ == nullptr) return {};
+  const double t2_per_t1 = a.brightness * circuit_.poles.t2_ns / circuit_.poles.t1_unit_ns;
+  const double fraction = 1 / (1 + t2_per_t1);
+  const double value = kActiveDeviations * gain_ * std::sqrt(noise_->variance() * fraction);
+  return {value, -0.5 * value * (1 - fraction) * light_.rate};
+}
+
+/// The first time between a and b at which the signal is so near to a threshold that the noise matters; without noise,
+/// at which it reaches the threshold.
+std::optional<double> CircuitPixel::find_near(const SignalAt& a, const SignalAt& b) const {
+  const double reach_a = reach(a).value, reach_b = reach(b).value;
   // The reach of the noise falls with rising light, so that it is maximal at one of the ends.
-  const double reach_max = reach(light_.rate > 0 ? a : b, kActiveDeviations);
-  const auto [low, high] = range(a, b);
-  if (high + reach_max < upper() && low - reach_max > lower()) return std::nullopt;
-  const double reach_a = reach(a, kActiveDeviations), reach_b = reach(b, kActiveDeviations);
-  const double value = signal(a);
-  if (value + reach_a >= upper() || value - reach_a <= lower()) return a;
-  if (b - a <= (noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns)) {
-    const double last = signal(b);
-    return last + reach_b >= upper() || last - reach_b <= lower() ? std::optional(b) : std::nullopt;
-  }
-  const auto distance = [&](double s) {
-    const double here = signal(s);
-    return std::min(upper() - here, here - lower()) - reach(s, kActiveDeviations);
-  };
-  if (const double last = distance(b); last <= 0 && is_monotone(a, b)) {
-    // The Illinois method, between a positive and a negative distance.
-    double from = a, to = b, at_from = distance(a), at_to = last;
-    const double resolution = noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns;
-    for (int i = 0, side = 0; i < 60 && to - from > resolution; ++i) {
-      const double s = from + (to - from) * std::clamp(at_from / (at_from - at_to), 1e-3, 1 - 1e-3);
-      const double here = distance(s);
-      if (here <= 0) {
-        to = s, at_to = here;
-        if (side == 1) at_from *= 0.5;
-        side = 1;
-      } else {
-        from = s, at_from = here;
-        if (side == -1) at_to *= 0.5;
-        side = -1;
-      }
-      if (here == 0) break;
-    }
-    return to;
-  }
-  const double middle = 0.5 * (a + b);
+  const double beyond = beyond_chord(a, b) + std::max(reach_a, reach_b);
+  if (std::max(a.value, b.value) + beyond < upper() && std::min(a.value, b.value) - beyond > lower())
+    return std::nullopt;
+  if (a.value + reach_a >= upper() || a.value - reach_a <= lower()) return a.s;
+  const bool near_b = b.value + reach_b >= upper() || b.value - reach_b <= lower();
+  if (b.s - a.s <= (noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns))
+    return near_b ? std::optional(b.s) : std::nullopt;
+  if (near_b && is_monotone(a, b)) return solve_near(a, b);
+  const SignalAt middle = at(0.5 * (a.s + b.s));
   if (const auto found = find_near(a, middle)) return found;
   return find_near(middle, b);
 }
 
-std::optional<std::pair<double, int>> CircuitPixel::find_crossing(const PhotoreceptorNoise::Part& part, double a,
-                                                                  double b, double at_a, double at_b,
-                                                                  PhotoreceptorNoise::Middles& middles) const {
-  if (a >= b && part.index != 1) return std::nullopt;
-  const auto [low, high] = noise_->bounds(state_.pole, part);
-  const double beyond = piece_.beyond_chord(a, b);
-  if (std::min(at_a, at_b) - beyond + gain_ * low > lower() && std::max(at_a, at_b) + beyond + gain_ * high < upper())
-    return std::nullopt;
-  const double start = state_.node_time - start_;
-  if (noise_->is_cubic(state_.pole, part)) {
-    const NoiseCubic noise = noise_->cubic(state_.pole, part);
-    const double u = a - start - part.start, v = b - start - part.start;
-    const NoiseCubic sum{at_a + gain_ * noise.value(u), slope(a) + gain_ * noise.slope(u),
-                         at_b + gain_ * noise.value(v), slope(b) + gain_ * noise.slope(v), b - a};
-    const auto exit = sum.first_exit(lower(), upper());
-    return exit ? std::optional(std::pair{a + exit->first, exit->second}) : std::nullopt;
+/// The same if the signal is monotone, near a threshold at b and not at a.
+double CircuitPixel::solve_near(const SignalAt& a, const SignalAt& b) const {
+  const auto distance = [&](const SignalAt& here) {
+    const double above = upper() - here.value, below = here.value - lower();
+    const Reach reach = this->reach(here);
+    return Reach{std::min(above, below) - reach.value, (above < below ? -here.slope : here.slope) - reach.slope};
+  };
+  const double resolution = noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns;
+  double from = a.s, to = b.s;
+  const double at_from = distance(a).value;
+  double s = from + (to - from) * at_from / (at_from - distance(b).value);
+  // Newton's method, with bisection where it would leave the part that contains the root. Its error after a step is
+  // about the step's square divided by the length of the part.
+  const double enough = std::sqrt(0.5 * resolution * (to - from));
+  for (int i = 0; i < 60 && to - from > resolution; ++i) {
+    const Reach here = distance(at(s));
+    (here.value <= 0 ? to : from) = s;
+    const double next = s - here.value / here.slope, last = s;
+    s = next >= from && next <= to ? next : 0.5 * (from + to);
+    if (std::abs(s - last) < enough && s == next) break;
   }
-  const auto [first, second] = noise_->halves(state_.pole, part, middles);
-  const double middle = std::clamp(start + second.start, a, b);
-  const double at_middle = middle == a ? at_a : middle == b ? at_b : signal(middle);
-  if (const auto crossing = find_crossing(first, a, middle, at_a, at_middle, middles)) return crossing;
-  return find_crossing(second, middle, b, at_middle, at_b, middles);
+  return s;
+}
+
+std::optional<CircuitCrossing> CircuitPixel::find_crossing(const SignalAt& a, const SignalAt& b) const {
+  const auto [low, high] = noise_->bounds(state_.from, state_.to, state_.pole);
+  const double beyond = beyond_chord(a, b);
+  if (std::min(a.value, b.value) - beyond + gain_ * low > lower() &&
+      std::max(a.value, b.value) + beyond + gain_ * high < upper())
+    return std::nullopt;
+  const double start = state_.node_time - start_, length = noise_->part_ns(state_.pole);
+  const PhotoreceptorNoise::Path& path = this->path();
+  std::array<double, 4> ratio{-piece_.k1 * length, -piece_.k2 * length, -piece_.k3 * length, 0};
+  bool has_ratio = false;
+  const auto first = std::max(0.0, std::floor((a.s - start) / length));
+  SignalAt from = a;
+  for (auto i = static_cast<std::size_t>(first); i < PhotoreceptorNoise::kParts && from.s < b.s; ++i) {
+    const double part_start = start + static_cast<double>(i) * length, end = part_start + length;
+    SignalAt to = b;
+    if (end < b.s && i + 1 < PhotoreceptorNoise::kParts) {
+      if (end - from.s < 0.99 * length) {
+        to = at(end);
+      } else {
+        if (!has_ratio) exponentials(ratio), has_ratio = true;
+        to.s = end;
+        to.fast = from.fast * ratio[0], to.slow = from.slow * ratio[1], to.passed = from.passed * ratio[2];
+        to.value = piece_.level + piece_.rate * end + to.fast + to.slow + to.passed + leaked(end);
+        to.slope = piece_.rate - to.fast * piece_.k1 - to.slow * piece_.k2 - to.passed * piece_.k3 + leak_.rate;
+      }
+    }
+    const NoiseCubic noise = noise_->cubic(path, i, state_.pole);
+    // A cubic lies between the control points of its Bezier curve.
+    const auto [lowest, highest] =
+        std::minmax({noise.v0, noise.v1, noise.v0 + noise.s0 * length / 3, noise.v1 - noise.s1 * length / 3});
+    const double outside = beyond_chord(from, to);
+    if (std::min(from.value, to.value) - outside + gain_ * lowest <= lower() ||
+        std::max(from.value, to.value) + outside + gain_ * highest >= upper()) {
+      const double u = from.s - part_start, v = to.s - part_start;
+      const NoiseCubic sum{from.value + gain_ * noise.value(u), from.slope + gain_ * noise.slope(u),
+                           to.value + gain_ * noise.value(v), to.slope + gain_ * noise.slope(v), to.s - from.s};
+      if (const auto exit = sum.first_exit(lower(), upper()))
+        return CircuitCrossing{from.s + exit->first, exit->second};
+    }
+    from = to;
+  }
+  return std::nullopt;
+}
+
+const PhotoreceptorNoise::Path& CircuitPixel::path() const {
+  if (known_.node != state_.node) {
+    known_.path = noise_->path(state_.from, state_.to, pixel_, state_.node, state_.pole);
+    known_.node = state_.node;
+  }
+  return known_.path;
 }
 
 /// Chooses the length of steps for the light at `s`.
@@ -99,10 +152,10 @@ void CircuitPixel::start_step(const NoiseState& from, double time) {
 }
 
 /// At the end of a step, where the signal is `value`: begins the next one, if the noise still matters.
-void CircuitPixel::pass_node(double s, double value) {
+void CircuitPixel::pass_node(const SignalAt& here) {
   const double time = state_.node_time + noise_->step_ns(state_.pole);
-  if (std::abs(light(s) - static_cast<double>(state_.node_light)) > kLightReach) follow_light(s);
-  const double distance = std::min(upper() - value, value - lower());
+  if (std::abs(light(here.s) - static_cast<double>(state_.node_light)) > kLightReach) follow_light(here.s);
+  const double distance = std::min(upper() - here.value, here.value - lower());
   if (distance < kInactiveDeviations * gain_ * noise_->deviation(state_.pole)) {
     start_step(state_.to, time);
     return;
@@ -125,10 +178,7 @@ void CircuitPixel::activate(double s) {
 double CircuitPixel::noise_at(double s) {
   if (state_.active) {
     const double end = state_.node_time + noise_->step_ns(state_.pole);
-    if (end > start_ + s) {
-      PhotoreceptorNoise::Middles middles(pixel_, state_.node);
-      return noise_->at(state_.pole, {state_.from, state_.to}, start_ + s - state_.node_time, middles);
-    }
+    if (end > start_ + s) return noise_->at(path(), start_ + s - state_.node_time, state_.pole);
     state_.from = state_.to;
     state_.node_time = end;
     state_.node += 1;
@@ -161,10 +211,11 @@ void CircuitPixel::open(double light, double signal, const LeakRamp& leak, doubl
   state_.reference += gain_ * state_.from.x;
 }
 
-void CircuitPixel::release(double s) {
+/// Ends the reset of a pixel: its new reference is signal plus noise.
+void CircuitPixel::release(const SignalAt& here) {
   state_.held_until = -1;
-  if (origin_ != nullptr) origin_->v = piece_.value(s), origin_->leaked = leaked(s);
-  const double value = signal(s) + (noise_ != nullptr ? gain_ * noise_at(s) : 0.0);
+  if (origin_ != nullptr) origin_->v = piece_.value(here.s), origin_->leaked = leaked(here.s);
+  const double value = here.value + (noise_ != nullptr ? gain_ * noise_at(here.s) : 0.0);
   const double change = value - state_.reference;
   lost_ +=
       static_cast<std::int64_t>(std::abs(change) / static_cast<double>(change > 0 ? parameters_.on : parameters_.off));

@@ -36,10 +36,10 @@ LeakRamp CircuitArray::leak_in(const Row& row, std::size_t column, std::size_t a
   return leak(i, light_leak_.empty() ? 0.0 : (buffer.light_sum[at] - light_sum_[i]) / row.length, row.start);
 }
 
-/// Takes the pixel of a column to the segment's end, from `s` on in its piece that begins `done` ns after the segment's
-/// start and is `length` long. `front` is its front end after this piece.
+/// Takes the pixel of a column to the segment's end, from where its lane is in its piece, which begins `done` ns after
+/// the segment's start. `front` is its front end after this piece.
 void CircuitArray::finish(const Row& row, std::uint32_t column, std::size_t at, const CircuitPiece& piece, double done,
-                          double s, CircuitState& front, CircuitBuffer& buffer) {
+                          std::size_t lane, CircuitState& front, CircuitBuffer& buffer) {
   const std::size_t i = row.first + column;
   const auto emit_event = [&](double t, int polarity) {
     const double time = std::clamp(std::ceil(t - row.start), 0.0, row.length);
@@ -48,14 +48,14 @@ void CircuitArray::finish(const Row& row, std::uint32_t column, std::size_t at, 
   };
   const LightRamp ramp{light_[i], (buffer.light[at] - light_[i]) / row.length};
   const LeakRamp leak = leak_in(row, column, at, buffer);
-  CircuitPixel pixel = this->pixel(i);
-  const auto run = [&](const CircuitPiece& of, double begin, double from) {
+  CircuitPixel pixel = this->pixel(i, buffer.lanes.known(lane));
+  const auto run = [&](const CircuitPiece& of, double begin, double from, std::optional<CircuitCrossing> crossing) {
     pixel.set(of, {ramp.light + ramp.rate * begin, ramp.rate}, {leak.leaked + leak.rate * begin, leak.rate},
               row.start + begin);
-    set_bounds(i, pixel.run(emit_event, from));
+    set_bounds(i, pixel.run(emit_event, from, crossing));
     buffer.lost += limits_ ? pixel.lost() : 0;
   };
-  run(piece, done, s);
+  run(piece, done, buffer.lanes.s[lane], buffer.lanes.crossing(lane));
   done = piece.length < row.length - done ? done + piece.length : row.length;
   while (done < row.length) {
     const LightRamp part{ramp.light + ramp.rate * done, ramp.rate};
@@ -67,7 +67,7 @@ void CircuitArray::finish(const Row& row, std::uint32_t column, std::size_t at, 
     const bool quiet = lowest + std::min(leaked0, leaked1) - kGuard > low_[i] &&
                        highest + std::max(leaked0, leaked1) + kGuard < high_[i] && row.start + done + h < until_[i] &&
                        std::abs(change) < kLightReach;
-    if (!quiet) run(next, done, 0);
+    if (!quiet) run(next, done, 0, {});
     done = h < row.length - done ? done + h : row.length;
   }
 }
@@ -85,10 +85,10 @@ CircuitLanes::Lanes CircuitArray::wake(CircuitLanes& lanes, const std::array<std
       set_bounds(i, lanes.resting_bounds(lane, parameters_[i], states_[i]));
       continue;
     }
-    CircuitPixel pixel = this->pixel(i);
+    CircuitPixel pixel = this->pixel(i, lanes.known(lane));
     pixel.set(lanes.piece(circuit_, lane), {lanes.light[lane], lanes.light_rate[lane]},
               {lanes.leaked[lane], lanes.leak_rate[lane]}, lanes.start[lane]);
-    if (const auto near = pixel.wake(0)) {
+    if (const auto near = pixel.wake(pixel.at(0))) {
       lanes.enter(lane, circuit_, static_cast<std::uint32_t>(i), parameters_[i], states_[i]);
       lanes.s[lane] = *near;
       active |= 1U << lane;
@@ -131,7 +131,7 @@ void CircuitArray::advance_in_one(const Row& row, std::span<const std::uint32_t>
       set_bounds(i, lanes.bounds(lane, parameters_[i]));
     } else if ((rests >> lane & 1U) == 0) {
       CircuitState unused;
-      finish(row, columns[lane], at, lanes.piece(circuit_, lane), 0, lanes.s[lane], unused, buffer);
+      finish(row, columns[lane], at, lanes.piece(circuit_, lane), 0, lane, unused, buffer);
     }
     keep(i, at, buffer);
   }
@@ -212,7 +212,7 @@ void CircuitArray::advance_in_several(const Row& row, std::span<const std::uint3
       CircuitState front{lag[lane], v[lane], w[lane]};
       if (was_active) lanes.leave(lane, states_[i]);
       if (!has_arrived) {
-        finish(row, columns[lane], at, lanes.piece(circuit_, lane), done[lane], lanes.s[lane], front, buffer);
+        finish(row, columns[lane], at, lanes.piece(circuit_, lane), done[lane], lane, front, buffer);
       } else if (!at_end) {
         done[lane] = next_done[lane];
         continue;

@@ -14,7 +14,10 @@ constexpr double kPoleStep = 1.01;  // ratio of successive time constants t1
 // Standard deviation of x in the middle of an interval with known ends, in deviations of x: of steps, and where x is
 // taken for a cubic.
 constexpr double kUnknown = 0.12, kNeglected = 0.015;
-// Addresses of draws: those of steps, 8 i + j with j = 1 to 7 within steps, 0 of the first state, others above 32 bits.
+// A root is found when a step of Newton's method is shorter than this, relative to the interval.
+constexpr double kRootStep = 1e-6;
+// Addresses of draws: those of steps, 8 i + j with j = 1 to 7 within step i, 0 of the first state, others above 32
+// bits.
 constexpr std::uint32_t kStepAddresses = 0x80000000;
 
 /// A 2 x 2 matrix that acts on (y, x).
@@ -132,11 +135,12 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
       const double h = std::sqrt(shortest * longest);
       (make_bridge(pole.t1, h).deviation <= kUnknown * pole.deviation ? shortest : longest) = h;
     }
-    pole.first_bridge = bridges_.size();
-    const auto is_cubic = [&](double h) { return make_bridge(pole.t1, h).deviation <= kNeglected * pole.deviation; };
-    while (!is_cubic(std::ldexp(shortest, -static_cast<int>(kMaxDepth)))) shortest *= 0.9;
+    while (make_bridge(pole.t1, 2 * shortest / kParts).deviation > kNeglected * pole.deviation) shortest *= 0.9;
     pole.step = shortest;
-    for (double h = pole.step; !is_cubic(h); h *= 0.5, ++pole.bridges) bridges_.push_back(make_bridge(pole.t1, h));
+    double length = pole.step;
+    for (Bridge& bridge : pole.bridges) bridge = make_bridge(pole.t1, length), length *= 0.5;
+    pole.along = std::min(pole.step / 3, t2_) / t2_;
+    pole.margin = kBoundDeviations * pole.bridges[0].deviation;
     pole.decay = std::exp(-pole.step / t2_);
     poles_.push_back(pole);
     for (int k = -kDrifts; k <= kDrifts; ++k) {
@@ -160,37 +164,33 @@ PhotoreceptorNoise::Bridge PhotoreceptorNoise::make_bridge(double t1, double h) 
           std::sqrt(std::max(covariance.xx, 0.0))};
 }
 
-void PhotoreceptorNoise::draw(Middles& middles) const {
+PhotoreceptorNoise::Path PhotoreceptorNoise::path(const NoiseState& from, const NoiseState& to, std::uint32_t pixel,
+                                                  std::uint32_t node, std::int32_t pole) const {
   alignas(64) std::array<std::uint32_t, 16> items, addresses;
-  items.fill(middles.pixel);
-  for (std::uint32_t i = 0; i < 16; ++i) addresses[i] = (8 * middles.node + i) & ~kStepAddresses;
+  items.fill(pixel);
+  for (std::uint32_t i = 0; i < 16; ++i) addresses[i] = (kParts * node + i) & ~kStepAddresses;
   alignas(64) std::array<std::array<std::uint32_t, 16>, 4> words;
-  random_.bits(8, items.data(), addresses.data(), {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
-  normals(8, words[0].data(), words[1].data(), middles.n1.data(), middles.n2.data());
-  middles.drawn = true;
-}
-
-std::pair<PhotoreceptorNoise::Part, PhotoreceptorNoise::Part> PhotoreceptorNoise::halves(std::int32_t pole,
-                                                                                         const Part& part,
-                                                                                         Middles& middles) const {
-  if (!middles.drawn) draw(middles);
-  const Bridge& bridge = bridges_[poles_[static_cast<std::size_t>(pole)].first_bridge + part.depth];
-  const auto n1 = static_cast<double>(middles.n1[part.index]), n2 = static_cast<double>(middles.n2[part.index]);
-  const auto sum = [&](const std::array<double, 6>& row) {
-    return row[0] * part.from.y + row[1] * part.from.x + row[2] * part.to.y + row[3] * part.to.x + row[4] * n1 +
-           row[5] * n2;
-  };
-  const NoiseState middle{sum(bridge.y), sum(bridge.x)};
-  return {{part.from, middle, part.start, 2 * part.index, part.depth + 1},
-          {middle, part.to, part.start + 0.5 * length(pole, part), 2 * part.index + 1, part.depth + 1}};
-}
-
-double PhotoreceptorNoise::at(std::int32_t pole, Part part, double tau, Middles& middles) const {
-  while (!is_cubic(pole, part)) {
-    const auto [first, second] = halves(pole, part, middles);
-    part = tau < second.start ? first : second;
+  random_.bits(kParts, items.data(), addresses.data(),
+               {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
+  alignas(64) std::array<float, 16> n1, n2;
+  normals(kParts, words[0].data(), words[1].data(), n1.data(), n2.data());
+  Path path;
+  path.y[0] = from.y, path.x[0] = from.x;
+  path.y[kParts] = to.y, path.x[kParts] = to.x;
+  std::size_t draw = 1;
+  std::size_t length = kParts;
+  for (const Bridge& bridge : poles_[static_cast<std::size_t>(pole)].bridges) {
+    for (std::size_t i = 0; i < kParts; i += length, ++draw) {
+      const auto d1 = static_cast<double>(n1[draw]), d2 = static_cast<double>(n2[draw]);
+      const auto sum = [&](const std::array<double, 6>& row) {
+        return row[0] * path.y[i] + row[1] * path.x[i] + row[2] * path.y[i + length] + row[3] * path.x[i + length] +
+               row[4] * d1 + row[5] * d2;
+      };
+      path.y[i + length / 2] = sum(bridge.y), path.x[i + length / 2] = sum(bridge.x);
+    }
+    length /= 2;
   }
-  return cubic(pole, part).value(tau - part.start);
+  return path;
 }
 
 NoiseState PhotoreceptorNoise::first(std::uint32_t pixel, std::int32_t pole) const {
@@ -253,40 +253,41 @@ NoiseState PhotoreceptorNoise::after_gap(const NoiseState& from, double gap, std
 std::optional<std::pair<double, int>> NoiseCubic::first_exit(double lower, double upper) const {
   if (v0 >= upper) return std::pair{0.0, 1};
   if (v0 <= lower) return std::pair{0.0, -1};
-  // The extrema lie at the roots of the slope, a parabola a u^2 + b u + c in u = t / h.
-  const double a = 6 * (v0 - v1) + 3 * h * (s0 + s1), b = 6 * (v1 - v0) - 2 * h * (2 * s0 + s1), c = h * s0;
-  std::array<double, 4> ends{0.0, h, h, h};
-  std::size_t count = 1;
-  const double discriminant = b * b - 4 * a * c;
-  if (discriminant > 0) {
-    const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
-    std::array<double, 2> roots{a != 0 ? q / a : -1.0, q != 0 ? c / q : -1.0};
-    std::sort(roots.begin(), roots.end());
-    for (const double root : roots) {
-      if (root > 0 && root < 1) ends[count++] = root * h;
+  // v0 + c1 u + c2 u^2 + c3 u^3 in u = t / h
+  const double c1 = h * s0, rise = v1 - v0;
+  const double c2 = 3 * rise - h * (2 * s0 + s1), c3 = h * (s0 + s1) - 2 * rise;
+  std::array<double, 3> ends{1.0, 1.0, 1.0};  // of monotone parts
+  std::size_t count = 0;
+  if (!(s0 * rise > 0 && s1 * rise > 0 && std::abs(s0 + s1) * h < 3 * std::abs(rise))) {
+    // The extrema lie at the roots of the slope.
+    const double discriminant = c2 * c2 - 3 * c1 * c3;
+    if (discriminant > 0) {
+      const double q = -(c2 + std::copysign(std::sqrt(discriminant), c2));
+      const double r1 = c3 != 0 ? q / (3 * c3) : -1.0, r2 = q != 0 ? c1 / q : -1.0;
+      for (const double root : {std::min(r1, r2), std::max(r1, r2)}) {
+        if (root > 0 && root < 1) ends[count++] = root;
+      }
     }
   }
-  ends[count] = h;
-  // Monotone between successive ends: bisection cannot miss a crossing.
-  for (std::size_t i = 1; i <= count; ++i) {
-    const double v = i == count ? v1 : value(ends[i]);
-    const int polarity = v >= upper ? 1 : v <= lower ? -1 : 0;
-    if (polarity == 0) continue;
-    double before = ends[i - 1], after = ends[i];
+  double begin = 0, at_begin = v0;
+  for (std::size_t i = 0; i <= count; ++i) {
+    const double end = ends[i], at_end = i == count ? v1 : v0 + end * (c1 + end * (c2 + end * c3));
+    const int polarity = at_end >= upper ? 1 : at_end <= lower ? -1 : 0;
+    if (polarity == 0) {
+      begin = end, at_begin = at_end;
+      continue;
+    }
+    // Newton's method, with bisection where it would leave the part that contains the root.
     const double level = polarity > 0 ? upper : lower;
-    for (int k = 0; k < 6; ++k) {
-      const double centre = 0.5 * (before + after), here = value(centre);
-      (polarity > 0 ? here >= upper : here <= lower) ? after = centre : before = centre;
+    double before = begin, after = end, u = begin + (end - begin) * (level - at_begin) / (at_end - at_begin);
+    for (int k = 0; k < 60; ++k) {
+      const double beyond = v0 + u * (c1 + u * (c2 + u * c3)) - level, rate = c1 + u * (2 * c2 + 3 * u * c3);
+      (beyond * polarity >= 0 ? after : before) = u;
+      const double next = u - beyond / rate, last = u;
+      u = next >= before && next <= after ? next : 0.5 * (before + after);
+      if (std::abs(u - last) < kRootStep) break;
     }
-    // Newton's method, so that the time hardly depends on where the search began.
-    double t = 0.5 * (before + after);
-    for (int k = 0; k < 8; ++k) {
-      const double rate = slope(t);
-      if (rate * polarity <= 0) return std::pair{after, polarity};
-      const double last = std::exchange(t, std::clamp(t - (value(t) - level) / rate, before, after));
-      if (std::abs(t - last) < 1e-9 * h) break;
-    }
-    return std::pair{t, polarity};
+    return std::pair{u * h, polarity};
   }
   return std::nullopt;
 }

@@ -31,8 +31,6 @@ struct NoiseCubic {
     const double u = t / h;
     return 6 * u * (1 - u) * (v1 - v0) / h + (1 - u) * (1 - 3 * u) * s0 + u * (3 * u - 2) * s1;
   }
-  /// A cubic lies between the control points of its Bezier curve.
-  std::pair<double, double> bounds() const { return std::minmax({v0, v1, v0 + s0 * h / 3, v1 - s1 * h / 3}); }
 
   /// The first t in [0, h] at which it reaches `upper` (1) or `lower` (-1).
   std::optional<std::pair<double, int>> first_exit(double lower, double upper) const;
@@ -98,76 +96,58 @@ class PhotoreceptorNoise {
   NoiseState after_gap(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
                        std::int32_t pole) const;
 
-  /// A part of a step that begins at a node: part 1 is the whole step, 2 i and 2 i + 1 are the halves of i.
-  struct Part {
-    NoiseState from, to;
-    double start = 0;  ///< ns after the node
-    std::uint32_t index = 1;
-    std::size_t depth = 0;
+  /// Within a step, x is a cubic in each of kParts equal parts. The states at their ends:
+  static constexpr std::size_t kParts = 8;
+  struct Path {
+    std::array<double, kParts + 1> y, x;
   };
-  double length(std::int32_t pole, const Part& part) const {
-    return std::ldexp(step_ns(pole), -static_cast<int>(part.depth));
+  /// The path from the state `from` at a node to the state `to` a step later, drawn by the bridge of the process.
+  Path path(const NoiseState& from, const NoiseState& to, std::uint32_t pixel, std::uint32_t node,
+            std::int32_t pole) const;
+  double part_ns(std::int32_t pole) const { return step_ns(pole) / kParts; }
+  NoiseCubic cubic(const Path& path, std::size_t part, std::int32_t pole) const {
+    const std::size_t next = part + 1;
+    return {path.x[part], (path.y[part] - path.x[part]) / t2_, path.x[next], (path.y[next] - path.x[next]) / t2_,
+            part_ns(pole)};
   }
-  /// Whether x is cubic() in this part.
-  bool is_cubic(std::int32_t pole, const Part& part) const {
-    return part.depth == poles_[static_cast<std::size_t>(pole)].bridges;
-  }
-  NoiseCubic cubic(std::int32_t pole, const Part& part) const {
-    const NoiseState &from = part.from, &to = part.to;
-    return {from.x, (from.y - from.x) / t2_, to.x, (to.y - to.x) / t2_, length(pole, part)};
-  }
-  /// The draws within a step, which are made together when they are needed.
-  struct Middles {
-    Middles(std::uint32_t pixel_, std::uint32_t node_) : pixel(pixel_), node(node_) {}
-
-    std::uint32_t pixel, node;
-    bool drawn = false;
-    alignas(64) std::array<float, 16> n1, n2;  ///< by index of the part
-  };
-  std::pair<Part, Part> halves(std::int32_t pole, const Part& part, Middles& middles) const;
-
-  /// Bounds of x in a part, except with a probability below 1e-4 where it matters. The values at both ends, and those
-  /// which the slopes lead to after reach(), are within them by margin().
-  std::pair<double, double> bounds(std::int32_t pole, const Part& part) const {
-    const double along = reach(pole, part.depth) / t2_;
-    const auto [low, high] = std::minmax({part.from.x, part.to.x, part.from.x + (part.from.y - part.from.x) * along,
-                                          part.to.x - (part.to.y - part.to.x) * along});
-    return {low - margin(pole, part.depth), high + margin(pole, part.depth)};
-  }
-  double reach(std::int32_t pole, std::size_t depth) const {
-    return std::min(std::ldexp(step_ns(pole), -static_cast<int>(depth)) / 3, t2_);
-  }
-  double margin(std::int32_t pole, std::size_t depth) const {
-    const Pole& of = poles_[static_cast<std::size_t>(pole)];
-    return depth == of.bridges ? 0.0 : kBoundDeviations * bridges_[of.first_bridge + depth].deviation;
+  /// x at `tau` ns after the node.
+  double at(const Path& path, double tau, std::int32_t pole) const {
+    const double length = part_ns(pole), place = std::clamp(std::floor(tau / length), 0.0, kParts - 1.0);
+    return cubic(path, static_cast<std::size_t>(place), pole).value(tau - place * length);
   }
 
-  /// x at `tau` ns after a node, within its step.
-  double at(std::int32_t pole, Part part, double tau, Middles& middles) const;
+  /// Bounds of x in a step, except with a probability below 1e-4 where it matters: the values at both ends, and those
+  /// to which the slopes lead after along() t2, are within them by margin().
+  std::pair<double, double> bounds(const NoiseState& from, const NoiseState& to, std::int32_t pole) const {
+    const auto [low, high] =
+        std::minmax({from.x, to.x, from.x + (from.y - from.x) * along(pole), to.x - (to.y - to.x) * along(pole)});
+    return {low - margin(pole), high + margin(pole)};
+  }
+  double along(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].along; }
+  double margin(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].margin; }
 
  private:
   static constexpr double kBoundDeviations = 4.5;
-  static constexpr std::size_t kMaxDepth = 3;  // of parts
+  static constexpr std::size_t kHalvings = 3;
+  static_assert(kParts == 1U << kHalvings);
 
-  /// The state in the middle of a part: each row is that of y or x, from y and x at the start and at the end, n1 and
-  /// n2.
+  /// The state in the middle of an interval: each row is that of y or x, from y and x at the start and at the end, n1
+  /// and n2.
   struct Bridge {
     std::array<double, 6> y, x;
     double deviation = 0;  // of x in the middle
   };
   struct Pole {
-    double t1 = 0, deviation = 0, step = 0, decay = 0;
-    std::size_t first_bridge = 0, bridges = 0;  // by depth
+    double t1 = 0, deviation = 0, step = 0, decay = 0, along = 0, margin = 0;
+    std::array<Bridge, kHalvings> bridges;  // of the step, of its halves, ...
   };
 
   Bridge make_bridge(double t1, double h) const;
-  void draw(Middles& middles) const;
 
   double variance_, t2_, log_first_, per_log_step_;
   AddressedRandom random_;
   std::vector<Pole> poles_;
   std::vector<Step> steps_;
-  std::vector<Bridge> bridges_;
 };
 
 }  // namespace esim::inline event_camera

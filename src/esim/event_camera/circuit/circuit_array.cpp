@@ -153,8 +153,11 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
     ramp.length = length;
     ramp.decay2 = set(std::exp(-row.length / t2)), ramp.decay3 = set(std::exp(-k3 * row.length));
     const V area = area_of(d, ramp);
+    const V transient = transient_of(d, ramp, state.lag), decays = hn::Mul(area, set(1 / kMaxDecay));
+    const V decays2 = hn::Mul(decays, decays);
+    const auto is_long = hn::And(hn::Gt(decays, one), hn::Gt(hn::Mul(hn::Mul(decays2, decays2), transient), one));
     several = hn::Or(hn::Gt(hn::Abs(ramp.growth), set(kMaxLightStep)),
-                     hn::And(is_transient(d, ramp, state.lag), hn::Gt(area, set(kMaxDecay))));
+                     hn::And(hn::Gt(transient, set(kMaxTransient)), is_long));
     piece = esim::advance(d, circuit_.poles, ramp, area, state);
 
     const V size_fast = hn::Abs(piece.fast), size_slow = hn::Abs(piece.slow), size_passed = hn::Abs(piece.passed);

@@ -169,8 +169,11 @@ void CircuitArray::advance_in_several(const Row& row, std::span<const std::uint3
     ramp.length = hn::Div(remaining, hn::Max(one, hn::Ceil(hn::Sub(changes, hn::Set(d, 1e-9)))));
     ramp.growth = hn::Mul(v_rate, ramp.length);
     const V brightest = hn::Exp(d, hn::Max(hn::Zero(d), ramp.growth));
-    const V shorter = hn::Div(hn::Set(d, kMaxDecay), hn::Mul(ramp.rate0, brightest));
-    ramp.length = hn::IfThenElse(is_transient(d, ramp, state.lag), hn::Min(ramp.length, shorter), ramp.length);
+    const V transient = transient_of(d, ramp, state.lag);
+    const V decay = hn::Div(hn::Set(d, kMaxDecay), hn::Sqrt(hn::Sqrt(hn::Min(one, transient))));
+    const V shorter = hn::Div(decay, hn::Mul(ramp.rate0, brightest));
+    ramp.length =
+        hn::IfThenElse(hn::Gt(transient, hn::Set(d, kMaxTransient)), hn::Min(ramp.length, shorter), ramp.length);
     const auto ends = hn::Ge(ramp.length, remaining);
     ramp.growth = hn::Mul(v_rate, ramp.length);
     ramp.light1 = hn::Add(state.light, ramp.growth);

@@ -19,8 +19,10 @@ double step_length(const CircuitPoles& poles, const CircuitState& state, const L
   const double step = length / std::max(1.0, std::ceil(change / kMaxLightStep - 1e-9));
   // Far from the lag that the ramp keeps up, the response is not an exponential.
   const double rate = std::exp(ramp.light) / poles.t1_unit_ns;
-  if (std::abs(state.lag - ramp.rate / rate) <= kMaxTransient) return step;
-  return std::min(step, kMaxDecay / (rate * std::exp(std::max(0.0, ramp.rate * step))));
+  const double transient = std::abs(state.lag - ramp.rate / rate);
+  if (transient <= kMaxTransient) return step;
+  const double decay = kMaxDecay / std::sqrt(std::sqrt(std::min(1.0, transient)));
+  return std::min(step, decay / (rate * std::exp(std::max(0.0, ramp.rate * step))));
 }
 
 namespace {

@@ -37,11 +37,10 @@ HWY_INLINE hn::Vec<D> area_of(D d, const CircuitRamps<D>& ramp) {
   return hn::Mul(hn::Mul(ramp.rate0, ramp.length), mean);
 }
 
-/// Whether the lag is far from the one that the ramp keeps up.
+/// How far the lag is from the one that the ramp keeps up.
 template <class D>
-HWY_INLINE hn::Mask<D> is_transient(D d, const CircuitRamps<D>& ramp, hn::Vec<D> lag) {
-  const auto kept = hn::Div(ramp.growth, hn::Mul(ramp.rate0, ramp.length));
-  return hn::Gt(hn::Abs(hn::Sub(lag, kept)), hn::Set(d, kMaxTransient));
+HWY_INLINE hn::Vec<D> transient_of(D, const CircuitRamps<D>& ramp, hn::Vec<D> lag) {
+  return hn::Abs(hn::Sub(lag, hn::Div(ramp.growth, hn::Mul(ramp.rate0, ramp.length))));
 }
 
 /// As advance(), which has the equations. `area` is that of area_of().

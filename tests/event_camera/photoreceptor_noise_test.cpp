@@ -139,7 +139,7 @@ TEST(PhotoreceptorNoise, DrawsDoNotDependOnTheOthersDrawnWithThem) {
       for (const std::size_t j : {0, 1}) EXPECT_EQ(together[k][j][i], alone[k][j][0]);
     }
   }
-  EXPECT_EQ(together[2][0][0], together[0][0][2]);  // node 12 of pixel 7, twice
+  EXPECT_NE(together[0][0][2], together[0][0][0]);  // nodes 12 and 10 of pixel 7
   EXPECT_NE(together[1][0][0], together[0][0][0]);
 }
 

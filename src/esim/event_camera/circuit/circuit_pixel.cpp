@@ -142,12 +142,12 @@ void CircuitPixel::start_step(const NoiseState& from, double time) {
   state_.node_time = time;
   state_.from = from;
   state_.active = true;
-  if (drawn_ != (state_.node & ~3U)) {
-    drawn_ = state_.node & ~3U;
+  if (drawn_ != (state_.node & ~1U)) {
+    drawn_ = state_.node & ~1U;
     noise_->draw(1, &pixel_, &drawn_, draws_);
   }
   const auto& n = draws_[state_.node - drawn_];
-  const double drift = (static_cast<double>(state_.node_light) - light(time - start_)) / PhotoreceptorNoise::kDriftStep;
+  const float drift = state_.node_light - static_cast<float>(light(time - start_));
   state_.to = noise_->after_step(from, {n[0][0], n[1][0]}, state_.pole, drift);
 }
 
@@ -188,7 +188,7 @@ double CircuitPixel::noise_at(double s) {
   state_.node += 1;
   state_.from = noise_->after_gap(state_.from, start_ + s - state_.node_time, pixel_, state_.node, state_.pole);
   state_.node_time = start_ + s;
-  return state_.from.x;
+  return static_cast<double>(state_.from.x);
 }
 
 void CircuitPixel::open(double light, double signal, const LeakRamp& leak, double time, double place) {
@@ -208,7 +208,7 @@ void CircuitPixel::open(double light, double signal, const LeakRamp& leak, doubl
   if (noise_ == nullptr) return;
   state_.pole = circuit_.pole(light);
   state_.from = noise_->first(pixel_, state_.pole);
-  state_.reference += gain_ * state_.from.x;
+  state_.reference += gain_ * static_cast<double>(state_.from.x);
 }
 
 /// Ends the reset of a pixel: its new reference is signal plus noise.

@@ -59,7 +59,8 @@ struct CircuitBounds {
   double low = 0, high = 0, until = 0;
 };
 
-inline constexpr double kLightReach = 0.2;  ///< change of L within which steps of the noise keep their length
+inline constexpr double kLightReach =
+    PhotoreceptorNoise::kMaxDrift;  ///< change of L within which steps keep their length
 inline constexpr double kActiveDeviations =
     5.5;  ///< distance to a threshold, in deviations, at which noise begins to matter
 inline constexpr double kInactiveDeviations = 6.0;  ///< distance at a node at which it ceases to matter

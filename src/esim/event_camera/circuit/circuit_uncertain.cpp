@@ -106,8 +106,8 @@ void CircuitArray::advance_in_one(const Row& row, std::span<const std::uint32_t>
   CircuitLanes& lanes = buffer.lanes;
   std::array<std::size_t, CircuitLanes::kLanes> pixels{};
   CircuitLanes::Lanes active = 0, inactive = 0, rests = 0;
-  for (std::size_t lane = 0; lane < CircuitLanes::count(); ++lane) {
-    const std::uint32_t column = columns[std::min(lane, columns.size() - 1)];  // the last pixel fills all other lanes
+  for (std::size_t lane = 0; lane < columns.size(); ++lane) {
+    const std::uint32_t column = columns[lane];
     const std::size_t i = row.first + column, at = column - begin;
     pixels[lane] = i;
     if (circuit_.noise) lanes.enter(lane, circuit_, static_cast<std::uint32_t>(i), parameters_[i], states_[i]);
@@ -119,8 +119,7 @@ void CircuitArray::advance_in_one(const Row& row, std::span<const std::uint32_t>
     const LeakRamp leak = leak_in(row, column, at, buffer);
     lanes.leaked[lane] = leak.leaked, lanes.leak_rate[lane] = leak.rate;
     lanes.s[lane] = 0;
-    if (lane < columns.size() && circuit_.noise && states_[i].held_until <= row.start)
-      (states_[i].active ? active : inactive) |= 1U << lane;
+    if (circuit_.noise && states_[i].held_until <= row.start) (states_[i].active ? active : inactive) |= 1U << lane;
   }
   active |= wake(lanes, pixels, inactive, rests);
   const CircuitLanes::Lanes arrived = active != 0 ? lanes.take_quiet_steps(circuit_, active) : 0;
@@ -128,7 +127,7 @@ void CircuitArray::advance_in_one(const Row& row, std::span<const std::uint32_t>
     const std::size_t i = pixels[lane], at = columns[lane] - begin;
     if ((active >> lane & 1U) != 0) lanes.leave(lane, states_[i]);
     if ((arrived >> lane & 1U) != 0) {
-      set_bounds(i, lanes.bounds(lane, parameters_[i]));
+      set_bounds(i, lanes.bounds(lane));
     } else if ((rests >> lane & 1U) == 0) {
       CircuitState unused;
       finish(row, columns[lane], at, lanes.piece(circuit_, lane), 0, lane, unused, buffer);
@@ -146,8 +145,8 @@ void CircuitArray::advance_in_several(const Row& row, std::span<const std::uint3
   CircuitLanes& lanes = buffer.lanes;
   alignas(64) CircuitLanes::Values light{}, rate{}, lag{}, y{}, v{}, w{}, done{}, leaked{}, next_done{};
   std::array<std::size_t, CircuitLanes::kLanes> pixels{};
-  for (std::size_t lane = 0; lane < CircuitLanes::count(); ++lane) {
-    const std::uint32_t column = columns[std::min(lane, columns.size() - 1)];
+  for (std::size_t lane = 0; lane < columns.size(); ++lane) {
+    const std::uint32_t column = columns[lane];
     const std::size_t i = row.first + column, at = column - begin;
     pixels[lane] = i;
     if (circuit_.noise) lanes.enter(lane, circuit_, static_cast<std::uint32_t>(i), parameters_[i], states_[i]);
@@ -158,38 +157,40 @@ void CircuitArray::advance_in_several(const Row& row, std::span<const std::uint3
   }
   const auto all = static_cast<CircuitLanes::Lanes>((1U << columns.size()) - 1);
   for (CircuitLanes::Lanes left = all; left != 0;) {
-    // The next piece of each pixel, as step_length() and esim::advance() make it
-    const V v_done = hn::Load(d, done.data()), v_rate = hn::Load(d, rate.data()), one = hn::Set(d, 1.0);
-    const V remaining = hn::Sub(hn::Set(d, row.length), v_done);
-    CircuitStates<D> state{hn::MulAdd(v_rate, v_done, hn::Load(d, light.data())), hn::Load(d, lag.data()),
-                           hn::Load(d, y.data()), hn::Load(d, v.data()), hn::Load(d, w.data())};
-    const V changes = hn::Mul(hn::Abs(hn::Mul(v_rate, remaining)), hn::Set(d, 1 / kMaxLightStep));
-    CircuitRamps<D> ramp;
-    ramp.rate0 = hn::Mul(hn::Exp(d, state.light), hn::Set(d, 1 / circuit_.poles.t1_unit_ns));
-    ramp.length = hn::Div(remaining, hn::Max(one, hn::Ceil(hn::Sub(changes, hn::Set(d, 1e-9)))));
-    ramp.growth = hn::Mul(v_rate, ramp.length);
-    const V brightest = hn::Exp(d, hn::Max(hn::Zero(d), ramp.growth));
-    const V transient = transient_of(d, ramp, state.lag);
-    const V decay = hn::Div(hn::Set(d, kMaxDecay), hn::Sqrt(hn::Sqrt(hn::Min(one, transient))));
-    const V shorter = hn::Div(decay, hn::Mul(ramp.rate0, brightest));
-    ramp.length =
-        hn::IfThenElse(hn::Gt(transient, hn::Set(d, kMaxTransient)), hn::Min(ramp.length, shorter), ramp.length);
-    const auto ends = hn::Ge(ramp.length, remaining);
-    ramp.growth = hn::Mul(v_rate, ramp.length);
-    ramp.light1 = hn::Add(state.light, ramp.growth);
-    ramp.rho = hn::Expm1(d, ramp.growth);
-    ramp.decay2 = hn::Exp(d, hn::Mul(ramp.length, hn::Set(d, -1 / circuit_.poles.t2_ns)));
-    ramp.decay3 = hn::Exp(d, hn::Mul(ramp.length, hn::Set(d, -circuit_.poles.high_pass_per_ns)));
-    const V light0 = state.light;
-    const CircuitPieces<D> piece = esim::advance(d, circuit_.poles, ramp, area_of(d, ramp), state);
-    const auto store = [d](V values, CircuitLanes::Values& to) { hn::Store(values, d, to.data()); };
-    store(piece.level, lanes.level), store(piece.rate, lanes.rate), store(piece.fast, lanes.fast);
-    store(piece.slow, lanes.slow), store(piece.k1, lanes.k1), store(piece.passed, lanes.passed);
-    store(ramp.length, lanes.length), store(light0, lanes.light);
-    store(hn::Add(hn::Set(d, row.start), v_done), lanes.start), store(hn::Zero(d), lanes.s);
-    store(hn::MulAdd(hn::Load(d, lanes.leak_rate.data()), v_done, hn::Load(d, leaked.data())), lanes.leaked);
-    store(state.lag, lag), store(state.y, y), store(state.v, v), store(state.w, w);
-    store(hn::IfThenElse(ends, hn::Set(d, row.length), hn::Add(v_done, ramp.length)), next_done);
+    for (std::size_t i = 0; i < columns.size(); i += hn::Lanes(d)) {
+      // The next piece of each pixel, as step_length() and esim::advance() make it
+      const V v_done = hn::Load(d, &done[i]), v_rate = hn::Load(d, &rate[i]), one = hn::Set(d, 1.0);
+      const V remaining = hn::Sub(hn::Set(d, row.length), v_done);
+      CircuitStates<D> state{hn::MulAdd(v_rate, v_done, hn::Load(d, &light[i])), hn::Load(d, &lag[i]),
+                             hn::Load(d, &y[i]), hn::Load(d, &v[i]), hn::Load(d, &w[i])};
+      const V changes = hn::Mul(hn::Abs(hn::Mul(v_rate, remaining)), hn::Set(d, 1 / kMaxLightStep));
+      CircuitRamps<D> ramp;
+      ramp.rate0 = hn::Mul(hn::Exp(d, state.light), hn::Set(d, 1 / circuit_.poles.t1_unit_ns));
+      ramp.length = hn::Div(remaining, hn::Max(one, hn::Ceil(hn::Sub(changes, hn::Set(d, 1e-9)))));
+      ramp.growth = hn::Mul(v_rate, ramp.length);
+      const V brightest = hn::Exp(d, hn::Max(hn::Zero(d), ramp.growth));
+      const V transient = transient_of(d, ramp, state.lag);
+      const V decay = hn::Div(hn::Set(d, kMaxDecay), hn::Sqrt(hn::Sqrt(hn::Min(one, transient))));
+      const V shorter = hn::Div(decay, hn::Mul(ramp.rate0, brightest));
+      ramp.length =
+          hn::IfThenElse(hn::Gt(transient, hn::Set(d, kMaxTransient)), hn::Min(ramp.length, shorter), ramp.length);
+      const auto ends = hn::Ge(ramp.length, remaining);
+      ramp.growth = hn::Mul(v_rate, ramp.length);
+      ramp.light1 = hn::Add(state.light, ramp.growth);
+      ramp.rho = hn::Expm1(d, ramp.growth);
+      ramp.decay2 = hn::Exp(d, hn::Mul(ramp.length, hn::Set(d, -1 / circuit_.poles.t2_ns)));
+      ramp.decay3 = hn::Exp(d, hn::Mul(ramp.length, hn::Set(d, -circuit_.poles.high_pass_per_ns)));
+      const V light0 = state.light;
+      const CircuitPieces<D> piece = esim::advance(d, circuit_.poles, ramp, area_of(d, ramp), state);
+      const auto store = [d, i](V values, CircuitLanes::Values& to) { hn::Store(values, d, &to[i]); };
+      store(piece.level, lanes.level), store(piece.rate, lanes.rate), store(piece.fast, lanes.fast);
+      store(piece.slow, lanes.slow), store(piece.k1, lanes.k1), store(piece.passed, lanes.passed);
+      store(ramp.length, lanes.length), store(light0, lanes.light);
+      store(hn::Add(hn::Set(d, row.start), v_done), lanes.start), store(hn::Zero(d), lanes.s);
+      store(hn::MulAdd(hn::Load(d, &lanes.leak_rate[i]), v_done, hn::Load(d, &leaked[i])), lanes.leaked);
+      store(state.lag, lag), store(state.y, y), store(state.v, v), store(state.w, w);
+      store(hn::IfThenElse(ends, hn::Set(d, row.length), hn::Add(v_done, ramp.length)), next_done);
+    }
 
     CircuitLanes::Lanes active = 0, inactive = 0, arrived = 0, rests = 0;
     for (std::size_t lane = 0; lane < columns.size(); ++lane) {
@@ -220,7 +221,7 @@ void CircuitArray::advance_in_several(const Row& row, std::span<const std::uint3
         done[lane] = next_done[lane];
         continue;
       } else if (was_active) {
-        set_bounds(i, lanes.bounds(lane, parameters_[i]));
+        set_bounds(i, lanes.bounds(lane));
       }
       left &= ~(1U << lane);
       const double last = std::abs(front.lag) < kSettled ? 0.0 : front.lag,

@@ -6,6 +6,7 @@
 
 #include "esim/core/error.h"
 #include "esim/core/vector_math.h"
+#include "esim/event_camera/circuit/photoreceptor_vectors.h"
 
 namespace esim::inline event_camera {
 namespace {
@@ -24,7 +25,9 @@ constexpr std::uint32_t kStepAddresses = 0x80000000;
 struct NoiseMatrix {
   double yy = 0, yx = 0, xy = 0, xx = 0;
 
-  NoiseState operator*(const NoiseState& s) const { return {yy * s.y + yx * s.x, xy * s.y + xx * s.x}; }
+  NoiseState apply(double y, double x) const {
+    return {static_cast<float>(yy * y + yx * x), static_cast<float>(xy * y + xx * x)};
+  }
 };
 
 /// A symmetric 2 x 2 matrix.
@@ -89,9 +92,9 @@ Covariance added(double variance, double t1, double t2, double h) {
 }
 
 /// Pairs of standard normal deviates from two words each, by the Box-Muller method in single precision: the radius from
-/// 31 random bits, at most 6.7. All arrays have 16 elements.
+/// 31 random bits, at most 6.7. All arrays are read and written up to `count` rounded up to a multiple of 8.
 void normals(std::size_t count, const std::uint32_t* first, const std::uint32_t* second, float* n1, float* n2) {
-  const hn::CappedTag<float, 16> d;
+  const NoiseLanes d;
   const hn::RebindToSigned<decltype(d)> di;
   const hn::RebindToUnsigned<decltype(d)> du;
   const auto unit = [&](const std::uint32_t* from) {  // in (0, 1): the upper 31 bits and a half
@@ -131,24 +134,39 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
     pole.t1 = apart(std::exp(log_first_ + static_cast<double>(i) / per_log_step_), t2_);
     pole.deviation = deviation_at(pole.t1);
     double shortest = 0.1 * std::min(pole.t1, t2_), longest = 4 * std::max(pole.t1, t2_);
+    const auto deviation_within = [&](double h) { return static_cast<double>(make_bridge(pole.t1, h).deviation); };
     for (int k = 0; k < 30; ++k) {
       const double h = std::sqrt(shortest * longest);
-      (make_bridge(pole.t1, h).deviation <= kUnknown * pole.deviation ? shortest : longest) = h;
+      (deviation_within(h) <= kUnknown * pole.deviation ? shortest : longest) = h;
     }
-    while (make_bridge(pole.t1, 2 * shortest / kParts).deviation > kNeglected * pole.deviation) shortest *= 0.9;
+    while (deviation_within(2 * shortest / kParts) > kNeglected * pole.deviation) shortest *= 0.9;
     pole.step = shortest;
     double length = pole.step;
     for (Bridge& bridge : pole.bridges) bridge = make_bridge(pole.t1, length), length *= 0.5;
-    pole.along = std::min(pole.step / 3, t2_) / t2_;
+    pole.along = static_cast<float>(std::min(pole.step / 3, t2_) / t2_);
     pole.margin = kBoundDeviations * pole.bridges[0].deviation;
-    pole.decay = std::exp(-pole.step / t2_);
     poles_.push_back(pole);
-    for (int k = -kDrifts; k <= kDrifts; ++k) {
-      const double t1 = apart(pole.t1 * std::exp(kDriftStep * k), t2_);
-      const NoiseMatrix moved = drift(t1, t2_, pole.step), drawn = root(added(variance_, t1, t2_, pole.step));
-      steps_.push_back({moved.yy, moved.xy, drawn.yy, drawn.xy, drawn.xx});
-    }
+    steps_.push_back(make_step(pole));
   }
+}
+
+PhotoreceptorNoise::Step PhotoreceptorNoise::make_step(const Pole& pole) const {
+  // Parabolas through the factors at three drifts.
+  const double apart_by = kMaxDrift * std::sqrt(0.75);
+  std::array<std::array<double, Step::kFactors>, 3> factors{};
+  for (const int k : {-1, 0, 1}) {
+    const double t1 = apart(pole.t1 * std::exp(k * apart_by), t2_);
+    const NoiseMatrix moved = drift(t1, t2_, pole.step), drawn = root(added(variance_, t1, t2_, pole.step));
+    factors[static_cast<std::size_t>(k + 1)] = {moved.yy, moved.xy, drawn.yy, drawn.xy, drawn.xx};
+  }
+  Step step;
+  for (std::size_t i = 0; i < Step::kFactors; ++i) {
+    const double low = factors[0][i], middle = factors[1][i], high = factors[2][i];
+    step.parabolas[i] = {static_cast<float>(middle), static_cast<float>((high - low) / (2 * apart_by)),
+                         static_cast<float>((high + low - 2 * middle) / (2 * apart_by * apart_by))};
+  }
+  step.xx = static_cast<float>(std::exp(-pole.step / t2_));
+  return step;
 }
 
 PhotoreceptorNoise::Bridge PhotoreceptorNoise::make_bridge(double t1, double h) const {
@@ -159,9 +177,14 @@ PhotoreceptorNoise::Bridge PhotoreceptorNoise::make_bridge(double t1, double h) 
   const NoiseMatrix covariance = difference(c, product(product(k, a), c));
   const NoiseMatrix from = difference(a, product(k, product(a, a)));
   const NoiseMatrix spread = root({covariance.yy, 0.5 * (covariance.xy + covariance.yx), covariance.xx});
-  return {{from.yy, from.yx, k.yy, k.yx, spread.yy, 0.0},
-          {from.xy, from.xx, k.xy, k.xx, spread.xy, spread.xx},
-          std::sqrt(std::max(covariance.xx, 0.0))};
+  const auto row = [](const std::array<double, 6>& values) {
+    std::array<float, 6> floats{};
+    std::transform(values.begin(), values.end(), floats.begin(), [](double v) { return static_cast<float>(v); });
+    return floats;
+  };
+  return {row({from.yy, from.yx, k.yy, k.yx, spread.yy, 0.0}),
+          row({from.xy, from.xx, k.xy, k.xx, spread.xy, spread.xx}),
+          static_cast<float>(std::sqrt(std::max(covariance.xx, 0.0)))};
 }
 
 PhotoreceptorNoise::Path PhotoreceptorNoise::path(const NoiseState& from, const NoiseState& to, std::uint32_t pixel,
@@ -181,10 +204,9 @@ PhotoreceptorNoise::Path PhotoreceptorNoise::path(const NoiseState& from, const 
   std::size_t length = kParts;
   for (const Bridge& bridge : poles_[static_cast<std::size_t>(pole)].bridges) {
     for (std::size_t i = 0; i < kParts; i += length, ++draw) {
-      const auto d1 = static_cast<double>(n1[draw]), d2 = static_cast<double>(n2[draw]);
-      const auto sum = [&](const std::array<double, 6>& row) {
+      const auto sum = [&](const std::array<float, 6>& row) {
         return row[0] * path.y[i] + row[1] * path.x[i] + row[2] * path.y[i + length] + row[3] * path.x[i + length] +
-               row[4] * d1 + row[5] * d2;
+               row[4] * n1[draw] + row[5] * n2[draw];
       };
       path.y[i + length / 2] = sum(bridge.y), path.x[i + length / 2] = sum(bridge.x);
     }
@@ -197,42 +219,29 @@ NoiseState PhotoreceptorNoise::first(std::uint32_t pixel, std::int32_t pole) con
   // Stationary: Var y = v, Var x = Cov xy = v t1 / (t1 + t2). Draw 0 belongs to this state alone.
   const double t1 = poles_[static_cast<std::size_t>(pole)].t1, common = variance_ * t1 / (t1 + t2_);
   const auto n = random_.normals(pixel, 0);
-  return root({variance_, common, common}) * NoiseState{n[0], n[1]};
+  return root({variance_, common, common}).apply(n[0], n[1]);
 }
 
 NoiseState PhotoreceptorNoise::after_step(const NoiseState& from, const std::array<float, 2>& n, std::int32_t pole,
-                                          double drift) const {
-  const double place = drift + kDrifts, below = std::clamp(std::floor(place), 0.0, 2.0 * kDrifts - 1);
-  const Step* const step = steps(pole) + static_cast<std::size_t>(below);
-  const auto at = [&](double Step::*value) {
-    return step[0].*value + (place - below) * (step[1].*value - step[0].*value);
-  };
-  const auto n1 = static_cast<double>(n[0]), n2 = static_cast<double>(n[1]);
-  return {at(&Step::yy) * from.y + at(&Step::n_yy) * n1,
-          at(&Step::xy) * from.y + decay(pole) * from.x + at(&Step::n_xy) * n1 + at(&Step::n_xx) * n2};
+                                          float drift) const {
+  const NoiseLanes d;
+  const Step& step = this->step(pole);
+  const auto parabola = [&](std::size_t factor, std::size_t i) { return hn::Set(d, step.parabolas[factor][i]); };
+  auto y = hn::Set(d, from.y), x = hn::Set(d, from.x);
+  noise_step(d, parabola, hn::Set(d, step.xx), hn::Set(d, drift), hn::Set(d, n[0]), hn::Set(d, n[1]), y, x);
+  return {hn::GetLane(y), hn::GetLane(x)};
 }
 
 void PhotoreceptorNoise::draw(std::size_t count, const std::uint32_t* pixels, const std::uint32_t* first,
                               Draws& n) const {
-  // Four words serve two nodes. Words of the nodes first and first + 1 of all pixels come before those of the next two.
-  constexpr std::size_t kWords = 2 * kDrawn;
-  alignas(64) std::array<std::uint32_t, kWords> items{}, addresses{};
-  for (std::size_t i = 0; i < count; ++i) {
-    items[i] = items[count + i] = pixels[i];
-    addresses[i] = kStepAddresses | (first[i] >> 1);
-    addresses[count + i] = addresses[i] + 1;
-  }
-  alignas(64) std::array<std::array<std::uint32_t, kWords>, 4> words;
-  random_.bits(2 * count, items.data(), addresses.data(),
+  // Four words serve two nodes.
+  alignas(64) std::array<std::uint32_t, 16> items{}, addresses{};
+  for (std::size_t i = 0; i < count; ++i) items[i] = pixels[i], addresses[i] = kStepAddresses | (first[i] >> 1);
+  alignas(64) std::array<std::array<std::uint32_t, 16>, 4> words;
+  random_.bits(count, items.data(), addresses.data(),
                {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
-  alignas(64) std::array<float, kWords> cosines, sines;
-  for (std::size_t parity = 0; parity < 2; ++parity) {
-    normals(2 * count, words[2 * parity].data(), words[2 * parity + 1].data(), cosines.data(), sines.data());
-    for (std::size_t half = 0; half < 2; ++half) {
-      std::copy_n(&cosines[half * count], count, n[2 * half + parity][0].begin());
-      std::copy_n(&sines[half * count], count, n[2 * half + parity][1].begin());
-    }
-  }
+  for (std::size_t k = 0; k < kNodesDrawn; ++k)
+    normals(count, words[2 * k].data(), words[2 * k + 1].data(), n[k][0].data(), n[k][1].data());
 }
 
 NoiseState PhotoreceptorNoise::after_gap(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
@@ -243,11 +252,11 @@ NoiseState PhotoreceptorNoise::after_gap(const NoiseState& from, double gap, std
   const double yy = variance_ * (1 - e1 * e1), uu = gain * gain * power * t2_ / 2 * (1 - e2 * e2);
   const double cross = -gain * power * t1 * t2_ / (t1 + t2_) * (1 - e1 * e2);
   const auto n = random_.normals(pixel, (std::uint64_t{node} << 32) | 1);
-  const NoiseState drawn =
-      root({yy, cross + gain * yy, uu + 2 * gain * cross + gain * gain * yy}) * NoiseState{n[0], n[1]};
-  const NoiseState drifted = drift(t1, t2_, gap) * from;
   const double part = gap < h ? std::sqrt(gap / h) : 1.0;
-  return {drifted.y + part * drawn.y, drifted.x + part * drawn.x};
+  const NoiseState drawn =
+      root({yy, cross + gain * yy, uu + 2 * gain * cross + gain * gain * yy}).apply(part * n[0], part * n[1]);
+  const NoiseState drifted = drift(t1, t2_, gap).apply(static_cast<double>(from.y), static_cast<double>(from.x));
+  return {drifted.y + drawn.y, drifted.x + drawn.x};
 }
 
 std::optional<std::pair<double, int>> NoiseCubic::first_exit(double lower, double upper) const {

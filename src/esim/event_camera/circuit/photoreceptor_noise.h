@@ -15,8 +15,8 @@ namespace esim::inline event_camera {
 
 /// The noise of a photoreceptor, as brightness (natural logarithm of the photocurrent).
 struct NoiseState {
-  double y = 0;  ///< at the photodiode, whose pole has the time constant t1 = Q / I
-  double x = 0;  ///< after the source follower, whose pole has the time constant t2: what the comparators see
+  float y = 0;  ///< at the photodiode, whose pole has the time constant t1 = Q / I
+  float x = 0;  ///< after the source follower, whose pole has the time constant t2: what the comparators see
 };
 
 /// A cubic on [0, h] with these values and slopes at its ends.
@@ -57,11 +57,6 @@ class PhotoreceptorNoise {
     const double place = (log_t1_ns - log_first_) * per_log_step_ + 0.5;
     return static_cast<std::int32_t>(std::clamp(place, 0.0, static_cast<double>(poles_.size()) - 0.5));
   }
-  /// Steps keep the length of their pole in other light, where ln(t1) is larger by `drift` times kDriftStep. What they
-  /// do is interpolated for |drift| up to kDrifts, so that rounding errors of the light have no large consequences.
-  static constexpr int kDrifts = 4;
-  static constexpr double kDriftStep = 0.05;
-
   double t1_ns(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].t1; }
   double t2_ns() const { return t2_; }
   double step_ns(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].step; }
@@ -72,17 +67,20 @@ class PhotoreceptorNoise {
   double deviation_at(double t1_ns) const { return std::sqrt(variance_ * t1_ns / (t1_ns + t2_)); }
 
   /// A step: y1 = yy y0 + n_yy n1, x1 = xy y0 + xx x0 + n_xy n1 + n_xx n2, with the standard normal deviates n1 and n2
-  /// of its end. xx = exp(-step / t2).
+  /// of its end. xx = exp(-step / t2). Steps keep the length of their pole in other light, where ln(t1) is larger by
+  /// `drift`, up to kMaxDrift either way: the other factors are parabolas c0 + c1 drift + c2 drift^2.
   struct Step {
-    double yy = 0, xy = 0, n_yy = 0, n_xy = 0, n_xx = 0;
+    enum Factor : std::uint8_t { yy, xy, n_yy, n_xy, n_xx };
+    static constexpr std::size_t kFactors = 5;
+    std::array<std::array<float, 3>, kFactors> parabolas{};
+    float xx = 0;
   };
-  /// Those of a pole for drifts of -kDrifts to kDrifts, and xx.
-  const Step* steps(std::int32_t pole) const { return &steps_[(2 * kDrifts + 1) * static_cast<std::size_t>(pole)]; }
-  double decay(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].decay; }
+  static constexpr double kMaxDrift = 0.2;
+  const Step& step(std::int32_t pole) const { return steps_[static_cast<std::size_t>(pole)]; }
 
-  /// The draws of the nodes first to first + 3 of `count` pixels, a power of two up to kDrawn; `first` is even.
+  /// The draws of the nodes first and first + 1 of `count` pixels, up to kDrawn; `first` is even.
   /// n[k][j][i] is n_(j+1) of node first[i] + k of pixel pixels[i].
-  static constexpr std::size_t kDrawn = 8, kNodesDrawn = 4;
+  static constexpr std::size_t kDrawn = 8, kNodesDrawn = 2;
   using Draws = std::array<std::array<std::array<float, kDrawn>, 2>, kNodesDrawn>;
   void draw(std::size_t count, const std::uint32_t* pixels, const std::uint32_t* first, Draws& n) const;
 
@@ -90,7 +88,7 @@ class PhotoreceptorNoise {
   NoiseState first(std::uint32_t pixel, std::int32_t pole) const;
 
   /// The state a step after the state `from`, with the draws of its node.
-  NoiseState after_step(const NoiseState& from, const std::array<float, 2>& n, std::int32_t pole, double drift) const;
+  NoiseState after_step(const NoiseState& from, const std::array<float, 2>& n, std::int32_t pole, float drift) const;
 
   /// The state `gap` ns after the state `from`, at node `node`: for times without steps.
   NoiseState after_gap(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
@@ -99,16 +97,16 @@ class PhotoreceptorNoise {
   /// Within a step, x is a cubic in each of kParts equal parts. The states at their ends:
   static constexpr std::size_t kParts = 8;
   struct Path {
-    std::array<double, kParts + 1> y, x;
+    std::array<float, kParts + 1> y, x;
   };
   /// The path from the state `from` at a node to the state `to` a step later, drawn by the bridge of the process.
   Path path(const NoiseState& from, const NoiseState& to, std::uint32_t pixel, std::uint32_t node,
             std::int32_t pole) const;
   double part_ns(std::int32_t pole) const { return step_ns(pole) / kParts; }
   NoiseCubic cubic(const Path& path, std::size_t part, std::int32_t pole) const {
-    const std::size_t next = part + 1;
-    return {path.x[part], (path.y[part] - path.x[part]) / t2_, path.x[next], (path.y[next] - path.x[next]) / t2_,
-            part_ns(pole)};
+    const auto x0 = static_cast<double>(path.x[part]), x1 = static_cast<double>(path.x[part + 1]);
+    const auto y0 = static_cast<double>(path.y[part]), y1 = static_cast<double>(path.y[part + 1]);
+    return {x0, (y0 - x0) / t2_, x1, (y1 - x1) / t2_, part_ns(pole)};
   }
   /// x at `tau` ns after the node.
   double at(const Path& path, double tau, std::int32_t pole) const {
@@ -119,30 +117,33 @@ class PhotoreceptorNoise {
   /// Bounds of x in a step, except with a probability below 1e-4 where it matters: the values at both ends, and those
   /// to which the slopes lead after along() t2, are within them by margin().
   std::pair<double, double> bounds(const NoiseState& from, const NoiseState& to, std::int32_t pole) const {
+    const float reach = along(pole);
     const auto [low, high] =
-        std::minmax({from.x, to.x, from.x + (from.y - from.x) * along(pole), to.x - (to.y - to.x) * along(pole)});
-    return {low - margin(pole), high + margin(pole)};
+        std::minmax({from.x, to.x, from.x + (from.y - from.x) * reach, to.x - (to.y - to.x) * reach});
+    return {static_cast<double>(low - margin(pole)), static_cast<double>(high + margin(pole))};
   }
-  double along(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].along; }
-  double margin(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].margin; }
+  float along(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].along; }
+  float margin(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].margin; }
 
  private:
-  static constexpr double kBoundDeviations = 4.5;
+  static constexpr float kBoundDeviations = 4.5F;
   static constexpr std::size_t kHalvings = 3;
   static_assert(kParts == 1U << kHalvings);
 
   /// The state in the middle of an interval: each row is that of y or x, from y and x at the start and at the end, n1
   /// and n2.
   struct Bridge {
-    std::array<double, 6> y, x;
-    double deviation = 0;  // of x in the middle
+    std::array<float, 6> y, x;
+    float deviation = 0;  // of x in the middle
   };
   struct Pole {
-    double t1 = 0, deviation = 0, step = 0, decay = 0, along = 0, margin = 0;
+    double t1 = 0, deviation = 0, step = 0;
+    float along = 0, margin = 0;
     std::array<Bridge, kHalvings> bridges;  // of the step, of its halves, ...
   };
 
   Bridge make_bridge(double t1, double h) const;
+  Step make_step(const Pole& pole) const;
 
   double variance_, t2_, log_first_, per_log_step_;
   AddressedRandom random_;

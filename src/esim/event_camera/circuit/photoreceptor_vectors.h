@@ -1,9 +1,10 @@
 #pragma once
 
 #include "esim/core/vector_math.h"
+#include "esim/event_camera/circuit/photoreceptor_noise.h"
 #include "esim/event_camera/circuit/photoreceptor_signal.h"
 
-// advance() of photoreceptor_signal.h for several pixels side by side.
+// advance() of photoreceptor_signal.h and the steps of PhotoreceptorNoise for several pixels side by side.
 // Private to .cpp files: includes hwy/highway.h.
 namespace esim::inline event_camera {
 
@@ -128,6 +129,24 @@ HWY_INLINE CircuitPieces<D> advance(D d, const CircuitPoles& poles, const Circui
   }
   state = {ramp.light1, lag1, y1, v1, w1};
   return piece;
+}
+
+/// Pixels whose noise makes a step side by side.
+using NoiseLanes = hn::CappedTag<float, 8>;
+
+/// A step of the noise from (y, x), as in PhotoreceptorNoise::Step: parabola(factor, i) is its c_i. Rounds in the same
+/// way wherever it is used, since all products are part of a multiplication with addition or stand alone.
+template <class D, class Parabola>
+HWY_INLINE void noise_step(D d, const Parabola& parabola, hn::Vec<D> xx, hn::Vec<D> drift, hn::Vec<D> n1, hn::Vec<D> n2,
+                           hn::Vec<D>& y, hn::Vec<D>& x) {
+  static_cast<void>(d);
+  using Step = PhotoreceptorNoise::Step;
+  const auto factor = [&](std::size_t i) {
+    return hn::MulAdd(drift, hn::MulAdd(drift, parabola(i, 2), parabola(i, 1)), parabola(i, 0));
+  };
+  x = hn::MulAdd(factor(Step::n_xx), n2,
+                 hn::MulAdd(factor(Step::n_xy), n1, hn::MulAdd(factor(Step::xy), y, hn::Mul(xx, x))));
+  y = hn::MulAdd(factor(Step::n_yy), n1, hn::Mul(factor(Step::yy), y));
 }
 
 }  // namespace esim::inline event_camera

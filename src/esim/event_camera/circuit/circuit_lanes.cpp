@@ -13,9 +13,6 @@ using VF = hn::Vec<F>;
 using VD = hn::Vec<D>;
 static_assert(hn::MaxLanes(F()) == 2 * hn::MaxLanes(D()));
 
-// Rounding errors of a signal in floats, relative to its largest term, at most.
-constexpr float kRounding = 5e-7F;
-
 template <class Tag>
 CircuitLanes::Lanes bits_of(Tag d, hn::Mask<Tag> mask) {
   std::array<std::uint8_t, 8> bits{};
@@ -44,49 +41,21 @@ VF floats_of(const CircuitLanes::Values& values) {
 
 }  // namespace
 
-/// The signal minus the reference, in floats.
-struct CircuitLanes::Signal {
-  VF level, rate, fast, slow, passed, k1, k2, k3, guard;
-  bool has_high_pass;
-
-  Signal(const CircuitLanes& lanes, const CircuitPoles& poles)
-      : level(floats_of([&](std::size_t i) {
-          const VD sum = hn::Add(hn::Load(D(), &lanes.level[i]), hn::Load(D(), &lanes.leaked[i]));
-          return hn::Sub(sum, hn::Load(D(), &lanes.reference_[i]));
-        })),
-        rate(floats_of(
-            [&](std::size_t i) { return hn::Add(hn::Load(D(), &lanes.rate[i]), hn::Load(D(), &lanes.leak_rate[i])); })),
-        fast(floats_of(lanes.fast)),
-        slow(floats_of(lanes.slow)),
-        passed(floats_of(lanes.passed)),
-        k1(floats_of(lanes.k1)),
-        k2(hn::Set(F(), static_cast<float>(1 / poles.t2_ns))),
-        k3(hn::Set(F(), static_cast<float>(poles.high_pass_per_ns))),
-        has_high_pass(poles.high_pass_per_ns > 0) {
-    const VF terms = hn::Add(hn::Abs(level), hn::Abs(hn::Mul(rate, floats_of(lanes.length))));
-    guard = hn::Mul(hn::Set(F(), kRounding),
-                    hn::Add(hn::Add(terms, hn::Abs(fast)), hn::Add(hn::Abs(slow), hn::Abs(passed))));
-  }
-
-  struct At {
-    VF time, value, fast, slow, passed;
-  };
-  HWY_INLINE At at(VF time) const {
-    const auto decayed = [&](VF value, VF per_ns) {
-      return hn::NegMulAdd(value, moved_after(F(), hn::Mul(per_ns, time)), value);
-    };
-    At at{time, level, decayed(fast, k1), decayed(slow, k2), has_high_pass ? decayed(passed, k3) : passed};
-    at.value = hn::Add(hn::MulAdd(rate, time, level), hn::Add(hn::Add(at.fast, at.slow), at.passed));
-    return at;
-  }
-  /// As CircuitPiece::beyond_chord(), with the rounding errors.
-  HWY_INLINE VF beyond_chord(const At& a, const At& b) const {
-    const VF size1 = hn::Abs(a.fast), size2 = hn::Abs(a.slow), size3 = hn::Abs(a.passed);
-    const VF span = hn::Sub(b.time, a.time);
-    const VF curvature =
-        hn::MulAdd(hn::Mul(size1, k1), k1, hn::MulAdd(hn::Mul(size2, k2), k2, hn::Mul(hn::Mul(size3, k3), k3)));
-    const VF bent = hn::Mul(hn::Mul(curvature, hn::Set(F(), 0.125F)), hn::Mul(span, span));
-    return hn::Add(guard, hn::Min(bent, hn::Add(hn::Add(size1, size2), size3)));
+/// The signals minus the references.
+struct CircuitLanes::Signals : FloatSignals<F> {
+  Signals(const CircuitLanes& lanes, const CircuitPoles& poles) {
+    level = floats_of([&](std::size_t i) {
+      const VD sum = hn::Add(hn::Load(D(), &lanes.level[i]), hn::Load(D(), &lanes.leaked[i]));
+      return hn::Sub(sum, hn::Load(D(), &lanes.reference_[i]));
+    });
+    rate = floats_of(
+        [&](std::size_t i) { return hn::Add(hn::Load(D(), &lanes.rate[i]), hn::Load(D(), &lanes.leak_rate[i])); });
+    fast = floats_of(lanes.fast), slow = floats_of(lanes.slow), passed = floats_of(lanes.passed);
+    k1 = floats_of(lanes.k1);
+    k2 = hn::Set(F(), static_cast<float>(1 / poles.t2_ns));
+    k3 = hn::Set(F(), static_cast<float>(poles.high_pass_per_ns));
+    has_high_pass = poles.high_pass_per_ns > 0;
+    set_guard(F(), floats_of(lanes.length));
   }
 };
 
@@ -151,8 +120,8 @@ void CircuitLanes::draw(const Circuit& circuit, Lanes lanes) {
 /// As the first lines of CircuitPixel::find_near().
 CircuitLanes::Lanes CircuitLanes::find_resting(const Circuit& circuit, Lanes lanes) {
   const F d;
-  const Signal signal(*this, circuit.poles);
-  const auto first = signal.at(hn::Zero(d)), last = signal.at(floats_of(length));
+  const Signals signals(*this, circuit.poles);
+  const auto first = signals.at(d, hn::Zero(d)), last = signals.at(d, floats_of(length));
   const VF light0 = floats_of(light), change = hn::Mul(floats_of(light_rate), last.time);
   const VF one = hn::Set(d, 1.0F);
   const VF t2_per_t1 = hn::Set(d, static_cast<float>(circuit.poles.t2_ns / circuit.poles.t1_unit_ns));
@@ -162,9 +131,10 @@ CircuitLanes::Lanes CircuitLanes::find_resting(const Circuit& circuit, Lanes lan
     return hn::Mul(hn::Mul(hn::Set(d, static_cast<float>(kActiveDeviations)), load(gain_)), hn::Sqrt(part));
   };
   const VF darkest = hn::Min(light0, hn::Add(light0, change));
-  const VF farthest = hn::Add(signal.beyond_chord(first, last), reach(darkest));
-  const auto rests = hn::And(hn::Lt(hn::Add(hn::Max(first.value, last.value), farthest), load(on_)),
-                             hn::Lt(hn::Sub(farthest, hn::Min(first.value, last.value)), load(off_)));
+  const VF farthest = reach(darkest);
+  const auto [lowest, highest] = signals.range(d, first, last);
+  const auto rests =
+      hn::And(hn::Lt(hn::Add(highest, farthest), load(on_)), hn::Lt(hn::Sub(farthest, lowest), load(off_)));
   store(reach(hn::Sub(hn::Add(light0, change), hn::Set(d, static_cast<float>(kLightReach)))), high_);
   return bits_of(d, rests) & lanes;
 }
@@ -176,18 +146,18 @@ std::optional<CircuitCrossing> CircuitLanes::find_crossing(const Circuit& circui
   state.reference = reference_[lane];
   CircuitPixel pixel(circuit, pixels_[lane], *parameters_[lane], state, known_[lane]);
   pixel.set(piece(circuit, lane), {light[lane], light_rate[lane]}, {leaked[lane], leak_rate[lane]}, start[lane]);
-  return pixel.find_crossing(pixel.at(s[lane]), pixel.at(end));
+  return pixel.find_crossing(s[lane], end);
 }
 
 CircuitLanes::Lanes CircuitLanes::take_quiet_steps(const Circuit& circuit, Lanes lanes) {
   const F d;
   const D dd;
-  const Signal signal(*this, circuit.poles);
+  const Signals signals(*this, circuit.poles);
   const VF gain = load(gain_), on = load(on_), off = load(off_);
   const VF light0 = floats_of(light), light_change = floats_of(light_rate);
   VF from_y = load(from_y_), from_x = load(from_x_), to_y = load(to_y_), to_x = load(to_x_);
   VF low = hn::Zero(d), high = low;
-  auto here = signal.at(floats_of(s));
+  auto here = signals.at(d, floats_of(s));
   Lanes running = lanes, arrived = 0;
   alignas(64) Values next_nodes{}, ends{};
   const auto save = [&] { store(from_y, from_y_), store(from_x, from_x_), store(to_y, to_y_), store(to_x, to_x_); };
@@ -201,15 +171,10 @@ CircuitLanes::Lanes CircuitLanes::take_quiet_steps(const Circuit& circuit, Lanes
       hn::Store(node_time, dd, &next_nodes[i]);
       hn::Store(hn::Min(node, piece_end), dd, &ends[i]);
     }
-    const auto next = signal.at(floats_of(ends));
-    const VF along = load(along_), margin = load(margin_);
-    const VF a = hn::MulAdd(hn::Sub(from_y, from_x), along, from_x);
-    const VF b = hn::NegMulAdd(hn::Sub(to_y, to_x), along, to_x);
-    const VF low_here = hn::Sub(hn::Min(hn::Min(from_x, to_x), hn::Min(a, b)), margin);
-    const VF high_here = hn::Add(hn::Max(hn::Max(from_x, to_x), hn::Max(a, b)), margin);
-    const VF beyond = signal.beyond_chord(here, next);
-    const VF highest = hn::Add(hn::Max(here.value, next.value), beyond);
-    const VF lowest = hn::Sub(hn::Min(here.value, next.value), beyond);
+    const auto next = signals.at(d, floats_of(ends));
+    const auto [low_at, high_at] = cubic_bounds(from_y, from_x, to_y, to_x, load(along_));
+    const VF low_here = hn::Sub(low_at, load(margin_)), high_here = hn::Add(high_at, load(margin_));
+    const auto [lowest, highest] = signals.range(d, here, next);
     Lanes quiet = bits_of(d, hn::And(hn::Lt(hn::MulAdd(gain, high_here, highest), on),
                                      hn::Gt(hn::Add(hn::MulAdd(gain, low_here, lowest), off), hn::Zero(d))));
     if (const Lanes doubtful = running & ~quiet; doubtful != 0) {

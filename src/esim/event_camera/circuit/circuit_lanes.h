@@ -66,7 +66,7 @@ struct CircuitLanes {
   alignas(64) Values s{};  ///< where a pixel is, in ns after the start of its piece
 
  private:
-  struct Signal;
+  struct Signals;
 
   void use_pole(const PhotoreceptorNoise& noise, std::size_t lane, std::int16_t pole, float node_light);
   void load_step(const PhotoreceptorNoise& noise, std::size_t lane);

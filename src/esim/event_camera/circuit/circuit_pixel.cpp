@@ -1,6 +1,9 @@
 #include "esim/event_camera/circuit/circuit_pixel.h"
 
+#include <bit>
+
 #include "esim/core/vector_math.h"
+#include "esim/event_camera/circuit/photoreceptor_vectors.h"
 
 namespace esim::inline event_camera {
 namespace {
@@ -39,11 +42,11 @@ CircuitPixel::Reach CircuitPixel::reach(const SignalAt& a) const {
 /// The first time between a and b at which the signal is so near to a threshold that the noise matters; without noise,
 /// at which it reaches the threshold.
 std::optional<double> CircuitPixel::find_near(const SignalAt& a, const SignalAt& b) const {
-  const double reach_a = reach(a).value, reach_b = reach(b).value;
   // The reach of the noise falls with rising light, so that it is maximal at one of the ends.
-  const double beyond = beyond_chord(a, b) + std::max(reach_a, reach_b);
+  const double farthest = reach(light_.rate > 0 ? a : b).value, beyond = beyond_chord(a, b) + farthest;
   if (std::max(a.value, b.value) + beyond < upper() && std::min(a.value, b.value) - beyond > lower())
     return std::nullopt;
+  const double reach_a = reach(a).value, reach_b = reach(b).value;
   if (a.value + reach_a >= upper() || a.value - reach_a <= lower()) return a.s;
   const bool near_b = b.value + reach_b >= upper() || b.value - reach_b <= lower();
   if (b.s - a.s <= (noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns))
@@ -63,61 +66,83 @@ double CircuitPixel::solve_near(const SignalAt& a, const SignalAt& b) const {
   };
   const double resolution = noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns;
   double from = a.s, to = b.s;
-  const double at_from = distance(a).value;
-  double s = from + (to - from) * at_from / (at_from - distance(b).value);
+  // A cubic with the same values and slopes at the ends leads near the root.
+  const Reach first = distance(a), last = distance(b);
+  const auto exit = NoiseCubic{first.value, first.slope, last.value, last.slope, to - from}.first_exit(0, kNever);
+  double s = exit ? from + exit->first : 0.5 * (from + to);
   // Newton's method, with bisection where it would leave the part that contains the root. Its error after a step is
   // about the step's square divided by the length of the part.
   const double enough = std::sqrt(0.5 * resolution * (to - from));
   for (int i = 0; i < 60 && to - from > resolution; ++i) {
     const Reach here = distance(at(s));
     (here.value <= 0 ? to : from) = s;
-    const double next = s - here.value / here.slope, last = s;
+    const double next = s - here.value / here.slope, before = s;
     s = next >= from && next <= to ? next : 0.5 * (from + to);
-    if (std::abs(s - last) < enough && s == next) break;
+    if (std::abs(s - before) < enough && s == next) break;
   }
   return s;
 }
 
-std::optional<CircuitCrossing> CircuitPixel::find_crossing(const SignalAt& a, const SignalAt& b) const {
+/// Whether the signal plus noise may reach a threshold between a and b, within the step at the last node.
+bool CircuitPixel::may_cross(const SignalAt& a, const SignalAt& b) const {
   const auto [low, high] = noise_->bounds(state_.from, state_.to, state_.pole);
   const double beyond = beyond_chord(a, b);
-  if (std::min(a.value, b.value) - beyond + gain_ * low > lower() &&
-      std::max(a.value, b.value) + beyond + gain_ * high < upper())
-    return std::nullopt;
+  return std::min(a.value, b.value) - beyond + gain_ * low <= lower() ||
+         std::max(a.value, b.value) + beyond + gain_ * high >= upper();
+}
+
+/// The parts of the step in which the same may happen between a and b: one bit each.
+std::uint32_t CircuitPixel::doubtful_parts(double a, double b) const {
+  const NoiseLanes d;
+  const auto set = [d](double value) { return hn::Set(d, static_cast<float>(value)); };
+  FloatSignals<NoiseLanes> signal{set(piece_.level + leak_.leaked - state_.reference),
+                                  set(piece_.rate + leak_.rate),
+                                  set(piece_.fast),
+                                  set(piece_.slow),
+                                  set(piece_.passed),
+                                  set(piece_.k1),
+                                  set(piece_.k2),
+                                  set(piece_.k3),
+                                  hn::Zero(d),
+                                  piece_.k3 > 0};
+  signal.set_guard(d, set(piece_.length));
+  const PhotoreceptorNoise::Path& path = this->path();
+  const double part = noise_->part_ns(state_.pole);
+  const auto start = set(state_.node_time - start_), length = set(part), first = set(a), last = set(b);
+  const auto along = set(part / (3 * circuit_.poles.t2_ns)), gain = set(gain_);
+  std::uint32_t doubtful = 0;
+  for (std::size_t i = 0; i < PhotoreceptorNoise::kParts; i += hn::Lanes(d)) {
+    const auto index = hn::Iota(d, static_cast<float>(i)), t0 = hn::MulAdd(index, length, start);
+    const auto from = signal.at(d, hn::Max(first, hn::Min(t0, last)));
+    const auto to = signal.at(d, hn::Max(first, hn::Min(hn::Add(t0, length), last)));
+    const auto load = [&](const float* values) { return hn::LoadU(d, values + i); };
+    const auto [low, high] =
+        cubic_bounds(load(&path.y[0]), load(&path.x[0]), load(&path.y[1]), load(&path.x[1]), along);
+    const auto [lowest, highest] = signal.range(d, from, to);
+    const auto quiet = hn::And(hn::Lt(hn::MulAdd(gain, high, highest), hn::Set(d, parameters_.on)),
+                               hn::Gt(hn::MulAdd(gain, low, lowest), hn::Set(d, -parameters_.off)));
+    std::array<std::uint8_t, 8> bits{};
+    hn::StoreMaskBits(d, hn::Not(quiet), bits.data());
+    doubtful |= static_cast<std::uint32_t>(bits[0]) << i;
+  }
+  return doubtful;
+}
+
+std::optional<CircuitCrossing> CircuitPixel::find_crossing(double a, double b) const {
   const double start = state_.node_time - start_, length = noise_->part_ns(state_.pole);
   const PhotoreceptorNoise::Path& path = this->path();
-  std::array<double, 4> ratio{-piece_.k1 * length, -piece_.k2 * length, -piece_.k3 * length, 0};
-  bool has_ratio = false;
-  const auto first = std::max(0.0, std::floor((a.s - start) / length));
-  SignalAt from = a;
-  for (auto i = static_cast<std::size_t>(first); i < PhotoreceptorNoise::kParts && from.s < b.s; ++i) {
-    const double part_start = start + static_cast<double>(i) * length, end = part_start + length;
-    SignalAt to = b;
-    if (end < b.s && i + 1 < PhotoreceptorNoise::kParts) {
-      if (end - from.s < 0.99 * length) {
-        to = at(end);
-      } else {
-        if (!has_ratio) exponentials(ratio), has_ratio = true;
-        to.s = end;
-        to.fast = from.fast * ratio[0], to.slow = from.slow * ratio[1], to.passed = from.passed * ratio[2];
-        to.value = piece_.level + piece_.rate * end + to.fast + to.slow + to.passed + leaked(end);
-        to.slope = piece_.rate - to.fast * piece_.k1 - to.slow * piece_.k2 - to.passed * piece_.k3 + leak_.rate;
-      }
-    }
+  for (std::uint32_t parts = doubtful_parts(a, b); parts != 0; parts &= parts - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(parts));
+    const double part_start = start + static_cast<double>(i) * length;
+    const double begin = std::max(a, part_start);
+    const double end = i + 1 == PhotoreceptorNoise::kParts ? b : std::min(b, part_start + length);
+    if (begin >= end) continue;
     const NoiseCubic noise = noise_->cubic(path, i, state_.pole);
-    // A cubic lies between the control points of its Bezier curve.
-    const auto [lowest, highest] =
-        std::minmax({noise.v0, noise.v1, noise.v0 + noise.s0 * length / 3, noise.v1 - noise.s1 * length / 3});
-    const double outside = beyond_chord(from, to);
-    if (std::min(from.value, to.value) - outside + gain_ * lowest <= lower() ||
-        std::max(from.value, to.value) + outside + gain_ * highest >= upper()) {
-      const double u = from.s - part_start, v = to.s - part_start;
-      const NoiseCubic sum{from.value + gain_ * noise.value(u), from.slope + gain_ * noise.slope(u),
-                           to.value + gain_ * noise.value(v), to.slope + gain_ * noise.slope(v), to.s - from.s};
-      if (const auto exit = sum.first_exit(lower(), upper()))
-        return CircuitCrossing{from.s + exit->first, exit->second};
-    }
-    from = to;
+    const SignalAt from = at(begin), to = at(end);
+    const double u = begin - part_start, v = end - part_start;
+    const NoiseCubic sum{from.value + gain_ * noise.value(u), from.slope + gain_ * noise.slope(u),
+                         to.value + gain_ * noise.value(v), to.slope + gain_ * noise.slope(v), end - begin};
+    if (const auto exit = sum.first_exit(lower(), upper())) return CircuitCrossing{begin + exit->first, exit->second};
   }
   return std::nullopt;
 }

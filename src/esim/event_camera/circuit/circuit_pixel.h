@@ -135,7 +135,7 @@ class CircuitPixel {
   }
 
   /// The first event between a and b, within the step at the last node.
-  std::optional<CircuitCrossing> find_crossing(const SignalAt& a, const SignalAt& b) const;
+  std::optional<CircuitCrossing> find_crossing(double a, double b) const;
 
   /// The bounds of an inactive pixel at the end of its piece.
   CircuitBounds bounds_without_noise();
@@ -175,6 +175,8 @@ class CircuitPixel {
     return a.slope * b.slope > 0 && std::min(std::abs(a.slope), std::abs(b.slope)) > 0.25 * std::abs(a.slope - b.slope);
   }
   double solve_near(const SignalAt& a, const SignalAt& b) const;
+  bool may_cross(const SignalAt& a, const SignalAt& b) const;
+  std::uint32_t doubtful_parts(double a, double b) const;
   void take_apart(double s, int polarity);
   void release(const SignalAt& here);
   void activate(double s);
@@ -215,8 +217,13 @@ CircuitBounds CircuitPixel::run(const Emit& emit, double s, std::optional<Circui
       state_.held_until = start_ + event.s + static_cast<double>(parameters_.refractory);
     }
   };
+  SignalAt here;
+  const auto go_to = [&](double to) {
+    here.s = to;
+    if (state_.held_until <= start_ + to) here = at(to);
+  };
   if (crossing) fire(*crossing), s = crossing->s;
-  SignalAt here = at(s);
+  go_to(s);
   while (true) {
     if (state_.held_until > start_ + here.s) {
       if (state_.held_until > start_ + length) return {-kNever, kNever, state_.held_until};
@@ -237,10 +244,12 @@ CircuitBounds CircuitPixel::run(const Emit& emit, double s, std::optional<Circui
     }
     const double node = state_.node_time - start_ + noise_->step_ns(state_.pole);
     const SignalAt next = node < length ? at(node) : end();
-    if (crossing = find_crossing(here, next); crossing) {
-      fire(*crossing);
-      here = at(crossing->s);
-      continue;
+    if (may_cross(here, next)) {
+      if (crossing = find_crossing(here.s, next.s); crossing) {
+        fire(*crossing);
+        go_to(crossing->s);
+        continue;
+      }
     }
     if (node > length) {
       const auto [low, high] = noise_->bounds(state_.from, state_.to, state_.pole);

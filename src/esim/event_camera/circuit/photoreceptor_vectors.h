@@ -134,6 +134,50 @@ HWY_INLINE CircuitPieces<D> advance(D d, const CircuitPoles& poles, const Circui
 /// Pixels whose noise makes a step side by side.
 using NoiseLanes = hn::CappedTag<float, 8>;
 
+/// Signals as in CircuitPiece, plus leak and minus a reference, for comparisons that may fail by rounding errors:
+/// `guard` is above all of them.
+template <class D>
+struct FloatSignals {
+  using V = hn::Vec<D>;
+  struct At {
+    V time, value, fast, slow, passed;
+  };
+  V level, rate, fast, slow, passed, k1, k2, k3, guard;
+  bool has_high_pass;
+
+  HWY_INLINE void set_guard(D d, V length) {
+    constexpr float kRounding = 5e-7F;
+    const V terms = hn::Add(hn::Abs(level), hn::Abs(hn::Mul(rate, length)));
+    guard =
+        hn::Mul(hn::Set(d, kRounding), hn::Add(hn::Add(terms, hn::Abs(fast)), hn::Add(hn::Abs(slow), hn::Abs(passed))));
+  }
+  HWY_INLINE At at(D d, V time) const {
+    const auto decayed = [&](V value, V per_ns) {
+      return hn::NegMulAdd(value, moved_after(d, hn::Mul(per_ns, time)), value);
+    };
+    At at{time, level, decayed(fast, k1), decayed(slow, k2), has_high_pass ? decayed(passed, k3) : passed};
+    at.value = hn::Add(hn::MulAdd(rate, time, level), hn::Add(hn::Add(at.fast, at.slow), at.passed));
+    return at;
+  }
+  /// As CircuitPiece::range(a, b).
+  HWY_INLINE std::pair<V, V> range(D d, const At& a, const At& b) const {
+    const V size1 = hn::Abs(a.fast), size2 = hn::Abs(a.slow), size3 = hn::Abs(a.passed), span = hn::Sub(b.time, a.time);
+    const V curvature =
+        hn::MulAdd(hn::Mul(size1, k1), k1, hn::MulAdd(hn::Mul(size2, k2), k2, hn::Mul(hn::Mul(size3, k3), k3)));
+    const V bent = hn::Mul(hn::Mul(curvature, hn::Set(d, 0.125F)), hn::Mul(span, span));
+    const V beyond = hn::Add(guard, hn::Min(bent, hn::Add(hn::Add(size1, size2), size3)));
+    return {hn::Sub(hn::Min(a.value, b.value), beyond), hn::Add(hn::Max(a.value, b.value), beyond)};
+  }
+};
+
+/// Bounds of cubics from x0 to x1, which y0 and y1 pull with the time constant t2, after a third of their length:
+/// `along` t2. A cubic lies between the control points of its Bezier curve.
+template <class V>
+HWY_INLINE std::pair<V, V> cubic_bounds(V y0, V x0, V y1, V x1, V along) {
+  const V a = hn::MulAdd(hn::Sub(y0, x0), along, x0), b = hn::NegMulAdd(hn::Sub(y1, x1), along, x1);
+  return {hn::Min(hn::Min(x0, x1), hn::Min(a, b)), hn::Max(hn::Max(x0, x1), hn::Max(a, b))};
+}
+
 /// A step of the noise from (y, x), as in PhotoreceptorNoise::Step: parabola(factor, i) is its c_i. Rounds in the same
 /// way wherever it is used, since all products are part of a multiplication with addition or stand alone.
 template <class D, class Parabola>

@@ -119,7 +119,11 @@ TEST(PhotoreceptorNoise, GapsKeepTheVarianceAndTheMemoryOfTheCircuit) {
   for (const double gap : {1e-4 * kMs, 0.5 * kMs, 20 * kMs}) {
     double xx = 0, yy = 0, lagged = 0;
     for (std::uint32_t i = 0; i < kPixels; ++i) {
-      const NoiseState before = noise.first(i, 0), after = noise.after_gap(before, gap, i, 1, 0);
+      PhotoreceptorNoise::Draws draws;
+      const std::uint32_t node = 2;
+      noise.draw(1, &i, &node, draws);
+      const NoiseState before = noise.first(i, 0);
+      const NoiseState after = noise.after_gap(before, {draws[0][0][0], draws[0][1][0]}, gap, 0);
       xx += after.x * after.x, yy += after.y * after.y, lagged += before.x * after.x;
     }
     EXPECT_NEAR(xx / kPixels, s2, kTolerance * s2) << gap;

@@ -26,6 +26,7 @@ CircuitArray::CircuitArray(const EventCameraOptions& options, int width, int hei
   const double white_fa = o.white_photocurrent_fa();
   dark_ = o.dark_current_fa / white_fa;
   circuit_.poles.t1_unit_ns = 1e9 * o.photodiode_charge_e * CircuitOptions::kElementaryCharge_fC / white_fa;
+  circuit_.log_t1_unit = std::log(circuit_.poles.t1_unit_ns);
   circuit_.waits = options.readout.acknowledges();
   circuit_.poles.t2_ns = 1e9 / (2 * std::numbers::pi * o.source_follower_hz);
   circuit_.poles.high_pass_per_ns = 1e-9 * 2 * std::numbers::pi * o.high_pass_hz;

@@ -13,40 +13,37 @@ constexpr double kResolution_ns = 0.25, kNoiseResolution_ns = 0.05;
 
 constexpr double kRestingDeviations = 3.5;
 
-/// exp() of several values side by side.
-void exponentials(std::array<double, 4>& values) {
-  const hn::CappedTag<double, 4> d;
-  for (std::size_t i = 0; i < values.size(); i += hn::Lanes(d))
-    hn::StoreU(hn::Exp(d, hn::LoadU(d, &values[i])), d, &values[i]);
-}
-
 }  // namespace
 
 SignalAt CircuitPixel::at(double s) const {
-  std::array<double, 4> e{-piece_.k1 * s, -piece_.k2 * s, -piece_.k3 * s, light(s)};
-  exponentials(e);
-  SignalAt at{s, 0, 0, piece_.fast * e[0], piece_.slow * e[1], piece_.passed * e[2], e[3]};
+  const hn::CappedTag<double, 4> d;
+  alignas(32) std::array<double, 4> terms = terms_;
+  if (s != 0) {
+    for (std::size_t i = 0; i < terms.size(); i += hn::Lanes(d)) {
+      const auto decay = hn::Exp(d, hn::Mul(hn::Load(d, &decays_[i]), hn::Set(d, s)));
+      hn::Store(hn::Mul(hn::Load(d, &terms_[i]), decay), d, &terms[i]);
+    }
+  }
+  SignalAt at{s, 0, 0, terms[0], terms[1], terms[2]};
   at.value = piece_.level + piece_.rate * s + at.fast + at.slow + at.passed + leaked(s);
   at.slope = piece_.rate - at.fast * piece_.k1 - at.slow * piece_.k2 - at.passed * piece_.k3 + leak_.rate;
   return at;
 }
 
-CircuitPixel::Reach CircuitPixel::reach(const SignalAt& a) const {
+CircuitPixel::Reach CircuitPixel::reach(double s) const {
   if (noise_ == nullptr) return {};
-  const double t2_per_t1 = a.brightness * circuit_.poles.t2_ns / circuit_.poles.t1_unit_ns;
-  const double fraction = 1 / (1 + t2_per_t1);
-  const double value = kActiveDeviations * gain_ * std::sqrt(noise_->variance() * fraction);
-  return {value, -0.5 * value * (1 - fraction) * light_.rate};
+  const PhotoreceptorNoise::Deviation deviation = noise_->deviation_at(circuit_.log_t1_unit - light(s));
+  return {kActiveDeviations * gain_ * deviation.value, -kActiveDeviations * gain_ * deviation.slope * light_.rate};
 }
 
 /// The first time between a and b at which the signal is so near to a threshold that the noise matters; without noise,
 /// at which it reaches the threshold.
 std::optional<double> CircuitPixel::find_near(const SignalAt& a, const SignalAt& b) const {
   // The reach of the noise falls with rising light, so that it is maximal at one of the ends.
-  const double farthest = reach(light_.rate > 0 ? a : b).value, beyond = beyond_chord(a, b) + farthest;
+  const double farthest = reach(light_.rate > 0 ? a.s : b.s).value, beyond = beyond_chord(a, b) + farthest;
   if (std::max(a.value, b.value) + beyond < upper() && std::min(a.value, b.value) - beyond > lower())
     return std::nullopt;
-  const double reach_a = reach(a).value, reach_b = reach(b).value;
+  const double reach_a = reach(a.s).value, reach_b = reach(b.s).value;
   if (a.value + reach_a >= upper() || a.value - reach_a <= lower()) return a.s;
   const bool near_b = b.value + reach_b >= upper() || b.value - reach_b <= lower();
   if (b.s - a.s <= (noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns))
@@ -61,7 +58,7 @@ std::optional<double> CircuitPixel::find_near(const SignalAt& a, const SignalAt&
 double CircuitPixel::solve_near(const SignalAt& a, const SignalAt& b) const {
   const auto distance = [&](const SignalAt& here) {
     const double above = upper() - here.value, below = here.value - lower();
-    const Reach reach = this->reach(here);
+    const Reach reach = this->reach(here.s);
     return Reach{std::min(above, below) - reach.value, (above < below ? -here.slope : here.slope) - reach.slope};
   };
   const double resolution = noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns;
@@ -161,19 +158,26 @@ void CircuitPixel::follow_light(double s) {
   state_.pole = circuit_.pole(light(s));
 }
 
+/// The draws of the last node.
+std::array<float, 2> CircuitPixel::draws() {
+  if (state_.node - drawn_ >= 2 * PhotoreceptorNoise::kNodesDrawn) {
+    drawn_ = state_.node & ~1U;
+    const std::array<std::uint32_t, 2> pixels{pixel_, pixel_}, first{drawn_, drawn_ + 2};
+    noise_->draw(2, pixels.data(), first.data(), draws_);
+  }
+  const std::uint32_t place = state_.node - drawn_;
+  const auto& n = draws_[place & 1U];
+  return {n[0][place >> 1], n[1][place >> 1]};
+}
+
 /// Begins a step at a node, whose number is the next one.
 void CircuitPixel::start_step(const NoiseState& from, double time) {
   state_.node += 1;
   state_.node_time = time;
   state_.from = from;
   state_.active = true;
-  if (drawn_ != (state_.node & ~1U)) {
-    drawn_ = state_.node & ~1U;
-    noise_->draw(1, &pixel_, &drawn_, draws_);
-  }
-  const auto& n = draws_[state_.node - drawn_];
   const float drift = state_.node_light - static_cast<float>(light(time - start_));
-  state_.to = noise_->after_step(from, {n[0][0], n[1][0]}, state_.pole, drift);
+  state_.to = noise_->after_step(from, draws(), state_.pole, drift);
 }
 
 /// At the end of a step, where the signal is `value`: begins the next one, if the noise still matters.
@@ -195,8 +199,7 @@ void CircuitPixel::pass_node(const SignalAt& here) {
 void CircuitPixel::activate(double s) {
   follow_light(s);
   state_.node += 1;
-  start_step(noise_->after_gap(state_.from, start_ + s - state_.node_time, pixel_, state_.node, state_.pole),
-             start_ + s);
+  start_step(noise_->after_gap(state_.from, draws(), start_ + s - state_.node_time, state_.pole), start_ + s);
 }
 
 /// The noise at `s`, at the end of a reset. It continues from the last node before, whatever the signal did meanwhile.
@@ -211,7 +214,7 @@ double CircuitPixel::noise_at(double s) {
   }
   follow_light(s);
   state_.node += 1;
-  state_.from = noise_->after_gap(state_.from, start_ + s - state_.node_time, pixel_, state_.node, state_.pole);
+  state_.from = noise_->after_gap(state_.from, draws(), start_ + s - state_.node_time, state_.pole);
   state_.node_time = start_ + s;
   return static_cast<double>(state_.from.x);
 }

@@ -18,13 +18,11 @@ struct Circuit {
   CircuitPoles poles;
   std::optional<PhotoreceptorNoise> noise{};
   bool waits = false;  ///< after an event, a pixel waits until it is acknowledged
+  double log_t1_unit = std::log(poles.t1_unit_ns);
 
-  double t1_ns(double light) const { return poles.t1_unit_ns * std::exp(-light); }
-  std::int16_t pole(double light) const {
-    return static_cast<std::int16_t>(noise->pole_of(std::log(poles.t1_unit_ns) - light));
-  }
+  std::int16_t pole(double light) const { return static_cast<std::int16_t>(noise->pole_of(log_t1_unit - light)); }
   /// Standard deviation of the noise in steady light.
-  double deviation(double light) const { return noise->deviation_at(t1_ns(light)); }
+  double deviation(double light) const { return noise->deviation_at(log_t1_unit - light).value; }
 };
 
 /// The fixed parameters of a pixel.
@@ -75,7 +73,6 @@ struct SignalAt {
   double s = 0;  ///< ns after the start of the piece
   double value = 0, slope = 0;
   double fast = 0, slow = 0, passed = 0;  ///< those of CircuitPiece, decayed
-  double brightness = 1;                  ///< exp(L)
 };
 
 /// An event: the signal plus noise reaches a threshold.
@@ -118,6 +115,7 @@ class CircuitPixel {
   /// The stretch that the next functions are about: its signal, light and leak, and its start in ns after the epoch.
   void set(const CircuitPiece& piece, const LightRamp& light, const LeakRamp& leak, double start) {
     piece_ = piece, light_ = light, leak_ = leak, start_ = start, lost_ = 0;
+    terms_ = {piece.fast, piece.slow, piece.passed, 0}, decays_ = {-piece.k1, -piece.k2, -piece.k3, 0};
     has_end_ = false;
   }
 
@@ -167,7 +165,7 @@ class CircuitPixel {
   struct Reach {
     double value = 0, slope = 0;
   };
-  Reach reach(const SignalAt& a) const;
+  Reach reach(double s) const;
 
   std::optional<double> find_near(const SignalAt& a, const SignalAt& b) const;
   /// Whether the slope of the signal has one sign between a and b, by its ends.
@@ -180,6 +178,7 @@ class CircuitPixel {
   void take_apart(double s, int polarity);
   void release(const SignalAt& here);
   void activate(double s);
+  std::array<float, 2> draws();
   void start_step(const NoiseState& from, double time);
   void pass_node(const SignalAt& here);
   void follow_light(double s);
@@ -193,6 +192,7 @@ class CircuitPixel {
   CircuitPixelState& state_;
   KnownPath& known_;
   CircuitPiece piece_;
+  alignas(32) std::array<double, 4> terms_{}, decays_{};  // of the exponentials of piece_
   LightRamp light_;
   LeakRamp leak_;
   double start_ = 0, gain_;
@@ -200,7 +200,7 @@ class CircuitPixel {
   SignalAt end_;
   CircuitOrigin* origin_ = nullptr;
   PhotoreceptorNoise::Draws draws_;
-  std::uint32_t drawn_ = ~0U;  // the first node of draws_
+  std::uint32_t drawn_ = 0x80000000;  // the first node of draws_; above all nodes: none
   std::int64_t lost_ = 0;
 };
 

@@ -19,7 +19,7 @@ constexpr double kUnknown = 0.12, kNeglected = 0.015;
 constexpr double kRootStep = 1e-6;
 // Addresses of draws: those of steps, 8 i + j with j = 1 to 7 within step i, 0 of the first state, others above 32
 // bits.
-constexpr std::uint32_t kStepAddresses = 0x80000000;
+constexpr std::uint32_t kNodeAddresses = 0x80000000;
 
 /// A 2 x 2 matrix that acts on (y, x).
 struct NoiseMatrix {
@@ -132,7 +132,8 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
   for (std::size_t i = 0; i < count; ++i) {
     Pole pole;
     pole.t1 = apart(std::exp(log_first_ + static_cast<double>(i) / per_log_step_), t2_);
-    pole.deviation = deviation_at(pole.t1);
+    pole.deviation = std::sqrt(variance_ * pole.t1 / (pole.t1 + t2_));
+    deviations_.push_back(pole.deviation);
     double shortest = 0.1 * std::min(pole.t1, t2_), longest = 4 * std::max(pole.t1, t2_);
     const auto deviation_within = [&](double h) { return static_cast<double>(make_bridge(pole.t1, h).deviation); };
     for (int k = 0; k < 30; ++k) {
@@ -148,6 +149,8 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
     poles_.push_back(pole);
     steps_.push_back(make_step(pole));
   }
+  deviations_.push_back(deviations_.back());
+  last_place_ = static_cast<double>(count - 1);
 }
 
 PhotoreceptorNoise::Step PhotoreceptorNoise::make_step(const Pole& pole) const {
@@ -191,7 +194,7 @@ PhotoreceptorNoise::Path PhotoreceptorNoise::path(const NoiseState& from, const 
                                                   std::uint32_t node, std::int32_t pole) const {
   alignas(64) std::array<std::uint32_t, 16> items, addresses;
   items.fill(pixel);
-  for (std::uint32_t i = 0; i < 16; ++i) addresses[i] = (kParts * node + i) & ~kStepAddresses;
+  for (std::uint32_t i = 0; i < 16; ++i) addresses[i] = (kParts * node + i) & ~kNodeAddresses;
   alignas(64) std::array<std::array<std::uint32_t, 16>, 4> words;
   random_.bits(kParts, items.data(), addresses.data(),
                {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
@@ -236,7 +239,7 @@ void PhotoreceptorNoise::draw(std::size_t count, const std::uint32_t* pixels, co
                               Draws& n) const {
   // Four words serve two nodes.
   alignas(64) std::array<std::uint32_t, 16> items{}, addresses{};
-  for (std::size_t i = 0; i < count; ++i) items[i] = pixels[i], addresses[i] = kStepAddresses | (first[i] >> 1);
+  for (std::size_t i = 0; i < count; ++i) items[i] = pixels[i], addresses[i] = kNodeAddresses | (first[i] >> 1);
   alignas(64) std::array<std::array<std::uint32_t, 16>, 4> words;
   random_.bits(count, items.data(), addresses.data(),
                {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
@@ -244,17 +247,16 @@ void PhotoreceptorNoise::draw(std::size_t count, const std::uint32_t* pixels, co
     normals(count, words[2 * k].data(), words[2 * k + 1].data(), n[k][0].data(), n[k][1].data());
 }
 
-NoiseState PhotoreceptorNoise::after_gap(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
+NoiseState PhotoreceptorNoise::after_gap(const NoiseState& from, const std::array<float, 2>& n, double gap,
                                          std::int32_t pole) const {
   // The closed form of added(), which is exact enough except for gaps far below the time constants.
   const double t1 = poles_[static_cast<std::size_t>(pole)].t1, h = std::max(gap, 1e-3 * std::min(t1, t2_));
   const double e1 = std::exp(-h / t1), e2 = std::exp(-h / t2_), gain = t1 / (t1 - t2_), power = 2 * variance_ / t1;
   const double yy = variance_ * (1 - e1 * e1), uu = gain * gain * power * t2_ / 2 * (1 - e2 * e2);
   const double cross = -gain * power * t1 * t2_ / (t1 + t2_) * (1 - e1 * e2);
-  const auto n = random_.normals(pixel, (std::uint64_t{node} << 32) | 1);
   const double part = gap < h ? std::sqrt(gap / h) : 1.0;
-  const NoiseState drawn =
-      root({yy, cross + gain * yy, uu + 2 * gain * cross + gain * gain * yy}).apply(part * n[0], part * n[1]);
+  const NoiseState drawn = root({yy, cross + gain * yy, uu + 2 * gain * cross + gain * gain * yy})
+                               .apply(part * static_cast<double>(n[0]), part * static_cast<double>(n[1]));
   const NoiseState drifted = drift(t1, t2_, gap).apply(static_cast<double>(from.y), static_cast<double>(from.x));
   return {drifted.y + drawn.y, drifted.x + drawn.x};
 }

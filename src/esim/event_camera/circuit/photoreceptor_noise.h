@@ -64,7 +64,16 @@ class PhotoreceptorNoise {
   double variance() const { return variance_; }  ///< of y
   /// Standard deviation of x in steady light.
   double deviation(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].deviation; }
-  double deviation_at(double t1_ns) const { return std::sqrt(variance_ * t1_ns / (t1_ns + t2_)); }
+  /// The same for any t1: linear in ln(t1) between the poles; and its slope.
+  struct Deviation {
+    double value = 0, slope = 0;
+  };
+  Deviation deviation_at(double log_t1_ns) const {
+    const double place = std::clamp((log_t1_ns - log_first_) * per_log_step_, 0.0, last_place_);
+    const auto below = static_cast<std::size_t>(place);
+    const double value = deviations_[below], step = deviations_[below + 1] - value;
+    return {value + (place - static_cast<double>(below)) * step, step * per_log_step_};
+  }
 
   /// A step: y1 = yy y0 + n_yy n1, x1 = xy y0 + xx x0 + n_xy n1 + n_xx n2, with the standard normal deviates n1 and n2
   /// of its end. xx = exp(-step / t2). Steps keep the length of their pole in other light, where ln(t1) is larger by
@@ -90,9 +99,8 @@ class PhotoreceptorNoise {
   /// The state a step after the state `from`, with the draws of its node.
   NoiseState after_step(const NoiseState& from, const std::array<float, 2>& n, std::int32_t pole, float drift) const;
 
-  /// The state `gap` ns after the state `from`, at node `node`: for times without steps.
-  NoiseState after_gap(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
-                       std::int32_t pole) const;
+  /// The state at a node `gap` ns after the state `from`, with the draws of the node: for times without steps.
+  NoiseState after_gap(const NoiseState& from, const std::array<float, 2>& n, double gap, std::int32_t pole) const;
 
   /// Within a step, x is a cubic in each of kParts equal parts. The states at their ends:
   static constexpr std::size_t kParts = 8;
@@ -145,9 +153,10 @@ class PhotoreceptorNoise {
   Bridge make_bridge(double t1, double h) const;
   Step make_step(const Pole& pole) const;
 
-  double variance_, t2_, log_first_, per_log_step_;
+  double variance_, t2_, log_first_, per_log_step_, last_place_ = 0;
   AddressedRandom random_;
   std::vector<Pole> poles_;
+  std::vector<double> deviations_;  // of the poles, and of one more
   std::vector<Step> steps_;
 };
 

@@ -105,7 +105,7 @@ class CircuitArray {
   std::array<const LargeVector<double>*, 6> front() const { return {&light_, &lag_, &y_, &v_, &w_, &light_sum_}; }
   void make_pixels(const EventCameraOptions& options, std::uint64_t seed, std::uint16_t stream);
   template <class D>
-  bool move_vector(D d, const Row& row, std::size_t x, CircuitBuffer& buffer, std::size_t at);
+  void move_vector(D d, const Row& row, std::size_t x, CircuitBuffer& buffer, std::size_t at);
   void advance_uncertain(const Row& row, std::size_t begin, CircuitBuffer& buffer);
   void advance_in_one(const Row& row, std::span<const std::uint32_t> columns, std::size_t begin, CircuitBuffer& buffer);
   void advance_in_several(const Row& row, std::span<const std::uint32_t> columns, std::size_t begin,

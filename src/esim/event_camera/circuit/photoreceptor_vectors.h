@@ -44,6 +44,55 @@ HWY_INLINE hn::Vec<D> transient_of(D, const CircuitRamps<D>& ramp, hn::Vec<D> la
   return hn::Abs(hn::Sub(lag, hn::Div(ramp.growth, hn::Mul(ramp.rate0, ramp.length))));
 }
 
+/// exponential_moments() of each area.
+template <class D>
+HWY_INLINE std::array<hn::Vec<D>, 4> exponential_moments(D d, hn::Vec<D> area) {
+  using V = hn::Vec<D>;
+  const auto set = [d](double value) { return hn::Set(d, value); };
+  const V one = set(1);
+  constexpr double kLarge = 0.5;
+  const auto large = hn::Gt(area, set(kLarge));
+  std::array<V, 4> moments;
+  if (!hn::AllTrue(d, large)) {
+    const V a = hn::Min(area, set(kLarge)), a2 = hn::Mul(a, a);
+    // Sum over j of (-a)^j 3! / (4 + j)!, odd and even powers apart
+    constexpr auto kTerms = [] {
+      std::array<double, 12> terms{0.25};
+      for (std::size_t j = 1; j < terms.size(); ++j) terms[j] = -terms[j - 1] / static_cast<double>(4 + j);
+      return terms;
+    }();
+    V even = set(kTerms[10]), odd = set(kTerms[11]);
+    for (std::size_t j = 10; j >= 2; j -= 2) {
+      even = hn::MulAdd(even, a2, set(kTerms[j - 2]));
+      odd = hn::MulAdd(odd, a2, set(kTerms[j - 1]));
+    }
+    moments[3] = hn::MulAdd(odd, a, even);
+    moments[2] = hn::Mul(hn::NegMulAdd(a, moments[3], one), set(1.0 / 3));
+    moments[1] = hn::Mul(hn::NegMulAdd(a, moments[2], one), set(0.5));
+    moments[0] = hn::NegMulAdd(a, moments[1], one);
+  }
+  if (!hn::AllFalse(d, large)) {
+    const V a = hn::Max(area, set(kLarge)), inverse = hn::Div(one, a);
+    const V p0 = hn::Mul(hn::Sub(one, hn::Exp(d, hn::Neg(a))), inverse), p1 = hn::Mul(hn::Sub(one, p0), inverse);
+    const V p2 = hn::Mul(hn::NegMulAdd(set(2), p1, one), inverse);
+    const V p3 = hn::Mul(hn::NegMulAdd(set(3), p2, one), inverse);
+    moments[0] = hn::IfThenElse(large, p0, moments[0]), moments[1] = hn::IfThenElse(large, p1, moments[1]);
+    moments[2] = hn::IfThenElse(large, p2, moments[2]), moments[3] = hn::IfThenElse(large, p3, moments[3]);
+  }
+  return moments;
+}
+
+/// ln(1 + x)
+template <class D>
+HWY_INLINE hn::Vec<D> logarithm_of_one_plus(D d, hn::Vec<D> x) {
+  if (!hn::AllTrue(d, hn::Lt(hn::Abs(x), hn::Set(d, 0.2)))) return hn::Log1p(d, x);
+  // 2 artanh(s), s = x / (2 + x) below 1 / 9
+  const auto s = hn::Div(x, hn::Add(hn::Set(d, 2.0), x)), s2 = hn::Mul(s, s);
+  auto sum = hn::Set(d, 2.0 / 15);
+  for (const int k : {13, 11, 9, 7, 5, 3}) sum = hn::MulAdd(sum, s2, hn::Set(d, 2.0 / k));
+  return hn::MulAdd(hn::Mul(sum, s2), s, hn::Add(s, s));
+}
+
 /// As advance(), which has the equations. `area` is that of area_of().
 template <class D>
 HWY_INLINE CircuitPieces<D> advance(D d, const CircuitPoles& poles, const CircuitRamps<D>& ramp, hn::Vec<D> area,
@@ -53,20 +102,7 @@ HWY_INLINE CircuitPieces<D> advance(D d, const CircuitPoles& poles, const Circui
   const V one = set(1), light0 = state.light, lag0 = state.lag, y0 = state.y, v0 = state.v, in0 = hn::Sub(v0, state.w);
   const bool high_pass = poles.high_pass_per_ns > 0;
 
-  // exponential_moments()
-  const V safe = hn::Max(area, set(1e-9)), inverse = hn::Div(one, safe);
-  const V up0 = hn::Mul(hn::Sub(one, hn::Exp(d, hn::Neg(safe))), inverse);
-  const V up1 = hn::Mul(hn::Sub(one, up0), inverse), up2 = hn::Mul(hn::NegMulAdd(set(2), up1, one), inverse);
-  const V up3 = hn::Mul(hn::NegMulAdd(set(3), up2, one), inverse);
-  const V low_area = hn::Min(area, set(2));
-  V down3 = one;
-  for (int j = 18; j >= 1; --j) down3 = hn::NegMulAdd(hn::Mul(low_area, set(1.0 / (4 + j))), down3, one);
-  down3 = hn::Mul(down3, set(0.25));
-  const V down2 = hn::Mul(hn::NegMulAdd(low_area, down3, one), set(1.0 / 3));
-  const V down1 = hn::Mul(hn::NegMulAdd(low_area, down2, one), set(0.5)), down0 = hn::NegMulAdd(low_area, down1, one);
-  const auto large = hn::Gt(area, set(2));
-  const V p0 = hn::IfThenElse(large, up0, down0), p1 = hn::IfThenElse(large, up1, down1),
-          p2 = hn::IfThenElse(large, up2, down2), p3 = hn::IfThenElse(large, up3, down3);
+  const auto [p0, p1, p2, p3] = exponential_moments(d, area);
   const V decay = hn::NegMulAdd(area, p0, one);
 
   // The lag at the end
@@ -83,7 +119,7 @@ HWY_INLINE CircuitPieces<D> advance(D d, const CircuitPoles& poles, const Circui
   const V grown = hn::Add(one, ramp.rho);
   V lag1 = hn::Mul(grown, hn::MulAdd(lag0, decay, hn::Mul(ramp.rho, integral)));
   lag1 = hn::IfThenElse(hn::Lt(hn::Abs(lag1), set(kSettled)), hn::Zero(d), lag1);
-  const V y1 = hn::Sub(ramp.light1, hn::Log1p(d, lag1));
+  const V y1 = hn::Sub(ramp.light1, logarithm_of_one_plus(d, lag1));
 
   // An exponential plus a line through y, and what the source follower makes of it
   const V slope0 = hn::Div(hn::Mul(ramp.rate0, lag0), hn::Add(one, lag0));
@@ -102,7 +138,7 @@ HWY_INLINE CircuitPieces<D> advance(D d, const CircuitPoles& poles, const Circui
   }
   const V a = hn::Mul(piece.k1, ramp.length);
   const auto exact = hn::And(hn::Eq(a_plain, area), hn::Not(resonates));
-  const V decay1 = hn::IfThenElse(exact, decay, hn::Exp(d, hn::Neg(a)));
+  const V decay1 = hn::AllTrue(d, exact) ? decay : hn::IfThenElse(exact, decay, hn::Exp(d, hn::Neg(a)));
   const V mean_decay = hn::Div(hn::Sub(one, decay1), a);
   piece.rate =
       hn::Div(hn::NegMulAdd(slope0, mean_decay, hn::Mul(hn::Sub(y1, y0), per_length)), hn::Sub(one, mean_decay));

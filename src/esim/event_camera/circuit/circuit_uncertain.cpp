@@ -157,30 +157,14 @@ void CircuitArray::advance_in_several(const Row& row, std::span<const std::uint3
   }
   const auto all = static_cast<CircuitLanes::Lanes>((1U << columns.size()) - 1);
   for (CircuitLanes::Lanes left = all; left != 0;) {
+    // The next piece of each pixel, as step_length() and esim::advance() make it
     for (std::size_t i = 0; i < columns.size(); i += hn::Lanes(d)) {
-      // The next piece of each pixel, as step_length() and esim::advance() make it
-      const V v_done = hn::Load(d, &done[i]), v_rate = hn::Load(d, &rate[i]), one = hn::Set(d, 1.0);
+      const V v_done = hn::Load(d, &done[i]), v_rate = hn::Load(d, &rate[i]);
       const V remaining = hn::Sub(hn::Set(d, row.length), v_done);
-      CircuitStates<D> state{hn::MulAdd(v_rate, v_done, hn::Load(d, &light[i])), hn::Load(d, &lag[i]),
-                             hn::Load(d, &y[i]), hn::Load(d, &v[i]), hn::Load(d, &w[i])};
-      const V changes = hn::Mul(hn::Abs(hn::Mul(v_rate, remaining)), hn::Set(d, 1 / kMaxLightStep));
-      CircuitRamps<D> ramp;
-      ramp.rate0 = hn::Mul(hn::Exp(d, state.light), hn::Set(d, 1 / circuit_.poles.t1_unit_ns));
-      ramp.length = hn::Div(remaining, hn::Max(one, hn::Ceil(hn::Sub(changes, hn::Set(d, 1e-9)))));
-      ramp.growth = hn::Mul(v_rate, ramp.length);
-      const V brightest = hn::Exp(d, hn::Max(hn::Zero(d), ramp.growth));
-      const V transient = transient_of(d, ramp, state.lag);
-      const V decay = hn::Div(hn::Set(d, kMaxDecay), hn::Sqrt(hn::Sqrt(hn::Min(one, transient))));
-      const V shorter = hn::Div(decay, hn::Mul(ramp.rate0, brightest));
-      ramp.length =
-          hn::IfThenElse(hn::Gt(transient, hn::Set(d, kMaxTransient)), hn::Min(ramp.length, shorter), ramp.length);
+      const V light0 = hn::MulAdd(v_rate, v_done, hn::Load(d, &light[i]));
+      CircuitStates<D> state{light0, hn::Load(d, &lag[i]), hn::Load(d, &y[i]), hn::Load(d, &v[i]), hn::Load(d, &w[i])};
+      const CircuitRamps<D> ramp = ramp_of_step(d, circuit_.poles, light0, state.lag, v_rate, remaining);
       const auto ends = hn::Ge(ramp.length, remaining);
-      ramp.growth = hn::Mul(v_rate, ramp.length);
-      ramp.light1 = hn::Add(state.light, ramp.growth);
-      ramp.rho = hn::Expm1(d, ramp.growth);
-      ramp.decay2 = hn::Exp(d, hn::Mul(ramp.length, hn::Set(d, -1 / circuit_.poles.t2_ns)));
-      ramp.decay3 = hn::Exp(d, hn::Mul(ramp.length, hn::Set(d, -circuit_.poles.high_pass_per_ns)));
-      const V light0 = state.light;
       const CircuitPieces<D> piece = esim::advance(d, circuit_.poles, ramp, area_of(d, ramp), state);
       const auto store = [d, i](V values, CircuitLanes::Values& to) { hn::Store(values, d, &to[i]); };
       store(piece.level, lanes.level), store(piece.rate, lanes.rate), store(piece.fast, lanes.fast);

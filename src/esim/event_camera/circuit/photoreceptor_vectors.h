@@ -22,7 +22,7 @@ struct CircuitPieces {
   hn::Vec<D> level, rate, fast, slow, k1, passed;
 };
 
-/// A change of the light over `length` ns, to `light1`. growth = light1 - L, e: its factor minus 1, and rate0 = I / Q
+/// A change of the light over `length` ns, to `light1`: growth = light1 - L, rho = exp(growth) - 1, and rate0 = I / Q
 /// at the start. Each decay is exp(-k length) of the pole of its number.
 template <class D>
 struct CircuitRamps {
@@ -38,13 +38,8 @@ HWY_INLINE hn::Vec<D> area_of(D d, const CircuitRamps<D>& ramp) {
   return hn::Mul(hn::Mul(ramp.rate0, ramp.length), mean);
 }
 
-/// How far the lag is from the one that the ramp keeps up.
-template <class D>
-HWY_INLINE hn::Vec<D> transient_of(D, const CircuitRamps<D>& ramp, hn::Vec<D> lag) {
-  return hn::Abs(hn::Sub(lag, hn::Div(ramp.growth, hn::Mul(ramp.rate0, ramp.length))));
-}
-
-/// exponential_moments() of each area.
+/// exponential_moments() of each area: psi_0 = (1 - exp(-a)) / a and a psi_k = 1 - k psi_{k-1}, which is stable upwards
+/// for large a, downwards for small a.
 template <class D>
 HWY_INLINE std::array<hn::Vec<D>, 4> exponential_moments(D d, hn::Vec<D> area) {
   using V = hn::Vec<D>;
@@ -82,6 +77,15 @@ HWY_INLINE std::array<hn::Vec<D>, 4> exponential_moments(D d, hn::Vec<D> area) {
   return moments;
 }
 
+/// exp(x) - 1 for |x| up to kMaxLightStep.
+template <class D>
+HWY_INLINE hn::Vec<D> exponential_minus_one(D d, hn::Vec<D> x) {
+  auto sum = hn::Set(d, 1.0 / 3628800);
+  for (const double term : {362880.0, 40320.0, 5040.0, 720.0, 120.0, 24.0, 6.0, 2.0})
+    sum = hn::MulAdd(sum, x, hn::Set(d, 1 / term));
+  return hn::MulAdd(hn::Mul(sum, x), x, x);
+}
+
 /// ln(1 + x)
 template <class D>
 HWY_INLINE hn::Vec<D> logarithm_of_one_plus(D d, hn::Vec<D> x) {
@@ -93,7 +97,12 @@ HWY_INLINE hn::Vec<D> logarithm_of_one_plus(D d, hn::Vec<D> x) {
   return hn::MulAdd(hn::Mul(sum, s2), s, hn::Add(s, s));
 }
 
-/// As advance(), which has the equations. `area` is that of area_of().
+/// Advances the states by ramps, and returns the signals on the way. `area` is that of area_of().
+///
+/// With a = integral of I / Q, in which I is linear: lag1 = (1 + rho) [lag0 exp(-A) + rho integral of
+/// exp(-A (1 - x)) / (1 + rho x)^2 over x]. The quotient is replaced by a cubic through x = 0, 1/3, 2/3 and 1. Then
+/// y = start + slope s + gap (exp(-k s) - 1), through y and its slope at the start and y at the end; at a resonance of
+/// k with another pole, the quotients below would fail.
 template <class D>
 HWY_INLINE CircuitPieces<D> advance(D d, const CircuitPoles& poles, const CircuitRamps<D>& ramp, hn::Vec<D> area,
                                     CircuitStates<D>& state) {
@@ -153,7 +162,7 @@ HWY_INLINE CircuitPieces<D> advance(D d, const CircuitPoles& poles, const Circui
                                hn::Lt(hn::Abs(hn::Sub(v1, y1)), set(kSettled)));
   v1 = hn::IfThenElse(settles, y1, v1);
   V w1 = state.w;
-  if (high_pass) {  // as high_passed()
+  if (high_pass) {
     piece.level = hn::Div(piece.rate, set(k_3));
     piece.rate = hn::Zero(d);
     piece.fast = hn::Div(hn::Mul(piece.fast, piece.k1), hn::Sub(piece.k1, set(k_3)));
@@ -169,6 +178,33 @@ HWY_INLINE CircuitPieces<D> advance(D d, const CircuitPoles& poles, const Circui
 
 /// Pixels whose noise makes a step side by side.
 using NoiseLanes = hn::CappedTag<float, 8>;
+
+/// As step_length() and the ramp of this length, `rate` in 1/ns.
+template <class D>
+HWY_INLINE CircuitRamps<D> ramp_of_step(D d, const CircuitPoles& poles, hn::Vec<D> light, hn::Vec<D> lag,
+                                        hn::Vec<D> rate, hn::Vec<D> length) {
+  const auto set = [d](double value) { return hn::Set(d, value); };
+  const auto one = set(1), zero = hn::Zero(d);
+  const auto changes = hn::Mul(hn::Abs(hn::Mul(rate, length)), set(1 / kMaxLightStep));
+  CircuitRamps<D> ramp;
+  ramp.rate0 = hn::Mul(hn::Exp(d, light), set(1 / poles.t1_unit_ns));
+  ramp.length = hn::Div(length, hn::Max(one, hn::Ceil(hn::Sub(changes, set(1e-9)))));
+  const auto transient = hn::Abs(hn::Sub(lag, hn::Div(rate, ramp.rate0)));
+  const auto far = hn::Gt(transient, set(kMaxTransient));
+  if (!hn::AllFalse(d, far)) {
+    const auto decay = hn::Div(set(kMaxDecay), hn::Sqrt(hn::Sqrt(hn::Min(one, transient))));
+    const auto brightest = hn::Add(one, exponential_minus_one(d, hn::Max(zero, hn::Mul(rate, ramp.length))));
+    const auto shorter = hn::Div(decay, hn::Mul(ramp.rate0, brightest));
+    ramp.length = hn::IfThenElse(far, hn::Min(ramp.length, shorter), ramp.length);
+  }
+  ramp.growth = hn::Mul(rate, ramp.length);
+  ramp.light1 = hn::Add(light, ramp.growth);
+  ramp.rho = exponential_minus_one(d, ramp.growth);
+  const double k3 = poles.high_pass_per_ns;
+  ramp.decay2 = hn::Exp(d, hn::Mul(ramp.length, set(-1 / poles.t2_ns)));
+  ramp.decay3 = k3 > 0 ? hn::Exp(d, hn::Mul(ramp.length, set(-k3))) : one;
+  return ramp;
+}
 
 /// Signals as in CircuitPiece, plus leak and minus a reference, for comparisons that may fail by rounding errors:
 /// `guard` is above all of them.

@@ -143,9 +143,9 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
     while (deviation_within(2 * shortest / kParts) > kNeglected * pole.deviation) shortest *= 0.9;
     pole.step = shortest;
     double length = pole.step;
-    for (Bridge& bridge : pole.bridges) bridge = make_bridge(pole.t1, length), length *= 0.5;
+    for (Bridge& bridge : bridges_.emplace_back()) bridge = make_bridge(pole.t1, length), length *= 0.5;
     pole.along = static_cast<float>(std::min(pole.step / 3, t2_) / t2_);
-    pole.margin = kBoundDeviations * pole.bridges[0].deviation;
+    pole.margin = kBoundDeviations * bridges_.back()[0].deviation;
     poles_.push_back(pole);
     steps_.push_back(make_step(pole));
   }
@@ -205,7 +205,7 @@ PhotoreceptorNoise::Path PhotoreceptorNoise::path(const NoiseState& from, const 
   path.y[kParts] = to.y, path.x[kParts] = to.x;
   std::size_t draw = 1;
   std::size_t length = kParts;
-  for (const Bridge& bridge : poles_[static_cast<std::size_t>(pole)].bridges) {
+  for (const Bridge& bridge : bridges_[static_cast<std::size_t>(pole)]) {
     for (std::size_t i = 0; i < kParts; i += length, ++draw) {
       const auto sum = [&](const std::array<float, 6>& row) {
         return row[0] * path.y[i] + row[1] * path.x[i] + row[2] * path.y[i + length] + row[3] * path.x[i + length] +
@@ -243,6 +243,17 @@ void PhotoreceptorNoise::draw(std::size_t count, const std::uint32_t* pixels, co
   alignas(64) std::array<std::array<std::uint32_t, 16>, 4> words;
   random_.bits(count, items.data(), addresses.data(),
                {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
+  if (2 * count <= kDrawn) {  // both nodes at once
+    std::copy_n(words[2].data(), count, words[0].data() + count);
+    std::copy_n(words[3].data(), count, words[1].data() + count);
+    alignas(64) std::array<float, 16> n1, n2;
+    normals(2 * count, words[0].data(), words[1].data(), n1.data(), n2.data());
+    for (std::size_t k = 0; k < kNodesDrawn; ++k) {
+      std::copy_n(&n1[k * count], count, n[k][0].data());
+      std::copy_n(&n2[k * count], count, n[k][1].data());
+    }
+    return;
+  }
   for (std::size_t k = 0; k < kNodesDrawn; ++k)
     normals(count, words[2 * k].data(), words[2 * k + 1].data(), n[k][0].data(), n[k][1].data());
 }

@@ -147,7 +147,6 @@ class PhotoreceptorNoise {
   struct Pole {
     double t1 = 0, deviation = 0, step = 0;
     float along = 0, margin = 0;
-    std::array<Bridge, kHalvings> bridges;  // of the step, of its halves, ...
   };
 
   Bridge make_bridge(double t1, double h) const;
@@ -156,7 +155,8 @@ class PhotoreceptorNoise {
   double variance_, t2_, log_first_, per_log_step_, last_place_ = 0;
   AddressedRandom random_;
   std::vector<Pole> poles_;
-  std::vector<double> deviations_;  // of the poles, and of one more
+  std::vector<std::array<Bridge, kHalvings>> bridges_;  // of poles: of the step, of its halves, ...
+  std::vector<double> deviations_;                      // of the poles, and of one more
   std::vector<Step> steps_;
 };
 

@@ -14,7 +14,7 @@ namespace {
 constexpr double kPoleStep = 1.01;  // ratio of successive time constants t1
 // Standard deviation of x in the middle of an interval with known ends, in deviations of x: of steps, and where x is
 // taken for a cubic.
-constexpr double kUnknown = 0.12, kNeglected = 0.015;
+constexpr double kUnknown = 0.24, kNeglected = 0.015;
 // A root is found when a step of Newton's method is shorter than this, relative to the interval.
 constexpr double kRootStep = 1e-6;
 // Addresses of draws: those of steps, 8 i + j with j = 1 to 7 within step i, 0 of the first state, others above 32
@@ -140,7 +140,7 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
       const double h = std::sqrt(shortest * longest);
       (deviation_within(h) <= kUnknown * pole.deviation ? shortest : longest) = h;
     }
-    while (deviation_within(2 * shortest / kParts) > kNeglected * pole.deviation) shortest *= 0.9;
+    while (deviation_within(shortest / kParts) > kNeglected * pole.deviation) shortest *= 0.9;
     pole.step = shortest;
     double length = pole.step;
     for (Bridge& bridge : bridges_.emplace_back()) bridge = make_bridge(pole.t1, length), length *= 0.5;

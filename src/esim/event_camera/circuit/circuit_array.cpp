@@ -215,12 +215,19 @@ HWY_INLINE void CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
   store(state.w, buffer.w), store(light_sum, buffer.light_sum);
   store(piece.level, buffer.level), store(piece.rate, buffer.rate), store(piece.fast, buffer.fast);
   store(piece.slow, buffer.slow), store(piece.k1, buffer.k1), store(piece.passed, buffer.passed);
-  store(hn::IfThenElseZero(several, one), buffer.several);
-  std::array<std::uint8_t, 8> bits{};
-  hn::StoreMaskBits(d, uncertain, bits.data());
-  for (std::uint32_t left = bits[0]; left != 0; left &= left - 1) {
+  const auto bits_of = [d](auto mask) {
+    std::array<std::uint8_t, 8> bits{};
+    hn::StoreMaskBits(d, mask, bits.data());
+    return std::uint32_t{bits[0]};
+  };
+  // Bounds without an end belong to inactive pixels.
+  const std::uint32_t many = bits_of(several), active = bits_of(hn::Lt(hn::LoadU(d, &until_[i]), hn::Inf(d)));
+  for (std::uint32_t left = bits_of(uncertain); left != 0; left &= left - 1) {
     const auto k = static_cast<std::size_t>(std::countr_zero(left));
-    buffer.uncertain.push_back(static_cast<std::uint32_t>(x + k));
+    auto& columns = (many >> k & 1U) != 0     ? buffer.uncertain.several
+                    : (active >> k & 1U) != 0 ? buffer.uncertain.active
+                                              : buffer.uncertain.inactive;
+    columns.push_back(static_cast<std::uint32_t>(x + k));
     hwy::Prefetch(&states_[i + k]);
     hwy::Prefetch(&parameters_[i + k]);
   }

@@ -22,14 +22,18 @@ namespace esim::inline event_camera {
 
 /// The working memory of a thread.
 struct CircuitBuffer {
-  static constexpr std::size_t kTogether = 128;
+  static constexpr std::size_t kTogether = 256;
   template <typename T>
   using Values = std::array<T, kTogether + kVectorPadding>;
 
-  Values<double> light, lag, y, v, w, light_sum;  // at the segment's end
-  Values<double> level, rate, fast, slow, k1, passed,
-      several;                           // of CircuitPiece; several: not 0 if one step is not enough
-  std::vector<std::uint32_t> uncertain;  // columns whose pixels may fire, or need more than one step
+  Values<double> light, lag, y, v, w, light_sum;       // at the segment's end
+  Values<double> level, rate, fast, slow, k1, passed;  // of CircuitPiece
+  /// Columns whose pixels may fire, or need more than one step.
+  struct Uncertain {
+    std::vector<std::uint32_t> inactive, active, several;
+
+    void clear() { inactive.clear(), active.clear(), several.clear(); }
+  } uncertain;
   struct Found {
     std::uint32_t column;
     int polarity;

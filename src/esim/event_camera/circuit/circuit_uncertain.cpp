@@ -221,14 +221,15 @@ void CircuitArray::advance_in_several(const Row& row, std::span<const std::uint3
 
 /// Takes all pixels of buffer.uncertain to the segment's end; the columns of the buffer begin at `begin`.
 void CircuitArray::advance_uncertain(const Row& row, std::size_t begin, CircuitBuffer& buffer) {
-  const auto several = std::stable_partition(buffer.uncertain.begin(), buffer.uncertain.end(),
-                                             [&](std::uint32_t column) { return buffer.several[column - begin] == 0; });
-  const auto in_one = static_cast<std::size_t>(several - buffer.uncertain.begin());
-  const std::span<const std::uint32_t> columns(buffer.uncertain);
-  for (std::size_t k = 0; k < in_one; k += CircuitLanes::count())
-    advance_in_one(row, columns.subspan(k, std::min(CircuitLanes::count(), in_one - k)), begin, buffer);
-  for (std::size_t k = in_one; k < columns.size(); k += CircuitLanes::count())
-    advance_in_several(row, columns.subspan(k, std::min(CircuitLanes::count(), columns.size() - k)), begin, buffer);
+  const auto in_groups = [](std::span<const std::uint32_t> columns, const auto& advance_group) {
+    for (std::size_t k = 0; k < columns.size(); k += CircuitLanes::count())
+      advance_group(columns.subspan(k, std::min(CircuitLanes::count(), columns.size() - k)));
+  };
+  const auto in_one = [&](std::span<const std::uint32_t> columns) { advance_in_one(row, columns, begin, buffer); };
+  in_groups(buffer.uncertain.inactive, in_one);
+  in_groups(buffer.uncertain.active, in_one);
+  in_groups(buffer.uncertain.several,
+            [&](std::span<const std::uint32_t> columns) { advance_in_several(row, columns, begin, buffer); });
 }
 
 /// Whether an inactive pixel stays within its bounds during the piece in a lane.

@@ -208,8 +208,8 @@ PhotoreceptorNoise::Path PhotoreceptorNoise::path(const NoiseState& from, const 
   for (const Bridge& bridge : bridges_[static_cast<std::size_t>(pole)]) {
     for (std::size_t i = 0; i < kParts; i += length, ++draw) {
       const auto sum = [&](const std::array<float, 6>& row) {
-        return row[0] * path.y[i] + row[1] * path.x[i] + row[2] * path.y[i + length] + row[3] * path.x[i + length] +
-               row[4] * n1[draw] + row[5] * n2[draw];
+        return (row[0] * path.y[i] + row[1] * path.x[i]) + (row[2] * path.y[i + length] + row[3] * path.x[i + length]) +
+               (row[4] * n1[draw] + row[5] * n2[draw]);
       };
       path.y[i + length / 2] = sum(bridge.y), path.x[i + length / 2] = sum(bridge.x);
     }

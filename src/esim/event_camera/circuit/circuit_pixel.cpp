@@ -8,9 +8,6 @@
 namespace esim::inline event_camera {
 namespace {
 
-// Of the times at which a signal without noise crosses a level, and at which noise begins to matter.
-constexpr double kResolution_ns = 0.25, kNoiseResolution_ns = 0.05;
-
 constexpr double kRestingDeviations = 3.5;
 
 }  // namespace
@@ -30,50 +27,45 @@ SignalAt CircuitPixel::at(double s) const {
   return at;
 }
 
-CircuitPixel::Reach CircuitPixel::reach(double s) const {
-  if (noise_ == nullptr) return {};
-  const PhotoreceptorNoise::Deviation deviation = noise_->deviation_at(circuit_.log_t1_unit - light(s));
-  return {kActiveDeviations * gain_ * deviation.value, -kActiveDeviations * gain_ * deviation.slope * light_.rate};
+CircuitPixel::Approach CircuitPixel::approach(const SignalAt& signal) const {
+  const double above = upper() - signal.value, below = signal.value - lower();
+  Approach here{signal, std::min(above, below), above < below ? -signal.slope : signal.slope, 0};
+  if (noise_ == nullptr) return here;
+  const auto deviation = noise_->deviation_at(circuit_.log_t1_unit - light(signal.s));
+  here.reach = kActiveDeviations * gain_ * deviation.value;
+  here.distance -= here.reach;
+  here.slope += kActiveDeviations * gain_ * deviation.slope * light_.rate;
+  return here;
 }
 
 /// The first time between a and b at which the signal is so near to a threshold that the noise matters; without noise,
 /// at which it reaches the threshold.
-std::optional<double> CircuitPixel::find_near(const SignalAt& a, const SignalAt& b) const {
+std::optional<double> CircuitPixel::find_near(const Approach& a, const Approach& b) const {
+  const double va = a.signal.value, vb = b.signal.value, length = b.signal.s - a.signal.s;
   // The reach of the noise falls with rising light, so that it is maximal at one of the ends.
-  const double farthest = reach(light_.rate > 0 ? a.s : b.s).value, beyond = beyond_chord(a, b) + farthest;
-  if (std::max(a.value, b.value) + beyond < upper() && std::min(a.value, b.value) - beyond > lower())
-    return std::nullopt;
-  const double reach_a = reach(a.s).value, reach_b = reach(b.s).value;
-  if (a.value + reach_a >= upper() || a.value - reach_a <= lower()) return a.s;
-  const bool near_b = b.value + reach_b >= upper() || b.value - reach_b <= lower();
-  if (b.s - a.s <= (noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns))
-    return near_b ? std::optional(b.s) : std::nullopt;
-  if (near_b && is_monotone(a, b)) return solve_near(a, b);
-  const SignalAt middle = at(0.5 * (a.s + b.s));
+  const double beyond = beyond_chord(a.signal, b.signal) + std::max(a.reach, b.reach);
+  if (std::max(va, vb) + beyond < upper() && std::min(va, vb) - beyond > lower()) return std::nullopt;
+  if (a.distance <= 0) return a.signal.s;
+  if (length <= resolution_ns()) return b.distance <= 0 ? std::optional(b.signal.s) : std::nullopt;
+  if (b.distance <= 0 && is_monotone(a.signal, b.signal)) return solve_near(a, b);
+  const Approach middle = approach(at(0.5 * (a.signal.s + b.signal.s)));
   if (const auto found = find_near(a, middle)) return found;
   return find_near(middle, b);
 }
 
 /// The same if the signal is monotone, near a threshold at b and not at a.
-double CircuitPixel::solve_near(const SignalAt& a, const SignalAt& b) const {
-  const auto distance = [&](const SignalAt& here) {
-    const double above = upper() - here.value, below = here.value - lower();
-    const Reach reach = this->reach(here.s);
-    return Reach{std::min(above, below) - reach.value, (above < below ? -here.slope : here.slope) - reach.slope};
-  };
-  const double resolution = noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns;
-  double from = a.s, to = b.s;
+double CircuitPixel::solve_near(const Approach& a, const Approach& b) const {
+  double from = a.signal.s, to = b.signal.s;
   // A cubic with the same values and slopes at the ends leads near the root.
-  const Reach first = distance(a), last = distance(b);
-  const auto exit = NoiseCubic{first.value, first.slope, last.value, last.slope, to - from}.first_exit(0, kNever);
+  const auto exit = NoiseCubic{a.distance, a.slope, b.distance, b.slope, to - from}.first_exit(0, kNever);
   double s = exit ? from + exit->first : 0.5 * (from + to);
   // Newton's method, with bisection where it would leave the part that contains the root. Its error after a step is
   // about the step's square divided by the length of the part.
-  const double enough = std::sqrt(0.5 * resolution * (to - from));
-  for (int i = 0; i < 60 && to - from > resolution; ++i) {
-    const Reach here = distance(at(s));
-    (here.value <= 0 ? to : from) = s;
-    const double next = s - here.value / here.slope, before = s;
+  const double enough = std::sqrt(0.5 * resolution_ns() * (to - from));
+  for (int i = 0; i < 60 && to - from > resolution_ns(); ++i) {
+    const Approach here = approach(at(s));
+    (here.distance <= 0 ? to : from) = s;
+    const double next = s - here.distance / here.slope, before = s;
     s = next >= from && next <= to ? next : 0.5 * (from + to);
     if (std::abs(s - before) < enough && s == next) break;
   }

@@ -127,7 +127,7 @@ class CircuitPixel {
   /// Makes an inactive pixel active when a threshold comes near; returns this time, from `here` on, in ns after the
   /// start.
   std::optional<double> wake(const SignalAt& here) {
-    const auto near = find_near(here, end());
+    const auto near = find_near(approach(here), approach(end()));
     if (near) activate(*near);
     return near;
   }
@@ -161,18 +161,21 @@ class CircuitPixel {
     const double curvature = e1 * piece_.k1 * piece_.k1 + e2 * piece_.k2 * piece_.k2 + e3 * piece_.k3 * piece_.k3;
     return std::min(0.125 * span * span * curvature, e1 + e2 + e3);
   }
-  /// How far the noise reaches at most where it matters, and its slope.
-  struct Reach {
-    double value = 0, slope = 0;
+  /// The signal, how far it is from the nearest threshold beyond the reach of the noise, and the slope of this
+  /// distance.
+  struct Approach {
+    SignalAt signal;
+    double distance, slope, reach;
   };
-  Reach reach(double s) const;
-
-  std::optional<double> find_near(const SignalAt& a, const SignalAt& b) const;
+  Approach approach(const SignalAt& signal) const;
+  std::optional<double> find_near(const Approach& a, const Approach& b) const;
+  double solve_near(const Approach& a, const Approach& b) const;
+  /// Of the times at which a signal without noise crosses a level, and at which noise begins to matter.
+  double resolution_ns() const { return noise_ == nullptr ? 0.25 : 0.05; }
   /// Whether the slope of the signal has one sign between a and b, by its ends.
   static bool is_monotone(const SignalAt& a, const SignalAt& b) {
     return a.slope * b.slope > 0 && std::min(std::abs(a.slope), std::abs(b.slope)) > 0.25 * std::abs(a.slope - b.slope);
   }
-  double solve_near(const SignalAt& a, const SignalAt& b) const;
   bool may_cross(const SignalAt& a, const SignalAt& b) const;
   std::uint32_t doubtful_parts(double a, double b) const;
   void take_apart(double s, int polarity);
@@ -231,7 +234,7 @@ CircuitBounds CircuitPixel::run(const Emit& emit, double s, std::optional<Circui
       release(here);
     }
     if (noise_ == nullptr) {
-      const auto near = find_near(here, end());
+      const auto near = find_near(approach(here), approach(end()));
       if (!near) return bounds_without_noise();
       here = at(*near);
       fire({*near, upper() - here.value < here.value - lower() ? 1 : -1});

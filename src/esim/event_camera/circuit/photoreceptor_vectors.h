@@ -47,7 +47,7 @@ HWY_INLINE std::array<hn::Vec<D>, 4> exponential_moments(D d, hn::Vec<D> area) {
   const V one = set(1);
   constexpr double kLarge = 0.02;  // where the recursion upwards loses at most 11 digits in psi_3, which hardly counts
   const auto large = hn::Gt(area, set(kLarge));
-  std::array<V, 4> moments;
+  std::array<V, 4> moments{hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
   if (!hn::AllTrue(d, large)) {
     const V a = hn::Min(area, set(kLarge)), a2 = hn::Mul(a, a);
     // Sum over j of (-a)^j 3! / (4 + j)!, odd and even powers apart
@@ -89,12 +89,13 @@ HWY_INLINE hn::Vec<D> exponential_minus_one(D d, hn::Vec<D> x) {
 /// ln(1 + x)
 template <class D>
 HWY_INLINE hn::Vec<D> logarithm_of_one_plus(D d, hn::Vec<D> x) {
-  if (!hn::AllTrue(d, hn::Lt(hn::Abs(x), hn::Set(d, 0.2)))) return hn::Log1p(d, x);
-  // 2 artanh(s), s = x / (2 + x) below 1 / 9
+  // For small x: 2 artanh(s), s = x / (2 + x) below 1 / 9
   const auto s = hn::Div(x, hn::Add(hn::Set(d, 2.0), x)), s2 = hn::Mul(s, s);
   auto sum = hn::Set(d, 2.0 / 15);
   for (const int k : {13, 11, 9, 7, 5, 3}) sum = hn::MulAdd(sum, s2, hn::Set(d, 2.0 / k));
-  return hn::MulAdd(hn::Mul(sum, s2), s, hn::Add(s, s));
+  const auto logarithm = hn::MulAdd(hn::Mul(sum, s2), s, hn::Add(s, s));
+  const auto small = hn::Lt(hn::Abs(x), hn::Set(d, 0.2));
+  return hn::AllTrue(d, small) ? logarithm : hn::IfThenElse(small, logarithm, hn::Log1p(d, x));
 }
 
 /// Advances the states by ramps, and returns the signals on the way. `area` is that of area_of().

@@ -40,7 +40,8 @@ std::vector<TimedEvent> run(const PixelSetup& setup, const Circuit& circuit, std
   CircuitState front{0, light(0), high_pass ? light(0) : 0.0};
   const double leak = 1e-9 * static_cast<double>(setup.leak);
   CircuitPixelState state;
-  CircuitPixel pixel(circuit, index, setup.pixel, state);
+  KnownPath known;
+  CircuitPixel pixel(circuit, index, setup.pixel, state, known);
   pixel.open(light(0), high_pass ? 0.0 : front.v, {0, leak}, 0, 0.5);
   std::vector<TimedEvent> events;
   CircuitBounds bounds{1, -1, -1};

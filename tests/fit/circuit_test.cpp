@@ -124,8 +124,8 @@ TEST(FitCircuit, ApproximateNumbersAreNearThoseOfTheCircuit) {
   using enum CircuitModel::Index;
   for (const std::uint32_t number : {1U, 2U, 3U}) {
     const EventCameraOptions truth = test::random_circuit(number, test::kLampNoise);
-    const std::vector<PixelCounts> recordings = test::record_lamps(truth, 1, 8);
-    const CountMoments recorded = count_moments(recordings, std::vector<bool>(64, true));
+    const std::vector<PixelCounts> recordings = test::record_lamps(truth, 1, 24);  // so that chance hardly matters
+    const CountMoments recorded = count_moments(recordings, std::vector<bool>(576, true));
     const CircuitModel model(truth, {kFollower}, recordings, recorded.mean);
     const Eigen::VectorXd found =
         model.approximate(Eigen::VectorXd::Constant(1, std::log(truth.circuit->source_follower_hz)));
@@ -144,7 +144,7 @@ TEST(FitCircuit, NumbersOfNoSensorDetermineNothing) {
 
 TEST(FitCircuit, OneLightLevelDoesNotTellTheTimeConstantsApart) {
   const EventCameraOptions truth = test::random_circuit(1, test::kLampNoise);
-  std::vector<PixelCounts> recordings = test::record_lamps(truth, 1, kSmall);
+  std::vector<PixelCounts> recordings = test::record_lamps(truth, 2, kSmall);
   recordings.resize(2);
   const CircuitFit found = test::fit_lamps(truth, recordings);
   EXPECT_TRUE(test::contains(estimate(found, "circuit.photocurrent_fa_per_lux").reason, "one light level"));

@@ -1,6 +1,9 @@
 #include "esim/event_camera/circuit/circuit_array.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -26,6 +29,7 @@ CircuitArray::CircuitArray(const EventCameraOptions& options, int width, int hei
   const double white_fa = o.white_photocurrent_fa();
   dark_ = o.dark_current_fa / white_fa;
   circuit_.poles.t1_unit_ns = 1e9 * o.photodiode_charge_e * CircuitOptions::kElementaryCharge_fC / white_fa;
+  circuit_.log_t1_unit = std::log(circuit_.poles.t1_unit_ns);
   circuit_.waits = options.readout.acknowledges();
   circuit_.poles.t2_ns = 1e9 / (2 * std::numbers::pi * o.source_follower_hz);
   circuit_.poles.high_pass_per_ns = 1e-9 * 2 * std::numbers::pi * o.high_pass_hz;
@@ -111,17 +115,18 @@ bool CircuitArray::open(const Segment& segment, Rows rows) {
       const double place = starts_.uniforms(static_cast<std::uint32_t>(i), 0)[0];
       const auto time = static_cast<double>(segment.t1 - epoch_);
       const double light_rate = std::round(2 * kPerLight * static_cast<double>(irradiance[x]));
-      pixel(i).open(lights[x], w_.empty() ? v_[i] : 0.0, leak(i, light_rate, time), time, place);
+      KnownPath unused;
+      pixel(i, unused).open(lights[x], w_.empty() ? v_[i] : 0.0, leak(i, light_rate, time), time, place);
       until_[i] = -1;  // looks at once
     }
   }
   return true;
 }
 
-/// Solves the front end of some neighbouring pixels as advance() does in one step, and adds those to
-/// buffer.uncertain that need more steps, or whose pixels may fire.
+/// Solves the front end of some neighbouring pixels as advance() does in one step. Puts those into the buffer that need
+/// more steps, or may fire, and takes the others to the segment's end.
 template <class D>
-HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, CircuitBuffer& buffer, std::size_t at) {
+HWY_INLINE void CircuitArray::move_vector(D d, const Row& row, std::size_t x, CircuitBuffer& buffer, std::size_t at) {
   using V = hn::Vec<D>;
   const hn::Rebind<float, D> df;
   const auto set = [d](double value) { return hn::Set(d, value); };
@@ -152,8 +157,14 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
     ramp.length = length;
     ramp.decay2 = set(std::exp(-row.length / t2)), ramp.decay3 = set(std::exp(-k3 * row.length));
     const V area = area_of(d, ramp);
+    // As in step_length(), multiplied by the length over Q / I, so that nothing is divided
+    const V decays = hn::Mul(area, set(1 / kMaxDecay)), decays2 = hn::Mul(decays, decays);
+    const V per_transient = hn::Mul(ramp.rate0, length);
+    const V transient = hn::Abs(hn::MulSub(state.lag, per_transient, ramp.growth));
+    const auto is_long =
+        hn::And(hn::Gt(decays, one), hn::Gt(hn::Mul(hn::Mul(decays2, decays2), transient), per_transient));
     several = hn::Or(hn::Gt(hn::Abs(ramp.growth), set(kMaxLightStep)),
-                     hn::And(is_transient(d, ramp, state.lag), hn::Gt(area, set(kMaxDecay))));
+                     hn::And(hn::Gt(transient, hn::Mul(per_transient, set(kMaxTransient))), is_long));
     piece = esim::advance(d, circuit_.poles, ramp, area, state);
 
     const V size_fast = hn::Abs(piece.fast), size_slow = hn::Abs(piece.slow), size_passed = hn::Abs(piece.passed);
@@ -165,12 +176,7 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
     lowest = hn::Sub(hn::Min(in0, in1), beyond);
     highest = hn::Add(hn::Max(in0, in1), beyond);
   }
-  hn::StoreU(state.light, d, &buffer.light[at]);
-  hn::StoreU(state.lag, d, &buffer.lag[at]);
-  hn::StoreU(state.y, d, &buffer.y[at]);
-  hn::StoreU(state.v, d, &buffer.v[at]);
-  if (!w_.empty()) hn::StoreU(state.w, d, &buffer.w[at]);
-
+  V light_sum = hn::Zero(d);
   const V leak = hn::Mul(hn::PromoteTo(d, hn::LoadU(df, &leak_[i])), set(1e-9));
   V leaked0 = hn::Mul(leak, set(row.start)), leaked1 = hn::Mul(leak, set(row.start + row.length));
   if (!light_leak_.empty()) {
@@ -179,7 +185,7 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
     const V sum0 = hn::LoadU(d, &light_sum_[i]), sum1 = hn::MulAdd(rounded, length, sum0);
     leaked0 = hn::MulAdd(light_leak, sum0, leaked0);
     leaked1 = hn::MulAdd(light_leak, sum1, leaked1);
-    hn::StoreU(sum1, d, &buffer.light_sum[at]);
+    light_sum = sum1;
   }
   const V node_light = hn::PromoteTo(d, hn::LoadU(df, &node_light_[i]));
   const V guard = set(kGuard);
@@ -189,26 +195,46 @@ HWY_INLINE bool CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
   uncertain =
       hn::Or(uncertain, hn::Ge(hn::Add(hn::Add(highest, hn::Max(leaked0, leaked1)), guard), hn::LoadU(d, &high_[i])));
   uncertain = hn::Or(uncertain, hn::Ge(hn::Abs(hn::Sub(state.light, node_light)), set(kLightReach)));
-  const std::size_t lanes = std::min(hn::Lanes(d), row.count - x);
-  const hn::RebindToUnsigned<D> du;
-  alignas(64) std::array<std::uint64_t, 16> flags;
-  hn::StoreU(hn::BitCast(du, hn::VecFromMask(d, uncertain)), du, flags.data());
-  if (hn::AllFalse(d, uncertain)) return false;
-  hn::StoreU(piece.level, d, &buffer.level[at]);
-  hn::StoreU(piece.rate, d, &buffer.rate[at]);
-  hn::StoreU(piece.fast, d, &buffer.fast[at]);
-  hn::StoreU(piece.slow, d, &buffer.slow[at]);
-  hn::StoreU(piece.k1, d, &buffer.k1[at]);
-  hn::StoreU(piece.passed, d, &buffer.passed[at]);
-  hn::StoreU(hn::IfThenElseZero(several, one), d, &buffer.several[at]);
-  for (std::size_t k = 0; k < lanes; ++k) {
-    if (flags[k] != 0) buffer.uncertain.push_back(static_cast<std::uint32_t>(x + k));
+  // Uncertain pixels keep their state before the segment for now. Nothing may be written behind the last pixel, where
+  // other threads work.
+  const bool whole = x + hn::Lanes(d) <= row.count;
+  const auto inside = hn::FirstN(d, row.count - x), certain = hn::AndNot(uncertain, inside);
+  const auto keep = [&](V value, LargeVector<double>& values) {
+    if (whole) return hn::BlendedStore(value, certain, d, &values[i]);
+    std::array<double, kVectorPadding> last{};
+    hn::StoreU(hn::IfThenElse(certain, value, hn::LoadU(d, &values[i])), d, last.data());
+    std::copy_n(last.data(), row.count - x, &values[i]);
+  };
+  keep(state.light, light_), keep(state.lag, lag_), keep(state.y, y_), keep(state.v, v_);
+  if (!w_.empty()) keep(state.w, w_);
+  if (!light_leak_.empty()) keep(light_sum, light_sum_);
+  uncertain = hn::And(uncertain, inside);
+  if (hn::AllFalse(d, uncertain)) return;
+  const auto store = [&](V value, CircuitBuffer::Values<double>& values) { hn::StoreU(value, d, &values[at]); };
+  store(state.light, buffer.light), store(state.lag, buffer.lag), store(state.y, buffer.y), store(state.v, buffer.v);
+  store(state.w, buffer.w), store(light_sum, buffer.light_sum);
+  store(piece.level, buffer.level), store(piece.rate, buffer.rate), store(piece.fast, buffer.fast);
+  store(piece.slow, buffer.slow), store(piece.k1, buffer.k1), store(piece.passed, buffer.passed);
+  const auto bits_of = [d](auto mask) {
+    std::array<std::uint8_t, 8> bits{};
+    hn::StoreMaskBits(d, mask, bits.data());
+    return std::uint32_t{bits[0]};
+  };
+  // Bounds without an end belong to inactive pixels.
+  const std::uint32_t many = bits_of(several), active = bits_of(hn::Lt(hn::LoadU(d, &until_[i]), hn::Inf(d)));
+  for (std::uint32_t left = bits_of(uncertain); left != 0; left &= left - 1) {
+    const auto k = static_cast<std::size_t>(std::countr_zero(left));
+    auto& columns = (many >> k & 1U) != 0     ? buffer.uncertain.several
+                    : (active >> k & 1U) != 0 ? buffer.uncertain.active
+                                              : buffer.uncertain.inactive;
+    columns.push_back(static_cast<std::uint32_t>(x + k));
+    hwy::Prefetch(&states_[i + k]);
+    hwy::Prefetch(&parameters_[i + k]);
   }
-  return true;
 }
 
-CircuitPixel CircuitArray::pixel(std::size_t i) {
-  CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], states_[i]);
+CircuitPixel CircuitArray::pixel(std::size_t i, KnownPath& known) {
+  CircuitPixel pixel(circuit_, static_cast<std::uint32_t>(i), parameters_[i], states_[i], known);
   if (!origins_.empty()) pixel.explain(&origins_[i]);
   return pixel;
 }
@@ -262,8 +288,8 @@ void CircuitArray::resume(std::uint32_t pixel, const PastSegment& past, CircuitB
     (*values)[pixel] = past.front[used++](column, line);
   }
   buffer.uncertain.clear();
-  if (move_vector(hn::ScalableTag<double>(), row, 0, buffer, 0) && !buffer.uncertain.empty())
-    advance_uncertain(row, 0, buffer);
+  move_vector(hn::ScalableTag<double>(), row, 0, buffer, 0);
+  advance_uncertain(row, 0, buffer);
   for (const auto& [unused, polarity, time] : buffer.found)
     requests.push_back({row.t0 + static_cast<TimeNs>(time), static_cast<std::uint16_t>(x),
                         static_cast<std::uint16_t>(y), static_cast<std::int8_t>(polarity)});
@@ -316,15 +342,6 @@ bool CircuitArray::advance(const Segment& segment, Rows rows, CircuitBuffer& buf
       const std::size_t count = std::min(CircuitBuffer::kTogether, width - begin);
       buffer.uncertain.clear();
       for (std::size_t x = 0; x < count; x += hn::Lanes(d)) move_vector(d, row, begin + x, buffer, x);
-      // Uncertain pixels start from the state before the segment.
-      std::size_t next = 0;
-      for (std::size_t x = 0; x < count; ++x) {
-        if (next < buffer.uncertain.size() && buffer.uncertain[next] == begin + x) {
-          ++next;
-          continue;
-        }
-        keep(first + begin + x, x, buffer);
-      }
       advance_uncertain(row, begin, buffer);
       for (const auto& [column, polarity, time] : buffer.found) {
         if (buffer.events == kBlock) flush(row, buffer, events);

@@ -22,14 +22,18 @@ namespace esim::inline event_camera {
 
 /// The working memory of a thread.
 struct CircuitBuffer {
-  static constexpr std::size_t kTogether = 128;
+  static constexpr std::size_t kTogether = 256;
   template <typename T>
   using Values = std::array<T, kTogether + kVectorPadding>;
 
-  Values<double> light, lag, y, v, w, light_sum;  // at the segment's end
-  Values<double> level, rate, fast, slow, k1, passed,
-      several;                           // of CircuitPiece; several: not 0 if one step is not enough
-  std::vector<std::uint32_t> uncertain;  // columns whose pixels may fire, or need more than one step
+  Values<double> light, lag, y, v, w, light_sum;       // at the segment's end
+  Values<double> level, rate, fast, slow, k1, passed;  // of CircuitPiece
+  /// Columns whose pixels may fire, or need more than one step.
+  struct Uncertain {
+    std::vector<std::uint32_t> inactive, active, several;
+
+    void clear() { inactive.clear(), active.clear(), several.clear(); }
+  } uncertain;
   struct Found {
     std::uint32_t column;
     int polarity;
@@ -105,19 +109,19 @@ class CircuitArray {
   std::array<const LargeVector<double>*, 6> front() const { return {&light_, &lag_, &y_, &v_, &w_, &light_sum_}; }
   void make_pixels(const EventCameraOptions& options, std::uint64_t seed, std::uint16_t stream);
   template <class D>
-  bool move_vector(D d, const Row& row, std::size_t x, CircuitBuffer& buffer, std::size_t at);
+  void move_vector(D d, const Row& row, std::size_t x, CircuitBuffer& buffer, std::size_t at);
   void advance_uncertain(const Row& row, std::size_t begin, CircuitBuffer& buffer);
   void advance_in_one(const Row& row, std::span<const std::uint32_t> columns, std::size_t begin, CircuitBuffer& buffer);
   void advance_in_several(const Row& row, std::span<const std::uint32_t> columns, std::size_t begin,
                           CircuitBuffer& buffer);
-  void finish(const Row& row, std::uint32_t column, std::size_t at, const CircuitPiece& piece, double done, double s,
-              CircuitState& front, CircuitBuffer& buffer);
+  void finish(const Row& row, std::uint32_t column, std::size_t at, const CircuitPiece& piece, double done,
+              std::size_t lane, CircuitState& front, CircuitBuffer& buffer);
   CircuitLanes::Lanes wake(CircuitLanes& lanes, const std::array<std::size_t, CircuitLanes::kLanes>& pixels,
                            CircuitLanes::Lanes inactive, CircuitLanes::Lanes& rests);
   bool is_quiet(const CircuitLanes& lanes, std::size_t lane, std::size_t i) const;
   LeakRamp leak_in(const Row& row, std::size_t column, std::size_t at, const CircuitBuffer& buffer) const;
   void set_bounds(std::size_t pixel, const CircuitBounds& bounds);
-  CircuitPixel pixel(std::size_t i);
+  CircuitPixel pixel(std::size_t i, KnownPath& known);
   LeakRamp leak(std::size_t i, double light_rate, double start) const;
   void keep(std::size_t i, std::size_t at, const CircuitBuffer& buffer);
   void label(std::size_t i, TimeNs t, int polarity, std::vector<NewLabel>& labels) const;

@@ -1,80 +1,147 @@
 #include "esim/event_camera/circuit/circuit_pixel.h"
 
+#include <bit>
+
+#include "esim/core/vector_math.h"
+#include "esim/event_camera/circuit/photoreceptor_vectors.h"
+
 namespace esim::inline event_camera {
 namespace {
-
-// Of the times at which a signal without noise crosses a level, and at which noise begins to matter.
-constexpr double kResolution_ns = 0.25, kNoiseResolution_ns = 0.05;
 
 constexpr double kRestingDeviations = 3.5;
 
 }  // namespace
 
-/// The first time in [a, b] at which the signal is so near to a threshold that the noise matters; without noise, at
-/// which it reaches the threshold.
-std::optional<double> CircuitPixel::find_near(double a, double b) const {
-  // The reach of the noise falls with rising light, so that it is maximal at one of the ends.
-  const double reach_max = reach(light_.rate > 0 ? a : b, kActiveDeviations);
-  const auto [low, high] = range(a, b);
-  if (high + reach_max < upper() && low - reach_max > lower()) return std::nullopt;
-  const double reach_a = reach(a, kActiveDeviations), reach_b = reach(b, kActiveDeviations);
-  const double value = signal(a);
-  if (value + reach_a >= upper() || value - reach_a <= lower()) return a;
-  if (b - a <= (noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns)) {
-    const double last = signal(b);
-    return last + reach_b >= upper() || last - reach_b <= lower() ? std::optional(b) : std::nullopt;
-  }
-  const auto distance = [&](double s) {
-    const double here = signal(s);
-    return std::min(upper() - here, here - lower()) - reach(s, kActiveDeviations);
-  };
-  if (const double last = distance(b); last <= 0 && is_monotone(a, b)) {
-    // The Illinois method, between a positive and a negative distance.
-    double from = a, to = b, at_from = distance(a), at_to = last;
-    const double resolution = noise_ == nullptr ? kResolution_ns : kNoiseResolution_ns;
-    for (int i = 0, side = 0; i < 60 && to - from > resolution; ++i) {
-      const double s = from + (to - from) * std::clamp(at_from / (at_from - at_to), 1e-3, 1 - 1e-3);
-      const double here = distance(s);
-      if (here <= 0) {
-        to = s, at_to = here;
-        if (side == 1) at_from *= 0.5;
-        side = 1;
-      } else {
-        from = s, at_from = here;
-        if (side == -1) at_to *= 0.5;
-        side = -1;
-      }
-      if (here == 0) break;
+SignalAt CircuitPixel::at(double s) const {
+  const hn::CappedTag<double, 4> d;
+  alignas(32) std::array<double, 4> terms = terms_;
+  if (s != 0) {
+    for (std::size_t i = 0; i < terms.size(); i += hn::Lanes(d)) {
+      const auto decay = hn::Exp(d, hn::Mul(hn::Load(d, &decays_[i]), hn::Set(d, s)));
+      hn::Store(hn::Mul(hn::Load(d, &terms_[i]), decay), d, &terms[i]);
     }
-    return to;
   }
-  const double middle = 0.5 * (a + b);
+  SignalAt at{s, 0, 0, terms[0], terms[1], terms[2]};
+  at.value = piece_.level + piece_.rate * s + at.fast + at.slow + at.passed + leaked(s);
+  at.slope = piece_.rate - at.fast * piece_.k1 - at.slow * piece_.k2 - at.passed * piece_.k3 + leak_.rate;
+  return at;
+}
+
+CircuitPixel::Approach CircuitPixel::approach(const SignalAt& signal) const {
+  const double above = upper() - signal.value, below = signal.value - lower();
+  Approach here{signal, std::min(above, below), above < below ? -signal.slope : signal.slope, 0};
+  if (noise_ == nullptr) return here;
+  const auto deviation = noise_->deviation_at(circuit_.log_t1_unit - light(signal.s));
+  here.reach = kActiveDeviations * gain_ * deviation.value;
+  here.distance -= here.reach;
+  here.slope += kActiveDeviations * gain_ * deviation.slope * light_.rate;
+  return here;
+}
+
+/// The first time between a and b at which the signal is so near to a threshold that the noise matters; without noise,
+/// at which it reaches the threshold.
+std::optional<double> CircuitPixel::find_near(const Approach& a, const Approach& b) const {
+  const double va = a.signal.value, vb = b.signal.value, length = b.signal.s - a.signal.s;
+  // The reach of the noise falls with rising light, so that it is maximal at one of the ends.
+  const double beyond = beyond_chord(a.signal, b.signal) + std::max(a.reach, b.reach);
+  if (std::max(va, vb) + beyond < upper() && std::min(va, vb) - beyond > lower()) return std::nullopt;
+  if (a.distance <= 0) return a.signal.s;
+  if (length <= resolution_ns()) return b.distance <= 0 ? std::optional(b.signal.s) : std::nullopt;
+  if (b.distance <= 0 && is_monotone(a.signal, b.signal)) return solve_near(a, b);
+  const Approach middle = approach(at(0.5 * (a.signal.s + b.signal.s)));
   if (const auto found = find_near(a, middle)) return found;
   return find_near(middle, b);
 }
 
-std::optional<std::pair<double, int>> CircuitPixel::find_crossing(const PhotoreceptorNoise::Part& part, double a,
-                                                                  double b, double at_a, double at_b,
-                                                                  PhotoreceptorNoise::Middles& middles) const {
-  if (a >= b && part.index != 1) return std::nullopt;
-  const auto [low, high] = noise_->bounds(state_.pole, part);
-  const double beyond = piece_.beyond_chord(a, b);
-  if (std::min(at_a, at_b) - beyond + gain_ * low > lower() && std::max(at_a, at_b) + beyond + gain_ * high < upper())
-    return std::nullopt;
-  const double start = state_.node_time - start_;
-  if (noise_->is_cubic(state_.pole, part)) {
-    const NoiseCubic noise = noise_->cubic(state_.pole, part);
-    const double u = a - start - part.start, v = b - start - part.start;
-    const NoiseCubic sum{at_a + gain_ * noise.value(u), slope(a) + gain_ * noise.slope(u),
-                         at_b + gain_ * noise.value(v), slope(b) + gain_ * noise.slope(v), b - a};
-    const auto exit = sum.first_exit(lower(), upper());
-    return exit ? std::optional(std::pair{a + exit->first, exit->second}) : std::nullopt;
+/// The same if the signal is monotone, near a threshold at b and not at a.
+double CircuitPixel::solve_near(const Approach& a, const Approach& b) const {
+  double from = a.signal.s, to = b.signal.s;
+  // A cubic with the same values and slopes at the ends leads near the root.
+  const auto exit = NoiseCubic{a.distance, a.slope, b.distance, b.slope, to - from}.first_exit(0, kNever);
+  double s = exit ? from + exit->first : 0.5 * (from + to);
+  // Newton's method, with bisection where it would leave the part that contains the root. Its error after a step is
+  // about the step's square divided by the length of the part.
+  const double enough = std::sqrt(0.5 * resolution_ns() * (to - from));
+  for (int i = 0; i < 60 && to - from > resolution_ns(); ++i) {
+    const Approach here = approach(at(s));
+    (here.distance <= 0 ? to : from) = s;
+    const double next = s - here.distance / here.slope, before = s;
+    s = next >= from && next <= to ? next : 0.5 * (from + to);
+    if (std::abs(s - before) < enough && s == next) break;
   }
-  const auto [first, second] = noise_->halves(state_.pole, part, middles);
-  const double middle = std::clamp(start + second.start, a, b);
-  const double at_middle = middle == a ? at_a : middle == b ? at_b : signal(middle);
-  if (const auto crossing = find_crossing(first, a, middle, at_a, at_middle, middles)) return crossing;
-  return find_crossing(second, middle, b, at_middle, at_b, middles);
+  return s;
+}
+
+/// Whether the signal plus noise may reach a threshold between a and b, within the step at the last node.
+bool CircuitPixel::may_cross(const SignalAt& a, const SignalAt& b) const {
+  const auto [low, high] = noise_->bounds(state_.from, state_.to, state_.pole);
+  const double beyond = beyond_chord(a, b);
+  return std::min(a.value, b.value) - beyond + gain_ * low <= lower() ||
+         std::max(a.value, b.value) + beyond + gain_ * high >= upper();
+}
+
+/// The parts of the step in which the same may happen between a and b: one bit each.
+std::uint32_t CircuitPixel::doubtful_parts(double a, double b) const {
+  const NoiseLanes d;
+  const auto set = [d](double value) { return hn::Set(d, static_cast<float>(value)); };
+  FloatSignals<NoiseLanes> signal{set(piece_.level + leak_.leaked - state_.reference),
+                                  set(piece_.rate + leak_.rate),
+                                  set(piece_.fast),
+                                  set(piece_.slow),
+                                  set(piece_.passed),
+                                  set(piece_.k1),
+                                  set(piece_.k2),
+                                  set(piece_.k3),
+                                  hn::Zero(d),
+                                  piece_.k3 > 0};
+  signal.set_guard(d, set(piece_.length));
+  const PhotoreceptorNoise::Path& path = this->path();
+  const double part = noise_->part_ns(state_.pole);
+  const auto start = set(state_.node_time - start_), length = set(part), first = set(a), last = set(b);
+  const auto along = set(part / (3 * circuit_.poles.t2_ns)), gain = set(gain_);
+  std::uint32_t doubtful = 0;
+  for (std::size_t i = 0; i < PhotoreceptorNoise::kParts; i += hn::Lanes(d)) {
+    const auto index = hn::Iota(d, static_cast<float>(i)), t0 = hn::MulAdd(index, length, start);
+    const auto from = signal.at(d, hn::Max(first, hn::Min(t0, last)));
+    const auto to = signal.at(d, hn::Max(first, hn::Min(hn::Add(t0, length), last)));
+    const auto load = [&](const float* values) { return hn::LoadU(d, values + i); };
+    const auto [low, high] =
+        cubic_bounds(load(&path.y[0]), load(&path.x[0]), load(&path.y[1]), load(&path.x[1]), along);
+    const auto [lowest, highest] = signal.range(d, from, to);
+    const auto quiet = hn::And(hn::Lt(hn::MulAdd(gain, high, highest), hn::Set(d, parameters_.on)),
+                               hn::Gt(hn::MulAdd(gain, low, lowest), hn::Set(d, -parameters_.off)));
+    std::array<std::uint8_t, 8> bits{};
+    hn::StoreMaskBits(d, hn::Not(quiet), bits.data());
+    doubtful |= static_cast<std::uint32_t>(bits[0]) << i;
+  }
+  return doubtful;
+}
+
+std::optional<CircuitCrossing> CircuitPixel::find_crossing(double a, double b) const {
+  const double start = state_.node_time - start_, length = noise_->part_ns(state_.pole);
+  const PhotoreceptorNoise::Path& path = this->path();
+  for (std::uint32_t parts = doubtful_parts(a, b); parts != 0; parts &= parts - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(parts));
+    const double part_start = start + static_cast<double>(i) * length;
+    const double begin = std::max(a, part_start);
+    const double end = i + 1 == PhotoreceptorNoise::kParts ? b : std::min(b, part_start + length);
+    if (begin >= end) continue;
+    const NoiseCubic noise = noise_->cubic(path, i, state_.pole);
+    const SignalAt from = at(begin), to = at(end);
+    const double u = begin - part_start, v = end - part_start;
+    const NoiseCubic sum{from.value + gain_ * noise.value(u), from.slope + gain_ * noise.slope(u),
+                         to.value + gain_ * noise.value(v), to.slope + gain_ * noise.slope(v), end - begin};
+    if (const auto exit = sum.first_exit(lower(), upper())) return CircuitCrossing{begin + exit->first, exit->second};
+  }
+  return std::nullopt;
+}
+
+const PhotoreceptorNoise::Path& CircuitPixel::path() const {
+  if (known_.node != state_.node) {
+    known_.path = noise_->path(state_.from, state_.to, pixel_, state_.node, state_.pole);
+    known_.node = state_.node;
+  }
+  return known_.path;
 }
 
 /// Chooses the length of steps for the light at `s`.
@@ -83,26 +150,33 @@ void CircuitPixel::follow_light(double s) {
   state_.pole = circuit_.pole(light(s));
 }
 
+/// The draws of the last node.
+std::array<float, 2> CircuitPixel::draws() {
+  if (state_.node - drawn_ >= 2 * PhotoreceptorNoise::kNodesDrawn) {
+    drawn_ = state_.node & ~1U;
+    const std::array<std::uint32_t, 2> pixels{pixel_, pixel_}, first{drawn_, drawn_ + 2};
+    noise_->draw(2, pixels.data(), first.data(), draws_);
+  }
+  const std::uint32_t place = state_.node - drawn_;
+  const auto& n = draws_[place & 1U];
+  return {n[0][place >> 1], n[1][place >> 1]};
+}
+
 /// Begins a step at a node, whose number is the next one.
 void CircuitPixel::start_step(const NoiseState& from, double time) {
   state_.node += 1;
   state_.node_time = time;
   state_.from = from;
   state_.active = true;
-  if (drawn_ != (state_.node & ~3U)) {
-    drawn_ = state_.node & ~3U;
-    noise_->draw(1, &pixel_, &drawn_, draws_);
-  }
-  const auto& n = draws_[state_.node - drawn_];
-  const double drift = (static_cast<double>(state_.node_light) - light(time - start_)) / PhotoreceptorNoise::kDriftStep;
-  state_.to = noise_->after_step(from, {n[0][0], n[1][0]}, state_.pole, drift);
+  const float drift = state_.node_light - static_cast<float>(light(time - start_));
+  state_.to = noise_->after_step(from, draws(), state_.pole, drift);
 }
 
 /// At the end of a step, where the signal is `value`: begins the next one, if the noise still matters.
-void CircuitPixel::pass_node(double s, double value) {
+void CircuitPixel::pass_node(const SignalAt& here) {
   const double time = state_.node_time + noise_->step_ns(state_.pole);
-  if (std::abs(light(s) - static_cast<double>(state_.node_light)) > kLightReach) follow_light(s);
-  const double distance = std::min(upper() - value, value - lower());
+  if (std::abs(light(here.s) - static_cast<double>(state_.node_light)) > kLightReach) follow_light(here.s);
+  const double distance = std::min(upper() - here.value, here.value - lower());
   if (distance < kInactiveDeviations * gain_ * noise_->deviation(state_.pole)) {
     start_step(state_.to, time);
     return;
@@ -117,18 +191,14 @@ void CircuitPixel::pass_node(double s, double value) {
 void CircuitPixel::activate(double s) {
   follow_light(s);
   state_.node += 1;
-  start_step(noise_->after_gap(state_.from, start_ + s - state_.node_time, pixel_, state_.node, state_.pole),
-             start_ + s);
+  start_step(noise_->after_gap(state_.from, draws(), start_ + s - state_.node_time, state_.pole), start_ + s);
 }
 
 /// The noise at `s`, at the end of a reset. It continues from the last node before, whatever the signal did meanwhile.
 double CircuitPixel::noise_at(double s) {
   if (state_.active) {
     const double end = state_.node_time + noise_->step_ns(state_.pole);
-    if (end > start_ + s) {
-      PhotoreceptorNoise::Middles middles(pixel_, state_.node);
-      return noise_->at(state_.pole, {state_.from, state_.to}, start_ + s - state_.node_time, middles);
-    }
+    if (end > start_ + s) return noise_->at(path(), start_ + s - state_.node_time, state_.pole);
     state_.from = state_.to;
     state_.node_time = end;
     state_.node += 1;
@@ -136,9 +206,9 @@ double CircuitPixel::noise_at(double s) {
   }
   follow_light(s);
   state_.node += 1;
-  state_.from = noise_->after_gap(state_.from, start_ + s - state_.node_time, pixel_, state_.node, state_.pole);
+  state_.from = noise_->after_gap(state_.from, draws(), start_ + s - state_.node_time, state_.pole);
   state_.node_time = start_ + s;
-  return state_.from.x;
+  return static_cast<double>(state_.from.x);
 }
 
 void CircuitPixel::open(double light, double signal, const LeakRamp& leak, double time, double place) {
@@ -158,13 +228,14 @@ void CircuitPixel::open(double light, double signal, const LeakRamp& leak, doubl
   if (noise_ == nullptr) return;
   state_.pole = circuit_.pole(light);
   state_.from = noise_->first(pixel_, state_.pole);
-  state_.reference += gain_ * state_.from.x;
+  state_.reference += gain_ * static_cast<double>(state_.from.x);
 }
 
-void CircuitPixel::release(double s) {
+/// Ends the reset of a pixel: its new reference is signal plus noise.
+void CircuitPixel::release(const SignalAt& here) {
   state_.held_until = -1;
-  if (origin_ != nullptr) origin_->v = piece_.value(s), origin_->leaked = leaked(s);
-  const double value = signal(s) + (noise_ != nullptr ? gain_ * noise_at(s) : 0.0);
+  if (origin_ != nullptr) origin_->v = piece_.value(here.s), origin_->leaked = leaked(here.s);
+  const double value = here.value + (noise_ != nullptr ? gain_ * noise_at(here.s) : 0.0);
   const double change = value - state_.reference;
   lost_ +=
       static_cast<std::int64_t>(std::abs(change) / static_cast<double>(change > 0 ? parameters_.on : parameters_.off));

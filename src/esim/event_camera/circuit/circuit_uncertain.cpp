@@ -36,10 +36,10 @@ LeakRamp CircuitArray::leak_in(const Row& row, std::size_t column, std::size_t a
   return leak(i, light_leak_.empty() ? 0.0 : (buffer.light_sum[at] - light_sum_[i]) / row.length, row.start);
 }
 
-/// Takes the pixel of a column to the segment's end, from `s` on in its piece that begins `done` ns after the segment's
-/// start and is `length` long. `front` is its front end after this piece.
+/// Takes the pixel of a column to the segment's end, from where its lane is in its piece, which begins `done` ns after
+/// the segment's start. `front` is its front end after this piece.
 void CircuitArray::finish(const Row& row, std::uint32_t column, std::size_t at, const CircuitPiece& piece, double done,
-                          double s, CircuitState& front, CircuitBuffer& buffer) {
+                          std::size_t lane, CircuitState& front, CircuitBuffer& buffer) {
   const std::size_t i = row.first + column;
   const auto emit_event = [&](double t, int polarity) {
     const double time = std::clamp(std::ceil(t - row.start), 0.0, row.length);
@@ -48,14 +48,14 @@ void CircuitArray::finish(const Row& row, std::uint32_t column, std::size_t at, 
   };
   const LightRamp ramp{light_[i], (buffer.light[at] - light_[i]) / row.length};
   const LeakRamp leak = leak_in(row, column, at, buffer);
-  CircuitPixel pixel = this->pixel(i);
-  const auto run = [&](const CircuitPiece& of, double begin, double from) {
+  CircuitPixel pixel = this->pixel(i, buffer.lanes.known(lane));
+  const auto run = [&](const CircuitPiece& of, double begin, double from, std::optional<CircuitCrossing> crossing) {
     pixel.set(of, {ramp.light + ramp.rate * begin, ramp.rate}, {leak.leaked + leak.rate * begin, leak.rate},
               row.start + begin);
-    set_bounds(i, pixel.run(emit_event, from));
+    set_bounds(i, pixel.run(emit_event, from, crossing));
     buffer.lost += limits_ ? pixel.lost() : 0;
   };
-  run(piece, done, s);
+  run(piece, done, buffer.lanes.s[lane], buffer.lanes.crossing(lane));
   done = piece.length < row.length - done ? done + piece.length : row.length;
   while (done < row.length) {
     const LightRamp part{ramp.light + ramp.rate * done, ramp.rate};
@@ -67,7 +67,7 @@ void CircuitArray::finish(const Row& row, std::uint32_t column, std::size_t at, 
     const bool quiet = lowest + std::min(leaked0, leaked1) - kGuard > low_[i] &&
                        highest + std::max(leaked0, leaked1) + kGuard < high_[i] && row.start + done + h < until_[i] &&
                        std::abs(change) < kLightReach;
-    if (!quiet) run(next, done, 0);
+    if (!quiet) run(next, done, 0, {});
     done = h < row.length - done ? done + h : row.length;
   }
 }
@@ -85,10 +85,10 @@ CircuitLanes::Lanes CircuitArray::wake(CircuitLanes& lanes, const std::array<std
       set_bounds(i, lanes.resting_bounds(lane, parameters_[i], states_[i]));
       continue;
     }
-    CircuitPixel pixel = this->pixel(i);
+    CircuitPixel pixel = this->pixel(i, lanes.known(lane));
     pixel.set(lanes.piece(circuit_, lane), {lanes.light[lane], lanes.light_rate[lane]},
               {lanes.leaked[lane], lanes.leak_rate[lane]}, lanes.start[lane]);
-    if (const auto near = pixel.wake(0)) {
+    if (const auto near = pixel.wake(pixel.at(0))) {
       lanes.enter(lane, circuit_, static_cast<std::uint32_t>(i), parameters_[i], states_[i]);
       lanes.s[lane] = *near;
       active |= 1U << lane;
@@ -106,8 +106,8 @@ void CircuitArray::advance_in_one(const Row& row, std::span<const std::uint32_t>
   CircuitLanes& lanes = buffer.lanes;
   std::array<std::size_t, CircuitLanes::kLanes> pixels{};
   CircuitLanes::Lanes active = 0, inactive = 0, rests = 0;
-  for (std::size_t lane = 0; lane < CircuitLanes::count(); ++lane) {
-    const std::uint32_t column = columns[std::min(lane, columns.size() - 1)];  // the last pixel fills all other lanes
+  for (std::size_t lane = 0; lane < columns.size(); ++lane) {
+    const std::uint32_t column = columns[lane];
     const std::size_t i = row.first + column, at = column - begin;
     pixels[lane] = i;
     if (circuit_.noise) lanes.enter(lane, circuit_, static_cast<std::uint32_t>(i), parameters_[i], states_[i]);
@@ -119,8 +119,7 @@ void CircuitArray::advance_in_one(const Row& row, std::span<const std::uint32_t>
     const LeakRamp leak = leak_in(row, column, at, buffer);
     lanes.leaked[lane] = leak.leaked, lanes.leak_rate[lane] = leak.rate;
     lanes.s[lane] = 0;
-    if (lane < columns.size() && circuit_.noise && states_[i].held_until <= row.start)
-      (states_[i].active ? active : inactive) |= 1U << lane;
+    if (circuit_.noise && states_[i].held_until <= row.start) (states_[i].active ? active : inactive) |= 1U << lane;
   }
   active |= wake(lanes, pixels, inactive, rests);
   const CircuitLanes::Lanes arrived = active != 0 ? lanes.take_quiet_steps(circuit_, active) : 0;
@@ -128,10 +127,10 @@ void CircuitArray::advance_in_one(const Row& row, std::span<const std::uint32_t>
     const std::size_t i = pixels[lane], at = columns[lane] - begin;
     if ((active >> lane & 1U) != 0) lanes.leave(lane, states_[i]);
     if ((arrived >> lane & 1U) != 0) {
-      set_bounds(i, lanes.bounds(lane, parameters_[i]));
+      set_bounds(i, lanes.bounds(lane));
     } else if ((rests >> lane & 1U) == 0) {
       CircuitState unused;
-      finish(row, columns[lane], at, lanes.piece(circuit_, lane), 0, lanes.s[lane], unused, buffer);
+      finish(row, columns[lane], at, lanes.piece(circuit_, lane), 0, lane, unused, buffer);
     }
     keep(i, at, buffer);
   }
@@ -146,8 +145,8 @@ void CircuitArray::advance_in_several(const Row& row, std::span<const std::uint3
   CircuitLanes& lanes = buffer.lanes;
   alignas(64) CircuitLanes::Values light{}, rate{}, lag{}, y{}, v{}, w{}, done{}, leaked{}, next_done{};
   std::array<std::size_t, CircuitLanes::kLanes> pixels{};
-  for (std::size_t lane = 0; lane < CircuitLanes::count(); ++lane) {
-    const std::uint32_t column = columns[std::min(lane, columns.size() - 1)];
+  for (std::size_t lane = 0; lane < columns.size(); ++lane) {
+    const std::uint32_t column = columns[lane];
     const std::size_t i = row.first + column, at = column - begin;
     pixels[lane] = i;
     if (circuit_.noise) lanes.enter(lane, circuit_, static_cast<std::uint32_t>(i), parameters_[i], states_[i]);
@@ -159,34 +158,23 @@ void CircuitArray::advance_in_several(const Row& row, std::span<const std::uint3
   const auto all = static_cast<CircuitLanes::Lanes>((1U << columns.size()) - 1);
   for (CircuitLanes::Lanes left = all; left != 0;) {
     // The next piece of each pixel, as step_length() and esim::advance() make it
-    const V v_done = hn::Load(d, done.data()), v_rate = hn::Load(d, rate.data()), one = hn::Set(d, 1.0);
-    const V remaining = hn::Sub(hn::Set(d, row.length), v_done);
-    CircuitStates<D> state{hn::MulAdd(v_rate, v_done, hn::Load(d, light.data())), hn::Load(d, lag.data()),
-                           hn::Load(d, y.data()), hn::Load(d, v.data()), hn::Load(d, w.data())};
-    const V changes = hn::Mul(hn::Abs(hn::Mul(v_rate, remaining)), hn::Set(d, 1 / kMaxLightStep));
-    CircuitRamps<D> ramp;
-    ramp.rate0 = hn::Mul(hn::Exp(d, state.light), hn::Set(d, 1 / circuit_.poles.t1_unit_ns));
-    ramp.length = hn::Div(remaining, hn::Max(one, hn::Ceil(hn::Sub(changes, hn::Set(d, 1e-9)))));
-    ramp.growth = hn::Mul(v_rate, ramp.length);
-    const V brightest = hn::Exp(d, hn::Max(hn::Zero(d), ramp.growth));
-    const V shorter = hn::Div(hn::Set(d, kMaxDecay), hn::Mul(ramp.rate0, brightest));
-    ramp.length = hn::IfThenElse(is_transient(d, ramp, state.lag), hn::Min(ramp.length, shorter), ramp.length);
-    const auto ends = hn::Ge(ramp.length, remaining);
-    ramp.growth = hn::Mul(v_rate, ramp.length);
-    ramp.light1 = hn::Add(state.light, ramp.growth);
-    ramp.rho = hn::Expm1(d, ramp.growth);
-    ramp.decay2 = hn::Exp(d, hn::Mul(ramp.length, hn::Set(d, -1 / circuit_.poles.t2_ns)));
-    ramp.decay3 = hn::Exp(d, hn::Mul(ramp.length, hn::Set(d, -circuit_.poles.high_pass_per_ns)));
-    const V light0 = state.light;
-    const CircuitPieces<D> piece = esim::advance(d, circuit_.poles, ramp, area_of(d, ramp), state);
-    const auto store = [d](V values, CircuitLanes::Values& to) { hn::Store(values, d, to.data()); };
-    store(piece.level, lanes.level), store(piece.rate, lanes.rate), store(piece.fast, lanes.fast);
-    store(piece.slow, lanes.slow), store(piece.k1, lanes.k1), store(piece.passed, lanes.passed);
-    store(ramp.length, lanes.length), store(light0, lanes.light);
-    store(hn::Add(hn::Set(d, row.start), v_done), lanes.start), store(hn::Zero(d), lanes.s);
-    store(hn::MulAdd(hn::Load(d, lanes.leak_rate.data()), v_done, hn::Load(d, leaked.data())), lanes.leaked);
-    store(state.lag, lag), store(state.y, y), store(state.v, v), store(state.w, w);
-    store(hn::IfThenElse(ends, hn::Set(d, row.length), hn::Add(v_done, ramp.length)), next_done);
+    for (std::size_t i = 0; i < columns.size(); i += hn::Lanes(d)) {
+      const V v_done = hn::Load(d, &done[i]), v_rate = hn::Load(d, &rate[i]);
+      const V remaining = hn::Sub(hn::Set(d, row.length), v_done);
+      const V light0 = hn::MulAdd(v_rate, v_done, hn::Load(d, &light[i]));
+      CircuitStates<D> state{light0, hn::Load(d, &lag[i]), hn::Load(d, &y[i]), hn::Load(d, &v[i]), hn::Load(d, &w[i])};
+      const CircuitRamps<D> ramp = ramp_of_step(d, circuit_.poles, light0, state.lag, v_rate, remaining);
+      const auto ends = hn::Ge(ramp.length, remaining);
+      const CircuitPieces<D> piece = esim::advance(d, circuit_.poles, ramp, area_of(d, ramp), state);
+      const auto store = [d, i](V values, CircuitLanes::Values& to) { hn::Store(values, d, &to[i]); };
+      store(piece.level, lanes.level), store(piece.rate, lanes.rate), store(piece.fast, lanes.fast);
+      store(piece.slow, lanes.slow), store(piece.k1, lanes.k1), store(piece.passed, lanes.passed);
+      store(ramp.length, lanes.length), store(light0, lanes.light);
+      store(hn::Add(hn::Set(d, row.start), v_done), lanes.start), store(hn::Zero(d), lanes.s);
+      store(hn::MulAdd(hn::Load(d, &lanes.leak_rate[i]), v_done, hn::Load(d, &leaked[i])), lanes.leaked);
+      store(state.lag, lag), store(state.y, y), store(state.v, v), store(state.w, w);
+      store(hn::IfThenElse(ends, hn::Set(d, row.length), hn::Add(v_done, ramp.length)), next_done);
+    }
 
     CircuitLanes::Lanes active = 0, inactive = 0, arrived = 0, rests = 0;
     for (std::size_t lane = 0; lane < columns.size(); ++lane) {
@@ -212,12 +200,12 @@ void CircuitArray::advance_in_several(const Row& row, std::span<const std::uint3
       CircuitState front{lag[lane], v[lane], w[lane]};
       if (was_active) lanes.leave(lane, states_[i]);
       if (!has_arrived) {
-        finish(row, columns[lane], at, lanes.piece(circuit_, lane), done[lane], lanes.s[lane], front, buffer);
+        finish(row, columns[lane], at, lanes.piece(circuit_, lane), done[lane], lane, front, buffer);
       } else if (!at_end) {
         done[lane] = next_done[lane];
         continue;
       } else if (was_active) {
-        set_bounds(i, lanes.bounds(lane, parameters_[i]));
+        set_bounds(i, lanes.bounds(lane));
       }
       left &= ~(1U << lane);
       const double last = std::abs(front.lag) < kSettled ? 0.0 : front.lag,
@@ -233,14 +221,15 @@ void CircuitArray::advance_in_several(const Row& row, std::span<const std::uint3
 
 /// Takes all pixels of buffer.uncertain to the segment's end; the columns of the buffer begin at `begin`.
 void CircuitArray::advance_uncertain(const Row& row, std::size_t begin, CircuitBuffer& buffer) {
-  const auto several = std::stable_partition(buffer.uncertain.begin(), buffer.uncertain.end(),
-                                             [&](std::uint32_t column) { return buffer.several[column - begin] == 0; });
-  const auto in_one = static_cast<std::size_t>(several - buffer.uncertain.begin());
-  const std::span<const std::uint32_t> columns(buffer.uncertain);
-  for (std::size_t k = 0; k < in_one; k += CircuitLanes::count())
-    advance_in_one(row, columns.subspan(k, std::min(CircuitLanes::count(), in_one - k)), begin, buffer);
-  for (std::size_t k = in_one; k < columns.size(); k += CircuitLanes::count())
-    advance_in_several(row, columns.subspan(k, std::min(CircuitLanes::count(), columns.size() - k)), begin, buffer);
+  const auto in_groups = [](std::span<const std::uint32_t> columns, const auto& advance_group) {
+    for (std::size_t k = 0; k < columns.size(); k += CircuitLanes::count())
+      advance_group(columns.subspan(k, std::min(CircuitLanes::count(), columns.size() - k)));
+  };
+  const auto in_one = [&](std::span<const std::uint32_t> columns) { advance_in_one(row, columns, begin, buffer); };
+  in_groups(buffer.uncertain.inactive, in_one);
+  in_groups(buffer.uncertain.active, in_one);
+  in_groups(buffer.uncertain.several,
+            [&](std::span<const std::uint32_t> columns) { advance_in_several(row, columns, begin, buffer); });
 }
 
 /// Whether an inactive pixel stays within its bounds during the piece in a lane.

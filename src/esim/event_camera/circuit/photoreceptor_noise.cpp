@@ -6,6 +6,7 @@
 
 #include "esim/core/error.h"
 #include "esim/core/vector_math.h"
+#include "esim/event_camera/circuit/photoreceptor_vectors.h"
 
 namespace esim::inline event_camera {
 namespace {
@@ -13,15 +14,20 @@ namespace {
 constexpr double kPoleStep = 1.01;  // ratio of successive time constants t1
 // Standard deviation of x in the middle of an interval with known ends, in deviations of x: of steps, and where x is
 // taken for a cubic.
-constexpr double kUnknown = 0.12, kNeglected = 0.015;
-// Addresses of draws: those of steps, 8 i + j with j = 1 to 7 within steps, 0 of the first state, others above 32 bits.
-constexpr std::uint32_t kStepAddresses = 0x80000000;
+constexpr double kUnknown = 0.24, kNeglected = 0.015;
+// A root is found when a step of Newton's method is shorter than this, relative to the interval.
+constexpr double kRootStep = 1e-6;
+// Addresses of draws: those of steps, 8 i + j with j = 1 to 7 within step i, 0 of the first state, others above 32
+// bits.
+constexpr std::uint32_t kNodeAddresses = 0x80000000;
 
 /// A 2 x 2 matrix that acts on (y, x).
 struct NoiseMatrix {
   double yy = 0, yx = 0, xy = 0, xx = 0;
 
-  NoiseState operator*(const NoiseState& s) const { return {yy * s.y + yx * s.x, xy * s.y + xx * s.x}; }
+  NoiseState apply(double y, double x) const {
+    return {static_cast<float>(yy * y + yx * x), static_cast<float>(xy * y + xx * x)};
+  }
 };
 
 /// A symmetric 2 x 2 matrix.
@@ -86,9 +92,9 @@ Covariance added(double variance, double t1, double t2, double h) {
 }
 
 /// Pairs of standard normal deviates from two words each, by the Box-Muller method in single precision: the radius from
-/// 31 random bits, at most 6.7. All arrays have 16 elements.
+/// 31 random bits, at most 6.7. All arrays are read and written up to `count` rounded up to a multiple of 8.
 void normals(std::size_t count, const std::uint32_t* first, const std::uint32_t* second, float* n1, float* n2) {
-  const hn::CappedTag<float, 16> d;
+  const NoiseLanes d;
   const hn::RebindToSigned<decltype(d)> di;
   const hn::RebindToUnsigned<decltype(d)> du;
   const auto unit = [&](const std::uint32_t* from) {  // in (0, 1): the upper 31 bits and a half
@@ -126,25 +132,44 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
   for (std::size_t i = 0; i < count; ++i) {
     Pole pole;
     pole.t1 = apart(std::exp(log_first_ + static_cast<double>(i) / per_log_step_), t2_);
-    pole.deviation = deviation_at(pole.t1);
+    pole.deviation = std::sqrt(variance_ * pole.t1 / (pole.t1 + t2_));
+    deviations_.push_back(pole.deviation);
     double shortest = 0.1 * std::min(pole.t1, t2_), longest = 4 * std::max(pole.t1, t2_);
+    const auto deviation_within = [&](double h) { return static_cast<double>(make_bridge(pole.t1, h).deviation); };
     for (int k = 0; k < 30; ++k) {
       const double h = std::sqrt(shortest * longest);
-      (make_bridge(pole.t1, h).deviation <= kUnknown * pole.deviation ? shortest : longest) = h;
+      (deviation_within(h) <= kUnknown * pole.deviation ? shortest : longest) = h;
     }
-    pole.first_bridge = bridges_.size();
-    const auto is_cubic = [&](double h) { return make_bridge(pole.t1, h).deviation <= kNeglected * pole.deviation; };
-    while (!is_cubic(std::ldexp(shortest, -static_cast<int>(kMaxDepth)))) shortest *= 0.9;
+    while (deviation_within(shortest / kParts) > kNeglected * pole.deviation) shortest *= 0.9;
     pole.step = shortest;
-    for (double h = pole.step; !is_cubic(h); h *= 0.5, ++pole.bridges) bridges_.push_back(make_bridge(pole.t1, h));
-    pole.decay = std::exp(-pole.step / t2_);
+    double length = pole.step;
+    for (Bridge& bridge : bridges_.emplace_back()) bridge = make_bridge(pole.t1, length), length *= 0.5;
+    pole.along = static_cast<float>(std::min(pole.step / 3, t2_) / t2_);
+    pole.margin = kBoundDeviations * bridges_.back()[0].deviation;
     poles_.push_back(pole);
-    for (int k = -kDrifts; k <= kDrifts; ++k) {
-      const double t1 = apart(pole.t1 * std::exp(kDriftStep * k), t2_);
-      const NoiseMatrix moved = drift(t1, t2_, pole.step), drawn = root(added(variance_, t1, t2_, pole.step));
-      steps_.push_back({moved.yy, moved.xy, drawn.yy, drawn.xy, drawn.xx});
-    }
+    steps_.push_back(make_step(pole));
   }
+  deviations_.push_back(deviations_.back());
+  last_place_ = static_cast<double>(count - 1);
+}
+
+PhotoreceptorNoise::Step PhotoreceptorNoise::make_step(const Pole& pole) const {
+  // Parabolas through the factors at three drifts.
+  const double apart_by = kMaxDrift * std::sqrt(0.75);
+  std::array<std::array<double, Step::kFactors>, 3> factors{};
+  for (const int k : {-1, 0, 1}) {
+    const double t1 = apart(pole.t1 * std::exp(k * apart_by), t2_);
+    const NoiseMatrix moved = drift(t1, t2_, pole.step), drawn = root(added(variance_, t1, t2_, pole.step));
+    factors[static_cast<std::size_t>(k + 1)] = {moved.yy, moved.xy, drawn.yy, drawn.xy, drawn.xx};
+  }
+  Step step;
+  for (std::size_t i = 0; i < Step::kFactors; ++i) {
+    const double low = factors[0][i], middle = factors[1][i], high = factors[2][i];
+    step.parabolas[i] = {static_cast<float>(middle), static_cast<float>((high - low) / (2 * apart_by)),
+                         static_cast<float>((high + low - 2 * middle) / (2 * apart_by * apart_by))};
+  }
+  step.xx = static_cast<float>(std::exp(-pole.step / t2_));
+  return step;
 }
 
 PhotoreceptorNoise::Bridge PhotoreceptorNoise::make_bridge(double t1, double h) const {
@@ -155,138 +180,136 @@ PhotoreceptorNoise::Bridge PhotoreceptorNoise::make_bridge(double t1, double h) 
   const NoiseMatrix covariance = difference(c, product(product(k, a), c));
   const NoiseMatrix from = difference(a, product(k, product(a, a)));
   const NoiseMatrix spread = root({covariance.yy, 0.5 * (covariance.xy + covariance.yx), covariance.xx});
-  return {{from.yy, from.yx, k.yy, k.yx, spread.yy, 0.0},
-          {from.xy, from.xx, k.xy, k.xx, spread.xy, spread.xx},
-          std::sqrt(std::max(covariance.xx, 0.0))};
-}
-
-void PhotoreceptorNoise::draw(Middles& middles) const {
-  alignas(64) std::array<std::uint32_t, 16> items, addresses;
-  items.fill(middles.pixel);
-  for (std::uint32_t i = 0; i < 16; ++i) addresses[i] = (8 * middles.node + i) & ~kStepAddresses;
-  alignas(64) std::array<std::array<std::uint32_t, 16>, 4> words;
-  random_.bits(8, items.data(), addresses.data(), {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
-  normals(8, words[0].data(), words[1].data(), middles.n1.data(), middles.n2.data());
-  middles.drawn = true;
-}
-
-std::pair<PhotoreceptorNoise::Part, PhotoreceptorNoise::Part> PhotoreceptorNoise::halves(std::int32_t pole,
-                                                                                         const Part& part,
-                                                                                         Middles& middles) const {
-  if (!middles.drawn) draw(middles);
-  const Bridge& bridge = bridges_[poles_[static_cast<std::size_t>(pole)].first_bridge + part.depth];
-  const auto n1 = static_cast<double>(middles.n1[part.index]), n2 = static_cast<double>(middles.n2[part.index]);
-  const auto sum = [&](const std::array<double, 6>& row) {
-    return row[0] * part.from.y + row[1] * part.from.x + row[2] * part.to.y + row[3] * part.to.x + row[4] * n1 +
-           row[5] * n2;
+  const auto row = [](const std::array<double, 6>& values) {
+    std::array<float, 6> floats{};
+    std::transform(values.begin(), values.end(), floats.begin(), [](double v) { return static_cast<float>(v); });
+    return floats;
   };
-  const NoiseState middle{sum(bridge.y), sum(bridge.x)};
-  return {{part.from, middle, part.start, 2 * part.index, part.depth + 1},
-          {middle, part.to, part.start + 0.5 * length(pole, part), 2 * part.index + 1, part.depth + 1}};
+  return {row({from.yy, from.yx, k.yy, k.yx, spread.yy, 0.0}),
+          row({from.xy, from.xx, k.xy, k.xx, spread.xy, spread.xx}),
+          static_cast<float>(std::sqrt(std::max(covariance.xx, 0.0)))};
 }
 
-double PhotoreceptorNoise::at(std::int32_t pole, Part part, double tau, Middles& middles) const {
-  while (!is_cubic(pole, part)) {
-    const auto [first, second] = halves(pole, part, middles);
-    part = tau < second.start ? first : second;
+PhotoreceptorNoise::Path PhotoreceptorNoise::path(const NoiseState& from, const NoiseState& to, std::uint32_t pixel,
+                                                  std::uint32_t node, std::int32_t pole) const {
+  alignas(64) std::array<std::uint32_t, 16> items, addresses;
+  items.fill(pixel);
+  for (std::uint32_t i = 0; i < 16; ++i) addresses[i] = (kParts * node + i) & ~kNodeAddresses;
+  alignas(64) std::array<std::array<std::uint32_t, 16>, 4> words;
+  random_.bits(kParts, items.data(), addresses.data(),
+               {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
+  alignas(64) std::array<float, 16> n1, n2;
+  normals(kParts, words[0].data(), words[1].data(), n1.data(), n2.data());
+  Path path;
+  path.y[0] = from.y, path.x[0] = from.x;
+  path.y[kParts] = to.y, path.x[kParts] = to.x;
+  std::size_t draw = 1;
+  std::size_t length = kParts;
+  for (const Bridge& bridge : bridges_[static_cast<std::size_t>(pole)]) {
+    for (std::size_t i = 0; i < kParts; i += length, ++draw) {
+      const auto sum = [&](const std::array<float, 6>& row) {
+        return (row[0] * path.y[i] + row[1] * path.x[i]) + (row[2] * path.y[i + length] + row[3] * path.x[i + length]) +
+               (row[4] * n1[draw] + row[5] * n2[draw]);
+      };
+      path.y[i + length / 2] = sum(bridge.y), path.x[i + length / 2] = sum(bridge.x);
+    }
+    length /= 2;
   }
-  return cubic(pole, part).value(tau - part.start);
+  return path;
 }
 
 NoiseState PhotoreceptorNoise::first(std::uint32_t pixel, std::int32_t pole) const {
   // Stationary: Var y = v, Var x = Cov xy = v t1 / (t1 + t2). Draw 0 belongs to this state alone.
   const double t1 = poles_[static_cast<std::size_t>(pole)].t1, common = variance_ * t1 / (t1 + t2_);
   const auto n = random_.normals(pixel, 0);
-  return root({variance_, common, common}) * NoiseState{n[0], n[1]};
+  return root({variance_, common, common}).apply(n[0], n[1]);
 }
 
 NoiseState PhotoreceptorNoise::after_step(const NoiseState& from, const std::array<float, 2>& n, std::int32_t pole,
-                                          double drift) const {
-  const double place = drift + kDrifts, below = std::clamp(std::floor(place), 0.0, 2.0 * kDrifts - 1);
-  const Step* const step = steps(pole) + static_cast<std::size_t>(below);
-  const auto at = [&](double Step::*value) {
-    return step[0].*value + (place - below) * (step[1].*value - step[0].*value);
-  };
-  const auto n1 = static_cast<double>(n[0]), n2 = static_cast<double>(n[1]);
-  return {at(&Step::yy) * from.y + at(&Step::n_yy) * n1,
-          at(&Step::xy) * from.y + decay(pole) * from.x + at(&Step::n_xy) * n1 + at(&Step::n_xx) * n2};
+                                          float drift) const {
+  const NoiseLanes d;
+  const Step& step = this->step(pole);
+  const auto parabola = [&](std::size_t factor, std::size_t i) { return hn::Set(d, step.parabolas[factor][i]); };
+  auto y = hn::Set(d, from.y), x = hn::Set(d, from.x);
+  noise_step(d, parabola, hn::Set(d, step.xx), hn::Set(d, drift), hn::Set(d, n[0]), hn::Set(d, n[1]), y, x);
+  return {hn::GetLane(y), hn::GetLane(x)};
 }
 
 void PhotoreceptorNoise::draw(std::size_t count, const std::uint32_t* pixels, const std::uint32_t* first,
                               Draws& n) const {
-  // Four words serve two nodes. Words of the nodes first and first + 1 of all pixels come before those of the next two.
-  constexpr std::size_t kWords = 2 * kDrawn;
-  alignas(64) std::array<std::uint32_t, kWords> items{}, addresses{};
-  for (std::size_t i = 0; i < count; ++i) {
-    items[i] = items[count + i] = pixels[i];
-    addresses[i] = kStepAddresses | (first[i] >> 1);
-    addresses[count + i] = addresses[i] + 1;
-  }
-  alignas(64) std::array<std::array<std::uint32_t, kWords>, 4> words;
-  random_.bits(2 * count, items.data(), addresses.data(),
+  // Four words serve two nodes.
+  alignas(64) std::array<std::uint32_t, 16> items{}, addresses{};
+  for (std::size_t i = 0; i < count; ++i) items[i] = pixels[i], addresses[i] = kNodeAddresses | (first[i] >> 1);
+  alignas(64) std::array<std::array<std::uint32_t, 16>, 4> words;
+  random_.bits(count, items.data(), addresses.data(),
                {words[0].data(), words[1].data(), words[2].data(), words[3].data()});
-  alignas(64) std::array<float, kWords> cosines, sines;
-  for (std::size_t parity = 0; parity < 2; ++parity) {
-    normals(2 * count, words[2 * parity].data(), words[2 * parity + 1].data(), cosines.data(), sines.data());
-    for (std::size_t half = 0; half < 2; ++half) {
-      std::copy_n(&cosines[half * count], count, n[2 * half + parity][0].begin());
-      std::copy_n(&sines[half * count], count, n[2 * half + parity][1].begin());
+  if (2 * count <= kDrawn) {  // both nodes at once
+    std::copy_n(words[2].data(), count, words[0].data() + count);
+    std::copy_n(words[3].data(), count, words[1].data() + count);
+    alignas(64) std::array<float, 16> n1, n2;
+    normals(2 * count, words[0].data(), words[1].data(), n1.data(), n2.data());
+    for (std::size_t k = 0; k < kNodesDrawn; ++k) {
+      std::copy_n(&n1[k * count], count, n[k][0].data());
+      std::copy_n(&n2[k * count], count, n[k][1].data());
     }
+    return;
   }
+  for (std::size_t k = 0; k < kNodesDrawn; ++k)
+    normals(count, words[2 * k].data(), words[2 * k + 1].data(), n[k][0].data(), n[k][1].data());
 }
 
-NoiseState PhotoreceptorNoise::after_gap(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
+NoiseState PhotoreceptorNoise::after_gap(const NoiseState& from, const std::array<float, 2>& n, double gap,
                                          std::int32_t pole) const {
   // The closed form of added(), which is exact enough except for gaps far below the time constants.
   const double t1 = poles_[static_cast<std::size_t>(pole)].t1, h = std::max(gap, 1e-3 * std::min(t1, t2_));
   const double e1 = std::exp(-h / t1), e2 = std::exp(-h / t2_), gain = t1 / (t1 - t2_), power = 2 * variance_ / t1;
   const double yy = variance_ * (1 - e1 * e1), uu = gain * gain * power * t2_ / 2 * (1 - e2 * e2);
   const double cross = -gain * power * t1 * t2_ / (t1 + t2_) * (1 - e1 * e2);
-  const auto n = random_.normals(pixel, (std::uint64_t{node} << 32) | 1);
-  const NoiseState drawn =
-      root({yy, cross + gain * yy, uu + 2 * gain * cross + gain * gain * yy}) * NoiseState{n[0], n[1]};
-  const NoiseState drifted = drift(t1, t2_, gap) * from;
   const double part = gap < h ? std::sqrt(gap / h) : 1.0;
-  return {drifted.y + part * drawn.y, drifted.x + part * drawn.x};
+  const NoiseState drawn = root({yy, cross + gain * yy, uu + 2 * gain * cross + gain * gain * yy})
+                               .apply(part * static_cast<double>(n[0]), part * static_cast<double>(n[1]));
+  const NoiseState drifted = drift(t1, t2_, gap).apply(static_cast<double>(from.y), static_cast<double>(from.x));
+  return {drifted.y + drawn.y, drifted.x + drawn.x};
 }
 
 std::optional<std::pair<double, int>> NoiseCubic::first_exit(double lower, double upper) const {
   if (v0 >= upper) return std::pair{0.0, 1};
   if (v0 <= lower) return std::pair{0.0, -1};
-  // The extrema lie at the roots of the slope, a parabola a u^2 + b u + c in u = t / h.
-  const double a = 6 * (v0 - v1) + 3 * h * (s0 + s1), b = 6 * (v1 - v0) - 2 * h * (2 * s0 + s1), c = h * s0;
-  std::array<double, 4> ends{0.0, h, h, h};
-  std::size_t count = 1;
-  const double discriminant = b * b - 4 * a * c;
-  if (discriminant > 0) {
-    const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
-    std::array<double, 2> roots{a != 0 ? q / a : -1.0, q != 0 ? c / q : -1.0};
-    std::sort(roots.begin(), roots.end());
-    for (const double root : roots) {
-      if (root > 0 && root < 1) ends[count++] = root * h;
+  // v0 + c1 u + c2 u^2 + c3 u^3 in u = t / h
+  const double c1 = h * s0, rise = v1 - v0;
+  const double c2 = 3 * rise - h * (2 * s0 + s1), c3 = h * (s0 + s1) - 2 * rise;
+  std::array<double, 3> ends{1.0, 1.0, 1.0};  // of monotone parts
+  std::size_t count = 0;
+  if (!(s0 * rise > 0 && s1 * rise > 0 && std::abs(s0 + s1) * h < 3 * std::abs(rise))) {
+    // The extrema lie at the roots of the slope.
+    const double discriminant = c2 * c2 - 3 * c1 * c3;
+    if (discriminant > 0) {
+      const double q = -(c2 + std::copysign(std::sqrt(discriminant), c2));
+      const double r1 = c3 != 0 ? q / (3 * c3) : -1.0, r2 = q != 0 ? c1 / q : -1.0;
+      for (const double root : {std::min(r1, r2), std::max(r1, r2)}) {
+        if (root > 0 && root < 1) ends[count++] = root;
+      }
     }
   }
-  ends[count] = h;
-  // Monotone between successive ends: bisection cannot miss a crossing.
-  for (std::size_t i = 1; i <= count; ++i) {
-    const double v = i == count ? v1 : value(ends[i]);
-    const int polarity = v >= upper ? 1 : v <= lower ? -1 : 0;
-    if (polarity == 0) continue;
-    double before = ends[i - 1], after = ends[i];
+  double begin = 0, at_begin = v0;
+  for (std::size_t i = 0; i <= count; ++i) {
+    const double end = ends[i], at_end = i == count ? v1 : v0 + end * (c1 + end * (c2 + end * c3));
+    const int polarity = at_end >= upper ? 1 : at_end <= lower ? -1 : 0;
+    if (polarity == 0) {
+      begin = end, at_begin = at_end;
+      continue;
+    }
+    // Newton's method, with bisection where it would leave the part that contains the root.
     const double level = polarity > 0 ? upper : lower;
-    for (int k = 0; k < 6; ++k) {
-      const double centre = 0.5 * (before + after), here = value(centre);
-      (polarity > 0 ? here >= upper : here <= lower) ? after = centre : before = centre;
+    double before = begin, after = end, u = begin + (end - begin) * (level - at_begin) / (at_end - at_begin);
+    for (int k = 0; k < 60; ++k) {
+      const double beyond = v0 + u * (c1 + u * (c2 + u * c3)) - level, rate = c1 + u * (2 * c2 + 3 * u * c3);
+      (beyond * polarity >= 0 ? after : before) = u;
+      const double next = u - beyond / rate, last = u;
+      u = next >= before && next <= after ? next : 0.5 * (before + after);
+      if (std::abs(u - last) < kRootStep) break;
     }
-    // Newton's method, so that the time hardly depends on where the search began.
-    double t = 0.5 * (before + after);
-    for (int k = 0; k < 8; ++k) {
-      const double rate = slope(t);
-      if (rate * polarity <= 0) return std::pair{after, polarity};
-      const double last = std::exchange(t, std::clamp(t - (value(t) - level) / rate, before, after));
-      if (std::abs(t - last) < 1e-9 * h) break;
-    }
-    return std::pair{t, polarity};
+    return std::pair{u * h, polarity};
   }
   return std::nullopt;
 }

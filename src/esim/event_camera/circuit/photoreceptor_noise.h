@@ -15,8 +15,8 @@ namespace esim::inline event_camera {
 
 /// The noise of a photoreceptor, as brightness (natural logarithm of the photocurrent).
 struct NoiseState {
-  double y = 0;  ///< at the photodiode, whose pole has the time constant t1 = Q / I
-  double x = 0;  ///< after the source follower, whose pole has the time constant t2: what the comparators see
+  float y = 0;  ///< at the photodiode, whose pole has the time constant t1 = Q / I
+  float x = 0;  ///< after the source follower, whose pole has the time constant t2: what the comparators see
 };
 
 /// A cubic on [0, h] with these values and slopes at its ends.
@@ -31,8 +31,6 @@ struct NoiseCubic {
     const double u = t / h;
     return 6 * u * (1 - u) * (v1 - v0) / h + (1 - u) * (1 - 3 * u) * s0 + u * (3 * u - 2) * s1;
   }
-  /// A cubic lies between the control points of its Bezier curve.
-  std::pair<double, double> bounds() const { return std::minmax({v0, v1, v0 + s0 * h / 3, v1 - s1 * h / 3}); }
 
   /// The first t in [0, h] at which it reaches `upper` (1) or `lower` (-1).
   std::optional<std::pair<double, int>> first_exit(double lower, double upper) const;
@@ -59,11 +57,6 @@ class PhotoreceptorNoise {
     const double place = (log_t1_ns - log_first_) * per_log_step_ + 0.5;
     return static_cast<std::int32_t>(std::clamp(place, 0.0, static_cast<double>(poles_.size()) - 0.5));
   }
-  /// Steps keep the length of their pole in other light, where ln(t1) is larger by `drift` times kDriftStep. What they
-  /// do is interpolated for |drift| up to kDrifts, so that rounding errors of the light have no large consequences.
-  static constexpr int kDrifts = 4;
-  static constexpr double kDriftStep = 0.05;
-
   double t1_ns(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].t1; }
   double t2_ns() const { return t2_; }
   double step_ns(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].step; }
@@ -71,20 +64,32 @@ class PhotoreceptorNoise {
   double variance() const { return variance_; }  ///< of y
   /// Standard deviation of x in steady light.
   double deviation(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].deviation; }
-  double deviation_at(double t1_ns) const { return std::sqrt(variance_ * t1_ns / (t1_ns + t2_)); }
+  /// The same for any t1: linear in ln(t1) between the poles; and its slope.
+  struct Deviation {
+    double value = 0, slope = 0;
+  };
+  Deviation deviation_at(double log_t1_ns) const {
+    const double place = std::clamp((log_t1_ns - log_first_) * per_log_step_, 0.0, last_place_);
+    const auto below = static_cast<std::size_t>(place);
+    const double value = deviations_[below], step = deviations_[below + 1] - value;
+    return {value + (place - static_cast<double>(below)) * step, step * per_log_step_};
+  }
 
   /// A step: y1 = yy y0 + n_yy n1, x1 = xy y0 + xx x0 + n_xy n1 + n_xx n2, with the standard normal deviates n1 and n2
-  /// of its end. xx = exp(-step / t2).
+  /// of its end. xx = exp(-step / t2). Steps keep the length of their pole in other light, where ln(t1) is larger by
+  /// `drift`, up to kMaxDrift either way: the other factors are parabolas c0 + c1 drift + c2 drift^2.
   struct Step {
-    double yy = 0, xy = 0, n_yy = 0, n_xy = 0, n_xx = 0;
+    enum Factor : std::uint8_t { yy, xy, n_yy, n_xy, n_xx };
+    static constexpr std::size_t kFactors = 5;
+    std::array<std::array<float, 3>, kFactors> parabolas{};
+    float xx = 0;
   };
-  /// Those of a pole for drifts of -kDrifts to kDrifts, and xx.
-  const Step* steps(std::int32_t pole) const { return &steps_[(2 * kDrifts + 1) * static_cast<std::size_t>(pole)]; }
-  double decay(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].decay; }
+  static constexpr double kMaxDrift = 0.2;
+  const Step& step(std::int32_t pole) const { return steps_[static_cast<std::size_t>(pole)]; }
 
-  /// The draws of the nodes first to first + 3 of `count` pixels, a power of two up to kDrawn; `first` is even.
+  /// The draws of the nodes first and first + 1 of `count` pixels, up to kDrawn; `first` is even.
   /// n[k][j][i] is n_(j+1) of node first[i] + k of pixel pixels[i].
-  static constexpr std::size_t kDrawn = 8, kNodesDrawn = 4;
+  static constexpr std::size_t kDrawn = 8, kNodesDrawn = 2;
   using Draws = std::array<std::array<std::array<float, kDrawn>, 2>, kNodesDrawn>;
   void draw(std::size_t count, const std::uint32_t* pixels, const std::uint32_t* first, Draws& n) const;
 
@@ -92,82 +97,67 @@ class PhotoreceptorNoise {
   NoiseState first(std::uint32_t pixel, std::int32_t pole) const;
 
   /// The state a step after the state `from`, with the draws of its node.
-  NoiseState after_step(const NoiseState& from, const std::array<float, 2>& n, std::int32_t pole, double drift) const;
+  NoiseState after_step(const NoiseState& from, const std::array<float, 2>& n, std::int32_t pole, float drift) const;
 
-  /// The state `gap` ns after the state `from`, at node `node`: for times without steps.
-  NoiseState after_gap(const NoiseState& from, double gap, std::uint32_t pixel, std::uint32_t node,
-                       std::int32_t pole) const;
+  /// The state at a node `gap` ns after the state `from`, with the draws of the node: for times without steps.
+  NoiseState after_gap(const NoiseState& from, const std::array<float, 2>& n, double gap, std::int32_t pole) const;
 
-  /// A part of a step that begins at a node: part 1 is the whole step, 2 i and 2 i + 1 are the halves of i.
-  struct Part {
-    NoiseState from, to;
-    double start = 0;  ///< ns after the node
-    std::uint32_t index = 1;
-    std::size_t depth = 0;
+  /// Within a step, x is a cubic in each of kParts equal parts. The states at their ends:
+  static constexpr std::size_t kParts = 8;
+  struct Path {
+    std::array<float, kParts + 1> y, x;
   };
-  double length(std::int32_t pole, const Part& part) const {
-    return std::ldexp(step_ns(pole), -static_cast<int>(part.depth));
+  /// The path from the state `from` at a node to the state `to` a step later, drawn by the bridge of the process.
+  Path path(const NoiseState& from, const NoiseState& to, std::uint32_t pixel, std::uint32_t node,
+            std::int32_t pole) const;
+  double part_ns(std::int32_t pole) const { return step_ns(pole) / kParts; }
+  NoiseCubic cubic(const Path& path, std::size_t part, std::int32_t pole) const {
+    const auto x0 = static_cast<double>(path.x[part]), x1 = static_cast<double>(path.x[part + 1]);
+    const auto y0 = static_cast<double>(path.y[part]), y1 = static_cast<double>(path.y[part + 1]);
+    return {x0, (y0 - x0) / t2_, x1, (y1 - x1) / t2_, part_ns(pole)};
   }
-  /// Whether x is cubic() in this part.
-  bool is_cubic(std::int32_t pole, const Part& part) const {
-    return part.depth == poles_[static_cast<std::size_t>(pole)].bridges;
-  }
-  NoiseCubic cubic(std::int32_t pole, const Part& part) const {
-    const NoiseState &from = part.from, &to = part.to;
-    return {from.x, (from.y - from.x) / t2_, to.x, (to.y - to.x) / t2_, length(pole, part)};
-  }
-  /// The draws within a step, which are made together when they are needed.
-  struct Middles {
-    Middles(std::uint32_t pixel_, std::uint32_t node_) : pixel(pixel_), node(node_) {}
-
-    std::uint32_t pixel, node;
-    bool drawn = false;
-    alignas(64) std::array<float, 16> n1, n2;  ///< by index of the part
-  };
-  std::pair<Part, Part> halves(std::int32_t pole, const Part& part, Middles& middles) const;
-
-  /// Bounds of x in a part, except with a probability below 1e-4 where it matters. The values at both ends, and those
-  /// which the slopes lead to after reach(), are within them by margin().
-  std::pair<double, double> bounds(std::int32_t pole, const Part& part) const {
-    const double along = reach(pole, part.depth) / t2_;
-    const auto [low, high] = std::minmax({part.from.x, part.to.x, part.from.x + (part.from.y - part.from.x) * along,
-                                          part.to.x - (part.to.y - part.to.x) * along});
-    return {low - margin(pole, part.depth), high + margin(pole, part.depth)};
-  }
-  double reach(std::int32_t pole, std::size_t depth) const {
-    return std::min(std::ldexp(step_ns(pole), -static_cast<int>(depth)) / 3, t2_);
-  }
-  double margin(std::int32_t pole, std::size_t depth) const {
-    const Pole& of = poles_[static_cast<std::size_t>(pole)];
-    return depth == of.bridges ? 0.0 : kBoundDeviations * bridges_[of.first_bridge + depth].deviation;
+  /// x at `tau` ns after the node.
+  double at(const Path& path, double tau, std::int32_t pole) const {
+    const double length = part_ns(pole), place = std::clamp(std::floor(tau / length), 0.0, kParts - 1.0);
+    return cubic(path, static_cast<std::size_t>(place), pole).value(tau - place * length);
   }
 
-  /// x at `tau` ns after a node, within its step.
-  double at(std::int32_t pole, Part part, double tau, Middles& middles) const;
+  /// Bounds of x in a step, except with a probability below 1e-4 where it matters: the values at both ends, and those
+  /// to which the slopes lead after along() t2, are within them by margin().
+  std::pair<double, double> bounds(const NoiseState& from, const NoiseState& to, std::int32_t pole) const {
+    const float reach = along(pole);
+    const auto [low, high] =
+        std::minmax({from.x, to.x, from.x + (from.y - from.x) * reach, to.x - (to.y - to.x) * reach});
+    return {static_cast<double>(low - margin(pole)), static_cast<double>(high + margin(pole))};
+  }
+  float along(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].along; }
+  float margin(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].margin; }
 
  private:
-  static constexpr double kBoundDeviations = 4.5;
-  static constexpr std::size_t kMaxDepth = 3;  // of parts
+  static constexpr float kBoundDeviations = 4.5F;
+  static constexpr std::size_t kHalvings = 3;
+  static_assert(kParts == 1U << kHalvings);
 
-  /// The state in the middle of a part: each row is that of y or x, from y and x at the start and at the end, n1 and
-  /// n2.
+  /// The state in the middle of an interval: each row is that of y or x, from y and x at the start and at the end, n1
+  /// and n2.
   struct Bridge {
-    std::array<double, 6> y, x;
-    double deviation = 0;  // of x in the middle
+    std::array<float, 6> y, x;
+    float deviation = 0;  // of x in the middle
   };
   struct Pole {
-    double t1 = 0, deviation = 0, step = 0, decay = 0;
-    std::size_t first_bridge = 0, bridges = 0;  // by depth
+    double t1 = 0, deviation = 0, step = 0;
+    float along = 0, margin = 0;
   };
 
   Bridge make_bridge(double t1, double h) const;
-  void draw(Middles& middles) const;
+  Step make_step(const Pole& pole) const;
 
-  double variance_, t2_, log_first_, per_log_step_;
+  double variance_, t2_, log_first_, per_log_step_, last_place_ = 0;
   AddressedRandom random_;
   std::vector<Pole> poles_;
+  std::vector<std::array<Bridge, kHalvings>> bridges_;  // of poles: of the step, of its halves, ...
+  std::vector<double> deviations_;                      // of the poles, and of one more
   std::vector<Step> steps_;
-  std::vector<Bridge> bridges_;
 };
 
 }  // namespace esim::inline event_camera

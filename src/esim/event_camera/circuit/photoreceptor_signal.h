@@ -72,7 +72,9 @@ std::array<double, 4> exponential_moments(double a);
 /// Longest stretch that advance() takes in one step: the light may change by at most this.
 inline constexpr double kMaxLightStep = 0.1;
 
-/// Distance of the lag from that of a steady ramp, beyond which steps must be shorter than kMaxDecay Q / I.
+/// If the lag is farther than kMaxTransient from that of a steady ramp, by T, steps must be shorter than kMaxDecay Q /
+/// I, or, for T below 1, T^(-1/4) times as long: the response differs from an exponential by T^2 times the cube of the
+/// step.
 inline constexpr double kMaxTransient = 0.03;
 inline constexpr double kMaxDecay = 0.25;
 

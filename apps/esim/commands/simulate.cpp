@@ -21,7 +21,7 @@ struct SimulateArguments : RunOptions {
 void print_summary(const Summary& summary, const std::filesystem::path& out, bool previews) {
   std::int64_t events = 0, samples = 0;
   for (const CameraSummary& camera : summary.cameras) {
-    events += camera.events_on + camera.events_off;
+    events += camera.events();
     samples += camera.sampling.samples;
   }
   const double simulated_s = to_seconds(summary.end - summary.start);
@@ -35,8 +35,9 @@ void print_summary(const Summary& summary, const std::filesystem::path& out, boo
 }
 
 int run(const SimulateArguments& arguments) {
-  Scenario scenario = read_scenario(arguments.scenario, arguments.overrides);
-  if (arguments.seed) scenario.seed = *arguments.seed;
+  std::vector<std::string> overrides = arguments.overrides;
+  if (arguments.seed) overrides.push_back(fmt::format("seed={}", *arguments.seed));
+  const Scenario scenario = read_scenario(arguments.scenario, overrides);
   const std::filesystem::path out =
       arguments.out.empty() ? std::filesystem::path("out") / std::filesystem::path(arguments.scenario).stem()
                             : std::filesystem::path(arguments.out);

@@ -12,6 +12,7 @@
 #include "esim/light/flicker.h"
 #include "esim/recording/format.h"
 #include "esim/render/pixel_area.h"
+#include "esim/sampling/context.h"
 #include "esim/scenario/conversion.h"
 #include "esim/scenario/scenario.h"
 #include "esim/scene/scene_file.h"
@@ -68,6 +69,13 @@ World build_world(const Scenario& scenario, const Substitutes& substitutes, int 
 
 /// The part of the body's trajectory that a scenario simulates. Throws UserError if the trajectory does not cover it.
 TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory);
+
+/// The numbers of the event sensors of each camera in RecordingInfo::cameras: that of the camera itself for a sensor
+/// without a name; sensors with names come after all cameras.
+std::vector<std::vector<int>> sensor_numbers(const Scenario& scenario);
+
+/// What a camera's sampler and its lights must suit: the smallest threshold and the smallest dark light of its sensors.
+SensorTraits strictest_sensor(const Scenario& scenario, const CameraOptions& camera);
 
 /// A camera as it is recorded. If its options give no field of view, it has that of the followed camera (may be null).
 CameraInfo camera_info(CameraOptions options, const SceneCamera* followed);

@@ -32,6 +32,15 @@ void describe(Visitor& visit, FovOptions& o) {
 }
 
 template <class Visitor>
+void describe(Visitor& visit, SensorOptions& o) {
+  visit("name", o.name,
+        About{"name of the sensor's folder in that of its camera (default: the only sensor has none; others are "
+              "sensor0, sensor1, ...)"});
+  visit("seed", o.seed, About{"seed of the sensor's random numbers (default: that of the scenario)"});
+  describe(visit, static_cast<EventCameraOptions&>(o));
+}
+
+template <class Visitor>
 void describe(Visitor& visit, CameraOptions& o) {
   visit("name", o.name, About{"name, unique within the rig (default: cam0, cam1, ...)"});
   visit("calibration", o.calibration,
@@ -60,7 +69,12 @@ void describe(Visitor& visit, CameraOptions& o) {
         About{"when esim renders the scene (default: adaptive; flow for renderers of complete images, such as OpenGL; "
               "keyframes if another program renders)"});
   visit("events", o.events, About{"whether the camera has an event sensor; false: it is a standard camera"});
-  visit("event_camera", o.event_camera, About{"the event sensor"});
+  if (o.event_cameras.empty())
+    visit("event_camera", o.event_camera,
+          About{"the event sensor; an option may be {values: [...]} or a distribution such as {uniform: [LOW, HIGH]}, "
+                "and count a number of sensors: then there are several"});
+  visit("event_cameras", o.event_cameras,
+        About{"several event sensors that see the same: a list of maps like event_camera, which gives their defaults"});
   visit("frame_camera", o.frame_camera, About{"a standard camera at the same pose (default: none)"});
 }
 

@@ -76,11 +76,11 @@ class CameraPacket(OldAttributes):
             if name in parts and name not in ("sensors", *self._OF_SENSORS):
                 setattr(self, name, parts[name])
 
-    def __getattr__(self, name):
+    def _miss(self, name):
         if name in self._OF_SENSORS:
             raise Error(f"the camera has several event sensors: use sensors[name].{name}, "
                         f"with name one of {list(self.sensors)}")
-        return super().__getattr__(name)
+        super()._miss(name)
 
     def _count(self):
         """The number of events of all sensors."""

@@ -63,6 +63,7 @@ TEST_F(EventCameras, AreAListThatInheritsFromEventCamera) {
   EXPECT_EQ(all[1].seed, 9U);
   EXPECT_EQ(all[2].threshold_on(), 0.25);
   EXPECT_FALSE(all[0].seed);
+  EXPECT_EQ(names(sensors("event_cameras: [{}, {}]", {"event_cameras=null"})), Names{""});
   // Only one is in a folder of its own, too.
   EXPECT_EQ(names(sensors("event_cameras: [{}]")), Names{"sensor0"});
   // For each camera, or for one of them.

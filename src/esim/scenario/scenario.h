@@ -77,7 +77,7 @@ struct CameraOptions {
     if (!events) return {};
     return event_cameras.empty() ? std::span(&event_camera, 1) : std::span(event_cameras);
   }
-  /// The first of them; default values if there are none.
+  /// The first of them; default values for a camera without any.
   const SensorOptions& first_sensor() const { return event_cameras.empty() ? event_camera : event_cameras.front(); }
 };
 
@@ -105,11 +105,15 @@ struct TruthOptions {
 enum class EventTimeUnit { us, ns };
 enum class EventCompression { blosc, gzip, none };
 
+/// Whether the samples of event sensors are kept.
+enum class KeptSamples { none, exact, rounded };
+
 struct OutputOptions {
   EventTimeUnit time_unit = EventTimeUnit::us;
   EventCompression compression = EventCompression::blosc;
   std::vector<std::string> formats{};
   bool preview = true;
+  KeptSamples samples = KeptSamples::none;
 };
 
 // --- the scenario --------------------------------------------------------------------------------------------------

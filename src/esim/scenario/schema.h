@@ -107,6 +107,10 @@ void describe(Visitor& visit, OutputOptions& o) {
   visit("formats", o.formats,
         About{"additional formats to write, by their names in esim convert --list, such as text, rosbag"});
   visit("preview", o.preview, About{"write preview.mp4 and preview.png"});
+  visit(
+      "samples", o.samples,
+      About{"keep what the event sensors saw in samples.esim, for esim resense; rounded: smaller, with an error of the "
+            "brightness up to 1.3e-4"});
 }
 
 /// All options of a scenario except its cameras, which have two spellings (see read_scenario).
@@ -133,6 +137,8 @@ template <>
 inline constexpr std::array<const char*, 2> kEnumNames<ColourFilters>{"none", "rggb"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<EventTimeUnit>{"us", "ns"};
+template <>
+inline constexpr std::array<const char*, 3> kEnumNames<KeptSamples>{"false", "true", "rounded"};
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<EventCompression>{"blosc", "gzip", "none"};
 

@@ -73,6 +73,7 @@ void Stages::make_events(CameraChannel& camera, std::span<const Segment> segment
       for_each_sensor(camera, [&](EventSensor& sensor, const Workers& workers) {
         sensor.event_camera.integrate(some, watermark, workers);
       });
+      if (camera.keep_samples) camera.keep_samples(some, watermark);
     };
     const TimeNs watermark = camera.sampler->watermark();
     if (!camera.flicker) return integrate(segments, watermark);

@@ -33,7 +33,7 @@ class Stages {
   void look_at_lights(CameraChannel& camera, std::span<const Segment> segments);
 
   // --- events
-  /// Gives segments to all event sensors, divided if the light flickers.
+  /// Gives segments to all event sensors, divided if the light flickers, and keeps them if requested.
   void make_events(CameraChannel& camera, std::span<const Segment> segments);
   /// Replaces EventSensor::events of each sensor by its next ones up to `until`.
   void release_events(CameraChannel& camera, TimeNs until);

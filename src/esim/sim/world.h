@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "esim/core/parallel.h"
@@ -39,6 +40,9 @@ struct CameraChannel {
   std::unique_ptr<Rendering> rendering{};  // the running rendering of the sampler's next request
   std::optional<FrameCamera> frame_camera{};
   std::optional<Flicker> flicker{};  // unset: constant light
+
+  /// If set, takes what the event sensors see, as EventCamera::integrate() does.
+  std::function<void(std::span<const Segment> segments, TimeNs watermark)> keep_samples{};
 
   // Ground truth, if requested.
   std::unique_ptr<OpticalFlowFromDepth> optical_flow{};

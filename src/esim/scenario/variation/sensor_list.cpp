@@ -183,7 +183,7 @@ void SensorList::add(const YAML::Node& map, const std::string& key, bool listed,
 std::vector<SensorOptions> SensorList::read(const YAML::Node& event_camera, const YAML::Node& event_cameras,
                                             const std::string& camera, const YamlSource& source) {
   std::vector<SensorOptions> sensors;
-  if (!event_cameras.IsDefined()) {
+  if (!event_cameras.IsDefined() || event_cameras.IsNull()) {
     if (event_camera.IsDefined() && describes_several(event_camera))
       add(event_camera, camera + ".event_camera", false, source, sensors);
     return sensors;

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "esim/core/image.h"
+#include "esim/core/time.h"
+#include "esim/sample_store/sample_store.h"
+
+// The bytes of a store: a header, then blocks, of which the last one has no portions.
+// Private to sample_store.
+namespace esim::inline sample_store {
+
+inline constexpr std::array<char, 8> kMagic{'e', 's', 'i', 'm', '-', 's', 'm', 'p'};
+inline constexpr std::uint32_t kVersion = 1;
+
+struct Header {
+  std::array<char, 8> magic = kMagic;
+  std::uint32_t version = kVersion;
+  std::uint32_t precision = 0;
+  std::int32_t width = 0, height = 0;
+  std::int64_t start = 0, end = 0;
+};
+static_assert(sizeof(Header) == 40);
+
+/// The irradiance of a block is divided into planes: byte k of all its pixels.
+inline constexpr std::size_t kPlanes = 4;
+
+struct BlockHeader {
+  std::uint32_t portions = 0;  ///< 0: the end of a complete store
+  std::uint32_t segments = 0;
+  std::uint64_t pixels = 0;
+  std::uint32_t list_bytes = 0;                      ///< compressed portions and segments
+  std::array<std::uint32_t, kPlanes> plane_bytes{};  ///< compressed
+  std::uint32_t checksum = 0;                        ///< of these compressed bytes
+};
+static_assert(sizeof(BlockHeader) == 40);
+
+struct PortionEntry {
+  std::int64_t watermark = 0;
+  std::uint64_t segments = 0;
+};
+
+struct SegmentEntry {
+  std::int64_t t0 = 0, t1 = 0;
+  std::uint16_t x = 0, y = 0, width = 0, height = 0;
+  std::uint64_t own_start = 0;  ///< 1: the irradiance at t0 is stored, too, before that at t1
+};
+static_assert(sizeof(SegmentEntry) == 32);
+
+/// Limits of a block, which bound the memory that a damaged file can request.
+inline constexpr std::uint64_t kUsualBlockPixels = std::uint64_t{1} << 20;
+inline constexpr std::uint32_t kMaxBlockEntries = std::uint32_t{1} << 20;
+inline std::uint64_t max_block_pixels(int width, int height) {
+  return kUsualBlockPixels + 4 * static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+}
+
+/// Bits of irradiance as the difference to those of the pixel's previous sample, small for small changes in both
+/// directions; the inverse.
+inline std::uint32_t difference(std::uint32_t bits, std::uint32_t before) {
+  const auto d = static_cast<std::int32_t>(bits - before);
+  return (static_cast<std::uint32_t>(d) << 1) ^ static_cast<std::uint32_t>(d >> 31);
+}
+inline std::uint32_t undo_difference(std::uint32_t difference, std::uint32_t before) {
+  return before + ((difference >> 1) ^ (0U - (difference & 1U)));
+}
+
+}  // namespace esim::inline sample_store

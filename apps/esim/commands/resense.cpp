@@ -54,7 +54,7 @@ void add_resense(CLI::App& app, int& exit_code) {
   command->add_option("-o,--out", arguments->out, "Folder to write")->required()->type_name("DIR");
   add_run_options(
       *command, *arguments,
-      "Change the event sensors, seed, light.white_lux or output; event_camera.preset replaces all options of "
+      "Change event_camera, event_cameras, light.white_lux or output; event_camera.preset replaces all options of "
       "the sensors");
   command->footer(
       "Says whether the events are exactly those of a simulation with the new sensors.\n"

@@ -16,7 +16,7 @@ struct SimulateArguments : RunOptions {
   std::string scenario;
   std::string out;
   std::optional<std::uint64_t> seed;
-  bool keep_samples = false;
+  std::string keep_samples{};
 };
 
 void print_summary(const Summary& summary, const std::filesystem::path& out, bool previews) {
@@ -37,7 +37,7 @@ void print_summary(const Summary& summary, const std::filesystem::path& out, boo
 
 int run(const SimulateArguments& arguments) {
   std::vector<std::string> overrides = arguments.overrides;
-  if (arguments.keep_samples) overrides.emplace_back("output.samples=true");
+  if (!arguments.keep_samples.empty()) overrides.push_back("output.samples=" + arguments.keep_samples);
   if (arguments.seed) overrides.push_back(fmt::format("seed={}", *arguments.seed));
   const Scenario scenario = read_scenario(arguments.scenario, overrides);
   const std::filesystem::path out =
@@ -80,8 +80,11 @@ void add_simulate(CLI::App& app, int& exit_code) {
   add_run_options(*command, *arguments, "Change one option, for example --set event_camera.contrast_threshold=0.2");
   command->add_option("--seed", arguments->seed, "Seed of all random numbers (default: the scenario's)")
       ->type_name("N");
-  command->add_flag("--keep-samples", arguments->keep_samples,
-                    "Keep what the event sensors saw, for esim resense; the same as --set output.samples=true");
+  command
+      ->add_flag("--keep-samples{true}", arguments->keep_samples,
+                 "Keep what the event sensors saw, for esim resense, with an error of the brightness up to 0.0005; "
+                 "--keep-samples=exact: without error, but larger. The same as --set output.samples=true or exact")
+      ->check(CLI::IsMember({"true", "exact"}));
   command->footer(
       "Examples:\n"
       "  esim simulate scenes/room.yaml --out out/room\n"

@@ -188,10 +188,9 @@ struct ResenseOptions {
 };
 
 /// Makes a recording with the events that other sensors, or the same ones with other options, have of the samples of a
-/// recording, without a renderer. The overrides may change the event sensors, the seed, the light's unit and the
-/// output; those of `event_camera` apply to all sensors of all cameras, and a preset replaces all their options. A
-/// notice says whether the events are exact, and why not. Throws UserError for other overrides and for recordings
-/// without complete samples.
+/// recording, without a renderer. The overrides may change the event sensors, the light's unit and the output; those of
+/// `event_camera` apply to all sensors of all cameras, and a preset replaces all their options. A notice says whether
+/// the events are exact, and why not. Throws UserError for other overrides and for recordings without complete samples.
 Resensed resense(const ResenseOptions& options, const Notices& notify, const Monitor& monitor);
 
 // --- reports (recording_report.cpp, losses_and_hints.cpp) ------------------------------------------------------------

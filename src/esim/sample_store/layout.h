@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -25,16 +26,17 @@ struct Header {
 };
 static_assert(sizeof(Header) == 40);
 
-/// The irradiance of a block is divided into planes: byte k of all its pixels.
+/// The irradiance of a block is divided into planes: byte k of the differences of all its pixels.
 inline constexpr std::size_t kPlanes = 4;
 
+/// Each compressed part is a frame of Zstandard with a checksum.
 struct BlockHeader {
   std::uint32_t portions = 0;  ///< 0: the end of a complete store
   std::uint32_t segments = 0;
   std::uint64_t pixels = 0;
   std::uint32_t list_bytes = 0;                      ///< compressed portions and segments
-  std::array<std::uint32_t, kPlanes> plane_bytes{};  ///< compressed
-  std::uint32_t checksum = 0;                        ///< of these compressed bytes
+  std::array<std::uint32_t, kPlanes> plane_bytes{};  ///< compressed; 0: all bytes are 0
+  std::uint32_t reserved = 0;
 };
 static_assert(sizeof(BlockHeader) == 40);
 
@@ -51,16 +53,25 @@ struct SegmentEntry {
 static_assert(sizeof(SegmentEntry) == 32);
 
 /// Limits of a block, which bound the memory that a damaged file can request.
-inline constexpr std::uint64_t kUsualBlockPixels = std::uint64_t{1} << 20;
+inline constexpr std::uint64_t kUsualBlockPixels = std::uint64_t{1} << 18;
 inline constexpr std::uint32_t kMaxBlockEntries = std::uint32_t{1} << 20;
 inline std::uint64_t max_block_pixels(int width, int height) {
   return kUsualBlockPixels + 4 * static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
 }
 
-/// Bits of irradiance as the difference to those of the pixel's previous sample, small for small changes in both
+/// The number that stands for an irradiance: its bits without those that are dropped. Rounds to the nearest, half
+/// upwards; the carry may increase the exponent.
+inline constexpr int kDroppedBits = 23 - kRoundedBits;
+inline std::uint32_t code_of(float irradiance, bool rounded) {
+  const auto bits = std::bit_cast<std::uint32_t>(irradiance);
+  return rounded ? (bits + (1U << (kDroppedBits - 1))) >> kDroppedBits : bits;
+}
+inline float irradiance_of(std::uint32_t code, int dropped_bits) { return std::bit_cast<float>(code << dropped_bits); }
+
+/// A code as the difference to that of the pixel's previous sample, small for small changes in both
 /// directions; the inverse.
-inline std::uint32_t difference(std::uint32_t bits, std::uint32_t before) {
-  const auto d = static_cast<std::int32_t>(bits - before);
+inline std::uint32_t difference(std::uint32_t code, std::uint32_t before) {
+  const auto d = static_cast<std::int32_t>(code - before);
   return (static_cast<std::uint32_t>(d) << 1) ^ static_cast<std::uint32_t>(d >> 31);
 }
 inline std::uint32_t undo_difference(std::uint32_t difference, std::uint32_t before) {

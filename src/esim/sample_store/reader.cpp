@@ -1,6 +1,6 @@
-#include <zlib.h>
 #include <zstd.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <limits>
@@ -15,6 +15,22 @@ namespace esim::inline sample_store {
 namespace {
 
 constexpr int kMaxExtent = 16384;  // px, as in scenarios
+
+/// Irradiance of consecutive pixels before and after their differences, of which `Planes` bytes are not 0.
+template <std::size_t Planes>
+void undo_row(std::size_t count, const std::array<const std::uint8_t*, kPlanes>& bytes, int dropped_bits,
+              std::uint32_t* __restrict codes, float* __restrict from, float* __restrict to) {
+  const std::uint8_t *const a = bytes[0], *const b = bytes[1], *const c = bytes[2], *const d = bytes[3];
+  for (std::size_t i = 0; i < count; ++i) {
+    std::uint32_t difference = a[i] | static_cast<std::uint32_t>(b[i]) << 8;
+    if constexpr (Planes > 2) difference |= static_cast<std::uint32_t>(c[i]) << 16;
+    if constexpr (Planes > 3) difference |= static_cast<std::uint32_t>(d[i]) << 24;
+    const std::uint32_t before = codes[i], now = undo_difference(difference, before);
+    codes[i] = now;
+    from[i] = irradiance_of(before, dropped_bits);
+    to[i] = irradiance_of(now, dropped_bits);
+  }
+}
 
 template <typename T>
 T value_of(std::span<const std::byte> bytes) {
@@ -46,7 +62,7 @@ struct SampleStoreReader::Impl {
   bool read_block(const Workers& workers);
   void read_lists(const BlockHeader& header, std::span<const std::byte> compressed);
   void check_segment(const SegmentEntry& entry) const;
-  void undo_differences(std::size_t segment);
+  void undo_differences(Rows rows);
   [[noreturn]] void damaged(const std::string& what) const { file.fail(block_offset, "the block is damaged: " + what); }
 
   InputFile file;
@@ -60,9 +76,10 @@ struct SampleStoreReader::Impl {
   std::vector<PortionEntry> portions;
   std::vector<SegmentEntry> entries;
   std::array<std::vector<std::uint8_t>, kPlanes> planes;
-  std::vector<float> irradiance;   // of all segments; with that of their start
-  std::vector<float> start;        // of those that start where they were
-  std::vector<std::size_t> first;  // of each segment's pixels in `irradiance`
+  std::size_t used_planes = kPlanes;  // the others are 0
+  std::vector<float> irradiance;      // of all segments; with that of their start
+  std::vector<float> start;           // of those that start where their pixels were
+  std::vector<std::size_t> first;     // of each segment's pixels in `irradiance`
   std::vector<Segment> segments;
   std::size_t next_portion = 0, next_segment = 0;
   Portion portion;
@@ -99,20 +116,20 @@ void SampleStoreReader::Impl::read_lists(const BlockHeader& header, std::span<co
   if (counted != entries.size() || pixels != header.pixels) damaged("it has another number of segments or pixels");
 }
 
-/// The irradiance of a segment, from the differences. The segments of a tile must come in order.
-void SampleStoreReader::Impl::undo_differences(std::size_t segment) {
-  const SegmentEntry& entry = entries[segment];
-  std::size_t i = first[segment];
-  for (std::uint64_t part = 0; part <= entry.own_start; ++part) {
-    for (int y = entry.y; y < entry.y + entry.height; ++y) {
-      std::uint32_t* const before = last.row(y) + entry.x;
-      for (int x = 0; x < entry.width; ++x, ++i) {
-        const std::uint32_t d = planes[0][i] | static_cast<std::uint32_t>(planes[1][i]) << 8 |
-                                static_cast<std::uint32_t>(planes[2][i]) << 16 |
-                                static_cast<std::uint32_t>(planes[3][i]) << 24;
-        if (entry.own_start == 0) start[i] = std::bit_cast<float>(before[x]);
-        before[x] = undo_difference(d, before[x]);
-        irradiance[i] = std::bit_cast<float>(before[x]);
+/// The irradiance of some rows of all segments, from the differences, in order.
+void SampleStoreReader::Impl::undo_differences(Rows rows) {
+  const int dropped = info.precision == SamplePrecision::rounded ? kDroppedBits : 0;
+  for (std::size_t segment = 0; segment < entries.size(); ++segment) {
+    const SegmentEntry& entry = entries[segment];
+    const int first_row = std::max<int>(rows.first, entry.y), last_row = std::min(rows.last, entry.y + entry.height);
+    const std::size_t width = entry.width, area = width * entry.height;
+    for (std::uint64_t part = 0; part <= entry.own_start; ++part) {
+      for (int y = first_row; y < last_row; ++y) {
+        const std::size_t i = first[segment] + part * area + static_cast<std::size_t>(y - entry.y) * width;
+        const std::array<const std::uint8_t*, kPlanes> bytes{planes[0].data() + i, planes[1].data() + i,
+                                                             planes[2].data() + i, planes[3].data() + i};
+        const auto undo = used_planes <= 2 ? undo_row<2> : used_planes == 3 ? undo_row<3> : undo_row<4>;
+        undo(width, bytes, dropped, last.row(y) + entry.x, start.data() + i, irradiance.data() + i);
       }
     }
   }
@@ -136,8 +153,6 @@ bool SampleStoreReader::Impl::read_block(const Workers& workers) {
   std::uint64_t bytes = header.list_bytes;
   for (const std::uint32_t plane : header.plane_bytes) bytes += plane;
   const std::span<const std::byte> all = file.read_exactly(bytes, "a block: the file was truncated");
-  if (crc32(0, reinterpret_cast<const Bytef*>(all.data()), static_cast<uInt>(all.size())) != header.checksum)
-    damaged("its checksum does not fit");
   std::array<std::span<const std::byte>, kPlanes> compressed;
   std::size_t offset = 0;
   for (std::size_t k = 0; k < kPlanes; ++k) {
@@ -145,10 +160,17 @@ bool SampleStoreReader::Impl::read_block(const Workers& workers) {
     offset += header.plane_bytes[k];
   }
   read_lists(header, all.subspan(offset));
+  used_planes = kPlanes;
+  while (used_planes > 2 && header.plane_bytes[used_planes - 1] == 0) --used_planes;
   std::array<bool, kPlanes> good{};
   workers.for_each(static_cast<int>(kPlanes), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     planes[k].resize(header.pixels);
+    if (compressed[k].empty()) {
+      if (k < used_planes) std::ranges::fill(planes[k], std::uint8_t{0});
+      good[k] = true;
+      return;
+    }
     good[k] = ZSTD_decompress(planes[k].data(), planes[k].size(), compressed[k].data(), compressed[k].size()) ==
               planes[k].size();
   });
@@ -169,7 +191,10 @@ bool SampleStoreReader::Impl::read_block(const Workers& workers) {
     pixel += tile.area();
     segments.push_back({tile, entry.t0, entry.t1, {entry.t0 == entry.t1 ? to : from, tile}, {to, tile}});
   }
-  for (std::size_t i = 0; i < entries.size(); ++i) undo_differences(i);
+  const int pieces = std::min(workers.threads(), info.height);
+  workers.for_each(pieces, [&](int i) {
+    undo_differences({info.height * i / pieces, info.height * (i + 1) / pieces});
+  });
   next_portion = next_segment = 0;
   return true;
 }

@@ -19,7 +19,7 @@ enum class SamplePrecision {
 };
 
 /// Bits of the mantissa that rounding keeps, so that the brightness ln(E + eps) changes by at most kMaxRoundingError.
-inline constexpr int kRoundedBits = 12;
+inline constexpr int kRoundedBits = 10;
 inline constexpr double kMaxRoundingError = 1.0 / (2 << kRoundedBits);
 
 /// Properties of a store.

@@ -1,9 +1,9 @@
-#include <zlib.h>
 #include <zstd.h>
 
 #include <algorithm>
-#include <bit>
 #include <limits>
+#include <memory>
+#include <new>
 #include <string>
 
 #include "esim/core/error.h"
@@ -13,7 +13,8 @@
 namespace esim::inline sample_store {
 namespace {
 
-constexpr int kLevel = 1;  // of Zstandard
+// Levels of Zstandard. The lowest bytes are almost random: to compress them by some percent would triple the time.
+constexpr int kLevel = 1, kLevelOfLowest = -1;
 
 template <typename T>
 std::string_view bytes_of(const T& value) {
@@ -25,17 +26,15 @@ std::string_view bytes_of(const std::vector<T>& values) {
   return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
 }
 
-void compress(std::string_view bytes, std::string& out) {
+void compress(std::string_view bytes, int level, std::string& out) {
+  const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(), ZSTD_freeCCtx);
+  if (context == nullptr) throw std::bad_alloc();
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
   out.resize(ZSTD_compressBound(bytes.size()));
-  const std::size_t size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), kLevel);
+  const std::size_t size = ZSTD_compress2(context.get(), out.data(), out.size(), bytes.data(), bytes.size());
   if (ZSTD_isError(size)) throw InternalError(std::string("Zstandard: ") + ZSTD_getErrorName(size));
   out.resize(size);
-}
-
-std::uint32_t rounded(std::uint32_t bits) {
-  constexpr int kDropped = 23 - kRoundedBits;
-  // To the nearest; half upwards. The carry may increase the exponent. Infinity cannot occur: irradiance is checked.
-  return (bits + (1U << (kDropped - 1))) >> kDropped << kDropped;
 }
 
 }  // namespace
@@ -51,10 +50,7 @@ struct SampleStoreWriter::Impl {
     file.flush();
   }
 
-  std::uint32_t stored(float irradiance) const {
-    const auto bits = std::bit_cast<std::uint32_t>(irradiance);
-    return info.precision == SamplePrecision::rounded ? rounded(bits) : bits;
-  }
+  std::uint32_t code(float irradiance) const { return code_of(irradiance, info.precision == SamplePrecision::rounded); }
 
   /// A block ends after the segment with which it is full.
   bool full() const {
@@ -68,7 +64,7 @@ struct SampleStoreWriter::Impl {
   OutputFile file;
   SampleStoreInfo info;
   TimeNs watermark = std::numeric_limits<TimeNs>::min();  // of the last portion
-  Image<std::uint32_t> last;                              // bits of each pixel's latest sample, as stored
+  Image<std::uint32_t> last;                              // code of each pixel's latest sample
 
   // The block.
   std::vector<PortionEntry> portions;
@@ -88,8 +84,8 @@ void SampleStoreWriter::Impl::add(const ImageView<float>& irradiance, const Tile
     const float* const row = irradiance.row(y) + tile.x;
     std::uint32_t* const before = last.row(y) + tile.x;
     for (std::size_t i = 0; i < width; ++i) {
-      const std::uint32_t bits = stored(row[i]), d = difference(bits, before[i]);
-      before[i] = bits;
+      const std::uint32_t now = code(row[i]), d = difference(now, before[i]);
+      before[i] = now;
       for (std::size_t k = 0; k < kPlanes; ++k) out[k][i] = static_cast<std::uint8_t>(d >> (8 * k));
     }
     for (std::uint8_t*& plane : out) plane += width;
@@ -102,7 +98,7 @@ void SampleStoreWriter::Impl::add(const Segment& segment) {
   for (int y = tile.y; y < tile.y + tile.height && !own_start && segment.t0 != segment.t1; ++y) {
     const float* const row = segment.irradiance0.row(y) + tile.x;
     const std::uint32_t* const before = last.row(y) + tile.x;
-    for (int x = 0; x < tile.width; ++x) own_start |= stored(row[x]) != before[x];
+    for (int x = 0; x < tile.width; ++x) own_start |= code(row[x]) != before[x];
   }
   segments.push_back({segment.t0, segment.t1, static_cast<std::uint16_t>(tile.x), static_cast<std::uint16_t>(tile.y),
                       static_cast<std::uint16_t>(tile.width), static_cast<std::uint16_t>(tile.height), own_start});
@@ -116,20 +112,19 @@ void SampleStoreWriter::Impl::write_block(const Workers& workers) {
   std::array<std::string, kPlanes + 1> compressed;
   workers.for_each(static_cast<int>(kPlanes) + 1, [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    compress(k == kPlanes ? std::string_view(lists) : bytes_of(planes[k]), compressed[k]);
+    compressed[k].clear();
+    if (k == kPlanes) {
+      compress(lists, kLevel, compressed[k]);
+    } else if (std::ranges::any_of(planes[k], [](std::uint8_t byte) { return byte != 0; })) {
+      compress(bytes_of(planes[k]), k == 0 ? kLevelOfLowest : kLevel, compressed[k]);
+    }
   });
   BlockHeader header;
   header.portions = static_cast<std::uint32_t>(portions.size());
   header.segments = static_cast<std::uint32_t>(segments.size());
   header.pixels = planes[0].size();
   header.list_bytes = static_cast<std::uint32_t>(compressed[kPlanes].size());
-  uLong checksum = 0;
-  for (std::size_t k = 0; k <= kPlanes; ++k) {
-    if (k < kPlanes) header.plane_bytes[k] = static_cast<std::uint32_t>(compressed[k].size());
-    checksum =
-        crc32(checksum, reinterpret_cast<const Bytef*>(compressed[k].data()), static_cast<uInt>(compressed[k].size()));
-  }
-  header.checksum = static_cast<std::uint32_t>(checksum);
+  for (std::size_t k = 0; k < kPlanes; ++k) header.plane_bytes[k] = static_cast<std::uint32_t>(compressed[k].size());
   file.append(bytes_of(header));
   for (const std::string& part : compressed) file.append(part);
   file.flush();

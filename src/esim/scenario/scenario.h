@@ -106,7 +106,7 @@ enum class EventTimeUnit { us, ns };
 enum class EventCompression { blosc, gzip, none };
 
 /// Whether the samples of event sensors are kept.
-enum class KeptSamples { none, exact, rounded };
+enum class KeptSamples { none, rounded, exact };
 
 struct OutputOptions {
   EventTimeUnit time_unit = EventTimeUnit::us;

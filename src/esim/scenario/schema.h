@@ -109,8 +109,8 @@ void describe(Visitor& visit, OutputOptions& o) {
   visit("preview", o.preview, About{"write preview.mp4 and preview.png"});
   visit(
       "samples", o.samples,
-      About{"keep what the event sensors saw in samples.esim, for esim resense; rounded: smaller, with an error of the "
-            "brightness up to 1.3e-4"});
+      About{"keep what the event sensors saw in samples.esim, for esim resense; true: with an error of the brightness "
+            "up to 0.0005; exact: without, and larger"});
 }
 
 /// All options of a scenario except its cameras, which have two spellings (see read_scenario).
@@ -138,7 +138,7 @@ inline constexpr std::array<const char*, 2> kEnumNames<ColourFilters>{"none", "r
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<EventTimeUnit>{"us", "ns"};
 template <>
-inline constexpr std::array<const char*, 3> kEnumNames<KeptSamples>{"false", "true", "rounded"};
+inline constexpr std::array<const char*, 3> kEnumNames<KeptSamples>{"false", "true", "exact"};
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<EventCompression>{"blosc", "gzip", "none"};
 

@@ -60,7 +60,7 @@ std::vector<WrittenSensor> written_sensors(const Scenario& recorded) {
 /// which gives the defaults of the others, replaces them all.
 void add_override(const Scenario& recorded, const std::string& key, const std::string& value, const std::string& setter,
                   std::vector<std::string>& result) {
-  if (key == "seed" || key == "light.white_lux" || is_or_is_in(key, "output")) {
+  if (key == "light.white_lux" || is_or_is_in(key, "output")) {
     result.push_back(key + "=" + value);
   } else if (key == "event_camera" || is_or_is_in(key, "event_cameras")) {
     for (std::size_t i = 0; i < recorded.cameras.size(); ++i) {
@@ -77,9 +77,9 @@ void add_override(const Scenario& recorded, const std::string& key, const std::s
     for (const auto& [sensor, name] : written_sensors(recorded)) result.push_back(sensor + option + "=" + value);
   } else {
     throw UserError(fmt::format(
-        "{}{}: cannot be changed without rendering again; resense changes event_camera, event_cameras, seed, "
-        "light.white_lux and output only: simulate again",
-        setter, key));
+        "{}{}: cannot be changed without rendering again; resense changes event_camera, event_cameras, light.white_lux "
+        "and output only{}",
+        setter, key, key == "seed" ? ": set event_camera.seed, the seed of the sensors" : ": simulate again"));
   }
 }
 
@@ -222,7 +222,8 @@ Resensed resense(const ResenseOptions& options, const Notices& notify, const Mon
   World world = build_world(sensors, substitutes, options.threads, notices);
   auto store = stores.begin();
   for (std::size_t i = 0; i < world.cameras.size(); ++i) {
-    if (sensors.cameras[i].events) world.cameras[i].sampler = make_stored_sampler(std::move(*store++), *world.workers);
+    world.cameras[i].sampler = sensors.cameras[i].events ? make_stored_sampler(std::move(*store++), *world.workers)
+                                                         : make_no_sampler(world.info.end);
   }
   write_file_atomically(directory.path() / "scenario.yaml", write_scenario(changed));
   const std::unique_ptr<Sink> sink = build_sink(sensors, directory.path());

@@ -60,7 +60,23 @@ class StoredSampler final : public Sampler {
   TimeNs watermark_ = 0;
 };
 
+class NoSampler final : public Sampler {
+ public:
+  explicit NoSampler(TimeNs end) : end_(end) {}
+
+  const SampleRequest* next() const override { return nullptr; }
+  std::span<const Segment> accept(Sample&) override { return {}; }
+  std::span<const Segment> more() override { return {}; }
+  TimeNs watermark() const override { return end_; }
+  SamplingStatistics statistics() const override { return {}; }
+
+ private:
+  TimeNs end_;
+};
+
 }  // namespace
+
+std::unique_ptr<Sampler> make_no_sampler(TimeNs end) { return std::make_unique<NoSampler>(end); }
 
 std::unique_ptr<Renderer> make_no_renderer() { return std::make_unique<NoRenderer>(); }
 

@@ -12,6 +12,9 @@ namespace esim::inline compose {
 /// A renderer that renders nothing, for samplers that have all samples.
 std::unique_ptr<Renderer> make_no_renderer();
 
+/// A sampler without segments, for cameras without event sensors.
+std::unique_ptr<Sampler> make_no_sampler(TimeNs end);
+
 /// A sampler whose segments come from a store. The workers must outlive it.
 std::unique_ptr<Sampler> make_stored_sampler(SampleStoreReader store, const Workers& workers);
 

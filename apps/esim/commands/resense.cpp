@@ -57,10 +57,10 @@ void add_resense(CLI::App& app, int& exit_code) {
       "Change event_camera, event_cameras, light.white_lux or output; event_camera.preset replaces all options of "
       "the sensors");
   command->footer(
-      "Says whether the events are exactly those of a simulation with the new sensors.\n"
+      "Says whether the events are exactly those of a simulation with the new sensors. The recording out/room of the\n"
+      "examples: esim simulate scenes/room.yaml --out out/room --keep-samples\n"
       "\n"
       "Examples:\n"
-      "  esim simulate scenes/room.yaml --out out/room --keep-samples\n"
       "  esim resense out/room --out out/high --set event_camera.contrast_threshold=0.4\n"
       "  esim resense out/room --out out/davis --set event_camera.preset=davis346\n"
       "  esim resense out/room --out out/grid --set 'event_camera.contrast_threshold={values: [0.2, 0.3, 0.4]}'");

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -57,11 +58,12 @@ struct SampleStoreReader::Impl {
     if (header.precision > 1 || header.end < header.start) wrong("its header is damaged");
     info = {header.width, header.height, header.start, header.end, static_cast<SamplePrecision>(header.precision)};
     last = Image<std::uint32_t>(info.width, info.height);
+    covered = Image<std::uint8_t>(info.width, info.height);
   }
 
   bool read_block(const Workers& workers);
   void read_lists(const BlockHeader& header, std::span<const std::byte> compressed);
-  void check_segment(const SegmentEntry& entry) const;
+  void check_segment(const SegmentEntry& entry);
   void undo_differences(Rows rows);
   [[noreturn]] void damaged(const std::string& what) const { file.fail(block_offset, "the block is damaged: " + what); }
 
@@ -70,6 +72,8 @@ struct SampleStoreReader::Impl {
   Image<std::uint32_t> last;
   std::uint64_t block_offset = 0;
   TimeNs watermark = std::numeric_limits<TimeNs>::min();  // of the last portion
+  std::map<std::array<std::uint16_t, 4>, TimeNs> ends;    // of the last segment of each tile
+  Image<std::uint8_t> covered;                            // by these tiles
   bool ended = false;
 
   // The block.
@@ -85,11 +89,20 @@ struct SampleStoreReader::Impl {
   Portion portion;
 };
 
-void SampleStoreReader::Impl::check_segment(const SegmentEntry& entry) const {
+/// Tiles divide the image, and the segments of each follow each other.
+void SampleStoreReader::Impl::check_segment(const SegmentEntry& entry) {
   const bool inside = entry.width >= 1 && entry.height >= 1 && entry.x + entry.width <= info.width &&
                       entry.y + entry.height <= info.height;
   if (!inside || entry.own_start > 1) damaged("a tile is outside the image");
   if (entry.t1 < entry.t0 || entry.t0 < info.start || entry.t1 > info.end) damaged("a time is outside the simulation");
+  const auto [done, is_new] = ends.try_emplace({entry.x, entry.y, entry.width, entry.height}, entry.t0);
+  for (int y = entry.y; is_new && y < entry.y + entry.height; ++y) {
+    for (int x = entry.x; x < entry.x + entry.width; ++x) {
+      if (std::exchange(covered(x, y), std::uint8_t{1}) != 0) damaged("tiles overlap");
+    }
+  }
+  if (entry.t0 != done->second) damaged("a segment does not begin where the previous one of its tile ended");
+  done->second = entry.t1;
 }
 
 void SampleStoreReader::Impl::read_lists(const BlockHeader& header, std::span<const std::byte> compressed) {
@@ -205,6 +218,8 @@ SampleStoreReader::SampleStoreReader(SampleStoreReader&&) noexcept = default;
 SampleStoreReader& SampleStoreReader::operator=(SampleStoreReader&&) noexcept = default;
 
 const SampleStoreInfo& SampleStoreReader::info() const { return impl_->info; }
+
+bool SampleStoreReader::has_more() const { return impl_->next_portion < impl_->portions.size(); }
 
 const SampleStoreReader::Portion* SampleStoreReader::next(const Workers& workers) {
   Impl& impl = *impl_;

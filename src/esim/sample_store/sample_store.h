@@ -60,7 +60,7 @@ class SampleStoreReader {
 
   const SampleStoreInfo& info() const;
 
-  /// The segments of the next add(), valid until the next call, and its watermark.
+  /// The segments of the next add(), valid until the next call unless has_more(), and its watermark.
   struct Portion {
     std::span<const Segment> segments;
     TimeNs watermark = 0;
@@ -69,6 +69,9 @@ class SampleStoreReader {
   /// Null after the last one. Throws UserError (which file, at which byte, what is wrong) if the file is damaged, or if
   /// it ends before it was completed.
   const Portion* next(const Workers& workers);
+
+  /// Whether the next portion has been read together with the last one, which then stays valid.
+  bool has_more() const;
 
  private:
   struct Impl;

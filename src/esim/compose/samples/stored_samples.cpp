@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 namespace esim::inline compose {
 namespace {
@@ -14,26 +15,26 @@ class NoRenderer final : public ProcessorRenderer {
   void compute(std::span<const RenderRequest>, Sample&) const override {}
 };
 
-/// Requests a sample of nothing for each portion of a store.
+/// Requests a sample of nothing for each group of portions of a store. Few large groups are faster than many small
+/// ones.
 class StoredSampler final : public Sampler {
  public:
-  StoredSampler(SampleStoreReader store, const Workers& workers) : store_(std::move(store)), workers_(workers) {
-    watermark_ = store_.info().start;
-    advance();
+  StoredSampler(SampleStoreReader store, const Workers& workers)
+      : store_(std::move(store)), workers_(workers), watermark_(store_.info().start) {
+    read_group();
   }
 
-  const SampleRequest* next() const override { return portion_ != nullptr && !handed_out_ ? &request_ : nullptr; }
+  const SampleRequest* next() const override { return has_group_ && !handed_out_ ? &request_ : nullptr; }
 
   std::span<const Segment> accept(Sample&) override {
-    watermark_ = portion_->watermark;
-    const std::span<const Segment> segments = portion_->segments;
-    handed_out_ = true;
-    if (segments.empty()) advance();
-    return segments;
+    watermark_ = std::max(watermark_, group_watermark_);
+    handed_out_ = !segments_.empty();
+    if (!handed_out_) read_group();
+    return handed_out_ ? segments_ : std::span<const Segment>{};
   }
 
   std::span<const Segment> more() override {
-    if (handed_out_) advance();
+    if (std::exchange(handed_out_, false)) read_group();
     return {};
   }
 
@@ -41,23 +42,31 @@ class StoredSampler final : public Sampler {
   SamplingStatistics statistics() const override { return {}; }
 
  private:
-  void advance() {
-    handed_out_ = false;
-    portion_ = store_.next(workers_);
-    if (portion_ == nullptr) {
-      watermark_ = store_.info().end;
-      return;
-    }
-    request_.t = std::clamp(portion_->watermark, watermark_, store_.info().end);
+  void read_group() {
+    segments_.clear();
+    has_group_ = false;
+    do {
+      const SampleStoreReader::Portion* const portion = store_.next(workers_);
+      if (portion == nullptr) break;
+      segments_.insert(segments_.end(), portion->segments.begin(), portion->segments.end());
+      group_watermark_ = portion->watermark;
+      has_group_ = true;
+    } while (store_.has_more());
+    if (!has_group_) watermark_ = store_.info().end;
+    // Event cameras take the segments of a tile one after the other.
+    std::ranges::stable_sort(segments_, {}, [](const Segment& s) { return std::pair(s.tile.y, s.tile.x); });
+    request_.t = std::clamp(group_watermark_, watermark_, store_.info().end);
     request_.tiles = {{0, 0, 1, 1}};
   }
 
   SampleStoreReader store_;
   const Workers& workers_;
-  const SampleStoreReader::Portion* portion_ = nullptr;  // the next one; null after the last
-  bool handed_out_ = false;                              // its segments are in use
+  std::vector<Segment> segments_;  // of the group
+  TimeNs group_watermark_ = 0;
+  bool has_group_ = false;
+  bool handed_out_ = false;  // its segments are in use
   SampleRequest request_;
-  TimeNs watermark_ = 0;
+  TimeNs watermark_;
 };
 
 class NoSampler final : public Sampler {

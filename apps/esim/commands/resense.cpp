@@ -4,7 +4,7 @@
 
 #include "commands.h"
 #include "esim/compose/compose.h"
-#include "esim/core/error.h"
+#include "esim/scenario/read.h"
 #include "progress_bar.h"
 #include "support.h"
 
@@ -24,6 +24,7 @@ int run(const ResenseArguments& arguments) {
                                  .replace = arguments.force,
                                  .threads = arguments.threads,
                                  .overrides = arguments.overrides,
+                                 .setter = kSetter,
                                  .repetition = {shell_command(own_command_line())}},
                                 printing(arguments.quiet), [&](const Progress& progress) {
                                   bar.show(progress);

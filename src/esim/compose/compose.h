@@ -183,7 +183,7 @@ struct ResenseOptions {
   bool replace = false;                  ///< an existing one
   int threads = 0;                       ///< 0: every processor
   std::vector<std::string> overrides{};  ///< "key=value"
-  std::string setter = "--set ";         ///< beginning of messages about these
+  std::string setter{};                  ///< beginning of messages about these
   Repetition repetition{};               ///< for the report
 };
 

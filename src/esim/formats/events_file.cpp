@@ -33,7 +33,8 @@ fs::path find_any_file(const fs::path& path) {
   std::vector<fs::path> cameras;
   for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error)) {
     if (events_file_in(entry->path())) cameras.push_back(entry->path());
-    if (!entry->is_directory(error)) continue;
+    std::error_code unreadable;
+    if (!entry->is_directory(unreadable)) continue;
     for (const std::string& sensor : sensors_in(entry->path())) cameras.push_back(entry->path() / sensor);
   }
   if (cameras.empty()) throw UserError(path.string() + ": there is no events.h5 or events.txt inside");

@@ -17,7 +17,7 @@ EventCameraOptions sensor_of(const std::string& argument, const std::vector<std:
   for (const std::string& override : overrides) text.overrides.push_back("event_camera." + override);
   text.needs_renderer = text.needs_trajectory = text.needs_waypoints = false;
   const Scenario scenario = read_scenario(argument, text);
-  return event_camera_of(scenario, scenario.cameras.front());
+  return in_light_of(scenario, scenario.cameras.front().first_sensor());
 }
 
 }  // namespace esim::app

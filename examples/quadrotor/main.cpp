@@ -86,8 +86,7 @@ int fly(const std::string& scenario_file, const std::string& out, const std::vec
   const double off_path_m = rms_distance(flight.flown, flight.commanded);
   std::printf("flown for %.1f s, %.1f cm rms off the commanded path; estimated to %.1f cm rms; %lld events\n",
               esim::to_seconds(summary.end - summary.start), 100 * off_path_m,
-              100 * rms_distance(flight.flown, flight.estimated),
-              static_cast<long long>(summary.cameras[0].events_on + summary.cameras[0].events_off));
+              100 * rms_distance(flight.flown, flight.estimated), static_cast<long long>(summary.cameras[0].events()));
   std::printf("recording: %s\n", out.c_str());
   return summary.complete && off_path_m < kLost_m ? 0 : 1;
 }

@@ -86,6 +86,7 @@ class EventCamera:
 def linear_light(image: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.float32]: ...
 
 class CameraPacket:
+    sensors: dict[str, CameraPacket]
     events: Events
     labels: NDArray[np.void]
     truth_t: NDArray[np.int64]

@@ -46,7 +46,7 @@ class Recording:
     @property
     def info(self):
         """dict: `start` and `end` (ns; equal if the end is not known in advance), `cameras`: a dict by name with width,
-        height, K and T_body_camera, and `objects`: the names of moving objects."""
+        height, K, T_body_camera and sensors, and `objects`: the names of moving objects."""
         return self._core.info()
 
     def __iter__(self):

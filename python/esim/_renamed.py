@@ -29,8 +29,11 @@ class OldAttributes:
 
     def __getattr__(self, name):
         if name not in self._renamed:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            self._miss(name)
         return getattr(self, present_name(name, self._renamed))
+
+    def _miss(self, name):
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
 
 class OldKeys(dict):

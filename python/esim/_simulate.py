@@ -50,23 +50,41 @@ class CameraPacket(OldAttributes):
     trigger_t, trigger_kind : int64, uint8, shape (number of triggers,)
         Triggers of files: time, ns, and kind, numbered as in AEDAT 4 (1, 2: rising, falling edge of the external
         signal).
+    sensors : dict of str to CameraPacket
+        By name, the `events`, `labels` and `event_points` of each sensor in `event_cameras`. The camera itself then has
+        none of these. Empty for a camera with one `event_camera`.
     """
 
     __slots__ = (
-        "events labels truth_t pose irradiance depth motion_field object optical_flow optical_flow_t visible event_points "
+        "sensors events labels truth_t pose irradiance depth motion_field object optical_flow optical_flow_t visible event_points "
         "images image_t exposure_start exposure trigger_t trigger_kind"
     ).split()
 
     _renamed = {"flow": "motion_field", "displacement": "optical_flow", "displacement_t": "optical_flow_t"}
 
+    _OF_SENSORS = ("events", "labels", "event_points")
+
     def __init__(self, parts, width, height):
-        self.events = of_bytes(parts["events"], width, height)
-        self.labels = parts["labels"].view(LABEL_DTYPE)
+        self.sensors = {name: CameraPacket(sensor, width, height) for name, sensor in parts["sensors"].items()}
+        if not self.sensors:
+            self.events = of_bytes(parts["events"], width, height)
+            self.labels = parts["labels"].view(LABEL_DTYPE)
+            self.event_points = parts["event_points"]
         self.truth_t = parts["t"]
         self.optical_flow_t = parts["optical_flow_span"]
         for name in self.__slots__:
-            if name in parts and name not in ("events", "labels"):
+            if name in parts and name not in ("sensors", *self._OF_SENSORS):
                 setattr(self, name, parts[name])
+
+    def _miss(self, name):
+        if name in self._OF_SENSORS:
+            raise Error(f"the camera has several event sensors: use sensors[name].{name}, "
+                        f"with name one of {list(self.sensors)}")
+        super()._miss(name)
+
+    def _count(self):
+        """The number of events of all sensors."""
+        return sum(len(sensor.events) for sensor in self.sensors.values()) if self.sensors else len(self.events)
 
 
 class Packet:
@@ -76,7 +94,7 @@ class Packet:
     end.
 
     With one camera, its records are attributes of the packet: `packet.events`. With several cameras, write
-    `packet["name"].events`.
+    `packet["name"].events`. The events of several sensors behind one lens are `packet.sensors["name"].events`.
 
     Attributes
     ----------
@@ -117,7 +135,7 @@ class Packet:
         return [*super().__dir__(), *CameraPacket.__slots__]
 
     def __repr__(self):
-        events = sum(len(camera.events) for camera in self.cameras.values())
+        events = sum(camera._count() for camera in self.cameras.values())
         return f"<esim.Packet from {self.t0 * 1e-9:g} s to {self.t1 * 1e-9:g} s, {events} events>"
 
 
@@ -214,7 +232,8 @@ class Simulation:
     start, end : int
         The simulated time, ns.
     cameras : dict of str to dict
-        By camera name, `width` and `height` (px), `K` (3, 3, px, without distortion) and `T_body_camera` (4, 4).
+        By camera name, `width` and `height` (px), `K` (3, 3, px, without distortion), `T_body_camera` (4, 4) and
+        `sensors`: the names of its event sensors, if it has several.
     objects : list of str
         Names of the moving objects, in the order of their numbers.
     """
@@ -333,9 +352,8 @@ def simulate(
     if renderer is not None and not isinstance(renderer, Renderer):
         renderer = Renderer(renderer)
     scenario = to_scenario(scenario)
-    values = scenario._read(to_overrides(overrides), renderer is None, trajectory is None)
-    if seed is not None:
-        values.seed = _checks.seed(seed)
+    seeded = [] if seed is None else [f"seed={_checks.seed(seed)}"]
+    values = scenario._read(to_overrides(overrides) + seeded, renderer is None, trajectory is None)
     given = [name for name, part in (("renderer", renderer), ("trajectory", trajectory)) if part is not None]
     origin = "".join(f"# A program replaced the {name}: the entry {name} was not used.\n" for name in given)
     out = "" if out is None else os.fspath(out)

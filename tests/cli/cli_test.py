@@ -192,6 +192,36 @@ class Recordings(Cli):
             self.assertGreater(points, 0.7 * camera["events"], "most are on the poster")
         self.assertIn("right", run("info", self.out).stdout)
 
+    def test_several_sensors_and_new_ones_from_their_samples(self):
+        grid = ["--set", "event_camera.contrast_threshold={values: [0.2, 0.4]}", "--set", "sampling={type: flow}"]
+        result = self.simulate(*FAST, *grid, "--keep-samples=exact")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        report = json.loads((self.out / "report.json").read_text())
+        self.assertEqual([sensor["varied"] for sensor in report["cameras"][0]["sensors"]],
+                         [{"contrast_threshold": "0.2"}, {"contrast_threshold": "0.4"}])
+        self.assertIn("cam0/sensor1", run("info", self.out).stdout)
+        self.assertIn("cam0/sensor0, cam0/sensor1", run("stats", self.out).stderr)
+
+        again = self.folder / "again"
+        result = run("resense", self.out, "--out", again)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("exactly those of a simulation", result.stderr + result.stdout)
+        for sensor in ("sensor0", "sensor1"):
+            self.assertEqual((self.out / "cam0" / sensor / "events.h5").read_bytes(),
+                             (again / "cam0" / sensor / "events.h5").read_bytes())
+        self.assertFalse((again / "cam0" / "truth.h5").exists())
+        new = self.folder / "new"
+        for arguments, problem in (
+            ([self.out, "--out", again], "--force"),
+            ([self.out, "--out", new, "--set", "camera.width=9"], "--set camera.width: cannot be changed without"),
+            ([again, "--out", new], "has no samples"),
+        ):
+            result = run("resense", *arguments)
+            self.assertEqual(result.returncode, 2)
+            self.assertIn(problem, result.stderr)
+            self.assertFalse(new.exists())
+        self.assertIn("--keep-samples", self.simulate(*FAST, "--keep-samples=some").stderr)
+
     def test_an_imu_is_written_the_same_again_from_the_resolved_scenario(self):
         imu = ["--set", "imu={rate_hz: 400, T_body_imu: {position: [0.1, 0, 0]}, gyroscope: {random_walk: 0.1}}"]
         self.assertEqual(self.simulate(*FAST, *imu, "--threads", "1").returncode, 0)

@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <set>
 
 #include "esim/core/error.h"
 #include "esim/dataset/generators/image_folder.h"
@@ -49,6 +51,23 @@ TEST(AffineSequences, OpticalFlowCarriesTheFirstImageToTheLast) {
     }
     EXPECT_LT(with, 0.5 * without) << index;
   }
+}
+
+TEST(AffineSequences, AreRenderedOnceForSeveralSensors) {
+  AffineOptions options = small();
+  options.sensors = 3;
+  const AffineSequences sequences(options);
+  const std::vector<Sequence> all = sequences.make_all(2);
+  ASSERT_EQ(all.size(), 3U);
+  const Sequence alone = AffineSequences(small()).make(2);
+  std::set<double> thresholds;
+  for (std::uint32_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(all[k].index, 6 + k);
+    EXPECT_TRUE(std::ranges::equal(all[k].motion_field.x.pixels(), alone.motion_field.x.pixels())) << "the same motion";
+    EXPECT_FALSE(all[k].events.empty());
+    thresholds.insert(nlohmann::json::parse(all[k].info)["contrast_threshold"].get<double>());
+  }
+  EXPECT_EQ(thresholds.size(), 3U);
 }
 
 TEST(AffineSequences, ChecksSamplingLikeAScenario) {

@@ -26,11 +26,23 @@ namespace fs = std::filesystem;
 /// Sequences that are cheap to make and distinguishable.
 class Numbers final : public SequenceMaker {
  public:
+  explicit Numbers(std::uint32_t sensors = 1) : sensors_(sensors) {}
+
   std::string options() const override { return R"({"kind": "numbers", "seed": 1})"; }
   const MagnitudeHistogram& magnitudes() const override { return bins_; }
   bool is_target() const override { return true; }
-  Sequence make(std::uint32_t index) const override {
+  std::uint32_t sensors() const override { return sensors_; }
+  std::vector<Sequence> make_all(std::uint32_t rendering) const override {
     ++made;
+    std::vector<Sequence> sequences;
+    for (std::uint32_t k = 0; k < sensors_; ++k) sequences.push_back(sequence_of(rendering * sensors_ + k));
+    return sequences;
+  }
+
+  mutable std::atomic<int> made = 0;
+
+ private:
+  static Sequence sequence_of(std::uint32_t index) {
     Sequence sequence;
     sequence.index = index;
     sequence.width = 16, sequence.height = 8;
@@ -50,9 +62,7 @@ class Numbers final : public SequenceMaker {
     return sequence;
   }
 
-  mutable std::atomic<int> made = 0;
-
- private:
+  std::uint32_t sensors_;
   MagnitudeHistogram bins_{{0, 0.3, 1}, {0.5, 0.5}, "test"};
 };
 
@@ -114,6 +124,16 @@ TEST_P(Produce, MakesTheSameBytesWithAnyNumberOfThreads) {
   make(folder_.path() / "two", GetParam(), 2);
   EXPECT_TRUE(content(folder_.path() / "two") == straight_);
   EXPECT_TRUE(check_dataset(DatasetFolder(folder_.path() / "two")).empty());
+}
+
+TEST_P(Produce, RendersOnceForSeveralSensors) {
+  const fs::path out = folder_.path() / "sensors";
+  const DatasetFolder folder(out, plan_of(GetParam()), "1.0");
+  const Numbers maker(4);
+  produce(folder, maker, {}, 2, [](const auto&) { return true; });
+  write_manifest(folder, survey_dataset(folder), maker.magnitudes(), true);
+  EXPECT_TRUE(content(out) == straight_);
+  EXPECT_EQ(maker.made, 6 + 3) << "six renderings for 23 sequences; three of them are in two shards";
 }
 
 TEST_P(Produce, MakesTheSameBytesInShares) {

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "esim/core/error.h"
@@ -104,6 +106,35 @@ TEST_F(ScenarioTemplates, MakeSequencesWithWhatWasDrawn) {
   }
   EXPECT_GT(widths.size(), 2U);
   EXPECT_NE(sequences.make(0).events, ScenarioSequences(file, {}, 2, true).make(0).events);
+}
+
+TEST_F(ScenarioTemplates, AreRenderedOnceForSeveralSensors) {
+  const auto file =
+      write("randomise: {event_camera.contrast_threshold: {uniform: [0.1, 0.5]}, camera.width: {integer: [20, 60]}}\n");
+  const ScenarioSequences sequences(file, {}, 1, true, 3);
+  ASSERT_EQ(sequences.sensors(), 3U);
+  std::set<double> thresholds;
+  for (std::uint32_t rendering = 0; rendering < 3; ++rendering) {
+    const std::vector<Sequence> all = sequences.make_all(rendering);
+    ASSERT_EQ(all.size(), 3U);
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      EXPECT_EQ(all[k].index, 3 * rendering + k);
+      EXPECT_EQ(all[k].width, all[0].width);
+      EXPECT_TRUE(std::ranges::equal(all[k].optical_flow.x.pixels(), all[0].optical_flow.x.pixels()));
+      EXPECT_GT(all[k].events.size(), 10U);
+      EXPECT_EQ(all[k].events, sequences.make(3 * rendering + k).events);
+      const auto info = nlohmann::json::parse(all[k].info);
+      thresholds.insert(std::stod(info.at("event_camera.contrast_threshold").get<std::string>()));
+      EXPECT_EQ(info.at("sensor"), "sensor" + std::to_string(k));
+    }
+  }
+  EXPECT_EQ(thresholds.size(), 9U) << "each sensor has its own";
+  EXPECT_NE(sequences.options(), ScenarioSequences(file, {}, 1, true, 4).options());
+  // The same from a scenario with several sensors of its own.
+  const ScenarioSequences own(write("event_cameras: [{contrast_threshold: 0.2}, {contrast_threshold: 0.4}]\n"), {}, 1,
+                              true);
+  ASSERT_EQ(own.sensors(), 2U);
+  EXPECT_GT(own.make(0).events.size(), own.make(1).events.size());
 }
 
 TEST_F(ScenarioTemplates, NameUnknownOptionsAndValuesOutOfRange) {

@@ -568,16 +568,17 @@ TEST_F(ScenarioFile, TheLightAppliesToEveryEventCamera) {
   const Scenario scenario = read(std::string(kMinimal) +
                                  "light: {white_lux: 20}\nevent_camera: {preset: davis346}\ncameras:\n- {}\n"
                                  "- event_camera: {circuit: {white_lux: 3}}\n- event_camera: {preset: davis346@1}\n");
-  const auto in_light = [&](std::size_t i) { return event_camera_of(scenario, scenario.cameras[i]); };
+  const auto in_light = [&](std::size_t i) { return in_light_of(scenario, scenario.cameras[i].event_camera); };
   EXPECT_EQ(in_light(0).circuit->white_lux, 20);
   EXPECT_EQ(in_light(1).circuit->white_lux, 3);
   EXPECT_FALSE(in_light(2).circuit);
   EXPECT_FALSE(scenario.cameras[0].event_camera.circuit->white_lux);
   // The recorded scenario keeps the light in one place, so that it can still be changed there.
   const Scenario again = read(write_scenario(scenario), {"light.white_lux=5"});
-  EXPECT_EQ(event_camera_of(again, again.cameras[0]).circuit->white_lux, 5);
+  EXPECT_EQ(in_light_of(again, again.cameras[0].event_camera).circuit->white_lux, 5);
   const Scenario dark = read(kMinimal, {"event_camera.preset=davis346"});
-  EXPECT_DOUBLE_EQ(event_camera_of(dark, dark.cameras[0]).circuit->white_photocurrent_fa(), 33 * 1000 * 0.9 / 16);
+  EXPECT_DOUBLE_EQ(in_light_of(dark, dark.cameras[0].event_camera).circuit->white_photocurrent_fa(),
+                   33 * 1000 * 0.9 / 16);
 
   for (const char* value : {"0", "-1", "1e10", ".nan", ".inf"}) {
     EXPECT_TRUE(contains(error(kMinimal, {std::string("light.white_lux=") + value}), "light.white_lux: ")) << value;

@@ -197,7 +197,7 @@ TEST_F(FlickeringLight, LeavesTheEventsOfMotionAsTheyAre) {
 TEST_F(FlickeringLight, IsTheSameWithAnyNumberOfThreadsTilesAndRenderers) {
   add_moving_card();
   mesh().objects[0].flicker = kPwm;
-  camera().event_camera = preset_options("davis346");
+  camera().event_camera = {preset_options("davis346")};
   for (const SamplingOptions& sampling :
        {SamplingOptions(AdaptiveSampling{}), SamplingOptions(FlowSampling{}), SamplingOptions(KeyframeSampling{})}) {
     camera().sampling = sampling;
@@ -336,7 +336,7 @@ TEST_F(FlickeringLight, ThatGoesDarkIsSeenByEverySensor) {
     for (const Event& event : out.events) ASSERT_TRUE(event.t >= 0 && event.t <= 20 * kNsPerMs) << name;
   };
   for (const std::string& name : SensorPreset::names()) {
-    camera().event_camera = preset_options(name);
+    camera().event_camera = {preset_options(name)};
     check(name);
   }
   camera().event_camera = {};

@@ -131,12 +131,12 @@ TEST_P(SensorFilters, GiveTheSameEventsAsFilteringAfterwards) {
         EXPECT_EQ(out.events[i], expected);
         EXPECT_GT(expected.size(), 100U);
         const CameraSummary& camera = summary.cameras[i];
-        EXPECT_EQ(camera.sensor.read_out, static_cast<std::int64_t>(unfiltered.events[i].size()));
-        EXPECT_EQ(camera.events_on + camera.events_off, static_cast<std::int64_t>(expected.size()));
-        ASSERT_EQ(camera.sensor.filtered.size(), chain.dropped().size());
+        EXPECT_EQ(camera.sensors[0].statistics.read_out, static_cast<std::int64_t>(unfiltered.events[i].size()));
+        EXPECT_EQ(camera.events(), static_cast<std::int64_t>(expected.size()));
+        ASSERT_EQ(camera.sensors[0].statistics.filtered.size(), chain.dropped().size());
         for (std::size_t k = 0; k < chain.dropped().size(); ++k) {
-          EXPECT_EQ(camera.sensor.filtered[k].filter, chain.dropped()[k].filter);
-          EXPECT_EQ(camera.sensor.filtered[k].events, chain.dropped()[k].events);
+          EXPECT_EQ(camera.sensors[0].statistics.filtered[k].filter, chain.dropped()[k].filter);
+          EXPECT_EQ(camera.sensors[0].statistics.filtered[k].events, chain.dropped()[k].events);
           EXPECT_GT(chain.dropped()[k].events, 0U) << chain.dropped()[k].filter;
         }
       }
@@ -169,7 +169,8 @@ TEST_F(FilteredSensor, TheReportCountsWhatEachFilterDropped) {
   ASSERT_EQ(report["filtered"].size(), 1U) << "only one camera has filters";
   const auto& right = report["filtered"][0];
   EXPECT_EQ(right["name"], "right");
-  EXPECT_EQ(right["events"].get<std::size_t>(), static_cast<std::size_t>(summary.cameras[1].sensor.read_out));
+  EXPECT_EQ(right["events"].get<std::size_t>(),
+            static_cast<std::size_t>(summary.cameras[1].sensors[0].statistics.read_out));
   EXPECT_EQ(right["kept"].get<std::size_t>(), out.events[1].size());
   EXPECT_EQ(right["dropped"].size(), 5U);
   EXPECT_EQ(report["cameras"][1]["events"].get<std::size_t>(), out.events[1].size());

@@ -18,6 +18,10 @@ int run(const std::string& file, const std::vector<std::string>& overrides) {
     fmt::print("camera {}: {}x{} px, fx {:.2f}, fy {:.2f}, renderer {}, {} sampling\n", camera.name, camera.model.width,
                camera.model.height, camera.model.fx, camera.model.fy, world.cameras[i].renderer->traits().label(),
                std::visit([](const auto& sampling) { return sampling.kType; }, scenario.cameras[i].sampling));
+    std::string names;
+    for (const SensorOptions& sensor : scenario.cameras[i].event_cameras)
+      names += (names.empty() ? "" : ", ") + sensor.name;
+    if (!names.empty()) fmt::print("camera {}: event sensors {}\n", camera.name, names);
   }
   if (world.info.imu) fmt::print("imu: {} Hz\n", world.info.imu->rate_hz);
   fmt::print("duration: {:.3f} s\n{}: ready to simulate\n", to_seconds(world.info.end - world.info.start), file);

@@ -30,7 +30,7 @@ constexpr const char* kAffine = "affine";
 
 struct DatasetArguments {
   std::string what, out, check, share;
-  std::uint32_t count = 10'000, shard_size = 0;
+  std::uint32_t count = 10'000, shard_size = 0, sensors = 1;
   std::uint64_t seed = 1;
   std::string format = "hdf5";
   std::vector<std::string> contents, overrides;
@@ -62,6 +62,7 @@ std::unique_ptr<SequenceMaker> make_affine(const DatasetArguments& arguments) {
       options.motion_field_at = static_cast<MotionFieldTime>(i);
   }
   options.event_camera = read_event_camera(arguments.overrides);
+  options.sensors = arguments.sensors;
   return std::make_unique<AffineSequences>(std::move(options));
 }
 
@@ -134,14 +135,18 @@ int run(DatasetArguments arguments) {
       tell(stderr, "warning: --contents: {} is now {}\n", name, present);
   }
   DatasetPlan plan{.count = arguments.count,
-                   .shard_size = arguments.shard_size > 0 ? arguments.shard_size : usual_shard_size(arguments.count),
+                   .shard_size = arguments.shard_size,
                    .format = arguments.format == "hdf5" ? ShardFormat::hdf5 : ShardFormat::webdataset,
                    .contents = contents_named(names)};
   const Share share = share_named(arguments.share);
   const std::unique_ptr<SequenceMaker> maker =
       affine ? make_affine(arguments)
              : std::make_unique<ScenarioSequences>(arguments.what, arguments.overrides, arguments.seed,
-                                                   plan.contents.optical_flow);
+                                                   plan.contents.optical_flow, arguments.sensors);
+  if (plan.shard_size == 0) {
+    const std::uint32_t usual = usual_shard_size(arguments.count), sensors = maker->sensors();
+    plan.shard_size = (usual + sensors - 1) / sensors * sensors;  // files do not divide the sequences of a rendering
+  }
   plan.maker = maker->options();
   if (share.part == 0) SequenceArrays(maker->make(0), plan.contents);  // a sample, before anything is written
   const DatasetFolder folder(arguments.out, plan, ESIM_VERSION);
@@ -240,6 +245,13 @@ void add_dataset(CLI::App& app, int& exit_code) {
   command->add_option("--shard-size", arguments->shard_size, "Sequences per file (default: up to 100)")
       ->type_name("N")
       ->check(CLI::Range(1U, 1'000'000U));
+  command
+      ->add_option(
+          "--sensors", arguments->sensors,
+          "Event sensors per rendered sequence: K consecutive sequences show the same, with other random options "
+          "of event_camera and other noise (default: 1)")
+      ->type_name("K")
+      ->check(CLI::Range(1U, 256U));
   command->add_option("--seed", arguments->seed, "Seed of all random numbers (default: 1)")->type_name("N");
   command
       ->add_option("--set", arguments->overrides,

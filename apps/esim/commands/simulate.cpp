@@ -16,12 +16,13 @@ struct SimulateArguments : RunOptions {
   std::string scenario;
   std::string out;
   std::optional<std::uint64_t> seed;
+  std::string keep_samples{};
 };
 
 void print_summary(const Summary& summary, const std::filesystem::path& out, bool previews) {
   std::int64_t events = 0, samples = 0;
   for (const CameraSummary& camera : summary.cameras) {
-    events += camera.events_on + camera.events_off;
+    events += camera.events();
     samples += camera.sampling.samples;
   }
   const double simulated_s = to_seconds(summary.end - summary.start);
@@ -35,8 +36,10 @@ void print_summary(const Summary& summary, const std::filesystem::path& out, boo
 }
 
 int run(const SimulateArguments& arguments) {
-  Scenario scenario = read_scenario(arguments.scenario, arguments.overrides);
-  if (arguments.seed) scenario.seed = *arguments.seed;
+  std::vector<std::string> overrides = arguments.overrides;
+  if (!arguments.keep_samples.empty()) overrides.push_back("output.samples=" + arguments.keep_samples);
+  if (arguments.seed) overrides.push_back(fmt::format("seed={}", *arguments.seed));
+  const Scenario scenario = read_scenario(arguments.scenario, overrides);
   const std::filesystem::path out =
       arguments.out.empty() ? std::filesystem::path("out") / std::filesystem::path(arguments.scenario).stem()
                             : std::filesystem::path(arguments.out);
@@ -77,9 +80,16 @@ void add_simulate(CLI::App& app, int& exit_code) {
   add_run_options(*command, *arguments, "Change one option, for example --set event_camera.contrast_threshold=0.2");
   command->add_option("--seed", arguments->seed, "Seed of all random numbers (default: the scenario's)")
       ->type_name("N");
+  command
+      ->add_flag("--keep-samples{true}", arguments->keep_samples,
+                 "Keep what the event sensors saw, for esim resense, with an error of the brightness up to 0.0005; "
+                 "--keep-samples=exact: without error, but larger. The same as --set output.samples=true or exact")
+      ->check(CLI::IsMember({"true", "exact"}));
   command->footer(
       "Examples:\n"
       "  esim simulate scenes/room.yaml --out out/room\n"
+      "  esim simulate scenes/room.yaml --out out/room --keep-samples     for other sensors later: esim resense "
+      "--help\n"
       "  esim simulate scenes/room.yaml --out out/fine --set sampling.lambda=0.1 --set duration_s=1 --seed 7");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

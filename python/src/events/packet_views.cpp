@@ -52,6 +52,15 @@ nb::dict to_dict(CameraPart part, const Camera& model) {
   return view;
 }
 
+const CameraInfo& lens_of(const CameraInfo& sensor, const RecordingInfo& info) {
+  return info.cameras[static_cast<std::size_t>(sensor.lens)];
+}
+
+/// The name of an event sensor that shares a lens, within its camera.
+std::string name_of_sensor(const CameraInfo& sensor, const RecordingInfo& info) {
+  return sensor.name.substr(lens_of(sensor, info).name.size() + 1);
+}
+
 nb::object matrix(const SE3& pose) {
   std::vector<double> values;
   append_matrix(pose, values);
@@ -64,8 +73,16 @@ nb::dict to_dict(Packet packet, const RecordingInfo& info) {
   nb::dict view, cameras;
   view["t0"] = packet.t0;
   view["t1"] = packet.t1;
-  for (std::size_t i = 0; i < packet.cameras.size(); ++i)
-    cameras[info.cameras[i].name.c_str()] = to_dict(std::move(packet.cameras[i]), info.cameras[i].model);
+  for (std::size_t i = 0; i < packet.cameras.size(); ++i) {
+    const CameraInfo& camera = info.cameras[i];
+    nb::dict part = to_dict(std::move(packet.cameras[i]), camera.model);
+    part["sensors"] = nb::dict();
+    if (camera.lens < 0) {
+      cameras[camera.name.c_str()] = part;
+    } else {
+      cameras[lens_of(camera, info).name.c_str()]["sensors"][name_of_sensor(camera, info).c_str()] = part;
+    }
+  }
   view["cameras"] = cameras;
   const std::size_t states = packet.body.size();
   view["body"] = bytes_to_numpy(std::move(packet.body));
@@ -77,7 +94,12 @@ nb::dict to_dict(Packet packet, const RecordingInfo& info) {
 nb::dict to_dict(const RecordingInfo& info) {
   nb::dict view, cameras;
   for (const CameraInfo& camera : info.cameras) {
+    if (camera.lens >= 0) {
+      nb::cast<nb::list>(cameras[lens_of(camera, info).name.c_str()]["sensors"]).append(name_of_sensor(camera, info));
+      continue;
+    }
     nb::dict one;
+    one["sensors"] = nb::list();
     const Camera& model = camera.model;
     one["width"] = model.width;
     one["height"] = model.height;

@@ -44,9 +44,6 @@ void bind_scenario(nb::module_& module) {
           },
           nb::arg("yaml"), nb::arg("file"), nb::arg("has_lines"), nb::arg("overrides"), nb::arg("needs_renderer"),
           nb::arg("needs_trajectory"))
-      .def_prop_rw(
-          "seed", [](const CheckedScenario& self) { return self.value.seed; },
-          [](CheckedScenario& self, std::uint64_t seed) { self.value.seed = seed; })
       .def("describe", [](const CheckedScenario& self) { return describe(self.value); })
       .def("to_yaml", [](const CheckedScenario& self) { return write_scenario(self.value); });
   module.def("scenario_reference", &scenario_reference);

@@ -87,6 +87,7 @@ void Simulation::build(const Substitutes& substitutes, const std::string& origin
   if (directory_ != nullptr) {
     write_file_atomically(directory_->path() / "scenario.yaml", origin + write_scenario(scenario_));
     recorder_ = build_sink(scenario_, directory_->path());
+    samples_ = std::make_unique<SampleStores>(scenario_, directory_->path(), *world_);
   }
   sink_ = std::make_unique<Both>(*packets_, recorder_.get());
   simulator_ = std::make_unique<Simulator>(*world_, *sink_);
@@ -119,6 +120,7 @@ bool Simulation::advance() {
 void Simulation::finish() {
   over_ = true;
   const Summary summary = simulator_->finish();
+  if (samples_ != nullptr && summary.complete) samples_->finish();
   simulator_.reset();
   losses_ = esim::losses(scenario_, summary);
   for (const std::string& loss : losses_) notices_.push_back("warning: " + loss);

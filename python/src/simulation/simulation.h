@@ -69,6 +69,7 @@ class Simulation {
   std::unique_ptr<World> world_;
   std::unique_ptr<PacketSink> packets_;
   std::unique_ptr<Sink> recorder_, sink_;
+  std::unique_ptr<SampleStores> samples_;
   std::unique_ptr<Simulator> simulator_;
   std::optional<nanobind::python_error> signal_;
   double looked_at_ = 0;  // wall-clock time of the last check for signals, s

@@ -10,10 +10,20 @@ namespace {
 /// Errors of brightness are this fraction of the smallest threshold.
 constexpr double kTolerance = 1e-3;
 
-LightAccuracy accuracy_for(const CameraOptions& camera) {
-  const EventCameraOptions& sensor = camera.event_camera;
+LightAccuracy accuracy_for(const EventCameraOptions& sensor) {
   const bool linear_toe = sensor.response == PixelResponse::lin_log && !sensor.circuit;
   return {kTolerance * sensor.min_threshold(), linear_toe ? sensor.lin_log_knee : sensor.dark_light()};
+}
+
+/// What suffices for each of the camera's sensors.
+LightAccuracy accuracy_for(const CameraOptions& camera) {
+  LightAccuracy strictest = accuracy_for(camera.first_sensor());
+  for (const SensorOptions& sensor : camera.sensors()) {
+    const LightAccuracy accuracy = accuracy_for(sensor);
+    strictest.tolerance = std::min(strictest.tolerance, accuracy.tolerance);
+    strictest.dark = std::min(strictest.dark, accuracy.dark);
+  }
+  return strictest;
 }
 
 /// Makes each object, or sprite, that flickers a light of its own. `first`: the number of the first one.

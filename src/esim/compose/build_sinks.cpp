@@ -53,11 +53,21 @@ std::filesystem::path place_for(const Format& format, const std::filesystem::pat
   return path;
 }
 
-/// The formats of output.formats: formats for several cameras at the top, others in the cameras' folders.
+/// The folder of the files of an event sensor.
+std::filesystem::path folder_of(const std::filesystem::path& folder, const CameraOptions& camera,
+                                const SensorOptions& sensor) {
+  return sensor.name.empty() ? folder / camera.name : folder / camera.name / sensor.name;
+}
+
+/// The formats of output.formats: formats for several cameras at the top, others in the folders of the event sensors,
+/// each with the images of its camera.
 void add_formats(const Scenario& scenario, const std::filesystem::path& folder, const WriteOptions& options,
                  FanOut& sinks) {
   std::set<std::filesystem::path> taken;
-  for (const CameraOptions& camera : scenario.cameras) taken.insert(folder / camera.name / "events.h5");
+  const std::vector<std::vector<int>> numbers = sensor_numbers(scenario);
+  for (const CameraOptions& camera : scenario.cameras) {
+    for (const SensorOptions& sensor : camera.sensors()) taken.insert(folder_of(folder, camera, sensor) / "events.h5");
+  }
   for (const std::string& name : scenario.output.formats) {
     const Format& format = written(name);
     if (format.several_cameras) {
@@ -66,9 +76,14 @@ void add_formats(const Scenario& scenario, const std::filesystem::path& folder, 
     }
     const bool events_alone = format.holds == std::vector{Content::events};
     for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
-      if (events_alone && !scenario.cameras[i].events) continue;
-      const auto place = place_for(format, folder / scenario.cameras[i].name / "events", taken);
-      sinks.add(std::make_unique<OneCamera>(format.create(place, options), static_cast<int>(i)));
+      const CameraOptions& camera = scenario.cameras[i];
+      const auto add = [&](const std::filesystem::path& place, int sensor) {
+        sinks.add(std::make_unique<OneCamera>(format.create(place_for(format, place / "events", taken), options),
+                                              static_cast<int>(i), sensor));
+      };
+      for (std::size_t k = 0; k < numbers[i].size(); ++k)
+        add(folder_of(folder, camera, camera.sensors()[k]), numbers[i][k]);
+      if (!camera.events && !events_alone) add(folder / camera.name, static_cast<int>(i));
     }
   }
 }
@@ -85,6 +100,7 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
   const Compression compression = compression_of(output.compression);
   const TimeUnit unit = output.time_unit == EventTimeUnit::us ? TimeUnit::us : TimeUnit::ns;
 
+  const std::vector<std::vector<int>> numbers = sensor_numbers(scenario);
   auto sinks = std::make_unique<FanOut>();
   sinks->add(std::make_unique<CalibrationWriter>(folder / "calibration"));
   if (scenario.imu) sinks->add(std::make_unique<ImuCsvWriter>(folder));
@@ -96,21 +112,26 @@ std::unique_ptr<Sink> build_sink(const Scenario& scenario, const std::filesystem
     const int camera = static_cast<int>(i);
     const auto place = folder / scenario.cameras[i].name;
     create_folder(place);
-    const bool events = scenario.cameras[i].events;
-    if (events)
-      sinks->add(std::make_unique<EventsHdf5Writer>(place / "events.h5", camera, EventsHdf5Options{unit, compression}));
+    for (std::size_t k = 0; k < numbers[i].size(); ++k) {
+      const auto of_sensor = folder_of(folder, scenario.cameras[i], scenario.cameras[i].sensors()[k]);
+      create_folder(of_sensor);
+      sinks->add(std::make_unique<EventsHdf5Writer>(of_sensor / "events.h5", numbers[i][k],
+                                                    EventsHdf5Options{unit, compression}));
+      if (truth.event_points)
+        sinks->add(std::make_unique<EventPointsPlyWriter>(of_sensor / "event_points.ply", numbers[i][k]));
+    }
     if (const auto& frames = scenario.cameras[i].frame_camera) {
       const bool in_colour = scenario.cameras[i].colour != ColourFilters::none && frames->demosaic;
       sinks->add(std::make_unique<FramesPngWriter>(place, camera, in_colour));
     }
-    if (events && truth.event_points)
-      sinks->add(std::make_unique<EventPointsPlyWriter>(place / "event_points.ply", camera));
     if (truth.rate_hz <= 0) continue;
     if (truth.images) sinks->add(std::make_unique<ImagesPngWriter>(place / "images", camera));
     const TruthHdf5Options datasets{truth.depth, truth.motion_field, compression, truth.objects, truth.optical_flow};
     if (datasets.depth || datasets.motion_field || datasets.objects || datasets.optical_flow)
       sinks->add(std::make_unique<TruthHdf5Writer>(place / "truth.h5", camera, datasets));
-    if (output.preview) sinks->add(std::make_unique<PreviewWriter>(place, camera));
+    if (!output.preview) continue;
+    const int shown = numbers[i].empty() ? camera : numbers[i].front();  // the events of the first sensor
+    sinks->add(std::make_unique<OneCamera>(std::make_unique<PreviewWriter>(place, 0), camera, shown));
   }
   add_formats(scenario, folder, {unit, compression}, *sinks);
   return std::make_unique<BackgroundSink>(std::move(sinks));

@@ -34,11 +34,17 @@ void check_sampling(const CameraOptions& camera, const Notices& notices) {
   std::visit(check, camera.sampling);
 }
 
-/// Warns of filters that the camera's sensor does not have.
+/// The name of an event sensor's camera in the recording.
+std::string name_of(const CameraOptions& camera, const SensorOptions& sensor) {
+  return sensor.name.empty() ? camera.name : camera.name + "/" + sensor.name;
+}
+
+/// Warns of filters that the camera's sensors do not have.
 void check_filters(const CameraOptions& camera, const Notices& notices) {
-  if (!camera.events) return;
-  for (const std::string& line : warnings_of_filters(camera.event_camera))
-    notices.warning(fmt::format("camera {}: {}", camera.name, line));
+  for (const SensorOptions& sensor : camera.sensors()) {
+    for (const std::string& line : warnings_of_filters(sensor))
+      notices.warning(fmt::format("camera {}: {}", name_of(camera, sensor), line));
+  }
 }
 
 /// Whether any camera sees colour.
@@ -50,12 +56,12 @@ bool sees_colour(const Scenario& scenario) {
 /// What cameras need of the scene's textures.
 SceneLook look_of(const Scenario& scenario) { return sees_colour(scenario) ? SceneLook::colour : SceneLook::luminance; }
 
-std::unique_ptr<Sampler> build_sampler(const CameraOptions& options, const EventCameraOptions& sensor,
-                                       const World& world, std::size_t index, Renderer& renderer,
-                                       const CameraRenderers& renderers) {
+std::unique_ptr<Sampler> build_sampler(const Scenario& scenario, const World& world, std::size_t index,
+                                       Renderer& renderer, const CameraRenderers& renderers) {
+  const CameraOptions& options = scenario.cameras[index];
   const Workers& workers = *world.workers;
   const Camera& model = world.info.cameras[index].model;
-  const SensorTraits traits{sensor.min_threshold(), sensor.dark_light(), sees_colour(options)};
+  const SensorTraits traits = strictest_sensor(scenario, options);
   const auto make_other = [&](const Camera& camera, const std::optional<PixelArea>& area) {
     return renderers.make(camera, area);
   };
@@ -67,6 +73,40 @@ std::unique_ptr<Sampler> build_sampler(const CameraOptions& options, const Event
     throw;
   } catch (const UserError& error) {
     throw UserError(fmt::format("camera {}: {}", options.name, error.what()));
+  }
+}
+
+/// Sets the event sensors of a camera, and their descriptions. `numbers`: of the sensors in the recording.
+void add_event_sensors(const Scenario& scenario, std::size_t index, const std::vector<int>& numbers, TimeNs start,
+                       const Notices& notices, World& world) {
+  const CameraOptions& options = scenario.cameras[index];
+  CameraChannel& camera = world.cameras[index];
+  const Camera& model = world.info.cameras[index].model;
+  const bool moves = !world.info.objects.empty() || !world.info.sprites.empty();
+  for (std::size_t k = 0; k < options.sensors().size(); ++k) {
+    const SensorOptions& sensor = options.sensors()[k];
+    const std::string name = name_of(options, sensor);
+    const EventCameraOptions lit = in_light_of(scenario, sensor);
+    warn_of_noise(fmt::format("camera {}: ", name), lit, notices);
+    try {
+      camera.event_sensors.push_back({EventCamera(lit, model.width, model.height, sensor.seed.value_or(scenario.seed),
+                                                  static_cast<std::uint16_t>(index)),
+                                      numbers[k]});
+    } catch (const UserError& error) {
+      if (sensor.name.empty()) throw;
+      throw UserError(fmt::format("camera {}: {}", name, error.what()));
+    }
+    const auto number = static_cast<std::size_t>(numbers[k]);
+    if (!sensor.name.empty()) {
+      world.info.cameras[number] = world.info.cameras[index];
+      world.info.cameras[number].name = name;
+      world.info.cameras[number].has_frames = false;
+      world.info.cameras[number].lens = static_cast<int>(index);
+    }
+    world.info.cameras[number].has_labels = sensor.labels;
+    if (!sensor.labels) continue;
+    if (moves && !camera.seen_objects) camera.seen_objects.emplace(model.width, model.height);
+    if (camera.flicker) camera.event_sensors.back().flicker_labels.emplace(model.width, model.height, start);
   }
 }
 
@@ -121,7 +161,8 @@ void name_what_has_no_effect(const Scenario& scenario, const World& world, std::
 
 void warn_of_light_without_effect(const Scenario& scenario, const Notices& notices) {
   const auto uses_light = [](const CameraOptions& camera) {
-    return camera.events && camera.event_camera.circuit && !camera.event_camera.circuit->white_lux;
+    return std::ranges::any_of(
+        camera.sensors(), [](const SensorOptions& sensor) { return sensor.circuit && !sensor.circuit->white_lux; });
   };
   if (!scenario.light.white_lux || std::ranges::any_of(scenario.cameras, uses_light)) return;
   notices.warning(
@@ -183,7 +224,9 @@ void check_substitutes(const Scenario& scenario, const Substitutes& substitutes,
 
 /// Notes formats that lose labels which the scenario requests.
 void name_formats_without_labels(const Scenario& scenario, const Notices& notices) {
-  const auto has_labels = [](const CameraOptions& camera) { return camera.events && camera.event_camera.labels; };
+  const auto has_labels = [](const CameraOptions& camera) {
+    return std::ranges::any_of(camera.sensors(), &SensorOptions::labels);
+  };
   if (std::ranges::none_of(scenario.cameras, has_labels)) return;
   for (const std::string& name : scenario.output.formats) {
     if (format_named(name).can_hold(Content::event_labels)) continue;
@@ -231,7 +274,6 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
     check_sampling(options, notices);
     check_filters(options, notices);
     world.info.cameras.push_back(camera_info(options, followed));
-    world.info.cameras.back().has_labels = options.events && options.event_camera.labels;
   }
   const RendererFactory make_renderer =
       substitutes.make_renderer
@@ -239,30 +281,27 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
               return substitutes.make_renderer(camera, workers);
             }}
           : build_renderer_factory(scenario.renderer, scene, sees_colour(scenario), world.info.cameras, notices);
+  const std::vector<std::vector<int>> numbers = sensor_numbers(scenario);
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
     const CameraOptions& options = scenario.cameras[i];
-    const Camera& model = world.info.cameras[i].model;
-    const EventCameraOptions sensor = event_camera_of(scenario, options);
+    const Camera model = world.info.cameras[i].model;
     const bool sees_more = !substitutes.make_renderer && engine_objects(scenario.renderer) == nullptr;
     const CameraRenderers renderers(make_renderer, options, model, sees_more, *world.workers);
     std::unique_ptr<Renderer> renderer = renderers.make();
-    std::unique_ptr<Sampler> sampler = build_sampler(options, sensor, world, i, *renderer, renderers);
-    world.cameras.push_back({std::move(renderer), std::move(sampler), std::nullopt, {}});
-    if (options.events) {
-      warn_of_noise(fmt::format("camera {}: ", options.name), sensor, notices);
-      world.cameras.back().event_camera.emplace(sensor, model.width, model.height, scenario.seed,
-                                                static_cast<std::uint16_t>(i));
-      const bool moves = !world.info.objects.empty() || !world.info.sprites.empty();
-      if (sensor.labels && moves) world.cameras.back().seen_objects.emplace(model.width, model.height);
-    }
+    std::unique_ptr<Sampler> sampler = build_sampler(scenario, world, i, *renderer, renderers);
+    world.cameras.push_back({std::move(renderer), std::move(sampler)});
+    world.cameras.back().flicker = build_flicker(scenario, options, world.info.objects.size(), span.start);
     if (options.frame_camera)
       world.cameras.back().frame_camera = build_frame_camera(options, model, span, scenario.seed, i, notices);
-    world.cameras.back().flicker = build_flicker(scenario, options, world.info.objects.size(), span.start);
-    if (world.cameras.back().flicker && options.events && options.event_camera.labels)
-      world.cameras.back().flicker_labels.emplace(model.width, model.height, span.start);
     require_a_view(world, i);
     name_what_has_no_effect(scenario, world, i, notices);
   }
+  for (const std::vector<int>& camera : numbers) {
+    for (const int number : camera)
+      world.info.cameras.resize(std::max(world.info.cameras.size(), static_cast<std::size_t>(number) + 1));
+  }
+  for (std::size_t i = 0; i < scenario.cameras.size(); ++i)
+    add_event_sensors(scenario, i, numbers[i], span.start, notices, world);
   prepare_truth(scenario, scene, make_renderer, notices, world);
   return world;
 }
@@ -285,6 +324,30 @@ TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory) 
                     *scenario.duration_s, available_s));
   }
   return {start, end};
+}
+
+std::vector<std::vector<int>> sensor_numbers(const Scenario& scenario) {
+  std::vector<std::vector<int>> numbers(scenario.cameras.size());
+  int next = static_cast<int>(scenario.cameras.size());
+  for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
+    for (const SensorOptions& sensor : scenario.cameras[i].sensors())
+      numbers[i].push_back(sensor.name.empty() ? static_cast<int>(i) : next++);
+  }
+  return numbers;
+}
+
+SensorTraits strictest_sensor(const Scenario& scenario, const CameraOptions& camera) {
+  const auto traits_of = [&](const EventCameraOptions& sensor) {
+    const EventCameraOptions lit = in_light_of(scenario, sensor);
+    return SensorTraits{lit.min_threshold(), lit.dark_light(), sees_colour(camera)};
+  };
+  SensorTraits strictest = traits_of(camera.first_sensor());
+  for (const SensorOptions& sensor : camera.sensors()) {
+    const SensorTraits traits = traits_of(sensor);
+    strictest.contrast_threshold = std::min(strictest.contrast_threshold, traits.contrast_threshold);
+    strictest.log_eps = std::min(strictest.log_eps, traits.log_eps);
+  }
+  return strictest;
 }
 
 CameraInfo camera_info(CameraOptions options, const SceneCamera* followed) {

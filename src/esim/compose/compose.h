@@ -12,6 +12,7 @@
 #include "esim/light/flicker.h"
 #include "esim/recording/format.h"
 #include "esim/render/pixel_area.h"
+#include "esim/sampling/context.h"
 #include "esim/scenario/conversion.h"
 #include "esim/scenario/scenario.h"
 #include "esim/scene/scene_file.h"
@@ -68,6 +69,13 @@ World build_world(const Scenario& scenario, const Substitutes& substitutes, int 
 
 /// The part of the body's trajectory that a scenario simulates. Throws UserError if the trajectory does not cover it.
 TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory);
+
+/// The numbers of the event sensors of each camera in RecordingInfo::cameras: that of the camera itself for a sensor
+/// without a name; sensors with names come after all cameras.
+std::vector<std::vector<int>> sensor_numbers(const Scenario& scenario);
+
+/// What a camera's sampler and its lights must suit: the smallest threshold and the smallest dark light of its sensors.
+SensorTraits strictest_sensor(const Scenario& scenario, const CameraOptions& camera);
 
 /// A camera as it is recorded. If its options give no field of view, it has that of the followed camera (may be null).
 CameraInfo camera_info(CameraOptions options, const SceneCamera* followed);
@@ -142,6 +150,48 @@ std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& folder)
 
 /// One file of a format.
 std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& file, const Format& format);
+
+// --- samples (samples/) ----------------------------------------------------------------------------------------------
+
+/// Keeps the samples of a world, for resense(), in the folders of its cameras if the scenario requests it. It must
+/// outlive the simulation.
+class SampleStores {
+ public:
+  SampleStores(const Scenario& scenario, const std::filesystem::path& folder, World& world);
+  ~SampleStores();
+  SampleStores(const SampleStores&) = delete;
+  SampleStores& operator=(const SampleStores&) = delete;
+
+  /// Completes the stores of a complete simulation.
+  void finish();
+
+ private:
+  struct Store;
+  std::vector<std::unique_ptr<Store>> stores_;
+};
+
+/// New events from the samples of a recording.
+struct Resensed {
+  Summary summary;
+  bool exact = false;  ///< the events are those of a simulation with the same options
+};
+
+/// Options of resense().
+struct ResenseOptions {
+  std::filesystem::path recording{};     ///< with samples
+  std::filesystem::path out{};           ///< the folder of the new recording
+  bool replace = false;                  ///< an existing one
+  int threads = 0;                       ///< 0: every processor
+  std::vector<std::string> overrides{};  ///< "key=value"
+  std::string setter{};                  ///< beginning of messages about these
+  Repetition repetition{};               ///< for the report
+};
+
+/// Makes a recording with the events that other sensors, or the same ones with other options, have of the samples of a
+/// recording, without a renderer. The overrides may change the event sensors, the light's unit and the output; those of
+/// `event_camera` apply to all sensors of all cameras, and a preset replaces all their options. A notice says whether
+/// the events are exact, and why not. Throws UserError for other overrides and for recordings without complete samples.
+Resensed resense(const ResenseOptions& options, const Notices& notify, const Monitor& monitor);
 
 // --- reports (recording_report.cpp, losses_and_hints.cpp) ------------------------------------------------------------
 

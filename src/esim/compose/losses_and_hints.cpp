@@ -77,7 +77,7 @@ void add_sampling(const std::string& name, const Scenario& scenario, const Camer
         steps ? "Set renderer.samples_per_pixel to 16: with 1, edges move in steps of whole pixels"
               : "Raise max_rate_hz, or move more slowly"));
   }
-  const double budget = sampling.tolerance * camera.event_camera.min_threshold();
+  const double budget = sampling.tolerance * strictest_sensor(scenario, camera).contrast_threshold;
   if (sampling.measured_error && sampling.measured_error->p99 > budget) {
     lines.push_back(fmt::format(
         "{}sampling missed its tolerance: the 99th percentile of the measured error is {:.3g} in brightness, "
@@ -108,7 +108,9 @@ std::vector<std::string> warnings_of_filters(const EventCameraOptions& sensor) {
 
 std::vector<FilteredCamera> filtered_cameras(const Summary& summary) {
   std::vector<FilteredCamera> cameras;
-  for (const CameraSummary& camera : summary.cameras) add_filtered(camera.name, camera.sensor, cameras);
+  for (const CameraSummary& camera : summary.cameras) {
+    for (const SensorSummary& sensor : camera.sensors) add_filtered(sensor.name, sensor.statistics, cameras);
+  }
   return cameras;
 }
 
@@ -124,7 +126,8 @@ std::vector<std::string> losses(const Scenario& scenario, const Summary& summary
     const CameraSummary& done = summary.cameras[i];
     const CameraOptions& camera = scenario.cameras[i];
     const std::string name = done.name + ": ";
-    if (camera.events) add_sensor(name, camera.event_camera.readout, done.sensor, lines);
+    for (std::size_t k = 0; k < done.sensors.size(); ++k)
+      add_sensor(done.sensors[k].name + ": ", camera.sensors()[k].readout, done.sensors[k].statistics, lines);
     add_sampling(name, scenario, camera, done.sampling, lines);
   }
   return lines;

@@ -32,6 +32,7 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
   World world = build_world(scenario, options.threads, notices);
   write_file_atomically(directory.path() / "scenario.yaml", write_scenario(scenario));
   std::unique_ptr<Sink> sink = build_sink(scenario, directory.path());
+  SampleStores samples(scenario, directory.path(), world);
   if (options.beside != nullptr) {
     auto both = std::make_unique<FanOut>();
     both->add(std::move(sink));
@@ -45,6 +46,7 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
       recorded |= progress.now > progress.start;
       return monitor(progress);
     });
+    if (summary.complete) samples.finish();
     for (const std::string& loss : losses(scenario, summary)) given.push_back("warning: " + loss);
     std::ranges::copy(hints(scenario, summary), std::back_inserter(given));
     directory.finish(

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "esim/compose/compose.h"
 
@@ -30,6 +32,46 @@ void add_provenance(const Provenance& provenance, Json& report) {
   for (const HashedFile& input : provenance.inputs) report["inputs"].push_back(json(input));
 }
 
+/// The events of a sensor, or of several.
+Json json(const SensorSummary& sensor, double simulated_s) {
+  const std::int64_t events = sensor.events_on + sensor.events_off;
+  return {{"events", events},
+          {"events_on", sensor.events_on},
+          {"events_off", sensor.events_off},
+          {"events_dropped_by_readout", sensor.statistics.dropped},
+          {"events_delayed_by_readout", sensor.statistics.delayed},
+          {"longest_readout_delay_s", to_seconds(sensor.statistics.longest_delay)},
+          {"events_lost_by_max_rate", sensor.statistics.lost},
+          {"events_per_second", simulated_s > 0 ? static_cast<double>(events) / simulated_s : 0.0}};
+}
+
+/// The events of all sensors of a camera; the longest delay of any.
+SensorSummary sum_of(const std::vector<SensorSummary>& sensors) {
+  SensorSummary sum;
+  for (const SensorSummary& sensor : sensors) {
+    sum.events_on += sensor.events_on;
+    sum.events_off += sensor.events_off;
+    sum.statistics.dropped += sensor.statistics.dropped;
+    sum.statistics.delayed += sensor.statistics.delayed;
+    sum.statistics.longest_delay = std::max(sum.statistics.longest_delay, sensor.statistics.longest_delay);
+    sum.statistics.lost += sensor.statistics.lost;
+  }
+  return sum;
+}
+
+/// One of several sensors: its name, what distinguishes it, and its events.
+Json json(const SensorOptions& sensor, const Scenario& scenario, const SensorSummary& summary, double simulated_s) {
+  Json result = {{"name", sensor.name},
+                 {"folder", summary.name},
+                 {"preset", sensor.preset.name()},
+                 {"contrast_threshold_on", sensor.threshold_on()},
+                 {"contrast_threshold_off", sensor.threshold_off()},
+                 {"seed", sensor.seed.value_or(scenario.seed)}};
+  for (const SensorOptions::Varied& option : sensor.varied) result["varied"][option.key] = option.value;
+  result.update(json(summary, simulated_s));
+  return result;
+}
+
 Json json(double number) { return number; }
 Json json(std::int64_t number) { return number; }
 
@@ -43,7 +85,6 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
   for (std::size_t i = 0; i < summary.cameras.size(); ++i) {
     const CameraSummary& camera = summary.cameras[i];
     const SamplingStatistics& sampling = camera.sampling;
-    const std::int64_t events = camera.events_on + camera.events_off;
     const double pixels = static_cast<double>(camera.width * camera.height);
     cameras.push_back({
         {"name", camera.name},
@@ -55,16 +96,14 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
         {"pixel_evaluations", sampling.pixel_evaluations},
         {"frame_equivalents", static_cast<double>(sampling.pixel_evaluations) / pixels},
         {"samples_held_to_max_rate", sampling.held_to_max_rate},
-        {"events", events},
-        {"events_on", camera.events_on},
-        {"events_off", camera.events_off},
-        {"events_dropped_by_readout", camera.sensor.dropped},
-        {"events_delayed_by_readout", camera.sensor.delayed},
-        {"longest_readout_delay_s", to_seconds(camera.sensor.longest_delay)},
-        {"events_lost_by_max_rate", camera.sensor.lost},
-        {"events_per_second", simulated_s > 0 ? static_cast<double>(events) / simulated_s : 0.0},
     });
-    if (scenario.cameras[i].events) cameras.back()["preset"] = scenario.cameras[i].event_camera.preset.name();
+    cameras.back().update(json(sum_of(camera.sensors), simulated_s));
+    const std::span<const SensorOptions> sensors = scenario.cameras[i].sensors();
+    if (sensors.size() == 1) cameras.back()["preset"] = sensors.front().preset.name();
+    for (std::size_t k = 0; k < sensors.size(); ++k) {
+      if (!sensors[k].name.empty())
+        cameras.back()["sensors"].push_back(json(sensors[k], scenario, camera.sensors[k], simulated_s));
+    }
     if (scenario.cameras[i].frame_camera) cameras.back()["frames_written"] = camera.frames;
     if (sampling.measured_error) {
       cameras.back()["tolerance"] = sampling.tolerance;

@@ -28,6 +28,7 @@ enum class Purpose : std::uint16_t {
   circuit_mismatch = 25,
   circuit_start = 26,
   resampling = 27,
+  sensor_choice = 28,
   test = 1000,
 };
 

@@ -108,9 +108,12 @@ class Run {
     record.magnitudes.assign(maker_.magnitudes().bins() + 1, 0);
     WorkingFile working{folder_.working_path(shard)};
     const auto writer = make_writer(plan.format, working.path);
-    std::vector<Sequence> shown;
+    std::vector<Sequence> shown, rendered;
+    const std::uint32_t sensors = maker_.sensors();
     for (std::uint32_t i = 0; i < record.count; ++i) {
-      Sequence sequence = maker_.make(record.first + i);
+      const std::uint32_t index = record.first + i;
+      if (i == 0 || index % sensors == 0) rendered = maker_.make_all(index / sensors);
+      Sequence sequence = std::move(rendered[index % sensors]);
       writer->add(SequenceArrays(sequence, plan.contents).shard_sequence());
       record.events += sequence.events.size();
       record.passed_over.insert(sequence.passed_over.begin(), sequence.passed_over.end());

@@ -37,8 +37,9 @@ class EventStore final : public Sink {
 Scenario bare(const Scenario& scenario) {
   Scenario bare = scenario;
   bare.cameras.resize(1);
-  const EventCameraOptions given = event_camera_of(scenario, scenario.cameras.at(0));
-  EventCameraOptions& sensor = bare.cameras[0].event_camera;
+  const EventCameraOptions given = in_light_of(scenario, scenario.cameras.at(0).first_sensor());
+  bare.cameras[0].event_cameras.clear();
+  SensorOptions& sensor = bare.cameras[0].event_camera;
   sensor = {};
   sensor.contrast_threshold = given.contrast_threshold;
   sensor.contrast_threshold_on = given.threshold_on();
@@ -226,7 +227,7 @@ class Evaluation {
     for (std::size_t i = 0; i < brightness.size(); ++i) result.windows[i].brightness = std::move(brightness[i]);
     const CameraSummary& done = summary.cameras[0];
     result.held_to_max_rate = done.sampling.held_to_max_rate;
-    result.events = done.events_on + done.events_off;
+    result.events = done.events();
     result.seconds = summary.seconds;
     result.seconds.sampling = std::max(0.0, result.seconds.sampling - measuring_s);
     result.wall_seconds = summary.wall_seconds - measuring_s;

@@ -143,6 +143,7 @@ std::string conversion_report(const RecordingInfo& info, const std::string& from
                               const std::function<std::map<std::string, std::string>()>& further) {
   auto cameras = nlohmann::ordered_json::array();
   for (const CameraInfo& camera : info.cameras) {
+    if (camera.lens >= 0) continue;
     cameras.push_back({{"name", camera.name}, {"width", camera.model.width}, {"height", camera.model.height}});
   }
   nlohmann::ordered_json report = {{"status", complete ? "complete" : "interrupted"}, {"converted_from", from}};

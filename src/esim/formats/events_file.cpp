@@ -11,6 +11,7 @@
 #include "esim/core/remedy.h"
 #include "esim/files/number_text.h"
 #include "esim/formats/formats.h"
+#include "esim/formats/recording_folder/recording_folder.h"
 #include "esim/recording/recording_directory.h"
 
 namespace esim::inline formats {
@@ -28,15 +29,20 @@ fs::path find_any_file(const fs::path& path) {
   if (!fs::is_directory(path, error)) return path;
   if (const auto file = events_file_in(path)) return *file;
 
+  // The folders of cameras, and of event sensors that share their lenses.
   std::vector<fs::path> cameras;
   for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error)) {
     if (events_file_in(entry->path())) cameras.push_back(entry->path());
+    std::error_code unreadable;
+    if (!entry->is_directory(unreadable)) continue;
+    for (const std::string& sensor : sensors_in(entry->path())) cameras.push_back(entry->path() / sensor);
   }
   if (cameras.empty()) throw UserError(path.string() + ": there is no events.h5 or events.txt inside");
   if (cameras.size() == 1) return *events_file_in(cameras.front());
   std::sort(cameras.begin(), cameras.end());
   std::string names;
-  for (const fs::path& camera : cameras) names += (names.empty() ? "" : ", ") + camera.filename().string();
+  for (const fs::path& camera : cameras)
+    names += (names.empty() ? "" : ", ") + camera.lexically_relative(path).string();
   throw UserError(fmt::format("{} holds several cameras ({}): name one, for example {}", path.string(), names,
                               cameras.front().string()));
 }

@@ -138,7 +138,7 @@ void list_files(const fs::path& root, const fs::path& below, std::vector<FileSiz
     if (fs::is_regular_file(status)) {
       const std::uintmax_t bytes = fs::file_size(root / name, error);
       files.push_back({name, error ? 0 : bytes});
-    } else if (fs::is_directory(status) && below.empty() && is_camera_folder(root / name)) {
+    } else if (fs::is_directory(status) && (is_camera_folder(root / name) || !sensors_in(root / name).empty())) {
       list_files(root, name, files);
     } else if (fs::is_directory(status)) {
       files.push_back(folder_size(root / name, name));
@@ -162,6 +162,10 @@ Inspection inspect_directory(const fs::path& directory) {
   std::sort(cameras.begin(), cameras.end());
   for (const std::string& camera : cameras) {
     if (auto summary = summarise_folder(directory / camera, camera)) inspection.cameras.push_back(*std::move(summary));
+    for (const std::string& sensor : sensors_in(directory / camera)) {
+      const std::string name = camera + "/" + sensor;
+      if (auto summary = summarise_folder(directory / name, name)) inspection.cameras.push_back(*std::move(summary));
+    }
   }
   if (inspection.cameras.empty() && inspection.status == RecordingStatus::unknown) {
     throw UserError(directory.string() + " is not a recording: no report.json and no events.h5 inside");

@@ -5,13 +5,17 @@ namespace esim::inline recording {
 void OneCamera::begin(const RecordingInfo& info) {
   RecordingInfo one = info;
   one.cameras = {info.cameras.at(static_cast<std::size_t>(camera_))};
+  const CameraInfo& sensor = info.cameras.at(static_cast<std::size_t>(sensor_));
+  one.cameras[0].name = sensor.name;
+  one.cameras[0].has_labels = sensor.has_labels;
   inner_->begin(one);
 }
 
 void OneCamera::write(const Record& record) {
   const auto pass_on = [&]<typename Kind>(const Kind& alternative) {
     if constexpr (requires { alternative.camera; }) {
-      if (alternative.camera != camera_) return;
+      constexpr bool kOfEvents = requires { alternative.events; };
+      if (alternative.camera != (kOfEvents ? sensor_ : camera_)) return;
       Kind of_the_only_one = alternative;
       of_the_only_one.camera = 0;
       inner_->write(of_the_only_one);

@@ -13,7 +13,11 @@ namespace esim::inline recording {
 /// Passes on the records of one camera, as camera 0 and the only one, and those that belong to no camera.
 class OneCamera final : public Sink {
  public:
-  OneCamera(std::unique_ptr<Sink> inner, int camera) : inner_(std::move(inner)), camera_(camera) {}
+  OneCamera(std::unique_ptr<Sink> inner, int camera) : OneCamera(std::move(inner), camera, camera) {}
+
+  /// The same with the events of camera `sensor`, an event sensor that shares the lens of `camera`.
+  OneCamera(std::unique_ptr<Sink> inner, int camera, int sensor)
+      : inner_(std::move(inner)), camera_(camera), sensor_(sensor) {}
 
   void begin(const RecordingInfo& info) override;
   void write(const Record& record) override;
@@ -21,7 +25,7 @@ class OneCamera final : public Sink {
 
  private:
   std::unique_ptr<Sink> inner_;
-  int camera_;
+  int camera_, sensor_;
 };
 
 /// Passes all records on, with times relative to the start of the recording.

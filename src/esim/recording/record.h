@@ -17,13 +17,15 @@
 
 namespace esim::inline recording {
 
-/// One camera of the recording.
+/// One camera of the recording. Each event sensor of several behind one lens is a camera, too, which has only events;
+/// it comes after the cameras with lenses.
 struct CameraInfo {
-  std::string name;         ///< unique within the rig: `cam0`, ...
+  std::string name;         ///< unique within the rig: `cam0`, ...; of a sensor that shares a lens: `cam0/NAME`
   Camera model;             ///< intrinsics and distortion; 0 if unknown, as in files of other programs
   SE3 T_body_camera;        ///< pose of the camera in the body frame
   bool has_frames = false;  ///< a frame camera shares the lens: FrameRecords are possible
   bool has_labels = false;  ///< all of its EventsRecords have labels
+  int lens = -1;            ///< the index of the camera whose lens this event sensor shares; -1: it has its own
 };
 
 /// The inertial measurement unit of the recording. Densities are continuous-time.

@@ -10,35 +10,16 @@
 #include "esim/core/inputs/used_files.h"
 #include "esim/geometry/calibration.h"
 #include "esim/scenario/sprite_scene.h"
+#include "esim/scenario/variation/sensor_list.h"
 #include "esim/scenario/waypoint_file.h"
+#include "esim/scenario/yaml/inherit.h"
 #include "esim/scenario/yaml/renamed_keys.h"
 #include "esim/scenario/yaml/yaml_reader.h"
 
 namespace esim::inline scenario {
 namespace {
 
-constexpr std::array<const char*, 3> kInherited{"sampling", "event_camera", "frame_camera"};
-
-/// A map with the entries of `base`, of which those of `over` replace the ones with the same key. Entries keep their
-/// lines, which YAML::Clone() would lose.
-YAML::Node merged(const YAML::Node& base, const YAML::Node& over) {
-  YAML::Node map(YAML::NodeType::Map);
-  for (const auto& entry : base) {
-    if (!entry.first.IsScalar() || !over[entry.first.Scalar()].IsDefined()) map.force_insert(entry.first, entry.second);
-  }
-  for (const auto& entry : over) map.force_insert(entry.first, entry.second);
-  return map;
-}
-
-/// The map that applies to a camera: the shared map, overridden entry by entry by the camera's own. A map with another
-/// `type` replaces the shared one.
-YAML::Node inherit(const YAML::Node& shared, const YAML::Node& own) {
-  if (!shared.IsDefined() || !own.IsDefined()) return own.IsDefined() ? own : shared;
-  if (!shared.IsMap() || !own.IsMap()) return own;
-  const YAML::Node own_type = own["type"], shared_type = shared["type"];
-  if (own_type.IsDefined() && (!shared_type.IsDefined() || own_type.Scalar() != shared_type.Scalar())) return own;
-  return merged(shared, own);
-}
+constexpr std::array<const char*, 4> kInherited{"sampling", "event_camera", "event_cameras", "frame_camera"};
 
 /// The same source, in which what was set for all cameras on the command line is also set for the camera `key`.
 YamlSource with_inherited(YamlSource source, const std::string& key) {
@@ -104,10 +85,15 @@ YAML::Node find_innermost(const YAML::Node& root, const std::string& key) {
 /// Throws OptionError if filters contradict each other or do not suit the size of the camera, whose map is `node`.
 void check_filters(const CameraOptions& camera, const YAML::Node& node, const std::string& key,
                    const YamlSource& source) {
-  const auto problem = find_problem(camera.event_camera.filters, camera.width, camera.height);
-  if (!problem) return;
-  const std::string option = "event_camera.filters." + problem->key;
-  YamlReader::fail(source, find_innermost(node, option), key + "." + option, problem->problem);
+  for (const SensorOptions& sensor : camera.sensors()) {
+    const auto problem = find_problem(sensor.filters, camera.width, camera.height);
+    if (!problem) continue;
+    const std::string option = "event_camera.filters." + problem->key;
+    if (camera.event_cameras.empty())
+      YamlReader::fail(source, find_innermost(node, option), key + "." + option, problem->problem);
+    YamlReader::fail(source, node["event_cameras"], key + ".event_cameras",
+                     fmt::format("{}: filters.{}: {}", sensor.name, problem->key, problem->problem));
+  }
 }
 
 /// The default sampling method: flow for renderers of complete images and for parts that the scenario does not
@@ -120,9 +106,9 @@ SamplingOptions usual_sampling(const RendererOptions& renderer, bool described) 
   return FlowSampling{};
 }
 
-/// `otherwise` holds the default values of a camera.
+/// `otherwise` holds the default values of a camera, `seed` is that of the scenario.
 std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource& source,
-                                        const CameraOptions& otherwise) {
+                                        const CameraOptions& otherwise, std::uint64_t seed) {
   const YAML::Node one = root["camera"], several = root["cameras"];
   if (one.IsDefined() && several.IsDefined())
     YamlReader::fail(source, several, "cameras", "must not be given together with camera; remove one of them");
@@ -130,6 +116,7 @@ std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource
     YamlReader::fail(source, several, "cameras", "must be a list of at least one camera");
 
   std::vector<CameraOptions> cameras;
+  SensorList sensor_list(seed);
   const std::size_t count = several.IsDefined() ? several.size() : 1;
   for (std::size_t i = 0; i < count; ++i) {
     const std::string key = several.IsDefined() ? fmt::format("cameras.{}", i) : "camera";
@@ -145,10 +132,17 @@ std::vector<CameraOptions> read_cameras(const YAML::Node& root, const YamlSource
       map.reset(merged(map, parts));
       refuse_geometry_beside_calibration(std::as_const(map), key, of_camera);
     }
+    std::vector<SensorOptions> sensors;
+    if (map.IsMap()) {
+      const YAML::Node& given = std::as_const(map);
+      sensors = sensor_list.read(given["event_camera"], given["event_cameras"], key, of_camera);
+    }
     CameraOptions options = otherwise;
-    YamlReader reader(map, key, of_camera);
+    const YAML::Node others = sensors.empty() ? map : without(map, {"event_camera", "event_cameras"});
+    YamlReader reader(others, key, of_camera);
     describe(reader, options);
     reader.finish();
+    options.event_cameras = std::move(sensors);
     for (CameraOptions& camera : with_calibration(options)) {
       check_filters(camera, std::as_const(map), key, of_camera);
       cameras.push_back(std::move(camera));
@@ -179,19 +173,38 @@ void read_imu(RigImuOptions& imu, const YAML::Node& node, const YamlSource& sour
   imu.accelerometer.random_walk = calibrated.accelerometer_random_walk;
 }
 
+bool is_plain(const std::string& name) {
+  return name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") ==
+         std::string::npos;
+}
+
 /// Gives every camera a unique name that is also valid for a folder.
 void name_cameras(std::vector<CameraOptions>& cameras, const YamlSource& source) {
   std::set<std::string> names;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     std::string& name = cameras[i].name;
     if (name.empty()) name = fmt::format("cam{}", i);
-    const bool plain =
-        name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == std::string::npos;
-    if (!plain)
+    if (!is_plain(name))
       throw UserError(
           fmt::format("{}: camera name '{}': must consist of letters, digits, _ and -", source.file.string(), name));
     if (!names.insert(name).second)
       throw UserError(fmt::format("{}: two cameras are named {}; rename one", source.file.string(), name));
+  }
+}
+
+/// Throws UserError unless the names of a camera's sensors are unique and valid for folders beside the camera's others.
+void check_sensor_names(const CameraOptions& camera, const std::vector<std::string>& formats,
+                        const YamlSource& source) {
+  std::set<std::string> names;
+  const auto fail = [&](const std::string& problem) {
+    throw UserError(fmt::format("{}: camera {}: {}", source.file.string(), camera.name, problem));
+  };
+  for (const SensorOptions& sensor : camera.sensors()) {
+    const std::string& name = sensor.name;
+    if (!is_plain(name)) fail(fmt::format("sensor name '{}': must consist of letters, digits, _ and -", name));
+    if (name == "images" || name == "frames" || std::ranges::find(formats, name) != formats.end())
+      fail(fmt::format("sensor name '{}': is the name of another folder of the recording; choose another", name));
+    if (!names.insert(name).second) fail(fmt::format("two event sensors are named {}; rename one", name));
   }
 }
 
@@ -285,7 +298,8 @@ Scenario read_scenario(const ScenarioText& text) {
 
   YamlReader reader(root, "", source);
   describe(reader, scenario);
-  for (const char* key : {"camera", "cameras", "sampling", "event_camera", "frame_camera"}) reader.know(key);
+  for (const char* key : {"camera", "cameras", "sampling", "event_camera", "event_cameras", "frame_camera"})
+    reader.know(key);
   reader.finish();
   const YAML::Node renderer = std::as_const(root)["renderer"], trajectory = std::as_const(root)["trajectory"];
   auto* const sprites = std::get_if<SpritesRendererOptions>(&scenario.renderer);
@@ -313,14 +327,15 @@ Scenario read_scenario(const ScenarioText& text) {
     read_sprites(*sprites, renderer, source, camera);
     complete_for_sprites(scenario, *sprites, trajectory.IsDefined());
   }
-  scenario.cameras = read_cameras(std::as_const(root), source, camera);
+  scenario.cameras = read_cameras(std::as_const(root), source, camera, scenario.seed);
   name_cameras(scenario.cameras, source);
+  for (const CameraOptions& each : scenario.cameras) check_sensor_names(each, scenario.output.formats, source);
   scenario.files = std::move(files);
   return scenario;
 }
 
-EventCameraOptions event_camera_of(const Scenario& scenario, const CameraOptions& camera) {
-  EventCameraOptions options = camera.event_camera;
+EventCameraOptions in_light_of(const Scenario& scenario, const EventCameraOptions& sensor) {
+  EventCameraOptions options = sensor;
   if (options.circuit && !options.circuit->white_lux) options.circuit->white_lux = scenario.light.white_lux;
   return options;
 }

@@ -73,8 +73,8 @@ std::string write_sampling(const SamplingOptions& options);
 /// Every option with type, default, unit, range and help, as text for users.
 std::string scenario_reference();
 
-/// The options of a camera's event sensor, in the light of the scenario unless the sensor has its own white_lux.
-EventCameraOptions event_camera_of(const Scenario& scenario, const CameraOptions& camera);
+/// The options of an event sensor, in the light of the scenario unless the sensor has its own white_lux.
+EventCameraOptions in_light_of(const Scenario& scenario, const EventCameraOptions& sensor);
 
 /// The geometry that `options` describe. Throws UserError if it is impossible.
 Camera camera_model(const CameraOptions& options);

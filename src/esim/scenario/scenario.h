@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -20,6 +21,21 @@
 #include "esim/scenario/trajectory_options.h"
 
 namespace esim::inline scenario {
+
+// --- event sensors -----------------------------------------------------------------------------------------------
+
+/// One event sensor behind the lens of a camera.
+struct SensorOptions : EventCameraOptions {
+  std::string name{};                   ///< of the folder of its files; empty: that of its camera
+  std::optional<std::uint64_t> seed{};  ///< of its random numbers; unset: the scenario's
+
+  /// An option that a grid or a distribution has set.
+  struct Varied {
+    std::string key;    ///< dotted
+    std::string value;  ///< as YAML
+  };
+  std::vector<Varied> varied{};  ///< for reports
+};
 
 // --- cameras -----------------------------------------------------------------------------------------------------
 
@@ -52,8 +68,17 @@ struct CameraOptions {
   ColourFilters colour = ColourFilters::none;
   SamplingOptions sampling;
   bool events = true;
-  EventCameraOptions event_camera;
+  SensorOptions event_camera;                      ///< the only event sensor, unless event_cameras has any
+  std::vector<SensorOptions> event_cameras{};      ///< several; each has a name, unique within the camera
   std::optional<FrameCameraOptions> frame_camera;  ///< unset: no frame camera
+
+  /// The event sensors.
+  std::span<const SensorOptions> sensors() const {
+    if (!events) return {};
+    return event_cameras.empty() ? std::span(&event_camera, 1) : std::span(event_cameras);
+  }
+  /// The first of them; default values for a camera without any.
+  const SensorOptions& first_sensor() const { return event_cameras.empty() ? event_camera : event_cameras.front(); }
 };
 
 // --- the inertial measurement unit --------------------------------------------------------------------------------
@@ -80,11 +105,15 @@ struct TruthOptions {
 enum class EventTimeUnit { us, ns };
 enum class EventCompression { blosc, gzip, none };
 
+/// Whether the samples of event sensors are kept.
+enum class KeptSamples { none, rounded, exact };
+
 struct OutputOptions {
   EventTimeUnit time_unit = EventTimeUnit::us;
   EventCompression compression = EventCompression::blosc;
   std::vector<std::string> formats{};
   bool preview = true;
+  KeptSamples samples = KeptSamples::none;
 };
 
 // --- the scenario --------------------------------------------------------------------------------------------------

@@ -32,6 +32,15 @@ void describe(Visitor& visit, FovOptions& o) {
 }
 
 template <class Visitor>
+void describe(Visitor& visit, SensorOptions& o) {
+  visit("name", o.name,
+        About{"name of the sensor's folder in that of its camera (default: the only sensor has none; others are "
+              "sensor0, sensor1, ...)"});
+  visit("seed", o.seed, About{"seed of the sensor's random numbers (default: that of the scenario)"});
+  describe(visit, static_cast<EventCameraOptions&>(o));
+}
+
+template <class Visitor>
 void describe(Visitor& visit, CameraOptions& o) {
   visit("name", o.name, About{"name, unique within the rig (default: cam0, cam1, ...)"});
   visit("calibration", o.calibration,
@@ -60,7 +69,12 @@ void describe(Visitor& visit, CameraOptions& o) {
         About{"when esim renders the scene (default: adaptive; flow for renderers of complete images, such as OpenGL; "
               "keyframes if another program renders)"});
   visit("events", o.events, About{"whether the camera has an event sensor; false: it is a standard camera"});
-  visit("event_camera", o.event_camera, About{"the event sensor"});
+  if (o.event_cameras.empty())
+    visit("event_camera", o.event_camera,
+          About{"the event sensor; an option may be {values: [...]} or a distribution such as {uniform: [LOW, HIGH]}, "
+                "and count a number of sensors: then there are several"});
+  visit("event_cameras", o.event_cameras,
+        About{"several event sensors that see the same: a list of maps like event_camera, which gives their defaults"});
   visit("frame_camera", o.frame_camera, About{"a standard camera at the same pose (default: none)"});
 }
 
@@ -93,6 +107,10 @@ void describe(Visitor& visit, OutputOptions& o) {
   visit("formats", o.formats,
         About{"additional formats to write, by their names in esim convert --list, such as text, rosbag"});
   visit("preview", o.preview, About{"write preview.mp4 and preview.png"});
+  visit(
+      "samples", o.samples,
+      About{"keep what the event sensors saw in samples.esim, for esim resense; true: with an error of the brightness "
+            "up to 0.0005; exact: without, and larger"});
 }
 
 /// All options of a scenario except its cameras, which have two spellings (see read_scenario).
@@ -119,6 +137,8 @@ template <>
 inline constexpr std::array<const char*, 2> kEnumNames<ColourFilters>{"none", "rggb"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<EventTimeUnit>{"us", "ns"};
+template <>
+inline constexpr std::array<const char*, 3> kEnumNames<KeptSamples>{"false", "true", "exact"};
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<EventCompression>{"blosc", "gzip", "none"};
 

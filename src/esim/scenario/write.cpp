@@ -190,6 +190,7 @@ class ReferenceWriter {
     T entry;
     nested(entry);
   }
+  void nested(std::vector<SensorOptions>&) {}  // as event_camera
   template <typename... T>
   void nested(std::variant<T...>&) {
     (alternative<T>(), ...);

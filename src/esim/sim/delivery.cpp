@@ -36,18 +36,24 @@ TimeNs Delivery::due() const {
 void Delivery::deliver_events(TimeNs until) {
   for (std::size_t i = 0; i < world_.cameras.size(); ++i) {
     CameraChannel& camera = world_.cameras[i];
-    const int number = static_cast<int>(i);
-    stages_.release_events(camera, until, events_);
-    if (events_.empty()) continue;
-    const auto on = std::count_if(events_.begin(), events_.end(), [](const Event& e) { return e.polarity > 0; });
-    summary_.cameras[i].events_on += on;
-    summary_.cameras[i].events_off += static_cast<std::int64_t>(events_.size()) - on;
-    stages_.label_events(camera, events_, labels_);
-    write(EventsRecord{number, events_, labels_});
-    if (!camera.event_points) continue;
-    stages_.locate_events(camera, events_, event_points_);
-    write(EventPointsRecord{number, events_, event_points_});
+    stages_.release_events(camera, until);
+    for (std::size_t k = 0; k < camera.event_sensors.size(); ++k) {
+      EventSensor& sensor = camera.event_sensors[k];
+      if (!sensor.events.empty()) deliver_events(camera, sensor, summary_.cameras[i].sensors[k]);
+    }
+    stages_.forget_seen_objects(camera);
   }
+}
+
+void Delivery::deliver_events(CameraChannel& camera, EventSensor& sensor, SensorSummary& summary) {
+  const auto on = std::ranges::count_if(sensor.events, [](const Event& e) { return e.polarity > 0; });
+  summary.events_on += on;
+  summary.events_off += static_cast<std::int64_t>(sensor.events.size()) - on;
+  stages_.label_events(camera, sensor, labels_);
+  write(EventsRecord{sensor.number, sensor.events, labels_});
+  if (!camera.event_points) return;
+  stages_.locate_events(camera, sensor.events, event_points_);
+  write(EventPointsRecord{sensor.number, sensor.events, event_points_});
 }
 
 void Delivery::deliver_imu(TimeNs t) {

@@ -31,6 +31,7 @@ class Delivery {
 
   // Each writes the records of one kind for all cameras: events up to `until`, others at their due time t.
   void deliver_events(TimeNs until);
+  void deliver_events(CameraChannel& camera, EventSensor& sensor, SensorSummary& summary);
   void deliver_imu(TimeNs t);
   void deliver_pose(TimeNs t);
   void deliver_truth(TimeNs t);
@@ -44,7 +45,6 @@ class Delivery {
   Summary& summary_;
 
   // Buffers.
-  std::vector<Event> events_;
   std::vector<EventLabel> labels_;
   std::vector<Eigen::Vector3f> event_points_;
   std::vector<SE3> object_poses_;

@@ -87,7 +87,9 @@ Simulator::Run::Run(World& simulated, Sink& sink) : world(simulated), out(sink) 
   for (std::size_t i = 0; i < world.cameras.size(); ++i) {
     const CameraInfo& info = world.info.cameras[i];
     summary.cameras.push_back(
-        {info.name, world.cameras[i].renderer->traits().label(), info.model.width, info.model.height, {}, 0, 0, {}});
+        {info.name, world.cameras[i].renderer->traits().label(), info.model.width, info.model.height});
+    for (const EventSensor& sensor : world.cameras[i].event_sensors)
+      summary.cameras[i].sensors.push_back({world.info.cameras[static_cast<std::size_t>(sensor.number)].name});
     stages.start_rendering(world.cameras[i], known_until);
   }
 }
@@ -100,7 +102,7 @@ Progress Simulator::Run::progress() const {
   Progress progress{summary.start, summary.end, world.info.end, 0, 0, elapsed()};
   for (std::size_t i = 0; i < world.cameras.size(); ++i) {
     progress.samples += world.cameras[i].sampler->statistics().samples;
-    progress.events += summary.cameras[i].events_on + summary.cameras[i].events_off;
+    progress.events += summary.cameras[i].events();
   }
   return progress;
 }
@@ -112,7 +114,8 @@ Summary Simulator::finish() {
   run_->stages.end(run_->out, summary.complete);
   for (std::size_t i = 0; i < world.cameras.size(); ++i) {
     summary.cameras[i].sampling = world.cameras[i].sampler->statistics();
-    if (world.cameras[i].event_camera) summary.cameras[i].sensor = world.cameras[i].event_camera->statistics();
+    for (std::size_t k = 0; k < world.cameras[i].event_sensors.size(); ++k)
+      summary.cameras[i].sensors[k].statistics = world.cameras[i].event_sensors[k].event_camera.statistics();
   }
   summary.wall_seconds = run_->elapsed();
   return std::move(summary);

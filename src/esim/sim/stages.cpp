@@ -1,5 +1,8 @@
 #include "esim/sim/stages.h"
 
+#include <algorithm>
+#include <limits>
+
 #include "esim/sim/stopwatch.h"
 
 namespace esim::inline sim {
@@ -51,11 +54,26 @@ void Stages::look_at_lights(CameraChannel& camera, std::span<const Segment> segm
   });
 }
 
+template <typename Work>
+void Stages::for_each_sensor(CameraChannel& camera, const Work& work) {
+  std::vector<EventSensor>& sensors = camera.event_sensors;
+  const Workers& workers = *world_.workers;
+  if (static_cast<int>(sensors.size()) < workers.threads()) {
+    for (EventSensor& sensor : sensors) work(sensor, workers);
+  } else {
+    workers.for_each(static_cast<int>(sensors.size()),
+                     [&](int i) { work(sensors[static_cast<std::size_t>(i)], one_thread_); });
+  }
+}
+
 void Stages::make_events(CameraChannel& camera, std::span<const Segment> segments) {
-  if (!camera.event_camera) return;
+  if (camera.event_sensors.empty()) return;
   timed(seconds_.events, [&] {
     const auto integrate = [&](std::span<const Segment> some, TimeNs watermark) {
-      camera.event_camera->integrate(some, watermark, *world_.workers);
+      for_each_sensor(camera, [&](EventSensor& sensor, const Workers& workers) {
+        sensor.event_camera.integrate(some, watermark, workers);
+      });
+      if (camera.keep_samples) camera.keep_samples(some, watermark);
     };
     const TimeNs watermark = camera.sampler->watermark();
     if (!camera.flicker) return integrate(segments, watermark);
@@ -63,9 +81,14 @@ void Stages::make_events(CameraChannel& camera, std::span<const Segment> segment
   });
 }
 
-void Stages::release_events(CameraChannel& camera, TimeNs until, std::vector<Event>& events) {
-  events.clear();
-  if (camera.event_camera) timed(seconds_.events, [&] { camera.event_camera->release_until(until, events); });
+void Stages::release_events(CameraChannel& camera, TimeNs until) {
+  if (camera.event_sensors.empty()) return;
+  timed(seconds_.events, [&] {
+    for_each_sensor(camera, [&](EventSensor& sensor, const Workers&) {
+      sensor.events.clear();
+      sensor.event_camera.release_until(until, sensor.events);
+    });
+  });
 }
 
 void Stages::expose_frames(CameraChannel& camera, std::span<const Segment> segments) {
@@ -84,17 +107,27 @@ const OpticalFlowImages* Stages::render_truth(CameraChannel& camera, const Rende
   });
 }
 
-void Stages::label_events(CameraChannel& camera, std::span<const Event> events, std::vector<EventLabel>& labels) {
-  const LabelSpan made = camera.event_camera->labels();
+void Stages::label_events(CameraChannel& camera, EventSensor& sensor, std::vector<EventLabel>& labels) {
+  const LabelSpan made = sensor.event_camera.labels();
   labels.assign(made.begin(), made.end());
   if (labels.empty()) return;
   timed(seconds_.truth, [&] {
     if (camera.seen_objects) {
       for (std::size_t i = 0; i < labels.size(); ++i)
-        labels[i].object = camera.seen_objects->at(events[i].x, events[i].y, labels[i].t_ideal);
-      if (camera.seen_objects->is_long()) camera.seen_objects->forget_before(camera.event_camera->labels_from());
+        labels[i].object = camera.seen_objects->at(sensor.events[i].x, sensor.events[i].y, labels[i].t_ideal);
     }
-    if (camera.flicker_labels) camera.flicker_labels->set(*camera.flicker, events, labels);
+    if (sensor.flicker_labels) sensor.flicker_labels->set(*camera.flicker, sensor.events, labels);
+  });
+}
+
+void Stages::forget_seen_objects(CameraChannel& camera) {
+  if (!camera.seen_objects || !camera.seen_objects->is_long()) return;
+  timed(seconds_.truth, [&] {
+    TimeNs needed_from = std::numeric_limits<TimeNs>::max();
+    for (const EventSensor& sensor : camera.event_sensors) {
+      if (sensor.event_camera.has_labels()) needed_from = std::min(needed_from, sensor.event_camera.labels_from());
+    }
+    camera.seen_objects->forget_before(needed_from);
   });
 }
 

@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "esim/core/parallel.h"
 #include "esim/sim/summary.h"
 #include "esim/sim/world.h"
 
@@ -32,10 +33,10 @@ class Stages {
   void look_at_lights(CameraChannel& camera, std::span<const Segment> segments);
 
   // --- events
-  /// Gives segments to the event camera, if there is one, divided if the light flickers.
+  /// Gives segments to all event sensors, divided if the light flickers, and keeps them if requested.
   void make_events(CameraChannel& camera, std::span<const Segment> segments);
-  /// Replaces `events` by the next events of the event camera up to `until`.
-  void release_events(CameraChannel& camera, TimeNs until, std::vector<Event>& events);
+  /// Replaces EventSensor::events of each sensor by its next ones up to `until`.
+  void release_events(CameraChannel& camera, TimeNs until);
 
   // --- frames
   /// Gives segments to the frame camera, if there is one; without segments, only the sampler's watermark.
@@ -45,9 +46,10 @@ class Stages {
   /// Renders the ground truth of a camera in the light of that time. Returns the optical flow from the previous one;
   /// null if not requested, and for the first one.
   const OpticalFlowImages* render_truth(CameraChannel& camera, const RenderRequest& request, Sample& truth);
-  /// The labels of the events that release_events() returned last, with the objects that the pixels saw; none unless
-  /// the event camera has labels.
-  void label_events(CameraChannel& camera, std::span<const Event> events, std::vector<EventLabel>& labels);
+  /// The labels of EventSensor::events, with the objects that the pixels saw; none unless the sensor has labels.
+  void label_events(CameraChannel& camera, EventSensor& sensor, std::vector<EventLabel>& labels);
+  /// Forgets the objects that are needed for no later label of any sensor, if they are many.
+  void forget_seen_objects(CameraChannel& camera);
   /// The scene points of events, in their order.
   void locate_events(CameraChannel& camera, std::span<const Event> events, std::vector<Eigen::Vector3f>& points);
 
@@ -56,8 +58,14 @@ class Stages {
   void end(Sink& out, bool complete);
 
  private:
+  /// Calls work(sensor, workers) for each sensor of a camera: several at the same time, each on one thread, if they are
+  /// enough for all threads, otherwise one after the other, each on all threads.
+  template <typename Work>
+  void for_each_sensor(CameraChannel& camera, const Work& work);
+
   World& world_;
   StageSeconds& seconds_;
+  Workers one_thread_{1};
 };
 
 }  // namespace esim::inline sim

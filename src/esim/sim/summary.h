@@ -20,15 +20,28 @@ struct StageSeconds {
   double write = 0;     ///< calls of sinks; their background threads do not count
 };
 
+/// Results of one event sensor.
+struct SensorSummary {
+  std::string name;  ///< of its camera in the recording
+  std::int64_t events_on = 0, events_off = 0;
+  EventCameraStatistics statistics{};
+};
+
 /// Results of one camera.
 struct CameraSummary {
   std::string name;
   std::string renderer;
   std::int64_t width = 0, height = 0;
-  SamplingStatistics sampling;
-  std::int64_t events_on = 0, events_off = 0;
-  EventCameraStatistics sensor;
+  SamplingStatistics sampling{};
+  std::vector<SensorSummary> sensors{};
   std::int64_t frames = 0;  ///< of the frame camera
+
+  /// The number of events of all sensors.
+  std::int64_t events() const {
+    std::int64_t sum = 0;
+    for (const SensorSummary& sensor : sensors) sum += sensor.events_on + sensor.events_off;
+    return sum;
+  }
 };
 
 /// Results of a simulation, for the report.

@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "esim/core/parallel.h"
@@ -22,23 +23,32 @@
 
 namespace esim::inline sim {
 
-/// One camera of the rig with its renderer, sampler and sensors.
+/// One event sensor of a camera.
+struct EventSensor {
+  EventCamera event_camera;
+  int number = 0;                                 // of its records' camera in RecordingInfo::cameras
+  std::optional<FlickerLabels> flicker_labels{};  // if it has labels and the light flickers
+  std::vector<Event> events{};                    // the latest ones, on their way to the sink
+};
+
+/// One camera of the rig with its renderer, sampler and sensors. All sensors see the same samples.
 struct CameraChannel {
   std::unique_ptr<Renderer> renderer;
   std::unique_ptr<Sampler> sampler;
-  std::optional<EventCamera> event_camera;
-  Sample sample;                           // the latest sample; renderer and sampler exchange its buffers
+  std::vector<EventSensor> event_sensors{};
+  Sample sample{};                         // the latest sample; renderer and sampler exchange its buffers
   std::unique_ptr<Rendering> rendering{};  // the running rendering of the sampler's next request
   std::optional<FrameCamera> frame_camera{};
   std::optional<Flicker> flicker{};  // unset: constant light
+
+  /// If set, takes what the event sensors see, as EventCamera::integrate() does.
+  std::function<void(std::span<const Segment> segments, TimeNs watermark)> keep_samples{};
 
   // Ground truth, if requested.
   std::unique_ptr<OpticalFlowFromDepth> optical_flow{};
   std::unique_ptr<EventPoints> event_points{};
 
-  // For labels.
-  std::optional<SeenObjects> seen_objects{};      // if anything moves
-  std::optional<FlickerLabels> flicker_labels{};  // if the light flickers
+  std::optional<SeenObjects> seen_objects{};  // for labels, if anything moves
 };
 
 /// The rig's inertial measurement unit.
@@ -54,7 +64,7 @@ struct World {
   std::unique_ptr<const Workers> workers;                  // outlives the channels
   std::shared_ptr<const Trajectory> trajectory;            // of the body
   std::vector<std::shared_ptr<const Trajectory>> objects;  // of the scene's moving objects, in its order
-  std::vector<CameraChannel> cameras;                      // as in info.cameras
+  std::vector<CameraChannel> cameras;                      // the first of info.cameras; then come event sensors
   PeriodicClock truth_clock, pose_clock;
   std::optional<ImuChannel> imu{};
   bool truth_objects = false;  // whether ground truth has the object of each pixel

@@ -72,16 +72,14 @@ AffineFlow velocity(const SpritePlacement& at, PixelSize sensor) {
 }
 
 /// A camera at rest that sees the sprites, without ground truth, on one thread.
-World world_of(const AffineOptions& o, const EventCameraOptions& event_camera, std::uint64_t seed,
-               const SpriteScene& scene) {
+World world_of(const AffineOptions& o, const std::vector<SensorOptions>& sensors, const SpriteScene& scene) {
   CameraOptions camera;
   camera.name = "cam0";
   camera.width = o.width;
   camera.height = o.height;
   camera.sampling = o.sampling;
-  camera.event_camera = event_camera;
+  camera.event_cameras = sensors;
   Scenario scenario;
-  scenario.seed = seed;
   scenario.cameras = {camera};
   scenario.truth.rate_hz = scenario.truth.pose_rate_hz = 0;
   Substitutes substitutes;
@@ -153,41 +151,46 @@ std::string AffineSequences::options() const {
       {"sampling", write_sampling(o.sampling)},
       {"event_camera", write_event_camera(o.event_camera)},
       {"magnitudes", {{"edges_px", o.magnitudes.edges}, {"fractions", o.magnitudes.fractions}}}};
+  if (o.sensors > 1) json["sensors"] = o.sensors;
   return json.dump();
 }
 
-Sequence AffineSequences::make(std::uint32_t index) const {
+SensorOptions AffineSequences::draw_sensor(std::uint32_t index) const {
+  SensorOptions sensor{options_.event_camera};
+  if (options_.sensors > 1) sensor.name = fmt::format("sensor{}", index % options_.sensors);
+  const AddressedRandom random(options_.seed, Purpose::dataset_sensor);
+  const auto words = random.bits(index);
+  const auto [low, high] = options_.contrast_threshold;
+  sensor.contrast_threshold = low + random.uniforms(index, 1)[0] * (high - low);
+  sensor.contrast_threshold_on.reset();
+  sensor.contrast_threshold_off.reset();
+  sensor.seed = (std::uint64_t{words[0]} << 32) | words[1];
+  return sensor;
+}
+
+std::vector<Sequence> AffineSequences::make_all(std::uint32_t rendering) const {
   const AffineOptions& o = options_;
   const PixelSize sensor{o.width, o.height};
 
   // The image and its motion. Strengths cover their distribution evenly.
   const AddressedRandom random(o.seed, Purpose::dataset_image);
   const auto all = random.bits(0xffffffffU);  // common to all sequences
-  const ImageFolder::Picture picture = impl_->picture(o.seed, index, all[0]);
-  const Framing framing = draw_framing(sensor, *picture.light, random, index);
+  const ImageFolder::Picture picture = impl_->picture(o.seed, rendering, all[0]);
+  const Framing framing = draw_framing(sensor, *picture.light, random, rendering);
   double turn = 0;
-  const double u = std::modf(AddressedRandom::open_unit(all[1], all[2]) + std::numbers::phi * index, &turn);
+  const double u = std::modf(AddressedRandom::open_unit(all[1], all[2]) + std::numbers::phi * rendering, &turn);
   const AffineMotion motion =
-      draw_motion(o.mix, sensor, framing.start, o.duration_s, impl_->strengths.quantile(u), o.seed, index);
+      draw_motion(o.mix, sensor, framing.start, o.duration_s, impl_->strengths.quantile(u), o.seed, rendering);
   const SpriteMotion sprite_motion({motion.poses.begin(), motion.poses.end()}, SpriteInterpolation::spline);
   const Sprite sprite{picture.light, nullptr, SpriteUnits::pixel, SpriteBeyond::mirror, sprite_motion, framing.pivot};
 
   // The pixels.
-  EventCameraOptions camera = o.event_camera;
-  const AddressedRandom sensor_random(o.seed, Purpose::dataset_sensor);
-  const auto words = sensor_random.bits(index);
-  const double fraction = sensor_random.uniforms(index, 1)[0];
-  camera.contrast_threshold =
-      o.contrast_threshold.low + fraction * (o.contrast_threshold.high - o.contrast_threshold.low);
-  camera.contrast_threshold_on.reset();
-  camera.contrast_threshold_off.reset();
-  const std::uint64_t sensor_seed = (std::uint64_t{words[0]} << 32) | words[1];
+  std::vector<SensorOptions> sensors;
+  for (std::uint32_t k = 0; k < o.sensors; ++k) sensors.push_back(draw_sensor(rendering * o.sensors + k));
+  World world = world_of(o, sensors, SpriteScene{{sprite}});
 
-  World world = world_of(o, camera, sensor_seed, SpriteScene{{sprite}});
-
-  Sequence sequence;
-  sequence.index = index;
-  Collector collector(sequence);
+  std::vector<Sequence> sequences(o.sensors);
+  Collector collector(sequences);
   simulate(world, collector, [](const Progress&) { return true; });
 
   // Ground truth, from the placements of the image.
@@ -196,13 +199,14 @@ Sequence AffineSequences::make(std::uint32_t index) const {
                  framing.pivot);
   };
   const TimeNs start = 0, end = world.info.end;
-  sequence.motion_field_t = o.motion_field_at == MotionFieldTime::start ? start
-                            : o.motion_field_at == MotionFieldTime::end ? end
-                                                                        : end / 2;
-  sequence.motion_field = affine_field(sensor, velocity(lies(sequence.motion_field_t), sensor));
-  sequence.optical_flow = affine_field(sensor, flow_between(lies(start), lies(end), sensor));
+  Sequence truth;
+  truth.motion_field_t = o.motion_field_at == MotionFieldTime::start ? start
+                         : o.motion_field_at == MotionFieldTime::end ? end
+                                                                     : end / 2;
+  truth.motion_field = affine_field(sensor, velocity(lies(truth.motion_field_t), sensor));
+  truth.optical_flow = affine_field(sensor, flow_between(lies(start), lies(end), sensor));
   Sample sample;
-  for (const auto& [t, image] : {std::pair{start, &sequence.first}, std::pair{end, &sequence.last}}) {
+  for (const auto& [t, image] : {std::pair{start, &truth.first}, std::pair{end, &truth.last}}) {
     world.cameras[0].renderer->render(view(world, 0, t), sample);
     *image = sample.irradiance;
   }
@@ -213,15 +217,23 @@ Sequence AffineSequences::make(std::uint32_t index) const {
                                   {"scale", {k.scale.x(), k.scale.y()}},
                                   {"shear", k.shear}};
   };
-  sequence.passed_over = picture.passed_over;
-  const nlohmann::ordered_json info{{"image", picture.name},
-                                    {"motion_field_t", sequence.motion_field_t},
-                                    {"contrast_threshold", camera.contrast_threshold},
-                                    {"optical_flow_rms_px", motion.optical_flow_rms_px},
-                                    {"pivot", {framing.pivot.x(), framing.pivot.y()}},
-                                    {"poses", {pose(motion.poses[0]), pose(motion.poses[1]), pose(motion.poses[2])}}};
-  sequence.info = info.dump();
-  return sequence;
+  truth.passed_over = picture.passed_over;
+  for (std::uint32_t k = 0; k < o.sensors; ++k) {
+    Sequence sequence = truth;
+    sequence.index = rendering * o.sensors + k;
+    sequence.width = sequences[k].width, sequence.height = sequences[k].height;
+    sequence.span = sequences[k].span;
+    sequence.events = std::move(sequences[k].events);
+    const nlohmann::ordered_json info{{"image", picture.name},
+                                      {"motion_field_t", sequence.motion_field_t},
+                                      {"contrast_threshold", sensors[k].contrast_threshold},
+                                      {"optical_flow_rms_px", motion.optical_flow_rms_px},
+                                      {"pivot", {framing.pivot.x(), framing.pivot.y()}},
+                                      {"poses", {pose(motion.poses[0]), pose(motion.poses[1]), pose(motion.poses[2])}}};
+    sequence.info = info.dump();
+    sequences[k] = std::move(sequence);
+  }
+  return sequences;
 }
 
 }  // namespace esim::inline dataset

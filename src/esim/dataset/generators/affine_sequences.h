@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "esim/core/describe.h"
 #include "esim/dataset/generators/affine_motion.h"
@@ -12,6 +13,7 @@
 #include "esim/dataset/sequence_maker.h"
 #include "esim/event_camera/options.h"
 #include "esim/sampling/options.h"
+#include "esim/scenario/scenario.h"
 
 namespace esim::inline dataset {
 
@@ -44,6 +46,7 @@ struct AffineOptions {
   Range contrast_threshold{0.2, 0.5};  ///< C+ = C-, random for each sequence
   EventCameraOptions event_camera{};   ///< all other options
   SamplingOptions sampling = FlowSampling{};
+  std::uint32_t sensors = 1;  ///< consecutive sequences of the same motion, with other thresholds and seeds
 };
 
 /// Random affine motions of images over the sensor, with events and exact optical flow: the dataset of the paper's
@@ -58,11 +61,17 @@ class AffineSequences final : public SequenceMaker {
   const MagnitudeHistogram& magnitudes() const override { return options_.magnitudes; }
   bool is_target() const override { return true; }
 
-  /// The sequence from 0 to the duration. Throws UserError if no image is usable.
-  Sequence make(std::uint32_t index) const override;
+  std::uint32_t sensors() const override { return options_.sensors; }
+
+  /// The sequences from 0 to the duration. Throws UserError if no image is usable.
+  std::vector<Sequence> make_all(std::uint32_t rendering) const override;
 
  private:
   struct Impl;
+
+  /// The event sensor of a sequence.
+  SensorOptions draw_sensor(std::uint32_t index) const;
+
   AffineOptions options_;
   std::unique_ptr<const Impl> impl_;
 };

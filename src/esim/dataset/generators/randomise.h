@@ -1,35 +1,18 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <string>
-#include <variant>
 #include <vector>
 
-namespace esim::inline dataset {
+#include "esim/scenario/variation/distribution.h"
 
-// Distributions of values.
-struct Uniform {
-  double low = 0, high = 0;
-};
-struct LogUniform {
-  double low = 0, high = 0;  ///< above 0
-};
-struct Normal {
-  double mean = 0, deviation = 0;
-};
-struct WholeNumber {
-  std::int64_t low = 0, high = 0;  ///< both included
-};
-struct Choice {
-  std::vector<std::string> values{};  ///< as YAML
-};
-using Distribution = std::variant<Uniform, LogUniform, Normal, WholeNumber, Choice>;
+namespace esim::inline dataset {
 
 /// An option of a scenario, by its dotted key, and its distribution.
 struct RandomOption {
   std::string key{};
   Distribution distribution{};
+  std::string yaml{};  ///< of the distribution
 };
 
 /// A random value as YAML. Depends on the seed, the number of the sequence and the option only.

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <sstream>
 #include <utility>
 
@@ -48,12 +50,13 @@ std::vector<std::string> extremes(const Distribution& distribution) {
 }  // namespace
 
 ScenarioSequences::ScenarioSequences(const std::filesystem::path& file, std::vector<std::string> overrides,
-                                     std::uint64_t seed, bool optical_flow)
+                                     std::uint64_t seed, bool optical_flow, std::uint32_t sensors)
     : file_(file),
       template_(read_template(text_of(file), file.string())),
       overrides_(std::move(overrides)),
       seed_(seed),
       optical_flow_(optical_flow),
+      wanted_sensors_(sensors),
       magnitudes_(sintel_magnitudes()) {
   const auto read = [&](std::vector<std::string> set, const char* setter) {
     return read_scenario(
@@ -67,7 +70,12 @@ ScenarioSequences::ScenarioSequences(const std::filesystem::path& file, std::vec
     throw UserError(fmt::format("{}: has {} cameras, but must have one; remove the others", file_.string(),
                                 scenario.cameras.size()));
   }
-  if (scenario.cameras[0].event_camera.labels)
+  const Scenario begun = scenario_of(drawn(0));
+  const std::span<const SensorOptions> first = begun.cameras[0].sensors();
+  sensors_ = static_cast<std::uint32_t>(first.size());
+  if (first.empty())
+    throw UserError(fmt::format("{}: its camera has no event sensor; remove events: false", file_.string()));
+  if (std::ranges::any_of(first, &SensorOptions::labels))
     throw UserError(
         fmt::format("{}: event_camera.labels: data sets have no labels of events; remove it", file_.string()));
 }
@@ -79,33 +87,55 @@ std::string ScenarioSequences::options() const {
     if (const auto* const normal = std::get_if<Normal>(&option.distribution))
       drawn_from[option.key]["deviation"] = normal->deviation;
   }
-  return nlohmann::ordered_json{{"kind", "scenario"},      {"scenario", template_.yaml},
-                                {"randomise", drawn_from}, {"set", overrides_},
-                                {"seed", seed_},           {"optical_flow", optical_flow_}}
-      .dump();
+  nlohmann::ordered_json options{{"kind", "scenario"},      {"scenario", template_.yaml},
+                                 {"randomise", drawn_from}, {"set", overrides_},
+                                 {"seed", seed_},           {"optical_flow", optical_flow_}};
+  if (wanted_sensors_ > 1) options["sensors"] = wanted_sensors_;
+  return options.dump();
 }
 
-std::vector<std::string> ScenarioSequences::drawn(std::uint32_t index) const {
+/// Several sensors draw their options themselves, with seeds of their own.
+bool ScenarioSequences::is_drawn_by_sensors(const RandomOption& option) const {
+  return wanted_sensors_ > 1 && option.key.starts_with("event_camera.");
+}
+
+std::vector<std::string> ScenarioSequences::drawn(std::uint32_t rendering) const {
   std::vector<std::string> set;
-  const auto words = AddressedRandom(seed_, Purpose::dataset_sensor).bits(index);
+  const auto words = AddressedRandom(seed_, Purpose::dataset_sensor).bits(rendering);
   set.push_back(fmt::format("seed={}", (std::uint64_t{words[0]} << 31) | words[1]));
   for (std::size_t i = 0; i < template_.options.size(); ++i) {
     const RandomOption& option = template_.options[i];
-    set.push_back(option.key + "=" + draw(option.distribution, seed_, index, static_cast<std::uint16_t>(i)));
+    if (is_drawn_by_sensors(option)) continue;
+    set.push_back(option.key + "=" + draw(option.distribution, seed_, rendering, static_cast<std::uint16_t>(i)));
   }
   return set;
 }
 
-Sequence ScenarioSequences::make(std::uint32_t index) const {
-  std::vector<std::string> set = drawn(index);
+Scenario ScenarioSequences::scenario_of(const std::vector<std::string>& drawn) const {
+  std::vector<std::string> set = drawn;
+  for (const RandomOption& option : template_.options) {
+    if (is_drawn_by_sensors(option)) set.push_back(option.key + "=" + option.yaml);
+  }
+  if (wanted_sensors_ > 1) set.push_back(fmt::format("event_camera.count={}", wanted_sensors_));
+  set.insert(set.end(), overrides_.begin(), overrides_.end());
+  return read_scenario({.yaml = template_.yaml,
+                        .file = file_,
+                        .has_lines = false,
+                        .overrides = std::move(set),
+                        .setter = kSetterOfDrawn});
+}
+
+std::vector<Sequence> ScenarioSequences::make_all(std::uint32_t rendering) const {
+  const std::vector<std::string> set = drawn(rendering);
   nlohmann::ordered_json info = nlohmann::ordered_json::object();
   for (const std::string& text : set) info[text.substr(0, text.find('='))] = text.substr(text.find('=') + 1);
-  set.insert(set.end(), overrides_.begin(), overrides_.end());
-  Scenario scenario = read_scenario({.yaml = template_.yaml,
-                                     .file = file_,
-                                     .has_lines = false,
-                                     .overrides = std::move(set),
-                                     .setter = kSetterOfDrawn});
+  Scenario scenario = scenario_of(set);
+  if (scenario.cameras[0].sensors().size() != sensors_) {
+    throw UserError(
+        fmt::format("{}: the number of event sensors must be the same in all sequences, but is {} and {}; "
+                    "do not randomise it",
+                    file_.string(), sensors_, scenario.cameras[0].sensors().size()));
+  }
 
   // Only the events and the ground truth at the two instants are needed.
   scenario.truth = TruthOptions{};
@@ -115,9 +145,8 @@ Sequence ScenarioSequences::make(std::uint32_t index) const {
   const auto ignore = [](const std::string&) {};
   World world = build_world(scenario, 1, {ignore, ignore});
 
-  Sequence sequence;
-  sequence.index = index;
-  Collector collector(sequence);
+  std::vector<Sequence> sequences(sensors_);
+  Collector collector(sequences);
   simulate(world, collector, [](const Progress&) { return true; });
 
   const TimeNs start = world.info.start, end = world.info.end;
@@ -125,22 +154,35 @@ Sequence ScenarioSequences::make(std::uint32_t index) const {
   Sample sample;
   OpticalFlowFromDepth field(world.info.cameras[0].model, *world.workers);
   const RenderRequest first = view(world, 0, start), last = view(world, 0, end);
+  Sequence truth;
   renderer.render(first, sample);
-  sequence.first = sample.irradiance;
-  sequence.depth = sample.depth;
+  truth.first = sample.irradiance;
+  truth.depth = sample.depth;
   const bool has_optical_flow = optical_flow_ && !renderer.traits().on_sensor;
   if (has_optical_flow) field.advance(first, sample);
   renderer.render(last, sample);
-  sequence.last = sample.irradiance;
-  sequence.motion_field = {sample.motion_x, sample.motion_y};
-  sequence.motion_field_t = end - start;
+  truth.last = sample.irradiance;
+  truth.motion_field = {sample.motion_x, sample.motion_y};
+  truth.motion_field_t = end - start;
   if (has_optical_flow) {
     const OpticalFlowImages* const optical_flow = field.advance(last, sample);
-    sequence.optical_flow = {optical_flow->x, optical_flow->y};
+    truth.optical_flow = {optical_flow->x, optical_flow->y};
   }
-  info["motion_field_t"] = sequence.motion_field_t;
-  sequence.info = info.dump();
-  return sequence;
+  info["motion_field_t"] = truth.motion_field_t;
+  for (std::uint32_t k = 0; k < sensors_; ++k) {
+    Sequence sequence = truth;
+    sequence.index = rendering * sensors_ + k;
+    sequence.width = sequences[k].width, sequence.height = sequences[k].height;
+    sequence.span = sequences[k].span;
+    sequence.events = std::move(sequences[k].events);
+    nlohmann::ordered_json own = info;
+    const SensorOptions& sensor = scenario.cameras[0].sensors()[k];
+    if (!sensor.name.empty()) own["sensor"] = sensor.name;
+    for (const SensorOptions::Varied& option : sensor.varied) own["event_camera." + option.key] = option.value;
+    sequence.info = own.dump();
+    sequences[k] = std::move(sequence);
+  }
+  return sequences;
 }
 
 }  // namespace esim::inline dataset

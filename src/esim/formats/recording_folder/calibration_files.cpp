@@ -52,7 +52,8 @@ std::string matrix(int indent, const char* key, int rows, int columns, const std
 std::string kalibr_camchain(const RecordingInfo& info) {
   std::string text;
   for (std::size_t i = 0; i < info.cameras.size(); ++i) {
-    const auto& [name, model, T_body_camera, has_frames, has_labels] = info.cameras[i];
+    const auto& [name, model, T_body_camera, has_frames, has_labels, lens] = info.cameras[i];
+    if (lens >= 0) continue;
     const NamedDistortion distortion = distortion_of(model);
     text += fmt::format("cam{}:\n", i);
     text += "  camera_model: pinhole\n";
@@ -84,7 +85,8 @@ std::string kalibr_imu(const ImuInfo& imu) {
 
 std::string rig_yaml(const RecordingInfo& info) {
   std::string text = "label: \"esim\"\ncameras:\n";
-  for (const auto& [name, model, T_body_camera, has_frames, has_labels] : info.cameras) {
+  for (const auto& [name, model, T_body_camera, has_frames, has_labels, lens] : info.cameras) {
+    if (lens >= 0) continue;
     const NamedDistortion distortion = distortion_of(model);
     text += fmt::format("- camera:\n    label: {}\n    line-delay-nanoseconds: 0\n", name);
     text += fmt::format("    image_height: {}\n    image_width: {}\n    type: pinhole\n", model.height, model.width);

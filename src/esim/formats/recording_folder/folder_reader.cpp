@@ -46,6 +46,18 @@ std::vector<fs::path> sorted_entries(const fs::path& folder) {
   return paths;
 }
 
+}  // namespace
+
+std::vector<std::string> sensors_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const fs::path& sensor : sorted_entries(folder)) {
+    if (is_file(sensor / "events.h5")) names.push_back(sensor.filename().string());
+  }
+  return names;
+}
+
+namespace {
+
 std::vector<CameraInfo> cameras_in_folders(const fs::path& root) {
   std::vector<CameraInfo> cameras;
   for (const fs::path& folder : sorted_entries(root)) {
@@ -86,21 +98,30 @@ class RecordingFolder {
       root_ = path;
       attempt([&] { read_rig(); });
       for (CameraInfo& camera : info_.cameras) folders_.push_back(root_ / camera.name);
+      add_sensors();
       return;
     }
-    // A camera's folder by itself. "DIR/cam0/" and "DIR/cam0" are the same.
+    // The folder of a camera, or of one of its event sensors, by itself. "DIR/cam0/" and "DIR/cam0" are the same.
     const fs::path folder = fs::absolute(path / ".").lexically_normal().parent_path();
     root_ = folder.parent_path();
-    attempt([&] { read_rig(); });
     CameraInfo own;
     own.name = folder.filename().string();
+    if (!is_file(root_ / "report.json") && is_file(root_.parent_path() / "report.json")) {
+      own.name = (root_.filename() / own.name).string();
+      root_ = root_.parent_path();
+    }
+    attempt([&] { read_rig(); });
     for (const CameraInfo& camera : info_.cameras) {
-      if (camera.name == own.name) own = camera;
+      if (camera.name != own.name && !own.name.starts_with(camera.name + "/")) continue;
+      const std::string name = own.name;
+      own = camera;
+      own.name = name;
     }
     info_.cameras = {own};
     info_.imu.reset();
     folders_ = {path};
     alone_ = true;
+    add_sensors();
   }
 
   std::unique_ptr<Source> open() {
@@ -119,6 +140,20 @@ class RecordingFolder {
   }
 
  private:
+  /// Adds the event sensors that share the lenses of the cameras.
+  void add_sensors() {
+    const std::size_t lenses = info_.cameras.size();
+    for (std::size_t i = 0; i < lenses; ++i) {
+      for (const std::string& name : sensors_in(folders_[i])) {
+        CameraInfo sensor = info_.cameras[i];
+        sensor.name += "/" + name;
+        sensor.lens = static_cast<int>(i);
+        info_.cameras.push_back(sensor);
+        folders_.push_back(folders_[i] / name);
+      }
+    }
+  }
+
   /// With `recover`, continues if a part cannot be read.
   template <typename Part>
   void attempt(const Part& read) {

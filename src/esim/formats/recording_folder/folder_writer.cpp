@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <string_view>
 #include <utility>
 
 #include "esim/core/error.h"
@@ -38,14 +39,24 @@ TimeNs time_of(const Record& record) {
   return std::visit(time, record);
 }
 
-/// Gives every camera a unique name that is valid for a folder.
+bool is_plain(std::string_view name) {
+  return !name.empty() && name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") ==
+                              std::string_view::npos;
+}
+
+/// Gives every camera a unique name that is valid for a folder; that of an event sensor that shares a lens is in the
+/// folder of its camera.
 void name_folders(std::vector<CameraInfo>& cameras) {
   std::set<std::string> taken = {"calibration", "objects"};
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     std::string& name = cameras[i].name;
-    const bool plain =
-        !name.empty() &&
-        name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == std::string::npos;
+    bool plain = is_plain(name);
+    if (cameras[i].lens >= 0) {
+      const std::string lens = cameras[static_cast<std::size_t>(cameras[i].lens)].name;
+      const std::string sensor = name.substr(name.find('/') + 1);
+      name = lens + "/" + sensor;
+      plain = is_plain(sensor);
+    }
     if (plain && taken.insert(name).second) continue;
     for (std::size_t number = i; !taken.insert(name = "cam" + std::to_string(number)).second;) ++number;
   }
@@ -137,8 +148,10 @@ void RecordingWriter::end(bool complete) {
   for (const auto& [key, sink] : sinks_) sink->end(complete);
   sinks_.clear();
   nlohmann::ordered_json cameras = nlohmann::ordered_json::array();
-  for (const CameraInfo& camera : info_.cameras)
+  for (const CameraInfo& camera : info_.cameras) {
+    if (camera.lens >= 0) continue;  // found by its folder
     cameras.push_back({{"name", camera.name}, {"width", camera.model.width}, {"height", camera.model.height}});
+  }
   nlohmann::ordered_json report = {{"status", complete ? "complete" : "interrupted"}};
   if (info_.start_known) {
     report["start_s"] = to_seconds(info_.start);

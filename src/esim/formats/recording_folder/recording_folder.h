@@ -4,7 +4,9 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "esim/recording/format.h"
 
@@ -15,6 +17,9 @@ Format recording_format();
 
 /// Whether it is the folder of a camera, by the names of its files.
 bool is_camera_folder(const std::filesystem::path& folder);
+
+/// The event sensors that share the lens of a camera: the subfolders of its folder that have events.
+std::vector<std::string> sensors_in(const std::filesystem::path& folder);
 
 /// Writes any records as such a folder: the calibration if the intrinsics are known, each file when its first record
 /// comes, and report.json at the end. Event points are written with the events.

@@ -86,7 +86,10 @@ RecordingView::RecordingView(const fs::path& path) {
   span_ = {info.start, info.end};
   const bool alone = is_camera_folder(path);
   attempt([&] { read_report(path / "report.json"); });
-  for (const CameraInfo& camera : info.cameras) open_camera(alone ? path : path / camera.name, camera);
+  for (const CameraInfo& camera : info.cameras) {
+    const fs::path name = camera.name;
+    open_camera(!alone ? path / name : camera.lens < 0 ? path : path / name.filename(), camera);
+  }
   if (cameras_.empty()) throw UserError(path.string() + ": has no data that can be shown");
   if (!alone && has_file(path / "imu.csv")) imu_file_ = path / "imu.csv";
   if (!alone && has_file(path / "states.csv")) states_file_ = path / "states.csv";
@@ -125,8 +128,9 @@ void RecordingView::open_camera(const fs::path& folder, CameraInfo info) {
   CameraView camera;
   camera.info = std::move(info);
   if (has_file(folder / "events.h5")) attempt([&] { open_events(folder / "events.h5", camera); });
-  attempt([&] { open_images(folder, camera); });
-  if (has_file(folder / "truth.h5")) attempt([&] { open_truth(folder / "truth.h5", camera); });
+  const fs::path lens = camera.info.lens < 0 ? folder : folder.parent_path();  // an event sensor shows its images
+  attempt([&] { open_images(lens, camera); });
+  if (has_file(lens / "truth.h5")) attempt([&] { open_truth(lens / "truth.h5", camera); });
   attempt([&] { learn_size(camera); });
   cameras_.push_back(std::move(camera));
 }

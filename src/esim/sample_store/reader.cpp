@@ -1,0 +1,237 @@
+#include <zstd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "esim/core/error.h"
+#include "esim/files/input_file.h"
+#include "esim/sample_store/layout.h"
+
+namespace esim::inline sample_store {
+namespace {
+
+constexpr int kMaxExtent = 16384;  // px, as in scenarios
+
+/// Irradiance of consecutive pixels before and after their differences, of which `Planes` bytes are not 0.
+template <std::size_t Planes>
+void undo_row(std::size_t count, const std::array<const std::uint8_t*, kPlanes>& bytes, int dropped_bits,
+              std::uint32_t* __restrict codes, float* __restrict from, float* __restrict to) {
+  const std::uint8_t *const a = bytes[0], *const b = bytes[1], *const c = bytes[2], *const d = bytes[3];
+  for (std::size_t i = 0; i < count; ++i) {
+    std::uint32_t difference = a[i] | static_cast<std::uint32_t>(b[i]) << 8;
+    if constexpr (Planes > 2) difference |= static_cast<std::uint32_t>(c[i]) << 16;
+    if constexpr (Planes > 3) difference |= static_cast<std::uint32_t>(d[i]) << 24;
+    const std::uint32_t before = codes[i], now = undo_difference(difference, before);
+    codes[i] = now;
+    from[i] = irradiance_of(before, dropped_bits);
+    to[i] = irradiance_of(now, dropped_bits);
+  }
+}
+
+template <typename T>
+T value_of(std::span<const std::byte> bytes) {
+  T value;
+  std::memcpy(&value, bytes.data(), sizeof value);
+  return value;
+}
+
+}  // namespace
+
+struct SampleStoreReader::Impl {
+  explicit Impl(const std::filesystem::path& path) : file(path) {
+    const auto wrong = [&](const std::string& reason) { file.fail(0, reason); };
+    const std::span<const std::byte> bytes = file.read(sizeof(Header));
+    if (bytes.size() < sizeof(Header) || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0)
+      wrong("it is not a store of samples (samples.esim of a recording)");
+    const auto header = value_of<Header>(bytes);
+    if (header.version != kVersion) {
+      wrong("its version is " + std::to_string(header.version) + ", but this esim reads version " +
+            std::to_string(kVersion) + "; simulate again, or use the esim that wrote it");
+    }
+    if (header.width < 1 || header.width > kMaxExtent || header.height < 1 || header.height > kMaxExtent)
+      wrong("its size, " + std::to_string(header.width) + " x " + std::to_string(header.height) + " px, is invalid");
+    if (header.precision > 1 || header.end < header.start) wrong("its header is damaged");
+    info = {header.width, header.height, header.start, header.end, static_cast<SamplePrecision>(header.precision)};
+    last = Image<std::uint32_t>(info.width, info.height);
+    covered = Image<std::uint8_t>(info.width, info.height);
+  }
+
+  bool read_block(const Workers& workers);
+  void read_lists(const BlockHeader& header, std::span<const std::byte> compressed);
+  void check_segment(const SegmentEntry& entry);
+  void undo_differences(Rows rows);
+  [[noreturn]] void damaged(const std::string& what) const { file.fail(block_offset, "the block is damaged: " + what); }
+
+  InputFile file;
+  SampleStoreInfo info;
+  Image<std::uint32_t> last;
+  std::uint64_t block_offset = 0;
+  TimeNs watermark = std::numeric_limits<TimeNs>::min();  // of the last portion
+  std::map<std::array<std::uint16_t, 4>, TimeNs> ends;    // of the last segment of each tile
+  Image<std::uint8_t> covered;                            // by these tiles
+  bool ended = false;
+
+  // The block.
+  std::vector<PortionEntry> portions;
+  std::vector<SegmentEntry> entries;
+  std::array<std::vector<std::uint8_t>, kPlanes> planes;
+  std::size_t used_planes = kPlanes;  // the others are 0
+  std::vector<float> irradiance;      // of all segments; with that of their start
+  std::vector<float> start;           // of those that start where their pixels were
+  std::vector<std::size_t> first;     // of each segment's pixels in `irradiance`
+  std::vector<Segment> segments;
+  std::size_t next_portion = 0, next_segment = 0;
+  Portion portion;
+};
+
+/// Tiles divide the image, and the segments of each follow each other.
+void SampleStoreReader::Impl::check_segment(const SegmentEntry& entry) {
+  const bool inside = entry.width >= 1 && entry.height >= 1 && entry.x + entry.width <= info.width &&
+                      entry.y + entry.height <= info.height;
+  if (!inside || entry.own_start > 1) damaged("a tile is outside the image");
+  if (entry.t1 < entry.t0 || entry.t0 < info.start || entry.t1 > info.end) damaged("a time is outside the simulation");
+  const auto [done, is_new] = ends.try_emplace({entry.x, entry.y, entry.width, entry.height}, entry.t0);
+  for (int y = entry.y; is_new && y < entry.y + entry.height; ++y) {
+    for (int x = entry.x; x < entry.x + entry.width; ++x) {
+      if (std::exchange(covered(x, y), std::uint8_t{1}) != 0) damaged("tiles overlap");
+    }
+  }
+  if (entry.t0 != done->second) damaged("a segment does not begin where the previous one of its tile ended");
+  done->second = entry.t1;
+}
+
+void SampleStoreReader::Impl::read_lists(const BlockHeader& header, std::span<const std::byte> compressed) {
+  portions.resize(header.portions);
+  entries.resize(header.segments);
+  const std::size_t of_portions = portions.size() * sizeof(PortionEntry),
+                    of_segments = entries.size() * sizeof(SegmentEntry);
+  std::string lists(of_portions + of_segments, '\0');
+  const std::size_t size = ZSTD_decompress(lists.data(), lists.size(), compressed.data(), compressed.size());
+  if (size != lists.size()) damaged("the list of its segments has another size");
+  std::memcpy(portions.data(), lists.data(), of_portions);
+  if (of_segments > 0) std::memcpy(entries.data(), lists.data() + of_portions, of_segments);
+  std::uint64_t counted = 0, pixels = 0;
+  for (const PortionEntry& entry : portions) {
+    if (entry.segments > entries.size() || entry.watermark < watermark || entry.watermark > info.end)
+      damaged("a portion is invalid");
+    watermark = entry.watermark;
+    counted += entry.segments;
+  }
+  for (const SegmentEntry& entry : entries) {
+    check_segment(entry);
+    pixels += (1 + entry.own_start) * entry.width * std::uint64_t{entry.height};
+  }
+  if (counted != entries.size() || pixels != header.pixels) damaged("it has another number of segments or pixels");
+}
+
+/// The irradiance of some rows of all segments, from the differences, in order.
+void SampleStoreReader::Impl::undo_differences(Rows rows) {
+  const int dropped = info.precision == SamplePrecision::rounded ? kDroppedBits : 0;
+  for (std::size_t segment = 0; segment < entries.size(); ++segment) {
+    const SegmentEntry& entry = entries[segment];
+    const int first_row = std::max<int>(rows.first, entry.y), last_row = std::min(rows.last, entry.y + entry.height);
+    const std::size_t width = entry.width, area = width * entry.height;
+    for (std::uint64_t part = 0; part <= entry.own_start; ++part) {
+      for (int y = first_row; y < last_row; ++y) {
+        const std::size_t i = first[segment] + part * area + static_cast<std::size_t>(y - entry.y) * width;
+        const std::array<const std::uint8_t*, kPlanes> bytes{planes[0].data() + i, planes[1].data() + i,
+                                                             planes[2].data() + i, planes[3].data() + i};
+        const auto undo = used_planes <= 2 ? undo_row<2> : used_planes == 3 ? undo_row<3> : undo_row<4>;
+        undo(width, bytes, dropped, last.row(y) + entry.x, start.data() + i, irradiance.data() + i);
+      }
+    }
+  }
+}
+
+/// False at the end.
+bool SampleStoreReader::Impl::read_block(const Workers& workers) {
+  block_offset = file.offset();
+  const auto header = value_of<BlockHeader>(file.read_exactly(
+      sizeof(BlockHeader), "the samples: their recording was interrupted, or the file was truncated; simulate again"));
+  if (header.portions == 0) {
+    if (file.offset() + header.list_bytes + header.plane_bytes[0] + header.plane_bytes[1] + header.plane_bytes[2] +
+            header.plane_bytes[3] !=
+        file.size())
+      damaged("more follows the end");
+    return false;
+  }
+  const std::uint64_t max_pixels = max_block_pixels(info.width, info.height);
+  if (header.portions > kMaxBlockEntries || header.segments > kMaxBlockEntries || header.pixels > max_pixels)
+    damaged("its header is invalid");
+  std::uint64_t bytes = header.list_bytes;
+  for (const std::uint32_t plane : header.plane_bytes) bytes += plane;
+  const std::span<const std::byte> all = file.read_exactly(bytes, "a block: the file was truncated");
+  std::array<std::span<const std::byte>, kPlanes> compressed;
+  std::size_t offset = 0;
+  for (std::size_t k = 0; k < kPlanes; ++k) {
+    compressed[k] = all.subspan(offset, header.plane_bytes[k]);
+    offset += header.plane_bytes[k];
+  }
+  read_lists(header, all.subspan(offset));
+  used_planes = kPlanes;
+  while (used_planes > 2 && header.plane_bytes[used_planes - 1] == 0) --used_planes;
+  std::array<bool, kPlanes> good{};
+  workers.for_each(static_cast<int>(kPlanes), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    planes[k].resize(header.pixels);
+    if (compressed[k].empty()) {
+      if (k < used_planes) std::ranges::fill(planes[k], std::uint8_t{0});
+      good[k] = true;
+      return;
+    }
+    good[k] = ZSTD_decompress(planes[k].data(), planes[k].size(), compressed[k].data(), compressed[k].size()) ==
+              planes[k].size();
+  });
+  for (const bool each : good) {
+    if (!each) damaged("its irradiance has another size");
+  }
+  irradiance.resize(header.pixels);
+  start.resize(header.pixels);
+  first.clear();
+  segments.clear();
+  std::size_t pixel = 0;
+  for (const SegmentEntry& entry : entries) {
+    const Tile tile{entry.x, entry.y, entry.width, entry.height};
+    first.push_back(pixel);
+    const float* const from = (entry.own_start != 0 ? irradiance.data() : start.data()) + pixel;
+    if (entry.own_start != 0) pixel += tile.area();
+    const float* const to = irradiance.data() + pixel;
+    pixel += tile.area();
+    segments.push_back({tile, entry.t0, entry.t1, {entry.t0 == entry.t1 ? to : from, tile}, {to, tile}});
+  }
+  const int pieces = std::min(workers.threads(), info.height);
+  workers.for_each(pieces, [&](int i) {
+    undo_differences({info.height * i / pieces, info.height * (i + 1) / pieces});
+  });
+  next_portion = next_segment = 0;
+  return true;
+}
+
+SampleStoreReader::SampleStoreReader(const std::filesystem::path& file) : impl_(std::make_unique<Impl>(file)) {}
+SampleStoreReader::~SampleStoreReader() = default;
+SampleStoreReader::SampleStoreReader(SampleStoreReader&&) noexcept = default;
+SampleStoreReader& SampleStoreReader::operator=(SampleStoreReader&&) noexcept = default;
+
+const SampleStoreInfo& SampleStoreReader::info() const { return impl_->info; }
+
+bool SampleStoreReader::has_more() const { return impl_->next_portion < impl_->portions.size(); }
+
+const SampleStoreReader::Portion* SampleStoreReader::next(const Workers& workers) {
+  Impl& impl = *impl_;
+  if (impl.ended) return nullptr;
+  if (impl.next_portion == impl.portions.size() && !impl.read_block(workers)) {
+    impl.ended = true;
+    return nullptr;
+  }
+  const PortionEntry& entry = impl.portions[impl.next_portion++];
+  impl.portion = {std::span(impl.segments).subspan(impl.next_segment, entry.segments), entry.watermark};
+  impl.next_segment += entry.segments;
+  return &impl.portion;
+}
+
+}  // namespace esim::inline sample_store

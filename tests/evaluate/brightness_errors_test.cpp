@@ -52,7 +52,9 @@ World plaid_world(TimeNs end) {
   world.info.end = end;
   world.workers = std::make_unique<const Workers>(1);
   world.trajectory = std::make_shared<const StaticTrajectory>(SE3{}, 0, end);
-  world.cameras.push_back({std::make_unique<PlaidRenderer>(), nullptr, EventCamera({}, kWidth, kHeight), {}});
+  CameraChannel& camera = world.cameras.emplace_back();
+  camera.renderer = std::make_unique<PlaidRenderer>();
+  camera.event_sensors.push_back({EventCamera({}, kWidth, kHeight)});
   return world;
 }
 

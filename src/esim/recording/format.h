@@ -52,8 +52,8 @@ struct Format {
   TimeNs min_time = std::numeric_limits<TimeNs>::min();  ///< earliest and
   TimeNs max_time = std::numeric_limits<TimeNs>::max();  ///< latest time of events, ns
 
-  /// Whether a path is a file (or folder) of this format, by its content; `head` is its first 4096 bytes, or fewer. Empty
-  /// if another format reads its files.
+  /// Whether a path is a file (or folder) of this format, by its content; `head` is its first 4096 bytes, or fewer.
+  /// Empty if another format reads its files.
   std::function<bool(const std::filesystem::path& path, std::string_view head)> recognises{};
 
   /// Throws UserError if the file cannot be opened.

@@ -64,7 +64,7 @@ TEST(Bench, SCurvesReturnThresholdMismatchAndNoise) {
 TEST(Bench, SCurvesAtTwoLightLevelsReturnTheDarkCurrent) {
   EventCameraOptions options = slow_to_fire();
   options.threshold_mismatch = 0.02;
-  const SensorUnderTest sensor = simulated_sensor(options, 24, 16, 2);
+  const SensorUnderTest sensor = simulated_sensor(options, 48, 32, 2);
   const ResponseTimes truth = times_of(options);
   std::vector<TrialCounts> recordings;
   for (const double lux : {20.0, 0.3}) {

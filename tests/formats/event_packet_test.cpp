@@ -136,6 +136,10 @@ TEST(EventPacket, DamageIsAnError) {
   EXPECT_TRUE(test::contains(problem_of(packet_of("mono", "", 0, ~std::uint64_t{0})), "time base"));
   EXPECT_TRUE(
       test::contains(problem_of(packet_of("libcaer_cmp", bytes_of<std::uint16_t>({0x9000}), 0, 0)), "unknown type"));
+  // Each step back of a clock of 31 bits is a wrap.
+  EXPECT_TRUE(test::contains(
+      problem_of(packet_of("libcaer", bytes_of<std::uint64_t>({1ULL << 32, 0}), 0, std::uint64_t{1} << 62)),
+      "out of range"));
   EventPacketMessage big_endian = packet_of("evt3", "", 0, 0);
   big_endian.is_bigendian = 1;
   EXPECT_TRUE(test::contains(problem_of(big_endian), "big-endian"));
@@ -168,6 +172,20 @@ TEST(EventPacket, LargeSensorsAreRefused) {
   EXPECT_TRUE(
       test::contains(test::message_of<UserError>([&] { sink->begin(test::recording_info(2049, 10, 0, kNsPerSecond)); }),
                      "2049 x 10 px"));
+}
+
+TEST(EventPacket, LongPausesNeedNanoseconds) {
+  const test::TemporaryDirectory base;
+  for (const TimeUnit unit : {TimeUnit::us, TimeUnit::ns}) {
+    const auto sink = format_named("mcap-packets").create(base.path() / "pause.mcap", {.unit = unit});
+    sink->begin(test::recording_info(640, 480, 0, kNsPerSecond));
+    const std::vector<Event> events{{kNsPerSecond, 1, 2, 1}, {100'000 * kNsPerSecond, 1, 2, 1}};
+    const std::string problem = test::message_of<UserError>([&] {
+      sink->write(EventsRecord{0, events});
+      sink->end(true);
+    });
+    EXPECT_EQ(test::contains(problem, "a pause of 99999 s"), unit == TimeUnit::us) << problem;
+  }
 }
 
 // A recording of a camera by its ROS driver, with triggers.

@@ -3,11 +3,11 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "esim/compose/compose.h"
 #include "esim/formats/formats.h"
 #include "esim/sim/simulate.h"
+#include "sim/blobs.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
 
@@ -82,12 +82,7 @@ std::vector<SensorOptions> all_kinds() {
 class EventSensors : public testing::Test {
  protected:
   void SetUp() override {
-    cv::Mat image(128, 256, CV_8U);
-    for (int y = 0; y < image.rows; ++y) {
-      for (int x = 0; x < image.cols; ++x)
-        image.at<unsigned char>(y, x) = static_cast<unsigned char>(127 + 100 * std::sin(x * 0.3) * std::sin(y * 0.2));
-    }
-    cv::imwrite((folder_.path() / "p.png").string(), image);
+    test::write_blobs(folder_.path() / "p.png", 256);
     RandomTrajectoryOptions motion;
     motion.rotation_amplitude_deg = {20, 40, 30};
     scenario_.trajectory = motion;

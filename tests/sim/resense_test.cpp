@@ -5,12 +5,12 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
 #include "esim/formats/formats.h"
 #include "esim/scenario/read.h"
+#include "sim/blobs.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
 
@@ -29,14 +29,7 @@ std::string content_of(const fs::path& file) {
 
 class Resense : public testing::Test {
  protected:
-  void SetUp() override {
-    cv::Mat image(128, 256, CV_8U);
-    for (int y = 0; y < image.rows; ++y) {
-      for (int x = 0; x < image.cols; ++x)
-        image.at<unsigned char>(y, x) = static_cast<unsigned char>(127 + 100 * std::sin(x * 0.3) * std::sin(y * 0.2));
-    }
-    cv::imwrite((folder_.path() / "p.png").string(), image);
-  }
+  void SetUp() override { test::write_blobs(folder_.path() / "p.png", 256); }
 
   static constexpr const char* kScene =
       "renderer: {type: panorama, image: p.png}\n"

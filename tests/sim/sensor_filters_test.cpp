@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "esim/compose/compose.h"
 #include "esim/filters/filter_chain.h"
 #include "esim/sim/simulate.h"
+#include "sim/blobs.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
 
@@ -70,12 +70,7 @@ class Collector final : public Sink {
 class SensorFilters : public testing::TestWithParam<Case> {
  protected:
   void SetUp() override {
-    cv::Mat image(128, 128, CV_8U);
-    for (int y = 0; y < image.rows; ++y) {
-      for (int x = 0; x < image.cols; ++x)
-        image.at<unsigned char>(y, x) = static_cast<unsigned char>(127 + 100 * std::sin(x * 0.3) * std::sin(y * 0.2));
-    }
-    cv::imwrite((folder_.path() / "p.png").string(), image);
+    test::write_blobs(folder_.path() / "p.png", 128);
     RandomTrajectoryOptions motion;
     motion.rotation_amplitude_deg = {10, 20, 15};
     scenario_.trajectory = motion;

@@ -8,6 +8,7 @@
 
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
+#include "sim/blobs.h"
 #include "support/errors.h"
 #include "support/named_result.h"
 #include "support/temporary_directory.h"
@@ -52,12 +53,7 @@ class Collector final : public Sink {
 class Simulation : public testing::Test {
  protected:
   void SetUp() override {
-    cv::Mat image(128, 256, CV_8U);
-    for (int y = 0; y < image.rows; ++y) {
-      for (int x = 0; x < image.cols; ++x)
-        image.at<unsigned char>(y, x) = static_cast<unsigned char>(127 + 100 * std::sin(x * 0.3) * std::sin(y * 0.2));
-    }
-    cv::imwrite((folder_.path() / "p.png").string(), image);
+    test::write_blobs(folder_.path() / "p.png", 256);
 
     RandomTrajectoryOptions motion;
     motion.rotation_amplitude_deg = {20, 40, 30};

@@ -19,6 +19,10 @@ namespace {
 constexpr TimeNs kEventsDuration = 10 * kNsPerMs;
 constexpr std::size_t kEventsCount = 50'000;
 
+// Of EventPackets, because of EVT 3.0: px; and the longest pause, in which each 4 ms take two bytes.
+constexpr int kMaxPacketExtent = prophesee::evt3::kMaxExtent;
+constexpr TimeNs kMaxPause = 4 * 3600 * kNsPerSecond;
+
 std::array<double, 9> isotropic(double variance) { return {variance, 0, 0, 0, variance, 0, 0, 0, variance}; }
 
 class RosSink final : public Sink {
@@ -66,6 +70,7 @@ class RosSink final : public Sink {
   RecordingInfo info_;
   std::vector<std::vector<Event>> events_;    // of each camera, not yet written
   std::vector<EventPacketEncoder> encoders_;  // of each camera, if events are packets
+  std::vector<TimeNs> last_packet_;           // time of the last event in a packet; 0: none yet
   std::string payload_;
   std::vector<std::uint8_t> pixels_;
 };
@@ -95,6 +100,7 @@ void RosSink::begin(const RecordingInfo& info) {
   info_ = info;
   events_.resize(info.cameras.size());
   if (packets_) encoders_.assign(info.cameras.size(), EventPacketEncoder(*packets_));
+  last_packet_.assign(info.cameras.size(), 0);
   checked(info.start);
   for (const CameraInfo& camera : info.cameras) require_fit(camera.model.width, camera.model.height);
   output_ = create_();
@@ -126,10 +132,12 @@ void RosSink::put(const EventsRecord& record) {
   if (record.events.empty()) return;
   checked(record.events.front().t);
   checked(record.events.back().t);
-  int width = 0, height = 0;
-  for (const Event& event : record.events)
-    width = std::max<int>(width, event.x + 1), height = std::max<int>(height, event.y + 1);
-  require_fit(width, height);
+  if (packets_) {
+    int width = 0, height = 0;
+    for (const Event& event : record.events)
+      width = std::max<int>(width, event.x + 1), height = std::max<int>(height, event.y + 1);
+    require_fit(width, height);
+  }
   std::vector<Event>& waiting = events_[static_cast<std::size_t>(record.camera)];
   for (EventSpan rest = record.events; !rest.empty();) {
     const TimeNs end = (waiting.empty() ? rest.front().t : waiting.front().t) + kEventsDuration;
@@ -148,6 +156,14 @@ void RosSink::flush_events(int camera) {
   const Camera& model = camera_of(camera).model;
   const auto height = static_cast<std::uint32_t>(model.height), width = static_cast<std::uint32_t>(model.width);
   if (packets_) {
+    TimeNs& last = last_packet_[static_cast<std::size_t>(camera)];
+    if (packets_ == PacketEncoding::evt3 && last > 0 && events.front().t - last > kMaxPause) {
+      throw UserError(fmt::format(
+          "cannot write {}: a pause of {:.0f} s between events: packets with times in us hold at most {:.0f} s; write "
+          "times in ns",
+          path_.string(), to_seconds(events.front().t - last), to_seconds(kMaxPause)));
+    }
+    last = t;
     EventPacketMessage packet{.header = header(t, camera_of(camera).name), .height = height, .width = width};
     encoders_[static_cast<std::size_t>(camera)].encode(events, packet);
     send(topic_of(camera, topic::kEvents), MessageType::event_packet, t, packet);
@@ -263,6 +279,20 @@ void RosSink::end(bool) {
 std::unique_ptr<Sink> make_sink(std::filesystem::path path, Encoding encoding, std::optional<PacketEncoding> packets,
                                 std::function<std::unique_ptr<MessageOutput>()> create) {
   return std::make_unique<RosSink>(std::move(path), encoding, packets, std::move(create));
+}
+
+Format with_packets(Format format, std::string name, std::string description,
+                    std::unique_ptr<Sink> (*make)(const std::filesystem::path& path, const WriteOptions& options,
+                                                  std::optional<PacketEncoding> packets)) {
+  format.name = std::move(name);
+  format.description = std::move(description);
+  format.either_unit = true;
+  format.max_width = format.max_height = kMaxPacketExtent;
+  format.recognises = {};
+  format.create = [make](const auto& path, const WriteOptions& options) {
+    return make(path, options, options.unit == TimeUnit::ns ? PacketEncoding::mono : PacketEncoding::evt3);
+  };
+  return format;
 }
 
 }  // namespace esim::inline formats::ros

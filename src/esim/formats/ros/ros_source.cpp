@@ -72,8 +72,9 @@ class RosSource final : public Source {
   TopicSurvey survey_;
   std::vector<CameraState> cameras_;
   std::vector<Event> events_;
-  EventSpan rest_;                                     // events that have not been handed out
-  std::vector<EventPacketDecoder::Trigger> triggers_;  // likewise
+  EventSpan rest_;  // events that have not been handed out
+  std::vector<EventPacketDecoder::Trigger> triggers_;
+  std::size_t next_trigger_ = 0;
   int events_camera_ = 0;
   Remembered<ImuMessage> imu_bias_;
   Remembered<TwistMessage> twist_, accel_;
@@ -108,7 +109,7 @@ const Record* RosSource::next() {
   try {
     for (Message message; !ended_;) {
       if (!rest_.empty()) return next_events();
-      if (!triggers_.empty()) return next_trigger();
+      if (next_trigger_ < triggers_.size()) return next_trigger();
       ended_ = !input_->next(message);
       if (ended_) break;
       try {
@@ -133,8 +134,7 @@ const Record* RosSource::next_events() {
 }
 
 const Record* RosSource::next_trigger() {
-  const EventPacketDecoder::Trigger trigger = triggers_.front();
-  triggers_.erase(triggers_.begin());
+  const EventPacketDecoder::Trigger& trigger = triggers_[next_trigger_++];
   return &record_.emplace(TriggerRecord{events_camera_, trigger.t,
                                         trigger.rising ? TriggerKind::external_rising : TriggerKind::external_falling});
 }
@@ -193,6 +193,7 @@ RosSource::Result RosSource::read_events(const Assignment& to, const Channel& ch
     EventPacketMessage packet;
     reader(packet);
     camera(to).packets.decode(packet, events_, triggers_);
+    next_trigger_ = 0;
   } else {
     EventArrayHead head;
     reader(head);

@@ -35,16 +35,8 @@ Format mcap_format() {
 }
 
 Format mcap_packets_format() {
-  Format format = mcap_format();
-  format.name = "mcap-packets";
-  format.description = "MCAP of ROS 2: event_camera_msgs, sensor_msgs, geometry_msgs, tf2_msgs";
-  format.either_unit = true;
-  format.max_width = format.max_height = ros::kMaxPacketExtent;
-  format.recognises = {};
-  format.create = [](const auto& path, const WriteOptions& options) {
-    return make_sink(path, options, ros::packet_encoding(options.unit));
-  };
-  return format;
+  return ros::with_packets(mcap_format(), "mcap-packets",
+                           "MCAP of ROS 2: event_camera_msgs, sensor_msgs, geometry_msgs, tf2_msgs", make_sink);
 }
 
 }  // namespace esim::inline formats

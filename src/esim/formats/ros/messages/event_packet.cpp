@@ -36,6 +36,7 @@ void decode_libcaer(Bytes bytes, TimeNs base, std::vector<Event>& events) {
   for_each_word<std::uint64_t>(bytes, [&](std::uint64_t word) {
     const TimeNs after = static_cast<TimeNs>(word >> 32 & 0x7FFFFFFFU) * kNsPerUs;
     if (after < last) base += kTurn;
+    if (base > kMaxTimeBase) throw Malformed("its times are out of range");
     last = after;
     events.push_back(event_at(base + after, word >> 17 & 0x7FFFU, word >> 2 & 0x7FFFU, (word >> 1 & 1U) != 0));
   });

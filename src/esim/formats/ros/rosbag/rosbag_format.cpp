@@ -35,16 +35,8 @@ Format rosbag_format() {
 }
 
 Format rosbag_packets_format() {
-  Format format = rosbag_format();
-  format.name = "rosbag-packets";
-  format.description = "ROS 1 bag: event_camera_msgs, sensor_msgs, geometry_msgs, tf2_msgs";
-  format.either_unit = true;
-  format.max_width = format.max_height = ros::kMaxPacketExtent;
-  format.recognises = {};
-  format.create = [](const auto& path, const WriteOptions& options) {
-    return make_sink(path, options, ros::packet_encoding(options.unit));
-  };
-  return format;
+  return ros::with_packets(rosbag_format(), "rosbag-packets",
+                           "ROS 1 bag: event_camera_msgs, sensor_msgs, geometry_msgs, tf2_msgs", make_sink);
 }
 
 }  // namespace esim::inline formats

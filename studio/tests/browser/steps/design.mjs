@@ -271,8 +271,8 @@ test("options are searched for by name and description, and lead to what they ne
   await until(async () => (await names.count()) > 0, "what is found");
   const hits = await names.allTextContents();
   assert.match(hits[0], /event_camera\..*refractory/);
-  assert.ok(hits.at(-1).endsWith("event_camera.circuit.max_rate_hz"), "found by its description");
-  for (const name of hits) assert.match(name, /event_camera\./);
+  assert.ok(hits.indexOf("event_camera.circuit.max_rate_hz") > hits.lastIndexOf("event_camera.refractory_mode"), "found by its description");
+  for (const name of hits) assert.match(name, /event_cameras?\./);
   await page.keyboard.press("Control+a");
   await page.keyboard.type("rate_hz");
   await until(async () => (await names.count()) > 3, "what is found now");

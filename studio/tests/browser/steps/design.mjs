@@ -271,7 +271,10 @@ test("options are searched for by name and description, and lead to what they ne
   await until(async () => (await names.count()) > 0, "what is found");
   const hits = await names.allTextContents();
   assert.match(hits[0], /event_camera\..*refractory/);
-  assert.ok(hits.indexOf("event_camera.circuit.max_rate_hz") > hits.lastIndexOf("event_camera.refractory_mode"), "found by its description");
+  assert.ok(
+    hits.indexOf("event_camera.circuit.max_rate_hz") > hits.lastIndexOf("event_camera.refractory_mode"),
+    "found by its description",
+  );
   for (const name of hits) assert.match(name, /event_cameras?\./);
   await page.keyboard.press("Control+a");
   await page.keyboard.type("rate_hz");

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <map>
 
+#include "esim/core/colour/srgb.h"
 #include "esim/core/error.h"
-#include "esim/core/srgb.h"
 #include "esim/formats/formats.h"
 #include "esim/geometry/so3.h"
 #include "formats/recordings.h"

@@ -4,8 +4,8 @@
 #include <cstring>
 #include <map>
 
+#include "esim/core/colour/srgb.h"
 #include "esim/core/error.h"
-#include "esim/core/srgb.h"
 #include "esim/formats/copy_recording.h"
 #include "esim/formats/events_file.h"
 #include "esim/formats/formats.h"

@@ -6,8 +6,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
+#include "esim/core/colour/srgb.h"
 #include "esim/core/error.h"
-#include "esim/core/srgb.h"
 #include "esim/formats/hdf5/truth.h"
 #include "esim/formats/images/images_png.h"
 #include "esim/formats/images/png_file.h"

@@ -5,6 +5,7 @@
 #include "commands.h"
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
+#include "esim/recording/recording_directory.h"
 #include "esim/scenario/read.h"
 #include "progress_bar.h"
 #include "support.h"
@@ -17,6 +18,7 @@ struct SimulateArguments : RunOptions {
   std::string out;
   std::optional<std::uint64_t> seed;
   std::string keep_samples{};
+  std::string resume{};
 };
 
 void print_summary(const Summary& summary, const std::filesystem::path& out, bool previews) {
@@ -39,19 +41,28 @@ int run(const SimulateArguments& arguments) {
   std::vector<std::string> overrides = arguments.overrides;
   if (!arguments.keep_samples.empty()) overrides.push_back("output.samples=" + arguments.keep_samples);
   if (arguments.seed) overrides.push_back(fmt::format("seed={}", *arguments.seed));
-  const Scenario scenario = read_scenario(arguments.scenario, overrides);
-  const std::filesystem::path out =
-      arguments.out.empty() ? std::filesystem::path("out") / std::filesystem::path(arguments.scenario).stem()
-                            : std::filesystem::path(arguments.out);
+  const bool resume = !arguments.resume.empty();
+  const std::filesystem::path file = !arguments.scenario.empty() ? std::filesystem::path(arguments.scenario)
+                                     : resume
+                                         ? RecordingDirectory::resumable(arguments.resume) / "scenario.yaml"
+                                         : throw UserError("name a scenario to simulate, or a recording to --resume");
+  const Scenario scenario = read_scenario(file, overrides);
+  const std::filesystem::path out = resume                  ? std::filesystem::path(arguments.resume)
+                                    : arguments.out.empty() ? std::filesystem::path("out") / file.stem()
+                                                            : std::filesystem::path(arguments.out);
 
   catch_interrupts();
   ProgressBar bar(!arguments.quiet);
-  const auto made =
-      make_recording(scenario, {out, arguments.force, arguments.threads, nullptr, {shell_command(own_command_line())}},
-                     printing(arguments.quiet), [&](const Progress& progress) {
-                       bar.show(progress);
-                       return !interrupted();
-                     });
+  const auto made = make_recording(scenario,
+                                   {.out = out,
+                                    .replace = arguments.force,
+                                    .resume = resume,
+                                    .threads = arguments.threads,
+                                    .repetition = {shell_command(own_command_line())}},
+                                   printing(arguments.quiet), [&](const Progress& progress) {
+                                     bar.show(progress);
+                                     return !interrupted();
+                                   });
   bar.clear();
   if (!made) return kInterrupted;  // while loading: nothing was worth keeping
   const Summary& summary = *made;
@@ -62,6 +73,7 @@ int run(const SimulateArguments& arguments) {
       tell(stderr, "hint:      {}: esim simulate {} --set 'sampling={{type: flow}}'\n", hint, arguments.scenario);
     }
   }
+  if (!summary.complete && can_be_resumed(out)) tell(stderr, "continue:  esim simulate --resume {}\n", out.string());
   if (!summary.problem.empty()) {
     throw UserError(fmt::format("{}; the {:.3f} s before this error are kept in {}, marked incomplete", summary.problem,
                                 to_seconds(summary.end - summary.start), out.string()));
@@ -74,9 +86,17 @@ int run(const SimulateArguments& arguments) {
 void add_simulate(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<SimulateArguments>();
   CLI::App* command = app.add_subcommand("simulate", "Simulate a scenario and write a recording");
-  command->add_option("scenario", arguments->scenario, "Scenario file (YAML)")->required()->type_name("SCENARIO.yaml");
-  command->add_option("-o,--out", arguments->out, "Folder to write (default: out/NAME of the scenario)")
-      ->type_name("DIR");
+  command->add_option("scenario", arguments->scenario, "Scenario file (YAML); with --resume, it is not needed")
+      ->type_name("SCENARIO.yaml");
+  CLI::Option* const out =
+      command->add_option("-o,--out", arguments->out, "Folder to write (default: out/NAME of the scenario)")
+          ->type_name("DIR");
+  command
+      ->add_option("--resume", arguments->resume,
+                   "Continue the simulation that was to become this folder, and that was killed, interrupted, or lost "
+                   "its engine, from its last checkpoint")
+      ->type_name("DIR")
+      ->excludes(out);
   add_run_options(*command, *arguments, "Change one option, for example --set event_camera.contrast_threshold=0.2");
   command->add_option("--seed", arguments->seed, "Seed of all random numbers (default: the scenario's)")
       ->type_name("N");
@@ -90,6 +110,7 @@ void add_simulate(CLI::App& app, int& exit_code) {
       "  esim simulate scenes/room.yaml --out out/room\n"
       "  esim simulate scenes/room.yaml --out out/room --keep-samples     for other sensors later: esim resense "
       "--help\n"
+      "  esim simulate --resume out/room                                   after it was interrupted or killed\n"
       "  esim simulate scenes/room.yaml --out out/fine --set sampling.lambda=0.1 --set duration_s=1 --seed 7");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

@@ -137,7 +137,7 @@ std::optional<Flicker> build_flicker(const Scenario& scenario, const CameraOptio
 void prepare_truth(const Scenario& scenario, const SceneFile& scene, const RendererFactory& make_renderer,
                    const Notices& notices, World& world);
 
-// --- files (build_sinks.cpp) -----------------------------------------------------------------------------------------
+// --- files (recordings/build_sinks.cpp) ------------------------------------------------------------------------------
 
 /// Throws UserError for unknown names in output.formats.
 void check_output(const Scenario& scenario);
@@ -193,7 +193,7 @@ struct ResenseOptions {
 /// the events are exact, and why not. Throws UserError for other overrides and for recordings without complete samples.
 Resensed resense(const ResenseOptions& options, const Notices& notify, const Monitor& monitor);
 
-// --- reports (recording_report.cpp, losses_and_hints.cpp) ------------------------------------------------------------
+// --- reports (recordings/recording_report.cpp, recordings/losses_and_hints.cpp) --------------------------------------
 
 /// The text of report.json: results, cost, time by stage, notices, and of recordings, their provenance.
 std::string report_json(const Scenario& scenario, const Summary& summary, int threads,
@@ -222,12 +222,13 @@ void warn_of_noise(const std::string& name, const EventCameraOptions& options, c
 /// of rendering.
 std::vector<std::string> hints(const Scenario& scenario, const Summary& summary);
 
-// --- all together (make_recording.cpp) -------------------------------------------------------------------------------
+// --- all together (recordings/make_recording.cpp) --------------------------------------------------------------------
 
 /// Options of make_recording().
 struct RecordingOptions {
   std::filesystem::path out{};  ///< the recording's folder
   bool replace = false;         ///< an existing recording
+  bool resume = false;          ///< continue one that ended early, from its last checkpoint
   int threads = 0;              ///< 0: every processor
 
   std::unique_ptr<Sink> beside{};  ///< if set, receives every record too
@@ -240,6 +241,9 @@ struct RecordingOptions {
 /// RecordingDirectory. The report contains the notices, and also losses and hints, which `notify` does not receive.
 std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions options, const Notices& notify,
                                       const Monitor& monitor);
+
+/// Whether the folder of a recording that ended early has a checkpoint, from which it can be resumed.
+bool can_be_resumed(const std::filesystem::path& recording);
 
 // --- videos (make_conversion.cpp) ------------------------------------------------------------------------------------
 

@@ -23,7 +23,7 @@ class CenterSurround {
   /// Advances to `brightness`, `duration_s` later, and subtracts the surround from it.
   void advance(Image<float>& brightness, double duration_s);
 
-  /// Its state, for state_archive.h.
+  /// Its state, for core/state_archive.h.
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     archive.image(self.wave_);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/core/state_archive.h"
 #include "esim/event_camera/center_surround.h"
 #include "esim/event_camera/circuit/circuit_array.h"
 #include "esim/event_camera/circuit/circuit_readout.h"
@@ -17,7 +18,6 @@
 #include "esim/event_camera/pixel/pixel_update.h"
 #include "esim/event_camera/pixel/pixel_watch.h"
 #include "esim/event_camera/readout/pixel_readout.h"
-#include "esim/event_camera/state_archive.h"
 #include "esim/events/event_queue.h"
 #include "esim/filters/labels_of_passed.h"
 #include "esim/render/irradiance_check.h"
@@ -342,16 +342,11 @@ EventCameraStatistics EventCamera::statistics() const {
 }
 
 std::vector<std::byte> EventCamera::state() const {
-  const bool has_history = (state_->readout && !state_->readout->history.empty()) ||
-                           (state_->circuit_readout && !state_->circuit_readout->history.empty());
-  if (has_history) {
-    throw UserError(
-        "event camera: its state cannot be saved while the segments of its tiles end at different times; save it when "
-        "every segment ends at the watermark");
-  }
   std::vector<std::byte> bytes;
   StateWriter archive(bytes);
   State::transfer(archive, *state_);
+  if (state_->readout) state_->readout->history.save(archive);
+  if (state_->circuit_readout) state_->circuit_readout->history.save(archive);
   archive.list(state_->queue.waiting());
   if (state_->labels) archive.list(state_->labels->waiting());
   return bytes;
@@ -361,6 +356,8 @@ void EventCamera::restore(std::span<const std::byte> state) {
   StateReader archive(state);
   state_->last_frame = Image<float>(state_->size.width, state_->size.height);
   State::transfer(archive, *state_);
+  if (state_->readout) state_->readout->history.restore(archive);
+  if (state_->circuit_readout) state_->circuit_readout->history.restore(archive);
   std::vector<Event> waiting;
   archive.list(waiting);
   std::vector<PendingLabels::Waiting> labels;

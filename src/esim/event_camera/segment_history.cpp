@@ -18,6 +18,20 @@ void keep(ImageView<float>& view, Image<float>& copy, const Tile& tile) {
   view = ImageView<float>(copy.data(), tile);
 }
 
+template <class Archive, class Past>
+void transfer(Archive& archive, Past& past) {
+  archive.value(past.segment.tile);
+  archive.value(past.segment.t0);
+  archive.value(past.segment.t1);
+  archive.sized_image(past.light0);
+  archive.sized_image(past.light1);
+  archive.objects(past.front, [](auto& a, auto& image) { a.sized_image(image); });
+  archive.sized_image(past.filtered1);
+  archive.sized_image(past.filtered2);
+  archive.sized_image(past.start);
+  archive.sized_image(past.end);
+}
+
 }  // namespace
 
 void SegmentHistory::add(std::span<const Segment> segments, const PixelArray& pixels) {
@@ -80,6 +94,28 @@ void SegmentHistory::index() {
     }
   }
   indexed_ = true;
+}
+
+void SegmentHistory::save(StateWriter& archive) const {
+  archive.value(width_);
+  archive.value(height_);
+  archive.objects(std::span(segments_).first(count_), [](auto& a, const PastSegment& past) { transfer(a, past); });
+}
+
+void SegmentHistory::restore(StateReader& archive) {
+  archive.value(width_);
+  archive.value(height_);
+  archive.objects(segments_, [](auto& a, PastSegment& past) {
+    transfer(a, past);
+    Segment& segment = past.segment;
+    for (const Image<float>* light : {&past.light0, &past.light1}) {
+      if (light->width() != segment.tile.width || light->height() != segment.tile.height) StateReader::fail();
+    }
+    segment.irradiance0 = ImageView<float>(past.light0.data(), segment.tile);
+    segment.irradiance1 = ImageView<float>(past.light1.data(), segment.tile);
+  });
+  count_ = added_ = segments_.size();
+  indexed_ = false;
 }
 
 std::uint32_t SegmentHistory::find(std::uint32_t pixel, TimeNs t) {

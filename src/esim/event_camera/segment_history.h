@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "esim/core/image.h"
+#include "esim/core/state_archive.h"
 #include "esim/event_camera/pixel/pixel_array.h"
 #include "esim/render/sample.h"
 
@@ -47,6 +48,10 @@ class SegmentHistory {
   /// The segment of the same tile after this one, or kNone.
   std::uint32_t next(std::uint32_t i) const { return next_[i]; }
   const PastSegment& operator[](std::uint32_t i) const { return segments_[i]; }
+
+  /// Its state after keep_after(), for core/state_archive.h.
+  void save(StateWriter& archive) const;
+  void restore(StateReader& archive);
 
  private:
   void append(std::span<const Segment> segments, bool filtered1, bool filtered2, bool ends);

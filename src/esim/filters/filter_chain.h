@@ -37,7 +37,7 @@ class FilterChain final : public EventFilter {
   std::vector<Dropped> dropped() const;
 
   /// Saves or restores the state, for a chain that continues elsewhere. Archives have the functions of
-  /// event_camera/state_archive.h.
+  /// core/state_archive.h.
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     archive.value(self.last_);

@@ -36,6 +36,8 @@ class Exposure {
   bool add(const Segment& segment, Rows rows, const SegmentLight* light);
 
   const Image<float>& mean() const { return mean_; }
+  /// Sets the sums of an exposure that was saved; empty: not open yet.
+  void restore(Image<float> mean) { mean_ = std::move(mean); }
   Image<float> take_memory() { return std::move(mean_); }
 
  private:

@@ -106,6 +106,31 @@ struct FrameCamera::State {
   void finish_first(const Workers& workers);
   void adapt(const CameraFrame& frame);
 
+  /// Everything except the current exposures and working memory.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.value(self.number);
+    archive.value(self.next_exposure);
+    archive.value(self.horizon);
+    archive.value(self.spoiled);
+    archive.objects(self.finished, [](auto& a, auto& frame) {
+      a.value(frame.t);
+      a.value(frame.exposure_start);
+      a.value(frame.exposure);
+      a.value(frame.exposure_end);
+      a.sized_image(frame.numbers);
+    });
+    archive.objects(self.held, [](auto& a, auto& part) {
+      a.value(part.tile);
+      a.value(part.t0);
+      a.value(part.t1);
+      a.sized_image(part.irradiance0);
+      a.sized_image(part.irradiance1);
+      a.sized_image(part.objects0);
+      a.sized_image(part.objects1);
+    });
+  }
+
   FrameCameraOptions options;
   Tile image;
   TimeSpan span;
@@ -293,6 +318,34 @@ void FrameCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
 TimeNs FrameCamera::due() const {
   if (!state_->finished.empty()) return state_->finished.front().exposure_end;
   return state_->exposing.empty() ? kNever : state_->exposing.front().end();
+}
+
+void FrameCamera::save(StateWriter& archive) const {
+  State::transfer(archive, *state_);
+  archive.objects(state_->exposing, [](StateWriter& a, const Exposure& exposure) {
+    a.value(exposure.number());
+    a.value(exposure.first_row());
+    a.value(exposure.duration());
+    a.sized_image(exposure.mean());
+  });
+}
+
+void FrameCamera::restore(StateReader& archive) {
+  State& state = *state_;
+  State::transfer(archive, state);
+  state.exposing.clear();
+  std::uint64_t count = 0;
+  archive.value(count);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    std::int64_t number = 0;
+    TimeNs first_row = 0, duration = 0;
+    Image<float> mean;
+    archive.value(number);
+    archive.value(first_row);
+    archive.value(duration);
+    archive.sized_image(mean);
+    state.exposing.emplace_back(number, first_row, duration, state.row_delays).restore(std::move(mean));
+  }
 }
 
 const FrameCameraOptions& FrameCamera::options() const { return state_->options; }

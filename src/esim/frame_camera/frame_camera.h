@@ -7,6 +7,7 @@
 
 #include "esim/core/image.h"
 #include "esim/core/parallel.h"
+#include "esim/core/state_archive.h"
 #include "esim/core/time.h"
 #include "esim/frame_camera/options.h"
 #include "esim/light/flicker.h"
@@ -53,6 +54,10 @@ class FrameCamera {
   CameraFrame take();
 
   const FrameCameraOptions& options() const;
+
+  /// Saves the state for restore() of a camera that was created with the same arguments.
+  void save(StateWriter& archive) const;
+  void restore(StateReader& archive);
 
  private:
   struct State;

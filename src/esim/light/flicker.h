@@ -52,6 +52,16 @@ class Flicker {
   /// Multiplies an image at t by its light. `object`: as in Sample; read only if objects are lights.
   void illuminate(TimeNs t, const Image<std::uint16_t>& object, Image<float>& irradiance) const;
 
+  /// The state between two samples, for core/state_archive.h.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.sized_image(self.last_objects_);
+    archive.objects(self.objects_, [](auto& a, auto& at_end) {
+      a.value(at_end.first);
+      a.sized_image(at_end.second);
+    });
+  }
+
  private:
   /// What the pixels of a segment see at its ends.
   struct Ends {

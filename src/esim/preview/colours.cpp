@@ -8,9 +8,9 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "esim/core/colour/srgb.h"
 #include "esim/core/fast_arc_tangent.h"
 #include "esim/core/fast_log.h"
-#include "esim/core/srgb.h"
 
 namespace esim::inline preview {
 namespace {

@@ -25,6 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kReport = "report.json";
+constexpr const char* kRunning = "{\"status\": \"running\"}\n";
 
 // "out/" and "./out" name the same directory as "out".
 fs::path normalised(const fs::path& out) {
@@ -33,6 +34,13 @@ fs::path normalised(const fs::path& out) {
   if (!path.has_filename() || path.filename() == "." || path.filename() == "..") {
     throw UserError("cannot record to \"" + out.string() + "\": give the path of a new directory");
   }
+  return path;
+}
+
+// The final folder of a recording that may be given by the name that it has until then.
+fs::path without_incomplete(const fs::path& out) {
+  fs::path path = normalised(out);
+  if (path.extension() == ".incomplete") path.replace_extension();
   return path;
 }
 
@@ -152,11 +160,37 @@ RecordingDirectory::RecordingDirectory(const fs::path& out, bool force)
   try {
     create_parents();
     create_working_directory(force);
-    write_file_atomically(working_ / kReport, "{\"status\": \"running\"}\n");
+    write_file_atomically(working_ / kReport, kRunning);
   } catch (...) {
     discard();
     throw;
   }
+}
+
+RecordingDirectory::RecordingDirectory(fs::path out, fs::path working)
+    : out_(std::move(out)), working_(std::move(working)), owned_(true), keep_(true), lock_(lock_directory(working_)) {
+  write_file_atomically(working_ / kReport, kRunning);
+}
+
+fs::path RecordingDirectory::resumable(const fs::path& out) {
+  const fs::path whole = without_incomplete(out), working = incomplete_path(whole);
+  std::error_code error;
+  if (fs::exists(working, error)) {
+    if (is_being_written(working))
+      throw UserError(working.string() + " is being written by another process: wait for its end, or stop it first");
+    return working;
+  }
+  if (fs::is_directory(whole, error)) return whole;
+  throw UserError("there is neither " + whole.string() + " nor " + working.string() + " to resume");
+}
+
+RecordingDirectory RecordingDirectory::resume(const fs::path& out) {
+  const fs::path existing = resumable(out), whole = without_incomplete(out), working = incomplete_path(whole);
+  std::error_code error;
+  if (existing != working) fs::rename(existing, working, error);
+  if (error)
+    throw OutputError("cannot rename " + existing.string() + " to " + working.string() + ": " + error.message());
+  return {whole, working};
 }
 
 void RecordingDirectory::create_parents() {
@@ -184,7 +218,7 @@ void RecordingDirectory::create_working_directory(bool force) {
     }
     if (!force) {
       throw RemediableError(
-          working_.string() + " is left from a run that was killed: inspect it, or choose another name",
+          working_.string() + " is left from a run that was killed: inspect it, resume it, or choose another name",
           Remedy::replace_output);
     }
     require_replaceable(working_);

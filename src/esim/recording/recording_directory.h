@@ -13,13 +13,21 @@ namespace esim::inline recording {
 ///   finish()       the final report, then OUT.incomplete -> OUT, in one step even if an older OUT is replaced
 ///   destructor     without finish() and keep(): removes OUT.incomplete, so an error leaves nothing behind
 ///   keep()         OUT.incomplete stays, whatever happens: it holds records
-///   killed         OUT.incomplete stays
+///   killed         OUT.incomplete stays; resume() takes it over
 class RecordingDirectory {
  public:
   /// Throws UserError if OUT exists or OUT.incomplete is left from a killed run, unless `force`; even with `force`, if
   /// the existing folder does not look like a recording or a running process is writing it. Throws OutputError if the
   /// folders cannot be created.
   RecordingDirectory(const std::filesystem::path& out, bool force);
+
+  /// The folder that resume() takes over: OUT.incomplete of a run that was killed, or else OUT. Throws UserError if
+  /// there is neither, or if a running process is writing it.
+  static std::filesystem::path resumable(const std::filesystem::path& out);
+
+  /// Takes over that folder with its files; OUT becomes OUT.incomplete again.
+  static RecordingDirectory resume(const std::filesystem::path& out);
+
   ~RecordingDirectory();
   RecordingDirectory(const RecordingDirectory&) = delete;
   RecordingDirectory& operator=(const RecordingDirectory&) = delete;
@@ -39,6 +47,7 @@ class RecordingDirectory {
   void keep(std::string_view reason = {}) noexcept;
 
  private:
+  RecordingDirectory(std::filesystem::path out, std::filesystem::path working);
   void create_parents();
   void create_working_directory(bool force);
   void discard() noexcept;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <variant>
 
@@ -45,7 +46,30 @@ class FrameSampler final : public Sampler {
   TimeNs watermark() const override { return watermark_; }
   SamplingStatistics statistics() const override { return statistics_; }
 
+  void save(StateWriter& archive) const override {
+    transfer(archive, *this);
+    archive.value(request_ ? request_->t : kEnded);
+  }
+  void restore(StateReader& archive) override {
+    current_.resize(context_.width, context_.height);
+    transfer(archive, *this);
+    TimeNs t = 0;
+    archive.value(t);
+    t == kEnded ? request_.reset() : void(request_->t = t);
+  }
+
  private:
+  static constexpr TimeNs kEnded = std::numeric_limits<TimeNs>::max();
+
+  /// Of the last sample, only what the next segment and its time need.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    transfer_statistics(archive, self.statistics_);
+    archive.value(self.watermark_);
+    archive.value(self.current_.t);
+    archive.sized_image(self.current_.irradiance);
+  }
+
   /// Chooses the time of the next request from the current sample.
   void schedule() {
     if (current_.t >= context_.span.end) {

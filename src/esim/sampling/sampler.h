@@ -7,7 +7,9 @@
 #include <variant>
 #include <vector>
 
+#include "esim/core/error.h"
 #include "esim/core/image.h"
+#include "esim/core/state_archive.h"
 #include "esim/core/time.h"
 #include "esim/render/renderer.h"
 #include "esim/sampling/measured_error.h"
@@ -76,6 +78,23 @@ class Sampler {
   virtual TimeNs watermark() const = 0;
 
   virtual SamplingStatistics statistics() const = 0;
+
+  /// Saves the state for restore() of a sampler that was made with the same arguments, which then requests the same
+  /// evaluations. Not while more() must be called. Throws InternalError if the sampler does not support it.
+  virtual void save(StateWriter&) const { throw InternalError("sampling: this sampler cannot save its state"); }
+  virtual void restore(StateReader&) { throw InternalError("sampling: this sampler cannot restore a state"); }
 };
+
+/// The statistics, except `others`, for core/state_archive.h.
+template <class Archive, class Statistics>
+void transfer_statistics(Archive& archive, Statistics& statistics) {
+  archive.value(statistics.samples);
+  archive.value(statistics.pixel_evaluations);
+  archive.value(statistics.held_to_max_rate);
+  archive.value(statistics.measured_error);
+  archive.value(statistics.tolerance);
+  archive.value(statistics.bisections);
+  archive.value(statistics.audits);
+}
 
 }  // namespace esim::inline sampling

@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "esim/core/colour.h"
+#include "esim/core/colour/colour.h"
 #include "esim/core/inputs/used_files.h"
 #include "esim/event_camera/event_camera.h"
 #include "esim/frame_camera/options.h"
@@ -114,6 +114,7 @@ struct OutputOptions {
   std::vector<std::string> formats{};
   bool preview = true;
   KeptSamples samples = KeptSamples::none;
+  bool checkpoints = true;
 };
 
 // --- the scenario --------------------------------------------------------------------------------------------------

@@ -111,6 +111,10 @@ void describe(Visitor& visit, OutputOptions& o) {
       "samples", o.samples,
       About{"keep what the event sensors saw in samples.esim, for esim resense; true: with an error of the brightness "
             "up to 0.0005; exact: without, and larger"});
+  visit(
+      "checkpoints", o.checkpoints,
+      About{"save the state of the simulation every few seconds, so that esim simulate --resume can continue it after "
+            "it has ended early; not with samples"});
 }
 
 /// All options of a scenario except its cameras, which have two spellings (see read_scenario).

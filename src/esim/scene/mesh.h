@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "esim/core/colour.h"
+#include "esim/core/colour/colour.h"
 #include "esim/scene/images/texture.h"
 #include "esim/scene/planes.h"
 

@@ -22,6 +22,12 @@ class FlickerLabels {
   /// signal and not against its sign.
   void set(const Flicker& flicker, std::span<const Event> events, std::span<EventLabel> labels);
 
+  /// The state, for core/state_archive.h.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.fixed(self.last_);
+  }
+
  private:
   int width_;
   std::vector<TimeNs> last_;  // ideal time of each pixel's previous event

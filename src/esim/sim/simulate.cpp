@@ -6,6 +6,7 @@
 #include "esim/core/engine_error.h"
 #include "esim/recording/keep_on_failure.h"
 #include "esim/sim/delivery.h"
+#include "esim/sim/saved_state.h"
 #include "esim/sim/stages.h"
 
 namespace esim::inline sim {
@@ -38,7 +39,9 @@ struct Simulator::Run {
   Run(World& simulated, Sink& sink);
   void advance(CameraChannel& camera);
   Progress progress() const;
-  double elapsed() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count(); }
+  double elapsed() const {
+    return earlier_seconds + std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  }
 
   World& world;
   Sink& out;
@@ -46,6 +49,7 @@ struct Simulator::Run {
   Stages stages{world, summary.seconds};           // does the work
   Delivery delivery{world, out, stages, summary};  // writes the records
   TimeNs known_until = 0;                          // the body's motion is known until this time
+  double earlier_seconds = 0;                      // until the state from which the simulation continues
   std::chrono::steady_clock::time_point began = std::chrono::steady_clock::now();
 };
 
@@ -107,6 +111,18 @@ Progress Simulator::Run::progress() const {
   return progress;
 }
 
+std::vector<std::byte> Simulator::state() const {
+  run_->summary.wall_seconds = run_->elapsed();
+  return save_state(run_->world, run_->summary);
+}
+
+void Simulator::restore(std::span<const std::byte> state) {
+  for (CameraChannel& camera : run_->world.cameras) camera.rendering.reset();  // of the sampler's first request
+  restore_state(state, run_->world, run_->summary);
+  run_->earlier_seconds = run_->summary.wall_seconds;
+  run_->began = std::chrono::steady_clock::now();
+}
+
 Summary Simulator::finish() {
   World& world = run_->world;
   Summary& summary = run_->summary;
@@ -121,14 +137,17 @@ Summary Simulator::finish() {
   return std::move(summary);
 }
 
-Summary simulate(World& world, Sink& out, const Monitor& monitor) {
+Summary simulate(World& world, Sink& out, const Monitor& monitor, Checkpoints* checkpoints) {
   Simulator simulator(world, out);
   bool anything = false;
   std::string problem;
   try {
+    if (checkpoints != nullptr && !checkpoints->resumed.empty()) simulator.restore(checkpoints->resumed);
     simulator.advance_until(world.info.end, [&](const Progress& progress) {
       anything |= progress.now > progress.start;
-      return monitor(progress);
+      const bool goes_on = monitor(progress);
+      if (checkpoints != nullptr && (!goes_on || checkpoints->due())) checkpoints->save(simulator.state());
+      return goes_on;
     });
   } catch (const EngineError& error) {
     problem = error.what();

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "esim/recording/record.h"
 #include "esim/sim/summary.h"
@@ -35,6 +38,13 @@ class Simulator {
   /// returns false if it stopped the simulation, which another call continues.
   bool advance_until(TimeNs t, const Monitor& monitor);
 
+  /// The state between two samples as bytes, for restore() of the same build of esim. They do not contain the world.
+  std::vector<std::byte> state() const;
+
+  /// Continues from a state of a simulator of an equal world; before advance_until(). The next records are those that
+  /// follow the state. Throws UserError if the state does not suit the world.
+  void restore(std::span<const std::byte> state);
+
   /// Ends the recording, complete if it has reached the world's end.
   Summary finish();
 
@@ -43,9 +53,20 @@ class Simulator {
   std::unique_ptr<Run> run_;
 };
 
+/// What makes a simulation resumable.
+struct Checkpoints {
+  /// Whether it is time to save the state; called after every sample.
+  std::function<bool()> due;
+  /// Takes the state. All records before it have been written.
+  std::function<void(std::span<const std::byte> state)> save;
+  /// The state in which the simulation begins, after `out` has received all records before it; empty: the start.
+  std::vector<std::byte> resumed{};
+};
+
 /// Runs `world` from its start to its end and writes everything to `out`. This is the main loop: time advances only
 /// here. After an EngineError, the records before it are kept and the summary contains the problem. Other errors are
-/// thrown after `out` has been ended as incomplete if it has received any records.
-Summary simulate(World& world, Sink& out, const Monitor& monitor);
+/// thrown after `out` has been ended as incomplete if it has received any records. `checkpoints` may be null; a
+/// simulation that the monitor stops saves its last state.
+Summary simulate(World& world, Sink& out, const Monitor& monitor, Checkpoints* checkpoints = nullptr);
 
 }  // namespace esim::inline sim

@@ -49,6 +49,26 @@ const OpticalFlowImages* OpticalFlowFromDepth::advance(const RenderRequest& view
   return first ? nullptr : &optical_flow_;
 }
 
+void OpticalFlowFromDepth::save(StateWriter& archive) const {
+  archive.value(before_.has_value());
+  if (!before_) return;
+  archive.value(before_->view.t);
+  archive.sized_image(before_->depth);
+  archive.sized_image(before_->object);
+}
+
+void OpticalFlowFromDepth::restore(StateReader& archive, const std::function<RenderRequest(TimeNs)>& view_at) {
+  before_.reset();
+  bool any = false;
+  archive.value(any);
+  if (!any) return;
+  TimeNs t = 0;
+  archive.value(t);
+  before_.emplace(view_at(t));
+  archive.sized_image(before_->depth);
+  archive.sized_image(before_->object);
+}
+
 void OpticalFlowFromDepth::compute(const Frame& from, const RenderRequest& to, const Image<float>& depth_there) {
   const std::vector<SE3> T_there_here = motions(from.view, to);
   optical_flow_.t0 = from.view.t;

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 
 #include "esim/core/parallel.h"
+#include "esim/core/state_archive.h"
 #include "esim/render/renderer.h"
 #include "esim/truth/bearings.h"
 
@@ -34,6 +36,11 @@ class OpticalFlowFromDepth {
   /// Takes the next frame, a `sample` of the whole image rendered for `view`. Returns the optical flow from the
   /// previous frame to this one, valid until the next call; null for the first frame.
   const OpticalFlowImages* advance(const RenderRequest& view, const Sample& sample);
+
+  /// The previous frame, for restore() of an object for the same camera.
+  void save(StateWriter& archive) const;
+  /// `view_at`: the views of the camera.
+  void restore(StateReader& archive, const std::function<RenderRequest(TimeNs)>& view_at);
 
  private:
   struct Frame {

@@ -27,6 +27,17 @@ class SeenObjects {
   /// Makes at() undefined for earlier times.
   void forget_before(TimeNs t);
 
+  /// The state, for core/state_archive.h.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.objects(self.pixels_, [](auto& a, auto& pixel) {
+      a.value(pixel.last);
+      a.list(pixel.changes);
+    });
+    archive.value(self.changes_);
+    archive.value(self.limit_);
+  }
+
  private:
   struct Change {
     TimeNs from = 0;

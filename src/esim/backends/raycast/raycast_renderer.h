@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "esim/core/colour.h"
+#include "esim/core/colour/colour.h"
 #include "esim/core/parallel.h"
 #include "esim/geometry/camera.h"
 #include "esim/render/pixel_area.h"

@@ -5,8 +5,8 @@
 #include <charconv>
 #include <deque>
 
+#include "esim/core/colour/srgb.h"
 #include "esim/core/error.h"
-#include "esim/core/srgb.h"
 #include "esim/represent/representations.h"
 
 namespace esim::inline dataset {

@@ -78,7 +78,7 @@ class CircuitArray {
     if (epoch_ == kNoEpoch) epoch_ = t;
   }
 
-  /// The variable state, for state_archive.h.
+  /// The variable state, for core/state_archive.h.
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     archive.value(self.epoch_);

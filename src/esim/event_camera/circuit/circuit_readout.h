@@ -42,7 +42,7 @@ class CircuitReadout {
   TimeNs longest_delay() const { return longest_delay_; }
   std::size_t waiting() const { return requests_.size() + waiting_ + read_.size() - released_; }
 
-  /// Its state without the history, for state_archive.h.
+  /// Its state without the history, for core/state_archive.h.
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     archive.list(self.requests_);

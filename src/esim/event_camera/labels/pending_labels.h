@@ -41,7 +41,7 @@ class PendingLabels {
   /// The earliest crossing among the labels; the maximum time without labels.
   TimeNs earliest() const;
 
-  /// A label and whether its event has been read, for state_archive.h.
+  /// A label and whether its event has been read, for core/state_archive.h.
   struct Waiting {
     NewLabel label;
     std::uint64_t was_read = 0;

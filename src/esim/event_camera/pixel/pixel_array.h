@@ -108,7 +108,7 @@ class PixelArray {
 
   AddressedRandom per_event;
 
-  /// The variable state, for state_archive.h.
+  /// The variable state, for core/state_archive.h.
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     archive.value(self.epoch);

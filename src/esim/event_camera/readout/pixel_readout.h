@@ -42,7 +42,7 @@ class PixelReadout {
   TimeNs longest_delay() const { return longest_delay_; }  ///< of any event
   std::size_t waiting() const { return readout_.waiting() + again_.size() + read_.size() - released_; }
 
-  /// Its state without the history, for state_archive.h.
+  /// Its state without the history, for core/state_archive.h.
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     Readout::transfer(archive, self.readout_);

@@ -48,7 +48,7 @@ class Readout {
   std::int64_t dropped() const { return dropped_; }
   std::size_t waiting() const { return waiting_; }
 
-  /// Its state, for state_archive.h.
+  /// Its state, for core/state_archive.h.
   template <class Archive, class Self>
   static void transfer(Archive& archive, Self& self) {
     archive.value(self.free_at_);

@@ -1,6 +1,6 @@
 #include "esim/formats/images/images_png.h"
 
-#include "esim/core/srgb.h"
+#include "esim/core/colour/srgb.h"
 #include "esim/formats/images/png_file.h"
 
 namespace esim::inline formats {

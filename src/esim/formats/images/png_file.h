@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "esim/core/colour.h"
+#include "esim/core/colour/colour.h"
 #include "esim/core/image.h"
 
 namespace esim::inline formats {

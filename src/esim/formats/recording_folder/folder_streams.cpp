@@ -7,8 +7,8 @@
 #include <exception>
 #include <utility>
 
+#include "esim/core/colour/srgb.h"
 #include "esim/core/error.h"
-#include "esim/core/srgb.h"
 #include "esim/formats/images/png_file.h"
 #include "esim/formats/images/timed_files.h"
 #include "esim/formats/text/csv.h"

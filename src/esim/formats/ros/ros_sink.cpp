@@ -6,8 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "esim/core/colour/srgb.h"
 #include "esim/core/error.h"
-#include "esim/core/srgb.h"
 #include "esim/formats/ros/messages/event_array.h"
 #include "esim/formats/ros/messages/sensor_messages.h"
 #include "esim/formats/ros/topics.h"

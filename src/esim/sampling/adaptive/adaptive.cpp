@@ -101,7 +101,25 @@ class AdaptiveSampler final : public Sampler {
 
   SamplingStatistics statistics() const override { return statistics_; }
 
+  void save(StateWriter& archive) const override { transfer(archive, *this); }
+  void restore(StateReader& archive) override { transfer(archive, *this); }
+
  private:
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.objects(self.tiles_, [](auto& a, auto& tile) { TileCourse::transfer(a, tile); });
+    archive.value(self.request_.t);
+    archive.list(self.request_.tiles);
+    archive.value(self.request_.motion_rows);
+    archive.objects(self.request_.later, [](auto& a, auto& at) {
+      a.value(at.t);
+      a.list(at.tiles);
+    });
+    archive.list(self.asked_);
+    archive.value(self.budget_);
+    transfer_statistics(archive, self.statistics_);
+  }
+
   /// Calls body(tile, index) for some of the tiles in parallel.
   template <typename Body>
   void for_each(const std::vector<std::uint32_t>& indices, const Body& body) {

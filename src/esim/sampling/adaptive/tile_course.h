@@ -25,6 +25,20 @@ struct TileCourse {
 
   TileCourse(const Tile& tile, float log_eps, TimeNs start) : timeline(tile, log_eps), due(start) {}
 
+  /// What remains between two samples, for core/state_archive.h.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    TileTimeline::transfer(archive, self.timeline);
+    archive.value(self.done);
+    archive.value(self.due);
+    archive.value(self.reason);
+    archive.value(self.audited);
+    archive.value(self.step);
+    archive.value(self.speed);
+    archive.value(self.arrival);
+    archive.value(self.begun);
+  }
+
   TimeNs last() const { return timeline.time(timeline.size() - 1); }
   bool complete(TimeNs end) const { return timeline.size() > 0 && last() >= end; }
 

@@ -34,6 +34,18 @@ class TileTimeline {
   /// Prefetches the last samples and the place of the next one: other tiles have replaced them in the caches.
   void prefetch() const;
 
+  /// The samples, for core/state_archive.h.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.objects(self.samples_, [](auto& a, auto& sample) {
+      a.value(sample.t);
+      a.value(sample.surprise);
+      a.value(sample.bend);
+      a.list(sample.irradiance);
+      a.list(sample.brightness);
+    });
+  }
+
   std::size_t size() const { return samples_.size(); }
   TimeNs time(std::size_t i) const { return samples_[i].t; }
 

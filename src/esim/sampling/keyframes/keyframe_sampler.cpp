@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -110,7 +111,73 @@ class KeyframeSampler final : public Sampler {
     return result;
   }
 
+  void save(StateWriter& archive) const override {
+    transfer(archive, *this);
+    transfer_keyframe(archive, before_);
+    archive.objects(ahead_, transfer_keyframe<StateWriter, const MovingKeyframe>);
+    const bool of_sensor = request_ && request_->renderer == nullptr;
+    archive.value(of_sensor);
+    archive.value(request_ ? request_->t : kEnded);
+  }
+  /// Renders the keyframes that are still needed again.
+  void restore(StateReader& archive) override {
+    truth_.resize(sensor().width, sensor().height);
+    transfer(archive, *this);
+    transfer_keyframe(archive, before_);
+    archive.objects(ahead_, transfer_keyframe<StateReader, MovingKeyframe>);
+    bool of_sensor = false;
+    TimeNs t = 0;
+    archive.value(of_sensor);
+    archive.value(t);
+    if (statistics_.samples > 0) render_again(before_.keyframe);
+    for (MovingKeyframe& ahead : ahead_) render_again(ahead.keyframe);
+    if (t == kEnded) {
+      request_.reset();
+    } else if (of_sensor) {
+      request_ = SampleRequest{t, {sensor()}};
+    } else {
+      request(t);
+    }
+  }
+
  private:
+  static constexpr TimeNs kEnded = std::numeric_limits<TimeNs>::max();
+
+  /// All that differs between two samples, except the keyframes and the request.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.value(self.step_);
+    archive.value(self.steps_);
+    archive.value(self.intervals_);
+    archive.value(self.truth_.t);
+    archive.sized_image(self.truth_.irradiance);
+    archive.sized_image(self.later_.irradiance);
+    archive.value(self.watermark_);
+    archive.value(self.unsettled_);
+    transfer_statistics(archive, self.statistics_);
+    archive.value(self.errors_);
+    archive.value(self.reconstructions_);
+    archive.value(self.unseen_);
+  }
+
+  template <class Archive, class Self>
+  static void transfer_keyframe(Archive& archive, Self& self) {
+    archive.value(self.keyframe.view.t);
+    archive.value(self.typical_px_per_s);
+    archive.value(self.fastest_px_per_s);
+    archive.value(self.unseen);
+  }
+
+  /// Renders a keyframe of which only the time is known.
+  void render_again(Keyframe& keyframe) {
+    const RenderRequest view = view_at_(keyframe.view.t);
+    RenderRequest whole = view;
+    whole.tiles = {{0, 0, layout().camera.width, layout().camera.height}};
+    Sample sample;
+    setup_.renderer->render(std::move(whole), sample);
+    reprojector_.prepare(view, sample, setup_.renderer->take_light(sample), keyframe);
+  }
+
   const KeyframeLayout& layout() const { return setup_.layout; }
   Tile sensor() const { return {0, 0, layout().sensor.width, layout().sensor.height}; }
 

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "esim/core/colour.h"
+#include "esim/core/colour/colour.h"
 #include "esim/scene/images/texture.h"
 #include "esim/scene/planes.h"
 

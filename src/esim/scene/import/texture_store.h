@@ -7,7 +7,7 @@
 #include <tuple>
 #include <vector>
 
-#include "esim/core/colour.h"
+#include "esim/core/colour/colour.h"
 #include "esim/scene/import/scene_graph.h"
 #include "esim/scene/planes.h"
 

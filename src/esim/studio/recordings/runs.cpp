@@ -155,11 +155,11 @@ void Runs::make(Run& run) {
     }
     return !run.cancelled;
   };
-  RecordingOptions options{run.status.out,
-                           run.replace,
-                           threads_,
-                           std::make_unique<LiveSink>(run.picture),
-                           {command_of(run.status.scenario, run.status.out, run.replace)}};
+  RecordingOptions options{.out = run.status.out,
+                           .replace = run.replace,
+                           .threads = threads_,
+                           .beside = std::make_unique<LiveSink>(run.picture),
+                           .repetition = {command_of(run.status.scenario, run.status.out, run.replace)}};
   const std::optional<Summary> summary = make_recording(run.scenario, std::move(options), notices, monitor);
 
   if (summary) std::ranges::for_each(losses(run.scenario, *summary), notices.warning);

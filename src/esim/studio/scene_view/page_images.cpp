@@ -5,7 +5,7 @@
 #include <span>
 #include <string_view>
 
-#include "esim/core/srgb.h"
+#include "esim/core/colour/srgb.h"
 #include "esim/files/codecs/image_codecs.h"
 #include "esim/preview/pictures.h"
 #include "esim/scene/images/image_header.h"

@@ -1,4 +1,4 @@
-#include "esim/core/srgb.h"
+#include "esim/core/colour/srgb.h"
 
 #include <algorithm>
 #include <array>

@@ -1,0 +1,143 @@
+#include "esim/compose/recordings/checkpoints.h"
+
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "esim/compose/compose.h"
+#include "esim/compose/provenance.h"
+#include "esim/core/error.h"
+#include "esim/core/state_archive.h"
+#include "esim/files/input_file.h"
+#include "esim/files/output_file.h"
+
+namespace esim::inline compose {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kSignature = "esim checkpoint\n";
+
+fs::path state_file(const fs::path& recording) { return checkpoint_folder(recording) / "state"; }
+
+void put(StateWriter& archive, const std::string& text) { archive.list(std::span(text)); }
+void get(StateReader& archive, std::string& text) {
+  std::vector<char> characters;
+  archive.list(characters);
+  text.assign(characters.begin(), characters.end());
+}
+
+bool is_complete(const fs::path& recording) {
+  std::ifstream stream(recording / "report.json");
+  const nlohmann::json report = nlohmann::json::parse(stream, nullptr, false);
+  return report.is_object() && report.value("status", "") == "complete";
+}
+
+std::string build() { return std::string(ESIM_VERSION) + " " + std::string(source_commit()); }
+
+}  // namespace
+
+fs::path checkpoint_folder(const fs::path& recording) { return recording / "checkpoint"; }
+fs::path journal_file(const fs::path& recording) { return checkpoint_folder(recording) / "journal"; }
+
+bool can_be_resumed(const fs::path& recording) {
+  std::error_code error;
+  return fs::is_regular_file(state_file(recording), error);
+}
+
+Checkpoint read_checkpoint(const fs::path& recording) {
+  const fs::path file = state_file(recording);
+  if (!can_be_resumed(recording)) {
+    if (is_complete(recording)) throw UserError(recording.string() + " is complete: there is nothing to resume");
+    throw UserError(recording.string() +
+                    " cannot be resumed: it has no checkpoint; the first one is written after a few seconds. Simulate "
+                    "the scenario again");
+  }
+  InputFile input(file);
+  const auto size = static_cast<std::size_t>(input.size());
+  const std::span<const std::byte> all = input.read_exactly(size, "the checkpoint");
+  if (size < kSignature.size() || std::memcmp(all.data(), kSignature.data(), kSignature.size()) != 0)
+    throw UserError(file.string() + " is not a checkpoint of a simulation; simulate the scenario again");
+  StateReader archive(all.subspan(kSignature.size()));
+  std::string writer;
+  get(archive, writer);
+  if (writer != build()) {
+    throw UserError(recording.string() + " cannot be resumed: its checkpoint is of another build of esim, " + writer +
+                    " (this is " + build() + "); resume it with that one, or simulate the scenario again");
+  }
+  Checkpoint checkpoint;
+  archive.value(checkpoint.journal_bytes);
+  archive.objects(checkpoint.inputs, [](StateReader& a, UsedFile& used) {
+    std::string path;
+    get(a, path);
+    used.path = path;
+    a.value(used.regular);
+    a.value(used.bytes);
+    a.value(used.changed_ns);
+  });
+  archive.list(checkpoint.state);
+  if (!archive.at_end()) StateReader::fail();
+  return checkpoint;
+}
+
+void require_unchanged(const Checkpoint& checkpoint, const std::vector<UsedFile>& inputs) {
+  for (const UsedFile& before : checkpoint.inputs) {
+    const auto now = std::ranges::find(inputs, before.path, &UsedFile::path);
+    if (now != inputs.end() && now->bytes == before.bytes && now->changed_ns == before.changed_ns) continue;
+    if (now != inputs.end() && !before.regular) continue;
+    throw UserError(before.path.string() +
+                    " has been changed since the simulation began, which can therefore not be resumed: restore the "
+                    "file, or simulate the scenario again");
+  }
+}
+
+void require_same_scenario(const std::string& recorded, const std::string& given) {
+  if (recorded == given) return;
+  std::istringstream before(recorded), now(given);
+  std::string a, b;
+  const auto next = [](std::istringstream& lines, std::string& line) {
+    if (!std::getline(lines, line)) line.clear();
+    line.erase(0, line.find_first_not_of(" -"));
+  };
+  do {
+    next(before, a);
+    next(now, b);
+  } while (a == b && (before || now));
+  const auto quoted = [](const std::string& line) { return line.empty() ? "nothing" : "\"" + line + "\""; };
+  throw UserError("the simulation to resume has other options: " + quoted(a) + ", now " + quoted(b) +
+                  "; resume it without changes, or simulate into another folder");
+}
+
+CheckpointWriter::CheckpointWriter(fs::path recording, RecordJournal& journal)
+    : recording_(std::move(recording)), journal_(journal) {}
+
+bool CheckpointWriter::due() const {
+  constexpr std::chrono::seconds kShortest{2}, kLongest{60};
+  const Clock::time_point now = Clock::now();
+  const Clock::duration share = std::clamp<Clock::duration>((now - began_) / 50, kShortest, kLongest);
+  return now - last_ >= std::max(share, 50 * cost_);
+}
+
+void CheckpointWriter::save(std::span<const std::byte> state, const std::vector<UsedFile>& inputs) {
+  const Clock::time_point before = Clock::now();
+  std::vector<std::byte> bytes;
+  StateWriter archive(bytes);
+  archive.fixed(kSignature);
+  put(archive, build());
+  archive.value(journal_.checkpoint());
+  archive.objects(inputs, [](StateWriter& a, const UsedFile& used) {
+    put(a, used.path.string());
+    a.value(used.regular);
+    a.value(used.bytes);
+    a.value(used.changed_ns);
+  });
+  archive.list(state);
+  write_file_atomically(state_file(recording_),
+                        std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  last_ = Clock::now();
+  cost_ = last_ - before;
+}
+
+}  // namespace esim::inline compose

@@ -1,0 +1,114 @@
+#include <algorithm>
+#include <iterator>
+
+#include "esim/compose/compose.h"
+#include "esim/compose/recordings/checkpoints.h"
+#include "esim/files/input_file.h"
+#include "esim/files/output_file.h"
+#include "esim/recording/fan_out.h"
+#include "esim/recording/keep_on_failure.h"
+#include "esim/recording/recording_directory.h"
+#include "esim/scenario/read.h"
+
+namespace esim::inline compose {
+Notices keeping(Notices notify, std::vector<std::string>& given) {
+  return {[warning = std::move(notify.warning), &given](const std::string& text) {
+            given.push_back("warning: " + text);
+            warning(text);
+          },
+          [note = std::move(notify.note), &given](const std::string& text) {
+            given.push_back(text);
+            note(text);
+          }};
+}
+
+namespace {
+
+constexpr const char* kScenarioFile = "scenario.yaml";
+
+/// The checkpoint of a simulation that ended early, if it is one of this scenario.
+Checkpoint checkpoint_of(const std::filesystem::path& recording, const std::string& scenario) {
+  constexpr std::size_t kLongest = std::size_t{1} << 26;
+  Checkpoint checkpoint = read_checkpoint(recording);
+  require_same_scenario(read_head(recording / kScenarioFile, kLongest), scenario);
+  return checkpoint;
+}
+
+/// Removes what a simulation that is resumed writes again.
+void remove_outputs(const std::filesystem::path& recording) {
+  for (const auto& entry : std::filesystem::directory_iterator(recording)) {
+    const std::filesystem::path& path = entry.path();
+    if (path != checkpoint_folder(recording) && path.filename() != kScenarioFile && path.filename() != "report.json")
+      std::filesystem::remove_all(path);
+  }
+}
+
+}  // namespace
+
+std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions options, const Notices& notify,
+                                      const Monitor& monitor) {
+  std::vector<std::string> given;
+  const Notices notices = keeping(notify, given);
+  const std::string scenario_text = write_scenario(scenario);
+  std::optional<Checkpoint> checkpoint;
+  if (options.resume) checkpoint = checkpoint_of(RecordingDirectory::resumable(options.out), scenario_text);
+  // The directory comes first, so that an existing one is reported before a scene is loaded.
+  RecordingDirectory directory =
+      options.resume ? RecordingDirectory::resume(options.out) : RecordingDirectory(options.out, options.replace);
+  ProvenanceRecorder provenance(options.repetition);
+  std::vector<UsedFile> inputs;  // except those of the scenario, which is compared itself
+  provenance.add(scenario.files);
+  const UsedFilesListener listener([&](const UsedFile& file) {
+    inputs.push_back(file);
+    provenance.add(file);
+  });
+  World world = build_world(scenario, options.threads, notices);
+  if (checkpoint) {
+    require_unchanged(*checkpoint, inputs);
+    remove_outputs(directory.path());
+  }
+  write_file_atomically(directory.path() / kScenarioFile, scenario_text);
+  std::unique_ptr<Sink> sink = build_sink(scenario, directory.path());
+  SampleStores samples(scenario, directory.path(), world);
+  if (options.beside != nullptr) {
+    auto both = std::make_unique<FanOut>();
+    both->add(std::move(sink));
+    both->add(std::move(options.beside));
+    sink = std::move(both);
+  }
+  std::optional<CheckpointWriter> writer;
+  Checkpoints checkpoints{
+      [&] { return writer->due(); }, [&](std::span<const std::byte> state) { writer->save(state, inputs); }, {}};
+  if (scenario.output.checkpoints && scenario.output.samples == KeptSamples::none) {
+    create_folder(checkpoint_folder(directory.path()));
+    std::unique_ptr<RecordJournal> journal =
+        checkpoint ? std::make_unique<RecordJournal>(journal_file(directory.path()), checkpoint->journal_bytes,
+                                                     std::move(sink))
+                   : std::make_unique<RecordJournal>(journal_file(directory.path()), std::move(sink));
+    writer.emplace(directory.path(), *journal);
+    sink = std::move(journal);
+    if (checkpoint) checkpoints.resumed = std::move(checkpoint->state);
+  }
+  if (!monitor({world.info.start, world.info.start, world.info.end, 0, 0, 0})) return std::nullopt;
+  bool recorded = checkpoint.has_value();
+  return keep_on_failure(directory, recorded, [&]() -> std::optional<Summary> {
+    Summary summary = simulate(
+        world, *sink,
+        [&](const Progress& progress) {
+          recorded |= progress.now > progress.start;
+          return monitor(progress);
+        },
+        writer ? &checkpoints : nullptr);
+    if (summary.complete) {
+      samples.finish();
+      std::filesystem::remove_all(checkpoint_folder(directory.path()));
+    }
+    for (const std::string& loss : losses(scenario, summary)) given.push_back("warning: " + loss);
+    std::ranges::copy(hints(scenario, summary), std::back_inserter(given));
+    directory.finish(
+        report_json(scenario, summary, world.workers->threads(), given, provenance.finish(summary.complete)));
+    return summary;
+  });
+}
+
+}  // namespace esim::inline compose

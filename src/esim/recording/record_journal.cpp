@@ -1,0 +1,345 @@
+#include "esim/recording/record_journal.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <utility>
+#include <vector>
+
+#include "esim/core/error.h"
+#include "esim/core/state_archive.h"
+#include "esim/files/output_file.h"
+
+namespace esim::inline recording {
+namespace {
+
+// --- records as bytes
+// -------------------------------------------------------------------------------------------------
+
+template <class Archive, class Vector>
+void transfer_vector(Archive& archive, Vector& v) {
+  for (int i = 0; i < v.size(); ++i) archive.value(v[i]);
+}
+
+template <class Archive, class Pose>
+void transfer_pose(Archive& archive, Pose& pose) {
+  transfer_vector(archive, pose.rotation.coeffs());
+  transfer_vector(archive, pose.translation);
+}
+
+template <class Archive, class Motion>
+void transfer_motion(Archive& archive, Motion& motion) {
+  transfer_pose(archive, motion.T_world_body);
+  for (auto* v : {&motion.velocity_world, &motion.acceleration_world, &motion.omega_body, &motion.alpha_body})
+    transfer_vector(archive, *v);
+}
+
+template <class Archive, class Signals>
+void transfer_signals(Archive& archive, Signals& signals) {
+  transfer_vector(archive, signals.angular_rate);
+  transfer_vector(archive, signals.specific_force);
+}
+
+void put(StateWriter& to, const EventsRecord& record) {
+  to.value(record.camera);
+  to.list(record.events);
+  to.list(record.labels);
+}
+void pass(StateReader& from, Sink& out, const EventsRecord*) {
+  int camera = 0;
+  std::vector<Event> events;
+  std::vector<EventLabel> labels;
+  from.value(camera);
+  from.list(events);
+  from.list(labels);
+  out.write(EventsRecord{camera, events, labels});
+}
+
+void put(StateWriter& to, const TruthRecord& record) {
+  to.value(record.camera);
+  to.value(record.t);
+  transfer_pose(to, record.T_world_camera);
+  for (const Image<float>* image : {&record.irradiance, &record.depth, &record.motion_x, &record.motion_y})
+    to.sized_image(*image);
+  to.value(record.object != nullptr);
+  if (record.object != nullptr) to.sized_image(*record.object);
+  to.objects(record.T_world_objects, [](auto& archive, const SE3& pose) { transfer_pose(archive, pose); });
+}
+void pass(StateReader& from, Sink& out, const TruthRecord*) {
+  int camera = 0;
+  TimeNs t = 0;
+  SE3 pose;
+  std::array<Image<float>, 4> images;
+  bool has_object = false;
+  Image<std::uint16_t> object;
+  std::vector<SE3> T_world_objects;
+  from.value(camera);
+  from.value(t);
+  transfer_pose(from, pose);
+  for (Image<float>& image : images) from.sized_image(image);
+  from.value(has_object);
+  if (has_object) from.sized_image(object);
+  from.objects(T_world_objects, [](auto& archive, SE3& one) { transfer_pose(archive, one); });
+  out.write(TruthRecord{camera, t, pose, images[0], images[1], images[2], images[3], has_object ? &object : nullptr,
+                        T_world_objects});
+}
+
+void put(StateWriter& to, const OpticalFlowRecord& record) {
+  to.value(record.camera);
+  to.value(record.t0);
+  to.value(record.t1);
+  to.sized_image(record.x);
+  to.sized_image(record.y);
+  to.sized_image(record.visible);
+}
+void pass(StateReader& from, Sink& out, const OpticalFlowRecord*) {
+  int camera = 0;
+  TimeNs t0 = 0, t1 = 0;
+  Image<float> x, y;
+  Image<std::uint8_t> visible;
+  from.value(camera);
+  from.value(t0);
+  from.value(t1);
+  from.sized_image(x);
+  from.sized_image(y);
+  from.sized_image(visible);
+  out.write(OpticalFlowRecord{camera, t0, t1, x, y, visible});
+}
+
+void put(StateWriter& to, const EventPointsRecord& record) {
+  to.value(record.camera);
+  to.list(record.events);
+  for (const Eigen::Vector3f& point : record.points) transfer_vector(to, point);
+}
+void pass(StateReader& from, Sink& out, const EventPointsRecord*) {
+  int camera = 0;
+  std::vector<Event> events;
+  from.value(camera);
+  from.list(events);
+  std::vector<Eigen::Vector3f> points(events.size());
+  for (Eigen::Vector3f& point : points) transfer_vector(from, point);
+  out.write(EventPointsRecord{camera, events, points});
+}
+
+void put(StateWriter& to, const ImageRecord& record) {
+  to.value(record.camera);
+  to.value(record.t);
+  to.sized_image(record.irradiance);
+}
+void pass(StateReader& from, Sink& out, const ImageRecord*) {
+  int camera = 0;
+  TimeNs t = 0;
+  Image<float> irradiance;
+  from.value(camera);
+  from.value(t);
+  from.sized_image(irradiance);
+  out.write(ImageRecord{camera, t, irradiance});
+}
+
+void put(StateWriter& to, const FrameRecord& record) {
+  to.value(record.camera);
+  to.value(record.t);
+  to.value(record.exposure_start);
+  to.value(record.exposure_duration);
+  to.value(record.gain);
+  to.sized_image(record.image);
+  to.value(record.bits);
+}
+void pass(StateReader& from, Sink& out, const FrameRecord*) {
+  int camera = 0, bits = 0;
+  TimeNs t = 0, start = 0, duration = 0;
+  double gain = 0;
+  Image<std::uint16_t> image;
+  from.value(camera);
+  from.value(t);
+  from.value(start);
+  from.value(duration);
+  from.value(gain);
+  from.sized_image(image);
+  from.value(bits);
+  out.write(FrameRecord{camera, t, start, duration, gain, image, bits});
+}
+
+void put(StateWriter& to, const PoseRecord& record) {
+  to.value(record.t);
+  transfer_motion(to, record.body);
+  to.objects(record.objects, [](auto& archive, const Kinematics& motion) { transfer_motion(archive, motion); });
+  to.value(record.imu_bias.has_value());
+  if (record.imu_bias) transfer_signals(to, *record.imu_bias);
+}
+void pass(StateReader& from, Sink& out, const PoseRecord*) {
+  PoseRecord record;
+  bool has_bias = false;
+  from.value(record.t);
+  transfer_motion(from, record.body);
+  from.objects(record.objects, [](auto& archive, Kinematics& motion) { transfer_motion(archive, motion); });
+  from.value(has_bias);
+  if (has_bias) transfer_signals(from, record.imu_bias.emplace());
+  out.write(record);
+}
+
+void put(StateWriter& to, const ImuRecord& record) {
+  to.value(record.t);
+  transfer_signals(to, record.measured);
+  transfer_signals(to, record.bias);
+}
+void pass(StateReader& from, Sink& out, const ImuRecord*) {
+  ImuRecord record;
+  from.value(record.t);
+  transfer_signals(from, record.measured);
+  transfer_signals(from, record.bias);
+  out.write(record);
+}
+
+void put(StateWriter& to, const TriggerRecord& record) {
+  to.value(record.camera);
+  to.value(record.t);
+  to.value(record.kind);
+}
+void pass(StateReader& from, Sink& out, const TriggerRecord*) {
+  TriggerRecord record;
+  from.value(record.camera);
+  from.value(record.t);
+  from.value(record.kind);
+  out.write(record);
+}
+
+/// Passes the next record on, which is the `kind`-th alternative of Record.
+template <std::size_t i = 0>
+void pass_next(std::size_t kind, StateReader& from, Sink& out) {
+  if constexpr (i < std::variant_size_v<Record>) {
+    if (kind == i) return pass(from, out, static_cast<const std::variant_alternative_t<i, Record>*>(nullptr));
+    pass_next<i + 1>(kind, from, out);
+  } else {
+    StateReader::fail();
+  }
+}
+
+/// In front of each compressed block of records.
+struct BlockHeader {
+  std::uint64_t bytes = 0, compressed = 0;
+};
+
+constexpr std::size_t kBlockBytes = std::size_t{1} << 20;  // at least
+constexpr int kLevel = 1;
+
+}  // namespace
+
+// --- the file
+// ---------------------------------------------------------------------------------------------------------
+
+class RecordJournal::File {
+ public:
+  File(std::filesystem::path path, int flags)
+      : path_(std::move(path)), descriptor_(::open(path_.c_str(), O_RDWR | O_CLOEXEC | flags, 0666)) {
+    if (descriptor_ < 0) throw_cannot_write(path_, system_reason(errno));
+  }
+  ~File() { ::close(descriptor_); }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+
+  std::vector<std::byte> records;  // not in the file yet
+
+  /// Appends the records to the file as one block.
+  void write_block() {
+    if (records.empty()) return;
+    compressed_.resize(sizeof(BlockHeader) + ZSTD_compressBound(records.size()));
+    const std::size_t size =
+        ZSTD_compress(compressed_.data() + sizeof(BlockHeader), compressed_.size() - sizeof(BlockHeader),
+                      records.data(), records.size(), kLevel);
+    if (ZSTD_isError(size) != 0) throw_cannot_write(path_, ZSTD_getErrorName(size));
+    const BlockHeader header{records.size(), size};
+    std::memcpy(compressed_.data(), &header, sizeof header);
+    const std::size_t whole = sizeof header + size;
+    for (std::size_t done = 0; done < whole;) {
+      const ssize_t written =
+          ::pwrite(descriptor_, compressed_.data() + done, whole - done, static_cast<off_t>(size_ + done));
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0) throw_cannot_write(path_, system_reason(errno));
+      done += static_cast<std::size_t>(written);
+    }
+    size_ += whole;
+    records.clear();
+  }
+
+  std::uint64_t make_durable() {
+    if (::fdatasync(descriptor_) != 0 && errno != EINVAL) throw_cannot_write(path_, system_reason(errno));
+    return size_;
+  }
+
+  /// Passes on the records of the first bytes of the file, and removes the rest.
+  void replay(std::uint64_t bytes, Sink& out) {
+    while (size_ < bytes) {
+      BlockHeader header;
+      read(&header, sizeof header, bytes);
+      if (header.compressed > bytes - size_) damaged();
+      compressed_.resize(header.compressed);
+      read(compressed_.data(), compressed_.size(), bytes);
+      if (ZSTD_getFrameContentSize(compressed_.data(), compressed_.size()) != header.bytes) damaged();
+      std::vector<std::byte> block(header.bytes);
+      if (ZSTD_decompress(block.data(), block.size(), compressed_.data(), compressed_.size()) != block.size())
+        damaged();
+      for (StateReader from(block); !from.at_end();) {
+        std::uint8_t kind = 0;
+        from.value(kind);
+        pass_next(kind, from, out);
+      }
+    }
+    if (::ftruncate(descriptor_, static_cast<off_t>(size_)) != 0) throw_cannot_write(path_, system_reason(errno));
+  }
+
+ private:
+  void read(void* to, std::size_t count, std::uint64_t end) {
+    if (count > end - size_) damaged();
+    for (std::size_t done = 0; done < count;) {
+      const ssize_t got =
+          ::pread(descriptor_, static_cast<char*>(to) + done, count - done, static_cast<off_t>(size_ + done));
+      if (got < 0 && errno == EINTR) continue;
+      if (got <= 0) damaged();
+      done += static_cast<std::size_t>(got);
+    }
+    size_ += count;
+  }
+  [[noreturn]] void damaged() const {
+    throw UserError(path_.string() + " is damaged, and the simulation cannot be resumed; simulate it again");
+  }
+
+  std::filesystem::path path_;
+  int descriptor_;
+  std::uint64_t size_ = 0;  // of the valid part
+  std::vector<std::byte> compressed_;
+};
+
+RecordJournal::RecordJournal(std::filesystem::path file, std::unique_ptr<Sink> out)
+    : file_(std::make_unique<File>(std::move(file), O_CREAT | O_TRUNC)), out_(std::move(out)) {}
+
+RecordJournal::RecordJournal(std::filesystem::path file, std::uint64_t valid_bytes, std::unique_ptr<Sink> out)
+    : file_(std::make_unique<File>(std::move(file), 0)), to_replay_(valid_bytes), out_(std::move(out)) {}
+
+RecordJournal::~RecordJournal() = default;
+
+void RecordJournal::begin(const RecordingInfo& info) {
+  out_->begin(info);
+  file_->replay(std::exchange(to_replay_, 0), *out_);
+}
+
+void RecordJournal::write(const Record& record) {
+  StateWriter to(file_->records);
+  to.value(static_cast<std::uint8_t>(record.index()));
+  std::visit([&](const auto& one) { put(to, one); }, record);
+  if (file_->records.size() >= kBlockBytes) file_->write_block();
+  out_->write(record);
+}
+
+void RecordJournal::end(bool complete) { out_->end(complete); }
+
+std::uint64_t RecordJournal::checkpoint() {
+  file_->write_block();
+  return file_->make_durable();
+}
+
+}  // namespace esim::inline recording

@@ -29,7 +29,8 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
   ProvenanceRecorder provenance(options.repetition);
   provenance.add(scenario.files);
   const UsedFilesListener listener([&](const UsedFile& file) { provenance.add(file); });
-  World world = build_world(scenario, options.threads, notices);
+  const auto cache = open_image_cache(options.images, scenario.renderer, notices.warning);
+  World world = build_world(scenario, options.threads, notices, cache);
   write_file_atomically(directory.path() / "scenario.yaml", write_scenario(scenario));
   std::unique_ptr<Sink> sink = build_sink(scenario, directory.path());
   SampleStores samples(scenario, directory.path(), world);
@@ -47,6 +48,7 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
       return monitor(progress);
     });
     if (summary.complete) samples.finish();
+    if (cache != nullptr) summary.engine_images = {cache->from_engine, cache->from_cache, cache->folder().string()};
     for (const std::string& loss : losses(scenario, summary)) given.push_back("warning: " + loss);
     std::ranges::copy(hints(scenario, summary), std::back_inserter(given));
     directory.finish(

@@ -135,9 +135,12 @@ struct ImageCacheOptions {
   std::uint64_t max_bytes = 10'000'000'000;  ///< of the folder
 };
 
-/// The cache for a scenario's renderer; null if there is none.
+/// The cache for a scenario's renderer; null without a cache.
 std::shared_ptr<ImageCache> open_image_cache(const ImageCacheOptions& options, const RendererOptions& renderer,
                                              const NoticeHandler& warning);
+
+/// What the renderers with a cache have delivered; empty without a cache.
+std::optional<EngineImages> engine_images(const std::shared_ptr<ImageCache>& cache);
 
 // --- light (build_light.cpp) -----------------------------------------------------------------------------------------
 

@@ -48,7 +48,7 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
       return monitor(progress);
     });
     if (summary.complete) samples.finish();
-    if (cache != nullptr) summary.engine_images = {cache->from_engine, cache->from_cache, cache->folder().string()};
+    summary.engine_images = engine_images(cache);
     for (const std::string& loss : losses(scenario, summary)) given.push_back("warning: " + loss);
     std::ranges::copy(hints(scenario, summary), std::back_inserter(given));
     directory.finish(

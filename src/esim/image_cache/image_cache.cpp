@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
-#include <iterator>
 #include <random>
 #include <utility>
 #include <vector>
@@ -62,10 +61,15 @@ fs::path ImageCache::file_of(const std::string& key) const { return folder_ / (k
 
 std::optional<std::string> ImageCache::load(const std::string& key, std::size_t bytes) {
   const fs::path path = file_of(key);
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (!file) return std::nullopt;
-  const std::string frame{std::istreambuf_iterator<char>(file), {}};
-  std::optional<std::string> image = decompressed(frame, bytes);
+  std::optional<std::string> image;
+  if (const std::streamoff size = file.tellg();
+      size > 0 && static_cast<std::size_t>(size) <= ZSTD_compressBound(bytes)) {
+    std::string frame(static_cast<std::size_t>(size), '\0');
+    file.seekg(0);
+    if (file.read(frame.data(), size)) image = decompressed(frame, bytes);
+  }
   std::error_code ignored;
   if (image) {
     fs::last_write_time(path, fs::file_time_type::clock::now(), ignored);

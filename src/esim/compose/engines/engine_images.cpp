@@ -87,4 +87,9 @@ std::shared_ptr<ImageCache> open_image_cache(const ImageCacheOptions& options, c
   }
 }
 
+std::optional<EngineImages> engine_images(const std::shared_ptr<ImageCache>& cache) {
+  if (cache == nullptr) return std::nullopt;
+  return EngineImages{cache->from_engine, cache->from_cache, cache->folder().string()};
+}
+
 }  // namespace esim::inline compose

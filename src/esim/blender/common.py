@@ -89,6 +89,7 @@ def esim_open(path):
         bpy.ops.wm.collada_import(filepath=path)
     else:
         raise RuntimeError("Error: Blender does not support the format " + extension)
+    esim_list_other_files()
 
 
 def esim_export(path):

@@ -158,6 +158,8 @@ def simulate(
     packet_s: Number | None = None,
     trajectory: Trajectory | None = None,
     renderer: Renderer | Callable[..., Mapping[str, ArrayLike]] | None = None,
+    cache: Path | Literal[False] | None = None,
+    cache_bytes: Int = 10_000_000_000,
 ) -> Simulation: ...
 
 class EventsIterator(Iterator[Events]):

@@ -242,6 +242,7 @@ class Simulation:
         self._core = core
         self._made = []  # a packet, or None at the end, that has not been returned: after a signal
         self._told = 0
+        self._warned = len(core.warnings())
         for text in core.warnings():
             warnings.warn(text, stacklevel=3)
         info = core.info()
@@ -281,7 +282,11 @@ class Simulation:
         self._warn_of_losses()
 
     def _warn_of_losses(self):
-        """Warns of each loss once. Must be called directly from a public method, for `stacklevel`."""
+        """Warns of each loss and of later problems once. Must be called directly from a public method, for `stacklevel`."""
+        later = self._core.warnings()[self._warned :]
+        self._warned += len(later)
+        for text in later:
+            warnings.warn(text, stacklevel=3)
         losses = self._core.losses()[self._told :]
         self._told += len(losses)
         for loss in losses:
@@ -312,6 +317,8 @@ def simulate(
     packet_s=None,
     trajectory=None,
     renderer=None,
+    cache=None,
+    cache_bytes=10_000_000_000,
 ):
     """Simulates a scenario.
 
@@ -336,6 +343,11 @@ def simulate(
         Motion of the body; replaces the scenario's trajectory, which may be missing.
     renderer : Renderer or callable, optional
         Replaces the scenario's renderer, which may be missing.
+    cache : path or False, optional
+        Folder of the images that Blender or UnrealCV has rendered, so that none is rendered twice. False: no cache. By
+        default, scenes that esim opens in Blender have one, in ~/.cache/esim/images.
+    cache_bytes : int
+        Maximum size of this folder.
 
     Returns
     -------
@@ -351,6 +363,8 @@ def simulate(
     """
     if renderer is not None and not isinstance(renderer, Renderer):
         renderer = Renderer(renderer)
+    if renderer is not None and cache:
+        raise Error("cache must not be given with renderer: it keeps images of the renderers blender and unrealcv only")
     scenario = to_scenario(scenario)
     seeded = [] if seed is None else [f"seed={_checks.seed(seed)}"]
     values = scenario._read(to_overrides(overrides) + seeded, renderer is None, trajectory is None)
@@ -371,5 +385,10 @@ def simulate(
             _checks.flag(force, "force"),
             "" if given else scenario._command(to_overrides(overrides), seed, out),
             obstacle,
+            _core.ImageCacheOptions(
+                cache is not False,
+                "" if cache is None or cache is False else os.fspath(cache),
+                _checks.whole(cache_bytes, "cache_bytes", 1, 2**63 - 1),
+            ),
         )
     )

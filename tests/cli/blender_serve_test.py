@@ -7,14 +7,32 @@ import pathlib
 import re
 import shutil
 import struct
+import subprocess
 import sys
 import tempfile
 import unittest
 
-from blender_server import BLENDER, MAGIC, Client, Serving, make_scene
+from blender_server import BLENDER, ENVIRONMENT, MAGIC, Client, Serving, make_scene
 
 SCRIPTS = pathlib.Path(sys.argv[1])
 SMALL = ("--size", "33x25", "--samples", "2")
+# A scene that refers to an image, to an image sequence, to a tiled texture, to a volume, to a library and to a folder of a simulation.
+REFERRING = """
+import bpy
+bpy.ops.wm.read_factory_settings(use_empty=True)
+for name, source in (("wood.png", "FILE"), ("frames/0001.png", "SEQUENCE"), ("stone.<UDIM>.png", "TILED")):
+    image = bpy.data.images.new(name, 4, 4)
+    image.source, image.filepath, image.use_fake_user = source, {files!r} + "/" + name, True
+volume = bpy.data.volumes.new("fog")
+volume.filepath, volume.use_fake_user = {files!r} + "/fog.vdb", True
+with bpy.data.libraries.load({bright!r}, link=True) as (there, here):
+    here.objects = ["Box"]
+bpy.context.scene.collection.objects.link(here.objects[0])
+bpy.ops.mesh.primitive_cube_add()
+bpy.context.object.modifiers.new("smoke", "FLUID").fluid_type = "DOMAIN"
+bpy.context.object.modifiers[0].domain_settings.cache_directory = {files!r} + "/smoke"
+bpy.ops.wm.save_as_mainfile(filepath={files!r} + "/a.blend")
+"""
 
 
 @unittest.skipUnless(BLENDER, "there is no blender; apt install blender")
@@ -206,6 +224,22 @@ class Serve(unittest.TestCase):
         client.receive()
         self.assertEqual(client.numbers("vget /camera/0/pose"), [0] * 6)
         self.assertAlmostEqual(client.array("vget /camera/0/lit npy")[12][16][0], 0.1, 5)
+
+    def test_all_files_of_a_scene_are_listed(self):
+        files = self.folder / "files"
+        (files / "frames").mkdir(parents=True)
+        (files / "smoke").mkdir()
+        for name in ("wood.png", "frames/0001.png", "frames/0002.png", "stone.1001.png", "stone.1002.png", "fog.vdb"):
+            (files / name).write_bytes(b"-")
+        script = files / "make.py"
+        script.write_text(REFERRING.format(bright=str(self.folder / "bright.blend"), files=str(files)))
+        subprocess.run([BLENDER, "--background", "--factory-startup", "--python-exit-code", "3", "--python", script], check=True,
+                       capture_output=True, env=ENVIRONMENT)
+        server = Serving(SCRIPTS, None, "--scene", str(files / "a.blend"), *SMALL)
+        self.addCleanup(server.end)
+        listed = re.findall(r"esim warning file (.*)", server.said)
+        for expected in (files / "wood.png", self.folder / "bright.blend", files / "frames", files, files / "smoke", files / "fog.vdb"):
+            self.assertIn(str(expected), listed)
 
     def test_a_scene_that_cannot_be_opened_is_an_error(self):
         broken = self.folder / "broken.blend"

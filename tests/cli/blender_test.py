@@ -40,6 +40,10 @@ def leftovers(folder):
 
 
 class Blender(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        os.environ["XDG_CACHE_HOME"] = str(self.folder / "cache")
+
     def scenario(self, scene, more=""):
         (self.folder / "box.txt").write_text("# t x y z qx qy qz qw\n" + BOX)
         path = self.folder / "scenario.yaml"
@@ -77,6 +81,12 @@ class Blender(ProgramTest):
         # The box of light 2 passes before a wall of 0.1, as seen at the middle: never more than ln 20 / 0.25 per pixel and edge.
         self.assertLess(report["events"], 32 * 24 * 13)
         self.assertEqual(running_blenders(), before)
+        # The same from the cache, and without it.
+        for out, arguments in (("cached", ()), ("rendered", ("--no-cache",))):
+            result = run("simulate", scenario, "--out", self.folder / out, *arguments)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(self.events(self.folder / out), self.events(self.out))
+        self.assertEqual(json.loads((self.folder / "cached" / "report.json").read_text())["engine_images"]["rendered"], 0)
         # The same with a server that runs already.
         server = Serving(SCRIPTS, self.folder / "bright.blend", "--samples", "4")
         self.addCleanup(server.end)
@@ -94,7 +104,7 @@ class Blender(ProgramTest):
         dark = make_scene(self.folder, "dark")
         result = run("check", self.scenario(dark))
         self.assertIn("no light", result.stderr)
-        self.assert_refused(run("simulate", self.scenario(dark), "--out", self.out), "no object Box", "Cube")
+        self.assert_refused(run("simulate", self.scenario(dark), "--out", self.out), "object Box does not exist", "Cube")
 
     @unittest.skipUnless(BLENDER, "there is no blender; apt install blender")
     def test_follows_the_camera_of_the_scene(self):

@@ -43,6 +43,7 @@ class Server(threading.Thread):
 
     def run(self):
         connection, _ = self.listener.accept()
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.listener.close()
         self.send(connection, b"connected to a test")
         stream = connection.makefile("rb")

@@ -19,6 +19,8 @@ struct SimulateArguments : RunOptions {
   std::optional<std::uint64_t> seed;
   std::string keep_samples{};
   std::string resume{};
+  bool no_cache = false;
+  ImageCacheOptions images{};
 };
 
 void print_summary(const Summary& summary, const std::filesystem::path& out, bool previews) {
@@ -31,6 +33,8 @@ void print_summary(const Summary& summary, const std::filesystem::path& out, boo
   tell(stderr, "{}: {:.3f} s simulated in {:.1f} s ({:.2f}x real time), {} samples, {} events\n",
        summary.complete ? "done" : "interrupted", simulated_s, summary.wall_seconds, simulated_s / summary.wall_seconds,
        samples, events);
+  if (const auto& images = summary.engine_images)
+    tell(stderr, "images:    {} rendered, {} from the cache {}\n", images->rendered, images->from_cache, images->cache);
   tell(stderr, "{}recording: {}\n", describe(filtered_cameras(summary)), out.string());
   for (const CameraSummary& camera : summary.cameras) {
     if (previews) tell(stderr, "look at:   {}\n", (out / camera.name / "preview.png").string());
@@ -51,6 +55,9 @@ int run(const SimulateArguments& arguments) {
                                     : arguments.out.empty() ? std::filesystem::path("out") / file.stem()
                                                             : std::filesystem::path(arguments.out);
 
+  ImageCacheOptions images = arguments.images;
+  images.use = !arguments.no_cache;
+
   catch_interrupts();
   ProgressBar bar(!arguments.quiet);
   const auto made = make_recording(scenario,
@@ -58,7 +65,8 @@ int run(const SimulateArguments& arguments) {
                                     .replace = arguments.force,
                                     .resume = resume,
                                     .threads = arguments.threads,
-                                    .repetition = {shell_command(own_command_line())}},
+                                    .repetition = {shell_command(own_command_line())},
+                                    .images = images},
                                    printing(arguments.quiet), [&](const Progress& progress) {
                                      bar.show(progress);
                                      return !interrupted();
@@ -105,6 +113,18 @@ void add_simulate(CLI::App& app, int& exit_code) {
                  "Keep what the event sensors saw, for esim resense, with an error of the brightness up to 0.0005; "
                  "--keep-samples=exact: without error, but larger. The same as --set output.samples=true or exact")
       ->check(CLI::IsMember({"true", "exact"}));
+  CLI::Option* const cache =
+      command
+          ->add_option(
+              "--cache", arguments->images.folder,
+              "Folder of the images that Blender or UnrealCV has rendered, so that none is rendered twice. For "
+              "UnrealCV, use one folder per scene (default: ~/.cache/esim/images for scenes that esim opens in "
+              "Blender, no cache for others)")
+          ->type_name("DIR");
+  command->add_option("--cache-size", arguments->images.max_bytes, "Maximum size of this folder (default: 10GB)")
+      ->transform(CLI::AsSizeValue(true))
+      ->type_name("SIZE");
+  command->add_flag("--no-cache", arguments->no_cache, "Render every image")->excludes(cache);
   command->footer(
       "Examples:\n"
       "  esim simulate scenes/room.yaml --out out/room\n"

@@ -19,7 +19,7 @@ using NamedTrajectories = std::vector<std::pair<std::string, SharedTrajectory>>;
 void make_simulation(Simulation* self, const CheckedScenario& scenario, const std::optional<SharedTrajectory>& body,
                      const nb::object& render, const NamedTrajectories& objects, const std::string& origin, int threads,
                      TimeNs packet, const std::filesystem::path& out, bool force, const std::string& command,
-                     const std::string& obstacle) {
+                     const std::string& obstacle, const ImageCacheOptions& images) {
   Substitutes substitutes;
   if (body) substitutes.body = body->motion;
   std::optional<PythonFunction> function;
@@ -30,8 +30,8 @@ void make_simulation(Simulation* self, const CheckedScenario& scenario, const st
     };
   }
   for (const auto& [name, trajectory] : objects) substitutes.objects.push_back({name, trajectory.motion});
-  new (self)
-      Simulation(scenario.value, substitutes, function, origin, {threads, packet, out, force, {command, obstacle}});
+  new (self) Simulation(scenario.value, substitutes, function, origin,
+                        {threads, packet, out, force, {command, obstacle}, images});
 }
 
 // A renderer often refers to the owner of the simulation: the garbage collector must be able to traverse this cycle.
@@ -57,10 +57,15 @@ PyType_Slot slots[] = {
 }  // namespace
 
 void bind_simulation(nb::module_& module) {
+  nb::class_<ImageCacheOptions>(module, "ImageCacheOptions")
+      .def("__init__",
+           [](ImageCacheOptions* self, bool use, const std::filesystem::path& folder, std::uint64_t max_bytes) {
+             new (self) ImageCacheOptions{use, folder, max_bytes};
+           });
   nb::class_<Simulation>(module, "Simulation", nb::type_slots(slots))
       .def("__init__", &make_simulation, nb::arg("scenario"), nb::arg("trajectory").none(), nb::arg("render").none(),
            nb::arg("objects"), nb::arg("origin"), nb::arg("threads"), nb::arg("packet"), nb::arg("out"),
-           nb::arg("force"), nb::arg("command"), nb::arg("obstacle"))
+           nb::arg("force"), nb::arg("command"), nb::arg("obstacle"), nb::arg("images"))
       // Appends the next packet, or None, to a list: a signal that raises in Python on the way back cannot lose it.
       .def("append_next",
            [](Simulation& self, nb::list to) {

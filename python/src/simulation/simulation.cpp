@@ -82,7 +82,8 @@ void Simulation::build(const Substitutes& substitutes, const std::string& origin
     provenance_->add(scenario_.files);
     listener.emplace([this](const UsedFile& file) { provenance_->add(file); });
   }
-  world_ = std::make_unique<World>(build_world(scenario_, substitutes, options.threads, notices));
+  if (!substitutes.make_renderer) cache_ = open_image_cache(options.images, scenario_.renderer, notices.warning);
+  world_ = std::make_unique<World>(build_world(scenario_, substitutes, options.threads, notices, cache_));
   packets_ = std::make_unique<PacketSink>(packet_clock(*world_, options.packet));
   if (directory_ != nullptr) {
     write_file_atomically(directory_->path() / "scenario.yaml", origin + write_scenario(scenario_));
@@ -119,7 +120,8 @@ bool Simulation::advance() {
 /// Ends the recording at the current time.
 void Simulation::finish() {
   over_ = true;
-  const Summary summary = simulator_->finish();
+  Summary summary = simulator_->finish();
+  summary.engine_images = engine_images(cache_);
   if (samples_ != nullptr && summary.complete) samples_->finish();
   simulator_.reset();
   losses_ = esim::losses(scenario_, summary);

@@ -22,6 +22,7 @@ struct SimulationOptions {
   std::filesystem::path out;  ///< folder of the recording; empty: none is written
   bool force = false;         ///< replace an existing recording
   Repetition repetition{};    ///< for the report of the recording
+  ImageCacheOptions images{};
 };
 
 /// A simulation packet by packet. Callers hold the GIL, which is released during the simulation.
@@ -66,6 +67,7 @@ class Simulation {
   std::vector<std::string> warnings_, notices_, losses_;
   std::unique_ptr<RecordingDirectory> directory_;
   std::unique_ptr<ProvenanceRecorder> provenance_;  // of the recording
+  std::shared_ptr<ImageCache> cache_;
   std::unique_ptr<World> world_;
   std::unique_ptr<PacketSink> packets_;
   std::unique_ptr<Sink> recorder_, sink_;

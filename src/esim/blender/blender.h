@@ -39,8 +39,11 @@ bool export_blend(const std::filesystem::path& blend, const std::filesystem::pat
 bool bake_scene(const std::filesystem::path& scene, const std::filesystem::path& glb, const BakeOptions& options,
                 const BlenderWatch& watch);
 
+/// The folder of esim's caches, which is created: $XDG_CACHE_HOME/esim, or ~/.cache/esim. Throws UserError.
+std::filesystem::path cache_folder();
+
 /// The GLB of a .blend file, from the cache; exported again if the .blend, a file to which it refers, or the exporter
-/// has changed. The cache is $XDG_CACHE_HOME/esim, or ~/.cache/esim.
+/// has changed.
 std::filesystem::path cached_glb(const std::filesystem::path& blend, const BlenderWatch& watch);
 
 }  // namespace esim::inline blender

@@ -46,23 +46,6 @@ std::string hash_of(const fs::path& blend) {
   return hash.text();
 }
 
-fs::path cache_folder() {
-  const auto variable = [](const char* name) {
-    const char* const value = std::getenv(name);
-    return fs::path(value != nullptr ? value : "");
-  };
-  fs::path base = variable("XDG_CACHE_HOME");
-  if (!base.is_absolute()) base = variable("HOME").empty() ? fs::path() : variable("HOME") / ".cache";
-  if (base.empty())
-    throw UserError("the cache has no folder, since neither HOME nor XDG_CACHE_HOME is set; set XDG_CACHE_HOME");
-  std::error_code error;
-  fs::create_directories(base / "esim", error);
-  if (error)
-    throw OutputError(fmt::format("cannot create the folder {}: {}; set XDG_CACHE_HOME to another one",
-                                  (base / "esim").string(), error.message()));
-  return base / "esim";
-}
-
 /// The state of a file to which a scene refers: size and time of the last change; "absent" if it does not exist.
 std::string state_of(const fs::path& file) {
   std::error_code error;
@@ -93,6 +76,23 @@ void note_files(const std::vector<std::string>& files) {
 }
 
 }  // namespace
+
+fs::path cache_folder() {
+  const auto variable = [](const char* name) {
+    const char* const value = std::getenv(name);
+    return fs::path(value != nullptr ? value : "");
+  };
+  fs::path base = variable("XDG_CACHE_HOME");
+  if (!base.is_absolute()) base = variable("HOME").empty() ? fs::path() : variable("HOME") / ".cache";
+  if (base.empty())
+    throw UserError("the cache has no folder, since neither HOME nor XDG_CACHE_HOME is set; set XDG_CACHE_HOME");
+  std::error_code error;
+  fs::create_directories(base / "esim", error);
+  if (error)
+    throw OutputError(fmt::format("cannot create the folder {}: {}; set XDG_CACHE_HOME to another one",
+                                  (base / "esim").string(), error.message()));
+  return base / "esim";
+}
 
 fs::path cached_glb(const fs::path& blend, const BlenderWatch& watch) {
   const std::string hash = hash_of(blend);

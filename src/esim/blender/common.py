@@ -53,6 +53,20 @@ def esim_find_images(folder):
         print("esim warning file " + os.path.abspath(bpy.path.abspath(library.filepath)), flush=True)
 
 
+def esim_list_other_files():
+    """Prints all other files to which the scene refers, such as volumes and fonts. Where Blender chooses among files, as in
+    image sequences, it prints the folder."""
+    sequences = {os.path.abspath(bpy.path.abspath(data.filepath, library=data.library))
+                 for data in (*bpy.data.images, *bpy.data.movieclips) if data.source in ("SEQUENCE", "TILED")}
+    sequences |= {os.path.abspath(bpy.path.abspath(data.filepath, library=data.library))
+                  for data in (*bpy.data.volumes, *bpy.data.cache_files) if data.is_sequence}
+    paths = {os.path.dirname(path) for path in sequences}
+    for path in map(os.path.abspath, bpy.utils.blend_paths(absolute=True)):
+        paths.update((folder for folder, _, _ in os.walk(path)) if os.path.isdir(path) else (path,))
+    for path in sorted(paths):
+        print("esim warning file " + path, flush=True)
+
+
 def esim_open(path):
     """Opens the scene of a file in any supported format."""
     extension = os.path.splitext(path)[1].lower()
@@ -60,6 +74,7 @@ def esim_open(path):
         bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
         esim_restore_legacy_materials(path)
         esim_find_images(os.path.dirname(path))
+        esim_list_other_files()
         return
     bpy.ops.wm.read_factory_settings(use_empty=True)
     if extension in (".glb", ".gltf"):
@@ -74,6 +89,7 @@ def esim_open(path):
         bpy.ops.wm.collada_import(filepath=path)
     else:
         raise RuntimeError("Error: Blender does not support the format " + extension)
+    esim_list_other_files()
 
 
 def esim_export(path):

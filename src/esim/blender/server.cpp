@@ -8,7 +8,6 @@
 #include "esim/blender/script.h"
 #include "esim/blender/scripts.h"
 #include "esim/core/error.h"
-#include "esim/core/inputs/used_files.h"
 
 namespace esim::inline blender {
 
@@ -40,14 +39,14 @@ BlenderServer::BlenderServer(const BlenderServerOptions& options, const BlenderN
   blender_program(options.scene);
   if (!fs::is_regular_file(options.scene, error))
     throw UserError(fmt::format("scene {}: no such file", options.scene.string()));
-  note_used(options.scene);
+  use(options.scene);
   parts_ = std::make_unique<Parts>(options);
   const bool serves = parts_->process.read_until(
       [&](const std::string& line) {
         constexpr std::string_view kServing = "esim serving 127.0.0.1:", kWarning = "esim warning ",
                                    kFile = "esim warning file ";
         if (line.starts_with(kFile)) {
-          if (fs::is_regular_file(line.substr(kFile.size()), error)) note_used(line.substr(kFile.size()));
+          use(line.substr(kFile.size()));
         } else if (line.starts_with(kWarning)) {
           warning(line.substr(kWarning.size()));
         }
@@ -65,6 +64,14 @@ BlenderServer::BlenderServer(const BlenderServerOptions& options, const BlenderN
 }
 
 BlenderServer::~BlenderServer() = default;
+
+/// Notes a file or a folder, if it exists.
+void BlenderServer::use(const fs::path& file) {
+  std::error_code error;
+  if (!fs::exists(file, error)) return;
+  files_.push_back(used_file(file));
+  if (files_.back().regular) note_used(file);
+}
 
 std::optional<std::string> BlenderServer::why_ended() {
   const auto status = parts_->process.exit_status();

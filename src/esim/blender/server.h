@@ -4,8 +4,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "esim/blender/blender.h"
+#include "esim/core/inputs/used_files.h"
 
 namespace esim::inline blender {
 
@@ -31,12 +33,18 @@ class BlenderServer {
   /// The TCP port, on the loopback interface only.
   int port() const { return port_; }
 
+  /// The scene, and everything to which a .blend refers: files, and folders in which Blender chooses files.
+  const std::vector<UsedFile>& files() const { return files_; }
+
   /// Why it ended, on one line; empty while it runs.
   std::optional<std::string> why_ended();
 
  private:
   struct Parts;
+  void use(const std::filesystem::path& file);
+
   std::unique_ptr<Parts> parts_;
+  std::vector<UsedFile> files_;
   int port_ = 0;
 };
 

@@ -262,7 +262,8 @@ World build_motions(const Scenario& scenario, const SceneFile& scene, std::share
 
 /// Everything. All other functions that build a world end here.
 World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<const Trajectory> body,
-            const TimeSpan& span, const Substitutes& substitutes, int threads, const Notices& notices) {
+            const TimeSpan& span, const Substitutes& substitutes, int threads, const Notices& notices,
+            const std::shared_ptr<ImageCache>& cache = nullptr) {
   std::ranges::for_each(scenario.notices, notices.warning);
   check_substitutes(scenario, substitutes, span);
   World world = build_motions(scenario, scene, std::move(body), span, substitutes, threads, notices);
@@ -280,7 +281,7 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
           ? RendererFactory{[&](const Camera& camera, ColourFilters, const Workers& workers) {
               return substitutes.make_renderer(camera, workers);
             }}
-          : build_renderer_factory(scenario.renderer, scene, sees_colour(scenario), world.info.cameras, notices);
+          : build_renderer_factory(scenario.renderer, scene, sees_colour(scenario), world.info.cameras, notices, cache);
   const std::vector<std::vector<int>> numbers = sensor_numbers(scenario);
   for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
     const CameraOptions& options = scenario.cameras[i];
@@ -358,16 +359,18 @@ CameraInfo camera_info(CameraOptions options, const SceneCamera* followed) {
           options.frame_camera.has_value()};
 }
 
-World build_world(const Scenario& scenario, int threads, const Notices& notices) {
-  return build_world(scenario, Substitutes{}, threads, notices);
+World build_world(const Scenario& scenario, int threads, const Notices& notices,
+                  const std::shared_ptr<ImageCache>& cache) {
+  return build_world(scenario, Substitutes{}, threads, notices, cache);
 }
 
-World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices) {
+World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices,
+                  const std::shared_ptr<ImageCache>& cache) {
   const SceneFile scene = substitutes.make_renderer ? SceneFile{} : load_scenes(scenario, look_of(scenario), notices);
   std::shared_ptr<const Trajectory> body =
       substitutes.body != nullptr ? substitutes.body : build_trajectory(scenario, scene, notices);
   const TimeSpan span = simulated_span(scenario, *body);
-  return build(scenario, scene, std::move(body), span, substitutes, threads, notices);
+  return build(scenario, scene, std::move(body), span, substitutes, threads, notices, cache);
 }
 
 World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> body, int threads,

@@ -9,6 +9,7 @@
 
 #include "esim/compose/provenance.h"
 #include "esim/formats/filter_recording.h"
+#include "esim/image_cache/image_cache.h"
 #include "esim/light/flicker.h"
 #include "esim/recording/format.h"
 #include "esim/render/pixel_area.h"
@@ -39,8 +40,9 @@ Notices keeping(Notices notify, std::vector<std::string>& given);
 
 /// Builds everything that a scenario describes, ready to simulate on `threads` threads (0: every processor). Loads
 /// scenes and trajectories, and checks everything that can be checked before the simulation. Throws UserError for
-/// problems that the user can repair.
-World build_world(const Scenario& scenario, int threads, const Notices& notices);
+/// problems that the user can repair. `cache`: of the images of engines; null: each is rendered.
+World build_world(const Scenario& scenario, int threads, const Notices& notices,
+                  const std::shared_ptr<ImageCache>& cache = nullptr);
 
 /// The same for a body that moves along `body` instead of the scenario's trajectory. Only the beginning of `body` may
 /// be known yet. The scenario needs a duration_s.
@@ -65,7 +67,8 @@ struct Substitutes {
 };
 
 /// The same with substitutes. Throws UserError if the scenario has an option that custom renderers do not support.
-World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices);
+World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices,
+                  const std::shared_ptr<ImageCache>& cache = nullptr);
 
 /// The part of the body's trajectory that a scenario simulates. Throws UserError if the trajectory does not cover it.
 TimeSpan simulated_span(const Scenario& scenario, const Trajectory& trajectory);
@@ -103,7 +106,7 @@ std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const S
                                                                          const TimeSpan& simulated,
                                                                          const Notices& notices);
 
-// --- renderers (renderer_factory.cpp, start_blender.cpp) -------------------------------------------------------------
+// --- renderers (renderer_factory.cpp, engines/) ----------------------------------------------------------------------
 
 /// Makes the renderers of a scenario's cameras, which share one loaded scene.
 struct RendererFactory {
@@ -117,11 +120,27 @@ struct RendererFactory {
 
 /// Cameras may have colour filters if `colour`. `sensors`: the cameras of the scenario; samplers may need others.
 RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene, bool colour,
-                                       const std::vector<CameraInfo>& sensors, const Notices& notices);
+                                       const std::vector<CameraInfo>& sensors, const Notices& notices,
+                                       const std::shared_ptr<ImageCache>& cache = nullptr);
 
 /// Starts Blender, which runs as long as any renderer of the factory, or connects to a running one.
 RendererFactory start_blender(const BlenderRendererOptions& options, const std::vector<CameraInfo>& sensors,
-                              const Notices& notices);
+                              const Notices& notices, std::shared_ptr<ImageCache> cache);
+
+/// Whether and where the images of engines (Blender, UnrealCV) are kept, so that none is rendered twice.
+struct ImageCacheOptions {
+  bool use = true;
+  std::filesystem::path folder{};            ///< empty: images/ in esim's cache folder, and only for scenes that esim
+                                             ///< can identify: .blend, .glb and .ply files that it opens in Blender
+  std::uint64_t max_bytes = 10'000'000'000;  ///< of the folder
+};
+
+/// The cache for a scenario's renderer; null without a cache.
+std::shared_ptr<ImageCache> open_image_cache(const ImageCacheOptions& options, const RendererOptions& renderer,
+                                             const NoticeHandler& warning);
+
+/// What the renderers with a cache have delivered; empty without a cache.
+std::optional<EngineImages> engine_images(const std::shared_ptr<ImageCache>& cache);
 
 // --- light (build_light.cpp) -----------------------------------------------------------------------------------------
 
@@ -233,6 +252,7 @@ struct RecordingOptions {
 
   std::unique_ptr<Sink> beside{};  ///< if set, receives every record too
   Repetition repetition{};         ///< for the report
+  ImageCacheOptions images{};      ///< of engines
 };
 
 /// Simulates a scenario into a recording's folder with scenario.yaml and report.json, as `esim simulate` does. The

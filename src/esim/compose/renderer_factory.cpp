@@ -12,7 +12,9 @@
 #include "esim/backends/sprites/sprites_renderer.h"
 #include "esim/backends/unrealcv/unrealcv_renderer.h"
 #include "esim/compose/compose.h"
+#include "esim/compose/engines/engine_images.h"
 #include "esim/core/error.h"
+#include "esim/image_cache/cached_renderer.h"
 #include "esim/scene/images/image_file.h"
 
 namespace esim::inline compose {
@@ -162,7 +164,7 @@ RendererFactory factory(const SpritesRendererOptions& options, const SceneFile&,
   }};
 }
 
-RendererFactory factory(const UnrealcvRendererOptions& options, const SceneFile&, bool) {
+RendererFactory factory(const UnrealcvRendererOptions& options, const std::shared_ptr<ImageCache>& cache) {
   UnrealcvOptions engine;
   engine.host = options.host;
   engine.port = options.port;
@@ -175,20 +177,27 @@ RendererFactory factory(const UnrealcvRendererOptions& options, const SceneFile&
   engine.depth = options.depth;
   engine.mask = options.object_mask;
   for (const EngineObjectOptions& object : options.objects) engine.objects.push_back(object.name);
-  return {[client = make_unrealcv_client(engine)](const Camera& camera, ColourFilters filters, const Workers& workers) {
+  const std::shared_ptr<UnrealcvClient> client = make_unrealcv_client(engine);
+  std::string identity;
+  if (cache != nullptr)
+    identity = identity_of_images(engine, *client, {fmt::format("{}:{}", options.host, options.port)});
+  return {[=](const Camera& camera, ColourFilters filters, const Workers& workers) {
     refuse(filters, "the renderer unrealcv", "a mesh, a plane or a panorama");
-    return make_unrealcv_renderer(client, camera, workers);
+    return with_image_cache(make_unrealcv_renderer(client, camera, workers), cache, identity, camera, workers);
   }};
 }
 
 }  // namespace
 
 RendererFactory build_renderer_factory(const RendererOptions& options, const SceneFile& scene, bool colour,
-                                       const std::vector<CameraInfo>& sensors, const Notices& notices) {
+                                       const std::vector<CameraInfo>& sensors, const Notices& notices,
+                                       const std::shared_ptr<ImageCache>& cache) {
   return std::visit(
       [&]<typename Options>(const Options& renderer) {
         if constexpr (std::is_same_v<Options, BlenderRendererOptions>) {
-          return start_blender(renderer, sensors, notices);
+          return start_blender(renderer, sensors, notices, cache);
+        } else if constexpr (std::is_same_v<Options, UnrealcvRendererOptions>) {
+          return factory(renderer, cache);
         } else {
           return factory(renderer, scene, colour);
         }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,6 +45,12 @@ struct CameraSummary {
   }
 };
 
+/// Images of an external engine of which some may come from a cache, so that they took no time to render.
+struct EngineImages {
+  std::int64_t rendered = 0, from_cache = 0;
+  std::string cache;  ///< its folder
+};
+
 /// Results of a simulation, for the report.
 struct Summary {
   bool complete = false;
@@ -54,6 +61,7 @@ struct Summary {
   std::int64_t imu_samples = 0;
   StageSeconds seconds;
   double wall_seconds = 0;
+  std::optional<EngineImages> engine_images{};  ///< if there is a cache
 };
 
 }  // namespace esim::inline sim

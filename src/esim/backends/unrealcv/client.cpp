@@ -38,7 +38,7 @@ std::shared_ptr<UnrealcvClient::Asked> UnrealcvClient::start(EngineView view) {
   forget_answered();
   auto asked = std::make_shared<Asked>(Asked{std::move(view)});
   asked_.push_back(asked);
-  if (session_) submit_or_lose(*asked);
+  if (session_ && dialect_) submit_or_lose(*asked);
   return asked;
 }
 
@@ -65,7 +65,7 @@ void UnrealcvClient::forget_answered() {
 
 /// Connects, and repeats requests without an answer.
 void UnrealcvClient::connect(const EngineView& view, SteadyTime give_up) {
-  session_.emplace(options_, give_up);
+  if (!session_) session_.emplace(options_, give_up);
   state_ = {};
   if (!dialect_) dialect_.emplace(options_, *session_, view, state_);
   asked_.remove_if([](const auto& asked) { return !asked->is_wanted; });
@@ -74,16 +74,14 @@ void UnrealcvClient::connect(const EngineView& view, SteadyTime give_up) {
   }
 }
 
-/// Waits for the answers, and connects as often as necessary.
-void UnrealcvClient::wait_for(const Asked& asked, Until until) {
+/// Calls work(deadline of connecting) until the connection is not lost meanwhile.
+template <typename Work>
+void UnrealcvClient::until_connected(const Work& work) {
   SteadyTime give_up = seconds_from_now(options_.timeout_s);
   while (true) {
     const bool was_connected = session_.has_value();
     try {
-      if (!session_) connect(asked.view, give_up);
-      const std::size_t later = until == Until::light ? dialect_->images() - 1 : 0;
-      session_->wait_for(std::span(asked.batch).first(asked.batch.size() - later));
-      return;
+      return work(give_up);
     } catch (const ConnectionLost& lost) {
       session_.reset();
       if (const auto why = options_.why_ended())
@@ -98,6 +96,25 @@ void UnrealcvClient::wait_for(const Asked& asked, Until until) {
       throw;
     }
   }
+}
+
+/// Waits for the answers, and connects as often as necessary.
+void UnrealcvClient::wait_for(const Asked& asked, Until until) {
+  until_connected([&](SteadyTime give_up) {
+    if (!session_ || !dialect_) connect(asked.view, give_up);
+    const std::size_t later = until == Until::light ? dialect_->images() - 1 : 0;
+    session_->wait_for(std::span(asked.batch).first(asked.batch.size() - later));
+  });
+}
+
+std::vector<std::string> UnrealcvClient::ask(std::vector<std::string> commands) {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::string> answers;
+  until_connected([&](SteadyTime give_up) {
+    if (!session_) session_.emplace(options_, give_up);
+    for (EngineRequest& request : session_->ask(commands)) answers.push_back(std::move(*request.answer));
+  });
+  return answers;
 }
 
 void UnrealcvClient::fail_to_connect(const std::string& reason) const {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "esim/backends/unrealcv/dialect.h"
 #include "esim/backends/unrealcv/session.h"
@@ -22,6 +23,9 @@ class UnrealcvClient {
   explicit UnrealcvClient(UnrealcvOptions options) : options_(std::move(options)) {}
 
   const UnrealcvOptions& options() const { return options_; }
+
+  /// The answers to commands, before the first view. Connects. Throws EngineError.
+  std::vector<std::string> ask(std::vector<std::string> commands);
 
   /// A view in progress.
   struct Asked {
@@ -48,6 +52,8 @@ class UnrealcvClient {
   void connect(const EngineView& view, SteadyTime give_up);
   enum class Until { light, all };
   void wait_for(const Asked& asked, Until until);
+  template <typename Work>
+  void until_connected(const Work& work);
   void receive(Asked& asked, const Workers& workers, PinholeImage& image, const std::function<void()>& take_geometry);
   [[noreturn]] void fail_to_connect(const std::string& reason) const;
   void forget_answered();

@@ -82,6 +82,10 @@ std::shared_ptr<UnrealcvClient> make_unrealcv_client(UnrealcvOptions options) {
   return std::make_shared<UnrealcvClient>(std::move(options));
 }
 
+std::vector<std::string> description_by(UnrealcvClient& client) {
+  return client.ask({"vget /unrealcv/version", "vget /objects"});
+}
+
 std::unique_ptr<Renderer> make_unrealcv_renderer(std::shared_ptr<UnrealcvClient> client, const Camera& camera,
                                                  const Workers& workers, int samples) {
   return std::make_unique<UnrealcvRenderer>(std::move(client), camera, workers, samples);

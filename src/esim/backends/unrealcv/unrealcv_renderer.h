@@ -1,6 +1,8 @@
 #pragma once
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "esim/backends/unrealcv/unrealcv_options.h"
 #include "esim/core/parallel.h"
@@ -14,6 +16,9 @@ class UnrealcvClient;
 /// A connection to a program with UnrealCV's protocol, shared by the renderers of all cameras. It is opened when the
 /// first image is waited for.
 std::shared_ptr<UnrealcvClient> make_unrealcv_client(UnrealcvOptions options);
+
+/// What the program says of itself: its version, and the names of its objects. Connects, and throws EngineError.
+std::vector<std::string> description_by(UnrealcvClient& client);
 
 /// Renders a camera's images with the program: E and Z come from the program; V follows from Z, the visible objects and
 /// the twists. For cameras other than pinholes with square pixels and a central principal point, pixels are looked up

@@ -62,7 +62,8 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
     inputs.push_back(file);
     provenance.add(file);
   });
-  World world = build_world(scenario, options.threads, notices);
+  const auto cache = open_image_cache(options.images, scenario.renderer, notices.warning);
+  World world = build_world(scenario, options.threads, notices, cache);
   if (checkpoint) {
     require_unchanged(*checkpoint, inputs);
     remove_outputs(directory.path());
@@ -103,6 +104,7 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
       samples.finish();
       std::filesystem::remove_all(checkpoint_folder(directory.path()));
     }
+    summary.engine_images = engine_images(cache);
     for (const std::string& loss : losses(scenario, summary)) given.push_back("warning: " + loss);
     std::ranges::copy(hints(scenario, summary), std::back_inserter(given));
     directory.finish(

@@ -72,6 +72,10 @@ Json json(const SensorOptions& sensor, const Scenario& scenario, const SensorSum
   return result;
 }
 
+Json json(const EngineImages& images) {
+  return {{"rendered", images.rendered}, {"from_cache", images.from_cache}, {"cache", images.cache}};
+}
+
 Json json(double number) { return number; }
 Json json(std::int64_t number) { return number; }
 
@@ -142,6 +146,7 @@ std::string report_json(const Scenario& scenario, const Summary& summary, int th
       {"cameras", cameras},
       {"notices", notices},
   };
+  if (summary.engine_images) report["engine_images"] = json(*summary.engine_images);
   add_filtered(filtered_cameras(summary), report);
   if (!summary.problem.empty()) report["reason"] = summary.problem;
   if (provenance) add_provenance(*provenance, report);

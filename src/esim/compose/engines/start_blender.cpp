@@ -4,10 +4,10 @@
 #include <charconv>
 #include <cmath>
 
-#include "esim/backends/unrealcv/unrealcv_renderer.h"
 #include "esim/blender/server.h"
-#include "esim/compose/compose.h"
+#include "esim/compose/engines/engine_images.h"
 #include "esim/core/error.h"
+#include "esim/image_cache/cached_renderer.h"
 
 namespace esim::inline compose {
 namespace {
@@ -45,7 +45,7 @@ int samples_for(const Camera& camera, const std::vector<CameraInfo>& sensors, in
 }  // namespace
 
 RendererFactory start_blender(const BlenderRendererOptions& options, const std::vector<CameraInfo>& sensors,
-                              const Notices& notices) {
+                              const Notices& notices, std::shared_ptr<ImageCache> cache) {
   if (options.address.empty() && options.scene.empty())
     throw UserError(
         "renderer.scene: is missing; name a file, or set renderer.address to a Blender that already serves");
@@ -58,6 +58,7 @@ RendererFactory start_blender(const BlenderRendererOptions& options, const std::
   if (options.engine == BlenderEngine::eevee) engine.mask = EngineMask::none;
   for (const EngineObjectOptions& object : options.objects) engine.objects.push_back(object.name);
   auto blender = std::make_shared<StartedBlender>();
+  std::vector<std::string> scene;  // what identifies it
   if (options.address.empty()) {
     blender->server = std::make_unique<BlenderServer>(
         BlenderServerOptions{options.scene, options.engine == BlenderEngine::eevee, options.samples, options.noise_seed,
@@ -65,17 +66,33 @@ RendererFactory start_blender(const BlenderRendererOptions& options, const std::
         notices.warning);
     engine.port = blender->server->port();
     engine.why_ended = [server = blender->server.get()] { return server->why_ended(); };
+    if (cache != nullptr) {
+      if (auto files = identities_of(blender->server->files(), notices.warning)) {
+        scene = std::move(*files);
+        scene.push_back(options.scene.extension().string());
+      } else {
+        cache = nullptr;
+      }
+    }
   } else {
     set_address(options.address, engine);
+    scene.push_back(options.address);
   }
   blender->client = make_unrealcv_client(engine);
   const std::shared_ptr<UnrealcvClient> client(blender, blender->client.get());
-  return {[client, sensors, samples = options.samples](const Camera& camera, ColourFilters filters,
-                                                       const Workers& workers) {
+  std::string identity;
+  if (cache != nullptr) {
+    for (const int number : {static_cast<int>(options.engine), options.noise_seed, options.threads})
+      scene.push_back(std::to_string(number));
+    identity = identity_of_images(engine, *client, scene);
+  }
+  return {[=, samples = options.samples](const Camera& camera, ColourFilters filters, const Workers& workers) {
     if (filters != ColourFilters::none)
       throw UserError(
           "colour: the renderer blender renders luminance only; use a mesh, a plane or a panorama, or colour: none");
-    return make_unrealcv_renderer(client, camera, workers, samples_for(camera, sensors, samples));
+    const int paths = samples_for(camera, sensors, samples);
+    return with_image_cache(make_unrealcv_renderer(client, camera, workers, paths), cache,
+                            fmt::format("{} {}", identity, paths), camera, workers);
   }};
 }
 

@@ -157,7 +157,7 @@ class Sweep(ProgramTest):
             result = self.sweep(*over, options=options)
             self.assertEqual(result.returncode, 2)
             self.assertIn(named, result.stderr)
-            self.assertIn("choose another --out", result.stderr)
+            self.assertIn("choose another folder", result.stderr)
         self.scenario.write_text(SCENARIO + "# changed\n")
         self.assertIn("text differs", self.sweep(THRESHOLDS).stderr)
         self.assertEqual((self.out / "sweep.csv").read_bytes(), table)

@@ -72,7 +72,7 @@ void begin_or_continue(const fs::path& folder, const FolderPlan& plan) {
   std::error_code error;
   if (!fs::exists(file, error)) {
     if (fs::exists(folder, error) && (!fs::is_directory(folder, error) || !holds_nothing(folder, plan.file))) {
-      throw UserError(fmt::format("{}: must be a {} or an empty folder; choose another --out, or empty it",
+      throw UserError(fmt::format("{}: must be a {} or an empty folder; choose another folder, or empty it",
                                   folder.string(), plan.kind));
     }
     create_folder(folder);
@@ -85,11 +85,11 @@ void begin_or_continue(const fs::path& folder, const FolderPlan& plan) {
   if (const std::string version = here.value("esim", ""); there.value("esim", "") != version) {
     throw UserError(
         fmt::format("{}: begun by esim {}, but this is esim {}; finish it with that version, or choose another "
-                    "--out",
+                    "folder",
                     folder.string(), there.value("esim", "of an unknown version"), version));
   }
   throw UserError(
-      fmt::format("{}: contains a different {}: {}; give the same options to continue it, or choose another --out",
+      fmt::format("{}: contains a different {}: {}; give the same options to continue it, or choose another folder",
                   folder.string(), plan.kind, difference(there, here)));
 }
 

@@ -172,8 +172,8 @@ class Sweep(ProgramTest):
 
     def test_errors_name_the_option(self):
         for over, named in (
-            (["event_camera.contrast_treshold=0.1"], ("--over event_camera.contrast_treshold", "contrast_threshold")),
-            (["event_camera.contrast_threshold=0.1,-1"], ("--over event_camera.contrast_threshold", "-1")),
+            (["event_camera.contrast_treshold=0.1"], ("--over camera.event_camera.contrast_treshold: unknown key", "did you mean contrast_threshold?")),
+            (["event_camera.contrast_threshold=0.1,-1"], ("--over camera.event_camera.contrast_threshold", "-1")),
             (["event_camera.contrast_threshold="], ("has no values",)),
             (["event_camera.contrast_threshold=0.1,,0.2"], ("value 2 is empty",)),
             (["event_camera.contrast_threshold"], ("must be KEY=VALUE",)),

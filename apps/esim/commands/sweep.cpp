@@ -50,8 +50,8 @@ void divide_processors(const SweepArguments& arguments, const SweepPlan& plan, S
     throw UserError("--jobs: must be 1 for renderers that are other programs; remove it");
   const int processors = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   const int simulations = static_cast<int>(plan.simulations.size());
-  constexpr int kThreads = 2;  // of a simulation, if there are enough simulations for all processors
-  work.jobs = arguments.jobs > 0 ? arguments.jobs : engine ? 1 : std::max(1, processors / kThreads);
+  constexpr int kMaxJobs = 8;  // each needs its own memory
+  work.jobs = arguments.jobs > 0 ? arguments.jobs : engine ? 1 : std::min(processors, kMaxJobs);
   work.jobs = std::min(work.jobs, simulations);
   work.threads = arguments.threads > 0 ? arguments.threads : std::max(1, processors / work.jobs);
 }
@@ -105,6 +105,9 @@ int run(const SweepArguments& arguments) {
       bar.clear();
       throw OutputError(fmt::format("{}; complete simulations stay in {}, and the same command continues from them",
                                     error.what(), arguments.out));
+    } catch (...) {
+      bar.clear();
+      throw;
     }
   }();
   bar.clear();
@@ -149,9 +152,10 @@ void add_sweep(CLI::App& app, int& exit_code) {
       ->type_name("N")
       ->check(CLI::Range(1U, 1'000'000U));
   command
-      ->add_option("--jobs", arguments->jobs,
-                   "Number of simulations at the same time (default: one for two processors; one if another program "
-                   "renders). Each needs its own memory for the scene")
+      ->add_option(
+          "--jobs", arguments->jobs,
+          "Number of simulations at the same time (default: one per processor, at most 8; one if another program "
+          "renders). Each needs its own memory for the scene")
       ->type_name("N")
       ->check(CLI::Range(1, 1024));
   command

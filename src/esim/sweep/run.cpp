@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/core/parallel.h"
 #include "esim/files/folder_plan.h"
 #include "esim/formats/events_file.h"
 #include "esim/stats/event_statistics.h"
@@ -110,10 +111,12 @@ class Sweeping {
       if (stop_) return;
       factor = factor_of_complete(recording);
     }
-    for (const SweptEvents& events : simulation.events) {
-      if (!keep_going()) return;
-      rows_[index].push_back(row_of(events, work_.folder, simulation.name, factor.value_or(0)));
-    }
+    rows_[index].resize(simulation.events.size());
+    Workers(work_.threads).for_each(static_cast<int>(simulation.events.size()), [&](int i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (keep_going())
+        rows_[index][k] = row_of(simulation.events[k], work_.folder, simulation.name, factor.value_or(0));
+    });
   }
 
   void make(std::size_t index, const fs::path& recording) {

@@ -63,6 +63,7 @@ class Sweep(ProgramTest):
         result = self.sweep(THRESHOLDS, "event_camera.seed=1..3")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("6 runs in 1 simulation", result.stderr)
+        self.assertNotIn("hint", result.stderr)
         self.assertEqual(self.simulations(), ["simulation0000"])
         rows = self.table()
         self.assertEqual([(row["event_camera.contrast_threshold"], row["event_camera.seed"]) for row in rows],
@@ -89,6 +90,7 @@ class Sweep(ProgramTest):
         adaptive = ("--set", "sampling={type: adaptive}")
         result = self.sweep(THRESHOLDS, "event_camera.seed=1,2", options=adaptive)
         self.assertIn("4 runs in 2 simulations", result.stderr)  # sampling depends on the threshold, not on the seed
+        self.assertIn("hint: the sampling", result.stderr)
         self.assert_same_as_alone(["event_camera.contrast_threshold", "event_camera.seed"], adaptive)
 
     def test_the_seed_is_shared_if_it_is_only_that_of_the_sensors(self):
@@ -178,6 +180,7 @@ class Sweep(ProgramTest):
             (["event_camera.contrast_threshold=0.1,,0.2"], ("value 2 is empty",)),
             (["event_camera.contrast_threshold"], ("must be KEY=VALUE",)),
             (["seed=1,2", "seed=3"], ("--over seed: is given twice",)),
+            (["event_camera.seed=1,2", "event_camera={preset: ideal},{preset: davis346}"], ("replaces event_camera.seed",)),
             (["seed=1,1"], ("the value 1 is given twice",)),
             (["seed=5..1"], ("the range is reversed; write 1..5",)),
             (["duration_s=0.1..0.5"], ("a range must be of whole numbers",)),

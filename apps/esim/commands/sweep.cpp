@@ -71,6 +71,12 @@ int run(const SweepArguments& arguments) {
          number_of(plan.simulations.size(), "simulation"),
          before > 0 ? fmt::format(", of which {} complete", before) : "", work.jobs,
          number_of(static_cast<std::size_t>(work.threads), "thread"));
+    if (plan.separated_by_samples) {
+      tell(stderr,
+           "hint: the sampling, or flickering light, depends on the thresholds of the event sensors, so that runs with "
+           "other thresholds are rendered separately; without flicker, flow sampling renders once for all: --set "
+           "'sampling={{type: flow}}'\n");
+    }
   }
 
   catch_interrupts();

@@ -75,18 +75,22 @@ void append_values(const std::string& word, std::uint64_t max_values, const Fail
   for (std::uint64_t i = 0; i <= steps; ++i) values.push_back(std::to_string(first + static_cast<std::int64_t>(i)));
 }
 
-/// What runs must have in common to share a simulation: everything but the event sensors, and of these what the samples
-/// depend on.
-std::string shared_part(Scenario scenario) {
-  std::string demands;
+/// What runs must have in common to share a simulation.
+struct Common {
+  std::string seen{};     // everything but the event sensors
+  std::string samples{};  // what the samples depend on of these
+};
+
+Common common_of(Scenario scenario) {
+  Common common;
   for (const CameraOptions& camera : scenario.cameras) {
     if (sampling_depends_on_sensors(camera)) {
       const SensorTraits traits = strictest_sensor(scenario, camera);
-      demands += fmt::format("sampling {} {}\n", traits.contrast_threshold, traits.log_eps);
+      common.samples += fmt::format("sampling {} {}\n", traits.contrast_threshold, traits.log_eps);
     }
     if (flickers(scenario)) {
       const LightAccuracy accuracy = light_accuracy(camera);
-      demands += fmt::format("light {} {}\n", accuracy.tolerance, accuracy.dark);
+      common.samples += fmt::format("light {} {}\n", accuracy.tolerance, accuracy.dark);
     }
   }
   for (CameraOptions& camera : scenario.cameras) {
@@ -94,7 +98,8 @@ std::string shared_part(Scenario scenario) {
     camera.event_cameras.clear();
   }
   if (!seed_determines_more_than_events(scenario)) scenario.seed = 0;
-  return write_scenario(scenario) + demands;
+  common.seen = write_scenario(scenario);
+  return common;
 }
 
 /// The largest number of event sensors behind one lens.
@@ -144,16 +149,22 @@ SweptSimulation simulation_of(const Group& group, const SweepPlan& plan) {
   return simulation;
 }
 
+/// Throws UserError if an option is given twice, or as a part of one that replaces it afterwards.
 void check_keys(const SweepOptions& options) {
-  std::set<std::string> set;
-  for (const std::string& text : options.overrides) set.insert(text.substr(0, text.find('=')));
-  std::set<std::string> swept;
+  std::vector<std::string> before;
+  for (const std::string& text : options.overrides) before.push_back(text.substr(0, text.find('=')));
   for (const SweptOption& option : options.over) {
-    if (!swept.insert(option.key).second)
-      throw UserError(fmt::format("{}{}: is given twice; list all its values once", options.setter, option.key));
-    if (set.contains(option.key)) {
-      throw UserError(fmt::format("{}{}: is also set for all runs; remove one of them", options.setter, option.key));
+    const auto fail = [&](const std::string& problem) {
+      throw UserError(fmt::format("{}{}: {}", options.setter, option.key, problem));
+    };
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      if (before[i] == option.key)
+        fail(i < options.overrides.size() ? "is also set for all runs; remove one of them"
+                                          : "is given twice; list all its values once");
+      if (before[i].starts_with(option.key + "."))
+        fail(fmt::format("replaces {}, which is given before it; give it first, or remove one of them", before[i]));
     }
+    before.push_back(option.key);
   }
 }
 
@@ -207,6 +218,7 @@ SweepPlan plan_sweep(const SweepOptions& options, const std::string& version) {
   SweepPlan plan{.over = options.over, .json = arguments_json(options, version)};
   std::vector<Group> groups;
   std::map<std::string, std::size_t> open;  // the latest group by what its runs have in common
+  std::set<std::string> seen;
   const std::size_t runs = number_of_runs(options.over);
   for (std::size_t run = 0; run < runs; ++run) {
     std::vector<std::string>& values = plan.runs.emplace_back();
@@ -226,7 +238,9 @@ SweepPlan plan_sweep(const SweepOptions& options, const std::string& version) {
       throw UserError(fmt::format("{}: no camera has an event sensor{}; remove events: false",
                                   options.scenario.string(), plan.over.empty() ? "" : " with " + values_of(plan, run)));
     }
-    const auto [found, added] = open.try_emplace(shared_part(scenario), groups.size());
+    const Common common = common_of(scenario);
+    seen.insert(common.seen);
+    const auto [found, added] = open.try_emplace(common.seen + common.samples, groups.size());
     if (added || groups[found->second].sensors + sensors > kMaxShared) {
       found->second = groups.size();
       groups.emplace_back();
@@ -236,6 +250,7 @@ SweepPlan plan_sweep(const SweepOptions& options, const std::string& version) {
     group.scenarios.push_back(std::move(scenario));
     group.sensors += sensors;
   }
+  plan.separated_by_samples = open.size() > seen.size();
   for (Group& group : groups) {
     plan.simulations.push_back(group.runs.size() == 1
                                    ? simulation_of(group.runs.front(), std::move(group.scenarios.front()))

@@ -49,6 +49,10 @@ struct SweepPlan {
   std::vector<std::vector<std::string>> runs{};  ///< the values of each; those of the last option change first
   std::vector<SweptSimulation> simulations{};    ///< in the order of their first runs
   std::string json{};                            ///< the arguments
+
+  /// Whether runs that differ only in their event sensors are simulated separately, since their samples depend on
+  /// these.
+  bool separated_by_samples = false;
 };
 
 /// Runs share a simulation if only their event sensors differ, and if each then has exactly the events that it has

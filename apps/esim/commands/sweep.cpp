@@ -30,13 +30,13 @@ struct SweepArguments {
   bool quiet = false;
 };
 
-SweepPlan plan(const SweepArguments& arguments) {
+SweepPlan read_plan(const SweepArguments& arguments) {
   SweepOptions options{arguments.scenario, arguments.overrides, {}, kOver};
   for (const std::string& text : arguments.over)
     options.over.push_back(read_swept_option(text, arguments.max_runs, kOver));
   if (const std::uint64_t runs = number_of_runs(options.over); runs > arguments.max_runs) {
-    throw UserError(fmt::format("{}: {} runs, but --max-runs is {}; give fewer values, or raise it", "--over",
-                                grouped(runs), grouped(arguments.max_runs)));
+    throw UserError(fmt::format("--over: {} runs, but --max-runs is {}; give fewer values, or raise it", grouped(runs),
+                                grouped(arguments.max_runs)));
   }
   return plan_sweep(options, ESIM_VERSION);
 }
@@ -61,7 +61,7 @@ std::string number_of(std::size_t count, const char* what) {
 }
 
 int run(const SweepArguments& arguments) {
-  const SweepPlan plan = esim::app::plan(arguments);
+  const SweepPlan plan = read_plan(arguments);
   SweepWork work{.folder = arguments.out, .repetition = {shell_command(own_command_line())}};
   divide_processors(arguments, plan, work);
   begin_or_continue(work.folder, {"sweep", "sweep.json", plan.json});

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -38,13 +39,6 @@ Json parse_plan(const fs::path& file, const std::string& text) {
   return json;
 }
 
-/// A value for a message: "missing" for null, "different" if it is long.
-std::string short_text(const Json& value) {
-  constexpr std::size_t kMax = 60;
-  const std::string text = value.is_null() ? "missing" : value.dump();
-  return text.size() > kMax ? "different" : text;
-}
-
 /// The first difference of two plans: "seed is 1 there, but 2 here".
 std::string difference(const Json& there, const Json& here, const std::string& within = "") {
   const auto member = [](const Json& object, const std::string& key) {
@@ -57,9 +51,10 @@ std::string difference(const Json& there, const Json& here, const std::string& w
     const Json before = member(there, key), now = member(here, key);
     if (before == now) continue;
     if (before.is_object() && now.is_object()) return difference(before, now, within + key + ".");
-    const std::string was = short_text(before), is = short_text(now);
-    return was == is ? fmt::format("{}{} differs", within, key)
-                     : fmt::format("{}{} is {} there, but {} here", within, key, was, is);
+    constexpr std::size_t kMax = 60;
+    const std::string was = before.is_null() ? "missing" : before.dump(), is = now.is_null() ? "missing" : now.dump();
+    return std::max(was.size(), is.size()) > kMax ? fmt::format("{}{} differs", within, key)
+                                                  : fmt::format("{}{} is {} there, but {} here", within, key, was, is);
   }
   return "the order differs";
 }

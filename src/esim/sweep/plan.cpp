@@ -169,16 +169,17 @@ void check_keys(const SweepOptions& options) {
 }
 
 std::string arguments_json(const SweepOptions& options, const std::string& version) {
-  nlohmann::ordered_json over = nlohmann::ordered_json::object(), order = nlohmann::ordered_json::array();
+  using Json = nlohmann::ordered_json;
+  Json over = Json::object(), order = Json::array();
   for (const SweptOption& option : options.over) {
     over[option.key] = option.values;
     order.push_back(option.key);
   }
-  return nlohmann::ordered_json{
+  const Json arguments{
       {"esim", version},          {"scenario", fs::absolute(options.scenario).lexically_normal().string()},
       {"set", options.overrides}, {"over", over},
-      {"order", order},           {"text", read_text(options.scenario).value_or("")}}
-      .dump();
+      {"order", order},           {"text", read_text(options.scenario).value_or("")}};
+  return arguments.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ std::string csv_cell(const std::string& text) {
 
 std::string csv_cell(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
 
-/// A number of three digits, or "-" if it is undefined.
+/// The text of a value, or "-" if it is undefined.
 std::string or_dash(double value, const std::string& text) { return std::isfinite(value) ? text : "-"; }
 
 /// The last part of a dotted key, or the key if two options end alike.

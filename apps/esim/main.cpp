@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
       "  esim simulate scenes/room.yaml --out out/room     simulate; then look at out/room/cam0/preview.png\n"
       "  esim simulate scenes/room.yaml --out out/low --set event_camera.contrast_threshold=0.2\n"
       "  esim resense out/room --out out/high --set event_camera.contrast_threshold=0.4   new events, no rendering\n"
+      "  esim sweep scenes/room.yaml --over event_camera.contrast_threshold=0.2,0.3 --out out/sweep\n"
       "  esim check scenes/room.yaml                       check a scenario without writing anything\n"
       "  esim video clip.mp4 --out out/clip                events of a video, or of a folder of images\n"
       "  esim convert out/room room.bag                    other formats: esim convert --list\n"
@@ -36,6 +37,7 @@ int main(int argc, char** argv) {
   int exit_code = kOk;
   add_simulate(app, exit_code);
   add_resense(app, exit_code);
+  add_sweep(app, exit_code);
   add_video(app, exit_code);
   add_check(app, exit_code);
   add_convert(app, exit_code);

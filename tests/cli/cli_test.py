@@ -334,7 +334,7 @@ class BadInput(Cli):
 
     def test_unknown_words_are_named_with_the_most_similar_ones(self):
         for arguments, *words in ((["simulat"], "no command simulat", "did you mean simulate?"), (["--hlp"], "--help"),
-                                  ([], "needs a command", "simulate, resense, video"), (["evaluate", "relism"], "mean realism?"),
+                                  ([], "needs a command", "simulate, resense, sweep, video"), (["evaluate", "relism"], "mean realism?"),
                                   (["simulate", "x.yaml", "--outt", "x"], "no option --outt", "--out?", "esim simulate --help"),
                                   (["simulate", "x.yaml", "--qqqqqqq=5"], "no option --qqqqqqq;", "options are --help, --out")):
             with self.subTest(arguments=arguments):

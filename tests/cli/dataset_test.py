@@ -125,7 +125,7 @@ class Dataset(ProgramTest):
             result = self.make(self.out, *options)
             self.assertEqual(result.returncode, 2)
             self.assertIn(named, result.stderr)
-            self.assertIn("choose another --out", result.stderr)
+            self.assertIn("choose another folder", result.stderr)
         plan = self.out / "dataset.json"
         plan.write_text(plan.read_text().replace('"esim": "', '"esim": "0.'))
         result = self.make(self.out)

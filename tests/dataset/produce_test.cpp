@@ -15,6 +15,7 @@
 #include "esim/core/error.h"
 #include "esim/core/random.h"
 #include "esim/dataset/files/manifest.h"
+#include "esim/files/folder_plan.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
 
@@ -177,7 +178,7 @@ TEST_P(Produce, SharesNoShard) {
   const DatasetFolder folder(out, plan_of(GetParam()), "1.0");
   const Numbers maker;
   {
-    const ShardLock lock(folder, 3), again(folder, 3), other(folder, 4);
+    const FolderLock lock(folder.path(), 3), again(folder.path(), 3), other(folder.path(), 4);
     EXPECT_TRUE(lock.owned() && !again.owned() && other.owned());
     const Production production = produce(folder, maker, {}, 2, [](const auto&) { return true; });
     EXPECT_FALSE(production.complete());

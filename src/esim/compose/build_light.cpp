@@ -15,17 +15,6 @@ LightAccuracy accuracy_for(const EventCameraOptions& sensor) {
   return {kTolerance * sensor.min_threshold(), linear_toe ? sensor.lin_log_knee : sensor.dark_light()};
 }
 
-/// What suffices for each of the camera's sensors.
-LightAccuracy accuracy_for(const CameraOptions& camera) {
-  LightAccuracy strictest = accuracy_for(camera.first_sensor());
-  for (const SensorOptions& sensor : camera.sensors()) {
-    const LightAccuracy accuracy = accuracy_for(sensor);
-    strictest.tolerance = std::min(strictest.tolerance, accuracy.tolerance);
-    strictest.dark = std::min(strictest.dark, accuracy.dark);
-  }
-  return strictest;
-}
-
 /// Makes each object, or sprite, that flickers a light of its own. `first`: the number of the first one.
 template <typename Objects>
 void add_sources(const Objects& objects, const char* list, std::size_t first, TimeNs start,
@@ -39,9 +28,29 @@ void add_sources(const Objects& objects, const char* list, std::size_t first, Ti
 
 }  // namespace
 
+bool flickers(const Scenario& scenario) {
+  const auto has_flicker = [](const auto& objects) {
+    return std::ranges::any_of(objects, [](const auto& object) { return object.flicker.has_value(); });
+  };
+  const auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
+  const auto* const sprites = std::get_if<SpritesRendererOptions>(&scenario.renderer);
+  return scenario.light.flicker || (mesh != nullptr && has_flicker(mesh->objects)) ||
+         (sprites != nullptr && has_flicker(sprites->sprites));
+}
+
+LightAccuracy light_accuracy(const CameraOptions& camera) {
+  LightAccuracy strictest = accuracy_for(camera.first_sensor());
+  for (const SensorOptions& sensor : camera.sensors()) {
+    const LightAccuracy accuracy = accuracy_for(sensor);
+    strictest.tolerance = std::min(strictest.tolerance, accuracy.tolerance);
+    strictest.dark = std::min(strictest.dark, accuracy.dark);
+  }
+  return strictest;
+}
+
 std::optional<Flicker> build_flicker(const Scenario& scenario, const CameraOptions& camera, std::size_t moving,
                                      TimeNs start) {
-  const LightAccuracy accuracy = accuracy_for(camera);
+  const LightAccuracy accuracy = light_accuracy(camera);
   std::optional<Modulation> all;
   if (scenario.light.flicker) all.emplace(*scenario.light.flicker, start, accuracy, "light.flicker");
   SceneLight light(std::move(all));

@@ -351,6 +351,24 @@ SensorTraits strictest_sensor(const Scenario& scenario, const CameraOptions& cam
   return strictest;
 }
 
+bool sampling_depends_on_sensors(const CameraOptions& camera) {
+  return !std::holds_alternative<UniformSampling>(camera.sampling) &&
+         !std::holds_alternative<FlowSampling>(camera.sampling);
+}
+
+bool seed_determines_more_than_events(const Scenario& scenario) {
+  const auto is_random = [](const TrajectoryOptions& trajectory) {
+    return std::holds_alternative<RandomTrajectoryOptions>(trajectory);
+  };
+  const auto moves_randomly = [&](const auto& object) { return is_random(object.trajectory); };
+  const auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
+  const auto* const objects = engine_objects(scenario.renderer);
+  return is_random(scenario.trajectory) || (mesh != nullptr && std::ranges::any_of(mesh->objects, moves_randomly)) ||
+         (objects != nullptr && std::ranges::any_of(*objects, moves_randomly)) || scenario.imu ||
+         std::ranges::any_of(scenario.cameras,
+                             [](const CameraOptions& camera) { return camera.frame_camera.has_value(); });
+}
+
 CameraInfo camera_info(CameraOptions options, const SceneCamera* followed) {
   if (followed != nullptr && followed->horizontal_fov_rad && !options.horizontal_fov_deg)
     options.horizontal_fov_deg = *followed->horizontal_fov_rad * 180.0 / std::numbers::pi;

@@ -80,6 +80,13 @@ std::vector<std::vector<int>> sensor_numbers(const Scenario& scenario);
 /// What a camera's sampler and its lights must suit: the smallest threshold and the smallest dark light of its sensors.
 SensorTraits strictest_sensor(const Scenario& scenario, const CameraOptions& camera);
 
+/// Whether the samples of a camera depend on strictest_sensor(), by its sampling method.
+bool sampling_depends_on_sensors(const CameraOptions& camera);
+
+/// Whether the scenario's seed determines more than the noise of its event sensors: a random trajectory, the noise of
+/// an IMU or of a frame camera.
+bool seed_determines_more_than_events(const Scenario& scenario);
+
 /// A camera as it is recorded. If its options give no field of view, it has that of the followed camera (may be null).
 CameraInfo camera_info(CameraOptions options, const SceneCamera* followed);
 
@@ -143,6 +150,12 @@ std::shared_ptr<ImageCache> open_image_cache(const ImageCacheOptions& options, c
 std::optional<EngineImages> engine_images(const std::shared_ptr<ImageCache>& cache);
 
 // --- light (build_light.cpp) -----------------------------------------------------------------------------------------
+
+/// Whether any light of a scenario flickers.
+bool flickers(const Scenario& scenario);
+
+/// How exactly flickering light is divided: as each of the camera's event sensors requires.
+LightAccuracy light_accuracy(const CameraOptions& camera);
 
 /// The flicker of a scenario's lights as one of its cameras sees it; empty if the light is constant. `moving`: number
 /// of moving objects, of which the scenario's own are the last. Throws UserError, naming the option, for values out of

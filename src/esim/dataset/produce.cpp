@@ -13,6 +13,7 @@
 #include "esim/core/error.h"
 #include "esim/dataset/files/checksum.h"
 #include "esim/dataset/files/preview.h"
+#include "esim/files/folder_plan.h"
 #include "esim/files/output_file.h"
 #include "esim/preview/pictures.h"
 
@@ -86,7 +87,7 @@ class Run {
 
   /// Makes a shard unless another process makes it.
   void take(std::uint32_t shard) {
-    const ShardLock lock(folder_, shard);
+    const FolderLock lock(folder_.path(), shard);
     if (!lock.owned()) {
       const std::lock_guard locked(mutex_);
       ++result_.elsewhere;

@@ -83,16 +83,6 @@ void add_override(const Scenario& recorded, const std::string& key, const std::s
   }
 }
 
-bool flickers(const Scenario& scenario) {
-  const auto has_flicker = [](const auto& objects) {
-    return std::ranges::any_of(objects, [](const auto& object) { return object.flicker.has_value(); });
-  };
-  const auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
-  const auto* const sprites = std::get_if<SpritesRendererOptions>(&scenario.renderer);
-  return scenario.light.flicker || (mesh != nullptr && has_flicker(mesh->objects)) ||
-         (sprites != nullptr && has_flicker(sprites->sprites));
-}
-
 /// Why the events are not those of a simulation with the new sensors; empty if they are.
 std::string inexact_because(const Scenario& recorded, const Scenario& changed,
                             const std::vector<SampleStoreInfo>& stores) {
@@ -102,8 +92,7 @@ std::string inexact_because(const Scenario& recorded, const Scenario& changed,
   }
   for (std::size_t i = 0; i < recorded.cameras.size(); ++i) {
     if (!changed.cameras[i].events) continue;
-    const bool by_sensor = !std::holds_alternative<UniformSampling>(recorded.cameras[i].sampling) &&
-                           !std::holds_alternative<FlowSampling>(recorded.cameras[i].sampling);
+    const bool by_sensor = sampling_depends_on_sensors(recorded.cameras[i]);
     const SensorTraits then = strictest_sensor(recorded, recorded.cameras[i]),
                        now = strictest_sensor(changed, changed.cameras[i]);
     const bool same = then.contrast_threshold == now.contrast_threshold && then.log_eps == now.log_eps;

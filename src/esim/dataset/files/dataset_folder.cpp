@@ -1,19 +1,16 @@
 #include "esim/dataset/files/dataset_folder.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cerrno>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "esim/core/error.h"
 #include "esim/dataset/files/checksum.h"
+#include "esim/files/folder_plan.h"
 #include "esim/files/output_file.h"
 
 namespace esim::inline dataset {
@@ -25,28 +22,10 @@ using Json = nlohmann::ordered_json;
 constexpr int kFormatVersion = 1;
 constexpr std::array<const char*, 2> kFormats{"hdf5", "webdataset"};
 constexpr const char* kPlanName = "dataset.json";
-constexpr const char* kLockName = ".lock";
-constexpr std::uint64_t kPlanByte = std::uint64_t{1} << 40;  // beyond the bytes of shards
 
 std::string host_name() {
   std::array<char, 256> name{};
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "host";
-}
-
-/// The content of a small file; empty optional if it does not exist.
-std::optional<std::string> read_text(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) return std::nullopt;
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return std::move(text).str();
-}
-
-Json parse(const fs::path& file, const std::string& text) {
-  Json json = Json::parse(text, nullptr, false);
-  if (json.is_discarded() || !json.is_object())
-    throw UserError(file.string() + ": is damaged; restore it, or write to another folder");
-  return json;
 }
 
 Json to_json_value(const DatasetPlan& plan, const std::string& version) {
@@ -70,51 +49,6 @@ DatasetPlan plan_in(const Json& json) {
   return plan;
 }
 
-/// The first difference of two plans: "seed is 1 there, but 2 here".
-std::string difference(const Json& there, const Json& here, const std::string& within = "") {
-  for (const auto& [key, value] : here.items()) {
-    const auto found = there.find(key);
-    if (found != there.end() && *found == value) continue;
-    if (found != there.end() && value.is_object() && found->is_object()) return difference(*found, value, key + ".");
-    std::string before = found == there.end() ? "missing" : found->dump(), now = value.dump();
-    constexpr std::size_t kMax = 60;
-    for (std::string* text : {&before, &now}) {
-      if (text->size() > kMax) *text = "different";
-    }
-    return before == now ? fmt::format("{}{} differs", within, key)
-                         : fmt::format("{}{} is {} there, but {} here", within, key, before, now);
-  }
-  return "it has additional options";
-}
-
-/// Whether the folder is empty except for files of a dataset that has just been begun.
-bool holds_nothing(const fs::path& folder) {
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string();
-    if (name != kLockName && !name.starts_with(kPlanName)) return false;
-  }
-  return !error;
-}
-
-/// Locks a byte of the folder's lock file while the returned descriptor is open. If another process has locked it,
-/// waits if `wait`, otherwise returns -1.
-int lock_byte(const fs::path& folder, std::uint64_t byte, bool wait) {
-  const fs::path file = folder / kLockName;
-  const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-  if (descriptor < 0) throw_cannot_write(file, system_reason(errno));
-  struct flock range {};
-  range.l_type = F_WRLCK;
-  range.l_whence = SEEK_SET;
-  range.l_start = static_cast<off_t>(byte);
-  range.l_len = 1;
-  if (::fcntl(descriptor, wait ? F_OFD_SETLKW : F_OFD_SETLK, &range) == 0) return descriptor;
-  const int error = errno;
-  ::close(descriptor);
-  if (error == EAGAIN || error == EACCES) return -1;
-  throw_cannot_write(file, "cannot lock it: " + system_reason(error));
-}
-
 }  // namespace
 
 std::uint32_t usual_shard_size(std::uint32_t count) {
@@ -124,38 +58,15 @@ std::uint32_t usual_shard_size(std::uint32_t count) {
 
 DatasetFolder::DatasetFolder(fs::path folder, const DatasetPlan& plan, const std::string& version)
     : folder_(std::move(folder)), plan_(plan), version_(version) {
-  const fs::path file = folder_ / kPlanName;
-  std::error_code error;
-  if (!fs::exists(file, error)) {
-    if (fs::exists(folder_, error) && (!fs::is_directory(folder_, error) || !holds_nothing(folder_))) {
-      throw UserError(folder_.string() + ": must be a dataset or an empty folder; choose another --out, or empty it");
-    }
-    create_folder(folder_);
-    const int lock = lock_byte(folder_, kPlanByte, true);
-    if (!fs::exists(file, error)) write_file_atomically(file, to_json_value(plan, version).dump(1) + "\n");
-    ::close(lock);
-    sync_directory(folder_);
-  }
-  const Json there = parse(file, read_text(file).value_or("")), here = to_json_value(plan, version);
-  if (there == here) return;
-  if (there.value("esim", "") != version) {
-    throw UserError(
-        fmt::format("{}: begun by esim {}, but this is esim {}; finish it with that version, or choose another "
-                    "--out",
-                    folder_.string(), there.value("esim", "of an unknown version"), version));
-  }
-  throw UserError(
-      fmt::format("{}: contains a different dataset: {}; give the same options to continue it, or choose another "
-                  "--out",
-                  folder_.string(), difference(there, here)));
+  begin_or_continue(folder_, {"dataset", kPlanName, to_json_value(plan, version).dump()});
 }
 
 DatasetFolder::DatasetFolder(fs::path folder) : folder_(std::move(folder)) {
   const fs::path file = folder_ / kPlanName;
   const auto text = read_text(file);
   if (!text) throw UserError(fmt::format("{}: is not a dataset: {} is missing", folder_.string(), kPlanName));
-  const Json json = parse(file, *text);
   try {
+    const Json json = Json::parse(*text);
     plan_ = plan_in(json);
     version_ = json.at("esim").get<std::string>();
   } catch (const std::exception&) {
@@ -219,14 +130,6 @@ void DatasetFolder::remove_leftovers(std::uint32_t shard) const {
     std::error_code ignored;
     if (entry.path().filename().string().starts_with(prefix)) fs::remove(entry.path(), ignored);
   }
-}
-
-ShardLock::ShardLock(const DatasetFolder& folder, std::uint32_t shard) {
-  descriptor_ = lock_byte(folder.path(), shard, false);
-}
-
-ShardLock::~ShardLock() {
-  if (descriptor_ >= 0) ::close(descriptor_);
 }
 
 std::string to_json(const ShardRecord& record) {

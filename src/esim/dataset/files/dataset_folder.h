@@ -45,7 +45,7 @@ struct ShardRecord {
 ///   dataset.json              the plan and the version of esim; written first
 ///   shard-000012.h5 or .tar   sequences
 ///   shard-000012.json         its record; written when the file is complete
-///   .lock                     byte k is locked while a process writes shard k
+///   .lock                     a FolderLock of part k is held while a process writes shard k
 ///   manifest.json             all records; written when the dataset is complete
 ///
 /// Each file appears under its name atomically, when it is complete and on disk.
@@ -80,21 +80,6 @@ class DatasetFolder {
   std::filesystem::path folder_;
   DatasetPlan plan_;
   std::string version_;
-};
-
-/// The exclusive right to write a shard during the lifetime of this object. Also ends with the process.
-class ShardLock {
- public:
-  ShardLock(const DatasetFolder& folder, std::uint32_t shard);
-  ~ShardLock();
-  ShardLock(const ShardLock&) = delete;
-  ShardLock& operator=(const ShardLock&) = delete;
-
-  /// False if another process has the lock.
-  bool owned() const { return descriptor_ >= 0; }
-
- private:
-  int descriptor_ = -1;
 };
 
 /// The record as it is written in a manifest.

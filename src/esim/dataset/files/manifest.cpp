@@ -9,6 +9,7 @@
 
 #include "esim/dataset/files/checksum.h"
 #include "esim/dataset/files/preview.h"
+#include "esim/files/folder_plan.h"
 #include "esim/files/output_file.h"
 #include "esim/preview/pictures.h"
 
@@ -110,7 +111,7 @@ void write_manifest(const DatasetFolder& folder, const DatasetState& state, cons
                     bool is_target) {
   // Several processes may arrive here at the same time; only one of them writes.
   const std::uint32_t beyond = folder.plan().shards();
-  const ShardLock lock(folder, beyond);
+  const FolderLock lock(folder.path(), beyond);
   if (!lock.owned()) return;
   folder.remove_leftovers(beyond);
   const std::vector<std::uint64_t> counts = magnitudes_of(state);

@@ -128,8 +128,10 @@ class Sweeping {
     };
     std::optional<Summary> summary;
     try {
-      summary = make_recording(simulation.scenario, {.out = recording, .replace = true, .threads = work_.threads, .repetition = work_.repetition},
-                               notices(), [&](const Progress& progress) { return show(index, progress); });
+      summary =
+          make_recording(simulation.scenario,
+                         {.out = recording, .replace = true, .threads = work_.threads, .repetition = work_.repetition},
+                         notices(), [&](const Progress& progress) { return show(index, progress); });
     } catch (const OutputError& error) {
       throw OutputError(named(error.what()));
     } catch (const UserError& error) {

@@ -225,7 +225,7 @@ struct BlockHeader {
 };
 
 constexpr std::size_t kBlockBytes = std::size_t{1} << 20;  // at least
-constexpr int kLevel = 1;
+constexpr int kLevel = -10;
 
 }  // namespace
 

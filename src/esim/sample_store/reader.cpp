@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <future>
 #include <limits>
 #include <map>
 #include <string>
@@ -43,6 +44,18 @@ T value_of(std::span<const std::byte> bytes) {
 }  // namespace
 
 struct SampleStoreReader::Impl {
+  /// A block of segments.
+  struct Block {
+    std::vector<PortionEntry> portions;
+    std::vector<SegmentEntry> entries;
+    std::array<std::vector<std::uint8_t>, kPlanes> planes;
+    std::size_t used_planes = kPlanes;  // the others are 0
+    std::vector<float> irradiance;      // of all segments; with that of their start
+    std::vector<float> start;           // of those that start where their pixels were
+    std::vector<std::size_t> first;     // of each segment's pixels in `irradiance`
+    std::vector<Segment> segments;
+  };
+
   explicit Impl(const std::filesystem::path& path) : file(path) {
     const auto wrong = [&](const std::string& reason) { file.fail(0, reason); };
     const std::span<const std::byte> bytes = file.read(sizeof(Header));
@@ -61,10 +74,11 @@ struct SampleStoreReader::Impl {
     covered = Image<std::uint8_t>(info.width, info.height);
   }
 
-  bool read_block(const Workers& workers);
-  void read_lists(const BlockHeader& header, std::span<const std::byte> compressed);
+  bool next_block(const Workers& workers);
+  bool read(Block& block, const Workers& workers);
+  void read_lists(const BlockHeader& header, std::span<const std::byte> compressed, Block& block);
   void check_segment(const SegmentEntry& entry);
-  void undo_differences(Rows rows);
+  void undo_differences(Rows rows, Block& block);
   [[noreturn]] void damaged(const std::string& what) const { file.fail(block_offset, "the block is damaged: " + what); }
 
   InputFile file;
@@ -76,15 +90,9 @@ struct SampleStoreReader::Impl {
   Image<std::uint8_t> covered;                            // by these tiles
   bool ended = false;
 
-  // The block.
-  std::vector<PortionEntry> portions;
-  std::vector<SegmentEntry> entries;
-  std::array<std::vector<std::uint8_t>, kPlanes> planes;
-  std::size_t used_planes = kPlanes;  // the others are 0
-  std::vector<float> irradiance;      // of all segments; with that of their start
-  std::vector<float> start;           // of those that start where their pixels were
-  std::vector<std::size_t> first;     // of each segment's pixels in `irradiance`
-  std::vector<Segment> segments;
+  Block current, ahead;  // handed out, and read meanwhile
+  Workers one_thread{1};
+  std::future<bool> reading;  // of `ahead`; destroyed first
   std::size_t next_portion = 0, next_segment = 0;
   Portion portion;
 };
@@ -105,7 +113,10 @@ void SampleStoreReader::Impl::check_segment(const SegmentEntry& entry) {
   done->second = entry.t1;
 }
 
-void SampleStoreReader::Impl::read_lists(const BlockHeader& header, std::span<const std::byte> compressed) {
+void SampleStoreReader::Impl::read_lists(const BlockHeader& header, std::span<const std::byte> compressed,
+                                         Block& block) {
+  auto& portions = block.portions;
+  auto& entries = block.entries;
   portions.resize(header.portions);
   entries.resize(header.segments);
   const std::size_t of_portions = portions.size() * sizeof(PortionEntry),
@@ -130,26 +141,26 @@ void SampleStoreReader::Impl::read_lists(const BlockHeader& header, std::span<co
 }
 
 /// The irradiance of some rows of all segments, from the differences, in order.
-void SampleStoreReader::Impl::undo_differences(Rows rows) {
+void SampleStoreReader::Impl::undo_differences(Rows rows, Block& block) {
   const int dropped = info.precision == SamplePrecision::rounded ? kDroppedBits : 0;
-  for (std::size_t segment = 0; segment < entries.size(); ++segment) {
-    const SegmentEntry& entry = entries[segment];
+  for (std::size_t segment = 0; segment < block.entries.size(); ++segment) {
+    const SegmentEntry& entry = block.entries[segment];
     const int first_row = std::max<int>(rows.first, entry.y), last_row = std::min(rows.last, entry.y + entry.height);
     const std::size_t width = entry.width, area = width * entry.height;
     for (std::uint64_t part = 0; part <= entry.own_start; ++part) {
       for (int y = first_row; y < last_row; ++y) {
-        const std::size_t i = first[segment] + part * area + static_cast<std::size_t>(y - entry.y) * width;
-        const std::array<const std::uint8_t*, kPlanes> bytes{planes[0].data() + i, planes[1].data() + i,
-                                                             planes[2].data() + i, planes[3].data() + i};
-        const auto undo = used_planes <= 2 ? undo_row<2> : used_planes == 3 ? undo_row<3> : undo_row<4>;
-        undo(width, bytes, dropped, last.row(y) + entry.x, start.data() + i, irradiance.data() + i);
+        const std::size_t i = block.first[segment] + part * area + static_cast<std::size_t>(y - entry.y) * width;
+        const std::array<const std::uint8_t*, kPlanes> bytes{block.planes[0].data() + i, block.planes[1].data() + i,
+                                                             block.planes[2].data() + i, block.planes[3].data() + i};
+        const auto undo = block.used_planes <= 2 ? undo_row<2> : block.used_planes == 3 ? undo_row<3> : undo_row<4>;
+        undo(width, bytes, dropped, last.row(y) + entry.x, block.start.data() + i, block.irradiance.data() + i);
       }
     }
   }
 }
 
-/// False at the end.
-bool SampleStoreReader::Impl::read_block(const Workers& workers) {
+/// Reads the next block; false at the end.
+bool SampleStoreReader::Impl::read(Block& block, const Workers& workers) {
   block_offset = file.offset();
   const auto header = value_of<BlockHeader>(file.read_exactly(
       sizeof(BlockHeader), "the samples: their recording was interrupted, or the file was truncated; simulate again"));
@@ -172,43 +183,52 @@ bool SampleStoreReader::Impl::read_block(const Workers& workers) {
     compressed[k] = all.subspan(offset, header.plane_bytes[k]);
     offset += header.plane_bytes[k];
   }
-  read_lists(header, all.subspan(offset));
-  used_planes = kPlanes;
-  while (used_planes > 2 && header.plane_bytes[used_planes - 1] == 0) --used_planes;
+  read_lists(header, all.subspan(offset), block);
+  block.used_planes = kPlanes;
+  while (block.used_planes > 2 && header.plane_bytes[block.used_planes - 1] == 0) --block.used_planes;
   std::array<bool, kPlanes> good{};
   workers.for_each(static_cast<int>(kPlanes), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    planes[k].resize(header.pixels);
+    block.planes[k].resize(header.pixels);
     if (compressed[k].empty()) {
-      if (k < used_planes) std::ranges::fill(planes[k], std::uint8_t{0});
+      if (k < block.used_planes) std::ranges::fill(block.planes[k], std::uint8_t{0});
       good[k] = true;
       return;
     }
-    good[k] = ZSTD_decompress(planes[k].data(), planes[k].size(), compressed[k].data(), compressed[k].size()) ==
-              planes[k].size();
+    good[k] = ZSTD_decompress(block.planes[k].data(), block.planes[k].size(), compressed[k].data(),
+                              compressed[k].size()) == block.planes[k].size();
   });
   for (const bool each : good) {
     if (!each) damaged("its irradiance has another size");
   }
-  irradiance.resize(header.pixels);
-  start.resize(header.pixels);
-  first.clear();
-  segments.clear();
+  block.irradiance.resize(header.pixels);
+  block.start.resize(header.pixels);
+  block.first.clear();
+  block.segments.clear();
   std::size_t pixel = 0;
-  for (const SegmentEntry& entry : entries) {
+  for (const SegmentEntry& entry : block.entries) {
     const Tile tile{entry.x, entry.y, entry.width, entry.height};
-    first.push_back(pixel);
-    const float* const from = (entry.own_start != 0 ? irradiance.data() : start.data()) + pixel;
+    block.first.push_back(pixel);
+    const float* const from = (entry.own_start != 0 ? block.irradiance.data() : block.start.data()) + pixel;
     if (entry.own_start != 0) pixel += tile.area();
-    const float* const to = irradiance.data() + pixel;
+    const float* const to = block.irradiance.data() + pixel;
     pixel += tile.area();
-    segments.push_back({tile, entry.t0, entry.t1, {entry.t0 == entry.t1 ? to : from, tile}, {to, tile}});
+    block.segments.push_back({tile, entry.t0, entry.t1, {entry.t0 == entry.t1 ? to : from, tile}, {to, tile}});
   }
   const int pieces = std::min(workers.threads(), info.height);
   workers.for_each(pieces, [&](int i) {
-    undo_differences({info.height * i / pieces, info.height * (i + 1) / pieces});
+    undo_differences({info.height * i / pieces, info.height * (i + 1) / pieces}, block);
   });
+  return true;
+}
+
+/// Makes the next block the current one; false at the end. With several threads, the block after it is read while the
+/// current one is in use.
+bool SampleStoreReader::Impl::next_block(const Workers& workers) {
+  if (!(reading.valid() ? reading.get() : read(ahead, workers))) return false;
+  std::swap(current, ahead);
   next_portion = next_segment = 0;
+  if (workers.threads() > 1) reading = std::async(std::launch::async, [this] { return read(ahead, one_thread); });
   return true;
 }
 
@@ -219,17 +239,17 @@ SampleStoreReader& SampleStoreReader::operator=(SampleStoreReader&&) noexcept = 
 
 const SampleStoreInfo& SampleStoreReader::info() const { return impl_->info; }
 
-bool SampleStoreReader::has_more() const { return impl_->next_portion < impl_->portions.size(); }
+bool SampleStoreReader::has_more() const { return impl_->next_portion < impl_->current.portions.size(); }
 
 const SampleStoreReader::Portion* SampleStoreReader::next(const Workers& workers) {
   Impl& impl = *impl_;
   if (impl.ended) return nullptr;
-  if (impl.next_portion == impl.portions.size() && !impl.read_block(workers)) {
+  if (impl.next_portion == impl.current.portions.size() && !impl.next_block(workers)) {
     impl.ended = true;
     return nullptr;
   }
-  const PortionEntry& entry = impl.portions[impl.next_portion++];
-  impl.portion = {std::span(impl.segments).subspan(impl.next_segment, entry.segments), entry.watermark};
+  const PortionEntry& entry = impl.current.portions[impl.next_portion++];
+  impl.portion = {std::span(impl.current.segments).subspan(impl.next_segment, entry.segments), entry.watermark};
   impl.next_segment += entry.segments;
   return &impl.portion;
 }

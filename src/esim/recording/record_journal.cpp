@@ -237,6 +237,8 @@ class RecordJournal::File {
   File(std::filesystem::path path, int flags)
       : path_(std::move(path)), descriptor_(::open(path_.c_str(), O_RDWR | O_CLOEXEC | flags, 0666)) {
     if (descriptor_ < 0) throw_cannot_write(path_, system_reason(errno));
+    ZSTD_CCtx_setParameter(context_.get(), ZSTD_c_compressionLevel, kLevel);
+    ZSTD_CCtx_setParameter(context_.get(), ZSTD_c_checksumFlag, 1);
   }
   ~File() { ::close(descriptor_); }
   File(const File&) = delete;
@@ -248,9 +250,8 @@ class RecordJournal::File {
   void write_block() {
     if (records.empty()) return;
     compressed_.resize(sizeof(BlockHeader) + ZSTD_compressBound(records.size()));
-    const std::size_t size =
-        ZSTD_compress(compressed_.data() + sizeof(BlockHeader), compressed_.size() - sizeof(BlockHeader),
-                      records.data(), records.size(), kLevel);
+    const std::size_t size = ZSTD_compress2(context_.get(), compressed_.data() + sizeof(BlockHeader),
+                                            compressed_.size() - sizeof(BlockHeader), records.data(), records.size());
     if (ZSTD_isError(size) != 0) throw_cannot_write(path_, ZSTD_getErrorName(size));
     const BlockHeader header{records.size(), size};
     std::memcpy(compressed_.data(), &header, sizeof header);
@@ -312,6 +313,7 @@ class RecordJournal::File {
   int descriptor_;
   std::uint64_t size_ = 0;  // of the valid part
   std::vector<std::byte> compressed_;
+  std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> context_{ZSTD_createCCtx(), ZSTD_freeCCtx};
 };
 
 RecordJournal::RecordJournal(std::filesystem::path file, std::unique_ptr<Sink> out)

@@ -64,7 +64,7 @@ void OpticalFlowFromDepth::restore(StateReader& archive, const std::function<Ren
   if (!any) return;
   TimeNs t = 0;
   archive.value(t);
-  before_.emplace(view_at(t));
+  before_ = Frame{view_at(t), {}, {}};
   archive.sized_image(before_->depth);
   archive.sized_image(before_->object);
 }

@@ -56,7 +56,7 @@ struct SampleStoreReader::Impl {
     std::vector<Segment> segments;
   };
 
-  explicit Impl(const std::filesystem::path& path) : file(path) {
+  Impl(const std::filesystem::path& path, bool reads_ahead) : file(path), read_ahead(reads_ahead) {
     const auto wrong = [&](const std::string& reason) { file.fail(0, reason); };
     const std::span<const std::byte> bytes = file.read(sizeof(Header));
     if (bytes.size() < sizeof(Header) || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0)
@@ -82,6 +82,7 @@ struct SampleStoreReader::Impl {
   [[noreturn]] void damaged(const std::string& what) const { file.fail(block_offset, "the block is damaged: " + what); }
 
   InputFile file;
+  bool read_ahead;
   SampleStoreInfo info;
   Image<std::uint32_t> last;
   std::uint64_t block_offset = 0;
@@ -222,17 +223,17 @@ bool SampleStoreReader::Impl::read(Block& block, const Workers& workers) {
   return true;
 }
 
-/// Makes the next block the current one; false at the end. With several threads, the block after it is read while the
-/// current one is in use.
+/// Makes the next block the current one; false at the end.
 bool SampleStoreReader::Impl::next_block(const Workers& workers) {
   if (!(reading.valid() ? reading.get() : read(ahead, workers))) return false;
   std::swap(current, ahead);
   next_portion = next_segment = 0;
-  if (workers.threads() > 1) reading = std::async(std::launch::async, [this] { return read(ahead, one_thread); });
+  if (read_ahead) reading = std::async(std::launch::async, [this] { return read(ahead, one_thread); });
   return true;
 }
 
-SampleStoreReader::SampleStoreReader(const std::filesystem::path& file) : impl_(std::make_unique<Impl>(file)) {}
+SampleStoreReader::SampleStoreReader(const std::filesystem::path& file, bool read_ahead)
+    : impl_(std::make_unique<Impl>(file, read_ahead)) {}
 SampleStoreReader::~SampleStoreReader() = default;
 SampleStoreReader::SampleStoreReader(SampleStoreReader&&) noexcept = default;
 SampleStoreReader& SampleStoreReader::operator=(SampleStoreReader&&) noexcept = default;

@@ -52,8 +52,9 @@ class SampleStoreWriter {
 /// Reads such a file.
 class SampleStoreReader {
  public:
-  /// Throws UserError if it is not a store, or one of another version.
-  explicit SampleStoreReader(const std::filesystem::path& file);
+  /// `read_ahead`: a thread of its own reads what comes next while the last portions are in use. Throws UserError if
+  /// the file is not a store, or one of another version.
+  explicit SampleStoreReader(const std::filesystem::path& file, bool read_ahead = false);
   ~SampleStoreReader();
   SampleStoreReader(SampleStoreReader&&) noexcept;
   SampleStoreReader& operator=(SampleStoreReader&&) noexcept;

@@ -129,7 +129,7 @@ Scenario sensors_only(const Scenario& changed) {
 }
 
 /// The stores of the cameras with sensors, checked against the scenario.
-std::vector<SampleStoreReader> open_stores(const Scenario& scenario, const fs::path& recording) {
+std::vector<SampleStoreReader> open_stores(const Scenario& scenario, const fs::path& recording, bool read_ahead) {
   std::vector<SampleStoreReader> stores;
   for (const CameraOptions& camera : scenario.cameras) {
     if (!camera.events) continue;
@@ -139,7 +139,7 @@ std::vector<SampleStoreReader> open_stores(const Scenario& scenario, const fs::p
       throw UserError(fmt::format(
           "{}: does not exist: the recording has no samples; simulate again with output.samples=true", file.string()));
     }
-    const SampleStoreInfo& info = stores.emplace_back(file).info();
+    const SampleStoreInfo& info = stores.emplace_back(file, read_ahead).info();
     if (info.width != camera.width || info.height != camera.height) {
       throw UserError(fmt::format("{}: has {} x {} px, but camera {} of scenario.yaml has {} x {} px; simulate again",
                                   file.string(), info.width, info.height, camera.name, camera.width, camera.height));
@@ -151,6 +151,17 @@ std::vector<SampleStoreReader> open_stores(const Scenario& scenario, const fs::p
   }
   if (stores.empty()) throw UserError(fmt::format("{}: no camera has an event sensor", recording.string()));
   return stores;
+}
+
+/// The threads for the pixels. Pixels of a single sensor without a circuit are so fast that reading the samples and
+/// writing the events keep another thread busy.
+int pixel_threads(const Scenario& scenario, int threads) {
+  std::size_t sensors = 0;
+  bool circuit = false;
+  for (const CameraOptions& camera : scenario.cameras) {
+    for (const SensorOptions& sensor : camera.sensors()) ++sensors, circuit |= sensor.circuit.has_value();
+  }
+  return sensors == 1 && !circuit ? std::max(1, threads - 1) : threads;
 }
 
 /// Refuses labels that need what the samples do not contain.
@@ -183,7 +194,8 @@ Resensed resense(const ResenseOptions& options, const Notices& notify, const Mon
                  overrides);
   }
   const Scenario changed = recorded_scenario(options.recording, overrides, options.setter);
-  std::vector<SampleStoreReader> stores = open_stores(changed, options.recording);
+  const int threads = Workers(options.threads).threads();
+  std::vector<SampleStoreReader> stores = open_stores(changed, options.recording, threads > 1);
   check_labels(recorded, changed, options.recording);
   std::error_code error;
   if (fs::equivalent(options.recording, options.out, error))
@@ -208,7 +220,7 @@ Resensed resense(const ResenseOptions& options, const Notices& notify, const Mon
   substitutes.body =
       std::make_shared<const StaticTrajectory>(SE3{}, infos.front().start, infos.front().end - infos.front().start);
   substitutes.make_renderer = [](const Camera&, const Workers&) { return make_no_renderer(); };
-  World world = build_world(sensors, substitutes, options.threads, notices);
+  World world = build_world(sensors, substitutes, pixel_threads(sensors, threads), notices);
   auto store = stores.begin();
   for (std::size_t i = 0; i < world.cameras.size(); ++i) {
     world.cameras[i].sampler = sensors.cameras[i].events ? make_stored_sampler(std::move(*store++), *world.workers)
@@ -223,8 +235,7 @@ Resensed resense(const ResenseOptions& options, const Notices& notify, const Mon
       return monitor(progress);
     });
     for (const std::string& loss : losses(sensors, result.summary)) given.push_back("warning: " + loss);
-    directory.finish(report_json(changed, result.summary, world.workers->threads(), given,
-                                 provenance.finish(result.summary.complete)));
+    directory.finish(report_json(changed, result.summary, threads, given, provenance.finish(result.summary.complete)));
     return result.summary;
   });
   return result;

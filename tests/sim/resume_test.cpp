@@ -219,6 +219,18 @@ TEST_F(Resume, ContinuesWhereTheDiskWasFull) {
   EXPECT_TRUE(files_of(out) == files_of(folder_.path() / "whole"));
 }
 
+TEST_F(Resume, ReplacesTheRecordingThatTheKilledSimulationWasToReplace) {
+  const Scenario scenario = read(kPlane);
+  const fs::path out = folder_.path() / "out", incomplete = folder_.path() / "out.incomplete";
+  run(scenario, {.out = out}, 30);
+  fs::rename(out, incomplete);
+  fs::create_directory(out);
+  folder_.write("out/report.json", "{}");
+  EXPECT_TRUE(run(scenario, {.out = out, .resume = true}, 0));
+  EXPECT_FALSE(fs::exists(incomplete));
+  EXPECT_EQ(report_of(out)["status"], "complete");
+}
+
 TEST_F(Resume, LeavesNoCheckpointInACompleteRecording) {
   run(read(kPlane), {.out = folder_.path() / "out"}, 0);
   EXPECT_FALSE(fs::exists(folder_.path() / "out/checkpoint"));

@@ -169,6 +169,9 @@ RecordingDirectory::RecordingDirectory(const fs::path& out, bool force)
 
 RecordingDirectory::RecordingDirectory(fs::path out, fs::path working)
     : out_(std::move(out)), working_(std::move(working)), owned_(true), keep_(true), lock_(lock_directory(working_)) {
+  std::error_code error;
+  replace_ = fs::exists(out_, error);  // as it was begun
+  if (replace_) require_replaceable(out_);
   write_file_atomically(working_ / kReport, kRunning);
 }
 

@@ -36,11 +36,16 @@ Checkpoint checkpoint_of(const std::filesystem::path& recording, const std::stri
 
 /// Removes what a simulation that is resumed writes again.
 void remove_outputs(const std::filesystem::path& recording) {
-  for (const auto& entry : std::filesystem::directory_iterator(recording)) {
-    const std::filesystem::path& path = entry.path();
-    if (path != checkpoint_folder(recording) && path.filename() != kScenarioFile && path.filename() != "report.json")
-      std::filesystem::remove_all(path);
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(recording, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::filesystem::path& path = entry->path();
+    if (path == checkpoint_folder(recording) || path.filename() == kScenarioFile || path.filename() == "report.json")
+      continue;
+    std::filesystem::remove_all(path, error);
+    if (error) break;
   }
+  if (error) throw OutputError("cannot remove the files in " + recording.string() + ": " + error.message());
 }
 
 }  // namespace
@@ -102,7 +107,8 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
         writer ? &checkpoints : nullptr);
     if (summary.complete) {
       samples.finish();
-      std::filesystem::remove_all(checkpoint_folder(directory.path()));
+      std::error_code ignored;  // only space is lost
+      std::filesystem::remove_all(checkpoint_folder(directory.path()), ignored);
     }
     summary.engine_images = engine_images(cache);
     for (const std::string& loss : losses(scenario, summary)) given.push_back("warning: " + loss);

@@ -94,7 +94,8 @@ class FullDisk(ProgramTest):
                     continue
             with self.subTest(name):
                 out = self.folder / name.replace(" ", "_")
-                result = self.simulate(*options, "--set", "output.compression=gzip", "--set", "duration_s=5", "--set", "output.checkpoints=false", out=out, **files_of(2_000_000))
+                result = self.simulate(*options, "--set", "output.compression=gzip", "--set", "duration_s=5", "--set", "output.checkpoints=false",
+                                       out=out, **files_of(2_000_000))
                 if result.returncode == 0:
                     self.fail("nothing was too large")
                 kept = self.kept_by(result, out)
@@ -133,7 +134,7 @@ class FullDisk(ProgramTest):
             self.skipTest("only root can mount a small disk")
         self.addCleanup(subprocess.run, ["umount", disk], check=True)
         out = disk / "out"
-        kept = self.kept_by(self.simulate("--set", "duration_s=30", out=out), out)
+        kept = self.kept_by(self.simulate("--set", "duration_s=30", "--set", "output.checkpoints=false", out=out), out)
         self.assertIn("No space left on device", run("simulate", SCENES / "poster.yaml", "--out", disk / "b").stderr)
         self.assertGreater(self.events_in(kept), 100_000)
         self.all_read(kept)

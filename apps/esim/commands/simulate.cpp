@@ -121,10 +121,11 @@ void add_simulate(CLI::App& app, int& exit_code) {
               "UnrealCV, use one folder per scene (default: ~/.cache/esim/images for scenes that esim opens in "
               "Blender, no cache for others)")
           ->type_name("DIR");
-  command->add_option("--cache-size", arguments->images.max_bytes, "Maximum size of this folder (default: 10GB)")
-      ->transform(CLI::AsSizeValue(true))
-      ->type_name("SIZE");
-  command->add_flag("--no-cache", arguments->no_cache, "Render every image")->excludes(cache);
+  CLI::Option* const cache_size =
+      command->add_option("--cache-size", arguments->images.max_bytes, "Maximum size of this folder (default: 10GB)")
+          ->transform(CLI::AsSizeValue(true))
+          ->type_name("SIZE");
+  command->add_flag("--no-cache", arguments->no_cache, "Render every image")->excludes(cache)->excludes(cache_size);
   command->footer(
       "Examples:\n"
       "  esim simulate scenes/room.yaml --out out/room\n"

@@ -8,9 +8,11 @@ void ProvenanceRecorder::add(const std::vector<UsedFile>& files) {
   for (const UsedFile& file : files) add(file);
 }
 
-Provenance ProvenanceRecorder::finish(bool wait) {
+Provenance ProvenanceRecorder::finish(bool wait) { return {repetition_, working_folder_, hashes_.finish(wait)}; }
+
+std::filesystem::path current_folder() {
   std::error_code error;
-  return {repetition_, std::filesystem::current_path(error), hashes_.finish(wait)};
+  return std::filesystem::current_path(error);
 }
 
 std::string shell_quoted(const std::string& word) {

@@ -23,10 +23,14 @@ struct Provenance {
   std::vector<HashedFile> inputs{};
 };
 
+/// The current folder of this process; empty if it does not exist.
+std::filesystem::path current_folder();
+
 /// Collects how a recording was made, and hashes its input files meanwhile.
 class ProvenanceRecorder {
  public:
-  explicit ProvenanceRecorder(Repetition repetition) : repetition_(std::move(repetition)) {}
+  explicit ProvenanceRecorder(Repetition repetition, std::filesystem::path working_folder = current_folder())
+      : repetition_(std::move(repetition)), working_folder_(std::move(working_folder)) {}
 
   /// Adds files that were opened before.
   void add(const std::vector<UsedFile>& files);
@@ -39,6 +43,7 @@ class ProvenanceRecorder {
 
  private:
   Repetition repetition_;
+  std::filesystem::path working_folder_;
   FileHashes hashes_;
 };
 

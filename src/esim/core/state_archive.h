@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstring>
 #include <span>
+#include <string>
 #include <type_traits>
 #include <vector>
 
@@ -37,6 +38,8 @@ class StateWriter {
     static_assert(std::is_trivially_copyable_v<typename List::value_type>);
     append(values.data(), values.size() * sizeof(typename List::value_type));
   }
+
+  void text(const std::string& text) { list(std::span(text)); }
 
   /// An image whose size is determined by the constructor's arguments.
   void image(const Image<float>& image) { append(image.data(), image.size() * sizeof(float)); }
@@ -96,6 +99,11 @@ class StateReader {
   void fixed(std::vector<T, Allocator>& values) {
     static_assert(std::is_trivially_copyable_v<T>);
     take(values.data(), values.size());
+  }
+  void text(std::string& text) {
+    std::vector<char> characters;
+    list(characters);
+    text.assign(characters.begin(), characters.end());
   }
   void image(Image<float>& image) { take(image.data(), image.size()); }
   template <class T>

@@ -1,7 +1,6 @@
 #include "esim/image_cache/image_cache.h"
 
 #include <fmt/format.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "esim/core/error.h"
+#include "esim/files/codecs/zstandard.h"
 #include "esim/files/output_file.h"
 
 namespace esim::inline image_cache {
@@ -23,27 +23,6 @@ constexpr std::size_t kKeyDigits = 64;
 
 // The lowest bytes of an engine's numbers are noise: higher levels take longer without making them smaller.
 constexpr int kLevel = 1;
-
-/// Zstandard's frame with a checksum.
-std::string compressed(std::string_view image) {
-  std::string out(ZSTD_compressBound(image.size()), '\0');
-  ZSTD_CCtx* const context = ZSTD_createCCtx();
-  ZSTD_CCtx_setParameter(context, ZSTD_c_compressionLevel, kLevel);
-  ZSTD_CCtx_setParameter(context, ZSTD_c_checksumFlag, 1);
-  const std::size_t size = ZSTD_compress2(context, out.data(), out.size(), image.data(), image.size());
-  ZSTD_freeCCtx(context);
-  if (ZSTD_isError(size)) throw InternalError(std::string("Zstandard: ") + ZSTD_getErrorName(size));
-  out.resize(size);
-  return out;
-}
-
-/// The content of a frame of exactly `bytes` bytes; empty if it is damaged.
-std::optional<std::string> decompressed(const std::string& frame, std::size_t bytes) {
-  if (ZSTD_getFrameContentSize(frame.data(), frame.size()) != bytes) return std::nullopt;
-  std::string image(bytes, '\0');
-  if (ZSTD_decompress(image.data(), bytes, frame.data(), frame.size()) != bytes) return std::nullopt;
-  return image;
-}
 
 /// The part of a file's name after its key; empty for files that are not the cache's.
 std::string extension_after_key(const fs::path& file) {
@@ -64,11 +43,13 @@ std::optional<std::string> ImageCache::load(const std::string& key, std::size_t 
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (!file) return std::nullopt;
   std::optional<std::string> image;
-  if (const std::streamoff size = file.tellg();
-      size > 0 && static_cast<std::size_t>(size) <= ZSTD_compressBound(bytes)) {
+  const std::streamoff size = file.tellg();
+  // Incompressible images become slightly larger.
+  if (size > 0 && static_cast<std::size_t>(size) <= 2 * bytes + 1024) {
     std::string frame(static_cast<std::size_t>(size), '\0');
     file.seekg(0);
-    if (file.read(frame.data(), size)) image = decompressed(frame, bytes);
+    image.emplace(bytes, '\0');
+    if (!file.read(frame.data(), size) || !decompress_zstandard(frame, *image)) image.reset();
   }
   std::error_code ignored;
   if (image) {
@@ -97,7 +78,8 @@ void ImageCache::store(const std::string& key, std::string_view image) {
 }
 
 void ImageCache::write(const std::string& key, std::string_view image) {
-  const std::string frame = compressed(image);
+  std::string frame;
+  compress_zstandard(image, kLevel, frame);
   std::random_device random;
   const fs::path draft = folder_ / fmt::format("{}.{:08x}{:08x}{}", key, random(), random(), kTemporaryExtension);
   std::error_code error, ignored;

@@ -2,23 +2,23 @@
 
 #include <fcntl.h>
 #include <unistd.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "esim/core/error.h"
 #include "esim/core/state_archive.h"
+#include "esim/files/codecs/zstandard.h"
 #include "esim/files/output_file.h"
 
 namespace esim::inline recording {
 namespace {
 
-// --- records as bytes
-// -------------------------------------------------------------------------------------------------
+// --- records as bytes ---------------------------------------------------------------------------------------
 
 template <class Archive, class Vector>
 void transfer_vector(Archive& archive, Vector& v) {
@@ -229,16 +229,13 @@ constexpr int kLevel = -10;
 
 }  // namespace
 
-// --- the file
-// ---------------------------------------------------------------------------------------------------------
+// --- the file -----------------------------------------------------------------------------------------------
 
 class RecordJournal::File {
  public:
   File(std::filesystem::path path, int flags)
       : path_(std::move(path)), descriptor_(::open(path_.c_str(), O_RDWR | O_CLOEXEC | flags, 0666)) {
     if (descriptor_ < 0) throw_cannot_write(path_, system_reason(errno));
-    ZSTD_CCtx_setParameter(context_.get(), ZSTD_c_compressionLevel, kLevel);
-    ZSTD_CCtx_setParameter(context_.get(), ZSTD_c_checksumFlag, 1);
   }
   ~File() { ::close(descriptor_); }
   File(const File&) = delete;
@@ -249,21 +246,10 @@ class RecordJournal::File {
   /// Appends the records to the file as one block.
   void write_block() {
     if (records.empty()) return;
-    compressed_.resize(sizeof(BlockHeader) + ZSTD_compressBound(records.size()));
-    const std::size_t size = ZSTD_compress2(context_.get(), compressed_.data() + sizeof(BlockHeader),
-                                            compressed_.size() - sizeof(BlockHeader), records.data(), records.size());
-    if (ZSTD_isError(size) != 0) throw_cannot_write(path_, ZSTD_getErrorName(size));
-    const BlockHeader header{records.size(), size};
-    std::memcpy(compressed_.data(), &header, sizeof header);
-    const std::size_t whole = sizeof header + size;
-    for (std::size_t done = 0; done < whole;) {
-      const ssize_t written =
-          ::pwrite(descriptor_, compressed_.data() + done, whole - done, static_cast<off_t>(size_ + done));
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) throw_cannot_write(path_, system_reason(errno));
-      done += static_cast<std::size_t>(written);
-    }
-    size_ += whole;
+    compress_zstandard({reinterpret_cast<const char*>(records.data()), records.size()}, kLevel, frame_);
+    const BlockHeader header{records.size(), frame_.size()};
+    append(&header, sizeof header);
+    append(frame_.data(), frame_.size());
     records.clear();
   }
 
@@ -278,12 +264,11 @@ class RecordJournal::File {
       BlockHeader header;
       read(&header, sizeof header, bytes);
       if (header.compressed > bytes - size_) damaged();
-      compressed_.resize(header.compressed);
-      read(compressed_.data(), compressed_.size(), bytes);
-      if (ZSTD_getFrameContentSize(compressed_.data(), compressed_.size()) != header.bytes) damaged();
+      frame_.resize(header.compressed);
+      read(frame_.data(), frame_.size(), bytes);
+      if (zstandard_content_size(frame_) != header.bytes) damaged();
       std::vector<std::byte> block(header.bytes);
-      if (ZSTD_decompress(block.data(), block.size(), compressed_.data(), compressed_.size()) != block.size())
-        damaged();
+      if (!decompress_zstandard(frame_, {reinterpret_cast<char*>(block.data()), block.size()})) damaged();
       for (StateReader from(block); !from.at_end();) {
         std::uint8_t kind = 0;
         from.value(kind);
@@ -294,6 +279,16 @@ class RecordJournal::File {
   }
 
  private:
+  void append(const void* from, std::size_t count) {
+    for (std::size_t done = 0; done < count;) {
+      const ssize_t written =
+          ::pwrite(descriptor_, static_cast<const char*>(from) + done, count - done, static_cast<off_t>(size_ + done));
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0) throw_cannot_write(path_, system_reason(errno));
+      done += static_cast<std::size_t>(written);
+    }
+    size_ += count;
+  }
   void read(void* to, std::size_t count, std::uint64_t end) {
     if (count > end - size_) damaged();
     for (std::size_t done = 0; done < count;) {
@@ -312,8 +307,7 @@ class RecordJournal::File {
   std::filesystem::path path_;
   int descriptor_;
   std::uint64_t size_ = 0;  // of the valid part
-  std::vector<std::byte> compressed_;
-  std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> context_{ZSTD_createCCtx(), ZSTD_freeCCtx};
+  std::string frame_;
 };
 
 RecordJournal::RecordJournal(std::filesystem::path file, std::unique_ptr<Sink> out)

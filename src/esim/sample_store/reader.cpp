@@ -1,5 +1,3 @@
-#include <zstd.h>
-
 #include <algorithm>
 #include <bit>
 #include <cstring>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/files/codecs/zstandard.h"
 #include "esim/files/input_file.h"
 #include "esim/sample_store/layout.h"
 
@@ -32,6 +31,10 @@ void undo_row(std::size_t count, const std::array<const std::uint8_t*, kPlanes>&
     from[i] = irradiance_of(before, dropped_bits);
     to[i] = irradiance_of(now, dropped_bits);
   }
+}
+
+std::string_view text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 template <typename T>
@@ -123,8 +126,7 @@ void SampleStoreReader::Impl::read_lists(const BlockHeader& header, std::span<co
   const std::size_t of_portions = portions.size() * sizeof(PortionEntry),
                     of_segments = entries.size() * sizeof(SegmentEntry);
   std::string lists(of_portions + of_segments, '\0');
-  const std::size_t size = ZSTD_decompress(lists.data(), lists.size(), compressed.data(), compressed.size());
-  if (size != lists.size()) damaged("the list of its segments has another size");
+  if (!decompress_zstandard(text_of(compressed), lists)) damaged("the list of its segments has another size");
   std::memcpy(portions.data(), lists.data(), of_portions);
   if (of_segments > 0) std::memcpy(entries.data(), lists.data() + of_portions, of_segments);
   std::uint64_t counted = 0, pixels = 0;
@@ -196,8 +198,8 @@ bool SampleStoreReader::Impl::read(Block& block, const Workers& workers) {
       good[k] = true;
       return;
     }
-    good[k] = ZSTD_decompress(block.planes[k].data(), block.planes[k].size(), compressed[k].data(),
-                              compressed[k].size()) == block.planes[k].size();
+    std::vector<std::uint8_t>& plane = block.planes[k];
+    good[k] = decompress_zstandard(text_of(compressed[k]), {reinterpret_cast<char*>(plane.data()), plane.size()});
   });
   for (const bool each : good) {
     if (!each) damaged("its irradiance has another size");

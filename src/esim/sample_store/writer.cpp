@@ -1,12 +1,9 @@
-#include <zstd.h>
-
 #include <algorithm>
 #include <limits>
 #include <memory>
-#include <new>
 #include <string>
 
-#include "esim/core/error.h"
+#include "esim/files/codecs/zstandard.h"
 #include "esim/files/output_file.h"
 #include "esim/sample_store/layout.h"
 
@@ -24,17 +21,6 @@ std::string_view bytes_of(const T& value) {
 template <typename T>
 std::string_view bytes_of(const std::vector<T>& values) {
   return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
-}
-
-void compress(std::string_view bytes, int level, std::string& out) {
-  const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(), ZSTD_freeCCtx);
-  if (context == nullptr) throw std::bad_alloc();
-  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level);
-  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
-  out.resize(ZSTD_compressBound(bytes.size()));
-  const std::size_t size = ZSTD_compress2(context.get(), out.data(), out.size(), bytes.data(), bytes.size());
-  if (ZSTD_isError(size)) throw InternalError(std::string("Zstandard: ") + ZSTD_getErrorName(size));
-  out.resize(size);
 }
 
 }  // namespace
@@ -114,9 +100,9 @@ void SampleStoreWriter::Impl::write_block(const Workers& workers) {
     const auto k = static_cast<std::size_t>(i);
     compressed[k].clear();
     if (k == kPlanes) {
-      compress(lists, kLevel, compressed[k]);
+      compress_zstandard(lists, kLevel, compressed[k]);
     } else if (std::ranges::any_of(planes[k], [](std::uint8_t byte) { return byte != 0; })) {
-      compress(bytes_of(planes[k]), k == 0 ? kLevelOfLowest : kLevel, compressed[k]);
+      compress_zstandard(bytes_of(planes[k]), k == 0 ? kLevelOfLowest : kLevel, compressed[k]);
     }
   });
   BlockHeader header;

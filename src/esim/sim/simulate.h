@@ -58,7 +58,7 @@ struct Checkpoints {
   /// Whether it is time to save the state; called after every sample.
   std::function<bool()> due;
   /// Takes the state. All records before it have been written.
-  std::function<void(std::span<const std::byte> state)> save;
+  std::function<void(std::vector<std::byte> state)> save;
   /// The state in which the simulation begins, after `out` has received all records before it; empty: the start.
   std::vector<std::byte> resumed{};
 };

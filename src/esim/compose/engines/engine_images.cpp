@@ -70,15 +70,19 @@ std::string identity_of_images(const UnrealcvOptions& options, UnrealcvClient& c
 std::shared_ptr<ImageCache> open_image_cache(const ImageCacheOptions& options, const RendererOptions& renderer,
                                              const NoticeHandler& warning) {
   if (!options.use) return nullptr;
-  const bool is_named = !options.folder.empty();
+  const bool is_named = !options.folder.empty(),
+             is_wanted = is_named || options.max_bytes != ImageCacheOptions{}.max_bytes;
   if (engine_objects(renderer) == nullptr) {
-    if (is_named)
+    if (is_wanted)
       warning(
           "the image cache has no effect: it is for the renderers blender and unrealcv, whose images are expensive");
     return nullptr;
   }
   if (is_named) return std::make_shared<ImageCache>(options.folder, options.max_bytes, warning);
-  if (!is_identified(renderer)) return nullptr;
+  if (!is_identified(renderer)) {
+    if (is_wanted) warning("images are not cached: esim cannot identify this scene; name a folder for its images");
+    return nullptr;
+  }
   try {
     return std::make_shared<ImageCache>(cache_folder() / "images", options.max_bytes, warning);
   } catch (const UserError& error) {

@@ -1,16 +1,16 @@
 #include "esim/compose/recordings/checkpoints.h"
 
 #include <algorithm>
-#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <utility>
 
 #include "esim/compose/compose.h"
-#include "esim/compose/provenance.h"
 #include "esim/core/error.h"
 #include "esim/core/state_archive.h"
-#include "esim/files/input_file.h"
+#include "esim/files/codecs/zstandard.h"
+#include "esim/files/folder_plan.h"
 #include "esim/files/output_file.h"
 
 namespace esim::inline compose {
@@ -22,11 +22,33 @@ constexpr std::string_view kSignature = "esim checkpoint\n";
 
 fs::path state_file(const fs::path& recording) { return checkpoint_folder(recording) / "state"; }
 
-void put(StateWriter& archive, const std::string& text) { archive.list(std::span(text)); }
-void get(StateReader& archive, std::string& text) {
-  std::vector<char> characters;
-  archive.list(characters);
-  text.assign(characters.begin(), characters.end());
+void transfer(StateWriter& archive, const fs::path& path) { archive.text(path.string()); }
+void transfer(StateReader& archive, fs::path& path) {
+  std::string text;
+  archive.text(text);
+  path = text;
+}
+
+template <class Archive, class Files>
+void transfer_files(Archive& archive, Files& files) {
+  archive.objects(files, [](auto& a, auto& used) {
+    transfer(a, used.path);
+    a.value(used.regular);
+    a.value(used.bytes);
+    a.value(used.changed_ns);
+    a.text(used.sha256);
+  });
+}
+
+template <class Archive, class ACheckpoint>
+void transfer_checkpoint(Archive& archive, ACheckpoint& checkpoint) {
+  archive.value(checkpoint.journal_bytes);
+  archive.list(checkpoint.state);
+  archive.text(checkpoint.repetition.command);
+  archive.text(checkpoint.repetition.obstacle);
+  transfer(archive, checkpoint.working_folder);
+  transfer_files(archive, checkpoint.scenario_files);
+  transfer_files(archive, checkpoint.inputs);
 }
 
 bool is_complete(const fs::path& recording) {
@@ -55,30 +77,23 @@ Checkpoint read_checkpoint(const fs::path& recording) {
                     " cannot be resumed: it has no checkpoint; the first one is written after a few seconds. Simulate "
                     "the scenario again");
   }
-  InputFile input(file);
-  const auto size = static_cast<std::size_t>(input.size());
-  const std::span<const std::byte> all = input.read_exactly(size, "the checkpoint");
-  if (size < kSignature.size() || std::memcmp(all.data(), kSignature.data(), kSignature.size()) != 0)
+  const std::string all = read_text(file).value_or("");
+  if (!all.starts_with(kSignature))
     throw UserError(file.string() + " is not a checkpoint of a simulation; simulate the scenario again");
-  StateReader archive(all.subspan(kSignature.size()));
+  const std::string_view frame = std::string_view(all).substr(kSignature.size());
+  std::string bytes(zstandard_content_size(frame), '\0');
+  if (bytes.empty() || !decompress_zstandard(frame, bytes)) {
+    throw UserError(file.string() + " is damaged, and the simulation cannot be resumed; simulate the scenario again");
+  }
+  StateReader archive(std::as_bytes(std::span(bytes)));
   std::string writer;
-  get(archive, writer);
+  archive.text(writer);
   if (writer != build()) {
     throw UserError(recording.string() + " cannot be resumed: its checkpoint is of another build of esim, " + writer +
                     " (this is " + build() + "); resume it with that one, or simulate the scenario again");
   }
   Checkpoint checkpoint;
-  archive.value(checkpoint.journal_bytes);
-  archive.objects(checkpoint.inputs, [](StateReader& a, UsedFile& used) {
-    std::string path;
-    get(a, path);
-    used.path = path;
-    a.value(used.regular);
-    a.value(used.bytes);
-    a.value(used.changed_ns);
-  });
-  archive.list(checkpoint.state);
-  if (!archive.at_end()) StateReader::fail();
+  transfer_checkpoint(archive, checkpoint);
   return checkpoint;
 }
 
@@ -110,8 +125,8 @@ void require_same_scenario(const std::string& recorded, const std::string& given
                   "; resume it without changes, or simulate into another folder");
 }
 
-CheckpointWriter::CheckpointWriter(fs::path recording, RecordJournal& journal)
-    : recording_(std::move(recording)), journal_(journal) {}
+CheckpointWriter::CheckpointWriter(fs::path recording, RecordJournal& journal, Checkpoint origin)
+    : recording_(std::move(recording)), journal_(journal), checkpoint_(std::move(origin)) {}
 
 bool CheckpointWriter::due() const {
   constexpr std::chrono::seconds kShortest{2}, kLongest{60};
@@ -120,22 +135,18 @@ bool CheckpointWriter::due() const {
   return now - last_ >= std::max(share, 50 * cost_);
 }
 
-void CheckpointWriter::save(std::span<const std::byte> state, const std::vector<UsedFile>& inputs) {
+void CheckpointWriter::save(std::vector<std::byte> state) {
+  constexpr int kLevel = -10;  // of Zstandard
   const Clock::time_point before = Clock::now();
+  checkpoint_.journal_bytes = journal_.checkpoint();
+  checkpoint_.state = std::move(state);
   std::vector<std::byte> bytes;
   StateWriter archive(bytes);
-  archive.fixed(kSignature);
-  put(archive, build());
-  archive.value(journal_.checkpoint());
-  archive.objects(inputs, [](StateWriter& a, const UsedFile& used) {
-    put(a, used.path.string());
-    a.value(used.regular);
-    a.value(used.bytes);
-    a.value(used.changed_ns);
-  });
-  archive.list(state);
-  write_file_atomically(state_file(recording_),
-                        std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  archive.text(build());
+  transfer_checkpoint(archive, std::as_const(checkpoint_));
+  std::string frame;
+  compress_zstandard({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, kLevel, frame);
+  write_file_atomically(state_file(recording_), std::string(kSignature) + frame);
   last_ = Clock::now();
   cost_ = last_ - before;
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "esim/compose/provenance.h"
 #include "esim/core/inputs/used_files.h"
 #include "esim/recording/record_journal.h"
 
@@ -18,15 +19,22 @@ namespace esim::inline compose {
 /// records.
 struct Checkpoint {
   std::uint64_t journal_bytes = 0;  ///< of the journal, which belong to it
-  std::vector<UsedFile> inputs;     ///< files that the simulation has read
-  std::vector<std::byte> state;
+  std::vector<std::byte> state{};
+
+  // How the simulation began, for its report.
+  Repetition repetition{};
+  std::filesystem::path working_folder{};
+  std::vector<UsedFile> scenario_files{};
+
+  std::vector<UsedFile> inputs{};  ///< other files that the simulation has read
 };
 
 /// The folder of a recording's checkpoint.
 std::filesystem::path checkpoint_folder(const std::filesystem::path& recording);
 std::filesystem::path journal_file(const std::filesystem::path& recording);
 
-/// Reads the latest checkpoint. Throws UserError if it does not exist, or if another build of esim wrote it.
+/// Reads the latest checkpoint. Throws UserError if it does not exist, is damaged, or if another build of esim wrote
+/// it.
 Checkpoint read_checkpoint(const std::filesystem::path& recording);
 
 /// Throws UserError, naming the file, if an input has changed since the checkpoint.
@@ -38,19 +46,21 @@ void require_same_scenario(const std::string& recorded, const std::string& given
 /// Writes checkpoints: often enough to lose little, seldom enough to cost little.
 class CheckpointWriter {
  public:
-  CheckpointWriter(std::filesystem::path recording, RecordJournal& journal);
+  /// `origin`: of the simulation.
+  CheckpointWriter(std::filesystem::path recording, RecordJournal& journal, Checkpoint origin);
 
   /// Whether it is time for the next one: 2 s after the previous one, more in longer simulations (2 % of the time so
   /// far, up to a minute) and if writing it takes longer than 2 % of that.
   bool due() const;
 
-  void save(std::span<const std::byte> state, const std::vector<UsedFile>& inputs);
+  void save(std::vector<std::byte> state);
 
  private:
   using Clock = std::chrono::steady_clock;
 
   std::filesystem::path recording_;
   RecordJournal& journal_;
+  Checkpoint checkpoint_;
   Clock::time_point began_ = Clock::now(), last_ = began_;
   Clock::duration cost_{};  // of the last one
 };

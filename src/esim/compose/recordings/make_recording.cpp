@@ -3,7 +3,7 @@
 
 #include "esim/compose/compose.h"
 #include "esim/compose/recordings/checkpoints.h"
-#include "esim/files/input_file.h"
+#include "esim/files/folder_plan.h"
 #include "esim/files/output_file.h"
 #include "esim/recording/fan_out.h"
 #include "esim/recording/keep_on_failure.h"
@@ -28,9 +28,8 @@ constexpr const char* kScenarioFile = "scenario.yaml";
 
 /// The checkpoint of a simulation that ended early, if it is one of this scenario.
 Checkpoint checkpoint_of(const std::filesystem::path& recording, const std::string& scenario) {
-  constexpr std::size_t kLongest = std::size_t{1} << 26;
   Checkpoint checkpoint = read_checkpoint(recording);
-  require_same_scenario(read_head(recording / kScenarioFile, kLongest), scenario);
+  require_same_scenario(read_text(recording / kScenarioFile).value_or(""), scenario);
   return checkpoint;
 }
 
@@ -60,17 +59,23 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
   // The directory comes first, so that an existing one is reported before a scene is loaded.
   RecordingDirectory directory =
       options.resume ? RecordingDirectory::resume(options.out) : RecordingDirectory(options.out, options.replace);
-  ProvenanceRecorder provenance(options.repetition);
-  std::vector<UsedFile> inputs;  // except those of the scenario, which is compared itself
-  provenance.add(scenario.files);
+  Checkpoint origin{
+      .repetition = options.repetition, .working_folder = current_folder(), .scenario_files = scenario.files};
+  if (checkpoint) {
+    origin.repetition = checkpoint->repetition;
+    origin.working_folder = checkpoint->working_folder;
+    origin.scenario_files = checkpoint->scenario_files;
+  }
+  ProvenanceRecorder provenance(origin.repetition, origin.working_folder);
+  provenance.add(origin.scenario_files);
   const UsedFilesListener listener([&](const UsedFile& file) {
-    inputs.push_back(file);
+    origin.inputs.push_back(file);
     provenance.add(file);
   });
   const auto cache = open_image_cache(options.images, scenario.renderer, notices.warning);
   World world = build_world(scenario, options.threads, notices, cache);
   if (checkpoint) {
-    require_unchanged(*checkpoint, inputs);
+    require_unchanged(*checkpoint, origin.inputs);
     remove_outputs(directory.path());
   }
   write_file_atomically(directory.path() / kScenarioFile, scenario_text);
@@ -84,14 +89,14 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
   }
   std::optional<CheckpointWriter> writer;
   Checkpoints checkpoints{
-      [&] { return writer->due(); }, [&](std::span<const std::byte> state) { writer->save(state, inputs); }, {}};
+      [&] { return writer->due(); }, [&](std::vector<std::byte> state) { writer->save(std::move(state)); }, {}};
   if (scenario.output.checkpoints && scenario.output.samples == KeptSamples::none) {
     create_folder(checkpoint_folder(directory.path()));
     std::unique_ptr<RecordJournal> journal =
         checkpoint ? std::make_unique<RecordJournal>(journal_file(directory.path()), checkpoint->journal_bytes,
                                                      std::move(sink))
                    : std::make_unique<RecordJournal>(journal_file(directory.path()), std::move(sink));
-    writer.emplace(directory.path(), *journal);
+    writer.emplace(directory.path(), *journal, std::move(origin));
     sink = std::move(journal);
     if (checkpoint) checkpoints.resumed = std::move(checkpoint->state);
   }

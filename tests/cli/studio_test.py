@@ -285,14 +285,14 @@ class Answers(StudioTest):
         events.write_bytes(events.read_bytes()[:events.stat().st_size // 2])
         recording = self.ask("POST", "/api/recordings", {"path": "work/cut"})
         self.assertIn("events.h5", recording["note"])
-        self.assertEqual(recording["cameras"][0]["has"], {"events": False, "images": True, "depth": True, "motion_field": True})
+        self.assertEqual(recording["cameras"][0]["has"], {"events": False, "images": True, "depth": True, "motion_field": True, "samples": False})
         self.ask("GET", f"/api/recordings/{recording['id']}/rate", status=404)
 
     def check_recording(self, path):
         recording = self.ask("POST", "/api/recordings", {"path": path})
         camera = recording["cameras"][0]
         self.assertEqual((camera["width"], camera["height"], recording["incomplete"], recording["indexing"]), (64, 48, False, 1))
-        self.assertEqual(camera["has"], {"events": True, "images": True, "depth": True, "motion_field": True})
+        self.assertEqual(camera["has"], {"events": True, "images": True, "depth": True, "motion_field": True, "samples": False})
         base = f"/api/recordings/{recording['id']}"
         start, end = recording["start"], recording["end"]
         on, off = self.counts(self.ask("GET", f"{base}/rate?bins=7"))
@@ -317,6 +317,46 @@ class Answers(StudioTest):
         self.ask("GET", f"{base}/imu", status=404)
         self.ask("GET", f"{base}/events.bin?camera=none", status=404)
         self.ask("GET", f"{base}/events.bin?from=x", status=400)
+
+    def test_a_recorded_sensor_can_be_changed(self):
+        kept = self.work / "kept"
+        for command in (("simulate", self.work / "small.yaml", "--out", kept, "--set", "output.samples=exact",
+                         "--set", "output.time_unit=ns", "-q"),
+                        ("resense", kept, "--out", self.work / "other", "--set", "event_camera.contrast_threshold=0.15", "-q")):
+            result = run(*command)
+            self.assertEqual(result.returncode, 0, result.stderr)
+        recording = self.ask("POST", "/api/recordings", {"path": "work/kept"})
+        self.assertTrue(recording["cameras"][0]["has"]["samples"])
+        base, span = f"/api/recordings/{recording['id']}", f"from={recording['start']}&to={recording['end']}&max=500000"
+
+        def change(changes, status=200, **more):
+            changes = [{"where": where, "value": value} for where, value in changes.items()]
+            return self.ask("POST", f"{base}/sensor", {"camera": "cam0", "changes": changes, **more}, status)
+
+        def events(query):
+            status, _, binary = self.server.request("GET", f"{base}/events.bin?{span}{query}")
+            self.assertEqual(status, 200)
+            return binary
+
+        recorded = change({})
+        self.assertEqual(recorded["values"]["event_camera"]["refractory_period_us"], 0)
+        self.assertEqual(recorded["values"]["light"], {})
+        self.assertEqual(events(f"&sensor={recorded['sensor']}"), events(""))
+        changed = change({"event_camera.contrast_threshold": 0.15}, replaces=recorded["sensor"])
+        self.assertEqual(changed["values"]["event_camera"]["contrast_threshold"], 0.15)
+        other = self.ask("POST", "/api/recordings", {"path": "work/other"})
+        _, _, whole = self.server.request("GET", f"/api/recordings/{other['id']}/events.bin?{span}")
+        self.assertEqual(events(f"&sensor={changed['sensor']}"), whole)
+        status, headers, png = self.server.request("GET", f"{base}/picture.png?t={recording['end']}&sensor={changed['sensor']}")
+        self.assertEqual((status, png[1:4]), (200, b"PNG"))
+        self.assertGreater(int(headers["X-Events"]), 0)
+        self.ask("GET", f"{base}/events.bin?{span}&sensor={recorded['sensor']}", status=404)
+        for changes, where in (({"event_camera.contrast_threshold": -1}, "event_camera.contrast_threshold"), ({"seed": 3}, "seed"),
+                               ({"event_camera.preset": "none"}, "event_camera.preset"), ({"renderer.image": "/etc/passwd"}, "renderer.image")):
+            self.assertEqual(change(changes, 400)["where"], where)
+        self.ask("POST", f"{base}/sensor", {"camera": "cam0"}, 400)
+        self.ask("POST", f"{base}/sensor", {"camera": "cam9", "changes": []}, 404)
+        self.assertIn("samples", self.ask("POST", f"/api/recordings/{other['id']}/sensor", {"camera": "cam0", "changes": []}, 404)["error"])
 
     def check_other_format(self, path):
         recording = self.ask("POST", "/api/recordings", {"path": path})

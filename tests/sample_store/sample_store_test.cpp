@@ -33,15 +33,15 @@ float random_irradiance(std::uint32_t item, std::uint64_t draw) {
   return static_cast<float>(0.3 + 0.3 * std::sin(item) + 0.01 * u[0]);
 }
 
-/// Portions of the segments of two tiles, side by side, which have samples at different times.
-std::vector<Portion> make_portions(int count) {
+/// Portions of the segments of two tiles, side by side, which have samples at different times, `step` ns apart.
+std::vector<Portion> make_portions(int count, TimeNs step = 1000) {
   const std::array<Tile, 2> tiles{Tile{0, 0, 33, kHeight}, Tile{33, 0, kWidth - 33, kHeight}};
   std::array<TimeNs, 2> done{};
   std::array<std::vector<float>, 2> latest;
   std::vector<Portion> portions;
   for (int i = 0; i < count; ++i) {
     Portion portion;
-    portion.watermark = 1000 * i;
+    portion.watermark = step * i;
     const int segments = i % 4 == 3 ? 0 : 1 + i % 3;
     for (int k = 0; k < segments; ++k) {
       const std::size_t which = static_cast<std::size_t>(i + k) % 2;
@@ -52,7 +52,7 @@ std::vector<Portion> make_portions(int count) {
       const bool begins = latest[which].empty();
       std::vector<float> before = begins ? now : latest[which];
       if (i == 7) before[5] += 1;  // starts elsewhere
-      const TimeNs t1 = begins ? 0 : 1000 * i + k + 1;
+      const TimeNs t1 = begins ? 0 : step * i + k + 1;
       latest[which] = now;
       portion.memory.push_back(std::move(before));
       portion.segments.push_back({tile, begins ? 0 : done[which], t1, {}, {}});
@@ -72,9 +72,9 @@ class SampleStore : public testing::TestWithParam<SamplePrecision> {
  protected:
   std::filesystem::path file() const { return folder_.path() / "samples.esim"; }
 
-  void write(const std::vector<Portion>& portions, int threads = 2, bool finish = true) {
+  void write(const std::vector<Portion>& portions, int threads = 2, bool finish = true, TimeNs end = 1'000'000) {
     const Workers workers(threads);
-    SampleStoreWriter writer(file(), {kWidth, kHeight, 0, 1'000'000, GetParam()});
+    SampleStoreWriter writer(file(), {kWidth, kHeight, 0, end, GetParam()});
     for (const Portion& portion : portions) writer.add(portion.segments, portion.watermark, workers);
     if (finish) writer.finish(workers);
   }
@@ -156,6 +156,79 @@ TEST_P(SampleStore, HasTheSameBytesWithAnyNumberOfThreads) {
   EXPECT_EQ(bytes(), one);
 }
 
+/// A segment as it was read, with the bits of its irradiance.
+struct ReadSegment {
+  Tile tile;
+  TimeNs t0 = 0, t1 = 0;
+  std::vector<std::uint32_t> bits;
+  bool operator==(const ReadSegment&) const = default;
+};
+
+std::vector<ReadSegment> rest_of(SampleStoreReader& reader) {
+  const Workers workers(2);
+  std::vector<ReadSegment> all;
+  while (const auto* const portion = reader.next(workers)) {
+    for (const Segment& segment : portion->segments) {
+      ReadSegment& read = all.emplace_back(ReadSegment{segment.tile, segment.t0, segment.t1, {}});
+      for (const ImageView<float>& image : {segment.irradiance0, segment.irradiance1}) {
+        for (int y = segment.tile.y; y < segment.tile.y + segment.tile.height; ++y) {
+          for (int x = segment.tile.x; x < segment.tile.x + segment.tile.width; ++x)
+            read.bits.push_back(std::bit_cast<std::uint32_t>(image(x, y)));
+        }
+      }
+    }
+  }
+  return all;
+}
+
+TEST_P(SampleStore, BeginsWhereRequested) {
+  constexpr TimeNs kStep = 5 * kNsPerMs, kEnd = 8 * kNsPerSecond;
+  write(make_portions(1400, kStep), 2, true, kEnd);
+  SampleStoreReader complete(file());
+  const std::vector<ReadSegment> all = rest_of(complete);
+  std::size_t most_left_out = 0;
+  for (const TimeNs t :
+       {TimeNs{-5}, TimeNs{0}, kNsPerSecond, 2 * kNsPerSecond, 3'141'592'653, 6 * kNsPerSecond, kEnd}) {
+    SampleStoreReader reader(file(), t % 2 == 0);
+    reader.seek(t);
+    const std::vector<ReadSegment> rest = rest_of(reader);
+    ASSERT_LE(rest.size(), all.size());
+    const std::size_t left_out = all.size() - rest.size();
+    EXPECT_TRUE(std::equal(rest.begin(), rest.end(), all.begin() + static_cast<std::ptrdiff_t>(left_out))) << t;
+    for (std::size_t i = 0; i < left_out; ++i) ASSERT_LE(all[i].t1, t + kStep + 3);  // tiles are ahead by a portion
+    // Key blocks follow each other after half a second, plus the block that is not yet full, which has 1.5 s here.
+    EXPECT_GE(all[left_out].t0 + 3 * kNsPerSecond, std::min(t, all.back().t0));
+    most_left_out = std::max(most_left_out, left_out);
+  }
+  EXPECT_GT(most_left_out, all.size() / 2);
+}
+
+TEST_P(SampleStore, BeginsOnlyInCompleteStores) {
+  const auto sought = [&] {
+    return test::message_of<UserError>([&] {
+      SampleStoreReader reader(file());
+      reader.seek(3 * kNsPerSecond);
+      while (reader.next(workers_) != nullptr) continue;
+    });
+  };
+  const std::vector<Portion> portions = make_portions(400, 10 * kNsPerMs);
+  write(portions, 2, true, 8 * kNsPerSecond);
+  const std::string good = bytes();
+  EXPECT_EQ(sought(), kNoError);
+  for (std::size_t missing = 1; missing < 200; ++missing) {
+    write_bytes(good.substr(0, good.size() - missing));
+    EXPECT_TRUE(test::contains(sought(), "cannot read")) << missing;
+  }
+  for (std::size_t at = good.size() - 100; at < good.size(); ++at) {
+    std::string damaged = good;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x5a);
+    write_bytes(damaged);
+    sought();  // reads or refuses
+  }
+  write(portions, 2, false, 8 * kNsPerSecond);
+  EXPECT_TRUE(test::contains(sought(), "their recording was interrupted"));
+}
+
 TEST_P(SampleStore, MayBeEmpty) {
   write({});
   EXPECT_EQ(read_all(), kNoError);
@@ -171,7 +244,7 @@ TEST_P(SampleStore, RefusesOtherFilesVersionsAndSizes) {
   std::string other = good;
   other[8] = 9;
   write_bytes(other);
-  EXPECT_TRUE(test::contains(read_all(), "its version is 9, but this esim reads version 1; simulate again"));
+  EXPECT_TRUE(test::contains(read_all(), "its version is 9, but this esim reads version 2; simulate again"));
   other = good;
   std::memset(other.data() + 16, 0xff, 4);
   write_bytes(other);

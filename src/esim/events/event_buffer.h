@@ -42,6 +42,7 @@ class EventBuffer {
 
   EventSpan events() const { return {events_, size_}; }
   std::size_t size() const { return size_; }
+  std::size_t capacity() const { return capacity_; }
   void swap(EventBuffer& other) noexcept {
     std::swap(events_, other.events_);
     std::swap(size_, other.size_);

@@ -7,14 +7,28 @@
 namespace esim::inline events {
 namespace {
 
+/// std::merge() of events whose order cannot be predicted: without a branch that depends on it.
 void merge(EventSpan a, EventSpan b, EventBuffer& out) {
-  std::merge(a.begin(), a.end(), b.begin(), b.end(), out.make_room(a.size() + b.size()));
+  Event* next = out.make_room(a.size() + b.size());
+  const Event *first = a.data(), *second = b.data();
+  const Event *const first_end = first + a.size(), *const second_end = second + b.size();
+  while (first != first_end && second != second_end) {
+    bool is_second = second->t < first->t;
+    if (second->t == first->t) [[unlikely]]
+      is_second = *second < *first;
+    *next++ = *(is_second ? second : first);
+    first += is_second ? 0 : 1;
+    second += is_second ? 1 : 0;
+  }
+  std::copy(second, second_end, std::copy(first, first_end, next));
 }
 
 }  // namespace
 
 EventBuffer EventQueue::take_buffer() {
   if (unused_.empty()) return {};
+  const auto largest = std::ranges::max_element(unused_, {}, &EventBuffer::capacity);
+  std::swap(*largest, unused_.back());
   EventBuffer buffer = std::move(unused_.back());
   unused_.pop_back();
   return buffer;

@@ -36,6 +36,7 @@ class OutputFile {
   void close();
 
   const std::filesystem::path& path() const { return path_; }
+  std::uint64_t size() const { return flushed_ + buffer_.size(); }  ///< bytes
 
  private:
   void take_back(std::size_t written);

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cstring>
@@ -16,6 +18,10 @@ namespace esim::inline sample_store {
 namespace {
 
 constexpr int kMaxExtent = 16384;  // px, as in scenarios
+
+/// What files end within.
+constexpr const char* kSamples =
+    "the samples: their recording was interrupted, or the file was truncated; simulate again";
 
 /// Irradiance of consecutive pixels before and after their differences, of which `Planes` bytes are not 0.
 template <std::size_t Planes>
@@ -77,6 +83,7 @@ struct SampleStoreReader::Impl {
     covered = Image<std::uint8_t>(info.width, info.height);
   }
 
+  void seek(TimeNs t);
   bool next_block(const Workers& workers);
   bool read(Block& block, const Workers& workers);
   void read_lists(const BlockHeader& header, std::span<const std::byte> compressed, Block& block);
@@ -93,6 +100,7 @@ struct SampleStoreReader::Impl {
   std::map<std::array<std::uint16_t, 4>, TimeNs> ends;    // of the last segment of each tile
   Image<std::uint8_t> covered;                            // by these tiles
   bool ended = false;
+  bool must_be_key = false;  // the next block
 
   Block current, ahead;  // handed out, and read meanwhile
   Workers one_thread{1};
@@ -165,15 +173,13 @@ void SampleStoreReader::Impl::undo_differences(Rows rows, Block& block) {
 /// Reads the next block; false at the end.
 bool SampleStoreReader::Impl::read(Block& block, const Workers& workers) {
   block_offset = file.offset();
-  const auto header = value_of<BlockHeader>(file.read_exactly(
-      sizeof(BlockHeader), "the samples: their recording was interrupted, or the file was truncated; simulate again"));
+  const auto header = value_of<BlockHeader>(file.read_exactly(sizeof(BlockHeader), kSamples));
   if (header.portions == 0) {
-    if (file.offset() + header.list_bytes + header.plane_bytes[0] + header.plane_bytes[1] + header.plane_bytes[2] +
-            header.plane_bytes[3] !=
-        file.size())
-      damaged("more follows the end");
+    if (file.offset() + header.list_bytes + sizeof(block_offset) != file.size()) damaged("more follows the end");
     return false;
   }
+  if (std::exchange(must_be_key, false) && header.is_key == 0) damaged("it should be a key block");
+  if (header.is_key != 0) last.fill(0);
   const std::uint64_t max_pixels = max_block_pixels(info.width, info.height);
   if (header.portions > kMaxBlockEntries || header.segments > kMaxBlockEntries || header.pixels > max_pixels)
     damaged("its header is invalid");
@@ -225,6 +231,28 @@ bool SampleStoreReader::Impl::read(Block& block, const Workers& workers) {
   return true;
 }
 
+void SampleStoreReader::Impl::seek(TimeNs t) {
+  constexpr std::size_t kOffsetBytes = sizeof(std::uint64_t);
+  file.seek(file.size() - std::min<std::uint64_t>(file.size(), kOffsetBytes));
+  block_offset = value_of<std::uint64_t>(file.read_exactly(kOffsetBytes, kSamples));
+  if (block_offset > file.size() - kOffsetBytes)
+    file.fail(file.size(), fmt::format("the file ends within {}", kSamples));
+  file.seek(block_offset);
+  const auto end = value_of<BlockHeader>(file.read_exactly(sizeof(BlockHeader), kSamples));
+  if (end.portions != 0 || end.segments > kMaxBlockEntries)
+    file.fail(file.size(), fmt::format("the file ends within {}", kSamples));
+  std::vector<KeyEntry> keys(end.segments);
+  const std::span<char> list{reinterpret_cast<char*>(keys.data()), keys.size() * sizeof(KeyEntry)};
+  if (!decompress_zstandard(text_of(file.read_exactly(end.list_bytes, kSamples)), list))
+    damaged("the list of key blocks has another size");
+  const auto later = std::ranges::find_if(keys, [&](const KeyEntry& key) { return key.watermark > t; });
+  if (later == keys.begin()) return file.seek(sizeof(Header));
+  const KeyEntry& key = *std::prev(later);
+  file.seek(key.offset);
+  watermark = key.watermark;
+  must_be_key = true;
+}
+
 /// Makes the next block the current one; false at the end.
 bool SampleStoreReader::Impl::next_block(const Workers& workers) {
   if (!(reading.valid() ? reading.get() : read(ahead, workers))) return false;
@@ -241,6 +269,8 @@ SampleStoreReader::SampleStoreReader(SampleStoreReader&&) noexcept = default;
 SampleStoreReader& SampleStoreReader::operator=(SampleStoreReader&&) noexcept = default;
 
 const SampleStoreInfo& SampleStoreReader::info() const { return impl_->info; }
+
+void SampleStoreReader::seek(TimeNs t) { impl_->seek(t); }
 
 bool SampleStoreReader::has_more() const { return impl_->next_portion < impl_->current.portions.size(); }
 

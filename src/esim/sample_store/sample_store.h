@@ -61,6 +61,11 @@ class SampleStoreReader {
 
   const SampleStoreInfo& info() const;
 
+  /// Before the first next(): begins where reading can, at the last watermark that is at most `t` (ns). The first
+  /// segments of the tiles are then not instants, and begin at different times, since tiles are ahead of the watermark.
+  /// Throws UserError if the store is damaged or incomplete.
+  void seek(TimeNs t);
+
   /// The segments of the next add(), valid until the next call unless has_more(), and its watermark.
   struct Portion {
     std::span<const Segment> segments;

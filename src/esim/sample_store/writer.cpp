@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <limits>
 #include <memory>
 #include <string>
 
@@ -43,20 +42,31 @@ struct SampleStoreWriter::Impl {
     return planes[0].size() >= kUsualBlockPixels || std::max(segments.size(), portions.size()) + 2 >= kMaxBlockEntries;
   }
 
+  void begin_block();
   void add(const Segment& segment);
   void add(const ImageView<float>& irradiance, const Tile& tile);
   void write_block(const Workers& workers);
+  void write_end();
 
   OutputFile file;
   SampleStoreInfo info;
-  TimeNs watermark = std::numeric_limits<TimeNs>::min();  // of the last portion
-  Image<std::uint32_t> last;                              // code of each pixel's latest sample
+  TimeNs watermark = info.start;  // of the last portion
+  Image<std::uint32_t> last;      // code of each pixel's latest sample
+  std::vector<KeyEntry> keys;
 
   // The block.
+  bool is_key = false;
   std::vector<PortionEntry> portions;
   std::vector<SegmentEntry> segments;
   std::array<std::vector<std::uint8_t>, kPlanes> planes;
 };
+
+void SampleStoreWriter::Impl::begin_block() {
+  is_key = keys.empty() || watermark - keys.back().watermark >= kKeyInterval;
+  if (!is_key) return;
+  keys.push_back({watermark, file.size()});
+  last.fill(0);
+}
 
 /// Appends the irradiance of a tile.
 void SampleStoreWriter::Impl::add(const ImageView<float>& irradiance, const Tile& tile) {
@@ -111,12 +121,26 @@ void SampleStoreWriter::Impl::write_block(const Workers& workers) {
   header.pixels = planes[0].size();
   header.list_bytes = static_cast<std::uint32_t>(compressed[kPlanes].size());
   for (std::size_t k = 0; k < kPlanes; ++k) header.plane_bytes[k] = static_cast<std::uint32_t>(compressed[k].size());
+  header.is_key = is_key ? 1 : 0;
   file.append(bytes_of(header));
   for (const std::string& part : compressed) file.append(part);
   file.flush();
   portions.clear();
   segments.clear();
   for (auto& plane : planes) plane.clear();
+}
+
+void SampleStoreWriter::Impl::write_end() {
+  std::string list;
+  compress_zstandard(bytes_of(keys), kLevel, list);
+  BlockHeader header;
+  header.segments = static_cast<std::uint32_t>(keys.size());
+  header.list_bytes = static_cast<std::uint32_t>(list.size());
+  const std::uint64_t offset = file.size();
+  file.append(bytes_of(header));
+  file.append(list);
+  file.append(bytes_of(offset));
+  file.close();
 }
 
 SampleStoreWriter::SampleStoreWriter(const std::filesystem::path& file, const SampleStoreInfo& info)
@@ -126,6 +150,7 @@ SampleStoreWriter::SampleStoreWriter(SampleStoreWriter&&) noexcept = default;
 SampleStoreWriter& SampleStoreWriter::operator=(SampleStoreWriter&&) noexcept = default;
 
 void SampleStoreWriter::add(std::span<const Segment> segments, TimeNs watermark, const Workers& workers) {
+  if (impl_->portions.empty()) impl_->begin_block();
   std::uint64_t count = 0;  // of the portion
   for (const Segment& segment : segments) {
     impl_->add(segment);
@@ -133,6 +158,7 @@ void SampleStoreWriter::add(std::span<const Segment> segments, TimeNs watermark,
     if (!impl_->full()) continue;
     impl_->portions.push_back({impl_->watermark, count});  // divided: the rest follows with the new watermark
     impl_->write_block(workers);
+    impl_->begin_block();
     count = 0;
   }
   impl_->portions.push_back({watermark, count});
@@ -142,8 +168,7 @@ void SampleStoreWriter::add(std::span<const Segment> segments, TimeNs watermark,
 
 void SampleStoreWriter::finish(const Workers& workers) {
   if (!impl_->portions.empty()) impl_->write_block(workers);
-  impl_->write_block(workers);  // an empty one is the end
-  impl_->file.close();
+  impl_->write_end();
 }
 
 }  // namespace esim::inline sample_store

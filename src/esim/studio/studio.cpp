@@ -68,11 +68,12 @@ struct Studio::Impl {
         access(token, given.host, server.port()) {
     add_files(router, roots, options);
     add_scenarios(router, roots);
-    const Workshop workshop{roots, scenes, runs, recordings};
+    const Workshop workshop{roots, scenes, runs, recordings, sensors, options.threads};
     add_scenes(router, workshop);
     add_motion(router, workshop);
     add_runs(router, workshop);
     add_recordings(router, workshop);
+    add_sensors(router, workshop);
     add_pages(router, options.pages);
     server.start([this](const RequestHead& head) { return access.answer(head); },
                  [this](const Request& request) { return router.answer(request); });
@@ -99,6 +100,7 @@ struct Studio::Impl {
   SceneStore scenes;
   Runs runs;
   Recordings recordings;
+  SensorPreviews sensors;
   HttpServer server;
   Access access;
   Router router;

@@ -135,12 +135,14 @@ export async function getBytes(path: string, query: Query, signal?: AbortSignal)
   return (await request(url(path, query), { signal: signal ?? null })).arrayBuffer();
 }
 
-/** An image and its time (X-Time-Ns), if the server gives it. */
-export async function getPicture(
-  path: string,
-  query: Query,
-  signal?: AbortSignal,
-): Promise<{ picture: ImageBitmap; time_ns: number | null }> {
+/** An image, its time (X-Time-Ns) and its number of events (X-Events), if the server gives them. */
+export interface Picture {
+  picture: ImageBitmap;
+  time_ns: number | null;
+  events: number | null;
+}
+
+export async function getPicture(path: string, query: Query, signal?: AbortSignal): Promise<Picture> {
   return asPicture(await request(url(path, query), { signal: signal ?? null }));
 }
 
@@ -154,7 +156,11 @@ export async function postForPicture(path: string, body: unknown, signal?: Abort
   return (await asPicture(answer)).picture;
 }
 
-async function asPicture(answer: Response): Promise<{ picture: ImageBitmap; time_ns: number | null }> {
-  const time = answer.headers.get("X-Time-Ns");
-  return { picture: await createImageBitmap(await answer.blob()), time_ns: time === null ? null : Number(time) };
+async function asPicture(answer: Response): Promise<Picture> {
+  const number = (name: string) => (answer.headers.has(name) ? Number(answer.headers.get(name)) : null);
+  return {
+    picture: await createImageBitmap(await answer.blob()),
+    time_ns: number("X-Time-Ns"),
+    events: number("X-Events"),
+  };
 }

@@ -1,6 +1,7 @@
 import { getBytes, getJson, getPicture, postForPicture, sendJson } from "./http.ts";
 import { parseEvents, type EventCloud } from "./events_bin.ts";
 import type {
+  ChangedSensor,
   FileEntry,
   ImuData,
   Pose,
@@ -58,6 +59,8 @@ export interface PictureQuery {
   view: "onoff" | "counts" | "time_surface";
   over: "image" | "none";
   theme: "light" | "dark";
+  /** A changed sensor. */
+  sensor?: string | undefined;
 }
 const recording = (id: string, rest: string) => `/api/recordings/${id}/${rest}`;
 export const eventPicture = (id: string, query: PictureQuery, signal?: AbortSignal) =>
@@ -79,13 +82,25 @@ export const events = async (
   from: number,
   to: number,
   max: number,
-  signal?: AbortSignal,
+  sensor: string | null,
 ): Promise<EventCloud> =>
   parseEvents(
-    await getBytes(recording(id, "events.bin"), { camera, from: Math.round(from), to: Math.round(to), max }, signal),
+    await getBytes(recording(id, "events.bin"), {
+      camera,
+      from: Math.round(from),
+      to: Math.round(to),
+      max,
+      sensor: sensor ?? undefined,
+    }),
   );
 export const rate = (id: string, camera: string, bins: number) =>
   getJson<Rate>(recording(id, "rate"), { camera, bins });
+export const changeSensor = (
+  id: string,
+  camera: string,
+  changes: { where: string; value: unknown }[],
+  replaces: string | null,
+) => sendJson<ChangedSensor>("POST", recording(id, "sensor"), { camera, changes, replaces });
 export const imu = (id: string, from: number, to: number, max: number) =>
   getJson<ImuData>(recording(id, "imu"), { from, to, max });
 export const poses = (id: string, from: number, to: number, max: number) =>

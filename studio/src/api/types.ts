@@ -132,7 +132,7 @@ export interface RecordingInfo {
     width: number;
     height: number;
     events: number;
-    has: { events: boolean; images: boolean; depth: boolean; motion_field: boolean };
+    has: { events: boolean; images: boolean; depth: boolean; motion_field: boolean; samples: boolean };
     /** The range of the depth colours [m]. */
     depth_m?: [number, number];
     /** The speed at which the colour saturates. */
@@ -141,6 +141,15 @@ export interface RecordingInfo {
   imu: boolean;
   poses: boolean;
   indexing?: number;
+}
+
+/** An event sensor of a recording with other options. */
+export interface ChangedSensor {
+  sensor: string;
+  /** All options, with the changes. */
+  values: JsonMap;
+  /** Why its events are not exact. */
+  inexact?: string;
 }
 
 /** Events per second in bins; there is one more edge than bins. */

@@ -3,18 +3,19 @@ import type { Json, Preset, SchemaNode } from "../api/types.ts";
 import type { ScenarioDocument } from "../document/document.ts";
 import { problemEntries } from "../document/problems.ts";
 import { getIn } from "../document/values.ts";
+import type { FieldView, FormContext } from "../form/field.ts";
+import { makeField } from "../form/fields.ts";
+import { findOptions, type Hit } from "../form/search.ts";
 import { button, h } from "../ui/dom.ts";
 import type { Place } from "../ui/place.ts";
 import { addShortcuts } from "../ui/shortcuts.ts";
 import { complain } from "../ui/status.ts";
-import { type FieldView, type FormContext, idOf } from "./field.ts";
-import { makeField } from "./fields.ts";
-import { findOptions, type Hit } from "./search.ts";
 import type { YamlEditor } from "./yaml_editor.ts";
 
 /** Options at the top of the scenario, without a group. */
 const general = "general";
 const max_hits = 40;
+const idOf = (where: string) => `option-${where.replaceAll(".", "-")}`;
 
 /** Every option of the scenario as a form, next to its text. */
 export class ConfigurePlace implements Place {
@@ -43,7 +44,7 @@ export class ConfigurePlace implements Place {
     private document: ScenarioDocument,
     chooseFile: () => Promise<string | null>,
   ) {
-    this.context = { document, chooseFile, defaultOf: (where, node) => this.defaultOf(where, node) };
+    this.context = { document, idOf, chooseFile, defaultOf: (where, node) => this.defaultOf(where, node) };
     this.element = h(
       "main",
       { class: "place configure", attrs: { "aria-label": "Configure" } },

@@ -113,6 +113,10 @@ export class ScenarioDocument {
     return getIn(this.values, where);
   }
 
+  isGiven(where: string): boolean {
+    return this.get(where) !== undefined;
+  }
+
   /** The current text for requests. */
   source(): server.Source {
     return { yaml: this.revision.yaml, dir: this.dir };

@@ -44,5 +44,6 @@ export function factsOf(slot: Slot, options: FactsOptions): HTMLElement[] {
     h("dl", {}, ...rows.flatMap(([name, value]) => [h("dt", { text: name }), h("dd", {}, value)])),
     ...(info.incomplete ? [h("p", { class: "badge warn", text: "incomplete: it was cancelled or interrupted" })] : []),
     ...(info.note ? [h("p", { class: "quiet", text: info.note })] : []),
+    ...(slot.sensorPanel ? [slot.sensorPanel.element] : []),
   ];
 }

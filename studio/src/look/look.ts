@@ -20,7 +20,7 @@ export class LookPlace implements Place {
   opened: (paths: string[]) => void = () => undefined;
   private display: Display = { view: "onoff", over: "image", window: 20e6, span: 200e6 };
   private clock = new Clock();
-  private slots = [0, 1].map(() => new Slot(this.display, () => this.refresh()));
+  private slots = [0, 1].map((index) => new Slot(index, this.display, () => this.refresh()));
   private kinds = new Set<TileKind>(["events", "space"]);
   private tiles = h("div", { class: "tiles" });
   private plot = new TimePlot("Time of the recording; arrow keys step, Home and End jump");

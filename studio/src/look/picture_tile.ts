@@ -1,7 +1,7 @@
 import * as server from "../api/server.ts";
 import { ApiError } from "../api/http.ts";
 import { h } from "../ui/dom.ts";
-import { seconds, shortNumber } from "../ui/format.ts";
+import { count, duration, seconds, shortNumber } from "../ui/format.ts";
 import { complain } from "../ui/status.ts";
 import { theme } from "../ui/theme.ts";
 import { Latest } from "./latest.ts";
@@ -32,13 +32,13 @@ export class PictureTile implements Tile {
   }
 
   private async load(time: number): Promise<void> {
-    const { recording, camera } = this.source;
+    const { recording, camera, sensor } = this.source;
     const t = Math.round(recording.start + time);
     const { view, over, window } = this.display;
-    const key = this.kind === "events" ? JSON.stringify([t, view, over, window, theme.value]) : String(t);
+    const key = this.kind === "events" ? JSON.stringify([t, view, over, window, theme.value, sensor]) : String(t);
     if (key === this.shown) return;
     try {
-      const { picture, time_ns } =
+      const { picture, time_ns, events } =
         this.kind === "events"
           ? await server.eventPicture(recording.id, {
               camera: camera.name,
@@ -47,6 +47,7 @@ export class PictureTile implements Tile {
               view,
               over: camera.has.images ? over : "none",
               theme: theme.value,
+              sensor: sensor ?? undefined,
             })
           : await server.image(recording.id, camera.name, this.kind, t);
       this.shown = key;
@@ -57,10 +58,13 @@ export class PictureTile implements Tile {
       this.canvas.getContext("2d")!.drawImage(picture, 0, 0);
       picture.close();
       this.caption.textContent =
-        this.kind === "events" || time_ns === null
-          ? tileNames[this.kind]
-          : `${tileNames[this.kind]} of ${seconds(time_ns - recording.start)}${this.scale()}`;
+        events !== null && view !== "time_surface"
+          ? `${count(events)} events in ${duration(window)}${sensor === null ? "" : " of the changed sensor"}`
+          : this.kind === "events" || time_ns === null
+            ? tileNames[this.kind]
+            : `${tileNames[this.kind]} of ${seconds(time_ns - recording.start)}${this.scale()}`;
     } catch (error) {
+      if (sensor !== this.source.sensor) return; // it was replaced meanwhile, and the next request has the new one
       if (error instanceof ApiError && error.status === 404)
         this.caption.textContent = `${tileNames[this.kind]}: none yet`;
       else complain(error);

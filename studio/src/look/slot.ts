@@ -5,7 +5,8 @@ import { complain } from "../ui/status.ts";
 import { PathTile } from "./path_tile.ts";
 import { PictureTile } from "./picture_tile.ts";
 import { SpaceTile } from "./space_tile.ts";
-import { type Display, has, type Tile, type TileKind } from "./tiles.ts";
+import { SensorPanel } from "./sensor_panel.ts";
+import { type Display, has, type Tile, type TileKind, type TileSource } from "./tiles.ts";
 
 const rate_bins = 800;
 const imu_values = 1500;
@@ -18,11 +19,15 @@ export class Slot {
   rate: Rate | null = null;
   imu: ImuData | null = null;
   cameraIndex = 0;
+  /** For recordings with samples. */
+  sensorPanel: SensorPanel | null = null;
+  private source: TileSource | null = null;
   private tiles = new Map<TileKind, Tile>();
   private time = 0;
 
   /** `changed` is called when information about the recording changes. */
   constructor(
+    private index: number,
     private display: Display,
     private changed: () => void,
   ) {}
@@ -41,6 +46,7 @@ export class Slot {
     this.info = info;
     const withEvents = info.cameras.findIndex((camera) => camera.has.events);
     this.cameraIndex = Math.max(0, withEvents);
+    this.begin();
     this.changed();
     void this.measure(info);
   }
@@ -49,7 +55,22 @@ export class Slot {
     for (const tile of this.tiles.values()) tile.dispose();
     this.tiles.clear();
     this.element.replaceChildren();
-    this.info = this.rate = this.imu = null;
+    this.info = this.rate = this.imu = this.source = this.sensorPanel = null;
+  }
+
+  /** For the chosen camera. */
+  private begin(): void {
+    const [recording, camera] = [this.info!, this.camera!];
+    this.source = { recording, camera, sensor: null };
+    this.sensorPanel = camera.has.samples
+      ? new SensorPanel(recording, camera.name, (sensor) => this.showSensor(sensor), this.index)
+      : null;
+  }
+
+  private showSensor(sensor: string | null): void {
+    if (!this.source) return;
+    this.source.sensor = sensor;
+    this.show(this.time);
   }
 
   chooseCamera(index: number): void {
@@ -59,6 +80,7 @@ export class Slot {
     this.tiles.clear();
     this.cameraIndex = index;
     this.rate = null;
+    this.begin();
     this.changed();
     void this.measure(info);
   }
@@ -101,7 +123,7 @@ export class Slot {
   }
 
   private make(kind: TileKind): Tile {
-    const source = { recording: this.info!, camera: this.camera! };
+    const source = this.source!;
     if (kind === "space") return new SpaceTile(source, this.display);
     if (kind === "path") return new PathTile(source);
     return new PictureTile(source, kind, this.display);

@@ -45,6 +45,7 @@ export class SpaceTile implements Tile {
   private pictureCanvas = document.createElement("canvas");
   private pictureTime: number | null = null;
   private shown = "";
+  private labelled = 0;
   private queue = new Latest<number>((time) => this.load(time));
   private aspect: number;
   private stopTheme: () => void;
@@ -109,6 +110,7 @@ export class SpaceTile implements Tile {
   }
 
   private label(): void {
+    this.labelled = this.display.span;
     for (const sprite of this.labels) this.stage.scene.remove(sprite);
     const { camera } = this.source;
     const z = -this.aspect / 2 - 0.08;
@@ -138,20 +140,21 @@ export class SpaceTile implements Tile {
   }
 
   private async load(time: number): Promise<void> {
-    const { recording, camera } = this.source;
+    const { recording, camera, sensor } = this.source;
     const to = recording.start + time;
     const from = Math.max(recording.start, to - this.display.span);
-    const key = `${from} ${to} ${this.display.over}`;
+    const key = `${from} ${to} ${this.display.over} ${sensor}`;
     if (key === this.shown) return;
-    if (!this.shown.endsWith(` ${this.display.span}`)) this.label();
+    if (this.labelled !== this.display.span) this.label();
     try {
-      const cloud = await server.events(recording.id, camera.name, from, to, max_points);
+      const cloud = await server.events(recording.id, camera.name, from, to, max_points, sensor);
       this.fill(cloud, to);
       this.shown = key;
       const thinned = cloud.total > cloud.x.length ? `, of which ${count(cloud.x.length)} are shown` : "";
       this.caption.textContent = `${count(cloud.total)} events in ${duration(to - from)}${thinned}`;
       await this.loadPicture(to);
     } catch (error) {
+      if (sensor !== this.source.sensor) return; // it was replaced meanwhile, and the next request has the new one
       complain(error);
     }
     this.stage.invalidate();

@@ -31,6 +31,8 @@ export interface Tile {
 export interface TileSource {
   recording: RecordingInfo;
   camera: RecordingInfo["cameras"][number];
+  /** The changed sensor whose events are shown; null: the recorded ones. */
+  sensor: string | null;
 }
 
 /** Whether a recording can show a tile. */

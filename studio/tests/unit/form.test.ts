@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { rangeText, readValue, relativePath } from "../../src/configure/field_text.ts";
+import { rangeText, readValue, relativePath } from "../../src/form/field_text.ts";
 import { diffLines } from "../../src/ui/diff.ts";
 import { readAddress, writeAddress } from "../../src/ui/address.ts";
 

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import type { SchemaNode } from "../../src/api/types.ts";
-import { findOptions } from "../../src/configure/search.ts";
+import { findOptions } from "../../src/form/search.ts";
 
 const schema: SchemaNode[] = [
   { name: "seed", kind: "integer", help: "of all noise" },

@@ -1,6 +1,7 @@
 #include "esim/compose/samples/stored_samples.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -15,12 +16,16 @@ class NoRenderer final : public ProcessorRenderer {
   void compute(std::span<const RenderRequest>, Sample&) const override {}
 };
 
+/// The tiles of a sampler are ahead of each other by its longest interval, which is usually shorter.
+constexpr TimeNs kMostAhead = kNsPerSecond / 4;
+
 /// Requests a sample of nothing for each group of portions of a store. Few large groups are faster than many small
 /// ones.
 class StoredSampler final : public Sampler {
  public:
-  StoredSampler(SampleStoreReader store, const Workers& workers)
-      : store_(std::move(store)), workers_(workers), watermark_(store_.info().start) {
+  StoredSampler(SampleStoreReader store, TimeNs begin, const Workers& workers)
+      : store_(std::move(store)), workers_(workers), begin_(begin), watermark_(store_.info().start) {
+    if (begin > store_.info().start) store_.seek(begin - kMostAhead);
     read_group();
   }
 
@@ -48,7 +53,7 @@ class StoredSampler final : public Sampler {
     do {
       const SampleStoreReader::Portion* const portion = store_.next(workers_);
       if (portion == nullptr) break;
-      segments_.insert(segments_.end(), portion->segments.begin(), portion->segments.end());
+      for (const Segment& segment : portion->segments) add(segment);
       group_watermark_ = portion->watermark;
       has_group_ = true;
     } while (store_.has_more());
@@ -59,9 +64,21 @@ class StoredSampler final : public Sampler {
     request_.tiles = {{0, 0, 1, 1}};
   }
 
+  void add(const Segment& segment) {
+    if (begin_ > store_.info().start) {
+      if (segment.t1 <= begin_) return;
+      const bool is_first = begun_.emplace(segment.tile.x, segment.tile.y).second;
+      if (is_first && segment.t0 != segment.t1)
+        segments_.push_back({segment.tile, segment.t0, segment.t0, segment.irradiance0, segment.irradiance0});
+    }
+    segments_.push_back(segment);
+  }
+
   SampleStoreReader store_;
   const Workers& workers_;
-  std::vector<Segment> segments_;  // of the group
+  TimeNs begin_;
+  std::set<std::pair<int, int>> begun_;  // tiles, if it begins later than the store
+  std::vector<Segment> segments_;        // of the group
   TimeNs group_watermark_ = 0;
   bool has_group_ = false;
   bool handed_out_ = false;  // its segments are in use
@@ -90,7 +107,12 @@ std::unique_ptr<Sampler> make_no_sampler(TimeNs end) { return std::make_unique<N
 std::unique_ptr<Renderer> make_no_renderer() { return std::make_unique<NoRenderer>(); }
 
 std::unique_ptr<Sampler> make_stored_sampler(SampleStoreReader store, const Workers& workers) {
-  return std::make_unique<StoredSampler>(std::move(store), workers);
+  const TimeNs start = store.info().start;
+  return make_stored_sampler(std::move(store), start, workers);
+}
+
+std::unique_ptr<Sampler> make_stored_sampler(SampleStoreReader store, TimeNs begin, const Workers& workers) {
+  return std::make_unique<StoredSampler>(std::move(store), begin, workers);
 }
 
 }  // namespace esim::inline compose

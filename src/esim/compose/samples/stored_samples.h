@@ -18,4 +18,7 @@ std::unique_ptr<Sampler> make_no_sampler(TimeNs end);
 /// A sampler whose segments come from a store. The workers must outlive it.
 std::unique_ptr<Sampler> make_stored_sampler(SampleStoreReader store, const Workers& workers);
 
+/// The same from a time (ns) on: each tile begins with its first segment that ends after `begin`.
+std::unique_ptr<Sampler> make_stored_sampler(SampleStoreReader store, TimeNs begin, const Workers& workers);
+
 }  // namespace esim::inline compose

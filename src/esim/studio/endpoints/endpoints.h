@@ -2,6 +2,7 @@
 
 #include "esim/studio/recordings/recordings.h"
 #include "esim/studio/recordings/runs.h"
+#include "esim/studio/recordings/sensor_previews.h"
 #include "esim/studio/roots.h"
 #include "esim/studio/scene_view/scenes.h"
 #include "esim/studio/server/router.h"
@@ -16,6 +17,8 @@ struct Workshop {
   SceneStore& scenes;
   Runs& runs;
   Recordings& recordings;
+  SensorPreviews& sensors;
+  int threads;  ///< 0: every processor
 };
 
 // Each function adds the routes of its topic; docs/studio-api.md lists them.
@@ -26,5 +29,6 @@ void add_scenes(Router& router, const Workshop& workshop);
 void add_motion(Router& router, const Workshop& workshop);
 void add_runs(Router& router, const Workshop& workshop);
 void add_recordings(Router& router, const Workshop& workshop);
+void add_sensors(Router& router, const Workshop& workshop);
 
 }  // namespace esim::studio

@@ -33,23 +33,28 @@ std::int64_t number_in(const Request& request, const char* name, std::int64_t ot
 }
 
 struct Asked {
+  const SensorPreviews& sensors;
   std::shared_ptr<OpenRecording> recording;
   std::shared_ptr<const RecordingView> view;
 };
 
-Asked asked(const Request& request, const Recordings& recordings) {
-  auto recording = recordings.find(request.captured.front());
+Asked asked(const Request& request, const Workshop& workshop) {
+  auto recording = workshop.recordings.find(request.captured.front());
   auto view = recording->view();
-  return {std::move(recording), std::move(view)};
+  return {workshop.sensors, std::move(recording), std::move(view)};
 }
 
 const CameraView& camera_in(const Request& request, const Asked& asked) {
   return asked.view->camera(text_in(request, "camera", ""));
 }
 
-const EventStore& events_of(const CameraView& camera) {
+/// The recorded events of a camera, or those of the changed sensor that the request names, with from <= t <= to.
+std::shared_ptr<const EventStore> events_of(const Request& request, const Asked& asked, const CameraView& camera,
+                                            TimeNs from, TimeNs to) {
+  const std::string sensor = text_in(request, "sensor", "");
+  if (!sensor.empty()) return store_of(asked.sensors.find(sensor)->events(from, to));
   if (camera.events == nullptr) throw HttpError(404, camera.info.name + ": has no events");
-  return *camera.events;
+  return {asked.view, camera.events.get()};
 }
 
 Json recording_json(const std::string& id, const std::string& path, const OpenRecording& recording) {
@@ -75,7 +80,8 @@ Json recording_json(const std::string& id, const std::string& path, const OpenRe
                                 {{"events", camera.events != nullptr},
                                  {"images", !camera.images.empty()},
                                  {"depth", camera.depth},
-                                 {"motion_field", camera.motion_field}}}});
+                                 {"motion_field", camera.motion_field},
+                                 {"samples", camera.samples}}}});
     if (camera.depth) json["cameras"].back()["depth_m"] = {camera.depth_scale.near_m(), camera.depth_scale.far_m()};
     if (camera.motion_field) json["cameras"].back()["motion_px_per_s"] = camera.motion_scale.full_px_per_s();
   }
@@ -119,7 +125,6 @@ Response picture(const Request& request, const Asked& asked) {
   constexpr double kWindowsPerTau = 1.5;
   constexpr TimeNs kTausSeen = 5, kDefaultWindow = 20 * kNsPerMs, kMaxWindow = 3600 * kNsPerSecond;
   const CameraView& camera = camera_in(request, asked);
-  const EventStore& store = events_of(camera);
   const Camera& model = camera.info.model;
   if (model.width == 0) throw HttpError(404, camera.info.name + ": has no events");
   const TimeNs t = number_in(request, "t", asked.view->span().start, -kMaxTime, kMaxTime);
@@ -127,9 +132,10 @@ Response picture(const Request& request, const Asked& asked) {
   const std::string view = text_in(request, "view", "counts");
   const bool surface = view == "time_surface";
   const TimeNs shown = surface ? static_cast<TimeNs>(kWindowsPerTau * static_cast<double>(kTausSeen * window)) : window;
-  EventStore::Range range = store.find(t - shown + 1, t + 1);
+  const auto store = events_of(request, asked, camera, t - shown + 1, t);
+  EventStore::Range range = store->find(t - shown + 1, t + 1);
   range.first = std::max(range.first, range.end - std::min(range.end, kMaxEvents));
-  const std::vector<Event> events = store.read(range.first, range.end - range.first);
+  const std::vector<Event> events = store->read(range.first, range.end - range.first);
   const PictureGrid grid = picture_grid({model.width, model.height}, model.width, model.height);
   Image<Rgb> image;
   if (surface) {
@@ -184,12 +190,12 @@ Response events(const Request& request, const Asked& asked) {
   constexpr std::int64_t kMaxEvents = 500'000;
   constexpr TimeNs kLongestSpan = 0xffff'ffff;  // ns from the start, in 32 bits
   const CameraView& camera = camera_in(request, asked);
-  const EventStore& store = events_of(camera);
   const TimeNs from = number_in(request, "from", asked.view->span().start, -kMaxTime, kMaxTime);
   const TimeNs to = number_in(request, "to", from + 100 * kNsPerMs, from, from + kLongestSpan);
   const auto max = static_cast<std::uint64_t>(number_in(request, "max", 100'000, 1, kMaxEvents));
-  const EventStore::Range range = store.find(from, to + 1);
-  const std::vector<Event> shown = store.thinned(range, max);
+  const auto store = events_of(request, asked, camera, from, to);
+  const EventStore::Range range = store->find(from, to + 1);
+  const std::vector<Event> shown = store->thinned(range, max);
   Response response;
   response.content_type = "application/octet-stream";
   constexpr std::size_t kHead = 24, kEach = 8;
@@ -211,7 +217,7 @@ Response rate(const Request& request, const Asked& asked) {
   const TimeNs from = number_in(request, "from", span.start, -kMaxTime, kMaxTime);
   const TimeNs to = std::max(from + 1, number_in(request, "to", span.end + 1, -kMaxTime, kMaxTime));
   const auto bins = static_cast<std::size_t>(number_in(request, "bins", 500, 1, 10'000));
-  const EventRate counted = events_of(camera_in(request, asked)).rate(from, to, bins);
+  const EventRate counted = events_of(request, asked, camera_in(request, asked), from, to)->rate(from, to, bins);
   Json on = Json::array(), off = on;
   for (std::size_t i = 0; i < counted.on.size(); ++i) {
     const double width_s = to_seconds(counted.edges[i + 1] - counted.edges[i]);
@@ -294,9 +300,8 @@ void add_recordings(Router& router, const Workshop& workshop) {
     return json_response(recording_json(id, "", *workshop.recordings.find(id)));
   });
   const auto add = [&](const char* name, Response (*answer)(const Request&, const Asked&)) {
-    router.add("GET", std::string("/api/recordings/*/") + name, [workshop, answer](const Request& request) {
-      return answer(request, asked(request, workshop.recordings));
-    });
+    router.add("GET", std::string("/api/recordings/*/") + name,
+               [workshop, answer](const Request& request) { return answer(request, asked(request, workshop)); });
   };
   add("picture.png", picture);
   add("image.png", image);

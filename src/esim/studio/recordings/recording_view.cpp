@@ -131,6 +131,7 @@ void RecordingView::open_camera(const fs::path& folder, CameraInfo info) {
   const fs::path lens = camera.info.lens < 0 ? folder : folder.parent_path();  // an event sensor shows its images
   attempt([&] { open_images(lens, camera); });
   if (has_file(lens / "truth.h5")) attempt([&] { open_truth(lens / "truth.h5", camera); });
+  camera.samples = has_file(lens / "samples.esim") && has_file(folder_ / "scenario.yaml");
   attempt([&] { learn_size(camera); });
   cameras_.push_back(std::move(camera));
 }

@@ -29,6 +29,7 @@ struct CameraView {
   std::unique_ptr<TruthHdf5Reader> truth{};  ///< null: none
   std::vector<TimeNs> truth_times{};
   bool depth = false, motion_field = false;
+  bool samples = false;  ///< of its pixels, for other sensors
   DepthScale depth_scale{};
   MotionScale motion_scale{};
 };

@@ -30,7 +30,7 @@ fs::path new_folder() {
 
 }  // namespace
 
-OpenRecording::OpenRecording(const fs::path& path) : format_(format_of(path).name) {
+OpenRecording::OpenRecording(const fs::path& path) : path_(path), format_(format_of(path).name) {
   if (RecordingView::takes(path)) {
     view_ = std::make_shared<const RecordingView>(path);
     return;
@@ -38,7 +38,7 @@ OpenRecording::OpenRecording(const fs::path& path) : format_(format_of(path).nam
   view_ = RecordingView::beginning_of(path);
   indexed_ = 0;
   folder_ = new_folder();
-  thread_ = std::thread([this, path] { copy(path); });
+  thread_ = std::thread([this] { copy(); });
 }
 
 OpenRecording::~OpenRecording() {
@@ -48,14 +48,14 @@ OpenRecording::~OpenRecording() {
   if (!folder_.empty()) fs::remove_all(folder_, error);
 }
 
-void OpenRecording::copy(const fs::path& path) {
+void OpenRecording::copy() {
   std::string problem;
   try {
     const fs::path copy = folder_ / "recording";
     ConvertOptions options;
     options.copy.write = {TimeUnit::ns, Compression::none};  // fast, and without rounding of times
     options.read.recover = [&](const std::string& what) { problem = what; };
-    convert_recording(path, format_named("recording"), copy, options, [&](double share) {
+    convert_recording(path_, format_named("recording"), copy, options, [&](double share) {
       indexed_ = 0.99 * share;
       return !stop_;
     });

@@ -27,6 +27,7 @@ class OpenRecording {
   /// The part that is available now.
   std::shared_ptr<const RecordingView> view() const;
 
+  const std::filesystem::path& path() const { return path_; }
   const std::string& format() const { return format_; }
 
   /// The converted fraction; 1 if complete or if no conversion is needed.
@@ -36,8 +37,9 @@ class OpenRecording {
   std::string problem() const;
 
  private:
-  void copy(const std::filesystem::path& path);
+  void copy();
 
+  std::filesystem::path path_;
   std::string format_;
   std::filesystem::path folder_;  // of the copy; empty without a copy
   std::atomic<double> indexed_{1};

@@ -94,3 +94,43 @@ test("a recording of another format beside it", async () => {
   await shot(page, "look-two-light");
   await page.emulateMedia({ colorScheme: "dark" });
 });
+
+test("the sensor of a recording with samples is changed, and its new events appear within a second", async () => {
+  const { page } = main;
+  const kept = join(files.folder, "kept");
+  esim("simulate", join(files.folder, "walk.yaml"), "--out", kept, "--set", "output.samples=true");
+  await visit(page, server, "#/look?recording=project/kept");
+  const caption = page.locator(".look figcaption").first();
+  const shownEvents = async () => Number((await caption.textContent()).replace(/ events.*/, "").replace(/\D/g, ""));
+  await until(async () => /events in/.test(await caption.textContent()), "the recorded events");
+  const recorded = await shownEvents();
+  await page.getByText("Change the sensor").click();
+  const form = page.locator(".sensor-form");
+  const threshold = form.getByLabel("event_camera.contrast_threshold", { exact: true });
+  await threshold.waitFor();
+  await threshold.fill("0.1");
+  const begin = Date.now();
+  await threshold.press("Enter");
+  await until(async () => /of the changed sensor/.test(await caption.textContent()), "the new events");
+  const took_ms = Date.now() - begin;
+  assert.ok(took_ms < 1000, `${took_ms} ms`);
+  assert.ok((await shownEvents()) > 1.5 * recorded, "a lower threshold has more events");
+  const command = await page.locator(".sensor-command").textContent();
+  assert.match(command, /^esim resense project\/kept --out .* --set event_camera.contrast_threshold=0.1$/);
+  await shot(page, "look-sensor-dark");
+  assert.deepEqual(await cramped(page), []);
+
+  await threshold.fill("-1");
+  await threshold.press("Enter");
+  assert.equal(await threshold.getAttribute("aria-invalid"), "true");
+  assert.match(await form.locator(".problem:not(:empty)").textContent(), /must be/);
+  await page.getByLabel("Search the options of the sensor").fill("refractory");
+  await until(async () => (await form.locator(".option").count()) > 0, "options that were found");
+  assert.equal(await threshold.count(), 0);
+  await page.getByLabel("Search the options of the sensor").fill("");
+  await form.getByLabel("event_camera.preset").selectOption("davis346");
+  await until(async () => !/threshold=/.test(await page.locator(".sensor-command").textContent()), "the preset");
+  await page.getByRole("button", { name: "Back to the recorded sensor" }).click();
+  await until(async () => /events in 20.ms$/.test(await caption.textContent()), "the recorded events");
+  assert.equal(await shownEvents(), recorded);
+});

@@ -1,7 +1,7 @@
 import type { Json, SchemaNode } from "../api/types.ts";
 import { button, h } from "../ui/dom.ts";
 import { shortNumber } from "../ui/format.ts";
-import { type FieldView, type FormContext, idOf } from "./field.ts";
+import type { FieldView, FormContext } from "./field.ts";
 import { rangeText, readValue, relativePath, valueText } from "./field_text.ts";
 
 /** One value: text, a check box or a choice. */
@@ -18,7 +18,7 @@ export class LeafField implements FieldView {
     private where: string,
     private context: FormContext,
   ) {
-    const id = idOf(where);
+    const id = context.idOf(where);
     const control = this.makeControl(id);
     this.reset = button("", () => this.set(null), { icon: "undo", class: "plain small", title: "Back to the default" });
     const range = rangeText(node);
@@ -148,8 +148,9 @@ export class LeafField implements FieldView {
       input.placeholder =
         (typeof held === "number" ? shortNumber(held) : preset) || (this.node.optional ? "unset" : "");
     });
-    this.element.classList.toggle("given", value !== undefined);
-    this.reset.classList.toggle("unseen", value === undefined && !refused);
+    const given = this.context.document.isGiven(this.where);
+    this.element.classList.toggle("given", given);
+    this.reset.classList.toggle("unseen", !given && !refused);
     this.showProblem();
   }
 

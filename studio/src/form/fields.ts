@@ -1,6 +1,6 @@
 import type { Json, JsonMap, SchemaNode } from "../api/types.ts";
 import { button, h } from "../ui/dom.ts";
-import { type FieldView, type FormContext, idOf } from "./field.ts";
+import type { FieldView, FormContext } from "./field.ts";
 import { valueText } from "./field_text.ts";
 import { LeafField } from "./leaf_field.ts";
 
@@ -44,7 +44,7 @@ class GroupField implements FieldView {
     const title = groupTitle(node, where);
     if (node.optional) {
       this.used = h("input", {
-        id: idOf(where),
+        id: context.idOf(where),
         type: "checkbox",
         attrs: { "aria-label": `Use ${where}` },
         on: {
@@ -94,7 +94,7 @@ class VariantField implements FieldView {
     private context: FormContext,
   ) {
     const tag = node.tag ?? "type";
-    const id = idOf(where);
+    const id = context.idOf(where);
     this.select = h(
       "select",
       { id, attrs: { "aria-label": `${where}.${tag}` }, on: { change: () => this.choose() } },
@@ -159,7 +159,7 @@ class ListField implements FieldView {
     private context: FormContext,
   ) {
     const add = button("Add", () => this.add(), { icon: "add", class: "small", title: `Add an entry to ${where}` });
-    add.id = idOf(where);
+    add.id = context.idOf(where);
     this.element = h(
       "fieldset",
       { class: "group" },

@@ -189,10 +189,15 @@ std::unique_ptr<Sink> build_conversion_sink(const std::filesystem::path& file, c
 /// outlive the simulation.
 class SampleStores {
  public:
-  SampleStores(const Scenario& scenario, const std::filesystem::path& folder, World& world);
+  /// `resumed`: a state() of the stores in the folder, which are continued from there; empty: new stores.
+  SampleStores(const Scenario& scenario, const std::filesystem::path& folder, World& world,
+               std::span<const std::vector<std::byte>> resumed = {});
   ~SampleStores();
   SampleStores(const SampleStores&) = delete;
   SampleStores& operator=(const SampleStores&) = delete;
+
+  /// What is needed to continue the stores after the samples so far; one for each.
+  std::vector<std::vector<std::byte>> state();
 
   /// Completes the stores of a complete simulation.
   void finish();

@@ -27,6 +27,19 @@ OutputFile::OutputFile(std::filesystem::path path) : path_(std::move(path)) {
   if (descriptor_ < 0) throw_cannot_write(path_, system_reason(errno));
 }
 
+OutputFile::OutputFile(std::filesystem::path path, std::uint64_t kept) : path_(std::move(path)), flushed_(kept) {
+  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC);
+  if (descriptor_ < 0) throw_cannot_write(path_, system_reason(errno));
+  const auto bytes = static_cast<off_t>(kept);
+  const off_t size = ::lseek(descriptor_, 0, SEEK_END);
+  const bool good =
+      size >= bytes && ::ftruncate(descriptor_, bytes) == 0 && ::lseek(descriptor_, bytes, SEEK_SET) == bytes;
+  if (good) return;
+  const std::string reason = size >= 0 && size < bytes ? "it is shorter than it was" : system_reason(errno);
+  ::close(std::exchange(descriptor_, -1));
+  throw_cannot_write(path_, reason);
+}
+
 OutputFile::~OutputFile() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
@@ -74,11 +87,15 @@ void OutputFile::take_back(std::size_t written) {
   buffer_.erase(0, written);
 }
 
-void OutputFile::close() {
-  if (descriptor_ < 0) return;
+void OutputFile::make_durable() {
   flush();
   // Pipes and devices cannot be synchronised: EINVAL is not a failure.
   if (::fsync(descriptor_) != 0 && errno != EINVAL) throw_cannot_write(path_, system_reason(errno));
+}
+
+void OutputFile::close() {
+  if (descriptor_ < 0) return;
+  make_durable();
   if (::close(std::exchange(descriptor_, -1)) != 0) throw_cannot_write(path_, system_reason(errno));
 }
 

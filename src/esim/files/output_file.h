@@ -13,6 +13,9 @@ class OutputFile {
   /// Creates the file, or empties an existing one.
   explicit OutputFile(std::filesystem::path path);
 
+  /// Keeps the first `kept` bytes of an existing file, and continues there. Throws OutputError if it is shorter.
+  OutputFile(std::filesystem::path path, std::uint64_t kept);
+
   /// Closes without writing the buffer, which is empty after close().
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
@@ -31,6 +34,9 @@ class OutputFile {
   /// Hands the buffer to the system, so that it survives the end of this process: all of it or, on failure, nothing.
   /// Files that are flushed after whole lines therefore end with a whole line, even on a full disk.
   void flush();
+
+  /// Writes everything to the disk, so that it survives the end of the system.
+  void make_durable();
 
   /// Writes everything to the disk and closes.
   void close();

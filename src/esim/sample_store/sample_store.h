@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "esim/core/image.h"
 #include "esim/core/parallel.h"
@@ -34,12 +36,19 @@ class SampleStoreWriter {
  public:
   /// Throws OutputError if the file cannot be written, as all functions do.
   SampleStoreWriter(const std::filesystem::path& file, const SampleStoreInfo& info);
+
+  /// Continues a file from a state(): what was written later is dropped. Throws UserError if the state is of another
+  /// store.
+  SampleStoreWriter(const std::filesystem::path& file, const SampleStoreInfo& info, std::span<const std::byte> state);
   ~SampleStoreWriter();
   SampleStoreWriter(SampleStoreWriter&&) noexcept;
   SampleStoreWriter& operator=(SampleStoreWriter&&) noexcept;
 
   /// Adds segments in the order of EventCamera::integrate(), with its watermark.
   void add(std::span<const Segment> segments, TimeNs watermark, const Workers& workers);
+
+  /// What is needed to continue after the segments so far, which are on the disk when it returns.
+  std::vector<std::byte> state();
 
   /// Completes the file. Without it, the file ends with what has been written.
   void finish(const Workers& workers);

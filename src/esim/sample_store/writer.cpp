@@ -1,7 +1,10 @@
 #include <algorithm>
 #include <memory>
 #include <string>
+#include <utility>
 
+#include "esim/core/error.h"
+#include "esim/core/state_archive.h"
 #include "esim/files/codecs/zstandard.h"
 #include "esim/files/output_file.h"
 #include "esim/sample_store/layout.h"
@@ -26,13 +29,24 @@ std::string_view bytes_of(const std::vector<T>& values) {
 
 struct SampleStoreWriter::Impl {
   Impl(const std::filesystem::path& path, const SampleStoreInfo& store)
-      : file(path), info(store), last(store.width, store.height) {
+      : file(std::make_unique<OutputFile>(path)), info(store), last(store.width, store.height) {
     Header header;
     header.precision = static_cast<std::uint32_t>(info.precision);
     header.width = info.width, header.height = info.height;
     header.start = info.start, header.end = info.end;
-    file.append(bytes_of(header));
-    file.flush();
+    file->append(bytes_of(header));
+    file->flush();
+  }
+
+  Impl(const std::filesystem::path& path, const SampleStoreInfo& store, std::span<const std::byte> state)
+      : info(store) {
+    StateReader archive(state);
+    std::uint64_t kept = 0;
+    archive.value(kept);
+    transfer(archive, *this);
+    if (last.width() != info.width || last.height() != info.height)
+      throw UserError(path.string() + ": the saved state has another size; simulate again");
+    file = std::make_unique<OutputFile>(path, kept);
   }
 
   std::uint32_t code(float irradiance) const { return code_of(irradiance, info.precision == SamplePrecision::rounded); }
@@ -48,7 +62,19 @@ struct SampleStoreWriter::Impl {
   void write_block(const Workers& workers);
   void write_end();
 
-  OutputFile file;
+  /// The members that state() has.
+  template <class Archive, class Self>
+  static void transfer(Archive& archive, Self& self) {
+    archive.value(self.watermark);
+    archive.sized_image(self.last);
+    archive.list(self.keys);
+    archive.value(self.is_key);
+    archive.list(self.portions);
+    archive.list(self.segments);
+    for (auto& plane : self.planes) archive.list(plane);
+  }
+
+  std::unique_ptr<OutputFile> file;
   SampleStoreInfo info;
   TimeNs watermark = info.start;  // of the last portion
   Image<std::uint32_t> last;      // code of each pixel's latest sample
@@ -64,7 +90,7 @@ struct SampleStoreWriter::Impl {
 void SampleStoreWriter::Impl::begin_block() {
   is_key = keys.empty() || watermark - keys.back().watermark >= kKeyInterval;
   if (!is_key) return;
-  keys.push_back({watermark, file.size()});
+  keys.push_back({watermark, file->size()});
   last.fill(0);
 }
 
@@ -122,9 +148,9 @@ void SampleStoreWriter::Impl::write_block(const Workers& workers) {
   header.list_bytes = static_cast<std::uint32_t>(compressed[kPlanes].size());
   for (std::size_t k = 0; k < kPlanes; ++k) header.plane_bytes[k] = static_cast<std::uint32_t>(compressed[k].size());
   header.is_key = is_key ? 1 : 0;
-  file.append(bytes_of(header));
-  for (const std::string& part : compressed) file.append(part);
-  file.flush();
+  file->append(bytes_of(header));
+  for (const std::string& part : compressed) file->append(part);
+  file->flush();
   portions.clear();
   segments.clear();
   for (auto& plane : planes) plane.clear();
@@ -136,15 +162,18 @@ void SampleStoreWriter::Impl::write_end() {
   BlockHeader header;
   header.segments = static_cast<std::uint32_t>(keys.size());
   header.list_bytes = static_cast<std::uint32_t>(list.size());
-  const std::uint64_t offset = file.size();
-  file.append(bytes_of(header));
-  file.append(list);
-  file.append(bytes_of(offset));
-  file.close();
+  const std::uint64_t offset = file->size();
+  file->append(bytes_of(header));
+  file->append(list);
+  file->append(bytes_of(offset));
+  file->close();
 }
 
 SampleStoreWriter::SampleStoreWriter(const std::filesystem::path& file, const SampleStoreInfo& info)
     : impl_(std::make_unique<Impl>(file, info)) {}
+SampleStoreWriter::SampleStoreWriter(const std::filesystem::path& file, const SampleStoreInfo& info,
+                                     std::span<const std::byte> state)
+    : impl_(std::make_unique<Impl>(file, info, state)) {}
 SampleStoreWriter::~SampleStoreWriter() = default;
 SampleStoreWriter::SampleStoreWriter(SampleStoreWriter&&) noexcept = default;
 SampleStoreWriter& SampleStoreWriter::operator=(SampleStoreWriter&&) noexcept = default;
@@ -164,6 +193,15 @@ void SampleStoreWriter::add(std::span<const Segment> segments, TimeNs watermark,
   impl_->portions.push_back({watermark, count});
   impl_->watermark = watermark;
   if (impl_->full()) impl_->write_block(workers);
+}
+
+std::vector<std::byte> SampleStoreWriter::state() {
+  impl_->file->make_durable();
+  std::vector<std::byte> bytes;
+  StateWriter archive(bytes);
+  archive.value(impl_->file->size());
+  Impl::transfer(archive, std::as_const(*impl_));
+  return bytes;
 }
 
 void SampleStoreWriter::finish(const Workers& workers) {

@@ -114,7 +114,7 @@ void describe(Visitor& visit, OutputOptions& o) {
   visit(
       "checkpoints", o.checkpoints,
       About{"save the state of the simulation every few seconds, so that esim simulate --resume can continue it after "
-            "it has ended early; not with samples"});
+            "it has ended early"});
 }
 
 /// All options of a scenario except its cameras, which have two spellings (see read_scenario).

@@ -44,6 +44,7 @@ template <class Archive, class ACheckpoint>
 void transfer_checkpoint(Archive& archive, ACheckpoint& checkpoint) {
   archive.value(checkpoint.journal_bytes);
   archive.list(checkpoint.state);
+  archive.objects(checkpoint.samples, [](auto& a, auto& store) { a.list(store); });
   archive.text(checkpoint.repetition.command);
   archive.text(checkpoint.repetition.obstacle);
   transfer(archive, checkpoint.working_folder);
@@ -135,11 +136,12 @@ bool CheckpointWriter::due() const {
   return now - last_ >= std::max(share, 50 * cost_);
 }
 
-void CheckpointWriter::save(std::vector<std::byte> state) {
+void CheckpointWriter::save(std::vector<std::byte> state, std::vector<std::vector<std::byte>> samples) {
   constexpr int kLevel = -10;  // of Zstandard
   const Clock::time_point before = Clock::now();
   checkpoint_.journal_bytes = journal_.checkpoint();
   checkpoint_.state = std::move(state);
+  checkpoint_.samples = std::move(samples);
   std::vector<std::byte> bytes;
   StateWriter archive(bytes);
   archive.text(build());

@@ -20,6 +20,7 @@ namespace esim::inline compose {
 struct Checkpoint {
   std::uint64_t journal_bytes = 0;  ///< of the journal, which belong to it
   std::vector<std::byte> state{};
+  std::vector<std::vector<std::byte>> samples{};  ///< of SampleStores::state()
 
   // How the simulation began, for its report.
   Repetition repetition{};
@@ -53,7 +54,8 @@ class CheckpointWriter {
   /// far, up to a minute) and if writing it takes longer than 2 % of that.
   bool due() const;
 
-  void save(std::vector<std::byte> state);
+  /// `samples`: of SampleStores::state().
+  void save(std::vector<std::byte> state, std::vector<std::vector<std::byte>> samples);
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -3,6 +3,7 @@
 
 #include "esim/compose/compose.h"
 #include "esim/compose/recordings/checkpoints.h"
+#include "esim/compose/samples/samples_file.h"
 #include "esim/files/folder_plan.h"
 #include "esim/files/output_file.h"
 #include "esim/recording/fan_out.h"
@@ -33,17 +34,19 @@ Checkpoint checkpoint_of(const std::filesystem::path& recording, const std::stri
   return checkpoint;
 }
 
-/// Removes what a simulation that is resumed writes again.
+/// Removes the files that a simulation that is resumed writes again.
 void remove_outputs(const std::filesystem::path& recording) {
   std::error_code error;
-  for (std::filesystem::directory_iterator entry(recording, error), end; !error && entry != end;
+  std::vector<std::filesystem::path> files;
+  for (std::filesystem::recursive_directory_iterator entry(recording, error), end; !error && entry != end;
        entry.increment(error)) {
     const std::filesystem::path& path = entry->path();
-    if (path == checkpoint_folder(recording) || path.filename() == kScenarioFile || path.filename() == "report.json")
-      continue;
-    std::filesystem::remove_all(path, error);
-    if (error) break;
+    const bool is_kept = path.filename() == kScenarioFile || path.filename() == kSamplesFile ||
+                         path.filename() == "report.json" || path == checkpoint_folder(recording);
+    if (path == checkpoint_folder(recording)) entry.disable_recursion_pending();
+    if (!is_kept && !entry->is_directory(error)) files.push_back(path);
   }
+  for (auto file = files.begin(); file != files.end() && !error; ++file) std::filesystem::remove(*file, error);
   if (error) throw OutputError("cannot remove the files in " + recording.string() + ": " + error.message());
 }
 
@@ -80,7 +83,8 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
   }
   write_file_atomically(directory.path() / kScenarioFile, scenario_text);
   std::unique_ptr<Sink> sink = build_sink(scenario, directory.path());
-  SampleStores samples(scenario, directory.path(), world);
+  SampleStores samples(scenario, directory.path(), world,
+                       checkpoint ? std::span(checkpoint->samples) : std::span<std::vector<std::byte>>{});
   if (options.beside != nullptr) {
     auto both = std::make_unique<FanOut>();
     both->add(std::move(sink));
@@ -88,9 +92,10 @@ std::optional<Summary> make_recording(const Scenario& scenario, RecordingOptions
     sink = std::move(both);
   }
   std::optional<CheckpointWriter> writer;
-  Checkpoints checkpoints{
-      [&] { return writer->due(); }, [&](std::vector<std::byte> state) { writer->save(std::move(state)); }, {}};
-  if (scenario.output.checkpoints && scenario.output.samples == KeptSamples::none) {
+  Checkpoints checkpoints{[&] { return writer->due(); },
+                          [&](std::vector<std::byte> state) { writer->save(std::move(state), samples.state()); },
+                          {}};
+  if (scenario.output.checkpoints) {
     create_folder(checkpoint_folder(directory.path()));
     std::unique_ptr<RecordJournal> journal =
         checkpoint ? std::make_unique<RecordJournal>(journal_file(directory.path()), checkpoint->journal_bytes,

@@ -130,7 +130,7 @@ CheckpointWriter::CheckpointWriter(fs::path recording, RecordJournal& journal, C
     : recording_(std::move(recording)), journal_(journal), checkpoint_(std::move(origin)) {}
 
 bool CheckpointWriter::due() const {
-  constexpr std::chrono::seconds kShortest{2}, kLongest{60};
+  constexpr std::chrono::seconds kShortest{1}, kLongest{60};
   const Clock::time_point now = Clock::now();
   const Clock::duration share = std::clamp<Clock::duration>((now - began_) / 50, kShortest, kLongest);
   return now - last_ >= std::max(share, 50 * cost_);

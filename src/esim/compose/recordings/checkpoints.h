@@ -50,7 +50,7 @@ class CheckpointWriter {
   /// `origin`: of the simulation.
   CheckpointWriter(std::filesystem::path recording, RecordJournal& journal, Checkpoint origin);
 
-  /// Whether it is time for the next one: 2 s after the previous one, more in longer simulations (2 % of the time so
+  /// Whether it is time for the next one: 1 s after the previous one, more in longer simulations (2 % of the time so
   /// far, up to a minute) and if writing it takes longer than 2 % of that.
   bool due() const;
 

@@ -14,7 +14,7 @@
 namespace esim::inline formats::jaer {
 namespace {
 
-constexpr std::size_t kMaxLineBytes = 1 << 16;
+constexpr std::size_t kMaxLineBytes = 1 << 16, kMaxNameBytes = 100;
 constexpr std::string_view kVersion = "2.0", kChipKey = "AEChip:", kSensorKey = "Sensor:";
 
 /// Classes of jAER by the number in their names. The first of each size is written.
@@ -31,7 +31,7 @@ constexpr std::string_view kPackage = "eu.seebetter.ini.chips.davis.";
 constexpr SensorSize kDvs128{128, 128};
 
 struct Header {
-  std::string chip{};                  // in small letters; empty: not stated
+  std::string chip{};                  // empty: not stated
   std::optional<SensorSize> sensor{};  // of the line that davis_header() writes
 };
 
@@ -62,7 +62,16 @@ std::optional<SensorSize> parse_size(std::string_view text) {
 
 /// Events are no text: the last byte of the address of the first one is 0, if its first byte is a '#'.
 bool is_text(std::string_view line) {
-  return std::none_of(line.begin(), line.end(), [](char c) { return c >= 0 && c < ' ' && c != '\t' && c != '\r'; });
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  return std::none_of(line.begin(), line.end(), [](unsigned char c) { return c < ' ' && c != '\t'; });
+}
+
+/// A name from the file, for messages.
+std::string shown(std::string_view name) {
+  std::string text(name.substr(0, kMaxNameBytes));
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  return text;
 }
 
 bool ends_header(std::string_view line) {
@@ -72,7 +81,7 @@ bool ends_header(std::string_view line) {
 
 void take_line(std::string_view line, Header& header) {
   std::string_view text = trimmed(line.substr(1));
-  if (text.starts_with(kChipKey)) header.chip = in_small_letters(trimmed(text.substr(kChipKey.size())));
+  if (text.starts_with(kChipKey)) header.chip = shown(trimmed(text.substr(kChipKey.size())));
   if (text.starts_with(kSensorKey)) header.sensor = parse_size(trimmed(text.substr(kSensorKey.size())));
 }
 
@@ -95,10 +104,9 @@ std::pair<std::size_t, bool> take_lines(std::string_view block, Header& header) 
 void check_version(const InputFile& file, std::string_view line) {
   const std::string_view version = trimmed(line.substr(std::min(kSignature.size(), line.size())));
   if (version == kVersion) return;
-  const bool readable = !version.empty() && is_text(version);
-  file.fail(0,
-            fmt::format("version {} of AEDAT is not supported, only 2.0 and 4.0; convert the file with iniVation's DV",
-                        readable ? version : std::string_view("?")));
+  file.fail(
+      0, fmt::format("version \"{}\" of AEDAT is not supported, only 2.0 and 4.0; convert the file with iniVation's DV",
+                     shown(version)));
 }
 
 Header read_lines(InputFile& file) {
@@ -149,9 +157,10 @@ Chip read_header(InputFile& file, const std::optional<SensorSize>& stated) {
   const Header header = read_lines(file);
   if (header.sensor) return {Layout::davis, *header.sensor};
   if (header.chip.empty()) return chip_of_size(file, stated);
-  const std::string_view name = std::string_view(header.chip).substr(header.chip.rfind('.') + 1);
+  const std::string chip = in_small_letters(header.chip);
+  const std::string_view name = std::string_view(chip).substr(chip.rfind('.') + 1);
   if (name.find("dvs128") != std::string_view::npos) return {Layout::dvs128, kDvs128};
-  if (header.chip.find("davi") == std::string::npos) {
+  if (chip.find("davi") == std::string::npos) {
     throw UserError(
         fmt::format("cannot read {}: the addresses of chip \"{}\" are not supported, only those of DAVIS and "
                     "DVS128; convert the file with jAER",

@@ -54,16 +54,16 @@ class InteropTest(unittest.TestCase):
         rows = [line.split() for line in path.read_text().splitlines()]
         return self.np.array([[round(float(t) * 1e6), int(x), int(y), int(p)] for t, x, y, p in rows])
 
-    def write(self, events, name):
+    def write(self, events, name, *arguments):
         """By esim."""
         source, path = self.write_text(events), self.folder / name.replace("/", ".")
-        convert(source, path, "--format", name.split("/")[0].split(".")[0])
+        convert(source, path, "--format", name.split("/")[0].split(".")[0], *arguments)
         return path
 
-    def read(self, path):
+    def read(self, path, *arguments):
         """By esim."""
         target = self.folder / "read.txt"
-        convert(path, target)
+        convert(path, target, *arguments)
         return self.read_text(target)
 
     def columns(self, array, *names):
@@ -132,6 +132,67 @@ class Tonic(InteropTest):
         dtype = self.np.dtype([("x", int), ("y", int), ("t", int), ("p", int)])
         array = read_mnist_file(str(self.write(events, "nmnist.bin")), dtype)
         self.assert_same(self.columns(array, "t", "x", "y", "p"), events)
+
+
+    # It reads the layout of a DAVIS346, and all samples of frames as events.
+    SIZE = ("--width", "346", "--height", "260")
+
+    def read_aedat2(self, path):
+        _, _, array = package("tonic.io").read_davis_346(str(path))
+        return self.columns(array, "t", "x", "y", "p")
+
+    def test_reads_aedat2(self):
+        events = self.random_events(duration_s=4200)  # the clock has 32 bits, in us
+        self.assert_same(self.read_aedat2(self.write(events, "aedat2.aedat", *self.SIZE)), events)
+
+    def test_reads_aedat2_of_others_alike(self):
+        """A file as from v2e: its header does not name the chip."""
+        np, events = self.np, self.random_events(duration_s=4200)
+        t, x, y, p = events.astype("u4").T
+        address = (259 - y) << 22 | (345 - x) << 12 | p << 11
+        path = self.folder / "others.aedat"
+        path.write_bytes(b"#!AER-DAT2.0\r\n# Timestamps tick is 1 us\r\n" + np.stack([address, t], axis=1).astype(">u4").tobytes())
+        self.assert_same(self.read(path, *self.SIZE), events)
+        self.assert_same(self.read_aedat2(path), events)
+
+
+class EventStream(InteropTest):
+    SIZE = ("--width", str(WIDTH), "--height", str(HEIGHT))
+    DURATION_S = 40
+
+    def flipped(self, events):
+        """The package event_stream counts rows from the bottom, faery from the top, in the same files."""
+        return self.np.stack([events[:, 0], events[:, 1], HEIGHT - 1 - events[:, 2], events[:, 3]], axis=1)
+
+    def test_event_stream_reads_what_esim_writes(self):
+        decoder = package("event_stream").Decoder(self.write(self.random_events(self.DURATION_S), "es.es", *self.SIZE))
+        self.assertEqual((decoder.type, decoder.width, decoder.height), ("dvs", WIDTH, HEIGHT))
+        found = self.columns(self.np.concatenate(list(decoder)), "t", "x", "y", "on")
+        self.assert_same(self.flipped(found), self.random_events(self.DURATION_S))
+
+    def test_event_stream_writes_what_esim_reads(self):
+        event_stream, events = package("event_stream"), self.random_events(self.DURATION_S)
+        t, x, y, p = self.flipped(events).T
+        for kind in ("dvs", "atis"):
+            with self.subTest(kind):
+                array = self.np.zeros(len(events), getattr(event_stream, kind + "_dtype"))
+                array["t"], array["x"], array["y"], array["p"] = t, x, y, p
+                if kind == "atis":
+                    array["exposure"][1::3] = True
+                path = self.folder / f"by_event_stream_{kind}.es"
+                with event_stream.Encoder(path, kind, WIDTH, HEIGHT) as encoder:
+                    encoder.write(array)
+                changes = self.np.ones(len(events), bool) if kind == "dvs" else ~array["exposure"]
+                self.assert_same(self.read(path), events[changes])
+
+    def test_faery_reads_and_writes(self):
+        faery, events = package("faery"), self.random_events(self.DURATION_S)
+        path, back = self.write(events, "es.es", *self.SIZE), self.folder / "by_faery.es"
+        stream = faery.events_stream_from_file(path)
+        self.assertEqual(stream.dimensions(), (WIDTH, HEIGHT))
+        self.assert_same(self.columns(self.np.concatenate(list(stream)), "t", "x", "y", "on"), events)
+        faery.events_stream_from_file(path).to_file(back, zero_t0=False)
+        self.assert_same(self.read(back), events)
 
 
 class NumPy(InteropTest):

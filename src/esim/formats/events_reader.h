@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "esim/events/event.h"
@@ -10,7 +11,7 @@
 
 namespace esim::inline formats {
 
-/// Reads the events of one camera. A format that holds only events needs nothing else to be a Source.
+/// Reads the events of one camera, and its triggers. A format that holds only these needs nothing else to be a Source.
 class EventsReader {
  public:
   virtual ~EventsReader() = default;
@@ -31,6 +32,12 @@ class EventsReader {
   virtual bool has_labels() const { return false; }
   /// Appends the labels of all events that have been read since the last call.
   virtual void read_labels(std::vector<EventLabel>&) {}
+
+  /// Appends the triggers that have been read since the last call, in order of time.
+  virtual void read_triggers(std::vector<TriggerRecord>&) {}
+
+  /// Unsupported parts of the file, as Source::not_read().
+  virtual std::vector<std::string> not_read() const { return {}; }
 
   /// The fraction of the file that has been read.
   virtual double progress() const = 0;

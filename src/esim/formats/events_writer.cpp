@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/core/remedy.h"
 #include "esim/files/number_text.h"
 #include "esim/formats/formats.h"
 
@@ -99,6 +100,14 @@ class EventsSink final : public Sink {
 };
 
 }  // namespace
+
+void require_size(const std::filesystem::path& path, SensorSize sensor) {
+  if (sensor.width > 0 && sensor.height > 0) return;
+  throw RemediableError(fmt::format("cannot write {}: the format counts pixels from another corner of the sensor, so "
+                                    "that the size of the sensor must be known; state it",
+                                    path.string()),
+                        Remedy::sensor_size);
+}
 
 std::unique_ptr<Sink> make_events_sink(std::unique_ptr<EventsWriter> writer, std::filesystem::path path,
                                        std::string_view format) {

@@ -29,6 +29,10 @@ class EventsWriter {
   virtual void end() = 0;
 };
 
+/// For formats that count pixels from another corner than the upper left one: throws RemediableError if the size of the
+/// sensor is unknown (0 x 0).
+void require_size(const std::filesystem::path& path, SensorSize sensor);
+
 /// A Sink for the events of camera 0. Events beyond the limits of the Format of that name, or outside the sensor, are a
 /// UserError that names the problem and a format that would work.
 std::unique_ptr<Sink> make_events_sink(std::unique_ptr<EventsWriter> writer, std::filesystem::path path,

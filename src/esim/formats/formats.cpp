@@ -10,11 +10,13 @@
 #include "esim/formats/aedat4/aedat4.h"
 #include "esim/formats/datasets/event_camera_dataset.h"
 #include "esim/formats/datasets/nmnist.h"
+#include "esim/formats/event_stream/event_stream.h"
 #include "esim/formats/hdf5/dsec.h"
 #include "esim/formats/hdf5/event_columns.h"
 #include "esim/formats/hdf5/m3ed.h"
 #include "esim/formats/hdf5/v2e.h"
 #include "esim/formats/images/image_sequences.h"
+#include "esim/formats/jaer/aedat2.h"
 #include "esim/formats/numpy/npy.h"
 #include "esim/formats/prophesee/prophesee.h"
 #include "esim/formats/recording_folder/recording_folder.h"
@@ -56,6 +58,8 @@ const std::vector<Format>& all_formats() {
       nmnist_format(),
       aedat4_zstd_format(),
       aedat4_format(),
+      aedat2_format(),  // recognises every other version of AEDAT
+      event_stream_format(),
       rosbag_format(),
       rosbag_packets_format(),
       mcap_format(),

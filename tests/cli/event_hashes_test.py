@@ -30,7 +30,7 @@ NOISY = ("event_camera={contrast_threshold: 0.2, threshold_mismatch: 0.03, thres
          "refractory_period_us: 100, leak_rate_hz: 5, leak_jitter: 0.1, shot_noise_hz: 5, hot_pixels: 0.001, latency_us: 20, "
          "latency_jitter_us: 5, readout: {rate_mev_per_s: 5}}")
 DURATION_S = {"poster": 0.3, "poster_6dof": 0.3, "room": 0.2, "bicycle_parking": 0.05, "panorama": 0.05, "studio_room_baked": 0.05}  # else 0.1
-NEEDS = {"studio_room": "blender"}
+IN_BLENDER = {"studio_room": "scenes/studio_room/studio_room.blend"}  # and the scene that a script makes
 # Name: scenario, then what is set.
 VARIANTS = {
     "room, adaptive": ("scenes/room.yaml", "duration_s=0.1", "sampling={type: adaptive}"),
@@ -96,7 +96,7 @@ def main():
         for name, (scenario, *settings) in cases():
             data = os.environ.get("ESIM_TEST_DATA", "")
             if ("ESIM_TEST_DATA" in (ROOT / scenario).read_text() and not pathlib.Path(data).is_dir()) or (
-                    name in NEEDS and shutil.which(NEEDS[name]) is None):
+                    name in IN_BLENDER and (shutil.which("blender") is None or not (ROOT / IN_BLENDER[name]).is_file())):
                 skipped.append(name)
                 if RENEW and name in known["events"]:
                     found[name] = known["events"][name]
@@ -105,7 +105,7 @@ def main():
             if not RENEW and found[name] != expected.get(name):
                 wrong.append(f"{name}: {found[name]} instead of {expected.get(name)}")
     if skipped:
-        print(f"not simulated, because Blender or the test data are not there: {', '.join(skipped)}")
+        print(f"not simulated, because Blender, its scene or the test data are not there: {', '.join(skipped)}")
     if RENEW:
         FILE.write_text(json.dumps({**known, "toolchain": toolchain(), "events": found}, indent=2) + "\n")
         print(f"{FILE}: {len(found)} sums")
